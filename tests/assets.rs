@@ -314,7 +314,7 @@ fn packages_show_their_name() {
     fn collect_text(mask: &Mask, words: &mut Vec<String>) {
         match mask {
             Mask::Text { decal } => words.push(decal.line.text.to_lowercase()),
-            Mask::Both { masks } => masks.iter().for_each(|mask| collect_text(mask, words)),
+            Mask::Product { masks } => masks.iter().for_each(|mask| collect_text(mask, words)),
             Mask::Inverse { mask } => collect_text(mask, words),
             _ => {}
         }

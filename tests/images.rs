@@ -126,6 +126,6 @@ fn materials_match_their_reference() {
         ..Camera::third_person_table()
     };
     let scene = RenderScene::new(objects, Lighting::default()).expect("good light");
-    let image = Renderer::default().render(&scene, &FrameView::empty(), &camera).expect("an image");
+    let image = Renderer::default().render(&scene, &FrameView::default(), &camera).expect("an image");
     check("materials.png", image);
 }

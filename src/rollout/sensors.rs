@@ -182,7 +182,7 @@ impl SensorSuite {
     /// The parts of a state that images depend on.
     pub fn view<'a>(&self, frame: &'a WorldSnapshot) -> FrameView<'a> {
         let hand_w = frame.links[self.articulation.index()][panda::HAND_LINK] * panda::hand_in_link();
-        FrameView::new(frame, Some(hand_w))
+        FrameView { nodes: &frame.nodes, rigid: &frame.rigid, links: &frame.links, hand_w: Some(hand_w) }
     }
 
     /// Renders the image of a camera in an initial state, in which it must not be inside an object.

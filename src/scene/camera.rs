@@ -44,24 +44,29 @@ pub struct Camera {
 }
 
 /// Vertical field of view (rad) of a lens with this focal length and aperture height, both in the same unit.
-pub fn fovy_from_lens(focal: f64, aperture: f64) -> f64 {
+fn fovy_from_lens(focal: f64, aperture: f64) -> f64 {
     2.0 * (0.5 * aperture / focal).atan()
 }
 
 /// Width and height of the default policy images, pixels.
-pub const POLICY_IMAGE_EDGE: usize = 224;
+const POLICY_IMAGE_EDGE: usize = 224;
 
 impl Camera {
     /// The third-person camera of table scenes (SoftVTBench's environment: focal length 18, aperture 15, table at
     /// z = 0.90 m). Image right is +y of the world.
     pub fn third_person_table() -> Self {
-        Self::third_person(Vec3::new(0.6586, 0.0, 0.7104), [0.6380, 0.3048, 0.3048, 0.6380])
-    }
-
-    /// The third-person camera of floor scenes, in which the robot is mounted on the floor. Image right is
-    /// +y of the world.
-    pub fn third_person_floor() -> Self {
-        Self::third_person(Vec3::new(0.8966, 0.0, 0.65), [0.6182, 0.3432, 0.3432, 0.6182])
+        let at = Vec3::new(0.6586, 0.0, 0.7104);
+        Self {
+            name: "third_person".to_owned(),
+            mount: CameraMount::World,
+            pose: placed(at, Quaternion::new(0.6380, 0.3048, 0.3048, 0.6380)),
+            fovy_rad: fovy_from_lens(18.0, 15.0),
+            near_m: 0.05,
+            far_m: 20.0,
+            width: POLICY_IMAGE_EDGE,
+            height: POLICY_IMAGE_EDGE,
+            set_at: None,
+        }
     }
 
     /// The wrist camera on the hand (SoftVTBench's environment: focal length 9.77, aperture 15). Image right
@@ -70,27 +75,10 @@ impl Camera {
         Self {
             name: "wrist".to_owned(),
             mount: CameraMount::Hand,
-            pose: placed(Vec3::new(0.05, 0.0, 0.0), [0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0]),
+            pose: placed(Vec3::new(0.05, 0.0, 0.0), Quaternion::new(0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0)),
             fovy_rad: fovy_from_lens(9.77, 15.0),
             near_m: 0.01,
-            far_m: 20.0,
-            width: POLICY_IMAGE_EDGE,
-            height: POLICY_IMAGE_EDGE,
-            set_at: None,
-        }
-    }
-
-    fn third_person(eye_w: Vec3, wxyz: [f64; 4]) -> Self {
-        Self {
-            name: "third_person".to_owned(),
-            mount: CameraMount::World,
-            pose: placed(eye_w, wxyz),
-            fovy_rad: fovy_from_lens(18.0, 15.0),
-            near_m: 0.05,
-            far_m: 20.0,
-            width: POLICY_IMAGE_EDGE,
-            height: POLICY_IMAGE_EDGE,
-            set_at: None,
+            ..Self::third_person_table()
         }
     }
 
@@ -102,6 +90,6 @@ impl Camera {
     }
 }
 
-fn placed(at: Vec3, [w, x, y, z]: [f64; 4]) -> Pose {
-    Pose::from_parts(at.into(), Quat::from_quaternion(Quaternion::new(w, x, y, z)))
+fn placed(at: Vec3, rotation: Quaternion<f64>) -> Pose {
+    Pose::from_parts(at.into(), Quat::from_quaternion(rotation))
 }

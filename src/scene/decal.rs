@@ -71,14 +71,14 @@ impl TextDecal {
     }
 
     /// The rasterised glyphs.
-    pub fn coverage(&self) -> &GlyphCoverage {
-        self.coverage.get_or_init(|| GlyphCoverage::of(&self.line))
+    pub(crate) fn coverage(&self) -> &GlyphCoverage {
+        self.coverage.get_or_init(|| GlyphCoverage::rasterize(&self.line))
     }
 }
 
 impl LabelLine {
     /// The first character that the typeface cannot show.
-    pub fn missing(&self) -> Option<char> {
+    pub fn unsupported_char(&self) -> Option<char> {
         let font = font(self.typeface)?;
         self.text.chars().find(|&letter| letter.is_control() || font.glyph_id(letter).0 == 0)
     }
@@ -95,7 +95,7 @@ fn font(typeface: Typeface) -> Option<FontRef<'static>> {
 /// Coverage of a line's area by glyphs, as a summed-area table (Crow, Summed-Area Tables for Texture Mapping, 1984):
 /// the mean over any rectangle takes four lookups.
 #[derive(Debug, Default)]
-pub struct GlyphCoverage {
+pub(crate) struct GlyphCoverage {
     size: [usize; 2],
     /// Row by row, one row and one column more than texels.
     sums: Vec<f64>,
@@ -106,7 +106,7 @@ pub struct GlyphCoverage {
 }
 
 impl GlyphCoverage {
-    fn of(line: &LabelLine) -> Self {
+    fn rasterize(line: &LabelLine) -> Self {
         let Some(font) = font(line.typeface) else { return Self::default() };
         let em = CAPITAL / capital(&font);
         let thick = line.weight as f32 * CAPITAL;
@@ -147,7 +147,7 @@ impl GlyphCoverage {
 
     /// Share of a square covered by glyphs, 0..=1. The square has edge `width` (m); its centre is `right` and `up`
     /// (m) from the centre of the line.
-    pub fn share(&self, right: f64, up: f64, width: f64) -> f64 {
+    pub(crate) fn share(&self, right: f64, up: f64, width: f64) -> f64 {
         if self.sums.is_empty() {
             return 0.0;
         }
@@ -165,7 +165,7 @@ impl GlyphCoverage {
     }
 
     /// Length of the line including its margins, m.
-    pub fn length_m(&self) -> f64 {
+    pub(crate) fn length_m(&self) -> f64 {
         self.size[0] as f64 / self.scale.max(1e-9)
     }
 
@@ -275,8 +275,8 @@ mod tests {
     #[test]
     fn a_character_missing_from_the_typeface_is_found() {
         let line = |text: &str| LabelLine { text: text.into(), ..LabelLine::default() };
-        assert_eq!(line("Käse & Öl").missing(), None);
-        assert_eq!(line("ab漢").missing(), Some('漢'));
-        assert_eq!(line("a\nb").missing(), Some('\n'));
+        assert_eq!(line("Käse & Öl").unsupported_char(), None);
+        assert_eq!(line("ab漢").unsupported_char(), Some('漢'));
+        assert_eq!(line("a\nb").unsupported_char(), Some('\n'));
     }
 }

@@ -1,7 +1,5 @@
 //! Fingerprints of assets: short hashes that are equal only for mechanically equal assets.
 
-use std::fmt::Write;
-
 use sha2::{Digest, Sha256};
 
 use super::asset::{Asset, Body, Part};
@@ -30,44 +28,18 @@ impl Asset {
 
 /// Rewrites all numbers with a fraction or an exponent in `text` with seven significant digits.
 fn rounded(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    let mut rest = text;
-    let mut in_word = false;
-    while let Some(first) = rest.chars().next() {
-        let length = if in_word { 0 } else { number_length(rest) };
-        if length == 0 {
-            out.push(first);
-            in_word = first.is_alphanumeric() || first == '_';
-            rest = &rest[first.len_utf8()..];
-            continue;
-        }
-        let (token, after) = rest.split_at(length);
+    let is_separator = |c: char| !(c.is_alphanumeric() || "._-".contains(c));
+    let round = |piece: &str| {
+        let token = piece.trim_end_matches(is_separator);
         match token.parse::<f64>() {
             // Adding zero turns -0.0 into 0.0.
             Ok(x) if token.contains(['.', 'e']) => {
-                let _ = write!(out, "{:.6e}", if x.abs() < 1e-12 { 0.0 } else { x + 0.0 });
+                format!("{:.6e}{}", if x.abs() < 1e-12 { 0.0 } else { x + 0.0 }, &piece[token.len()..])
             }
-            _ => out.push_str(token),
+            _ => piece.to_owned(),
         }
-        rest = after;
-    }
-    out
-}
-
-/// Length of the number at the beginning of `text`, in bytes; 0 if it does not begin with a number.
-fn number_length(text: &str) -> usize {
-    let digits = text.strip_prefix('-').unwrap_or(text);
-    if !digits.starts_with(|c: char| c.is_ascii_digit()) {
-        return 0;
-    }
-    let mut previous = '-';
-    let end = text.find(|c: char| {
-        let sign = c == '-' && (previous == 'e' || previous == '-');
-        let belongs = c.is_ascii_digit() || c == '.' || c == 'e' || sign;
-        previous = c;
-        !belongs
-    });
-    end.unwrap_or(text.len())
+    };
+    text.split_inclusive(is_separator).map(round).collect()
 }
 
 #[cfg(test)]

@@ -2,6 +2,42 @@
 //! lighting, cameras, the workspace.
 //!
 //! Lengths are metres, angles radians, colours linear RGB. The world frame has z up and z = 0 on the support surface.
+//!
+//! # Example
+//!
+//! A soft ball with a rough brown surface, and its rigid counterpart:
+//!
+//! ```
+//! use softvt::{
+//!     geometry::{Vec3, shape::Shape},
+//!     physics::contact::Friction,
+//!     scene::{Asset, Body, SoftMaterial, Visual},
+//! };
+//!
+//! let material = SoftMaterial {
+//!     youngs_pa: 5e4,
+//!     poisson: 0.4,
+//!     density: 300.0,
+//!     resolution: 10,
+//!     grasp_spacing: 7.5e-4,
+//! };
+//! let soft = Asset {
+//!     name: "bun".to_owned(),
+//!     // The lowest point of an asset is at z = 0.
+//!     shape: Shape::Sphere { radius: 0.03 }.translated(Vec3::z() * 0.03),
+//!     body: Body::Soft(material.clone()),
+//!     friction: Friction::default(),
+//!     visuals: vec![Visual::plain([0.6, 0.4, 0.2], 0.8, 0.0)],
+//!     hints: Default::default(),
+//! };
+//! let rigid = Asset { body: Body::Rigid { density: material.density }, ..soft.clone() };
+//!
+//! let mass = soft.mass().expect("a soft body has a mass");
+//! assert!((mass / 0.0339 - 1.0).abs() < 0.02, "{mass} kg");
+//! assert_eq!(rigid.mass(), Some(mass));
+//! // Calibrations refer to assets by this hash, which appearance and name do not enter.
+//! assert_ne!(rigid.fingerprint(), soft.fingerprint());
+//! ```
 
 mod asset;
 mod camera;
@@ -17,8 +53,8 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::{Aabb, Pose, Quat, Vec3};
 
 pub use asset::{Asset, Body, Joint, JointMotion, Part, SoftMaterial, part_poses};
-pub use camera::{Camera, CameraMount, POLICY_IMAGE_EDGE, fovy_from_lens};
-pub use decal::{GlyphCoverage, LabelLine, MAX_LETTERS, TextDecal, Typeface};
+pub use camera::{Camera, CameraMount};
+pub use decal::{LabelLine, MAX_LETTERS, TextDecal, Typeface};
 pub use light::{KeyLight, Lighting, Sky};
 pub use visual::{Mask, Visual, VisualLayer};
 

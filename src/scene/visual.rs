@@ -166,7 +166,7 @@ pub enum Mask {
         mask: Arc<Mask>,
     },
     /// The product of masks (their intersection).
-    Both {
+    Product {
         /// The factors.
         masks: Vec<Arc<Mask>>,
     },

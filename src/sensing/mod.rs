@@ -1,4 +1,5 @@
-//! Sensor models: pure functions of a physics [`WorldSnapshot`](crate::physics::world::WorldSnapshot) and a scene, evaluated on demand.
+//! Sensor models: pure functions of a scene and a [`WorldSnapshot`](crate::physics::world::WorldSnapshot), evaluated on
+//! demand.
 //!
 //! [`camera`] renders colour, depth and segmentation images, [`tactile`] simulates the GelSight Mini of each finger,
 //! and [`panda`] holds the meshes of the robot that the cameras see.

@@ -42,7 +42,7 @@ fn above() -> Camera {
 
 fn draw(objects: Vec<RenderObject>, camera: &Camera) -> RenderedImage {
     let scene = RenderScene::new(objects, Lighting::default()).expect("the default light is good");
-    Renderer::default().render(&scene, &FrameView::empty(), camera).expect("an image")
+    Renderer::default().render(&scene, &FrameView::default(), camera).expect("an image")
 }
 
 /// Focal length, pixels.

@@ -279,12 +279,12 @@ class! {
             /// Returns the product of two masks: 1 where both are.
             fn both(lua, this, other: LuaMask) -> ["softvt.Mask"] {
                 let (mut masks, own) = match &*this.0.mask {
-                    Mask::Both { masks } => (masks.clone(), 0),
+                    Mask::Product { masks } => (masks.clone(), 0),
                     _ => (vec![this.0.mask.clone()], 1),
                 };
                 masks.push(other.0.mask.clone());
                 let bytes = this.0.bytes + other.0.bytes + size_of::<Mask>();
-                LuaMask::new(lua, Mask::Both { masks }, this.0.parts + other.0.parts + own, bytes)?
+                LuaMask::new(lua, Mask::Product { masks }, this.0.parts + other.0.parts + own, bytes)?
             }
             /// Returns 1 minus the mask.
             fn inverted(lua, this) -> ["softvt.Mask"] {
@@ -407,7 +407,7 @@ fn text_line(lua: &Lua, spec: TextMaskSpec) -> mlua::Result<LabelLine> {
         turn: spec.turn,
         wrap_m: spec.wrap_m,
     };
-    match line.missing() {
+    match line.unsupported_char() {
         Some(letter) => wrong(
             "text",
             &format!("the typeface has no letter {letter:?}; expected Latin, Greek or Cyrillic ones"),

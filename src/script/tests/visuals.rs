@@ -54,7 +54,7 @@ fn layers_reach_the_scene_as_they_are_written() {
         weave,
     ];
     let masks = masks.into_iter().map(Arc::new).collect();
-    assert_eq!(both.mask, Mask::Both { masks });
+    assert_eq!(both.mask, Mask::Product { masks });
     assert_eq!((&whole.mask, whole.opacity), (&Mask::Whole, 1.0));
 }
 

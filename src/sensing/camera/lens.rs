@@ -1,12 +1,14 @@
 //! Pinhole projection of a posed camera, and validation of camera settings.
 
+use nalgebra::Matrix3;
+
+use super::{
+    error::CameraError,
+    math::{V3, Vec3x8, f32x8, is_finite},
+};
 use crate::{
-    geometry::Pose,
+    geometry::{Pose, Vec3},
     scene::{Camera, CameraMount},
-    sensing::camera::{
-        CameraError,
-        math::{RigidTransform, V3, is_finite},
-    },
 };
 
 /// Maximum width and height of an image, pixels.
@@ -30,8 +32,14 @@ pub(crate) struct Lens {
     pub(crate) focal: f32,
     /// Position of the camera, world, m.
     pub(crate) eye: V3,
-    to_view: RigidTransform,
-    to_world: RigidTransform,
+    /// Rotation from the world to the camera frame.
+    to_view: Matrix3<f32>,
+    /// Ray through the top left corner of the image, world, scaled so that its depth along the optical axis is 1.
+    corner: V3,
+    /// Change of the ray per pixel to the right.
+    pub(crate) right: V3,
+    /// Change of the ray per pixel downwards.
+    down: V3,
 }
 
 /// A vertex projected into the image.
@@ -45,18 +53,6 @@ pub(crate) struct ScreenVertex {
     pub(crate) w: f32,
     /// Position in the camera frame, m.
     pub(crate) view: V3,
-}
-
-/// The rays through the pixels of an image, in the world frame: `origin + x · right + y · down` is the ray through
-/// (x, y), scaled so that its depth along the optical axis is 1.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct RayBasis {
-    /// Ray through the top left corner of the image.
-    pub(crate) corner: V3,
-    /// Change of the ray per pixel to the right.
-    pub(crate) right: V3,
-    /// Change of the ray per pixel downwards.
-    pub(crate) down: V3,
 }
 
 fn field_error(camera: &Camera, field: &'static str, expected: &str, got: String) -> CameraError {
@@ -88,31 +84,26 @@ pub fn check_cameras(cameras: &[Camera]) -> Result<(), (usize, CameraError)> {
 }
 
 fn check_camera(camera: &Camera) -> Result<(), CameraError> {
-    let fail = |field, expected: &str, got: String| Err(field_error(camera, field, expected, got));
+    let require = |is_valid: bool, field, expected: &str, got: String| {
+        if is_valid { Ok(()) } else { Err(field_error(camera, field, expected, got)) }
+    };
     for (field, edge) in [("width", camera.width), ("height", camera.height)] {
-        if !(1..=MAX_EDGE).contains(&edge) {
-            return fail(field, &format!("1 to {MAX_EDGE} pixels"), edge.to_string());
-        }
+        let expected = format!("1 to {MAX_EDGE} pixels");
+        require((1..=MAX_EDGE).contains(&edge), field, &expected, edge.to_string())?;
     }
-    if !(camera.fovy_rad >= 0.01 && camera.fovy_rad <= 2.8) {
-        return fail("fovy", "0.01 to 2.8 rad (0.6° to 160°)", format!("{} rad", camera.fovy_rad));
-    }
-    if !(camera.near_m >= 1e-4 && camera.near_m.is_finite()) {
-        return fail("near", "at least 0.0001 m", format!("{} m", camera.near_m));
-    }
-    if !(camera.far_m > camera.near_m && camera.far_m.is_finite()) {
-        let expected = format!("more than near ({} m)", camera.near_m);
-        return fail("far", &expected, format!("{} m", camera.far_m));
-    }
+    // Comparisons with NaN are false.
+    let (fovy, near, far) = (camera.fovy_rad, camera.near_m, camera.far_m);
+    let is_valid = (0.01..=2.8).contains(&fovy);
+    require(is_valid, "fovy", "0.01 to 2.8 rad (0.6° to 160°)", format!("{fovy} rad"))?;
+    let is_valid = near >= 1e-4 && near.is_finite();
+    require(is_valid, "near", "at least 0.0001 m", format!("{near} m"))?;
+    let is_valid = far > near && far.is_finite();
+    require(is_valid, "far", &format!("more than near ({near} m)"), format!("{far} m"))?;
     let (position, rotation) = (&camera.pose.translation.vector, &camera.pose.rotation.coords);
-    if !position.iter().all(|x| x.abs() <= MAX_COORDINATE) {
-        return fail("position", "metres within ±1e6", format!("{:?}", position.as_slice()));
-    }
-    // Also false for NaN.
-    if !(0.999..=1.001).contains(&rotation.norm()) {
-        return fail("quat", "a unit quaternion", format!("{:?} (x, y, z, w)", rotation.as_slice()));
-    }
-    Ok(())
+    let is_valid = position.iter().all(|x| x.abs() <= MAX_COORDINATE);
+    require(is_valid, "position", "metres within ±1e6", format!("{:?}", position.as_slice()))?;
+    let is_valid = (0.999..=1.001).contains(&rotation.norm());
+    require(is_valid, "quat", "a unit quaternion", format!("{:?} (x, y, z, w)", rotation.as_slice()))
 }
 
 impl Lens {
@@ -131,21 +122,26 @@ impl Lens {
         if !is_finite(&pose) {
             return Err(mount_error("a finite hand pose", "NaN or infinity"));
         }
+        let focal = (0.5 * camera.height as f64 / (0.5 * camera.fovy_rad).tan()) as f32;
+        let to_world: Matrix3<f32> = pose.rotation.to_rotation_matrix().matrix().cast();
+        let (pixel, slope) = (1.0 / focal, |edge: usize| 0.5 * edge as f32 / focal);
         Ok(Self {
             width: camera.width,
             height: camera.height,
             near: camera.near_m as f32,
             far: camera.far_m as f32,
-            focal: (0.5 * camera.height as f64 / (0.5 * camera.fovy_rad).tan()) as f32,
+            focal,
             eye: pose.translation.vector.cast(),
-            to_view: RigidTransform::from_pose(&pose.inverse()),
-            to_world: RigidTransform::from_pose(&pose),
+            to_view: pose.inverse().rotation.to_rotation_matrix().matrix().cast(),
+            corner: to_world * V3::new(-slope(camera.width), slope(camera.height), -1.0),
+            right: to_world * V3::new(pixel, 0.0, 0.0),
+            down: to_world * V3::new(0.0, -pixel, 0.0),
         })
     }
 
     fn in_camera_frame(&self, p_w: &V3) -> V3 {
         // Subtracting the eye first keeps the precision of points near a camera that is far from the origin.
-        self.to_view.rotate(&(p_w - self.eye))
+        self.to_view * (p_w - self.eye)
     }
 
     /// Projects a point of the world.
@@ -166,17 +162,16 @@ impl Lens {
         }
     }
 
-    /// Returns the rays through the pixels.
-    pub(crate) fn rays(&self) -> RayBasis {
-        let slope = |edge: usize| 0.5 * edge as f32 / self.focal;
-        let pixel = 1.0 / self.focal;
-        let [corner, right, down] = [
-            V3::new(-slope(self.width), slope(self.height), -1.0),
-            V3::new(pixel, 0.0, 0.0),
-            V3::new(0.0, -pixel, 0.0),
-        ]
-        .map(|v| self.to_world.rotate(&v));
-        RayBasis { corner, right, down }
+    /// The ray through the point (x, y) of the image, world, of depth 1.
+    #[inline(always)]
+    pub(crate) fn ray(&self, x: f32, y: f32) -> Vec3 {
+        self.corner.cast::<f64>() + self.right.cast() * f64::from(x) + self.down.cast() * f64::from(y)
+    }
+
+    /// z components of the unit vectors along the rays through eight points (x, y).
+    pub(crate) fn ray_direction_z(&self, x: f32x8, y: f32x8) -> f32x8 {
+        let [corner, right, down] = [&self.corner, &self.right, &self.down].map(Vec3x8::splat);
+        (corner + right * x + down * y).normalized().z
     }
 
     /// Depth of a point of the world along the optical axis, m.

@@ -7,12 +7,11 @@
 //!
 //! [`Renderer::render`] draws one image in these steps:
 //!
-//! 1. Objects are posed at the coarsest level of detail that looks like the finest one (`render::visibility`, `mesh`).
+//! 1. Objects are posed at the coarsest level of detail that looks like the finest one (`render::pass`, `mesh`).
 //! 2. Triangles are projected, clipped and sorted into tiles of 32 × 32 pixels (`raster`).
-//! 3. Each tile is rasterised with four samples per pixel into triangle ids and depths (`raster`, `render::tile`).
-//! 4. Each surface that a pixel shows is shaded once, eight points at a time: Lambert and GGX under a key light with
-//!    soft
-//!    shadows and a sky (`shade`).
+//! 3. Each tile is rasterised with four samples per pixel into triangle ids and depths (`raster`).
+//! 4. Each surface that a pixel shows is shaded once, eight points at a time (`render::tile`): Lambert and GGX under a
+//!    key light with soft shadows and a sky (`shade`).
 //!
 //! Materials are procedural functions of the object frame. [`RenderMesh`] bakes them into vertices or
 //! textures once, filtered to the spacing of the samples. Objects that do not move are drawn once for a
@@ -47,7 +46,7 @@
 //! let scene = RenderScene::new(vec![floor, cube], Lighting::default())?;
 //!
 //! let camera = Camera::third_person_table().with_edge(64);
-//! let image = Renderer::default().render(&scene, &FrameView::empty(), &camera)?;
+//! let image = Renderer::default().render(&scene, &FrameView::default(), &camera)?;
 //!
 //! let pixel = image.segmentation.iter().position(|&id| id == 2).expect("the cube is in view");
 //! let [red, green] = [image.rgb[3 * pixel], image.rgb[3 * pixel + 1]];
@@ -55,7 +54,7 @@
 //! # Ok::<(), softvt::sensing::camera::CameraError>(())
 //! ```
 
-// Each module uses only those before it: error, math, simd, image, lens, raster, shade, mesh, scene, render.
+// Each module uses only those before it: error, math, image, lens, raster, shade, mesh, scene, render.
 mod error;
 mod image;
 mod lens;
@@ -65,7 +64,6 @@ mod raster;
 mod render;
 mod scene;
 mod shade;
-mod simd;
 
 #[cfg(test)]
 mod tests;
@@ -73,10 +71,10 @@ mod tests;
 pub use self::image::{RenderedImage, encode_png, resize};
 pub use error::CameraError;
 pub use lens::check_cameras;
+pub(crate) use mesh::render_mesh::RenderSolid;
 pub use mesh::{
-    primitive_mesh::{box_mesh, flat_faces},
+    primitive::{box_mesh, flat_faces},
     render_mesh::RenderMesh,
-    solid::{RenderSolid, Tessellation},
 };
 pub use render::Renderer;
-pub use scene::render_scene::{FrameView, RenderObject, RenderScene, check_light};
+pub use scene::{FrameView, RenderObject, RenderScene, check_light};

@@ -32,16 +32,16 @@ pub(super) fn base() -> RobotPart {
         |side: f64| rounded_cylinder([0.040, side * 0.062, -0.01], [0.040, side * 0.062, 0.026], 0.032, 8e-3);
     let body = blended(vec![column, heel, foot, toe(-1.0), toe(1.0)], 0.036);
     let plugs = Pose::translation(-0.122, 0.0, 0.038);
-    RobotPart {
-        link: None,
-        name: "base",
-        solids: vec![
+    RobotPart::new(
+        None,
+        "base",
+        vec![
             RenderSolid::new(flat_below(body), FINE, WHITE_SHELL),
             box_solid(&plugs, [0.024, 0.046, 0.036], 4e-3, 4e-3, BLACK_PLASTIC),
             collar([0.0, 0.0, 0.122], [0.0, 0.0, 0.139], 0.0585),
             cylinder_solid([0.0, 0.0, 0.120], [0.0, 0.0, 0.160], NECK, 2e-3, GREY_PLASTIC),
         ],
-    }
+    )
 }
 
 /// The rim of a shell at a seam; `from` is inside the shell, `to` at the seam.
@@ -54,10 +54,6 @@ pub(super) fn links() -> Vec<RobotPart> {
     vec![shoulder(), upper_arm(), elbow_above(), elbow_below(), forearm(), wrist(), flange()]
 }
 
-fn part(link: usize, name: &'static str, solids: Vec<RenderSolid>) -> RobotPart {
-    RobotPart { link: Some(link), name, solids }
-}
-
 /// Link 1: a column that widens to the shoulder housing.
 fn shoulder() -> RobotPart {
     let column = rounded_cylinder([0.0, 0.0, -0.185], [0.0, 0.0, -0.03], TUBE, RIM);
@@ -67,7 +63,11 @@ fn shoulder() -> RobotPart {
     };
     let shell = blended(vec![column, bulge], 0.032);
     let rim = collar([0.0, 0.0, -0.175], [0.0, 0.0, -0.191], TUBE);
-    part(0, "shoulder", vec![RenderSolid::new(shell, CELL, WHITE_SHELL), rim, cap(-1.0), cap(1.0)])
+    RobotPart::new(
+        Some(0),
+        "shoulder",
+        vec![RenderSolid::new(shell, CELL, WHITE_SHELL), rim, cap(-1.0), cap(1.0)],
+    )
 }
 
 /// Link 2: the upper arm, along −y of its frame.
@@ -77,7 +77,7 @@ fn upper_arm() -> RobotPart {
     let shell = blended(vec![tube, core], 0.032);
     let rim = collar([0.0, -0.175, 0.0], [0.0, -0.191, 0.0], TUBE);
     let seam = cylinder_solid([0.0, -0.175, 0.0], [0.0, -0.212, 0.0], NECK, 2e-3, GREY_PLASTIC);
-    part(1, "upper arm", vec![RenderSolid::new(shell, CELL, WHITE_SHELL), rim, seam])
+    RobotPart::new(Some(1), "upper arm", vec![RenderSolid::new(shell, CELL, WHITE_SHELL), rim, seam])
 }
 
 /// Link 3: from the upper arm to the elbow axis at x = 82.5 mm.
@@ -90,7 +90,11 @@ fn elbow_above() -> RobotPart {
         cylinder_solid([0.0825, side * 0.04, 0.0], [0.0825, side * 0.0690, 0.0], 0.0460, 5e-3, BLACK_PLASTIC)
     };
     let rim = collar([0.0, 0.0, -0.105], [0.0, 0.0, -0.1215], TUBE);
-    part(2, "elbow", vec![RenderSolid::new(shell, CELL, WHITE_SHELL), rim, cap(-1.0), cap(1.0)])
+    RobotPart::new(
+        Some(2),
+        "elbow",
+        vec![RenderSolid::new(shell, CELL, WHITE_SHELL), rim, cap(-1.0), cap(1.0)],
+    )
 }
 
 /// Link 4: from the elbow axis back to the forearm axis at x = −82.5 mm.
@@ -101,7 +105,7 @@ fn elbow_below() -> RobotPart {
     let shell = blended(vec![core, crown, tube], 0.035);
     let seam = cylinder_solid([-0.0825, 0.105, 0.0], [-0.0825, 0.142, 0.0], NECK, 2e-3, BLACK_PLASTIC);
     let rim = collar([-0.0825, 0.103, 0.0], [-0.0825, 0.1195, 0.0], TUBE);
-    part(3, "elbow, lower half", vec![RenderSolid::new(shell, CELL, WHITE_SHELL), rim, seam])
+    RobotPart::new(Some(3), "elbow, lower half", vec![RenderSolid::new(shell, CELL, WHITE_SHELL), rim, seam])
 }
 
 /// Link 5: the slanted forearm, from its axis to y = 80 mm, where it holds the wrist.
@@ -114,7 +118,7 @@ fn forearm() -> RobotPart {
     let shell = blended(vec![tube, dome, slant, back, hub], 0.040);
     let cap = cylinder_solid([0.0, 0.095, 0.0], [0.0, 0.1175, 0.0], 0.036, 4e-3, BLACK_PLASTIC);
     let rim = collar([0.0, 0.0, -0.245], [0.0, 0.0, -0.2615], TUBE);
-    part(4, "forearm", vec![RenderSolid::new(shell, FINE, WHITE_SHELL), rim, cap])
+    RobotPart::new(Some(4), "forearm", vec![RenderSolid::new(shell, FINE, WHITE_SHELL), rim, cap])
 }
 
 /// Link 6: the wrist, from the housing on its axis to that of the last joint at x = 88 mm.
@@ -127,7 +131,7 @@ fn wrist() -> RobotPart {
     let pilot = cylinder_solid([0.088, 0.040, 0.0], [0.088, 0.0620, 0.0], 0.033, 3e-3, BLACK_PLASTIC);
     let seam = cylinder_solid([0.088, -0.038, 0.0], [0.088, -0.068, 0.0], 0.0420, 2e-3, GREY_PLASTIC);
     let rim = collar([0.088, -0.034, 0.0], [0.088, -0.0512, 0.0], 0.0478);
-    part(5, "wrist", vec![RenderSolid::new(shell, FINE, WHITE_SHELL), rim, cap, pilot, seam])
+    RobotPart::new(Some(5), "wrist", vec![RenderSolid::new(shell, FINE, WHITE_SHELL), rim, cap, pilot, seam])
 }
 
 /// Link 7: the last body with its guiding grip, and the flange.
@@ -136,5 +140,5 @@ fn flange() -> RobotPart {
     let lobe = capsule([0.020, 0.0, 0.076], [0.060, 0.0, 0.076], 0.0200);
     let face = cylinder_solid([0.0, 0.0, 0.080], [0.0, 0.0, 0.107], 0.0315, 1e-3, BARE_METAL);
     let button = cylinder_solid([0.066, 0.0, 0.076], [0.0820, 0.0, 0.076], 0.011, 3e-3, BLACK_PLASTIC);
-    part(6, "flange", vec![body, RenderSolid::new(lobe, 6e-3, WHITE_SHELL), face, button])
+    RobotPart::new(Some(6), "flange", vec![body, RenderSolid::new(lobe, 6e-3, WHITE_SHELL), face, button])
 }

@@ -10,7 +10,7 @@ use crate::{
         Side, pads,
         panda::{HAND_LINK, finger_link, hand_in_link},
     },
-    sensing::camera::{RenderSolid, Tessellation},
+    sensing::camera::RenderSolid,
 };
 
 /// The hand's body, 204 × 63 mm in plan and 66 mm high, with shoulders that slope to rounded ends (Franka hand,
@@ -29,11 +29,11 @@ pub(super) fn hand() -> RobotPart {
         [0.0870, 0.0545],
     ];
     let hand = hand_in_link();
-    RobotPart {
-        link: Some(HAND_LINK),
-        name: "hand",
-        solids: vec![
-            tapered(plate_solid(&Pose::identity(), &outline, 0.0316, EDGE, WHITE_SHELL)).placed(&hand),
+    RobotPart::new(
+        Some(HAND_LINK),
+        "hand",
+        vec![
+            tapered(plate_solid(&outline, 0.0316, EDGE, WHITE_SHELL)).placed(&hand),
             cylinder_solid([0.0, 0.0, 0.0], [0.0, 0.0, 0.0105], 0.0265, 1e-3, BARE_METAL).placed(&hand),
             box_solid(
                 &(hand * Pose::translation(0.0, 0.0, 0.060)),
@@ -43,7 +43,7 @@ pub(super) fn hand() -> RobotPart {
                 BLACK_PLASTIC,
             ),
         ],
-    }
+    )
 }
 
 /// Tapers the hand's body: it is as deep as the flange where it is mounted, and shallower at the fingers.
@@ -53,10 +53,8 @@ fn tapered(mut body: RenderSolid) -> RenderSolid {
     const END: f64 = 0.0655;
     /// Remaining fraction of the depth.
     const TAPER: f64 = 0.76;
-    if let Tessellation::Mesh(mesh) = &mut body.tessellation {
-        for v in &mut mesh.vertices {
-            v.x *= 1.0 - (1.0 - TAPER) * ((v.z - START) / (END - START)).clamp(0.0, 1.0);
-        }
+    for v in &mut body.mesh.vertices {
+        v.x *= 1.0 - (1.0 - TAPER) * ((v.z - START) / (END - START)).clamp(0.0, 1.0);
     }
     body.shape = body.shape.scaled(Vec3::new(TAPER, 1.0, 1.0));
     body
@@ -73,25 +71,21 @@ pub(super) fn finger(side: Side) -> RobotPart {
     let plug = Pose::translation(0.0, out * 0.0285, 0.050);
     // In the pad's frame the case is long along x, wide along y and deep along z.
     let behind = pad * Pose::translation(0.0, 0.0, -body.pose.translation.vector.y.abs());
-    RobotPart {
-        link: Some(finger_link(side)),
-        name: match side {
-            Side::Left => "left finger",
-            Side::Right => "right finger",
-        },
-        solids: vec![
-            box_solid(&behind, [body.half.z, body.half.x, body.half.y], 3e-3, 1.5e-3, SENSOR_CASE),
-            box_solid(
-                &bracket.pose,
-                [bracket.half.x, bracket.half.y, bracket.half.z],
-                2e-3,
-                0.5e-3,
-                BLACK_PLASTIC,
-            ),
+    let name = match side {
+        Side::Left => "left finger",
+        Side::Right => "right finger",
+    };
+    let [x, y, z] = [body.half.x, body.half.y, body.half.z];
+    RobotPart::new(
+        Some(finger_link(side)),
+        name,
+        vec![
+            box_solid(&behind, [z, x, y], 3e-3, 1.5e-3, SENSOR_CASE),
+            box_solid(&bracket.pose, bracket.half.into(), 2e-3, 0.5e-3, BLACK_PLASTIC),
             box_solid(&bezel, [0.0143, 0.0121, 0.0011], 2.4e-3, 0.6e-3, BLACK_PLASTIC),
             box_solid(&plug, [0.0050, 0.0022, 0.0018], 1e-3, 0.5e-3, BARE_METAL),
         ],
-    }
+    )
 }
 
 /// The gel's dome and side walls in the finger's frame, sampled from [`pads::PadSurface`]: the drawn gel is the

@@ -5,7 +5,6 @@
 
 mod arm;
 mod hand;
-mod rounded_plate;
 mod solid;
 
 #[cfg(test)]
@@ -37,6 +36,12 @@ struct RobotPart {
     name: &'static str,
     /// In the frame of the link.
     solids: Vec<RenderSolid>,
+}
+
+impl RobotPart {
+    fn new(link: Option<usize>, name: &'static str, solids: Vec<RenderSolid>) -> Self {
+        Self { link, name, solids }
+    }
 }
 
 /// Materials of the robot, by the indices above.
@@ -82,9 +87,7 @@ impl RobotMeshes {
             meshes.push(PartMesh { link, name, mesh: Arc::new(mesh) });
         }
         for (side, name) in Side::BOTH.into_iter().zip(["left gel", "right gel"]) {
-            let gel = hand::gel(side);
-            let material_ids = vec![SENSOR_GEL as u16; gel.triangles.len()];
-            let mesh = RenderMesh::from_mesh(name, &gel, &material_ids, &visuals)?;
+            let mesh = RenderMesh::from_mesh(name, &hand::gel(side), &visuals[SENSOR_GEL..])?;
             meshes.push(PartMesh { link: Some(panda::finger_link(side)), name, mesh: Arc::new(mesh) });
         }
         Ok(Self { parts: meshes })
@@ -107,10 +110,5 @@ impl RobotMeshes {
             casts_shadow: true,
         };
         self.parts.iter().map(object).collect()
-    }
-
-    /// Number of triangles of the finest level of detail of all parts.
-    pub fn triangle_count(&self) -> usize {
-        self.parts.iter().map(|part| part.mesh.triangle_count()).sum()
     }
 }

@@ -21,7 +21,7 @@ const POSE: [f64; panda::DOFS] = [0.3, -0.5, 0.2, -2.0, 0.4, 1.9, 0.7, 0.02, 0.0
 
 #[test]
 fn the_robot_has_a_moderate_number_of_triangles() {
-    let triangles = meshes().triangle_count();
+    let triangles: usize = meshes().parts.iter().map(|part| part.mesh.lods[0].triangles.len()).sum();
     assert!((5_000..=30_000).contains(&triangles), "{triangles}");
 }
 
@@ -106,7 +106,7 @@ fn the_arm_is_light_and_the_sensors_are_dark() {
     let stage = RenderScene::new(objects, Lighting::default()).expect("good light");
     let tree = panda::tree(Pose::translation(-0.66, 0.0, 0.0), &GripperSpec::default());
     let links = [forward(&tree, &[0.0, -0.19, 0.0, -2.4, 0.0, 2.245, 0.79, 0.04, 0.04])];
-    let view = FrameView { nodes: &[], rigid: &[], links: &links, hand_w: None };
+    let view = FrameView { links: &links, ..FrameView::default() };
     let image = Renderer::default().render(&stage, &view, &Camera::third_person_table()).expect("a image");
     let mut tones: Vec<u32> = (0..224 * 224)
         .filter(|&i| image.segmentation[i] == 200)

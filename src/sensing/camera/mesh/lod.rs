@@ -3,8 +3,15 @@
 use std::collections::BTreeMap;
 
 use crate::{
-    geometry::union_find::UnionFind,
-    sensing::camera::{math::V3, shade::pattern::MaterialSample},
+    geometry::{Aabb, basis_from_reference, mesh::Mesh, shape::Shape, union_find::UnionFind},
+    scene::Visual,
+    sensing::camera::{
+        math::V3,
+        shade::{
+            occlusion::self_visibility,
+            pattern::{METALNESS, MaterialSample, SKY_VISIBILITY, VisualSample, sample_visual},
+        },
+    },
 };
 
 /// Faces that meet at a larger angle than this (cosine) form a crease; others are one smooth surface.
@@ -13,6 +20,8 @@ const CREASE_COSINE: f32 = 0.8;
 const MAX_EDGE_PIXELS: f32 = 1.7;
 /// Maximum geometric error of a coarse level of uniform material, pixels.
 pub(crate) const MAX_ERROR_PIXELS: f32 = 0.12;
+/// Reach of ambient occlusion by the object itself, in longest extents of the object.
+const OCCLUSION_REACH: f64 = 0.12;
 
 /// A vertex as a weighted sum of the nodes of a soft body.
 #[derive(Clone, Copy, Debug)]
@@ -22,7 +31,7 @@ pub(crate) struct NodeWeights {
 }
 
 /// One level of detail of a [`RenderMesh`](super::render_mesh::RenderMesh), in the object frame at rest.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Lod {
     /// Vertex positions, m. Vertices are duplicated at creases, so that each has one normal.
     pub(crate) positions: Vec<V3>,
@@ -48,83 +57,161 @@ pub(crate) struct Lod {
 
 impl Lod {
     /// True if the level looks like finer ones where a pixel covers `pixel` metres.
-    pub(crate) fn suffices(&self, pixel: f32) -> bool {
+    pub(crate) fn is_fine_enough(&self, pixel: f32) -> bool {
         self.vertex_spacing <= MAX_EDGE_PIXELS * pixel
             || self.is_uniform && self.geometric_error <= MAX_ERROR_PIXELS * pixel
     }
 }
 
-/// A mesh whose vertices are duplicated at creases.
+/// A mesh whose vertices are duplicated at creases: one vertex for each smooth group of triangles around each original
+/// vertex.
 pub(crate) struct CreasedMesh {
     /// The original vertex of each vertex.
-    pub(crate) sources: Vec<u32>,
+    sources: Vec<u32>,
+    pub(crate) positions: Vec<V3>,
+    pub(crate) normals: Vec<V3>,
     pub(crate) triangles: Vec<[u32; 3]>,
 }
 
-/// Duplicates vertices at creases: one vertex for each smooth group of triangles around each original vertex.
-pub(crate) fn split_at_creases(points: &[V3], triangles: &[[u32; 3]]) -> CreasedMesh {
-    /// A triangle at a vertex, and which of its corners the vertex is.
-    struct MeshCorner {
-        triangle: u32,
-        corner: u8,
-    }
-    let face_normals: Vec<V3> = triangles
-        .iter()
-        .map(|t| {
+impl CreasedMesh {
+    pub(crate) fn new(mesh: &Mesh) -> Self {
+        let points: Vec<V3> = mesh.vertices.iter().map(|v| v.cast()).collect();
+        let face_normal = |t: &[u32; 3]| {
             let [a, b, c] = t.map(|v| points[v as usize]);
             (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_else(V3::z)
-        })
-        .collect();
-    let mut corners: Vec<Vec<MeshCorner>> = points.iter().map(|_| Vec::new()).collect();
-    for (t, triangle) in triangles.iter().enumerate() {
-        for (i, &v) in triangle.iter().enumerate() {
-            corners[v as usize].push(MeshCorner { triangle: t as u32, corner: i as u8 });
+        };
+        let face_normals: Vec<V3> = mesh.triangles.iter().map(face_normal).collect();
+        // Triangle and corner, for each corner at each vertex.
+        let mut corners: Vec<Vec<[usize; 2]>> = vec![Vec::new(); points.len()];
+        for (t, triangle) in mesh.triangles.iter().enumerate() {
+            triangle.iter().enumerate().for_each(|(i, &v)| corners[v as usize].push([t, i]));
         }
-    }
-    let (mut sources, mut split) = (Vec::new(), triangles.to_vec());
-    for (v, corners) in corners.iter().enumerate() {
-        let normal = |i: usize| face_normals[corners[i].triangle as usize];
-        let mut group: Vec<usize> = (0..corners.len()).collect();
-        for i in 0..corners.len() {
-            for j in 0..i {
-                if normal(i).dot(&normal(j)) > CREASE_COSINE && group[i] != group[j] {
-                    let (from, to) = (group[i].max(group[j]), group[i].min(group[j]));
-                    group.iter_mut().filter(|g| **g == from).for_each(|g| *g = to);
+        let (mut sources, mut triangles) = (Vec::new(), mesh.triangles.clone());
+        for (v, corners) in corners.iter().enumerate() {
+            let normal = |i: usize| face_normals[corners[i][0]];
+            let mut group: Vec<usize> = (0..corners.len()).collect();
+            for i in 0..corners.len() {
+                for j in 0..i {
+                    if normal(i).dot(&normal(j)) > CREASE_COSINE && group[i] != group[j] {
+                        let (from, to) = (group[i].max(group[j]), group[i].min(group[j]));
+                        group.iter_mut().filter(|g| **g == from).for_each(|g| *g = to);
+                    }
                 }
             }
+            let mut vertex_of_group: BTreeMap<usize, u32> = BTreeMap::new();
+            for (group, &[triangle, corner]) in group.iter().zip(corners) {
+                triangles[triangle][corner] = *vertex_of_group.entry(*group).or_insert_with(|| {
+                    sources.push(v as u32);
+                    sources.len() as u32 - 1
+                });
+            }
         }
-        let mut vertex_of_group: BTreeMap<usize, u32> = BTreeMap::new();
-        for (group, corner) in group.iter().zip(corners) {
-            let vertex = *vertex_of_group.entry(*group).or_insert_with(|| {
-                sources.push(v as u32);
-                sources.len() as u32 - 1
-            });
-            split[corner.triangle as usize][corner.corner as usize] = vertex;
-        }
+        let positions: Vec<V3> = sources.iter().map(|&v| points[v as usize]).collect();
+        let normals = vertex_normals(&positions, &triangles);
+        Self { sources, positions, normals, triangles }
     }
-    CreasedMesh { sources, triangles: split }
 }
 
-/// Numbers the connected components of triangles that share vertices.
-pub(crate) fn smoothing_groups(triangles: &[[u32; 3]], vertex_count: usize) -> Vec<u32> {
-    let mut connected = UnionFind::new(vertex_count);
-    for t in triangles {
-        connected.union(t[0] as usize, t[1] as usize);
-        connected.union(t[0] as usize, t[2] as usize);
-    }
-    triangles.iter().map(|t| connected.find(t[0] as usize) as u32).collect()
-}
-
-/// Computes unit vertex normals: the normalised sum of the area normals of the adjacent triangles.
-pub(crate) fn compute_normals(positions: &[V3], triangles: &[[u32; 3]], normals: &mut [V3]) {
-    normals.fill(V3::zeros());
+/// Unit normals of vertices: the normalised sum of the area normals of the adjacent triangles.
+pub(crate) fn vertex_normals(positions: &[V3], triangles: &[[u32; 3]]) -> Vec<V3> {
+    let mut normals = vec![V3::zeros(); positions.len()];
     for t in triangles {
         let [a, b, c] = t.map(|v| positions[v as usize]);
         let area = (b - a).cross(&(c - a));
         t.iter().for_each(|&v| normals[v as usize] += area);
     }
-    for n in normals {
+    for n in &mut normals {
         let length = n.norm();
         *n = if length > 0.0 { *n / length } else { V3::z() };
     }
+    normals
+}
+
+/// Builds a level of detail: splits vertices at creases, evaluates materials at them and raises their drawn relief.
+///
+/// `material_ids` are those of the triangles. Patterns are filtered to `spacing`, m. With a `shape`, materials blend
+/// smoothly across their borders and ambient occlusion is baked in.
+pub(crate) fn bake_vertices(
+    mesh: &Mesh,
+    material_ids: &[u16],
+    visuals: &[Visual],
+    spacing: f32,
+    shape: Option<&Shape>,
+) -> Lod {
+    let CreasedMesh { sources, mut positions, mut normals, triangles } = CreasedMesh::new(mesh);
+    let mut adjacent_ids: Vec<Vec<u16>> = vec![Vec::new(); sources.len()];
+    for (t, &id) in triangles.iter().zip(material_ids) {
+        t.iter().for_each(|&v| adjacent_ids[v as usize].push(id));
+    }
+    let reach = OCCLUSION_REACH * extent(mesh);
+    // Copies of a vertex share its material, so that nothing changes along a crease.
+    let mut known: BTreeMap<u32, VisualSample> = BTreeMap::new();
+    let sample = |i: usize| {
+        let (p, n) = (&positions[i], &normals[i]);
+        *known.entry(sources[i]).or_insert_with(|| {
+            let is_border = adjacent_ids[i].iter().any(|&id| id != adjacent_ids[i][0]);
+            let ids = match shape {
+                Some(shape) if is_border => material_ids_near(shape, p, n, spacing),
+                _ => adjacent_ids[i].clone(),
+            };
+            let mut sample = blend_visuals(ids, visuals, p, n, spacing);
+            sample.material[SKY_VISIBILITY] = shape.map_or(1.0, |shape| self_visibility(shape, p, n, reach));
+            sample
+        })
+    };
+    let samples: Vec<VisualSample> = (0..positions.len()).map(sample).collect();
+    if samples.iter().any(|sample| sample.relief != 0.0) {
+        positions.iter_mut().zip(&normals).zip(&samples).for_each(|((p, n), s)| *p += n * s.relief);
+        normals = vertex_normals(&positions, &triangles);
+    }
+    let mut connected = UnionFind::new(positions.len());
+    for t in &triangles {
+        connected.union(t[0] as usize, t[1] as usize);
+        connected.union(t[0] as usize, t[2] as usize);
+    }
+    let materials: Vec<MaterialSample> = samples.iter().map(|sample| sample.material).collect();
+    let is_same = |m: &MaterialSample| m.iter().zip(&materials[0]).take(METALNESS + 1).all(|(a, b)| a == b);
+    Lod {
+        is_uniform: materials.iter().all(is_same),
+        smoothing_groups: triangles.iter().map(|t| connected.find(t[0] as usize) as u32).collect(),
+        positions,
+        normals,
+        materials,
+        triangles,
+        vertex_spacing: spacing,
+        ..Lod::default()
+    }
+}
+
+/// Longest extent of a mesh along an axis, m.
+pub(crate) fn extent(mesh: &Mesh) -> f64 {
+    Aabb::from_points(&mesh.vertices).map_or(0.0, |bounds| bounds.size().max())
+}
+
+/// Material ids at points spread evenly over the surface around `p`, to a little more than half the distance to
+/// adjacent vertices. Their proportions change smoothly across a border, however the triangles there are shaped.
+fn material_ids_near(shape: &Shape, p: &V3, n: &V3, spacing: f32) -> Vec<u16> {
+    const STEPS: i32 = 2;
+    let reference = if n.z.abs() < 0.9 { V3::z() } else { V3::x() };
+    let [u, v] = basis_from_reference(n, &reference);
+    let step = 0.7 * spacing / STEPS as f32;
+    let point = |i: i32, j: i32| p + u * (i as f32 * step) + v * (j as f32 * step);
+    (-STEPS..=STEPS)
+        .flat_map(|i| (-STEPS..=STEPS).map(move |j| point(i, j)))
+        .map(|q| shape.material(&q.cast()))
+        .collect()
+}
+
+/// Averages the visuals of `ids`, by how often each occurs.
+fn blend_visuals(mut ids: Vec<u16>, visuals: &[Visual], p: &V3, n: &V3, spacing: f32) -> VisualSample {
+    let mut blend = VisualSample { material: MaterialSample::zeros(), relief: 0.0 };
+    let share = 1.0 / ids.len() as f32;
+    ids.sort_unstable();
+    for run in ids.chunk_by(|a, b| a == b) {
+        let VisualSample { material, relief } = sample_visual(&visuals[run[0] as usize], p, n, spacing);
+        let weight = share * run.len() as f32;
+        blend.material += material * weight;
+        blend.relief += relief * weight;
+    }
+    blend
 }

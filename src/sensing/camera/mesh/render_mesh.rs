@@ -3,24 +3,21 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use super::{
-    bake::{bake_vertices, extent},
-    lathe_mesh::lathe_mesh,
-    lod::{Lod, MAX_ERROR_PIXELS, NodeWeights},
-    primitive_mesh::{flat_faces, primitive_mesh},
+    lod::{Lod, MAX_ERROR_PIXELS, NodeWeights, bake_vertices, extent},
+    primitive::{append_visible, flat_faces, primitive_mesh, transform},
     simplify::simplify,
-    texture_chart::{SurfaceMaterial, TEXT_TEXEL, TextureChart},
-    uv_atlas::{flat_charts, parameterize, suits_flat_charts},
+    texture::{SurfaceMaterial, TEXT_TEXEL, TextureChart, flat_charts, parameterize, suits_flat_charts},
 };
 use crate::{
     geometry::{
-        Vec3,
+        Pose, Vec3,
         mesh::Mesh,
-        shape::{Polygon, Shape},
+        shape::Shape,
         surface_mesh::SurfaceMesh,
         voxel::{Embedding, VoxelMesh},
     },
     scene::Visual,
-    sensing::camera::{CameraError, math::V3, raster::TRIANGLE_BITS, shade::pattern},
+    sensing::camera::{error::CameraError, math::V3, raster::TRIANGLE_BITS, shade::pattern},
 };
 
 /// Cells along the longest edge of a shape, per level of detail. The coarsest level also casts shadows.
@@ -31,6 +28,16 @@ const SIMPLIFY_TOLERANCE: f32 = 0.025;
 const MAX_PATTERN_EDGE: f64 = 1.0 / 48.0;
 /// Maximum number of triangles that subdivision creates.
 const MAX_SUBDIVIDED_TRIANGLES: usize = 120_000;
+/// Geometric errors of the levels of detail, m: for large images, for small ones, and for distant views and shadows.
+/// The last is below the depth bias of shadow maps, so that casters do not shade their own surface.
+const LOD_ERRORS: [f32; 3] = [1e-4, 2.5e-4, 5e-4];
+/// Vertex spacing in cells that counts for the choice of a level: surfaces of one colour need
+/// fewer vertices than patterns.
+const UNIFORM_SPACING: f64 = 0.16;
+/// Minimum cell that counts for it, m: meshes given explicitly are fine enough for any view.
+const MIN_CELL: f64 = 2e-3;
+/// Vertices deeper than this inside another solid are invisible, m.
+const HIDDEN_DEPTH: f64 = 1.5e-3;
 
 /// Triangles and materials of one kind of object, shared by all its instances.
 ///
@@ -51,9 +58,9 @@ impl RenderMesh {
     /// The shape has no surface, or a material id has no visual.
     pub fn from_shape(name: &str, shape: &Shape, visuals: &[Visual]) -> Result<Self, CameraError> {
         if let Some(mesh) = flat_faces(shape) {
-            return Self::from_mesh(name, &mesh, &[], visuals);
+            return Self::from_mesh(name, &mesh, visuals);
         }
-        let mut mesh = Self::with_lods(name, shape, visuals, primitive_mesh)?;
+        let mut mesh = Self::with_lods(name, shape, visuals, true)?;
         // Texture coordinates belong to the triangles as they are.
         if mesh.charts.is_empty() {
             for lod in &mut mesh.lods {
@@ -68,29 +75,24 @@ impl RenderMesh {
     /// # Errors
     /// As [`RenderMesh::from_shape`].
     pub fn from_deformable_shape(name: &str, shape: &Shape, visuals: &[Visual]) -> Result<Self, CameraError> {
-        Self::with_lods(name, shape, visuals, |_, _| None)
+        Self::with_lods(name, shape, visuals, false)
     }
 
-    /// `exact_mesh` triangulates shapes with text, which need no small triangles, if it can.
-    fn with_lods(
-        name: &str,
-        shape: &Shape,
-        visuals: &[Visual],
-        exact_mesh: impl Fn(&Shape, f64) -> Option<Mesh>,
-    ) -> Result<Self, CameraError> {
+    fn with_lods(name: &str, shape: &Shape, visuals: &[Visual], is_rigid: bool) -> Result<Self, CameraError> {
         let longest = shape.bounds().size().max();
         let (mut lods, mut charts) = (Vec::new(), Vec::new());
         let text_material = visuals
             .iter()
             .any(pattern::has_text)
             .then(|| Arc::new(SurfaceMaterial { shape: shape.clone(), visuals: visuals.to_vec() }));
+        // Textured faces of rigid shapes need no small triangles.
+        let prefers_primitives = is_revolved(shape) || is_rigid && text_material.is_some();
         for cells in CELLS {
             let cell = longest / cells;
-            let exact = text_material.as_ref().and_then(|_| exact_mesh(shape, cell));
-            let (mesh, material_ids) = match exact {
-                Some(mesh) => with_material_ids(mesh, shape),
-                None => triangulate(shape, cell),
-            };
+            let primitives = prefers_primitives.then(|| primitive_mesh(shape, cell)).flatten();
+            let mesh = primitives.unwrap_or_else(|| SurfaceMesh::from_shape(shape, cell).mesh);
+            let material_ids: Vec<u16> =
+                mesh.triangles.iter().map(|t| shape.material(&centroid(&mesh, t))).collect();
             check_mesh(name, &mesh, &material_ids, visuals)?;
             let mut lod = bake_vertices(&mesh, &material_ids, visuals, cell as f32, Some(shape));
             let texel = TEXT_TEXEL * (CELLS[0] / cells) as f32;
@@ -112,36 +114,57 @@ impl RenderMesh {
 
     /// Builds the mesh of triangles, closed or not, which are visible from their counter-clockwise side.
     ///
-    /// `material_ids` index the visual of each triangle; if empty, all have the first visual. Normals are computed. The
-    /// texture coordinates of `mesh` are ignored, since patterns are functions of the object frame.
+    /// They have the first of `visuals`, a function of the object frame: the texture coordinates of `mesh` are ignored.
     ///
     /// # Errors
-    /// The mesh is empty, not finite, or refers to a vertex or visual that does not exist.
-    pub fn from_mesh(
+    /// The mesh is empty, not finite, or refers to a vertex that does not exist; or there are no visuals.
+    pub fn from_mesh(name: &str, mesh: &Mesh, visuals: &[Visual]) -> Result<Self, CameraError> {
+        check_mesh(name, mesh, &[0], visuals)?;
+        let (mut mesh, mut charts) = (mesh.clone(), Vec::new());
+        let mut edge = extent(&mesh);
+        let has_pattern = !visuals[0].layers.is_empty();
+        let lod = if has_pattern && suits_flat_charts(&mesh, visuals.iter().any(pattern::has_text)) {
+            flat_charts(&mesh, &visuals[0], &mut charts)
+        } else {
+            if has_pattern {
+                edge = edge.min(subdivide(&mut mesh, edge * MAX_PATTERN_EDGE));
+            }
+            bake_vertices(&mesh, &vec![0; mesh.triangles.len()], visuals, edge as f32, None)
+        };
+        Ok(Self { lods: vec![lod], charts })
+    }
+
+    /// Builds the mesh of solids that may overlap; `visuals` are those that the solids index. They are meshed
+    /// separately, so that their materials meet along clean lines.
+    ///
+    /// # Errors
+    /// A solid has no surface, or its visual does not exist.
+    pub(crate) fn from_solids(
         name: &str,
-        mesh: &Mesh,
-        material_ids: &[u16],
+        solids: &[RenderSolid],
         visuals: &[Visual],
     ) -> Result<Self, CameraError> {
-        let material_ids =
-            if material_ids.is_empty() { vec![0; mesh.triangles.len()] } else { material_ids.to_vec() };
-        check_mesh(name, mesh, &material_ids, visuals)?;
-        let has_pattern = material_ids.iter().any(|&id| !visuals[id as usize].layers.is_empty());
-        if has_pattern && suits_flat_charts(mesh, visuals.iter().any(pattern::has_text)) {
-            let (lod, charts) = flat_charts(mesh, &material_ids, visuals);
-            return Ok(Self { lods: vec![lod], charts });
+        let union = Shape::Union(solids.iter().map(|solid| solid.shape.clone()).collect());
+        let mut combined = Mesh::default();
+        let mut material_ids = Vec::new();
+        for (i, solid) in solids.iter().enumerate() {
+            check_mesh(name, &solid.mesh, &[solid.visual as u16], visuals)?;
+            append_visible(&mut combined, solid.mesh.clone(), |v: &Vec3| {
+                let mut others = solids.iter().enumerate().filter(|(j, _)| *j != i);
+                others.any(|(_, other)| other.shape.distance(v) < -HIDDEN_DEPTH)
+            });
+            material_ids.resize(combined.triangles.len(), solid.visual as u16);
         }
-        let longest = extent(mesh);
-        let mesh =
-            Mesh { vertices: mesh.vertices.clone(), triangles: mesh.triangles.clone(), uvs: Vec::new() };
-        let fine = if has_pattern {
-            subdivide(mesh, material_ids, longest * MAX_PATTERN_EDGE)
-        } else {
-            SubdividedMesh { mesh, material_ids, edge: longest }
-        };
-        let spacing = fine.edge.min(longest) as f32;
-        let lod = bake_vertices(&fine.mesh, &fine.material_ids, visuals, spacing, None);
-        Ok(Self { lods: vec![lod], charts: Vec::new() })
+        let max_cell = solids.iter().map(|solid| solid.cell_m).fold(MIN_CELL, f64::max);
+        let spacing = (UNIFORM_SPACING * max_cell) as f32;
+        let mut finer = bake_vertices(&combined, &material_ids, visuals, spacing, Some(&union));
+        // Solids share no vertices and are uniform each, so their materials do not limit simplification.
+        finer.is_uniform = true;
+        let lods = LOD_ERRORS.map(|geometric_error| {
+            finer = Lod { geometric_error, ..simplify(&finer, geometric_error) };
+            finer.clone()
+        });
+        Ok(Self { lods: lods.into(), charts: Vec::new() })
     }
 
     /// Attaches the mesh to the nodes of a soft body.
@@ -165,19 +188,43 @@ impl RenderMesh {
         }
         Ok(self)
     }
+}
 
-    /// Number of triangles of the finest level.
-    pub fn triangle_count(&self) -> usize {
-        self.lods.first().map_or(0, |lod| lod.triangles.len())
+/// A solid of one material, in the object frame.
+#[derive(Clone, Debug)]
+pub(crate) struct RenderSolid {
+    /// Volume occupied by the solid.
+    pub(crate) shape: Shape,
+    /// Its surface.
+    pub(crate) mesh: Mesh,
+    /// Edge of the cells of the surface mesher, m; 0 for an explicit mesh.
+    cell_m: f64,
+    /// Index of its visual.
+    visual: usize,
+}
+
+impl RenderSolid {
+    /// A solid triangulated by the surface mesher with cells of edge `cell_m`, m.
+    pub(crate) fn new(shape: Shape, cell_m: f64, visual: usize) -> Self {
+        let mesh = SurfaceMesh::from_shape(&shape, cell_m).mesh;
+        Self { mesh, shape, cell_m, visual }
+    }
+
+    /// A solid with a given mesh.
+    pub(crate) fn with_mesh(shape: Shape, mesh: Mesh, visual: usize) -> Self {
+        Self { shape, mesh, cell_m: 0.0, visual }
+    }
+
+    /// Moves the solid by `pose`.
+    #[must_use]
+    pub(crate) fn placed(mut self, pose: &Pose) -> Self {
+        self.shape = self.shape.placed(*pose);
+        transform(&mut self.mesh, pose);
+        self
     }
 }
 
-pub(crate) fn check_mesh(
-    name: &str,
-    mesh: &Mesh,
-    material_ids: &[u16],
-    visuals: &[Visual],
-) -> Result<(), CameraError> {
+fn check_mesh(name: &str, mesh: &Mesh, material_ids: &[u16], visuals: &[Visual]) -> Result<(), CameraError> {
     let fail = |reason: String| Err(CameraError::Mesh { name: name.to_owned(), reason });
     if let Err(error) = mesh.validate() {
         return fail(error.to_string());
@@ -187,65 +234,37 @@ pub(crate) fn check_mesh(
         let max = (1 << TRIANGLE_BITS) - 1;
         return fail(format!("{count} triangles; at most {max} can be drawn, simplify it"));
     }
-    if material_ids.len() != count {
-        let ids = material_ids.len();
-        return fail(format!("{ids} material ids for {count} triangles; give one per triangle"));
-    }
     match material_ids.iter().find(|&&m| m as usize >= visuals.len()) {
         Some(m) => fail(format!("material {m} has no visual; there are {} (from 0)", visuals.len())),
         None => Ok(()),
     }
 }
 
-/// Triangulates a shape with edges about `cell` long, m. Returns the material id of each triangle, too.
-fn triangulate(shape: &Shape, cell: f64) -> (Mesh, Vec<u16>) {
-    match revolved_profile(shape) {
-        Some(profile) => with_material_ids(lathe_mesh(profile, cell), shape),
-        None => {
-            let surface = SurfaceMesh::from_shape(shape, cell);
-            (surface.mesh, surface.materials)
-        }
-    }
-}
-
-/// Evaluates the material of `shape` at the centroid of each triangle.
-fn with_material_ids(mesh: Mesh, shape: &Shape) -> (Mesh, Vec<u16>) {
-    let material_ids = mesh.triangles.iter().map(|t| shape.material(&centroid(&mesh, t))).collect();
-    (mesh, material_ids)
-}
-
 fn centroid(mesh: &Mesh, triangle: &[u32; 3]) -> Vec3 {
     triangle.iter().map(|&v| mesh.vertices[v as usize]).sum::<Vec3>() / 3.0
 }
 
-/// The profile of a surface of revolution, painted or not.
-fn revolved_profile(shape: &Shape) -> Option<&Polygon> {
+/// True for a surface of revolution, painted or not.
+fn is_revolved(shape: &Shape) -> bool {
     match shape {
-        Shape::Lathe(profile) => Some(profile),
-        Shape::Paint { shape, .. } => revolved_profile(shape),
-        _ => None,
+        Shape::Lathe(_) => true,
+        Shape::Paint { shape, .. } => is_revolved(shape),
+        _ => false,
     }
 }
 
-struct SubdividedMesh {
-    mesh: Mesh,
-    material_ids: Vec<u16>,
-    /// Length of the edges reached, m.
-    edge: f64,
-}
-
-/// Divides every triangle into four until no edge is longer than `max_edge`, m, or the mesh becomes too large.
-fn subdivide(mut mesh: Mesh, mut material_ids: Vec<u16>, max_edge: f64) -> SubdividedMesh {
+/// Divides every triangle into four until no edge is longer than `max_edge`, m, or the mesh becomes too large. Returns
+/// the length of the edges reached, m.
+fn subdivide(mesh: &mut Mesh, max_edge: f64) -> f64 {
     loop {
         let length = |a: u32, b: u32| (mesh.vertices[a as usize] - mesh.vertices[b as usize]).norm();
         let is_long = |t: &[u32; 3]| (0..3).any(|i| length(t[i], t[(i + 1) % 3]) > max_edge);
         if !mesh.triangles.iter().any(is_long) {
-            return SubdividedMesh { mesh, material_ids, edge: max_edge };
+            return max_edge;
         }
         if 4 * mesh.triangles.len() > MAX_SUBDIVIDED_TRIANGLES {
             let sum = mesh.triangles.iter().map(|t| length(t[0], t[1])).sum::<f64>();
-            let edge = sum / mesh.triangles.len() as f64;
-            return SubdividedMesh { mesh, material_ids, edge };
+            return sum / mesh.triangles.len() as f64;
         }
         let mut midpoints: BTreeMap<[u32; 2], u32> = BTreeMap::new();
         let mut triangles = Vec::with_capacity(4 * mesh.triangles.len());
@@ -259,7 +278,6 @@ fn subdivide(mut mesh: Mesh, mut material_ids: Vec<u16>, max_edge: f64) -> Subdi
             triangles.extend([[t[0], ab, ca], [ab, t[1], bc], [ca, bc, t[2]], [ab, bc, ca]]);
         }
         mesh.triangles = triangles;
-        material_ids = material_ids.iter().flat_map(|&m| [m; 4]).collect();
     }
 }
 

@@ -12,10 +12,10 @@
 use std::{cmp::Reverse, collections::BinaryHeap};
 
 use super::lod::Lod;
-use crate::sensing::camera::{math::V3, shade::pattern::MaterialSample};
+use crate::sensing::camera::math::V3;
 
 /// Position, normal and material.
-const DIMENSIONS: usize = 6 + MaterialSample::COMPONENTS;
+const DIMENSIONS: usize = 12;
 /// Deviation of a normal that costs as much as a displacement by the tolerance, rad.
 const NORMAL_TOLERANCE: f64 = 0.15;
 /// Deviation of a material component that costs as much.
@@ -131,13 +131,13 @@ pub(crate) fn simplify(lod: &Lod, tolerance: f32) -> Lod {
 impl<'a> Simplifier<'a> {
     fn new(lod: &'a Lod, tolerance: f64) -> Self {
         let point = |v: usize| {
-            let (p, n, material) = (lod.positions[v], lod.normals[v], lod.materials[v].components());
+            let (p, n, material) = (lod.positions[v], lod.normals[v], &lod.materials[v]);
             let mut x = [0.0; DIMENSIONS];
             for axis in 0..3 {
                 x[axis] = f64::from(p[axis]);
                 x[3 + axis] = f64::from(n[axis]) * tolerance / NORMAL_TOLERANCE;
             }
-            for (x, &value) in x[6..].iter_mut().zip(&material) {
+            for (x, &value) in x[6..].iter_mut().zip(material) {
                 *x = f64::from(value) * tolerance / MATERIAL_TOLERANCE;
             }
             x
@@ -258,13 +258,11 @@ impl<'a> Simplifier<'a> {
             normals: used.iter().map(|&v| lod.normals[v]).collect(),
             materials: used.iter().map(|&v| lod.materials[v]).collect(),
             triangles: alive().map(|t| self.triangles[t].map(|v| new_index[v as usize])).collect(),
-            chart_ids: Vec::new(),
-            uvs: Vec::new(),
             smoothing_groups: alive().map(|t| lod.smoothing_groups[t]).collect(),
-            embedding: Vec::new(),
             vertex_spacing: lod.vertex_spacing,
             is_uniform: lod.is_uniform,
             geometric_error: lod.geometric_error + tolerance,
+            ..Lod::default()
         }
     }
 }
@@ -275,7 +273,7 @@ mod tests {
     use crate::{
         geometry::{shape::Shape, surface_mesh::SurfaceMesh},
         scene::{Mask, Visual, VisualLayer},
-        sensing::camera::mesh::bake::bake_vertices,
+        sensing::camera::mesh::lod::bake_vertices,
     };
 
     fn fine_level(shape: &Shape, cell: f64, visual: Visual) -> Lod {

@@ -1,55 +1,28 @@
 //! Interpolates the attributes of triangles at the surface points that pixels show.
 
+use std::sync::Arc;
+
 use crate::{
     geometry::Vec3,
     sensing::camera::{
-        lens::{Lens, RayBasis},
-        math::V3,
-        mesh::{lod::Lod, texture_chart::TextureChart},
+        lens::Lens,
+        math::{LANE_INDEX, LANES, V3, Vec3x8, f32x8},
+        mesh::{lod::Lod, texture::TextureChart},
         raster::{object_index, triangle_index},
-        scene::pose::PosedMesh,
-        shade::{pattern::MaterialSample, shading::SurfaceSamples},
-        simd::{LANE_INDEX, LANES, Vec3x8, f32x8},
+        scene::PosedMesh,
+        shade::{
+            pattern::{METALNESS, MaterialSample, SKY_VISIBILITY},
+            shading::SurfaceSamples,
+        },
     },
 };
 
-/// Number of material components.
-const COMPONENTS: usize = MaterialSample::COMPONENTS;
-
-/// An object at the level of detail and pose at which it is drawn.
-#[derive(Clone, Copy, Debug)]
+/// A mesh at one level of detail, posed in the world.
+#[derive(Clone, Debug)]
 pub(crate) struct MeshInstance<'a> {
     pub(crate) lod: &'a Lod,
-    pub(crate) posed: &'a PosedMesh,
     pub(crate) charts: &'a [TextureChart],
-}
-
-/// Rays from the eye through pixels.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct PixelRays {
-    pub(crate) eye: V3,
-    basis: RayBasis,
-    /// Width of a pixel at unit depth.
-    pixel_width: f32,
-}
-
-impl PixelRays {
-    pub(crate) fn new(lens: &Lens) -> Self {
-        Self { eye: lens.eye, basis: lens.rays(), pixel_width: 1.0 / lens.focal }
-    }
-
-    /// The ray through (x, y).
-    #[inline(always)]
-    fn at(&self, x: f32, y: f32) -> Vec3 {
-        let RayBasis { corner, right, down } = self.basis;
-        corner.cast::<f64>() + right.cast() * f64::from(x) + down.cast() * f64::from(y)
-    }
-
-    /// z components of the unit vectors along the rays through eight points (x, y).
-    pub(crate) fn direction_z(&self, x: f32x8, y: f32x8) -> f32x8 {
-        let RayBasis { corner, right, down } = &self.basis;
-        (Vec3x8::splat(corner) + Vec3x8::splat(right) * x + Vec3x8::splat(down) * y).normalized().z
-    }
+    pub(crate) posed: Arc<PosedMesh>,
 }
 
 /// A triangle prepared for interpolation.
@@ -64,7 +37,7 @@ pub(crate) struct TriangleInterpolator<'a> {
     /// Corners relative to the eye.
     p: [V3; 3],
     n: [V3; 3],
-    materials: [[f32; COMPONENTS]; 3],
+    materials: [MaterialSample; 3],
     texture: Option<CornerUvs<'a>>,
 }
 
@@ -76,10 +49,10 @@ struct CornerUvs<'a> {
 }
 
 impl<'a> TriangleInterpolator<'a> {
-    pub(crate) fn new(instance: &MeshInstance<'a>, rays: &PixelRays, id: u32) -> Self {
+    pub(crate) fn new(instance: &MeshInstance<'a>, lens: &Lens, id: u32) -> Self {
         let triangle = triangle_index(id);
         let corners = instance.lod.triangles[triangle].map(|v| v as usize);
-        let p = corners.map(|v| instance.posed.positions[v] - rays.eye);
+        let p = corners.map(|v| instance.posed.positions[v] - lens.eye);
         let [a, b, c] = p.map(|p| p.cast::<f64>());
         let texture = instance.lod.chart_ids.get(triangle).map(|&chart| CornerUvs {
             chart: &instance.charts[chart as usize],
@@ -91,14 +64,14 @@ impl<'a> TriangleInterpolator<'a> {
             barycentric: [b.cross(&c), c.cross(&a), a.cross(&b)],
             p,
             n: corners.map(|v| instance.posed.normals[v]),
-            materials: corners.map(|v| instance.lod.materials[v].components()),
+            materials: corners.map(|v| instance.lod.materials[v]),
             texture,
         }
     }
 
     /// Surface points at eight pixels in a row, all of which this triangle covers; (x, y) is the centre of the first.
-    pub(crate) fn row(&self, rays: &PixelRays, x: f32, y: f32) -> SurfaceSamples {
-        let (first, right) = (rays.at(x, y), rays.basis.right.cast());
+    pub(crate) fn row(&self, lens: &Lens, x: f32, y: f32) -> SurfaceSamples {
+        let (first, right) = (lens.ray(x, y), lens.right.cast());
         let weights = self
             .barycentric
             .map(|b| f32x8::splat(b.dot(&first) as f32) + f32x8::splat(b.dot(&right) as f32) * LANE_INDEX);
@@ -116,24 +89,24 @@ impl<'a> TriangleInterpolator<'a> {
         let (albedo, roughness) = match &self.texture {
             Some(CornerUvs { chart, uvs }) => {
                 let uv = [0, 1].map(|axis| mix(uvs.map(|uv| uv[axis])));
-                chart.sample(uv, pixel_footprint(from_eye, n, rays))
+                chart.sample(uv, pixel_footprint(from_eye, n, lens))
             }
             None => (Vec3x8 { x: component(0), y: component(1), z: component(2) }, component(3)),
         };
         SurfaceSamples {
-            p: from_eye + Vec3x8::splat(&rays.eye),
+            p: from_eye + Vec3x8::splat(&lens.eye),
             n,
             albedo,
             roughness,
-            metalness: component(4),
-            sky_visibility: component(5),
+            metalness: component(METALNESS),
+            sky_visibility: component(SKY_VISIBILITY),
             object: f32x8::splat(self.object),
         }
     }
 
     /// Appends the point where the ray through (x, y) meets the triangle, or the nearest point of the triangle.
-    pub(crate) fn push(&self, batch: &mut ShadingBatch<'a>, rays: &PixelRays, x: f32, y: f32) {
-        let ray = rays.at(x, y);
+    pub(crate) fn push(&self, batch: &mut ShadingBatch<'a>, lens: &Lens, x: f32, y: f32) {
+        let ray = lens.ray(x, y);
         let weights = self.barycentric.map(|b| b.dot(&ray));
         let sum = weights[0] + weights[1] + weights[2];
         let w = if sum == 0.0 { [1.0 / 3.0; 3] } else { weights.map(|w| (w / sum).max(0.0) as f32) };
@@ -147,7 +120,7 @@ impl<'a> TriangleInterpolator<'a> {
             batch.n[axis][lane] = n[axis];
         }
         let [a, b, c] = &self.materials;
-        for i in 0..COMPONENTS {
+        for i in 0..a.len() {
             batch.materials[i][lane] = a[i] * w[0] + b[i] * w[1] + c[i] * w[2];
         }
         batch.object[lane] = self.object;
@@ -162,11 +135,11 @@ impl<'a> TriangleInterpolator<'a> {
 
 /// Width of a pixel projected onto surfaces at `from_eye`, m: the geometric mean over both directions.
 #[inline(always)]
-fn pixel_footprint(from_eye: Vec3x8, n: Vec3x8, rays: &PixelRays) -> f32x8 {
+fn pixel_footprint(from_eye: Vec3x8, n: Vec3x8, lens: &Lens) -> f32x8 {
     let distance2 = from_eye.dot(from_eye).fast_max(f32x8::splat(1e-12));
     let distance = distance2.sqrt();
     let cosine = (n.dot(from_eye).abs() / distance).fast_max(f32x8::splat(0.05));
-    distance * f32x8::splat(rays.pixel_width) / cosine.sqrt()
+    distance * f32x8::splat(1.0 / lens.focal) / cosine.sqrt()
 }
 
 /// Surface points of unrelated pixels, collected until eight can be shaded together.
@@ -180,7 +153,7 @@ pub(crate) struct ShadingBatch<'a> {
     /// Relative to the eye.
     p: [[f32; LANES]; 3],
     n: [[f32; LANES]; 3],
-    materials: [[f32; LANES]; COMPONENTS],
+    materials: [[f32; LANES]; 6],
     object: [f32; LANES],
     uv: [[f32; LANES]; 2],
     charts: [Option<&'a TextureChart>; LANES],
@@ -188,17 +161,17 @@ pub(crate) struct ShadingBatch<'a> {
 
 impl ShadingBatch<'_> {
     /// Returns the points; lanes from `count` on hold leftovers.
-    pub(crate) fn samples(&self, rays: &PixelRays) -> SurfaceSamples {
+    pub(crate) fn samples(&self, lens: &Lens) -> SurfaceSamples {
         let from_eye = Vec3x8::from_arrays(&self.p);
         let n = Vec3x8::from_arrays(&self.n).normalized();
         let component = |i: usize| f32x8::new(self.materials[i]);
         let mut samples = SurfaceSamples {
-            p: from_eye + Vec3x8::splat(&rays.eye),
+            p: from_eye + Vec3x8::splat(&lens.eye),
             n,
             albedo: Vec3x8 { x: component(0), y: component(1), z: component(2) },
             roughness: component(3),
-            metalness: component(4),
-            sky_visibility: component(5),
+            metalness: component(METALNESS),
+            sky_visibility: component(SKY_VISIBILITY),
             object: f32x8::new(self.object),
         };
         let chart_of = |lane: usize| self.charts[lane].map_or(std::ptr::null(), |c| c as *const TextureChart);
@@ -212,7 +185,7 @@ impl ShadingBatch<'_> {
             let mask = f32x8::new(shares_chart).simd_gt(f32x8::ZERO);
             // Other lanes repeat this one, so that they read no other mip levels.
             let here = |values: &[f32; LANES]| mask.select(f32x8::new(*values), f32x8::splat(values[lane]));
-            let footprint = pixel_footprint(from_eye, n, rays);
+            let footprint = pixel_footprint(from_eye, n, lens);
             let footprint = mask.select(footprint, f32x8::splat(footprint.to_array()[lane]));
             let (albedo, roughness) = chart.sample([here(&self.uv[0]), here(&self.uv[1])], footprint);
             samples.albedo = Vec3x8::select(mask, albedo, samples.albedo);

@@ -4,24 +4,22 @@ pub(crate) mod background;
 pub(crate) mod interpolate;
 pub(crate) mod pass;
 pub(crate) mod tile;
-pub(crate) mod visibility;
 
 use background::{BackgroundTile, CachedBackground};
-use interpolate::PixelRays;
-use pass::RenderPass;
-use tile::{TileDisplay, TileRect, TileResolver, TileSamples};
-use visibility::{Occluders, choose_levels, draw_moving_shadows, enclosing_object, instances, pose_objects};
+use pass::{PosedObject, RenderPass};
+use tile::{TileDisplay, TileRect, TileResolver, is_all_moving};
 
+use super::{
+    error::CameraError,
+    image::RenderedImage,
+    lens::Lens,
+    raster::{TILE_EDGE, TileBins, TileSamples},
+    scene::{FrameView, RenderScene},
+    shade::{occlusion::OcclusionEllipsoid, shadow::ShadowMap},
+};
 use crate::{
     geometry::{Pose, Vec3},
     scene::{Camera, CameraMount},
-    sensing::camera::{
-        CameraError, FrameView, RenderScene, RenderedImage,
-        lens::Lens,
-        raster::binning::{TILE_EDGE, TileBins},
-        scene::{pose::PosedMesh, render_scene::SceneId},
-        shade::shadow::ShadowMap,
-    },
 };
 
 /// Draws images of a [`RenderScene`] as cameras see it.
@@ -32,18 +30,16 @@ use crate::{
 /// A renderer may be used with several scenes, but keeps the cache of one.
 #[derive(Debug, Default)]
 pub struct Renderer {
-    /// World-space levels of detail of the moving objects.
-    poses: Vec<Vec<PosedMesh>>,
+    /// The scene of the caches.
+    scene_id: Option<u64>,
     bins: TileBins,
     moving_shadow: Option<MovingShadow>,
     backgrounds: Vec<CachedBackground>,
-    is_uncached: bool,
 }
 
 /// The shadow map of the moving objects in one state.
 #[derive(Debug)]
 struct MovingShadow {
-    scene: SceneId,
     nodes: Vec<Vec<Vec3>>,
     rigid: Vec<Pose>,
     links: Vec<Vec<Pose>>,
@@ -51,34 +47,21 @@ struct MovingShadow {
 }
 
 impl MovingShadow {
-    fn new(scene: &RenderScene) -> Self {
-        Self {
-            scene: scene.id.clone(),
-            nodes: Vec::new(),
-            rigid: Vec::new(),
-            links: Vec::new(),
-            map: ShadowMap::new(&scene.lighting),
+    fn update(&mut self, view: &FrameView, objects: &[PosedObject]) {
+        if self.nodes == view.nodes && self.rigid == view.rigid && self.links == view.links {
+            return;
         }
-    }
-
-    fn shows(&self, view: &FrameView) -> bool {
-        self.nodes == view.nodes && self.rigid == view.rigid && self.links == view.links
-    }
-
-    fn draw(&mut self, scene: &RenderScene, view: &FrameView, poses: &[Vec<PosedMesh>]) {
         view.nodes.clone_into(&mut self.nodes);
         view.rigid.clone_into(&mut self.rigid);
         view.links.clone_into(&mut self.links);
-        draw_moving_shadows(scene, poses, &mut self.map);
+        let casters = objects.iter().filter(|o| o.object.casts_shadow && o.object.is_moving());
+        self.map.draw(
+            casters.map(|o| (o.coarsest.posed.positions.as_slice(), o.coarsest.lod.triangles.as_slice())),
+        );
     }
 }
 
 impl Renderer {
-    /// A renderer that caches no backgrounds: each image is drawn from scratch.
-    pub fn without_cache() -> Self {
-        Self { is_uncached: true, ..Self::default() }
-    }
-
     /// Draws the image that `camera` sees of `scene` in the state `view`.
     ///
     /// The result depends on the arguments alone and is byte-identical on every machine.
@@ -93,45 +76,51 @@ impl Renderer {
         camera: &Camera,
     ) -> Result<RenderedImage, CameraError> {
         let lens = Lens::new(camera, view.hand_w)?;
-        // Taken out, so that an error below leaves no shadow whose poses are half updated.
-        let known = self.moving_shadow.take().filter(|shadow| shadow.scene == scene.id);
-        let is_same_state = known.as_ref().is_some_and(|shadow| shadow.shows(view));
-        let bounds = pose_objects(scene, view, is_same_state, &mut self.poses)?;
-        let levels = choose_levels(scene, view, &lens, &bounds, &mut self.poses)?;
-        let inside = enclosing_object(scene, &lens, &bounds, &self.poses);
-        let mut moving_shadow = known.unwrap_or_else(|| MovingShadow::new(scene));
-        if !is_same_state {
-            moving_shadow.draw(scene, view, &self.poses);
+        if self.scene_id != Some(scene.id) {
+            *self =
+                Self { scene_id: Some(scene.id), bins: std::mem::take(&mut self.bins), ..Self::default() };
         }
-        let occluders = Occluders::new(scene, &bounds);
+        let posed = |index| PosedObject::new(scene, index, view, &lens);
+        let objects = (0..scene.objects.len()).map(posed).collect::<Result<Vec<_>, _>>()?;
+        let moving_shadow = self.moving_shadow.get_or_insert_with(|| MovingShadow {
+            nodes: Vec::new(),
+            rigid: Vec::new(),
+            links: Vec::new(),
+            map: ShadowMap::new(&scene.lighting),
+        });
+        moving_shadow.update(view, &objects);
+        let occluders = |is_moving: bool| -> Vec<OcclusionEllipsoid> {
+            let occluders = objects
+                .iter()
+                .enumerate()
+                .filter(|(_, o)| o.is_occluder() && o.object.is_moving() == is_moving);
+            occluders.map(|(i, o)| OcclusionEllipsoid::from_bounds(i, &o.bounds)).collect()
+        };
         let pass = RenderPass {
             scene,
             lens: &lens,
-            rays: PixelRays::new(&lens),
-            instances: &instances(scene, &self.poses, &levels),
-            fixed_occluders: &occluders.fixed,
-            moving_occluders: &occluders.moving,
+            objects: &objects,
+            fixed_occluders: &occluders(false),
+            moving_occluders: &occluders(true),
             moving_shadow: &moving_shadow.map,
         };
-        let mut image = if self.is_uncached || camera.mount != CameraMount::World {
+        let mut image = if camera.mount != CameraMount::World {
             draw_all(&pass, &mut self.bins)
         } else {
-            let known = self.backgrounds.iter().position(|b| b.scene == scene.id && b.camera == *camera);
+            let known = self.backgrounds.iter().position(|background| background.camera == *camera);
             let index = known.unwrap_or_else(|| {
-                self.backgrounds.retain(|b| b.scene == scene.id);
                 self.backgrounds.push(draw_background(&pass, camera, &mut self.bins));
                 self.backgrounds.len() - 1
             });
             draw_over_background(&pass, &self.backgrounds[index], &mut self.bins)
         };
-        self.moving_shadow = Some(moving_shadow);
-        image.inside = inside;
+        image.inside = objects.iter().find(|o| o.contains(&lens.eye)).map(|o| o.object.name.clone());
         Ok(image)
     }
 }
 
-fn blank_image(lens: &Lens) -> RenderedImage {
-    let (width, height) = (lens.width, lens.height);
+fn blank_image(pass: &RenderPass) -> RenderedImage {
+    let (width, height) = (pass.lens.width, pass.lens.height);
     let pixels = width * height;
     RenderedImage {
         width,
@@ -143,26 +132,22 @@ fn blank_image(lens: &Lens) -> RenderedImage {
     }
 }
 
-fn blank_samples(lens: &Lens) -> TileSamples {
-    TileSamples::new(TILE_EDGE, TILE_EDGE, 1.0 / lens.far, true)
+fn blank_samples(pass: &RenderPass) -> TileSamples {
+    TileSamples::new(TILE_EDGE, TILE_EDGE, 1.0 / pass.lens.far, true)
 }
 
 /// Draws all objects, without a cached background.
 fn draw_all(pass: &RenderPass, bins: &mut TileBins) -> RenderedImage {
-    bins.clear(pass.lens);
-    pass.bin_objects(false, bins);
-    pass.bin_objects(true, bins);
-    bins.sort();
-    let (mut image, mut display) = (blank_image(pass.lens), TileDisplay::new());
-    let (mut samples, mut triangles) = (blank_samples(pass.lens), Vec::new());
-    for tile in 0..bins.tile_counts().iter().product() {
-        let rect = TileRect::new(tile, bins, pass);
+    pass.bin(&[false, true], bins);
+    let (mut image, mut display) = (blank_image(pass), TileDisplay::zeros());
+    let mut samples = blank_samples(pass);
+    for (tile, rect) in TileRect::all(pass.lens).enumerate() {
         samples.clear(1.0 / pass.lens.far);
-        if rect.collect_visible(bins, &mut triangles) {
-            rect.draw_single(&triangles[0], pass, &mut samples, &mut display, &mut image);
-        } else {
-            rect.rasterize(&triangles, &mut samples);
-            TileResolver::new(pass, rect, &samples).run(false, &mut display, &mut image);
+        let covering = bins.draw_tile(tile, rect.origin(), &mut samples, true);
+        let mut resolver = TileResolver::new(pass, rect, &samples, &mut display, &mut image);
+        match covering {
+            Some(id) => resolver.run_covered(id),
+            None => resolver.run(false),
         }
         rect.write(&display, &mut image);
     }
@@ -171,25 +156,18 @@ fn draw_all(pass: &RenderPass, bins: &mut TileBins) -> RenderedImage {
 
 /// Draws the fixed objects.
 fn draw_background(pass: &RenderPass, camera: &Camera, bins: &mut TileBins) -> CachedBackground {
-    bins.clear(pass.lens);
-    pass.bin_objects(false, bins);
-    bins.sort();
-    let (mut image, mut display) = (blank_image(pass.lens), TileDisplay::new());
-    let (mut samples, mut triangles) = (blank_samples(pass.lens), Vec::new());
-    let mut tiles = Vec::new();
-    for tile in 0..bins.tile_counts().iter().product() {
-        let rect = TileRect::new(tile, bins, pass);
-        samples.clear(1.0 / pass.lens.far);
-        rect.collect_visible(bins, &mut triangles);
-        rect.rasterize(&triangles, &mut samples);
+    pass.bin(&[false], bins);
+    let (mut image, mut tiles) = (blank_image(pass), Vec::new());
+    for (tile, rect) in TileRect::all(pass.lens).enumerate() {
+        let mut samples = blank_samples(pass);
+        bins.draw_tile(tile, rect.origin(), &mut samples, false);
         let mut background = BackgroundTile::new();
-        TileResolver::new(pass, rect, &samples).run(false, &mut background, &mut image);
-        background.finish(pass, &samples);
-        background.copy_display(&mut display);
-        rect.write(&display, &mut image);
+        TileResolver::new(pass, rect, &samples, &mut background, &mut image).run(false);
+        background.finish(pass, samples);
+        rect.write(&background.display, &mut image);
         tiles.push(background);
     }
-    CachedBackground { scene: pass.scene.id.clone(), camera: camera.clone(), tiles, image }
+    CachedBackground { camera: camera.clone(), tiles, image }
 }
 
 /// Draws the moving objects over a background.
@@ -198,27 +176,20 @@ fn draw_over_background(
     background: &CachedBackground,
     bins: &mut TileBins,
 ) -> RenderedImage {
-    bins.clear(pass.lens);
-    pass.bin_objects(true, bins);
-    bins.sort();
-    let (mut image, mut display) = (background.image.clone(), TileDisplay::new());
-    let (mut samples, mut triangles) = (blank_samples(pass.lens), Vec::new());
-    for (tile, fixed) in background.tiles.iter().enumerate() {
-        let occlusion = fixed.moving_occlusion(pass);
-        let is_occupied = bins.is_occupied(tile);
-        if !is_occupied && occlusion.is_none() {
-            continue;
-        }
-        let rect = TileRect::new(tile, bins, pass);
-        if is_occupied {
+    pass.bin(&[true], bins);
+    let (mut image, mut display) = (background.image.clone(), TileDisplay::zeros());
+    let mut samples = blank_samples(pass);
+    for (tile, (rect, fixed)) in TileRect::all(pass.lens).zip(&background.tiles).enumerate() {
+        let occluders = fixed.moving_occluders(pass);
+        if bins.is_occupied(tile) {
             samples.clone_from(&fixed.samples);
-            rect.collect_visible(bins, &mut triangles);
-            rect.rasterize(&triangles, &mut samples);
-            let mut resolver = TileResolver::new(pass, rect, &samples);
-            fixed.relight(pass, &occlusion, |first| resolver.is_all_moving(first), &mut display);
-            resolver.run(true, &mut display, &mut image);
+            bins.draw_tile(tile, rect.origin(), &mut samples, false);
+            fixed.relight(pass, occluders.as_deref(), |first| is_all_moving(&samples, first), &mut display);
+            TileResolver::new(pass, rect, &samples, &mut display, &mut image).run(true);
+        } else if occluders.is_some() {
+            fixed.relight(pass, occluders.as_deref(), |_| false, &mut display);
         } else {
-            fixed.relight(pass, &occlusion, |_| false, &mut display);
+            continue;
         }
         rect.write(&display, &mut image);
     }

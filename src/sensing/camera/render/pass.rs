@@ -1,87 +1,158 @@
-//! Everything that drawing one image needs: the visible meshes, and the light on them.
+//! Everything that drawing one image needs: the posed objects, and the light on them.
 
-use super::interpolate::{MeshInstance, PixelRays};
-use crate::sensing::camera::{
-    lens::Lens,
-    raster::{NO_TRIANGLE, binning::TileBins, first_triangle_id, object_index, triangle_index},
-    scene::render_scene::RenderScene,
-    shade::{
-        occlusion::{OcclusionEllipsoid, sky_visibility},
-        shading::{DirectAndAmbient, SurfaceSamples},
-        shadow::ShadowMap,
+use std::sync::Arc;
+
+use super::interpolate::MeshInstance;
+use crate::{
+    physics::BodyId,
+    sensing::camera::{
+        error::CameraError,
+        lens::Lens,
+        math::{V3, Vec3x8},
+        raster::{TileBins, first_triangle_id, object_index, triangle_index},
+        scene::{FrameView, PosedMesh, RenderObject, RenderScene},
+        shade::{
+            occlusion::{OcclusionEllipsoid, sky_visibility},
+            shading::{DirectAndAmbient, SurfaceSamples},
+            shadow::ShadowMap,
+        },
     },
-    simd::{Vec3x8, f32x8},
 };
+
+/// Maximum extent of objects that occlude the sky for others, m; larger ones are floors and walls.
+const MAX_OCCLUDER_EXTENT: f32 = 0.35;
+/// Factor on the bounding radius in the frustum test: finer levels may exceed the coarsest one a little.
+const BOUNDS_MARGIN: f32 = 1.1;
+
+/// Lowest and highest corner of a bounding box.
+pub(crate) type Bounds = [V3; 2];
+
+/// Bounds of points; inverted if there are none.
+pub(crate) fn bounds_of(points: impl IntoIterator<Item = V3>) -> Bounds {
+    points.into_iter().fold([V3::repeat(f32::MAX), V3::repeat(f32::MIN)], |b, p| [b[0].inf(&p), b[1].sup(&p)])
+}
+
+/// An object of a scene in the state of an image.
+pub(crate) struct PosedObject<'a> {
+    pub(crate) object: &'a RenderObject,
+    pub(crate) coarsest: MeshInstance<'a>,
+    /// Bounds of the coarsest level, world, m.
+    pub(crate) bounds: Bounds,
+    /// The level of detail that the image shows; `None` if the object is out of view.
+    pub(crate) drawn: Option<MeshInstance<'a>>,
+}
+
+impl<'a> PosedObject<'a> {
+    /// Poses the coarsest level of detail, and the one for the distance from the camera.
+    pub(crate) fn new(
+        scene: &'a RenderScene,
+        index: usize,
+        view: &FrameView,
+        lens: &Lens,
+    ) -> Result<Self, CameraError> {
+        let object = &scene.objects[index];
+        let lods = &object.mesh.lods;
+        let pose = |level: usize| {
+            let posed = match scene.fixed_meshes[index].get(level) {
+                Some(posed) => posed.clone(),
+                None => Arc::new(PosedMesh::new(object, &lods[level], view)?),
+            };
+            Ok(MeshInstance { lod: &lods[level], charts: &object.mesh.charts, posed })
+        };
+        let coarsest = pose(lods.len() - 1)?;
+        let bounds @ [low, high] = bounds_of(coarsest.posed.positions.iter().copied());
+        let (centre, radius) = ((low + high) * 0.5, 0.5 * (high - low).norm());
+        let drawn = if lens.may_see(&centre, BOUNDS_MARGIN * radius) {
+            let pixel = (lens.depth(&centre) - radius).max(lens.near) / lens.focal;
+            let level = lods.iter().rposition(|lod| lod.is_fine_enough(pixel)).unwrap_or(0);
+            Some(if level + 1 == lods.len() { coarsest.clone() } else { pose(level)? })
+        } else {
+            None
+        };
+        Ok(Self { object, coarsest, bounds, drawn })
+    }
+
+    /// True for small objects that cast shadows, except links of articulations.
+    pub(crate) fn is_occluder(&self) -> bool {
+        self.object.casts_shadow
+            && !matches!(self.object.body, BodyId::Link(_))
+            && (self.bounds[1] - self.bounds[0]).max() < MAX_OCCLUDER_EXTENT
+    }
+
+    /// True if the triangles subtend a solid angle of 4π at a point (Van Oosterom & Strackee, 1983).
+    pub(crate) fn contains(&self, point: &V3) -> bool {
+        let [low, high] = &self.bounds;
+        if (0..3).any(|axis| point[axis] < low[axis] || point[axis] > high[axis]) {
+            return false;
+        }
+        let mut angle = 0.0_f64;
+        for t in &self.coarsest.lod.triangles {
+            let [a, b, c] = t.map(|v| (self.coarsest.posed.positions[v as usize] - point).cast::<f64>());
+            let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
+            let denominator = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
+            angle += 2.0 * a.dot(&b.cross(&c)).atan2(denominator);
+        }
+        // 4π inside and 0 outside, up to rounding.
+        angle.abs() > std::f64::consts::TAU
+    }
+}
 
 /// The inputs of one image.
 pub(crate) struct RenderPass<'a> {
     pub(crate) scene: &'a RenderScene,
     pub(crate) lens: &'a Lens,
-    pub(crate) rays: PixelRays,
-    /// By object; `None` if it is out of view.
-    pub(crate) instances: &'a [Option<MeshInstance<'a>>],
+    pub(crate) objects: &'a [PosedObject<'a>],
     pub(crate) fixed_occluders: &'a [OcclusionEllipsoid],
     pub(crate) moving_occluders: &'a [OcclusionEllipsoid],
     pub(crate) moving_shadow: &'a ShadowMap,
 }
 
-/// Identity of a smooth surface.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) struct SurfaceId {
-    /// Index of the object; `usize::MAX` for the background.
-    object: usize,
-    smoothing_group: u32,
-}
-
 impl RenderPass<'_> {
-    /// Adds the triangles of the moving objects, or of the fixed ones.
-    pub(crate) fn bin_objects(&self, moving: bool, bins: &mut TileBins) {
-        for (i, (object, instance)) in self.scene.objects.iter().zip(self.instances).enumerate() {
-            if let Some(instance) = instance.as_ref().filter(|_| object.is_moving() == moving) {
-                let first_id = first_triangle_id(i, moving);
-                bins.add(self.lens, &instance.posed.positions, &instance.lod.triangles, first_id);
-            }
-        }
-    }
-
     /// Value of a triangle's object in segmentation images; 0 for none.
     pub(crate) fn segmentation_id(&self, id: u32) -> u16 {
-        if id == NO_TRIANGLE { 0 } else { self.scene.objects[object_index(id)].segmentation_id }
+        self.scene.objects.get(object_index(id)).map_or(0, |object| object.segmentation_id)
     }
 
-    /// The smooth surface that a triangle belongs to. Only samples of one surface are averaged before shading.
-    pub(crate) fn surface(&self, id: u32) -> SurfaceId {
-        if id == NO_TRIANGLE {
-            return SurfaceId { object: usize::MAX, smoothing_group: 0 };
-        }
-        let object = object_index(id);
-        let group = self.instances[object].as_ref().map(|i| i.lod.smoothing_groups[triangle_index(id)]);
-        SurfaceId { object, smoothing_group: group.unwrap_or(0) }
+    /// The smooth surface that a triangle belongs to: object and smoothing group; `None` for the background. Only
+    /// samples of one surface are averaged before shading.
+    pub(crate) fn surface(&self, id: u32) -> Option<[usize; 2]> {
+        let mesh = self.objects.get(object_index(id))?.drawn.as_ref()?;
+        Some([object_index(id), mesh.lod.smoothing_groups[triangle_index(id)] as usize])
     }
 
     /// Radiance of points that only fixed objects shadow and occlude.
     #[inline(always)]
-    pub(crate) fn shade_under_fixed(&self, samples: &SurfaceSamples) -> DirectAndAmbient {
-        let to_eye = (Vec3x8::splat(&self.rays.eye) - samples.p).normalized();
+    pub(crate) fn shade(&self, points: &SurfaceSamples) -> DirectAndAmbient {
+        let to_eye = (Vec3x8::splat(&self.lens.eye) - points.p).normalized();
         let illumination = &self.scene.illumination;
-        let mut radiance = illumination.shade(samples, to_eye);
+        let mut radiance = illumination.shade(points, to_eye);
         let (fine, wide) = (&self.scene.fixed_shadow, self.scene.wide_shadow.as_ref());
         radiance.direct =
-            radiance.direct * illumination.key_visibility_cascaded(samples.p, &samples.n, fine, wide);
+            radiance.direct * illumination.key_visibility_cascaded(points.p, &points.n, fine, wide);
         radiance.ambient =
-            radiance.ambient * sky_visibility(self.fixed_occluders, samples.p, samples.n, samples.object);
+            radiance.ambient * sky_visibility(self.fixed_occluders, points.p, points.n, points.object);
         radiance
     }
 
-    /// Fractions of the key light and of the sky that moving objects leave visible.
+    /// The part of the radiance under fixed objects that moving objects leave.
     #[inline(always)]
-    pub(crate) fn visibility_under_moving(&self, samples: &SurfaceSamples) -> (f32x8, f32x8) {
-        let key = self.scene.illumination.key_visibility(samples.p, &samples.n, self.moving_shadow);
-        (key, sky_visibility(self.moving_occluders, samples.p, samples.n, samples.object))
+    pub(crate) fn attenuate_by_moving(&self, radiance: DirectAndAmbient, points: &SurfaceSamples) -> Vec3x8 {
+        let key = self.scene.illumination.key_visibility(points.p, &points.n, self.moving_shadow);
+        let sky = sky_visibility(self.moving_occluders, points.p, points.n, points.object);
+        radiance.direct * key + radiance.ambient * sky
     }
 
-    /// Radiance of the background at eight points (x, y) of the image.
-    pub(crate) fn background_radiance(&self, x: f32x8, y: f32x8) -> Vec3x8 {
-        self.scene.illumination.sky_radiance(self.rays.direction_z(x, y))
+    /// Sorts the triangles of moving objects, fixed ones, or one kind after the other into tiles.
+    pub(crate) fn bin(&self, kinds: &[bool], bins: &mut TileBins) {
+        bins.clear(self.lens);
+        for &is_moving in kinds {
+            for (i, posed) in self.objects.iter().enumerate() {
+                if let Some(mesh) = posed.drawn.as_ref().filter(|_| posed.object.is_moving() == is_moving) {
+                    let first_id = first_triangle_id(i, is_moving);
+                    bins.add(self.lens, &mesh.posed.positions, &mesh.lod.triangles, first_id);
+                }
+            }
+        }
+        bins.sort();
     }
 }

@@ -7,22 +7,18 @@ use super::{
     pass::RenderPass,
 };
 use crate::sensing::camera::{
-    RenderedImage,
+    image::RenderedImage,
+    lens::Lens,
+    math::{LANE_INDEX, LANES, Vec3x8, f32x8, floor_to_u32},
     raster::{
-        MOVING_FLAG, NO_TRIANGLE,
-        binning::{TILE_EDGE, TileBins, TileTriangle},
+        CENTRE_ROW, MOVING_FLAG, NO_TRIANGLE, ROWS_PER_PIXEL, SAMPLE_OFFSETS, TILE_EDGE, TileSamples,
         object_index,
-        sample_buffer::{CENTRE_ROW, ROWS_PER_PIXEL, SAMPLE_OFFSETS, SampleBuffer},
     },
-    shade::shading::SurfaceSamples,
-    simd::{LANE_INDEX, LANES, Vec3x8, f32x8, floor_to_u32},
+    shade::shading::{DirectAndAmbient, SurfaceSamples},
 };
 
 /// Number of pixels of a tile.
 pub(crate) const TILE_PIXELS: usize = TILE_EDGE * TILE_EDGE;
-
-/// The samples of a tile.
-pub(crate) type TileSamples = SampleBuffer<ROWS_PER_PIXEL>;
 
 /// Pixels of a tile that eight lanes contribute to, and the share of each.
 #[derive(Clone, Copy, Debug)]
@@ -32,14 +28,6 @@ pub(crate) struct PixelTargets {
     count: usize,
     /// True if the lanes are whole pixels in a row.
     is_row: bool,
-}
-
-/// The target of one lane.
-#[derive(Clone, Copy)]
-pub(crate) struct LaneTarget {
-    pub(crate) lane: usize,
-    pub(crate) pixel: usize,
-    pub(crate) share: f32,
 }
 
 impl PixelTargets {
@@ -53,46 +41,49 @@ impl PixelTargets {
         Self { pixel: [pixel as u32; LANES], share: [share; LANES], count: 1, is_row: false }
     }
 
-    pub(crate) fn lanes(&self) -> impl Iterator<Item = LaneTarget> {
-        (0..self.count).map(|lane| LaneTarget {
-            lane,
-            pixel: self.pixel[lane] as usize % TILE_PIXELS,
-            share: self.share[lane],
-        })
+    /// Calls `add` with the lane, the pixel and its share for each target.
+    #[inline(always)]
+    pub(crate) fn for_each(&self, mut add: impl FnMut(usize, usize, f32)) {
+        (0..self.count).for_each(|lane| add(lane, self.pixel[lane] as usize % TILE_PIXELS, self.share[lane]));
     }
 }
 
-/// Receives the surface points that the pixels of a tile show.
+/// Receives the light that the pixels of a tile show.
 pub(crate) trait ShadingSink {
     /// Clears a pixel before its shares are added.
-    fn begin_pixel(&mut self, pixel: usize);
-    fn add_surface(&mut self, pass: &RenderPass, samples: &SurfaceSamples, targets: &PixelTargets);
-    fn add_background(&mut self, pass: &RenderPass, radiance: Vec3x8, targets: &PixelTargets);
+    fn begin_pixel(&mut self, _pixel: usize) {}
+
+    /// Adds radiance under fixed objects alone to pixels; `surface` are the points that it comes from, `None` for the
+    /// background.
+    fn add(
+        &mut self,
+        pass: &RenderPass,
+        radiance: DirectAndAmbient,
+        surface: Option<&SurfaceSamples>,
+        targets: &PixelTargets,
+    );
 }
 
-/// Display values of a tile, 0..=255, by channel.
-pub(crate) struct TileDisplay(Box<[[f32; TILE_PIXELS]; 3]>);
+/// Three values per pixel of a tile, by channel.
+#[derive(Clone, Debug)]
+pub(crate) struct TileChannels(pub(crate) [Vec<f32>; 3]);
 
-impl TileDisplay {
-    pub(crate) fn new() -> Self {
-        Self(Box::new([[0.0; TILE_PIXELS]; 3]))
+impl TileChannels {
+    pub(crate) fn zeros() -> Self {
+        Self(std::array::from_fn(|_| vec![0.0; TILE_PIXELS]))
     }
 
+    /// Returns eight pixels from `first` on.
     #[inline(always)]
-    fn add(&mut self, display: Vec3x8, targets: &PixelTargets) {
-        if targets.is_row {
-            self.set_row(targets.pixel[0] as usize, display);
-            return;
-        }
-        for (channel, values) in self.0.iter_mut().zip(display.to_arrays()) {
-            targets.lanes().for_each(|t| channel[t.pixel] += t.share * values[t.lane]);
-        }
+    pub(crate) fn load(&self, first: usize) -> Vec3x8 {
+        let lanes = |c: usize| self.0[c][first..].first_chunk::<LANES>().copied().unwrap_or_default();
+        Vec3x8::from_arrays(&[lanes(0), lanes(1), lanes(2)])
     }
 
     /// Sets eight pixels from `first` on.
     #[inline(always)]
-    pub(crate) fn set_row(&mut self, first: usize, display: Vec3x8) {
-        for (channel, values) in self.0.iter_mut().zip(display.to_arrays()) {
+    pub(crate) fn store(&mut self, first: usize, values: Vec3x8) {
+        for (channel, values) in self.0.iter_mut().zip(values.to_arrays()) {
             if let Some(pixels) = channel.get_mut(first..).and_then(|c| c.first_chunk_mut::<LANES>()) {
                 *pixels = values;
             }
@@ -100,26 +91,37 @@ impl TileDisplay {
     }
 }
 
+/// Display values of a tile, 0..=255.
+pub(crate) type TileDisplay = TileChannels;
+
 impl ShadingSink for TileDisplay {
     fn begin_pixel(&mut self, pixel: usize) {
         self.0.iter_mut().for_each(|channel| channel[pixel] = 0.0);
     }
 
-    fn add_surface(&mut self, pass: &RenderPass, samples: &SurfaceSamples, targets: &PixelTargets) {
-        let (key, sky) = pass.visibility_under_moving(samples);
-        let radiance = pass.shade_under_fixed(samples).attenuated(key, sky);
-        self.add(pass.scene.tone_mapper.display(radiance), targets);
-    }
-
-    fn add_background(&mut self, pass: &RenderPass, radiance: Vec3x8, targets: &PixelTargets) {
-        self.add(pass.scene.tone_mapper.display(radiance), targets);
+    #[inline(always)]
+    fn add(
+        &mut self,
+        pass: &RenderPass,
+        radiance: DirectAndAmbient,
+        surface: Option<&SurfaceSamples>,
+        targets: &PixelTargets,
+    ) {
+        let radiance = surface.map_or(radiance.ambient, |points| pass.attenuate_by_moving(radiance, points));
+        let display = pass.scene.tone_mapper.display(radiance);
+        if targets.is_row {
+            self.store(targets.pixel[0] as usize, display);
+            return;
+        }
+        for (channel, values) in self.0.iter_mut().zip(display.to_arrays()) {
+            targets.for_each(|lane, pixel, share| channel[pixel] += share * values[lane]);
+        }
     }
 }
 
 /// The part of the image that a tile covers, pixels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TileRect {
-    tile: usize,
     x: usize,
     y: usize,
     width: usize,
@@ -127,45 +129,24 @@ pub(crate) struct TileRect {
 }
 
 impl TileRect {
-    pub(crate) fn new(tile: usize, bins: &TileBins, pass: &RenderPass) -> Self {
-        let columns = bins.tile_counts()[0];
-        let (x, y) = (tile % columns * TILE_EDGE, tile / columns * TILE_EDGE);
-        let (width, height) = ((pass.lens.width - x).min(TILE_EDGE), (pass.lens.height - y).min(TILE_EDGE));
-        Self { tile, x, y, width, height }
+    /// The tiles of an image, row by row.
+    pub(crate) fn all(lens: &Lens) -> impl Iterator<Item = Self> {
+        let [width, height] = [lens.width, lens.height];
+        let columns = move || (0..width).step_by(TILE_EDGE);
+        let rows = (0..height).step_by(TILE_EDGE);
+        rows.flat_map(move |y| {
+            columns().map(move |x| Self {
+                x,
+                y,
+                width: (width - x).min(TILE_EDGE),
+                height: (height - y).min(TILE_EDGE),
+            })
+        })
     }
 
-    fn origin(&self) -> [f32; 2] {
+    /// Position of the top left corner.
+    pub(crate) fn origin(&self) -> [f32; 2] {
         [self.x as f32, self.y as f32]
-    }
-
-    /// Collects the triangles of the tile that are not hidden. Returns true if a single one covers all of it.
-    pub(crate) fn collect_visible(&self, bins: &TileBins, triangles: &mut Vec<TileTriangle>) -> bool {
-        bins.collect_visible(self.tile, self.origin(), triangles)
-    }
-
-    /// Rasterises the triangles of the tile.
-    pub(crate) fn rasterize(&self, triangles: &[TileTriangle], samples: &mut TileSamples) {
-        triangles.iter().for_each(|t| samples.draw::<true>(&t.corners, self.origin(), t.id));
-    }
-
-    /// Draws a tile that a single triangle covers: only pixel centres are rasterised, for their depths.
-    pub(crate) fn draw_single<'a>(
-        &self,
-        triangle: &TileTriangle,
-        pass: &RenderPass<'a>,
-        samples: &mut TileSamples,
-        sink: &mut impl ShadingSink,
-        image: &mut RenderedImage,
-    ) {
-        let id = triangle.id;
-        samples.draw_rows::<true, CENTRE_ROW, ROWS_PER_PIXEL>(&triangle.corners, self.origin(), id);
-        let mut resolver = TileResolver::new(pass, *self, samples);
-        for y in 0..self.height {
-            for x in (0..self.width).step_by(LANES) {
-                resolver.write_centres(x, y, &[id; LANES], image);
-                resolver.shade_row(id, x, y, sink);
-            }
-        }
     }
 
     /// Writes display values to the colours of the image.
@@ -175,53 +156,46 @@ impl TileRect {
             let row = &mut image.rgb[at..at + 3 * self.width];
             for (block, bytes) in row.chunks_mut(3 * LANES).enumerate() {
                 let first = y * TILE_EDGE + block * LANES;
-                let channel = |c: usize| {
-                    let values = display.0[c][first..].first_chunk::<LANES>().copied().unwrap_or_default();
-                    floor_to_u32(f32x8::new(values) + f32x8::splat(0.5))
-                };
-                let [r, g, b] = [channel(0), channel(1), channel(2)];
-                let packed = pack_rgb(std::array::from_fn(|i| u64::from(r[i] | g[i] << 8 | b[i] << 16)));
-                match <&mut [u8; 3 * LANES]>::try_from(&mut *bytes) {
-                    Ok(block) => *block = packed,
-                    Err(_) => bytes.copy_from_slice(&packed[..bytes.len()]),
+                let Vec3x8 { x, y, z } = display.load(first);
+                let channels = [x, y, z].map(|values| floor_to_u32(values + f32x8::splat(0.5)));
+                for (lane, pixel) in bytes.chunks_exact_mut(3).enumerate() {
+                    (0..3).for_each(|c| pixel[c] = channels[c][lane] as u8);
                 }
             }
         }
     }
 }
 
-/// Concatenates the lower three bytes of eight words.
-fn pack_rgb(w: [u64; LANES]) -> [u8; 3 * LANES] {
-    let words = [
-        w[0] | w[1] << 24 | w[2] << 48,
-        w[2] >> 16 | w[3] << 8 | w[4] << 32 | w[5] << 56,
-        w[5] >> 8 | w[6] << 16 | w[7] << 40,
-    ];
-    let mut bytes = [0; 3 * LANES];
-    bytes.chunks_exact_mut(8).zip(words).for_each(|(out, word)| out.copy_from_slice(&word.to_le_bytes()));
-    bytes
-}
-
 /// Resolves the samples of a tile: finds the surfaces that each pixel shows and passes them to a sink.
-pub(crate) struct TileResolver<'a, 'p> {
+pub(crate) struct TileResolver<'a, 'p, S> {
     pass: &'p RenderPass<'a>,
     rect: TileRect,
     samples: &'p TileSamples,
+    /// Receives the colours.
+    sink: &'p mut S,
+    /// Receives depth and segmentation.
+    image: &'p mut RenderedImage,
     /// The triangle that was interpolated last.
     last: Option<TriangleInterpolator<'a>>,
     batch: ShadingBatch<'a>,
 }
 
-impl<'a, 'p> TileResolver<'a, 'p> {
-    pub(crate) fn new(pass: &'p RenderPass<'a>, rect: TileRect, samples: &'p TileSamples) -> Self {
-        Self { pass, rect, samples, last: None, batch: ShadingBatch::default() }
+impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
+    pub(crate) fn new(
+        pass: &'p RenderPass<'a>,
+        rect: TileRect,
+        samples: &'p TileSamples,
+        sink: &'p mut S,
+        image: &'p mut RenderedImage,
+    ) -> Self {
+        Self { pass, rect, samples, sink, image, last: None, batch: ShadingBatch::default() }
     }
 
     /// Resolves all pixels, or only those that show a moving object. Depth and segmentation go to `image` directly.
-    pub(crate) fn run(&mut self, only_moving: bool, sink: &mut impl ShadingSink, image: &mut RenderedImage) {
+    pub(crate) fn run(&mut self, only_moving: bool) {
         for y in 0..self.rect.height {
             for x in (0..self.rect.width).step_by(LANES) {
-                let rows = self.sample_ids(x, y);
+                let rows = sample_ids(self.samples, x, y);
                 let ids = rows.map(u32x8::new);
                 let all = (1 << (self.rect.width - x).min(LANES)) - 1;
                 let any_moving = ids.iter().fold(u32x8::ZERO, |any, row| any | *row);
@@ -230,45 +204,39 @@ impl<'a, 'p> TileResolver<'a, 'p> {
                 if selected == 0 {
                     continue;
                 }
-                self.write_centres(x, y, &rows[CENTRE_ROW], image);
+                self.write_centres(x, y, &rows[CENTRE_ROW]);
                 let first = u32x8::splat(rows[0][0]);
                 let same = ids.iter().fold(u32x8::MAX, |same, row| same & row.simd_eq(first));
                 if same.all() && selected == all {
-                    self.shade_row(rows[0][0], x, y, sink);
+                    self.shade_row(rows[0][0], x, y);
                     continue;
                 }
                 for lane in (0..LANES).filter(|lane| selected >> lane & 1 == 1) {
-                    self.shade_pixel(rows.map(|row| row[lane]), x + lane, y, sink);
+                    self.shade_pixel(rows.map(|row| row[lane]), x + lane, y);
                 }
             }
         }
-        self.flush(sink);
+        self.flush();
     }
 
-    /// Triangle ids of the samples of eight pixels from (x, y) on, by sample row.
-    fn sample_ids(&self, x: usize, y: usize) -> [[u32; LANES]; ROWS_PER_PIXEL] {
-        let stride = self.samples.stride();
-        std::array::from_fn(|row| {
-            let at = (ROWS_PER_PIXEL * y + row) * stride + x;
-            self.samples.ids[at..].first_chunk::<LANES>().copied().unwrap_or([NO_TRIANGLE; LANES])
-        })
-    }
-
-    /// True if eight pixels from `first` on show moving objects only.
-    pub(crate) fn is_all_moving(&self, first: usize) -> bool {
-        let rows = self.sample_ids(first % TILE_EDGE, first / TILE_EDGE);
-        let all = rows.iter().fold(u32x8::MAX, |all, row| all & u32x8::new(*row));
-        (all & u32x8::splat(MOVING_FLAG)).to_bitmask() == 0xFF
+    /// Shades all pixels of a tile that triangle `id` covers wholly; only the samples at their centres are read.
+    pub(crate) fn run_covered(&mut self, id: u32) {
+        for y in 0..self.rect.height {
+            for x in (0..self.rect.width).step_by(LANES) {
+                self.write_centres(x, y, &[id; LANES]);
+                self.shade_row(id, x, y);
+            }
+        }
     }
 
     /// Writes depth and segmentation of eight pixels from (x, y) on; `ids` are the triangles at their centres.
-    fn write_centres(&self, x: usize, y: usize, ids: &[u32; LANES], image: &mut RenderedImage) {
+    fn write_centres(&mut self, x: usize, y: usize, ids: &[u32; LANES]) {
         let from = (ROWS_PER_PIXEL * y + CENTRE_ROW) * self.samples.stride() + x;
         let w = f32x8::new(self.samples.w[from..].first_chunk::<LANES>().copied().unwrap_or_default());
         let depths = (f32x8::ONE / w).to_array();
-        let at = (self.rect.y + y) * image.width + self.rect.x + x;
+        let at = (self.rect.y + y) * self.image.width + self.rect.x + x;
         let end = at + (self.rect.width - x).min(LANES);
-        let pixels = image.depth[at..end].iter_mut().zip(&mut image.segmentation[at..end]);
+        let pixels = self.image.depth[at..end].iter_mut().zip(&mut self.image.segmentation[at..end]);
         for ((depth, segmentation), (&id, own)) in pixels.zip(ids.iter().zip(depths)) {
             *depth = if id == NO_TRIANGLE { f32::INFINITY } else { own };
             *segmentation = self.pass.segmentation_id(id);
@@ -276,33 +244,37 @@ impl<'a, 'p> TileResolver<'a, 'p> {
     }
 
     /// Shades eight pixels from (x, y) on, all covered by one triangle.
-    fn shade_row(&mut self, id: u32, x: usize, y: usize, sink: &mut impl ShadingSink) {
+    fn shade_row(&mut self, id: u32, x: usize, y: usize) {
         let targets = PixelTargets::row(y * TILE_EDGE + x);
         let (px, py) = ((self.rect.x + x) as f32 + 0.5, (self.rect.y + y) as f32 + 0.5);
-        let (pass, rays) = (self.pass, self.pass.rays);
         if id == NO_TRIANGLE {
-            let radiance = pass.background_radiance(f32x8::splat(px) + LANE_INDEX, f32x8::splat(py));
-            sink.add_background(pass, radiance, &targets);
-        } else if let Some(triangle) = interpolator(&mut self.last, pass, id) {
-            sink.add_surface(pass, &triangle.row(&rays, px, py), &targets);
+            self.shade_background(f32x8::splat(px) + LANE_INDEX, f32x8::splat(py), &targets);
+        } else if let Some(triangle) = interpolator(&mut self.last, self.pass, id) {
+            let points = triangle.row(self.pass.lens, px, py);
+            self.sink.add(self.pass, self.pass.shade(&points), Some(&points), &targets);
         }
     }
 
+    /// Shades the background at eight points (x, y) of the self.image.
+    fn shade_background(&mut self, x: f32x8, y: f32x8, targets: &PixelTargets) {
+        let ambient = self.pass.scene.illumination.sky_radiance(self.pass.lens.ray_direction_z(x, y));
+        self.sink.add(self.pass, DirectAndAmbient { ambient, ..Default::default() }, None, targets);
+    }
+
     /// Shades a pixel: each surface once, at the mean position of its samples.
-    fn shade_pixel(&mut self, ids: [u32; ROWS_PER_PIXEL], x: usize, y: usize, sink: &mut impl ShadingSink) {
+    fn shade_pixel(&mut self, ids: [u32; ROWS_PER_PIXEL], x: usize, y: usize) {
         const COLOUR_ROWS: [usize; 4] = [0, 1, 3, 4];
         let pixel = y * TILE_EDGE + x;
-        sink.begin_pixel(pixel);
+        self.sink.begin_pixel(pixel);
         let position = |row: usize| [0, 1].map(|axis| [x, y][axis] as f32 + SAMPLE_OFFSETS[row][axis]);
         if COLOUR_ROWS.iter().all(|&row| ids[row] == ids[0]) {
-            self.shade_share(ids[0], position(CENTRE_ROW), pixel, 1.0, sink);
+            self.shade_share(ids[0], position(CENTRE_ROW), pixel, 1.0);
             return;
         }
         let surfaces = ids.map(|id| self.pass.surface(id));
-        for (i, first) in COLOUR_ROWS.into_iter().enumerate() {
+        for first in COLOUR_ROWS {
             let members = || COLOUR_ROWS.into_iter().filter(|&row| surfaces[row] == surfaces[first]);
-            let is_done = members().next() != Some(COLOUR_ROWS[i]);
-            if is_done {
+            if members().next() != Some(first) {
                 continue;
             }
             let count = members().count() as f32;
@@ -313,45 +285,54 @@ impl<'a, 'p> TileResolver<'a, 'p> {
             };
             let nearest =
                 members().fold(first, |best, row| if distance2(row) < distance2(best) { row } else { best });
-            self.shade_share(ids[nearest], mean, pixel, 0.25 * count, sink);
+            self.shade_share(ids[nearest], mean, pixel, 0.25 * count);
         }
     }
 
     /// Shades a share of a pixel that shows triangle `id` at the position `[x, y]` of the tile.
-    fn shade_share(
-        &mut self,
-        id: u32,
-        [x, y]: [f32; 2],
-        pixel: usize,
-        share: f32,
-        sink: &mut impl ShadingSink,
-    ) {
+    fn shade_share(&mut self, id: u32, [x, y]: [f32; 2], pixel: usize, share: f32) {
         let (x, y) = (self.rect.x as f32 + x, self.rect.y as f32 + y);
         if id == NO_TRIANGLE {
-            let radiance = self.pass.background_radiance(f32x8::splat(x), f32x8::splat(y));
-            sink.add_background(self.pass, radiance, &PixelTargets::single(pixel, share));
+            let targets = PixelTargets::single(pixel, share);
+            self.shade_background(f32x8::splat(x), f32x8::splat(y), &targets);
             return;
         }
         if let Some(triangle) = interpolator(&mut self.last, self.pass, id) {
             let batch = &mut self.batch;
-            triangle.push(batch, &self.pass.rays, x, y);
+            triangle.push(batch, self.pass.lens, x, y);
             (batch.pixel[batch.count], batch.share[batch.count]) = (pixel as u32, share);
             batch.count += 1;
         }
         if self.batch.count == LANES {
-            self.flush(sink);
+            self.flush();
         }
     }
 
     /// Shades the collected points.
-    fn flush(&mut self, sink: &mut impl ShadingSink) {
+    fn flush(&mut self) {
         let ShadingBatch { count, pixel, share, .. } = self.batch;
         if count > 0 {
             let targets = PixelTargets { pixel, share, count, is_row: false };
-            sink.add_surface(self.pass, &self.batch.samples(&self.pass.rays), &targets);
+            let points = self.batch.samples(self.pass.lens);
+            self.sink.add(self.pass, self.pass.shade(&points), Some(&points), &targets);
             self.batch.count = 0;
         }
     }
+}
+
+/// Triangle ids of the samples of eight pixels from (x, y) on, by sample row.
+fn sample_ids(samples: &TileSamples, x: usize, y: usize) -> [[u32; LANES]; ROWS_PER_PIXEL] {
+    std::array::from_fn(|row| {
+        let at = (ROWS_PER_PIXEL * y + row) * samples.stride() + x;
+        samples.ids[at..].first_chunk::<LANES>().copied().unwrap_or([NO_TRIANGLE; LANES])
+    })
+}
+
+/// True if eight pixels from `first` on show moving objects only.
+pub(crate) fn is_all_moving(samples: &TileSamples, first: usize) -> bool {
+    let rows = sample_ids(samples, first % TILE_EDGE, first / TILE_EDGE);
+    let all = rows.iter().fold(u32x8::MAX, |all, row| all & u32x8::new(*row));
+    (all & u32x8::splat(MOVING_FLAG)).to_bitmask() == 0xFF
 }
 
 /// Prepares triangle `id`, unless it is the last one. `None` if its object is out of view.
@@ -361,8 +342,8 @@ fn interpolator<'m, 'a>(
     id: u32,
 ) -> Option<&'m TriangleInterpolator<'a>> {
     if last.as_ref().is_none_or(|triangle| triangle.id != id) {
-        let instance = pass.instances.get(object_index(id))?.as_ref()?;
-        *last = Some(TriangleInterpolator::new(instance, &pass.rays, id));
+        let instance = pass.objects.get(object_index(id))?.drawn.as_ref()?;
+        *last = Some(TriangleInterpolator::new(instance, pass.lens, id));
     }
     last.as_ref()
 }

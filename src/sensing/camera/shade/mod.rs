@@ -1,9 +1,7 @@
 //! Shading: procedural materials, ambient occlusion, shadow maps, reflectance and tone mapping.
 
-pub(crate) mod noise;
 pub(crate) mod occlusion;
 pub(crate) mod pattern;
 pub(crate) mod shading;
 pub(crate) mod shadow;
-pub(crate) mod text_decal;
 pub(crate) mod tonemap;

@@ -5,10 +5,7 @@
 
 use crate::{
     geometry::{Vec3, shape::Shape},
-    sensing::camera::{
-        math::V3,
-        simd::{Vec3x8, f32x8},
-    },
+    sensing::camera::math::{V3, Vec3x8, f32x8},
 };
 
 /// Radius of influence of an occluder, in radii of the occluder.

@@ -1,43 +1,20 @@
 //! Procedural materials: evaluates the masks and layers of a [`Visual`] at a point, filtered to the sampling distance.
+//!
+//! Noise comes from integer hashes, so that its bytes are the same on every machine.
 
-use super::{noise, text_decal};
 use crate::{
-    scene::{Mask, Visual},
+    geometry::Vec3,
+    scene::{Mask, TextDecal, Visual},
     sensing::camera::math::V3,
 };
 
-/// Material parameters at a point of a surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct MaterialSample {
-    /// Diffuse or metallic colour, linear RGB.
-    pub(crate) albedo: V3,
-    pub(crate) roughness: f32,
-    pub(crate) metalness: f32,
-    /// Fraction of the sky left visible by the object itself.
-    pub(crate) sky_visibility: f32,
-}
-
-impl MaterialSample {
-    /// Number of components of [`components`](Self::components).
-    pub(crate) const COMPONENTS: usize = 6;
-
-    /// Returns the components that textures store: albedo and roughness.
-    pub(crate) fn texel(&self) -> [f32; 4] {
-        [self.albedo.x, self.albedo.y, self.albedo.z, self.roughness]
-    }
-
-    /// Returns albedo, roughness, metalness and sky visibility.
-    #[inline(always)]
-    pub(crate) fn components(&self) -> [f32; Self::COMPONENTS] {
-        let a = &self.albedo;
-        [a.x, a.y, a.z, self.roughness, self.metalness, self.sky_visibility]
-    }
-
-    /// True if both samples differ at most in their sky visibility.
-    pub(crate) fn is_same_material(&self, other: &Self) -> bool {
-        self.albedo == other.albedo && self.roughness == other.roughness && self.metalness == other.metalness
-    }
-}
+/// Material parameters at a point of a surface: albedo (linear RGB), roughness, metalness, and the fraction of the sky
+/// left visible by the object itself. The first four are those that textures store.
+pub(crate) type MaterialSample = nalgebra::SVector<f32, 6>;
+/// Index of the metalness in a [`MaterialSample`].
+pub(crate) const METALNESS: usize = 4;
+/// Index of the sky visibility in a [`MaterialSample`].
+pub(crate) const SKY_VISIBILITY: usize = 5;
 
 /// A visual evaluated at a point.
 #[derive(Clone, Copy, Debug)]
@@ -55,19 +32,17 @@ const SAMPLE_DEPTH: f32 = 2e-5;
 /// Details finer than `spacing` (m) along the surface are averaged.
 pub(crate) fn sample_visual(visual: &Visual, p: &V3, n: &V3, spacing: f32) -> VisualSample {
     let p = &(p - n * SAMPLE_DEPTH);
-    let to_v3 = |c: [f64; 3]| V3::from(c.map(|x| x as f32));
-    let mut material = MaterialSample {
-        albedo: to_v3(visual.albedo),
-        roughness: visual.roughness as f32,
-        metalness: visual.metalness as f32,
-        sky_visibility: 1.0,
-    };
+    let [r, g, b] = visual.albedo;
+    let mut material =
+        MaterialSample::from([r, g, b, visual.roughness, visual.metalness, 1.0].map(|x| x as f32));
     let mut relief = 0.0;
     for layer in &visual.layers {
         let mask = mask_value(&layer.mask, p, n, spacing);
         let alpha = mask * layer.opacity as f32;
-        material.albedo += (to_v3(layer.albedo) - material.albedo) * alpha;
-        material.roughness += (layer.roughness as f32 - material.roughness) * alpha;
+        let [r, g, b] = layer.albedo;
+        for (value, target) in material.iter_mut().zip([r, g, b, layer.roughness]) {
+            *value += (target as f32 - *value) * alpha;
+        }
         relief += mask * layer.relief_m as f32;
     }
     VisualSample { material, relief }
@@ -84,20 +59,15 @@ pub(crate) fn finest_feature(visual: &Visual) -> f32 {
                 // A narrow range turns the noise into sharp edges.
                 coarsest * 0.5_f64.powi(*octaves as i32 - 1) * (to - from).abs().min(1.0)
             }
-            Mask::Both { masks } => masks.iter().map(|mask| mask_feature(mask)).fold(f64::INFINITY, f64::min),
+            Mask::Product { masks } => {
+                masks.iter().map(|mask| mask_feature(mask)).fold(f64::INFINITY, f64::min)
+            }
             Mask::Inverse { mask } => mask_feature(mask),
             Mask::Inside { soft_m, .. } => *soft_m,
             // Varies with the normal only, whose detail is that of the mesh.
             Mask::Facing { .. } => f64::INFINITY,
             // Sharp edges.
-            Mask::Text { .. }
-            | Mask::Checker { .. }
-            | Mask::Stripes { .. }
-            | Mask::Rings { .. }
-            | Mask::Boards { .. }
-            | Mask::Seams { .. }
-            | Mask::Specks { .. }
-            | Mask::Weave { .. } => 0.0,
+            _ => 0.0,
         }
     }
     visual.layers.iter().map(|layer| mask_feature(&layer.mask)).fold(f64::INFINITY, f64::min) as f32
@@ -108,7 +78,7 @@ pub(crate) fn has_text(visual: &Visual) -> bool {
     fn mask_has_text(mask: &Mask) -> bool {
         match mask {
             Mask::Text { .. } => true,
-            Mask::Both { masks } => masks.iter().any(|mask| mask_has_text(mask)),
+            Mask::Product { masks } => masks.iter().any(|mask| mask_has_text(mask)),
             Mask::Inverse { mask } => mask_has_text(mask),
             _ => false,
         }
@@ -140,7 +110,7 @@ fn mask_value(mask: &Mask, p: &V3, n: &V3, spacing: f32) -> f32 {
             let size = size_m.map(|s| s as f32);
             let filter_width = spacing / size.iter().copied().fold(f32::INFINITY, f32::min).max(1e-6);
             let scaled = std::array::from_fn(|i| p[i] / size[i]);
-            let value = noise::fractal_noise(scaled, *octaves, filter_width, *seed);
+            let value = fractal_noise(scaled, *octaves, filter_width, *seed);
             smoothstep((value - *from as f32) / (*to - *from) as f32)
         }
         Mask::Rings { centre_m, pitch_m, wobble_m, seed } => {
@@ -160,9 +130,9 @@ fn mask_value(mask: &Mask, p: &V3, n: &V3, spacing: f32) -> f32 {
             let width = (*soft_m as f32).max(spacing).max(1e-6);
             smoothstep(0.5 - shape.distance(&p.cast()) as f32 / width)
         }
-        Mask::Text { decal } => text_decal::coverage(decal, p, n, spacing),
+        Mask::Text { decal } => text_coverage(decal, p, n, spacing),
         Mask::Inverse { mask } => 1.0 - mask_value(mask, p, n, spacing),
-        Mask::Both { masks } => masks.iter().map(|m| mask_value(m, p, n, spacing)).product(),
+        Mask::Product { masks } => masks.iter().map(|m| mask_value(m, p, n, spacing)).product(),
     }
 }
 
@@ -189,7 +159,7 @@ fn pulse_wave(x: f32, duty: f32, width: f32) -> f32 {
 /// Wood rings about the z axis: brightness grows slowly across a ring and falls sharply at its edge.
 fn rings(p: &V3, pitch: f32, wobble: f32, spacing: f32, seed: u32) -> f32 {
     let scaled = [p.x / (8.0 * wobble), p.y / (8.0 * wobble), p.z / (40.0 * wobble)];
-    let bend = noise::fractal_noise(scaled, 2, 0.0, seed);
+    let bend = fractal_noise(scaled, 2, 0.0, seed);
     let phase = ((p.x * p.x + p.y * p.y).sqrt() + 2.0 * wobble * (bend - 0.5)) / pitch;
     let t = phase - phase.floor();
     let ring = if t < 0.85 { (t / 0.85).powi(3) } else { 1.0 - (t - 0.85) / 0.15 };
@@ -197,29 +167,21 @@ fn rings(p: &V3, pitch: f32, wobble: f32, spacing: f32, seed: u32) -> f32 {
     0.3 + (ring - 0.3) * fade
 }
 
-/// A board of a floor: its number along x and across y, and the position in it as fractions of its length and width.
-struct BoardPosition {
-    cell: [i32; 2],
-    fraction: [f32; 2],
-}
-
-/// Finds the board at `p`. Each row is shifted along x by a random fraction of the board length.
-fn locate_board(p: &V3, length: f32, width: f32) -> BoardPosition {
+/// Position on a floor in units of its boards' length and width. Each row is shifted along x by a random fraction of
+/// the board length.
+fn board_position(p: &V3, length: f32, width: f32) -> [f32; 2] {
     let y = p.y / width;
-    let row = y.floor() as i32;
-    let shift = noise::cell_random([row, 17, 5], 1)[0];
-    let x = p.x / length + shift;
-    BoardPosition { cell: [x.floor() as i32, row], fraction: [x - x.floor(), y - y.floor()] }
+    [p.x / length + cell_random([y.floor() as i32, 17, 5], 1)[0], y]
 }
 
 /// A random value per board.
 fn board(p: &V3, length: f32, width: f32, seed: u32) -> f32 {
-    let [column, row] = locate_board(p, length, width).cell;
-    noise::cell_random([column, row, 3], seed)[1]
+    let [column, row] = board_position(p, length, width).map(|x| x.floor() as i32);
+    cell_random([column, row, 3], seed)[1]
 }
 
 fn seams(p: &V3, length: f32, width: f32, gap: f32, spacing: f32) -> f32 {
-    let [x, y] = locate_board(p, length, width).fraction;
+    let [x, y] = board_position(p, length, width).map(|x| x - x.floor());
     let seam = |t: f32, period: f32| {
         let d = t.min(1.0 - t) * period;
         ((0.5 * gap + 0.5 * spacing - d) / spacing.max(1e-6)).clamp(0.0, 1.0).min(gap / spacing.max(gap))
@@ -233,7 +195,7 @@ fn specks(p: &V3, cell: f32, radius: f32, spacing: f32, seed: u32) -> f32 {
     let mut value: f32 = 0.0;
     for neighbour in 0..27 {
         let lattice = [own.x + neighbour % 3 - 1, own.y + neighbour / 3 % 3 - 1, own.z + neighbour / 9 - 1];
-        let jitter = noise::cell_random(lattice, seed);
+        let jitter = cell_random(lattice, seed);
         let centre = V3::from_fn(|i, _| (lattice[i] as f32 + jitter[i]) * cell);
         let gap = (p - centre).norm() - radius;
         value = value.max((0.5 - gap / spacing.max(0.15 * radius)).clamp(0.0, 1.0));
@@ -251,12 +213,105 @@ fn weave(p: &V3, pitch: f32, spacing: f32) -> f32 {
     2.0 / 3.0 + (thread - 2.0 / 3.0) * fade
 }
 
+/// Minimum cosine between the normal of a printed surface and the direction of the text.
+const MIN_FACING_COSINE: f32 = 0.1;
+/// Maximum distance of a printed surface from the cylinder of a wrapped line, in radii of the cylinder.
+const MAX_RADIUS_DEVIATION: f64 = 0.5;
+
+/// Fraction of the square of edge `spacing` (m) about `p` (object frame, m) that letters cover, on a
+/// surface of normal `n`.
+fn text_coverage(decal: &TextDecal, p: &V3, n: &V3, spacing: f32) -> f32 {
+    let Some([right, up]) = text_position(decal, &p.cast(), n) else { return 0.0 };
+    let (sin, cos) = decal.line.turn.sin_cos();
+    let (x, y) = (right * cos + up * sin, up * cos - right * sin);
+    decal.coverage().share(x, y, f64::from(spacing)) as f32
+}
+
+/// Position of a surface point relative to the middle of the line, to the right and up as seen by the viewer, m;
+/// `None` if the point is outside the printed area.
+fn text_position(decal: &TextDecal, p: &Vec3, n: &V3) -> Option<[f64; 2]> {
+    let line = &decal.line;
+    let middle = Vec3::from(line.at);
+    let facing = Vec3::from(line.facing).normalize();
+    if let Some(radius) = line.wrap_m {
+        let outwards = Vec3::new(p.x, p.y, 0.0);
+        let faces_out =
+            f64::from(n.x) * p.x + f64::from(n.y) * p.y > f64::from(MIN_FACING_COSINE) * outwards.norm();
+        if !faces_out || (outwards.norm() - radius).abs() > MAX_RADIUS_DEVIATION * radius {
+            return None;
+        }
+        let angle = (facing.x * p.y - facing.y * p.x).atan2(facing.x * p.x + facing.y * p.y);
+        return Some([radius * angle, p.z - middle.z]);
+    }
+    let head = if facing.z.abs() > 0.999 { Vec3::y() } else { Vec3::z() };
+    let up = (head - facing * facing.dot(&head)).normalize();
+    let offset = p - middle;
+    let depth = 0.5 * decal.coverage().length_m() + line.height_m;
+    let is_printed =
+        n.cast::<f64>().dot(&facing) > f64::from(MIN_FACING_COSINE) && offset.dot(&facing).abs() < depth;
+    is_printed.then(|| [offset.dot(&up.cross(&facing)), offset.dot(&up)])
+}
+
+/// Hashes three words to three words (`pcg3d` of Jarzynski & Olano, Hash Functions for GPU Rendering, JCGT 9(3), 2020).
+fn pcg3d(mut v: [u32; 3]) -> [u32; 3] {
+    let mix = |v: &mut [u32; 3]| {
+        v[0] = v[0].wrapping_add(v[1].wrapping_mul(v[2]));
+        v[1] = v[1].wrapping_add(v[2].wrapping_mul(v[0]));
+        v[2] = v[2].wrapping_add(v[0].wrapping_mul(v[1]));
+    };
+    v = v.map(|x| x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223));
+    mix(&mut v);
+    v = v.map(|x| x ^ (x >> 16));
+    mix(&mut v);
+    v
+}
+
+/// Returns three pseudo-random numbers in 0..1 for a cell of the integer lattice.
+fn cell_random(cell: [i32; 3], seed: u32) -> [f32; 3] {
+    let word = |i: usize, salt: u32| (cell[i] as u32).wrapping_add(seed.wrapping_mul(salt));
+    let words = pcg3d([word(0, 0x9E37_79B9), word(1, 0x85EB_CA6B), word(2, 0xC2B2_AE35)]);
+    words.map(|w| (w >> 8) as f32 * (1.0 / 16_777_216.0))
+}
+
+/// Value noise with features of unit size, 0..=1, mean 0.5: lattice values blended by quintics
+/// (Perlin, Improving Noise, 2002).
+fn value_noise(p: [f32; 3], seed: u32) -> f32 {
+    let cell = p.map(|x| x.floor() as i32);
+    let f: [f32; 3] = std::array::from_fn(|i| p[i] - cell[i] as f32);
+    let s = f.map(|t| t * t * t * (t * (t * 6.0 - 15.0) + 10.0));
+    let corner = |c: usize| {
+        let lattice = std::array::from_fn(|axis| cell[axis].wrapping_add((c >> axis & 1) as i32));
+        cell_random(lattice, seed)[0]
+    };
+    let lerp = |a: f32, b: f32, t: f32| a + (b - a) * t;
+    let along_x: [f32; 4] = std::array::from_fn(|i| lerp(corner(2 * i), corner(2 * i + 1), s[0]));
+    lerp(lerp(along_x[0], along_x[1], s[1]), lerp(along_x[2], along_x[3], s[1]), s[2])
+}
+
+/// Sums octaves of value noise, each half the size and weight of the previous one, 0..=1.
+///
+/// Octaves finer than `filter_width` (in units of the coarsest feature) fade to their mean, which prevents aliasing.
+fn fractal_noise(p: [f32; 3], octaves: u32, filter_width: f32, seed: u32) -> f32 {
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for octave in 0..octaves {
+        let scale = (1_u32 << octave) as f32;
+        let weight = 1.0 / scale;
+        let fade = (2.0 - 2.0 * filter_width * scale).clamp(0.0, 1.0);
+        let noise =
+            if fade > 0.0 { value_noise(p.map(|x| x * scale), seed.wrapping_add(octave)) - 0.5 } else { 0.0 };
+        sum += weight * fade * noise;
+        weights += weight;
+    }
+    // A sum of independent octaves varies less than one of them; the factor restores about the same spread.
+    (0.5 + 1.5 * sum / weights).clamp(0.0, 1.0)
+}
+
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::{geometry::shape::Shape, scene::Mask};
+    use crate::{geometry::shape::Shape, scene::LabelLine};
 
     fn value(of: &Mask, p: [f32; 3], n: [f32; 3], spacing: f32) -> f32 {
         mask_value(of, &p.into(), &n.into(), spacing)
@@ -284,6 +339,86 @@ mod tests {
             assert_eq!(at(&mask, 0.01 + 1.01 * half, spacing), 0.0);
             // Smoothstep at 3/4.
             assert!((at(&mask, 0.01 - 0.5 * half, spacing) - 0.84375).abs() < 1e-4);
+        }
+    }
+
+    fn text_value(line: &LabelLine, p: [f64; 3], n: [f32; 3]) -> f32 {
+        let p = Vec3::from(p).cast();
+        text_coverage(&TextDecal::new(line.clone()), &p, &n.into(), 5e-4)
+    }
+
+    /// Coverage to the left and to the right of the middle; an L has more on its left.
+    fn sides(line: &LabelLine, n: [f32; 3], place: impl Fn(f64, f64) -> [f64; 3]) -> [f32; 2] {
+        [-1.0, 1.0].map(|side| {
+            let all = (1..=12).flat_map(|i| (-12..=12).map(move |j| (f64::from(i), f64::from(j))));
+            all.map(|(i, j)| text_value(line, place(side * i * 5e-4, j * 5e-4), n)).sum()
+        })
+    }
+
+    #[test]
+    fn text_is_upright_and_not_mirrored_seen_from_the_direction_it_faces() {
+        let line = |facing: [f64; 3]| LabelLine {
+            text: "L".into(),
+            height_m: 0.01,
+            weight: 0.1,
+            at: [0.001, 0.002, 0.003],
+            facing,
+            ..LabelLine::default()
+        };
+        // The viewer's right and up for each direction.
+        for (n, right, up) in [
+            ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]),
+            ([-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]),
+            ([0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]),
+            ([0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]),
+            ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]),
+            ([0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]),
+        ] {
+            let facing = line(n.map(f64::from));
+            let place = |r: f64, u: f64| std::array::from_fn(|i| facing.at[i] + r * right[i] + u * up[i]);
+            let [left, other] = sides(&facing, n, place);
+            assert!(left > 1.5 * other && other > 0.5, "{n:?}: {left} {other}");
+            let foot = text_value(&facing, place(0.0, -0.0044), n);
+            let head = text_value(&facing, place(0.0, 0.0044), n);
+            assert!(foot > 0.5 && head == 0.0, "{n:?}: the bar of an L is at the bottom: {foot} {head}");
+            assert_eq!(
+                text_value(&facing, place(0.0, -0.0044), n.map(|x: f32| -x)),
+                0.0,
+                "the back is blank"
+            );
+        }
+    }
+
+    #[test]
+    fn a_wrapped_line_follows_the_cylinder_and_turn_rotates_a_line() {
+        let line = LabelLine {
+            text: "L".into(),
+            height_m: 0.01,
+            weight: 0.1,
+            at: [0.0, 0.0, 0.05],
+            facing: [0.0, -2.0, 0.0],
+            wrap_m: Some(0.01),
+            ..LabelLine::default()
+        };
+        let n = |turn: f64| [turn.sin() as f32, -turn.cos() as f32, 0.0];
+        let place = |r: f64, u: f64| [0.01 * (r / 0.01).sin(), -0.01 * (r / 0.01).cos(), 0.05 + u];
+        let ink = |r: f64| {
+            let at = |j: i32| text_value(&line, place(r, f64::from(j) * 4e-4), n(r / 0.01));
+            (-14..=14).map(at).sum::<f32>()
+        };
+        let [left, right] =
+            [-1.0, 1.0].map(|side| (1..=12).map(|i| ink(side * f64::from(i) * 5e-4)).sum::<f32>());
+        assert!(left > 1.5 * right && right > 0.5, "{left} {right}");
+        assert_eq!(text_value(&line, [0.0, 0.01, 0.05], [0.0, 1.0, 0.0]), 0.0, "the far side is blank");
+        let upright = LabelLine { wrap_m: None, facing: [0.0, 0.0, 1.0], at: [0.0; 3], ..line };
+        let turned = LabelLine { turn: std::f64::consts::FRAC_PI_2, ..upright.clone() };
+        for (r, u) in [(-0.002, 0.003), (0.001, -0.0044), (0.002, 0.002)] {
+            let up = [0.0, 0.0, 1.0];
+            let before = text_value(&upright, [r, u, 0.0], up);
+            assert!(
+                (before - text_value(&turned, [-u, r, 0.0], up)).abs() < 1e-5,
+                "a quarter turn counter-clockwise"
+            );
         }
     }
 }

@@ -3,10 +3,7 @@
 use super::shadow::ShadowMap;
 use crate::{
     scene::Lighting,
-    sensing::camera::{
-        math::V3,
-        simd::{Vec3x8, approx_exp2, f32x8},
-    },
+    sensing::camera::math::{V3, Vec3x8, approx_exp2, f32x8},
 };
 
 /// Eight surface points to be shaded.
@@ -31,14 +28,6 @@ pub(crate) struct SurfaceSamples {
 pub(crate) struct DirectAndAmbient {
     pub(crate) direct: Vec3x8,
     pub(crate) ambient: Vec3x8,
-}
-
-impl DirectAndAmbient {
-    /// Adds both parts, scaled by the visible fractions of the key light and of the sky.
-    #[inline(always)]
-    pub(crate) fn attenuated(&self, key_visibility: f32x8, sky_visibility: f32x8) -> Vec3x8 {
-        self.direct * key_visibility + self.ambient * sky_visibility
-    }
 }
 
 /// The key light and the sky of a scene, converted for shading.

@@ -10,9 +10,8 @@ use crate::{
     geometry::basis_from_reference,
     scene::Lighting,
     sensing::camera::{
-        math::V3,
-        raster::sample_buffer::SampleBuffer,
-        simd::{LANE_INDEX, LANES, Vec3x8, f32x8, sum_lanes},
+        math::{LANE_INDEX, LANES, V3, Vec3x8, f32x8, sum_lanes},
+        raster::SampleBuffer,
     },
 };
 
@@ -93,10 +92,6 @@ pub(crate) struct ShadowMap {
     heights: SampleBuffer<1>,
     /// Heights above level ground in and around each tile.
     ranges: Vec<HeightRange>,
-    /// Scratch memory: heights above level ground in each tile.
-    tile_ranges: Vec<HeightRange>,
-    /// Scratch memory: vertices in the frame of the map.
-    vertices: Vec<[f32; 3]>,
 }
 
 /// Eight points in the frame of a shadow map.
@@ -110,17 +105,6 @@ pub(crate) struct LightSpacePoints {
     pub(crate) height: f32x8,
     /// Height above level ground, m.
     pub(crate) height_above_ground: f32x8,
-}
-
-/// The part of a shadow map that a set of points projects to.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct LightSpaceBounds {
-    /// Smallest u and v, texels.
-    pub(crate) low: [f32; 2],
-    /// Greatest u and v, texels.
-    pub(crate) high: [f32; 2],
-    /// Smallest height above level ground, m.
-    pub(crate) min_height: f32,
 }
 
 impl ShadowMap {
@@ -145,14 +129,23 @@ impl ShadowMap {
             tangent: lighting.key.softness_rad.tan() as f32,
             heights: SampleBuffer::new(EDGE, EDGE, EMPTY, false),
             ranges: vec![HeightRange::EMPTY; TILES * TILES],
-            tile_ranges: vec![HeightRange::EMPTY; TILES * TILES],
-            vertices: Vec::new(),
         }
     }
 
-    /// Empties the map for the next set of casters.
-    pub(crate) fn clear(&mut self) {
+    /// Redraws the map with these casters, each given by its vertices (world) and triangles.
+    pub(crate) fn draw<'a>(&mut self, casters: impl Iterator<Item = (&'a [V3], &'a [[u32; 3]])>) {
         self.heights.clear(EMPTY);
+        for (positions, triangles) in casters {
+            let vertices: Vec<[f32; 3]> = positions.iter().map(|p| self.project_vertex(p)).collect();
+            for t in triangles {
+                let corners @ [a, b, c] = t.map(|v| vertices[v as usize]);
+                // u × v points to the light, so triangles that face it have positive area.
+                if (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]) > 0.0 {
+                    self.heights.draw(&corners, [0.0; 2], 0);
+                }
+            }
+        }
+        self.update_ranges();
     }
 
     fn project_vertex(&self, p_w: &V3) -> [f32; 3] {
@@ -173,29 +166,14 @@ impl ShadowMap {
         LightSpacePoints { u, v, height, height_above_ground: height - ground }
     }
 
-    /// Draws the triangles of a caster that face the light.
-    pub(crate) fn draw(&mut self, positions: &[V3], triangles: &[[u32; 3]]) {
-        let mut vertices = std::mem::take(&mut self.vertices);
-        vertices.clear();
-        vertices.extend(positions.iter().map(|p| self.project_vertex(p)));
-        for t in triangles {
-            let corners @ [a, b, c] = t.map(|v| vertices[v as usize]);
-            // u × v points to the light, so triangles that face it have positive area.
-            if (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]) > 0.0 {
-                self.heights.draw::<false>(&corners, [0.0; 2], 0);
-            }
-        }
-        self.vertices = vertices;
-    }
-
-    /// Computes the ranges of heights. To be called after all casters are drawn.
-    pub(crate) fn finish(&mut self) {
-        self.tile_ranges.fill(HeightRange::EMPTY);
+    /// Computes the ranges of heights.
+    fn update_ranges(&mut self) {
         self.ranges.fill(HeightRange::EMPTY);
         let [from, to] = self.heights.drawn_rows;
         if from >= to {
             return;
         }
+        let mut tile_ranges = vec![HeightRange::EMPTY; TILES * TILES];
         let stride = self.heights.stride();
         for row in from / TILE..to.div_ceil(TILE) {
             for column in 0..TILES {
@@ -211,7 +189,7 @@ impl ShadowMap {
                 }
                 let min = low.to_array().into_iter().fold(f32::MAX, f32::min);
                 let max = high.to_array().into_iter().fold(EMPTY, f32::max);
-                self.tile_ranges[row * TILES + column] = HeightRange { min, max };
+                tile_ranges[row * TILES + column] = HeightRange { min, max };
             }
         }
         // Dilate by the reach of the filter: along v, then along u.
@@ -220,7 +198,7 @@ impl ShadowMap {
         for y in rows {
             let mut columns = [HeightRange::NEUTRAL; TILES];
             for row in around(y) {
-                let line = &self.tile_ranges[row * TILES..(row + 1) * TILES];
+                let line = &tile_ranges[row * TILES..(row + 1) * TILES];
                 columns.iter_mut().zip(line).for_each(|(all, own)| *all = all.union(own));
             }
             for x in 0..TILES {
@@ -230,13 +208,14 @@ impl ShadowMap {
         }
     }
 
-    /// True if a shadow may fall within `bounds`.
-    pub(crate) fn may_shade(&self, bounds: &LightSpaceBounds) -> bool {
+    /// True if a shadow may fall within a box in the frame of the map: lowest and highest u, v (texels) and height above
+    /// level ground (m).
+    pub(crate) fn may_shade(&self, [low, high]: &[V3; 2]) -> bool {
         let tile = |x: f32| (x.max(0.0) as usize / TILE).min(TILES - 1);
-        let columns = tile(bounds.low[0])..tile(bounds.high[0]) + 1;
-        (tile(bounds.low[1])..tile(bounds.high[1]) + 1).any(|y| {
-            let line = &self.ranges[y * TILES..][columns.clone()];
-            line.iter().any(|range| range.max > bounds.min_height + DEPTH_BIAS)
+        let columns = tile(low.x)..tile(high.x) + 1;
+        (tile(low.y)..tile(high.y) + 1).any(|y| {
+            let line = self.ranges[y * TILES..].get(columns.clone()).unwrap_or_default();
+            line.iter().any(|range| range.max > low.z + DEPTH_BIAS)
         })
     }
 
@@ -274,14 +253,31 @@ impl ShadowMap {
         occluded: u32,
         ranges: &[HeightRange; LANES],
     ) -> f32x8 {
-        let receivers = ReceiverPlanes::new(self, at, n);
+        let component = |axis: usize| n.dot(Vec3x8::splat(&self.axes[axis]));
+        let inverse_cosine = f32x8::ONE / component(2).fast_max(f32x8::splat(MIN_COSINE));
+        let texel = f32x8::splat(1.0 / self.texels_per_metre);
+        let slope = [0, 1].map(|axis| -component(axis) * inverse_cosine * texel);
+        let max_slope = f32x8::splat(MAX_RECEIVER_SLOPE) * texel;
+        let normal_bias =
+            f32x8::splat(MIN_RADIUS * MAX_NORMAL_ERROR) * texel * inverse_cosine * inverse_cosine;
+        let bias = (f32x8::splat(DEPTH_BIAS) * inverse_cosine + normal_bias).to_array();
+        let clamped_slope = slope.map(|s| s.fast_max(-max_slope).fast_min(max_slope).to_array());
+        let position = [at.u, at.v, at.height].map(f32x8::to_array);
+        let slopes = slope.map(f32x8::to_array);
         let own_height = at.height_above_ground.to_array();
         let filter = |i: usize| {
+            let receiver = PenumbraFilter {
+                map: self,
+                position: position.map(|x| x[i]),
+                slope: slopes.map(|slope| slope[i]),
+                clamped_slope: clamped_slope.map(|slope| slope[i]),
+                bias: bias[i],
+                cone: self.tangent * self.texels_per_metre,
+            };
             let HeightRange { min, max } = ranges[i];
-            let above_point = HeightRange { min: min - own_height[i], max: max - own_height[i] };
-            receivers.filter(self, i).visibility(above_point)
+            receiver.visibility(HeightRange { min: min - own_height[i], max: max - own_height[i] })
         };
-        let run_length = if occluded == 0xFF { receivers.run_length() } else { f32::MAX };
+        let run_length = if occluded == 0xFF { run_length(at, n, slopes.map(|s| s[0])) } else { f32::MAX };
         if run_length > UNIFORM_RUN {
             let lane = |i: usize| if occluded >> i & 1 == 1 { filter(i) } else { 1.0 };
             return f32x8::new(std::array::from_fn(lane));
@@ -313,66 +309,23 @@ fn interpolate_run(values: [f32; 4]) -> f32x8 {
     sum.fast_max(f32x8::ZERO).fast_min(f32x8::ONE)
 }
 
-/// Eight receivers: points with the planes of their surfaces in the frame of the map.
-struct ReceiverPlanes {
-    /// u and v, texels, and height, m.
-    position: [f32x8; 3],
-    normal: Vec3x8,
-    /// See [`PenumbraFilter`].
-    slope: [[f32; LANES]; 2],
-    clamped_slope: [[f32; LANES]; 2],
-    bias: [f32; LANES],
-}
-
-impl ReceiverPlanes {
-    fn new(map: &ShadowMap, at: &LightSpacePoints, n: &Vec3x8) -> Self {
-        let component = |axis: usize| n.dot(Vec3x8::splat(&map.axes[axis]));
-        let inverse_cosine = f32x8::ONE / component(2).fast_max(f32x8::splat(MIN_COSINE));
-        let texel = f32x8::splat(1.0 / map.texels_per_metre);
-        let slope = [0, 1].map(|axis| -component(axis) * inverse_cosine * texel);
-        let max_slope = f32x8::splat(MAX_RECEIVER_SLOPE) * texel;
-        let normal_bias =
-            f32x8::splat(MIN_RADIUS * MAX_NORMAL_ERROR) * texel * inverse_cosine * inverse_cosine;
-        Self {
-            position: [at.u, at.v, at.height],
-            normal: *n,
-            slope: slope.map(f32x8::to_array),
-            clamped_slope: slope.map(|s| s.fast_max(-max_slope).fast_min(max_slope).to_array()),
-            bias: (f32x8::splat(DEPTH_BIAS) * inverse_cosine + normal_bias).to_array(),
-        }
-    }
-
-    fn filter<'a>(&self, map: &'a ShadowMap, i: usize) -> PenumbraFilter<'a> {
-        PenumbraFilter {
-            map,
-            position: self.position.map(|x| x.to_array()[i]),
-            slope: self.slope.map(|slope| slope[i]),
-            clamped_slope: self.clamped_slope.map(|slope| slope[i]),
-            bias: self.bias[i],
-            cone: map.tangent * map.texels_per_metre,
-        }
-    }
-
-    /// Length in texels of the line on which the points are equally spaced on one plane; `f32::MAX` if they are not.
-    fn run_length(&self) -> f32 {
-        let [u, v, _] = self.position;
-        let extents = [u, v].map(|x| {
-            let [first, .., last] = x.to_array();
-            let line = f32x8::splat(first) + LANE_INDEX * f32x8::splat((last - first) / (LANES - 1) as f32);
-            let is_even = (x - line).abs().simd_lt(f32x8::splat(MAX_RUN_DEVIATION)).all();
-            if is_even { (last - first).abs() } else { f32::MAX }
-        });
-        let first_normal = V3::from(self.normal.to_arrays().map(|axis| axis[0]));
-        let rise = |axis: usize| {
-            let origin = f32x8::splat(self.position[axis].to_array()[0]);
-            (self.position[axis] - origin) * f32x8::splat(self.slope[axis][0])
-        };
-        let plane = f32x8::splat(self.position[2].to_array()[0]) + rise(0) + rise(1);
-        let on_plane = (self.position[2] - plane).abs().simd_lt(f32x8::splat(DEPTH_BIAS)).all();
-        let cosines = self.normal.dot(Vec3x8::splat(&first_normal));
-        let is_flat = cosines.simd_gt(f32x8::splat(MIN_RUN_COSINE)).all();
-        if is_flat && on_plane { extents[0].max(extents[1]) } else { f32::MAX }
-    }
+/// Length in texels of the line on which points of normals `n` are equally spaced on one plane; `f32::MAX` if they are
+/// not. `slope` is the rise of the plane per texel along u and v, m.
+fn run_length(at: &LightSpacePoints, n: &Vec3x8, slope: [f32; 2]) -> f32 {
+    let extents = [at.u, at.v].map(|x| {
+        let [first, .., last] = x.to_array();
+        let line = f32x8::splat(first) + LANE_INDEX * f32x8::splat((last - first) / (LANES - 1) as f32);
+        let is_even = (x - line).abs().simd_lt(f32x8::splat(MAX_RUN_DEVIATION)).all();
+        if is_even { (last - first).abs() } else { f32::MAX }
+    });
+    let from_first = |x: f32x8| x - f32x8::splat(x.to_array()[0]);
+    let plane = f32x8::splat(at.height.to_array()[0])
+        + from_first(at.u) * f32x8::splat(slope[0])
+        + from_first(at.v) * f32x8::splat(slope[1]);
+    let on_plane = (at.height - plane).abs().simd_lt(f32x8::splat(DEPTH_BIAS)).all();
+    let first_normal = V3::from(n.to_arrays().map(|axis| axis[0]));
+    let is_flat = n.dot(Vec3x8::splat(&first_normal)).simd_gt(f32x8::splat(MIN_RUN_COSINE)).all();
+    if is_flat && on_plane { extents[0].max(extents[1]) } else { f32::MAX }
 }
 
 /// Percentage-closer filter around one receiver.

@@ -2,25 +2,36 @@
 //!
 //! A chart maps surface points to texels by projection along one direction. Its texture is painted on first use from
 //! the materials of the surface and filtered by a mip map (Williams, Pyramidal Parametrics, 1983).
+//!
+//! Flat meshes get one chart per plane. A curved surface with text is divided into connected parts that face mostly
+//! along one axis; projection along that axis stretches them by less than √3.
 
-use std::sync::{Arc, OnceLock};
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, OnceLock},
+};
 
 use wide::{bytemuck::cast, i32x8, u32x8};
 
+use super::lod::{CreasedMesh, Lod};
 use crate::{
-    geometry::shape::Shape,
+    geometry::{mesh::Mesh, shape::Shape, union_find::UnionFind},
     scene::Visual,
     sensing::camera::{
-        math::V3,
-        shade::pattern::{self, sample_visual},
-        simd::{LANES, Vec3x8, approx_log2, f32x8},
+        math::{LANES, V3, Vec3x8, approx_log2, f32x8},
+        shade::pattern::{self, METALNESS, MaterialSample, sample_visual},
     },
 };
+
+/// Maximum number of triangles of a mesh that is textured plane by plane.
+const MAX_FLAT_TRIANGLES: usize = 160;
+/// Minimum size (square root of the area) of a mesh without text that is textured, m.
+const MIN_FLAT_SIZE: f64 = 0.1;
 
 /// Maximum number of texels along an edge.
 const MAX_TEXELS: f32 = 1536.0;
 /// Minimum edge of a texel, m.
-pub(crate) const MIN_TEXEL: f32 = 0.8e-3;
+const MIN_TEXEL: f32 = 0.8e-3;
 /// Edge of a texel on surfaces with text, m.
 pub(crate) const TEXT_TEXEL: f32 = 0.3e-3;
 /// Texels across the finest feature of a pattern.
@@ -54,7 +65,8 @@ pub(crate) struct TextureChart {
 enum ChartSource {
     /// A flat face of one material.
     Flat(Visual),
-    Curved(CurvedChart),
+    /// Triangles of a curved surface.
+    Curved { material: Arc<SurfaceMaterial>, triangles: Vec<[ChartVertex; 3]> },
 }
 
 /// Materials of a curved surface, by position.
@@ -66,33 +78,121 @@ pub(crate) struct SurfaceMaterial {
 
 /// A vertex of a curved chart.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ChartVertex {
-    pub(crate) position: V3,
-    pub(crate) normal: V3,
+struct ChartVertex {
+    position: V3,
+    normal: V3,
 }
 
-/// A part of a curved surface.
-#[derive(Clone, Debug)]
-pub(crate) struct CurvedChart {
-    pub(crate) material: Arc<SurfaceMaterial>,
-    pub(crate) triangles: Vec<[ChartVertex; 3]>,
+/// True if a mesh has few faces, and they are large or have text: a texture is then cheaper than fine triangles.
+pub(crate) fn suits_flat_charts(mesh: &Mesh, has_text: bool) -> bool {
+    mesh.triangles.len() <= MAX_FLAT_TRIANGLES && (has_text || mesh.area().sqrt() > MIN_FLAT_SIZE)
+}
+
+/// Builds a level of detail with one chart for the triangles of each plane. The charts are appended to `charts`.
+pub(crate) fn flat_charts(mesh: &Mesh, visual: &Visual, charts: &mut Vec<TextureChart>) -> Lod {
+    struct Plane {
+        normal: V3,
+        offset: f32,
+        corners: Vec<V3>,
+    }
+    let CreasedMesh { positions, normals, triangles, .. } = CreasedMesh::new(mesh);
+    let mut planes: Vec<Plane> = Vec::new();
+    let mut chart_ids = Vec::new();
+    for t in &triangles {
+        let corners = t.map(|v| positions[v as usize]);
+        let area = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+        let normal = area.try_normalize(0.0).unwrap_or_else(V3::z);
+        let offset = normal.dot(&corners[0]);
+        let known = planes
+            .iter()
+            .position(|plane| plane.normal.dot(&normal) > 0.99999 && (plane.offset - offset).abs() < 1e-4);
+        let index = known.unwrap_or_else(|| {
+            planes.push(Plane { normal, offset, corners: Vec::new() });
+            planes.len() - 1
+        });
+        planes[index].corners.extend(corners);
+        chart_ids.push(index as u32);
+    }
+    let min_texel = if pattern::has_text(visual) { TEXT_TEXEL } else { MIN_TEXEL };
+    let texel = |size: f32| min_texel.max(pattern::finest_feature(visual).min(size) / TEXELS_PER_FEATURE);
+    charts.extend(planes.iter().map(|plane| {
+        TextureChart::new(&plane.normal, &plane.corners, texel, ChartSource::Flat(visual.clone()))
+    }));
+    // Albedo and roughness come from the texture; metalness does not vary over a chart.
+    let mut material = MaterialSample::from([0.0, 0.0, 0.0, 1.0, 0.0, 1.0]);
+    material[METALNESS] = visual.metalness as f32;
+    Lod {
+        uvs: texture_coordinates(&positions, &triangles, charts, &chart_ids),
+        smoothing_groups: chart_ids.clone(),
+        materials: vec![material; positions.len()],
+        positions,
+        normals,
+        triangles,
+        chart_ids,
+        vertex_spacing: MIN_TEXEL,
+        ..Lod::default()
+    }
+}
+
+/// Textures every triangle of a curved level; its charts are appended to `charts`. `texel` is the edge of a texel, m.
+///
+/// The level then counts as uniform: its materials no longer require small triangles.
+pub(crate) fn parameterize(
+    lod: &mut Lod,
+    charts: &mut Vec<TextureChart>,
+    material: &Arc<SurfaceMaterial>,
+    texel: f32,
+) {
+    // The axis along which each triangle mostly faces, twice, plus 1 if it faces backwards.
+    let face_direction = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|v| lod.positions[v as usize]);
+        let n = (b - a).cross(&(c - a));
+        2 * n.iamax() + usize::from(n[n.iamax()] < 0.0)
+    };
+    let directions: Vec<usize> = lod.triangles.iter().map(face_direction).collect();
+    let mut connected = UnionFind::new(lod.triangles.len());
+    let mut first_at: BTreeMap<(u32, usize), usize> = BTreeMap::new();
+    for (t, (corners, &direction)) in lod.triangles.iter().zip(&directions).enumerate() {
+        for &v in corners {
+            let other = *first_at.entry((v, direction)).or_insert(t);
+            connected.union(other, t);
+        }
+    }
+    let mut parts: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for t in 0..lod.triangles.len() {
+        parts.entry(connected.find(t)).or_default().push(t);
+    }
+    let mut chart_ids = vec![0; lod.triangles.len()];
+    for (first, part) in parts {
+        let vertex =
+            |v: u32| ChartVertex { position: lod.positions[v as usize], normal: lod.normals[v as usize] };
+        part.iter().for_each(|&t| chart_ids[t] = charts.len() as u32);
+        let triangles: Vec<_> = part.iter().map(|&t| lod.triangles[t].map(vertex)).collect();
+        let corners: Vec<V3> = triangles.iter().flatten().map(|vertex| vertex.position).collect();
+        let is_backwards = directions[first] % 2 == 1;
+        let n = V3::ith(directions[first] / 2, if is_backwards { -1.0 } else { 1.0 });
+        let source = ChartSource::Curved { material: material.clone(), triangles };
+        charts.push(TextureChart::new(&n, &corners, |_| texel, source));
+    }
+    lod.uvs = texture_coordinates(&lod.positions, &lod.triangles, charts, &chart_ids);
+    lod.chart_ids = chart_ids;
+    lod.is_uniform = true;
+}
+
+fn texture_coordinates(
+    positions: &[V3],
+    triangles: &[[u32; 3]],
+    charts: &[TextureChart],
+    chart_ids: &[u32],
+) -> Vec<[[f32; 2]; 3]> {
+    let of_triangle =
+        |(t, &chart): (&[u32; 3], &u32)| t.map(|v| charts[chart as usize].uv(&positions[v as usize]));
+    triangles.iter().zip(chart_ids).map(of_triangle).collect()
 }
 
 impl TextureChart {
-    /// The chart of a flat face with unit normal `n` and these corners.
-    pub(crate) fn flat(n: &V3, corners: &[V3], visual: &Visual) -> Self {
-        let min_texel = if pattern::has_text(visual) { TEXT_TEXEL } else { MIN_TEXEL };
-        let texel = |size: f32| min_texel.max(pattern::finest_feature(visual).min(size) / TEXELS_PER_FEATURE);
-        Self::new(n, corners, texel, ChartSource::Flat(visual.clone()))
-    }
-
-    /// The chart of a curved part, projected along the unit vector `n`, with texels of edge `texel`, m.
-    pub(crate) fn curved(n: &V3, texel: f32, curved: CurvedChart) -> Self {
-        let corners: Vec<V3> = curved.triangles.iter().flatten().map(|vertex| vertex.position).collect();
-        Self::new(n, &corners, |_| texel, ChartSource::Curved(curved))
-    }
-
-    /// `texel` returns the edge of a texel for a chart of a given size, both m.
+    /// The chart of a surface with these corners, projected along the unit vector `n`. `texel` returns the edge of a
+    /// texel for a chart of a given size, both m.
     fn new(n: &V3, corners: &[V3], texel: impl Fn(f32) -> f32, source: ChartSource) -> Self {
         let u = if n.x.abs() < 0.9 { V3::x() } else { V3::y() };
         let u = (u - n * u.dot(n)).normalize();
@@ -109,7 +209,7 @@ impl TextureChart {
     }
 
     /// Texture coordinates of a point of the object frame, texels.
-    pub(crate) fn uv(&self, p: &V3) -> [f32; 2] {
+    fn uv(&self, p: &V3) -> [f32; 2] {
         let d = p - self.origin;
         [d.dot(&self.u) / self.texel, d.dot(&self.v) / self.texel]
     }
@@ -142,10 +242,10 @@ impl TextureChart {
                 .map(|i| {
                     let [x, y] = [(i % width) as f32 + 0.5, (i / width) as f32 + 0.5];
                     let p = self.origin + (self.u * x + self.v * y) * self.texel;
-                    sample_visual(visual, &p, &self.n, self.texel).material.texel()
+                    texel_of(&sample_visual(visual, &p, &self.n, self.texel).material)
                 })
                 .collect(),
-            ChartSource::Curved(curved) => self.paint_curved(curved),
+            ChartSource::Curved { material, triangles } => self.paint_curved(material, triangles),
         };
         let mut size = self.size;
         let mut mips = vec![MipLevel::new(&texels, size)];
@@ -156,24 +256,26 @@ impl TextureChart {
         mips
     }
 
-    fn paint_curved(&self, curved: &CurvedChart) -> Vec<Texel> {
+    fn paint_curved(&self, material: &SurfaceMaterial, triangles: &[[ChartVertex; 3]]) -> Vec<Texel> {
         let mut points: Vec<Option<SurfacePoint>> = vec![None; self.size[0] * self.size[1]];
-        for corners in &curved.triangles {
+        for corners in triangles {
             project_triangle(corners, corners.map(|c| self.uv(&c.position)), self.size, &mut points);
         }
-        let SurfaceMaterial { shape, visuals } = &*curved.material;
+        let SurfaceMaterial { shape, visuals } = material;
         let texel = |point: &SurfacePoint| {
             let p = &point.position;
             let id = if visuals.len() > 1 { shape.material(&p.cast()) as usize } else { 0 };
             let n = point.normal.try_normalize(0.0).unwrap_or_else(V3::z);
-            let sample = match visuals.get(id) {
-                Some(visual) => sample_visual(visual, p, &n, self.texel),
-                None => sample_visual(&Visual::default(), p, &n, self.texel),
-            };
-            sample.material.texel()
+            let default = Visual::default();
+            texel_of(&sample_visual(visuals.get(id).unwrap_or(&default), p, &n, self.texel).material)
         };
         fill_gaps(points.iter().map(|point| point.as_ref().map(texel)).collect(), self.size)
     }
+}
+
+/// The components of a material that textures store.
+fn texel_of(material: &MaterialSample) -> Texel {
+    std::array::from_fn(|i| material[i])
 }
 
 /// The point of a surface that a texel shows.
@@ -325,4 +427,66 @@ fn blend_bytes(corners: [u32x8; 4], x: u32x8, y: u32x8) -> [f32x8; 4] {
     let value = |x: u32x8| f32x8::from_i32x8(cast(x)) * f32x8::splat(1.0 / 65_280.0);
     let low = u32x8::splat(0xFFFF);
     [value(even & low), value(odd & low), value(even >> 16), value(odd >> 16)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        scene::{LabelLine, Mask, TextDecal, VisualLayer},
+        sensing::camera::RenderMesh,
+    };
+
+    /// A word facing +x, white on black.
+    fn printed() -> Visual {
+        let line = LabelLine {
+            text: "soft".into(),
+            height_m: 0.012,
+            weight: 0.15,
+            at: [0.03, 0.0, 0.0],
+            facing: [1.0, 0.0, 0.0],
+            ..LabelLine::default()
+        };
+        let mask = Mask::Text { decal: Arc::new(TextDecal::new(line)) };
+        let layer = VisualLayer { mask, albedo: [1.0; 3], roughness: 0.5, opacity: 1.0, relief_m: 0.0 };
+        Visual::plain([0.0; 3], 0.5, 0.0).with(layer)
+    }
+
+    fn ball() -> RenderMesh {
+        RenderMesh::from_shape("ball", &Shape::Sphere { radius: 0.03 }, &[printed()]).expect("a mesh")
+    }
+
+    #[test]
+    fn every_triangle_of_every_level_has_valid_texture_coordinates_and_faces_its_chart() {
+        for lod in &ball().lods {
+            let count = lod.triangles.len();
+            assert_eq!((lod.chart_ids.len(), lod.uvs.len()), (count, count));
+            for uvs in &lod.uvs {
+                let [a, b, c] = *uvs;
+                let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+                assert!(area > 0.0 && uvs.iter().flatten().all(|x| *x > -1e-3), "{uvs:?}");
+            }
+        }
+        assert_eq!(ball().lods[0].chart_ids.iter().max(), Some(&5), "a ball has six sides");
+    }
+
+    #[test]
+    fn letters_finer_than_the_triangles_are_sampled_at_their_positions() {
+        let mesh = ball();
+        let lod = &mesh.lods[0];
+        let mut counts = [0; 2];
+        for (uvs, (t, &chart)) in lod.uvs.iter().zip(lod.triangles.iter().zip(&lod.chart_ids)) {
+            let middle = t.iter().map(|&v| lod.positions[v as usize]).sum::<V3>() / 3.0;
+            let expected = sample_visual(&printed(), &middle, &middle.normalize(), 1e-3).material[0];
+            if (0.02..=0.98).contains(&expected) {
+                continue;
+            }
+            let uv: [f32x8; 2] =
+                std::array::from_fn(|i| f32x8::splat(uvs.iter().map(|p| p[i]).sum::<f32>() / 3.0));
+            let found = mesh.charts[chart as usize].sample(uv, f32x8::splat(1e-4)).0.x.to_array()[0];
+            assert!((found - expected).abs() < 0.1, "{middle:?}: {found} for {expected}");
+            counts[usize::from(expected > 0.5)] += 1;
+        }
+        assert!(counts[0] > 1000 && counts[1] > 20, "triangles off and on letters: {counts:?}");
+    }
 }

@@ -1,0 +1,239 @@
+//! The scene to be drawn: objects, their poses in a state, and the light.
+
+use std::sync::{
+    Arc,
+    atomic::{AtomicU64, Ordering},
+};
+
+use nalgebra::Matrix3;
+
+use super::{
+    error::CameraError,
+    math::{V3, is_finite},
+    mesh::{
+        lod::{Lod, NodeWeights, vertex_normals},
+        render_mesh::RenderMesh,
+    },
+    shade::{shading::Illumination, shadow::ShadowMap, tonemap::ToneMapper},
+};
+use crate::{
+    geometry::{Pose, Vec3},
+    physics::BodyId,
+    scene::Lighting,
+};
+
+/// Maximum number of objects of a scene; triangle ids have bits for about as many.
+const MAX_OBJECTS: usize = 1000;
+/// Maximum radius of the wide shadow map, in radii of the fine one: beyond, it would be too coarse.
+const MAX_WIDE_RADIUS: f32 = 8.0;
+
+/// An object to be drawn.
+#[derive(Clone, Debug)]
+pub struct RenderObject {
+    /// Name for error messages.
+    pub name: String,
+    /// Value of its pixels in segmentation images; 0 is the background.
+    pub segmentation_id: u16,
+    /// Triangles and materials, shared by all instances.
+    pub mesh: Arc<RenderMesh>,
+    /// The body that the object moves with. If it is a soft body, the mesh must be
+    /// [embedded](RenderMesh::embedded_in) in it. Kinematic bodies are not supported.
+    pub body: BodyId,
+    /// Pose of the object in the frame of the body, or in the world; ignored for soft bodies.
+    pub pose_in_body: Pose,
+    /// True if the object casts shadows.
+    pub casts_shadow: bool,
+}
+
+impl RenderObject {
+    /// True unless the object is fixed in the world.
+    pub(crate) fn is_moving(&self) -> bool {
+        self.body != BodyId::World
+    }
+}
+
+/// All objects and the light of a scene, with everything that does not change during an episode precomputed.
+///
+/// Immutable: one scene can be shared by several [`Renderer`](super::Renderer)s.
+#[derive(Debug)]
+pub struct RenderScene {
+    pub(crate) objects: Vec<RenderObject>,
+    pub(crate) lighting: Lighting,
+    /// World-space levels of detail of each fixed object; empty for moving ones.
+    pub(crate) fixed_meshes: Vec<Vec<Arc<PosedMesh>>>,
+    pub(crate) fixed_shadow: ShadowMap,
+    /// Coarser shadows of fixed objects beyond the fine map, if there are any.
+    pub(crate) wide_shadow: Option<ShadowMap>,
+    pub(crate) illumination: Illumination,
+    pub(crate) tone_mapper: ToneMapper,
+    /// Identifies the scene in the caches of renderers.
+    pub(crate) id: u64,
+}
+
+/// The part of a [`WorldSnapshot`](crate::physics::world::WorldSnapshot) that images depend on. The default has no
+/// moving bodies.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FrameView<'a> {
+    /// Node positions of each soft body, world, m.
+    pub nodes: &'a [Vec<Vec3>],
+    /// Poses of the rigid bodies, world.
+    pub rigid: &'a [Pose],
+    /// Link poses of each articulation, world.
+    pub links: &'a [Vec<Pose>],
+    /// Pose of the robot's hand, world, for cameras mounted on it.
+    pub hand_w: Option<Pose>,
+}
+
+impl RenderScene {
+    /// Prepares a scene: poses its fixed objects and draws their shadow maps.
+    ///
+    /// # Errors
+    /// A setting of the light is out of range, the pose of a fixed object is not finite, or there are
+    /// more than 1000 objects.
+    pub fn new(objects: Vec<RenderObject>, lighting: Lighting) -> Result<Self, CameraError> {
+        check_light(&lighting)?;
+        if objects.len() > MAX_OBJECTS {
+            return Err(CameraError::Mesh {
+                name: "the scene".to_owned(),
+                reason: format!("{} objects; at most {MAX_OBJECTS} can be drawn, join some", objects.len()),
+            });
+        }
+        let mut fixed_meshes = Vec::new();
+        for object in &objects {
+            let posed = |lod| PosedMesh::new(object, lod, &FrameView::default()).map(Arc::new);
+            let lods = if object.is_moving() { &[] } else { object.mesh.lods.as_slice() };
+            fixed_meshes.push(lods.iter().map(posed).collect::<Result<Vec<_>, _>>()?);
+        }
+        let draw_shadows = |mut map: ShadowMap| {
+            let casters = objects.iter().zip(&fixed_meshes).filter(|(object, _)| object.casts_shadow);
+            map.draw(casters.filter_map(|(object, posed)| {
+                Some((posed.first()?.positions.as_slice(), object.mesh.lods[0].triangles.as_slice()))
+            }));
+            map
+        };
+        let fixed_shadow = draw_shadows(ShadowMap::new(&lighting));
+        let wide_shadow = wide_shadow_radius(&fixed_meshes, &lighting)
+            .map(|radius| draw_shadows(ShadowMap::with_radius(&lighting, radius)));
+        // Relaxed: only uniqueness matters.
+        static NEXT_ID: AtomicU64 = AtomicU64::new(0);
+        Ok(Self {
+            illumination: Illumination::new(&lighting),
+            tone_mapper: ToneMapper::new(lighting.exposure),
+            objects,
+            lighting,
+            fixed_meshes,
+            fixed_shadow,
+            wide_shadow,
+            id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
+        })
+    }
+}
+
+/// Radius that contains all fixed objects, m, if the fine shadow map does not.
+fn wide_shadow_radius(fixed_meshes: &[Vec<Arc<PosedMesh>>], lighting: &Lighting) -> Option<f32> {
+    let (centre, fine_radius) = (lighting.shadow_centre_w.cast::<f32>(), lighting.shadow_radius_m as f32);
+    let positions = fixed_meshes.iter().filter_map(|lods| lods.last()).flat_map(|posed| &posed.positions);
+    let farthest = positions.map(|p| (p - centre).norm()).fold(0.0, f32::max);
+    (farthest > fine_radius).then(|| farthest.min(MAX_WIDE_RADIUS * fine_radius))
+}
+
+/// Validates the settings of the light.
+///
+/// # Errors
+/// The first setting that is out of range.
+pub fn check_light(light: &Lighting) -> Result<(), CameraError> {
+    let require = |is_valid: bool, field, expected, got: String| {
+        if is_valid { Ok(()) } else { Err(CameraError::Light { field, expected, got }) }
+    };
+    // Comparisons with NaN are false.
+    let (direction, centre) = (light.key.direction_w, light.shadow_centre_w);
+    let is_valid = direction.norm() > 1e-9 && direction.norm().is_finite();
+    require(is_valid, "direction", "a direction", format!("{:?}", direction.as_slice()))?;
+    let softness = light.key.softness_rad;
+    require((0.0..=0.5).contains(&softness), "softness", "0 to 0.5 rad", softness.to_string())?;
+    for (field, values) in [
+        ("colour", light.key.colour),
+        ("sky_zenith", light.sky.zenith),
+        ("sky_horizon", light.sky.horizon),
+        ("sky_ground", light.sky.ground),
+        ("strength", [light.key.strength; 3]),
+        ("sky_strength", [light.sky.strength; 3]),
+    ] {
+        let is_valid = values.iter().all(|&x| x >= 0.0 && x.is_finite());
+        require(is_valid, field, "numbers from 0", format!("{values:?}"))?;
+    }
+    for (field, expected, value) in [
+        ("exposure", "a number above 0", light.exposure),
+        ("shadow_radius_m", "a length above 0 m", light.shadow_radius_m),
+    ] {
+        require(value > 0.0 && value.is_finite(), field, expected, value.to_string())?;
+    }
+    let is_valid = centre.iter().all(|x| x.is_finite());
+    require(is_valid, "shadow_centre_w", "a point", format!("{:?}", centre.as_slice()))
+}
+
+/// Vertices and normals of a level of detail in the world.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct PosedMesh {
+    pub(crate) positions: Vec<V3>,
+    pub(crate) normals: Vec<V3>,
+}
+
+impl PosedMesh {
+    /// Places a level of `object` as in the state `view`.
+    pub(crate) fn new(object: &RenderObject, lod: &Lod, view: &FrameView) -> Result<Self, CameraError> {
+        let fail = |reason: String| CameraError::State { name: object.name.clone(), reason };
+        let body_w = match object.body {
+            BodyId::World => None,
+            BodyId::Rigid(id) => {
+                let pose = view.rigid.get(id.index());
+                Some(pose.ok_or_else(|| fail(format!("no rigid body {}", id.index())))?)
+            }
+            BodyId::Link(id) => {
+                let articulation = id.articulation.index();
+                let pose = view.links.get(articulation).and_then(|links| links.get(id.index));
+                let missing = || fail(format!("no link {} of articulation {articulation}", id.index));
+                Some(pose.ok_or_else(missing)?)
+            }
+            BodyId::Soft(id) => {
+                let nodes = view.nodes.get(id.index());
+                let nodes = nodes.ok_or_else(|| fail(format!("no soft body {}", id.index())))?;
+                return Self::embedded(lod, nodes).map_err(fail);
+            }
+            BodyId::Kinematic(_) => return Err(fail("no pose for this kind of body".to_owned())),
+        };
+        let pose_w = body_w.map_or(object.pose_in_body, |body_w| body_w * object.pose_in_body);
+        if !is_finite(&pose_w) {
+            return Err(fail("a pose that is not a number".to_owned()));
+        }
+        let rotation: Matrix3<f32> = pose_w.rotation.to_rotation_matrix().matrix().cast();
+        let translation: V3 = pose_w.translation.vector.cast();
+        Ok(Self {
+            positions: lod.positions.iter().map(|p| rotation * p + translation).collect(),
+            normals: lod.normals.iter().map(|n| rotation * n).collect(),
+        })
+    }
+
+    /// Places a level that is embedded in a soft body with these nodes. An error is the reason why it cannot.
+    fn embedded(lod: &Lod, nodes: &[Vec3]) -> Result<Self, String> {
+        if lod.embedding.len() != lod.positions.len() {
+            return Err("nodes for it, but its mesh is not embedded in a soft body".to_owned());
+        }
+        if lod.embedding.iter().any(|vertex| vertex.nodes.iter().any(|&n| n as usize >= nodes.len())) {
+            return Err(format!("{} nodes, fewer than its mesh refers to", nodes.len()));
+        }
+        if nodes.iter().any(|p| !p.iter().all(|x| x.is_finite())) {
+            return Err("a node position that is not a number".to_owned());
+        }
+        let position = |vertex: &NodeWeights| {
+            let mut p = V3::zeros();
+            for (&node, weight) in vertex.nodes.iter().zip(&vertex.weights) {
+                p += nodes[node as usize].cast::<f32>() * *weight;
+            }
+            p
+        };
+        let positions: Vec<V3> = lod.embedding.iter().map(position).collect();
+        let normals = vertex_normals(&positions, &lod.triangles);
+        Ok(Self { positions, normals })
+    }
+}
