@@ -18,12 +18,28 @@ pub(crate) fn print_json(value: &impl serde::Serialize) {
     print(&format!("{:#}\n", serde_json::json!(value)));
 }
 
+/// Formats rows of equal length in columns that are two spaces apart and as wide as their longest cell.
+pub(crate) fn text_columns(rows: &[Vec<String>], is_right_aligned: impl Fn(usize) -> bool) -> String {
+    let mut lines = vec![String::new(); rows.len()];
+    for column in 0..rows.first().map_or(0, Vec::len) {
+        let width = rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+        for (line, row) in lines.iter_mut().zip(rows) {
+            let (gap, cell) = (if column > 0 { "  " } else { "" }, &row[column]);
+            *line += gap;
+            *line +=
+                &if is_right_aligned(column) { format!("{cell:>width$}") } else { format!("{cell:width$}") };
+        }
+    }
+    lines.iter().map(|line| format!("{}\n", line.trim_end())).collect()
+}
+
 /// Prints a message of the program to standard error, after `softvt: `.
 pub(crate) fn eprint_notice(message: impl std::fmt::Display) {
     text::eprint_line(&format!("softvt: {message}"));
 }
 
-/// Progress of a list of jobs on standard error: a bar on a terminal, one line per job elsewhere.
+/// Progress of a list of jobs on standard error: a bar on a terminal, which disappears
+/// when this is dropped, and one line per job elsewhere.
 pub(crate) struct Progress {
     bar: Option<ProgressBar>,
     total: usize,
@@ -54,13 +70,6 @@ impl Progress {
                 bar.inc(1);
             }
             None => text::eprint_line(&format!("[{}/{}] {message}", self.done, self.total)),
-        }
-    }
-
-    /// Removes the bar.
-    pub(crate) fn finish(&self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
         }
     }
 }

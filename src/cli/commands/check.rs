@@ -8,7 +8,7 @@ use std::{
 use clap::Args;
 
 use crate::{
-    benchmark::{Goal, GoalKind, Plan, Suite, Task},
+    benchmark::{Goal, GoalKind, Plan, Task},
     cli::{
         error::CliError,
         output::print,
@@ -23,7 +23,7 @@ use crate::{
     parallel,
     rollout::{AssetCache, SensorAssets, cancel, target_asset},
     scene::Asset,
-    script::{LoadedScript, SceneBuilder},
+    script::SceneBuilder,
     text::{self, counted},
 };
 
@@ -37,12 +37,6 @@ pub(crate) struct CheckArgs {
     policy: PolicyArgs,
 }
 
-/// Assets that the checks of several suites share.
-struct SharedAssets {
-    assets: AssetCache,
-    sensor_assets: SensorAssets,
-}
-
 /// Loads a script and builds the first scene of every task. Nothing is settled, run or rendered.
 ///
 /// # Errors
@@ -51,13 +45,18 @@ pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
     let config = RunConfig::new(args.script, RunFlags::default())?;
     let config = &config.with_policy(PolicyConfig::load(&args.policy)?);
     let loaded = config.load_script()?;
-    let shared = SharedAssets { assets: AssetCache::approximate(), sensor_assets: SensorAssets::default() };
-    match &loaded.plan {
-        Plan::Suite(suite) => check_suite(config, &loaded, suite, &shared)?,
-        Plan::Suites { suites } => check_suites(config, &loaded, suites, &shared)?,
-        Plan::Conditions { suites, conditions: list, .. } => {
-            check_suites(config, &loaded, suites, &shared)?;
-            conditions::check(config, &loaded, suites, list)?;
+    let plan = &loaded.plan;
+    check_distinct_out_dirs(config, plan.suites())?;
+    let (assets, sensor_assets) = (AssetCache::approximate(), SensorAssets::default());
+    for suite in plan.suites() {
+        let mut run = SuiteRun::new(config, &loaded, suite, Vec::new(), PathBuf::new())?;
+        (run.assets, run.sensor_assets) = (assets.clone(), sensor_assets.clone());
+        check_suite(run)?;
+    }
+    match plan {
+        Plan::Suite(_) | Plan::Suites { .. } => {}
+        Plan::Conditions { suites, conditions, .. } => {
+            conditions::check(config, &loaded, suites, conditions)?
         }
         Plan::Experiment { name, points, .. } => {
             print(&format!("experiment {name}: {}, not run by this check\n", counted(*points, "point")));
@@ -67,26 +66,10 @@ pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-fn check_suites(
-    config: &RunConfig,
-    loaded: &LoadedScript,
-    suites: &[Suite],
-    shared: &SharedAssets,
-) -> Result<(), CliError> {
-    check_distinct_out_dirs(config, suites)?;
-    suites.iter().try_for_each(|suite| check_suite(config, loaded, suite, shared))
-}
-
-fn check_suite(
-    config: &RunConfig,
-    loaded: &LoadedScript,
-    suite: &Suite,
-    shared: &SharedAssets,
-) -> Result<(), CliError> {
+fn check_suite(mut run: SuiteRun) -> Result<(), CliError> {
+    let suite = run.suite;
     let tasks: Vec<_> = suite.tasks.iter().collect();
-    let mut run = SuiteRun::new(config, loaded, suite, Vec::new(), PathBuf::new())?;
-    (run.assets, run.sensor_assets) = (shared.assets.clone(), shared.sensor_assets.clone());
-    let targets = check_first_scenes(loaded, &run, &tasks)?;
+    let targets = check_first_scenes(&run, &tasks)?;
     targets.into_iter().try_for_each(|target| run.read_limit(target))?;
     print(&format!(
         "suite {}: {}, {} each\n",
@@ -108,18 +91,14 @@ fn check_suite(
 }
 
 /// Builds and checks the first scene of every task on all processors. Returns the assets of their targets.
-fn check_first_scenes(
-    loaded: &LoadedScript,
-    run: &SuiteRun,
-    tasks: &[&Task],
-) -> Result<Vec<Option<Arc<Asset>>>, CliError> {
+fn check_first_scenes(run: &SuiteRun, tasks: &[&Task]) -> Result<Vec<Option<Arc<Asset>>>, CliError> {
     // Opening the scenes runs the whole script, so each thread takes idle ones before it opens others.
     let idle: Mutex<Vec<SceneBuilder>> = Mutex::default();
     let mut targets = vec![None; tasks.len()];
     let check = |job: usize| -> Result<_, CliError> {
         let task = tasks[job];
         let taken = parallel::lock(&idle).pop();
-        let builder = taken.map_or_else(|| SceneBuilder::open(loaded), Ok)?;
+        let builder = taken.map_or_else(|| SceneBuilder::open(run.loaded), Ok)?;
         let setup = builder.build(&run.episode_id(task, 0), &run.config.shifts)?;
         parallel::lock(&idle).push(builder);
         run.check_scene(task, setup.scene)?;

@@ -9,7 +9,7 @@ use crate::{
     benchmark::{Plan, Task},
     cli::{
         error::CliError,
-        output::{print, print_json},
+        output::{print, print_json, text_columns},
         run::policy::BuiltinPolicy,
     },
     policy::profile::PROFILES,
@@ -77,20 +77,12 @@ fn table(rows: &[Value]) -> String {
         }
         other => other.to_string(),
     };
-    let mut lines = vec![String::new(); rows.len() + 1];
-    for (column, key) in headings.iter().enumerate() {
-        let cells = rows.iter().map(|row| cell(row, key));
-        let cells: Vec<String> = std::iter::once((*key).to_owned()).chain(cells).collect();
-        let width = cells.iter().map(|cell| cell.chars().count()).max().unwrap_or(0);
-        let is_number = rows.iter().all(|row| row[*key].is_number() || row[*key].is_null());
-        for (line, cell) in lines.iter_mut().zip(cells) {
-            if column > 0 {
-                line.push_str("  ");
-            }
-            *line += &if is_number { format!("{cell:>width$}") } else { format!("{cell:width$}") };
-        }
-    }
-    lines.iter().map(|line| format!("{}\n", line.trim_end())).collect()
+    let heading = headings.iter().map(ToString::to_string).collect();
+    let cells = rows.iter().map(|row| headings.iter().map(|key| cell(row, key)).collect());
+    let lines: Vec<Vec<String>> = std::iter::once(heading).chain(cells).collect();
+    text_columns(&lines, |column| {
+        rows.iter().all(|row| row[headings[column]].is_number() || row[headings[column]].is_null())
+    })
 }
 
 /// Built-in entries, and Lua files, which are named by their paths.

@@ -7,11 +7,11 @@ use crate::{
     cli::{
         error::CliError,
         run::{
-            config::{RunConfig, ScriptArgs},
+            config::ScriptArgs,
             policy::{PolicyArgs, PolicyConfig, expert_controller},
             recording::record_all,
-            selection::{select_suites, select_tasks},
-            suite_recording::{AttemptPlan, GripLog, RecordingArgs, RecordingConfig, SuiteRecording},
+            selection::{EpisodeJob, select_suites, select_tasks},
+            suite_recording::{GripLog, RecordingArgs, SuiteRecording},
             suite_run::SuiteRun,
         },
     },
@@ -54,37 +54,46 @@ pub(crate) struct RecordArgs {
 /// The script has no suite, the folder contains something else, an attempt or a file fails, or too
 /// few attempts are good.
 pub(super) fn run(args: RecordArgs) -> Result<(), CliError> {
-    let config = RecordingConfig::new(args.script, args.recording, args.tasks)?
-        .with_policy(PolicyConfig::load(&args.policy)?);
-    let default_attempts = args.demos.saturating_mul(ATTEMPTS_PER_DEMO).max(MIN_ATTEMPTS);
-    let plan =
-        AttemptPlan::First { demos: args.demos, max_attempts: args.attempts.unwrap_or(default_attempts) };
-    let run = &config.run;
-    let loaded = run.load_script()?;
-    let suites = select_suites("record", run, &loaded.plan)?;
-    let names: Vec<String> = suites.iter().map(|suite| run.suite_name(suite)).collect();
+    let (recording, demos) = (&args.recording, args.demos);
+    let config =
+        recording.run_config(args.script, args.tasks)?.with_policy(PolicyConfig::load(&args.policy)?);
+    let default_attempts = demos.saturating_mul(ATTEMPTS_PER_DEMO).max(MIN_ATTEMPTS);
+    let max_attempts = args.attempts.unwrap_or(default_attempts);
+    let loaded = config.load_script()?;
+    let suites = select_suites("record", &config, &loaded.plan)?;
+    let names: Vec<String> = suites.iter().map(|suite| config.suite_name(suite)).collect();
     let request = json!({
         "softvt": env!("CARGO_PKG_VERSION"),
-        "demos": args.demos,
-        "pictures": config.has_hdf5_images(),
-        "privileged": config.has_privileged(),
+        "demos": demos,
+        "pictures": recording.has_hdf5_images(),
+        "privileged": !recording.no_privileged,
         "suites": names,
     });
-    record_all(&config, &request, || {
+    record_all(recording, &request, || {
         let prepare = |suite| {
-            let tasks = select_tasks(run, suite)?;
-            SuiteRecording::new(&config, &loaded, suite, tasks, plan.clone(), |suite_run, log| {
-                record_grips(run, suite_run, log);
-                Ok(())
-            })
+            let tasks = select_tasks(&config, suite)?.into_iter();
+            let jobs =
+                tasks.flat_map(|task| (0..max_attempts).map(move |episode| EpisodeJob { task, episode }));
+            SuiteRecording::new(
+                &config,
+                recording,
+                &loaded,
+                suite,
+                jobs.collect(),
+                Some(demos),
+                |run, log| {
+                    record_grips(run, log);
+                    Ok(())
+                },
+            )
         };
         suites.iter().map(prepare).collect()
     })
 }
 
 /// Makes the experts of a run record their intent into `log`. Other policies are left unchanged.
-fn record_grips(config: &RunConfig, run: &mut SuiteRun, log: &GripLog) {
-    let Some(policy) = config.policy.expert() else { return };
+fn record_grips(run: &mut SuiteRun, log: &GripLog) {
+    let Some(policy) = run.config.policy.expert() else { return };
     let log = log.clone();
     run.controllers = Box::new(move |opened, brief| {
         Ok(Box::new(GripRecorder {

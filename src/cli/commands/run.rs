@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Parser;
 
 use crate::{
-    benchmark::{Plan, Suite},
+    benchmark::Plan,
     cli::{
         error::CliError,
         output::{print, print_json},
@@ -21,9 +21,7 @@ use crate::{
             suite_run::{SuiteRun, find_replay_source},
         },
     },
-    evaluation::summary::SuiteSummary,
     report::terminal,
-    script::LoadedScript,
 };
 
 /// A safety-aware visuo-tactile manipulation benchmark for soft objects, on an ordinary CPU
@@ -58,29 +56,27 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
     check_video_episodes(config, &loaded.plan)?;
     check_recorded_episodes(config, &loaded.plan)?;
     match &loaded.plan {
-        Plan::Suite(suite) => {
-            let out = flags.out.clone().unwrap_or_else(|| next_run_dir(config, &config.suite_name(suite)));
-            let summary = evaluate(config, &loaded, suite, out)?;
-            match flags.json {
-                true => print_json(&summary),
-                false => print(&terminal::table(&summary)),
-            }
-            requirement::check(&flags.requirements, &[summary])
-        }
-        Plan::Suites { suites } => {
-            check_distinct_out_dirs(config, suites)?;
+        plan @ (Plan::Suite(_) | Plan::Suites { .. }) => {
+            let is_list = matches!(plan, Plan::Suites { .. });
+            check_distinct_out_dirs(config, plan.suites())?;
             let mut summaries = Vec::new();
-            for suite in suites {
+            for suite in plan.suites() {
                 let name = config.suite_name(suite);
                 let out = match &flags.out {
-                    Some(dir) => dir.join(path_component(&name)),
+                    Some(dir) if is_list => dir.join(path_component(&name)),
+                    Some(dir) => dir.clone(),
                     None => next_run_dir(config, &name),
                 };
-                summaries.push(evaluate(config, &loaded, suite, out)?);
+                let tasks = select_tasks(config, suite)?;
+                let jobs = select_episodes(config, suite, &tasks);
+                let mut run = SuiteRun::new(config, &loaded, suite, jobs, out)?;
+                run.prepare(&tasks)?;
+                summaries.push(run_suite(&run, &tasks)?.summary);
             }
-            match flags.json {
-                true => print_json(&summaries),
-                false => summaries.iter().for_each(|summary| print(&terminal::table(summary))),
+            match &summaries[..] {
+                [summary] if flags.json && !is_list => print_json(summary),
+                summaries if flags.json => print_json(&summaries),
+                summaries => summaries.iter().for_each(|summary| print(&terminal::table(summary))),
             }
             requirement::check(&flags.requirements, &summaries)
         }
@@ -142,22 +138,9 @@ fn check_recorded_episodes(config: &RunConfig, plan: &Plan) -> Result<(), CliErr
 
 /// The first folder `runs/<name>-<policy>-NNN` that does not exist.
 fn next_run_dir(config: &RunConfig, name: &str) -> PathBuf {
-    let (name, policy) = (path_component(name), path_component(config.policy.name()));
+    let (name, policy) = (path_component(name), path_component(&config.policy.name));
     (1..)
         .map(|number| PathBuf::from(format!("runs/{name}-{policy}-{number:03}")))
         .find(|dir| !dir.exists())
         .unwrap_or_default()
-}
-
-fn evaluate(
-    config: &RunConfig,
-    loaded: &LoadedScript,
-    suite: &Suite,
-    out: PathBuf,
-) -> Result<SuiteSummary, CliError> {
-    let tasks = select_tasks(config, suite)?;
-    let jobs = select_episodes(config, suite, &tasks);
-    let mut run = SuiteRun::new(config, loaded, suite, jobs, out)?;
-    run.prepare(&tasks)?;
-    Ok(run_suite(&run, &tasks)?.summary)
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::{
-    benchmark::{Condition, ObjectType, REFERENCE, ShiftValue, Suite, Task},
+    benchmark::{Condition, ObjectType, REFERENCE, Suite, Task},
     cli::{
         error::CliError,
         output::{eprint_notice, print},
@@ -41,9 +41,7 @@ struct ConditionsFile<'a> {
 
 /// A suite under one condition, or the unchanged reference.
 struct ConditionCase {
-    name: String,
-    shift: Vec<ShiftValue>,
-    set: Vec<(String, String)>,
+    condition: Condition,
     /// Folder of the run, relative to that of all runs.
     folder: String,
     /// The configuration with the shifts and settings of the condition after those of the command line.
@@ -117,33 +115,21 @@ fn condition_cases(
         true => format!("{}/", path_component(&config.suite_name(suite))),
         false => String::new(),
     };
-    let mut cases = vec![ConditionCase {
-        name: REFERENCE.to_owned(),
-        shift: Vec::new(),
-        set: Vec::new(),
-        folder: format!("{parent}{REFERENCE}"),
-        config: config.clone(),
-        not_applicable: None,
-    }];
-    for condition in conditions {
+    let reference = Condition { name: REFERENCE.to_owned(), shift: Vec::new(), set: Vec::new(), only: None };
+    let mut cases: Vec<ConditionCase> = Vec::new();
+    for condition in std::iter::once(&reference).chain(conditions) {
         let folder = format!("{parent}{}", path_component(&condition.name));
         if let Some(same) = cases.iter().find(|case| case.folder == folder) {
             return Err(config.error(format!(
                 "the conditions {:?} and {:?} share the folder {folder}; rename one",
-                same.name, condition.name
+                same.condition.name, condition.name
             )));
         }
         let mut changed = config.clone();
         changed.shifts.extend(condition.shift.iter().cloned());
         changed.settings.extend(condition.set.iter().cloned());
-        cases.push(ConditionCase {
-            name: condition.name.clone(),
-            shift: condition.shift.clone(),
-            set: condition.set.clone(),
-            folder,
-            config: changed,
-            not_applicable: not_applicable(condition.only, object_type),
-        });
+        let not_applicable = not_applicable(condition.only, object_type);
+        cases.push(ConditionCase { condition: condition.clone(), folder, config: changed, not_applicable });
     }
     Ok(cases)
 }
@@ -170,9 +156,9 @@ fn prepare_runs<'a>(
             runs.push(None);
             continue;
         }
-        let in_case = |error: CliError| match case.name == REFERENCE {
+        let in_case = |error: CliError| match case.condition.name == REFERENCE {
             true => error,
-            false => error.within(&format!("suite {}, condition {:?}", suite.name, case.name)),
+            false => error.within(&format!("suite {}, condition {:?}", suite.name, case.condition.name)),
         };
         let dir: PathBuf = out.join(&case.folder);
         // A finished run is left unchanged, and an interrupted one is continued on request.
@@ -202,7 +188,7 @@ fn compare_conditions(
     for (case, run) in cases.iter().zip(runs) {
         let mut outcome = None;
         if let Some(run) = run {
-            let (name, number) = (text::escape_control(&case.name), rows.len() + 1);
+            let (name, number) = (text::escape_control(&case.condition.name), rows.len() + 1);
             eprint_notice(format!("{}, {name} ({number} of {})", suite.name, cases.len()));
             let result = run_suite(&run, tasks)?;
             outcome = Some(ConditionOutcome::new(case.folder.clone(), &result.records, reference.as_deref()));
@@ -210,15 +196,15 @@ fn compare_conditions(
             force_observed |= result.summary.force_observed;
         }
         rows.push(ConditionRow {
-            condition: case.name.clone(),
-            shift: case.shift.clone(),
-            set: case.set.clone(),
+            condition: case.condition.name.clone(),
+            shift: case.condition.shift.clone(),
+            set: case.condition.set.clone(),
             outcome,
             not_applicable: case.not_applicable.clone(),
         });
     }
     let deformable = suite.object_type == ObjectType::Deformable && !config.is_rigid_twin();
-    let policy = method_label(config.policy.name(), config.policy.is_privileged(), force_observed);
+    let policy = method_label(&config.policy.name, config.policy.is_privileged(), force_observed);
     Ok(ConditionTable { suite: config.suite_name(suite), policy, deformable, rows })
 }
 
@@ -231,7 +217,7 @@ fn write(
     let document = ConditionsFile {
         softvt: env!("CARGO_PKG_VERSION"),
         script: &loaded.sources.main,
-        policy: config.policy.name(),
+        policy: &config.policy.name,
         seed: config.script.seed,
         suites: tables,
     };

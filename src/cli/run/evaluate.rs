@@ -38,7 +38,7 @@ pub(crate) struct SuiteResult {
 
 impl SuiteResult {
     fn new(run: &SuiteRun, records: Vec<EpisodeRecord>) -> Self {
-        Self { summary: SuiteSummary::from_records(&run.name, run.config.policy.name(), &records), records }
+        Self { summary: SuiteSummary::from_records(&run.name, &run.config.policy.name, &records), records }
     }
 }
 
@@ -86,7 +86,7 @@ impl<'a> RunLog<'a> {
             let (header, id, index) = (&record.header, &record.header.id, record.header.id.index());
             let is_own = id.suite == run.name
                 && id.base_seed == config.script.seed
-                && header.policy == config.policy.name();
+                && header.policy == config.policy.name;
             let problem = if !is_own || !requested.contains(&index) {
                 "belongs to another run"
             } else if !seen.insert(index) {
@@ -112,7 +112,7 @@ impl<'a> RunLog<'a> {
         line: fn(&EpisodeRecord) -> String,
     ) -> Result<(), CliError> {
         let mut progress = Progress::new(jobs.len(), name);
-        let outcome = parallel::run(
+        parallel::run(
             jobs.len(),
             self.run.config.threads(),
             cancel::requested,
@@ -126,9 +126,7 @@ impl<'a> RunLog<'a> {
                 self.records.push(finished.record);
                 Ok(())
             },
-        );
-        progress.finish();
-        outcome
+        )
     }
 
     /// Sorts the records and the lines of the folder.
@@ -266,7 +264,7 @@ fn restore_artifacts(run: &SuiteRun, records: &[EpisodeRecord]) -> Result<(), Cl
     let incomplete = records.iter().filter(|record| !artifacts.missing(record).is_empty());
     let has_actions = |record: &EpisodeRecord| actions::path(&run.out, record.header.id.index()).is_file();
     let (restorable, lost): (Vec<_>, Vec<_>) =
-        incomplete.partition(|record| has_actions(record) || !run.config.policy.is_remote());
+        incomplete.partition(|record| has_actions(record) || !run.config.policy.server().is_some());
     if let Some(first) = lost.first() {
         eprint_notice(format!(
             "{} finished episodes lack their actions, so their files cannot be restored (first: {}); their results stay",

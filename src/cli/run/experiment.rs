@@ -11,7 +11,7 @@ use serde_json::Value;
 use crate::{
     cli::{
         error::CliError,
-        output::{Progress, eprint_notice, print},
+        output::{Progress, eprint_notice, print, text_columns},
         run::config::RunConfig,
     },
     files::replace,
@@ -60,7 +60,7 @@ pub(crate) fn run(
             Ok(())
         },
     );
-    progress.finish();
+    drop(progress);
     let done = rows.iter().filter(|rows| !rows.is_empty()).count();
     let rows: Vec<ExperimentRow> = rows.into_iter().flatten().collect();
     if cancel::requested() {
@@ -107,16 +107,10 @@ fn print_rows(config: &RunConfig, rows: &[ExperimentRow], columns: &[String]) {
     let all: BTreeSet<&String> = rows.iter().flat_map(|row| row.keys()).collect();
     let columns: Vec<&String> =
         if columns.is_empty() { all.into_iter().collect() } else { columns.iter().collect() };
-    let header: Vec<String> = columns.iter().map(|column| column.to_string()).collect();
+    let header = columns.iter().map(ToString::to_string).collect();
     let cells = rows.iter().map(|row| columns.iter().map(|column| format_cell(row.get(*column))).collect());
     let lines: Vec<Vec<String>> = std::iter::once(header).chain(cells).collect();
-    let widths: Vec<usize> = (0..columns.len())
-        .map(|column| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0))
-        .collect();
-    for line in &lines {
-        let padded = line.iter().zip(&widths).map(|(cell, width)| format!("{cell:>width$}"));
-        print(&format!("{}\n", padded.collect::<Vec<_>>().join("  ")));
-    }
+    print(&text_columns(&lines, |_| true));
 }
 
 fn format_cell(value: Option<&Value>) -> String {

@@ -171,92 +171,106 @@ fn parse_name(word: &str) -> Result<String, String> {
 pub(crate) type ControllerFactory =
     Box<dyn Fn(EpisodeSetup, TaskBrief) -> Result<Box<dyn Controller>, CliError> + Sync>;
 
-/// A policy on a server.
-#[derive(Debug)]
-struct ServerPolicy {
-    server: PolicyServer,
-    /// The profile as `--profile` names it.
-    profile_name: String,
-    /// SHA-256 of the files of the profile, by name.
-    sources: BTreeMap<String, String>,
-    /// Actions executed from each chunk.
-    replan: usize,
-}
-
 #[derive(Clone, Debug)]
 enum PolicyKind {
     Builtin(BuiltinPolicy),
-    /// A policy in Lua, and the actions executed from each chunk if that is limited.
-    Lua {
-        file: Arc<PolicyFile>,
-        replan: Option<usize>,
-    },
-    Server(Arc<ServerPolicy>),
+    Lua(Arc<PolicyFile>),
+    Server(Arc<PolicyServer>),
     /// Repeats the actions of recorded runs.
     Recorded(Arc<RecordedRuns>),
     /// The actions come from elsewhere: a client, a dataset or a single recorded episode.
     External,
 }
 
-/// A policy under the name that results show.
+/// The sensors that the file of a policy declares.
+#[derive(Clone, Debug)]
+pub(crate) struct DeclaredStreams {
+    /// Source location of the declaration.
+    pub place: String,
+    pub streams: SensorStreams,
+}
+
+/// A loaded policy.
 #[derive(Clone, Debug)]
 pub(crate) struct PolicyConfig {
     kind: PolicyKind,
-    name: String,
+    /// The name that results show.
+    pub name: String,
+    /// Actions executed from each chunk, for policies that predict chunks.
+    pub replan: Option<usize>,
+    /// File of a policy in Lua, as messages name it.
+    pub file: Option<String>,
+    /// SHA-256 of the files of the policy or of its profile, by name.
+    pub sources: BTreeMap<String, String>,
+    pub declared: Option<DeclaredStreams>,
 }
 
 impl Default for PolicyConfig {
     /// The scripted experts of the tasks.
     fn default() -> Self {
-        Self { kind: PolicyKind::Builtin(BuiltinPolicy::Expert), name: BuiltinPolicy::Expert.name() }
+        Self::new(PolicyKind::Builtin(BuiltinPolicy::Expert), BuiltinPolicy::Expert.name())
     }
 }
 
 impl PolicyConfig {
+    fn new(kind: PolicyKind, name: String) -> Self {
+        Self { kind, name, replan: None, file: None, sources: BTreeMap::new(), declared: None }
+    }
+
     /// Loads the policy that the arguments select.
     ///
     /// # Errors
     /// A file that is not valid, a folder without a run, or a flag that has no effect on this policy.
     pub(crate) fn load(args: &PolicyArgs) -> Result<Self, CliError> {
         refuse_flags_without_effect(args)?;
-        let (kind, name) = match &args.policy {
-            PolicyArg::Builtin(policy) => (PolicyKind::Builtin(*policy), policy.name()),
+        let replan = args.replan.map(usize::from);
+        let mut policy = match &args.policy {
+            PolicyArg::Builtin(policy) => Self::new(PolicyKind::Builtin(*policy), policy.name()),
             PolicyArg::Lua(path) => {
                 let file = PolicyFile::load(path)?;
-                let replan = args.replan.map(usize::from).or(file.replan);
-                let name = file.name.clone();
-                (PolicyKind::Lua { file: Arc::new(file), replan }, name)
+                let place = format!("{}: policy.observes", file.observes_at);
+                Self {
+                    name: file.name.clone(),
+                    replan: replan.or(file.replan),
+                    file: Some(file.sources.main.clone()),
+                    sources: file.sources.bundle.hashes(),
+                    declared: Some(DeclaredStreams { place, streams: file.streams.clone() }),
+                    kind: PolicyKind::Lua(Arc::new(file)),
+                }
             }
             PolicyArg::Server(url) => {
                 let (profile, sources) = load_profile_of(args)?;
-                let name = profile.name.clone();
-                let server = PolicyServer {
-                    url: url.clone(),
-                    protocol: args.protocol.unwrap_or_default(),
-                    profile,
-                    timeout: args.policy_timeout.unwrap_or(DEFAULT_TIMEOUT),
-                    api_key: std::env::var(API_KEY).ok(),
-                    cancel: &cancel::FLAG,
-                };
-                let profile_name = args.profile.clone().unwrap_or_else(|| DEFAULT_PROFILE.to_owned());
-                let replan = args.replan.map_or(DEFAULT_REPLAN, usize::from);
-                (PolicyKind::Server(Arc::new(ServerPolicy { server, profile_name, sources, replan })), name)
+                let profile_name = args.profile.as_deref().unwrap_or(DEFAULT_PROFILE);
+                let place = format!("--profile {profile_name}: inputs");
+                Self {
+                    name: profile.name.clone(),
+                    replan: replan.or(Some(DEFAULT_REPLAN)),
+                    file: None,
+                    sources,
+                    declared: Some(DeclaredStreams { place, streams: profile.streams() }),
+                    kind: PolicyKind::Server(Arc::new(PolicyServer {
+                        url: url.clone(),
+                        protocol: args.protocol.unwrap_or_default(),
+                        profile,
+                        timeout: args.policy_timeout.unwrap_or(DEFAULT_TIMEOUT),
+                        api_key: std::env::var(API_KEY).ok(),
+                        cancel: &cancel::FLAG,
+                    })),
+                }
             }
             PolicyArg::Run(dir) => {
-                (PolicyKind::Recorded(Arc::new(RecordedRuns::load(dir)?)), "replay".to_owned())
+                Self::new(PolicyKind::Recorded(Arc::new(RecordedRuns::load(dir)?)), "replay".to_owned())
             }
         };
-        Ok(Self { kind, name: args.name.clone().unwrap_or(name) })
+        if let Some(name) = &args.name {
+            policy.name.clone_from(name);
+        }
+        Ok(policy)
     }
 
     /// Actions that come from elsewhere, under a name such as `replay`.
     pub(crate) fn external(name: &str) -> Self {
-        Self { kind: PolicyKind::External, name: name.to_owned() }
-    }
-
-    /// The name that results show.
-    pub(crate) fn name(&self) -> &str {
-        &self.name
+        Self::new(PolicyKind::External, name.to_owned())
     }
 
     /// The scripted expert. `None` for other policies.
@@ -272,54 +286,11 @@ impl PolicyConfig {
         self.expert().is_some()
     }
 
-    pub(crate) fn is_remote(&self) -> bool {
-        matches!(self.kind, PolicyKind::Server(_))
-    }
-
-    /// Profile of a policy server.
-    pub(crate) fn profile(&self) -> Option<&Profile> {
+    /// The server of the policy, if it has one.
+    pub(crate) fn server(&self) -> Option<&PolicyServer> {
         match &self.kind {
-            PolicyKind::Server(remote) => Some(&remote.server.profile),
+            PolicyKind::Server(server) => Some(server),
             _ => None,
-        }
-    }
-
-    /// The sensors that a policy declares, and the source location of the declaration.
-    pub(crate) fn declared_streams(&self) -> Option<(String, SensorStreams)> {
-        match &self.kind {
-            PolicyKind::Server(remote) => {
-                Some((format!("--profile {}: inputs", remote.profile_name), remote.server.profile.streams()))
-            }
-            PolicyKind::Lua { file, .. } => {
-                Some((format!("{}: policy.observes", file.observes_at), file.streams.clone()))
-            }
-            _ => None,
-        }
-    }
-
-    /// Actions executed from each chunk, for policies that predict chunks.
-    pub(crate) fn replan(&self) -> Option<usize> {
-        match &self.kind {
-            PolicyKind::Server(remote) => Some(remote.replan),
-            PolicyKind::Lua { replan, .. } => *replan,
-            _ => None,
-        }
-    }
-
-    /// File of a policy in Lua, as messages name it.
-    pub(crate) fn file(&self) -> Option<&str> {
-        match &self.kind {
-            PolicyKind::Lua { file, .. } => Some(&file.sources.main),
-            _ => None,
-        }
-    }
-
-    /// SHA-256 of the files of the policy or of its profile, by name.
-    pub(crate) fn sources(&self) -> BTreeMap<String, String> {
-        match &self.kind {
-            PolicyKind::Lua { file, .. } => file.sources.bundle.hashes(),
-            PolicyKind::Server(remote) => remote.sources.clone(),
-            _ => BTreeMap::new(),
         }
     }
 
@@ -331,13 +302,7 @@ impl PolicyConfig {
         }
     }
 
-    /// Connections to the policy server, if there is one. Nothing is connected yet.
-    pub(crate) fn connections(&self) -> Option<Arc<PolicyConnections>> {
-        let PolicyKind::Server(remote) = &self.kind else { return None };
-        Some(Arc::new(PolicyConnections::new(remote.server.clone())))
-    }
-
-    /// A factory of controllers for the episodes of a suite; `connections` are those of [`Self::connections`].
+    /// A factory of controllers for the episodes of a suite; `connections` lead to its server.
     pub(crate) fn controller_factory(
         &self,
         connections: Option<Arc<PolicyConnections>>,
@@ -345,21 +310,22 @@ impl PolicyConfig {
         is_rigid_twin: bool,
     ) -> ControllerFactory {
         let (kind, suite) = (self.kind.clone(), suite.to_owned());
+        let replan = self.replan.unwrap_or(usize::MAX);
         Box::new(move |opened, brief| {
             let chunked = |policy: Box<dyn Policy>, replan| -> Box<dyn Controller> {
                 Box::new(ChunkedPolicy::new(policy, brief.clone(), replan))
             };
             Ok(match (&kind, &connections) {
-                (PolicyKind::Server(remote), Some(connections)) => {
-                    chunked(Box::new(RemotePolicy::new(connections.clone())), remote.replan)
+                (PolicyKind::Server(_), Some(connections)) => {
+                    chunked(Box::new(RemotePolicy::new(connections.clone())), replan)
                 }
                 (PolicyKind::Recorded(runs), _) => {
                     let actions = runs.actions(&suite, is_rigid_twin, &brief)?;
                     chunked(Box::new(RecordedPolicy::from_actions(&actions, None)), 1)
                 }
-                (PolicyKind::Lua { file, replan }, _) => {
+                (PolicyKind::Lua(file), _) => {
                     let policy = file.start(&opened.seed)?;
-                    chunked(Box::new(policy), replan.unwrap_or(usize::MAX))
+                    chunked(Box::new(policy), replan)
                 }
                 (PolicyKind::Builtin(BuiltinPolicy::Noop), _) => {
                     chunked(Box::<builtin::NoopPolicy>::default(), 1)
@@ -447,7 +413,7 @@ mod tests {
     fn built_in_policies_have_the_names_that_are_listed() {
         for (name, _) in BuiltinPolicy::descriptions() {
             let policy = PolicyConfig::load(&args(parse_policy(&name).unwrap())).unwrap();
-            assert_eq!(policy.name(), name);
+            assert_eq!(policy.name, name);
             assert_eq!(policy.is_privileged(), name.starts_with("expert") || name == "tactile-servo");
         }
     }

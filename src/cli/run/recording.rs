@@ -19,7 +19,7 @@ use crate::{
         output::{eprint_notice, print},
         run::{
             run_manifest,
-            suite_recording::{RecordingConfig, SuiteRecording, kept},
+            suite_recording::{RecordingArgs, SuiteRecording, kept},
         },
     },
     dataset::{
@@ -37,12 +37,12 @@ use crate::{
 /// # Errors
 /// The folder contains something else, an attempt or a file fails, or too few attempts are good.
 pub(crate) fn record_all<'a>(
-    config: &'a RecordingConfig,
+    args: &'a RecordingArgs,
     request: &Value,
     prepare: impl FnOnce() -> Result<Vec<SuiteRecording<'a>>, CliError>,
 ) -> Result<(), CliError> {
-    let root = &config.args.out;
-    if check_folder(root, config.args.resume, request)? {
+    let root = &args.out;
+    if check_folder(root, args.resume, request)? {
         eprint_notice(format!("{} is already complete", root.display()));
         return Ok(());
     }
@@ -55,7 +55,7 @@ pub(crate) fn record_all<'a>(
     for suite in &suites {
         records.push(suite.record().inspect_err(|_| remove_if_empty(root, &missing))?);
     }
-    write_summary(config, &suites, &records)
+    write_summary(args, &suites, &records)
 }
 
 /// Checks that a dataset can be recorded into a folder. Returns true if it contains this very recording, complete.
@@ -120,11 +120,11 @@ fn remove_if_empty(root: &Path, missing: &[PathBuf]) {
 /// # Errors
 /// No demonstration was kept, or a file cannot be written.
 fn write_summary(
-    config: &RecordingConfig,
+    args: &RecordingArgs,
     suites: &[SuiteRecording],
     records: &[Vec<EpisodeRecord>],
 ) -> Result<(), CliError> {
-    let root = &config.args.out;
+    let root = &args.out;
     let (mut entries, mut tasks) = (Vec::new(), Vec::new());
     let size = |path: &Path| fs::metadata(path).map_or(0, |metadata| metadata.len());
     for (suite, records) in suites.iter().zip(records) {
@@ -159,8 +159,8 @@ fn write_summary(
     let card = Card {
         softvt: env!("CARGO_PKG_VERSION").to_owned(),
         fps: CONTROL_HZ,
-        has_images: config.has_hdf5_images(),
-        has_privileged: config.has_privileged(),
+        has_images: args.has_hdf5_images(),
+        has_privileged: !args.no_privileged,
         imported: suites.first().map(|suite| suite.run.imported.clone()).unwrap_or_default(),
         tasks,
     };

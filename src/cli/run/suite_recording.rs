@@ -2,7 +2,7 @@
 //! per task.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::BTreeMap,
     io::ErrorKind,
     path::{Path, PathBuf},
     sync::{Arc, Mutex},
@@ -18,7 +18,7 @@ use crate::{
         run::{
             config::{RunConfig, RunFlags, ScriptArgs, TraceDetail, parse_folder},
             evaluate::{RunLog, SimulatedEpisode, with_kept},
-            policy::{ControllerFactory, PolicyConfig},
+            policy::ControllerFactory,
             run_manifest::RunManifest,
             selection::{EpisodeJob, path_component},
             suite_run::SuiteRun,
@@ -74,98 +74,36 @@ pub(crate) enum ImageStorage {
     Video,
 }
 
-/// Configuration of a recording.
-#[derive(Clone, Debug)]
-pub(crate) struct RecordingConfig {
-    pub run: RunConfig,
-    pub args: RecordingArgs,
-}
-
-impl RecordingConfig {
+impl RecordingArgs {
+    /// The configuration of the attempts, under the expert.
+    ///
     /// # Errors
     /// A shift or setting that is not valid.
-    pub(crate) fn new(script: ScriptArgs, args: RecordingArgs, tasks: Vec<String>) -> Result<Self, CliError> {
-        let flags = RunFlags {
-            tasks,
-            threads: args.threads,
-            // The contact streams of a demonstration come from the trace.
-            trace: Some(TraceDetail::State),
-            ..RunFlags::default()
-        };
-        Ok(Self { run: RunConfig::new(script, flags)?, args })
-    }
-
-    /// The same recording under another policy.
-    pub(crate) fn with_policy(self, policy: PolicyConfig) -> Self {
-        Self { run: self.run.with_policy(policy), ..self }
+    pub(crate) fn run_config(&self, script: ScriptArgs, tasks: Vec<String>) -> Result<RunConfig, CliError> {
+        // The contact streams of a demonstration come from the trace.
+        let (threads, trace) = (self.threads, Some(TraceDetail::State));
+        RunConfig::new(script, RunFlags { tasks, threads, trace, ..RunFlags::default() })
     }
 
     /// True if images go into the HDF5 files too.
     pub(crate) fn has_hdf5_images(&self) -> bool {
-        self.args.images == ImageStorage::Hdf5
-    }
-
-    /// True if the ground-truth streams are recorded.
-    pub(crate) fn has_privileged(&self) -> bool {
-        !self.args.no_privileged
+        self.images == ImageStorage::Hdf5
     }
 }
 
 /// Per attempt and control step: true if the gripper is intended to hold.
 pub(crate) type GripLog = Arc<Mutex<BTreeMap<EpisodeIndex, Vec<bool>>>>;
 
-/// The attempts at each task, and which of them become demonstrations.
-#[derive(Clone, Debug)]
-pub(crate) enum AttemptPlan {
-    /// The first `demos` good ones per task, of at most `max_attempts`.
-    First { demos: u32, max_attempts: u32 },
-    /// All good ones of these attempts, by task.
-    All(BTreeMap<usize, BTreeSet<u32>>),
-}
-
-impl AttemptPlan {
-    /// All attempts at a task that may be needed.
-    fn attempts(&self, task: usize) -> Vec<u32> {
-        match self {
-            Self::First { max_attempts, .. } => (0..*max_attempts).collect(),
-            Self::All(all) => all.get(&task).into_iter().flatten().copied().collect(),
-        }
-    }
-
-    /// Attempts to run next. `finished` maps each finished attempt to true if it is good.
-    fn due(&self, task: usize, finished: &BTreeMap<u32, bool>) -> Vec<u32> {
-        match self {
-            Self::First { demos, max_attempts } => due(finished, *demos, *max_attempts),
-            Self::All(_) => self.attempts(task).into_iter().filter(|i| !finished.contains_key(i)).collect(),
-        }
-    }
-
-    /// Demonstrations that each task must have. `None` if any number is enough.
-    fn required_demos(&self) -> Option<usize> {
-        match self {
-            Self::First { demos, .. } => Some(*demos as usize),
-            Self::All(_) => None,
-        }
-    }
-
-    /// Episodes per task, as `run.json` counts them.
-    fn episodes(&self) -> u32 {
-        match self {
-            Self::First { demos, .. } => *demos,
-            Self::All(all) => all.values().map(BTreeSet::len).max().unwrap_or_default() as u32,
-        }
-    }
-}
-
 /// A suite that is being recorded.
 pub(crate) struct SuiteRecording<'a> {
-    config: &'a RecordingConfig,
+    args: &'a RecordingArgs,
     /// The attempts.
     pub(super) run: SuiteRun<'a>,
     pub(super) tasks: Vec<&'a Task>,
     /// Name of the suite as a path component.
     pub(super) folder_name: String,
-    plan: AttemptPlan,
+    /// Demonstrations that each task must have: its first good attempts. `None` to keep all good attempts.
+    demos: Option<u32>,
     grip_log: GripLog,
     manifest: Value,
     /// Environment arguments of the HDF5 files, in robomimic's form.
@@ -173,33 +111,34 @@ pub(crate) struct SuiteRecording<'a> {
 }
 
 impl<'a> SuiteRecording<'a> {
-    /// Prepares the tasks of a suite. `customize` selects the controllers, and where the intent to grip is recorded.
+    /// Prepares a recording of at most the attempts `jobs`. `customize` selects the controllers, and where the intent to
+    /// grip is recorded.
     ///
     /// # Errors
     /// A setting or scene that is not valid.
     pub(crate) fn new(
-        config: &'a RecordingConfig,
+        config: &'a RunConfig,
+        args: &'a RecordingArgs,
         loaded: &'a LoadedScript,
         suite: &'a Suite,
-        tasks: Vec<&'a Task>,
-        plan: AttemptPlan,
+        jobs: Vec<EpisodeJob<'a>>,
+        demos: Option<u32>,
         customize: impl FnOnce(&mut SuiteRun<'a>, &GripLog) -> Result<(), CliError>,
     ) -> Result<Self, CliError> {
-        let folder_name = path_component(&config.run.suite_name(suite));
-        let attempts = |task: &'a Task| {
-            plan.attempts(task.id).into_iter().map(move |episode| EpisodeJob { task, episode })
-        };
-        let jobs = tasks.iter().flat_map(|task| attempts(task)).collect();
-        let dir = layout::attempts(&config.args.out, &folder_name);
-        let mut run = SuiteRun::new(&config.run, loaded, suite, jobs, dir)?;
+        let folder_name = path_component(&config.suite_name(suite));
+        let mut tasks: Vec<&Task> = jobs.iter().map(|job| job.task).collect();
+        tasks.dedup_by_key(|task| task.id);
+        let mut run = SuiteRun::new(config, loaded, suite, jobs, layout::attempts(&args.out, &folder_name))?;
         run.split = Split::Demonstration;
         run.renders_episodes = true;
         let grip_log = GripLog::default();
         customize(&mut run, &grip_log)?;
         run.prepare(&tasks)?;
-        let manifest = json!(RunManifest::new(&run, &tasks, plan.episodes()));
+        let attempts = tasks.iter().map(|task| run.jobs.iter().filter(|job| job.task.id == task.id).count());
+        let episodes = demos.unwrap_or(attempts.max().unwrap_or_default() as u32);
+        let manifest = json!(RunManifest::new(&run, &tasks, episodes));
         let environment = json!({ "env_name": "softvt", "type": 2, "env_kwargs": manifest });
-        Ok(Self { config, run, tasks, folder_name, plan, grip_log, manifest, environment })
+        Ok(Self { args, run, tasks, folder_name, demos, grip_log, manifest, environment })
     }
 
     /// Records all tasks of the suite, and returns the records of all attempts.
@@ -209,8 +148,7 @@ impl<'a> SuiteRecording<'a> {
     /// Finished attempts are kept.
     pub(super) fn record(&self) -> Result<Vec<EpisodeRecord>, CliError> {
         let mut log = RunLog::new(&self.run, RunFolder::resume(&self.run.out)?, &self.manifest)?;
-        let outcome = self.run_rounds(&mut log);
-        let outcome = match outcome {
+        let outcome = match self.run_rounds(&mut log) {
             Err(error) if log.records.is_empty() => {
                 log.discard()?;
                 return Err(error);
@@ -219,7 +157,7 @@ impl<'a> SuiteRecording<'a> {
         };
         log.sort()?;
         let kept = log.records.iter().filter(|record| rejection(record).is_none()).count();
-        let out = self.config.args.out.display();
+        let out = self.args.out.display();
         let kept = format!("{} in {out}; continue with --resume", counted(kept, "demonstration"));
         with_kept(outcome, &kept, "")?;
         self.check_demo_counts(&log.records)?;
@@ -244,8 +182,8 @@ impl<'a> SuiteRecording<'a> {
             }
             for task in &self.tasks {
                 let kept = kept(&log.records, task.id);
-                let is_complete = match self.plan.required_demos() {
-                    Some(required) => kept.len() == required,
+                let is_complete = match self.demos {
+                    Some(required) => kept.len() == required as usize,
                     None => self.due(&log.records, task.id).is_empty(),
                 };
                 if !kept.is_empty() && is_complete {
@@ -259,10 +197,11 @@ impl<'a> SuiteRecording<'a> {
     }
 
     fn due(&self, records: &[EpisodeRecord], task: usize) -> Vec<u32> {
-        let attempts = records.iter().filter(|record| record.header.id.task == task);
+        let attempts = self.run.jobs.iter().filter(|job| job.task.id == task).map(|job| job.episode);
+        let finished = records.iter().filter(|record| record.header.id.task == task);
         let finished =
-            attempts.map(|record| (record.header.id.episode, rejection(record).is_none())).collect();
-        self.plan.due(task, &finished)
+            finished.map(|record| (record.header.id.episode, rejection(record).is_none())).collect();
+        due(&attempts.collect::<Vec<_>>(), &finished, self.demos.map_or(usize::MAX, |demos| demos as usize))
     }
 
     /// Runs an attempt and, if it is good, writes the files of its demonstration.
@@ -277,13 +216,13 @@ impl<'a> SuiteRecording<'a> {
         let mut is_holding: Vec<bool> = recorded_grip.unwrap_or_else(commanded_grip);
         // The recorded grip can have fewer entries than there are steps, or more. The last one continues.
         is_holding.resize(finished.actions.len(), is_holding.last().copied().unwrap_or_default());
-        let demonstration = Demonstration::new(&finished, &states, is_holding, self.config.has_privileged());
+        let demonstration = Demonstration::new(&finished, &states, is_holding, !self.args.no_privileged);
         let (paths, attempt) = (self.paths(job.task.id), job.episode);
         let writer = DemonstrationWriter {
             hdf5: paths.part(attempt, "hdf5"),
             videos: VIDEO_STREAMS.map(|video| paths.part(attempt, &format!("{video}.mp4"))),
             preview: paths.part(attempt, "preview.mp4"),
-            store_images: self.config.has_hdf5_images(),
+            store_images: self.args.has_hdf5_images(),
             environment: &self.environment,
         };
         writer.write(&mut states, demonstration, cancel::requested)?;
@@ -316,7 +255,7 @@ impl<'a> SuiteRecording<'a> {
 
     /// Paths of the files of a task.
     pub(super) fn paths(&self, task: usize) -> TaskPaths {
-        TaskPaths { root: self.config.args.out.clone(), suite: self.folder_name.clone(), task }
+        TaskPaths { root: self.args.out.clone(), suite: self.folder_name.clone(), task }
     }
 
     /// Merges the demonstrations of a task into one file, unless it exists, and removes their parts.
@@ -344,7 +283,7 @@ impl<'a> SuiteRecording<'a> {
     /// # Errors
     /// The tasks that have too few, with the reasons for which attempts were not kept.
     fn check_demo_counts(&self, records: &[EpisodeRecord]) -> Result<(), CliError> {
-        let Some(required) = self.plan.required_demos() else { return Ok(()) };
+        let Some(required) = self.demos.map(|demos| demos as usize) else { return Ok(()) };
         let short =
             self.tasks.iter().map(|task| self.count(task, records)).filter(|count| count.demos < required);
         let short = short.map(|count| {
@@ -362,10 +301,10 @@ impl<'a> SuiteRecording<'a> {
         if short.is_empty() {
             return Ok(());
         }
-        Err(self.config.run.error(format!(
+        Err(self.run.config.error(format!(
             "{}\nthe good ones are in {}; continue with --resume and more --attempts, or fix the expert",
             short.join("\n"),
-            self.config.args.out.display()
+            self.args.out.display()
         )))
     }
 
@@ -418,17 +357,18 @@ fn is_start_error(error: &EpisodeError) -> bool {
     }
 }
 
-/// Attempts to run next, so that the first `demos` good ones are found whatever the order in which attempts finish.
-/// `finished` maps each finished attempt to true if it is good; at most `max` attempts are run.
-fn due(finished: &BTreeMap<u32, bool>, demos: u32, max: u32) -> Vec<u32> {
+/// Those of `attempts` to run next, so that the first `demos` good ones are found whatever the order in which attempts
+/// finish. `finished` maps each finished attempt to true if it is good.
+fn due(attempts: &[u32], finished: &BTreeMap<u32, bool>, demos: usize) -> Vec<u32> {
     let mut end = 0;
     loop {
-        let missing: Vec<u32> = (0..end).filter(|attempt| !finished.contains_key(attempt)).collect();
-        let good = finished.range(..end).filter(|(_, good)| **good).count() as u32;
-        if !missing.is_empty() || good >= demos || end == max {
+        let missing = attempts[..end].iter().copied().filter(|attempt| !finished.contains_key(attempt));
+        let missing: Vec<u32> = missing.collect();
+        let good = attempts[..end].iter().filter(|attempt| finished.get(attempt) == Some(&true)).count();
+        if !missing.is_empty() || good >= demos || end == attempts.len() {
             return missing;
         }
-        end = (end + demos - good).min(max);
+        end = end.saturating_add(demos - good).min(attempts.len());
     }
 }
 
@@ -470,9 +410,9 @@ mod tests {
     /// Runs attempts that are kept if `good` is true of their number. Returns their numbers and how many were kept. If
     /// `interrupted`, only the last attempt of each round finishes.
     fn record(good: impl Fn(u32) -> bool, demos: u32, max: u32, interrupted: bool) -> (BTreeSet<u32>, usize) {
-        let mut done = BTreeMap::new();
+        let (attempts, mut done) = ((0..max).collect::<Vec<_>>(), BTreeMap::new());
         loop {
-            let mut next = due(&done, demos, max);
+            let mut next = due(&attempts, &done, demos as usize);
             if next.is_empty() {
                 let kept = done.values().filter(|good| **good).count();
                 return (done.into_keys().collect(), kept);

@@ -14,7 +14,7 @@ use crate::{
         run::{
             config::{RunConfig, TraceDetail},
             episode_artifacts::EpisodeArtifacts,
-            policy::ControllerFactory,
+            policy::{ControllerFactory, DeclaredStreams},
             recorded_runs::{RecordedRuns, ReplaySource},
             selection::EpisodeJob,
         },
@@ -96,9 +96,10 @@ impl<'a> SuiteRun<'a> {
                 .map_err(|error| config.error(format!("--shift: {error}")))?;
         }
         let replay_source = find_replay_source(config, suite, &jobs)?;
-        let connections = config.policy.connections();
+        let connections =
+            config.policy.server().map(|server| Arc::new(PolicyConnections::new(server.clone())));
         let mut sources = loaded.sources.bundle.hashes();
-        sources.extend(config.policy.sources());
+        sources.extend(config.policy.sources.clone());
         let generated_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
         Ok(Self {
             config,
@@ -271,7 +272,7 @@ impl<'a> SuiteRun<'a> {
         }
         let limit = target_asset(&opened.nominal, task).and_then(|asset| self.limit_of(asset));
         let id = EpisodeId { suite: self.name.clone(), ..id.clone() };
-        let (policy, scene) = (self.config.policy.name(), opened.scene.clone());
+        let (policy, scene) = (&self.config.policy.name, opened.scene.clone());
         let mut spec = EpisodeSpec::new(id, policy, task, &opened.nominal, scene, &self.settings);
         spec.header.privileged = self.is_privileged();
         spec.header.origin = origin.cloned().map(Box::new);
@@ -341,7 +342,7 @@ impl<'a> SuiteRun<'a> {
 
     /// Checks that the scene has the cameras that the file of the policy declares.
     fn check_declared_cameras(&self, scene: &Scene, task: &Task) -> Result<(), CliError> {
-        let Some((place, streams)) = self.config.policy.declared_streams() else { return Ok(()) };
+        let Some(DeclaredStreams { place, streams }) = &self.config.policy.declared else { return Ok(()) };
         let missing = streams.cameras.iter().find(|name| scene.camera(name).is_none());
         missing.map_or(Ok(()), |name| {
             let known = scene.cameras.iter().map(|camera| camera.name.as_str());

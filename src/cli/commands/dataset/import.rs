@@ -11,16 +11,15 @@ use serde_json::json;
 
 use super::task_matching::{MatchedDemo, match_demos};
 use crate::{
-    benchmark::Task,
     cli::{
-        error::{CliError, Exit},
+        error::CliError,
         output::eprint_notice,
         run::{
             config::ScriptArgs,
             policy::PolicyConfig,
             recording::record_all,
-            selection::select_suites,
-            suite_recording::{AttemptPlan, GripLog, RecordingArgs, RecordingConfig, SuiteRecording},
+            selection::{EpisodeJob, select_suites},
+            suite_recording::{GripLog, RecordingArgs, SuiteRecording},
             suite_run::SuiteRun,
         },
     },
@@ -64,51 +63,50 @@ pub(crate) struct ImportArgs {
 /// The script has no suite, a file is not valid or matches no task, the folder contains something else, an attempt or a
 /// file fails, or no demonstration is kept.
 pub(super) fn run(args: ImportArgs) -> Result<(), CliError> {
-    let config = RecordingConfig::new(args.script, args.recording, args.tasks)?
-        .with_policy(PolicyConfig::external("import"));
-    let run = &config.run;
-    let loaded = run.load_script()?;
-    let suites = select_suites("dataset import", run, &loaded.plan)?;
+    let recording = &args.recording;
+    let config =
+        &recording.run_config(args.script, args.tasks)?.with_policy(PolicyConfig::external("import"));
+    let loaded = config.load_script()?;
+    let suites = select_suites("dataset import", config, &loaded.plan)?;
     let files: Vec<ForeignFile> =
         args.files.iter().map(|path| import::read(path)).collect::<Result<_, _>>()?;
     let sources = describe_files(&files)?;
-    let matched = match_demos(run, suites, &files, args.attempts.unwrap_or(u32::MAX))?;
-    let names: BTreeSet<String> = matched.iter().map(|demo| run.suite_name(&suites[demo.suite])).collect();
+    let matched = match_demos(config, suites, &files, args.attempts.unwrap_or(u32::MAX))?;
+    let names: BTreeSet<String> =
+        matched.iter().map(|demo| config.suite_name(&suites[demo.task.suite])).collect();
     let request = json!({
         "softvt": env!("CARGO_PKG_VERSION"),
         "imported": sources,
         "attempts": args.attempts,
         "layout": args.layout,
-        "task": run.flags.tasks,
-        "pictures": config.has_hdf5_images(),
-        "privileged": config.has_privileged(),
+        "task": config.flags.tasks,
+        "pictures": recording.has_hdf5_images(),
+        "privileged": !recording.no_privileged,
         "suites": names,
     });
-    record_all(&config, &request, || {
+    record_all(recording, &request, || {
         for Imported { file, layout, demos, commands, .. } in &sources {
             eprint_notice(format!("{file}: {layout}, {}: {commands}", counted(*demos, "demonstration")));
         }
         let mut recordings = Vec::new();
         for (index, suite) in suites.iter().enumerate() {
-            let demos: Vec<&MatchedDemo> = matched.iter().filter(|demo| demo.suite == index).collect();
+            let demos: Vec<&MatchedDemo> = matched.iter().filter(|demo| demo.task.suite == index).collect();
             if demos.is_empty() {
                 continue;
             }
-            let mut attempts: BTreeMap<usize, BTreeSet<u32>> = BTreeMap::new();
-            for demo in &demos {
-                attempts.entry(demo.task).or_default().insert(demo.attempt);
-            }
-            let tasks = suite.tasks.iter().filter(|task| attempts.contains_key(&task.id)).collect();
-            let plan = AttemptPlan::All(attempts);
+            let mut jobs: Vec<EpisodeJob> =
+                demos.iter().map(|demo| EpisodeJob { task: demo.task.task, episode: demo.attempt }).collect();
+            jobs.sort_by_key(|job| (suite.tasks.iter().position(|task| task.id == job.task.id), job.episode));
             recordings.push(SuiteRecording::new(
-                &config,
+                config,
+                recording,
                 &loaded,
                 suite,
-                tasks,
-                plan,
-                |suite_run, grip_log| {
-                    suite_run.imported = sources.clone();
-                    replay_demos(suite_run, grip_log, &demos, args.layout)
+                jobs,
+                None,
+                |run, log| {
+                    run.imported = sources.clone();
+                    replay_demos(run, log, &demos, args.layout)
                 },
             )?);
         }
@@ -156,7 +154,7 @@ fn replay_demos(
     let mut commands: BTreeMap<EpisodeIndex, Vec<ToolCommand>> = BTreeMap::new();
     let (mut placed, mut foreign) = (0, 0);
     for matched in demos {
-        let index = EpisodeIndex { task: matched.task, episode: matched.attempt };
+        let index = EpisodeIndex { task: matched.task.task.id, episode: matched.attempt };
         let (start, demo) = initial_state(run, matched, use_layout)?;
         foreign += usize::from(matches!(demo.initial_condition, InitialCondition::OtherSimulator { .. }));
         placed += usize::from(!start.places.is_empty());
@@ -206,9 +204,7 @@ fn initial_state(
     if poses.is_empty() && !demo.is_stopped_by_object.contains(&true) {
         return Ok((start, demo));
     }
-    let task: Option<&Task> = run.suite.tasks.iter().find(|task| task.id == matched.task);
-    let task =
-        task.ok_or_else(|| CliError::new(Exit::Internal, "matched a task that is not in the suite"))?;
+    let task = matched.task.task;
     let opened = run.open_episode(&run.episode_id(task, matched.attempt))?;
     start.places = import::match_objects(&opened.scene, &task.goal.object, poses);
     if target_asset(&opened.scene, task).is_some_and(|asset| matches!(asset.body, Body::Rigid { .. })) {

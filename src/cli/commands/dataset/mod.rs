@@ -148,9 +148,7 @@ fn run_export(args: ExportArgs) -> Result<(), CliError> {
     let exported = lerobot::export(&config, cancel::requested, |total, episode| {
         progress.get_or_insert_with(|| Progress::new(total, "export")).tick(episode);
     });
-    if let Some(progress) = &progress {
-        progress.finish();
-    }
+    drop(progress);
     let exported = exported.map_err(|error| match error {
         DatasetError::Interrupted => CliError::interrupted("interrupted; nothing was written"),
         other => CliError::input(other),

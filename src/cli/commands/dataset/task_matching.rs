@@ -11,36 +11,34 @@ use crate::{
     dataset::import::{ForeignDemo, ForeignFile, ForeignLayout, ForeignTask, InitialCondition},
 };
 
+/// A task of one of several suites.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SuiteTask<'a> {
+    /// Position of the suite in the list of suites.
+    pub suite: usize,
+    pub task: &'a Task,
+}
+
+/// Position of the suite, and index of the task.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct TaskKey {
+    suite: usize,
+    task: usize,
+}
+
+impl SuiteTask<'_> {
+    fn key(&self) -> TaskKey {
+        TaskKey { suite: self.suite, task: self.task.id }
+    }
+}
+
 /// A demonstration with the task and attempt that it becomes.
 pub(super) struct MatchedDemo<'a> {
     pub file: &'a ForeignFile,
     pub demo: &'a ForeignDemo,
-    /// Position of the suite in the list of suites.
-    pub suite: usize,
-    /// Index of the task.
-    pub task: usize,
+    pub task: SuiteTask<'a>,
     /// Number of the attempt.
     pub attempt: u32,
-}
-
-/// A task of one of several suites.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct TaskRef {
-    /// Position of the suite in the list of suites.
-    suite: usize,
-    /// Index of the task.
-    task: usize,
-}
-
-impl MatchedDemo<'_> {
-    fn task_ref(&self) -> TaskRef {
-        TaskRef { suite: self.suite, task: self.task }
-    }
-
-    /// An error about this demonstration.
-    fn refuse(&self, message: String) -> CliError {
-        refuse(self.file, self.demo, message)
-    }
 }
 
 /// Finds the tasks of all demonstrations, at most `max` of each task, and numbers the attempts. Demonstrations of
@@ -50,44 +48,62 @@ impl MatchedDemo<'_> {
 /// A demonstration matches no task or several, or has another seed; or two are the same attempt.
 pub(super) fn match_demos<'a>(
     config: &RunConfig,
-    suites: &[Suite],
+    suites: &'a [Suite],
     files: &'a [ForeignFile],
     max: u32,
 ) -> Result<Vec<MatchedDemo<'a>>, CliError> {
     let forced = forced_task(config, suites)?;
     let mut found: Vec<MatchedDemo> = Vec::new();
-    // Attempt numbers of the demonstrations that have one.
-    let mut own_attempts: Vec<Option<u32>> = Vec::new();
-    let mut counts: BTreeMap<TaskRef, u32> = BTreeMap::new();
-    for file in files {
-        for demo in &file.demos {
-            let TaskRef { suite, task } = match forced {
-                // A demonstration of softvt can only be of its own task.
-                Some(forced) if file.layout != ForeignLayout::Softvt => forced,
-                Some(forced) if task_of(config, suites, file, demo)? == forced => forced,
-                Some(_) => {
-                    let id = demo.task.id.map_or(String::new(), |id| format!(" {id}"));
-                    return Err(refuse(
-                        file,
-                        demo,
-                        format!(
-                            "--task {}: it was recorded by softvt and is of task{id}; leave --task out",
-                            config.flags.tasks.join(",")
-                        ),
-                    ));
-                }
-                None => task_of(config, suites, file, demo)?,
-            };
-            let count = counts.entry(TaskRef { suite, task }).or_default();
-            *count += 1;
-            if *count <= max {
-                let matched = MatchedDemo { file, demo, suite, task, attempt: 0 };
-                own_attempts.push(own_attempt(config, &matched)?);
-                found.push(matched);
+    let mut counts: BTreeMap<TaskKey, u32> = BTreeMap::new();
+    for (file, demo) in files.iter().flat_map(|file| file.demos.iter().map(move |demo| (file, demo))) {
+        let task = match forced {
+            // A demonstration of softvt can only be of its own task.
+            Some(forced) if file.layout != ForeignLayout::Softvt => forced,
+            Some(forced) if task_of(config, suites, file, demo)?.key() == forced.key() => forced,
+            Some(_) => {
+                let id = demo.task.id.map_or(String::new(), |id| format!(" {id}"));
+                return Err(refuse(
+                    file,
+                    demo,
+                    format!(
+                        "--task {}: it was recorded by softvt and is of task{id}; leave --task out",
+                        config.flags.tasks.join(",")
+                    ),
+                ));
             }
+            None => task_of(config, suites, file, demo)?,
+        };
+        let count = counts.entry(task.key()).or_default();
+        *count += 1;
+        if *count <= max {
+            found.push(MatchedDemo {
+                file,
+                demo,
+                task,
+                attempt: own_attempt(config, file, demo)?.unwrap_or(0),
+            });
         }
     }
-    number_attempts(&mut found, &own_attempts)?;
+    let mut taken: BTreeSet<(TaskKey, u32)> = BTreeSet::new();
+    let is_foreign = |matched: &MatchedDemo| {
+        matches!(matched.demo.initial_condition, InitialCondition::OtherSimulator { .. })
+    };
+    for MatchedDemo { file, demo, task, attempt } in found.iter().filter(|matched| !is_foreign(matched)) {
+        if !taken.insert((task.key(), *attempt)) {
+            return Err(refuse(
+                file,
+                demo,
+                format!(
+                    "another demonstration is of the same task and attempt {attempt}; import them into separate folders"
+                ),
+            ));
+        }
+    }
+    for matched in found.iter_mut().filter(|matched| is_foreign(matched)) {
+        while !taken.insert((matched.task.key(), matched.attempt)) {
+            matched.attempt += 1;
+        }
+    }
     Ok(found)
 }
 
@@ -99,7 +115,7 @@ fn refuse(file: &ForeignFile, demo: &ForeignDemo, message: String) -> CliError {
 ///
 /// # Errors
 /// It selects none or several.
-fn forced_task(config: &RunConfig, suites: &[Suite]) -> Result<Option<TaskRef>, CliError> {
+fn forced_task<'a>(config: &RunConfig, suites: &'a [Suite]) -> Result<Option<SuiteTask<'a>>, CliError> {
     if config.flags.tasks.is_empty() {
         return Ok(None);
     }
@@ -107,7 +123,7 @@ fn forced_task(config: &RunConfig, suites: &[Suite]) -> Result<Option<TaskRef>, 
     let mut error = None;
     for (suite, tasks) in suites.iter().map(|suite| select_tasks(config, suite)).enumerate() {
         match tasks {
-            Ok(tasks) => found.extend(tasks.iter().map(|task| TaskRef { suite, task: task.id })),
+            Ok(tasks) => found.extend(tasks.into_iter().map(|task| SuiteTask { suite, task })),
             Err(failure) => error = Some(failure),
         }
     }
@@ -123,36 +139,19 @@ fn forced_task(config: &RunConfig, suites: &[Suite]) -> Result<Option<TaskRef>, 
     }
 }
 
-fn number_attempts(found: &mut [MatchedDemo], own_attempts: &[Option<u32>]) -> Result<(), CliError> {
-    let mut taken: BTreeSet<(TaskRef, u32)> = BTreeSet::new();
-    for (demo, own) in found.iter_mut().zip(own_attempts) {
-        let Some(attempt) = own else { continue };
-        demo.attempt = *attempt;
-        if !taken.insert((demo.task_ref(), *attempt)) {
-            return Err(demo.refuse(format!(
-                "another demonstration is of the same task and attempt {attempt}; import them into separate folders"
-            )));
-        }
-    }
-    for (demo, _) in found.iter_mut().zip(own_attempts).filter(|(_, own)| own.is_none()) {
-        while !taken.insert((demo.task_ref(), demo.attempt)) {
-            demo.attempt += 1;
-        }
-    }
-    Ok(())
-}
-
 /// The attempt number of a demonstration of softvt.
-fn own_attempt(config: &RunConfig, matched: &MatchedDemo) -> Result<Option<u32>, CliError> {
-    match &matched.demo.initial_condition {
+fn own_attempt(config: &RunConfig, file: &ForeignFile, demo: &ForeignDemo) -> Result<Option<u32>, CliError> {
+    let own = config.script.seed;
+    match &demo.initial_condition {
         InitialCondition::OtherSimulator { .. } => Ok(None),
-        InitialCondition::SoftvtEpisode { seed, attempt, .. } if *seed == config.script.seed => {
-            Ok(Some(*attempt))
-        }
-        InitialCondition::SoftvtEpisode { seed, .. } => Err(matched.refuse(format!(
-            "it was recorded with the seed {seed}, and this import uses the seed {}; add --seed {seed}",
-            config.script.seed
-        ))),
+        InitialCondition::SoftvtEpisode { seed, attempt, .. } if *seed == own => Ok(Some(*attempt)),
+        InitialCondition::SoftvtEpisode { seed, .. } => Err(refuse(
+            file,
+            demo,
+            format!(
+                "it was recorded with the seed {seed}, and this import uses the seed {own}; add --seed {seed}"
+            ),
+        )),
     }
 }
 
@@ -163,45 +162,37 @@ fn normalized(text: &str) -> String {
 }
 
 /// Finds the task of a demonstration: by its instructions, or by its index where it has no instruction.
-fn task_of(
+fn task_of<'a>(
     config: &RunConfig,
-    suites: &[Suite],
+    suites: &'a [Suite],
     file: &ForeignFile,
     demo: &ForeignDemo,
-) -> Result<TaskRef, CliError> {
+) -> Result<SuiteTask<'a>, CliError> {
     let ForeignTask { suite: named, id, prompts } = &demo.task;
-    let is_named = |suite: usize| {
-        named.as_ref().is_some_and(|name| {
-            normalized(&name.replace('-', "_")) == normalized(&config.suite_name(&suites[suite]))
-        })
-    };
-    let names_a_suite = (0..suites.len()).any(is_named);
+    let name = named.as_ref().map(|name| normalized(&name.replace('-', "_")));
+    let is_named = |suite: &Suite| name.as_ref() == Some(&normalized(&config.suite_name(suite)));
+    let names_a_suite = suites.iter().any(is_named);
     if file.layout == ForeignLayout::Softvt && !names_a_suite {
         return Err(no_task(config, suites, file, demo));
     }
-    let candidates: Vec<(TaskRef, &Task)> = suites
+    let candidates: Vec<SuiteTask> = suites
         .iter()
         .enumerate()
-        .filter(|(suite, _)| !names_a_suite || is_named(*suite))
-        .flat_map(|(suite, tasks)| {
-            tasks.tasks.iter().map(move |task| (TaskRef { suite, task: task.id }, task))
-        })
+        .filter(|(_, suite)| !names_a_suite || is_named(suite))
+        .flat_map(|(suite, of)| of.tasks.iter().map(move |task| SuiteTask { suite, task }))
         .collect();
+    let select = |is_match: &dyn Fn(&Task) -> bool| -> Vec<SuiteTask> {
+        candidates.iter().copied().filter(|candidate| is_match(candidate.task)).collect()
+    };
     for prompt in prompts {
-        let matching: Vec<TaskRef> = candidates
-            .iter()
-            .filter(|(_, task)| normalized(&task.prompt) == normalized(prompt))
-            .map(|(task_ref, _)| *task_ref)
-            .collect();
-        let by_index = matching.iter().find(|task_ref| Some(task_ref.task) == *id);
+        let matching = select(&|task| normalized(&task.prompt) == normalized(prompt));
+        let by_index = matching.iter().find(|candidate| Some(candidate.task.id) == *id);
         match (&matching[..], by_index) {
             ([], _) => {}
-            ([task_ref], _) | (_, Some(task_ref)) => return Ok(*task_ref),
+            ([only], _) | (_, Some(only)) => return Ok(*only),
             _ => {
-                let tasks: Vec<String> = matching
-                    .iter()
-                    .map(|task_ref| format!("{} task {}", suites[task_ref.suite].name, task_ref.task))
-                    .collect();
+                let name = |found: &SuiteTask| format!("{} task {}", suites[found.suite].name, found.task.id);
+                let tasks: Vec<String> = matching.iter().map(name).collect();
                 return Err(refuse(
                     file,
                     demo,
@@ -213,15 +204,10 @@ fn task_of(
             }
         }
     }
-    let by_index: Vec<TaskRef> = candidates
-        .iter()
-        .filter(|(task_ref, _)| Some(task_ref.task) == *id)
-        .map(|(task_ref, _)| *task_ref)
-        .collect();
     // An index alone identifies a task only within a suite that is known.
     let index_is_enough = prompts.is_empty() && (names_a_suite || named.is_none());
-    match by_index[..] {
-        [task_ref] if index_is_enough => Ok(task_ref),
+    match select(&|task| Some(task.id) == *id)[..] {
+        [only] if index_is_enough => Ok(only),
         _ => Err(no_task(config, suites, file, demo)),
     }
 }
