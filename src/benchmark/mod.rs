@@ -69,7 +69,7 @@ pub struct Task {
     pub prompt: String,
     /// Name of the layout; tasks that share it share initial states.
     pub layout: String,
-    /// Success condition.
+    /// Condition of Goal Success, judged at every control step.
     pub goal: Goal,
     /// Maximum number of control steps.
     pub budget_steps: u32,
@@ -84,11 +84,11 @@ pub struct Shift {
     pub name: String,
     /// Unit of its value, "1" for none.
     pub unit: String,
-    /// Value without effect.
+    /// Value that leaves the scene unchanged.
     pub default: f64,
-    /// Minimum allowed value.
+    /// Smallest allowed value; `None` for no bound.
     pub min: Option<f64>,
-    /// Largest allowed value.
+    /// Largest allowed value; `None` for no bound.
     pub max: Option<f64>,
 }
 

@@ -1,9 +1,8 @@
 //! Safe interaction envelope of an asset: from the closure that just holds it to the closure that deforms it by τ.
 //!
 //! - Lower bound: the smallest closure at which every grasp–lift–hold trial held.
-//! - Upper bound: the closure at which D reaches τ = κ·D_ref in the compression sweep. D_ref is the largest
-//!   deformation of a
-//!   *stable* squeeze ([`SweepRow::meets_criteria`]; SoftVTBench, appendix C.3).
+//! - Upper bound: the closure at which D reaches τ = κ·D_ref in the compression sweep. D_ref is the largest deformation
+//!   of a *stable* squeeze ([`SweepRow::meets_criteria`]; SoftVTBench, appendix C.3).
 //!
 //! Closure is 0 with the gripper open (80 mm) and 1 with the gels in contact. `softvt
 //! scripts/calibrate.lua` runs both scans.
@@ -58,9 +57,9 @@ pub struct SweepRow {
 }
 
 impl SweepRow {
-    /// True if the squeeze is stable: both pads touch, and no element is nearly inverted, no node moves at rest and the
-    /// object does not slip, within the bounds of this module. `stable` is not read. Numbers that are not finite are
-    /// not stable.
+    /// True if the squeeze is stable: both pads touch, no element is nearly inverted, no node moves at rest and the
+    /// object does not slip, within the bounds of this module. `stable` is not read. A squeeze with a number that is not
+    /// finite is not stable.
     pub fn meets_criteria(&self) -> bool {
         self.both_pads
             && self.d_peak_pct.is_finite()

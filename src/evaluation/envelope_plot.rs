@@ -163,12 +163,12 @@ mod tests {
         let text = plotted(0.33);
         assert!(text.lines().all(|line| line.chars().count() < 100), "{text}");
         let zone = text.lines().find(|line| line.contains("zone")).unwrap();
-        let mut seen: Vec<char> = zone.chars().filter(|c| "░█▓".contains(*c)).collect();
+        let mut marks_in_order: Vec<char> = zone.chars().filter(|c| "░█▓".contains(*c)).collect();
         // Closures 0.30..0.60: loose below 0.34, safe up to D = τ = 1.2 at 0.42.
-        let count = |c: char| seen.iter().filter(|s| **s == c).count();
+        let count = |c: char| marks_in_order.iter().filter(|s| **s == c).count();
         assert_eq!((count('░'), count('█'), count('▓')), (10, 19, 43));
-        seen.dedup();
-        assert_eq!(seen, ['░', '█', '▓']);
+        marks_in_order.dedup();
+        assert_eq!(marks_in_order, ['░', '█', '▓']);
         assert!(text.contains("░ too loose < 0.340 ≤ █ safe window ≤ 0.420 < ▓ too tight"), "{text}");
         let marks = |c: char| text.chars().filter(|m| *m == c).count();
         assert_eq!((marks('●'), marks('○')), (13, 3));

@@ -1,10 +1,9 @@
 //! Goal Success: the target rests at its goal, released, for long enough.
 //!
 //! Once per control step the target *rests at the goal* if
-//! 1. its centre is over (`on`) or inside (`in`) the [`GoalRegion`],
-//! 2. at least [`support_share`](SuccessCriteria::support_share) of its weight, mean over the control step, is
-//!    carried by the
-//!    object at the goal (`on`), or by anything but the robot (`in`),
+//! 1. its centre is over (`On`) or inside (`Inside`) the [`GoalRegion`],
+//! 2. at least [`support_share`](SuccessCriteria::support_share) of its weight, mean over the control step, is carried
+//!    by the object at the goal (`On`), or by anything but the robot (`Inside`),
 //! 3. no part of the robot pressed on it at any physics step of the control step.
 //!
 //! The goal is reached when this held for ⌈hold time / control step⌉ control steps in a row, at

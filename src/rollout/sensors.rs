@@ -273,10 +273,8 @@ impl SensorSuite {
             placed.push((skin, vertices));
             substrate = object.substrate();
         }
-        let skins: Vec<SkinMesh> = placed
-            .iter()
-            .map(|(skin, vertices)| SkinMesh { vertices, triangles: skin.triangles() })
-            .collect();
+        let skins: Vec<SkinMesh> =
+            placed.iter().map(|(skin, vertices)| SkinMesh { vertices, triangles: &skin.triangles }).collect();
         let contact = TactileContact {
             wrench: PadWrench::from_patch(patch),
             skins: &skins,

@@ -155,8 +155,8 @@ fn loosening_the_grip_is_not_a_release_but_opening_in_small_steps_is() {
 
 /// The gripper opens by `step` per physics step from 40 mm around an object that is 50 mm wide and lies on something:
 /// its pads stay on the object while they are pressed, a little wider than commanded.
-fn opened_by(step: f64, noticed_at: f64) -> Vec<(bool, f64, f64)> {
-    let mut grips = vec![(false, 0.08, 0.08), (true, noticed_at, 0.04), (true, 0.0425, 0.04)];
+fn opened_by(step: f64, detected_at: f64) -> Vec<(bool, f64, f64)> {
+    let mut grips = vec![(false, 0.08, 0.08), (true, detected_at, 0.04), (true, 0.0425, 0.04)];
     let mut commanded: f64 = 0.04;
     while commanded < 0.06 {
         commanded += step;
@@ -169,8 +169,8 @@ fn opened_by(step: f64, noticed_at: f64) -> Vec<(bool, f64, f64)> {
 
 #[test]
 fn opening_by_steps_of_any_size_is_a_release_once_the_object_is_no_longer_squeezed() {
-    for (step, noticed_at) in [(1e-4, 0.050), (5e-4, 0.050), (2e-3, 0.050), (1e-4, 0.046), (5e-4, 0.044)] {
-        let grips = opened_by(step, noticed_at);
+    for (step, detected_at) in [(1e-4, 0.050), (5e-4, 0.050), (2e-3, 0.050), (1e-4, 0.046), (5e-4, 0.044)] {
+        let grips = opened_by(step, detected_at);
         let at = released(&grips).iter().position(|released| *released).expect("released in the end");
         let (_, width, commanded) = grips[at];
         assert!((0.0499..0.0521).contains(&commanded), "{step} m steps: at {commanded} m, {width} m wide");
@@ -179,7 +179,7 @@ fn opening_by_steps_of_any_size_is_a_release_once_the_object_is_no_longer_squeez
 
 #[test]
 fn a_hold_loosened_until_the_object_slips_out_is_a_lost_grasp_and_not_a_release() {
-    // Touch is noticed at 46 mm; the hold is loosened to 48 mm, wider than that, where 0.5 N still hold the object.
+    // Contact is detected at 46 mm; the hold is loosened to 48 mm, wider than that, where 0.5 N still hold the object.
     let loosened =
         [(true, 0.046, 0.040), (true, 0.0425, 0.040), (true, 0.0485, 0.048), (true, 0.0485, 0.048)];
     // Then it slips out, and the pads close to the commanded width.

@@ -3,17 +3,14 @@
 //! Order of evaluation in one physics step ([`Judge::observe`]); names of thresholds are those of [`SuccessCriteria`]:
 //!
 //! 1. **Deformation.** Peaks of D of the target and of the other soft bodies. A step without a measured D of a soft
-//!    target is
-//!    counted in `missing_deformation`.
-//! 2. **Missing evidence.** If another number is not finite, the step is counted in `missing_evidence`, NoDrop
-//!    becomes false,
-//!    and the rest is skipped.
+//!    target is counted in `missing_deformation`.
+//! 2. **Missing evidence.** If another number is not finite, the step is counted in `missing_evidence`, NoDrop becomes
+//!    false, and the rest is skipped.
 //! 3. **Contact.** A pad touches if its normal force on the target exceeds `touch_force_n`; the rest of the robot
-//!    likewise.
-//!    A body is supported if the upward force on it from everything but the robot exceeds `touch_force_n`.
+//!    likewise. A body is supported if the upward force on it from everything but the robot exceeds `touch_force_n`.
 //! 4. **Lift.** A body is lifted if it is not supported and its lowest point is more than `lift_height_m` above its
-//!    settled
-//!    height. The first body that is lifted decides `wrong_instance`; the target, if several are lifted in one step.
+//!    settled height. The first body that is lifted decides `wrong_instance`; the target, if several are lifted in one
+//!    step.
 //! 5. **Release** and **slip**: [`ReleaseMonitor`], [`SlipMonitor`]. The target is held while both pads touch it and no
 //!    release was commanded.
 //! 6. **Drop**: [`DropMonitor`].

@@ -21,8 +21,9 @@ const NEAR_BOX: Vec3 = Vec3::new(0.018, 0.016, 0.010);
 /// Surface of an object at rest, in its frame, that can be placed over a pad.
 #[derive(Clone, Debug)]
 pub struct TactileSkin {
+    /// Vertex indices of the triangles, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
     vertices: Vec<Vec3>,
-    triangles: Vec<[u32; 3]>,
     /// For soft bodies only.
     embedding: Option<SplineEmbedding>,
 }
@@ -83,11 +84,6 @@ impl TactileSkin {
     fn sampled(shape: &Shape) -> Self {
         let mesh = SurfaceMesh::from_shape(shape, CELL.max(shape.bounds().size().max() / MAX_CELLS)).mesh;
         Self { vertices: mesh.vertices, triangles: mesh.triangles, embedding: None }
-    }
-
-    /// Vertex indices of the triangles, counter-clockwise seen from outside.
-    pub fn triangles(&self) -> &[[u32; 3]] {
-        &self.triangles
     }
 
     /// Writes the vertices of a rigid skin whose object frame is at `pose` (for a pad: in the pad frame).

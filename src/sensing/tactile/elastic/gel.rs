@@ -83,22 +83,13 @@ impl Gel {
 
     /// Centre (x, y) of the cell at index `c`, m, pad frame.
     pub fn centre(&self, c: usize) -> Vector2<f64> {
-        Vector2::new(self.x(c % self.columns), self.y(c / self.columns))
+        let (i, j) = ((c % self.columns) as f64, (c / self.columns) as f64);
+        self.cell * Vector2::new(i - 0.5 * (self.columns - 1) as f64, j - 0.5 * (self.rows - 1) as f64)
     }
 
     /// Position of a point (m) in units of cells, with the centre of cell (0, 0) at 0.
     pub(super) fn grid_position(&self, x: f64, y: f64) -> [f64; 2] {
         [x / self.cell + 0.5 * (self.columns - 1) as f64, y / self.cell + 0.5 * (self.rows - 1) as f64]
-    }
-
-    /// x of the centres of column `i`, m.
-    pub fn x(&self, i: usize) -> f64 {
-        (i as f64 - 0.5 * (self.columns - 1) as f64) * self.cell
-    }
-
-    /// y of the centres of row `j`, m.
-    pub fn y(&self, j: usize) -> f64 {
-        (j as f64 - 0.5 * (self.rows - 1) as f64) * self.cell
     }
 }
 

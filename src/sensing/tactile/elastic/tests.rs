@@ -60,7 +60,7 @@ fn sphere(at: [f64; 2]) -> TestSkin {
 }
 
 /// Field of one skin pressed by `wrench`, with friction 1.5.
-pub(in super::super) fn touch(gel: &Gel, skin: &TestSkin, wrench: PadWrench) -> GelField {
+pub(in super::super) fn pressed(gel: &Gel, skin: &TestSkin, wrench: PadWrench) -> GelField {
     let contact = TactileContact { wrench, skins: &[skin.mesh()], friction: 1.5, substrate: None };
     GelField::solve(gel, &contact, &mut GelScratch::default()).expect("a good contact").expect("a force")
 }
@@ -68,7 +68,7 @@ pub(in super::super) fn touch(gel: &Gel, skin: &TestSkin, wrench: PadWrench) -> 
 #[test]
 fn the_surface_bulges_around_a_press_as_in_the_reference() {
     let gel = gel(flat());
-    let field = touch(&gel, &sphere([0.0; 2]), PadWrench::new(0.81625, [0.0; 2], 0.0, [0.0; 2]));
+    let field = pressed(&gel, &sphere([0.0; 2]), PadWrench::new(0.81625, [0.0; 2], 0.0, [0.0; 2]));
     for (r, u) in
         [(0.0, -0.5e-3), (1e-3, -0.373e-3), (2e-3, -0.084e-3), (3e-3, -0.01244e-3), (5e-3, 0.01029e-3)]
     {
@@ -145,7 +145,7 @@ fn the_tractions_integrate_to_the_solvers_wrench_within_friction() {
         [(2.0, [0.0, 0.0], 0.0), (0.3, [0.3, -0.2], 4e-4), (12.0, [-3.0, 8.0], -2e-2)]
     {
         let wrench = PadWrench::new(normal, shear, twist, [0.0; 2]);
-        let field = touch(&gel, &ridges, wrench);
+        let field = pressed(&gel, &ridges, wrench);
         let found = field.wrench(&gel);
         assert!((found.force - wrench.force).norm() < 1e-9 * normal, "{found:?} {wrench:?}");
         assert!((found.moment.z - wrench.moment.z).abs() < 1e-12, "{found:?} {wrench:?}");
@@ -194,7 +194,7 @@ fn a_load_within_friction_is_held_and_one_beyond_it_slips() {
 fn ridges_stand_out_in_the_touched_surface() {
     let gel = gel(PadSurface::default());
     let ridges = graph(12e-3, 1e-4, |x, _| 2e-4 * (1.0 - (x * std::f64::consts::TAU / 3e-3).cos()));
-    let field = touch(&gel, &ridges, PadWrench::new(3.0, [0.0; 2], 0.0, [0.0; 2]));
+    let field = pressed(&gel, &ridges, PadWrench::new(3.0, [0.0; 2], 0.0, [0.0; 2]));
     let (crest, valley) =
         (field.displacement_at(&gel, 0.0, 0.0)[2], field.displacement_at(&gel, 1.5e-3, 0.0)[2]);
     assert!(valley - crest > 5e-5, "crest {crest:e}, valley {valley:e}");

@@ -5,7 +5,7 @@ use super::{
         PadWrench, TactileSpec,
         elastic::{
             Gel,
-            tests::{TestSkin, graph, touch},
+            tests::{TestSkin, graph, pressed},
         },
     },
     PolynomialOptics,
@@ -32,7 +32,7 @@ fn shadows_darken_the_ground_next_to_a_press_and_not_the_untouched_image() {
     assert_eq!(optics.render(&gel, None, true), optics.untouched);
     // A stamp 4 mm wide, pushed in with steep sides.
     let stamp = graph(2e-3, 1e-4, |_, _| 0.0);
-    let field = touch(&gel, &stamp, PadWrench::new(12.0, [0.0; 2], 0.0, [0.0; 2]));
+    let field = pressed(&gel, &stamp, PadWrench::new(12.0, [0.0; 2], 0.0, [0.0; 2]));
     let (rgb, shaded) = (optics.render(&gel, Some(&field), false), optics.render(&gel, Some(&field), true));
     let darker = rgb.iter().zip(shaded.iter()).filter(|(lit, shaded)| **shaded + 3 < **lit).count();
     assert!(darker > 300, "{darker} values darker");
@@ -50,7 +50,7 @@ fn shadows_darken_the_ground_next_to_a_press_and_not_the_untouched_image() {
 #[test]
 fn a_contact_changes_the_image_around_it_and_nowhere_else() {
     let (gel, optics) = (gel(), PolynomialOptics::gelsight_mini().expect("shipped"));
-    let field = touch(&gel, &dome(4e-3), PadWrench::new(0.5, [0.0; 2], 0.0, [0.0; 2]));
+    let field = pressed(&gel, &dome(4e-3), PadWrench::new(0.5, [0.0; 2], 0.0, [0.0; 2]));
     let image = optics.render(&gel, Some(&field), false);
     let changed = |x: u32, y: u32| image.get_pixel(x, y) != optics.untouched.get_pixel(x, y);
     assert!((0..240).any(|y| changed(175, y)) && (0..320).any(|x| changed(x, 105)));

@@ -80,17 +80,17 @@ impl VisibleSurface {
                 }
             }
         }
-        let place = [Gel::x, Gel::y];
+        if low[0] > high[0] {
+            return None;
+        }
         let mut window = Self::default();
         for axis in 0..2 {
-            let px = |at: f64| at / gel.view.pitch + 0.5 * IMAGE_SIZE[axis] as f64;
-            let from =
-                (px(place[axis](gel, low[axis].min(high[axis]))) - 2.0).clamp(0.0, IMAGE_SIZE[axis] as f64);
-            let to = (px(place[axis](gel, high[axis])) + 2.0).clamp(0.0, IMAGE_SIZE[axis] as f64);
-            window.from[axis] = from as usize;
-            window.size[axis] = to as usize - from as usize;
+            let edge = IMAGE_SIZE[axis] as f64;
+            let px = |[i, j]: [usize; 2]| gel.centre(j * n + i)[axis] / gel.view.pitch + 0.5 * edge;
+            window.from[axis] = (px(low) - 2.0).clamp(0.0, edge) as usize;
+            window.size[axis] = (px(high) + 2.0).clamp(0.0, edge) as usize - window.from[axis];
         }
-        (low[0] <= high[0] && window.size[0] > 2 && window.size[1] > 2).then_some(window)
+        (window.size[0] > 2 && window.size[1] > 2).then_some(window)
     }
 
     /// Lowers the surface to the skin where they touch.

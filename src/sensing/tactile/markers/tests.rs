@@ -5,7 +5,7 @@ use super::{
         FotsSpec, MarkerModel, PadWrench, TactileSpec,
         elastic::{
             Gel,
-            tests::{graph, touch},
+            tests::{graph, pressed},
         },
     },
     MarkerStyle, Markers,
@@ -28,7 +28,7 @@ fn without_a_contact_no_marker_moves() {
 fn a_dent_moves_markers_outwards_by_perspective_and_by_the_gel() {
     let gel = gel();
     let skin = graph(12e-3, 2e-4, |_, _| 0.0);
-    let field = touch(&gel, &skin, PadWrench::new(40.0, [0.0; 2], 0.0, [0.0; 2]));
+    let field = pressed(&gel, &skin, PadWrench::new(40.0, [0.0; 2], 0.0, [0.0; 2]));
     let Markers { initial: from, current: to } = Markers::new(&gel, &MarkerModel::Elastic, Some(&field));
     let marker = 4 * 11 + 8;
     let rest = gel.view.image_to_pad(&gel.pad, from[marker].map(f64::from));
@@ -45,9 +45,9 @@ fn shear_moves_markers_along_and_gravity_pulls_them_to_the_left_on_both_fingers(
     // A lifted object is pulled towards the finger tips: −x of both pads, left in both images.
     let gel = gel();
     let flat = graph(6e-3, 2e-4, |_, _| 0.0);
-    let still = touch(&gel, &flat, PadWrench::new(5.0, [0.0; 2], 0.0, [0.0; 2]));
+    let still = pressed(&gel, &flat, PadWrench::new(5.0, [0.0; 2], 0.0, [0.0; 2]));
     for (shear, axis, sign) in [([-2.0, 0.0], 0, -1.0), ([0.0, 2.0], 1, 1.0)] {
-        let field = touch(&gel, &flat, PadWrench::new(5.0, shear, 0.0, [0.0; 2]));
+        let field = pressed(&gel, &flat, PadWrench::new(5.0, shear, 0.0, [0.0; 2]));
         for model in [MarkerModel::Elastic, MarkerModel::Fots(FotsSpec::default())] {
             let place = |field| Markers::new(&gel, &model, Some(field)).current[4 * 11 + 5];
             let (before, after) = (place(&still), place(&field));
@@ -69,7 +69,7 @@ fn twist_moves_opposite_markers_in_opposite_directions() {
     let flat = graph(6e-3, 2e-4, |_, _| 0.0);
     for model in [MarkerModel::Elastic, MarkerModel::Fots(FotsSpec::default())] {
         let place = |twist| {
-            let field = touch(&gel, &flat, PadWrench::new(5.0, [0.0; 2], twist, [0.0; 2]));
+            let field = pressed(&gel, &flat, PadWrench::new(5.0, [0.0; 2], twist, [0.0; 2]));
             Markers::new(&gel, &model, Some(&field)).current
         };
         let (still, twisted) = (place(0.0), place(6e-3));
@@ -86,7 +86,7 @@ fn fots_follows_its_published_law() {
     let gel = gel();
     let law = FotsSpec::default();
     let flat = graph(2e-3, 1e-4, |_, _| 0.0);
-    let field = touch(&gel, &flat, PadWrench::new(2.0, [0.5, 0.0], 0.0, [0.0; 2]));
+    let field = pressed(&gel, &flat, PadWrench::new(2.0, [0.5, 0.0], 0.0, [0.0; 2]));
     let model = MarkerModel::Fots(FotsSpec { height_factor: 0.0, ..law });
     let Markers { initial: from, current: to } = Markers::new(&gel, &model, Some(&field));
     let centre = field.centre(&gel);

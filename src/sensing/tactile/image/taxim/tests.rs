@@ -8,7 +8,7 @@ use crate::{
     robot::PadSurface,
     sensing::tactile::{
         PadWrench, TactileSpec,
-        elastic::tests::{graph, touch},
+        elastic::tests::{graph, pressed},
     },
 };
 
@@ -143,10 +143,10 @@ fn every_broken_array_is_named_with_its_file() {
             "array \"f0\": expected the shape [480, 640, 3]",
         ),
     ] {
-        let said = refused(file, key, by);
+        let message = refused(file, key, by);
         assert!(
-            said.contains(file) && said.contains(what),
-            "{file}, {key}: expected \"{what}\", got \"{said}\""
+            message.contains(file) && message.contains(what),
+            "{file}, {key}: expected \"{what}\", got \"{message}\""
         );
     }
 }
@@ -157,23 +157,26 @@ fn a_truncated_or_damaged_file_is_named_with_the_requested_array() {
     let (poly, pack) = (folder.path().join("polycalib.npz"), folder.path().join("dataPack.npz"));
     write(&poly, &polycalib());
     write(&pack, &data_pack());
-    let said = || TaximOptics::load(folder.path()).expect_err("a broken file").to_string();
+    let error = || TaximOptics::load(folder.path()).expect_err("a broken file").to_string();
     let whole = fs::read(&poly).expect("written");
     for length in [0, 1, 1000, whole.len() / 2, whole.len() - 1] {
         fs::write(&poly, &whole[..length]).expect("written");
-        let said = said();
-        assert!(said.contains("polycalib.npz") && said.contains("\"bins\""), "{length} bytes: {said}");
+        let message = error();
+        assert!(
+            message.contains("polycalib.npz") && message.contains("\"bins\""),
+            "{length} bytes: {message}"
+        );
     }
     // One flipped bit in grad_g, so that its checksum is wrong.
     let mut damaged = whole.clone();
     let at = whole.windows(6).position(|w| w == b"grad_g").expect("an entry") + 10_000;
     damaged[at] ^= 1;
     fs::write(&poly, &damaged).expect("written");
-    let message = said();
+    let message = error();
     assert!(message.contains("polycalib.npz: array \"grad_g\": cannot be read to its end"), "{message}");
     fs::write(&poly, &whole).expect("written");
     fs::write(&pack, b"PK").expect("written");
-    let message = said();
+    let message = error();
     assert!(message.contains("dataPack.npz") && message.contains("\"f0\""), "{message}");
 }
 
@@ -199,7 +202,7 @@ fn painted() -> TaximOptics {
 fn the_table_is_read_at_size_and_direction_of_the_rise() {
     let gel = Gel::new(&TactileSpec::default(), PadSurface::default()).expect("default numbers");
     let ball = graph(8e-3, 2e-4, |x, y| (x * x + y * y) / 8e-3);
-    let field = touch(&gel, &ball, PadWrench::new(1.5, [0.0; 2], 0.0, [0.0; 2]));
+    let field = pressed(&gel, &ball, PadWrench::new(1.5, [0.0; 2], 0.0, [0.0; 2]));
     let rgb = painted().render(&gel, Some(&field)).into_raw();
     let red = |x: usize, y: usize| rgb[3 * (y * IMAGE_SIZE[0] + x)];
     // The dent rises towards its middle: to the right on its left side.
