@@ -16,7 +16,7 @@ use tungstenite::{
 };
 
 use crate::policy::{
-    msgpack::unpack,
+    msgpack::{MsgpackError, unpack},
     transport::{self, TransportError, complete_handshake, is_wait, websocket_config},
 };
 
@@ -31,16 +31,17 @@ const CLOSE_DRAIN_TIMEOUT: Duration = Duration::from_secs(3);
 /// Idle time before a ping is sent; pings to a dead host eventually fail the connection.
 const PING_INTERVAL: Duration = Duration::from_secs(60);
 
-/// Result of receiving a message.
-#[derive(Debug)]
-pub(super) enum Incoming {
-    /// A message.
-    Message(Value),
-    /// An invalid message, with an explanation. The connection remains usable.
-    Malformed(String),
-    /// An invalid message after which the connection cannot be used, with an explanation.
-    Disconnected(String),
-    /// The connection was closed, or the server is cancelled.
+/// No message was received.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum ReceiveError {
+    #[error("the message is {0}")]
+    Malformed(#[from] MsgpackError),
+    #[error("the message is a text frame; expected msgpack")]
+    TextFrame,
+    /// The connection cannot be used any more.
+    #[error("the message is longer than {} MiB", MAX_MESSAGE_BYTES >> 20)]
+    TooLong,
+    #[error("the connection was closed, or the server is cancelled")]
     Closed,
 }
 
@@ -83,7 +84,10 @@ impl<'a> Connection<'a> {
     }
 
     /// Waits for the next message. Sends pings meanwhile.
-    pub(super) fn recv(&mut self) -> Incoming {
+    ///
+    /// # Errors
+    /// The message is invalid, or there will be no further one.
+    pub(super) fn recv(&mut self) -> Result<Value, ReceiveError> {
         let mut idle_since = Instant::now();
         loop {
             let message = transport::receive(&mut self.socket, |socket| {
@@ -97,25 +101,17 @@ impl<'a> Connection<'a> {
                 Ok(())
             });
             match message {
-                Ok(Message::Binary(bytes)) => {
-                    return unpack(&bytes).map_or_else(
-                        |error| Incoming::Malformed(format!("the message is {error}")),
-                        Incoming::Message,
-                    );
-                }
-                Ok(Message::Text(_)) => {
-                    return Incoming::Malformed("the message is a text frame; expected msgpack".to_owned());
-                }
+                Ok(Message::Binary(bytes)) => return Ok(unpack(&bytes)?),
+                Ok(Message::Text(_)) => return Err(ReceiveError::TextFrame),
                 Ok(Message::Close(_)) => {
                     let _ = self.socket.flush();
-                    return Incoming::Closed;
+                    return Err(ReceiveError::Closed);
                 }
                 Ok(_) => idle_since = Instant::now(),
                 Err(TransportError::Socket(tungstenite::Error::Capacity(_))) => {
-                    let limit = MAX_MESSAGE_BYTES >> 20;
-                    return Incoming::Disconnected(format!("the message is longer than {limit} MiB"));
+                    return Err(ReceiveError::TooLong);
                 }
-                Err(_) => return Incoming::Closed,
+                Err(_) => return Err(ReceiveError::Closed),
             }
         }
     }

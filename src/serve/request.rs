@@ -56,10 +56,10 @@ impl Request {
     /// # Errors
     /// The message is not a request, or a field is unknown, missing or invalid.
     pub(super) fn read(message: &Value, config: &ServerConfig) -> Result<Self, RequestError> {
-        let Some(map) = message.as_map() else {
+        if !message.is_map() {
             let what = kind(message);
             return Err(format!("the message is {what}; expected a map with a type of {TYPES}").into());
-        };
+        }
         let Some(what) = entry(message, "type") else {
             let has = shortened(&names(message));
             return Err(format!("the message has no type; expected one of {TYPES}; it has {has}").into());
@@ -68,7 +68,7 @@ impl Request {
             text(what).ok_or_else(|| format!("the type is {}; expected one of {TYPES}", kind(what)))?;
         let fields = |known: &[&str]| {
             let all: Vec<&str> = ["type"].iter().chain(known).copied().collect();
-            RequestFields::new(&what, map, &all)
+            RequestFields::new(&what, message, &all)
         };
         match what.as_str() {
             "reset" => Ok(Self::Reset(episode_id(&fields(&EPISODE_FIELDS)?, config)?)),
@@ -148,11 +148,12 @@ fn action_rows(fields: &RequestFields, value: &Value, most: usize) -> Result<Vec
 
 fn state(fields: &RequestFields, config: &ServerConfig) -> Result<Request, RequestError> {
     let value = fields.required("state", fields.get("state"))?;
-    let map = value.as_map().ok_or_else(|| {
-        fields.error(&format!("state is {}; expected the state of a get_state response", kind(value)))
-    })?;
+    if !value.is_map() {
+        let message = format!("state is {}; expected the state of a get_state response", kind(value));
+        return Err(fields.error(&message));
+    }
     let known: Vec<&str> = EPISODE_FIELDS.into_iter().chain(["actions", "code", "made_by"]).collect();
-    let inner = RequestFields::new("set_state: state", map, &known)?;
+    let inner = RequestFields::new("set_state: state", value, &known)?;
     for (name, own, what) in [
         ("code", config.action_code(), "its actions are encoded differently: another profile or gripper"),
         ("made_by", config.fingerprint.clone(), "its scripts, shifts, settings or version differ"),
@@ -170,7 +171,7 @@ fn state(fields: &RequestFields, config: &ServerConfig) -> Result<Request, Reque
 struct RequestFields<'a> {
     /// Prefix of error messages.
     context: &'a str,
-    map: &'a [(Value, Value)],
+    map: &'a Value,
 }
 
 impl<'a> RequestFields<'a> {
@@ -178,9 +179,9 @@ impl<'a> RequestFields<'a> {
     ///
     /// # Errors
     /// A field is not in `known`.
-    fn new(context: &'a str, map: &'a [(Value, Value)], known: &[&str]) -> Result<Self, RequestError> {
+    fn new(context: &'a str, map: &'a Value, known: &[&str]) -> Result<Self, RequestError> {
         let fields = Self { context, map };
-        for (key, _) in map {
+        for (key, _) in map.as_map().into_iter().flatten() {
             let name = text(key).unwrap_or_else(|| "that is not text".to_owned());
             if !known.contains(&name.as_str()) {
                 let name = shortened(&name);
@@ -197,8 +198,7 @@ impl<'a> RequestFields<'a> {
 
     /// Value of a field, `None` if it is absent or nil.
     fn get(&self, name: &str) -> Option<&'a Value> {
-        let found = self.map.iter().find(|(key, _)| text(key).as_deref() == Some(name));
-        found.map(|(_, value)| value).filter(|value| !value.is_nil())
+        entry(self.map, name).filter(|value| !value.is_nil())
     }
 
     fn required<T>(&self, name: &str, value: Option<T>) -> Result<T, RequestError> {

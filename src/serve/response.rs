@@ -1,5 +1,7 @@
 //! Responses to clients.
 
+use std::fmt::Display;
+
 use rmpv::Value;
 use serde_json::{Map, json};
 
@@ -30,8 +32,8 @@ pub(super) fn typed(kind: &str, entries: impl IntoIterator<Item = (&'static str,
 }
 
 /// The response to a request that cannot be executed.
-pub(super) fn error(message: &str) -> Value {
-    typed("error", [("error", message.into())])
+pub(super) fn error(message: &dyn Display) -> Value {
+    typed("error", [("error", message.to_string().into())])
 }
 
 /// The first message to every client: suites, tasks, and the spaces of observations and actions. `first` is the first

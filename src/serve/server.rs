@@ -13,7 +13,7 @@ use rmpv::Value;
 
 use super::{
     config::ServerConfig,
-    connection::{Connection, HANDSHAKE_TIMEOUT, Incoming},
+    connection::{Connection, HANDSHAKE_TIMEOUT, ReceiveError},
     request::Request,
     response,
     session::ClientSession,
@@ -156,10 +156,9 @@ fn run_session(mut connection: Connection, state: &ServerState) {
     let mut session = ClientSession::new(state.config, state.cancel);
     loop {
         let (response, is_last) = match connection.recv() {
-            Incoming::Closed => return connection.close(),
-            Incoming::Disconnected(reason) => (response::error(&reason), true),
-            Incoming::Malformed(reason) => (response::error(&reason), false),
-            Incoming::Message(message) => respond(&mut session, state.config, &message),
+            Ok(message) => respond(&mut session, state.config, &message),
+            Err(ReceiveError::Closed) => return connection.close(),
+            Err(error) => (response::error(&error), matches!(error, ReceiveError::TooLong)),
         };
         if connection.send(&response).is_err() {
             return;
@@ -174,15 +173,15 @@ fn run_session(mut connection: Connection, state: &ServerState) {
 fn respond(session: &mut ClientSession, config: &ServerConfig, message: &Value) -> (Value, bool) {
     let request = match Request::read(message, config) {
         Ok(request) => request,
-        Err(error) => return (response::error(&error.to_string()), false),
+        Err(error) => return (response::error(&error), false),
     };
     let is_last = request == Request::Close;
     match catch_unwind(AssertUnwindSafe(|| session.execute(request))) {
         Ok(Ok(response)) => (response, is_last),
-        Ok(Err(error)) => (response::error(&error.to_string()), false),
+        Ok(Err(error)) => (response::error(&error), false),
         Err(_) => {
             session.discard_episode();
-            (response::error("internal error of the server; the episode was discarded; send reset"), false)
+            (response::error(&"internal error of the server; the episode was discarded; send reset"), false)
         }
     }
 }

@@ -27,7 +27,14 @@ pub(super) fn observation(config: &ServerConfig, first: &Observation) -> Value {
     let entries = config.profile.inputs.iter().filter_map(|input| {
         let space = match content(first, &input.source)? {
             ObservationEntry::Text(_) => text(config),
-            ObservationEntry::Array(array) => array_space(&array.dtype, &array.shape, bounds(&input.source)),
+            ObservationEntry::Array(array) => {
+                let high = largest(&input.source);
+                let low = match array.dtype.as_str() {
+                    "|u1" => vec![0.0],
+                    _ => high.iter().map(|x| -x).collect(),
+                };
+                array_space(&array.dtype, &array.shape, low, high)
+            }
         };
         Some((input.shortest_key(), space))
     });
@@ -49,7 +56,7 @@ pub(super) fn action(encoding: &ActionEncoding) -> Value {
     let mut high: Vec<f64> = (0..most.len()).map(|i| end(i, 1.0)).collect();
     low.push(encoding.gripper.open.min(encoding.gripper.closed));
     high.push(encoding.gripper.open.max(encoding.gripper.closed));
-    array_space("<f8", &[ACTION_LEN], BoxBounds { low, high })
+    array_space("<f8", &[ACTION_LEN], low, high)
 }
 
 /// Space of the prompts: the length of the longest one and all characters in use.
@@ -60,44 +67,28 @@ fn text(config: &ServerConfig) -> Value {
     map([("max_length", longest.into()), ("charset", String::from_iter(characters).into())])
 }
 
-/// Bounds of an array: one number for all elements, or one per element.
-struct BoxBounds {
-    low: Vec<f64>,
-    high: Vec<f64>,
-}
-
-impl BoxBounds {
-    fn symmetric(high: Vec<f64>) -> Self {
-        Self { low: high.iter().map(|x| -x).collect(), high }
-    }
-}
-
-fn array_space(dtype: &str, shape: &[usize], bounds: BoxBounds) -> Value {
+/// Space of an array; its bounds are one number for all elements, or one per element.
+fn array_space(dtype: &str, shape: &[usize], low: Vec<f64>, high: Vec<f64>) -> Value {
     let list = |all: Vec<f64>| match all[..] {
         [one] => Value::F64(one),
         _ => Value::Array(all.into_iter().map(Value::F64).collect()),
     };
     let shape = shape.iter().map(|n| Value::from(*n)).collect();
-    map([
-        ("dtype", dtype.into()),
-        ("shape", Value::Array(shape)),
-        ("low", list(bounds.low)),
-        ("high", list(bounds.high)),
-    ])
+    map([("dtype", dtype.into()), ("shape", Value::Array(shape)), ("low", list(low)), ("high", list(high))])
 }
 
-fn bounds(source: &InputSource) -> BoxBounds {
+/// Largest magnitude of all elements, or of each.
+fn largest(source: &InputSource) -> Vec<f64> {
     match source {
-        InputSource::Camera { .. } | InputSource::TactileImage { .. } | InputSource::Tactile { .. } => {
-            BoxBounds { low: vec![0.0], high: vec![255.0] }
-        }
         InputSource::State { parts } => {
-            let of = |part: &StatePart| vec![max_magnitude(*part); part.count()];
-            BoxBounds::symmetric(parts.iter().flat_map(of).collect())
+            parts.iter().flat_map(|part| vec![max_magnitude(*part); part.count()]).collect()
         }
-        InputSource::MarkerMotion => BoxBounds::symmetric(vec![MAX_MARKER_PX]),
-        InputSource::Force => BoxBounds::symmetric(vec![MAX_FORCE_N]),
-        InputSource::Prompt => BoxBounds::symmetric(vec![f64::INFINITY]),
+        InputSource::MarkerMotion => vec![MAX_MARKER_PX],
+        InputSource::Force => vec![MAX_FORCE_N],
+        InputSource::Prompt => vec![f64::INFINITY],
+        InputSource::Camera { .. } | InputSource::TactileImage { .. } | InputSource::Tactile { .. } => {
+            vec![255.0]
+        }
     }
 }
 

@@ -59,7 +59,7 @@ impl ScriptSources {
     }
 }
 
-/// A loaded script.
+/// A loaded script: its plan, its options, and the files of which its episodes are made.
 #[derive(Clone, Debug)]
 pub struct LoadedScript {
     /// The files; episodes run on these.
@@ -335,6 +335,9 @@ fn condition(lua: &Lua, spec: &ConditionSpec) -> mlua::Result<Condition> {
     Ok(Condition { name: spec.name.clone(), shift, set, only: spec.only })
 }
 
+/// Points of the grid of an experiment.
+const MAX_POINTS: usize = 1_000_000;
+
 /// The points of an experiment: those of its function, or every combination of its grid.
 pub(crate) fn points(lua: &Lua, spec: &ExperimentSpec) -> mlua::Result<Vec<Value>> {
     match (&spec.points, &spec.grid) {
@@ -352,21 +355,19 @@ pub(crate) fn points(lua: &Lua, spec: &ExperimentSpec) -> mlua::Result<Vec<Value
             }
         }
         (None, Some(grid)) => {
-            let mut points: Vec<Vec<(&str, &Value)>> = vec![Vec::new()];
-            for (name, values) in grid {
-                if points.len().saturating_mul(values.len()) > 1_000_000 {
-                    let message = "experiment.grid: has more than a million points; give fewer values";
-                    return Err(fail(lua, message));
-                }
-                let mut extended = Vec::new();
-                for point in &points {
-                    let with = |value| point.iter().copied().chain([(name.as_str(), value)]).collect();
-                    extended.extend(values.iter().map(with));
-                }
-                points = extended;
+            let count = grid.values().fold(1_usize, |count, values| count.saturating_mul(values.len()));
+            if count > MAX_POINTS {
+                return Err(fail(lua, "experiment.grid: has more than a million points; give fewer values"));
             }
-            let tables = points.into_iter().map(|point| lua.create_table_from(point).map(Value::Table));
-            tables.collect()
+            let point = |mut index: usize| {
+                let point = lua.create_table()?;
+                for (name, values) in grid.iter().rev() {
+                    point.raw_set(name.as_str(), &values[index % values.len()])?;
+                    index /= values.len();
+                }
+                Ok(Value::Table(point))
+            };
+            (0..count).map(point).collect()
         }
         _ => Err(fail(lua, "experiment: give either grid or points")),
     }

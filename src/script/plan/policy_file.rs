@@ -79,7 +79,7 @@ impl PolicyFile {
         let instance = self.sources.instance()?;
         let PolicySpec { act, reset, .. } = instance.policy()?.spec;
         instance.vm.random.reseed(seed.stream(RandomStream::Policy));
-        Ok(LuaPolicy { name: self.name.clone(), streams: self.streams.clone(), instance, act, reset })
+        Ok(LuaPolicy { file: self.clone(), instance, act, reset })
     }
 }
 
@@ -91,8 +91,7 @@ impl ScriptInstance {
 
 /// A policy in Lua, in one episode.
 pub struct LuaPolicy {
-    name: String,
-    streams: SensorStreams,
+    file: PolicyFile,
     instance: ScriptInstance,
     act: Function,
     reset: Option<Function>,
@@ -100,11 +99,11 @@ pub struct LuaPolicy {
 
 impl Policy for LuaPolicy {
     fn name(&self) -> &str {
-        &self.name
+        &self.file.name
     }
 
     fn streams(&self) -> SensorStreams {
-        self.streams.clone()
+        self.file.streams.clone()
     }
 
     fn reset(&mut self, brief: &TaskBrief) -> Result<(), PolicyError> {
