@@ -18,11 +18,11 @@ use std::{
 use rmpv::Value;
 use softvt::{
     policy::{
-        ActionChunk, ChunkedPolicy, Observation, Policy, PolicyError, SensorStreams, TaskBrief,
+        ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief,
         profile::Profile,
         remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},
     },
-    rollout::{AssetCache, Episode, SensorAssets},
+    rollout::{AssetCache, ChunkedPolicy, Episode, SensorAssets},
 };
 use tungstenite::{Message, accept};
 

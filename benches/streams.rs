@@ -8,8 +8,8 @@ mod episode;
 
 use cpu_time::ThreadTime;
 use softvt::{
-    policy::{Action, Observation, SensorStreams},
-    rollout::{AssetCache, ControlError, Controller, Episode, SensorAssets, Simulation},
+    policy::{Action, Observation, PolicyError, SensorStreams},
+    rollout::{AssetCache, Controller, Episode, SensorAssets, Simulation},
     script::{ExpertController, LoadedScript},
 };
 
@@ -28,7 +28,7 @@ impl Controller for ExpertWithStreams {
         self.streams.clone()
     }
 
-    fn act(&mut self, sim: &Simulation, seen: &Observation) -> Result<Option<Action>, ControlError> {
+    fn act(&mut self, sim: &Simulation, seen: &Observation) -> Result<Option<Action>, PolicyError> {
         self.since.get_or_insert_with(ThreadTime::now);
         self.expert.act(sim, seen)
     }

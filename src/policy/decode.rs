@@ -12,35 +12,40 @@ use crate::geometry::Vec3;
 /// Number of actions from which on a chunk is rejected as a mistake.
 pub const MAX_CHUNK_LEN: usize = 10_000;
 
-/// Decodes a reply: a map whose entry `actions` (or `action`) has the shape (horizon, n), (1, horizon, n) or
+/// Decodes a response: a map whose entry `actions` (or `action`) has the shape (horizon, n), (1, horizon, n) or
 /// (n), n ≥ 7.
 ///
+/// ```
+/// use rmpv::Value;
+/// use softvt::policy::{ToolCommand, decode, msgpack::map, profile::Profile};
+///
+/// let libero = Profile::named("libero").expect("a built-in profile");
+/// // A step of +5 cm along x at most; the gripper's value 1 means closed.
+/// let row = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0].map(Value::from).to_vec();
+/// let chunk = decode::chunk(&map([("actions", Value::Array(row))]), &libero.actions)?;
+/// let [ToolCommand::Delta { translation_b, closure, .. }] = chunk.commands[..] else { unreachable!() };
+/// assert_eq!((translation_b.x, closure), (0.05, 1.0));
+/// # Ok::<(), softvt::policy::PolicyError>(())
+/// ```
+///
 /// # Errors
-/// [`PolicyError::Reply`] if the reply has another form, [`PolicyError::Action`] if a number is not finite.
-pub fn chunk(reply: &Value, encoding: &ActionEncoding) -> Result<ActionChunk, PolicyError> {
-    let wrong = |what: String| PolicyError::Reply(format!("the policy's reply {what}"));
-    if reply.as_map().is_none() {
-        return Err(wrong(format!("is {}; expected a map with the entry actions", kind(reply))));
+/// [`PolicyError::Response`] if the response has another form, [`PolicyError::Action`] if a number is not finite.
+pub fn chunk(response: &Value, encoding: &ActionEncoding) -> Result<ActionChunk, PolicyError> {
+    if response.as_map().is_none() {
+        let kind = kind(response);
+        return Err(PolicyError::Response(format!("is {kind}; expected a map with the entry actions")));
     }
-    let actions = entry(reply, "actions")
-        .or_else(|| entry(reply, "action"))
-        .ok_or_else(|| wrong(format!("has no entry actions; it has {}", names(reply))))?;
-    let actions =
-        numbers(actions).map_err(|error| wrong(format!("has {error} as actions; expected numbers")))?;
-    rows(&actions, encoding)
-}
-
-/// Decodes the actions of a chunk; see [`chunk`] for shapes and errors.
-pub(crate) fn rows(
-    NumberArray { shape, values }: &NumberArray,
-    encoding: &ActionEncoding,
-) -> Result<ActionChunk, PolicyError> {
-    let wrong = |what: &str| {
-        PolicyError::Reply(format!(
-            "the policy's reply has actions of shape {shape:?}: {what}; expected (horizon, {ACTION_LEN} or more)"
+    let actions = entry(response, "actions")
+        .or_else(|| entry(response, "action"))
+        .ok_or_else(|| PolicyError::Response(format!("has no entry actions; it has {}", names(response))))?;
+    let NumberArray { shape, values } = numbers(actions)
+        .map_err(|error| PolicyError::Response(format!("has {error} as actions; expected numbers")))?;
+    let wrong = |problem: &str| {
+        PolicyError::Response(format!(
+            "has actions of shape {shape:?}: {problem}; expected (horizon, {ACTION_LEN} or more)"
         ))
     };
-    let (horizon, width) = match *shape.as_slice() {
+    let (horizon, width) = match shape[..] {
         [width] => (1, width),
         [horizon, width] | [1, horizon, width] => (horizon, width),
         _ => return Err(wrong("not rows of actions")),
@@ -54,40 +59,22 @@ pub(crate) fn rows(
     if let Some(length) = encoding.length.filter(|length| *length != width) {
         return Err(wrong(&format!("the profile requires {length} numbers per action")));
     }
-    let commands: Result<Vec<ToolCommand>, PolicyError> =
-        values.chunks_exact(width).map(|row| command(&row[..ACTION_LEN], encoding)).collect();
-    Ok(ActionChunk { commands: commands? })
+    let rows = values.chunks_exact(width).filter_map(<[f64]>::first_chunk);
+    Ok(ActionChunk { commands: rows.map(|row| command(row, encoding)).collect::<Result<_, _>>()? })
 }
 
 /// Decodes the seven numbers of an action.
 ///
-/// ```
-/// use softvt::policy::{ToolCommand, decode, profile::Profile};
-///
-/// let libero = Profile::named("libero").expect("a built-in profile");
-/// // A step of +5 cm along x at most; the gripper's value 1 means closed.
-/// let command = decode::command(&[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], &libero.actions)?;
-/// let ToolCommand::Delta { translation_b, closure, .. } = command else { unreachable!() };
-/// assert_eq!((translation_b.x, closure), (0.05, 1.0));
-/// # Ok::<(), softvt::policy::PolicyError>(())
-/// ```
-///
 /// # Errors
-/// [`PolicyError::Action`] if a number is not finite, [`PolicyError::Reply`] if there are not seven of them.
-pub fn command(row: &[f64], encoding: &ActionEncoding) -> Result<ToolCommand, PolicyError> {
-    let [_, _, _, _, _, _, gripper] = row else {
-        return Err(PolicyError::Reply(format!(
-            "an action has {} numbers; expected {ACTION_LEN}",
-            row.len()
-        )));
-    };
+/// [`PolicyError::Action`] if a number is not finite.
+pub fn command(row: &[f64; ACTION_LEN], encoding: &ActionEncoding) -> Result<ToolCommand, PolicyError> {
     if row.iter().any(|number| !number.is_finite()) {
         return Err(PolicyError::Action(format!("the action {row:?} holds a number that is not finite")));
     }
     let ActionUnits { scale, offset } = encoding.units.unwrap_or(ActionUnits::IDENTITY);
     let [x, y, z, rx, ry, rz] = std::array::from_fn(|i| scale[i] * row[i] + offset[i]);
     let (linear, angular) = (Vec3::new(x, y, z), Vec3::new(rx, ry, rz));
-    let closure = encoding.gripper.closure(*gripper);
+    let closure = encoding.gripper.closure(row[6]);
     // robosuite's controller clips to −1..=1 as well.
     let delta = |full, translation_m: f64, rotation_rad: f64| ToolCommand::Delta {
         full,
@@ -144,7 +131,7 @@ mod tests {
             (Value::Map(vec![("actions".into(), "x".into())]), "has text as actions"),
         ] {
             match read(value) {
-                Err(PolicyError::Reply(message)) => assert!(message.contains(words), "{message}"),
+                Err(PolicyError::Response(message)) => assert!(message.contains(words), "{message}"),
                 other => panic!("{words}: {other:?}"),
             }
         }
@@ -186,11 +173,9 @@ mod tests {
     #[test]
     fn a_profile_with_a_length_refuses_actions_of_another_length() {
         let code = ActionEncoding { length: Some(32), ..Profile::named("visuo_tactile").unwrap().actions };
-        let array =
-            |rows, columns| NumberArray { shape: vec![rows, columns], values: vec![0.25; rows * columns] };
-        assert_eq!(rows(&array(2, 32), &code).unwrap().commands.len(), 2);
-        match rows(&array(2, 7), &code) {
-            Err(PolicyError::Reply(message)) => assert!(message.contains("32 numbers"), "{message}"),
+        assert_eq!(chunk(&reply(vec![2, 32], 0.25), &code).unwrap().commands.len(), 2);
+        match chunk(&reply(vec![2, 7], 0.25), &code) {
+            Err(PolicyError::Response(message)) => assert!(message.contains("32 numbers"), "{message}"),
             other => panic!("{other:?}"),
         }
     }

@@ -84,19 +84,50 @@ impl TaskBrief {
 /// Failure of a policy. Only [`Action`](Self::Action) is confined to its episode; every other failure ends the run.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PolicyError {
-    /// The server cannot be reached or does not respond.
-    #[error("{0}")]
-    Transport(String),
+    /// The connection to the server failed, or the server does not respond as its protocol requires.
+    #[error("the policy server {url} {problem}")]
+    Server {
+        /// Address of the server.
+        url: String,
+        /// The problem, after the subject "the policy server".
+        problem: String,
+    },
+    /// No server accepted a connection in time.
+    #[error(
+        "no policy server at {url}: {reason}; tried for {seconds} s: start it, or raise --policy-timeout"
+    )]
+    Unreachable {
+        /// Address of the server.
+        url: String,
+        /// Failure of the last attempt.
+        reason: String,
+        /// The time limit, s.
+        seconds: String,
+    },
+    /// Something other than a websocket server listens at the address.
+    #[error("{url} is not a websocket server: {reason}")]
+    NotWebsocket {
+        /// Address of the server.
+        url: String,
+        /// Failure of the handshake.
+        reason: String,
+    },
     /// The address of the server is invalid: an error in the user's input.
-    #[error("{0}")]
-    Address(String),
-    /// The response does not have the form that the profile defines.
-    #[error("{0}")]
-    Reply(String),
-    /// A response of the right form holds an action that cannot be executed. The episode fails; the run continues.
+    #[error("--policy {url}: {problem}; expected ws://HOST:PORT")]
+    Address {
+        /// The address.
+        url: String,
+        /// The problem.
+        problem: String,
+    },
+    /// The response does not have the form that the profile defines. The text continues "the policy's reply".
+    #[error("the policy's reply {0}")]
+    Response(String),
+    /// A response of the right form holds an action that cannot be executed; the text becomes that of the outcome. The
+    /// episode fails; the run continues.
     #[error("{0}")]
     Action(String),
-    /// The script of a Lua policy failed.
+    /// The script of a Lua policy or of an expert failed: an error in the user's input, with the message of the script.
     #[error("{0}")]
     Script(String),
     /// The run was cancelled.
@@ -104,10 +135,20 @@ pub enum PolicyError {
     Interrupted,
 }
 
+impl PolicyError {
+    /// True if a policy server is at fault, not the user's input.
+    pub fn is_of_server(&self) -> bool {
+        matches!(
+            self,
+            Self::Server { .. } | Self::Unreachable { .. } | Self::NotWebsocket { .. } | Self::Response(_)
+        )
+    }
+}
+
 /// A policy that acts on observations alone.
 ///
 /// An episode calls [`reset`](Self::reset) once, then [`act`](Self::act) each time a new [`ActionChunk`] is needed, and
-/// [`finish`](Self::finish) at the end. [`ChunkedPolicy`](super::ChunkedPolicy) executes the chunks at 20 Hz.
+/// [`finish`](Self::finish) at the end. [`ChunkedPolicy`](crate::rollout::ChunkedPolicy) executes the chunks at 20 Hz.
 ///
 /// ```
 /// use softvt::policy::{Action, ActionChunk, Observation, Policy, PolicyError};

@@ -1,7 +1,6 @@
 //! Policies: their interface, their observations, the encodings of observations and actions, and policy servers.
 
 pub mod builtin;
-mod chunked;
 pub mod decode;
 pub mod encode;
 mod interface;
@@ -12,6 +11,6 @@ pub mod profile;
 pub mod remote;
 pub mod transport;
 
-pub use chunked::{ChunkedPolicy, CommandResolver};
 pub use interface::{Action, ActionChunk, Policy, PolicyError, TaskBrief, ToolCommand};
 pub use observation::{CameraImage, Observation, PadForce, SensorStreams, TactileFrame, TactileHistory};
+pub use osc::CommandResolver;

@@ -6,7 +6,7 @@
 //! distance that it does cover. The equation x'' = kp (g − x) − kd x' has the solution x(t) = g + e^{−ωt} ((x₀ − g) +
 //! (v₀ + ω (x₀ − g)) t) with ω = √kp. Position and rotation vector both follow it.
 
-use super::{Action, Observation};
+use super::{Action, Observation, ToolCommand};
 use crate::{
     benchmark::CONTROL_DT,
     geometry::{Quat, Vec3},
@@ -16,32 +16,35 @@ use crate::{
 /// Stiffness of the spring, 1/s².
 const KP: f64 = 150.0;
 
-/// Velocities of the tool between two control steps, as the spring leaves them.
+/// Turns a sequence of commands into absolute poses. Stateful, because a displacement executed by robosuite's
+/// controller depends on the velocity after the previous one.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct OscController {
+pub struct CommandResolver {
+    /// Velocities of the tool between two control steps, as the spring leaves them; zero after other commands.
     velocity: Vec3,
     angular_velocity: Vec3,
 }
 
-impl OscController {
-    /// Tool pose at the end of a control step whose goal is displaced from the measured pose; m and rad, base frame.
-    pub fn step(
-        &mut self,
-        observation: &Observation,
-        translation_b: Vec3,
-        rotation_b: Vec3,
-        closure: f64,
-    ) -> Action {
-        let moved = spring(&translation_b, &mut self.velocity);
-        let turned = spring(&rotation_b, &mut self.angular_velocity);
-        displaced(observation, moved, turned, closure)
+impl CommandResolver {
+    /// The pose that `command` means in the control step of `observation`.
+    pub fn resolve(&mut self, observation: &Observation, command: ToolCommand) -> Action {
+        let (translation_b, rotation_b, closure) = match command {
+            ToolCommand::Pose(action) => {
+                *self = Self::default();
+                return action;
+            }
+            ToolCommand::Delta { full: true, translation_b, rotation_b, closure } => {
+                *self = Self::default();
+                (translation_b, rotation_b, closure)
+            }
+            ToolCommand::Delta { full: false, translation_b, rotation_b, closure } => {
+                let moved = spring(&translation_b, &mut self.velocity);
+                (moved, spring(&rotation_b, &mut self.angular_velocity), closure)
+            }
+        };
+        let orientation_b = rotation::from_axis_angle(&observation.ee_axis_angle_b);
+        goal(observation.ee_position_b, orientation_b, translation_b, rotation_b, closure)
     }
-}
-
-/// The measured tool pose displaced by a translation (m) and a rotation vector (rad) in the base frame.
-pub fn displaced(observation: &Observation, translation_b: Vec3, rotation_b: Vec3, closure: f64) -> Action {
-    let orientation_b = rotation::from_axis_angle(&observation.ee_axis_angle_b);
-    goal(observation.ee_position_b, orientation_b, translation_b, rotation_b, closure)
 }
 
 /// A tool pose displaced by a translation (m) and a rotation vector (rad) in the base frame: the

@@ -1,24 +1,12 @@
-//! The interface of an episode to its controller.
+//! The interface of an episode to its controller, and the controller that executes the action chunks of a policy.
+
+use std::collections::VecDeque;
 
 use super::simulation::Simulation;
-use crate::policy::{Action, ChunkedPolicy, Observation, PolicyError, SensorStreams};
-
-/// Failure of a controller.
-#[derive(Debug, thiserror::Error)]
-pub enum ControlError {
-    /// A script failed: an error in the user's input.
-    #[error("{0}")]
-    Script(String),
-    /// A policy server failed or sent an invalid response.
-    #[error("{0}")]
-    Policy(String),
-    /// The controller returned an action that cannot be executed. The episode fails; the run continues.
-    #[error("{0}")]
-    Action(String),
-    /// The run was cancelled.
-    #[error("interrupted")]
-    Interrupted,
-}
+use crate::policy::{
+    Action, ActionChunk, CommandResolver, Observation, Policy, PolicyError, SensorStreams, TaskBrief,
+    ToolCommand,
+};
 
 /// Controls the robot during an episode. Implemented by observation-only policies and by privileged experts.
 ///
@@ -42,65 +30,60 @@ pub trait Controller {
     /// Action of this control step, `None` to repeat the previous one.
     ///
     /// # Errors
-    /// [`ControlError::Action`] ends the episode with the outcome `error`; any other error ends the run.
-    fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError>;
+    /// [`PolicyError::Action`] ends the episode with the outcome `error`; any other error ends the run.
+    fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, PolicyError>;
     /// Called once after the last control step.
     fn finish(&mut self) {}
 }
 
+/// A policy together with the execution of its chunks, one command per control step. Its observations have sensor
+/// streams only in the control steps in which the policy is queried.
+pub struct ChunkedPolicy<'a> {
+    policy: Box<dyn Policy + 'a>,
+    replan: usize,
+    brief: Option<TaskBrief>,
+    remaining: VecDeque<ToolCommand>,
+    resolver: CommandResolver,
+}
+
+impl<'a> ChunkedPolicy<'a> {
+    /// Runs `policy` in the episode `brief`. At most the first `replan` commands of each chunk are executed.
+    pub fn new(policy: Box<dyn Policy + 'a>, brief: TaskBrief, replan: usize) -> Self {
+        Self {
+            policy,
+            replan: replan.max(1),
+            brief: Some(brief),
+            remaining: VecDeque::new(),
+            resolver: CommandResolver::default(),
+        }
+    }
+}
+
 impl Controller for ChunkedPolicy<'_> {
     fn streams(&self) -> SensorStreams {
-        ChunkedPolicy::streams(self)
+        self.policy.streams()
     }
 
     fn wants_observation(&self) -> bool {
-        ChunkedPolicy::wants_observation(self)
+        self.remaining.is_empty()
     }
 
-    fn act(&mut self, _sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
-        ChunkedPolicy::act(self, observation).map(Some).map_err(ControlError::from)
+    fn act(&mut self, _sim: &Simulation, observation: &Observation) -> Result<Option<Action>, PolicyError> {
+        if let Some(brief) = self.brief.take() {
+            self.policy.reset(&brief)?;
+        }
+        if self.remaining.is_empty() {
+            let ActionChunk { mut commands } = self.policy.act(observation)?;
+            commands.truncate(self.replan);
+            self.remaining = commands.into();
+        }
+        let Some(command) = self.remaining.pop_front() else {
+            return Err(PolicyError::Response("has no action at all".to_owned()));
+        };
+        Ok(Some(self.resolver.resolve(observation, command)))
     }
 
     fn finish(&mut self) {
-        ChunkedPolicy::finish(self);
-    }
-}
-
-impl From<PolicyError> for ControlError {
-    fn from(error: PolicyError) -> Self {
-        match error {
-            PolicyError::Transport(message) | PolicyError::Reply(message) => Self::Policy(message),
-            PolicyError::Action(message) => Self::Action(message),
-            PolicyError::Script(message) | PolicyError::Address(message) => Self::Script(message),
-            PolicyError::Interrupted => Self::Interrupted,
-        }
-    }
-}
-
-/// A controller that fails with [`ControlError::Interrupted`] once the process is [cancelled](super::cancel).
-pub struct Cancellable(pub Box<dyn Controller>);
-
-impl Controller for Cancellable {
-    fn streams(&self) -> SensorStreams {
-        self.0.streams()
-    }
-
-    fn wants_observation(&self) -> bool {
-        self.0.wants_observation()
-    }
-
-    fn gave_up(&self) -> Option<&str> {
-        self.0.gave_up()
-    }
-
-    fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
-        if super::cancel::requested() {
-            return Err(ControlError::Interrupted);
-        }
-        self.0.act(sim, observation)
-    }
-
-    fn finish(&mut self) {
-        self.0.finish();
+        self.policy.finish();
     }
 }

@@ -5,7 +5,8 @@ use image::RgbImage;
 use super::{
     asset_cache::AssetCache,
     build_error::BuildError,
-    controller::{ControlError, Controller},
+    cancel,
+    controller::Controller,
     evidence::{EvidenceCollector, lowest},
     object::ObjectInstance,
     observation_history::ObservationHistory,
@@ -30,7 +31,7 @@ use crate::{
         BodyId,
         world::{StepFailure, WorldSnapshot},
     },
-    policy::{Action, Observation, SensorStreams},
+    policy::{Action, Observation, PolicyError, SensorStreams},
     robot::{
         Side,
         ik::{LINEARISATION_RANGE, PoseDifference},
@@ -112,7 +113,7 @@ pub enum EpisodeError {
         /// Episode index.
         episode: u32,
         /// The cause.
-        source: ControlError,
+        source: PolicyError,
     },
 }
 
@@ -244,7 +245,8 @@ impl Episode {
     /// the state is invalid.
     ///
     /// # Errors
-    /// The controller fails with an error that is not confined to the episode, or a sensor stream cannot be computed.
+    /// The controller fails with an error that is not confined to the episode, a sensor stream cannot be computed, or the
+    /// process is [cancelled](super::cancel).
     pub fn run(mut self, controller: &mut dyn Controller) -> Result<FinishedEpisode, EpisodeError> {
         let mut action = self.start_hold;
         let streams = controller.streams();
@@ -252,10 +254,13 @@ impl Episode {
         while self.outcome.is_none() {
             let requested = if controller.wants_observation() { &streams } else { &SensorStreams::default() };
             let observation = self.observe(requested)?;
+            if cancel::requested() {
+                return Err(self.control_error(PolicyError::Interrupted));
+            }
             match controller.act(&self.sim, &observation) {
                 Ok(Some(next)) => action = next,
                 Ok(None) => {}
-                Err(ControlError::Action(message)) => {
+                Err(PolicyError::Action(message)) => {
                     self.outcome = Some(Outcome::Error { message });
                     break;
                 }
@@ -308,7 +313,7 @@ impl Episode {
         (self.steps >= self.spec.task.budget_steps).then_some(Outcome::Timeout)
     }
 
-    fn control_error(&self, source: ControlError) -> EpisodeError {
+    fn control_error(&self, source: PolicyError) -> EpisodeError {
         EpisodeError::Control { task: self.spec.task.id, episode: self.spec.header.id.episode, source }
     }
 

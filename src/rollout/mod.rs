@@ -26,7 +26,7 @@ mod trace;
 
 pub use asset_cache::AssetCache;
 pub use build_error::BuildError;
-pub use controller::{Cancellable, ControlError, Controller};
+pub use controller::{ChunkedPolicy, Controller};
 pub use episode::{Episode, EpisodeError, FinishedEpisode, ScoreFrame};
 pub use object::{ArticulatedPart, ObjectInstance};
 pub use robot_instance::RobotInstance;

@@ -10,11 +10,9 @@ use softvt::{
         record::EpisodeRecord,
         summary::SuiteSummary,
     },
-    policy::{
-        Action, ActionChunk, ChunkedPolicy, Observation, Policy, PolicyError, SensorStreams, TaskBrief,
-    },
+    policy::{Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief},
     report::terminal,
-    rollout::{AssetCache, Episode, EpisodeSpec, SensorAssets, SensorSuite, Simulation},
+    rollout::{AssetCache, ChunkedPolicy, Episode, EpisodeSpec, SensorAssets, SensorSuite, Simulation},
     script::{self, LoadedScript},
     sensing::tactile::MosaicLayout,
 };

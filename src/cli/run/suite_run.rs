@@ -244,10 +244,10 @@ impl<'a> SuiteRun<'a> {
         controllers: &ControllerFactory,
     ) -> Result<Result<FinishedEpisode, EpisodeError>, CliError> {
         let (spec, opened) = self.spec(job.task, &self.episode_id(job.task, job.episode), origin)?;
-        let mut controller = Cancellable(controllers(opened, self.brief(job.task, job.episode))?);
+        let mut controller = controllers(opened, self.brief(job.task, job.episode))?;
         let spec = EpisodeSpec { record_states: keep_states, ..spec };
         let started = Episode::start(spec, &self.assets, &self.sensor_assets);
-        Ok(started.and_then(|started| started.run(&mut controller)))
+        Ok(started.and_then(|started| started.run(&mut *controller)))
     }
 
     /// Starts an episode for an external client: settled, without a controller.
@@ -286,7 +286,7 @@ impl<'a> SuiteRun<'a> {
         let exit = match error {
             // An error after the interrupt may be its consequence.
             _ if cancel::requested() => Exit::Interrupted,
-            EpisodeError::Control { source: ControlError::Policy(_), .. } => Exit::Policy,
+            EpisodeError::Control { source, .. } if source.is_of_server() => Exit::Policy,
             _ => Exit::Input,
         };
         let message = match (error, error.place()) {

@@ -65,7 +65,7 @@ pub struct PolicyServer {
 impl PolicyServer {
     /// A failure of this server; `what` continues "the policy server URL …".
     pub(super) fn error(&self, what: &str) -> PolicyError {
-        PolicyError::Transport(format!("the policy server {} {what}", self.url))
+        PolicyError::Server { url: self.url.clone(), problem: what.to_owned() }
     }
 
     fn check_cancel(&self) -> Result<(), PolicyError> {
@@ -127,11 +127,8 @@ impl PolicyConnection {
                 Err(ConnectError::Retry(reason)) => reason,
             };
             if Instant::now() + pause > deadline {
-                return Err(PolicyError::Transport(format!(
-                    "no policy server at {}: {reason}; tried for {} s: start it, or raise --policy-timeout",
-                    server.url,
-                    server.timeout.as_secs_f64()
-                )));
+                let (url, seconds) = (server.url.clone(), server.timeout.as_secs_f64().to_string());
+                return Err(PolicyError::Unreachable { url, reason, seconds });
             }
             sleep(pause, server)?;
             pause = (2 * pause).min(MAX_PAUSE);
@@ -164,11 +161,7 @@ impl PolicyConnection {
                     return unpack(&bytes).map_err(|error| server.error(&format!("sent {error}")));
                 }
                 Message::Text(text) => {
-                    return Err(PolicyError::Transport(format!(
-                        "the policy server {} reported an error:\n{}",
-                        server.url,
-                        end_of(&text)
-                    )));
+                    return Err(server.error(&format!("reported an error:\n{}", end_of(&text))));
                 }
                 Message::Close(_) => return Err(server.socket_error(&Error::ConnectionClosed)),
                 Message::Ping(_) | Message::Pong(_) | Message::Frame(_) => {}
@@ -232,8 +225,8 @@ fn connect(
             Err(ConnectError::Retry("HTTP status 503".to_owned()))
         }
         Err(TransportError::Socket(error)) => {
-            let message = format!("{} is not a websocket server: {error}", server.url);
-            Err(ConnectError::Final(PolicyError::Transport(message)))
+            let (url, reason) = (server.url.clone(), error.to_string());
+            Err(ConnectError::Final(PolicyError::NotWebsocket { url, reason }))
         }
     }
 }
@@ -254,9 +247,7 @@ fn connect_tcp(url: &str, deadline: Instant) -> io::Result<TcpStream> {
 }
 
 fn request(server: &PolicyServer) -> Result<ClientRequestBuilder, PolicyError> {
-    let wrong = |what: &str| {
-        PolicyError::Address(format!("--policy {}: {what}; expected ws://HOST:PORT", server.url))
-    };
+    let wrong = |problem: &str| PolicyError::Address { url: server.url.clone(), problem: problem.to_owned() };
     let uri: Uri = server.url.parse().map_err(|_| wrong("not an address"))?;
     match uri.scheme_str() {
         Some("ws") => {}

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use crate::{
-    policy::{Action, Observation, SensorStreams},
+    policy::{Action, Observation, PolicyError, SensorStreams},
     robot::rotation,
-    rollout::{ControlError, Controller, Simulation},
+    rollout::{Controller, Simulation},
     script::{
         api::{
             expert::{Coroutine, FingerAccess},
@@ -59,7 +59,7 @@ impl Controller for ExpertController {
         self.coroutine.gave_up.as_deref()
     }
 
-    fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
+    fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, PolicyError> {
         let touch = observation.touch.as_ref().and_then(|touch| touch.frames.last());
         self.coroutine.set_readings(touch.cloned());
         let input = ExpertInput::new(sim, observation.time_s, &mut self.monitor);

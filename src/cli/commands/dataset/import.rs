@@ -29,8 +29,8 @@ use crate::{
     },
     evaluation::{episode_id::EpisodeIndex, record::Origin},
     parallel,
-    policy::{ChunkedPolicy, ToolCommand, builtin::RecordedPolicy},
-    rollout::target_asset,
+    policy::{ToolCommand, builtin::RecordedPolicy},
+    rollout::{ChunkedPolicy, target_asset},
     scene::{Body, InitialState},
     text::counted,
 };
