@@ -63,8 +63,8 @@ fn main() {
     let cases = [
         ("no streams", SensorStreams::default()),
         ("cameras", SensorStreams { cameras: cameras.clone(), ..SensorStreams::default() }),
-        ("touch", SensorStreams { touch: true, ..SensorStreams::default() }),
-        ("all streams", SensorStreams { cameras, touch: true, force: true }),
+        ("touch", SensorStreams { tactile: true, ..SensorStreams::default() }),
+        ("all streams", SensorStreams { cameras, tactile: true, force: true }),
     ];
     println!("{:<12} {:>10} {:>12} {:>12}", "case", "simulated", "CPU s / s", "× real time");
     for (name, streams) in cases {

@@ -40,7 +40,7 @@ pub fn run<T: Send, E: Send>(
         let result = work(job);
         (result, cancelled())
     };
-    drain(&queue, threads, &cancelled, timed, |job, (result, late)| {
+    run_queue(&queue, threads, &cancelled, timed, |job, (result, late)| {
         if let Err(error) = result.and_then(|value| sink(job, value)) {
             queue.close();
             failures.push(((late, job), error));
@@ -66,7 +66,7 @@ pub fn run_in_order<T: Send, E: Send>(
     let queue = JobQueue::new(jobs, threads.max(1));
     let (mut waiting, mut next) = (BTreeMap::new(), 0);
     let mut outcome = Ok(());
-    drain(&queue, threads, &cancelled, work, |job, result| {
+    run_queue(&queue, threads, &cancelled, work, |job, result| {
         waiting.insert(job, result);
         while outcome.is_ok()
             && let Some(result) = waiting.remove(&next)
@@ -83,7 +83,7 @@ pub fn run_in_order<T: Send, E: Send>(
 }
 
 /// Runs the jobs of `queue` and passes their results to `take`, on the calling thread.
-fn drain<T: Send>(
+fn run_queue<T: Send>(
     queue: &JobQueue,
     threads: usize,
     cancelled: &(impl Fn() -> bool + Sync),

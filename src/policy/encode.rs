@@ -45,12 +45,12 @@ pub fn content(observation: &Observation, source: &InputSource) -> Option<Observ
             let numbers: Vec<f32> = parts.iter().flat_map(|part| state(observation, *part)).collect();
             NpyArray::from_f32(vec![numbers.len()], numbers)
         }
-        InputSource::TactileImage { layout } => image_array(observation.touch.as_ref()?.mosaic(*layout)),
+        InputSource::TactileImage { layout } => image_array(observation.tactile.as_ref()?.mosaic(*layout)),
         InputSource::Tactile { finger } => {
-            image_array(observation.touch.as_ref()?.now()?[finger.index()].image.clone())
+            image_array(observation.tactile.as_ref()?.now()?[finger.index()].image.clone())
         }
         InputSource::MarkerMotion => {
-            let rows = observation.touch.as_ref()?.marker_motion();
+            let rows = observation.tactile.as_ref()?.marker_motion();
             NpyArray::from_f32(vec![rows.len(), 2 * MARKER_COUNT, 2], rows.into_iter().flatten().flatten())
         }
         InputSource::Force => {

@@ -18,7 +18,7 @@ pub struct SensorStreams {
     /// Names of the scene's cameras whose images are requested.
     pub cameras: Vec<String>,
     /// True to request images and markers of the tactile sensors.
-    pub touch: bool,
+    pub tactile: bool,
     /// True to request the true forces at the pads. No real sensor measures them, so
     /// results are marked `force_observed`.
     pub force: bool,
@@ -47,7 +47,7 @@ pub struct Observation {
     /// Images of the requested cameras, in the order of [`SensorStreams::cameras`].
     pub cameras: Vec<CameraImage>,
     /// Tactile images and markers of the last control steps, if requested.
-    pub touch: Option<TactileHistory>,
+    pub tactile: Option<TactileHistory>,
     /// True forces at the left and right pad, if requested.
     pub forces: Option<[PadForce; 2]>,
     /// Forces on the left and the right gel in the last 1 to 8 control steps, oldest first, if requested: (x, y, z)

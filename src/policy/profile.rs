@@ -221,7 +221,7 @@ impl Profile {
             input(both("state"), InputSource::State { parts: finger }),
             input(vec!["prompt".to_owned()], InputSource::Prompt),
         ];
-        let touch = [
+        let tactile = [
             input(both("tactile_image"), InputSource::TactileImage { layout: MosaicLayout::Rows }),
             input(both("tactile_marker_motion"), InputSource::MarkerMotion),
         ];
@@ -230,11 +230,11 @@ impl Profile {
         let actions = match name {
             "vision" => absolute(GripperValues { binary: true, ..closure }),
             "visuo_tactile" => {
-                inputs.extend(touch);
+                inputs.extend(tactile);
                 absolute(closure)
             }
             "softvtbench" => {
-                inputs.extend(touch);
+                inputs.extend(tactile);
                 inputs.push(input(both("tactile_gripper_force"), InputSource::Force));
                 inputs[3].keys.push("observation/prompt".to_owned());
                 // Commanded position of each finger, m.
@@ -269,7 +269,7 @@ impl Profile {
                 InputSource::TactileImage { .. }
                 | InputSource::Tactile { .. }
                 | InputSource::MarkerMotion => {
-                    streams.touch = true;
+                    streams.tactile = true;
                 }
                 InputSource::Force => streams.force = true,
                 InputSource::Camera { .. } | InputSource::State { .. } | InputSource::Prompt => {}
@@ -295,8 +295,8 @@ mod tests {
     fn streams_are_those_of_the_inputs() {
         let streams = |name| Profile::named(name).unwrap().streams();
         assert_eq!(streams("vision").cameras, CAMERAS);
-        assert!(!streams("vision").touch && !streams("visuo_tactile").force);
-        assert!(streams("visuo_tactile").touch && streams("softvtbench").force);
+        assert!(!streams("vision").tactile && !streams("visuo_tactile").force);
+        assert!(streams("visuo_tactile").tactile && streams("softvtbench").force);
     }
 
     #[test]

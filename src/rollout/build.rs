@@ -2,11 +2,20 @@
 
 use std::sync::Arc;
 
-use super::{articulated, asset_cache::AssetCache, build_error::BuildError, object::ObjectInstance};
+use super::{
+    asset_cache::{AssetCache, MIN_PART_WALL},
+    build_error::BuildError,
+    simulation::{ArticulatedPart, ObjectInstance},
+};
 use crate::{
-    geometry::Pose,
-    physics::{BodyId, World, contact::ContactSurface, rigid::RigidState},
-    scene::{Body, Object, Scene},
+    geometry::{Pose, Vec3},
+    physics::{
+        ArticulationId, BodyId, LinkId, World,
+        contact::ContactSurface,
+        joints::{JointKind, JointTree, Link},
+        rigid::RigidState,
+    },
+    scene::{Body, JointMotion, Object, Part, Scene},
     text::format_number,
 };
 
@@ -28,19 +37,17 @@ fn check_scale(object: &Object, cache: &AssetCache) -> Result<(), BuildError> {
     Err(BuildError::Material { asset: object.asset.name.clone(), what })
 }
 
-fn check_thickness(object: &Object, cache: &AssetCache) -> Result<(), BuildError> {
-    match cache.wall(&object.asset.shape).filter(|wall| *wall < MIN_WALL) {
-        None => Ok(()),
-        Some(wall) => Err(BuildError::Material {
-            asset: object.asset.name.clone(),
-            what: format!(
-                "it is about {} mm thick, or its walls are, expected at least {} mm: other bodies may pass \
-                 through thinner ones",
-                format_number((1e4 * wall).round() / 10.0),
-                format_number(1e3 * MIN_WALL)
-            ),
-        }),
-    }
+/// The error about walls that are too thin for a minimum (m); `description` states how thick they are.
+fn thin_walls(object: &Object, description: &str, min: f64) -> BuildError {
+    let min = format_number(1e3 * min);
+    let what =
+        format!("{description}, expected at least {min} mm: other bodies may pass through thinner ones");
+    BuildError::Material { asset: object.asset.name.clone(), what }
+}
+
+/// A thickness in mm, to a tenth.
+fn tenths_of_mm(metres: f64) -> String {
+    format_number((1e4 * metres).round() / 10.0)
 }
 
 /// Tolerated initial overlap, m. Contact forces resolve it while the objects settle.
@@ -55,7 +62,7 @@ pub(super) fn add_all(
     let mut instances: Vec<ObjectInstance> = Vec::new();
     for object in &scene.objects {
         if instances.iter().any(|known| known.name == object.name) {
-            return Err(BuildError::TwoNames(object.name.clone()).of(object));
+            return Err(BuildError::DuplicateName(object.name.clone()).of(object));
         }
         add(world, object, cache, &mut instances).map_err(|error| error.of(object))?;
     }
@@ -126,16 +133,20 @@ fn add(
 ) -> Result<(), BuildError> {
     let asset = &object.asset;
     check_scale(object, cache)?;
-    if matches!(asset.body, Body::Rigid { .. }) {
-        check_thickness(object, cache)?;
+    if matches!(asset.body, Body::Rigid { .. })
+        && let Some(wall) = cache.wall(&asset.shape).filter(|wall| *wall < MIN_WALL)
+    {
+        let description = format!("it is about {} mm thick, or its walls are", tenths_of_mm(wall));
+        return Err(thin_walls(object, &description, MIN_WALL));
     }
     let collider = |world: &World, parent: BodyId, pose_in_parent| {
         cache.collider(world, &object.name, parent, pose_in_parent, &asset.shape, asset.friction)
     };
-    let mut parts = Vec::new();
+    let (mut parts, mut fem_model) = (Vec::new(), None);
     let (body, colliders) = match &asset.body {
         Body::Soft(material) => {
             let model = cache.model(asset, material)?;
+            fem_model = Some(model.clone());
             let surface: Arc<dyn ContactSurface> = Arc::new(asset.shape.clone());
             let id = world.add_soft(&object.name, model, Some(surface), &object.pose_w, asset.friction);
             (id.into(), Vec::new())
@@ -149,7 +160,7 @@ fn add(
             (body, vec![world.add_collider(collider)])
         }
         Body::Articulated(asset_parts) => {
-            let (articulation, added) = articulated::add(world, object, asset_parts, instances.len(), cache)?;
+            let (articulation, added) = add_articulated(world, object, asset_parts, instances.len(), cache)?;
             parts = added;
             let base = collider(world, BodyId::World, object.pose_w).as_base_of(articulation);
             (BodyId::World, vec![world.add_collider(base)])
@@ -166,9 +177,76 @@ fn add(
         body,
         start_w: object.pose_w,
         colliders,
+        model: fem_model,
         bounds: cache.bounds(&asset.shape),
         part: None,
     });
     instances.extend(parts);
     Ok(())
+}
+
+/// Adds the parts of an articulated object to the world. `base` is the index of the whole object.
+fn add_articulated(
+    world: &mut World,
+    object: &Object,
+    parts: &[Part],
+    base: usize,
+    cache: &AssetCache,
+) -> Result<(ArticulationId, Vec<ObjectInstance>), BuildError> {
+    for part in parts {
+        if let Some(wall) = cache.wall(&part.asset.shape) {
+            let mm = tenths_of_mm(wall);
+            let description = format!("part {}: its walls are about {mm} mm thick", part.name);
+            return Err(thin_walls(object, &description, MIN_PART_WALL));
+        }
+    }
+    let links = parts.iter().map(|part| link(part, parts, cache)).collect();
+    let tree = JointTree { links, base_w: object.pose_w };
+    tree.validate().map_err(|source| BuildError::Joints { object: object.name.clone(), source })?;
+    let drives = vec![None; parts.len()];
+    let articulation = world.add_articulation(&object.name, tree, &object.joints, drives, true);
+    let instances = parts.iter().enumerate().map(|(index, part)| {
+        let name = format!("{}.{}", object.name, part.name);
+        let link = LinkId { articulation, index };
+        let pose_in_link = Pose::from(-part.joint.origin_o);
+        let (shape, friction) = (&part.asset.shape, part.asset.friction);
+        let collider = cache.collider(world, &name, link.into(), pose_in_link, shape, friction);
+        ObjectInstance {
+            name,
+            asset: part.asset.clone(),
+            body: link.into(),
+            start_w: world.link_pose(link) * pose_in_link,
+            colliders: vec![world.add_collider(collider)],
+            model: None,
+            bounds: cache.bounds(&part.asset.shape),
+            part: Some(ArticulatedPart { object: base, name: part.name.clone(), joint: part.joint.clone() }),
+        }
+    });
+    Ok((articulation, instances.collect()))
+}
+
+/// Link of a part. Its frame is that of the object, translated to the origin of the joint.
+fn link(part: &Part, parts: &[Part], cache: &AssetCache) -> Link {
+    let m = cache.mass(&part.asset.shape, part.density);
+    let joint = &part.joint;
+    let axis = nalgebra::Unit::new_normalize(joint.axis_o);
+    let parent_origin = part.parent.map_or(Vec3::zeros(), |parent| parts[parent].joint.origin_o);
+    Link {
+        name: part.name.clone(),
+        parent: part.parent,
+        placement: Pose::from(joint.origin_o - parent_origin),
+        kind: match joint.motion {
+            JointMotion::Slide => JointKind::Prismatic(axis),
+            JointMotion::Turn => JointKind::Revolute(axis),
+        },
+        mass: m.mass,
+        com: m.com - joint.origin_o,
+        inertia: (m.inertia + m.inertia.transpose()) * 0.5,
+        lower: joint.lower,
+        upper: joint.upper,
+        velocity_limit: f64::INFINITY,
+        effort_limit: f64::INFINITY,
+        friction: joint.friction,
+        damping: joint.damping,
+    }
 }

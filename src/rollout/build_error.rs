@@ -87,7 +87,7 @@ pub enum BuildError {
     },
     /// Two objects have the same name.
     #[error("the scene has two objects named {0}; names must be unique")]
-    TwoNames(String),
+    DuplicateName(String),
 }
 
 fn placed(at: &str) -> String {

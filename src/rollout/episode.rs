@@ -1,5 +1,7 @@
 //! One episode: settle, then observe, act, step and judge until it ends.
 
+use std::sync::Arc;
+
 use image::RgbImage;
 
 use super::{
@@ -8,23 +10,21 @@ use super::{
     cancel,
     controller::Controller,
     evidence::{EvidenceCollector, lowest},
-    object::ObjectInstance,
     observation_history::ObservationHistory,
     sensor_assets::{SensingError, SensorAssets},
-    sensor_check::check_sensors,
-    sensors::{SensorSuite, StateRecording},
-    settle::SettleError,
-    simulation::{Simulation, state_hash},
-    spec::EpisodeSpec,
+    sensors::{SensorSuite, StateRecording, check_sensors},
+    simulation::{ObjectInstance, SettleError, Simulation, state_hash},
     trace::StepTrace,
 };
 use crate::{
-    benchmark::{GoalKind, steps_per_control},
+    benchmark::{GoalKind, Task, settings::Settings, steps_per_control},
     evaluation::{
         deformation::{Deformation, ReferenceShape},
+        episode_id::EpisodeId,
         goal::GoalRegion,
         judge::{Judge, JudgeConfig},
-        record::{EpisodeRecord, Outcome, RolloutStats, Verdict},
+        record::{EpisodeHeader, EpisodeRecord, Outcome, RolloutStats, Verdict},
+        safety::DeformationLimit,
     },
     geometry::{Aabb, Pose, Vec3},
     physics::{
@@ -37,7 +37,75 @@ use crate::{
         ik::{LINEARISATION_RANGE, PoseDifference},
         rotation,
     },
+    scene::{Asset, Body, Scene},
 };
+
+/// Specification of an episode: task, scene and parameters. The controller
+/// is passed to [`Episode::run`](super::Episode::run).
+#[derive(Clone, Debug)]
+pub struct EpisodeSpec {
+    /// First columns of its record.
+    pub header: EpisodeHeader,
+    /// The task.
+    pub task: Task,
+    /// The scene, before settling.
+    pub scene: Arc<Scene>,
+    /// Deformation limit of the target; `None` if it was never calibrated.
+    pub limit: Option<DeformationLimit>,
+    /// Parameters of physics, robot, judge and sensors.
+    pub settings: Settings,
+    /// True to keep all states, from which images can be rendered after the episode.
+    pub record_states: bool,
+    /// True to keep a trace.
+    pub record_trace: bool,
+    /// True if traces hold the node positions of soft bodies.
+    pub trace_nodes: bool,
+}
+
+impl EpisodeSpec {
+    /// An episode of `task` in `scene`, without a limit, recording or trace. `nominal` is the scene before any shift;
+    /// the header names the asset that is the target there.
+    pub fn new(
+        id: EpisodeId,
+        policy: &str,
+        task: &Task,
+        nominal: &Scene,
+        scene: Scene,
+        settings: &Settings,
+    ) -> Self {
+        let target = target_asset(nominal, task);
+        let header = EpisodeHeader {
+            id,
+            prompt: task.prompt.clone(),
+            layout: task.layout.clone(),
+            policy: policy.to_owned(),
+            privileged: false,
+            soft: target.is_some_and(|asset| matches!(asset.body, Body::Soft(_))),
+            asset: target.map_or(String::new(), |asset| asset.name.clone()),
+            origin: None,
+        };
+        Self {
+            header,
+            task: task.clone(),
+            scene: Arc::new(scene),
+            limit: None,
+            settings: settings.clone(),
+            record_states: false,
+            record_trace: false,
+            trace_nodes: false,
+        }
+    }
+
+    fn sense_error(&self, source: SensingError) -> EpisodeError {
+        EpisodeError::Sense { task: self.task.id, episode: self.header.id.episode, source }
+    }
+}
+
+/// Asset of a task's target in a scene.
+pub fn target_asset<'a>(scene: &'a Scene, task: &Task) -> Option<&'a Arc<Asset>> {
+    let name = &task.goal.object;
+    scene.objects.iter().find(|object| object.name == *name).map(|object| &object.asset)
+}
 
 /// A finished episode.
 #[derive(Debug)]
@@ -117,12 +185,6 @@ pub enum EpisodeError {
     },
 }
 
-impl EpisodeSpec {
-    fn sense_error(&self, source: SensingError) -> EpisodeError {
-        EpisodeError::Sense { task: self.task.id, episode: self.header.id.episode, source }
-    }
-}
-
 impl EpisodeError {
     /// `file:line` of the error, if it is known and the message does not contain it.
     pub fn place(&self) -> Option<&str> {
@@ -189,9 +251,10 @@ impl Episode {
         cache: &AssetCache,
         sensor_assets: &SensorAssets,
     ) -> Result<Self, EpisodeError> {
-        check_sensors(&spec.scene, &spec.tactile, sensor_assets)
+        check_sensors(&spec.scene, &spec.settings.tactile, sensor_assets)
             .map_err(|source| spec.sense_error(source))?;
-        let mut sim = Simulation::new(spec.scene.clone(), &spec.params, &spec.robot, cache)?;
+        let mut sim =
+            Simulation::new(spec.scene.clone(), &spec.settings.physics, &spec.settings.robot, cache)?;
         let find = |role, name: &str| {
             sim.objects.iter().position(|o| o.name == name).ok_or_else(|| EpisodeError::NoObject {
                 task: spec.task.id,
@@ -216,7 +279,7 @@ impl Episode {
             axis_angle_b: rotation::axis_angle(&tool.rotation),
             closure: 0.0,
         };
-        let sensors = SensorSuite::new(&sim, &spec.tactile, sensor_assets);
+        let sensors = SensorSuite::new(&sim, &spec.settings.tactile, sensor_assets);
         let recorded = spec.record_states.then(RecordedStates::default);
         Ok(Self {
             spec,
@@ -332,7 +395,7 @@ impl Episode {
             closure: self.sim.robot.closure(),
             prompt: self.spec.task.prompt.clone(),
             cameras: Vec::new(),
-            touch: None,
+            tactile: None,
             forces: None,
             force_history: Vec::new(),
         };
@@ -379,7 +442,7 @@ impl Episode {
     }
 
     fn time(&self) -> f64 {
-        self.physics_steps as f64 * self.spec.params.dt
+        self.physics_steps as f64 * self.spec.settings.physics.dt
     }
 
     fn control_step(&mut self, action: &Action) -> Result<(), StepFailure> {
@@ -388,7 +451,7 @@ impl Episode {
         self.sim.robot.command(&mut self.sim.world, &pose_b, action.closure);
         self.steps += 1;
         let mut worst: Option<Deformation> = None;
-        for _ in 0..steps_per_control(self.spec.params.dt) {
+        for _ in 0..steps_per_control(self.spec.settings.physics.dt) {
             self.physics_steps += 1;
             self.sim.step()?;
             let stats = self.sim.world.stats();
@@ -517,12 +580,12 @@ fn settled_judge(
     goal: usize,
 ) -> Judge {
     Judge::new(JudgeConfig {
-        criteria: spec.criteria.clone(),
+        criteria: spec.settings.criteria.clone(),
         workspace: spec.scene.workspace,
         goal: goal_region(spec.task.goal.kind, &sim.objects[goal]),
         hold_s: spec.task.goal.hold_s,
-        dt_s: spec.params.dt,
-        steps_per_control: steps_per_control(spec.params.dt),
+        dt_s: spec.settings.physics.dt,
+        steps_per_control: steps_per_control(spec.settings.physics.dt),
         target_weight_n: weight(sim, target),
         is_target_soft: matches!(sim.objects[target].body, BodyId::Soft(_)),
         limit: spec.limit,

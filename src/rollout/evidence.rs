@@ -1,6 +1,6 @@
 //! The true state in the form in which the judge evaluates it.
 
-use super::{object::ObjectInstance, simulation::Simulation};
+use super::simulation::{ObjectInstance, Simulation};
 use crate::{
     evaluation::{
         deformation::{Deformation, ReferenceShape},

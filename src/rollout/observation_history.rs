@@ -52,8 +52,8 @@ impl ObservationHistory {
         self.camera_inside += u32::from(inside);
         let forces = streams.force.then(|| SensorSuite::pad_forces(frame));
         let force_history = if streams.force { self.forces() } else { Vec::new() };
-        let touch = if streams.touch { Some(self.touch(sensors)?) } else { None };
-        Ok(Observation { cameras, touch, forces, force_history, ..proprioceptive })
+        let tactile = if streams.tactile { Some(self.tactile(sensors)?) } else { None };
+        Ok(Observation { cameras, tactile, forces, force_history, ..proprioceptive })
     }
 
     /// Forces on the left and right pad in the last states, N.
@@ -66,7 +66,7 @@ impl ObservationHistory {
     }
 
     /// Tactile frames of the last states; each is computed once.
-    fn touch(&mut self, sensors: &mut SensorSuite) -> Result<TactileHistory, SensingError> {
+    fn tactile(&mut self, sensors: &mut SensorSuite) -> Result<TactileHistory, SensingError> {
         let mut frames = Vec::with_capacity(HISTORY_LENGTH);
         for HistoryEntry { frame, tactile } in &mut self.entries {
             let both = match tactile.take() {

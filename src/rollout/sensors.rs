@@ -1,50 +1,38 @@
-//! Sensors of a simulation: images, tactile readings, forces and proprioception. Each is a pure function of a
+//! Sensors of a simulation and their checks before an episode: images, tactile readings, forces and proprioception. Each is a pure function of a
 //! [`WorldSnapshot`] (a state of the world), so that it can be computed on demand, also after the episode.
 
 use std::sync::Arc;
 
 use super::{
-    object::ObjectInstance,
     sensor_assets::{SensingError, SensorAssets},
-    simulation::Simulation,
+    simulation::{ObjectInstance, Simulation},
 };
 use crate::{
     benchmark::CONTROL_DT,
     geometry::{Pose, Vec3},
     physics::{
         ArticulationId, BodyId, ColliderId, ContactPartner,
-        fem::FemModel,
         world::{ContactPatch, WorldSnapshot},
     },
-    policy::{PadForce, TactileFrame},
+    policy::{PadForce, SensorStreams, TactileFrame},
     robot::{
         RobotSpec, Side,
         ik::DiffIk,
         pads,
         panda::{self, ARM_DOFS},
     },
-    scene::{Asset, Body, Camera, Scene},
+    scene::{Body, Camera, CameraMount, Scene},
     sensing::{
-        camera::{self, CameraError, FrameView, RenderObject, RenderScene, RenderedImage},
+        camera::{
+            CameraError, FrameView, RenderObject, RenderScene, RenderedImage, Renderer, check_cameras,
+            check_light,
+        },
         tactile::{
-            GelScratch, PadWrench, SkinMesh, SubstrateCompliance, TactileContact, TactileReading,
-            TactileSkin, TactileSpec, Taxels, patch_friction,
+            GelScratch, OpticsModel, PadWrench, SkinMesh, SubstrateCompliance, TactileContact,
+            TactileReading, TactileSkin, TactileSpec, Taxels, patch_friction,
         },
     },
 };
-
-/// An object of the scene with the data that sensors need.
-#[derive(Clone, Debug)]
-struct SensedObject {
-    name: String,
-    asset: Arc<Asset>,
-    body: BodyId,
-    start_w: Pose,
-    /// Object frame in the frame of the link; identity for other bodies.
-    offset: Pose,
-    colliders: Vec<ColliderId>,
-    model: Option<Arc<FemModel>>,
-}
 
 /// The sensors of one simulation: the scene's cameras, two tactile sensors, and the true forces on the pads.
 ///
@@ -55,10 +43,10 @@ pub struct SensorSuite {
     spec: TactileSpec,
     robot: RobotSpec,
     articulation: ArticulationId,
-    objects: Vec<SensedObject>,
+    objects: Vec<ObjectInstance>,
     assets: SensorAssets,
     render_scene: Option<Arc<RenderScene>>,
-    renderer: camera::Renderer,
+    renderer: Renderer,
     gel_scratch: GelScratch,
 }
 
@@ -73,11 +61,21 @@ impl Clone for SensorSuite {
             objects: self.objects.clone(),
             assets: self.assets.clone(),
             render_scene: self.render_scene.clone(),
-            renderer: camera::Renderer::default(),
+            renderer: Renderer::default(),
             gel_scratch: GelScratch::default(),
         }
     }
 }
+
+/// Suffixes of a camera's name for its colour, depth and segmentation images.
+pub const CAMERA_IMAGE_SUFFIXES: [&str; 3] = ["", "_depth", "_segmentation"];
+/// Suffixes of a finger's name for its tactile image, and for those with the markers as dots and as arrows.
+pub const TACTILE_IMAGE_SUFFIXES: [&str; 3] = ["", "_markers", "_arrows"];
+/// Names of the left and right finger's tactile images.
+pub const TACTILE_IMAGES: [&str; 2] = ["tactile_left", "tactile_right"];
+
+/// Edge of the images that are rendered as a check only, px.
+const TRIAL_EDGE: usize = 16;
 
 /// Taxels of the force maps along x and y, 1 mm each.
 const TAXELS: [usize; 2] = [25, 21];
@@ -87,27 +85,15 @@ pub const ROBOT_SEGMENTATION_ID: u16 = 1000;
 impl SensorSuite {
     /// The sensors of a simulation.
     pub fn new(sim: &Simulation, spec: &TactileSpec, assets: &SensorAssets) -> Self {
-        let sensed = |object: &ObjectInstance| SensedObject {
-            name: object.name.clone(),
-            asset: object.asset.clone(),
-            body: object.body,
-            start_w: object.start_w,
-            offset: object.joint_frame_o().inverse(),
-            colliders: object.colliders.clone(),
-            model: match object.body {
-                BodyId::Soft(body) => Some(sim.world.soft(body).state.model.clone()),
-                _ => None,
-            },
-        };
         Self {
             scene: sim.scene.clone(),
             spec: spec.clone(),
             robot: sim.robot.spec.clone(),
             articulation: sim.robot.articulation,
-            objects: sim.objects.iter().map(sensed).collect(),
+            objects: sim.objects.clone(),
             assets: assets.clone(),
             render_scene: None,
-            renderer: camera::Renderer::default(),
+            renderer: Renderer::default(),
             gel_scratch: GelScratch::default(),
         }
     }
@@ -165,20 +151,6 @@ impl SensorSuite {
         RenderScene::new(self.render_objects()?, self.scene.lighting.clone())
     }
 
-    /// The robot without objects.
-    pub(super) fn robot_scene(&self) -> Result<RenderScene, CameraError> {
-        let robot = self.assets.robot()?.objects(self.articulation, self.scene.base_w, ROBOT_SEGMENTATION_ID);
-        RenderScene::new(robot.into_iter().collect(), self.scene.lighting.clone())
-    }
-
-    /// The object that contains a point in the initial poses.
-    pub(super) fn object_around(&self, point_w: &nalgebra::Point3<f64>) -> Option<&str> {
-        let inside = |object: &&SensedObject| {
-            object.asset.shape.distance(&object.start_w.inverse_transform_point(point_w).coords) < 0.0
-        };
-        self.objects.iter().find(inside).map(|object| object.name.as_str())
-    }
-
     /// The parts of a state that images depend on.
     pub fn view<'a>(&self, frame: &'a WorldSnapshot) -> FrameView<'a> {
         let hand_w = frame.links[self.articulation.index()][panda::HAND_LINK] * panda::hand_in_link();
@@ -202,6 +174,55 @@ impl SensorSuite {
                 Err(SensingError::from(inside).set_by(camera))
             }
         }
+    }
+
+    /// Computes the requested streams once in the initial state of an episode, so that errors appear before
+    /// its first control step.
+    ///
+    /// # Errors
+    /// As [`SensorSuite::render_unobstructed`] and [`SensorSuite::tactile_readings`].
+    pub fn validate(&mut self, frame: &WorldSnapshot, streams: &SensorStreams) -> Result<(), SensingError> {
+        for name in &streams.cameras {
+            let camera = self.camera(name)?.clone().with_edge(TRIAL_EDGE);
+            self.render_unobstructed(frame, &camera)?;
+        }
+        if streams.tactile {
+            self.tactile_readings(frame)?;
+        }
+        Ok(())
+    }
+
+    /// Checks that no camera of the scene is inside an object in the initial state. It evaluates the shapes of the
+    /// objects, which is a hundred times faster than rendering them; only the robot is rendered.
+    ///
+    /// # Errors
+    /// A camera is inside an object, or the robot cannot be rendered.
+    pub fn check_camera_positions(&mut self, frame: &WorldSnapshot) -> Result<(), SensingError> {
+        let robot = RenderScene::new(self.render_robot()?, self.scene.lighting.clone())?;
+        let view = self.view(frame);
+        for camera in &self.scene.cameras {
+            let mount_w = match (camera.mount, view.hand_w) {
+                (CameraMount::Hand, Some(hand_w)) => hand_w,
+                _ => Pose::identity(),
+            };
+            let eye_w = mount_w * nalgebra::Point3::from(camera.pose.translation.vector);
+            let is_around = |object: &&ObjectInstance| {
+                object.asset.shape.distance(&object.start_w.inverse_transform_point(&eye_w).coords) < 0.0
+            };
+            let object = match self.objects.iter().find(is_around) {
+                Some(object) => Some(object.name.clone()),
+                None => {
+                    let image =
+                        Renderer::default().render(&robot, &view, &camera.clone().with_edge(TRIAL_EDGE));
+                    image.map_err(|error| SensingError::from(error).set_by(camera))?.inside
+                }
+            };
+            if let Some(object) = object {
+                let inside = CameraError::Inside { camera: camera.name.clone(), object };
+                return Err(SensingError::from(inside).set_by(camera));
+            }
+        }
+        Ok(())
     }
 
     /// Readings of the left and right tactile sensor in a state.
@@ -255,7 +276,7 @@ impl SensorSuite {
             frame.links[self.articulation.index()][panda::finger_link(side)] * pads::pad_pose_in_finger(side);
         let mut placed: Vec<(Arc<TactileSkin>, Vec<Vec3>)> = Vec::new();
         let mut substrate = None;
-        for object in self.objects.iter().filter(|object| object.presses(patch)) {
+        for object in self.objects.iter().filter(|object| is_in_contact(object, patch)) {
             let mesh = object.model.as_ref().map(|model| &model.mesh);
             let skin = self.assets.skin(&object.name, &object.asset, mesh)?;
             let mut vertices = Vec::new();
@@ -263,15 +284,14 @@ impl SensorSuite {
             match object.body {
                 BodyId::Soft(body) => skin.place_soft(frame.soft(body), &w_p, &mut vertices),
                 BodyId::Rigid(body) => skin.place_rigid(&(w_p * frame.rigid(body)), &mut vertices),
-                BodyId::Link(link) => {
-                    skin.place_rigid(&(w_p * frame.link(link) * object.offset), &mut vertices)
-                }
+                BodyId::Link(link) => skin
+                    .place_rigid(&(w_p * frame.link(link) * object.joint_frame_o().inverse()), &mut vertices),
                 BodyId::World | BodyId::Kinematic(_) => {
                     skin.place_rigid(&(w_p * object.start_w), &mut vertices)
                 }
             }
             placed.push((skin, vertices));
-            substrate = object.substrate();
+            substrate = substrate_of(object);
         }
         let skins: Vec<SkinMesh> =
             placed.iter().map(|(skin, vertices)| SkinMesh { vertices, triangles: &skin.triangles }).collect();
@@ -304,7 +324,9 @@ impl SensorSuite {
             let state = match object.body {
                 BodyId::Soft(body) => BodyConfiguration::Nodes(frame.soft(body)),
                 BodyId::Rigid(body) => BodyConfiguration::Pose(*frame.rigid(body)),
-                BodyId::Link(link) => BodyConfiguration::Pose(frame.link(link) * object.offset),
+                BodyId::Link(link) => {
+                    BodyConfiguration::Pose(frame.link(link) * object.joint_frame_o().inverse())
+                }
                 BodyId::World | BodyId::Kinematic(_) => return None,
             };
             Some((object.name.as_str(), state))
@@ -313,11 +335,11 @@ impl SensorSuite {
 
     /// Render objects of the scene and the robot.
     fn render_objects(&self) -> Result<Vec<RenderObject>, CameraError> {
-        let render_object = |(index, object): (usize, &SensedObject)| {
+        let render_object = |(index, object): (usize, &ObjectInstance)| {
             let voxels = object.model.as_ref().map(|model| &model.mesh);
             let (body, pose_in_body) = match object.body {
                 BodyId::Soft(_) | BodyId::Rigid(_) => (object.body, Pose::identity()),
-                BodyId::Link(_) => (object.body, object.offset),
+                BodyId::Link(_) => (object.body, object.joint_frame_o().inverse()),
                 BodyId::World | BodyId::Kinematic(_) => (BodyId::World, object.start_w),
             };
             Ok(RenderObject {
@@ -331,30 +353,75 @@ impl SensorSuite {
         };
         let mut objects: Vec<RenderObject> =
             self.objects.iter().enumerate().map(render_object).collect::<Result<_, _>>()?;
-        objects.extend(self.assets.robot()?.objects(
-            self.articulation,
-            self.scene.base_w,
-            ROBOT_SEGMENTATION_ID,
-        ));
+        objects.extend(self.render_robot()?);
         Ok(objects)
+    }
+
+    fn render_robot(&self) -> Result<Vec<RenderObject>, CameraError> {
+        let base_w = self.scene.base_w;
+        Ok(self
+            .assets
+            .robot()?
+            .objects(self.articulation, base_w, ROBOT_SEGMENTATION_ID)
+            .into_iter()
+            .collect())
     }
 }
 
-impl SensedObject {
-    /// True if the object has a contact point in a patch.
-    fn presses(&self, patch: &ContactPatch) -> bool {
-        patch.points.iter().any(|point| match point.partner {
-            ContactPartner::Soft(id) => self.body == BodyId::Soft(id),
-            ContactPartner::Collider(id) => self.colliders.contains(&id),
-        })
+/// Checks the sensors of a scene without a simulation: parameters, names and sizes of the cameras, the light, and the
+/// table files of the tactile sensor.
+///
+/// # Errors
+/// The first invalid value, with the place in the script that set it.
+pub fn check_sensors(
+    scene: &Scene,
+    spec: &TactileSpec,
+    sensor_assets: &SensorAssets,
+) -> Result<(), SensingError> {
+    check_cameras(&scene.cameras)
+        .map_err(|(index, error)| SensingError::from(error).set_by(&scene.cameras[index]))?;
+    check_names(&scene.cameras)?;
+    check_light(&scene.lighting)?;
+    // Other optics models read no files.
+    if let OpticsModel::Taxim { .. } = spec.optics {
+        sensor_assets.sensor(spec)?;
     }
+    Ok(())
+}
 
-    /// Compliance of a soft body to a gel in ridges too fine for its elements.
-    fn substrate(&self) -> Option<SubstrateCompliance> {
-        let (Body::Soft(material), Some(model)) = (&self.asset.body, &self.model) else { return None };
-        let modulus = material.youngs_pa / (1.0 - material.poisson * material.poisson);
-        Some(SubstrateCompliance { modulus, resolved: 2.0 * model.mesh.edge })
+/// Checks that no two images of cameras and fingers have the same name; their files would overwrite each other.
+fn check_names(cameras: &[Camera]) -> Result<(), SensingError> {
+    let image_names = |owner: &str, kinds: [&str; 3]| kinds.map(|kind| format!("{owner}{kind}"));
+    let mut taken: Vec<(String, String)> = Vec::new();
+    for finger in TACTILE_IMAGES {
+        taken.extend(image_names(finger, TACTILE_IMAGE_SUFFIXES).map(|name| (name, "a finger".to_owned())));
     }
+    for camera in cameras {
+        for name in image_names(&camera.name, CAMERA_IMAGE_SUFFIXES) {
+            if let Some((_, owner)) = taken.iter().find(|(known, _)| *known == name) {
+                let (camera_name, owner) = (camera.name.clone(), owner.clone());
+                return Err(SensingError::Name { camera: camera_name, image: name, owner }.set_by(camera));
+            }
+        }
+        let owner = format!("camera {}", camera.name);
+        taken.extend(image_names(&camera.name, CAMERA_IMAGE_SUFFIXES).map(|name| (name, owner.clone())));
+    }
+    Ok(())
+}
+
+/// True if an object has a contact point in a patch.
+fn is_in_contact(object: &ObjectInstance, patch: &ContactPatch) -> bool {
+    patch.points.iter().any(|point| match point.partner {
+        ContactPartner::Soft(id) => object.body == BodyId::Soft(id),
+        ContactPartner::Collider(id) => object.colliders.contains(&id),
+    })
+}
+
+/// Compliance of a soft body to a gel in ridges too fine for its elements.
+fn substrate_of(object: &ObjectInstance) -> Option<SubstrateCompliance> {
+    let (Body::Soft(material), Some(model)) = (&object.asset.body, &object.model) else { return None };
+    let modulus = material.youngs_pa / (1.0 - material.poisson * material.poisson);
+    Some(SubstrateCompliance { modulus, resolved: 2.0 * model.mesh.edge })
 }
 
 /// Measurements of the robot's own sensors.
@@ -386,4 +453,35 @@ pub struct StateRecording {
     pub frames: Vec<WorldSnapshot>,
     /// The target's deformation in each frame, % of the settled diagonal; `None` for a rigid target.
     pub d_pct: Vec<Option<f64>>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn named(names: &[&str]) -> Vec<Camera> {
+        let camera = |name: &&str| Camera { name: (*name).to_owned(), ..Camera::wrist() };
+        names.iter().map(camera).collect()
+    }
+
+    #[test]
+    fn names_of_images_are_unique() {
+        assert!(check_names(&named(&["third_person", "wrist", "wrist_2", "depth"])).is_ok());
+        for (names, words) in [
+            (
+                ["wrist", "wrist_depth"],
+                "camera wrist_depth: name: \"wrist_depth\" is an image of camera wrist",
+            ),
+            (
+                ["wrist_depth", "wrist"],
+                "camera wrist: name: \"wrist_depth\" is an image of camera wrist_depth",
+            ),
+            (["wrist", "tactile_left"], "\"tactile_left\" is an image of a finger"),
+            (["wrist", "tactile_right_arrows"], "\"tactile_right_arrows\" is an image of a finger"),
+            (["wrist", "wrist"], "camera wrist: name: \"wrist\" is an image of camera wrist"),
+        ] {
+            let error = check_names(&named(&names)).expect_err(words);
+            assert!(error.to_string().contains(words), "{error}");
+        }
+    }
 }

@@ -1,26 +1,133 @@
-//! A simulated scene: the physics world, the robot and the objects by name.
+//! A simulated scene: the physics world, the robot and the objects by name, and its settling before an episode begins.
 
 use std::sync::Arc;
 
 use sha2::{Digest, Sha256};
 
-use super::{
-    asset_cache::AssetCache,
-    build,
-    build_error::BuildError,
-    object::{ArticulatedPart, ObjectInstance},
-    robot_instance::RobotInstance,
-};
+use super::{asset_cache::AssetCache, build, build_error::BuildError, cancel, robot_instance::RobotInstance};
 use crate::{
     benchmark::CONTROL_DT,
     geometry::{Aabb, Pose, Vec3},
     physics::{
-        BodyId, ContactPartner, PhysicsParams, World, joints,
+        BodyId, ColliderId, ContactPartner, PhysicsParams, World,
+        fem::FemModel,
+        joints,
         world::{ContactSummary, StepFailure},
     },
     robot::RobotSpec,
-    scene::{Body, Scene},
+    scene::{Asset, Body, Joint, Scene},
 };
+
+/// Speed below which an object counts as settled, m/s.
+const SETTLED_SPEED: f64 = 1e-3;
+/// Time for which all objects must be settled, s.
+const SETTLED_TIME: f64 = 0.5;
+/// Time limit of settling, s.
+const SETTLE_TIMEOUT: f64 = 3.0;
+/// Drop below all fixed objects from which on an object counts as fallen out of the world, m.
+const MIN_FALL: f64 = 0.5;
+
+/// A part of an articulated object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ArticulatedPart {
+    /// Index of the whole object in [`Simulation::objects`](super::Simulation::objects).
+    pub object: usize,
+    /// Name within the object.
+    pub name: String,
+    /// Joint between the part and its parent.
+    pub joint: Joint,
+}
+
+/// An object of the scene, or a part of one, in the world of a simulation.
+#[derive(Clone, Debug)]
+pub struct ObjectInstance {
+    /// Name in the scene; for a part `object.part`.
+    pub name: String,
+    /// Shape, material and appearance.
+    pub asset: Arc<Asset>,
+    /// Body in the world.
+    pub body: BodyId,
+    /// Initial pose of the object frame, world.
+    pub start_w: Pose,
+    /// Colliders of the body; none for a soft body.
+    pub colliders: Vec<ColliderId>,
+    /// Finite-element model of a soft body.
+    pub model: Option<Arc<FemModel>>,
+    /// Bounds of the shape at rest, object frame. For a part: that of the whole object with all joints at 0.
+    pub bounds: Aabb,
+    /// The part, if this is not a whole object.
+    pub part: Option<ArticulatedPart>,
+}
+
+impl ObjectInstance {
+    /// Reference point for placing other objects on or in this one, object frame, m: the lowest point on the vertical
+    /// centre line. It is the origin for whole objects.
+    pub fn foot_o(&self) -> Vec3 {
+        match self.part {
+            Some(_) => Vec3::new(self.bounds.centre().x, self.bounds.centre().y, self.bounds.min.z),
+            None => Vec3::zeros(),
+        }
+    }
+
+    /// Frame of a part's joint in the object frame. It coincides with the frame of the link.
+    pub(super) fn joint_frame_o(&self) -> Pose {
+        self.part.as_ref().map_or(Pose::identity(), |part| Pose::from(part.joint.origin_o))
+    }
+}
+
+/// The scene did not come to rest.
+#[derive(Debug, thiserror::Error)]
+pub enum SettleError {
+    /// An object still moves.
+    #[error(
+        "object {object} still moves at {speed_mm:.1} mm/s after {SETTLE_TIMEOUT} s of settling; put it nearer to what \
+         it rests on, or make it lie stably"
+    )]
+    Moving {
+        /// The fastest object.
+        object: String,
+        /// Its speed, mm/s.
+        speed_mm: f64,
+        /// `file:line` where the object was placed; empty if no script placed it.
+        placed_at: String,
+    },
+    /// An object fell below all fixed objects.
+    #[error(
+        "object {object} fell out of the world: there was nothing below it, and after {SETTLE_TIMEOUT} s of settling it is \
+         {fallen:.1} m lower; place it above a support"
+    )]
+    Fell {
+        /// The object.
+        object: String,
+        /// Distance that it has fallen, m.
+        fallen: f64,
+        /// `file:line` where the object was placed; empty if no script placed it.
+        placed_at: String,
+    },
+    /// The run was cancelled.
+    #[error("interrupted")]
+    Interrupted,
+    /// A physics step failed.
+    #[error("settling failed: {failure}")]
+    Failed {
+        /// The failure.
+        failure: StepFailure,
+        /// `file:line` where the failing object was placed; empty if unknown.
+        placed_at: String,
+    },
+}
+
+impl SettleError {
+    /// `file:line` where a script placed the object in question.
+    pub fn place(&self) -> Option<&str> {
+        match self {
+            Self::Moving { placed_at, .. }
+            | Self::Fell { placed_at, .. }
+            | Self::Failed { placed_at, .. } => Some(placed_at.as_str()).filter(|place| !place.is_empty()),
+            Self::Interrupted => None,
+        }
+    }
+}
 
 /// A scene with its robot, simulated at the physics rate (60 Hz by default).
 ///
@@ -65,6 +172,55 @@ impl Simulation {
     pub fn step(&mut self) -> Result<(), StepFailure> {
         self.robot.advance(&mut self.world);
         self.world.step()
+    }
+
+    /// Steps until all objects have been at rest for 0.5 s, while the arm holds its pose.
+    ///
+    /// # Errors
+    /// An object still moves after 3 s or has fallen out of the world, a physics step fails, or the run is cancelled.
+    pub fn settle(&mut self) -> Result<(), SettleError> {
+        let dt = self.world.params.dt;
+        let mut settled_time = 0.0;
+        let mut elapsed = 0.0;
+        while settled_time < SETTLED_TIME {
+            if cancel::requested() {
+                return Err(SettleError::Interrupted);
+            }
+            self.step().map_err(|failure| SettleError::Failed {
+                placed_at: failure.body().map_or(String::new(), |body| placed_at(&self.scene, body)),
+                failure,
+            })?;
+            elapsed += dt;
+            let fastest = self.fastest();
+            let moving = fastest.filter(|(_, speed)| *speed >= SETTLED_SPEED);
+            settled_time = if moving.is_none() { settled_time + dt } else { 0.0 };
+            if let Some((object, speed)) = moving.filter(|_| elapsed > SETTLE_TIMEOUT) {
+                return Err(self.unsettled(object, speed));
+            }
+        }
+        Ok(())
+    }
+
+    /// The error about an object that moves at `speed` (m/s) after the time limit.
+    fn unsettled(&self, object: &ObjectInstance, speed: f64) -> SettleError {
+        let (name, placed_at) = (object.name.clone(), placed_at(&self.scene, &object.name));
+        let height = self.centre(object).z;
+        let fixed =
+            self.objects.iter().filter(|other| other.body == BodyId::World && !other.colliders.is_empty());
+        let floor = fixed
+            .map(|other| Aabb::transformed(&other.bounds, &other.start_w).min.z)
+            .fold(f64::INFINITY, f64::min);
+        let fallen = object.start_w.translation.z - height;
+        match fallen > MIN_FALL && height < floor {
+            true => SettleError::Fell { object: name, fallen, placed_at },
+            false => SettleError::Moving { object: name, speed_mm: 1e3 * speed, placed_at },
+        }
+    }
+
+    /// The fastest object and its speed, m/s; the first one if several are equally fast.
+    fn fastest(&self) -> Option<(&ObjectInstance, f64)> {
+        let speeds = self.objects.iter().map(|object| (object, self.speed(object)));
+        speeds.reduce(|best, next| if next.1 > best.1 { next } else { best })
     }
 
     /// Speed of the fastest point of an object, m/s. For rigid bodies and parts: that of the centre plus 0.1 m
@@ -166,6 +322,13 @@ impl Simulation {
         }
         Ok(())
     }
+}
+
+/// `file:line` where the object of a name, or the object of the part of that name, was placed.
+fn placed_at(scene: &Scene, name: &str) -> String {
+    let whole = name.split('.').next().unwrap_or(name);
+    let object = scene.objects.iter().find(|object| object.name == whole);
+    object.map_or(String::new(), |object| object.placed_at.clone())
 }
 
 /// Hash of all positions, 16 hexadecimal digits. Equal hashes mean bitwise equal states.

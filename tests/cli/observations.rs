@@ -75,21 +75,21 @@ fn shown(streams: SensorStreams) -> Result<Vec<Observation>, String> {
 #[test]
 fn policies_get_the_requested_streams_only() {
     let all =
-        SensorStreams { cameras: vec!["wrist".into(), "third_person".into()], touch: true, force: true };
+        SensorStreams { cameras: vec!["wrist".into(), "third_person".into()], tactile: true, force: true };
     let seen = shown(all.clone()).expect("shown");
     assert_eq!(seen.len(), 10);
     for (step, observation) in seen.iter().enumerate() {
         let names: Vec<&str> = observation.cameras.iter().map(|c| c.name.as_str()).collect();
         assert_eq!(names, ["wrist", "third_person"]);
         assert!(observation.cameras.iter().all(|c| c.image.dimensions() == (224, 224)));
-        let touch = observation.touch.as_ref().expect("asked for");
-        assert_eq!(touch.frames.len(), (step + 1).min(8));
-        assert_eq!(touch.now().expect("a frame")[0].image.dimensions(), (320, 240));
-        assert_eq!(touch.mosaic(MosaicLayout::Rows).dimensions(), (224, 224));
-        assert_eq!(touch.marker_motion().len(), 9);
+        let tactile = observation.tactile.as_ref().expect("asked for");
+        assert_eq!(tactile.frames.len(), (step + 1).min(8));
+        assert_eq!(tactile.now().expect("a frame")[0].image.dimensions(), (320, 240));
+        assert_eq!(tactile.mosaic(MosaicLayout::Rows).dimensions(), (224, 224));
+        assert_eq!(tactile.marker_motion().len(), 9);
         assert_eq!(
-            touch.marker_motion()[0][99..],
-            touch.marker_motion()[0][..99],
+            tactile.marker_motion()[0][99..],
+            tactile.marker_motion()[0][..99],
             "both fingers start alike"
         );
         let forces = observation.forces.as_ref().expect("asked for");
@@ -99,7 +99,7 @@ fn policies_get_the_requested_streams_only() {
     }
     assert_eq!(seen, shown(all).expect("shown"), "the same bytes again");
     let blind = shown(SensorStreams::default()).expect("shown");
-    assert!(blind.iter().all(|o| o.cameras.is_empty() && o.touch.is_none() && o.forces.is_none()));
+    assert!(blind.iter().all(|o| o.cameras.is_empty() && o.tactile.is_none() && o.forces.is_none()));
     assert_eq!(blind[9].joints, seen[9].joints, "looking changes nothing");
 }
 
@@ -225,7 +225,7 @@ fn an_observation_has_no_field_for_hidden_state() {
         closure: _,
         prompt: _,
         cameras: _,
-        touch: _,
+        tactile: _,
         forces,
         force_history,
     } = observation;

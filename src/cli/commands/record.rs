@@ -17,8 +17,8 @@ use crate::{
     },
     evaluation::episode_id::EpisodeIndex,
     parallel,
-    policy::{Action, Observation, SensorStreams},
-    rollout::{ControlError, Controller, Simulation},
+    policy::{Action, Observation, PolicyError, SensorStreams},
+    rollout::{Controller, Simulation},
     script::ExpertController,
 };
 
@@ -125,7 +125,7 @@ impl Controller for GripRecorder {
         self.expert.gave_up()
     }
 
-    fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
+    fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, PolicyError> {
         let action = self.expert.act(sim, observation)?;
         self.is_holding.push(self.expert.is_gripping);
         Ok(action)

@@ -329,10 +329,8 @@ mod tests {
     use crate::{
         benchmark::Plan,
         cli::run::config::{RunConfig, ScriptArgs},
-        policy::{
-            Action, ActionChunk, ChunkedPolicy, Observation, Policy, PolicyError, SensorStreams, TaskBrief,
-        },
-        rollout::Controller,
+        policy::{Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief},
+        rollout::{ChunkedPolicy, Controller},
         script::EpisodeSetup,
     };
 

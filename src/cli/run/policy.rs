@@ -14,12 +14,12 @@ use crate::{
     cli::{error::CliError, run::recorded_runs::RecordedRuns},
     dataset::{layout::is_dataset, lerobot::GripperCoding},
     policy::{
-        ChunkedPolicy, Policy, SensorStreams, TaskBrief, builtin,
+        Policy, SensorStreams, TaskBrief, builtin,
         builtin::RecordedPolicy,
         profile::{PROFILES, Profile},
         remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},
     },
-    rollout::{Controller, cancel},
+    rollout::{ChunkedPolicy, Controller, cancel},
     script::{EpisodeSetup, ExpertController, GripMode, PolicyFile, load_profile},
     text,
 };

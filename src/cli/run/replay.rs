@@ -31,8 +31,8 @@ use crate::{
         record::{EpisodeRecord, Outcome},
     },
     parallel,
-    policy::{Action, ChunkedPolicy, builtin::RecordedPolicy},
-    rollout::cancel,
+    policy::{Action, builtin::RecordedPolicy},
+    rollout::{ChunkedPolicy, cancel},
     script::LoadedScript,
     text::counted,
 };

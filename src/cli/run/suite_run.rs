@@ -29,8 +29,8 @@ use crate::{
     files,
     policy::{PolicyError, SensorStreams, TaskBrief, remote::PolicyConnections},
     rollout::{
-        AssetCache, BuildError, Cancellable, ControlError, Episode, EpisodeError, EpisodeSpec,
-        FinishedEpisode, SensorAssets, SensorSuite, Simulation, cancel, check_sensors, target_asset,
+        AssetCache, BuildError, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SensorAssets,
+        SensorSuite, Simulation, cancel, check_sensors, target_asset,
     },
     scene::{Asset, Body, Scene},
     script::{self, EpisodeSetup, LoadedScript},
@@ -380,10 +380,10 @@ impl<'a> SuiteRun<'a> {
         let sense = |source| EpisodeError::Sense { task: task.id, episode, source };
         check_sensors(&scene, &settings.tactile, &self.sensor_assets).map_err(sense)?;
         if self.renders_episodes {
-            streams.touch = true;
+            streams.tactile = true;
             streams.cameras.extend(scene.cameras.iter().map(|camera| camera.name.clone()));
         }
-        if streams.cameras.is_empty() && !streams.touch {
+        if streams.cameras.is_empty() && !streams.tactile {
             return Ok(());
         }
         let sim = Simulation::new(scene, &settings.physics, &settings.robot, &self.assets)?;
@@ -411,7 +411,7 @@ pub(crate) fn find_replay_source(
 /// Converts the error of a policy server.
 fn policy_failure(error: PolicyError) -> CliError {
     match error {
-        PolicyError::Interrupted | PolicyError::Address(_) => CliError::input(error),
+        PolicyError::Interrupted | PolicyError::Address { .. } => CliError::input(error),
         other => CliError::new(Exit::Policy, other),
     }
 }

@@ -1,14 +1,15 @@
 //! Policies that run in another process and answer over a websocket.
 
 mod connection;
-mod openpi;
 mod vla_eval;
 
 use std::sync::{Arc, Mutex};
 
 use self::connection::PolicyConnection;
 pub use self::connection::{PolicyServer, Protocol};
-use super::{ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief};
+use super::{
+    ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief, decode, encode, msgpack::kind,
+};
 use crate::parallel::lock;
 
 /// Pool of connections to one policy server: one per running episode, reused by later episodes.
@@ -45,7 +46,7 @@ impl PolicyConnections {
         }
         let mut connection = PolicyConnection::open(&self.server)?;
         match self.server.protocol {
-            Protocol::Openpi => openpi::greet(&mut connection)?,
+            Protocol::Openpi => greet_openpi(&mut connection)?,
             Protocol::VlaEval => vla_eval::greet(&mut connection)?,
         }
         Ok(connection)
@@ -98,7 +99,7 @@ impl Policy for RemotePolicy {
         }
         let mut connection = current.map_or_else(|| self.connections.take(), Ok)?;
         let chunk = match protocol {
-            Protocol::Openpi => openpi::infer(&mut connection, observation),
+            Protocol::Openpi => infer_openpi(&mut connection, observation),
             Protocol::VlaEval => vla_eval::infer(&mut connection, observation),
         };
         // After a failure a response may still be on its way: the connection is not used again.
@@ -118,4 +119,24 @@ impl Policy for RemotePolicy {
             self.connections.put(connection);
         }
     }
+}
+
+/// openpi's protocol: receives the metadata that the server sends first.
+fn greet_openpi(connection: &mut PolicyConnection) -> Result<(), PolicyError> {
+    let metadata = connection.receive()?;
+    if metadata.as_map().is_none() {
+        let what = format!("sent {} first; openpi servers send a map of metadata", kind(&metadata));
+        return Err(connection.server.error(&what));
+    }
+    Ok(())
+}
+
+/// openpi's protocol: sends an observation and receives a chunk of actions.
+fn infer_openpi(
+    connection: &mut PolicyConnection,
+    observation: &Observation,
+) -> Result<ActionChunk, PolicyError> {
+    connection.send(&encode::openpi(observation, &connection.server.profile))?;
+    let response = connection.receive()?;
+    decode::chunk(&response, &connection.server.profile.actions)
 }

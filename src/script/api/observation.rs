@@ -29,7 +29,7 @@ impl LuaObservation {
     }
 
     fn touch(&self, lua: &Lua, key: &str) -> mlua::Result<&TactileHistory> {
-        self.0.touch.as_ref().ok_or_else(|| not_observed(lua, key, "touch = true"))
+        self.0.tactile.as_ref().ok_or_else(|| not_observed(lua, key, "touch = true"))
     }
 }
 

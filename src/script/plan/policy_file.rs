@@ -64,7 +64,7 @@ impl PolicyFile {
         let PolicySpec { name, observes, replan, .. } = policy.spec;
         let streams = SensorStreams {
             cameras: observes.cameras.unwrap_or_default(),
-            touch: observes.touch,
+            tactile: observes.touch,
             force: observes.force,
         };
         let observes_at = observes_at.map_or_else(|| sources.main.clone(), |line| line.to_string());

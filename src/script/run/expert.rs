@@ -48,7 +48,7 @@ impl ExpertController {
 
 impl Controller for ExpertController {
     fn streams(&self) -> SensorStreams {
-        SensorStreams { touch: self.mode == GripMode::TactileServo, ..SensorStreams::default() }
+        SensorStreams { tactile: self.mode == GripMode::TactileServo, ..SensorStreams::default() }
     }
 
     fn wants_observation(&self) -> bool {
@@ -60,13 +60,13 @@ impl Controller for ExpertController {
     }
 
     fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, PolicyError> {
-        let touch = observation.touch.as_ref().and_then(|touch| touch.frames.last());
-        self.coroutine.set_readings(touch.cloned());
+        let tactile = observation.tactile.as_ref().and_then(|tactile| tactile.frames.last());
+        self.coroutine.set_readings(tactile.cloned());
         let input = ExpertInput::new(sim, observation.time_s, &mut self.monitor);
         let vm = &self.instance.vm;
         let _deadline = vm.call_deadline();
         let command = self.coroutine.next_command(&vm.lua, input, &mut self.monitor);
-        let command = command.map_err(|error| ControlError::Script(vm.explain(&error).to_string()))?;
+        let command = command.map_err(|error| PolicyError::Script(vm.explain(&error).to_string()))?;
         Ok(command.map(|command| {
             self.is_gripping = command.gripping;
             let closure = match self.mode {

@@ -45,7 +45,7 @@ fn observation() -> Observation {
         closure: 0.25,
         prompt: "take it".into(),
         cameras: vec![CameraImage { name: "wrist".into(), image }],
-        touch: Some(TactileHistory { frames: vec![before, now] }),
+        tactile: Some(TactileHistory { frames: vec![before, now] }),
         forces: None,
         force_history: Vec::new(),
     }
