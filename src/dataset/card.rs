@@ -1,6 +1,6 @@
 //! [`Card`]: contents of a dataset, as `dataset.json` and as a human-readable `README.md`.
 
-use std::{collections::BTreeMap, fmt::Write, path::Path};
+use std::{collections::BTreeMap, path::Path};
 
 use serde::{Deserialize, Serialize};
 
@@ -94,9 +94,21 @@ impl Card {
 
     /// The text of `README.md`.
     fn page(&self) -> String {
-        let bytes = |of: fn(&TaskCount) -> u64| megabytes(self.tasks.iter().map(of).sum());
+        let megabytes =
+            |of: fn(&TaskCount) -> u64| format!("{:.1}", self.tasks.iter().map(of).sum::<u64>() as f64 / 1e6);
         let yes = |is: bool| if is { "yes" } else { "no" };
         let hours = self.samples() as f64 / f64::from(self.fps) / 3600.0;
+        let task = |task: &TaskCount| {
+            let TaskCount { suite, task: id, prompt, asset, demos, samples, attempts, rejected, .. } = task;
+            let reasons = rejection_counts(rejected);
+            format!(
+                "| {suite} | {id} | {prompt} | {asset} | {demos} | {samples} | {attempts} | {reasons} |\n"
+            )
+        };
+        let source = |source: &Imported| {
+            let Imported { file, sha256, layout, demos, commands } = source;
+            format!("| {file} | {sha256} | {layout} | {demos} | {commands} |\n")
+        };
         let mut page = format!(
             "---\nlicense: apache-2.0\ntask_categories:\n- robotics\n---\n\
              # Demonstrations of soft-object manipulation\n\n\
@@ -107,39 +119,19 @@ impl Card {
             self.demos(),
             self.samples(),
             self.fps,
-            bytes(|task| task.hdf5_bytes),
-            bytes(|task| task.video_bytes),
+            megabytes(|task| task.hdf5_bytes),
+            megabytes(|task| task.video_bytes),
             yes(self.has_images),
             yes(self.has_privileged),
         );
         page += "| suite | task | prompt | target | demos | steps | attempts | rejected |\n|---|---|---|---|---|---|---|---|\n";
-        for task in &self.tasks {
-            let TaskCount { suite, task: id, prompt, asset, demos, samples, attempts, .. } = task;
-            let reasons = rejection_counts(&task.rejected);
-            // Writing into a string cannot fail.
-            let _ = writeln!(
-                page,
-                "| {suite} | {id} | {prompt} | {asset} | {demos} | {samples} | {attempts} | {reasons} |"
-            );
+        page.extend(self.tasks.iter().map(task));
+        if !self.imported.is_empty() {
+            page += "\nImported: demonstrations from other simulators, re-executed with softvt's physics and sensors and judged again.\n\n";
+            page += "| file | SHA-256 | layout | demos | executed |\n|---|---|---|---|---|\n";
+            page.extend(self.imported.iter().map(source));
         }
-        page += &self.sources();
-        page += PAGE;
-        page
-    }
-
-    /// Table of the source files of imported demonstrations.
-    fn sources(&self) -> String {
-        if self.imported.is_empty() {
-            return String::new();
-        }
-        let mut text = "\nImported: demonstrations from other simulators, re-executed with softvt's physics and sensors and judged again.\n\n\
-                        | file | SHA-256 | layout | demos | executed |\n|---|---|---|---|---|\n"
-            .to_owned();
-        for Imported { file, sha256, layout, demos, commands } in &self.imported {
-            // Writing into a string cannot fail.
-            let _ = writeln!(text, "| {file} | {sha256} | {layout} | {demos} | {commands} |");
-        }
-        text
+        page + PAGE
     }
 }
 
@@ -147,10 +139,6 @@ impl Card {
 pub fn rejection_counts(rejected: &BTreeMap<String, usize>) -> String {
     let counts: Vec<String> = rejected.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
     if counts.is_empty() { "none".to_owned() } else { counts.join(", ") }
-}
-
-fn megabytes(bytes: u64) -> String {
-    format!("{:.1}", bytes as f64 / 1e6)
 }
 
 const PAGE: &str = "

@@ -3,7 +3,6 @@
 use crate::{
     benchmark::CONTROL_DT,
     evaluation::record::EpisodeRecord,
-    geometry::Pose,
     policy::Action,
     robot::{
         gripper::{self, MAX_WIDTH},
@@ -13,7 +12,10 @@ use crate::{
     sensing::tactile::{MARKER_COUNT, Markers},
 };
 
-use super::{privileged, stream::DataStream};
+use super::{
+    privileged,
+    stream::{DataStream, pose_row},
+};
 
 /// A rollout as training data: the state before each control step, and the action commanded in it.
 ///
@@ -95,12 +97,6 @@ impl Demonstration {
                 .unit("s", ""),
         ]
     }
-}
-
-/// Position, and quaternion w x y z with w ≥ 0.
-pub(super) fn pose_row(pose: &Pose) -> [f64; 7] {
-    let (p, q) = (pose.translation.vector, rotation::canonical(&pose.rotation));
-    [p.x, p.y, p.z, q.w, q.i, q.j, q.k]
 }
 
 /// Proprioception before each action.

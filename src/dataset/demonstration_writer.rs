@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use image::RgbImage;
+use image::{RgbImage, imageops};
 use rust_hdf5::H5Dataset;
 use serde_json::Value;
 
@@ -10,10 +10,14 @@ use super::{
     DatasetError, Demonstration,
     hdf5::{ChunkedSteps, Hdf5Writer, write_file},
     layout::IMAGE_STREAMS,
-    step_images::{StepImages, StepRenderer},
     video::VideoWriter,
 };
-use crate::{benchmark::CONTROL_HZ, rollout::StateRecording};
+use crate::{
+    benchmark::CONTROL_HZ,
+    rollout::StateRecording,
+    scene::Camera,
+    sensing::tactile::{MarkerStyle, Markers},
+};
 
 /// Output files of a demonstration. Each appears complete or not at all.
 pub struct DemonstrationWriter<'a> {
@@ -92,29 +96,20 @@ struct ImageStreamWriter {
 }
 
 impl ImageStreamWriter {
-    fn push(&mut self, path: &Path, image: &RgbImage) -> Result<(), DatasetError> {
+    fn push(&mut self, path: &Path, image: &RgbImage, is_last: bool) -> Result<(), DatasetError> {
         self.bytes.extend_from_slice(image);
-        if self.bytes.len() < self.images_per_chunk * image.len() {
-            return Ok(());
+        let chunk_bytes = self.images_per_chunk * image.len();
+        // HDF5 chunks are always full: the last one is padded with its last image.
+        while is_last && self.bytes.len() < chunk_bytes {
+            self.bytes.extend_from_slice(image);
         }
-        self.write_chunk(path)
-    }
-
-    fn write_chunk(&mut self, path: &Path) -> Result<(), DatasetError> {
-        let written = self.dataset.write_chunk(self.chunks_written, &self.bytes);
-        written.map_err(DatasetError::hdf5(path, self.name))?;
-        self.chunks_written += 1;
-        self.bytes.clear();
+        if self.bytes.len() == chunk_bytes {
+            let written = self.dataset.write_chunk(self.chunks_written, &self.bytes);
+            written.map_err(DatasetError::hdf5(path, self.name))?;
+            self.chunks_written += 1;
+            self.bytes.clear();
+        }
         Ok(())
-    }
-
-    /// Writes the last chunk, padded with its last image: HDF5 chunks are always full.
-    fn finish(&mut self, path: &Path, image_bytes: usize) -> Result<(), DatasetError> {
-        while !self.bytes.is_empty() && self.bytes.len() < self.images_per_chunk * image_bytes {
-            let last = self.bytes.len() - image_bytes;
-            self.bytes.extend_from_within(last..);
-        }
-        if self.bytes.is_empty() { Ok(()) } else { self.write_chunk(path) }
     }
 }
 
@@ -152,10 +147,7 @@ impl ImageOutputs {
 
     fn push(&mut self, path: &Path, images: &StepImages, is_last: bool) -> Result<(), DatasetError> {
         for (stream, image) in self.streams.iter_mut().zip(&images.images) {
-            stream.push(path, image)?;
-            if is_last {
-                stream.finish(path, image.len())?;
-            }
+            stream.push(path, image, is_last)?;
         }
         for (video, frame) in self.videos.iter_mut().zip(&images.video_frames) {
             video.push(frame)?;
@@ -168,5 +160,83 @@ impl ImageOutputs {
             video.save(path)?;
         }
         Ok(self.preview.save(&files.preview)?)
+    }
+}
+
+/// Cameras that every scene has.
+const CAMERAS: [&str; 2] = ["third_person", "wrist"];
+/// Cell of a preview, pixels: the size of a tactile image.
+const CELL_WIDTH: u32 = 320;
+const CELL_HEIGHT: u32 = 240;
+
+/// Camera and tactile images of one state.
+#[derive(Clone, Debug)]
+struct StepImages {
+    /// In the order of [`IMAGE_STREAMS`].
+    images: [RgbImage; 4],
+    /// In the order of [`super::layout::VIDEO_STREAMS`].
+    video_frames: [RgbImage; 4],
+    /// Marker positions of the left and right finger, px.
+    markers: [Markers; 2],
+}
+
+/// Renders the states of a recording.
+struct StepRenderer<'a> {
+    recording: &'a mut StateRecording,
+    cameras: Vec<Camera>,
+}
+
+impl<'a> StepRenderer<'a> {
+    /// # Errors
+    /// The scene lacks the camera `third_person` or `wrist`.
+    fn new(recording: &'a mut StateRecording) -> Result<Self, DatasetError> {
+        let camera = |name: &str| Ok(recording.sensors.camera(name)?.clone());
+        let cameras = CAMERAS.into_iter().map(camera).collect::<Result<_, DatasetError>>()?;
+        Ok(Self { recording, cameras })
+    }
+
+    /// Renders state `step`; `None` after the last state.
+    ///
+    /// # Errors
+    /// A sensor cannot be simulated.
+    fn render(&mut self, step: usize) -> Result<Option<StepImages>, DatasetError> {
+        let Some(frame) = self.recording.frames.get(step) else { return Ok(None) };
+        let sensors = &mut self.recording.sensors;
+        let third_person = sensors.render(frame, &self.cameras[0])?.into_rgb_image();
+        let wrist = sensors.render(frame, &self.cameras[1])?.into_rgb_image();
+        let tactile = sensors.tactile_readings(frame)?;
+        let [left, right] = [0, 1].map(|side: usize| tactile[side].image.clone());
+        let [left_markers, right_markers] =
+            [0, 1].map(|side: usize| tactile[side].with_markers(MarkerStyle::Dots));
+        Ok(Some(StepImages {
+            video_frames: [third_person.clone(), wrist.clone(), left_markers, right_markers],
+            images: [third_person, wrist, left, right],
+            markers: [0, 1].map(|side: usize| tactile[side].markers),
+        }))
+    }
+}
+
+impl StepImages {
+    /// The four video frames in one image, scaled down where they are larger than a cell.
+    fn preview(&self) -> RgbImage {
+        let mut preview = RgbImage::new(2 * CELL_WIDTH, 2 * CELL_HEIGHT);
+        for (at, image) in (0_u32..).zip(&self.video_frames) {
+            let (w, h) = image.dimensions();
+            let resized;
+            let cell = if w <= CELL_WIDTH && h <= CELL_HEIGHT {
+                image
+            } else {
+                let scale =
+                    f64::min(f64::from(CELL_WIDTH) / f64::from(w), f64::from(CELL_HEIGHT) / f64::from(h));
+                let edge = |pixels: u32| ((scale * f64::from(pixels)) as u32).max(1);
+                resized = imageops::resize(image, edge(w), edge(h), imageops::FilterType::Triangle);
+                &resized
+            };
+            let (w, h) = cell.dimensions();
+            let x = at % 2 * CELL_WIDTH + (CELL_WIDTH - w) / 2;
+            let y = at / 2 * CELL_HEIGHT + (CELL_HEIGHT - h) / 2;
+            imageops::replace(&mut preview, cell, i64::from(x), i64::from(y));
+        }
+        preview
     }
 }

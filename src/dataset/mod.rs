@@ -2,9 +2,8 @@
 //! and to other formats.
 //!
 //! A [`Demonstration`] holds the numbers of a rollout in memory, one [`DataStream`] per quantity. Images are rendered
-//! one step at a time ([`step_images::StepRenderer`]) and go straight into files
-//! ([`demonstration_writer::DemonstrationWriter`]), since the images of a whole rollout would not fit into memory.
-//! `docs/data.md` describes every stream.
+//! one step at a time and go straight into files ([`demonstration_writer::DemonstrationWriter`]), since those of a
+//! whole rollout would not fit into memory. `docs/data.md` describes every stream.
 
 pub mod card;
 pub mod check;
@@ -18,7 +17,6 @@ pub mod lerobot;
 pub mod manifest;
 mod privileged;
 pub mod stats;
-pub mod step_images;
 mod stream;
 pub mod video;
 

@@ -7,10 +7,7 @@ use crate::{
     rollout::{BodyConfiguration, FinishedEpisode, ScoreFrame, SensorSuite, StateRecording, StepTrace},
 };
 
-use super::{
-    demonstration::pose_row,
-    stream::{DataStream, StreamValues},
-};
+use super::stream::{DataStream, StreamValues, pose_row};
 
 /// All privileged streams. Row i is the state before action i, as in every stream of a demonstration.
 pub(super) fn streams(finished: &FinishedEpisode, recording: &StateRecording) -> Vec<DataStream> {

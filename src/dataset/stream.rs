@@ -1,5 +1,7 @@
 //! [`DataStream`]: one quantity of a demonstration over time.
 
+use crate::{geometry::Pose, robot::rotation};
+
 /// Values of a [`DataStream`], step by step.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StreamValues {
@@ -60,4 +62,10 @@ impl DataStream {
         let stream = self.attribute("unit", unit);
         if frame.is_empty() { stream } else { stream.attribute("frame", frame) }
     }
+}
+
+/// Position, and quaternion w x y z with w ≥ 0.
+pub(super) fn pose_row(pose: &Pose) -> [f64; 7] {
+    let (p, q) = (pose.translation.vector, rotation::canonical(&pose.rotation));
+    [p.x, p.y, p.z, q.w, q.i, q.j, q.k]
 }

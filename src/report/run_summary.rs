@@ -1,6 +1,6 @@
 //! [`RunSummary`]: a run with its results and a distinct name.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 use super::stored_run::StoredRun;
 use crate::evaluation::{
@@ -26,22 +26,13 @@ pub struct UnsafeEpisode<'a> {
 
 /// Summarises runs, sorted by suite. A folder given twice counts once.
 pub fn summarize_runs(mut runs: Vec<StoredRun>) -> Vec<RunSummary> {
-    let canonical = |run: &StoredRun| run.dir.canonicalize().unwrap_or_else(|_| run.dir.clone());
-    let mut seen = Vec::new();
-    runs.retain(|run| {
-        let path = canonical(run);
-        let is_new = !seen.contains(&path);
-        seen.push(path);
-        is_new
-    });
+    let mut seen = BTreeSet::new();
+    runs.retain(|run| seen.insert(run.dir.canonicalize().unwrap_or_else(|_| run.dir.clone())));
     let mut all: Vec<RunSummary> = runs.into_iter().map(summarize).collect();
     all.sort_by(|a, b| a.summary.suite.cmp(&b.summary.suite));
-    let mut count: BTreeMap<(String, String), usize> = BTreeMap::new();
-    for run in &all {
-        *count.entry((run.summary.suite.clone(), run.method.clone())).or_default() += 1;
-    }
-    for run in &mut all {
-        if count[&(run.summary.suite.clone(), run.method.clone())] > 1 {
+    let names: Vec<String> = all.iter().map(RunSummary::name).collect();
+    for (run, name) in all.iter_mut().zip(&names) {
+        if names.iter().filter(|other| *other == name).count() > 1 {
             run.method += &format!(" · {}", run.run.dir.display());
         }
     }
@@ -147,8 +138,8 @@ pub(super) mod tests {
         let mut heavy = stored("runs/b", "expert", vec![sample()]);
         heavy.manifest["shifts"] = json!([["mass", 2.0]]);
         heavy.manifest["set"] = json!([["robot.gripper.effort", "3"]]);
-        let mut felt = stored("runs/c", "pi", vec![sample()]);
-        felt.manifest["force_observed"] = json!(true);
+        let mut forces = stored("runs/c", "pi", vec![sample()]);
+        forces.manifest["force_observed"] = json!(true);
         let names = |runs: &[&StoredRun]| -> Vec<String> {
             summarize_runs(runs.iter().map(|run| (*run).clone()).collect())
                 .into_iter()
@@ -156,7 +147,7 @@ pub(super) mod tests {
                 .collect()
         };
         assert_eq!(
-            names(&[&plain, &heavy, &felt]),
+            names(&[&plain, &heavy, &forces]),
             [
                 "expert (privileged)",
                 "expert (privileged) · mass=2.0, robot.gripper.effort=3",

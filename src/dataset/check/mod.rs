@@ -148,106 +148,111 @@ fn check_demonstrations(findings: &mut Findings, file: &TaskFile) {
         let (names, steps) = (file.names(demo), file.steps(demo));
         let (Some(names), Some(steps)) = (findings.take(names), findings.take(steps)) else { continue };
         findings.steps += steps;
+        let mut check = DemoCheck { findings, file, demo, steps };
         let mut has_required_shapes = true;
         for (name, row_shape) in REQUIRED_STREAMS {
-            let Some(shape) = findings.take(file.shape(demo, name)) else {
-                has_required_shapes = false;
+            let shape = check.findings.take(file.shape(demo, name));
+            if shape.as_ref().is_some_and(|shape| shape.get(1..) == Some(row_shape)) {
                 continue;
-            };
-            if shape.get(1..) != Some(row_shape) {
-                has_required_shapes = false;
-                let expected: Vec<String> = std::iter::once("steps".to_owned())
-                    .chain(row_shape.iter().map(usize::to_string))
-                    .collect();
-                let what = format!("expected the shape ({}), got {shape:?}", expected.join(", "));
-                findings.add(&file.path, &format!("/data/demo_{demo}/{name}"), what);
+            }
+            has_required_shapes = false;
+            if let Some(shape) = shape {
+                let lengths = row_shape.iter().map(usize::to_string);
+                let expected: Vec<String> = std::iter::once("steps".to_owned()).chain(lengths).collect();
+                check.add(name, format!("expected the shape ({}), got {shape:?}", expected.join(", ")));
             }
         }
-        for name in &names {
-            check_stream(findings, file, demo, steps, name);
-        }
+        names.iter().for_each(|name| check.check_stream(name));
         if has_required_shapes {
-            check_relations(findings, file, demo);
+            check.check_relations();
         }
     }
 }
 
-/// Checks the length of a stream, and that its values are finite.
-fn check_stream(findings: &mut Findings, file: &TaskFile, demo: usize, steps: usize, name: &str) {
-    let key = format!("/data/demo_{demo}/{name}");
-    let Some(stream) = findings.take(file.stream(demo, name)) else { return };
-    let width: usize = stream.row_shape.iter().product();
-    let count = stream.values.len();
-    if count != steps * width {
-        findings.add(&file.path, &key, format!("{} steps, the actions have {steps}", count / width.max(1)));
+/// A demonstration that is being checked.
+struct DemoCheck<'a> {
+    findings: &'a mut Findings,
+    file: &'a TaskFile,
+    demo: usize,
+    steps: usize,
+}
+
+impl DemoCheck<'_> {
+    fn add(&mut self, name: &str, what: impl Into<String>) {
+        self.findings.problems.push(self.file.error(self.demo, name, what).to_string());
     }
-    let not_finite = match &stream.values {
-        StreamValues::F64(values) => values.iter().position(|x| !x.is_finite()),
-        StreamValues::F32(values) => values.iter().position(|x| !x.is_finite()),
-        StreamValues::U8(_) => None,
-    };
-    if let Some(at) = not_finite {
-        findings.add(&file.path, &key, format!("step {}: a number that is not finite", at / width.max(1)));
-    }
-    let is_image = IMAGE_STREAMS.iter().any(|image| name == format!("obs/{image}"));
-    if is_image && !matches!(stream.row_shape[..], [_, _, 3]) {
-        let what =
-            format!("expected the shape (steps, height, width, 3), got {:?} per step", stream.row_shape);
-        findings.add(&file.path, &key, what);
-    }
-    if name.ends_with("/root_pose_w") && width == 7 {
-        match &stream.values {
-            StreamValues::F64(poses) => check_quaternions(findings, file, &key, poses),
-            _ => findings.add(&file.path, &key, "expected float64"),
+
+    /// Checks the length of a stream, and that its values are finite.
+    fn check_stream(&mut self, name: &str) {
+        let Some(stream) = self.findings.take(self.file.stream(self.demo, name)) else { return };
+        let width: usize = stream.row_shape.iter().product();
+        let (count, steps) = (stream.values.len(), self.steps);
+        if count != steps * width {
+            self.add(name, format!("{} steps, the actions have {steps}", count / width.max(1)));
+        }
+        let not_finite = match &stream.values {
+            StreamValues::F64(values) => values.iter().position(|x| !x.is_finite()),
+            StreamValues::F32(values) => values.iter().position(|x| !x.is_finite()),
+            StreamValues::U8(_) => None,
+        };
+        if let Some(at) = not_finite {
+            self.add(name, format!("step {}: a number that is not finite", at / width.max(1)));
+        }
+        let is_image = IMAGE_STREAMS.iter().any(|image| name == format!("obs/{image}"));
+        if is_image && !matches!(stream.row_shape[..], [_, _, 3]) {
+            let got = &stream.row_shape;
+            self.add(name, format!("expected the shape (steps, height, width, 3), got {got:?} per step"));
+        }
+        if name.ends_with("/root_pose_w") && width == 7 {
+            match &stream.values {
+                StreamValues::F64(poses) => self.check_quaternions(name, poses),
+                _ => self.add(name, "expected float64"),
+            }
         }
     }
-}
 
-/// Checks that the quaternions of poses have length 1 and w ≥ 0.
-fn check_quaternions(findings: &mut Findings, file: &TaskFile, key: &str, poses: &[f64]) {
-    let bad = poses.chunks_exact(7).position(|row| {
-        let length = row[3..].iter().map(|x| x * x).sum::<f64>().sqrt();
-        (length - 1.0).abs() > TOLERANCE || row[3] < 0.0
-    });
-    if let Some(step) = bad {
-        let q = &poses[7 * step + 3..7 * step + 7];
-        findings.add(
-            &file.path,
-            key,
-            format!("step {step}: not a unit quaternion w x y z with w >= 0: {q:?}"),
-        );
+    /// Checks that the quaternions of poses have length 1 and w ≥ 0.
+    fn check_quaternions(&mut self, name: &str, poses: &[f64]) {
+        let bad = poses.chunks_exact(7).position(|row| {
+            let length = row[3..].iter().map(|x| x * x).sum::<f64>().sqrt();
+            (length - 1.0).abs() > TOLERANCE || row[3] < 0.0
+        });
+        if let Some(step) = bad {
+            let q = &poses[7 * step + 3..7 * step + 7];
+            self.add(name, format!("step {step}: not a unit quaternion w x y z with w >= 0: {q:?}"));
+        }
     }
-}
 
-/// Checks relations between streams.
-fn check_relations(findings: &mut Findings, file: &TaskFile, demo: usize) {
-    let mut get = |name: &str| findings.take(file.array(demo, name)).map_or(Vec::new(), |array| array.values);
-    let (poses, states, times) = (get("obs/eef_pose"), get("obs/state"), get("timestamps"));
-    let (actions, binary) = (get("actions"), get("actions_binary"));
-    let key = |name: &str| format!("/data/demo_{demo}/{name}");
-    check_quaternions(findings, file, &key("obs/eef_pose"), &poses);
-    let differs = poses.chunks_exact(7).zip(states.chunks_exact(7)).position(|(pose, state)| {
-        let q = Quat::new_unchecked(nalgebra::Quaternion::new(pose[3], pose[4], pose[5], pose[6]));
-        let other = rotation::from_axis_angle(&Vec3::new(state[3], state[4], state[5]));
-        (q.coords - other.coords).norm().min((q.coords + other.coords).norm()) > TOLERANCE
-    });
-    if let Some(step) = differs {
-        let what =
-            format!("step {step}: the quaternion is not the rotation of obs/state: is its order w x y z?");
-        findings.add(&file.path, &key("obs/eef_pose"), what);
-    }
-    let expected = |step: usize| step as f64 * CONTROL_DT;
-    if let Some(step) = times.iter().enumerate().position(|(step, t)| (t - expected(step)).abs() > TOLERANCE)
-    {
-        let what =
-            format!("step {step}: {} s, expected {} at {} Hz", times[step], expected(step), CONTROL_HZ);
-        findings.add(&file.path, &key("timestamps"), what);
-    }
-    let is_binary_of = |(a, b): (&[f64], &[f64])| a[..6] == b[..6] && [0.0, 1.0].contains(&b[6]);
-    let mut both = actions.chunks_exact(7).zip(binary.chunks_exact(7));
-    if let Some(step) = both.position(|pair| !is_binary_of(pair)) {
-        let what = format!("step {step}: not the actions with a gripper of 0 or 1");
-        findings.add(&file.path, &key("actions_binary"), what);
+    /// Checks relations between streams.
+    fn check_relations(&mut self) {
+        let (file, demo) = (self.file, self.demo);
+        let mut get =
+            |name: &str| self.findings.take(file.array(demo, name)).map_or(Vec::new(), |array| array.values);
+        let (poses, states, times) = (get("obs/eef_pose"), get("obs/state"), get("timestamps"));
+        let (actions, binary) = (get("actions"), get("actions_binary"));
+        self.check_quaternions("obs/eef_pose", &poses);
+        let differs = poses.chunks_exact(7).zip(states.chunks_exact(7)).position(|(pose, state)| {
+            let q = Quat::new_unchecked(nalgebra::Quaternion::new(pose[3], pose[4], pose[5], pose[6]));
+            let other = rotation::from_axis_angle(&Vec3::new(state[3], state[4], state[5]));
+            (q.coords - other.coords).norm().min((q.coords + other.coords).norm()) > TOLERANCE
+        });
+        if let Some(step) = differs {
+            let what = format!(
+                "step {step}: the quaternion is not the rotation of obs/state: is its order w x y z?"
+            );
+            self.add("obs/eef_pose", what);
+        }
+        let expected = |step: usize| step as f64 * CONTROL_DT;
+        let is_late = |(step, t): (usize, &f64)| (t - expected(step)).abs() > TOLERANCE;
+        if let Some(step) = times.iter().enumerate().position(is_late) {
+            let (time, expected) = (times[step], expected(step));
+            self.add("timestamps", format!("step {step}: {time} s, expected {expected} at {CONTROL_HZ} Hz"));
+        }
+        let is_binary_of = |(a, b): (&[f64], &[f64])| a[..6] == b[..6] && [0.0, 1.0].contains(&b[6]);
+        let mut both = actions.chunks_exact(7).zip(binary.chunks_exact(7));
+        if let Some(step) = both.position(|pair| !is_binary_of(pair)) {
+            self.add("actions_binary", format!("step {step}: not the actions with a gripper of 0 or 1"));
+        }
     }
 }
 

@@ -31,7 +31,7 @@ fn demonstration(salt: f64) -> Demonstration {
     let zeros = |name: &str, row: &[usize]| {
         DataStream::f64(name, row, vec![0.1 + salt; STEPS * row.iter().product::<usize>()]).unit("m", "")
     };
-    let mut made = Demonstration {
+    let mut demonstration = Demonstration {
         record: sample(),
         actions: (0..STEPS)
             .map(|step| Action { position_b: place(step), axis_angle_b: turn(step), closure: 0.3 })
@@ -53,10 +53,10 @@ fn demonstration(salt: f64) -> Demonstration {
             DataStream::u8("privileged/contact", &[2], vec![1; 2 * STEPS]).attribute("meaning", "touching"),
         ],
     };
-    made.set_markers(
+    demonstration.set_markers(
         &[[Markers { initial: [[1.5; 2]; MARKER_COUNT], current: [[1.5; 2]; MARKER_COUNT] }; 2]; STEPS],
     );
-    made
+    demonstration
 }
 
 fn write(demonstration: &Demonstration, name: &str) -> (tempfile::TempDir, PathBuf) {
@@ -72,9 +72,9 @@ fn write(demonstration: &Demonstration, name: &str) -> (tempfile::TempDir, PathB
 
 /// The problems of a file whose streams `change` has damaged.
 fn problems(change: impl Fn(&mut Vec<DataStream>)) -> String {
-    let mut made = demonstration(0.0);
-    change(&mut made.observed);
-    let (_folder, path) = write(&made, "task.hdf5");
+    let mut demonstration = demonstration(0.0);
+    change(&mut demonstration.observed);
+    let (_folder, path) = write(&demonstration, "task.hdf5");
     let found = file(&path).unwrap().problems;
     assert!(found.iter().all(|line| line.contains("task.hdf5: /data/demo_0/")), "{found:?}");
     found.join("\n")
@@ -88,25 +88,30 @@ fn numbers(stream: &mut DataStream) -> &mut Vec<f64> {
 #[test]
 fn demonstrations_read_from_a_merged_file_are_identical() {
     let both = [demonstration(0.0), demonstration(1e-9)];
-    let parts = both.each_ref().map(|made| write(made, "part.hdf5"));
+    let parts = both.each_ref().map(|demonstration| write(demonstration, "part.hdf5"));
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("hdf5/task.hdf5");
     let environment = json!({ "env_name": "softvt", "env_kwargs": { "seed": 7 } });
     merge_parts(&parts.each_ref().map(|(_, path)| path.clone()), &path, &environment).unwrap();
     let read = TaskFile::open(&path).unwrap();
     assert_eq!((&read.demos[..], read.environment().unwrap()), (&[0, 1][..], environment));
-    for (demo, made) in both.iter().enumerate() {
+    for (demo, demonstration) in both.iter().enumerate() {
         let mut back = read.read(demo).unwrap();
         let order = |streams: &mut Vec<DataStream>| {
             streams.sort_by(|a, b| a.name.cmp(&b.name));
             streams.iter_mut().for_each(|stream| stream.attributes.sort());
         };
-        let mut made = made.clone();
-        for streams in [&mut back.observed, &mut back.privileged, &mut made.observed, &mut made.privileged] {
+        let mut demonstration = demonstration.clone();
+        for streams in [
+            &mut back.observed,
+            &mut back.privileged,
+            &mut demonstration.observed,
+            &mut demonstration.privileged,
+        ] {
             order(streams);
         }
-        assert_eq!(back, made);
-        assert_eq!(read.actions(demo).unwrap(), made.actions);
+        assert_eq!(back, demonstration);
+        assert_eq!(read.actions(demo).unwrap(), demonstration.actions);
     }
     assert!(read.actions(2).unwrap_err().to_string().contains("there is no demo_2; there are 2"));
     let findings = file(&path).unwrap();
@@ -149,11 +154,11 @@ fn a_file_truncated_anywhere_is_reported_by_name() {
     for share in [0.0, 0.001, 0.3, 0.7, 0.99, 0.9999] {
         let cut = folder.path().join("cut.hdf5");
         fs::write(&cut, &whole[..(share * whole.len() as f64) as usize]).unwrap();
-        let said = match file(&cut) {
+        let message = match file(&cut) {
             Ok(findings) => findings.problems.join("\n"),
             Err(error) => error.to_string(),
         };
-        assert!(said.contains("cut.hdf5"), "{share}: {said:?}");
+        assert!(message.contains("cut.hdf5"), "{share}: {message:?}");
     }
     let none = folder.path().join("none.hdf5");
     let missing = TaskFile::open(&none).err().unwrap().to_string();

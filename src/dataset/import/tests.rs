@@ -54,37 +54,37 @@ impl FileBuilder {
     fn libero() -> Self {
         let kwargs =
             json!({ "robots": ["Panda"], "control_freq": 20, "controller_configs": { "type": "OSC_POSE" } });
-        let mut made =
+        let mut file =
             Self::new(json!({ "env_name": "Libero_Floor_Manipulation", "type": 1, "env_kwargs": kwargs }));
-        made.each("actions", |k| share(k).to_vec());
-        made.each("obs/joint_states", |k| joints(k + 1).to_vec());
+        file.each("actions", |k| share(k).to_vec());
+        file.each("obs/joint_states", |k| joints(k + 1).to_vec());
         let site =
             |k: usize| Pose::translation(-0.6, 0.0, 0.0) * tool(k + 1) * Pose::translation(0.0, 0.0, -0.0069);
-        made.each("obs/ee_pos", |k| site(k).translation.vector.as_slice().to_vec());
-        made.each("obs/ee_ori", |k| rotation::axis_angle(&site(k).rotation).as_slice().to_vec());
-        made.each("states", |k| [&[0.05 * k as f64], &joints(k)[..], &[0.04, -0.04], &[0.0; 9]].concat());
-        made
+        file.each("obs/ee_pos", |k| site(k).translation.vector.as_slice().to_vec());
+        file.each("obs/ee_ori", |k| rotation::axis_angle(&site(k).rotation).as_slice().to_vec());
+        file.each("states", |k| [&[0.05 * k as f64], &joints(k)[..], &[0.04, -0.04], &[0.0; 9]].concat());
+        file
     }
 
     /// SoftVTBench, whose tool point is 3.6 mm farther out.
     fn softvtbench() -> Self {
-        let mut made = Self::new(json!({ "env_name": "Isaac", "type": 2 }));
+        let mut file = Self::new(json!({ "env_name": "Isaac", "type": 2 }));
         let seen = |k: usize| tool(k) * Pose::translation(0.0, 0.0, 0.0036);
         let finger = |k: usize| if k < 3 { 0.04 } else { 0.03 };
         let pressed = |k: usize| if k < 4 { 0.0 } else { 2.0 };
-        made.each("actions", |k| {
+        file.each("actions", |k| {
             let (at, turn) = (seen(k).translation.vector, rotation::axis_angle(&seen(k).rotation));
             [at.as_slice(), turn.as_slice(), &[finger(k)], &[0.0, 0.0, pressed(k)], &[0.0, 0.0, pressed(k)]]
                 .concat()
         });
-        made.each("obs/eef_pose", |k| {
+        file.each("obs/eef_pose", |k| {
             let (at, q) = (seen(k).translation.vector, rotation::canonical(&seen(k).rotation));
             vec![at.x, at.y, at.z, q.w, q.i, q.j, q.k]
         });
-        made.each("obs/arm_joint_pos", |k| joints(k).to_vec());
-        made.each("obs/gripper_pos", |k| vec![finger(k); 2]);
-        made.demo.push(("language", "Pick up the  CUP.".to_owned()));
-        made
+        file.each("obs/arm_joint_pos", |k| joints(k).to_vec());
+        file.each("obs/gripper_pos", |k| vec![finger(k); 2]);
+        file.demo.push(("language", "Pick up the  CUP.".to_owned()));
+        file
     }
 
     fn each(&mut self, name: &str, row: impl Fn(usize) -> Vec<f64>) {
@@ -129,9 +129,9 @@ impl FileBuilder {
     }
 
     fn refusal(&self) -> String {
-        let said = read(&self.write()).unwrap_err().to_string();
-        assert!(said.contains("pick_up_the_cup_demo.hdf5: /data"), "{said}");
-        said
+        let message = read(&self.write()).unwrap_err().to_string();
+        assert!(message.contains("pick_up_the_cup_demo.hdf5: /data"), "{message}");
+        message
     }
 }
 
@@ -159,8 +159,8 @@ fn off(command: &Action, tool: &Pose, k: usize) -> f64 {
 
 #[test]
 fn liberos_steps_become_the_goals_of_its_controller() {
-    let made = FileBuilder::libero();
-    let (layout, demo) = made.read();
+    let file = FileBuilder::libero();
+    let (layout, demo) = file.read();
     assert_eq!(
         (layout, demo.task.prompts.clone()),
         (ForeignLayout::Libero, vec!["pick up the cup".to_owned()])
@@ -176,7 +176,7 @@ fn liberos_steps_become_the_goals_of_its_controller() {
         InitialCondition::OtherSimulator { joints: Some(joints(0)), objects: Vec::new() }
     );
     // Without states, the observations are assumed to be LIBERO's: the first is from after the first action.
-    let (_, demo) = made.without("states").read();
+    let (_, demo) = file.without("states").read();
     for (k, action) in poses(&demo).iter().enumerate() {
         assert!(off(action, &tool(k.max(1)), k) < 1e-9, "step {k}");
     }
@@ -184,9 +184,9 @@ fn liberos_steps_become_the_goals_of_its_controller() {
 
 #[test]
 fn observations_from_before_each_action_are_recognised_by_the_states() {
-    let mut made = FileBuilder::libero().without("obs/ee");
-    made.each("obs/joint_states", |k| joints(k).to_vec());
-    let (_, demo) = made.read();
+    let mut file = FileBuilder::libero().without("obs/ee");
+    file.each("obs/joint_states", |k| joints(k).to_vec());
+    let (_, demo) = file.read();
     poses(&demo).iter().enumerate().for_each(|(k, action)| assert!(off(action, &tool(k), k) < 1e-9));
 }
 
@@ -214,21 +214,22 @@ fn without_joints_the_recorded_tool_is_transformed_to_our_frames() {
 
 #[test]
 fn robomimics_quaternions_in_another_order_are_detected_by_the_joints() {
-    let mut made = FileBuilder::libero().without("obs/ee").without("obs/joint");
-    made.each("obs/robot0_joint_pos", |k| joints(k).to_vec());
-    made.each("obs/robot0_eef_pos", |k| tool(k).translation.vector.as_slice().to_vec());
+    let mut file = FileBuilder::libero().without("obs/ee").without("obs/joint");
+    file.each("obs/robot0_joint_pos", |k| joints(k).to_vec());
+    file.each("obs/robot0_eef_pos", |k| tool(k).translation.vector.as_slice().to_vec());
     let quaternion = |k: usize| rotation::canonical(&tool(k).rotation).coords;
-    made.each("obs/robot0_eef_quat", |k| quaternion(k).as_slice().to_vec());
-    let (_, demo) = made.read();
+    file.each("obs/robot0_eef_quat", |k| quaternion(k).as_slice().to_vec());
+    let (_, demo) = file.read();
     poses(&demo).iter().enumerate().for_each(|(k, action)| assert!(off(action, &tool(k), k) < 1e-9));
-    made.each("obs/robot0_eef_quat", |k| {
+    file.each("obs/robot0_eef_quat", |k| {
         let q = quaternion(k);
         vec![q.w, q.x, q.y, q.z]
     });
-    let said = made.refusal();
+    let message = file.refusal();
     assert!(
-        said.contains("obs/robot0_eef_quat: step") && said.contains("another order of the quaternion's"),
-        "{said}"
+        message.contains("obs/robot0_eef_quat: step")
+            && message.contains("another order of the quaternion's"),
+        "{message}"
     );
 }
 
@@ -277,8 +278,8 @@ fn object_poses_are_read_from_a_mujoco_state_by_its_model() {
 
 #[test]
 fn softvtbenchs_poses_are_transformed_from_its_tool_to_ours() {
-    let made = FileBuilder::softvtbench();
-    let (layout, mut demo) = made.read();
+    let file = FileBuilder::softvtbench();
+    let (layout, mut demo) = file.read();
     assert_eq!(layout, ForeignLayout::SoftVtBench);
     assert_eq!(demo.task.prompts[0], "Pick up the  CUP.");
     for (k, action) in poses(&demo).iter().enumerate() {
@@ -296,13 +297,13 @@ fn softvtbenchs_poses_are_transformed_from_its_tool_to_ours() {
 
 #[test]
 fn softvtbenchs_objects_are_those_of_the_initial_state() {
-    let mut made = FileBuilder::softvtbench();
-    made.put("initial_state/articulation/robot/root_pose", &[7], vec![-0.66, 0.0, 0.912, 1.0, 0.0, 0.0, 0.0]);
-    made.put("initial_state/articulation/robot/joint_position", &[9], [&START[..], &[0.04; 2]].concat());
-    made.put("initial_state/rigid_object/plate_1/root_pose", &[7], vec![0.04, 0.1, 0.9, 1.0, 0.0, 0.0, 0.0]);
+    let mut file = FileBuilder::softvtbench();
+    file.put("initial_state/articulation/robot/root_pose", &[7], vec![-0.66, 0.0, 0.912, 1.0, 0.0, 0.0, 0.0]);
+    file.put("initial_state/articulation/robot/joint_position", &[9], [&START[..], &[0.04; 2]].concat());
+    file.put("initial_state/rigid_object/plate_1/root_pose", &[7], vec![0.04, 0.1, 0.9, 1.0, 0.0, 0.0, 0.0]);
     let nodes = vec![0.0, 0.0, 0.9, 0.2, 0.0, 0.9, 0.1, 0.3, 0.93];
-    made.put("initial_state/deformable_object/soft_bun/nodal_position", &[3, 3], nodes);
-    let InitialCondition::OtherSimulator { joints, objects } = made.read().1.initial_condition else {
+    file.put("initial_state/deformable_object/soft_bun/nodal_position", &[3, 3], nodes);
+    let InitialCondition::OtherSimulator { joints, objects } = file.read().1.initial_condition else {
         panic!("an episode")
     };
     assert_eq!(joints, Some(START));
@@ -347,10 +348,10 @@ fn errors_in_liberos_files_name_the_key() {
         (|m| m.data.retain(|(name, ..)| name != "obs/ee_ori"), "obs/ee_ori: it is missing"),
     ];
     for (damage, words) in libero {
-        let mut made = FileBuilder::libero();
-        damage(&mut made);
-        let said = made.refusal();
-        assert!(said.contains(words), "{words}: {said}");
+        let mut file = FileBuilder::libero();
+        damage(&mut file);
+        let message = file.refusal();
+        assert!(message.contains(words), "{words}: {message}");
     }
 }
 
@@ -408,10 +409,10 @@ fn errors_in_softvtbenchs_files_name_the_key() {
         ),
     ];
     for (damage, words) in softvtbench {
-        let mut made = FileBuilder::softvtbench();
-        damage(&mut made);
-        let said = made.refusal();
-        assert!(said.contains(words), "{words}: {said}");
+        let mut file = FileBuilder::softvtbench();
+        damage(&mut file);
+        let message = file.refusal();
+        assert!(message.contains(words), "{words}: {message}");
     }
 }
 
@@ -424,49 +425,49 @@ fn another_robot_controller_or_rate_is_refused() {
         ("controller_configs", json!({ "type": "JOINT_POSITION" }), "the controller is JOINT_POSITION"),
         ("controller_configs", json!({ "type": "OSC_POSE", "output_max": [1, 2, 3, 4, 5, 6] }), "output_max"),
     ] {
-        let mut made = FileBuilder::libero();
-        made.environment["env_kwargs"][path] = value;
-        let said = made.refusal();
-        assert!(said.contains(words), "{words}: {said}");
+        let mut file = FileBuilder::libero();
+        file.environment["env_kwargs"][path] = value;
+        let message = file.refusal();
+        assert!(message.contains(words), "{words}: {message}");
     }
-    let mut made = FileBuilder::softvtbench();
-    made.about.push(("robot_type", "UR10e".to_owned()));
-    assert!(made.refusal().contains("the robot is UR10e"));
-    let mut made = FileBuilder::softvtbench().without("obs/arm_joint_pos");
-    made.each("obs/arm_joint_pos", |k| joints(k)[..6].to_vec());
-    let said = made.refusal();
+    let mut file = FileBuilder::softvtbench();
+    file.about.push(("robot_type", "UR10e".to_owned()));
+    assert!(file.refusal().contains("the robot is UR10e"));
+    let mut file = FileBuilder::softvtbench().without("obs/arm_joint_pos");
+    file.each("obs/arm_joint_pos", |k| joints(k)[..6].to_vec());
+    let message = file.refusal();
     assert!(
-        said.ends_with("obs/arm_joint_pos: 6 joints per step; a Panda has 7: is it another robot?"),
-        "{said}"
+        message.ends_with("obs/arm_joint_pos: 6 joints per step; a Panda has 7: is it another robot?"),
+        "{message}"
     );
 }
 
 #[test]
 fn files_that_hold_no_demonstrations_are_reported() {
-    let made = FileBuilder::libero();
-    let whole = fs::read(made.write()).unwrap();
-    let path = made.folder.path().join("x.hdf5");
-    let said = || read(&path).unwrap_err().to_string();
+    let file = FileBuilder::libero();
+    let whole = fs::read(file.write()).unwrap();
+    let path = file.folder.path().join("x.hdf5");
+    let message = || read(&path).unwrap_err().to_string();
     fs::write(&path, &whole[..whole.len() / 2]).unwrap();
     assert!(
-        said().ends_with(&format!(
+        message().ends_with(&format!(
             "x.hdf5 is cut short: it has {} of {} bytes",
             whole.len() / 2,
             whole.len()
         )),
         "{}",
-        said()
+        message()
     );
     fs::write(&path, &whole[..20]).unwrap();
-    assert!(said().ends_with("x.hdf5 is cut short: it has only 20 bytes"), "{}", said());
+    assert!(message().ends_with("x.hdf5 is cut short: it has only 20 bytes"), "{}", message());
     // HDF5 allows other data before the signature.
     for (before, read) in [(512, true), (1024, true), (700, false)] {
         fs::write(&path, [&vec![0; before], &whole[..]].concat()).unwrap();
         assert_eq!(super::read(&path).is_ok(), read, "{before}");
     }
     fs::write(&path, "PK").unwrap();
-    assert!(said().ends_with("x.hdf5 is not an HDF5 file: it lacks the HDF5 signature"), "{}", said());
-    assert!(read(made.folder.path()).unwrap_err().to_string().ends_with("is a folder, not an HDF5 file"));
+    assert!(message().ends_with("x.hdf5 is not an HDF5 file: it lacks the HDF5 signature"), "{}", message());
+    assert!(read(file.folder.path()).unwrap_err().to_string().ends_with("is a folder, not an HDF5 file"));
     let mut other = FileBuilder::new(Value::Null);
     other.each("actions", |_| vec![0.0; 7]);
     assert!(other.refusal().contains("unknown layout"));
@@ -474,20 +475,20 @@ fn files_that_hold_no_demonstrations_are_reported() {
 
 #[test]
 fn quaternions_in_another_order_are_detected_with_and_without_joints() {
-    let made = |order: fn(Quat) -> [f64; 4], joints: bool| {
-        let mut made = FileBuilder::libero().without("obs/ee").without("states");
-        made.each("obs/robot0_joint_pos", |k| self::joints(k).to_vec());
+    let file = |order: fn(Quat) -> [f64; 4], joints: bool| {
+        let mut file = FileBuilder::libero().without("obs/ee").without("states");
+        file.each("obs/robot0_joint_pos", |k| self::joints(k).to_vec());
         let site =
             |k: usize| Pose::translation(-0.6, 0.0, 0.0) * tool(k) * Pose::translation(0.0, 0.0, -0.0069);
-        made.each("obs/robot0_eef_pos", |k| site(k).translation.vector.as_slice().to_vec());
-        made.each("obs/robot0_eef_quat", |k| order(site(k).rotation).to_vec());
-        let made = made.without("obs/joint");
-        if joints { made } else { made.without("obs/robot0_joint") }
+        file.each("obs/robot0_eef_pos", |k| site(k).translation.vector.as_slice().to_vec());
+        file.each("obs/robot0_eef_quat", |k| order(site(k).rotation).to_vec());
+        let file = file.without("obs/joint");
+        if joints { file } else { file.without("obs/robot0_joint") }
     };
     for joints in [true, false] {
-        made(|q| [q.i, q.j, q.k, q.w], joints).read();
-        let said = made(|q| [q.w, q.i, q.j, q.k], joints).refusal();
-        assert!(said.contains("robot0_eef_quat") && said.contains("another order"), "{said}");
+        file(|q| [q.i, q.j, q.k, q.w], joints).read();
+        let message = file(|q| [q.w, q.i, q.j, q.k], joints).refusal();
+        assert!(message.contains("robot0_eef_quat") && message.contains("another order"), "{message}");
     }
 }
 
@@ -507,14 +508,14 @@ fn a_deeply_nested_model_does_not_overflow_the_stack() {
 
 #[test]
 fn names_of_demonstrations_have_no_leading_zeros() {
-    let made = FileBuilder::libero();
-    let path = made.write();
+    let file = FileBuilder::libero();
+    let path = file.write();
     let file = rust_hdf5::H5File::open_rw(&path).unwrap();
     file.create_group("data/demo_00").unwrap();
     file.close().unwrap();
-    let said = read(&path).unwrap_err().to_string();
+    let message = read(&path).unwrap_err().to_string();
     assert!(
-        said.ends_with("/data/demo_00: expected the names demo_0, demo_1, …, without leading zeros"),
-        "{said}"
+        message.ends_with("/data/demo_00: expected the names demo_0, demo_1, …, without leading zeros"),
+        "{message}"
     );
 }

@@ -13,7 +13,7 @@ use crate::dataset::{
 };
 
 /// Size of an image, pixels.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct ImageSize {
     pub height: usize,
     pub width: usize,
@@ -110,10 +110,9 @@ fn matching_entries(
 /// Image sizes of both cameras.
 fn image_sizes(demo: &SelectedDemo) -> Result<[ImageSize; 2], DatasetError> {
     let file = TaskFile::open(&demo.path)?;
-    let mut sizes = [ImageSize::default(); 2];
-    for (size, name) in sizes.iter_mut().zip(IMAGE_STREAMS) {
+    let size = |name: &str| -> Result<ImageSize, DatasetError> {
         let block = file.images(demo.entry.demo_id, &format!("obs/{name}"), 0..1)?;
-        *size = ImageSize { height: block.height, width: block.width };
-    }
-    Ok(sizes)
+        Ok(ImageSize { height: block.height, width: block.width })
+    };
+    Ok([size(IMAGE_STREAMS[0])?, size(IMAGE_STREAMS[1])?])
 }

@@ -82,10 +82,6 @@ impl VideoWriter {
         Ok(())
     }
 
-    pub fn frames(&self) -> usize {
-        self.track.len()
-    }
-
     /// The bytes of the file.
     ///
     /// # Errors

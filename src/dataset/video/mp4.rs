@@ -55,12 +55,12 @@ impl Track {
     /// The bytes of the file.
     pub(super) fn file(&self) -> Vec<u8> {
         let brands = b"isomiso2avc1mp41";
-        let mut file = boxed(b"ftyp", &[b"isom".as_slice(), &512_u32.to_be_bytes(), brands].concat());
+        let mut file = mp4_box(b"ftyp", &[b"isom".as_slice(), &512_u32.to_be_bytes(), brands].concat());
         // The index contains the offset of the first frame, which follows it. Its length does not depend on the value.
         let first_frame = file.len() + self.moov(0).len() + 8;
         file.extend(self.moov(first_frame as u32));
         let frames: Vec<u8> = self.samples.iter().flat_map(|s| s.bytes.iter().copied()).collect();
-        file.extend(boxed(b"mdat", &frames));
+        file.extend(mp4_box(b"mdat", &frames));
         file
     }
 
@@ -77,15 +77,15 @@ impl Track {
         let mdhd = BoxFields::full(0).u32s(&[0, 0, scale, duration]).u16s(&[0x55c4, 0]);
         let hdlr = BoxFields::full(0).u32s(&[0]).bytes(b"vide").u32s(&[0; 3]).bytes(b"softvt\0");
         let vmhd = BoxFields::full(1).u16s(&[0; 4]);
-        let dref = BoxFields::full(0).u32s(&[1]).bytes(&boxed(b"url ", &BoxFields::full(1).0));
+        let dref = BoxFields::full(0).u32s(&[1]).bytes(&mp4_box(b"url ", &BoxFields::full(1).0));
         let minf = [
-            boxed(b"vmhd", &vmhd.0),
-            boxed(b"dinf", &boxed(b"dref", &dref.0)),
-            boxed(b"stbl", &self.sample_table(first)),
+            mp4_box(b"vmhd", &vmhd.0),
+            mp4_box(b"dinf", &mp4_box(b"dref", &dref.0)),
+            mp4_box(b"stbl", &self.sample_table(first)),
         ];
-        let mdia = [boxed(b"mdhd", &mdhd.0), boxed(b"hdlr", &hdlr.0), boxed(b"minf", &minf.concat())];
-        let trak = [boxed(b"tkhd", &tkhd.0), boxed(b"mdia", &mdia.concat())];
-        boxed(b"moov", &[boxed(b"mvhd", &mvhd.0), boxed(b"trak", &trak.concat())].concat())
+        let mdia = [mp4_box(b"mdhd", &mdhd.0), mp4_box(b"hdlr", &hdlr.0), mp4_box(b"minf", &minf.concat())];
+        let trak = [mp4_box(b"tkhd", &tkhd.0), mp4_box(b"mdia", &mdia.concat())];
+        mp4_box(b"moov", &[mp4_box(b"mvhd", &mvhd.0), mp4_box(b"trak", &trak.concat())].concat())
     }
 
     fn sample_table(&self, first: u32) -> Vec<u8> {
@@ -107,7 +107,7 @@ impl Track {
             (b"stsz", stsz),
             (b"stco", stco),
         ];
-        boxes.iter().flat_map(|(name, fields)| boxed(name, &fields.0)).collect()
+        boxes.iter().flat_map(|(name, fields)| mp4_box(name, &fields.0)).collect()
     }
 
     /// The `avc1` entry: size, decoder configuration and colour space (BT.601 primaries, transfer
@@ -122,14 +122,14 @@ impl Track {
             BoxFields(vec![0; 6]).u16s(&[1]).u16s(&[0; 8]).u16s(&[self.width as u16, self.height as u16]);
         // 72 dpi, one frame per sample, no name, 24 bits per pixel, no colour table.
         let entry = entry.u32s(&[0x0048_0000, 0x0048_0000, 0]).u16s(&[1]).bytes(&[0; 32]).u16s(&[24, 0xffff]);
-        boxed(b"avc1", &entry.bytes(&boxed(b"avcC", &avcc.0)).bytes(&boxed(b"colr", &colr.0)).0)
+        mp4_box(b"avc1", &entry.bytes(&mp4_box(b"avcC", &avcc.0)).bytes(&mp4_box(b"colr", &colr.0)).0)
     }
 }
 
 /// The identity (16.16 and 2.30 fixed point).
 const MATRIX: [u32; 9] = [0x0001_0000, 0, 0, 0, 0x0001_0000, 0, 0, 0, 0x4000_0000];
 
-fn boxed(name: &[u8; 4], payload: &[u8]) -> Vec<u8> {
+fn mp4_box(name: &[u8; 4], payload: &[u8]) -> Vec<u8> {
     [&(payload.len() as u32 + 8).to_be_bytes(), name.as_slice(), payload].concat()
 }
 

@@ -225,19 +225,13 @@ fn summary(records: &[EpisodeRecord]) -> Value {
     let (all, n) = (in_order(records), records.len());
     let goal_rate = Rate::from_test(&all, |r| r.verdict.goal).rate;
     let safe_rate = Rate::from_test(&all, is_safe).rate;
-    let mut assets: Vec<&str> = Vec::new();
-    for record in &all {
-        if !assets.contains(&record.header.asset.as_str()) {
-            assets.push(&record.header.asset);
+    let mut by_asset = serde_json::Map::new();
+    for asset in all.iter().map(|r| &r.header.asset) {
+        if !by_asset.contains_key(asset) {
+            let group: Vec<_> = all.iter().copied().filter(|r| r.header.asset == *asset).collect();
+            by_asset.insert(asset.clone(), asset_summary(&group));
         }
     }
-    let by_asset: serde_json::Map<_, _> = assets
-        .into_iter()
-        .map(|asset| {
-            let group: Vec<_> = all.iter().copied().filter(|r| r.header.asset == asset).collect();
-            (asset.to_owned(), asset_summary(&group))
-        })
-        .collect();
     let mut scores = json!({
         "n_episodes": n,
         "n_goal_known": n,

@@ -32,16 +32,12 @@ impl Canvas {
 
     /// Copies an image to (x, y), clipped at the edges.
     pub fn place(&mut self, image: &RgbImage, x: u32, y: u32) {
-        let width = self.pixels.width() as usize;
-        let height = self.pixels.height();
+        let (width, height) = (self.pixels.width(), self.pixels.height());
         let data = self.pixels.data_mut();
-        for (row, line) in image.rows().enumerate().take((height.saturating_sub(y)) as usize) {
-            let start = (y as usize + row) * width + x as usize;
-            let visible = width.saturating_sub(x as usize);
-            for (column, pixel) in line.enumerate().take(visible) {
-                let at = 4 * (start + column);
-                data[at..at + 3].copy_from_slice(&pixel.0);
-                data[at + 3] = 255;
+        for (column, row, &image::Rgb([r, g, b])) in image.enumerate_pixels() {
+            if x + column < width && y + row < height {
+                let at = 4 * ((y + row) * width + x + column) as usize;
+                data[at..at + 4].copy_from_slice(&[r, g, b, 255]);
             }
         }
     }
