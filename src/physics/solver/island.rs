@@ -1,13 +1,20 @@
 //! Connected islands of a problem, and the factors kept for them between steps.
 
 use super::{
-    options::{FACTOR_COST_IN_STEPS, MAX_CACHED_FACTORS, UNAVOIDABLE_STEPS},
-    problem::ContactProblem,
-    secant::{SecantPairs, SecantState},
+    problem::{ContactProblem, ScalarConstraint},
+    secant::SecantPairs,
 };
 use crate::{geometry::union_find::UnionFind, physics::sparse::dense};
 
+/// Cost of a factorization in Newton steps with an existing factor.
+pub(super) const FACTOR_COST_IN_STEPS: f64 = 8.0;
+/// Steps of a pass that refactoring would not avoid.
+const UNAVOIDABLE_STEPS: u32 = 4;
+/// Number of islands whose factors are kept.
+const MAX_CACHED_FACTORS: usize = 6;
+
 /// The blocks, clusters and constraints of one connected island.
+#[derive(Default)]
 pub(super) struct Island {
     /// Blocks, ascending.
     pub blocks: Vec<usize>,
@@ -20,11 +27,18 @@ pub(super) struct Island {
 }
 
 impl Island {
-    /// Size of the constrained block: the number of velocities from the first one with a scalar constraint to the end.
-    pub(super) fn constrained_size(&self, problem: &ContactProblem, offsets: &[usize]) -> usize {
+    /// The scalar constraints, with the index of the velocity of each in the vectors of the island.
+    pub(super) fn scalars<'a>(
+        &'a self,
+        problem: &'a ContactProblem,
+    ) -> impl Iterator<Item = (usize, &'a ScalarConstraint)> {
         let constraints = self.constraints.iter().map(|&index| &problem.constraints[index]);
-        let first = constraints.map(|c| offsets[c.block] + c.index).min().unwrap_or(self.size);
-        self.size - first
+        constraints.map(|constraint| (problem.blocks[constraint.block].offset + constraint.index, constraint))
+    }
+
+    /// Size of the constrained block: the number of velocities from the first one with a scalar constraint to the end.
+    pub(super) fn constrained_size(&self, problem: &ContactProblem) -> usize {
+        self.size - self.scalars(problem).map(|(at, _)| at).min().unwrap_or(self.size)
     }
 }
 
@@ -42,12 +56,7 @@ pub(super) fn islands(problem: &ContactProblem) -> Vec<Island> {
         let r = connected.find(block);
         if of_root[r] == usize::MAX {
             of_root[r] = islands.len();
-            islands.push(Island {
-                blocks: Vec::new(),
-                clusters: Vec::new(),
-                constraints: Vec::new(),
-                size: 0,
-            });
+            islands.push(Island::default());
         }
         islands[of_root[r]].blocks.push(block);
         islands[of_root[r]].size += problem.blocks[block].dim;
@@ -155,15 +164,9 @@ impl FactorCache {
         });
     }
 
-    /// Corrects the current factor by a step, excluding the gradient changes `others` (index, amount), which come from
-    /// constraints not in the factor.
-    pub(super) fn correct(
-        &mut self,
-        before: SecantState,
-        after: SecantState,
-        others: impl Iterator<Item = (usize, f64)>,
-    ) {
-        self.entries[0].secant.push(before, after, others);
+    /// Corrections of the current factor.
+    pub(super) fn corrections(&mut self) -> &mut SecantPairs {
+        &mut self.entries[0].secant
     }
 }
 

@@ -1,12 +1,12 @@
 //! Constitutive laws: impulse, cost and curvature of contact points and scalar constraints as
 //! functions of their velocity.
 
-use super::problem::ContactPoint;
+use super::problem::{ContactPoint, ScalarConstraint};
 use crate::geometry::{Mat3, Vec3};
 
 /// Impulse and cost of a contact point at a velocity.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ConstraintResponse {
+pub(super) struct ContactResponse {
     /// Impulse on `a`, N s.
     pub impulse: Vec3,
     /// Cost, J.
@@ -41,7 +41,7 @@ impl ContactLaw {
     /// Normal: the spring at the end of the step with dissipation, `γ = dt k (−φ − (dt + τ) v_n)₊`. Tangent: with
     /// `z = s + (dt + τ) v_t` the spring `−dt k_t z`, cut off at the lagged bound `μ γ_n` (a Huber cost in `z`).
     #[inline]
-    pub(super) fn contact(&self, point: &ContactPoint, v: &Vec3) -> Option<ConstraintResponse> {
+    pub(super) fn contact(&self, point: &ContactPoint, v: &Vec3) -> Option<ContactResponse> {
         let n = &point.normal;
         let vn = n.dot(v);
         let depth = -point.gap - self.dt_plus_tau * vn;
@@ -51,7 +51,7 @@ impl ContactLaw {
         }
         let depth = depth.max(0.0);
         let normal = self.dt * point.stiffness * depth;
-        let mut response = ConstraintResponse {
+        let mut response = ContactResponse {
             impulse: n * normal,
             cost: 0.5 * normal * depth * self.inverse,
             normal,
@@ -67,7 +67,7 @@ impl ContactLaw {
 
     /// Adds friction: a tangential spring of stiffness `c` (N s/m) whose impulse is at most `bound` (N s).
     #[inline]
-    fn apply_friction(&self, response: &mut ConstraintResponse, c: f64, bound: f64) {
+    fn apply_friction(&self, response: &mut ContactResponse, c: f64, bound: f64) {
         let z = response.stretch;
         let square = z.norm_squared();
         if c * c * square <= bound * bound {
@@ -82,7 +82,7 @@ impl ContactLaw {
     }
 
     /// Hessian of the cost with respect to the velocity at a response of this point, kg.
-    pub(super) fn curvature(&self, point: &ContactPoint, response: &ConstraintResponse) -> Mat3 {
+    pub(super) fn curvature(&self, point: &ContactPoint, response: &ContactResponse) -> Mat3 {
         let n = &point.normal;
         let onto_normal = n * n.transpose();
         let mut curvature = Mat3::zeros();
@@ -104,30 +104,7 @@ impl ContactLaw {
     }
 }
 
-/// A spring–damper with a force limit on one velocity of one block: a joint drive, a stop, a speed limit, dry friction.
-#[derive(Clone, Copy, Debug)]
-pub struct ScalarConstraint {
-    /// The block.
-    pub block: usize,
-    /// Index of the velocity in the block.
-    pub index: usize,
-    /// Stiffness (N/m or N m/rad).
-    pub stiffness: f64,
-    /// Damping (N s/m or N m s/rad).
-    pub damping: f64,
-    /// Target minus position at the start of the step (m or rad).
-    pub error: f64,
-    /// Target velocity (m/s or rad/s) of the damping.
-    pub target_velocity: f64,
-    /// Smallest force (N or N m); 0 for a lower stop.
-    pub min_force: f64,
-    /// Largest force (N or N m); 0 for an upper stop.
-    pub max_force: f64,
-    /// Result: the force (N or N m).
-    pub force: f64,
-}
-
-/// The segments of a scalar row's law: at its least force, on its line, at its greatest force.
+/// The segments of the force law of a scalar constraint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum LinearSegment {
     /// At the smallest force.
@@ -154,27 +131,35 @@ impl ScalarConstraint {
         }
     }
 
-    /// Slope and curvature of the cost at `v`, with `segment` continued beyond its ends.
-    pub(super) fn derivatives(&self, segment: LinearSegment, dt: f64, v: f64) -> (f64, f64) {
+    /// Slope of the cost at `v`, with `segment` continued beyond its ends.
+    pub(super) fn slope(&self, segment: LinearSegment, dt: f64, v: f64) -> f64 {
         match segment {
-            LinearSegment::Lower => (-dt * self.min_force, 0.0),
-            LinearSegment::Upper => (-dt * self.max_force, 0.0),
-            LinearSegment::Linear => (-dt * self.unlimited(dt, v), dt * (self.stiffness * dt + self.damping)),
+            LinearSegment::Lower => -dt * self.min_force,
+            LinearSegment::Upper => -dt * self.max_force,
+            LinearSegment::Linear => -dt * self.unlimited(dt, v),
         }
     }
 
-    /// Force at velocity `v`, `clamp(k (e − dt v) + d (v_t − v), min, max)`, and its cost.
-    pub(super) fn force_and_cost(&self, dt: f64, v: f64) -> (f64, f64) {
+    /// Curvature of the cost on `segment`.
+    pub(super) fn curvature(&self, segment: LinearSegment, dt: f64) -> f64 {
+        if segment == LinearSegment::Linear { dt * (self.stiffness * dt + self.damping) } else { 0.0 }
+    }
+
+    /// Force at velocity `v`: `clamp(k (e − dt v) + d (v_t − v), min, max)`.
+    pub(super) fn force_at(&self, dt: f64, v: f64) -> f64 {
+        self.unlimited(dt, v).clamp(self.min_force, self.max_force)
+    }
+
+    /// Cost at velocity `v`.
+    pub(super) fn cost(&self, dt: f64, v: f64) -> f64 {
         let gain = self.stiffness * dt + self.damping;
-        let unlimited = self.unlimited(dt, v);
-        let force = unlimited.clamp(self.min_force, self.max_force);
+        let (unlimited, force) = (self.unlimited(dt, v), self.force_at(dt, v));
         // d(cost)/dv = −dt force; outside of the limits the cost continues linearly.
-        let cost = if gain > 0.0 {
+        if gain > 0.0 {
             dt / gain * (0.5 * force * force + force * (unlimited - force))
         } else {
             -dt * force * v
-        };
-        (force, cost)
+        }
     }
 }
 
@@ -185,21 +170,14 @@ mod tests {
 
     fn point(gap: f64, offset: [f64; 2], previous_normal_impulse: f64) -> ContactPoint {
         ContactPoint {
-            weights_a: [0.0; 8],
-            weights_b: [0.0; 8],
-            p: Vec3::zeros(),
             normal: Vec3::z(),
-            drift: Vec3::zeros(),
             stiffness: 500.0,
             shear_stiffness: 250.0,
             gap,
             offset: Vec3::new(offset[0], offset[1], 0.0),
             mu: 1.2,
             previous_normal_impulse,
-            normal_impulse: 0.0,
-            shear_impulse: Vec3::zeros(),
-            velocity: Vec3::zeros(),
-            is_slipping: false,
+            ..ContactPoint::default()
         }
     }
 
@@ -210,7 +188,7 @@ mod tests {
             previous_normal_impulse in 0.0f64..5e-3,
         ) {
             let (law, v, p) = (ContactLaw::new(1.0 / 60.0, 0.01), Vec3::from(v), point(gap, offset, previous_normal_impulse));
-            let open = ConstraintResponse {
+            let open = ContactResponse {
                 impulse: Vec3::zeros(), cost: 0.0, normal: 0.0, is_slipping: false, stretch: Vec3::zeros(),
             };
             let response = |v: &Vec3| law.contact(&p, v).unwrap_or(open);
@@ -233,10 +211,10 @@ mod tests {
                 block: 0, index: 0, stiffness: 2000.0, damping: 100.0, error, target_velocity: 0.1, min_force: -70.0, max_force: 70.0, force: 0.0,
             };
             let (dt, e) = (1.0 / 60.0, 1e-6);
-            let slope = (row.force_and_cost(dt, v + e).1 - row.force_and_cost(dt, v - e).1) / (2.0 * e);
-            prop_assert!((slope + dt * row.force_and_cost(dt, v).0).abs() < 1e-5);
-            let (on_piece, _) = row.derivatives(row.segment(dt, v), dt, v);
-            prop_assert!((on_piece + dt * row.force_and_cost(dt, v).0).abs() < 1e-12);
+            let slope = (row.cost(dt, v + e) - row.cost(dt, v - e)) / (2.0 * e);
+            prop_assert!((slope + dt * row.force_at(dt, v)).abs() < 1e-5);
+            let on_piece = row.slope(row.segment(dt, v), dt, v);
+            prop_assert!((on_piece + dt * row.force_at(dt, v)).abs() < 1e-12);
         }
     }
 }

@@ -10,16 +10,14 @@
 //! The solver does not depend on the kinds of bodies: a [`VelocityBlock`] is a symmetric positive definite matrix
 //! with a right-hand side, a [`ContactCluster`] a set of contact points between two endpoints.
 
-mod assemble;
-mod cost;
-mod direction;
 mod island;
+mod kinematics;
 mod law;
 mod newton;
-mod options;
 mod problem;
 mod secant;
 
-pub use law::ScalarConstraint;
 pub use newton::{Solver, SolverFailure, SolverStats};
-pub use problem::{ContactCluster, ContactPoint, ContactProblem, Endpoint, FrameJacobian, VelocityBlock};
+pub use problem::{
+    ContactCluster, ContactPoint, ContactProblem, Endpoint, FrameJacobian, ScalarConstraint, VelocityBlock,
+};

@@ -1,17 +1,37 @@
 //! Newton's method with an exact line search on each island, and the lagged passes around it.
+//!
+//! The cost of a solve is `½ vᵀA v − rᵀv + Σ ℓ(J v)`. The step of one iteration is the minimum of a model in which
+//! everything but the scalar constraints is quadratic. Drives at their effort limit, stops and dry joint friction are
+//! far stiffer than what they act on, so a joint that begins to move makes a kept factor of the whole Hessian useless.
+//! They act on a few velocities only, which are last in the island (the *constrained block*). So the factor excludes
+//! them, and each step is solved with the scalar constraints in the state that they will have at its end: a proximal
+//! Newton method (Lee, Sun & Saunders 2014) in which the scalar constraints are the part that is not linearised.
 
 use super::{
-    assemble::{ClusterHessian, DofMap},
-    cost::PassResidual,
-    island::{FactorCache, Island, islands},
-    law::{ConstraintResponse, LinearSegment},
-    options::{
-        ABSOLUTE_TOLERANCE, FACTOR_COST_IN_STEPS, MAX_NEWTON, MAX_PASSES, PASS_TOLERANCE,
-        REFACTOR_EVERY_STEP_AFTER, RELATIVE_TOLERANCE, STALE_FACTOR_TRIAL,
-    },
+    island::{FACTOR_COST_IN_STEPS, FactorCache, Island, islands},
+    kinematics::{ClusterHessian, DofMap},
+    law::{ContactLaw, ContactResponse, LinearSegment},
     problem::ContactProblem,
 };
 use crate::{geometry::Vec3, physics::sparse::dense};
+
+/// Convergence of the gradient relative to the momenta of the island (both scaled by `diag(A)^-1/2`).
+const RELATIVE_TOLERANCE: f64 = 1e-5;
+/// Absolute tolerance of the scaled gradient, √J.
+const ABSOLUTE_TOLERANCE: f64 = 1e-10;
+/// Largest number of Newton steps per pass.
+const MAX_NEWTON: u32 = 240;
+/// Newton steps of a pass after which each step refactors. With many stiff points that open and close, quasi-Newton
+/// corrections of a stale factor may stop converging.
+const REFACTOR_EVERY_STEP_AFTER: u32 = 60;
+/// Largest number of passes over the lagged friction bound.
+const MAX_PASSES: usize = 3;
+/// Relative change of the normal impulses below which the passes end.
+const PASS_TOLERANCE: f64 = 0.01;
+/// Steps after which the convergence with a stale factor, corrected by those steps, is judged.
+const STALE_FACTOR_TRIAL: u32 = 2;
+/// Guesses of the active segments of the scalar constraints before the segments at the current velocities are taken.
+const MAX_SEGMENT_GUESSES: usize = 8;
 
 /// Iteration counts of a solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -40,26 +60,24 @@ pub struct SolverFailure {
 /// of convergence within the tolerance.
 #[derive(Clone, Debug, Default)]
 pub struct Solver {
-    /// First index of each block in the vectors of its island.
-    pub(super) offsets: Vec<usize>,
-    pub(super) v: Vec<f64>,
-    pub(super) trial: Vec<f64>,
-    pub(super) step: Vec<f64>,
-    pub(super) gradient: Vec<f64>,
-    pub(super) trial_gradient: Vec<f64>,
+    v: Vec<f64>,
+    trial: Vec<f64>,
+    step: Vec<f64>,
+    gradient: Vec<f64>,
+    trial_gradient: Vec<f64>,
     /// `A v`.
-    pub(super) product: Vec<f64>,
+    product: Vec<f64>,
     /// `diag(A)^-1/2`.
     scale: Vec<f64>,
-    pub(super) cache: FactorCache,
+    cache: FactorCache,
     /// Segment on which each scalar constraint of the island is assumed to end.
-    pub(super) segments: Vec<LinearSegment>,
+    segments: Vec<LinearSegment>,
     /// Curvature of the scalar constraints on the velocities of the constrained block.
-    pub(super) stiffness: Vec<f64>,
-    pub(super) local: ClusterHessian,
-    pub(super) map: DofMap,
-    /// Velocities and responses of one cluster.
-    pub(super) solved: Vec<(Vec3, Option<ConstraintResponse>)>,
+    stiffness: Vec<f64>,
+    local: ClusterHessian,
+    map: DofMap,
+    /// Relative velocities of the points of one cluster.
+    velocities: Vec<Vec3>,
     factorizations: u32,
 }
 
@@ -80,6 +98,15 @@ impl NewtonProgress {
         let gained = (self.initial_ratio / ratio).ln();
         if gained > 0.0 { f64::from(self.steps) * ratio.ln() / gained } else { f64::INFINITY }
     }
+}
+
+/// Normal impulses of an island after a pass, N s.
+#[derive(Default)]
+struct PassResidual {
+    /// Sum of the absolute changes against the previous pass.
+    change: f64,
+    /// Sum.
+    total: f64,
 }
 
 impl Solver {
@@ -121,24 +148,23 @@ impl Solver {
             }
         }
         for &block in &island.blocks {
-            let (start, dim) = (self.offsets[block], problem.blocks[block].dim);
-            problem.blocks[block].v.copy_from_slice(&self.v[start..start + dim]);
+            let range = problem.range(block);
+            problem.blocks[block].v.copy_from_slice(&self.v[range]);
         }
         for &index in &island.constraints {
             let constraint = &mut problem.constraints[index];
-            let v = self.v[self.offsets[constraint.block] + constraint.index];
-            constraint.force = constraint.force_and_cost(problem.dt, v).0;
+            let v = self.v[problem.blocks[constraint.block].offset + constraint.index];
+            constraint.force = constraint.force_at(problem.dt, v);
         }
         Ok(steps)
     }
 
-    fn prepare(&mut self, problem: &ContactProblem, island: &Island) {
-        self.offsets.resize(problem.blocks.len(), 0);
+    fn prepare(&mut self, problem: &mut ContactProblem, island: &Island) {
         self.v.clear();
         self.scale.clear();
         for &block in &island.blocks {
-            self.offsets[block] = self.v.len();
-            let b = &problem.blocks[block];
+            let b = &mut problem.blocks[block];
+            b.offset = self.v.len();
             self.v.extend_from_slice(&b.v);
             self.scale.extend((0..b.dim).map(|i| 1.0 / b.matrix[i * b.dim + i].sqrt()));
         }
@@ -154,7 +180,10 @@ impl Solver {
     /// The cost is piecewise quadratic and changes little from step to step, so an existing factor of its Hessian is
     /// used for as long as that is cheaper than a new one. The gradient is always exact.
     fn newton(&mut self, problem: &ContactProblem, island: &Island) -> Result<u32, SolverFailure> {
-        let mut cost = self.update_gradient(problem, island);
+        let v = std::mem::take(&mut self.v);
+        let mut gradient = std::mem::take(&mut self.gradient);
+        let mut cost = self.evaluate(problem, island, &v, &mut gradient);
+        (self.v, self.gradient) = (v, gradient);
         let mut ratio = self.residual_ratio(problem, island);
         let mut has_factor = self.cache.select(problem, island);
         let mut progress = NewtonProgress { steps: 0, initial_ratio: ratio };
@@ -194,28 +223,160 @@ impl Solver {
         Err(SolverFailure { block: island.blocks[0], residual_ratio: ratio })
     }
 
-    /// Updates the gradient at the current velocities; returns the cost.
-    fn update_gradient(&mut self, problem: &ContactProblem, island: &Island) -> f64 {
-        let v = std::mem::take(&mut self.v);
-        let mut gradient = std::mem::take(&mut self.gradient);
-        let cost = self.evaluate(problem, island, &v, &mut gradient);
-        (self.v, self.gradient) = (v, gradient);
+    /// Cost and gradient at `v`.
+    fn evaluate(
+        &mut self,
+        problem: &ContactProblem,
+        island: &Island,
+        v: &[f64],
+        gradient: &mut [f64],
+    ) -> f64 {
+        let mut cost = 0.0;
+        for &block in &island.blocks {
+            let (b, range) = (&problem.blocks[block], problem.range(block));
+            let product = &mut self.product[range.clone()];
+            dense::symmetric_multiply(&b.matrix, b.dim, &v[range.clone()], product);
+            let rows = gradient[range.clone()].iter_mut().zip(product.iter());
+            for ((g, p), (r, v)) in rows.zip(b.rhs.iter().zip(&v[range])) {
+                *g = p - r;
+                cost += v * (0.5 * p - r);
+            }
+        }
+        let law = ContactLaw::new(problem.dt, problem.dissipation_time);
+        for cluster in island.clusters.iter().map(|&index| &problem.clusters[index]) {
+            let (mut on_a, mut on_b, mut is_touched) = ([Vec3::zeros(); 8], [Vec3::zeros(); 8], false);
+            for (point, velocity) in problem.point_velocities(cluster, v) {
+                let Some(ContactResponse { impulse, cost: own, .. }) = law.contact(point, &velocity) else {
+                    continue;
+                };
+                is_touched = true;
+                cost += own;
+                problem.add_point_impulse(&cluster.a, &mut on_a, &point.weights_a, &point.p, &impulse);
+                problem.add_point_impulse(&cluster.b, &mut on_b, &point.weights_b, &point.p, &impulse);
+            }
+            if is_touched {
+                problem.scatter_impulses(&cluster.a, -1.0, &on_a, gradient);
+                problem.scatter_impulses(&cluster.b, 1.0, &on_b, gradient);
+            }
+        }
+        for (at, constraint) in island.scalars(problem) {
+            cost += constraint.cost(problem.dt, v[at]);
+            gradient[at] -= problem.dt * constraint.force_at(problem.dt, v[at]);
+        }
         cost
     }
 
-    /// Factors the Hessian at the current velocities down to the constrained block. False if it
-    /// is not positive definite.
+    /// Factors the Hessian at the current velocities, without the scalar constraints, down to the constrained block.
+    /// False if it is not positive definite.
     fn refactor(&mut self, problem: &ContactProblem, island: &Island) -> bool {
-        let mut hessian = self.cache.take(island);
-        let v = std::mem::take(&mut self.v);
-        self.assemble_hessian(problem, island, &v, &mut hessian);
-        self.v = v;
         let n = island.size;
-        let constrained = island.constrained_size(problem, &self.offsets);
-        let is_definite = dense::partial_cholesky(&mut hessian[..n * n], n, n - constrained);
+        let mut hessian = self.cache.take(island);
+        hessian[..n * n].fill(0.0);
+        for b in island.blocks.iter().map(|&block| &problem.blocks[block]) {
+            for column in 0..b.dim {
+                let source = &b.matrix[column * b.dim + column..(column + 1) * b.dim];
+                let target = (b.offset + column) * n + b.offset + column;
+                hessian[target..target + source.len()].copy_from_slice(source);
+            }
+        }
+        let law = ContactLaw::new(problem.dt, problem.dissipation_time);
+        for cluster in island.clusters.iter().map(|&index| &problem.clusters[index]) {
+            let mut is_touched = false;
+            self.local.start(cluster);
+            for (point, velocity) in problem.point_velocities(cluster, &self.v) {
+                let Some(response) = law.contact(point, &velocity) else { continue };
+                is_touched = true;
+                self.local.add(problem, cluster, point, &law.curvature(point, &response));
+            }
+            if is_touched {
+                self.map.set(problem, cluster);
+                self.map.scatter(&self.local, &mut hessian, n);
+            }
+        }
+        let is_definite =
+            dense::partial_cholesky(&mut hessian[..n * n], n, n - island.constrained_size(problem));
         self.cache.set(hessian, is_definite);
         self.factorizations += 1;
         is_definite
+    }
+
+    /// Writes impulses and velocities into the points.
+    fn record(&mut self, problem: &mut ContactProblem, island: &Island) -> PassResidual {
+        let mut residual = PassResidual::default();
+        let law = ContactLaw::new(problem.dt, problem.dissipation_time);
+        for &index in &island.clusters {
+            let cluster = problem.clusters[index];
+            self.velocities.clear();
+            self.velocities.extend(problem.point_velocities(&cluster, &self.v).map(|(_, velocity)| velocity));
+            for (point, v) in problem.points[cluster.first..cluster.last].iter_mut().zip(&self.velocities) {
+                let response = law.contact(point, v);
+                let normal = response.map_or(0.0, |response| response.normal);
+                residual.change += (normal - point.previous_normal_impulse).abs();
+                residual.total += normal;
+                point.normal_impulse = normal;
+                point.shear_impulse = response.map_or(Vec3::zeros(), |a| a.impulse - point.normal * normal);
+                point.is_slipping = response.is_some_and(|response| response.is_slipping);
+                point.velocity = *v;
+            }
+        }
+        residual
+    }
+
+    /// Writes the step from the current velocities into `step`. It is always a descent direction.
+    fn find_step(&mut self, problem: &ContactProblem, island: &Island) {
+        self.segments.clear();
+        let scalars = island.scalars(problem);
+        self.segments.extend(scalars.map(|(at, constraint)| constraint.segment(problem.dt, self.v[at])));
+        let current = self.segments.clone();
+        for _ in 0..MAX_SEGMENT_GUESSES {
+            self.step_on_segments(problem, island);
+            if !self.update_segments(problem, island) {
+                return;
+            }
+        }
+        self.segments = current;
+        self.step_on_segments(problem, island);
+    }
+
+    /// Solves the model with the scalar constraints on the guessed segments.
+    fn step_on_segments(&mut self, problem: &ContactProblem, island: &Island) {
+        let dt = problem.dt;
+        self.step.iter_mut().zip(&self.gradient).for_each(|(s, g)| *s = -g);
+        self.stiffness.clear();
+        self.stiffness.resize(island.constrained_size(problem), 0.0);
+        let first = island.size - self.stiffness.len();
+        for ((at, constraint), &segment) in island.scalars(problem).zip(&self.segments) {
+            let v = self.v[at];
+            self.step[at] -= constraint.slope(segment, dt, v) + dt * constraint.force_at(dt, v);
+            self.stiffness[at - first] += constraint.curvature(segment, dt);
+        }
+        self.cache.solve(island, &self.stiffness, &mut self.step);
+    }
+
+    /// Moves each guess by one segment towards that on which its constraint ended; true if any moved.
+    fn update_segments(&mut self, problem: &ContactProblem, island: &Island) -> bool {
+        let mut moved = false;
+        for ((at, constraint), segment) in island.scalars(problem).zip(&mut self.segments) {
+            let ended = constraint.segment(problem.dt, self.v[at] + self.step[at]);
+            if ended != *segment {
+                moved = true;
+                *segment = if *segment == LinearSegment::Linear { ended } else { LinearSegment::Linear };
+            }
+        }
+        moved
+    }
+
+    /// Corrects the kept factor by the last step, without the contribution of the scalar constraints.
+    fn correct_factor(&mut self, problem: &ContactProblem, island: &Island) {
+        let (old, new) = (&self.trial, &self.v);
+        let step = new.iter().zip(old).map(|(v, v0)| v - v0).collect();
+        let gradients = self.gradient.iter().zip(&self.trial_gradient);
+        let mut change: Vec<f64> = gradients.map(|(g, g0)| g - g0).collect();
+        for (at, constraint) in island.scalars(problem) {
+            let force = |v: &[f64]| constraint.force_at(problem.dt, v[at]);
+            change[at] -= problem.dt * (force(old) - force(new));
+        }
+        self.cache.corrections().push(step, change);
     }
 
     /// Norm of the scaled gradient over the tolerance.
@@ -224,9 +385,8 @@ impl Solver {
             |values: &[f64]| values.iter().zip(&self.scale).map(|(g, s)| (g * s).powi(2)).sum::<f64>().sqrt();
         let mut rhs = 0.0;
         for &block in &island.blocks {
-            let start = self.offsets[block];
             let b = &problem.blocks[block];
-            rhs += b.rhs.iter().zip(&self.scale[start..]).map(|(r, s)| (r * s).powi(2)).sum::<f64>();
+            rhs += b.rhs.iter().zip(&self.scale[b.offset..]).map(|(r, s)| (r * s).powi(2)).sum::<f64>();
         }
         let momentum = rhs.sqrt().max(norm(&self.product));
         norm(&self.gradient) / (RELATIVE_TOLERANCE * momentum + ABSOLUTE_TOLERANCE)
@@ -234,7 +394,7 @@ impl Solver {
 
     /// Moves along `step` to a lower cost: by the full step if that descends enough, else to the minimum on the line.
     ///
-    /// Returns the new cost; the gradient there is in `gradient`. `None` if no descent was found.
+    /// Returns the new cost; the gradient there is in `gradient`, the former point and its gradient in `trial`. `None` if no descent was found.
     fn line_search(&mut self, problem: &ContactProblem, island: &Island, cost: f64) -> Option<f64> {
         let slope: f64 = self.gradient.iter().zip(&self.step).map(|(g, s)| g * s).sum();
         if slope.is_nan() || slope >= 0.0 {
@@ -243,8 +403,12 @@ impl Solver {
         let (mut low, mut high, mut at) = (0.0, f64::INFINITY, 1.0);
         let mut value = f64::INFINITY;
         for _ in 0..40 {
-            let along;
-            (value, along) = self.probe(problem, island, at);
+            self.trial.iter_mut().zip(&self.v).zip(&self.step).for_each(|((t, v), s)| *t = v + at * s);
+            let trial = std::mem::take(&mut self.trial);
+            let mut gradient = std::mem::take(&mut self.trial_gradient);
+            value = self.evaluate(problem, island, &trial, &mut gradient);
+            let along: f64 = gradient.iter().zip(&self.step).map(|(g, s)| g * s).sum();
+            (self.trial, self.trial_gradient) = (trial, gradient);
             let descends = value <= cost + 1e-4 * at * slope;
             // At a slope this small, or still downhill, the model is accurate enough to take the step.
             if descends && (along.abs() <= 0.3 * slope.abs() || along <= 0.0) {
@@ -266,16 +430,5 @@ impl Solver {
         std::mem::swap(&mut self.v, &mut self.trial);
         std::mem::swap(&mut self.gradient, &mut self.trial_gradient);
         Some(value)
-    }
-
-    /// Cost and slope at `v + at · step`, which is left in `trial`.
-    fn probe(&mut self, problem: &ContactProblem, island: &Island, at: f64) -> (f64, f64) {
-        self.trial.iter_mut().zip(&self.v).zip(&self.step).for_each(|((t, v), s)| *t = v + at * s);
-        let trial = std::mem::take(&mut self.trial);
-        let mut gradient = std::mem::take(&mut self.trial_gradient);
-        let value = self.evaluate(problem, island, &trial, &mut gradient);
-        let along = gradient.iter().zip(&self.step).map(|(g, s)| g * s).sum();
-        (self.trial, self.trial_gradient) = (trial, gradient);
-        (value, along)
     }
 }

@@ -1,6 +1,5 @@
 //! Data of one solve.
 
-use super::law::ScalarConstraint;
 use crate::geometry::Vec3;
 
 /// A block of generalised velocities with its own momentum equation `A v = r` (a *clique* of Drake's SAP).
@@ -21,6 +20,8 @@ pub struct VelocityBlock {
     /// Meaning of the velocities: blocks of equal identity and size in two problems describe the same coordinates,
     /// and a factored Hessian is kept from one to the other.
     pub identity: u64,
+    /// Index of its first velocity in the vectors of its island; set by the solver.
+    pub offset: usize,
 }
 
 /// Jacobian of a rigid frame: its motion as a linear function of the velocities of one block.
@@ -66,7 +67,7 @@ pub struct ContactCluster {
 }
 
 /// One contact point. Its relative velocity is `v_a − v_b − drift`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct ContactPoint {
     /// Weights of `a`'s nodes.
     pub weights_a: [f64; 8],
@@ -101,6 +102,29 @@ pub struct ContactPoint {
     pub is_slipping: bool,
 }
 
+/// A spring–damper with a force limit on one velocity of one block: a joint drive, a stop, a speed limit, dry friction.
+#[derive(Clone, Copy, Debug)]
+pub struct ScalarConstraint {
+    /// The block.
+    pub block: usize,
+    /// Index of the velocity in the block.
+    pub index: usize,
+    /// Stiffness (N/m or N m/rad).
+    pub stiffness: f64,
+    /// Damping (N s/m or N m s/rad).
+    pub damping: f64,
+    /// Target minus position at the start of the step (m or rad).
+    pub error: f64,
+    /// Target velocity (m/s or rad/s) of the damping.
+    pub target_velocity: f64,
+    /// Smallest force (N or N m); 0 for a lower stop.
+    pub min_force: f64,
+    /// Largest force (N or N m); 0 for an upper stop.
+    pub max_force: f64,
+    /// Result: the force (N or N m).
+    pub force: f64,
+}
+
 /// A whole problem; its buffers are reused between steps.
 #[derive(Clone, Debug, Default)]
 pub struct ContactProblem {
@@ -130,6 +154,12 @@ impl ContactProblem {
         self.clusters.clear();
         self.points.clear();
         self.constraints.clear();
+    }
+
+    /// The velocities of a block, or values that belong to them, in a vector of its island.
+    pub(super) fn range(&self, block: usize) -> std::ops::Range<usize> {
+        let VelocityBlock { offset, dim, .. } = self.blocks[block];
+        offset..offset + dim
     }
 
     /// The block that an endpoint moves with.

@@ -3,15 +3,7 @@
 //! Contacts that have begun to slip since the factor was computed change the Hessian by a matrix of low rank, which a
 //! few secant pairs capture: limited-memory BFGS (Nocedal 1980) with the factor in the place of the initial matrix.
 
-use super::options::MAX_SECANT_PAIRS;
 use crate::physics::sparse::dense::dot;
-
-/// Velocities and the gradient of the cost there.
-#[derive(Clone, Copy)]
-pub(super) struct SecantState<'a> {
-    pub v: &'a [f64],
-    pub gradient: &'a [f64],
-}
 
 /// A step and the change of the gradient along it.
 #[derive(Clone, Debug)]
@@ -21,45 +13,29 @@ struct SecantPair {
     curvature: f64,
 }
 
+/// Number of pairs kept per factor.
+const MAX_PAIRS: usize = 8;
+
 /// The last pairs, oldest first.
 #[derive(Clone, Debug, Default)]
-pub(super) struct SecantPairs {
-    pairs: Vec<SecantPair>,
-    used: usize,
-}
+pub(super) struct SecantPairs(Vec<SecantPair>);
 
 impl SecantPairs {
     /// Discards all pairs, after a new factorization.
     pub(super) fn clear(&mut self) {
-        self.used = 0;
+        self.0.clear();
     }
 
-    /// Adds the pair of a step, excluding the gradient changes `others` (index, amount), which come from constraints
-    /// that are not in the factor.
-    pub(super) fn push(
-        &mut self,
-        before: SecantState,
-        after: SecantState,
-        others: impl Iterator<Item = (usize, f64)>,
-    ) {
-        if self.used == MAX_SECANT_PAIRS {
-            self.pairs.rotate_left(1);
-            self.used -= 1;
+    /// Adds a step and the change of the gradient along it.
+    pub(super) fn push(&mut self, step: Vec<f64>, change: Vec<f64>) {
+        if self.0.len() == MAX_PAIRS {
+            self.0.remove(0);
         }
-        if self.used == self.pairs.len() {
-            self.pairs.push(SecantPair { step: Vec::new(), change: Vec::new(), curvature: 0.0 });
-        }
-        let pair = &mut self.pairs[self.used];
-        pair.step.clear();
-        pair.step.extend(after.v.iter().zip(before.v).map(|(v, v0)| v - v0));
-        pair.change.clear();
-        pair.change.extend(after.gradient.iter().zip(before.gradient).map(|(g, g0)| g - g0));
-        others.for_each(|(at, amount)| pair.change[at] -= amount);
-        pair.curvature = dot(&pair.step, &pair.change);
+        let curvature = dot(&step, &change);
         // The cost is convex, so a curvature below this is rounding.
-        let floor = 1e-12 * (dot(&pair.step, &pair.step) * dot(&pair.change, &pair.change)).sqrt();
-        if pair.curvature > floor {
-            self.used += 1;
+        let floor = 1e-12 * (dot(&step, &step) * dot(&change, &change)).sqrt();
+        if curvature > floor {
+            self.0.push(SecantPair { step, change, curvature });
         }
     }
 
@@ -67,8 +43,8 @@ impl SecantPairs {
     /// includes `stiffness` on the diagonal of the last velocities. The pairs do not include it.
     pub(super) fn solve(&self, stiffness: &[f64], b: &mut [f64], solve: impl FnOnce(&mut [f64])) {
         let head = b.len() - stiffness.len();
-        let (mut weights, mut curvatures) = ([0.0; MAX_SECANT_PAIRS], [0.0; MAX_SECANT_PAIRS]);
-        let pairs = self.pairs[..self.used].iter();
+        let (mut weights, mut curvatures) = ([0.0; MAX_PAIRS], [0.0; MAX_PAIRS]);
+        let pairs = self.0.iter();
         for ((pair, weight), curvature) in pairs.clone().zip(&mut weights).zip(&mut curvatures).rev() {
             let tail = || pair.step[head..].iter().zip(stiffness);
             *curvature = pair.curvature + tail().map(|(s, k)| k * s * s).sum::<f64>();
@@ -98,10 +74,7 @@ mod tests {
         for i in [1, 2, 4] {
             let v: [f64; 5] = std::array::from_fn(|j| if i == j { 0.7 } else { 0.0 });
             let g: [f64; 5] = std::array::from_fn(|j| hessian[j] * v[j]);
-            // The contribution of a stiffness of 7 on the last entry is excluded.
-            let all: [f64; 5] = std::array::from_fn(|j| g[j] + if j == 4 { 7.0 * v[j] } else { 0.0 });
-            let before = SecantState { v: &[0.0; 5], gradient: &[0.0; 5] };
-            pairs.push(before, SecantState { v: &v, gradient: &all }, [(4, 7.0 * v[4])].into_iter());
+            pairs.push(v.to_vec(), g.to_vec());
         }
         let mut b = [1.0, 2.0, 3.0, 4.0, 5.0];
         let full = [1.0, 5.0, 0.25, 1.0, 3.0 + 2.0];

@@ -126,7 +126,8 @@ impl World {
             let dim = 3 * soft.system.retained().len();
             let identity = (index as u64) << 40 | soft.system.retained_version();
             let matrix = soft.system.take_matrix();
-            let mut block = VelocityBlock { dim, matrix, rhs: vec![0.0; dim], v: vec![0.0; dim], identity };
+            let (rhs, v) = (vec![0.0; dim], vec![0.0; dim]);
+            let mut block = VelocityBlock { dim, matrix, rhs, v, identity, ..VelocityBlock::default() };
             soft.system.reduce(momentum, &mut block.rhs);
             for (i, &node) in soft.system.retained().iter().enumerate() {
                 block.v[3 * i..3 * i + 3].copy_from_slice(body.v[node as usize].as_slice());
@@ -165,6 +166,7 @@ impl World {
                 rhs: stack(&linear, &angular),
                 v: stack(&body.v, &body.w),
                 identity: 1 << 60 | self.blocks.rigid.len() as u64,
+                ..VelocityBlock::default()
             });
         }
     }
@@ -197,6 +199,7 @@ impl World {
                 rhs: rhs.as_slice().to_vec(),
                 v: articulation.state.v.as_slice().to_vec(),
                 identity: 1 << 61 | self.blocks.articulations.len() as u64,
+                ..VelocityBlock::default()
             });
         }
     }
