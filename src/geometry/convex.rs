@@ -1,4 +1,4 @@
-//! Closest points and penetration of two convex shapes, by the GJK and EPA of parry.
+//! Convex primitives, and their closest points or penetration by the GJK and EPA of parry.
 
 use parry3d_f64::{
     math as parry,
@@ -11,20 +11,44 @@ use super::{
     parry::{from_parry, pose_to_parry, to_parry},
 };
 
-/// A convex shape centred on the origin of its own frame.
+/// A convex primitive in its own frame, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ConvexShape {
-    /// A box with these half extents, m.
-    Box(Vec3),
-    /// A cylinder along z.
+pub enum Primitive {
+    /// The half-space z ≤ 0.
+    Plane,
+    /// A box centred on the origin.
+    Box {
+        /// Half extents, m.
+        half: Vec3,
+    },
+    /// A cylinder along z, centred on the origin.
     Cylinder {
         /// Radius, m.
         radius: f64,
-        /// Half the height, m.
+        /// Half of its height, m.
         half_height: f64,
     },
-    /// A segment along z with this half length, m.
-    Segment(f64),
+    /// A capsule along z, centred on the origin.
+    Capsule {
+        /// Radius, m.
+        radius: f64,
+        /// Half of the length of its core segment (the total is 2 (half_height + radius)), m.
+        half_height: f64,
+    },
+    /// A sphere centred on the origin.
+    Sphere {
+        /// Radius, m.
+        radius: f64,
+    },
+}
+
+/// A shape and the pose of its frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placed<T> {
+    /// The shape, in its own frame.
+    pub shape: T,
+    /// Its frame, in the frame of the context.
+    pub pose: Pose,
 }
 
 /// Closest points of two separated shapes, or the end points of the least penetration of two overlapping ones.
@@ -38,47 +62,53 @@ pub struct ClosestPoints {
     pub n_w: Vec3,
 }
 
-/// Closest points of `a` and `b`; `None` if they are farther apart than `max_distance` (m) or the search fails.
+/// A primitive as a convex core with a layer around it.
+struct LayeredCore {
+    core: Box<dyn SupportMap>,
+    /// Frame of the core: parry's cylinders are along y, those of [`Primitive`] along z.
+    frame: Pose,
+    /// Thickness of the layer, m.
+    radius: f64,
+}
+
+impl Placed<Primitive> {
+    fn core(&self) -> Option<LayeredCore> {
+        let (mut rotation, mut layer) = (Vec3::zeros(), 0.0);
+        let core: Box<dyn SupportMap> = match self.shape {
+            Primitive::Box { half } => Box::new(Cuboid::new(to_parry(&half))),
+            Primitive::Cylinder { radius, half_height } => {
+                rotation = Vec3::x() * std::f64::consts::FRAC_PI_2;
+                Box::new(Cylinder::new(half_height, radius))
+            }
+            Primitive::Capsule { radius, half_height } => {
+                layer = radius;
+                let end = parry::Vector::new(0.0, 0.0, half_height);
+                Box::new(Segment::new(-end, end))
+            }
+            Primitive::Plane | Primitive::Sphere { .. } => return None,
+        };
+        Some(LayeredCore { core, frame: self.pose * Pose::new(Vec3::zeros(), rotation), radius: layer })
+    }
+}
+
+/// Closest points of two boxes, cylinders or capsules; `None` if they are farther apart than `max_distance` (m), if the
+/// search fails, or for other primitives.
 pub fn closest_points(
-    a: &ConvexShape,
-    pose_a: &Pose,
-    b: &ConvexShape,
-    pose_b: &Pose,
+    a: &Placed<Primitive>,
+    b: &Placed<Primitive>,
     max_distance: f64,
 ) -> Option<ClosestPoints> {
-    let (frame_a, frame_b) = (pose_a * parry_frame(a), pose_b * parry_frame(b));
-    let relative = pose_to_parry(&frame_a.inv_mul(&frame_b));
-    let (map_a, map_b) = (support_map(a), support_map(b));
+    let (a, b) = (a.core()?, b.core()?);
     let found = details::contact_support_map_support_map_with_params(
-        &relative,
-        &*map_a,
-        &*map_b,
-        max_distance,
+        &pose_to_parry(&a.frame.inv_mul(&b.frame)),
+        &*a.core,
+        &*b.core,
+        max_distance + a.radius + b.radius,
         &mut VoronoiSimplex::new(),
         None,
     );
     let GJKResult::ClosestPoints(on_a, on_b, normal) = found else { return None };
-    let point = |p: parry::Vector| frame_a * nalgebra::Point3::from(from_parry(p));
-    let n_w = frame_a.rotation * from_parry(normal);
-    Some(ClosestPoints { a_w: point(on_a).coords, b_w: point(on_b).coords, n_w: n_w.try_normalize(0.0)? })
-}
-
-/// Frame of parry's shape in the frame of `piece`: parry's cylinders are along y, those of [`ConvexShape`] along z.
-fn parry_frame(piece: &ConvexShape) -> Pose {
-    let rotation = match piece {
-        ConvexShape::Cylinder { .. } => Vec3::x() * std::f64::consts::FRAC_PI_2,
-        ConvexShape::Box(_) | ConvexShape::Segment(_) => Vec3::zeros(),
-    };
-    Pose::new(Vec3::zeros(), rotation)
-}
-
-fn support_map(piece: &ConvexShape) -> Box<dyn SupportMap> {
-    match *piece {
-        ConvexShape::Box(half) => Box::new(Cuboid::new(to_parry(&half))),
-        ConvexShape::Cylinder { radius, half_height } => Box::new(Cylinder::new(half_height, radius)),
-        ConvexShape::Segment(half) => {
-            let end = parry::Vector::new(0.0, 0.0, half);
-            Box::new(Segment::new(-end, end))
-        }
-    }
+    let point = |p: parry::Vector| (a.frame * nalgebra::Point3::from(from_parry(p))).coords;
+    let n_w = (a.frame.rotation * from_parry(normal)).try_normalize(0.0)?;
+    Some(ClosestPoints { a_w: point(on_a) + n_w * a.radius, b_w: point(on_b) - n_w * b.radius, n_w })
 }

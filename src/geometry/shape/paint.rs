@@ -61,34 +61,18 @@ impl Shape {
             Self::Displace { shape, reliefs } => {
                 Self::Displace { shape: arc(shape), reliefs: reliefs.clone() }
             }
-            Self::Box { .. }
-            | Self::Sphere { .. }
-            | Self::Ellipsoid { .. }
-            | Self::Capsule { .. }
-            | Self::Cylinder { .. }
-            | Self::Torus { .. }
-            | Self::Prism { .. }
-            | Self::Lathe(_)
-            | Self::Mesh(_) => self.clone(),
+            _ => self.clone(),
         }
     }
 
     /// The largest material id that [`Shape::material`] can return.
     pub fn highest_material(&self) -> u16 {
-        let most = |parts: &[Self]| parts.iter().map(Self::highest_material).max().unwrap_or(0);
-        match self {
-            Self::Paint { shape, material, .. } => shape.highest_material().max(*material),
-            Self::Placed { shape, .. }
-            | Self::Scaled { shape, .. }
-            | Self::Rounded { shape, .. }
-            | Self::Shell { shape, .. }
-            | Self::Twist { shape, .. }
-            | Self::Bend { shape, .. }
-            | Self::Displace { shape, .. } => shape.highest_material(),
-            Self::Union(parts) | Self::Intersect(parts) | Self::SmoothUnion { parts, .. } => most(parts),
-            Self::Subtract { from, .. } | Self::SmoothSubtract { from, .. } => from.highest_material(),
-            _ => 0,
-        }
+        let (own, parts) = match self {
+            Self::Paint { shape, material, .. } => (*material, vec![&**shape]),
+            Self::Subtract { from, .. } | Self::SmoothSubtract { from, .. } => (0, vec![&**from]),
+            _ => (0, self.children()),
+        };
+        parts.into_iter().map(Self::highest_material).fold(own, u16::max)
     }
 }
 

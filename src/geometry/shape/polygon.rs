@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::error::ShapeError;
+use super::validate::ShapeError;
 
 /// A simple closed polygon with counter-clockwise corners, m: (x, z) for a prism, (r, z) with r ≥ 0 for a lathe.
 #[derive(Clone, PartialEq)]

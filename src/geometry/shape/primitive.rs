@@ -47,16 +47,22 @@ pub(super) fn capsule(p: &Vec3, radius: f64, half_length: f64) -> SignedDistance
     sphere(&Vec3::new(p.x, p.y, p.z - p.z.clamp(-half_length, half_length)), radius)
 }
 
+/// The intersection of a cross-section and the slab between two ends, whose normals are perpendicular.
+fn extruded(section: SignedDistance, slab: SignedDistance) -> SignedDistance {
+    if section.distance > 0.0 && slab.distance > 0.0 {
+        let edge = length(section.distance, slab.distance);
+        let normal = (section.normal * section.distance + slab.normal * slab.distance) / edge;
+        return SignedDistance::new(edge, normal);
+    }
+    if section.distance > slab.distance { section } else { slab }
+}
+
 pub(super) fn cylinder(p: &Vec3, radius: f64, half_height: f64) -> SignedDistance {
     let r = length(p.x, p.y);
     let (side, cap) = (r - radius, p.z.abs() - half_height);
     let radial = unit_or_x(Vec3::new(p.x, p.y, 0.0), r);
     let up = Vec3::z() * if p.z < 0.0 { -1.0 } else { 1.0 };
-    if side > 0.0 && cap > 0.0 {
-        let edge = length(side, cap);
-        return SignedDistance::new(edge, (radial * side + up * cap) / edge);
-    }
-    if side > cap { SignedDistance::new(side, radial) } else { SignedDistance::new(cap, up) }
+    extruded(SignedDistance::new(side, radial), SignedDistance::new(cap, up))
 }
 
 pub(super) fn torus(p: &Vec3, major: f64, minor: f64) -> SignedDistance {
@@ -72,11 +78,7 @@ pub(super) fn prism(p: &Vec3, section: &Polygon, half_length: f64) -> SignedDist
     let side = p.y.abs() - half_length;
     let across = Vec3::new(gradient[0], 0.0, gradient[1]);
     let along = Vec3::y() * if p.y < 0.0 { -1.0 } else { 1.0 };
-    if flat > 0.0 && side > 0.0 {
-        let edge = length(flat, side);
-        return SignedDistance::new(edge, (across * flat + along * side) / edge);
-    }
-    if flat > side { SignedDistance::new(flat, across) } else { SignedDistance::new(side, along) }
+    extruded(SignedDistance::new(flat, across), SignedDistance::new(side, along))
 }
 
 pub(super) fn lathe(p: &Vec3, profile: &Polygon) -> SignedDistance {

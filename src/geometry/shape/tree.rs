@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{
-    displacement::Displacement, error::ShapeError, mesh_solid::MeshSolid, polygon::Polygon, warp::Axis,
+    displacement::Displacement, mesh_solid::MeshSolid, polygon::Polygon, validate::ShapeError, warp::Axis,
 };
 use crate::geometry::{
     Pose, Quat, Vec3,
@@ -315,7 +315,7 @@ const EVALUATIONS: f64 = 3.0;
 
 impl Shape {
     /// The direct children.
-    fn children(&self) -> Vec<&Self> {
+    pub(super) fn children(&self) -> Vec<&Self> {
         match self {
             Self::Placed { shape, .. }
             | Self::Scaled { shape, .. }
@@ -324,22 +324,12 @@ impl Shape {
             | Self::Twist { shape, .. }
             | Self::Bend { shape, .. }
             | Self::Displace { shape, .. } => vec![shape],
-            Self::Paint { shape, region, .. } => {
-                [Some(shape), region.as_ref()].into_iter().flatten().map(AsRef::as_ref).collect()
-            }
+            Self::Paint { shape, region, .. } => region.iter().chain([shape]).map(AsRef::as_ref).collect(),
             Self::Subtract { from, cut } | Self::SmoothSubtract { from, cut, .. } => vec![from, cut],
             Self::Union(parts) | Self::Intersect(parts) | Self::SmoothUnion { parts, .. } => {
                 parts.iter().collect()
             }
-            Self::Box { .. }
-            | Self::Sphere { .. }
-            | Self::Ellipsoid { .. }
-            | Self::Capsule { .. }
-            | Self::Cylinder { .. }
-            | Self::Torus { .. }
-            | Self::Prism { .. }
-            | Self::Lathe(_)
-            | Self::Mesh(_) => Vec::new(),
+            _ => Vec::new(),
         }
     }
 
@@ -350,22 +340,19 @@ impl Shape {
             _ => 1,
         };
         let exact = matches!(self, Self::Union(_) | Self::Intersect(_) | Self::Subtract { .. });
-        let sum = |sum: TreeSize, part: TreeSize| TreeSize {
-            nodes: sum.nodes + part.nodes,
-            depth: sum.depth.max(part.depth),
-            work: sum.work + part.work,
-        };
-        let none = TreeSize { nodes: 0, depth: 0, work: 0.0 };
-        let parts = self.children().into_iter().map(Self::tree_size).fold(none, sum);
+        let mut size = TreeSize { nodes: own, depth: 0, work: 0.0 };
+        for part in self.children().into_iter().map(Self::tree_size) {
+            size.nodes += part.nodes;
+            size.depth = size.depth.max(part.depth);
+            size.work += part.work;
+        }
         let region = match self {
             Self::Paint { region: Some(region), .. } => region.tree_size().work,
             _ => 0.0,
         };
-        TreeSize {
-            nodes: parts.nodes + own,
-            depth: parts.depth + 1,
-            work: (parts.work - region).max(1.0) * if exact { EVALUATIONS } else { 1.0 },
-        }
+        size.depth += 1;
+        size.work = (size.work - region).max(1.0) * if exact { EVALUATIONS } else { 1.0 };
+        size
     }
 }
 

@@ -1,11 +1,34 @@
-//! Validation of the numbers of a shape.
+//! Validation of the numbers of a shape, and its errors.
 
 use super::{
     displacement::{Bumps, Displacement, Ramp, Ridges},
-    error::ShapeError,
     tree::Shape,
 };
 use crate::geometry::Vec3;
+
+/// Invalid number or profile of a shape.
+#[allow(missing_docs, reason = "the messages describe the variants")]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ShapeError {
+    #[error("{kind}: {field} is {value} m; give a finite length above 0")]
+    Size { kind: &'static str, field: &'static str, value: f64 },
+    #[error("{kind}: {field} is {value}; {hint}")]
+    Number { kind: &'static str, field: &'static str, value: f64, hint: &'static str },
+    #[error("{kind}: has no parts; give at least one")]
+    Empty { kind: &'static str },
+    #[error("profile: has {corners} corners; give at least 3")]
+    ProfileSize { corners: usize },
+    #[error("profile: corner {index} is ({r}, {z}); give finite numbers, and r ≥ 0 for a lathe")]
+    ProfilePoint { index: usize, r: f64, z: f64 },
+    #[error(
+        "profile: corner ({r}, {z}) is given twice in a row; leave one out (the last joins the first by itself)"
+    )]
+    ProfileRepeat { r: f64, z: f64 },
+    #[error("profile: encloses no area; go around the cross-section, not along a line")]
+    ProfileArea,
+    #[error("profile: its edges cross each other; list the corners in order around the cross-section")]
+    ProfileCrossing,
+}
 
 impl Shape {
     /// Validates all numbers of the tree.
@@ -14,87 +37,50 @@ impl Shape {
     /// The first invalid number, with its value and a hint.
     pub fn validate(&self) -> Result<(), ShapeError> {
         match self {
-            Self::Box { half } => sizes("box", "half extent", half),
-            Self::Sphere { radius } => size("sphere", "radius", *radius),
-            Self::Ellipsoid { radii } => sizes("ellipsoid", "semi-axis", radii),
+            Self::Box { half } => sizes("box", "half extent", half)?,
+            Self::Sphere { radius } => size("sphere", "radius", *radius)?,
+            Self::Ellipsoid { radii } => sizes("ellipsoid", "semi-axis", radii)?,
             Self::Capsule { radius, half_length } => {
                 size("capsule", "radius", *radius)?;
-                at_least_zero("capsule", "half length of the straight part", *half_length)
+                at_least_zero("capsule", "half length of the straight part", *half_length)?;
             }
             Self::Cylinder { radius, half_height } => {
                 size("cylinder", "radius", *radius)?;
-                size("cylinder", "half height", *half_height)
+                size("cylinder", "half height", *half_height)?;
             }
             Self::Torus { major, minor } => {
                 size("torus", "minor radius", *minor)?;
                 let hint = "give a major radius larger than the minor one";
-                ensure(major.is_finite() && major > minor, "torus", "major radius", *major, hint)
+                ensure(major.is_finite() && major > minor, "torus", "major radius", *major, hint)?;
             }
-            Self::Prism { half_length, .. } => size("prism", "half length", *half_length),
-            Self::Lathe(_) | Self::Mesh(_) => Ok(()),
-            _ => self.validate_composite(),
-        }
-    }
-
-    /// [`Shape::validate`] for shapes with parts.
-    fn validate_composite(&self) -> Result<(), ShapeError> {
-        match self {
-            Self::Placed { shape, pose } => {
-                let offset = pose.translation.vector;
-                finite("move", "offset", offset.sum() + pose.rotation.coords.sum())?;
-                shape.validate()
+            Self::Prism { half_length, .. } => size("prism", "half length", *half_length)?,
+            Self::Placed { pose, .. } => {
+                finite("move", "offset", pose.translation.vector.sum() + pose.rotation.coords.sum())?;
             }
-            Self::Scaled { shape, scale } => {
+            Self::Scaled { scale, .. } => {
                 let hint = "give a finite factor above 0";
                 let worst = scale.min();
                 ensure(worst > 0.0 && scale.sum().is_finite(), "scale", "factor", worst, hint)?;
-                shape.validate()
             }
-            Self::Rounded { shape, radius } => {
-                at_least_zero("round", "radius", *radius)?;
-                shape.validate()
-            }
-            Self::Shell { shape, thickness } => {
-                size("shell", "thickness", *thickness)?;
-                shape.validate()
-            }
-            Self::Union(parts) => all("union", parts),
-            Self::Intersect(parts) => all("intersection", parts),
-            Self::Subtract { from, cut } => from.validate().and_then(|()| cut.validate()),
+            Self::Rounded { radius, .. } => at_least_zero("round", "radius", *radius)?,
+            Self::Shell { thickness, .. } => size("shell", "thickness", *thickness)?,
+            Self::Union(parts) => not_empty("union", parts)?,
+            Self::Intersect(parts) => not_empty("intersection", parts)?,
             Self::SmoothUnion { parts, blend } => {
                 size("smooth union", "blend", *blend)?;
-                all("smooth union", parts)
+                not_empty("smooth union", parts)?;
             }
-            Self::SmoothSubtract { from, cut, blend } => {
-                size("smooth subtraction", "blend", *blend)?;
-                from.validate().and_then(|()| cut.validate())
-            }
-            Self::Twist { shape, rate, .. } => {
-                finite("twist", "rate", *rate)?;
-                shape.validate()
-            }
-            Self::Bend { shape, along, towards, curvature } => {
+            Self::SmoothSubtract { blend, .. } => size("smooth subtraction", "blend", *blend)?,
+            Self::Twist { rate, .. } => finite("twist", "rate", *rate)?,
+            Self::Bend { along, towards, curvature, .. } => {
                 finite("bend", "curvature", *curvature)?;
-                let axis = towards.index() as f64;
-                ensure(
-                    along != towards,
-                    "bend",
-                    "towards axis",
-                    axis,
-                    "bend towards another axis than along",
-                )?;
-                shape.validate()
+                let (axis, hint) = (towards.index() as f64, "bend towards another axis than along");
+                ensure(along != towards, "bend", "towards axis", axis, hint)?;
             }
-            Self::Displace { shape, reliefs } => {
-                reliefs.iter().try_for_each(Displacement::validate)?;
-                shape.validate()
-            }
-            Self::Paint { shape, region, .. } => {
-                region.as_ref().map_or(Ok(()), |region| region.validate())?;
-                shape.validate()
-            }
-            _ => Ok(()),
+            Self::Displace { reliefs, .. } => reliefs.iter().try_for_each(Displacement::validate)?,
+            Self::Subtract { .. } | Self::Paint { .. } | Self::Lathe(_) | Self::Mesh(_) => {}
         }
+        self.children().into_iter().try_for_each(Self::validate)
     }
 }
 
@@ -155,9 +141,6 @@ fn finite(kind: &'static str, field: &'static str, value: f64) -> Result<(), Sha
     ensure(value.is_finite(), kind, field, value, "give a finite number")
 }
 
-fn all(kind: &'static str, parts: &[Shape]) -> Result<(), ShapeError> {
-    if parts.is_empty() {
-        return Err(ShapeError::Empty { kind });
-    }
-    parts.iter().try_for_each(Shape::validate)
+fn not_empty(kind: &'static str, parts: &[Shape]) -> Result<(), ShapeError> {
+    if parts.is_empty() { Err(ShapeError::Empty { kind }) } else { Ok(()) }
 }

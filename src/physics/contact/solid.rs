@@ -1,30 +1,34 @@
 //! Collision geometry of a collider: how it meets other colliders.
 //!
-//! A hard shape is either composed of convex primitives, whose manifolds are exact, or general: then its surface
-//! features are tested in the other's distance field. A compliant skin (the gel of a tactile sensor) meets hard
+//! A rigid shape is either composed of convex primitives, whose manifolds are exact, or general: then its surface
+//! features are tested in the other's distance field. A compliant skin (the gel of a tactile sensor) meets rigid
 //! shapes at its samples.
 
 use std::sync::OnceLock;
 
 use super::manifold::{
-    ManifoldPoint, Primitive, SurfaceFeatures, field::SurfaceInField, manifold, primitives, surface_features,
+    ManifoldPoint, SurfaceFeatures, field::SurfaceInField, manifold, primitives, surface_features,
 };
-use crate::geometry::{Aabb, Pose, Vec3, shape::Shape};
+use crate::geometry::{
+    Aabb, Pose, Vec3,
+    convex::{Placed, Primitive},
+    shape::Shape,
+};
 
 /// Geometry of a collider for contact with other colliders, in the collider's frame.
 #[derive(Debug)]
 pub enum CollisionGeometry {
-    /// A hard shape.
+    /// A rigid shape.
     Rigid(Box<RigidShape>),
-    /// A compliant skin: it meets hard shapes at its samples, and no other skin.
+    /// A compliant skin: it meets rigid shapes at its samples, and no other skin.
     Gel(Vec<GelSample>),
 }
 
-/// A hard shape and the data derived from it.
+/// A rigid shape and the data derived from it.
 #[derive(Debug)]
 pub struct RigidShape {
     shape: Shape,
-    primitives: Option<Vec<(Primitive, Pose)>>,
+    primitives: Option<Vec<Placed<Primitive>>>,
     /// Computed on first use: it takes milliseconds, and most colliders never meet a general shape.
     features: OnceLock<SurfaceFeatures>,
     /// Computed on first use, since the bounds of a displaced shape take a search.
@@ -50,7 +54,7 @@ pub type PairId = u32;
 const MAX_FACING_COSINE: f64 = 0.3;
 
 impl CollisionGeometry {
-    /// The geometry of a hard shape.
+    /// The geometry of a rigid shape.
     pub fn new(shape: &Shape) -> Self {
         Self::Rigid(Box::new(RigidShape {
             shape: shape.clone(),
@@ -60,35 +64,36 @@ impl CollisionGeometry {
         }))
     }
 
-    /// Appends the contact points with `other` whose gap is below `margin` (m). Normals point from this to the other.
+    /// Appends the contact points of `a` and `b` whose gap is below `margin` (m). Normals point from `a` to `b`.
     pub fn find_contacts(
-        &self,
-        pose: &Pose,
-        other: &Self,
-        other_pose: &Pose,
+        a: Placed<&Self>,
+        b: Placed<&Self>,
         margin: f64,
         out: &mut Vec<(PairId, ManifoldPoint)>,
     ) {
-        match (self, other) {
-            (Self::Rigid(own), Self::Rigid(other)) => own.find_contacts(pose, other, other_pose, margin, out),
-            (Self::Gel(gel), Self::Rigid(hard)) => {
-                out.extend(hard.gel_contacts(other_pose, gel, pose, margin).map(|point| (0, point)));
+        match (a.shape, b.shape) {
+            (Self::Rigid(shape_a), Self::Rigid(shape_b)) => {
+                shape_a.find_contacts(&a.pose, shape_b, &b.pose, margin, out);
             }
-            (Self::Rigid(hard), Self::Gel(gel)) => {
-                let points = hard.gel_contacts(pose, gel, other_pose, margin);
+            (Self::Gel(gel), Self::Rigid(rigid)) => {
+                out.extend(rigid.gel_contacts(&b.pose, gel, &a.pose, margin).map(|point| (0, point)));
+            }
+            (Self::Rigid(rigid), Self::Gel(gel)) => {
+                let points = rigid.gel_contacts(&a.pose, gel, &b.pose, margin);
                 out.extend(points.map(|point| (0, ManifoldPoint { n_w: -point.n_w, ..point })));
             }
             (Self::Gel(_), Self::Gel(_)) => {}
         }
     }
 
-    /// Depth of the deepest point of two hard shapes under the other's surface, m; 0 if they do not overlap.
+    /// Depth of the deepest point of two rigid shapes under the other's surface, m; 0 if they do not overlap.
     /// Compliant skins are ignored.
-    pub fn depth(&self, pose: &Pose, other: &Self, other_pose: &Pose) -> f64 {
-        let (Self::Rigid(own), Self::Rigid(other)) = (self, other) else { return 0.0 };
+    pub fn depth(a: Placed<&Self>, b: Placed<&Self>) -> f64 {
+        let (Self::Rigid(shape_a), Self::Rigid(shape_b)) = (a.shape, b.shape) else { return 0.0 };
         let mut found = Vec::new();
-        own.find_contacts(pose, other, other_pose, 0.0, &mut found);
-        found.iter().map(|(_, point)| -point.phi).fold(own.seed_depth(pose, other, other_pose), f64::max)
+        shape_a.find_contacts(&a.pose, shape_b, &b.pose, 0.0, &mut found);
+        let seeds = shape_a.seed_depth(&a.pose, shape_b, &b.pose);
+        found.iter().map(|(_, point)| -point.phi).fold(seeds, f64::max)
     }
 }
 
@@ -125,9 +130,10 @@ impl RigidShape {
     ) {
         let mut found = Vec::new();
         if let (Some(own), Some(others)) = (&self.primitives, &other.primitives) {
-            for (i, (a, frame_a)) in own.iter().enumerate() {
-                for (j, (b, frame_b)) in others.iter().enumerate() {
-                    manifold(a, &(pose * frame_a), b, &(other_pose * frame_b), margin, &mut found);
+            let moved = |part: &Placed<Primitive>, pose: &Pose| Placed { pose: pose * part.pose, ..*part };
+            for (i, a) in own.iter().enumerate() {
+                for (j, b) in others.iter().enumerate() {
+                    manifold(&moved(a, pose), &moved(b, other_pose), margin, &mut found);
                     let pair = (i * others.len() + j) as PairId;
                     out.extend(found.drain(..).map(|point| (pair, point)));
                 }

@@ -2,8 +2,12 @@
 
 use super::{SoftBody, World, rigid_contacts::ColliderPair};
 use crate::{
-    geometry::{Aabb, Pose, Vec3},
-    physics::{contact::Collider, fem::FemState},
+    geometry::{Aabb, Pose, Vec3, convex::Placed},
+    physics::{
+        contact::{Collider, CollisionGeometry},
+        fem::FemState,
+        ids::ColliderId,
+    },
 };
 
 /// Two bodies that overlap.
@@ -42,9 +46,11 @@ impl World {
         let penetration = |&ColliderPair { a, b, .. }: &ColliderPair| {
             let (a, b) = (a.min(b), a.max(b));
             let [first, second] = [self.collider(a), self.collider(b)];
-            let (solid_a, solid_b) = (first.solid.as_ref()?, second.solid.as_ref()?);
-            let (pose_a, pose_b) = (&self.motions[a.index()].pose, &self.motions[b.index()].pose);
-            let depth = solid_a.depth(pose_a, solid_b, pose_b);
+            let placed = |id: ColliderId| {
+                let shape = self.collider(id).solid.as_deref()?;
+                Some(Placed { shape, pose: self.motions[id.index()].pose })
+            };
+            let depth = CollisionGeometry::depth(placed(a)?, placed(b)?);
             Some(Penetration { names: [first.name.clone(), second.name.clone()], depth })
         };
         pairs.iter().filter_map(penetration).collect()

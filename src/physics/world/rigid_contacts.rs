@@ -10,9 +10,9 @@ use super::{
     contact_points::{ContactPair, EndStretch, SlidingPairs},
 };
 use crate::{
-    geometry::{Aabb, GroupedAabb, Vec3, overlapping_pairs},
+    geometry::{Aabb, GroupedAabb, Vec3, convex::Placed, overlapping_pairs},
     physics::{
-        contact::{DetectionLimits, ManifoldPoint, PairId},
+        contact::{CollisionGeometry, DetectionLimits, ManifoldPoint, PairId},
         ids::{BodyId, ColliderId},
         solver::{ContactCluster, ContactPoint, Endpoint},
     },
@@ -100,8 +100,9 @@ impl World {
             let (first, second) = (self.collider(a), self.collider(b));
             let (Some(solid_a), Some(solid_b)) = (&first.solid, &second.solid) else { continue };
             contacts.found.clear();
-            let (pose_a, pose_b) = (&self.motions[a.index()].pose, &self.motions[b.index()].pose);
-            solid_b.find_contacts(pose_b, solid_a, pose_a, margin, &mut contacts.found);
+            let placed = |shape, id: ColliderId| Placed { shape, pose: self.motions[id.index()].pose };
+            let (placed_a, placed_b) = (placed(&**solid_a, a), placed(&**solid_b, b));
+            CollisionGeometry::find_contacts(placed_b, placed_a, margin, &mut contacts.found);
             if contacts.found.is_empty() {
                 continue;
             }

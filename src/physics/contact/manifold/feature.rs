@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{NON_MATERIAL, Primitive};
+use super::{NON_MATERIAL, Placed, Primitive};
 use crate::geometry::{Pose, Vec3};
 
 /// Number of points that represent a rim in flat contact. The circle is at most 0.9 % outside of their polygon, which
@@ -60,8 +60,11 @@ pub(super) struct FacingFeatures {
 }
 
 /// The features of `primitive` that face `direction` (unit, world).
-pub(super) fn facing_features(primitive: &Primitive, pose: &Pose, direction: &Vec3) -> FacingFeatures {
-    match *primitive {
+pub(super) fn facing_features(
+    Placed { shape, pose }: &Placed<Primitive>,
+    direction: &Vec3,
+) -> FacingFeatures {
+    match *shape {
         Primitive::Plane => {
             let normal = pose.rotation * Vec3::z();
             let face = Face { corners: Vec::new(), normal, origin: pose.translation.vector, weight: 1.0 };

@@ -4,7 +4,7 @@
 use nalgebra::SymmetricEigen;
 
 use super::{
-    POINT_AREA, Primitive,
+    POINT_AREA, Placed, Primitive,
     flat_region::{FlatSample, flat_samples, project_to_surface},
 };
 use crate::geometry::{
@@ -72,27 +72,29 @@ pub(in super::super) fn surface_features(shape: &Shape) -> SurfaceFeatures {
 
 /// The convex primitives that a shape is composed of, with their frames in the object frame. `None` if
 /// it has other parts.
-pub(in super::super) fn primitives(shape: &Shape) -> Option<Vec<(Primitive, Pose)>> {
-    let one = |primitive| Some(vec![(primitive, Pose::identity())]);
-    match shape {
-        Shape::Box { half } => one(Primitive::Box { half: *half }),
-        Shape::Sphere { radius } => one(Primitive::Sphere { radius: *radius }),
+pub(in super::super) fn primitives(shape: &Shape) -> Option<Vec<Placed<Primitive>>> {
+    let primitive = match shape {
+        Shape::Box { half } => Primitive::Box { half: *half },
+        Shape::Sphere { radius } => Primitive::Sphere { radius: *radius },
         Shape::Cylinder { radius, half_height } => {
-            one(Primitive::Cylinder { radius: *radius, half_height: *half_height })
+            Primitive::Cylinder { radius: *radius, half_height: *half_height }
         }
         Shape::Capsule { radius, half_length } => {
-            one(Primitive::Capsule { radius: *radius, half_height: *half_length })
+            Primitive::Capsule { radius: *radius, half_height: *half_length }
         }
         Shape::Placed { shape, pose } => {
-            Some(primitives(shape)?.into_iter().map(|(primitive, frame)| (primitive, pose * frame)).collect())
+            let mut parts = primitives(shape)?;
+            parts.iter_mut().for_each(|part| part.pose = pose * part.pose);
+            return Some(parts);
         }
-        Shape::Paint { shape, .. } => primitives(shape),
+        Shape::Paint { shape, .. } => return primitives(shape),
         Shape::Union(parts) => {
             let parts: Option<Vec<_>> = parts.iter().map(primitives).collect();
-            Some(parts?.into_iter().flatten().collect())
+            return Some(parts?.into_iter().flatten().collect());
         }
-        _ => None,
-    }
+        _ => return None,
+    };
+    Some(vec![Placed { shape: primitive, pose: Pose::identity() }])
 }
 
 /// Adds the features of `shape` at `frame_o`.

@@ -1,7 +1,7 @@
 //! Contact points of two primitives by the overlap of their features along a common normal.
 
 use super::{
-    ManifoldPoint, NON_MATERIAL, POINT_AREA, Primitive,
+    ManifoldPoint, NON_MATERIAL, POINT_AREA, Placed, Primitive,
     clip::{self, ClippedEnd, Corner},
     feature::{Face, FaceCorner, FacingFeatures, Line, facing_features},
     separating_axis::{ContactNormal, contact_normal, support},
@@ -88,16 +88,14 @@ struct FeatureOverlap {
 
 /// Appends the contact points of two primitives in rank order.
 pub(super) fn features(
-    a: &Primitive,
-    pose_a: &Pose,
-    b: &Primitive,
-    pose_b: &Pose,
+    a: &Placed<Primitive>,
+    b: &Placed<Primitive>,
     margin: f64,
     out: &mut Vec<ManifoldPoint>,
 ) {
-    let Some(axis) = contact_normal(a, pose_a, b, pose_b, margin) else { return };
-    let plane = ProjectionPlane::new(pose_b.translation.vector, axis.n_w);
-    let (on_a, on_b) = (facing_features(a, pose_a, &axis.n_w), facing_features(b, pose_b, &-axis.n_w));
+    let Some(axis) = contact_normal(a, b, margin) else { return };
+    let plane = ProjectionPlane::new(b.pose.translation.vector, axis.n_w);
+    let (on_a, on_b) = (facing_features(a, &axis.n_w), facing_features(b, &-axis.n_w));
     let mut carried = 0.0;
     for FeatureOverlap { q, height_a, height_b, area, feature } in feature_overlaps(&plane, &on_a, &on_b) {
         let phi = height_b - height_a;
@@ -111,21 +109,15 @@ pub(super) fn features(
     }
     let uncarried = POINT_AREA - carried;
     if uncarried > 0.0 && (axis.closest.is_some() || carried == 0.0) && axis.is_attained {
-        out.push(ManifoldPoint { area: uncarried, ..witness(a, pose_a, b, pose_b, &axis) });
+        out.push(ManifoldPoint { area: uncarried, ..witness(a, b, &axis) });
     }
 }
 
 /// The closest points, for contacts that no overlap of features represents (a rim against an edge, end against end).
-fn witness(
-    a: &Primitive,
-    pose_a: &Pose,
-    b: &Primitive,
-    pose_b: &Pose,
-    axis: &ContactNormal,
-) -> ManifoldPoint {
+fn witness(a: &Placed<Primitive>, b: &Placed<Primitive>, axis: &ContactNormal) -> ManifoldPoint {
     let p_w = match axis.closest {
         Some(touch) => 0.5 * (touch.a_w + touch.b_w),
-        None => 0.5 * (support(a, pose_a, &axis.n_w) + support(b, pose_b, &-axis.n_w)),
+        None => 0.5 * (support(a, &axis.n_w) + support(b, &-axis.n_w)),
     };
     ManifoldPoint { p_w, n_w: axis.n_w, phi: axis.gap, area: POINT_AREA, feature: WITNESS }
 }

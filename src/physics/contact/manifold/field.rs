@@ -4,7 +4,6 @@ use std::f64::consts::TAU;
 
 use super::{
     ManifoldPoint, NON_MATERIAL, POINT_AREA,
-    closest_points::lowest_points,
     feature::RIM_POINTS,
     feature_extraction::{Rim, SAMPLE_AREA, SurfaceFeatures},
     field_probe::{FieldProbe, golden_minimum},
@@ -22,9 +21,9 @@ const FLAT_FEATURES: u32 = 1 << 23;
 
 /// Surface of body a in the distance field of body b.
 pub(in super::super) struct SurfaceInField<'a> {
-    features: &'a SurfaceFeatures,
-    shape: &'a Shape,
-    probe: FieldProbe<'a>,
+    pub(super) features: &'a SurfaceFeatures,
+    pub(super) shape: &'a Shape,
+    pub(super) probe: FieldProbe<'a>,
 }
 
 impl<'a> SurfaceInField<'a> {
@@ -61,12 +60,6 @@ impl<'a> SurfaceInField<'a> {
         for (index, rim) in self.features.rims.iter().enumerate() {
             rim_points(&self.probe, rim, RIM_FEATURES + 64 * index as u32, margin, out);
         }
-    }
-
-    /// Appends the lowest points and lines of smooth parts whose gap is below `margin` (m), as far as the points
-    /// already in `out` do not carry there.
-    pub(in super::super) fn lowest(&self, margin: f64, out: &mut Vec<ManifoldPoint>) {
-        lowest_points(&self.probe, self.features, self.shape, margin, out);
     }
 }
 
@@ -288,8 +281,8 @@ mod tests {
         let parts = primitives(&tray).expect("two boxes");
         assert_eq!(parts.len(), 2);
         let centre = Quat::from_scaled_axis(Vec3::z()) * Vec3::new(0.0, 0.1, 0.05);
-        assert!((parts[1].1.translation.vector - centre).norm() < 1e-15);
-        assert_eq!(parts[1].0, Primitive::Box { half: Vec3::new(0.1, 0.005, 0.05) });
+        assert!((parts[1].pose.translation.vector - centre).norm() < 1e-15);
+        assert_eq!(parts[1].shape, Primitive::Box { half: Vec3::new(0.1, 0.005, 0.05) });
         assert_eq!(primitives(&bowl()), None);
     }
 }

@@ -11,16 +11,19 @@
 //! change of pose must change the sum of forces little: points have to fade in and out. Parry's contact manifolds
 //! give neither areas nor continuous weights.
 
-use crate::geometry::{Pose, Vec3};
+use crate::geometry::{
+    Vec3,
+    convex::{Placed, Primitive},
+};
 
 mod clip;
-mod closest_points;
 mod feature;
 mod feature_extraction;
 mod feature_overlap;
 pub(super) mod field;
 mod field_probe;
 mod flat_region;
+mod lowest_points;
 mod separating_axis;
 mod sphere_capsule;
 
@@ -30,37 +33,6 @@ mod test_rig;
 mod tests;
 
 pub(super) use feature_extraction::{SurfaceFeatures, primitives, surface_features};
-
-/// A convex primitive in its own frame, m.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Primitive {
-    /// The half-space z ≤ 0.
-    Plane,
-    /// A box centred on the origin.
-    Box {
-        /// Half extents, m.
-        half: Vec3,
-    },
-    /// A cylinder along z, centred on the origin.
-    Cylinder {
-        /// Radius, m.
-        radius: f64,
-        /// Half of its height, m.
-        half_height: f64,
-    },
-    /// A capsule along z, centred on the origin.
-    Capsule {
-        /// Radius, m.
-        radius: f64,
-        /// Half of the length of its core segment (the total is 2 (half_height + radius)), m.
-        half_height: f64,
-    },
-    /// A sphere centred on the origin.
-    Sphere {
-        /// Radius, m.
-        radius: f64,
-    },
-}
 
 /// One point where two bodies touch or nearly touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,16 +63,14 @@ pub const NON_MATERIAL: u32 = 1 << 31;
 /// rim that carries it sinks in.
 pub const POINT_AREA: f64 = 1e-3;
 
-impl Primitive {
-    /// Position in the order of types; the manifold of each pair of types is implemented for one order only.
-    fn rank(&self) -> u8 {
-        match self {
-            Self::Plane => 0,
-            Self::Box { .. } => 1,
-            Self::Cylinder { .. } => 2,
-            Self::Capsule { .. } => 3,
-            Self::Sphere { .. } => 4,
-        }
+/// Position in the order of types; the manifold of each pair of types is implemented for one order only.
+fn rank(primitive: &Primitive) -> u8 {
+    match primitive {
+        Primitive::Plane => 0,
+        Primitive::Box { .. } => 1,
+        Primitive::Cylinder { .. } => 2,
+        Primitive::Capsule { .. } => 3,
+        Primitive::Sphere { .. } => 4,
     }
 }
 
@@ -108,40 +78,19 @@ impl Primitive {
 ///
 /// Swapping the two flips the normals and changes nothing else, except the feature identifiers of two
 /// primitives of one type.
-pub fn manifold(
-    a: &Primitive,
-    pose_a: &Pose,
-    b: &Primitive,
-    pose_b: &Pose,
-    margin: f64,
-    out: &mut Vec<ManifoldPoint>,
-) {
-    let start = out.len();
-    if a.rank() <= b.rank() {
-        return ordered(a, pose_a, b, pose_b, margin, out);
+pub fn manifold(a: &Placed<Primitive>, b: &Placed<Primitive>, margin: f64, out: &mut Vec<ManifoldPoint>) {
+    if rank(&a.shape) > rank(&b.shape) {
+        let start = out.len();
+        manifold(b, a, margin, out);
+        return out[start..].iter_mut().for_each(|point| point.n_w = -point.n_w);
     }
-    ordered(b, pose_b, a, pose_a, margin, out);
-    out[start..].iter_mut().for_each(|point| point.n_w = -point.n_w);
-}
-
-/// [`manifold`] of a pair in rank order.
-fn ordered(
-    a: &Primitive,
-    pose_a: &Pose,
-    b: &Primitive,
-    pose_b: &Pose,
-    margin: f64,
-    out: &mut Vec<ManifoldPoint>,
-) {
-    match (*a, *b) {
+    match (a.shape, b.shape) {
         (Primitive::Plane, Primitive::Plane) => {}
         (Primitive::Plane, Primitive::Box { half }) => {
-            feature_overlap::plane_box(pose_a, &half, pose_b, margin, out);
+            feature_overlap::plane_box(&a.pose, &half, &b.pose, margin, out);
         }
-        (_, Primitive::Sphere { radius }) => sphere_capsule::sphere(a, pose_a, radius, pose_b, margin, out),
-        (Primitive::Capsule { .. }, Primitive::Capsule { .. }) => {
-            sphere_capsule::capsules(a, pose_a, b, pose_b, margin, out);
-        }
-        _ => feature_overlap::features(a, pose_a, b, pose_b, margin, out),
+        (_, Primitive::Sphere { radius }) => sphere_capsule::sphere(a, radius, &b.pose, margin, out),
+        (Primitive::Capsule { .. }, Primitive::Capsule { .. }) => sphere_capsule::capsules(a, b, margin, out),
+        _ => feature_overlap::features(a, b, margin, out),
     }
 }

@@ -1,9 +1,9 @@
 //! The contact normal of two convex primitives: the direction in which they are farthest apart.
 
-use super::Primitive;
+use super::{Placed, Primitive};
 use crate::geometry::{
-    Pose, Vec3,
-    convex::{self, ClosestPoints, ConvexShape},
+    Vec3,
+    convex::{self, ClosestPoints},
 };
 
 /// Gap by which a refined direction must exceed that of a face or axis to be preferred, m. Directions of faces are
@@ -27,36 +27,34 @@ pub(super) struct ContactNormal {
 
 /// The contact normal of `a` and `b` in rank order, or `None` if they are at least `margin` (m) apart.
 pub(super) fn contact_normal(
-    a: &Primitive,
-    pose_a: &Pose,
-    b: &Primitive,
-    pose_b: &Pose,
+    a: &Placed<Primitive>,
+    b: &Placed<Primitive>,
     margin: f64,
 ) -> Option<ContactNormal> {
-    let gap_along = |n_w: &Vec3| n_w.dot(&(support(b, pose_b, &-n_w) - support(a, pose_a, n_w)));
+    let gap_along = |n_w: &Vec3| n_w.dot(&(support(b, &-n_w) - support(a, n_w)));
     let signed = |axis: &Vec3| {
         let (ahead, behind) = (gap_along(axis), gap_along(&-axis));
         if ahead >= behind { (ahead, *axis) } else { (behind, -axis) }
     };
-    let (mut gap, mut n_w) = if matches!(a, Primitive::Plane) {
-        let n_w = faces(a, pose_a)[0];
+    let (mut gap, mut n_w) = if a.shape == Primitive::Plane {
+        let n_w = faces(a)[0];
         (gap_along(&n_w), n_w)
     } else {
-        faces(a, pose_a)
+        faces(a)
             .iter()
-            .chain(&faces(b, pose_b))
+            .chain(&faces(b))
             .map(signed)
             .fold((f64::NEG_INFINITY, Vec3::z()), |best, found| if found.0 > best.0 { found } else { best })
     };
     if gap >= margin {
         return None;
     }
-    if matches!(a, Primitive::Plane) {
+    if a.shape == Primitive::Plane {
         return Some(ContactNormal { n_w, gap, closest: None, is_attained: true });
     }
     let mut to_beat = gap + PREFER_FACES_M + PREFER_FACES_SHARE * gap.abs();
-    for edge_a in edges(a, pose_a) {
-        for edge_b in edges(b, pose_b) {
+    for edge_a in edges(a) {
+        for edge_b in edges(b) {
             let Some(cross) = edge_a.cross(&edge_b).try_normalize(1e-6) else { continue };
             let found = signed(&cross);
             if found.0 > to_beat {
@@ -68,10 +66,10 @@ pub(super) fn contact_normal(
     if gap >= margin {
         return None;
     }
-    if matches!((a, b), (Primitive::Box { .. }, Primitive::Box { .. })) {
+    if matches!((a.shape, b.shape), (Primitive::Box { .. }, Primitive::Box { .. })) {
         return Some(ContactNormal { n_w, gap, closest: None, is_attained: gap <= 0.0 });
     }
-    let closest = refine(a, pose_a, b, pose_b, margin);
+    let closest = convex::closest_points(a, b, margin);
     if let Some(found) = closest {
         let refined = gap_along(&found.n_w);
         if refined > gap + PREFER_FACES_M {
@@ -81,30 +79,10 @@ pub(super) fn contact_normal(
     (gap < margin).then_some(ContactNormal { n_w, gap, closest, is_attained: true })
 }
 
-/// The closest points of the primitives, from those of their cores.
-fn refine(a: &Primitive, pose_a: &Pose, b: &Primitive, pose_b: &Pose, margin: f64) -> Option<ClosestPoints> {
-    let ((core_a, radius_a), (core_b, radius_b)) = (core(a)?, core(b)?);
-    let found = convex::closest_points(&core_a, pose_a, &core_b, pose_b, margin + radius_a + radius_b)?;
-    let (a_w, b_w) = (found.a_w + found.n_w * radius_a, found.b_w - found.n_w * radius_b);
-    Some(ClosestPoints { a_w, b_w, ..found })
-}
-
-/// A primitive as a convex core and the thickness of a layer around it, m.
-fn core(primitive: &Primitive) -> Option<(ConvexShape, f64)> {
-    match *primitive {
-        Primitive::Box { half } => Some((ConvexShape::Box(half), 0.0)),
-        Primitive::Cylinder { radius, half_height } => {
-            Some((ConvexShape::Cylinder { radius, half_height }, 0.0))
-        }
-        Primitive::Capsule { radius, half_height } => Some((ConvexShape::Segment(half_height), radius)),
-        Primitive::Plane | Primitive::Sphere { .. } => None,
-    }
-}
-
 /// The point of a primitive farthest along `direction` (unit, world).
-pub(super) fn support(primitive: &Primitive, pose: &Pose, direction: &Vec3) -> Vec3 {
+pub(super) fn support(Placed { shape, pose }: &Placed<Primitive>, direction: &Vec3) -> Vec3 {
     let d = pose.rotation.inverse() * direction;
-    let p = match *primitive {
+    let p = match *shape {
         Primitive::Plane => Vec3::zeros(),
         Primitive::Box { half } => half.zip_map(&d, f64::copysign),
         Primitive::Cylinder { radius, half_height } => {
@@ -118,8 +96,8 @@ pub(super) fn support(primitive: &Primitive, pose: &Pose, direction: &Vec3) -> V
 }
 
 /// Directions of flat faces, world.
-fn faces(primitive: &Primitive, pose: &Pose) -> Vec<Vec3> {
-    match primitive {
+fn faces(Placed { shape, pose }: &Placed<Primitive>) -> Vec<Vec3> {
+    match shape {
         Primitive::Plane | Primitive::Cylinder { .. } => vec![pose.rotation * Vec3::z()],
         Primitive::Box { .. } => (0..3).map(|axis| pose.rotation * Vec3::ith(axis, 1.0)).collect(),
         Primitive::Capsule { .. } | Primitive::Sphere { .. } => Vec::new(),
@@ -127,10 +105,12 @@ fn faces(primitive: &Primitive, pose: &Pose) -> Vec<Vec3> {
 }
 
 /// Directions of straight edges and side lines, world.
-fn edges(primitive: &Primitive, pose: &Pose) -> Vec<Vec3> {
-    match primitive {
-        Primitive::Box { .. } => faces(primitive, pose),
-        Primitive::Cylinder { .. } | Primitive::Capsule { .. } => vec![pose.rotation * Vec3::z()],
+fn edges(primitive: &Placed<Primitive>) -> Vec<Vec3> {
+    match primitive.shape {
+        Primitive::Box { .. } => faces(primitive),
+        Primitive::Cylinder { .. } | Primitive::Capsule { .. } => {
+            vec![primitive.pose.rotation * Vec3::z()]
+        }
         Primitive::Plane | Primitive::Sphere { .. } => Vec::new(),
     }
 }

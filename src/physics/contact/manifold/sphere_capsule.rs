@@ -1,6 +1,6 @@
 //! Manifolds of a sphere with any primitive and of two capsules, by distances to points and segments.
 
-use super::{ManifoldPoint, NON_MATERIAL, POINT_AREA, Primitive};
+use super::{ManifoldPoint, NON_MATERIAL, POINT_AREA, Placed, Primitive};
 use crate::geometry::{Pose, Vec3};
 
 /// Distance by which the closest points of two capsules must be closer than the interpolated gaps at the ends to
@@ -9,61 +9,67 @@ const CLOSEST_FADE_M: f64 = 1e-4;
 
 /// The closest point of a sphere.
 pub(super) fn sphere(
-    a: &Primitive,
-    pose_a: &Pose,
+    a: &Placed<Primitive>,
     radius: f64,
     sphere_w: &Pose,
     margin: f64,
     out: &mut Vec<ManifoldPoint>,
 ) {
     let centre_w = sphere_w.translation.vector;
-    let (distance, n_a) = signed_distance(a, &(pose_a.inverse() * nalgebra::Point3::from(centre_w)).coords);
-    let (phi, n_w) = (distance - radius, pose_a.rotation * n_a);
+    let centre_a = (a.pose.inverse() * nalgebra::Point3::from(centre_w)).coords;
+    let SurfaceDistance { distance, normal } = SurfaceDistance::new(&a.shape, &centre_a);
+    let (phi, n_w) = (distance - radius, a.pose.rotation * normal);
     if phi < margin {
         let p_w = centre_w - n_w * (radius + 0.5 * phi);
         out.push(ManifoldPoint { p_w, n_w, phi, area: POINT_AREA, feature: NON_MATERIAL });
     }
 }
 
-/// Signed distance of `p` to a primitive and the outward unit normal there, in the primitive's frame; exact.
-pub(super) fn signed_distance(primitive: &Primitive, p: &Vec3) -> (f64, Vec3) {
-    match *primitive {
-        Primitive::Plane => (p.z, Vec3::z()),
-        Primitive::Box { half } => {
-            let sign = p.map(|x| 1f64.copysign(x));
-            let (distance, n) = outside_corner(&(p.abs() - half));
-            (distance, n.component_mul(&sign))
-        }
-        Primitive::Cylinder { radius, half_height } => {
-            let radial = Vec3::new(p.x, p.y, 0.0).try_normalize(0.0).unwrap_or(Vec3::x());
-            let (distance, n) = outside_corner(&Vec3::new(
-                radial.dot(p) - radius,
-                f64::NEG_INFINITY,
-                p.z.abs() - half_height,
-            ));
-            (distance, radial * n.x + Vec3::z() * n.z.copysign(p.z))
-        }
-        Primitive::Capsule { radius, half_height } => {
-            to_point(&(p - Vec3::z() * p.z.clamp(-half_height, half_height)), radius)
-        }
-        Primitive::Sphere { radius } => to_point(p, radius),
-    }
+/// Signed distance to a primitive, and the outward unit normal there.
+pub(super) struct SurfaceDistance {
+    /// m; negative inside.
+    pub distance: f64,
+    pub normal: Vec3,
 }
 
-fn to_point(from: &Vec3, radius: f64) -> (f64, Vec3) {
-    let distance = from.norm();
-    (distance - radius, if distance > 0.0 { from / distance } else { Vec3::x() })
-}
-
-/// Distance and normal to the octant whose corner is at the origin, of a point at `excess`.
-fn outside_corner(excess: &Vec3) -> (f64, Vec3) {
-    let outside = excess.sup(&Vec3::zeros());
-    let distance = outside.norm();
-    if distance > 0.0 {
-        return (distance, outside / distance);
+impl SurfaceDistance {
+    /// Of the point `p`, in the primitive's frame; exact.
+    pub(super) fn new(primitive: &Primitive, p: &Vec3) -> Self {
+        match *primitive {
+            Primitive::Plane => Self { distance: p.z, normal: Vec3::z() },
+            Primitive::Box { half } => {
+                let Self { distance, normal } = Self::to_octant(&(p.abs() - half));
+                Self { distance, normal: normal.component_mul(&p.map(|x| 1f64.copysign(x))) }
+            }
+            Primitive::Cylinder { radius, half_height } => {
+                let radial = Vec3::new(p.x, p.y, 0.0).try_normalize(0.0).unwrap_or(Vec3::x());
+                let excess = Vec3::new(radial.dot(p) - radius, f64::NEG_INFINITY, p.z.abs() - half_height);
+                let Self { distance, normal: n } = Self::to_octant(&excess);
+                Self { distance, normal: radial * n.x + Vec3::z() * n.z.copysign(p.z) }
+            }
+            Primitive::Capsule { radius, half_height } => {
+                Self::to_ball(&(p - Vec3::z() * p.z.clamp(-half_height, half_height)), radius)
+            }
+            Primitive::Sphere { radius } => Self::to_ball(p, radius),
+        }
     }
-    let axis = excess.imax();
-    (excess[axis], Vec3::ith(axis, 1.0))
+
+    /// To a ball about the origin.
+    fn to_ball(p: &Vec3, radius: f64) -> Self {
+        let distance = p.norm();
+        Self { distance: distance - radius, normal: if distance > 0.0 { p / distance } else { Vec3::x() } }
+    }
+
+    /// To the octant of negative coordinates, whose corner is the origin.
+    fn to_octant(p: &Vec3) -> Self {
+        let outside = p.sup(&Vec3::zeros());
+        let distance = outside.norm();
+        if distance > 0.0 {
+            return Self { distance, normal: outside / distance };
+        }
+        let axis = p.imax();
+        Self { distance: p[axis], normal: Vec3::ith(axis, 1.0) }
+    }
 }
 
 /// Two capsules: the four end spheres against the other's core, and the closest pair of the cores between the ends.
@@ -71,33 +77,21 @@ fn outside_corner(excess: &Vec3) -> (f64, Vec3) {
 /// Each is a true gap of the two bodies. The closest pair is undefined where the cores are parallel, so it counts
 /// only as far as it is closer than the gaps at the ends, interpolated.
 pub(super) fn capsules(
-    a: &Primitive,
-    pose_a: &Pose,
-    b: &Primitive,
-    pose_b: &Pose,
+    a: &Placed<Primitive>,
+    b: &Placed<Primitive>,
     margin: f64,
     out: &mut Vec<ManifoldPoint>,
 ) {
-    let (
-        &Primitive::Capsule { radius: ra, half_height: ha },
-        &Primitive::Capsule { radius: rb, half_height: hb },
-    ) = (a, b)
-    else {
-        return;
-    };
-    let (core_a, core_b) = (core(pose_a, ha), core(pose_b, hb));
+    let Primitive::Capsule { radius: ra, half_height: ha } = a.shape else { return };
+    let Primitive::Capsule { radius: rb, half_height: hb } = b.shape else { return };
+    let (core_a, core_b) = (core(&a.pose, ha), core(&b.pose, hb));
     let mut push = |on_a: Vec3, on_b: Vec3, weight: f64, feature: u32| {
-        let (distance, n_w) = to_point(&(on_b - on_a), 0.0);
+        let SurfaceDistance { distance, normal: n_w } = SurfaceDistance::to_ball(&(on_b - on_a), 0.0);
         let phi = distance - ra - rb;
         if phi < margin && weight > 0.0 {
             let p_w = on_a + n_w * (ra + 0.5 * phi);
-            out.push(ManifoldPoint {
-                p_w,
-                n_w,
-                phi,
-                area: POINT_AREA * weight,
-                feature: NON_MATERIAL | feature,
-            });
+            let (area, feature) = (POINT_AREA * weight, NON_MATERIAL | feature);
+            out.push(ManifoldPoint { p_w, n_w, phi, area, feature });
         }
         phi
     };

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use super::tests::{BALL, BOX, CAN, meet};
+use super::tests::{BALL, BOX, CAN, meet, support};
 use super::*;
-use crate::geometry::{Mat3, Quat};
+use crate::geometry::{Mat3, Pose, Quat};
 use crate::physics::rigid::{RigidState, advance, free_spin};
 
 const GRAVITY: f64 = 9.81;
@@ -43,7 +43,7 @@ impl Incline {
     fn new(primitive: Primitive, turn: Quat, slope: f64, friction: f64) -> Self {
         let mass = 0.3;
         let mut pose = Pose::from_parts(nalgebra::Translation3::identity(), turn);
-        pose.translation.vector.z = -separating_axis::support(&primitive, &pose, &-Vec3::z()).z;
+        pose.translation.vector.z = -support(&primitive, &pose, &-Vec3::z()).z;
         let body =
             RigidState::new(&pose, Vec3::zeros(), mass, inertia(&primitive, mass)).expect("a real body");
         let gravity = Vec3::new(slope.sin(), 0.0, -slope.cos()) * GRAVITY;

@@ -2,7 +2,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::geometry::Quat;
+use crate::geometry::{Pose, Quat};
 
 pub(super) const BOX: Primitive = Primitive::Box { half: Vec3::new(0.03, 0.02, 0.05) };
 pub(super) const CAN: Primitive = Primitive::Cylinder { radius: 0.033, half_height: 0.05 };
@@ -18,8 +18,14 @@ pub(super) fn meet(
     margin: f64,
 ) -> Vec<ManifoldPoint> {
     let mut out = Vec::new();
-    manifold(a, pose_a, b, pose_b, margin, &mut out);
+    let placed = |shape: &Primitive, pose: &Pose| Placed { shape: *shape, pose: *pose };
+    manifold(&placed(a, pose_a), &placed(b, pose_b), margin, &mut out);
     out
+}
+
+/// The point of a primitive farthest along `direction` (unit, world).
+pub(super) fn support(shape: &Primitive, pose: &Pose, direction: &Vec3) -> Vec3 {
+    separating_axis::support(&Placed { shape: *shape, pose: *pose }, direction)
 }
 
 /// True if a point moves over the material as the bodies roll.
@@ -51,8 +57,7 @@ fn touching(rng: &mut ChaCha8Rng, a: &Primitive, b: &Primitive, depth: f64) -> (
         n = pose_a.rotation * Vec3::z();
     }
     let mut pose_b = Pose::new(Vec3::zeros(), turn_b);
-    let shift =
-        separating_axis::support(a, &pose_a, &n) - separating_axis::support(b, &pose_b, &-n) - n * depth;
+    let shift = support(a, &pose_a, &n) - support(b, &pose_b, &-n) - n * depth;
     pose_b.translation.vector += shift;
     (pose_a, pose_b)
 }
@@ -180,10 +185,7 @@ fn the_gap_is_the_largest_that_any_direction_shows() {
                     if matches!(a, Primitive::Plane) && (n - pose_a.rotation * Vec3::z()).norm() > 1e-9 {
                         return f64::NEG_INFINITY;
                     }
-                    n.dot(
-                        &(separating_axis::support(&b, &pose_b, &-n)
-                            - separating_axis::support(&a, &pose_a, n)),
-                    )
+                    n.dot(&(support(&b, &pose_b, &-n) - support(&a, &pose_a, n)))
                 };
                 let least = points.iter().min_by(|p, q| p.phi.total_cmp(&q.phi)).expect("a point");
                 assert!((gap_along(&least.n_w) - gap).abs() < 1.2e-5, "{a:?} {b:?}: {gap} not attained");
@@ -245,8 +247,7 @@ fn resting_contacts_change_little_when_a_pose_changes_little() {
                     let turn = Quat::from_scaled_axis(Vec3::new(0.3, 0.9, 0.1) * tilt)
                         * Quat::from_scaled_axis(base);
                     let mut pose = Pose::from_parts(nalgebra::Translation3::identity(), turn);
-                    pose.translation.vector.z -=
-                        separating_axis::support(&primitive, &pose, &-Vec3::z()).z + 1e-4;
+                    pose.translation.vector.z -= support(&primitive, &pose, &-Vec3::z()).z + 1e-4;
                     let now = push(&meet(&ground.0, &ground.1, &primitive, &pose, 0.002));
                     if let Some(before) = last {
                         let jump = (now.0 - before.0).norm();

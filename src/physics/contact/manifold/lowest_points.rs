@@ -10,7 +10,8 @@ use std::f64::consts::{FRAC_PI_4, TAU};
 
 use super::{
     ManifoldPoint, NON_MATERIAL, POINT_AREA,
-    feature_extraction::{Rim, SAMPLE_AREA, SurfaceFeatures},
+    feature_extraction::{Rim, SAMPLE_AREA},
+    field::SurfaceInField,
     field_probe::{FieldProbe, golden_minimum},
     flat_region::{MAX_FLAT_CURVATURE, project_to_surface},
 };
@@ -36,50 +37,46 @@ const LINE_RISE: f64 = 2e-5;
 
 /// The smooth surface of the first body in the field of the second.
 struct Smooth<'a> {
-    probe: &'a FieldProbe<'a>,
-    features: &'a SurfaceFeatures,
-    shape: &'a Shape,
+    surface: &'a SurfaceInField<'a>,
     /// Distance at which the rise of the gap is measured, m.
     distance: f64,
     /// Rise of the gap there from which a lowest point is well defined, m: that of [`MAX_FLAT_CURVATURE`].
     rise: f64,
 }
 
-/// Appends the lowest points of the smooth parts of body a in the field of b whose gap is below `margin` (m).
-///
-/// `out` already holds the points of its other features.
-pub(super) fn lowest_points(
-    probe: &FieldProbe,
-    features: &SurfaceFeatures,
-    shape: &Shape,
-    margin: f64,
-    out: &mut Vec<ManifoldPoint>,
-) {
-    let distance = PROBE_DISTANCE.min(PROBE_DISTANCE_RATIO * features.spacing);
-    let rise = 0.5 * MAX_FLAT_CURVATURE * distance * distance;
-    let smooth = Smooth { probe, features, shape, distance, rise };
-    let reach = margin + features.spacing;
-    let near = features.seeds.iter().filter(|p| !probe.is_beyond(p, reach));
-    let mut starts: Vec<(f64, Vec3)> = near.map(|p| (probe.gap(p), *p)).collect();
-    starts.retain(|(gap, _)| *gap < reach);
-    starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let others = out.clone();
-    let (mut used, mut found): (Vec<Vec3>, Vec<[Vec3; 2]>) = (Vec::new(), Vec::new());
-    for (_, start) in starts {
-        if used.len() == MAX_LOWEST {
-            break;
+impl SurfaceInField<'_> {
+    /// Appends the lowest points and lines of smooth parts whose gap is below `margin` (m), as far as the points
+    /// already in `out` do not carry there.
+    pub(in super::super) fn lowest(&self, margin: f64, out: &mut Vec<ManifoldPoint>) {
+        let Self { features, shape, probe } = self;
+        let distance = PROBE_DISTANCE.min(PROBE_DISTANCE_RATIO * features.spacing);
+        let smooth = Smooth { surface: self, distance, rise: 0.5 * MAX_FLAT_CURVATURE * distance * distance };
+        let reach = margin + features.spacing;
+        let near = features.seeds.iter().filter(|p| !probe.is_beyond(p, reach));
+        let mut starts: Vec<(f64, Vec3)> = near.map(|p| (probe.gap(p), *p)).collect();
+        starts.retain(|(gap, _)| *gap < reach);
+        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let others = out.clone();
+        let (mut used, mut found): (Vec<Vec3>, Vec<[Vec3; 2]>) = (Vec::new(), Vec::new());
+        for (_, start) in starts {
+            if used.len() == MAX_LOWEST {
+                break;
+            }
+            let is_known =
+                |p: &Vec3, apart: f64| found.iter().any(|line| distance_to_segment(p, line) < apart);
+            if used.iter().any(|p| (p - start).norm() < features.spacing)
+                || is_known(&start, features.spacing)
+            {
+                continue;
+            }
+            used.push(start);
+            let lowest = descend(probe, shape, start, features.spacing);
+            if is_known(&lowest, 0.5 * features.spacing) {
+                continue;
+            }
+            let feature = NON_MATERIAL | (LOWEST_FEATURES + 4 * used.len() as u32);
+            found.push(smooth.add_points(&lowest, feature, &others, margin, out));
         }
-        let is_known = |p: &Vec3, apart: f64| found.iter().any(|line| distance_to_segment(p, line) < apart);
-        if used.iter().any(|p| (p - start).norm() < features.spacing) || is_known(&start, features.spacing) {
-            continue;
-        }
-        used.push(start);
-        let lowest = descend(probe, shape, start, features.spacing);
-        if is_known(&lowest, 0.5 * features.spacing) {
-            continue;
-        }
-        let feature = NON_MATERIAL | (LOWEST_FEATURES + 4 * used.len() as u32);
-        found.push(smooth.add_points(&lowest, feature, &others, margin, out));
     }
 }
 
@@ -101,10 +98,10 @@ impl Smooth<'_> {
         margin: f64,
         out: &mut Vec<ManifoldPoint>,
     ) -> [Vec3; 2] {
-        let uncarried = uncarried_share(&self.probe.contact(p, 0.0, feature), others);
+        let uncarried = uncarried_share(&self.surface.probe.contact(p, 0.0, feature), others);
         let mut push = |p: &Vec3, share: f64, feature: u32| {
             let area = POINT_AREA * uncarried.min(self.distance_from_edges(p)) * share;
-            let point = self.probe.contact(p, area, feature);
+            let point = self.surface.probe.contact(p, area, feature);
             if point.phi < margin && area > 0.0 {
                 out.push(point);
             }
@@ -131,47 +128,49 @@ impl Smooth<'_> {
 
     /// Rise of the gap around a point, m, in eight directions.
     fn rises(&self, p: &Vec3) -> [f64; 8] {
-        let here = self.probe.gap(p);
-        let [u, v] = orthonormal_basis(&self.shape.distance_and_normal(p).1);
+        let here = self.surface.probe.gap(p);
+        let [u, v] = orthonormal_basis(&self.surface.shape.distance_and_normal(p).1);
         let directions = [u, v, (u + v).normalize(), (u - v).normalize()];
         std::array::from_fn(|k| {
             let direction = if k < 4 { directions[k] } else { -directions[k - 4] };
-            self.probe.gap(&project_to_surface(self.shape, p + direction * self.distance)) - here
+            self.surface.probe.gap(&project_to_surface(self.surface.shape, p + direction * self.distance))
+                - here
         })
     }
 
     /// The direction, near the given one of eight, in which the gap rises least.
     fn line_direction(&self, p: &Vec3, eighth: usize) -> LineDirection {
-        let [u, v] = orthonormal_basis(&self.shape.distance_and_normal(p).1);
+        let [u, v] = orthonormal_basis(&self.surface.shape.distance_and_normal(p).1);
         // The order of `rises`: along u, v and the two between them, then the opposite ones.
         let angle = [0.0, 2.0, 1.0, -1.0, 4.0, 6.0, 5.0, 3.0][eighth] * FRAC_PI_4;
         let at = |angle: f64| u * angle.cos() + v * angle.sin();
-        let gap = |d: &Vec3| self.probe.gap(&project_to_surface(self.shape, p + d * self.distance));
+        let gap =
+            |d: &Vec3| self.surface.probe.gap(&project_to_surface(self.surface.shape, p + d * self.distance));
         let direction = at(golden_minimum(|angle| gap(&at(angle)), angle - FRAC_PI_4, 0.25 * TAU));
-        let rise = gap(&direction).min(gap(&-direction)) - self.probe.gap(p);
+        let rise = gap(&direction).min(gap(&-direction)) - self.surface.probe.gap(p);
         LineDirection { direction, point_share: (rise / self.rise).clamp(0.0, 1.0) }
     }
 
     /// End of the straight line along `direction` from the lowest point `p`, where it leaves the surface
     /// or the other body.
     fn line_end(&self, p: &Vec3, direction: Vec3) -> Vec3 {
-        let (gap, normal) = (self.probe.gap(p), self.shape.distance_and_normal(p).1);
+        let (gap, normal) = (self.surface.probe.gap(p), self.surface.shape.distance_and_normal(p).1);
         let is_on_line = |length: f64| {
             let q = p + direction * length;
-            let (off, turned) = self.shape.distance_and_normal(&q);
+            let (off, turned) = self.surface.shape.distance_and_normal(&q);
             off.abs() < LINE_RISE
                 && (turned - normal).norm() < LINE_TURN
-                && self.probe.gap(&q) - gap < LINE_RISE
+                && self.surface.probe.gap(&q) - gap < LINE_RISE
         };
-        let (mut inside, mut outside) = (0.0, self.features.spacing);
-        while is_on_line(outside) && outside < 100.0 * self.features.spacing {
-            (inside, outside) = (outside, outside + self.features.spacing);
+        let (mut inside, mut outside) = (0.0, self.surface.features.spacing);
+        while is_on_line(outside) && outside < 100.0 * self.surface.features.spacing {
+            (inside, outside) = (outside, outside + self.surface.features.spacing);
         }
         for _ in 0..14 {
             let middle = 0.5 * (inside + outside);
             if is_on_line(middle) { inside = middle } else { outside = middle }
         }
-        project_to_surface(self.shape, p + direction * inside)
+        project_to_surface(self.surface.shape, p + direction * inside)
     }
 
     /// 0 on a sharp corner, edge or rim, which carries there itself, to 1 away from them.
@@ -180,8 +179,8 @@ impl Smooth<'_> {
             let q = rim.frame_o.inverse_transform_point(&nalgebra::Point3::from(*p));
             (q.x.hypot(q.y) - rim.radius).hypot(q.z)
         };
-        let to_corners = self.features.corners.iter().map(|q| (p - q).norm());
-        let to_rims = self.features.rims.iter().filter(|rim| rim.is_sharp).map(to_rim);
+        let to_corners = self.surface.features.corners.iter().map(|q| (p - q).norm());
+        let to_rims = self.surface.features.rims.iter().filter(|rim| rim.is_sharp).map(to_rim);
         (to_corners.chain(to_rims).fold(f64::INFINITY, f64::min) / self.distance).min(1.0)
     }
 }
