@@ -1,7 +1,5 @@
 //! Errors that end a command, with their exit codes.
 
-use std::process::ExitCode;
-
 use crate::rollout::cancel;
 
 /// Exit codes, the same for every command. `docs/cli.md` lists them.
@@ -19,12 +17,6 @@ pub(crate) enum Exit {
     RequirementNotMet = 99,
     /// Ctrl-C. Finished episodes are on disk.
     Interrupted = 130,
-}
-
-impl From<Exit> for ExitCode {
-    fn from(exit: Exit) -> Self {
-        Self::from(exit as u8)
-    }
 }
 
 /// An error that ends a command: an exit code and a message for standard error.

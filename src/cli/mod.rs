@@ -38,7 +38,7 @@ pub fn main() -> ExitCode {
         }
         Err(_) => Exit::Internal,
     };
-    exit.into()
+    ExitCode::from(exit as u8)
 }
 
 fn run_process() -> Result<(), CliError> {

@@ -9,9 +9,8 @@ use crate::{
         run::{
             config::ScriptArgs,
             policy::{PolicyArgs, PolicyConfig, expert_controller},
-            recording::record_all,
+            recording::{GripLog, RecordingArgs, SuiteRecording, record_all},
             selection::{EpisodeJob, select_suites, select_tasks},
-            suite_recording::{GripLog, RecordingArgs, SuiteRecording},
             suite_run::SuiteRun,
         },
     },

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde_json::json;
 
 use crate::{
     benchmark::{Condition, ObjectType, REFERENCE, Suite, Task},
@@ -28,16 +28,6 @@ use crate::{
 
 /// Name of the file with the comparison of all suites, in the folder above all runs.
 const FILE: &str = "conditions.json";
-
-/// Content of `conditions.json`.
-#[derive(Serialize)]
-struct ConditionsFile<'a> {
-    softvt: &'a str,
-    script: &'a str,
-    policy: &'a str,
-    seed: u64,
-    suites: &'a [ConditionTable],
-}
 
 /// A suite under one condition, or the unchanged reference.
 struct ConditionCase {
@@ -214,14 +204,14 @@ fn write(
     tables: &[ConditionTable],
     out: &Path,
 ) -> Result<(), CliError> {
-    let document = ConditionsFile {
-        softvt: env!("CARGO_PKG_VERSION"),
-        script: &loaded.sources.main,
-        policy: &config.policy.name,
-        seed: config.script.seed,
-        suites: tables,
-    };
-    let text = format!("{:#}\n", serde_json::json!(document));
+    let document = json!({
+        "softvt": env!("CARGO_PKG_VERSION"),
+        "script": loaded.sources.main,
+        "policy": config.policy.name,
+        "seed": config.script.seed,
+        "suites": tables,
+    });
+    let text = format!("{document:#}\n");
     let path = out.join(FILE);
     replace(&path, &text)?;
     if config.flags.json {

@@ -62,7 +62,8 @@ impl<'a> RunLog<'a> {
     /// The folder is of another run, or the manifest cannot be written.
     pub(crate) fn new(
         run: &'a SuiteRun,
-        (folder, records): (RunFolder, Vec<EpisodeRecord>),
+        folder: RunFolder,
+        records: Vec<EpisodeRecord>,
         manifest: &impl Serialize,
     ) -> Result<Self, CliError> {
         let log = Self { run, folder, records };
@@ -184,7 +185,8 @@ pub(crate) fn run_suite(run: &SuiteRun, tasks: &[&Task]) -> Result<SuiteResult, 
         true => RunFolder::resume(&run.out),
         false => RunFolder::create(&run.out).map(|folder| (folder, Vec::new())),
     };
-    let mut log = RunLog::new(run, opened.map_err(|error| config.error(error))?, &manifest)?;
+    let (folder, records) = opened.map_err(|error| config.error(error))?;
+    let mut log = RunLog::new(run, folder, records, &manifest)?;
     let artifacts = run.artifacts();
     let done: BTreeSet<_> = log.records.iter().map(|record| record.header.id.index()).collect();
     let remaining: Vec<_> = run.jobs.iter().copied().filter(|job| !done.contains(&job.index())).collect();

@@ -12,5 +12,4 @@ pub(crate) mod replay;
 pub(crate) mod requirement;
 pub(crate) mod run_manifest;
 pub(crate) mod selection;
-pub(crate) mod suite_recording;
 pub(crate) mod suite_run;

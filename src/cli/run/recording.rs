@@ -5,32 +5,408 @@
 //! of a task is merged from them, so an interrupted recording can be continued.
 
 use std::{
+    collections::BTreeMap,
     fs,
     io::ErrorKind,
     path::{Path, PathBuf},
+    sync::{Arc, Mutex},
 };
 
-use serde_json::Value;
+use clap::{Args, ValueEnum, value_parser};
+use serde_json::{Value, json};
 
 use crate::{
-    benchmark::CONTROL_HZ,
+    benchmark::{CONTROL_HZ, Suite, Task},
     cli::{
         error::CliError,
         output::{eprint_notice, print},
         run::{
-            run_manifest,
-            suite_recording::{RecordingArgs, SuiteRecording, kept},
+            config::{RunConfig, RunFlags, ScriptArgs, TraceDetail, parse_folder},
+            evaluate::{RunLog, SimulatedEpisode, with_kept},
+            policy::ControllerFactory,
+            run_manifest::{self, RunManifest},
+            selection::{EpisodeJob, path_component},
+            suite_run::SuiteRun,
         },
     },
     dataset::{
+        Demonstration,
         card::{Card, TaskCount, rejection_counts},
-        layout::{self, DATASET, MANIFEST, PARTS, RECORDING},
+        demonstration_writer::DemonstrationWriter,
+        layout::{self, DATASET, MANIFEST, PARTS, RECORDING, TaskPaths, VIDEO_STREAMS},
         manifest::{self, ManifestEntry},
+        merge_parts,
     },
-    evaluation::record::EpisodeRecord,
-    files,
+    evaluation::{
+        episode_id::{EpisodeIndex, Split},
+        record::{EpisodeRecord, Origin, Outcome},
+    },
+    files::{self, FileError},
+    parallel,
+    policy::builtin::RecordedPolicy,
+    report::{actions, run_folder::RunFolder},
+    rollout::{ChunkedPolicy, EpisodeError, FinishedEpisode, SettleError, cancel},
+    scene::InitialState,
+    script::LoadedScript,
     text::counted,
 };
+
+/// Prefix of the error of an attempt that could not start from the state of its demonstration.
+const START_FAILED: &str = "cannot reproduce the initial state: ";
+
+// Flags of all commands that create datasets.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct RecordingArgs {
+    /// Output folder: a new one, or with --resume that of an interrupted recording
+    #[arg(long, value_name = "DIR", value_parser = parse_folder)]
+    pub out: PathBuf,
+    /// Storage of images: in the HDF5 files and as videos, or only as videos
+    #[arg(long, value_name = "WHERE", default_value = "hdf5")]
+    pub images: ImageStorage,
+    /// Leave out the true state: node positions, deformation, contacts, forces
+    #[arg(long)]
+    pub no_privileged: bool,
+    /// Number of threads; the dataset does not depend on it [default: number of processors]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Continue the interrupted recording in --out, if there is one
+    #[arg(long)]
+    pub resume: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ImageStorage {
+    Hdf5,
+    Video,
+}
+
+impl RecordingArgs {
+    /// The configuration of the attempts, under the expert.
+    ///
+    /// # Errors
+    /// A shift or setting that is not valid.
+    pub(crate) fn run_config(&self, script: ScriptArgs, tasks: Vec<String>) -> Result<RunConfig, CliError> {
+        // The contact streams of a demonstration come from the trace.
+        let (threads, trace) = (self.threads, Some(TraceDetail::State));
+        RunConfig::new(script, RunFlags { tasks, threads, trace, ..RunFlags::default() })
+    }
+
+    /// True if images go into the HDF5 files too.
+    pub(crate) fn has_hdf5_images(&self) -> bool {
+        self.images == ImageStorage::Hdf5
+    }
+}
+
+/// Per attempt and control step: true if the gripper is intended to hold.
+pub(crate) type GripLog = Arc<Mutex<BTreeMap<EpisodeIndex, Vec<bool>>>>;
+
+/// A suite that is being recorded: rounds of attempts, the files of the good ones, and one merged file per task.
+pub(crate) struct SuiteRecording<'a> {
+    args: &'a RecordingArgs,
+    /// The attempts.
+    run: SuiteRun<'a>,
+    tasks: Vec<&'a Task>,
+    /// Name of the suite as a path component.
+    folder_name: String,
+    /// Demonstrations that each task must have: its first good attempts. `None` to keep all good attempts.
+    demos: Option<u32>,
+    grip_log: GripLog,
+    manifest: Value,
+    /// Environment arguments of the HDF5 files, in robomimic's form.
+    environment: Value,
+}
+
+impl<'a> SuiteRecording<'a> {
+    /// Prepares a recording of at most the attempts `jobs`. `customize` selects the controllers, and where the intent to
+    /// grip is recorded.
+    ///
+    /// # Errors
+    /// A setting or scene that is not valid.
+    pub(crate) fn new(
+        config: &'a RunConfig,
+        args: &'a RecordingArgs,
+        loaded: &'a LoadedScript,
+        suite: &'a Suite,
+        jobs: Vec<EpisodeJob<'a>>,
+        demos: Option<u32>,
+        customize: impl FnOnce(&mut SuiteRun<'a>, &GripLog) -> Result<(), CliError>,
+    ) -> Result<Self, CliError> {
+        let folder_name = path_component(&config.suite_name(suite));
+        let mut tasks: Vec<&Task> = jobs.iter().map(|job| job.task).collect();
+        tasks.dedup_by_key(|task| task.id);
+        let mut run = SuiteRun::new(config, loaded, suite, jobs, layout::attempts(&args.out, &folder_name))?;
+        run.split = Split::Demonstration;
+        run.renders_episodes = true;
+        let grip_log = GripLog::default();
+        customize(&mut run, &grip_log)?;
+        run.prepare(&tasks)?;
+        let attempts = tasks.iter().map(|task| run.jobs.iter().filter(|job| job.task.id == task.id).count());
+        let episodes = demos.unwrap_or(attempts.max().unwrap_or_default() as u32);
+        let manifest = json!(RunManifest::new(&run, &tasks, episodes));
+        let environment = json!({ "env_name": "softvt", "type": 2, "env_kwargs": manifest });
+        Ok(Self { args, run, tasks, folder_name, demos, grip_log, manifest, environment })
+    }
+
+    /// Records all tasks of the suite, and returns the records of all attempts.
+    ///
+    /// # Errors
+    /// The folder contains other attempts, an attempt or a file fails, or too few attempts are good.
+    /// Finished attempts are kept.
+    fn record(&self) -> Result<Vec<EpisodeRecord>, CliError> {
+        let (folder, records) = RunFolder::resume(&self.run.out)?;
+        let mut log = RunLog::new(&self.run, folder, records, &self.manifest)?;
+        let outcome = match self.run_rounds(&mut log) {
+            Err(error) if log.records.is_empty() => {
+                log.discard()?;
+                return Err(error);
+            }
+            outcome => outcome,
+        };
+        log.sort()?;
+        let kept = log.records.iter().filter(|record| rejection(record).is_none()).count();
+        let out = self.args.out.display();
+        let kept = format!("{} in {out}; continue with --resume", counted(kept, "demonstration"));
+        with_kept(outcome, &kept, "")?;
+        self.check_demo_counts(&log.records)?;
+        Ok(log.finish()?.records)
+    }
+
+    /// Runs attempts until every task has its demonstrations or has used up its attempts.
+    fn run_rounds(&self, log: &mut RunLog) -> Result<(), CliError> {
+        let write_actions = |finished: &FinishedEpisode| {
+            let path = actions::path(&self.run.out, finished.record.header.id.index());
+            Ok(actions::write(&path, &finished.actions)?)
+        };
+        loop {
+            let due = |task: &'a Task| {
+                self.due(&log.records, task.id).into_iter().map(move |episode| EpisodeJob { task, episode })
+            };
+            let jobs: Vec<EpisodeJob> = self.tasks.iter().flat_map(|task| due(task)).collect();
+            if !jobs.is_empty() {
+                let record =
+                    |job| Ok(SimulatedEpisode { finished: self.record_attempt(job)?, rendered: Ok(()) });
+                log.run_jobs(&self.folder_name, &jobs, record, write_actions, attempt_line)?;
+            }
+            for task in &self.tasks {
+                let kept = kept(&log.records, task.id);
+                let is_complete = match self.demos {
+                    Some(required) => kept.len() == required as usize,
+                    None => self.due(&log.records, task.id).is_empty(),
+                };
+                if !kept.is_empty() && is_complete {
+                    self.merge_task(task.id, &kept)?;
+                }
+            }
+            if jobs.is_empty() || cancel::requested() {
+                return Ok(());
+            }
+        }
+    }
+
+    fn due(&self, records: &[EpisodeRecord], task: usize) -> Vec<u32> {
+        let attempts = self.run.jobs.iter().filter(|job| job.task.id == task).map(|job| job.episode);
+        let finished = records.iter().filter(|record| record.header.id.task == task);
+        let finished =
+            finished.map(|record| (record.header.id.episode, rejection(record).is_none())).collect();
+        due(&attempts.collect::<Vec<_>>(), &finished, self.demos.map_or(usize::MAX, |demos| demos as usize))
+    }
+
+    /// Runs an attempt and, if it is good, writes the files of its demonstration.
+    fn record_attempt(&self, job: EpisodeJob) -> Result<FinishedEpisode, CliError> {
+        let mut finished = self.run_attempt(job)?;
+        let recorded_grip = parallel::lock(&self.grip_log).remove(&job.index());
+        let states = finished.recording.take();
+        let Some(mut states) = states.filter(|_| rejection(&finished.record).is_none()) else {
+            return Ok(finished);
+        };
+        let commanded_grip = || finished.actions.iter().map(|action| action.closure > 0.5).collect();
+        let mut is_holding: Vec<bool> = recorded_grip.unwrap_or_else(commanded_grip);
+        // The recorded grip can have fewer entries than there are steps, or more. The last one continues.
+        is_holding.resize(finished.actions.len(), is_holding.last().copied().unwrap_or_default());
+        let demonstration = Demonstration::new(&finished, &states, is_holding, !self.args.no_privileged);
+        let (paths, attempt) = (self.paths(job.task.id), job.episode);
+        let writer = DemonstrationWriter {
+            hdf5: paths.part(attempt, "hdf5"),
+            videos: VIDEO_STREAMS.map(|video| paths.part(attempt, &format!("{video}.mp4"))),
+            preview: paths.part(attempt, "preview.mp4"),
+            store_images: self.args.has_hdf5_images(),
+            environment: &self.environment,
+        };
+        writer.write(&mut states, demonstration, cancel::requested)?;
+        Ok(finished)
+    }
+
+    /// Simulates an attempt. One that cannot start from the state of its foreign demonstration becomes a failed attempt
+    /// from the state of the layout.
+    fn run_attempt(&self, job: EpisodeJob) -> Result<FinishedEpisode, CliError> {
+        let run = &self.run;
+        let origin = run.origins.get(&job.index());
+        let error = match (run.run_episode_from(job, origin, true, &run.controllers)?, origin) {
+            (Ok(finished), _) => return Ok(finished),
+            (Err(error), Some(origin))
+                if is_start_error(&error) && origin.start != InitialState::default() =>
+            {
+                error
+            }
+            (Err(error), _) => return Err(run.episode_error(&error)),
+        };
+        let ending = format!("{START_FAILED}{error}");
+        let failing: ControllerFactory = Box::new(move |_, brief| {
+            let policy = RecordedPolicy::new(Vec::new(), Some(ending.clone()));
+            Ok(Box::new(ChunkedPolicy::new(Box::new(policy), brief, 1)))
+        });
+        let layout_start = origin.map(|origin| Origin { start: InitialState::default(), ..origin.clone() });
+        run.run_episode_from(job, layout_start.as_ref(), true, &failing)?
+            .map_err(|error| run.episode_error(&error))
+    }
+
+    /// Paths of the files of a task.
+    fn paths(&self, task: usize) -> TaskPaths {
+        TaskPaths { root: self.args.out.clone(), suite: self.folder_name.clone(), task }
+    }
+
+    /// Merges the demonstrations of a task into one file, unless it exists, and removes their parts.
+    fn merge_task(&self, task: usize, kept: &[&EpisodeRecord]) -> Result<(), CliError> {
+        let paths = self.paths(task);
+        if !paths.hdf5().is_file() {
+            for (demo, record) in kept.iter().enumerate() {
+                for file in paths.video_moves(record.header.id.episode, demo) {
+                    move_part(&file.part, &file.target)?;
+                }
+            }
+            let parts: Vec<PathBuf> = kept.iter().map(|r| paths.part(r.header.id.episode, "hdf5")).collect();
+            merge_parts(&parts, &paths.hdf5(), &self.environment)?;
+        }
+        match fs::remove_dir_all(paths.parts()) {
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                Err(FileError::io("remove", &paths.parts())(error).into())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks that every task has its demonstrations.
+    ///
+    /// # Errors
+    /// The tasks that have too few, with the reasons for which attempts were not kept.
+    fn check_demo_counts(&self, records: &[EpisodeRecord]) -> Result<(), CliError> {
+        let Some(required) = self.demos.map(|demos| demos as usize) else { return Ok(()) };
+        let short =
+            self.tasks.iter().map(|task| self.count(task, records)).filter(|count| count.demos < required);
+        let short = short.map(|count| {
+            format!(
+                "{}: task {}: {} of {} after {} ({})",
+                self.folder_name,
+                count.task,
+                count.demos,
+                counted(required, "demonstration"),
+                counted(count.attempts, "attempt"),
+                rejection_counts(&count.rejected)
+            )
+        });
+        let short: Vec<String> = short.collect();
+        if short.is_empty() {
+            return Ok(());
+        }
+        Err(self.run.config.error(format!(
+            "{}\nthe good ones are in {}; continue with --resume and more --attempts, or fix the expert",
+            short.join("\n"),
+            self.args.out.display()
+        )))
+    }
+
+    /// Counts of a task, without the sizes of its files.
+    fn count(&self, task: &Task, records: &[EpisodeRecord]) -> TaskCount {
+        let kept = kept(records, task.id);
+        let attempts = || records.iter().filter(|record| record.header.id.task == task.id);
+        let mut rejected = BTreeMap::new();
+        for reason in attempts().filter_map(rejection) {
+            *rejected.entry(reason).or_insert(0) += 1;
+        }
+        TaskCount {
+            suite: self.folder_name.clone(),
+            task: task.id,
+            prompt: task.prompt.clone(),
+            asset: attempts().next().map_or(String::new(), |record| record.header.asset.clone()),
+            demos: kept.len(),
+            samples: kept.iter().map(|record| record.stats.steps as usize).sum(),
+            attempts: attempts().count(),
+            rejected,
+            hdf5_bytes: 0,
+            video_bytes: 0,
+        }
+    }
+}
+
+/// Moves a part to its final path, unless an interrupted recording has done so already.
+fn move_part(part: &Path, path: &Path) -> Result<(), CliError> {
+    if !part.is_file() && path.is_file() {
+        return Ok(());
+    }
+    files::create_parent(path)?;
+    Ok(files::rename(part, path)?)
+}
+
+/// Attempts at a task that became demonstrations, in order.
+fn kept(records: &[EpisodeRecord], task: usize) -> Vec<&EpisodeRecord> {
+    let is_kept = |record: &&EpisodeRecord| record.header.id.task == task && rejection(record).is_none();
+    let mut kept: Vec<_> = records.iter().filter(is_kept).collect();
+    kept.sort_by_key(|record| record.header.id.episode);
+    kept
+}
+
+/// True if an episode failed before its first step.
+fn is_start_error(error: &EpisodeError) -> bool {
+    match error {
+        EpisodeError::Build(_) => true,
+        EpisodeError::Settle { source, .. } => !matches!(source, SettleError::Interrupted),
+        _ => false,
+    }
+}
+
+/// Those of `attempts` to run next, so that the first `demos` good ones are found whatever the order in which attempts
+/// finish. `finished` maps each finished attempt to true if it is good.
+fn due(attempts: &[u32], finished: &BTreeMap<u32, bool>, demos: usize) -> Vec<u32> {
+    let mut end = 0;
+    loop {
+        let missing = attempts[..end].iter().copied().filter(|attempt| !finished.contains_key(attempt));
+        let missing: Vec<u32> = missing.collect();
+        let good = attempts[..end].iter().filter(|attempt| finished.get(attempt) == Some(&true)).count();
+        if !missing.is_empty() || good >= demos || end == attempts.len() {
+            return missing;
+        }
+        end = end.saturating_add(demos - good).min(attempts.len());
+    }
+}
+
+/// The reason for which an attempt is not kept. `None` if it is.
+fn rejection(record: &EpisodeRecord) -> Option<String> {
+    let verdict = &record.verdict;
+    let reason = match &record.outcome {
+        _ if verdict.safety => return None,
+        Outcome::Invalid { reason, .. } => return Some(format!("invalid ({reason})")),
+        Outcome::Error { message } if message.starts_with(START_FAILED) => "could not start",
+        Outcome::Error { .. } => "ended by an error",
+        _ if record.stats.gave_up.is_some() => "given up",
+        _ if !verdict.goal => "goal not reached",
+        _ if !verdict.no_drop => "dropped",
+        _ if verdict.deformation_ok == Some(false) => "deformed too much",
+        _ if record.header.soft && verdict.tau.is_none() => "without a known limit of deformation",
+        _ => "not safe",
+    };
+    Some(reason.to_owned())
+}
+
+/// Formats an attempt as one line of progress.
+fn attempt_line(record: &EpisodeRecord) -> String {
+    let id = &record.header.id;
+    let result = match (rejection(record), &record.outcome) {
+        (None, _) => "kept".to_owned(),
+        (Some(reason), Outcome::Error { message }) => format!("not kept: {reason} ({message})"),
+        (Some(reason), _) => format!("not kept: {reason}"),
+    };
+    format!("task {} attempt {}: {result}, {:.1} s", id.task, id.episode, record.stats.time_s)
+}
 
 /// Records a dataset. `request` describes it in `recording.json`; `prepare` returns its prepared suites.
 ///
@@ -179,4 +555,44 @@ fn write_summary(
     }
     print(&format!("{}\n", root.join(MANIFEST).display()));
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    /// Runs attempts that are kept if `good` is true of their number. Returns their numbers and how many were kept. If
+    /// `interrupted`, only the last attempt of each round finishes.
+    fn record(good: impl Fn(u32) -> bool, demos: u32, max: u32, interrupted: bool) -> (BTreeSet<u32>, usize) {
+        let (attempts, mut done) = ((0..max).collect::<Vec<_>>(), BTreeMap::new());
+        loop {
+            let mut next = due(&attempts, &done, demos as usize);
+            if next.is_empty() {
+                let kept = done.values().filter(|good| **good).count();
+                return (done.into_keys().collect(), kept);
+            }
+            if interrupted {
+                next = next.split_off(next.len() - 1);
+            }
+            done.extend(next.into_iter().map(|attempt| (attempt, good(attempt))));
+        }
+    }
+
+    #[test]
+    fn attempts_depend_only_on_the_outcomes_of_earlier_ones() {
+        let good = |attempt: u32| !attempt.is_multiple_of(3);
+        let (run, kept) = record(good, 10, 100, false);
+        assert_eq!(run, (0..15).collect(), "attempt 14 is the tenth good one");
+        assert_eq!(kept, 10);
+        assert_eq!(record(good, 10, 100, true), (run, kept));
+        assert_eq!(record(|_| true, 7, 100, false), ((0..7).collect(), 7));
+    }
+
+    #[test]
+    fn attempts_stop_at_their_maximum() {
+        assert_eq!(record(|_| false, 5, 12, false), ((0..12).collect(), 0));
+        assert_eq!(record(|attempt| attempt == 3, 2, 8, true), ((0..8).collect(), 1));
+    }
 }

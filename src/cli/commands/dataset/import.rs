@@ -17,9 +17,8 @@ use crate::{
         run::{
             config::ScriptArgs,
             policy::PolicyConfig,
-            recording::record_all,
+            recording::{GripLog, RecordingArgs, SuiteRecording, record_all},
             selection::{EpisodeJob, select_suites},
-            suite_recording::{GripLog, RecordingArgs, SuiteRecording},
             suite_run::SuiteRun,
         },
     },
