@@ -77,12 +77,12 @@ fn rigid_suites_refuse_soft_targets() {
 
 #[test]
 fn valid_suites_are_listed() {
-    let said = Small::default().project().succeeds("check x.lua");
-    assert_eq!(said.out, "suite one: 1 task, 1 episode each\n   0 wait: cube on post\nx.lua: OK\n");
+    let output = Small::default().project().succeeds("check x.lua");
+    assert_eq!(output.out, "suite one: 1 task, 1 episode each\n   0 wait: cube on post\nx.lua: OK\n");
 }
 
 #[test]
 fn standard_suites_are_valid() {
-    let said = Project::new(&[]).succeeds("check suites/all.lua");
-    assert_eq!(said.out.matches(" tasks, ").count(), 4);
+    let output = Project::new(&[]).succeeds("check suites/all.lua");
+    assert_eq!(output.out.matches(" tasks, ").count(), 4);
 }

@@ -30,13 +30,18 @@ const THREE: &str = "{ name = \"heavy x2\", shift = { mass = 2 } },
 #[test]
 fn each_condition_is_a_run_of_the_same_episodes() {
     let project = project(THREE, "deformable");
-    let said = project.succeeds("suites/trial.lua --policy noop --out run");
-    let rows: Vec<&str> = said.out.lines().filter(|line| !line.starts_with('─')).collect();
+    let output = project.succeeds("suites/trial.lua --policy noop --out run");
+    let rows: Vec<&str> = output.out.lines().filter(|line| !line.starts_with('─')).collect();
     let starts: Vec<&str> = rows.iter().map(|row| row.split("  ").next().unwrap_or_default()).collect();
-    assert_eq!(starts[1..7], ["condition", "reference", "heavy x2", "same", "hard", "weak"], "{}", said.out);
-    assert!(said.out.lines().all(|line| line.chars().count() <= 100), "{}", said.out);
-    let (_, against) = said.out.split_once("change from the reference").expect("a second table");
-    assert!(against.contains("95 % interval") && against.contains("\nheavy x2"), "{}", said.out);
+    assert_eq!(
+        starts[1..7],
+        ["condition", "reference", "heavy x2", "same", "hard", "weak"],
+        "{}",
+        output.out
+    );
+    assert!(output.out.lines().all(|line| line.chars().count() <= 100), "{}", output.out);
+    let (_, against) = output.out.split_once("change from the reference").expect("a second table");
+    assert!(against.contains("95 % interval") && against.contains("\nheavy x2"), "{}", output.out);
     let alone = project.succeeds("suites/one.lua --policy noop --shift mass=2 --out alone");
     assert!(!alone.out.is_empty());
     assert_eq!(project.text("run/heavy_x2/episodes.jsonl"), project.text("alone/episodes.jsonl"));
@@ -48,9 +53,9 @@ fn each_condition_is_a_run_of_the_same_episodes() {
 #[test]
 fn the_comparison_is_written_and_light_alone_changes_no_result() {
     let project = project(THREE, "deformable");
-    let said = project.succeeds("suites/trial.lua --policy noop --out run --json");
+    let output = project.succeeds("suites/trial.lua --policy noop --out run --json");
     let document = project.json("run/conditions.json");
-    assert_eq!(document, serde_json::from_str::<Value>(&said.out).expect("JSON"));
+    assert_eq!(document, serde_json::from_str::<Value>(&output.out).expect("JSON"));
     let suite = &document["suites"][0];
     assert_eq!((&suite["suite"], &document["policy"]), (&Value::from("one"), &Value::from("noop")));
     let rows = suite["rows"].as_array().expect("rows");
@@ -68,10 +73,10 @@ fn the_comparison_is_written_and_light_alone_changes_no_result() {
 #[test]
 fn conditions_without_effect_are_reported_and_not_run() {
     let project = project(THREE, "rigid");
-    let said = project.succeeds("suites/trial.lua --policy noop --out run");
-    let row = said.out.lines().find(|line| line.starts_with("hard  ")).expect("a row");
+    let output = project.succeeds("suites/trial.lua --policy noop --out run");
+    let row = output.out.lines().find(|line| line.starts_with("hard  ")).expect("a row");
     assert!(row.split_whitespace().skip(1).all(|cell| cell == "N/A"), "{row}");
-    assert!(said.out.contains("hard: N/A, nothing that is judged deforms"), "{}", said.out);
+    assert!(output.out.contains("hard: N/A, nothing that is judged deforms"), "{}", output.out);
     assert!(!project.path("run/hard").exists() && project.path("run/weak/summary.json").exists());
     let twin = self::project(THREE, "deformable");
     twin.succeeds("suites/trial.lua --policy noop --twin rigid --out run");
@@ -115,10 +120,10 @@ fn invalid_conditions_are_reported_before_anything_runs() {
 #[test]
 fn conditions_are_checked_and_listed() {
     let project = project(THREE, "deformable");
-    let said = project.succeeds("check suites/trial.lua");
-    assert!(said.out.contains("conditions: reference, heavy x2, same, hard, weak\n"), "{}", said.out);
-    let said = project.succeeds("list suites --json");
-    let rows: Value = serde_json::from_str(&said.out).expect("JSON");
+    let output = project.succeeds("check suites/trial.lua");
+    assert!(output.out.contains("conditions: reference, heavy x2, same, hard, weak\n"), "{}", output.out);
+    let output = project.succeeds("list suites --json");
+    let rows: Value = serde_json::from_str(&output.out).expect("JSON");
     let row = |name: &str| rows.as_array().into_iter().flatten().find(|row| row["name"] == name).cloned();
     assert_eq!(row("all").map(|row| row["tasks"].clone()), Some(Value::from(40)));
     assert_eq!(row("trial").map(|row| row["conditions"].clone()), Some(Value::from(5)));

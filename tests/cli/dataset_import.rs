@@ -35,7 +35,7 @@ fn recorded() -> Project {
 const OWN: &str = "data/hdf5/one_task0_demo.hdf5";
 
 /// Content of a SoftVTBench file, apart from its poses.
-struct Said<'a> {
+struct SyntheticFile<'a> {
     language: &'a str,
     /// Position of the cube.
     cube: [f64; 2],
@@ -44,7 +44,7 @@ struct Said<'a> {
 }
 
 /// Writes a file with one demonstration that holds the arm still.
-fn write(from: &Path, into: &Path, said: &Said) {
+fn write(from: &Path, into: &Path, content: &SyntheticFile) {
     let read = TaskFile::open(from).expect("a file");
     let numbers = |name: &str| match read.stream(0, name).expect("a stream").values {
         StreamValues::F64(numbers) => numbers,
@@ -54,12 +54,12 @@ fn write(from: &Path, into: &Path, said: &Said) {
     let file = H5File::create(into).expect("made");
     let data = file.create_group("data").expect("a group");
     let demo = data.create_group("demo_0").expect("a group");
-    demo.set_attr_string("language", said.language).expect("written");
+    demo.set_attr_string("language", content.language).expect("written");
     let observed = demo.create_group("obs").expect("a group");
     let steps = 12;
     let put = |group: &rust_hdf5::H5Group, name: &str, row: &[f64]| {
         let all: Vec<f64> = (0..steps)
-            .flat_map(|i| if i < said.still { row.to_vec() } else { vec![0.0; row.len()] })
+            .flat_map(|i| if i < content.still { row.to_vec() } else { vec![0.0; row.len()] })
             .collect();
         let array = group.new_dataset::<f64>().shape([steps, row.len()]).create(name).expect("an array");
         array.write_raw(&all).expect("written");
@@ -71,15 +71,15 @@ fn write(from: &Path, into: &Path, said: &Said) {
     let kind = start.create_group("rigid_object").expect("a group");
     let cube = kind.create_group("cube_1").expect("a group");
     let root = cube.new_dataset::<f64>().shape([1, 7]).create("root_pose").expect("an array");
-    root.write_raw(&[said.cube[0], said.cube[1], 0.9, 1.0, 0.0, 0.0, 0.0]).expect("written");
+    root.write_raw(&[content.cube[0], content.cube[1], 0.9, 1.0, 0.0, 0.0, 0.0]).expect("written");
     file.close().expect("closed");
 }
 
 #[test]
 fn own_demonstrations_end_in_the_same_states() {
     let project = recorded();
-    let said = project.succeeds(&format!("dataset import x.lua {OWN} --out again --images video"));
-    assert!(said.err.contains("one_task0_demo.hdf5: softvt, 2 demonstrations"), "{}", said.err);
+    let output = project.succeeds(&format!("dataset import x.lua {OWN} --out again --images video"));
+    assert!(output.err.contains("one_task0_demo.hdf5: softvt, 2 demonstrations"), "{}", output.err);
     let states = |folder: &str| -> Vec<_> {
         let lines = project.lines(&format!("{folder}/manifest.jsonl"));
         lines.iter().map(|line| (line["episode"].clone(), line["state_hash"].clone())).collect()
@@ -99,14 +99,14 @@ fn own_demonstrations_end_in_the_same_states() {
 fn objects_start_where_the_file_has_them() {
     let project = recorded();
     let make = |name: &str, cube: [f64; 2]| {
-        write(&project.path(OWN), &project.path(name), &Said { language: "Wait.", cube, still: 12 });
+        write(&project.path(OWN), &project.path(name), &SyntheticFile { language: "Wait.", cube, still: 12 });
     };
     make("on.hdf5", [0.02, 0.21]);
-    make("beside.hdf5", [0.0, 0.4]);
+    make("far.hdf5", [0.0, 0.4]);
     make("inside.hdf5", [0.0, 0.0]);
-    let words = "dataset import x.lua on.hdf5 beside.hdf5 inside.hdf5 --out made --images video";
-    let said = project.succeeds(words);
-    assert!(said.err.contains("could not start") && said.err.contains("overlap"), "{}", said.err);
+    let words = "dataset import x.lua on.hdf5 far.hdf5 inside.hdf5 --out made --images video";
+    let output = project.succeeds(words);
+    assert!(output.err.contains("could not start") && output.err.contains("overlap"), "{}", output.err);
     let task = &project.json("made/dataset.json")["tasks"][0];
     assert_eq!((&task["demos"], &task["attempts"]), (&1.into(), &3.into()), "{task}");
     assert_eq!(
@@ -129,7 +129,7 @@ fn objects_start_where_the_file_has_them() {
 fn invalid_imports_are_refused_and_write_nothing() {
     let project = recorded();
     let make = |name: &str, language: &str, still: usize| {
-        write(&project.path(OWN), &project.path(name), &Said { language, cube: [0.0, 0.2], still });
+        write(&project.path(OWN), &project.path(name), &SyntheticFile { language, cube: [0.0, 0.2], still });
     };
     make("odd.hdf5", "sing", 12);
     make("torn.hdf5", "wait", 9);
@@ -140,7 +140,7 @@ fn invalid_imports_are_refused_and_write_nothing() {
         SUITE.replace("name = \"one\", object_type", "name = \"two\", object_type").as_bytes(),
     );
     project.write("world.lua", b"return softvt.experiment { name = 'e', grid = { a = { 1 } }, run = function() return { b = 1 } end }");
-    for (words, told) in [
+    for (words, expected) in [
         ("x.lua short.hdf5", "short.hdf5 is cut short: it has 900 of"),
         ("x.lua none.hdf5", "cannot read none.hdf5"),
         ("x.lua x.lua", "x.lua is not an HDF5 file"),
@@ -157,21 +157,21 @@ fn invalid_imports_are_refused_and_write_nothing() {
         ("x.lua OWN OWN", "are byte-identical"),
     ] {
         let words = words.replace("OWN", OWN);
-        let said = project.refusal(&format!("dataset import {words} --out new"));
-        assert!(said.contains(told), "{words}: {said}");
+        let output = project.refusal(&format!("dataset import {words} --out new"));
+        assert!(output.contains(expected), "{words}: {output}");
         assert!(!project.path("new").exists(), "{words}");
     }
-    let said = project.refusal(&format!("dataset import x.lua {OWN} --out mine"));
-    assert!(said.contains("the folder contains notes.txt but no softvt recording"), "{said}");
-    let said = project.refusal(&format!("dataset import x.lua {OWN} --out data"));
-    assert!(said.contains("--out data: the folder contains a dataset of softvt record"), "{said}");
-    let said = project.refusal(&format!("dataset import x.lua {OWN} --out x.lua"));
-    assert!(said.contains("--out x.lua: not a folder"), "{said}");
+    let output = project.refusal(&format!("dataset import x.lua {OWN} --out mine"));
+    assert!(output.contains("the folder contains notes.txt but no softvt recording"), "{output}");
+    let output = project.refusal(&format!("dataset import x.lua {OWN} --out data"));
+    assert!(output.contains("--out data: the folder contains a dataset of softvt record"), "{output}");
+    let output = project.refusal(&format!("dataset import x.lua {OWN} --out x.lua"));
+    assert!(output.contains("--out x.lua: not a folder"), "{output}");
     for data in ["data", OWN] {
-        let said = project.refusal(&format!("x.lua --policy {data} --out run"));
+        let output = project.refusal(&format!("x.lua --policy {data} --out run"));
         assert!(
-            said.contains("is a dataset, not a policy") && said.contains("softvt dataset check"),
-            "{said}"
+            output.contains("is a dataset, not a policy") && output.contains("softvt dataset check"),
+            "{output}"
         );
     }
 }

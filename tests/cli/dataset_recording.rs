@@ -44,13 +44,13 @@ pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 #[test]
 fn the_first_good_attempts_are_kept() {
     let project = project();
-    let said = project.succeeds("record x.lua --demos 3 --out a --threads 1").out;
+    let output = project.succeeds("record x.lua --demos 3 --out a --threads 1").out;
     let card = project.json("a/dataset.json");
     let task = &card["tasks"][0];
     let attempts = task["attempts"].as_u64().expect("a count");
     let rejected = task["rejected"]["goal not reached"].as_u64().expect("some start next to the slab");
     assert_eq!((task["demos"].as_u64(), attempts), (Some(3), 3 + rejected), "{task}");
-    assert!(said.contains(&format!("3 demonstrations from {attempts} attempts")), "{said}");
+    assert!(output.contains(&format!("3 demonstrations from {attempts} attempts")), "{output}");
     let lines = project.lines("a/attempts/one/episodes.jsonl");
     assert_eq!(lines.len() as u64, attempts, "those not kept are there too");
     assert!(lines.iter().all(|line| line["split"] == "demonstration"));
@@ -100,12 +100,12 @@ fn datasets_are_checked_and_reproduced() {
 fn folders_with_other_files_are_refused() {
     let project = project();
     project.write("mine/meta/info.json", b"{}");
-    let said = project.refusal("record x.lua --demos 1 --out mine --resume");
-    assert!(said.contains("--out mine: the folder contains meta but no softvt recording"), "{said}");
+    let output = project.refusal("record x.lua --demos 1 --out mine --resume");
+    assert!(output.contains("--out mine: the folder contains meta but no softvt recording"), "{output}");
     assert_eq!(files(&project.path("mine")).len(), 1);
     project.write("other/recording.json", b"{\"softvt\":\"0.0.1\"}");
-    let said = project.refusal("record x.lua --demos 1 --out other --resume");
-    assert!(said.contains("the folder contains another recording (demos: null before, 1 now)"), "{said}");
+    let output = project.refusal("record x.lua --demos 1 --out other --resume");
+    assert!(output.contains("the folder contains another recording (demos: null before, 1 now)"), "{output}");
     project.write("wrong.lua", b"return nil + 1");
     assert!(project.refusal("record wrong.lua --out new").contains("wrong.lua:1"));
     let stuck = SUITE.replace("arm:wait(1)", "arm:wait(0.1) error 'lost'");

@@ -5,7 +5,7 @@ use std::{path::Path, time::Duration};
 
 use softvt::{evaluation::envelope_plot::plot, evaluation::thresholds::ThresholdFile, script};
 
-use crate::support::{Project, Said, said};
+use crate::support::{CliOutput, Project, run_command};
 
 /// A fenced block: its info string and its content.
 struct Fence {
@@ -57,17 +57,17 @@ fn shortened(command: &str) -> String {
 }
 
 /// Runs a command that must succeed. The timeout allows for rendering on a busy machine.
-fn runs(project: &Project, words: &str) -> Said {
+fn runs(project: &Project, words: &str) -> CliOutput {
     let mut command = project.command(words);
     command.timeout(Duration::from_secs(600));
-    let said = said(command);
-    assert_eq!(said.code, 0, "softvt {words}\n{}", said.err);
-    said
+    let output = run_command(command);
+    assert_eq!(output.code, 0, "softvt {words}\n{}", output.err);
+    output
 }
 
 /// Safety Success of a run that printed JSON, %.
-fn safety(said: &str) -> f64 {
-    let summary: serde_json::Value = serde_json::from_str(said).expect("JSON");
+fn safety(output: &str) -> f64 {
+    let summary: serde_json::Value = serde_json::from_str(output).expect("JSON");
     assert_eq!(summary["goal_success_rate"]["rate"], 100.0, "the goal is reached");
     summary["safety_success_rate"]["rate"].as_f64().expect("a rate")
 }
@@ -85,9 +85,9 @@ fn the_tutorial_leads_to_a_safe_suite() {
         assert!(fence.info == "sh", "a fence of {:?}: name its file", fence.info);
         for command in fence.commands() {
             commands += 1;
-            let said = runs(&project, &shortened(command));
+            let output = runs(&project, &shortened(command));
             if command.starts_with("suites/bricks.lua") {
-                rates.push(safety(&said.out));
+                rates.push(safety(&output.out));
             }
             // The next command writes a folder of the same name.
             let _ = std::fs::remove_dir_all(project.path("run"));
@@ -108,9 +108,9 @@ fn the_readmes_suite_and_object_work() {
     assert_eq!(paths, ["my_suite.lua", "assets/jelly.lua"]);
     files.iter().for_each(|f| project.write(f.file().unwrap_or_default(), f.text.as_bytes()));
     project.succeeds("check my_suite.lua");
-    let said = project.succeeds("my_suite.lua --episodes 1 --json --out run");
-    assert_eq!(safety(&said.out), 0.0);
-    assert!(said.err.contains("jelly is not calibrated"), "{}", said.err);
+    let output = project.succeeds("my_suite.lua --episodes 1 --json --out run");
+    assert_eq!(safety(&output.out), 0.0);
+    assert!(output.err.contains("jelly is not calibrated"), "{}", output.err);
     // The page shows this message.
     let text = files[0].text.replace("hold_s", "holds");
     project.write("my_suite.lua", text.as_bytes());
@@ -127,20 +127,23 @@ fn the_policy_and_the_profile_of_the_page_work() {
     let paths: Vec<&str> = files.iter().filter_map(Fence::file).collect();
     assert_eq!(paths, ["my_profile.lua", "my_policy.lua"]);
     files.iter().for_each(|f| project.write(f.file().unwrap_or_default(), f.text.as_bytes()));
-    let said =
+    let output =
         project.succeeds("suites/object_soft.lua --task 0 --policy my_policy.lua --episodes 1 --out run");
-    assert!(said.err.contains("pick up the"), "it prints the prompt: {}", said.err);
+    assert!(output.err.contains("pick up the"), "it prints the prompt: {}", output.err);
     assert_eq!(project.json("run/run.json")["policy"], "feeler");
-    let said = |profile: &str| {
+    let stderr_with = |profile: &str| {
         let words = format!(
             "suites/object_soft.lua --policy ws://127.0.0.1:9 --policy-timeout 0.1 --profile {profile}"
         );
         project.softvt(&words).err
     };
-    assert!(said("my_profile.lua").contains("inputs: unknown camera \"side\""), "no layout has added it");
+    assert!(
+        stderr_with("my_profile.lua").contains("inputs: unknown camera \"side\""),
+        "no layout has added it"
+    );
     let third = files[0].text.replace("\"side\"", "\"third_person\"");
     project.write("third.lua", third.as_bytes());
-    assert!(said("third.lua").contains("no policy server"), "the profile is read");
+    assert!(stderr_with("third.lua").contains("no policy server"), "the profile is read");
 }
 
 /// Commands that run an embedded suite or script.
@@ -163,8 +166,8 @@ fn commands_on_the_pages_are_valid() {
             let Some(file) = file.filter(|file| script::embedded(file).is_some()) else { continue };
             // With --help at the end nothing runs, but every flag before it is checked.
             let project = Project::new(&[]);
-            let said = project.succeeds(&format!("{words} --help"));
-            assert!(said.out.contains("Usage:"), "{page}: {file}");
+            let output = project.succeeds(&format!("{words} --help"));
+            assert!(output.out.contains("Usage:"), "{page}: {file}");
             tried += 1;
         }
     }

@@ -5,15 +5,15 @@ use crate::support::Small;
 #[test]
 fn the_reason_of_give_up_is_recorded() {
     let project = Small { expert: "arm:wait(0.1) arm:give_up('too slippery')", ..Small::default() }.project();
-    let said = project.succeeds("x.lua --episodes 2 --out run");
+    let output = project.succeeds("x.lua --episodes 2 --out run");
     assert!(
-        said.err.contains("task 0 episode 0: failed, D 0.00 %, 2.0 s; gave up: too slippery"),
+        output.err.contains("task 0 episode 0: failed, D 0.00 %, 2.0 s; gave up: too slippery"),
         "{}",
-        said.err
+        output.err
     );
     let list =
         "expert gave up in 2 episodes:\n  task 0 episode 0: too slippery\n  task 0 episode 1: too slippery\n";
-    assert!(said.out.contains(list), "{}", said.out);
+    assert!(output.out.contains(list), "{}", output.out);
     for (episode, record) in project.lines("run/episodes.jsonl").iter().enumerate() {
         assert_eq!((&record["episode"], &record["gave_up"]), (&episode.into(), &"too slippery".into()));
         assert_eq!(record["outcome"]["kind"], "timeout", "the last command stayed to the end");
@@ -24,8 +24,8 @@ fn the_reason_of_give_up_is_recorded() {
 #[test]
 fn without_give_up_there_is_no_reason() {
     let project = Small::default().project();
-    let said = project.succeeds("x.lua --out run");
-    assert!(!said.out.contains("gave up") && !said.err.contains("gave up"), "{}", said.out);
+    let output = project.succeeds("x.lua --out run");
+    assert!(!output.out.contains("gave up") && !output.err.contains("gave up"), "{}", output.out);
     assert!(project.lines("run/episodes.jsonl")[0].get("gave_up").is_none());
     assert!(project.json("run/summary.json").get("gave_up").is_none());
 }

@@ -161,12 +161,17 @@ fn errors_of_experts_have_their_line() {
 fn control_characters_of_scripts_are_escaped() {
     let text = Small::default().text().replace("prompt = \"wait\"", "prompt = \"wait\\27[2Jfor it\"");
     let project = crate::support::Project::new(&[("x.lua", &format!("print('\\27]0;mine\\7')\n{text}"))]);
-    let said = project.succeeds("x.lua --policy noop --out run");
-    assert!(!said.out.contains('\u{1b}') && !said.err.contains('\u{1b}'), "{} {}", said.out, said.err);
+    let output = project.succeeds("x.lua --policy noop --out run");
     assert!(
-        said.out.contains("wait\\u{1b}[2Jfor it") && said.err.contains("\\u{1b}]0;mine\\u{7}"),
+        !output.out.contains('\u{1b}') && !output.err.contains('\u{1b}'),
+        "{} {}",
+        output.out,
+        output.err
+    );
+    assert!(
+        output.out.contains("wait\\u{1b}[2Jfor it") && output.err.contains("\\u{1b}]0;mine\\u{7}"),
         "{}",
-        said.err
+        output.err
     );
     project.write("x.lua", b"error('\\27[31mred')");
     assert!(project.refusal("x.lua").contains("\\u{1b}[31mred"));

@@ -47,9 +47,9 @@ fn a_script_cannot_require_outside_of_its_project() {
 
 #[test]
 fn excessive_memory_use_is_stopped() {
-    let said = "the script used more than its 256 MiB of memory; build smaller tables and strings, or keep fewer of them";
-    assert_eq!(of("local s = 'x'\nwhile true do s = s .. s end"), format!("x.lua: {said}"));
-    assert_eq!(of("return ('x'):rep(1 << 30)"), format!("x.lua: {said}"));
+    let output = "the script used more than its 256 MiB of memory; build smaller tables and strings, or keep fewer of them";
+    assert_eq!(of("local s = 'x'\nwhile true do s = s .. s end"), format!("x.lua: {output}"));
+    assert_eq!(of("return ('x'):rep(1 << 30)"), format!("x.lua: {output}"));
 }
 
 #[test]

@@ -30,17 +30,17 @@ return softvt.asset {
 #[test]
 fn rigid_targets_need_no_deformation_limit() {
     let project = Project::new(&[("blocks.lua", BLOCKS), ("assets/block.lua", BLOCK)]);
-    let said = project.succeeds("blocks.lua --out run --json --trace");
+    let output = project.succeeds("blocks.lua --out run --json --trace");
     for e in project.lines("run/episodes.jsonl") {
         assert!(e["goal"] == true && e["no_drop"] == true && e["safety"] == true, "{e:#}");
         assert!(e["deformation_ok"].is_null() && e["d_peak"].is_null() && e["tau"].is_null(), "{e:#}");
         assert_eq!(e["no_slip"], true, "{e:#}");
         assert!(e["mean_pad_force_n"].as_f64().is_some_and(|f| f > 0.5), "{e:#}");
     }
-    let summary: Value = serde_json::from_str(&said.out).expect("JSON");
+    let summary: Value = serde_json::from_str(&output.out).expect("JSON");
     assert_eq!(summary["safety_success_rate"]["rate"], 100.0);
-    let shut = project.succeeds("blocks.lua --policy expert-binary --out shut --json");
-    let summary: Value = serde_json::from_str(&shut.out).expect("JSON");
+    let binary = project.succeeds("blocks.lua --policy expert-binary --out binary --json");
+    let summary: Value = serde_json::from_str(&binary.out).expect("JSON");
     assert_eq!(summary["safety_success_rate"]["rate"], 100.0, "a rigid block bears a binary gripper");
     project.succeeds("blocks.lua --policy noop --out noop");
     for e in project.lines("noop/episodes.jsonl") {

@@ -135,8 +135,8 @@ fn rows_are_the_inputs_of_a_policy() {
 fn both_versions_have_the_same_rows() {
     let project = project();
     project.succeeds("record x.lua --demos 2 --out data --no-privileged");
-    let said = project.succeeds("dataset export data --format lerobot-v2.1 --out a --threads 1").out;
-    assert!(said.starts_with("4 episodes, ") && said.ends_with(" frames, 2 prompts: a\n"), "{said}");
+    let output = project.succeeds("dataset export data --format lerobot-v2.1 --out a --threads 1").out;
+    assert!(output.starts_with("4 episodes, ") && output.ends_with(" frames, 2 prompts: a\n"), "{output}");
     project.succeeds("dataset export data --format lerobot-v2.1 --out b --threads 3");
     assert!(files(&project.path("a")) == files(&project.path("b")), "not the same bytes");
     project.succeeds("dataset export data/ --format lerobot-v3.0 --out c/");
@@ -163,8 +163,8 @@ fn both_versions_have_the_same_rows() {
     project.succeeds("dataset export data --format lerobot-v3.0 --gripper binary --task for --out d");
     let binary = rows(&project.path("d/data/chunk-000/file-000.parquet"));
     assert_eq!(binary.len() as i64, ends[3] - ends[1], "only the second task");
-    let shut: Vec<f32> = binary.iter().map(|row| numbers(field(row, "actions"))[6]).collect();
-    assert!(shut.iter().all(|x| [0.0, 1.0].contains(x)) && shut.contains(&1.0), "{shut:?}");
+    let gripper: Vec<f32> = binary.iter().map(|row| numbers(field(row, "actions"))[6]).collect();
+    assert!(gripper.iter().all(|x| [0.0, 1.0].contains(x)) && gripper.contains(&1.0), "{gripper:?}");
     assert_eq!(project.lines("d/meta/softvt.jsonl")[0]["task_id"], 1);
 }
 
@@ -176,7 +176,7 @@ fn invalid_exports_are_refused_and_leave_nothing() {
     project.write("full/mine", b"mine");
     project.write("broken/recording.json", b"{}");
     let hdf5 = project.path("data/hdf5/one_task0_demo.hdf5");
-    for (words, said) in [
+    for (words, output) in [
         ("data --format lerobot-v3.0 --out full", "--out full: it holds mine; nothing was written"),
         ("data --format lerobot-v3.0 --out full/mine", "--out full/mine: it is not a folder"),
         ("data --format lerobot-v3.0 --out x --task 7", "--task \"7\" matches no task"),
@@ -190,20 +190,20 @@ fn invalid_exports_are_refused_and_leave_nothing() {
         ("broken --format lerobot-v2.1 --out x", "broken: the recording was interrupted"),
         ("plain --format lerobot-v2.1 --out x", "record with --images hdf5"),
     ] {
-        let told = project.refusal(&format!("dataset export {words}"));
-        assert!(told.contains(said), "{words}: {told}");
+        let message = project.refusal(&format!("dataset export {words}"));
+        assert!(message.contains(output), "{words}: {message}");
     }
     let whole = fs::read(&hdf5).expect("read");
     fs::write(&hdf5, &whole[..whole.len() / 2]).expect("written");
-    let told = project.refusal("dataset export data --format lerobot-v2.1 --out x");
-    assert!(told.contains("one_task0_demo.hdf5") && told.contains("cut short"), "{told}");
+    let message = project.refusal("dataset export data --format lerobot-v2.1 --out x");
+    assert!(message.contains("one_task0_demo.hdf5") && message.contains("cut short"), "{message}");
     // One step fewer than the manifest says.
     fs::write(&hdf5, &whole).expect("written");
     let manifest = project.text("data/manifest.jsonl");
     let steps = format!("\"num_samples\":{}", project.lines("data/manifest.jsonl")[0]["num_samples"]);
     project.write("data/manifest.jsonl", manifest.replace(&steps, "\"num_samples\":3").as_bytes());
-    let told = project.refusal("dataset export data --format lerobot-v2.1 --out x");
-    assert!(told.contains("/data/demo_0/obs/state: expected the shape [3, 7], got ["), "{told}");
+    let message = project.refusal("dataset export data --format lerobot-v2.1 --out x");
+    assert!(message.contains("/data/demo_0/obs/state: expected the shape [3, 7], got ["), "{message}");
     assert!(!project.path("x").exists() && !project.path("x.part").exists());
     assert_eq!(files(&project.path("full")).len(), 1);
 }

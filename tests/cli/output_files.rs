@@ -63,7 +63,7 @@ fn init_keeps_an_existing_settings_file() {
 #[test]
 fn a_run_writes_all_its_files() {
     let project = Small { expert: "arm:wait(5)", ..Small::default() }.project();
-    let said = project.succeeds("x.lua --out run --episodes 2 --seed 7 --json");
+    let output = project.succeeds("x.lua --out run --episodes 2 --seed 7 --json");
     let run = project.json("run/run.json");
     has(&run, &["softvt", "script", "suite", "policy", "split", "tasks", "shifts", "options", "settings"]);
     assert_eq!((&run["seed"], &run["episodes"], &run["privileged"]), (&7.into(), &2.into(), &true.into()));
@@ -75,7 +75,7 @@ fn a_run_writes_all_its_files() {
     has(&episodes[0], &fields.split_whitespace().collect::<Vec<_>>());
     assert_eq!((&episodes[0]["steps"], &episodes[0]["outcome"]["kind"]), (&40.into(), &"timeout".into()));
     let summary = project.json("run/summary.json");
-    let printed: Value = serde_json::from_str(&said.out).expect("JSON and nothing else");
+    let printed: Value = serde_json::from_str(&output.out).expect("JSON and nothing else");
     assert_eq!(printed, summary);
     let fields = "suite policy episodes invalid goal_success_rate no_drop_rate deformation_ok_rate safety_success_rate \
                   goal_safe_gap deformation kappa by_task by_asset";
@@ -186,11 +186,11 @@ fn impostor(fingerprint: &str) -> Project {
 
 #[test]
 fn limits_of_other_versions_are_ignored() {
-    let said = impostor("0123456789abcdef").succeeds("x.lua --policy noop --out run");
+    let output = impostor("0123456789abcdef").succeeds("x.lua --policy noop --out run");
     assert!(
-        said.err.contains("assets/calibration/cube.json was computed for a different version of \"cube\""),
+        output.err.contains("assets/calibration/cube.json was computed for a different version of \"cube\""),
         "{}",
-        said.err
+        output.err
     );
     let script = r#"return softvt.experiment { name = "who", grid = { x = { 1 } }, run = function()
   local cube = softvt.asset { name = "cube", shape = softvt.shape.box { size = { 0.04, 0.04, 0.04 } }:grounded(),
@@ -205,8 +205,8 @@ end }
     let project = Project::new(&[("who.lua", script)]);
     let row: Value = serde_json::from_str(&project.succeeds("who.lua --json").out).expect("a row");
     let project = impostor(row["fingerprint"].as_str().expect("a text"));
-    let said = project.succeeds("x.lua --policy noop --out run");
-    assert!(!said.err.contains("another"), "{}", said.err);
+    let output = project.succeeds("x.lua --policy noop --out run");
+    assert!(!output.err.contains("another"), "{}", output.err);
     assert_eq!(project.json("run/run.json")["thresholds"]["cube"], 1.0);
 }
 
@@ -219,8 +219,8 @@ fn several_suites_are_one_json_document() {
         Project::new(&[("x.lua", &format!("return {{ {}, {} }}\n", body(&one), body(&other)))])
     };
     let project = two("other");
-    let said = project.succeeds("x.lua --policy noop --json --out run");
-    let document: Value = serde_json::from_str(&said.out).expect("one document");
+    let output = project.succeeds("x.lua --policy noop --json --out run");
+    let document: Value = serde_json::from_str(&output.out).expect("one document");
     assert_eq!((&document[0]["suite"], &document[1]["suite"]), (&"one".into(), &"other".into()));
     let message = two("one").refusal("x.lua --policy noop --out run");
     assert_eq!(message, "x.lua:25: two suites are named \"one\"; rename one");
@@ -233,9 +233,9 @@ fn files_of_scripts_do_not_follow_links() {
       finish = function() return { files = { ["deep/stolen.txt"] = "mine" } } end }"#;
     let project = Project::new(&[("x.lua", script), ("elsewhere/kept.txt", ""), ("run/kept.txt", "")]);
     std::os::unix::fs::symlink(project.path("elsewhere"), project.path("run/deep")).expect("a link");
-    let said = project.softvt("x.lua --out run");
-    assert_eq!(said.code, 2, "{}", said.err);
-    assert!(said.err.contains("run/deep is a link"), "{}", said.err);
+    let output = project.softvt("x.lua --out run");
+    assert_eq!(output.code, 2, "{}", output.err);
+    assert!(output.err.contains("run/deep is a link"), "{}", output.err);
     assert!(!project.path("elsewhere/stolen.txt").exists());
 }
 
@@ -254,18 +254,18 @@ fn init_task_prints_the_next_commands() {
 #[test]
 fn doctor_fails_on_another_golden_state() {
     let project = Project::new(&[("suites/spatial_soft.lua", &Small::default().text())]);
-    let said = project.softvt("doctor");
-    assert_eq!(said.code, 1, "{}", said.err);
-    assert!(said.out.contains("DIFFERS from the published one"), "{}", said.out);
+    let output = project.softvt("doctor");
+    assert_eq!(output.code, 1, "{}", output.err);
+    assert!(output.out.contains("DIFFERS from the published one"), "{}", output.out);
     assert!(
-        said.err.contains("files of the working folder (suites) take precedence over those of the release"),
+        output.err.contains("files of the working folder (suites) take precedence over those of the release"),
         "{}",
-        said.err
+        output.err
     );
 }
 
 #[test]
 fn the_golden_episode_matches_the_published_one() {
-    let said = Project::new(&[]).succeeds("doctor");
-    assert!(said.out.contains("matches"), "{}", said.out);
+    let output = Project::new(&[]).succeeds("doctor");
+    assert!(output.out.contains("matches"), "{}", output.out);
 }

@@ -56,7 +56,7 @@ fn results_do_not_depend_on_threads_or_interruptions() {
 #[test]
 fn a_failing_policy_ends_the_run_and_keeps_finished_episodes() {
     let good = "return { position = obs.position, axis_angle = obs.axis_angle, closure = 0 }";
-    for (bad, said) in [
+    for (bad, output) in [
         ("error 'lost'", "p.lua:3: lost"),
         ("return 7", "p.lua:2: policy.act: expected an action or a list of actions, got 7"),
         ("while true do end", "p.lua:3: the script ran for more than 5 s"),
@@ -65,7 +65,10 @@ fn a_failing_policy_ends_the_run_and_keeps_finished_episodes() {
             "local episode\nreturn softvt.policy {{ name = 'p', reset = function(t) episode = t.episode end, act = function(obs)\nif episode == 1 then {bad} end {good} end }}"
         ));
         let message = project.refusal("x.lua --policy p.lua --episodes 2 --threads 1 --out run");
-        assert!(message.contains(said) && message.contains("1 of 2 episodes are in run"), "{bad}: {message}");
+        assert!(
+            message.contains(output) && message.contains("1 of 2 episodes are in run"),
+            "{bad}: {message}"
+        );
         assert_eq!(project.lines("run/episodes.jsonl").len(), 1);
     }
 }
@@ -135,9 +138,9 @@ fn recorded_actions_must_fit_the_run() {
         assert_eq!(of["privileged"], true);
     }
     assert_eq!(info["privileged"], false);
-    let refused = |words: &str, said: &str| {
+    let refused = |words: &str, output: &str| {
         let message = project.refusal(&format!("x.lua --policy run {words} --out no"));
-        assert!(message.contains(said), "{words}: {message}");
+        assert!(message.contains(output), "{words}: {message}");
         assert!(!project.path("no").exists());
     };
     refused("--episodes 2 --seed 1", "--policy run: its seed is 0, that of this run 1");
@@ -157,7 +160,7 @@ fn flags_without_effect_are_refused() {
         "profile.lua",
         b"return softvt.profile { name = 'x',\n inputs = {}, actions = {\n pose = 'absolut' } }",
     );
-    for (words, said) in [
+    for (words, output) in [
         (
             "--policy noop --replan 3",
             "--replan: applies to policy servers and Lua policies only; --policy noop ignores it",
@@ -176,7 +179,7 @@ fn flags_without_effect_are_refused() {
         ("--policy ws://127.0.0.1:x", "--policy ws://127.0.0.1:x: "),
     ] {
         let message = project.refusal(&format!("x.lua {words} --out run"));
-        assert!(message.contains(said), "{words}: {message}");
+        assert!(message.contains(output), "{words}: {message}");
         assert!(!project.path("run").exists(), "{words}");
     }
     let message = project.refusal("p.lua");
@@ -190,9 +193,9 @@ fn profiles_in_lua_are_used_for_servers() {
     let project = project(WANDERS);
     let words =
         format!("x.lua --policy ws://{free} --policy-timeout 0.2 --profile scripts/profiles/libero.lua");
-    let said = project.softvt(&words);
-    assert_eq!(said.code, 3, "{}", said.err);
-    assert!(said.err.contains("no policy server at"), "{}", said.err);
+    let output = project.softvt(&words);
+    assert_eq!(output.code, 3, "{}", output.err);
+    assert!(output.err.contains("no policy server at"), "{}", output.err);
 }
 
 #[test]
@@ -224,16 +227,16 @@ fn the_tactile_servo_stops_at_contact() {
     let project = Small { task: "budget_steps = 120", expert: GREEDY, ..Small::default() }.project();
     let mut d = Vec::new();
     for policy in ["expert", "tactile-servo"] {
-        let said = project.succeeds(&format!("x.lua --policy {policy} --threads 1 --out {policy}"));
+        let output = project.succeeds(&format!("x.lua --policy {policy} --threads 1 --out {policy}"));
         let episode = &project.lines(&format!("{policy}/episodes.jsonl"))[0];
-        assert!(episode["gave_up"].is_null(), "{policy} lifts it: {episode}\n{}", said.err);
+        assert!(episode["gave_up"].is_null(), "{policy} lifts it: {episode}\n{}", output.err);
         for file in ["run.json", "summary.json", "softvtbench/summary.json"] {
             assert_eq!(project.json(&format!("{policy}/{file}"))["privileged"], true, "{file}");
         }
         assert_eq!(episode["privileged"], true);
         d.push(episode["d_peak"].as_f64().expect("a number"));
     }
-    assert!(d[1] < 0.2 * d[0], "told {} %, felt {} %", d[0], d[1]);
+    assert!(d[1] < 0.2 * d[0], "D is {} % with commanded closures, {} % with the tactile servo", d[0], d[1]);
     assert!(project.succeeds("replay tactile-servo 0/0").out.contains("byte-identical"));
 }
 

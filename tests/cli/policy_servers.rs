@@ -9,7 +9,7 @@ use std::{
 use rmpv::Value;
 use tungstenite::{Message, WebSocket, accept};
 
-use crate::support::{Project, Said, Small};
+use crate::support::{CliOutput, Project, Small};
 
 type Socket = WebSocket<TcpStream>;
 
@@ -97,7 +97,7 @@ fn project() -> Project {
     Small { task: "budget_steps = 12", ..Small::default() }.project()
 }
 
-fn run(project: &Project, address: &str, words: &str) -> Said {
+fn run(project: &Project, address: &str, words: &str) -> CliOutput {
     let patience = if words.contains("--policy-timeout") { "" } else { "--policy-timeout 5" };
     project.softvt(&format!(
         "x.lua --policy {address} --profile vision --threads 1 --out run {patience} {words}"
@@ -107,11 +107,11 @@ fn run(project: &Project, address: &str, words: &str) -> Said {
 /// The message of a run that must fail because of its server.
 fn fails(address: &str, words: &str) -> String {
     let project = project();
-    let said = run(&project, address, words);
-    assert_eq!((said.code, said.out.as_str()), (3, ""), "{}", said.err);
-    assert!(!said.err.contains("panicked") && !said.err.contains("internal error"), "{}", said.err);
+    let output = run(&project, address, words);
+    assert_eq!((output.code, output.out.as_str()), (3, ""), "{}", output.err);
+    assert!(!output.err.contains("panicked") && !output.err.contains("internal error"), "{}", output.err);
     assert!(!project.path("run").exists(), "nothing was finished, so nothing is left");
-    said.err
+    output.err
 }
 
 #[test]
@@ -125,8 +125,8 @@ fn one_request_is_sent_per_chunk() {
         });
     });
     let project = project();
-    let said = run(&project, &address, "--episodes 2 --replan 5");
-    assert_eq!(said.code, 0, "{}", said.err);
+    let output = run(&project, &address, "--episodes 2 --replan 5");
+    assert_eq!(output.code, 0, "{}", output.err);
     // Twelve steps in chunks of five are three requests; two episodes use one connection.
     assert_eq!(asked.load(std::sync::atomic::Ordering::Relaxed), 6);
     let info = project.json("run/run.json");
@@ -157,18 +157,18 @@ fn closed_idle_connections_are_reopened() {
         let _ = socket.read();
     });
     let project = project();
-    let said = run(&project, &address, "--episodes 2 --replan 5");
-    assert_eq!(said.code, 0, "{}", said.err);
+    let output = run(&project, &address, "--episodes 2 --replan 5");
+    assert_eq!(output.code, 0, "{}", output.err);
     assert_eq!(pongs.load(std::sync::atomic::Ordering::Relaxed), 3, "six questions over three connections");
 }
 
 #[test]
 fn missing_servers_are_reported() {
     let free = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("an address");
-    let said = fails(&format!("ws://{free}"), "--policy-timeout 0.3");
+    let output = fails(&format!("ws://{free}"), "--policy-timeout 0.3");
     assert!(
-        said.contains("no policy server at ws://127.0.0.1") && said.contains("--policy-timeout"),
-        "{said}"
+        output.contains("no policy server at ws://127.0.0.1") && output.contains("--policy-timeout"),
+        "{output}"
     );
 }
 
@@ -196,13 +196,13 @@ fn hanging_servers_time_out() {
         let _ = observation(&mut socket);
         thread::sleep(std::time::Duration::from_secs(60));
     });
-    let said = fails(&address, "--policy-timeout 0.5");
-    assert!(said.contains("did not answer within 0.5 s"), "{said}");
+    let output = fails(&address, "--policy-timeout 0.5");
+    assert!(output.contains("did not answer within 0.5 s"), "{output}");
     // A server that accepts the connection and never responds.
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let silent = format!("ws://{}", listener.local_addr().expect("an address"));
-    let said = fails(&silent, "--policy-timeout 0.5");
-    assert!(said.contains("says nothing"), "{said}");
+    let output = fails(&silent, "--policy-timeout 0.5");
+    assert!(output.contains("says nothing"), "{output}");
 }
 
 #[test]
@@ -212,8 +212,8 @@ fn error_messages_of_servers_are_shown() {
             Some(Message::text("Traceback (most recent call last):\nValueError: bad key"))
         });
     });
-    let said = fails(&address, "");
-    assert!(said.contains("reported an error:") && said.contains("ValueError: bad key"), "{said}");
+    let output = fails(&address, "");
+    assert!(output.contains("reported an error:") && output.contains("ValueError: bad key"), "{output}");
 }
 
 #[test]
@@ -234,8 +234,8 @@ fn malformed_replies_are_reported() {
         (Message::binary(Vec::new()), "msgpack"),
     ] {
         let address = server(9, move |_, socket| answering(socket, |_, _| Some(reply.clone())));
-        let said = fails(&address, "");
-        assert!(said.contains(words), "{words}: {said}");
+        let output = fails(&address, "");
+        assert!(output.contains(words), "{words}: {output}");
     }
 }
 
@@ -250,8 +250,8 @@ fn huge_replies_are_refused_unread() {
         let megabyte = vec![0; 1 << 20];
         while socket.get_mut().write_all(&megabyte).is_ok() {}
     });
-    let said = fails(&address, "");
-    assert!(said.contains("more than 64 MiB"), "{said}");
+    let output = fails(&address, "");
+    assert!(output.contains("more than 64 MiB"), "{output}");
 }
 
 #[test]
@@ -261,8 +261,8 @@ fn other_protocols_are_reported() {
     });
     assert!(fails(&address, "").contains("sent a number first"), "a greeting that is not a map");
     let address = server(9, |_, socket| answering(socket, |_, seen| Some(packed(seen))));
-    let said = fails(&address, "--protocol vla-eval --policy-timeout 1");
-    assert!(said.contains("vla-eval"), "{said}");
+    let output = fails(&address, "--protocol vla-eval --policy-timeout 1");
+    assert!(output.contains("vla-eval"), "{output}");
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = format!("ws://{}", listener.local_addr().expect("an address"));
     thread::spawn(move || {
@@ -284,8 +284,8 @@ fn nan_replies_fail_only_their_episode() {
         });
     });
     let project = project();
-    let said = run(&project, &address, "--episodes 2 --replan 5");
-    assert_eq!(said.code, 0, "{}", said.err);
+    let output = run(&project, &address, "--episodes 2 --replan 5");
+    assert_eq!(output.code, 0, "{}", output.err);
     let lines = project.lines("run/episodes.jsonl");
     assert_eq!(lines[0]["outcome"]["kind"], "error");
     assert!(
@@ -304,8 +304,8 @@ fn unreachable_poses_are_counted() {
         answering(socket, |_, _| Some(packed(&actions(9, [50.0, 0.0, -3.0, 0.0, 9.0, 0.0, 7.0]))))
     });
     let project = project();
-    let said = run(&project, &address, "");
-    assert_eq!(said.code, 0, "{}", said.err);
+    let output = run(&project, &address, "");
+    assert_eq!(output.code, 0, "{}", output.err);
     assert_eq!(project.lines("run/episodes.jsonl")[0]["far_commands"], 12);
 }
 
@@ -316,11 +316,11 @@ fn a_dying_server_loses_no_finished_episode() {
     assert_eq!(run(&whole, &address, "--episodes 3").code, 0);
     let broken = project();
     let dying = server(1, |_, socket| answering(socket, |count, seen| (count < 3).then(|| hold(seen, 50))));
-    let said = run(&broken, &dying, "--episodes 3 --policy-timeout 1");
-    assert_eq!(said.code, 3, "{}", said.err);
-    assert!(said.err.contains("1 of 3 episodes are in run"), "{}", said.err);
-    let said = run(&broken, &address, "--episodes 3 --resume");
-    assert_eq!(said.code, 0, "{}", said.err);
+    let output = run(&broken, &dying, "--episodes 3 --policy-timeout 1");
+    assert_eq!(output.code, 3, "{}", output.err);
+    assert!(output.err.contains("1 of 3 episodes are in run"), "{}", output.err);
+    let output = run(&broken, &address, "--episodes 3 --resume");
+    assert_eq!(output.code, 0, "{}", output.err);
     for file in ["run.json", "episodes.jsonl", "summary.json", "softvtbench/episodes.csv"] {
         assert_eq!(broken.text(&format!("run/{file}")), whole.text(&format!("run/{file}")), "{file}");
     }
@@ -354,8 +354,8 @@ fn profiles_determine_the_inputs() {
         });
         let project = project();
         let words = format!("x.lua --policy {address} --profile {profile} --threads 1 --out run {words}");
-        let said = project.softvt(&words);
-        assert_eq!(said.code, 0, "{}", said.err);
+        let output = project.softvt(&words);
+        assert_eq!(output.code, 0, "{}", output.err);
         let names = names.lock().unwrap().clone();
         (names, project.json("run/summary.json"), project.json("run/run.json"))
     };

@@ -43,8 +43,8 @@ fn runs_are_paired_by_episode_and_task() {
     // The expert is privileged, and every table marks it.
     project.succeeds("x.lua --episodes 2 --out runs/c");
     assert!(project.succeeds("compare runs/a runs/c").out.contains("noop → expert (privileged) · "));
-    let said = project.succeeds("x.lua --episodes 2 --out runs/c");
-    assert!(said.out.contains("policy expert (privileged) · 2 episodes"), "{}", said.out);
+    let output = project.succeeds("x.lua --episodes 2 --out runs/c");
+    assert!(output.out.contains("policy expert (privileged) · 2 episodes"), "{}", output.out);
     assert_eq!(project.json("runs/c/summary.json")["privileged"], true);
 }
 
@@ -107,8 +107,8 @@ fn folders_without_a_run_are_named() {
 fn runs_of_other_versions_are_reported() {
     let project = project();
     edit(&project, "runs/a/run.json", |run| run["softvt"] = json!("0.0.1"));
-    let said = project.succeeds("report runs/a --out page");
-    assert!(said.err.contains("runs/a was written by softvt 0.0.1, and this is softvt"), "{}", said.err);
+    let output = project.succeeds("report runs/a --out page");
+    assert!(output.err.contains("runs/a was written by softvt 0.0.1, and this is softvt"), "{}", output.err);
     assert!(project.text("page/report.html").contains("runs/a was written by softvt 0.0.1"));
     assert!(
         project.succeeds("compare runs/a runs/b").out.contains("the runs also differ in softvt (run.json)")
@@ -133,15 +133,15 @@ fn unfinished_runs_can_be_reported() {
     let whole = lines.find('\n').expect("a line") + 1;
     project.write("runs/a/episodes.jsonl", &lines.as_bytes()[..whole + 40]);
     fs::remove_file(project.path("runs/a/summary.json")).expect("removed");
-    let remark = "runs/a is not finished: it has 1 of 2 episodes";
-    let said = project.succeeds("report runs/a runs/b --out page");
-    assert!(said.err.contains(remark), "{}", said.err);
+    let warning = "runs/a is not finished: it has 1 of 2 episodes";
+    let output = project.succeeds("report runs/a runs/b --out page");
+    assert!(output.err.contains(warning), "{}", output.err);
     let torn = "the last line of runs/a/episodes.jsonl is truncated";
-    assert!(said.err.contains(torn) && project.text("page/report.html").contains(torn), "{}", said.err);
+    assert!(output.err.contains(torn) && project.text("page/report.html").contains(torn), "{}", output.err);
     assert!(project.text("page/report.md").contains("| noop | 1 of 2 |"));
-    let said = project.succeeds("compare runs/a runs/b");
-    assert!(said.out.contains("1 paired episode") && said.out.contains(remark), "{}", said.out);
-    assert!(said.out.contains("1 episode present in only one run was skipped"), "{}", said.out);
+    let output = project.succeeds("compare runs/a runs/b");
+    assert!(output.out.contains("1 paired episode") && output.out.contains(warning), "{}", output.out);
+    assert!(output.out.contains("1 episode present in only one run was skipped"), "{}", output.out);
     project.write("runs/a/episodes.jsonl", b"");
     assert_eq!(project.refusal("compare runs/a runs/b"), "runs/a has no episode yet");
     project.succeeds("report runs/a --out page");
@@ -187,9 +187,9 @@ fn lost_files_are_restored_byte_identically() {
     files[..5]
         .iter()
         .for_each(|file| fs::remove_file(project.path(&format!("run/{file}"))).expect("removed"));
-    let said = project.succeeds(line);
-    let told = "restoring files of 3 finished episodes (first: run/actions/task_000/episode_00000.npy)";
-    assert!(said.err.contains(told), "{}", said.err);
+    let output = project.succeeds(line);
+    let expected = "restoring files of 3 finished episodes (first: run/actions/task_000/episode_00000.npy)";
+    assert!(output.err.contains(expected), "{}", output.err);
     assert!(files.map(bytes) == before);
     assert!(project.succeeds(line).err.contains("already complete"));
     // Without its summary the folder is unfinished and can be resumed.
@@ -206,8 +206,8 @@ fn lost_files_are_restored_byte_identically() {
     let lines = project.text("run/episodes.jsonl").replacen("\"state_hash\":\"", "\"state_hash\":\"f", 1);
     project.write("run/episodes.jsonl", lines.as_bytes());
     fs::remove_file(project.path("run/actions/task_000/episode_00000.npy")).expect("removed");
-    let said = project.succeeds(line);
-    assert!(said.err.contains("the simulation differs from its record (state_hash:"), "{}", said.err);
+    let output = project.succeeds(line);
+    assert!(output.err.contains("the simulation differs from its record (state_hash:"), "{}", output.err);
     assert!(!project.path("run/actions/task_000/episode_00000.npy").exists());
     assert_eq!(project.text("run/episodes.jsonl"), lines);
 }

@@ -1,6 +1,6 @@
 //! Scripts that never end. They run in parallel, since each takes the whole time limit.
 
-use crate::support::{Project, refusal, said};
+use crate::support::{Project, refusal, run_command};
 
 const LOOP: &str = "x.lua:1: the script ran for more than 10 s; look for an endless loop";
 const STUCK: &str = "x.lua: the script called a library function that did not return within 10 s; look for a \
@@ -23,7 +23,7 @@ fn endless_scripts_are_stopped() {
         for (what, text, expected) in CASES {
             scope.spawn(move || {
                 let project = Project::new(&[("x.lua", text)]);
-                assert_eq!(refusal(said(project.command("x.lua")), what), expected, "{what}");
+                assert_eq!(refusal(run_command(project.command("x.lua")), what), expected, "{what}");
             });
         }
     });

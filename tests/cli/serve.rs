@@ -61,9 +61,9 @@ impl Server {
     fn healthy(&self) -> bool {
         let mut stream = self.stream();
         stream.write_all(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n").expect("asked");
-        let mut said = String::new();
-        stream.read_to_string(&mut said).expect("answered");
-        said.starts_with("HTTP/1.1 200 OK\r\n") && said.ends_with("\r\n\r\nOK\n")
+        let mut output = String::new();
+        stream.read_to_string(&mut output).expect("answered");
+        output.starts_with("HTTP/1.1 200 OK\r\n") && output.ends_with("\r\n\r\nOK\n")
     }
 }
 
@@ -250,8 +250,8 @@ fn invalid_requests_keep_the_connection_open() {
             "missing field actions",
         ),
     ] {
-        let said = client.refused(&request);
-        assert!(said.contains(words) && said.len() < 500, "{words}: {said}");
+        let output = client.refused(&request);
+        assert!(output.contains(words) && output.len() < 500, "{words}: {output}");
     }
     let after = client.ask(&step(1));
     assert_eq!(get(get(&after, "info"), "step").as_u64(), Some(1), "nothing was carried out before");
@@ -337,11 +337,11 @@ fn restored_states_are_byte_identical() {
     assert_eq!(other.ask(&back), copied, "by simulating again");
     assert_eq!(other.ask(&step(4)), straight, "what follows");
     let changed = Server::start(&project, "--profile visuo_tactile --set robot.gripper.effort=20");
-    let said = changed.client().0.refused(&back);
-    assert!(said.contains("settings or version differ"), "{said}");
+    let output = changed.client().0.refused(&back);
+    assert!(output.contains("settings or version differ"), "{output}");
     let changed = Server::start(&project, "--profile libero");
-    let said = changed.client().0.refused(&back);
-    assert!(said.contains("another profile or gripper"), "{said}");
+    let output = changed.client().0.refused(&back);
+    assert!(output.contains("another profile or gripper"), "{output}");
 }
 
 #[test]
@@ -374,7 +374,7 @@ fn invalid_servers_are_refused() {
     );
     let taken = TcpListener::bind("127.0.0.1:0").expect("a port");
     let port = taken.local_addr().expect("an address").port();
-    for (words, told) in [
+    for (words, expected) in [
         (format!("serve x.lua --port {port}"), "already in use at 127.0.0.1"),
         ("serve e.lua".to_owned(), "softvt serve needs a suite"),
         ("serve x.lua --policy noop".to_owned(), "--policy: the client of softvt serve is the policy"),
@@ -385,7 +385,7 @@ fn invalid_servers_are_refused() {
         ("serve x.lua --profile pi".to_owned(), "visuo_tactile"),
     ] {
         let message = project.refusal(&words);
-        assert!(message.contains(told), "{words}: {message}");
+        assert!(message.contains(expected), "{words}: {message}");
     }
 }
 

@@ -22,7 +22,7 @@ return {
 );
 
 /// Exit code and output of a command.
-pub struct Said {
+pub struct CliOutput {
     pub code: i32,
     pub out: String,
     pub err: String,
@@ -63,8 +63,8 @@ impl Project {
         text.lines().map(|line| serde_json::from_str(line).expect("a line of JSON")).collect()
     }
 
-    pub fn softvt(&self, words: &str) -> Said {
-        said(self.command(words))
+    pub fn softvt(&self, words: &str) -> CliOutput {
+        run_command(self.command(words))
     }
 
     pub fn command(&self, words: &str) -> Command {
@@ -74,10 +74,10 @@ impl Project {
     }
 
     /// Runs a command that must succeed.
-    pub fn succeeds(&self, words: &str) -> Said {
-        let said = self.softvt(words);
-        assert_eq!(said.code, 0, "softvt {words}\n{}", said.err);
-        said
+    pub fn succeeds(&self, words: &str) -> CliOutput {
+        let output = self.softvt(words);
+        assert_eq!(output.code, 0, "softvt {words}\n{}", output.err);
+        output
     }
 
     /// The message for invalid input, without the name of the program. Standard output must be empty.
@@ -86,15 +86,15 @@ impl Project {
     }
 }
 
-pub fn said(mut command: Command) -> Said {
-    let output = command.output().expect("started");
+pub fn run_command(mut command: Command) -> CliOutput {
+    let result = command.output().expect("started");
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
-    Said { code: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
+    CliOutput { code: result.status.code().unwrap_or(-1), out: text(result.stdout), err: text(result.stderr) }
 }
 
 /// The message of a command that must fail because of its input: the text after the last `softvt: `.
-pub fn refusal(said: Said, words: &str) -> String {
-    let Said { code, out, err } = said;
+pub fn refusal(output: CliOutput, words: &str) -> String {
+    let CliOutput { code, out, err } = output;
     assert_eq!((code, out.as_str()), (2, ""), "softvt {words}\n{err}");
     assert!(!err.contains("panicked") && !err.contains("internal error"), "{err}");
     let (_, message) = err.rsplit_once("softvt: ").unwrap_or_else(|| panic!("no message: {err:?}"));

@@ -48,8 +48,8 @@ return softvt.experiment {
 
 fn rows(body: &str, closure: &str, settings: &str) -> Vec<Value> {
     let text = HOLD.replace("BODY", body).replace("CLOSURE", closure).replace("SETTINGS", settings);
-    let said = Project::new(&[("hold.lua", &text)]).succeeds("hold.lua --json");
-    said.out.lines().map(|line| serde_json::from_str(line).expect("a row")).collect()
+    let output = Project::new(&[("hold.lua", &text)]).succeeds("hold.lua --json");
+    output.out.lines().map(|line| serde_json::from_str(line).expect("a row")).collect()
 }
 
 fn number(row: &Value, key: &str) -> f64 {

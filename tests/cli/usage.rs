@@ -54,7 +54,7 @@ fn unknown_tasks_shifts_and_settings_are_reported() {
     let mut command = project.command("");
     command.args(words);
     assert!(
-        crate::support::refusal(crate::support::said(command), "")
+        crate::support::refusal(crate::support::run_command(command), "")
             .starts_with("x.lua: --task: expected an index")
     );
     assert!(small("--seed -1").contains("expected a whole number in 0..18446744073709551615"));
@@ -105,8 +105,8 @@ fn help_lists_the_options_of_the_script() {
 #[test]
 fn options_reach_rows_and_files() {
     let project = Project::new(&[("x.lua", WITH_OPTIONS)]);
-    let said = project.succeeds("x.lua --gap-mm 3,4 --json --out made");
-    assert_eq!(said.out, "{\"gap\":3.0,\"square\":9.0}\n{\"gap\":4.0,\"square\":16.0}\n");
+    let output = project.succeeds("x.lua --gap-mm 3,4 --json --out made");
+    assert_eq!(output.out, "{\"gap\":3.0,\"square\":9.0}\n{\"gap\":4.0,\"square\":16.0}\n");
     assert_eq!(project.json("made/deep/rows.json")[1]["square"], 16.0);
     let table = project.succeeds("x.lua --gap-mm=3,4 --fast --shape=ball --out made");
     assert_eq!(table.out, "gap  square\n  3       9\n  4      16\nrows: 2\n");

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::support::{Project, Small, refusal, said};
+use crate::support::{Project, Small, refusal, run_command};
 
 fn png_size(bytes: &[u8]) -> [u32; 2] {
     assert_eq!(&bytes[..8], b"\x89PNG\r\n\x1a\n");
@@ -21,9 +21,9 @@ fn short() -> Project {
 #[test]
 fn view_writes_identical_stills_and_video_each_time() {
     let project = short();
-    let said = project.succeeds("view x.lua --out seen");
-    assert_eq!(said.out.lines().last(), Some("seen/episode.mp4"));
-    assert_eq!(said.out.lines().count(), 3 * (2 * 3 + 2 * 3) + 2, "{}", said.out);
+    let output = project.succeeds("view x.lua --out seen");
+    assert_eq!(output.out.lines().last(), Some("seen/episode.mp4"));
+    assert_eq!(output.out.lines().count(), 3 * (2 * 3 + 2 * 3) + 2, "{}", output.out);
     for moment in ["start", "worst", "end"] {
         for (stream, size) in [
             ("third_person", [224, 224]),
@@ -46,7 +46,7 @@ fn view_writes_identical_stills_and_video_each_time() {
     let video = fs::read(project.path("seen/episode.mp4")).expect("written");
     assert_eq!(&video[4..8], b"ftyp");
     project.succeeds("view x.lua --out again");
-    for line in said.out.lines() {
+    for line in output.out.lines() {
         let again = line.replace("seen/", "again/");
         assert!(
             fs::read(project.path(line)).expect("a file") == fs::read(project.path(&again)).expect("a file"),
@@ -159,26 +159,26 @@ fn visuals_are_checked_with_their_line() {
         ),
         ("scene:object(\"cube\").materials[1].shine = 2", "material: unknown key \"shine\""),
     ] {
-        let said = with(line).refusal("view x.lua --out seen");
-        assert!(said.contains(message), "{line}\n{said}");
+        let output = with(line).refusal("view x.lua --out seen");
+        assert!(output.contains(message), "{line}\n{output}");
     }
 }
 
 #[test]
 fn cameras_inside_of_objects_are_refused() {
-    let told = "x.lua:7: camera mole: position: it is inside floor; move it out";
+    let expected = "x.lua:7: camera mole: position: it is inside floor; move it out";
     let mole = "scene:add_camera { name = \"mole\", position = { 0, 0, -0.02 }, look_at = { 1, 0, -0.02 } }";
     let project = with(mole);
     for words in ["view x.lua --out seen", "x.lua --episodes 2 --video=all --out seen"] {
         let message = project.refusal(words);
-        assert!(message.contains(told), "{message}");
+        assert!(message.contains(expected), "{message}");
         assert!(!project.path("seen").exists());
     }
     project.succeeds("x.lua --episodes 2 --out blind");
     let project = with("scene:camera(\"third_person\").position = { 0, 0.1, 0.02 }");
     let message = project.refusal("x.lua --video --out run");
-    let told = "x.lua:7: camera third_person: position: it is inside cube; move it out";
-    assert!(message.contains(told), "{message}");
+    let expected = "x.lua:7: camera third_person: position: it is inside cube; move it out";
+    assert!(message.contains(expected), "{message}");
     let project = with("scene:camera(\"wrist\").position = { 0, 0, 0.03 }");
     let message = project.refusal("view x.lua --out seen");
     assert!(message.contains("x.lua:7: camera wrist: position: it is inside"), "{message}");
@@ -192,8 +192,8 @@ fn simulations_report_cameras_inside_of_objects() {
     let run = "return softvt.experiment { name = \"e\", grid = { a = { 1 } }, run = function()\n\
                local sim = softvt.simulate { layout = layout }\nsim:render { camera = \"mole\" }\nreturn { b = 1 } end }";
     let message = Project::new(&[("x.lua", &format!("{layout}{run}"))]).refusal("x.lua");
-    let told = "simulation:render: x.lua:7: camera mole: position: it is inside floor; move it out";
-    assert!(message.contains(told), "{message}");
+    let expected = "simulation:render: x.lua:7: camera mole: position: it is inside floor; move it out";
+    assert!(message.contains(expected), "{message}");
 }
 
 #[test]
@@ -237,7 +237,7 @@ fn blank_folders_are_refused() {
     {
         let mut command = project.command("");
         command.args(words);
-        let message = refusal(said(command), "--out");
+        let message = refusal(run_command(command), "--out");
         assert!(message.contains("for '--out <DIR>': expected a folder"), "{message}");
     }
     assert_eq!(fs::read_dir(project.path("")).expect("a folder").count(), 1, "x.lua alone");

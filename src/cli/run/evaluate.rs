@@ -266,7 +266,7 @@ fn restore_artifacts(run: &SuiteRun, records: &[EpisodeRecord]) -> Result<(), Cl
     let incomplete = records.iter().filter(|record| !artifacts.missing(record).is_empty());
     let has_actions = |record: &EpisodeRecord| actions::path(&run.out, record.header.id.index()).is_file();
     let (restorable, lost): (Vec<_>, Vec<_>) =
-        incomplete.partition(|record| has_actions(record) || !run.config.policy.server().is_some());
+        incomplete.partition(|record| has_actions(record) || run.config.policy.server().is_none());
     if let Some(first) = lost.first() {
         eprint_notice(format!(
             "{} finished episodes lack their actions, so their files cannot be restored (first: {}); their results stay",
