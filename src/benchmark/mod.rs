@@ -5,16 +5,7 @@ pub mod settings;
 
 use serde::{Deserialize, Serialize};
 
-/// Control period, s: policies act, and results are recorded, at 20 Hz.
-pub const CONTROL_DT: f64 = 0.05;
-
-/// Control steps, and frames of a video, per second: 1 / [`CONTROL_DT`].
-pub const CONTROL_HZ: u32 = 20;
-
-/// Number of physics steps of `dt` seconds per control step, 3 at 60 Hz. `dt` must divide [`CONTROL_DT`].
-pub fn steps_per_control(dt: f64) -> u32 {
-    (CONTROL_DT / dt).round().max(1.0) as u32
-}
+pub use self::settings::{CONTROL_DT, CONTROL_HZ, steps_per_control};
 
 /// Kind of the objects of a suite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

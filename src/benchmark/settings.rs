@@ -3,7 +3,6 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::{CONTROL_DT, steps_per_control};
 use crate::{
     evaluation::criteria::SuccessCriteria,
     physics::PhysicsParams,
@@ -11,6 +10,17 @@ use crate::{
     sensing::tactile::TactileSpec,
     text::{RangeError, format_number},
 };
+
+/// Control period, s: policies act, and results are recorded, at 20 Hz.
+pub const CONTROL_DT: f64 = 0.05;
+
+/// Control steps, and frames of a video, per second: 1 / [`CONTROL_DT`].
+pub const CONTROL_HZ: u32 = 20;
+
+/// Number of physics steps of `dt` seconds per control step, 3 at 60 Hz. `dt` must divide [`CONTROL_DT`].
+pub fn steps_per_control(dt: f64) -> u32 {
+    (CONTROL_DT / dt).round().max(1.0) as u32
+}
 
 /// Error of a setting's path or value.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -88,7 +88,10 @@ impl GelField {
             return Ok(None);
         }
         scratch.fit(gel);
-        set_compliance(gel, *substrate, scratch);
+        scratch.compliance.clone_from(&gel.kernels.normal);
+        if let Some(body) = substrate {
+            body.add_to(gel, &mut scratch.compliance);
+        }
         let mut height_map = HeightMap::new(gel, skins);
         let normal = solve_normal_contact(gel, &height_map.gaps(gel), wrench.normal(), scratch)
             .ok_or_else(|| ContactError::NoSkin { force: wrench.normal(), skins: skins.len() })?;
@@ -212,16 +215,16 @@ fn validate(contact: &TactileContact) -> Result<(), ContactError> {
     Ok(())
 }
 
-/// Sets the compliance of gel and body in series.
-fn set_compliance(gel: &Gel, substrate: Option<SubstrateCompliance>, scratch: &mut GelScratch) {
-    scratch.compliance.clone_from(&gel.kernels.normal);
-    let Some(substrate) = substrate else { return };
-    let size = (gel.fft.width * gel.fft.height) as f64;
-    let resolved_k = std::f64::consts::TAU / substrate.resolved;
-    for (total, &k) in scratch.compliance.iter_mut().zip(&gel.kernels.k) {
-        let k = f64::from(k).max(1e-3);
-        let unresolved = 1.0 - (-(k / resolved_k).powi(2)).exp();
-        *total += (2.0 * unresolved / (substrate.modulus * k) / size) as f32;
+impl SubstrateCompliance {
+    /// Adds the compliance of the body, in series, to that of the gel.
+    fn add_to(&self, gel: &Gel, compliance: &mut [f32]) {
+        let size = (gel.fft.width * gel.fft.height) as f64;
+        let resolved_k = std::f64::consts::TAU / self.resolved;
+        for (total, &k) in compliance.iter_mut().zip(&gel.kernels.k) {
+            let k = f64::from(k).max(1e-3);
+            let unresolved = 1.0 - (-(k / resolved_k).powi(2)).exp();
+            *total += (2.0 * unresolved / (self.modulus * k) / size) as f32;
+        }
     }
 }
 

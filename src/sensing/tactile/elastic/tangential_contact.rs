@@ -66,10 +66,13 @@ pub(super) fn solve_tangential_contact(
     scratch: &mut GelScratch,
 ) -> TangentialSolution {
     let cells: Vec<usize> = (0..pressure.len()).filter(|&c| pressure[c] > 0.0).collect();
+    let positions: Vec<_> = cells.iter().map(|&c| gel.centre(c)).collect();
+    let load = load / (gel.cell * gel.cell);
     let zeros = || vec![0.0; pressure.len()];
     let mut friction_excess = 1.0;
     while mu > 0.0 && friction_excess <= 1e6 {
-        let problem = TangentialProblem::new(gel, pressure, &cells, load, mu * friction_excess);
+        let bounds = cells.iter().map(|&c| mu * friction_excess * f64::from(pressure[c])).collect();
+        let problem = TangentialProblem { gel, cells: &cells, positions: &positions, bounds, load };
         if let Some((traction, motion)) = problem.solve(scratch) {
             return TangentialSolution { traction, motion, friction_excess };
         }
@@ -83,20 +86,14 @@ struct TangentialProblem<'a> {
     /// Indices of the touching cells.
     cells: &'a [usize],
     /// Centre of each touching cell, m.
-    positions: Vec<Vector2<f64>>,
+    positions: &'a [Vector2<f64>],
     /// Largest shear of each touching cell, Pa.
     bounds: Vec<f64>,
     /// Load per area of a cell, as [`Self::resultant`] sums tractions.
     load: Vec3,
 }
 
-impl<'a> TangentialProblem<'a> {
-    fn new(gel: &'a Gel, pressure: &[f32], cells: &'a [usize], load: &Vec3, mu: f64) -> Self {
-        let positions = cells.iter().map(|&c| gel.centre(c)).collect();
-        let bounds = cells.iter().map(|&c| mu * f64::from(pressure[c])).collect();
-        Self { gel, cells, positions, bounds, load: load / (gel.cell * gel.cell) }
-    }
-
+impl TangentialProblem<'_> {
     /// Traction and motion of the sticking part; `None` if friction cannot hold the load.
     fn solve(&self, scratch: &mut GelScratch) -> Option<([Vec<f32>; 2], PlanarMotion)> {
         let n = self.cells.len();
