@@ -170,7 +170,7 @@ impl<const PER_UNIT: usize> SampleBuffer<PER_UNIT> {
 }
 
 /// Returns the smallest w of a triangle within a square, if it covers the whole square.
-pub(crate) fn min_w_if_covering(corners: &ScreenCorners, origin: [f32; 2], size: f32) -> Option<f32> {
+fn min_w_if_covering(corners: &ScreenCorners, origin: [f32; 2], size: f32) -> Option<f32> {
     let setup = TriangleSetup::new(corners, origin)?;
     let square = [[0.0; 2], [size, 0.0], [0.0, size], [size; 2]];
     let corner_w =
@@ -315,7 +315,7 @@ pub(crate) struct TileBins {
     /// Indices into `triangles`, grouped by tile.
     sorted: Vec<u32>,
     /// Number of tiles along x and y.
-    pub(crate) tile_counts: [usize; 2],
+    tile_counts: [usize; 2],
 }
 
 impl TileBins {

@@ -11,7 +11,7 @@ use crate::{
         raster::{object_index, triangle_index},
         scene::PosedMesh,
         shade::{
-            pattern::{METALNESS, MaterialSample, SKY_VISIBILITY},
+            pattern::{METALNESS, ROUGHNESS, SKY_VISIBILITY},
             shading::SurfaceSamples,
         },
     },
@@ -25,47 +25,44 @@ pub(crate) struct MeshInstance<'a> {
     pub(crate) posed: Arc<PosedMesh>,
 }
 
+/// Values that are interpolated over a triangle: position relative to the eye, normal, material, and texture
+/// coordinates.
+const ATTRIBUTES: usize = 14;
+/// Index of the first component of the normal.
+const NORMAL: usize = 3;
+/// Index of the first component of the material.
+const MATERIAL: usize = 6;
+/// Index of the first texture coordinate.
+const UV: usize = 12;
+
 /// A triangle prepared for interpolation.
 #[derive(Clone, Copy)]
 pub(crate) struct TriangleInterpolator<'a> {
     pub(crate) id: u32,
-    object: f32,
     /// Products of a ray with these vectors are proportional to its barycentric coordinates: they are the volumes
     /// that the ray spans with the opposite edges. This also holds for triangles that reach behind the camera (Olano
     /// & Greer, Triangle Scan Conversion using 2D Homogeneous Coordinates, 1997).
     barycentric: [Vec3; 3],
-    /// Corners relative to the eye.
-    p: [V3; 3],
-    n: [V3; 3],
-    materials: [MaterialSample; 3],
-    texture: Option<CornerUvs<'a>>,
-}
-
-/// The chart of a triangle, and its corners in it.
-#[derive(Clone, Copy)]
-struct CornerUvs<'a> {
-    chart: &'a TextureChart,
-    uvs: [[f32; 2]; 3],
+    corners: [[f32; ATTRIBUTES]; 3],
+    chart: Option<&'a TextureChart>,
 }
 
 impl<'a> TriangleInterpolator<'a> {
     pub(crate) fn new(instance: &MeshInstance<'a>, lens: &Lens, id: u32) -> Self {
-        let triangle = triangle_index(id);
-        let corners = instance.lod.triangles[triangle].map(|v| v as usize);
-        let p = corners.map(|v| instance.posed.positions[v] - lens.eye);
-        let [a, b, c] = p.map(|p| p.cast::<f64>());
-        let texture = instance.lod.chart_ids.get(triangle).map(|&chart| CornerUvs {
-            chart: &instance.charts[chart as usize],
-            uvs: instance.lod.uvs[triangle],
+        let (lod, triangle) = (instance.lod, triangle_index(id));
+        let corners: [[f32; ATTRIBUTES]; 3] = std::array::from_fn(|corner| {
+            let v = lod.triangles[triangle][corner] as usize;
+            let (p, n) = (instance.posed.positions[v] - lens.eye, instance.posed.normals[v]);
+            let [r, g, b, roughness, metalness, sky]: [f32; 6] = lod.materials[v].into();
+            let [u, v] = lod.uvs.get(triangle).map_or([0.0; 2], |uvs| uvs[corner]);
+            [p.x, p.y, p.z, n.x, n.y, n.z, r, g, b, roughness, metalness, sky, u, v]
         });
+        let [a, b, c] = corners.map(|corner| V3::new(corner[0], corner[1], corner[2]).cast::<f64>());
         Self {
             id,
-            object: object_index(id) as f32,
             barycentric: [b.cross(&c), c.cross(&a), a.cross(&b)],
-            p,
-            n: corners.map(|v| instance.posed.normals[v]),
-            materials: corners.map(|v| instance.lod.materials[v]),
-            texture,
+            corners,
+            chart: lod.chart_ids.get(triangle).map(|&chart| &instance.charts[chart as usize]),
         }
     }
 
@@ -77,31 +74,16 @@ impl<'a> TriangleInterpolator<'a> {
             .map(|b| f32x8::splat(b.dot(&first) as f32) + f32x8::splat(b.dot(&right) as f32) * LANE_INDEX);
         let scale = f32x8::ONE / (weights[0] + weights[1] + weights[2]);
         let w = weights.map(|weight| weight * scale);
-        let mix3 = |of: &[V3; 3]| {
-            Vec3x8::splat(&of[0]) * w[0] + Vec3x8::splat(&of[1]) * w[1] + Vec3x8::splat(&of[2]) * w[2]
+        let attribute = |i: usize| {
+            let [a, b, c] = self.corners.map(|corner| f32x8::splat(corner[i]));
+            a * w[0] + b * w[1] + c * w[2]
         };
-        let mix = |of: [f32; 3]| {
-            f32x8::splat(of[0]) * w[0] + f32x8::splat(of[1]) * w[1] + f32x8::splat(of[2]) * w[2]
-        };
-        let from_eye = mix3(&self.p);
-        let n = mix3(&self.n).normalized();
-        let component = |i: usize| mix(self.materials.map(|material| material[i]));
-        let (albedo, roughness) = match &self.texture {
-            Some(CornerUvs { chart, uvs }) => {
-                let uv = [0, 1].map(|axis| mix(uvs.map(|uv| uv[axis])));
-                chart.sample(uv, pixel_footprint(from_eye, n, lens))
-            }
-            None => (Vec3x8 { x: component(0), y: component(1), z: component(2) }, component(3)),
-        };
-        SurfaceSamples {
-            p: from_eye + Vec3x8::splat(&lens.eye),
-            n,
-            albedo,
-            roughness,
-            metalness: component(METALNESS),
-            sky_visibility: component(SKY_VISIBILITY),
-            object: f32x8::splat(self.object),
+        let mut samples = surface_samples(attribute, f32x8::splat(object_index(self.id) as f32), lens);
+        if let Some(chart) = self.chart {
+            let footprint = pixel_footprint(attribute, samples.n, lens);
+            (samples.albedo, samples.roughness) = chart.sample([UV, UV + 1].map(attribute), footprint);
         }
+        samples
     }
 
     /// Appends the point where the ray through (x, y) meets the triangle, or the nearest point of the triangle.
@@ -112,30 +94,37 @@ impl<'a> TriangleInterpolator<'a> {
         let w = if sum == 0.0 { [1.0 / 3.0; 3] } else { weights.map(|w| (w / sum).max(0.0) as f32) };
         let scale = 1.0 / (w[0] + w[1] + w[2]);
         let w = w.map(|w| w * scale);
-        let lane = batch.count;
-        let mix3 = |of: &[V3; 3]| of[0] * w[0] + of[1] * w[1] + of[2] * w[2];
-        let (p, n) = (mix3(&self.p), mix3(&self.n));
-        for axis in 0..3 {
-            batch.p[axis][lane] = p[axis];
-            batch.n[axis][lane] = n[axis];
+        let ([a, b, c], lane) = (&self.corners, batch.count);
+        for (i, values) in batch.attributes.iter_mut().enumerate() {
+            values[lane] = a[i] * w[0] + b[i] * w[1] + c[i] * w[2];
         }
-        let [a, b, c] = &self.materials;
-        for i in 0..a.len() {
-            batch.materials[i][lane] = a[i] * w[0] + b[i] * w[1] + c[i] * w[2];
-        }
-        batch.object[lane] = self.object;
-        batch.charts[lane] = self.texture.as_ref().map(|CornerUvs { chart, uvs }| {
-            for (axis, lanes) in batch.uv.iter_mut().enumerate() {
-                lanes[lane] = uvs[0][axis] * w[0] + uvs[1][axis] * w[1] + uvs[2][axis] * w[2];
-            }
-            *chart
-        });
+        batch.object[lane] = object_index(self.id) as f32;
+        batch.charts[lane] = self.chart;
     }
 }
 
-/// Width of a pixel projected onto surfaces at `from_eye`, m: the geometric mean over both directions.
+fn vec3_attribute(attribute: impl Fn(usize) -> f32x8, first: usize) -> Vec3x8 {
+    Vec3x8 { x: attribute(first), y: attribute(first + 1), z: attribute(first + 2) }
+}
+
+/// Surface points with these attributes, without textures.
 #[inline(always)]
-fn pixel_footprint(from_eye: Vec3x8, n: Vec3x8, lens: &Lens) -> f32x8 {
+fn surface_samples(attribute: impl Fn(usize) -> f32x8 + Copy, object: f32x8, lens: &Lens) -> SurfaceSamples {
+    SurfaceSamples {
+        p: vec3_attribute(attribute, 0) + Vec3x8::splat(&lens.eye),
+        n: vec3_attribute(attribute, NORMAL).normalized(),
+        albedo: vec3_attribute(attribute, MATERIAL),
+        roughness: attribute(MATERIAL + ROUGHNESS),
+        metalness: attribute(MATERIAL + METALNESS),
+        sky_visibility: attribute(MATERIAL + SKY_VISIBILITY),
+        object,
+    }
+}
+
+/// Width of a pixel projected onto surfaces of normals `n`, m: the geometric mean over both directions.
+#[inline(always)]
+fn pixel_footprint(attribute: impl Fn(usize) -> f32x8, n: Vec3x8, lens: &Lens) -> f32x8 {
+    let from_eye = vec3_attribute(attribute, 0);
     let distance2 = from_eye.dot(from_eye).fast_max(f32x8::splat(1e-12));
     let distance = distance2.sqrt();
     let cosine = (n.dot(from_eye).abs() / distance).fast_max(f32x8::splat(0.05));
@@ -150,30 +139,16 @@ pub(crate) struct ShadingBatch<'a> {
     pub(crate) pixel: [u32; LANES],
     /// Fraction of the pixel that each point accounts for.
     pub(crate) share: [f32; LANES],
-    /// Relative to the eye.
-    p: [[f32; LANES]; 3],
-    n: [[f32; LANES]; 3],
-    materials: [[f32; LANES]; 6],
+    attributes: [[f32; LANES]; ATTRIBUTES],
     object: [f32; LANES],
-    uv: [[f32; LANES]; 2],
     charts: [Option<&'a TextureChart>; LANES],
 }
 
 impl ShadingBatch<'_> {
     /// Returns the points; lanes from `count` on hold leftovers.
     pub(crate) fn samples(&self, lens: &Lens) -> SurfaceSamples {
-        let from_eye = Vec3x8::from_arrays(&self.p);
-        let n = Vec3x8::from_arrays(&self.n).normalized();
-        let component = |i: usize| f32x8::new(self.materials[i]);
-        let mut samples = SurfaceSamples {
-            p: from_eye + Vec3x8::splat(&lens.eye),
-            n,
-            albedo: Vec3x8 { x: component(0), y: component(1), z: component(2) },
-            roughness: component(3),
-            metalness: component(METALNESS),
-            sky_visibility: component(SKY_VISIBILITY),
-            object: f32x8::new(self.object),
-        };
+        let attribute = |i: usize| f32x8::new(self.attributes[i]);
+        let mut samples = surface_samples(attribute, f32x8::new(self.object), lens);
         let chart_of = |lane: usize| self.charts[lane].map_or(std::ptr::null(), |c| c as *const TextureChart);
         for lane in 0..self.count {
             let Some(chart) = self.charts[lane] else { continue };
@@ -184,10 +159,10 @@ impl ShadingBatch<'_> {
                 std::array::from_fn(|other| if chart_of(other) == chart_of(lane) { 1.0 } else { 0.0 });
             let mask = f32x8::new(shares_chart).simd_gt(f32x8::ZERO);
             // Other lanes repeat this one, so that they read no other mip levels.
-            let here = |values: &[f32; LANES]| mask.select(f32x8::new(*values), f32x8::splat(values[lane]));
-            let footprint = pixel_footprint(from_eye, n, lens);
-            let footprint = mask.select(footprint, f32x8::splat(footprint.to_array()[lane]));
-            let (albedo, roughness) = chart.sample([here(&self.uv[0]), here(&self.uv[1])], footprint);
+            let here = |values: f32x8| mask.select(values, f32x8::splat(values.to_array()[lane]));
+            let uv = [UV, UV + 1].map(|i| here(attribute(i)));
+            let footprint = here(pixel_footprint(attribute, samples.n, lens));
+            let (albedo, roughness) = chart.sample(uv, footprint);
             samples.albedo = Vec3x8::select(mask, albedo, samples.albedo);
             samples.roughness = mask.select(roughness, samples.roughness);
         }

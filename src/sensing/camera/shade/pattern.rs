@@ -11,6 +11,8 @@ use crate::{
 /// Material parameters at a point of a surface: albedo (linear RGB), roughness, metalness, and the fraction of the sky
 /// left visible by the object itself. The first four are those that textures store.
 pub(crate) type MaterialSample = nalgebra::SVector<f32, 6>;
+/// Index of the roughness in a [`MaterialSample`].
+pub(crate) const ROUGHNESS: usize = 3;
 /// Index of the metalness in a [`MaterialSample`].
 pub(crate) const METALNESS: usize = 4;
 /// Index of the sky visibility in a [`MaterialSample`].
