@@ -93,7 +93,7 @@ impl Illumination {
         let reflect_z = s.n.z * (f32x8::splat(2.0) * s.n.dot(to_eye)) - to_eye.z;
         let reflected =
             self.sky_radiance(reflect_z) * (one - s.roughness) + self.sky_irradiance(reflect_z) * s.roughness;
-        let (scale, bias) = environment_brdf(s.roughness, n_v);
+        let [scale, bias] = environment_brdf(s.roughness, n_v);
         let ambient = diffuse.component_mul(self.sky_irradiance(s.n.z))
             + f0.map(|c| c * scale + bias).component_mul(reflected);
         DirectAndAmbient {
@@ -159,7 +159,7 @@ impl Illumination {
 
 /// Karis's fit of the preintegrated environment BRDF: scale and bias of the reflectance at normal incidence.
 #[inline(always)]
-fn environment_brdf(roughness: f32x8, n_v: f32x8) -> (f32x8, f32x8) {
+fn environment_brdf(roughness: f32x8, n_v: f32x8) -> [f32x8; 2] {
     let linear = |a: f32, b: f32| f32x8::splat(a) + f32x8::splat(b) * roughness;
     let r = linear(1.0, -1.0);
     // 0.001 to the power of 0.93 n·v: close to the 2^(−9.28 n·v) of the fit.
@@ -167,5 +167,5 @@ fn environment_brdf(roughness: f32x8, n_v: f32x8) -> (f32x8, f32x8) {
     let a004 = fall * r + linear(0.0425, -0.0275);
     let scale = linear(1.04, -0.572) - f32x8::splat(1.04) * a004;
     let bias = linear(-0.04, 0.022) + f32x8::splat(1.04) * a004;
-    (scale, bias.fast_max(f32x8::ZERO))
+    [scale, bias.fast_max(f32x8::ZERO)]
 }
