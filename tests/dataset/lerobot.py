@@ -131,17 +131,17 @@ def figures(name, values, version):
     else:
         shape = values.shape[1:] or (1,)
         values = values.reshape(steps, -1).astype(float)
-    told = {"min": values.min(0), "max": values.max(0), "mean": values.mean(0), "std": values.std(0)}
+    stored = {"min": values.min(0), "max": values.max(0), "mean": values.mean(0), "std": values.std(0)}
     if version == "v3.0":
-        told |= dict(zip(QUANTILES, np.quantile(values, list(QUANTILES.values()), axis=0)))
-    return {figure: numbers.reshape(shape) for figure, numbers in told.items()} | {"count": np.array([steps])}
+        stored |= dict(zip(QUANTILES, np.quantile(values, list(QUANTILES.values()), axis=0)))
+    return {figure: numbers.reshape(shape) for figure, numbers in stored.items()} | {"count": np.array([steps])}
 
 
-def same(name, told, values, version):
+def same(name, stored, values, version):
     expected = figures(name, values, version)
-    assert set(told) == set(expected), (name, set(told))
+    assert set(stored) == set(expected), (name, set(stored))
     for figure, numbers in expected.items():
-        found = np.array(told[figure], dtype=float)
+        found = np.array(stored[figure], dtype=float)
         assert found.shape == numbers.shape, (name, figure, found.shape)
         # Single precision in v2.1; places of markers are counted to 0.01 px for their quantiles.
         coarse = name == "tactile_marker_motion" and figure in QUANTILES
@@ -170,8 +170,8 @@ def version_21(data, root, gripper):
         held = compare(table, demo, (number, first, prompts.index(entry["language"])), "frame_{:06d}.png", gripper)
         assert episodes[number] == {"episode_index": number, "tasks": [entry["language"]], "length": table.num_rows}
         assert stats[number]["episode_index"] == number and set(stats[number]["stats"]) == set(ORDER)
-        for name, told in stats[number]["stats"].items():
-            same(name, told, held[name], "v2.1")
+        for name, stored in stats[number]["stats"].items():
+            same(name, stored, held[name], "v2.1")
         first += table.num_rows
     assert len(episodes) == len(stats) == number + 1
     tasks = [json.loads(line) for line in (root / "meta/tasks.jsonl").read_text().splitlines()]
@@ -196,24 +196,24 @@ def version_30(data, root, gripper):
         bounds = files[at].metadata.row_group(group).column(ORDER.index("episode_index") + 3).statistics
         assert (bounds.min, bounds.max) == (number, number), "one episode a group, and it says which"
         held = compare(table, demo, (number, first, prompts.index(entry["language"])), "frame-{:06d}.png", gripper)
-        told, steps = episodes[number], table.num_rows
+        stored, steps = episodes[number], table.num_rows
         expected = {
             "episode_index": number, "tasks": [entry["language"]], "length": steps, "data/chunk_index": 0, "data/file_index": at,
             "dataset_from_index": first, "dataset_to_index": first + steps, "meta/episodes/chunk_index": 0,
             "meta/episodes/file_index": 0,
         }
-        assert expected == {key: value for key, value in told.items() if not key.startswith("stats/")}, told
+        assert expected == {key: value for key, value in stored.items() if not key.startswith("stats/")}, stored
         for name in ORDER:
             prefix = f"stats/{name}/"
-            figures = {key.removeprefix(prefix): value for key, value in told.items() if key.startswith(prefix)}
+            figures = {key.removeprefix(prefix): value for key, value in stored.items() if key.startswith(prefix)}
             same(name, figures, held[name], "v3.0")
             whole[name].append(held[name])
         first += steps
     assert len(groups) == len(episodes) == number + 1
     stats = json.loads((root / "meta/stats.json").read_text())
     assert set(stats) == set(ORDER)
-    for name, told in stats.items():
-        same(name, told, np.concatenate(whole[name]), "v3.0")
+    for name, stored in stats.items():
+        same(name, stored, np.concatenate(whole[name]), "v3.0")
     tasks = pd.read_parquet(root / "meta/tasks.parquet")
     assert tasks.index.tolist() == prompts and tasks["task_index"].tolist() == list(range(len(prompts))), tasks
     assert tasks.columns.tolist() == ["task_index"] and tasks.index.name is None

@@ -3,7 +3,7 @@
 use image::{ImageError, RgbImage};
 
 use super::{
-    ExportConfig, GripperCoding, LeRobotVersion,
+    config::{ExportConfig, GripperCoding, LeRobotVersion},
     features::{IMAGE_FEATURES, INDEX_FEATURES, MARKER_SHAPE, VECTOR_LENGTH},
     parquet_table::{ColumnValues, EmbeddedImage},
     selection::{ImageSize, SelectedDemo, Selection},

@@ -6,8 +6,7 @@ use parquet::file::metadata::KeyValue;
 use serde_json::{Value, json};
 
 use super::{
-    ExportConfig, ExportSummary, GripperCoding, LeRobotVersion,
-    config::{CHUNK, MAX_TABLE_MB},
+    config::{CHUNK, ExportConfig, ExportSummary, GripperCoding, LeRobotVersion, MAX_TABLE_MB},
     features::{self, Feature},
     parquet_table::{ColumnType, ColumnValues, ParquetColumn, ParquetTable},
     selection::{SelectedDemo, Selection},
