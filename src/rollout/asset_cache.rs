@@ -2,11 +2,7 @@
 
 use std::{convert::Infallible, sync::Arc};
 
-use super::{
-    build_error::BuildError,
-    shared_cache::SharedCache,
-    soft_model::{check_soft, meshed, soft_model},
-};
+use super::{build_error::BuildError, shared_cache::SharedCache, soft_model::build_model};
 use crate::{
     geometry::{
         Aabb, Pose, Vec3,
@@ -34,24 +30,10 @@ pub struct AssetCache {
     approximate: bool,
 }
 
-/// Factor on the spacing of contact samples for approximate models.
-const APPROXIMATE_SPACING: f64 = 4.0;
-
 /// The cached value of a shape.
 fn of_shape<V: Clone>(cache: &SharedCache<Shape, V>, shape: &Shape, compute: impl FnOnce() -> V) -> V {
-    let value: Result<_, Infallible> = cache.get(shape, |known| known == shape, || Ok(compute()));
-    value.unwrap_or_else(|never| match never {})
-}
-
-fn approximate_model(
-    name: &str,
-    shape: &Shape,
-    material: &SoftMaterial,
-) -> Result<Arc<FemModel>, BuildError> {
-    check_soft(name, shape, material)?;
-    let material =
-        &SoftMaterial { grasp_spacing: APPROXIMATE_SPACING * material.grasp_spacing, ..material.clone() };
-    meshed(name, shape, material, approximate_mass_properties(shape, 1.0).mass)
+    let Ok(value) = cache.get(shape, |known| known == shape, || Ok::<_, Infallible>(compute()));
+    value
 }
 
 impl AssetCache {
@@ -109,10 +91,7 @@ impl AssetCache {
         self.models.get(
             asset,
             |known| known.shape == asset.shape && known.body == asset.body,
-            || match self.approximate {
-                true => approximate_model(&asset.name, &asset.shape, material),
-                false => soft_model(&asset.name, &asset.shape, material),
-            },
+            || build_model(&asset.name, &asset.shape, material, self.approximate),
         )
     }
 }
@@ -152,16 +131,16 @@ fn outer_points(shape: &Shape) -> Vec<Vec3> {
     let mut hits = Vec::new();
     for (axis, far) in (0..3).flat_map(|axis| [(axis, false), (axis, true)]) {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        let mut ahead = Vec3::zeros();
-        ahead[axis] = if far { -1.0 } else { 1.0 };
+        let mut direction = Vec3::zeros();
+        direction[axis] = if far { -1.0 } else { 1.0 };
         for cell in 0..RAYS * RAYS {
             let share = |index: usize| (index as f64 + 0.5) / RAYS as f64;
             let mut start = if far { bounds.max } else { bounds.min };
             start[u] = bounds.min[u] + size[u] * share(cell % RAYS);
             start[v] = bounds.min[v] + size[v] * share(cell / RAYS);
-            start -= ahead * MIN_PART_WALL;
-            let hit = shape.ray(&start, &ahead, size[axis] + 2.0 * MIN_PART_WALL);
-            hits.extend(hit.map(|length| start + ahead * length));
+            start -= direction * MIN_PART_WALL;
+            let hit = shape.ray(&start, &direction, size[axis] + 2.0 * MIN_PART_WALL);
+            hits.extend(hit.map(|length| start + direction * length));
         }
     }
     hits

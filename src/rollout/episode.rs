@@ -356,8 +356,8 @@ impl Episode {
     }
 
     fn advance(&mut self, action: &Action) -> Option<Outcome> {
-        if let Err(message) = check_action(action) {
-            return Some(Outcome::Error { message });
+        if let Err(error) = check_action(action) {
+            return Some(Outcome::Error { message: error.to_string() });
         }
         self.actions.push(*action);
         self.far_commands += u32::from(is_far(&self.sim.robot.tool_b(&self.sim.world), action));
@@ -558,15 +558,23 @@ fn is_far(tool_b: &Pose, action: &Action) -> bool {
 /// Largest magnitude of the numbers of an action, m and rad. The squares of larger ones may overflow.
 const MAX_ACTION: f64 = 1e6;
 
-/// Checks that the numbers of an action are finite and plausible. The error is the message of the outcome.
-fn check_action(action: &Action) -> Result<(), String> {
-    let numbers = action.position_b.iter().chain(action.axis_angle_b.iter()).chain([&action.closure]);
-    let all: Vec<f64> = numbers.copied().collect();
-    if !all.iter().all(|x| x.is_finite()) {
-        return Err(format!("the action {all:?} holds a number that is not finite"));
+/// An action cannot be executed. The text becomes the message of the outcome.
+#[derive(Debug, thiserror::Error)]
+enum ActionError {
+    #[error("the action {0:?} holds a number that is not finite")]
+    NotFinite([f64; 7]),
+    #[error("the action {action:?} holds {number:e}, which is not a pose in m and rad")]
+    Implausible { action: [f64; 7], number: f64 },
+}
+
+/// Checks that the numbers of an action are finite and plausible.
+fn check_action(action: &Action) -> Result<(), ActionError> {
+    let action = action.to_array();
+    if !action.iter().all(|x| x.is_finite()) {
+        return Err(ActionError::NotFinite(action));
     }
-    match all.iter().find(|x| x.abs() > MAX_ACTION) {
-        Some(x) => Err(format!("the action {all:?} holds {x:e}, which is not a pose in m and rad")),
+    match action.iter().find(|x| x.abs() > MAX_ACTION) {
+        Some(&number) => Err(ActionError::Implausible { action, number }),
         None => Ok(()),
     }
 }
@@ -628,7 +636,7 @@ mod tests {
         let action =
             |x| Action { position_b: Vec3::new(x, 0.0, 0.0), axis_angle_b: Vec3::zeros(), closure: 0.0 };
         assert!(check_action(&action(-1e5)).is_ok());
-        assert!(check_action(&action(1e308)).is_err_and(|message| message.contains("not a pose")));
-        assert!(check_action(&action(f64::NAN)).is_err_and(|message| message.contains("not finite")));
+        assert!(check_action(&action(1e308)).is_err_and(|error| error.to_string().contains("not a pose")));
+        assert!(check_action(&action(f64::NAN)).is_err_and(|error| error.to_string().contains("not finite")));
     }
 }

@@ -2,6 +2,76 @@
 //!
 //! `build` turns a scene into a [`Simulation`]; an [`Episode`] runs it with a [`Controller`] and returns the record.
 //! Data derived from assets are shared between episodes in [`AssetCache`] and [`SensorAssets`].
+//!
+//! # Example
+//!
+//! An episode from its scene to its record. It is compiled but not run here, because settling takes seconds without
+//! optimisation.
+//!
+//! ```no_run
+//! use std::sync::Arc;
+//!
+//! use softvt::{
+//!     benchmark::{Goal, GoalKind, Task, settings::Settings},
+//!     evaluation::{
+//!         episode_id::{EpisodeId, Split},
+//!         record::Outcome,
+//!     },
+//!     geometry::{Aabb, Pose, Vec3, shape::Shape},
+//!     physics::contact::Friction,
+//!     policy::{TaskBrief, builtin::NoopPolicy},
+//!     rollout::{AssetCache, ChunkedPolicy, Episode, EpisodeSpec, SensorAssets},
+//!     scene::{Asset, Body, Lighting, Object, Scene},
+//! };
+//!
+//! // A cube of 4 cm rests on a table top of 5 cm, whose upper side is at z = 0.
+//! let cuboid = |name: &str, size: Vec3, z: f64, body| Object {
+//!     name: name.to_owned(),
+//!     asset: Arc::new(Asset {
+//!         name: name.to_owned(),
+//!         // The lowest point of an asset is at z = 0.
+//!         shape: Shape::cuboid(size).translated(Vec3::z() * (0.5 * size.z)),
+//!         body,
+//!         friction: Friction::default(),
+//!         visuals: Vec::new(),
+//!         hints: Default::default(),
+//!     }),
+//!     pose_w: Pose::translation(0.0, 0.0, z),
+//!     joints: Vec::new(),
+//!     placed_at: String::new(),
+//! };
+//! let scene = Scene {
+//!     objects: vec![
+//!         cuboid("table", Vec3::new(0.4, 0.4, 0.05), -0.05, Body::Static),
+//!         cuboid("cube", Vec3::repeat(0.04), 0.0, Body::Rigid { density: 500.0 }),
+//!     ],
+//!     base_w: Pose::translation(-0.66, 0.0, 0.012),
+//!     start_q: [0.0, -0.19, 0.0, -2.4, 0.0, 2.25, 0.79],
+//!     gravity: Vec3::new(0.0, 0.0, -9.81),
+//!     workspace: Aabb { min: Vec3::new(-0.5, -0.6, -0.05), max: Vec3::new(0.5, 0.6, 1.0) },
+//!     lighting: Lighting::default(),
+//!     cameras: Vec::new(),
+//! };
+//! let (object, target) = ("cube".to_owned(), "table".to_owned());
+//! let task = Task {
+//!     id: 0,
+//!     prompt: "do nothing".to_owned(),
+//!     layout: "cube".to_owned(),
+//!     goal: Goal { kind: GoalKind::On, object, target, hold_s: 10.0 },
+//!     budget_steps: 3,
+//!     expert: false,
+//! };
+//! let suite = "example".to_owned();
+//! let id = EpisodeId { suite: suite.clone(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };
+//! let spec = EpisodeSpec::new(id, "noop", &task, &scene.clone(), scene, &Settings::default());
+//! let episode = Episode::start(spec, &AssetCache::default(), &SensorAssets::default())?;
+//!
+//! let brief = TaskBrief { suite, task: 0, prompt: task.prompt.clone(), episode: 0 };
+//! let finished = episode.run(&mut ChunkedPolicy::new(Box::<NoopPolicy>::default(), brief, 1))?;
+//! assert_eq!(finished.record.outcome, Outcome::Timeout);
+//! assert_eq!(finished.record.stats.steps, 3);
+//! # Ok::<(), softvt::rollout::EpisodeError>(())
+//! ```
 
 mod asset_cache;
 mod build;

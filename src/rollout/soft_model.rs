@@ -4,36 +4,42 @@ use std::sync::Arc;
 
 use super::build_error::BuildError;
 use crate::{
-    geometry::{mass::mass_properties, samples::SampleSpec, shape::Shape},
+    geometry::{
+        mass::{approximate_mass_properties, mass_properties},
+        samples::SampleSpec,
+        shape::Shape,
+    },
     physics::fem::{ElasticMaterial, FemModel},
     scene::SoftMaterial,
     text::format_number,
 };
+
+/// Factor on the spacing of contact samples for approximate models.
+const APPROXIMATE_SPACING: f64 = 4.0;
 
 /// Builds the finite-element model of a soft body. `name` identifies the asset in error messages.
 ///
 /// # Errors
 /// The shape cannot be meshed, or a material parameter is out of range.
 pub fn soft_model(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<Arc<FemModel>, BuildError> {
-    check_soft(name, shape, material)?;
-    meshed(name, shape, material, mass_properties(shape, 1.0).mass)
+    build_model(name, shape, material, false)
 }
 
-/// Checks the material and the dimensions of a soft body.
-pub(super) fn check_soft(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<(), BuildError> {
-    check_material(name, material)?;
-    check_size(name, shape, material)?;
-    check_thickness(name, shape, material)
-}
-
-/// Meshes a checked soft body of a volume, m³.
-pub(super) fn meshed(
+/// As [`soft_model`]. An `approximate` model has fewer contact samples and an approximate volume.
+pub(super) fn build_model(
     name: &str,
     shape: &Shape,
     material: &SoftMaterial,
-    volume: f64,
+    approximate: bool,
 ) -> Result<Arc<FemModel>, BuildError> {
-    let spacing = SampleSpec { grasp_spacing: material.grasp_spacing, ..SampleSpec::default() };
+    check_material(name, material)?;
+    check_size(name, shape, material)?;
+    check_thickness(name, shape, material)?;
+    let (grasp_spacing, volume) = match approximate {
+        true => (APPROXIMATE_SPACING * material.grasp_spacing, approximate_mass_properties(shape, 1.0).mass),
+        false => (material.grasp_spacing, mass_properties(shape, 1.0).mass),
+    };
+    let spacing = SampleSpec { grasp_spacing, ..SampleSpec::default() };
     let law = ElasticMaterial {
         youngs_pa: material.youngs_pa,
         poisson: material.poisson,
