@@ -37,12 +37,12 @@ local function lay(where, albedo, opacity)
   table.insert(layers, { mask = where, albedo = albedo, roughness = 0.6, opacity = opacity or 1 })
 end
 local function all(first, ...)
-  for _, more in ipairs { ... } do first = first:both(more) end
+  for _, more in ipairs { ... } do first = first:intersect(more) end
   return first
 end
 local function stripes(axis, pitch, share) return mask.stripes { axis = axis, pitch_m = pitch, share = share } end
 -- The middle of each stripe.
-local function middle(axis, pitch, from, to) return stripes(axis, pitch, to):both(stripes(axis, pitch, from):inverted()) end
+local function middle(axis, pitch, from, to) return stripes(axis, pitch, to):intersect(stripes(axis, pitch, from):inverted()) end
 
 -- Weavers run around, in front of one stake and behind the next, in the row above the other way round; both are round, so
 -- they are dark at their sides.
@@ -53,15 +53,15 @@ lay(middle("z", WEAVER, 0.28, 0.86):inverted(), BARK, 0.55)
 lay(middle("z", WEAVER, 0.12, 1):inverted(), GAP, 0.9)
 for _, wall in ipairs { { out = "y", across = "x" }, { out = "x", across = "y" } } do
   local column, across = stripes(wall.across, 2 * STAKE, 0.5), wall.across
-  local cells = { column:both(row), column:inverted():both(row:inverted()) }
+  local cells = { column:intersect(row), column:inverted():intersect(row:inverted()) }
   for _, cell in ipairs(cells) do
     for _, sign in ipairs { -1, 1 } do
       local outwards = { wall.out == "x" and sign or 0, wall.out == "y" and sign or 0, 0 }
-      local here = cell:both(mask.facing { axis = outwards, from = 0.8, to = 0.81 })
+      local here = cell:intersect(mask.facing { axis = outwards, from = 0.8, to = 0.81 })
       lay(here, GAP, 0.85)
-      lay(here:both(middle(across, STAKE, 0.16, 0.84)), BARK)
-      lay(here:both(middle(across, STAKE, 0.26, 0.74)), WILLOW)
-      lay(here:both(middle(across, STAKE, 0.38, 0.56)), PALE, 0.7)
+      lay(here:intersect(middle(across, STAKE, 0.16, 0.84)), BARK)
+      lay(here:intersect(middle(across, STAKE, 0.26, 0.74)), WILLOW)
+      lay(here:intersect(middle(across, STAKE, 0.38, 0.56)), PALE, 0.7)
     end
   end
 end
@@ -69,9 +69,9 @@ end
 -- Willow wound around the rods, and a tag on the front and the back.
 local wound = mask.inside { shape = rods, soft_m = 1 * mm }
 lay(wound, WILLOW)
-lay(wound:both(mask.noise { size_m = 6 * mm, octaves = 3, from = 0.35, to = 0.75, seed = 9 }), PALE, 0.8)
-lay(wound:both(middle({ 1, 1, 0.8 }, 6 * mm, 0.30, 0.84):inverted()), BARK, 0.5)
-lay(wound:both(middle({ 1, 1, 0.8 }, 6 * mm, 0.14, 1):inverted()), GAP, 0.85)
+lay(wound:intersect(mask.noise { size_m = 6 * mm, octaves = 3, from = 0.35, to = 0.75, seed = 9 }), PALE, 0.8)
+lay(wound:intersect(middle({ 1, 1, 0.8 }, 6 * mm, 0.30, 0.84):inverted()), BARK, 0.5)
+lay(wound:intersect(middle({ 1, 1, 0.8 }, 6 * mm, 0.14, 1):inverted()), GAP, 0.85)
 local tag = packaging.label { on = { "+x", "-x" }, out = 74 }
 tag.bar(0, 84, 54, 22, { 0.10, 0.042, 0.016 })
 tag.bar(0, 84, 52.6, 20.6, { 0.60, 0.46, 0.27 })

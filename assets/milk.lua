@@ -14,7 +14,7 @@ local shape = packaging.extrude({
 -- A cow's patches below, the sky above.
 local label = packaging.label { on = { "+x", "-x", "+y", "-y" }, out = 26.5 }
 local patches = softvt.mask.noise { size_m = 22 * mm, octaves = 2, from = 0.535, to = 0.55, seed = 11 }
-label.ink(patches:both(softvt.mask.inside { shape = packaging.band(-1, 40) }), BLACK)
+label.ink(patches:intersect(softvt.mask.inside { shape = packaging.band(-1, 40) }), BLACK)
 label.belt(90, 99, BLUE)
 label.belt(99, 140, DEEP)
 label.belt(88, 88.8, BLUE)

@@ -17,7 +17,7 @@ local facing = softvt.mask.facing
 local herbs = softvt.mask.specks { spacing_m = 4.5 * mm, radius_m = 0.9 * mm, seed = 5 }
 label.ink(softvt.mask.gradient { from_m = 90 * mm, to_m = 96 * mm }, { 0.86, 0.66, 0.12 }, { roughness = 0.12 })
 label.ink(softvt.mask.gradient { from_m = 116 * mm, to_m = 117 * mm }, { 0.70, 0.74, 0.66 }, { roughness = 0.12 })
-label.ink(herbs:both(softvt.mask.inside { shape = packaging.band(-1, 94) }), LEAF, { roughness = 0.14 })
+label.ink(herbs:intersect(softvt.mask.inside { shape = packaging.band(-1, 94) }), LEAF, { roughness = 0.14 })
 for _, axis in ipairs { "x", { -1, 0, 0 } } do
   label.ink(facing { axis = axis, from = 0.55, to = 1 }, { 0.42, 0.20, 0.02 }, { roughness = 0.12, opacity = 0.6 })
 end

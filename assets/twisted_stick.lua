@@ -26,7 +26,7 @@ table.insert(crust.layers, {
   mask = softvt.mask.inside { shape = seam, soft_m = 5 * mm }, albedo = { 0.82, 0.60, 0.30 }, roughness = 0.6, opacity = 0.85,
 })
 table.insert(crust.layers, {
-  mask = softvt.mask.specks { spacing_m = 4.6 * mm, radius_m = 0.8 * mm, seed = 34 }:both(softvt.mask.facing { from = 0.45, to = 0.8 }),
+  mask = softvt.mask.specks { spacing_m = 4.6 * mm, radius_m = 0.8 * mm, seed = 34 }:intersect(softvt.mask.facing { from = 0.45, to = 0.8 }),
   albedo = { 0.90, 0.86, 0.78 }, roughness = 0.2, opacity = 0.9, relief_m = 0.35 * mm,
 })
 

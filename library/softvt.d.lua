@@ -16,8 +16,13 @@
 ---@field prompt string Instruction for the policy.
 ---@field layout softvt.Layout Initial scene.
 ---@field goal softvt.On|softvt.Inside Success criterion.
----@field expert? fun(arm: softvt.Arm, scene: softvt.View) A coroutine that solves the task with privileged state.
+---@field expert? fun(arm: softvt.Arm, scene: softvt.SceneState) A coroutine that solves the task with privileged state.
 ---@field budget_steps? integer Control steps (20 Hz) that the policy has; by default 500 in suites that vary layouts, 700 in those that vary objects. Expects a whole number in 1..100000.
+
+---The layout of a scene. Tasks with the same layout name share their initial states.
+---@class softvt.Layout
+---@field name string Name; part of the seed.
+---@field build fun(scene: softvt.Scene, rng: softvt.Rng) Adds the objects to the scene.
 
 ---The object rests on the target, released, for a time.
 ---@class softvt.On
@@ -45,6 +50,13 @@
 ---@field name string Name in results.
 ---@field suites softvt.Suite[] The suites, in order.
 ---@field conditions softvt.Condition[] The conditions, in order.
+
+---A difference between a run and its reference: other shifts or settings with the same tasks, initial states and seeds.
+---@class softvt.Condition
+---@field name string Name in the table of results and of the run folder.
+---@field shift? table<string, number> Shifts by name, as for --shift: { mass = 1.25 }.
+---@field set? table<string, number|boolean|string> Settings by path, as for --set: { ["robot.gripper.effort"] = 20 }.
+---@field only? "deformable"|"rigid" object_type of the suites that it applies to; others are not run, and their row says N/A.
 
 ---A function that is evaluated at points and returns rows of results. Give either grid or points.
 ---@class softvt.Experiment
@@ -77,15 +89,19 @@
 ---@class softvt.Rigid
 ---@field density number Density. Expects a number (kg/m³) above 0.
 
----A fixed body, which never moves.
----@class softvt.Static
-
----Scenery: it is drawn and casts shadows, but has no contact.
----@class softvt.Scenery
-
 ---Parts on joints. The asset's own shape is their base, which never moves.
 ---@class softvt.Articulated
 ---@field parts softvt.Part[] The parts, in any order.
+
+---A part of an articulated object. Parts of one object never touch each other or its base.
+---@class softvt.Part
+---@field name string Name, unique in the object. A scene names the part cabinet.top_drawer.
+---@field shape softvt.Shape Shape with all joints at 0, in the frame of the whole object. Walls must be at least 4 mm thick.
+---@field density number Density. Expects a number (kg/m³) above 0.
+---@field joint softvt.Slider|softvt.Hinge Joint that carries it; axes and origins are in the frame of the whole object.
+---@field parent? string Name of the part that carries it; the fixed base by default.
+---@field visuals? softvt.Visual[] Visuals by material id of its shape, from 0; those of the asset by default.
+---@field hints? table<string, number> Numbers for experts (handle height …).
 
 ---A joint along which a part slides, such as that of a drawer. Values are in m.
 ---@class softvt.Slider
@@ -104,35 +120,6 @@
 ---@field damping? number Viscous damping. Expects a number (N m s/rad) of 0 or more. Default 0.
 ---@field friction? number Dry friction. Expects a number (N m) of 0 or more. Default 0.
 
----A policy, as the file given to --policy returns it. Every episode has a virtual machine of its own, in which the file runs again; math.random is seeded by the episode.
----@class softvt.Policy
----@field name string Name in results, unless --name gives another.
----@field observes? softvt.Observes Observations of the policy.
----@field reset? fun(task: softvt.Brief) Called when the episode begins.
----@field act fun(obs: softvt.Observation): softvt.Action|softvt.Action[] Returns the action of this control step, or a list of actions for the next ones.
----@field replan? integer Number of actions of a list that are executed before act is called again, unless --replan gives another; all by default. Expects a whole number in 1..10000.
-
----The messages of a policy server: the observations it gets and the meaning of its actions. The file given to --profile returns one.
----@class softvt.Profile
----@field name string Name in results, unless --name gives another.
----@field inputs softvt.Input[] Observations that are sent, in order.
----@field actions softvt.ActionEncoding Meaning of the actions.
-
----Coulomb friction of a surface. A pair of surfaces has the larger of each coefficient.
----@class softvt.Friction
----@field static_mu? number Static coefficient. Expects a number in 0..10. Default 0.6.
----@field dynamic_mu? number Dynamic coefficient, at most the static one. Expects a number in 0..10. Default 0.5.
-
----A part of an articulated object. Parts of one object never touch each other or its base.
----@class softvt.Part
----@field name string Name, unique in the object. A scene names the part cabinet.top_drawer.
----@field shape softvt.Shape Shape with all joints at 0, in the frame of the whole object. Walls must be at least 4 mm thick.
----@field density number Density. Expects a number (kg/m³) above 0.
----@field joint softvt.Slider|softvt.Hinge Joint that carries it; axes and origins are in the frame of the whole object.
----@field parent? string Name of the part that carries it; the fixed base by default.
----@field visuals? softvt.Visual[] Visuals by material id of its shape, from 0; those of the asset by default.
----@field hints? table<string, number> Numbers for experts (handle height …).
-
 ---The appearance of a surface: a base material, and layers painted over it in order.
 ---@class softvt.Visual
 ---@field albedo number[] Base colour. Expects a list of 3 numbers in 0..1 (linear RGB).
@@ -148,52 +135,36 @@
 ---@field opacity? number Share of this layer where the mask is 1; with 0 only the relief shows. Expects a number in 0..1. Default 1.
 ---@field relief_m? number Height of the drawn surface where the mask is 1. It is drawn only: contact does not see it. Expects metres in -0.005..0.005. Default 0.
 
----A weight that rises smoothly from 0 to 1 along an axis.
----@class softvt.MaskSpec
----@field axis "x"|"y"|"z" The axis.
----@field from number Coordinate at which the weight is 0. Expects metres.
----@field to number Coordinate at which the weight is 1. Expects metres.
+---A fixed body, which never moves.
+---@class softvt.Static
 
----The layout of a scene. Tasks with the same layout name share their initial states.
----@class softvt.Layout
----@field name string Name; part of the seed.
----@field build fun(scene: softvt.Scene, rng: softvt.Rng) Adds the objects to the scene.
+---Scenery: it is drawn and casts shadows, but has no contact.
+---@class softvt.Scenery
 
----A difference between a run and its reference: other shifts or settings with the same tasks, initial states and seeds.
----@class softvt.Condition
----@field name string Name in the table of results and of the run folder.
----@field shift? table<string, number> Shifts by name, as for --shift: { mass = 1.25 }.
----@field set? table<string, number|boolean|string> Settings by path, as for --set: { ["robot.gripper.effort"] = 20 }.
----@field only? "deformable"|"rigid" object_type of the suites that it applies to; others are not run, and their row says N/A.
+---Coulomb friction of a surface. A pair of surfaces has the larger of each coefficient.
+---@class softvt.Friction
+---@field static_mu? number Static coefficient. Expects a number in 0..10. Default 0.6.
+---@field dynamic_mu? number Dynamic coefficient, at most the static one. Expects a number in 0..10. Default 0.5.
 
----Summary of an experiment.
----@class softvt.Finish
----@field text? string Printed after the rows.
----@field files? table<string, string|softvt.Image|table<string, any>|any[]> Files to write, by relative path: text as it is, images as PNG, tables as JSON with sorted keys.
-
----The hand of a clearance query, and the objects it may touch.
----@class softvt.Clearance
----@field width? number Distance of the gels. Expects metres in 0..0.08. Default 0.08.
----@field ignore? string[] Scene names of objects that it may touch.
-
----Position and style of a line of text.
----@class softvt.Text
----@field at number[] Left end of its baseline, from the top left. Expects a list of 2 numbers (pixels).
----@field size? number Height of the letters. Expects a number (pixels) in 4..200. Default 18.
----@field colour number[] Colour. Expects a list of 3 numbers (sRGB of 0 to 255).
+---A policy, as the file given to --policy returns it. Every episode has a virtual machine of its own, in which the file runs again; math.random is seeded by the episode.
+---@class softvt.Policy
+---@field name string Name in results, unless --name gives another.
+---@field observes? softvt.Observes Observations of the policy.
+---@field reset? fun(task: softvt.TaskBrief) Called when the episode begins.
+---@field act fun(obs: softvt.Observation): softvt.Action|softvt.Action[] Returns the action of this control step, or a list of actions for the next ones.
+---@field replan? integer Number of actions of a list that are executed before act is called again, unless --replan gives another; all by default. Expects a whole number in 1..10000.
 
 ---The observations of a policy; nothing else is computed.
 ---@class softvt.Observes
 ---@field cameras? string[] Names of cameras of the scene.
----@field touch? boolean True to get the tactile images and markers of the fingers. Default false.
+---@field tactile? boolean True to get the tactile images and markers of the fingers. Default false.
 ---@field force? boolean True to get the true forces on the gels, which no real sensor gives; results then say force_observed. Default false.
 
----A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame, and a closure. Give either axis_angle or rotation.
----@class softvt.Action
----@field position number[] Position. Expects a list of 3 numbers (m, base frame).
----@field axis_angle? number[] Orientation as axis-angle. Expects a list of 3 numbers (rad, base frame).
----@field rotation? number[] Orientation as quaternion. Expects a list of 4 numbers (w, x, y, z, base frame).
----@field closure number Gripper closure: 0 is open, 1 is closed. Expects a number in 0..1.
+---The messages of a policy server: the observations it gets and the meaning of its actions. The file given to --profile returns one.
+---@class softvt.Profile
+---@field name string Name in results, unless --name gives another.
+---@field inputs softvt.Input[] Observations that are sent, in order.
+---@field actions softvt.ActionEncoding Meaning of the actions.
 
 ---One entry of the observations that are sent to a policy server.
 ---@class softvt.Input
@@ -221,6 +192,60 @@
 ---@field closed number Value that closes it. Expects a number.
 ---@field binary? boolean True if every value beyond the middle closes, and any other opens. Default false.
 
+---Summary of an experiment.
+---@class softvt.Finish
+---@field text? string Printed after the rows.
+---@field files? table<string, string|softvt.Image|table<string, any>|any[]> Files to write, by relative path: text as it is, images as PNG, tables as JSON with sorted keys.
+
+---A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame, and a closure. Give either axis_angle or quaternion.
+---@class softvt.Action
+---@field position number[] Position. Expects a list of 3 numbers (m, base frame).
+---@field axis_angle? number[] Orientation as axis-angle. Expects a list of 3 numbers (rad, base frame).
+---@field quaternion? number[] Orientation as quaternion. Expects a list of 4 numbers (w, x, y, z, base frame).
+---@field closure number Gripper closure: 0 is open, 1 is closed. Expects a number in 0..1.
+
+---Returns an empty world: soft bodies among fixed or prescribed solids, without a robot.
+---@class softvt.WorldSpec
+---@field dt? number Time step. Expects seconds in 0.00001..0.05. Default 0.016666666666666666.
+---@field rayleigh_mass? number Mass-proportional Rayleigh damping. Expects a number (1/s) in 0..1000. Default 0.
+---@field rayleigh_stiffness? number Stiffness-proportional Rayleigh damping. Expects seconds in 0..1. Default 0.005.
+---@field gravity? number[] Gravity; {0, 0, -9.81} by default. Expects a list of 3 numbers (m/s²).
+---@field sleeping? boolean True if bodies at rest fall asleep. Default true.
+
+---Builds a scene with the robot and lets it settle. Deformation refers to the settled shapes.
+---@class softvt.SimulateSpec
+---@field layout softvt.Layout Initial scene.
+---@field suite? string Part of the seed. Default "experiment".
+---@field episode? integer Part of the seed. Expects a whole number in 0..1000000000. Default 0.
+---@field seed? integer Part of the seed. Expects a whole number in 0..1000000000. Default 0.
+---@field settings? table<string, table<string, any>> Changed settings of physics, robot and judge: { physics = {…}, robot = {…}, criteria = {…} }.
+
+---Returns the results of a calibration: the lower bound of closure, the deformation limit τ, and the files to write.
+---@class softvt.EnvelopeSpec
+---@field asset string Name of the asset.
+---@field kappa? number Safety factor κ of the deformation limit τ = κ D_ref. Expects a number in 0..1. Default 0.5.
+---@field fingerprint? string Fingerprint of the calibrated asset, as simulation:measure returns it. Results for another object of that name then do not use the calibration.
+---@field holds table<string, any>[] Rows closure, trials, held, slip_mm, d_peak_pct of the scan for the lower bound.
+---@field sweep table<string, any>[] Rows closure, gripper_width_mm, d_peak_pct, force_n, min_det_f, node_speed_m_s, both_pads, slip_mm, stable of the compression sweep.
+
+---Returns an image of one colour: `softvt.image { width = 640, height = 480, colour = { 255, 255, 255 } }`.
+---@class softvt.NewImage
+---@field width integer Width, pixels. Expects a whole number in 1..8192.
+---@field height integer Height, pixels. Expects a whole number in 1..8192.
+---@field colour number[] Colour. Expects a list of 3 numbers (sRGB of 0 to 255).
+
+---Returns a pose in the world frame: `softvt.pose { position = { 0.4, 0, 0.2 }, yaw = math.pi / 2 }`. Without a quaternion the hand points straight down.
+---@class softvt.PoseSpec
+---@field position number[] Position. Expects a list of 3 numbers (m, world).
+---@field yaw? number Rotation of the downward hand about the vertical. Expects radians. Default 0.
+---@field quaternion? number[] Orientation instead of yaw. Expects a list of 4 numbers (w, x, y, z).
+
+---Reads a shape from an OBJ, STL or GLB file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface must be closed.
+---@class softvt.MeshSpec
+---@field file string Path inside of the project, next to the Lua file or from a root folder.
+---@field scale? number Metres per unit of the file: 0.001 for millimetres. Expects metres above 0. Default 1.
+---@field z_up? boolean True if z is up in the file; otherwise y is. Default true.
+
 ---An option of the script: key gap_mm is --gap-mm on the command line. The default determines the type.
 ---@class softvt.Option
 ---@field default any A number, string, boolean, or list of numbers or strings.
@@ -230,48 +255,6 @@
 ---@field max? number Highest number. Expects a number.
 ---@field choices? string[] The allowed strings; any by default.
 ---@field help? string Description for --help. Default "".
-
----A world of soft bodies among fixed or prescribed solids, without a robot.
----@class softvt.WorldSpec
----@field dt? number Time step. Expects seconds in 0.00001..0.05. Default 0.016666666666666666.
----@field rayleigh_mass? number Mass-proportional Rayleigh damping. Expects a number (1/s) in 0..1000. Default 0.
----@field rayleigh_stiffness? number Stiffness-proportional Rayleigh damping. Expects seconds in 0..1. Default 0.005.
----@field gravity? number[] Gravity; {0, 0, -9.81} by default. Expects a list of 3 numbers (m/s²).
----@field sleeping? boolean True if bodies at rest fall asleep. Default true.
-
----A scene with the robot, which is built and settled. Deformation refers to the settled shapes.
----@class softvt.SimulateSpec
----@field layout softvt.Layout Initial scene.
----@field suite? string Part of the seed. Default "experiment".
----@field episode? integer Part of the seed. Expects a whole number in 0..1000000000. Default 0.
----@field seed? integer Part of the seed. Expects a whole number in 0..1000000000. Default 0.
----@field settings? table<string, table<string, any>> Changed settings of physics, robot and judge: { physics = {…}, robot = {…}, criteria = {…} }.
-
----The rows of a calibration.
----@class softvt.EnvelopeSpec
----@field asset string Name of the asset.
----@field kappa? number Safety factor κ of the deformation limit τ = κ D_ref. Expects a number in 0..1. Default 0.5.
----@field fingerprint? string Fingerprint of the calibrated asset, as simulation:measure returns it. Results for another object of that name then do not use the calibration.
----@field holds table<string, any>[] Rows closure, trials, held, slip_mm, d_peak_pct of the scan for the lower bound.
----@field sweep table<string, any>[] Rows closure, gripper_width_mm, d_peak_pct, force_n, min_det_f, node_speed_m_s, both_pads, slip_mm, stable of the compression sweep.
-
----An image of one colour.
----@class softvt.NewImage
----@field width integer Width, pixels. Expects a whole number in 1..8192.
----@field height integer Height, pixels. Expects a whole number in 1..8192.
----@field colour number[] Colour. Expects a list of 3 numbers (sRGB of 0 to 255).
-
----A pose in the world frame. Without a quaternion the hand points straight down.
----@class softvt.PoseSpec
----@field xyz number[] Position. Expects a list of 3 numbers (m, world).
----@field yaw? number Rotation of the downward hand about the vertical. Expects radians. Default 0.
----@field quat? number[] Orientation instead of yaw, of any length but 0. Expects a list of 4 numbers (w, x, y, z).
-
----A closed surface from an OBJ, STL or GLB file.
----@class softvt.MeshSpec
----@field file string Path inside of the project, next to the Lua file or from a root folder.
----@field scale? number Metres per unit of the file: 0.001 for millimetres. Expects metres above 0. Default 1.
----@field z_up? boolean True if z is up in the file; otherwise y is. Default true.
 
 ---A box centred on the origin.
 ---@class softvt.BoxSpec
@@ -320,13 +303,13 @@
 
 ---Slabs across an axis.
 ---@class softvt.StripesMask
----@field axis "x"|"y"|"z"|number[] Direction in which they follow each other.
+---@field axis "x"|"y"|"z"|number[] Direction in which they follow each other. Expects one of "x", "y", "z" or a list of 3 numbers (any length).
 ---@field pitch_m number Distance from one to the next. Expects metres above 0.
 ---@field share? number Share of the pitch that is 1. Expects a number in 0..1. Default 0.5.
 
 ---Rises smoothly from 0 to 1 along an axis.
 ---@class softvt.GradientMask
----@field axis? "x"|"y"|"z"|number[] Direction. Default "z".
+---@field axis? "x"|"y"|"z"|number[] Direction. Expects one of "x", "y", "z" or a list of 3 numbers (any length). Default "z".
 ---@field from_m number Coordinate at which it is 0. Expects metres.
 ---@field to_m number Coordinate at which it is 1; may be below from_m. Expects metres.
 
@@ -369,7 +352,7 @@
 
 ---Surfaces that face a direction, by the cosine between their normal and that direction.
 ---@class softvt.FacingMask
----@field axis? "x"|"y"|"z"|number[] Direction. Default "z".
+---@field axis? "x"|"y"|"z"|number[] Direction. Expects one of "x", "y", "z" or a list of 3 numbers (any length). Default "z".
 ---@field from? number Cosine at which it is 0. Expects a number in -1..1. Default 0.
 ---@field to? number Cosine at which it is 1; may be below from. Expects a number in -1..1. Default 1.
 
@@ -383,23 +366,23 @@
 ---@field text string At most 64 letters.
 ---@field height_m number Height of a capital letter. Expects metres in 0.0005..1.
 ---@field at number[] Middle of the line; of a wrapped line, only the height counts. Expects a list of 3 numbers (m).
----@field facing "+x"|"-x"|"+y"|"-y"|"+z"|"-z"|number[] Direction that the printed surface faces. The top of the letters points to +y on top faces, else to +z.
----@field turn? number Rotation of the line on its surface, counter-clockwise for the reader. Expects radians. Default 0.
+---@field facing "+x"|"-x"|"+y"|"-y"|"+z"|"-z"|number[] Direction that the printed surface faces. The top of the letters points to +y on top faces, else to +z. Expects one of "+x", "-x", "+y", "-y", "+z", "-z" or a list of 3 numbers (any length).
+---@field angle? number Rotation of the line on its surface, counter-clockwise for the reader. Expects radians. Default 0.
 ---@field wrap_m? number Radius of the upright cylinder about the z axis that the line is wrapped around; flat by default. Expects metres above 0.
 ---@field weight? number Thickening of the strokes, in heights of a capital letter. Expects a number in 0..0.25. Default 0.08.
 ---@field font? "sans"|"mono" Typeface. Default "sans".
 
----A rotation about an axis through the origin.
+---Rotates the shape about an axis through the origin.
 ---@class softvt.RotateSpec
 ---@field axis "x"|"y"|"z" The axis.
 ---@field angle number Right-handed angle. Expects radians.
 
----A twist about an axis through the origin.
+---Twists the shape about an axis through the origin.
 ---@class softvt.TwistSpec
 ---@field axis "x"|"y"|"z" The axis.
 ---@field rate number Angle per length along the axis. Expects a number (rad/m).
 
----A bend into an arc; the origin stays in place.
+---Bends the shape into an arc; the origin stays in place.
 ---@class softvt.BendSpec
 ---@field along "x"|"y"|"z" The axis that becomes an arc.
 ---@field towards "x"|"y"|"z" The axis with the centre of the arc.
@@ -410,11 +393,17 @@
 ---@field axis? "x"|"y"|"z" The axis that the ridges run around or along. Default "z".
 ---@field height number Height from valley to crest; negative for grooves. Expects metres.
 ---@field count? integer Number of ridges around the axis. Expects a whole number in -1000..1000. Default 0.
----@field pitch? number Distance of ridges along the axis. Expects metres above 0.
----@field radial_pitch? number Distance of ridges away from the axis. Expects metres above 0.
+---@field pitch? number Distance of ridges along the axis; infinite for flutes. Expects metres above 0. Default inf.
+---@field radial_pitch? number Distance of ridges away from the axis; infinite if they do not depend on it. Expects metres above 0. Default inf.
 ---@field phase? number Phase. Expects radians. Default 0.
 ---@field sharpness? number 1 is a sine; larger values give narrower ridges. Expects a number in 1..8. Default 1.
----@field mask? softvt.MaskSpec Weight of their height; 1 everywhere by default.
+---@field mask? softvt.Ramp Weight of their height; 1 everywhere by default.
+
+---A weight that rises smoothly from 0 to 1 along an axis.
+---@class softvt.Ramp
+---@field axis "x"|"y"|"z" The axis.
+---@field from number Coordinate at which the weight is 0. Expects metres.
+---@field to number Coordinate at which the weight is 1. Expects metres.
 
 ---Adds scattered bumps to a shape (seeds, raisins).
 ---@class softvt.BumpsSpec
@@ -422,63 +411,85 @@
 ---@field radius number Radius of a bump, at most half the spacing. Expects metres above 0.
 ---@field spacing number Mean distance of bumps. Expects metres above 0.
 ---@field seed? integer Selects their positions. Expects a whole number of 0 or more. Default 0.
----@field mask? softvt.MaskSpec Weight of their height; 1 everywhere by default.
+---@field mask? softvt.Ramp Weight of their height; 1 everywhere by default.
 
 ---Gives all or part of the surface another material.
 ---@class softvt.PaintSpec
 ---@field material integer Material id: index into the asset's visuals, from 0. Expects a whole number in 0..65535.
 ---@field region? softvt.Shape Part of the surface inside of this shape; the whole surface by default.
 
----A finite-element soft body of a world.
+---Adds a soft body.
 ---@class softvt.WorldSoft
 ---@field name? string Name in messages. Default "body".
 ---@field shape softvt.Shape Shape.
----@field youngs_pa number Young's modulus. Expects pascals above 0.
----@field poisson number Poisson's ratio. Expects a number in 0..below 0.5.
----@field density number Density. Expects a number (kg/m³) above 0.
----@field resolution? integer Voxels along the longest edge. Expects a whole number in 1..64. Default 6.
----@field grasp_spacing? number Spacing of contact samples on steep surfaces. Expects metres in 0.0001..0.02. Default 0.00075.
+---@field body softvt.Soft Material.
 ---@field friction? softvt.Friction Friction of its surface.
----@field xyz number[] Position of its frame. Expects a list of 3 numbers (m).
----@field turn? number[] Orientation as axis-angle; none by default. Expects a list of 3 numbers (rad).
+---@field position number[] Position of its frame. Expects a list of 3 numbers (m).
+---@field axis_angle? number[] Orientation; none by default. Expects a list of 3 numbers (rad).
 
 ---A solid that moves as prescribed (kinematic) or never (static).
 ---@class softvt.WorldSolid
 ---@field name? string Name in messages. Default "solid".
 ---@field shape softvt.Shape Shape.
 ---@field friction? softvt.Friction Friction of its surface.
----@field xyz number[] Position of its frame. Expects a list of 3 numbers (m).
----@field turn? number[] Orientation as axis-angle; none by default. Expects a list of 3 numbers (rad).
+---@field position number[] Position of its frame. Expects a list of 3 numbers (m).
+---@field axis_angle? number[] Orientation; none by default. Expects a list of 3 numbers (rad).
 
----The camera of an image and its size.
+---Renders the image of a camera, by default third_person.
 ---@class softvt.Render
 ---@field camera? string A camera of the scene. Default "third_person".
 ---@field width? integer Width, pixels; the camera's by default. Expects a whole number in 1..4096.
 ---@field height? integer Height, pixels; the camera's by default. Expects a whole number in 1..4096.
 
----Placement of an asset. Give either at or xyz.
+---Writes a line of text on the image.
+---@class softvt.Text
+---@field at number[] Left end of its baseline, from the top left. Expects a list of 2 numbers in -100000..100000 (pixels).
+---@field size? number Height of the letters. Expects a number (pixels) in 4..200. Default 18.
+---@field colour number[] Colour. Expects a list of 3 numbers (sRGB of 0 to 255).
+
+---Placement of an asset. Give either at or position.
 ---@class softvt.Place
 ---@field name string Name in the scene, unique.
 ---@field asset softvt.Asset Asset of the object.
----@field at? number[] Position x, y; the object rests on the table, or on the object that `on` names. Expects a list of 2 numbers (m, world).
----@field xyz? number[] Position of its origin: its lowest point, on the centre line. Expects a list of 3 numbers (m, world).
+---@field at? number[] Position x, y; the object rests on the table, or on the object that `on` names. Expects a list of 2 numbers in -1000..1000 (m, world).
+---@field position? number[] Position of its origin: its lowest point, on the centre line. Expects a list of 3 numbers in -1000..1000 (m, world).
 ---@field yaw? number Rotation about the vertical. Expects radians. Default 0.
 ---@field on? string Scene name of the object or part (cabinet.top_drawer) that it rests on (with at).
 ---@field joints? table<string, number> Start values of an articulated object's joints by part; 0, or the nearest limit, by default.
 
----A camera. Give either look_at or quat.
+---A camera. Give either look_at or quaternion.
 ---@class softvt.NewCamera
 ---@field name string Name, unique; also that of its image stream.
 ---@field mount? "world"|"hand" Frame that the camera is fixed to; hand is panda_hand. Default "world".
----@field position number[] Position. Expects a list of 3 numbers (m, frame of the mount).
----@field look_at? number[] A point in the middle of the image. Expects a list of 3 numbers (m, frame of the mount).
+---@field position number[] Position. Expects a list of 3 numbers in -1000000..1000000 (m, frame of the mount).
+---@field look_at? number[] A point in the middle of the image. Expects a list of 3 numbers in -1000000..1000000 (m, frame of the mount).
 ---@field up? number[] Upward direction in the image (with look_at); z by default. Expects a list of 3 numbers (frame of the mount).
----@field quat? number[] Orientation: the camera looks along its −z axis, and +y is up in the image. Expects a list of 4 numbers (w, x, y, z, frame of the mount).
+---@field quaternion? number[] Orientation: the camera looks along its −z axis, and +y is up in the image. Expects a list of 4 numbers (w, x, y, z, frame of the mount).
 ---@field fovy? number Vertical field of view. Expects radians in 0.01..2.8. Default 0.8.
 ---@field near? number Nearest visible distance. Expects metres in 0.0001..100. Default 0.01.
 ---@field far? number Farthest visible distance. Expects metres in 0.001..10000. Default 20.
 ---@field width? integer Width of the image, pixels. Expects a whole number in 1..4096. Default 224.
 ---@field height? integer Height of the image, pixels. Expects a whole number in 1..4096. Default 224.
+
+---Returns the distance between a hand at a pose and the nearest object, m, and the name of that object. The distance is at most 0.2 and negative inside.
+---@class softvt.Clearance
+---@field width? number Distance of the gels. Expects metres in 0..0.08. Default 0.08.
+---@field ignore? string[] Scene names of objects that it may touch.
+
+---Options of a motion of the arm.
+---@class softvt.MotionOptions
+---@field speed? number Largest speed. Expects a number (m/s) above 0. Default 0.25.
+---@field angular_speed? number Largest angular speed. Expects a number (rad/s) above 0. Default 1.5.
+---@field closure? number Closure at the end; by default it stays. Expects a number in 0..1.
+
+---Options of closing and opening.
+---@class softvt.RateOptions
+---@field rate? number Rate of the gripper; 1 is the whole stroke in a second. Expects a number (1/s) above 0. Default 0.5.
+
+---Options of releasing an object.
+---@class softvt.ReleaseOptions
+---@field rate? number Rate of the gripper; 1 is the whole stroke in a second. Expects a number (1/s) above 0. Default 0.5.
+---@field closure? number Closure at the end. Expects a number in 0..1. Default 0.
 
 ---A solid. Methods return a new shape and leave this one as it is.
 ---@class softvt.Shape
@@ -543,17 +554,17 @@ function Shape:volume() end
 ---@return softvt.Shape
 function Shape:grounded() end
 
----A rotation about an axis through the origin.
+---Rotates the shape about an axis through the origin.
 ---@param spec softvt.RotateSpec
 ---@return softvt.Shape
 function Shape:rotate(spec) end
 
----A twist about an axis through the origin.
+---Twists the shape about an axis through the origin.
 ---@param spec softvt.TwistSpec
 ---@return softvt.Shape
 function Shape:twist(spec) end
 
----A bend into an arc; the origin stays in place.
+---Bends the shape into an arc; the origin stays in place.
 ---@param spec softvt.BendSpec
 ---@return softvt.Shape
 function Shape:bend(spec) end
@@ -580,7 +591,7 @@ local Mask = {}
 ---Returns the product of two masks: 1 where both are.
 ---@param other softvt.Mask
 ---@return softvt.Mask
-function Mask:both(other) end
+function Mask:intersect(other) end
 
 ---Returns 1 minus the mask.
 ---@return softvt.Mask
@@ -695,9 +706,9 @@ function Body:slipping(solid) end
 local Solid = {}
 
 ---Prescribes the pose after the next step: position, m, and orientation as axis-angle, rad (none by default).
----@param xyz number[]
----@param turn? number[]
-function Solid:move_to(xyz, turn) end
+---@param position number[]
+---@param axis_angle? number[]
+function Solid:move_to(position, axis_angle) end
 
 ---Deformation of a body against its reference shape, in percent of the diagonal of its bounding box.
 ---@class softvt.Deformation
@@ -711,7 +722,7 @@ local Deformation = {}
 local Simulation = {}
 
 ---Runs an expert to its end. Returns false and the reason if it gave up or the physics failed.
----@param expert fun(arm: softvt.Arm, scene: softvt.View)
+---@param expert fun(arm: softvt.Arm, scene: softvt.SceneState)
 ---@return boolean
 ---@return string?
 function Simulation:drive(expert) end
@@ -832,30 +843,30 @@ function Image:text(text, style) end
 ---@field x number Position along x, m.
 ---@field y number Position along y, m.
 ---@field z number Position along z, m.
----@field xyz number[] Position x, y, z, m.
----@field quat number[] Orientation as quaternion w, x, y, z with w ≥ 0.
+---@field position number[] Position x, y, z, m.
+---@field quaternion number[] Orientation as quaternion w, x, y, z with w ≥ 0.
 local Pose = {}
 
 ---Returns the pose moved by an offset in the world frame, m.
----@param by number[]
+---@param offset number[]
 ---@return softvt.Pose
-function Pose:moved(by) end
+function Pose:translated(offset) end
 
 ---Returns the same orientation at another position, m.
----@param xyz number[]
+---@param position number[]
 ---@return softvt.Pose
-function Pose:at(xyz) end
+function Pose:at(position) end
 
 ---Returns the same position, rotated by an angle about the world's vertical, rad.
 ---@param angle number
 ---@return softvt.Pose
-function Pose:turned(angle) end
+function Pose:rotated(angle) end
 
----Interpolates towards another pose: a share of 0 returns this pose, 1 the other.
+---Returns a pose between this one (at a share of 0) and another (at 1).
 ---@param other softvt.Pose
 ---@param share number
 ---@return softvt.Pose
-function Pose:towards(other, share) end
+function Pose:interpolate(other, share) end
 
 ---Returns the distance to another pose, m, and the angle between the orientations, rad.
 ---@param other softvt.Pose
@@ -904,7 +915,7 @@ function Rng:shuffle(list) end
 ---@class softvt.Scene
 ---@field objects softvt.Object[] The placed objects, in order.
 ---@field light softvt.Light The light.
----@field base number[] Position of the robot base. Expects a list of 3 numbers (m, world).
+---@field base number[] Position of the robot base. Expects a list of 3 numbers in -1000..1000 (m, world).
 ---@field start_q number[] Joint angles of the arm at the start, within its limits. Expects a list of 7 numbers (rad).
 ---@field gravity number[] Gravity. Expects a list of 3 numbers (m/s², world).
 ---@field workspace_min number[] Lowest corner of the workspace. Expects a list of 3 numbers (m, world).
@@ -933,12 +944,12 @@ function Scene:add_camera(spec) end
 ---The light of a scene: a key light and a sky.
 ---@class softvt.Light
 ---@field direction number[] Direction to the key light. Expects a list of 3 numbers (world, any length).
----@field colour number[] Colour of the key light. Expects a list of 3 numbers (linear RGB).
+---@field colour number[] Colour of the key light. Expects a list of 3 numbers in 0..1000 (linear RGB).
 ---@field strength number Strength of the key light; 1 shows a white surface at full value. Expects a number in 0..1000.
 ---@field softness number Half of the angle under which the key light is seen; larger values give softer shadows. Expects radians in 0..0.5.
----@field sky_zenith number[] Light from straight above. Expects a list of 3 numbers (linear RGB).
----@field sky_horizon number[] Light from the horizon, and the background. Expects a list of 3 numbers (linear RGB).
----@field sky_ground number[] Light from straight below. Expects a list of 3 numbers (linear RGB).
+---@field sky_zenith number[] Light from straight above. Expects a list of 3 numbers in 0..1000 (linear RGB).
+---@field sky_horizon number[] Light from the horizon, and the background. Expects a list of 3 numbers in 0..1000 (linear RGB).
+---@field sky_ground number[] Light from straight below. Expects a list of 3 numbers in 0..1000 (linear RGB).
 ---@field sky_strength number Factor on the sky. Expects a number in 0..1000.
 ---@field exposure number Factor on the whole image. Expects a number in above 0..1000.
 local Light = {}
@@ -947,8 +958,8 @@ local Light = {}
 ---@class softvt.Camera
 ---@field name string Name.
 ---@field mount "world"|"hand" Frame that the camera is fixed to.
----@field position number[] Position. Expects a list of 3 numbers (m, frame of the mount).
----@field quat number[] Orientation: the camera looks along its −z axis, and +y is up in the image. Expects a list of 4 numbers (w, x, y, z, frame of the mount).
+---@field position number[] Position. Expects a list of 3 numbers in -1000000..1000000 (m, frame of the mount).
+---@field quaternion number[] Orientation: the camera looks along its −z axis, and +y is up in the image. Expects a list of 4 numbers (w, x, y, z, frame of the mount).
 ---@field fovy number Vertical field of view. Expects radians in 0.01..2.8.
 ---@field near number Nearest visible distance. Expects metres in 0.0001..100.
 ---@field far number Farthest visible distance. Expects metres in 0.001..10000.
@@ -963,7 +974,7 @@ function Camera:look_at(point, up) end
 
 ---The base material of a visual of a placed object. Its layers stay as they are.
 ---@class softvt.Material
----@field albedo number[] Base colour. Expects a list of 3 numbers (linear RGB in 0..1).
+---@field albedo number[] Base colour. Expects a list of 3 numbers in 0..1 (linear RGB).
 ---@field roughness number Roughness: 0 is a mirror, 1 is chalk. Expects a number in 0..1.
 ---@field metalness number Metalness: 1 is bare metal. Expects a number in 0..1.
 local Material = {}
@@ -974,7 +985,7 @@ local Material = {}
 ---@field asset string Name of its asset.
 ---@field materials softvt.Material[] The base materials of its visuals, by material id.
 ---@field joints table<string, number> Start values of its joints by part, m or rad.
----@field xyz number[] Position of its origin: its lowest point, on the centre line. Expects a list of 3 numbers (m, world).
+---@field position number[] Position of its origin: its lowest point, on the centre line. Expects a list of 3 numbers in -1000..1000 (m, world).
 ---@field yaw number Rotation about the vertical. Expects radians.
 ---@field density number Density of a soft or rigid body. Expects a number (kg/m³) above 0.
 ---@field youngs_pa number Young's modulus of a soft body. Expects pascals above 0.
@@ -993,36 +1004,36 @@ function Object:mass(part) end
 function Object:scale_mass(factor) end
 
 ---The true state of the scene at this control step, as an expert gets it.
----@class softvt.View
-local View = {}
+---@class softvt.SceneState
+local SceneState = {}
 
 ---Returns the state of an object.
 ---@param name string
 ---@return softvt.ObjectState
-function View:object(name) end
+function SceneState:object(name) end
 
 ---Returns the state of a part of an articulated object.
 ---@param object string
 ---@param part string
 ---@return softvt.ObjectState
-function View:part(object, part) end
+function SceneState:part(object, part) end
 
 ---Returns the states of all objects, in the order of the scene.
 ---@return softvt.ObjectState[]
-function View:objects() end
+function SceneState:objects() end
 
 ---Returns the distance between a hand at a pose and the nearest object, m, and the name of that object. The distance is at most 0.2 and negative inside.
 ---@param pose softvt.Pose
 ---@param options? softvt.Clearance
 ---@return number
 ---@return string?
-function View:clearance(pose, options) end
+function SceneState:clearance(pose, options) end
 
 ---The true state of an object at one moment.
 ---@class softvt.ObjectState
 ---@field name string Name in the scene.
 ---@field asset string Name of its asset.
----@field xyz number[] Centre of its bounding box, world frame, m.
+---@field centre number[] Centre of its bounding box, world frame, m.
 ---@field size number[] Edge lengths of its bounding box at rest, m.
 ---@field yaw number Rotation about the vertical, rad.
 ---@field hints table<string, number> Numbers of its asset for experts.
@@ -1048,32 +1059,32 @@ local Arm = {}
 ---@param closure number
 function Arm:command(pose, closure) end
 
----Moves along a straight line with a smooth speed profile. Options: speed (at most, m/s, default 0.25), turn (at most, rad/s, default 1.5), closure (reached at the end; by default it stays).
+---Moves along a straight line with a smooth speed profile.
 ---@param pose softvt.Pose
----@param options? {speed: number?, turn: number?, closure: number?}
+---@param options? softvt.MotionOptions
 function Arm:move_to(pose, options) end
 
----Moves by an offset in the world frame, m, with the options of move_to.
+---Moves by an offset in the world frame, m.
 ---@param offset number[]
----@param options? {speed: number?, turn: number?, closure: number?}
+---@param options? softvt.MotionOptions
 function Arm:move_by(offset, options) end
 
----Closes or opens to a closure. Option: rate (1/s, default 0.5; 1 is the whole stroke in a second).
+---Closes or opens to a closure.
 ---@param closure number
----@param options? {rate: number?}
+---@param options? softvt.RateOptions
 function Arm:close_to(closure, options) end
 
 ---Closes on an object. A binary gripper, which is either open or closed, closes here and not in close_to. A tactile servo closes until both fingers show a firm grasp, whatever closure is given.
 ---@param closure number
----@param options? {rate: number?}
+---@param options? softvt.RateOptions
 function Arm:grasp(closure, options) end
 
----Releases an object by opening to options.closure, by default wide.
----@param options? {rate: number?, closure: number?}
+---Releases an object by opening, by default wide.
+---@param options? softvt.ReleaseOptions
 function Arm:release(options) end
 
 ---Opens the gripper.
----@param options? {rate: number?}
+---@param options? softvt.RateOptions
 function Arm:open(options) end
 
 ---Returns the present readings of the tactile sensors; the first call waits for a control step. Available in simulation:drive and under --policy tactile-servo.
@@ -1093,25 +1104,25 @@ function Arm:give_up(reason) end
 local List = {}
 
 ---The episode that begins.
----@class softvt.Brief
+---@class softvt.TaskBrief
 ---@field suite string Name of the suite.
 ---@field task integer Index of the task, from 0.
 ---@field prompt string The instruction.
 ---@field episode integer Index of the episode, from 0.
-local Brief = {}
+local TaskBrief = {}
 
 ---The observation of a policy at a control step. Poses are of the tool centre point in the robot's base frame. The true state of the scene is not part of it.
 ---@class softvt.Observation
 ---@field time number Time since the policy took over, s.
 ---@field position number[] Tool position, m.
 ---@field axis_angle number[] Tool orientation as axis-angle, rad.
----@field rotation number[] Tool orientation as quaternion w, x, y, z with w ≥ 0.
+---@field quaternion number[] Tool orientation as quaternion w, x, y, z with w ≥ 0.
 ---@field joints number[] The seven joint angles of the arm, rad.
 ---@field width number Measured distance of the gels, 0 to 0.08 m.
 ---@field closure number Last commanded closure: 0 is open, 1 is closed.
 ---@field prompt string The instruction.
----@field touch softvt.Fingers Tactile sensors; requires observes.touch.
----@field touch_history softvt.Fingers[] Tactile sensors in the last 1 to 8 control steps, oldest first; requires observes.touch.
+---@field tactile softvt.Fingers Tactile sensors; requires observes.tactile.
+---@field tactile_history softvt.Fingers[] Tactile sensors in the last 1 to 8 control steps, oldest first; requires observes.tactile.
 ---@field force softvt.Forces True forces on the gels; requires observes.force.
 local Observation = {}
 
@@ -1122,16 +1133,16 @@ function Observation:camera(name) end
 
 ---The tactile sensors of both fingers at one control step.
 ---@class softvt.Fingers
----@field left softvt.Touch The left finger.
----@field right softvt.Touch The right finger.
+---@field left softvt.TactileFrame The left finger.
+---@field right softvt.TactileFrame The right finger.
 local Fingers = {}
 
 ---The tactile sensor of a finger at one control step; docs/tactile.md draws its frames.
----@class softvt.Touch
+---@class softvt.TactileFrame
 ---@field image softvt.Image Colour image, 320 × 240.
 ---@field difference softvt.Image Absolute difference of every channel from the image of the untouched gel.
 ---@field markers softvt.Markers The 11 × 9 markers.
-local Touch = {}
+local TactileFrame = {}
 
 ---The 99 markers of a finger, row by row, in px of its image: x to the right (towards the hand), y down. 1 px is 0.063 mm.
 ---@class softvt.Markers
@@ -1146,15 +1157,15 @@ function Markers:mean() end
 
 ---Returns the length of the longest displacement.
 ---@return number
-function Markers:largest() end
+function Markers:max_displacement() end
 
 ---Returns the root mean square of the displacements without their mean and twist. It grows with the normal force: about 0.3 px per newton on round dough and rigid objects, less on flat and soft ones.
 ---@return number
-function Markers:press() end
+function Markers:rms_residual() end
 
 ---Returns the mean displacement towards the fingertip or across, as of an object that slips out of the grasp; 0 if it is pushed in.
 ---@return number
-function Markers:drag() end
+function Markers:outward_shear() end
 
 ---Returns the trace of the displacement gradient; positive where an indentation pushes the markers outwards.
 ---@return number
@@ -1171,12 +1182,12 @@ function Markers:shear() end
 ---Returns the contact mask: true for markers displaced by more than px.
 ---@param px number
 ---@return boolean[]
-function Markers:moved(px) end
+function Markers:contact_mask(px) end
 
 ---Returns the share of markers displaced by more than px; the whole image is 20.3 × 15.2 mm.
 ---@param px number
 ---@return number
-function Markers:area(px) end
+function Markers:contact_share(px) end
 
 ---True forces on the gels, N, pad frame: a pressing body makes z negative.
 ---@class softvt.Forces
@@ -1282,12 +1293,12 @@ function softvt.profile(spec) end
 ---@return softvt.Layout
 function softvt.layout(name, build) end
 
----Returns an empty world without a robot.
+---Returns an empty world: soft bodies among fixed or prescribed solids, without a robot.
 ---@param spec? softvt.WorldSpec
 ---@return softvt.World
 function softvt.world(spec) end
 
----Builds a scene with the robot and lets it settle.
+---Builds a scene with the robot and lets it settle. Deformation refers to the settled shapes.
 ---@param spec softvt.SimulateSpec
 ---@return softvt.Simulation
 function softvt.simulate(spec) end
@@ -1312,12 +1323,12 @@ function softvt.stable(row) end
 ---@return softvt.Image
 function softvt.image(spec) end
 
----Returns a pose in the world frame: `softvt.pose { xyz = { 0.4, 0, 0.2 }, yaw = math.pi / 2 }`.
+---Returns a pose in the world frame: `softvt.pose { position = { 0.4, 0, 0.2 }, yaw = math.pi / 2 }`. Without a quaternion the hand points straight down.
 ---@param spec softvt.PoseSpec
 ---@return softvt.Pose
 function softvt.pose(spec) end
 
----Reads a shape from a mesh file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface must be closed.
+---Reads a shape from an OBJ, STL or GLB file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface must be closed.
 ---@param spec softvt.MeshSpec
 ---@return softvt.Shape
 function softvt.mesh(spec) end

@@ -19,7 +19,7 @@ function views.portrait(asset, edge)
   local across = math.sqrt(size[1] ^ 2 + size[2] ^ 2 + size[3] ^ 2)
   local reach = 0.99 * across / 2 / math.sin(FOVY / 2)
   local layout = softvt.layout("portrait_" .. asset.name, function(scene)
-    scene:add { name = "table", asset = table_top, xyz = { 0, 0, 0 } }
+    scene:add { name = "table", asset = table_top, position = { 0, 0, 0 } }
     scene:add { name = "object", asset = asset, at = { 0.1, 0 }, yaw = math.rad(25) }
     local middle = { 0.1, 0, size[3] / 2 }
     scene:add_camera {
@@ -33,7 +33,7 @@ end
 -- A simulation of the asset in the expert's grasp, lifted by `lift` (m).
 function views.held(asset, lift)
   local layout = softvt.layout("imprint_" .. asset.name, function(scene)
-    scene:add { name = "table", asset = table_top, xyz = { 0, 0, 0 } }
+    scene:add { name = "table", asset = table_top, position = { 0, 0, 0 } }
     scene:add { name = "object", asset = asset, at = { -0.05, 0 } }
   end)
   local sim = softvt.simulate { layout = layout }
@@ -41,7 +41,7 @@ function views.held(asset, lift)
     local object = scene:object "object"
     local at = grasp.pose(object, grasp.height(object))
     if object.hints.grasp_rim_m then at = grasp.choose(scene, object, grasp.height(object)) end
-    arm:move_to(at:moved { 0, 0, 0.08 }, { speed = 0.6, turn = 3 })
+    arm:move_to(at:translated { 0, 0, 0.08 }, { speed = 0.6, angular_speed = 3 })
     arm:move_to(at, { speed = 0.25 })
     arm:grasp(grasp.closure(object), { rate = 0.6 })
     arm:wait(0.3)

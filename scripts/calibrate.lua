@@ -39,7 +39,7 @@ local CONTACT_N = 1e-3                    -- pad force that counts as contact, N
 -- the index of the trial, not on the closure.
 local function single_object(name, displacement)
   return softvt.layout("calibrate_" .. name, function(scene, rng)
-    scene:add { name = "table", asset = table_top, xyz = { 0, 0, 0 } }
+    scene:add { name = "table", asset = table_top, position = { 0, 0, 0 } }
     scene:add { name = "object", asset = assets[name], at = { -0.05, 0 } }
     if displacement then
       displacement.offset = { rng:uniform(-OFFSET, OFFSET), rng:uniform(-OFFSET, OFFSET) }
@@ -54,7 +54,7 @@ local function grasp_at(closure, displacement)
     local object = scene:object "object"
     local height = grasp.height(object)
     local at = grasp.pose(object, height, displacement and displacement.offset, displacement and displacement.turn)
-    arm:move_to(at:moved { 0, 0, 0.08 }, { speed = 0.6, turn = 3 })
+    arm:move_to(at:translated { 0, 0, 0.08 }, { speed = 0.6, angular_speed = 3 })
     arm:move_to(at, { speed = 0.25 })
     arm:wait(0.1)
     arm:grasp(closure, { rate = 0.6 })

@@ -75,7 +75,7 @@ end
 function material.floured(look, o)
   local dust = mask.noise { size_m = o.size_m or 3 * mm, octaves = 3, from = 0.5, to = 0.8, seed = o.seed or 1 }
   look.layers = look.layers or {}
-  table.insert(look.layers, layer(dust:both(mask.facing { from = 0.35, to = 0.85 }), { 0.78, 0.70, 0.58 }, 0.95, o.opacity or 0.5))
+  table.insert(look.layers, layer(dust:intersect(mask.facing { from = 0.35, to = 0.85 }), { 0.78, 0.70, 0.58 }, 0.95, o.opacity or 0.5))
   return look
 end
 

@@ -123,7 +123,7 @@ function packaging.label(spec)
         facing, at = { math.cos(way), math.sin(way), 0 }, { 0, 0, y * mm }
       end
       label.ink(mask.text {
-        text = words, height_m = high * mm, at = at, facing = facing, turn = turn + (more.lean or 0),
+        text = words, height_m = high * mm, at = at, facing = facing, angle = turn + (more.lean or 0),
         wrap_m = spec.wrap and spec.wrap * mm or nil, weight = more.weight or 0.14, font = more.font,
       }, albedo, more)
     end

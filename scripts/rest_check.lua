@@ -20,7 +20,7 @@ local MOVED_MM, TURNED_DEG, SPEED = 0.1, 0.5, 1e-3
 
 local function alone(name)
   return softvt.layout("rest_" .. name, function(scene)
-    scene:add { name = "table", asset = table_top, xyz = { 0, 0, 0 } }
+    scene:add { name = "table", asset = table_top, position = { 0, 0, 0 } }
     scene:add { name = "object", asset = assets[name], at = { 0.1, 0 }, yaw = math.rad(opt.yaw_deg) }
   end)
 end
@@ -45,8 +45,8 @@ return softvt.experiment {
     local ok, why = sim:wait(opt.wait_s)
     if not ok then error(point.asset .. ": " .. why) end
     local after, seen = state(sim), sim:measure "object"
-    local moved = 1e3 * math.sqrt((after.xyz[1] - before.xyz[1]) ^ 2 + (after.xyz[2] - before.xyz[2]) ^ 2)
-    local sunk = 1e3 * (before.xyz[3] - after.xyz[3])
+    local moved = 1e3 * math.sqrt((after.centre[1] - before.centre[1]) ^ 2 + (after.centre[2] - before.centre[2]) ^ 2)
+    local sunk = 1e3 * (before.centre[3] - after.centre[3])
     -- Relative to the initial yaw, because settling may rotate the object too.
     local turned = math.deg(after.yaw) - opt.yaw_deg
     return {

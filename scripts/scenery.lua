@@ -57,10 +57,10 @@ local function stand(height)
 end
 
 local function walls(scene, floor_z)
-  scene:add { name = "wall", asset = wall, xyz = { -1.75, 0, floor_z } }
-  scene:add { name = "skirting", asset = skirting, xyz = { -1.75, 0, floor_z } }
-  scene:add { name = "side_wall", asset = wall, xyz = { 0.75, 2.5, floor_z }, yaw = -math.pi / 2 }
-  scene:add { name = "side_skirting", asset = skirting, xyz = { 0.75, 2.5, floor_z }, yaw = -math.pi / 2 }
+  scene:add { name = "wall", asset = wall, position = { -1.75, 0, floor_z } }
+  scene:add { name = "skirting", asset = skirting, position = { -1.75, 0, floor_z } }
+  scene:add { name = "side_wall", asset = wall, position = { 0.75, 2.5, floor_z }, yaw = -math.pi / 2 }
+  scene:add { name = "side_skirting", asset = skirting, position = { 0.75, 2.5, floor_z }, yaw = -math.pi / 2 }
 end
 
 -- Walls for scenes supported by the floor, z = 0: walls behind the robot and on the side away from the light. The floor
@@ -72,11 +72,11 @@ end
 -- Walls for scenes supported by a table with its top at z = 0, with the robot on a stand next to it.
 function scenery.table_room(scene)
   local floor_z = -HIGH - 0.05
-  scene:add { name = "floor", asset = shaded_floor, xyz = { 0.75, 0, floor_z } }
+  scene:add { name = "floor", asset = shaded_floor, position = { 0.75, 0, floor_z } }
   walls(scene, floor_z)
-  scene:add { name = "table_frame", asset = frame, xyz = { 0, 0, floor_z } }
+  scene:add { name = "table_frame", asset = frame, position = { 0, 0, floor_z } }
   local base = scene.base
-  scene:add { name = "robot_stand", asset = stand(base[3] - floor_z), xyz = { base[1], base[2], floor_z } }
+  scene:add { name = "robot_stand", asset = stand(base[3] - floor_z), position = { base[1], base[2], floor_z } }
 end
 
 return scenery

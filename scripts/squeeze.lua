@@ -44,16 +44,16 @@ local function build(o)
   local world = softvt.world { dt = o.dt, rayleigh_stiffness = o.beta_s, sleeping = false }
   local grip = { static_mu = o.friction, dynamic_mu = o.friction }
   local body = world:soft {
-    name = o.shape, shape = shape, youngs_pa = o.youngs_pa, poisson = o.poisson, density = o.density,
-    resolution = o.resolution, friction = { static_mu = 0, dynamic_mu = 0 }, xyz = { 0, 0, width / 2 },
+    name = o.shape, shape = shape, friction = { static_mu = 0, dynamic_mu = 0 }, position = { 0, 0, width / 2 },
+    body = softvt.soft { youngs_pa = o.youngs_pa, poisson = o.poisson, density = o.density, resolution = o.resolution },
   }
   local slab = softvt.shape.box { size = { 1, 1, 0.1 } }
-  world:static { name = "table", shape = slab, friction = grip, xyz = { 0, 0, -0.05 } }
+  world:static { name = "table", shape = slab, friction = grip, position = { 0, 0, -0.05 } }
   local pad = softvt.shape.box { size = { PAD_THICKNESS, o.pad_mm * mm, o.pad_mm * mm } }
   local pads = {}
   for i, side in ipairs { -1, 1 } do
     local x = side * (width / 2 + CLEARANCE + PAD_THICKNESS / 2)
-    pads[i] = { side = side, solid = world:kinematic { name = "pad", shape = pad, friction = grip, xyz = { x, 0, width / 2 } } }
+    pads[i] = { side = side, solid = world:kinematic { name = "pad", shape = pad, friction = grip, position = { x, 0, width / 2 } } }
   end
   return { world = world, body = body, pads = pads, width = width }
 end

@@ -22,7 +22,7 @@ local bowl = softvt.asset {
   } },
 }
 local layout = softvt.layout("kitchen", function(scene)
-  scene:add { name = "table", asset = table_top, xyz = { 0, 0, 0 } }
+  scene:add { name = "table", asset = table_top, position = { 0, 0, 0 } }
   scene:add { name = "cabinet", asset = cabinet, at = { 0, 0.2 }, joints = { top_drawer = 0.12 } }
   scene:add { name = "stove", asset = stove, at = { 0, -0.3 }, joints = { knob = 1 } }
   scene:add { name = "bowl", asset = bowl, at = { 0, 0.2 - 0.0805 - 0.06 }, on = "cabinet.top_drawer" }

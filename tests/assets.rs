@@ -266,7 +266,7 @@ fn stacks(stacks: &[&[&str]]) -> Vec<Scene> {
         end
         for _, names in ipairs(all) do
           local layout = softvt.layout(table.concat(names, \"_\"), function(scene)
-            scene:add {{ name = \"table\", asset = assets.table, xyz = {{ 0, 0, 0 }} }}
+            scene:add {{ name = \"table\", asset = assets.table, position = {{ 0, 0, 0 }} }}
             for i, name in ipairs(names) do
               local on = i > 1 and names[i - 1] or nil
               scene:add {{ name = name, asset = assets[name], at = {{ 0.05, 0.02 }}, yaw = 0.3 * i, on = on }}

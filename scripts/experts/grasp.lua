@@ -25,7 +25,7 @@ end
 function grasp.long_axis_yaw(object) return object.yaw + (object.size[1] < object.size[2] and math.pi / 2 or 0) end
 
 -- Height of an object's lowest point, m.
-function grasp.bottom(object) return object.xyz[3] - object.size[3] / 2 end
+function grasp.bottom(object) return object.centre[3] - object.size[3] / 2 end
 
 -- Longer and shorter horizontal side of an object, m.
 function grasp.sides(object)
@@ -36,9 +36,9 @@ end
 -- object's lowest point; `offset` (m) and `turn` (rad) displace the grasp, for trials.
 function grasp.pose(object, height, offset, turn)
   local yaw = grasp.long_axis_yaw(object) + (turn or 0)
-  local x, y = object.xyz[1], object.xyz[2]
+  local x, y = object.centre[1], object.centre[2]
   if offset then x, y = x + offset[1], y + offset[2] end
-  return softvt.pose { xyz = { x, y, grasp.bottom(object) + height }, yaw = wrap_half_turn(yaw) }
+  return softvt.pose { position = { x, y, grasp.bottom(object) + height }, yaw = wrap_half_turn(yaw) }
 end
 
 -- Height of the tool centre point above an object's lowest point in a grasp: half its height, or the lowest at which the sensor
@@ -87,13 +87,13 @@ local function candidates(object, height, offset)
     local bottom = grasp.bottom(object)
     for k = 0, 47 do
       local angle = k * STEP
-      local x = object.xyz[1] + hints.grasp_rim_m * math.cos(angle)
-      local y = object.xyz[2] + hints.grasp_rim_m * math.sin(angle)
+      local x = object.centre[1] + hints.grasp_rim_m * math.cos(angle)
+      local y = object.centre[2] + hints.grasp_rim_m * math.sin(angle)
       local yaw = wrap_half_turn(angle - math.pi / 2)
       -- The side of the rim that is nearer to the robot is reached with the arm less stretched.
-      local stretch = 8 * (x - object.xyz[1])
+      local stretch = 8 * (x - object.centre[1])
       for _, up in ipairs { 0, 0.003, 0.006 } do
-        list[#list + 1] = { softvt.pose { xyz = { x, y, bottom + height + up }, yaw = yaw }, math.abs(yaw) + stretch + 300 * up }
+        list[#list + 1] = { softvt.pose { position = { x, y, bottom + height + up }, yaw = yaw }, math.abs(yaw) + stretch + 300 * up }
       end
     end
   else

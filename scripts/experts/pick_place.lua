@@ -4,7 +4,7 @@
 local grasp = require "experts.grasp"
 local route = require "experts.route"
 
-local FIELDS = { object = true, target = true, closure = true, speed = true }
+local FIELDS = { object = "string", target = "string", closure = "number?", speed = "number?" }
 -- Clearance above obstacles while carrying, above the target at release, and around the fingers, m.
 local CARRY_CLEARANCE, RELEASE_HEIGHT, FINGER_CLEARANCE = 0.025, 0.001, 0.002
 -- Fraction of a lift that a held object must follow.
@@ -14,16 +14,6 @@ local ATTEMPTS, MAX_DISPLACEMENT = 3, 0.08
 -- Random variation of the speed (relative) and of the grasp position (m), so that demonstrations differ.
 local SPEED_SPREAD, GRASP_SPREAD = 0.12, 0.0015
 
-local function checked(spec)
-  for key in pairs(spec) do
-    if not FIELDS[key] then error("pick_place: unknown field " .. tostring(key), 3) end
-  end
-  if type(spec.object) ~= "string" or type(spec.target) ~= "string" then
-    error("pick_place: object and target must name objects of the scene", 3)
-  end
-  return spec
-end
-
 local function spread(most) return (2 * math.random() - 1) * most end
 
 -- Grasps the object and lifts it off its support. Returns true and the grasp height (m), or false and the reason.
@@ -32,17 +22,17 @@ local function pick(arm, scene, spec, pace)
   local height = grasp.height(object)
   local at, opening, clearance = grasp.choose(scene, object, height, { spread(GRASP_SPREAD), spread(GRASP_SPREAD) })
   if clearance < 0 then return false, "leaves no clearance for the hand" end
-  local over = route.approach_height(scene, arm.pose.xyz, at, 0.05, FINGER_CLEARANCE)
+  local over = route.approach_height(scene, arm.pose.position, at, 0.05, FINGER_CLEARANCE)
   arm:move_to(arm.target:at { arm.target.x, arm.target.y, math.max(over, arm.target.z) }, { speed = 0.4 * pace })
   arm:move_to(at:at { at.x, at.y, over }, { speed = 0.4 * pace, closure = opening })
   arm:move_to(at, { speed = 0.25 * pace, closure = opening })
   arm:wait(0.1)
-  local before = scene:object(spec.object).xyz[3]
+  local before = scene:object(spec.object).centre[3]
   arm:grasp(spec.closure or grasp.closure(object), { rate = 0.6 })
   arm:wait(0.3)
   -- Straight up first.
   arm:move_by({ 0, 0, 0.05 }, { speed = 0.2 * pace })
-  if scene:object(spec.object).xyz[3] - before > MIN_LIFT_FRACTION * 0.05 then return true, height end
+  if scene:object(spec.object).centre[3] - before > MIN_LIFT_FRACTION * 0.05 then return true, height end
   return false, "was not lifted by the grasp"
 end
 
@@ -65,13 +55,13 @@ local function release_pose(arm, scene, spec, height)
   local surface = grasp.bottom(target) + (target.hints.surface_m or target.size[3]) + height + RELEASE_HEIGHT
   local width = 0.08 * (1 - grasp.clear_closure(object))
   -- The object's offset from the tool rotates with the hand.
-  local dx, dy = object.xyz[1] - arm.pose.x, object.xyz[2] - arm.pose.y
+  local dx, dy = object.centre[1] - arm.pose.x, object.centre[2] - arm.pose.y
   local best, rotations = nil, place_rotations(object, target)
   for up = 0, 20 do
     for _, turn in ipairs(rotations) do
       local c, s = math.cos(turn), math.sin(turn)
-      local x, y = target.xyz[1] - (c * dx - s * dy), target.xyz[2] - (s * dx + c * dy)
-      local pose = arm.target:turned(turn):at { x, y, surface + 0.005 * up }
+      local x, y = target.centre[1] - (c * dx - s * dy), target.centre[2] - (s * dx + c * dy)
+      local pose = arm.target:rotated(turn):at { x, y, surface + 0.005 * up }
       local clearance = scene:clearance(pose, { width = width, ignore = { spec.object } })
       if not best or clearance > best.clearance then best = { pose = pose, clearance = clearance } end
       if clearance >= FINGER_CLEARANCE then return pose end
@@ -84,7 +74,7 @@ local function place(arm, scene, spec, height, pace)
   local object = scene:object(spec.object)
   local target_pose = release_pose(arm, scene, spec, height)
   local carried = { object = object, below = height }
-  local over = math.max(target_pose.z + 0.03, route.carry_height(scene, arm.pose.xyz, target_pose.xyz, carried, CARRY_CLEARANCE))
+  local over = math.max(target_pose.z + 0.03, route.carry_height(scene, arm.pose.position, target_pose.position, carried, CARRY_CLEARANCE))
   arm:move_to(arm.target:at { arm.target.x, arm.target.y, math.max(over, arm.target.z) }, { speed = 0.25 * pace })
   arm:move_to(target_pose:at { target_pose.x, target_pose.y, over }, { speed = 0.4 * pace })
   arm:move_to(target_pose, { speed = 0.2 * pace })
@@ -96,13 +86,13 @@ local function place(arm, scene, spec, height, pace)
 end
 
 return function(spec)
-  checked(spec)
+  softvt.check_fields("pick_place", spec, FIELDS)
   return function(arm, scene)
     local pace = (spec.speed or 1) * (1 + spread(SPEED_SPREAD))
-    local first, reason = scene:object(spec.object).xyz, nil
+    local first, reason = scene:object(spec.object).centre, nil
     for _ = 1, ATTEMPTS do
       -- An object that has slid or rolled away is not followed.
-      local now = scene:object(spec.object).xyz
+      local now = scene:object(spec.object).centre
       local moved = math.sqrt((now[1] - first[1]) ^ 2 + (now[2] - first[2]) ^ 2)
       if moved > MAX_DISPLACEMENT then
         arm:give_up(("%s has moved by %.0f mm; grasping it again is not attempted"):format(spec.object, 1e3 * moved))

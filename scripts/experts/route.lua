@@ -27,8 +27,8 @@ function route.carry_height(scene, from, to, carried, margin)
   for _, object in ipairs(scene:objects()) do
     local radius = radius_of(object)
     -- A larger object is the support or scenery.
-    if object.name ~= name and radius < 0.5 and segment_distance(object.xyz, from, to) < reach + radius then
-      top = math.max(top, object.xyz[3] + object.size[3] / 2)
+    if object.name ~= name and radius < 0.5 and segment_distance(object.centre, from, to) < reach + radius then
+      top = math.max(top, object.centre[3] + object.size[3] / 2)
     end
   end
   return top + math.max(CASE, carried.below) + margin

@@ -9,6 +9,11 @@ local PALM, LOW = { 0.108, 0.036 }, 0.05
 -- Draws per object, draws of the other objects per placement of the graspable ones, and placements before an error.
 local DRAWS, REDRAWS, PLACEMENTS = 60, 40, 20
 
+local FIELDS = {
+  name = "string", asset = "table", at = "table", yaw = "number?",
+  position_range = "number?", yaw_range = "number?", clearance = "number?", reachable = "boolean?",
+}
+
 -- Adds normal noise to the arm's initial joint angles.
 function arrange.arm(scene, rng)
   local joints, noise = scene.start_q, rng:stream "arm"
@@ -103,6 +108,7 @@ end
 -- Reachable objects are drawn first and keep their positions while the others are redrawn. Their distribution therefore
 -- does not depend on the other objects.
 function arrange.scatter(rng, objects, clearance)
+  for k, object in ipairs(objects) do softvt.check_fields(("arrange.scatter: objects[%d]"):format(k), object, FIELDS) end
   for _ = 1, PLACEMENTS do
     local first = place_all(rng, objects, {}, true, clearance)
     for _ = 1, first and REDRAWS or 0 do

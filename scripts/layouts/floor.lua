@@ -53,8 +53,8 @@ local function layout(name, asset, k, range)
   return softvt.layout(name, function(scene, rng)
     scene.base = { -0.6, 0, 0 }
     local camera = scene:camera "third_person"
-    camera.position, camera.quat = { 0.8966, 0, 0.65 }, { 0.6182, 0.3432, 0.3432, 0.6182 }
-    scene:add { name = "floor", asset = floor, xyz = { 0.75, 0, 0 } }
+    camera.position, camera.quaternion = { 0.8966, 0, 0.65 }, { 0.6182, 0.3432, 0.3432, 0.6182 }
+    scene:add { name = "floor", asset = floor, position = { 0.75, 0, 0 } }
     arrange.add(scene, rng, objects, CLEARANCE)
     scenery.floor_room(scene)
     arrange.arm(scene, rng)

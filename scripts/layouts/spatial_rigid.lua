@@ -68,7 +68,7 @@ function layouts.relation(k)
   local open = relation[1] == "in_drawer" and 0.15 or 0
 
   return softvt.layout("table_" .. relation[1], function(scene, rng)
-    scene:add { name = "table", asset = table_top, xyz = { 0, 0, 0 } }
+    scene:add { name = "table", asset = table_top, position = { 0, 0, 0 } }
     local placed = {}
     for i, place in ipairs(arrange.scatter(rng, objects, CLEARANCE)) do
       local object = objects[i]
@@ -83,13 +83,13 @@ function layouts.relation(k)
       if how.on then
         local under = placed[how.on]
         if how.rests then
-          scene:add { name = name, asset = bowl, xyz = { under.x, under.y, how.rests } }
+          scene:add { name = name, asset = bowl, position = { under.x, under.y, how.rests } }
         else
           scene:add { name = name, asset = bowl, at = { under.x + dx, under.y + dy }, on = how.on }
         end
       elseif how.drawer then
-        local xyz = to_world(placed.cabinet, how.drawer)
-        scene:add { name = name, asset = bowl, xyz = { xyz[1] + dx, xyz[2] + dy, xyz[3] } }
+        local drawer = to_world(placed.cabinet, how.drawer)
+        scene:add { name = name, asset = bowl, position = { drawer[1] + dx, drawer[2] + dy, drawer[3] } }
       end
     end
     scenery.table_room(scene)

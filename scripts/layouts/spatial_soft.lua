@@ -26,7 +26,7 @@ function layouts.pair(asset, k)
   local places = assert(PLACES[k], "there are five arrangements")
   local recipe = require("assets." .. asset)
   return softvt.layout(asset .. "_pair", function(scene, rng)
-    scene:add { name = "table", asset = table_top, xyz = { 0, 0, 0 } }
+    scene:add { name = "table", asset = table_top, position = { 0, 0, 0 } }
     scene:add { name = "plate", asset = plate, at = { places.plate[1] * mm, places.plate[2] * mm } }
     for _, side in ipairs { "left", "right" } do
       local x, y = places[side][1] * mm, places[side][2] * mm

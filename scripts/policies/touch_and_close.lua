@@ -1,5 +1,5 @@
--- Moves down, closes until both fingers report contact, and lifts. It uses touch alone and does not know where objects are.
--- When the object drags harder than it presses, the gripper closes slightly more.
+-- Moves down, closes until both fingers report contact, and lifts. It uses the tactile sensors alone.
+-- When the outward shear exceeds the residual, the gripper closes slightly more.
 --
 --   softvt suites/object_soft.lua --policy scripts/policies/touch_and_close.lua --episodes 1
 local DOWN, UP = 0.01, 0.005       -- m per control step
@@ -9,8 +9,8 @@ local HELD, STEP = 0.08, 0.0125    -- px of marker motion; closure per control s
 local phase, start, height, closure
 
 -- The smaller value of a measure over both fingers.
-local function least(touch, measure)
-  return math.min(measure(touch.left.markers), measure(touch.right.markers))
+local function least(fingers, measure)
+  return math.min(measure(fingers.left.markers), measure(fingers.right.markers))
 end
 
 local phases = {}
@@ -20,29 +20,29 @@ function phases.down()
   if height == LOWEST then phase = "close" end
 end
 
-function phases.close(touch)
-  if closure == 1 or least(touch, function(m) return m:press() end) > HELD then
+function phases.close(fingers)
+  if closure == 1 or least(fingers, function(m) return m:rms_residual() end) > HELD then
     phase = "lift"
   else
     closure = math.min(1, closure + STEP)
   end
 end
 
-function phases.lift(touch)
+function phases.lift(fingers)
   height = math.min(LOWEST + LIFT, height + UP)
-  if least(touch, function(m) return m:press() - m:drag() end) < 0 then closure = math.min(1, closure + STEP) end
+  if least(fingers, function(m) return m:rms_residual() - m:outward_shear() end) < 0 then closure = math.min(1, closure + STEP) end
 end
 
 return softvt.policy {
   name = "touch_and_close",
-  observes = { touch = true },
+  observes = { tactile = true },
   reset = function() phase, start, closure = "down", nil, 0 end,
   act = function(obs)
     if not start then
       start = { obs.position[1], obs.position[2] }
       height = obs.position[3]
     end
-    phases[phase](obs.touch)
+    phases[phase](obs.tactile)
     -- The gripper points down: a rotation by 180° about x.
     return { position = { start[1], start[2], height }, axis_angle = { math.pi, 0, 0 }, closure = closure }
   end,

@@ -42,26 +42,22 @@ local function travel(self, pose, options, closure)
   local from, start = self.target, self.closure
   if closure < start then end_servo(self) end
   local metres, radians = from:distance(pose)
-  local seconds = PEAK * max(metres / options.speed, radians / options.turn)
+  local seconds = PEAK * max(metres / options.speed, radians / options.angular_speed)
   local steps = max(1, ceil(seconds / host.dt))
   for step = 1, steps do
     local s = smooth(step / steps)
-    self:command(from:towards(pose, s), start * (1 - s) + closure * s)
+    self:command(from:interpolate(pose, s), start * (1 - s) + closure * s)
   end
 end
 
--- Moves along a straight line. Options: speed (m/s), turn (rad/s), closure to reach during the motion.
-function Arm:move_to(pose, options)
-  options = check.options("arm:move_to", options, { speed = 0.25, turn = 1.5, closure = self.closure })
-  travel(self, pose, options, options.closure)
-end
+-- Moves along a straight line, and to options.closure on the way.
+function Arm:move_to(pose, options) travel(self, pose, options, options.closure or self.closure) end
 
 -- Moves by an offset in the world frame, m.
-function Arm:move_by(offset, options) self:move_to(self.target:moved(offset), options) end
+function Arm:move_by(offset, options) self:move_to(self.target:translated(offset), options) end
 
 -- Closes or opens to a closure at a rate (1/s; 1 is the full stroke per second).
 function Arm:close_to(closure, options)
-  options = check.options("arm:close_to", options, { rate = 0.5 })
   local start = self.closure
   if closure < start then end_servo(self) end
   local change = closure - start
@@ -74,7 +70,6 @@ end
 function Arm:grasp(closure, options)
   self.gripping = true
   if not fingers.servo then return self:close_to(closure, options) end
-  options = check.options("arm:grasp", options, { rate = 0.5 })
   end_servo(self)
   self.wants_readings = true
   self.holds = servo.close(self.closure, options.rate * host.dt, function(next)
@@ -85,7 +80,6 @@ end
 
 -- Releases an object by opening to options.closure (default: fully open).
 function Arm:release(options)
-  options = check.options("arm:release", options, { rate = 0.5, closure = 0 })
   self.gripping = false
   end_servo(self)
   self:close_to(options.closure, { rate = options.rate })
@@ -106,7 +100,6 @@ end
 -- Ends the expert with a reason. The last command stays in effect, and the coroutine is not resumed.
 function Arm:give_up(reason) yield(self.target, self.closure, self.gripping, reason) end
 
-local measured = { pose = true, width = true, force = true, time = true, dt = true }
 local own = { target = true, closure = true, gripping = true }
 local state, methods, arm = { target = host.target, closure = host.closure, gripping = host.gripping, wants_readings = false }, {}, nil
 
@@ -121,16 +114,10 @@ setmetatable(state, { __index = Arm })
 
 arm = setmetatable({}, {
   __index = function(_, key)
-    if measured[key] then return host[key] end
     if own[key] then return state[key] end
-    local method = methods[key]
-    if method == nil then check.unknown(key) end
-    return method
+    return methods[key] or host[key]
   end,
-  __newindex = function(_, key)
-    if not (measured[key] or own[key] or methods[key]) then check.unknown(key) end
-    check.refuse("arm." .. key .. ": is read-only; use the methods of the arm")
-  end,
+  __newindex = function(_, key, value) host[key] = value end,
   __tostring = function() return "softvt.Arm" end,
   __metatable = "softvt.Arm",
 })

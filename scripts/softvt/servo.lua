@@ -1,34 +1,34 @@
--- A tactile servo. It closes until the markers of both fingers show a firm grasp, and closes slightly more whenever the object
--- drags on the gels harder than it presses into them. Its parameters describe the gels only, not the object's closure,
+-- A tactile servo. It closes until the markers of both fingers show a firm grasp, and closes slightly more whenever the outward
+-- shear of the markers exceeds their residual. Its parameters describe the gels only, not the object's closure,
 -- stiffness, mass or friction, and are the same for a bun and a can.
 local servo = {}
 
 local min = math.min
 
--- Press of a firm grasp and of first contact, px of marker motion. Flat dough presses by 0.08 px at 0.6 N, round dough and a
--- carton at 0.3 N.
+-- Residual of the markers in a firm grasp and at first contact, px. Flat dough gives 0.08 px at 0.6 N, round dough and a carton
+-- at 0.3 N.
 local HELD, TOUCHED = 0.08, 0.01
--- Change of closure per control step after first contact, and in response to drag (0.5 mm and 1 mm of width).
+-- Change of closure per control step after first contact, and in response to shear (0.5 mm and 1 mm of width).
 local FINE, TIGHTEN = 0.00625, 0.0125
--- Smallest ratio of press to drag of a held object. A sliding grasp drags at least three times as hard as it presses at the
--- friction of a gel.
+-- Smallest ratio of residual to outward shear of a held object. In a sliding grasp the shear is at least three times the
+-- residual at the friction of a gel.
 local RATIO = 1
 
 local function least(fingers, measure) return min(measure(fingers.left.markers), measure(fingers.right.markers)) end
 
-local function press(markers) return markers:press() end
+local function residual(markers) return markers:rms_residual() end
 
 -- True if an object touches either finger.
-local function touched(fingers) return fingers.left.markers:press() > TOUCHED or fingers.right.markers:press() > TOUCHED end
+local function touched(fingers) return fingers.left.markers:rms_residual() > TOUCHED or fingers.right.markers:rms_residual() > TOUCHED end
 
--- Press in excess of drag, px. Negative if the object is being pulled out of the finger.
-local function margin(markers) return markers:press() - RATIO * markers:drag() end
+-- Residual in excess of the outward shear, px. Negative if the object is being pulled out of the finger.
+local function margin(markers) return markers:rms_residual() - RATIO * markers:outward_shear() end
 
 -- Closes by `rate` per control step until both fingers show a firm grasp or the gripper is closed. `step` sends a closure and returns the
 -- finger readings of the next control step.
 function servo.close(closure, rate, step)
   local fingers = step(closure)
-  while closure < 1 and least(fingers, press) < HELD do
+  while closure < 1 and least(fingers, residual) < HELD do
     closure = min(1, closure + (touched(fingers) and FINE or rate))
     fingers = step(closure)
   end

@@ -14,7 +14,7 @@ local assets = { loaf = require "assets.my_object", plate = require "assets.plat
 -- The initial scene of an episode. All random numbers come from rng, so the index of an episode determines it.
 -- z = 0 is the top of the table, the robot's base is at x = -0.66, and +y is to the right in the third-person image.
 local layout = softvt.layout("my_layout", function(scene, rng)
-  scene:add { name = "table", asset = assets.table, xyz = { 0, 0, 0 } }
+  scene:add { name = "table", asset = assets.table, position = { 0, 0, 0 } }
   arrange.add(scene, rng, {
     { name = "plate", asset = assets.plate, at = { 40 * mm, 120 * mm } },
     { name = "loaf", asset = assets.loaf, at = { -40 * mm, -120 * mm }, position_range = 20 * mm, yaw_range = math.rad(30) },

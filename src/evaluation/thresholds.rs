@@ -205,6 +205,21 @@ fn check_equal(path: &str, field: &'static str, got: &str, expected: &str) -> Re
     })
 }
 
+/// `compression_sweep.jsonl`: the sweep rows of an asset. Their closure is the *opening*: 1 open, 0 closed.
+pub fn sweep_jsonl(asset: &str, envelope: &Envelope) -> String {
+    let rows = envelope.sweep.iter().enumerate().map(|(level, row)| {
+        serde_json::json!({
+            "asset": asset,
+            "closure": 1.0 - row.closure,
+            "stable": row.stable,
+            "d_peak": row.d_peak_pct,
+            "level": level,
+            "gripper_width_mm": row.gripper_width_mm,
+        })
+    });
+    rows.map(|row| format!("{row}\n")).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::calibration::tests::{hold, squeeze};

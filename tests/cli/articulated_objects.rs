@@ -13,7 +13,7 @@ local slab = softvt.shape.box {{ size = {{ 0.1, 0.1, 0.01 }} }}
 local chest = softvt.asset {{ name = "chest", shape = slab:grounded(), body = softvt.articulated {{ parts = {{ {{ name = "tray", shape = slab:translate(0, 0, 0.02), density = 500,
   joint = {joint} }} }} }} }}
 local layout = softvt.layout("one", function(scene)
-  scene:add {{ name = "floor", asset = floor, xyz = {{ 0, 0, 0 }} }}
+  scene:add {{ name = "floor", asset = floor, position = {{ 0, 0, 0 }} }}
   scene:add {{ name = "chest", asset = chest, at = {{ 0, 0.1 }}, joints = {{ tray = 0.05 }} }}
   scene:add {{ name = "block", asset = block, at = {{ 0, 0.03 }}, on = "chest.tray" }}
   assert(scene:object("chest").joints.tray == 0.05)
@@ -50,7 +50,7 @@ fn an_expert_sees_parts_and_joints() {
       assert(math.abs(chest.joints.tray - 0.05) < 1e-5 and chest.joint == nil)
       local tray = scene:part("chest", "tray")
       assert(tray.name == "tray" and tray.joint == chest.joints.tray and chest.parts.tray.joint == tray.joint)
-      assert(math.abs(tray.xyz[2] - 0.05) < 1e-5 and math.abs(tray.size[1] - 0.1) < 1e-9)
+      assert(math.abs(tray.centre[2] - 0.05) < 1e-5 and math.abs(tray.size[1] - 0.1) < 1e-9)
       assert(#scene:objects() == 3, "parts are no objects of their own")
       error "all seen""#;
     let project = suite(TRAY, "chest.tray", expert);

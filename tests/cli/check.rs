@@ -24,7 +24,7 @@ fn errors_of_a_run_are_found_by_the_check() {
 
 #[test]
 fn invalid_scenes_are_found_without_settling() {
-    assert_snapshot!(of(Small { at: "xyz = { 0, 0.1, -0.012 }", ..Small::default() }), @"x.lua:6: objects cube and floor (placed at x.lua:5) overlap by 12 mm at the start; move them apart");
+    assert_snapshot!(of(Small { at: "position = { 0, 0.1, -0.012 }", ..Small::default() }), @"x.lua:6: objects cube and floor (placed at x.lua:5) overlap by 12 mm at the start; move them apart");
     let thin = of(Small {
         shape: "softvt.shape.box { size = { 0.04, 0.04, 0.003 } }:grounded()",
         ..Small::default()
@@ -35,18 +35,18 @@ fn invalid_scenes_are_found_without_settling() {
         ..Small::default()
     });
     assert_snapshot!(inside, @"x.lua: task 0, episode 0: x.lua:6: camera in: position: it is inside cube; move it out");
-    let beside = of(Small { at: "xyz = { 0, -1, 0 }", ..Small::default() });
+    let beside = of(Small { at: "position = { 0, -1, 0 }", ..Small::default() });
     assert_snapshot!(beside, @"x.lua:6: object cube has nothing below it; place it above a support");
-    let below = of(Small { at: "xyz = { 0, 0.1, -0.3 }", ..Small::default() });
+    let below = of(Small { at: "position = { 0, 0.1, -0.3 }", ..Small::default() });
     assert_snapshot!(below, @"x.lua:6: object cube has nothing below it; place it above a support");
-    let base = of(Small { at: "xyz = { -0.6, 0, 0.05 }", ..Small::default() });
+    let base = of(Small { at: "position = { -0.6, 0, 0.05 }", ..Small::default() });
     assert_snapshot!(base, @"x.lua:6: object cube starts inside of the robot's base; move it away");
     let dust = of(Small {
         shape: "softvt.shape.box { size = { 4e-5, 4e-5, 4e-5 } }:grounded()",
         ..Small::default()
     });
     assert_snapshot!(dust, @"x.lua:6: asset cube: it is 4.0e-5 m long, expected at least 0.001 m; sizes are in metres (a mesh has a scale)");
-    let hand = of(Small { at: "xyz = { -0.187, 0.03, 0.29 }", ..Small::default() });
+    let hand = of(Small { at: "position = { -0.187, 0.03, 0.29 }", ..Small::default() });
     assert!(hand.starts_with("x.lua:6: object cube starts inside of the robot's hand ("), "{hand}");
 }
 

@@ -12,10 +12,10 @@ const SUITE: &str = r#"
 local solids = require "solids"
 local layout = softvt.layout("one", function(scene)
   local x = 0.01 * math.random()
-  scene:add { name = "floor", asset = solids.floor, xyz = { 0, 0, 0 } }
-  scene:add { name = "slab", asset = solids.slab, xyz = { 0, 0.2, 0 } }
-  scene:add { name = "cube", asset = solids.cube, xyz = { x, 0.2, 0.02 } }
-  scene:add { name = "other", asset = solids.cube, xyz = { 0, 0, 0 } }
+  scene:add { name = "floor", asset = solids.floor, position = { 0, 0, 0 } }
+  scene:add { name = "slab", asset = solids.slab, position = { 0, 0.2, 0 } }
+  scene:add { name = "cube", asset = solids.cube, position = { x, 0.2, 0.02 } }
+  scene:add { name = "other", asset = solids.cube, position = { 0, 0, 0 } }
 end)
 local function task(prompt)
   return softvt.task { prompt = prompt, layout = layout, goal = softvt.on { object = "cube", target = "slab" }, budget_steps = 30,

@@ -9,9 +9,9 @@ const SUITE: &str = r#"
 local solids = require "solids"
 local layout = softvt.layout("one", function(scene)
   local beside = math.random() < 0.4
-  scene:add { name = "floor", asset = solids.floor, xyz = { 0, 0, 0 } }
-  scene:add { name = "slab", asset = solids.slab, xyz = { 0, 0.2, 0 } }
-  scene:add { name = "cube", asset = solids.cube, xyz = { 0, beside and 0.35 or 0.2, beside and 0 or 0.02 } }
+  scene:add { name = "floor", asset = solids.floor, position = { 0, 0, 0 } }
+  scene:add { name = "slab", asset = solids.slab, position = { 0, 0.2, 0 } }
+  scene:add { name = "cube", asset = solids.cube, position = { 0, beside and 0.35 or 0.2, beside and 0 or 0.02 } }
 end)
 return softvt.suite { name = "one", object_type = "rigid", variation = "spatial", episodes = 1, tasks = {
   softvt.task { prompt = "wait", layout = layout, goal = softvt.on { object = "cube", target = "slab" }, budget_steps = 30,

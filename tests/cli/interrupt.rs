@@ -54,7 +54,7 @@ for i = 1, 100 do points[i] = { i = i } end
 return softvt.experiment { name = "e", options = {}, points = function() return points end, run = function(point)
   if point.i == 1 then return { i = 1 } end
   local world = softvt.world { sleeping = false, gravity = { 0, 0, 0 } }
-  world:soft { name = "cube", shape = softvt.shape.box { size = { 0.05, 0.05, 0.05 } }, youngs_pa = 3e4, poisson = 0.4, density = 300, xyz = { 0, 0, 1 } }
+  world:soft { name = "cube", shape = softvt.shape.box { size = { 0.05, 0.05, 0.05 } }, body = softvt.soft { youngs_pa = 3e4, poisson = 0.4, density = 300 }, position = { 0, 0, 1 } }
   for _ = 1, 1e9 do pcall(world.step, world) end
   return { i = point.i }
 end }
@@ -124,7 +124,7 @@ fn interrupted(project: &Project, words: &[&str], work_s: f64) -> (Option<i32>, 
 /// Defines `step_for_ever()`, which spends nearly all its time in the physics.
 const STEPS: &str = r#"local function step_for_ever()
   local world = softvt.world { sleeping = false, gravity = { 0, 0, 0 } }
-  world:soft { name = "cube", shape = softvt.shape.box { size = { 0.05, 0.05, 0.05 } }, youngs_pa = 3e4, poisson = 0.4, density = 300, xyz = { 0, 0, 1 } }
+  world:soft { name = "cube", shape = softvt.shape.box { size = { 0.05, 0.05, 0.05 } }, body = softvt.soft { youngs_pa = 3e4, poisson = 0.4, density = 300 }, position = { 0, 0, 1 } }
   while true do pcall(world.step, world) end
 end
 "#;

@@ -47,7 +47,7 @@ fn placed(body: &str, add: &str) -> String {
 fn overlaps_are_reported_with_depth_and_place() {
     let (rigid, soft) =
         ("softvt.rigid { density = 500 }", "softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300 }");
-    let floor = "scene:add { name = 'floor', asset = floor, xyz = { 0, 0, 0 } }\n";
+    let floor = "scene:add { name = 'floor', asset = floor, position = { 0, 0, 0 } }\n";
     let add = |a: &str, b: &str| {
         format!(
             "{floor}scene:add {{ name = 'a', asset = block, {a} }}\nscene:add {{ name = 'b', asset = block, {b} }}"
@@ -57,7 +57,7 @@ fn overlaps_are_reported_with_depth_and_place() {
     assert_snapshot!(placed(rigid, &beside), @"x.lua:6: objects b and a (placed at x.lua:5) overlap by 10 mm at the start; move them apart");
     assert_snapshot!(placed(soft, &beside), @"x.lua:6: objects b and a (placed at x.lua:5) overlap by 10 mm at the start; move them apart");
     for body in [rigid, soft] {
-        let sunk = add("xyz = { 0, 0.1, -0.012 }", "at = { 0.2, 0.1 }");
+        let sunk = add("position = { 0, 0.1, -0.012 }", "at = { 0.2, 0.1 }");
         assert_eq!(
             placed(body, &sunk),
             "x.lua:5: objects a and floor (placed at x.lua:4) overlap by 12 mm at the start; move them apart"
@@ -81,7 +81,7 @@ fn sizes_in_millimetres_are_recognized() {
 fn unsettled_objects_are_reported() {
     let slope = "softvt.rigid { density = 500 }";
     let add = "local ramp = softvt.asset { name = 'ramp', shape = softvt.shape.box { size = { 9, 1, 0.05 } }:rotate { axis = 'y', angle = 0.1 }, body = softvt.static {} }\n\
-               scene:add { name = 'floor', asset = ramp, xyz = { 0, 0, 0 } }\n\
+               scene:add { name = 'floor', asset = ramp, position = { 0, 0, 0 } }\n\
                local ball = softvt.asset { name = 'ball', shape = softvt.shape.sphere { radius = 0.02 }:grounded(), body = softvt.rigid { density = 500 } }\n\
                scene:add { name = 'a', asset = ball, at = { 0, 0.1 }, on = 'floor' }";
     let message = placed(slope, add);
@@ -96,22 +96,23 @@ fn unsettled_objects_are_reported() {
 
 #[test]
 fn falling_objects_are_reported() {
-    let project = Small { at: "xyz = { 0, 0.8, 0.1 }", ..Small::default() }.project();
+    let project = Small { at: "position = { 0, 0.8, 0.1 }", ..Small::default() }.project();
     let message = project.refusal("x.lua --out run");
     assert_snapshot!(message, @"x.lua:6: layout one, episode 0: object cube fell out of the world: there was nothing below it, and after 3 s of settling it is 44.9 m lower; place it above a support");
 }
 
 #[test]
 fn objects_inside_of_the_hand_are_reported() {
-    let message =
-        Small { at: "xyz = { -0.187, 0.03, 0.29 }", ..Small::default() }.project().refusal("x.lua --out run");
+    let message = Small { at: "position = { -0.187, 0.03, 0.29 }", ..Small::default() }
+        .project()
+        .refusal("x.lua --out run");
     assert!(message.starts_with("x.lua:6: object cube starts inside of the robot's hand ("), "{message}");
     assert!(message.ends_with(" mm deep; move it away, or the arm (scene.start_q)"), "{message}");
 }
 
 #[test]
 fn a_failed_first_episode_leaves_no_folder() {
-    let project = Small { at: "xyz = { 0, 0.8, 0.1 }", ..Small::default() }.project();
+    let project = Small { at: "position = { 0, 0.8, 0.1 }", ..Small::default() }.project();
     project.refusal("x.lua --out run");
     assert!(!project.path("run").exists());
     project.write("x.lua", Small::default().text().as_bytes());
@@ -120,7 +121,7 @@ fn a_failed_first_episode_leaves_no_folder() {
 
 #[test]
 fn unreachable_poses_are_reported_with_their_distance() {
-    let message = expert("\n  arm:move_to(softvt.pose { xyz = { 2, 0, 0.3 } }, { speed = 1 })");
+    let message = expert("\n  arm:move_to(softvt.pose { position = { 2, 0, 0.3 } }, { speed = 1 })");
     let (place, rest) = message.split_once("no nearer to (").expect("a pose");
     assert_eq!(place, "x.lua: task 0, episode 0: x.lua:13: unreachable pose: the tool gets ");
     // On the straight path to x = 2 m the hand leaves the reach of the arm, 0.855 m from the shoulder.
@@ -134,18 +135,18 @@ fn unreachable_poses_are_reported_with_their_distance() {
 
 #[test]
 fn unreachable_poses_are_detected_inside_of_pcall() {
-    let sent = expert("arm:command(softvt.pose { xyz = { 2, 0, 0.3 } }, 0)");
+    let sent = expert("arm:command(softvt.pose { position = { 2, 0, 0.3 } }, 0)");
     assert!(sent.starts_with(
         "x.lua: task 0, episode 0: x.lua: unreachable pose: the tool gets no nearer to (2.000,"
     ));
-    let caught = expert("pcall(arm.move_to, arm, softvt.pose { xyz = { 2, 0, 0.3 } }) arm:wait(5)");
+    let caught = expert("pcall(arm.move_to, arm, softvt.pose { position = { 2, 0, 0.3 } }) arm:wait(5)");
     assert!(caught.contains("unreachable pose"), "{caught}");
 }
 
 #[test]
 fn fast_motions_within_reach_are_accepted() {
     let way = "for _, y in ipairs { -0.3, 0.3, -0.3 } do\n\
-               arm:move_to(softvt.pose { xyz = { 0.05, y, 0.2 }, yaw = y }, { speed = 3, turn = 6 })\nend";
+               arm:move_to(softvt.pose { position = { 0.05, y, 0.2 }, yaw = y }, { speed = 3, angular_speed = 6 })\nend";
     let project = Small { expert: way, task: "budget_steps = 120", ..Small::default() }.project();
     project.succeeds("x.lua --out run");
 }

@@ -58,10 +58,10 @@ local function block(name, edge, body)
 end
 local floor = softvt.asset {{ name = "floor", shape = softvt.shape.box {{ size = {{ 1, 1, 0.05 }} }}:translate(0, 0, -0.025), body = static }}
 local layout = softvt.layout("stack", function(scene)
-  scene:add {{ name = "floor", asset = floor, xyz = {{ 0, 0, 0 }} }}
-  scene:add {{ name = "lower", asset = block("lower", 0.06, {lower}), xyz = {{ 0, 0.1, 0 }} }}
-  scene:add {{ name = "upper", asset = block("upper", 0.04, {upper}), xyz = {{ 0, 0.1, 0.0401 }} }}
-  scene:add {{ name = "far", asset = block("far", 0.04, rigid), xyz = {{ 0, -0.2, 0 }} }}
+  scene:add {{ name = "floor", asset = floor, position = {{ 0, 0, 0 }} }}
+  scene:add {{ name = "lower", asset = block("lower", 0.06, {lower}), position = {{ 0, 0.1, 0 }} }}
+  scene:add {{ name = "upper", asset = block("upper", 0.04, {upper}), position = {{ 0, 0.1, 0.0401 }} }}
+  scene:add {{ name = "far", asset = block("far", 0.04, rigid), position = {{ 0, -0.2, 0 }} }}
 end)
 local function task(on)
   return softvt.task {{ prompt = on, layout = layout, goal = softvt.on {{ object = "upper", target = on }}, budget_steps = 20 }}
@@ -109,7 +109,7 @@ local layout = softvt.layout("one", function(scene, rng)
   local episode = rng:uniform(0, 1)
   local cube = softvt.asset {{ name = "cube", shape = softvt.shape.box {{ size = {{ 0.04, 0.04, 0.04 }} }}:grounded(),
     body = softvt.soft {{ youngs_pa = {stiffness}, poisson = 0.3, density = 300 }} }}
-  scene:add {{ name = "floor", asset = floor, xyz = {{ 0, 0, 0 }} }}
+  scene:add {{ name = "floor", asset = floor, position = {{ 0, 0, 0 }} }}
   scene:add {{ name = "cube", asset = cube, at = {{ 0, 0.1 }} }}
 end)
 "#

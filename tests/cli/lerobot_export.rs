@@ -26,11 +26,11 @@ local pillar = solids.solid("pillar", { 0.03, 0.03, 0.26 }, softvt.static {})
 local block = solids.solid("block", { 0.03, 0.05, 0.05 }, softvt.rigid { density = 300 })
 local layout = softvt.layout("one", function(scene)
   scene.base = { -0.6, 0, 0 }
-  scene:add { name = "floor", asset = solids.floor, xyz = { 0, 0, 0 } }
-  scene:add { name = "slab", asset = solids.slab, xyz = { 0, 0.2, 0 } }
-  scene:add { name = "pillar", asset = pillar, xyz = { -0.127, -0.005, 0 } }
-  scene:add { name = "block", asset = block, xyz = { -0.127, -0.005, 0.26 } }
-  scene:add { name = "cube", asset = solids.cube, xyz = { 0, 0.2, 0.02 } }
+  scene:add { name = "floor", asset = solids.floor, position = { 0, 0, 0 } }
+  scene:add { name = "slab", asset = solids.slab, position = { 0, 0.2, 0 } }
+  scene:add { name = "pillar", asset = pillar, position = { -0.127, -0.005, 0 } }
+  scene:add { name = "block", asset = block, position = { -0.127, -0.005, 0.26 } }
+  scene:add { name = "cube", asset = solids.cube, position = { 0, 0.2, 0.02 } }
 end)
 local function task(prompt)
   return softvt.task { prompt = prompt, layout = layout, budget_steps = 40,

@@ -197,7 +197,7 @@ fn limits_of_other_versions_are_ignored() {
     body = softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300 } }
   local floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 1, 1, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} }
   local sim = softvt.simulate { layout = softvt.layout("one", function(scene)
-    scene:add { name = "floor", asset = floor, xyz = { 0, 0, 0 } }
+    scene:add { name = "floor", asset = floor, position = { 0, 0, 0 } }
     scene:add { name = "cube", asset = cube, at = { 0, 0.1 } } end) }
   return { fingerprint = sim:measure "cube".fingerprint }
 end }

@@ -13,7 +13,7 @@ fn project(policy: &str) -> Project {
 
 /// A policy that moves at random, depending on its observation, in chunks of three.
 const WANDERS: &str = "local n = 0
-return softvt.policy { name = 'wanders', observes = { touch = true, cameras = { 'wrist' } }, replan = 2,
+return softvt.policy { name = 'wanders', observes = { tactile = true, cameras = { 'wrist' } }, replan = 2,
   reset = function(task) n = task.episode end,
   act = function(obs)
     n = n + 1
@@ -215,12 +215,12 @@ fn policies_and_profiles_in_lua_are_listed() {
 }
 
 /// An expert that grasps the cube from above, closing fully without tactile feedback, and lifts it.
-const GREEDY: &str = "local c = scene:object('cube').xyz
-    local at = softvt.pose { xyz = { c[1], c[2], 0.022 } }
-    arm:move_to(at:moved { 0, 0, 0.05 }, { speed = 0.5 })
+const GREEDY: &str = "local c = scene:object('cube').centre
+    local at = softvt.pose { position = { c[1], c[2], 0.022 } }
+    arm:move_to(at:translated { 0, 0, 0.05 }, { speed = 0.5 })
     arm:move_to(at, { speed = 0.25 }) arm:grasp(0.9, { rate = 0.6 })
     arm:move_by({ 0, 0, 0.06 }, { speed = 0.2 }) arm:wait(0.5)
-    if scene:object('cube').xyz[3] < 0.06 then arm:give_up('it did not come along') end";
+    if scene:object('cube').centre[3] < 0.06 then arm:give_up('it did not come along') end";
 
 #[test]
 fn the_tactile_servo_stops_at_contact() {

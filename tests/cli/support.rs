@@ -131,9 +131,9 @@ impl Small {
 local shape = {shape}
 local cube = softvt.asset {{ name = "cube", shape = shape, body = softvt.soft {{ {material} }} }}
 local layout = softvt.layout("one", function(scene)
-  scene:add {{ name = "floor", asset = floor, xyz = {{ 0, 0, 0 }} }}
+  scene:add {{ name = "floor", asset = floor, position = {{ 0, 0, 0 }} }}
   scene:add {{ name = "cube", asset = cube, {at} }}
-  scene:add {{ name = "post", asset = floor, xyz = {{ 0, 2, 0 }} }}
+  scene:add {{ name = "post", asset = floor, position = {{ 0, 2, 0 }} }}
 end)
 return softvt.suite {{ name = "one", object_type = "deformable", variation = "spatial", episodes = 1, tasks = {{
   softvt.task {{ prompt = "wait", layout = layout, goal = softvt.on {{ object = "cube", target = "post" }},

@@ -10,7 +10,7 @@ const HOLD: &str = r#"local block = softvt.asset {
 }
 local floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 1, 1, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} }
 local layout = softvt.layout("held", function(scene)
-  scene:add { name = "floor", asset = floor, xyz = { 0, 0, 0 } }
+  scene:add { name = "floor", asset = floor, position = { 0, 0, 0 } }
   scene:add { name = "block", asset = block, at = { 0, 0 } }
 end)
 return softvt.experiment {
@@ -30,8 +30,8 @@ return softvt.experiment {
     end
     note "open"
     assert(sim:drive(function(arm)
-      local at = softvt.pose { xyz = { 0, 0, 0.027 } }
-      arm:move_to(at:moved { 0, 0, 0.08 })
+      local at = softvt.pose { position = { 0, 0, 0.027 } }
+      arm:move_to(at:translated { 0, 0, 0.08 })
       arm:move_to(at)
       arm:close_to(point.closure)
       arm:wait(0.5)

@@ -132,8 +132,8 @@ fn visuals_are_checked_with_their_line() {
         ),
         ("scene:camera(\"wrist\").position = { 0/0, 0, 0 }", ".position[1]: expected a number, got NaN"),
         (
-            "scene:camera(\"wrist\").quat = { 0, 0, 0, 0 }",
-            ".quat: expected a quaternion other than 0, got {0, 0, 0, 0}",
+            "scene:camera(\"wrist\").quaternion = { 0, 0, 0, 0 }",
+            ".quaternion: expected a quaternion, got one of length 0",
         ),
         (
             "scene:add_camera { name = \"top\", position = { 0, 0, 1 }, look_at = { 0, 0, 0 } }",
@@ -200,7 +200,7 @@ fn simulations_report_cameras_inside_of_objects() {
 fn an_enclosed_camera_does_not_end_the_video() {
     // A block falls over the camera while the scene settles.
     let block = "local block = softvt.asset { name = \"block\", shape = softvt.shape.box { size = { 0.1, 0.1, 0.05 } }:grounded(), body = softvt.rigid { density = 300 } }";
-    let lines = "scene:add { name = \"block\", asset = block, xyz = { 0.3, 0.1, 0.03 } } \
+    let lines = "scene:add { name = \"block\", asset = block, position = { 0.3, 0.1, 0.03 } } \
                  scene:add_camera { name = \"mole\", position = { 0.3, 0.1, 0.01 }, look_at = { -0.5, 0.1, 0.1 } }";
     let project = with(lines);
     project.write("x.lua", format!("{block}\n{}", project.text("x.lua")).as_bytes());

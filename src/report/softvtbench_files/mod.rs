@@ -14,7 +14,6 @@ use serde_json::{Value, json};
 
 use crate::{
     evaluation::{
-        calibration::Envelope,
         deformation::{METRIC_ID, ReferenceShape},
         episode_id::{EpisodeId, EpisodeIndex},
         record::{EpisodeHeader, EpisodeRecord},
@@ -145,21 +144,6 @@ pub fn write_scores(
     replace(&folder.join(EPISODES_CSV), episodes_csv(records))?;
     replace(&folder.join(SUMMARY_JSON), format!("{:#}\n", summary(records)))?;
     replace(&folder.join(THRESHOLDS_JSON), released.to_text())
-}
-
-/// `compression_sweep.jsonl`: the sweep rows of an asset. Their closure is the *opening*: 1 open, 0 closed.
-pub fn sweep_jsonl(asset: &str, envelope: &Envelope) -> String {
-    let rows = envelope.sweep.iter().enumerate().map(|(level, row)| {
-        json!({
-            "asset": asset,
-            "closure": 1.0 - row.closure,
-            "stable": row.stable,
-            "d_peak": row.d_peak_pct,
-            "level": level,
-            "gripper_width_mm": row.gripper_width_mm,
-        })
-    });
-    rows.map(|row| format!("{row}\n")).collect()
 }
 
 /// SoftVTBench's Safe Success: Goal ∧ D_peak ≤ τ, without NoDrop; `None` if evidence is missing.

@@ -3,8 +3,12 @@ use std::fs;
 use super::*;
 use crate::{
     evaluation::{
-        calibration::tests::{hold, squeeze},
+        calibration::{
+            Envelope,
+            tests::{hold, squeeze},
+        },
         record::tests::sample,
+        thresholds::sweep_jsonl,
     },
     geometry::Vec3,
 };

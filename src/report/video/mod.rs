@@ -1,15 +1,13 @@
 //! Videos and still images of episodes: both cameras on top, both fingers below them, and the deformation against its
 //! limit at the bottom.
 
-mod canvas;
-
 use std::path::{Path, PathBuf};
 
-pub use canvas::{Canvas, Rgb8};
 use image::{ImageBuffer, ImageError, Luma, RgbImage};
 
 use crate::{
     benchmark::{CONTROL_DT, CONTROL_HZ},
+    canvas::{Canvas, Rgb8},
     dataset::video::{VideoError, VideoWriter},
     evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord},
     files::{FileError, replace},

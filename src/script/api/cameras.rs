@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex};
 use mlua::Lua;
 
 use super::{
+    index_of,
     pose::{direction, rotation_from_wxyz, unit_direction, wxyz},
-    visuals::{braced, colour},
 };
 use crate::{
     geometry::{Pose, Quat, Vec3},
@@ -16,7 +16,6 @@ use crate::{
         schema::{Range, Type, choice, class, object::fixed_list, record},
         vm::error::{current_line, fail},
     },
-    text::unknown_name,
 };
 
 /// Cameras of a scene; each renders its own images.
@@ -28,14 +27,14 @@ const NEAR: Type = Type::Number("m", Range::closed(1e-4, 100.0));
 const FAR: Type = Type::Number("m", Range::closed(1e-3, 1e4));
 /// Width or height of a camera's image.
 pub(crate) const IMAGE_EDGE: Type = Type::Integer(Range::closed(1.0, 4096.0));
-const LINEAR_RGB: Type = Type::Vector(3, "linear RGB");
-const POINT: Type = Type::Vector(3, "m, frame of the mount");
-const ORIENTATION: Type = Type::Vector(4, "w, x, y, z, frame of the mount");
+const LIGHT_COLOUR: Type = Type::colour(BRIGHTNESS.max);
+const POINT: Type = Type::Vector(3, "m, frame of the mount", Range::closed(-1e6, 1e6));
+const ORIENTATION: Type = Type::Quaternion("frame of the mount");
 
-choice! { CameraMount { "world" => CameraMount::World, "hand" => CameraMount::Hand } }
+choice! { CameraMount { "world" => World, "hand" => Hand } }
 
 record! {
-    /// A camera. Give either look_at or quat.
+    /// A camera. Give either look_at or quaternion.
     CameraSpec: "softvt.NewCamera" as "scene:add_camera" {
         /// Name, unique; also that of its image stream.
         name: String = Type::Name;
@@ -46,9 +45,9 @@ record! {
         /// A point in the middle of the image.
         look_at: Option<[f64; 3]> = POINT;
         /// Upward direction in the image (with look_at); z by default.
-        up: Option<[f64; 3]> = Type::Vector(3, "frame of the mount");
+        up: Option<[f64; 3]> = Type::vector(3, "frame of the mount");
         /// Orientation: the camera looks along its −z axis, and +y is up in the image.
-        quat: Option<[f64; 4]> = ORIENTATION;
+        quaternion: Option<[f64; 4]> = ORIENTATION;
         /// Vertical field of view.
         fovy: f64 = FIELD_OF_VIEW => Number(0.8);
         /// Nearest visible distance.
@@ -73,14 +72,9 @@ impl LuaLight {
         read(&lock(&self.0).lighting)
     }
 
-    fn change(&self, change: impl FnOnce(&mut Lighting)) {
+    fn change(&self, _: &Lua, change: impl FnOnce(&mut Lighting)) {
         change(&mut lock(&self.0).lighting);
     }
-}
-
-/// Checks the colour that is written to the field `key` of the light.
-fn light_colour(lua: &Lua, key: &str, rgb: [f64; 3]) -> mlua::Result<[f64; 3]> {
-    colour(lua, &format!("scene.light.{key}"), rgb, BRIGHTNESS.max)
 }
 
 class! {
@@ -89,68 +83,28 @@ class! {
         label(_) { "scene.light".to_owned() }
         writable {
             /// Direction to the key light.
-            direction: Type::Vector(3, "world, any length") => {
+            direction: Type::Direction(&[], "world, any length") => {
                 get(_, this) { this.read(|light| light.key.direction_w) }
                 set(lua, this, numbers: [f64; 3]) {
-                    let Some(direction) = direction(numbers) else {
-                        let got = braced(&numbers);
-                        return Err(fail(lua, format!("scene.light.direction: expected a direction, got {got}")));
-                    };
-                    this.change(|light| light.key.direction_w = direction);
+                    this.change(lua, |light| light.key.direction_w = direction(numbers).unwrap_or(numbers.into()));
                 }
             }
             /// Colour of the key light.
-            colour: LINEAR_RGB => {
-                get(_, this) { this.read(|light| light.key.colour) }
-                set(lua, this, rgb: [f64; 3]) {
-                    let rgb = light_colour(lua, "colour", rgb)?;
-                    this.change(|light| light.key.colour = rgb);
-                }
-            }
+            colour: LIGHT_COLOUR => key.colour;
             /// Strength of the key light; 1 shows a white surface at full value.
-            strength: Type::Number("", BRIGHTNESS) => {
-                get(_, this) { this.read(|light| light.key.strength) }
-                set(_, this, value: f64) { this.change(|light| light.key.strength = value); }
-            }
+            strength: Type::Number("", BRIGHTNESS) => key.strength;
             /// Half of the angle under which the key light is seen; larger values give softer shadows.
-            softness: Type::Number("rad", Range::closed(0.0, 0.5)) => {
-                get(_, this) { this.read(|light| light.key.softness_rad) }
-                set(_, this, value: f64) { this.change(|light| light.key.softness_rad = value); }
-            }
+            softness: Type::Number("rad", Range::closed(0.0, 0.5)) => key.softness_rad;
             /// Light from straight above.
-            sky_zenith: LINEAR_RGB => {
-                get(_, this) { this.read(|light| light.sky.zenith) }
-                set(lua, this, rgb: [f64; 3]) {
-                    let rgb = light_colour(lua, "sky_zenith", rgb)?;
-                    this.change(|light| light.sky.zenith = rgb);
-                }
-            }
+            sky_zenith: LIGHT_COLOUR => sky.zenith;
             /// Light from the horizon, and the background.
-            sky_horizon: LINEAR_RGB => {
-                get(_, this) { this.read(|light| light.sky.horizon) }
-                set(lua, this, rgb: [f64; 3]) {
-                    let rgb = light_colour(lua, "sky_horizon", rgb)?;
-                    this.change(|light| light.sky.horizon = rgb);
-                }
-            }
+            sky_horizon: LIGHT_COLOUR => sky.horizon;
             /// Light from straight below.
-            sky_ground: LINEAR_RGB => {
-                get(_, this) { this.read(|light| light.sky.ground) }
-                set(lua, this, rgb: [f64; 3]) {
-                    let rgb = light_colour(lua, "sky_ground", rgb)?;
-                    this.change(|light| light.sky.ground = rgb);
-                }
-            }
+            sky_ground: LIGHT_COLOUR => sky.ground;
             /// Factor on the sky.
-            sky_strength: Type::Number("", BRIGHTNESS) => {
-                get(_, this) { this.read(|light| light.sky.strength) }
-                set(_, this, value: f64) { this.change(|light| light.sky.strength = value); }
-            }
+            sky_strength: Type::Number("", BRIGHTNESS) => sky.strength;
             /// Factor on the whole image.
-            exposure: Type::Number("", Range { max: 1000.0, ..Range::POSITIVE }) => {
-                get(_, this) { this.read(|light| light.exposure) }
-                set(_, this, value: f64) { this.change(|light| light.exposure = value); }
-            }
+            exposure: Type::Number("", Range { max: 1000.0, ..Range::POSITIVE }) => exposure;
         }
     }
 }
@@ -162,22 +116,10 @@ pub(crate) struct LuaCamera {
     index: usize,
 }
 
-fn orientation(lua: &Lua, label: &str, numbers: [f64; 4]) -> mlua::Result<Quat> {
-    rotation_from_wxyz(numbers).ok_or_else(|| {
-        fail(lua, format!("{label}.quat: expected a quaternion other than 0, got {}", braced(&numbers)))
-    })
-}
-
-const UP: [f64; 3] = [0.0, 0.0, 1.0];
-
-/// The orientation of a camera at `from` that looks at `to`, with `up` upwards in the image.
-fn look_at(lua: &Lua, label: &str, from: &Vec3, to: &Vec3, up: [f64; 3]) -> mlua::Result<Quat> {
-    if from.amax().max(to.amax()) > 1e6 {
-        let (from, to) = (braced(from.as_slice()), braced(to.as_slice()));
-        return Err(fail(lua, format!("{label}: expected numbers within ±1e6, got {to} from {from}")));
-    }
-    let ahead = to - from;
-    let up = unit_direction(up);
+/// The orientation of a camera at `from` that looks at `point`, with `up` (z by default) upwards in the image.
+fn look_at(lua: &Lua, label: &str, from: &Vec3, point: [f64; 3], up: Option<[f64; 3]>) -> mlua::Result<Quat> {
+    let ahead = Vec3::from(point) - from;
+    let up = up.map_or(Some(Vec3::z()), unit_direction);
     match up.filter(|up| ahead.norm() > 1e-6 && ahead.cross(up).norm() > 1e-6 * ahead.norm()) {
         Some(up) => Ok(Quat::face_towards(&-ahead, &up)),
         None => {
@@ -190,25 +132,20 @@ fn look_at(lua: &Lua, label: &str, from: &Vec3, to: &Vec3, up: [f64; 3]) -> mlua
 impl LuaCamera {
     /// The scene's camera of a name.
     pub(crate) fn named(lua: &Lua, scene: &SharedScene, name: &str) -> mlua::Result<Self> {
-        let cameras = lock(scene);
-        let names = cameras.cameras.iter().map(|camera| camera.name.as_str());
-        match cameras.cameras.iter().position(|camera| camera.name == name) {
-            Some(index) => Ok(Self { scene: scene.clone(), index }),
-            None => Err(fail(lua, format!("scene:camera: {}", unknown_name("camera", name, names)))),
-        }
+        let inner = lock(scene);
+        let names = inner.cameras.iter().map(|camera| camera.name.as_str());
+        let index = index_of(lua, "scene:camera", "camera", names, name)?;
+        Ok(Self { scene: scene.clone(), index })
     }
 
     /// Adds a camera to the scene.
     pub(crate) fn add(lua: &Lua, scene: &SharedScene, spec: CameraSpec) -> mlua::Result<Self> {
         const LABEL: &str = "scene:add_camera";
         let position = Vec3::from(spec.position);
-        let rotation = match (spec.look_at, spec.quat) {
-            (Some(point), None) => {
-                let label = format!("{LABEL}.look_at");
-                look_at(lua, &label, &position, &Vec3::from(point), spec.up.unwrap_or(UP))?
-            }
-            (None, Some(numbers)) => orientation(lua, LABEL, numbers)?,
-            _ => return Err(fail(lua, format!("{LABEL}: give either look_at or quat"))),
+        let rotation = match (spec.look_at, spec.quaternion) {
+            (Some(point), None) => look_at(lua, &format!("{LABEL}.look_at"), &position, point, spec.up)?,
+            (None, Some(numbers)) => rotation_from_wxyz(numbers).unwrap_or_default(),
+            _ => return Err(fail(lua, format!("{LABEL}: give either look_at or quaternion"))),
         };
         let mut inner = lock(scene);
         if inner.camera(&spec.name).is_some() {
@@ -258,67 +195,38 @@ class! {
             /// Name.
             name: "string" { get(_, this) { this.read(|camera| camera.name.clone()) } }
             /// Frame that the camera is fixed to.
-            mount: "\"world\"|\"hand\"" {
-                get(_, this) {
-                    match this.read(|camera| camera.mount) {
-                        CameraMount::World => "world",
-                        CameraMount::Hand => "hand",
-                    }
-                }
-            }
+            mount: "\"world\"|\"hand\"" { get(_, this) { this.read(|camera| camera.mount) } }
         }
         writable {
             /// Position.
-            position: POINT => {
-                get(_, this) { this.read(|camera| camera.pose.translation.vector) }
-                set(lua, this, xyz: [f64; 3]) {
-                    this.change(lua, |camera| camera.pose.translation.vector = xyz.into());
-                }
-            }
+            position: POINT => pose.translation.vector;
             /// Orientation: the camera looks along its −z axis, and +y is up in the image.
-            quat: ORIENTATION => {
+            quaternion: ORIENTATION => {
                 get(lua, this) {
-                    let quat = this.read(|camera| wxyz(&camera.pose.rotation));
-                    fixed_list(lua, quat, "its numbers belong together: write camera.quat = { w, x, y, z }")?
+                    let numbers = this.read(|camera| wxyz(&camera.pose.rotation));
+                    fixed_list(lua, numbers, "its numbers belong together: write camera.quaternion = { w, x, y, z }")?
                 }
                 set(lua, this, numbers: [f64; 4]) {
-                    let rotation = orientation(lua, &this.name(), numbers)?;
-                    this.change(lua, |camera| camera.pose.rotation = rotation);
+                    this.change(lua, |camera| camera.pose.rotation = rotation_from_wxyz(numbers).unwrap_or_default());
                 }
             }
             /// Vertical field of view.
-            fovy: FIELD_OF_VIEW => {
-                get(_, this) { this.read(|camera| camera.fovy_rad) }
-                set(lua, this, value: f64) { this.change(lua, |camera| camera.fovy_rad = value); }
-            }
+            fovy: FIELD_OF_VIEW => fovy_rad;
             /// Nearest visible distance.
-            near: NEAR => {
-                get(_, this) { this.read(|camera| camera.near_m) }
-                set(lua, this, value: f64) { this.change(lua, |camera| camera.near_m = value); }
-            }
+            near: NEAR => near_m;
             /// Farthest visible distance.
-            far: FAR => {
-                get(_, this) { this.read(|camera| camera.far_m) }
-                set(lua, this, value: f64) { this.change(lua, |camera| camera.far_m = value); }
-            }
+            far: FAR => far_m;
             /// Width of the image, pixels.
-            width: IMAGE_EDGE => {
-                get(_, this) { this.read(|camera| camera.width) }
-                set(lua, this, value: usize) { this.change(lua, |camera| camera.width = value); }
-            }
+            width: IMAGE_EDGE => width;
             /// Height of the image, pixels.
-            height: IMAGE_EDGE => {
-                get(_, this) { this.read(|camera| camera.height) }
-                set(lua, this, value: usize) { this.change(lua, |camera| camera.height = value); }
-            }
+            height: IMAGE_EDGE => height;
         }
         methods {
             /// Turns the camera to a point; up (z by default) is the upward direction in the image. Both are in the frame
             /// of the mount.
             fn look_at(lua, this, point: [f64; 3] = POINT, up: Option<[f64; 3]>) -> [] {
                 let from = this.read(|camera| camera.pose.translation.vector);
-                let label = format!("{}:look_at", this.name());
-                let rotation = look_at(lua, &label, &from, &point.into(), up.unwrap_or(UP))?;
+                let rotation = look_at(lua, &format!("{}:look_at", this.name()), &from, point, up)?;
                 this.change(lua, |camera| camera.pose.rotation = rotation);
             }
         }

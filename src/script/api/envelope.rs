@@ -7,12 +7,11 @@ use crate::{
         calibration::{self, Envelope, HoldRow, SweepRow},
         envelope_plot::plot,
         safety::DeformationLimit,
-        thresholds::ThresholdFile,
+        thresholds::{ThresholdFile, sweep_jsonl},
     },
     parallel::lock,
-    report::softvtbench_files::sweep_jsonl,
     script::{
-        schema::{Range, Type, Unchecked, functions, output, record},
+        schema::{Range, Type, Unchecked, functions, output},
         vm::{
             error::{app_data, fail},
             json::deserialize,
@@ -23,24 +22,6 @@ use crate::{
 
 /// Type of a list of rows.
 const ROWS: Type = Type::List(&Type::Map(&Type::Any));
-
-record! {
-    /// The rows of a calibration.
-    EnvelopeSpec: "softvt.EnvelopeSpec" as "softvt.envelope" {
-        /// Name of the asset.
-        asset: String = Type::Name;
-        /// Safety factor κ of the deformation limit τ = κ D_ref.
-        kappa: f64 = Type::Number("", Range::closed(0.0, 1.0)) => Number(0.5);
-        /// Fingerprint of the calibrated asset, as simulation:measure returns it. Results for another object of that name
-        /// then do not use the calibration.
-        fingerprint: Option<String>;
-        /// Rows closure, trials, held, slip_mm, d_peak_pct of the scan for the lower bound.
-        holds: Value = ROWS;
-        /// Rows closure, gripper_width_mm, d_peak_pct, force_n, min_det_f, node_speed_m_s, both_pads, slip_mm, stable of
-        /// the compression sweep.
-        sweep: Value = ROWS;
-    }
-}
 
 output! {
     /// Results of a calibration.
@@ -73,15 +54,27 @@ fn limit(envelope: &Envelope, file: &ThresholdFile) -> Option<DeformationLimit> 
 functions! {
     FUNCTIONS {
         /// Returns the results of a calibration: the lower bound of closure, the deformation limit τ, and the files to write.
-        fn envelope(lua, spec: EnvelopeSpec) -> ["softvt.Envelope"] {
-            let EnvelopeSpec { asset, kappa, .. } = spec;
-            let holds: Vec<HoldRow> = deserialize(lua, "softvt.envelope: holds", &spec.holds)?;
-            let sweep: Vec<SweepRow> = deserialize(lua, "softvt.envelope: sweep", &spec.sweep)?;
+        fn envelope(lua) takes spec "softvt.EnvelopeSpec" {
+            /// Name of the asset.
+            asset: String = Type::Name;
+            /// Safety factor κ of the deformation limit τ = κ D_ref.
+            kappa: f64 = Type::Number("", Range::closed(0.0, 1.0)) => Number(0.5);
+            /// Fingerprint of the calibrated asset, as simulation:measure returns it. Results for another object of that
+            /// name then do not use the calibration.
+            fingerprint: Option<String>;
+            /// Rows closure, trials, held, slip_mm, d_peak_pct of the scan for the lower bound.
+            holds: Value = ROWS;
+            /// Rows closure, gripper_width_mm, d_peak_pct, force_n, min_det_f, node_speed_m_s, both_pads, slip_mm, stable
+            /// of the compression sweep.
+            sweep: Value = ROWS;
+        } -> ["softvt.Envelope"] {
+            let holds: Vec<HoldRow> = deserialize(lua, "softvt.envelope: holds", &holds)?;
+            let sweep: Vec<SweepRow> = deserialize(lua, "softvt.envelope: sweep", &sweep)?;
             let envelope = Envelope::new(holds, sweep, kappa);
             let made_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
             let mut file = ThresholdFile::new(kappa, vec![format!("{asset}.sweep.jsonl")], made_by);
             file.insert(&asset, envelope.clone());
-            if let Some(fingerprint) = spec.fingerprint {
+            if let Some(fingerprint) = fingerprint {
                 file.fingerprints.insert(asset.clone(), fingerprint);
             }
             envelope_table(lua, &asset, &envelope, &file)?

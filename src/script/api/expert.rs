@@ -6,27 +6,19 @@ use mlua::{Function, Lua, MultiValue, Table, Thread, Value, chunk::ChunkMode};
 
 use super::{
     expert_input::{ExpertCommand, ExpertInput, ExpertView, ObjectView, TrackingErrorMonitor},
+    index_of,
+    observation::{FingerReadings, fingers},
     pose::LuaPose,
-    touch::{FingerReadings, fingers},
 };
 use crate::{
+    geometry::Pose,
     parallel::lock,
     robot::{Obstacle, clearance, gripper::MAX_WIDTH},
     scene::Body,
     script::{
-        schema::{
-            ApiObject, Range, Type, class,
-            object::{MEASURED, arguments, fixed_list},
-            output, record,
-        },
-        vm::{
-            base_library,
-            error::fail,
-            library::embedded,
-            value::{describe, number, sorted_pairs},
-        },
+        schema::{ApiObject, Range, Type, class, object::arguments, output},
+        vm::{base_library, error::fail, library::embedded, value::number},
     },
-    text::unknown_name,
 };
 
 /// Access of an expert to the tactile sensors.
@@ -40,17 +32,17 @@ pub(crate) enum FingerAccess {
 }
 
 type SharedReadings = Arc<Mutex<Option<FingerReadings>>>;
-type SharedView = Arc<Mutex<Option<ExpertView>>>;
+type SharedView = Arc<Mutex<ExpertView>>;
 
 /// An expert as a coroutine of any virtual machine.
 pub(crate) struct Coroutine {
     function: Function,
-    view: SharedView,
     access: FingerAccess,
     readings: SharedReadings,
     /// True if the expert needs finger readings at the next control step.
     pub wants_readings: bool,
-    thread: Option<Thread>,
+    /// The started coroutine, and the view that it reads.
+    running: Option<(Thread, SharedView)>,
     /// Reason given to `arm:give_up`, after which the expert is not resumed.
     pub gave_up: Option<String>,
 }
@@ -60,8 +52,8 @@ const MAX_REASON_CHARS: usize = 300;
 
 impl Coroutine {
     pub(crate) fn new(function: Function, access: FingerAccess) -> Self {
-        let (view, readings) = (Arc::default(), Arc::default());
-        Self { function, view, access, readings, wants_readings: false, thread: None, gave_up: None }
+        let readings = Arc::default();
+        Self { function, access, readings, wants_readings: false, running: None, gave_up: None }
     }
 
     /// Sets the finger readings of the next control step.
@@ -91,9 +83,8 @@ impl Coroutine {
         if self.gave_up.is_some() {
             return Ok(None);
         }
-        *lock(&self.view) = Some(view.clone());
-        let values = self.resume(lua)?;
-        if self.thread.as_ref().is_none_or(|thread| !thread.is_resumable()) {
+        let values = self.resume(lua, view)?;
+        if self.waiting().is_none() {
             return Ok(None);
         }
         let mut values = values.into_iter();
@@ -118,27 +109,30 @@ impl Coroutine {
         }
     }
 
+    /// The coroutine, if it waits for the next control step.
+    fn waiting(&self) -> Option<&Thread> {
+        self.running.as_ref().map(|(thread, _)| thread).filter(|thread| thread.is_resumable())
+    }
+
     /// Raises `complaint` where the script waits for the next control step, and returns the error.
     pub(crate) fn refuse(&mut self, lua: &Lua, complaint: &str) -> mlua::Error {
-        let is_over = self.gave_up.is_some();
-        let waiting = self.thread.as_ref().filter(|thread| !is_over && thread.is_resumable());
+        let waiting = self.waiting().filter(|_| self.gave_up.is_none());
         let raised = waiting.and_then(|thread| thread.resume::<MultiValue>(complaint).err());
         // A script that is over, or that catches errors, has no line to show.
         raised.unwrap_or_else(|| fail(lua, complaint))
     }
 
-    fn resume(&mut self, lua: &Lua) -> mlua::Result<MultiValue> {
-        match &self.thread {
-            Some(thread) if thread.is_resumable() => thread.resume(()),
-            Some(_) => Ok(MultiValue::new()),
-            None => {
-                let host = lua.create_userdata(MeasuredArm(self.view.clone()))?;
-                let arm = arm(lua, &host, finger_access(lua, self.access, &self.readings)?)?;
-                let thread = lua.create_thread(self.function.clone())?;
-                let scene = lua.create_userdata(LuaView(self.view.clone()))?;
-                self.thread.insert(thread).resume((arm, scene))
-            }
+    fn resume(&mut self, lua: &Lua, view: &ExpertView) -> mlua::Result<MultiValue> {
+        if let Some((thread, shared)) = &self.running {
+            *lock(shared) = view.clone();
+            return if thread.is_resumable() { thread.resume(()) } else { Ok(MultiValue::new()) };
         }
+        let view = Arc::new(Mutex::new(view.clone()));
+        let host = lua.create_userdata(MeasuredArm(view.clone()))?;
+        let arm = arm(lua, &host, finger_access(lua, self.access, &self.readings)?)?;
+        let thread = lua.create_thread(self.function.clone())?;
+        let (thread, view) = self.running.insert((thread, view));
+        thread.resume((arm, SceneState(view.clone())))
     }
 }
 
@@ -170,7 +164,6 @@ fn finger_access(lua: &Lua, access: FingerAccess, readings: &SharedReadings) -> 
 /// Checks for the arm's Lua code; errors are at the expert's line.
 fn checks(lua: &Lua) -> mlua::Result<Table> {
     let class = MeasuredArm::CLASS;
-    let checks = lua.create_table()?;
     let check_arguments = move |lua: &Lua, (name, values): (String, MultiValue)| match class
         .methods
         .iter()
@@ -179,77 +172,65 @@ fn checks(lua: &Lua) -> mlua::Result<Table> {
         Some(signature) => arguments(lua, &format!("arm:{name}"), signature, values),
         None => Err(fail(lua, format!("arm: the method {name:?} is not declared"))),
     };
-    checks.set("arguments", lua.create_function(check_arguments)?)?;
     let missing_self_error = move |lua: &Lua, (name, first): (String, Value)| -> mlua::Result<()> {
         Err(class.missing_self_error(lua, &name, &first))
     };
-    checks.set("missing_self_error", lua.create_function(missing_self_error)?)?;
-    checks.set("options", lua.create_function(options)?)?;
-    let unknown_key = move |lua: &Lua, key: Value| -> mlua::Result<()> {
-        match &key {
-            Value::String(key) => Err(class.unknown_key_error(lua, "arm", &key.to_string_lossy())),
-            other => {
-                let got = describe(other);
-                Err(fail(lua, format!("arm: expected the name of a field or method, got {got}")))
-            }
-        }
-    };
-    checks.set("unknown", lua.create_function(unknown_key)?)?;
     let refuse = |lua: &Lua, complaint: String| -> mlua::Result<()> { Err(fail(lua, complaint)) };
+    let checks = lua.create_table()?;
+    checks.set("arguments", lua.create_function(check_arguments)?)?;
+    checks.set("missing_self_error", lua.create_function(missing_self_error)?)?;
     checks.set("refuse", lua.create_function(refuse)?)?;
     Ok(checks)
 }
 
-/// Fills the given options into the defaults. A closure is in 0..1, any other option a rate above 0.
-fn options(lua: &Lua, (label, given, defaults): (String, Value, Table)) -> mlua::Result<Table> {
-    let given = match given {
-        Value::Nil => return Ok(defaults),
-        Value::Table(given) => given,
-        other => {
-            return Err(fail(lua, format!("{label}: expected a table of options, got {}", describe(&other))));
-        }
-    };
-    let known: Vec<String> =
-        sorted_pairs(&defaults).iter().filter_map(|(key, _)| key.to_string().ok()).collect();
-    for (key, value) in sorted_pairs(&given) {
-        let Value::String(key) = &key else {
-            return Err(fail(lua, format!("{label}: expected names of options, got {}", describe(&key))));
-        };
-        let key = key.to_string_lossy();
-        if !known.contains(&key) {
-            let message = unknown_name("option", &key, known.iter().map(String::as_str));
-            return Err(fail(lua, format!("{label}: {message}")));
-        }
-        let range = if key == "closure" { Range::closed(0.0, 1.0) } else { Range::POSITIVE };
-        match number(&value).filter(|n| range.holds(*n)) {
-            Some(n) => defaults.set(key, n)?,
-            None => {
-                let (words, got) = (range.describe(), describe(&value));
-                return Err(fail(lua, format!("{label}: {key}: expected a number{words}, got {got}")));
-            }
-        }
-    }
-    Ok(defaults)
-}
-
-fn with_view<R>(
-    lua: &Lua,
-    view: &SharedView,
-    read: impl FnOnce(&ExpertView) -> mlua::Result<R>,
-) -> mlua::Result<R> {
-    match &*lock(view) {
-        Some(view) => read(view),
-        None => Err(fail(lua, "the expert has not started yet")),
-    }
-}
-
 const CLOSURE: Type = Type::Number("", Range::closed(0.0, 1.0));
-const MOTION: Type = Type::Table("{speed: number?, turn: number?, closure: number?}");
-const RATE: Type = Type::Table("{rate: number?}");
+/// Rate of the gripper; 1 is the whole stroke in a second.
+const RATE: Type = Type::Number("1/s", Range::POSITIVE);
+
+#[expect(dead_code, reason = "the arm's Lua code reads the fields")]
+mod options {
+    use super::{CLOSURE, RATE};
+    use crate::script::schema::{Range, Type, record};
+
+    record! {
+        /// Options of a motion of the arm.
+        MotionOptions: "softvt.MotionOptions" as "arm:move_to" {
+            /// Largest speed.
+            speed: f64 = Type::Number("m/s", Range::POSITIVE) => Number(0.25);
+            /// Largest angular speed.
+            angular_speed: f64 = Type::Number("rad/s", Range::POSITIVE) => Number(1.5);
+            /// Closure at the end; by default it stays.
+            closure: Option<f64> = CLOSURE;
+        }
+        /// Options of closing and opening.
+        RateOptions: "softvt.RateOptions" as "arm:close_to" {
+            /// Rate of the gripper; 1 is the whole stroke in a second.
+            rate: f64 = RATE => Number(0.5);
+        }
+        /// Options of releasing an object.
+        ReleaseOptions: "softvt.ReleaseOptions" as "arm:release" {
+            /// Rate of the gripper; 1 is the whole stroke in a second.
+            rate: f64 = RATE => Number(0.5);
+            /// Closure at the end.
+            closure: f64 = CLOSURE => Number(0.0);
+        }
+    }
+}
+use options::{MotionOptions, RateOptions, ReleaseOptions};
 
 /// The measurements of the arm. Commanded values are kept by the arm's Lua code, from these on.
 #[derive(Clone)]
 pub(crate) struct MeasuredArm(SharedView);
+
+impl MeasuredArm {
+    fn read<T>(&self, read: impl FnOnce(&ExpertView) -> T) -> T {
+        read(&lock(&self.0))
+    }
+
+    fn tool_pose(&self) -> LuaPose {
+        self.read(|view| LuaPose(view.base_w * view.tcp_b))
+    }
+}
 
 class! {
     /// The robot arm as an expert controls it. Each motion takes as many control steps as it needs.
@@ -257,51 +238,38 @@ class! {
         label(_) { "arm".to_owned() }
         fields {
             /// Measured pose of the tool centre point.
-            pose: "softvt.Pose" {
-                get(lua, this) {
-                    let pose = with_view(lua, &this.0, |view| Ok(LuaPose(view.base_w * view.tcp_b)))?;
-                    Value::UserData(lua.create_userdata(pose)?)
-                }
-            }
+            pose: "softvt.Pose" { get(_, this) { this.tool_pose() } }
             /// Last commanded pose.
-            target: "softvt.Pose" {
-                get(lua, this) {
-                    let pose = with_view(lua, &this.0, |view| Ok(LuaPose(view.base_w * view.tcp_b)))?;
-                    Value::UserData(lua.create_userdata(pose)?)
-                }
-            }
+            target: "softvt.Pose" { get(_, this) { this.tool_pose() } }
             /// Last commanded closure: 0 is open, 1 is closed.
-            closure: "number" { get(lua, this) { with_view(lua, &this.0, |view| Ok(view.closure))? } }
+            closure: "number" { get(_, this) { this.read(|view| view.closure) } }
             /// True from a call of grasp to the next call of release or open.
             gripping: "boolean" { get(_, _) { false } }
             /// Measured distance of the gels, m.
-            width: "number" { get(lua, this) { with_view(lua, &this.0, |view| Ok(view.width_m))? } }
+            width: "number" { get(_, this) { this.read(|view| view.width_m) } }
             /// Normal force on the left and the right pad, N.
-            force: "number[]" {
-                get(lua, this) { fixed_list(lua, with_view(lua, &this.0, |view| Ok(view.pad_force_n))?, MEASURED)? }
-            }
+            force: "number[]" { get(_, this) { this.read(|view| view.pad_force_n) } }
             /// Time since the start, s.
-            time: "number" { get(lua, this) { with_view(lua, &this.0, |view| Ok(view.time_s))? } }
+            time: "number" { get(_, this) { this.read(|view| view.time_s) } }
             /// Length of a control step, s.
-            dt: "number" { get(lua, this) { with_view(lua, &this.0, |view| Ok(view.dt_s))? } }
+            dt: "number" { get(_, this) { this.read(|view| view.dt_s) } }
         }
         lua_methods {
             /// Sends one command and returns at the next control step.
             fn command(pose: LuaPose, closure: f64 = CLOSURE) -> [];
-            /// Moves along a straight line with a smooth speed profile. Options: speed (at most, m/s, default 0.25), turn
-            /// (at most, rad/s, default 1.5), closure (reached at the end; by default it stays).
-            fn move_to(pose: LuaPose, options: Option<Table> = MOTION) -> [];
-            /// Moves by an offset in the world frame, m, with the options of move_to.
-            fn move_by(offset: [f64; 3] = Type::Vector(3, "m"), options: Option<Table> = MOTION) -> [];
-            /// Closes or opens to a closure. Option: rate (1/s, default 0.5; 1 is the whole stroke in a second).
-            fn close_to(closure: f64 = CLOSURE, options: Option<Table> = RATE) -> [];
+            /// Moves along a straight line with a smooth speed profile.
+            fn move_to(pose: LuaPose, options: MotionOptions) -> [];
+            /// Moves by an offset in the world frame, m.
+            fn move_by(offset: [f64; 3] = Type::vector(3, "m"), options: MotionOptions) -> [];
+            /// Closes or opens to a closure.
+            fn close_to(closure: f64 = CLOSURE, options: RateOptions) -> [];
             /// Closes on an object. A binary gripper, which is either open or closed, closes here and not in close_to. A
             /// tactile servo closes until both fingers show a firm grasp, whatever closure is given.
-            fn grasp(closure: f64 = CLOSURE, options: Option<Table> = RATE) -> [];
-            /// Releases an object by opening to options.closure, by default wide.
-            fn release(options: Option<Table> = Type::Table("{rate: number?, closure: number?}")) -> [];
+            fn grasp(closure: f64 = CLOSURE, options: RateOptions) -> [];
+            /// Releases an object by opening, by default wide.
+            fn release(options: ReleaseOptions) -> [];
             /// Opens the gripper.
-            fn open(options: Option<Table> = RATE) -> [];
+            fn open(options: RateOptions) -> [];
             /// Returns the present readings of the tactile sensors; the first call waits for a control step. Available in
             /// simulation:drive and under --policy tactile-servo.
             fn tactile() -> ["softvt.Fingers"];
@@ -313,86 +281,77 @@ class! {
     }
 }
 
-record! {
-    /// The hand of a clearance query, and the objects it may touch.
-    ClearanceSpec: "softvt.Clearance" as "scene:clearance" {
-        /// Distance of the gels.
-        width: f64 = Type::Number("m", Range::closed(0.0, MAX_WIDTH)) => Number(MAX_WIDTH);
-        /// Scene names of objects that it may touch.
-        ignore: Option<Vec<String>>;
-    }
-}
-
 /// Distances beyond this are reported as this, m.
 const MAX_CLEARANCE: f64 = 0.2;
 
-/// `softvt.View`.
+/// `softvt.SceneState`.
 #[derive(Clone)]
-pub(crate) struct LuaView(SharedView);
+pub(crate) struct SceneState(SharedView);
 
 class! {
     /// The true state of the scene at this control step, as an expert gets it.
-    LuaView: "softvt.View" {
+    SceneState: "softvt.SceneState" {
         label(_) { "scene".to_owned() }
         methods {
             /// Returns the state of an object.
             fn object(lua, this, name: String) -> ["softvt.ObjectState"] {
-                with_view(lua, &this.0, |view| object_state(lua, find(lua, "object", &view.objects, &name)?))?
+                object_state(lua, find(lua, "scene", "object", &lock(&this.0).objects, &name)?)?
             }
             /// Returns the state of a part of an articulated object.
             fn part(lua, this, object: String, part: String) -> ["softvt.ObjectState"] {
-                with_view(lua, &this.0, |view| {
-                    let whole = find(lua, "object", &view.objects, &object)?;
-                    object_state(lua, find(lua, "part", &whole.parts, &part)?)
-                })?
+                let view = lock(&this.0);
+                let whole = find(lua, "scene", "object", &view.objects, &object)?;
+                object_state(lua, find(lua, "scene", "part", &whole.parts, &part)?)?
             }
             /// Returns the states of all objects, in the order of the scene.
             fn objects(lua, this) -> ["softvt.ObjectState[]"] {
-                with_view(lua, &this.0, |view| {
-                    let states = view.objects.iter().map(|object| object_state(lua, object));
-                    lua.create_sequence_from(states.collect::<mlua::Result<Vec<_>>>()?)
-                })?
+                let view = lock(&this.0);
+                let states = view.objects.iter().map(|object| object_state(lua, object));
+                lua.create_sequence_from(states.collect::<mlua::Result<Vec<_>>>()?)?
             }
             /// Returns the distance between a hand at a pose and the nearest object, m, and the name of that object. The
             /// distance is at most 0.2 and negative inside.
-            fn clearance(lua, this, pose: LuaPose, options: ClearanceSpec) -> ["number", "string?"] {
-                with_view(lua, &this.0, |view| clearance_of(lua, view, &pose, &options))?
+            fn clearance(lua, this, pose: LuaPose) takes options "softvt.Clearance" {
+                /// Distance of the gels.
+                width: f64 = Type::Number("m", Range::closed(0.0, MAX_WIDTH)) => Number(MAX_WIDTH);
+                /// Scene names of objects that it may touch.
+                ignore: Vec<String> => Empty;
+            } -> ["number", "string?"] {
+                let view = lock(&this.0);
+                for name in &ignore {
+                    find(lua, "scene:clearance: ignore", "object", &view.objects, name)?;
+                }
+                clearance_of(&view, &pose.0, width, &ignore)
             }
         }
     }
 }
 
-fn clearance_of(
-    lua: &Lua,
-    view: &ExpertView,
-    pose: &LuaPose,
-    spec: &ClearanceSpec,
-) -> mlua::Result<(f64, Option<String>)> {
-    let ignored = spec.ignore.as_deref().unwrap_or_default();
-    let known = || view.objects.iter().map(|object| object.name.as_str());
-    if let Some(name) = ignored.iter().find(|name| !known().any(|other| other == name.as_str())) {
-        return Err(fail(lua, format!("scene:clearance: ignore: {}", unknown_name("object", name, known()))));
-    }
-    let has_contact =
-        |object: &&ObjectView| object.asset.body != Body::Scenery && !ignored.contains(&object.name);
+/// The clearance of a hand and the name of the nearest object.
+fn clearance_of(view: &ExpertView, hand_w: &Pose, width: f64, ignore: &[String]) -> (f64, Option<String>) {
     let objects: Vec<&ObjectView> = view
         .objects
         .iter()
-        .filter(has_contact)
+        .filter(|object| object.asset.body != Body::Scenery && !ignore.contains(&object.name))
         .flat_map(|object| std::iter::once(object).chain(&object.parts))
         .collect();
     let obstacles: Vec<Obstacle<'_>> = objects
         .iter()
         .map(|object| Obstacle { pose_w: object.pose_w, shape: &object.asset.shape, bounds: object.bounds })
         .collect();
-    let found = clearance(&pose.0, spec.width, &obstacles, MAX_CLEARANCE);
-    Ok((found.distance, found.nearest.map(|index| objects[index].name.clone())))
+    let found = clearance(hand_w, width, &obstacles, MAX_CLEARANCE);
+    (found.distance, found.nearest.map(|index| objects[index].name.clone()))
 }
 
-fn find<'a>(lua: &Lua, what: &str, all: &'a [ObjectView], name: &str) -> mlua::Result<&'a ObjectView> {
+fn find<'a>(
+    lua: &Lua,
+    label: &str,
+    what: &str,
+    all: &'a [ObjectView],
+    name: &str,
+) -> mlua::Result<&'a ObjectView> {
     let names = all.iter().map(|object| object.name.as_str());
-    let found = all.iter().find(|object| object.name == name);
-    found.ok_or_else(|| fail(lua, format!("scene: {}", unknown_name(what, name, names))))
+    Ok(&all[index_of(lua, label, what, names, name)?])
 }
 
 output! {
@@ -403,7 +362,7 @@ output! {
         /// Name of its asset.
         asset: "string" = object.asset.name.as_str();
         /// Centre of its bounding box, world frame, m.
-        xyz: "number[]" = lua.create_sequence_from(object.centre_w.iter().copied())?;
+        centre: "number[]" = lua.create_sequence_from(object.centre_w.iter().copied())?;
         /// Edge lengths of its bounding box at rest, m.
         size: "number[]" = lua.create_sequence_from(object.bounds.size().iter().copied())?;
         /// Rotation about the vertical, rad.

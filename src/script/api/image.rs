@@ -3,20 +3,20 @@
 use std::sync::{Arc, Mutex};
 
 use image::{Rgb, RgbImage, imageops};
-use mlua::{FromLua, Lua, LuaString, Value};
+use mlua::{Lua, LuaString, Value};
 
 use crate::{
+    canvas::Canvas,
     parallel::lock,
-    report::video::Canvas,
     script::{
-        schema::{LuaType, Range, Type, class, functions, record},
+        schema::{Range, Type, class, functions},
         vm::{
             error::fail,
             memory_budget::{Reservation, reserve},
-            value::describe,
         },
     },
     sensing::camera::resize,
+    text::format_number,
 };
 
 /// Longest text that is written on an image, bytes.
@@ -25,31 +25,10 @@ const MAX_TEXT_BYTES: usize = 1000;
 const MAX_EDGE: f64 = 8192.0;
 const EDGE: Type = Type::Integer(Range::closed(1.0, MAX_EDGE));
 const PIXEL: Type = Type::Integer(Range::closed(0.0, MAX_EDGE));
-const REGION: Type = Type::Vector(4, "x, y, width, height in pixels");
-/// Position of an image that is pasted, pixels.
-const OFFSET: Type = Type::Number("pixels", Range::closed(-1e5, 1e5));
-const SRGB: Type = Type::Vector(3, "sRGB of 0 to 255");
-
-record! {
-    /// An image of one colour.
-    ImageSpec: "softvt.NewImage" as "softvt.image" {
-        /// Width, pixels.
-        width: u32 = EDGE;
-        /// Height, pixels.
-        height: u32 = EDGE;
-        /// Colour.
-        colour: [f64; 3] = SRGB;
-    }
-    /// Position and style of a line of text.
-    TextSpec: "softvt.Text" as "image:text" {
-        /// Left end of its baseline, from the top left.
-        at: [f64; 2] = Type::Vector(2, "pixels");
-        /// Height of the letters.
-        size: f32 = Type::Number("pixels", Range::closed(4.0, 200.0)) => Number(18.0);
-        /// Colour.
-        colour: [f64; 3] = SRGB;
-    }
-}
+const REGION: Type = Type::vector(4, "x, y, width, height in pixels");
+/// Position of text or of an image that is pasted, pixels.
+const OFFSET: Range = Range::closed(-1e5, 1e5);
+const SRGB: Type = Type::vector(3, "sRGB of 0 to 255");
 
 /// `softvt.Image`.
 #[derive(Clone, Debug)]
@@ -88,18 +67,6 @@ impl LuaImage {
     }
 }
 
-impl FromLua for LuaImage {
-    fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
-        let image =
-            value.as_userdata().and_then(|data| data.borrow::<Self>().ok().map(|image| image.clone()));
-        image.ok_or_else(|| fail(lua, format!("expected an image, got {}", describe(&value))))
-    }
-}
-
-impl LuaType for LuaImage {
-    const TYPE: Type = Type::Object("softvt.Image");
-}
-
 /// A copy of the image that a value is, if it is one.
 pub(crate) fn image_of(value: &Value) -> Option<RgbImage> {
     value.as_userdata()?.borrow::<LuaImage>().ok().map(|image| lock(&image.0).image.clone())
@@ -128,16 +95,22 @@ fn part(lua: &Lua, method: &str, image: &RgbImage, region: Option<[f64; 4]>) -> 
     if is_whole && w > 0 && h > 0 && x + w <= width && y + h <= height {
         return Ok(ImageRegion { x, y, width: w, height: h });
     }
-    let got = super::visuals::braced(&region);
-    let message = format!("expected x, y, width, height within {width} × {height} pixels, got {got}");
+    let got = region.map(format_number).join(", ");
+    let message = format!("expected x, y, width, height within {width} × {height} pixels, got {{{got}}}");
     Err(fail(lua, format!("image:{method}: region: {message}")))
 }
 
 functions! {
     FUNCTIONS {
         /// Returns an image of one colour: `softvt.image { width = 640, height = 480, colour = { 255, 255, 255 } }`.
-        fn image(lua, spec: ImageSpec) -> ["softvt.Image"] {
-            let ImageSpec { width, height, colour } = spec;
+        fn image(lua) takes spec "softvt.NewImage" {
+            /// Width, pixels.
+            width: u32 = EDGE;
+            /// Height, pixels.
+            height: u32 = EDGE;
+            /// Colour.
+            colour: [f64; 3] = SRGB;
+        } -> ["softvt.Image"] {
             LuaImage::make(lua, width, height, 0, || RgbImage::from_pixel(width, height, Rgb(srgb(colour))))?
         }
     }
@@ -196,13 +169,16 @@ class! {
                 LuaImage::make(lua, width, height, scratch_bytes, || resize(image, width, height))?
             }
             /// Copies another image onto this one, with its top left pixel at x, y.
-            fn paste(_, this, other: LuaImage, x: f64 = OFFSET, y: f64 = OFFSET) -> [] { this.paste(&other, x, y) }
+            fn paste(_, this, other: LuaImage, x: f64 = Type::Number("pixels", OFFSET), y: f64 = Type::Number("pixels", OFFSET)) -> [] { this.paste(&other, x, y) }
             /// Writes a line of text on the image.
-            fn text(lua, this, text: LuaString = Type::Line, style: TextSpec) -> [] {
-                let [x, y] = style.at;
-                if x.abs().max(y.abs()) > 1e5 {
-                    return Err(fail(lua, "image:text.at: expected pixels within ±100000"));
-                }
+            fn text(lua, this, text: LuaString = Type::Line) takes style "softvt.Text" {
+                /// Left end of its baseline, from the top left.
+                at: [f64; 2] = Type::Vector(2, "pixels", OFFSET);
+                /// Height of the letters.
+                size: f32 = Type::Number("pixels", Range::closed(4.0, 200.0)) => Number(18.0);
+                /// Colour.
+                colour: [f64; 3] = SRGB;
+            } -> [] {
                 let text = text.to_string_lossy();
                 if text.len() > MAX_TEXT_BYTES {
                     let length = text.len();
@@ -213,7 +189,7 @@ class! {
                 // The canvas has four bytes per pixel, and its image three.
                 let _scratch = reserve(lua, 7 * image.width() as usize * image.height() as usize)?;
                 let mut canvas = Canvas::from_image(image);
-                canvas.write(&text, x as f32, y as f32, style.size, srgb(style.colour));
+                canvas.write(&text, at[0] as f32, at[1] as f32, size, srgb(colour));
                 *image = canvas.to_image();
             }
         }

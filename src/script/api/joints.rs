@@ -2,21 +2,15 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use mlua::{Lua, Table, Value};
+use mlua::{Lua, Table};
 
-use super::{
-    shapes::LuaShape,
-    visuals::{VisualSpec, visuals_of},
-};
+use super::{shapes::LuaShape, visuals::visuals_of};
 use crate::{
     geometry::{Pose, Vec3},
     physics::contact::Friction,
-    scene::{Asset, Body, Joint, JointMotion, Part, part_poses},
+    scene::{Asset, Body, Joint, JointMotion, Part, Visual, part_poses},
     script::{
-        schema::{
-            Constructed, Range, Record, RecordType, Type, ValidationError, error_at_key, invalid, make,
-            object::LuaConstructor, one_of, record,
-        },
+        schema::{Range, Record, RecordType, Type, ValidationError, error_at_key, invalid, one_of, record},
         vm::error::fail,
     },
     text::{format_number, unknown_name},
@@ -24,9 +18,9 @@ use crate::{
 
 record! {
     /// A joint along which a part slides, such as that of a drawer. Values are in m.
-    SliderSpec: "softvt.Slider" as "slider", constructor "softvt.slider" {
+    SliderSpec: "softvt.Slider" as "slider", constructor "softvt.slider", relations check_limits {
         /// Direction in which its value grows.
-        axis: [f64; 3] = Type::Vector(3, "object frame");
+        axis: [f64; 3] = Type::Direction(&[], "object frame");
         /// Lowest value.
         lower: f64 = Type::Number("m", Range::ANY);
         /// Highest value, above the lowest.
@@ -37,11 +31,11 @@ record! {
         friction: f64 = Type::Number("N", Range::NOT_NEGATIVE) => Number(0.0);
     }
     /// A joint about which a part turns, such as that of a door or a knob. Values are in rad.
-    HingeSpec: "softvt.Hinge" as "hinge", constructor "softvt.hinge" {
+    HingeSpec: "softvt.Hinge" as "hinge", constructor "softvt.hinge", relations check_limits {
         /// Axis about which its value grows, right-handed.
-        axis: [f64; 3] = Type::Vector(3, "object frame");
+        axis: [f64; 3] = Type::Direction(&[], "object frame");
         /// A point of the axis, with all joints at 0.
-        origin: [f64; 3] = Type::Vector(3, "m, object frame");
+        origin: [f64; 3] = Type::vector(3, "m, object frame");
         /// Lowest value.
         lower: f64 = Type::Number("rad", Range::ANY);
         /// Highest value, above the lowest.
@@ -64,12 +58,12 @@ record! {
         /// Name of the part that carries it; the fixed base by default.
         parent: Option<String> = Type::Name;
         /// Visuals by material id of its shape, from 0; those of the asset by default.
-        visuals: Option<Vec<VisualSpec>>;
+        visuals: Vec<Visual> => Empty;
         /// Numbers for experts (handle height …).
-        hints: Option<BTreeMap<String, f64>>;
+        hints: BTreeMap<String, f64> => Empty;
     }
     /// Parts on joints. The asset's own shape is their base, which never moves.
-    ArticulatedSpec: "softvt.Articulated" as "articulated", constructor "softvt.articulated" {
+    ArticulatedSpec: "softvt.Articulated" as "articulated", constructor "softvt.articulated", relations check_parts {
         /// The parts, in any order.
         parts: Vec<PartSpec>;
     }
@@ -80,81 +74,54 @@ one_of! {
     JointSpec { Slider(SliderSpec), Hinge(HingeSpec) }
 }
 
-/// Constructors that check more than single fields.
-pub(crate) static CONSTRUCTORS: &[LuaConstructor] = &[
-    LuaConstructor::with(ArticulatedSpec::RECORD, make_articulated),
-    LuaConstructor::with(SliderSpec::RECORD, make_joint),
-    LuaConstructor::with(HingeSpec::RECORD, make_joint),
-];
+pub(crate) static CONSTRUCTORS: &[&Record] =
+    &[ArticulatedSpec::RECORD, SliderSpec::RECORD, HingeSpec::RECORD];
 
-fn make_joint(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Result<Table> {
-    if let Value::Table(table) = value {
-        for key in ["lower", "upper"] {
-            if table.raw_get::<Value>(key)?.is_nil() {
-                let message = "missing; every joint needs limits: give lower and upper";
-                return Err(invalid(lua, record, key, message));
-            }
-        }
+fn check_limits(lua: &Lua, record: &Record, joint: &Table) -> mlua::Result<()> {
+    let (lower, upper): (f64, f64) = (joint.raw_get("lower")?, joint.raw_get("upper")?);
+    if lower < upper {
+        return Ok(());
     }
-    let made = make(lua, record, value)?;
-    if Vec3::from(made.raw_get::<[f64; 3]>("axis")?).norm() < 1e-9 {
-        return Err(invalid(lua, record, "axis", "expected a direction, got one of length 0"));
-    }
-    let (lower, upper): (f64, f64) = (made.raw_get("lower")?, made.raw_get("upper")?);
-    match lower < upper {
-        true => Ok(made),
-        false => {
-            let (lower, upper) = (format_number(lower), format_number(upper));
-            Err(invalid(lua, record, "upper", format!("expected more than lower, {lower}, got {upper}")))
-        }
-    }
+    let (lower, upper) = (format_number(lower), format_number(upper));
+    Err(invalid(lua, record.label, "upper", format!("expected more than lower, {lower}, got {upper}")))
 }
 
-fn make_articulated(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Result<Table> {
-    let made = make(lua, record, value)?;
-    let parts: Vec<PartSpec> = made.raw_get("parts")?;
-    match order(&parts) {
-        Ok(_) => Ok(made),
-        Err(message) => Err(invalid(lua, record, "parts", message)),
-    }
+fn check_parts(lua: &Lua, record: &Record, body: &Table) -> mlua::Result<()> {
+    let parts: Vec<PartSpec> = body.raw_get("parts")?;
+    order(&parts).map(|_| ()).map_err(|error| error_at_key(lua, record.label, &error.inside("parts")))
 }
 
-/// Sorts the parts so that each comes after the one that carries it, and returns their indices; or the reason why there is
-/// no such order.
-fn order(parts: &[PartSpec]) -> Result<Vec<usize>, String> {
+/// Sorts the parts so that each comes after the one that carries it, and returns their indices.
+fn order(parts: &[PartSpec]) -> Result<Vec<usize>, ValidationError> {
+    let wrong = |message: String| Err(ValidationError::new(message));
     if parts.is_empty() {
-        return Err("expected at least one part; without any it is softvt.static {}".into());
+        return wrong("expected at least one part; without any it is softvt.static {}".into());
     }
     let names: Vec<&str> = parts.iter().map(|part| part.name.as_str()).collect();
     if let Some(duplicate) = (1..names.len()).find(|&i| names[..i].contains(&names[i])) {
-        return Err(format!("there are two parts named {:?}; names must be unique", names[duplicate]));
+        return wrong(format!("there are two parts named {:?}; names must be unique", names[duplicate]));
     }
-    let mut parents = Vec::new();
-    for part in parts {
-        let parent = part.parent.as_deref().map(|parent| {
-            names.iter().position(|known| *known == parent).ok_or_else(|| {
-                format!(
-                    "part {:?}: parent: {}",
-                    part.name,
-                    unknown_name("part", parent, names.iter().copied())
-                )
-            })
-        });
-        parents.push(parent.transpose()?);
+    let index_of = |parent: &String| names.iter().position(|name| name == parent);
+    for PartSpec { name, parent, .. } in parts {
+        if let Some(parent) = parent.as_ref().filter(|parent| index_of(parent).is_none()) {
+            let message = unknown_name("part", parent, names.iter().copied());
+            return wrong(format!("part {name:?}: parent: {message}"));
+        }
     }
     let mut sorted: Vec<usize> = Vec::new();
     while sorted.len() < parts.len() {
-        let ready = |&i: &usize| !sorted.contains(&i) && parents[i].is_none_or(|p| sorted.contains(&p));
-        match (0..parts.len()).find(ready) {
-            Some(next) => sorted.push(next),
-            None => {
-                let stuck = (0..parts.len()).filter(|i| !sorted.contains(i)).map(|i| names[i]);
-                let stuck = stuck.collect::<Vec<_>>().join(", ");
-                return Err(format!(
-                    "parts {stuck} carry each other in a circle; one must be carried by the base"
-                ));
-            }
-        }
+        let is_ready = |i: &usize| {
+            let parent = parts[*i].parent.as_ref().and_then(index_of);
+            !sorted.contains(i) && parent.is_none_or(|parent| sorted.contains(&parent))
+        };
+        let Some(next) = (0..parts.len()).find(is_ready) else {
+            let stuck = (0..parts.len()).filter(|i| !sorted.contains(i)).map(|i| names[i]);
+            let stuck = stuck.collect::<Vec<_>>().join(", ");
+            return wrong(format!(
+                "parts {stuck} carry each other in a circle; one must be carried by the base"
+            ));
+        };
+        sorted.push(next);
     }
     Ok(sorted)
 }
@@ -163,20 +130,21 @@ fn order(parts: &[PartSpec]) -> Result<Vec<usize>, String> {
 pub(crate) fn parts(
     lua: &Lua,
     body: &ArticulatedSpec,
-    asset_visuals: Option<&[VisualSpec]>,
+    asset_visuals: &[Visual],
     friction: Friction,
 ) -> mlua::Result<Vec<Part>> {
     let mut parts: Vec<Part> = Vec::new();
-    for index in order(&body.parts).map_err(|message| fail(lua, message))? {
+    for index in order(&body.parts).map_err(|error| fail(lua, error.describe("articulated")))? {
         let PartSpec { name, shape, density, joint, parent, visuals, hints } = &body.parts[index];
         let shape = shape.copy();
+        let visuals = if visuals.is_empty() { asset_visuals } else { visuals };
         let asset = Asset {
             name: name.clone(),
-            visuals: visuals_of(lua, name, visuals.as_deref().or(asset_visuals), &shape)?,
+            visuals: visuals_of(lua, name, visuals, &shape)?,
             shape,
             body: Body::Rigid { density: *density },
             friction,
-            hints: hints.clone().unwrap_or_default(),
+            hints: hints.clone(),
         };
         parts.push(Part {
             name: name.clone(),
@@ -192,23 +160,23 @@ pub(crate) fn parts(
 impl JointSpec {
     fn joint(&self) -> Joint {
         match self {
-            Self::Slider(Constructed { spec, .. }) => Joint {
+            Self::Slider(slider) => Joint {
                 motion: JointMotion::Slide,
-                axis_o: Vec3::from(spec.axis).normalize(),
+                axis_o: Vec3::from(slider.axis).normalize(),
                 origin_o: Vec3::zeros(),
-                lower: spec.lower,
-                upper: spec.upper,
-                damping: spec.damping,
-                friction: spec.friction,
+                lower: slider.lower,
+                upper: slider.upper,
+                damping: slider.damping,
+                friction: slider.friction,
             },
-            Self::Hinge(Constructed { spec, .. }) => Joint {
+            Self::Hinge(hinge) => Joint {
                 motion: JointMotion::Turn,
-                axis_o: Vec3::from(spec.axis).normalize(),
-                origin_o: Vec3::from(spec.origin),
-                lower: spec.lower,
-                upper: spec.upper,
-                damping: spec.damping,
-                friction: spec.friction,
+                axis_o: Vec3::from(hinge.axis).normalize(),
+                origin_o: Vec3::from(hinge.origin),
+                lower: hinge.lower,
+                upper: hinge.upper,
+                damping: hinge.damping,
+                friction: hinge.friction,
             },
         }
     }

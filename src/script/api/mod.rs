@@ -16,19 +16,25 @@ pub(crate) mod scene;
 pub(crate) mod shapes;
 pub(crate) mod simulation;
 pub(crate) mod tasks;
-pub(crate) mod touch;
 pub(crate) mod visuals;
 pub(crate) mod world;
 
-use mlua::{Lua, Table};
+use std::collections::BTreeMap;
+
+use mlua::{Lua, Table, Value};
 
 use super::{
     schema::{
-        ApiObject, Class, Function, Record, RecordType, Signature,
-        object::{LuaConstructor, signature},
+        ApiObject, Class, Function, Record, RecordType, Signature, Type, Unchecked, ValidationError,
+        check::error_of_caller, functions, make, object::signature,
     },
-    vm::list::LuaList,
+    vm::{
+        error::fail,
+        list::{LuaList, plain},
+        value::{describe, sorted_pairs},
+    },
 };
+use crate::text::unknown_name;
 
 /// `softvt.List` for stubs and reference; its behaviour is in [`LuaList`].
 static LIST: Class = Class {
@@ -47,16 +53,60 @@ pub(crate) static SORTED: Signature = signature!(
     sorted(t: Table) -> ["fun(): any, any"]
 );
 
-/// Constructors `softvt.name{…}`.
-pub(crate) fn constructors() -> impl Iterator<Item = &'static LuaConstructor> {
+functions! {
+    FUNCTIONS {
+        /// Checks a table that a function of a script takes, and returns it: `softvt.check_fields("pick_place", spec, { object =
+        /// "string", speed = "number?" })`. Each key has the name of a Lua type, with ? if it may be absent. The error is at the
+        /// line of the file that called the function.
+        fn check_fields(
+            lua,
+            label: String,
+            value: Unchecked = Type::Table("table"),
+            fields: BTreeMap<String, String>
+        ) -> ["table"] {
+            let checked = check_fields(lua, &value.0, &fields);
+            checked.map_err(|error| error_of_caller(lua, &label, &error))?
+        }
+    }
+}
+
+fn check_fields(
+    lua: &Lua,
+    value: &Value,
+    fields: &BTreeMap<String, String>,
+) -> Result<Table, ValidationError> {
+    let Value::Table(table) = plain(lua, value)? else {
+        return Err(ValidationError::new(format!("expected a table, got {}", describe(value))));
+    };
+    for (key, _) in sorted_pairs(&table) {
+        if !key.as_string().is_some_and(|key| fields.contains_key(&key.to_string_lossy())) {
+            let key = key.to_string()?;
+            return Err(ValidationError::new(unknown_name("key", &key, fields.keys().map(String::as_str))));
+        }
+    }
+    for (name, ty) in fields {
+        let value: Value = table.raw_get(name.as_str())?;
+        let kind = if value.is_integer() { "number" } else { value.type_name() };
+        if kind != ty.trim_end_matches('?') && !(value.is_nil() && ty.ends_with('?')) {
+            let message = format!("expected a {}, got {}", ty.trim_end_matches('?'), describe(&value));
+            return Err(ValidationError::new(message).inside(name));
+        }
+    }
+    Ok(table)
+}
+
+/// Records of the constructors `softvt.name{…}`.
+pub(crate) fn constructors() -> impl Iterator<Item = &'static Record> {
     [tasks::CONSTRUCTORS, assets::CONSTRUCTORS, joints::CONSTRUCTORS, policy::CONSTRUCTORS]
         .into_iter()
         .flatten()
+        .copied()
 }
 
 /// Functions `softvt.name(…)`.
 pub(crate) fn functions() -> impl Iterator<Item = &'static Function> {
     [
+        FUNCTIONS,
         tasks::FUNCTIONS,
         world::FUNCTIONS,
         simulation::FUNCTIONS,
@@ -69,24 +119,20 @@ pub(crate) fn functions() -> impl Iterator<Item = &'static Function> {
     .flatten()
 }
 
-/// Records that are neither made by a constructor nor taken as the only argument of a function or method.
-pub(crate) static NESTED_RECORDS: &[&Record] = &[
-    assets::FrictionSpec::RECORD,
-    joints::PartSpec::RECORD,
-    visuals::VisualSpec::RECORD,
-    visuals::LayerSpec::RECORD,
-    shapes::MaskSpec::RECORD,
-    tasks::LayoutSpec::RECORD,
-    tasks::ConditionSpec::RECORD,
-    tasks::FinishSpec::RECORD,
-    expert::ClearanceSpec::RECORD,
-    image::TextSpec::RECORD,
-    policy::ObservesSpec::RECORD,
-    policy::ActionSpec::RECORD,
-    policy::InputSpec::RECORD,
-    policy::ActionEncodingSpec::RECORD,
-    policy::GripperValuesSpec::RECORD,
-];
+/// The index of the one of `names` that is `name`; `label` and `what` name the place and the kind in the error.
+fn index_of<'a>(
+    lua: &Lua,
+    label: &str,
+    what: &str,
+    names: impl Iterator<Item = &'a str> + Clone,
+    name: &str,
+) -> mlua::Result<usize> {
+    let index = names.clone().position(|known| known == name);
+    index.ok_or_else(|| fail(lua, format!("{label}: {}", unknown_name(what, name, names))))
+}
+
+/// Records of tables that functions of scripts return.
+pub(crate) static RETURNED_RECORDS: &[&Record] = &[tasks::FinishSpec::RECORD, policy::ActionSpec::RECORD];
 
 /// Classes of objects and of tables that scripts receive.
 pub(crate) static CLASSES: &[&Class] = &[
@@ -108,26 +154,29 @@ pub(crate) static CLASSES: &[&Class] = &[
     cameras::LuaCamera::CLASS,
     visuals::LuaMaterial::CLASS,
     scene::LuaObject::CLASS,
-    expert::LuaView::CLASS,
+    expert::SceneState::CLASS,
     &expert::object_state::CLASS,
     expert::MeasuredArm::CLASS,
     &LIST,
     &observation::task_brief::CLASS,
     observation::LuaObservation::CLASS,
-    &touch::fingers::CLASS,
-    touch::LuaTouch::CLASS,
-    touch::LuaMarkers::CLASS,
+    &observation::fingers::CLASS,
+    observation::LuaTactileFrame::CLASS,
+    observation::LuaMarkers::CLASS,
     &observation::forces::CLASS,
 ];
 
 /// Adds everything to the table `softvt`.
 pub(crate) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
-    constructors().try_for_each(|constructor| constructor.install(lua, api))?;
-    functions().try_for_each(|function| function.install(lua, api, "softvt."))?;
-    for (name, functions) in [("shape", shapes::SHAPES), ("mask", visuals::MASKS)] {
-        let table = lua.create_table()?;
-        functions.iter().try_for_each(|function| function.install(lua, &table, "softvt."))?;
-        api.set(name, table)?;
+    for record in constructors() {
+        let constructor = lua.create_function(move |lua, value: Value| make(lua, record, &value))?;
+        api.set(record.constructor(), constructor)?;
     }
-    Ok(())
+    functions().try_for_each(|function| function.install(lua, api, "softvt."))?;
+    let shapes = lua.create_table()?;
+    shapes::SHAPES.iter().try_for_each(|function| function.install(lua, &shapes, "shape."))?;
+    api.set("shape", shapes)?;
+    let masks = lua.create_table()?;
+    visuals::MASKS.iter().try_for_each(|function| function.install(lua, &masks, "mask."))?;
+    api.set("mask", masks)
 }

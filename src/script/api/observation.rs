@@ -1,21 +1,22 @@
-//! The observation of a policy, as a read-only object.
+//! The observation of a policy, and tactile sensors with their markers, as read-only objects.
 
 use std::sync::Arc;
 
 use mlua::{Lua, Table, Value};
 
-use super::{image::LuaImage, pose::wxyz, touch::fingers};
+use super::{image::LuaImage, pose::wxyz};
 use crate::{
-    policy::{Observation, TactileHistory, TaskBrief},
+    policy::{Observation, PadForce, TactileFrame, TactileHistory, TaskBrief},
     robot::rotation,
     script::{
         schema::{
-            class,
+            FieldValue, Range, Type, class,
             object::{MEASURED, fixed_list},
             output,
         },
         vm::error::fail,
     },
+    sensing::tactile::{MarkerFlow, MarkerPositions, Markers},
     text::unknown_name,
 };
 
@@ -28,8 +29,8 @@ impl LuaObservation {
         Self(Arc::new(observation.clone()))
     }
 
-    fn touch(&self, lua: &Lua, key: &str) -> mlua::Result<&TactileHistory> {
-        self.0.tactile.as_ref().ok_or_else(|| not_observed(lua, key, "touch = true"))
+    fn tactile(&self, lua: &Lua, key: &str) -> mlua::Result<&TactileHistory> {
+        self.0.tactile.as_ref().ok_or_else(|| not_observed(lua, key, "tactile = true"))
     }
 }
 
@@ -42,17 +43,17 @@ fn not_observed(lua: &Lua, key: &str, declaration: &str) -> mlua::Error {
 
 output! {
     /// True forces on the gels, N, pad frame: a pressing body makes z negative.
-    fn forces(lua, left: Table, right: Table) -> "softvt.Forces" as "force" {
+    fn forces(lua, pads: &[PadForce; 2]) -> "softvt.Forces" as "force" {
         /// Force on the left gel.
-        left: "number[]" = left;
+        left: "number[]" = lua.create_sequence_from(pads[0].wrench.force.iter().copied())?;
         /// Force on the right gel.
-        right: "number[]" = right;
+        right: "number[]" = lua.create_sequence_from(pads[1].wrench.force.iter().copied())?;
     }
 }
 
 output! {
     /// The episode that begins.
-    fn task_brief(lua, brief: &TaskBrief) -> "softvt.Brief" as "task" {
+    fn task_brief(lua, brief: &TaskBrief) -> "softvt.TaskBrief" as "task" {
         /// Name of the suite.
         suite: "string" = brief.suite.as_str();
         /// Index of the task, from 0.
@@ -73,39 +74,30 @@ class! {
             /// Time since the policy took over, s.
             time: "number" { get(_, this) { this.0.time_s } }
             /// Tool position, m.
-            position: "number[]" {
-                get(lua, this) { fixed_list(lua, this.0.ee_position_b.iter().copied(), MEASURED)? }
-            }
+            position: "number[]" { get(_, this) { this.0.ee_position_b } }
             /// Tool orientation as axis-angle, rad.
-            axis_angle: "number[]" {
-                get(lua, this) { fixed_list(lua, this.0.ee_axis_angle_b.iter().copied(), MEASURED)? }
-            }
+            axis_angle: "number[]" { get(_, this) { this.0.ee_axis_angle_b } }
             /// Tool orientation as quaternion w, x, y, z with w ≥ 0.
-            rotation: "number[]" {
-                get(lua, this) {
-                    let rotation = rotation::from_axis_angle(&this.0.ee_axis_angle_b);
-                    fixed_list(lua, wxyz(&rotation), MEASURED)?
-                }
-            }
+            quaternion: "number[]" { get(_, this) { wxyz(&rotation::from_axis_angle(&this.0.ee_axis_angle_b)) } }
             /// The seven joint angles of the arm, rad.
-            joints: "number[]" { get(lua, this) { fixed_list(lua, this.0.joints, MEASURED)? } }
+            joints: "number[]" { get(_, this) { this.0.joints } }
             /// Measured distance of the gels, 0 to 0.08 m.
             width: "number" { get(_, this) { this.0.gripper_width_m } }
             /// Last commanded closure: 0 is open, 1 is closed.
             closure: "number" { get(_, this) { this.0.closure } }
             /// The instruction.
             prompt: "string" { get(_, this) { this.0.prompt.clone() } }
-            /// Tactile sensors; requires observes.touch.
-            touch: "softvt.Fingers" {
+            /// Tactile sensors; requires observes.tactile.
+            tactile: "softvt.Fingers" {
                 get(lua, this) {
-                    let now = this.touch(lua, "touch")?.frames.last();
+                    let now = this.tactile(lua, "tactile")?.frames.last();
                     now.map(|now| fingers(lua, now)).transpose()?.map_or(Value::Nil, Value::Table)
                 }
             }
-            /// Tactile sensors in the last 1 to 8 control steps, oldest first; requires observes.touch.
-            touch_history: "softvt.Fingers[]" {
+            /// Tactile sensors in the last 1 to 8 control steps, oldest first; requires observes.tactile.
+            tactile_history: "softvt.Fingers[]" {
                 get(lua, this) {
-                    let frames = this.touch(lua, "touch_history")?.frames.iter().map(|frame| fingers(lua, frame));
+                    let frames = this.tactile(lua, "tactile_history")?.frames.iter().map(|frame| fingers(lua, frame));
                     fixed_list(lua, frames.collect::<mlua::Result<Vec<_>>>()?, MEASURED)?
                 }
             }
@@ -113,9 +105,7 @@ class! {
             force: "softvt.Forces" {
                 get(lua, this) {
                     let pads = this.0.forces.as_ref().ok_or_else(|| not_observed(lua, "force", "force = true"))?;
-                    let [left, right] = [&pads[0], &pads[1]].map(|pad| pad.wrench.force);
-                    let list = |force: crate::geometry::Vec3| lua.create_sequence_from(force.iter().copied());
-                    forces(lua, list(left)?, list(right)?)?
+                    forces(lua, pads)?
                 }
             }
         }
@@ -131,6 +121,106 @@ class! {
                     None => return Err(fail(lua, format!("obs:camera: {}", unknown_name("camera", &name, names)))),
                 }
             }
+        }
+    }
+}
+
+/// Tactile frames of the left and the right finger at one control step.
+pub(crate) type FingerReadings = Arc<[TactileFrame; 2]>;
+
+const PIXELS: Type = Type::Number("px", Range::closed(0.0, 1e3));
+
+/// `softvt.TactileFrame`: a finger at one control step.
+#[derive(Clone)]
+pub(crate) struct LuaTactileFrame {
+    readings: FingerReadings,
+    finger: usize,
+}
+
+/// `softvt.Markers`.
+#[derive(Clone)]
+pub(crate) struct LuaMarkers {
+    markers: Arc<Markers>,
+    flow: Arc<MarkerFlow>,
+}
+
+impl LuaMarkers {
+    /// The markers of one finger.
+    pub(crate) fn new(markers: Markers) -> Self {
+        Self { flow: Arc::new(MarkerFlow::new(&markers)), markers: Arc::new(markers) }
+    }
+}
+
+output! {
+    /// The tactile sensors of both fingers at one control step.
+    fn fingers(lua, readings: &FingerReadings) -> "softvt.Fingers" as "tactile" {
+        /// The left finger.
+        left: "softvt.TactileFrame" = LuaTactileFrame { readings: readings.clone(), finger: 0 };
+        /// The right finger.
+        right: "softvt.TactileFrame" = LuaTactileFrame { readings: readings.clone(), finger: 1 };
+    }
+}
+
+class! {
+    /// The tactile sensor of a finger at one control step; docs/tactile.md draws its frames.
+    LuaTactileFrame: "softvt.TactileFrame" {
+        label(_) { "tactile".to_owned() }
+        fields {
+            /// Colour image, 320 × 240.
+            image: "softvt.Image" {
+                get(lua, this) { LuaImage::new(lua, this.readings[this.finger].image.clone())? }
+            }
+            /// Absolute difference of every channel from the image of the untouched gel.
+            difference: "softvt.Image" {
+                get(lua, this) { LuaImage::new(lua, this.readings[this.finger].change())? }
+            }
+            /// The 11 × 9 markers.
+            markers: "softvt.Markers" { get(_, this) { LuaMarkers::new(this.readings[this.finger].markers) } }
+        }
+    }
+}
+
+/// Marker positions as a list of lists.
+pub(crate) fn positions(lua: &Lua, places: &MarkerPositions) -> mlua::Result<Table> {
+    lua.create_sequence_from(places.iter().map(|place| place.map(f64::from).to_vec()))
+}
+
+class! {
+    /// The 99 markers of a finger, row by row, in px of its image: x to the right (towards the hand), y down. 1 px is
+    /// 0.063 mm.
+    LuaMarkers: "softvt.Markers" {
+        label(_) { "markers".to_owned() }
+        fields {
+            /// Positions on the untouched gel.
+            initial: "number[][]" { get(lua, this) { FieldValue::Fixed(positions(lua, &this.markers.initial)?, MEASURED) } }
+            /// Present positions.
+            present: "number[][]" { get(lua, this) { FieldValue::Fixed(positions(lua, &this.markers.current)?, MEASURED) } }
+            /// Displacements.
+            motion: "number[][]" {
+                get(lua, this) { fixed_list(lua, this.flow.displacements.iter().map(|u| vec![u.x, u.y]), MEASURED)? }
+            }
+        }
+        methods {
+            /// Returns the mean displacement along x and y, which grows with shear along the gel's surface.
+            fn mean(lua, this) -> ["number[]"] { lua.create_sequence_from(this.flow.mean())? }
+            /// Returns the length of the longest displacement.
+            fn max_displacement(_, this) -> ["number"] { this.flow.max_displacement() }
+            /// Returns the root mean square of the displacements without their mean and twist. It grows with the normal
+            /// force: about 0.3 px per newton on round dough and rigid objects, less on flat and soft ones.
+            fn rms_residual(_, this) -> ["number"] { this.flow.press() }
+            /// Returns the mean displacement towards the fingertip or across, as of an object that slips out of the grasp;
+            /// 0 if it is pushed in.
+            fn outward_shear(_, this) -> ["number"] { this.flow.drag() }
+            /// Returns the trace of the displacement gradient; positive where an indentation pushes the markers outwards.
+            fn divergence(_, this) -> ["number"] { this.flow.divergence() }
+            /// Returns the rotation of the markers, rad; positive is clockwise in the image.
+            fn twist(_, this) -> ["number"] { this.flow.twist() }
+            /// Returns the pure shear of the markers: stretch along x against y, and along the diagonal x = y.
+            fn shear(lua, this) -> ["number[]"] { lua.create_sequence_from(this.flow.shear())? }
+            /// Returns the contact mask: true for markers displaced by more than px.
+            fn contact_mask(lua, this, px: f64 = PIXELS) -> ["boolean[]"] { lua.create_sequence_from(this.flow.moved(px))? }
+            /// Returns the share of markers displaced by more than px; the whole image is 20.3 × 15.2 mm.
+            fn contact_share(_, this, px: f64 = PIXELS) -> ["number"] { this.flow.moved_share(px) }
         }
     }
 }

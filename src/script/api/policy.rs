@@ -3,33 +3,28 @@
 use mlua::Function;
 
 use crate::{
-    policy::{decode::MAX_CHUNK_LEN, profile::StatePart},
+    policy::{
+        SensorStreams,
+        decode::MAX_CHUNK_LEN,
+        profile::{GripperValues, StatePart},
+    },
     robot::Side,
-    script::schema::{Range, RecordType, Type, choice, object::LuaConstructor, record},
+    script::schema::{Range, Record, RecordType, Type, choice, record, record_of},
     sensing::tactile::MosaicLayout,
 };
 
 const STEP: Type = Type::Number("", Range { max: 10.0, ..Range::POSITIVE });
 
 record! {
-    /// The observations of a policy; nothing else is computed.
-    ObservesSpec: "softvt.Observes" as "policy.observes" {
-        /// Names of cameras of the scene.
-        cameras: Option<Vec<String>> = Type::List(&Type::Name);
-        /// True to get the tactile images and markers of the fingers.
-        touch: bool => Boolean(false);
-        /// True to get the true forces on the gels, which no real sensor gives; results then say force_observed.
-        force: bool => Boolean(false);
-    }
     /// A policy, as the file given to --policy returns it. Every episode has a virtual machine of its own, in which the
     /// file runs again; math.random is seeded by the episode.
     PolicySpec: "softvt.Policy" as "policy", constructor "softvt.policy" {
         /// Name in results, unless --name gives another.
         name: String = Type::Name;
         /// Observations of the policy.
-        observes: ObservesSpec;
+        observes: SensorStreams;
         /// Called when the episode begins.
-        reset: Option<Function> = Type::Function("fun(task: softvt.Brief)");
+        reset: Option<Function> = Type::Function("fun(task: softvt.TaskBrief)");
         /// Returns the action of this control step, or a list of actions for the next ones.
         act: Function = Type::Function("fun(obs: softvt.Observation): softvt.Action|softvt.Action[]");
         /// Number of actions of a list that are executed before act is called again, unless --replan gives another; all
@@ -37,14 +32,14 @@ record! {
         replan: Option<usize> = Type::Integer(Range::closed(1.0, MAX_CHUNK_LEN as f64));
     }
     /// A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame, and a closure.
-    /// Give either axis_angle or rotation.
+    /// Give either axis_angle or quaternion.
     ActionSpec: "softvt.Action" as "action" {
         /// Position.
-        position: [f64; 3] = Type::Vector(3, "m, base frame");
+        position: [f64; 3] = Type::vector(3, "m, base frame");
         /// Orientation as axis-angle.
-        axis_angle: Option<[f64; 3]> = Type::Vector(3, "rad, base frame");
+        axis_angle: Option<[f64; 3]> = Type::vector(3, "rad, base frame");
         /// Orientation as quaternion.
-        rotation: Option<[f64; 4]> = Type::Vector(4, "w, x, y, z, base frame");
+        quaternion: Option<[f64; 4]> = Type::Quaternion("base frame");
         /// Gripper closure: 0 is open, 1 is closed.
         closure: f64 = Type::Number("", Range::closed(0.0, 1.0));
     }
@@ -67,15 +62,6 @@ record! {
         /// For tactile: the finger.
         finger: Option<Side>;
     }
-    /// The seventh number of an action. Values between open and closed close in proportion.
-    GripperValuesSpec: "softvt.GripperValues" as "profile.actions.gripper" {
-        /// Value that opens the gripper.
-        open: f64;
-        /// Value that closes it.
-        closed: f64;
-        /// True if every value beyond the middle closes, and any other opens.
-        binary: bool => Boolean(false);
-    }
     /// The meaning of the numbers of an action: three of position, three of orientation (axis-angle), one of the gripper;
     /// further ones are padding.
     ActionEncodingSpec: "softvt.ActionEncoding" as "profile.actions" {
@@ -93,7 +79,7 @@ record! {
         /// Length that an action must have, padding included; any from 7 by default.
         length: Option<usize> = Type::Integer(Range::closed(7.0, 4096.0));
         /// The seventh number.
-        gripper: GripperValuesSpec;
+        gripper: GripperValues;
     }
     /// The messages of a policy server: the observations it gets and the meaning of its actions. The file given to --profile
     /// returns one.
@@ -107,58 +93,52 @@ record! {
     }
 }
 
-/// The content of an input.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum InputKind {
-    Camera,
-    State,
-    Prompt,
-    TactileImage,
-    Tactile,
-    MarkerMotion,
-    Force,
-}
-
-choice! {
-    InputKind {
-        "camera" => InputKind::Camera,
-        "state" => InputKind::State,
-        "prompt" => InputKind::Prompt,
-        "tactile_image" => InputKind::TactileImage,
-        "tactile" => InputKind::Tactile,
-        "marker_motion" => InputKind::MarkerMotion,
-        "force" => InputKind::Force,
+record_of! {
+    /// The observations of a policy; nothing else is computed.
+    SensorStreams: "softvt.Observes" as "policy.observes" {
+        /// Names of cameras of the scene.
+        cameras: Vec<String> = Type::List(&Type::Name) => Empty;
+        /// True to get the tactile images and markers of the fingers.
+        tactile: bool => Boolean(false);
+        /// True to get the true forces on the gels, which no real sensor gives; results then say force_observed.
+        force: bool => Boolean(false);
+    }
+    /// The seventh number of an action. Values between open and closed close in proportion.
+    GripperValues: "softvt.GripperValues" as "profile.actions.gripper" {
+        /// Value that opens the gripper.
+        open: f64;
+        /// Value that closes it.
+        closed: f64;
+        /// True if every value beyond the middle closes, and any other opens.
+        binary: bool => Boolean(false);
     }
 }
 
-choice! { MosaicLayout { "rows" => MosaicLayout::Rows, "columns" => MosaicLayout::Columns } }
+choice! {
+    /// The content of an input.
+    enum InputKind {
+        "camera" => Camera,
+        "state" => State,
+        "prompt" => Prompt,
+        "tactile_image" => TactileImage,
+        "tactile" => Tactile,
+        "marker_motion" => MarkerMotion,
+        "force" => Force,
+    }
+}
+
+choice! { MosaicLayout { "rows" => Rows, "columns" => Columns } }
 choice! {
     StatePart {
-        "position" => StatePart::Position,
-        "axis_angle" => StatePart::AxisAngle,
-        "quaternion_wxyz" => StatePart::QuaternionWxyz,
-        "quaternion_xyzw" => StatePart::QuaternionXyzw,
-        "joints" => StatePart::Joints,
-        "gripper_width" => StatePart::GripperWidth,
-        "finger_position" => StatePart::FingerPosition,
-        "finger_pair" => StatePart::FingerPair,
-        "closure" => StatePart::Closure,
+        "position" => Position, "axis_angle" => AxisAngle,
+        "quaternion_wxyz" => QuaternionWxyz, "quaternion_xyzw" => QuaternionXyzw,
+        "joints" => Joints, "closure" => Closure,
+        "gripper_width" => GripperWidth, "finger_position" => FingerPosition, "finger_pair" => FingerPair,
     }
 }
-
-/// The reference of an action's pose.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum PoseKind {
-    Absolute,
-    Delta,
-    DeltaOsc,
-}
-
 choice! {
-    PoseKind {
-        "absolute" => PoseKind::Absolute, "delta" => PoseKind::Delta, "delta_osc" => PoseKind::DeltaOsc,
-    }
+    /// The reference of an action's pose.
+    enum PoseKind { "absolute" => Absolute, "delta" => Delta, "delta_osc" => DeltaOsc }
 }
 
-pub(crate) static CONSTRUCTORS: &[LuaConstructor] =
-    &[LuaConstructor::of(PolicySpec::RECORD), LuaConstructor::of(ProfileSpec::RECORD)];
+pub(crate) static CONSTRUCTORS: &[&Record] = &[PolicySpec::RECORD, ProfileSpec::RECORD];

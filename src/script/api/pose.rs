@@ -1,19 +1,12 @@
 //! Poses, and orientations and directions from numbers of any size.
 
-use mlua::{FromLua, Lua, Value};
 use nalgebra::Quaternion;
 
 use crate::{
     geometry::{Pose, Quat, Vec3},
     robot::rotation,
-    script::{
-        schema::{LuaType, Type, class, functions, object::fixed_list, record},
-        vm::{error::fail, value::describe},
-    },
+    script::schema::{Range, Type, check::MIN_LENGTH, class, functions},
 };
-
-/// Vectors with a smaller largest component have no direction.
-const MIN_LENGTH: f64 = 1e-9;
 
 /// Divides the numbers by the largest magnitude, so that no square over- or underflows. `None` if that is too small or not
 /// finite.
@@ -36,7 +29,7 @@ pub(crate) fn direction(numbers: [f64; 3]) -> Option<Vec3> {
     Some(if (1e-6..1e6).contains(&largest) { Vec3::from(numbers) } else { unit })
 }
 
-/// The rotation of a quaternion w, x, y, z of any length.
+/// The rotation of a quaternion w, x, y, z of any length but 0.
 pub(crate) fn rotation_from_wxyz(numbers: [f64; 4]) -> Option<Quat> {
     normalized_to_max(numbers).map(|[w, x, y, z]| Quat::new_normalize(Quaternion::new(w, x, y, z)))
 }
@@ -53,28 +46,22 @@ fn downward(yaw: f64) -> Quat {
     Quat::from_axis_angle(&Vec3::z_axis(), yaw) * Quat::from_axis_angle(&Vec3::x_axis(), std::f64::consts::PI)
 }
 
-record! {
-    /// A pose in the world frame. Without a quaternion the hand points straight down.
-    PoseSpec: "softvt.PoseSpec" as "pose" {
-        /// Position.
-        xyz: [f64; 3] = Type::Vector(3, "m, world");
-        /// Rotation of the downward hand about the vertical.
-        yaw: f64 = Type::Number("rad", crate::script::schema::Range::ANY) => Number(0.0);
-        /// Orientation instead of yaw, of any length but 0.
-        quat: Option<[f64; 4]> = Type::Vector(4, "w, x, y, z");
-    }
-}
+const POSITION: Type = Type::vector(3, "m, world");
 
 functions! {
     FUNCTIONS {
-        /// Returns a pose in the world frame: `softvt.pose { xyz = { 0.4, 0, 0.2 }, yaw = math.pi / 2 }`.
-        fn pose(lua, spec: PoseSpec) -> ["softvt.Pose"] {
-            let rotation = match spec.quat {
-                None => downward(spec.yaw),
-                Some(quat) => rotation_from_wxyz(quat)
-                    .ok_or_else(|| fail(lua, "pose.quat: expected a quaternion other than 0"))?,
-            };
-            LuaPose(Pose::from_parts(Vec3::from(spec.xyz).into(), rotation))
+        /// Returns a pose in the world frame: `softvt.pose { position = { 0.4, 0, 0.2 }, yaw = math.pi / 2 }`. Without a
+        /// quaternion the hand points straight down.
+        fn pose(_) takes spec "softvt.PoseSpec" {
+            /// Position.
+            position: [f64; 3] = POSITION;
+            /// Rotation of the downward hand about the vertical.
+            yaw: f64 = Type::Number("rad", Range::ANY) => Number(0.0);
+            /// Orientation instead of yaw.
+            quaternion: Option<[f64; 4]> = Type::Quaternion("");
+        } -> ["softvt.Pose"] {
+            let rotation = quaternion.and_then(rotation_from_wxyz).unwrap_or_else(|| downward(yaw));
+            LuaPose(Pose::from_parts(Vec3::from(position).into(), rotation))
         }
     }
 }
@@ -82,20 +69,6 @@ functions! {
 /// `softvt.Pose`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LuaPose(pub Pose);
-
-impl FromLua for LuaPose {
-    fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
-        let pose = value.as_userdata().and_then(|data| data.borrow::<Self>().ok().map(|pose| *pose));
-        pose.ok_or_else(|| fail(lua, format!("expected a pose (softvt.pose{{…}}), got {}", describe(&value))))
-    }
-}
-
-impl LuaType for LuaPose {
-    const TYPE: Type = Type::Object("softvt.Pose");
-}
-
-/// Hint for lists of a pose.
-const IMMUTABLE: &str = "a pose never changes: make another with softvt.pose{…}, or with moved";
 
 class! {
     /// An immutable pose in the world frame.
@@ -113,30 +86,32 @@ class! {
             /// Position along z, m.
             z: "number" { get(_, this) { this.0.translation.z } }
             /// Position x, y, z, m.
-            xyz: "number[]" {
-                get(lua, this) { fixed_list(lua, this.0.translation.vector.iter().copied(), IMMUTABLE)? }
+            position: "number[]" or "a pose never changes: make another with softvt.pose{…}, or with translated" {
+                get(_, this) { this.0.translation.vector }
             }
             /// Orientation as quaternion w, x, y, z with w ≥ 0.
-            quat: "number[]" { get(lua, this) { fixed_list(lua, wxyz(&this.0.rotation), IMMUTABLE)? } }
+            quaternion: "number[]" or "a pose never changes: make another with softvt.pose{…}, or with rotated" {
+                get(_, this) { wxyz(&this.0.rotation) }
+            }
         }
         methods {
             /// Returns the pose moved by an offset in the world frame, m.
-            fn moved(_, this, by: [f64; 3] = Type::Vector(3, "m")) -> ["softvt.Pose"] {
+            fn translated(_, this, offset: [f64; 3] = Type::vector(3, "m")) -> ["softvt.Pose"] {
                 let mut pose = this.0;
-                pose.translation.vector += Vec3::from(by);
+                pose.translation.vector += Vec3::from(offset);
                 LuaPose(pose)
             }
             /// Returns the same orientation at another position, m.
-            fn at(_, this, xyz: [f64; 3] = Type::Vector(3, "m")) -> ["softvt.Pose"] {
-                LuaPose(Pose::from_parts(Vec3::from(xyz).into(), this.0.rotation))
+            fn at(_, this, position: [f64; 3] = POSITION) -> ["softvt.Pose"] {
+                LuaPose(Pose::from_parts(Vec3::from(position).into(), this.0.rotation))
             }
             /// Returns the same position, rotated by an angle about the world's vertical, rad.
-            fn turned(_, this, angle: f64) -> ["softvt.Pose"] {
+            fn rotated(_, this, angle: f64) -> ["softvt.Pose"] {
                 let rotation = Quat::from_axis_angle(&Vec3::z_axis(), angle);
                 LuaPose(Pose::from_parts(this.0.translation, rotation * this.0.rotation))
             }
-            /// Interpolates towards another pose: a share of 0 returns this pose, 1 the other.
-            fn towards(_, this, other: LuaPose, share: f64) -> ["softvt.Pose"] {
+            /// Returns a pose between this one (at a share of 0) and another (at 1).
+            fn interpolate(_, this, other: LuaPose, share: f64) -> ["softvt.Pose"] {
                 let at = this.0.translation.vector.lerp(&other.0.translation.vector, share);
                 // Between opposite orientations the shortest rotation is not unique, and slerp undefined.
                 let rotation = this.0.rotation.try_slerp(&other.0.rotation, share, 1e-12);

@@ -10,19 +10,20 @@ use mlua::{Lua, Table};
 use super::{
     assets::{AssetSpec, COEFFICIENT, DENSITY, PASCALS, POISSON},
     cameras::{CameraSpec, LuaCamera, LuaLight},
-    joints,
-    visuals::{LuaMaterial, braced},
+    index_of, joints,
+    visuals::LuaMaterial,
 };
 use crate::{
     geometry::{Aabb, Pose, Quat, Vec3},
     parallel::lock,
+    physics::contact::Friction,
     robot::panda::{self, ARM_DOFS},
     scene::{Asset, Body, Camera, Lighting, Object, Scene, SoftMaterial},
     script::{
         schema::{Constructed, Range, Type, class, object::fixed_list, record},
         vm::error::{current_line, fail},
     },
-    text::{format_number, unknown_name},
+    text::format_number,
 };
 
 /// Start pose of the arm as in SoftVTBench (from the released code): the hand above the table, pointing down.
@@ -34,7 +35,9 @@ const MAX_OBJECTS: usize = 1000;
 /// Largest coordinate, m: beyond it floating-point positions are too coarse for a grasp.
 const MAX_COORDINATE: f64 = 1e3;
 
-const POSITION: Type = Type::Vector(3, "m, world");
+const POSITION: Type = Type::Vector(3, "m, world", COORDINATE);
+const COORDINATE: Range = Range::closed(-MAX_COORDINATE, MAX_COORDINATE);
+const CORNER: Type = Type::vector(3, "m, world");
 
 /// A scene without objects: robot base and workspace of the table scenes.
 pub(crate) fn empty_scene() -> Scene {
@@ -50,16 +53,16 @@ pub(crate) fn empty_scene() -> Scene {
 }
 
 record! {
-    /// Placement of an asset. Give either at or xyz.
+    /// Placement of an asset. Give either at or position.
     PlacementSpec: "softvt.Place" as "scene:add" {
         /// Name in the scene, unique.
         name: String = Type::Name;
         /// Asset of the object.
         asset: Constructed<AssetSpec>;
         /// Position x, y; the object rests on the table, or on the object that `on` names.
-        at: Option<[f64; 2]> = Type::Vector(2, "m, world");
+        at: Option<[f64; 2]> = Type::Vector(2, "m, world", COORDINATE);
         /// Position of its origin: its lowest point, on the centre line.
-        xyz: Option<[f64; 3]> = POSITION;
+        position: Option<[f64; 3]> = POSITION;
         /// Rotation about the vertical.
         yaw: f64 = Type::Number("rad", Range::ANY) => Number(0.0);
         /// Scene name of the object or part (cabinet.top_drawer) that it rests on (with at).
@@ -67,15 +70,6 @@ record! {
         /// Start values of an articulated object's joints by part; 0, or the nearest limit, by default.
         joints: Option<BTreeMap<String, f64>> = Type::Map(&Type::Number("m or rad", Range::ANY));
     }
-}
-
-/// Checks that a position is within [`MAX_COORDINATE`] of the origin.
-fn checked_position(lua: &Lua, label: &str, xyz: Vec3) -> mlua::Result<Vec3> {
-    if xyz.amax() <= MAX_COORDINATE {
-        return Ok(xyz);
-    }
-    let got = braced(xyz.as_slice());
-    Err(fail(lua, format!("{label}: expected a place within {MAX_COORDINATE} m of the origin, got {got}")))
 }
 
 /// Checks joint angles against the limits of the arm, rad.
@@ -114,6 +108,14 @@ impl LuaScene {
         Self { scene: Arc::new(Mutex::new(scene)), assets: Arc::default() }
     }
 
+    fn read<T>(&self, read: impl FnOnce(&Scene) -> T) -> T {
+        read(&lock(&self.scene))
+    }
+
+    fn change(&self, _: &Lua, change: impl FnOnce(&mut Scene)) {
+        change(&mut lock(&self.scene));
+    }
+
     fn asset(&self, lua: &Lua, made: &Constructed<AssetSpec>) -> mlua::Result<Arc<Asset>> {
         let mut assets = lock(&self.assets);
         let pointer = made.table.to_pointer();
@@ -149,22 +151,23 @@ impl LuaScene {
 
 /// The position of an object that is added to the scene.
 fn position(lua: &Lua, scene: &Scene, spec: &PlacementSpec) -> mlua::Result<Vec3> {
-    match (spec.at, spec.xyz, &spec.on) {
-        (None, Some(xyz), None) => checked_position(lua, "scene:add.xyz", Vec3::from(xyz)),
+    match (spec.at, spec.position, &spec.on) {
+        (None, Some(position), None) => Ok(position.into()),
         (Some([x, y]), None, on) => {
-            let at = checked_position(lua, "scene:add.at", Vec3::new(x, y, 0.0))?;
-            let Some(on) = on else { return Ok(at) };
+            let Some(on) = on else { return Ok(Vec3::new(x, y, 0.0)) };
             let (object, part) = on.split_once('.').map_or((on.as_str(), None), |(o, p)| (o, Some(p)));
             let support = &scene.objects[find(lua, scene, object)?];
-            let parts = support.asset.parts().iter().map(|part| part.name.as_str());
-            if let Some(part) = part.filter(|part| !parts.clone().any(|known| known == *part)) {
-                let message =
-                    format!("scene:add: on: object {object:?}: {}", unknown_name("part", part, parts));
-                return Err(fail(lua, message));
+            if let Some(part) = part {
+                let parts = support.asset.parts().iter().map(|part| part.name.as_str());
+                index_of(lua, &format!("scene:add: on: object {object:?}"), "part", parts, part)?;
             }
             Ok(Vec3::new(x, y, top(support, part, x, y).unwrap_or(0.0)))
         }
-        _ => Err(fail(lua, "scene:add: give either at = { x, y } (with or without on) or xyz = { x, y, z }")),
+        _ => {
+            let message =
+                "scene:add: give either at = { x, y } (with or without on) or position = { x, y, z }";
+            Err(fail(lua, message))
+        }
     }
 }
 
@@ -182,9 +185,7 @@ fn top(object: &Object, part: Option<&str>, x: f64, y: f64) -> Option<f64> {
 }
 
 fn find(lua: &Lua, scene: &Scene, name: &str) -> mlua::Result<usize> {
-    let names = scene.objects.iter().map(|object| object.name.as_str());
-    let index = scene.objects.iter().position(|object| object.name == name);
-    index.ok_or_else(|| fail(lua, format!("scene: {}", unknown_name("object", name, names))))
+    index_of(lua, "scene", "object", scene.objects.iter().map(|object| object.name.as_str()), name)
 }
 
 class! {
@@ -195,50 +196,33 @@ class! {
             /// The placed objects, in order.
             objects: "softvt.Object[]" {
                 get(lua, this) {
-                    let count = lock(&this.scene).objects.len();
+                    let count = this.read(|scene| scene.objects.len());
                     let handles = (0..count).map(|index| LuaObject { scene: this.scene.clone(), index });
                     fixed_list(lua, handles, "scene:add{…} adds an object")?
                 }
             }
             /// The light.
             light: "softvt.Light" or "its numbers are written one by one, as in scene.light.strength = …" {
-                get(lua, this) {
-                    mlua::Value::UserData(lua.create_userdata(LuaLight(this.scene.clone()))?)
-                }
+                get(_, this) { LuaLight(this.scene.clone()) }
             }
         }
         writable {
             /// Position of the robot base.
-            base: POSITION => {
-                get(_, this) { lock(&this.scene).base_w.translation.vector }
-                set(lua, this, xyz: [f64; 3]) {
-                    let base = checked_position(lua, "scene.base", xyz.into())?;
-                    lock(&this.scene).base_w.translation.vector = base;
-                }
-            }
+            base: POSITION => base_w.translation.vector;
             /// Joint angles of the arm at the start, within its limits.
-            start_q: Type::Vector(7, "rad") => {
-                get(_, this) { lock(&this.scene).start_q }
+            start_q: Type::vector(7, "rad") => {
+                get(_, this) { this.read(|scene| scene.start_q) }
                 set(lua, this, q: [f64; ARM_DOFS]) {
                     check_joint_limits(lua, &q)?;
-                    lock(&this.scene).start_q = q;
+                    this.change(lua, |scene| scene.start_q = q);
                 }
             }
             /// Gravity.
-            gravity: Type::Vector(3, "m/s², world") => {
-                get(_, this) { lock(&this.scene).gravity }
-                set(_, this, gravity: [f64; 3]) { lock(&this.scene).gravity = gravity.into(); }
-            }
+            gravity: Type::vector(3, "m/s², world") => gravity;
             /// Lowest corner of the workspace.
-            workspace_min: POSITION => {
-                get(_, this) { lock(&this.scene).workspace.min }
-                set(_, this, corner: [f64; 3]) { lock(&this.scene).workspace.min = corner.into(); }
-            }
+            workspace_min: CORNER => workspace.min;
             /// Highest corner of the workspace.
-            workspace_max: POSITION => {
-                get(_, this) { lock(&this.scene).workspace.max }
-                set(_, this, corner: [f64; 3]) { lock(&this.scene).workspace.max = corner.into(); }
-            }
+            workspace_max: CORNER => workspace.max;
         }
         methods {
             /// Adds an object: `scene:add { name = "left", asset = bun, at = { 0.1, -0.2 }, yaw = 0.5 }`.
@@ -270,36 +254,32 @@ impl LuaObject {
         read(&lock(&self.scene).objects[self.index])
     }
 
-    fn soft<T>(&self, read: impl FnOnce(&SoftMaterial) -> T) -> Option<T> {
-        self.read(|object| match &object.asset.body {
-            Body::Soft(soft) => Some(read(soft)),
-            Body::Rigid { .. } | Body::Articulated(_) | Body::Static | Body::Scenery => None,
-        })
+    fn change(&self, _: &Lua, change: impl FnOnce(&mut Object)) {
+        change(&mut lock(&self.scene).objects[self.index]);
     }
 
-    fn change_asset(&self, change: impl FnOnce(&mut Asset)) {
-        change(Arc::make_mut(&mut lock(&self.scene).objects[self.index].asset));
+    fn material_number(&self, key: &str) -> Option<f64> {
+        self.read(|object| material_number(&mut object.asset.body.clone(), key).copied())
     }
 
-    /// Changes the soft body of the object.
-    fn change_soft(&self, lua: &Lua, key: &str, change: impl FnOnce(&mut SoftMaterial)) -> mlua::Result<()> {
-        if self.soft(|_| ()).is_none() {
-            return Err(self.no_such_number(lua, key));
+    fn set_material_number(&self, lua: &Lua, key: &str, value: f64) -> mlua::Result<()> {
+        let mut scene = lock(&self.scene);
+        let object = &mut scene.objects[self.index];
+        match material_number(&mut Arc::make_mut(&mut object.asset).body, key) {
+            Some(number) => {
+                *number = value;
+                Ok(())
+            }
+            None => {
+                let name = &object.name;
+                Err(fail(lua, format!("object.{key}: the body of object {name:?} has no {key}")))
+            }
         }
-        self.change_asset(|asset| match &mut asset.body {
-            Body::Soft(soft) => change(soft),
-            Body::Rigid { .. } | Body::Articulated(_) | Body::Static | Body::Scenery => {}
-        });
-        Ok(())
     }
 
-    fn no_such_number(&self, lua: &Lua, key: &str) -> mlua::Error {
-        let name = self.read(|object| object.name.clone());
-        fail(lua, format!("object.{key}: the body of object {name:?} has no {key}"))
-    }
-
-    fn change_friction(&self, change: impl FnOnce(&mut crate::physics::contact::Friction)) {
-        self.change_asset(|asset| {
+    fn change_friction(&self, lua: &Lua, change: impl FnOnce(&mut Friction)) {
+        self.change(lua, |object| {
+            let asset = Arc::make_mut(&mut object.asset);
             change(&mut asset.friction);
             // The parts of an object have the friction of the whole.
             if let Body::Articulated(parts) = &mut asset.body {
@@ -307,6 +287,16 @@ impl LuaObject {
                 parts.iter_mut().for_each(|part| Arc::make_mut(&mut part.asset).friction = friction);
             }
         });
+    }
+}
+
+/// The number `key` of the material of a body, if it has one.
+fn material_number<'a>(body: &'a mut Body, key: &str) -> Option<&'a mut f64> {
+    match (body, key) {
+        (Body::Soft(soft), "youngs_pa") => Some(&mut soft.youngs_pa),
+        (Body::Soft(soft), "poisson") => Some(&mut soft.poisson),
+        (Body::Soft(SoftMaterial { density, .. }) | Body::Rigid { density }, "density") => Some(density),
+        _ => None,
     }
 }
 
@@ -339,57 +329,39 @@ class! {
         }
         writable {
             /// Position of its origin: its lowest point, on the centre line.
-            xyz: POSITION => {
-                get(_, this) { this.read(|object| object.pose_w.translation.vector) }
-                set(lua, this, xyz: [f64; 3]) {
-                    let xyz = checked_position(lua, "object.xyz", xyz.into())?;
-                    lock(&this.scene).objects[this.index].pose_w.translation.vector = xyz;
-                }
-            }
+            position: POSITION => pose_w.translation.vector;
             /// Rotation about the vertical.
             yaw: Type::Number("rad", Range::ANY) => {
                 get(_, this) { this.read(|object| object.pose_w.rotation.euler_angles().2) }
-                set(_, this, yaw: f64) {
+                set(lua, this, yaw: f64) {
                     let rotation = Quat::from_axis_angle(&Vec3::z_axis(), yaw);
-                    lock(&this.scene).objects[this.index].pose_w.rotation = rotation;
+                    this.change(lua, |object| object.pose_w.rotation = rotation);
                 }
             }
             /// Density of a soft or rigid body.
             density: DENSITY => {
-                get(_, this) {
-                    this.read(|object| match &object.asset.body {
-                        Body::Soft(soft) => Some(soft.density),
-                        Body::Rigid { density } => Some(*density),
-                        Body::Articulated(_) | Body::Static | Body::Scenery => None,
-                    })
-                }
-                set(lua, this, value: f64) {
-                    if this.read(|object| matches!(object.asset.body, Body::Rigid { .. })) {
-                        this.change_asset(|asset| asset.body = Body::Rigid { density: value });
-                    } else {
-                        this.change_soft(lua, "density", |soft| soft.density = value)?;
-                    }
-                }
+                get(_, this) { this.material_number("density") }
+                set(lua, this, value: f64) { this.set_material_number(lua, "density", value)? }
             }
             /// Young's modulus of a soft body.
             youngs_pa: PASCALS => {
-                get(_, this) { this.soft(|soft| soft.youngs_pa) }
-                set(lua, this, value: f64) { this.change_soft(lua, "youngs_pa", |soft| soft.youngs_pa = value)?; }
+                get(_, this) { this.material_number("youngs_pa") }
+                set(lua, this, value: f64) { this.set_material_number(lua, "youngs_pa", value)? }
             }
             /// Poisson's ratio of a soft body.
             poisson: POISSON => {
-                get(_, this) { this.soft(|soft| soft.poisson) }
-                set(lua, this, value: f64) { this.change_soft(lua, "poisson", |soft| soft.poisson = value)?; }
+                get(_, this) { this.material_number("poisson") }
+                set(lua, this, value: f64) { this.set_material_number(lua, "poisson", value)? }
             }
             /// Static coefficient of friction.
             static_mu: COEFFICIENT => {
                 get(_, this) { this.read(|object| object.asset.friction.static_mu) }
-                set(_, this, value: f64) { this.change_friction(|friction| friction.static_mu = value); }
+                set(lua, this, value: f64) { this.change_friction(lua, |friction| friction.static_mu = value); }
             }
             /// Dynamic coefficient of friction.
             dynamic_mu: COEFFICIENT => {
                 get(_, this) { this.read(|object| object.asset.friction.dynamic_mu) }
-                set(_, this, value: f64) { this.change_friction(|friction| friction.dynamic_mu = value); }
+                set(lua, this, value: f64) { this.change_friction(lua, |friction| friction.dynamic_mu = value); }
             }
         }
         methods {
@@ -401,22 +373,18 @@ class! {
                 let parts = object.asset.parts();
                 match part {
                     None => object.asset.mass(),
-                    Some(name) => match parts.iter().find(|part| part.name == name) {
-                        Some(part) => Some(part.mass()),
-                        None if parts.is_empty() => {
-                            let message = format!("object:mass: object {:?} has no parts", object.name);
-                            return Err(fail(lua, message));
-                        }
-                        None => {
-                            let names = parts.iter().map(|part| part.name.as_str());
-                            return Err(fail(lua, format!("object:mass: {}", unknown_name("part", &name, names))));
-                        }
-                    },
+                    Some(_) if parts.is_empty() => {
+                        return Err(fail(lua, format!("object:mass: object {:?} has no parts", object.name)));
+                    }
+                    Some(name) => {
+                        let names = parts.iter().map(|part| part.name.as_str());
+                        Some(parts[index_of(lua, "object:mass", "part", names, &name)?].mass())
+                    }
                 }
             }
             /// Multiplies the density of a soft or rigid body, or of every moving part. Static objects are unchanged.
-            fn scale_mass(_, this, factor: f64 = Type::Number("", Range::closed(1e-6, 1e6))) -> [] {
-                this.change_asset(|asset| asset.scale_mass(factor))
+            fn scale_mass(lua, this, factor: f64 = Type::Number("", Range::closed(1e-6, 1e6))) -> [] {
+                this.change(lua, |object| Arc::make_mut(&mut object.asset).scale_mass(factor))
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mlua::{FromLua, Lua, Value};
+use mlua::Lua;
 
 use crate::{
     geometry::{
@@ -13,163 +13,31 @@ use crate::{
     },
     parallel::lock,
     script::{
-        schema::{LuaType, Range, Type, choice, class, functions, record},
+        schema::{Range, Type, choice, class, functions, record_of},
         vm::{
             error::{app_data, current_line, fail},
             library::SharedLibrary,
             memory_budget::{Reservation, reserve},
-            value::describe,
         },
     },
 };
 
 const LENGTH: Type = Type::Number("m", Range::POSITIVE);
 const METRES: Type = Type::Number("m", Range::ANY);
-const POINT: Type = Type::Vector(3, "m");
+const POINT: Type = Type::vector(3, "m");
+const CORNERS: Type = Type::List(&Type::vector(2, "m"));
 
-choice! { Axis { "x" => Axis::X, "y" => Axis::Y, "z" => Axis::Z } }
+choice! { Axis { "x" => X, "y" => Y, "z" => Z } }
 
-record! {
-    /// A box centred on the origin.
-    BoxSpec: "softvt.BoxSpec" as "shape.box" {
-        /// Edge lengths.
-        size: [f64; 3] = POINT;
-    }
-    /// A sphere centred on the origin.
-    SphereSpec: "softvt.SphereSpec" as "shape.sphere" {
-        /// Radius.
-        radius: f64 = LENGTH;
-    }
-    /// An ellipsoid centred on the origin.
-    EllipsoidSpec: "softvt.EllipsoidSpec" as "shape.ellipsoid" {
-        /// Diameters along x, y and z.
-        size: [f64; 3] = POINT;
-    }
-    /// A capsule along the z axis, centred on the origin.
-    CapsuleSpec: "softvt.CapsuleSpec" as "shape.capsule" {
-        /// Radius.
-        radius: f64 = LENGTH;
-        /// Total length including the caps; at least twice the radius.
-        length: f64 = LENGTH;
-    }
-    /// A cylinder along the z axis, centred on the origin.
-    CylinderSpec: "softvt.CylinderSpec" as "shape.cylinder" {
-        /// Radius.
-        radius: f64 = LENGTH;
-        /// Height.
-        height: f64 = LENGTH;
-    }
-    /// A torus about the z axis, centred on the origin.
-    TorusSpec: "softvt.TorusSpec" as "shape.torus" {
-        /// Radius of the centre line of the tube.
-        major: f64 = LENGTH;
-        /// Radius of the tube, less than major.
-        minor: f64 = LENGTH;
-    }
-    /// A triangular prism along y in a box centred on the origin.
-    WedgeSpec: "softvt.WedgeSpec" as "shape.wedge" {
-        /// Edge lengths of the box.
-        size: [f64; 3] = POINT;
-        /// Position of the top edge across the width: -1 and 1 are the sides, 0 the middle.
-        apex: f64 = Type::Number("", Range::closed(-1.0, 1.0)) => Number(0.0);
-    }
-    /// A polygon in (x, z), extruded along y and centred on y = 0.
-    PrismSpec: "softvt.PrismSpec" as "shape.prism" {
-        /// Corners (x, z) in order.
-        corners: Vec<[f64; 2]> = Type::List(&Type::Vector(2, "m"));
-        /// Length along y.
-        length: f64 = LENGTH;
-    }
-    /// A profile revolved about the z axis.
-    LatheSpec: "softvt.LatheSpec" as "shape.lathe" {
-        /// Corners (r, z) in order, with r ≥ 0.
-        corners: Vec<[f64; 2]> = Type::List(&Type::Vector(2, "m"));
-    }
-    /// A rotation about an axis through the origin.
-    RotateSpec: "softvt.RotateSpec" as "shape:rotate" {
-        /// The axis.
-        axis: Axis;
-        /// Right-handed angle.
-        angle: f64 = Type::Number("rad", Range::ANY);
-    }
-    /// A twist about an axis through the origin.
-    TwistSpec: "softvt.TwistSpec" as "shape:twist" {
-        /// The axis.
-        axis: Axis;
-        /// Angle per length along the axis.
-        rate: f64 = Type::Number("rad/m", Range::ANY);
-    }
-    /// A bend into an arc; the origin stays in place.
-    BendSpec: "softvt.BendSpec" as "shape:bend" {
-        /// The axis that becomes an arc.
-        along: Axis;
-        /// The axis with the centre of the arc.
-        towards: Axis;
-        /// Curvature of the arc.
-        curvature: f64 = Type::Number("1/m", Range::ANY);
-    }
+record_of! {
     /// A weight that rises smoothly from 0 to 1 along an axis.
-    MaskSpec: "softvt.MaskSpec" as "mask" {
+    Ramp: "softvt.Ramp" as "mask" {
         /// The axis.
         axis: Axis;
         /// Coordinate at which the weight is 0.
         from: f64 = METRES;
         /// Coordinate at which the weight is 1.
         to: f64 = METRES;
-    }
-    /// Adds regular ridges to a shape: rings, flutes, screws or spirals.
-    RidgesSpec: "softvt.RidgesSpec" as "shape:ridges" {
-        /// The axis that the ridges run around or along.
-        axis: Axis => Text("z");
-        /// Height from valley to crest; negative for grooves.
-        height: f64 = METRES;
-        /// Number of ridges around the axis.
-        count: i32 = Type::Integer(Range::closed(-1000.0, 1000.0)) => Integer(0);
-        /// Distance of ridges along the axis.
-        pitch: Option<f64> = LENGTH;
-        /// Distance of ridges away from the axis.
-        radial_pitch: Option<f64> = LENGTH;
-        /// Phase.
-        phase: f64 = Type::Number("rad", Range::ANY) => Number(0.0);
-        /// 1 is a sine; larger values give narrower ridges.
-        sharpness: f64 = Type::Number("", Range::closed(1.0, 8.0)) => Number(1.0);
-        /// Weight of their height; 1 everywhere by default.
-        mask: Option<MaskSpec>;
-    }
-    /// Adds scattered bumps to a shape (seeds, raisins).
-    BumpsSpec: "softvt.BumpsSpec" as "shape:bumps" {
-        /// Height; negative for pits.
-        height: f64 = METRES;
-        /// Radius of a bump, at most half the spacing.
-        radius: f64 = LENGTH;
-        /// Mean distance of bumps.
-        spacing: f64 = LENGTH;
-        /// Selects their positions.
-        seed: u64 = Type::Integer(Range::NOT_NEGATIVE) => Integer(0);
-        /// Weight of their height; 1 everywhere by default.
-        mask: Option<MaskSpec>;
-    }
-    /// Gives all or part of the surface another material.
-    PaintSpec: "softvt.PaintSpec" as "shape:paint" {
-        /// Material id: index into the asset's visuals, from 0.
-        material: u16 = Type::Integer(Range::closed(0.0, 65535.0));
-        /// Part of the surface inside of this shape; the whole surface by default.
-        region: Option<LuaShape>;
-    }
-    /// A closed surface from an OBJ, STL or GLB file.
-    MeshSpec: "softvt.MeshSpec" as "mesh" {
-        /// Path inside of the project, next to the Lua file or from a root folder.
-        file: String;
-        /// Metres per unit of the file: 0.001 for millimetres.
-        scale: f64 = LENGTH => Number(1.0);
-        /// True if z is up in the file; otherwise y is.
-        z_up: bool => Boolean(true);
-    }
-}
-
-impl MaskSpec {
-    fn ramp(&self) -> Ramp {
-        Ramp { axis: self.axis, from: self.from, to: self.to }
     }
 }
 
@@ -233,21 +101,6 @@ impl LuaShape {
     }
 }
 
-impl FromLua for LuaShape {
-    fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
-        match value.as_userdata().and_then(|data| data.borrow::<Self>().ok()) {
-            Some(shape) => Ok(shape.clone()),
-            None => {
-                Err(fail(lua, format!("expected a shape (softvt.shape.…{{…}}), got {}", describe(&value))))
-            }
-        }
-    }
-}
-
-impl LuaType for LuaShape {
-    const TYPE: Type = Type::Object("softvt.Shape");
-}
-
 /// Memory of a profile's corner with its edge.
 const BYTES_PER_CORNER: usize = 128;
 /// Memory of a mesh shape, in bytes per byte of its file.
@@ -261,56 +114,95 @@ fn build(lua: &Lua, shape: Result<Shape, ShapeError>, corners: usize) -> mlua::R
 
 functions! {
     SHAPES {
-        fn box(lua, spec: BoxSpec) -> ["softvt.Shape"] {
-            build(lua, Ok(Shape::cuboid(spec.size.into())), 0)?
+        /// A box centred on the origin.
+        fn box(lua) takes spec "softvt.BoxSpec" {
+            /// Edge lengths.
+            size: [f64; 3] = POINT;
+        } -> ["softvt.Shape"] { build(lua, Ok(Shape::cuboid(size.into())), 0)? }
+        /// A sphere centred on the origin.
+        fn sphere(lua) takes spec "softvt.SphereSpec" {
+            /// Radius.
+            radius: f64 = LENGTH;
+        } -> ["softvt.Shape"] { build(lua, Ok(Shape::Sphere { radius }), 0)? }
+        /// An ellipsoid centred on the origin.
+        fn ellipsoid(lua) takes spec "softvt.EllipsoidSpec" {
+            /// Diameters along x, y and z.
+            size: [f64; 3] = POINT;
+        } -> ["softvt.Shape"] { build(lua, Ok(Shape::Ellipsoid { radii: 0.5 * Vec3::from(size) }), 0)? }
+        /// A capsule along the z axis, centred on the origin.
+        fn capsule(lua) takes spec "softvt.CapsuleSpec" {
+            /// Radius.
+            radius: f64 = LENGTH;
+            /// Total length including the caps; at least twice the radius.
+            length: f64 = LENGTH;
+        } -> ["softvt.Shape"] {
+            build(lua, Ok(Shape::Capsule { radius, half_length: 0.5 * length - radius }), 0)?
         }
-        fn sphere(lua, spec: SphereSpec) -> ["softvt.Shape"] {
-            build(lua, Ok(Shape::Sphere { radius: spec.radius }), 0)?
+        /// A cylinder along the z axis, centred on the origin.
+        fn cylinder(lua) takes spec "softvt.CylinderSpec" {
+            /// Radius.
+            radius: f64 = LENGTH;
+            /// Height.
+            height: f64 = LENGTH;
+        } -> ["softvt.Shape"] { build(lua, Ok(Shape::Cylinder { radius, half_height: 0.5 * height }), 0)? }
+        /// A torus about the z axis, centred on the origin.
+        fn torus(lua) takes spec "softvt.TorusSpec" {
+            /// Radius of the centre line of the tube.
+            major: f64 = LENGTH;
+            /// Radius of the tube, less than major.
+            minor: f64 = LENGTH;
+        } -> ["softvt.Shape"] { build(lua, Ok(Shape::Torus { major, minor }), 0)? }
+        /// A triangular prism along y in a box centred on the origin.
+        fn wedge(lua) takes spec "softvt.WedgeSpec" {
+            /// Edge lengths of the box.
+            size: [f64; 3] = POINT;
+            /// Position of the top edge across the width: -1 and 1 are the sides, 0 the middle.
+            apex: f64 = Type::Number("", Range::closed(-1.0, 1.0)) => Number(0.0);
+        } -> ["softvt.Shape"] { build(lua, Shape::wedge(size.into(), apex), 0)? }
+        /// A polygon in (x, z), extruded along y and centred on y = 0.
+        fn prism(lua) takes spec "softvt.PrismSpec" {
+            /// Corners (x, z) in order.
+            corners: Vec<[f64; 2]> = CORNERS;
+            /// Length along y.
+            length: f64 = LENGTH;
+        } -> ["softvt.Shape"] {
+            let count = corners.len();
+            build(lua, Shape::prism(corners, length), count)?
         }
-        fn ellipsoid(lua, spec: EllipsoidSpec) -> ["softvt.Shape"] {
-            build(lua, Ok(Shape::Ellipsoid { radii: 0.5 * Vec3::from(spec.size) }), 0)?
-        }
-        fn capsule(lua, spec: CapsuleSpec) -> ["softvt.Shape"] {
-            let half_length = 0.5 * spec.length - spec.radius;
-            build(lua, Ok(Shape::Capsule { radius: spec.radius, half_length }), 0)?
-        }
-        fn cylinder(lua, spec: CylinderSpec) -> ["softvt.Shape"] {
-            build(lua, Ok(Shape::Cylinder { radius: spec.radius, half_height: 0.5 * spec.height }), 0)?
-        }
-        fn torus(lua, spec: TorusSpec) -> ["softvt.Shape"] {
-            build(lua, Ok(Shape::Torus { major: spec.major, minor: spec.minor }), 0)?
-        }
-        fn wedge(lua, spec: WedgeSpec) -> ["softvt.Shape"] {
-            build(lua, Shape::wedge(spec.size.into(), spec.apex), 0)?
-        }
-        fn prism(lua, spec: PrismSpec) -> ["softvt.Shape"] {
-            let corners = spec.corners.len();
-            build(lua, Shape::prism(spec.corners, spec.length), corners)?
-        }
-        fn lathe(lua, spec: LatheSpec) -> ["softvt.Shape"] {
-            let corners = spec.corners.len();
-            build(lua, Shape::lathe(spec.corners), corners)?
+        /// A profile revolved about the z axis.
+        fn lathe(lua) takes spec "softvt.LatheSpec" {
+            /// Corners (r, z) in order, with r ≥ 0.
+            corners: Vec<[f64; 2]> = CORNERS;
+        } -> ["softvt.Shape"] {
+            let count = corners.len();
+            build(lua, Shape::lathe(corners), count)?
         }
     }
 }
 
 functions! {
     FUNCTIONS {
-        /// Reads a shape from a mesh file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface must be closed.
-        fn mesh(lua, spec: MeshSpec) -> ["softvt.Shape"] {
-            let path = &spec.file;
+        /// Reads a shape from an OBJ, STL or GLB file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface must be
+        /// closed.
+        fn mesh(lua) takes spec "softvt.MeshSpec" {
+            /// Path inside of the project, next to the Lua file or from a root folder.
+            file: String;
+            /// Metres per unit of the file: 0.001 for millimetres.
+            scale: f64 = LENGTH => Number(1.0);
+            /// True if z is up in the file; otherwise y is.
+            z_up: bool => Boolean(true);
+        } -> ["softvt.Shape"] {
             let requester = current_line(lua).map(|line| line.file);
             let library = app_data::<SharedLibrary>(lua)?;
-            let file = lock(&library).data(path, requester.as_deref());
-            let bytes = file.map_err(|error| fail(lua, format!("mesh.file: {error}")))?.bytes;
+            let found = lock(&library).data(&file, requester.as_deref());
+            let bytes = found.map_err(|error| fail(lua, format!("softvt.mesh.file: {error}")))?.bytes;
             // Fails before the mesh is built if it would not fit.
             drop(reserve(lua, MESH_BYTES_PER_FILE_BYTE * bytes.len())?);
-            let extension = path.rsplit_once('.').map_or("", |(_, extension)| extension);
-            let options = ImportOptions { scale: spec.scale, z_up: spec.z_up };
+            let extension = file.rsplit_once('.').map_or("", |(_, extension)| extension);
             let shape = MeshFormat::from_extension(extension)
-                .and_then(|format| import(&bytes, format, &options))
+                .and_then(|format| import(&bytes, format, &ImportOptions { scale, z_up }))
                 .and_then(|mesh| Ok(Shape::from_mesh(mesh)?));
-            let shape = shape.map_err(|error| fail(lua, format!("mesh: {path}: {error}")))?;
+            let shape = shape.map_err(|error| fail(lua, format!("softvt.mesh: {file}: {error}")))?;
             LuaShape::new(lua, shape, MESH_BYTES_PER_FILE_BYTE * bytes.len())?
         }
     }
@@ -373,43 +265,79 @@ class! {
                 let offset = Vec3::new(-centre.x, -centre.y, -bounds.min.z);
                 this.derived(lua, this.copy().translated(offset), &[])?
             }
-            fn rotate(lua, this, spec: RotateSpec) -> ["softvt.Shape"] {
-                let axis = nalgebra::Unit::new_unchecked(spec.axis.unit());
-                this.derived(lua, this.copy().rotated(Quat::from_axis_angle(&axis, spec.angle)), &[])?
+            /// Rotates the shape about an axis through the origin.
+            fn rotate(lua, this) takes spec "softvt.RotateSpec" {
+                /// The axis.
+                axis: Axis;
+                /// Right-handed angle.
+                angle: f64 = Type::Number("rad", Range::ANY);
+            } -> ["softvt.Shape"] {
+                let axis = nalgebra::Unit::new_unchecked(axis.unit());
+                this.derived(lua, this.copy().rotated(Quat::from_axis_angle(&axis, angle)), &[])?
             }
-            fn twist(lua, this, spec: TwistSpec) -> ["softvt.Shape"] {
-                this.derived(lua, this.copy().twisted(spec.axis, spec.rate), &[])?
+            /// Twists the shape about an axis through the origin.
+            fn twist(lua, this) takes spec "softvt.TwistSpec" {
+                /// The axis.
+                axis: Axis;
+                /// Angle per length along the axis.
+                rate: f64 = Type::Number("rad/m", Range::ANY);
+            } -> ["softvt.Shape"] { this.derived(lua, this.copy().twisted(axis, rate), &[])? }
+            /// Bends the shape into an arc; the origin stays in place.
+            fn bend(lua, this) takes spec "softvt.BendSpec" {
+                /// The axis that becomes an arc.
+                along: Axis;
+                /// The axis with the centre of the arc.
+                towards: Axis;
+                /// Curvature of the arc.
+                curvature: f64 = Type::Number("1/m", Range::ANY);
+            } -> ["softvt.Shape"] { this.derived(lua, this.copy().bent(along, towards, curvature), &[])? }
+            /// Adds regular ridges to a shape: rings, flutes, screws or spirals.
+            fn ridges(lua, this) takes spec "softvt.RidgesSpec" {
+                /// The axis that the ridges run around or along.
+                axis: Axis => Text("z");
+                /// Height from valley to crest; negative for grooves.
+                height: f64 = METRES;
+                /// Number of ridges around the axis.
+                count: i32 = Type::Integer(Range::closed(-1000.0, 1000.0)) => Integer(0);
+                /// Distance of ridges along the axis; infinite for flutes.
+                pitch: f64 = LENGTH => Number(f64::INFINITY);
+                /// Distance of ridges away from the axis; infinite if they do not depend on it.
+                radial_pitch: f64 = LENGTH => Number(f64::INFINITY);
+                /// Phase.
+                phase: f64 = Type::Number("rad", Range::ANY) => Number(0.0);
+                /// 1 is a sine; larger values give narrower ridges.
+                sharpness: f64 = Type::Number("", Range::closed(1.0, 8.0)) => Number(1.0);
+                /// Weight of their height; 1 everywhere by default.
+                mask: Option<Ramp>;
+            } -> ["softvt.Shape"] {
+                let ridges = Ridges { axis, height, count, pitch, radial_pitch, phase, sharpness, mask };
+                this.derived(lua, this.copy().displaced(Displacement::Ridges(ridges)), &[])?
             }
-            fn bend(lua, this, spec: BendSpec) -> ["softvt.Shape"] {
-                this.derived(lua, this.copy().bent(spec.along, spec.towards, spec.curvature), &[])?
+            /// Adds scattered bumps to a shape (seeds, raisins).
+            fn bumps(lua, this) takes spec "softvt.BumpsSpec" {
+                /// Height; negative for pits.
+                height: f64 = METRES;
+                /// Radius of a bump, at most half the spacing.
+                radius: f64 = LENGTH;
+                /// Mean distance of bumps.
+                spacing: f64 = LENGTH;
+                /// Selects their positions.
+                seed: u64 => Integer(0);
+                /// Weight of their height; 1 everywhere by default.
+                mask: Option<Ramp>;
+            } -> ["softvt.Shape"] {
+                let bumps = Bumps { height, radius, spacing, seed, mask };
+                this.derived(lua, this.copy().displaced(Displacement::Bumps(bumps)), &[])?
             }
-            fn ridges(lua, this, spec: RidgesSpec) -> ["softvt.Shape"] {
-                let ridges = Displacement::Ridges(Ridges {
-                    axis: spec.axis,
-                    height: spec.height,
-                    count: spec.count,
-                    pitch: spec.pitch.unwrap_or(f64::INFINITY),
-                    radial_pitch: spec.radial_pitch.unwrap_or(f64::INFINITY),
-                    phase: spec.phase,
-                    sharpness: spec.sharpness,
-                    mask: spec.mask.as_ref().map(MaskSpec::ramp),
-                });
-                this.derived(lua, this.copy().displaced(ridges), &[])?
-            }
-            fn bumps(lua, this, spec: BumpsSpec) -> ["softvt.Shape"] {
-                let bumps = Displacement::Bumps(Bumps {
-                    height: spec.height,
-                    radius: spec.radius,
-                    spacing: spec.spacing,
-                    seed: spec.seed,
-                    mask: spec.mask.as_ref().map(MaskSpec::ramp),
-                });
-                this.derived(lua, this.copy().displaced(bumps), &[])?
-            }
-            fn paint(lua, this, spec: PaintSpec) -> ["softvt.Shape"] {
-                let region = spec.region.as_ref();
-                let shape = this.copy().painted(spec.material, region.map(LuaShape::copy));
-                this.derived(lua, shape, &Vec::from_iter(region))?
+            /// Gives all or part of the surface another material.
+            fn paint(lua, this) takes spec "softvt.PaintSpec" {
+                /// Material id: index into the asset's visuals, from 0.
+                material: u16;
+                /// Part of the surface inside of this shape; the whole surface by default.
+                region: Option<LuaShape>;
+            } -> ["softvt.Shape"] {
+                let shape = this.copy().painted(material, region.as_ref().map(LuaShape::copy));
+                this.derived(lua, shape, &Vec::from_iter(&region))?
             }
         }
     }

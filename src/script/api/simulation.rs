@@ -9,10 +9,11 @@ use super::{
     expert::{Coroutine, FingerAccess},
     expert_input::{ExpertCommand, ExpertInput, TrackingErrorMonitor},
     image::LuaImage,
+    index_of,
+    observation::{FingerReadings, LuaMarkers, positions},
     random::LuaRng,
     scene::{LuaScene, empty_scene},
     tasks::{EXPERT, LayoutSpec, SETTINGS},
-    touch::{FingerReadings, LuaMarkers, positions},
 };
 use crate::{
     benchmark::{
@@ -27,7 +28,7 @@ use crate::{
     robot::{Side, rotation},
     rollout::{AssetCache, SensingError, SensorAssets, SensorSuite, Simulation, cancel},
     script::{
-        schema::{Constructed, Range, Type, choice, class, functions, output, record},
+        schema::{Constructed, Range, Type, choice, class, functions, output},
         vm::{
             error::{app_data, fail},
             json::deserialize,
@@ -37,7 +38,6 @@ use crate::{
         },
     },
     sensing::tactile::{MarkerStyle, PadWrench, TactileReading},
-    text::unknown_name,
 };
 
 const EPISODE: Type = Type::Integer(Range::closed(0.0, 1e9));
@@ -45,32 +45,7 @@ const EPISODE: Type = Type::Integer(Range::closed(0.0, 1e9));
 /// Approximate memory of a simulation without its soft bodies: the robot, its sensors, fixed objects.
 const BYTES_PER_SIMULATION: usize = 4 << 20;
 
-choice! { Side { "left" => Side::Left, "right" => Side::Right } }
-
-record! {
-    /// A scene with the robot, which is built and settled. Deformation refers to the settled shapes.
-    SimulateSpec: "softvt.SimulateSpec" as "softvt.simulate" {
-        /// Initial scene.
-        layout: Constructed<LayoutSpec>;
-        /// Part of the seed.
-        suite: String => Text("experiment");
-        /// Part of the seed.
-        episode: u32 = EPISODE => Integer(0);
-        /// Part of the seed.
-        seed: u64 = EPISODE => Integer(0);
-        /// Changed settings of physics, robot and judge: { physics = {…}, robot = {…}, criteria = {…} }.
-        settings: Option<Table> = SETTINGS;
-    }
-    /// The camera of an image and its size.
-    RenderSpec: "softvt.Render" as "simulation:render" {
-        /// A camera of the scene.
-        camera: String = Type::Name => Text("third_person");
-        /// Width, pixels; the camera's by default.
-        width: Option<usize> = IMAGE_EDGE;
-        /// Height, pixels; the camera's by default.
-        height: Option<usize> = IMAGE_EDGE;
-    }
-}
+choice! { Side { "left" => Left, "right" => Right } }
 
 /// Reads a table of settings; `label` names it in messages.
 pub(crate) fn settings(lua: &Lua, label: &str, table: Option<&Table>) -> mlua::Result<Settings> {
@@ -105,61 +80,69 @@ struct Caches {
     sensors: SensorAssets,
 }
 
-fn simulate(lua: &Lua, spec: SimulateSpec) -> mlua::Result<LuaSimulation> {
-    let settings = settings(lua, "softvt.simulate: settings", spec.settings.as_ref())?;
-    let seed = EpisodeSeed {
-        suite: spec.suite,
-        layout: spec.layout.name.clone(),
-        episode: spec.episode,
-        base_seed: spec.seed,
-        split: Split::Experiment,
-    };
-    let scene = LuaScene::new(empty_scene());
-    spec.layout.build.call::<()>((scene.clone(), LuaRng::new(seed, RandomStream::Layout)))?;
-    let scene = Arc::new(lock(&scene.scene).clone());
-    let clock = app_data::<Clock>(lua)?;
-    let _pause = clock.pause();
-    if lua.app_data_ref::<Caches>().is_none() {
-        lua.set_app_data(Caches::default());
+impl LuaSimulation {
+    /// Builds the scene of a layout and lets it settle.
+    fn new(lua: &Lua, layout: &LayoutSpec, seed: EpisodeSeed, settings: &Settings) -> mlua::Result<Self> {
+        let scene = LuaScene::new(empty_scene());
+        layout.build.call::<()>((scene.clone(), LuaRng::new(seed, RandomStream::Layout)))?;
+        let scene = Arc::new(lock(&scene.scene).clone());
+        let clock = app_data::<Clock>(lua)?;
+        let _pause = clock.pause();
+        if lua.app_data_ref::<Caches>().is_none() {
+            lua.set_app_data(Caches::default());
+        }
+        let caches = lua.app_data_ref::<Caches>().ok_or_else(|| mlua::Error::runtime("no caches"))?;
+        let mut sim = Simulation::new(scene, &settings.physics, &settings.robot, &caches.assets)
+            .map_err(|e| fail(lua, format!("softvt.simulate: {e}")))?;
+        let soft_bytes: usize = sim.world.soft_bodies().iter().map(|soft| soft.state.model.bytes()).sum();
+        let reserved = reserve_in_world(lua, BYTES_PER_SIMULATION + soft_bytes)?;
+        sim.settle().map_err(|e| {
+            let place = e.place().map_or(String::new(), |place| format!("{place}: "));
+            fail(lua, format!("softvt.simulate: {place}{e}"))
+        })?;
+        let records = sim.objects.iter().map(|object| Record {
+            settled: match object.body {
+                BodyId::Soft(id) => {
+                    let body = &sim.world.soft(id).state;
+                    ReferenceShape::new(&body.x, &body.model.mass).ok()
+                }
+                _ => None,
+            },
+            d_peak_pct: 0.0,
+            start_z: sim.centre(object).z,
+        });
+        Ok(Self(Arc::new(Mutex::new(SimulationState {
+            records: records.collect(),
+            physics_steps: 0,
+            failed: None,
+            clock: clock.clone(),
+            sensors: SensorSuite::new(&sim, &settings.tactile, &caches.sensors),
+            sim,
+            _reserved: reserved,
+        }))))
     }
-    let caches = lua.app_data_ref::<Caches>().ok_or_else(|| mlua::Error::runtime("no caches"))?;
-    let mut sim = Simulation::new(scene, &settings.physics, &settings.robot, &caches.assets)
-        .map_err(|e| fail(lua, format!("softvt.simulate: {e}")))?;
-    let soft_bytes: usize = sim.world.soft_bodies().iter().map(|soft| soft.state.model.bytes()).sum();
-    let reserved = reserve_in_world(lua, BYTES_PER_SIMULATION + soft_bytes)?;
-    sim.settle().map_err(|e| {
-        let place = e.place().map_or(String::new(), |place| format!("{place}: "));
-        fail(lua, format!("softvt.simulate: {place}{e}"))
-    })?;
-    let records = sim.objects.iter().map(|object| Record {
-        settled: match object.body {
-            BodyId::Soft(id) => {
-                let body = &sim.world.soft(id).state;
-                ReferenceShape::new(&body.x, &body.model.mass).ok()
-            }
-            _ => None,
-        },
-        d_peak_pct: 0.0,
-        start_z: sim.centre(object).z,
-    });
-    let records = records.collect();
-    let sensors = SensorSuite::new(&sim, &settings.tactile, &caches.sensors);
-    let inner = SimulationState {
-        sim,
-        records,
-        physics_steps: 0,
-        failed: None,
-        clock: clock.clone(),
-        sensors,
-        _reserved: reserved,
-    };
-    Ok(LuaSimulation(Arc::new(Mutex::new(inner))))
 }
 
 functions! {
     FUNCTIONS {
-        /// Builds a scene with the robot and lets it settle.
-        fn simulate(lua, spec: SimulateSpec) -> ["softvt.Simulation"] { simulate(lua, spec)? }
+        /// Builds a scene with the robot and lets it settle. Deformation refers to the settled shapes.
+        fn simulate(lua) takes spec "softvt.SimulateSpec" {
+            /// Initial scene.
+            layout: Constructed<LayoutSpec>;
+            /// Part of the seed.
+            suite: String => Text("experiment");
+            /// Part of the seed.
+            episode: u32 = EPISODE => Integer(0);
+            /// Part of the seed.
+            seed: u64 = EPISODE => Integer(0);
+            /// Changed settings of physics, robot and judge: { physics = {…}, robot = {…}, criteria = {…} }.
+            settings: Option<Table> = SETTINGS;
+        } -> ["softvt.Simulation"] {
+            let settings = self::settings(lua, "softvt.simulate: settings", settings.as_ref())?;
+            let (layout_name, split) = (layout.name.clone(), Split::Experiment);
+            let seed = EpisodeSeed { suite, layout: layout_name, episode, base_seed: seed, split };
+            LuaSimulation::new(lua, &layout, seed, &settings)?
+        }
     }
 }
 
@@ -244,20 +227,25 @@ impl LuaSimulation {
         }
     }
 
-    fn render(&self, lua: &Lua, spec: &RenderSpec) -> mlua::Result<LuaImage> {
+    fn render(
+        &self,
+        lua: &Lua,
+        camera: &str,
+        width: Option<usize>,
+        height: Option<usize>,
+    ) -> mlua::Result<LuaImage> {
         let wrong = |e: SensingError| fail(lua, format!("simulation:render: {e}"));
         let mut inner = lock(&self.0);
         let SimulationState { sim, sensors, clock, physics_steps, .. } = &mut *inner;
         let _pause = clock.pause();
-        let mut camera = sensors.camera(&spec.camera).map_err(wrong)?.clone();
-        camera.width = spec.width.unwrap_or(camera.width);
-        camera.height = spec.height.unwrap_or(camera.height);
+        let mut camera = sensors.camera(camera).map_err(wrong)?.clone();
+        camera.width = width.unwrap_or(camera.width);
+        camera.height = height.unwrap_or(camera.height);
         let frame = SensorSuite::frame(sim);
         // A camera inside of an object is a mistake of the layout, unless something has moved since.
-        let image = if *physics_steps == 0 {
-            sensors.render_unobstructed(&frame, &camera)
-        } else {
-            sensors.render(&frame, &camera)
+        let image = match *physics_steps {
+            0 => sensors.render_unobstructed(&frame, &camera),
+            _ => sensors.render(&frame, &camera),
         };
         LuaImage::new(lua, image.map_err(wrong)?.into_rgb_image())
     }
@@ -278,10 +266,8 @@ impl LuaSimulation {
         let inner = lock(&self.0);
         let _pause = inner.clock.pause();
         let names = inner.sim.objects.iter().map(|object| object.name.as_str());
-        match inner.sim.objects.iter().position(|object| object.name == name) {
-            Some(index) => measurements(lua, &inner, index),
-            None => Err(fail(lua, format!("simulation:measure: {}", unknown_name("object", name, names)))),
-        }
+        let index = index_of(lua, "simulation:measure", "object", names, name)?;
+        measurements(lua, &inner, index)
     }
 }
 
@@ -381,7 +367,14 @@ class! {
             /// Returns measurements of an object.
             fn measure(lua, this, object: String) -> ["softvt.Measurements"] { this.measure(lua, &object)? }
             /// Renders the image of a camera, by default third_person.
-            fn render(lua, this, spec: RenderSpec) -> ["softvt.Image"] { this.render(lua, &spec)? }
+            fn render(lua, this) takes spec "softvt.Render" {
+                /// A camera of the scene.
+                camera: String = Type::Name => Text("third_person");
+                /// Width, pixels; the camera's by default.
+                width: Option<usize> = IMAGE_EDGE;
+                /// Height, pixels; the camera's by default.
+                height: Option<usize> = IMAGE_EDGE;
+            } -> ["softvt.Image"] { this.render(lua, &camera, width, height)? }
             /// Returns the reading of a finger's tactile sensor, with the true force on its gel.
             fn tactile(lua, this, side: Side) -> ["softvt.TactileReading"] { this.tactile(lua, side)? }
             /// Returns the time since settling, s.

@@ -9,7 +9,7 @@ use crate::{
     script::{
         schema::{
             Constructed, Range, Record, RecordType, Type, Unchecked, ValidationError, choice, error_at_key,
-            functions, make, object::LuaConstructor, one_of, record,
+            functions, make, one_of, record,
         },
         vm::{error::fail, value::describe},
     },
@@ -18,13 +18,13 @@ use crate::{
 /// Type of a layout's function.
 const BUILD: Type = Type::Function("fun(scene: softvt.Scene, rng: softvt.Rng)");
 /// Type of a task's expert.
-pub(crate) const EXPERT: Type = Type::Function("fun(arm: softvt.Arm, scene: softvt.View)");
+pub(crate) const EXPERT: Type = Type::Function("fun(arm: softvt.Arm, scene: softvt.SceneState)");
 const HOLD: Type = Type::Number("s", Range::closed(0.0, 10.0));
 /// Type of a table of settings.
 pub(crate) const SETTINGS: Type = Type::Map(&Type::Map(&Type::Any));
 
-choice! { ObjectType { "deformable" => ObjectType::Deformable, "rigid" => ObjectType::Rigid } }
-choice! { Variation { "object" => Variation::Object, "spatial" => Variation::Spatial } }
+choice! { ObjectType { "deformable" => Deformable, "rigid" => Rigid } }
+choice! { Variation { "object" => Object, "spatial" => Spatial } }
 
 record! {
     /// The layout of a scene. Tasks with the same layout name share their initial states.
@@ -94,7 +94,7 @@ record! {
         /// The tasks, in order.
         tasks: Vec<Constructed<TaskSpec>>;
         /// Changes of the scene that a run can request.
-        shifts: Option<Vec<Constructed<ShiftSpec>>>;
+        shifts: Vec<Constructed<ShiftSpec>> => Empty;
         /// Changed settings of physics, robot and judge: { physics = {…}, robot = {…}, criteria = {…} }.
         settings: Option<Table> = SETTINGS;
     }
@@ -104,14 +104,14 @@ record! {
         /// Name in the table of results and of the run folder.
         name: String;
         /// Shifts by name, as for --shift: { mass = 1.25 }.
-        shift: Option<BTreeMap<String, f64>>;
+        shift: BTreeMap<String, f64> => Empty;
         /// Settings by path, as for --set: { ["robot.gripper.effort"] = 20 }.
         set: Option<Table> = Type::Map(&Type::OneOf(&[Type::Number("", Range::ANY), Type::Boolean, Type::Text]));
         /// object_type of the suites that it applies to; others are not run, and their row says N/A.
         only: Option<ObjectType>;
     }
     /// Runs suites as they are, then under each condition, and compares them episode by episode.
-    ConditionsSpec: "softvt.Conditions" as "conditions", constructor "softvt.conditions" {
+    ConditionsSpec: "softvt.Conditions" as "conditions", constructor "softvt.conditions", relations check_conditions {
         /// Name in results.
         name: String = Type::Name;
         /// The suites, in order.
@@ -134,19 +134,19 @@ record! {
         /// Summarizes all rows.
         finish: Option<Function> = Type::Function("fun(rows: table[], opt: table): softvt.Finish?");
         /// Columns of the table, in order; by default all, sorted.
-        columns: Option<Vec<String>>;
+        columns: Vec<String> => Empty;
     }
     /// Summary of an experiment.
     FinishSpec: "softvt.Finish" as "finish" {
         /// Printed after the rows.
         text: Option<String>;
         /// Files to write, by relative path: text as it is, images as PNG, tables as JSON with sorted keys.
-        files: Option<BTreeMap<String, Value>> = Type::Map(&Type::OneOf(&[
+        files: BTreeMap<String, Value> = Type::Map(&Type::OneOf(&[
             Type::Text,
             Type::Object("softvt.Image"),
             Type::Map(&Type::Any),
             Type::List(&Type::Any),
-        ]));
+        ])) => Empty;
     }
 }
 
@@ -172,14 +172,14 @@ impl GoalSpec {
 }
 
 /// Constructors of plans and their parts; that of layouts is a function.
-pub(crate) static CONSTRUCTORS: &[LuaConstructor] = &[
-    LuaConstructor::of(SuiteSpec::RECORD),
-    LuaConstructor::of(TaskSpec::RECORD),
-    LuaConstructor::of(OnSpec::RECORD),
-    LuaConstructor::of(InsideSpec::RECORD),
-    LuaConstructor::of(ShiftSpec::RECORD),
-    LuaConstructor::with(ConditionsSpec::RECORD, make_conditions),
-    LuaConstructor::of(ExperimentSpec::RECORD),
+pub(crate) static CONSTRUCTORS: &[&Record] = &[
+    SuiteSpec::RECORD,
+    TaskSpec::RECORD,
+    OnSpec::RECORD,
+    InsideSpec::RECORD,
+    ShiftSpec::RECORD,
+    ConditionsSpec::RECORD,
+    ExperimentSpec::RECORD,
 ];
 
 functions! {
@@ -208,14 +208,13 @@ functions! {
     }
 }
 
-fn make_conditions(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Result<Table> {
-    let made = make(lua, record, value)?;
+fn check_conditions(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<()> {
     for key in ["suites", "conditions"] {
-        if made.raw_get::<Table>(key)?.raw_len() == 0 {
+        if table.raw_get::<Table>(key)?.raw_len() == 0 {
             return Err(fail(lua, format!("conditions.{key}: expected at least one, got an empty list")));
         }
     }
-    let conditions: Vec<ConditionSpec> = made.raw_get("conditions")?;
+    let conditions: Vec<ConditionSpec> = table.raw_get("conditions")?;
     let mut names = vec![REFERENCE.to_owned()];
     for (index, ConditionSpec { name, .. }) in conditions.into_iter().enumerate() {
         if names.contains(&name) {
@@ -226,5 +225,5 @@ fn make_conditions(lua: &Lua, record: &'static Record, value: &Value) -> mlua::R
         }
         names.push(name);
     }
-    Ok(made)
+    Ok(())
 }

@@ -11,11 +11,10 @@ use crate::{
     parallel::lock,
     scene::{LabelLine, MAX_LETTERS, Mask, Scene, TextDecal, Typeface, Visual, VisualLayer},
     script::{
-        schema::{LuaType, Range, RecordType, Type, choice, class, functions, invalid, record},
+        schema::{FieldDefault, LuaType, Range, Type, choice, class, functions, invalid, record_of},
         vm::{
             error::fail,
             memory_budget::{Reservation, reserve},
-            value::describe,
         },
     },
 };
@@ -24,28 +23,29 @@ const LENGTH: Type = Type::Number("m", Range::POSITIVE);
 const SHARE: Type = Type::Number("", Range::closed(0.0, 1.0));
 const COSINE: Type = Type::Number("", Range::closed(-1.0, 1.0));
 const NOISE_VALUE: Type = Type::Number("", Range::closed(-1.0, 2.0));
+const ALBEDO: Type = Type::colour(1.0);
 
 /// Masks that one mask may be made of: each is evaluated at every point that is drawn.
 const MAX_PARTS: usize = 200;
 
-record! {
+record_of! {
     /// The appearance of a surface: a base material, and layers painted over it in order.
-    VisualSpec: "softvt.Visual" as "visual" {
+    Visual: "softvt.Visual" as "visual" {
         /// Base colour.
-        albedo: [f64; 3] = Type::Colour;
+        albedo: [f64; 3] = ALBEDO;
         /// Roughness: 0 is a mirror, 1 is chalk.
         roughness: f64 = SHARE => Number(0.6);
         /// Metalness: 1 is bare metal.
         metalness: f64 = SHARE => Number(0.0);
         /// Layers painted over the base, in this order.
-        layers: Option<Vec<LayerSpec>>;
+        layers: Vec<VisualLayer> => Empty;
     }
     /// A colour laid over the layers below where a mask is not 0.
-    LayerSpec: "softvt.Layer" as "layer" {
+    VisualLayer: "softvt.Layer" as "layer" {
         /// Weight of the layer; 1 everywhere by default.
-        mask: Option<LuaMask>;
+        mask: Mask;
         /// Colour.
-        albedo: [f64; 3] = Type::Colour;
+        albedo: [f64; 3] = ALBEDO;
         /// Roughness: 0 is a mirror, 1 is chalk.
         roughness: f64 = SHARE => Number(0.6);
         /// Share of this layer where the mask is 1; with 0 only the relief shows.
@@ -53,165 +53,36 @@ record! {
         /// Height of the drawn surface where the mask is 1. It is drawn only: contact does not see it.
         relief_m: f64 = Type::Number("m", Range::closed(-0.005, 0.005)) => Number(0.0);
     }
-    /// Cubes, every other one 1; one corner is at the origin.
-    CheckerSpec: "softvt.CheckerMask" as "mask.checker" {
-        /// Edge of a cube.
-        size_m: f64 = LENGTH;
-    }
-    /// Slabs across an axis.
-    StripesSpec: "softvt.StripesMask" as "mask.stripes" {
-        /// Direction in which they follow each other.
-        axis: Direction;
-        /// Distance from one to the next.
-        pitch_m: f64 = LENGTH;
-        /// Share of the pitch that is 1.
-        share: f64 = SHARE => Number(0.5);
-    }
-    /// Rises smoothly from 0 to 1 along an axis.
-    GradientSpec: "softvt.GradientMask" as "mask.gradient" {
-        /// Direction.
-        axis: Direction => Text("z");
-        /// Coordinate at which it is 0.
-        from_m: f64 = Type::Number("m", Range::ANY);
-        /// Coordinate at which it is 1; may be below from_m.
-        to_m: f64 = Type::Number("m", Range::ANY);
-    }
-    /// Cloudy noise with values around 0.5, few below 0.2 or above 0.8.
-    NoiseSpec: "softvt.NoiseMask" as "mask.noise" {
-        /// Size of the coarsest features: one number for all axes, or one for each of x, y and z.
-        size_m: Sizes;
-        /// Octaves, each half the size and half the weight of the one before.
-        octaves: u32 = Type::Integer(Range::closed(1.0, 8.0)) => Integer(3);
-        /// Value of the noise that becomes 0.
-        from: f64 = NOISE_VALUE => Number(0.35);
-        /// Value of the noise that becomes 1; may be below from.
-        to: f64 = NOISE_VALUE => Number(0.65);
-        /// Selects the pattern.
-        seed: u32 => Integer(0);
-    }
-    /// Annual rings of a trunk: cylinders about a line along z, distorted by noise.
-    RingsSpec: "softvt.RingsMask" as "mask.rings" {
-        /// A point of the line.
-        centre_m: [f64; 3] = Type::Vector(3, "m");
-        /// Distance from one ring to the next.
-        pitch_m: f64 = LENGTH;
-        /// Amplitude of the distortion.
-        wobble_m: f64 = LENGTH => Number(0.01);
-        /// Selects the pattern.
-        seed: u32 => Integer(0);
-    }
-    /// Boards along x, side by side in y, with one value per board.
-    BoardsSpec: "softvt.BoardsMask" as "mask.boards" {
-        /// Length of a board.
-        length_m: f64 = LENGTH;
-        /// Width of a board.
-        width_m: f64 = LENGTH;
-        /// Selects the pattern.
-        seed: u32 => Integer(0);
-    }
-    /// The gaps between boards of these sizes.
-    SeamsSpec: "softvt.SeamsMask" as "mask.seams" {
-        /// Length of a board.
-        length_m: f64 = LENGTH;
-        /// Width of a board.
-        width_m: f64 = LENGTH;
-        /// Width of a gap.
-        gap_m: f64 = LENGTH;
-    }
-    /// Scattered round specks.
-    SpecksSpec: "softvt.SpecksMask" as "mask.specks" {
-        /// Mean distance.
-        spacing_m: f64 = LENGTH;
-        /// Radius, at most half the spacing.
-        radius_m: f64 = LENGTH;
-        /// Selects the pattern.
-        seed: u32 => Integer(0);
-    }
-    /// A plain weave in x and y: high in the middle of a thread.
-    WeaveSpec: "softvt.WeaveMask" as "mask.weave" {
-        /// Width of a thread.
-        pitch_m: f64 = LENGTH;
-    }
-    /// Surfaces that face a direction, by the cosine between their normal and that direction.
-    FacingSpec: "softvt.FacingMask" as "mask.facing" {
-        /// Direction.
-        axis: Direction => Text("z");
-        /// Cosine at which it is 0.
-        from: f64 = COSINE => Number(0.0);
-        /// Cosine at which it is 1; may be below from.
-        to: f64 = COSINE => Number(1.0);
-    }
-    /// The inside of a shape: a painted rim, the grooves between ridges.
-    InsideMaskSpec: "softvt.InsideMask" as "mask.inside" {
-        /// The shape.
-        shape: LuaShape;
-        /// Width of the border, half of it on either side of the shape's surface.
-        soft_m: f64 = Type::Number("m", Range::NOT_NEGATIVE) => Number(0.0);
-    }
-    /// The letters of a line of text, printed on surfaces that face the reader. Surfaces with text are drawn in finer
-    /// detail.
-    TextMaskSpec: "softvt.TextMask" as "mask.text" {
-        /// At most 64 letters.
-        text: String;
-        /// Height of a capital letter.
-        height_m: f64 = Type::Number("m", Range::closed(0.0005, 1.0));
-        /// Middle of the line; of a wrapped line, only the height counts.
-        at: [f64; 3] = Type::Vector(3, "m");
-        /// Direction that the printed surface faces. The top of the letters points to +y on top faces, else to +z.
-        facing: Facing;
-        /// Rotation of the line on its surface, counter-clockwise for the reader.
-        turn: f64 = Type::Number("rad", Range::ANY) => Number(0.0);
-        /// Radius of the upright cylinder about the z axis that the line is wrapped around; flat by default.
-        wrap_m: Option<f64> = LENGTH;
-        /// Thickening of the strokes, in heights of a capital letter.
-        weight: f64 = Type::Number("", Range::closed(0.0, 0.25)) => Number(0.08);
-        /// Typeface.
-        font: Typeface => Text("sans");
+}
+
+choice! { Typeface { "sans" => Sans, "mono" => Mono } }
+
+const AXIS: Type = Type::Direction(&["x", "y", "z"], "any length");
+const FACING: Type = Type::Direction(&["+x", "-x", "+y", "-y", "+z", "-z"], "any length");
+
+/// A direction given by the name of an axis or by a vector.
+#[derive(Clone, Copy, Debug)]
+struct Direction([f64; 3]);
+
+impl FromLua for Direction {
+    fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
+        let Value::String(name) = &value else {
+            let numbers = lua.unpack(value)?;
+            return Ok(Self(direction(numbers).map_or(numbers, Into::into)));
+        };
+        let name = name.to_string_lossy();
+        let length = if name.starts_with('-') { -1.0 } else { 1.0 };
+        Ok(Self(["x", "y", "z"].map(|axis| if name.ends_with(axis) { length } else { 0.0 })))
     }
 }
 
-choice! { Typeface { "sans" => Typeface::Sans, "mono" => Typeface::Mono } }
-
-/// The components of a direction given by the name of an axis or by a vector.
-macro_rules! named_direction {
-    ($(#[doc = $doc:literal])+ $name:ident { $($text:literal => $vector:expr),+ }) => {
-        $(#[doc = $doc])+
-        #[derive(Clone, Copy, Debug)]
-        pub(crate) struct $name([f64; 3]);
-
-        impl FromLua for $name {
-            fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
-                let Value::String(name) = &value else { return lua.unpack(value).map(Self) };
-                match name.to_string_lossy().as_str() {
-                    $($text => Ok(Self($vector)),)+
-                    other => Err(fail(lua, format!("unexpected {other:?}"))),
-                }
-            }
-        }
-
-        impl LuaType for $name {
-            const TYPE: Type = Type::OneOf(&[Type::Choice(&[$($text),+]), Type::Vector(3, "any length")]);
-        }
-    };
-}
-
-named_direction! {
-    /// An axis, or a vector of any length.
-    Direction { "x" => [1.0, 0.0, 0.0], "y" => [0.0, 1.0, 0.0], "z" => [0.0, 0.0, 1.0] }
-}
-
-named_direction! {
-    /// A signed axis, or a vector of any length.
-    Facing {
-        "+x" => [1.0, 0.0, 0.0], "-x" => [-1.0, 0.0, 0.0],
-        "+y" => [0.0, 1.0, 0.0], "-y" => [0.0, -1.0, 0.0],
-        "+z" => [0.0, 0.0, 1.0], "-z" => [0.0, 0.0, -1.0]
-    }
+impl LuaType for Direction {
+    const TYPE: Type = AXIS;
 }
 
 /// One size for all axes, or one for each.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sizes([f64; 3]);
+struct Sizes([f64; 3]);
 
 impl FromLua for Sizes {
     fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
@@ -223,7 +94,7 @@ impl FromLua for Sizes {
 }
 
 impl LuaType for Sizes {
-    const TYPE: Type = Type::OneOf(&[LENGTH, Type::Vector(3, "m, each above 0")]);
+    const TYPE: Type = Type::OneOf(&[LENGTH, Type::Vector(3, "m", Range::POSITIVE)]);
 }
 
 /// `softvt.Mask`.
@@ -257,17 +128,16 @@ impl LuaMask {
     }
 }
 
-impl FromLua for LuaMask {
+impl FromLua for Mask {
     fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
-        let mask = value.as_userdata().and_then(|data| data.borrow::<Self>().ok().map(|mask| mask.clone()));
-        mask.ok_or_else(|| {
-            fail(lua, format!("expected a mask (softvt.mask.…{{…}}), got {}", describe(&value)))
-        })
+        let mask: Option<LuaMask> = lua.unpack(value)?;
+        Ok(mask.map_or(Self::Whole, |mask| (*mask.0.mask).clone()))
     }
 }
 
-impl LuaType for LuaMask {
-    const TYPE: Type = Type::Object("softvt.Mask");
+impl LuaType for Mask {
+    const TYPE: Type = LuaMask::TYPE;
+    const PRESENCE: FieldDefault = FieldDefault::Optional;
 }
 
 class! {
@@ -277,7 +147,7 @@ class! {
         label(_) { "mask".to_owned() }
         methods {
             /// Returns the product of two masks: 1 where both are.
-            fn both(lua, this, other: LuaMask) -> ["softvt.Mask"] {
+            fn intersect(lua, this, other: LuaMask) -> ["softvt.Mask"] {
                 let (mut masks, own) = match &*this.0.mask {
                     Mask::Product { masks } => (masks.clone(), 0),
                     _ => (vec![this.0.mask.clone()], 1),
@@ -295,142 +165,176 @@ class! {
     }
 }
 
-/// The error about a field of the record `T`.
-fn wrong<T: RecordType>(lua: &Lua, key: &str, message: impl Into<String>) -> mlua::Error {
-    invalid(lua, T::RECORD, key, message)
-}
-
-/// The components of the field `axis`.
-fn axis<T: RecordType>(lua: &Lua, axis: Direction) -> mlua::Result<[f64; 3]> {
-    let direction = direction(axis.0).map(Into::into);
-    direction.ok_or_else(|| wrong::<T>(lua, "axis", "expected a direction, got one of length 0"))
-}
-
-/// Checks that the ends of a ramp differ.
-fn check_ramp<T: RecordType>(lua: &Lua, [from, to]: [f64; 2], keys: [&str; 2]) -> mlua::Result<()> {
-    match from == to {
-        true => {
-            let message = format!("expected a number other than {}, got the same", keys[0]);
-            Err(wrong::<T>(lua, keys[1], message))
-        }
-        false => Ok(()),
+/// Checks that the ends of a ramp of the mask `label` differ; `keys` are theirs.
+fn check_ramp(lua: &Lua, label: &str, [from, to]: [f64; 2], keys: [&str; 2]) -> mlua::Result<()> {
+    if from != to {
+        return Ok(());
     }
+    Err(invalid(lua, label, keys[1], format!("expected a number other than {}, got the same", keys[0])))
 }
 
 functions! {
     MASKS {
-        fn checker(lua, spec: CheckerSpec) -> ["softvt.Mask"] {
-            LuaMask::simple(lua, Mask::Checker { size_m: spec.size_m })?
+        /// Cubes, every other one 1; one corner is at the origin.
+        fn checker(lua) takes spec "softvt.CheckerMask" {
+            /// Edge of a cube.
+            size_m: f64 = LENGTH;
+        } -> ["softvt.Mask"] { LuaMask::simple(lua, Mask::Checker { size_m })? }
+        /// Slabs across an axis.
+        fn stripes(lua) takes spec "softvt.StripesMask" {
+            /// Direction in which they follow each other.
+            axis: Direction;
+            /// Distance from one to the next.
+            pitch_m: f64 = LENGTH;
+            /// Share of the pitch that is 1.
+            share: f64 = SHARE => Number(0.5);
+        } -> ["softvt.Mask"] { LuaMask::simple(lua, Mask::Stripes { axis: axis.0, pitch_m, share })? }
+        /// Rises smoothly from 0 to 1 along an axis.
+        fn gradient(lua) takes spec "softvt.GradientMask" {
+            /// Direction.
+            axis: Direction => Text("z");
+            /// Coordinate at which it is 0.
+            from_m: f64 = Type::Number("m", Range::ANY);
+            /// Coordinate at which it is 1; may be below from_m.
+            to_m: f64 = Type::Number("m", Range::ANY);
+        } -> ["softvt.Mask"] {
+            check_ramp(lua, "mask.gradient", [from_m, to_m], ["from_m", "to_m"])?;
+            LuaMask::simple(lua, Mask::Gradient { axis: axis.0, from_m, to_m })?
         }
-        fn stripes(lua, spec: StripesSpec) -> ["softvt.Mask"] {
-            let StripesSpec { pitch_m, share, .. } = spec;
-            LuaMask::simple(lua, Mask::Stripes { axis: axis::<StripesSpec>(lua, spec.axis)?, pitch_m, share })?
+        /// Cloudy noise with values around 0.5, few below 0.2 or above 0.8.
+        fn noise(lua) takes spec "softvt.NoiseMask" {
+            /// Size of the coarsest features: one number for all axes, or one for each of x, y and z.
+            size_m: Sizes;
+            /// Octaves, each half the size and half the weight of the one before.
+            octaves: u32 = Type::Integer(Range::closed(1.0, 8.0)) => Integer(3);
+            /// Value of the noise that becomes 0.
+            from: f64 = NOISE_VALUE => Number(0.35);
+            /// Value of the noise that becomes 1; may be below from.
+            to: f64 = NOISE_VALUE => Number(0.65);
+            /// Selects the pattern.
+            seed: u32 => Integer(0);
+        } -> ["softvt.Mask"] {
+            check_ramp(lua, "mask.noise", [from, to], ["from", "to"])?;
+            LuaMask::simple(lua, Mask::Noise { size_m: size_m.0, octaves, from, to, seed })?
         }
-        fn gradient(lua, spec: GradientSpec) -> ["softvt.Mask"] {
-            let GradientSpec { from_m, to_m, .. } = spec;
-            let axis = axis::<GradientSpec>(lua, spec.axis)?;
-            check_ramp::<GradientSpec>(lua, [from_m, to_m], ["from_m", "to_m"])?;
-            LuaMask::simple(lua, Mask::Gradient { axis, from_m, to_m })?
-        }
-        fn noise(lua, spec: NoiseSpec) -> ["softvt.Mask"] {
-            let NoiseSpec { size_m: Sizes(size_m), octaves, from, to, seed } = spec;
-            check_ramp::<NoiseSpec>(lua, [from, to], ["from", "to"])?;
-            if size_m.iter().any(|&size| size <= 0.0) {
-                let message = "expected metres above 0 for each of x, y and z";
-                return Err(wrong::<NoiseSpec>(lua, "size_m", message));
-            }
-            LuaMask::simple(lua, Mask::Noise { size_m, octaves, from, to, seed })?
-        }
-        fn rings(lua, spec: RingsSpec) -> ["softvt.Mask"] {
-            let RingsSpec { centre_m, pitch_m, wobble_m, seed } = spec;
-            LuaMask::simple(lua, Mask::Rings { centre_m, pitch_m, wobble_m, seed })?
-        }
-        fn boards(lua, spec: BoardsSpec) -> ["softvt.Mask"] {
-            let BoardsSpec { length_m, width_m, seed } = spec;
-            LuaMask::simple(lua, Mask::Boards { length_m, width_m, seed })?
-        }
-        fn seams(lua, spec: SeamsSpec) -> ["softvt.Mask"] {
-            let SeamsSpec { length_m, width_m, gap_m } = spec;
-            LuaMask::simple(lua, Mask::Seams { length_m, width_m, gap_m })?
-        }
-        fn specks(lua, spec: SpecksSpec) -> ["softvt.Mask"] {
-            let SpecksSpec { spacing_m, radius_m, seed } = spec;
+        /// Annual rings of a trunk: cylinders about a line along z, distorted by noise.
+        fn rings(lua) takes spec "softvt.RingsMask" {
+            /// A point of the line.
+            centre_m: [f64; 3] = Type::vector(3, "m");
+            /// Distance from one ring to the next.
+            pitch_m: f64 = LENGTH;
+            /// Amplitude of the distortion.
+            wobble_m: f64 = LENGTH => Number(0.01);
+            /// Selects the pattern.
+            seed: u32 => Integer(0);
+        } -> ["softvt.Mask"] { LuaMask::simple(lua, Mask::Rings { centre_m, pitch_m, wobble_m, seed })? }
+        /// Boards along x, side by side in y, with one value per board.
+        fn boards(lua) takes spec "softvt.BoardsMask" {
+            /// Length of a board.
+            length_m: f64 = LENGTH;
+            /// Width of a board.
+            width_m: f64 = LENGTH;
+            /// Selects the pattern.
+            seed: u32 => Integer(0);
+        } -> ["softvt.Mask"] { LuaMask::simple(lua, Mask::Boards { length_m, width_m, seed })? }
+        /// The gaps between boards of these sizes.
+        fn seams(lua) takes spec "softvt.SeamsMask" {
+            /// Length of a board.
+            length_m: f64 = LENGTH;
+            /// Width of a board.
+            width_m: f64 = LENGTH;
+            /// Width of a gap.
+            gap_m: f64 = LENGTH;
+        } -> ["softvt.Mask"] { LuaMask::simple(lua, Mask::Seams { length_m, width_m, gap_m })? }
+        /// Scattered round specks.
+        fn specks(lua) takes spec "softvt.SpecksMask" {
+            /// Mean distance.
+            spacing_m: f64 = LENGTH;
+            /// Radius, at most half the spacing.
+            radius_m: f64 = LENGTH;
+            /// Selects the pattern.
+            seed: u32 => Integer(0);
+        } -> ["softvt.Mask"] {
             if radius_m > 0.5 * spacing_m {
-                return Err(wrong::<SpecksSpec>(lua, "radius_m", "expected at most half of spacing_m"));
+                return Err(invalid(lua, "mask.specks", "radius_m", "expected at most half of spacing_m"));
             }
             LuaMask::simple(lua, Mask::Specks { spacing_m, radius_m, seed })?
         }
-        fn weave(lua, spec: WeaveSpec) -> ["softvt.Mask"] {
-            LuaMask::simple(lua, Mask::Weave { pitch_m: spec.pitch_m })?
+        /// A plain weave in x and y: high in the middle of a thread.
+        fn weave(lua) takes spec "softvt.WeaveMask" {
+            /// Width of a thread.
+            pitch_m: f64 = LENGTH;
+        } -> ["softvt.Mask"] { LuaMask::simple(lua, Mask::Weave { pitch_m })? }
+        /// Surfaces that face a direction, by the cosine between their normal and that direction.
+        fn facing(lua) takes spec "softvt.FacingMask" {
+            /// Direction.
+            axis: Direction => Text("z");
+            /// Cosine at which it is 0.
+            from: f64 = COSINE => Number(0.0);
+            /// Cosine at which it is 1; may be below from.
+            to: f64 = COSINE => Number(1.0);
+        } -> ["softvt.Mask"] {
+            check_ramp(lua, "mask.facing", [from, to], ["from", "to"])?;
+            LuaMask::simple(lua, Mask::Facing { axis: axis.0, from, to })?
         }
-        fn facing(lua, spec: FacingSpec) -> ["softvt.Mask"] {
-            let FacingSpec { from, to, .. } = spec;
-            let axis = axis::<FacingSpec>(lua, spec.axis)?;
-            check_ramp::<FacingSpec>(lua, [from, to], ["from", "to"])?;
-            LuaMask::simple(lua, Mask::Facing { axis, from, to })?
+        /// The inside of a shape: a painted rim, the grooves between ridges.
+        fn inside(lua) takes spec "softvt.InsideMask" {
+            /// The shape.
+            shape: LuaShape;
+            /// Width of the border, half of it on either side of the shape's surface.
+            soft_m: f64 = Type::Number("m", Range::NOT_NEGATIVE) => Number(0.0);
+        } -> ["softvt.Mask"] {
+            let bytes = size_of::<Mask>() + shape.bytes();
+            LuaMask::new(lua, Mask::Inside { shape: Arc::new(shape.copy()), soft_m }, 1, bytes)?
         }
-        fn inside(lua, spec: InsideMaskSpec) -> ["softvt.Mask"] {
-            let bytes = size_of::<Mask>() + spec.shape.bytes();
-            let mask = Mask::Inside { shape: Arc::new(spec.shape.copy()), soft_m: spec.soft_m };
-            LuaMask::new(lua, mask, 1, bytes)?
-        }
-        fn text(lua, spec: TextMaskSpec) -> ["softvt.Mask"] {
-            let decal = TextDecal::new(text_line(lua, spec)?);
+        /// The letters of a line of text, printed on surfaces that face the reader. Surfaces with text are drawn in finer
+        /// detail.
+        fn text(lua) takes spec "softvt.TextMask" {
+            /// At most 64 letters.
+            text: String;
+            /// Height of a capital letter.
+            height_m: f64 = Type::Number("m", Range::closed(0.0005, 1.0));
+            /// Middle of the line; of a wrapped line, only the height counts.
+            at: [f64; 3] = Type::vector(3, "m");
+            /// Direction that the printed surface faces. The top of the letters points to +y on top faces, else to +z.
+            facing: Direction = FACING;
+            /// Rotation of the line on its surface, counter-clockwise for the reader.
+            angle: f64 = Type::Number("rad", Range::ANY) => Number(0.0);
+            /// Radius of the upright cylinder about the z axis that the line is wrapped around; flat by default.
+            wrap_m: Option<f64> = LENGTH;
+            /// Thickening of the strokes, in heights of a capital letter.
+            weight: f64 = Type::Number("", Range::closed(0.0, 0.25)) => Number(0.08);
+            /// Typeface.
+            font: Typeface => Text("sans");
+        } -> ["softvt.Mask"] {
+            let facing = facing.0;
+            let line = LabelLine { text, typeface: font, height_m, weight, at, facing, turn: angle, wrap_m };
+            check_label(lua, &line)?;
+            let decal = TextDecal::new(line);
             let bytes = decal.bytes();
             LuaMask::new(lua, Mask::Text { decal: Arc::new(decal) }, 1, bytes)?
         }
     }
 }
 
-/// A line of text that can be printed.
-fn text_line(lua: &Lua, spec: TextMaskSpec) -> mlua::Result<LabelLine> {
-    let wrong = |key: &str, message: &str| Err(wrong::<TextMaskSpec>(lua, key, message));
-    let count = spec.text.chars().count();
+/// Checks that a line of text can be printed.
+fn check_label(lua: &Lua, line: &LabelLine) -> mlua::Result<()> {
+    let wrong = |key: &str, message: String| Err(invalid(lua, "mask.text", key, message));
+    let count = line.text.chars().count();
     if count > MAX_LETTERS {
-        return wrong("text", &format!("expected at most {MAX_LETTERS} letters, got {count}"));
+        return wrong("text", format!("expected at most {MAX_LETTERS} letters, got {count}"));
     }
-    let Facing(facing) = spec.facing;
-    let length = facing.iter().map(|x| x * x).sum::<f64>().sqrt();
-    if !(length > 1e-6 && length < 1e6) {
-        return wrong("facing", "expected a direction, its length between 1e-6 and 1e6");
+    let [x, y, z] = line.facing;
+    if line.wrap_m.is_some() && x.hypot(y) < 1e-3 * x.hypot(y).hypot(z) {
+        let message = "expected a sideways direction, since the line is wrapped around the z axis";
+        return wrong("facing", message.to_owned());
     }
-    if spec.wrap_m.is_some() && facing[0].hypot(facing[1]) < 1e-3 * length {
-        return wrong("facing", "expected a sideways direction, since the line is wrapped around the z axis");
-    }
-    let line = LabelLine {
-        text: spec.text,
-        typeface: spec.font,
-        height_m: spec.height_m,
-        weight: spec.weight,
-        at: spec.at,
-        facing,
-        turn: spec.turn,
-        wrap_m: spec.wrap_m,
-    };
     match line.unsupported_char() {
         Some(letter) => wrong(
             "text",
-            &format!("the typeface has no letter {letter:?}; expected Latin, Greek or Cyrillic ones"),
+            format!("the typeface has no letter {letter:?}; expected Latin, Greek or Cyrillic ones"),
         ),
-        None => Ok(line),
-    }
-}
-
-impl From<&VisualSpec> for Visual {
-    fn from(spec: &VisualSpec) -> Self {
-        let layers = spec.layers.as_deref().unwrap_or_default().iter().map(|layer| VisualLayer {
-            mask: layer.mask.as_ref().map_or(Mask::Whole, |mask| (*mask.0.mask).clone()),
-            albedo: layer.albedo,
-            roughness: layer.roughness,
-            opacity: layer.opacity,
-            relief_m: layer.relief_m,
-        });
-        Self {
-            albedo: spec.albedo,
-            roughness: spec.roughness,
-            metalness: spec.metalness,
-            layers: layers.collect(),
-        }
+        None => Ok(()),
     }
 }
 
@@ -438,37 +342,23 @@ impl From<&VisualSpec> for Visual {
 pub(crate) fn visuals_of(
     lua: &Lua,
     name: &str,
-    specs: Option<&[VisualSpec]>,
+    visuals: &[Visual],
     shape: &Shape,
 ) -> mlua::Result<Vec<Visual>> {
     let needed = usize::from(shape.highest_material()) + 1;
-    match specs.unwrap_or_default() {
-        [] => Ok(vec![Visual::default(); needed]),
-        specs if specs.len() < needed => {
-            let message = format!(
-                "asset {name}: visuals: the shape is painted with material {}, expected {needed} visuals, got {}; \
-                 the first is that of material 0",
-                needed - 1,
-                specs.len()
-            );
-            Err(fail(lua, message))
-        }
-        specs => Ok(specs.iter().map(Visual::from).collect()),
+    if visuals.is_empty() {
+        return Ok(vec![Visual::default(); needed]);
     }
-}
-
-/// Checks the components of a colour; `label` names it in the message.
-pub(crate) fn colour(lua: &Lua, label: &str, colour: [f64; 3], max: f64) -> mlua::Result<[f64; 3]> {
-    match colour.iter().all(|c| (0.0..=max).contains(c)) {
-        true => Ok(colour),
-        false => Err(fail(lua, format!("{label}: expected linear RGB in 0..{max}, got {}", braced(&colour)))),
+    if visuals.len() < needed {
+        let message = format!(
+            "asset {name}: visuals: the shape is painted with material {}, expected {needed} visuals, got {}; the first is \
+             that of material 0",
+            needed - 1,
+            visuals.len()
+        );
+        return Err(fail(lua, message));
     }
-}
-
-/// Numbers as a Lua list: `{0, 1e300, 0}`.
-pub(crate) fn braced(numbers: &[f64]) -> String {
-    let numbers = numbers.iter().map(|x| crate::text::format_number(*x));
-    format!("{{{}}}", numbers.collect::<Vec<_>>().join(", "))
+    Ok(visuals.to_vec())
 }
 
 /// `softvt.Material`: a visual of an object in a scene.
@@ -490,7 +380,7 @@ impl LuaMaterial {
         read(&lock(&self.scene).objects[self.object].asset.visuals[self.index])
     }
 
-    fn change(&self, change: impl FnOnce(&mut Visual)) {
+    fn change(&self, _: &Lua, change: impl FnOnce(&mut Visual)) {
         let mut scene = lock(&self.scene);
         change(&mut Arc::make_mut(&mut scene.objects[self.object].asset).visuals[self.index]);
     }
@@ -502,23 +392,11 @@ class! {
         label(_) { "material".to_owned() }
         writable {
             /// Base colour.
-            albedo: Type::Vector(3, "linear RGB in 0..1") => {
-                get(_, this) { this.read(|visual| visual.albedo) }
-                set(lua, this, albedo: [f64; 3]) {
-                    let albedo = colour(lua, "material.albedo", albedo, 1.0)?;
-                    this.change(|visual| visual.albedo = albedo);
-                }
-            }
+            albedo: ALBEDO => albedo;
             /// Roughness: 0 is a mirror, 1 is chalk.
-            roughness: SHARE => {
-                get(_, this) { this.read(|visual| visual.roughness) }
-                set(_, this, roughness: f64) { this.change(|visual| visual.roughness = roughness); }
-            }
+            roughness: SHARE => roughness;
             /// Metalness: 1 is bare metal.
-            metalness: SHARE => {
-                get(_, this) { this.read(|visual| visual.metalness) }
-                set(_, this, metalness: f64) { this.change(|visual| visual.metalness = metalness); }
-            }
+            metalness: SHARE => metalness;
         }
     }
 }

@@ -7,30 +7,26 @@ use std::{
 };
 
 use cpu_time::ThreadTime;
-use mlua::{FromLua, Lua, Value};
+use mlua::Lua;
 
-use super::{
-    assets::{DENSITY, FrictionSpec, PASCALS, POISSON},
-    shapes::LuaShape,
-};
+use super::shapes::LuaShape;
 use crate::{
     evaluation::deformation::{Deformation, ReferenceShape},
-    geometry::{Pose, Quat, Vec3},
+    geometry::{Pose, Quat, Vec3, shape::Shape},
     parallel::lock,
     physics::{
         BodyId, ColliderId, KinematicId, PhysicsParams, SoftId, World,
         contact::Friction,
-        fem::FemModel,
         world::{ContactSummary, SoftBody, StepFailure},
     },
     rollout::{cancel, soft_model},
     scene::SoftMaterial,
     script::{
-        schema::{LuaType, Range, Type, class, functions, output, record},
+        schema::{Constructed, Range, Type, class, functions, output, record},
         vm::{
             error::{app_data, fail},
             memory_budget::{Reservation, reserve_in_world},
-            value::{describe, finite},
+            value::finite,
             watchdog::Clock,
         },
     },
@@ -40,46 +36,10 @@ use crate::{
 const BYTES_PER_WORLD: usize = 16 << 10;
 const BYTES_PER_SOLID: usize = 4 << 10;
 
-const POSITION: Type = Type::Vector(3, "m");
-const ROTATION: Type = Type::Vector(3, "rad");
+const POSITION: Type = Type::vector(3, "m");
+const AXIS_ANGLE: Type = Type::vector(3, "rad");
 
 record! {
-    /// A world of soft bodies among fixed or prescribed solids, without a robot.
-    WorldSpec: "softvt.WorldSpec" as "softvt.world" {
-        /// Time step.
-        dt: f64 = Type::Number("s", Range::closed(1e-5, 0.05)) => Number(1.0 / 60.0);
-        /// Mass-proportional Rayleigh damping.
-        rayleigh_mass: f64 = Type::Number("1/s", Range::closed(0.0, 1e3)) => Number(0.0);
-        /// Stiffness-proportional Rayleigh damping.
-        rayleigh_stiffness: f64 = Type::Number("s", Range::closed(0.0, 1.0)) => Number(5e-3);
-        /// Gravity; {0, 0, -9.81} by default.
-        gravity: Option<[f64; 3]> = Type::Vector(3, "m/s²");
-        /// True if bodies at rest fall asleep.
-        sleeping: bool => Boolean(true);
-    }
-    /// A finite-element soft body of a world.
-    WorldSoftSpec: "softvt.WorldSoft" as "world:soft" {
-        /// Name in messages.
-        name: String => Text("body");
-        /// Shape.
-        shape: LuaShape;
-        /// Young's modulus.
-        youngs_pa: f64 = PASCALS;
-        /// Poisson's ratio.
-        poisson: f64 = POISSON;
-        /// Density.
-        density: f64 = DENSITY;
-        /// Voxels along the longest edge.
-        resolution: usize = Type::Integer(Range::closed(1.0, SoftMaterial::MAX_RESOLUTION as f64)) => Integer(6);
-        /// Spacing of contact samples on steep surfaces.
-        grasp_spacing: f64 = Type::Number("m", Range::closed(1e-4, 0.02)) => Number(7.5e-4);
-        /// Friction of its surface.
-        friction: FrictionSpec;
-        /// Position of its frame.
-        xyz: [f64; 3] = POSITION;
-        /// Orientation as axis-angle; none by default.
-        turn: Option<[f64; 3]> = ROTATION;
-    }
     /// A solid that moves as prescribed (kinematic) or never (static).
     WorldSolidSpec: "softvt.WorldSolid" as "world:solid" {
         /// Name in messages.
@@ -87,11 +47,11 @@ record! {
         /// Shape.
         shape: LuaShape;
         /// Friction of its surface.
-        friction: FrictionSpec;
+        friction: Friction;
         /// Position of its frame.
-        xyz: [f64; 3] = POSITION;
-        /// Orientation as axis-angle; none by default.
-        turn: Option<[f64; 3]> = ROTATION;
+        position: [f64; 3] = POSITION;
+        /// Orientation; none by default.
+        axis_angle: Option<[f64; 3]> = AXIS_ANGLE;
     }
 }
 
@@ -167,23 +127,29 @@ struct Inner {
 
 type SharedWorld = Arc<Mutex<Inner>>;
 
-fn pose(xyz: [f64; 3], turn: Option<[f64; 3]>) -> Pose {
-    let rotation = turn.map_or(Quat::identity(), |turn| Quat::from_scaled_axis(Vec3::from(turn)));
-    Pose::from_parts(Vec3::from(xyz).into(), rotation)
+fn pose(position: [f64; 3], axis_angle: Option<[f64; 3]>) -> Pose {
+    let rotation = axis_angle.map_or(Quat::identity(), |turn| Quat::from_scaled_axis(Vec3::from(turn)));
+    Pose::from_parts(Vec3::from(position).into(), rotation)
 }
 
 functions! {
     FUNCTIONS {
-        /// Returns an empty world without a robot.
-        fn world(lua, spec: WorldSpec) -> ["softvt.World"] {
-            let params = PhysicsParams {
-                dt: spec.dt,
-                rayleigh_mass: spec.rayleigh_mass,
-                rayleigh_stiffness: spec.rayleigh_stiffness,
-                sleeping: spec.sleeping,
-                ..PhysicsParams::default()
-            };
-            let gravity = spec.gravity.map_or(Vec3::new(0.0, 0.0, -9.81), Vec3::from);
+        /// Returns an empty world: soft bodies among fixed or prescribed solids, without a robot.
+        fn world(lua) takes spec "softvt.WorldSpec" {
+            /// Time step.
+            dt: f64 = Type::Number("s", Range::closed(1e-5, 0.05)) => Number(1.0 / 60.0);
+            /// Mass-proportional Rayleigh damping.
+            rayleigh_mass: f64 = Type::Number("1/s", Range::closed(0.0, 1e3)) => Number(0.0);
+            /// Stiffness-proportional Rayleigh damping.
+            rayleigh_stiffness: f64 = Type::Number("s", Range::closed(0.0, 1.0)) => Number(5e-3);
+            /// Gravity; {0, 0, -9.81} by default.
+            gravity: Option<[f64; 3]> = Type::vector(3, "m/s²");
+            /// True if bodies at rest fall asleep.
+            sleeping: bool => Boolean(true);
+        } -> ["softvt.World"] {
+            let params =
+                PhysicsParams { dt, rayleigh_mass, rayleigh_stiffness, sleeping, ..PhysicsParams::default() };
+            let gravity = gravity.map_or(Vec3::new(0.0, 0.0, -9.81), Vec3::from);
             LuaWorld(Arc::new(Mutex::new(Inner {
                 world: World::new(params, gravity),
                 references: Vec::new(),
@@ -203,39 +169,31 @@ functions! {
 pub(crate) struct LuaWorld(SharedWorld);
 
 impl LuaWorld {
-    fn add_soft(&self, lua: &Lua, spec: &WorldSoftSpec) -> mlua::Result<LuaBody> {
-        let material = SoftMaterial {
-            youngs_pa: spec.youngs_pa,
-            poisson: spec.poisson,
-            density: spec.density,
-            resolution: spec.resolution,
-            grasp_spacing: spec.grasp_spacing,
-        };
-        let (name, shape) = (&spec.name, spec.shape.shape());
-        let wrong = |error: String| fail(lua, format!("world:soft: {error}"));
+    fn add_soft(
+        &self,
+        lua: &Lua,
+        name: &str,
+        shape: &Shape,
+        body: &SoftMaterial,
+        friction: Friction,
+        pose: Pose,
+    ) -> mlua::Result<LuaBody> {
+        let wrong = |error: &dyn fmt::Display| fail(lua, format!("world:soft: {error}"));
         let mut inner = lock(&self.0);
-        let model: Arc<FemModel> = {
+        let model = {
             let _pause = inner.clock.pause();
-            soft_model(name, shape, &material).map_err(|e| wrong(e.to_string()))?
+            soft_model(name, shape, body).map_err(|e| wrong(&e))?
         };
         let reserved = reserve_in_world(lua, model.bytes())?;
-        let reference =
-            ReferenceShape::new(&model.mesh.nodes, &model.mass).map_err(|e| wrong(e.to_string()))?;
-        let at = pose(spec.xyz, spec.turn);
-        let id = inner.world.add_soft(
-            name,
-            model,
-            Some(Arc::new(shape.clone())),
-            &at,
-            Friction::from(&spec.friction),
-        );
+        let reference = ReferenceShape::new(&model.mesh.nodes, &model.mass).map_err(|e| wrong(&e))?;
+        let id = inner.world.add_soft(name, model, Some(Arc::new(shape.clone())), &pose, friction);
         inner.references.push(reference);
         inner.reserved.push(reserved);
         Ok(LuaBody { world: self.0.clone(), id })
     }
 
     fn add_solid(&self, lua: &Lua, spec: &WorldSolidSpec, is_kinematic: bool) -> mlua::Result<LuaSolid> {
-        let at = pose(spec.xyz, spec.turn);
+        let at = pose(spec.position, spec.axis_angle);
         let reserved = reserve_in_world(lua, BYTES_PER_SOLID + spec.shape.bytes())?;
         let mut inner = lock(&self.0);
         inner.reserved.push(reserved);
@@ -245,8 +203,7 @@ impl LuaWorld {
             Some(id) => (BodyId::Kinematic(id), Pose::identity()),
             None => (BodyId::World, at),
         };
-        let friction = Friction::from(&spec.friction);
-        let collider = world.add_shape(&spec.name, parent, pose, spec.shape.shape(), friction);
+        let collider = world.add_shape(&spec.name, parent, pose, spec.shape.shape(), spec.friction);
         Ok(LuaSolid { world: self.0.clone(), kinematic, collider })
     }
 
@@ -275,7 +232,22 @@ class! {
         label(_) { "world".to_owned() }
         methods {
             /// Adds a soft body.
-            fn soft(lua, this, spec: WorldSoftSpec) -> ["softvt.Body"] { this.add_soft(lua, &spec)? }
+            fn soft(lua, this) takes spec "softvt.WorldSoft" {
+                /// Name in messages.
+                name: String => Text("body");
+                /// Shape.
+                shape: LuaShape;
+                /// Material.
+                body: Constructed<SoftMaterial>;
+                /// Friction of its surface.
+                friction: Friction;
+                /// Position of its frame.
+                position: [f64; 3] = POSITION;
+                /// Orientation; none by default.
+                axis_angle: Option<[f64; 3]> = AXIS_ANGLE;
+            } -> ["softvt.Body"] {
+                this.add_soft(lua, &name, shape.shape(), &body, friction, pose(position, axis_angle))?
+            }
             /// Adds a solid that solid:move_to moves.
             fn kinematic(lua, this, spec: WorldSolidSpec) -> ["softvt.Solid"] { this.add_solid(lua, &spec, true)? }
             /// Adds a solid that never moves.
@@ -383,30 +355,18 @@ pub(crate) struct LuaSolid {
     collider: ColliderId,
 }
 
-impl FromLua for LuaSolid {
-    fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
-        let solid =
-            value.as_userdata().and_then(|data| data.borrow::<Self>().ok().map(|solid| solid.clone()));
-        solid.ok_or_else(|| fail(lua, format!("expected a solid of a world, got {}", describe(&value))))
-    }
-}
-
-impl LuaType for LuaSolid {
-    const TYPE: Type = Type::Object("softvt.Solid");
-}
-
 class! {
     /// A solid of a world.
     LuaSolid: "softvt.Solid" {
         label(_) { "solid".to_owned() }
         methods {
             /// Prescribes the pose after the next step: position, m, and orientation as axis-angle, rad (none by default).
-            fn move_to(lua, this, xyz: [f64; 3] = POSITION, turn: Option<[f64; 3]> = ROTATION) -> [] {
+            fn move_to(lua, this, position: [f64; 3] = POSITION, axis_angle: Option<[f64; 3]> = AXIS_ANGLE) -> [] {
                 let Some(id) = this.kinematic else {
                     let message = "solid:move_to: a static solid cannot move; make it with world:kinematic";
                     return Err(fail(lua, message));
                 };
-                lock(&this.world).world.move_kinematic(id, pose(xyz, turn));
+                lock(&this.world).world.move_kinematic(id, pose(position, axis_angle));
             }
         }
     }

@@ -170,7 +170,7 @@ impl ScriptInstance {
         if let Some(spec) = self.result::<ExperimentSpec>()? {
             let _deadline = self.vm.call_deadline();
             let points = points(lua, &spec)?.len();
-            let columns = spec.spec.columns.unwrap_or_default();
+            let columns = spec.spec.columns;
             return Ok(Plan::Experiment { name: spec.spec.name, points, columns });
         }
         let specs = self.suites()?.filter(|specs| !specs.is_empty()).ok_or_else(|| {
@@ -279,7 +279,7 @@ fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Suite> {
         }
         tasks.push(task);
     }
-    let shifts = spec.shifts.iter().flatten().map(|shift| Shift {
+    let shifts = spec.shifts.iter().map(|shift| Shift {
         name: shift.name.clone(),
         unit: shift.unit.clone(),
         default: shift.default,
@@ -318,12 +318,8 @@ fn task(lua: &Lua, id: usize, spec: &TaskSpec, budget: u32) -> mlua::Result<Task
 }
 
 fn condition(lua: &Lua, spec: &ConditionSpec) -> mlua::Result<Condition> {
-    let shift = spec
-        .shift
-        .iter()
-        .flatten()
-        .map(|(name, value)| ShiftValue { name: name.clone(), value: *value })
-        .collect();
+    let shift =
+        spec.shift.iter().map(|(name, value)| ShiftValue { name: name.clone(), value: *value }).collect();
     let mut set = Vec::new();
     for (key, value) in spec.set.iter().flat_map(sorted_pairs) {
         let text = match &value {

@@ -61,12 +61,7 @@ impl PolicyFile {
         let (sources, instance) = ScriptSources::read(path, &[], limits)?;
         let policy = instance.policy()?;
         let observes_at = origin_of_key(&instance.vm.lua, &policy.table, &["observes", "cameras"]);
-        let PolicySpec { name, observes, replan, .. } = policy.spec;
-        let streams = SensorStreams {
-            cameras: observes.cameras.unwrap_or_default(),
-            tactile: observes.touch,
-            force: observes.force,
-        };
+        let PolicySpec { name, observes: streams, replan, .. } = policy.spec;
         let observes_at = observes_at.map_or_else(|| sources.main.clone(), |line| line.to_string());
         Ok(Self { name, replan, streams, observes_at, sources })
     }
@@ -176,15 +171,10 @@ impl LuaPolicy {
     fn checked_action(&self, table: &Table) -> Result<Action, ValidationError> {
         let lua = &self.instance.vm.lua;
         let spec = ActionSpec::from_lua(Value::Table(check(lua, ActionSpec::RECORD, table)?), lua)?;
-        let axis_angle_b = match (spec.axis_angle, spec.rotation) {
+        let axis_angle_b = match (spec.axis_angle, spec.quaternion) {
             (Some(axis_angle), None) => Vec3::from(axis_angle),
-            (None, Some(quat)) => match rotation_from_wxyz(quat) {
-                Some(quat) => rotation::axis_angle(&quat),
-                None => {
-                    return Err(ValidationError::new("expected a quaternion other than 0").inside("rotation"));
-                }
-            },
-            _ => return Err(ValidationError::new("give either axis_angle or rotation")),
+            (None, Some(wxyz)) => rotation::axis_angle(&rotation_from_wxyz(wxyz).unwrap_or_default()),
+            _ => return Err(ValidationError::new("give either axis_angle or quaternion")),
         };
         Ok(Action { position_b: Vec3::from(spec.position), axis_angle_b, closure: spec.closure })
     }

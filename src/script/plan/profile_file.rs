@@ -9,9 +9,7 @@ use mlua::Lua;
 
 use super::ScriptSources;
 use crate::{
-    policy::profile::{
-        ActionEncoding, ActionUnits, GripperValues, InputSource, PoseEncoding, Profile, ProfileInput,
-    },
+    policy::profile::{ActionEncoding, ActionUnits, InputSource, PoseEncoding, Profile, ProfileInput},
     script::{
         api::policy::{ActionEncodingSpec, InputKind, InputSpec, PoseKind, ProfileSpec},
         schema::Constructed,
@@ -103,11 +101,6 @@ impl ProfileReader<'_> {
     }
 
     fn actions(&self, spec: &ActionEncodingSpec) -> mlua::Result<ActionEncoding> {
-        let gripper = GripperValues {
-            open: spec.gripper.open,
-            closed: spec.gripper.closed,
-            binary: spec.gripper.binary,
-        };
         if spec.gripper.open == spec.gripper.closed {
             let message =
                 format!("actions.gripper.closed: is {} like open; nothing could close", spec.gripper.closed);
@@ -145,6 +138,6 @@ impl ProfileReader<'_> {
             scale: scale.unwrap_or(ActionUnits::IDENTITY.scale),
             offset: offset.unwrap_or(ActionUnits::IDENTITY.offset),
         });
-        Ok(ActionEncoding { pose, gripper, units, length: spec.length })
+        Ok(ActionEncoding { pose, gripper: spec.gripper, units, length: spec.length })
     }
 }

@@ -87,7 +87,7 @@ impl SceneBuilder {
         let rng = LuaRng::new(seed.clone(), RandomStream::Layout);
         vm.call::<()>(&task.layout.build, (current.clone(), rng))?;
         let nominal = lock(&current.scene).clone();
-        let declared = suite.shifts.as_deref().unwrap_or_default();
+        let declared = suite.shifts.as_slice();
         for ShiftValue { name, value } in shifts {
             let Some(shift) = declared.iter().find(|shift| shift.name == *name) else {
                 let names = declared.iter().map(|shift| shift.name.as_str());

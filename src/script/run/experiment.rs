@@ -117,7 +117,7 @@ fn read_summary(lua: &Lua, value: &Value) -> mlua::Result<ExperimentSummary> {
     }
     let spec: FinishSpec = lua.unpack(Value::Table(validate(lua, FinishSpec::RECORD, value)?))?;
     let mut files = Vec::new();
-    for (path, content) in spec.files.unwrap_or_default() {
+    for (path, content) in spec.files {
         let is_inside =
             |part: &str| !part.is_empty() && part != "." && part != ".." && !part.contains(['\\', ':', '\0']);
         if !path.split('/').all(is_inside) {

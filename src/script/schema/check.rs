@@ -5,7 +5,7 @@ use mlua::{Lua, Table, Value};
 use super::{Field, FieldDefault, Range, Record, Type, ValidationError, joined};
 use crate::{
     script::vm::{
-        error::{current_line, fail, fail_at},
+        error::{SourceLine, current_line, fail, fail_at},
         list::plain,
         source_map,
         value::{describe, number, sorted_pairs},
@@ -13,17 +13,20 @@ use crate::{
     text::{suggest, unknown_name},
 };
 
+/// Numbers whose largest magnitude is smaller have no direction.
+pub(crate) const MIN_LENGTH: f64 = 1e-9;
+
 impl Type {
     /// Checks `value` and returns it as it is stored: numbers converted, lists of the host as plain tables, nested tables
     /// as copies with their defaults.
     pub(crate) fn check(&self, lua: &Lua, value: &Value) -> Result<Value, ValidationError> {
         let value = &plain(lua, value)?;
-        let wrong = || ValidationError::new(format!("expected {}, got {}", self.describe(), describe(value)));
         if let Value::String(text) = value
             && text.to_str().is_err()
         {
             return Err(ValidationError::new(format!("expected UTF-8 text, got {}", describe(value))));
         }
+        let wrong = || self.expected(&describe(value));
         let kept = |accepted: bool| if accepted { Ok(value.clone()) } else { Err(wrong()) };
         match (self, value) {
             (Self::Number(_, range), _) => {
@@ -37,7 +40,7 @@ impl Type {
             (Self::Line, Value::String(_)) | (Self::Table(_), Value::Table(_)) => kept(true),
             (Self::Boolean, Value::Boolean(_)) | (Self::Function(_), Value::Function(_)) => kept(true),
             (Self::Any, value) => kept(!value.is_nil()),
-            (Self::Choice(names), Value::String(text)) => {
+            (Self::Choice(names) | Self::Direction(names, _), Value::String(text)) => {
                 let text = text.to_string_lossy();
                 match suggest(&text, names.iter().copied()) {
                     _ if names.contains(&text.as_str()) => kept(true),
@@ -47,12 +50,11 @@ impl Type {
                     None => Err(wrong()),
                 }
             }
-            (Self::Colour, Value::Table(list)) => {
-                check_numbers(lua, list, 3, Range::closed(0.0, 1.0), &wrong)
+            (Self::Vector(count, _, range), Value::Table(list)) => {
+                self.check_numbers(lua, list, *count, *range).map(|(list, _)| list)
             }
-            (Self::Vector(count, _), Value::Table(list)) => {
-                check_numbers(lua, list, *count, Range::ANY, &wrong)
-            }
+            (Self::Direction(..), Value::Table(list)) => self.check_length(lua, list, 3, "a direction"),
+            (Self::Quaternion(_), Value::Table(list)) => self.check_length(lua, list, 4, "a quaternion"),
             (Self::List(of), Value::Table(list)) => check_list(lua, of, list, &wrong),
             (Self::Map(of), Value::Table(map)) => check_map(lua, of, map),
             (Self::Nested(record), Value::Table(table)) => check(lua, record, table).map(Value::Table),
@@ -62,8 +64,67 @@ impl Type {
             (Self::Object(class), Value::UserData(object)) => {
                 kept(object.type_name().is_ok_and(|name| name.to_string_lossy() == *class))
             }
-            (Self::OneOf(types), _) => check_one_of(lua, types, value, &wrong),
+            (Self::OneOf(types), _) => {
+                // An error inside of the value is more helpful than one about the whole value.
+                let mut inner = None;
+                for ty in *types {
+                    match ty.check(lua, value) {
+                        Ok(value) => return Ok(value),
+                        Err(error) if !error.path.is_empty() => inner = inner.or(Some(error)),
+                        Err(_) => {}
+                    }
+                }
+                Err(inner.unwrap_or_else(wrong))
+            }
             _ => Err(wrong()),
+        }
+    }
+
+    fn expected(&self, got: &str) -> ValidationError {
+        ValidationError::new(format!("expected {}, got {got}", self.describe()))
+    }
+
+    /// Checks a list of exactly `count` finite numbers in `range`. The error is at the wrong entry, or at the list itself if
+    /// its length is wrong.
+    fn check_numbers(
+        &self,
+        lua: &Lua,
+        list: &Table,
+        count: usize,
+        range: Range,
+    ) -> Result<(Value, Vec<f64>), ValidationError> {
+        let entries = list.pairs::<Value, Value>().take(count + 1).count();
+        let values = (1..=count).map(|place| list.raw_get::<Value>(place));
+        let values: Vec<Value> = values.collect::<mlua::Result<_>>()?;
+        if entries != count || values.iter().any(Value::is_nil) {
+            let length = list.raw_len();
+            let is_list = length > 0 && list.pairs::<Value, Value>().count() == length;
+            let got = if is_list { format!("a list of {length}") } else { "a table".to_owned() };
+            return Err(self.expected(&got));
+        }
+        let checked = values.iter().enumerate().map(|(index, value)| {
+            let number = number(value).filter(|number| range.holds(*number));
+            number.ok_or_else(|| {
+                let message = format!("expected a number{}, got {}", range.describe(), describe(value));
+                ValidationError::new(message).inside(format!("[{}]", index + 1))
+            })
+        });
+        let numbers: Vec<f64> = checked.collect::<Result<_, _>>()?;
+        Ok((Value::Table(lua.create_sequence_from(numbers.iter().copied())?), numbers))
+    }
+
+    /// The same for numbers of any size that are not all 0.
+    fn check_length(
+        &self,
+        lua: &Lua,
+        list: &Table,
+        count: usize,
+        what: &str,
+    ) -> Result<Value, ValidationError> {
+        let (list, numbers) = self.check_numbers(lua, list, count, Range::ANY)?;
+        match numbers.iter().any(|number| number.abs() >= MIN_LENGTH) {
+            true => Ok(list),
+            false => Err(ValidationError::new(format!("expected {what}, got one of length 0"))),
         }
     }
 }
@@ -79,61 +140,6 @@ fn whole(value: &Value) -> Option<i64> {
         Value::Integer(n) => Some(*n),
         Value::Number(n) if n.fract() == 0.0 && n.abs() < 9e15 => Some(*n as i64),
         _ => None,
-    }
-}
-
-/// Returns the result of the first type that accepts the value. An error inside of the value is more helpful than one
-/// about the whole value.
-fn check_one_of(
-    lua: &Lua,
-    types: &[Type],
-    value: &Value,
-    wrong: &dyn Fn() -> ValidationError,
-) -> Result<Value, ValidationError> {
-    let mut inner = None;
-    for ty in types {
-        match ty.check(lua, value) {
-            Ok(value) => return Ok(value),
-            Err(error) if !error.path.is_empty() => inner = inner.or(Some(error)),
-            Err(_) => {}
-        }
-    }
-    Err(inner.unwrap_or_else(wrong))
-}
-
-/// Checks a list of exactly `count` finite numbers in `range`. The error is at the wrong entry, or at the list itself if its
-/// length is wrong.
-fn check_numbers(
-    lua: &Lua,
-    list: &Table,
-    count: usize,
-    range: Range,
-    wrong: &dyn Fn() -> ValidationError,
-) -> Result<Value, ValidationError> {
-    let entries = list.pairs::<Value, Value>().take(count + 1).count();
-    let values = (1..=count).map(|place| list.raw_get::<Value>(place));
-    let values: Vec<Value> = values.collect::<mlua::Result<_>>()?;
-    if entries != count || values.iter().any(Value::is_nil) {
-        return Err(with_length(list, wrong()));
-    }
-    let checked = values.iter().enumerate().map(|(index, value)| {
-        let number = number(value).filter(|number| range.holds(*number));
-        number.ok_or_else(|| {
-            let message = format!("expected a number{}, got {}", range.describe(), describe(value));
-            ValidationError::new(message).inside(format!("[{}]", index + 1))
-        })
-    });
-    let numbers: Vec<f64> = checked.collect::<Result<_, _>>()?;
-    Ok(Value::Table(lua.create_sequence_from(numbers)?))
-}
-
-/// Replaces `a table` by `a list of 2` in a message about a list.
-fn with_length(list: &Table, error: ValidationError) -> ValidationError {
-    let length = list.raw_len();
-    let is_list = length > 0 && list.pairs::<Value, Value>().count() == length;
-    match error.message.strip_suffix(&describe(&Value::Table(list.clone()))).filter(|_| is_list) {
-        Some(before) => ValidationError { message: format!("{before}a list of {length}"), ..error },
-        None => error,
     }
 }
 
@@ -231,15 +237,12 @@ pub(crate) fn validate(lua: &Lua, record: &Record, value: &Value) -> mlua::Resul
 /// The constructor of `record`: checks a table and marks it, so that it also refuses to be read by unknown keys.
 pub(crate) fn make(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Result<Table> {
     let made = validate(lua, record, value)?;
+    if let Some(check) = record.relations {
+        check(lua, record, &made)?;
+    }
     made.set_metatable(Some(metatable(lua, record)?))?;
     source_map::record_origin(lua, &made)?;
     Ok(made)
-}
-
-/// Checks a made table again, since a script may have written to it, and returns the checked copy.
-pub(crate) fn recheck(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<Table> {
-    check(lua, record, table)
-        .map_err(|error| fail(lua, format!("{} (changed after it was made)", error.describe(record.label))))
 }
 
 /// True if the constructor of `record` made `table`.
@@ -270,11 +273,23 @@ fn metatable(lua: &Lua, record: &'static Record) -> mlua::Result<Table> {
 
 /// The error of a script at the line of the offending key, as far as the source text shows it.
 pub(crate) fn error_at_key(lua: &Lua, label: &str, error: &ValidationError) -> mlua::Error {
-    let message = error.describe(label);
-    fail_at(lua, current_line(lua).map(|call| source_map::find_key(lua, call, &error.path)), message)
+    error_at(lua, current_line(lua), label, error)
 }
 
-/// The error of a script about the field `key` of a table, for what a single field's type does not express.
-pub(crate) fn invalid(lua: &Lua, record: &Record, key: &str, message: impl Into<String>) -> mlua::Error {
-    error_at_key(lua, record.label, &ValidationError::new(message).inside(key))
+/// The error of a function of a script about a table that it was given, at the line of the file that called the function.
+pub(crate) fn error_of_caller(lua: &Lua, label: &str, error: &ValidationError) -> mlua::Error {
+    let line = |level| lua.inspect_stack(level, |function| SourceLine::running(&function));
+    let mut lines = (0..).map_while(line).flatten();
+    let own = lines.next();
+    let caller = own.as_ref().and_then(|own| lines.find(|line| line.file != own.file));
+    error_at(lua, caller.or(own), label, error)
+}
+
+fn error_at(lua: &Lua, call: Option<SourceLine>, label: &str, error: &ValidationError) -> mlua::Error {
+    fail_at(lua, call.map(|call| source_map::find_key(lua, call, &error.path)), error.describe(label))
+}
+
+/// The error of a script about the field `key` of the table `label`, for what a single field's type does not express.
+pub(crate) fn invalid(lua: &Lua, label: &str, key: &str, message: impl Into<String>) -> mlua::Error {
+    error_at_key(lua, label, &ValidationError::new(message).inside(key))
 }

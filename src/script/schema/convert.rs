@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, ops::Deref};
 
 use mlua::{FromLua, Function, Lua, Table, Value};
 
-use super::{FieldDefault, Range, Record, Type, is_constructed, recheck};
+use super::{ApiObject, FieldDefault, Range, Record, Type, check::check};
 use crate::script::vm::{error::fail, value::describe};
 
 /// A Rust type that checked Lua values convert to.
@@ -41,7 +41,11 @@ lua_types! {
 }
 
 impl<const N: usize> LuaType for [f64; N] {
-    const TYPE: Type = Type::Vector(N, "");
+    const TYPE: Type = Type::vector(N, "");
+}
+
+impl<T: ApiObject> LuaType for T {
+    const TYPE: Type = Type::Object(T::NAME);
 }
 
 impl<T: LuaType> LuaType for Option<T> {
@@ -71,7 +75,7 @@ impl LuaType for Unchecked {
     const CHECKED: bool = false;
 }
 
-/// A struct declared by [`record!`].
+/// A struct with a [`Record`], declared by [`record!`] or [`record_of!`].
 pub(crate) trait RecordType: FromLua {
     const RECORD: &'static Record;
     const RECORDS: &'static [&'static Record] = &[Self::RECORD];
@@ -95,13 +99,13 @@ impl<T> Deref for Constructed<T> {
 
 impl<T: RecordType> FromLua for Constructed<T> {
     fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
-        match value {
-            Value::Table(table) if is_constructed(lua, T::RECORD, &table) => {
-                let spec = lua.unpack(Value::Table(recheck(lua, T::RECORD, &table)?))?;
-                Ok(Self { spec, table })
-            }
-            other => Err(fail(lua, format!("expected {}{{…}}, got {}", T::RECORD.kind, describe(&other)))),
-        }
+        let Value::Table(table) = &value else {
+            return Err(fail(lua, format!("expected {}{{…}}, got {}", T::RECORD.kind, describe(&value))));
+        };
+        let checked = check(lua, T::RECORD, table).map_err(|error| {
+            fail(lua, format!("{} (changed after it was made)", error.describe(T::RECORD.label)))
+        })?;
+        Ok(Self { spec: lua.unpack(Value::Table(checked))?, table: table.clone() })
     }
 }
 
@@ -117,12 +121,33 @@ macro_rules! first {
 }
 pub(crate) use first;
 
+/// The list of [`Field`](super::Field)s that a declaration describes.
+macro_rules! fields {
+    ($(
+        $(#[doc = $doc:literal])+
+        $field:ident : $rust:ty $(= $ty:expr)? $(=> $presence:ident $(($default:expr))?)? ;
+    )*) => {
+        &[$($crate::script::schema::Field {
+            name: stringify!($field),
+            ty: $crate::script::schema::convert::first!(
+                $($ty,)? <$rust as $crate::script::schema::LuaType>::TYPE
+            ),
+            presence: $crate::script::schema::convert::first!(
+                $($crate::script::schema::FieldDefault::$presence $(($default))?,)?
+                <$rust as $crate::script::schema::LuaType>::PRESENCE
+            ),
+            doc: concat!($($doc),+),
+        }),*]
+    };
+}
+pub(crate) use fields;
+
 /// Declares records.
 ///
 /// ```text
 /// record! {
 ///     /// Documentation of the record, for Rust, stubs and reference alike.
-///     Name: "softvt.Class" as "label in messages", constructor "softvt.name" {
+///     Name: "softvt.Class" as "label in messages", constructor "softvt.name", relations check_relations {
 ///         /// Documentation of the field.
 ///         field: RustType = Type::Number("m", Range::POSITIVE) => Number(1.0);
 ///     }
@@ -130,17 +155,15 @@ pub(crate) use first;
 /// ```
 ///
 /// The Lua type may be left out where [`LuaType`] of the Rust type says enough, and so may the default: an `Option` may then
-/// be absent, and a nested record of which every field has a default. Gives the struct with its conversion from a checked
-/// table ([`FromLua`]) and the [`Record`] by which tables are checked.
+/// be absent, and a nested record of which every field has a default. Constructor and relations are optional. Gives the
+/// struct with its conversion from a checked table ([`FromLua`]) and the [`Record`] by which tables are checked.
 macro_rules! record {
     ($(
         $(#[doc = $doc:literal])+
-        $name:ident : $class:literal as $label:literal $(, constructor $kind:literal)? {
-            $(
-                $(#[doc = $field_doc:literal])+
-                $field:ident : $rust:ty $(= $ty:expr)? $(=> $presence:ident($default:expr))? ;
-            )*
-        }
+        $name:ident : $class:literal as $label:literal $(, constructor $kind:literal)? $(, relations $check:path)? {$(
+            $(#[doc = $field_doc:literal])+
+            $field:ident : $rust:ty $(= $ty:expr)? $(=> $presence:ident $(($default:expr))?)? ;
+        )*}
     )+) => {$(
         $(#[doc = $doc])+
         #[derive(Clone, Debug)]
@@ -148,23 +171,38 @@ macro_rules! record {
             $( $(#[doc = $field_doc])+ pub(crate) $field: $rust, )*
         }
 
+        $crate::script::schema::record_of! {
+            $(#[doc = $doc])+
+            $name: $class as $label $(, constructor $kind)? $(, relations $check)? {$(
+                $(#[doc = $field_doc])+
+                $field: $rust $(= $ty)? $(=> $presence $(($default))?)? ;
+            )*}
+        }
+    )+};
+}
+pub(crate) use record;
+
+/// Declares records whose struct is already defined, with fields of the same names: scripts then write such a struct as a
+/// table. The syntax is that of [`record!`].
+macro_rules! record_of {
+    ($(
+        $(#[doc = $doc:literal])+
+        $name:ident : $class:literal as $label:literal $(, constructor $kind:literal)? $(, relations $check:path)? {$(
+            $(#[doc = $field_doc:literal])+
+            $field:ident : $rust:ty $(= $ty:expr)? $(=> $presence:ident $(($default:expr))?)? ;
+        )*}
+    )+) => {$(
         impl $crate::script::schema::RecordType for $name {
             const RECORD: &'static $crate::script::schema::Record = &$crate::script::schema::Record {
                 label: $label,
                 class: $class,
                 kind: $crate::script::schema::convert::first!($($kind,)? $class),
                 doc: concat!($($doc),+),
-                fields: &[$($crate::script::schema::Field {
-                    name: stringify!($field),
-                    ty: $crate::script::schema::convert::first!(
-                        $($ty,)? <$rust as $crate::script::schema::LuaType>::TYPE
-                    ),
-                    presence: $crate::script::schema::convert::first!(
-                        $($crate::script::schema::FieldDefault::$presence($default),)?
-                        <$rust as $crate::script::schema::LuaType>::PRESENCE
-                    ),
-                    doc: concat!($($field_doc),+),
-                }),*],
+                fields: $crate::script::schema::convert::fields! {$(
+                    $(#[doc = $field_doc])+
+                    $field: $rust $(= $ty)? $(=> $presence $(($default))?)? ;
+                )*},
+                relations: $crate::script::schema::convert::first!($(Some($check),)? None),
             };
         }
 
@@ -184,16 +222,24 @@ macro_rules! record {
         }
     )+};
 }
-pub(crate) use record;
+pub(crate) use record_of;
 
-/// Declares the strings that stand for the values of an enum: `choice! { Axis { "x" => Axis::X, … } }`.
+/// Declares the strings that stand for the values of an enum: `choice! { Axis { "x" => X, … } }`. `enum Axis` instead of `Axis`
+/// defines the enum too.
 macro_rules! choice {
-    ($name:ty { $($text:literal => $value:expr),+ $(,)? }) => {
+    ($(#[doc = $doc:literal])+ enum $name:ident { $($text:literal => $variant:ident),+ $(,)? }) => {
+        $(#[doc = $doc])+
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub(crate) enum $name { $($variant),+ }
+
+        $crate::script::schema::choice! { $name { $($text => $variant),+ } }
+    };
+    ($name:ty { $($text:literal => $variant:ident),+ $(,)? }) => {
         impl mlua::FromLua for $name {
             fn from_lua(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
                 let text: String = lua.unpack(value)?;
                 match text.as_str() {
-                    $($text => Ok($value),)+
+                    $($text => Ok(Self::$variant),)+
                     other => Err($crate::script::vm::error::fail(lua, format!("unexpected {other:?}"))),
                 }
             }
@@ -202,6 +248,12 @@ macro_rules! choice {
         impl $crate::script::schema::LuaType for $name {
             const TYPE: $crate::script::schema::Type =
                 $crate::script::schema::Type::Choice(&[$($text),+]);
+        }
+
+        impl $crate::script::schema::object::IntoFieldValue for $name {
+            fn into_field_value(self, lua: &mlua::Lua) -> mlua::Result<$crate::script::schema::FieldValue> {
+                match self { $(Self::$variant => $text,)+ }.into_field_value(lua)
+            }
         }
     };
 }

@@ -9,8 +9,12 @@ pub(crate) mod check;
 pub(crate) mod convert;
 pub(crate) mod object;
 
-pub(crate) use check::{error_at_key, invalid, is_constructed, make, recheck, validate};
-pub(crate) use convert::{Constructed, HasTable, LuaType, RecordType, Unchecked, choice, one_of, record};
+use mlua::{Lua, Table};
+
+pub(crate) use check::{error_at_key, invalid, is_constructed, make, validate};
+pub(crate) use convert::{
+    Constructed, HasTable, LuaType, RecordType, Unchecked, choice, one_of, record, record_of,
+};
 pub(crate) use object::{
     ApiObject, Class, FieldValue, Function, Signature, class, functions, output, strict_table,
 };
@@ -30,10 +34,12 @@ pub(crate) enum Type {
     Name,
     /// `true` or `false`.
     Boolean,
-    /// A list of a fixed number of numbers in a unit.
-    Vector(usize, &'static str),
-    /// A list of three numbers in 0..1, linear RGB.
-    Colour,
+    /// A list of a fixed number of numbers in a unit, each within the range.
+    Vector(usize, &'static str, Range),
+    /// A vector of any length but 0, in a frame, or one of these names of vectors.
+    Direction(&'static [&'static str], &'static str),
+    /// A quaternion w, x, y, z of any length but 0, in a frame.
+    Quaternion(&'static str),
     /// One of these strings.
     Choice(&'static [&'static str]),
     /// A function, with its LuaCATS signature.
@@ -95,9 +101,19 @@ pub(crate) struct Record {
     pub kind: &'static str,
     pub doc: &'static str,
     pub fields: &'static [Field],
+    /// Checks relations between the fields of a table whose fields are valid.
+    pub relations: Option<RelationCheck>,
 }
 
+/// See [`Record::relations`].
+pub(crate) type RelationCheck = fn(&Lua, &Record, &Table) -> mlua::Result<()>;
+
 impl Record {
+    /// `suite` of `softvt.suite`.
+    pub(crate) fn constructor(&self) -> &'static str {
+        self.kind.rsplit('.').next().unwrap_or(self.kind)
+    }
+
     /// [`FieldDefault::Empty`] if every field may be left out, else [`FieldDefault::Required`].
     pub(crate) const fn presence(&self) -> FieldDefault {
         let mut index = 0;
@@ -174,6 +190,16 @@ impl Range {
 }
 
 impl Type {
+    /// A list of numbers of any size.
+    pub(crate) const fn vector(count: usize, unit: &'static str) -> Self {
+        Self::Vector(count, unit, Range::ANY)
+    }
+
+    /// Linear RGB from 0 to `max`.
+    pub(crate) const fn colour(max: f64) -> Self {
+        Self::Vector(3, "linear RGB", Range::closed(0.0, max))
+    }
+
     /// The expected value for a message: `seconds in 0..10`.
     pub(crate) fn describe(&self) -> String {
         match self {
@@ -184,9 +210,16 @@ impl Type {
             Self::Table(_) => "a table".into(),
             Self::Name => "a name of letters, digits, _ and -".into(),
             Self::Boolean => "true or false".into(),
-            Self::Vector(count, "") => format!("a list of {count} numbers"),
-            Self::Vector(count, unit) => format!("a list of {count} numbers ({unit})"),
-            Self::Colour => "a list of 3 numbers in 0..1 (linear RGB)".into(),
+            Self::Vector(count, "", range) => format!("a list of {count} numbers{}", range.describe()),
+            Self::Vector(count, unit, range) => {
+                format!("a list of {count} numbers{} ({unit})", range.describe())
+            }
+            Self::Direction([], frame) => Self::vector(3, frame).describe(),
+            Self::Direction(names, frame) => {
+                format!("{} or {}", Self::Choice(names).describe(), Self::vector(3, frame).describe())
+            }
+            Self::Quaternion("") => Self::vector(4, "w, x, y, z").describe(),
+            Self::Quaternion(frame) => format!("a list of 4 numbers (w, x, y, z, {frame})"),
             Self::Choice(names) => {
                 let quoted: Vec<_> = names.iter().map(|name| format!("{name:?}")).collect();
                 format!("one of {}", quoted.join(", "))

@@ -1,9 +1,11 @@
 //! Objects of the host in Lua, tables that it returns, and functions: their declarations, and the one place where arguments
 //! are taken and fields are read and written.
 
-use mlua::{IntoLua, Lua, MetaMethod, MultiValue, Table, UserData, UserDataFields, UserDataMethods, Value};
+use mlua::{
+    FromLua, IntoLua, Lua, MetaMethod, MultiValue, Table, UserData, UserDataFields, UserDataMethods, Value,
+};
 
-use super::{FieldDefault, Type, error_at_key, make};
+use super::{FieldDefault, Type, error_at_key};
 use crate::{
     geometry::Vec3,
     script::vm::{error::fail, list::LuaList, value::describe},
@@ -97,7 +99,7 @@ impl Class {
 /// The value of a field of an object.
 pub(crate) enum FieldValue {
     Value(Value),
-    /// Numbers that scripts may write one by one.
+    /// Numbers that scripts may write one by one, if the field is writable.
     Numbers(Vec<f64>),
     /// A list that cannot be written, and how to change it instead.
     Fixed(Table, &'static str),
@@ -106,6 +108,12 @@ pub(crate) enum FieldValue {
 /// Results of getters.
 pub(crate) trait IntoFieldValue {
     fn into_field_value(self, lua: &Lua) -> mlua::Result<FieldValue>;
+}
+
+/// Types of fields that setters receive as scripts wrote them.
+pub(crate) trait FromChecked: Sized {
+    /// Converts a value that the field's [`Type`] accepts.
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self>;
 }
 
 impl IntoFieldValue for FieldValue {
@@ -120,9 +128,27 @@ impl IntoFieldValue for Vec3 {
     }
 }
 
+impl FromChecked for Vec3 {
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
+        lua.unpack::<[f64; 3]>(value).map(Self::from)
+    }
+}
+
 impl<const N: usize> IntoFieldValue for [f64; N] {
     fn into_field_value(self, _: &Lua) -> mlua::Result<FieldValue> {
         Ok(FieldValue::Numbers(self.to_vec()))
+    }
+}
+
+impl<const N: usize> FromChecked for [f64; N] {
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
+        lua.unpack(value)
+    }
+}
+
+impl<T: ApiObject> IntoFieldValue for T {
+    fn into_field_value(self, lua: &Lua) -> mlua::Result<FieldValue> {
+        self.into_lua(lua).map(FieldValue::Value)
     }
 }
 
@@ -133,10 +159,22 @@ macro_rules! plain_field_values {
                 self.into_lua(lua).map(FieldValue::Value)
             }
         }
+
+        impl FromChecked for $ty {
+            fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
+                lua.unpack(value)
+            }
+        }
     )+ };
 }
 
-plain_field_values!(f64, Option<f64>, usize, u32, bool, &str, String, Value, Table);
+plain_field_values!(f64, Option<f64>, usize, u32, bool, String, Value, Table);
+
+impl IntoFieldValue for &str {
+    fn into_field_value(self, lua: &Lua) -> mlua::Result<FieldValue> {
+        self.into_lua(lua).map(FieldValue::Value)
+    }
+}
 
 /// A list that cannot be written; `hint` says how to change it instead.
 pub(crate) fn fixed_list<T: IntoLua>(
@@ -147,29 +185,37 @@ pub(crate) fn fixed_list<T: IntoLua>(
     Ok(FieldValue::Fixed(lua.create_sequence_from(entries)?, hint))
 }
 
-/// Hint of [`fixed_list`] for measured values.
+/// Hint for lists of measured values.
 pub(crate) const MEASURED: &str = "it is measured";
 
-type Getter<T> = fn(&Lua, &T) -> mlua::Result<FieldValue>;
-type Setter<T> = fn(&Lua, &T, Value) -> mlua::Result<()>;
-type Body<T> = fn(&Lua, &T, MultiValue) -> mlua::Result<MultiValue>;
+/// The object that a value holds. Arguments are checked before, so that another value is an error of the interface itself.
+pub(crate) fn object_of<T: ApiObject>(lua: &Lua, value: &Value) -> mlua::Result<T> {
+    let object = value.as_userdata().and_then(|data| data.borrow::<T>().ok().map(|object| object.clone()));
+    object.ok_or_else(|| fail(lua, format!("expected a {}, got {}", T::NAME, describe(value))))
+}
+
+pub(crate) type Getter<T> = fn(&Lua, &T) -> mlua::Result<FieldValue>;
+pub(crate) type Setter<T> = fn(&Lua, &T, Value) -> mlua::Result<()>;
+pub(crate) type Method<T> = fn(&Lua, &T, MultiValue) -> mlua::Result<MultiValue>;
 
 /// An object that scripts hold: a cheap handle. Declared by [`class!`].
-pub(crate) trait ApiObject: Clone + Send + Sync + UserData + 'static {
+pub(crate) trait ApiObject: Clone + Send + Sync + UserData + FromLua + 'static {
+    /// Name of the class, on which types in its own description may depend.
+    const NAME: &'static str;
     const CLASS: &'static Class;
     /// One per field of the class.
     const GETTERS: &'static [Getter<Self>];
     /// One per field of the class; `None` for those that are read-only.
     const SETTERS: &'static [Option<Setter<Self>>];
     /// One per method of the class that is not implemented in Lua.
-    const METHODS: &'static [Body<Self>];
+    const METHODS: &'static [Method<Self>];
 
     /// Name in messages: `scene:camera("wrist")`.
     fn label(&self) -> String;
 
     /// Result of `tostring`.
     fn text(&self) -> String {
-        Self::CLASS.name.to_owned()
+        Self::NAME.to_owned()
     }
 }
 
@@ -184,14 +230,18 @@ pub(crate) trait ApiObject: Clone + Send + Sync + UserData + 'static {
 ///         fields {                                             // read-only
 ///             /// Documentation.
 ///             name: "LuaCATS type" { get(lua, this) { … } }
+///             name: "LuaCATS type" or "how to change it instead" { get(lua, this) { … } }
 ///         }
 ///         writable {
 ///             /// Documentation.
-///             name: Type::… { get(lua, this) { … } set(lua, this, value: RustType) { … } }
+///             name: Type::… => path.to.field;                  // of the target of RustType::read and RustType::change
+///             name: Type::… => { get(lua, this) { … } set(lua, this, value: RustType) { … } }
 ///         }
 ///         methods {
-///             /// Documentation; of a method that takes one record, that of the record if left out.
+///             /// Documentation.
 ///             fn name(lua, this, argument: RustType = Type::…) -> ["LuaCATS type"] { … }
+///             /// Documentation of the method and of the table, which comes last and whose fields the body uses by name.
+///             fn name(lua, this) takes spec "softvt.Table" { … as in record! … } -> ["LuaCATS type"] { … }
 ///         }
 ///         lua_methods {                                        // implemented in Lua, with arguments checked by `arguments`
 ///             /// Documentation.
@@ -201,7 +251,7 @@ pub(crate) trait ApiObject: Clone + Send + Sync + UserData + 'static {
 /// }
 /// ```
 ///
-/// Bodies may use `?` on [`mlua::Result`].
+/// Bodies may use `?` on [`mlua::Result`]. Numbers of read-only fields are read-only lists.
 macro_rules! class {
     (
         $(#[doc = $doc:literal])+
@@ -216,14 +266,18 @@ macro_rules! class {
             )*})?
             $(writable {$(
                 $(#[doc = $write_doc:literal])+
-                $write:ident : $write_type:expr => {
+                $write:ident : $write_type:expr => $($($path:ident).+ ;)? $({
                     get($get_lua:pat_param, $get_this:pat_param) $get:block
                     set($set_lua:pat_param, $set_this:pat_param, $value:ident : $value_type:ty) $set:block
-                }
+                })?
             )*})?
             $(methods {$(
-                $(#[doc = $method_doc:literal])*
+                $(#[doc = $method_doc:literal])+
                 fn $method:ident($method_lua:pat_param, $method_this:pat_param $(, $arg:ident : $arg_type:ty $(= $arg_lua:expr)?)*)
+                    $(takes $table:ident $table_class:literal {$(
+                        $(#[doc = $field_doc:literal])+
+                        $field:ident : $field_type:ty $(= $field_lua:expr)? $(=> $presence:ident $(($default:expr))?)? ;
+                    )*})?
                     -> [$($return:literal),*] $body:block
             )*})?
             $(lua_methods {$(
@@ -234,8 +288,9 @@ macro_rules! class {
         }
     ) => {
         impl $crate::script::schema::ApiObject for $object {
+            const NAME: &'static str = $class;
             const CLASS: &'static $crate::script::schema::Class = &$crate::script::schema::Class {
-                name: $class,
+                name: Self::NAME,
                 doc: concat!($($doc),+),
                 fields: &[
                     $($($crate::script::schema::object::LuaField {
@@ -254,36 +309,57 @@ macro_rules! class {
                 ],
                 methods: &[
                     $($($crate::script::schema::object::signature!(
-                        [$($method_doc)*] $method($($arg : $arg_type $(= $arg_lua)?),*) -> [$($return),*]
+                        [$($method_doc)*] $method($($arg : $arg_type $(= $arg_lua)?),*)
+                        $(takes $table $table_class {$(
+                            $(#[doc = $field_doc])+
+                            $field : $field_type $(= $field_lua)? $(=> $presence $(($default))?)? ;
+                        )*})?
+                        -> [$($return),*]
                     ),)*)?
                     $($($crate::script::schema::object::signature!(
                         [$($lua_method_doc)+] $lua_method($($lua_arg : $lua_arg_type $(= $lua_arg_lua)?),*)
-                            -> [$($lua_return),*]
+                        -> [$($lua_return),*]
                     ),)*)?
                 ],
             };
-            const GETTERS: &'static [fn(&mlua::Lua, &Self) -> mlua::Result<$crate::script::schema::FieldValue>] = &[
-                $($(|state: &mlua::Lua, object: &Self| -> mlua::Result<$crate::script::schema::FieldValue> {
+            const GETTERS: &'static [$crate::script::schema::object::Getter<Self>] = &[
+                $($(|state, object| {
                     let ($read_lua, $read_this) = (state, object);
                     $crate::script::schema::object::IntoFieldValue::into_field_value($read_get, state)
                 },)*)?
-                $($(|state: &mlua::Lua, object: &Self| -> mlua::Result<$crate::script::schema::FieldValue> {
-                    let ($get_lua, $get_this) = (state, object);
-                    $crate::script::schema::object::IntoFieldValue::into_field_value($get, state)
+                $($(|state, object| {
+                    $({
+                        let value = object.read(|target| target $(.$path)+);
+                        $crate::script::schema::object::IntoFieldValue::into_field_value(value, state)
+                    })?
+                    $({
+                        let ($get_lua, $get_this) = (state, object);
+                        $crate::script::schema::object::IntoFieldValue::into_field_value($get, state)
+                    })?
                 },)*)?
             ];
-            const SETTERS: &'static [Option<fn(&mlua::Lua, &Self, mlua::Value) -> mlua::Result<()>>] = &[
+            const SETTERS: &'static [Option<$crate::script::schema::object::Setter<Self>>] = &[
                 $($({ let _ = stringify!($read); None },)*)?
-                $($(Some(|state: &mlua::Lua, object: &Self, value: mlua::Value| -> mlua::Result<()> {
-                    let $value: $value_type = mlua::FromLua::from_lua(value, state)?;
-                    let ($set_lua, $set_this) = (state, object);
-                    $set
+                $($(Some(|state, object, value| {
+                    $(
+                        let value = $crate::script::schema::object::FromChecked::from_checked(value, state)?;
+                        object.change(state, |target| target $(.$path)+ = value);
+                    )?
+                    $(
+                        let $value: $value_type = mlua::FromLua::from_lua(value, state)?;
+                        let ($set_lua, $set_this) = (state, object);
+                        $set
+                    )?
                     Ok(())
                 }),)*)?
             ];
-            const METHODS: &'static [fn(&mlua::Lua, &Self, mlua::MultiValue) -> mlua::Result<mlua::MultiValue>] = &[
-                $($(|state: &mlua::Lua, object: &Self, values: mlua::MultiValue| -> mlua::Result<mlua::MultiValue> {
-                    let ($($arg,)*): ($($arg_type,)*) = mlua::FromLuaMulti::from_lua_multi(values, state)?;
+            const METHODS: &'static [$crate::script::schema::object::Method<Self>] = &[
+                $($(|state, object, values| {
+                    $crate::script::schema::object::bind_arguments! {
+                        (values, state)
+                        $($arg : $arg_type),*
+                        $(; takes $table $($field : $field_type),*)?
+                    }
                     let ($method_lua, $method_this) = (state, object);
                     mlua::IntoLuaMulti::into_lua_multi($body, state)
                 },)*)?
@@ -300,6 +376,12 @@ macro_rules! class {
             })?
         }
 
+        impl mlua::FromLua for $object {
+            fn from_lua(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
+                $crate::script::schema::object::object_of(lua, &value)
+            }
+        }
+
         impl mlua::UserData for $object {
             fn add_fields<F: mlua::UserDataFields<Self>>(fields: &mut F) {
                 $crate::script::schema::object::add_fields::<Self, F>(fields);
@@ -313,23 +395,58 @@ macro_rules! class {
 }
 pub(crate) use class;
 
+/// Declares variables for the checked arguments of a call: the parameters, and the fields of the table that comes last.
+macro_rules! bind_arguments {
+    (($values:ident, $lua:ident) $($arg:ident : $arg_type:ty),*) => {
+        let ($($arg,)*): ($($arg_type,)*) = mlua::FromLuaMulti::from_lua_multi($values, $lua)?;
+    };
+    (($values:ident, $lua:ident) $($arg:ident : $arg_type:ty),* ; takes $table:ident $($field:ident : $type:ty),*) => {
+        let ($($arg,)* $table,): ($($arg_type,)* mlua::Table,) = mlua::FromLuaMulti::from_lua_multi($values, $lua)?;
+        $(let $field: $type = $table.raw_get(stringify!($field))?;)*
+    };
+}
+pub(crate) use bind_arguments;
+
 /// The [`Signature`] of a function or method.
 macro_rules! signature {
-    ([$($doc:literal)*] $name:ident($($arg:ident : $arg_type:ty $(= $arg_lua:expr)?),*) -> [$($return:literal),*]) => {
+    (
+        [$($doc:literal)*] $name:ident($($arg:ident : $arg_type:ty $(= $arg_lua:expr)?),*)
+        $(takes $table:ident $class:literal { $($fields:tt)* })?
+        -> [$($return:literal),*]
+    ) => {{
+        const DOC: &str = concat!($($doc),*);
         $crate::script::schema::Signature {
             name: stringify!($name),
-            params: &[$($crate::script::schema::object::Param {
-                name: stringify!($arg),
-                ty: $crate::script::schema::convert::first!(
-                    $($arg_lua,)? <$arg_type as $crate::script::schema::LuaType>::TYPE
-                ),
-                presence: <$arg_type as $crate::script::schema::LuaType>::PRESENCE,
-                checked: <$arg_type as $crate::script::schema::LuaType>::CHECKED,
-            }),*],
+            params: &[
+                $($crate::script::schema::object::Param {
+                    name: stringify!($arg),
+                    ty: $crate::script::schema::convert::first!(
+                        $($arg_lua,)? <$arg_type as $crate::script::schema::LuaType>::TYPE
+                    ),
+                    presence: <$arg_type as $crate::script::schema::LuaType>::PRESENCE,
+                    checked: <$arg_type as $crate::script::schema::LuaType>::CHECKED,
+                },)*
+                $({
+                    const RECORD: &$crate::script::schema::Record = &$crate::script::schema::Record {
+                        label: stringify!($name),
+                        class: $class,
+                        kind: $class,
+                        doc: DOC,
+                        fields: $crate::script::schema::convert::fields! { $($fields)* },
+                        relations: None,
+                    };
+                    $crate::script::schema::object::Param {
+                        name: stringify!($table),
+                        ty: $crate::script::schema::Type::Nested(RECORD),
+                        presence: RECORD.presence(),
+                        checked: true,
+                    }
+                },)?
+            ],
             returns: &[$($return),*],
-            doc: concat!($($doc),*),
+            doc: DOC,
         }
-    };
+    }};
 }
 pub(crate) use signature;
 
@@ -337,25 +454,14 @@ pub(crate) use signature;
 #[derive(Clone, Copy)]
 pub(crate) struct Function {
     pub signature: Signature,
-    call: fn(&Lua, MultiValue) -> mlua::Result<MultiValue>,
+    pub call: fn(&Lua, MultiValue) -> mlua::Result<MultiValue>,
 }
 
 impl Function {
-    pub(crate) const fn new(
-        signature: Signature,
-        call: fn(&Lua, MultiValue) -> mlua::Result<MultiValue>,
-    ) -> Self {
-        Self { signature, call }
-    }
-
     /// Stores the function in `table`; messages name it with `prefix`.
     pub(crate) fn install(&'static self, lua: &Lua, table: &Table, prefix: &'static str) -> mlua::Result<()> {
         let function = lua.create_function(move |lua, values: MultiValue| {
-            // The record of a function that takes one names the function.
-            let label = match self.signature.record() {
-                Some(record) => record.label.to_owned(),
-                None => format!("{prefix}{}", self.signature.name),
-            };
+            let label = format!("{prefix}{}", self.signature.name);
             (self.call)(lua, arguments(lua, &label, &self.signature, values)?)
         })?;
         table.set(self.signature.name, function)
@@ -370,68 +476,42 @@ impl Signature {
             _ => None,
         }
     }
-
-    /// Its documentation, or that of its record.
-    pub(crate) fn doc(&self) -> &'static str {
-        match self.record() {
-            Some(record) if self.doc.is_empty() => record.doc.trim(),
-            _ => self.doc.trim(),
-        }
-    }
 }
 
 /// Declares a list of functions of the `softvt` table: `functions! { LIST { /// Documentation. fn name(lua, argument: RustType =
-/// Type::…) -> ["LuaCATS type"] { … } } }`.
+/// Type::…) -> ["LuaCATS type"] { … } } }`. As the methods of [`class!`], a function can take a table.
 macro_rules! functions {
     ($list:ident {$(
-        $(#[doc = $doc:literal])*
-        fn $name:ident($lua:pat_param $(, $arg:ident : $arg_type:ty $(= $arg_lua:expr)?)*) -> [$($return:literal),*] $body:block
+        $(#[doc = $doc:literal])+
+        fn $name:ident($lua:pat_param $(, $arg:ident : $arg_type:ty $(= $arg_lua:expr)?)*)
+            $(takes $table:ident $class:literal {$(
+                $(#[doc = $field_doc:literal])+
+                $field:ident : $field_type:ty $(= $field_lua:expr)? $(=> $presence:ident $(($default:expr))?)? ;
+            )*})?
+            -> [$($return:literal),*] $body:block
     )*}) => {
-        pub(crate) static $list: &[$crate::script::schema::Function] = &[$($crate::script::schema::Function::new(
-            $crate::script::schema::object::signature!(
-                [$($doc)*] $name($($arg : $arg_type $(= $arg_lua)?),*) -> [$($return),*]
+        pub(crate) static $list: &[$crate::script::schema::Function] = &[$($crate::script::schema::Function {
+            signature: $crate::script::schema::object::signature!(
+                [$($doc)*] $name($($arg : $arg_type $(= $arg_lua)?),*)
+                $(takes $table $class {$(
+                    $(#[doc = $field_doc])+
+                    $field : $field_type $(= $field_lua)? $(=> $presence $(($default))?)? ;
+                )*})?
+                -> [$($return),*]
             ),
-            |state: &mlua::Lua, values: mlua::MultiValue| -> mlua::Result<mlua::MultiValue> {
-                let ($($arg,)*): ($($arg_type,)*) = mlua::FromLuaMulti::from_lua_multi(values, state)?;
+            call: |state, values| {
+                $crate::script::schema::object::bind_arguments! {
+                    (values, state)
+                    $($arg : $arg_type),*
+                    $(; takes $table $($field : $field_type),*)?
+                }
                 let $lua = state;
                 mlua::IntoLuaMulti::into_lua_multi($body, state)
             },
-        )),*];
+        }),*];
     };
 }
 pub(crate) use functions;
-
-/// A function `softvt.name{…}` that checks and marks a table.
-#[derive(Clone, Copy)]
-pub(crate) struct LuaConstructor {
-    pub record: &'static super::Record,
-    make: fn(&Lua, &'static super::Record, &Value) -> mlua::Result<Table>,
-}
-
-impl LuaConstructor {
-    /// A constructor that only checks the fields of its record.
-    pub(crate) const fn of(record: &'static super::Record) -> Self {
-        Self { record, make }
-    }
-
-    /// A constructor that checks more than single fields.
-    pub(crate) const fn with(
-        record: &'static super::Record,
-        make: fn(&Lua, &'static super::Record, &Value) -> mlua::Result<Table>,
-    ) -> Self {
-        Self { record, make }
-    }
-
-    /// `suite` of `softvt.suite`.
-    pub(crate) fn name(&self) -> &'static str {
-        self.record.kind.rsplit('.').next().unwrap_or(self.record.kind)
-    }
-
-    pub(crate) fn install(&self, lua: &Lua, table: &Table) -> mlua::Result<()> {
-        let Self { record, make } = *self;
-        table.set(self.name(), lua.create_function(move |lua, value: Value| make(lua, record, &value))?)
-    }
-}
 
 /// Declares tables that scripts receive: the class for stubs and reference, and the function that fills such a table.
 ///
@@ -502,7 +582,7 @@ pub(crate) fn strict_table(lua: &Lua, label: &str, table: Table, names: Vec<Stri
 
 /// Sets the name of the class.
 pub(crate) fn add_fields<T: ApiObject, F: UserDataFields<T>>(fields: &mut F) {
-    fields.add_meta_field(MetaMethod::Type, T::CLASS.name);
+    fields.add_meta_field(MetaMethod::Type, T::NAME);
 }
 
 /// Adds fields, methods and the text of an object.
@@ -571,6 +651,13 @@ fn read<T: ApiObject>(lua: &Lua, this: &T, key: &Value) -> mlua::Result<Value> {
     let list = match get(lua, this)? {
         FieldValue::Value(value) => return Ok(value),
         FieldValue::Fixed(entries, hint) => LuaList::fixed(label(), entries, hint),
+        FieldValue::Numbers(numbers) if T::SETTERS[index].is_none() => {
+            let hint = match T::CLASS.fields[index].access {
+                Access::Read(_, Some(hint)) => hint,
+                _ => MEASURED,
+            };
+            LuaList::fixed(label(), lua.create_sequence_from(numbers)?, hint)
+        }
         FieldValue::Numbers(_) => {
             let (reader, writer) = (this.clone(), this.clone());
             let get = move |lua: &Lua| match get(lua, &reader)? {

@@ -237,16 +237,19 @@ fn invalid_meshes_are_refused_with_their_file() {
     };
     assert_eq!(
         error("open.obj"),
-        "x.lua:1: mesh: open.obj: the mesh is open: 3 edges have a triangle on one side only; close its holes"
+        "x.lua:1: softvt.mesh: open.obj: the mesh is open: 3 edges have a triangle on one side only; close its holes"
     );
     assert!(
-        error("empty.obj").starts_with("x.lua:1: mesh: empty.obj: the mesh is empty"),
+        error("empty.obj").starts_with("x.lua:1: softvt.mesh: empty.obj: the mesh is empty"),
         "{}",
         error("empty.obj")
     );
     assert!(error("mesh.doc").contains("\"doc\" is not a supported mesh format"));
     assert!(error("../a.obj").contains("leads out of the project"));
-    assert!(error("none.obj").starts_with("x.lua:1: mesh.file: no file \"none.obj\" next to x.lua, nor in "));
+    assert!(
+        error("none.obj")
+            .starts_with("x.lua:1: softvt.mesh.file: no file \"none.obj\" next to x.lua, nor in ")
+    );
     assert_eq!(error("good.obj"), "x.lua:1: softvt.Shape");
 }
 
@@ -328,7 +331,7 @@ fn text_never_holds_an_address_and_pairs_has_one_order() {
     let text = "local t = {} for _, k in ipairs { 'z', 'b', 'q', 'a' } do t[k] = 1 end t[2] = 1 t[1] = 1 t[true] = 1\n\
                 local keys = {} for k in pairs(t) do keys[#keys + 1] = tostring(k) end\n\
                 error(table.concat(keys, ' ') .. tostring({}) .. tostring(print) .. ('%s'):format({}) \
-                .. tostring(softvt.pose { xyz = { 0, 0, 0 } }) .. tostring(softvt.on { object = 'a', target = 'b' }), 0)";
+                .. tostring(softvt.pose { position = { 0, 0, 0 } }) .. tostring(softvt.on { object = 'a', target = 'b' }), 0)";
     assert_eq!(
         error_of(text),
         "suites/x.lua:3: 1 2 a b q z truetablefunctiontablepose(0.0000, 0.0000, 0.0000)softvt.on"

@@ -293,7 +293,7 @@ fn an_object_can_stand_on_another() {
 fn a_motion_is_straight_and_never_faster_than_requested() {
     let commands = run(
         "local ball = scene:object 'ball'\n\
-         arm:move_to(softvt.pose { xyz = ball.xyz }, { speed = 0.2, turn = 100 })\narm:close_to(0.5, { rate = 1 })",
+         arm:move_to(softvt.pose { position = ball.centre }, { speed = 0.2, angular_speed = 100 })\narm:close_to(0.5, { rate = 1 })",
     )
     .unwrap();
     let at = |c: &ExpertCommand| c.pose_b.translation.vector;
@@ -333,7 +333,7 @@ fn an_expert_that_fails_is_reported_with_its_line() {
     );
     assert_eq!(
         error("arm:move_to(arm.pose, { sped = 1 })"),
-        format!("x.lua:{line}: arm:move_to: unknown option \"sped\"; did you mean \"speed\"?")
+        format!("x.lua:{line}: arm:move_to: unknown key \"sped\"; did you mean \"speed\"?")
     );
     assert_eq!(
         error("arm:close_to(2)"),
@@ -347,8 +347,8 @@ fn an_expert_that_fails_is_reported_with_its_line() {
 
 #[test]
 fn an_expert_can_query_the_clearance_of_a_hand() {
-    let found = run("local over = softvt.pose { xyz = { 0.1, 0, 0.5 }, yaw = 0 }
-         local on = softvt.pose { xyz = { 0.1, 0, 0.06 }, yaw = 0 }
+    let found = run("local over = softvt.pose { position = { 0.1, 0, 0.5 }, yaw = 0 }
+         local on = softvt.pose { position = { 0.1, 0, 0.06 }, yaw = 0 }
          local far, none = scene:clearance(over)
          local near, ball = scene:clearance(on, { width = 0.02 })
          assert(far == 0.2 and none == nil, tostring(far))

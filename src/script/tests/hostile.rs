@@ -34,8 +34,8 @@ fn doubling_is_stopped_before_memory_is() {
     let doubled = |make: &str, how: &str| format!("local x = {make}\nfor i = 1, 64 do x = x:{how} end");
     let mask = "softvt.mask.weave { pitch_m = 1 }";
     let shape = "softvt.shape.sphere { radius = 1 }";
-    refused(&doubled(mask, "both(x)"), "x.lua:3: mask: is made of 384 masks; at most 200 can be drawn");
-    refused(&doubled(mask, "inverted():both(x:inverted())"), "x.lua:3: mask: is made of ");
+    refused(&doubled(mask, "intersect(x)"), "x.lua:3: mask: is made of 384 masks; at most 200 can be drawn");
+    refused(&doubled(mask, "inverted():intersect(x:inverted())"), "x.lua:3: mask: is made of ");
     for how in [
         "union(x)",
         "smooth_union(x, 0.1)",
@@ -92,11 +92,11 @@ fn memory_of_worlds_is_limited() {
     let full = "x.lua:3: the script holds more than 4096 MiB of worlds and simulations; keep fewer, or give bodies a lower resolution";
     let body = |resolution: u32| {
         format!(
-            "softvt.world {{}}:soft {{ name = 'b', shape = softvt.shape.sphere {{ radius = 0.01 }}, youngs_pa = 1e4, poisson = 0.3, density = 300, xyz = {{ 0, 0, 0 }}, grasp_spacing = 0.005, resolution = {resolution} }}"
+            "softvt.world {{}}:soft {{ name = 'b', shape = softvt.shape.sphere {{ radius = 0.01 }}, position = {{ 0, 0, 0 }}, body = softvt.soft {{ youngs_pa = 1e4, poisson = 0.3, density = 300, grasp_spacing = 0.005, resolution = {resolution} }} }}"
         )
     };
     refused(&format!("local kept = {{}}\nfor i = 1, 1e9 do kept[i] = {} end", body(28)), full);
-    let solids = "softvt.world {}:static { name = 's', shape = ball, xyz = { 0, 0, 0 } }";
+    let solids = "softvt.world {}:static { name = 's', shape = ball, position = { 0, 0, 0 } }";
     let hoard = format!(
         "local ball, world, kept = softvt.shape.sphere {{ radius = 1 }}, nil, {{}}\nfor i = 1, 20 do kept[i] = {solids} end return {{ a = 1 }}"
     );
@@ -120,11 +120,11 @@ fn endless_data_is_refused() {
         "experiment.run: row.b.c: expected a finite number, got NaN",
     );
     refused(
-        "return { a = softvt.pose { xyz = { 0, 0, 0 } } }",
+        "return { a = softvt.pose { position = { 0, 0, 0 } } }",
         "experiment.run: row.a: expected data, got a softvt.Pose",
     );
     assert_eq!(
-        run("return { a = softvt.pose { xyz = { 1, 2, 3 } }.xyz }"),
+        run("return { a = softvt.pose { position = { 1, 2, 3 } }.position }"),
         Ok("[{\"a\":[1.0,2.0,3.0]}]".into())
     );
 }
@@ -208,7 +208,7 @@ fn errors_of_every_kind_end_in_a_line_of_text() {
         ),
         ("error(setmetatable({}, { __tostring = function() error('again') end }))", "x.lua:2: again"),
         ("error(function() end)", "x.lua:2: error object a function"),
-        ("error(softvt.pose { xyz = { 0, 0, 0 } })", "x.lua:2: pose(0.0000, 0.0000, 0.0000)"),
+        ("error(softvt.pose { position = { 0, 0, 0 } })", "x.lua:2: pose(0.0000, 0.0000, 0.0000)"),
         ("coroutine.yield(1)", "x.lua:2: attempt to yield from outside a coroutine"),
         (
             "local function deep() return 1 + deep() end return deep()",
@@ -228,11 +228,11 @@ fn errors_of_every_kind_end_in_a_line_of_text() {
         ),
         (
             "local _, m = pcall(softvt.pose, 3) error(m, 0)",
-            "x.lua:2: pose: expected a table of xyz, yaw, quat, got 3",
+            "x.lua:2: softvt.pose: expected a table of position, yaw, quaternion, got 3",
         ),
         (
             "local _, m = pcall(softvt.pose, 3) error('so: ' .. m)",
-            "x.lua:2: so: x.lua:2: pose: expected a table of xyz, yaw, quat, got 3",
+            "x.lua:2: so: x.lua:2: softvt.pose: expected a table of position, yaw, quaternion, got 3",
         ),
     ] {
         let message = match run(text) {
@@ -251,7 +251,7 @@ fn errors_of_every_kind_end_in_a_line_of_text() {
 fn a_scene_holds_no_more_than_can_be_computed() {
     let crowd = SUITE.replace(
         "scene:add { name",
-        "for i = 1, 1e6 do scene:add { name = 'b' .. i, asset = ball, xyz = { 0, 0, 0 } } end scene:add { name",
+        "for i = 1, 1e6 do scene:add { name = 'b' .. i, asset = ball, position = { 0, 0, 0 } } end scene:add { name",
     );
     let project = Project::new(&[("x.lua", &(crowd + "return suite()"))]);
     let limits = Limits { call: Duration::from_secs(20), ..limits() };

@@ -55,7 +55,7 @@ fn brief() -> TaskBrief {
     TaskBrief { suite: "one".into(), task: 3, prompt: "take it".into(), episode: 7 }
 }
 
-const OBSERVES: &str = "observes = { cameras = { 'wrist' }, touch = true }";
+const OBSERVES: &str = "observes = { cameras = { 'wrist' }, tactile = true }";
 const POSE: &str = "position = { 0.5, 0, 0.25 }, axis_angle = { 3, 0, 0 }";
 
 /// A policy whose `act` is `body`, in an episode.
@@ -91,17 +91,17 @@ fn observations_have_the_values_of_the_simulation() {
     let checks = [
         "assert(obs.time == 1.5 and obs.width == 0.0625 and obs.closure == 0.25 and obs.prompt == 'take it')",
         "assert(obs.position[2] == -0.125 and #obs.position == 3 and #obs.joints == 7 and obs.joints[4] == -2)",
-        "assert(math.abs(obs.axis_angle[1] - math.pi) < 1e-12 and math.abs(obs.rotation[2] - 1) < 1e-12)",
+        "assert(math.abs(obs.axis_angle[1] - math.pi) < 1e-12 and math.abs(obs.quaternion[2] - 1) < 1e-12)",
         "local image = obs:camera 'wrist' assert(image.width == 8 and image.height == 6)",
         "local p = obs:camera('wrist'):pixel(2, 1) assert(p[1] == 10 and p[2] == 20 and p[3] == 30)",
         "local m = obs:camera('wrist'):mean { 2, 1, 1, 1 } assert(m[3] == 30)",
-        "local m = obs.touch.left.markers:mean() assert(m[1] == -0.5 and m[2] == 0.25)",
-        "assert(obs.touch.right.markers:drag() == 0 and obs.touch.left.markers:press() < 1e-6)",
-        "local mask = obs.touch.left.markers:moved(0.5) assert(#mask == 99 and mask[1] and mask[99])",
-        "assert(obs.touch.left.markers:area(0.5) == 1 and obs.touch.left.markers:area(0.6) == 0)",
-        "local m = obs.touch.left.markers assert(m.motion[99][2] == 0.25 and m.initial[1][1] == 15 and m.present[1][1] == 14.5)",
-        "local c = obs.touch.left.difference:mean() assert(c[1] == 40 and c[2] == 0 and c[3] == 40)",
-        "assert(#obs.touch_history == 2 and obs.touch_history[1].left.markers:largest() == 0)",
+        "local m = obs.tactile.left.markers:mean() assert(m[1] == -0.5 and m[2] == 0.25)",
+        "assert(obs.tactile.right.markers:outward_shear() == 0 and obs.tactile.left.markers:rms_residual() < 1e-6)",
+        "local mask = obs.tactile.left.markers:contact_mask(0.5) assert(#mask == 99 and mask[1] and mask[99])",
+        "assert(obs.tactile.left.markers:contact_share(0.5) == 1 and obs.tactile.left.markers:contact_share(0.6) == 0)",
+        "local m = obs.tactile.left.markers assert(m.motion[99][2] == 0.25 and m.initial[1][1] == 15 and m.present[1][1] == 14.5)",
+        "local c = obs.tactile.left.difference:mean() assert(c[1] == 40 and c[2] == 0 and c[3] == 40)",
+        "assert(#obs.tactile_history == 2 and obs.tactile_history[1].left.markers:max_displacement() == 0)",
     ];
     for check in checks {
         let chunk = act(&format!("{check}\nreturn {{ {POSE}, closure = 0 }}"));
@@ -121,7 +121,8 @@ fn actions_are_accepted_alone_or_as_lists_with_either_form_of_rotation() {
     let two = act(&format!("local a = {{ {POSE}, closure = 0.5 }} return {{ a, a }}")).unwrap();
     assert_eq!(two.commands.len(), 2);
     let turned =
-        act("return { position = obs.position, rotation = { 0, 2, 0, 0 }, closure = obs.closure }").unwrap();
+        act("return { position = obs.position, quaternion = { 0, 2, 0, 0 }, closure = obs.closure }")
+            .unwrap();
     let ToolCommand::Pose(action) = turned.commands[0] else { panic!("a pose") };
     assert!((action.axis_angle_b - Vec3::new(std::f64::consts::PI, 0.0, 0.0)).norm() < 1e-9);
     assert_eq!((action.position_b, action.closure), (Vec3::new(0.5, -0.125, 0.25), 0.25));
@@ -145,15 +146,15 @@ fn malformed_actions_end_the_run_at_the_line_of_act() {
         ),
         (
             "return { position = { 0, 0, 0 }, closure = 0 }",
-            format!("{at}: give either axis_angle or rotation"),
+            format!("{at}: give either axis_angle or quaternion"),
         ),
         (
             "return { position = { 0, 0, 0 }, axis_angle = { 0, 0, 0 }, closure = 2 }",
             format!("{at}.closure: expected"),
         ),
         (
-            "return { position = { 0, 0, 0 }, rotation = { 0, 0, 0, 0 }, closure = 1 }",
-            format!("{at}.rotation: expected a quaternion other than 0"),
+            "return { position = { 0, 0, 0 }, quaternion = { 0, 0, 0, 0 }, closure = 1 }",
+            format!("{at}.quaternion: expected a quaternion, got one of length 0"),
         ),
         ("error 'lost'", "p.lua:2: lost".into()),
         ("return obs.positon", "p.lua:2: obs: unknown key \"positon\"; did you mean \"position\"?".into()),
@@ -182,7 +183,7 @@ fn non_finite_actions_fail_only_the_episode() {
     for body in [
         "return { position = { 0/0, 0, 0 }, axis_angle = { 0, 0, 0 }, closure = 0 }",
         "return { position = { 0, 0, 0 }, axis_angle = { 0, 0, 0 }, closure = 1/0 }",
-        "return { { position = { 0, 0, 0 }, rotation = { 1, 0, 0, -1/0 }, closure = 0 } }",
+        "return { { position = { 0, 0, 0 }, quaternion = { 1, 0, 0, -1/0 }, closure = 0 } }",
     ] {
         match act(body) {
             Err(PolicyError::Action(message)) => assert!(message.contains("not finite"), "{message}"),
@@ -220,8 +221,8 @@ fn files_without_a_policy_are_reported() {
         ("return 3", "p.lua: a policy's file returns softvt.policy{…}, got 3"),
         ("return softvt.policy { name = 'p' }", "p.lua:1: policy.act: missing"),
         (
-            "return softvt.policy { name = 'p', act = print, observes = { touhc = true } }",
-            "p.lua:1: policy.observes: unknown key \"touhc\"; did you mean \"touch\"?",
+            "return softvt.policy { name = 'p', act = print, observes = { tactil = true } }",
+            "p.lua:1: policy.observes: unknown key \"tactil\"; did you mean \"tactile\"?",
         ),
         (
             "return softvt.policy { name = 'p', act = print,\nreplan = 0 }",

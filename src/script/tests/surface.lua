@@ -5,7 +5,7 @@ local function note(what, ok, message)
 end
 local wrong = {
   "abc", "", "\255", {}, { 1, 2 }, { "a", "b", "c" }, { 0/0, 0, 0 }, { 1e308, 1e308, 1e308 }, { x = 1 }, { [1.5] = {} }, true, 1e308, -1e308,
-  -1, 0.5, 0/0, 1/0, 2^53, math.mininteger, function() end, coroutine.create(print), softvt.pose { xyz = { 0, 0, 0 } },
+  -1, 0.5, 0/0, 1/0, 2^53, math.mininteger, function() end, coroutine.create(print), softvt.pose { position = { 0, 0, 0 } },
   softvt.image { width = 1, height = 1, colour = { 0, 0, 0 } },
   setmetatable({}, { __index = function() error("trap") end, __len = function() return 1e9 end }),
 }
@@ -46,7 +46,7 @@ local box = softvt.shape.box { size = { 0.04, 0.04, 0.04 } }
 local floor = softvt.asset { name = "floor", body = softvt.static {}, shape = softvt.shape.box { size = { 2, 2, 0.1 } }:translate(0, 0, -0.05) }
 local cube = softvt.asset { name = "cube", shape = box:grounded(), body = softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300, resolution = 2 } }
 local layout = softvt.layout("one", function(scene, rng)
-  scene:add { name = "floor", asset = floor, xyz = { 0, 0, 0 } }
+  scene:add { name = "floor", asset = floor, position = { 0, 0, 0 } }
   scene:add { name = "cube", asset = cube, at = { 0, 0 } }
   ATTACK(scene, rng)
 end)
@@ -57,11 +57,11 @@ local function run()
   for _, name in ipairs(MASKS) do call("softvt.mask." .. name, softvt.mask[name]) end
   all("softvt.Shape", box)
   all("softvt.Mask", softvt.mask.weave { pitch_m = 1 })
-  all("softvt.Pose", softvt.pose { xyz = { 0, 0, 0 } })
+  all("softvt.Pose", softvt.pose { position = { 0, 0, 0 } })
   all("softvt.Image", softvt.image { width = 4, height = 3, colour = { 0, 0, 0 } })
   local world = softvt.world {}
-  local solid = world:kinematic { shape = box, xyz = { 1, 0, 0 } }
-  local body = world:soft { shape = box, youngs_pa = 1e4, poisson = 0.3, density = 300, resolution = 2, xyz = { 0, 0, 0 } }
+  local solid = world:kinematic { shape = box, position = { 1, 0, 0 } }
+  local body = world:soft { shape = box, body = softvt.soft { youngs_pa = 1e4, poisson = 0.3, density = 300, resolution = 2 }, position = { 0, 0, 0 } }
   all("softvt.Solid", solid)
   all("softvt.Body", body)
   all("softvt.World", world)
@@ -82,10 +82,10 @@ local function run()
   for i = #methods, 1, -1 do if methods[i] == "give_up" then table.remove(methods, i) end end
   simulation:drive(function(arm, view)
     all("softvt.Arm", arm)
-    all("softvt.View", view)
+    all("softvt.SceneState", view)
     all("softvt.ObjectState", view:object "cube")
     local touch = arm:tactile().left
-    all("softvt.Touch", touch)
+    all("softvt.TactileFrame", touch)
     all("softvt.Markers", touch.markers)
   end)
   all("softvt.Simulation", simulation)
