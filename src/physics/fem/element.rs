@@ -27,9 +27,14 @@ pub fn mean_gradients(h: f64) -> [Vec3; 8] {
     std::array::from_fn(|corner| hex8::corner_sign(corner) * (0.25 / h))
 }
 
-/// Lamé parameters (λ, μ) in Pa.
-pub fn lame(youngs: f64, poisson: f64) -> (f64, f64) {
-    (youngs * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)), youngs / (2.0 * (1.0 + poisson)))
+/// First Lamé parameter λ, Pa.
+pub fn lame_lambda(youngs: f64, poisson: f64) -> f64 {
+    youngs * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson))
+}
+
+/// Shear modulus μ, Pa.
+pub fn shear_modulus(youngs: f64, poisson: f64) -> f64 {
+    youngs / (2.0 * (1.0 + poisson))
 }
 
 /// Stiffness of a voxel of edge `h` of which `fill` is material.
@@ -51,7 +56,7 @@ pub fn stiffness(h: f64, fill: &OccupancyMask, youngs: f64, poisson: f64) -> Sti
 
 /// `Σ w Bᵀ C B` over the points, with the dilatation averaged over them.
 fn integrate(points: &[(Vec3, f64)], h: f64, youngs: f64, poisson: f64) -> Stiffness {
-    let (lambda, mu) = lame(youngs, poisson);
+    let (lambda, mu) = (lame_lambda(youngs, poisson), shear_modulus(youngs, poisson));
     let volume: f64 = points.iter().map(|(_, w)| w).sum();
     let mut mean = [Vec3::zeros(); 8];
     for (xi, w) in points {
@@ -118,7 +123,7 @@ mod tests {
     #[test]
     fn uniform_strain_stores_the_energy_of_hookes_law() {
         let (h, youngs, poisson) = (0.013_f64, 4e4, 0.3);
-        let (lambda, mu) = lame(youngs, poisson);
+        let (lambda, mu) = (lame_lambda(youngs, poisson), shear_modulus(youngs, poisson));
         let grad = nalgebra::Matrix3::new(1e-3, 2e-3, -1e-3, 0.5e-3, -2e-3, 1e-3, 1e-3, 0.0, 1.5e-3);
         let strain = (grad + grad.transpose()) * 0.5;
         let exact =

@@ -31,21 +31,15 @@ impl ContactPair {
     /// The solver's point for this pair, without node weights and drift velocity.
     pub(super) fn contact_point(&self, friction: &Friction, stiffness: &SurfaceStiffness) -> ContactPoint {
         ContactPoint {
-            weights_a: [0.0; 8],
-            weights_b: [0.0; 8],
             p: self.p,
             normal: self.normal,
-            drift: Vec3::zeros(),
             stiffness: stiffness.normal * self.area,
             shear_stiffness: stiffness.shear * self.area,
             gap: self.gap,
             offset: self.stretch - self.normal * self.normal.dot(&self.stretch),
             mu: if self.is_sliding { friction.dynamic_mu } else { friction.static_mu },
             previous_normal_impulse: self.previous_normal_impulse,
-            normal_impulse: 0.0,
-            shear_impulse: Vec3::zeros(),
-            velocity: Vec3::zeros(),
-            is_slipping: false,
+            ..ContactPoint::default()
         }
     }
 }

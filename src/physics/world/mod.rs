@@ -98,8 +98,10 @@ use crate::{
 };
 
 pub use penetration::Penetration;
-pub use snapshot::{ContactPatch, ContactSummary, Energy, PatchPoint, SampleFace, WorldSnapshot};
-pub use state::{Articulation, BodyContact, JointDrive, KinematicFrame, RigidBody, SoftBody};
+pub use snapshot::{ContactPatch, Energy, PatchPoint, SampleFace, WorldSnapshot};
+pub use state::{
+    Articulation, BodyContact, ContactSummary, JointDrive, KinematicFrame, RigidBody, SoftBody,
+};
 
 /// Why a step is invalid. The world must not be used afterwards; nothing is repaired silently.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

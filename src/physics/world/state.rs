@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::{
-    geometry::Pose,
+    geometry::{Pose, Vec3},
     physics::{
         contact::{ContactHistory, ContactSurface, Friction, SurfaceStiffness},
         fem::{FemState, MinDetF, system::VelocitySystem},
@@ -13,7 +13,29 @@ use crate::{
     },
 };
 
-use super::snapshot::ContactSummary;
+/// Contact of one body with one partner, summed over the contact points.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactSummary {
+    /// Number of points that press.
+    pub points: usize,
+    /// Of those, points at the friction bound.
+    pub slipping_points: usize,
+    /// Sum of the normal forces, N.
+    pub normal_force: f64,
+    /// Force on the body, N, world.
+    pub force_w: Vec3,
+    /// Sum of the friction bounds μ f_n, N: the largest shear force that the patch can hold.
+    pub capacity: f64,
+    /// Force-weighted mean distance slipped since first contact, m.
+    pub travel: f64,
+}
+
+impl ContactSummary {
+    /// Shear force, N; exact if all normals of the patch agree.
+    pub fn shear(&self) -> f64 {
+        (self.force_w.norm_squared() - self.normal_force.powi(2)).max(0.0).sqrt()
+    }
+}
 
 /// Contact of a body with one partner.
 #[derive(Clone, Copy, Debug, PartialEq)]
