@@ -99,9 +99,7 @@ use crate::{
 
 pub use penetration::Penetration;
 pub use snapshot::{ContactPatch, Energy, PatchPoint, SampleFace, WorldSnapshot};
-pub use state::{
-    Articulation, BodyContact, ContactSummary, JointDrive, KinematicFrame, RigidBody, SoftBody,
-};
+pub use state::{Articulation, BodyContact, ContactSummary, JointDrive, KinematicFrame, RigidBody, SoftBody};
 
 /// Why a step is invalid. The world must not be used afterwards; nothing is repaired silently.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

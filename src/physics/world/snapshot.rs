@@ -140,8 +140,8 @@ impl World {
         for (row, point) in self.rows.iter().zip(soft) {
             if row.partner == own && point.normal_impulse > 0.0 {
                 let model = &self.soft(row.soft).state.model;
-                let area = model.samples[row.candidate.sample].surface.area * row.candidate.coverage;
-                let face = SampleFace { group: row.candidate.group, weights: point.weights_a };
+                let area = model.samples[row.sample].surface.area * row.coverage;
+                let face = SampleFace { group: row.group, weights: point.weights_a };
                 points.push(self.patch_point(collider, row.soft.into(), Some(face), point, 1.0, area));
             }
         }

@@ -44,7 +44,12 @@ struct SoftSoftCandidate {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SoftRow {
     pub soft: SoftId,
-    pub candidate: ContactCandidate,
+    /// Sample group of the body.
+    pub group: usize,
+    /// Sample of the body.
+    pub sample: usize,
+    /// Covered share of the sample's area, 0..=1.
+    pub coverage: f64,
     pub partner: ContactPartner,
     /// Distance slipped before this step, m.
     pub travel: f64,
@@ -173,7 +178,9 @@ impl World {
         };
         let row = SoftRow {
             soft: id,
-            candidate,
+            group: candidate.group,
+            sample: candidate.sample,
+            coverage: candidate.coverage,
             partner,
             anchor: record.anchor,
             travel: record.travel,
@@ -232,14 +239,9 @@ impl World {
         };
         let row = SoftRow {
             soft: found.soft,
-            candidate: ContactCandidate {
-                group,
-                sample,
-                p,
-                gap: contact.gap,
-                normal: contact.normal,
-                coverage: contact.coverage,
-            },
+            group,
+            sample,
+            coverage: contact.coverage,
             partner,
             anchor: record.anchor,
             travel: record.travel,
@@ -272,7 +274,7 @@ impl World {
                 record.anchor += row.to_anchor * (stretch.try_normalize(0.0).unwrap_or_default() * slipped);
                 record.travel += slipped;
             }
-            soft.history.put(row.candidate.sample, record);
+            soft.history.put(row.sample, record);
         }
     }
 }
