@@ -13,7 +13,7 @@ use crate::{
     physics::contact::Friction,
     scene::{Asset, Body, SoftMaterial, Visual},
     script::{
-        schema::{Range, Record, RecordType, Type, one_of, record, record_of},
+        schema::{FromChecked, Range, Record, RecordType, Type, one_of, record, record_of},
         vm::error::fail,
     },
 };
@@ -86,7 +86,7 @@ pub(crate) static CONSTRUCTORS: &[&Record] =
     &[AssetSpec::RECORD, SoftMaterial::RECORD, RigidSpec::RECORD, StaticSpec::RECORD, ScenerySpec::RECORD];
 
 fn check_friction(lua: &Lua, _: &Record, asset: &Table) -> mlua::Result<()> {
-    let Friction { static_mu, dynamic_mu } = asset.raw_get("friction")?;
+    let Friction { static_mu, dynamic_mu } = FromChecked::from_checked(asset.raw_get("friction")?, lua)?;
     if dynamic_mu <= static_mu {
         return Ok(());
     }

@@ -10,7 +10,10 @@ use crate::{
     physics::contact::Friction,
     scene::{Asset, Body, Joint, JointMotion, Part, Visual, part_poses},
     script::{
-        schema::{Range, Record, RecordType, Type, ValidationError, error_at_key, invalid, one_of, record},
+        schema::{
+            FromChecked, Range, Record, RecordType, Type, ValidationError, error_at_key, invalid, one_of,
+            record,
+        },
         vm::error::fail,
     },
     text::{format_number, unknown_name},
@@ -87,7 +90,7 @@ fn check_limits(lua: &Lua, record: &Record, joint: &Table) -> mlua::Result<()> {
 }
 
 fn check_parts(lua: &Lua, record: &Record, body: &Table) -> mlua::Result<()> {
-    let parts: Vec<PartSpec> = body.raw_get("parts")?;
+    let parts = Vec::<PartSpec>::from_checked(body.raw_get("parts")?, lua)?;
     order(&parts).map(|_| ()).map_err(|error| error_at_key(lua, record.label, &error.inside("parts")))
 }
 

@@ -8,8 +8,8 @@ use crate::{
     benchmark::{ObjectType, REFERENCE, Variation},
     script::{
         schema::{
-            Constructed, Range, Record, RecordType, Type, Unchecked, ValidationError, choice, error_at_key,
-            functions, make, one_of, record,
+            Constructed, FromChecked, Range, Record, RecordType, Type, Unchecked, ValidationError, choice,
+            error_at_key, functions, make, one_of, record,
         },
         vm::{error::fail, value::describe},
     },
@@ -214,7 +214,7 @@ fn check_conditions(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<(
             return Err(fail(lua, format!("conditions.{key}: expected at least one, got an empty list")));
         }
     }
-    let conditions: Vec<ConditionSpec> = table.raw_get("conditions")?;
+    let conditions = Vec::<ConditionSpec>::from_checked(table.raw_get("conditions")?, lua)?;
     let mut names = vec![REFERENCE.to_owned()];
     for (index, ConditionSpec { name, .. }) in conditions.into_iter().enumerate() {
         if names.contains(&name) {

@@ -3,7 +3,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use mlua::{FromLua, Lua, Value};
+use mlua::{Lua, Value};
 
 use super::{pose::direction, shapes::LuaShape};
 use crate::{
@@ -11,7 +11,9 @@ use crate::{
     parallel::lock,
     scene::{LabelLine, MAX_LETTERS, Mask, Scene, TextDecal, Typeface, Visual, VisualLayer},
     script::{
-        schema::{FieldDefault, LuaType, Range, Type, choice, class, functions, invalid, record_of},
+        schema::{
+            FieldDefault, FromChecked, LuaType, Range, Type, choice, class, functions, invalid, record_of,
+        },
         vm::{
             error::fail,
             memory_budget::{Reservation, reserve},
@@ -64,8 +66,8 @@ const FACING: Type = Type::Direction(&["+x", "-x", "+y", "-y", "+z", "-z"], "any
 #[derive(Clone, Copy, Debug)]
 struct Direction([f64; 3]);
 
-impl FromLua for Direction {
-    fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
+impl FromChecked for Direction {
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
         let Value::String(name) = &value else {
             let numbers = lua.unpack(value)?;
             return Ok(Self(direction(numbers).map_or(numbers, Into::into)));
@@ -84,8 +86,8 @@ impl LuaType for Direction {
 #[derive(Clone, Copy, Debug)]
 struct Sizes([f64; 3]);
 
-impl FromLua for Sizes {
-    fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
+impl FromChecked for Sizes {
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
         match value {
             Value::Table(_) => lua.unpack(value).map(Self),
             other => lua.unpack(other).map(|size| Self([size; 3])),
@@ -128,8 +130,8 @@ impl LuaMask {
     }
 }
 
-impl FromLua for Mask {
-    fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
+impl FromChecked for Mask {
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
         let mask: Option<LuaMask> = lua.unpack(value)?;
         Ok(mask.map_or(Self::Whole, |mask| (*mask.0.mask).clone()))
     }

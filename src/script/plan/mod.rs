@@ -18,7 +18,7 @@ use crate::{
             simulation::settings,
             tasks::{ConditionSpec, ConditionsSpec, ExperimentSpec, GoalSpec, SuiteSpec, TaskSpec},
         },
-        schema::{Constructed, HasTable, Record, RecordType, is_constructed, strict_table},
+        schema::{Constructed, FromChecked, HasTable, Record, RecordType, is_constructed, strict_table},
         vm::{
             Limits, Vm,
             error::{ScriptError, fail},
@@ -144,7 +144,9 @@ impl ScriptInstance {
     /// The result of the main file if the constructor of `T` made it, checked again, since a script may have written to it.
     pub(crate) fn result<T: RecordType>(&self) -> mlua::Result<Option<Constructed<T>>> {
         match &self.result {
-            Some(table) if self.returned(T::RECORD) => self.vm.lua.unpack(table.clone()).map(Some),
+            Some(table) if self.returned(T::RECORD) => {
+                Constructed::from_checked(table.clone(), &self.vm.lua).map(Some)
+            }
             _ => Ok(None),
         }
     }
@@ -212,7 +214,7 @@ impl ScriptInstance {
         match entries.iter().all(is_suite) {
             true => entries
                 .into_iter()
-                .map(|entry| self.vm.lua.unpack(entry))
+                .map(|entry| FromChecked::from_checked(entry, &self.vm.lua))
                 .collect::<mlua::Result<_>>()
                 .map(Some),
             false => Ok(None),

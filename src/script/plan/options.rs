@@ -9,7 +9,8 @@ use crate::{
     parallel::lock,
     script::{
         schema::{
-            LuaType, Range, RecordType, Type, Unchecked, error_at_key, functions, record, strict_table,
+            FromChecked, LuaType, Range, RecordType, Type, Unchecked, error_at_key, functions, record,
+            strict_table,
         },
         vm::{
             error::{ScriptError, app_data, fail},
@@ -246,7 +247,7 @@ fn declare(lua: &Lua, session: &mut OptionSession, key: &Value, value: &Value) -
     }
     let checked = OptionRecord::TYPE.check(lua, value);
     let checked = checked.map_err(|error| error_at_key(lua, "options", &error.inside(name.clone())))?;
-    let record: OptionRecord = lua.unpack(checked)?;
+    let record = OptionRecord::from_checked(checked, lua)?;
     let default = match record.default {
         Value::Integer(n) if record.integer => Some(OptionValue::Integer(n)),
         Value::Integer(_) | Value::Number(_) if record.integer => None,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use mlua::{FromLua, Function, Table, Value};
+use mlua::{Function, Table, Value};
 
 use super::{ScriptInstance, ScriptSources};
 use crate::{
@@ -19,7 +19,7 @@ use crate::{
             policy::{ActionSpec, PolicySpec},
             pose::rotation_from_wxyz,
         },
-        schema::{Constructed, RecordType, ValidationError, check::check},
+        schema::{Constructed, FromChecked, RecordType, ValidationError, check::check},
         vm::{
             Limits,
             error::ScriptError,
@@ -170,7 +170,7 @@ impl LuaPolicy {
 
     fn checked_action(&self, table: &Table) -> Result<Action, ValidationError> {
         let lua = &self.instance.vm.lua;
-        let spec = ActionSpec::from_lua(Value::Table(check(lua, ActionSpec::RECORD, table)?), lua)?;
+        let spec = ActionSpec::from_checked(Value::Table(check(lua, ActionSpec::RECORD, table)?), lua)?;
         let axis_angle_b = match (spec.axis_angle, spec.quaternion) {
             (Some(axis_angle), None) => Vec3::from(axis_angle),
             (None, Some(wxyz)) => rotation::axis_angle(&rotation_from_wxyz(wxyz).unwrap_or_default()),

@@ -9,7 +9,7 @@ use crate::script::{
         tasks::{ExperimentSpec, FinishSpec},
     },
     plan::{LoadedScript, ScriptInstance, points},
-    schema::{Constructed, RecordType, validate},
+    schema::{Constructed, FromChecked, RecordType, validate},
     vm::{
         error::{ScriptError, fail},
         json::to_json,
@@ -115,7 +115,7 @@ fn read_summary(lua: &Lua, value: &Value) -> mlua::Result<ExperimentSummary> {
     if value.is_nil() {
         return Ok(ExperimentSummary::default());
     }
-    let spec: FinishSpec = lua.unpack(Value::Table(validate(lua, FinishSpec::RECORD, value)?))?;
+    let spec = FinishSpec::from_checked(Value::Table(validate(lua, FinishSpec::RECORD, value)?), lua)?;
     let mut files = Vec::new();
     for (path, content) in spec.files {
         let is_inside =

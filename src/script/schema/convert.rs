@@ -2,13 +2,21 @@
 
 use std::{collections::BTreeMap, ops::Deref};
 
-use mlua::{FromLua, Function, Lua, Table, Value};
+use mlua::{Function, Lua, Table, Value};
 
 use super::{ApiObject, FieldDefault, Range, Record, Type, check::check};
-use crate::script::vm::{error::fail, value::describe};
+use crate::{
+    geometry::Vec3,
+    script::vm::{error::fail, value::describe},
+};
+
+/// Conversion of a checked Lua value. Unlike [`mlua::FromLua`], it can be implemented for types of other crates.
+pub(crate) trait FromChecked: Sized {
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self>;
+}
 
 /// A Rust type that checked Lua values convert to.
-pub(crate) trait LuaType: FromLua {
+pub(crate) trait LuaType: FromChecked {
     /// The Lua type, where a declaration gives no narrower one.
     const TYPE: Type;
     /// The same, for lists and maps of it.
@@ -20,7 +28,17 @@ pub(crate) trait LuaType: FromLua {
 }
 
 macro_rules! lua_types {
-    ($($rust:ty => $ty:expr),+ $(,)?) => { $(impl LuaType for $rust { const TYPE: Type = $ty; })+ };
+    ($($rust:ty => $ty:expr),+ $(,)?) => {$(
+        impl FromChecked for $rust {
+            fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
+                lua.unpack(value)
+            }
+        }
+
+        impl LuaType for $rust {
+            const TYPE: Type = $ty;
+        }
+    )+};
 }
 
 lua_types! {
@@ -40,12 +58,36 @@ lua_types! {
     Value => Type::Any,
 }
 
+impl FromChecked for Vec3 {
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
+        lua.unpack::<[f64; 3]>(value).map(Self::from)
+    }
+}
+
+impl<const N: usize> FromChecked for [f64; N] {
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
+        lua.unpack(value)
+    }
+}
+
 impl<const N: usize> LuaType for [f64; N] {
     const TYPE: Type = Type::vector(N, "");
 }
 
+impl<T: ApiObject> FromChecked for T {
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
+        lua.unpack(value)
+    }
+}
+
 impl<T: ApiObject> LuaType for T {
     const TYPE: Type = Type::Object(T::NAME);
+}
+
+impl<T: FromChecked> FromChecked for Option<T> {
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
+        if value.is_nil() { Ok(None) } else { T::from_checked(value, lua).map(Some) }
+    }
 }
 
 impl<T: LuaType> LuaType for Option<T> {
@@ -53,8 +95,24 @@ impl<T: LuaType> LuaType for Option<T> {
     const PRESENCE: FieldDefault = FieldDefault::Optional;
 }
 
+impl<T: FromChecked> FromChecked for Vec<T> {
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
+        lua.unpack::<Table>(value)?.sequence_values().map(|item| T::from_checked(item?, lua)).collect()
+    }
+}
+
 impl<T: LuaType> LuaType for Vec<T> {
     const TYPE: Type = Type::List(T::REFERENCE);
+}
+
+impl<T: FromChecked> FromChecked for BTreeMap<String, T> {
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
+        let entry = |pair: mlua::Result<(String, Value)>| {
+            let (key, value) = pair?;
+            Ok((key, T::from_checked(value, lua)?))
+        };
+        lua.unpack::<Table>(value)?.pairs().map(entry).collect()
+    }
 }
 
 impl<T: LuaType> LuaType for BTreeMap<String, T> {
@@ -64,8 +122,8 @@ impl<T: LuaType> LuaType for BTreeMap<String, T> {
 /// An argument that the function checks itself.
 pub(crate) struct Unchecked(pub Value);
 
-impl FromLua for Unchecked {
-    fn from_lua(value: Value, _: &Lua) -> mlua::Result<Self> {
+impl FromChecked for Unchecked {
+    fn from_checked(value: Value, _: &Lua) -> mlua::Result<Self> {
         Ok(Self(value))
     }
 }
@@ -76,7 +134,7 @@ impl LuaType for Unchecked {
 }
 
 /// A struct with a [`Record`], declared by [`record!`] or [`record_of!`].
-pub(crate) trait RecordType: FromLua {
+pub(crate) trait RecordType: FromChecked {
     const RECORD: &'static Record;
     const RECORDS: &'static [&'static Record] = &[Self::RECORD];
 }
@@ -97,15 +155,15 @@ impl<T> Deref for Constructed<T> {
     }
 }
 
-impl<T: RecordType> FromLua for Constructed<T> {
-    fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
+impl<T: RecordType> FromChecked for Constructed<T> {
+    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
         let Value::Table(table) = &value else {
             return Err(fail(lua, format!("expected {}{{…}}, got {}", T::RECORD.kind, describe(&value))));
         };
         let checked = check(lua, T::RECORD, table).map_err(|error| {
             fail(lua, format!("{} (changed after it was made)", error.describe(T::RECORD.label)))
         })?;
-        Ok(Self { spec: lua.unpack(Value::Table(checked))?, table: table.clone() })
+        Ok(Self { spec: T::from_checked(Value::Table(checked), lua)?, table: table.clone() })
     }
 }
 
@@ -156,7 +214,7 @@ pub(crate) use fields;
 ///
 /// The Lua type may be left out where [`LuaType`] of the Rust type says enough, and so may the default: an `Option` may then
 /// be absent, and a nested record of which every field has a default. Constructor and relations are optional. Gives the
-/// struct with its conversion from a checked table ([`FromLua`]) and the [`Record`] by which tables are checked.
+/// struct with its conversion from a checked table ([`FromChecked`]) and the [`Record`] by which tables are checked.
 macro_rules! record {
     ($(
         $(#[doc = $doc:literal])+
@@ -206,10 +264,14 @@ macro_rules! record_of {
             };
         }
 
-        impl mlua::FromLua for $name {
-            fn from_lua(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
-                let _table = mlua::Table::from_lua(value, lua)?;
-                Ok(Self { $( $field: _table.raw_get(stringify!($field))?, )* })
+        impl $crate::script::schema::FromChecked for $name {
+            fn from_checked(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
+                let _table: mlua::Table = lua.unpack(value)?;
+                Ok(Self {$(
+                    $field: $crate::script::schema::FromChecked::from_checked(
+                        _table.raw_get(stringify!($field))?, lua
+                    )?,
+                )*})
             }
         }
 
@@ -235,8 +297,8 @@ macro_rules! choice {
         $crate::script::schema::choice! { $name { $($text => $variant),+ } }
     };
     ($name:ty { $($text:literal => $variant:ident),+ $(,)? }) => {
-        impl mlua::FromLua for $name {
-            fn from_lua(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
+        impl $crate::script::schema::FromChecked for $name {
+            fn from_checked(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
                 let text: String = lua.unpack(value)?;
                 match text.as_str() {
                     $($text => Ok(Self::$variant),)+
@@ -274,14 +336,15 @@ macro_rules! one_of {
             $($variant($crate::script::schema::Constructed<$spec>)),+
         }
 
-        impl mlua::FromLua for $name {
-            fn from_lua(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
+        impl $crate::script::schema::FromChecked for $name {
+            fn from_checked(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
                 let table: mlua::Table = lua.unpack(value)?;
                 $(
                     if $crate::script::schema::is_constructed(
                         lua, <$spec as $crate::script::schema::RecordType>::RECORD, &table
                     ) {
-                        return lua.unpack(mlua::Value::Table(table)).map(Self::$variant);
+                        let checked = $crate::script::schema::FromChecked::from_checked(mlua::Value::Table(table), lua);
+                        return checked.map(Self::$variant);
                     }
                 )+
                 let expected = <Self as $crate::script::schema::LuaType>::TYPE.describe();

@@ -13,7 +13,7 @@ use mlua::{Lua, Table};
 
 pub(crate) use check::{error_at_key, invalid, is_constructed, make, validate};
 pub(crate) use convert::{
-    Constructed, HasTable, LuaType, RecordType, Unchecked, choice, one_of, record, record_of,
+    Constructed, FromChecked, HasTable, LuaType, RecordType, Unchecked, choice, one_of, record, record_of,
 };
 pub(crate) use object::{
     ApiObject, Class, FieldValue, Function, Signature, class, functions, output, strict_table,

@@ -110,12 +110,6 @@ pub(crate) trait IntoFieldValue {
     fn into_field_value(self, lua: &Lua) -> mlua::Result<FieldValue>;
 }
 
-/// Types of fields that setters receive as scripts wrote them.
-pub(crate) trait FromChecked: Sized {
-    /// Converts a value that the field's [`Type`] accepts.
-    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self>;
-}
-
 impl IntoFieldValue for FieldValue {
     fn into_field_value(self, _: &Lua) -> mlua::Result<FieldValue> {
         Ok(self)
@@ -128,21 +122,9 @@ impl IntoFieldValue for Vec3 {
     }
 }
 
-impl FromChecked for Vec3 {
-    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
-        lua.unpack::<[f64; 3]>(value).map(Self::from)
-    }
-}
-
 impl<const N: usize> IntoFieldValue for [f64; N] {
     fn into_field_value(self, _: &Lua) -> mlua::Result<FieldValue> {
         Ok(FieldValue::Numbers(self.to_vec()))
-    }
-}
-
-impl<const N: usize> FromChecked for [f64; N] {
-    fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
-        lua.unpack(value)
     }
 }
 
@@ -157,12 +139,6 @@ macro_rules! plain_field_values {
         impl IntoFieldValue for $ty {
             fn into_field_value(self, lua: &Lua) -> mlua::Result<FieldValue> {
                 self.into_lua(lua).map(FieldValue::Value)
-            }
-        }
-
-        impl FromChecked for $ty {
-            fn from_checked(value: Value, lua: &Lua) -> mlua::Result<Self> {
-                lua.unpack(value)
             }
         }
     )+ };
@@ -342,11 +318,11 @@ macro_rules! class {
                 $($({ let _ = stringify!($read); None },)*)?
                 $($(Some(|state, object, value| {
                     $(
-                        let value = $crate::script::schema::object::FromChecked::from_checked(value, state)?;
+                        let value = $crate::script::schema::FromChecked::from_checked(value, state)?;
                         object.change(state, |target| target $(.$path)+ = value);
                     )?
                     $(
-                        let $value: $value_type = mlua::FromLua::from_lua(value, state)?;
+                        let $value: $value_type = $crate::script::schema::FromChecked::from_checked(value, state)?;
                         let ($set_lua, $set_this) = (state, object);
                         $set
                     )?
@@ -398,11 +374,25 @@ pub(crate) use class;
 /// Declares variables for the checked arguments of a call: the parameters, and the fields of the table that comes last.
 macro_rules! bind_arguments {
     (($values:ident, $lua:ident) $($arg:ident : $arg_type:ty),*) => {
-        let ($($arg,)*): ($($arg_type,)*) = mlua::FromLuaMulti::from_lua_multi($values, $lua)?;
+        $crate::script::schema::object::bind_arguments! { @each ($values, $lua) $($arg : $arg_type,)* }
+    };
+    (@each ($values:ident, $lua:ident) $($arg:ident : $arg_type:ty,)*) => {
+        let mut _values = $values.into_iter();
+        $(
+            let $arg: $arg_type = $crate::script::schema::FromChecked::from_checked(
+                _values.next().unwrap_or(mlua::Value::Nil), $lua
+            )?;
+        )*
     };
     (($values:ident, $lua:ident) $($arg:ident : $arg_type:ty),* ; takes $table:ident $($field:ident : $type:ty),*) => {
-        let ($($arg,)* $table,): ($($arg_type,)* mlua::Table,) = mlua::FromLuaMulti::from_lua_multi($values, $lua)?;
-        $(let $field: $type = $table.raw_get(stringify!($field))?;)*
+        $crate::script::schema::object::bind_arguments! {
+            @each ($values, $lua) $($arg : $arg_type,)* $table : mlua::Table,
+        }
+        $(
+            let $field: $type = $crate::script::schema::FromChecked::from_checked(
+                $table.raw_get(stringify!($field))?, $lua
+            )?;
+        )*
     };
 }
 pub(crate) use bind_arguments;
