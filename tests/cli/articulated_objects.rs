@@ -63,6 +63,6 @@ fn an_expert_sees_parts_and_joints() {
 #[test]
 fn invalid_joints_and_parts_are_refused() {
     let refusal = |joint, target| suite(joint, target, "arm:wait(1)").refusal("x.lua --out run");
-    assert_snapshot!(refusal("softvt.slider { axis = { 0, -1, 0 }, lower = 0 }", "chest"), @"x.lua:5: slider.upper: missing; every joint needs limits: give lower and upper");
+    assert_snapshot!(refusal("softvt.slider { axis = { 0, -1, 0 }, lower = 0 }", "chest"), @"x.lua:5: slider.upper: missing; expected metres");
     assert_snapshot!(refusal(TRAY, "chest.drawer"), @r#"x.lua:13: task.goal.target: unknown object "chest.drawer"; did you mean "chest.tray"?"#);
 }
