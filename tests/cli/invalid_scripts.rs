@@ -76,7 +76,7 @@ fn impossible_materials_are_refused() {
 fn open_meshes_are_refused() {
     let project = Small { shape: "softvt.mesh { file = 'm.obj' }", ..Small::default() }.project();
     project.write("m.obj", b"v 0 0 0\n");
-    assert_snapshot!(project.refusal("x.lua"), @"x.lua:2: mesh: m.obj: the mesh is empty: it has no triangles; export a closed surface");
+    assert_snapshot!(project.refusal("x.lua"), @"x.lua:2: softvt.mesh: m.obj: the mesh is empty: it has no triangles; export a closed surface");
     project.write("m.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n");
-    assert_snapshot!(project.refusal("x.lua"), @"x.lua:2: mesh: m.obj: the mesh is open: 3 edges have a triangle on one side only; close its holes");
+    assert_snapshot!(project.refusal("x.lua"), @"x.lua:2: softvt.mesh: m.obj: the mesh is open: 3 edges have a triangle on one side only; close its holes");
 }
