@@ -16,7 +16,6 @@
 
 #[warn(missing_docs)]
 pub mod benchmark;
-mod canvas;
 pub mod cli;
 pub mod dataset;
 #[warn(missing_docs)]

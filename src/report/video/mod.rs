@@ -7,7 +7,6 @@ use image::{ImageBuffer, ImageError, Luma, RgbImage};
 
 use crate::{
     benchmark::{CONTROL_DT, CONTROL_HZ},
-    canvas::{Canvas, Rgb8},
     dataset::video::{VideoError, VideoWriter},
     evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord},
     files::{FileError, replace},
@@ -16,6 +15,7 @@ use crate::{
     scene::Camera,
     sensing::{
         camera::{RenderedImage, encode_png},
+        canvas::{Canvas, Rgb8},
         tactile::{MarkerStyle, TactileReading},
     },
     text::format_number,

@@ -6,7 +6,6 @@ use image::{Rgb, RgbImage, imageops};
 use mlua::{Lua, LuaString, Value};
 
 use crate::{
-    canvas::Canvas,
     parallel::lock,
     script::{
         schema::{Range, Type, class, functions},
@@ -16,6 +15,7 @@ use crate::{
         },
     },
     sensing::camera::resize,
+    sensing::canvas::Canvas,
     text::format_number,
 };
 

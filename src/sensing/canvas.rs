@@ -1,21 +1,21 @@
-//! A canvas for images, lines and text.
+//! A canvas for images, lines and text: captions and charts drawn on what sensors show.
 
 use ab_glyph::{Font, FontRef, PxScale, ScaleFont, point};
 use image::{RgbImage, imageops};
 use tiny_skia::{Color, Paint, PathBuilder, Pixmap, Rect, Stroke, StrokeDash, Transform};
 
 /// An opaque sRGB colour.
-pub(crate) type Rgb8 = [u8; 3];
+pub type Rgb8 = [u8; 3];
 
 /// Pixels to draw on, with one typeface. Positions are in pixels from the top left.
-pub(crate) struct Canvas {
+pub struct Canvas {
     pixels: Pixmap,
     font: Option<FontRef<'static>>,
 }
 
 impl Canvas {
     /// An empty canvas, at least one pixel large.
-    pub(crate) fn new(width: u32, height: u32, background: Rgb8) -> Self {
+    pub fn new(width: u32, height: u32, background: Rgb8) -> Self {
         // Pixmaps cannot be empty or larger than memory allows; no caller asks for either.
         let pixels = Pixmap::new(width.max(1), height.max(1)).or_else(|| Pixmap::new(1, 1));
         let mut pixels = pixels.unwrap_or_else(|| unreachable!("one pixel always fits"));
@@ -24,14 +24,14 @@ impl Canvas {
     }
 
     /// A canvas that shows `image`.
-    pub(crate) fn from_image(image: &RgbImage) -> Self {
+    pub fn from_image(image: &RgbImage) -> Self {
         let mut canvas = Self::new(image.width(), image.height(), [0; 3]);
         canvas.place(image, 0, 0);
         canvas
     }
 
     /// Copies an image to (x, y), clipped at the edges.
-    pub(crate) fn place(&mut self, image: &RgbImage, x: u32, y: u32) {
+    pub fn place(&mut self, image: &RgbImage, x: u32, y: u32) {
         let (width, height) = (self.pixels.width(), self.pixels.height());
         let data = self.pixels.data_mut();
         for (column, row, &image::Rgb([r, g, b])) in image.enumerate_pixels() {
@@ -43,13 +43,13 @@ impl Canvas {
     }
 
     /// Copies an image to (x, y), resized to `width` × `height` pixels.
-    pub(crate) fn place_resized(&mut self, image: &RgbImage, x: u32, y: u32, width: u32, height: u32) {
+    pub fn place_resized(&mut self, image: &RgbImage, x: u32, y: u32, width: u32, height: u32) {
         let resized = imageops::resize(image, width, height, imageops::FilterType::CatmullRom);
         self.place(&resized, x, y);
     }
 
     /// Fills a rectangle whose top left corner is (x, y).
-    pub(crate) fn fill(&mut self, x: f32, y: f32, width: f32, height: f32, colour: Rgb8, opacity: f32) {
+    pub fn fill(&mut self, x: f32, y: f32, width: f32, height: f32, colour: Rgb8, opacity: f32) {
         let Some(rect) = Rect::from_xywh(x, y, width, height) else { return };
         let mut colour = opaque(colour);
         colour.set_alpha(opacity.clamp(0.0, 1.0));
@@ -59,7 +59,7 @@ impl Canvas {
     }
 
     /// Draws a line through points; `dash` is the length of its strokes and gaps, 0 for a solid line.
-    pub(crate) fn line(&mut self, points: &[[f32; 2]], width: f32, dash: f32, colour: Rgb8) {
+    pub fn line(&mut self, points: &[[f32; 2]], width: f32, dash: f32, colour: Rgb8) {
         let mut path = PathBuilder::new();
         for (i, &[x, y]) in points.iter().enumerate() {
             if i == 0 { path.move_to(x, y) } else { path.line_to(x, y) }
@@ -74,7 +74,7 @@ impl Canvas {
     }
 
     /// Writes a line of text that starts at x with its baseline at y. Returns the x coordinate of its end.
-    pub(crate) fn write(&mut self, text: &str, x: f32, y: f32, size: f32, colour: Rgb8) -> f32 {
+    pub fn write(&mut self, text: &str, x: f32, y: f32, size: f32, colour: Rgb8) -> f32 {
         let Some(font) = self.font.clone() else { return x };
         let scaled = font.as_scaled(PxScale::from(size));
         let mut pen = x;
@@ -97,7 +97,7 @@ impl Canvas {
     }
 
     /// Width of a line of text, pixels.
-    pub(crate) fn text_width(&self, text: &str, size: f32) -> f32 {
+    pub fn text_width(&self, text: &str, size: f32) -> f32 {
         let Some(font) = &self.font else { return 0.0 };
         let scaled = font.as_scaled(PxScale::from(size));
         text.chars().map(|letter| scaled.h_advance(font.glyph_id(letter))).sum()
@@ -116,7 +116,7 @@ impl Canvas {
     }
 
     /// Copies the pixels to an image.
-    pub(crate) fn to_image(&self) -> RgbImage {
+    pub fn to_image(&self) -> RgbImage {
         let (width, height) = (self.pixels.width(), self.pixels.height());
         let rgb = |pixel: &[u8]| [pixel[0], pixel[1], pixel[2]];
         let data = self.pixels.data().chunks_exact(4).flat_map(rgb).collect();
