@@ -1,4 +1,5 @@
 //! The benchmark as plain data, as scripts return it: suites, tasks, experiments and plans.
+#![warn(missing_docs, unreachable_pub)]
 
 pub mod seed;
 pub mod settings;

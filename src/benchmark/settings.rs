@@ -3,13 +3,11 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::{
-    evaluation::criteria::SuccessCriteria,
-    physics::PhysicsParams,
-    robot::RobotSpec,
-    sensing::tactile::TactileSpec,
-    text::{RangeError, format_number},
-};
+use softvt_common::text::{RangeError, format_number};
+use softvt_evaluation::criteria::SuccessCriteria;
+use softvt_physics::PhysicsParams;
+use softvt_robot::RobotSpec;
+use softvt_sensing::tactile::TactileSpec;
 
 /// Control period, s: policies act, and results are recorded, at 20 Hz.
 pub const CONTROL_DT: f64 = 0.05;
@@ -182,7 +180,7 @@ fn refusal(path: &str, value: &str, error: &str) -> SettingsError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sensing::tactile::{FotsSpec, MarkerModel, OpticsModel};
+    use softvt_sensing::tactile::{FotsSpec, MarkerModel, OpticsModel};
 
     impl Settings {
         fn with(&self, path: &str, value: &str) -> Result<Self, SettingsError> {

@@ -2,6 +2,7 @@
 //!
 //! `commands` has one file per command, with its arguments; `parse` fills them in from the command line; `run` is the
 //! engine that the commands share.
+#![warn(unreachable_pub)]
 
 mod commands;
 mod error;
@@ -16,7 +17,8 @@ use std::{panic, process::ExitCode, sync::Arc, thread, time::Duration};
 use error::{CliError, Exit};
 use output::eprint_notice;
 
-use crate::{rollout::cancel, text};
+use softvt_common::text;
+use softvt_rollout::cancel;
 
 /// Time after Ctrl-C in which a command must finish its current step. A C function of Lua may never return.
 const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(3);
@@ -43,7 +45,7 @@ pub fn main() -> ExitCode {
 
 fn run_process() -> Result<(), CliError> {
     // Finished episodes are already on disk, and nothing can interrupt a C function of Lua that does not return.
-    crate::script::set_stuck_handler(Arc::new(|message| {
+    softvt_script::set_stuck_handler(Arc::new(|message| {
         text::eprint_line(&format!("softvt: {message}"));
         std::process::exit(2);
     }));

@@ -4,7 +4,7 @@ use std::io::{IsTerminal, Write};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::text;
+use softvt_common::text;
 
 /// Prints to standard output with control characters escaped. Ignores write errors: a closed pipe does
 /// not end a command.

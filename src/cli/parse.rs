@@ -11,10 +11,8 @@ use super::{
     error::CliError,
     output::print,
 };
-use crate::{
-    script::{self, OptionSpec, OptionValue},
-    text,
-};
+use softvt_common::text;
+use softvt_script::{OptionSpec, OptionValue};
 
 /// Flags that select the policy. `softvt serve` refuses them: there the client is the policy.
 const POLICY_FLAGS: [&str; 5] = ["policy", "protocol", "replan", "policy_timeout", "name"];
@@ -30,7 +28,7 @@ pub(super) fn parse(words: &[String]) -> Result<Option<Command>, CliError> {
         None => error,
     };
     let options = match file {
-        Some(file) => script::declared_options(Path::new(file))?,
+        Some(file) => softvt_script::declared_options(Path::new(file))?,
         None => Vec::new(),
     };
     let command = with_script_options(clap_command(), &options).map_err(in_file)?;

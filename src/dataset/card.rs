@@ -8,7 +8,7 @@ use super::{
     DatasetError,
     layout::{CARD, DATASET},
 };
-use crate::files;
+use softvt_common::files;
 
 /// Demonstrations of a task.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,16 +1,14 @@
 //! [`Demonstration`]: a rollout as training data, without its images.
 
-use crate::{
-    benchmark::CONTROL_DT,
-    evaluation::record::EpisodeRecord,
-    policy::Action,
-    robot::{
-        gripper::{self, MAX_WIDTH},
-        rotation,
-    },
-    rollout::{FinishedEpisode, StateRecording},
-    sensing::tactile::{MARKER_COUNT, Markers},
+use softvt_benchmark::CONTROL_DT;
+use softvt_evaluation::record::EpisodeRecord;
+use softvt_policy::Action;
+use softvt_robot::{
+    gripper::{self, MAX_WIDTH},
+    rotation,
 };
+use softvt_rollout::{FinishedEpisode, StateRecording};
+use softvt_sensing::tactile::{MARKER_COUNT, Markers};
 
 use super::{
     privileged,

@@ -12,12 +12,10 @@ use super::{
     layout::IMAGE_STREAMS,
     video::VideoWriter,
 };
-use crate::{
-    benchmark::CONTROL_HZ,
-    rollout::StateRecording,
-    scene::Camera,
-    sensing::tactile::{MarkerStyle, Markers},
-};
+use softvt_benchmark::CONTROL_HZ;
+use softvt_rollout::StateRecording;
+use softvt_scene::Camera;
+use softvt_sensing::tactile::{MarkerStyle, Markers};
 
 /// Output files of a demonstration. Each appears complete or not at all.
 pub struct DemonstrationWriter<'a> {

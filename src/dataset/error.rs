@@ -5,7 +5,8 @@ use std::{fmt::Display, path::Path};
 use rust_hdf5::Hdf5Error;
 
 use super::video::VideoError;
-use crate::{files::FileError, rollout::SensingError};
+use softvt_common::files::FileError;
+use softvt_rollout::SensingError;
 
 /// Error of reading, writing or rendering demonstrations. Messages name the file and the key in it.
 #[derive(Debug, thiserror::Error)]

@@ -8,10 +8,8 @@ use super::{
     DatasetError,
     layout::{MANIFEST, TaskPaths, VIDEO_STREAMS},
 };
-use crate::{
-    evaluation::record::{EpisodeRecord, Origin},
-    files,
-};
+use softvt_common::files;
+use softvt_evaluation::record::{EpisodeRecord, Origin};
 
 /// Version of the format.
 pub const SCHEMA_VERSION: u32 = 1;

@@ -1,10 +1,10 @@
 //! Ground-truth streams: shapes, forces, contact and deformation, which no real robot could measure.
 
-use crate::{
-    evaluation::deformation::METRIC_ID,
-    geometry::Vec3,
-    policy::PadForce,
-    rollout::{BodyConfiguration, FinishedEpisode, ScoreFrame, SensorSuite, StateRecording, StepTrace},
+use softvt_evaluation::deformation::METRIC_ID;
+use softvt_geometry::Vec3;
+use softvt_policy::PadForce;
+use softvt_rollout::{
+    BodyConfiguration, FinishedEpisode, ScoreFrame, SensorSuite, StateRecording, StepTrace,
 };
 
 use super::stream::{DataStream, StreamValues, pose_row};

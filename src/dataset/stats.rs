@@ -5,7 +5,7 @@ use std::{fmt::Write, path::Path};
 use serde::Serialize;
 
 use super::{DatasetError, TaskFile};
-use crate::text::{TextColumn, TextTable, decimal};
+use softvt_common::text::{TextColumn, TextTable, decimal};
 
 /// Columns of an action.
 const ACTION_NAMES: [&str; 7] =

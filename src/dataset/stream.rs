@@ -1,6 +1,7 @@
 //! [`DataStream`]: one quantity of a demonstration over time.
 
-use crate::{geometry::Pose, robot::rotation};
+use softvt_geometry::Pose;
+use softvt_robot::rotation;
 
 /// Values of a [`DataStream`], step by step.
 #[derive(Clone, Debug, PartialEq)]

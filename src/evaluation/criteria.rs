@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::text::{NOT_NEGATIVE, RangeError, check_range};
+use softvt_common::text::{NOT_NEGATIVE, RangeError, check_range};
 
 /// Thresholds that decide when an object counts as lifted, lost, dropped, slipped, released or placed.
 ///

@@ -3,7 +3,7 @@
 //! Forces enter as impulses (force times the length of the physics step), so that they may be summed
 //! over a control step.
 
-use crate::geometry::{Pose, Vec3};
+use softvt_geometry::{Pose, Vec3};
 
 use super::deformation::Deformation;
 

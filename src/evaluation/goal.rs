@@ -10,7 +10,7 @@
 //! least one. A target that has rested at the goal for one control step and leaves it later
 //! counts as dropped ([`super::drop::DropReason::LeftGoal`]).
 
-use crate::geometry::{Aabb, Pose, Vec3};
+use softvt_geometry::{Aabb, Pose, Vec3};
 
 use super::criteria::SuccessCriteria;
 

@@ -28,6 +28,7 @@
 //! | Rates, intervals, paired tests | [`statistics`], [`paired_stats`], [`summary`] |
 //!
 //! The metrics are those of SoftVTBench; `docs/decisions.md` lists the choices made where the paper is silent.
+#![warn(missing_docs, unreachable_pub)]
 
 pub mod calibration;
 pub mod criteria;

@@ -126,7 +126,7 @@ const RESAMPLES: usize = 4000;
 /// Of 100 episodes, 4 succeed in the first run only, 12 in the second only and 50 in both.
 ///
 /// ```
-/// use softvt::evaluation::paired_stats::PairedDifference;
+/// use softvt_evaluation::paired_stats::PairedDifference;
 ///
 /// let pairs = (0..100).map(|i| [i < 4 || i >= 50, i >= 4 && i < 16 || i >= 50]);
 /// let safety = PairedDifference::from_successes(pairs);
@@ -244,7 +244,7 @@ fn bootstrap(values: &[f64]) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::record::{Outcome, tests::sample};
+    use crate::record::{Outcome, tests::sample};
 
     /// Goal, safety and D of each episode; τ is 1.
     fn run(episodes: &[(bool, bool, f64)]) -> Vec<EpisodeRecord> {

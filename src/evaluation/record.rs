@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize, Serializer, ser::SerializeMap};
 
 use super::{drop::DropEvent, episode_id::EpisodeId, safety::KappaVerdict};
-use crate::scene::InitialState;
+use softvt_scene::InitialState;
 
 /// End of a rollout.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -206,64 +206,10 @@ pub struct EpisodeRecord {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::evaluation::episode_id::Split;
 
     /// A successful, safe soft episode.
     pub(crate) fn sample() -> EpisodeRecord {
-        let header = EpisodeHeader {
-            id: EpisodeId {
-                suite: "suite".into(),
-                task: 0,
-                episode: 0,
-                base_seed: 11,
-                split: Split::Validation,
-            },
-            prompt: "put it there".into(),
-            layout: "layout".into(),
-            policy: "expert".into(),
-            privileged: false,
-            asset: "bun".into(),
-            soft: true,
-            origin: None,
-        };
-        let verdict = Verdict {
-            goal: true,
-            goal_time_s: Some(8.4),
-            goal_v1: true,
-            no_drop: true,
-            drop: None,
-            no_slip: true,
-            slip_mm: 0.1,
-            d_peak: Some(1.0 / 3.0),
-            d_peak_weighted: Some(0.3),
-            d_peak_max: Some(0.9),
-            d_peak_other: Some(0.0),
-            wrong_instance: false,
-            kappa: Some(0.5),
-            tau: Some(1.0),
-            d_ref: Some(2.0),
-            deformation_ok: Some(true),
-            safety: true,
-            safety_known: true,
-            kappas: Vec::new(),
-            missing_evidence: 0,
-            missing_deformation: 0,
-            peak_pad_force_n: 1.5,
-            mean_pad_force_n: 1.2,
-        };
-        let stats = RolloutStats {
-            steps: 168,
-            time_s: 8.4,
-            min_det_f: Some(0.7),
-            newton_mean: 2.1,
-            newton_max: 5,
-            force_observed: false,
-            camera_inside: 0,
-            far_commands: 0,
-            gave_up: None,
-            state_hash: "00ff".into(),
-        };
-        EpisodeRecord { header, outcome: Outcome::Completed, verdict, stats }
+        serde_json::from_str(include_str!("../../tests/data/episode_record.json")).expect("a valid record")
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! Lengths are in metres and points in the *object frame* (`_o`) unless stated otherwise. Shapes carry material ids,
 //! but neither materials nor motion are part of this module. Closest points of convex shapes, mesh queries and the
 //! broad phase use parry, whose vector types stay inside.
+#![warn(missing_docs, unreachable_pub)]
 
 mod aabb;
 pub mod convex;

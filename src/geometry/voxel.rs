@@ -132,7 +132,7 @@ const MAX_EXTRAPOLATION: f64 = 0.3;
 /// If the shape or the resolution is invalid, or the shape is empty or thinner than the sub-cells.
 ///
 /// ```
-/// use softvt::geometry::{
+/// use softvt_geometry::{
 ///     shape::Shape,
 ///     voxel::{VoxelSpec, voxel_mesh},
 /// };
@@ -142,7 +142,7 @@ const MAX_EXTRAPOLATION: f64 = 0.3;
 /// let filled: f64 = mesh.occupancy.iter().map(|cell| cell.fraction()).sum();
 /// let exact = 4.0 / 3.0 * std::f64::consts::PI * 0.03_f64.powi(3);
 /// assert!((filled * mesh.edge.powi(3) / exact - 1.0).abs() < 0.005);
-/// # Ok::<(), softvt::geometry::voxel::VoxelMeshError>(())
+/// # Ok::<(), softvt_geometry::voxel::VoxelMeshError>(())
 /// ```
 pub fn voxel_mesh(shape: &Shape, spec: &VoxelSpec) -> Result<VoxelMesh, VoxelMeshError> {
     shape.validate()?;

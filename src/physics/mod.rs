@@ -4,6 +4,7 @@
 //! it can be used on their own: [`fem`] (corotational finite elements), [`rigid`], [`joints`] (articulated dynamics),
 //! [`contact`] (detection), [`solver`] (the convex problem of a step) and [`sparse`] (multifrontal Cholesky). No
 //! module here depends on scripts, files or images.
+#![warn(missing_docs, unreachable_pub)]
 
 pub mod contact;
 pub mod fem;

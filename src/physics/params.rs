@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::text::{NOT_NEGATIVE, POSITIVE, RangeError, check_range};
+use softvt_common::text::{NOT_NEGATIVE, POSITIVE, RangeError, check_range};
 
 /// Parameters of the mechanics. The defaults are those of the benchmark.
 ///

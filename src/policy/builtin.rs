@@ -4,7 +4,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::{Action, ActionChunk, Observation, Policy, PolicyError, ToolCommand};
-use crate::{benchmark::seed::uniform, geometry::Vec3};
+use softvt_benchmark::seed::uniform;
+use softvt_geometry::Vec3;
 
 /// Holds the initial tool pose with the gripper open.
 #[derive(Debug, Default)]

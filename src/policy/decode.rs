@@ -7,7 +7,7 @@ use super::{
     msgpack::{NumberArray, entry, kind, names, numbers},
     profile::{ACTION_LEN, ActionEncoding, ActionUnits, PoseEncoding},
 };
-use crate::geometry::Vec3;
+use softvt_geometry::Vec3;
 
 /// Number of actions from which on a chunk is rejected as a mistake.
 pub const MAX_CHUNK_LEN: usize = 10_000;
@@ -17,7 +17,7 @@ pub const MAX_CHUNK_LEN: usize = 10_000;
 ///
 /// ```
 /// use rmpv::Value;
-/// use softvt::policy::{ToolCommand, decode, msgpack::map, profile::Profile};
+/// use softvt_policy::{ToolCommand, decode, msgpack::map, profile::Profile};
 ///
 /// let libero = Profile::named("libero").expect("a built-in profile");
 /// // A step of +5 cm along x at most; the gripper's value 1 means closed.
@@ -25,7 +25,7 @@ pub const MAX_CHUNK_LEN: usize = 10_000;
 /// let chunk = decode::chunk(&map([("actions", Value::Array(row))]), &libero.actions)?;
 /// let [ToolCommand::Delta { translation_b, closure, .. }] = chunk.commands[..] else { unreachable!() };
 /// assert_eq!((translation_b.x, closure), (0.05, 1.0));
-/// # Ok::<(), softvt::policy::PolicyError>(())
+/// # Ok::<(), softvt_policy::PolicyError>(())
 /// ```
 ///
 /// # Errors
@@ -94,10 +94,8 @@ pub fn command(row: &[f64; ACTION_LEN], encoding: &ActionEncoding) -> Result<Too
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        npy::NpyArray,
-        policy::{msgpack::pack_array, profile::Profile},
-    };
+    use crate::{msgpack::pack_array, profile::Profile};
+    use softvt_common::npy::NpyArray;
 
     fn read(value: Value) -> Result<ActionChunk, PolicyError> {
         chunk(&value, &Profile::named("visuo_tactile").unwrap().actions)

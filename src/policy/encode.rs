@@ -8,11 +8,9 @@ use super::{
     msgpack::pack_array,
     profile::{InputSource, Profile, StatePart},
 };
-use crate::{
-    npy::NpyArray,
-    robot::rotation,
-    sensing::tactile::{HISTORY_LENGTH, MARKER_COUNT},
-};
+use softvt_common::npy::NpyArray;
+use softvt_robot::rotation;
+use softvt_sensing::tactile::{HISTORY_LENGTH, MARKER_COUNT};
 
 /// Content of an entry of an observation, before it is packed.
 #[derive(Clone, Debug, PartialEq)]

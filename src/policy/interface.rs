@@ -1,7 +1,8 @@
 //! The interface of a policy: its trait, the description of an episode, and commands.
 
 use super::{Observation, SensorStreams};
-use crate::{evaluation::episode_id::EpisodeIndex, geometry::Vec3};
+use softvt_evaluation::episode_id::EpisodeIndex;
+use softvt_geometry::Vec3;
 
 /// Command of one control step: where the tool and the gripper should be at its end.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -148,10 +149,10 @@ impl PolicyError {
 /// A policy that acts on observations alone.
 ///
 /// An episode calls [`reset`](Self::reset) once, then [`act`](Self::act) each time a new [`ActionChunk`] is needed, and
-/// [`finish`](Self::finish) at the end. [`ChunkedPolicy`](crate::rollout::ChunkedPolicy) executes the chunks at 20 Hz.
+/// [`finish`](Self::finish) at the end. [`ChunkedPolicy`](softvt_rollout::ChunkedPolicy) executes the chunks at 20 Hz.
 ///
 /// ```
-/// use softvt::policy::{Action, ActionChunk, Observation, Policy, PolicyError};
+/// use softvt_policy::{Action, ActionChunk, Observation, Policy, PolicyError};
 ///
 /// /// Descends by 5 mm per control step with the gripper open.
 /// struct Descend;

@@ -1,4 +1,5 @@
 //! Policies: their interface, their observations, the encodings of observations and actions, and policy servers.
+#![warn(missing_docs, unreachable_pub)]
 
 pub mod builtin;
 pub mod decode;

@@ -6,7 +6,7 @@
 
 use rmpv::Value;
 
-use crate::npy::{NpyArray, element_size};
+use softvt_common::npy::{NpyArray, element_size};
 
 /// Encodes an array. Keys are of type bin (openpi) or str (vla-eval).
 pub fn pack_array(array: NpyArray, bin_keys: bool) -> Value {

@@ -5,11 +5,9 @@ use std::sync::Arc;
 
 use image::RgbImage;
 
-use crate::{
-    geometry::Vec3,
-    sensing::tactile::{
-        HISTORY_LENGTH, MARKER_COUNT, Markers, MosaicLayout, PadWrench, Taxels, mosaic, mosaic_cell,
-    },
+use softvt_geometry::Vec3;
+use softvt_sensing::tactile::{
+    HISTORY_LENGTH, MARKER_COUNT, Markers, MosaicLayout, PadWrench, Taxels, mosaic, mosaic_cell,
 };
 
 /// Sensor streams of an observation. Streams that are not requested are never computed.

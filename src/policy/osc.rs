@@ -7,11 +7,9 @@
 //! (v₀ + ω (x₀ − g)) t) with ω = √kp. Position and rotation vector both follow it.
 
 use super::{Action, Observation, ToolCommand};
-use crate::{
-    benchmark::CONTROL_DT,
-    geometry::{Quat, Vec3},
-    robot::rotation,
-};
+use softvt_benchmark::CONTROL_DT;
+use softvt_geometry::{Quat, Vec3};
+use softvt_robot::rotation;
 
 /// Stiffness of the spring, 1/s².
 const KP: f64 = 150.0;

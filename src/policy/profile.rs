@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::SensorStreams;
-use crate::{robot::Side, sensing::tactile::MosaicLayout};
+use softvt_robot::Side;
+use softvt_sensing::tactile::MosaicLayout;
 
 /// Names of the cameras that every scene has.
 const CAMERAS: [&str; 2] = ["third_person", "wrist"];

@@ -6,12 +6,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::{
-    evaluation::episode_id::EpisodeIndex,
+use softvt_common::{
     files::{FileError, replace},
     npy::{NpyArray, NpyError},
-    policy::Action,
 };
+use softvt_evaluation::episode_id::EpisodeIndex;
+use softvt_policy::Action;
 
 /// Numbers per action.
 const WIDTH: usize = 7;
@@ -70,7 +70,7 @@ pub fn read(path: &Path) -> Result<Vec<Action>, ActionsError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vec3;
+    use softvt_geometry::Vec3;
 
     #[test]
     fn actions_are_read_back_exactly_and_damaged_files_are_named() {

@@ -5,15 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 
 use super::stored_run::StoredRun;
-use crate::{
-    evaluation::{
-        paired_stats::{
-            EpisodeKey, EpisodePair, PairedComparison, PairedDifference, group_by_task, pair_episodes,
-        },
-        record::{EpisodeHeader, EpisodeRecord},
-        summary::method_label,
+use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
+use softvt_evaluation::{
+    paired_stats::{
+        EpisodeKey, EpisodePair, PairedComparison, PairedDifference, group_by_task, pair_episodes,
     },
-    text::{TextColumn, TextTable, counted, decimal, shortened},
+    record::{EpisodeHeader, EpisodeRecord},
+    summary::method_label,
 };
 
 /// Width of a policy's name in the header, columns.

@@ -3,15 +3,13 @@
 use serde::{Deserialize, Serialize};
 
 use super::comparison;
-use crate::{
-    benchmark::ShiftValue,
-    evaluation::{
-        paired_stats::{PairedComparison, d_over_tau, pair_episodes},
-        record::EpisodeRecord,
-        statistics::{Distribution, Rate},
-        summary::Scores,
-    },
-    text::{TextColumn, TextTable, counted, decimal},
+use softvt_benchmark::ShiftValue;
+use softvt_common::text::{TextColumn, TextTable, counted, decimal};
+use softvt_evaluation::{
+    paired_stats::{PairedComparison, d_over_tau, pair_episodes},
+    record::EpisodeRecord,
+    statistics::{Distribution, Rate},
+    summary::Scores,
 };
 
 /// Results under one condition.
@@ -130,7 +128,7 @@ fn cells(row: &ConditionRow, deformable: bool) -> [String; 6] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::record::tests::sample;
+    use crate::sample_record;
 
     fn row(condition: &str, outcome: Option<ConditionOutcome>) -> ConditionRow {
         let not_applicable = outcome.is_none().then(|| "nothing in it deforms".to_owned());
@@ -145,8 +143,8 @@ mod tests {
 
     #[test]
     fn the_table_has_one_row_per_condition_and_at_most_100_columns() {
-        let reference = [sample()];
-        let mut worse = sample();
+        let reference = [sample_record()];
+        let mut worse = sample_record();
         (worse.verdict.safety, worse.verdict.d_peak) = (false, Some(1.5));
         let suite = ConditionTable {
             suite: "buns".into(),

@@ -1,4 +1,5 @@
 //! Run folders and everything derived from them: result tables, HTML report, videos, and files in SoftVTBench's format.
+#![warn(unreachable_pub)]
 
 pub mod actions;
 pub mod comparison;
@@ -12,3 +13,9 @@ pub mod stored_run;
 pub mod tables;
 pub mod terminal;
 pub mod video;
+
+/// A successful, safe soft episode.
+#[cfg(test)]
+pub(crate) fn sample_record() -> softvt_evaluation::record::EpisodeRecord {
+    serde_json::from_str(include_str!("../../tests/data/episode_record.json")).expect("a valid record")
+}

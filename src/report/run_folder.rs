@@ -10,10 +10,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::{
-    evaluation::record::EpisodeRecord,
-    files::{self, FileError},
-};
+use softvt_common::files::{self, FileError};
+use softvt_evaluation::record::EpisodeRecord;
 
 /// One line per episode.
 pub const EPISODES: &str = "episodes.jsonl";
@@ -50,7 +48,7 @@ impl RunFolder {
     /// Checks that `dir` holds no run.
     ///
     /// # Errors
-    /// It does.
+    /// The folder holds a run.
     pub fn check_vacant(dir: &Path) -> Result<(), RunFolderError> {
         match [RUN, EPISODES, SUMMARY].into_iter().find(|name| dir.join(name).exists()) {
             Some(found) => Err(RunFolderError::Occupied { dir: dir.display().to_string(), found }),
@@ -191,10 +189,10 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Vec<EpisodeRecord>, RunFolderError
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::record::tests::sample;
+    use crate::sample_record;
 
     fn episode(index: u32) -> EpisodeRecord {
-        let mut record = sample();
+        let mut record = sample_record();
         record.header.id.episode = index;
         record
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::stored_run::StoredRun;
-use crate::evaluation::{
+use softvt_evaluation::{
     record::{EpisodeRecord, Outcome},
     summary::SuiteSummary,
 };
@@ -116,10 +116,10 @@ pub(super) mod tests {
     use serde_json::json;
 
     use super::*;
-    use crate::evaluation::record::tests::sample;
+    use crate::sample_record;
 
     /// A finished run of `records` in the folder `dir`.
-    pub(in crate::report) fn stored(dir: &str, policy: &str, mut records: Vec<EpisodeRecord>) -> StoredRun {
+    pub(crate) fn stored(dir: &str, policy: &str, mut records: Vec<EpisodeRecord>) -> StoredRun {
         for record in &mut records {
             (record.header.policy, record.header.privileged) = (policy.into(), policy == "expert");
         }
@@ -134,11 +134,11 @@ pub(super) mod tests {
 
     #[test]
     fn runs_of_one_suite_have_distinct_names() {
-        let plain = stored("runs/a", "expert", vec![sample()]);
-        let mut heavy = stored("runs/b", "expert", vec![sample()]);
+        let plain = stored("runs/a", "expert", vec![sample_record()]);
+        let mut heavy = stored("runs/b", "expert", vec![sample_record()]);
         heavy.manifest["shifts"] = json!([["mass", 2.0]]);
         heavy.manifest["set"] = json!([["robot.gripper.effort", "3"]]);
-        let mut forces = stored("runs/c", "pi", vec![sample()]);
+        let mut forces = stored("runs/c", "pi", vec![sample_record()]);
         forces.manifest["force_observed"] = json!(true);
         let names = |runs: &[&StoredRun]| -> Vec<String> {
             summarize_runs(runs.iter().map(|run| (*run).clone()).collect())
@@ -164,7 +164,7 @@ pub(super) mod tests {
 
     #[test]
     fn an_unsafe_episode_has_a_reason() {
-        let mut record = sample();
+        let mut record = sample_record();
         assert_eq!(unsafe_reason(&record), None);
         record.verdict.safety = false;
         record.verdict.d_peak = Some(2.5);

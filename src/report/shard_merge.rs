@@ -13,14 +13,12 @@ use super::{
     softvtbench_files,
     stored_run::{StoredRun, StoredRunError, load},
 };
-use crate::{
-    evaluation::{
-        episode_id::EpisodeIndex,
-        record::EpisodeRecord,
-        summary::SuiteSummary,
-        thresholds::{ThresholdError, ThresholdFile},
-    },
-    files::{self, FileError},
+use softvt_common::files::{self, FileError};
+use softvt_evaluation::{
+    episode_id::EpisodeIndex,
+    record::EpisodeRecord,
+    summary::SuiteSummary,
+    thresholds::{ThresholdError, ThresholdFile},
 };
 
 /// Folders with files of single episodes.

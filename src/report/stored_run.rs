@@ -8,10 +8,8 @@ use std::{
 use serde_json::Value;
 
 use super::run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, is_truncated, read_episodes};
-use crate::{
-    evaluation::record::EpisodeRecord,
-    files::{self, FileError},
-};
+use softvt_common::files::{self, FileError};
+use softvt_evaluation::record::EpisodeRecord;
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 

@@ -1,12 +1,10 @@
 //! The results table of a run in the terminal.
 
-use crate::{
-    evaluation::{
-        safety::KAPPAS,
-        statistics::{Distribution, Rate},
-        summary::{AbortedEpisode, Scores, SuiteSummary},
-    },
-    text::{TextColumn, TextTable, counted, decimal, shortened},
+use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
+use softvt_evaluation::{
+    safety::KAPPAS,
+    statistics::{Distribution, Rate},
+    summary::{AbortedEpisode, Scores, SuiteSummary},
 };
 
 /// Columns: index and prompt of the task, three rates, four figures of D, τ and the number of invalid episodes.
@@ -156,10 +154,11 @@ fn distinct_parts<'a>(prompts: &[&'a str]) -> Vec<&'a str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::record::{EpisodeRecord, Outcome, tests::sample};
+    use crate::sample_record;
+    use softvt_evaluation::record::{EpisodeRecord, Outcome};
 
     fn episode(task: usize, prompt: &str, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
-        let mut record = sample();
+        let mut record = sample_record();
         record.header.id.task = task;
         record.header.prompt = prompt.into();
         edit(&mut record);

@@ -5,7 +5,7 @@ use super::{
     panda,
     spec::Side,
 };
-use crate::geometry::{Aabb, Pose, Vec3, shape::Shape};
+use softvt_geometry::{Aabb, Pose, Vec3, shape::Shape};
 
 /// Spacing of the sample points on the surface of the hand, m. The distance found is too large by at most 0.71 of it.
 const SPACING: f64 = 6e-3;
@@ -92,7 +92,7 @@ fn surface_points(half: &Vec3) -> impl Iterator<Item = Vec3> + use<> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Quat;
+    use softvt_geometry::Quat;
 
     fn down(x: f64, z: f64) -> Pose {
         let turn = Quat::from_axis_angle(&Vec3::x_axis(), std::f64::consts::PI);

@@ -13,10 +13,8 @@ use super::{
     rotation,
     spec::IkSpec,
 };
-use crate::{
-    geometry::{Pose, Vec3},
-    physics::joints::{JointTree, Link, forward, point_jacobian},
-};
+use softvt_geometry::{Pose, Vec3};
+use softvt_physics::joints::{JointTree, Link, forward, point_jacobian};
 
 /// Joint angles of the arm, rad.
 pub type ArmAngles = [f64; ARM_DOFS];
@@ -87,10 +85,8 @@ const RESTARTS: u32 = 48;
 /// Remembers its last command, so that the commanded speed, not the lead over the measured joints, is limited.
 ///
 /// ```
-/// use softvt::{
-///     geometry::Vec3,
-///     robot::{DiffIk, IkSpec, ik::PoseDifference},
-/// };
+/// use softvt_geometry::Vec3;
+/// use softvt_robot::{DiffIk, IkSpec, ik::PoseDifference};
 ///
 /// let start = [0.0, -0.2, 0.0, -2.4, 0.0, 2.2, 0.8];
 /// let mut ik = DiffIk::new(&IkSpec::default(), start, 0.05);
@@ -311,7 +307,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::geometry::Quat;
+    use softvt_geometry::Quat;
 
     const START: ArmAngles = [-0.01988, -0.18734, 0.00767, -2.40340, 0.00496, 2.24534, 0.79485];
     const DT: f64 = 0.05;

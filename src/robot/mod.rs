@@ -4,6 +4,7 @@
 //! Frames, all functions of the joint coordinates: `hand` as in Franka's own description (z towards the finger tips, y
 //! from the right finger to the left one); the `tool` frame (TCP), with the hand's axes, at the nominal midpoint of the
 //! two gel apexes; a pad frame on each finger (see [`pads`]).
+#![warn(missing_docs, unreachable_pub)]
 
 pub mod clearance;
 pub mod gripper;

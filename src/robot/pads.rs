@@ -12,10 +12,8 @@
 use nalgebra::Quaternion;
 
 use super::spec::Side;
-use crate::{
-    geometry::{Aabb, Mat3, Pose, Quat, Vec3, shape::Contact},
-    physics::contact::{CollisionGeometry, ContactSurface, GelSample},
-};
+use softvt_geometry::{Aabb, Mat3, Pose, Quat, Vec3, shape::Contact};
+use softvt_physics::contact::{CollisionGeometry, ContactSurface, GelSample};
 
 /// Height of the gel's apex above the finger frame, m; equal to that of Franka's own finger tips.
 pub(super) const APEX_Z: f64 = 0.045;

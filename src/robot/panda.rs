@@ -1,9 +1,7 @@
 //! Kinematics, limits and mass properties of the Franka Emika Panda with its hand, as a joint tree.
 
-use crate::{
-    geometry::{Mat3, Pose, Quat, Vec3},
-    physics::joints::{JointKind, JointTree, Link},
-};
+use softvt_geometry::{Mat3, Pose, Quat, Vec3};
+use softvt_physics::joints::{JointKind, JointTree, Link};
 
 use super::{
     gripper::MAX_WIDTH,
@@ -181,11 +179,9 @@ pub fn hand_boxes() -> [CollisionBox; 1] {
 /// apexes is the sum of both. The model has no joint friction, since the torque control of the real arm compensates it.
 ///
 /// ```
-/// use softvt::{
-///     geometry::Pose,
-///     physics::joints::forward,
-///     robot::{GripperSpec, panda},
-/// };
+/// use softvt_geometry::Pose;
+/// use softvt_physics::joints::forward;
+/// use softvt_robot::{GripperSpec, panda};
 ///
 /// let tree = panda::tree(Pose::identity(), &GripperSpec::default());
 /// let q = [0.0, -0.569, 0.0, -2.810, 0.0, 3.037, 0.741, 0.04, 0.04];
@@ -251,7 +247,7 @@ fn finger(side: Side, gripper: &GripperSpec) -> Link {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::joints::{bias, forward, mass_matrix};
+    use softvt_physics::joints::{bias, forward, mass_matrix};
 
     /// Start pose of the SoftVTBench release, fingers open.
     const START: [f64; DOFS] = [-0.01988, -0.18734, 0.00767, -2.40340, 0.00496, 2.24534, 0.79485, 0.04, 0.04];

@@ -1,6 +1,6 @@
 //! Conventions for rotations in files and actions: quaternions with w ≥ 0, and rotation vectors (axis times angle).
 
-use crate::geometry::{Quat, Vec3};
+use softvt_geometry::{Quat, Vec3};
 
 /// Canonical quaternion of a rotation: w ≥ 0, and at w = 0 a positive first non-zero component, so that equal half
 /// turns have equal components.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::text::{POSITIVE, RangeError, check_range};
+use softvt_common::text::{POSITIVE, RangeError, check_range};
 
 /// Parameters of arm, gripper, pads and inverse kinematics; the settings `robot.*` of an experiment.
 ///

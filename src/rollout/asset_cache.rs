@@ -3,19 +3,17 @@
 use std::{convert::Infallible, sync::Arc};
 
 use super::{build_error::BuildError, shared_cache::SharedCache, soft_model::build_model};
-use crate::{
-    geometry::{
-        Aabb, Pose, Vec3,
-        mass::{MassProperties, approximate_mass_properties, mass_properties},
-        shape::Shape,
-    },
-    physics::{
-        BodyId, World,
-        contact::{Collider, CollisionGeometry, Friction},
-        fem::FemModel,
-    },
-    scene::{Asset, SoftMaterial},
+use softvt_geometry::{
+    Aabb, Pose, Vec3,
+    mass::{MassProperties, approximate_mass_properties, mass_properties},
+    shape::Shape,
 };
+use softvt_physics::{
+    BodyId, World,
+    contact::{Collider, CollisionGeometry, Friction},
+    fem::FemModel,
+};
+use softvt_scene::{Asset, SoftMaterial};
 
 /// Finite-element models of assets, and expensive queries of their shapes: bounds, mass,
 /// wall thickness, contact samples.

@@ -7,17 +7,15 @@ use super::{
     build_error::BuildError,
     simulation::{ArticulatedPart, ObjectInstance},
 };
-use crate::{
-    geometry::{Pose, Vec3},
-    physics::{
-        ArticulationId, BodyId, LinkId, World,
-        contact::ContactSurface,
-        joints::{JointKind, JointTree, Link},
-        rigid::RigidState,
-    },
-    scene::{Body, JointMotion, Object, Part, Scene},
-    text::format_number,
+use softvt_common::text::format_number;
+use softvt_geometry::{Pose, Vec3};
+use softvt_physics::{
+    ArticulationId, BodyId, LinkId, World,
+    contact::ContactSurface,
+    joints::{JointKind, JointTree, Link},
+    rigid::RigidState,
 };
+use softvt_scene::{Body, JointMotion, Object, Part, Scene};
 
 /// Minimum thickness of rigid walls, m. Other bodies can pass through thinner ones between two steps.
 const MIN_WALL: f64 = 2e-3;

@@ -1,11 +1,9 @@
 //! Errors of building a scene.
 
-use crate::{
-    geometry::voxel::VoxelMeshError,
-    physics::{joints::JointTreeError, rigid::RigidError},
-    scene::Object,
-    text::format_number,
-};
+use softvt_common::text::format_number;
+use softvt_geometry::voxel::VoxelMeshError;
+use softvt_physics::{joints::JointTreeError, rigid::RigidError};
+use softvt_scene::Object;
 
 /// An object cannot be built.
 #[derive(Debug, thiserror::Error)]

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use super::simulation::Simulation;
-use crate::policy::{
+use softvt_policy::{
     Action, ActionChunk, CommandResolver, Observation, Policy, PolicyError, SensorStreams, TaskBrief,
     ToolCommand,
 };

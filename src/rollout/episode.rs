@@ -16,29 +16,27 @@ use super::{
     simulation::{ObjectInstance, SettleError, Simulation, state_hash},
     trace::StepTrace,
 };
-use crate::{
-    benchmark::{GoalKind, Task, settings::Settings, steps_per_control},
-    evaluation::{
-        deformation::{Deformation, ReferenceShape},
-        episode_id::EpisodeId,
-        goal::GoalRegion,
-        judge::{Judge, JudgeConfig},
-        record::{EpisodeHeader, EpisodeRecord, Outcome, RolloutStats, Verdict},
-        safety::DeformationLimit,
-    },
-    geometry::{Aabb, Pose, Vec3},
-    physics::{
-        BodyId,
-        world::{StepFailure, WorldSnapshot},
-    },
-    policy::{Action, Observation, PolicyError, SensorStreams},
-    robot::{
-        Side,
-        ik::{LINEARISATION_RANGE, PoseDifference},
-        rotation,
-    },
-    scene::{Asset, Body, Scene},
+use softvt_benchmark::{GoalKind, Task, settings::Settings, steps_per_control};
+use softvt_evaluation::{
+    deformation::{Deformation, ReferenceShape},
+    episode_id::EpisodeId,
+    goal::GoalRegion,
+    judge::{Judge, JudgeConfig},
+    record::{EpisodeHeader, EpisodeRecord, Outcome, RolloutStats, Verdict},
+    safety::DeformationLimit,
 };
+use softvt_geometry::{Aabb, Pose, Vec3};
+use softvt_physics::{
+    BodyId,
+    world::{StepFailure, WorldSnapshot},
+};
+use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
+use softvt_robot::{
+    Side,
+    ik::{LINEARISATION_RANGE, PoseDifference},
+    rotation,
+};
+use softvt_scene::{Asset, Body, Scene};
 
 /// Specification of an episode: task, scene and parameters. The controller
 /// is passed to [`Episode::run`](super::Episode::run).

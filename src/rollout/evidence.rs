@@ -1,15 +1,13 @@
 //! The true state in the form in which the judge evaluates it.
 
 use super::simulation::{ObjectInstance, Simulation};
-use crate::{
-    evaluation::{
-        deformation::{Deformation, ReferenceShape},
-        evidence::{BodyEvidence, Evidence, GoalEvidence, GripperEvidence, PadEvidence},
-    },
-    geometry::{Pose, Vec3},
-    physics::{BodyId, ContactPartner, world::ContactSummary},
-    robot::gripper::target_width,
+use softvt_evaluation::{
+    deformation::{Deformation, ReferenceShape},
+    evidence::{BodyEvidence, Evidence, GoalEvidence, GripperEvidence, PadEvidence},
 };
+use softvt_geometry::{Pose, Vec3};
+use softvt_physics::{BodyId, ContactPartner, world::ContactSummary};
+use softvt_robot::gripper::target_width;
 
 /// Collects the evidence of an episode: the target, its goal, the other movable objects, and their settled shapes.
 #[derive(Clone, Debug)]

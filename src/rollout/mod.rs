@@ -11,18 +11,13 @@
 //! ```no_run
 //! use std::sync::Arc;
 //!
-//! use softvt::{
-//!     benchmark::{Goal, GoalKind, Task, settings::Settings},
-//!     evaluation::{
-//!         episode_id::{EpisodeId, Split},
-//!         record::Outcome,
-//!     },
-//!     geometry::{Aabb, Pose, Vec3, shape::Shape},
-//!     physics::contact::Friction,
-//!     policy::{TaskBrief, builtin::NoopPolicy},
-//!     rollout::{AssetCache, ChunkedPolicy, Episode, EpisodeSpec, SensorAssets},
-//!     scene::{Asset, Body, Lighting, Object, Scene},
-//! };
+//! use softvt_benchmark::{Goal, GoalKind, Task, settings::Settings};
+//! use softvt_evaluation::{episode_id::{EpisodeId, Split}, record::Outcome};
+//! use softvt_geometry::{Aabb, Pose, Vec3, shape::Shape};
+//! use softvt_physics::contact::Friction;
+//! use softvt_policy::{TaskBrief, builtin::NoopPolicy};
+//! use softvt_rollout::{AssetCache, ChunkedPolicy, Episode, EpisodeSpec, SensorAssets};
+//! use softvt_scene::{Asset, Body, Lighting, Object, Scene};
 //!
 //! // A cube of 4 cm rests on a table top of 5 cm, whose upper side is at z = 0.
 //! let cuboid = |name: &str, size: Vec3, z: f64, body| Object {
@@ -70,8 +65,9 @@
 //! let finished = episode.run(&mut ChunkedPolicy::new(Box::<NoopPolicy>::default(), brief, 1))?;
 //! assert_eq!(finished.record.outcome, Outcome::Timeout);
 //! assert_eq!(finished.record.stats.steps, 3);
-//! # Ok::<(), softvt::rollout::EpisodeError>(())
+//! # Ok::<(), softvt_rollout::EpisodeError>(())
 //! ```
+#![warn(missing_docs, unreachable_pub)]
 
 mod asset_cache;
 mod build;

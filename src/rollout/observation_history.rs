@@ -3,11 +3,9 @@
 use std::{collections::VecDeque, sync::Arc};
 
 use super::{sensor_assets::SensingError, sensors::SensorSuite};
-use crate::{
-    physics::world::WorldSnapshot,
-    policy::{CameraImage, Observation, SensorStreams, TactileFrame, TactileHistory},
-    sensing::tactile::HISTORY_LENGTH,
-};
+use softvt_physics::world::WorldSnapshot;
+use softvt_policy::{CameraImage, Observation, SensorStreams, TactileFrame, TactileHistory};
+use softvt_sensing::tactile::HISTORY_LENGTH;
 
 #[derive(Clone, Debug)]
 struct HistoryEntry {

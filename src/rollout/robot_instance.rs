@@ -2,20 +2,18 @@
 
 use std::sync::Arc;
 
-use crate::{
-    geometry::{Pose, Vec3, shape::Shape},
-    physics::{
-        ArticulationId, ColliderId, LinkId, World,
-        contact::{Collider, Friction, SurfaceStiffness},
-        world::JointDrive,
-    },
-    robot::{
-        RobotSpec, Side,
-        gripper::{self, GripperSetpoint},
-        ik::DiffIk,
-        pads::{self, PadSurface},
-        panda::{self, ARM_DOFS},
-    },
+use softvt_geometry::{Pose, Vec3, shape::Shape};
+use softvt_physics::{
+    ArticulationId, ColliderId, LinkId, World,
+    contact::{Collider, Friction, SurfaceStiffness},
+    world::JointDrive,
+};
+use softvt_robot::{
+    RobotSpec, Side,
+    gripper::{self, GripperSetpoint},
+    ik::DiffIk,
+    pads::{self, PadSurface},
+    panda::{self, ARM_DOFS},
 };
 
 /// The robot of a simulation: an articulation with position drives, which follows commands of the tool pose
@@ -138,7 +136,7 @@ impl RobotInstance {
         &self,
         world: &World,
         pose_b: &Pose,
-    ) -> Result<[f64; ARM_DOFS], crate::robot::ik::UnreachablePose> {
+    ) -> Result<[f64; ARM_DOFS], softvt_robot::ik::UnreachablePose> {
         self.ik.solve(&self.q(world), pose_b)
     }
 }

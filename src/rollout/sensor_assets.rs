@@ -3,14 +3,12 @@
 use std::sync::Arc;
 
 use super::shared_cache::SharedCache;
-use crate::{
-    geometry::voxel::VoxelMesh,
-    scene::{Asset, Camera},
-    sensing::{
-        camera::{CameraError, RenderMesh},
-        panda::RobotMeshes,
-        tactile::{ContactError, TactileSensor, TactileSensorError, TactileSkin, TactileSpec},
-    },
+use softvt_geometry::voxel::VoxelMesh;
+use softvt_scene::{Asset, Camera};
+use softvt_sensing::{
+    camera::{CameraError, RenderMesh},
+    panda::RobotMeshes,
+    tactile::{ContactError, TactileSensor, TactileSensorError, TactileSkin, TactileSpec},
 };
 
 /// Data of a sensor cannot be computed.

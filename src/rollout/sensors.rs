@@ -7,30 +7,28 @@ use super::{
     sensor_assets::{SensingError, SensorAssets},
     simulation::{ObjectInstance, Simulation},
 };
-use crate::{
-    benchmark::CONTROL_DT,
-    geometry::{Pose, Vec3},
-    physics::{
-        ArticulationId, BodyId, ColliderId, ContactPartner,
-        world::{ContactPatch, WorldSnapshot},
+use softvt_benchmark::CONTROL_DT;
+use softvt_geometry::{Pose, Vec3};
+use softvt_physics::{
+    ArticulationId, BodyId, ColliderId, ContactPartner,
+    world::{ContactPatch, WorldSnapshot},
+};
+use softvt_policy::{PadForce, SensorStreams, TactileFrame};
+use softvt_robot::{
+    RobotSpec, Side,
+    ik::DiffIk,
+    pads,
+    panda::{self, ARM_DOFS},
+};
+use softvt_scene::{Body, Camera, CameraMount, Scene};
+use softvt_sensing::{
+    camera::{
+        CameraError, FrameView, RenderObject, RenderScene, RenderedImage, Renderer, check_cameras,
+        check_light,
     },
-    policy::{PadForce, SensorStreams, TactileFrame},
-    robot::{
-        RobotSpec, Side,
-        ik::DiffIk,
-        pads,
-        panda::{self, ARM_DOFS},
-    },
-    scene::{Body, Camera, CameraMount, Scene},
-    sensing::{
-        camera::{
-            CameraError, FrameView, RenderObject, RenderScene, RenderedImage, Renderer, check_cameras,
-            check_light,
-        },
-        tactile::{
-            GelScratch, OpticsModel, PadWrench, SkinMesh, SubstrateCompliance, TactileContact,
-            TactileReading, TactileSkin, TactileSpec, Taxels, patch_friction,
-        },
+    tactile::{
+        GelScratch, OpticsModel, PadWrench, SkinMesh, SubstrateCompliance, TactileContact, TactileReading,
+        TactileSkin, TactileSpec, Taxels, patch_friction,
     },
 };
 

@@ -5,7 +5,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use crate::parallel::lock;
+use softvt_common::parallel::lock;
 
 /// Maximum number of entries. A suite has a few dozen assets, but a layout with random appearance adds new ones of
 /// several megabytes in every episode.

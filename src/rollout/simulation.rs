@@ -5,18 +5,16 @@ use std::sync::Arc;
 use sha2::{Digest, Sha256};
 
 use super::{asset_cache::AssetCache, build, build_error::BuildError, cancel, robot_instance::RobotInstance};
-use crate::{
-    benchmark::CONTROL_DT,
-    geometry::{Aabb, Pose, Vec3},
-    physics::{
-        BodyId, ColliderId, ContactPartner, PhysicsParams, World,
-        fem::FemModel,
-        joints,
-        world::{ContactSummary, StepFailure},
-    },
-    robot::RobotSpec,
-    scene::{Asset, Body, Joint, Scene},
+use softvt_benchmark::CONTROL_DT;
+use softvt_geometry::{Aabb, Pose, Vec3};
+use softvt_physics::{
+    BodyId, ColliderId, ContactPartner, PhysicsParams, World,
+    fem::FemModel,
+    joints,
+    world::{ContactSummary, StepFailure},
 };
+use softvt_robot::RobotSpec;
+use softvt_scene::{Asset, Body, Joint, Scene};
 
 /// Speed below which an object counts as settled, m/s.
 const SETTLED_SPEED: f64 = 1e-3;

@@ -3,16 +3,14 @@
 use std::sync::Arc;
 
 use super::build_error::BuildError;
-use crate::{
-    geometry::{
-        mass::{approximate_mass_properties, mass_properties},
-        samples::SampleSpec,
-        shape::Shape,
-    },
-    physics::fem::{ElasticMaterial, FemModel},
-    scene::SoftMaterial,
-    text::format_number,
+use softvt_common::text::format_number;
+use softvt_geometry::{
+    mass::{approximate_mass_properties, mass_properties},
+    samples::SampleSpec,
+    shape::Shape,
 };
+use softvt_physics::fem::{ElasticMaterial, FemModel};
+use softvt_scene::SoftMaterial;
 
 /// Factor on the spacing of contact samples for approximate models.
 const APPROXIMATE_SPACING: f64 = 4.0;

@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::{evidence::EvidenceCollector, simulation::Simulation};
-use crate::physics::BodyId;
-use crate::robot::rotation;
+use softvt_physics::BodyId;
+use softvt_robot::rotation;
 
 /// State after a control step; a line of a trace file.
 #[derive(Clone, Debug, Serialize)]

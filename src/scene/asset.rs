@@ -5,10 +5,8 @@ use std::{collections::BTreeMap, sync::Arc};
 use serde::{Deserialize, Serialize};
 
 use super::visual::Visual;
-use crate::{
-    geometry::{Pose, Vec3, mass::mass_properties, shape::Shape},
-    physics::contact::Friction,
-};
+use softvt_geometry::{Pose, Vec3, mass::mass_properties, shape::Shape};
+use softvt_physics::contact::Friction;
 
 /// Kind of body that an object is.
 #[derive(Clone, Debug, PartialEq)]

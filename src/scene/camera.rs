@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use nalgebra::Quaternion;
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::{Pose, Quat, Vec3};
+use softvt_geometry::{Pose, Quat, Vec3};
 
 /// Frame to which a camera is attached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

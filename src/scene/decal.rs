@@ -71,7 +71,7 @@ impl TextDecal {
     }
 
     /// The rasterised glyphs.
-    pub(crate) fn coverage(&self) -> &GlyphCoverage {
+    pub fn coverage(&self) -> &GlyphCoverage {
         self.coverage.get_or_init(|| GlyphCoverage::rasterize(&self.line))
     }
 }
@@ -95,7 +95,7 @@ fn font(typeface: Typeface) -> Option<FontRef<'static>> {
 /// Coverage of a line's area by glyphs, as a summed-area table (Crow, Summed-Area Tables for Texture Mapping, 1984):
 /// the mean over any rectangle takes four lookups.
 #[derive(Debug, Default)]
-pub(crate) struct GlyphCoverage {
+pub struct GlyphCoverage {
     size: [usize; 2],
     /// Row by row, one row and one column more than texels.
     sums: Vec<f64>,
@@ -147,7 +147,7 @@ impl GlyphCoverage {
 
     /// Share of a square covered by glyphs, 0..=1. The square has edge `width` (m); its centre is `right` and `up`
     /// (m) from the centre of the line.
-    pub(crate) fn share(&self, right: f64, up: f64, width: f64) -> f64 {
+    pub fn share(&self, right: f64, up: f64, width: f64) -> f64 {
         if self.sums.is_empty() {
             return 0.0;
         }
@@ -165,7 +165,7 @@ impl GlyphCoverage {
     }
 
     /// Length of the line including its margins, m.
-    pub(crate) fn length_m(&self) -> f64 {
+    pub fn length_m(&self) -> f64 {
         self.size[0] as f64 / self.scale.max(1e-9)
     }
 

@@ -47,11 +47,9 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::{
-        geometry::{Pose, Vec3, mesh::Mesh, shape::Shape},
-        physics::contact::Friction,
-        scene::{SoftMaterial, Visual},
-    };
+    use crate::{SoftMaterial, Visual};
+    use softvt_geometry::{Pose, Vec3, mesh::Mesh, shape::Shape};
+    use softvt_physics::contact::Friction;
 
     fn bun() -> Asset {
         Asset {

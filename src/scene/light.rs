@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::Vec3;
+use softvt_geometry::Vec3;
 
 /// A distant light source with soft shadows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

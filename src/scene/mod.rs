@@ -8,11 +8,9 @@
 //! A soft ball with a rough brown surface, and its rigid counterpart:
 //!
 //! ```
-//! use softvt::{
-//!     geometry::{Vec3, shape::Shape},
-//!     physics::contact::Friction,
-//!     scene::{Asset, Body, SoftMaterial, Visual},
-//! };
+//! use softvt_geometry::{Vec3, shape::Shape};
+//! use softvt_physics::contact::Friction;
+//! use softvt_scene::{Asset, Body, SoftMaterial, Visual};
 //!
 //! let material = SoftMaterial {
 //!     youngs_pa: 5e4,
@@ -38,6 +36,7 @@
 //! // Calibrations refer to assets by this hash, which appearance and name do not enter.
 //! assert_ne!(rigid.fingerprint(), soft.fingerprint());
 //! ```
+#![warn(missing_docs, unreachable_pub)]
 
 mod asset;
 mod camera;
@@ -50,11 +49,11 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::{Aabb, Pose, Quat, Vec3};
+use softvt_geometry::{Aabb, Pose, Quat, Vec3};
 
 pub use asset::{Asset, Body, Joint, JointMotion, Part, SoftMaterial, part_poses};
 pub use camera::{Camera, CameraMount};
-pub use decal::{LabelLine, MAX_LETTERS, TextDecal, Typeface};
+pub use decal::{GlyphCoverage, LabelLine, MAX_LETTERS, TextDecal, Typeface};
 pub use light::{KeyLight, Lighting, Sky};
 pub use visual::{Mask, Visual, VisualLayer};
 

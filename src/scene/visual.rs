@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::decal::TextDecal;
-use crate::geometry::shape::Shape;
+use softvt_geometry::shape::Shape;
 
 /// Visual material of a surface (metalness–roughness model). Colours are linear RGB.
 ///

@@ -261,7 +261,7 @@ mod tests {
 
     /// Compares a committed file with the generated text, or writes it if SOFTVT_WRITE_DOCS is set.
     fn check_file(path: &str, generated: &str) {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
+        let file = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join(path);
         if std::env::var_os("SOFTVT_WRITE_DOCS").is_some() {
             fs::create_dir_all(file.parent().unwrap()).unwrap();
             fs::write(&file, generated).unwrap();
@@ -294,7 +294,7 @@ mod tests {
                     error(table.concat(names, ' '), 0)";
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("x.lua"), text).unwrap();
-        let error = crate::script::load(&folder.path().join("x.lua"), &[]).unwrap_err();
+        let error = crate::load(&folder.path().join("x.lua"), &[]).unwrap_err();
         let mut names: Vec<String> = error.message.split(' ').map(str::to_string).collect();
         let mut table: Vec<String> = ["version".to_string(), "shape".into(), "mask".into()].into();
         table.extend(api::constructors().map(|record| record.constructor().to_string()));

@@ -1,8 +1,9 @@
-//! Sensor models: pure functions of a scene and a [`WorldSnapshot`](crate::physics::world::WorldSnapshot), evaluated on
+//! Sensor models: pure functions of a scene and a [`WorldSnapshot`](softvt_physics::world::WorldSnapshot), evaluated on
 //! demand.
 //!
 //! [`camera`] renders colour, depth and segmentation images, [`tactile`] simulates the GelSight Mini of each finger,
 //! and [`panda`] holds the meshes of the robot that the cameras see. [`canvas`] draws captions and charts next to their images.
+#![warn(missing_docs, unreachable_pub)]
 
 pub mod camera;
 pub mod canvas;

@@ -1,11 +1,9 @@
 //! The suites and settings of a server.
 
-use crate::{
-    benchmark::Suite,
-    evaluation::episode_id::{EpisodeId, Split},
-    policy::{PolicyError, profile::Profile},
-    rollout::{Episode, EpisodeError},
-};
+use softvt_benchmark::Suite;
+use softvt_evaluation::episode_id::{EpisodeId, Split};
+use softvt_policy::{PolicyError, profile::Profile};
+use softvt_rollout::{Episode, EpisodeError};
 
 /// A request cannot be executed. The message is sent to the client.
 #[derive(Debug, thiserror::Error)]

@@ -15,7 +15,7 @@ use tungstenite::{
     protocol::{CloseFrame, frame::coding::CloseCode},
 };
 
-use crate::policy::{
+use softvt_policy::{
     msgpack::{MsgpackError, unpack},
     transport::{self, TransportError, complete_handshake, is_wait, websocket_config},
 };

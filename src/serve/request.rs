@@ -6,12 +6,10 @@ use super::{
     config::{RequestError, ServerConfig},
     state::{ActionRow, EpisodeState},
 };
-use crate::{
-    evaluation::episode_id::{EpisodeId, Split},
-    policy::{
-        msgpack::{NumberArray, entry, kind, names, numbers},
-        profile::ACTION_LEN,
-    },
+use softvt_evaluation::episode_id::{EpisodeId, Split};
+use softvt_policy::{
+    msgpack::{NumberArray, entry, kind, names, numbers},
+    profile::ACTION_LEN,
 };
 
 /// Maximum number of actions of one step, which bounds the time until its response.

@@ -10,15 +10,13 @@ use super::{
     spaces,
     state::LiveEpisode,
 };
-use crate::{
-    benchmark::{CONTROL_DT, Task},
-    evaluation::record::Outcome,
-    policy::{
-        Observation,
-        encode::content,
-        msgpack::map,
-        profile::{Profile, ProfileInput},
-    },
+use softvt_benchmark::{CONTROL_DT, Task};
+use softvt_evaluation::record::Outcome;
+use softvt_policy::{
+    Observation,
+    encode::content,
+    msgpack::map,
+    profile::{Profile, ProfileInput},
 };
 
 /// Version of the protocol.

@@ -18,7 +18,7 @@ use super::{
     response,
     session::ClientSession,
 };
-use crate::policy::transport::{configure, is_wait};
+use softvt_policy::transport::{configure, is_wait};
 
 /// Accept-loop polling interval.
 const ACCEPT_POLL_INTERVAL: Duration = Duration::from_millis(10);

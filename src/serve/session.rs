@@ -13,10 +13,8 @@ use super::{
     response,
     state::{ActionRow, EpisodeState, LiveEpisode},
 };
-use crate::{
-    policy::{encode::image_array, msgpack::pack_array},
-    robot::Side,
-};
+use softvt_policy::{encode::image_array, msgpack::pack_array};
+use softvt_robot::Side;
 
 /// Copies of earlier states per client.
 const MAX_SNAPSHOTS: usize = 4;

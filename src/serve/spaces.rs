@@ -6,7 +6,7 @@ use std::{collections::BTreeSet, f64::consts::PI};
 use rmpv::Value;
 
 use super::config::ServerConfig;
-use crate::policy::{
+use softvt_policy::{
     Observation,
     encode::{ObservationEntry, content},
     msgpack::map,

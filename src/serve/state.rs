@@ -4,16 +4,14 @@
 use rmpv::Value;
 
 use super::config::{RequestError, ServerConfig};
-use crate::{
-    evaluation::{episode_id::EpisodeId, record::Outcome},
-    npy::NpyArray,
-    policy::{
-        CommandResolver, Observation, SensorStreams, decode,
-        msgpack::{map, pack_array},
-        profile::ACTION_LEN,
-    },
-    rollout::{Episode, EpisodeError},
+use softvt_common::npy::NpyArray;
+use softvt_evaluation::{episode_id::EpisodeId, record::Outcome};
+use softvt_policy::{
+    CommandResolver, Observation, SensorStreams, decode,
+    msgpack::{map, pack_array},
+    profile::ACTION_LEN,
 };
+use softvt_rollout::{Episode, EpisodeError};
 
 /// The seven numbers of an action, in the encoding of the profile.
 pub(super) type ActionRow = [f64; ACTION_LEN];
@@ -111,7 +109,7 @@ impl LiveEpisode {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::episode_id::Split;
+    use softvt_evaluation::episode_id::Split;
 
     fn state(episode: u32, actions: &[f64]) -> EpisodeState {
         let (suite, split) = ("one".to_owned(), Split::Validation);

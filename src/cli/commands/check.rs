@@ -8,24 +8,24 @@ use std::{
 use clap::Args;
 
 use crate::{
-    benchmark::{Goal, GoalKind, Plan, Task},
-    cli::{
-        error::CliError,
-        output::print,
-        run::{
-            conditions,
-            config::{RunConfig, RunFlags, ScriptArgs},
-            policy::{PolicyArgs, PolicyConfig},
-            selection::check_distinct_out_dirs,
-            suite_run::SuiteRun,
-        },
+    error::CliError,
+    output::print,
+    run::{
+        conditions,
+        config::{RunConfig, RunFlags, ScriptArgs},
+        policy::{PolicyArgs, PolicyConfig},
+        selection::check_distinct_out_dirs,
+        suite_run::SuiteRun,
     },
+};
+use softvt_benchmark::{Goal, GoalKind, Plan, Task};
+use softvt_common::{
     parallel,
-    rollout::{AssetCache, SensorAssets, cancel, target_asset},
-    scene::Asset,
-    script::SceneBuilder,
     text::{self, counted},
 };
+use softvt_rollout::{AssetCache, SensorAssets, cancel, target_asset};
+use softvt_scene::Asset;
+use softvt_script::SceneBuilder;
 
 /// Check a script without running it
 #[derive(Args, Clone, Debug)]

@@ -5,19 +5,16 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::{
-    benchmark::Plan,
-    cli::{
-        error::{CliError, Exit},
-        output::print,
-        run::{
-            config::{RunConfig, ScriptArgs, thread_count},
-            selection::EpisodeJob,
-            suite_run::SuiteRun,
-        },
+    error::{CliError, Exit},
+    output::print,
+    run::{
+        config::{RunConfig, ScriptArgs, thread_count},
+        selection::EpisodeJob,
+        suite_run::SuiteRun,
     },
-    evaluation::record::EpisodeRecord,
-    script,
 };
+use softvt_benchmark::Plan;
+use softvt_evaluation::record::EpisodeRecord;
 
 /// `assets/golden.json`: an episode whose final state is published.
 #[derive(Deserialize)]
@@ -40,7 +37,7 @@ pub(super) fn run() -> Result<(), CliError> {
         thread_count(None),
         if cfg!(target_feature = "avx2") { "avx2" } else { "portable (slower; the same results)" },
     ));
-    let Some(golden) = script::embedded("assets/golden.json") else {
+    let Some(golden) = softvt_script::embedded("assets/golden.json") else {
         print("golden     none in this build\n");
         return Ok(());
     };

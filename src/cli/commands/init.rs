@@ -4,13 +4,11 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 
-use crate::{
-    cli::{error::CliError, output::print},
-    files,
-    script::{
-        embedded,
-        stubs::{LUARC, STUB_FILE, stubs},
-    },
+use crate::{error::CliError, output::print};
+use softvt_common::files;
+use softvt_script::{
+    embedded,
+    stubs::{LUARC, STUB_FILE, stubs},
 };
 
 /// Write editor stubs for Lua scripts; `init task` creates a project skeleton

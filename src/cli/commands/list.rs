@@ -6,15 +6,12 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
 use crate::{
-    benchmark::{Plan, Task},
-    cli::{
-        error::CliError,
-        output::{print, print_json, text_columns},
-        run::policy::BuiltinPolicy,
-    },
-    policy::profile::PROFILES,
-    script,
+    error::CliError,
+    output::{print, print_json, text_columns},
+    run::policy::BuiltinPolicy,
 };
+use softvt_benchmark::{Plan, Task};
+use softvt_policy::profile::PROFILES;
 
 /// List suites, tasks, assets, policies or profiles
 #[derive(Args, Debug)]
@@ -94,7 +91,8 @@ fn named(built_in: impl Iterator<Item = (String, String)>, folder: &str) -> Vec<
 /// The first sentence of the comment at the top of a Lua file; empty without a comment.
 fn first_sentence(path: &str) -> String {
     let text = std::fs::read_to_string(path).ok();
-    let text = text.or_else(|| String::from_utf8(script::embedded(path)?.to_vec()).ok()).unwrap_or_default();
+    let text =
+        text.or_else(|| String::from_utf8(softvt_script::embedded(path)?.to_vec()).ok()).unwrap_or_default();
     let comment = text.lines().map_while(|line| line.strip_prefix("--")).map(str::trim);
     let comment: Vec<&str> = comment.take_while(|line| !line.is_empty()).collect();
     let comment = comment.join(" ");
@@ -145,7 +143,7 @@ fn stem(path: &str) -> String {
 
 /// Lua files directly in a folder, on disk and embedded, in alphabetical order.
 fn scripts(folder: &str) -> BTreeSet<String> {
-    let mut found: BTreeSet<String> = script::embedded_scripts(folder).into_iter().collect();
+    let mut found: BTreeSet<String> = softvt_script::embedded_scripts(folder).into_iter().collect();
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let paths = entries.map(|entry| format!("{folder}/{}", entry.file_name().to_string_lossy()));
     found.extend(paths.filter(|path| path.ends_with(".lua")));
@@ -154,7 +152,7 @@ fn scripts(folder: &str) -> BTreeSet<String> {
 
 fn plans() -> Result<Vec<(String, Plan)>, CliError> {
     let load = |path: String| {
-        let loaded = script::load(Path::new(&path), &[])?;
+        let loaded = softvt_script::load(Path::new(&path), &[])?;
         Ok((path, loaded.plan))
     };
     scripts("suites").into_iter().map(load).collect()

@@ -4,22 +4,20 @@ use clap::{Args, value_parser};
 use serde_json::json;
 
 use crate::{
-    cli::{
-        error::CliError,
-        run::{
-            config::ScriptArgs,
-            policy::{PolicyArgs, PolicyConfig, expert_controller},
-            recording::{GripLog, RecordingArgs, SuiteRecording, record_all},
-            selection::{EpisodeJob, select_suites, select_tasks},
-            suite_run::SuiteRun,
-        },
+    error::CliError,
+    run::{
+        config::ScriptArgs,
+        policy::{PolicyArgs, PolicyConfig, expert_controller},
+        recording::{GripLog, RecordingArgs, SuiteRecording, record_all},
+        selection::{EpisodeJob, select_suites, select_tasks},
+        suite_run::SuiteRun,
     },
-    evaluation::episode_id::EpisodeIndex,
-    parallel,
-    policy::{Action, Observation, PolicyError, SensorStreams},
-    rollout::{Controller, Simulation},
-    script::ExpertController,
 };
+use softvt_common::parallel;
+use softvt_evaluation::episode_id::EpisodeIndex;
+use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
+use softvt_rollout::{Controller, Simulation};
+use softvt_script::ExpertController;
 
 /// Attempts per demonstration, unless `--attempts` is given.
 const ATTEMPTS_PER_DEMO: u32 = 4;

@@ -8,21 +8,19 @@ use std::{
 use clap::Args;
 
 use crate::{
-    cli::{
-        error::{CliError, Exit},
-        output::print,
-        run::replay::{DemoRef, StoredManifest, check_complete, demos_of, difference, replay_demos},
-    },
-    dataset::{
-        layout::is_dataset,
-        manifest::{self, ManifestEntry},
-    },
-    evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord},
-    report::{
-        actions,
-        stored_run::{self, StoredRun},
-    },
-    text::counted,
+    error::{CliError, Exit},
+    output::print,
+    run::replay::{DemoRef, StoredManifest, check_complete, demos_of, difference, replay_demos},
+};
+use softvt_common::text::counted;
+use softvt_dataset::{
+    layout::is_dataset,
+    manifest::{self, ManifestEntry},
+};
+use softvt_evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord};
+use softvt_report::{
+    actions,
+    stored_run::{self, StoredRun},
 };
 
 /// Simulate a recorded episode again; exit code 0 if the result is byte-identical

@@ -5,19 +5,17 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::{
-    cli::{
-        error::CliError,
-        output::{eprint_notice, print, print_json},
-        run::config::parse_folder,
-    },
-    files,
-    report::{
-        comparison, page,
-        run_summary::summarize_runs,
-        shard_merge, stored_run,
-        tables::{ResultTable, all_tables},
-        terminal,
-    },
+    error::CliError,
+    output::{eprint_notice, print, print_json},
+    run::config::parse_folder,
+};
+use softvt_common::files;
+use softvt_report::{
+    comparison, page,
+    run_summary::summarize_runs,
+    shard_merge, stored_run,
+    tables::{ResultTable, all_tables},
+    terminal,
 };
 
 /// Comment at the top of the LaTeX file: the packages and engines it needs.

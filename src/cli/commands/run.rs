@@ -5,24 +5,22 @@ use std::path::PathBuf;
 use clap::Parser;
 
 use crate::{
-    benchmark::Plan,
-    cli::{
-        error::CliError,
-        output::{print, print_json},
-        run::{
-            conditions,
-            config::{RunConfig, RunFlags, ScriptArgs},
-            episode_artifacts::VideoSelection,
-            evaluate::run_suite,
-            experiment,
-            policy::{PolicyArgs, PolicyConfig},
-            requirement,
-            selection::{check_distinct_out_dirs, path_component, select_episodes, select_tasks},
-            suite_run::{SuiteRun, find_replay_source},
-        },
+    error::CliError,
+    output::{print, print_json},
+    run::{
+        conditions,
+        config::{RunConfig, RunFlags, ScriptArgs},
+        episode_artifacts::VideoSelection,
+        evaluate::run_suite,
+        experiment,
+        policy::{PolicyArgs, PolicyConfig},
+        requirement,
+        selection::{check_distinct_out_dirs, path_component, select_episodes, select_tasks},
+        suite_run::{SuiteRun, find_replay_source},
     },
-    report::terminal,
 };
+use softvt_benchmark::Plan;
+use softvt_report::terminal;
 
 /// A safety-aware visuo-tactile manipulation benchmark for soft objects, on an ordinary CPU
 #[derive(Clone, Debug, Parser)]

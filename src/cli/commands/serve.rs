@@ -6,23 +6,21 @@ use clap::{Args, value_parser};
 use serde_json::json;
 
 use crate::{
-    benchmark::Suite,
-    cli::{
-        error::CliError,
-        output::print,
-        run::{
-            config::{RunConfig, RunFlags, ScriptArgs},
-            policy::{PolicyArgs, PolicyConfig, load_profile_of},
-            selection::{needs_suites, suites_of},
-            suite_run::SuiteRun,
-        },
+    error::CliError,
+    output::print,
+    run::{
+        config::{RunConfig, RunFlags, ScriptArgs},
+        policy::{PolicyArgs, PolicyConfig, load_profile_of},
+        selection::{needs_suites, suites_of},
+        suite_run::SuiteRun,
     },
-    evaluation::episode_id::{EpisodeId, Split},
-    policy::Observation,
-    rollout::{cancel, target_asset},
-    script::{self, LoadedScript},
-    serve::{self, RequestError, ServerConfig},
 };
+use softvt_benchmark::Suite;
+use softvt_evaluation::episode_id::{EpisodeId, Split};
+use softvt_policy::Observation;
+use softvt_rollout::{cancel, target_asset};
+use softvt_script::LoadedScript;
+use softvt_serve::{RequestError, ServerConfig};
 
 /// Serve episodes over a websocket for an external client: docs/serve.md
 #[derive(Args, Clone, Debug)]
@@ -93,17 +91,17 @@ pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
         fingerprint: provenance_hash(&config, &loaded),
         start_episode: Box::new(start_episode),
     };
-    let hello = serve::hello(&server_config, &first_observation(&config, &server_config)?);
+    let hello = softvt_serve::hello(&server_config, &first_observation(&config, &server_config)?);
     let address = listener.local_addr().map_err(|error| CliError::input(error).prefixed(&args.host))?;
     print(&format!("ws://{address}\n"));
-    serve::serve(&listener, &server_config, hello, usize::from(args.threads), &cancel::FLAG);
+    softvt_serve::serve(&listener, &server_config, hello, usize::from(args.threads), &cancel::FLAG);
     Err(CliError::interrupted("interrupted"))
 }
 
 fn listen(args: &ServeArgs) -> Result<TcpListener, CliError> {
     let ServeArgs { host, port, .. } = args;
     let bare = host.trim_start_matches('[').trim_end_matches(']');
-    serve::listen(bare, *port).map_err(|error| {
+    softvt_serve::listen(bare, *port).map_err(|error| {
         CliError::input(match error.kind() {
             ErrorKind::AddrInUse => {
                 format!("--port {port}: already in use at {host}; choose another, or 0 for any free port")
@@ -126,7 +124,7 @@ fn provenance_hash(config: &RunConfig, loaded: &LoadedScript) -> String {
         config.settings,
         config.is_rigid_twin()
     ]);
-    script::sha256(all.to_string().as_bytes())
+    softvt_script::sha256(all.to_string().as_bytes())
 }
 
 /// The first observation of the first episode. It reports invalid scenes and sensors before a client connects.

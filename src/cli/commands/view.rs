@@ -5,21 +5,19 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::{
-    benchmark::Plan,
-    cli::{
-        error::CliError,
-        output::print,
-        run::{
-            config::{RunConfig, RunFlags, ScriptArgs, parse_folder},
-            policy::{PolicyArgs, PolicyConfig},
-            selection::{EpisodeJob, select_tasks},
-            suite_run::SuiteRun,
-        },
+    error::CliError,
+    output::print,
+    run::{
+        config::{RunConfig, RunFlags, ScriptArgs, parse_folder},
+        policy::{PolicyArgs, PolicyConfig},
+        selection::{EpisodeJob, select_tasks},
+        suite_run::SuiteRun,
     },
-    files,
-    report::video::{Caption, worst_state, write_stills, write_video, write_video_frame},
-    rollout::cancel,
 };
+use softvt_benchmark::Plan;
+use softvt_common::files;
+use softvt_report::video::{Caption, worst_state, write_stills, write_video, write_video_frame};
+use softvt_rollout::cancel;
 
 /// Render one episode: a video, and stills of every camera and tactile sensor
 #[derive(Args, Clone, Debug)]

@@ -5,26 +5,23 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use crate::{
-    benchmark::{Condition, ObjectType, REFERENCE, Suite, Task},
-    cli::{
-        error::CliError,
-        output::{eprint_notice, print},
-        run::{
-            config::RunConfig,
-            evaluate::{is_finished, run_suite},
-            selection::{path_component, select_episodes, select_tasks},
-            suite_run::SuiteRun,
-        },
+    error::CliError,
+    output::{eprint_notice, print},
+    run::{
+        config::RunConfig,
+        evaluate::{is_finished, run_suite},
+        selection::{path_component, select_episodes, select_tasks},
+        suite_run::SuiteRun,
     },
-    evaluation::summary::method_label,
-    files::replace,
-    report::{
-        condition_table::{ConditionOutcome, ConditionRow, ConditionTable, table},
-        run_folder::RunFolder,
-    },
-    script::LoadedScript,
-    text,
 };
+use softvt_benchmark::{Condition, ObjectType, REFERENCE, Suite, Task};
+use softvt_common::{files::replace, text};
+use softvt_evaluation::summary::method_label;
+use softvt_report::{
+    condition_table::{ConditionOutcome, ConditionRow, ConditionTable, table},
+    run_folder::RunFolder,
+};
+use softvt_script::LoadedScript;
 
 /// Name of the file with the comparison of all suites, in the folder above all runs.
 const FILE: &str = "conditions.json";

@@ -5,13 +5,11 @@ use std::{fmt, path::PathBuf, str::FromStr};
 use clap::{Args, ValueEnum, value_parser};
 
 use crate::{
-    benchmark::{ShiftValue, Suite},
-    cli::{
-        error::CliError,
-        run::{episode_artifacts::VideoSelection, policy::PolicyConfig, requirement::Requirement},
-    },
-    script::{self, LoadedScript},
+    error::CliError,
+    run::{episode_artifacts::VideoSelection, policy::PolicyConfig, requirement::Requirement},
 };
+use softvt_benchmark::{ShiftValue, Suite};
+use softvt_script::LoadedScript;
 
 // The script, and changes of its scenes and their physics. A doc comment would replace the description of the commands
 // that this struct is flattened into.
@@ -152,7 +150,7 @@ impl RunConfig {
     /// # Errors
     /// The script fails or returns no plan.
     pub(crate) fn load_script(&self) -> Result<LoadedScript, CliError> {
-        Ok(script::load(&self.script.file, &self.script.options)?)
+        Ok(softvt_script::load(&self.script.file, &self.script.options)?)
     }
 
     /// An error about the script.

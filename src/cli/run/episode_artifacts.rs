@@ -5,17 +5,15 @@ use std::{
     str::FromStr,
 };
 
-use crate::{
-    cli::error::CliError,
-    evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord},
-    files,
-    report::{
-        actions,
-        softvtbench_files::{self, DebugFrame, DebugShape},
-        video::{self, Caption},
-    },
-    rollout::{FinishedEpisode, ScoreFrame, cancel},
+use crate::error::CliError;
+use softvt_common::files;
+use softvt_evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord};
+use softvt_report::{
+    actions,
+    softvtbench_files::{self, DebugFrame, DebugShape},
+    video::{self, Caption},
 };
+use softvt_rollout::{FinishedEpisode, ScoreFrame, cancel};
 
 /// Episodes of a run that become videos.
 #[derive(Clone, Debug, PartialEq, Eq)]

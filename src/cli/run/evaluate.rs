@@ -5,30 +5,27 @@ use std::{collections::BTreeSet, path::Path};
 use serde::Serialize;
 
 use crate::{
-    benchmark::Task,
-    cli::{
-        error::{CliError, Exit},
-        output::{Progress, eprint_notice},
-        run::{
-            replay::{difference, replay_factory, with_policy_fields},
-            run_manifest::{self, RunManifest},
-            selection::EpisodeJob,
-            suite_run::SuiteRun,
-        },
+    error::{CliError, Exit},
+    output::{Progress, eprint_notice},
+    run::{
+        replay::{difference, replay_factory, with_policy_fields},
+        run_manifest::{self, RunManifest},
+        selection::EpisodeJob,
+        suite_run::SuiteRun,
     },
-    evaluation::{
-        record::{EpisodeRecord, Outcome},
-        summary::SuiteSummary,
-    },
-    files, parallel,
-    report::{
-        actions,
-        run_folder::{EPISODES, RUN, RunFolder, SUMMARY},
-        softvtbench_files,
-    },
-    rollout::{FinishedEpisode, cancel},
-    text::counted,
 };
+use softvt_benchmark::Task;
+use softvt_common::{files, parallel, text::counted};
+use softvt_evaluation::{
+    record::{EpisodeRecord, Outcome},
+    summary::SuiteSummary,
+};
+use softvt_report::{
+    actions,
+    run_folder::{EPISODES, RUN, RunFolder, SUMMARY},
+    softvtbench_files,
+};
+use softvt_rollout::{FinishedEpisode, cancel};
 
 /// The episodes of a finished run, in order, with their summary.
 pub(crate) struct SuiteResult {
@@ -328,13 +325,11 @@ fn simulate_again(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        benchmark::Plan,
-        cli::run::config::{RunConfig, ScriptArgs},
-        policy::{Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief},
-        rollout::{ChunkedPolicy, Controller},
-        script::EpisodeSetup,
-    };
+    use crate::run::config::{RunConfig, ScriptArgs};
+    use softvt_benchmark::Plan;
+    use softvt_policy::{Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief};
+    use softvt_rollout::{ChunkedPolicy, Controller};
+    use softvt_script::EpisodeSetup;
 
     /// Requests the true forces, holds still, and fails without them.
     struct ForceObserver;

@@ -9,17 +9,13 @@ use std::{
 use serde_json::Value;
 
 use crate::{
-    cli::{
-        error::CliError,
-        output::{Progress, eprint_notice, print, text_columns},
-        run::config::RunConfig,
-    },
-    files::replace,
-    parallel,
-    rollout::cancel,
-    script::{Experiment, ExperimentRow, LoadedScript},
-    text::counted,
+    error::CliError,
+    output::{Progress, eprint_notice, print, text_columns},
+    run::config::RunConfig,
 };
+use softvt_common::{files::replace, parallel, text::counted};
+use softvt_rollout::cancel;
+use softvt_script::{Experiment, ExperimentRow, LoadedScript};
 
 /// Runs all points of an experiment and prints its rows.
 ///

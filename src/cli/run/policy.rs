@@ -9,20 +9,18 @@ use std::{
 
 use clap::{Args, ValueEnum, value_parser};
 
-use crate::{
-    benchmark::seed::RandomStream,
-    cli::{error::CliError, run::recorded_runs::RecordedRuns},
-    dataset::{layout::is_dataset, lerobot::GripperCoding},
-    policy::{
-        Policy, SensorStreams, TaskBrief, builtin,
-        builtin::RecordedPolicy,
-        profile::{PROFILES, Profile},
-        remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},
-    },
-    rollout::{ChunkedPolicy, Controller, cancel},
-    script::{EpisodeSetup, ExpertController, GripMode, PolicyFile, load_profile},
-    text,
+use crate::{error::CliError, run::recorded_runs::RecordedRuns};
+use softvt_benchmark::seed::RandomStream;
+use softvt_common::text;
+use softvt_dataset::{layout::is_dataset, lerobot::GripperCoding};
+use softvt_policy::{
+    Policy, SensorStreams, TaskBrief, builtin,
+    builtin::RecordedPolicy,
+    profile::{PROFILES, Profile},
+    remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},
 };
+use softvt_rollout::{ChunkedPolicy, Controller, cancel};
+use softvt_script::{EpisodeSetup, ExpertController, GripMode, PolicyFile, load_profile};
 
 /// Environment variable with the key of a policy server. A flag would show it to other users of the machine.
 const API_KEY: &str = "SOFTVT_API_KEY";

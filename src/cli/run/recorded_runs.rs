@@ -5,16 +5,14 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use crate::{
-    cli::error::CliError,
-    evaluation::episode_id::{EpisodeIndex, Split},
-    files::FileError,
-    policy::{Action, TaskBrief},
-    report::{
-        actions,
-        run_folder::EPISODES,
-        stored_run::{self, StoredRun},
-    },
+use crate::error::CliError;
+use softvt_common::files::FileError;
+use softvt_evaluation::episode_id::{EpisodeIndex, Split};
+use softvt_policy::{Action, TaskBrief};
+use softvt_report::{
+    actions,
+    run_folder::EPISODES,
+    stored_run::{self, StoredRun},
 };
 
 /// Missing episodes that a message lists.

@@ -16,40 +16,40 @@ use clap::{Args, ValueEnum, value_parser};
 use serde_json::{Value, json};
 
 use crate::{
-    benchmark::{CONTROL_HZ, Suite, Task},
-    cli::{
-        error::CliError,
-        output::{eprint_notice, print},
-        run::{
-            config::{RunConfig, RunFlags, ScriptArgs, TraceDetail, parse_folder},
-            evaluate::{RunLog, SimulatedEpisode, with_kept},
-            policy::ControllerFactory,
-            run_manifest::{self, RunManifest},
-            selection::{EpisodeJob, path_component},
-            suite_run::SuiteRun,
-        },
+    error::CliError,
+    output::{eprint_notice, print},
+    run::{
+        config::{RunConfig, RunFlags, ScriptArgs, TraceDetail, parse_folder},
+        evaluate::{RunLog, SimulatedEpisode, with_kept},
+        policy::ControllerFactory,
+        run_manifest::{self, RunManifest},
+        selection::{EpisodeJob, path_component},
+        suite_run::SuiteRun,
     },
-    dataset::{
-        Demonstration,
-        card::{Card, TaskCount, rejection_counts},
-        demonstration_writer::DemonstrationWriter,
-        layout::{self, DATASET, MANIFEST, PARTS, RECORDING, TaskPaths, VIDEO_STREAMS},
-        manifest::{self, ManifestEntry},
-        merge_parts,
-    },
-    evaluation::{
-        episode_id::{EpisodeIndex, Split},
-        record::{EpisodeRecord, Origin, Outcome},
-    },
+};
+use softvt_benchmark::{CONTROL_HZ, Suite, Task};
+use softvt_common::{
     files::{self, FileError},
     parallel,
-    policy::builtin::RecordedPolicy,
-    report::{actions, run_folder::RunFolder},
-    rollout::{ChunkedPolicy, EpisodeError, FinishedEpisode, SettleError, cancel},
-    scene::InitialState,
-    script::LoadedScript,
     text::counted,
 };
+use softvt_dataset::{
+    Demonstration,
+    card::{Card, TaskCount, rejection_counts},
+    demonstration_writer::DemonstrationWriter,
+    layout::{self, DATASET, MANIFEST, PARTS, RECORDING, TaskPaths, VIDEO_STREAMS},
+    manifest::{self, ManifestEntry},
+    merge_parts,
+};
+use softvt_evaluation::{
+    episode_id::{EpisodeIndex, Split},
+    record::{EpisodeRecord, Origin, Outcome},
+};
+use softvt_policy::builtin::RecordedPolicy;
+use softvt_report::{actions, run_folder::RunFolder};
+use softvt_rollout::{ChunkedPolicy, EpisodeError, FinishedEpisode, SettleError, cancel};
+use softvt_scene::InitialState;
+use softvt_script::LoadedScript;
 
 /// Prefix of the error of an attempt that could not start from the state of its demonstration.
 const START_FAILED: &str = "cannot reproduce the initial state: ";
@@ -364,7 +364,7 @@ fn is_start_error(error: &EpisodeError) -> bool {
     }
 }
 
-/// Those of `attempts` to run next, so that the first `demos` good ones are found whatever the order in which attempts
+/// The attempts to run next, so that the first `demos` good ones are found whatever the order in which attempts
 /// finish. `finished` maps each finished attempt to true if it is good.
 fn due(attempts: &[u32], finished: &BTreeMap<u32, bool>, demos: usize) -> Vec<u32> {
     let mut end = 0;

@@ -9,33 +9,30 @@ use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
 use crate::{
-    benchmark::Suite,
-    cli::{
-        error::{CliError, Exit},
-        output::print,
-        run::{
-            config::{RunConfig, RunFlags, ScriptArgs, Twin, thread_count},
-            policy::{ControllerFactory, PolicyConfig},
-            run_manifest,
-            selection::{EpisodeJob, select_tasks, suites_of},
-            suite_run::SuiteRun,
-        },
+    error::{CliError, Exit},
+    output::print,
+    run::{
+        config::{RunConfig, RunFlags, ScriptArgs, Twin, thread_count},
+        policy::{ControllerFactory, PolicyConfig},
+        run_manifest,
+        selection::{EpisodeJob, select_tasks, suites_of},
+        suite_run::SuiteRun,
     },
-    dataset::{
-        TaskFile,
-        layout::{DATASET, RECORDING},
-        manifest,
-    },
-    evaluation::{
-        episode_id::Split,
-        record::{EpisodeRecord, Outcome},
-    },
-    parallel,
-    policy::{Action, builtin::RecordedPolicy},
-    rollout::{ChunkedPolicy, cancel},
-    script::LoadedScript,
-    text::counted,
 };
+use softvt_benchmark::Suite;
+use softvt_common::{parallel, text::counted};
+use softvt_dataset::{
+    TaskFile,
+    layout::{DATASET, RECORDING},
+    manifest,
+};
+use softvt_evaluation::{
+    episode_id::Split,
+    record::{EpisodeRecord, Outcome},
+};
+use softvt_policy::{Action, builtin::RecordedPolicy};
+use softvt_rollout::{ChunkedPolicy, cancel};
+use softvt_script::LoadedScript;
 
 /// A controller factory that repeats the actions of a recorded episode, and its error if it ended with one.
 pub(crate) fn replay_factory(recorded: Vec<Action>, record: &EpisodeRecord) -> ControllerFactory {
@@ -180,7 +177,7 @@ struct DemoReplay {
 /// Checks that the recording in a folder is complete.
 ///
 /// # Errors
-/// It was interrupted.
+/// The recording was interrupted.
 pub(crate) fn check_complete(path: &Path) -> Result<(), CliError> {
     if path.is_dir() && path.join(RECORDING).is_file() && !path.join(DATASET).is_file() {
         return Err(CliError::input(format!(

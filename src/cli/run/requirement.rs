@@ -2,12 +2,10 @@
 
 use std::str::FromStr;
 
-use crate::{
-    cli::error::{CliError, Exit},
-    evaluation::{
-        statistics::Rate,
-        summary::{Scores, SuiteSummary},
-    },
+use crate::error::{CliError, Exit};
+use softvt_evaluation::{
+    statistics::Rate,
+    summary::{Scores, SuiteSummary},
 };
 
 /// Slack of comparisons, so that a rate of 90 % meets 0.9 whatever its last bit.
@@ -19,7 +17,7 @@ pub(crate) struct Requirement {
     /// As it was typed.
     text: String,
     metric: &'static Metric,
-    comparison: &'static Comparison,
+    comparison: &'static ComparisonSign,
     /// Rates are shares of 1.
     bound: f64,
 }
@@ -54,17 +52,17 @@ fn share(rate: &Rate) -> Option<f64> {
 }
 
 #[derive(Debug)]
-struct Comparison {
+struct ComparisonSign {
     sign: &'static str,
     holds: fn(f64, f64) -> bool,
 }
 
 /// The longer signs first, since `>` is a prefix of `>=`.
-static COMPARISONS: [Comparison; 4] = [
-    Comparison { sign: ">=", holds: |value, bound| value >= bound - TOLERANCE },
-    Comparison { sign: "<=", holds: |value, bound| value <= bound + TOLERANCE },
-    Comparison { sign: ">", holds: |value, bound| value > bound + TOLERANCE },
-    Comparison { sign: "<", holds: |value, bound| value < bound - TOLERANCE },
+static COMPARISONS: [ComparisonSign; 4] = [
+    ComparisonSign { sign: ">=", holds: |value, bound| value >= bound - TOLERANCE },
+    ComparisonSign { sign: "<=", holds: |value, bound| value <= bound + TOLERANCE },
+    ComparisonSign { sign: ">", holds: |value, bound| value > bound + TOLERANCE },
+    ComparisonSign { sign: "<", holds: |value, bound| value < bound - TOLERANCE },
 ];
 
 impl FromStr for Requirement {
@@ -117,13 +115,15 @@ impl Requirement {
 
 #[cfg(test)]
 mod tests {
+    use softvt_evaluation::record::EpisodeRecord;
+
     use super::*;
-    use crate::evaluation::record::tests::sample;
 
     fn summary(safe: usize, of: usize) -> SuiteSummary {
         let records: Vec<_> = (0..of)
             .map(|i| {
-                let mut record = sample();
+                let record = include_str!("../../../tests/data/episode_record.json");
+                let mut record: EpisodeRecord = serde_json::from_str(record).expect("a valid record");
                 record.header.id.episode = i as u32;
                 record.verdict.safety = i < safe;
                 record

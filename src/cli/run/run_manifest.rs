@@ -9,16 +9,14 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::{
-    benchmark::{ShiftValue, Task, settings::Settings},
-    cli::{
-        error::CliError,
-        run::{recorded_runs::ReplaySource, suite_run::SuiteRun},
-    },
-    dataset::card::Imported,
-    files,
-    policy::profile::Profile,
-    report::run_folder::{RUN, RunFolder},
+    error::CliError,
+    run::{recorded_runs::ReplaySource, suite_run::SuiteRun},
 };
+use softvt_benchmark::{ShiftValue, Task, settings::Settings};
+use softvt_common::files;
+use softvt_dataset::card::Imported;
+use softvt_policy::profile::Profile;
+use softvt_report::run_folder::{RUN, RunFolder};
 
 /// Content of `run.json`.
 #[derive(Serialize)]

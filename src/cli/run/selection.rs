@@ -2,11 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use crate::{
-    benchmark::{Plan, Suite, Task},
-    cli::{error::CliError, run::config::RunConfig},
-    evaluation::episode_id::EpisodeIndex,
-};
+use crate::{error::CliError, run::config::RunConfig};
+use softvt_benchmark::{Plan, Suite, Task};
+use softvt_evaluation::episode_id::EpisodeIndex;
 
 /// An episode to run.
 #[derive(Clone, Copy, Debug)]

@@ -7,35 +7,32 @@ use std::{
 };
 
 use crate::{
-    benchmark::{ObjectType, ShiftValue, Suite, Task, settings::Settings},
-    cli::{
-        error::{CliError, Exit},
-        output::eprint_notice,
-        run::{
-            config::{RunConfig, TraceDetail},
-            episode_artifacts::EpisodeArtifacts,
-            policy::{ControllerFactory, DeclaredStreams},
-            recorded_runs::{RecordedRuns, ReplaySource},
-            selection::EpisodeJob,
-        },
+    error::{CliError, Exit},
+    output::eprint_notice,
+    run::{
+        config::{RunConfig, TraceDetail},
+        episode_artifacts::EpisodeArtifacts,
+        policy::{ControllerFactory, DeclaredStreams},
+        recorded_runs::{RecordedRuns, ReplaySource},
+        selection::EpisodeJob,
     },
-    dataset::card::Imported,
-    evaluation::{
-        episode_id::{EpisodeId, EpisodeIndex, Split},
-        record::Origin,
-        safety::{DeformationLimit, NOMINAL_KAPPA},
-        thresholds::ThresholdFile,
-    },
-    files,
-    policy::{PolicyError, SensorStreams, TaskBrief, remote::PolicyConnections},
-    rollout::{
-        AssetCache, BuildError, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SensorAssets,
-        SensorSuite, Simulation, cancel, check_sensors, target_asset,
-    },
-    scene::{Asset, Body, Scene},
-    script::{self, EpisodeSetup, LoadedScript},
-    text::unknown_name,
 };
+use softvt_benchmark::{ObjectType, ShiftValue, Suite, Task, settings::Settings};
+use softvt_common::{files, text::unknown_name};
+use softvt_dataset::card::Imported;
+use softvt_evaluation::{
+    episode_id::{EpisodeId, EpisodeIndex, Split},
+    record::Origin,
+    safety::{DeformationLimit, NOMINAL_KAPPA},
+    thresholds::ThresholdFile,
+};
+use softvt_policy::{PolicyError, SensorStreams, TaskBrief, remote::PolicyConnections};
+use softvt_rollout::{
+    AssetCache, BuildError, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SensorAssets, SensorSuite,
+    Simulation, cancel, check_sensors, target_asset,
+};
+use softvt_scene::{Asset, Body, Scene};
+use softvt_script::{EpisodeSetup, LoadedScript};
 
 /// Folders above a script in which its calibration files are searched, the script's own included.
 const MAX_PARENT_FOLDERS: usize = 3;
@@ -92,7 +89,7 @@ impl<'a> SuiteRun<'a> {
         let settings = suite.settings.with_all(&config.settings);
         let settings = settings.map_err(|error| config.error(format!("--set: {error}")))?;
         for ShiftValue { name, value } in &config.shifts {
-            script::check_shift(&suite.shifts, name, *value)
+            softvt_script::check_shift(&suite.shifts, name, *value)
                 .map_err(|error| config.error(format!("--shift: {error}")))?;
         }
         let replay_source = find_replay_source(config, suite, &jobs)?;
@@ -198,7 +195,7 @@ impl<'a> SuiteRun<'a> {
             return Ok(None);
         }
         let limit = file.limit(name);
-        self.sources.insert(relative_path, script::sha256(text.as_bytes()));
+        self.sources.insert(relative_path, softvt_script::sha256(text.as_bytes()));
         self.thresholds.merge(file);
         Ok(limit)
     }
@@ -434,7 +431,7 @@ fn find_file(script: &Path, relative_path: &str) -> Result<Option<ProjectFile>, 
             }));
         }
     }
-    let embedded = script::embedded(relative_path).and_then(|bytes| std::str::from_utf8(bytes).ok());
+    let embedded = softvt_script::embedded(relative_path).and_then(|bytes| std::str::from_utf8(bytes).ok());
     Ok(embedded
         .map(|text| ProjectFile { text: text.to_owned(), path: format!("{relative_path} (embedded)") }))
 }

@@ -9,13 +9,11 @@ use super::{
     manifest::{self, ManifestEntry},
     video,
 };
-use crate::{
-    benchmark::{CONTROL_DT, CONTROL_HZ},
-    files::FileError,
-    geometry::{Quat, Vec3},
-    robot::rotation,
-    sensing::tactile::MARKER_COUNT,
-};
+use softvt_benchmark::{CONTROL_DT, CONTROL_HZ};
+use softvt_common::files::FileError;
+use softvt_geometry::{Quat, Vec3};
+use softvt_robot::rotation;
+use softvt_sensing::tactile::MARKER_COUNT;
 
 /// Result of a check.
 #[derive(Debug, Default)]

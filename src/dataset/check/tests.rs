@@ -5,12 +5,10 @@ use std::{fs, path::PathBuf};
 use serde_json::json;
 
 use super::*;
-use crate::{
-    dataset::{DataStream, Demonstration, hdf5::write_file, merge_parts},
-    evaluation::record::tests::sample,
-    policy::Action,
-    sensing::tactile::Markers,
-};
+use crate::{DataStream, Demonstration, hdf5::write_file, merge_parts};
+
+use softvt_policy::Action;
+use softvt_sensing::tactile::Markers;
 
 const STEPS: usize = 9;
 
@@ -32,7 +30,8 @@ fn demonstration(salt: f64) -> Demonstration {
         DataStream::f64(name, row, vec![0.1 + salt; STEPS * row.iter().product::<usize>()]).unit("m", "")
     };
     let mut demonstration = Demonstration {
-        record: sample(),
+        record: serde_json::from_str(include_str!("../../../tests/data/episode_record.json"))
+            .expect("a valid record"),
         actions: (0..STEPS)
             .map(|step| Action { position_b: place(step), axis_angle_b: turn(step), closure: 0.3 })
             .collect(),

@@ -11,7 +11,9 @@ use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group, Hdf5Error};
 use serde_json::Value;
 
 use super::super::{DataStream, DatasetError, Demonstration, StreamValues};
-use crate::{evaluation::record::EpisodeRecord, files::FileError, policy::Action};
+use softvt_common::files::FileError;
+use softvt_evaluation::record::EpisodeRecord;
+use softvt_policy::Action;
 
 /// The HDF5 file of a task, with the demonstrations `/data/demo_0`, `/data/demo_1`, …
 pub struct TaskFile {
@@ -24,7 +26,7 @@ pub struct TaskFile {
 
 /// Number types of the datasets that softvt reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::dataset) enum NumberType {
+pub(crate) enum NumberType {
     F64,
     F32,
     U8,
@@ -95,7 +97,7 @@ impl TaskFile {
     }
 
     /// An error about the dataset or group `name` of a demonstration.
-    pub(in crate::dataset) fn error(&self, demo: usize, name: &str, what: impl Into<String>) -> DatasetError {
+    pub(crate) fn error(&self, demo: usize, name: &str, what: impl Into<String>) -> DatasetError {
         DatasetError::content(&self.path, format!("/data/demo_{demo}/{name}"), what)
     }
 
@@ -156,12 +158,12 @@ impl TaskFile {
     }
 
     /// Text attribute of `/data`, if present.
-    pub(in crate::dataset) fn file_attribute(&self, name: &str) -> Option<String> {
+    pub(crate) fn file_attribute(&self, name: &str) -> Option<String> {
         self.data.attr_string(name).ok()
     }
 
     /// True if a demonstration has a dataset of this name, readable or not.
-    pub(in crate::dataset) fn has(&self, demo: usize, name: &str) -> bool {
+    pub(crate) fn has(&self, demo: usize, name: &str) -> bool {
         self.dataset(demo, name).is_ok() || self.is_listed(demo, name)
     }
 
@@ -180,11 +182,11 @@ impl TaskFile {
     }
 
     /// Names of the groups in a group of a demonstration; empty if that is missing.
-    pub(in crate::dataset) fn groups(&self, demo: usize, path: &str) -> Vec<String> {
+    pub(crate) fn groups(&self, demo: usize, path: &str) -> Vec<String> {
         self.subgroup(demo, Some(path)).and_then(|group| group.group_names().ok()).unwrap_or_default()
     }
 
-    pub(in crate::dataset) fn dataset(&self, demo: usize, name: &str) -> Result<H5Dataset, DatasetError> {
+    pub(crate) fn dataset(&self, demo: usize, name: &str) -> Result<H5Dataset, DatasetError> {
         self.group(demo)?;
         let key = format!("data/demo_{demo}/{name}");
         self.file.dataset(&key).map_err(|error| {
@@ -237,7 +239,7 @@ impl TaskFile {
     }
 
     /// Type of the numbers of a dataset.
-    pub(in crate::dataset) fn number_type(
+    pub(crate) fn number_type(
         &self,
         demo: usize,
         name: &str,

@@ -6,7 +6,9 @@ use rust_hdf5::{FilterPipeline, H5Dataset, H5File, H5Group, H5Type};
 use serde_json::{Value, json};
 
 use super::super::{DataStream, DatasetError, Demonstration, StreamValues};
-use crate::{benchmark::CONTROL_HZ, evaluation::record::EpisodeRecord, files};
+use softvt_benchmark::CONTROL_HZ;
+use softvt_common::files;
+use softvt_evaluation::record::EpisodeRecord;
 
 /// Largest chunk of numbers, bytes. Readers of one step decompress a whole chunk.
 const MAX_CHUNK_BYTES: usize = 1 << 18;
@@ -15,7 +17,7 @@ const COMPRESSION_LEVEL: u32 = 4;
 
 /// Length of a dataset and of its chunks, in steps.
 #[derive(Clone, Copy)]
-pub(in crate::dataset) struct ChunkedSteps {
+pub(crate) struct ChunkedSteps {
     pub steps: usize,
     pub per_chunk: usize,
 }
@@ -24,7 +26,7 @@ pub(in crate::dataset) struct ChunkedSteps {
 ///
 /// # Errors
 /// The file cannot be written, or `write` fails.
-pub(in crate::dataset) fn write_file(
+pub(crate) fn write_file(
     path: &Path,
     environment: &Value,
     total: usize,
@@ -43,7 +45,7 @@ pub(in crate::dataset) fn write_file(
 }
 
 /// A file that is being written.
-pub(in crate::dataset) struct Hdf5Writer<'a> {
+pub(crate) struct Hdf5Writer<'a> {
     file: H5File,
     pub path: &'a Path,
     /// Paths of the groups that exist.
@@ -65,7 +67,7 @@ impl<'a> Hdf5Writer<'a> {
     }
 
     /// The group at `path`, created with its parents if necessary.
-    pub(in crate::dataset) fn group(&mut self, path: &str) -> Result<H5Group, DatasetError> {
+    pub(crate) fn group(&mut self, path: &str) -> Result<H5Group, DatasetError> {
         let mut group = self.file.root_group();
         let mut end = 0;
         for name in path.split('/') {
@@ -79,7 +81,7 @@ impl<'a> Hdf5Writer<'a> {
     }
 
     /// Writes the attributes of a demonstration.
-    pub(in crate::dataset) fn write_attributes(
+    pub(crate) fn write_attributes(
         &mut self,
         demo: usize,
         record: &EpisodeRecord,
@@ -113,7 +115,7 @@ impl<'a> Hdf5Writer<'a> {
     }
 
     /// Writes all streams of a demonstration other than images.
-    pub(in crate::dataset) fn write_streams(
+    pub(crate) fn write_streams(
         &mut self,
         demo: usize,
         demonstration: &Demonstration,
@@ -147,7 +149,7 @@ impl<'a> Hdf5Writer<'a> {
 
     /// Creates a dataset. Before compression, HDF5's shuffle filter groups the bytes of a chunk that are
     /// `shuffle_stride` bytes apart; 1 disables it.
-    pub(in crate::dataset) fn create_dataset<T: H5Type>(
+    pub(crate) fn create_dataset<T: H5Type>(
         &mut self,
         key: &str,
         length: ChunkedSteps,
@@ -167,7 +169,7 @@ impl<'a> Hdf5Writer<'a> {
 
     /// Creates the dataset of an image stream. Within a chunk the values of one pixel in successive images are stored
     /// next to each other, so that static parts of the image compress well.
-    pub(in crate::dataset) fn create_image_dataset(
+    pub(crate) fn create_image_dataset(
         &mut self,
         demo: usize,
         name: &str,

@@ -3,7 +3,7 @@
 use rust_hdf5::DatatypeMessage;
 
 use super::super::{DatasetError, FloatArray, TaskFile, hdf5::NumberType};
-use crate::geometry::{Pose, Quat, Vec3};
+use softvt_geometry::{Pose, Quat, Vec3};
 
 /// One demonstration of a foreign file. Errors of its methods name the file and the key.
 #[derive(Clone, Copy)]

@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use crate::{geometry::Pose, policy::ToolCommand, scene::InitialState};
+use softvt_geometry::Pose;
+use softvt_policy::ToolCommand;
+use softvt_scene::InitialState;
 
 /// Layouts that can be imported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,7 +6,7 @@ use super::{
     super::{DatasetError, TaskFile},
     foreign::{ForeignLayout, ForeignTask},
 };
-use crate::benchmark::CONTROL_HZ;
+use softvt_benchmark::CONTROL_HZ;
 
 /// Metadata of a file.
 pub(super) struct Header {

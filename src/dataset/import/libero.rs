@@ -14,14 +14,12 @@ use super::{
     mujoco::MujocoModel,
     tool_pose::{self, RecordedPoses},
 };
-use crate::{
-    geometry::{Pose, Quat, Vec3},
-    policy::{
-        ToolCommand, decode, osc,
-        profile::{ActionEncoding, PoseEncoding, Profile},
-    },
-    robot::{ik::ArmAngles, rotation},
+use softvt_geometry::{Pose, Quat, Vec3};
+use softvt_policy::{
+    ToolCommand, decode, osc,
+    profile::{ActionEncoding, PoseEncoding, Profile},
 };
+use softvt_robot::{ik::ArmAngles, rotation};
 
 /// Tolerance of the range −1..1 of actions, for single precision.
 const ACTION_TOLERANCE: f64 = 1e-5;

@@ -18,7 +18,9 @@ use sha2::{Digest, Sha256};
 
 use self::demo_reader::DemoReader;
 use super::{DatasetError, TaskFile};
-use crate::{evaluation::episode_id::Split, files::FileError, policy::ToolCommand};
+use softvt_common::files::FileError;
+use softvt_evaluation::episode_id::Split;
+use softvt_policy::ToolCommand;
 
 pub use foreign::{
     ForeignDemo, ForeignFile, ForeignLayout, ForeignObjectPose, ForeignTask, InitialCondition,

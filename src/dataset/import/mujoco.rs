@@ -10,7 +10,7 @@ use quick_xml::{
 };
 
 use super::{demo_reader::pose_from_row, foreign::ForeignObjectPose};
-use crate::geometry::Pose;
+use softvt_geometry::Pose;
 
 /// Kinematic tree of a model.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,10 +1,8 @@
 //! Assignment of recorded object poses to the objects of a softvt scene.
 
 use super::foreign::ForeignObjectPose;
-use crate::{
-    geometry::{Pose, Vec3},
-    scene::{Body, Object, ObjectPlacement, Scene},
-};
+use softvt_geometry::{Pose, Vec3};
+use softvt_scene::{Body, Object, ObjectPlacement, Scene};
 
 /// Objects longer than this are furniture and are not placed, m.
 const FURNITURE_LENGTH: f64 = 0.5;
@@ -79,11 +77,9 @@ mod tests {
     use std::{collections::BTreeMap, sync::Arc};
 
     use super::*;
-    use crate::{
-        geometry::{Aabb, Quat, shape::Shape},
-        physics::contact::Friction,
-        scene::{Asset, Lighting},
-    };
+    use softvt_geometry::{Aabb, Quat, shape::Shape};
+    use softvt_physics::contact::Friction;
+    use softvt_scene::{Asset, Lighting};
 
     fn object(name: &str, asset: &str, size: f64) -> Object {
         let asset = Asset {
@@ -141,7 +137,7 @@ mod tests {
         assert_eq!(named(&found), [("left", 10.0), ("right", 30.0)]);
         assert!((found[0].yaw.unwrap() - 0.3).abs() < 1e-12);
         let mut moved = scene();
-        crate::scene::InitialState { joints: Some([0.5; 7]), places: found }.apply(&mut moved);
+        softvt_scene::InitialState { joints: Some([0.5; 7]), places: found }.apply(&mut moved);
         let at = moved.objects[2].pose_w.translation.vector;
         assert!((at - Vec3::new(0.3, 0.1, 0.25)).norm() < 1e-12, "the height is that of the layout: {at}");
         assert_eq!((moved.start_q, &moved.objects[0]), ([0.5; 7], &scene().objects[0]));

@@ -10,11 +10,9 @@ use super::{
     header::Header,
     tool_pose::{self, RecordedPoses},
 };
-use crate::{
-    geometry::{Pose, Quat, Vec3},
-    policy::{Action, ToolCommand, profile::GripperValues},
-    robot::rotation,
-};
+use softvt_geometry::{Pose, Quat, Vec3};
+use softvt_policy::{Action, ToolCommand, profile::GripperValues};
+use softvt_robot::rotation;
 
 const POSES: &str = "obs/eef_pose";
 const JOINTS: &str = "obs/arm_joint_pos";
@@ -216,7 +214,7 @@ fn tool_offset(reader: DemoReader, poses: &RecordedPoses, joints: &[[f64; 7]]) -
 /// Encoding of the gripper: a finger position, or 1 open and -1 closed.
 ///
 /// # Errors
-/// Neither.
+/// The values fit neither encoding.
 fn gripper_encoding(reader: DemoReader, actions: &[RecordedAction]) -> Result<GripperValues, DatasetError> {
     let is_position = |x: f64| (FINGER_RANGE[0]..=FINGER_RANGE[1]).contains(&x);
     let Some(step) = actions.iter().position(|action| !is_position(action.gripper())) else {

@@ -5,13 +5,11 @@ use std::{fs, path::PathBuf};
 use serde_json::{Value, json};
 
 use super::{libero::goals, mujoco::MujocoModel, *};
-use crate::{
-    benchmark::CONTROL_DT,
-    dataset::hdf5::{ChunkedSteps, write_file},
-    geometry::{Pose, Quat, Vec3},
-    policy::{Action, ToolCommand},
-    robot::{IkSpec, ik::DiffIk, rotation},
-};
+use crate::hdf5::{ChunkedSteps, write_file};
+use softvt_benchmark::CONTROL_DT;
+use softvt_geometry::{Pose, Quat, Vec3};
+use softvt_policy::{Action, ToolCommand};
+use softvt_robot::{IkSpec, ik::DiffIk, rotation};
 
 const STEPS: usize = 6;
 const START: [f64; 7] = [0.0, -0.161, 0.0, -2.4446, 0.0, 2.2268, 0.78];
@@ -151,7 +149,7 @@ fn off(command: &Action, tool: &Pose, k: usize) -> f64 {
     // Rodrigues' formula, premultiplied: the axes are those of the base.
     let (angle, cross) = (spin.norm(), (spin / spin.norm()).cross_matrix());
     let turned =
-        crate::geometry::Mat3::identity() + cross * angle.sin() + cross * cross * (1.0 - angle.cos());
+        softvt_geometry::Mat3::identity() + cross * angle.sin() + cross * cross * (1.0 - angle.cos());
     let expected = turned * tool.rotation.to_rotation_matrix().into_inner();
     let got = rotation::from_axis_angle(&command.axis_angle_b).to_rotation_matrix().into_inner();
     (command.position_b - at).norm() + (expected - got).norm()

@@ -1,14 +1,12 @@
 //! Consistency of recorded tool poses with joint angles, whose forward kinematics need no agreed frame.
 
 use super::{super::DatasetError, demo_reader::DemoReader};
-use crate::{
-    benchmark::CONTROL_DT,
-    geometry::{Pose, Quat, Vec3},
-    robot::{
-        IkSpec,
-        ik::{ArmAngles, DiffIk},
-        panda,
-    },
+use softvt_benchmark::CONTROL_DT;
+use softvt_geometry::{Pose, Quat, Vec3};
+use softvt_robot::{
+    IkSpec,
+    ik::{ArmAngles, DiffIk},
+    panda,
 };
 
 /// Tolerance of the joint limits, rad: simulators exceed them slightly.

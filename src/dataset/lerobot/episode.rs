@@ -9,13 +9,11 @@ use super::{
     selection::{ImageSize, SelectedDemo, Selection},
     statistics::{FeatureStatistics, QuantileSource, ValueCounts, ValueMoments, ValueStatistics},
 };
-use crate::{
-    benchmark::CONTROL_HZ,
-    dataset::{DatasetError, ImageBlock, TaskFile, layout::IMAGE_STREAMS},
-    sensing::{
-        camera::encode_png,
-        tactile::{HISTORY_LENGTH, IMAGE_SIZE, MARKER_COUNT, MosaicLayout, mosaic, mosaic_cell},
-    },
+use crate::{DatasetError, ImageBlock, TaskFile, layout::IMAGE_STREAMS};
+use softvt_benchmark::CONTROL_HZ;
+use softvt_sensing::{
+    camera::encode_png,
+    tactile::{HISTORY_LENGTH, IMAGE_SIZE, MARKER_COUNT, MosaicLayout, mosaic, mosaic_cell},
 };
 
 /// Images decompressed at once: whole chunks of the file.

@@ -7,7 +7,7 @@ use super::{
     parquet_table::{ColumnType, ParquetColumn, TableSchema},
     selection::ImageSize,
 };
-use crate::sensing::tactile::MARKER_COUNT;
+use softvt_sensing::tactile::MARKER_COUNT;
 
 /// Image features of a row, in order.
 pub(super) const IMAGE_FEATURES: [&str; 3] = ["image", "wrist_image", "tactile_image"];

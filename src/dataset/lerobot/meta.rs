@@ -11,7 +11,9 @@ use super::{
     parquet_table::{ColumnType, ColumnValues, ParquetColumn, ParquetTable},
     selection::{SelectedDemo, Selection},
 };
-use crate::{benchmark::CONTROL_HZ, dataset::DatasetError, files};
+use crate::DatasetError;
+use softvt_benchmark::CONTROL_HZ;
+use softvt_common::files;
 
 /// Writes all files that do not describe single episodes. `info.json` is last: LeRobot opens nothing without it.
 pub(super) fn write(

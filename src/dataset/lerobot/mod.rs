@@ -25,7 +25,7 @@ use self::{
     v30::SharedTableWriter,
 };
 use super::DatasetError;
-use crate::parallel;
+use softvt_common::parallel;
 
 pub use config::{ExportConfig, ExportSummary, GripperCoding, LeRobotVersion};
 

@@ -18,7 +18,8 @@ use parquet::{
     schema::{parser::parse_message_type, types::ColumnPath},
 };
 
-use crate::{dataset::DatasetError, files::FileError};
+use crate::DatasetError;
+use softvt_common::files::FileError;
 
 /// Type of the values of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

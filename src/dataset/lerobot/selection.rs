@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::dataset::{
+use crate::{
     DatasetError, TaskFile,
     card::Card,
     layout::{DATASET, IMAGE_STREAMS, MANIFEST},

@@ -5,10 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::{
-    dataset::DatasetError,
-    files::{self, FileError},
-};
+use crate::DatasetError;
+use softvt_common::files::{self, FileError};
 
 /// Marker file of an export in progress or interrupted; locked by the writing process.
 const MARKER_FILE: &str = ".softvt-export";

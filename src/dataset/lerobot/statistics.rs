@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::evaluation::statistics::{quantile, quantile_by};
+use softvt_evaluation::statistics::{quantile, quantile_by};
 
 /// The quantiles and their names.
 const QUANTILES: [f64; 5] = [0.01, 0.10, 0.50, 0.90, 0.99];

@@ -16,10 +16,8 @@ use super::{
     parquet_table::{ParquetTable, TableSchema},
     statistics::{FeatureStatistics, NestedList},
 };
-use crate::{
-    dataset::DatasetError,
-    files::{self, FileError},
-};
+use crate::DatasetError;
+use softvt_common::files::{self, FileError};
 
 /// Writes a file of JSON lines.
 struct JsonLinesWriter {

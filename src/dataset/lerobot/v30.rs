@@ -10,7 +10,8 @@ use super::{
     parquet_table::{ColumnType, ColumnValues, ParquetColumn, ParquetTable, TableSchema},
     statistics::{FeatureStatistics, Figure, NestedList},
 };
-use crate::{dataset::DatasetError, files};
+use crate::DatasetError;
+use softvt_common::files;
 
 /// Episodes per table about episodes: some 60 MB.
 const EPISODES_PER_TABLE: usize = 10_000;

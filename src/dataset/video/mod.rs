@@ -11,7 +11,7 @@ use thiserror::Error;
 
 pub use mp4::VideoInfo;
 
-use crate::files::{self, FileError};
+use softvt_common::files::{self, FileError};
 
 /// Quantiser of the encoder, 0 (lossless) to 51. Images of this benchmark reach about 40 dB.
 const QUANTISER: u8 = 22;

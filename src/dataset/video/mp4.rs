@@ -215,7 +215,7 @@ fn read_u32(bytes: &[u8], at: usize) -> Option<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::video::VideoWriter;
+    use crate::video::VideoWriter;
 
     #[test]
     fn length_and_rate_are_read_from_the_index_and_a_truncated_file_has_none() {

@@ -15,7 +15,7 @@
 
 use nalgebra::{Matrix4, Quaternion, SymmetricEigen};
 
-use crate::geometry::{Aabb, Mat3, Quat, Vec3};
+use softvt_geometry::{Aabb, Mat3, Quat, Vec3};
 
 /// Name of D with uniform weights, shared with SoftVTBench.
 pub const METRIC_ID: &str = "fem_rms_rigid_aligned_bbox_pct_v1";

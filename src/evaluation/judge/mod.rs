@@ -23,18 +23,8 @@
 //! A target rests on a plate, released, for nine control steps of 50 ms; the goal asks for 0.4 s.
 //!
 //! ```
-//! use softvt::{
-//!     evaluation::{
-//!         criteria::SuccessCriteria,
-//!         deformation::ReferenceShape,
-//!         evidence::{BodyEvidence, Evidence, GoalEvidence, GripperEvidence, PadEvidence},
-//!         goal::GoalRegion,
-//!         judge::{Judge, JudgeConfig},
-//!         record::Outcome,
-//!         safety::DeformationLimit,
-//!     },
-//!     geometry::{Aabb, Pose, Vec3},
-//! };
+//! use softvt_evaluation::{criteria::SuccessCriteria, deformation::ReferenceShape, evidence::{BodyEvidence, Evidence, GoalEvidence, GripperEvidence, PadEvidence}, goal::GoalRegion, judge::{Judge, JudgeConfig}, record::Outcome, safety::DeformationLimit};
+//! use softvt_geometry::{Aabb, Pose, Vec3};
 //!
 //! let (dt_s, weight_n) = (1.0 / 60.0, 0.3);
 //! let mut judge = Judge::new(JudgeConfig {
@@ -75,10 +65,10 @@
 //! assert!(verdict.goal && verdict.no_drop && verdict.safety);
 //! assert_eq!(verdict.tau, Some(1.0));
 //! assert!(verdict.d_peak.is_some_and(|d| d > 0.0 && d < 0.5));
-//! # Ok::<(), softvt::evaluation::deformation::DeformationError>(())
+//! # Ok::<(), softvt_evaluation::deformation::DeformationError>(())
 //! ```
 
-use crate::geometry::Aabb;
+use softvt_geometry::Aabb;
 
 use super::{
     criteria::SuccessCriteria,

@@ -1,11 +1,9 @@
 use super::*;
 use crate::{
-    evaluation::{
-        deformation::Deformation,
-        evidence::{GoalEvidence, GripperEvidence, PadEvidence},
-    },
-    geometry::{Aabb, Pose, Quat, Vec3},
+    deformation::Deformation,
+    evidence::{GoalEvidence, GripperEvidence, PadEvidence},
 };
+use softvt_geometry::{Aabb, Pose, Quat, Vec3};
 
 const DT: f64 = 1.0 / 60.0;
 const WEIGHT_N: f64 = 0.3;

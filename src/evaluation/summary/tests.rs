@@ -1,5 +1,5 @@
 use super::*;
-use crate::evaluation::record::{Outcome, tests::sample};
+use crate::record::{Outcome, tests::sample};
 
 fn episode(task: usize, index: u32, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
     let mut record = sample();

@@ -6,7 +6,7 @@ use super::{
     tree::{Shape, to_local},
     warp::Axis,
 };
-use crate::geometry::{Aabb, Vec3};
+use crate::{Aabb, Vec3};
 
 /// Cells along the longest edge in the search for the extreme points of a composite shape.
 const CELLS: f64 = 40.0;

@@ -4,11 +4,11 @@
 //! angle). Treating the surfaces as planes gives the distance to their common edge where the edge is nearest. This is
 //! exact for planes and accurate to first order otherwise; [`intersect_exactly`] iterates it.
 
-use crate::geometry::Vec3;
+use crate::Vec3;
 
 /// Signed distance (m) of a shape at a point, and the outward unit normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::geometry) struct SignedDistance {
+pub(crate) struct SignedDistance {
     pub distance: f64,
     pub normal: Vec3,
 }

@@ -5,7 +5,7 @@ use super::{
     primitive,
     tree::{Shape, to_local},
 };
-use crate::geometry::Vec3;
+use crate::Vec3;
 
 /// Contact of a surface sample with a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]

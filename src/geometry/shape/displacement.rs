@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::warp::Axis;
-use crate::geometry::{Vec3, hex8};
+use crate::{Vec3, hex8};
 
 /// A height field over a surface; positive heights raise it outwards.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,7 +7,7 @@ use super::{
     tree::{Shape, to_local},
     warp,
 };
-use crate::geometry::Vec3;
+use crate::Vec3;
 
 /// Distance from the surface beyond which a first-order distance is accurate enough and is not refined, m.
 const BAND: f64 = 12e-3;
@@ -36,7 +36,7 @@ impl Shape {
     /// distance up to 5 mm from the surface, where the radii of curvature are larger than that.
     ///
     /// ```
-    /// use softvt::geometry::{Vec3, shape::Shape};
+    /// use softvt_geometry::{Vec3, shape::Shape};
     ///
     /// let ball = Shape::Sphere { radius: 0.03 }.translated(Vec3::new(0.1, 0.0, 0.0));
     /// let (distance, normal) = ball.distance_and_normal(&Vec3::new(0.1, 0.0, 0.05));
@@ -138,7 +138,7 @@ impl Shape {
     }
 
     /// First-order distance `f/|∇f|` and unit gradient, by the chain rule through the tree.
-    pub(in crate::geometry) fn first_order(&self, p: &Vec3) -> SignedDistance {
+    pub(crate) fn first_order(&self, p: &Vec3) -> SignedDistance {
         match self {
             Self::Box { half } => primitive::cuboid(p, half),
             Self::Sphere { radius } => primitive::sphere(p, *radius),

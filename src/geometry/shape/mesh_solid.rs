@@ -7,7 +7,7 @@ use parry3d_f64::{
 use sha2::{Digest, Sha256};
 
 use super::combine::SignedDistance;
-use crate::geometry::{
+use crate::{
     Vec3,
     mesh::{Mesh, MeshError},
     parry::{from_parry, to_parry},

@@ -17,7 +17,7 @@ mod tree;
 mod validate;
 mod warp;
 
-pub(in crate::geometry) use combine::SignedDistance;
+pub(crate) use combine::SignedDistance;
 pub use contact::Contact;
 pub use displacement::{Bumps, Displacement, Ramp, Ridges};
 pub use mesh_solid::MeshSolid;

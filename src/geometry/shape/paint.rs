@@ -6,7 +6,7 @@ use super::{
     tree::{Shape, to_local},
     warp,
 };
-use crate::geometry::Vec3;
+use crate::Vec3;
 
 impl Shape {
     /// Material id at a point on or near the surface; 0 where the shape is not painted.

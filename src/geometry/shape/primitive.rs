@@ -1,7 +1,7 @@
 //! Signed distances and normals of the primitives; exact except for the ellipsoid.
 
 use super::{combine::SignedDistance, polygon::Polygon};
-use crate::geometry::Vec3;
+use crate::Vec3;
 
 /// The unit vector of `v`; the x axis where it is undefined (the centre of a sphere, the axis of a cylinder).
 fn unit_or_x(v: Vec3, length: f64) -> Vec3 {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{
     displacement::Displacement, mesh_solid::MeshSolid, polygon::Polygon, validate::ShapeError, warp::Axis,
 };
-use crate::geometry::{
+use crate::{
     Pose, Quat, Vec3,
     mesh::{Mesh, MeshError},
 };
@@ -359,7 +359,7 @@ impl Shape {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vec3;
+    use crate::Vec3;
 
     #[test]
     fn shared_parts_count_every_time_they_occur() {

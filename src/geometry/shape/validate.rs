@@ -4,7 +4,7 @@ use super::{
     displacement::{Bumps, Displacement, Ramp, Ridges},
     tree::Shape,
 };
-use crate::geometry::Vec3;
+use crate::Vec3;
 
 /// Invalid number or profile of a shape.
 #[allow(missing_docs, reason = "the messages describe the variants")]

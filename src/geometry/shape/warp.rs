@@ -1,7 +1,7 @@
 //! Coordinate axes, and the inverse maps of warps along them: from a point of the warped shape to the point of the
 //! straight one, with the Jacobian that transforms gradients.
 
-use crate::geometry::{Mat3, Vec3};
+use crate::{Mat3, Vec3};
 
 /// A coordinate axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

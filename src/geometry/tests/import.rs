@@ -1,7 +1,7 @@
 use super::rng;
 use rand::Rng;
 
-use crate::geometry::{
+use crate::{
     Aabb, Vec3,
     import::{ImportError, ImportOptions, MeshFormat, import},
     mesh::{Mesh, MeshError},

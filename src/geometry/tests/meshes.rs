@@ -1,7 +1,7 @@
 use std::f64::consts::PI;
 
 use super::{composite_shapes, euler, exact_shapes, lathe, random_unit, rng};
-use crate::geometry::{
+use crate::{
     Mat3, Pose, Quat, Vec3, hex8,
     mass::mass_properties,
     samples::{SampleSpec, surface_samples},

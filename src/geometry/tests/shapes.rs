@@ -1,7 +1,7 @@
 use rand::Rng;
 
 use super::{composite_shapes, crate_with_low_sides, exact_shapes, lathe, random_unit, rng, wedge};
-use crate::geometry::{
+use crate::{
     Aabb, Vec3,
     mesh::Mesh,
     shape::{Axis, Polygon, Shape, ShapeError},

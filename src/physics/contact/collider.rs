@@ -5,12 +5,10 @@ use std::{fmt::Debug, sync::Arc};
 use serde::{Deserialize, Serialize};
 
 use super::solid::CollisionGeometry;
-use crate::{
-    geometry::{
-        Aabb, Pose, Vec3,
-        shape::{Contact, Shape},
-    },
-    physics::ids::{ArticulationId, BodyId},
+use crate::ids::{ArticulationId, BodyId};
+use softvt_geometry::{
+    Aabb, Pose, Vec3,
+    shape::{Contact, Shape},
 };
 
 /// The surface of a solid in its own frame, m. [`Shape`] implements it.

@@ -1,6 +1,7 @@
 //! State of contact samples between steps: stick anchors, impulses, distance slipped.
 
-use crate::{geometry::Vec3, physics::ids::ContactPartner};
+use crate::ids::ContactPartner;
+use softvt_geometry::Vec3;
 
 /// State of one sample against one partner.
 #[derive(Clone, Copy, Debug, PartialEq)]

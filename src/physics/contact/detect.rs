@@ -1,10 +1,8 @@
 //! Search for the samples of a soft body near a collider.
 
 use super::collider::Collider;
-use crate::{
-    geometry::{Aabb, Mat3, Pose, Vec3},
-    physics::fem::FemState,
-};
+use crate::fem::FemState;
+use softvt_geometry::{Aabb, Mat3, Pose, Vec3};
 
 /// A sample near a surface, at the start of the step.
 #[derive(Clone, Copy, Debug)]

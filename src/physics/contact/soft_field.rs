@@ -7,10 +7,8 @@
 //! Element Analysis, 2008, §4.10).
 
 use super::{collider::ContactSurface, detect::DetectionLimits};
-use crate::{
-    geometry::{Aabb, Mat3, Vec3, hex8, voxel::Embedding},
-    physics::fem::FemState,
-};
+use crate::fem::FemState;
+use softvt_geometry::{Aabb, Mat3, Vec3, hex8, voxel::Embedding};
 
 /// Distance from a voxel, in voxel edges, up to which its trilinear map is used; beyond, the map is continued linearly.
 const MAX_EXTRAPOLATION: f64 = 0.3;

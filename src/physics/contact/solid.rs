@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 use super::manifold::{
     ManifoldPoint, SurfaceFeatures, field::SurfaceInField, manifold, primitives, surface_features,
 };
-use crate::geometry::{
+use softvt_geometry::{
     Aabb, Pose, Vec3,
     convex::{Placed, Primitive},
     shape::Shape,

@@ -7,7 +7,7 @@ use super::{
     force::{self, Corners, elastic},
     rotation::polar,
 };
-use crate::geometry::{
+use softvt_geometry::{
     Mat3, Pose, Quat, Vec3, hex8,
     samples::{SampleSpec, surface_samples},
     shape::Shape,
@@ -95,7 +95,7 @@ impl FemModel {
 
     /// Builds the model of a shape with `resolution` voxels along its longest edge.
     ///
-    /// `volume` (m³) is the mass of [`mass_properties`](crate::geometry::mass::mass_properties) at unit density. It is
+    /// `volume` (m³) is the mass of [`mass_properties`](softvt_geometry::mass::mass_properties) at unit density. It is
     /// a parameter because its computation may take longer than everything else.
     ///
     /// # Errors

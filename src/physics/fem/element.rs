@@ -5,7 +5,7 @@
 //! partly filled one at the centres of its filled sub-cells, plus [`GHOST`] of the full stiffness, so that an almost
 //! empty voxel stays regular.
 
-use crate::geometry::{
+use softvt_geometry::{
     Vec3, hex8,
     voxel::{OccupancyMask, SUBCELLS},
 };

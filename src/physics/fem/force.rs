@@ -1,7 +1,7 @@
 //! Elastic force of one element and its energy.
 
 use super::rotation::{polar, positive_inverse, stretch_hessian};
-use crate::geometry::{Mat3, Vec3};
+use softvt_geometry::{Mat3, Vec3};
 
 /// Corner positions or forces of an element.
 pub type Corners = [Vec3; 8];
@@ -85,11 +85,9 @@ pub fn min_det(x: &Corners, h: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        geometry::{Quat, hex8, voxel::OccupancyMask},
-        physics::fem::element::{gauss_points, mean_gradients, stiffness},
-    };
+    use crate::fem::element::{gauss_points, mean_gradients, stiffness};
     use proptest::prelude::*;
+    use softvt_geometry::{Quat, hex8, voxel::OccupancyMask};
 
     const H: f64 = 0.01;
 

@@ -8,10 +8,8 @@
 //! 3 rad/s and 10 kPa).
 
 use super::FemState;
-use crate::{
-    geometry::{Mat3, Pose, Vec3},
-    physics::rigid::{RigidState, free_spin},
-};
+use crate::rigid::{RigidState, free_spin};
+use softvt_geometry::{Mat3, Pose, Vec3};
 
 /// Rotation per step below which nodes move straight, rad: the stretch is then below the rounding of positions.
 const MIN_ROTATION: f64 = 1e-7;

@@ -1,6 +1,6 @@
 //! Rotation of an element: the orthogonal polar factor of its mean deformation gradient.
 
-use crate::geometry::{Mat3, Vec3};
+use softvt_geometry::{Mat3, Vec3};
 
 /// Newton steps before the singular value decomposition takes over.
 const MAX_NEWTON: usize = 8;
@@ -71,8 +71,8 @@ pub fn polar_svd(f: &Mat3) -> Mat3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Quat;
     use proptest::prelude::*;
+    use softvt_geometry::Quat;
 
     proptest! {
         #[test]

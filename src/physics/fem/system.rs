@@ -7,10 +7,8 @@
 //! tangent changes no equilibrium: the elastic force is always evaluated exactly, and `A` only affects the transient.
 
 use super::body::{FemModel, FemState};
-use crate::{
-    geometry::{Mat3, Vec3},
-    physics::sparse::{BlockMatrix, CholeskyFactor, SymbolicFactor},
-};
+use crate::sparse::{BlockMatrix, CholeskyFactor, SymbolicFactor};
+use softvt_geometry::{Mat3, Vec3};
 
 /// Change of an element's rotation (Frobenius norm, about √2 × radians) beyond which the matrix is factored again.
 const STALE_ROTATION: f64 = 0.04;

@@ -9,7 +9,7 @@ use super::{
     kinematics::{LinkVelocity, unit_joint_velocity},
     tree::point_inertia,
 };
-use crate::geometry::{Mat3, Pose, Vec3};
+use softvt_geometry::{Mat3, Pose, Vec3};
 
 /// A spatial velocity, acceleration or (moment, force) pair at the world origin.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

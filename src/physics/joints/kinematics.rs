@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::{JointKind, JointTree};
-use crate::geometry::{Pose, Vec3};
+use softvt_geometry::{Pose, Vec3};
 
 /// Velocity of a link in world coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,7 +3,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::geometry::{Mat3, Pose, Quat, Vec3};
+use softvt_geometry::{Mat3, Pose, Quat, Vec3};
 
 const GRAVITY: Vec3 = Vec3::new(0.0, 0.0, -9.81);
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{DVector, Unit};
 
-use crate::geometry::{Mat3, Pose, Vec3};
+use softvt_geometry::{Mat3, Pose, Vec3};
 
 /// Type of a joint: motion about or along a unit axis given in the joint frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,7 +18,7 @@ impl JointKind {
     pub fn motion(&self, q: f64) -> Pose {
         match self {
             Self::Revolute(axis) => {
-                Pose::from_parts(Vec3::zeros().into(), crate::geometry::Quat::from_axis_angle(axis, q))
+                Pose::from_parts(Vec3::zeros().into(), softvt_geometry::Quat::from_axis_angle(axis, q))
             }
             Self::Prismatic(axis) => Pose::translation(axis.x * q, axis.y * q, axis.z * q),
         }

@@ -4,7 +4,7 @@
 //! the step (without torques, the angular velocity is [`FreeSpin::end_w`]), and then calls [`advance`]. In free
 //! flight this conserves the vector of angular momentum and the kinetic energy to rounding, at any step size.
 
-use crate::geometry::{Mat3, Pose, Quat, Vec3};
+use softvt_geometry::{Mat3, Pose, Quat, Vec3};
 
 #[cfg(test)]
 mod tests;

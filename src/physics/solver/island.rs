@@ -4,7 +4,8 @@ use super::{
     problem::{ContactProblem, ScalarConstraint},
     secant::SecantPairs,
 };
-use crate::{geometry::union_find::UnionFind, physics::sparse::dense};
+use crate::sparse::dense;
+use softvt_geometry::union_find::UnionFind;
 
 /// Cost of a factorization in Newton steps with an existing factor.
 pub(super) const FACTOR_COST_IN_STEPS: f64 = 8.0;

@@ -4,7 +4,7 @@
 //! are linear in them, so gradient and Hessian of a cluster are summed in local coordinates first and scattered once.
 
 use super::problem::{ContactCluster, ContactPoint, ContactProblem, Endpoint};
-use crate::geometry::{Mat3, Vec3};
+use softvt_geometry::{Mat3, Vec3};
 
 /// Largest number of local coordinates of a cluster: two endpoints of eight nodes.
 const MAX_LOCAL: usize = 48;

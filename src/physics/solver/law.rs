@@ -2,7 +2,7 @@
 //! functions of their velocity.
 
 use super::problem::{ContactPoint, ScalarConstraint};
-use crate::geometry::{Mat3, Vec3};
+use softvt_geometry::{Mat3, Vec3};
 
 /// Impulse and cost of a contact point at a velocity.
 #[derive(Clone, Copy, Debug)]

@@ -13,7 +13,8 @@ use super::{
     law::{ContactLaw, ContactResponse, LinearSegment},
     problem::ContactProblem,
 };
-use crate::{geometry::Vec3, physics::sparse::dense};
+use crate::sparse::dense;
+use softvt_geometry::Vec3;
 
 /// Convergence of the gradient relative to the momenta of the island (both scaled by `diag(A)^-1/2`).
 const RELATIVE_TOLERANCE: f64 = 1e-5;

@@ -1,6 +1,6 @@
 //! Data of one solve.
 
-use crate::geometry::Vec3;
+use softvt_geometry::Vec3;
 
 /// A block of generalised velocities with its own momentum equation `A v = r` (a *clique* of Drake's SAP).
 ///

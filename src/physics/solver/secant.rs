@@ -3,7 +3,7 @@
 //! Contacts that have begun to slip since the factor was computed change the Hessian by a matrix of low rank, which a
 //! few secant pairs capture: limited-memory BFGS (Nocedal 1980) with the factor in the place of the initial matrix.
 
-use crate::physics::sparse::dense::dot;
+use crate::sparse::dense::dot;
 
 /// A step and the change of the gradient along it.
 #[derive(Clone, Debug)]

@@ -3,16 +3,14 @@
 
 use super::{Articulation, StepFailure, World};
 use crate::{
-    geometry::{Pose, Vec3},
-    physics::{
-        contact::ColliderMotion,
-        fem::system::StepCoefficients,
-        ids::{ArticulationId, BodyId, RigidId, SoftId},
-        joints,
-        rigid::{FreeSpin, free_spin},
-        solver::{Endpoint, FrameJacobian, ScalarConstraint, VelocityBlock},
-    },
+    contact::ColliderMotion,
+    fem::system::StepCoefficients,
+    ids::{ArticulationId, BodyId, RigidId, SoftId},
+    joints,
+    rigid::{FreeSpin, free_spin},
+    solver::{Endpoint, FrameJacobian, ScalarConstraint, VelocityBlock},
 };
+use softvt_geometry::{Pose, Vec3};
 
 /// Distance to a surface within which a group's nodes are retained in the reduced system, m. The factor then does not
 /// change when a contact begins.

@@ -7,15 +7,13 @@ use super::{
     state::{JointFriction, SleepState},
 };
 use crate::{
-    geometry::{Pose, shape::Shape},
-    physics::{
-        contact::{Collider, ContactHistory, ContactSurface, Friction, SurfaceStiffness},
-        fem::{FemModel, FemState, system::VelocitySystem},
-        ids::{ArticulationId, BodyId, ColliderId, KinematicId, RigidId, SoftId},
-        joints::{self, JointState, JointTree},
-        rigid::RigidState,
-    },
+    contact::{Collider, ContactHistory, ContactSurface, Friction, SurfaceStiffness},
+    fem::{FemModel, FemState, system::VelocitySystem},
+    ids::{ArticulationId, BodyId, ColliderId, KinematicId, RigidId, SoftId},
+    joints::{self, JointState, JointTree},
+    rigid::RigidState,
 };
+use softvt_geometry::{Pose, shape::Shape};
 
 impl World {
     /// Adds a soft body in its rest configuration at `pose`. [`FemModel::from_shape`] builds the model.

@@ -2,12 +2,10 @@
 //! evolution of its tangential spring.
 
 use crate::{
-    geometry::Vec3,
-    physics::{
-        contact::{Friction, SurfaceStiffness},
-        solver::ContactPoint,
-    },
+    contact::{Friction, SurfaceStiffness},
+    solver::ContactPoint,
 };
+use softvt_geometry::Vec3;
 
 /// Geometry and history of one contact between two surfaces.
 pub(super) struct ContactPair {

@@ -3,7 +3,7 @@
 //! A step beyond these bounds has diverged, even if it seems to recover later.
 
 use super::{SoftBody, StepFailure, World};
-use crate::physics::{PhysicsParams, fem::FemModel};
+use crate::{PhysicsParams, fem::FemModel};
 
 impl World {
     /// Checks that the state is finite, that no element stays inverted, and that speeds and forces are physical.
@@ -85,15 +85,13 @@ fn force_limit(model: &FemModel, params: &PhysicsParams) -> f64 {
 mod tests {
     use super::*;
     use crate::{
-        geometry::{Mat3, Pose, Vec3, samples::SampleSpec, shape::Shape},
-        physics::{
-            contact::Friction,
-            fem::ElasticMaterial,
-            ids::ColliderId,
-            rigid::RigidState,
-            world::{BodyContact, ContactSummary},
-        },
+        contact::Friction,
+        fem::ElasticMaterial,
+        ids::ColliderId,
+        rigid::RigidState,
+        world::{BodyContact, ContactSummary},
     };
+    use softvt_geometry::{Mat3, Pose, Vec3, samples::SampleSpec, shape::Shape};
 
     /// A soft cube of 50 mm in free space.
     fn floating() -> World {

@@ -1,10 +1,8 @@
 //! Update of the state from the solved velocities.
 
 use super::World;
-use crate::{
-    geometry::Vec3,
-    physics::{fem::rigid_motion, joints, rigid},
-};
+use crate::{fem::rigid_motion, joints, rigid};
+use softvt_geometry::Vec3;
 
 impl World {
     /// Sets the velocities at the end of the step and moves everything.

@@ -7,14 +7,8 @@
 //! A soft cube falls on a table and comes to rest:
 //!
 //! ```
-//! use softvt::{
-//!     geometry::{Pose, Vec3, samples::SampleSpec, shape::Shape},
-//!     physics::{
-//!         BodyId, PhysicsParams, World,
-//!         contact::Friction,
-//!         fem::{ElasticMaterial, FemModel},
-//!     },
-//! };
+//! use softvt_geometry::{Pose, Vec3, samples::SampleSpec, shape::Shape};
+//! use softvt_physics::{BodyId, PhysicsParams, World, contact::Friction, fem::{ElasticMaterial, FemModel}};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let mut world = World::new(PhysicsParams::default(), Vec3::new(0.0, 0.0, -9.81));
@@ -39,14 +33,8 @@
 //! Two plates squeeze it by a fifth, and the force on each is read:
 //!
 //! ```
-//! use softvt::{
-//!     geometry::{Pose, Vec3, samples::SampleSpec, shape::Shape},
-//!     physics::{
-//!         PhysicsParams, World,
-//!         contact::Friction,
-//!         fem::{ElasticMaterial, FemModel},
-//!     },
-//! };
+//! use softvt_geometry::{Pose, Vec3, samples::SampleSpec, shape::Shape};
+//! use softvt_physics::{PhysicsParams, World, contact::Friction, fem::{ElasticMaterial, FemModel}};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let mut world = World::new(PhysicsParams::default(), Vec3::zeros());
@@ -88,14 +76,12 @@ mod soft_contacts;
 mod state;
 
 use crate::{
-    geometry::{Pose, Vec3},
-    physics::{
-        contact::{Collider, ColliderMotion, DetectionLimits},
-        ids::{ArticulationId, ColliderId, ContactPartner, KinematicId, LinkId, RigidId, SoftId},
-        params::PhysicsParams,
-        solver::{ContactProblem, Solver, SolverStats},
-    },
+    contact::{Collider, ColliderMotion, DetectionLimits},
+    ids::{ArticulationId, ColliderId, ContactPartner, KinematicId, LinkId, RigidId, SoftId},
+    params::PhysicsParams,
+    solver::{ContactProblem, Solver, SolverStats},
 };
+use softvt_geometry::{Pose, Vec3};
 
 pub use penetration::Penetration;
 pub use snapshot::{ContactPatch, Energy, PatchPoint, SampleFace, WorldSnapshot};

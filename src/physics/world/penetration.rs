@@ -2,13 +2,11 @@
 
 use super::{SoftBody, World, rigid_contacts::ColliderPair};
 use crate::{
-    geometry::{Aabb, Pose, Vec3, convex::Placed},
-    physics::{
-        contact::{Collider, CollisionGeometry},
-        fem::FemState,
-        ids::ColliderId,
-    },
+    contact::{Collider, CollisionGeometry},
+    fem::FemState,
+    ids::ColliderId,
 };
+use softvt_geometry::{Aabb, Pose, Vec3, convex::Placed};
 
 /// Two bodies that overlap.
 #[derive(Clone, Debug, PartialEq)]

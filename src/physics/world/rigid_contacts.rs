@@ -10,13 +10,11 @@ use super::{
     contact_points::{ContactPair, EndStretch, SlidingPairs},
 };
 use crate::{
-    geometry::{Aabb, GroupedAabb, Vec3, convex::Placed, overlapping_pairs},
-    physics::{
-        contact::{CollisionGeometry, DetectionLimits, ManifoldPoint, PairId},
-        ids::{BodyId, ColliderId},
-        solver::{ContactCluster, ContactPoint, Endpoint},
-    },
+    contact::{CollisionGeometry, DetectionLimits, ManifoldPoint, PairId},
+    ids::{BodyId, ColliderId},
+    solver::{ContactCluster, ContactPoint, Endpoint},
 };
+use softvt_geometry::{Aabb, GroupedAabb, Vec3, convex::Placed, overlapping_pairs};
 
 /// Identity of a contact point of two colliders from step to step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,10 +1,8 @@
 //! Sleep: a body at rest costs nothing until something moves near it.
 
 use super::World;
-use crate::{
-    geometry::{Aabb, Vec3},
-    physics::ids::{BodyId, ColliderId, ContactPartner, SoftId},
-};
+use crate::ids::{BodyId, ColliderId, ContactPartner, SoftId};
+use softvt_geometry::{Aabb, Vec3};
 
 /// Speed above which a driven link or a kinematic frame wakes bodies near it, m/s (and rad/s at a lever of 1 m).
 const WAKING_SPEED: f64 = 1e-5;

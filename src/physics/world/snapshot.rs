@@ -2,13 +2,11 @@
 
 use super::{BodyContact, World, state::ContactSummary};
 use crate::{
-    geometry::{Pose, Vec3},
-    physics::{
-        ids::{BodyId, ColliderId, ContactPartner, LinkId, RigidId, SoftId},
-        joints::{kinetic_energy, potential_energy},
-        solver::ContactPoint,
-    },
+    ids::{BodyId, ColliderId, ContactPartner, LinkId, RigidId, SoftId},
+    joints::{kinetic_energy, potential_energy},
+    solver::ContactPoint,
 };
+use softvt_geometry::{Pose, Vec3};
 
 /// An immutable copy of the state after a step: all that images and tactile sensors are computed from.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,17 +5,15 @@ use super::{
     contact_points::{ContactPair, EndStretch, SlidingPairs},
 };
 use crate::{
-    geometry::{Mat3, Vec3},
-    physics::{
-        contact::{
-            BodyBounds, ContactCandidate, ContactRecord, FieldCandidate, SoftField, detect, detect_soft,
-            may_touch,
-        },
-        fem::FemState,
-        ids::{ColliderId, ContactPartner, SoftId},
-        solver::{ContactCluster, ContactPoint, Endpoint},
+    contact::{
+        BodyBounds, ContactCandidate, ContactRecord, FieldCandidate, SoftField, detect, detect_soft,
+        may_touch,
     },
+    fem::FemState,
+    ids::{ColliderId, ContactPartner, SoftId},
+    solver::{ContactCluster, ContactPoint, Endpoint},
 };
+use softvt_geometry::{Mat3, Vec3};
 
 /// Candidates of a step, in the order in which they become contact points.
 #[derive(Clone, Debug, Default)]

@@ -3,15 +3,13 @@
 use std::sync::Arc;
 
 use crate::{
-    geometry::{Pose, Vec3},
-    physics::{
-        contact::{ContactHistory, ContactSurface, Friction, SurfaceStiffness},
-        fem::{FemState, MinDetF, system::VelocitySystem},
-        ids::ContactPartner,
-        joints::{JointState, JointTree},
-        rigid::RigidState,
-    },
+    contact::{ContactHistory, ContactSurface, Friction, SurfaceStiffness},
+    fem::{FemState, MinDetF, system::VelocitySystem},
+    ids::ContactPartner,
+    joints::{JointState, JointTree},
+    rigid::RigidState,
 };
+use softvt_geometry::{Pose, Vec3};
 
 /// Contact of one body with one partner, summed over the contact points.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -11,7 +11,7 @@ use std::{
 use rmpv::Value;
 use tungstenite::{ClientRequestBuilder, Error, Message, WebSocket, client, http::Uri};
 
-use crate::policy::{
+use crate::{
     PolicyError,
     msgpack::unpack,
     profile::Profile,

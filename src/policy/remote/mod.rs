@@ -10,7 +10,7 @@ pub use self::connection::{PolicyServer, Protocol};
 use super::{
     ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief, decode, encode, msgpack::kind,
 };
-use crate::parallel::lock;
+use softvt_common::parallel::lock;
 
 /// Pool of connections to one policy server: one per running episode, reused by later episodes.
 #[derive(Debug)]

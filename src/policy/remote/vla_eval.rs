@@ -7,7 +7,7 @@
 use rmpv::Value;
 
 use super::connection::PolicyConnection;
-use crate::policy::{
+use crate::{
     ActionChunk, Observation, PolicyError, TaskBrief, decode,
     encode::content,
     msgpack::{entry, map, names},

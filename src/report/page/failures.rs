@@ -7,13 +7,11 @@ use serde_json::Value;
 
 use super::images::{ByteBudget, DataImage, embed_image, relative_link};
 use crate::{
-    evaluation::{episode_id::EpisodeId, record::EpisodeHeader},
-    report::{
-        run_summary::{RunSummary, UnsafeEpisode},
-        video::{still_path, video_path},
-    },
-    text::counted,
+    run_summary::{RunSummary, UnsafeEpisode},
+    video::{still_path, video_path},
 };
+use softvt_common::text::counted;
+use softvt_evaluation::{episode_id::EpisodeId, record::EpisodeHeader};
 
 /// Largest number of episodes listed per run.
 const MAX_LISTED: usize = 60;

@@ -4,12 +4,10 @@
 
 use maud::{Markup, Render, html};
 
-use crate::{
-    evaluation::{
-        paired_stats::d_over_tau,
-        statistics::{Distribution, Rate},
-    },
-    report::run_summary::RunSummary,
+use crate::run_summary::RunSummary;
+use softvt_evaluation::{
+    paired_stats::d_over_tau,
+    statistics::{Distribution, Rate},
 };
 
 /// Height of a bar, and distance between bars, pixels.

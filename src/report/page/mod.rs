@@ -10,7 +10,7 @@ use std::path::Path;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde_json::Value;
 
-use crate::text::counted;
+use softvt_common::text::counted;
 
 use super::{
     run_summary::RunSummary,

@@ -1,15 +1,14 @@
+use crate::sample_record;
 use std::{collections::BTreeMap, fs};
 
 use serde_json::json;
 
 use super::*;
 use crate::{
-    evaluation::record::{EpisodeRecord, tests::sample},
-    report::{
-        run_summary::{summarize_runs, tests::stored},
-        stored_run::StoredRun,
-    },
+    run_summary::{summarize_runs, tests::stored},
+    stored_run::StoredRun,
 };
+use softvt_evaluation::record::EpisodeRecord;
 
 const HOSTILE: &str = "<script>alert('x')</script>\"&lt; | \\input{x}";
 
@@ -17,7 +16,7 @@ const HOSTILE: &str = "<script>alert('x')</script>\"&lt; | \\input{x}";
 fn episodes(suite: &str, count: u32) -> Vec<EpisodeRecord> {
     (0..count)
         .map(|i| {
-            let mut record = sample();
+            let mut record = sample_record();
             (record.header.id.suite, record.header.id.episode) = (suite.into(), i);
             if i % 2 == 1 {
                 (record.verdict.safety, record.verdict.d_peak) = (false, Some(1.5));

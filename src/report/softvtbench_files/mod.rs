@@ -12,17 +12,15 @@ use std::{
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::{
-    evaluation::{
-        deformation::{METRIC_ID, ReferenceShape},
-        episode_id::{EpisodeId, EpisodeIndex},
-        record::{EpisodeHeader, EpisodeRecord},
-        statistics::{Rate, quantile},
-        thresholds::ThresholdFile,
-    },
-    files::{self, FileError, replace},
-    geometry::Vec3,
+use softvt_common::files::{self, FileError, replace};
+use softvt_evaluation::{
+    deformation::{METRIC_ID, ReferenceShape},
+    episode_id::{EpisodeId, EpisodeIndex},
+    record::{EpisodeHeader, EpisodeRecord},
+    statistics::{Rate, quantile},
+    thresholds::ThresholdFile,
 };
+use softvt_geometry::Vec3;
 
 /// Folder within a run folder.
 pub const FOLDER: &str = "softvtbench";

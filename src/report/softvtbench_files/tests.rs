@@ -1,20 +1,33 @@
+use crate::sample_record;
 use std::fs;
 
 use super::*;
-use crate::{
-    evaluation::{
-        calibration::{
-            Envelope,
-            tests::{hold, squeeze},
-        },
-        record::tests::sample,
-        thresholds::sweep_jsonl,
-    },
-    geometry::Vec3,
+use softvt_evaluation::{
+    calibration::{Envelope, HoldRow, SweepRow},
+    thresholds::sweep_jsonl,
 };
+use softvt_geometry::Vec3;
+
+fn hold(closure: f64, held: u32) -> HoldRow {
+    HoldRow { closure, trials: 5, held, slip_mm: 0.1, d_peak_pct: 0.5 }
+}
+
+fn squeeze(closure: f64, d: f64, stable: bool) -> SweepRow {
+    SweepRow {
+        closure,
+        gripper_width_mm: 80.0 * (1.0 - closure),
+        d_peak_pct: d,
+        force_n: 2.0,
+        min_det_f: 0.6,
+        node_speed_m_s: 1e-4,
+        both_pads: true,
+        slip_mm: 0.0,
+        stable,
+    }
+}
 
 fn episode(task: usize, asset: &str, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
-    let mut record = sample();
+    let mut record = sample_record();
     (record.header.id.task, record.header.asset) = (task, asset.into());
     edit(&mut record);
     record
@@ -73,7 +86,7 @@ fn a_debug_frame_describes_the_shape_of_the_target() {
     let now = nodes.map(|x| Vec3::new(0.5 * x.x, x.y, x.z));
     let d = reference.measure(&now).unwrap();
     let shape = DebugShape::new("bun", Some(&reference), Some(d.rms_pct), Some(d.max_pct), Some(d.bbox_m));
-    let frame = serde_json::to_value(DebugFrame::new(&sample().header.id, 7, false, shape)).unwrap();
+    let frame = serde_json::to_value(DebugFrame::new(&sample_record().header.id, 7, false, shape)).unwrap();
     assert_eq!((&frame["frame"], &frame["exp_idx"], &frame["task_id"]), (&json!(7), &json!(0), &json!(0)));
     assert_eq!(frame["fem_deformation_metric_id"], METRIC_ID);
     assert_eq!(frame["fem_deformation_nodes"], 4);
@@ -100,7 +113,7 @@ fn files_land_where_the_scorer_finds_them() {
     let mut thresholds = ThresholdFile::new(0.5, vec![], "softvt".into());
     thresholds.insert("bun", Envelope::new(vec![hold(0.3, 5)], vec![squeeze(0.3, 2.0, true)], 0.5));
     write_scores(root.path(), &records(), &thresholds).unwrap();
-    let header = sample().header;
+    let header = sample_record().header;
     let frame = DebugFrame::new(&header.id, 0, true, DebugShape::new("bun", None, None, None, None));
     let path = debug_log_path(root.path(), header.id.index());
     assert!(path.ends_with("softvtbench/task_000/episode_00000/policy_action_debug.jsonl"));

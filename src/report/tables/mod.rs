@@ -1,13 +1,11 @@
 //! Result tables of runs, as markdown and as LaTeX with booktabs. Names come from scripts and are escaped.
 
 use super::run_summary::RunSummary;
-use crate::{
-    evaluation::{
-        safety::KAPPAS,
-        statistics::{Distribution, Rate},
-        summary::TaskScores,
-    },
-    text::decimal,
+use softvt_common::text::decimal;
+use softvt_evaluation::{
+    safety::KAPPAS,
+    statistics::{Distribution, Rate},
+    summary::TaskScores,
 };
 
 /// Number of columns, from the left, that hold text; the others hold numbers.

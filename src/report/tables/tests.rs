@@ -1,17 +1,17 @@
 use super::*;
-use crate::{
-    evaluation::record::tests::sample,
-    report::run_summary::{summarize_runs, tests::stored},
-};
+use crate::run_summary::{summarize_runs, tests::stored};
+use crate::sample_record;
 
 #[test]
 fn rigid_suites_have_no_safety_and_privileged_policies_are_marked_in_every_table() {
-    let mut rigid = sample();
+    let mut rigid = sample_record();
     rigid.header.id.suite = "rigid".into();
     rigid.header.soft = false;
     (rigid.verdict.d_peak, rigid.verdict.tau, rigid.verdict.deformation_ok) = (None, None, None);
-    let runs =
-        summarize_runs(vec![stored("a", "expert", vec![sample()]), stored("b", "expert", vec![rigid])]);
+    let runs = summarize_runs(vec![
+        stored("a", "expert", vec![sample_record()]),
+        stored("b", "expert", vec![rigid]),
+    ]);
     let all = all_tables(&runs);
     assert_eq!(all.len(), 5);
     for table in &all {
@@ -27,7 +27,7 @@ fn rigid_suites_have_no_safety_and_privileged_policies_are_marked_in_every_table
 
 #[test]
 fn a_run_in_progress_shows_its_episode_count() {
-    let mut run = stored("a", "noop", vec![sample()]);
+    let mut run = stored("a", "noop", vec![sample_record()]);
     run.manifest["episodes"] = serde_json::json!(20);
     let table = main_table(&summarize_runs(vec![run]));
     assert_eq!(table.rows[0][2], "1 of 20");

@@ -5,20 +5,22 @@ use std::path::{Path, PathBuf};
 
 use image::{ImageBuffer, ImageError, Luma, RgbImage};
 
-use crate::{
-    benchmark::{CONTROL_DT, CONTROL_HZ},
-    dataset::video::{VideoError, VideoWriter},
-    evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord},
+use softvt_benchmark::{CONTROL_DT, CONTROL_HZ};
+use softvt_common::{
     files::{FileError, replace},
-    physics::world::WorldSnapshot,
-    rollout::{CAMERA_IMAGE_SUFFIXES, SensingError, StateRecording, TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES},
-    scene::Camera,
-    sensing::{
-        camera::{RenderedImage, encode_png},
-        canvas::{Canvas, Rgb8},
-        tactile::{MarkerStyle, TactileReading},
-    },
     text::format_number,
+};
+use softvt_dataset::video::{VideoError, VideoWriter};
+use softvt_evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord};
+use softvt_physics::world::WorldSnapshot;
+use softvt_rollout::{
+    CAMERA_IMAGE_SUFFIXES, SensingError, StateRecording, TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES,
+};
+use softvt_scene::Camera;
+use softvt_sensing::{
+    camera::{RenderedImage, encode_png},
+    canvas::{Canvas, Rgb8},
+    tactile::{MarkerStyle, TactileReading},
 };
 
 /// Edge of a camera panel, pixels.
@@ -237,7 +239,7 @@ fn full_size(camera: &Camera) -> usize {
 ///
 /// Cameras also get depth (16 bits, units of 0.1 mm along the optical axis, 65535 beyond the
 /// range and in the background) and segmentation (16 bits: objects from 1 in the order of the
-/// scene, [`crate::rollout::ROBOT_SEGMENTATION_ID`], 0 in the background). Files are written
+/// scene, [`softvt_rollout::ROBOT_SEGMENTATION_ID`], 0 in the background). Files are written
 /// atomically. Returns their paths.
 ///
 /// # Errors

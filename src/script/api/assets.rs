@@ -10,13 +10,11 @@ use super::{
     visuals::visuals_of,
 };
 use crate::{
-    physics::contact::Friction,
-    scene::{Asset, Body, SoftMaterial, Visual},
-    script::{
-        schema::{FromChecked, Range, Record, RecordType, Type, one_of, record, record_of},
-        vm::error::fail,
-    },
+    schema::{FromChecked, Range, Record, RecordType, Type, one_of, record, record_of},
+    vm::error::fail,
 };
+use softvt_physics::contact::Friction;
+use softvt_scene::{Asset, Body, SoftMaterial, Visual};
 
 /// A coefficient of friction.
 pub(crate) const COEFFICIENT: Type = Type::Number("", Range::closed(0.0, 10.0));

@@ -9,14 +9,12 @@ use super::{
     pose::{direction, rotation_from_wxyz, unit_direction, wxyz},
 };
 use crate::{
-    geometry::{Pose, Quat, Vec3},
-    parallel::lock,
-    scene::{Camera, CameraMount, Lighting, Scene},
-    script::{
-        schema::{Range, Type, choice, class, object::fixed_list, record},
-        vm::error::{current_line, fail},
-    },
+    schema::{Range, Type, choice, class, object::fixed_list, record},
+    vm::error::{current_line, fail},
 };
+use softvt_common::parallel::lock;
+use softvt_geometry::{Pose, Quat, Vec3};
+use softvt_scene::{Camera, CameraMount, Lighting, Scene};
 
 /// Cameras of a scene; each renders its own images.
 const MAX_CAMERAS: usize = 64;

@@ -3,21 +3,19 @@
 use mlua::{LuaSerdeExt, Value};
 
 use crate::{
-    evaluation::{
-        calibration::{self, Envelope, HoldRow, SweepRow},
-        envelope_plot::plot,
-        safety::DeformationLimit,
-        thresholds::{ThresholdFile, sweep_jsonl},
+    schema::{Range, Type, Unchecked, functions, output},
+    vm::{
+        error::{app_data, fail},
+        json::deserialize,
+        library::{FoundFile, SharedLibrary},
     },
-    parallel::lock,
-    script::{
-        schema::{Range, Type, Unchecked, functions, output},
-        vm::{
-            error::{app_data, fail},
-            json::deserialize,
-            library::{FoundFile, SharedLibrary},
-        },
-    },
+};
+use softvt_common::parallel::lock;
+use softvt_evaluation::{
+    calibration::{self, Envelope, HoldRow, SweepRow},
+    envelope_plot::plot,
+    safety::DeformationLimit,
+    thresholds::{ThresholdFile, sweep_jsonl},
 };
 
 /// Type of a list of rows.

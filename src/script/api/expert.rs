@@ -11,15 +11,13 @@ use super::{
     pose::LuaPose,
 };
 use crate::{
-    geometry::Pose,
-    parallel::lock,
-    robot::{Obstacle, clearance, gripper::MAX_WIDTH},
-    scene::Body,
-    script::{
-        schema::{ApiObject, Range, Type, class, object::arguments, output},
-        vm::{base_library, error::fail, library::embedded, value::number},
-    },
+    schema::{ApiObject, Range, Type, class, object::arguments, output},
+    vm::{base_library, error::fail, library::embedded, value::number},
 };
+use softvt_common::parallel::lock;
+use softvt_geometry::Pose;
+use softvt_robot::{Obstacle, clearance, gripper::MAX_WIDTH};
+use softvt_scene::Body;
 
 /// Access of an expert to the tactile sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -190,7 +188,7 @@ const RATE: Type = Type::Number("1/s", Range::POSITIVE);
 #[expect(dead_code, reason = "the arm's Lua code reads the fields")]
 mod options {
     use super::{CLOSURE, RATE};
-    use crate::script::schema::{Range, Type, record};
+    use crate::schema::{Range, Type, record};
 
     record! {
         /// Options of a motion of the arm.

@@ -2,13 +2,11 @@
 
 use std::sync::Arc;
 
-use crate::{
-    benchmark::CONTROL_DT,
-    geometry::{Aabb, Pose, Vec3},
-    robot::ik::{PoseDifference, PoseTolerance, UnreachablePose},
-    rollout::{ObjectInstance, Simulation},
-    scene::Asset,
-};
+use softvt_benchmark::CONTROL_DT;
+use softvt_geometry::{Aabb, Pose, Vec3};
+use softvt_robot::ik::{PoseDifference, PoseTolerance, UnreachablePose};
+use softvt_rollout::{ObjectInstance, Simulation};
+use softvt_scene::Asset;
 
 /// True state of an object.
 #[derive(Clone, Debug, PartialEq)]

@@ -6,18 +6,15 @@ use image::{Rgb, RgbImage, imageops};
 use mlua::{Lua, LuaString, Value};
 
 use crate::{
-    parallel::lock,
-    script::{
-        schema::{Range, Type, class, functions},
-        vm::{
-            error::fail,
-            memory_budget::{Reservation, reserve},
-        },
+    schema::{Range, Type, class, functions},
+    vm::{
+        error::fail,
+        memory_budget::{Reservation, reserve},
     },
-    sensing::camera::resize,
-    sensing::canvas::Canvas,
-    text::format_number,
 };
+use softvt_common::{parallel::lock, text::format_number};
+use softvt_sensing::camera::resize;
+use softvt_sensing::canvas::Canvas;
 
 /// Longest text that is written on an image, bytes.
 const MAX_TEXT_BYTES: usize = 1000;

@@ -6,18 +6,15 @@ use mlua::{Lua, Table};
 
 use super::{shapes::LuaShape, visuals::visuals_of};
 use crate::{
-    geometry::{Pose, Vec3},
-    physics::contact::Friction,
-    scene::{Asset, Body, Joint, JointMotion, Part, Visual, part_poses},
-    script::{
-        schema::{
-            FromChecked, Range, Record, RecordType, Type, ValidationError, error_at_key, invalid, one_of,
-            record,
-        },
-        vm::error::fail,
+    schema::{
+        FromChecked, Range, Record, RecordType, Type, ValidationError, error_at_key, invalid, one_of, record,
     },
-    text::{format_number, unknown_name},
+    vm::error::fail,
 };
+use softvt_common::text::{format_number, unknown_name};
+use softvt_geometry::{Pose, Vec3};
+use softvt_physics::contact::Friction;
+use softvt_scene::{Asset, Body, Joint, JointMotion, Part, Visual, part_poses};
 
 record! {
     /// A joint along which a part slides, such as that of a drawer. Values are in m.

@@ -34,7 +34,7 @@ use super::{
         value::{describe, sorted_pairs},
     },
 };
-use crate::text::unknown_name;
+use softvt_common::text::unknown_name;
 
 /// `softvt.List` for stubs and reference; its behaviour is in [`LuaList`].
 static LIST: Class = Class {

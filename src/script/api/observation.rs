@@ -6,19 +6,17 @@ use mlua::{Lua, Table, Value};
 
 use super::{image::LuaImage, pose::wxyz};
 use crate::{
-    policy::{Observation, PadForce, TactileFrame, TactileHistory, TaskBrief},
-    robot::rotation,
-    script::{
-        schema::{
-            FieldValue, Range, Type, class,
-            object::{MEASURED, fixed_list},
-            output,
-        },
-        vm::error::fail,
+    schema::{
+        FieldValue, Range, Type, class,
+        object::{MEASURED, fixed_list},
+        output,
     },
-    sensing::tactile::{MarkerFlow, MarkerPositions, Markers},
-    text::unknown_name,
+    vm::error::fail,
 };
+use softvt_common::text::unknown_name;
+use softvt_policy::{Observation, PadForce, TactileFrame, TactileHistory, TaskBrief};
+use softvt_robot::rotation;
+use softvt_sensing::tactile::{MarkerFlow, MarkerPositions, Markers};
 
 /// `softvt.Observation`.
 #[derive(Clone)]

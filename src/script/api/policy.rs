@@ -2,16 +2,14 @@
 
 use mlua::Function;
 
-use crate::{
-    policy::{
-        SensorStreams,
-        decode::MAX_CHUNK_LEN,
-        profile::{GripperValues, StatePart},
-    },
-    robot::Side,
-    script::schema::{Range, Record, RecordType, Type, choice, record, record_of},
-    sensing::tactile::MosaicLayout,
+use crate::schema::{Range, Record, RecordType, Type, choice, record, record_of};
+use softvt_policy::{
+    SensorStreams,
+    decode::MAX_CHUNK_LEN,
+    profile::{GripperValues, StatePart},
 };
+use softvt_robot::Side;
+use softvt_sensing::tactile::MosaicLayout;
 
 const STEP: Type = Type::Number("", Range { max: 10.0, ..Range::POSITIVE });
 

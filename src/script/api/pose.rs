@@ -2,11 +2,9 @@
 
 use nalgebra::Quaternion;
 
-use crate::{
-    geometry::{Pose, Quat, Vec3},
-    robot::rotation,
-    script::schema::{Range, Type, check::MIN_LENGTH, class, functions},
-};
+use crate::schema::{Range, Type, check::MIN_LENGTH, class, functions};
+use softvt_geometry::{Pose, Quat, Vec3};
+use softvt_robot::rotation;
 
 /// Divides the numbers by the largest magnitude, so that no square over- or underflows. `None` if that is too small or not
 /// finite.

@@ -6,13 +6,11 @@ use mlua::{Lua, Table, Value};
 use rand_chacha::ChaCha8Rng;
 
 use crate::{
-    benchmark::seed::{self, EpisodeSeed, RandomStream},
-    parallel::lock,
-    script::{
-        schema::{Type, class},
-        vm::error::fail,
-    },
+    schema::{Type, class},
+    vm::error::fail,
 };
+use softvt_benchmark::seed::{self, EpisodeSeed, RandomStream};
+use softvt_common::parallel::lock;
 
 /// `softvt.Rng`.
 #[derive(Clone)]

@@ -14,17 +14,14 @@ use super::{
     visuals::LuaMaterial,
 };
 use crate::{
-    geometry::{Aabb, Pose, Quat, Vec3},
-    parallel::lock,
-    physics::contact::Friction,
-    robot::panda::{self, ARM_DOFS},
-    scene::{Asset, Body, Camera, Lighting, Object, Scene, SoftMaterial},
-    script::{
-        schema::{Constructed, Range, Type, class, object::fixed_list, record},
-        vm::error::{current_line, fail},
-    },
-    text::format_number,
+    schema::{Constructed, Range, Type, class, object::fixed_list, record},
+    vm::error::{current_line, fail},
 };
+use softvt_common::{parallel::lock, text::format_number};
+use softvt_geometry::{Aabb, Pose, Quat, Vec3};
+use softvt_physics::contact::Friction;
+use softvt_robot::panda::{self, ARM_DOFS};
+use softvt_scene::{Asset, Body, Camera, Lighting, Object, Scene, SoftMaterial};
 
 /// Start pose of the arm as in SoftVTBench (from the released code): the hand above the table, pointing down.
 const START_Q: [f64; ARM_DOFS] = [-0.01988, -0.18734, 0.00767, -2.40340, 0.00496, 2.24534, 0.79485];

@@ -5,21 +5,19 @@ use std::sync::Arc;
 use mlua::Lua;
 
 use crate::{
-    geometry::{
-        Quat, Vec3,
-        import::{ImportOptions, MeshFormat, import},
-        mass::mass_properties,
-        shape::{Axis, Bumps, Displacement, Ramp, Ridges, Shape, ShapeError, TreeSize},
+    schema::{Range, Type, choice, class, functions, record_of},
+    vm::{
+        error::{app_data, current_line, fail},
+        library::SharedLibrary,
+        memory_budget::{Reservation, reserve},
     },
-    parallel::lock,
-    script::{
-        schema::{Range, Type, choice, class, functions, record_of},
-        vm::{
-            error::{app_data, current_line, fail},
-            library::SharedLibrary,
-            memory_budget::{Reservation, reserve},
-        },
-    },
+};
+use softvt_common::parallel::lock;
+use softvt_geometry::{
+    Quat, Vec3,
+    import::{ImportOptions, MeshFormat, import},
+    mass::mass_properties,
+    shape::{Axis, Bumps, Displacement, Ramp, Ridges, Shape, ShapeError, TreeSize},
 };
 
 const LENGTH: Type = Type::Number("m", Range::POSITIVE);

@@ -16,29 +16,27 @@ use super::{
     tasks::{EXPERT, LayoutSpec, SETTINGS},
 };
 use crate::{
-    benchmark::{
-        seed::{EpisodeSeed, RandomStream},
-        settings::Settings,
-        steps_per_control,
+    schema::{Constructed, Range, Type, choice, class, functions, output},
+    vm::{
+        error::{app_data, fail},
+        json::deserialize,
+        memory_budget::{Reservation, reserve_in_world},
+        value::finite,
+        watchdog::Clock,
     },
-    evaluation::{deformation::ReferenceShape, episode_id::Split},
-    geometry::{Pose, Vec3},
-    parallel::lock,
-    physics::BodyId,
-    robot::{Side, rotation},
-    rollout::{AssetCache, SensingError, SensorAssets, SensorSuite, Simulation, cancel},
-    script::{
-        schema::{Constructed, Range, Type, choice, class, functions, output},
-        vm::{
-            error::{app_data, fail},
-            json::deserialize,
-            memory_budget::{Reservation, reserve_in_world},
-            value::finite,
-            watchdog::Clock,
-        },
-    },
-    sensing::tactile::{MarkerStyle, PadWrench, TactileReading},
 };
+use softvt_benchmark::{
+    seed::{EpisodeSeed, RandomStream},
+    settings::Settings,
+    steps_per_control,
+};
+use softvt_common::parallel::lock;
+use softvt_evaluation::{deformation::ReferenceShape, episode_id::Split};
+use softvt_geometry::{Pose, Vec3};
+use softvt_physics::BodyId;
+use softvt_robot::{Side, rotation};
+use softvt_rollout::{AssetCache, SensingError, SensorAssets, SensorSuite, Simulation, cancel};
+use softvt_sensing::tactile::{MarkerStyle, PadWrench, TactileReading};
 
 const EPISODE: Type = Type::Integer(Range::closed(0.0, 1e9));
 
@@ -56,7 +54,7 @@ pub(crate) fn settings(lua: &Lua, label: &str, table: Option<&Table>) -> mlua::R
 }
 
 /// Measurements of an object since the simulation has settled.
-struct Record {
+struct ObjectMeasurements {
     settled: Option<ReferenceShape>,
     d_peak_pct: f64,
     start_z: f64,
@@ -65,7 +63,7 @@ struct Record {
 /// A simulation with the measurements of its objects.
 pub(crate) struct SimulationState {
     sim: Simulation,
-    records: Vec<Record>,
+    records: Vec<ObjectMeasurements>,
     physics_steps: u64,
     failed: Option<String>,
     clock: Clock,
@@ -100,7 +98,7 @@ impl LuaSimulation {
             let place = e.place().map_or(String::new(), |place| format!("{place}: "));
             fail(lua, format!("softvt.simulate: {place}{e}"))
         })?;
-        let records = sim.objects.iter().map(|object| Record {
+        let records = sim.objects.iter().map(|object| ObjectMeasurements {
             settled: match object.body {
                 BodyId::Soft(id) => {
                     let body = &sim.world.soft(id).state;
@@ -328,11 +326,11 @@ output! {
 }
 
 impl SimulationState {
-    fn object(&self, index: usize) -> &crate::rollout::ObjectInstance {
+    fn object(&self, index: usize) -> &softvt_rollout::ObjectInstance {
         &self.sim.objects[index]
     }
 
-    fn soft_body(&self, index: usize) -> Option<&crate::physics::world::SoftBody> {
+    fn soft_body(&self, index: usize) -> Option<&softvt_physics::world::SoftBody> {
         match self.object(index).body {
             BodyId::Soft(id) => Some(self.sim.world.soft(id)),
             _ => None,
@@ -340,7 +338,7 @@ impl SimulationState {
     }
 
     /// Contacts of the left and the right pad with a movable object.
-    fn pad_contacts(&self, index: usize) -> Option<[crate::physics::world::ContactSummary; 2]> {
+    fn pad_contacts(&self, index: usize) -> Option<[softvt_physics::world::ContactSummary; 2]> {
         let object = self.object(index);
         object.body.is_free().then(|| self.sim.pad_contacts(object))
     }

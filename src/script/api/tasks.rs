@@ -5,15 +5,13 @@ use std::collections::BTreeMap;
 use mlua::{Function, Lua, Table, Value};
 
 use crate::{
-    benchmark::{ObjectType, REFERENCE, Variation},
-    script::{
-        schema::{
-            Constructed, FromChecked, Range, Record, RecordType, Type, Unchecked, ValidationError, choice,
-            error_at_key, functions, make, one_of, record,
-        },
-        vm::{error::fail, value::describe},
+    schema::{
+        Constructed, FromChecked, Range, Record, RecordType, Type, Unchecked, ValidationError, choice,
+        error_at_key, functions, make, one_of, record,
     },
+    vm::{error::fail, value::describe},
 };
+use softvt_benchmark::{ObjectType, REFERENCE, Variation};
 
 /// Type of a layout's function.
 const BUILD: Type = Type::Function("fun(scene: softvt.Scene, rng: softvt.Rng)");

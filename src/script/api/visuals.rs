@@ -7,19 +7,15 @@ use mlua::{Lua, Value};
 
 use super::{pose::direction, shapes::LuaShape};
 use crate::{
-    geometry::shape::Shape,
-    parallel::lock,
-    scene::{LabelLine, MAX_LETTERS, Mask, Scene, TextDecal, Typeface, Visual, VisualLayer},
-    script::{
-        schema::{
-            FieldDefault, FromChecked, LuaType, Range, Type, choice, class, functions, invalid, record_of,
-        },
-        vm::{
-            error::fail,
-            memory_budget::{Reservation, reserve},
-        },
+    schema::{FieldDefault, FromChecked, LuaType, Range, Type, choice, class, functions, invalid, record_of},
+    vm::{
+        error::fail,
+        memory_budget::{Reservation, reserve},
     },
 };
+use softvt_common::parallel::lock;
+use softvt_geometry::shape::Shape;
+use softvt_scene::{LabelLine, MAX_LETTERS, Mask, Scene, TextDecal, Typeface, Visual, VisualLayer};
 
 const LENGTH: Type = Type::Number("m", Range::POSITIVE);
 const SHARE: Type = Type::Number("", Range::closed(0.0, 1.0));

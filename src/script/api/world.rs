@@ -11,26 +11,24 @@ use mlua::Lua;
 
 use super::shapes::LuaShape;
 use crate::{
-    evaluation::deformation::{Deformation, ReferenceShape},
-    geometry::{Pose, Quat, Vec3, shape::Shape},
-    parallel::lock,
-    physics::{
-        BodyId, ColliderId, KinematicId, PhysicsParams, SoftId, World,
-        contact::Friction,
-        world::{ContactSummary, SoftBody, StepFailure},
-    },
-    rollout::{cancel, soft_model},
-    scene::SoftMaterial,
-    script::{
-        schema::{Constructed, Range, Type, class, functions, output, record},
-        vm::{
-            error::{app_data, fail},
-            memory_budget::{Reservation, reserve_in_world},
-            value::finite,
-            watchdog::Clock,
-        },
+    schema::{Constructed, Range, Type, class, functions, output, record},
+    vm::{
+        error::{app_data, fail},
+        memory_budget::{Reservation, reserve_in_world},
+        value::finite,
+        watchdog::Clock,
     },
 };
+use softvt_common::parallel::lock;
+use softvt_evaluation::deformation::{Deformation, ReferenceShape};
+use softvt_geometry::{Pose, Quat, Vec3, shape::Shape};
+use softvt_physics::{
+    BodyId, ColliderId, KinematicId, PhysicsParams, SoftId, World,
+    contact::Friction,
+    world::{ContactSummary, SoftBody, StepFailure},
+};
+use softvt_rollout::{cancel, soft_model};
+use softvt_scene::SoftMaterial;
 
 /// Approximate memory of a world and of one of its solids.
 const BYTES_PER_WORLD: usize = 16 << 10;
@@ -266,7 +264,7 @@ class! {
             /// Starts a phase: CPU time of later steps counts for it.
             fn phase(_, this, name: String) -> [] { lock(&this.0).timing.start(&name) }
             /// Prints CPU time per simulated time, by phase, to standard error.
-            fn report_timing(_, this) -> [] { crate::text::eprint_line(&lock(&this.0).timing.to_string()) }
+            fn report_timing(_, this) -> [] { softvt_common::text::eprint_line(&lock(&this.0).timing.to_string()) }
         }
     }
 }

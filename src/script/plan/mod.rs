@@ -9,28 +9,25 @@ use std::{path::Path, sync::Arc};
 use mlua::{Lua, Value};
 
 use crate::{
-    benchmark::{Condition, Goal, GoalKind, Plan, Shift, ShiftValue, Suite, Task, Variation},
-    parallel::lock,
-    script::{
-        api::{
-            self,
-            policy::{PolicySpec, ProfileSpec},
-            simulation::settings,
-            tasks::{ConditionSpec, ConditionsSpec, ExperimentSpec, GoalSpec, SuiteSpec, TaskSpec},
-        },
-        schema::{Constructed, FromChecked, HasTable, Record, RecordType, is_constructed, strict_table},
-        vm::{
-            Limits, Vm,
-            error::{ScriptError, fail},
-            json::to_json,
-            library::{Bundle, Library},
-            source_map::fail_at_key,
-            value::{describe, describe_constructed, sorted_pairs},
-        },
+    api::{
+        self,
+        policy::{PolicySpec, ProfileSpec},
+        simulation::settings,
+        tasks::{ConditionSpec, ConditionsSpec, ExperimentSpec, GoalSpec, SuiteSpec, TaskSpec},
     },
-    text::unknown_name,
+    schema::{Constructed, FromChecked, HasTable, Record, RecordType, is_constructed, strict_table},
+    vm::{
+        Limits, Vm,
+        error::{ScriptError, fail},
+        json::to_json,
+        library::{Bundle, Library},
+        source_map::fail_at_key,
+        value::{describe, describe_constructed, sorted_pairs},
+    },
 };
 use options::{OptionSession, OptionSpec, SharedOptions};
+use softvt_benchmark::{Condition, Goal, GoalKind, Plan, Shift, ShiftValue, Suite, Task, Variation};
+use softvt_common::{parallel::lock, text::unknown_name};
 
 /// The files of a script and the command line that they ran with: enough to run it again without the disk.
 #[derive(Clone, Debug)]
@@ -74,12 +71,12 @@ pub struct LoadedScript {
 ///
 /// ```
 /// use std::path::Path;
-/// use softvt::{benchmark::Plan, script};
+/// use softvt_benchmark::Plan;
 ///
-/// let loaded = script::load(Path::new("suites/spatial_soft.lua"), &[])?;
+/// let loaded = softvt_script::load(Path::new("suites/spatial_soft.lua"), &[])?;
 /// let Plan::Suite(suite) = &loaded.plan else { panic!("the file returns a suite") };
 /// assert_eq!(suite.tasks.len(), 10);
-/// # Ok::<(), script::ScriptError>(())
+/// # Ok::<(), softvt_script::ScriptError>(())
 /// ```
 ///
 /// # Errors

@@ -6,19 +6,16 @@ use mlua::{Lua, LuaSerdeExt, Value};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    parallel::lock,
-    script::{
-        schema::{
-            FromChecked, LuaType, Range, RecordType, Type, Unchecked, error_at_key, functions, record,
-            strict_table,
-        },
-        vm::{
-            error::{ScriptError, app_data, fail},
-            value::{describe, sorted_pairs},
-        },
+    schema::{
+        FromChecked, LuaType, Range, RecordType, Type, Unchecked, error_at_key, functions, record,
+        strict_table,
     },
-    text::suggest,
+    vm::{
+        error::{ScriptError, app_data, fail},
+        value::{describe, sorted_pairs},
+    },
 };
+use softvt_common::{parallel::lock, text::suggest};
 
 record! {
     /// An option of the script: key gap_mm is --gap-mm on the command line. The default determines the type.

@@ -6,29 +6,27 @@ use mlua::{Function, Table, Value};
 
 use super::{ScriptInstance, ScriptSources};
 use crate::{
-    benchmark::seed::{EpisodeSeed, RandomStream},
-    geometry::Vec3,
-    policy::{
-        Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief, ToolCommand,
-        decode::MAX_CHUNK_LEN,
+    api::{
+        observation::{LuaObservation, task_brief},
+        policy::{ActionSpec, PolicySpec},
+        pose::rotation_from_wxyz,
     },
-    robot::rotation,
-    script::{
-        api::{
-            observation::{LuaObservation, task_brief},
-            policy::{ActionSpec, PolicySpec},
-            pose::rotation_from_wxyz,
-        },
-        schema::{Constructed, FromChecked, RecordType, ValidationError, check::check},
-        vm::{
-            Limits,
-            error::ScriptError,
-            list::plain,
-            source_map::origin_of_key,
-            value::{describe, literal, number},
-        },
+    schema::{Constructed, FromChecked, RecordType, ValidationError, check::check},
+    vm::{
+        Limits,
+        error::ScriptError,
+        list::plain,
+        source_map::origin_of_key,
+        value::{describe, literal, number},
     },
 };
+use softvt_benchmark::seed::{EpisodeSeed, RandomStream};
+use softvt_geometry::Vec3;
+use softvt_policy::{
+    Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief, ToolCommand,
+    decode::MAX_CHUNK_LEN,
+};
+use softvt_robot::rotation;
 
 /// A loaded policy file.
 #[derive(Clone, Debug)]

@@ -9,13 +9,11 @@ use mlua::Lua;
 
 use super::ScriptSources;
 use crate::{
-    policy::profile::{ActionEncoding, ActionUnits, InputSource, PoseEncoding, Profile, ProfileInput},
-    script::{
-        api::policy::{ActionEncodingSpec, InputKind, InputSpec, PoseKind, ProfileSpec},
-        schema::Constructed,
-        vm::{Limits, error::ScriptError, source_map::fail_at_key},
-    },
+    api::policy::{ActionEncodingSpec, InputKind, InputSpec, PoseKind, ProfileSpec},
+    schema::Constructed,
+    vm::{Limits, error::ScriptError, source_map::fail_at_key},
 };
+use softvt_policy::profile::{ActionEncoding, ActionUnits, InputSource, PoseEncoding, Profile, ProfileInput};
 
 /// Reads the profile at `path`. Also returns the SHA-256 of every file that was read, by name.
 ///

@@ -6,28 +6,28 @@ use mlua::{Function, Lua, Value};
 
 use super::expert::{ExpertController, GripMode};
 use crate::{
-    benchmark::{
-        Shift, ShiftValue,
-        seed::{EpisodeSeed, RandomStream},
+    api::{
+        random::LuaRng,
+        scene::{LuaScene, empty_scene},
+        tasks::GoalSpec,
     },
-    evaluation::episode_id::EpisodeId,
+    plan::{FoundTask, LoadedScript, ScriptInstance},
+    schema::{HasTable, Range},
+    vm::{
+        error::{ScriptError, fail},
+        source_map::fail_at_key,
+    },
+};
+use softvt_benchmark::{
+    Shift, ShiftValue,
+    seed::{EpisodeSeed, RandomStream},
+};
+use softvt_common::{
     parallel::lock,
-    scene::{Body, Scene},
-    script::{
-        api::{
-            random::LuaRng,
-            scene::{LuaScene, empty_scene},
-            tasks::GoalSpec,
-        },
-        plan::{FoundTask, LoadedScript, ScriptInstance},
-        schema::{HasTable, Range},
-        vm::{
-            error::{ScriptError, fail},
-            source_map::fail_at_key,
-        },
-    },
     text::{format_number, unknown_name},
 };
+use softvt_evaluation::episode_id::EpisodeId;
+use softvt_scene::{Body, Scene};
 
 /// An episode as its script describes it: the scene that the layout builds, and the expert of the task.
 pub struct EpisodeSetup {

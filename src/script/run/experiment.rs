@@ -3,7 +3,7 @@
 use mlua::{Lua, LuaSerdeExt, Value};
 use serde_json::{Map, Value as Json};
 
-use crate::script::{
+use crate::{
     api::{
         image::image_of,
         tasks::{ExperimentSpec, FinishSpec},
@@ -16,7 +16,7 @@ use crate::script::{
         value::describe,
     },
 };
-use crate::sensing::camera::encode_png;
+use softvt_sensing::camera::encode_png;
 
 /// A row of results, with sorted keys.
 pub type ExperimentRow = Map<String, Json>;
@@ -89,7 +89,7 @@ impl Experiment {
     /// If the script fails, takes too long, or returns something other than rows.
     pub fn run(&self, index: usize) -> Result<Vec<ExperimentRow>, ScriptError> {
         let vm = &self.instance.vm;
-        vm.random.reseed(crate::benchmark::seed::keyed_rng(&["softvt point", &index.to_string()]));
+        vm.random.reseed(softvt_benchmark::seed::keyed_rng(&["softvt point", &index.to_string()]));
         let spec = self.spec()?;
         let _deadline = vm.point_deadline();
         let result = vm.call(&spec.run, (self.value(index), spec.options.clone()))?;

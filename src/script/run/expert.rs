@@ -3,17 +3,15 @@
 use std::sync::Arc;
 
 use crate::{
-    policy::{Action, Observation, PolicyError, SensorStreams},
-    robot::rotation,
-    rollout::{Controller, Simulation},
-    script::{
-        api::{
-            expert::{Coroutine, FingerAccess},
-            expert_input::{ExpertInput, TrackingErrorMonitor},
-        },
-        plan::ScriptInstance,
+    api::{
+        expert::{Coroutine, FingerAccess},
+        expert_input::{ExpertInput, TrackingErrorMonitor},
     },
+    plan::ScriptInstance,
 };
+use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
+use softvt_robot::rotation;
+use softvt_rollout::{Controller, Simulation};
 
 /// Gripper control of the scripted experts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,15 +3,13 @@
 use mlua::{Lua, Table, Value};
 
 use super::{Field, FieldDefault, Range, Record, Type, ValidationError, joined};
-use crate::{
-    script::vm::{
-        error::{SourceLine, current_line, fail, fail_at},
-        list::plain,
-        source_map,
-        value::{describe, number, sorted_pairs},
-    },
-    text::{suggest, unknown_name},
+use crate::vm::{
+    error::{SourceLine, current_line, fail, fail_at},
+    list::plain,
+    source_map,
+    value::{describe, number, sorted_pairs},
 };
+use softvt_common::text::{suggest, unknown_name};
 
 /// Numbers whose largest magnitude is smaller have no direction.
 pub(crate) const MIN_LENGTH: f64 = 1e-9;

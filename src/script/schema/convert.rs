@@ -5,10 +5,8 @@ use std::{collections::BTreeMap, ops::Deref};
 use mlua::{Function, Lua, Table, Value};
 
 use super::{ApiObject, FieldDefault, Range, Record, Type, check::check};
-use crate::{
-    geometry::Vec3,
-    script::vm::{error::fail, value::describe},
-};
+use crate::vm::{error::fail, value::describe};
+use softvt_geometry::Vec3;
 
 /// Conversion of a checked Lua value. Unlike [`mlua::FromLua`], it can be implemented for types of other crates.
 pub(crate) trait FromChecked: Sized {
@@ -185,14 +183,14 @@ macro_rules! fields {
         $(#[doc = $doc:literal])+
         $field:ident : $rust:ty $(= $ty:expr)? $(=> $presence:ident $(($default:expr))?)? ;
     )*) => {
-        &[$($crate::script::schema::Field {
+        &[$($crate::schema::Field {
             name: stringify!($field),
-            ty: $crate::script::schema::convert::first!(
-                $($ty,)? <$rust as $crate::script::schema::LuaType>::TYPE
+            ty: $crate::schema::convert::first!(
+                $($ty,)? <$rust as $crate::schema::LuaType>::TYPE
             ),
-            presence: $crate::script::schema::convert::first!(
-                $($crate::script::schema::FieldDefault::$presence $(($default))?,)?
-                <$rust as $crate::script::schema::LuaType>::PRESENCE
+            presence: $crate::schema::convert::first!(
+                $($crate::schema::FieldDefault::$presence $(($default))?,)?
+                <$rust as $crate::schema::LuaType>::PRESENCE
             ),
             doc: concat!($($doc),+),
         }),*]
@@ -229,7 +227,7 @@ macro_rules! record {
             $( $(#[doc = $field_doc])+ pub(crate) $field: $rust, )*
         }
 
-        $crate::script::schema::record_of! {
+        $crate::schema::record_of! {
             $(#[doc = $doc])+
             $name: $class as $label $(, constructor $kind)? $(, relations $check)? {$(
                 $(#[doc = $field_doc])+
@@ -250,37 +248,37 @@ macro_rules! record_of {
             $field:ident : $rust:ty $(= $ty:expr)? $(=> $presence:ident $(($default:expr))?)? ;
         )*}
     )+) => {$(
-        impl $crate::script::schema::RecordType for $name {
-            const RECORD: &'static $crate::script::schema::Record = &$crate::script::schema::Record {
+        impl $crate::schema::RecordType for $name {
+            const RECORD: &'static $crate::schema::Record = &$crate::schema::Record {
                 label: $label,
                 class: $class,
-                kind: $crate::script::schema::convert::first!($($kind,)? $class),
+                kind: $crate::schema::convert::first!($($kind,)? $class),
                 doc: concat!($($doc),+),
-                fields: $crate::script::schema::convert::fields! {$(
+                fields: $crate::schema::convert::fields! {$(
                     $(#[doc = $field_doc])+
                     $field: $rust $(= $ty)? $(=> $presence $(($default))?)? ;
                 )*},
-                relations: $crate::script::schema::convert::first!($(Some($check),)? None),
+                relations: $crate::schema::convert::first!($(Some($check),)? None),
             };
         }
 
-        impl $crate::script::schema::FromChecked for $name {
+        impl $crate::schema::FromChecked for $name {
             fn from_checked(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
                 let _table: mlua::Table = lua.unpack(value)?;
                 Ok(Self {$(
-                    $field: $crate::script::schema::FromChecked::from_checked(
+                    $field: $crate::schema::FromChecked::from_checked(
                         _table.raw_get(stringify!($field))?, lua
                     )?,
                 )*})
             }
         }
 
-        impl $crate::script::schema::LuaType for $name {
-            const TYPE: $crate::script::schema::Type = $crate::script::schema::Type::Nested(
-                <Self as $crate::script::schema::RecordType>::RECORD
+        impl $crate::schema::LuaType for $name {
+            const TYPE: $crate::schema::Type = $crate::schema::Type::Nested(
+                <Self as $crate::schema::RecordType>::RECORD
             );
-            const PRESENCE: $crate::script::schema::FieldDefault =
-                <Self as $crate::script::schema::RecordType>::RECORD.presence();
+            const PRESENCE: $crate::schema::FieldDefault =
+                <Self as $crate::schema::RecordType>::RECORD.presence();
         }
     )+};
 }
@@ -294,26 +292,26 @@ macro_rules! choice {
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub(crate) enum $name { $($variant),+ }
 
-        $crate::script::schema::choice! { $name { $($text => $variant),+ } }
+        $crate::schema::choice! { $name { $($text => $variant),+ } }
     };
     ($name:ty { $($text:literal => $variant:ident),+ $(,)? }) => {
-        impl $crate::script::schema::FromChecked for $name {
+        impl $crate::schema::FromChecked for $name {
             fn from_checked(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
                 let text: String = lua.unpack(value)?;
                 match text.as_str() {
                     $($text => Ok(Self::$variant),)+
-                    other => Err($crate::script::vm::error::fail(lua, format!("unexpected {other:?}"))),
+                    other => Err($crate::vm::error::fail(lua, format!("unexpected {other:?}"))),
                 }
             }
         }
 
-        impl $crate::script::schema::LuaType for $name {
-            const TYPE: $crate::script::schema::Type =
-                $crate::script::schema::Type::Choice(&[$($text),+]);
+        impl $crate::schema::LuaType for $name {
+            const TYPE: $crate::schema::Type =
+                $crate::schema::Type::Choice(&[$($text),+]);
         }
 
-        impl $crate::script::schema::object::IntoFieldValue for $name {
-            fn into_field_value(self, lua: &mlua::Lua) -> mlua::Result<$crate::script::schema::FieldValue> {
+        impl $crate::schema::object::IntoFieldValue for $name {
+            fn into_field_value(self, lua: &mlua::Lua) -> mlua::Result<$crate::schema::FieldValue> {
                 match self { $(Self::$variant => $text,)+ }.into_field_value(lua)
             }
         }
@@ -333,34 +331,34 @@ macro_rules! one_of {
         $(#[doc = $doc])*
         #[derive(Clone, Debug)]
         pub(crate) enum $name {
-            $($variant($crate::script::schema::Constructed<$spec>)),+
+            $($variant($crate::schema::Constructed<$spec>)),+
         }
 
-        impl $crate::script::schema::FromChecked for $name {
+        impl $crate::schema::FromChecked for $name {
             fn from_checked(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
                 let table: mlua::Table = lua.unpack(value)?;
                 $(
-                    if $crate::script::schema::is_constructed(
-                        lua, <$spec as $crate::script::schema::RecordType>::RECORD, &table
+                    if $crate::schema::is_constructed(
+                        lua, <$spec as $crate::schema::RecordType>::RECORD, &table
                     ) {
-                        let checked = $crate::script::schema::FromChecked::from_checked(mlua::Value::Table(table), lua);
+                        let checked = $crate::schema::FromChecked::from_checked(mlua::Value::Table(table), lua);
                         return checked.map(Self::$variant);
                     }
                 )+
-                let expected = <Self as $crate::script::schema::LuaType>::TYPE.describe();
-                Err($crate::script::vm::error::fail(lua, format!("expected {expected}, got a table")))
+                let expected = <Self as $crate::schema::LuaType>::TYPE.describe();
+                Err($crate::vm::error::fail(lua, format!("expected {expected}, got a table")))
             }
         }
 
-        impl $crate::script::schema::convert::HasTable for $name {
+        impl $crate::schema::convert::HasTable for $name {
             fn table(&self) -> &mlua::Table {
                 match self { $(Self::$variant(made) => &made.table,)+ }
             }
         }
 
-        impl $crate::script::schema::LuaType for $name {
-            const TYPE: $crate::script::schema::Type = $crate::script::schema::Type::Constructed(&[
-                $(<$spec as $crate::script::schema::RecordType>::RECORD),+
+        impl $crate::schema::LuaType for $name {
+            const TYPE: $crate::schema::Type = $crate::schema::Type::Constructed(&[
+                $(<$spec as $crate::schema::RecordType>::RECORD),+
             ]);
         }
     };

@@ -6,11 +6,9 @@ use mlua::{
 };
 
 use super::{FieldDefault, Type, error_at_key};
-use crate::{
-    geometry::Vec3,
-    script::vm::{error::fail, list::LuaList, value::describe},
-    text::unknown_name,
-};
+use crate::vm::{error::fail, list::LuaList, value::describe};
+use softvt_common::text::unknown_name;
+use softvt_geometry::Vec3;
 
 /// A class of objects or of tables that scripts receive: the part that stubs, reference and messages need.
 #[derive(Clone, Copy, Debug)]
@@ -263,28 +261,28 @@ macro_rules! class {
             )*})?
         }
     ) => {
-        impl $crate::script::schema::ApiObject for $object {
+        impl $crate::schema::ApiObject for $object {
             const NAME: &'static str = $class;
-            const CLASS: &'static $crate::script::schema::Class = &$crate::script::schema::Class {
+            const CLASS: &'static $crate::schema::Class = &$crate::schema::Class {
                 name: Self::NAME,
                 doc: concat!($($doc),+),
                 fields: &[
-                    $($($crate::script::schema::object::LuaField {
+                    $($($crate::schema::object::LuaField {
                         name: stringify!($read),
-                        access: $crate::script::schema::object::Access::Read(
+                        access: $crate::schema::object::Access::Read(
                             $read_type,
-                            $crate::script::schema::convert::first!($(Some($hint),)? None),
+                            $crate::schema::convert::first!($(Some($hint),)? None),
                         ),
                         doc: concat!($($read_doc),+),
                     },)*)?
-                    $($($crate::script::schema::object::LuaField {
+                    $($($crate::schema::object::LuaField {
                         name: stringify!($write),
-                        access: $crate::script::schema::object::Access::Write($write_type),
+                        access: $crate::schema::object::Access::Write($write_type),
                         doc: concat!($($write_doc),+),
                     },)*)?
                 ],
                 methods: &[
-                    $($($crate::script::schema::object::signature!(
+                    $($($crate::schema::object::signature!(
                         [$($method_doc)*] $method($($arg : $arg_type $(= $arg_lua)?),*)
                         $(takes $table $table_class {$(
                             $(#[doc = $field_doc])+
@@ -292,46 +290,46 @@ macro_rules! class {
                         )*})?
                         -> [$($return),*]
                     ),)*)?
-                    $($($crate::script::schema::object::signature!(
+                    $($($crate::schema::object::signature!(
                         [$($lua_method_doc)+] $lua_method($($lua_arg : $lua_arg_type $(= $lua_arg_lua)?),*)
                         -> [$($lua_return),*]
                     ),)*)?
                 ],
             };
-            const GETTERS: &'static [$crate::script::schema::object::Getter<Self>] = &[
+            const GETTERS: &'static [$crate::schema::object::Getter<Self>] = &[
                 $($(|state, object| {
                     let ($read_lua, $read_this) = (state, object);
-                    $crate::script::schema::object::IntoFieldValue::into_field_value($read_get, state)
+                    $crate::schema::object::IntoFieldValue::into_field_value($read_get, state)
                 },)*)?
                 $($(|state, object| {
                     $({
                         let value = object.read(|target| target $(.$path)+);
-                        $crate::script::schema::object::IntoFieldValue::into_field_value(value, state)
+                        $crate::schema::object::IntoFieldValue::into_field_value(value, state)
                     })?
                     $({
                         let ($get_lua, $get_this) = (state, object);
-                        $crate::script::schema::object::IntoFieldValue::into_field_value($get, state)
+                        $crate::schema::object::IntoFieldValue::into_field_value($get, state)
                     })?
                 },)*)?
             ];
-            const SETTERS: &'static [Option<$crate::script::schema::object::Setter<Self>>] = &[
+            const SETTERS: &'static [Option<$crate::schema::object::Setter<Self>>] = &[
                 $($({ let _ = stringify!($read); None },)*)?
                 $($(Some(|state, object, value| {
                     $(
-                        let value = $crate::script::schema::FromChecked::from_checked(value, state)?;
+                        let value = $crate::schema::FromChecked::from_checked(value, state)?;
                         object.change(state, |target| target $(.$path)+ = value);
                     )?
                     $(
-                        let $value: $value_type = $crate::script::schema::FromChecked::from_checked(value, state)?;
+                        let $value: $value_type = $crate::schema::FromChecked::from_checked(value, state)?;
                         let ($set_lua, $set_this) = (state, object);
                         $set
                     )?
                     Ok(())
                 }),)*)?
             ];
-            const METHODS: &'static [$crate::script::schema::object::Method<Self>] = &[
+            const METHODS: &'static [$crate::schema::object::Method<Self>] = &[
                 $($(|state, object, values| {
-                    $crate::script::schema::object::bind_arguments! {
+                    $crate::schema::object::bind_arguments! {
                         (values, state)
                         $($arg : $arg_type),*
                         $(; takes $table $($field : $field_type),*)?
@@ -354,17 +352,17 @@ macro_rules! class {
 
         impl mlua::FromLua for $object {
             fn from_lua(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
-                $crate::script::schema::object::object_of(lua, &value)
+                $crate::schema::object::object_of(lua, &value)
             }
         }
 
         impl mlua::UserData for $object {
             fn add_fields<F: mlua::UserDataFields<Self>>(fields: &mut F) {
-                $crate::script::schema::object::add_fields::<Self, F>(fields);
+                $crate::schema::object::add_fields::<Self, F>(fields);
             }
 
             fn add_methods<M: mlua::UserDataMethods<Self>>(methods: &mut M) {
-                $crate::script::schema::object::add_methods(methods);
+                $crate::schema::object::add_methods(methods);
             }
         }
     };
@@ -374,22 +372,22 @@ pub(crate) use class;
 /// Declares variables for the checked arguments of a call: the parameters, and the fields of the table that comes last.
 macro_rules! bind_arguments {
     (($values:ident, $lua:ident) $($arg:ident : $arg_type:ty),*) => {
-        $crate::script::schema::object::bind_arguments! { @each ($values, $lua) $($arg : $arg_type,)* }
+        $crate::schema::object::bind_arguments! { @each ($values, $lua) $($arg : $arg_type,)* }
     };
     (@each ($values:ident, $lua:ident) $($arg:ident : $arg_type:ty,)*) => {
         let mut _values = $values.into_iter();
         $(
-            let $arg: $arg_type = $crate::script::schema::FromChecked::from_checked(
+            let $arg: $arg_type = $crate::schema::FromChecked::from_checked(
                 _values.next().unwrap_or(mlua::Value::Nil), $lua
             )?;
         )*
     };
     (($values:ident, $lua:ident) $($arg:ident : $arg_type:ty),* ; takes $table:ident $($field:ident : $type:ty),*) => {
-        $crate::script::schema::object::bind_arguments! {
+        $crate::schema::object::bind_arguments! {
             @each ($values, $lua) $($arg : $arg_type,)* $table : mlua::Table,
         }
         $(
-            let $field: $type = $crate::script::schema::FromChecked::from_checked(
+            let $field: $type = $crate::schema::FromChecked::from_checked(
                 $table.raw_get(stringify!($field))?, $lua
             )?;
         )*
@@ -405,29 +403,29 @@ macro_rules! signature {
         -> [$($return:literal),*]
     ) => {{
         const DOC: &str = concat!($($doc),*);
-        $crate::script::schema::Signature {
+        $crate::schema::Signature {
             name: stringify!($name),
             params: &[
-                $($crate::script::schema::object::Param {
+                $($crate::schema::object::Param {
                     name: stringify!($arg),
-                    ty: $crate::script::schema::convert::first!(
-                        $($arg_lua,)? <$arg_type as $crate::script::schema::LuaType>::TYPE
+                    ty: $crate::schema::convert::first!(
+                        $($arg_lua,)? <$arg_type as $crate::schema::LuaType>::TYPE
                     ),
-                    presence: <$arg_type as $crate::script::schema::LuaType>::PRESENCE,
-                    checked: <$arg_type as $crate::script::schema::LuaType>::CHECKED,
+                    presence: <$arg_type as $crate::schema::LuaType>::PRESENCE,
+                    checked: <$arg_type as $crate::schema::LuaType>::CHECKED,
                 },)*
                 $({
-                    const RECORD: &$crate::script::schema::Record = &$crate::script::schema::Record {
+                    const RECORD: &$crate::schema::Record = &$crate::schema::Record {
                         label: stringify!($name),
                         class: $class,
                         kind: $class,
                         doc: DOC,
-                        fields: $crate::script::schema::convert::fields! { $($fields)* },
+                        fields: $crate::schema::convert::fields! { $($fields)* },
                         relations: None,
                     };
-                    $crate::script::schema::object::Param {
+                    $crate::schema::object::Param {
                         name: stringify!($table),
-                        ty: $crate::script::schema::Type::Nested(RECORD),
+                        ty: $crate::schema::Type::Nested(RECORD),
                         presence: RECORD.presence(),
                         checked: true,
                     }
@@ -480,8 +478,8 @@ macro_rules! functions {
             )*})?
             -> [$($return:literal),*] $body:block
     )*}) => {
-        pub(crate) static $list: &[$crate::script::schema::Function] = &[$($crate::script::schema::Function {
-            signature: $crate::script::schema::object::signature!(
+        pub(crate) static $list: &[$crate::schema::Function] = &[$($crate::schema::Function {
+            signature: $crate::schema::object::signature!(
                 [$($doc)*] $name($($arg : $arg_type $(= $arg_lua)?),*)
                 $(takes $table $class {$(
                     $(#[doc = $field_doc])+
@@ -490,7 +488,7 @@ macro_rules! functions {
                 -> [$($return),*]
             ),
             call: |state, values| {
-                $crate::script::schema::object::bind_arguments! {
+                $crate::schema::object::bind_arguments! {
                     (values, state)
                     $($arg : $arg_type),*
                     $(; takes $table $($field : $field_type),*)?
@@ -528,16 +526,16 @@ macro_rules! output {
         pub(crate) fn $name($lua: &mlua::Lua $(, $arg: $arg_type)*) -> mlua::Result<mlua::Table> {
             let table = $lua.create_table()?;
             $(table.raw_set(stringify!($field), $value)?;)*
-            $crate::script::schema::strict_table($lua, $label, table, vec![$(stringify!($field).to_owned()),*])
+            $crate::schema::strict_table($lua, $label, table, vec![$(stringify!($field).to_owned()),*])
         }
 
         pub(crate) mod $name {
-            pub(crate) static CLASS: $crate::script::schema::Class = $crate::script::schema::Class {
+            pub(crate) static CLASS: $crate::schema::Class = $crate::schema::Class {
                 name: $class,
                 doc: concat!($($doc),+),
-                fields: &[$($crate::script::schema::object::LuaField {
+                fields: &[$($crate::schema::object::LuaField {
                     name: stringify!($field),
-                    access: $crate::script::schema::object::Access::Read($field_type, None),
+                    access: $crate::schema::object::Access::Read($field_type, None),
                     doc: concat!($($field_doc),+),
                 }),*],
                 methods: &[],

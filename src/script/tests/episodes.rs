@@ -2,17 +2,15 @@ use std::sync::Arc;
 
 use super::*;
 use crate::{
-    benchmark::{Plan, ShiftValue},
-    evaluation::episode_id::{EpisodeId, Split},
-    geometry::{Pose, Vec3, shape::Shape},
-    rollout::Controller,
-    scene::{Asset, Body},
-    script::{
-        EpisodeSetup, ExpertController, GripMode,
-        api::expert_input::{ExpertCommand, ExpertView, ObjectView},
-        check_shift,
-    },
+    EpisodeSetup, ExpertController, GripMode,
+    api::expert_input::{ExpertCommand, ExpertView, ObjectView},
+    check_shift,
 };
+use softvt_benchmark::{Plan, ShiftValue};
+use softvt_evaluation::episode_id::{EpisodeId, Split};
+use softvt_geometry::{Pose, Vec3, shape::Shape};
+use softvt_rollout::Controller;
+use softvt_scene::{Asset, Body};
 
 fn episode_id(episode: u32, base_seed: u64) -> EpisodeId {
     EpisodeId { suite: "test".into(), task: 0, episode, base_seed, split: Split::Validation }

@@ -1,12 +1,10 @@
 use super::*;
-use crate::{
-    evaluation::episode_id::{EpisodeId, Split},
-    geometry::{Pose, Vec3},
-    physics::joints,
-    rollout::{AssetCache, Simulation},
-    scene::{JointMotion, Scene},
-    script::EpisodeSetup,
-};
+use crate::EpisodeSetup;
+use softvt_evaluation::episode_id::{EpisodeId, Split};
+use softvt_geometry::{Pose, Vec3};
+use softvt_physics::joints;
+use softvt_rollout::{AssetCache, Simulation};
+use softvt_scene::{JointMotion, Scene};
 
 /// A chest with one drawer on the given joint, and further parts.
 fn chest(joint: &str, more: &str) -> String {
@@ -162,7 +160,7 @@ fn scene_and_physics_agree_on_part_poses() {
     let object = scene.objects[0].clone();
     assert_eq!(object.joints, [0.05, 0.6, 0.2], "the knob starts at its nearest limit");
     assert_eq!(object.asset.parts()[1].joint.motion, JointMotion::Turn);
-    let placed = crate::scene::part_poses(object.asset.parts(), &object.joints);
+    let placed = softvt_scene::part_poses(object.asset.parts(), &object.joints);
     let sim =
         Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &AssetCache::default());
     let sim = sim.expect("builds");

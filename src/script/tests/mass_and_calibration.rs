@@ -1,7 +1,7 @@
 //! Volumes, masses and calibration files.
 
 use super::*;
-use crate::script::Experiment;
+use crate::Experiment;
 
 /// The message of a script that raises its result.
 fn message_of(text: &str) -> String {

@@ -1,5 +1,5 @@
 use super::*;
-use crate::script::OptionValue;
+use crate::OptionValue;
 
 const SCRIPT: &str = r#"
 local opt = softvt.options {
@@ -68,7 +68,7 @@ fn a_wrong_value_is_refused_with_what_was_expected() {
 fn rows_follow_the_grid_and_the_options() {
     let project = Project::new(&[("x.lua", SCRIPT)]);
     let loaded = project.load("x.lua", &["--gap-mm=42,40", "--closure=0.25"]).unwrap();
-    let experiment = crate::script::Experiment::open(&loaded).unwrap();
+    let experiment = crate::Experiment::open(&loaded).unwrap();
     assert_eq!(experiment.len(), 2);
     let row = serde_json::to_string(&experiment.run(1).unwrap()).unwrap();
     assert_eq!(row, r#"[{"closure":0.25,"gap":40.0,"sleep":true}]"#);

@@ -5,17 +5,15 @@ use std::sync::Arc;
 use image::{Rgb, RgbImage};
 
 use super::*;
-use crate::{
-    benchmark::seed::EpisodeSeed,
-    evaluation::episode_id::Split,
-    geometry::Vec3,
-    policy::{
-        Action, ActionChunk, CameraImage, Observation, Policy, PolicyError, TactileFrame, TactileHistory,
-        TaskBrief, ToolCommand, profile::Profile,
-    },
-    script::{LuaPolicy, PolicyFile, load_profile},
-    sensing::tactile::Markers,
+use crate::{LuaPolicy, PolicyFile, load_profile};
+use softvt_benchmark::seed::EpisodeSeed;
+use softvt_evaluation::episode_id::Split;
+use softvt_geometry::Vec3;
+use softvt_policy::{
+    Action, ActionChunk, CameraImage, Observation, Policy, PolicyError, TactileFrame, TactileHistory,
+    TaskBrief, ToolCommand, profile::Profile,
 };
+use softvt_sensing::tactile::Markers;
 
 fn seed(episode: u32) -> EpisodeSeed {
     let (suite, layout) = ("one".to_owned(), "one".to_owned());
@@ -238,7 +236,7 @@ fn files_without_a_policy_are_reported() {
 #[test]
 fn the_shipped_policies_act() {
     for name in ["hold", "touch_and_close"] {
-        let path = format!("{}/scripts/policies/{name}.lua", env!("CARGO_MANIFEST_DIR"));
+        let path = format!("{}/../../scripts/policies/{name}.lua", env!("CARGO_MANIFEST_DIR"));
         let file = PolicyFile::load(path.as_ref()).unwrap();
         assert_eq!(file.name, name);
         let mut policy = file.start(&seed(0)).unwrap();
@@ -258,7 +256,7 @@ fn profile(text: &str) -> Result<Profile, String> {
 
 /// A shipped profile's text, changed.
 fn changed(name: &str, changes: &[(&str, &str)]) -> String {
-    let path = format!("{}/scripts/profiles/{name}.lua", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{}/../../scripts/profiles/{name}.lua", env!("CARGO_MANIFEST_DIR"));
     changes.iter().fold(fs::read_to_string(path).unwrap(), |text, (from, to)| {
         assert!(text.contains(from), "{name}: {from}");
         text.replace(from, to)

@@ -3,13 +3,13 @@
 use std::{collections::BTreeSet, fmt::Write, time::Duration};
 
 use super::{Project, limits};
-use crate::evaluation::episode_id::{EpisodeId, Split};
-use crate::script::{
+use crate::{
     Experiment,
     api::{self, shapes::SHAPES, visuals::MASKS},
     plan::options,
     schema::{Function, Record},
 };
+use softvt_evaluation::episode_id::{EpisodeId, Split};
 
 /// Makes an object of each class, calls everything with everything, and returns the messages.
 const SCRIPT: &str = include_str!("surface.lua");
@@ -82,13 +82,8 @@ fn leak(message: &str) -> Option<&'static str> {
 fn wrong_calls_get_messages_in_terms_of_the_lua_interface() {
     let project = Project::new(&[("x.lua", &script())]);
     let minute = Duration::from_secs(60);
-    let limits = crate::script::Limits {
-        load: minute,
-        call: minute,
-        point: minute,
-        memory_bytes: 128 << 20,
-        ..limits()
-    };
+    let limits =
+        crate::Limits { load: minute, call: minute, point: minute, memory_bytes: 128 << 20, ..limits() };
     let loaded = project.load_with("x.lua", &[], &limits).unwrap();
     let rows = Experiment::open(&loaded).unwrap().run(0).unwrap();
     let folder = format!("{}/", project.path("").display()).replace("//", "/");
@@ -134,7 +129,7 @@ fn in_layout(text: &str) -> String {
     let loaded = project.load("x.lua", &[]).unwrap();
     let id = EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };
     let folder = format!("{}/", project.path("").display()).replace("//", "/");
-    match crate::script::EpisodeSetup::open(&loaded, &id, &[]) {
+    match crate::EpisodeSetup::open(&loaded, &id, &[]) {
         Ok(_) => String::new(),
         Err(error) => error.to_string().replace(&folder, ""),
     }

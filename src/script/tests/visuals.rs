@@ -3,11 +3,9 @@
 use std::sync::Arc;
 
 use super::{Project, SUITE, error_of};
-use crate::{
-    evaluation::episode_id::{EpisodeId, Split},
-    scene::{Body, Mask, Visual},
-    script::EpisodeSetup,
-};
+use crate::EpisodeSetup;
+use softvt_evaluation::episode_id::{EpisodeId, Split};
+use softvt_scene::{Body, Mask, Visual};
 
 fn with_visuals(visuals: &str) -> String {
     format!(
@@ -74,7 +72,7 @@ fn every_mask_can_be_made_from_lua() {
         "inside { shape = softvt.shape.sphere { radius = 0.01 }, soft_m = 1e-3 }",
         "text { text = 'Ünder', height_m = 5e-3, at = { 0, 0, 0.03 }, facing = '-y', wrap_m = 0.03, weight = 0.1, font = 'mono' }",
     ];
-    assert_eq!(masks.len(), crate::script::api::visuals::MASKS.len());
+    assert_eq!(masks.len(), crate::api::visuals::MASKS.len());
     let layers: Vec<_> =
         masks.iter().map(|m| format!("{{ albedo = {{ 0, 0, 0 }}, mask = mask.{m} }}")).collect();
     let visuals = read(&format!("{{ {{ albedo = {{ 1, 1, 1 }}, layers = {{ {} }} }} }}", layers.join(", ")));

@@ -12,13 +12,13 @@ use include_dir::{Dir, include_dir};
 use sha2::{Digest, Sha256};
 
 use super::error::{ScriptError, SourceLine};
-use crate::text::suggest;
+use softvt_common::text::suggest;
 
 /// The embedded folders, by their names in the repository.
 static EMBEDDED: [(&str, Dir<'_>); 3] = [
-    ("scripts", include_dir!("$CARGO_MANIFEST_DIR/scripts")),
-    ("suites", include_dir!("$CARGO_MANIFEST_DIR/suites")),
-    ("assets", include_dir!("$CARGO_MANIFEST_DIR/assets")),
+    ("scripts", include_dir!("$CARGO_MANIFEST_DIR/../../scripts")),
+    ("suites", include_dir!("$CARGO_MANIFEST_DIR/../../suites")),
+    ("assets", include_dir!("$CARGO_MANIFEST_DIR/../../assets")),
 ];
 
 /// Largest file that is read, bytes.

@@ -29,8 +29,8 @@ use memory_budget::MemoryUse;
 use value::{describe, literal};
 use watchdog::{Clock, Deadline, OnStuck};
 
-use crate::{
-    benchmark::seed,
+use softvt_benchmark::seed;
+use softvt_common::{
     parallel::lock,
     text::{eprint_line, escape_control},
 };

@@ -11,7 +11,7 @@ use super::{
     error::{SourceLine, app_data, current_line, fail_at},
     library::Library,
 };
-use crate::parallel::lock;
+use softvt_common::parallel::lock;
 
 /// Registry key of the weak table from constructed tables to `file:line`.
 const ORIGINS: &str = "softvt origins";

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use mlua::{Table, Value};
 
-use crate::text::format_number;
+use softvt_common::text::format_number;
 
 /// A text in quotes, with control characters escaped and a long text cut off.
 fn quoted(text: &str) -> String {

@@ -6,10 +6,8 @@ use super::{
     error::CameraError,
     math::{V3, Vec3x8, f32x8, is_finite},
 };
-use crate::{
-    geometry::{Pose, Vec3},
-    scene::{Camera, CameraMount},
-};
+use softvt_geometry::{Pose, Vec3};
+use softvt_scene::{Camera, CameraMount};
 
 /// Maximum width and height of an image, pixels.
 const MAX_EDGE: usize = 4096;

@@ -7,7 +7,7 @@ use wide::{bytemuck::cast, i32x8, u32x8};
 
 pub(crate) use wide::f32x8;
 
-use crate::geometry::Pose;
+use softvt_geometry::Pose;
 
 /// A point, direction or linear RGB colour.
 pub(crate) type V3 = nalgebra::Vector3<f32>;

@@ -23,16 +23,14 @@
 //!
 //! ```
 //! use std::sync::Arc;
-//! use softvt::{
-//!     geometry::{Pose, Vec3, shape::Shape},
-//!     physics::BodyId,
-//!     scene::{Camera, Lighting, Visual},
-//!     sensing::camera::{FrameView, RenderMesh, RenderObject, RenderScene, Renderer},
-//! };
+//! use softvt_geometry::{Pose, Vec3, shape::Shape};
+//! use softvt_physics::BodyId;
+//! use softvt_scene::{Camera, Lighting, Visual};
+//! use softvt_sensing::camera::{FrameView, RenderMesh, RenderObject, RenderScene, Renderer};
 //!
 //! let object = |name: &str, id: u16, half: Vec3, colour: [f64; 3], z: f64| {
 //!     let mesh = RenderMesh::from_shape(name, &Shape::Box { half }, &[Visual::plain(colour, 0.6, 0.0)])?;
-//!     Ok::<_, softvt::sensing::camera::CameraError>(RenderObject {
+//!     Ok::<_, softvt_sensing::camera::CameraError>(RenderObject {
 //!         name: name.to_owned(),
 //!         segmentation_id: id,
 //!         mesh: Arc::new(mesh),
@@ -51,7 +49,7 @@
 //! let pixel = image.segmentation.iter().position(|&id| id == 2).expect("the cube is in view");
 //! let [red, green] = [image.rgb[3 * pixel], image.rgb[3 * pixel + 1]];
 //! assert!(red > green && image.depth[pixel] < camera.far_m as f32);
-//! # Ok::<(), softvt::sensing::camera::CameraError>(())
+//! # Ok::<(), softvt_sensing::camera::CameraError>(())
 //! ```
 
 // Each module uses only those before it: error, math, image, lens, raster, shade, mesh, scene, render.

@@ -16,11 +16,9 @@ use super::{
     },
     shade::{shading::Illumination, shadow::ShadowMap, tonemap::ToneMapper},
 };
-use crate::{
-    geometry::{Pose, Vec3},
-    physics::BodyId,
-    scene::Lighting,
-};
+use softvt_geometry::{Pose, Vec3};
+use softvt_physics::BodyId;
+use softvt_scene::Lighting;
 
 /// Maximum number of objects of a scene; triangle ids have bits for about as many.
 const MAX_OBJECTS: usize = 1000;
@@ -70,7 +68,7 @@ pub struct RenderScene {
     pub(crate) id: u64,
 }
 
-/// The part of a [`WorldSnapshot`](crate::physics::world::WorldSnapshot) that images depend on. The default has no
+/// The part of a [`WorldSnapshot`](softvt_physics::world::WorldSnapshot) that images depend on. The default has no
 /// moving bodies.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FrameView<'a> {

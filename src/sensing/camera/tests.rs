@@ -7,11 +7,9 @@ use super::{
     shade::shadow::ShadowMap,
     *,
 };
-use crate::{
-    geometry::{Pose, Quat, Vec3, mesh::Mesh, shape::Shape},
-    physics::{BodyId, RigidId},
-    scene::{Camera, CameraMount, Lighting, Mask, Visual, VisualLayer},
-};
+use softvt_geometry::{Pose, Quat, Vec3, mesh::Mesh, shape::Shape};
+use softvt_physics::{BodyId, RigidId};
+use softvt_scene::{Camera, CameraMount, Lighting, Mask, Visual, VisualLayer};
 
 fn rigid(index: usize) -> BodyId {
     BodyId::Rigid(RigidId::new(index))

@@ -1,6 +1,6 @@
 //! Base and arm.
 //!
-//! Shapes are in the frames of their links (modified Denavit–Hartenberg, as [`crate::robot::panda`]). Radii, centres
+//! Shapes are in the frames of their links (modified Denavit–Hartenberg, as [`softvt_robot::panda`]). Radii, centres
 //! and lengths follow the capsules of Franka's public self-collision model (`franka_description`, Apache-2.0). The
 //! seams between links follow its drawings (Panda datasheet: 333, 316, 82.5, 384, 88 and 107 mm between the axes).
 
@@ -8,7 +8,8 @@ use super::{
     BARE_METAL, BLACK_PLASTIC, GREY_PLASTIC, RobotPart, WHITE_SHELL,
     solid::{blended, box_solid, capsule, cylinder_solid, flat_below, rounded_box, rounded_cylinder},
 };
-use crate::{geometry::Pose, sensing::camera::RenderSolid};
+use crate::camera::RenderSolid;
+use softvt_geometry::Pose;
 
 /// Edge of the mesher's cells on the shells of the base and upper arm, m.
 const CELL: f64 = 8.5e-3;

@@ -4,13 +4,11 @@ use super::{
     BARE_METAL, BLACK_PLASTIC, RobotPart, SENSOR_CASE, WHITE_SHELL,
     solid::{box_solid, cylinder_solid, plate_solid},
 };
-use crate::{
-    geometry::{Pose, Vec3, mesh::Mesh},
-    robot::{
-        Side, pads,
-        panda::{HAND_LINK, finger_link, hand_in_link},
-    },
-    sensing::camera::RenderSolid,
+use crate::camera::RenderSolid;
+use softvt_geometry::{Pose, Vec3, mesh::Mesh};
+use softvt_robot::{
+    Side, pads,
+    panda::{HAND_LINK, finger_link, hand_in_link},
 };
 
 /// The hand's body, 204 × 63 mm in plan and 66 mm high, with shoulders that slope to rounded ends (Franka hand,

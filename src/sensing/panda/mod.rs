@@ -13,12 +13,10 @@ mod tests;
 use std::sync::Arc;
 
 use super::camera::{CameraError, RenderMesh, RenderObject, RenderSolid};
-use crate::{
-    geometry::Pose,
-    physics::{ArticulationId, BodyId, LinkId},
-    robot::{Side, panda},
-    scene::Visual,
-};
+use softvt_geometry::Pose;
+use softvt_physics::{ArticulationId, BodyId, LinkId};
+use softvt_robot::{Side, panda};
+use softvt_scene::Visual;
 
 // Indices into `visuals`.
 const WHITE_SHELL: usize = 0;

@@ -8,10 +8,8 @@ use std::{
 
 use nalgebra::Quaternion;
 
-use crate::{
-    geometry::{Pose, Quat, Vec3, mesh::Mesh, shape::Shape},
-    sensing::camera::RenderSolid,
-};
+use crate::camera::RenderSolid;
+use softvt_geometry::{Pose, Quat, Vec3, mesh::Mesh, shape::Shape};
 
 /// Segments of a full turn around cylinders.
 const CYLINDER_SEGMENTS: usize = 36;

@@ -3,13 +3,11 @@
 use std::sync::OnceLock;
 
 use super::*;
-use crate::{
-    geometry::Vec3,
-    physics::joints::forward,
-    robot::{GripperSpec, pads, panda},
-    scene::{Camera, Lighting},
-    sensing::camera::{FrameView, RenderScene, Renderer},
-};
+use crate::camera::{FrameView, RenderScene, Renderer};
+use softvt_geometry::Vec3;
+use softvt_physics::joints::forward;
+use softvt_robot::{GripperSpec, pads, panda};
+use softvt_scene::{Camera, Lighting};
 
 fn meshes() -> &'static RobotMeshes {
     static MESHES: OnceLock<RobotMeshes> = OnceLock::new();

@@ -10,7 +10,8 @@ use super::{
     markers::{MarkerStyle, Markers},
     spec::{MarkerModel, OpticsModel, TactileSpec},
 };
-use crate::{npy::NpzError, robot::PadSurface, text::RangeError};
+use softvt_common::{npy::NpzError, text::RangeError};
+use softvt_robot::PadSurface;
 
 /// Reasons why a sensor cannot be created.
 #[derive(Debug, thiserror::Error)]
@@ -39,10 +40,8 @@ enum OpticsBackend {
 /// the pad frame: origin at the apex of the gel, z out of the gel.
 ///
 /// ```
-/// use softvt::{
-///     geometry::Vec3,
-///     sensing::tactile::{GelScratch, TactileContact, PadWrench, SkinMesh, TactileSensor, TactileSpec},
-/// };
+/// use softvt_geometry::Vec3;
+/// use softvt_sensing::tactile::{GelScratch, TactileContact, PadWrench, SkinMesh, TactileSensor, TactileSpec};
 ///
 /// let sensor = TactileSensor::new(&TactileSpec::default())?;
 /// // A grid of 21 × 21 vertices, 0.4 mm apart; the triangles face the gel.

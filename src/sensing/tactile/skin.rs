@@ -3,10 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::{
-    geometry::{Mat3, Pose, Vec3, shape::Shape, surface_mesh::SurfaceMesh, voxel::VoxelMesh},
-    sensing::camera,
-};
+use crate::camera;
+use softvt_geometry::{Mat3, Pose, Vec3, shape::Shape, surface_mesh::SurfaceMesh, voxel::VoxelMesh};
 
 /// Edge of the cells from which a skin is extracted, m: fine enough for seeds and ridges of a millimetre, with the
 /// field of the gel solved on 0.4 mm.
@@ -204,7 +202,7 @@ fn neighbour_steps() -> [[i64; 3]; 27] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{
+    use softvt_geometry::{
         Quat,
         voxel::{VoxelSpec, voxel_mesh},
     };

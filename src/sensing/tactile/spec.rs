@@ -4,11 +4,9 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    geometry::Vec3,
-    robot::PadSurface,
-    text::{RangeError, check_range},
-};
+use softvt_common::text::{RangeError, check_range};
+use softvt_geometry::Vec3;
+use softvt_robot::PadSurface;
 
 /// Width and height of a tactile image, px.
 pub const IMAGE_SIZE: [usize; 2] = [320, 240];
@@ -29,7 +27,7 @@ pub struct TactileSpec {
     pub markers: MarkerModel,
 }
 
-/// Material and grid of the gel. Its shape is [`crate::robot::PadSurface`].
+/// Material and grid of the gel. Its shape is [`softvt_robot::PadSurface`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GelSpec {
@@ -175,7 +173,7 @@ impl TactileSpec {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::{Side, pads::pad_pose_in_finger};
+    use softvt_robot::{Side, pads::pad_pose_in_finger};
 
     #[test]
     fn defaults_are_valid_and_bad_numbers_are_named() {

@@ -23,7 +23,8 @@ fn imprint(height: impl Fn(f64, f64) -> f64, wrench: PadWrench) -> RgbImage {
 }
 
 fn check(name: &str, found: &RgbImage) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/tactile").join(name);
+    let path =
+        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("tests/golden/tactile").join(name);
     if std::env::var_os("SOFTVT_WRITE_GOLDEN").is_some() {
         found.save(&path).expect("a folder that can be written to");
     }

@@ -11,28 +11,25 @@ use serde_json::json;
 
 use super::task_matching::{MatchedDemo, match_demos};
 use crate::{
-    cli::{
-        error::CliError,
-        output::eprint_notice,
-        run::{
-            config::ScriptArgs,
-            policy::PolicyConfig,
-            recording::{GripLog, RecordingArgs, SuiteRecording, record_all},
-            selection::{EpisodeJob, select_suites},
-            suite_run::SuiteRun,
-        },
+    error::CliError,
+    output::eprint_notice,
+    run::{
+        config::ScriptArgs,
+        policy::PolicyConfig,
+        recording::{GripLog, RecordingArgs, SuiteRecording, record_all},
+        selection::{EpisodeJob, select_suites},
+        suite_run::SuiteRun,
     },
-    dataset::{
-        card::Imported,
-        import::{self, ForeignDemo, ForeignFile, InitialCondition},
-    },
-    evaluation::{episode_id::EpisodeIndex, record::Origin},
-    parallel,
-    policy::{ToolCommand, builtin::RecordedPolicy},
-    rollout::{ChunkedPolicy, target_asset},
-    scene::{Body, InitialState},
-    text::counted,
 };
+use softvt_common::{parallel, text::counted};
+use softvt_dataset::{
+    card::Imported,
+    import::{self, ForeignDemo, ForeignFile, InitialCondition},
+};
+use softvt_evaluation::{episode_id::EpisodeIndex, record::Origin};
+use softvt_policy::{ToolCommand, builtin::RecordedPolicy};
+use softvt_rollout::{ChunkedPolicy, target_asset};
+use softvt_scene::{Body, InitialState};
 
 /// Re-execute demonstrations of robomimic, LIBERO, SoftVTBench or softvt in a suite, and record the safe ones that reach the goal
 #[derive(Args, Clone, Debug)]

@@ -8,23 +8,20 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand, value_parser};
 
 use crate::{
-    cli::{
-        error::CliError,
-        output::{Progress, eprint_notice, print, print_json},
-        run::{
-            config::{parse_folder, thread_count},
-            replay::{DemoRef, check_complete, demos_of, replay_demos},
-        },
+    error::CliError,
+    output::{Progress, eprint_notice, print, print_json},
+    run::{
+        config::{parse_folder, thread_count},
+        replay::{DemoRef, check_complete, demos_of, replay_demos},
     },
-    dataset::{
-        DatasetError, check,
-        lerobot::{self, ExportConfig, GripperCoding, LeRobotVersion},
-        stats,
-    },
-    files,
-    rollout::cancel,
-    text::counted,
 };
+use softvt_common::{files, text::counted};
+use softvt_dataset::{
+    DatasetError, check,
+    lerobot::{self, ExportConfig, GripperCoding, LeRobotVersion},
+    stats,
+};
+use softvt_rollout::cancel;
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum DatasetCommand {

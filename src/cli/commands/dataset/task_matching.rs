@@ -3,13 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::{
-    benchmark::{Suite, Task},
-    cli::{
-        error::CliError,
-        run::{config::RunConfig, selection::select_tasks},
-    },
-    dataset::import::{ForeignDemo, ForeignFile, ForeignLayout, ForeignTask, InitialCondition},
+    error::CliError,
+    run::{config::RunConfig, selection::select_tasks},
 };
+use softvt_benchmark::{Suite, Task};
+use softvt_dataset::import::{ForeignDemo, ForeignFile, ForeignLayout, ForeignTask, InitialCondition};
 
 /// A task of one of several suites.
 #[derive(Clone, Copy, Debug)]

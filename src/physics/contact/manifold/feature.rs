@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::{NON_MATERIAL, Placed, Primitive};
-use crate::geometry::{Pose, Vec3};
+use softvt_geometry::{Pose, Vec3};
 
 /// Number of points that represent a rim in flat contact. The circle is at most 0.9 % outside of their polygon, which
 /// changes a tipping angle by less than 0.25°.

@@ -7,7 +7,7 @@ use super::{
     POINT_AREA, Placed, Primitive,
     flat_region::{FlatSample, flat_samples, project_to_surface},
 };
-use crate::geometry::{
+use softvt_geometry::{
     Mat3, Pose, Vec3, hex8, orthonormal_basis,
     shape::{Polygon, Shape},
 };

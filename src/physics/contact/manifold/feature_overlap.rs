@@ -6,7 +6,7 @@ use super::{
     feature::{Face, FaceCorner, FacingFeatures, Line, facing_features},
     separating_axis::{ContactNormal, contact_normal, support},
 };
-use crate::geometry::{Pose, Vec3, hex8, orthonormal_basis};
+use softvt_geometry::{Pose, Vec3, hex8, orthonormal_basis};
 
 /// Distance up to which features count as overlapping, m: above the rounding of a refined normal.
 const SLACK_M: f64 = 1e-6;

@@ -8,7 +8,7 @@ use super::{
     feature_extraction::{Rim, SAMPLE_AREA, SurfaceFeatures},
     field_probe::{FieldProbe, golden_minimum},
 };
-use crate::geometry::{Aabb, Pose, shape::Shape};
+use softvt_geometry::{Aabb, Pose, shape::Shape};
 
 /// Tilt (sine) of a rim up to which all of it carries, and from which only its lowest point does.
 const FLAT_RIM_TILT: [f64; 2] = [0.05, 0.1];
@@ -108,7 +108,7 @@ mod tests {
         super::{Primitive, primitives, surface_features, tests::is_non_material},
         *,
     };
-    use crate::geometry::{Quat, Vec3};
+    use softvt_geometry::{Quat, Vec3};
 
     fn touch(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64) -> Vec<ManifoldPoint> {
         let mut out = Vec::new();

@@ -1,7 +1,7 @@
 //! Queries of the distance field of one body at points of another.
 
 use super::ManifoldPoint;
-use crate::geometry::{Aabb, Pose, Vec3, shape::Shape};
+use softvt_geometry::{Aabb, Pose, Vec3, shape::Shape};
 
 /// The distance field of the second body, evaluated at points of the first.
 pub(super) struct FieldProbe<'a> {

@@ -5,7 +5,7 @@
 //! counts less the flatter the region is (see [`super::field`]); samples spread over it count for the rest.
 
 use super::POINT_AREA;
-use crate::geometry::{Vec3, orthonormal_basis, shape::Shape};
+use softvt_geometry::{Vec3, orthonormal_basis, shape::Shape};
 
 /// Curvature from which the moving lowest point carries alone, 1/m: a radius of 250 mm.
 pub(super) const MAX_FLAT_CURVATURE: f64 = 4.0;

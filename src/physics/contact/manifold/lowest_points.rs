@@ -15,7 +15,7 @@ use super::{
     field_probe::{FieldProbe, golden_minimum},
     flat_region::{MAX_FLAT_CURVATURE, project_to_surface},
 };
-use crate::geometry::{Vec3, orthonormal_basis, shape::Shape};
+use softvt_geometry::{Vec3, orthonormal_basis, shape::Shape};
 
 /// Distance from a lowest point at which the rise of the gap is measured, m.
 const PROBE_DISTANCE: f64 = 1e-3;

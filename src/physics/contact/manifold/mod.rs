@@ -11,7 +11,7 @@
 //! change of pose must change the sum of forces little: points have to fade in and out. Parry's contact manifolds
 //! give neither areas nor continuous weights.
 
-use crate::geometry::{
+use softvt_geometry::{
     Vec3,
     convex::{Placed, Primitive},
 };

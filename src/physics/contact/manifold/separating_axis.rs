@@ -1,7 +1,7 @@
 //! The contact normal of two convex primitives: the direction in which they are farthest apart.
 
 use super::{Placed, Primitive};
-use crate::geometry::{
+use softvt_geometry::{
     Vec3,
     convex::{self, ClosestPoints},
 };

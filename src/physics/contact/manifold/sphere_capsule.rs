@@ -1,7 +1,7 @@
 //! Manifolds of a sphere with any primitive and of two capsules, by distances to points and segments.
 
 use super::{ManifoldPoint, NON_MATERIAL, POINT_AREA, Placed, Primitive};
-use crate::geometry::{Pose, Vec3};
+use softvt_geometry::{Pose, Vec3};
 
 /// Distance by which the closest points of two capsules must be closer than the interpolated gaps at the ends to
 /// count in full, m.

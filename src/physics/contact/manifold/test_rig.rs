@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 
 use super::tests::{BALL, BOX, CAN, meet, support};
 use super::*;
-use crate::geometry::{Mat3, Pose, Quat};
-use crate::physics::rigid::{RigidState, advance, free_spin};
+use crate::rigid::{RigidState, advance, free_spin};
+use softvt_geometry::{Mat3, Pose, Quat};
 
 const GRAVITY: f64 = 9.81;
 const DT: f64 = 2e-5;

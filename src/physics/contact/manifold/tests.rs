@@ -2,7 +2,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::geometry::{Pose, Quat};
+use softvt_geometry::{Pose, Quat};
 
 pub(super) const BOX: Primitive = Primitive::Box { half: Vec3::new(0.03, 0.02, 0.05) };
 pub(super) const CAN: Primitive = Primitive::Cylinder { radius: 0.033, half_height: 0.05 };

@@ -2,17 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use crate::{
-    geometry::{Aabb, basis_from_reference, mesh::Mesh, shape::Shape, union_find::UnionFind},
-    scene::Visual,
-    sensing::camera::{
-        math::V3,
-        shade::{
-            occlusion::self_visibility,
-            pattern::{METALNESS, MaterialSample, SKY_VISIBILITY, VisualSample, sample_visual},
-        },
+use crate::camera::{
+    math::V3,
+    shade::{
+        occlusion::self_visibility,
+        pattern::{METALNESS, MaterialSample, SKY_VISIBILITY, VisualSample, sample_visual},
     },
 };
+use softvt_geometry::{Aabb, basis_from_reference, mesh::Mesh, shape::Shape, union_find::UnionFind};
+use softvt_scene::Visual;
 
 /// Faces that meet at a larger angle than this (cosine) form a crease; others are one smooth surface.
 const CREASE_COSINE: f32 = 0.8;

@@ -4,7 +4,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::geometry::{
+use softvt_geometry::{
     Pose, Vec3,
     mesh::Mesh,
     shape::{Polygon, Shape},

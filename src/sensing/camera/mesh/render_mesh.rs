@@ -8,17 +8,15 @@ use super::{
     simplify::simplify,
     texture::{SurfaceMaterial, TEXT_TEXEL, TextureChart, flat_charts, parameterize, suits_flat_charts},
 };
-use crate::{
-    geometry::{
-        Pose, Vec3,
-        mesh::Mesh,
-        shape::Shape,
-        surface_mesh::SurfaceMesh,
-        voxel::{Embedding, VoxelMesh},
-    },
-    scene::Visual,
-    sensing::camera::{error::CameraError, math::V3, raster::TRIANGLE_BITS, shade::pattern},
+use crate::camera::{error::CameraError, math::V3, raster::TRIANGLE_BITS, shade::pattern};
+use softvt_geometry::{
+    Pose, Vec3,
+    mesh::Mesh,
+    shape::Shape,
+    surface_mesh::SurfaceMesh,
+    voxel::{Embedding, VoxelMesh},
 };
+use softvt_scene::Visual;
 
 /// Cells along the longest edge of a shape, per level of detail. The coarsest level also casts shadows.
 const CELLS: [f64; 4] = [64.0, 40.0, 26.0, 16.0];

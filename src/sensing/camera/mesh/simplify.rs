@@ -12,7 +12,7 @@
 use std::{cmp::Reverse, collections::BinaryHeap};
 
 use super::lod::Lod;
-use crate::sensing::camera::math::V3;
+use crate::camera::math::V3;
 
 /// Position, normal and material.
 const DIMENSIONS: usize = 12;
@@ -270,11 +270,9 @@ impl<'a> Simplifier<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        geometry::{shape::Shape, surface_mesh::SurfaceMesh},
-        scene::{Mask, Visual, VisualLayer},
-        sensing::camera::mesh::lod::bake_vertices,
-    };
+    use crate::camera::mesh::lod::bake_vertices;
+    use softvt_geometry::{shape::Shape, surface_mesh::SurfaceMesh};
+    use softvt_scene::{Mask, Visual, VisualLayer};
 
     fn fine_level(shape: &Shape, cell: f64, visual: Visual) -> Lod {
         let mesh = SurfaceMesh::from_shape(shape, cell).mesh;

@@ -14,14 +14,12 @@ use std::{
 use wide::{bytemuck::cast, i32x8, u32x8};
 
 use super::lod::{CreasedMesh, Lod};
-use crate::{
-    geometry::{mesh::Mesh, shape::Shape, union_find::UnionFind},
-    scene::Visual,
-    sensing::camera::{
-        math::{LANES, V3, Vec3x8, approx_log2, f32x8},
-        shade::pattern::{self, METALNESS, MaterialSample, sample_visual},
-    },
+use crate::camera::{
+    math::{LANES, V3, Vec3x8, approx_log2, f32x8},
+    shade::pattern::{self, METALNESS, MaterialSample, sample_visual},
 };
+use softvt_geometry::{mesh::Mesh, shape::Shape, union_find::UnionFind};
+use softvt_scene::Visual;
 
 /// Maximum number of triangles of a mesh that is textured plane by plane.
 const MAX_FLAT_TRIANGLES: usize = 160;
@@ -432,10 +430,8 @@ fn blend_bytes(corners: [u32x8; 4], x: u32x8, y: u32x8) -> [f32x8; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        scene::{LabelLine, Mask, TextDecal, VisualLayer},
-        sensing::camera::RenderMesh,
-    };
+    use crate::camera::RenderMesh;
+    use softvt_scene::{LabelLine, Mask, TextDecal, VisualLayer};
 
     /// A word facing +x, white on black.
     fn printed() -> Visual {

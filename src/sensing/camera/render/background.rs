@@ -5,18 +5,16 @@ use super::{
     pass::{Bounds, RenderPass, bounds_of},
     tile::{PixelTargets, ShadingSink, TILE_PIXELS, TileChannels, TileDisplay},
 };
-use crate::{
-    scene::Camera,
-    sensing::camera::{
-        image::RenderedImage,
-        math::{LANES, V3, Vec3x8, f32x8},
-        raster::TileSamples,
-        shade::{
-            occlusion::{OcclusionEllipsoid, sky_visibility},
-            shading::{DirectAndAmbient, SurfaceSamples},
-        },
+use crate::camera::{
+    image::RenderedImage,
+    math::{LANES, V3, Vec3x8, f32x8},
+    raster::TileSamples,
+    shade::{
+        occlusion::{OcclusionEllipsoid, sky_visibility},
+        shading::{DirectAndAmbient, SurfaceSamples},
     },
 };
+use softvt_scene::Camera;
 
 /// The background of a scene for one camera.
 #[derive(Debug)]

@@ -2,20 +2,18 @@
 
 use std::sync::Arc;
 
-use crate::{
-    geometry::Vec3,
-    sensing::camera::{
-        lens::Lens,
-        math::{LANE_INDEX, LANES, V3, Vec3x8, f32x8},
-        mesh::{lod::Lod, texture::TextureChart},
-        raster::{object_index, triangle_index},
-        scene::PosedMesh,
-        shade::{
-            pattern::{METALNESS, ROUGHNESS, SKY_VISIBILITY},
-            shading::SurfaceSamples,
-        },
+use crate::camera::{
+    lens::Lens,
+    math::{LANE_INDEX, LANES, V3, Vec3x8, f32x8},
+    mesh::{lod::Lod, texture::TextureChart},
+    raster::{object_index, triangle_index},
+    scene::PosedMesh,
+    shade::{
+        pattern::{METALNESS, ROUGHNESS, SKY_VISIBILITY},
+        shading::SurfaceSamples,
     },
 };
+use softvt_geometry::Vec3;
 
 /// A mesh at one level of detail, posed in the world.
 #[derive(Clone, Debug)]

@@ -17,10 +17,8 @@ use super::{
     scene::{FrameView, RenderScene},
     shade::{occlusion::OcclusionEllipsoid, shadow::ShadowMap},
 };
-use crate::{
-    geometry::{Pose, Vec3},
-    scene::{Camera, CameraMount},
-};
+use softvt_geometry::{Pose, Vec3};
+use softvt_scene::{Camera, CameraMount};
 
 /// Draws images of a [`RenderScene`] as cameras see it.
 ///

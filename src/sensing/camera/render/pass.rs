@@ -3,21 +3,19 @@
 use std::sync::Arc;
 
 use super::interpolate::MeshInstance;
-use crate::{
-    physics::BodyId,
-    sensing::camera::{
-        error::CameraError,
-        lens::Lens,
-        math::{V3, Vec3x8},
-        raster::{TileBins, first_triangle_id, object_index, triangle_index},
-        scene::{FrameView, PosedMesh, RenderObject, RenderScene},
-        shade::{
-            occlusion::{OcclusionEllipsoid, sky_visibility},
-            shading::{DirectAndAmbient, SurfaceSamples},
-            shadow::ShadowMap,
-        },
+use crate::camera::{
+    error::CameraError,
+    lens::Lens,
+    math::{V3, Vec3x8},
+    raster::{TileBins, first_triangle_id, object_index, triangle_index},
+    scene::{FrameView, PosedMesh, RenderObject, RenderScene},
+    shade::{
+        occlusion::{OcclusionEllipsoid, sky_visibility},
+        shading::{DirectAndAmbient, SurfaceSamples},
+        shadow::ShadowMap,
     },
 };
+use softvt_physics::BodyId;
 
 /// Maximum extent of objects that occlude the sky for others, m; larger ones are floors and walls.
 const MAX_OCCLUDER_EXTENT: f32 = 0.35;

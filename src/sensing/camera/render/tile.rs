@@ -6,7 +6,7 @@ use super::{
     interpolate::{ShadingBatch, TriangleInterpolator},
     pass::RenderPass,
 };
-use crate::sensing::camera::{
+use crate::camera::{
     image::RenderedImage,
     lens::Lens,
     math::{LANE_INDEX, LANES, Vec3x8, f32x8, floor_to_u32},

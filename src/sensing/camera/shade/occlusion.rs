@@ -3,10 +3,8 @@
 //! An object's own occlusion is evaluated once per vertex from its distance field. Occlusion by other objects, which
 //! may move, is approximated per point by one ellipsoid per object.
 
-use crate::{
-    geometry::{Vec3, shape::Shape},
-    sensing::camera::math::{V3, Vec3x8, f32x8},
-};
+use crate::camera::math::{V3, Vec3x8, f32x8};
+use softvt_geometry::{Vec3, shape::Shape};
 
 /// Radius of influence of an occluder, in radii of the occluder.
 const INFLUENCE_RADII: f32 = 2.6;

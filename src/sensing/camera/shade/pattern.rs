@@ -2,11 +2,9 @@
 //!
 //! Noise comes from integer hashes, so that its bytes are the same on every machine.
 
-use crate::{
-    geometry::Vec3,
-    scene::{Mask, TextDecal, Visual},
-    sensing::camera::math::V3,
-};
+use crate::camera::math::V3;
+use softvt_geometry::Vec3;
+use softvt_scene::{Mask, TextDecal, Visual};
 
 /// Material parameters at a point of a surface: albedo (linear RGB), roughness, metalness, and the fraction of the sky
 /// left visible by the object itself. The first four are those that textures store.
@@ -313,7 +311,8 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::{geometry::shape::Shape, scene::LabelLine};
+    use softvt_geometry::shape::Shape;
+    use softvt_scene::LabelLine;
 
     fn value(of: &Mask, p: [f32; 3], n: [f32; 3], spacing: f32) -> f32 {
         mask_value(of, &p.into(), &n.into(), spacing)

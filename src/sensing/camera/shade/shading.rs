@@ -1,10 +1,8 @@
 //! Reflected light at surface points, eight at a time.
 
 use super::shadow::ShadowMap;
-use crate::{
-    scene::Lighting,
-    sensing::camera::math::{V3, Vec3x8, approx_exp2, f32x8},
-};
+use crate::camera::math::{V3, Vec3x8, approx_exp2, f32x8};
+use softvt_scene::Lighting;
 
 /// Eight surface points to be shaded.
 #[derive(Clone, Copy, Debug)]

@@ -6,14 +6,12 @@
 
 use wide::i32x8;
 
-use crate::{
-    geometry::basis_from_reference,
-    scene::Lighting,
-    sensing::camera::{
-        math::{LANE_INDEX, LANES, V3, Vec3x8, f32x8, sum_lanes},
-        raster::SampleBuffer,
-    },
+use crate::camera::{
+    math::{LANE_INDEX, LANES, V3, Vec3x8, f32x8, sum_lanes},
+    raster::SampleBuffer,
 };
+use softvt_geometry::basis_from_reference;
+use softvt_scene::Lighting;
 
 /// Edge of the part of the map in which points can be shaded, texels.
 const INNER: usize = 768;

@@ -1,6 +1,6 @@
 //! Conversion of scene radiance to display values: exposure, tone curve and sRGB encoding.
 
-use crate::sensing::camera::math::{Vec3x8, f32x8, floor_to_u32};
+use crate::camera::math::{Vec3x8, f32x8, floor_to_u32};
 
 /// The Khronos PBR Neutral tone mapper (Khronos Group, 2024), linear RGB to linear RGB in 0..1.
 ///

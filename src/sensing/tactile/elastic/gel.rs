@@ -8,7 +8,8 @@ use super::{
     elastic_layer::LayerResponse,
     fourier::{FftBuffers, PaddedFft},
 };
-use crate::{robot::PadSurface, text::RangeError};
+use softvt_common::text::RangeError;
+use softvt_robot::PadSurface;
 
 /// Grid over the pad, kernels of the bonded layer and view of the camera: everything that is computed once per sensor.
 ///

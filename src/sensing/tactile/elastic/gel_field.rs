@@ -10,7 +10,7 @@ use super::{
     pad_wrench::{PadWrench, Taxels},
     tangential_contact::{PlanarMotion, apply_shear_kernel, solve_tangential_contact, spring_stiffness},
 };
-use crate::geometry::{Mat3, Vec3};
+use softvt_geometry::{Mat3, Vec3};
 
 /// Contact of bodies with a pad: the input of [`GelField::solve`].
 #[derive(Clone, Copy, Debug)]

@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 use super::gel::Gel;
-use crate::geometry::Vec3;
+use softvt_geometry::Vec3;
 
 /// Surface of a touching body in the pad frame.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,8 @@
 //! Force and pressure on a pad as the solver computes them: ground truth for the images, and for evaluation.
 
-use crate::{geometry::Vec3, physics::world::ContactPatch, robot::PadSurface};
+use softvt_geometry::Vec3;
+use softvt_physics::world::ContactPatch;
+use softvt_robot::PadSurface;
 
 /// Force on a gel and its moment about the apex, pad frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -109,7 +111,7 @@ impl Taxels {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::{
+    use softvt_physics::{
         ColliderId, SoftId,
         world::{PatchPoint, SampleFace},
     };

@@ -10,7 +10,7 @@ use nalgebra::Vector2;
 use rustfft::num_complex::Complex32;
 
 use super::gel::{Gel, GelScratch};
-use crate::geometry::{Mat3, Vec3};
+use softvt_geometry::{Mat3, Vec3};
 
 /// Iterations end when the sticking cells differ from a rigid motion by less than this share of it (energy norm).
 const TOLERANCE: f64 = 3e-2;

@@ -10,7 +10,8 @@ use super::{
     gel_field::surface_displacement,
     tangential_contact::{TangentialSolution, solve_tangential_contact},
 };
-use crate::{geometry::Vec3, robot::PadSurface};
+use softvt_geometry::Vec3;
+use softvt_robot::PadSurface;
 
 /// Vertices and triangles of a skin in the pad frame.
 pub(in super::super) struct TestSkin {

@@ -5,7 +5,7 @@ use std::borrow::Borrow;
 use image::{RgbImage, imageops};
 use serde::{Deserialize, Serialize};
 
-use crate::sensing::camera::resize;
+use crate::camera::resize;
 
 /// Images of history per finger.
 pub const HISTORY_LENGTH: usize = 8;

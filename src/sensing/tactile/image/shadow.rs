@@ -100,7 +100,7 @@ impl<'a> ShadowCaster<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sensing::tactile::PolynomialOptics;
+    use crate::tactile::PolynomialOptics;
 
     const PITCH: f32 = 6.34e-5;
 

@@ -11,7 +11,7 @@ use super::{
     elastic::{Gel, GelField},
     spec::{FotsSpec, IMAGE_SIZE, MarkerModel},
 };
-use crate::geometry::Vec3;
+use softvt_geometry::Vec3;
 
 /// Number of markers: 9 rows of 11.
 pub const MARKER_COUNT: usize = 99;

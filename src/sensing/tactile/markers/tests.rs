@@ -10,7 +10,7 @@ use super::{
     },
     MarkerStyle, Markers,
 };
-use crate::robot::PadSurface;
+use softvt_robot::PadSurface;
 
 fn gel() -> Gel {
     Gel::new(&TactileSpec::default(), PadSurface::default()).expect("default numbers")

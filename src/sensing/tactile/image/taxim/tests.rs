@@ -3,14 +3,12 @@
 use std::{fs, io::Write, path::Path};
 
 use super::*;
-use crate::{
-    npy::NpyArray,
-    robot::PadSurface,
-    sensing::tactile::{
-        PadWrench, TactileSpec,
-        elastic::tests::{graph, pressed},
-    },
+use crate::tactile::{
+    PadWrench, TactileSpec,
+    elastic::tests::{graph, pressed},
 };
+use softvt_common::npy::NpyArray;
+use softvt_robot::PadSurface;
 
 const BINS: usize = 125;
 

@@ -25,7 +25,7 @@ pub enum FileError {
 
 impl FileError {
     /// Converts the `io::Error` of `action` on `path`, for `map_err`.
-    pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self + use<> {
+    pub fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self + use<> {
         let path = path.display().to_string();
         move |source| Self::Io { action, path, source }
     }

@@ -2,6 +2,6 @@
 
 fn main() {
     for tree in ["scripts", "suites", "assets"] {
-        println!("cargo:rerun-if-changed={tree}");
+        println!("cargo:rerun-if-changed=../../{tree}");
     }
 }

@@ -19,12 +19,12 @@ const ALIGNMENT: usize = 64;
 /// An array in C order (last axis fastest).
 ///
 /// ```
-/// use softvt::npy::NpyArray;
+/// use softvt_common::npy::NpyArray;
 ///
 /// let array = NpyArray::from_f64(vec![2, 3], [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
 /// let back = NpyArray::parse(&array.to_npy())?;
 /// assert_eq!((back.dtype.as_str(), back.values()[4]), ("<f8", 4.0));
-/// # Ok::<(), softvt::npy::NpyError>(())
+/// # Ok::<(), softvt_common::npy::NpyError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct NpyArray {

@@ -31,7 +31,7 @@ pub const NOT_NEGATIVE: RangeInclusive<f64> = 0.0..=f64::MAX;
 /// Checks that the parameter at `path` lies in `range`, which `expected` describes. NaN lies in no range.
 ///
 /// # Errors
-/// It does not.
+/// The value is outside the range.
 pub fn check_range(
     path: &str,
     value: f64,
@@ -164,7 +164,7 @@ pub enum TextColumn {
 /// A plain-text table: rows of cells in columns one space apart, lines of other text, and rules.
 ///
 /// ```
-/// use softvt::text::{TextColumn, TextTable};
+/// use softvt_common::text::{TextColumn, TextTable};
 ///
 /// let mut table = TextTable::new([TextColumn::Left(6), TextColumn::Right(5)]);
 /// table.row(["task", "D, %"]);

@@ -1,0 +1,8 @@
+//! What every layer may use: atomic [`files`], numpy files ([`npy`]), jobs on threads ([`parallel`]), numbers and
+//! [`text`] in messages.
+#![warn(missing_docs, unreachable_pub)]
+
+pub mod files;
+pub mod npy;
+pub mod parallel;
+pub mod text;
