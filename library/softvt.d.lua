@@ -172,7 +172,7 @@
 ---@field source "camera"|"state"|"prompt"|"tactile_image"|"tactile"|"marker_motion"|"force" Content: the image of a camera; numbers of the robot's state; the prompt; the mosaic of 8 tactile images of both fingers; the latest image of one finger; the first and the last 8 marker positions; the last 8 true forces on the gels.
 ---@field camera? string For camera: its name in the scene.
 ---@field half_turn? boolean For camera: true to rotate the image by 180°.
----@field parts? ("position"|"axis_angle"|"quaternion_wxyz"|"quaternion_xyzw"|"joints"|"closure"|"gripper_width"|"finger_position"|"finger_pair")[] For state: its parts in order, of 3, 3, 4, 4, 7, 1, 1, 2 and 1 numbers, in m and rad in the base frame.
+---@field parts? ("position"|"axis_angle"|"quaternion_wxyz"|"quaternion_xyzw"|"joints"|"gripper_width"|"finger_position"|"finger_pair"|"closure")[] For state: its parts in order, of 3, 3, 4, 4, 7, 1, 1, 2 and 1 numbers, in m and rad in the base frame.
 ---@field layout? "rows"|"columns" For tactile_image: the left finger above the right one (rows, the default) or left of it.
 ---@field finger? "left"|"right" For tactile: the finger.
 

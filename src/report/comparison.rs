@@ -126,7 +126,8 @@ fn check_unique(runs: &[StoredRun]) -> Result<(), CompareError> {
 
 /// The error about two runs without common episodes, with the property in which they differ.
 fn no_common_episode(first: &[StoredRun], second: &[StoredRun]) -> CompareError {
-    let properties: [(&str, fn(&StoredRun) -> String); 4] = [
+    type Property = fn(&StoredRun) -> String;
+    let properties: [(&str, Property); 4] = [
         ("suite", |run| run.suite().to_owned()),
         ("seed", |run| run.manifest["seed"].to_string()),
         ("split", |run| run.text("split").to_owned()),

@@ -130,8 +130,8 @@ choice! {
     StatePart {
         "position" => Position, "axis_angle" => AxisAngle,
         "quaternion_wxyz" => QuaternionWxyz, "quaternion_xyzw" => QuaternionXyzw,
-        "joints" => Joints, "closure" => Closure,
-        "gripper_width" => GripperWidth, "finger_position" => FingerPosition, "finger_pair" => FingerPair,
+        "joints" => Joints, "gripper_width" => GripperWidth, "finger_position" => FingerPosition,
+        "finger_pair" => FingerPair, "closure" => Closure,
     }
 }
 choice! {

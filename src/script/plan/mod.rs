@@ -34,7 +34,7 @@ use softvt_common::{parallel::lock, text::unknown_name};
 pub struct ScriptSources {
     /// The main file, as messages name it.
     pub main: String,
-    /// Every file that was read.
+    /// Every file that was read until the plan was made.
     pub bundle: Arc<Bundle>,
     argv: Vec<String>,
     limits: Limits,
@@ -90,9 +90,11 @@ pub fn load(path: &Path, argv: &[String]) -> Result<LoadedScript, ScriptError> {
 /// # Errors
 /// As [`load`].
 pub fn load_with(path: &Path, argv: &[String], limits: &Limits) -> Result<LoadedScript, ScriptError> {
-    let (sources, instance) = ScriptSources::read(path, argv, limits)?;
+    let (mut sources, instance) = ScriptSources::read(path, argv, limits)?;
     let options = lock(&instance.options).declared.clone();
     let plan = instance.plan().map_err(|e| instance.vm.explain(&e))?;
+    // The points of an experiment may be a function, which reads files as well.
+    sources.bundle = Arc::new(lock(&instance.vm.library).bundle.clone());
     Ok(LoadedScript { sources, plan, options })
 }
 

@@ -276,7 +276,7 @@ pub(crate) fn error_at_key(lua: &Lua, label: &str, error: &ValidationError) -> m
 
 /// The error of a function of a script about a table that it was given, at the line of the file that called the function.
 pub(crate) fn error_of_caller(lua: &Lua, label: &str, error: &ValidationError) -> mlua::Error {
-    let line = |level| lua.inspect_stack(level, |function| SourceLine::running(&function));
+    let line = |level| lua.inspect_stack(level, SourceLine::running);
     let mut lines = (0..).map_while(line).flatten();
     let own = lines.next();
     let caller = own.as_ref().and_then(|own| lines.find(|line| line.file != own.file));

@@ -62,6 +62,17 @@ fn a_calibration_is_read_when_the_plan_is_made_and_no_later() {
 }
 
 #[test]
+fn points_may_read_files_that_later_machines_then_hold() {
+    let script = "return softvt.experiment { name = 'e',\n\
+        points = function() return { { a = require('lib').value } } end,\n\
+        run = function(point) return { a = point.a, again = require('lib').value } end }";
+    let project = Project::new(&[("x.lua", script), ("lib.lua", "return { value = 7 }")]);
+    let loaded = project.load("x.lua", &[]).expect("loads");
+    let row = Experiment::open(&loaded).expect("opens").run(0).expect("a row");
+    assert_eq!((row[0]["a"].as_i64(), row[0]["again"].as_i64()), (Some(7), Some(7)));
+}
+
+#[test]
 fn a_main_file_with_the_name_of_a_module_can_require_it() {
     let main = "local shifts = require 'shifts'\nerror(shifts.soft[1].name, 0)";
     let project = Project::new(&[("suites/shifts.lua", main)]);

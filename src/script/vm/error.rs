@@ -206,7 +206,7 @@ pub(crate) fn app_data<T: Clone + 'static>(lua: &Lua) -> mlua::Result<T> {
 pub(crate) fn current_line(lua: &Lua) -> Option<SourceLine> {
     let mut level = 0;
     loop {
-        let line = lua.inspect_stack(level, |function| SourceLine::running(&function))?;
+        let line = lua.inspect_stack(level, SourceLine::running)?;
         if line.is_some() {
             return line;
         }

@@ -84,8 +84,7 @@ impl VisibleSurface {
             return None;
         }
         let mut window = Self::default();
-        for axis in 0..2 {
-            let edge = IMAGE_SIZE[axis] as f64;
+        for (axis, edge) in IMAGE_SIZE.map(|edge| edge as f64).into_iter().enumerate() {
             let px = |[i, j]: [usize; 2]| gel.centre(j * n + i)[axis] / gel.view.pitch + 0.5 * edge;
             window.from[axis] = (px(low) - 2.0).clamp(0.0, edge) as usize;
             window.size[axis] = (px(high) + 2.0).clamp(0.0, edge) as usize - window.from[axis];
