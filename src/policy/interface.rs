@@ -149,7 +149,7 @@ impl PolicyError {
 /// A policy that acts on observations alone.
 ///
 /// An episode calls [`reset`](Self::reset) once, then [`act`](Self::act) each time a new [`ActionChunk`] is needed, and
-/// [`finish`](Self::finish) at the end. [`ChunkedPolicy`](softvt_rollout::ChunkedPolicy) executes the chunks at 20 Hz.
+/// [`finish`](Self::finish) at the end. `ChunkedPolicy` of the layer `rollout` executes the chunks at 20 Hz.
 ///
 /// ```
 /// use softvt_policy::{Action, ActionChunk, Observation, Policy, PolicyError};
