@@ -1,5 +1,5 @@
-//! What every layer may use: atomic [`files`], numpy files ([`npy`]), jobs on threads ([`parallel`]), numbers and
-//! [`text`] in messages.
+//! Functions for all layers: atomic [`files`], numpy files ([`npy`]), jobs on threads ([`parallel`]), numbers and [`text`]
+//! in messages.
 #![warn(missing_docs, unreachable_pub)]
 
 pub mod files;

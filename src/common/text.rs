@@ -138,7 +138,7 @@ pub fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
-/// Formats a number with a fixed number of decimals; a dash if there is none.
+/// Formats a number with a fixed number of decimals; a dash for `None`.
 pub fn decimal(value: Option<f64>, digits: usize) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{value:.digits$}"))
 }

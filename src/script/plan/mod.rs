@@ -34,19 +34,26 @@ use softvt_common::{parallel::lock, text::unknown_name};
 pub struct ScriptSources {
     /// The main file, as messages name it.
     pub main: String,
-    /// Every file that was read until the plan was made.
+    /// Every file that was read.
     pub bundle: Arc<Bundle>,
     argv: Vec<String>,
     limits: Limits,
 }
 
 impl ScriptSources {
-    /// Runs the main file at `path`, and returns its virtual machine with the files that were read.
-    fn read(path: &Path, argv: &[String], limits: &Limits) -> Result<(Self, ScriptInstance), ScriptError> {
+    /// Runs the main file at `path` and converts its result. The bundle holds the files that both have read: a result
+    /// may contain functions that read further ones.
+    fn read<T>(
+        path: &Path,
+        argv: &[String],
+        limits: &Limits,
+        convert: impl FnOnce(&ScriptInstance) -> Result<T, ScriptError>,
+    ) -> Result<(Self, T), ScriptError> {
         let (library, main) = Library::open(path)?;
         let instance = ScriptInstance::open(&main, library, argv, limits)?;
+        let result = convert(&instance)?;
         let bundle = Arc::new(lock(&instance.vm.library).bundle.clone());
-        Ok((Self { main, bundle, argv: argv.to_vec(), limits: limits.clone() }, instance))
+        Ok((Self { main, bundle, argv: argv.to_vec(), limits: limits.clone() }, result))
     }
 
     /// Runs the main file again in a new virtual machine.
@@ -90,11 +97,10 @@ pub fn load(path: &Path, argv: &[String]) -> Result<LoadedScript, ScriptError> {
 /// # Errors
 /// As [`load`].
 pub fn load_with(path: &Path, argv: &[String], limits: &Limits) -> Result<LoadedScript, ScriptError> {
-    let (mut sources, instance) = ScriptSources::read(path, argv, limits)?;
-    let options = lock(&instance.options).declared.clone();
-    let plan = instance.plan().map_err(|e| instance.vm.explain(&e))?;
-    // The points of an experiment may be a function, which reads files as well.
-    sources.bundle = Arc::new(lock(&instance.vm.library).bundle.clone());
+    let (sources, (options, plan)) = ScriptSources::read(path, argv, limits, |instance| {
+        let options = lock(&instance.options).declared.clone();
+        Ok((options, instance.plan().map_err(|e| instance.vm.explain(&e))?))
+    })?;
     Ok(LoadedScript { sources, plan, options })
 }
 

@@ -56,10 +56,12 @@ impl PolicyFile {
     /// # Errors
     /// As [`PolicyFile::load`].
     pub fn load_with(path: &Path, limits: &Limits) -> Result<Self, ScriptError> {
-        let (sources, instance) = ScriptSources::read(path, &[], limits)?;
-        let policy = instance.policy()?;
-        let observes_at = origin_of_key(&instance.vm.lua, &policy.table, &["observes", "cameras"]);
-        let PolicySpec { name, observes: streams, replan, .. } = policy.spec;
+        let (sources, (spec, observes_at)) = ScriptSources::read(path, &[], limits, |instance| {
+            let policy = instance.policy()?;
+            let observes_at = origin_of_key(&instance.vm.lua, &policy.table, &["observes", "cameras"]);
+            Ok((policy.spec, observes_at))
+        })?;
+        let PolicySpec { name, observes: streams, replan, .. } = spec;
         let observes_at = observes_at.map_or_else(|| sources.main.clone(), |line| line.to_string());
         Ok(Self { name, replan, streams, observes_at, sources })
     }

@@ -20,10 +20,12 @@ use softvt_policy::profile::{ActionEncoding, ActionUnits, InputSource, PoseEncod
 /// # Errors
 /// If the file cannot be read or does not return a valid profile; the message names file and line.
 pub fn load_profile(path: &Path) -> Result<(Profile, BTreeMap<String, String>), ScriptError> {
-    let (sources, instance) = ScriptSources::read(path, &[], &Limits::default())?;
-    let spec = instance.expected_result("a profile's file");
-    let profile = spec.and_then(|spec| ProfileReader { lua: &instance.vm.lua, spec: &spec }.profile());
-    Ok((profile.map_err(|e| instance.vm.explain(&e))?, sources.bundle.hashes()))
+    let (sources, profile) = ScriptSources::read(path, &[], &Limits::default(), |instance| {
+        let spec = instance.expected_result("a profile's file");
+        let profile = spec.and_then(|spec| ProfileReader { lua: &instance.vm.lua, spec: &spec }.profile());
+        profile.map_err(|e| instance.vm.explain(&e))
+    })?;
+    Ok((profile, sources.bundle.hashes()))
 }
 
 /// Reads a profile and checks the relations between its fields.
