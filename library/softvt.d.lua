@@ -36,7 +36,7 @@
 ---@field target string Scene name of the target, or of a part of it (cabinet.top_drawer).
 ---@field hold_s? number Time that it must stay there. Expects seconds in 0..10. Default 0.4.
 
----A change of the scene that a run can request with --shift name=value. Deformation limits stay nominal.
+---A change of the scene that a run can request with --shift name=value. Limits of D stay those of the assets.
 ---@class softvt.Shift
 ---@field name string Name on the command line.
 ---@field unit? string Unit of the value. Default "1".
@@ -1222,7 +1222,7 @@ function softvt.on(spec) end
 ---@return softvt.Inside
 function softvt.inside(spec) end
 
----A change of the scene that a run can request with --shift name=value. Deformation limits stay nominal.
+---A change of the scene that a run can request with --shift name=value. Limits of D stay those of the assets.
 ---@param spec softvt.Shift
 ---@return softvt.Shift
 function softvt.shift(spec) end

@@ -1,6 +1,6 @@
 //! One episode: settle, then observe, act, step and judge until it ends.
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 use image::RgbImage;
 
@@ -48,8 +48,8 @@ pub struct EpisodeSpec {
     pub task: Task,
     /// The scene, before settling.
     pub scene: Arc<Scene>,
-    /// Deformation limit of the target; `None` if it was never calibrated.
-    pub limit: Option<DeformationLimit>,
+    /// Deformation limits of the soft objects by name in the scene; an object without one was never calibrated.
+    pub limits: BTreeMap<String, DeformationLimit>,
     /// Parameters of physics, robot, judge and sensors.
     pub settings: Settings,
     /// True to keep all states, from which images can be rendered after the episode.
@@ -86,7 +86,7 @@ impl EpisodeSpec {
             header,
             task: task.clone(),
             scene: Arc::new(scene),
-            limit: None,
+            limits: BTreeMap::new(),
             settings: settings.clone(),
             record_states: false,
             record_trace: false,
@@ -594,7 +594,7 @@ fn settled_judge(
         steps_per_control: steps_per_control(spec.settings.physics.dt),
         target_weight_n: weight(sim, target),
         is_target_soft: matches!(sim.objects[target].body, BodyId::Soft(_)),
-        limit: spec.limit,
+        limit: spec.limits.get(&sim.objects[target].name).copied(),
         target_lowest_z_w: lowest(sim, &sim.objects[target]),
         others_lowest_z_w: evidence.others_lowest(sim),
     })

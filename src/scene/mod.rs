@@ -62,8 +62,10 @@ pub use visual::{Mask, Visual, VisualLayer};
 pub struct Object {
     /// Name, unique in the scene, for example "left" or "plate".
     pub name: String,
-    /// Kind of object.
+    /// The object as it is in this scene: its asset, with what the layout or a shift changed of it.
     pub asset: Arc<Asset>,
+    /// The asset as its file defines it. Its fingerprint is the one that a calibration refers to.
+    pub nominal: Arc<Asset>,
     /// Object frame in the world frame, before settling.
     pub pose_w: Pose,
     /// Initial joint values of an articulated object, in the order of its parts, m or rad.
@@ -90,6 +92,21 @@ pub struct Scene {
     pub lighting: Lighting,
     /// Cameras with unique names, by which policies request images.
     pub cameras: Vec<Camera>,
+}
+
+impl Object {
+    /// Reason why the deformation limit of the nominal asset does not hold for this object; `None` if it does.
+    ///
+    /// D is a strain over a diagonal, so that a limit holds whatever the stiffness, density, friction, colour or uniform
+    /// scale. Poisson's ratio changes how a shape deforms under the same strain.
+    pub fn departure(&self) -> Option<String> {
+        let poisson = |asset: &Asset| match &asset.body {
+            Body::Soft(material) => Some(material.poisson),
+            _ => None,
+        };
+        let (own, nominal) = (poisson(&self.asset)?, poisson(&self.nominal)?);
+        (own != nominal).then(|| format!("Poisson's ratio {own} instead of {nominal}"))
+    }
 }
 
 impl Scene {

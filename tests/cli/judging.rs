@@ -148,3 +148,80 @@ fn limits_apply_only_to_the_calibrated_object() {
     project.write("x.lua", other[1].1.as_bytes());
     assert_eq!(safe(&project, ""), [false, false]);
 }
+
+/// A suite of soft cubes, with calibrations of the assets `cube` and `small`. Layout `drawn` places one of the two;
+/// layout `changed` runs `change` on a cube.
+fn calibrated(change: &str) -> Project {
+    let library = r#"
+local function cube(name, edge)
+  return softvt.asset { name = name, shape = softvt.shape.box { size = { edge, edge, edge } }:grounded(),
+    body = softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300 } }
+end
+return { cube = cube("cube", 0.04), small = cube("small", 0.03),
+  floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 1, 1, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} } }
+"#;
+    let suite = format!(
+        r#"
+local assets = require "cubes"
+local function layout(name, place)
+  return softvt.layout(name, function(scene, rng)
+    scene:add {{ name = "floor", asset = assets.floor, position = {{ 0, 0, 0 }} }}
+    place(scene, rng:uniform(0, 1))
+  end)
+end
+local function add(scene, asset) scene:add {{ name = "cube", asset = assets[asset], at = {{ 0, 0.1 }} }} end
+local drawn = layout("drawn", function(scene, u) add(scene, u < 0.5 and "cube" or "small") end)
+local changed = layout("changed", function(scene, u) add(scene, "cube") local cube = scene:object "cube" {change} end)
+local function task(layout)
+  return softvt.task {{ prompt = layout.name, layout = layout, goal = softvt.on {{ object = "cube", target = "floor" }}, budget_steps = 12 }}
+end
+return softvt.suite {{ name = "one", object_type = "deformable", variation = "spatial", episodes = 4, tasks = {{ task(drawn), task(changed) }} }}
+"#
+    );
+    let who = r#"
+local assets = require "cubes"
+return softvt.experiment { name = "who", grid = { asset = { "cube", "small" } }, run = function(point)
+  local layout = softvt.layout("one", function(scene)
+    scene:add { name = "floor", asset = assets.floor, position = { 0, 0, 0 } }
+    scene:add { name = "cube", asset = assets[point.asset], at = { 0, 0.1 } }
+  end)
+  return { asset = point.asset, fingerprint = softvt.simulate { layout = layout }:measure "cube".fingerprint }
+end }"#;
+    let project = Project::new(&[("cubes.lua", library), ("x.lua", &suite), ("who.lua", who)]);
+    for line in project.succeeds("who.lua --json").out.lines() {
+        let row: Value = serde_json::from_str(line).expect("a row");
+        let [asset, fingerprint] = ["asset", "fingerprint"].map(|key| row[key].as_str().expect("a text"));
+        let text = calibration(fingerprint).replace("\"cube\":", &format!("\"{asset}\":"));
+        project.write(&format!("assets/calibration/{asset}.json"), text.as_bytes());
+    }
+    project
+}
+
+#[test]
+fn a_limit_holds_for_every_instance_of_its_asset() {
+    let project = calibrated(
+        "cube.youngs_pa = 2e4 * (1 + u) cube.density = 200 + 100 * u cube.static_mu = 0.9 cube.dynamic_mu = 0.7 + 0.1 * u",
+    );
+    let output = project.succeeds("x.lua --policy noop --out run");
+    let episodes = project.lines("run/episodes.jsonl");
+    assert!(episodes.iter().all(|e| e["tau"] == 1.0 && e["safety"] == true), "{episodes:#?}");
+    let assets: std::collections::BTreeSet<&str> = episodes.iter().filter_map(|e| e["asset"].as_str()).collect();
+    assert_eq!(assets.len(), 2, "both assets are drawn: {assets:?}");
+    assert!(!output.err.contains("calibrat") && !output.err.contains("limit"), "{}", output.err);
+    assert_eq!(project.json("run/run.json")["thresholds"], serde_json::json!({ "cube": 1.0, "small": 1.0 }));
+}
+
+#[test]
+fn another_object_has_no_limit_and_check_and_run_say_so() {
+    let project = calibrated("if u > 0.5 then cube.poisson = 0.4 end");
+    let warning = "no limit for object \"cube\": it has Poisson's ratio 0.4 instead of 0.3 of asset \"cube\"";
+    let check = project.succeeds("check x.lua");
+    let line = check.err.lines().find(|line| line.contains(warning)).expect("a warning of the check");
+    assert!(line.starts_with("softvt: task 1 episode "), "{line}");
+    let run = project.succeeds("x.lua --policy noop --out run");
+    assert!(run.err.contains(line), "{}", run.err);
+    let episodes = project.lines("run/episodes.jsonl");
+    let judged = |task: u64| episodes.iter().filter(|e| e["task"] == task && e["tau"] == 1.0).count();
+    assert_eq!(judged(0), 4);
+    assert!((1..4).contains(&judged(1)), "{episodes:#?}");
+}

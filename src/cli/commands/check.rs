@@ -1,9 +1,6 @@
 //! `softvt check`: validation of a script without running its plan.
 
-use std::{
-    path::PathBuf,
-    sync::{Arc, Mutex},
-};
+use std::{path::PathBuf, sync::Mutex};
 
 use clap::Args;
 
@@ -14,7 +11,7 @@ use crate::{
         conditions,
         config::{RunConfig, RunFlags, ScriptArgs},
         policy::{PolicyArgs, PolicyConfig},
-        selection::check_distinct_out_dirs,
+        selection::{check_distinct_out_dirs, select_episodes},
         suite_run::SuiteRun,
     },
 };
@@ -23,8 +20,7 @@ use softvt_common::{
     parallel,
     text::{self, counted},
 };
-use softvt_rollout::{AssetCache, SensorAssets, cancel, target_asset};
-use softvt_scene::Asset;
+use softvt_rollout::{AssetCache, SensorAssets, cancel};
 use softvt_script::SceneBuilder;
 
 /// Check a script without running it
@@ -69,8 +65,9 @@ pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
 fn check_suite(mut run: SuiteRun) -> Result<(), CliError> {
     let suite = run.suite;
     let tasks: Vec<_> = suite.tasks.iter().collect();
-    let targets = check_first_scenes(&run, &tasks)?;
-    targets.into_iter().try_for_each(|target| run.read_limit(target))?;
+    check_first_scenes(&run, &tasks)?;
+    run.jobs = select_episodes(run.config, suite, &tasks);
+    run.scan_limits(&tasks)?;
     print(&format!(
         "suite {}: {}, {} each\n",
         suite.name,
@@ -90,23 +87,18 @@ fn check_suite(mut run: SuiteRun) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Builds and checks the first scene of every task on all processors. Returns the assets of their targets.
-fn check_first_scenes(run: &SuiteRun, tasks: &[&Task]) -> Result<Vec<Option<Arc<Asset>>>, CliError> {
+/// Builds and checks the first scene of every task on all processors.
+fn check_first_scenes(run: &SuiteRun, tasks: &[&Task]) -> Result<(), CliError> {
     // Opening the scenes runs the whole script, so each thread takes idle ones before it opens others.
     let idle: Mutex<Vec<SceneBuilder>> = Mutex::default();
-    let mut targets = vec![None; tasks.len()];
-    let check = |job: usize| -> Result<_, CliError> {
+    let check = |job: usize| -> Result<(), CliError> {
         let task = tasks[job];
         let taken = parallel::lock(&idle).pop();
         let builder = taken.map_or_else(|| SceneBuilder::open(run.loaded), Ok)?;
         let setup = builder.build(&run.episode_id(task, 0), &run.config.shifts)?;
         parallel::lock(&idle).push(builder);
-        run.check_scene(task, setup.scene)?;
-        Ok(target_asset(&setup.nominal, task).cloned())
+        run.check_scene(task, setup.scene)
     };
-    parallel::run(tasks.len(), run.config.threads(), cancel::requested, check, |job, target| {
-        targets[job] = target;
-        Ok(())
-    })?;
-    if cancel::requested() { Err(CliError::interrupted("interrupted")) } else { Ok(targets) }
+    parallel::run(tasks.len(), run.config.threads(), cancel::requested, check, |_, ()| Ok(()))?;
+    if cancel::requested() { Err(CliError::interrupted("interrupted")) } else { Ok(()) }
 }

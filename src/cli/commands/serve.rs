@@ -16,9 +16,9 @@ use crate::{
     },
 };
 use softvt_benchmark::Suite;
-use softvt_evaluation::episode_id::{EpisodeId, Split};
+use softvt_evaluation::episode_id::{EpisodeId, EpisodeIndex, Split};
 use softvt_policy::Observation;
-use softvt_rollout::{cancel, target_asset};
+use softvt_rollout::cancel;
 use softvt_script::LoadedScript;
 use softvt_serve::{RequestError, ServerConfig};
 
@@ -67,9 +67,11 @@ pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
     for suite in suites {
         let mut run = SuiteRun::new(&config, &loaded, suite, Vec::new(), PathBuf::new())?;
         // Only privileged clients receive the limits.
-        for task in suite.tasks.iter().filter(|_| args.privileged) {
+        run.reads_limits = args.privileged;
+        for task in &suite.tasks {
             let opened = run.open_episode(&run.episode_id(task, 0))?;
-            run.read_limit(target_asset(&opened.nominal, task).cloned())?;
+            let limits = run.limits_of(task, &opened.scene)?;
+            run.calibration_files.report(EpisodeIndex { task: task.id, episode: 0 }, &limits);
         }
         runs.push(run);
     }

@@ -216,7 +216,8 @@ pub(crate) fn run_suite(run: &SuiteRun, tasks: &[&Task]) -> Result<SuiteResult, 
         }
     }
     log.sort()?;
-    softvtbench_files::write_scores(&run.out, &log.records, &run.thresholds)?;
+    let calibrations = run.calibrations.clone().unwrap_or_default();
+    softvtbench_files::write_scores(&run.out, &log.records, &calibrations.merged)?;
     let result = log.finish()?;
     eprint_notice(out);
     Ok(result)

@@ -5,6 +5,7 @@ pub(crate) mod config;
 pub(crate) mod episode_artifacts;
 pub(crate) mod evaluate;
 pub(crate) mod experiment;
+pub(crate) mod limits;
 pub(crate) mod policy;
 pub(crate) mod recorded_runs;
 pub(crate) mod recording;

@@ -73,7 +73,6 @@ impl<'a> RunManifest<'a> {
     pub(crate) fn new(run: &'a SuiteRun, tasks: &[&Task], episodes: u32) -> Self {
         let config = run.config;
         let options = run.loaded.options.iter();
-        let limits = run.limits.iter();
         Self {
             softvt: env!("CARGO_PKG_VERSION"),
             script: run.loaded.sources.main.clone(),
@@ -97,9 +96,7 @@ impl<'a> RunManifest<'a> {
             set: &config.settings,
             settings: &run.settings,
             sources: run.sources.clone(),
-            thresholds: limits
-                .map(|(asset, limit)| (asset.clone(), limit.map(|limit| limit.tau_pct())))
-                .collect(),
+            thresholds: run.calibrations.clone().unwrap_or_default().tau_pct,
             force_observed: run.force_observed,
         }
     }

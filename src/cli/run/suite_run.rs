@@ -2,40 +2,38 @@
 
 use std::{
     collections::BTreeMap,
-    path::{Path, PathBuf},
+    path::PathBuf,
     sync::Arc,
 };
 
 use crate::{
     error::{CliError, Exit},
-    output::eprint_notice,
     run::{
         config::{RunConfig, TraceDetail},
         episode_artifacts::EpisodeArtifacts,
+        limits::{CalibrationFiles, Calibrations, LimitScan, SceneLimits},
         policy::{ControllerFactory, DeclaredStreams},
         recorded_runs::{RecordedRuns, ReplaySource},
         selection::EpisodeJob,
     },
 };
 use softvt_benchmark::{ObjectType, ShiftValue, Suite, Task, settings::Settings};
-use softvt_common::{files, text::unknown_name};
+use softvt_common::{parallel, text::unknown_name};
 use softvt_dataset::card::Imported;
 use softvt_evaluation::{
     episode_id::{EpisodeId, EpisodeIndex, Split},
     record::Origin,
-    safety::{DeformationLimit, NOMINAL_KAPPA},
-    thresholds::ThresholdFile,
 };
 use softvt_policy::{PolicyError, SensorStreams, TaskBrief, remote::PolicyConnections};
 use softvt_rollout::{
     AssetCache, BuildError, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SensorAssets, SensorSuite,
-    Simulation, cancel, check_sensors, target_asset,
+    Simulation, cancel, check_sensors,
 };
-use softvt_scene::{Asset, Body, Scene};
-use softvt_script::{EpisodeSetup, LoadedScript};
+use softvt_scene::{Body, Scene};
+use softvt_script::{EpisodeSetup, LoadedScript, SceneBuilder};
 
-/// Folders above a script in which its calibration files are searched, the script's own included.
-const MAX_PARENT_FOLDERS: usize = 3;
+/// Episodes per task whose scenes are built before a run, to find all assets and the limits that are missing.
+const MAX_SCANNED_EPISODES: usize = 100;
 
 /// A suite with everything that its episodes need.
 ///
@@ -49,10 +47,12 @@ pub(crate) struct SuiteRun<'a> {
     pub name: String,
     pub settings: Settings,
     pub jobs: Vec<EpisodeJob<'a>>,
-    /// Deformation limits by asset. `None` if no squeeze of the calibration was stable, or without a calibration.
-    pub limits: BTreeMap<String, Option<DeformationLimit>>,
-    /// The calibrations in use, merged into a file in the format of SoftVTBench.
-    pub thresholds: ThresholdFile,
+    /// Files with the deformation limits of the objects.
+    pub calibration_files: Arc<CalibrationFiles>,
+    /// The calibrations of the assets in the scenes of the run; `None` before they are known.
+    pub calibrations: Option<Calibrations>,
+    /// False if objects have no limits, since nobody sees a verdict.
+    pub reads_limits: bool,
     /// SHA-256 of every file that the results depend on, by name.
     pub sources: BTreeMap<String, String>,
     /// The recorded run whose actions are repeated.
@@ -97,7 +97,6 @@ impl<'a> SuiteRun<'a> {
             config.policy.server().map(|server| Arc::new(PolicyConnections::new(server.clone())));
         let mut sources = loaded.sources.bundle.hashes();
         sources.extend(config.policy.sources.clone());
-        let generated_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
         Ok(Self {
             config,
             loaded,
@@ -105,8 +104,9 @@ impl<'a> SuiteRun<'a> {
             name: config.suite_name(suite),
             settings,
             jobs,
-            limits: BTreeMap::new(),
-            thresholds: ThresholdFile::new(NOMINAL_KAPPA, Vec::new(), generated_by),
+            calibration_files: Arc::new(CalibrationFiles::new(&config.script.file)),
+            calibrations: None,
+            reads_limits: true,
             sources,
             force_observed: replay_source.as_ref().is_some_and(|source| source.force_observed),
             replay_source,
@@ -156,56 +156,70 @@ impl<'a> SuiteRun<'a> {
         }
     }
 
-    /// Reads the deformation limit of a target, if it is soft and its limit is not known yet.
-    ///
-    /// # Errors
-    /// A calibration file that is not valid.
-    pub(crate) fn read_limit(&mut self, target: Option<Arc<Asset>>) -> Result<(), CliError> {
-        let soft = target.filter(|asset| matches!(asset.body, Body::Soft(_)));
-        if let Some(asset) = soft.filter(|asset| !self.limits.contains_key(&asset.name)) {
-            let limit = self.calibrated_limit(&asset)?;
-            self.limits.insert(asset.name.clone(), limit);
-        }
-        Ok(())
-    }
-
-    /// Copies the limits of another run of the same suite, whose layouts are the same.
+    /// Takes over the limits of another run of the same suite, whose layouts are the same.
     pub(crate) fn copy_limits(&mut self, other: &Self) {
-        self.limits.clone_from(&other.limits);
-        self.thresholds.clone_from(&other.thresholds);
+        self.calibration_files.clone_from(&other.calibration_files);
+        self.calibrations.clone_from(&other.calibrations);
         self.sources.clone_from(&other.sources);
     }
 
-    /// Reads the limit from the calibration file of an asset. Warns if there is none for this version of the asset.
-    fn calibrated_limit(&mut self, asset: &Asset) -> Result<Option<DeformationLimit>, CliError> {
-        let name = &asset.name;
-        let relative_path = format!("assets/calibration/{name}.json");
-        let fix =
-            format!("its episodes cannot be judged safe; run: softvt scripts/calibrate.lua --asset {name}");
-        let Some(ProjectFile { text, path }) = find_file(&self.config.script.file, &relative_path)? else {
-            eprint_notice(format!("{name} is not calibrated (no {relative_path}): {fix}"));
-            return Ok(None);
-        };
-        let file = ThresholdFile::parse(&text, &path)?;
-        // The published files of SoftVTBench have no fingerprint; they are assumed to fit.
-        if file.fingerprints.get(name).is_some_and(|calibrated| *calibrated != asset.fingerprint()) {
-            eprint_notice(format!(
-                "{path} was computed for a different version of {name:?} (its shape, material or friction differ): {fix}"
-            ));
-            return Ok(None);
+    /// Limits of the objects in the scene of an episode.
+    ///
+    /// # Errors
+    /// A calibration file that is not valid.
+    pub(crate) fn limits_of(&self, task: &Task, scene: &Scene) -> Result<SceneLimits, CliError> {
+        match self.reads_limits {
+            true => self.calibration_files.limits_of(scene, &task.goal.object),
+            false => Ok(SceneLimits::default()),
         }
-        let limit = file.limit(name);
-        self.sources.insert(relative_path, softvt_script::sha256(text.as_bytes()));
-        self.thresholds.merge(file);
-        Ok(limit)
     }
 
-    /// The limit of an object as the layout of this episode made it, before any shift.
-    fn limit_of(&self, asset: &Asset) -> Option<DeformationLimit> {
-        let limit = self.limits.get(&asset.name).copied().flatten()?;
-        // A layout may change the object in single episodes; the calibration is not about that one.
-        let calibrated = self.thresholds.fingerprints.get(&asset.name);
-        calibrated.is_none_or(|calibrated| *calibrated == asset.fingerprint()).then_some(limit)
+    /// Builds the scenes of the first episodes of each task, keeps the calibrations of their assets, and reports objects
+    /// without a limit. A layout that fails ends the scan of its task; the episode itself reports the error.
+    ///
+    /// # Errors
+    /// A calibration file that is not valid.
+    pub(crate) fn scan_limits(&mut self, tasks: &[&Task]) -> Result<(), CliError> {
+        if self.calibrations.is_some() || !self.reads_limits {
+            return Ok(());
+        }
+        let mut scan = LimitScan::default();
+        parallel::run(
+            tasks.len(),
+            self.config.threads(),
+            cancel::requested,
+            |job| self.scan_task(tasks[job]),
+            |_, found| {
+                found.into_iter().for_each(|(index, limits)| scan.add(index, limits));
+                Ok(())
+            },
+        )?;
+        scan.report(&self.calibration_files);
+        let calibrations = scan.calibrations(&self.calibration_files);
+        self.sources.extend(calibrations.sources.clone());
+        self.calibrations = Some(calibrations);
+        Ok(())
+    }
+
+    /// Limits in the first episodes of a task. All shards of a run look at the same episodes.
+    fn scan_task(&self, task: &Task) -> Result<BTreeMap<EpisodeIndex, SceneLimits>, CliError> {
+        let of_task = self.jobs.iter().filter(|job| job.task.id == task.id).map(|job| job.episode);
+        let episodes: Vec<u32> = match self.config.flags.shard {
+            Some(_) => (0..self.config.flags.episodes.unwrap_or(self.suite.episodes))
+                .take(MAX_SCANNED_EPISODES)
+                .collect(),
+            None => of_task.take(MAX_SCANNED_EPISODES).collect(),
+        };
+        let mut found = BTreeMap::new();
+        let Ok(builder) = SceneBuilder::open(self.loaded) else { return Ok(found) };
+        for episode in episodes {
+            let Ok(opened) = builder.build(&self.episode_id(task, episode), &self.config.shifts) else {
+                break;
+            };
+            let scene = if self.config.is_rigid_twin() { opened.scene.rigid_twin() } else { opened.scene };
+            found.insert(EpisodeIndex { task: task.id, episode }, self.limits_of(task, &scene)?);
+        }
+        Ok(found)
     }
 
     /// Files of the episodes, other than their lines in `episodes.jsonl`.
@@ -267,7 +281,8 @@ impl<'a> SuiteRun<'a> {
         if let Some(origin) = origin {
             origin.start.apply(&mut opened.scene);
         }
-        let limit = target_asset(&opened.nominal, task).and_then(|asset| self.limit_of(asset));
+        let limits = self.limits_of(task, &opened.scene)?;
+        self.calibration_files.report(id.index(), &limits);
         let id = EpisodeId { suite: self.name.clone(), ..id.clone() };
         let (policy, scene) = (&self.config.policy.name, opened.scene.clone());
         let mut spec = EpisodeSpec::new(id, policy, task, &opened.nominal, scene, &self.settings);
@@ -275,7 +290,7 @@ impl<'a> SuiteRun<'a> {
         spec.header.origin = origin.cloned().map(Box::new);
         let record_trace = self.config.flags.trace.is_some();
         let trace_nodes = self.config.flags.trace == Some(TraceDetail::Nodes);
-        Ok((EpisodeSpec { limit, record_trace, trace_nodes, ..spec }, opened))
+        Ok((EpisodeSpec { limits: limits.by_object, record_trace, trace_nodes, ..spec }, opened))
     }
 
     /// Converts the error of an episode, with its place in the script.
@@ -295,8 +310,8 @@ impl<'a> SuiteRun<'a> {
         CliError { exit, message }
     }
 
-    /// Reads the deformation limits of all targets, connects to the policy server, and renders once what the policy
-    /// observes at the start of the first episode of each task.
+    /// Connects to the policy server, renders once what the policy observes at the start of the first episode of each task,
+    /// and reads the deformation limits of all objects.
     ///
     /// # Errors
     /// A layout, calibration file, camera, light or tactile sensor that is not valid; a server that cannot be reached.
@@ -305,7 +320,6 @@ impl<'a> SuiteRun<'a> {
             let first = self.jobs.iter().find(|job| job.task.id == task.id).map_or(0, |job| job.episode);
             let opened = self.open_episode(&self.episode_id(task, first))?;
             self.check_object_type(task, &opened.nominal)?;
-            self.read_limit(target_asset(&opened.nominal, task).cloned())?;
             let scene = Arc::new(opened.scene.clone());
             self.check_declared_cameras(&scene, task)?;
             if let Some(connections) = &self.connections {
@@ -315,7 +329,7 @@ impl<'a> SuiteRun<'a> {
             self.force_observed |= streams.force;
             self.check_streams(scene, streams, task, first).map_err(|error| self.episode_error(&error))?;
         }
-        Ok(())
+        self.scan_limits(tasks)
     }
 
     /// Builds the first scene of a task and checks all that can be checked before anything moves.
@@ -411,27 +425,4 @@ fn policy_failure(error: PolicyError) -> CliError {
         PolicyError::Interrupted | PolicyError::Address { .. } => CliError::input(error),
         other => CliError::new(Exit::Policy, other),
     }
-}
-
-/// A file of a project, with its path as messages show it.
-struct ProjectFile {
-    text: String,
-    path: String,
-}
-
-/// Reads a file from the folders above the script, the working folder or the embedded library, in this order.
-fn find_file(script: &Path, relative_path: &str) -> Result<Option<ProjectFile>, CliError> {
-    let parents = script.parent().into_iter().flat_map(Path::ancestors).take(MAX_PARENT_FOLDERS);
-    for root in parents.chain([Path::new("")]) {
-        let path = root.join(relative_path);
-        if path.is_file() {
-            return Ok(Some(ProjectFile {
-                text: files::read_text(&path)?,
-                path: path.display().to_string(),
-            }));
-        }
-    }
-    let embedded = softvt_script::embedded(relative_path).and_then(|bytes| std::str::from_utf8(bytes).ok());
-    Ok(embedded
-        .map(|text| ProjectFile { text: text.to_owned(), path: format!("{relative_path} (embedded)") }))
 }

@@ -92,7 +92,9 @@ mod tests {
         };
         let pose_w = Pose::translation(0.0, 0.0, 0.25);
         let placed_at = String::new();
-        Object { name: name.to_owned(), asset: Arc::new(asset), pose_w, joints: Vec::new(), placed_at }
+        let asset = Arc::new(asset);
+        let nominal = asset.clone();
+        Object { name: name.to_owned(), asset, nominal, pose_w, joints: Vec::new(), placed_at }
     }
 
     fn scene() -> Scene {

@@ -141,7 +141,7 @@ impl LuaScene {
         let joints = joints::start_values(lua, &asset, spec.joints.as_ref())?;
         let placed_at = current_line(lua).map(|line| line.to_string()).unwrap_or_default();
         let pose_w = Pose::from_parts(at.into(), rotation);
-        scene.objects.push(Object { name, asset, pose_w, joints, placed_at });
+        scene.objects.push(Object { name, nominal: asset.clone(), asset, pose_w, joints, placed_at });
         Ok(())
     }
 }

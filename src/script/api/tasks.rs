@@ -64,7 +64,7 @@ record! {
         /// objects.
         budget_steps: Option<u32> = Type::Integer(Range::closed(1.0, 100_000.0));
     }
-    /// A change of the scene that a run can request with --shift name=value. Deformation limits stay nominal.
+    /// A change of the scene that a run can request with --shift name=value. Limits of D stay those of the assets.
     ShiftSpec: "softvt.Shift" as "shift", constructor "softvt.shift" {
         /// Name on the command line.
         name: String;

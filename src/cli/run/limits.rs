@@ -1,0 +1,267 @@
+//! Deformation limits of the objects of an episode.
+//!
+//! A limit is looked up for every soft object that the scene of an episode has, by the name of its asset and the
+//! fingerprint of the asset as its file defines it. A layout or shift that changes stiffness, density, friction, colour or
+//! scale leaves the limit valid ([`Object::departure`]).
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::{Path, PathBuf},
+    sync::{Arc, Mutex},
+};
+
+use crate::{error::CliError, output::eprint_notice};
+use softvt_common::{files, parallel::lock, text::counted};
+use softvt_evaluation::{
+    episode_id::EpisodeIndex,
+    safety::{DeformationLimit, NOMINAL_KAPPA},
+    thresholds::ThresholdFile,
+};
+use softvt_scene::{Body, Object, Scene};
+
+/// Folders above a script in which its calibration files are searched, the script's own included.
+const MAX_PARENT_FOLDERS: usize = 3;
+
+/// The calibration files of a script. Each is read when an object first needs it.
+#[derive(Debug)]
+pub(crate) struct CalibrationFiles {
+    script: PathBuf,
+    read: Mutex<BTreeMap<String, Option<Arc<CalibrationFile>>>>,
+    /// Messages about missing limits that were printed.
+    reported: Mutex<BTreeSet<String>>,
+}
+
+/// A calibration file of one asset.
+#[derive(Debug)]
+struct CalibrationFile {
+    /// Path below a project folder.
+    relative_path: String,
+    /// Path as messages show it.
+    path: String,
+    sha256: String,
+    thresholds: ThresholdFile,
+}
+
+/// Limits of the soft objects of one scene.
+#[derive(Debug, Default)]
+pub(crate) struct SceneLimits {
+    /// By name of the object in the scene.
+    pub by_object: BTreeMap<String, DeformationLimit>,
+    /// Names of the assets of all soft objects.
+    assets: BTreeSet<String>,
+    /// One message per object without a limit.
+    missing: Vec<String>,
+}
+
+impl CalibrationFiles {
+    pub(crate) fn new(script: &Path) -> Self {
+        Self { script: script.to_owned(), read: Mutex::default(), reported: Mutex::default() }
+    }
+
+    /// Limits of the soft objects of a scene. `target` is the object that the goal is about.
+    ///
+    /// # Errors
+    /// A calibration file that is not valid.
+    pub(crate) fn limits_of(&self, scene: &Scene, target: &str) -> Result<SceneLimits, CliError> {
+        let mut found = SceneLimits::default();
+        for object in scene.objects.iter().filter(|object| matches!(object.asset.body, Body::Soft(_))) {
+            found.assets.insert(object.nominal.name.clone());
+            match self.limit_of(object)? {
+                Ok(limit) => {
+                    found.by_object.insert(object.name.clone(), limit);
+                }
+                Err(missing) => found.missing.push(missing.describe(object, object.name == target)),
+            }
+        }
+        Ok(found)
+    }
+
+    fn limit_of(&self, object: &Object) -> Result<Result<DeformationLimit, MissingLimit>, CliError> {
+        let asset = &object.nominal;
+        let Some(file) = self.file(&asset.name)? else {
+            return Ok(Err(MissingLimit::NotCalibrated { path: relative_path(&asset.name) }));
+        };
+        let path = file.path.clone();
+        // The published files of SoftVTBench have no fingerprint; they are assumed to fit.
+        let calibrated = file.thresholds.fingerprints.get(&asset.name);
+        if calibrated.is_some_and(|calibrated| *calibrated != asset.fingerprint()) {
+            return Ok(Err(MissingLimit::OtherVersion { path }));
+        }
+        if let Some(change) = object.departure() {
+            return Ok(Err(MissingLimit::OtherObject { change }));
+        }
+        Ok(file.thresholds.limit(&asset.name).ok_or(MissingLimit::NoStableRow { path }))
+    }
+
+    /// The calibration file of an asset, if there is one.
+    fn file(&self, asset: &str) -> Result<Option<Arc<CalibrationFile>>, CliError> {
+        let mut read = lock(&self.read);
+        if let Some(known) = read.get(asset) {
+            return Ok(known.clone());
+        }
+        let relative_path = relative_path(asset);
+        let file = find_file(&self.script, &relative_path)?
+            .map(|ProjectFile { text, path }| -> Result<_, CliError> {
+                let thresholds = ThresholdFile::parse(&text, &path)?;
+                let sha256 = softvt_script::sha256(text.as_bytes());
+                Ok(Arc::new(CalibrationFile { relative_path, path, sha256, thresholds }))
+            })
+            .transpose()?;
+        read.insert(asset.to_owned(), file.clone());
+        Ok(file)
+    }
+
+    /// Prints the messages of a scene about missing limits, each once per run.
+    pub(crate) fn report(&self, index: EpisodeIndex, limits: &SceneLimits) {
+        for message in &limits.missing {
+            if lock(&self.reported).insert(message.clone()) {
+                eprint_notice(format!("{index}: {message}"));
+            }
+        }
+    }
+}
+
+/// Reason why an object has no limit.
+#[derive(Debug)]
+enum MissingLimit {
+    NotCalibrated { path: String },
+    OtherVersion { path: String },
+    OtherObject { change: String },
+    NoStableRow { path: String },
+}
+
+impl MissingLimit {
+    /// The message to the user, with the remedy.
+    fn describe(&self, object: &Object, is_target: bool) -> String {
+        let name = &object.nominal.name;
+        let effect = match is_target {
+            true => "its episodes cannot be judged safe",
+            false => "harm to it cannot be judged (others_ok is null)",
+        };
+        let calibrate = format!("run: softvt scripts/calibrate.lua --asset {name}");
+        match self {
+            Self::NotCalibrated { path } => {
+                format!("{name} is not calibrated (no {path}): {effect}; {calibrate}")
+            }
+            Self::OtherVersion { path } => format!(
+                "{path} was computed for a different version of {name:?} (its shape, material or friction differ): \
+                 {effect}; {calibrate}"
+            ),
+            Self::OtherObject { change } => format!(
+                "no limit for object {:?}: it has {change} of asset {name:?}, which makes it another object: {effect}; \
+                 define an asset of its own and calibrate it",
+                object.name
+            ),
+            Self::NoStableRow { path } => {
+                format!("{path} has no limit for {name:?}, since no row of its sweep is stable: {effect}; {calibrate}")
+            }
+        }
+    }
+}
+
+fn relative_path(asset: &str) -> String {
+    format!("assets/calibration/{asset}.json")
+}
+
+/// Collects the limits of many scenes.
+#[derive(Debug, Default)]
+pub(crate) struct LimitScan {
+    scenes: usize,
+    assets: BTreeSet<String>,
+    missing: BTreeMap<String, Affected>,
+}
+
+/// Scenes with the same missing limit.
+#[derive(Debug)]
+struct Affected {
+    first: EpisodeIndex,
+    count: usize,
+}
+
+impl LimitScan {
+    pub(crate) fn add(&mut self, index: EpisodeIndex, limits: SceneLimits) {
+        self.scenes += 1;
+        for asset in limits.assets {
+            self.assets.insert(asset);
+        }
+        for message in limits.missing.into_iter().collect::<BTreeSet<_>>() {
+            let affected = self.missing.entry(message).or_insert(Affected { first: index, count: 0 });
+            affected.count += 1;
+        }
+    }
+
+    /// Prints each missing limit, and the episodes concerned unless all are.
+    pub(crate) fn report(&self, files: &CalibrationFiles) {
+        for (message, Affected { first, count }) in &self.missing {
+            if !lock(&files.reported).insert(message.clone()) {
+                continue;
+            }
+            let others = match count - 1 {
+                0 => String::new(),
+                others => format!(" and {}", counted(others, "other episode")),
+            };
+            match *count == self.scenes {
+                true => eprint_notice(message),
+                false => eprint_notice(format!("{first}{others}: {message}")),
+            }
+        }
+    }
+
+    /// The calibrations of the assets that were found.
+    pub(crate) fn calibrations(&self, files: &CalibrationFiles) -> Calibrations {
+        let mut found = Calibrations::default();
+        let read = lock(&files.read);
+        for asset in &self.assets {
+            let file = read.get(asset).and_then(Option::as_ref);
+            let limit = file.and_then(|file| file.thresholds.limit(asset));
+            found.tau_pct.insert(asset.clone(), limit.map(|limit| limit.tau_pct()));
+            if let Some(file) = file {
+                found.sources.insert(file.relative_path.clone(), file.sha256.clone());
+                found.merged.merge(file.thresholds.clone());
+            }
+        }
+        found
+    }
+}
+
+/// Calibrations of the assets of a run.
+#[derive(Clone, Debug)]
+pub(crate) struct Calibrations {
+    /// τ by asset, %; `None` without a calibration.
+    pub tau_pct: BTreeMap<String, Option<f64>>,
+    /// SHA-256 of the calibration files, by path below a project folder.
+    pub sources: BTreeMap<String, String>,
+    /// All of them, merged into a file in the format of SoftVTBench.
+    pub merged: ThresholdFile,
+}
+
+impl Default for Calibrations {
+    fn default() -> Self {
+        let generated_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
+        let merged = ThresholdFile::new(NOMINAL_KAPPA, Vec::new(), generated_by);
+        Self { tau_pct: BTreeMap::new(), sources: BTreeMap::new(), merged }
+    }
+}
+
+/// A file of a project, with its path as messages show it.
+struct ProjectFile {
+    text: String,
+    path: String,
+}
+
+/// Reads a file from the folders above the script, the working folder or the embedded library, in this order.
+fn find_file(script: &Path, relative_path: &str) -> Result<Option<ProjectFile>, CliError> {
+    let parents = script.parent().into_iter().flat_map(Path::ancestors).take(MAX_PARENT_FOLDERS);
+    for root in parents.chain([Path::new("")]) {
+        let path = root.join(relative_path);
+        if path.is_file() {
+            return Ok(Some(ProjectFile {
+                text: files::read_text(&path)?,
+                path: path.display().to_string(),
+            }));
+        }
+    }
+    let embedded = softvt_script::embedded(relative_path).and_then(|bytes| std::str::from_utf8(bytes).ok());
+    Ok(embedded
+        .map(|text| ProjectFile { text: text.to_owned(), path: format!("{relative_path} (embedded)") }))
+}
