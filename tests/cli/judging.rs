@@ -205,7 +205,8 @@ fn a_limit_holds_for_every_instance_of_its_asset() {
     let output = project.succeeds("x.lua --policy noop --out run");
     let episodes = project.lines("run/episodes.jsonl");
     assert!(episodes.iter().all(|e| e["tau"] == 1.0 && e["safety"] == true), "{episodes:#?}");
-    let assets: std::collections::BTreeSet<&str> = episodes.iter().filter_map(|e| e["asset"].as_str()).collect();
+    let assets: std::collections::BTreeSet<&str> =
+        episodes.iter().filter_map(|e| e["asset"].as_str()).collect();
     assert_eq!(assets.len(), 2, "both assets are drawn: {assets:?}");
     assert!(!output.err.contains("calibrat") && !output.err.contains("limit"), "{}", output.err);
     assert_eq!(project.json("run/run.json")["thresholds"], serde_json::json!({ "cube": 1.0, "small": 1.0 }));

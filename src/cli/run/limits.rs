@@ -153,7 +153,9 @@ impl MissingLimit {
                 object.name
             ),
             Self::NoStableRow { path } => {
-                format!("{path} has no limit for {name:?}, since no row of its sweep is stable: {effect}; {calibrate}")
+                format!(
+                    "{path} has no limit for {name:?}, since no row of its sweep is stable: {effect}; {calibrate}"
+                )
             }
         }
     }

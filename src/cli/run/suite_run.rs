@@ -1,10 +1,6 @@
 //! A suite with everything that its episodes need: settings, deformation limits, assets and controllers.
 
-use std::{
-    collections::BTreeMap,
-    path::PathBuf,
-    sync::Arc,
-};
+use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 
 use crate::{
     error::{CliError, Exit},
