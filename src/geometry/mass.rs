@@ -45,6 +45,15 @@ impl MassProperties {
         Self { mass, com: Vec3::zeros(), inertia: Mat3::from_diagonal(&diagonal) * mass }
     }
 
+    /// The same solid at `scale` times the size.
+    fn resized(self, scale: f64) -> Self {
+        Self {
+            mass: self.mass * scale.powi(3),
+            com: self.com * scale,
+            inertia: self.inertia * scale.powi(5),
+        }
+    }
+
     fn transformed(self, pose: &Pose) -> Self {
         let turn = pose.rotation.to_rotation_matrix();
         Self {
@@ -87,6 +96,9 @@ fn unit_density(shape: &Shape, cells: f64) -> MassProperties {
         Shape::Lathe(profile) => revolved(profile),
         Shape::Placed { shape, pose } => unit_density(shape, cells).transformed(pose),
         Shape::Paint { shape, .. } => unit_density(shape, cells),
+        Shape::Scaled { shape, scale } if scale.x == scale.y && scale.y == scale.z => {
+            unit_density(shape, cells).resized(scale.x)
+        }
         Shape::Mesh(solid) => of_mesh(solid.mesh()),
         _ => of_mesh(&surface_triangles(shape, shape.loose_bounds().size().max() / cells).0),
     }

@@ -219,7 +219,26 @@ fn number_nodes(mesh: &mut VoxelMesh) {
     mesh.elements = cells.iter().map(|&cell| std::array::from_fn(|c| number[corner(cell, c)])).collect();
 }
 
+impl SurfaceSample {
+    /// The sample of the same surface at `scale` times the size.
+    #[must_use]
+    pub fn scaled(&self, scale: f64) -> Self {
+        Self { p_o: self.p_o * scale, area: self.area * scale * scale, ..*self }
+    }
+}
+
 impl VoxelMesh {
+    /// The mesh of the same shape at `scale` times the size: as many voxels, filled alike.
+    #[must_use]
+    pub fn scaled(&self, scale: f64) -> Self {
+        Self {
+            edge: self.edge * scale,
+            nodes: self.nodes.iter().map(|node| node * scale).collect(),
+            origin: self.origin * scale,
+            ..self.clone()
+        }
+    }
+
     /// Embeds a rest point `p_o` (object frame, m) in the element that contains it, or in the nearest element up to two
     /// edges away; `None` without such a voxel.
     ///

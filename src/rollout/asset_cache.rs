@@ -2,7 +2,11 @@
 
 use std::{convert::Infallible, sync::Arc};
 
-use super::{build_error::BuildError, shared_cache::SharedCache, soft_model::build_model};
+use super::{
+    build_error::BuildError,
+    shared_cache::SharedCache,
+    soft_model::{SoftGeometry, check_material},
+};
 use softvt_geometry::{
     Aabb, Pose, Vec3,
     mass::{MassProperties, approximate_mass_properties, mass_properties},
@@ -13,13 +17,15 @@ use softvt_physics::{
     contact::{Collider, CollisionGeometry, Friction},
     fem::FemModel,
 };
-use softvt_scene::{Asset, SoftMaterial};
+use softvt_scene::{Asset, Body, Object, SoftMaterial};
 
 /// Finite-element models of assets, and expensive queries of their shapes: bounds, mass,
 /// wall thickness, contact samples.
 #[derive(Clone, Debug, Default)]
 pub struct AssetCache {
     models: SharedCache<Arc<Asset>, Arc<FemModel>>,
+    /// By the asset as it was declared.
+    geometries: SharedCache<Arc<Asset>, Arc<SoftGeometry>>,
     bounds: SharedCache<Shape, Aabb>,
     masses: SharedCache<Shape, MassProperties>,
     solids: SharedCache<Shape, Arc<CollisionGeometry>>,
@@ -80,18 +86,34 @@ impl AssetCache {
         }
     }
 
-    /// Finite-element model of a soft asset.
+    /// Finite-element model of a soft object with this material. Instances of one asset share its discretisation.
     pub(super) fn model(
         &self,
-        asset: &Arc<Asset>,
+        object: &Object,
         material: &SoftMaterial,
     ) -> Result<Arc<FemModel>, BuildError> {
-        self.models.get(
-            asset,
-            |known| known.shape == asset.shape && known.body == asset.body,
-            || build_model(&asset.name, &asset.shape, material, self.approximate),
-        )
+        let Object { asset, nominal, .. } = object;
+        let declared = match &nominal.body {
+            Body::Soft(declared) => declared,
+            _ => material,
+        };
+        let build = || {
+            check_material(&asset.name, material)?;
+            let geometry = self.geometries.get(
+                nominal,
+                |known| known.shape == nominal.shape && has_discretisation(known, declared),
+                || SoftGeometry::new(&asset.name, &nominal.shape, declared, self.approximate).map(Arc::new),
+            )?;
+            Ok(geometry.model(material, object.scale))
+        };
+        self.models.get(asset, |known| known.shape == asset.shape && known.body == asset.body, build)
     }
+}
+
+/// True if an asset is a soft body with the resolution and the contact samples of `material`.
+fn has_discretisation(asset: &Asset, material: &SoftMaterial) -> bool {
+    matches!(&asset.body, Body::Soft(SoftMaterial { resolution, grasp_spacing, .. })
+        if *resolution == material.resolution && *grasp_spacing == material.grasp_spacing)
 }
 
 /// Minimum thickness of the walls of moving parts, m. Other bodies can pass through thinner ones between two steps.

@@ -143,7 +143,7 @@ fn add(
     let (mut parts, mut fem_model) = (Vec::new(), None);
     let (body, colliders) = match &asset.body {
         Body::Soft(material) => {
-            let model = cache.model(asset, material)?;
+            let model = cache.model(object, material)?;
             fem_model = Some(model.clone());
             let surface: Arc<dyn ContactSurface> = Arc::new(asset.shape.clone());
             let id = world.add_soft(&object.name, model, Some(surface), &object.pose_w, asset.friction);

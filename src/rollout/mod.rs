@@ -21,7 +21,7 @@
 //!
 //! // A cube of 4 cm rests on a table top of 5 cm, whose upper side is at z = 0.
 //! let cuboid = |name: &str, size: Vec3, z: f64, body| {
-//!     let asset = Arc::new(Asset {
+//!     let asset = Asset {
 //!         name: name.to_owned(),
 //!         // The lowest point of an asset is at z = 0.
 //!         shape: Shape::cuboid(size).translated(Vec3::z() * (0.5 * size.z)),
@@ -29,15 +29,8 @@
 //!         friction: Friction::default(),
 //!         visuals: Vec::new(),
 //!         hints: Default::default(),
-//!     });
-//!     Object {
-//!         name: name.to_owned(),
-//!         nominal: asset.clone(),
-//!         asset,
-//!         pose_w: Pose::translation(0.0, 0.0, z),
-//!         joints: Vec::new(),
-//!         placed_at: String::new(),
-//!     }
+//!     };
+//!     Object::new(name, Arc::new(asset), Pose::translation(0.0, 0.0, z))
 //! };
 //! let scene = Scene {
 //!     objects: vec![

@@ -6,8 +6,9 @@ use super::build_error::BuildError;
 use softvt_common::text::format_number;
 use softvt_geometry::{
     mass::{approximate_mass_properties, mass_properties},
-    samples::SampleSpec,
+    samples::{SampleSpec, surface_samples},
     shape::Shape,
+    voxel::{SurfaceSample, VoxelMesh, VoxelSpec, voxel_mesh},
 };
 use softvt_physics::fem::{ElasticMaterial, FemModel};
 use softvt_scene::SoftMaterial;
@@ -20,34 +21,60 @@ const APPROXIMATE_SPACING: f64 = 4.0;
 /// # Errors
 /// The shape cannot be meshed, or a material parameter is out of range.
 pub fn soft_model(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<Arc<FemModel>, BuildError> {
-    build_model(name, shape, material, false)
-}
-
-/// As [`soft_model`]. An `approximate` model has fewer contact samples and an approximate volume.
-pub(super) fn build_model(
-    name: &str,
-    shape: &Shape,
-    material: &SoftMaterial,
-    approximate: bool,
-) -> Result<Arc<FemModel>, BuildError> {
     check_material(name, material)?;
-    check_size(name, shape, material)?;
-    check_thickness(name, shape, material)?;
-    let (grasp_spacing, volume) = match approximate {
-        true => (APPROXIMATE_SPACING * material.grasp_spacing, approximate_mass_properties(shape, 1.0).mass),
-        false => (material.grasp_spacing, mass_properties(shape, 1.0).mass),
-    };
-    let spacing = SampleSpec { grasp_spacing, ..SampleSpec::default() };
-    let law = ElasticMaterial {
-        youngs_pa: material.youngs_pa,
-        poisson: material.poisson,
-        density: material.density,
-    };
-    FemModel::from_shape(shape, volume, law, material.resolution, &spacing)
-        .map_err(|source| BuildError::Geometry { asset: name.to_owned(), source })
+    Ok(SoftGeometry::new(name, shape, material, false)?.model(material, 1.0))
 }
 
-fn check_material(name: &str, m: &SoftMaterial) -> Result<(), BuildError> {
+/// Discretised shape of a soft body: the part of its model that depends on neither elasticity nor density.
+#[derive(Debug)]
+pub(super) struct SoftGeometry {
+    mesh: VoxelMesh,
+    samples: Vec<SurfaceSample>,
+    /// m³.
+    volume: f64,
+}
+
+impl SoftGeometry {
+    /// Meshes a shape. An `approximate` geometry has fewer contact samples and an approximate volume.
+    pub(super) fn new(
+        name: &str,
+        shape: &Shape,
+        material: &SoftMaterial,
+        approximate: bool,
+    ) -> Result<Self, BuildError> {
+        check_size(name, shape, material)?;
+        check_thickness(name, shape, material)?;
+        let (grasp_spacing, volume) = match approximate {
+            true => {
+                (APPROXIMATE_SPACING * material.grasp_spacing, approximate_mass_properties(shape, 1.0).mass)
+            }
+            false => (material.grasp_spacing, mass_properties(shape, 1.0).mass),
+        };
+        let mesh = voxel_mesh(shape, &VoxelSpec { resolution: material.resolution })
+            .map_err(|source| BuildError::Geometry { asset: name.to_owned(), source })?;
+        let samples =
+            surface_samples(shape, &mesh, &SampleSpec { grasp_spacing, ..SampleSpec::default() });
+        Ok(Self { mesh, samples, volume })
+    }
+
+    /// The model of a body of this shape at `scale` times the size. Its deformations under proportional loads are those
+    /// of the unscaled body, up to rounding.
+    pub(super) fn model(&self, material: &SoftMaterial, scale: f64) -> Arc<FemModel> {
+        let law = ElasticMaterial {
+            youngs_pa: material.youngs_pa,
+            poisson: material.poisson,
+            density: material.density,
+        };
+        if scale == 1.0 {
+            return FemModel::new(self.mesh.clone(), law, self.volume, self.samples.clone());
+        }
+        let samples = self.samples.iter().map(|sample| sample.scaled(scale)).collect();
+        FemModel::new(self.mesh.scaled(scale), law, self.volume * scale.powi(3), samples)
+    }
+}
+
+/// Checks the parameters of a material.
+pub(super) fn check_material(name: &str, m: &SoftMaterial) -> Result<(), BuildError> {
     let wrong = |what: String| Err(BuildError::Material { asset: name.to_owned(), what });
     if !(m.youngs_pa > 0.0 && m.youngs_pa.is_finite()) {
         return wrong(format!(

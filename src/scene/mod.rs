@@ -43,6 +43,7 @@ mod camera;
 mod decal;
 mod fingerprint;
 mod light;
+mod scale;
 mod visual;
 
 use std::sync::Arc;
@@ -66,12 +67,30 @@ pub struct Object {
     pub asset: Arc<Asset>,
     /// The asset as its file defines it. Its fingerprint is the one that a calibration refers to.
     pub nominal: Arc<Asset>,
+    /// Size relative to that of the nominal asset.
+    pub scale: f64,
     /// Object frame in the world frame, before settling.
     pub pose_w: Pose,
     /// Initial joint values of an articulated object, in the order of its parts, m or rad.
     pub joints: Vec<f64>,
     /// Source location (`file:line`) of the placing call, for messages; empty if no script placed the object.
     pub placed_at: String,
+}
+
+impl Object {
+    /// An instance of `asset` as it is, with all joints at rest.
+    pub fn new(name: &str, asset: Arc<Asset>, pose_w: Pose) -> Self {
+        let joints = asset.parts().iter().map(|part| part.joint.rest()).collect();
+        Self {
+            name: name.to_owned(),
+            nominal: asset.clone(),
+            asset,
+            scale: 1.0,
+            pose_w,
+            joints,
+            placed_at: String::new(),
+        }
+    }
 }
 
 /// The state from which an episode starts, before settling.

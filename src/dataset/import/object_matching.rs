@@ -90,11 +90,7 @@ mod tests {
             visuals: Vec::new(),
             hints: BTreeMap::new(),
         };
-        let pose_w = Pose::translation(0.0, 0.0, 0.25);
-        let placed_at = String::new();
-        let asset = Arc::new(asset);
-        let nominal = asset.clone();
-        Object { name: name.to_owned(), asset, nominal, pose_w, joints: Vec::new(), placed_at }
+        Object::new(name, Arc::new(asset), Pose::translation(0.0, 0.0, 0.25))
     }
 
     fn scene() -> Scene {

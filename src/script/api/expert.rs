@@ -363,9 +363,15 @@ output! {
         centre: "number[]" = lua.create_sequence_from(object.centre_w.iter().copied())?;
         /// Edge lengths of its bounding box at rest, m.
         size: "number[]" = lua.create_sequence_from(object.bounds.size().iter().copied())?;
+        /// Size relative to that of its asset. `size` and hints in metres are those of the object itself.
+        scale: "number" = object.scale;
+        /// Young's modulus relative to that of its asset; nil unless soft.
+        youngs_factor: "number?" = object.youngs_factor;
+        /// Density relative to that of its asset; nil unless soft or rigid.
+        density_factor: "number?" = object.density_factor;
         /// Rotation about the vertical, rad.
         yaw: "number" = object.yaw;
-        /// Numbers of its asset for experts.
+        /// Numbers of its asset for experts; those whose names end in _m are lengths and follow the scale.
         hints: "table<string, number>" = lua.create_table_from(
             object.asset.hints.iter().map(|(name, value)| (name.as_str(), *value))
         )?;

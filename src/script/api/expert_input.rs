@@ -6,14 +6,21 @@ use softvt_benchmark::CONTROL_DT;
 use softvt_geometry::{Aabb, Pose, Vec3};
 use softvt_robot::ik::{PoseDifference, PoseTolerance, UnreachablePose};
 use softvt_rollout::{ObjectInstance, Simulation};
-use softvt_scene::Asset;
+use softvt_scene::{Asset, Object};
 
 /// True state of an object.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ObjectView {
     /// Name in the scene.
     pub name: String,
+    /// Shape, material and hints of this instance.
     pub asset: Arc<Asset>,
+    /// Size relative to that of the asset.
+    pub scale: f64,
+    /// Young's modulus relative to that of the asset; `None` unless soft.
+    pub youngs_factor: Option<f64>,
+    /// Density relative to that of the asset; `None` unless soft or rigid.
+    pub density_factor: Option<f64>,
     /// Object frame in the world.
     pub pose_w: Pose,
     /// Bounds of its shape at rest, object frame.
@@ -100,9 +107,13 @@ fn object_view(sim: &Simulation, object: &ObjectInstance, name: &str) -> ObjectV
     let bounds = object.bounds;
     let centre_w = (pose * nalgebra::Point3::from(bounds.centre())).coords;
     let x = pose.rotation * Vec3::x();
+    let placed = sim.scene.objects.iter().find(|placed| placed.name == object.name);
     ObjectView {
         name: name.to_owned(),
         asset: object.asset.clone(),
+        scale: placed.map_or(1.0, |placed| placed.scale),
+        youngs_factor: placed.and_then(Object::youngs_factor),
+        density_factor: placed.and_then(Object::density_factor),
         pose_w: pose,
         bounds,
         centre_w,

@@ -34,6 +34,8 @@ const MAX_COORDINATE: f64 = 1e3;
 
 const POSITION: Type = Type::Vector(3, "m, world", COORDINATE);
 const COORDINATE: Range = Range::closed(-MAX_COORDINATE, MAX_COORDINATE);
+/// Uniform scales of objects.
+const SCALE: Type = Type::Number("", Range::closed(0.1, 10.0));
 const CORNER: Type = Type::vector(3, "m, world");
 
 /// A scene without objects: robot base and workspace of the table scenes.
@@ -64,6 +66,8 @@ record! {
         yaw: f64 = Type::Number("rad", Range::ANY) => Number(0.0);
         /// Scene name of the object or part (cabinet.top_drawer) that it rests on (with at).
         on: Option<String>;
+        /// Size relative to that of the asset. Its material stays, and its mass follows as the cube.
+        scale: f64 = SCALE => Number(1.0);
         /// Start values of an articulated object's joints by part; 0, or the nearest limit, by default.
         joints: Option<BTreeMap<String, f64>> = Type::Map(&Type::Number("m or rad", Range::ANY));
     }
@@ -141,9 +145,27 @@ impl LuaScene {
         let joints = joints::start_values(lua, &asset, spec.joints.as_ref())?;
         let placed_at = current_line(lua).map(|line| line.to_string()).unwrap_or_default();
         let pose_w = Pose::from_parts(at.into(), rotation);
-        scene.objects.push(Object { name, nominal: asset.clone(), asset, pose_w, joints, placed_at });
+        let mut object = Object { joints, placed_at, ..Object::new(&name, asset, pose_w) };
+        if spec.scale != 1.0 {
+            rescale(lua, "scene:add: scale", &mut object, spec.scale)?;
+        }
+        scene.objects.push(object);
         Ok(())
     }
+}
+
+/// Gives an object another size. `label` names the value in the message for one that cannot have it.
+fn rescale(lua: &Lua, label: &str, object: &mut Object, scale: f64) -> mlua::Result<()> {
+    if !object.is_scalable() {
+        let message = format!(
+            "{label}: object {:?} is articulated, and the limits, damping and friction of its joints belong to its \
+             size; declare an asset of the size you need",
+            object.name
+        );
+        return Err(fail(lua, message));
+    }
+    object.set_scale(scale);
+    Ok(())
 }
 
 /// The position of an object that is added to the scene.
@@ -333,6 +355,13 @@ class! {
                 set(lua, this, yaw: f64) {
                     let rotation = Quat::from_axis_angle(&Vec3::z_axis(), yaw);
                     this.change(lua, |object| object.pose_w.rotation = rotation);
+                }
+            }
+            /// Size relative to that of its asset. Material numbers stay, and the mass follows as the cube.
+            scale: SCALE => {
+                get(_, this) { this.read(|object| object.scale) }
+                set(lua, this, scale: f64) {
+                    rescale(lua, "object.scale", &mut lock(&this.scene).objects[this.index], scale)?;
                 }
             }
             /// Density of a soft or rigid body.

@@ -1,0 +1,234 @@
+//! Uniform scaling of placed objects: their shape, contact samples, visuals and hints at another size.
+
+use std::sync::Arc;
+
+use softvt_geometry::{Vec3, shape::Shape};
+
+use super::{
+    Object,
+    asset::{Asset, Body, SoftMaterial},
+    decal::{LabelLine, TextDecal},
+    visual::{Mask, Visual, VisualLayer},
+};
+
+/// Ending of the names of hints that are lengths.
+const LENGTH_HINT: &str = "_m";
+
+impl Object {
+    /// True if the object can have another size. An articulated one cannot: the range, damping and friction of its
+    /// joints belong to its size.
+    pub fn is_scalable(&self) -> bool {
+        !matches!(self.nominal.body, Body::Articulated(_))
+    }
+
+    /// Gives the object `scale` times the size of its asset: shape, spacing of contact samples, patterns of the visuals
+    /// and hints that are lengths. Material numbers and changed base colours stay. The mass follows as the cube of the
+    /// scale, the number of voxels stays. Objects that are not [scalable](Self::is_scalable) are unchanged.
+    pub fn set_scale(&mut self, scale: f64) {
+        if !self.is_scalable() {
+            return;
+        }
+        let nominal = self.nominal.clone();
+        let asset = Arc::make_mut(&mut self.asset);
+        self.scale = scale;
+        asset.shape = resized(&nominal.shape, scale);
+        if let (Body::Soft(own), Body::Soft(SoftMaterial { grasp_spacing, .. })) =
+            (&mut asset.body, &nominal.body)
+        {
+            own.grasp_spacing = grasp_spacing * scale;
+        }
+        for (own, visual) in asset.visuals.iter_mut().zip(&nominal.visuals) {
+            for (layer, nominal) in own.layers.iter_mut().zip(&visual.layers) {
+                layer.mask = nominal.mask.scaled(scale);
+                layer.relief_m = nominal.relief_m * scale;
+            }
+        }
+        for (name, value) in &nominal.hints {
+            let factor = if name.ends_with(LENGTH_HINT) { scale } else { 1.0 };
+            asset.hints.insert(name.clone(), value * factor);
+        }
+    }
+
+    /// Young's modulus relative to that of the asset; `None` if it is not a soft body.
+    pub fn youngs_factor(&self) -> Option<f64> {
+        match (&self.asset.body, &self.nominal.body) {
+            (Body::Soft(own), Body::Soft(nominal)) => Some(own.youngs_pa / nominal.youngs_pa),
+            _ => None,
+        }
+    }
+
+    /// Density relative to that of the asset; `None` if it is neither a soft nor a rigid body.
+    pub fn density_factor(&self) -> Option<f64> {
+        Some(self.asset.density()? / self.nominal.density()?)
+    }
+}
+
+impl Asset {
+    /// Density of a soft or rigid body, kg/m³.
+    fn density(&self) -> Option<f64> {
+        match &self.body {
+            Body::Soft(SoftMaterial { density, .. }) | Body::Rigid { density } => Some(*density),
+            Body::Articulated(_) | Body::Static | Body::Scenery => None,
+        }
+    }
+}
+
+/// The shape at `scale` times its size. At 1 it is the shape itself, bit for bit.
+fn resized(shape: &Shape, scale: f64) -> Shape {
+    if scale == 1.0 { shape.clone() } else { shape.clone().scaled(Vec3::repeat(scale)) }
+}
+
+impl Visual {
+    /// Multiplies the colours of the base and of all layers by `tint`, up to the largest value of a colour, 1.
+    pub fn tint(&mut self, tint: [f64; 3]) {
+        let apply = |albedo: &mut [f64; 3]| {
+            albedo.iter_mut().zip(tint).for_each(|(value, factor)| *value = (*value * factor).min(1.0));
+        };
+        apply(&mut self.albedo);
+        self.layers.iter_mut().for_each(|VisualLayer { albedo, .. }| apply(albedo));
+    }
+}
+
+impl Mask {
+    /// The mask of a surface at `scale` times the size: all lengths are multiplied.
+    pub fn scaled(&self, scale: f64) -> Self {
+        let length = |metres: &f64| metres * scale;
+        let vector = |metres: &[f64; 3]| metres.map(|metres| metres * scale);
+        let inner = |mask: &Arc<Self>| Arc::new(mask.scaled(scale));
+        match self {
+            Self::Whole => Self::Whole,
+            Self::Checker { size_m } => Self::Checker { size_m: length(size_m) },
+            Self::Stripes { axis, pitch_m, share } => {
+                Self::Stripes { axis: *axis, pitch_m: length(pitch_m), share: *share }
+            }
+            Self::Gradient { axis, from_m, to_m } => {
+                Self::Gradient { axis: *axis, from_m: length(from_m), to_m: length(to_m) }
+            }
+            Self::Noise { size_m, octaves, from, to, seed } => Self::Noise {
+                size_m: vector(size_m),
+                octaves: *octaves,
+                from: *from,
+                to: *to,
+                seed: *seed,
+            },
+            Self::Rings { centre_m, pitch_m, wobble_m, seed } => Self::Rings {
+                centre_m: vector(centre_m),
+                pitch_m: length(pitch_m),
+                wobble_m: length(wobble_m),
+                seed: *seed,
+            },
+            Self::Boards { length_m, width_m, seed } => {
+                Self::Boards { length_m: length(length_m), width_m: length(width_m), seed: *seed }
+            }
+            Self::Seams { length_m, width_m, gap_m } => {
+                Self::Seams { length_m: length(length_m), width_m: length(width_m), gap_m: length(gap_m) }
+            }
+            Self::Specks { spacing_m, radius_m, seed } => {
+                Self::Specks { spacing_m: length(spacing_m), radius_m: length(radius_m), seed: *seed }
+            }
+            Self::Weave { pitch_m } => Self::Weave { pitch_m: length(pitch_m) },
+            Self::Facing { axis, from, to } => Self::Facing { axis: *axis, from: *from, to: *to },
+            Self::Inside { shape, soft_m } => {
+                Self::Inside { shape: Arc::new(resized(shape, scale)), soft_m: length(soft_m) }
+            }
+            Self::Text { decal } => {
+                let line = &decal.line;
+                Self::Text {
+                    decal: Arc::new(TextDecal::new(LabelLine {
+                        height_m: length(&line.height_m),
+                        at: vector(&line.at),
+                        wrap_m: line.wrap_m.as_ref().map(length),
+                        ..line.clone()
+                    })),
+                }
+            }
+            Self::Inverse { mask } => Self::Inverse { mask: inner(mask) },
+            Self::Product { masks } => Self::Product { masks: masks.iter().map(inner).collect() },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use softvt_geometry::Pose;
+    use softvt_physics::contact::Friction;
+
+    fn ball() -> Object {
+        let material = SoftMaterial {
+            youngs_pa: 2e4,
+            poisson: 0.4,
+            density: 300.0,
+            resolution: 6,
+            grasp_spacing: 1e-3,
+        };
+        let gradient = Mask::Gradient { axis: [0.0, 0.0, 1.0], from_m: 0.01, to_m: 0.05 };
+        let layer = VisualLayer {
+            mask: gradient,
+            albedo: [0.9; 3],
+            roughness: 0.5,
+            opacity: 1.0,
+            relief_m: 1e-4,
+        };
+        let asset = Arc::new(Asset {
+            name: "ball".to_owned(),
+            shape: Shape::Sphere { radius: 0.03 }.translated(Vec3::z() * 0.03),
+            body: Body::Soft(material),
+            friction: Friction::default(),
+            visuals: vec![Visual::plain([0.5; 3], 0.5, 0.0).with(layer)],
+            hints: [("grasp_height_m".to_owned(), 0.03), ("count".to_owned(), 3.0)].into(),
+        });
+        Object::new("left", asset, Pose::identity())
+    }
+
+    #[test]
+    fn everything_that_has_a_size_follows_the_scale() {
+        let mut object = ball();
+        object.set_scale(1.2);
+        let asset = &object.asset;
+        let radius = asset.shape.bounds().size() / 2.0;
+        assert!((radius - Vec3::repeat(0.036)).norm() < 1e-9, "{radius}");
+        assert!(asset.shape.bounds().min.z.abs() < 1e-9, "the lowest point stays at z = 0");
+        let mass = [&object.asset, &object.nominal].map(|asset| asset.mass().expect("soft"));
+        assert!((mass[0] / mass[1] - 1.2f64.powi(3)).abs() < 1e-9, "{mass:?}");
+        assert!((asset.hints["grasp_height_m"] - 0.036).abs() < 1e-12);
+        assert_eq!(asset.hints["count"], 3.0, "not a length");
+        let Body::Soft(material) = &asset.body else { panic!("soft") };
+        assert!((material.grasp_spacing - 1.2e-3).abs() < 1e-12);
+        let layer = &asset.visuals[0].layers[0];
+        assert_eq!(
+            layer.mask,
+            Mask::Gradient { axis: [0.0, 0.0, 1.0], from_m: 0.01 * 1.2, to_m: 0.05 * 1.2 }
+        );
+        assert!((layer.relief_m - 1.2e-4).abs() < 1e-12);
+    }
+
+    #[test]
+    fn scales_do_not_accumulate_and_a_scale_of_one_is_the_asset_itself() {
+        let mut object = ball();
+        object.set_scale(0.5);
+        object.set_scale(1.2);
+        let twice = object.asset.clone();
+        let mut once = ball();
+        once.set_scale(1.2);
+        assert_eq!(twice, once.asset);
+        object.set_scale(1.0);
+        assert_eq!(object.asset, object.nominal);
+        assert_eq!(object.asset.fingerprint(), ball().asset.fingerprint());
+    }
+
+    #[test]
+    fn changed_materials_survive_the_scale_and_count_as_factors() {
+        let mut object = ball();
+        let Body::Soft(material) = &mut Arc::make_mut(&mut object.asset).body else { panic!("soft") };
+        (material.youngs_pa, material.density) = (4e4, 150.0);
+        Arc::make_mut(&mut object.asset).visuals[0].tint([0.5, 1.0, 3.0]);
+        object.set_scale(0.9);
+        assert_eq!((object.youngs_factor(), object.density_factor()), (Some(2.0), Some(0.5)));
+        assert_eq!(object.asset.visuals[0].albedo, [0.25, 0.5, 1.0]);
+        assert_eq!(object.asset.visuals[0].layers[0].albedo, [0.45, 0.9, 1.0]);
+        assert_ne!(object.asset.fingerprint(), object.nominal.fingerprint());
+        Arc::make_mut(&mut object.asset).body = Body::Static;
+        assert_eq!((object.youngs_factor(), object.density_factor()), (None, None));
+    }
+}
