@@ -3,6 +3,7 @@
 
 pub mod seed;
 pub mod settings;
+pub mod variation;
 
 use serde::{Deserialize, Serialize};
 
@@ -99,6 +100,9 @@ pub struct Suite {
     pub tasks: Vec<Task>,
     /// Shifts that the suite supports.
     pub shifts: Vec<Shift>,
+    /// Ranges from which the soft objects, the light and the cameras of every episode are drawn, if they vary.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vary: Option<variation::VariationRanges>,
     /// Settings of physics, robot, sensors and judge.
     pub settings: settings::Settings,
 }

@@ -18,8 +18,12 @@ pub enum RandomStream {
     Layout,
     /// Initial joint angles of the arm.
     Arm,
-    /// Variation of materials.
+    /// Variation of materials: stiffness, density and friction.
     Material,
+    /// Variation of sizes.
+    Size,
+    /// Variation of colours.
+    Colour,
     /// Lights.
     Light,
     /// Cameras.
@@ -36,10 +40,12 @@ pub enum RandomStream {
 
 impl RandomStream {
     /// Every stream with the name that scripts use.
-    const NAMES: [(Self, &str); 9] = [
+    const NAMES: [(Self, &str); 11] = [
         (Self::Layout, "layout"),
         (Self::Arm, "arm"),
         (Self::Material, "material"),
+        (Self::Size, "size"),
+        (Self::Colour, "colour"),
         (Self::Light, "light"),
         (Self::Camera, "camera"),
         (Self::Sensor, "sensor"),

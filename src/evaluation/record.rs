@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize, Serializer, ser::SerializeMap};
 
 use super::{drop::DropEvent, episode_id::EpisodeId, safety::KappaVerdict};
-use softvt_scene::InitialState;
+use softvt_scene::{InitialState, SceneVariation};
 
 /// End of a rollout.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -58,6 +58,9 @@ pub struct EpisodeHeader {
     pub asset: String,
     /// True if the target is a soft body.
     pub soft: bool,
+    /// What the variation of the suite changed in the scene, if it varies. The policy does not see it.
+    #[serde(default)]
+    pub variation: Option<Box<SceneVariation>>,
     /// Foreign demonstration that the episode re-executes, if any.
     #[serde(default)]
     pub origin: Option<Box<Origin>>,
@@ -81,6 +84,9 @@ impl Serialize for EpisodeHeader {
         }
         map.serialize_entry("asset", &self.asset)?;
         map.serialize_entry("soft", &self.soft)?;
+        if let Some(variation) = &self.variation {
+            map.serialize_entry("variation", variation)?;
+        }
         if let Some(origin) = &self.origin {
             map.serialize_entry("origin", origin)?;
         }

@@ -159,8 +159,8 @@ fn policies(runs: &[StoredRun]) -> String {
 
 /// Fields of `run.json` about the conditions of a run in which two runs of one suite differ.
 fn differing_fields(first: &[StoredRun], second: &[StoredRun]) -> Vec<String> {
-    const CONDITION_FIELDS: [&str; 7] =
-        ["softvt", "twin", "shifts", "options", "settings", "sources", "thresholds"];
+    const CONDITION_FIELDS: [&str; 8] =
+        ["softvt", "twin", "variation", "shifts", "options", "settings", "sources", "thresholds"];
     let mut found = BTreeSet::new();
     for a in first {
         let Some(b) = second.iter().find(|b| b.suite() == a.suite()) else { continue };

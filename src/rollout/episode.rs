@@ -80,6 +80,7 @@ impl EpisodeSpec {
             privileged: false,
             soft: target.is_some_and(|asset| matches!(asset.body, Body::Soft(_))),
             asset: target.map_or(String::new(), |asset| asset.name.clone()),
+            variation: None,
             origin: None,
         };
         Self {

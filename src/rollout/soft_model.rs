@@ -144,3 +144,73 @@ fn check_thickness(name: &str, shape: &Shape, material: &SoftMaterial) -> Result
     );
     Err(BuildError::Material { asset: name.to_owned(), what })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use softvt_evaluation::deformation::ReferenceShape;
+    use softvt_geometry::{Pose, Vec3};
+    use softvt_physics::{BodyId, PhysicsParams, World, contact::Friction};
+
+    const RADIUS: f64 = 0.03;
+
+    fn ball() -> (Shape, SoftMaterial) {
+        let material =
+            SoftMaterial { youngs_pa: 3e4, poisson: 0.4, density: 300.0, resolution: 6, grasp_spacing: 1.5e-3 };
+        (Shape::Sphere { radius: RADIUS }, material)
+    }
+
+    /// D (%) and force per pad (N) of the ball at `scale`, pressed between two plates to `share` of its diameter.
+    fn press(scale: f64, share: f64) -> (f64, f64) {
+        let (shape, material) = ball();
+        let geometry = SoftGeometry::new("ball", &shape, &material, false).expect("meshed");
+        let model = geometry.model(&material, scale);
+        let mut world = World::new(PhysicsParams::default(), Vec3::zeros());
+        let body = world.add_soft("ball", model.clone(), None, &Pose::identity(), Friction::default());
+        let plate = Shape::Box { half: Vec3::new(0.005, 0.05, 0.05) };
+        let at = |side: f64, gap: f64| Pose::translation(side * (gap + 0.005), 0.0, 0.0);
+        let plates = [-1.0, 1.0].map(|side| {
+            let frame = world.add_kinematic(at(side, RADIUS * scale));
+            (side, frame, world.add_shape("plate", frame, Pose::identity(), &plate, Friction::NONE))
+        });
+        let rest = ReferenceShape::new(&world.soft(body).state.x, &model.mass).expect("a shape");
+        for step in 1..=60 {
+            let closed = f64::from(step.min(30)) / 30.0;
+            let gap = RADIUS * scale * (1.0 - closed * (1.0 - share));
+            plates.iter().for_each(|(side, frame, _)| world.move_kinematic(*frame, at(*side, gap)));
+            world.step().expect("a gentle squeeze");
+        }
+        let d = rest.measure(&world.soft(body).state.x).expect("measured").rms_pct;
+        (d, world.contact(BodyId::from(body), plates[0].2).normal_force)
+    }
+
+    #[test]
+    fn a_scaled_body_has_the_voxels_of_the_nominal_one_and_the_cube_of_its_mass() {
+        let (shape, material) = ball();
+        let geometry = SoftGeometry::new("ball", &shape, &material, false).expect("meshed");
+        let [nominal, scaled] = [1.0, 1.12].map(|scale| geometry.model(&material, scale));
+        assert_eq!(nominal.mesh.elements, scaled.mesh.elements);
+        assert_eq!(nominal.mesh.occupancy, scaled.mesh.occupancy);
+        assert_eq!(nominal.samples.len(), scaled.samples.len());
+        let ratio = scaled.total_mass() / nominal.total_mass();
+        assert!((ratio - 1.12f64.powi(3)).abs() < 1e-9, "{ratio}");
+        // The same as an asset that is declared at that size.
+        let declared = soft_model("ball", &Shape::Sphere { radius: 1.12 * RADIUS }, &material).expect("meshed");
+        assert!((declared.total_mass() / scaled.total_mass() - 1.0).abs() < 1e-9);
+        assert_eq!(declared.mesh.elements.len(), scaled.mesh.elements.len());
+    }
+
+    #[test]
+    fn proportional_squeezes_of_scaled_bodies_have_equal_deformation_and_forces_as_their_area() {
+        let (nominal, force) = press(1.0, 0.85);
+        assert!(nominal > 1.0, "{nominal} %");
+        for scale in [0.88, 1.12] {
+            let (d, scaled_force) = press(scale, 0.85);
+            assert!((d / nominal - 1.0).abs() < 0.01, "at {scale}: {d} % instead of {nominal} %");
+            let ratio = scaled_force / force / (scale * scale);
+            assert!((ratio - 1.0).abs() < 0.02, "at {scale}: {scaled_force} N, {force} N");
+        }
+        let (deeper, _) = press(1.0, 0.80);
+        assert!(deeper > 1.1 * nominal, "the criterion distinguishes squeezes");
+    }
+}

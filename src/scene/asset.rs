@@ -8,6 +8,9 @@ use super::visual::Visual;
 use softvt_geometry::{Pose, Vec3, mass::mass_properties, shape::Shape};
 use softvt_physics::contact::Friction;
 
+/// Hint that gives the width of an asset where the fingers grasp it.
+const GRASP_WIDTH_HINT: &str = "grasp_width_m";
+
 /// Kind of body that an object is.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Body {
@@ -83,6 +86,13 @@ impl Asset {
             Body::Articulated(parts) => Some(parts.iter().map(Part::mass).sum()),
             Body::Static | Body::Scenery => None,
         }
+    }
+
+    /// Width between two fingers that grasp from above, m: the hint of the asset, or the narrower horizontal side. Not
+    /// that of an articulated object, which is grasped by its parts.
+    pub fn grasp_width(&self) -> f64 {
+        let size = self.shape.bounds().size();
+        self.hints.get(GRASP_WIDTH_HINT).copied().unwrap_or_else(|| size.x.min(size.y))
     }
 
     /// Multiplies the density of everything that moves by `factor`.

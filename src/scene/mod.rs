@@ -44,6 +44,7 @@ mod decal;
 mod fingerprint;
 mod light;
 mod scale;
+mod variation;
 mod visual;
 
 use std::sync::Arc;
@@ -56,6 +57,7 @@ pub use asset::{Asset, Body, Joint, JointMotion, Part, SoftMaterial, part_poses}
 pub use camera::{Camera, CameraMount};
 pub use decal::{GlyphCoverage, LabelLine, MAX_LETTERS, TextDecal, Typeface};
 pub use light::{KeyLight, Lighting, Sky};
+pub use variation::{CameraVariation, LightVariation, ObjectVariation, SceneVariation};
 pub use visual::{Mask, Visual, VisualLayer};
 
 /// An asset placed in a scene.

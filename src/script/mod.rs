@@ -17,6 +17,7 @@ pub use plan::{
     options::{OptionSpec, OptionValue},
     policy_file::{LuaPolicy, PolicyFile},
     profile_file::load_profile,
+    variation_file::{STANDARD_VARIATION, VaryError, load_variation},
 };
 pub use run::{
     episode::{EpisodeSetup, SceneBuilder, ShiftError, check_shift},

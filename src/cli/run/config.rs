@@ -9,7 +9,7 @@ use crate::{
     run::{episode_artifacts::VideoSelection, policy::PolicyConfig, requirement::Requirement},
 };
 use softvt_benchmark::{ShiftValue, Suite};
-use softvt_script::LoadedScript;
+use softvt_script::{LoadedScript, STANDARD_VARIATION};
 
 // The script, and changes of its scenes and their physics. A doc comment would replace the description of the commands
 // that this struct is flattened into.
@@ -30,6 +30,9 @@ pub(crate) struct ScriptArgs {
     /// Make every soft object rigid, with the same shape, mass and appearance
     #[arg(long, value_name = "KIND")]
     pub twin: Option<Twin>,
+    /// Vary the soft objects, the light and the cameras from episode to episode: by a Lua file, or by the standard ranges (scripts/variations/standard.lua)
+    #[arg(long, value_name = "FILE.lua", num_args = 0..=1, require_equals = true, default_missing_value = STANDARD_VARIATION)]
+    pub vary: Option<PathBuf>,
     /// Change a setting, such as robot.gripper.effort=20
     #[arg(long = "set", value_name = "PATH=VALUE")]
     pub settings: Vec<String>,
@@ -150,7 +153,12 @@ impl RunConfig {
     /// # Errors
     /// The script fails or returns no plan.
     pub(crate) fn load_script(&self) -> Result<LoadedScript, CliError> {
-        Ok(softvt_script::load(&self.script.file, &self.script.options)?)
+        let mut loaded = softvt_script::load(&self.script.file, &self.script.options)?;
+        if let Some(file) = &self.script.vary {
+            let (ranges, _) = softvt_script::load_variation(file).map_err(|error| CliError::from(error).prefixed("--vary"))?;
+            loaded.vary(&ranges).map_err(|error| self.error(format!("--vary: {error}")))?;
+        }
+        Ok(loaded)
     }
 
     /// An error about the script.
@@ -167,11 +175,12 @@ impl RunConfig {
         thread_count(self.flags.threads)
     }
 
-    /// Name of a suite in results. A rigid twin has a name of its own, though its initial states are
-    /// those of the suite.
+    /// Name of a suite in results. A suite that `--vary` varies and a rigid twin have names of their own, though the
+    /// places of their objects are those of the suite.
     pub(crate) fn suite_name(&self, suite: &Suite) -> String {
+        let varied = if self.script.vary.is_some() { "_varied" } else { "" };
         let twin = if self.is_rigid_twin() { "_rigid_twin" } else { "" };
-        format!("{}{twin}", suite.name)
+        format!("{}{varied}{twin}", suite.name)
     }
 }
 

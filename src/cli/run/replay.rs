@@ -120,6 +120,7 @@ impl StoredManifest<'_> {
             options: self.field("arguments")?,
             seed: self.field("seed")?,
             twin: self.manifest["twin"].is_string().then_some(Twin::Rigid),
+            vary: self.manifest["vary"].as_str().map(PathBuf::from),
             ..ScriptArgs::default()
         };
         let flags = RunFlags { tasks: vec![task.to_string()], ..RunFlags::default() };

@@ -12,7 +12,7 @@ use crate::{
     error::CliError,
     run::{recorded_runs::ReplaySource, suite_run::SuiteRun},
 };
-use softvt_benchmark::{ShiftValue, Task, settings::Settings};
+use softvt_benchmark::{ShiftValue, Task, settings::Settings, variation::VariationRanges};
 use softvt_common::files;
 use softvt_dataset::card::Imported;
 use softvt_policy::profile::Profile;
@@ -27,6 +27,12 @@ pub(crate) struct RunManifest<'a> {
     suite: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
     twin: Option<&'a str>,
+    /// Ranges within which the episodes vary, if they do.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    variation: Option<&'a VariationRanges>,
+    /// File of `--vary`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    vary: Option<String>,
     policy: &'a str,
     /// Profile of a policy server.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -78,6 +84,8 @@ impl<'a> RunManifest<'a> {
             script: run.loaded.sources.main.clone(),
             suite: &run.suite.name,
             twin: config.is_rigid_twin().then_some("rigid"),
+            variation: run.suite.vary.as_ref(),
+            vary: config.script.vary.as_ref().map(|file| file.display().to_string()),
             policy: &config.policy.name,
             profile: config.policy.server().map(|server| &server.profile),
             policy_file: config.policy.file.as_deref(),

@@ -283,6 +283,7 @@ impl<'a> SuiteRun<'a> {
         let (policy, scene) = (&self.config.policy.name, opened.scene.clone());
         let mut spec = EpisodeSpec::new(id, policy, task, &opened.nominal, scene, &self.settings);
         spec.header.privileged = self.is_privileged();
+        spec.header.variation = opened.variation.clone().map(Box::new);
         spec.header.origin = origin.cloned().map(Box::new);
         let record_trace = self.config.flags.trace.is_some();
         let trace_nodes = self.config.flags.trace == Some(TraceDetail::Nodes);

@@ -120,6 +120,8 @@ fn view_commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
         let arguments = manifest["arguments"].as_array().into_iter().flatten().filter_map(Value::as_str);
         view.extend(arguments.map(str::to_owned));
     }
+    // The value of this flag follows an equals sign.
+    view.extend(manifest["vary"].as_str().map(|file| format!("--vary={file}")));
     let mut add = |flag: &str, value: String| view.extend([flag.to_owned(), value]);
     add("--task", id.task.to_string());
     // Defaults are omitted.

@@ -42,7 +42,7 @@ class! {
         methods {
             /// Returns another stream, from its start. Draws from one stream do not change those from another.
             fn stream(_, this, name: String = Type::Choice(&[
-                "layout", "arm", "material", "light", "camera", "sensor", "expert", "script", "policy",
+                "layout", "arm", "material", "size", "colour", "light", "camera", "sensor", "expert", "script", "policy",
             ])) -> ["softvt.Rng"] {
                 RandomStream::from_name(&name).map(|stream| LuaRng::new(this.seed.clone(), stream))
             }

@@ -11,12 +11,17 @@ use crate::{
     },
     vm::{error::fail, value::describe},
 };
-use softvt_benchmark::{ObjectType, REFERENCE, Variation};
+use softvt_benchmark::{
+    ObjectType, REFERENCE, Variation,
+    variation::{FactorRange, VariationRanges},
+};
 
 /// Type of a layout's function.
 const BUILD: Type = Type::Function("fun(scene: softvt.Scene, rng: softvt.Rng)");
 /// Type of a task's expert.
 pub(crate) const EXPERT: Type = Type::Function("fun(arm: softvt.Arm, scene: softvt.SceneState)");
+/// Smallest and largest factor.
+const FACTORS: Type = Type::Vector(2, "", Range::closed(0.1, 10.0));
 const HOLD: Type = Type::Number("s", Range::closed(0.0, 10.0));
 /// Type of a table of settings.
 pub(crate) const SETTINGS: Type = Type::Map(&Type::Map(&Type::Any));
@@ -79,6 +84,28 @@ record! {
         /// Changes the scene; may return another one.
         apply: Function = Type::Function("fun(scene: softvt.Scene, value: number): softvt.Scene?");
     }
+    /// Ranges from which every episode of a suite draws: factors on size, stiffness, density and friction of each soft
+    /// object, its colour, the light and the poses of the cameras. The policy sees none of the drawn numbers; records do.
+    VariationSpec: "softvt.Variation" as "variation", constructor "softvt.variation", relations check_variation {
+        /// Name in results.
+        name: String = Type::Name;
+        /// Smallest and largest factor on the size of a soft object, uniform.
+        size: [f64; 2] = FACTORS;
+        /// Factors on Young's modulus, log-uniform.
+        stiffness: [f64; 2] = FACTORS;
+        /// Factors on the density, log-uniform.
+        density: [f64; 2] = FACTORS;
+        /// Factors on the coefficients of friction, log-uniform. A pair of surfaces takes the larger coefficient.
+        friction: [f64; 2] = FACTORS;
+        /// Largest relative change of each colour channel of a soft object.
+        colour: f64 = Type::Number("", Range::closed(0.0, 0.9));
+        /// Factors on the strength of lamp and sky, log-uniform.
+        light: [f64; 2] = FACTORS;
+        /// Largest displacement along each axis of the cameras that are fixed to the world.
+        camera_offset: f64 = Type::Number("m", Range::closed(0.0, 1.0));
+        /// Largest rotation of these cameras about each of their axes.
+        camera_rotation: f64 = Type::Number("rad", Range::closed(0.0, 1.0));
+    }
     /// A set of tasks that are reported together.
     SuiteSpec: "softvt.Suite" as "suite", constructor "softvt.suite" {
         /// Name in results; part of the seed.
@@ -93,6 +120,8 @@ record! {
         tasks: Vec<Constructed<TaskSpec>>;
         /// Changes of the scene that a run can request.
         shifts: Vec<Constructed<ShiftSpec>> => Empty;
+        /// Ranges from which the soft objects, the light and the cameras of every episode are drawn.
+        vary: Option<Constructed<VariationSpec>>;
         /// Changed settings of physics, robot and judge: { physics = {…}, robot = {…}, criteria = {…} }.
         settings: Option<Table> = SETTINGS;
     }
@@ -176,6 +205,7 @@ pub(crate) static CONSTRUCTORS: &[&Record] = &[
     OnSpec::RECORD,
     InsideSpec::RECORD,
     ShiftSpec::RECORD,
+    VariationSpec::RECORD,
     ConditionsSpec::RECORD,
     ExperimentSpec::RECORD,
 ];
@@ -202,6 +232,35 @@ functions! {
                     return Err(fail(lua, message));
                 }
             }
+        }
+    }
+}
+
+fn check_variation(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<()> {
+    for key in ["size", "stiffness", "density", "friction", "light"] {
+        let [min, max] = table.raw_get::<[f64; 2]>(key)?;
+        if min > max {
+            let message = format!("the smallest factor {min} comes first and is above {max}; swap them");
+            return Err(error_at_key(lua, record.label, &ValidationError { path: vec![key.into()], message }));
+        }
+    }
+    Ok(())
+}
+
+impl VariationSpec {
+    /// The ranges as plain data.
+    pub(crate) fn ranges(&self) -> VariationRanges {
+        let range = |[min, max]: [f64; 2]| FactorRange { min, max };
+        VariationRanges {
+            name: self.name.clone(),
+            size: range(self.size),
+            stiffness: range(self.stiffness),
+            density: range(self.density),
+            friction: range(self.friction),
+            colour: self.colour,
+            light: range(self.light),
+            camera_offset_m: self.camera_offset,
+            camera_rotation_rad: self.camera_rotation,
         }
     }
 }

@@ -3,6 +3,7 @@
 pub(crate) mod options;
 pub(crate) mod policy_file;
 pub(crate) mod profile_file;
+pub(crate) mod variation_file;
 
 use std::{path::Path, sync::Arc};
 
@@ -26,7 +27,7 @@ use crate::{
     },
 };
 use options::{OptionSession, OptionSpec, SharedOptions};
-use softvt_benchmark::{Condition, Goal, GoalKind, Plan, Shift, ShiftValue, Suite, Task, Variation};
+use softvt_benchmark::{Condition, Goal, GoalKind, ObjectType, Plan, Shift, ShiftValue, Suite, Task, Variation};
 use softvt_common::{parallel::lock, text::unknown_name};
 
 /// The files of a script and the command line that they ran with: enough to run it again without the disk.
@@ -293,6 +294,10 @@ fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Suite> {
         min: shift.min,
         max: shift.max,
     });
+    if let Some(vary) = spec.vary.as_ref().filter(|_| spec.object_type == ObjectType::Rigid) {
+        let message = format!("suite.vary: {}", variation_file::no_soft_objects(&name, &vary.name));
+        return Err(fail_at_key(lua, &spec.table, "vary", message));
+    }
     Ok(Suite {
         name,
         object_type: spec.object_type,
@@ -300,6 +305,7 @@ fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Suite> {
         episodes: spec.episodes,
         tasks,
         shifts: shifts.collect(),
+        vary: spec.vary.as_ref().map(|vary| vary.ranges()),
         settings: settings(lua, "suite.settings", spec.settings.as_ref())?,
     })
 }

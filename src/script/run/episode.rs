@@ -1,6 +1,6 @@
 //! Episodes: the scene that a task's layout builds, and the task's expert.
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 use mlua::{Function, Lua, Value};
 
@@ -21,13 +21,15 @@ use crate::{
 use softvt_benchmark::{
     Shift, ShiftValue,
     seed::{EpisodeSeed, RandomStream},
+    variation::VariationRanges,
 };
 use softvt_common::{
     parallel::lock,
     text::{format_number, unknown_name},
 };
 use softvt_evaluation::episode_id::EpisodeId;
-use softvt_scene::{Body, Scene};
+use softvt_robot::gripper::MAX_WIDTH;
+use softvt_scene::{Body, Scene, SceneVariation};
 
 /// An episode as its script describes it: the scene that the layout builds, and the expert of the task.
 pub struct EpisodeSetup {
@@ -35,6 +37,8 @@ pub struct EpisodeSetup {
     pub scene: Scene,
     /// Initial scene before the shifts; deformation limits are those of its objects.
     pub nominal: Scene,
+    /// What the variation of the suite changed in the scene of the layout, if the suite varies.
+    pub variation: Option<SceneVariation>,
     /// Source of its random streams.
     pub seed: EpisodeSeed,
     instance: Arc<ScriptInstance>,
@@ -63,6 +67,8 @@ impl EpisodeSetup {
 /// changes is seen by the next.
 pub struct SceneBuilder {
     instance: Arc<ScriptInstance>,
+    /// Ranges of the suites that vary, by name.
+    ranges: BTreeMap<String, VariationRanges>,
 }
 
 impl SceneBuilder {
@@ -71,7 +77,9 @@ impl SceneBuilder {
     /// # Errors
     /// If the script fails.
     pub fn open(loaded: &LoadedScript) -> Result<Self, ScriptError> {
-        Ok(Self { instance: Arc::new(loaded.sources.instance()?) })
+        let suites = loaded.plan.suites().iter();
+        let ranges = suites.filter_map(|suite| Some((suite.name.clone(), suite.vary.clone()?))).collect();
+        Ok(Self { instance: Arc::new(loaded.sources.instance()?), ranges })
     }
 
     /// Builds the initial scene of an episode.
@@ -86,6 +94,8 @@ impl SceneBuilder {
         let mut current = LuaScene::new(empty_scene());
         let rng = LuaRng::new(seed.clone(), RandomStream::Layout);
         vm.call::<()>(&task.layout.build, (current.clone(), rng))?;
+        let varied = self.ranges.get(&id.suite).map(|ranges| vary(&mut lock(&current.scene), ranges, &seed));
+        let variation = varied.transpose().map_err(|what| ScriptError::new(vm.main(), what))?;
         let nominal = lock(&current.scene).clone();
         let declared = suite.shifts.as_slice();
         for ShiftValue { name, value } in shifts {
@@ -97,8 +107,10 @@ impl SceneBuilder {
         }
         let scene = lock(&current.scene).clone();
         check_goal(&vm.lua, &task.goal, &scene).map_err(|e| vm.explain(&e))?;
+        let largest = self.ranges.get(&id.suite).map_or(1.0, |ranges| ranges.size.max);
+        check_width(&scene, task.goal.object(), variation.as_ref(), largest)?;
         let (instance, expert) = (self.instance.clone(), task.expert.clone());
-        Ok(EpisodeSetup { scene, nominal, seed, instance, expert })
+        Ok(EpisodeSetup { scene, nominal, variation, seed, instance, expert })
     }
 
     /// The result of a shift's function: a scene, or nothing if it changed the given one.
@@ -116,6 +128,49 @@ impl SceneBuilder {
             _ => Err(wrong("the scene or nothing")),
         }
     }
+}
+
+/// Draws and applies the variation of an episode.
+///
+/// # Errors
+/// The scene has nothing that the variation changes; the message is a fragment.
+fn vary(scene: &mut Scene, ranges: &VariationRanges, seed: &EpisodeSeed) -> Result<SceneVariation, String> {
+    let drawn = ranges.draw(seed, scene);
+    if drawn.objects.is_empty() {
+        return Err(format!(
+            "layout {:?} of suite {:?} has no soft object, and the variation {:?} changes soft objects; vary a suite of \
+             soft objects",
+            seed.layout, seed.suite, ranges.name
+        ));
+    }
+    drawn.apply(scene);
+    Ok(drawn)
+}
+
+/// Checks that an object that was scaled fits between the fingers. `largest` is the largest factor that the variation can
+/// draw: a suite of which one episode in ten cannot be solved is not valid.
+fn check_width(
+    scene: &Scene,
+    name: &str,
+    variation: Option<&SceneVariation>,
+    largest: f64,
+) -> Result<(), ScriptError> {
+    let Some(object) = scene.objects.iter().find(|object| object.name == name) else { return Ok(()) };
+    let drawn = variation.and_then(|variation| variation.objects.get(name)).map_or(1.0, |drawn| drawn.scale);
+    let scale = if drawn == 1.0 { object.scale } else { object.scale / drawn * largest };
+    let width = object.nominal.grasp_width() * scale;
+    if scale == 1.0 || width < MAX_WIDTH {
+        return Ok(());
+    }
+    let message = format!(
+        "object {name:?} is {:.1} mm wide where fingers grasp it, at {} times the size of {}, and the gripper opens {:.0} mm; \
+         give a smaller scale",
+        1e3 * width,
+        format_number((1e6 * scale).round() / 1e6),
+        object.nominal.name,
+        1e3 * MAX_WIDTH
+    );
+    Err(ScriptError::new(object.placed_at.as_str(), message))
 }
 
 /// Message about a shift that a suite does not declare.

@@ -8,6 +8,7 @@ mod mass_and_calibration;
 mod options;
 mod policies;
 mod surface;
+mod variation;
 mod visuals;
 
 use std::{fs, path::PathBuf, sync::Arc, time::Duration};

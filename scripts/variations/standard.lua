@@ -1,0 +1,16 @@
+-- The standard variation: no two objects of a kind are alike. Size, stiffness and density decide how far a hand has to close;
+-- colour, light and camera do not tell them. Stiffness and colour are drawn independently.
+--
+--   softvt suites/object_soft.lua --vary
+return softvt.variation {
+  name = "standard",
+  size = { 0.88, 1.12 },
+  stiffness = { 0.5, 2 },
+  density = { 0.6, 1.8 },
+  -- The pads' friction is the larger one, so that this counts where an object slides on its support.
+  friction = { 0.7, 1.4 },
+  colour = 0.1,
+  light = { 0.7, 1.4 },
+  camera_offset = 0.01,
+  camera_rotation = math.rad(1),
+}

@@ -1,0 +1,88 @@
+//! What the variation of a suite changed in the scene of an episode. Only records and experts see it.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use softvt_geometry::{Pose, Quat, Vec3};
+
+use super::{Body, CameraMount, Scene};
+use std::sync::Arc;
+
+/// Factors that make an instance of an asset another object of the same kind.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ObjectVariation {
+    /// Factor on its size.
+    pub scale: f64,
+    /// Factor on Young's modulus.
+    pub youngs_factor: f64,
+    /// Factor on the density.
+    pub density_factor: f64,
+    /// Factor on both coefficients of friction.
+    pub friction_factor: f64,
+    /// Factors on the colours, linear RGB.
+    pub colour: [f64; 3],
+}
+
+/// Factors on the light of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LightVariation {
+    /// Factor on the strength of lamp and sky.
+    pub strength: f64,
+}
+
+/// Displacement of a camera in its own frame.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CameraVariation {
+    /// Translation, m.
+    pub offset_m: [f64; 3],
+    /// Rotation, as an axis times an angle in rad.
+    pub rotation_rad: [f64; 3],
+}
+
+/// What a variation changed in a scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SceneVariation {
+    /// By name in the scene.
+    pub objects: BTreeMap<String, ObjectVariation>,
+    /// The light.
+    pub light: LightVariation,
+    /// By name of the camera.
+    pub cameras: BTreeMap<String, CameraVariation>,
+}
+
+impl SceneVariation {
+    /// True if a variation may change the object: it is a soft body.
+    pub fn applies_to(body: &Body) -> bool {
+        matches!(body, Body::Soft(_))
+    }
+
+    /// True if a variation may move a camera with this mount: the one on the hand is calibrated.
+    pub fn moves(mount: CameraMount) -> bool {
+        mount == CameraMount::World
+    }
+
+    /// Changes the scene. Sizes and material numbers are multiplied, so that those of the layout still count. Names that
+    /// the scene does not contain are ignored.
+    pub fn apply(&self, scene: &mut Scene) {
+        for object in &mut scene.objects {
+            let Some(drawn) = self.objects.get(&object.name) else { continue };
+            object.set_scale(object.scale * drawn.scale);
+            let asset = Arc::make_mut(&mut object.asset);
+            if let Body::Soft(material) = &mut asset.body {
+                material.youngs_pa *= drawn.youngs_factor;
+                material.density *= drawn.density_factor;
+            }
+            asset.friction.static_mu *= drawn.friction_factor;
+            asset.friction.dynamic_mu *= drawn.friction_factor;
+            asset.visuals.iter_mut().for_each(|visual| visual.tint(drawn.colour));
+        }
+        scene.lighting.key.strength *= self.light.strength;
+        scene.lighting.sky.strength *= self.light.strength;
+        for camera in &mut scene.cameras {
+            let Some(drawn) = self.cameras.get(&camera.name) else { continue };
+            let turn = Quat::from_scaled_axis(Vec3::from(drawn.rotation_rad));
+            camera.pose *= Pose::from_parts(Vec3::from(drawn.offset_m).into(), turn);
+        }
+    }
+}

@@ -1,0 +1,198 @@
+//! Scales of objects, and suites whose objects vary from episode to episode.
+
+use super::*;
+use crate::{EpisodeSetup, load_variation};
+use softvt_benchmark::Plan;
+use softvt_evaluation::episode_id::{EpisodeId, Split};
+use softvt_scene::{Body, Object, SoftMaterial};
+
+const ASSETS: &str = r#"
+local mat = softvt.asset { name = "mat", shape = softvt.shape.box { size = { 0.2, 0.2, 0.01 } }:grounded(), body = softvt.static {} }
+local function ball(body)
+  return softvt.asset { name = "ball", shape = softvt.shape.sphere { radius = 0.03 }:grounded(), body = body, hints = { grasp_height_m = 0.03 } }
+end
+local soft = ball(softvt.soft { youngs_pa = 40e3, poisson = 0.4, density = 200 })
+local rigid = ball(softvt.rigid { density = 200 })
+local ranges = { name = "test", size = { 0.9, 1.1 }, stiffness = { 0.5, 2 }, density = { 0.6, 1.8 }, friction = { 0.7, 1.4 }, colour = 0.1,
+  light = { 0.7, 1.4 }, camera_offset = 0.01, camera_rotation = 0.02 }
+local function suite(build, vary, type)
+  local layout = softvt.layout("pair", function(scene, rng)
+    scene:add { name = "mat", asset = mat, at = { 0.3, 0 } }
+    build(scene, rng)
+  end)
+  local function task(name)
+    return softvt.task { prompt = "lift " .. name, layout = layout, goal = softvt.on { object = name, target = "mat" } }
+  end
+  return softvt.suite { name = "test", object_type = type or "deformable", variation = "spatial", vary = vary, tasks = { task "left", task "right" } }
+end
+local function pair(scene, rng)
+  for k, name in ipairs { "left", "right" } do scene:add { name = name, asset = soft, at = { 0.1 * k + rng:uniform(0, 0.01), 0 } } end
+end
+"#;
+
+fn project(rest: &str) -> Project {
+    Project::new(&[("x.lua", &format!("{ASSETS}{rest}"))])
+}
+
+fn open(loaded: &LoadedScript, task: usize, episode: u32) -> Result<EpisodeSetup, ScriptError> {
+    let id = EpisodeId { suite: "test".into(), task, episode, base_seed: 3, split: Split::Validation };
+    EpisodeSetup::open(loaded, &id, &[])
+}
+
+fn opened(rest: &str) -> EpisodeSetup {
+    open(&project(rest).load("x.lua", &[]).expect("a suite"), 0, 0).expect("an episode")
+}
+
+fn object<'a>(setup: &'a EpisodeSetup, name: &str) -> &'a Object {
+    setup.scene.objects.iter().find(|object| object.name == name).expect("placed")
+}
+
+fn material(object: &Object) -> &SoftMaterial {
+    match &object.asset.body {
+        Body::Soft(material) => material,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// The error of a script at load or of its first episode, without the folder's name.
+fn refusal(rest: &str) -> String {
+    let project = project(rest);
+    let error = project.load("x.lua", &[]).and_then(|loaded| open(&loaded, 0, 0)).map(|_| ()).unwrap_err();
+    error.to_string().replace(&format!("{}/", project.path("").display()).replace("//", "/"), "")
+}
+
+#[test]
+fn an_object_is_placed_at_another_size() {
+    let by_field = opened(
+        "return suite(function(scene) scene:add { name = 'left', asset = soft, at = { 0, 0 }, scale = 1.2 }
+           scene:add { name = 'right', asset = soft, at = { 0.2, 0 } } end)",
+    );
+    let by_property = opened(
+        "return suite(function(scene) pair(scene, { uniform = function() return 0 end })
+           local left = scene:object 'left'
+           left.scale = 0.7
+           left.youngs_pa = left.youngs_pa * 3
+           left.scale = 1.2
+           assert(left.scale == 1.2 and math.abs(left:mass() / scene:object('right'):mass() - 1.2 ^ 3) < 1e-9) end)",
+    );
+    let [first, second] = [&by_field, &by_property].map(|setup| object(setup, "left"));
+    assert_eq!(first.asset.shape, second.asset.shape, "the last scale counts");
+    assert!((first.asset.hints["grasp_height_m"] - 0.036).abs() < 1e-12);
+    assert_eq!(first.nominal.fingerprint(), object(&by_field, "right").asset.fingerprint());
+    assert_eq!((first.scale, second.youngs_factor()), (1.2, Some(3.0)));
+}
+
+#[test]
+fn an_articulated_object_has_one_size() {
+    let cabinet = "local drawer = { name = 'drawer', shape = softvt.shape.box { size = { 0.05, 0.05, 0.05 } }:grounded(), density = 500,
+        joint = softvt.slider { axis = { 0, -1, 0 }, lower = 0, upper = 0.1 } }
+      local cabinet = softvt.asset { name = 'cabinet', shape = softvt.shape.box { size = { 0.2, 0.2, 0.01 } }:grounded(),
+        body = softvt.articulated { parts = { drawer } } }
+      return suite(function(scene) pair(scene, { uniform = function() return 0 end })
+        scene:add { name = 'cabinet', asset = cabinet, at = { 1, 0 }, scale = 1.1 } end)";
+    let message = refusal(cabinet);
+    assert!(message.starts_with("x.lua:") && message.contains("scene:add: scale: object \"cabinet\" is articulated"), "{message}");
+}
+
+#[test]
+fn both_tasks_of_a_pair_vary_alike_and_the_two_instances_differ() {
+    let project = project("return suite(pair, softvt.variation(ranges))");
+    let loaded = project.load("x.lua", &[]).expect("a suite");
+    let [first, second] = [0, 1].map(|task| open(&loaded, task, 4).expect("an episode"));
+    assert_eq!(first.scene, second.scene);
+    assert_eq!(first.variation, second.variation);
+    let [left, right] = ["left", "right"].map(|name| object(&first, name));
+    assert!(left.scale != right.scale && left.asset.visuals != right.asset.visuals);
+    assert!(left.youngs_factor() != right.youngs_factor() && left.density_factor() != right.density_factor());
+    assert_eq!(left.nominal, right.nominal);
+    let drawn = first.variation.as_ref().expect("varied").objects["left"];
+    assert_eq!((drawn.scale, Some(drawn.youngs_factor)), (left.scale, left.youngs_factor()));
+    assert_eq!(first.nominal, first.scene, "deformation limits are those of the varied objects");
+}
+
+#[test]
+fn draws_cover_their_ranges_and_leave_places_alone() {
+    let project = project("return suite(pair, softvt.variation(ranges))");
+    let loaded = project.load("x.lua", &[]).expect("a suite");
+    let plain = self::project("return suite(pair)");
+    let plain = plain.load("x.lua", &[]).expect("a suite");
+    let (mut stiffness, mut sizes) = (Vec::new(), Vec::new());
+    for episode in 0..200 {
+        let [varied, same] = [&loaded, &plain].map(|loaded| open(loaded, 0, episode).expect("an episode"));
+        assert_eq!(object(&varied, "left").pose_w, object(&same, "left").pose_w);
+        assert_eq!(same.variation, None);
+        assert_eq!(same.scene.lighting, plain_light());
+        let drawn = varied.variation.expect("varied");
+        assert!((0.7..=1.4).contains(&drawn.light.strength));
+        assert_eq!(drawn.cameras.keys().collect::<Vec<_>>(), ["third_person"], "the camera on the hand stays");
+        stiffness.extend(drawn.objects.values().map(|drawn| drawn.youngs_factor.log2()));
+        sizes.extend(drawn.objects.values().map(|drawn| drawn.scale));
+    }
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    assert!(stiffness.iter().all(|x| (-1.0..=1.0).contains(x)) && mean(&stiffness).abs() < 0.1);
+    assert!(sizes.iter().all(|x| (0.9..=1.1).contains(x)) && (mean(&sizes) - 1.0).abs() < 0.01);
+    let product: Vec<f64> = stiffness.iter().zip(&sizes).map(|(a, b)| a * (b - 1.0)).collect();
+    assert!(mean(&product).abs() < 0.01, "stiffness and size are independent");
+}
+
+fn plain_light() -> softvt_scene::Lighting {
+    softvt_scene::Lighting::default()
+}
+
+#[test]
+fn a_range_changes_only_its_own_factor() {
+    let with = |change: &str| {
+        opened(&format!("{change} return suite(pair, softvt.variation(ranges))")).variation.expect("varied")
+    };
+    let (all, sized) = (with(""), with("ranges.size = { 1, 1 }"));
+    for (name, drawn) in &all.objects {
+        let other = sized.objects[name];
+        assert_eq!(other.scale, 1.0);
+        assert_eq!(softvt_scene::ObjectVariation { scale: drawn.scale, ..other }, *drawn);
+    }
+    assert_eq!((&all.cameras, all.light), (&sized.cameras, sized.light));
+}
+
+#[test]
+fn the_standard_variation_applies_to_any_suite_of_soft_objects() {
+    let standard = format!("{}/../../{}", env!("CARGO_MANIFEST_DIR"), crate::STANDARD_VARIATION);
+    let (ranges, sources) = load_variation(std::path::Path::new(&standard)).expect("a variation");
+    assert_eq!(sources.len(), 1);
+    let project = project("return suite(pair)");
+    let mut loaded = project.load("x.lua", &[]).expect("a suite");
+    loaded.vary(&ranges).expect("it varies");
+    let setup = open(&loaded, 0, 0).expect("an episode");
+    assert_eq!(setup.variation.expect("varied").objects.len(), 2);
+    let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
+    assert_eq!(suite.vary.as_ref(), Some(&ranges));
+    let again = loaded.vary(&ranges).expect_err("it varies already").to_string();
+    assert!(again.contains("suite test varies already"), "{again}");
+}
+
+#[test]
+fn what_cannot_vary_is_refused() {
+    let rigid = "return suite(function(scene) for k, name in ipairs { 'left', 'right' } do
+        scene:add { name = name, asset = rigid, at = { 0.1 * k, 0 } } end end, softvt.variation(ranges)";
+    let message = refusal(&format!("{rigid}, 'rigid')"));
+    assert!(message.starts_with("x.lua:") && message.contains("suite.vary: suite test has object_type = \"rigid\""), "{message}");
+    let message = refusal(&format!("{rigid})"));
+    assert!(message.contains("layout \"pair\" of suite \"test\" has no soft object"), "{message}");
+    let message = refusal("ranges.size = { 1.1, 0.9 } return suite(pair, softvt.variation(ranges))");
+    assert!(message.contains("variation.size: the smallest factor 1.1 comes first and is above 0.9"), "{message}");
+    let message = refusal("ranges.size = nil return suite(pair, softvt.variation(ranges))");
+    assert!(message.starts_with("x.lua:") && message.contains("size"), "{message}");
+}
+
+#[test]
+fn an_object_that_no_hand_can_hold_is_refused_where_it_is_placed() {
+    let message = refusal("ranges.size = { 0.9, 1.5 } return suite(pair, softvt.variation(ranges))");
+    assert_eq!(
+        message,
+        "x.lua:21: object \"left\" is 90.0 mm wide where fingers grasp it, at 1.5 times the size of ball, and the gripper \
+         opens 80 mm; give a smaller scale"
+    );
+    let message = refusal(
+        "return suite(function(scene, rng) pair(scene, rng) scene:object('left').scale = 1.4 end)",
+    );
+    assert!(message.contains("84.0 mm wide"), "{message}");
+}

@@ -1,0 +1,14 @@
+-- Object-Varied: the tasks of Object-Soft, in which no two objects of a kind are alike. Size, stiffness, density, colour, light
+-- and camera differ from episode to episode, so that the closure that holds an object without harm has to be felt.
+local object_soft = require "suites.object_soft"
+local standard = require "variations.standard"
+
+return softvt.suite {
+  name = "object_varied",
+  object_type = "deformable",
+  variation = "object",
+  episodes = 5,
+  tasks = object_soft.tasks,
+  shifts = object_soft.shifts,
+  vary = standard,
+}
