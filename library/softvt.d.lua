@@ -9,6 +9,7 @@
 ---@field episodes? integer Default number of episodes per task. Expects a whole number in 1..1000000. Default 5.
 ---@field tasks softvt.Task[] The tasks, in order.
 ---@field shifts? softvt.Shift[] Changes of the scene that a run can request.
+---@field vary? softvt.Variation Ranges from which the soft objects, the light and the cameras of every episode are drawn.
 ---@field settings? table<string, table<string, any>> Changed settings of physics, robot and judge: { physics = {…}, robot = {…}, criteria = {…} }.
 
 ---A task of a suite.
@@ -45,6 +46,18 @@
 ---@field max? number Highest value. Expects a number.
 ---@field apply fun(scene: softvt.Scene, value: number): softvt.Scene? Changes the scene; may return another one.
 
+---Ranges from which every episode of a suite draws: factors on size, stiffness, density and friction of each soft object, its colour, the light and the poses of the cameras. The policy sees none of the drawn numbers; records do.
+---@class softvt.Variation
+---@field name string Name in results.
+---@field size number[] Smallest and largest factor on the size of a soft object, uniform. Expects a list of 2 numbers in 0.1..10.
+---@field stiffness number[] Factors on Young's modulus, log-uniform. Expects a list of 2 numbers in 0.1..10.
+---@field density number[] Factors on the density, log-uniform. Expects a list of 2 numbers in 0.1..10.
+---@field friction number[] Factors on the coefficients of friction, log-uniform. A pair of surfaces takes the larger coefficient. Expects a list of 2 numbers in 0.1..10.
+---@field colour number Largest relative change of each colour channel of a soft object. Expects a number in 0..0.9.
+---@field light number[] Factors on the strength of lamp and sky, log-uniform. Expects a list of 2 numbers in 0.1..10.
+---@field camera_offset number Largest displacement along each axis of the cameras that are fixed to the world. Expects metres in 0..1.
+---@field camera_rotation number Largest rotation of these cameras about each of their axes. Expects radians in 0..1.
+
 ---Runs suites as they are, then under each condition, and compares them episode by episode.
 ---@class softvt.Conditions
 ---@field name string Name in results.
@@ -75,7 +88,7 @@
 ---@field body softvt.Soft|softvt.Rigid|softvt.Articulated|softvt.Static|softvt.Scenery Mechanics.
 ---@field friction? softvt.Friction Friction of its surface.
 ---@field visuals? softvt.Visual[] Visuals by material id of the shape, from 0; plain grey by default.
----@field hints? table<string, number> Numbers for experts (grasp height, closure …).
+---@field hints? table<string, number> Numbers for experts (grasp height …). Those whose names end in _m are lengths, which follow an object's scale.
 
 ---A finite-element soft body of linear-elastic, isotropic material.
 ---@class softvt.Soft
@@ -455,6 +468,7 @@
 ---@field position? number[] Position of its origin: its lowest point, on the centre line. Expects a list of 3 numbers in -1000..1000 (m, world).
 ---@field yaw? number Rotation about the vertical. Expects radians. Default 0.
 ---@field on? string Scene name of the object or part (cabinet.top_drawer) that it rests on (with at).
+---@field scale? number Size relative to that of the asset. Its material stays, and its mass follows as the cube. Expects a number in 0.1..10. Default 1.
 ---@field joints? table<string, number> Start values of an articulated object's joints by part; 0, or the nearest limit, by default.
 
 ---A camera. Give either look_at or quaternion.
@@ -879,7 +893,7 @@ function Pose:distance(other) end
 local Rng = {}
 
 ---Returns another stream, from its start. Draws from one stream do not change those from another.
----@param name "layout"|"arm"|"material"|"light"|"camera"|"sensor"|"expert"|"script"|"policy"
+---@param name "layout"|"arm"|"material"|"size"|"colour"|"light"|"camera"|"sensor"|"expert"|"script"|"policy"
 ---@return softvt.Rng
 function Rng:stream(name) end
 
@@ -987,6 +1001,7 @@ local Material = {}
 ---@field joints table<string, number> Start values of its joints by part, m or rad.
 ---@field position number[] Position of its origin: its lowest point, on the centre line. Expects a list of 3 numbers in -1000..1000 (m, world).
 ---@field yaw number Rotation about the vertical. Expects radians.
+---@field scale number Size relative to that of its asset. Material numbers stay, and the mass follows as the cube. Expects a number in 0.1..10.
 ---@field density number Density of a soft or rigid body. Expects a number (kg/m³) above 0.
 ---@field youngs_pa number Young's modulus of a soft body. Expects pascals above 0.
 ---@field poisson number Poisson's ratio of a soft body. Expects a number in 0..below 0.5.
@@ -1035,8 +1050,11 @@ function SceneState:clearance(pose, options) end
 ---@field asset string Name of its asset.
 ---@field centre number[] Centre of its bounding box, world frame, m.
 ---@field size number[] Edge lengths of its bounding box at rest, m.
+---@field scale number Size relative to that of its asset. `size` and hints in metres are those of the object itself.
+---@field youngs_factor number? Young's modulus relative to that of its asset; nil unless soft.
+---@field density_factor number? Density relative to that of its asset; nil unless soft or rigid.
 ---@field yaw number Rotation about the vertical, rad.
----@field hints table<string, number> Numbers of its asset for experts.
+---@field hints table<string, number> Numbers of its asset for experts; those whose names end in _m are lengths and follow the scale.
 ---@field joint number? Joint value of a part, m or rad.
 ---@field joints table<string, number> Joint values of an articulated object by part, m or rad.
 ---@field parts table<string, softvt.ObjectState> Parts of an articulated object by name.
@@ -1226,6 +1244,11 @@ function softvt.inside(spec) end
 ---@param spec softvt.Shift
 ---@return softvt.Shift
 function softvt.shift(spec) end
+
+---Ranges from which every episode of a suite draws: factors on size, stiffness, density and friction of each soft object, its colour, the light and the poses of the cameras. The policy sees none of the drawn numbers; records do.
+---@param spec softvt.Variation
+---@return softvt.Variation
+function softvt.variation(spec) end
 
 ---Runs suites as they are, then under each condition, and compares them episode by episode.
 ---@param spec softvt.Conditions
