@@ -47,11 +47,7 @@ impl MassProperties {
 
     /// The same solid at `scale` times the size.
     fn resized(self, scale: f64) -> Self {
-        Self {
-            mass: self.mass * scale.powi(3),
-            com: self.com * scale,
-            inertia: self.inertia * scale.powi(5),
-        }
+        Self { mass: self.mass * scale.powi(3), com: self.com * scale, inertia: self.inertia * scale.powi(5) }
     }
 
     fn transformed(self, pose: &Pose) -> Self {

@@ -52,8 +52,7 @@ impl SoftGeometry {
         };
         let mesh = voxel_mesh(shape, &VoxelSpec { resolution: material.resolution })
             .map_err(|source| BuildError::Geometry { asset: name.to_owned(), source })?;
-        let samples =
-            surface_samples(shape, &mesh, &SampleSpec { grasp_spacing, ..SampleSpec::default() });
+        let samples = surface_samples(shape, &mesh, &SampleSpec { grasp_spacing, ..SampleSpec::default() });
         Ok(Self { mesh, samples, volume })
     }
 
@@ -195,7 +194,8 @@ mod tests {
         let ratio = scaled.total_mass() / nominal.total_mass();
         assert!((ratio - 1.12f64.powi(3)).abs() < 1e-9, "{ratio}");
         // The same as an asset that is declared at that size.
-        let declared = soft_model("ball", &Shape::Sphere { radius: 1.12 * RADIUS }, &material).expect("meshed");
+        let declared =
+            soft_model("ball", &Shape::Sphere { radius: 1.12 * RADIUS }, &material).expect("meshed");
         assert!((declared.total_mass() / scaled.total_mass() - 1.0).abs() < 1e-9);
         assert_eq!(declared.mesh.elements.len(), scaled.mesh.elements.len());
     }

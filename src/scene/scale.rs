@@ -104,13 +104,9 @@ impl Mask {
             Self::Gradient { axis, from_m, to_m } => {
                 Self::Gradient { axis: *axis, from_m: length(from_m), to_m: length(to_m) }
             }
-            Self::Noise { size_m, octaves, from, to, seed } => Self::Noise {
-                size_m: vector(size_m),
-                octaves: *octaves,
-                from: *from,
-                to: *to,
-                seed: *seed,
-            },
+            Self::Noise { size_m, octaves, from, to, seed } => {
+                Self::Noise { size_m: vector(size_m), octaves: *octaves, from: *from, to: *to, seed: *seed }
+            }
             Self::Rings { centre_m, pitch_m, wobble_m, seed } => Self::Rings {
                 centre_m: vector(centre_m),
                 pitch_m: length(pitch_m),
@@ -155,21 +151,11 @@ mod tests {
     use softvt_physics::contact::Friction;
 
     fn ball() -> Object {
-        let material = SoftMaterial {
-            youngs_pa: 2e4,
-            poisson: 0.4,
-            density: 300.0,
-            resolution: 6,
-            grasp_spacing: 1e-3,
-        };
+        let material =
+            SoftMaterial { youngs_pa: 2e4, poisson: 0.4, density: 300.0, resolution: 6, grasp_spacing: 1e-3 };
         let gradient = Mask::Gradient { axis: [0.0, 0.0, 1.0], from_m: 0.01, to_m: 0.05 };
-        let layer = VisualLayer {
-            mask: gradient,
-            albedo: [0.9; 3],
-            roughness: 0.5,
-            opacity: 1.0,
-            relief_m: 1e-4,
-        };
+        let layer =
+            VisualLayer { mask: gradient, albedo: [0.9; 3], roughness: 0.5, opacity: 1.0, relief_m: 1e-4 };
         let asset = Arc::new(Asset {
             name: "ball".to_owned(),
             shape: Shape::Sphere { radius: 0.03 }.translated(Vec3::z() * 0.03),

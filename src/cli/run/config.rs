@@ -155,7 +155,8 @@ impl RunConfig {
     pub(crate) fn load_script(&self) -> Result<LoadedScript, CliError> {
         let mut loaded = softvt_script::load(&self.script.file, &self.script.options)?;
         if let Some(file) = &self.script.vary {
-            let (ranges, _) = softvt_script::load_variation(file).map_err(|error| CliError::from(error).prefixed("--vary"))?;
+            let (ranges, _) = softvt_script::load_variation(file)
+                .map_err(|error| CliError::from(error).prefixed("--vary"))?;
             loaded.vary(&ranges).map_err(|error| self.error(format!("--vary: {error}")))?;
         }
         Ok(loaded)

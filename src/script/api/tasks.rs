@@ -241,7 +241,11 @@ fn check_variation(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<()
         let [min, max] = table.raw_get::<[f64; 2]>(key)?;
         if min > max {
             let message = format!("the smallest factor {min} comes first and is above {max}; swap them");
-            return Err(error_at_key(lua, record.label, &ValidationError { path: vec![key.into()], message }));
+            return Err(error_at_key(
+                lua,
+                record.label,
+                &ValidationError { path: vec![key.into()], message },
+            ));
         }
     }
     Ok(())

@@ -27,7 +27,9 @@ use crate::{
     },
 };
 use options::{OptionSession, OptionSpec, SharedOptions};
-use softvt_benchmark::{Condition, Goal, GoalKind, ObjectType, Plan, Shift, ShiftValue, Suite, Task, Variation};
+use softvt_benchmark::{
+    Condition, Goal, GoalKind, ObjectType, Plan, Shift, ShiftValue, Suite, Task, Variation,
+};
 use softvt_common::{parallel::lock, text::unknown_name};
 
 /// The files of a script and the command line that they ran with: enough to run it again without the disk.

@@ -91,7 +91,11 @@ fn an_articulated_object_has_one_size() {
       return suite(function(scene) pair(scene, { uniform = function() return 0 end })
         scene:add { name = 'cabinet', asset = cabinet, at = { 1, 0 }, scale = 1.1 } end)";
     let message = refusal(cabinet);
-    assert!(message.starts_with("x.lua:") && message.contains("scene:add: scale: object \"cabinet\" is articulated"), "{message}");
+    assert!(
+        message.starts_with("x.lua:")
+            && message.contains("scene:add: scale: object \"cabinet\" is articulated"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -124,7 +128,11 @@ fn draws_cover_their_ranges_and_leave_places_alone() {
         assert_eq!(same.scene.lighting, plain_light());
         let drawn = varied.variation.expect("varied");
         assert!((0.7..=1.4).contains(&drawn.light.strength));
-        assert_eq!(drawn.cameras.keys().collect::<Vec<_>>(), ["third_person"], "the camera on the hand stays");
+        assert_eq!(
+            drawn.cameras.keys().collect::<Vec<_>>(),
+            ["third_person"],
+            "the camera on the hand stays"
+        );
         stiffness.extend(drawn.objects.values().map(|drawn| drawn.youngs_factor.log2()));
         sizes.extend(drawn.objects.values().map(|drawn| drawn.scale));
     }
@@ -174,11 +182,18 @@ fn what_cannot_vary_is_refused() {
     let rigid = "return suite(function(scene) for k, name in ipairs { 'left', 'right' } do
         scene:add { name = name, asset = rigid, at = { 0.1 * k, 0 } } end end, softvt.variation(ranges)";
     let message = refusal(&format!("{rigid}, 'rigid')"));
-    assert!(message.starts_with("x.lua:") && message.contains("suite.vary: suite test has object_type = \"rigid\""), "{message}");
+    assert!(
+        message.starts_with("x.lua:")
+            && message.contains("suite.vary: suite test has object_type = \"rigid\""),
+        "{message}"
+    );
     let message = refusal(&format!("{rigid})"));
     assert!(message.contains("layout \"pair\" of suite \"test\" has no soft object"), "{message}");
     let message = refusal("ranges.size = { 1.1, 0.9 } return suite(pair, softvt.variation(ranges))");
-    assert!(message.contains("variation.size: the smallest factor 1.1 comes first and is above 0.9"), "{message}");
+    assert!(
+        message.contains("variation.size: the smallest factor 1.1 comes first and is above 0.9"),
+        "{message}"
+    );
     let message = refusal("ranges.size = nil return suite(pair, softvt.variation(ranges))");
     assert!(message.starts_with("x.lua:") && message.contains("size"), "{message}");
 }
@@ -191,8 +206,7 @@ fn an_object_that_no_hand_can_hold_is_refused_where_it_is_placed() {
         "x.lua:21: object \"left\" is 90.0 mm wide where fingers grasp it, at 1.5 times the size of ball, and the gripper \
          opens 80 mm; give a smaller scale"
     );
-    let message = refusal(
-        "return suite(function(scene, rng) pair(scene, rng) scene:object('left').scale = 1.4 end)",
-    );
+    let message =
+        refusal("return suite(function(scene, rng) pair(scene, rng) scene:object('left').scale = 1.4 end)");
     assert!(message.contains("84.0 mm wide"), "{message}");
 }
