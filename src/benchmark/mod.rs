@@ -173,6 +173,8 @@ pub enum Plan {
         points: usize,
         /// Columns of the table of rows, in order; all of them, sorted, if empty.
         columns: Vec<String>,
+        /// True if a function summarises the rows, which can return files to write.
+        has_finish: bool,
     },
 }
 

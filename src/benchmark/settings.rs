@@ -77,6 +77,20 @@ impl Settings {
         Ok(changed)
     }
 
+    /// The physics alone with the fields at dotted paths set, for simulations without the control steps of the
+    /// benchmark: `physics.dt` need not divide [`CONTROL_DT`].
+    ///
+    /// # Errors
+    /// As [`Settings::with_all`].
+    pub fn physics_with(&self, fields: &[(String, String)]) -> Result<PhysicsParams, SettingsError> {
+        let mut changed = self.clone();
+        for (path, value) in fields {
+            changed = changed.replaced(path, value)?;
+        }
+        changed.physics.validate()?;
+        Ok(changed.physics)
+    }
+
     fn replaced(&self, path: &str, value: &str) -> Result<Self, SettingsError> {
         let path = &current_path(path);
         let refused = |e: serde_json::Error| refusal(path, value, &e.to_string());

@@ -1,21 +1,33 @@
 //! Standard output and progress.
 
-use std::io::{IsTerminal, Write};
+use std::io::{self, IsTerminal, Write};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::error::CliError;
 use softvt_common::text;
 
-/// Prints to standard output with control characters escaped. Ignores write errors: a closed pipe does
-/// not end a command.
-pub(crate) fn print(text: &str) {
-    let mut out = std::io::stdout().lock();
-    let _ = out.write_all(text::escape_control(text).as_bytes()).and_then(|()| out.flush());
+/// Prints to standard output with control characters escaped. A closed pipe (`| head -1`) is no error: the reader has
+/// what it wants.
+///
+/// # Errors
+/// The text cannot be written, for example to a full disk.
+pub(crate) fn print(text: &str) -> Result<(), CliError> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text::escape_control(text).as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(CliError::input(format!("cannot write to standard output: {error}")))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Prints a value as indented JSON.
-pub(crate) fn print_json(value: &impl serde::Serialize) {
-    print(&format!("{:#}\n", serde_json::json!(value)));
+///
+/// # Errors
+/// As [`print`].
+pub(crate) fn print_json(value: &impl serde::Serialize) -> Result<(), CliError> {
+    print(&format!("{:#}\n", serde_json::json!(value)))
 }
 
 /// Formats rows of equal length in columns that are two spaces apart and as wide as their longest cell.

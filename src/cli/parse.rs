@@ -10,6 +10,7 @@ use super::{
     commands::{Command, run::RunArgs},
     error::CliError,
     output::print,
+    run::plan_flags::GivenFlag,
 };
 use softvt_common::text;
 use softvt_script::{OptionSpec, OptionValue};
@@ -36,10 +37,11 @@ pub(super) fn parse(words: &[String]) -> Result<Option<Command>, CliError> {
         text::eprint_line(short_help(command).trim_end());
         return Err(CliError::input(""));
     }
+    let flags = flags_of(&command);
     let matches = match command.try_get_matches_from(words) {
         Ok(matches) => matches,
         Err(error) if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
-            print(&error.to_string());
+            print(&error.to_string())?;
             return Ok(None);
         }
         Err(error) => return Err(in_file(usage_error(&error.to_string()))),
@@ -60,6 +62,7 @@ pub(super) fn parse(words: &[String]) -> Result<Option<Command>, CliError> {
     let mut command = parsed.map_err(|error| in_file(usage_error(&error.to_string())))?;
     if let Some(script) = command.script_mut() {
         script.options = given_options(innermost, &options);
+        script.given = given_flags(innermost, &flags);
     }
     Ok(Some(command))
 }
@@ -103,9 +106,12 @@ fn with_script_options(
     Ok(command)
 }
 
-/// Identifier of a script's option among the arguments; a colon cannot occur in those of the commands.
+/// Start of the identifier of a script's option among the arguments; a colon cannot occur in those of the commands.
+const SCRIPT_ARG: &str = "script:";
+
+/// Identifier of a script's option among the arguments.
 fn script_arg_id(option: &OptionSpec) -> String {
-    format!("script:{}", option.name)
+    format!("{SCRIPT_ARG}{}", option.name)
 }
 
 fn script_arg(option: &OptionSpec) -> Arg {
@@ -134,6 +140,28 @@ fn given_options(matches: &ArgMatches, options: &[OptionSpec]) -> Vec<String> {
         Some(format!("{}={value}", option.flag()))
     });
     given.collect()
+}
+
+/// The flags of all commands without the options of a script.
+fn flags_of(command: &clap::Command) -> Vec<GivenFlag> {
+    let own = command.get_arguments().filter_map(|arg| {
+        let id = arg.get_id().to_string();
+        let long = arg.get_long().filter(|_| !id.starts_with(SCRIPT_ARG))?.to_owned();
+        Some(GivenFlag { id, long })
+    });
+    let mut flags: Vec<GivenFlag> = own.collect();
+    for inner in command.get_subcommands().flat_map(flags_of) {
+        if !flags.contains(&inner) {
+            flags.push(inner);
+        }
+    }
+    flags
+}
+
+/// Those of `flags` that are given.
+fn given_flags(matches: &ArgMatches, flags: &[GivenFlag]) -> Vec<GivenFlag> {
+    let is_known = |flag: &GivenFlag| matches.try_contains_id(&flag.id).is_ok();
+    flags.iter().filter(|flag| is_known(flag) && is_given(matches, &flag.id)).cloned().collect()
 }
 
 fn is_given(matches: &ArgMatches, id: &str) -> bool {

@@ -10,6 +10,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use super::softvtbench_files;
 use softvt_common::files::{self, FileError};
 use softvt_evaluation::record::EpisodeRecord;
 
@@ -20,6 +21,9 @@ pub const RUN: &str = "run.json";
 /// Results of a finished run.
 pub const SUMMARY: &str = "summary.json";
 
+/// Folders with files of single episodes.
+pub(super) const EPISODE_FOLDERS: [&str; 4] = ["actions", "trace", "video", softvtbench_files::FOLDER];
+
 /// Error of using a run folder.
 #[derive(Debug, thiserror::Error)]
 pub enum RunFolderError {
@@ -28,6 +32,9 @@ pub enum RunFolderError {
         "{dir} already holds a run ({found}): resume it with --resume, or give another folder with --out"
     )]
     Occupied { dir: String, found: &'static str },
+    /// `found` is a file that no run has written.
+    #[error("{dir} is not empty and holds no run (it contains {found}); give a new folder with --out")]
+    Foreign { dir: String, found: String },
     #[error("another softvt process is using {dir}; wait for it to finish, or stop it")]
     Busy { dir: String },
     #[error(transparent)]
@@ -56,13 +63,34 @@ impl RunFolder {
         }
     }
 
+    /// Checks that `dir` is new or empty.
+    ///
+    /// # Errors
+    /// The folder holds a run or anything else.
+    pub fn check_new(dir: &Path) -> Result<(), RunFolderError> {
+        Self::check_vacant(dir)?;
+        check_own(dir)
+    }
+
+    /// Checks that `dir`, which shall hold the folders of several runs, is new or empty, or holds such folders already.
+    ///
+    /// # Errors
+    /// The folder holds something else.
+    pub fn check_parent(dir: &Path) -> Result<(), RunFolderError> {
+        let holds_runs = |dir: &Path| subfolders(dir).iter().any(|inner| inner.join(EPISODES).is_file());
+        match holds_runs(dir) || subfolders(dir).iter().any(|inner| holds_runs(inner)) {
+            true => Ok(()),
+            false => check_own(dir),
+        }
+    }
+
     /// Creates `dir` with an empty `episodes.jsonl`.
     ///
     /// # Errors
     /// The folder holds a run, or cannot be created or written to.
     pub fn create(dir: &Path) -> Result<Self, RunFolderError> {
         files::create_folder(dir)?;
-        Self::check_vacant(dir)?;
+        Self::check_new(dir)?;
         let path = dir.join(EPISODES);
         // `create_new`: if two runs start in one folder at the same time, one must fail here.
         let episodes = OpenOptions::new().append(true).create_new(true).open(&path).map_err(|source| {
@@ -84,6 +112,9 @@ impl RunFolder {
     /// Another process is using the folder, a line is not an episode, or the system refuses.
     pub fn resume(dir: &Path) -> Result<(Self, Vec<EpisodeRecord>), RunFolderError> {
         files::create_folder(dir)?;
+        if !dir.join(EPISODES).exists() {
+            check_own(dir)?;
+        }
         let path = dir.join(EPISODES);
         let episodes = OpenOptions::new().read(true).append(true).create(true).open(&path);
         let mut episodes = episodes.map_err(FileError::io("open", &path))?;
@@ -148,9 +179,33 @@ impl RunFolder {
         for name in [RUN, EPISODES] {
             files::remove_if_present(&self.dir.join(name))?;
         }
+        for name in EPISODE_FOLDERS {
+            match fs::remove_dir_all(self.dir.join(name)) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                    return Err(FileError::io("remove", &self.dir.join(name))(error).into());
+                }
+                _ => {}
+            }
+        }
         // Fails if the folder holds other files, which must stay.
         let _ = fs::remove_dir(&self.dir);
         Ok(())
+    }
+}
+
+fn subfolders(dir: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(dir).into_iter().flatten().filter_map(Result::ok);
+    entries.map(|entry| entry.path()).filter(|path| path.is_dir()).collect()
+}
+
+/// Checks that a folder without a run is new or empty, so that a run never mixes its files with others. Hidden files
+/// do not count: systems and editors leave them anywhere.
+fn check_own(dir: &Path) -> Result<(), RunFolderError> {
+    let Ok(entries) = fs::read_dir(dir) else { return Ok(()) };
+    let names = entries.filter_map(Result::ok).map(|entry| entry.file_name().to_string_lossy().into_owned());
+    match names.filter(|name| !name.starts_with('.')).min() {
+        None => Ok(()),
+        Some(found) => Err(RunFolderError::Foreign { dir: dir.display().to_string(), found }),
     }
 }
 

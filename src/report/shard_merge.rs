@@ -9,9 +9,9 @@ use std::{
 use serde_json::Value;
 
 use super::{
-    run_folder::{EPISODES, RUN, SUMMARY},
+    run_folder::{EPISODE_FOLDERS, EPISODES, RUN, SUMMARY},
     softvtbench_files,
-    stored_run::{StoredRun, StoredRunError, load},
+    stored_run::{StoredRun, StoredRunError, load, remove_folder},
 };
 use softvt_common::files::{self, FileError};
 use softvt_evaluation::{
@@ -20,9 +20,6 @@ use softvt_evaluation::{
     summary::SuiteSummary,
     thresholds::{ThresholdError, ThresholdFile},
 };
-
-/// Folders with files of single episodes.
-const EPISODE_FOLDERS: [&str; 4] = ["actions", "trace", "video", softvtbench_files::FOLDER];
 
 /// Error of merging shards.
 #[derive(Debug, thiserror::Error)]
@@ -99,9 +96,10 @@ impl<'a> MergedRun<'a> {
         let manifest_without_shard = |run: &StoredRun| {
             let mut manifest = run.manifest.clone();
             manifest.as_object_mut().map(|map| map.shift_remove("shard"));
+            remove_folder(&mut manifest);
             manifest
         };
-        let manifest = manifest_without_shard(&shards[0]);
+        let mut manifest = manifest_without_shard(&shards[0]);
         let mut seen: BTreeMap<EpisodeIndex, &StoredRun> = BTreeMap::new();
         for run in shards {
             let dir = || run.dir.display().to_string();
@@ -120,21 +118,24 @@ impl<'a> MergedRun<'a> {
             }
         }
         let tasks = manifest["tasks"].as_array().into_iter().flatten();
-        let tasks = tasks.filter_map(|task| Some(task.as_u64()? as usize));
+        let tasks: BTreeSet<usize> = tasks.filter_map(|task| Some(task.as_u64()? as usize)).collect();
         let episodes = manifest["episodes"].as_u64().unwrap_or(0) as u32;
-        let expected: BTreeSet<EpisodeIndex> =
-            tasks.flat_map(|task| (0..episodes).map(move |episode| EpisodeIndex { task, episode })).collect();
-        let missing: Vec<_> = expected.iter().filter(|index| !seen.contains_key(index)).collect();
-        if let Some(&&first) = missing.first() {
-            return Err(MergeError::Missing {
-                suite: shards[0].text("suite").to_owned(),
-                missing: missing.len(),
-                expected: expected.len(),
-                first,
-            });
+        let expected = tasks.len() * episodes as usize;
+        let of_task = |task: usize| (0..episodes).map(move |episode| EpisodeIndex { task, episode });
+        let first_missing =
+            tasks.iter().flat_map(|task| of_task(*task)).find(|index| !seen.contains_key(index));
+        if let Some(first) = first_missing {
+            let is_expected = |index: &&EpisodeIndex| tasks.contains(&index.task) && index.episode < episodes;
+            let missing = expected - seen.keys().filter(is_expected).count();
+            let suite = shards[0].text("suite").to_owned();
+            return Err(MergeError::Missing { suite, missing, expected, first });
         }
         let mut records: Vec<EpisodeRecord> = shards.iter().flat_map(|run| run.records.clone()).collect();
         records.sort_by_key(|r| r.header.id.index());
+        // The shards may have run on several machines. Their scripts are looked for in the folder of the first.
+        if let (Some(fields), Some(folder)) = (manifest.as_object_mut(), shards[0].manifest.get("folder")) {
+            fields.insert("folder".to_owned(), folder.clone());
+        }
         Ok(Self { shards, manifest, records })
     }
 

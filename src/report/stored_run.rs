@@ -43,10 +43,19 @@ pub enum StoredRunError {
     Missing { dir: String },
     #[error("{path} is a file; give the folder of a run")]
     File { path: String },
+    #[error("{dir} holds an experiment, not a run of a suite; its rows are in {dir}/rows.jsonl")]
+    Experiment { dir: String },
     #[error("{dir} holds no run: neither the folder nor any of its subfolders has {RUN} and {EPISODES}")]
     None { dir: String },
     #[error("{path} is not a valid run file: {what}")]
     Manifest { path: String, what: String },
+}
+
+/// Removes the folder in which a run was made from its manifest. Runs that differ in it alone are the same.
+pub fn remove_folder(manifest: &mut Value) {
+    if let Some(fields) = manifest.as_object_mut() {
+        fields.shift_remove("folder");
+    }
 }
 
 impl StoredRun {
@@ -139,7 +148,7 @@ pub fn load(dir: &Path) -> Result<Vec<StoredRun>, StoredRunError> {
         }
         Err(error) => return Err(FileError::io("read", dir)(error).into()),
     };
-    inner.retain(|path| path.join(RUN).is_file());
+    inner.retain(|path| path.join(RUN).is_file() && path.join(EPISODES).is_file());
     inner.sort();
     if inner.is_empty() {
         return Err(StoredRunError::None { dir: name() });
@@ -152,6 +161,9 @@ fn load_one(dir: &Path) -> Result<StoredRun, StoredRunError> {
     let invalid = |what: String| StoredRunError::Manifest { path: path.display().to_string(), what };
     let manifest: Value =
         serde_json::from_str(&files::read_text(&path)?).map_err(|e| invalid(e.to_string()))?;
+    if manifest["experiment"].is_string() {
+        return Err(StoredRunError::Experiment { dir: dir.display().to_string() });
+    }
     let version = manifest["softvt"].as_str().unwrap_or_default().to_owned();
     let read = || {
         let has = |field: &str, is_type: fn(&Value) -> bool| {

@@ -82,6 +82,19 @@ fn datasets_are_checked_and_reproduced() {
     assert!(project.refusal("replay a 0/2").contains("no such demonstration"));
     assert!(project.succeeds("dataset stats a").out.contains("length (steps)"));
     assert!(project.text("a/stats.svg").starts_with("<svg"));
+    project.write("elsewhere/note.txt", b"");
+    for words in ["dataset check ../a", "replay ../a 0/1"] {
+        let mut command = project.command(words);
+        command.current_dir(project.path("elsewhere"));
+        let output = crate::support::run_command(command);
+        assert_eq!(output.code, 0, "{words}: {}", output.err);
+        assert!(output.out.contains("byte-identical, final state"), "{words}: {}", output.out);
+    }
+    let script = project.text("x.lua");
+    fs::rename(project.path("x.lua"), project.path("y.lua")).expect("renamed");
+    let lost = project.refusal("dataset check a");
+    assert!(lost.contains("a: its script x.lua is neither in the working folder nor in"), "{lost}");
+    project.write("x.lua", script.as_bytes());
     project.write("a/videos/one_task0/demo_0_eye_in_hand_rgb.mp4", b"not a video");
     let hdf5 = project.path("a/hdf5/one_task0_demo.hdf5");
     let whole = fs::read(&hdf5).expect("read");

@@ -11,6 +11,7 @@ mod determinism;
 mod documentation;
 mod expert_failure;
 mod external_scorer;
+mod flags;
 mod initial_state_coverage;
 mod interrupt;
 mod invalid_scenes;

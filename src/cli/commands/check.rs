@@ -10,7 +10,8 @@ use crate::{
     run::{
         conditions,
         config::{RunConfig, RunFlags, ScriptArgs},
-        policy::{PolicyArgs, PolicyConfig},
+        episode_list::EpisodeList,
+        policy::PolicyArgs,
         selection::{check_distinct_out_dirs, select_episodes},
         suite_run::SuiteRun,
     },
@@ -21,7 +22,7 @@ use softvt_common::{
     text::{self, counted},
 };
 use softvt_rollout::{AssetCache, SensorAssets, cancel};
-use softvt_script::SceneBuilder;
+use softvt_script::{ExperimentInput, SceneBuilder};
 
 /// Check a script without running it
 #[derive(Args, Clone, Debug)]
@@ -39,27 +40,25 @@ pub(crate) struct CheckArgs {
 /// The first thing that is not valid.
 pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
     let config = RunConfig::new(args.script, RunFlags::default())?;
-    let config = &config.with_policy(PolicyConfig::load(&args.policy)?);
-    let loaded = config.load_script()?;
+    let (config, loaded) = &config.load_plan("check", &args.policy)?;
     let plan = &loaded.plan;
     check_distinct_out_dirs(config, plan.suites())?;
     let (assets, sensor_assets) = (AssetCache::approximate(), SensorAssets::default());
     for suite in plan.suites() {
-        let mut run = SuiteRun::new(config, &loaded, suite, Vec::new(), PathBuf::new())?;
+        let mut run = SuiteRun::new(config, loaded, suite, EpisodeList::listed(Vec::new()), PathBuf::new())?;
         (run.assets, run.sensor_assets) = (assets.clone(), sensor_assets.clone());
         check_suite(run)?;
     }
     match plan {
         Plan::Suite(_) | Plan::Suites { .. } => {}
-        Plan::Conditions { suites, conditions, .. } => {
-            conditions::check(config, &loaded, suites, conditions)?
-        }
+        Plan::Conditions { suites, conditions, .. } => conditions::check(config, loaded, suites, conditions)?,
         Plan::Experiment { name, points, .. } => {
-            print(&format!("experiment {name}: {}, not run by this check\n", counted(*points, "point")));
+            ExperimentInput::new(config.settings.clone(), config.script.seed)
+                .map_err(|error| config.error(error))?;
+            print(&format!("experiment {name}: {}, not run by this check\n", counted(*points, "point")))?;
         }
     }
-    print(&format!("{}: OK\n", config.script.file.display()));
-    Ok(())
+    print(&format!("{}: OK\n", config.script.file.display()))
 }
 
 fn check_suite(mut run: SuiteRun) -> Result<(), CliError> {
@@ -73,7 +72,7 @@ fn check_suite(mut run: SuiteRun) -> Result<(), CliError> {
         suite.name,
         counted(tasks.len(), "task"),
         counted(suite.episodes as usize, "episode")
-    ));
+    ))?;
     for task in tasks {
         let expert = if task.expert { "" } else { ", no expert" };
         let Goal { kind, object, target, .. } = &task.goal;
@@ -82,7 +81,7 @@ fn check_suite(mut run: SuiteRun) -> Result<(), CliError> {
             GoalKind::Inside => "in",
         };
         let (id, prompt) = (task.id, text::escape_control(&task.prompt));
-        print(&format!("{id:>4} {prompt}: {object} {relation} {target}{expert}\n"));
+        print(&format!("{id:>4} {prompt}: {object} {relation} {target}{expert}\n"))?;
     }
     Ok(())
 }

@@ -9,7 +9,7 @@ use crate::{
     output::print,
     run::{
         config::{RunConfig, ScriptArgs, thread_count},
-        selection::EpisodeJob,
+        episode_list::{EpisodeJob, EpisodeList},
         suite_run::SuiteRun,
     },
 };
@@ -36,16 +36,15 @@ pub(super) fn run() -> Result<(), CliError> {
         std::env::consts::OS,
         thread_count(None),
         if cfg!(target_feature = "avx2") { "avx2" } else { "portable (slower; the same results)" },
-    ));
+    ))?;
     let Some(golden) = softvt_script::embedded("assets/golden.json") else {
-        print("golden     none in this build\n");
-        return Ok(());
+        return print("golden     none in this build\n");
     };
     let golden: GoldenEpisode = serde_json::from_slice(golden)?;
     let hash = run_golden(&golden)?.stats.state_hash;
     let is_same = hash == golden.state_hash;
     let verdict = if is_same { "matches the published one" } else { "DIFFERS from the published one" };
-    print(&format!("golden     {} task {}: {hash}, {verdict}\n", golden.script, golden.task));
+    print(&format!("golden     {} task {}: {hash}, {verdict}\n", golden.script, golden.task))?;
     if is_same { Ok(()) } else { Err(mismatch(&golden)) }
 }
 
@@ -61,7 +60,7 @@ fn run_golden(golden: &GoldenEpisode) -> Result<EpisodeRecord, CliError> {
     let task =
         task.ok_or_else(|| CliError::input(format!("{} has no task {}", golden.script, golden.task)))?;
     let job = EpisodeJob { task, episode: 0 };
-    let run = SuiteRun::new(&config, &loaded, suite, vec![job], PathBuf::new())?;
+    let run = SuiteRun::new(&config, &loaded, suite, EpisodeList::listed(vec![job]), PathBuf::new())?;
     Ok(run.run_episode(job, false, &run.controllers)?.record)
 }
 

@@ -56,8 +56,7 @@ fn write_stubs(dir: &Path) -> Result<(), CliError> {
     write(&dir.join(STUB_FILE), stubs().as_bytes())?;
     let settings = dir.join(".luarc.json");
     if settings.exists() {
-        print(&format!("kept {}\n", settings.display()));
-        return Ok(());
+        return print(&format!("kept {}\n", settings.display()));
     }
     write(&settings, LUARC.as_bytes())
 }
@@ -75,12 +74,10 @@ fn write_skeleton(dir: &Path) -> Result<(), CliError> {
     write_stubs(dir)?;
     let suite = dir.join(SUITE.path);
     let suite = suite.strip_prefix(".").unwrap_or(&suite).display();
-    print(&format!("now: softvt check {suite}, softvt {suite}; next: docs/write-a-task.md\n"));
-    Ok(())
+    print(&format!("now: softvt check {suite}, softvt {suite}; next: docs/write-a-task.md\n"))
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
     files::replace(path, bytes)?;
-    print(&format!("wrote {}\n", path.display()));
-    Ok(())
+    print(&format!("wrote {}\n", path.display()))
 }

@@ -50,12 +50,7 @@ pub(super) fn run(args: &ListArgs) -> Result<(), CliError> {
         ListKind::Suites => plans()?.iter().filter_map(|(path, plan)| suite_row(path, plan)).collect(),
         ListKind::Tasks => plans()?.iter().flat_map(|(path, plan)| task_rows(path, plan)).collect::<Vec<_>>(),
     };
-    if args.json {
-        print_json(&rows);
-    } else {
-        print(&table(&rows));
-    }
-    Ok(())
+    if args.json { print_json(&rows) } else { print(&table(&rows)) }
 }
 
 /// Formats rows as a table with the keys of all rows as headings. Numbers are right-aligned.

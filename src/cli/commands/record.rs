@@ -7,9 +7,10 @@ use crate::{
     error::CliError,
     run::{
         config::ScriptArgs,
-        policy::{PolicyArgs, PolicyConfig, expert_controller},
+        episode_list::EpisodeList,
+        policy::{PolicyArgs, expert_controller},
         recording::{GripLog, RecordingArgs, SuiteRecording, record_all},
-        selection::{EpisodeJob, select_suites, select_tasks},
+        selection::{select_suites, select_tasks},
         suite_run::SuiteRun,
     },
 };
@@ -52,11 +53,10 @@ pub(crate) struct RecordArgs {
 /// few attempts are good.
 pub(super) fn run(args: RecordArgs) -> Result<(), CliError> {
     let (recording, demos) = (&args.recording, args.demos);
-    let config =
-        recording.run_config(args.script, args.tasks)?.with_policy(PolicyConfig::load(&args.policy)?);
+    let config = recording.run_config(args.script, args.tasks)?;
     let default_attempts = demos.saturating_mul(ATTEMPTS_PER_DEMO).max(MIN_ATTEMPTS);
     let max_attempts = args.attempts.unwrap_or(default_attempts);
-    let loaded = config.load_script()?;
+    let (config, loaded) = config.load_plan("record", &args.policy)?;
     let suites = select_suites("record", &config, &loaded.plan)?;
     let names: Vec<String> = suites.iter().map(|suite| config.suite_name(suite)).collect();
     let request = json!({
@@ -68,21 +68,12 @@ pub(super) fn run(args: RecordArgs) -> Result<(), CliError> {
     });
     record_all(recording, &request, || {
         let prepare = |suite| {
-            let tasks = select_tasks(&config, suite)?.into_iter();
-            let jobs =
-                tasks.flat_map(|task| (0..max_attempts).map(move |episode| EpisodeJob { task, episode }));
-            SuiteRecording::new(
-                &config,
-                recording,
-                &loaded,
-                suite,
-                jobs.collect(),
-                Some(demos),
-                |run, log| {
-                    record_grips(run, log);
-                    Ok(())
-                },
-            )
+            let tasks = select_tasks(&config, suite)?;
+            let jobs = EpisodeList::of_tasks(&tasks, max_attempts, None);
+            SuiteRecording::new(&config, recording, &loaded, suite, tasks, jobs, Some(demos), |run, log| {
+                record_grips(run, log);
+                Ok(())
+            })
         };
         suites.iter().map(prepare).collect()
     })

@@ -10,7 +10,12 @@ use clap::Args;
 use crate::{
     error::{CliError, Exit},
     output::print,
-    run::replay::{DemoRef, StoredManifest, check_complete, demos_of, difference, replay_demos},
+    run::{
+        replay::{
+            DemoRef, StoredManifest, check_complete, demos_of, difference, report_replays, simulate_demos,
+        },
+        stored_folder::{enter_for_dataset, enter_for_run},
+    },
 };
 use softvt_common::text::counted;
 use softvt_dataset::{
@@ -63,7 +68,8 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
     let dir = &args.run;
     if is_dataset(dir) {
         check_complete(dir)?;
-        return replay_demos(&[find_demo(dir, args.episode)?]);
+        let demos = [find_demo(&enter_for_dataset(dir)?, args.episode)?];
+        return report_replays(&demos, &simulate_demos(&demos)?);
     }
     let stored = stored_run::load(dir)?;
     let [stored] = &stored[..] else {
@@ -76,14 +82,12 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
     };
     let record = find_episode(stored, args.episode)?;
     let index = record.header.id.index();
-    let path = actions::path(&stored.dir, index);
-    let manifest = StoredManifest { path: &stored.dir, manifest: &stored.manifest };
+    let dir = enter_for_run(stored)?;
+    let path = actions::path(&dir, index);
+    let manifest = StoredManifest { path: &dir, manifest: &stored.manifest };
     let simulated = manifest.simulate(record, actions::read(&path)?)?;
     match difference(record, &simulated)? {
-        None => {
-            print(&format!("{index}: byte-identical, final state {}\n", simulated.stats.state_hash));
-            Ok(())
-        }
+        None => print(&format!("{index}: byte-identical, final state {}\n", simulated.stats.state_hash)),
         Some(difference) => Err(CliError::new(
             Exit::Internal,
             format!(

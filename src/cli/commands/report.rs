@@ -97,7 +97,6 @@ pub(super) fn compare(args: &CompareArgs) -> Result<(), CliError> {
         true => print_json(&compared),
         false => print(&comparison::table(&compared)),
     }
-    Ok(())
 }
 
 /// Merges shards into a new folder and prints the tables of the merged runs.
@@ -106,7 +105,7 @@ pub(super) fn compare(args: &CompareArgs) -> Result<(), CliError> {
 /// The shards do not belong to one run, or a file cannot be read or written.
 pub(super) fn merge(args: &MergeArgs) -> Result<(), CliError> {
     let summaries = shard_merge::merge(&args.out, &args.shards)?;
-    summaries.iter().for_each(|summary| print(&terminal::table(summary)));
+    summaries.iter().try_for_each(|summary| print(&terminal::table(summary)))?;
     eprint_notice(args.out.display());
     Ok(())
 }

@@ -12,15 +12,15 @@ use crate::{
         config::{RunConfig, RunFlags, ScriptArgs},
         episode_artifacts::VideoSelection,
         evaluate::run_suite,
-        experiment,
-        policy::{PolicyArgs, PolicyConfig},
+        experiment, plan_flags,
+        policy::PolicyArgs,
         requirement,
         selection::{check_distinct_out_dirs, path_component, select_episodes, select_tasks},
         suite_run::{SuiteRun, find_replay_source},
     },
 };
 use softvt_benchmark::Plan;
-use softvt_report::terminal;
+use softvt_report::{run_folder::RunFolder, terminal};
 
 /// A safety-aware visuo-tactile manipulation benchmark for soft objects, on an ordinary CPU
 #[derive(Clone, Debug, Parser)]
@@ -48,15 +48,18 @@ pub(crate) struct RunArgs {
 /// # Errors
 /// The script, a flag, the folder or the policy is not valid, or an episode fails.
 pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
-    let config = RunConfig::new(args.script, args.flags)?.with_policy(PolicyConfig::load(&args.policy)?);
+    let (config, loaded) =
+        RunConfig::new(args.script, args.flags)?.load_plan(plan_flags::RUN, &args.policy)?;
     let (config, flags) = (&config, &config.flags);
-    let loaded = config.load_script()?;
     check_video_episodes(config, &loaded.plan)?;
     check_recorded_episodes(config, &loaded.plan)?;
     match &loaded.plan {
         plan @ (Plan::Suite(_) | Plan::Suites { .. }) => {
             let is_list = matches!(plan, Plan::Suites { .. });
             check_distinct_out_dirs(config, plan.suites())?;
+            if is_list {
+                check_parent_folder(config)?;
+            }
             let mut summaries = Vec::new();
             for suite in plan.suites() {
                 let name = config.suite_name(suite);
@@ -74,33 +77,24 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
             match &summaries[..] {
                 [summary] if flags.json && !is_list => print_json(summary),
                 summaries if flags.json => print_json(&summaries),
-                summaries => summaries.iter().for_each(|summary| print(&terminal::table(summary))),
-            }
+                summaries => summaries.iter().try_for_each(|summary| print(&terminal::table(summary))),
+            }?;
             requirement::check(&flags.requirements, &summaries)
         }
         Plan::Conditions { name, suites, conditions } => {
-            if !flags.requirements.is_empty() {
-                return Err(config.error(
-                    "--require: applies to suites, and this file compares conditions; read conditions.json",
-                ));
-            }
             check_distinct_out_dirs(config, suites)?;
+            check_parent_folder(config)?;
             let out = flags.out.clone().unwrap_or_else(|| next_run_dir(config, name));
             conditions::run(config, &loaded, suites, conditions, &out)
         }
-        Plan::Experiment { name, points, columns } => {
-            let suite_flags = [
-                ("--require", !flags.requirements.is_empty()),
-                ("--shard", flags.shard.is_some()),
-                ("--resume", flags.resume),
-            ];
-            if let Some((flag, _)) = suite_flags.iter().find(|(_, is_given)| *is_given) {
-                let message = format!("{flag}: applies to suites, and this file is an experiment");
-                return Err(config.error(message));
-            }
-            experiment::run(config, &loaded, name, *points, columns)
-        }
+        Plan::Experiment { .. } => experiment::run(config, &loaded),
     }
+}
+
+/// Checks `--out` of a plan that writes several run folders.
+fn check_parent_folder(config: &RunConfig) -> Result<(), CliError> {
+    let Some(dir) = &config.flags.out else { return Ok(()) };
+    RunFolder::check_parent(dir).map_err(|error| config.error(error))
 }
 
 /// Checks that every suite has the episodes that `--video` selects.

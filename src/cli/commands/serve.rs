@@ -10,6 +10,8 @@ use crate::{
     output::print,
     run::{
         config::{RunConfig, RunFlags, ScriptArgs},
+        episode_list::EpisodeList,
+        plan_flags,
         policy::{PolicyArgs, PolicyConfig, load_profile_of},
         selection::{needs_suites, suites_of},
         suite_run::SuiteRun,
@@ -58,6 +60,7 @@ pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
     let config = config.with_policy(PolicyConfig::external("client"));
     let (profile, _) = load_profile_of(&args.policy)?;
     let loaded = config.load_script()?;
+    plan_flags::check("serve", &config, &loaded.plan)?;
     let suites = suites_of(&loaded.plan);
     if suites.iter().all(|suite| suite.tasks.is_empty()) {
         return Err(needs_suites("serve", &config));
@@ -65,7 +68,8 @@ pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
     let listener = listen(&args)?;
     let mut runs = Vec::new();
     for suite in suites {
-        let mut run = SuiteRun::new(&config, &loaded, suite, Vec::new(), PathBuf::new())?;
+        let mut run =
+            SuiteRun::new(&config, &loaded, suite, EpisodeList::listed(Vec::new()), PathBuf::new())?;
         // Only privileged clients receive the limits.
         run.reads_limits = args.privileged;
         for task in &suite.tasks {
@@ -95,7 +99,7 @@ pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
     };
     let hello = softvt_serve::hello(&server_config, &first_observation(&config, &server_config)?);
     let address = listener.local_addr().map_err(|error| CliError::input(error).prefixed(&args.host))?;
-    print(&format!("ws://{address}\n"));
+    print(&format!("ws://{address}\n"))?;
     softvt_serve::serve(&listener, &server_config, hello, usize::from(args.threads), &cancel::FLAG);
     Err(CliError::interrupted("interrupted"))
 }

@@ -9,8 +9,9 @@ use crate::{
     output::print,
     run::{
         config::{RunConfig, RunFlags, ScriptArgs, parse_folder},
-        policy::{PolicyArgs, PolicyConfig},
-        selection::{EpisodeJob, select_tasks},
+        episode_list::{EpisodeJob, EpisodeList},
+        policy::PolicyArgs,
+        selection::select_tasks,
         suite_run::SuiteRun,
     },
 };
@@ -48,8 +49,7 @@ pub(crate) struct ViewArgs {
 /// The script is not a suite, the task or episode fails, or a file cannot be rendered or written.
 pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     let flags = RunFlags { tasks: vec![args.task.clone()], ..RunFlags::default() };
-    let config = RunConfig::new(args.script, flags)?.with_policy(PolicyConfig::load(&args.policy)?);
-    let loaded = config.load_script()?;
+    let (config, loaded) = RunConfig::new(args.script, flags)?.load_plan("view", &args.policy)?;
     let Plan::Suite(suite) = &loaded.plan else {
         return Err(config.error("softvt view needs a single suite; name a file that returns softvt.suite"));
     };
@@ -64,7 +64,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     };
     let dir = &args.out;
     let job = EpisodeJob { task, episode: args.episode };
-    let mut run = SuiteRun::new(&config, &loaded, suite, vec![job], dir.clone())?;
+    let mut run = SuiteRun::new(&config, &loaded, suite, EpisodeList::listed(vec![job]), dir.clone())?;
     run.renders_episodes = true;
     run.prepare(&[task])?;
     files::create_folder(dir)?;
@@ -81,6 +81,5 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     let video = dir.join("episode.mp4");
     write_video(&mut states, &caption, &video, cancel::requested)?;
     written.push(video);
-    written.iter().for_each(|path| print(&format!("{}\n", path.display())));
-    Ok(())
+    written.iter().try_for_each(|path| print(&format!("{}\n", path.display())))
 }

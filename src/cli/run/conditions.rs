@@ -63,7 +63,7 @@ pub(crate) fn run(
     for ((suite, cases), (runs, tasks)) in suites.iter().zip(&cases).zip(prepared) {
         let compared = compare_conditions(config, suite, cases, runs, &tasks)?;
         if !config.flags.json {
-            print(&table(&compared));
+            print(&table(&compared))?;
         }
         tables.push(compared);
     }
@@ -86,8 +86,7 @@ pub(crate) fn check(
         prepare_runs(loaded, suite, &cases, &first, Path::new(""))?;
     }
     let names: Vec<&str> = conditions.iter().map(|condition| condition.name.as_str()).collect();
-    print(&format!("conditions: {REFERENCE}, {}\n", text::escape_control(&names.join(", "))));
-    Ok(())
+    print(&format!("conditions: {REFERENCE}, {}\n", text::escape_control(&names.join(", "))))
 }
 
 /// The reference and all conditions of a suite, in folders below one of the suite if there are several suites.
@@ -212,7 +211,7 @@ fn write(
     let path = out.join(FILE);
     replace(&path, &text)?;
     if config.flags.json {
-        print(&text);
+        print(&text)?;
     }
     eprint_notice(path.display());
     Ok(())

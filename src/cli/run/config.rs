@@ -6,7 +6,12 @@ use clap::{Args, ValueEnum, value_parser};
 
 use crate::{
     error::CliError,
-    run::{episode_artifacts::VideoSelection, policy::PolicyConfig, requirement::Requirement},
+    run::{
+        episode_artifacts::VideoSelection,
+        plan_flags::{self, GivenFlag},
+        policy::{PolicyArgs, PolicyConfig},
+        requirement::Requirement,
+    },
 };
 use softvt_benchmark::{ShiftValue, Suite};
 use softvt_script::{LoadedScript, STANDARD_VARIATION};
@@ -21,6 +26,9 @@ pub(crate) struct ScriptArgs {
     /// Values of the options that the script declares, as `--name=value`. Filled in after parsing.
     #[arg(skip)]
     pub options: Vec<String>,
+    /// Flags of the command that are given. Filled in after parsing.
+    #[arg(skip)]
+    pub given: Vec<GivenFlag>,
     /// Base seed
     #[arg(long, value_name = "S", default_value = "0", allow_hyphen_values = true, value_parser = parse_seed)]
     pub seed: u64,
@@ -98,6 +106,21 @@ impl Shard {
     pub(crate) fn contains(&self, job: usize) -> bool {
         job % self.count == self.index - 1
     }
+
+    /// Number of episodes of the shard, of `all` in the whole run.
+    pub(crate) fn len(&self, all: usize) -> usize {
+        (all + self.count - self.index) / self.count
+    }
+
+    /// Number in the whole run of the episode at a position in the shard, both from 0.
+    pub(crate) fn number(&self, position: usize) -> usize {
+        position * self.count + self.index - 1
+    }
+
+    /// Position in the shard of one of its episodes by its number in the whole run.
+    pub(crate) fn position(&self, number: usize) -> usize {
+        number / self.count
+    }
 }
 
 impl FromStr for Shard {
@@ -146,6 +169,20 @@ impl RunConfig {
 
     pub(crate) fn with_policy(self, policy: PolicyConfig) -> Self {
         Self { policy, ..self }
+    }
+
+    /// Loads the script, refuses flags of `command` that would do nothing for its plan, and then loads the policy.
+    ///
+    /// # Errors
+    /// The script fails or returns no plan; a flag without effect; a policy that cannot be loaded.
+    pub(crate) fn load_plan(
+        self,
+        command: &str,
+        policy: &PolicyArgs,
+    ) -> Result<(Self, LoadedScript), CliError> {
+        let loaded = self.load_script()?;
+        plan_flags::check(command, &self, &loaded.plan)?;
+        Ok((self.with_policy(PolicyConfig::load(policy)?), loaded))
     }
 
     /// Loads the script with its options.

@@ -8,9 +8,9 @@ use crate::{
     error::{CliError, Exit},
     output::{Progress, eprint_notice},
     run::{
+        episode_list::{EpisodeJob, EpisodeList},
         replay::{difference, replay_factory, with_policy_fields},
         run_manifest::{self, RunManifest},
-        selection::EpisodeJob,
         suite_run::SuiteRun,
     },
 };
@@ -78,14 +78,13 @@ impl<'a> RunLog<'a> {
                 "{path}: there is no {RUN} next to it, so its run is not known"
             )));
         }
-        let requested: BTreeSet<_> = run.jobs.iter().map(EpisodeJob::index).collect();
         let mut seen = BTreeSet::new();
         for (number, record) in self.records.iter().enumerate() {
             let (header, id, index) = (&record.header, &record.header.id, record.header.id.index());
             let is_own = id.suite == run.name
                 && id.base_seed == config.script.seed
                 && header.policy == config.policy.name;
-            let problem = if !is_own || !requested.contains(&index) {
+            let problem = if !is_own || run.jobs.find(index).is_none() {
                 "belongs to another run"
             } else if !seen.insert(index) {
                 "occurs twice"
@@ -104,7 +103,7 @@ impl<'a> RunLog<'a> {
     pub(crate) fn run_jobs<'j>(
         &mut self,
         name: &str,
-        jobs: &[EpisodeJob<'j>],
+        jobs: &EpisodeList<'j>,
         simulate: impl Fn(EpisodeJob<'j>) -> Result<SimulatedEpisode, CliError> + Sync,
         write: impl Fn(&FinishedEpisode) -> Result<(), CliError>,
         line: fn(&EpisodeRecord) -> String,
@@ -114,7 +113,7 @@ impl<'a> RunLog<'a> {
             jobs.len(),
             self.run.config.threads(),
             cancel::requested,
-            |index| simulate(jobs[index]),
+            |position| simulate(jobs.job(position)),
             |_, SimulatedEpisode { finished, rendered }| {
                 // The line comes after all other files, so that every listed episode is complete.
                 write(&finished)?;
@@ -185,8 +184,7 @@ pub(crate) fn run_suite(run: &SuiteRun, tasks: &[&Task]) -> Result<SuiteResult, 
     let (folder, records) = opened.map_err(|error| config.error(error))?;
     let mut log = RunLog::new(run, folder, records, &manifest)?;
     let artifacts = run.artifacts();
-    let done: BTreeSet<_> = log.records.iter().map(|record| record.header.id.index()).collect();
-    let remaining: Vec<_> = run.jobs.iter().copied().filter(|job| !done.contains(&job.index())).collect();
+    let remaining = run.jobs.without(log.records.iter().map(|record| record.header.id.index()));
     let out = run.out.display();
     if finished
         && remaining.is_empty()
@@ -303,7 +301,7 @@ fn simulate_again(
     has_actions: bool,
 ) -> Result<Option<SimulatedEpisode>, CliError> {
     let (index, artifacts) = (record.header.id.index(), run.artifacts());
-    let Some(job) = run.jobs.iter().find(|job| job.index() == index).copied() else { return Ok(None) };
+    let Some(job) = run.jobs.find(index) else { return Ok(None) };
     let keep_states = artifacts.may_render(index.episode);
     let mut finished = if has_actions {
         let path = actions::path(&run.out, index);
@@ -368,7 +366,7 @@ mod tests {
         let root = tempfile::tempdir().expect("a folder");
         for (out, observed) in [("without", false), ("with", true)] {
             let dir = root.path().join(out);
-            let jobs = vec![EpisodeJob { task: tasks[0], episode: 0 }];
+            let jobs = EpisodeList::of_tasks(&tasks, 1, None);
             let mut run = SuiteRun::new(&config, &loaded, &suite, jobs, dir.clone()).expect("valid");
             if observed {
                 run.controllers = Box::new(force_observer);

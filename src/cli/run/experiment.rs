@@ -1,38 +1,74 @@
 //! Run of an experiment: its points on threads, its rows in the order of the points, its files at the end.
 
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
-    sync::Mutex,
+    sync::{Arc, Mutex},
 };
 
+use serde::Serialize;
 use serde_json::Value;
 
 use crate::{
     error::CliError,
     output::{Progress, eprint_notice, print, text_columns},
-    run::config::RunConfig,
+    run::{config::RunConfig, run_manifest},
 };
-use softvt_common::{files::replace, parallel, text::counted};
+use softvt_benchmark::Plan;
+use softvt_common::{
+    files::{self, replace},
+    parallel,
+    text::counted,
+};
+use softvt_report::run_folder::{RUN, RunFolder};
 use softvt_rollout::cancel;
-use softvt_script::{Experiment, ExperimentRow, LoadedScript};
+use softvt_script::{Experiment, ExperimentInput, ExperimentRow, LoadedScript};
 
-/// Runs all points of an experiment and prints its rows.
+/// The rows of an experiment, one JSON object per line.
+const ROWS: &str = "rows.jsonl";
+
+/// `run.json` of an experiment.
+#[derive(Serialize)]
+struct ExperimentManifest<'a> {
+    /// Version of softvt.
+    softvt: &'a str,
+    script: &'a str,
+    experiment: &'a str,
+    points: usize,
+    seed: u64,
+    /// Values of all options of the script.
+    options: BTreeMap<String, String>,
+    /// Options of the script as they were typed.
+    arguments: &'a [String],
+    /// Arguments of `--set`: the settings that are not those of the script.
+    set: &'a [(String, String)],
+    /// SHA-256 of files by name.
+    sources: BTreeMap<String, String>,
+}
+
+/// Runs all points of the experiment that a script returned, and prints its rows. With `--out` the rows and the files of
+/// the script are written into that folder.
 ///
 /// # Errors
-/// The script fails, or a file cannot be written.
-pub(crate) fn run(
-    config: &RunConfig,
-    loaded: &LoadedScript,
-    name: &str,
-    points: usize,
-    columns: &[String],
-) -> Result<(), CliError> {
+/// The script fails, a setting or the seed changes nothing, or a file cannot be written.
+pub(crate) fn run(config: &RunConfig, loaded: &LoadedScript) -> Result<(), CliError> {
+    let Plan::Experiment { name, points, columns, has_finish } = &loaded.plan else {
+        return Err(config.error("the script returned no experiment"));
+    };
+    let (points, out) = (*points, config.flags.out.as_deref());
+    if let Some(dir) = out {
+        RunFolder::check_new(dir).map_err(|error| config.error(error))?;
+    }
+    let input = ExperimentInput::new(config.settings.clone(), config.script.seed);
+    let input = Arc::new(input.map_err(|error| config.error(error))?);
+    if *has_finish && out.is_none() {
+        refuse_changed_project_files(config)?;
+    }
     // Opening an experiment runs the whole script, so each thread takes an idle one before it opens another.
     let idle: Mutex<Vec<Experiment>> = Mutex::default();
     let take = || match parallel::lock(&idle).pop() {
         Some(experiment) => Ok(experiment),
-        None => Experiment::open(loaded),
+        None => Experiment::open_with(loaded, &input),
     };
     let mut rows: Vec<Vec<ExperimentRow>> = vec![Vec::new(); points];
     let mut progress = Progress::new(points, name);
@@ -60,19 +96,54 @@ pub(crate) fn run(
     let done = rows.iter().filter(|rows| !rows.is_empty()).count();
     let rows: Vec<ExperimentRow> = rows.into_iter().flatten().collect();
     if cancel::requested() {
-        print_rows(config, &rows, columns);
+        print_rows(config, &rows, columns)?;
         return Err(CliError::interrupted(format!(
             "interrupted; the rows of {done} of {points} points are above; no file was written"
         )));
     }
     outcome?;
+    input.check_used().map_err(|error| config.error(error))?;
     let finish = take()?.finish(&rows)?;
-    print_rows(config, &rows, columns);
+    print_rows(config, &rows, columns)?;
     if let Some(text) = finish.text.filter(|_| !config.flags.json) {
-        print(&format!("{text}\n"));
+        print(&format!("{text}\n"))?;
     }
-    let base = config.flags.out.clone().unwrap_or_default();
-    finish.files.iter().try_for_each(|(relative, bytes)| write(&base, relative, bytes))
+    let base = out.map(Path::to_owned).unwrap_or_default();
+    if let Some((reserved, _)) =
+        finish.files.iter().find(|(path, _)| out.is_some() && [RUN, ROWS].contains(&path.as_str()))
+    {
+        return Err(config.error(format!("finish.files: {reserved} is written by softvt; give another path")));
+    }
+    finish.files.iter().try_for_each(|(relative, bytes)| write(&base, relative, bytes))?;
+    let Some(dir) = out else { return Ok(()) };
+    files::write_json_lines(&dir.join(ROWS), &rows)?;
+    let options = loaded.options.iter();
+    let manifest = ExperimentManifest {
+        softvt: env!("CARGO_PKG_VERSION"),
+        script: &loaded.sources.main,
+        experiment: name,
+        points,
+        seed: config.script.seed,
+        options: options.map(|option| (option.name.clone(), format!("{:?}", option.value))).collect(),
+        arguments: &config.script.options,
+        set: &config.settings,
+        sources: loaded.sources.bundle.hashes(),
+    };
+    run_manifest::write_new(dir, &manifest)
+}
+
+/// Refuses to write files into the project that were made with changed settings or another seed: they would be taken for
+/// the nominal ones, such as the calibration of an asset.
+fn refuse_changed_project_files(config: &RunConfig) -> Result<(), CliError> {
+    let flag = match (config.settings.first(), config.script.seed) {
+        (Some((path, _)), _) => format!("--set {path}"),
+        (None, seed) if seed != 0 => "--seed".to_owned(),
+        _ => return Ok(()),
+    };
+    Err(config.error(format!(
+        "{flag}: give --out DIR: this experiment can write files, and those made with it must not replace the files of \
+         the project"
+    )))
 }
 
 /// Writes a file of the script under `base`. Refuses to follow symbolic links, which could lead out of the folder.
@@ -92,13 +163,15 @@ fn write(base: &Path, relative: &str, bytes: &[u8]) -> Result<(), CliError> {
 }
 
 /// Prints rows as JSON lines or as a table.
-fn print_rows(config: &RunConfig, rows: &[ExperimentRow], columns: &[String]) {
+///
+/// # Errors
+/// As [`print`].
+fn print_rows(config: &RunConfig, rows: &[ExperimentRow], columns: &[String]) -> Result<(), CliError> {
     if config.flags.json {
-        rows.iter().for_each(|row| print(&format!("{}\n", serde_json::json!(row))));
-        return;
+        return rows.iter().try_for_each(|row| print(&format!("{}\n", serde_json::json!(row))));
     }
     if rows.is_empty() {
-        return;
+        return Ok(());
     }
     let all: BTreeSet<&String> = rows.iter().flat_map(|row| row.keys()).collect();
     let columns: Vec<&String> =
@@ -106,7 +179,7 @@ fn print_rows(config: &RunConfig, rows: &[ExperimentRow], columns: &[String]) {
     let header = columns.iter().map(ToString::to_string).collect();
     let cells = rows.iter().map(|row| columns.iter().map(|column| format_cell(row.get(*column))).collect());
     let lines: Vec<Vec<String>> = std::iter::once(header).chain(cells).collect();
-    print(&text_columns(&lines, |_| true));
+    print(&text_columns(&lines, |_| true))
 }
 
 fn format_cell(value: Option<&Value>) -> String {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use crate::error::CliError;
+use crate::{error::CliError, run::episode_list::EpisodeList};
 use softvt_common::files::FileError;
 use softvt_evaluation::episode_id::{EpisodeIndex, Split};
 use softvt_policy::{Action, TaskBrief};
@@ -63,7 +63,7 @@ impl RecordedRuns {
         suite: &str,
         is_twin: bool,
         base_seed: u64,
-        episodes: &[EpisodeIndex],
+        requested: &EpisodeList,
     ) -> Result<ReplaySource, CliError> {
         let run = self.run_of(suite, is_twin).ok_or_else(|| {
             let available: Vec<String> =
@@ -86,10 +86,11 @@ impl RecordedRuns {
         if split != own {
             return refuse(format!("its split is {split}, that of this run {own}"));
         }
-        let missing = episodes.iter().filter(|index| !has_actions(run, **index));
-        let missing: Vec<String> = missing.map(ToString::to_string).collect();
+        let missing = requested.without(episodes_with_actions(run));
         if !missing.is_empty() {
-            let listed = missing[..missing.len().min(MAX_LISTED)].join(", ");
+            let listed: Vec<String> =
+                missing.iter().take(MAX_LISTED).map(|job| job.index().to_string()).collect();
+            let listed = listed.join(", ");
             let more = match missing.len().saturating_sub(MAX_LISTED) {
                 0 => String::new(),
                 more => format!(" and {more} more"),
@@ -97,7 +98,7 @@ impl RecordedRuns {
             return refuse(format!(
                 "it lacks {} of the {} requested episodes: {listed}{more}; select available ones with --task and --episodes",
                 missing.len(),
-                episodes.len()
+                requested.len()
             ));
         }
         Ok(ReplaySource {
@@ -132,9 +133,9 @@ fn is_rigid_twin(run: &StoredRun) -> bool {
     run.manifest["twin"].is_string()
 }
 
-fn has_actions(run: &StoredRun, index: EpisodeIndex) -> bool {
-    let is_listed = run.records.iter().any(|record| record.header.id.index() == index);
-    is_listed && actions::path(&run.dir, index).is_file()
+fn episodes_with_actions(run: &StoredRun) -> impl Iterator<Item = EpisodeIndex> {
+    let episodes = run.records.iter().map(|record| record.header.id.index());
+    episodes.filter(|index| actions::path(&run.dir, *index).is_file())
 }
 
 /// SHA-256 of the list of episodes and of the actions of each, in the order of the list.

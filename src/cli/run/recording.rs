@@ -20,10 +20,11 @@ use crate::{
     output::{eprint_notice, print},
     run::{
         config::{RunConfig, RunFlags, ScriptArgs, TraceDetail, parse_folder},
+        episode_list::{EpisodeJob, EpisodeList},
         evaluate::{RunLog, SimulatedEpisode, with_kept},
         policy::ControllerFactory,
         run_manifest::{self, RunManifest},
-        selection::{EpisodeJob, path_component},
+        selection::path_component,
         suite_run::SuiteRun,
     },
 };
@@ -117,7 +118,7 @@ pub(crate) struct SuiteRecording<'a> {
 }
 
 impl<'a> SuiteRecording<'a> {
-    /// Prepares a recording of at most the attempts `jobs`. `customize` selects the controllers, and where the intent to
+    /// Prepares a recording of at most the attempts `jobs` at `tasks`. `customize` selects the controllers, and where the intent to
     /// grip is recorded.
     ///
     /// # Errors
@@ -127,20 +128,19 @@ impl<'a> SuiteRecording<'a> {
         args: &'a RecordingArgs,
         loaded: &'a LoadedScript,
         suite: &'a Suite,
-        jobs: Vec<EpisodeJob<'a>>,
+        tasks: Vec<&'a Task>,
+        jobs: EpisodeList<'a>,
         demos: Option<u32>,
         customize: impl FnOnce(&mut SuiteRun<'a>, &GripLog) -> Result<(), CliError>,
     ) -> Result<Self, CliError> {
         let folder_name = path_component(&config.suite_name(suite));
-        let mut tasks: Vec<&Task> = jobs.iter().map(|job| job.task).collect();
-        tasks.dedup_by_key(|task| task.id);
         let mut run = SuiteRun::new(config, loaded, suite, jobs, layout::attempts(&args.out, &folder_name))?;
         run.split = Split::Demonstration;
         run.renders_episodes = true;
         let grip_log = GripLog::default();
         customize(&mut run, &grip_log)?;
         run.prepare(&tasks)?;
-        let attempts = tasks.iter().map(|task| run.jobs.iter().filter(|job| job.task.id == task.id).count());
+        let attempts = tasks.iter().map(|task| run.jobs.episodes_of(task.id).count());
         let episodes = demos.unwrap_or(attempts.max().unwrap_or_default() as u32);
         let manifest = json!(RunManifest::new(&run, &tasks, episodes));
         let environment = json!({ "env_name": "softvt", "type": 2, "env_kwargs": manifest });
@@ -181,7 +181,7 @@ impl<'a> SuiteRecording<'a> {
             let due = |task: &'a Task| {
                 self.due(&log.records, task.id).into_iter().map(move |episode| EpisodeJob { task, episode })
             };
-            let jobs: Vec<EpisodeJob> = self.tasks.iter().flat_map(|task| due(task)).collect();
+            let jobs = EpisodeList::listed(self.tasks.iter().flat_map(|task| due(task)).collect());
             if !jobs.is_empty() {
                 let record =
                     |job| Ok(SimulatedEpisode { finished: self.record_attempt(job)?, rendered: Ok(()) });
@@ -204,7 +204,7 @@ impl<'a> SuiteRecording<'a> {
     }
 
     fn due(&self, records: &[EpisodeRecord], task: usize) -> Vec<u32> {
-        let attempts = self.run.jobs.iter().filter(|job| job.task.id == task).map(|job| job.episode);
+        let attempts = self.run.jobs.episodes_of(task);
         let finished = records.iter().filter(|record| record.header.id.task == task);
         let finished =
             finished.map(|record| (record.header.id.episode, rejection(record).is_none())).collect();
@@ -551,10 +551,9 @@ fn write_summary(
             counted(task.samples, "step"),
             (task.hdf5_bytes + task.video_bytes) as f64 / 1e6,
             rejection_counts(&task.rejected)
-        ));
+        ))?;
     }
-    print(&format!("{}\n", root.join(MANIFEST).display()));
-    Ok(())
+    print(&format!("{}\n", root.join(MANIFEST).display()))
 }
 
 #[cfg(test)]

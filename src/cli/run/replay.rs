@@ -13,9 +13,10 @@ use crate::{
     output::print,
     run::{
         config::{RunConfig, RunFlags, ScriptArgs, Twin, thread_count},
+        episode_list::{EpisodeJob, EpisodeList},
         policy::{ControllerFactory, PolicyConfig},
         run_manifest,
-        selection::{EpisodeJob, select_tasks, suites_of},
+        selection::{select_tasks, suites_of},
         suite_run::SuiteRun,
     },
 };
@@ -93,7 +94,7 @@ impl StoredManifest<'_> {
         let suite = self.suite(&loaded)?;
         let tasks = select_tasks(&config, suite)?;
         let job = EpisodeJob { task: tasks[0], episode: index.episode };
-        let mut run = SuiteRun::new(&config, &loaded, suite, vec![job], PathBuf::new())?;
+        let mut run = SuiteRun::new(&config, &loaded, suite, EpisodeList::listed(vec![job]), PathBuf::new())?;
         run.split = self.split()?;
         run.controllers = replay_factory(actions, record);
         run.origins.extend(record.header.origin.iter().map(|origin| (index, (**origin).clone())));
@@ -167,11 +168,11 @@ pub(crate) struct DemoRef {
 }
 
 /// Result of the re-simulation of a demonstration.
-struct DemoReplay {
+pub(crate) struct DemoReplay {
     /// Hash of the final state.
     state_hash: String,
     /// First difference from the recording. `None` if they are byte-identical.
-    difference: Option<String>,
+    pub difference: Option<String>,
     goal_reached: bool,
 }
 
@@ -204,12 +205,11 @@ pub(crate) fn demos_of(path: &Path) -> Result<Vec<DemoRef>, CliError> {
     Ok(file.demos.iter().map(|demo| DemoRef { file: path.to_owned(), demo: *demo }).collect())
 }
 
-/// Simulates demonstrations again by their actions alone. Prints for each whether the result is byte-identical, and how
-/// many reach the goal.
+/// Simulates demonstrations again by their actions alone.
 ///
 /// # Errors
-/// A demonstration cannot be simulated, or (exit code 1) a result differs.
-pub(crate) fn replay_demos(demos: &[DemoRef]) -> Result<(), CliError> {
+/// A demonstration cannot be simulated.
+pub(crate) fn simulate_demos(demos: &[DemoRef]) -> Result<Vec<DemoReplay>, CliError> {
     let mut replays: BTreeMap<usize, DemoReplay> = BTreeMap::new();
     parallel::run(
         demos.len(),
@@ -224,20 +224,28 @@ pub(crate) fn replay_demos(demos: &[DemoRef]) -> Result<(), CliError> {
     if cancel::requested() {
         return Err(CliError::interrupted("interrupted"));
     }
-    for (DemoRef { file, demo }, replay) in demos.iter().zip(replays.values()) {
+    Ok(replays.into_values().collect())
+}
+
+/// Prints for each demonstration whether its re-simulation is byte-identical, and how many reach the goal.
+///
+/// # Errors
+/// A result differs (exit code 1).
+pub(crate) fn report_replays(demos: &[DemoRef], replays: &[DemoReplay]) -> Result<(), CliError> {
+    for (DemoRef { file, demo }, replay) in demos.iter().zip(replays) {
         let result = match &replay.difference {
             None => format!("byte-identical, final state {}", replay.state_hash),
             Some(difference) => format!("differs: {difference}"),
         };
-        print(&format!("{} demo_{demo}: {result}\n", file.display()));
+        print(&format!("{} demo_{demo}: {result}\n", file.display()))?;
     }
     let all = demos.len();
-    let identical = replays.values().filter(|replay| replay.difference.is_none()).count();
-    let reached = replays.values().filter(|replay| replay.goal_reached).count();
+    let identical = replays.iter().filter(|replay| replay.difference.is_none()).count();
+    let reached = replays.iter().filter(|replay| replay.goal_reached).count();
     if all > 1 {
         print(&format!(
             "replayed by their actions alone: {identical} of {all} byte-identical, {reached} of {all} reach the goal\n"
-        ));
+        ))?;
     }
     if identical == all {
         return Ok(());

@@ -16,7 +16,10 @@ use softvt_benchmark::{ShiftValue, Task, settings::Settings, variation::Variatio
 use softvt_common::files;
 use softvt_dataset::card::Imported;
 use softvt_policy::profile::Profile;
-use softvt_report::run_folder::{RUN, RunFolder};
+use softvt_report::{
+    run_folder::{RUN, RunFolder},
+    stored_run,
+};
 
 /// Content of `run.json`.
 #[derive(Serialize)]
@@ -110,6 +113,24 @@ impl<'a> RunManifest<'a> {
     }
 }
 
+/// A manifest and the folder in which its command ran.
+#[derive(Serialize)]
+struct LocatedManifest<'a, M> {
+    #[serde(flatten)]
+    manifest: &'a M,
+    /// The working folder, to which the paths of the manifest are relative.
+    folder: String,
+}
+
+/// Writes the manifest into a run folder that has none.
+///
+/// # Errors
+/// The file cannot be written.
+pub(crate) fn write_new(dir: &Path, manifest: &impl Serialize) -> Result<(), CliError> {
+    let folder = std::env::current_dir().map(|dir| dir.display().to_string()).unwrap_or_default();
+    Ok(files::write_json(&dir.join(RUN), &LocatedManifest { manifest, folder })?)
+}
+
 /// Writes the manifest into a run folder. An existing manifest must be equal.
 ///
 /// # Errors
@@ -117,11 +138,12 @@ impl<'a> RunManifest<'a> {
 pub(crate) fn write(folder: &RunFolder, manifest: &impl Serialize) -> Result<(), CliError> {
     let path = folder.path().join(RUN);
     let Some(stored) = folder.read(RUN)? else {
-        return Ok(files::write_json(&path, manifest)?);
+        return write_new(folder.path(), manifest);
     };
     let path = path.display();
-    let stored: Value = serde_json::from_str(&stored)
+    let mut stored: Value = serde_json::from_str(&stored)
         .map_err(|error| CliError::input(format!("{path} is not a valid run file: {error}")))?;
+    stored_run::remove_folder(&mut stored);
     match difference(&stored, &json!(manifest)) {
         None => Ok(()),
         Some(what) => Err(CliError::input(format!(
@@ -136,7 +158,10 @@ pub(crate) fn write(folder: &RunFolder, manifest: &impl Serialize) -> Result<(),
 /// The file cannot be read.
 pub(crate) fn is_in(dir: &Path, manifest: &RunManifest) -> Result<bool, CliError> {
     let text = files::read_text(&dir.join(RUN))?;
-    Ok(serde_json::from_str::<Value>(&text).is_ok_and(|stored| stored == json!(manifest)))
+    Ok(serde_json::from_str::<Value>(&text).is_ok_and(|mut stored| {
+        stored_run::remove_folder(&mut stored);
+        stored == json!(manifest)
+    }))
 }
 
 /// Longest value that a message shows in full, in characters. A SHA-256 fits.

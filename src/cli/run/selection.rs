@@ -2,22 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use crate::{error::CliError, run::config::RunConfig};
+use crate::{
+    error::CliError,
+    run::{config::RunConfig, episode_list::EpisodeList},
+};
 use softvt_benchmark::{Plan, Suite, Task};
-use softvt_evaluation::episode_id::EpisodeIndex;
-
-/// An episode to run.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct EpisodeJob<'a> {
-    pub task: &'a Task,
-    pub episode: u32,
-}
-
-impl EpisodeJob<'_> {
-    pub(crate) fn index(&self) -> EpisodeIndex {
-        EpisodeIndex { task: self.task.id, episode: self.episode }
-    }
-}
 
 /// The suites of a plan that is a suite or a list of suites; empty for other plans.
 pub(crate) fn suites_of(plan: &Plan) -> &[Suite] {
@@ -93,15 +82,9 @@ pub(crate) fn select_tasks<'a>(config: &RunConfig, suite: &'a Suite) -> Result<V
 }
 
 /// All episodes of the tasks, or those of the shard.
-pub(crate) fn select_episodes<'a>(
-    config: &RunConfig,
-    suite: &Suite,
-    tasks: &[&'a Task],
-) -> Vec<EpisodeJob<'a>> {
+pub(crate) fn select_episodes<'a>(config: &RunConfig, suite: &Suite, tasks: &[&'a Task]) -> EpisodeList<'a> {
     let episodes = config.flags.episodes.unwrap_or(suite.episodes);
-    let all = tasks.iter().flat_map(|task| (0..episodes).map(move |episode| EpisodeJob { task, episode }));
-    let is_selected = |job: usize| config.flags.shard.is_none_or(|shard| shard.contains(job));
-    all.enumerate().filter(|(number, _)| is_selected(*number)).map(|(_, job)| job).collect()
+    EpisodeList::of_tasks(tasks, episodes, config.flags.shard)
 }
 
 /// Checks that every suite gets an output folder of its own.

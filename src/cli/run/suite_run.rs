@@ -8,9 +8,9 @@ use crate::{
         config::{RunConfig, TraceDetail},
         episode_artifacts::EpisodeArtifacts,
         limits::{CalibrationFiles, Calibrations, LimitScan, SceneLimits},
+        episode_list::{EpisodeJob, EpisodeList},
         policy::{ControllerFactory, DeclaredStreams},
         recorded_runs::{RecordedRuns, ReplaySource},
-        selection::EpisodeJob,
     },
 };
 use softvt_benchmark::{ObjectType, ShiftValue, Suite, Task, settings::Settings};
@@ -42,7 +42,7 @@ pub(crate) struct SuiteRun<'a> {
     /// Name in results.
     pub name: String,
     pub settings: Settings,
-    pub jobs: Vec<EpisodeJob<'a>>,
+    pub jobs: EpisodeList<'a>,
     /// Files with the deformation limits of the objects.
     pub calibration_files: Arc<CalibrationFiles>,
     /// The calibrations of the assets in the scenes of the run; `None` before they are known.
@@ -79,7 +79,7 @@ impl<'a> SuiteRun<'a> {
         config: &'a RunConfig,
         loaded: &'a LoadedScript,
         suite: &'a Suite,
-        jobs: Vec<EpisodeJob<'a>>,
+        jobs: EpisodeList<'a>,
         out: PathBuf,
     ) -> Result<Self, CliError> {
         let settings = suite.settings.with_all(&config.settings);
@@ -199,7 +199,7 @@ impl<'a> SuiteRun<'a> {
 
     /// Limits in the first episodes of a task. All shards of a run look at the same episodes.
     fn scan_task(&self, task: &Task) -> Result<BTreeMap<EpisodeIndex, SceneLimits>, CliError> {
-        let of_task = self.jobs.iter().filter(|job| job.task.id == task.id).map(|job| job.episode);
+        let of_task = self.jobs.episodes_of(task.id);
         let episodes: Vec<u32> = match self.config.flags.shard {
             Some(_) => (0..self.config.flags.episodes.unwrap_or(self.suite.episodes))
                 .take(MAX_SCANNED_EPISODES)
@@ -314,7 +314,7 @@ impl<'a> SuiteRun<'a> {
     /// A layout, calibration file, camera, light or tactile sensor that is not valid; a server that cannot be reached.
     pub(crate) fn prepare(&mut self, tasks: &[&Task]) -> Result<(), CliError> {
         for task in tasks {
-            let first = self.jobs.iter().find(|job| job.task.id == task.id).map_or(0, |job| job.episode);
+            let first = self.jobs.episodes_of(task.id).next().unwrap_or(0);
             let opened = self.open_episode(&self.episode_id(task, first))?;
             self.check_object_type(task, &opened.nominal)?;
             let scene = Arc::new(opened.scene.clone());
@@ -407,11 +407,10 @@ impl<'a> SuiteRun<'a> {
 pub(crate) fn find_replay_source(
     config: &RunConfig,
     suite: &Suite,
-    jobs: &[EpisodeJob],
+    jobs: &EpisodeList,
 ) -> Result<Option<ReplaySource>, CliError> {
-    let episodes: Vec<EpisodeIndex> = jobs.iter().map(EpisodeJob::index).collect();
     let source = |recorded: &RecordedRuns| {
-        recorded.replay_source(&suite.name, config.is_rigid_twin(), config.script.seed, &episodes)
+        recorded.replay_source(&suite.name, config.is_rigid_twin(), config.script.seed, jobs)
     };
     config.policy.recorded().map(source).transpose()
 }

@@ -113,9 +113,10 @@ fn view_commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
     let (run, manifest) = (&run.run, &run.run.manifest);
     // The script that returns the suite itself: `view` does not accept a list of suites, which may be what was run.
     let main = run.text("script");
+    let located = |path: &str| located(path, manifest["folder"].as_str());
     let sibling = Path::new(main).with_file_name(format!("{}.lua", run.text("suite"))).display().to_string();
     let is_main = sibling == main || manifest["sources"].get(&sibling).is_none();
-    let mut view = if is_main { vec![main.to_owned()] } else { vec![sibling] };
+    let mut view = vec![located(if is_main { main } else { &sibling })];
     if is_main {
         let arguments = manifest["arguments"].as_array().into_iter().flatten().filter_map(Value::as_str);
         view.extend(arguments.map(str::to_owned));
@@ -128,9 +129,13 @@ fn view_commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
     if id.episode > 0 {
         add("--episode", id.episode.to_string());
     }
-    // The address of a remote policy is not stored in run.json.
-    let is_remote = manifest["profile"].is_object();
-    add("--policy", if is_remote { "ws://HOST:PORT" } else { run.text("policy") }.to_owned());
+    let policy = match (manifest["policy_file"].as_str(), manifest["replayed"]["run"].as_str()) {
+        // The address of a remote policy is not stored in run.json.
+        _ if manifest["profile"].is_object() => "ws://HOST:PORT".to_owned(),
+        (Some(path), _) | (None, Some(path)) => located(path),
+        (None, None) => run.text("policy").to_owned(),
+    };
+    add("--policy", policy);
     if id.base_seed > 0 {
         add("--seed", id.base_seed.to_string());
     }
@@ -149,11 +154,28 @@ fn view_commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
     ]
 }
 
-/// Quotes a word for a shell where necessary.
+/// The path of a file of a run from the working folder: the path itself, or that in the folder in which the run was made.
+fn located(path: &str, folder: Option<&str>) -> String {
+    let stored = folder.map(|folder| Path::new(folder).join(path));
+    match stored.filter(|stored| !Path::new(path).exists() && stored.exists()) {
+        Some(stored) => stored.display().to_string(),
+        None => path.to_owned(),
+    }
+}
+
+/// Quotes a word for a shell where necessary; with control characters as escapes, which a terminal does not execute.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
         return word.to_owned();
+    }
+    if word.contains(char::is_control) {
+        let escape = |c: char| match c {
+            '\'' | '\\' => format!("\\{c}"),
+            c if c.is_control() => c.to_string().bytes().map(|byte| format!("\\x{byte:02x}")).collect(),
+            c => c.to_string(),
+        };
+        return format!("$'{}'", word.chars().map(escape).collect::<String>());
     }
     format!("'{}'", word.replace('\'', "'\\''"))
 }

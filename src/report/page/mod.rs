@@ -10,7 +10,7 @@ use std::path::Path;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde_json::Value;
 
-use softvt_common::text::counted;
+use softvt_common::text::{counted, escape_control};
 
 use super::{
     run_summary::RunSummary,
@@ -52,7 +52,8 @@ pub fn page(runs: &[RunSummary], out: &Path) -> String {
             }
         }
     };
-    markup.into_string()
+    // Names come from scripts and policies; their control characters must reach neither a terminal nor a clipboard.
+    escape_control(&markup.into_string()).into_owned()
 }
 
 fn sections(runs: &[RunSummary], out: &Path) -> Markup {

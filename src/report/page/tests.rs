@@ -70,6 +70,22 @@ fn hostile_names_are_escaped() {
 }
 
 #[test]
+fn control_characters_of_names_are_escaped() {
+    let hostile = "bun\u{1b}[2J's";
+    let mut records = episodes("soft", 4);
+    for record in &mut records {
+        (record.header.prompt, record.header.asset) = (hostile.into(), hostile.into());
+    }
+    let mut run = stored("/nowhere/\u{1b}[31mrun", "noop", records);
+    run.manifest["arguments"] = json!([format!("--asset={hostile}")]);
+    let page = render(vec![run]);
+    assert_well_formed(&page);
+    assert!(!page.contains(|c: char| c.is_control() && c != '\n' && c != '\t'));
+    assert!(page.contains("$'--asset=bun\\x1b[2J\\'s'"), "{page}");
+    assert!(page.contains("softvt replay $'/nowhere/\\x1b[31mrun' 0/1"), "{page}");
+}
+
+#[test]
 fn the_page_is_self_contained_and_accessible() {
     let mut rigid = episodes("rigid", 2);
     for record in &mut rigid {

@@ -6,6 +6,7 @@ use mlua::{Function, Lua, Table, Value};
 
 use super::{
     cameras::IMAGE_EDGE,
+    experiment_input,
     expert::{Coroutine, FingerAccess},
     expert_input::{ExpertCommand, ExpertInput, TrackingErrorMonitor},
     image::LuaImage,
@@ -51,6 +52,18 @@ pub(crate) fn settings(lua: &Lua, label: &str, table: Option<&Table>) -> mlua::R
     let settings: Settings = deserialize(lua, label, &Value::Table(table.clone()))?;
     settings.validate().map_err(|e| fail(lua, format!("{label}: {e}")))?;
     Ok(settings)
+}
+
+/// The settings of a simulation: those of the script, then those of the command line.
+fn simulation_settings(lua: &Lua, table: Option<&Table>) -> mlua::Result<Settings> {
+    const LABEL: &str = "softvt.simulate: settings";
+    for key in ["criteria", "rules"] {
+        if table.is_some_and(|table| table.contains_key(key).unwrap_or(false)) {
+            return Err(fail(lua, format!("{LABEL}.{key}: a simulation judges no episodes; leave it out")));
+        }
+    }
+    let own = settings(lua, LABEL, table)?;
+    experiment_input::simulation_settings(lua, &own).map_err(|e| fail(lua, format!("{LABEL}: --set: {e}")))
 }
 
 /// Measurements of an object since the simulation has settled.
@@ -131,12 +144,14 @@ functions! {
             suite: String => Text("experiment");
             /// Part of the seed.
             episode: u32 = EPISODE => Integer(0);
-            /// Part of the seed.
-            seed: u64 = EPISODE => Integer(0);
-            /// Changed settings of physics, robot and judge: { physics = {…}, robot = {…}, criteria = {…} }.
+            /// Part of the seed; by default that of the run, --seed.
+            seed: Option<u64> = EPISODE;
+            /// Changed settings of physics, robot and tactile sensors: { physics = {…}, robot = {…}, tactile = {…} }.
+            /// Those of the command line, --set, take precedence in experiments.
             settings: Option<Table> = SETTINGS;
         } -> ["softvt.Simulation"] {
-            let settings = self::settings(lua, "softvt.simulate: settings", settings.as_ref())?;
+            let settings = simulation_settings(lua, settings.as_ref())?;
+            let seed = seed.unwrap_or_else(|| experiment_input::base_seed(lua));
             let (layout_name, split) = (layout.name.clone(), Split::Experiment);
             let seed = EpisodeSeed { suite, layout: layout_name, episode, base_seed: seed, split };
             LuaSimulation::new(lua, &layout, seed, &settings)?

@@ -9,7 +9,7 @@ use std::{
 use cpu_time::ThreadTime;
 use mlua::Lua;
 
-use super::shapes::LuaShape;
+use super::{experiment_input, shapes::LuaShape};
 use crate::{
     schema::{Constructed, Range, Type, class, functions, output, record},
     vm::{
@@ -132,7 +132,8 @@ fn pose(position: [f64; 3], axis_angle: Option<[f64; 3]>) -> Pose {
 
 functions! {
     FUNCTIONS {
-        /// Returns an empty world: soft bodies among fixed or prescribed solids, without a robot.
+        /// Returns an empty world: soft bodies among fixed or prescribed solids, without a robot. Settings of the command
+        /// line, --set physics.…, take precedence in experiments.
         fn world(lua) takes spec "softvt.WorldSpec" {
             /// Time step.
             dt: f64 = Type::Number("s", Range::closed(1e-5, 0.05)) => Number(1.0 / 60.0);
@@ -147,6 +148,8 @@ functions! {
         } -> ["softvt.World"] {
             let params =
                 PhysicsParams { dt, rayleigh_mass, rayleigh_stiffness, sleeping, ..PhysicsParams::default() };
+            let params = experiment_input::world_params(lua, params)
+                .map_err(|e| fail(lua, format!("softvt.world: --set: {e}")))?;
             let gravity = gravity.map_or(Vec3::new(0.0, 0.0, -9.81), Vec3::from);
             LuaWorld(Arc::new(Mutex::new(Inner {
                 world: World::new(params, gravity),

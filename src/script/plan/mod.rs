@@ -53,7 +53,7 @@ impl ScriptSources {
         convert: impl FnOnce(&ScriptInstance) -> Result<T, ScriptError>,
     ) -> Result<(Self, T), ScriptError> {
         let (library, main) = Library::open(path)?;
-        let instance = ScriptInstance::open(&main, library, argv, limits)?;
+        let instance = ScriptInstance::open(&main, library, argv, limits, |_| ())?;
         let result = convert(&instance)?;
         let bundle = Arc::new(lock(&instance.vm.library).bundle.clone());
         Ok((Self { main, bundle, argv: argv.to_vec(), limits: limits.clone() }, result))
@@ -61,8 +61,13 @@ impl ScriptSources {
 
     /// Runs the main file again in a new virtual machine.
     pub(crate) fn instance(&self) -> Result<ScriptInstance, ScriptError> {
+        self.instance_with(|_| ())
+    }
+
+    /// As [`ScriptSources::instance`], with a virtual machine that `prepare` has changed before the main file runs.
+    pub(crate) fn instance_with(&self, prepare: impl FnOnce(&Lua)) -> Result<ScriptInstance, ScriptError> {
         let library = Library::frozen((*self.bundle).clone());
-        ScriptInstance::open(&self.main, library, &self.argv, &self.limits)
+        ScriptInstance::open(&self.main, library, &self.argv, &self.limits, prepare)
     }
 }
 
@@ -136,8 +141,15 @@ impl ScriptInstance {
         Ok(Self { vm, options, result: None })
     }
 
-    fn open(main: &str, library: Library, argv: &[String], limits: &Limits) -> Result<Self, ScriptError> {
+    fn open(
+        main: &str,
+        library: Library,
+        argv: &[String],
+        limits: &Limits,
+        prepare: impl FnOnce(&Lua),
+    ) -> Result<Self, ScriptError> {
         let mut instance = Self::new(main, library, argv, limits)?;
+        prepare(&instance.vm.lua);
         instance.result = instance.vm.run_main()?;
         lock(&instance.options).check_all_consumed(main)?;
         Ok(instance)
@@ -181,7 +193,8 @@ impl ScriptInstance {
             let _deadline = self.vm.call_deadline();
             let points = points(lua, &spec)?.len();
             let columns = spec.spec.columns;
-            return Ok(Plan::Experiment { name: spec.spec.name, points, columns });
+            let has_finish = spec.spec.finish.is_some();
+            return Ok(Plan::Experiment { name: spec.spec.name, points, columns, has_finish });
         }
         let specs = self.suites()?.filter(|specs| !specs.is_empty()).ok_or_else(|| {
             let got = self.result.as_ref().map_or("nothing".to_owned(), describe);

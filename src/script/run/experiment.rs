@@ -1,10 +1,13 @@
 //! Experiments: points in, rows out.
 
+use std::sync::Arc;
+
 use mlua::{Lua, LuaSerdeExt, Value};
 use serde_json::{Map, Value as Json};
 
 use crate::{
     api::{
+        experiment_input::ExperimentInput,
         image::image_of,
         tasks::{ExperimentSpec, FinishSpec},
     },
@@ -34,6 +37,7 @@ pub struct ExperimentSummary {
 pub struct Experiment {
     instance: ScriptInstance,
     points: Vec<Value>,
+    input: Arc<ExperimentInput>,
 }
 
 impl Experiment {
@@ -42,7 +46,19 @@ impl Experiment {
     /// # Errors
     /// If the script fails or does not return an experiment.
     pub fn open(loaded: &LoadedScript) -> Result<Self, ScriptError> {
-        let mut experiment = Self { instance: loaded.sources.instance()?, points: Vec::new() };
+        Self::open_with(loaded, &Arc::default())
+    }
+
+    /// As [`Experiment::open`], with simulations that take the settings and seed of `input`.
+    ///
+    /// # Errors
+    /// As [`Experiment::open`].
+    pub fn open_with(loaded: &LoadedScript, input: &Arc<ExperimentInput>) -> Result<Self, ScriptError> {
+        let input = Arc::clone(input);
+        let instance = loaded.sources.instance_with(|lua| {
+            lua.set_app_data(Arc::clone(&input));
+        })?;
+        let mut experiment = Self { instance, points: Vec::new(), input };
         let vm = &experiment.instance.vm;
         let points = {
             let _deadline = vm.call_deadline();
@@ -83,16 +99,21 @@ impl Experiment {
         spec.ok_or_else(|| ScriptError::new(vm.main(), "the script did not return an experiment"))
     }
 
-    /// The rows of point `index`. `math.random` is seeded by the index, so that the order of points does not matter.
+    /// The rows of point `index`. `math.random` is seeded by the index and the base seed, so that the order of points
+    /// does not matter.
     ///
     /// # Errors
     /// If the script fails, takes too long, or returns something other than rows.
     pub fn run(&self, index: usize) -> Result<Vec<ExperimentRow>, ScriptError> {
         let vm = &self.instance.vm;
-        vm.random.reseed(softvt_benchmark::seed::keyed_rng(&["softvt point", &index.to_string()]));
+        let [index_key, seed_key] = self.input.point_key(index);
+        vm.random.reseed(softvt_benchmark::seed::keyed_rng(&["softvt point", &index_key, &seed_key]));
         let spec = self.spec()?;
         let _deadline = vm.point_deadline();
         let result = vm.call(&spec.run, (self.value(index), spec.options.clone()))?;
+        if vm.random.has_drawn() {
+            self.input.record_random();
+        }
         rows(&vm.lua, &result).map_err(|e| vm.explain(&e))
     }
 

@@ -283,8 +283,12 @@ fn module_names(tree: &str) -> Vec<String> {
 }
 
 fn read(path: &Path) -> io::Result<Vec<u8>> {
+    // Opening a named pipe would wait for a writer.
+    if !fs::metadata(path)?.is_file() {
+        return Err(io::Error::other("is a pipe or a device, not a file"));
+    }
     let mut bytes = Vec::new();
-    // The size of a pipe or a device is only known once it is read.
+    // The file may grow while it is read.
     fs::File::open(path)?.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
     match bytes.len() as u64 > MAX_BYTES {
         true => Err(io::Error::other(format!("is larger than {} MiB", MAX_BYTES >> 20))),

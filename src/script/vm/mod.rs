@@ -377,6 +377,11 @@ impl MathRandom {
     pub(crate) fn reseed(&self, rng: ChaCha8Rng) {
         *lock(&self.0) = rng;
     }
+
+    /// True if a number was drawn since the generator was seeded.
+    pub(crate) fn has_drawn(&self) -> bool {
+        lock(&self.0).get_word_pos() > 0
+    }
 }
 
 /// `math.random()`, `math.random(m)`, `math.random(m, n)` as in Lua 5.4.

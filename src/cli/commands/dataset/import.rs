@@ -15,12 +15,15 @@ use crate::{
     output::eprint_notice,
     run::{
         config::ScriptArgs,
+        episode_list::{EpisodeJob, EpisodeList},
+        plan_flags,
         policy::PolicyConfig,
         recording::{GripLog, RecordingArgs, SuiteRecording, record_all},
-        selection::{EpisodeJob, select_suites},
+        selection::select_suites,
         suite_run::SuiteRun,
     },
 };
+use softvt_benchmark::Task;
 use softvt_common::{parallel, text::counted};
 use softvt_dataset::{
     card::Imported,
@@ -63,6 +66,7 @@ pub(super) fn run(args: ImportArgs) -> Result<(), CliError> {
     let config =
         &recording.run_config(args.script, args.tasks)?.with_policy(PolicyConfig::external("import"));
     let loaded = config.load_script()?;
+    plan_flags::check("dataset import", config, &loaded.plan)?;
     let suites = select_suites("dataset import", config, &loaded.plan)?;
     let files: Vec<ForeignFile> =
         args.files.iter().map(|path| import::read(path)).collect::<Result<_, _>>()?;
@@ -93,12 +97,15 @@ pub(super) fn run(args: ImportArgs) -> Result<(), CliError> {
             let mut jobs: Vec<EpisodeJob> =
                 demos.iter().map(|demo| EpisodeJob { task: demo.task.task, episode: demo.attempt }).collect();
             jobs.sort_by_key(|job| (suite.tasks.iter().position(|task| task.id == job.task.id), job.episode));
+            let mut tasks: Vec<&Task> = jobs.iter().map(|job| job.task).collect();
+            tasks.dedup_by_key(|task| task.id);
             recordings.push(SuiteRecording::new(
                 config,
                 recording,
                 &loaded,
                 suite,
-                jobs,
+                tasks,
+                EpisodeList::listed(jobs),
                 None,
                 |run, log| {
                     run.imported = sources.clone();

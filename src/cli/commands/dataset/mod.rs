@@ -12,7 +12,8 @@ use crate::{
     output::{Progress, eprint_notice, print, print_json},
     run::{
         config::{parse_folder, thread_count},
-        replay::{DemoRef, check_complete, demos_of, replay_demos},
+        replay::{DemoRef, check_complete, demos_of, report_replays, simulate_demos},
+        stored_folder::enter_for_dataset,
     },
 };
 use softvt_common::{files, text::counted};
@@ -112,13 +113,20 @@ fn run_check(args: &DatasetCheckArgs) -> Result<(), CliError> {
             counted(findings.problems.len(), "problem")
         )));
     }
+    let demos = match args.replays {
+        0 => Vec::new(),
+        count => sample(&demos_of(&enter_for_dataset(path)?)?, count),
+    };
+    let replays = simulate_demos(&demos)?;
+    let is_ok = replays.iter().all(|replay| replay.difference.is_none());
     print(&format!(
-        "{}, {}, {}: OK\n",
+        "{}, {}, {}{}\n",
         counted(findings.demos, "demonstration"),
         counted(findings.steps, "step"),
-        counted(findings.videos, "video")
-    ));
-    replay_demos(&sample(&demos_of(path)?, args.replays))
+        counted(findings.videos, "video"),
+        if is_ok { ": OK" } else { "" }
+    ))?;
+    report_replays(&demos, &replays)
 }
 
 /// Selects `count` demonstrations, evenly spaced from the first.
@@ -156,8 +164,7 @@ fn run_export(args: ExportArgs) -> Result<(), CliError> {
         counted(exported.frames, "frame"),
         counted(exported.tasks, "prompt"),
         config.out.display()
-    ));
-    Ok(())
+    ))
 }
 
 /// Prints and plots the distributions.
@@ -173,7 +180,7 @@ fn run_stats(args: &DatasetStatsArgs) -> Result<(), CliError> {
     match args.json {
         true => print_json(&distributions),
         false => print(&stats::table(&distributions)),
-    }
+    }?;
     let default = if path.is_dir() { path.join("stats.svg") } else { path.with_extension("stats.svg") };
     let out = args.out.clone().unwrap_or(default);
     files::replace(&out, stats::svg(&distributions).as_bytes())?;

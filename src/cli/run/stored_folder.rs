@@ -1,0 +1,71 @@
+//! The folder in which a run or a recording was made. Its paths are relative to it, so that it can be replayed from any
+//! folder.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use serde_json::Value;
+
+use crate::{error::CliError, output::eprint_notice, run::replay::demos_of};
+use softvt_common::files::{self, FileError};
+use softvt_dataset::{TaskFile, layout::ATTEMPTS};
+use softvt_report::{run_folder::RUN, stored_run::StoredRun};
+
+/// Makes the folder of a run the working folder, unless its script is in the present one. Returns the path of the run
+/// from the working folder.
+///
+/// # Errors
+/// The script is in none of the folders.
+pub(crate) fn enter_for_run(run: &StoredRun) -> Result<PathBuf, CliError> {
+    enter(&run.dir, run.text("script"), run.manifest["folder"].as_str())
+}
+
+/// Makes the folder of a recording the working folder, unless its script is in the present one. Returns the path of the
+/// dataset from the working folder.
+///
+/// # Errors
+/// The dataset cannot be read, or the script is in none of the folders.
+pub(crate) fn enter_for_dataset(path: &Path) -> Result<PathBuf, CliError> {
+    let Some(demo) = demos_of(path)?.into_iter().next() else { return Ok(path.to_owned()) };
+    let environment = TaskFile::open(&demo.file)?.environment()?;
+    let folder = recording_folder(&demo.file)?;
+    enter(path, environment["env_kwargs"]["script"].as_str().unwrap_or_default(), folder.as_deref())
+}
+
+/// The folder in which the recording of an HDF5 file was made, as its attempts state it.
+fn recording_folder(file: &Path) -> Result<Option<String>, CliError> {
+    let file = std::path::absolute(file).map_err(FileError::io("locate", file))?;
+    let attempts = file.ancestors().map(|folder| folder.join(ATTEMPTS)).find(|folder| folder.is_dir());
+    let suites = attempts.and_then(|attempts| fs::read_dir(attempts).ok());
+    let mut manifests: Vec<PathBuf> =
+        suites.into_iter().flatten().filter_map(Result::ok).map(|suite| suite.path().join(RUN)).collect();
+    manifests.sort();
+    let Some(manifest) = manifests.into_iter().find(|path| path.is_file()) else { return Ok(None) };
+    let manifest: Value = serde_json::from_str(&files::read_text(&manifest)?)?;
+    Ok(manifest["folder"].as_str().map(str::to_owned))
+}
+
+/// Makes the folder that has `script` the working folder: the present one, `stored`, or one above `path`. Returns `path`
+/// from there.
+fn enter(path: &Path, script: &str, stored: Option<&str>) -> Result<PathBuf, CliError> {
+    if Path::new(script).is_file() {
+        return Ok(path.to_owned());
+    }
+    let absolute = std::path::absolute(path).map_err(FileError::io("locate", path))?;
+    let folders = stored.map(Path::new).into_iter().chain(absolute.ancestors().skip(1));
+    if let Some(folder) = folders.into_iter().find(|folder| folder.join(script).is_file()) {
+        std::env::set_current_dir(folder).map_err(FileError::io("enter the folder", folder))?;
+        eprint_notice(format!("using {script} in {}", folder.display()));
+        return Ok(absolute);
+    }
+    if softvt_script::embedded(script).is_some() {
+        return Ok(path.to_owned());
+    }
+    let made_in = stored.map_or(String::new(), |folder| format!(" nor in {folder}, where it was made"));
+    Err(CliError::input(format!(
+        "{}: its script {script} is neither in the working folder{made_in}; change to the folder that contains it",
+        path.display()
+    )))
+}

@@ -1,0 +1,119 @@
+//! The part of the command line that reaches the simulations of an experiment: `--set` and `--seed`.
+
+use std::sync::{
+    Arc,
+    atomic::{AtomicBool, Ordering},
+};
+
+use mlua::Lua;
+
+use softvt_benchmark::settings::{Settings, SettingsError};
+use softvt_physics::PhysicsParams;
+
+/// Settings and seed of the command line for an experiment, shared by all its virtual machines. It also records what
+/// the points have used, since a setting of a part that no point simulates would change nothing.
+#[derive(Debug, Default)]
+pub struct ExperimentInput {
+    set: Vec<(String, String)>,
+    seed: u64,
+    has_simulation: AtomicBool,
+    has_world: AtomicBool,
+    has_random: AtomicBool,
+}
+
+/// A part of the command line that would change nothing.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum InputError {
+    #[error("--set: {0}")]
+    Settings(#[from] SettingsError),
+    #[error("--set {path}: an experiment judges no episodes; leave it out")]
+    Criteria { path: String },
+    #[error(
+        "--set {path}: the experiment simulates no robot (softvt.simulate), so this changes nothing; leave it out"
+    )]
+    NoRobot { path: String },
+    #[error("--set {path}: the experiment simulates nothing, so this changes nothing; leave it out")]
+    NoPhysics { path: String },
+    #[error("--seed: the experiment draws no random numbers, so this changes nothing; leave it out")]
+    NoRandomNumbers,
+}
+
+/// The group of settings that a path begins with.
+fn group(path: &str) -> &str {
+    path.split('.').next().unwrap_or(path)
+}
+
+impl ExperimentInput {
+    /// Checks settings by path and value, as `--set` gives them, against the defaults.
+    ///
+    /// # Errors
+    /// A setting does not exist, has a value out of its range, or concerns the judge.
+    pub fn new(set: Vec<(String, String)>, seed: u64) -> Result<Self, InputError> {
+        Settings::default().with_all(&set)?;
+        match set.iter().find(|(path, _)| ["criteria", "rules"].contains(&group(path))) {
+            Some((path, _)) => Err(InputError::Criteria { path: path.clone() }),
+            None => Ok(Self { set, seed, ..Self::default() }),
+        }
+    }
+
+    /// Checks that the points have used every setting and the seed, once all have run.
+    ///
+    /// # Errors
+    /// A setting or seed that changed nothing.
+    pub fn check_used(&self) -> Result<(), InputError> {
+        let has = |flag: &AtomicBool| flag.load(Ordering::Relaxed);
+        for (path, _) in &self.set {
+            let path = path.clone();
+            if has(&self.has_simulation) {
+                break;
+            }
+            if group(&path) != "physics" {
+                return Err(InputError::NoRobot { path });
+            }
+            if !has(&self.has_world) {
+                return Err(InputError::NoPhysics { path });
+            }
+        }
+        if self.seed != 0 && !has(&self.has_random) {
+            return Err(InputError::NoRandomNumbers);
+        }
+        Ok(())
+    }
+
+    /// Key of the random numbers of a point.
+    pub(crate) fn point_key(&self, index: usize) -> [String; 2] {
+        [index.to_string(), self.seed.to_string()]
+    }
+
+    pub(crate) fn record_random(&self) {
+        self.has_random.store(true, Ordering::Relaxed);
+    }
+}
+
+/// The input of the experiment that runs in a virtual machine; the default elsewhere.
+fn input(lua: &Lua) -> Arc<ExperimentInput> {
+    lua.app_data_ref::<Arc<ExperimentInput>>().map_or_else(Arc::default, |input| Arc::clone(&input))
+}
+
+/// The settings of a simulation with those of the command line.
+pub(crate) fn simulation_settings(lua: &Lua, settings: &Settings) -> Result<Settings, SettingsError> {
+    let input = input(lua);
+    input.has_simulation.store(true, Ordering::Relaxed);
+    settings.with_all(&input.set)
+}
+
+/// The parameters of a world of bare bodies with those of the command line.
+pub(crate) fn world_params(lua: &Lua, params: PhysicsParams) -> Result<PhysicsParams, SettingsError> {
+    let input = input(lua);
+    input.has_world.store(true, Ordering::Relaxed);
+    let fields: Vec<_> = input.set.iter().filter(|(path, _)| group(path) == "physics").cloned().collect();
+    Settings { physics: params, ..Settings::default() }.physics_with(&fields)
+}
+
+/// The base seed of a simulation that states none of its own.
+pub(crate) fn base_seed(lua: &Lua) -> u64 {
+    let input = input(lua);
+    input.record_random();
+    input.seed
+}

@@ -1,0 +1,228 @@
+//! Every flag acts, or is refused: the command line of experiments, `--out` folders, standard output, and replays from
+//! other folders.
+
+use std::{
+    fs::{self, OpenOptions},
+    process::{Command, Stdio},
+    time::{Duration, Instant},
+};
+
+use assert_cmd::cargo::cargo_bin;
+
+use crate::support::{Project, SPATIAL_SOFT, Small};
+
+/// An experiment that squeezes a soft cube with the robot, drops one without it, and draws random numbers.
+const SQUEEZE: &str = r#"local floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 1, 1, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} }
+local cube = softvt.asset { name = "cube", shape = softvt.shape.box { size = { 0.04, 0.04, 0.04 } }:grounded(),
+  body = softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300, resolution = 3 } }
+local layout = softvt.layout("one", function(scene, rng)
+  scene:add { name = "floor", asset = floor, position = { 0, 0, 0 } }
+  scene:add { name = "cube", asset = cube, at = { 0, rng:uniform(0.08, 0.12) } }
+end)
+local function drop()
+  local world = softvt.world { sleeping = false }
+  local body = world:soft { shape = softvt.shape.box { size = { 0.04, 0.04, 0.04 } }, body = softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300, resolution = 2 }, position = { 0, 0, 1 } }
+  for _ = 1, 3 do world:step() end
+  return body:centre()[3]
+end
+return softvt.experiment { name = "e", grid = { part = { "robot", "world", "random" } }, run = function(point)
+  if point.part == "world" then return { part = point.part, height = drop() } end
+  if point.part == "random" then return { part = point.part, drawn = math.random() } end
+  local sim = softvt.simulate { layout = layout }
+  sim:drive(function(arm) arm:close_to(1, { rate = 4 }) arm:wait(0.1) end)
+  return { part = point.part, width = sim:measure "cube".width_m }
+end }
+"#;
+
+fn rows(project: &Project, words: &str) -> Vec<serde_json::Value> {
+    let out = project.succeeds(&format!("x.lua --json {words}")).out;
+    out.lines().map(|line| serde_json::from_str(line).expect("a row")).collect()
+}
+
+#[test]
+fn settings_and_seed_reach_the_simulations_of_an_experiment() {
+    let project = Project::new(&[("x.lua", SQUEEZE)]);
+    let plain = rows(&project, "");
+    assert_eq!(rows(&project, "--threads 2"), plain);
+    let slow = rows(&project, "--set robot.gripper.speed=0.01");
+    assert_ne!(slow[0]["width"], plain[0]["width"], "the robot's settings act on softvt.simulate");
+    assert_eq!((&slow[1], &slow[2]), (&plain[1], &plain[2]));
+    let fine = rows(&project, "--set physics.dt=0.025");
+    assert_ne!(fine[1]["height"], plain[1]["height"], "the physics acts on softvt.world");
+    let seeded = rows(&project, "--seed 3");
+    assert_ne!(seeded[2]["drawn"], plain[2]["drawn"]);
+    assert_eq!(seeded[1], plain[1]);
+    for (words, part) in [
+        ("--set nonsense=1", "no setting \"nonsense\""),
+        ("--set physics.dt=-1", "physics.dt"),
+        ("--set criteria.slip_m=0.1", "--set criteria.slip_m: an experiment judges no episodes"),
+        ("--shift mass=2", "--shift: applies to suites, lists of suites, conditions, and this file is an experiment"),
+    ] {
+        let refused = project.refusal(&format!("x.lua {words}"));
+        assert!(refused.contains(part), "{refused}");
+    }
+}
+
+#[test]
+fn an_experiment_refuses_what_it_does_not_use() {
+    let text = "return softvt.experiment { name = 'e', grid = { x = { 1 } }, run = function() return { x = 1 } end }";
+    let project = Project::new(&[("x.lua", text)]);
+    for (words, part) in [
+        ("--set robot.gripper.effort=1", "--set robot.gripper.effort: the experiment simulates no robot"),
+        ("--set physics.sleeping=false", "--set physics.sleeping: the experiment simulates nothing"),
+        ("--seed 1", "--seed: the experiment draws no random numbers"),
+    ] {
+        let refused = project.refusal(&format!("x.lua --out run {words}"));
+        assert!(refused.contains(part), "{refused}");
+    }
+    assert!(!project.path("run").exists());
+}
+
+#[test]
+fn an_experiment_writes_its_rows_and_its_command_line() {
+    let text = SQUEEZE;
+    let finish = "columns = { 'part' }, finish = function(rows) return { files = { ['assets/n.json'] = { n = #rows } } } end }";
+    let project = Project::new(&[("x.lua", &(text.trim_end().trim_end_matches('}').to_owned() + ", " + finish))]);
+    let refused = project.refusal("x.lua --set robot.gripper.speed=0.01");
+    assert!(refused.contains("--set robot.gripper.speed: give --out DIR"), "{refused}");
+    assert!(project.refusal("x.lua --seed 1").contains("--seed: give --out DIR"));
+    assert!(!project.path("assets").exists(), "a file of the project is not replaced by one of changed settings");
+    let printed = project.succeeds("x.lua --json --out run --seed 1 --set robot.gripper.speed=0.01").out;
+    assert_eq!(project.text("run/rows.jsonl"), printed);
+    assert_eq!(project.json("run/assets/n.json")["n"], 3);
+    let run = project.json("run/run.json");
+    assert_eq!((&run["experiment"], &run["seed"], &run["script"]), (&"e".into(), &1.into(), &"x.lua".into()));
+    assert_eq!(run["set"], serde_json::json!([["robot.gripper.speed", "0.01"]]));
+    assert!(project.refusal("x.lua --out run").contains("run already holds a run (run.json)"));
+    assert!(project.refusal("report run").contains("run holds an experiment, not a run of a suite"));
+}
+
+#[test]
+fn a_folder_with_other_files_is_refused() {
+    let project = Small { task: "budget_steps = 1", ..Small::default() }.project();
+    project.write("mine/notes.txt", b"mine");
+    project.write("list.lua", b"return { (require \"x\") }");
+    for words in ["x.lua --policy noop --out mine", "x.lua --policy noop --out mine --resume", "list.lua --policy noop --out mine"] {
+        let refused = project.refusal(words);
+        assert!(refused.contains("mine is not empty and holds no run (it contains notes.txt)"), "{refused}");
+    }
+    assert_eq!(fs::read_dir(project.path("mine")).expect("there").count(), 1);
+    fs::create_dir(project.path("empty")).expect("made");
+    project.write("empty/.gitignore", b"*");
+    project.succeeds("x.lua --policy noop --out empty");
+    project.succeeds("list.lua --policy noop --out many");
+    project.succeeds("list.lua --policy noop --out many");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_device_is_an_error_and_a_closed_pipe_is_not() {
+    let project = Small { task: "budget_steps = 1", ..Small::default() }.project();
+    project.succeeds("x.lua --policy noop --out run");
+    for words in ["list tasks", "list assets --json", "--version", "compare run run", "x.lua --policy noop --json --out run", "check x.lua"] {
+        let full = OpenOptions::new().write(true).open("/dev/full").expect("the device");
+        let output = Command::new(cargo_bin!("softvt"))
+            .current_dir(project.path(""))
+            .args(words.split_whitespace())
+            .stdout(Stdio::from(full))
+            .stderr(Stdio::piped())
+            .output()
+            .expect("started");
+        let err = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{words}: {err}");
+        assert!(err.contains("cannot write to standard output"), "{words}: {err}");
+        let mut child = Command::new(cargo_bin!("softvt"))
+            .current_dir(project.path(""))
+            .args(words.split_whitespace())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("started");
+        drop(child.stdout.take());
+        let output = child.wait_with_output().expect("ended");
+        let err = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && !err.contains("standard output"), "{words}: {err}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn billions_of_episodes_start_at_once_and_can_be_interrupted() {
+    let project = Small { task: "budget_steps = 1", ..Small::default() }.project();
+    let mut child = Command::new(cargo_bin!("softvt"))
+        .current_dir(project.path(""))
+        .args(["x.lua", "--policy", "noop", "--threads", "1", "--episodes", "4294967295", "--out", "run"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("started");
+    let start = Instant::now();
+    let has_episode = || fs::read(project.path("run/episodes.jsonl")).is_ok_and(|text| !text.is_empty());
+    while !has_episode() && start.elapsed() < Duration::from_secs(60) {
+        assert!(child.try_wait().expect("a child").is_none(), "it ended early");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    #[cfg(target_os = "linux")]
+    {
+        let status = fs::read_to_string(format!("/proc/{}/status", child.id())).expect("it runs");
+        let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).expect("a peak");
+        let kilobytes: u64 = peak.trim().trim_end_matches(" kB").parse().expect("a number");
+        assert!(kilobytes < 500_000, "{kilobytes} kB");
+    }
+    Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
+    let output = child.wait_with_output().expect("ended");
+    let err = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(130), "{err}");
+    assert!(err.contains("of 4294967295 episodes are in run"), "{err}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_named_pipe_is_refused_without_waiting() {
+    let project = Project::new(&[("y.lua", "return require 'pipe'")]);
+    let made = Command::new("mkfifo").arg(project.path("pipe.lua")).status().expect("mkfifo runs");
+    assert!(made.success());
+    let refused = project.refusal("check pipe.lua");
+    assert!(refused.contains("pipe.lua: cannot be read: is a pipe or a device, not a file"), "{refused}");
+    assert!(project.refusal("check y.lua").contains("pipe"), "a module that is a pipe");
+}
+
+#[test]
+fn runs_and_datasets_are_replayed_from_any_folder() {
+    let project = Project::new(&[("suites/x.lua", &Small { task: "budget_steps = 3", ..Small::default() }.text())]);
+    project.succeeds("suites/x.lua --policy noop --out runs/one");
+    project.write("elsewhere/note.txt", b"");
+    let elsewhere = |words: &str| {
+        let mut command = project.command(words);
+        command.current_dir(project.path("elsewhere"));
+        crate::support::run_command(command)
+    };
+    let output = elsewhere("replay ../runs/one 0/0");
+    assert_eq!(output.code, 0, "{}", output.err);
+    assert!(output.out.contains("byte-identical"), "{}", output.out);
+    // Both commands of the report work from the folder of the report.
+    let report = elsewhere("report ../runs/one --out page");
+    assert_eq!(report.code, 0, "{}", report.err);
+    let page = project.text("elsewhere/page/report.html");
+    let (_, view) = page.split_once("<code>softvt view ").expect("a command");
+    let (script, _) = view.split_once(' ').expect("a script");
+    assert!(project.path("elsewhere").join(script).is_file(), "{script}");
+    assert!(page.contains("softvt replay ../runs/one 0/0"));
+    // The run has moved, and its own folder is gone: the message names both.
+    let moved = tempfile::tempdir().expect("a folder");
+    let copied = moved.path().join("one");
+    fs::rename(project.path("runs/one"), &copied).expect("moved");
+    let from = project.path("suites/x.lua");
+    fs::remove_file(&from).expect("removed");
+    let refused = crate::support::refusal(elsewhere(&format!("replay {} 0/0", copied.display())), "replay");
+    let folder = project.path("").canonicalize().expect("there").display().to_string();
+    assert!(refused.contains("suites/x.lua is neither in the working folder nor in"), "{refused}");
+    assert!(refused.contains(folder.trim_end_matches('/')), "{refused}");
+}
+
+#[test]
+fn the_rigid_twin_of_rigid_objects_is_refused() {
+    let refused = Project::new(&[]).refusal("check suites/object_rigid.lua --twin rigid");
+    assert!(refused.contains("--twin: the objects of this suite are rigid already"), "{refused}");
+    assert!(!Project::new(&[]).succeeds(&format!("check {SPATIAL_SOFT} --twin rigid")).out.is_empty());
+}
