@@ -18,7 +18,12 @@ pub struct RobotSpec {
     pub pads: PadSpec,
     /// Inverse kinematics.
     pub ik: IkSpec,
+    /// Delay between a command and the robot's response, control steps of 0.05 s.
+    pub latency: u32,
 }
+
+/// Longest [`RobotSpec::latency`], control steps: 5 s.
+const MAX_LATENCY: u32 = 100;
 
 impl RobotSpec {
     /// The profile `paper`: a finger force limit of 200 N, as in the paper's simulator.
@@ -39,6 +44,7 @@ impl RobotSpec {
         positive("gripper.effort", gripper.effort, "N")?;
         positive("gripper.speed", gripper.speed, "m/s")?;
         positive("gripper.finger_mass", gripper.finger_mass, "kg")?;
+        within("latency", f64::from(self.latency), f64::from(MAX_LATENCY))?;
         positive("ik.lambda", ik.lambda, "1")?;
         within("ik.posture_gain", ik.posture_gain, 1.0)?;
         positive("pads.normal_modulus", pads.normal_modulus, "Pa/m")?;

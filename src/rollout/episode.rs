@@ -14,9 +14,10 @@ use super::{
     sensor_assets::{SensingError, SensorAssets},
     sensors::{SensorSuite, StateRecording, check_sensors},
     simulation::{ObjectInstance, SettleError, Simulation, state_hash},
+    tactile_wear::WearSeed,
     trace::StepTrace,
 };
-use softvt_benchmark::{GoalKind, Task, settings::Settings, steps_per_control};
+use softvt_benchmark::{GoalKind, Task, seed::EpisodeSeed, settings::Settings, steps_per_control};
 use softvt_evaluation::{
     deformation::{Deformation, ReferenceShape},
     episode_id::EpisodeId,
@@ -278,7 +279,8 @@ impl Episode {
             axis_angle_b: rotation::axis_angle(&tool.rotation),
             closure: 0.0,
         };
-        let sensors = SensorSuite::new(&sim, &spec.settings.tactile, sensor_assets);
+        let wear_seed = WearSeed::new(&EpisodeSeed::new(&spec.header.id, &spec.task.layout));
+        let sensors = SensorSuite::new(&sim, &spec.settings.tactile, sensor_assets).with_wear_seed(wear_seed);
         let recorded = spec.record_states.then(RecordedStates::default);
         Ok(Self {
             spec,

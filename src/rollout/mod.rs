@@ -80,6 +80,7 @@ mod sensors;
 mod shared_cache;
 mod simulation;
 mod soft_model;
+mod tactile_wear;
 mod trace;
 
 pub use asset_cache::AssetCache;
@@ -94,4 +95,5 @@ pub use sensors::{
 };
 pub use simulation::{ArticulatedPart, ObjectInstance, SettleError, Simulation, state_hash};
 pub use soft_model::soft_model;
+pub use tactile_wear::WearSeed;
 pub use trace::{ObjectTrace, StepTrace};

@@ -1,6 +1,6 @@
 //! The robot in the world: the Panda as an articulation, its drives, pads and inverse kinematics.
 
-use std::sync::Arc;
+use std::{collections::VecDeque, sync::Arc};
 
 use softvt_geometry::{Pose, Vec3, shape::Shape};
 use softvt_physics::{
@@ -32,6 +32,15 @@ pub struct RobotInstance {
     pub base_w: Pose,
     ik: DiffIk,
     gripper: GripperSetpoint,
+    /// Commands that the robot has not responded to yet, oldest first.
+    delayed: VecDeque<ToolCommand>,
+}
+
+/// Command of a control step.
+#[derive(Clone, Copy, Debug)]
+struct ToolCommand {
+    pose_b: Pose,
+    closure: f64,
 }
 
 impl RobotInstance {
@@ -80,13 +89,20 @@ impl RobotInstance {
             base_w: *base_w,
             ik: DiffIk::new(&spec.ik, *q, control_dt),
             gripper: GripperSetpoint::new(&spec.gripper, gripper::MAX_WIDTH),
+            delayed: VecDeque::with_capacity(spec.latency as usize + 1),
             spec: spec.clone(),
         }
     }
 
-    /// Sets the command of the next control step: tool pose in the base frame, and closure 0 (open) ..= 1 (closed).
+    /// Sets the command of a control step: tool pose in the base frame, and closure 0 (open) ..= 1 (closed). The robot
+    /// responds to it in the next control step, or `spec.latency` steps later; until then it follows the earlier ones.
     pub fn command(&mut self, world: &mut World, pose_b: &Pose, closure: f64) {
-        let target = self.ik.step(&self.q(world), pose_b);
+        self.delayed.push_back(ToolCommand { pose_b: *pose_b, closure });
+        if self.delayed.len() <= self.spec.latency as usize {
+            return;
+        }
+        let Some(ToolCommand { pose_b, closure }) = self.delayed.pop_front() else { return };
+        let target = self.ik.step(&self.q(world), &pose_b);
         let drives = world.articulation_mut(self.articulation).drives_mut();
         drives.iter_mut().flatten().zip(target).for_each(|(drive, q)| drive.target = q);
         self.gripper.command(closure);
@@ -123,7 +139,7 @@ impl RobotInstance {
         gripper::width([q[ARM_DOFS], q[ARM_DOFS + 1]])
     }
 
-    /// Closure last commanded, 0..=1.
+    /// Closure of the last command that the robot has responded to, 0..=1.
     pub fn closure(&self) -> f64 {
         self.gripper.closure()
     }

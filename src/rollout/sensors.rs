@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::{
     sensor_assets::{SensingError, SensorAssets},
     simulation::{ObjectInstance, Simulation},
+    tactile_wear::WearSeed,
 };
 use softvt_benchmark::CONTROL_DT;
 use softvt_geometry::{Pose, Vec3};
@@ -46,6 +47,7 @@ pub struct SensorSuite {
     render_scene: Option<Arc<RenderScene>>,
     renderer: Renderer,
     gel_scratch: GelScratch,
+    wear_seed: WearSeed,
 }
 
 /// A clone shares the meshes but has its own working memory.
@@ -61,6 +63,7 @@ impl Clone for SensorSuite {
             render_scene: self.render_scene.clone(),
             renderer: Renderer::default(),
             gel_scratch: GelScratch::default(),
+            wear_seed: self.wear_seed,
         }
     }
 }
@@ -93,7 +96,13 @@ impl SensorSuite {
             render_scene: None,
             renderer: Renderer::default(),
             gel_scratch: GelScratch::default(),
+            wear_seed: WearSeed::default(),
         }
+    }
+
+    /// The same sensors with the noise and wear of an episode.
+    pub fn with_wear_seed(self, wear_seed: WearSeed) -> Self {
+        Self { wear_seed, ..self }
     }
 
     /// The current state, with all that sensors need of it.
@@ -299,7 +308,9 @@ impl SensorSuite {
             friction: patch_friction(patch).unwrap_or(self.robot.pads.static_mu),
             substrate: if placed.len() == 1 { substrate } else { None },
         };
-        Ok(sensor.read(&contact, &mut self.gel_scratch)?)
+        let mut reading = sensor.read(&contact, &mut self.gel_scratch)?;
+        self.wear_seed.apply(&self.spec.wear, side, frame.step, &sensor.untouched_image, &mut reading);
+        Ok(reading)
     }
 
     /// Proprioception in a state.

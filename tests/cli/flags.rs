@@ -56,7 +56,10 @@ fn settings_and_seed_reach_the_simulations_of_an_experiment() {
         ("--set nonsense=1", "no setting \"nonsense\""),
         ("--set physics.dt=-1", "physics.dt"),
         ("--set criteria.slip_m=0.1", "--set criteria.slip_m: an experiment judges no episodes"),
-        ("--shift mass=2", "--shift: applies to suites, lists of suites, conditions, and this file is an experiment"),
+        (
+            "--shift mass=2",
+            "--shift: applies to suites, lists of suites, conditions, and this file is an experiment",
+        ),
     ] {
         let refused = project.refusal(&format!("x.lua {words}"));
         assert!(refused.contains(part), "{refused}");
@@ -82,11 +85,15 @@ fn an_experiment_refuses_what_it_does_not_use() {
 fn an_experiment_writes_its_rows_and_its_command_line() {
     let text = SQUEEZE;
     let finish = "columns = { 'part' }, finish = function(rows) return { files = { ['assets/n.json'] = { n = #rows } } } end }";
-    let project = Project::new(&[("x.lua", &(text.trim_end().trim_end_matches('}').to_owned() + ", " + finish))]);
+    let project =
+        Project::new(&[("x.lua", &(text.trim_end().trim_end_matches('}').to_owned() + ", " + finish))]);
     let refused = project.refusal("x.lua --set robot.gripper.speed=0.01");
     assert!(refused.contains("--set robot.gripper.speed: give --out DIR"), "{refused}");
     assert!(project.refusal("x.lua --seed 1").contains("--seed: give --out DIR"));
-    assert!(!project.path("assets").exists(), "a file of the project is not replaced by one of changed settings");
+    assert!(
+        !project.path("assets").exists(),
+        "a file of the project is not replaced by one of changed settings"
+    );
     let printed = project.succeeds("x.lua --json --out run --seed 1 --set robot.gripper.speed=0.01").out;
     assert_eq!(project.text("run/rows.jsonl"), printed);
     assert_eq!(project.json("run/assets/n.json")["n"], 3);
@@ -102,7 +109,11 @@ fn a_folder_with_other_files_is_refused() {
     let project = Small { task: "budget_steps = 1", ..Small::default() }.project();
     project.write("mine/notes.txt", b"mine");
     project.write("list.lua", b"return { (require \"x\") }");
-    for words in ["x.lua --policy noop --out mine", "x.lua --policy noop --out mine --resume", "list.lua --policy noop --out mine"] {
+    for words in [
+        "x.lua --policy noop --out mine",
+        "x.lua --policy noop --out mine --resume",
+        "list.lua --policy noop --out mine",
+    ] {
         let refused = project.refusal(words);
         assert!(refused.contains("mine is not empty and holds no run (it contains notes.txt)"), "{refused}");
     }
@@ -119,7 +130,14 @@ fn a_folder_with_other_files_is_refused() {
 fn a_full_device_is_an_error_and_a_closed_pipe_is_not() {
     let project = Small { task: "budget_steps = 1", ..Small::default() }.project();
     project.succeeds("x.lua --policy noop --out run");
-    for words in ["list tasks", "list assets --json", "--version", "compare run run", "x.lua --policy noop --json --out run", "check x.lua"] {
+    for words in [
+        "list tasks",
+        "list assets --json",
+        "--version",
+        "compare run run",
+        "x.lua --policy noop --json --out run",
+        "check x.lua",
+    ] {
         let full = OpenOptions::new().write(true).open("/dev/full").expect("the device");
         let output = Command::new(cargo_bin!("softvt"))
             .current_dir(project.path(""))
@@ -189,7 +207,8 @@ fn a_named_pipe_is_refused_without_waiting() {
 
 #[test]
 fn runs_and_datasets_are_replayed_from_any_folder() {
-    let project = Project::new(&[("suites/x.lua", &Small { task: "budget_steps = 3", ..Small::default() }.text())]);
+    let project =
+        Project::new(&[("suites/x.lua", &Small { task: "budget_steps = 3", ..Small::default() }.text())]);
     project.succeeds("suites/x.lua --policy noop --out runs/one");
     project.write("elsewhere/note.txt", b"");
     let elsewhere = |words: &str| {

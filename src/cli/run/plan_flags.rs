@@ -305,7 +305,10 @@ local suite = softvt.suite { name = "one", object_type = "deformable", variation
                         (_, true) => {
                             message.contains(&format!("{long}: ")) && message.contains(&kind.to_string())
                         }
-                        (_, false) => message.contains(&format!("softvt {command} needs a ")),
+                        (_, false) => {
+                            message.contains(&format!("softvt {command} needs a "))
+                                || message.contains(&format!("{long}: applies to policy servers"))
+                        }
                     };
                     assert!(is_clear, "{command} {sample}: {message}");
                 }

@@ -36,7 +36,7 @@ use softvt_evaluation::{deformation::ReferenceShape, episode_id::Split};
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::BodyId;
 use softvt_robot::{Side, rotation};
-use softvt_rollout::{AssetCache, SensingError, SensorAssets, SensorSuite, Simulation, cancel};
+use softvt_rollout::{AssetCache, SensingError, SensorAssets, SensorSuite, Simulation, WearSeed, cancel};
 use softvt_sensing::tactile::{MarkerStyle, PadWrench, TactileReading};
 
 const EPISODE: Type = Type::Integer(Range::closed(0.0, 1e9));
@@ -95,6 +95,7 @@ impl LuaSimulation {
     /// Builds the scene of a layout and lets it settle.
     fn new(lua: &Lua, layout: &LayoutSpec, seed: EpisodeSeed, settings: &Settings) -> mlua::Result<Self> {
         let scene = LuaScene::new(empty_scene());
+        let wear_seed = WearSeed::new(&seed);
         layout.build.call::<()>((scene.clone(), LuaRng::new(seed, RandomStream::Layout)))?;
         let scene = Arc::new(lock(&scene.scene).clone());
         let clock = app_data::<Clock>(lua)?;
@@ -127,7 +128,7 @@ impl LuaSimulation {
             physics_steps: 0,
             failed: None,
             clock: clock.clone(),
-            sensors: SensorSuite::new(&sim, &settings.tactile, &caches.sensors),
+            sensors: SensorSuite::new(&sim, &settings.tactile, &caches.sensors).with_wear_seed(wear_seed),
             sim,
             _reserved: reserved,
         }))))

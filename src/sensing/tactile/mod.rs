@@ -28,5 +28,5 @@ pub use self::{
     markers::{MARKER_COUNT, MarkerFlow, MarkerPositions, MarkerStyle, Markers},
     sensor::{TactileReading, TactileSensor, TactileSensorError},
     skin::TactileSkin,
-    spec::{FotsSpec, GelSpec, IMAGE_SIZE, MarkerModel, OpticsModel, Pinhole, TactileSpec},
+    spec::{FotsSpec, GelSpec, IMAGE_SIZE, MarkerModel, OpticsModel, Pinhole, TactileSpec, WearSpec},
 };

@@ -25,6 +25,30 @@ pub struct TactileSpec {
     pub shadows: bool,
     /// Model of the marker motion.
     pub markers: MarkerModel,
+    /// Noise and wear of both sensors.
+    pub wear: WearSpec,
+}
+
+/// Noise and wear of a tactile sensor: what a policy observes of it. The forces of the contact are unchanged.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct WearSpec {
+    /// Standard deviation of the noise of each marker coordinate in each image, px.
+    pub noise_px: f64,
+    /// Standard deviation of the constant offset of each marker coordinate, px.
+    pub offset_px: f64,
+    /// Factor on the displacements of the markers and on the changes of the image.
+    pub gain: f64,
+    /// Share of the markers that do not follow the gel.
+    pub dead_share: f64,
+    /// Standard deviation of the noise of each colour value in each image, of 255.
+    pub image_noise: f64,
+}
+
+impl Default for WearSpec {
+    fn default() -> Self {
+        Self { noise_px: 0.0, offset_px: 0.0, gain: 1.0, dead_share: 0.0, image_noise: 0.0 }
+    }
 }
 
 /// Material and grid of the gel. Its shape is [`softvt_robot::PadSurface`].
@@ -154,6 +178,12 @@ impl TactileSpec {
         between("gel.cell", gel.cell, 1e-4, 5e-4, "m in 0.0001..0.0005")?;
         between("view.pitch", view.pitch, 1e-5, 2e-4, "m in 1e-5..2e-4")?;
         between("view.lens", view.lens, 5e-3, 1.0, "m in 0.005..1")?;
+        let wear = &self.wear;
+        between("wear.noise_px", wear.noise_px, 0.0, 20.0, "px in 0..20")?;
+        between("wear.offset_px", wear.offset_px, 0.0, 20.0, "px in 0..20")?;
+        between("wear.gain", wear.gain, 0.0, 10.0, "0..10")?;
+        between("wear.dead_share", wear.dead_share, 0.0, 1.0, "0..1")?;
+        between("wear.image_noise", wear.image_noise, 0.0, 128.0, "0..128")?;
         if self.shadows && self.optics != OpticsModel::Polynomial {
             let expected = "false with the model \"taxim\", whose images have no shadows";
             let (path, value) = ("tactile.shadows".into(), "true".into());
