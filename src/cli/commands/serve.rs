@@ -11,7 +11,6 @@ use crate::{
     run::{
         config::{RunConfig, RunFlags, ScriptArgs},
         episode_list::EpisodeList,
-        plan_flags,
         policy::{PolicyArgs, PolicyConfig, load_profile_of},
         selection::{needs_suites, suites_of},
         suite_run::SuiteRun,
@@ -59,8 +58,7 @@ pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
     let config = RunConfig::new(args.script.clone(), RunFlags::default())?;
     let config = config.with_policy(PolicyConfig::external("client"));
     let (profile, _) = load_profile_of(&args.policy)?;
-    let loaded = config.load_script()?;
-    plan_flags::check("serve", &config, &loaded.plan)?;
+    let loaded = config.load_checked("serve")?;
     let suites = suites_of(&loaded.plan);
     if suites.iter().all(|suite| suite.tasks.is_empty()) {
         return Err(needs_suites("serve", &config));

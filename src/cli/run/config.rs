@@ -180,9 +180,19 @@ impl RunConfig {
         command: &str,
         policy: &PolicyArgs,
     ) -> Result<(Self, LoadedScript), CliError> {
-        let loaded = self.load_script()?;
-        plan_flags::check(command, &self, &loaded.plan)?;
+        let loaded = self.load_checked(command)?;
         Ok((self.with_policy(PolicyConfig::load(policy)?), loaded))
+    }
+
+    /// Loads the script and refuses flags of `command` that would do nothing for its plan.
+    ///
+    /// # Errors
+    /// The script fails or returns no plan; a flag without effect.
+    pub(crate) fn load_checked(&self, command: &str) -> Result<LoadedScript, CliError> {
+        let mut loaded = softvt_script::load(&self.script.file, &self.script.options)?;
+        plan_flags::check(command, self, &loaded.plan)?;
+        self.apply_variation(&mut loaded)?;
+        Ok(loaded)
     }
 
     /// Loads the script with its options.
@@ -191,12 +201,16 @@ impl RunConfig {
     /// The script fails or returns no plan.
     pub(crate) fn load_script(&self) -> Result<LoadedScript, CliError> {
         let mut loaded = softvt_script::load(&self.script.file, &self.script.options)?;
-        if let Some(file) = &self.script.vary {
-            let (ranges, _) = softvt_script::load_variation(file)
-                .map_err(|error| CliError::from(error).prefixed("--vary"))?;
-            loaded.vary(&ranges).map_err(|error| self.error(format!("--vary: {error}")))?;
-        }
+        self.apply_variation(&mut loaded)?;
         Ok(loaded)
+    }
+
+    /// Makes the suites vary as `--vary` says.
+    fn apply_variation(&self, loaded: &mut LoadedScript) -> Result<(), CliError> {
+        let Some(file) = &self.script.vary else { return Ok(()) };
+        let (ranges, _) = softvt_script::load_variation(file)
+            .map_err(|error| CliError::from(error).prefixed("--vary"))?;
+        loaded.vary(&ranges).map_err(|error| self.error(format!("--vary: {error}")))
     }
 
     /// An error about the script.

@@ -65,13 +65,13 @@ const SUITES: &[PlanKind] = &[Suite, Suites];
 /// The command without a name: `softvt FILE.lua`.
 pub(crate) const RUN: &str = "softvt";
 const POLICY_SERVER: &[&str] = &["policy", "protocol", "replan", "policy_timeout", "name"];
-const SCENE: &[&str] = &["seed", "settings", "shifts", "twin"];
+const SCENE: &[&str] = &["seed", "settings", "shifts", "twin", "vary"];
 
 /// Every flag of every command that loads a plan. `check` accepts what a run accepts and validates it; the other
 /// commands refuse plans of other kinds as such.
 static DECISIONS: &[Decision] = &[
     Decision { commands: &[RUN, "check"], flags: &["seed", "settings"], acts_on: ALL },
-    Decision { commands: &[RUN, "check"], flags: &["shifts", "twin"], acts_on: EPISODES },
+    Decision { commands: &[RUN, "check"], flags: &["shifts", "twin", "vary"], acts_on: EPISODES },
     Decision { commands: &[RUN, "check"], flags: POLICY_SERVER, acts_on: EPISODES },
     Decision { commands: &[RUN, "check"], flags: &["profile", "gripper"], acts_on: EPISODES },
     Decision { commands: &[RUN], flags: &["threads", "out", "json"], acts_on: ALL },
@@ -171,6 +171,7 @@ mod tests {
         ("settings", "--set physics.sleeping=false"),
         ("shifts", "--shift mass=2"),
         ("twin", "--twin rigid"),
+        ("vary", "--vary"),
         ("policy", "--policy noop"),
         ("protocol", "--protocol openpi"),
         ("replan", "--replan 2"),

@@ -16,7 +16,6 @@ use crate::{
     run::{
         config::ScriptArgs,
         episode_list::{EpisodeJob, EpisodeList},
-        plan_flags,
         policy::PolicyConfig,
         recording::{GripLog, RecordingArgs, SuiteRecording, record_all},
         selection::select_suites,
@@ -65,8 +64,7 @@ pub(super) fn run(args: ImportArgs) -> Result<(), CliError> {
     let recording = &args.recording;
     let config =
         &recording.run_config(args.script, args.tasks)?.with_policy(PolicyConfig::external("import"));
-    let loaded = config.load_script()?;
-    plan_flags::check("dataset import", config, &loaded.plan)?;
+    let loaded = config.load_checked("dataset import")?;
     let suites = select_suites("dataset import", config, &loaded.plan)?;
     let files: Vec<ForeignFile> =
         args.files.iter().map(|path| import::read(path)).collect::<Result<_, _>>()?;
