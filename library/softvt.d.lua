@@ -217,7 +217,7 @@
 ---@field quaternion? number[] Orientation as quaternion. Expects a list of 4 numbers (w, x, y, z, base frame).
 ---@field closure number Gripper closure: 0 is open, 1 is closed. Expects a number in 0..1.
 
----Returns an empty world: soft bodies among fixed or prescribed solids, without a robot.
+---Returns an empty world: soft bodies among fixed or prescribed solids, without a robot. Settings of the command line, --set physics.…, take precedence in experiments.
 ---@class softvt.WorldSpec
 ---@field dt? number Time step. Expects seconds in 0.00001..0.05. Default 0.016666666666666666.
 ---@field rayleigh_mass? number Mass-proportional Rayleigh damping. Expects a number (1/s) in 0..1000. Default 0.
@@ -230,8 +230,8 @@
 ---@field layout softvt.Layout Initial scene.
 ---@field suite? string Part of the seed. Default "experiment".
 ---@field episode? integer Part of the seed. Expects a whole number in 0..1000000000. Default 0.
----@field seed? integer Part of the seed. Expects a whole number in 0..1000000000. Default 0.
----@field settings? table<string, table<string, any>> Changed settings of physics, robot and judge: { physics = {…}, robot = {…}, criteria = {…} }.
+---@field seed? integer Part of the seed; by default that of the run, --seed. Expects a whole number in 0..1000000000.
+---@field settings? table<string, table<string, any>> Changed settings of physics, robot and tactile sensors: { physics = {…}, robot = {…}, tactile = {…} }. Those of the command line, --set, take precedence in experiments.
 
 ---Returns the results of a calibration: the lower bound of closure, the deformation limit τ, and the files to write.
 ---@class softvt.EnvelopeSpec
@@ -1323,7 +1323,7 @@ function softvt.check_fields(label, value, fields) end
 ---@return softvt.Layout
 function softvt.layout(name, build) end
 
----Returns an empty world: soft bodies among fixed or prescribed solids, without a robot.
+---Returns an empty world: soft bodies among fixed or prescribed solids, without a robot. Settings of the command line, --set physics.…, take precedence in experiments.
 ---@param spec? softvt.WorldSpec
 ---@return softvt.World
 function softvt.world(spec) end

@@ -210,7 +210,7 @@ mod tests {
         assert!(settings.with("robot.gripper.efort", "0.2").is_err_and(|e| e.to_string().contains("effort")));
         assert_eq!(
             settings.with("tactile", "1").expect_err("a group").to_string(),
-            "tactile is a group of settings; its fields are gel, view, optics, shadows, markers, as in \
+            "tactile is a group of settings; its fields are gel, view, optics, shadows, markers, wear, as in \
              tactile.gel=…"
         );
         assert_eq!(
