@@ -208,8 +208,8 @@ impl RunConfig {
     /// Makes the suites vary as `--vary` says.
     fn apply_variation(&self, loaded: &mut LoadedScript) -> Result<(), CliError> {
         let Some(file) = &self.script.vary else { return Ok(()) };
-        let (ranges, _) = softvt_script::load_variation(file)
-            .map_err(|error| CliError::from(error).prefixed("--vary"))?;
+        let (ranges, _) =
+            softvt_script::load_variation(file).map_err(|error| CliError::from(error).prefixed("--vary"))?;
         loaded.vary(&ranges).map_err(|error| self.error(format!("--vary: {error}")))
     }
 

@@ -7,8 +7,8 @@ use crate::{
     run::{
         config::{RunConfig, TraceDetail},
         episode_artifacts::EpisodeArtifacts,
-        limits::{CalibrationFiles, Calibrations, LimitScan, SceneLimits},
         episode_list::{EpisodeJob, EpisodeList},
+        limits::{CalibrationFiles, Calibrations, LimitScan, SceneLimits},
         policy::{ControllerFactory, DeclaredStreams},
         recorded_runs::{RecordedRuns, ReplaySource},
     },
