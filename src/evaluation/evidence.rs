@@ -35,6 +35,8 @@ pub struct BodyEvidence {
     /// Sum of the upward impulses on the body in this step from everything but the robot, N s. A sleeping body keeps
     /// the value with which it fell asleep.
     pub support_impulse_ns: f64,
+    /// Normal impulse on the body in this step from all parts of the robot, pads included, N s.
+    pub robot_impulse_ns: f64,
     /// Present deformation; `None` for a rigid body, and for a soft one when it could not be measured.
     pub deformation: Option<Deformation>,
 }
@@ -63,7 +65,7 @@ pub struct Evidence<'a> {
     pub robot_impulse_ns: f64,
     /// State of the target.
     pub target: BodyEvidence,
-    /// States of the other movable bodies, in the same order in every step.
+    /// States of the other movable bodies, the one at the goal included, in the same order in every step.
     pub others: &'a [BodyEvidence],
     /// State of the object at the goal.
     pub goal: GoalEvidence,
@@ -76,7 +78,7 @@ impl Evidence<'_> {
         let bodies = self.others.iter().chain([&self.target]);
         let bodies = bodies.flat_map(|body| {
             let centre = body.centre_w;
-            [centre.x, centre.y, centre.z, body.lowest_z_w, body.support_impulse_ns]
+            [centre.x, centre.y, centre.z, body.lowest_z_w, body.support_impulse_ns, body.robot_impulse_ns]
         });
         let pads = self.pads.iter().flat_map(|pad| [pad.normal_impulse_ns, pad.travel_m]);
         let (pose, gripper) = (self.goal.pose_w.to_homogeneous(), &self.gripper);

@@ -48,6 +48,17 @@ impl GoalRegion {
         }
     }
 
+    /// True if a centre at `centre_w` is over the region of an object at `object_w`, at any height.
+    pub fn is_below(&self, object_w: &Pose, centre_w: &Vec3) -> bool {
+        match self {
+            Self::On { .. } => self.contains(object_w, centre_w, 0.0),
+            Self::Inside { space } => {
+                let p = object_w.inverse_transform_point(&(*centre_w).into());
+                (0..2).all(|i| p[i] >= space.min[i] && p[i] <= space.max[i])
+            }
+        }
+    }
+
     /// The looser predicate of SoftVTBench's released code: true if both centres are closer than
     /// a distance, horizontally and vertically ([`goal_v1_on_m`](SuccessCriteria::goal_v1_on_m),
     /// [`goal_v1_in_m`](SuccessCriteria::goal_v1_in_m)).

@@ -22,6 +22,7 @@
 //! | Does the target rest at its goal, released? | [`goal`] |
 //! | Was the object dropped, or released on purpose? | [`drop`](mod@drop) |
 //! | How far did it slide in the grasp? | [`slip`] |
+//! | At which stage did the episode fail? | [`stage`] |
 //! | Goal, NoDrop and deformation limit together | [`safety`] |
 //! | Where does the limit τ of an asset come from? | [`calibration`], [`thresholds`], [`envelope_plot`] |
 //! | Every threshold of the judge | [`criteria`] |
@@ -43,6 +44,7 @@ pub mod paired_stats;
 pub mod record;
 pub mod safety;
 pub mod slip;
+pub mod stage;
 pub mod statistics;
 pub mod summary;
 pub mod thresholds;

@@ -6,16 +6,12 @@
 
 use std::collections::BTreeMap;
 
-use rand_chacha::{
-    ChaCha8Rng,
-    rand_core::{RngCore, SeedableRng},
-};
 use serde::{Deserialize, Serialize};
 
 use super::{
     episode_id::EpisodeId,
     record::EpisodeRecord,
-    statistics::{Z95, mean, quantile},
+    statistics::{Z95, mean, stratified_bootstrap},
 };
 
 /// One episode in both runs.
@@ -88,6 +84,15 @@ pub struct PairedComparison {
     pub no_drop: PairedDifference,
     /// Safety Success, %.
     pub safety: PairedDifference,
+    /// DSR: Goal Success with D_peak ≤ τ, %; over soft targets.
+    #[serde(default)]
+    pub dsr: PairedDifference,
+    /// No other soft body beyond its own τ, %; where both runs know it.
+    #[serde(default)]
+    pub others_ok: PairedDifference,
+    /// Time over τ where both runs have one, s.
+    #[serde(default)]
+    pub time_over_tau_s: PairedDifference,
     /// Peak D where both runs have one, % of the diagonal.
     pub d_peak: PairedDifference,
     /// Peak D over τ where both runs have both.
@@ -110,14 +115,21 @@ impl PairedComparison {
             goal: rate(|r| r.verdict.goal),
             no_drop: rate(|r| r.verdict.no_drop),
             safety: rate(|r| r.verdict.safety),
+            dsr: PairedDifference::from_successes(
+                pairs
+                    .iter()
+                    .filter(|pair| pair.first.header.soft && pair.second.header.soft)
+                    .map(|pair| [pair.first, pair.second].map(EpisodeRecord::is_deformation_safe)),
+            ),
+            others_ok: PairedDifference::from_successes(pairs.iter().filter_map(|pair| {
+                Some([pair.first.verdict.others_ok?, pair.second.verdict.others_ok?])
+            })),
+            time_over_tau_s: mean(|r| r.verdict.time_over_tau_s.filter(|_| r.outcome.is_valid())),
             d_peak: mean(d_peak),
             d_over_tau: mean(d_over_tau),
         }
     }
 }
-
-/// Number of resamples of the bootstrap.
-const RESAMPLES: usize = 4000;
 
 /// Difference of a success rate (%) or of the mean of a lower-is-better quantity over the same episodes of two runs.
 ///
@@ -152,7 +164,8 @@ pub struct PairedDifference {
     /// Second minus first; percentage points for a rate, null without episodes.
     pub difference: Option<f64>,
     /// 95 % interval of the difference: of a rate by Agresti & Min (2005); of a mean by the percentile bootstrap over
-    /// episodes (Efron, 1979), from a fixed seed, null for fewer than two episodes.
+    /// episodes (Efron, 1979), from a fixed seed, null for fewer than
+    /// [`MIN_BOOTSTRAP_VALUES`](super::statistics::MIN_BOOTSTRAP_VALUES) episodes.
     pub interval95: Option<[f64; 2]>,
     /// Exact two-sided p-value of McNemar's test of a rate (binomial on the episodes that differ); absent for a mean.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -198,7 +211,7 @@ impl PairedDifference {
             worse,
             same: differences.len() - better - worse,
             difference: mean(&differences),
-            interval95: bootstrap(&differences),
+            interval95: stratified_bootstrap(std::slice::from_ref(&differences)),
             p: None,
         }
     }
@@ -221,24 +234,6 @@ fn mcnemar(better: usize, worse: usize) -> f64 {
     let ln_choose = |k: usize| (1..=k).map(|i| ((n - k + i) as f64 / i as f64).ln()).sum::<f64>();
     let tail: f64 = (0..=fewer).map(|k| (ln_choose(k) - n as f64 * std::f64::consts::LN_2).exp()).sum();
     (2.0 * tail).min(1.0)
-}
-
-/// 95 % interval of a mean by the percentile bootstrap; `None` of fewer than two values. The seed is the number of
-/// values, so equal runs give equal intervals.
-fn bootstrap(values: &[f64]) -> Option<[f64; 2]> {
-    let n = values.len();
-    if n < 2 {
-        return None;
-    }
-    let mut rng = ChaCha8Rng::seed_from_u64(n as u64);
-    let mut means: Vec<f64> = (0..RESAMPLES)
-        .map(|_| {
-            let draw = |_| values[((rng.next_u64() >> 32) as usize * n) >> 32];
-            (0..n).map(draw).sum::<f64>() / n as f64
-        })
-        .collect();
-    means.sort_by(f64::total_cmp);
-    quantile(&means, 0.025).zip(quantile(&means, 0.975)).map(|(low, high)| [low, high])
 }
 
 #[cfg(test)]
@@ -279,7 +274,7 @@ mod tests {
         let same = run(&[(true, true, 0.5), (false, false, 2.0)]);
         let paired = PairedComparison::from_pairs(&pair_episodes(&same, &same));
         assert_eq!([paired.goal, paired.no_drop, paired.safety].map(counts), [[0, 0, 2]; 3]);
-        assert_eq!((paired.d_over_tau.same, paired.d_over_tau.interval95), (2, Some([0.0, 0.0])));
+        assert_eq!((paired.d_over_tau.same, paired.d_over_tau.interval95), (2, None));
     }
 
     #[test]

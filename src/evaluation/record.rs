@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize, Serializer, ser::SerializeMap};
 
-use super::{drop::DropEvent, episode_id::EpisodeId, safety::KappaVerdict};
+use super::{drop::DropEvent, episode_id::EpisodeId, safety::KappaVerdict, stage::Stage};
 use softvt_scene::{InitialState, SceneVariation};
 
 /// End of a rollout.
@@ -109,6 +109,28 @@ pub struct Origin {
     pub start: InitialState,
 }
 
+/// First contact of the robot with an object that is not the target.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WrongContact {
+    /// Time of the contact, s.
+    pub time_s: f64,
+    /// Name of the object.
+    pub object: String,
+}
+
+/// Deformation of a soft body that is not the target.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OtherDeformation {
+    /// Name of the object in the scene.
+    pub object: String,
+    /// Peak D, %; null if it was never measured.
+    pub d_peak: Option<f64>,
+    /// τ of the object, %; null without a calibration.
+    pub tau: Option<f64>,
+    /// D_peak ≤ τ; null where either is unknown.
+    pub deformation_ok: Option<bool>,
+}
+
 /// Judgement of one episode. Percentages are of the diagonal of the settled bounding box.
 ///
 /// [`super::judge`] defines each field.
@@ -134,8 +156,32 @@ pub struct Verdict {
     pub d_peak_weighted: Option<f64>,
     /// Peak of the largest node displacement of the target, %.
     pub d_peak_max: Option<f64>,
-    /// Peak D over the other soft bodies, %.
+    /// Mean D of the target over all physics steps, %.
+    #[serde(default)]
+    pub d_mean: Option<f64>,
+    /// D of the target at the last physics step, %.
+    #[serde(default)]
+    pub d_final: Option<f64>,
+    /// 95th percentile of the target's D over all physics steps, %.
+    #[serde(default)]
+    pub d_p95: Option<f64>,
+    /// Time for which the target's D exceeded τ, s; null without a limit.
+    #[serde(default)]
+    pub time_over_tau_s: Option<f64>,
+    /// Peak D over the other soft bodies, the object at the goal included, %.
     pub d_peak_other: Option<f64>,
+    /// The other soft bodies, one by one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub others: Vec<OtherDeformation>,
+    /// No other soft body exceeded its own τ; null where that is unknown.
+    #[serde(default)]
+    pub others_ok: Option<bool>,
+    /// First contact of the robot with a movable object that is not the target; null without one.
+    #[serde(default)]
+    pub first_wrong_contact: Option<WrongContact>,
+    /// Stage at which an episode without Goal Success ended; null with it.
+    #[serde(default)]
+    pub failed_stage: Option<Stage>,
     /// True if the first object that was lifted is not the target.
     pub wrong_instance: bool,
     /// κ of the benchmark, the share of D_ref that is allowed; null without a calibration.
@@ -189,6 +235,10 @@ pub struct RolloutStats {
     /// Reason given by the controller for aborting the episode, if it did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gave_up: Option<String>,
+    /// SHA-256 of the actions, as the float64 numbers of their file (little-endian), hexadecimal; absent in runs of earlier
+    /// versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub actions_sha256: Option<String>,
     /// Hash of the final state, hexadecimal.
     pub state_hash: String,
 }
@@ -207,6 +257,36 @@ pub struct EpisodeRecord {
     /// Counters of the rollout.
     #[serde(flatten)]
     pub stats: RolloutStats,
+}
+
+impl EpisodeRecord {
+    /// True if the episode counts in DSR: Goal Success with D_peak ≤ τ. Drops do not enter.
+    pub fn is_deformation_safe(&self) -> bool {
+        self.outcome.is_valid() && self.verdict.goal && self.verdict.deformation_ok == Some(true)
+    }
+
+    /// True if the deformation of the target can be judged. An invalid episode with a limit is judged: it fails.
+    pub fn is_deformation_judged(&self) -> bool {
+        match self.outcome.is_valid() {
+            true => self.verdict.deformation_ok.is_some(),
+            false => self.verdict.tau.is_some(),
+        }
+    }
+
+    /// Removes the fields that records of version 0.1 lack, for the comparison with such a record.
+    pub fn remove_new_fields(&mut self) {
+        self.stats.actions_sha256 = None;
+        let v = &mut self.verdict;
+        (v.d_mean, v.d_final, v.d_p95, v.time_over_tau_s) = (None, None, None, None);
+        (v.others_ok, v.first_wrong_contact, v.failed_stage) = (None, None, None);
+        v.others.clear();
+    }
+
+    /// True if harm to other objects was recorded; runs of earlier versions have no such fields.
+    pub(crate) fn has_harm(&self) -> bool {
+        let v = &self.verdict;
+        v.others_ok.is_some() || v.failed_stage.is_some() || v.d_mean.is_some() || v.first_wrong_contact.is_some()
+    }
 }
 
 #[cfg(test)]

@@ -1,24 +1,43 @@
 //! Rates with confidence intervals, means and quantiles.
 
+use rand_chacha::{
+    ChaCha8Rng,
+    rand_core::{RngCore, SeedableRng},
+};
 use serde::{Deserialize, Serialize};
 
 /// Quantile of the normal distribution for a two-sided 95 % interval.
 pub(super) const Z95: f64 = 1.959_963_984_540_054;
 
 /// Share of episodes with its uncertainty, in percent.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Rate {
     /// Share, %; null without episodes.
     pub rate: Option<f64>,
     /// 95 % Wilson score interval of the share, %; null without episodes.
     pub wilson95: Option<[f64; 2]>,
+    /// 95 % interval of the share by [`stratified_bootstrap`] over tasks, %; absent where it is not computed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bootstrap95: Option<[f64; 2]>,
 }
 
 impl Rate {
     /// Rate of `count` in `total`.
     pub fn new(count: usize, total: usize) -> Self {
         let rate = (total > 0).then(|| 100.0 * count as f64 / total as f64);
-        Self { rate, wilson95: wilson95(count, total) }
+        Self { rate, wilson95: wilson95(count, total), bootstrap95: None }
+    }
+
+    /// The rate of what was never judged: null.
+    pub fn not_judged() -> Self {
+        Self::default()
+    }
+
+    /// Adds the bootstrap interval; `strata` are the outcomes by task.
+    pub fn with_bootstrap(self, strata: &[Vec<bool>]) -> Self {
+        let percent = |outcomes: &Vec<bool>| outcomes.iter().map(|held| if *held { 100.0 } else { 0.0 }).collect();
+        let strata: Vec<Vec<f64>> = strata.iter().map(percent).collect();
+        Self { bootstrap95: self.rate.and_then(|_| stratified_bootstrap(&strata)), ..self }
     }
 
     /// Rate of the `items` for which `test` holds.
@@ -42,6 +61,40 @@ fn wilson95(count: usize, total: usize) -> Option<[f64; 2]> {
     Some([low, high])
 }
 
+/// Number of resamples of a bootstrap.
+const RESAMPLES: usize = 4000;
+/// Smallest number of values of a bootstrap interval. With fewer the interval is little more than their range.
+pub const MIN_BOOTSTRAP_VALUES: usize = 10;
+/// Smallest number of values per stratum: resampling within n values underestimates their variance by the factor
+/// (n − 1)/n.
+pub const MIN_STRATUM_VALUES: usize = 5;
+
+/// 95 % interval of the mean of all values by the percentile bootstrap (Efron, 1979), resampled within each stratum.
+///
+/// `None` for fewer than [`MIN_BOOTSTRAP_VALUES`] values, or fewer than [`MIN_STRATUM_VALUES`] in a stratum that has
+/// any. The seed is the number of values, so equal data give equal intervals.
+pub fn stratified_bootstrap(strata: &[Vec<f64>]) -> Option<[f64; 2]> {
+    let strata: Vec<&Vec<f64>> = strata.iter().filter(|values| !values.is_empty()).collect();
+    let n: usize = strata.iter().map(|values| values.len()).sum();
+    if n < MIN_BOOTSTRAP_VALUES || strata.iter().any(|values| values.len() < MIN_STRATUM_VALUES) {
+        return None;
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(n as u64);
+    let mut resampled = |values: &[f64]| -> f64 {
+        // Equal values need no resampling.
+        if values.iter().all(|value| *value == values[0]) {
+            return values[0] * values.len() as f64;
+        }
+        let draw = |_| values[((rng.next_u64() >> 32) as usize * values.len()) >> 32];
+        (0..values.len()).map(draw).sum()
+    };
+    let mut means: Vec<f64> = (0..RESAMPLES)
+        .map(|_| strata.iter().map(|values| resampled(values)).sum::<f64>() / n as f64)
+        .collect();
+    means.sort_by(f64::total_cmp);
+    quantile(&means, 0.025).zip(quantile(&means, 0.975)).map(|(low, high)| [low, high])
+}
+
 /// Arithmetic mean; `None` of an empty slice.
 pub fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
@@ -59,10 +112,16 @@ pub fn quantile_by(count: usize, at: impl Fn(usize) -> f64, q: f64) -> Option<f6
     let place = q.clamp(0.0, 1.0) * last as f64;
     let (rank, share) = (place.floor() as usize, place.fract());
     let low = at(rank);
+    if share == 0.0 {
+        return Some(low);
+    }
     Some(low + share * (at((rank + 1).min(last)) - low))
 }
 
-/// Mean and quantiles of a quantity; all null without values.
+/// Mean and quantiles of a quantity.
+///
+/// Invalid episodes have no value that could be averaged; they rank above all values, as +∞. A percentile that falls on
+/// one of them is null. All are null without values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Distribution {
     /// Arithmetic mean of the values.
@@ -73,21 +132,42 @@ pub struct Distribution {
     pub median: Option<f64>,
     /// 95th percentile of the values.
     pub p95: Option<f64>,
-    /// Number of values; 0 of an empty list.
+    /// Number of values, which the mean is over; 0 of an empty list.
     pub n: usize,
+    /// Number of invalid episodes, which rank above all values.
+    #[serde(default)]
+    pub invalid: usize,
+    /// 95 % interval of the mean by [`stratified_bootstrap`] over tasks; absent where it is not computed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bootstrap95: Option<[f64; 2]>,
 }
 
 impl Distribution {
     /// Distribution of `values`, which must be finite.
-    pub fn from_values(mut values: Vec<f64>) -> Self {
+    pub fn from_values(values: Vec<f64>) -> Self {
+        Self::with_invalid(values, 0)
+    }
+
+    /// Distribution of `values`, which must be finite, and of `invalid` episodes that rank above them.
+    pub fn with_invalid(mut values: Vec<f64>, invalid: usize) -> Self {
         values.sort_by(f64::total_cmp);
+        let n = values.len();
+        let ranked = |rank: usize| values.get(rank).copied().unwrap_or(f64::INFINITY);
+        let percentile = |q| quantile_by(n + invalid, ranked, q).filter(|value| value.is_finite());
         Self {
             mean: mean(&values),
-            p5: quantile(&values, 0.05),
-            median: quantile(&values, 0.5),
-            p95: quantile(&values, 0.95),
-            n: values.len(),
+            p5: percentile(0.05),
+            median: percentile(0.5),
+            p95: percentile(0.95),
+            n,
+            invalid,
+            bootstrap95: None,
         }
+    }
+
+    /// True if a percentile that is null falls on an invalid episode.
+    pub fn has_invalid(&self) -> bool {
+        self.invalid > 0
     }
 }
 
@@ -137,5 +217,33 @@ mod tests {
         assert_eq!(a, Distribution::from_values(vec![1.0, 2.0, 3.0]));
         assert_eq!((a.mean, a.median, a.n), (Some(2.0), Some(2.0), 3));
         assert_eq!(Distribution::from_values(vec![]), Distribution::default());
+    }
+
+    #[test]
+    fn invalid_episodes_rank_above_all_values() {
+        // Ranks 0 to 4: 1, 2, 3, ∞, ∞.
+        let d = Distribution::with_invalid(vec![3.0, 1.0, 2.0], 2);
+        assert_eq!((d.mean, d.median, d.p95, d.n, d.invalid), (Some(2.0), Some(3.0), None, 3, 2));
+        assert!((d.p5.unwrap() - 1.2).abs() < 1e-12);
+        let d = Distribution::with_invalid(vec![1.0, 2.0, 3.0], 1);
+        assert_eq!(d.median, Some(2.5));
+        assert_eq!(Distribution::with_invalid(vec![1.0], 1).median, None, "half way to an invalid one");
+        assert_eq!(Distribution::with_invalid(vec![], 2).mean, None);
+    }
+
+    #[test]
+    fn the_bootstrap_resamples_within_strata_and_needs_enough_values() {
+        let values = |n: usize, offset: f64| (0..n).map(|i| offset + (i % 5) as f64).collect::<Vec<f64>>();
+        assert_eq!(stratified_bootstrap(&[values(9, 0.0)]), None, "nine values");
+        assert_eq!(stratified_bootstrap(&[values(10, 0.0), values(4, 0.0)]), None, "a task of four");
+        let [low, high] = stratified_bootstrap(&[values(50, 0.0), values(50, 100.0)]).unwrap();
+        // The variance within strata is 2; that between them, 2500, does not enter.
+        let half = Z95 * (2.0f64 / 100.0).sqrt();
+        assert!((low - (52.0 - half)).abs() < 0.05 && (high - (52.0 + half)).abs() < 0.05, "{low} {high}");
+        let pooled = stratified_bootstrap(&[[values(50, 0.0), values(50, 100.0)].concat()]).unwrap();
+        assert!(pooled[1] - pooled[0] > 10.0, "{pooled:?}");
+        assert_eq!(stratified_bootstrap(&[values(50, 0.0)]), stratified_bootstrap(&[values(50, 0.0)]));
+        let rate = Rate::new(30, 60).with_bootstrap(&[vec![true; 30], vec![false; 30]]);
+        assert_eq!(rate.bootstrap95, Some([50.0, 50.0]), "each task is certain");
     }
 }

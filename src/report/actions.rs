@@ -10,8 +10,9 @@ use softvt_common::{
     files::{FileError, replace},
     npy::{NpyArray, NpyError},
 };
-use softvt_evaluation::episode_id::EpisodeIndex;
+use softvt_evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord};
 use softvt_policy::Action;
+use softvt_rollout::checksum;
 
 /// Numbers per action.
 const WIDTH: usize = 7;
@@ -29,6 +30,10 @@ pub enum ActionsError {
     Shape { path: String, dtype: String, shape: Vec<usize> },
     #[error("{path}: it holds a number that is not finite")]
     NotFinite { path: String },
+    #[error("{path}: it has {actions} actions, and the episode {steps} steps: the file is damaged")]
+    Count { path: String, actions: usize, steps: usize },
+    #[error("{path}: its SHA-256 differs from that in the record of the episode: the file is damaged")]
+    Checksum { path: String },
 }
 
 /// Path of the actions of an episode in the run folder `dir`.
@@ -67,10 +72,49 @@ pub fn read(path: &Path) -> Result<Vec<Action>, ActionsError> {
     Ok(numbers.as_chunks::<WIDTH>().0.iter().copied().map(Action::from_array).collect())
 }
 
+/// Checks that the file of an episode below the run folder `dir` holds the actions of its record. Records of earlier
+/// versions have no checksum; of these the number of actions is compared.
+///
+/// # Errors
+/// The file is missing, cut or changed.
+pub fn verify(dir: &Path, record: &EpisodeRecord) -> Result<(), ActionsError> {
+    let path = path(dir, record.header.id.index());
+    let actions = read(&path)?;
+    let (steps, path) = (record.stats.steps as usize, path.display().to_string());
+    if actions.len() != steps {
+        return Err(ActionsError::Count { path, actions: actions.len(), steps });
+    }
+    match &record.stats.actions_sha256 {
+        Some(expected) if *expected != checksum(&actions) => Err(ActionsError::Checksum { path }),
+        _ => Ok(()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sample_record;
     use softvt_geometry::Vec3;
+
+    #[test]
+    fn a_damaged_file_is_found_by_its_checksum() {
+        let root = tempfile::tempdir().unwrap();
+        let actions = [Action { position_b: Vec3::x(), axis_angle_b: Vec3::z(), closure: 0.5 }; 3];
+        let mut record = sample_record();
+        (record.stats.steps, record.stats.actions_sha256) = (3, Some(checksum(&actions)));
+        let at = path(root.path(), record.header.id.index());
+        let problem = |record: &EpisodeRecord| verify(root.path(), record).unwrap_err().to_string();
+        assert!(problem(&record).contains("episode_00000.npy"), "a missing file is named");
+        write(&at, &actions).unwrap();
+        verify(root.path(), &record).unwrap();
+        let mut changed = actions;
+        changed[1].closure = 0.25;
+        write(&at, &changed).unwrap();
+        assert!(problem(&record).contains("episode_00000.npy: its SHA-256 differs"), "{}", problem(&record));
+        write(&at, &actions[..2]).unwrap();
+        record.stats.actions_sha256 = None;
+        assert!(problem(&record).contains("it has 2 actions, and the episode 3 steps"), "{}", problem(&record));
+    }
 
     #[test]
     fn actions_are_read_back_exactly_and_damaged_files_are_named() {

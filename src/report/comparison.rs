@@ -197,8 +197,10 @@ pub fn table(comparison: &Comparison) -> String {
     }
     table.rule();
     push(&mut table, "all", &comparison.all);
+    push_harm(&mut table, &comparison.all);
     table.rule();
     table.line(LEGEND);
+    table.line("Goal is TSR · DSR: goal with D within τ · others: no other soft object above its own τ");
     if comparison.unmatched > 0 {
         let verb = if comparison.unmatched == 1 { "was" } else { "were" };
         let episodes = counted(comparison.unmatched, "episode");
@@ -217,8 +219,21 @@ pub(super) const COLUMNS: [TextColumn; 9] = {
     [Left(29), Left(9), Right(6), Right(7), Right(7), Right(17), Right(6), Right(5), Right(5)]
 };
 
+/// Appends rows of DSR, harm to others and time over τ, where both runs have them.
+fn push_harm(table: &mut TextTable, paired: &PairedComparison) {
+    for (measure, difference, digits) in [
+        ("DSR, %", paired.dsr, 1),
+        ("others, %", paired.others_ok, 1),
+        ("over τ, s", paired.time_over_tau_s, 2),
+    ] {
+        if difference.n > 0 {
+            push_difference(table, "", measure, &difference, digits);
+        }
+    }
+}
+
 /// Legend of the rows.
-pub(super) const LEGEND: &str = "diff.: second minus first · 95 % intervals: Agresti and Min for rates, bootstrap for D\nbetter, worse: number of episodes; a lower D is better · p: McNemar's exact test";
+pub(super) const LEGEND: &str = "diff.: second minus first · 95 % intervals: Agresti and Min for rates, bootstrap for D (n ≥ 10)\nbetter, worse: number of episodes; a lower D is better · p: McNemar's exact test";
 
 /// Appends the column headings, with `name` above the names of the rows.
 pub(super) fn push_headings(table: &mut TextTable, name: &str, first: &str, second: &str) {

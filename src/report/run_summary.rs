@@ -3,7 +3,9 @@
 use std::collections::BTreeSet;
 
 use super::stored_run::StoredRun;
+use softvt_common::text::decimal;
 use softvt_evaluation::{
+    drop::DropReason,
     record::{EpisodeRecord, Outcome},
     summary::SuiteSummary,
 };
@@ -90,7 +92,11 @@ pub fn unsafe_reason(record: &EpisodeRecord) -> Option<String> {
     if let Some(why) = &record.stats.gave_up {
         parts.push(format!("gave up: {why}"));
     }
-    if let Some(drop) = &v.drop {
+    if let Some(stage) = v.failed_stage {
+        parts.push(format!("failed while: {}", stage.name()));
+    }
+    // An invalid episode has no evidence; nothing was dropped.
+    if let Some(drop) = v.drop.as_ref().filter(|drop| drop.reason != DropReason::NoEvidence) {
         let reason =
             serde_json::to_value(drop.reason).ok().and_then(|v| v.as_str().map(|s| s.replace('_', " ")));
         parts.push(format!("dropped at {:.1} s: {}", drop.time_s, reason.unwrap_or_default()));
@@ -102,6 +108,10 @@ pub fn unsafe_reason(record: &EpisodeRecord) -> Option<String> {
         (Some(d), Some(tau)) if d > tau => parts.push(format!("D {d:.2} % is above τ {tau:.2} %")),
         (_, None) if record.header.soft => parts.push("the object has no threshold".to_owned()),
         _ => {}
+    }
+    for other in v.others.iter().filter(|other| other.deformation_ok == Some(false)) {
+        let [d, tau] = [other.d_peak, other.tau].map(|x| decimal(x, 2));
+        parts.push(format!("{}: D {d} % is above its τ {tau} %", other.object));
     }
     if parts.is_empty() && !v.safety_known {
         parts.push("evidence is missing".to_owned());
@@ -116,6 +126,7 @@ pub(super) mod tests {
     use serde_json::json;
 
     use super::*;
+    use softvt_evaluation::{drop::DropEvent, stage::Stage};
     use crate::sample_record;
 
     /// A finished run of `records` in the folder `dir`.
@@ -175,6 +186,10 @@ pub(super) mod tests {
         record.stats.gave_up = Some("it slipped".into());
         assert!(unsafe_reason(&record).unwrap().contains("; gave up: it slipped;"));
         record.outcome = Outcome::Error { message: "the action holds NaN".into() };
-        assert!(unsafe_reason(&record).unwrap().starts_with("the action holds NaN"));
+        record.verdict.drop = Some(DropEvent { reason: DropReason::NoEvidence, time_s: 0.0 });
+        let reason = unsafe_reason(&record).unwrap();
+        assert!(reason.starts_with("the action holds NaN") && !reason.contains("dropped"), "{reason}");
+        record.verdict.failed_stage = Some(Stage::Reach);
+        assert!(unsafe_reason(&record).unwrap().contains("; failed while: reach;"));
     }
 }

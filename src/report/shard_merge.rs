@@ -9,6 +9,7 @@ use std::{
 use serde_json::Value;
 
 use super::{
+    actions::{self, ActionsError},
     run_folder::{EPISODE_FOLDERS, EPISODES, RUN, SUMMARY},
     softvtbench_files,
     stored_run::{StoredRun, StoredRunError, load, remove_folder},
@@ -30,6 +31,8 @@ pub enum MergeError {
     File(#[from] FileError),
     #[error(transparent)]
     Thresholds(#[from] ThresholdError),
+    #[error("{0}; --resume of that shard restores it")]
+    Actions(#[from] ActionsError),
     #[error("{out} already exists; give a new folder")]
     OutputExists { out: String },
     #[error("these are shards of several suites ({suites}): merge each suite separately")]
@@ -115,6 +118,7 @@ impl<'a> MergedRun<'a> {
                     let other = other.dir.display().to_string();
                     return Err(MergeError::DuplicateEpisode { dir: dir(), episode, other });
                 }
+                actions::verify(&run.dir, record)?;
             }
         }
         let tasks = manifest["tasks"].as_array().into_iter().flatten();

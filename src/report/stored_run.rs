@@ -1,6 +1,7 @@
 //! [`StoredRun`]: a finished or unfinished run, read from its folder.
 
 use std::{
+    collections::BTreeMap,
     fs, io,
     path::{Path, PathBuf},
 };
@@ -9,7 +10,7 @@ use serde_json::Value;
 
 use super::run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, is_truncated, read_episodes};
 use softvt_common::files::{self, FileError};
-use softvt_evaluation::record::EpisodeRecord;
+use softvt_evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord};
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -47,6 +48,8 @@ pub enum StoredRunError {
     Experiment { dir: String },
     #[error("{dir} holds no run: neither the folder nor any of its subfolders has {RUN} and {EPISODES}")]
     None { dir: String },
+    #[error("{path}:{line}: {episode} occurs twice (first in line {first}): remove one of the lines")]
+    DuplicateEpisode { path: String, line: usize, first: usize, episode: EpisodeIndex },
     #[error("{path} is not a valid run file: {what}")]
     Manifest { path: String, what: String },
 }
@@ -173,6 +176,7 @@ fn load_one(dir: &Path) -> Result<StoredRun, StoredRunError> {
         has("tasks", Value::is_array)?;
         has("episodes", Value::is_u64)?;
         let mut records = read_episodes(dir)?;
+        check_unique(dir, &records)?;
         records.sort_by_key(|r| r.header.id.index());
         let (is_finished, is_truncated) = (dir.join(SUMMARY).is_file(), is_truncated(dir));
         Ok(StoredRun { dir: dir.to_owned(), manifest: manifest.clone(), records, is_finished, is_truncated })
@@ -181,4 +185,39 @@ fn load_one(dir: &Path) -> Result<StoredRun, StoredRunError> {
         true => error,
         false => StoredRunError::Version { error: Box::new(error), version },
     })
+}
+
+/// Checks that no episode has two lines, since it would count twice.
+fn check_unique(dir: &Path, records: &[EpisodeRecord]) -> Result<(), StoredRunError> {
+    let mut lines: BTreeMap<EpisodeIndex, usize> = BTreeMap::new();
+    for (number, record) in records.iter().enumerate() {
+        let (line, episode) = (number + 1, record.header.id.index());
+        if let Some(first) = lines.insert(episode, line) {
+            let path = dir.join(EPISODES).display().to_string();
+            return Err(StoredRunError::DuplicateEpisode { path, line, first, episode });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sample_record;
+
+    #[test]
+    fn doubled_lines_are_refused() {
+        let root = tempfile::tempdir().unwrap();
+        let manifest = serde_json::json!({
+            "softvt": VERSION, "script": "x.lua", "suite": "suite", "policy": "expert", "tasks": [0], "episodes": 1,
+        });
+        files::write_json(&root.path().join(RUN), &manifest).unwrap();
+        let lines = root.path().join(EPISODES);
+        files::write_json_lines(&lines, &[sample_record()]).unwrap();
+        assert_eq!(load(root.path()).unwrap()[0].records.len(), 1);
+        files::write_json_lines(&lines, &[sample_record(), sample_record()]).unwrap();
+        let error = load(root.path()).unwrap_err().to_string();
+        let expected = "episodes.jsonl:2: task 0 episode 0 occurs twice (first in line 1): remove one of the lines";
+        assert!(error.ends_with(expected), "{error}");
+    }
 }

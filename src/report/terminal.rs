@@ -4,7 +4,7 @@ use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
 use softvt_evaluation::{
     safety::KAPPAS,
     statistics::{Distribution, Rate},
-    summary::{AbortedEpisode, Scores, SuiteSummary},
+    summary::{AbortedEpisode, EpisodeDeformation, InvalidEpisode, Scores, SuiteSummary, TauRange},
 };
 
 /// Columns: index and prompt of the task, three rates, four figures of D, τ and the number of invalid episodes.
@@ -12,7 +12,7 @@ const COLUMNS: [TextColumn; 11] = {
     use TextColumn::{Left, Right};
     [
         Right(3),
-        Left(30),
+        Left(27),
         Right(6),
         Right(6),
         Right(6),
@@ -20,11 +20,13 @@ const COLUMNS: [TextColumn; 11] = {
         Right(6),
         Right(6),
         Right(6),
-        Right(6),
+        Right(9),
         Right(7),
     ]
 };
 
+/// Largest number of invalid episodes listed.
+const MAX_INVALID_LISTED: usize = 5;
 /// Largest number of aborted episodes listed.
 const MAX_ABORTED_LISTED: usize = 10;
 
@@ -40,47 +42,63 @@ pub fn table(summary: &SuiteSummary) -> String {
     table.rule();
     let prompts: Vec<&str> = summary.by_task.iter().map(|t| t.prompt.as_str()).collect();
     for (task, name) in summary.by_task.iter().zip(distinct_parts(&prompts)) {
-        let tau = summary.by_asset.get(&task.asset).and_then(|asset| asset.tau);
-        table.row(cells(&task.task.to_string(), name, &task.scores, tau, is_soft));
+        table.row(cells(&task.task.to_string(), name, &task.scores, is_soft));
     }
     table.rule();
-    table.row(cells("", "all", scores, None, is_soft));
+    table.row(cells("", "all", scores, is_soft));
     table.rule();
     push_rates(&mut table, summary);
+    push_harm_and_stages(&mut table, scores);
     push_notes(&mut table, summary);
     table.text
 }
 
-fn cells(number: &str, name: &str, scores: &Scores, tau: Option<f64>, is_soft: bool) -> [String; 11] {
+fn cells(number: &str, name: &str, scores: &Scores, is_soft: bool) -> [String; 11] {
     let Distribution { mean, p5, median, p95, .. } = scores.deformation;
-    let deformation = |value: Option<f64>| match value {
-        None if !is_soft => "N/A".to_owned(),
-        value => decimal(value, 2),
-    };
+    let not_applicable = || "N/A".to_owned();
+    let percentile = |value| if is_soft { percentile(&scores.deformation, value) } else { not_applicable() };
     [
         number.to_owned(),
         name.to_owned(),
         decimal(scores.goal_success_rate.rate, 1),
         decimal(scores.no_drop_rate.rate, 1),
-        decimal(scores.safety_success_rate.rate, 1),
-        deformation(mean),
-        deformation(p5),
-        deformation(median),
-        deformation(p95),
-        tau.map_or_else(String::new, |tau| format!("{tau:.2}")),
+        scores.safety_success_rate.rate.map_or_else(not_applicable, |rate| format!("{rate:.1}")),
+        if is_soft { decimal(mean, 2) } else { not_applicable() },
+        percentile(p5),
+        percentile(median),
+        percentile(p95),
+        tau_range(scores.tau_range),
         scores.invalid.to_string(),
     ]
+}
+
+/// A percentile of D, with two decimals; "∞" if it falls on an invalid episode.
+pub(crate) fn percentile(of: &Distribution, value: Option<f64>) -> String {
+    if value.is_none() && of.has_invalid() { "∞".to_owned() } else { decimal(value, 2) }
+}
+
+/// The τ that was applied, or the range of several; empty without any.
+pub(crate) fn tau_range(range: Option<TauRange>) -> String {
+    let Some(TauRange { min, max }) = range else { return String::new() };
+    let [min, max] = [min, max].map(|tau| format!("{tau:.2}"));
+    if min == max { min } else { format!("{min}–{max}") }
 }
 
 fn push_rates(table: &mut TextTable, summary: &SuiteSummary) {
     let scores = &summary.scores;
     for (name, rate) in [
-        ("Goal Success", Some(scores.goal_success_rate)),
+        ("Goal Success (TSR)", Some(scores.goal_success_rate)),
         ("NoDrop", Some(scores.no_drop_rate)),
         ("Deformation within τ", scores.deformation_ok_rate),
         ("Safety Success", Some(scores.safety_success_rate)),
+        ("DSR", scores.dsr),
     ] {
-        table.line(format!("{name:<22}{}", rate.map_or_else(|| "   N/A".to_owned(), interval)));
+        let text = match rate.filter(|rate| rate.rate.is_some()) {
+            Some(rate) => interval(rate),
+            None if scores.not_judged > 0 => format!("   N/A  not judged: {}", scores.not_judged),
+            None => "   N/A".to_owned(),
+        };
+        table.line(format!("{name:<22}{text}"));
     }
     table.line(format!("{:<22}{:>6} pp", "Goal–safety gap", decimal(scores.goal_safe_gap, 1)));
     if summary.kappa.is_empty() {
@@ -89,12 +107,43 @@ fn push_rates(table: &mut TextTable, summary: &SuiteSummary) {
     let at = KAPPAS.iter().filter_map(|kappa| summary.kappa.iter().find(|row| row.kappa == *kappa));
     let rates = at.map(|row| format!("κ={}: {} %", row.kappa, decimal(row.safety_success_rate.rate, 1)));
     table.line(format!("{:<22}{}", "Safety Success at", rates.collect::<Vec<_>>().join(" · ")));
-    let (all, goal) = (scores.deformation.n, scores.deformation_goal);
+    let (all, goal) = (scores.deformation, scores.deformation_goal);
     let of_goal = goal.mean.map_or_else(|| "–".to_owned(), |mean| format!("{mean:.2} %"));
     table.line(format!(
-        "D is the peak in % of the bounding-box diagonal; n {all}; mean {of_goal} over the {} at the goal",
-        goal.n
+        "D is the peak in % of the bounding-box diagonal; n {}; mean {of_goal} over the {} at the goal",
+        all.n, goal.n
     ));
+    if all.has_invalid() {
+        table.line(format!("percentiles rank the {} as worst (∞)", counted(all.invalid, "invalid episode")));
+    }
+    let EpisodeDeformation { d_mean, d_final, d_p95, time_over_tau_s } = scores.within_episodes;
+    if d_mean.is_some() {
+        table.line(format!(
+            "within an episode, on average: D mean {} %, final {} %, P95 {} %; over τ for {} s",
+            decimal(d_mean, 2),
+            decimal(d_final, 2),
+            decimal(d_p95, 2),
+            decimal(time_over_tau_s, 2)
+        ));
+    }
+}
+
+/// Harm to other objects, and the stages at which episodes failed.
+fn push_harm_and_stages(table: &mut TextTable, scores: &Scores) {
+    if let Some(rate) = scores.others_ok_rate {
+        let unknown = match scores.others_unknown {
+            0 => String::new(),
+            unknown => format!("  unknown: {unknown}"),
+        };
+        table.line(format!("{:<22}{}{unknown}", "Others within their τ", interval(rate)));
+    }
+    if let Some(rate) = scores.wrong_contact_rate {
+        table.line(format!("{:<22}{}", "Touched other objects", interval(rate)));
+    }
+    if !scores.failed_stages.is_empty() {
+        let stages = scores.failed_stages.iter().map(|(stage, count)| format!("{} {count}", stage.name()));
+        table.line(format!("{:<22}{}", "Failed while", stages.collect::<Vec<_>>().join(" · ")));
+    }
 }
 
 fn push_notes(table: &mut TextTable, summary: &SuiteSummary) {
@@ -116,6 +165,13 @@ fn push_notes(table: &mut TextTable, summary: &SuiteSummary) {
     if scores.invalid > 0 {
         table.line(format!("{} counted as failed in every rate", counted(scores.invalid, "invalid episode")));
     }
+    let invalid = &summary.invalid_episodes;
+    for InvalidEpisode { task, episode, reason } in invalid.iter().take(MAX_INVALID_LISTED) {
+        table.line(shortened(&format!("  task {task} episode {episode}: invalid: {reason}"), TextTable::WIDTH));
+    }
+    if invalid.len() > MAX_INVALID_LISTED {
+        table.line(format!("  … and {} more, in summary.json", invalid.len() - MAX_INVALID_LISTED));
+    }
     let aborted = &summary.gave_up;
     if aborted.is_empty() {
         return;
@@ -131,7 +187,9 @@ fn push_notes(table: &mut TextTable, summary: &SuiteSummary) {
 
 fn interval(rate: Rate) -> String {
     let bounds = rate.wilson95.map(|[low, high]| format!("  [{low:.1}, {high:.1}]")).unwrap_or_default();
-    format!("{:>6} %{bounds}", decimal(rate.rate, 1))
+    let by_task =
+        rate.bootstrap95.map(|[low, high]| format!("  bootstrap by task [{low:.1}, {high:.1}]")).unwrap_or_default();
+    format!("{:>6} %{bounds}{by_task}", decimal(rate.rate, 1))
 }
 
 /// The prompts without the whole words with which all of them begin or end.
@@ -190,7 +248,7 @@ mod tests {
         );
         assert_eq!(
             words(row("  1 right")),
-            ["1", "right", "0.0", "0.0", "0.0", "–", "–", "–", "–", "1.00", "1"]
+            ["1", "right", "0.0", "0.0", "0.0", "–", "∞", "∞", "∞", "1.00", "1"]
         );
         assert_eq!(row("Safety Success  "), "Safety Success          33.3 %  [6.1, 79.2]");
         assert_eq!(row("Goal–safety gap"), "Goal–safety gap         33.3 pp");
@@ -199,6 +257,33 @@ mod tests {
             "Safety Success at     κ=0.3: 33.3 % · κ=0.5: 33.3 % · κ=0.7: 33.3 %"
         );
         assert!(text.contains("1 invalid episode counted as failed"));
+        assert!(text.contains("  task 1 episode 0: invalid: x\n"), "the reason is given: {text}");
+        assert!(text.contains("percentiles rank the 1 invalid episode as worst"), "{text}");
+        assert_eq!(row("DSR"), "DSR                     33.3 %  [6.1, 79.2]");
+    }
+
+    #[test]
+    fn what_was_never_judged_has_no_rate_and_no_tau() {
+        let unknown = episode(0, "put it there", |r| {
+            (r.verdict.tau, r.verdict.d_ref, r.verdict.deformation_ok) = (None, None, None);
+            (r.verdict.safety, r.verdict.safety_known) = (false, false);
+        });
+        let text = table(&SuiteSummary::from_records("suite", "expert", &[unknown]));
+        let row = |start: &str| text.lines().find(|line| line.starts_with(start)).unwrap_or_default();
+        assert_eq!(row("Deformation within τ"), "Deformation within τ     N/A  not judged: 1");
+        assert_eq!(row("Safety Success  "), "Safety Success           N/A  not judged: 1");
+        assert!(text.contains("κ=0.3: – %") && !text.contains("1.00"), "{text}");
+    }
+
+    #[test]
+    fn the_column_of_tau_shows_what_was_applied() {
+        let tau = |tau: Option<f64>| episode(0, "put it there", |r| r.verdict.tau = tau);
+        let shown = |records: &[EpisodeRecord]| {
+            tau_range(SuiteSummary::from_records("suite", "expert", records).scores.tau_range)
+        };
+        assert_eq!(shown(&[tau(None), tau(Some(2.5))]), "2.50");
+        assert_eq!(shown(&[tau(Some(1.018)), tau(Some(3.09))]), "1.02–3.09");
+        assert_eq!(shown(&[tau(None)]), "");
     }
 
     #[test]

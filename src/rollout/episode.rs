@@ -17,6 +17,8 @@ use super::{
     tactile_wear::WearSeed,
     trace::StepTrace,
 };
+use sha2::{Digest, Sha256};
+
 use softvt_benchmark::{GoalKind, Task, seed::EpisodeSeed, settings::Settings, steps_per_control};
 use softvt_evaluation::{
     deformation::{Deformation, ReferenceShape},
@@ -521,6 +523,7 @@ impl Episode {
             camera_inside: self.history.camera_inside,
             far_commands: self.far_commands,
             gave_up,
+            actions_sha256: Some(checksum(&self.actions)),
             state_hash: state_hash(&self.sim),
         };
         let outcome = self.outcome.clone().unwrap_or(Outcome::Timeout);
@@ -544,6 +547,15 @@ impl Episode {
             recording,
         }
     }
+}
+
+/// SHA-256 of actions, as little-endian float64 numbers; hexadecimal.
+pub fn checksum(actions: &[Action]) -> String {
+    let mut hash = Sha256::new();
+    for number in actions.iter().flat_map(|action| action.to_array()) {
+        hash.update(number.to_le_bytes());
+    }
+    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// True if a command is farther from the tool than one step of the inverse kinematics reaches; both in the base frame.
@@ -599,7 +611,8 @@ fn settled_judge(
         is_target_soft: matches!(sim.objects[target].body, BodyId::Soft(_)),
         limit: spec.limits.get(&sim.objects[target].name).copied(),
         target_lowest_z_w: lowest(sim, &sim.objects[target]),
-        others_lowest_z_w: evidence.others_lowest(sim),
+        others: evidence.other_bodies(sim, &spec.limits),
+        max_steps: spec.task.budget_steps as usize * steps_per_control(spec.settings.physics.dt) as usize,
     })
 }
 

@@ -1,9 +1,13 @@
 //! The true state in the form in which the judge evaluates it.
 
+use std::collections::BTreeMap;
+
 use super::simulation::{ObjectInstance, Simulation};
 use softvt_evaluation::{
     deformation::{Deformation, ReferenceShape},
     evidence::{BodyEvidence, Evidence, GoalEvidence, GripperEvidence, PadEvidence},
+    judge::OtherBody,
+    safety::DeformationLimit,
 };
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::{BodyId, ContactPartner, world::ContactSummary};
@@ -14,6 +18,7 @@ use softvt_robot::gripper::target_width;
 pub(super) struct EvidenceCollector {
     target: usize,
     goal: usize,
+    /// Movable objects that are not the target.
     others: Vec<usize>,
     references: Vec<Option<ReferenceShape>>,
     bodies: Vec<BodyEvidence>,
@@ -22,7 +27,7 @@ pub(super) struct EvidenceCollector {
 impl EvidenceCollector {
     /// Takes the current, settled state as the reference of deformation. `target` and `goal` are indices of objects.
     pub(super) fn new(sim: &Simulation, target: usize, goal: usize) -> Self {
-        let movable = |i: &usize| *i != target && sim.objects[*i].body.is_free();
+        let is_other = |i: &usize| *i != target && sim.objects[*i].body.is_free();
         let references = sim
             .objects
             .iter()
@@ -34,13 +39,28 @@ impl EvidenceCollector {
                 _ => None,
             })
             .collect();
-        let others = (0..sim.objects.len()).filter(movable).filter(|i| *i != goal).collect();
-        Self { target, goal, others, references, bodies: Vec::new() }
+        let others: Vec<usize> = (0..sim.objects.len()).filter(is_other).collect();
+        let bodies = Vec::with_capacity(others.len());
+        Self { target, goal, others, references, bodies }
     }
 
-    /// Heights of the lowest points of the other movable objects, m.
-    pub(super) fn others_lowest(&self, sim: &Simulation) -> Vec<f64> {
-        self.others.iter().map(|&i| lowest(sim, &sim.objects[i])).collect()
+    /// The other movable objects as they settled, with their deformation limits by name.
+    pub(super) fn other_bodies(
+        &self,
+        sim: &Simulation,
+        limits: &BTreeMap<String, DeformationLimit>,
+    ) -> Vec<OtherBody> {
+        let other = |&index: &usize| {
+            let object = &sim.objects[index];
+            OtherBody {
+                name: object.name.clone(),
+                is_goal: index == self.goal,
+                is_soft: matches!(object.body, BodyId::Soft(_)),
+                limit: limits.get(&object.name).copied(),
+                lowest_z_w: lowest(sim, object),
+            }
+        };
+        self.others.iter().map(other).collect()
     }
 
     /// Current deformation of an object; `None` if it is rigid or cannot be measured.
@@ -57,7 +77,10 @@ impl EvidenceCollector {
     /// The evidence of the last physics step.
     pub(super) fn collect<'a>(&'a mut self, sim: &Simulation, time_s: f64) -> Evidence<'a> {
         let dt = sim.world.params.dt;
-        self.bodies = self.others.iter().map(|&i| self.body(sim, i)).collect();
+        let mut bodies = std::mem::take(&mut self.bodies);
+        bodies.clear();
+        bodies.extend(self.others.iter().map(|&i| self.body(sim, i)));
+        self.bodies = bodies;
         let target = &sim.objects[self.target];
         let goal = &sim.objects[self.goal];
         let from_goal = partners(goal).map(|partner| upward(&sim.contact(target, partner))).sum::<f64>();
@@ -91,12 +114,18 @@ impl EvidenceCollector {
     fn body(&self, sim: &Simulation, index: usize) -> BodyEvidence {
         let object = &sim.objects[index];
         let is_robot = |partner| matches!(partner, ContactPartner::Collider(c) if sim.robot.pads.contains(&c) || sim.robot.body.contains(&c));
-        let others = sim.world.contacts(object.body).iter().filter(|contact| !is_robot(contact.partner));
-        let support: f64 = others.map(|contact| upward(&contact.summary)).sum();
+        let (mut support, mut from_robot) = (0.0, 0.0);
+        for contact in sim.world.contacts(object.body) {
+            match is_robot(contact.partner) {
+                true => from_robot += contact.summary.normal_force,
+                false => support += upward(&contact.summary),
+            }
+        }
         BodyEvidence {
             centre_w: sim.centre(object),
             lowest_z_w: lowest(sim, object),
             support_impulse_ns: support * sim.world.params.dt,
+            robot_impulse_ns: from_robot * sim.world.params.dt,
             deformation: self.deformation(sim, index),
         }
     }

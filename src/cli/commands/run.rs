@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Parser;
 
 use crate::{
-    error::CliError,
+    error::{CliError, Exit},
     output::{print, print_json},
     run::{
         conditions,
@@ -20,6 +20,8 @@ use crate::{
     },
 };
 use softvt_benchmark::Plan;
+use softvt_common::text::counted;
+use softvt_evaluation::record::{EpisodeRecord, Outcome};
 use softvt_report::{run_folder::RunFolder, terminal};
 
 /// A safety-aware visuo-tactile manipulation benchmark for soft objects, on an ordinary CPU
@@ -60,7 +62,7 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
             if is_list {
                 check_parent_folder(config)?;
             }
-            let mut summaries = Vec::new();
+            let (mut summaries, mut failed) = (Vec::new(), None);
             for suite in plan.suites() {
                 let name = config.suite_name(suite);
                 let out = match &flags.out {
@@ -72,14 +74,19 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
                 let jobs = select_episodes(config, suite, &tasks);
                 let mut run = SuiteRun::new(config, &loaded, suite, jobs, out)?;
                 run.prepare(&tasks)?;
-                summaries.push(run_suite(&run, &tasks)?.summary);
+                let result = run_suite(&run, &tasks)?;
+                failed = failed.or_else(|| all_actions_refused(&result.records));
+                summaries.push(result.summary);
             }
             match &summaries[..] {
                 [summary] if flags.json && !is_list => print_json(summary),
                 summaries if flags.json => print_json(&summaries),
                 summaries => summaries.iter().try_for_each(|summary| print(&terminal::table(summary))),
             }?;
-            requirement::check(&flags.requirements, &summaries)
+            match failed {
+                Some(error) => Err(error),
+                None => requirement::check(&flags.requirements, &summaries),
+            }
         }
         Plan::Conditions { name, suites, conditions } => {
             check_distinct_out_dirs(config, suites)?;
@@ -95,6 +102,19 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
 fn check_parent_folder(config: &RunConfig) -> Result<(), CliError> {
     let Some(dir) = &config.flags.out else { return Ok(()) };
     RunFolder::check_parent(dir).map_err(|error| config.error(error))
+}
+
+/// The error of a policy whose actions could be executed in no episode, such as one that answers NaN.
+fn all_actions_refused(records: &[EpisodeRecord]) -> Option<CliError> {
+    let message = |record: &EpisodeRecord| match &record.outcome {
+        Outcome::Error { message } => Some(message.clone()),
+        _ => None,
+    };
+    let first = message(records.first()?)?;
+    records.iter().all(|record| message(record).is_some()).then(|| {
+        let count = counted(records.len(), "episode");
+        CliError::new(Exit::Policy, format!("no episode is valid: the policy's actions were refused in {count}, first: {first}"))
+    })
 }
 
 /// Checks that every suite has the episodes that `--video` selects.

@@ -65,7 +65,7 @@ impl EpisodeArtifacts<'_> {
         self.may_render(record.header.id.episode) && !is_excluded
     }
 
-    /// The requested files of a finished episode that do not exist.
+    /// The requested files of a finished episode that do not exist, and its actions if they are damaged.
     pub(crate) fn missing(&self, record: &EpisodeRecord) -> Vec<PathBuf> {
         let index = record.header.id.index();
         let mut requested =
@@ -79,8 +79,18 @@ impl EpisodeArtifacts<'_> {
                 requested.push(video::still_path(self.dir, index));
             }
         }
-        requested.retain(|path| !path.is_file());
+        let actions_path = actions::path(self.dir, index);
+        let is_intact = |path: &PathBuf| match *path == actions_path {
+            true => self.has_actions(record),
+            false => path.is_file(),
+        };
+        requested.retain(|path| !is_intact(path));
         requested
+    }
+
+    /// True if the actions of a finished episode are those of its record.
+    pub(crate) fn has_actions(&self, record: &EpisodeRecord) -> bool {
+        actions::verify(self.dir, record).is_ok()
     }
 
     /// Writes all files except video and still.

@@ -260,7 +260,13 @@ fn episode_line(record: &EpisodeRecord) -> String {
 fn restore_artifacts(run: &SuiteRun, records: &[EpisodeRecord]) -> Result<(), CliError> {
     let artifacts = run.artifacts();
     let incomplete = records.iter().filter(|record| !artifacts.missing(record).is_empty());
-    let has_actions = |record: &EpisodeRecord| actions::path(&run.out, record.header.id.index()).is_file();
+    let has_actions = |record: &EpisodeRecord| artifacts.has_actions(record);
+    for record in records {
+        let path = actions::path(&run.out, record.header.id.index());
+        if let (true, Err(damage)) = (path.is_file(), actions::verify(&run.out, record)) {
+            eprint_notice(damage);
+        }
+    }
     let (restorable, lost): (Vec<_>, Vec<_>) =
         incomplete.partition(|record| has_actions(record) || run.config.policy.server().is_none());
     if let Some(first) = lost.first() {

@@ -13,6 +13,8 @@
 //! The score uses uniform weights ([`METRIC_ID`], as SoftVTBench); the mass-weighted value and the largest node
 //! displacement are reported next to it. The reference is the settled shape, so sagging under gravity does not count.
 
+pub mod series;
+
 use nalgebra::{Matrix4, Quaternion, SymmetricEigen};
 
 use softvt_geometry::{Aabb, Mat3, Quat, Vec3};

@@ -15,6 +15,9 @@
 //!    release was commanded.
 //! 6. **Drop**: [`DropMonitor`].
 //! 7. **Goal**, at the last physics step of each control step: [`GoalMonitor`].
+//! 8. **Stage** of the episode: [`StageMonitor`].
+//!
+//! Harm to others is judged beside: their peaks of D against their own τ, and the first contact of the robot with one of them.
 //!
 //! At the end ([`Judge::finish`]): Safety Success = Goal ∧ NoDrop ∧ D_peak ≤ τ ([`super::safety`]).
 //!
@@ -38,7 +41,8 @@
 //!     is_target_soft: true,
 //!     limit: Some(DeformationLimit { d_ref_pct: 2.0, kappa: 0.5 }),
 //!     target_lowest_z_w: 0.0,
-//!     others_lowest_z_w: Vec::new(),
+//!     others: Vec::new(),
+//!     max_steps: 27,
 //! });
 //! // Settled nodes, and the same stretched by 0.5 % along x.
 //! let settled = [Vec3::zeros(), Vec3::x() * 0.06, Vec3::y() * 0.06, Vec3::z() * 0.06];
@@ -55,6 +59,7 @@
 //!             centre_w: Vec3::new(0.02, 0.0, 0.03),
 //!             lowest_z_w: 0.0,
 //!             support_impulse_ns: weight_n * dt_s,
+//!             robot_impulse_ns: 0.0,
 //!             deformation: reference.measure(&stretched).ok(),
 //!         },
 //!         others: &[],
@@ -72,12 +77,14 @@ use softvt_geometry::Aabb;
 
 use super::{
     criteria::SuccessCriteria,
+    deformation::series::DeformationSeries,
     drop::{DropEvent, DropMonitor, DropReason, DropSample, ReleaseMonitor},
     evidence::{BodyEvidence, Evidence},
     goal::{GoalMonitor, GoalRegion, GoalSample},
-    record::{Outcome, Verdict},
+    record::{OtherDeformation, Outcome, Verdict, WrongContact},
     safety::{DeformationLimit, KAPPAS, KappaVerdict, PeakDeformation, is_safe},
     slip::SlipMonitor,
+    stage::{StageMonitor, StageSample},
 };
 
 /// Parameters of a [`Judge`], known once the scene has settled.
@@ -103,8 +110,33 @@ pub struct JudgeConfig {
     pub limit: Option<DeformationLimit>,
     /// Height of the target's lowest point after settling, m.
     pub target_lowest_z_w: f64,
-    /// Heights of the lowest points of the other movable bodies after settling, in the order of the evidence, m.
-    pub others_lowest_z_w: Vec<f64>,
+    /// The other movable bodies, in the order of the evidence.
+    pub others: Vec<OtherBody>,
+    /// Physics steps of the budget.
+    pub max_steps: usize,
+}
+
+/// A movable body that is not the target, once the scene has settled.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OtherBody {
+    /// Name in the scene.
+    pub name: String,
+    /// True for the object that the target must be placed on or in, which may be lifted first.
+    pub is_goal: bool,
+    /// True if it is a soft body.
+    pub is_soft: bool,
+    /// Its deformation limit; `None` if its asset was never calibrated.
+    pub limit: Option<DeformationLimit>,
+    /// Height of its lowest point after settling, m.
+    pub lowest_z_w: f64,
+}
+
+/// The first contact with a body that is not the target.
+#[derive(Clone, Copy, Debug)]
+struct FirstContact {
+    time_s: f64,
+    /// Index in the evidence.
+    other: usize,
 }
 
 /// Sums over the physics steps of one control step.
@@ -139,7 +171,11 @@ pub struct Judge {
     peak: PeakDeformation,
     peak_weighted: PeakDeformation,
     peak_max: PeakDeformation,
-    peak_other: PeakDeformation,
+    series: DeformationSeries,
+    /// Peaks of the other bodies, in the order of the evidence.
+    peaks_other: Vec<PeakDeformation>,
+    first_wrong_contact: Option<FirstContact>,
+    stage: StageMonitor,
     missing_evidence: u64,
     time_s: f64,
 }
@@ -149,6 +185,10 @@ impl Judge {
     pub fn new(config: JudgeConfig) -> Self {
         let goal = GoalMonitor::new(config.hold_s, config.dt_s * f64::from(config.steps_per_control));
         Self {
+            series: DeformationSeries::new(if config.is_target_soft { config.max_steps } else { 0 }),
+            peaks_other: vec![PeakDeformation::default(); config.others.len()],
+            first_wrong_contact: None,
+            stage: StageMonitor::default(),
             config,
             goal,
             release: ReleaseMonitor::default(),
@@ -160,7 +200,6 @@ impl Judge {
             peak: PeakDeformation::default(),
             peak_weighted: PeakDeformation::default(),
             peak_max: PeakDeformation::default(),
-            peak_other: PeakDeformation::default(),
             missing_evidence: 0,
             time_s: 0.0,
         }
@@ -176,6 +215,7 @@ impl Judge {
             return;
         }
         self.time_s = evidence.time_s;
+        self.observe_wrong_contact(evidence);
         let touch = self.observe_pads(evidence);
         let is_lifted = self.observe_lift(evidence);
         let both_pads_touch = touch[0] && touch[1];
@@ -194,7 +234,9 @@ impl Judge {
             is_in_workspace: self.config.workspace.contains(&evidence.target.centre_w),
         };
         self.drops.update(&self.config.criteria, self.config.dt_s, &sample);
-        self.observe_goal(evidence, sample.is_touched || sample.is_touched_by_body);
+        let is_placed = self.observe_goal(evidence, sample.is_touched || sample.is_touched_by_body);
+        let is_over_goal = self.config.goal.is_below(&evidence.goal.pose_w, &evidence.target.centre_w);
+        self.stage.update(&StageSample { touch, is_lifted, is_over_goal, is_placed });
     }
 
     /// True if the goal has held for long enough: the episode may end.
@@ -226,6 +268,17 @@ impl Judge {
             let safety = is_safe(goal, no_drop, soft, deformation_ok);
             KappaVerdict { kappa, tau_pct, deformation_ok, safety }
         };
+        let others = self.others(valid);
+        let others_ok = match valid {
+            true if others.iter().any(|other| other.deformation_ok == Some(false)) => Some(false),
+            true if others.iter().all(|other| other.deformation_ok == Some(true)) => Some(true),
+            _ => None,
+        };
+        let first_wrong_contact = self.first_wrong_contact.map(|contact| WrongContact {
+            time_s: contact.time_s,
+            object: self.config.others[contact.other].name.clone(),
+        });
+        let series = self.series.finish();
         Verdict {
             goal,
             goal_time_s: self.goal.reached_s.filter(|_| goal),
@@ -237,7 +290,15 @@ impl Judge {
             d_peak: self.peak.d_pct,
             d_peak_weighted: self.peak_weighted.d_pct,
             d_peak_max: self.peak_max.d_pct,
-            d_peak_other: self.peak_other.d_pct,
+            d_mean: series.mean,
+            d_final: series.last,
+            d_p95: series.p95,
+            time_over_tau_s: limit.map(|_| series.steps_over_tau as f64 * self.config.dt_s),
+            d_peak_other: others.iter().filter_map(|other| other.d_peak).reduce(f64::max),
+            others,
+            others_ok,
+            first_wrong_contact,
+            failed_stage: (!goal).then_some(self.stage.stage),
             wrong_instance: self.is_other_first == Some(true),
             kappa: limit.map(|l| l.kappa),
             tau: limit.map(|l| l.tau_pct()),
@@ -254,14 +315,41 @@ impl Judge {
     }
 
     fn observe_deformation(&mut self, evidence: &Evidence<'_>) {
-        for other in evidence.others.iter().filter_map(|body| body.deformation) {
-            self.peak_other.update(Some(other.rms_pct));
+        for ((other, body), peak) in self.config.others.iter().zip(evidence.others).zip(&mut self.peaks_other) {
+            if other.is_soft {
+                peak.update(body.deformation.map(|d| d.rms_pct));
+            }
         }
         if self.config.is_target_soft {
             let d = evidence.target.deformation;
+            self.series.push(d.map(|d| d.rms_pct), self.config.limit.map(|limit| limit.tau_pct()));
             self.peak.update(d.map(|d| d.rms_pct));
             self.peak_weighted.update(d.map(|d| d.weighted_pct));
             self.peak_max.update(d.map(|d| d.max_pct));
+        }
+    }
+
+    /// Deformation of the other soft bodies, judged if the episode ended validly.
+    fn others(&self, valid: bool) -> Vec<OtherDeformation> {
+        let soft = self.config.others.iter().zip(&self.peaks_other).filter(|(other, _)| other.is_soft);
+        soft.map(|(other, peak)| {
+            let tau = other.limit.map(|limit| limit.tau_pct());
+            OtherDeformation {
+                object: other.name.clone(),
+                d_peak: peak.d_pct,
+                tau,
+                deformation_ok: peak.is_within(tau).filter(|_| valid),
+            }
+        })
+        .collect()
+    }
+
+    fn observe_wrong_contact(&mut self, evidence: &Evidence<'_>) {
+        let least_ns = self.config.criteria.touch_force_n * self.config.dt_s;
+        if self.first_wrong_contact.is_none() {
+            let touched = evidence.others.iter().position(|body| body.robot_impulse_ns > least_ns);
+            self.first_wrong_contact =
+                touched.map(|other| FirstContact { time_s: evidence.time_s, other });
         }
     }
 
@@ -283,15 +371,16 @@ impl Judge {
             !self.is_supported(body) && body.lowest_z_w > settled_z + self.config.criteria.lift_height_m
         };
         let target = is_lifted(&evidence.target, self.config.target_lowest_z_w);
-        let other =
-            evidence.others.iter().zip(&self.config.others_lowest_z_w).any(|(body, z)| is_lifted(body, *z));
+        let others = evidence.others.iter().zip(&self.config.others).filter(|(_, other)| !other.is_goal);
+        let other = others.into_iter().any(|(body, other)| is_lifted(body, other.lowest_z_w));
         if target || other {
             self.is_other_first.get_or_insert(!target);
         }
         target
     }
 
-    fn observe_goal(&mut self, evidence: &Evidence<'_>, is_touched: bool) {
+    /// Returns true at the end of a control step if the target is in the goal region and supported.
+    fn observe_goal(&mut self, evidence: &Evidence<'_>, is_touched: bool) -> bool {
         self.control_step.steps += 1;
         self.control_step.is_touched |= is_touched;
         self.control_step.support_ns += match self.config.goal {
@@ -299,23 +388,24 @@ impl Judge {
             GoalRegion::Inside { .. } => evidence.target.support_impulse_ns,
         };
         if self.control_step.steps < self.config.steps_per_control {
-            return;
+            return false;
         }
         let sums = std::mem::take(&mut self.control_step);
         let (criteria, region) = (&self.config.criteria, &self.config.goal);
         let (pose, centre) = (&evidence.goal.pose_w, &evidence.target.centre_w);
         let weight_ns = self.config.target_weight_n * self.config.dt_s * f64::from(sums.steps);
-        let has_left = self.goal.update(&GoalSample {
+        let sample = GoalSample {
             time_s: evidence.time_s,
             is_inside: region.contains(pose, centre, 0.0),
             is_inside_with_margin: region.contains(pose, centre, criteria.leave_margin_m),
             is_supported: sums.support_ns >= criteria.support_share * weight_ns,
             is_touched: sums.is_touched,
             is_inside_v1: region.contains_v1(criteria, pose, centre),
-        });
-        if has_left {
+        };
+        if self.goal.update(&sample) {
             self.drops.record(DropReason::LeftGoal, evidence.time_s);
         }
+        sample.is_inside && sample.is_supported
     }
 
     fn is_supported(&self, body: &BodyEvidence) -> bool {

@@ -2,6 +2,7 @@ use super::*;
 use crate::{
     deformation::Deformation,
     evidence::{GoalEvidence, GripperEvidence, PadEvidence},
+    stage::Stage,
 };
 use softvt_geometry::{Aabb, Pose, Quat, Vec3};
 
@@ -20,7 +21,14 @@ fn config() -> JudgeConfig {
         is_target_soft: true,
         limit: Some(DeformationLimit { d_ref_pct: 2.0, kappa: 0.5 }),
         target_lowest_z_w: 0.0,
-        others_lowest_z_w: vec![0.0],
+        others: vec![OtherBody {
+            name: "other".into(),
+            is_goal: false,
+            is_soft: true,
+            limit: Some(DeformationLimit { d_ref_pct: 3.0, kappa: 0.5 }),
+            lowest_z_w: 0.0,
+        }],
+        max_steps: 1000,
     }
 }
 
@@ -39,6 +47,7 @@ fn lying(x: f64, d_pct: f64) -> BodyEvidence {
         centre_w: Vec3::new(x, 0.0, 0.03),
         lowest_z_w: 0.0,
         support_impulse_ns: WEIGHT_N * DT,
+        robot_impulse_ns: 0.0,
         deformation: Some(deformed(d_pct)),
     }
 }
@@ -81,6 +90,7 @@ impl Replay {
                 centre_w: Vec3::new(x, 0.0, 0.13),
                 lowest_z_w: 0.1,
                 support_impulse_ns: 0.0,
+                robot_impulse_ns: 0.0,
                 deformation: Some(deformed(d_pct)),
             };
             e.hand_w = Vec3::new(x, 0.0, 0.2);
@@ -231,4 +241,71 @@ fn slip_is_reported_and_does_not_affect_safety() {
     let v = replay.verdict(Outcome::Completed);
     assert!(!v.no_slip && (v.slip_mm - 2.1).abs() < 1e-9);
     assert!(v.safety);
+}
+
+#[test]
+fn the_goal_may_be_lifted_first_and_its_deformation_counts_as_that_of_others() {
+    let mut config = config();
+    config.others[0].is_goal = true;
+    let mut replay = Replay::new(config.clone());
+    replay.other = BodyEvidence { lowest_z_w: 0.1, support_impulse_ns: 0.0, ..lying(0.3, 2.0) };
+    replay.rest(30, 0.0);
+    let v = replay.verdict(Outcome::Completed);
+    assert!(!v.wrong_instance && v.safety, "harm to others is reported, not part of Safety Success");
+    assert_eq!((v.d_peak_other, v.others_ok), (Some(2.0), Some(false)));
+    assert_eq!((v.others[0].tau, v.others[0].deformation_ok), (Some(1.5), Some(false)));
+    config.others[0].limit = None;
+    let mut replay = Replay::new(config);
+    replay.rest(30, 0.0);
+    assert_eq!(replay.verdict(Outcome::Completed).others_ok, None, "it has no limit");
+    let mut replay = Replay::new(self::config());
+    replay.rest(30, 0.0);
+    let v = replay.verdict(Outcome::Completed);
+    assert_eq!((v.others_ok, v.first_wrong_contact), (Some(true), None));
+    let alone = JudgeConfig { others: Vec::new(), ..self::config() };
+    assert_eq!(Judge::new(alone).finish(&Outcome::Timeout).others_ok, Some(true));
+}
+
+#[test]
+fn the_first_contact_with_another_object_is_kept() {
+    let mut replay = Replay::new(config());
+    replay.rest(6, 0.0);
+    replay.other.robot_impulse_ns = 0.001 * DT;
+    replay.rest(1, 0.0);
+    replay.other.robot_impulse_ns = 2.0 * DT;
+    replay.rest(2, 0.0);
+    let contact = replay.verdict(Outcome::Timeout).first_wrong_contact.expect("a contact");
+    assert_eq!(contact.object, "other");
+    assert!((contact.time_s - 8.0 * DT).abs() < 1e-12, "a touch below the threshold is none: {contact:?}");
+}
+
+#[test]
+fn the_series_of_deformation_is_summarised() {
+    let mut replay = Replay::new(config());
+    for d in [0.4, 1.2, 1.6, 0.8] {
+        replay.carry(1, -0.2, d);
+    }
+    let v = replay.verdict(Outcome::Timeout);
+    assert_eq!((v.d_mean, v.d_final), (Some(1.0), Some(0.8)));
+    assert!((v.d_p95.unwrap() - 1.54).abs() < 1e-9 && v.d_peak == Some(1.6), "{v:?}");
+    assert!((v.time_over_tau_s.unwrap() - 2.0 * DT).abs() < 1e-12, "τ is 1: {v:?}");
+    let mut replay = Replay::new(JudgeConfig { limit: None, ..config() });
+    replay.carry(3, 0.0, 0.4);
+    assert_eq!(replay.verdict(Outcome::Timeout).time_over_tau_s, None);
+}
+
+#[test]
+fn a_failed_episode_names_its_stage() {
+    let stage = |replay: &Replay| replay.judge.clone().finish(&Outcome::Timeout).failed_stage;
+    let mut replay = Replay::new(config());
+    replay.rest(2, -0.2);
+    assert_eq!(stage(&replay), Some(Stage::Reach));
+    replay.carry(2, -0.2, 0.5);
+    assert_eq!(stage(&replay), Some(Stage::Carry));
+    replay.carry(2, 0.0, 0.5);
+    assert_eq!(stage(&replay), Some(Stage::Place));
+    replay.rest(3, 0.0);
+    assert_eq!(stage(&replay), Some(Stage::Release));
+    replay.rest(30, 0.0);
+    assert_eq!(replay.verdict(Outcome::Completed).failed_stage, None);
 }

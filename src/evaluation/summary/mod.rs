@@ -1,16 +1,18 @@
 //! Summary of a run (`summary.json`): rates and distributions over its episodes.
 //!
-//! Rates are in percent over *all* episodes: an invalid episode, or one with missing evidence, counts as a failure.
-//! Distributions of D are over the valid episodes with a measured D.
+//! Rates are in percent over *all* episodes: an invalid episode, or one with missing evidence, counts as a failure. What was
+//! judged in no episode has no rate. Distributions of D are over all episodes with a soft target: means over the valid
+//! ones, percentiles with invalid ones ranked as worst.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
 use super::{
-    record::EpisodeRecord,
+    record::{EpisodeRecord, Outcome},
     safety::{DeformationLimit, PeakDeformation, is_safe},
-    statistics::{Distribution, Rate},
+    stage::Stage,
+    statistics::{Distribution, Rate, mean, stratified_bootstrap},
 };
 
 /// Number of intervals of the κ curve between 0 and 1.
@@ -25,13 +27,23 @@ pub struct Scores {
     pub invalid: usize,
     /// Number of valid episodes whose safety could not be judged, for lack of a threshold or of evidence.
     pub safety_unknown: usize,
+    /// Number of episodes with a soft target whose deformation was not judged, for lack of a limit or of evidence.
+    #[serde(default)]
+    pub not_judged: usize,
+    /// TSR, the task success rate: Goal Success.
+    #[serde(default)]
+    pub tsr: Rate,
+    /// DSR, the deformation-safe success rate: Goal Success with D_peak ≤ τ, whether dropped or not. Null where no target
+    /// deforms, its rate where none was judged.
+    #[serde(default)]
+    pub dsr: Option<Rate>,
     /// Rate of Goal Success over all episodes.
     pub goal_success_rate: Rate,
     /// Rate of NoDrop over all episodes.
     pub no_drop_rate: Rate,
-    /// D_peak ≤ τ; null where no target deforms.
+    /// D_peak ≤ τ; null where no target deforms. Its rate is null where none was judged.
     pub deformation_ok_rate: Option<Rate>,
-    /// Rate of Safety Success over all episodes.
+    /// Rate of Safety Success over all episodes; null where all targets are soft and none was judged.
     pub safety_success_rate: Rate,
     /// Goal Success minus Safety Success, percentage points.
     pub goal_safe_gap: Option<f64>,
@@ -41,10 +53,52 @@ pub struct Scores {
     pub goal_v1_rate: Rate,
     /// Share of episodes in which another object was lifted first.
     pub wrong_instance_rate: Rate,
-    /// Peak D of all valid episodes, %.
+    /// Share of valid episodes in which no other soft body exceeded its own τ, of those in which that is known; null
+    /// where it is never known.
+    #[serde(default)]
+    pub others_ok_rate: Option<Rate>,
+    /// Number of valid episodes in which harm to other soft bodies is unknown.
+    #[serde(default)]
+    pub others_unknown: usize,
+    /// Share of episodes in which the robot touched a movable object other than the target; null in runs of versions
+    /// that did not record it.
+    #[serde(default)]
+    pub wrong_contact_rate: Option<Rate>,
+    /// Number of episodes without Goal Success by the stage at which they ended.
+    #[serde(default)]
+    pub failed_stages: BTreeMap<Stage, usize>,
+    /// Smallest and largest τ that was applied, %; null without any.
+    #[serde(default)]
+    pub tau_range: Option<TauRange>,
+    /// Deformation within the episodes.
+    #[serde(default)]
+    pub within_episodes: EpisodeDeformation,
+    /// Peak D of all episodes with a soft target, %; invalid ones rank as worst.
     pub deformation: Distribution,
     /// Peak D of the valid episodes that reached the goal, %.
     pub deformation_goal: Distribution,
+}
+
+/// Smallest and largest τ of some episodes, %.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TauRange {
+    /// Smallest τ.
+    pub min: f64,
+    /// Largest τ.
+    pub max: f64,
+}
+
+/// D within an episode, each the mean over the valid episodes that have it; null without any.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct EpisodeDeformation {
+    /// Mean D, %.
+    pub d_mean: Option<f64>,
+    /// D at the end, %.
+    pub d_final: Option<f64>,
+    /// 95th percentile of D, %.
+    pub d_p95: Option<f64>,
+    /// Time over τ, s.
+    pub time_over_tau_s: Option<f64>,
 }
 
 /// One point of the curve of safety over κ.
@@ -95,6 +149,17 @@ pub struct AbortedEpisode {
     pub reason: String,
 }
 
+/// Invalid episode with its reason.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct InvalidEpisode {
+    /// Index of the task.
+    pub task: usize,
+    /// Index of the episode in the task.
+    pub episode: u32,
+    /// Reason why it is invalid.
+    pub reason: String,
+}
+
 /// Contents of `summary.json`: one suite, one policy.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SuiteSummary {
@@ -120,6 +185,9 @@ pub struct SuiteSummary {
     /// Episodes that the controller aborted, in order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub gave_up: Vec<AbortedEpisode>,
+    /// Invalid episodes, in order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub invalid_episodes: Vec<InvalidEpisode>,
 }
 
 impl Scores {
@@ -129,28 +197,86 @@ impl Scores {
         let rate = |test: fn(&EpisodeRecord) -> bool| {
             Rate::new(valid.iter().filter(|r| test(r)).count(), records.len())
         };
-        let soft = records.iter().any(|r| r.header.soft);
-        let (goal, safety) = (rate(|r| r.verdict.goal), rate(|r| r.verdict.safety));
-        let peaks = |reached: fn(&EpisodeRecord) -> bool| {
-            Distribution::from_values(
-                valid.iter().filter(|r| reached(r)).filter_map(|r| r.verdict.d_peak).collect(),
-            )
+        let soft: Vec<_> = records.iter().copied().filter(|r| r.header.soft).collect();
+        let is_judged = soft.is_empty() || soft.iter().any(|r| r.is_deformation_judged());
+        let judged_rate = |test: fn(&EpisodeRecord) -> bool| match is_judged {
+            true => rate(test),
+            false => Rate::not_judged(),
         };
+        let goal = rate(|r| r.verdict.goal);
+        let safety = match soft.len() == records.len() {
+            true => judged_rate(|r| r.verdict.safety),
+            false => rate(|r| r.verdict.safety),
+        };
+        let peaks = |reached: fn(&EpisodeRecord) -> bool| -> Vec<f64> {
+            valid.iter().filter(|r| reached(r)).filter_map(|r| r.verdict.d_peak).collect()
+        };
+        let mean_of = |value: fn(&EpisodeRecord) -> Option<f64>| {
+            mean(&valid.iter().filter_map(|r| value(r)).collect::<Vec<f64>>())
+        };
+        let others: Vec<bool> = valid.iter().filter_map(|r| r.verdict.others_ok).collect();
+        let mut failed_stages = BTreeMap::new();
+        for stage in records.iter().filter_map(|r| r.verdict.failed_stage) {
+            *failed_stages.entry(stage).or_insert(0) += 1;
+        }
+        let taus = || soft.iter().filter_map(|r| r.verdict.tau);
+        let tau_range = taus().reduce(f64::min).zip(taus().reduce(f64::max));
         Self {
             episodes: records.len(),
             invalid: records.len() - valid.len(),
             safety_unknown: valid.iter().filter(|r| !r.verdict.safety_known).count(),
+            not_judged: soft.iter().filter(|r| !r.is_deformation_judged()).count(),
+            tsr: goal,
+            dsr: (!soft.is_empty()).then(|| judged_rate(EpisodeRecord::is_deformation_safe)),
             goal_success_rate: goal,
             no_drop_rate: rate(|r| r.verdict.no_drop),
-            deformation_ok_rate: soft.then(|| rate(|r| r.verdict.deformation_ok == Some(true))),
+            deformation_ok_rate: (!soft.is_empty())
+                .then(|| judged_rate(|r| r.verdict.deformation_ok == Some(true))),
             safety_success_rate: safety,
             goal_safe_gap: goal.rate.zip(safety.rate).map(|(goal, safety)| goal - safety),
             no_slip_rate: rate(|r| r.verdict.no_slip),
             goal_v1_rate: rate(|r| r.verdict.goal_v1),
             wrong_instance_rate: rate(|r| r.verdict.wrong_instance),
-            deformation: peaks(|_| true),
-            deformation_goal: peaks(|r| r.verdict.goal),
+            others_ok_rate: (!others.is_empty()).then(|| Rate::from_test(&others, |ok| *ok)),
+            others_unknown: valid.len() - others.len(),
+            wrong_contact_rate: records
+                .iter()
+                .any(|r| r.has_harm())
+                .then(|| Rate::from_test(records, |r| r.verdict.first_wrong_contact.is_some())),
+            failed_stages,
+            tau_range: tau_range.map(|(min, max)| TauRange { min, max }),
+            within_episodes: EpisodeDeformation {
+                d_mean: mean_of(|r| r.verdict.d_mean),
+                d_final: mean_of(|r| r.verdict.d_final),
+                d_p95: mean_of(|r| r.verdict.d_p95),
+                time_over_tau_s: mean_of(|r| r.verdict.time_over_tau_s),
+            },
+            deformation: Distribution::with_invalid(
+                peaks(|_| true),
+                soft.iter().filter(|r| !r.outcome.is_valid()).count(),
+            ),
+            deformation_goal: Distribution::from_values(peaks(|r| r.verdict.goal)),
         }
+    }
+}
+
+impl Scores {
+    /// Adds the bootstrap intervals of the rates and of the mean D, stratified by task.
+    fn add_bootstrap(&mut self, tasks: &BTreeMap<usize, Vec<&EpisodeRecord>>) {
+        let outcomes = |test: fn(&EpisodeRecord) -> bool| -> Vec<Vec<bool>> {
+            let held = |r: &&EpisodeRecord| r.outcome.is_valid() && test(r);
+            tasks.values().map(|group| group.iter().map(held).collect()).collect()
+        };
+        self.goal_success_rate = self.goal_success_rate.with_bootstrap(&outcomes(|r| r.verdict.goal));
+        self.tsr = self.goal_success_rate;
+        self.no_drop_rate = self.no_drop_rate.with_bootstrap(&outcomes(|r| r.verdict.no_drop));
+        self.safety_success_rate = self.safety_success_rate.with_bootstrap(&outcomes(|r| r.verdict.safety));
+        self.dsr = self.dsr.map(|dsr| dsr.with_bootstrap(&outcomes(EpisodeRecord::is_deformation_safe)));
+        let within = |r: &EpisodeRecord| r.verdict.deformation_ok == Some(true);
+        self.deformation_ok_rate = self.deformation_ok_rate.map(|rate| rate.with_bootstrap(&outcomes(within)));
+        let peak = |r: &&EpisodeRecord| r.verdict.d_peak.filter(|_| r.outcome.is_valid());
+        let peaks: Vec<Vec<f64>> = tasks.values().map(|group| group.iter().filter_map(peak).collect()).collect();
+        self.deformation.bootstrap95 = stratified_bootstrap(&peaks);
     }
 }
 
@@ -173,16 +299,29 @@ impl SuiteSummary {
             let (task, episode) = (r.header.id.task, r.header.id.episode);
             r.stats.gave_up.clone().map(|reason| AbortedEpisode { task, episode, reason })
         };
+        let invalid = |r: &&EpisodeRecord| {
+            let (task, episode) = (r.header.id.task, r.header.id.episode);
+            let reason = match &r.outcome {
+                Outcome::Invalid { reason, step, .. } => format!("{reason} at physics step {step}"),
+                Outcome::Error { message } => message.clone(),
+                Outcome::Completed | Outcome::Timeout => return None,
+            };
+            Some(InvalidEpisode { task, episode, reason })
+        };
+        let by_task = grouped(&records, |r| r.header.id.task);
+        let mut scores = Scores::from_records(&records);
+        scores.add_bootstrap(&by_task);
         Self {
             suite: suite.into(),
             policy: policy.into(),
             privileged: records.iter().any(|r| r.header.privileged),
             force_observed: records.iter().any(|r| r.stats.force_observed),
-            scores: Scores::from_records(&records),
+            scores,
             kappa: kappa_curve(&records),
-            by_task: grouped(&records, |r| r.header.id.task).into_iter().map(task_scores).collect(),
+            by_task: by_task.into_iter().map(task_scores).collect(),
             by_asset: grouped(&records, |r| r.header.asset.clone()).into_iter().map(asset_scores).collect(),
             gave_up: records.iter().filter_map(aborted).collect(),
+            invalid_episodes: records.iter().filter_map(invalid).collect(),
         }
     }
 
@@ -213,8 +352,13 @@ fn kappa_curve(records: &[&EpisodeRecord]) -> Vec<KappaRow> {
     if !records.iter().any(|r| r.header.soft) {
         return Vec::new();
     }
+    let is_judged = records.iter().any(|r| r.header.soft && r.is_deformation_judged());
     let row = |step| {
         let kappa = f64::from(step) / f64::from(KAPPA_STEPS);
+        if !is_judged {
+            let none = Rate::not_judged();
+            return KappaRow { kappa, deformation_ok_rate: none, safety_success_rate: none };
+        }
         KappaRow {
             kappa,
             deformation_ok_rate: Rate::from_test(records, |r| is_within(r, kappa) == Some(true)),

@@ -1,5 +1,5 @@
 use super::*;
-use crate::record::{Outcome, tests::sample};
+use crate::record::{Outcome, WrongContact, tests::sample};
 
 fn episode(task: usize, index: u32, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
     let mut record = sample();
@@ -31,7 +31,7 @@ fn records() -> Vec<EpisodeRecord> {
 }
 
 #[test]
-fn rates_count_every_episode_and_deformation_only_the_valid_ones() {
+fn rates_count_every_episode_and_deformation_ranks_invalid_ones_as_worst() {
     let s = SuiteSummary::from_records("suite", "expert", &records());
     assert_eq!((s.scores.episodes, s.scores.invalid, s.scores.safety_unknown), (4, 1, 0));
     assert_eq!(s.scores.goal_success_rate.rate, Some(50.0));
@@ -39,7 +39,13 @@ fn rates_count_every_episode_and_deformation_only_the_valid_ones() {
     assert_eq!(s.scores.deformation_ok_rate.unwrap().rate, Some(50.0));
     assert_eq!(s.scores.safety_success_rate.rate, Some(25.0));
     assert_eq!(s.scores.goal_safe_gap, Some(25.0));
-    assert_eq!((s.scores.deformation.n, s.scores.deformation.median), (3, Some(0.7)));
+    // 0.5, 0.7, 1.5 and the invalid one, which ranks as worst.
+    let d = s.scores.deformation;
+    assert_eq!((d.n, d.invalid, d.median, d.p95), (3, 1, Some(1.1), None));
+    assert_eq!(d.mean, Some(0.9), "of the valid ones");
+    assert_eq!((s.scores.tsr.rate, s.scores.dsr.unwrap().rate), (Some(50.0), Some(25.0)));
+    assert_eq!(s.invalid_episodes[0].reason, "inverted at physics step 9");
+    assert_eq!(s.scores.tau_range, Some(TauRange { min: 1.0, max: 1.0 }));
     assert_eq!((s.scores.deformation_goal.n, s.scores.deformation_goal.mean), (2, Some(1.0)));
 }
 
@@ -88,9 +94,41 @@ fn missing_thresholds_are_unknown_not_safe() {
         (r.verdict.deformation_ok, r.verdict.d_ref, r.verdict.tau) = (None, None, None);
         (r.verdict.safety, r.verdict.safety_known) = (false, false);
     });
-    let s = SuiteSummary::from_records("suite", "expert", &[unknown]);
-    assert_eq!((s.scores.safety_unknown, s.scores.safety_success_rate.rate), (1, Some(0.0)));
-    assert_eq!(s.scores.deformation_ok_rate.unwrap().rate, Some(0.0));
+    let s = SuiteSummary::from_records("suite", "expert", std::slice::from_ref(&unknown));
+    assert_eq!((s.scores.safety_unknown, s.scores.not_judged), (1, 1));
+    // What was never judged has no rate and no interval.
+    let none = Rate::not_judged();
+    assert_eq!((s.scores.safety_success_rate, s.scores.deformation_ok_rate), (none, Some(none)));
+    assert_eq!((s.scores.dsr, s.scores.goal_safe_gap, s.scores.tau_range), (Some(none), None, None));
+    assert!(s.kappa.iter().all(|row| row.safety_success_rate == none));
+    // Beside a judged one it counts as not safe.
+    let s = SuiteSummary::from_records("suite", "expert", &[episode(0, 1, |_| ()), unknown]);
+    assert_eq!((s.scores.not_judged, s.scores.safety_success_rate.rate), (1, Some(50.0)));
+}
+
+#[test]
+fn harm_and_stages_are_counted() {
+    let s = SuiteSummary::from_records(
+        "suite",
+        "expert",
+        &[
+            episode(0, 0, |r| r.verdict.others_ok = Some(true)),
+            episode(0, 1, |r| {
+                r.verdict.others_ok = Some(false);
+                r.verdict.first_wrong_contact = Some(WrongContact { time_s: 1.0, object: "cube".into() });
+            }),
+            episode(0, 2, |r| (r.verdict.goal, r.verdict.failed_stage) = (false, Some(Stage::Lift))),
+        ],
+    );
+    assert_eq!((s.scores.others_ok_rate.unwrap().rate, s.scores.others_unknown), (Some(50.0), 1));
+    assert!((s.scores.wrong_contact_rate.unwrap().rate.unwrap() - 100.0 / 3.0).abs() < 1e-9);
+    assert_eq!(s.scores.failed_stages, [(Stage::Lift, 1)].into());
+    let old = SuiteSummary::from_records("suite", "expert", &[episode(0, 0, |_| ())]);
+    assert_eq!((old.scores.others_ok_rate, old.scores.wrong_contact_rate), (None, None));
+    let many: Vec<_> = (0..20).map(|i| episode(i as usize % 2, i / 2, |r| r.verdict.goal = i % 4 != 0)).collect();
+    let s = SuiteSummary::from_records("suite", "expert", &many);
+    assert!(s.scores.tsr.bootstrap95.is_some_and(|[low, high]| low < 75.0 && 75.0 < high), "{:?}", s.scores.tsr);
+    assert!(s.by_task[0].scores.tsr.bootstrap95.is_none());
 }
 
 #[test]

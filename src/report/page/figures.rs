@@ -7,6 +7,7 @@ use maud::{Markup, Render, html};
 use crate::run_summary::RunSummary;
 use softvt_evaluation::{
     paired_stats::d_over_tau,
+    record::EpisodeRecord,
     statistics::{Distribution, Rate},
 };
 
@@ -267,16 +268,76 @@ fn style(index: usize) -> String {
     format!("curve c{} d{}", index % 6, index / 6 % 4)
 }
 
+/// A point of the curve of Safety Success over κ.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct CurvePoint {
+    kappa: f64,
+    percent: f64,
+}
+
+/// The corners of the curve. Safety Success is a step function of κ: it rises where κ reaches D_peak / D_ref of an
+/// episode. Empty if nothing was judged.
+fn curve_corners(run: &RunSummary) -> Vec<CurvePoint> {
+    if run.summary.kappa.iter().all(|row| row.safety_success_rate.rate.is_none()) {
+        return Vec::new();
+    }
+    let records = &run.run.records;
+    let safe_from = |record: &EpisodeRecord| {
+        let v = &record.verdict;
+        if !(record.outcome.is_valid() && v.goal && v.no_drop && v.missing_deformation == 0) {
+            return None;
+        }
+        if record.header.soft { v.d_peak.zip(v.d_ref).map(|(d, d_ref)| d / d_ref) } else { Some(0.0) }
+    };
+    let mut steps: Vec<f64> = records.iter().filter_map(safe_from).filter(|kappa| *kappa <= 1.0).collect();
+    steps.sort_by(f64::total_cmp);
+    let percent = |count: usize| 100.0 * count as f64 / records.len().max(1) as f64;
+    let mut corners = vec![CurvePoint { kappa: 0.0, percent: 0.0 }];
+    for (count, kappa) in steps.into_iter().enumerate() {
+        corners.extend([count, count + 1].map(|count| CurvePoint { kappa, percent: percent(count) }));
+    }
+    let last = corners[corners.len() - 1];
+    corners.push(CurvePoint { kappa: 1.0, ..last });
+    corners
+}
+
 fn curve(run: &RunSummary, index: usize) -> Markup {
-    let points: Vec<(f64, f64)> =
-        run.summary.kappa.iter().filter_map(|row| Some((row.kappa, row.safety_success_rate.rate?))).collect();
+    let corners = curve_corners(run);
     // Separates coinciding lines.
     let offset = 1.5 * ((index % 5) as f64 - 2.0);
     html! {
         g class=(style(index)) {
-            @for pair in points.windows(2) {
-                line x1=(x(pair[0].0)) x2=(x(pair[1].0)) y1=(y(level(pair[0].1) + offset)) y2=(y(level(pair[1].1) + offset)) {}
+            @for pair in corners.windows(2) {
+                line x1=(x(pair[0].kappa)) x2=(x(pair[1].kappa)) y1=(y(level(pair[0].percent) + offset)) y2=(y(level(pair[1].percent) + offset)) {}
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        run_summary::{summarize_runs, tests::stored},
+        sample_record,
+    };
+
+    #[test]
+    fn the_curve_of_strictness_is_a_step_function() {
+        // D_ref is 2: safe from κ 0.225 and from κ 0.8.
+        let records = [0.45, 1.6, 9.0].map(|d| {
+            let mut record = sample_record();
+            record.header.id.episode = (10.0 * d) as u32;
+            record.verdict.d_peak = Some(d);
+            record
+        });
+        let runs = summarize_runs(vec![stored("a", "pi", records.to_vec())]);
+        let corners = curve_corners(&runs[0]);
+        let level = |step: usize| 100.0 * step as f64 / 3.0;
+        let expected = [(0.0, 0), (0.225, 0), (0.225, 1), (0.8, 1), (0.8, 2), (1.0, 2)]
+            .map(|(kappa, step)| CurvePoint { kappa, percent: level(step) });
+        assert_eq!(corners, expected);
+        let rises = |pair: &[CurvePoint]| pair[0].percent != pair[1].percent;
+        assert!(corners.windows(2).filter(|pair| rises(pair)).all(|pair| pair[0].kappa == pair[1].kappa));
     }
 }

@@ -14,7 +14,10 @@ use softvt_common::text::{counted, escape_control};
 
 use super::{
     run_summary::RunSummary,
-    tables::{ResultTable, TEXT_COLUMNS, deformation_table, kappa_table, main_table, task_table},
+    tables::{
+        ResultTable, TEXT_COLUMNS, bootstrap_table, deformation_table, kappa_table, main_table, stage_table,
+        task_table,
+    },
 };
 
 /// Largest number of runs whose details are expanded initially.
@@ -96,8 +99,10 @@ fn results(runs: &[RunSummary]) -> Markup {
         @for warning in runs.iter().flat_map(|run| run.run.warnings()) { p.warning { (warning) } }
         figure {
             (figures::goal_and_safety(runs))
-            figcaption { "Goal Success and Safety Success. The gap between them is invisible in success rates alone. Whiskers are 95 % Wilson intervals." }
+            figcaption { "Goal Success (TSR) and Safety Success. The gap between them is invisible in success rates alone. Whiskers are 95 % Wilson intervals." }
         }
+        @if let Some(bootstrap) = bootstrap_table(runs) { (table(&bootstrap)) }
+        @if let Some(stages) = stage_table(runs) { (table(&stages)) }
     }
 }
 

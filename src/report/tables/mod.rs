@@ -1,11 +1,15 @@
 //! Result tables of runs, as markdown and as LaTeX with booktabs. Names come from scripts and are escaped.
 
-use super::run_summary::RunSummary;
+use super::{
+    run_summary::RunSummary,
+    terminal::{percentile, tau_range},
+};
 use softvt_common::text::decimal;
 use softvt_evaluation::{
     safety::KAPPAS,
+    stage::Stage,
     statistics::{Distribution, Rate},
-    summary::TaskScores,
+    summary::{EpisodeDeformation, Scores, TaskScores},
 };
 
 /// Number of columns, from the left, that hold text; the others hold numbers.
@@ -31,9 +35,10 @@ pub fn rate(rate: &Rate) -> String {
     rate.rate.map_or_else(|| "–".to_owned(), |value| format!("{value:.1}{bounds}"))
 }
 
-/// As [`rate`]; "N/A" for rigid suites.
-fn soft_rate(run: &RunSummary, of: &Rate) -> String {
-    if run.is_soft() { rate(of) } else { "N/A".to_owned() }
+/// As [`rate`]; "N/A" for rigid suites and for what was never judged.
+fn soft_rate(run: &RunSummary, scores: &Scores, of: &Rate) -> String {
+    let is_judged = of.rate.is_some() || scores.not_judged == 0;
+    if run.is_soft() && is_judged { rate(of) } else { "N/A".to_owned() }
 }
 
 /// Number of episodes, and of how many if the run is not finished.
@@ -56,14 +61,27 @@ pub fn main_table(runs: &[RunSummary]) -> ResultTable {
             episodes(run),
             rate(&s.goal_success_rate),
             rate(&s.no_drop_rate),
-            soft_rate(run, &s.safety_success_rate),
+            soft_rate(run, s, &s.safety_success_rate),
             if run.is_soft() { decimal(s.goal_safe_gap, 1) } else { "N/A".to_owned() },
             s.invalid.to_string(),
+            s.dsr.map_or_else(|| "N/A".to_owned(), |dsr| soft_rate(run, s, &dsr)),
+            s.not_judged.to_string(),
         ]
     };
     ResultTable {
-        caption: "Success by suite and method, % of episodes with 95 % Wilson intervals. Safety Success requires the goal, no drop, and a peak deformation within the object's threshold; it does not apply to rigid objects.".to_owned(),
-        head: strings(["Suite", "Method", "Episodes", "Goal Success", "NoDrop", "Safety Success", "Gap, pp", "Invalid"]),
+        caption: "Success by suite and method, % of episodes with 95 % Wilson intervals. Safety Success requires the goal, no drop, and a peak deformation within the object's threshold; it does not apply to rigid objects. TSR is Goal Success; DSR is Goal Success with the deformation within the threshold, dropped or not.".to_owned(),
+        head: strings([
+            "Suite",
+            "Method",
+            "Episodes",
+            "Goal Success (TSR)",
+            "NoDrop",
+            "Safety Success",
+            "Gap, pp",
+            "Invalid",
+            "DSR",
+            "Not judged",
+        ]),
         rows: runs.iter().map(row).collect(),
     }
 }
@@ -71,15 +89,32 @@ pub fn main_table(runs: &[RunSummary]) -> ResultTable {
 /// The paper's deformation table; `None` if all suites are rigid.
 pub fn deformation_table(runs: &[RunSummary]) -> Option<ResultTable> {
     let row = |run: &RunSummary| {
-        let Distribution { mean, p5, median, p95, n } = run.summary.scores.deformation;
-        let head = [run.summary.suite.clone(), run.method.clone()];
-        let figures = [mean, p5, median, p95].map(|x| decimal(x, 2));
-        head.into_iter().chain(figures).chain([n.to_string()]).collect()
+        let scores = &run.summary.scores;
+        let Distribution { mean, p5, median, p95, n, invalid, .. } = scores.deformation;
+        let EpisodeDeformation { d_mean, d_final, d_p95, time_over_tau_s } = scores.within_episodes;
+        let head = [run.summary.suite.clone(), run.method.clone(), decimal(mean, 2)];
+        let percentiles = [p5, median, p95].map(|x| percentile(&scores.deformation, x));
+        let within = [d_mean, d_final, d_p95, time_over_tau_s].map(|x| decimal(x, 2));
+        let counts = [n.to_string(), invalid.to_string()];
+        head.into_iter().chain(percentiles).chain(counts).chain(within).collect()
     };
     soft_table(
         runs,
-        "Peak FEM-RMS deformation over all valid episodes, % of the settled bounding-box diagonal.",
-        strings(["Suite", "Method", "Mean", "P5", "Median", "P95", "Episodes"]),
+        "Peak FEM-RMS deformation, % of the settled bounding-box diagonal. The mean is over the valid episodes; percentiles are over all, with invalid ones ranked as worst (∞). On the right, deformation within an episode, averaged over the valid ones.",
+        strings([
+            "Suite",
+            "Method",
+            "Mean",
+            "P5",
+            "Median",
+            "P95",
+            "Valid",
+            "Invalid",
+            "Mean in episode",
+            "Final",
+            "P95 in episode",
+            "Over τ, s",
+        ]),
         row,
     )
 }
@@ -115,20 +150,17 @@ fn soft_table(
 pub fn task_table(run: &RunSummary) -> ResultTable {
     let row = |task: &TaskScores| {
         let s = &task.scores;
-        let tau = run.summary.by_asset.get(&task.asset).and_then(|asset| asset.tau);
-        let number = |x: Option<f64>| match x {
-            None if !run.is_soft() => "N/A".to_owned(),
-            x => decimal(x, 2),
-        };
+        let not_applicable = || "N/A".to_owned();
+        let is_soft = run.is_soft();
         vec![
             task.task.to_string(),
             task.prompt.clone(),
             s.episodes.to_string(),
             rate(&s.goal_success_rate),
             rate(&s.no_drop_rate),
-            soft_rate(run, &s.safety_success_rate),
-            number(s.deformation.median),
-            number(tau),
+            soft_rate(run, s, &s.safety_success_rate),
+            if is_soft { percentile(&s.deformation, s.deformation.median) } else { not_applicable() },
+            if is_soft && s.tau_range.is_some() { tau_range(s.tau_range) } else { not_applicable() },
         ]
     };
     ResultTable {
@@ -138,11 +170,57 @@ pub fn task_table(run: &RunSummary) -> ResultTable {
     }
 }
 
+/// Harm to other objects, and the stages at which episodes failed; `None` if no run recorded them.
+pub fn stage_table(runs: &[RunSummary]) -> Option<ResultTable> {
+    let row = |run: &RunSummary| {
+        let s = &run.summary.scores;
+        let optional = |of: &Option<Rate>| of.as_ref().map_or_else(|| "N/A".to_owned(), rate);
+        let head = [run.summary.suite.clone(), run.method.clone()];
+        let harm =
+            [optional(&s.others_ok_rate), s.others_unknown.to_string(), optional(&s.wrong_contact_rate)];
+        let stages = Stage::ALL.map(|stage| s.failed_stages.get(&stage).copied().unwrap_or(0).to_string());
+        head.into_iter().chain(harm).chain(stages).collect()
+    };
+    let known = runs.iter().filter(|run| run.summary.scores.wrong_contact_rate.is_some());
+    let rows: Vec<Vec<String>> = known.map(row).collect();
+    let stages = Stage::ALL.map(Stage::name);
+    let head = ["Suite", "Method", "Others within their τ", "Unknown", "Touched others"];
+    (!rows.is_empty()).then(|| ResultTable {
+        caption: "Harm to other objects, % of episodes, and the number of episodes without Goal Success by the stage at which they ended.".to_owned(),
+        head: head.into_iter().chain(stages).map(str::to_owned).collect(),
+        rows,
+    })
+}
+
+/// Task-stratified bootstrap intervals of the rates and of the mean D; `None` if no run has enough episodes.
+pub fn bootstrap_table(runs: &[RunSummary]) -> Option<ResultTable> {
+    let bounds = |bounds: Option<[f64; 2]>, digits: usize| {
+        bounds.map_or_else(|| "–".to_owned(), |[low, high]| format!("{low:.digits$} to {high:.digits$}"))
+    };
+    let row = |run: &RunSummary| {
+        let s = &run.summary.scores;
+        let dsr = s.dsr.and_then(|dsr| dsr.bootstrap95);
+        let rates = [s.tsr.bootstrap95, s.no_drop_rate.bootstrap95, s.safety_success_rate.bootstrap95, dsr];
+        let head = [run.summary.suite.clone(), run.method.clone()];
+        let rates = rates.map(|rate| bounds(rate, 1));
+        head.into_iter().chain(rates).chain([bounds(s.deformation.bootstrap95, 2)]).collect()
+    };
+    let known = runs.iter().filter(|run| run.summary.scores.tsr.bootstrap95.is_some());
+    let rows: Vec<Vec<String>> = known.map(row).collect();
+    (!rows.is_empty()).then(|| ResultTable {
+        caption: "95 % intervals by the bootstrap within tasks, %: beside the Wilson intervals, which take all episodes as independent.".to_owned(),
+        head: strings(["Suite", "Method", "TSR", "NoDrop", "Safety Success", "DSR", "D mean"]),
+        rows,
+    })
+}
+
 /// All tables of some runs, in reading order.
 pub fn all_tables(runs: &[RunSummary]) -> Vec<ResultTable> {
     let mut all = vec![main_table(runs)];
     all.extend(deformation_table(runs));
     all.extend(kappa_table(runs));
+    all.extend(stage_table(runs));
+    all.extend(bootstrap_table(runs));
     all.extend(runs.iter().map(task_table));
     all
 }
@@ -237,6 +315,7 @@ fn escape_latex(text: &str) -> String {
             '·' => out += "$\\cdot$",
             '–' => out += "--",
             '…' => out += "\\ldots{}",
+            '∞' => out += "$\\infty$",
             c if c.is_control() => out.push(' '),
             other => out.push(other),
         }

@@ -1,6 +1,7 @@
 use super::*;
 use crate::run_summary::{summarize_runs, tests::stored};
 use crate::sample_record;
+use softvt_evaluation::stage::Stage;
 
 #[test]
 fn rigid_suites_have_no_safety_and_privileged_policies_are_marked_in_every_table() {
@@ -22,7 +23,20 @@ fn rigid_suites_have_no_safety_and_privileged_policies_are_marked_in_every_table
     let [rigid, soft] = &all[0].rows[..] else { panic!("two rows") };
     assert_eq!((&rigid[5][..], &rigid[6][..]), ("N/A", "N/A"));
     assert_eq!((&soft[5][..], &soft[6][..]), ("100.0 [20.7, 100.0]", "0.0"));
-    assert_eq!(all[1].rows, [strings(["suite", "expert (privileged)", "0.33", "0.33", "0.33", "0.33", "1"])]);
+    assert_eq!(all[1].rows, [strings([
+            "suite",
+            "expert (privileged)",
+            "0.33",
+            "0.33",
+            "0.33",
+            "0.33",
+            "1",
+            "0",
+            "–",
+            "–",
+            "–",
+            "–"
+        ])]);
 }
 
 #[test]
@@ -67,7 +81,7 @@ fn read_latex(line: &str) -> (i32, usize) {
                         name.push(c);
                     }
                     let known = "textbackslash textasciitilde textasciicircum textless textgreater textbar ldots tau kappa pi leq geq rightarrow times cdot \
-                                 begin end centering footnotesize caption toprule midrule bottomrule textwidth";
+                                 infty begin end centering footnotesize caption toprule midrule bottomrule textwidth";
                     assert!(known.split_whitespace().any(|k| k == name), "\\{name} in {line}");
                 } else {
                     letters.next();
@@ -119,4 +133,18 @@ fn hostile_names_are_escaped_in_markdown() {
     }
     assert!(text.contains("| a_b \\| c &amp; \\\\z |"), "{text}");
     assert!(text.contains("1.0 [0.0, 2.0] |"), "{text}");
+}
+
+#[test]
+fn harm_and_stages_have_a_table() {
+    let mut record = sample_record();
+    (record.verdict.others_ok, record.verdict.failed_stage) = (Some(false), Some(Stage::Carry));
+    (record.verdict.d_mean, record.verdict.time_over_tau_s) = (Some(0.2), Some(0.25));
+    let runs = summarize_runs(vec![stored("a", "pi", vec![record])]);
+    let table = stage_table(&runs).expect("recorded");
+    assert_eq!(table.rows[0][2..], strings(["0.0 [0.0, 79.3]", "0", "0.0 [0.0, 79.3]", "0", "0", "0", "1", "0", "0"]));
+    let deformation = deformation_table(&runs).expect("soft");
+    assert_eq!(deformation.rows[0][8..], strings(["0.20", "–", "–", "0.25"]));
+    assert_eq!(bootstrap_table(&runs), None, "one episode");
+    assert_eq!(stage_table(&summarize_runs(vec![stored("b", "pi", vec![sample_record()])])), None, "an earlier version");
 }

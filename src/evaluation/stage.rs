@@ -1,0 +1,105 @@
+//! Stages of a pick-and-place episode, and the one at which an episode failed.
+//!
+//! The stages come in order; an episode is in the first one that it has not completed. A stage that is completed stays so,
+//! whatever happens later. The stages are computed from the true state, which policies never see.
+
+use serde::{Deserialize, Serialize};
+
+/// A stage, with the event that completes it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stage {
+    /// Until a pad touches the target.
+    #[default]
+    Reach,
+    /// Until both pads touch it at once.
+    Grasp,
+    /// Until it is lifted while a pad touches it.
+    Lift,
+    /// Until its centre is over the goal region.
+    Carry,
+    /// Until it is in the goal region and supported, at the end of a control step.
+    Place,
+    /// Until it has rested there, released, for long enough: Goal Success.
+    Release,
+}
+
+impl Stage {
+    /// All stages, in order.
+    pub const ALL: [Self; 6] =
+        [Self::Reach, Self::Grasp, Self::Lift, Self::Carry, Self::Place, Self::Release];
+
+    /// Name in results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Reach => "reach",
+            Self::Grasp => "grasp",
+            Self::Lift => "lift",
+            Self::Carry => "carry",
+            Self::Place => "place",
+            Self::Release => "release",
+        }
+    }
+}
+
+/// One physics step as [`StageMonitor`] reads it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StageSample {
+    /// True for each pad that touches the target.
+    pub touch: [bool; 2],
+    /// True if the target is lifted.
+    pub is_lifted: bool,
+    /// True if its centre is over the goal region, at any height.
+    pub is_over_goal: bool,
+    /// True if it is in the goal region and supported, at the end of a control step.
+    pub is_placed: bool,
+}
+
+/// Finds the stage of an episode.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StageMonitor {
+    /// The present stage.
+    pub stage: Stage,
+}
+
+impl StageMonitor {
+    /// Takes in one physics step, which may complete several stages.
+    pub fn update(&mut self, sample: &StageSample) {
+        let [left, right] = sample.touch;
+        loop {
+            self.stage = match self.stage {
+                Stage::Reach if left || right => Stage::Grasp,
+                Stage::Grasp if left && right => Stage::Lift,
+                Stage::Lift if sample.is_lifted && (left || right) => Stage::Carry,
+                Stage::Carry if sample.is_over_goal => Stage::Place,
+                Stage::Place if sample.is_placed => Stage::Release,
+                _ => return,
+            };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stages_are_completed_in_order() {
+        let mut monitor = StageMonitor::default();
+        let mut after = |sample: StageSample| {
+            monitor.update(&sample);
+            monitor.stage
+        };
+        let none = StageSample::default();
+        assert_eq!(after(StageSample { is_over_goal: true, is_placed: true, ..none }), Stage::Reach, "not touched");
+        assert_eq!(after(StageSample { touch: [false, true], is_lifted: true, ..none }), Stage::Grasp);
+        assert_eq!(after(StageSample { touch: [true, true], ..none }), Stage::Lift);
+        assert_eq!(after(none), Stage::Lift, "stages stay completed");
+        assert_eq!(after(StageSample { is_lifted: true, ..none }), Stage::Lift, "thrown, not held");
+        let carried = StageSample { touch: [true, true], is_lifted: true, ..none };
+        assert_eq!(after(carried), Stage::Carry);
+        assert_eq!(after(StageSample { is_over_goal: true, ..carried }), Stage::Place);
+        assert_eq!(after(StageSample { is_over_goal: true, is_placed: true, ..none }), Stage::Release);
+        assert!(Stage::ALL.is_sorted());
+    }
+}
