@@ -121,9 +121,11 @@ impl PairedComparison {
                     .filter(|pair| pair.first.header.soft && pair.second.header.soft)
                     .map(|pair| [pair.first, pair.second].map(EpisodeRecord::is_deformation_safe)),
             ),
-            others_ok: PairedDifference::from_successes(pairs.iter().filter_map(|pair| {
-                Some([pair.first.verdict.others_ok?, pair.second.verdict.others_ok?])
-            })),
+            others_ok: PairedDifference::from_successes(
+                pairs
+                    .iter()
+                    .filter_map(|pair| Some([pair.first.verdict.others_ok?, pair.second.verdict.others_ok?])),
+            ),
             time_over_tau_s: mean(|r| r.verdict.time_over_tau_s.filter(|_| r.outcome.is_valid())),
             d_peak: mean(d_peak),
             d_over_tau: mean(d_over_tau),

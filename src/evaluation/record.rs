@@ -285,7 +285,10 @@ impl EpisodeRecord {
     /// True if harm to other objects was recorded; runs of earlier versions have no such fields.
     pub(crate) fn has_harm(&self) -> bool {
         let v = &self.verdict;
-        v.others_ok.is_some() || v.failed_stage.is_some() || v.d_mean.is_some() || v.first_wrong_contact.is_some()
+        v.others_ok.is_some()
+            || v.failed_stage.is_some()
+            || v.d_mean.is_some()
+            || v.first_wrong_contact.is_some()
     }
 }
 

@@ -91,7 +91,11 @@ mod tests {
             monitor.stage
         };
         let none = StageSample::default();
-        assert_eq!(after(StageSample { is_over_goal: true, is_placed: true, ..none }), Stage::Reach, "not touched");
+        assert_eq!(
+            after(StageSample { is_over_goal: true, is_placed: true, ..none }),
+            Stage::Reach,
+            "not touched"
+        );
         assert_eq!(after(StageSample { touch: [false, true], is_lifted: true, ..none }), Stage::Grasp);
         assert_eq!(after(StageSample { touch: [true, true], ..none }), Stage::Lift);
         assert_eq!(after(none), Stage::Lift, "stages stay completed");

@@ -35,7 +35,8 @@ impl Rate {
 
     /// Adds the bootstrap interval; `strata` are the outcomes by task.
     pub fn with_bootstrap(self, strata: &[Vec<bool>]) -> Self {
-        let percent = |outcomes: &Vec<bool>| outcomes.iter().map(|held| if *held { 100.0 } else { 0.0 }).collect();
+        let percent =
+            |outcomes: &Vec<bool>| outcomes.iter().map(|held| if *held { 100.0 } else { 0.0 }).collect();
         let strata: Vec<Vec<f64>> = strata.iter().map(percent).collect();
         Self { bootstrap95: self.rate.and_then(|_| stratified_bootstrap(&strata)), ..self }
     }

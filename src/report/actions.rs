@@ -113,7 +113,11 @@ mod tests {
         assert!(problem(&record).contains("episode_00000.npy: its SHA-256 differs"), "{}", problem(&record));
         write(&at, &actions[..2]).unwrap();
         record.stats.actions_sha256 = None;
-        assert!(problem(&record).contains("it has 2 actions, and the episode 3 steps"), "{}", problem(&record));
+        assert!(
+            problem(&record).contains("it has 2 actions, and the episode 3 steps"),
+            "{}",
+            problem(&record)
+        );
     }
 
     #[test]

@@ -126,8 +126,8 @@ pub(super) mod tests {
     use serde_json::json;
 
     use super::*;
-    use softvt_evaluation::{drop::DropEvent, stage::Stage};
     use crate::sample_record;
+    use softvt_evaluation::{drop::DropEvent, stage::Stage};
 
     /// A finished run of `records` in the folder `dir`.
     pub(crate) fn stored(dir: &str, policy: &str, mut records: Vec<EpisodeRecord>) -> StoredRun {

@@ -217,7 +217,8 @@ mod tests {
         assert_eq!(load(root.path()).unwrap()[0].records.len(), 1);
         files::write_json_lines(&lines, &[sample_record(), sample_record()]).unwrap();
         let error = load(root.path()).unwrap_err().to_string();
-        let expected = "episodes.jsonl:2: task 0 episode 0 occurs twice (first in line 1): remove one of the lines";
+        let expected =
+            "episodes.jsonl:2: task 0 episode 0 occurs twice (first in line 1): remove one of the lines";
         assert!(error.ends_with(expected), "{error}");
     }
 }

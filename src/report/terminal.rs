@@ -167,7 +167,10 @@ fn push_notes(table: &mut TextTable, summary: &SuiteSummary) {
     }
     let invalid = &summary.invalid_episodes;
     for InvalidEpisode { task, episode, reason } in invalid.iter().take(MAX_INVALID_LISTED) {
-        table.line(shortened(&format!("  task {task} episode {episode}: invalid: {reason}"), TextTable::WIDTH));
+        table.line(shortened(
+            &format!("  task {task} episode {episode}: invalid: {reason}"),
+            TextTable::WIDTH,
+        ));
     }
     if invalid.len() > MAX_INVALID_LISTED {
         table.line(format!("  … and {} more, in summary.json", invalid.len() - MAX_INVALID_LISTED));
@@ -187,8 +190,10 @@ fn push_notes(table: &mut TextTable, summary: &SuiteSummary) {
 
 fn interval(rate: Rate) -> String {
     let bounds = rate.wilson95.map(|[low, high]| format!("  [{low:.1}, {high:.1}]")).unwrap_or_default();
-    let by_task =
-        rate.bootstrap95.map(|[low, high]| format!("  bootstrap by task [{low:.1}, {high:.1}]")).unwrap_or_default();
+    let by_task = rate
+        .bootstrap95
+        .map(|[low, high]| format!("  bootstrap by task [{low:.1}, {high:.1}]"))
+        .unwrap_or_default();
     format!("{:>6} %{bounds}{by_task}", decimal(rate.rate, 1))
 }
 

@@ -86,9 +86,7 @@ mod trace;
 pub use asset_cache::AssetCache;
 pub use build_error::BuildError;
 pub use controller::{ChunkedPolicy, Controller};
-pub use episode::{
-    Episode, EpisodeError, EpisodeSpec, FinishedEpisode, ScoreFrame, checksum, target_asset,
-};
+pub use episode::{Episode, EpisodeError, EpisodeSpec, FinishedEpisode, ScoreFrame, checksum, target_asset};
 pub use robot_instance::RobotInstance;
 pub use sensor_assets::{SensingError, SensorAssets};
 pub use sensors::{

@@ -113,7 +113,10 @@ fn all_actions_refused(records: &[EpisodeRecord]) -> Option<CliError> {
     let first = message(records.first()?)?;
     records.iter().all(|record| message(record).is_some()).then(|| {
         let count = counted(records.len(), "episode");
-        CliError::new(Exit::Policy, format!("no episode is valid: the policy's actions were refused in {count}, first: {first}"))
+        CliError::new(
+            Exit::Policy,
+            format!("no episode is valid: the policy's actions were refused in {count}, first: {first}"),
+        )
     })
 }
 

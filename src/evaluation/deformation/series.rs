@@ -69,7 +69,11 @@ mod tests {
         assert!((of.p95.unwrap() - 3.85).abs() < 1e-12, "{of:?}");
         let buffer = series.values.as_ptr();
         (0..9).for_each(|_| series.push(Some(9.0), None));
-        assert_eq!((series.count, series.values.as_ptr()), (5, buffer), "the buffer has the size of the budget");
+        assert_eq!(
+            (series.count, series.values.as_ptr()),
+            (5, buffer),
+            "the buffer has the size of the budget"
+        );
         assert_eq!(DeformationSeries::new(3).finish(), SeriesStatistics::default());
     }
 }

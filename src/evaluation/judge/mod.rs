@@ -315,7 +315,8 @@ impl Judge {
     }
 
     fn observe_deformation(&mut self, evidence: &Evidence<'_>) {
-        for ((other, body), peak) in self.config.others.iter().zip(evidence.others).zip(&mut self.peaks_other) {
+        for ((other, body), peak) in self.config.others.iter().zip(evidence.others).zip(&mut self.peaks_other)
+        {
             if other.is_soft {
                 peak.update(body.deformation.map(|d| d.rms_pct));
             }
@@ -348,8 +349,7 @@ impl Judge {
         let least_ns = self.config.criteria.touch_force_n * self.config.dt_s;
         if self.first_wrong_contact.is_none() {
             let touched = evidence.others.iter().position(|body| body.robot_impulse_ns > least_ns);
-            self.first_wrong_contact =
-                touched.map(|other| FirstContact { time_s: evidence.time_s, other });
+            self.first_wrong_contact = touched.map(|other| FirstContact { time_s: evidence.time_s, other });
         }
     }
 

@@ -273,9 +273,11 @@ impl Scores {
         self.safety_success_rate = self.safety_success_rate.with_bootstrap(&outcomes(|r| r.verdict.safety));
         self.dsr = self.dsr.map(|dsr| dsr.with_bootstrap(&outcomes(EpisodeRecord::is_deformation_safe)));
         let within = |r: &EpisodeRecord| r.verdict.deformation_ok == Some(true);
-        self.deformation_ok_rate = self.deformation_ok_rate.map(|rate| rate.with_bootstrap(&outcomes(within)));
+        self.deformation_ok_rate =
+            self.deformation_ok_rate.map(|rate| rate.with_bootstrap(&outcomes(within)));
         let peak = |r: &&EpisodeRecord| r.verdict.d_peak.filter(|_| r.outcome.is_valid());
-        let peaks: Vec<Vec<f64>> = tasks.values().map(|group| group.iter().filter_map(peak).collect()).collect();
+        let peaks: Vec<Vec<f64>> =
+            tasks.values().map(|group| group.iter().filter_map(peak).collect()).collect();
         self.deformation.bootstrap95 = stratified_bootstrap(&peaks);
     }
 }

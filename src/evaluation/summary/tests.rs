@@ -125,9 +125,14 @@ fn harm_and_stages_are_counted() {
     assert_eq!(s.scores.failed_stages, [(Stage::Lift, 1)].into());
     let old = SuiteSummary::from_records("suite", "expert", &[episode(0, 0, |_| ())]);
     assert_eq!((old.scores.others_ok_rate, old.scores.wrong_contact_rate), (None, None));
-    let many: Vec<_> = (0..20).map(|i| episode(i as usize % 2, i / 2, |r| r.verdict.goal = i % 4 != 0)).collect();
+    let many: Vec<_> =
+        (0..20).map(|i| episode(i as usize % 2, i / 2, |r| r.verdict.goal = i % 4 != 0)).collect();
     let s = SuiteSummary::from_records("suite", "expert", &many);
-    assert!(s.scores.tsr.bootstrap95.is_some_and(|[low, high]| low < 75.0 && 75.0 < high), "{:?}", s.scores.tsr);
+    assert!(
+        s.scores.tsr.bootstrap95.is_some_and(|[low, high]| low < 75.0 && 75.0 < high),
+        "{:?}",
+        s.scores.tsr
+    );
     assert!(s.by_task[0].scores.tsr.bootstrap95.is_none());
 }
 

@@ -23,7 +23,9 @@ fn rigid_suites_have_no_safety_and_privileged_policies_are_marked_in_every_table
     let [rigid, soft] = &all[0].rows[..] else { panic!("two rows") };
     assert_eq!((&rigid[5][..], &rigid[6][..]), ("N/A", "N/A"));
     assert_eq!((&soft[5][..], &soft[6][..]), ("100.0 [20.7, 100.0]", "0.0"));
-    assert_eq!(all[1].rows, [strings([
+    assert_eq!(
+        all[1].rows,
+        [strings([
             "suite",
             "expert (privileged)",
             "0.33",
@@ -36,7 +38,8 @@ fn rigid_suites_have_no_safety_and_privileged_policies_are_marked_in_every_table
             "–",
             "–",
             "–"
-        ])]);
+        ])]
+    );
 }
 
 #[test]
@@ -142,9 +145,16 @@ fn harm_and_stages_have_a_table() {
     (record.verdict.d_mean, record.verdict.time_over_tau_s) = (Some(0.2), Some(0.25));
     let runs = summarize_runs(vec![stored("a", "pi", vec![record])]);
     let table = stage_table(&runs).expect("recorded");
-    assert_eq!(table.rows[0][2..], strings(["0.0 [0.0, 79.3]", "0", "0.0 [0.0, 79.3]", "0", "0", "0", "1", "0", "0"]));
+    assert_eq!(
+        table.rows[0][2..],
+        strings(["0.0 [0.0, 79.3]", "0", "0.0 [0.0, 79.3]", "0", "0", "0", "1", "0", "0"])
+    );
     let deformation = deformation_table(&runs).expect("soft");
     assert_eq!(deformation.rows[0][8..], strings(["0.20", "–", "–", "0.25"]));
     assert_eq!(bootstrap_table(&runs), None, "one episode");
-    assert_eq!(stage_table(&summarize_runs(vec![stored("b", "pi", vec![sample_record()])])), None, "an earlier version");
+    assert_eq!(
+        stage_table(&summarize_runs(vec![stored("b", "pi", vec![sample_record()])])),
+        None,
+        "an earlier version"
+    );
 }
