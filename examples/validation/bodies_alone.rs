@@ -85,5 +85,6 @@ pub fn extremes(report: &mut Report) {
             1e-3,
         );
         report.claim("free flight: change of momentum", [flight.momentum_change], 1e-9);
+        report.claim("free flight: change of angular momentum", [flight.spin_change], 1e-6);
     }
 }

@@ -56,8 +56,8 @@ between two flat sharp pads of 22 × 22 mm, friction 1.2, 60 Hz, sleeping off: 0
 const MISSES: &str = "
 ## Misses
 
-- A free body that is thrown *strained* loses angular momentum while it rings down (last table above): the null space of the
-  step's tangent has the rotations of the rest shape, not those of the strained shape. Unstrained bodies conserve it exactly.
+- In contact, the step's tangent brakes the rotation of a strained body: its null space has the rotations of the rest shape.
+  The brake is zero at rest. Bodies in flight conserve angular momentum.
 - Converged truth: pads of 24 mm, and pads half a voxel off, are beyond 15 % at resolution 6 (16 % at most).
 - Resolutions 18 and 24 are compared by their small-strain stiffness only; their squeezes take minutes.
 - Speed (`softvt scripts/squeeze.lua --gap-mm 42`): 0.12 to 0.14 CPU s per simulated second (target 0.05);
@@ -74,7 +74,6 @@ const MISSES: &str = "
   only then.
 - Tactile images have cast shadows only on request (14 to 46 ms per image). Images were not compared across machines; on one
   machine, the number of threads does not change a byte.
-- Deep squeezes of some pastries oscillate at a few cm/s with no element inverted, which ends their calibration sweep.
 ";
 
 fn main() {

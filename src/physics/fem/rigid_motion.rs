@@ -41,6 +41,39 @@ pub fn advance(body: &mut FemState, dt: f64) {
     body.x.iter().zip(&mut body.v).for_each(|(x, v)| *v += w.cross(&(x - end)));
 }
 
+/// Velocity field of a rigid body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RigidVelocity {
+    /// Centre of mass, m.
+    pub centre: Vec3,
+    /// Its velocity, m/s.
+    pub linear: Vec3,
+    /// Angular velocity, rad/s.
+    pub angular: Vec3,
+}
+
+impl RigidVelocity {
+    /// The rigid motion that has the same linear and angular momentum as node momenta `momenta` (N s) at the
+    /// positions of `body`.
+    pub fn with_momenta(body: &FemState, momenta: impl Iterator<Item = Vec3>) -> Self {
+        let centre = body.centre();
+        let (mut sum, mut spin, mut inertia) = (Vec3::zeros(), Vec3::zeros(), Mat3::zeros());
+        for ((x, m), p) in body.x.iter().zip(&body.model.mass).zip(momenta) {
+            let r = x - centre;
+            sum += p;
+            spin += r.cross(&p);
+            inertia += (Mat3::from_diagonal_element(r.norm_squared()) - r * r.transpose()) * *m;
+        }
+        let angular = inertia.try_inverse().map_or(Vec3::zeros(), |inverse| inverse * spin);
+        Self { centre, linear: sum / body.model.total_mass(), angular }
+    }
+
+    /// Velocity at the point `p` (m, world), m/s.
+    pub fn at(&self, p: &Vec3) -> Vec3 {
+        self.linear + self.angular.cross(&(p - self.centre))
+    }
+}
+
 /// Rotation of a body about a point.
 struct Spin {
     /// Angular momentum, kg m²/s.

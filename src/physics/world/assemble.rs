@@ -4,7 +4,7 @@
 use super::{Articulation, StepFailure, World};
 use crate::{
     contact::ColliderMotion,
-    fem::system::StepCoefficients,
+    fem::{rigid_motion::RigidVelocity, system::StepCoefficients},
     ids::{ArticulationId, BodyId, RigidId, SoftId},
     joints,
     rigid::{FreeSpin, free_spin},
@@ -24,6 +24,9 @@ const FIRM_RATE: f64 = 50.0;
 #[derive(Clone, Debug, Default)]
 pub(super) struct BlockMap {
     pub soft: Vec<Option<usize>>,
+    /// Rigid part of the motion of each soft body that is solved for its deviation from it; see
+    /// [`World::add_soft_blocks`].
+    pub rigid_parts: Vec<Option<RigidVelocity>>,
     pub rigid: Vec<Option<usize>>,
     pub articulations: Vec<Option<usize>>,
     /// Torque-free rotation of each rigid body in this step.
@@ -99,6 +102,13 @@ impl World {
         Ok(())
     }
 
+    /// Adds the velocity system `A v = b` of each soft body.
+    ///
+    /// The tangent `K = Σ R K₀ Rᵀ` in `A` has the rotations of the *rest* shape as null directions. On the rotation of a
+    /// strained body it acts as a brake. So a body without contact is solved for its deviation `w = v − v_r` from the
+    /// rigid motion `v_r` with the momenta of `b`: `A w = b − (1 + α dt) M v_r`. What momenta `w` still has through `K`
+    /// are removed ([`World::integrate`]), so linear and angular momentum are exact for any strain and any age of the
+    /// factor. In contact, the brake is a force that the contacts balance, and that is zero at rest.
     fn add_soft_blocks(&mut self) -> Result<(), StepFailure> {
         let c = StepCoefficients {
             dt: self.params.dt,
@@ -106,9 +116,11 @@ impl World {
             rayleigh_stiffness: self.params.rayleigh_stiffness,
         };
         self.blocks.soft.clear();
+        self.blocks.rigid_parts.clear();
         for (index, soft) in self.soft.iter_mut().enumerate() {
             if soft.sleep.is_asleep {
                 self.blocks.soft.push(None);
+                self.blocks.rigid_parts.push(None);
                 continue;
             }
             let body = &soft.state;
@@ -121,6 +133,16 @@ impl World {
                 (0..body.x.len())
                     .map(|n| (body.v[n] + self.gravity * c.dt) * body.model.mass[n] + body.force[n] * c.dt),
             );
+            let is_free = !self.candidates.involves(SoftId::new(index));
+            let rigid_part = is_free.then(|| {
+                let damping = 1.0 + c.rayleigh_mass * c.dt;
+                let undamped = momentum.iter().map(|p| p / damping);
+                let rigid = RigidVelocity::with_momenta(body, undamped);
+                for ((p, x), m) in momentum.iter_mut().zip(&body.x).zip(&body.model.mass) {
+                    *p -= rigid.at(x) * (damping * m);
+                }
+                rigid
+            });
             let dim = 3 * soft.system.retained().len();
             let identity = (index as u64) << 40 | soft.system.retained_version();
             let matrix = soft.system.take_matrix();
@@ -128,8 +150,11 @@ impl World {
             let mut block = VelocityBlock { dim, matrix, rhs, v, identity, ..VelocityBlock::default() };
             soft.system.reduce(momentum, &mut block.rhs);
             for (i, &node) in soft.system.retained().iter().enumerate() {
-                block.v[3 * i..3 * i + 3].copy_from_slice(body.v[node as usize].as_slice());
+                let node = node as usize;
+                let v = body.v[node] - rigid_part.map_or(Vec3::zeros(), |rigid| rigid.at(&body.x[node]));
+                block.v[3 * i..3 * i + 3].copy_from_slice(v.as_slice());
             }
+            self.blocks.rigid_parts.push(rigid_part);
             self.blocks.soft.push(Some(self.problem.blocks.len()));
             self.problem.blocks.push(block);
         }

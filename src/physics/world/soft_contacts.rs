@@ -22,6 +22,13 @@ pub(super) struct Candidates {
     soft: Vec<SoftSoftCandidate>,
 }
 
+impl Candidates {
+    /// True if a soft body may touch anything in this step.
+    pub(super) fn involves(&self, id: SoftId) -> bool {
+        self.collider.iter().any(|c| c.soft == id) || self.soft.iter().any(|c| c.soft == id || c.other == id)
+    }
+}
+
 /// A sample of a soft body near a collider.
 #[derive(Clone, Copy, Debug)]
 struct SoftColliderCandidate {
