@@ -25,6 +25,7 @@ mod policy_servers;
 mod reports;
 mod script_timeouts;
 mod serve;
+mod shut_hand;
 mod support;
 mod tactile_forces;
 mod usage;

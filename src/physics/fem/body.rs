@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::{
+    densification::{self, Densification},
     element::{self, Stiffness},
     force::{self, Corners, elastic},
     rotation::polar,
@@ -74,7 +75,11 @@ pub struct FemModel {
     pub(super) stiffness: Vec<Stiffness>,
     pub(super) stiffness_of: Vec<u32>,
     pub(super) corners: Corners,
-    pub(super) mean: [Vec3; 8],
+    /// Mean shape gradients, parallel to `stiffness`.
+    pub(super) mean: Vec<[Vec3; 8]>,
+    /// Share of material, parallel to `stiffness`.
+    pub(super) share: Vec<f64>,
+    pub(super) densification: Densification,
     is_checked: Vec<bool>,
 }
 
@@ -146,7 +151,9 @@ impl FemModel {
             stiffness,
             stiffness_of,
             corners: std::array::from_fn(|c| hex8::corner(c) * h),
-            mean: element::mean_gradients(h),
+            mean: fills.iter().map(|fill| element::mean_gradients(h, fill)).collect(),
+            share: fills.iter().map(element::material_share).collect(),
+            densification: Densification::new(&material, h),
             mesh,
         })
     }
@@ -243,6 +250,9 @@ pub struct FemState {
     pub frame: Mat3,
     /// Stored elastic energy at `x`, J.
     pub elastic_energy: f64,
+    /// Largest curvature of the densification of each element at `x`.
+    pub(super) densification: Vec<f64>,
+    min_det_f: MinDetF,
 }
 
 impl FemState {
@@ -258,21 +268,34 @@ impl FemState {
             v: vec![Vec3::zeros(); nodes],
             force: vec![Vec3::zeros(); nodes],
             elastic_energy: 0.0,
+            densification: vec![0.0; model.mesh.elements.len()],
+            min_det_f: MinDetF { det_f: 1.0, element: 0 },
             x,
             model,
         }
     }
 
-    /// Updates rotations, forces and energy for the current positions.
+    /// Updates rotations, forces, energy and volume ratios for the current positions.
     pub fn update_elastic(&mut self) {
         let rest = &*self.model;
         self.force.fill(Vec3::zeros());
         self.elastic_energy = 0.0;
+        self.min_det_f = MinDetF { det_f: f64::INFINITY, element: 0 };
         let mut mean = Mat3::zeros();
         for (e, nodes) in rest.mesh.elements.iter().enumerate() {
             let x: Corners = std::array::from_fn(|c| self.x[nodes[c] as usize]);
-            let k0 = &rest.stiffness[rest.stiffness_of[e] as usize];
-            let result = elastic(&x, &rest.corners, &rest.mean, k0, self.rotation[e]);
+            let kind = rest.stiffness_of[e] as usize;
+            let (k0, mean_gradients) = (&rest.stiffness[kind], &rest.mean[kind]);
+            let mut result = elastic(&x, &rest.corners, mean_gradients, k0, self.rotation[e]);
+            let det_f = force::min_det(&x, rest.mesh.edge);
+            if rest.is_checked[e] && det_f < self.min_det_f.det_f {
+                self.min_det_f = MinDetF { det_f, element: e };
+            }
+            self.densification[e] = if det_f < densification::ONSET {
+                rest.densification.add(&x, rest.share[kind], &mut result)
+            } else {
+                0.0
+            };
             self.rotation[e] = result.rotation;
             self.elastic_energy += result.energy;
             mean += result.rotation;
@@ -283,18 +306,9 @@ impl FemState {
         self.frame = polar(&(mean / rest.mesh.elements.len() as f64), self.frame);
     }
 
-    /// Smallest det F over the Gauss points of all elements that hold enough material.
+    /// Smallest det F at `x` over the Gauss points of all elements that hold enough material.
     pub fn min_det_f(&self) -> MinDetF {
-        let rest = &*self.model;
-        let mut min = MinDetF { det_f: f64::INFINITY, element: 0 };
-        for (e, nodes) in rest.mesh.elements.iter().enumerate().filter(|(e, _)| rest.is_checked[*e]) {
-            let x: Corners = std::array::from_fn(|c| self.x[nodes[c] as usize]);
-            let det = force::min_det(&x, rest.mesh.edge);
-            if det < min.det_f {
-                min = MinDetF { det_f: det, element: e };
-            }
-        }
-        min
+        self.min_det_f
     }
 
     /// Object frame of the body as if it were rigid, world: its mean rotation and mean node position.

@@ -18,7 +18,7 @@ pub struct Elastic {
 
 /// Force and energy of an element at world corner positions `x`.
 ///
-/// `rest` are the undeformed corners (m), `g` the mean shape gradients (1/m), `k0` the rest stiffness (N/m,
+/// `rest` are the undeformed corners (m), `g` mean shape gradients (1/m, with any weights), `k0` the rest stiffness (N/m,
 /// column-major 24×24), and `last` is an estimate of the rotation. The force is `f_a = −R (p_a − q × g_a)` with `p =
 /// K₀ (y − X)`, `m = Σ y_a × p_a`, `S = Rᵀ F`, `q = (tr S I − S)⁻¹ m`: the second term is due to the change of the
 /// rotation itself. Without it the force is not the derivative of the energy and has a spurious moment.
@@ -85,9 +85,14 @@ pub fn min_det(x: &Corners, h: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fem::element::{gauss_points, mean_gradients, stiffness};
+    use crate::fem::element::{
+        gauss_points, lame_lambda, material_share, mean_gradients, shear_modulus, stiffness,
+    };
     use proptest::prelude::*;
-    use softvt_geometry::{Quat, hex8, voxel::OccupancyMask};
+    use softvt_geometry::{
+        Quat, hex8,
+        voxel::{OccupancyMask, SUBCELLS},
+    };
 
     const H: f64 = 0.01;
 
@@ -95,8 +100,23 @@ mod tests {
         std::array::from_fn(|a| hex8::corner(a) * H)
     }
 
-    fn evaluate(x: &Corners, last: Mat3) -> Elastic {
-        elastic(x, &cube(), &mean_gradients(H), &stiffness(H, &OccupancyMask::full(), 3e4, 0.4), last)
+    /// Fills of a voxel: full, a half, a thin layer, one corner.
+    fn fills() -> [OccupancyMask; 4] {
+        let part = |keep: fn(usize) -> bool| {
+            let mut fill = OccupancyMask::default();
+            (0..SUBCELLS.pow(3)).filter(|&cell| keep(cell)).for_each(|cell| fill.insert(cell));
+            fill
+        };
+        [
+            OccupancyMask::full(),
+            part(|cell| cell % 6 < 3),
+            part(|cell| cell < 36),
+            part(|cell| cell % 6 < 2 && cell < 80),
+        ]
+    }
+
+    fn evaluate(x: &Corners, fill: &OccupancyMask, last: Mat3) -> Elastic {
+        elastic(x, &cube(), &mean_gradients(H, fill), &stiffness(H, fill, 3e4, 0.4), last)
     }
 
     fn bent(e: &[f64]) -> Corners {
@@ -110,9 +130,27 @@ mod tests {
         for angle in [0.0, 0.3, std::f64::consts::FRAC_PI_2, std::f64::consts::PI] {
             let turn = Quat::from_scaled_axis(Vec3::new(1.0, 2.0, -0.5).normalize() * angle);
             let x = cube().map(|x| turn * x + Vec3::new(3.0, -2.0, 1.0));
-            let e = evaluate(&x, Mat3::identity());
-            let scale = 3e4 * H * H;
-            assert!(e.force.iter().all(|f| f.norm() < 1e-11 * scale), "at {angle}");
+            for fill in fills() {
+                let e = evaluate(&x, &fill, Mat3::identity());
+                let scale = 3e4 * H * H;
+                assert!(e.force.iter().all(|f| f.norm() < 1e-11 * scale), "at {angle}");
+            }
+        }
+    }
+
+    #[test]
+    fn homogeneous_strain_stores_the_energy_of_the_filled_part_at_any_rotation() {
+        let (youngs, poisson) = (3e4, 0.4);
+        let (lambda, mu) = (lame_lambda(youngs, poisson), shear_modulus(youngs, poisson));
+        let stretch = Mat3::new(0.7, 0.1, 0.0, 0.1, 1.2, -0.05, 0.0, -0.05, 0.9);
+        let strain = stretch - Mat3::identity();
+        let density = mu * strain.norm_squared() + 0.5 * lambda * strain.trace().powi(2);
+        let turn = Quat::from_scaled_axis(Vec3::new(0.5, -0.8, 1.3));
+        for fill in fills() {
+            let e = evaluate(&cube().map(|x| turn * (stretch * x)), &fill, Mat3::identity());
+            let exact = material_share(&fill) * H.powi(3) * density;
+            assert!((e.energy / exact - 1.0).abs() < 1e-10, "{} against {exact}", e.energy);
+            assert!((e.rotation - turn.to_rotation_matrix().matrix()).norm() < 1e-10);
         }
     }
 
@@ -126,14 +164,16 @@ mod tests {
         }
 
         #[test]
-        fn force_is_the_derivative_of_energy_without_net_force_or_moment(e in prop::collection::vec(-0.2f64..0.2, 24)) {
-            let x = bent(&e);
-            let at = evaluate(&x, Mat3::identity());
+        fn force_is_the_derivative_of_energy_without_net_force_or_moment(
+            e in prop::collection::vec(-0.2f64..0.2, 24), kind in 0usize..4,
+        ) {
+            let (x, fill) = (bent(&e), fills()[kind]);
+            let at = evaluate(&x, &fill, Mat3::identity());
             let scale = at.force.iter().map(|f| f.norm()).fold(0.0, f64::max);
             let step = 1e-6 * H;
             for a in 0..8 {
                 for i in 0..3 {
-                    let moved = |s: f64| { let mut y = x; y[a][i] += s; evaluate(&y, at.rotation).energy };
+                    let moved = |s: f64| { let mut y = x; y[a][i] += s; evaluate(&y, &fill, at.rotation).energy };
                     // Fourth-order central difference: its own error is below 1e-8 of the scale.
                     let slope = (8.0 * (moved(step) - moved(-step)) - (moved(2.0 * step) - moved(-2.0 * step))) / (12.0 * step);
                     prop_assert!((at.force[a][i] + slope).abs() < 1e-7 * scale.max(1e-3), "{} vs {}", at.force[a][i], -slope);

@@ -2,7 +2,7 @@
 //!
 //! `K = Σ R K₀ Rᵀ` is assembled and factored in the body's co-rotating frame, so a body that is carried or rotates
 //! without changing shape keeps its factor. It is factored again when an element's rotation has changed by
-//! `STALE_ROTATION` relative to the body, or when a new node comes into contact. The frame itself follows the body in
+//! `STALE_ROTATION` relative to the body, when the densification of an element has changed, or when a new node comes into contact. The frame itself follows the body in
 //! steps of `STALE_FRAME`, so that the matrix of a body that is merely held is not even rotated. A slightly old
 //! tangent changes no equilibrium: the elastic force is always evaluated exactly, and `A` only affects the transient.
 
@@ -14,6 +14,10 @@ use softvt_geometry::{Mat3, Vec3};
 const STALE_ROTATION: f64 = 0.04;
 /// Change of the body's rotation (same norm) beyond which the reduced matrix is rotated again.
 const STALE_FRAME: f64 = 2e-3;
+/// Ratio by which the densification of an element may grow, and by which it may fall, before the matrix is factored again.
+const STALE_DENSIFICATION: [f64; 2] = [1.2, 0.6];
+/// Curvature of the densification that counts as none in this comparison.
+const SMALL_DENSIFICATION: f64 = 0.05;
 /// Steps for which a node stays retained after its last contact.
 const RETAIN_STEPS: u64 = 10;
 
@@ -36,6 +40,8 @@ pub struct VelocitySystem {
     factor: CholeskyFactor,
     /// Element rotations in that frame at the last factorization.
     factored: Vec<Mat3>,
+    /// Densification of the elements at the last factorization.
+    factored_densification: Vec<f64>,
     /// Rotation of the frame in which the matrix is factored.
     frame: Mat3,
     /// Schur complement in the world frame; empty while it is taken out or out of date.
@@ -130,7 +136,8 @@ impl Blocks {
         Self { places: places.collect(), neighbours, slot, diagonal, off, pairs }
     }
 
-    fn assemble(&mut self, rest: &FemModel, rotations: &[Mat3], c: &StepCoefficients) {
+    fn assemble(&mut self, body: &FemState, rotations: &[Mat3], c: &StepCoefficients) {
+        let rest = &*body.model;
         self.off.iter_mut().for_each(|b| *b = [0.0; 9]);
         for (block, m) in self.diagonal.iter_mut().zip(&rest.mass) {
             let m = (1.0 + c.rayleigh_mass * c.dt) * m;
@@ -138,9 +145,15 @@ impl Blocks {
         }
         let scale = c.dt * (c.dt + c.rayleigh_stiffness);
         for (e, (pairs, r)) in self.pairs.iter().zip(rotations).enumerate() {
-            let k0 = &rest.stiffness[rest.stiffness_of[e] as usize];
+            let kind = rest.stiffness_of[e] as usize;
+            let k0 = &rest.stiffness[kind];
+            let mut dense = [Mat3::zeros(); 36];
+            if body.densification[e] > 0.0 {
+                let x = std::array::from_fn(|c| body.x[rest.mesh.elements[e][c] as usize]);
+                rest.densification.add_tangent(&x, &body.rotation[e], rest.share[kind], &mut dense);
+            }
             for (at, (a, b)) in corner_pairs().enumerate() {
-                let local = Mat3::from_fn(|i, j| k0[(3 * b + j) * 24 + 3 * a + i]);
+                let local = Mat3::from_fn(|i, j| k0[(3 * b + j) * 24 + 3 * a + i]) + dense[at];
                 let turned = r * local * r.transpose() * scale;
                 let slot = pairs[at];
                 if a == b {
@@ -172,6 +185,7 @@ impl VelocitySystem {
             plan: None,
             factor: CholeskyFactor::default(),
             factored: Vec::new(),
+            factored_densification: Vec::new(),
             frame: Mat3::identity(),
             schur_w: Vec::new(),
             coefficients: None,
@@ -218,16 +232,22 @@ impl VelocitySystem {
         let to_frame = self.frame.transpose();
         let stale =
             |(r, old): (&Mat3, &Mat3)| (to_frame * r - old).norm_squared() > STALE_ROTATION * STALE_ROTATION;
+        let [growth, fall] = STALE_DENSIFICATION;
+        let has_changed = |(now, old): (&f64, &f64)| {
+            *now > growth * old + SMALL_DENSIFICATION || *now < fall * old - SMALL_DENSIFICATION
+        };
         let fresh = !new_plan
             && self.coefficients == Some(*c)
-            && !body.rotation.iter().zip(&self.factored).any(stale);
+            && !body.rotation.iter().zip(&self.factored).any(stale)
+            && !body.densification.iter().zip(&self.factored_densification).any(has_changed);
         if fresh {
             return true;
         }
         self.schur_w.clear();
         self.factored.clear();
         self.factored.extend(body.rotation.iter().map(|r| to_frame * r));
-        self.blocks.assemble(&body.model, &self.factored, c);
+        self.factored_densification.clone_from(&body.densification);
+        self.blocks.assemble(body, &self.factored, c);
         self.coefficients = Some(*c);
         self.factorizations += 1;
         let Some(plan) = &self.plan else { return false };

@@ -4,7 +4,7 @@ Energy of an element, with nodes x_a, rest nodes X_a, stiffness K0 and R = polar
 
     U = 1/2 (y - X)^T K0 (y - X),   y_a = R^T x_a,   F = sum_a x_a g_a^T,
 
-g_a being the mean of the shape gradients over the whole cube. As R depends on x, the force is
+g_a being the mean of the shape gradients over the points that integrate K0, with their volumes. As R depends on x, the force is
 -dU/dx_a = -R (p_a - q x g_a) with p = K0 (y - X), S = R^T F, m = sum_a y_a x p_a, q = (tr S I - S)^-1 m.
 
 B-bar: Hughes, The Finite Element Method, 2000, 4.5.2. Corotation: Mueller & Gross 2004; the term q follows from
@@ -36,9 +36,19 @@ def gradients(xi):
     return out
 
 
-def mean_gradient(edge):
-    """Shape gradients (8, 3) averaged over the whole cube of the given edge, 1/m."""
-    return gradients(GAUSS).mean(0) / edge
+GHOST = 0.05  # share of the full stiffness that a partly filled voxel has besides that of its filled points
+
+
+def mean_gradient(inside, edge):
+    """Shape gradients (8, 3) averaged over the material of a voxel of the given edge, 1/m.
+
+    `inside` are its filled sub-points (216 booleans). A partly filled voxel has GHOST of a full one besides.
+    """
+    whole = gradients(GAUSS).mean(0)
+    if inside.all():
+        return whole / edge
+    filled, share = gradients(SUBPOINTS[inside]).mean(0), inside.mean()
+    return (share * filled + GHOST * whole) / (share + GHOST) / edge
 
 
 def bbar_stiffness(points, volumes, edge, youngs, poisson):
@@ -76,7 +86,7 @@ def filled_stiffness(inside, edge, youngs, poisson):
     if inside.all():
         return full
     part = bbar_stiffness(SUBPOINTS[inside], np.full(inside.sum(), (edge / SUB) ** 3), edge, youngs, poisson)
-    return part + 0.01 * full
+    return part + GHOST * full
 
 
 def cross_matrix(v):
@@ -95,15 +105,18 @@ def polar(f):
 
 
 class Corotated:
-    """A batch of n elements with rest corners `rest` (n, 8, 3) and stiffness `k0` (n, 24, 24) or (24, 24)."""
+    """A batch of n elements with rest corners `rest` (n, 8, 3), stiffness `k0` (n, 24, 24) or (24, 24) and mean
+    gradients `g` (n, 8, 3); without `g`, those of full voxels.
+    """
 
-    def __init__(self, rest, edge, k0):
-        self.rest, self.k0, self.g = rest, k0, mean_gradient(edge)
+    def __init__(self, rest, edge, k0, g=None):
+        full = mean_gradient(np.ones(len(SUBPOINTS), bool), edge)
+        self.rest, self.k0, self.g = rest, k0, np.broadcast_to(full, (len(rest), 8, 3)) if g is None else g
         self.gauss = gradients(GAUSS) / edge
 
     def state(self, x):
         """Energy per element and the pieces that force and tangent share."""
-        f = np.einsum("nai,aj->nij", x, self.g)
+        f = np.einsum("nai,naj->nij", x, self.g)
         r = polar(f)
         y = x @ r
         d = (y - self.rest).reshape(-1, 24, 1)
@@ -118,7 +131,7 @@ class Corotated:
 
     def gradient(self, st, projection=True):
         """dU/dx (n, 8, 3), minus the nodal forces. Without `projection` the term q is left out."""
-        t = st["p"] - np.cross(st["q"][:, None], self.g[None]) if projection else st["p"]
+        t = st["p"] - np.cross(st["q"][:, None], self.g) if projection else st["p"]
         return np.einsum("nij,naj->nai", st["r"], t)
 
     def warped_tangent(self, st):
@@ -130,24 +143,24 @@ class Corotated:
         n, g = len(st["r"]), self.g
         y, p, q, s, inv = st["y"], st["p"], st["q"], st["s"], st["inv"]
         gx = cross_matrix(g)                                      # d -> g_a x d_a
-        w = inv @ np.concatenate(gx, axis=1)[None]                # spin of R per nodal motion
+        w = inv @ gx.transpose(0, 2, 1, 3).reshape(n, 3, 24)       # spin of R per nodal motion
         jy = np.eye(24) + cross_matrix(y).reshape(n, 24, 3) @ w
         jp = self.k0 @ jy
         yc, pc = cross_matrix(y), cross_matrix(p)
         jm = np.einsum("naij,najk->nik", yc, jp.reshape(n, 8, 3, 24)) - np.einsum(
             "naij,najk->nik", pc, jy.reshape(n, 8, 3, 24))
         # dS = D - [w]S with D = sum d_a g_a^T; dA q = tr(dS) q - dS q
-        gq = np.einsum("aj,nj->na", g, q)
+        gq = np.einsum("naj,nj->na", g, q)
         dq = np.zeros((n, 3, 24))
         for a in range(8):
             dq[:, :, 3 * a:3 * a + 3] = gq[:, a, None, None] * np.eye(3)
         sq = np.einsum("nij,nj->ni", s, q)
         dsq = dq + cross_matrix(sq) @ w                           # -[w] S q = [Sq] w
-        trace = g.reshape(24)[None]                               # tr([w]S) = 0 for symmetric S
+        trace = g.reshape(n, 24)                                  # tr([w]S) = 0 for symmetric S
         jaq = q[:, :, None] * trace[:, None, :] - dsq
         jq = inv @ (jm - jaq)
-        t = p - np.cross(q[:, None], g[None])
-        jt = jp + np.einsum("aij,njk->naik", gx, jq).reshape(n, 24, 24)
+        t = p - np.cross(q[:, None], g)
+        jt = jp + np.einsum("naij,njk->naik", gx, jq).reshape(n, 24, 24)
         jt = jt - cross_matrix(t).reshape(n, 24, 3) @ w
         jt = 0.5 * (jt + np.swapaxes(jt, 1, 2))
         return self._rotate(jt, st["r"])

@@ -4,7 +4,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
 from . import contact, symmetry
-from .element import Corotated, filled_stiffness
+from .element import Corotated, filled_stiffness, mean_gradient
 
 TOLERANCE = 1e-9
 GRAVITY = 9.81
@@ -29,7 +29,9 @@ class Elastic:
         self.reps, self.share = symmetry.orbits(centres, mirrors or {})
         self.corners = mesh.elements[self.reps]
         table = np.array([filled_stiffness(p, mesh.edge, youngs, poisson) for p in mesh.patterns])
-        self.batch = Corotated(mesh.nodes[self.corners], mesh.edge, table[mesh.pattern_of[self.reps]])
+        means = np.array([mean_gradient(p, mesh.edge) for p in mesh.patterns])
+        kinds = mesh.pattern_of[self.reps]
+        self.batch = Corotated(mesh.nodes[self.corners], mesh.edge, table[kinds], means[kinds])
         dof = (3 * self.corners[:, :, None] + np.arange(3)).reshape(-1, 24)
         n = 3 * len(mesh.nodes)
         one = sp.csr_matrix((np.ones(dof.size), (np.arange(dof.size), dof.ravel())), (dof.size, n))

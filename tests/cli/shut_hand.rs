@@ -1,0 +1,51 @@
+//! Standard soft objects in a shut hand: crushed, but upright and at rest.
+
+use crate::support::Project;
+
+/// Grasps an object as the expert does, closes the hand to `closure` at once, and waits half a second. Returns the
+/// fastest node of the 0.2 s that follow.
+const SHUT: &str = r#"local grasp = require "experts.grasp"
+local function held(name)
+  return softvt.layout("held", function(scene)
+    scene:add { name = "table", asset = require "assets.table", position = { 0, 0, 0 } }
+    scene:add { name = "object", asset = require("assets." .. name), at = { -0.05, 0 } }
+  end)
+end
+local layouts = { braided_roll = held "braided_roll", steamed_bun = held "steamed_bun", wedge = held "wedge" }
+return softvt.experiment {
+  name = "shut",
+  points = {
+    { asset = "braided_roll", closure = 0.95 }, { asset = "steamed_bun", closure = 1.0 }, { asset = "wedge", closure = 1.0 },
+  },
+  run = function(point)
+    local sim = softvt.simulate { layout = layouts[point.asset] }
+    assert(sim:drive(function(arm, scene)
+      local object = scene:object "object"
+      arm:move_to(grasp.pose(object, grasp.height(object)), { speed = 0.6, angular_speed = 3 })
+      arm:grasp(point.closure, { rate = 0.6 })
+      arm:wait(0.5)
+    end))
+    local row = { asset = point.asset, mm_s = 0, det_f = 1, force_n = 0 }
+    for _ = 1, 4 do
+      assert(sim:wait(0.05))
+      local seen = sim:measure "object"
+      row.mm_s = math.max(row.mm_s, 1e3 * seen.speed)
+      row.det_f = math.min(row.det_f, seen.min_det_f)
+      row.force_n = math.min(table.unpack(seen.pad_force))
+    end
+    return row
+  end,
+}
+"#;
+
+#[test]
+fn no_standard_object_chatters_or_is_turned_inside_out_in_a_shut_hand() {
+    let output = Project::new(&[("shut.lua", SHUT)]).succeeds("shut.lua --json");
+    let rows: Vec<serde_json::Value> =
+        output.out.lines().map(|line| serde_json::from_str(line).expect("a row")).collect();
+    assert_eq!(rows.len(), 3);
+    for row in rows {
+        let number = |key: &str| row[key].as_f64().unwrap_or_else(|| panic!("{key} in {row}"));
+        assert!(number("mm_s") < 5.0 && number("det_f") > 0.1 && number("force_n") > 10.0, "{row}");
+    }
+}
