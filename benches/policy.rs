@@ -24,7 +24,7 @@ use softvt::{
     },
     rollout::{AssetCache, ChunkedPolicy, Episode, SensorAssets},
 };
-use tungstenite::{Message, accept};
+use tungstenite::{Bytes, Message, WebSocket, accept};
 
 /// Largest latency beyond the server's own time, ms.
 const GOAL_MS: f64 = 2.0;
@@ -54,7 +54,7 @@ fn answer(stream: TcpStream, delay: Duration, answers: &Answers, model: &Mutex<(
     stream.set_nodelay(true).expect("a socket");
     let Ok(mut socket) = accept(stream) else { return };
     let _ = socket.send(packed(&Value::Map(Vec::new())));
-    while let Ok(Message::Binary(bytes)) = socket.read() {
+    while let Some(bytes) = observation(&mut socket) {
         let turn = model.lock().expect("the model");
         let begun = Instant::now();
         let seen = rmpv::decode::read_value(&mut &bytes[..]).expect("msgpack");
@@ -64,6 +64,17 @@ fn answer(stream: TcpStream, delay: Duration, answers: &Answers, model: &Mutex<(
         drop(turn);
         if socket.send(message).is_err() {
             return;
+        }
+    }
+}
+
+/// The next observation. The socket answers pings by itself.
+fn observation(socket: &mut WebSocket<TcpStream>) -> Option<Bytes> {
+    loop {
+        match socket.read() {
+            Ok(Message::Binary(bytes)) => return Some(bytes),
+            Ok(Message::Ping(_) | Message::Pong(_)) => {}
+            _ => return None,
         }
     }
 }

@@ -25,11 +25,15 @@ class SoftVTEnv(gymnasium.Env):
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 20}
 
-    def __init__(self, url="ws://127.0.0.1:8765", render_mode=None, camera=None):
-        """`camera` selects the image of `render`: a camera's name (default: the scene's first), or "left" or "right" for a finger."""
+    def __init__(self, url="ws://127.0.0.1:8765", render_mode=None, camera=None, token=None):
+        """`camera` selects the image of `render`: a camera's name (default: the scene's first), or "left" or "right" for a finger.
+
+        `token` is that of a server with `--token`.
+        """
         self.url, self.render_mode, self.camera = url, render_mode, camera
         self._server = None
-        self._socket = create_connection(url)
+        headers = {"Authorization": f"Bearer {token}"} if token else {}
+        self._socket = create_connection(url, header=headers)
         self.about = self._receive()
         self.observation_space = spaces.Dict(
             {key: _space(entry) for key, entry in self.about["observation_space"].items()}

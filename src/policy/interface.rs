@@ -189,5 +189,10 @@ pub trait Policy: Send {
     /// See [`PolicyError`].
     fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError>;
     /// Ends the episode. The result of the episode is not disclosed.
-    fn finish(&mut self) {}
+    ///
+    /// # Errors
+    /// The policy finds that its earlier commands are not valid; the episode is then not recorded.
+    fn finish(&mut self) -> Result<(), PolicyError> {
+        Ok(())
+    }
 }

@@ -57,6 +57,9 @@ pub fn kind(value: &Value) -> &'static str {
 
 /// Deepest nesting that is read.
 const MAX_DEPTH: usize = 64;
+/// Maximum number of values in a message, and of elements in an array. A decoded value takes 40 bytes, an encoded one
+/// can take a single byte. The longest valid messages, states of 50,000 actions, have 350,000 numbers.
+const MAX_VALUES: usize = 1 << 20;
 
 /// A message is not one msgpack value. The text completes "the message is …".
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -68,6 +71,8 @@ pub enum MsgpackError {
     TooDeep,
     #[error("not msgpack: the end is missing")]
     Truncated,
+    #[error("too long: more than {MAX_VALUES} values")]
+    TooManyValues,
 }
 
 /// A value is not an array of numbers. The text says what it is instead.
@@ -88,6 +93,8 @@ pub enum ArrayError {
     Shape,
     #[error("an array of dtype {0:?}")]
     Dtype(String),
+    #[error("an array with more than {MAX_VALUES} elements")]
+    TooManyElements,
     #[error("an array of shape {shape:?} and dtype {dtype:?} with {bytes} bytes")]
     Size { shape: Vec<usize>, dtype: String, bytes: usize },
 }
@@ -114,17 +121,85 @@ pub fn pack(value: &Value) -> Vec<u8> {
     bytes
 }
 
-/// Decodes a message, which must be exactly one value.
+/// Decodes a message, which must be exactly one value. The values are counted before memory is allocated for them.
 ///
 /// # Errors
-/// The bytes are not one valid value.
+/// The bytes are not one valid value, or hold too many values.
 pub fn unpack(mut bytes: &[u8]) -> Result<Value, MsgpackError> {
     use rmpv::decode::{Error, read_value_with_max_depth};
+    count_values(bytes)?;
     match read_value_with_max_depth(&mut bytes, MAX_DEPTH) {
         Ok(value) if bytes.is_empty() => Ok(value),
         Ok(_) => Err(MsgpackError::TrailingBytes(bytes.len())),
         Err(Error::DepthLimitExceeded) => Err(MsgpackError::TooDeep),
         Err(Error::InvalidMarkerRead(_) | Error::InvalidDataRead(_)) => Err(MsgpackError::Truncated),
+    }
+}
+
+/// Counts the values of the first value in `bytes`, its own and those that it contains.
+///
+/// # Errors
+/// The value is cut off, or has more than [`MAX_VALUES`].
+fn count_values(mut bytes: &[u8]) -> Result<usize, MsgpackError> {
+    let (mut counted, mut pending) = (0, 1);
+    while pending > 0 {
+        let header = ValueHeader::read(&mut bytes).ok_or(MsgpackError::Truncated)?;
+        bytes = bytes.get(header.data_bytes..).ok_or(MsgpackError::Truncated)?;
+        (counted, pending) = (counted + 1, pending - 1 + header.children);
+        // Every value takes at least one byte, so that a false length is found before its values are counted.
+        if pending > bytes.len() {
+            return Err(MsgpackError::Truncated);
+        }
+        if counted + pending > MAX_VALUES {
+            return Err(MsgpackError::TooManyValues);
+        }
+    }
+    Ok(counted)
+}
+
+/// What follows the first bytes of an encoded value: data of its own, and other values.
+struct ValueHeader {
+    data_bytes: usize,
+    children: usize,
+}
+
+impl ValueHeader {
+    /// Reads the marker and the length of a value. `None` at the end of the bytes.
+    fn read(bytes: &mut &[u8]) -> Option<Self> {
+        let (&marker, rest) = bytes.split_first()?;
+        *bytes = rest;
+        let mut length = |size: usize| {
+            let (number, rest) = bytes.split_at_checked(size)?;
+            *bytes = rest;
+            Some(number.iter().fold(0_usize, |all, byte| all << 8 | usize::from(*byte)))
+        };
+        let data = |data_bytes| Some(Self { data_bytes, children: 0 });
+        let children = |children| Some(Self { data_bytes: 0, children });
+        let low = |mask: u8| usize::from(marker & mask);
+        match marker {
+            // Integers below 128 and from −32, nil, booleans, and the marker that msgpack leaves unused.
+            0x00..=0x7F | 0xE0..=0xFF | 0xC0..=0xC3 => data(0),
+            0x80..=0x8F => children(2 * low(0x0F)),
+            0x90..=0x9F => children(low(0x0F)),
+            0xA0..=0xBF => data(low(0x1F)),
+            0xC4 | 0xD9 => data(length(1)?),
+            0xC5 | 0xDA => data(length(2)?),
+            0xC6 | 0xDB => data(length(4)?),
+            // Extensions have a byte with their type.
+            0xC7 => data(length(1)? + 1),
+            0xC8 => data(length(2)? + 1),
+            0xC9 => data(length(4)? + 1),
+            // Floats and integers of 4, 8 or 1, 2, 4, 8 bytes; extensions of 1 to 16.
+            0xCA => data(4),
+            0xCB => data(8),
+            0xCC..=0xCF => data(1 << (marker - 0xCC)),
+            0xD0..=0xD3 => data(1 << (marker - 0xD0)),
+            0xD4..=0xD8 => data((1 << (marker - 0xD4)) + 1),
+            0xDC => children(length(2)?),
+            0xDD => children(length(4)?),
+            0xDE => children(2 * length(2)?),
+            0xDF => children(2 * length(4)?),
+        }
     }
 }
 
@@ -179,6 +254,9 @@ fn ndarray(value: &Value) -> Result<NumberArray, ArrayError> {
     if count.and_then(|count| count.checked_mul(size)) != Some(data.len()) {
         return Err(ArrayError::Size { shape, dtype: dtype.to_owned(), bytes: data.len() });
     }
+    if count.is_some_and(|count| count > MAX_VALUES) {
+        return Err(ArrayError::TooManyElements);
+    }
     let array = NpyArray { dtype: dtype.to_owned(), shape, data: data.to_vec() };
     let values = array.values();
     Ok(NumberArray { shape: array.shape, values })
@@ -225,6 +303,39 @@ mod tests {
         assert!(of("<c8", &[0; 8]).is_err_and(|e| e.to_string().contains("dtype \"<c8\"")));
         assert!(of("<f4", &[0; 5]).is_err_and(|e| e.to_string().contains("5 bytes")));
         assert!(of("é", &[0; 5]).is_err());
+    }
+
+    #[test]
+    fn values_are_counted_in_every_encoding() {
+        let nested = Value::Array(vec![
+            map([("a", Value::from(-3)), ("b", Value::from(300)), ("c", Value::F64(0.5))]),
+            Value::Array(vec![Value::F32(1.0); 20]),
+            Value::Binary(vec![0xDD; 300]),
+            Value::from("é".repeat(70_000)),
+            Value::Ext(7, vec![0xFF; 16]),
+            Value::Ext(7, vec![0xFF; 1000]),
+            Value::from(u64::MAX),
+            Value::from(i64::MIN),
+            Value::Nil,
+            Value::Array(vec![Value::from(1_u16 << 12); 70_000]),
+        ]);
+        let bytes = pack(&nested);
+        assert_eq!(count_values(&bytes), Ok(1 + 7 + 21 + 7 + 70_001));
+        assert_eq!(unpack(&bytes), Ok(nested));
+        for cut in [1, 7, 400, bytes.len() - 1] {
+            assert_eq!(unpack(&bytes[..cut]), Err(MsgpackError::Truncated));
+        }
+    }
+
+    #[test]
+    fn a_message_of_many_small_values_is_refused_before_it_is_decoded() {
+        let count: u32 = 63 << 20;
+        let mut bytes = vec![0xDD];
+        bytes.extend(count.to_be_bytes());
+        bytes.resize(bytes.len() + count as usize, 0xC0);
+        assert_eq!(unpack(&bytes), Err(MsgpackError::TooManyValues));
+        let array = NpyArray { dtype: "|u1".to_owned(), shape: vec![2 << 20], data: vec![0; 2 << 20] };
+        assert_eq!(numbers(&pack_array(array, true)), Err(ArrayError::TooManyElements));
     }
 
     #[test]

@@ -1,13 +1,13 @@
 //! Websocket messages over connections with short time slices, for both sides.
 //!
-//! Reads and writes of the underlying stream time out after [`POLL_INTERVAL`], so that every wait can
-//! check a deadline or a cancellation. The functions here repeat an interrupted operation as long as the
+//! An operation on a [`PollingStream`] is interrupted after [`POLL_INTERVAL`], also while bytes arrive, so that every
+//! wait can check a deadline or a cancellation. The functions here repeat an interrupted operation as long as the
 //! caller's `on_wait` returns `Ok`.
 
 use std::{
-    io::{self, ErrorKind},
+    io::{self, ErrorKind, Read, Write},
     net::TcpStream,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use rmpv::Value;
@@ -17,7 +17,7 @@ use tungstenite::{
 
 use super::msgpack::pack;
 
-/// Longest time that a read or write blocks.
+/// Longest time between two interruptions of a read or write.
 pub const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Failure of an operation: that of the websocket, or the reason of the caller to wait no longer.
@@ -29,14 +29,70 @@ pub enum TransportError<E> {
     Aborted(E),
 }
 
-/// Sets the timeouts of a stream and sends small packets at once.
+/// A TCP stream whose operations fail with [`ErrorKind::WouldBlock`] at least once per [`POLL_INTERVAL`].
 ///
-/// # Errors
-/// The operating system refuses.
-pub fn configure(stream: &TcpStream) -> io::Result<()> {
-    stream.set_nodelay(true)?;
-    stream.set_read_timeout(Some(POLL_INTERVAL))?;
-    stream.set_write_timeout(Some(POLL_INTERVAL))
+/// The timeouts of the operating system interrupt only operations that make no progress. A peer that sends a byte now
+/// and then would keep a websocket in its loop of reads until a message is complete.
+#[derive(Debug)]
+pub struct PollingStream {
+    stream: TcpStream,
+    /// Time of the last interruption; `None` if the stream never waits.
+    interrupted: Option<Instant>,
+}
+
+impl PollingStream {
+    /// Sets the timeouts of a stream and sends small packets at once.
+    ///
+    /// # Errors
+    /// The operating system refuses.
+    pub fn new(stream: TcpStream) -> io::Result<Self> {
+        stream.set_nodelay(true)?;
+        stream.set_read_timeout(Some(POLL_INTERVAL))?;
+        stream.set_write_timeout(Some(POLL_INTERVAL))?;
+        Ok(Self { stream, interrupted: Some(Instant::now()) })
+    }
+
+    /// Makes operations fail with [`ErrorKind::WouldBlock`] where they would wait and not otherwise, or wait again.
+    ///
+    /// # Errors
+    /// The operating system refuses.
+    pub fn set_nonblocking(&mut self, nonblocking: bool) -> io::Result<()> {
+        self.interrupted = (!nonblocking).then(Instant::now);
+        self.stream.set_nonblocking(nonblocking)
+    }
+
+    /// The stream.
+    pub fn tcp(&self) -> &TcpStream {
+        &self.stream
+    }
+
+    fn interrupt(&mut self) -> io::Result<()> {
+        match &mut self.interrupted {
+            Some(last) if last.elapsed() >= POLL_INTERVAL => {
+                *last = Instant::now();
+                Err(ErrorKind::WouldBlock.into())
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Read for PollingStream {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.interrupt()?;
+        self.stream.read(buffer)
+    }
+}
+
+impl Write for PollingStream {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.interrupt()?;
+        self.stream.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.stream.flush()
+    }
 }
 
 /// Configuration of a websocket that accepts messages of up to so many bytes.
@@ -76,11 +132,23 @@ pub fn complete_handshake<R: HandshakeRole, E>(
 /// # Errors
 /// The connection fails, or `on_wait` does.
 pub fn send<E>(
-    socket: &mut WebSocket<TcpStream>,
+    socket: &mut WebSocket<PollingStream>,
     value: &Value,
+    on_wait: impl FnMut() -> Result<(), E>,
+) -> Result<(), TransportError<E>> {
+    send_frame(socket, Message::binary(pack(value)), on_wait)
+}
+
+/// Sends a message of any kind.
+///
+/// # Errors
+/// The connection fails, or `on_wait` does.
+pub fn send_frame<E>(
+    socket: &mut WebSocket<PollingStream>,
+    message: Message,
     mut on_wait: impl FnMut() -> Result<(), E>,
 ) -> Result<(), TransportError<E>> {
-    let mut sent = socket.send(Message::binary(pack(value)));
+    let mut sent = socket.send(message);
     while let Err(Error::Io(error)) = &sent
         && is_wait(error)
     {
@@ -95,8 +163,8 @@ pub fn send<E>(
 /// # Errors
 /// The connection fails, or `on_wait` does.
 pub fn receive<E>(
-    socket: &mut WebSocket<TcpStream>,
-    mut on_wait: impl FnMut(&mut WebSocket<TcpStream>) -> Result<(), E>,
+    socket: &mut WebSocket<PollingStream>,
+    mut on_wait: impl FnMut(&mut WebSocket<PollingStream>) -> Result<(), E>,
 ) -> Result<Message, TransportError<E>> {
     loop {
         match socket.read() {

@@ -33,7 +33,12 @@ pub trait Controller {
     /// [`PolicyError::Action`] ends the episode with the outcome `error`; any other error ends the run.
     fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, PolicyError>;
     /// Called once after the last control step.
-    fn finish(&mut self) {}
+    ///
+    /// # Errors
+    /// The earlier actions are not valid; the error ends the run.
+    fn finish(&mut self) -> Result<(), PolicyError> {
+        Ok(())
+    }
 }
 
 /// A policy together with the execution of its chunks, one command per control step. Its observations have sensor
@@ -83,7 +88,7 @@ impl Controller for ChunkedPolicy<'_> {
         Ok(Some(self.resolver.resolve(observation, command)))
     }
 
-    fn finish(&mut self) {
-        self.policy.finish();
+    fn finish(&mut self) -> Result<(), PolicyError> {
+        self.policy.finish()
     }
 }

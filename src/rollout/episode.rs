@@ -39,7 +39,7 @@ use softvt_robot::{
     ik::{LINEARISATION_RANGE, PoseDifference},
     rotation,
 };
-use softvt_scene::{Asset, Body, Scene};
+use softvt_scene::{Asset, Body, Camera, Scene};
 
 /// Specification of an episode: task, scene and parameters. The controller
 /// is passed to [`Episode::run`](super::Episode::run).
@@ -334,7 +334,7 @@ impl Episode {
             }
             self.step(&action);
         }
-        controller.finish();
+        controller.finish().map_err(|source| self.control_error(source))?;
         Ok(self.finish(controller.gave_up().map(str::to_owned)))
     }
 
@@ -417,10 +417,19 @@ impl Episode {
         width: Option<usize>,
         height: Option<usize>,
     ) -> Result<RgbImage, SensingError> {
-        let mut camera = self.sensors.camera(camera)?.clone();
-        camera.width = width.unwrap_or(camera.width);
-        camera.height = height.unwrap_or(camera.height);
-        Ok(self.sensors.render(&SensorSuite::frame(&self.sim), &camera)?.into_rgb_image())
+        let own = self.sensors.camera(camera)?.clone();
+        let camera = Camera {
+            width: width.unwrap_or(own.width),
+            height: height.unwrap_or(own.height),
+            ..own.clone()
+        };
+        let frame = SensorSuite::frame(&self.sim);
+        let image = if camera == own {
+            self.sensors.render(&frame, &camera)?
+        } else {
+            self.sensors.render_once(&frame, &camera)?
+        };
+        Ok(image.into_rgb_image())
     }
 
     /// Renders the current tactile image of a finger. It does not change the record.

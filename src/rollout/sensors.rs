@@ -142,6 +142,21 @@ impl SensorSuite {
         image.map_err(|error| SensingError::from(error).set_by(camera))
     }
 
+    /// As [`render`](Self::render), for a camera that is used once: nothing is kept for its next image.
+    ///
+    /// # Errors
+    /// As [`render`](Self::render).
+    pub fn render_once(
+        &mut self,
+        frame: &WorldSnapshot,
+        camera: &Camera,
+    ) -> Result<RenderedImage, SensingError> {
+        let kept = std::mem::replace(&mut self.renderer, Renderer::transient());
+        let image = self.render(frame, camera);
+        self.renderer = kept;
+        image
+    }
+
     /// The meshes and the light that [`render`](Self::render) uses, built on first use.
     ///
     /// # Errors

@@ -1,5 +1,6 @@
 //! The suites and settings of a server.
 
+use super::access::AccessRules;
 use softvt_benchmark::Suite;
 use softvt_evaluation::episode_id::{EpisodeId, Split};
 use softvt_policy::{PolicyError, profile::Profile};
@@ -42,6 +43,8 @@ pub struct ServerConfig<'a> {
     pub split: Split,
     /// Hash of the scripts, shifts, settings and version. States of servers with another hash are refused.
     pub fingerprint: String,
+    /// Connections that are accepted.
+    pub access: AccessRules,
     /// Starts an episode.
     pub start_episode: StartEpisode<'a>,
 }

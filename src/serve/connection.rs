@@ -11,13 +11,14 @@ use rmpv::Value;
 use tungstenite::{
     Message, WebSocket, accept_hdr_with_config,
     handshake::server::{ErrorResponse, Request, Response},
-    http::StatusCode,
     protocol::{CloseFrame, frame::coding::CloseCode},
 };
 
+use super::access::Refusal;
+
 use softvt_policy::{
     msgpack::{MsgpackError, unpack},
-    transport::{self, TransportError, complete_handshake, is_wait, websocket_config},
+    transport::{self, PollingStream, TransportError, complete_handshake, is_wait, websocket_config},
 };
 
 /// Longest message that is accepted; a state of 50,000 actions has 2.7 MiB.
@@ -52,34 +53,35 @@ pub(super) struct Aborted;
 /// A connection to a client.
 #[derive(Debug)]
 pub(super) struct Connection<'a> {
-    socket: WebSocket<TcpStream>,
+    socket: WebSocket<PollingStream>,
     cancel: &'a AtomicBool,
 }
 
 impl<'a> Connection<'a> {
-    /// Accepts a websocket, unless `refusal` returns a reason: then the client receives HTTP status 503 with it.
+    /// Accepts a websocket, unless `check` refuses the request: then the client receives the HTTP status and the reason.
     ///
     /// # Errors
     /// The client does not complete the handshake, or is refused.
     pub(super) fn accept(
         stream: TcpStream,
         cancel: &'a AtomicBool,
-        refusal: impl FnOnce() -> Option<String>,
+        check: impl FnOnce(&Request) -> Result<(), Refusal>,
     ) -> Result<Self, TransportError<Aborted>> {
         // The type of the error is tungstenite's.
         #[allow(clippy::result_large_err)]
-        let callback = |_: &Request, response: Response| match refusal() {
-            None => Ok(response),
-            Some(reason) => {
+        let callback = |request: &Request, response: Response| match check(request) {
+            Ok(()) => Ok(response),
+            Err(Refusal { status, reason }) => {
                 let mut refused = ErrorResponse::new(Some(reason));
-                *refused.status_mut() = StatusCode::SERVICE_UNAVAILABLE;
+                *refused.status_mut() = status;
                 Err(refused)
             }
         };
+        let stream = PollingStream::new(stream).map_err(|error| TransportError::Socket(error.into()))?;
         let deadline = Instant::now() + HANDSHAKE_TIMEOUT;
         let config = websocket_config(MAX_MESSAGE_BYTES);
         let handshake = accept_hdr_with_config(stream, callback, Some(config));
-        let socket = complete_handshake(handshake, || check(cancel, deadline))?;
+        let socket = complete_handshake(handshake, || may_go_on(cancel, deadline))?;
         Ok(Self { socket, cancel })
     }
 
@@ -122,7 +124,7 @@ impl<'a> Connection<'a> {
     /// The connection failed, or the client does not accept the message in time.
     pub(super) fn send(&mut self, value: &Value) -> Result<(), TransportError<Aborted>> {
         let deadline = Instant::now() + WRITE_TIMEOUT;
-        transport::send(&mut self.socket, value, || check(self.cancel, deadline))
+        transport::send(&mut self.socket, value, || may_go_on(self.cancel, deadline))
     }
 
     /// Closes the connection after the client has received the last message.
@@ -143,6 +145,6 @@ impl<'a> Connection<'a> {
     }
 }
 
-fn check(cancel: &AtomicBool, deadline: Instant) -> Result<(), Aborted> {
+fn may_go_on(cancel: &AtomicBool, deadline: Instant) -> Result<(), Aborted> {
     if cancel.load(Ordering::Relaxed) || Instant::now() > deadline { Err(Aborted) } else { Ok(()) }
 }

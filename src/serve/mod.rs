@@ -2,8 +2,10 @@
 //! is described in `docs/serve.md`.
 #![warn(unreachable_pub)]
 
+mod access;
 mod config;
 mod connection;
+mod render_budget;
 mod request;
 mod response;
 mod server;
@@ -11,6 +13,7 @@ mod session;
 mod spaces;
 mod state;
 
+pub use access::AccessRules;
 pub use config::{RequestError, ServerConfig};
 pub use response::hello;
 pub use server::{listen, serve};

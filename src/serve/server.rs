@@ -11,23 +11,30 @@ use std::{
 
 use rmpv::Value;
 
+use tungstenite::http::StatusCode;
+
 use super::{
+    access::Refusal,
     config::ServerConfig,
     connection::{Connection, HANDSHAKE_TIMEOUT, ReceiveError},
+    render_budget::RenderBudget,
     request::Request,
     response,
     session::ClientSession,
 };
-use softvt_policy::transport::{configure, is_wait};
+use softvt_policy::transport::{POLL_INTERVAL, is_wait};
 
 /// Accept-loop polling interval.
 const ACCEPT_POLL_INTERVAL: Duration = Duration::from_millis(10);
 /// Connections accepted above `max_clients` while the type of their request is still unknown.
-const BACKLOG: usize = 16;
+const BACKLOG: usize = 64;
 /// Beginning of a health check, and the response.
 const HEALTH_REQUEST: &[u8] = b"GET /healthz";
 const HEALTH_RESPONSE: &[u8] =
     b"HTTP/1.1 200 OK\r\nContent-Type: text/plain\r\nContent-Length: 3\r\nConnection: close\r\n\r\nOK\n";
+/// Response to connections above the limit, health checks included.
+const OVERLOAD_RESPONSE: &[u8] =
+    b"HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\nContent-Length: 21\r\nConnection: close\r\n\r\ntoo many connections\n";
 /// Time for which incoming data is discarded after a health check.
 const HEALTH_DRAIN_TIMEOUT: Duration = Duration::from_secs(1);
 
@@ -47,6 +54,7 @@ struct ServerState<'a> {
     hello: Value,
     max_clients: usize,
     clients: AtomicUsize,
+    render_budget: RenderBudget,
     cancel: &'a AtomicBool,
 }
 
@@ -58,7 +66,8 @@ pub fn serve(
     max_clients: usize,
     cancel: &AtomicBool,
 ) {
-    let state = ServerState { config, hello, max_clients, clients: AtomicUsize::new(0), cancel };
+    let (clients, render_budget) = (AtomicUsize::new(0), RenderBudget::default());
+    let state = ServerState { config, hello, max_clients, clients, render_budget, cancel };
     let connections = AtomicUsize::new(0);
     thread::scope(|scope| {
         while !cancel.load(Ordering::Relaxed) {
@@ -67,7 +76,10 @@ pub fn serve(
                 thread::sleep(ACCEPT_POLL_INTERVAL);
                 continue;
             };
-            let Some(slot) = SlotGuard::acquire(&connections, max_clients + BACKLOG) else { continue };
+            let Some(slot) = SlotGuard::acquire(&connections, max_clients + BACKLOG) else {
+                refuse_connection(stream);
+                continue;
+            };
             let state = &state;
             let handle = move || {
                 let _slot = slot;
@@ -80,13 +92,15 @@ pub fn serve(
 }
 
 /// One of a limited number of slots, released on drop.
+#[derive(Debug)]
 struct SlotGuard<'a>(&'a AtomicUsize);
 
 impl<'a> SlotGuard<'a> {
     fn acquire(count: &'a AtomicUsize, limit: usize) -> Option<Self> {
         let taken =
             count.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| (n < limit).then_some(n + 1));
-        taken.is_ok().then_some(Self(count))
+        // A guard that is only constructed and dropped would release a slot that was not taken.
+        taken.ok().map(|_| Self(count))
     }
 }
 
@@ -96,9 +110,19 @@ impl Drop for SlotGuard<'_> {
     }
 }
 
+/// Answers a connection above the limit without waiting.
+fn refuse_connection(mut stream: TcpStream) {
+    if stream.set_nonblocking(true).is_ok() {
+        let _ = stream.write(OVERLOAD_RESPONSE).and_then(|_| stream.shutdown(Shutdown::Write));
+        // Unread data would make the system discard the response.
+        let _ = stream.read(&mut [0; 1024]);
+    }
+}
+
 /// Handles a connection from its first byte to its end. Its failures affect no other connection.
 fn handle_connection(stream: TcpStream, state: &ServerState) {
-    if stream.set_nonblocking(false).and_then(|()| configure(&stream)).is_err() {
+    let wait = Some(POLL_INTERVAL);
+    if stream.set_nonblocking(false).and_then(|()| stream.set_read_timeout(wait)).is_err() {
         return;
     }
     match is_health_check(&stream, state.cancel) {
@@ -107,12 +131,16 @@ fn handle_connection(stream: TcpStream, state: &ServerState) {
         Some(false) => {}
     }
     let mut slot = None;
-    let refusal = || {
+    let check = |request: &_| {
+        state.config.access.check(request)?;
         slot = SlotGuard::acquire(&state.clients, state.max_clients);
         let reason = || format!("the server has {} clients, its limit (--threads)\n", state.max_clients);
-        slot.is_none().then(reason)
+        match slot {
+            Some(_) => Ok(()),
+            None => Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, reason())),
+        }
     };
-    if let Ok(connection) = Connection::accept(stream, state.cancel, refusal) {
+    if let Ok(connection) = Connection::accept(stream, state.cancel, check) {
         run_session(connection, state);
     }
 }
@@ -153,7 +181,7 @@ fn run_session(mut connection: Connection, state: &ServerState) {
     if connection.send(&state.hello).is_err() {
         return;
     }
-    let mut session = ClientSession::new(state.config, state.cancel);
+    let mut session = ClientSession::new(state.config, &state.render_budget, state.cancel);
     loop {
         let (response, is_last) = match connection.recv() {
             Ok(message) => respond(&mut session, state.config, &message),
@@ -183,5 +211,24 @@ fn respond(session: &mut ClientSession, config: &ServerConfig, message: &Value) 
             session.discard_episode();
             (response::error(&"internal error of the server; the episode was discarded; send reset"), false)
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refused_slot_is_not_released() {
+        let count = AtomicUsize::new(0);
+        let first = SlotGuard::acquire(&count, 1);
+        assert!(first.is_some());
+        for _ in 0..3 {
+            assert!(SlotGuard::acquire(&count, 1).is_none());
+        }
+        assert_eq!(count.load(Ordering::Relaxed), 1);
+        drop(first);
+        assert_eq!(count.load(Ordering::Relaxed), 0);
+        assert!(SlotGuard::acquire(&count, 1).is_some());
     }
 }

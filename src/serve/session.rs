@@ -9,6 +9,7 @@ use rmpv::Value;
 
 use super::{
     config::{RequestError, ServerConfig},
+    render_budget::{MAX_RENDER_PIXELS, RenderBudget},
     request::Request,
     response,
     state::{ActionRow, EpisodeState, LiveEpisode},
@@ -22,6 +23,7 @@ const MAX_SNAPSHOTS: usize = 4;
 /// The session of one client.
 pub(super) struct ClientSession<'a> {
     config: &'a ServerConfig<'a>,
+    render_budget: &'a RenderBudget,
     cancel: &'a AtomicBool,
     live: Option<LiveEpisode>,
     /// Copies of earlier states, the most recently used one last.
@@ -29,9 +31,13 @@ pub(super) struct ClientSession<'a> {
 }
 
 impl<'a> ClientSession<'a> {
-    /// A session without an episode. `cancel` interrupts long requests.
-    pub(super) fn new(config: &'a ServerConfig<'a>, cancel: &'a AtomicBool) -> Self {
-        Self { config, cancel, live: None, snapshots: VecDeque::new() }
+    /// A session without an episode. Its images wait for `render_budget`; `cancel` interrupts long requests.
+    pub(super) fn new(
+        config: &'a ServerConfig<'a>,
+        render_budget: &'a RenderBudget,
+        cancel: &'a AtomicBool,
+    ) -> Self {
+        Self { config, render_budget, cancel, live: None, snapshots: VecDeque::new() }
     }
 
     /// Discards the episode, whose state may be inconsistent after a panic.
@@ -127,6 +133,7 @@ impl<'a> ClientSession<'a> {
         width: Option<usize>,
         height: Option<usize>,
     ) -> Result<Value, RequestError> {
+        let (budget, cancel) = (self.render_budget, self.cancel);
         let live = self.live("render")?;
         let cameras = &live.episode.sim.scene.cameras;
         let camera = camera.or_else(|| cameras.first().map(|camera| camera.name.clone())).unwrap_or_default();
@@ -140,6 +147,20 @@ impl<'a> ClientSession<'a> {
             let message = format!("render: {camera}: tactile images have one size; omit width and height");
             return Err(message.into());
         }
+        let own = cameras.iter().find(|other| other.name == camera);
+        let width_px = width.or(own.map(|own| own.width)).unwrap_or_default();
+        let height_px = height.or(own.map(|own| own.height)).unwrap_or_default();
+        let pixels = width_px * height_px;
+        if (width.is_some() || height.is_some()) && pixels > MAX_RENDER_PIXELS {
+            let message = format!(
+                "render: width × height is {width_px} × {height_px}; expected at most {MAX_RENDER_PIXELS} pixels \
+                 (1920 × 1080)"
+            );
+            return Err(message.into());
+        }
+        let Some(_permit) = budget.acquire(pixels, cancel) else {
+            return Err("the server is shutting down".to_owned().into());
+        };
         let image = match finger {
             Some(side) => live.episode.render_tactile(side),
             None => live.episode.render_camera(&camera, width, height),

@@ -4,6 +4,7 @@ use std::{
     io::Write,
     net::{TcpListener, TcpStream},
     thread,
+    time::Duration,
 };
 
 use rmpv::Value;
@@ -67,10 +68,14 @@ fn state(observation: &Value) -> Vec<f32> {
     data.as_slice().expect("bytes").as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
 }
 
+/// The next observation. The socket answers pings by itself.
 fn observation(socket: &mut Socket) -> Option<Value> {
-    match socket.read() {
-        Ok(Message::Binary(bytes)) => rmpv::decode::read_value(&mut &bytes[..]).ok(),
-        _ => None,
+    loop {
+        match socket.read() {
+            Ok(Message::Binary(bytes)) => return rmpv::decode::read_value(&mut &bytes[..]).ok(),
+            Ok(Message::Ping(_) | Message::Pong(_)) => {}
+            _ => return None,
+        }
     }
 }
 
@@ -147,7 +152,8 @@ fn closed_idle_connections_are_reopened() {
         let _ = socket.write(hold(&first, 50));
         let _ = socket.write(Message::Ping("still there?".into()));
         let _ = socket.flush();
-        if let Ok(Message::Pong(_)) = socket.read() {
+        let answers = std::iter::from_fn(|| socket.read().ok());
+        if answers.take(3).any(|message| matches!(&message, Message::Pong(_))) {
             count.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         }
         let Some(second) = observation(&mut socket) else { return };
@@ -160,6 +166,110 @@ fn closed_idle_connections_are_reopened() {
     let output = run(&project, &address, "--episodes 2 --replan 5");
     assert_eq!(output.code, 0, "{}", output.err);
     assert_eq!(pongs.load(std::sync::atomic::Ordering::Relaxed), 3, "six questions over three connections");
+}
+
+/// Five actions that close the gripper: a reply that is wrong for an observation answered by `hold`.
+fn shut() -> Message {
+    packed(&actions(5, [0.4, 0.0, 0.3, 3.1, 0.0, 0.0, 1.0]))
+}
+
+#[test]
+fn surplus_replies_end_the_run() {
+    let twice = server(9, |_, mut socket| {
+        let _ = socket.send(packed(&Value::Map(Vec::new())));
+        while let Some(seen) = observation(&mut socket) {
+            let _ = socket.send(hold(&seen, 5));
+            let _ = socket.send(shut());
+        }
+    });
+    let early = server(9, |_, mut socket| {
+        let _ = socket.send(packed(&Value::Map(Vec::new())));
+        answering(socket, |_, seen| Some(hold(seen, 5)));
+    });
+    // The surplus reply leaves after the pong, at the first chunk and at the only one.
+    let late = || {
+        server(9, |_, mut socket| {
+            let _ = socket.send(packed(&Value::Map(Vec::new())));
+            let Some(seen) = observation(&mut socket) else { return };
+            let _ = socket.send(hold(&seen, 50));
+            let _ = socket.read();
+            let _ = socket.flush();
+            thread::sleep(Duration::from_millis(5));
+            let _ = socket.send(shut());
+            let _ = observation(&mut socket);
+        })
+    };
+    for (address, words) in [(twice, ""), (early, ""), (late(), "--replan 5"), (late(), "--replan 50")] {
+        let output = fails(&address, words);
+        assert!(output.contains("sent a message that was not requested"), "{words}: {output}");
+    }
+}
+
+#[test]
+fn the_timeout_holds_while_bytes_arrive() {
+    let metadata = |socket: &mut Socket| {
+        let _ = socket.send(packed(&Value::Map(Vec::new())));
+        let _ = observation(socket);
+    };
+    let pings = move |pause: Duration| {
+        server(9, move |_, mut socket| {
+            metadata(&mut socket);
+            while socket.send(Message::Ping("still there?".into())).is_ok() {
+                thread::sleep(pause);
+            }
+        })
+    };
+    // A byte at a time: a reply, and the answer to a handshake.
+    let trickle = |stream: &mut TcpStream, start: &[u8]| {
+        let _ = stream.write_all(start);
+        while stream.write_all(b"a").is_ok() {
+            thread::sleep(Duration::from_millis(20));
+        }
+    };
+    let reply = server(9, move |_, mut socket| {
+        metadata(&mut socket);
+        trickle(socket.get_mut(), &[0x82, 126, 0xFF, 0xFF]);
+    });
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let handshake = format!("ws://{}", listener.local_addr().expect("an address"));
+    thread::spawn(move || {
+        for mut stream in listener.incoming().flatten() {
+            trickle(&mut stream, b"HTTP/1.1 101 Switching Protocols\r\nX-Long: ");
+        }
+    });
+    for (address, words) in [
+        (pings(Duration::from_millis(10)), "did not answer within 1 s"),
+        (pings(Duration::ZERO), "did not answer within 1 s"),
+        (reply, "did not answer within 1 s"),
+        (handshake, "tried for 1 s"),
+    ] {
+        let output = fails(&address, "--policy-timeout 1");
+        assert!(output.contains(words), "{words}: {output}");
+    }
+}
+
+#[test]
+fn connections_end_with_a_close_frame() {
+    let (sender, closed) = std::sync::mpsc::channel();
+    let address = server(9, move |_, mut socket| {
+        let _ = socket.send(packed(&Value::Map(Vec::new())));
+        while let Ok(message) = socket.read() {
+            match message {
+                Message::Binary(bytes) => {
+                    let seen = rmpv::decode::read_value(&mut &bytes[..]).expect("msgpack");
+                    let _ = socket.send(hold(&seen, 50));
+                }
+                Message::Close(frame) => {
+                    let _ = socket.flush();
+                    let _ = sender.send(frame.map(|frame| u16::from(frame.code)));
+                }
+                _ => {}
+            }
+        }
+    });
+    let project = project();
+    assert_eq!(run(&project, &address, "--episodes 2").code, 0);
+    assert_eq!(closed.recv_timeout(Duration::from_secs(5)), Ok(Some(1000)));
 }
 
 #[test]
@@ -232,6 +342,7 @@ fn malformed_replies_are_reported() {
         (Message::binary(vec![0xDD, 0xFF, 0xFF, 0xFF, 0xFF]), "msgpack"),
         (Message::binary(vec![0x91; 5000]), "msgpack"),
         (Message::binary(Vec::new()), "msgpack"),
+        (Message::binary([&[0xDD, 0, 0x20, 0, 0][..], &[0xC0; 2 << 20]].concat()), "more than 1048576 values"),
     ] {
         let address = server(9, move |_, socket| answering(socket, |_, _| Some(reply.clone())));
         let output = fails(&address, "");

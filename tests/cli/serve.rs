@@ -319,6 +319,108 @@ fn silent_clients_do_not_block_others() {
     assert_eq!(get(get(&first.ask(&step(2)), "info"), "step").as_u64(), Some(2), "the first did not notice");
 }
 
+/// Status of a handshake with these headers besides those of every websocket.
+fn handshake(server: &Server, headers: &[(&str, &str)]) -> u16 {
+    let uri = format!("ws://{}", server.address).parse().expect("an address");
+    let mut request = tungstenite::client::IntoClientRequest::into_client_request(
+        tungstenite::ClientRequestBuilder::new(uri),
+    )
+    .expect("a request");
+    for (name, value) in headers {
+        let name = tungstenite::http::HeaderName::try_from(*name).expect("a name");
+        request.headers_mut().insert(name, value.parse().expect("a value"));
+    }
+    match tungstenite::client(request, server.stream()) {
+        Ok((_, response)) => response.status().as_u16(),
+        Err(tungstenite::HandshakeError::Failure(Error::Http(response))) => response.status().as_u16(),
+        Err(other) => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_refused_client_takes_no_seat_and_releases_none() {
+    let project = project();
+    let server = Server::start(&project, "--profile vision --threads 1");
+    let (first, _) = server.client();
+    for _ in 0..3 {
+        assert_eq!(handshake(&server, &[]), 503, "the only seat is taken");
+    }
+    drop(first);
+    std::thread::sleep(Duration::from_millis(500));
+    let (mut second, _) = server.client();
+    assert_eq!(handshake(&server, &[]), 503, "the limit still holds");
+    second.reset();
+    drop(second);
+    std::thread::sleep(Duration::from_millis(500));
+    // More connections than the server accepts at a time, none of which says anything.
+    let silent: Vec<TcpStream> = (0..80).map(|_| server.stream()).collect();
+    std::thread::sleep(Duration::from_millis(500));
+    assert!(!server.healthy(), "a full server says so");
+    drop(silent);
+    std::thread::sleep(Duration::from_millis(500));
+    for _ in 0..3 {
+        assert!(server.healthy());
+        server.client().0.reset();
+        std::thread::sleep(Duration::from_millis(300));
+    }
+}
+
+#[test]
+fn web_pages_and_clients_without_the_token_are_refused() {
+    let project = project();
+    let server = Server::start(&project, "--profile vision");
+    let own = format!("http://{}", server.address);
+    for (headers, status) in [
+        (vec![], 101),
+        (vec![("origin", own.as_str())], 101),
+        (vec![("origin", "https://evil.example")], 403),
+        (vec![("origin", "null")], 403),
+        (vec![("origin", "http://localhost:3000")], 403),
+        (vec![("host", "evil.example")], 403),
+        (vec![("host", "evil.example"), ("origin", "http://evil.example")], 403),
+    ] {
+        assert_eq!(handshake(&server, &headers), status, "{headers:?}");
+    }
+    let server = Server::start(&project, "--profile vision --token s3cret");
+    for (headers, status) in [
+        (vec![], 401),
+        (vec![("authorization", "Bearer other")], 401),
+        (vec![("authorization", "Bearer s3cret")], 101),
+        (vec![("authorization", "Bearer s3cret"), ("origin", "null")], 403),
+    ] {
+        assert_eq!(handshake(&server, &headers), status, "{headers:?}");
+    }
+    assert!(project.refusal("serve x.lua --token").contains("--token"));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn images_of_any_size_do_not_fill_the_memory() {
+    let project = project();
+    let server = Server::start(&project, "--profile vision");
+    let resident_mib = || {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", server.child.id())).expect("a process");
+        let line = status.lines().find(|line| line.starts_with("VmHWM:")).expect("a line");
+        line.split_whitespace().nth(1).and_then(|kib| kib.parse::<u64>().ok()).expect("a number") >> 10
+    };
+    let (mut client, _) = server.client();
+    client.reset();
+    let render = |width: u64, height: u64| {
+        map(&[("type", "render".into()), ("width", width.into()), ("height", height.into())])
+    };
+    for (width, height) in [(4096, 4096), (1920, 1081), (60_000, 1), (1, 60_000)] {
+        let message = client.refused(&render(width, height));
+        assert!(message.contains("render"), "{message}");
+    }
+    assert_eq!(text(&client.ask(&render(300, 300)), "type"), "render");
+    let before = resident_mib();
+    for size in 301..321 {
+        assert_eq!(text(&client.ask(&render(size, 300)), "type"), "render");
+    }
+    // The backgrounds of twenty sizes would take 230 MiB.
+    assert!(resident_mib() < before + 60, "{before} MiB before, {} MiB after", resident_mib());
+}
+
 #[test]
 fn restored_states_are_byte_identical() {
     let project = project();

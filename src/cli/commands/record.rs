@@ -119,7 +119,8 @@ impl Controller for GripRecorder {
         Ok(action)
     }
 
-    fn finish(&mut self) {
+    fn finish(&mut self) -> Result<(), PolicyError> {
         parallel::lock(&self.log).insert(self.index, std::mem::take(&mut self.is_holding));
+        Ok(())
     }
 }

@@ -21,7 +21,10 @@ use softvt_evaluation::episode_id::{EpisodeId, EpisodeIndex, Split};
 use softvt_policy::Observation;
 use softvt_rollout::cancel;
 use softvt_script::LoadedScript;
-use softvt_serve::{RequestError, ServerConfig};
+use softvt_serve::{AccessRules, RequestError, ServerConfig};
+
+/// Environment variable with the token of the server. A flag shows it to other users of the machine.
+const TOKEN: &str = "SOFTVT_TOKEN";
 
 /// Serve episodes over a websocket for an external client: docs/serve.md
 #[derive(Args, Clone, Debug)]
@@ -41,6 +44,9 @@ pub(crate) struct ServeArgs {
     /// List of episodes for clients that do not name one
     #[arg(long, value_name = "SPLIT", default_value = "validation")]
     split: Split,
+    /// Token that clients have to send as Authorization: Bearer TOKEN [default: the environment variable SOFTVT_TOKEN, if set]
+    #[arg(long, value_name = "TOKEN", value_parser = parse_token)]
+    token: Option<String>,
     /// Send clients the true state: poses, deformation, contact forces, limits, verdict
     #[arg(long)]
     privileged: bool,
@@ -86,6 +92,7 @@ pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
         let id = EpisodeId { suite: run.suite.name.clone(), ..id.clone() };
         run.start_episode(task, &id).map_err(|error| RequestError::Invalid(error.message))
     };
+    let address = listener.local_addr().map_err(|error| CliError::input(error).prefixed(&args.host))?;
     let server_config = ServerConfig {
         suites: suites.iter().map(named).collect(),
         profile,
@@ -93,13 +100,27 @@ pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
         seed: config.script.seed,
         split: args.split,
         fingerprint: provenance_hash(&config, &loaded),
+        access: AccessRules::new(&args.host, address, token(&args)?),
         start_episode: Box::new(start_episode),
     };
     let hello = softvt_serve::hello(&server_config, &first_observation(&config, &server_config)?);
-    let address = listener.local_addr().map_err(|error| CliError::input(error).prefixed(&args.host))?;
     print(&format!("ws://{address}\n"))?;
     softvt_serve::serve(&listener, &server_config, hello, usize::from(args.threads), &cancel::FLAG);
     Err(CliError::interrupted("interrupted"))
+}
+
+/// The token that clients have to send.
+fn token(args: &ServeArgs) -> Result<Option<String>, CliError> {
+    let from_environment = || std::env::var(TOKEN).ok().filter(|token| !token.is_empty());
+    let Some(token) = args.token.clone().or_else(from_environment) else { return Ok(None) };
+    let valid = parse_token(&token).map_err(|error| CliError::input(format!("{TOKEN}: {error}")))?;
+    Ok(Some(valid))
+}
+
+fn parse_token(word: &str) -> Result<String, String> {
+    let is_valid = !word.is_empty() && word.len() <= 256 && word.chars().all(|c| c.is_ascii_graphic());
+    let expected = "expected 1 to 256 visible ASCII characters without spaces";
+    if is_valid { Ok(word.to_owned()) } else { Err(expected.to_owned()) }
 }
 
 fn listen(args: &ServeArgs) -> Result<TcpListener, CliError> {

@@ -1,22 +1,29 @@
-//! A connection to a policy server. Every wait ends at a deadline or when the run is cancelled.
+//! A connection to a policy server. Every wait ends at a deadline or when the run is cancelled, whatever arrives.
 
 use std::{
     io::{self, ErrorKind},
     net::{TcpStream, ToSocketAddrs},
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        atomic::{AtomicBool, Ordering},
+        mpsc::{self, RecvTimeoutError},
+    },
     thread,
     time::{Duration, Instant},
 };
 
 use rmpv::Value;
-use tungstenite::{ClientRequestBuilder, Error, Message, WebSocket, client, http::Uri};
+use tungstenite::{
+    ClientRequestBuilder, Error, Message, WebSocket, client,
+    http::Uri,
+    protocol::{CloseFrame, frame::coding::CloseCode},
+};
 
 use crate::{
     PolicyError,
     msgpack::unpack,
     profile::Profile,
     transport::{
-        self, POLL_INTERVAL, TransportError, complete_handshake, configure, is_wait, websocket_config,
+        self, POLL_INTERVAL, PollingStream, TransportError, complete_handshake, is_wait, websocket_config,
     },
 };
 
@@ -28,6 +35,8 @@ const FIRST_PAUSE: Duration = Duration::from_millis(100);
 const MAX_PAUSE: Duration = Duration::from_secs(2);
 /// Maximum number of pings and pongs that an idle connection may have received.
 const MAX_IDLE_MESSAGES: usize = 1000;
+/// Longest wait for the server's answer to a close frame.
+const CLOSE_TIMEOUT: Duration = Duration::from_millis(500);
 /// Length to which a server's error text is cut, characters.
 const MAX_ERROR_CHARS: usize = 2000;
 /// Port of an address without one: that of openpi's servers.
@@ -54,7 +63,7 @@ pub struct PolicyServer {
     pub protocol: Protocol,
     /// Keys and units of observations and actions.
     pub profile: Profile,
-    /// Time limit for connecting and for each response.
+    /// Time limit for connecting, greeting included, and for each response.
     pub timeout: Duration,
     /// Sent as `Authorization: Api-Key …`, if present.
     pub api_key: Option<String>,
@@ -70,6 +79,18 @@ impl PolicyServer {
 
     fn check_cancel(&self) -> Result<(), PolicyError> {
         if self.cancel.load(Ordering::Relaxed) { Err(PolicyError::Interrupted) } else { Ok(()) }
+    }
+
+    /// End of an operation that begins now.
+    pub(super) fn deadline(&self) -> Instant {
+        Instant::now() + self.timeout
+    }
+
+    fn unrequested(&self) -> PolicyError {
+        self.error(
+            "sent a message that was not requested. Replies have no numbers, so a surplus reply would be taken as that \
+             to a later observation; the server must send its metadata once and one reply per observation",
+        )
     }
 
     fn check_deadline(&self, deadline: Instant, what: &str) -> Result<(), PolicyError> {
@@ -102,27 +123,28 @@ impl PolicyServer {
     }
 }
 
-/// An open connection, before or after the greeting of the protocol.
+/// An open connection, before or after the greeting of the protocol. Dropping it closes it with a close frame.
 #[derive(Debug)]
 pub(super) struct PolicyConnection {
     pub(super) server: PolicyServer,
-    socket: WebSocket<TcpStream>,
+    socket: WebSocket<PollingStream>,
     /// Number of the last message sent (vla-eval).
     pub(super) seq: u64,
+    /// Number of the last ping sent.
+    pings: u64,
 }
 
 impl PolicyConnection {
-    /// Connects. Retries while the server cannot be reached, until the timeout.
+    /// Connects. Retries while the server cannot be reached, until `deadline`.
     ///
     /// # Errors
     /// The address is invalid, or no connection was made in time.
-    pub(super) fn open(server: &PolicyServer) -> Result<Self, PolicyError> {
+    pub(super) fn open(server: &PolicyServer, deadline: Instant) -> Result<Self, PolicyError> {
         let request = request(server)?;
-        let deadline = Instant::now() + server.timeout;
         let mut pause = FIRST_PAUSE;
         loop {
             let reason = match connect(&request, server, deadline) {
-                Ok(socket) => return Ok(Self { server: server.clone(), socket, seq: 0 }),
+                Ok(socket) => return Ok(Self { server: server.clone(), socket, seq: 0, pings: 0 }),
                 Err(ConnectError::Final(error)) => return Err(error),
                 Err(ConnectError::Retry(reason)) => reason,
             };
@@ -135,57 +157,120 @@ impl PolicyConnection {
         }
     }
 
-    /// Sends a message.
+    /// Sends a message until `deadline`.
     ///
     /// # Errors
     /// The connection fails, or the server does not accept the message in time.
-    pub(super) fn send(&mut self, value: &Value) -> Result<(), PolicyError> {
+    pub(super) fn send(&mut self, value: &Value, deadline: Instant) -> Result<(), PolicyError> {
         let server = &self.server;
-        let deadline = Instant::now() + server.timeout;
         let on_wait = || server.check_deadline(deadline, "did not accept an observation");
         transport::send(&mut self.socket, value, on_wait).map_err(|error| server.transport_error(error))
     }
 
-    /// Receives the next message.
+    /// Receives the next message until `deadline`.
     ///
     /// # Errors
     /// The connection fails, or the server sends text (its error message), an invalid message, or nothing in time.
-    pub(super) fn receive(&mut self) -> Result<Value, PolicyError> {
-        let server = &self.server;
-        let deadline = Instant::now() + server.timeout;
+    pub(super) fn receive(&mut self, deadline: Instant) -> Result<Value, PolicyError> {
         loop {
-            let message =
-                transport::receive(&mut self.socket, |_| server.check_deadline(deadline, "did not answer"));
-            match message.map_err(|error| server.transport_error(error))? {
+            match self.receive_frame(deadline, "did not answer")? {
                 Message::Binary(bytes) => {
-                    return unpack(&bytes).map_err(|error| server.error(&format!("sent {error}")));
+                    return unpack(&bytes).map_err(|error| self.server.error(&format!("sent {error}")));
                 }
-                Message::Text(text) => {
-                    return Err(server.error(&format!("reported an error:\n{}", end_of(&text))));
-                }
-                Message::Close(_) => return Err(server.socket_error(&Error::ConnectionClosed)),
+                Message::Text(text) => return Err(self.reported_error(&text)),
+                Message::Close(_) => return Err(self.server.socket_error(&Error::ConnectionClosed)),
                 Message::Ping(_) | Message::Pong(_) | Message::Frame(_) => {}
             }
         }
     }
 
-    /// Answers the pings received while the connection was idle. Returns true if it can still be used.
-    pub(super) fn is_open(&mut self) -> bool {
-        let set_blocking = |socket: &WebSocket<TcpStream>, blocking: bool| {
-            socket.get_ref().set_nonblocking(!blocking).is_ok()
-        };
-        if !set_blocking(&self.socket, false) {
-            return false;
+    /// Checks that the server sent nothing after its last reply: sends a ping and waits for its pong. Frames keep their
+    /// order, so a message sent before the pong arrives before it. A connection that the server closed meanwhile passes.
+    ///
+    /// # Errors
+    /// The server sent a message, or no pong until `deadline`.
+    pub(super) fn check_silence(&mut self, deadline: Instant) -> Result<(), PolicyError> {
+        self.pings += 1;
+        let own = self.pings.to_be_bytes();
+        let ping = Message::Ping(own.to_vec().into());
+        let server = &self.server;
+        let on_wait = || server.check_deadline(deadline, "did not accept a ping");
+        match transport::send_frame(&mut self.socket, ping, on_wait) {
+            Ok(()) => {}
+            Err(TransportError::Aborted(error)) => return Err(error),
+            Err(TransportError::Socket(_)) => return Ok(()),
+        }
+        loop {
+            let server = &self.server;
+            let on_wait = |_: &mut _| server.check_deadline(deadline, "did not answer a ping");
+            match transport::receive(&mut self.socket, on_wait) {
+                Ok(Message::Pong(payload)) if *payload == own => return Ok(()),
+                Ok(Message::Binary(_)) => return Err(server.unrequested()),
+                Ok(Message::Text(text)) => return Err(self.reported_error(&text)),
+                Ok(Message::Close(_)) | Err(TransportError::Socket(_)) => return Ok(()),
+                Ok(Message::Ping(_) | Message::Pong(_) | Message::Frame(_)) => {
+                    server.check_deadline(deadline, "did not answer a ping")?;
+                }
+                Err(TransportError::Aborted(error)) => return Err(error),
+            }
+        }
+    }
+
+    /// Reads what was received while the connection was idle, and answers pings. Returns true if it can still be used.
+    ///
+    /// # Errors
+    /// The server sent a message.
+    pub(super) fn is_open(&mut self) -> Result<bool, PolicyError> {
+        if self.socket.get_mut().set_nonblocking(true).is_err() {
+            return Ok(false);
         }
         for _ in 0..MAX_IDLE_MESSAGES {
             match self.socket.read() {
                 Ok(Message::Ping(_) | Message::Pong(_)) => {}
-                Err(Error::Io(error)) if is_wait(&error) => return set_blocking(&self.socket, true),
-                // Data without a request, or the end: a new connection is needed.
-                _ => return false,
+                Ok(Message::Binary(_)) => return Err(self.server.unrequested()),
+                Ok(Message::Text(text)) => return Err(self.reported_error(&text)),
+                Err(Error::Io(error)) if is_wait(&error) => {
+                    return Ok(self.socket.get_mut().set_nonblocking(false).is_ok());
+                }
+                // The end: a new connection is needed.
+                _ => return Ok(false),
             }
         }
-        false
+        Ok(false)
+    }
+
+    fn receive_frame(&mut self, deadline: Instant, what: &str) -> Result<Message, PolicyError> {
+        let server = &self.server;
+        // A server that sends pings without a pause never makes a read wait.
+        server.check_deadline(deadline, what)?;
+        let message = transport::receive(&mut self.socket, |_| server.check_deadline(deadline, what));
+        message.map_err(|error| server.transport_error(error))
+    }
+
+    fn reported_error(&self, text: &str) -> PolicyError {
+        self.server.error(&format!("reported an error:\n{}", end_of(text)))
+    }
+}
+
+impl Drop for PolicyConnection {
+    /// Sends a close frame and waits for that of the server, so that its log shows a regular end.
+    fn drop(&mut self) {
+        let _ = self.socket.get_mut().set_nonblocking(false);
+        let deadline = Instant::now() + CLOSE_TIMEOUT;
+        let may_wait = || {
+            let is_over = Instant::now() > deadline || self.server.cancel.load(Ordering::Relaxed);
+            if is_over { Err(()) } else { Ok(()) }
+        };
+        let frame = CloseFrame { code: CloseCode::Normal, reason: "".into() };
+        let mut sent = self.socket.close(Some(frame));
+        while let Err(Error::Io(error)) = &sent
+            && is_wait(error)
+            && may_wait().is_ok()
+        {
+            sent = self.socket.flush();
+        }
+        // The socket reports the end of the closing handshake as an error.
+        while sent.is_ok() && transport::receive(&mut self.socket, |_| may_wait()).is_ok() && may_wait().is_ok() {}
     }
 }
 
@@ -204,9 +289,8 @@ fn connect(
     request: &ClientRequestBuilder,
     server: &PolicyServer,
     deadline: Instant,
-) -> Result<WebSocket<TcpStream>, ConnectError> {
-    let stream = connect_tcp(&server.url, deadline)?;
-    configure(&stream)?;
+) -> Result<WebSocket<PollingStream>, ConnectError> {
+    let stream = PollingStream::new(connect_tcp(server, deadline)?)?;
     let handshake =
         client::client_with_config(request.clone(), stream, Some(websocket_config(MAX_MESSAGE_BYTES)));
     let on_wait = || {
@@ -231,8 +315,31 @@ fn connect(
     }
 }
 
+/// Connects in a thread, since neither a name's resolution nor a connection attempt can be interrupted. The thread ends
+/// by itself.
+fn connect_tcp(server: &PolicyServer, deadline: Instant) -> Result<TcpStream, ConnectError> {
+    let (sender, receiver) = mpsc::channel();
+    let url = server.url.clone();
+    thread::Builder::new().name("connect".to_owned()).spawn(move || {
+        let _ = sender.send(connect_to_any(&url, deadline));
+    })?;
+    loop {
+        match receiver.recv_timeout(POLL_INTERVAL) {
+            Ok(connected) => return Ok(connected?),
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(ConnectError::Retry("the connection attempt ended early".to_owned()));
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+        }
+        server.check_cancel().map_err(ConnectError::Final)?;
+        if Instant::now() > deadline {
+            return Err(ConnectError::Retry("it does not accept connections".to_owned()));
+        }
+    }
+}
+
 /// Connects to the first address of the host that accepts a connection.
-fn connect_tcp(url: &str, deadline: Instant) -> io::Result<TcpStream> {
+fn connect_to_any(url: &str, deadline: Instant) -> io::Result<TcpStream> {
     let uri: Uri = url.parse().map_err(io::Error::other)?;
     let host = uri.host().unwrap_or_default().trim_start_matches('[').trim_end_matches(']');
     let mut refused = io::Error::new(ErrorKind::NotFound, "the host name does not resolve");

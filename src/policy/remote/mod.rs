@@ -3,7 +3,10 @@
 mod connection;
 mod vla_eval;
 
-use std::sync::{Arc, Mutex};
+use std::{
+    sync::{Arc, Mutex},
+    time::Instant,
+};
 
 use self::connection::PolicyConnection;
 pub use self::connection::{PolicyServer, Protocol};
@@ -40,14 +43,15 @@ impl PolicyConnections {
     fn take(&self) -> Result<PolicyConnection, PolicyError> {
         let idle = || lock(&self.idle).pop();
         while let Some(mut connection) = idle() {
-            if connection.is_open() {
+            if connection.is_open()? {
                 return Ok(connection);
             }
         }
-        let mut connection = PolicyConnection::open(&self.server)?;
+        let deadline = self.server.deadline();
+        let mut connection = PolicyConnection::open(&self.server, deadline)?;
         match self.server.protocol {
-            Protocol::Openpi => greet_openpi(&mut connection)?,
-            Protocol::VlaEval => vla_eval::greet(&mut connection)?,
+            Protocol::Openpi => greet_openpi(&mut connection, deadline)?,
+            Protocol::VlaEval => vla_eval::greet(&mut connection, deadline)?,
         }
         Ok(connection)
     }
@@ -84,7 +88,8 @@ impl Policy for RemotePolicy {
     fn reset(&mut self, brief: &TaskBrief) -> Result<(), PolicyError> {
         let mut connection = self.connections.take()?;
         if self.connections.server.protocol == Protocol::VlaEval {
-            vla_eval::start(&mut connection, brief)?;
+            let deadline = connection.server.deadline();
+            vla_eval::start(&mut connection, brief, deadline)?;
         }
         self.connection = Some(connection);
         Ok(())
@@ -94,8 +99,11 @@ impl Policy for RemotePolicy {
         let protocol = self.connections.server.protocol;
         let mut current = self.connection.take();
         // openpi's servers keep no state of an episode: the connection can be replaced between two requests.
-        if protocol == Protocol::Openpi {
-            current = current.and_then(|mut connection| connection.is_open().then_some(connection));
+        if protocol == Protocol::Openpi
+            && let Some(connection) = &mut current
+            && !connection.is_open()?
+        {
+            current = None;
         }
         let mut connection = current.map_or_else(|| self.connections.take(), Ok)?;
         let chunk = match protocol {
@@ -109,21 +117,23 @@ impl Policy for RemotePolicy {
         chunk
     }
 
-    fn finish(&mut self) {
-        let Some(mut connection) = self.connection.take() else { return };
-        let is_usable = match self.connections.server.protocol {
-            Protocol::Openpi => true,
-            Protocol::VlaEval => vla_eval::end(&mut connection).is_ok(),
-        };
-        if is_usable {
-            self.connections.put(connection);
+    fn finish(&mut self) -> Result<(), PolicyError> {
+        let Some(mut connection) = self.connection.take() else { return Ok(()) };
+        let deadline = connection.server.deadline();
+        match self.connections.server.protocol {
+            // The reply that the last actions came from may have been that to an earlier observation.
+            Protocol::Openpi => connection.check_silence(deadline)?,
+            Protocol::VlaEval if vla_eval::end(&mut connection, deadline).is_err() => return Ok(()),
+            Protocol::VlaEval => {}
         }
+        self.connections.put(connection);
+        Ok(())
     }
 }
 
 /// openpi's protocol: receives the metadata that the server sends first.
-fn greet_openpi(connection: &mut PolicyConnection) -> Result<(), PolicyError> {
-    let metadata = connection.receive()?;
+fn greet_openpi(connection: &mut PolicyConnection, deadline: Instant) -> Result<(), PolicyError> {
+    let metadata = connection.receive(deadline)?;
     if metadata.as_map().is_none() {
         let what = format!("sent {} first; openpi servers send a map of metadata", kind(&metadata));
         return Err(connection.server.error(&what));
@@ -136,7 +146,9 @@ fn infer_openpi(
     connection: &mut PolicyConnection,
     observation: &Observation,
 ) -> Result<ActionChunk, PolicyError> {
-    connection.send(&encode::openpi(observation, &connection.server.profile))?;
-    let response = connection.receive()?;
+    let deadline = connection.server.deadline();
+    connection.send(&encode::openpi(observation, &connection.server.profile), deadline)?;
+    let response = connection.receive(deadline)?;
+    connection.check_silence(deadline)?;
     decode::chunk(&response, &connection.server.profile.actions)
 }

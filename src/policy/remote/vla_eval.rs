@@ -4,6 +4,8 @@
 //! answered by an action of the same seq. An observation has images in `images`, numbers in `states`, and
 //! the prompt in `task_description`.
 
+use std::time::Instant;
+
 use rmpv::Value;
 
 use super::connection::PolicyConnection;
@@ -17,15 +19,15 @@ use crate::{
 const VERSION: u64 = 1;
 
 /// Exchanges greetings.
-pub(super) fn greet(connection: &mut PolicyConnection) -> Result<(), PolicyError> {
+pub(super) fn greet(connection: &mut PolicyConnection, deadline: Instant) -> Result<(), PolicyError> {
     let version = concat!("softvt ", env!("CARGO_PKG_VERSION"));
     let hello = map([
         ("harness_version", Value::from(version)),
         ("protocol_version", Value::from(VERSION)),
         ("benchmark", Value::from("softvt")),
     ]);
-    send(connection, "hello", hello)?;
-    let value = connection.receive()?;
+    send(connection, "hello", hello, deadline)?;
+    let value = connection.receive(deadline)?;
     let (kind, payload) = parts(connection, &value)?;
     if kind != "hello" {
         return Err(connection.server.error(&format!("answered hello with {kind:?}")));
@@ -40,19 +42,23 @@ pub(super) fn greet(connection: &mut PolicyConnection) -> Result<(), PolicyError
 }
 
 /// Starts an episode.
-pub(super) fn start(connection: &mut PolicyConnection, brief: &TaskBrief) -> Result<(), PolicyError> {
+pub(super) fn start(
+    connection: &mut PolicyConnection,
+    brief: &TaskBrief,
+    deadline: Instant,
+) -> Result<(), PolicyError> {
     let task = map([
         ("name", Value::from(brief.prompt.as_str())),
         ("suite", Value::from(brief.suite.as_str())),
         ("task_id", Value::from(brief.task as u64)),
         ("episode_idx", Value::from(brief.episode)),
     ]);
-    send(connection, "episode_start", map([("task", task)]))
+    send(connection, "episode_start", map([("task", task)]), deadline)
 }
 
 /// Ends an episode.
-pub(super) fn end(connection: &mut PolicyConnection) -> Result<(), PolicyError> {
-    send(connection, "episode_end", Value::Map(Vec::new()))
+pub(super) fn end(connection: &mut PolicyConnection, deadline: Instant) -> Result<(), PolicyError> {
+    send(connection, "episode_end", Value::Map(Vec::new()), deadline)
 }
 
 /// Requests a chunk.
@@ -61,9 +67,10 @@ pub(super) fn infer(
     observation: &Observation,
 ) -> Result<ActionChunk, PolicyError> {
     let payload = encoded(observation, &connection.server.profile);
-    send(connection, "observation", payload)?;
+    let deadline = connection.server.deadline();
+    send(connection, "observation", payload, deadline)?;
     loop {
-        let value = connection.receive()?;
+        let value = connection.receive(deadline)?;
         let (kind, payload) = parts(connection, &value)?;
         let answered = entry(&value, "seq").and_then(Value::as_u64);
         match kind {
@@ -107,7 +114,12 @@ fn encoded(observation: &Observation, profile: &Profile) -> Value {
     map(rest)
 }
 
-fn send(connection: &mut PolicyConnection, kind: &str, payload: Value) -> Result<(), PolicyError> {
+fn send(
+    connection: &mut PolicyConnection,
+    kind: &str,
+    payload: Value,
+    deadline: Instant,
+) -> Result<(), PolicyError> {
     connection.seq += 1;
     let message = map([
         ("type", Value::from(kind)),
@@ -116,7 +128,7 @@ fn send(connection: &mut PolicyConnection, kind: &str, payload: Value) -> Result
         // The field is required but not used; the time of day would make messages differ between runs.
         ("timestamp", Value::F64(0.0)),
     ]);
-    connection.send(&message)
+    connection.send(&message, deadline)
 }
 
 /// Type and payload of a message.

@@ -28,6 +28,8 @@ use softvt_scene::{Camera, CameraMount};
 /// A renderer may be used with several scenes, but keeps the cache of one.
 #[derive(Debug, Default)]
 pub struct Renderer {
+    /// True if no background is kept.
+    is_transient: bool,
     /// The scene of the caches.
     scene_id: Option<u64>,
     bins: TileBins,
@@ -60,6 +62,12 @@ impl MovingShadow {
 }
 
 impl Renderer {
+    /// A renderer for single images: it keeps no backgrounds, which take some 130 bytes per pixel. Its images are
+    /// byte-identical to those of a renderer that keeps them.
+    pub fn transient() -> Self {
+        Self { is_transient: true, ..Self::default() }
+    }
+
     /// Draws the image that `camera` sees of `scene` in the state `view`.
     ///
     /// The result depends on the arguments alone and is byte-identical on every machine.
@@ -75,8 +83,12 @@ impl Renderer {
     ) -> Result<RenderedImage, CameraError> {
         let lens = Lens::new(camera, view.hand_w)?;
         if self.scene_id != Some(scene.id) {
-            *self =
-                Self { scene_id: Some(scene.id), bins: std::mem::take(&mut self.bins), ..Self::default() };
+            *self = Self {
+                is_transient: self.is_transient,
+                scene_id: Some(scene.id),
+                bins: std::mem::take(&mut self.bins),
+                ..Self::default()
+            };
         }
         let posed = |index| PosedObject::new(scene, index, view, &lens);
         let objects = (0..scene.objects.len()).map(posed).collect::<Result<Vec<_>, _>>()?;
@@ -104,6 +116,8 @@ impl Renderer {
         };
         let mut image = if camera.mount != CameraMount::World {
             draw_all(&pass, &mut self.bins)
+        } else if self.is_transient {
+            draw_by_tiles(&pass, &mut self.bins)
         } else {
             let known = self.backgrounds.iter().position(|background| background.camera == *camera);
             let index = known.unwrap_or_else(|| {
@@ -157,15 +171,26 @@ fn draw_background(pass: &RenderPass, camera: &Camera, bins: &mut TileBins) -> C
     pass.bin(&[false], bins);
     let (mut image, mut tiles) = (blank_image(pass), Vec::new());
     for (tile, rect) in TileRect::all(pass.lens).enumerate() {
-        let mut samples = blank_samples(pass);
-        bins.draw_tile(tile, rect.origin(), &mut samples, false);
-        let mut background = BackgroundTile::new();
-        TileResolver::new(pass, rect, &samples, &mut background, &mut image).run(false);
-        background.finish(pass, samples);
+        let background = draw_background_tile(pass, tile, rect, bins, &mut image);
         rect.write(&background.display, &mut image);
         tiles.push(background);
     }
     CachedBackground { camera: camera.clone(), tiles, image }
+}
+
+fn draw_background_tile(
+    pass: &RenderPass,
+    tile: usize,
+    rect: TileRect,
+    bins: &TileBins,
+    image: &mut RenderedImage,
+) -> BackgroundTile {
+    let mut samples = blank_samples(pass);
+    bins.draw_tile(tile, rect.origin(), &mut samples, false);
+    let mut background = BackgroundTile::new();
+    TileResolver::new(pass, rect, &samples, &mut background, image).run(false);
+    background.finish(pass, samples);
+    background
 }
 
 /// Draws the moving objects over a background.
@@ -175,21 +200,60 @@ fn draw_over_background(
     bins: &mut TileBins,
 ) -> RenderedImage {
     pass.bin(&[true], bins);
-    let (mut image, mut display) = (background.image.clone(), TileDisplay::zeros());
-    let mut samples = blank_samples(pass);
+    let (mut image, mut working) = (background.image.clone(), TileWorkspace::new(pass));
     for (tile, (rect, fixed)) in TileRect::all(pass.lens).zip(&background.tiles).enumerate() {
+        working.draw_over(pass, tile, rect, fixed, bins, &mut image);
+    }
+    image
+}
+
+/// Draws the fixed objects, and the moving ones over them, tile by tile: the background of one tile is kept at a time.
+fn draw_by_tiles(pass: &RenderPass, fixed_bins: &mut TileBins) -> RenderedImage {
+    let mut moving_bins = TileBins::default();
+    pass.bin(&[false], fixed_bins);
+    pass.bin(&[true], &mut moving_bins);
+    let (mut image, mut working) = (blank_image(pass), TileWorkspace::new(pass));
+    for (tile, rect) in TileRect::all(pass.lens).enumerate() {
+        let fixed = draw_background_tile(pass, tile, rect, fixed_bins, &mut image);
+        rect.write(&fixed.display, &mut image);
+        working.draw_over(pass, tile, rect, &fixed, &moving_bins, &mut image);
+    }
+    image
+}
+
+/// Working memory for the moving objects in one tile.
+struct TileWorkspace {
+    samples: TileSamples,
+    display: TileDisplay,
+}
+
+impl TileWorkspace {
+    fn new(pass: &RenderPass) -> Self {
+        Self { samples: blank_samples(pass), display: TileDisplay::zeros() }
+    }
+
+    /// Draws the moving objects of a tile over its background, which `image` shows already.
+    fn draw_over(
+        &mut self,
+        pass: &RenderPass,
+        tile: usize,
+        rect: TileRect,
+        fixed: &BackgroundTile,
+        bins: &TileBins,
+        image: &mut RenderedImage,
+    ) {
+        let Self { samples, display } = self;
         let occluders = fixed.moving_occluders(pass);
         if bins.is_occupied(tile) {
             samples.clone_from(&fixed.samples);
-            bins.draw_tile(tile, rect.origin(), &mut samples, false);
-            fixed.relight(pass, occluders.as_deref(), |first| is_all_moving(&samples, first), &mut display);
-            TileResolver::new(pass, rect, &samples, &mut display, &mut image).run(true);
+            bins.draw_tile(tile, rect.origin(), samples, false);
+            fixed.relight(pass, occluders.as_deref(), |first| is_all_moving(samples, first), display);
+            TileResolver::new(pass, rect, samples, display, image).run(true);
         } else if occluders.is_some() {
-            fixed.relight(pass, occluders.as_deref(), |_| false, &mut display);
+            fixed.relight(pass, occluders.as_deref(), |_| false, display);
         } else {
-            continue;
+            return;
         }
-        rect.write(&display, &mut image);
+        rect.write(display, image);
     }
-    image
 }
