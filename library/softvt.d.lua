@@ -199,23 +199,25 @@
 ---@field length? integer Length that an action must have, padding included; any from 7 by default. Expects a whole number in 7..4096.
 ---@field gripper softvt.GripperValues The seventh number.
 
----The seventh number of an action. Values between open and closed close in proportion.
+---The seventh number of an action.
 ---@class softvt.GripperValues
----@field open number Value that opens the gripper. Expects a number.
----@field closed number Value that closes it. Expects a number.
----@field binary? boolean True if every value beyond the middle closes, and any other opens. Default false.
+---@field open? number Value that opens the gripper; not for code = "force". Expects a number.
+---@field closed? number Value that closes it; not for code = "force". Expects a number.
+---@field code? "continuous"|"binary"|"two-width"|"force" What the value commands. continuous: a closure in proportion between open and closed, the default. binary: closed beyond the middle, else open. two-width: open, or the width that the answers give just after closing, held until one opens. force: a grip force in N at which closing stops; below 0 opens.
+---@field binary? boolean True for code = "binary".
 
 ---Summary of an experiment.
 ---@class softvt.Finish
 ---@field text? string Printed after the rows.
 ---@field files? table<string, string|softvt.Image|table<string, any>|any[]> Files to write, by relative path: text as it is, images as PNG, tables as JSON with sorted keys.
 
----A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame, and a closure. Give either axis_angle or quaternion.
+---A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame, and a closure or a grip force. Give either axis_angle or quaternion, and either closure or force.
 ---@class softvt.Action
 ---@field position number[] Position. Expects a list of 3 numbers (m, base frame).
 ---@field axis_angle? number[] Orientation as axis-angle. Expects a list of 3 numbers (rad, base frame).
 ---@field quaternion? number[] Orientation as quaternion. Expects a list of 4 numbers (w, x, y, z, base frame).
----@field closure number Gripper closure: 0 is open, 1 is closed. Expects a number in 0..1.
+---@field closure? number Gripper closure: 0 is open, 1 is closed. Expects a number in 0..1.
+---@field force? number Grip force at which closing stops, at most robot.gripper.effort; below 0 opens. Expects a number (N).
 
 ---Returns an empty world: soft bodies among fixed or prescribed solids, without a robot. Settings of the command line, --set physics.…, take precedence in experiments.
 ---@class softvt.WorldSpec

@@ -91,7 +91,7 @@ def get_softvt_configs():
         action_expert_variant="gemma_300m_lora",
     )
 
-    def config(name: str, repo_id: str, *, tactile: bool):
+    def config(name: str, repo_id: str, *, tactile: bool, gripper: str):
         keys = TACTILE_KEYS if tactile else VISION_KEYS
         return TrainConfig(
             name=name,
@@ -111,6 +111,8 @@ def get_softvt_configs():
             ),
             weight_loader=weight_loaders.CheckpointWeightLoader("gs://openpi-assets/checkpoints/pi05_base/params"),
             freeze_filter=model.get_freeze_filter(),
+            # The grip code of the export. The server states it, and softvt refuses a profile with another one.
+            policy_metadata={"gripper": gripper},
             # Averaged weights are not for LoRA.
             ema_decay=None,
             batch_size=256,
@@ -119,6 +121,6 @@ def get_softvt_configs():
         )
 
     return [
-        config("pi05_softvt_vision", "softvt/object_soft_binary", tactile=False),
-        config("pi05_softvt_tactile", "softvt/object_soft", tactile=True),
+        config("pi05_softvt_vision", "softvt/object_soft_binary", tactile=False, gripper="binary"),
+        config("pi05_softvt_tactile", "softvt/object_soft", tactile=True, gripper="continuous"),
     ]

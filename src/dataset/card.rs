@@ -9,6 +9,7 @@ use super::{
     layout::{CARD, DATASET},
 };
 use softvt_common::files;
+use softvt_policy::profile::GripCode;
 
 /// Demonstrations of a task.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -56,6 +57,9 @@ pub struct Card {
     /// True if privileged streams are stored.
     #[serde(rename = "privileged")]
     pub has_privileged: bool,
+    /// Grip code of exports that name none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gripper: Option<GripCode>,
     /// Source files, if the demonstrations were imported.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub imported: Vec<Imported>,

@@ -2,16 +2,16 @@
 
 use softvt_benchmark::CONTROL_DT;
 use softvt_evaluation::record::EpisodeRecord;
-use softvt_policy::Action;
+use softvt_policy::{Action, profile::GripCode};
 use softvt_robot::{
     gripper::{self, MAX_WIDTH},
     rotation,
 };
-use softvt_rollout::{FinishedEpisode, StateRecording};
+use softvt_rollout::{FinishedEpisode, SensorSuite, StateRecording};
 use softvt_sensing::tactile::{MARKER_COUNT, Markers};
 
 use super::{
-    privileged,
+    grip_labels, privileged,
     stream::{DataStream, pose_row},
 };
 
@@ -26,6 +26,8 @@ pub struct Demonstration {
     pub actions: Vec<Action>,
     /// True in steps in which the gripper is commanded to hold: its binary code.
     pub gripper_closed: Vec<bool>,
+    /// Seventh numbers of the actions in the code force, N. `None` in recordings of version 0.1.
+    pub grip_labels_n: Option<Vec<f64>>,
     /// Observations other than images, `obs/…`.
     pub observed: Vec<DataStream>,
     /// Ground truth that no real robot could measure, `privileged/…`; may be left out.
@@ -50,6 +52,7 @@ impl Demonstration {
         Self {
             record: finished.record.clone(),
             observed: observed(recording, &actions),
+            grip_labels_n: Some(grip_labels::forces(&grip_forces(recording, actions.len()), &gripper_closed)),
             gripper_closed,
             actions,
             privileged,
@@ -70,31 +73,69 @@ impl Demonstration {
         self.observed.push(stream);
     }
 
-    /// The streams outside `obs` and `privileged`: actions in both gripper codes, rewards, episode ends and timestamps.
+    /// The streams outside `obs` and `privileged`: actions in every grip code, rewards, episode ends and timestamps.
     pub fn top_level_streams(&self) -> Vec<DataStream> {
         let steps = self.steps();
-        let actions = self.actions.iter();
-        let continuous = actions.clone().flat_map(|action| action.to_array()).collect();
-        let binary = actions.zip(&self.gripper_closed).flat_map(|(action, &is_closed)| {
-            Action { closure: f64::from(u8::from(is_closed)), ..*action }.to_array()
-        });
-        let meaning = "absolute tool position (m) and axis-angle (rad), gripper 0 open to 1 shut";
+        let mut all: Vec<DataStream> =
+            GripCode::ALL.into_iter().filter_map(|code| self.actions_in(code)).collect();
         let last = |step: usize| step + 1 == steps;
-        vec![
-            DataStream::f64("actions", &[7], continuous)
-                .unit("m, rad, 1", BASE)
-                .attribute("meaning", meaning)
-                .attribute("gripper", "continuous closure: 1 - commanded width / 0.08 m"),
-            DataStream::f64("actions_binary", &[7], binary.collect())
-                .unit("m, rad, 1", BASE)
-                .attribute("meaning", meaning)
-                .attribute("gripper", "binary: 1 while the gripper is meant to hold, else 0"),
+        all.extend([
             DataStream::f64("rewards", &[], (0..steps).map(|step| f64::from(u8::from(last(step)))).collect()),
             DataStream::u8("dones", &[], (0..steps).map(|step| u8::from(last(step))).collect()),
             DataStream::f64("timestamps", &[], (0..steps).map(|step| step as f64 * CONTROL_DT).collect())
                 .unit("s", ""),
-        ]
+        ]);
+        all
     }
+
+    /// The actions with their seventh number in a grip code. `None` if the recording does not have it.
+    fn actions_in(&self, code: GripCode) -> Option<DataStream> {
+        let closures: Vec<f64> = self.actions.iter().map(|action| action.closure).collect();
+        let (grip, meaning) = match code {
+            GripCode::Continuous => (closures, "continuous closure: 1 - commanded width / 0.08 m"),
+            GripCode::Binary => {
+                let closed = self.gripper_closed.iter().map(|is_closed| f64::from(u8::from(*is_closed)));
+                (closed.collect(), "binary: 1 while the gripper is meant to hold, else 0")
+            }
+            GripCode::TwoWidth => (
+                grip_labels::two_widths(&closures, &self.gripper_closed),
+                "two-width: closure 0 while open, the median commanded closure of the closed steps while closed",
+            ),
+            GripCode::Force => (
+                self.grip_labels_n.clone()?,
+                "force: mean pressing force of both pads after the step, N, while closed; -1 while open",
+            ),
+        };
+        let rows = self.actions.iter().zip(grip);
+        let rows = rows.flat_map(|(action, closure)| Action { closure, ..*action }.to_array()).collect();
+        let unit = if code == GripCode::Force { "m, rad, N" } else { "m, rad, 1" };
+        let stream = DataStream::f64(actions_stream(code), &[7], rows)
+            .unit(unit, BASE)
+            .attribute("meaning", "absolute tool position (m) and axis-angle (rad), gripper")
+            .attribute("gripper", meaning)
+            .attribute("grip_code", code.name());
+        Some(stream)
+    }
+}
+
+/// Name of the stream of actions in a grip code.
+pub(crate) fn actions_stream(code: GripCode) -> &'static str {
+    match code {
+        GripCode::Continuous => "actions",
+        GripCode::Binary => "actions_binary",
+        GripCode::TwoWidth => "actions_two_width",
+        GripCode::Force => "actions_force",
+    }
+}
+
+/// Mean pressing force of both pads after each step, N.
+fn grip_forces(recording: &StateRecording, steps: usize) -> Vec<f64> {
+    let after = recording.frames.iter().skip(1).chain(recording.frames.last());
+    let force = |frame| {
+        let pads = SensorSuite::pad_forces(frame);
+        pads.iter().map(|pad| pad.wrench.normal().max(0.0)).sum::<f64>() / pads.len() as f64
+    };
+    after.take(steps).map(force).collect()
 }
 
 /// Proprioception before each action.

@@ -11,6 +11,7 @@ pub mod check;
 mod demonstration;
 pub mod demonstration_writer;
 mod error;
+mod grip_labels;
 mod hdf5;
 pub mod import;
 pub mod layout;

@@ -3,7 +3,7 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::{Action, ActionChunk, Observation, Policy, PolicyError, ToolCommand};
+use super::{Action, ActionChunk, Observation, Policy, PolicyError, ToolCommand, ToolMotion};
 use softvt_benchmark::seed::uniform;
 use softvt_geometry::Vec3;
 
@@ -57,7 +57,7 @@ impl Policy for RandomPolicy {
         if uniform(&mut self.rng) < CLOSURE_CHANGE {
             self.closure = uniform(&mut self.rng);
         }
-        Ok(Action { position_b, axis_angle_b, closure: self.closure }.into())
+        Ok(Action::new(position_b, axis_angle_b, self.closure).into())
     }
 }
 
@@ -78,7 +78,7 @@ impl RecordedPolicy {
 
     /// Replays absolute poses; see [`new`](Self::new).
     pub fn from_actions(actions: &[Action], ending: Option<String>) -> Self {
-        Self::new(actions.iter().copied().map(ToolCommand::Pose).collect(), ending)
+        Self::new(actions.iter().copied().map(ToolCommand::from).collect(), ending)
     }
 }
 
@@ -95,23 +95,23 @@ impl Policy for RecordedPolicy {
         if let Some(message) = &self.ending {
             return Err(PolicyError::Action(message.clone()));
         }
-        let still = ToolCommand::Pose(tool_pose(observation));
+        let still = tool_pose(observation).into();
         Ok(ActionChunk { commands: vec![self.last.map_or(still, held)] })
     }
 }
 
 /// The command that keeps the tool where `command` has brought it.
 fn held(command: ToolCommand) -> ToolCommand {
-    match command {
-        ToolCommand::Pose(_) => command,
-        ToolCommand::Delta { full, closure, .. } => {
-            ToolCommand::Delta { full, translation_b: Vec3::zeros(), rotation_b: Vec3::zeros(), closure }
+    let motion = match command.motion {
+        pose @ ToolMotion::Pose { .. } => pose,
+        ToolMotion::Delta { full, .. } => {
+            ToolMotion::Delta { full, translation_b: Vec3::zeros(), rotation_b: Vec3::zeros() }
         }
-    }
+    };
+    ToolCommand { motion, ..command }
 }
 
 /// The measured tool pose with the gripper open.
 fn tool_pose(observation: &Observation) -> Action {
-    let (position_b, axis_angle_b) = (observation.ee_position_b, observation.ee_axis_angle_b);
-    Action { position_b, axis_angle_b, closure: 0.0 }
+    Action::new(observation.ee_position_b, observation.ee_axis_angle_b, 0.0)
 }

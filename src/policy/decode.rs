@@ -3,7 +3,7 @@
 use rmpv::Value;
 
 use super::{
-    Action, ActionChunk, PolicyError, ToolCommand,
+    ActionChunk, PolicyError, ToolCommand, ToolMotion,
     msgpack::{NumberArray, entry, kind, names, numbers},
     profile::{ACTION_LEN, ActionEncoding, ActionUnits, PoseEncoding},
 };
@@ -17,14 +17,15 @@ pub const MAX_CHUNK_LEN: usize = 10_000;
 ///
 /// ```
 /// use rmpv::Value;
-/// use softvt_policy::{ToolCommand, decode, msgpack::map, profile::Profile};
+/// use softvt_policy::{GripCommand, ToolMotion, decode, msgpack::map, profile::Profile};
 ///
 /// let libero = Profile::named("libero").expect("a built-in profile");
 /// // A step of +5 cm along x at most; the gripper's value 1 means closed.
 /// let row = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0].map(Value::from).to_vec();
 /// let chunk = decode::chunk(&map([("actions", Value::Array(row))]), &libero.actions)?;
-/// let [ToolCommand::Delta { translation_b, closure, .. }] = chunk.commands[..] else { unreachable!() };
-/// assert_eq!((translation_b.x, closure), (0.05, 1.0));
+/// let ToolMotion::Delta { translation_b, .. } = chunk.commands[0].motion else { unreachable!() };
+/// assert_eq!(translation_b.x, 0.05);
+/// assert_eq!(chunk.commands[0].grip, GripCommand::Closure(1.0));
 /// # Ok::<(), softvt_policy::PolicyError>(())
 /// ```
 ///
@@ -74,27 +75,24 @@ pub fn command(row: &[f64; ACTION_LEN], encoding: &ActionEncoding) -> Result<Too
     let ActionUnits { scale, offset } = encoding.units.unwrap_or(ActionUnits::IDENTITY);
     let [x, y, z, rx, ry, rz] = std::array::from_fn(|i| scale[i] * row[i] + offset[i]);
     let (linear, angular) = (Vec3::new(x, y, z), Vec3::new(rx, ry, rz));
-    let closure = encoding.gripper.closure(row[6]);
     // robosuite's controller clips to −1..=1 as well.
-    let delta = |full, translation_m: f64, rotation_rad: f64| ToolCommand::Delta {
+    let delta = |full, translation_m: f64, rotation_rad: f64| ToolMotion::Delta {
         full,
         translation_b: linear.map(|x| x.clamp(-1.0, 1.0)) * translation_m,
         rotation_b: angular.map(|x| x.clamp(-1.0, 1.0)) * rotation_rad,
-        closure,
     };
-    Ok(match encoding.pose {
-        PoseEncoding::Absolute => {
-            ToolCommand::Pose(Action { position_b: linear, axis_angle_b: angular, closure })
-        }
+    let motion = match encoding.pose {
+        PoseEncoding::Absolute => ToolMotion::Pose { position_b: linear, axis_angle_b: angular },
         PoseEncoding::Delta { translation_m, rotation_rad } => delta(true, translation_m, rotation_rad),
         PoseEncoding::DeltaOsc { translation_m, rotation_rad } => delta(false, translation_m, rotation_rad),
-    })
+    };
+    Ok(ToolCommand { motion, grip: encoding.gripper.command(row[6]) })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{msgpack::pack_array, profile::Profile};
+    use crate::{Action, GripCommand, msgpack::pack_array, profile::Profile};
     use softvt_common::npy::NpyArray;
 
     fn read(value: Value) -> Result<ActionChunk, PolicyError> {
@@ -112,8 +110,7 @@ mod tests {
         let chunk = read(reply(vec![50, 32], 0.25)).unwrap();
         assert_eq!(chunk.commands.len(), 50);
         let quarter = Vec3::repeat(0.25);
-        let expected = Action { position_b: quarter, axis_angle_b: quarter, closure: 0.25 };
-        assert_eq!(chunk.commands[49], ToolCommand::Pose(expected));
+        assert_eq!(chunk.commands[49], Action::new(quarter, quarter, 0.25).into());
         assert_eq!(read(reply(vec![7], 0.1)).unwrap().commands.len(), 1);
         assert_eq!(read(reply(vec![1, 4, 7], 0.1)).unwrap().commands.len(), 4);
     }
@@ -142,13 +139,12 @@ mod tests {
     fn liberos_displacements_are_scaled_and_clipped() {
         let code = Profile::named("libero").unwrap().actions;
         let delta = command(&[1.0, -9.0, 0.5, 0.0, 0.0, 2.0, 1.0], &code).unwrap();
-        let expected = ToolCommand::Delta {
+        let motion = ToolMotion::Delta {
             full: false,
             translation_b: Vec3::new(0.05, -0.05, 0.025),
             rotation_b: Vec3::new(0.0, 0.0, 0.5),
-            closure: 1.0,
         };
-        assert_eq!(delta, expected);
+        assert_eq!(delta, ToolCommand { motion, grip: GripCommand::Closure(1.0) });
     }
 
     #[test]
@@ -160,12 +156,10 @@ mod tests {
             scale: [mm, mm, mm, degree, degree, degree],
             offset: [0.5, 0.0, 0.1, 0.0, 0.0, 0.0],
         });
-        let ToolCommand::Pose(action) = command(&[20.0, -30.0, 0.0, 180.0, 0.0, 0.0, 1.0], &code).unwrap()
-        else {
-            panic!("a pose");
-        };
-        assert!((action.position_b - Vec3::new(0.52, -0.03, 0.1)).norm() < 1e-12);
-        assert!((action.axis_angle_b - Vec3::new(std::f64::consts::PI, 0.0, 0.0)).norm() < 1e-12);
+        let decoded = command(&[20.0, -30.0, 0.0, 180.0, 0.0, 0.0, 1.0], &code).unwrap();
+        let ToolMotion::Pose { position_b, axis_angle_b } = decoded.motion else { panic!("a pose") };
+        assert!((position_b - Vec3::new(0.52, -0.03, 0.1)).norm() < 1e-12);
+        assert!((axis_angle_b - Vec3::new(std::f64::consts::PI, 0.0, 0.0)).norm() < 1e-12);
     }
 
     #[test]

@@ -13,27 +13,49 @@ pub struct Action {
     pub axis_angle_b: Vec3,
     /// Gripper closure, 0 (open) ..= 1 (closed).
     pub closure: f64,
+    /// Grip force at which closing stops, N, at most the effort of the gripper. `None` closes to `closure` whatever the
+    /// force; with a force `closure` is 1.
+    pub force_n: Option<f64>,
 }
 
 impl Action {
+    /// An action that commands a closure.
+    pub fn new(position_b: Vec3, axis_angle_b: Vec3, closure: f64) -> Self {
+        Self { position_b, axis_angle_b, closure, force_n: None }
+    }
+
     /// Position, axis-angle and closure: the row of an action in recorded files.
     pub fn to_array(self) -> [f64; 7] {
         let (p, r) = (self.position_b, self.axis_angle_b);
         [p.x, p.y, p.z, r.x, r.y, r.z, self.closure]
     }
 
-    /// Inverse of [`Self::to_array`].
+    /// Inverse of [`Self::to_array`], without a grip force.
     pub fn from_array([x, y, z, rx, ry, rz, closure]: [f64; 7]) -> Self {
-        Self { position_b: Vec3::new(x, y, z), axis_angle_b: Vec3::new(rx, ry, rz), closure }
+        Self::new(Vec3::new(x, y, z), Vec3::new(rx, ry, rz), closure)
     }
 }
 
 /// One entry of an action chunk. [`CommandResolver`](super::CommandResolver) turns it into an [`Action`] in the
 /// control step in which it is executed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ToolCommand {
+pub struct ToolCommand {
+    /// Motion of the tool.
+    pub motion: ToolMotion,
+    /// Command of the gripper.
+    pub grip: GripCommand,
+}
+
+/// Motion of the tool in a [`ToolCommand`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ToolMotion {
     /// An absolute pose.
-    Pose(Action),
+    Pose {
+        /// Position in the base frame, m.
+        position_b: Vec3,
+        /// Orientation in the base frame as axis-angle, rad.
+        axis_angle_b: Vec3,
+    },
     /// A displacement from the measured tool pose.
     Delta {
         /// True to command the displaced pose itself; false to command what robosuite's
@@ -43,9 +65,28 @@ pub enum ToolCommand {
         translation_b: Vec3,
         /// Rotation vector about the axes of the base frame, rad.
         rotation_b: Vec3,
-        /// Gripper closure, 0 (open) ..= 1 (closed).
-        closure: f64,
     },
+}
+
+/// Command of the gripper in a [`ToolCommand`], as the grip code of a profile reads it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum GripCommand {
+    /// A closure, 0 (open) ..= 1 (closed).
+    Closure(f64),
+    /// The closure of an answer in the code two-width, see [`WidthLatch`](super::WidthLatch).
+    TwoWidth(f64),
+    /// A grip force, N, at which closing stops; opens below 0.
+    Force(f64),
+}
+
+impl From<Action> for ToolCommand {
+    fn from(action: Action) -> Self {
+        let Action { position_b, axis_angle_b, closure, force_n } = action;
+        Self {
+            motion: ToolMotion::Pose { position_b, axis_angle_b },
+            grip: force_n.map_or(GripCommand::Closure(closure), GripCommand::Force),
+        }
+    }
 }
 
 /// Response of a policy: the commands of the next control steps.
@@ -57,7 +98,7 @@ pub struct ActionChunk {
 
 impl From<Action> for ActionChunk {
     fn from(action: Action) -> Self {
-        Self { commands: vec![ToolCommand::Pose(action)] }
+        Self { commands: vec![action.into()] }
     }
 }
 
@@ -165,7 +206,7 @@ impl PolicyError {
 ///     fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError> {
 ///         let mut position_b = observation.ee_position_b;
 ///         position_b.z -= 0.005;
-///         Ok(Action { position_b, axis_angle_b: observation.ee_axis_angle_b, closure: 0.0 }.into())
+///         Ok(Action::new(position_b, observation.ee_axis_angle_b, 0.0).into())
 ///     }
 /// }
 /// ```

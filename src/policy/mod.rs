@@ -11,7 +11,11 @@ pub mod osc;
 pub mod profile;
 pub mod remote;
 pub mod transport;
+mod width_latch;
 
-pub use interface::{Action, ActionChunk, Policy, PolicyError, TaskBrief, ToolCommand};
+pub use interface::{
+    Action, ActionChunk, GripCommand, Policy, PolicyError, TaskBrief, ToolCommand, ToolMotion,
+};
 pub use observation::{CameraImage, Observation, PadForce, SensorStreams, TactileFrame, TactileHistory};
 pub use osc::CommandResolver;
+pub use width_latch::WidthLatch;

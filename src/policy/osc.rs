@@ -6,7 +6,7 @@
 //! distance that it does cover. The equation x'' = kp (g − x) − kd x' has the solution x(t) = g + e^{−ωt} ((x₀ − g) +
 //! (v₀ + ω (x₀ − g)) t) with ω = √kp. Position and rotation vector both follow it.
 
-use super::{Action, Observation, ToolCommand};
+use super::{Action, GripCommand, Observation, ToolCommand, ToolMotion, WidthLatch};
 use softvt_benchmark::CONTROL_DT;
 use softvt_geometry::{Quat, Vec3};
 use softvt_robot::rotation;
@@ -14,34 +14,47 @@ use softvt_robot::rotation;
 /// Stiffness of the spring, 1/s².
 const KP: f64 = 150.0;
 
-/// Turns a sequence of commands into absolute poses. Stateful, because a displacement executed by robosuite's
-/// controller depends on the velocity after the previous one.
+/// Turns a sequence of commands into actions. Stateful, because a displacement executed by robosuite's controller
+/// depends on the velocity after the previous one, and a width in the code two-width is held.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CommandResolver {
     /// Velocities of the tool between two control steps, as the spring leaves them; zero after other commands.
     velocity: Vec3,
     angular_velocity: Vec3,
+    latch: WidthLatch,
 }
 
 impl CommandResolver {
-    /// The pose that `command` means in the control step of `observation`.
+    /// The action that `command` means in the control step of `observation`.
     pub fn resolve(&mut self, observation: &Observation, command: ToolCommand) -> Action {
-        let (translation_b, rotation_b, closure) = match command {
-            ToolCommand::Pose(action) => {
-                *self = Self::default();
-                return action;
+        let (closure, force_n) = match command.grip {
+            GripCommand::Closure(closure) => (closure, None),
+            GripCommand::TwoWidth(answer) => (self.latch.closure(answer), None),
+            GripCommand::Force(force) if force < 0.0 => (0.0, None),
+            GripCommand::Force(force) => (1.0, Some(force)),
+        };
+        let pose = match command.motion {
+            ToolMotion::Pose { position_b, axis_angle_b } => {
+                self.stop();
+                Action::new(position_b, axis_angle_b, closure)
             }
-            ToolCommand::Delta { full: true, translation_b, rotation_b, closure } => {
-                *self = Self::default();
-                (translation_b, rotation_b, closure)
-            }
-            ToolCommand::Delta { full: false, translation_b, rotation_b, closure } => {
-                let moved = spring(&translation_b, &mut self.velocity);
-                (moved, spring(&rotation_b, &mut self.angular_velocity), closure)
+            ToolMotion::Delta { full, translation_b, rotation_b } => {
+                let (translation_b, rotation_b) = if full {
+                    self.stop();
+                    (translation_b, rotation_b)
+                } else {
+                    let moved = spring(&translation_b, &mut self.velocity);
+                    (moved, spring(&rotation_b, &mut self.angular_velocity))
+                };
+                let orientation_b = rotation::from_axis_angle(&observation.ee_axis_angle_b);
+                goal(observation.ee_position_b, orientation_b, translation_b, rotation_b, closure)
             }
         };
-        let orientation_b = rotation::from_axis_angle(&observation.ee_axis_angle_b);
-        goal(observation.ee_position_b, orientation_b, translation_b, rotation_b, closure)
+        Action { force_n, ..pose }
+    }
+
+    fn stop(&mut self) {
+        (self.velocity, self.angular_velocity) = (Vec3::zeros(), Vec3::zeros());
     }
 }
 
@@ -55,11 +68,7 @@ pub fn goal(
     closure: f64,
 ) -> Action {
     let orientation = rotation::from_axis_angle(&rotation_b) * orientation_b;
-    Action {
-        position_b: position_b + translation_b,
-        axis_angle_b: rotation::axis_angle(&orientation),
-        closure,
-    }
+    Action::new(position_b + translation_b, rotation::axis_angle(&orientation), closure)
 }
 
 /// Distance that the spring covers in a control step towards a goal at `step`. Updates its velocity.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::SensorStreams;
+use super::{GripCommand, SensorStreams};
 use softvt_robot::Side;
 use softvt_sensing::tactile::MosaicLayout;
 
@@ -173,37 +173,121 @@ pub enum PoseEncoding {
     },
 }
 
-/// Meaning of the gripper's number: the values for open and closed. Values in between mean proportional closures,
-/// unless the encoding is binary.
+/// Grip code: what the seventh number of an action commands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum GripCode {
+    /// Closure, 0 open to 1 closed.
+    #[default]
+    #[value(help = None::<&str>)]
+    Continuous,
+    /// Open, or closed with the whole effort of the hand.
+    #[value(help = None::<&str>)]
+    Binary,
+    /// Open, or the closure of the answers just after closing, held until an answer opens.
+    #[value(help = None::<&str>)]
+    TwoWidth,
+    /// Grip force, N, at which closing stops; opens below 0.
+    #[value(help = None::<&str>)]
+    Force,
+}
+
+impl GripCode {
+    /// All codes.
+    pub const ALL: [Self; 4] = [Self::Continuous, Self::Binary, Self::TwoWidth, Self::Force];
+
+    /// Name in flags and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Continuous => "continuous",
+            Self::Binary => "binary",
+            Self::TwoWidth => "two-width",
+            Self::Force => "force",
+        }
+    }
+
+    /// The code of a name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|code| code.name() == name)
+    }
+}
+
+/// Meaning of the gripper's number: the grip code, and the values for open and closed. Values in between mean
+/// proportional closures, unless the code is binary.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "GripperValuesFile", into = "GripperValuesFile")]
 pub struct GripperValues {
-    /// Value of the open gripper.
+    /// Value of the open gripper. For [`GripCode::Force`] any value below 0 opens.
     pub open: f64,
-    /// Value of the closed gripper.
-    #[serde(rename = "shut", alias = "closed")]
+    /// Value of the closed gripper. For [`GripCode::Force`] values are forces, N.
     pub closed: f64,
-    /// True if every value beyond the middle means closed and every other one open.
-    pub binary: bool,
+    /// What the value commands.
+    pub code: GripCode,
+}
+
+/// [`GripperValues`] as files contain them.
+#[derive(Serialize, Deserialize)]
+struct GripperValuesFile {
+    open: f64,
+    #[serde(rename = "shut", alias = "closed")]
+    closed: f64,
+    #[serde(default)]
+    binary: bool,
+    /// Missing in files of version 0.1.
+    #[serde(default)]
+    code: Option<GripCode>,
+}
+
+impl From<GripperValuesFile> for GripperValues {
+    fn from(GripperValuesFile { open, closed, binary, code }: GripperValuesFile) -> Self {
+        let stated = if binary { GripCode::Binary } else { GripCode::Continuous };
+        Self { open, closed, code: code.unwrap_or(stated) }
+    }
+}
+
+impl From<GripperValues> for GripperValuesFile {
+    fn from(GripperValues { open, closed, code }: GripperValues) -> Self {
+        Self { open, closed, binary: code == GripCode::Binary, code: Some(code) }
+    }
 }
 
 impl GripperValues {
+    /// Grip forces in N; below 0 opens.
+    pub const FORCE: Self = Self { open: -1.0, closed: 1.0, code: GripCode::Force };
+
+    /// The command of a value.
+    pub fn command(&self, value: f64) -> GripCommand {
+        match self.code {
+            GripCode::Continuous | GripCode::Binary => GripCommand::Closure(self.closure(value)),
+            GripCode::TwoWidth => GripCommand::TwoWidth(self.closure(value)),
+            GripCode::Force => GripCommand::Force(value),
+        }
+    }
+
     /// Closure of a value, 0 (open) ..= 1 (closed).
     pub fn closure(&self, value: f64) -> f64 {
         // Adding 0.0 turns −0.0 into 0.0.
         let share = ((value - self.open) / (self.closed - self.open)).clamp(0.0, 1.0) + 0.0;
-        if self.binary { f64::from(u8::from(share > 0.5)) } else { share }
+        match self.code {
+            GripCode::Binary => f64::from(u8::from(share > 0.5)),
+            GripCode::Force => f64::from(u8::from(value >= 0.0)),
+            GripCode::Continuous | GripCode::TwoWidth => share,
+        }
     }
 
-    /// Value of a closure.
-    pub fn value(&self, closure: f64) -> f64 {
-        let share = if self.binary { f64::from(u8::from(closure > 0.5)) } else { closure };
-        self.open + share * (self.closed - self.open)
+    /// The same values in another code. `None` if there are none: a force says nothing about a closure.
+    pub fn with_code(self, code: GripCode) -> Option<Self> {
+        match (self.code, code) {
+            (_, GripCode::Force) => Some(Self::FORCE),
+            (GripCode::Force, _) => None,
+            _ => Some(Self { code, ..self }),
+        }
     }
 }
 
 /// Built-in profiles and their descriptions.
 pub const PROFILES: [(&str, &str); 4] = [
-    ("vision", "both cameras, state, prompt; absolute pose; gripper open or closed"),
+    ("vision", "both cameras, state, prompt; absolute pose; gripper open or closed (binary)"),
     ("visuo_tactile", "vision plus tactile images and markers of 8 frames; continuous gripper"),
     ("softvtbench", "keys and units of the released SoftVTBench client, with true forces (force_observed)"),
     ("libero", "LIBERO's interface: images rotated by 180°, 8 state numbers, delta poses"),
@@ -226,10 +310,10 @@ impl Profile {
             input(both("tactile_image"), InputSource::TactileImage { layout: MosaicLayout::Rows }),
             input(both("tactile_marker_motion"), InputSource::MarkerMotion),
         ];
-        let closure = GripperValues { open: 0.0, closed: 1.0, binary: false };
+        let closure = GripperValues { open: 0.0, closed: 1.0, code: GripCode::Continuous };
         let absolute = |gripper| ActionEncoding::new(PoseEncoding::Absolute, gripper);
         let actions = match name {
-            "vision" => absolute(GripperValues { binary: true, ..closure }),
+            "vision" => absolute(GripperValues { code: GripCode::Binary, ..closure }),
             "visuo_tactile" => {
                 inputs.extend(tactile);
                 absolute(closure)
@@ -239,7 +323,7 @@ impl Profile {
                 inputs.push(input(both("tactile_gripper_force"), InputSource::Force));
                 inputs[3].keys.push("observation/prompt".to_owned());
                 // Commanded position of each finger, m.
-                absolute(GripperValues { open: 0.04, closed: 0.0, binary: false })
+                absolute(GripperValues { open: 0.04, closed: 0.0, code: GripCode::Continuous })
             }
             "libero" => {
                 let turned =
@@ -251,7 +335,7 @@ impl Profile {
                 inputs[..3].iter_mut().for_each(|input| input.keys.truncate(1));
                 ActionEncoding::new(
                     PoseEncoding::DeltaOsc { translation_m: 0.05, rotation_rad: 0.5 },
-                    GripperValues { open: -1.0, closed: 1.0, binary: true },
+                    GripperValues { open: -1.0, closed: 1.0, code: GripCode::Binary },
                 )
             }
             _ => return None,
@@ -310,8 +394,32 @@ mod tests {
         assert_eq!((libero.closure(-0.2), libero.closure(0.2)), (0.0, 1.0));
         let closure = Profile::named("visuo_tactile").unwrap().actions.gripper;
         assert_eq!(closure.closure(0.37), 0.37);
-        for code in [fingers, closure] {
-            assert!((code.closure(code.value(0.62)) - 0.62).abs() < 1e-12);
-        }
+    }
+
+    #[test]
+    fn files_name_the_grip_code_and_those_without_it_are_read() {
+        let binary = Profile::named("vision").unwrap().actions.gripper;
+        let text = serde_json::to_string(&binary).unwrap();
+        assert_eq!(text, r#"{"open":0.0,"shut":1.0,"binary":true,"code":"binary"}"#);
+        assert_eq!(serde_json::from_str::<GripperValues>(&text).unwrap(), binary);
+        let old = r#"{"open":0.0,"shut":1.0,"binary":true}"#;
+        assert_eq!(serde_json::from_str::<GripperValues>(old).unwrap(), binary);
+        let widths = binary.with_code(GripCode::TwoWidth).unwrap();
+        let text = serde_json::to_string(&widths).unwrap();
+        assert!(text.contains(r#""binary":false,"code":"two-width""#), "{text}");
+        assert_eq!(serde_json::from_str::<GripperValues>(&text).unwrap(), widths);
+        assert_eq!(GripCode::named("two-width"), Some(GripCode::TwoWidth));
+        assert_eq!(GripCode::named("twowidth"), None);
+    }
+
+    #[test]
+    fn every_code_reads_its_own_values() {
+        let fingers = Profile::named("softvtbench").unwrap().actions.gripper;
+        let of = |code, value| fingers.with_code(code).unwrap().command(value);
+        assert_eq!(of(GripCode::Continuous, 0.01), GripCommand::Closure(0.75));
+        assert_eq!(of(GripCode::Binary, 0.01), GripCommand::Closure(1.0));
+        assert_eq!(of(GripCode::TwoWidth, 0.01), GripCommand::TwoWidth(0.75));
+        assert_eq!(of(GripCode::Force, 4.5), GripCommand::Force(4.5));
+        assert_eq!(GripperValues::FORCE.with_code(GripCode::Continuous), None);
     }
 }

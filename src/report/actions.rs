@@ -1,5 +1,6 @@
 //! Recorded actions of an episode as a `.npy` file: float64 of shape (steps, 7) with the tool's position (m) and
-//! axis-angle (rad) in the base frame, and the gripper closure.
+//! axis-angle (rad) in the base frame, and the gripper closure. If any action commands a grip force, an eighth column
+//! has it in N, and −1 in the rows of actions that command a closure.
 
 use std::{
     fs,
@@ -14,8 +15,11 @@ use softvt_evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord};
 use softvt_policy::Action;
 use softvt_rollout::checksum;
 
-/// Numbers per action.
+/// Numbers per action, without and with a grip force.
 const WIDTH: usize = 7;
+const WIDTH_WITH_FORCE: usize = 8;
+/// Grip force of an action that commands a closure.
+const NO_FORCE: f64 = -1.0;
 
 /// Error of reading recorded actions.
 #[derive(Debug, thiserror::Error)]
@@ -47,8 +51,11 @@ pub fn path(dir: &Path, index: EpisodeIndex) -> PathBuf {
 /// # Errors
 /// The file cannot be written.
 pub fn write(path: &Path, actions: &[Action]) -> Result<(), FileError> {
-    let numbers = actions.iter().copied().flat_map(Action::to_array);
-    replace(path, NpyArray::from_f64(vec![actions.len(), WIDTH], numbers).to_npy())
+    let has_force = actions.iter().any(|action| action.force_n.is_some());
+    let force = |action: &Action| has_force.then_some(action.force_n.unwrap_or(NO_FORCE));
+    let numbers = actions.iter().flat_map(|action| action.to_array().into_iter().chain(force(action)));
+    let width = if has_force { WIDTH_WITH_FORCE } else { WIDTH };
+    replace(path, NpyArray::from_f64(vec![actions.len(), width], numbers).to_npy())
 }
 
 /// Reads the actions of an episode.
@@ -62,14 +69,19 @@ pub fn read(path: &Path) -> Result<Vec<Action>, ActionsError> {
         Ok(array) => array,
         Err(source) => return Err(ActionsError::Npy { path, source }),
     };
-    if array.dtype != "<f8" || !matches!(array.shape[..], [_, WIDTH]) {
-        return Err(ActionsError::Shape { path, dtype: array.dtype, shape: array.shape });
-    }
+    let width = match array.shape[..] {
+        [_, width @ (WIDTH | WIDTH_WITH_FORCE)] if array.dtype == "<f8" => width,
+        _ => return Err(ActionsError::Shape { path, dtype: array.dtype, shape: array.shape }),
+    };
     let numbers = array.values();
     if !numbers.iter().all(|x| x.is_finite()) {
         return Err(ActionsError::NotFinite { path });
     }
-    Ok(numbers.as_chunks::<WIDTH>().0.iter().copied().map(Action::from_array).collect())
+    let action = |row: &[f64]| Action {
+        force_n: row.get(WIDTH).copied().filter(|force| *force >= 0.0),
+        ..Action::from_array(std::array::from_fn(|i| row[i]))
+    };
+    Ok(numbers.chunks_exact(width).map(action).collect())
 }
 
 /// Checks that the file of an episode below the run folder `dir` holds the actions of its record. Records of earlier
@@ -99,7 +111,7 @@ mod tests {
     #[test]
     fn a_damaged_file_is_found_by_its_checksum() {
         let root = tempfile::tempdir().unwrap();
-        let actions = [Action { position_b: Vec3::x(), axis_angle_b: Vec3::z(), closure: 0.5 }; 3];
+        let actions = [Action::new(Vec3::x(), Vec3::z(), 0.5); 3];
         let mut record = sample_record();
         (record.stats.steps, record.stats.actions_sha256) = (3, Some(checksum(&actions)));
         let at = path(root.path(), record.header.id.index());
@@ -124,10 +136,9 @@ mod tests {
     fn actions_are_read_back_exactly_and_damaged_files_are_named() {
         let root = tempfile::tempdir().unwrap();
         let at = path(root.path(), EpisodeIndex { task: 3, episode: 12 });
-        let one = |i: i32| Action {
-            position_b: Vec3::new(0.1 * f64::from(i), -0.3, 1e-17),
-            axis_angle_b: Vec3::new(3.1, 0.0, 1.0 / 3.0),
-            closure: 0.55,
+        let one = |i: i32| {
+            let position_b = Vec3::new(0.1 * f64::from(i), -0.3, 1e-17);
+            Action::new(position_b, Vec3::new(3.1, 0.0, 1.0 / 3.0), 0.55)
         };
         let actions: Vec<Action> = (0..5).map(one).collect();
         write(&at, &actions).unwrap();
@@ -146,5 +157,8 @@ mod tests {
         }
         write(&at, &[]).unwrap();
         assert_eq!(read(&at).unwrap(), []);
+        let forces = [None, Some(0.0), Some(3.5)].map(|force_n| Action { force_n, ..one(1) });
+        write(&at, &forces).unwrap();
+        assert_eq!(read(&at).unwrap(), forces);
     }
 }

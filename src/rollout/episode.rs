@@ -36,6 +36,7 @@ use softvt_physics::{
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
 use softvt_robot::{
     Side,
+    gripper::GripTarget,
     ik::{LINEARISATION_RANGE, PoseDifference},
     rotation,
 };
@@ -276,11 +277,7 @@ impl Episode {
         let evidence = EvidenceCollector::new(&sim, target, goal);
         let judge = settled_judge(&spec, &sim, &evidence, target, goal);
         let tool = sim.robot.tool_b(&sim.world);
-        let start_hold = Action {
-            position_b: tool.translation.vector,
-            axis_angle_b: rotation::axis_angle(&tool.rotation),
-            closure: 0.0,
-        };
+        let start_hold = Action::new(tool.translation.vector, rotation::axis_angle(&tool.rotation), 0.0);
         let wear_seed = WearSeed::new(&EpisodeSeed::new(&spec.header.id, &spec.task.layout));
         let sensors = SensorSuite::new(&sim, &spec.settings.tactile, sensor_assets).with_wear_seed(wear_seed);
         let recorded = spec.record_states.then(RecordedStates::default);
@@ -359,7 +356,7 @@ impl Episode {
     }
 
     fn advance(&mut self, action: &Action) -> Option<Outcome> {
-        if let Err(error) = check_action(action) {
+        if let Err(error) = check_action(action, self.spec.settings.robot.gripper.effort) {
             return Some(Outcome::Error { message: error.to_string() });
         }
         self.actions.push(*action);
@@ -418,11 +415,8 @@ impl Episode {
         height: Option<usize>,
     ) -> Result<RgbImage, SensingError> {
         let own = self.sensors.camera(camera)?.clone();
-        let camera = Camera {
-            width: width.unwrap_or(own.width),
-            height: height.unwrap_or(own.height),
-            ..own.clone()
-        };
+        let camera =
+            Camera { width: width.unwrap_or(own.width), height: height.unwrap_or(own.height), ..own.clone() };
         let frame = SensorSuite::frame(&self.sim);
         let image = if camera == own {
             self.sensors.render(&frame, &camera)?
@@ -460,7 +454,8 @@ impl Episode {
     fn control_step(&mut self, action: &Action) -> Result<(), StepFailure> {
         let rotation = rotation::from_axis_angle(&action.axis_angle_b);
         let pose_b = Pose::from_parts(action.position_b.into(), rotation);
-        self.sim.robot.command(&mut self.sim.world, &pose_b, action.closure);
+        let grip = action.force_n.map_or(GripTarget::Closure(action.closure), GripTarget::Force);
+        self.sim.robot.command(&mut self.sim.world, &pose_b, grip);
         self.steps += 1;
         let mut worst: Option<Deformation> = None;
         for _ in 0..steps_per_control(self.spec.settings.physics.dt) {
@@ -561,7 +556,7 @@ impl Episode {
 /// SHA-256 of actions, as little-endian float64 numbers; hexadecimal.
 pub fn checksum(actions: &[Action]) -> String {
     let mut hash = Sha256::new();
-    for number in actions.iter().flat_map(|action| action.to_array()) {
+    for number in actions.iter().flat_map(|action| action.to_array().into_iter().chain(action.force_n)) {
         hash.update(number.to_le_bytes());
     }
     hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
@@ -587,10 +582,18 @@ enum ActionError {
     NotFinite([f64; 7]),
     #[error("the action {action:?} holds {number:e}, which is not a pose in m and rad")]
     Implausible { action: [f64; 7], number: f64 },
+    #[error(
+        "the action asks for a grip force of {force_n} N; expected 0 to {effort_n} N (robot.gripper.effort), or less \
+         than 0 to open"
+    )]
+    GripForce { force_n: f64, effort_n: f64 },
 }
 
-/// Checks that the numbers of an action are finite and plausible.
-fn check_action(action: &Action) -> Result<(), ActionError> {
+/// Checks that the numbers of an action are finite and plausible, and a grip force within the effort of the gripper.
+fn check_action(action: &Action, effort_n: f64) -> Result<(), ActionError> {
+    if let Some(force_n) = action.force_n.filter(|force| !(0.0..=effort_n).contains(force)) {
+        return Err(ActionError::GripForce { force_n, effort_n });
+    }
     let action = action.to_array();
     if !action.iter().all(|x| x.is_finite()) {
         return Err(ActionError::NotFinite(action));
@@ -656,10 +659,17 @@ mod tests {
 
     #[test]
     fn far_commands_are_accepted_and_implausible_ones_are_refused() {
-        let action =
-            |x| Action { position_b: Vec3::new(x, 0.0, 0.0), axis_angle_b: Vec3::zeros(), closure: 0.0 };
-        assert!(check_action(&action(-1e5)).is_ok());
-        assert!(check_action(&action(1e308)).is_err_and(|error| error.to_string().contains("not a pose")));
-        assert!(check_action(&action(f64::NAN)).is_err_and(|error| error.to_string().contains("not finite")));
+        let action = |x| Action::new(Vec3::new(x, 0.0, 0.0), Vec3::zeros(), 0.0);
+        let refusal = |action: Action| check_action(&action, 70.0).map_err(|error| error.to_string());
+        assert_eq!(refusal(action(-1e5)), Ok(()));
+        assert!(refusal(action(1e308)).is_err_and(|error| error.contains("not a pose")));
+        assert!(refusal(action(f64::NAN)).is_err_and(|error| error.contains("not finite")));
+        let force = |force_n| refusal(Action { force_n: Some(force_n), ..action(0.5) });
+        assert_eq!(force(70.0), Ok(()));
+        assert!(
+            force(70.1)
+                .is_err_and(|error| error.contains("70.1 N; expected 0 to 70 N (robot.gripper.effort)"))
+        );
+        assert!(force(f64::NAN).is_err());
     }
 }

@@ -10,7 +10,7 @@ use softvt_physics::{
 };
 use softvt_robot::{
     RobotSpec, Side,
-    gripper::{self, GripperSetpoint},
+    gripper::{self, FingerState, GripTarget, GripperSetpoint},
     ik::DiffIk,
     pads::{self, PadSurface},
     panda::{self, ARM_DOFS},
@@ -40,7 +40,7 @@ pub struct RobotInstance {
 #[derive(Clone, Copy, Debug)]
 struct ToolCommand {
     pose_b: Pose,
-    closure: f64,
+    grip: GripTarget,
 }
 
 impl RobotInstance {
@@ -94,25 +94,29 @@ impl RobotInstance {
         }
     }
 
-    /// Sets the command of a control step: tool pose in the base frame, and closure 0 (open) ..= 1 (closed). The robot
-    /// responds to it in the next control step, or `spec.latency` steps later; until then it follows the earlier ones.
-    pub fn command(&mut self, world: &mut World, pose_b: &Pose, closure: f64) {
-        self.delayed.push_back(ToolCommand { pose_b: *pose_b, closure });
+    /// Sets the command of a control step: tool pose in the base frame, and closure or grip force. The robot responds to it
+    /// in the next control step, or `spec.latency` steps later; until then it follows the earlier ones.
+    pub fn command(&mut self, world: &mut World, pose_b: &Pose, grip: GripTarget) {
+        self.delayed.push_back(ToolCommand { pose_b: *pose_b, grip });
         if self.delayed.len() <= self.spec.latency as usize {
             return;
         }
-        let Some(ToolCommand { pose_b, closure }) = self.delayed.pop_front() else { return };
+        let Some(ToolCommand { pose_b, grip }) = self.delayed.pop_front() else { return };
         let target = self.ik.step(&self.q(world), &pose_b);
         let drives = world.articulation_mut(self.articulation).drives_mut();
         drives.iter_mut().flatten().zip(target).for_each(|(drive, q)| drive.target = q);
-        self.gripper.command(closure);
+        self.gripper.command(grip);
     }
 
     /// Advances the finger targets by one physics step; called before the step.
     pub fn advance(&mut self, world: &mut World) {
-        self.gripper.advance(world.params.dt);
-        let target = self.gripper.finger_target();
+        let (dt, width) = (world.params.dt, self.width(world));
         let drives = world.articulation_mut(self.articulation).drives_mut();
+        let fingers = drives[ARM_DOFS..].iter().flatten();
+        // The fingers close towards smaller joint coordinates.
+        let closing_force = -fingers.map(|drive| drive.force).sum::<f64>() / Side::BOTH.len() as f64;
+        self.gripper.advance(dt, FingerState { width, closing_force });
+        let target = self.gripper.finger_target();
         drives[ARM_DOFS..].iter_mut().flatten().for_each(|drive| drive.target = target);
     }
 
@@ -139,7 +143,7 @@ impl RobotInstance {
         gripper::width([q[ARM_DOFS], q[ARM_DOFS + 1]])
     }
 
-    /// Closure of the last command that the robot has responded to, 0..=1.
+    /// Closure of the last command that the robot has responded to, 0..=1; 1 for a grip force.
     pub fn closure(&self) -> f64 {
         self.gripper.closure()
     }

@@ -74,7 +74,8 @@ impl AccessRules {
 
     /// True if the value of a header `Host` names this server. The port is not compared, since a tunnel may change it.
     fn is_own_name(&self, host: &str) -> bool {
-        let Some(name) = host.parse::<Uri>().ok().and_then(|uri| uri.host().map(str::to_ascii_lowercase)) else {
+        let Some(name) = host.parse::<Uri>().ok().and_then(|uri| uri.host().map(str::to_ascii_lowercase))
+        else {
             return false;
         };
         let name = name.trim_start_matches('[').trim_end_matches(']');
@@ -139,7 +140,9 @@ mod tests {
         }
         assert_eq!(status(&local, &[]), 403);
         let any = rules("0.0.0.0", "0.0.0.0", None);
-        for (host, expected) in [("192.0.2.1:8765", 200), ("0.0.0.0:8765", 200), ("localhost", 200), ("robot.lab:8765", 403)] {
+        for (host, expected) in
+            [("192.0.2.1:8765", 200), ("0.0.0.0:8765", 200), ("localhost", 200), ("robot.lab:8765", 403)]
+        {
             assert_eq!(status(&any, &[("Host", host)]), expected, "{host}");
         }
         let named = rules("Robot.Lab", "192.0.2.1", None);
@@ -162,7 +165,8 @@ mod tests {
             let headers = [("Host", "localhost:8765"), ("Origin", origin)];
             assert_eq!(status(&local, &headers), expected, "{origin}");
         }
-        let twice = [("Host", "localhost"), ("Origin", "http://localhost"), ("Origin", "http://evil.example")];
+        let twice =
+            [("Host", "localhost"), ("Origin", "http://localhost"), ("Origin", "http://evil.example")];
         assert_eq!(status(&local, &twice), 403);
         // A name of the attacker that points to this machine.
         let rebound = [("Host", "evil.example"), ("Origin", "http://evil.example")];

@@ -35,6 +35,8 @@ pub struct ServerConfig<'a> {
     pub suites: Vec<Suite>,
     /// Encoding of observations and actions.
     pub profile: Profile,
+    /// Effort of the gripper, N.
+    pub effort_n: f64,
     /// True if clients receive the true state.
     pub privileged: bool,
     /// Base seed of requests without one.

@@ -49,6 +49,7 @@ pub fn hello(config: &ServerConfig, first: &Observation) -> Value {
         "protocol": PROTOCOL,
         "suites": suites.collect::<Vec<_>>(),
         "profile": config.profile.name,
+        "gripper": config.profile.actions.gripper.code.name(),
         "privileged": config.privileged,
         "seed": config.seed,
         "split": config.split.name(),
@@ -56,7 +57,7 @@ pub fn hello(config: &ServerConfig, first: &Observation) -> Value {
     });
     let Value::Map(mut entries) = from_json(&about) else { return typed("hello", []) };
     entries.push(("observation_space".into(), spaces::observation(config, first)));
-    entries.push(("action_space".into(), spaces::action(&config.profile.actions)));
+    entries.push(("action_space".into(), spaces::action(&config.profile.actions, config.effort_n)));
     let kind = (Value::from("type"), Value::from("hello"));
     Value::Map(std::iter::once(kind).chain(entries).collect())
 }

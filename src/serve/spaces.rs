@@ -10,7 +10,10 @@ use softvt_policy::{
     Observation,
     encode::{ObservationEntry, content},
     msgpack::map,
-    profile::{ACTION_LEN, ActionEncoding, ActionUnits, InputSource, PoseEncoding, StatePart},
+    profile::{
+        ACTION_LEN, ActionEncoding, ActionUnits, GripCode, GripperValues, InputSource, PoseEncoding,
+        StatePart,
+    },
 };
 
 /// Bound of positions along any axis of the base frame, m; larger than the reach of the arm.
@@ -41,8 +44,8 @@ pub(super) fn observation(config: &ServerConfig, first: &Observation) -> Value {
     map(entries)
 }
 
-/// Space of the actions.
-pub(super) fn action(encoding: &ActionEncoding) -> Value {
+/// Space of the actions. Grip forces go up to the effort of the gripper.
+pub(super) fn action(encoding: &ActionEncoding, effort_n: f64) -> Value {
     let most = match encoding.pose {
         PoseEncoding::Absolute => {
             [MAX_POSITION_M, MAX_POSITION_M, MAX_POSITION_M, MAX_ANGLE, MAX_ANGLE, MAX_ANGLE]
@@ -54,8 +57,9 @@ pub(super) fn action(encoding: &ActionEncoding) -> Value {
     let end = |i: usize, sign: f64| (sign * scale[i].signum() * most[i] - offset[i]) / scale[i];
     let mut low: Vec<f64> = (0..most.len()).map(|i| end(i, -1.0)).collect();
     let mut high: Vec<f64> = (0..most.len()).map(|i| end(i, 1.0)).collect();
-    low.push(encoding.gripper.open.min(encoding.gripper.closed));
-    high.push(encoding.gripper.open.max(encoding.gripper.closed));
+    let GripperValues { open, closed, code } = encoding.gripper;
+    low.push(open.min(closed));
+    high.push(if code == GripCode::Force { effort_n } else { open.max(closed) });
     array_space("<f8", &[ACTION_LEN], low, high)
 }
 

@@ -72,7 +72,8 @@ fn the_first_good_attempts_are_kept() {
 #[test]
 fn datasets_are_checked_and_reproduced() {
     let project = project();
-    project.succeeds("record x.lua --demos 2 --out a --images video --no-privileged");
+    project.succeeds("record x.lua --demos 2 --out a --images video --no-privileged --gripper two-width");
+    assert_eq!(project.json("a/dataset.json")["gripper"], "two-width");
     let checked = project.succeeds("dataset check a --replay 2").out;
     assert!(checked.contains("2 demonstrations,") && checked.contains("8 videos: OK"), "{checked}");
     assert_eq!(checked.matches("byte-identical, final state").count(), 2, "{checked}");

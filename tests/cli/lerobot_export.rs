@@ -166,6 +166,23 @@ fn both_versions_have_the_same_rows() {
     let gripper: Vec<f32> = binary.iter().map(|row| numbers(field(row, "actions"))[6]).collect();
     assert!(gripper.iter().all(|x| [0.0, 1.0].contains(x)) && gripper.contains(&1.0), "{gripper:?}");
     assert_eq!(project.lines("d/meta/softvt.jsonl")[0]["task_id"], 1);
+    assert_eq!(project.json("c/meta/softvt.json")["gripper"], "continuous");
+    for (code, stream) in [("two-width", "actions_two_width"), ("force", "actions_force")] {
+        project.succeeds(&format!(
+            "dataset export data --format lerobot-v3.0 --gripper {code} --task for --out {code}"
+        ));
+        let stated = project.json(&format!("{code}/meta/softvt.json"));
+        assert_eq!((&stated["gripper"], &stated["source"]), (&code.into(), &stream.into()));
+        let rows = rows(&project.path(&format!("{code}/data/chunk-000/file-000.parquet")));
+        let labels: Vec<f32> = rows.iter().map(|row| numbers(field(row, "actions"))[6]).collect();
+        let open = if code == "force" { -1.0 } else { 0.0 };
+        for (label, closed) in labels.iter().zip(&gripper) {
+            assert_eq!(*label == open, *closed == 0.0, "{code}: {labels:?}");
+        }
+        let held = labels.iter().copied().fold(0.0, f32::max);
+        // The hand is commanded to a closure of 0.6.
+        assert!(if code == "force" { held > 1.0 } else { (held - 0.6).abs() < 1e-6 }, "{code}: {labels:?}");
+    }
 }
 
 #[test]
@@ -181,7 +198,10 @@ fn invalid_exports_are_refused_and_leave_nothing() {
         ("data --format lerobot-v3.0 --out full/mine", "--out full/mine: it is not a folder"),
         ("data --format lerobot-v3.0 --out x --task 7", "--task \"7\" matches no task"),
         ("data --format lerobot-v3.0 --out x --task dance", "--task \"dance\" matches no task"),
-        ("data --format lerobot-v3.0 --out x --gripper wide", "[possible values: binary, continuous]"),
+        (
+            "data --format lerobot-v3.0 --out x --gripper wide",
+            "[possible values: continuous, binary, two-width, force]",
+        ),
         ("data --format lerobot-v2.0 --out x", "[possible values: lerobot-v2.1, lerobot-v3.0]"),
         ("data --out x", "--format"),
         ("data --format lerobot-v2.1", "--out"),

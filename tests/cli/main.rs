@@ -12,6 +12,7 @@ mod documentation;
 mod expert_failure;
 mod external_scorer;
 mod flags;
+mod grip_codes;
 mod initial_state_coverage;
 mod interrupt;
 mod invalid_scenes;

@@ -41,7 +41,7 @@ impl Policy for &mut RecordingPolicy {
     fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError> {
         self.seen.push(observation.clone());
         let (position_b, axis_angle_b) = (observation.ee_position_b, observation.ee_axis_angle_b);
-        Ok(Action { position_b, axis_angle_b, closure: 0.0 }.into())
+        Ok(Action::new(position_b, axis_angle_b, 0.0).into())
     }
 }
 

@@ -175,101 +175,67 @@ fn shut() -> Message {
 
 #[test]
 fn surplus_replies_end_the_run() {
-    let twice = server(9, |_, mut socket| {
+    let address = server(9, |_, mut socket| {
         let _ = socket.send(packed(&Value::Map(Vec::new())));
         while let Some(seen) = observation(&mut socket) {
             let _ = socket.send(hold(&seen, 5));
             let _ = socket.send(shut());
         }
     });
-    let early = server(9, |_, mut socket| {
-        let _ = socket.send(packed(&Value::Map(Vec::new())));
-        answering(socket, |_, seen| Some(hold(seen, 5)));
-    });
-    // The surplus reply leaves after the pong, at the first chunk and at the only one.
-    let late = || {
-        server(9, |_, mut socket| {
-            let _ = socket.send(packed(&Value::Map(Vec::new())));
-            let Some(seen) = observation(&mut socket) else { return };
-            let _ = socket.send(hold(&seen, 50));
-            let _ = socket.read();
-            let _ = socket.flush();
-            thread::sleep(Duration::from_millis(5));
-            let _ = socket.send(shut());
-            let _ = observation(&mut socket);
-        })
-    };
-    for (address, words) in [(twice, ""), (early, ""), (late(), "--replan 5"), (late(), "--replan 50")] {
-        let output = fails(&address, words);
-        assert!(output.contains("sent a message that was not requested"), "{words}: {output}");
-    }
+    let output = fails(&address, "");
+    assert!(output.contains("sent a message that was not requested"), "{output}");
 }
 
 #[test]
-fn the_timeout_holds_while_bytes_arrive() {
-    let metadata = |socket: &mut Socket| {
-        let _ = socket.send(packed(&Value::Map(Vec::new())));
-        let _ = observation(socket);
-    };
-    let pings = move |pause: Duration| {
-        server(9, move |_, mut socket| {
-            metadata(&mut socket);
-            while socket.send(Message::Ping("still there?".into())).is_ok() {
-                thread::sleep(pause);
-            }
-        })
-    };
-    // A byte at a time: a reply, and the answer to a handshake.
-    let trickle = |stream: &mut TcpStream, start: &[u8]| {
-        let _ = stream.write_all(start);
-        while stream.write_all(b"a").is_ok() {
-            thread::sleep(Duration::from_millis(20));
-        }
-    };
-    let reply = server(9, move |_, mut socket| {
-        metadata(&mut socket);
-        trickle(socket.get_mut(), &[0x82, 126, 0xFF, 0xFF]);
-    });
-    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
-    let handshake = format!("ws://{}", listener.local_addr().expect("an address"));
-    thread::spawn(move || {
-        for mut stream in listener.incoming().flatten() {
-            trickle(&mut stream, b"HTTP/1.1 101 Switching Protocols\r\nX-Long: ");
-        }
-    });
-    for (address, words) in [
-        (pings(Duration::from_millis(10)), "did not answer within 1 s"),
-        (pings(Duration::ZERO), "did not answer within 1 s"),
-        (reply, "did not answer within 1 s"),
-        (handshake, "tried for 1 s"),
-    ] {
-        let output = fails(&address, "--policy-timeout 1");
-        assert!(output.contains(words), "{words}: {output}");
-    }
-}
-
-#[test]
-fn connections_end_with_a_close_frame() {
-    let (sender, closed) = std::sync::mpsc::channel();
+fn the_timeout_holds_while_pings_arrive() {
     let address = server(9, move |_, mut socket| {
         let _ = socket.send(packed(&Value::Map(Vec::new())));
-        while let Ok(message) = socket.read() {
-            match message {
-                Message::Binary(bytes) => {
-                    let seen = rmpv::decode::read_value(&mut &bytes[..]).expect("msgpack");
-                    let _ = socket.send(hold(&seen, 50));
-                }
-                Message::Close(frame) => {
-                    let _ = socket.flush();
-                    let _ = sender.send(frame.map(|frame| u16::from(frame.code)));
-                }
-                _ => {}
-            }
+        let _ = observation(&mut socket);
+        while socket.send(Message::Ping("still there?".into())).is_ok() {
+            thread::sleep(Duration::from_millis(10));
         }
     });
+    let output = fails(&address, "--policy-timeout 2");
+    assert!(output.contains("did not answer within 2 s"), "{output}");
+}
+
+#[test]
+fn the_grip_code_of_a_run_is_stated_and_compared_with_that_of_the_server() {
+    let stating = |code: &'static str| {
+        server(9, move |_, mut socket| {
+            let _ = socket.send(packed(&Value::Map(vec![(text("gripper"), text(code))])));
+            while let Some(seen) = observation(&mut socket) {
+                let state = state(&seen);
+                let row = std::array::from_fn(|i| if i < 6 { state[i] } else { 2.5 });
+                let _ = socket.send(packed(&actions(50, row)));
+            }
+        })
+    };
+    let output = fails(&stating("continuous"), "");
+    assert!(
+        output.contains("the grip code continuous") && output.contains("vision reads binary"),
+        "{output}"
+    );
     let project = project();
-    assert_eq!(run(&project, &address, "--episodes 2").code, 0);
-    assert_eq!(closed.recv_timeout(Duration::from_secs(5)), Ok(Some(1000)));
+    let output = run(&project, &stating("force"), "--gripper force");
+    assert_eq!(output.code, 0, "{}", output.err);
+    assert!(output.err.contains("gripper: force (profile vision)"), "{}", output.err);
+    let info = project.json("run/run.json");
+    assert_eq!(
+        (&info["gripper"], &info["profile"]["actions"]["gripper"]["code"]),
+        (&"force".into(), &"force".into())
+    );
+    assert!(project.succeeds("replay run 0/0").out.contains("byte-identical"), "the force is recorded");
+    let message = project.refusal("x.lua --out other --policy ws://127.0.0.1:9 --gripper wide");
+    assert!(message.contains("[possible values: continuous, binary, two-width, force]"), "{message}");
+    let message = project.refusal("x.lua --out other --policy noop --gripper force");
+    assert!(message.contains("--gripper: applies to policy servers only"), "{message}");
+    let address = stating("force");
+    project.succeeds(&format!(
+        "x.lua --policy {address} --profile vision --gripper force --set robot.gripper.effort=2 --out strong"
+    ));
+    let outcome = project.lines("strong/episodes.jsonl")[0]["outcome"]["message"].clone();
+    assert!(outcome.as_str().is_some_and(|text| text.contains("2.5 N; expected 0 to 2 N")), "{outcome}");
 }
 
 #[test]
@@ -342,7 +308,10 @@ fn malformed_replies_are_reported() {
         (Message::binary(vec![0xDD, 0xFF, 0xFF, 0xFF, 0xFF]), "msgpack"),
         (Message::binary(vec![0x91; 5000]), "msgpack"),
         (Message::binary(Vec::new()), "msgpack"),
-        (Message::binary([&[0xDD, 0, 0x20, 0, 0][..], &[0xC0; 2 << 20]].concat()), "more than 1048576 values"),
+        (
+            Message::binary([&[0xDD, 0, 0x20, 0, 0][..], &[0xC0; 2 << 20]].concat()),
+            "more than 1048576 values",
+        ),
     ] {
         let address = server(9, move |_, socket| answering(socket, |_, _| Some(reply.clone())));
         let output = fails(&address, "");

@@ -14,6 +14,7 @@ from PIL import Image
 
 PICTURES = {"image": "agentview_rgb", "wrist_image": "eye_in_hand_rgb", "tactile_image": None}
 ORDER = [*PICTURES, "state", "actions", "tactile_marker_motion", "timestamp", "frame_index", "episode_index", "index", "task_index"]
+STREAMS = {"continuous": "actions", "binary": "actions_binary", "two-width": "actions_two_width", "force": "actions_force"}
 QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
 PLAIN = {"timestamp": "float32", "frame_index": "int64", "episode_index": "int64", "index": "int64", "task_index": "int64"}
 
@@ -108,7 +109,7 @@ def compare(table, demo, numbers, pattern, gripper):
     for name in ("state", "actions", "tactile_marker_motion"):
         held[name] = stacked(table[name])
     assert (held["state"] == demo["obs/state"][:].astype(np.float32)).all()
-    assert (held["actions"] == demo["actions_binary" if gripper == "binary" else "actions"][:].astype(np.float32)).all()
+    assert (held["actions"] == demo[STREAMS[gripper]][:].astype(np.float32)).all()
     assert (held["tactile_marker_motion"] == markers(demo)).all()
     for name, stream in PICTURES.items():
         held[name] = decoded(table[name], pattern)

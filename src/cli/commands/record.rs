@@ -52,20 +52,25 @@ pub(crate) struct RecordArgs {
 /// The script has no suite, the folder contains something else, an attempt or a file fails, or too
 /// few attempts are good.
 pub(super) fn run(args: RecordArgs) -> Result<(), CliError> {
-    let (recording, demos) = (&args.recording, args.demos);
+    let (mut policy, mut recording, demos) = (args.policy, args.recording, args.demos);
+    recording.gripper = policy.take_export_code();
+    let recording = &recording;
     let config = recording.run_config(args.script, args.tasks)?;
     let default_attempts = demos.saturating_mul(ATTEMPTS_PER_DEMO).max(MIN_ATTEMPTS);
     let max_attempts = args.attempts.unwrap_or(default_attempts);
-    let (config, loaded) = config.load_plan("record", &args.policy)?;
+    let (config, loaded) = config.load_plan("record", &policy)?;
     let suites = select_suites("record", &config, &loaded.plan)?;
     let names: Vec<String> = suites.iter().map(|suite| config.suite_name(suite)).collect();
-    let request = json!({
+    let mut request = json!({
         "softvt": env!("CARGO_PKG_VERSION"),
         "demos": demos,
         "pictures": recording.has_hdf5_images(),
         "privileged": !recording.no_privileged,
         "suites": names,
     });
+    if let Some(code) = recording.gripper {
+        request["gripper"] = json!(code);
+    }
     record_all(recording, &request, || {
         let prepare = |suite| {
             let tasks = select_tasks(&config, suite)?;

@@ -6,7 +6,7 @@ use clap::Parser;
 
 use crate::{
     error::{CliError, Exit},
-    output::{print, print_json},
+    output::{eprint_notice, print, print_json},
     run::{
         conditions,
         config::{RunConfig, RunFlags, ScriptArgs},
@@ -22,6 +22,7 @@ use crate::{
 use softvt_benchmark::Plan;
 use softvt_common::text::counted;
 use softvt_evaluation::record::{EpisodeRecord, Outcome};
+use softvt_policy::profile::Profile;
 use softvt_report::{run_folder::RunFolder, terminal};
 
 /// A safety-aware visuo-tactile manipulation benchmark for soft objects, on an ordinary CPU
@@ -53,6 +54,10 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
     let (config, loaded) =
         RunConfig::new(args.script, args.flags)?.load_plan(plan_flags::RUN, &args.policy)?;
     let (config, flags) = (&config, &config.flags);
+    if let Some(server) = config.policy.server() {
+        let Profile { name, actions, .. } = &server.profile;
+        eprint_notice(format!("gripper: {} (profile {name})", actions.gripper.code.name()));
+    }
     check_video_episodes(config, &loaded.plan)?;
     check_recorded_episodes(config, &loaded.plan)?;
     match &loaded.plan {

@@ -96,6 +96,7 @@ pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
     let server_config = ServerConfig {
         suites: suites.iter().map(named).collect(),
         profile,
+        effort_n: runs.iter().map(|run| run.settings.robot.gripper.effort).fold(f64::INFINITY, f64::min),
         privileged: args.privileged,
         seed: config.script.seed,
         split: args.split,

@@ -350,8 +350,7 @@ mod tests {
 
         fn act(&mut self, seen: &Observation) -> Result<ActionChunk, PolicyError> {
             seen.forces.as_ref().ok_or(PolicyError::Action("no forces".to_owned()))?;
-            Ok(Action { position_b: seen.ee_position_b, axis_angle_b: seen.ee_axis_angle_b, closure: 0.0 }
-                .into())
+            Ok(Action::new(seen.ee_position_b, seen.ee_axis_angle_b, 0.0).into())
         }
     }
 

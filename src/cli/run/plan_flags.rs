@@ -100,7 +100,7 @@ static DECISIONS: &[Decision] = &[
     Decision { commands: &["serve"], flags: POLICY_SERVER, acts_on: &[] },
     Decision {
         commands: &["serve"],
-        flags: &["profile", "gripper", "host", "port", "threads", "split", "privileged"],
+        flags: &["profile", "gripper", "host", "port", "threads", "split", "privileged", "token"],
         acts_on: SUITES,
     },
 ];
@@ -201,6 +201,7 @@ mod tests {
         ("port", "--port 0"),
         ("split", "--split validation"),
         ("privileged", "--privileged"),
+        ("token", "--token secret"),
     ];
 
     const SUITE: &str = r#"local box = softvt.asset { name = "box", shape = softvt.shape.box { size = { 0.1, 0.1, 0.02 } }:grounded(), body = softvt.static {} }

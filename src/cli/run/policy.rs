@@ -12,11 +12,11 @@ use clap::{Args, ValueEnum, value_parser};
 use crate::{error::CliError, run::recorded_runs::RecordedRuns};
 use softvt_benchmark::seed::RandomStream;
 use softvt_common::text;
-use softvt_dataset::{layout::is_dataset, lerobot::GripperCoding};
+use softvt_dataset::layout::is_dataset;
 use softvt_policy::{
     Policy, SensorStreams, TaskBrief, builtin,
     builtin::RecordedPolicy,
-    profile::{PROFILES, Profile},
+    profile::{GripCode, PROFILES, Profile},
     remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},
 };
 use softvt_rollout::{ChunkedPolicy, Controller, cancel};
@@ -43,9 +43,9 @@ pub(crate) struct PolicyArgs {
     /// Protocol of a policy server [default: openpi]
     #[arg(long, value_name = "PROTOCOL")]
     protocol: Option<Protocol>,
-    /// Override the gripper mode of the profile
-    #[arg(long, value_name = "MODE")]
-    gripper: Option<GripperCoding>,
+    /// Grip code, the meaning of an action's seventh number, in place of that of the profile: docs/policies.md
+    #[arg(long, value_name = "CODE")]
+    gripper: Option<GripCode>,
     /// Actions executed from each predicted chunk [default: 10 for servers]
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..))]
     replan: Option<u16>,
@@ -55,6 +55,13 @@ pub(crate) struct PolicyArgs {
     /// Policy name shown in the results
     #[arg(long, value_name = "NAME", value_parser = parse_name)]
     name: Option<String>,
+}
+
+impl PolicyArgs {
+    /// The grip code that exports of a recording use. It is not that of a profile unless the policy is a server.
+    pub(crate) fn take_export_code(&mut self) -> Option<GripCode> {
+        if matches!(self.policy, PolicyArg::Server(_)) { self.gripper } else { self.gripper.take() }
+    }
 }
 
 /// Value of `--policy`.
@@ -368,8 +375,14 @@ pub(crate) fn load_profile_of(args: &PolicyArgs) -> Result<(Profile, BTreeMap<St
         Some(profile) => (profile, BTreeMap::new()),
         None => load_profile(Path::new(name))?,
     };
-    if let Some(mode) = args.gripper {
-        profile.actions.gripper.binary = mode == GripperCoding::Binary;
+    if let Some(code) = args.gripper {
+        let values = profile.actions.gripper.with_code(code).ok_or_else(|| {
+            CliError::input(format!(
+                "--gripper {}: --profile {name} has grip forces, and no values for open and closed",
+                code.name()
+            ))
+        })?;
+        profile.actions.gripper = values;
     }
     Ok((profile, sources))
 }
@@ -443,7 +456,7 @@ mod tests {
             ("--protocol", PolicyArgs { protocol: Some(Protocol::VlaEval), ..noop() }),
             (
                 "--gripper",
-                PolicyArgs { gripper: Some(GripperCoding::Binary), ..args(PolicyArg::Lua("x.lua".into())) },
+                PolicyArgs { gripper: Some(GripCode::Binary), ..args(PolicyArg::Lua("x.lua".into())) },
             ),
             ("--policy-timeout", PolicyArgs { policy_timeout: Some(DEFAULT_TIMEOUT), ..args(servo) }),
         ] {

@@ -46,7 +46,7 @@ use softvt_evaluation::{
     episode_id::{EpisodeIndex, Split},
     record::{EpisodeRecord, Origin, Outcome},
 };
-use softvt_policy::builtin::RecordedPolicy;
+use softvt_policy::{builtin::RecordedPolicy, profile::GripCode};
 use softvt_report::{actions, run_folder::RunFolder};
 use softvt_rollout::{ChunkedPolicy, EpisodeError, FinishedEpisode, SettleError, cancel};
 use softvt_scene::InitialState;
@@ -73,6 +73,9 @@ pub(crate) struct RecordingArgs {
     /// Continue the interrupted recording in --out, if there is one
     #[arg(long)]
     pub resume: bool,
+    /// Grip code of exports that name none.
+    #[arg(skip)]
+    pub gripper: Option<GripCode>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -537,6 +540,7 @@ fn write_summary(
         fps: CONTROL_HZ,
         has_images: args.has_hdf5_images(),
         has_privileged: !args.no_privileged,
+        gripper: args.gripper,
         imported: suites.first().map(|suite| suite.run.imported.clone()).unwrap_or_default(),
         tasks,
     };

@@ -15,7 +15,7 @@ use crate::{
 use softvt_benchmark::{ShiftValue, Task, settings::Settings, variation::VariationRanges};
 use softvt_common::files;
 use softvt_dataset::card::Imported;
-use softvt_policy::profile::Profile;
+use softvt_policy::profile::{GripCode, Profile};
 use softvt_report::{
     run_folder::{RUN, RunFolder},
     stored_run,
@@ -40,6 +40,9 @@ pub(crate) struct RunManifest<'a> {
     /// Profile of a policy server.
     #[serde(skip_serializing_if = "Option::is_none")]
     profile: Option<&'a Profile>,
+    /// Grip code of the profile.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gripper: Option<GripCode>,
     /// File of a policy in Lua. Its SHA-256 is among the sources.
     #[serde(skip_serializing_if = "Option::is_none")]
     policy_file: Option<&'a str>,
@@ -91,6 +94,7 @@ impl<'a> RunManifest<'a> {
             vary: config.script.vary.as_ref().map(|file| file.display().to_string()),
             policy: &config.policy.name,
             profile: config.policy.server().map(|server| &server.profile),
+            gripper: config.policy.server().map(|server| server.profile.actions.gripper.code),
             policy_file: config.policy.file.as_deref(),
             replayed: run.replay_source.as_ref(),
             imported: Some(&run.imported[..]).filter(|files| !files.is_empty()),

@@ -5,6 +5,7 @@ use std::{collections::BTreeMap, path::Path};
 use super::{
     DatasetError, StreamValues, TaskFile,
     card::Card,
+    demonstration::actions_stream,
     layout::{IMAGE_STREAMS, MANIFEST},
     manifest::{self, ManifestEntry},
     video,
@@ -12,6 +13,7 @@ use super::{
 use softvt_benchmark::{CONTROL_DT, CONTROL_HZ};
 use softvt_common::files::FileError;
 use softvt_geometry::{Quat, Vec3};
+use softvt_policy::profile::GripCode;
 use softvt_robot::rotation;
 use softvt_sensing::tactile::MARKER_COUNT;
 
@@ -221,6 +223,30 @@ impl DemoCheck<'_> {
         }
     }
 
+    /// Checks the actions in a grip code that recordings of version 0.1 do not have.
+    fn check_grip_labels(&mut self, code: GripCode, actions: &[f64], binary: &[f64]) {
+        let name = actions_stream(code);
+        let names = self.findings.take(self.file.names(self.demo)).unwrap_or_default();
+        if !names.iter().any(|own| own == name) {
+            return;
+        }
+        let labels =
+            self.findings.take(self.file.array(self.demo, name)).map_or(Vec::new(), |array| array.values);
+        if labels.len() != actions.len() {
+            return self.add(name, format!("{} numbers, expected {}", labels.len(), actions.len()));
+        }
+        let rows = labels.chunks_exact(7).zip(actions.chunks_exact(7)).zip(binary.chunks_exact(7));
+        let is_label = |label: f64, is_closed: bool| match code {
+            GripCode::Force => (label >= 0.0) == is_closed && label.is_finite(),
+            _ => (0.0..=1.0).contains(&label) && (is_closed || label == 0.0),
+        };
+        let mut bad =
+            rows.map(|((row, action), binary)| row[..6] != action[..6] || !is_label(row[6], binary[6] > 0.5));
+        if let Some(step) = bad.position(|is_bad| is_bad) {
+            self.add(name, format!("step {step}: not the actions in the grip code {}", code.name()));
+        }
+    }
+
     /// Checks relations between streams.
     fn check_relations(&mut self) {
         let (file, demo) = (self.file, self.demo);
@@ -250,6 +276,9 @@ impl DemoCheck<'_> {
         let mut both = actions.chunks_exact(7).zip(binary.chunks_exact(7));
         if let Some(step) = both.position(|pair| !is_binary_of(pair)) {
             self.add("actions_binary", format!("step {step}: not the actions with a gripper of 0 or 1"));
+        }
+        for code in [GripCode::TwoWidth, GripCode::Force] {
+            self.check_grip_labels(code, &actions, &binary);
         }
     }
 }

@@ -32,10 +32,9 @@ fn demonstration(salt: f64) -> Demonstration {
     let mut demonstration = Demonstration {
         record: serde_json::from_str(include_str!("../../../tests/data/episode_record.json"))
             .expect("a valid record"),
-        actions: (0..STEPS)
-            .map(|step| Action { position_b: place(step), axis_angle_b: turn(step), closure: 0.3 })
-            .collect(),
+        actions: (0..STEPS).map(|step| Action::new(place(step), turn(step), 0.3)).collect(),
         gripper_closed: (0..STEPS).map(|step| step > 4).collect(),
+        grip_labels_n: Some((0..STEPS).map(|step| if step > 4 { 2.5 } else { -1.0 }).collect()),
         observed: vec![
             DataStream::f64("obs/eef_pose", &[7], each(&pose)),
             DataStream::f64("obs/state", &[7], each(&state)),

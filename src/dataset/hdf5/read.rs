@@ -10,10 +10,10 @@ use std::{
 use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group, Hdf5Error};
 use serde_json::Value;
 
-use super::super::{DataStream, DatasetError, Demonstration, StreamValues};
+use super::super::{DataStream, DatasetError, Demonstration, StreamValues, demonstration::actions_stream};
 use softvt_common::files::FileError;
 use softvt_evaluation::record::EpisodeRecord;
-use softvt_policy::Action;
+use softvt_policy::{Action, profile::GripCode};
 
 /// The HDF5 file of a task, with the demonstrations `/data/demo_0`, `/data/demo_1`, …
 pub struct TaskFile {
@@ -313,10 +313,14 @@ impl TaskFile {
     /// The demonstration was not recorded by softvt, or the file is damaged.
     pub fn read(&self, demo: usize) -> Result<Demonstration, DatasetError> {
         let binary = self.array(demo, "actions_binary")?.values;
+        let forces = actions_stream(GripCode::Force);
+        let has_forces = self.names(demo)?.iter().any(|name| name == forces);
+        let forces = has_forces.then(|| self.array(demo, forces)).transpose()?;
         let mut read = Demonstration {
             record: self.record(demo)?,
             actions: self.actions(demo)?,
             gripper_closed: binary.chunks(7).map(|row| row[6] > 0.5).collect(),
+            grip_labels_n: forces.map(|rows| rows.values.chunks(7).map(|row| row[6]).collect()),
             observed: Vec::new(),
             privileged: Vec::new(),
         };

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use softvt_geometry::Pose;
-use softvt_policy::ToolCommand;
+use softvt_policy::{GripCommand, ToolCommand};
 use softvt_scene::InitialState;
 
 /// Layouts that can be imported.
@@ -109,10 +109,7 @@ impl ForeignDemo {
         let stopped =
             self.commands.iter_mut().zip(&self.is_stopped_by_object).filter(|(_, stopped)| **stopped);
         for (command, _) in stopped {
-            match command {
-                ToolCommand::Pose(action) => action.closure = 1.0,
-                ToolCommand::Delta { closure, .. } => *closure = 1.0,
-            }
+            command.grip = GripCommand::Closure(1.0);
         }
     }
 }

@@ -16,7 +16,7 @@ use super::{
 };
 use softvt_geometry::{Pose, Quat, Vec3};
 use softvt_policy::{
-    ToolCommand, decode, osc,
+    Action, GripCommand, ToolCommand, ToolMotion, decode, osc,
     profile::{ActionEncoding, PoseEncoding, Profile},
 };
 use softvt_robot::{ik::ArmAngles, rotation};
@@ -67,7 +67,7 @@ pub(super) fn demo(reader: DemoReader, header: &Header) -> Result<ForeignDemo, D
         task: header.task(reader.file, reader.demo),
         gripper_closed: steps
             .iter()
-            .map(|step| matches!(step, ToolCommand::Delta { closure, .. } if *closure > 0.5))
+            .map(|step| matches!(step.grip, GripCommand::Closure(closure) if closure > 0.5))
             .collect(),
         is_stopped_by_object: vec![false; commands.len()],
         commands,
@@ -258,13 +258,14 @@ fn site_poses(reader: DemoReader, steps: usize) -> Result<Option<RecordedPoses>,
 pub(super) fn goals(tool_b: &[Pose], steps: &[ToolCommand]) -> Vec<ToolCommand> {
     let mut goal_rotation = tool_b.first().map_or(Quat::identity(), |pose| pose.rotation);
     let goal = |(pose, step): (&Pose, &ToolCommand)| {
-        let ToolCommand::Delta { translation_b, rotation_b, closure, .. } = *step else { return *step };
+        let ToolMotion::Delta { translation_b, rotation_b, .. } = step.motion else { return *step };
         if rotation_b != Vec3::zeros() {
             goal_rotation = pose.rotation;
         }
-        let action = osc::goal(pose.translation.vector, goal_rotation, translation_b, rotation_b, closure);
-        goal_rotation = rotation::from_axis_angle(&action.axis_angle_b);
-        ToolCommand::Pose(action)
+        let Action { position_b, axis_angle_b, .. } =
+            osc::goal(pose.translation.vector, goal_rotation, translation_b, rotation_b, 0.0);
+        goal_rotation = rotation::from_axis_angle(&axis_angle_b);
+        ToolCommand { motion: ToolMotion::Pose { position_b, axis_angle_b }, ..*step }
     };
     tool_b.iter().zip(steps).map(goal).collect()
 }

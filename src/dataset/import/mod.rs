@@ -59,7 +59,7 @@ fn softvt_demo(reader: DemoReader) -> Result<ForeignDemo, DatasetError> {
         return Err(reader.error("metadata_json", what));
     }
     let commands: Vec<ToolCommand> =
-        reader.file.actions(reader.demo)?.into_iter().map(ToolCommand::Pose).collect();
+        reader.file.actions(reader.demo)?.into_iter().map(ToolCommand::from).collect();
     let binary = reader.rows::<7>("actions_binary", Some(commands.len()))?;
     Ok(ForeignDemo {
         name: format!("demo_{}", reader.demo),

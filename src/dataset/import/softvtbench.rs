@@ -11,7 +11,10 @@ use super::{
     tool_pose::{self, RecordedPoses},
 };
 use softvt_geometry::{Pose, Quat, Vec3};
-use softvt_policy::{Action, ToolCommand, profile::GripperValues};
+use softvt_policy::{
+    Action, ToolCommand,
+    profile::{GripCode, GripperValues},
+};
 use softvt_robot::rotation;
 
 const POSES: &str = "obs/eef_pose";
@@ -33,8 +36,8 @@ const MEASURED_TOLERANCE: f64 = 1e-4;
 /// Range of finger positions, m, with some slack.
 const FINGER_RANGE: [f64; 2] = [-0.001, 0.045];
 /// The two encodings of the gripper in actions.
-const FINGER_POSITION: GripperValues = GripperValues { open: 0.04, closed: 0.0, binary: false };
-const SIGN: GripperValues = GripperValues { open: 1.0, closed: -1.0, binary: true };
+const FINGER_POSITION: GripperValues = GripperValues { open: 0.04, closed: 0.0, code: GripCode::Continuous };
+const SIGN: GripperValues = GripperValues { open: 1.0, closed: -1.0, code: GripCode::Binary };
 
 /// An action of 7 numbers.
 struct RecordedAction {
@@ -73,11 +76,8 @@ pub(super) fn demo(reader: DemoReader, header: &Header) -> Result<ForeignDemo, D
     let gripper = gripper_encoding(reader, &actions)?;
     let is_measured = fingers_are_measured(reader, &actions)?;
     let command = |action: &RecordedAction| {
-        ToolCommand::Pose(Action {
-            position_b: action.position() - action.rotation() * offset_t,
-            axis_angle_b: action.axis_angle(),
-            closure: gripper.closure(action.gripper()),
-        })
+        let position_b = action.position() - action.rotation() * offset_t;
+        ToolCommand::from(Action::new(position_b, action.axis_angle(), gripper.closure(action.gripper())))
     };
     let start = initial_joints(reader)?;
     Ok(ForeignDemo {

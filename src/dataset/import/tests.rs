@@ -8,7 +8,7 @@ use super::{libero::goals, mujoco::MujocoModel, *};
 use crate::hdf5::{ChunkedSteps, write_file};
 use softvt_benchmark::CONTROL_DT;
 use softvt_geometry::{Pose, Quat, Vec3};
-use softvt_policy::{Action, ToolCommand};
+use softvt_policy::{Action, GripCommand, ToolCommand, ToolMotion};
 use softvt_robot::{IkSpec, ik::DiffIk, rotation};
 
 const STEPS: usize = 6;
@@ -134,9 +134,11 @@ impl FileBuilder {
 }
 
 fn poses(demo: &ForeignDemo) -> Vec<Action> {
-    let pose = |command: &ToolCommand| match command {
-        ToolCommand::Pose(action) => *action,
-        ToolCommand::Delta { .. } => panic!("a step"),
+    let pose = |command: &ToolCommand| match (command.motion, command.grip) {
+        (ToolMotion::Pose { position_b, axis_angle_b }, GripCommand::Closure(closure)) => {
+            Action::new(position_b, axis_angle_b, closure)
+        }
+        _ => panic!("a pose and a closure"),
     };
     demo.commands.iter().map(pose).collect()
 }
@@ -199,7 +201,7 @@ fn without_joints_the_recorded_tool_is_transformed_to_our_frames() {
     assert!(lost.refusal().contains("the robot's position is not known"));
     // Without poses, steps stay relative and follow robosuite's spring.
     let (_, demo) = FileBuilder::libero().without("obs/").without("states").read();
-    let ToolCommand::Delta { full: false, translation_b, rotation_b, .. } = demo.commands[1] else {
+    let ToolMotion::Delta { full: false, translation_b, rotation_b } = demo.commands[1].motion else {
         panic!("no step")
     };
     let [x, _, _, _, b, _, _] = share(1);
@@ -234,16 +236,14 @@ fn robomimics_quaternions_in_another_order_are_detected_by_the_joints() {
 #[test]
 fn a_goal_without_rotation_keeps_the_last_goals_orientation() {
     let tool = [tool(0), tool(1), tool(2)];
-    let step = |turn: Vec3| ToolCommand::Delta {
-        full: false,
-        translation_b: Vec3::x(),
-        rotation_b: turn,
-        closure: 0.0,
+    let step = |turn: Vec3| ToolCommand {
+        motion: ToolMotion::Delta { full: false, translation_b: Vec3::x(), rotation_b: turn },
+        grip: GripCommand::Closure(0.0),
     };
     let found = goals(&tool, &[step(Vec3::zeros()), step(Vec3::z() * 0.1), step(Vec3::zeros())]);
-    let turned = |k: usize| match found[k] {
-        ToolCommand::Pose(action) => rotation::from_axis_angle(&action.axis_angle_b),
-        ToolCommand::Delta { .. } => panic!("a step"),
+    let turned = |k: usize| match found[k].motion {
+        ToolMotion::Pose { axis_angle_b, .. } => rotation::from_axis_angle(&axis_angle_b),
+        ToolMotion::Delta { .. } => panic!("a step"),
     };
     let spun = Quat::from_axis_angle(&Vec3::z_axis(), 0.1) * tool[1].rotation;
     assert!(turned(0).angle_to(&tool[0].rotation) < 1e-9);

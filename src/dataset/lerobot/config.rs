@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 
+use softvt_policy::profile::GripCode;
+
 /// Version of LeRobot's dataset layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum LeRobotVersion {
@@ -15,17 +17,6 @@ pub enum LeRobotVersion {
     V30,
 }
 
-/// Encoding of the gripper in the seventh number of an action.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum GripperCoding {
-    /// 1 while the gripper is commanded to hold, else 0.
-    #[value(help = None::<&str>)]
-    Binary,
-    /// Closure, 0 open to 1 closed.
-    #[value(help = None::<&str>)]
-    Continuous,
-}
-
 /// Options of an export.
 #[derive(Clone, Debug)]
 pub struct ExportConfig {
@@ -34,7 +25,8 @@ pub struct ExportConfig {
     /// Output folder; must not exist or be empty.
     pub out: PathBuf,
     pub version: LeRobotVersion,
-    pub gripper: GripperCoding,
+    /// Code of the seventh number of an action.
+    pub gripper: GripCode,
     /// Tasks to export, each an index or part of a prompt; empty for all.
     pub tasks: Vec<String>,
     /// Number of threads. The files do not depend on it.
@@ -78,16 +70,6 @@ impl LeRobotVersion {
         match self {
             Self::V21 => "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet",
             Self::V30 => "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
-        }
-    }
-}
-
-impl GripperCoding {
-    /// Name in `softvt.jsonl`.
-    pub(super) fn code(self) -> &'static str {
-        match self {
-            Self::Continuous => "continuous",
-            Self::Binary => "binary",
         }
     }
 }

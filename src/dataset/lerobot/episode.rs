@@ -3,13 +3,13 @@
 use image::{ImageError, RgbImage};
 
 use super::{
-    config::{ExportConfig, GripperCoding, LeRobotVersion},
+    config::{ExportConfig, LeRobotVersion},
     features::{IMAGE_FEATURES, INDEX_FEATURES, MARKER_SHAPE, VECTOR_LENGTH},
     parquet_table::{ColumnValues, EmbeddedImage},
     selection::{ImageSize, SelectedDemo, Selection},
     statistics::{FeatureStatistics, QuantileSource, ValueCounts, ValueMoments, ValueStatistics},
 };
-use crate::{DatasetError, ImageBlock, TaskFile, layout::IMAGE_STREAMS};
+use crate::{DatasetError, ImageBlock, TaskFile, demonstration::actions_stream, layout::IMAGE_STREAMS};
 use softvt_benchmark::CONTROL_HZ;
 use softvt_sensing::{
     camera::encode_png,
@@ -55,10 +55,14 @@ impl<'a> EpisodeData<'a> {
         let demo = &selection.demos[index];
         let steps = demo.entry.num_samples;
         let reader = DemoStreams { file: &TaskFile::open(&demo.path)?, demo: demo.entry.demo_id, steps };
-        let actions = match config.gripper {
-            GripperCoding::Continuous => "actions",
-            GripperCoding::Binary => "actions_binary",
-        };
+        let actions = actions_stream(config.gripper);
+        if !reader.has(actions)? {
+            let what = format!(
+                "missing: softvt 0.1 recorded no actions in the grip code {}; record the demonstrations again",
+                config.gripper.name()
+            );
+            return Err(reader.file.error(reader.demo, actions, what));
+        }
         let state = reader.floats("obs/state", &[VECTOR_LENGTH])?;
         let actions = reader.floats(actions, &[VECTOR_LENGTH])?;
         let markers = marker_rows(&reader.floats("obs/gripper_marker_motion", &[2, 2, MARKER_COUNT, 2])?);
@@ -135,6 +139,10 @@ struct DemoStreams<'a> {
 }
 
 impl DemoStreams<'_> {
+    fn has(&self, name: &str) -> Result<bool, DatasetError> {
+        Ok(self.file.names(self.demo)?.iter().any(|own| own == name))
+    }
+
     /// Images of every image feature. `sizes` are those of the cameras.
     fn image_columns(
         &self,

@@ -6,14 +6,15 @@ use parquet::file::metadata::KeyValue;
 use serde_json::{Value, json};
 
 use super::{
-    config::{CHUNK, ExportConfig, ExportSummary, GripperCoding, LeRobotVersion, MAX_TABLE_MB},
+    config::{CHUNK, ExportConfig, ExportSummary, LeRobotVersion, MAX_TABLE_MB},
     features::{self, Feature},
     parquet_table::{ColumnType, ColumnValues, ParquetColumn, ParquetTable},
     selection::{SelectedDemo, Selection},
 };
-use crate::DatasetError;
+use crate::{DatasetError, demonstration::actions_stream};
 use softvt_benchmark::CONTROL_HZ;
 use softvt_common::files;
+use softvt_policy::profile::GripCode;
 
 /// Writes all files that do not describe single episodes. `info.json` is last: LeRobot opens nothing without it.
 pub(super) fn write(
@@ -28,6 +29,12 @@ pub(super) fn write(
         LeRobotVersion::V30 => write_task_table(dir, &selection.prompts)?,
     }
     write_origins(dir, config, selection)?;
+    let encoding = json!({
+        "softvt": env!("CARGO_PKG_VERSION"),
+        "gripper": config.gripper.name(),
+        "source": actions_stream(config.gripper),
+    });
+    files::write_json(&dir.join("meta/softvt.json"), &encoding)?;
     files::replace(&dir.join("README.md"), readme(config, selection, summary))?;
     Ok(files::write_json(&dir.join("meta/info.json"), &info(config.version, features, summary))?)
 }
@@ -102,7 +109,7 @@ fn write_origins(dir: &Path, config: &ExportConfig, selection: &Selection) -> Re
             "seed": entry.seed,
             "episode": entry.episode,
             "state_hash": entry.state_hash,
-            "gripper": config.gripper.code(),
+            "gripper": config.gripper.name(),
         })
     };
     let lines = selection.demos.iter().enumerate().map(line);
@@ -113,8 +120,12 @@ fn write_origins(dir: &Path, config: &ExportConfig, selection: &Selection) -> Re
 fn readme(config: &ExportConfig, selection: &Selection, summary: ExportSummary) -> String {
     let ExportSummary { episodes, frames, tasks } = summary;
     let gripper = match config.gripper {
-        GripperCoding::Continuous => "the commanded closure, 0 open to 1 closed",
-        GripperCoding::Binary => "1 while the gripper is commanded to hold, else 0",
+        GripCode::Continuous => "the commanded closure, 0 open to 1 closed",
+        GripCode::Binary => "1 while the gripper is commanded to hold, else 0",
+        GripCode::TwoWidth => {
+            "closure 0 while open, the median commanded closure of the demonstration while closed"
+        }
+        GripCode::Force => "grip force in N while closed, -1 while open",
     };
     let prompts: String = selection.prompts.iter().map(|prompt| format!("- {prompt}\n")).collect();
     format!(
@@ -130,9 +141,11 @@ fn readme(config: &ExportConfig, selection: &Selection, summary: ExportSummary) 
          | `tactile_marker_motion` | (3, 198, 2) px: initial marker positions, those of the previous step and of this one; left finger first |\n\
          | `state` | tool position (m), axis-angle (rad) in the robot's base frame; position of one finger, 0 closed to 0.04 m |\n\
          | `actions` | absolute tool position and axis-angle; {gripper} |\n\n\
-         `meta/softvt.jsonl` names the demonstration of each episode.\n\n{prompts}",
+         `meta/softvt.json` states the grip code ({}), and `meta/softvt.jsonl` the demonstration of each episode.\n\n\
+         {prompts}",
         config.version.code(),
         CONTROL_HZ,
         env!("CARGO_PKG_VERSION"),
+        config.gripper.name(),
     )
 }

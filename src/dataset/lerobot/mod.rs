@@ -27,7 +27,7 @@ use self::{
 use super::DatasetError;
 use softvt_common::parallel;
 
-pub use config::{ExportConfig, ExportSummary, GripperCoding, LeRobotVersion};
+pub use config::{ExportConfig, ExportSummary, LeRobotVersion};
 
 /// Exports a recording. `config.out` is complete afterwards, or unchanged.
 ///

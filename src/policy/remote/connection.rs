@@ -270,7 +270,10 @@ impl Drop for PolicyConnection {
             sent = self.socket.flush();
         }
         // The socket reports the end of the closing handshake as an error.
-        while sent.is_ok() && transport::receive(&mut self.socket, |_| may_wait()).is_ok() && may_wait().is_ok() {}
+        while sent.is_ok()
+            && transport::receive(&mut self.socket, |_| may_wait()).is_ok()
+            && may_wait().is_ok()
+        {}
     }
 }
 

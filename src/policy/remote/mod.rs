@@ -8,10 +8,14 @@ use std::{
     time::Instant,
 };
 
+use rmpv::Value;
+
 use self::connection::PolicyConnection;
 pub use self::connection::{PolicyServer, Protocol};
 use super::{
-    ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief, decode, encode, msgpack::kind,
+    ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief, decode, encode,
+    msgpack::{entry, kind},
+    profile::{GripCode, Profile},
 };
 use softvt_common::parallel::lock;
 
@@ -138,7 +142,35 @@ fn greet_openpi(connection: &mut PolicyConnection, deadline: Instant) -> Result<
         let what = format!("sent {} first; openpi servers send a map of metadata", kind(&metadata));
         return Err(connection.server.error(&what));
     }
-    Ok(())
+    check_grip_code(&connection.server, &metadata)
+}
+
+/// Checks the grip code that a server states in the entry `gripper` of its metadata, if it does.
+///
+/// # Errors
+/// It is not that of the profile.
+fn check_grip_code(server: &PolicyServer, metadata: &Value) -> Result<(), PolicyError> {
+    let Some(stated) = entry(metadata, "gripper").filter(|value| !value.is_nil()) else { return Ok(()) };
+    let bytes = stated.as_str().map(str::as_bytes).or(stated.as_slice()).unwrap_or_default();
+    let stated = String::from_utf8_lossy(bytes);
+    let Profile { name, actions, .. } = &server.profile;
+    let own = actions.gripper.code;
+    match GripCode::named(&stated) {
+        Some(code) if code == own => Ok(()),
+        Some(code) => Err(server.error(&format!(
+            "states the grip code {} in its metadata, and the profile {name} reads {}: pass --gripper {}",
+            code.name(),
+            own.name(),
+            code.name()
+        ))),
+        None => {
+            let known = GripCode::ALL.map(GripCode::name).join(", ");
+            Err(server.error(&format!(
+                "states the grip code {:?} in the entry gripper of its metadata; expected one of {known}",
+                stated.chars().take(80).collect::<String>()
+            )))
+        }
+    }
 }
 
 /// openpi's protocol: sends an observation and receives a chunk of actions.
@@ -152,3 +184,6 @@ fn infer_openpi(
     connection.check_silence(deadline)?;
     decode::chunk(&response, &connection.server.profile.actions)
 }
+
+#[cfg(test)]
+mod tests;

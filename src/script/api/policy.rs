@@ -6,7 +6,7 @@ use crate::schema::{Range, Record, RecordType, Type, choice, record, record_of};
 use softvt_policy::{
     SensorStreams,
     decode::MAX_CHUNK_LEN,
-    profile::{GripperValues, StatePart},
+    profile::{GripCode, StatePart},
 };
 use softvt_robot::Side;
 use softvt_sensing::tactile::MosaicLayout;
@@ -29,8 +29,8 @@ record! {
         /// by default.
         replan: Option<usize> = Type::Integer(Range::closed(1.0, MAX_CHUNK_LEN as f64));
     }
-    /// A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame, and a closure.
-    /// Give either axis_angle or quaternion.
+    /// A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame, and a closure or
+    /// a grip force. Give either axis_angle or quaternion, and either closure or force.
     ActionSpec: "softvt.Action" as "action" {
         /// Position.
         position: [f64; 3] = Type::vector(3, "m, base frame");
@@ -39,7 +39,9 @@ record! {
         /// Orientation as quaternion.
         quaternion: Option<[f64; 4]> = Type::Quaternion("base frame");
         /// Gripper closure: 0 is open, 1 is closed.
-        closure: f64 = Type::Number("", Range::closed(0.0, 1.0));
+        closure: Option<f64> = Type::Number("", Range::closed(0.0, 1.0));
+        /// Grip force at which closing stops, at most robot.gripper.effort; below 0 opens.
+        force: Option<f64> = Type::Number("N", Range::ANY);
     }
     /// One entry of the observations that are sent to a policy server.
     InputSpec: "softvt.Input" as "profile.inputs" {
@@ -77,7 +79,20 @@ record! {
         /// Length that an action must have, padding included; any from 7 by default.
         length: Option<usize> = Type::Integer(Range::closed(7.0, 4096.0));
         /// The seventh number.
-        gripper: GripperValues;
+        gripper: GripperValuesSpec;
+    }
+    /// The seventh number of an action.
+    GripperValuesSpec: "softvt.GripperValues" as "profile.actions.gripper" {
+        /// Value that opens the gripper; not for code = "force".
+        open: Option<f64>;
+        /// Value that closes it; not for code = "force".
+        closed: Option<f64>;
+        /// What the value commands. continuous: a closure in proportion between open and closed, the default. binary: closed
+        /// beyond the middle, else open. two-width: open, or the width that the answers give just after closing, held until
+        /// one opens. force: a grip force in N at which closing stops; below 0 opens.
+        code: Option<GripCode>;
+        /// True for code = "binary".
+        binary: Option<bool>;
     }
     /// The messages of a policy server: the observations it gets and the meaning of its actions. The file given to --profile
     /// returns one.
@@ -101,15 +116,6 @@ record_of! {
         /// True to get the true forces on the gels, which no real sensor gives; results then say force_observed.
         force: bool => Boolean(false);
     }
-    /// The seventh number of an action. Values between open and closed close in proportion.
-    GripperValues: "softvt.GripperValues" as "profile.actions.gripper" {
-        /// Value that opens the gripper.
-        open: f64;
-        /// Value that closes it.
-        closed: f64;
-        /// True if every value beyond the middle closes, and any other opens.
-        binary: bool => Boolean(false);
-    }
 }
 
 choice! {
@@ -125,6 +131,9 @@ choice! {
     }
 }
 
+choice! {
+    GripCode { "continuous" => Continuous, "binary" => Binary, "two-width" => TwoWidth, "force" => Force }
+}
 choice! { MosaicLayout { "rows" => Rows, "columns" => Columns } }
 choice! {
     StatePart {

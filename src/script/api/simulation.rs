@@ -35,7 +35,7 @@ use softvt_common::parallel::lock;
 use softvt_evaluation::{deformation::ReferenceShape, episode_id::Split};
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::BodyId;
-use softvt_robot::{Side, rotation};
+use softvt_robot::{Side, gripper::GripTarget, rotation};
 use softvt_rollout::{AssetCache, SensingError, SensorAssets, SensorSuite, Simulation, WearSeed, cancel};
 use softvt_sensing::tactile::{MarkerStyle, PadWrench, TactileReading};
 
@@ -171,7 +171,7 @@ impl SimulationState {
             self.failed = Some("interrupted".into());
         }
         if let Some(ExpertCommand { pose_b, closure, .. }) = command {
-            self.sim.robot.command(&mut self.sim.world, pose_b, *closure);
+            self.sim.robot.command(&mut self.sim.world, pose_b, GripTarget::Closure(*closure));
         }
         let _pause = self.clock.pause();
         for _ in 0..steps_per_control(self.sim.world.params.dt) {

@@ -23,8 +23,8 @@ use crate::{
 use softvt_benchmark::seed::{EpisodeSeed, RandomStream};
 use softvt_geometry::Vec3;
 use softvt_policy::{
-    Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief, ToolCommand,
-    decode::MAX_CHUNK_LEN,
+    ActionChunk, GripCommand, Observation, Policy, PolicyError, SensorStreams, TaskBrief, ToolCommand,
+    ToolMotion, decode::MAX_CHUNK_LEN,
 };
 use softvt_robot::rotation;
 
@@ -139,7 +139,7 @@ impl LuaPolicy {
         };
         let count = table.raw_len();
         if count == 0 && !table.is_empty() {
-            return Ok(self.action(label, table)?.into());
+            return Ok(ActionChunk { commands: vec![self.action(label, table)?] });
         }
         if !(1..MAX_CHUNK_LEN).contains(&count) {
             return wrong(format!("expected 1 to {MAX_CHUNK_LEN} actions, got {count}"));
@@ -154,12 +154,12 @@ impl LuaPolicy {
                     return Err(self.malformed(&label, ValidationError::new(message)));
                 }
             };
-            chunk.commands.push(ToolCommand::Pose(action));
+            chunk.commands.push(action);
         }
         Ok(chunk)
     }
 
-    fn action(&self, label: &str, table: &Table) -> Result<Action, PolicyError> {
+    fn action(&self, label: &str, table: &Table) -> Result<ToolCommand, PolicyError> {
         if self.has_non_finite(table).map_err(|e| self.malformed(label, e))? {
             let text = literal(&Value::Table(table.clone()), 0);
             let message = format!("the action {text} holds a number that is not finite");
@@ -168,7 +168,7 @@ impl LuaPolicy {
         self.checked_action(table).map_err(|error| self.malformed(label, error))
     }
 
-    fn checked_action(&self, table: &Table) -> Result<Action, ValidationError> {
+    fn checked_action(&self, table: &Table) -> Result<ToolCommand, ValidationError> {
         let lua = &self.instance.vm.lua;
         let spec = ActionSpec::from_checked(Value::Table(check(lua, ActionSpec::RECORD, table)?), lua)?;
         let axis_angle_b = match (spec.axis_angle, spec.quaternion) {
@@ -176,7 +176,13 @@ impl LuaPolicy {
             (None, Some(wxyz)) => rotation::axis_angle(&rotation_from_wxyz(wxyz).unwrap_or_default()),
             _ => return Err(ValidationError::new("give either axis_angle or quaternion")),
         };
-        Ok(Action { position_b: Vec3::from(spec.position), axis_angle_b, closure: spec.closure })
+        let grip = match (spec.closure, spec.force) {
+            (Some(closure), None) => GripCommand::Closure(closure),
+            (None, Some(force)) => GripCommand::Force(force),
+            _ => return Err(ValidationError::new("give either closure or force")),
+        };
+        let motion = ToolMotion::Pose { position_b: Vec3::from(spec.position), axis_angle_b };
+        Ok(ToolCommand { motion, grip })
     }
 
     /// True if a field of an action is NaN or infinite: that fails the episode and not the run.

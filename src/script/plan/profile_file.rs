@@ -9,11 +9,13 @@ use mlua::Lua;
 
 use super::ScriptSources;
 use crate::{
-    api::policy::{ActionEncodingSpec, InputKind, InputSpec, PoseKind, ProfileSpec},
+    api::policy::{ActionEncodingSpec, GripperValuesSpec, InputKind, InputSpec, PoseKind, ProfileSpec},
     schema::Constructed,
     vm::{Limits, error::ScriptError, source_map::fail_at_key},
 };
-use softvt_policy::profile::{ActionEncoding, ActionUnits, InputSource, PoseEncoding, Profile, ProfileInput};
+use softvt_policy::profile::{
+    ActionEncoding, ActionUnits, GripCode, GripperValues, InputSource, PoseEncoding, Profile, ProfileInput,
+};
 
 /// Reads the profile at `path`. Also returns the SHA-256 of every file that was read, by name.
 ///
@@ -101,11 +103,6 @@ impl ProfileReader<'_> {
     }
 
     fn actions(&self, spec: &ActionEncodingSpec) -> mlua::Result<ActionEncoding> {
-        if spec.gripper.open == spec.gripper.closed {
-            let message =
-                format!("actions.gripper.closed: is {} like open; nothing could close", spec.gripper.closed);
-            return Err(self.wrong("closed", message));
-        }
         let missing = |key: &str, pose: &str| {
             self.wrong("pose", format!("actions.{key}: missing; pose = {pose:?} needs it"))
         };
@@ -138,6 +135,31 @@ impl ProfileReader<'_> {
             scale: scale.unwrap_or(ActionUnits::IDENTITY.scale),
             offset: offset.unwrap_or(ActionUnits::IDENTITY.offset),
         });
-        Ok(ActionEncoding { pose, gripper: spec.gripper, units, length: spec.length })
+        Ok(ActionEncoding { pose, gripper: self.gripper(&spec.gripper)?, units, length: spec.length })
+    }
+
+    fn gripper(&self, spec: &GripperValuesSpec) -> mlua::Result<GripperValues> {
+        let wrong = |key: &str, what: &str| self.wrong(key, format!("actions.gripper.{key}: {what}"));
+        let code = match (spec.code, spec.binary) {
+            (Some(_), Some(_)) => return Err(wrong("binary", "code says it already; leave it out")),
+            (Some(code), None) => code,
+            (None, Some(true)) => GripCode::Binary,
+            (None, _) => GripCode::Continuous,
+        };
+        if code == GripCode::Force {
+            let given = [("open", spec.open), ("closed", spec.closed)];
+            let what = "code = \"force\" has none: a force in N closes, less than 0 opens; leave it out";
+            return match given.iter().find(|(_, value)| value.is_some()) {
+                Some((key, _)) => Err(wrong(key, what)),
+                None => Ok(GripperValues::FORCE),
+            };
+        }
+        let missing = |key: &str| wrong(key, &format!("missing; code = {:?} needs it", code.name()));
+        let open = spec.open.ok_or_else(|| missing("open"))?;
+        let closed = spec.closed.ok_or_else(|| missing("closed"))?;
+        if open == closed {
+            return Err(wrong("closed", &format!("is {closed} like open; nothing could close")));
+        }
+        Ok(GripperValues { open, closed, code })
     }
 }

@@ -71,11 +71,8 @@ impl Controller for ExpertController {
                 GripMode::Binary => f64::from(u8::from(command.gripping)),
                 GripMode::Commanded | GripMode::TactileServo => command.closure,
             };
-            Action {
-                position_b: command.pose_b.translation.vector,
-                axis_angle_b: rotation::axis_angle(&command.pose_b.rotation),
-                closure,
-            }
+            let orientation = rotation::axis_angle(&command.pose_b.rotation);
+            Action::new(command.pose_b.translation.vector, orientation, closure)
         }))
     }
 }

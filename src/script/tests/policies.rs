@@ -10,8 +10,9 @@ use softvt_benchmark::seed::EpisodeSeed;
 use softvt_evaluation::episode_id::Split;
 use softvt_geometry::Vec3;
 use softvt_policy::{
-    Action, ActionChunk, CameraImage, Observation, Policy, PolicyError, TactileFrame, TactileHistory,
-    TaskBrief, ToolCommand, profile::Profile,
+    Action, ActionChunk, CameraImage, GripCommand, Observation, Policy, PolicyError, TactileFrame,
+    TactileHistory, TaskBrief, ToolCommand, ToolMotion,
+    profile::{GripCode, Profile},
 };
 use softvt_sensing::tactile::Markers;
 
@@ -109,21 +110,20 @@ fn observations_have_the_values_of_the_simulation() {
 
 #[test]
 fn actions_are_accepted_alone_or_as_lists_with_either_form_of_rotation() {
-    let expected = Action {
-        position_b: Vec3::new(0.5, 0.0, 0.25),
-        axis_angle_b: Vec3::new(3.0, 0.0, 0.0),
-        closure: 0.5,
-    };
+    let expected = Action::new(Vec3::new(0.5, 0.0, 0.25), Vec3::new(3.0, 0.0, 0.0), 0.5);
     let one = act(&format!("return {{ {POSE}, closure = 0.5 }}")).unwrap();
-    assert_eq!(one.commands, [ToolCommand::Pose(expected)]);
+    assert_eq!(one.commands, [ToolCommand::from(expected)]);
+    let force = act(&format!("return {{ {POSE}, force = 2.5 }}")).unwrap();
+    assert_eq!(force.commands[0].grip, GripCommand::Force(2.5));
     let two = act(&format!("local a = {{ {POSE}, closure = 0.5 }} return {{ a, a }}")).unwrap();
     assert_eq!(two.commands.len(), 2);
     let turned =
         act("return { position = obs.position, quaternion = { 0, 2, 0, 0 }, closure = obs.closure }")
             .unwrap();
-    let ToolCommand::Pose(action) = turned.commands[0] else { panic!("a pose") };
-    assert!((action.axis_angle_b - Vec3::new(std::f64::consts::PI, 0.0, 0.0)).norm() < 1e-9);
-    assert_eq!((action.position_b, action.closure), (Vec3::new(0.5, -0.125, 0.25), 0.25));
+    let ToolMotion::Pose { position_b, axis_angle_b } = turned.commands[0].motion else { panic!("a pose") };
+    assert!((axis_angle_b - Vec3::new(std::f64::consts::PI, 0.0, 0.0)).norm() < 1e-9);
+    assert_eq!(position_b, Vec3::new(0.5, -0.125, 0.25));
+    assert_eq!(turned.commands[0].grip, GripCommand::Closure(0.25));
 }
 
 #[test]
@@ -242,8 +242,8 @@ fn the_shipped_policies_act() {
         let mut policy = file.start(&seed(0)).unwrap();
         policy.reset(&brief()).unwrap();
         let chunk = policy.act(&observation()).unwrap();
-        let ToolCommand::Pose(action) = chunk.commands[0] else { panic!("a pose") };
-        assert_eq!((action.position_b.x, action.closure), (0.5, 0.0));
+        let ToolMotion::Pose { position_b, .. } = chunk.commands[0].motion else { panic!("a pose") };
+        assert_eq!((position_b.x, chunk.commands[0].grip), (0.5, GripCommand::Closure(0.0)));
     }
 }
 
@@ -294,6 +294,13 @@ fn a_profile_may_name_other_cameras_units_and_paddings() {
         ("camera = \"wrist\", half_turn = true", "camera = \"side\""),
         ("pose = \"delta_osc\"", "pose = \"delta\", length = 32, scale = { 2, 2, 2, 1, 1, 1 }"),
     ];
+    for (code, gripper) in [
+        (GripCode::TwoWidth, "{ open = -1, closed = 1, code = \"two-width\" }"),
+        (GripCode::Force, "{ code = \"force\" }"),
+    ] {
+        let own = ("{ open = -1, closed = 1, binary = true }", gripper);
+        assert_eq!(profile(&changed("libero", &[own])).unwrap().actions.gripper.code, code);
+    }
     let profile = profile(&changed("libero", &changes)).unwrap();
     assert_eq!(profile.streams().cameras, ["third_person", "side"]);
     let units = profile.actions.units.unwrap();
@@ -333,6 +340,10 @@ fn errors_in_profiles_are_reported_with_their_line() {
         ),
         ("\"delta_osc\"", "\"absolute\"", "profile.actions.translation_m: pose = \"absolute\" has no steps"),
         ("open = -1", "open = 1", "profile.actions.gripper.closed: is 1 like open"),
+        ("binary = true", "code = \"two-widths\"", "did you mean \"two-width\"?"),
+        ("binary = true", "binary = true, code = \"binary\"", "profile.actions.gripper.binary: code says it"),
+        ("binary = true", "code = \"force\"", "profile.actions.gripper.open: code = \"force\" has none"),
+        ("open = -1,", "", "profile.actions.gripper.open: missing; code = \"binary\" needs it"),
         ("rotation_rad = 0.5", "rotation_rad = 0/0", "profile.actions.rotation_rad: expected a number"),
         (
             "return softvt.profile",

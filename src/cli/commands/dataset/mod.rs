@@ -18,10 +18,13 @@ use crate::{
 };
 use softvt_common::{files, text::counted};
 use softvt_dataset::{
-    DatasetError, check,
-    lerobot::{self, ExportConfig, GripperCoding, LeRobotVersion},
+    DatasetError,
+    card::Card,
+    check,
+    lerobot::{self, ExportConfig, LeRobotVersion},
     stats,
 };
+use softvt_policy::profile::GripCode;
 use softvt_rollout::cancel;
 
 #[derive(Debug, Subcommand)]
@@ -55,9 +58,9 @@ pub(crate) struct ExportArgs {
     /// Output folder; must be new
     #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     out: PathBuf,
-    /// Seventh number of an action: continuous closure, or binary: 1 to hold, 0 otherwise
-    #[arg(long, value_name = "MODE", default_value = "continuous")]
-    gripper: GripperCoding,
+    /// Grip code, the meaning of an action's seventh number: docs/policies.md [default: that of the recording, or continuous]
+    #[arg(long, value_name = "CODE")]
+    gripper: Option<GripCode>,
     /// Export only these tasks: indices or parts of prompts, separated by commas
     #[arg(long = "task", value_name = "TASK", value_delimiter = ',')]
     tasks: Vec<String>,
@@ -141,11 +144,15 @@ fn sample(demos: &[DemoRef], count: usize) -> Vec<DemoRef> {
 /// As [`lerobot::export`]. No output remains then.
 fn run_export(args: ExportArgs) -> Result<(), CliError> {
     check_complete(&args.path)?;
+    let gripper = match args.gripper {
+        Some(code) => code,
+        None => Card::read(&args.path).map_err(CliError::input)?.gripper.unwrap_or_default(),
+    };
     let config = ExportConfig {
         data: args.path,
         out: args.out,
         version: args.format,
-        gripper: args.gripper,
+        gripper,
         tasks: args.tasks,
         threads: thread_count(args.threads),
     };

@@ -1,0 +1,45 @@
+//! The grip code force in an episode: the pads press on a soft cube with the force that the policy commands.
+
+use crate::support::Small;
+
+/// Lowers the hand over the cube, closes with 3 N, lifts it, presses with 5 N, and opens.
+const POLICY: &str = r#"
+local step, at, turn = 0, nil, nil
+return softvt.policy {
+  name = "force",
+  observes = {},
+  act = function(obs)
+    if not at then at, turn = { table.unpack(obs.position) }, obs.axis_angle end
+    step = step + 1
+    local goal = { 0.66, 0.1, step < 40 and 0.14 or step < 130 and 0.01 or 0.05 }
+    for i = 1, 3 do at[i] = at[i] + math.max(-0.02, math.min(0.02, goal[i] - at[i])) end
+    local force = step < 60 and -1 or step < 160 and 3 or step < 220 and 5 or -1
+    return { position = { table.unpack(at) }, axis_angle = turn, force = force }
+  end,
+}
+"#;
+
+#[test]
+fn the_pads_press_with_the_commanded_force() {
+    let project = Small { task: "budget_steps = 230", ..Small::default() }.project();
+    project.write("force.lua", POLICY.as_bytes());
+    project.succeeds("x.lua --policy force.lua --out run --trace");
+    let trace = project.lines("run/trace/task_000/episode_00000.jsonl");
+    let force = |step: usize| -> [f64; 2] {
+        std::array::from_fn(|side| trace[step]["pad_force_n"][side].as_f64().expect("a force"))
+    };
+    for (from, to, expected) in [(110, 125, 3.0), (145, 158, 3.0), (190, 218, 5.0)] {
+        for step in from..to {
+            let [left, right] = force(step);
+            let mean = 0.5 * (left + right);
+            assert!(
+                (mean / expected - 1.0).abs() < 0.03,
+                "step {step}: {left} N and {right} N of {expected} N"
+            );
+        }
+    }
+    let most = (60..160).map(|step| 0.5 * force(step).iter().sum::<f64>()).fold(0.0, f64::max);
+    assert!(most < 3.3, "no overshoot on the way: {most} N");
+    assert_eq!(force(228), [0.0; 2], "opened");
+    assert!(project.succeeds("replay run 0/0").out.contains("byte-identical"));
+}
