@@ -5,18 +5,22 @@ use crate::support::Project;
 /// Grasps an object as the expert does, closes the hand to `closure` at once, and waits half a second. Returns the
 /// fastest node of the 0.2 s that follow.
 const SHUT: &str = r#"local grasp = require "experts.grasp"
+local table_top = require "assets.table"
 local function held(name)
+  local asset = require("assets." .. name)
   return softvt.layout("held", function(scene)
-    scene:add { name = "table", asset = require "assets.table", position = { 0, 0, 0 } }
-    scene:add { name = "object", asset = require("assets." .. name), at = { -0.05, 0 } }
+    scene:add { name = "table", asset = table_top, position = { 0, 0, 0 } }
+    scene:add { name = "object", asset = asset, at = { -0.05, 0 } }
   end)
 end
 local layouts = { braided_roll = held "braided_roll", steamed_bun = held "steamed_bun", wedge = held "wedge" }
 return softvt.experiment {
   name = "shut",
-  points = {
-    { asset = "braided_roll", closure = 0.95 }, { asset = "steamed_bun", closure = 1.0 }, { asset = "wedge", closure = 1.0 },
-  },
+  points = function()
+    return {
+      { asset = "braided_roll", closure = 0.95 }, { asset = "steamed_bun", closure = 0.95 }, { asset = "wedge", closure = 1.0 },
+    }
+  end,
   run = function(point)
     local sim = softvt.simulate { layout = layouts[point.asset] }
     assert(sim:drive(function(arm, scene)
@@ -39,7 +43,7 @@ return softvt.experiment {
 "#;
 
 #[test]
-fn no_standard_object_chatters_or_is_turned_inside_out_in_a_shut_hand() {
+fn standard_objects_neither_chatter_nor_turn_inside_out_in_a_shut_hand() {
     let output = Project::new(&[("shut.lua", SHUT)]).succeeds("shut.lua --json");
     let rows: Vec<serde_json::Value> =
         output.out.lines().map(|line| serde_json::from_str(line).expect("a row")).collect();
