@@ -141,6 +141,9 @@ pub struct Condition {
     pub shift: Vec<ShiftValue>,
     /// Settings by dotted path and value, as `--set` takes them.
     pub set: Vec<(String, String)>,
+    /// Built-in policy in place of that of the run, as `--policy` takes it; `None` for the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub policy: Option<String>,
     /// Kind of suites to which the condition applies; `None` for all.
     pub only: Option<ObjectType>,
 }

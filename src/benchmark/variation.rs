@@ -18,6 +18,9 @@ pub struct FactorRange {
 }
 
 impl FactorRange {
+    /// The range of a factor that changes nothing.
+    pub const ONE: Self = Self { min: 1.0, max: 1.0 };
+
     fn uniform(self, rng: &mut ChaCha8Rng) -> f64 {
         self.min + (self.max - self.min) * uniform(rng)
     }

@@ -52,6 +52,9 @@ pub struct ConditionRow {
     pub condition: String,
     pub shift: Vec<ShiftValue>,
     pub set: Vec<(String, String)>,
+    /// Policy in place of that of the reference; absent for the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub policy: Option<String>,
     /// Null if the condition could have no effect and was not run.
     pub outcome: Option<ConditionOutcome>,
     /// Reason for not running it; null if it was run.
@@ -136,6 +139,7 @@ mod tests {
             condition: condition.into(),
             shift: Vec::new(),
             set: Vec::new(),
+            policy: None,
             outcome,
             not_applicable,
         }

@@ -30,4 +30,5 @@ mod shut_hand;
 mod support;
 mod tactile_forces;
 mod usage;
+mod varied_suites;
 mod view;

@@ -9,6 +9,7 @@ use crate::{
     output::{eprint_notice, print},
     run::{
         config::RunConfig,
+        policy::PolicyConfig,
         evaluate::{is_finished, run_suite},
         selection::{path_component, select_episodes, select_tasks},
         suite_run::SuiteRun,
@@ -101,7 +102,13 @@ fn condition_cases(
         true => format!("{}/", path_component(&config.suite_name(suite))),
         false => String::new(),
     };
-    let reference = Condition { name: REFERENCE.to_owned(), shift: Vec::new(), set: Vec::new(), only: None };
+    let reference = Condition {
+        name: REFERENCE.to_owned(),
+        shift: Vec::new(),
+        set: Vec::new(),
+        policy: None,
+        only: None,
+    };
     let mut cases: Vec<ConditionCase> = Vec::new();
     for condition in std::iter::once(&reference).chain(conditions) {
         let folder = format!("{parent}{}", path_component(&condition.name));
@@ -114,6 +121,10 @@ fn condition_cases(
         let mut changed = config.clone();
         changed.shifts.extend(condition.shift.iter().cloned());
         changed.settings.extend(condition.set.iter().cloned());
+        if let Some(name) = &condition.policy {
+            changed.policy = PolicyConfig::builtin(name)
+                .map_err(|error| config.error(format!("condition {:?}: policy: {error}", condition.name)))?;
+        }
         let not_applicable = not_applicable(condition.only, object_type);
         cases.push(ConditionCase { condition: condition.clone(), folder, config: changed, not_applicable });
     }
@@ -185,6 +196,7 @@ fn compare_conditions(
             condition: case.condition.name.clone(),
             shift: case.condition.shift.clone(),
             set: case.condition.set.clone(),
+            policy: case.condition.policy.clone(),
             outcome,
             not_applicable: case.not_applicable.clone(),
         });

@@ -83,6 +83,8 @@ pub(crate) enum BuiltinPolicy {
     Expert,
     /// the same expert with a gripper that is either open or closed (privileged)
     ExpertBinary,
+    /// the same expert, with one closure for all instances of an asset (privileged)
+    FixedClosure,
     /// the same expert, closing until the tactile markers show a firm grasp (privileged)
     TactileServo,
     /// holds still with the gripper open
@@ -107,7 +109,7 @@ impl BuiltinPolicy {
 
     /// True for scripted experts, which have access to ground-truth state.
     fn is_expert(self) -> bool {
-        matches!(self, Self::Expert | Self::ExpertBinary | Self::TactileServo)
+        matches!(self, Self::Expert | Self::ExpertBinary | Self::FixedClosure | Self::TactileServo)
     }
 }
 
@@ -273,6 +275,19 @@ impl PolicyConfig {
         Ok(policy)
     }
 
+    /// The built-in policy of a name.
+    ///
+    /// # Errors
+    /// No policy has the name; the message is a fragment.
+    pub(crate) fn builtin(name: &str) -> Result<Self, String> {
+        let known: Vec<String> = BuiltinPolicy::descriptions().map(|(name, _)| name).collect();
+        let policy = BuiltinPolicy::from_str(name, false).map_err(|_| {
+            let hint = suggestion(name, known.iter().map(String::as_str));
+            format!("expected {}, got {name:?}{hint}", known.join(", "))
+        })?;
+        Ok(Self::new(PolicyKind::Builtin(policy), policy.name()))
+    }
+
     /// Actions that come from elsewhere, under a name such as `replay`.
     pub(crate) fn external(name: &str) -> Self {
         Self::new(PolicyKind::External, name.to_owned())
@@ -360,6 +375,7 @@ pub(crate) fn expert_controller(
     let mode = match policy {
         BuiltinPolicy::TactileServo => GripMode::TactileServo,
         BuiltinPolicy::ExpertBinary => GripMode::Binary,
+        BuiltinPolicy::FixedClosure => GripMode::FixedClosure,
         _ => GripMode::Commanded,
     };
     opened.expert(mode).ok_or_else(|| CliError::input("the task has no expert"))
@@ -425,7 +441,7 @@ mod tests {
         for (name, _) in BuiltinPolicy::descriptions() {
             let policy = PolicyConfig::load(&args(parse_policy(&name).unwrap())).unwrap();
             assert_eq!(policy.name, name);
-            assert_eq!(policy.is_privileged(), name.starts_with("expert") || name == "tactile-servo");
+            assert_eq!(policy.is_privileged(), !["noop", "random"].contains(&name.as_str()));
         }
     }
 

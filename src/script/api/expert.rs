@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use mlua::{Function, Lua, MultiValue, Table, Thread, Value, chunk::ChunkMode};
 
 use super::{
-    expert_input::{ExpertCommand, ExpertInput, ExpertView, ObjectView, TrackingErrorMonitor},
+    expert_input::{ExpertCommand, ExpertInput, ExpertView, InstanceRanges, ObjectView, TrackingErrorMonitor},
     index_of,
     observation::{FingerReadings, fingers},
     pose::LuaPose,
@@ -247,8 +247,14 @@ class! {
             width: "number" { get(_, this) { this.read(|view| view.width_m) } }
             /// Normal force on the left and the right pad, N.
             force: "number[]" { get(_, this) { this.read(|view| view.pad_force_n) } }
-            /// Time since the start, s.
-            time: "number" { get(_, this) { this.read(|view| view.time_s) } }
+            /// Under --policy fixed-closure: the ranges within which the instances of an asset differ. The expert then
+            /// closes to one closure for all of them (experts.fixed_closure). nil under other policies.
+            instances: "softvt.InstanceRanges?" {
+                get(lua, this) {
+                    this.read(|view| view.instances).map(|ranges| instance_ranges(lua, &ranges)).transpose()?
+                }
+            }
+            /// Time since the start, s. "number" { get(_, this) { this.read(|view| view.time_s) } }
             /// Length of a control step, s.
             dt: "number" { get(_, this) { this.read(|view| view.dt_s) } }
         }
@@ -276,6 +282,18 @@ class! {
             /// Ends the expert. The last command stays, and the episode's record and the results contain the reason.
             fn give_up(reason: String) -> [];
         }
+    }
+}
+
+output! {
+    /// Smallest and largest factors by which the instances of an asset differ.
+    fn instance_ranges(lua, ranges: &InstanceRanges) -> "softvt.InstanceRanges" as "instances" {
+        /// Factors on the size, uniform.
+        size: "number[]" = lua.create_sequence_from([ranges.size.min, ranges.size.max])?;
+        /// Factors on Young's modulus, log-uniform.
+        stiffness: "number[]" = lua.create_sequence_from([ranges.stiffness.min, ranges.stiffness.max])?;
+        /// Factors on the density, log-uniform.
+        density: "number[]" = lua.create_sequence_from([ranges.density.min, ranges.density.max])?;
     }
 }
 

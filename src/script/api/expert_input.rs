@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
-use softvt_benchmark::CONTROL_DT;
+use softvt_benchmark::{
+    CONTROL_DT,
+    variation::{FactorRange, VariationRanges},
+};
 use softvt_geometry::{Aabb, Pose, Vec3};
 use softvt_robot::ik::{PoseDifference, PoseTolerance, UnreachablePose};
 use softvt_rollout::{ObjectInstance, Simulation};
@@ -51,8 +54,30 @@ pub(crate) struct ExpertView {
     pub closure: f64,
     /// Normal force on the left and the right pad, N.
     pub pad_force_n: [f64; 2],
+    /// Ranges of the instances that one closure has to hold, for an expert that must not know the instance.
+    pub instances: Option<InstanceRanges>,
     /// The objects, in the order of the scene.
     pub objects: Vec<ObjectView>,
+}
+
+/// Ranges of factors by which the instances of an asset differ.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct InstanceRanges {
+    pub size: FactorRange,
+    pub stiffness: FactorRange,
+    pub density: FactorRange,
+}
+
+impl InstanceRanges {
+    /// The ranges of a suite; every instance is the asset itself without a variation.
+    pub(crate) fn new(variation: Option<&VariationRanges>) -> Self {
+        let of = |range: fn(&VariationRanges) -> FactorRange| variation.map_or(FactorRange::ONE, range);
+        Self {
+            size: of(|ranges| ranges.size),
+            stiffness: of(|ranges| ranges.stiffness),
+            density: of(|ranges| ranges.density),
+        }
+    }
 }
 
 /// Command of an expert for one control step.
@@ -92,6 +117,7 @@ fn expert_view(sim: &Simulation, time_s: f64) -> ExpertView {
             .iter()
             .map(|object| sim.pad_contacts(object))
             .fold([0.0; 2], |sum, pads| [sum[0] + pads[0].normal_force, sum[1] + pads[1].normal_force]),
+        instances: None,
         objects: (0..sim.objects.len())
             .filter(|&index| sim.objects[index].part.is_none())
             .map(|index| ObjectView {

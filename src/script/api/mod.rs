@@ -157,6 +157,7 @@ pub(crate) static CLASSES: &[&Class] = &[
     scene::LuaObject::CLASS,
     expert::SceneState::CLASS,
     &expert::object_state::CLASS,
+    &expert::instance_ranges::CLASS,
     expert::MeasuredArm::CLASS,
     &LIST,
     &observation::task_brief::CLASS,

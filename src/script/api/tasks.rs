@@ -125,8 +125,8 @@ record! {
         /// Changed settings of physics, robot and judge: { physics = {…}, robot = {…}, criteria = {…} }.
         settings: Option<Table> = SETTINGS;
     }
-    /// A difference between a run and its reference: other shifts or settings with the same tasks, initial states and
-    /// seeds.
+    /// A difference between a run and its reference: other shifts, settings or another policy, with the same tasks, initial
+    /// states and seeds.
     ConditionSpec: "softvt.Condition" as "conditions.conditions" {
         /// Name in the table of results and of the run folder.
         name: String;
@@ -134,6 +134,8 @@ record! {
         shift: BTreeMap<String, f64> => Empty;
         /// Settings by path, as for --set: { ["robot.gripper.effort"] = 20 }.
         set: Option<Table> = Type::Map(&Type::OneOf(&[Type::Number("", Range::ANY), Type::Boolean, Type::Text]));
+        /// Built-in policy in place of that of the run: "tactile-servo" (softvt list policies).
+        policy: Option<String>;
         /// object_type of the suites that it applies to; others are not run, and their row says N/A.
         only: Option<ObjectType>;
     }

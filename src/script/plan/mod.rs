@@ -356,7 +356,7 @@ fn condition(lua: &Lua, spec: &ConditionSpec) -> mlua::Result<Condition> {
         };
         set.push((key.to_string()?, text));
     }
-    Ok(Condition { name: spec.name.clone(), shift, set, only: spec.only })
+    Ok(Condition { name: spec.name.clone(), shift, set, policy: spec.policy.clone(), only: spec.only })
 }
 
 /// Points of the grid of an experiment.

@@ -7,6 +7,7 @@ use mlua::{Function, Lua, Value};
 use super::expert::{ExpertController, GripMode};
 use crate::{
     api::{
+        expert_input::InstanceRanges,
         random::LuaRng,
         scene::{LuaScene, empty_scene},
         tasks::GoalSpec,
@@ -43,6 +44,8 @@ pub struct EpisodeSetup {
     pub seed: EpisodeSeed,
     instance: Arc<ScriptInstance>,
     expert: Option<Function>,
+    /// Ranges within which the objects of the suite vary.
+    instances: InstanceRanges,
 }
 
 impl EpisodeSetup {
@@ -59,7 +62,7 @@ impl EpisodeSetup {
     pub fn expert(self, mode: GripMode) -> Option<ExpertController> {
         let function = self.expert?;
         self.instance.vm.random.reseed(self.seed.stream(RandomStream::Expert));
-        Some(ExpertController::new(self.instance, function, mode))
+        Some(ExpertController::new(self.instance, function, mode, self.instances))
     }
 }
 
@@ -110,7 +113,8 @@ impl SceneBuilder {
         let largest = self.ranges.get(&id.suite).map_or(1.0, |ranges| ranges.size.max);
         check_width(&scene, task.goal.object(), variation.as_ref(), largest)?;
         let (instance, expert) = (self.instance.clone(), task.expert.clone());
-        Ok(EpisodeSetup { scene, nominal, variation, seed, instance, expert })
+        let instances = InstanceRanges::new(self.ranges.get(&id.suite));
+        Ok(EpisodeSetup { scene, nominal, variation, seed, instance, expert, instances })
     }
 
     /// The result of a shift's function: a scene, or nothing if it changed the given one.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     api::{
         expert::{Coroutine, FingerAccess},
-        expert_input::{ExpertInput, TrackingErrorMonitor},
+        expert_input::{ExpertInput, InstanceRanges, TrackingErrorMonitor},
     },
     plan::ScriptInstance,
 };
@@ -20,6 +20,8 @@ pub enum GripMode {
     Commanded,
     /// Either open or closed.
     Binary,
+    /// The closure that is best for all instances that a variation can draw of the object's asset.
+    FixedClosure,
     /// Closes until the tactile sensors show a firm grasp, wherever the expert grasps.
     TactileServo,
 }
@@ -34,13 +36,19 @@ pub struct ExpertController {
     /// True while the gripper should hold an object, as last commanded.
     pub is_gripping: bool,
     monitor: TrackingErrorMonitor,
+    instances: InstanceRanges,
 }
 
 impl ExpertController {
-    pub(crate) fn new(instance: Arc<ScriptInstance>, function: mlua::Function, mode: GripMode) -> Self {
+    pub(crate) fn new(
+        instance: Arc<ScriptInstance>,
+        function: mlua::Function,
+        mode: GripMode,
+        instances: InstanceRanges,
+    ) -> Self {
         let access = if mode == GripMode::TactileServo { FingerAccess::Servo } else { FingerAccess::None };
         let (coroutine, monitor) = (Coroutine::new(function, access), TrackingErrorMonitor::default());
-        Self { instance, coroutine, mode, is_gripping: false, monitor }
+        Self { instance, coroutine, mode, is_gripping: false, monitor, instances }
     }
 }
 
@@ -60,7 +68,8 @@ impl Controller for ExpertController {
     fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, PolicyError> {
         let tactile = observation.tactile.as_ref().and_then(|tactile| tactile.frames.last());
         self.coroutine.set_readings(tactile.cloned());
-        let input = ExpertInput::new(sim, observation.time_s, &mut self.monitor);
+        let mut input = ExpertInput::new(sim, observation.time_s, &mut self.monitor);
+        input.view.instances = (self.mode == GripMode::FixedClosure).then_some(self.instances);
         let vm = &self.instance.vm;
         let _deadline = vm.call_deadline();
         let command = self.coroutine.next_command(&vm.lua, input, &mut self.monitor);
@@ -69,7 +78,7 @@ impl Controller for ExpertController {
             self.is_gripping = command.gripping;
             let closure = match self.mode {
                 GripMode::Binary => f64::from(u8::from(command.gripping)),
-                GripMode::Commanded | GripMode::TactileServo => command.closure,
+                GripMode::Commanded | GripMode::FixedClosure | GripMode::TactileServo => command.closure,
             };
             let orientation = rotation::axis_angle(&command.pose_b.rotation);
             Action::new(command.pose_b.translation.vector, orientation, closure)

@@ -4,7 +4,7 @@ use super::*;
 use crate::{EpisodeSetup, load_variation};
 use softvt_benchmark::Plan;
 use softvt_evaluation::episode_id::{EpisodeId, Split};
-use softvt_scene::{Body, Object, SoftMaterial};
+use softvt_scene::Object;
 
 const ASSETS: &str = r#"
 local mat = softvt.asset { name = "mat", shape = softvt.shape.box { size = { 0.2, 0.2, 0.01 } }:grounded(), body = softvt.static {} }
@@ -45,13 +45,6 @@ fn opened(rest: &str) -> EpisodeSetup {
 
 fn object<'a>(setup: &'a EpisodeSetup, name: &str) -> &'a Object {
     setup.scene.objects.iter().find(|object| object.name == name).expect("placed")
-}
-
-fn material(object: &Object) -> &SoftMaterial {
-    match &object.asset.body {
-        Body::Soft(material) => material,
-        other => panic!("{other:?}"),
-    }
 }
 
 /// The error of a script at load or of its first episode, without the folder's name.
@@ -209,4 +202,50 @@ fn an_object_that_no_hand_can_hold_is_refused_where_it_is_placed() {
     let message =
         refusal("return suite(function(scene, rng) pair(scene, rng) scene:object('left').scale = 1.4 end)");
     assert!(message.contains("84.0 mm wide"), "{message}");
+}
+
+/// Checks `experts.fixed_closure` in Lua against a search over closures and random instances.
+const FIXED_CLOSURE: &str = r#"
+local fixed_closure, grasp = require "experts.fixed_closure", require "experts.grasp"
+local function instance(scale, youngs_factor, density_factor)
+  return { name = "ball", asset = "ball", scale = scale, youngs_factor = youngs_factor, density_factor = density_factor,
+    hints = {}, size = { 0.06 * scale, 0.06 * scale, 0.06 * scale } }
+end
+local function ends(object)
+  local window = grasp.window(object)
+  return grasp.command(window.loose), grasp.command(window.tight)
+end
+-- Whatever the object at hand is, the closure is that of the nominal one if there is no other.
+local ones = { size = { 1, 1 }, stiffness = { 1, 1 }, density = { 1, 1 } }
+local from, to = ends(instance(1, 1, 1))
+for _, object in ipairs { instance(1, 1, 1), instance(1.1, 0.6, 1.5) } do
+  assert(math.abs(fixed_closure(object, ones) - (from + to) / 2) < 1e-9)
+end
+-- No other closure is safe for more instances, up to the resolution of the grid.
+local ranges = { size = { 0.88, 1.12 }, stiffness = { 0.5, 2 }, density = { 0.6, 1.8 } }
+local function safe_share(closure)
+  local count = 0
+  for k = 1, 500 do
+    -- A low-discrepancy sequence (additive recurrence).
+    local function share(step) return (0.5 + k * step) % 1 end
+    local low, high = ends(instance(
+      0.88 + 0.24 * share(0.8191725), 0.5 * 4 ^ share(0.6710436), 0.6 * 3 ^ share(0.5497005)
+    ))
+    if low <= closure and closure <= high then count = count + 1 end
+  end
+  return count / 500
+end
+local most = 0
+for closure = 0.2, 0.6, 0.01 do most = math.max(most, safe_share(closure)) end
+local own = safe_share(fixed_closure(instance(0.9, 2, 1), ranges))
+assert(own >= most - 0.03 and own < 0.95, ("%g of at most %g"):format(own, most))
+return suite(pair)
+"#;
+
+#[test]
+fn the_fixed_closure_is_safe_for_most_instances_and_independent_of_the_one_at_hand() {
+    let project = project(FIXED_CLOSURE);
+    let window = "return { ball = { width_contact = 0.060, width_lower = 0.0585, width_at_tau = 0.0535, force_lower = 0.1, force_at_tau = 0.8 } }";
+    project.write("scripts/calibrated.lua", window.as_bytes());
+    project.load("x.lua", &[]).unwrap_or_else(|error| panic!("{error}"));
 }
