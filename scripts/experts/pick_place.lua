@@ -3,6 +3,7 @@
 --   expert = pick_place { object = "left", target = "plate" }
 local grasp = require "experts.grasp"
 local route = require "experts.route"
+local fixed_closure = require "experts.fixed_closure"
 
 local FIELDS = { object = "string", target = "string", closure = "number?", speed = "number?" }
 -- Clearance above obstacles while carrying, above the target at release, and around the fingers, m.
@@ -70,6 +71,13 @@ local function release_pose(arm, scene, spec, height)
   return best.pose
 end
 
+-- The same specification with one closure for all instances of the asset, for an expert that must not know which one it is.
+local function with_fixed_closure(spec, arm, scene)
+  local full = { closure = fixed_closure(scene:object(spec.object), arm.instances) }
+  for key, value in pairs(spec) do full[key] = value end
+  return full
+end
+
 local function place(arm, scene, spec, height, pace)
   local object = scene:object(spec.object)
   local target_pose = release_pose(arm, scene, spec, height)
@@ -88,6 +96,7 @@ end
 return function(spec)
   softvt.check_fields("pick_place", spec, FIELDS)
   return function(arm, scene)
+    local spec = arm.instances and with_fixed_closure(spec, arm, scene) or spec
     local pace = (spec.speed or 1) * (1 + spread(SPEED_SPREAD))
     local first, reason = scene:object(spec.object).centre, nil
     for _ = 1, ATTEMPTS do
