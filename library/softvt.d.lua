@@ -64,11 +64,12 @@
 ---@field suites softvt.Suite[] The suites, in order.
 ---@field conditions softvt.Condition[] The conditions, in order.
 
----A difference between a run and its reference: other shifts or settings with the same tasks, initial states and seeds.
+---A difference between a run and its reference: other shifts, settings or another policy, with the same tasks, initial states and seeds.
 ---@class softvt.Condition
 ---@field name string Name in the table of results and of the run folder.
 ---@field shift? table<string, number> Shifts by name, as for --shift: { mass = 1.25 }.
 ---@field set? table<string, number|boolean|string> Settings by path, as for --set: { ["robot.gripper.effort"] = 20 }.
+---@field policy? string Built-in policy in place of that of the run: "tactile-servo" (softvt list policies).
 ---@field only? "deformable"|"rigid" object_type of the suites that it applies to; others are not run, and their row says N/A.
 
 ---A function that is evaluated at points and returns rows of results. Give either grid or points.
@@ -1062,6 +1063,13 @@ function SceneState:clearance(pose, options) end
 ---@field parts table<string, softvt.ObjectState> Parts of an articulated object by name.
 local ObjectState = {}
 
+---Smallest and largest factors by which the instances of an asset differ.
+---@class softvt.InstanceRanges
+---@field size number[] Factors on the size, uniform.
+---@field stiffness number[] Factors on Young's modulus, log-uniform.
+---@field density number[] Factors on the density, log-uniform.
+local InstanceRanges = {}
+
 ---The robot arm as an expert controls it. Each motion takes as many control steps as it needs.
 ---@class softvt.Arm
 ---@field pose softvt.Pose Measured pose of the tool centre point.
@@ -1070,6 +1078,7 @@ local ObjectState = {}
 ---@field gripping boolean True from a call of grasp to the next call of release or open.
 ---@field width number Measured distance of the gels, m.
 ---@field force number[] Normal force on the left and the right pad, N.
+---@field instances softvt.InstanceRanges? Under --policy fixed-closure: the ranges within which the instances of an asset differ. The expert then closes to one closure for all of them (experts.fixed_closure). nil under other policies.
 ---@field time number Time since the start, s.
 ---@field dt number Length of a control step, s.
 local Arm = {}
