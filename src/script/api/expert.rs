@@ -254,7 +254,8 @@ class! {
                     this.read(|view| view.instances).map(|ranges| instance_ranges(lua, &ranges)).transpose()?
                 }
             }
-            /// Time since the start, s. "number" { get(_, this) { this.read(|view| view.time_s) } }
+            /// Time since the start, s.
+            time: "number" { get(_, this) { this.read(|view| view.time_s) } }
             /// Length of a control step, s.
             dt: "number" { get(_, this) { this.read(|view| view.dt_s) } }
         }
