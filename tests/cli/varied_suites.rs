@@ -48,7 +48,10 @@ fn a_variation_in_a_file_replaces_the_standard_one() {
     project.write("small.lua", ranges.as_bytes());
     project.succeeds("x.lua --vary=small.lua --out run");
     let episode = &project.lines("run/episodes.jsonl")[0];
-    assert_eq!((drawn(episode, "scale"), drawn(episode, "youngs_factor")), (&Value::from(0.5), &Value::from(2.0)));
+    assert_eq!(
+        (drawn(episode, "scale"), drawn(episode, "youngs_factor")),
+        (&Value::from(0.5), &Value::from(2.0))
+    );
     project.write("small.lua", ranges.replace("{ 2, 2 }", "{ 2, 1 }").as_bytes());
     let message = project.refusal("x.lua --vary=small.lua --out other");
     assert!(message.contains("small.lua:1") && message.contains("variation.stiffness"), "{message}");
@@ -85,5 +88,8 @@ fn conditions_may_name_a_built_in_policy() {
     assert_eq!(project.json("run/conditions.json")["suites"][0]["rows"][1]["policy"], "noop");
     project.write("trial.lua", plan("exprt").as_bytes());
     let message = project.refusal("trial.lua --out again");
-    assert!(message.contains("condition \"other\": policy:") && message.contains("did you mean expert?"), "{message}");
+    assert!(
+        message.contains("condition \"other\": policy:") && message.contains("did you mean expert?"),
+        "{message}"
+    );
 }

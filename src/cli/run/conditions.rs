@@ -9,8 +9,8 @@ use crate::{
     output::{eprint_notice, print},
     run::{
         config::RunConfig,
-        policy::PolicyConfig,
         evaluate::{is_finished, run_suite},
+        policy::PolicyConfig,
         selection::{path_component, select_episodes, select_tasks},
         suite_run::SuiteRun,
     },

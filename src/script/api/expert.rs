@@ -5,7 +5,9 @@ use std::sync::{Arc, Mutex};
 use mlua::{Function, Lua, MultiValue, Table, Thread, Value, chunk::ChunkMode};
 
 use super::{
-    expert_input::{ExpertCommand, ExpertInput, ExpertView, InstanceRanges, ObjectView, TrackingErrorMonitor},
+    expert_input::{
+        ExpertCommand, ExpertInput, ExpertView, InstanceRanges, ObjectView, TrackingErrorMonitor,
+    },
     index_of,
     observation::{FingerReadings, fingers},
     pose::LuaPose,
