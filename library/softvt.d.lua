@@ -198,7 +198,7 @@
 ---@field scale? number[] Factors on the first six numbers, applied first. Expects a list of 6 numbers.
 ---@field offset? number[] Offsets added after that. Expects a list of 6 numbers.
 ---@field length? integer Length that an action must have, padding included; any from 7 by default. Expects a whole number in 7..4096.
----@field gripper softvt.GripperValues The seventh number.
+---@field gripper? softvt.GripperValues The seventh number.
 
 ---The seventh number of an action.
 ---@class softvt.GripperValues
