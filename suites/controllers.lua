@@ -1,5 +1,5 @@
 -- Controllers that differ in their grip alone, on the varied suites: the same expert knows the object (reference), closes by touch,
--- closes to one width per kind of object, or shuts the hand. Prints one table per suite.
+-- closes to one closure per kind of object, or fully. Prints one table per suite.
 --
 --   softvt suites/controllers.lua --episodes 50
 return softvt.conditions {

@@ -20,13 +20,13 @@ fn lists_are_printed_as_text_and_as_json() {
     assert!(suites.iter().any(|s| s["name"] == "spatial_soft" && s["tasks"] == 10 && s["episodes"] == 5));
     assert!(suites.iter().any(|s| s["name"] == "all" && s["tasks"] == 40 && s["file"] == "suites/all.lua"));
     let tasks = json("tasks");
-    assert_eq!(tasks.len(), 40, "no task is listed twice");
+    assert_eq!(tasks.len(), 60, "those of four suites and two varied ones; no task is listed twice");
     let of_suite: Vec<_> = tasks.iter().filter(|t| t["suite"] == "spatial_soft").collect();
     assert_eq!(of_suite.len(), 10);
     assert!(of_suite[1]["prompt"].as_str().is_some_and(|p| p.starts_with("pick up the left white spiral")));
     assert!(json("assets").iter().filter(|a| a["name"] == "plate" || a["name"] == "sesame_bun").count() == 2);
     let names = |what: &str| json(what).iter().map(|row| row["name"].clone()).collect::<Vec<_>>();
-    assert_eq!(names("policies")[..5], ["expert", "expert-binary", "tactile-servo", "noop", "random"]);
+    assert_eq!(names("policies")[..6], ["expert", "expert-binary", "fixed-closure", "tactile-servo", "noop", "random"]);
     assert!(names("policies").contains(&"scripts/policies/hold.lua".into()));
     assert_eq!(names("profiles")[..4], ["vision", "visuo_tactile", "softvtbench", "libero"]);
     assert!(names("profiles").contains(&"scripts/profiles/libero.lua".into()));
