@@ -11,6 +11,7 @@
 ---@field shifts? softvt.Shift[] Changes of the scene that a run can request.
 ---@field vary? softvt.Variation Ranges from which the soft objects, the light and the cameras of every episode are drawn.
 ---@field settings? table<string, table<string, any>> Changed settings of physics, robot and judge: { physics = {…}, robot = {…}, criteria = {…} }.
+---@field twin_of? string Name of the suite of soft objects whose rigid twin this is. All soft bodies become rigid, with the same shape, mass and looks; initial states are those of that suite, so tasks and layouts must be its own.
 
 ---A task of a suite.
 ---@class softvt.Task
@@ -44,7 +45,7 @@
 ---@field default number Value that changes nothing. Expects a number.
 ---@field min? number Lowest value. Expects a number.
 ---@field max? number Highest value. Expects a number.
----@field apply fun(scene: softvt.Scene, value: number): softvt.Scene? Changes the scene; may return another one.
+---@field apply fun(scene: softvt.Scene, value: number, rng: softvt.Rng): softvt.Scene? Changes the scene; may return another one. scene.goal_object is the object of the task's goal and scene.prompt the instruction. Draw from rng:stream "camera", "light", "material" or "sensor", whichever the shift changes.
 
 ---Ranges from which every episode of a suite draws: factors on size, stiffness, density and friction of each soft object, its colour, the light and the poses of the cameras. The policy sees none of the drawn numbers; records do.
 ---@class softvt.Variation
@@ -71,6 +72,7 @@
 ---@field set? table<string, number|boolean|string> Settings by path, as for --set: { ["robot.gripper.effort"] = 20 }.
 ---@field policy? string Built-in policy in place of that of the run: "tactile-servo" (softvt list policies).
 ---@field only? "deformable"|"rigid" object_type of the suites that it applies to; others are not run, and their row says N/A.
+---@field rigid_twin? boolean True to run the rigid twin of the suites: shapes, masses, looks, layouts and prompts stay. Default false.
 
 ---A function that is evaluated at points and returns rows of results. Give either grid or points.
 ---@class softvt.Experiment
@@ -931,9 +933,11 @@ function Rng:shuffle(list) end
 ---The scene that a layout or a shift builds.
 ---@class softvt.Scene
 ---@field objects softvt.Object[] The placed objects, in order.
+---@field goal_object softvt.Object? The object of the task's goal, in shifts; nil in layouts, which several tasks may share.
 ---@field light softvt.Light The light.
 ---@field base number[] Position of the robot base. Expects a list of 3 numbers in -1000..1000 (m, world).
 ---@field start_q number[] Joint angles of the arm at the start, within its limits. Expects a list of 7 numbers (rad).
+---@field prompt string The instruction of the task, in shifts; nil in layouts.
 ---@field gravity number[] Gravity. Expects a list of 3 numbers (m/s², world).
 ---@field workspace_min number[] Lowest corner of the workspace. Expects a list of 3 numbers (m, world).
 ---@field workspace_max number[] Highest corner of the workspace. Expects a list of 3 numbers (m, world).
@@ -947,6 +951,12 @@ function Scene:add(spec) end
 ---@param name string
 ---@return softvt.Object
 function Scene:object(name) end
+
+---Returns the horizontal distance from a point to the nearest object, taken as an upright cylinder about its origin, m; negative inside of one. Surfaces at or below z = 0 and scenery do not count.
+---@param x number
+---@param y number
+---@return number
+function Scene:distance_to_objects(x, y) end
 
 ---Returns a camera by name; every scene has third_person and wrist.
 ---@param name string

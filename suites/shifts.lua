@@ -1,19 +1,29 @@
--- The nine standard shifts, one factor at a time, compared with the unmodified reference at the same tasks, initial states and
+-- Suites under conditions of one changed factor each, compared with the unmodified reference at the same tasks, initial states and
 -- seeds. Writes one table per suite, conditions.json, and an ordinary run folder per condition.
 --
 --   softvt suites/shifts.lua
 --   softvt suites/shifts.lua --suite object_soft,spatial_rigid --episodes 1
+--   softvt suites/shifts.lua --conditions standard,perturbations --policy ws://host:8000
 local shifts = require "shifts"
+
+local LISTS = { standard = shifts.conditions, all_objects = shifts.all_objects, perturbations = shifts.perturbations }
 
 local opt = softvt.options {
   suite = { default = { "spatial_soft" }, help = "suites to run: files of suites/, without .lua" },
+  conditions = {
+    default = { "standard" }, choices = { "standard", "all_objects", "perturbations" },
+    help = "conditions: the nine of the later release; mass and stiffness of all objects and darker light; perception and control",
+  },
 }
 
-local suites = {}
+local suites, conditions = {}, {}
 for _, name in ipairs(opt.suite) do
   local found = require("suites." .. name)
   -- A file may return several, as suites/all.lua does.
   for _, suite in ipairs(#found > 0 and found or { found }) do table.insert(suites, suite) end
 end
+for _, name in ipairs(opt.conditions) do
+  for _, condition in ipairs(LISTS[name]) do table.insert(conditions, condition) end
+end
 
-return softvt.conditions { name = "shifts", suites = suites, conditions = shifts.conditions }
+return softvt.conditions { name = "shifts", suites = suites, conditions = conditions }

@@ -105,6 +105,9 @@ pub struct Suite {
     pub vary: Option<variation::VariationRanges>,
     /// Settings of physics, robot, sensors and judge.
     pub settings: settings::Settings,
+    /// The suite of soft objects whose rigid twin this is; its initial states are those of that suite.
+    #[serde(default)]
+    pub twin_of: Option<String>,
 }
 
 /// Value of a [`Shift`] in a run; `[name, value]` in files.
@@ -146,6 +149,9 @@ pub struct Condition {
     pub policy: Option<String>,
     /// Kind of suites to which the condition applies; `None` for all.
     pub only: Option<ObjectType>,
+    /// True for the rigid twin of the suites.
+    #[serde(default)]
+    pub rigid_twin: bool,
 }
 
 /// The task of `softvt FILE.lua`.

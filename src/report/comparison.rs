@@ -41,6 +41,8 @@ pub struct Comparison {
     pub unmatched: usize,
     /// Fields of `run.json`, other than the policy, in which the runs differ.
     pub unlike: Vec<String>,
+    /// How a suite is paired with its rigid twin, one sentence per pair; empty for runs of the same suites.
+    pub pairing: Vec<String>,
     /// One sentence per run with missing episodes.
     pub partial: Vec<String>,
     /// Over all common episodes.
@@ -70,6 +72,8 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
     for runs in [first, second] {
         check_unique(runs)?;
     }
+    let (twins, pairing) = with_twins_paired(first, second);
+    let [first, second] = &twins;
     let count = |runs: &[StoredRun]| -> usize { runs.iter().map(|run| run.records.len()).sum() };
     let pairs = pair_episodes(records(first), records(second));
     if pairs.is_empty() {
@@ -87,6 +91,7 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
         deformable: pairs.iter().any(|pair| pair.first.header.soft),
         unmatched: count(first) + count(second) - 2 * pairs.len(),
         unlike: differing_fields(first, second),
+        pairing,
         partial: all()
             .filter(|run| run.is_partial())
             .flat_map(|run| run.warnings().into_iter().take(1))
@@ -94,6 +99,34 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
         all: PairedComparison::from_pairs(&pairs),
         by_task: group_by_task(&pairs).map(task).collect(),
     })
+}
+
+/// The runs, with the records of rigid twins under the name of the soft original if the other side has that: initial
+/// states and prompts are the same. Also a sentence about each such pair.
+fn with_twins_paired(first: &[StoredRun], second: &[StoredRun]) -> ([Vec<StoredRun>; 2], Vec<String>) {
+    let mut sides = [first.to_vec(), second.to_vec()];
+    let mut pairing = Vec::new();
+    for (side, own, others) in [(0, first, second), (1, second, first)] {
+        for run in sides[side].iter_mut().filter(|run| run.is_rigid_twin()) {
+            let is_original =
+                |other: &&StoredRun| !other.is_rigid_twin() && other.suite() == run.original_suite();
+            // A folder with both has the original for the pair.
+            if own.iter().any(|run| is_original(&run)) {
+                continue;
+            }
+            let Some(original) = others.iter().find(is_original).map(|other| other.suite().to_owned()) else {
+                continue;
+            };
+            pairing.push(format!(
+                "{} is the rigid twin of {original}; their episodes are paired by task and episode",
+                run.suite()
+            ));
+            for record in &mut run.records {
+                record.header.id.suite.clone_from(&original);
+            }
+        }
+    }
+    (sides, pairing)
 }
 
 fn records(runs: &[StoredRun]) -> impl Iterator<Item = &EpisodeRecord> {
@@ -206,7 +239,7 @@ pub fn table(comparison: &Comparison) -> String {
         let episodes = counted(comparison.unmatched, "episode");
         table.line(format!("{episodes} present in only one run {verb} skipped"));
     }
-    comparison.partial.iter().for_each(|warning| table.line(warning));
+    comparison.pairing.iter().chain(&comparison.partial).for_each(|sentence| table.line(sentence));
     if !comparison.unlike.is_empty() {
         table.line(format!("the runs also differ in {} (run.json)", comparison.unlike.join(", ")));
     }

@@ -31,6 +31,17 @@ pub struct ConditionOutcome {
 impl ConditionOutcome {
     /// Results of `records`, compared with those of the reference.
     pub fn new(folder: String, records: &[EpisodeRecord], reference: Option<&[EpisodeRecord]>) -> Self {
+        // The twin of a suite has a name of its own in results. Within a table, task and episode identify the pair.
+        let renamed = |record: &EpisodeRecord, name: &str| {
+            let mut record = record.clone();
+            record.header.id.suite = name.to_owned();
+            record
+        };
+        let paired = reference.map(|reference| {
+            let name = reference.first().map_or("", |record| &record.header.id.suite);
+            let own: Vec<EpisodeRecord> = records.iter().map(|record| renamed(record, name)).collect();
+            PairedComparison::from_pairs(&pair_episodes(reference, &own))
+        });
         let scores = Scores::from_records(&records.iter().collect::<Vec<_>>());
         Self {
             folder,
@@ -40,8 +51,7 @@ impl ConditionOutcome {
             no_drop_rate: scores.no_drop_rate,
             safety_success_rate: scores.safety_success_rate,
             d_over_tau: Distribution::from_values(records.iter().filter_map(d_over_tau).collect()),
-            paired: reference
-                .map(|reference| PairedComparison::from_pairs(&pair_episodes(reference, records))),
+            paired,
         }
     }
 }
@@ -50,6 +60,9 @@ impl ConditionOutcome {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ConditionRow {
     pub condition: String,
+    /// True for the rigid twin of the suite, paired with the reference by task and episode.
+    #[serde(default)]
+    pub rigid_twin: bool,
     pub shift: Vec<ShiftValue>,
     pub set: Vec<(String, String)>,
     /// Policy in place of that of the reference; absent for the same.
@@ -136,6 +149,7 @@ mod tests {
     fn row(condition: &str, outcome: Option<ConditionOutcome>) -> ConditionRow {
         let not_applicable = outcome.is_none().then(|| "nothing in it deforms".to_owned());
         ConditionRow {
+            rigid_twin: false,
             condition: condition.into(),
             shift: Vec::new(),
             set: Vec::new(),

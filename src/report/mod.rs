@@ -3,6 +3,7 @@
 
 pub mod actions;
 pub mod comparison;
+pub mod condition_effects;
 pub mod condition_table;
 pub mod page;
 pub mod run_folder;

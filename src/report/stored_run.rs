@@ -72,6 +72,16 @@ impl StoredRun {
         self.records.first().map_or(self.text("suite"), |record| &record.header.id.suite)
     }
 
+    /// Name of the suite whose initial states the run has: for a rigid twin that of its soft original.
+    pub fn original_suite(&self) -> &str {
+        self.manifest["twin_of"].as_str().unwrap_or_else(|| self.text("suite"))
+    }
+
+    /// True if soft objects were made rigid.
+    pub fn is_rigid_twin(&self) -> bool {
+        self.manifest["twin_of"].is_string() || self.manifest["twin"].is_string()
+    }
+
     /// True if the policy has access to ground-truth state.
     pub fn is_privileged(&self) -> bool {
         self.manifest["privileged"].as_bool() == Some(true)

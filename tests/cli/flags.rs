@@ -250,3 +250,49 @@ fn the_rigid_twin_of_rigid_objects_is_refused() {
     assert!(refused.contains("--twin: the objects of this suite are rigid already"), "{refused}");
     project.succeeds("check soft.lua --twin rigid");
 }
+
+#[test]
+fn latency_delays_the_response_by_control_steps() {
+    let small = Small { expert: "arm:close_to(1, { rate = 2 }) arm:wait(1)", ..Small::default() };
+    let project = small.project();
+    let widths = |out: &str, words: &str| -> Vec<f64> {
+        project.succeeds(&format!("x.lua --trace --out {out} {words}"));
+        let steps = project.lines(&format!("{out}/trace/task_000/episode_00000.jsonl"));
+        steps.iter().map(|step| step["gripper_width_m"].as_f64().expect("a width")).collect()
+    };
+    let plain = widths("plain", "");
+    let late = widths("late", "--set robot.latency=3");
+    assert!(plain[1] < 0.079, "the hand closes at once: {plain:?}");
+    assert!(late[..3].iter().all(|width| (width - 0.08).abs() < 1e-6), "{late:?}");
+    for (step, width) in plain.iter().enumerate().take(8) {
+        assert!((late[step + 3] - width).abs() < 1e-9, "step {step}: {} and {width}", late[step + 3]);
+    }
+    assert!(
+        project
+            .refusal("x.lua --out bad --set robot.latency=101")
+            .contains("robot.latency: expected 0 to 100")
+    );
+}
+
+#[test]
+fn a_rigid_twin_is_paired_with_its_soft_original() {
+    let text = Small { task: "budget_steps = 1", ..Small::default() }.text();
+    let twin = "local soft = require \"x\"\nreturn softvt.suite { name = \"one_twin\", object_type = \"rigid\", twin_of = soft.name, variation = soft.variation, episodes = soft.episodes, tasks = soft.tasks }\n";
+    let conditions = "return softvt.conditions { name = \"c\", suites = { (require \"x\") }, conditions = { { name = \"twin\", rigid_twin = true } } }\n";
+    let project = Project::new(&[("x.lua", &text), ("twin.lua", twin), ("c.lua", conditions)]);
+    project.succeeds("x.lua --policy noop --out soft");
+    project.succeeds("twin.lua --policy noop --out twin");
+    let compared = project.succeeds("compare soft twin").out;
+    assert!(compared.contains("1 paired episode"), "{compared}");
+    assert!(
+        compared.contains("one_twin is the rigid twin of one; their episodes are paired by task and episode"),
+        "{compared}"
+    );
+    assert_eq!(project.json("twin/run.json")["twin_of"], "one");
+    project.succeeds("c.lua --policy noop --out conditions");
+    let rows = project.json("conditions/conditions.json")["suites"][0]["rows"].clone();
+    assert_eq!((&rows[1]["rigid_twin"], &rows[1]["outcome"]["paired"]["pairs"]), (&true.into(), &1.into()));
+    let wrong = twin.replace("\"rigid\"", "\"deformable\"");
+    project.write("wrong.lua", wrong.as_bytes());
+    assert!(project.refusal("check wrong.lua").contains("suite.twin_of: a rigid twin has object_type"));
+}

@@ -8,7 +8,7 @@ use crate::{
     error::CliError,
     output::{eprint_notice, print},
     run::{
-        config::RunConfig,
+        config::{RunConfig, Twin},
         evaluate::{is_finished, run_suite},
         policy::PolicyConfig,
         selection::{path_component, select_episodes, select_tasks},
@@ -108,6 +108,7 @@ fn condition_cases(
         set: Vec::new(),
         policy: None,
         only: None,
+        rigid_twin: false,
     };
     let mut cases: Vec<ConditionCase> = Vec::new();
     for condition in std::iter::once(&reference).chain(conditions) {
@@ -125,14 +126,20 @@ fn condition_cases(
             changed.policy = PolicyConfig::builtin(name)
                 .map_err(|error| config.error(format!("condition {:?}: policy: {error}", condition.name)))?;
         }
-        let not_applicable = not_applicable(condition.only, object_type);
+        if condition.rigid_twin {
+            changed.script.twin = Some(Twin::Rigid);
+        }
+        let not_applicable = not_applicable(condition, object_type);
         cases.push(ConditionCase { condition: condition.clone(), folder, config: changed, not_applicable });
     }
     Ok(cases)
 }
 
-fn not_applicable(only: Option<ObjectType>, object_type: ObjectType) -> Option<String> {
-    match only? {
+fn not_applicable(condition: &Condition, object_type: ObjectType) -> Option<String> {
+    if condition.rigid_twin && object_type == ObjectType::Rigid {
+        return Some("its objects are rigid already".to_owned());
+    }
+    match condition.only? {
         only if only == object_type => None,
         ObjectType::Deformable => Some("nothing that is judged deforms".to_owned()),
         ObjectType::Rigid => Some("it is for rigid objects".to_owned()),
@@ -194,6 +201,7 @@ fn compare_conditions(
         }
         rows.push(ConditionRow {
             condition: case.condition.name.clone(),
+            rigid_twin: case.condition.rigid_twin,
             shift: case.condition.shift.clone(),
             set: case.condition.set.clone(),
             policy: case.condition.policy.clone(),

@@ -36,6 +36,9 @@ pub(crate) struct RunManifest<'a> {
     /// File of `--vary`.
     #[serde(skip_serializing_if = "Option::is_none")]
     vary: Option<String>,
+    /// The suite whose rigid twin this one is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    twin_of: Option<&'a str>,
     policy: &'a str,
     /// Profile of a policy server.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -92,6 +95,7 @@ impl<'a> RunManifest<'a> {
             twin: config.is_rigid_twin().then_some("rigid"),
             variation: run.suite.vary.as_ref(),
             vary: config.script.vary.as_ref().map(|file| file.display().to_string()),
+            twin_of: run.suite.twin_of.as_deref(),
             policy: &config.policy.name,
             profile: config.policy.server().map(|server| &server.profile),
             gripper: config.policy.server().map(|server| server.profile.actions.gripper.code),

@@ -251,7 +251,8 @@ impl<'a> SuiteRun<'a> {
         controllers: &ControllerFactory,
     ) -> Result<Result<FinishedEpisode, EpisodeError>, CliError> {
         let (spec, opened) = self.spec(job.task, &self.episode_id(job.task, job.episode), origin)?;
-        let mut controller = controllers(opened, self.brief(job.task, job.episode))?;
+        let brief = TaskBrief { prompt: opened.prompt.clone(), ..self.brief(job.task, job.episode) };
+        let mut controller = controllers(opened, brief)?;
         let spec = EpisodeSpec { record_states: keep_states, ..spec };
         let started = Episode::start(spec, &self.assets, &self.sensor_assets);
         Ok(started.and_then(|started| started.run(&mut *controller)))
@@ -281,6 +282,7 @@ impl<'a> SuiteRun<'a> {
         self.calibration_files.report(id.index(), &limits);
         let id = EpisodeId { suite: self.name.clone(), ..id.clone() };
         let (policy, scene) = (&self.config.policy.name, opened.scene.clone());
+        let task = &Task { prompt: opened.prompt.clone(), ..task.clone() };
         let mut spec = EpisodeSpec::new(id, policy, task, &opened.nominal, scene, &self.settings);
         spec.header.privileged = self.is_privileged();
         spec.header.variation = opened.variation.clone().map(Box::new);
@@ -313,20 +315,41 @@ impl<'a> SuiteRun<'a> {
     /// # Errors
     /// A layout, calibration file, camera, light or tactile sensor that is not valid; a server that cannot be reached.
     pub(crate) fn prepare(&mut self, tasks: &[&Task]) -> Result<(), CliError> {
+        let mut has_changed = false;
         for task in tasks {
             let first = self.jobs.episodes_of(task.id).next().unwrap_or(0);
             let opened = self.open_episode(&self.episode_id(task, first))?;
+            has_changed |= opened.scene != opened.nominal || opened.prompt != task.prompt;
             self.check_object_type(task, &opened.nominal)?;
             let scene = Arc::new(opened.scene.clone());
             self.check_declared_cameras(&scene, task)?;
             if let Some(connections) = &self.connections {
                 connections.check().map_err(policy_failure)?;
             }
-            let streams = (self.controllers)(opened, self.brief(task, first))?.streams();
+            let brief = TaskBrief { prompt: opened.prompt.clone(), ..self.brief(task, first) };
+            let streams = (self.controllers)(opened, brief)?.streams();
             self.force_observed |= streams.force;
             self.check_streams(scene, streams, task, first).map_err(|error| self.episode_error(&error))?;
         }
+        if !has_changed {
+            self.refuse_shifts_without_effect()?;
+        }
         self.scan_limits(tasks)
+    }
+
+    /// Refuses shifts that change neither the scene nor the prompt of any task, unless their values are the nominal ones.
+    fn refuse_shifts_without_effect(&self) -> Result<(), CliError> {
+        let is_nominal = |shift: &ShiftValue| {
+            let declared = self.suite.shifts.iter().find(|declared| declared.name == shift.name);
+            declared.is_some_and(|declared| declared.default == shift.value)
+        };
+        match self.config.shifts.iter().find(|shift| !is_nominal(shift)) {
+            None => Ok(()),
+            Some(ShiftValue { name, value }) => Err(self.config.error(format!(
+                "--shift {name}={value}: changes nothing in suite {}; leave it out",
+                self.suite.name
+            ))),
+        }
     }
 
     /// Builds the first scene of a task and checks all that can be checked before anything moves.

@@ -4,7 +4,10 @@
 
 use maud::{Markup, Render, html};
 
-use crate::run_summary::RunSummary;
+use crate::{
+    condition_effects::{ConditionEffects, Trend, TrendPoint},
+    run_summary::RunSummary,
+};
 use softvt_evaluation::{
     paired_stats::d_over_tau,
     record::EpisodeRecord,
@@ -212,6 +215,63 @@ fn distribution_mark(of: &Distribution, max: f64) -> Markup {
         }
         @if let Some(median) = of.median {
             line.median x1=(x(median / max)) x2=(x(median / max)) y1="4" y2=(y(STRIP_HEIGHT - 4.0)) {}
+        }
+    }
+}
+
+/// Goal and Safety Success over the values of each factor: one plot per factor.
+pub(super) fn trends(suite: &ConditionEffects) -> Markup {
+    html! {
+        p.legend {
+            span.key { (curve_swatch("curve c0")) "Goal Success" }
+            span.key { (curve_swatch("curve c2")) "Safety Success" }
+        }
+        @for trend in suite.trends() {
+            p.suite { (trend.factor) }
+            (trend_plot(&trend, suite.unchanged()))
+        }
+    }
+}
+
+fn curve_swatch(class: &str) -> Markup {
+    html! {
+        svg.swatch width="30" height="12" aria-hidden="true" { line class=(class) x1="1" x2="29" y1="6" y2="6" {} }
+    }
+}
+
+fn trend_plot(trend: &Trend, unchanged: [Option<f64>; 2]) -> Markup {
+    let points = &trend.points;
+    let (low, high) = (points[0].value, points[points.len() - 1].value);
+    // The ends stay clear of the borders, where the labels would be cut off.
+    let at = |value: f64| 0.08 + 0.84 * (value - low) / (high - low).max(f64::MIN_POSITIVE);
+    type Rate = fn(&TrendPoint) -> f64;
+    let rates: [(&str, Rate); 2] = [("curve c0", |point| point.goal), ("curve c2", |point| point.safety)];
+    let label = format!("Goal and Safety Success over {}; the numbers are in the table above", trend.factor);
+    html! {
+        svg.plot width="100%" height=(PLOT_HEIGHT + 22.0) role="img" aria-label=(label) {
+            @for quarter in 0..=4 {
+                @let height = level(25.0 * f64::from(quarter));
+                line.grid x1="0" x2="100%" y1=(y(height)) y2=(y(height)) {}
+                @if quarter > 0 { text.tick x="0" y=(y(height - 3.0)) { (25 * quarter) " %" } }
+            }
+            @for ((class, rate), unchanged) in rates.iter().zip(unchanged) {
+                @if let Some(unchanged) = unchanged {
+                    g class=(class) {
+                        line stroke-dasharray="4 4" x1="0" x2="100%" y1=(y(level(unchanged))) y2=(y(level(unchanged))) {}
+                    }
+                }
+                g class=(class) {
+                    @for pair in points.windows(2) {
+                        line x1=(x(at(pair[0].value))) x2=(x(at(pair[1].value))) y1=(y(level(rate(&pair[0])))) y2=(y(level(rate(&pair[1])))) {}
+                    }
+                    @for point in points {
+                        circle cx=(x(at(point.value))) cy=(y(level(rate(point)))) r="3" {}
+                    }
+                }
+            }
+            @for point in points {
+                text.tick x=(x(at(point.value))) y=(y(PLOT_HEIGHT + 16.0)) text-anchor="middle" { (short(point.value)) }
+            }
         }
     }
 }

@@ -13,6 +13,7 @@ use serde_json::Value;
 use softvt_common::text::{counted, escape_control};
 
 use super::{
+    condition_effects::{condition_effects, effects_table},
     run_summary::RunSummary,
     tables::{
         ResultTable, TEXT_COLUMNS, bootstrap_table, deformation_table, kappa_table, main_table, stage_table,
@@ -68,6 +69,7 @@ fn sections(runs: &[RunSummary], out: &Path) -> Markup {
     };
     html! {
         (section("results", "Results", &results(runs)))
+        @if let Some(conditions) = conditions(runs) { (section("conditions", "Conditions", &conditions)) }
         @if let Some(deformation) = deformation(runs) { (section("deformation", "Deformation", &deformation)) }
         (section("tasks", "Tasks", &tasks))
         (section("failures", "Unsafe episodes", &failures::failures(runs, out)))
@@ -104,6 +106,24 @@ fn results(runs: &[RunSummary]) -> Markup {
         @if let Some(bootstrap) = bootstrap_table(runs) { (table(&bootstrap)) }
         @if let Some(stages) = stage_table(runs) { (table(&stages)) }
     }
+}
+
+/// Effects of changed factors; `None` without a run under a condition and its unchanged run.
+fn conditions(runs: &[RunSummary]) -> Option<Markup> {
+    let effects = condition_effects(runs);
+    let effects_table = effects_table(&effects)?;
+    Some(html! {
+        (table(&effects_table))
+        @for suite in effects.iter().filter(|suite| !suite.trends().is_empty()) {
+            figure {
+                (figures::trends(suite))
+                figcaption {
+                    "Goal and Safety Success over the value of each factor: " (suite.suite) ", " (suite.method)
+                    ". Dashed lines are the unchanged run."
+                }
+            }
+        }
+    })
 }
 
 /// `None` if all suites are rigid.

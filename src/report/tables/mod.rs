@@ -1,6 +1,7 @@
 //! Result tables of runs, as markdown and as LaTeX with booktabs. Names come from scripts and are escaped.
 
 use super::{
+    condition_effects::{condition_effects, effects_table},
     run_summary::RunSummary,
     terminal::{percentile, tau_range},
 };
@@ -217,6 +218,7 @@ pub fn bootstrap_table(runs: &[RunSummary]) -> Option<ResultTable> {
 /// All tables of some runs, in reading order.
 pub fn all_tables(runs: &[RunSummary]) -> Vec<ResultTable> {
     let mut all = vec![main_table(runs)];
+    all.extend(effects_table(&condition_effects(runs)));
     all.extend(deformation_table(runs));
     all.extend(kappa_table(runs));
     all.extend(stage_table(runs));

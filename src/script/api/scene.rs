@@ -5,7 +5,7 @@ use std::{
     sync::{Arc, Mutex},
 };
 
-use mlua::{Lua, Table};
+use mlua::{IntoLua, Lua, Table};
 
 use super::{
     assets::{AssetSpec, COEFFICIENT, DENSITY, PASCALS, POISSON},
@@ -94,8 +94,17 @@ fn check_joint_limits(lua: &Lua, q: &[f64; ARM_DOFS]) -> mlua::Result<()> {
 #[derive(Clone)]
 pub(crate) struct LuaScene {
     pub scene: Arc<Mutex<Scene>>,
+    /// The task, for shifts; `None` for layouts, which several tasks may share.
+    task: Option<Arc<Mutex<SceneTask>>>,
     /// The assets read so far: two objects of one table share an asset.
     assets: Arc<Mutex<Vec<ReadAsset>>>,
+}
+
+/// What a shift sees and changes of the task.
+struct SceneTask {
+    /// Scene name of the goal's object.
+    object: String,
+    prompt: String,
 }
 
 /// An asset with the Lua table that it was read from.
@@ -106,7 +115,38 @@ struct ReadAsset {
 
 impl LuaScene {
     pub(crate) fn new(scene: Scene) -> Self {
-        Self { scene: Arc::new(Mutex::new(scene)), assets: Arc::default() }
+        Self { scene: Arc::new(Mutex::new(scene)), task: None, assets: Arc::default() }
+    }
+
+    /// The scene as the shifts of a task see it.
+    pub(crate) fn for_task(self, object: &str, prompt: &str) -> Self {
+        let task = SceneTask { object: object.to_owned(), prompt: prompt.to_owned() };
+        Self { task: Some(Arc::new(Mutex::new(task))), ..self }
+    }
+
+    /// The instruction of the task; `None` in layouts.
+    pub(crate) fn prompt(&self) -> Option<String> {
+        self.task.as_ref().map(|task| lock(task).prompt.clone())
+    }
+
+    fn goal_object(&self) -> Option<LuaObject> {
+        let name = lock(self.task.as_ref()?).object.clone();
+        let index = self.read(|scene| scene.objects.iter().position(|object| object.name == name))?;
+        Some(LuaObject { scene: self.scene.clone(), index })
+    }
+
+    fn set_prompt(&self, lua: &Lua, prompt: String) -> mlua::Result<()> {
+        let Some(task) = &self.task else {
+            return Err(fail(
+                lua,
+                "scene.prompt: a layout has no prompt; set it in a shift, or in softvt.task",
+            ));
+        };
+        if prompt.trim().is_empty() {
+            return Err(fail(lua, "scene.prompt: expected an instruction, got an empty text"));
+        }
+        lock(task).prompt = prompt;
+        Ok(())
     }
 
     fn read<T>(&self, read: impl FnOnce(&Scene) -> T) -> T {
@@ -190,6 +230,25 @@ fn position(lua: &Lua, scene: &Scene, spec: &PlacementSpec) -> mlua::Result<Vec3
     }
 }
 
+/// Horizontal distance from a point to the nearest circle around the frame of an object that encloses the object, m.
+/// Scenery and surfaces at or below z = 0 do not count. Infinite in an empty scene.
+fn distance_to_objects(scene: &Scene, x: f64, y: f64) -> f64 {
+    /// Height below which an object is a support, m.
+    const SUPPORT: f64 = 1e-3;
+    let solid = scene.objects.iter().filter(|object| !matches!(object.asset.body, Body::Scenery));
+    let distances = solid.filter_map(|object| {
+        let bounds = object.asset.shape.bounds();
+        let centre = object.pose_w.translation.vector;
+        if centre.z + bounds.max.z <= SUPPORT {
+            return None;
+        }
+        let reach = |low: f64, high: f64| low.abs().max(high.abs());
+        let radius = reach(bounds.min.x, bounds.max.x).hypot(reach(bounds.min.y, bounds.max.y));
+        Some((centre.x - x).hypot(centre.y - y) - radius)
+    });
+    distances.fold(f64::INFINITY, f64::min)
+}
+
 /// Height of the surface of an object, or of one of its parts, at (x, y) of the world, m.
 fn top(object: &Object, part: Option<&str>, x: f64, y: f64) -> Option<f64> {
     /// Start of the ray, above everything that can be placed on a table, m.
@@ -220,6 +279,8 @@ class! {
                     fixed_list(lua, handles, "scene:add{…} adds an object")?
                 }
             }
+            /// The object of the task's goal, in shifts; nil in layouts, which several tasks may share.
+            goal_object: "softvt.Object?" { get(lua, this) { this.goal_object().into_lua(lua)? } }
             /// The light.
             light: "softvt.Light" or "its numbers are written one by one, as in scene.light.strength = …" {
                 get(_, this) { LuaLight(this.scene.clone()) }
@@ -236,6 +297,11 @@ class! {
                     this.change(lua, |scene| scene.start_q = q);
                 }
             }
+            /// The instruction of the task, in shifts; nil in layouts.
+            prompt: Type::Text => {
+                get(_, this) { this.prompt() }
+                set(lua, this, prompt: String) { this.set_prompt(lua, prompt)?; }
+            }
             /// Gravity.
             gravity: Type::vector(3, "m/s², world") => gravity;
             /// Lowest corner of the workspace.
@@ -250,6 +316,11 @@ class! {
             fn object(lua, this, name: String) -> ["softvt.Object"] {
                 let index = find(lua, &lock(&this.scene), &name)?;
                 LuaObject { scene: this.scene.clone(), index }
+            }
+            /// Returns the horizontal distance from a point to the nearest object, taken as an upright cylinder about its
+            /// origin, m; negative inside of one. Surfaces at or below z = 0 and scenery do not count.
+            fn distance_to_objects(_, this, x: f64, y: f64) -> ["number"] {
+                this.read(|scene| distance_to_objects(scene, x, y))
             }
             /// Returns a camera by name; every scene has third_person and wrist.
             fn camera(lua, this, name: String) -> ["softvt.Camera"] { LuaCamera::named(lua, &this.scene, &name)? }

@@ -81,8 +81,9 @@ record! {
         min: Option<f64>;
         /// Highest value.
         max: Option<f64>;
-        /// Changes the scene; may return another one.
-        apply: Function = Type::Function("fun(scene: softvt.Scene, value: number): softvt.Scene?");
+        /// Changes the scene; may return another one. scene.goal_object is the object of the task's goal and scene.prompt the
+        /// instruction. Draw from rng:stream "camera", "light", "material" or "sensor", whichever the shift changes.
+        apply: Function = Type::Function("fun(scene: softvt.Scene, value: number, rng: softvt.Rng): softvt.Scene?");
     }
     /// Ranges from which every episode of a suite draws: factors on size, stiffness, density and friction of each soft
     /// object, its colour, the light and the poses of the cameras. The policy sees none of the drawn numbers; records do.
@@ -124,6 +125,9 @@ record! {
         vary: Option<Constructed<VariationSpec>>;
         /// Changed settings of physics, robot and judge: { physics = {…}, robot = {…}, criteria = {…} }.
         settings: Option<Table> = SETTINGS;
+        /// Name of the suite of soft objects whose rigid twin this is. All soft bodies become rigid, with the same shape,
+        /// mass and looks; initial states are those of that suite, so tasks and layouts must be its own.
+        twin_of: Option<String> = Type::Name;
     }
     /// A difference between a run and its reference: other shifts, settings or another policy, with the same tasks, initial
     /// states and seeds.
@@ -138,6 +142,8 @@ record! {
         policy: Option<String>;
         /// object_type of the suites that it applies to; others are not run, and their row says N/A.
         only: Option<ObjectType>;
+        /// True to run the rigid twin of the suites: shapes, masses, looks, layouts and prompts stay.
+        rigid_twin: bool => Boolean(false);
     }
     /// Runs suites as they are, then under each condition, and compares them episode by episode.
     ConditionsSpec: "softvt.Conditions" as "conditions", constructor "softvt.conditions", relations check_conditions {

@@ -322,7 +322,19 @@ fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Suite> {
         shifts: shifts.collect(),
         vary: spec.vary.as_ref().map(|vary| vary.ranges()),
         settings: settings(lua, "suite.settings", spec.settings.as_ref())?,
+        twin_of: twin_of(lua, spec)?,
     })
+}
+
+/// The suite whose rigid twin this one is, which must say that its objects are rigid.
+fn twin_of(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Option<String>> {
+    let Some(name) = &spec.twin_of else { return Ok(None) };
+    let message = match (spec.object_type, *name == spec.name) {
+        (ObjectType::Deformable, _) => "suite.twin_of: a rigid twin has object_type = \"rigid\"",
+        (_, true) => "suite.twin_of: is the suite itself; name the suite of soft objects",
+        _ => return Ok(Some(name.clone())),
+    };
+    Err(fail_at_key(lua, &spec.table, "twin_of", message.to_owned()))
 }
 
 fn task(lua: &Lua, id: usize, spec: &TaskSpec, budget: u32) -> mlua::Result<Task> {
@@ -356,7 +368,14 @@ fn condition(lua: &Lua, spec: &ConditionSpec) -> mlua::Result<Condition> {
         };
         set.push((key.to_string()?, text));
     }
-    Ok(Condition { name: spec.name.clone(), shift, set, policy: spec.policy.clone(), only: spec.only })
+    Ok(Condition {
+        name: spec.name.clone(),
+        shift,
+        set,
+        policy: spec.policy.clone(),
+        only: spec.only,
+        rigid_twin: spec.rigid_twin,
+    })
 }
 
 /// Points of the grid of an experiment.

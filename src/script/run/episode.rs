@@ -40,6 +40,8 @@ pub struct EpisodeSetup {
     pub nominal: Scene,
     /// What the variation of the suite changed in the scene of the layout, if the suite varies.
     pub variation: Option<SceneVariation>,
+    /// Instruction to the policy, which a shift may have changed.
+    pub prompt: String,
     /// Source of its random streams.
     pub seed: EpisodeSeed,
     instance: Arc<ScriptInstance>,
@@ -92,38 +94,53 @@ impl SceneBuilder {
     pub fn build(&self, id: &EpisodeId, shifts: &[ShiftValue]) -> Result<EpisodeSetup, ScriptError> {
         let vm = &self.instance.vm;
         let FoundTask { suite, task } = self.instance.find_task(&id.suite, id.task)?;
-        let seed = EpisodeSeed::new(id, &task.layout.name);
+        // A twin has the initial states of the suite whose twin it is.
+        let seed_suite = suite.twin_of.clone().unwrap_or_else(|| id.suite.clone());
+        let seed = EpisodeSeed { suite: seed_suite, ..EpisodeSeed::new(id, &task.layout.name) };
         vm.random.reseed(seed.stream(RandomStream::Script));
         let mut current = LuaScene::new(empty_scene());
         let rng = LuaRng::new(seed.clone(), RandomStream::Layout);
         vm.call::<()>(&task.layout.build, (current.clone(), rng))?;
         let varied = self.ranges.get(&id.suite).map(|ranges| vary(&mut lock(&current.scene), ranges, &seed));
         let variation = varied.transpose().map_err(|what| ScriptError::new(vm.main(), what))?;
-        let nominal = lock(&current.scene).clone();
+        let mut nominal = lock(&current.scene).clone();
+        current = current.for_task(task.goal.object(), &task.prompt);
         let declared = suite.shifts.as_slice();
         for ShiftValue { name, value } in shifts {
             let Some(shift) = declared.iter().find(|shift| shift.name == *name) else {
                 let names = declared.iter().map(|shift| shift.name.as_str());
                 return Err(ScriptError::new(vm.main(), unknown_shift(name, names)));
             };
-            current = self.shifted(&shift.apply, current, *value)?;
+            current = self.shifted(&shift.apply, current, *value, &seed)?;
         }
-        let scene = lock(&current.scene).clone();
+        let prompt = current.prompt().unwrap_or_else(|| task.prompt.clone());
+        let mut scene = lock(&current.scene).clone();
+        if suite.twin_of.is_some() {
+            (scene, nominal) = (scene.rigid_twin(), nominal.rigid_twin());
+        }
         check_goal(&vm.lua, &task.goal, &scene).map_err(|e| vm.explain(&e))?;
         let largest = self.ranges.get(&id.suite).map_or(1.0, |ranges| ranges.size.max);
         check_width(&scene, task.goal.object(), variation.as_ref(), largest)?;
         let (instance, expert) = (self.instance.clone(), task.expert.clone());
         let instances = InstanceRanges::new(self.ranges.get(&id.suite));
-        Ok(EpisodeSetup { scene, nominal, variation, seed, instance, expert, instances })
+        Ok(EpisodeSetup { scene, nominal, variation, prompt, seed, instance, expert, instances })
     }
 
     /// The result of a shift's function: a scene, or nothing if it changed the given one.
-    fn shifted(&self, apply: &Function, scene: LuaScene, value: f64) -> Result<LuaScene, ScriptError> {
+    fn shifted(
+        &self,
+        apply: &Function,
+        scene: LuaScene,
+        value: f64,
+        seed: &EpisodeSeed,
+    ) -> Result<LuaScene, ScriptError> {
         let vm = &self.instance.vm;
         let wrong = |expected: &str| {
             vm.explain(&fail(&vm.lua, format!("shift.apply: expected {expected} to be returned")))
         };
-        match &vm.call::<Value>(apply, (scene.clone(), value))? {
+        match &vm
+            .call::<Value>(apply, (scene.clone(), value, LuaRng::new(seed.clone(), RandomStream::Script)))?
+        {
             Value::Nil => Ok(scene),
             Value::UserData(data) => match data.borrow::<LuaScene>() {
                 Ok(other) => Ok(other.clone()),

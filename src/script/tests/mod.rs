@@ -7,6 +7,7 @@ mod joints;
 mod mass_and_calibration;
 mod options;
 mod policies;
+mod shifts;
 mod surface;
 mod variation;
 mod visuals;

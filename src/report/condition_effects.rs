@@ -1,0 +1,262 @@
+//! Effects of conditions: runs with one changed factor against the unchanged run of the same suite, policy and seed, on
+//! the same episodes. A rigid twin is a condition of its soft original.
+
+use std::collections::BTreeMap;
+
+use super::{
+    run_summary::RunSummary,
+    tables::{ResultTable, strings},
+};
+use softvt_evaluation::{
+    paired_stats::{EpisodePair, PairedComparison, PairedDifference, pair_episodes},
+    record::EpisodeRecord,
+};
+
+/// The conditions of a suite and a policy.
+#[derive(Clone, Debug)]
+pub struct ConditionEffects {
+    pub suite: String,
+    /// Name of the unchanged run.
+    pub method: String,
+    /// In the order of factors and values.
+    pub effects: Vec<ConditionEffect>,
+    /// Mean over all conditions, Goal and Safety Success, percentage points; intervals over episodes.
+    pub mean_goal: PairedDifference,
+    pub mean_safety: PairedDifference,
+}
+
+/// A condition against the unchanged run.
+#[derive(Clone, Debug)]
+pub struct ConditionEffect {
+    /// What is changed, such as `target_mass`.
+    pub factor: String,
+    /// Its value, if one number is changed.
+    pub value: Option<f64>,
+    /// Factor and value.
+    pub label: String,
+    pub differences: PairedComparison,
+}
+
+/// What a run changes; `None` for an unchanged one.
+fn change(run: &RunSummary) -> Option<(String, Option<f64>, String)> {
+    let run = &run.run;
+    let twin = run.is_rigid_twin().then(|| "rigid twin".to_owned());
+    let changes: Vec<String> = run.changes("shifts").chain(run.changes("set")).chain(twin).collect();
+    let label = changes.join(", ");
+    match &changes[..] {
+        [] => None,
+        [single] => match single.split_once('=') {
+            Some((factor, value)) => Some((factor.to_owned(), value.parse().ok(), label)),
+            None => Some((single.clone(), None, label)),
+        },
+        _ => Some(("several".to_owned(), None, label)),
+    }
+}
+
+/// The records of a run under the name of the soft original.
+fn records_of_original(run: &RunSummary) -> Vec<EpisodeRecord> {
+    let mut records = run.run.records.clone();
+    for record in &mut records {
+        run.run.original_suite().clone_into(&mut record.header.id.suite);
+    }
+    records
+}
+
+/// The effects of all conditions among `runs` whose unchanged run is there too, exactly once.
+pub fn condition_effects(runs: &[RunSummary]) -> Vec<ConditionEffects> {
+    let key = |run: &RunSummary| {
+        let run = &run.run;
+        let text = |field: &str| run.manifest[field].to_string();
+        [run.original_suite().to_owned(), text("policy"), text("seed"), text("split"), text("vary")]
+    };
+    let mut groups: BTreeMap<_, Vec<&RunSummary>> = BTreeMap::new();
+    for run in runs {
+        groups.entry(key(run)).or_default().push(run);
+    }
+    groups.values().filter_map(|group| effects_of_group(group)).collect()
+}
+
+fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
+    let mut unchanged = group.iter().filter(|run| change(run).is_none());
+    let (reference, None) = (unchanged.next()?, unchanged.next()) else { return None };
+    let reference_records = records_of_original(reference);
+    let mut effects = Vec::new();
+    let mut changed: BTreeMap<_, Vec<EpisodeRecord>> = BTreeMap::new();
+    for run in group {
+        let Some((factor, value, label)) = change(run) else { continue };
+        let records = records_of_original(run);
+        let pairs = pair_episodes(&reference_records, &records);
+        if pairs.is_empty() {
+            continue;
+        }
+        effects.push(ConditionEffect {
+            factor,
+            value,
+            label,
+            differences: PairedComparison::from_pairs(&pairs),
+        });
+        for EpisodePair { first, second } in pairs {
+            changed.entry(first.header.id.index()).or_default().push(second.clone());
+        }
+    }
+    if effects.is_empty() {
+        return None;
+    }
+    effects.sort_by(|a, b| {
+        let by_value = || a.value.unwrap_or(f64::NAN).total_cmp(&b.value.unwrap_or(f64::NAN));
+        a.factor.cmp(&b.factor).then_with(by_value).then_with(|| a.label.cmp(&b.label))
+    });
+    let mean = |test: fn(&EpisodeRecord) -> bool| {
+        let percent = |record: &EpisodeRecord| {
+            if record.outcome.is_valid() && test(record) { 100.0 } else { 0.0 }
+        };
+        // One value per episode: its mean over the conditions. Episodes are independent, their conditions are not.
+        let pairs = reference_records.iter().filter_map(|record| {
+            let others = changed.get(&record.header.id.index())?;
+            let mean = others.iter().map(percent).sum::<f64>() / others.len() as f64;
+            Some([percent(record), mean])
+        });
+        PairedDifference::from_values(pairs)
+    };
+    Some(ConditionEffects {
+        suite: reference.summary.suite.clone(),
+        method: reference.method.clone(),
+        mean_goal: mean(|record| record.verdict.goal),
+        mean_safety: mean(|record| record.verdict.safety),
+        effects,
+    })
+}
+
+/// A difference with its interval and sign.
+fn signed(difference: &PairedDifference, digits: usize) -> String {
+    let interval = difference
+        .interval95
+        .map_or(String::new(), |[low, high]| format!(" [{low:+.digits$}, {high:+.digits$}]"));
+    difference.difference.map_or_else(|| "–".to_owned(), |value| format!("{value:+.digits$}{interval}"))
+}
+
+/// The table of all effects; `None` if there are none.
+pub fn effects_table(effects: &[ConditionEffects]) -> Option<ResultTable> {
+    let mut rows = Vec::new();
+    for suite in effects {
+        let name = format!("{}, {}", suite.suite, suite.method);
+        for effect in &suite.effects {
+            let PairedComparison { pairs, goal, safety, d_over_tau, .. } = &effect.differences;
+            rows.push(vec![
+                name.clone(),
+                effect.label.clone(),
+                pairs.to_string(),
+                signed(goal, 1),
+                signed(safety, 1),
+                signed(d_over_tau, 2),
+            ]);
+        }
+        if suite.effects.len() > 1 {
+            rows.push(vec![
+                name,
+                format!("mean of {} conditions", suite.effects.len()),
+                suite.mean_goal.n.to_string(),
+                signed(&suite.mean_goal, 1),
+                signed(&suite.mean_safety, 1),
+                "–".to_owned(),
+            ]);
+        }
+    }
+    (!rows.is_empty()).then(|| ResultTable {
+        caption: "Change from the unchanged run on the same episodes, percentage points, with 95 % intervals: of single conditions by Agresti and Min, of means by the bootstrap over episodes.".to_owned(),
+        head: strings(["Suite", "Condition", "Episodes", "Δ Goal", "Δ Safety", "Δ D/τ"]),
+        rows,
+    })
+}
+
+/// Values of a factor with at least two, for its trend: value, Goal and Safety Success in percent.
+#[derive(Clone, Debug)]
+pub struct Trend {
+    pub factor: String,
+    pub points: Vec<TrendPoint>,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct TrendPoint {
+    pub value: f64,
+    pub goal: f64,
+    pub safety: f64,
+}
+
+impl ConditionEffects {
+    /// Factors with at least two values, in order.
+    pub fn trends(&self) -> Vec<Trend> {
+        let of_factor = |effects: &[ConditionEffect]| {
+            let point = |effect: &ConditionEffect| {
+                let PairedComparison { goal, safety, .. } = effect.differences;
+                Some(TrendPoint { value: effect.value?, goal: goal.second?, safety: safety.second? })
+            };
+            let points: Vec<TrendPoint> = effects.iter().filter_map(point).collect();
+            (points.len() > 1).then(|| Trend { factor: effects[0].factor.clone(), points })
+        };
+        self.effects.chunk_by(|a, b| a.factor == b.factor).filter_map(of_factor).collect()
+    }
+
+    /// Goal and Safety Success of the unchanged run, percent.
+    pub fn unchanged(&self) -> [Option<f64>; 2] {
+        let first = self.effects.first().map(|effect| effect.differences);
+        [first.and_then(|first| first.goal.first), first.and_then(|first| first.safety.first)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use serde_json::json;
+
+    use super::*;
+    use crate::{run_summary::summarize_runs, sample_record, stored_run::StoredRun};
+
+    fn run(dir: &str, shifts: &[(&str, f64)], twin_of: Option<&str>, safe: &[bool]) -> StoredRun {
+        let suite = if twin_of.is_some() { "twin" } else { "soft" };
+        let records = safe.iter().enumerate().map(|(episode, safe)| {
+            let mut record = sample_record();
+            (record.header.id.suite, record.header.id.episode) = (suite.to_owned(), episode as u32);
+            (record.verdict.goal, record.verdict.safety) = (true, *safe);
+            record
+        });
+        StoredRun {
+            dir: Path::new(dir).to_owned(),
+            manifest: json!({
+                "softvt": "x", "script": "x.lua", "suite": suite, "policy": "p", "seed": 0, "split": "validation",
+                "tasks": [0], "episodes": safe.len(), "shifts": shifts, "set": [], "twin_of": twin_of,
+            }),
+            records: records.collect(),
+            is_finished: true,
+            is_truncated: false,
+        }
+    }
+
+    #[test]
+    fn conditions_are_paired_with_the_unchanged_run() {
+        let runs = summarize_runs(vec![
+            run("a", &[], None, &[true, true, true, false]),
+            run("b", &[("mass", 2.5)], None, &[false, false, true, false]),
+            run("c", &[("mass", 1.25)], None, &[true, false, true, false]),
+            run("d", &[], Some("soft"), &[true, true, true, true]),
+        ]);
+        let all = condition_effects(&runs);
+        let [effects] = &all[..] else { panic!("one suite: {all:?}") };
+        let labels: Vec<&str> = effects.effects.iter().map(|effect| effect.label.as_str()).collect();
+        assert_eq!(labels, ["mass=1.25", "mass=2.5", "rigid twin"]);
+        let safety = effects.effects[1].differences.safety;
+        assert_eq!((safety.n, safety.difference), (4, Some(-50.0)));
+        // The mean over three conditions of (2, 1, 4) of 4 safe episodes, against 3 of 4.
+        let mean = effects.mean_safety.difference.expect("episodes");
+        assert!((mean - (100.0 * 7.0 / 12.0 - 75.0)).abs() < 1e-9, "{mean}");
+        let trends = effects.trends();
+        assert_eq!((trends.len(), trends[0].factor.as_str(), trends[0].points.len()), (1, "mass", 2));
+        assert_eq!(trends[0].points.iter().map(|point| point.safety).collect::<Vec<_>>(), [50.0, 25.0]);
+        let table = effects_table(&all).expect("effects");
+        assert_eq!(table.rows.len(), 4);
+        assert!(table.rows[1][4].starts_with("-50.0 ["), "{:?}", table.rows);
+        assert_eq!(table.rows[3][1], "mean of 3 conditions");
+        assert!(condition_effects(&runs[1..3]).is_empty(), "there is no unchanged run");
+    }
+}
