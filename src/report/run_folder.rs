@@ -77,7 +77,7 @@ impl RunFolder {
     /// # Errors
     /// The folder holds something else.
     pub fn check_parent(dir: &Path) -> Result<(), RunFolderError> {
-        let holds_runs = |dir: &Path| subfolders(dir).iter().any(|inner| inner.join(EPISODES).is_file());
+        let holds_runs = |dir: &Path| subfolders(dir).iter().any(|inner| Self::check_vacant(inner).is_err());
         match holds_runs(dir) || subfolders(dir).iter().any(|inner| holds_runs(inner)) {
             true => Ok(()),
             false => check_own(dir),

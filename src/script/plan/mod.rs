@@ -364,6 +364,8 @@ fn condition(lua: &Lua, spec: &ConditionSpec) -> mlua::Result<Condition> {
     for (key, value) in spec.set.iter().flat_map(sorted_pairs) {
         let text = match &value {
             Value::String(text) => text.to_string_lossy(),
+            // Counts must stay whole: JSON would write 2 as 2.0.
+            Value::Integer(number) => number.to_string(),
             other => to_json(lua, other, "conditions.set")?.to_string(),
         };
         set.push((key.to_string()?, text));
