@@ -142,9 +142,7 @@ macro_rules! plain_field_values {
     )+ };
 }
 
-plain_field_values!(
-    f64, Option<f64>, usize, u32, bool, String, Option<String>, Value, Table, Option<Table>
-);
+plain_field_values!(f64, Option<f64>, usize, u32, bool, String, Option<String>, Value, Table, Option<Table>);
 
 impl IntoFieldValue for &str {
     fn into_field_value(self, lua: &Lua) -> mlua::Result<FieldValue> {
