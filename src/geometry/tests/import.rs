@@ -33,36 +33,63 @@ fn stl(mesh: &Mesh) -> Vec<u8> {
     bytes
 }
 
-/// The bytes of a binary glTF file with one node, translated by (1, 0, 0).
-fn glb(mesh: &Mesh) -> Vec<u8> {
-    let mut blob = Vec::new();
-    mesh.vertices.iter().flat_map(|v| v.iter()).for_each(|x| blob.extend((*x as f32).to_le_bytes()));
-    let start = blob.len();
-    mesh.triangles.iter().flatten().for_each(|v| blob.extend(v.to_le_bytes()));
-    let (count, corners) = (mesh.vertices.len(), 3 * mesh.triangles.len());
-    let mut json = format!(
-        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],
-        "nodes":[{{"mesh":0,"translation":[1,0,0]}}],
-        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}}]}}],
-        "buffers":[{{"byteLength":{total}}}],
-        "bufferViews":[{{"buffer":0,"byteLength":{start}}},{{"buffer":0,"byteOffset":{start},"byteLength":{rest}}}],
-        "accessors":[{{"bufferView":0,"componentType":5126,"count":{count},"type":"VEC3","min":[0,0,0],"max":[1,1,1]}},
-        {{"bufferView":1,"componentType":5125,"count":{corners},"type":"SCALAR"}}]}}"#,
-        total = blob.len(),
-        rest = blob.len() - start,
-    );
-    json.extend(std::iter::repeat_n(' ', (4 - json.len() % 4) % 4));
-    let mut bytes = b"glTF".to_vec();
-    let total = 12 + 8 + json.len() + 8 + blob.len();
-    for word in [2, total as u32, json.len() as u32] {
-        bytes.extend(word.to_le_bytes());
+/// A binary glTF file, whose JSON a test may change.
+struct Glb {
+    json: String,
+    blob: Vec<u8>,
+}
+
+impl Glb {
+    /// One node, translated by (1, 0, 0).
+    fn new(mesh: &Mesh) -> Self {
+        let mut blob = Vec::new();
+        mesh.vertices.iter().flat_map(|v| v.iter()).for_each(|x| blob.extend((*x as f32).to_le_bytes()));
+        let start = blob.len();
+        mesh.triangles.iter().flatten().for_each(|v| blob.extend(v.to_le_bytes()));
+        let (count, corners) = (mesh.vertices.len(), 3 * mesh.triangles.len());
+        let json = format!(
+            r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],
+            "nodes":[{{"mesh":0,"translation":[1,0,0]}}],
+            "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}}]}}],
+            "buffers":[{{"byteLength":{total}}}],
+            "bufferViews":[{{"buffer":0,"byteLength":{start}}},{{"buffer":0,"byteOffset":{start},"byteLength":{rest}}}],
+            "accessors":[{{"bufferView":0,"componentType":5126,"count":{count},"type":"VEC3","min":[0,0,0],"max":[1,1,1]}},
+            {{"bufferView":1,"componentType":5125,"count":{corners},"type":"SCALAR"}}]}}"#,
+            total = blob.len(),
+            rest = blob.len() - start,
+        );
+        Self { json, blob }
     }
-    bytes.extend(b"JSON");
-    bytes.extend(json.as_bytes());
-    bytes.extend((blob.len() as u32).to_le_bytes());
-    bytes.extend(b"BIN\0");
-    bytes.extend(blob);
-    bytes
+
+    /// The bytes of the file.
+    fn bytes(&self) -> Vec<u8> {
+        let Self { json, blob } = self;
+        let padding = (4 - json.len() % 4) % 4;
+        let json_length = json.len() + padding;
+        let mut bytes = b"glTF".to_vec();
+        let total = 12 + 8 + json_length + 8 + blob.len();
+        for word in [2, total as u32, json_length as u32] {
+            bytes.extend(word.to_le_bytes());
+        }
+        bytes.extend(b"JSON");
+        bytes.extend(json.as_bytes());
+        bytes.extend(std::iter::repeat_n(b' ', padding));
+        bytes.extend((blob.len() as u32).to_le_bytes());
+        bytes.extend(b"BIN\0");
+        bytes.extend(blob);
+        bytes
+    }
+
+    /// The message that refuses the file after one change of its JSON.
+    fn refusal(&self, from: &str, to: &str) -> String {
+        assert!(self.json.contains(from), "{from}");
+        let changed = Self { json: self.json.replacen(from, to, 1), blob: self.blob.clone() };
+        import(&changed.bytes(), MeshFormat::Gltf, &METRES).expect_err(to).to_string()
+    }
+}
+
+fn glb(mesh: &Mesh) -> Vec<u8> {
+    Glb::new(mesh).bytes()
 }
 
 #[test]
@@ -145,4 +172,62 @@ fn distances_to_an_imported_mesh_match_its_source_shape() {
         assert!((a - b).abs() < 2e-5, "{a} {b} at {p:?}");
     }
     assert!(matches!(imported, Shape::Mesh(_)));
+}
+
+#[test]
+fn glb_accessors_of_other_types_and_outside_data_are_refused() {
+    let cube = Glb::new(&read_obj(CUBE).expect("a cube"));
+    let refused = [
+        (r#""componentType":5125"#, r#""componentType":5126"#, "accessor indices is SCALAR of 32-bit floats"),
+        (r#""componentType":5126"#, r#""componentType":5121"#, "accessor POSITION is VEC3 of unsigned bytes"),
+        (r#""type":"VEC3""#, r#""type":"SCALAR""#, "accessor POSITION is SCALAR of 32-bit floats"),
+        (
+            r#""count":36,"type":"SCALAR""#,
+            r#""count":12,"type":"VEC3""#,
+            "accessor indices is VEC3 of unsigned 32-bit",
+        ),
+        (
+            r#""count":36"#,
+            r#""count":35"#,
+            "accessor indices has 35 elements; glTF requires three per triangle",
+        ),
+        (r#""count":36"#, r#""count":39"#, "accessor indices lies outside of its buffer"),
+        (r#""count":8"#, r#""count":4000000000"#, "accessor POSITION lies outside of its buffer"),
+        (r#""count":8"#, r#""count":0"#, "accessor POSITION has no data"),
+        (r#""count":8"#, r#""count":7"#, "accessor indices names vertex 7 of 7"),
+        (
+            r#""byteLength":96}"#,
+            r#""byteStride":4,"byteLength":96}"#,
+            "accessor POSITION has elements that overlap",
+        ),
+        (r#"[{"byteLength":"#, r#"[{"uri":"cube.bin","byteLength":"#, "uses buffers outside of the file"),
+        (r#"[{"byteLength":"#, r#"[{"byteLength":1"#, "uses buffers outside of the file"),
+    ];
+    for (from, to, expected) in refused {
+        let message = cube.refusal(from, to);
+        assert!(message.contains(expected), "{from} -> {to}: {message}");
+    }
+    let mut longer = cube.bytes();
+    let actual = longer.len() + 4;
+    longer.extend([0; 4]);
+    let declared = actual - 4;
+    assert_eq!(import(&longer, MeshFormat::Gltf, &METRES), Err(ImportError::Length { declared, actual }));
+}
+
+#[test]
+fn a_small_glb_that_expands_without_bound_is_refused_by_its_limit() {
+    let cube = read_obj(CUBE).expect("a cube");
+    // Each node is twice a child of the one before: 2^40 visits.
+    let doubled: Vec<String> = (1..40).map(|next| format!(r#"{{"children":[{next},{next}]}}"#)).collect();
+    let nodes = format!("{},{{\"mesh\":0}}", doubled.join(","));
+    let message = Glb::new(&cube).refusal(r#"{"mesh":0,"translation":[1,0,0]}"#, &nodes);
+    assert_eq!(message, "has more than 10000 nodes; simplify the mesh");
+    // 9000 nodes with a mesh of 300 triangles.
+    let triangles = cube.triangles.iter().copied().cycle().take(300).collect();
+    let children: Vec<String> = (1..=9000).map(|child| child.to_string()).collect();
+    let nodes =
+        format!(r#"{{"children":[{}]}},{}"#, children.join(","), vec![r#"{"mesh":0}"#; 9000].join(","));
+    let repeated = Glb::new(&Mesh { triangles, ..cube });
+    let message = repeated.refusal(r#"{"mesh":0,"translation":[1,0,0]}"#, &nodes);
+    assert_eq!(message, "has more than 2000000 triangles; simplify the mesh");
 }

@@ -15,7 +15,7 @@ use crate::{
 use softvt_common::parallel::lock;
 use softvt_geometry::{
     Quat, Vec3,
-    import::{ImportOptions, MeshFormat, import},
+    import::{ImportError, ImportOptions, MeshFormat, import},
     mass::mass_properties,
     shape::{Axis, Bumps, Displacement, Ramp, Ridges, Shape, ShapeError, TreeSize},
 };
@@ -103,6 +103,8 @@ impl LuaShape {
 const BYTES_PER_CORNER: usize = 128;
 /// Memory of a mesh shape, in bytes per byte of its file.
 const MESH_BYTES_PER_FILE_BYTE: usize = 8;
+/// Memory of a mesh shape per triangle.
+const BYTES_PER_TRIANGLE: usize = 400;
 
 /// Makes a shape with `corners` of a profile.
 fn build(lua: &Lua, shape: Result<Shape, ShapeError>, corners: usize) -> mlua::Result<LuaShape> {
@@ -197,11 +199,15 @@ functions! {
             // Fails before the mesh is built if it would not fit.
             drop(reserve(lua, MESH_BYTES_PER_FILE_BYTE * bytes.len())?);
             let extension = file.rsplit_once('.').map_or("", |(_, extension)| extension);
-            let shape = MeshFormat::from_extension(extension)
+            let refused = |error: ImportError| fail(lua, format!("softvt.mesh: {file}: {error}"));
+            let mesh = MeshFormat::from_extension(extension)
                 .and_then(|format| import(&bytes, format, &ImportOptions { scale, z_up }))
-                .and_then(|mesh| Ok(Shape::from_mesh(mesh)?));
-            let shape = shape.map_err(|error| fail(lua, format!("softvt.mesh: {file}: {error}")))?;
-            LuaShape::new(lua, shape, MESH_BYTES_PER_FILE_BYTE * bytes.len())?
+                .map_err(refused)?;
+            // A glTF mesh may occur in many nodes, so its size does not follow from that of the file.
+            let needed = (MESH_BYTES_PER_FILE_BYTE * bytes.len()).max(BYTES_PER_TRIANGLE * mesh.triangles.len());
+            drop(reserve(lua, needed)?);
+            let shape = Shape::from_mesh(mesh).map_err(|error| refused(error.into()))?;
+            LuaShape::new(lua, shape, needed)?
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Import of triangle meshes from OBJ, STL and binary glTF (GLB) files.
 
+mod glb;
+
 use std::io::Cursor;
 
 use super::{
@@ -39,6 +41,12 @@ pub enum ImportError {
     Scale(f64),
     #[error("uses {0}; export plain triangles into one .glb file")]
     Unsupported(&'static str),
+    #[error("the header declares {declared} bytes, but the file has {actual}; export it again")]
+    Length { declared: usize, actual: usize },
+    #[error("mesh {mesh}: accessor {attribute} {found}; glTF requires {required}; export the mesh again")]
+    Accessor { mesh: usize, attribute: &'static str, found: String, required: &'static str },
+    #[error("has more than {limit} {what}; simplify the mesh")]
+    TooLarge { what: &'static str, limit: usize },
     #[error(transparent)]
     Mesh(#[from] MeshError),
 }
@@ -58,12 +66,17 @@ impl MeshFormat {
     }
 }
 
+/// Largest number of triangles of a mesh; those of a glTF mesh count once per node that contains it.
+pub const MAX_TRIANGLES: usize = 2_000_000;
+/// Largest number of vertices of a mesh.
+pub const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
+
 /// Reads a mesh from the bytes of a file, in metres with z up. All objects of the file are merged into one mesh.
 ///
 /// Materials are ignored. [`Shape::from_mesh`](super::shape::Shape::from_mesh) turns a closed mesh into a solid.
 ///
 /// # Errors
-/// If the bytes do not parse, the mesh is empty, or a coordinate or an index is invalid.
+/// If the bytes do not parse, the mesh is empty or larger than the limits, or a coordinate or an index is invalid.
 pub fn import(bytes: &[u8], format: MeshFormat, options: &ImportOptions) -> Result<Mesh, ImportError> {
     if !(options.scale > 0.0 && options.scale.is_finite()) {
         return Err(ImportError::Scale(options.scale));
@@ -71,14 +84,23 @@ pub fn import(bytes: &[u8], format: MeshFormat, options: &ImportOptions) -> Resu
     let mut mesh = match format {
         MeshFormat::Obj => read_obj(bytes)?,
         MeshFormat::Stl => read_stl(bytes)?,
-        MeshFormat::Gltf => read_gltf(bytes)?,
+        MeshFormat::Gltf => glb::read(bytes)?,
     };
+    check_size(mesh.vertices.len(), mesh.triangles.len())?;
     // From y up to z up: a quarter turn about x.
     let upright =
         if options.z_up { Mat3::identity() } else { Mat3::new(1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0) };
     mesh.vertices.iter_mut().for_each(|v| *v = upright * *v * options.scale);
     mesh.validate()?;
     Ok(mesh)
+}
+
+fn check_size(vertices: usize, triangles: usize) -> Result<(), ImportError> {
+    let check = |what, count, limit| {
+        if count > limit { Err(ImportError::TooLarge { what, limit }) } else { Ok(()) }
+    };
+    check("triangles", triangles, MAX_TRIANGLES)?;
+    check("vertices", vertices, MAX_VERTICES)
 }
 
 fn read_obj(bytes: &[u8]) -> Result<Mesh, ImportError> {
@@ -117,76 +139,4 @@ fn read_stl(bytes: &[u8]) -> Result<Mesh, ImportError> {
         triangles: read.faces.iter().map(|face| face.vertices.map(|v| v as u32)).collect(),
         uvs: Vec::new(),
     })
-}
-
-fn read_gltf(bytes: &[u8]) -> Result<Mesh, ImportError> {
-    let file = gltf::Gltf::from_slice(bytes)
-        .map_err(|error| ImportError::Unreadable { format: "GLB", reason: error.to_string() })?;
-    let blob = file.blob.as_deref().ok_or(ImportError::Unsupported("buffers outside of the file"))?;
-    let mut out = Mesh::default();
-    let scene = file.default_scene().or_else(|| file.scenes().next());
-    let identity = nalgebra::Matrix4::identity();
-    for node in scene.iter().flat_map(gltf::Scene::nodes) {
-        read_node(&node, &identity, blob, &mut out, 0)?;
-    }
-    if out.uvs.len() != out.triangles.len() {
-        out.uvs.clear();
-    }
-    Ok(out)
-}
-
-/// Largest depth of a scene tree, which bounds the recursion.
-const MAX_DEPTH: usize = 64;
-
-fn read_node(
-    node: &gltf::Node,
-    parent: &nalgebra::Matrix4<f64>,
-    blob: &[u8],
-    out: &mut Mesh,
-    depth: usize,
-) -> Result<(), ImportError> {
-    if depth > MAX_DEPTH {
-        return Err(ImportError::Unsupported("a scene tree more than 64 deep"));
-    }
-    let columns = node.transform().matrix();
-    let pose = parent * nalgebra::Matrix4::from_fn(|row, column| f64::from(columns[column][row]));
-    for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {
-        read_primitive(&primitive, &pose, blob, out)?;
-    }
-    node.children().try_for_each(|child| read_node(&child, &pose, blob, out, depth + 1))
-}
-
-fn read_primitive(
-    primitive: &gltf::Primitive,
-    pose: &nalgebra::Matrix4<f64>,
-    blob: &[u8],
-    out: &mut Mesh,
-) -> Result<(), ImportError> {
-    if primitive.mode() != gltf::mesh::Mode::Triangles {
-        return Err(ImportError::Unsupported("points, lines or triangle strips"));
-    }
-    let reader = primitive.reader(|buffer| (buffer.index() == 0).then_some(blob));
-    let positions =
-        reader.read_positions().ok_or(ImportError::Unsupported("positions outside of the file"))?;
-    let base = out.vertices.len() as u32;
-    let place = |p: [f32; 3]| pose.transform_point(&nalgebra::Point3::from(p.map(f64::from))).coords;
-    out.vertices.extend(positions.map(place));
-    let added = out.vertices.len() as u32 - base;
-    let indices: Vec<u32> = match reader.read_indices() {
-        Some(indices) => indices.into_u32().collect(),
-        None => (0..added).collect(),
-    };
-    let uvs: Vec<[f64; 2]> = reader
-        .read_tex_coords(0)
-        .map_or_else(Vec::new, |uvs| uvs.into_f32().map(|uv| uv.map(f64::from)).collect());
-    // A mirroring transform reverses the orientation of triangles.
-    let mirrored = pose.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
-    for t in indices.chunks_exact(3) {
-        let t = if mirrored { [t[0], t[2], t[1]] } else { [t[0], t[1], t[2]] };
-        out.triangles.push(t.map(|v| v.saturating_add(base)));
-        if let [Some(a), Some(b), Some(c)] = t.map(|v| uvs.get(v as usize)) {
-            out.uvs.push([*a, *b, *c]);
-        }
-    }
-    Ok(())
 }

@@ -1,0 +1,240 @@
+//! Binary glTF 2.0. Accessors are validated before the readers of the `gltf` crate run, which panic on types that the
+//! specification does not allow and reinterpret others.
+
+use gltf::{
+    Accessor, Semantic,
+    accessor::{DataType, Dimensions},
+    buffer::Source,
+    mesh::Mode,
+};
+
+use super::{ImportError, check_size};
+use crate::mesh::Mesh;
+
+type Transform = nalgebra::Matrix4<f64>;
+
+/// Largest depth of a scene tree, which bounds the recursion.
+const MAX_DEPTH: usize = 64;
+/// Largest number of nodes of a scene, each counted once per parent that is visited.
+const MAX_NODES: usize = 10_000;
+/// Size of the header of a GLB file and the offset of its declared length, bytes.
+const HEADER_BYTES: usize = 12;
+const LENGTH_OFFSET: usize = 8;
+
+pub(super) fn read(bytes: &[u8]) -> Result<Mesh, ImportError> {
+    check_length(bytes)?;
+    let file = gltf::Gltf::from_slice(bytes)
+        .map_err(|error| ImportError::Unreadable { format: "GLB", reason: error.to_string() })?;
+    let outside = ImportError::Unsupported("buffers outside of the file");
+    let blob = file.blob.as_deref().ok_or_else(|| outside.clone())?;
+    let is_inside =
+        |buffer: gltf::Buffer| matches!(buffer.source(), Source::Bin) && buffer.length() <= blob.len();
+    if !file.buffers().all(is_inside) {
+        return Err(outside);
+    }
+    let mut reader = Reader { blob, mesh: Mesh::default(), nodes: 0 };
+    let scene = file.default_scene().or_else(|| file.scenes().next());
+    for node in scene.iter().flat_map(gltf::Scene::nodes) {
+        reader.add_node(&node, &Transform::identity(), 0)?;
+    }
+    let mut mesh = reader.mesh;
+    if mesh.uvs.len() != mesh.triangles.len() {
+        mesh.uvs.clear();
+    }
+    Ok(mesh)
+}
+
+/// Compares the length in the header with that of the file. Without a header of glTF the crate says what is wrong.
+fn check_length(bytes: &[u8]) -> Result<(), ImportError> {
+    let Some(header) = bytes.get(..HEADER_BYTES).filter(|header| header.starts_with(b"glTF")) else {
+        return Err(ImportError::Unreadable { format: "GLB", reason: "it has no glTF header".into() });
+    };
+    let declared =
+        header[LENGTH_OFFSET..].iter().rev().fold(0, |length, &byte| length << 8 | usize::from(byte));
+    let actual = bytes.len();
+    if declared == actual { Ok(()) } else { Err(ImportError::Length { declared, actual }) }
+}
+
+/// The mesh of the nodes so far.
+struct Reader<'a> {
+    blob: &'a [u8],
+    mesh: Mesh,
+    nodes: usize,
+}
+
+impl Reader<'_> {
+    fn add_node(&mut self, node: &gltf::Node, parent: &Transform, depth: usize) -> Result<(), ImportError> {
+        if depth > MAX_DEPTH {
+            return Err(ImportError::Unsupported("a scene tree more than 64 deep"));
+        }
+        self.nodes += 1;
+        if self.nodes > MAX_NODES {
+            return Err(ImportError::TooLarge { what: "nodes", limit: MAX_NODES });
+        }
+        let columns = node.transform().matrix();
+        let pose = parent * Transform::from_fn(|row, column| f64::from(columns[column][row]));
+        if let Some(mesh) = node.mesh() {
+            let mut primitives = mesh.primitives();
+            primitives.try_for_each(|primitive| self.add_primitive(&primitive, mesh.index(), &pose))?;
+        }
+        node.children().try_for_each(|child| self.add_node(&child, &pose, depth + 1))
+    }
+
+    fn add_primitive(
+        &mut self,
+        primitive: &gltf::Primitive,
+        mesh: usize,
+        pose: &Transform,
+    ) -> Result<(), ImportError> {
+        if primitive.mode() != Mode::Triangles {
+            return Err(ImportError::Unsupported("points, lines or triangle strips"));
+        }
+        let attributes = Attributes::check(primitive, mesh)?;
+        let corners = attributes.indices.unwrap_or(attributes.positions);
+        let (vertices, triangles) = (self.mesh.vertices.len(), self.mesh.triangles.len());
+        check_size(vertices.saturating_add(attributes.positions), triangles.saturating_add(corners / 3))?;
+        let outside =
+            |attribute| accessor_error(mesh, attribute, "lies outside of its buffer", "data in the file");
+        let blob = self.blob;
+        let reader = primitive.reader(|_| Some(blob));
+        let positions = reader.read_positions().ok_or_else(|| outside(POSITION))?;
+        let place = |p: [f32; 3]| pose.transform_point(&nalgebra::Point3::from(p.map(f64::from))).coords;
+        self.mesh.vertices.extend(positions.map(place));
+        let indices: Vec<u32> = match attributes.indices {
+            Some(_) => reader.read_indices().ok_or_else(|| outside(INDICES))?.into_u32().collect(),
+            None => (0..attributes.positions as u32).collect(),
+        };
+        if let Some(index) = indices.iter().find(|index| **index as usize >= attributes.positions) {
+            let found = format!("names vertex {index} of {}", attributes.positions);
+            return Err(accessor_error(mesh, INDICES, &found, "indices below the number of vertices"));
+        }
+        let uvs: Vec<[f64; 2]> = match attributes.uvs {
+            true => {
+                let uvs = reader.read_tex_coords(0).ok_or_else(|| outside(TEXCOORD))?;
+                uvs.into_f32().map(|uv| uv.map(f64::from)).collect()
+            }
+            false => Vec::new(),
+        };
+        // A mirroring transform reverses the orientation of triangles.
+        let mirrored = pose.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
+        for t in indices.chunks_exact(3) {
+            let t = if mirrored { [t[0], t[2], t[1]] } else { [t[0], t[1], t[2]] };
+            self.mesh.triangles.push(t.map(|v| v + vertices as u32));
+            if let [Some(a), Some(b), Some(c)] = t.map(|v| uvs.get(v as usize)) {
+                self.mesh.uvs.push([*a, *b, *c]);
+            }
+        }
+        Ok(())
+    }
+}
+
+const POSITION: &str = "POSITION";
+const INDICES: &str = "indices";
+const TEXCOORD: &str = "TEXCOORD_0";
+
+/// Number of elements of the accessors of a primitive, whose types have been checked.
+struct Attributes {
+    positions: usize,
+    indices: Option<usize>,
+    /// True if the primitive has texture coordinates.
+    uvs: bool,
+}
+
+impl Attributes {
+    fn check(primitive: &gltf::Primitive, mesh: usize) -> Result<Self, ImportError> {
+        let positions = primitive.get(&Semantic::Positions).ok_or_else(|| {
+            accessor_error(mesh, POSITION, "is missing", "positions of type VEC3 of 32-bit floats")
+        })?;
+        let check = |attribute, accessor: &Accessor, allowed: fn(&Accessor) -> bool, required| {
+            if !allowed(accessor) {
+                let found = format!("is {}", type_name(accessor));
+                return Err(accessor_error(mesh, attribute, &found, required));
+            }
+            check_layout(mesh, attribute, accessor)
+        };
+        check(POSITION, &positions, is_position, "VEC3 of 32-bit floats")?;
+        let indices = primitive.indices();
+        if let Some(indices) = &indices {
+            check(INDICES, indices, is_index, "SCALAR of unsigned integers")?;
+        }
+        let uvs = primitive.get(&Semantic::TexCoords(0));
+        if let Some(uvs) = &uvs {
+            check(TEXCOORD, uvs, is_texture_coordinate, "VEC2 of floats or unsigned integers")?;
+        }
+        let corners = indices.as_ref().unwrap_or(&positions).count();
+        if corners % 3 != 0 {
+            let attribute = if indices.is_some() { INDICES } else { POSITION };
+            let found = format!("has {corners} elements");
+            return Err(accessor_error(mesh, attribute, &found, "three per triangle"));
+        }
+        Ok(Self {
+            positions: positions.count(),
+            indices: indices.map(|indices| indices.count()),
+            uvs: uvs.is_some(),
+        })
+    }
+}
+
+fn is_position(accessor: &Accessor) -> bool {
+    (accessor.dimensions(), accessor.data_type()) == (Dimensions::Vec3, DataType::F32)
+}
+
+fn is_index(accessor: &Accessor) -> bool {
+    accessor.dimensions() == Dimensions::Scalar
+        && matches!(accessor.data_type(), DataType::U8 | DataType::U16 | DataType::U32)
+}
+
+fn is_texture_coordinate(accessor: &Accessor) -> bool {
+    accessor.dimensions() == Dimensions::Vec2
+        && matches!(accessor.data_type(), DataType::U8 | DataType::U16 | DataType::F32)
+}
+
+/// Refuses what the reader of the crate computes with unchecked arithmetic: no elements, elements that overlap, and
+/// offsets beyond the file.
+fn check_layout(mesh: usize, attribute: &'static str, accessor: &Accessor) -> Result<(), ImportError> {
+    if accessor.sparse().is_some() {
+        return Err(ImportError::Unsupported("sparse accessors"));
+    }
+    let error = |found: &str, required| Err(accessor_error(mesh, attribute, found, required));
+    let (Some(view), 1..) = (accessor.view(), accessor.count()) else {
+        return error("has no data", "at least one element in the file");
+    };
+    let stride = view.stride().unwrap_or(accessor.size());
+    if stride < accessor.size() {
+        return error("has elements that overlap", "a byteStride of at least one element");
+    }
+    let end = stride
+        .checked_mul(accessor.count() - 1)
+        .and_then(|start| start.checked_add(accessor.offset())?.checked_add(accessor.size()));
+    let view_end = view.offset().checked_add(view.length());
+    match (end, view_end) {
+        (Some(end), Some(view_end)) if end <= view.length() && view_end <= view.buffer().length() => Ok(()),
+        _ => error("lies outside of its buffer", "data in the file"),
+    }
+}
+
+/// Type of an accessor in the words of the specification.
+fn type_name(accessor: &Accessor) -> String {
+    let component = match accessor.data_type() {
+        DataType::I8 => "signed bytes",
+        DataType::U8 => "unsigned bytes",
+        DataType::I16 => "signed 16-bit integers",
+        DataType::U16 => "unsigned 16-bit integers",
+        DataType::U32 => "unsigned 32-bit integers",
+        DataType::F32 => "32-bit floats",
+    };
+    let dimensions = match accessor.dimensions() {
+        Dimensions::Scalar => "SCALAR",
+        Dimensions::Vec2 => "VEC2",
+        Dimensions::Vec3 => "VEC3",
+        Dimensions::Vec4 => "VEC4",
+        Dimensions::Mat2 => "MAT2",
+        Dimensions::Mat3 => "MAT3",
+        Dimensions::Mat4 => "MAT4",
+    };
+    format!("{dimensions} of {component}")
+}
+
+fn accessor_error(mesh: usize, attribute: &'static str, found: &str, required: &'static str) -> ImportError {
+    ImportError::Accessor { mesh, attribute, found: found.to_owned(), required }
+}
