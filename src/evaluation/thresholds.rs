@@ -189,6 +189,10 @@ impl AssetThreshold {
         if (self.tau - round_to_six_decimals(self.kappa * self.d_ref)).abs() > 1.5e-6 {
             return range("tau", self.tau, "kappa times d_ref");
         }
+        // D_ref is the largest D of a stable squeeze, so without one there is none.
+        if self.n_stable_trials == 0 {
+            return range("n_stable_trials", 0.0, "at least 1");
+        }
         Ok(())
     }
 }
@@ -272,6 +276,7 @@ mod tests {
         assert!(refused("\"schema_version\": 1", "\"schema_version\": 2").contains("schema_version"));
         assert!(refused("0.166667", "0.3").contains("thresholds.bun.tau is 0.3"));
         assert!(refused("\"d_ref\": 0.333333", "\"d_ref\": -1").contains("thresholds.bun.d_ref is -1"));
+        assert!(refused("\"n_stable_trials\": 2", "\"n_stable_trials\": 0").contains("n_stable_trials is 0"));
         assert!(refused("{", "").contains("not a threshold file"));
         let missing = ThresholdFile::read(Path::new("/nowhere/bun.json")).unwrap_err().to_string();
         assert!(missing.starts_with("/nowhere/bun.json: "), "{missing}");
