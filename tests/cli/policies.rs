@@ -94,6 +94,29 @@ fn nan_actions_fail_only_their_episode() {
 }
 
 #[test]
+fn a_policy_that_declares_access_to_limits_is_marked_in_its_results() {
+    let act = "act = function(obs) return { position = obs.position, axis_angle = obs.axis_angle, closure = 0 } end }";
+    let knows = "local tau = softvt.calibration('cube').tau\n";
+    let project = project(&format!("{knows}return softvt.policy {{ name = 'knows', {act}"));
+    let message = project.refusal("x.lua --policy p.lua --out run");
+    assert!(
+        message.starts_with("p.lua:1: softvt.calibration: a policy has no access to limits"),
+        "{message}"
+    );
+    assert!(!project.path("run").exists());
+    let text = format!("{knows}return softvt.policy {{ name = 'knows', privileged = true, {act}");
+    project.write("p.lua", text.as_bytes());
+    project.succeeds("x.lua --policy p.lua --out run");
+    for file in ["run.json", "summary.json", "softvtbench/summary.json"] {
+        assert_eq!(project.json(&format!("run/{file}"))["privileged"], true, "{file}");
+    }
+    assert_eq!(project.lines("run/episodes.jsonl")[0]["privileged"], true);
+    project.succeeds("x.lua --policy run --out again");
+    let compared = project.succeeds("compare run again").out;
+    assert!(compared.contains("knows (privileged)"), "{compared}");
+}
+
+#[test]
 fn missing_cameras_are_reported_before_anything_runs() {
     let policy =
         "return softvt.policy { name = 'p', observes = { cameras = { 'sied' } }, act = function() end }";

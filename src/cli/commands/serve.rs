@@ -62,7 +62,9 @@ pub(crate) struct ServeArgs {
 /// the end, the interrupt.
 pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
     let config = RunConfig::new(args.script.clone(), RunFlags::default())?;
-    let config = config.with_policy(PolicyConfig::external("client"));
+    let mut policy = PolicyConfig::external("client");
+    policy.privileged = args.privileged;
+    let config = config.with_policy(policy);
     let (profile, _) = load_profile_of(&args.policy)?;
     let loaded = config.load_checked("serve")?;
     let suites = suites_of(&loaded.plan);

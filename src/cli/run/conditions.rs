@@ -210,7 +210,7 @@ fn compare_conditions(
         });
     }
     let deformable = suite.object_type == ObjectType::Deformable && !config.is_rigid_twin();
-    let policy = method_label(&config.policy.name, config.policy.is_privileged(), force_observed);
+    let policy = method_label(&config.policy.name, config.policy.privileged, force_observed);
     Ok(ConditionTable { suite: config.suite_name(suite), policy, deformable, rows })
 }
 

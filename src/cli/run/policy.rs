@@ -210,6 +210,8 @@ pub(crate) struct PolicyConfig {
     /// SHA-256 of the files of the policy or of its profile, by name.
     pub sources: BTreeMap<String, String>,
     pub declared: Option<DeclaredStreams>,
+    /// True if the policy has access to ground-truth state, or to limits or materials of objects.
+    pub privileged: bool,
 }
 
 impl Default for PolicyConfig {
@@ -221,7 +223,8 @@ impl Default for PolicyConfig {
 
 impl PolicyConfig {
     fn new(kind: PolicyKind, name: String) -> Self {
-        Self { kind, name, replan: None, file: None, sources: BTreeMap::new(), declared: None }
+        let privileged = matches!(kind, PolicyKind::Builtin(policy) if policy.is_expert());
+        Self { kind, name, replan: None, file: None, sources: BTreeMap::new(), declared: None, privileged }
     }
 
     /// Loads the policy that the arguments select.
@@ -242,6 +245,7 @@ impl PolicyConfig {
                     file: Some(file.sources.main.clone()),
                     sources: file.sources.bundle.hashes(),
                     declared: Some(DeclaredStreams { place, streams: file.streams.clone() }),
+                    privileged: file.privileged,
                     kind: PolicyKind::Lua(Arc::new(file)),
                 }
             }
@@ -255,6 +259,7 @@ impl PolicyConfig {
                     file: None,
                     sources,
                     declared: Some(DeclaredStreams { place, streams: profile.streams() }),
+                    privileged: false,
                     kind: PolicyKind::Server(Arc::new(PolicyServer {
                         url: url.clone(),
                         protocol: args.protocol.unwrap_or_default(),
@@ -299,11 +304,6 @@ impl PolicyConfig {
             PolicyKind::Builtin(policy) if policy.is_expert() => Some(policy),
             _ => None,
         }
-    }
-
-    /// True if the policy has access to ground-truth state.
-    pub(crate) fn is_privileged(&self) -> bool {
-        self.expert().is_some()
     }
 
     /// The server of the policy, if it has one.
@@ -441,7 +441,7 @@ mod tests {
         for (name, _) in BuiltinPolicy::descriptions() {
             let policy = PolicyConfig::load(&args(parse_policy(&name).unwrap())).unwrap();
             assert_eq!(policy.name, name);
-            assert_eq!(policy.is_privileged(), !["noop", "random"].contains(&name.as_str()));
+            assert_eq!(policy.privileged, !["noop", "random"].contains(&name.as_str()));
         }
     }
 

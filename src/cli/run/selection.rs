@@ -75,7 +75,7 @@ pub(crate) fn select_tasks<'a>(config: &RunConfig, suite: &'a Suite) -> Result<V
     }
     selected.sort_by_key(|task| task.id);
     selected.dedup_by_key(|task| task.id);
-    if let Some(task) = selected.iter().find(|task| !task.expert && config.policy.is_privileged()) {
+    if let Some(task) = selected.iter().find(|task| !task.expert && config.policy.expert().is_some()) {
         return refuse(format!("task {} has no expert; add one, or select another --policy", task.id));
     }
     Ok(selected)

@@ -137,8 +137,7 @@ impl<'a> SuiteRun<'a> {
 
     /// True if the policy has access to ground-truth state, or had it when its actions were recorded.
     pub(crate) fn is_privileged(&self) -> bool {
-        self.config.policy.is_privileged()
-            || self.replay_source.as_ref().is_some_and(|source| source.privileged)
+        self.config.policy.privileged || self.replay_source.as_ref().is_some_and(|source| source.privileged)
     }
 
     /// Id of an episode of the run. The suite has its name in the script, which may differ from that in results.

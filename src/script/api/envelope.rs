@@ -8,6 +8,7 @@ use crate::{
         error::{app_data, fail},
         json::deserialize,
         library::{FoundFile, SharedLibrary},
+        privilege::check_privilege,
     },
 };
 use softvt_common::parallel::lock;
@@ -80,6 +81,7 @@ functions! {
         /// Returns the content of assets/calibration/<asset>.json as softvt.envelope does; nil if there is no such file.
         fn calibration(lua, asset: String = Type::Name) -> ["softvt.Envelope?"] {
             let label = "softvt.calibration";
+            check_privilege(lua, label)?;
             let path = format!("assets/calibration/{asset}.json");
             let library = app_data::<SharedLibrary>(lua)?;
             let found = lock(&library).optional_data(&path);

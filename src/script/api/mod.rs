@@ -32,10 +32,12 @@ use super::{
     vm::{
         error::fail,
         list::{LuaList, plain},
+        privilege::check_privilege,
         value::{describe, sorted_pairs},
     },
 };
 use softvt_common::text::unknown_name;
+use softvt_scene::SoftMaterial;
 
 /// `softvt.List` for stubs and reference; its behaviour is in [`LuaList`].
 static LIST: Class = Class {
@@ -171,7 +173,13 @@ pub(crate) static CLASSES: &[&Class] = &[
 /// Adds everything to the table `softvt`.
 pub(crate) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
     for record in constructors() {
-        let constructor = lua.create_function(move |lua, value: Value| make(lua, record, &value))?;
+        let constructor = lua.create_function(move |lua, value: Value| {
+            // A policy that ran the files of assets would learn their materials.
+            if std::ptr::eq(record, SoftMaterial::RECORD) {
+                check_privilege(lua, "softvt.soft")?;
+            }
+            make(lua, record, &value)
+        })?;
         api.set(record.constructor(), constructor)?;
     }
     functions().try_for_each(|function| function.install(lua, api, "softvt."))?;

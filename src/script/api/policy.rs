@@ -28,6 +28,9 @@ record! {
         /// Number of actions of a list that are executed before act is called again, unless --replan gives another; all
         /// by default.
         replan: Option<usize> = Type::Integer(Range::closed(1.0, MAX_CHUNK_LEN as f64));
+        /// True to let the policy use limits and materials of objects: softvt.calibration, assets, and the modules
+        /// calibrated and experts. Its results say that it is privileged.
+        privileged: bool => Boolean(false);
     }
     /// A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame, and a closure or
     /// a grip force. Give either axis_angle or quaternion, and either closure or force.

@@ -32,9 +32,19 @@ use softvt_benchmark::{
 };
 use softvt_common::{parallel::lock, text::unknown_name};
 
+/// What the main file of a script is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ScriptKind {
+    /// A plan or a profile.
+    Plan,
+    /// A policy, whose access to limits and materials depends on what it declares.
+    Policy,
+}
+
 /// The files of a script and the command line that they ran with: enough to run it again without the disk.
 #[derive(Clone, Debug)]
 pub struct ScriptSources {
+    kind: ScriptKind,
     /// The main file, as messages name it.
     pub main: String,
     /// Every file that was read.
@@ -47,16 +57,17 @@ impl ScriptSources {
     /// Runs the main file at `path` and converts its result. The bundle holds the files that both have read: a result
     /// may contain functions that read further ones.
     fn read<T>(
+        kind: ScriptKind,
         path: &Path,
         argv: &[String],
         limits: &Limits,
         convert: impl FnOnce(&ScriptInstance) -> Result<T, ScriptError>,
     ) -> Result<(Self, T), ScriptError> {
         let (library, main) = Library::open(path)?;
-        let instance = ScriptInstance::open(&main, library, argv, limits, |_| ())?;
+        let instance = ScriptInstance::open(kind, &main, library, argv, limits, |_| ())?;
         let result = convert(&instance)?;
         let bundle = Arc::new(lock(&instance.vm.library).bundle.clone());
-        Ok((Self { main, bundle, argv: argv.to_vec(), limits: limits.clone() }, result))
+        Ok((Self { kind, main, bundle, argv: argv.to_vec(), limits: limits.clone() }, result))
     }
 
     /// Runs the main file again in a new virtual machine.
@@ -67,7 +78,7 @@ impl ScriptSources {
     /// As [`ScriptSources::instance`], with a virtual machine that `prepare` has changed before the main file runs.
     pub(crate) fn instance_with(&self, prepare: impl FnOnce(&Lua)) -> Result<ScriptInstance, ScriptError> {
         let library = Library::frozen((*self.bundle).clone());
-        ScriptInstance::open(&self.main, library, &self.argv, &self.limits, prepare)
+        ScriptInstance::open(self.kind, &self.main, library, &self.argv, &self.limits, prepare)
     }
 }
 
@@ -105,7 +116,7 @@ pub fn load(path: &Path, argv: &[String]) -> Result<LoadedScript, ScriptError> {
 /// # Errors
 /// As [`load`].
 pub fn load_with(path: &Path, argv: &[String], limits: &Limits) -> Result<LoadedScript, ScriptError> {
-    let (sources, (options, plan)) = ScriptSources::read(path, argv, limits, |instance| {
+    let (sources, (options, plan)) = ScriptSources::read(ScriptKind::Plan, path, argv, limits, |instance| {
         let options = lock(&instance.options).declared.clone();
         Ok((options, instance.plan().map_err(|e| instance.vm.explain(&e))?))
     })?;
@@ -142,6 +153,7 @@ impl ScriptInstance {
     }
 
     fn open(
+        kind: ScriptKind,
         main: &str,
         library: Library,
         argv: &[String],
@@ -150,6 +162,9 @@ impl ScriptInstance {
     ) -> Result<Self, ScriptError> {
         let mut instance = Self::new(main, library, argv, limits)?;
         prepare(&instance.vm.lua);
+        if kind == ScriptKind::Policy {
+            instance.vm.privilege.expect_declaration();
+        }
         instance.result = instance.vm.run_main()?;
         lock(&instance.options).check_all_consumed(main)?;
         Ok(instance)

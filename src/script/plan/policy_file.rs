@@ -4,7 +4,7 @@ use std::path::Path;
 
 use mlua::{Function, Table, Value};
 
-use super::{ScriptInstance, ScriptSources};
+use super::{ScriptInstance, ScriptKind, ScriptSources};
 use crate::{
     api::{
         observation::{LuaObservation, task_brief},
@@ -36,6 +36,8 @@ pub struct PolicyFile {
     pub replan: Option<usize>,
     /// Observations of the policy.
     pub streams: SensorStreams,
+    /// True if the policy has access to limits and materials of objects.
+    pub privileged: bool,
     /// File and line of the declaration of its cameras.
     pub observes_at: String,
     /// The files; episodes run on these.
@@ -56,14 +58,15 @@ impl PolicyFile {
     /// # Errors
     /// As [`PolicyFile::load`].
     pub fn load_with(path: &Path, limits: &Limits) -> Result<Self, ScriptError> {
-        let (sources, (spec, observes_at)) = ScriptSources::read(path, &[], limits, |instance| {
-            let policy = instance.policy()?;
-            let observes_at = origin_of_key(&instance.vm.lua, &policy.table, &["observes", "cameras"]);
-            Ok((policy.spec, observes_at))
-        })?;
-        let PolicySpec { name, observes: streams, replan, .. } = spec;
+        let (sources, (spec, observes_at)) =
+            ScriptSources::read(ScriptKind::Policy, path, &[], limits, |instance| {
+                let policy = instance.policy()?;
+                let observes_at = origin_of_key(&instance.vm.lua, &policy.table, &["observes", "cameras"]);
+                Ok((policy.spec, observes_at))
+            })?;
+        let PolicySpec { name, observes: streams, replan, privileged, .. } = spec;
         let observes_at = observes_at.map_or_else(|| sources.main.clone(), |line| line.to_string());
-        Ok(Self { name, replan, streams, observes_at, sources })
+        Ok(Self { name, replan, streams, privileged, observes_at, sources })
     }
 
     /// Starts the policy of an episode in a virtual machine of its own.
@@ -80,7 +83,12 @@ impl PolicyFile {
 
 impl ScriptInstance {
     fn policy(&self) -> Result<Constructed<PolicySpec>, ScriptError> {
-        self.expected_result("a policy's file").map_err(|e| self.vm.explain(&e))
+        let policy = self.expected_result::<PolicySpec>("a policy's file");
+        let policy = policy.and_then(|policy| {
+            self.vm.privilege.declare(policy.privileged)?;
+            Ok(policy)
+        });
+        policy.map_err(|e| self.vm.explain(&e))
     }
 }
 

@@ -7,7 +7,7 @@ use std::{
 
 use mlua::Lua;
 
-use super::ScriptSources;
+use super::{ScriptKind, ScriptSources};
 use crate::{
     api::policy::{ActionEncodingSpec, GripperValuesSpec, InputKind, InputSpec, PoseKind, ProfileSpec},
     schema::Constructed,
@@ -22,11 +22,13 @@ use softvt_policy::profile::{
 /// # Errors
 /// If the file cannot be read or does not return a valid profile; the message names file and line.
 pub fn load_profile(path: &Path) -> Result<(Profile, BTreeMap<String, String>), ScriptError> {
-    let (sources, profile) = ScriptSources::read(path, &[], &Limits::default(), |instance| {
-        let spec = instance.expected_result("a profile's file");
-        let profile = spec.and_then(|spec| ProfileReader { lua: &instance.vm.lua, spec: &spec }.profile());
-        profile.map_err(|e| instance.vm.explain(&e))
-    })?;
+    let (sources, profile) =
+        ScriptSources::read(ScriptKind::Plan, path, &[], &Limits::default(), |instance| {
+            let spec = instance.expected_result("a profile's file");
+            let profile =
+                spec.and_then(|spec| ProfileReader { lua: &instance.vm.lua, spec: &spec }.profile());
+            profile.map_err(|e| instance.vm.explain(&e))
+        })?;
     Ok((profile, sources.bundle.hashes()))
 }
 

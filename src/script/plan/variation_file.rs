@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use super::{LoadedScript, ScriptSources};
+use super::{LoadedScript, ScriptKind, ScriptSources};
 use crate::{
     api::tasks::VariationSpec,
     vm::{Limits, error::ScriptError},
@@ -17,10 +17,11 @@ pub const STANDARD_VARIATION: &str = "scripts/variations/standard.lua";
 /// # Errors
 /// If the file cannot be read or does not return a valid variation; the message names file and line.
 pub fn load_variation(path: &Path) -> Result<(VariationRanges, BTreeMap<String, String>), ScriptError> {
-    let (sources, ranges) = ScriptSources::read(path, &[], &Limits::default(), |instance| {
-        let spec = instance.expected_result::<VariationSpec>("a variation's file");
-        spec.map(|spec| spec.ranges()).map_err(|e| instance.vm.explain(&e))
-    })?;
+    let (sources, ranges) =
+        ScriptSources::read(ScriptKind::Plan, path, &[], &Limits::default(), |instance| {
+            let spec = instance.expected_result::<VariationSpec>("a variation's file");
+            spec.map(|spec| spec.ranges()).map_err(|e| instance.vm.explain(&e))
+        })?;
     Ok((ranges, sources.bundle.hashes()))
 }
 

@@ -1,6 +1,6 @@
 //! Policies and profiles in Lua: loading, observations, actions and malformed results.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use image::{Rgb, RgbImage};
 
@@ -354,4 +354,42 @@ fn errors_in_profiles_are_reported_with_their_line() {
         let found = profile(&changed("libero", &[(from, to)])).unwrap_err();
         assert!(found.starts_with("p.lua:") && found.contains(expected), "{to}\n{found}\n{expected}");
     }
+}
+
+#[test]
+fn limits_and_materials_are_refused_to_a_policy_that_does_not_declare_them() {
+    let load = |text: &str| {
+        let project =
+            Project::new(&[("p.lua", text), ("assets/own.lua", "return { body = { youngs_pa = 1 } }")]);
+        PolicyFile::load_with(&project.path("p.lua"), &Limits { load: Duration::from_secs(10), ..limits() })
+            .map(|file| file.privileged)
+            .map_err(|error| (error.line, error.message))
+    };
+    let declared = |more: &str| format!("return softvt.policy {{ name = 'p', {more} act = function() end }}");
+    for access in [
+        "require 'calibrated'",
+        "require 'experts.grasp'",
+        "require 'experts.pick_place'",
+        "require 'assets.cube'",
+        "require 'assets.own'",
+        "softvt.calibration 'cube'",
+        "softvt.soft { youngs_pa = 1e4, poisson = 0.3, density = 300 }",
+    ] {
+        let (line, message) = load(&format!("\nlocal x = {access}\n{}", declared(""))).expect_err(access);
+        assert_eq!(line, Some(2), "{access}: {message}");
+        let what = access.split(['\'', ' ']).next().expect("a word");
+        assert!(message.starts_with(what) && message.contains("privileged = true"), "{access}: {message}");
+        assert_eq!(
+            load(&format!("local x = {access}\n{}", declared("privileged = true,"))),
+            Ok(true),
+            "{access}"
+        );
+    }
+    assert_eq!(load(&format!("local route = require 'experts.route'\n{}", declared(""))), Ok(false));
+    // A function that asks later is refused then, also inside of pcall.
+    let (_project, mut late) = policy(
+        "return { position = { 0.5, 0, softvt.calibration('cube').tau }, axis_angle = { 3, 0, 0 }, closure = 0 }",
+    );
+    let error = late.act(&observation()).expect_err("no limit").to_string();
+    assert!(error.contains("softvt.calibration: a policy has no access"), "{error}");
 }

@@ -5,6 +5,7 @@ pub(crate) mod json;
 pub(crate) mod library;
 pub(crate) mod list;
 pub(crate) mod memory_budget;
+pub(crate) mod privilege;
 pub(crate) mod source_map;
 pub(crate) mod value;
 pub(crate) mod watchdog;
@@ -26,6 +27,7 @@ use rand_chacha::{ChaCha8Rng, rand_core::RngCore};
 use error::{ErrorTranslator, MainFile, RaisedObject, ScriptError, app_data, current_line, fail};
 use library::{Library, SharedLibrary, lua_text};
 use memory_budget::MemoryUse;
+use privilege::{PrivilegedAccess, check_module};
 use value::{describe, literal};
 use watchdog::{Clock, Deadline, OnStuck};
 
@@ -122,6 +124,7 @@ pub(crate) struct Vm {
     /// The global table `softvt`.
     pub api: Table,
     pub library: SharedLibrary,
+    pub privilege: PrivilegedAccess,
     clock: Clock,
     state: Arc<VmState>,
 }
@@ -150,6 +153,8 @@ impl Vm {
         lua.set_app_data(library.clone());
         lua.set_app_data(MemoryUse::default());
         lua.set_app_data(clock.clone());
+        let privilege = PrivilegedAccess::granted();
+        lua.set_app_data(privilege.clone());
         let (api, host, globals) = (lua.create_table()?, lua.create_table()?, lua.globals());
         host.set("raised", lua.create_function(record_raised_object)?)?;
         host.set("error_text", lua.create_function(error_text)?)?;
@@ -167,7 +172,7 @@ impl Vm {
         let random = MathRandom::install(&lua)?;
         globals.set("softvt", &api)?;
         clock.install(&lua)?;
-        Ok(Self { lua, clock, random, library: library.clone(), state: state.clone(), api })
+        Ok(Self { lua, clock, random, library: library.clone(), privilege, state: state.clone(), api })
     }
 
     /// The main file, as messages name it.
@@ -309,6 +314,7 @@ fn require(lua: &Lua, loaded: &Table, name: &Value) -> mlua::Result<Value> {
     let name = name.to_string_lossy();
     let library = app_data::<SharedLibrary>(lua)?;
     let file = lock(&library).module(&name).map_err(|error| fail(lua, error.to_string()))?;
+    check_module(lua, &name, &file.name)?;
     let text = lua_text(&file.name, &file.bytes).map_err(mlua::Error::external)?;
     let file = file.name.as_str();
     match loaded.get::<Value>(file)? {
