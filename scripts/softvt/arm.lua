@@ -1,7 +1,7 @@
 -- The arm as experts control it. Each motion takes as many control steps as it needs; all are built on one primitive that sends
 -- a command and waits for the next control step. Poses are of the tool centre point, in the world frame.
-local host, check, servo, fingers = ...
-local yield, ceil, max = coroutine.yield, math.ceil, math.max
+local host, check, servo, fingers, note = ...
+local yield, ceil, max, min = coroutine.yield, math.ceil, math.max, math.min
 
 local Arm = {}
 
@@ -22,7 +22,7 @@ function Arm:command(pose, closure)
     closure = self.holds
   end
   self.target, self.closure = pose, closure
-  local refusal = yield(self.target, self.closure, self.gripping, nil, self.wants_readings)
+  local refusal = yield(self.target, self.closure, self.gripping, nil, self.wants_readings, self.goal)
   if refusal then check.refuse(refusal) end
 end
 
@@ -44,10 +44,12 @@ local function travel(self, pose, options, closure)
   local metres, radians = from:distance(pose)
   local seconds = PEAK * max(metres / options.speed, radians / options.angular_speed)
   local steps = max(1, ceil(seconds / host.dt))
+  self.goal = pose
   for step = 1, steps do
     local s = smooth(step / steps)
     self:command(from:interpolate(pose, s), start * (1 - s) + closure * s)
   end
+  self.goal = nil
 end
 
 -- Moves along a straight line, and to options.closure on the way.
@@ -65,11 +67,39 @@ function Arm:close_to(closure, options)
   for step = 1, steps do self:command(self.target, start * (1 - step / steps) + closure * (step / steps)) end
 end
 
+-- Width of the open gripper, m.
+local STROKE = 0.08
+-- Lag of the measured width behind its command, s, and the trim to the width of a grip: share of the error that a command corrects,
+-- largest duration, s, and tolerance, m.
+local LAG, TRIM_SHARE, TRIM_TIME, TRIM_TOLERANCE = 0.1, 0.5, 0.5, 5e-5
+
+-- Closes until the gels are at options.width or both pads press with options.force, at the latest at the closure. The measured
+-- width, which the compliance of the fingers displaces from the command, is then trimmed.
+local function close_until(self, closure, options)
+  local rate, width, force = options.rate, options.width, options.force
+  local function is_reached()
+    if force and min(host.force[1], host.force[2]) >= force then return true end
+    return width and host.width - LAG * rate * STROKE <= width
+  end
+  while self.closure < closure and not is_reached() do
+    self:command(self.target, min(closure, self.closure + rate * host.dt))
+  end
+  if not width then return end
+  for _ = 1, ceil(TRIM_TIME / host.dt) do
+    local error = host.width - width
+    if error < TRIM_TOLERANCE then return end
+    self:command(self.target, min(closure, self.closure + TRIM_SHARE * error / STROKE))
+  end
+end
+
 -- Closes on an object: to the given closure, or with the tactile servo until the fingers report a firm grasp. A binary gripper
 -- closes fully here, and not in close_to.
 function Arm:grasp(closure, options)
   self.gripping = true
-  if not fingers.servo then return self:close_to(closure, options) end
+  if not fingers.servo then
+    if options.width or options.force then return close_until(self, closure, options) end
+    return self:close_to(closure, options)
+  end
   end_servo(self)
   self.wants_readings = true
   self.holds = servo.close(self.closure, options.rate * host.dt, function(next)
@@ -96,6 +126,9 @@ end
 function Arm:wait(seconds)
   for _ = 1, ceil(seconds / host.dt - 1e-9) do self:command(self.target, self.closure) end
 end
+
+-- Notes a number in the record of the episode.
+function Arm:note(name, value) note(name, value) end
 
 -- Ends the expert with a reason. The last command stays in effect, and the coroutine is not resumed.
 function Arm:give_up(reason) yield(self.target, self.closure, self.gripping, reason) end

@@ -41,8 +41,8 @@ pub enum SettingsError {
     #[error(transparent)]
     Range(#[from] RangeError),
     #[error(
-        "physics.dt: control runs at 20 Hz, so dt must divide {CONTROL_DT} s; got {}, near are {below:.6} and {above:.6}",
-        format_number(*.dt)
+        "physics.dt: control runs at 20 Hz, so dt must divide {CONTROL_DT} s; got {}, near are {} and {}",
+        format_number(*.dt), format_number(*.below), format_number(*.above)
     )]
     TimeStep { dt: f64, below: f64, above: f64 },
 }
@@ -73,8 +73,7 @@ impl Settings {
         for (path, value) in fields {
             changed = changed.replaced(path, value)?;
         }
-        changed.validate()?;
-        Ok(changed)
+        changed.validated()
     }
 
     /// The physics alone with the fields at dotted paths set, for simulations without the control steps of the
@@ -121,32 +120,49 @@ impl Settings {
             }
             (_, Ok(value)) => value,
             (Value::String(_), Err(_)) => Value::String(value.to_owned()),
-            (present, Err(_)) => {
-                let expected = if present.is_boolean() { "true or false" } else { "a number" };
-                return Err(SettingsError::Type { path: path.clone(), expected, value: value.to_owned() });
-            }
+            (present, Err(_)) => match fraction(value).filter(|_| present.is_number()) {
+                Some(number) => json!(number),
+                None => {
+                    let expected = if present.is_boolean() { "true or false" } else { "a number" };
+                    return Err(SettingsError::Type {
+                        path: path.clone(),
+                        expected,
+                        value: value.to_owned(),
+                    });
+                }
+            },
         };
         serde_json::from_value(tree).map_err(refused)
     }
 
-    /// Checks the ranges of all parameters, and that the physics step divides [`CONTROL_DT`].
+    /// Checks the ranges of all parameters, and that the physics step divides [`CONTROL_DT`]. A step that was rounded to
+    /// a few decimals, such as 0.016667, becomes the exact one.
     ///
     /// # Errors
     /// The first parameter out of range.
-    pub fn validate(&self) -> Result<(), SettingsError> {
+    pub fn validated(mut self) -> Result<Self, SettingsError> {
         self.robot.validate()?;
         self.criteria.validate()?;
         self.tactile.validate()?;
         self.physics.validate()?;
         let dt = self.physics.dt;
-        if (f64::from(steps_per_control(dt)) * dt - CONTROL_DT).abs() <= 1e-9 {
-            return Ok(());
+        let exact = CONTROL_DT / f64::from(steps_per_control(dt));
+        let error = (dt / exact - 1.0).abs();
+        if error > ROUNDING {
+            let (below, above) =
+                (CONTROL_DT / (CONTROL_DT / dt).ceil(), CONTROL_DT / (CONTROL_DT / dt).floor().max(1.0));
+            return Err(SettingsError::TimeStep { dt, below, above });
         }
-        let (below, above) =
-            (CONTROL_DT / (CONTROL_DT / dt).ceil(), CONTROL_DT / (CONTROL_DT / dt).floor().max(1.0));
-        Err(SettingsError::TimeStep { dt, below, above })
+        // 1/140 and 0.05/7 differ in their last bit; both are exact.
+        if error > 2.0 * f64::EPSILON {
+            self.physics.dt = exact;
+        }
+        Ok(self)
     }
 }
+
+/// Largest relative difference of a physics step that was rounded from the exact one.
+const ROUNDING: f64 = 5e-4;
 
 /// Former paths of settings and what they are called now. The same keys are serde aliases, for settings
 /// in tables and files.
@@ -171,6 +187,13 @@ fn current_path(path: &str) -> String {
 
 /// Names the kind of a setting that can be of several: `tactile.optics.model`.
 const MODEL: &str = "model";
+
+/// A number written as a fraction: `1/60`.
+fn fraction(text: &str) -> Option<f64> {
+    let (numerator, denominator) = text.split_once('/')?;
+    let number = |text: &str| text.trim().parse::<f64>().ok();
+    Some(number(numerator)? / number(denominator)?).filter(|value| value.is_finite())
+}
 
 /// Names of the fields of a group.
 fn fields(group: &Value) -> Vec<String> {
@@ -234,10 +257,31 @@ mod tests {
             assert_eq!(steps_per_control(dt), steps);
             assert!(with_dt(dt).is_ok());
         }
-        assert!(
-            with_dt(1.0 / 50.0)
-                .is_err_and(|e| e.to_string().contains("0.016667") && e.to_string().contains("0.025"))
-        );
+        assert!(with_dt(1.0 / 50.0).is_err_and(|e| e.to_string().contains("0.016666666666666666 and 0.025")));
+    }
+
+    #[test]
+    fn a_rounded_physics_step_becomes_exact_and_every_suggestion_is_accepted() {
+        let dt =
+            |text: &str| Settings::default().with("physics.dt", text).map(|settings| settings.physics.dt);
+        for text in ["0.016667", "0.01667", "1/60", "0.016666666666666666", "1.6667e-2"] {
+            assert_eq!(
+                dt(text).map_err(|e| e.to_string()),
+                dt(&(0.05 / 3.0).to_string()).map_err(|e| e.to_string()),
+                "{text}"
+            );
+        }
+        assert_eq!(dt("1/140"), Ok(1.0 / 140.0));
+        for refused in ["0.02", "0.0168", "1/70"] {
+            let message = dt(refused).expect_err("does not divide the period").to_string();
+            let suggestions = message.split_once("near are ").expect("suggestions").1.split(" and ");
+            suggestions.for_each(|suggested| assert!(dt(suggested).is_ok(), "{message}"));
+        }
+        for refused in ["1/0", "1/x", "60 Hz", "/"] {
+            assert!(dt(refused).is_err_and(|e| e.to_string().contains("expected a number")), "{refused}");
+        }
+        let effort = Settings::default().with("robot.gripper.effort", "1/4").expect("a number");
+        assert_eq!(effort.robot.gripper.effort, 0.25);
     }
 
     #[test]

@@ -42,6 +42,9 @@ pub struct ManifestEntry {
     pub seed: u64,
     /// Hash of the final state.
     pub state_hash: String,
+    /// Numbers noted by the expert, such as the grip that it chose.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub notes: BTreeMap<String, f64>,
     /// Imported demonstration of which it is a re-execution.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub origin: Option<Box<Origin>>,
@@ -70,6 +73,7 @@ impl ManifestEntry {
             d_peak: record.verdict.d_peak,
             seed: id.base_seed,
             state_hash: record.stats.state_hash.clone(),
+            notes: record.stats.notes.clone(),
             origin: header.origin.clone(),
             video_files: videos
                 .map(|(i, name)| ((*name).to_owned(), paths.video_relative(demo, i)))

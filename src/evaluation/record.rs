@@ -3,6 +3,8 @@
 //! [`EpisodeRecord`] flattens four parts into one JSON object: the [`EpisodeHeader`] with its id, its [`Outcome`], the
 //! [`Verdict`] of the judge and the [`RolloutStats`].
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize, Serializer, ser::SerializeMap};
 
 use super::{drop::DropEvent, episode_id::EpisodeId, safety::KappaVerdict, stage::Stage};
@@ -235,6 +237,9 @@ pub struct RolloutStats {
     /// Reason given by the controller for aborting the episode, if it did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gave_up: Option<String>,
+    /// Numbers noted by the controller, such as the grip that an expert chose.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub notes: BTreeMap<String, f64>,
     /// SHA-256 of the actions, as the float64 numbers of their file (little-endian), hexadecimal; absent in runs of earlier
     /// versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]

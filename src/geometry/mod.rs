@@ -13,6 +13,7 @@ mod linear_algebra;
 pub mod mass;
 pub mod mesh;
 mod parry;
+pub mod pieces;
 pub mod samples;
 pub mod shape;
 pub mod surface_mesh;

@@ -1,6 +1,6 @@
 //! The interface of an episode to its controller, and the controller that executes the action chunks of a policy.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 use super::simulation::Simulation;
 use softvt_policy::{
@@ -26,6 +26,10 @@ pub trait Controller {
     /// Reason why the controller aborted its task, if it did. The last action is then held until the episode ends.
     fn gave_up(&self) -> Option<&str> {
         None
+    }
+    /// Numbers that the controller notes in the record of the episode, by name.
+    fn notes(&self) -> BTreeMap<String, f64> {
+        BTreeMap::new()
     }
     /// Action of this control step, `None` to repeat the previous one.
     ///

@@ -332,7 +332,9 @@ impl Episode {
             self.step(&action);
         }
         controller.finish().map_err(|source| self.control_error(source))?;
-        Ok(self.finish(controller.gave_up().map(str::to_owned)))
+        let mut finished = self.finish(controller.gave_up().map(str::to_owned));
+        finished.record.stats.notes = controller.notes();
+        Ok(finished)
     }
 
     /// Starts the episode. `streams` are those that any later observation may request; their history is kept.
@@ -527,6 +529,7 @@ impl Episode {
             camera_inside: self.history.camera_inside,
             far_commands: self.far_commands,
             gave_up,
+            notes: BTreeMap::new(),
             actions_sha256: Some(checksum(&self.actions)),
             state_hash: state_hash(&self.sim),
         };

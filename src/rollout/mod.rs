@@ -75,6 +75,7 @@ mod episode;
 mod evidence;
 mod observation_history;
 mod robot_instance;
+mod scene_doubts;
 mod sensor_assets;
 mod sensors;
 mod shared_cache;
@@ -88,6 +89,7 @@ pub use build_error::BuildError;
 pub use controller::{ChunkedPolicy, Controller};
 pub use episode::{Episode, EpisodeError, EpisodeSpec, FinishedEpisode, ScoreFrame, checksum, target_asset};
 pub use robot_instance::RobotInstance;
+pub use scene_doubts::scene_doubts;
 pub use sensor_assets::{SensingError, SensorAssets};
 pub use sensors::{
     BodyConfiguration, CAMERA_IMAGE_SUFFIXES, Proprioception, ROBOT_SEGMENTATION_ID, SensorSuite,

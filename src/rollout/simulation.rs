@@ -11,7 +11,7 @@ use softvt_physics::{
     BodyId, ColliderId, ContactPartner, PhysicsParams, World,
     fem::FemModel,
     joints,
-    world::{ContactSummary, StepFailure},
+    world::{ContactPatch, ContactSummary, StepFailure},
 };
 use softvt_robot::RobotSpec;
 use softvt_scene::{Asset, Body, Joint, Scene};
@@ -252,6 +252,22 @@ impl Simulation {
         self.robot.pads.map(|pad| self.contact(object, ContactPartner::Collider(pad)))
     }
 
+    /// Sum of the normal forces on the left and right pad, N, from bodies of every kind.
+    pub fn pad_normal_forces(&self) -> [f64; 2] {
+        self.robot.pads.map(|pad| normal_force(&self.world.patch(pad), |_| true))
+    }
+
+    /// Normal forces of the left and right pad on an object, N. Those on parts and on fixed objects are found in the
+    /// contact patches, since contacts are recorded for free bodies only.
+    pub fn pad_normal_forces_on(&self, object: &ObjectInstance) -> [f64; 2] {
+        if object.body.is_free() {
+            return self.pad_contacts(object).map(|contact| contact.normal_force);
+        }
+        let is_of_object =
+            |partner| object.colliders.iter().any(|&own| partner == ContactPartner::Collider(own));
+        self.robot.pads.map(|pad| normal_force(&self.world.patch(pad), is_of_object))
+    }
+
     /// The object of a name.
     pub fn object(&self, name: &str) -> Option<&ObjectInstance> {
         self.objects.iter().find(|o| o.name == name)
@@ -320,6 +336,12 @@ impl Simulation {
         }
         Ok(())
     }
+}
+
+/// Normal force at the points of a patch that touch the partners of interest, N.
+fn normal_force(patch: &ContactPatch, is_of_interest: impl Fn(ContactPartner) -> bool) -> f64 {
+    let points = patch.points.iter().filter(|point| is_of_interest(point.partner));
+    points.map(|point| point.pressure * point.area).sum()
 }
 
 /// `file:line` where the object of a name, or the object of the part of that name, was placed.

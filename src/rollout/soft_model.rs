@@ -6,6 +6,7 @@ use super::build_error::BuildError;
 use softvt_common::text::format_number;
 use softvt_geometry::{
     mass::{approximate_mass_properties, mass_properties},
+    pieces::SeparatePieces,
     samples::{SampleSpec, surface_samples},
     shape::Shape,
     voxel::{SurfaceSample, VoxelMesh, VoxelSpec, voxel_mesh},
@@ -52,6 +53,7 @@ impl SoftGeometry {
         };
         let mesh = voxel_mesh(shape, &VoxelSpec { resolution: material.resolution })
             .map_err(|source| BuildError::Geometry { asset: name.to_owned(), source })?;
+        check_connected(name, &mesh)?;
         let samples = surface_samples(shape, &mesh, &SampleSpec { grasp_spacing, ..SampleSpec::default() });
         Ok(Self { mesh, samples, volume })
     }
@@ -70,6 +72,17 @@ impl SoftGeometry {
         let samples = self.samples.iter().map(|sample| sample.scaled(scale)).collect();
         FemModel::new(self.mesh.scaled(scale), law, self.volume * scale.powi(3), samples)
     }
+}
+
+/// Checks that a body is one piece: D of several would measure how they move apart.
+fn check_connected(name: &str, mesh: &VoxelMesh) -> Result<(), BuildError> {
+    let Some(SeparatePieces { count, gap }) = SeparatePieces::find(mesh) else { return Ok(()) };
+    let what = format!(
+        "its voxel mesh has {count} separate pieces, {:.1} mm apart; join them, give a higher resolution if the shape is \
+         connected, or make each an asset of its own",
+        1e3 * gap
+    );
+    Err(BuildError::Material { asset: name.to_owned(), what })
 }
 
 /// Checks the parameters of a material.

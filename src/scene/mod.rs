@@ -43,6 +43,7 @@ mod camera;
 mod decal;
 mod fingerprint;
 mod light;
+mod plausibility;
 mod scale;
 mod variation;
 mod visual;

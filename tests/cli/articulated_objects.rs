@@ -66,3 +66,48 @@ fn invalid_joints_and_parts_are_refused() {
     assert_snapshot!(refusal("softvt.slider { axis = { 0, -1, 0 }, lower = 0 }", "chest"), @"x.lua:5: slider.upper: missing; expected metres");
     assert_snapshot!(refusal(TRAY, "chest.drawer"), @r#"x.lua:13: task.goal.target: unknown object "chest.drawer"; did you mean "chest.tray"?"#);
 }
+
+/// Grips the handle of a drawer of the standard cabinet and reads the forces.
+const HANDLE: &str = r#"local floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 2, 2, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} }
+local wooden_cabinet = require "assets.wooden_cabinet"
+local layout = softvt.layout("handle", function(scene)
+  scene:add { name = "floor", asset = floor, position = { 0, 0, 0 } }
+  scene:add { name = "cabinet", asset = wooden_cabinet, at = { 0, 0.25 } }
+end)
+return softvt.experiment {
+  name = "handle", grid = { closure = { 0.95 } },
+  run = function(point)
+    local sim, row = softvt.simulate { layout = layout }, nil
+    assert(sim:drive(function(arm, scene)
+      local cabinet, drawer = scene:object "cabinet", scene:part("cabinet", "top_drawer")
+      local x, y = cabinet.centre[1], 0.25 - drawer.hints.handle_out_m
+      -- The fingers point forward, above and below the bar.
+      local grip = softvt.pose { position = { x, y, drawer.hints.handle_height_m }, quaternion = { 0.7071, -0.7071, 0, 0 } }
+      arm:move_to(grip:translated { 0, -0.08, 0 }, { speed = 0.3 })
+      arm:move_to(grip, { speed = 0.1 })
+      arm:close_to(point.closure)
+      arm:wait(1)
+      row = { width_mm = 1e3 * arm.width, left = arm.force[1], right = arm.force[2] }
+    end))
+    local on = sim:measure "cabinet.top_drawer".pad_force
+    row.on_left, row.on_right = on[1], on[2]
+    row.felt_left, row.felt_right = -sim:tactile "left".force[3], -sim:tactile "right".force[3]
+    return row
+  end,
+}
+"#;
+
+#[test]
+fn forces_on_a_drawers_handle_are_those_that_the_gels_feel() {
+    let output = Project::new(&[("handle.lua", HANDLE)]).succeeds("handle.lua --json");
+    let row: serde_json::Value = serde_json::from_str(output.out.trim()).expect("a row");
+    let number = |key: &str| row[key].as_f64().unwrap_or_else(|| panic!("{key} in {row}"));
+    for side in ["left", "right"] {
+        let force = number(side);
+        assert!(force > 1.0, "{side} presses: {row}");
+        // The normals of a bar are not parallel, so their sum is a little above the force along the axis of the pad.
+        let felt = number(&format!("felt_{side}"));
+        assert!((0.8..=1.0 + 1e-9).contains(&(felt / force)), "{side}: {row}");
+        assert!((number(&format!("on_{side}")) / force - 1.0).abs() < 1e-9, "{side}: {row}");
+    }
+}

@@ -86,3 +86,33 @@ fn standard_suites_are_valid() {
     let output = Project::new(&[]).succeeds("check suites/all.lua");
     assert_eq!(output.out.matches(" tasks, ").count(), 4);
 }
+
+#[test]
+fn a_soft_body_of_two_pieces_is_refused() {
+    let ball = "softvt.shape.sphere { radius = 0.02 }";
+    let shape = format!("{ball}:union({ball}:translate(0.08, 0, 0)):grounded()");
+    let text = Small::default().text().replace(Small::default().shape, &shape);
+    let message = Project::new(&[("x.lua", &text)]).refusal("check x.lua");
+    assert!(message.starts_with("x.lua:6: asset cube: its voxel mesh has 2 separate pieces, "), "{message}");
+}
+
+#[test]
+fn implausible_units_and_wide_objects_are_doubted() {
+    let doubts = |small: Small| small.project().succeeds("check x.lua").err;
+    let light =
+        doubts(Small { material: "youngs_pa = 40, poisson = 0.3, density = 0.3", ..Small::default() });
+    assert!(
+        light.contains("asset cube: youngs_pa is 40 Pa, softer than a gel; did you mean 40 kPa"),
+        "{light}"
+    );
+    assert!(
+        light.contains("asset cube: density is 0.3 kg/m³, lighter than foam; did you mean 0.3 g/cm³"),
+        "{light}"
+    );
+    let wide = doubts(Small {
+        shape: "softvt.shape.box { size = { 0.12, 0.1, 0.04 } }:grounded()",
+        ..Small::default()
+    });
+    assert!(wide.contains("asset cube: it is 100 mm wide, and the gripper opens 80 mm"), "{wide}");
+    assert!(!doubts(Small::default()).contains("warning"));
+}

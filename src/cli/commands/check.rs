@@ -1,12 +1,12 @@
 //! `softvt check`: validation of a script without running its plan.
 
-use std::{path::PathBuf, sync::Mutex};
+use std::{collections::BTreeSet, path::PathBuf, sync::Mutex};
 
 use clap::Args;
 
 use crate::{
     error::CliError,
-    output::print,
+    output::{eprint_notice, print},
     run::{
         conditions,
         config::{RunConfig, RunFlags, ScriptArgs},
@@ -21,7 +21,7 @@ use softvt_common::{
     parallel,
     text::{self, counted},
 };
-use softvt_rollout::{AssetCache, SensorAssets, cancel};
+use softvt_rollout::{AssetCache, SensorAssets, cancel, scene_doubts};
 use softvt_script::{ExperimentInput, SceneBuilder};
 
 /// Check a script without running it
@@ -64,7 +64,9 @@ pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
 fn check_suite(mut run: SuiteRun) -> Result<(), CliError> {
     let suite = run.suite;
     let tasks: Vec<_> = suite.tasks.iter().collect();
-    check_first_scenes(&run, &tasks)?;
+    for doubt in check_first_scenes(&run, &tasks)? {
+        eprint_notice(format!("warning: {doubt}"));
+    }
     run.jobs = select_episodes(run.config, suite, &tasks);
     run.scan_limits(&tasks)?;
     print(&format!(
@@ -86,18 +88,24 @@ fn check_suite(mut run: SuiteRun) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Builds and checks the first scene of every task on all processors.
-fn check_first_scenes(run: &SuiteRun, tasks: &[&Task]) -> Result<(), CliError> {
+/// Builds and checks the first scene of every task on all processors. Returns doubts about their objects.
+fn check_first_scenes(run: &SuiteRun, tasks: &[&Task]) -> Result<BTreeSet<String>, CliError> {
     // Opening the scenes runs the whole script, so each thread takes idle ones before it opens others.
     let idle: Mutex<Vec<SceneBuilder>> = Mutex::default();
-    let check = |job: usize| -> Result<(), CliError> {
+    let mut doubts = BTreeSet::new();
+    let check = |job: usize| -> Result<BTreeSet<String>, CliError> {
         let task = tasks[job];
         let taken = parallel::lock(&idle).pop();
         let builder = taken.map_or_else(|| SceneBuilder::open(run.loaded), Ok)?;
         let setup = builder.build(&run.episode_id(task, 0), &run.config.shifts)?;
         parallel::lock(&idle).push(builder);
-        run.check_scene(task, setup.scene)
+        let doubts = scene_doubts(task, &setup.scene);
+        run.check_scene(task, setup.scene)?;
+        Ok(doubts)
     };
-    parallel::run(tasks.len(), run.config.threads(), cancel::requested, check, |_, ()| Ok(()))?;
-    if cancel::requested() { Err(CliError::interrupted("interrupted")) } else { Ok(()) }
+    parallel::run(tasks.len(), run.config.threads(), cancel::requested, check, |_, found| {
+        doubts.extend(found);
+        Ok(())
+    })?;
+    if cancel::requested() { Err(CliError::interrupted("interrupted")) } else { Ok(doubts) }
 }

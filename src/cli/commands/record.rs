@@ -1,5 +1,7 @@
 //! `softvt record`: demonstrations of the tasks of a suite that are safe and reach the goal.
 
+use std::collections::BTreeMap;
+
 use clap::{Args, value_parser};
 use serde_json::json;
 
@@ -116,6 +118,10 @@ impl Controller for GripRecorder {
 
     fn gave_up(&self) -> Option<&str> {
         self.expert.gave_up()
+    }
+
+    fn notes(&self) -> BTreeMap<String, f64> {
+        self.expert.notes()
     }
 
     fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, PolicyError> {

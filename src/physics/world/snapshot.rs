@@ -184,7 +184,8 @@ impl World {
 
     /// Contact of `body` with `partner` in the last step in which the body was awake; zero without a contact.
     ///
-    /// Contacts are recorded for free bodies only: that of anything else is zero.
+    /// Contacts are recorded for free bodies only: that of anything else is zero. [`patch`](Self::patch) has those of
+    /// a collider with bodies of every kind.
     pub fn contact(&self, body: impl Into<BodyId>, partner: impl Into<ContactPartner>) -> ContactSummary {
         let partner = partner.into();
         let found = self.contacts(body).iter().find(|contact| contact.partner == partner);

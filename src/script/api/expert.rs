@@ -1,6 +1,9 @@
 //! Experts: Lua coroutines that get the true state and yield one command per control step.
 
-use std::sync::{Arc, Mutex};
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Mutex},
+};
 
 use mlua::{Function, Lua, MultiValue, Table, Thread, Value, chunk::ChunkMode};
 
@@ -31,6 +34,7 @@ pub(crate) enum FingerAccess {
     Servo,
 }
 
+type SharedNotes = Arc<Mutex<BTreeMap<String, f64>>>;
 type SharedReadings = Arc<Mutex<Option<FingerReadings>>>;
 type SharedView = Arc<Mutex<ExpertView>>;
 
@@ -39,6 +43,7 @@ pub(crate) struct Coroutine {
     function: Function,
     access: FingerAccess,
     readings: SharedReadings,
+    notes: SharedNotes,
     /// True if the expert needs finger readings at the next control step.
     pub wants_readings: bool,
     /// The started coroutine, and the view that it reads.
@@ -47,13 +52,20 @@ pub(crate) struct Coroutine {
     pub gave_up: Option<String>,
 }
 
+/// Largest number of notes in the record of an episode.
+const MAX_NOTES: usize = 32;
 /// Longest reason for giving up that is kept, characters.
 const MAX_REASON_CHARS: usize = 300;
 
 impl Coroutine {
     pub(crate) fn new(function: Function, access: FingerAccess) -> Self {
-        let readings = Arc::default();
-        Self { function, access, readings, wants_readings: false, running: None, gave_up: None }
+        let (readings, notes) = (Arc::default(), Arc::default());
+        Self { function, access, readings, notes, wants_readings: false, running: None, gave_up: None }
+    }
+
+    /// Numbers that the expert noted for the record of its episode, by name.
+    pub(crate) fn notes(&self) -> BTreeMap<String, f64> {
+        lock(&self.notes).clone()
     }
 
     /// Sets the finger readings of the next control step.
@@ -72,8 +84,8 @@ impl Coroutine {
             return Err(self.refuse(lua, &complaint));
         }
         let command = self.step(lua, &input.view)?;
-        if let Some(command) = &command {
-            monitor.command_b = Some(command.pose_b);
+        if command.is_some() {
+            monitor.command = command;
         }
         Ok(command)
     }
@@ -88,8 +100,8 @@ impl Coroutine {
             return Ok(None);
         }
         let mut values = values.into_iter();
-        let pose =
-            values.next().and_then(|value| value.as_userdata()?.borrow::<LuaPose>().ok().map(|pose| pose.0));
+        let pose_of = |value: Value| value.as_userdata()?.borrow::<LuaPose>().ok().map(|pose| pose.0);
+        let pose = values.next().and_then(pose_of);
         let closure = values.next().and_then(|value| number(&value));
         let gripping = values.next().and_then(|value| value.as_boolean());
         if let Some(reason) = values.next().and_then(|value| value.as_string().map(|s| s.to_string_lossy())) {
@@ -97,9 +109,10 @@ impl Coroutine {
             return Ok(None);
         }
         self.wants_readings = values.next().is_some_and(|value| value.as_boolean() == Some(true));
+        let goal_b = values.next().and_then(pose_of).map(|goal_w| view.base_w.inv_mul(&goal_w));
         match (pose, closure.filter(|closure| (0.0..=1.0).contains(closure)), gripping) {
             (Some(pose_w), Some(closure), Some(gripping)) => {
-                Ok(Some(ExpertCommand { pose_b: view.base_w.inv_mul(&pose_w), closure, gripping }))
+                Ok(Some(ExpertCommand { pose_b: view.base_w.inv_mul(&pose_w), closure, gripping, goal_b }))
             }
             _ => Err(fail(
                 lua,
@@ -112,6 +125,14 @@ impl Coroutine {
     /// The coroutine, if it waits for the next control step.
     fn waiting(&self) -> Option<&Thread> {
         self.running.as_ref().map(|(thread, _)| thread).filter(|thread| thread.is_resumable())
+    }
+
+    /// Ends the expert as `arm:give_up` does, with `complaint` and the line of the script as the reason.
+    pub(crate) fn abort(&mut self, lua: &Lua, complaint: &str, explain: impl Fn(&mlua::Error) -> String) {
+        if self.gave_up.is_none() {
+            let error = self.refuse(lua, complaint);
+            self.gave_up = Some(explain(&error).chars().take(MAX_REASON_CHARS).collect());
+        }
     }
 
     /// Raises `complaint` where the script waits for the next control step, and returns the error.
@@ -129,7 +150,7 @@ impl Coroutine {
         }
         let view = Arc::new(Mutex::new(view.clone()));
         let host = lua.create_userdata(MeasuredArm(view.clone()))?;
-        let arm = arm(lua, &host, finger_access(lua, self.access, &self.readings)?)?;
+        let arm = arm(lua, &host, finger_access(lua, self.access, &self.readings)?, &self.notes)?;
         let thread = lua.create_thread(self.function.clone())?;
         let (thread, view) = self.running.insert((thread, view));
         thread.resume((arm, SceneState(view.clone())))
@@ -137,9 +158,18 @@ impl Coroutine {
 }
 
 /// Makes the arm, whose methods are in the embedded library.
-fn arm(lua: &Lua, host: &mlua::AnyUserData, fingers: Table) -> mlua::Result<Table> {
+fn arm(lua: &Lua, host: &mlua::AnyUserData, fingers: Table, notes: &SharedNotes) -> mlua::Result<Table> {
     let servo: Table = library_chunk(lua, "servo")?.call(())?;
-    library_chunk(lua, "arm")?.call((host, checks(lua)?, servo, fingers))
+    let notes = notes.clone();
+    let note = lua.create_function(move |lua, (name, value)| {
+        let mut notes = lock(&notes);
+        notes.insert(name, value);
+        if notes.len() > MAX_NOTES {
+            return Err(fail(lua, format!("arm:note: expected at most {MAX_NOTES} names; note fewer")));
+        }
+        Ok(())
+    })?;
+    library_chunk(lua, "arm")?.call((host, checks(lua)?, servo, fingers, note))
 }
 
 /// A file of the library's own Lua code, out of the reach of scripts.
@@ -189,7 +219,7 @@ const RATE: Type = Type::Number("1/s", Range::POSITIVE);
 
 #[expect(dead_code, reason = "the arm's Lua code reads the fields")]
 mod options {
-    use super::{CLOSURE, RATE};
+    use super::{CLOSURE, MAX_WIDTH, RATE};
     use crate::schema::{Range, Type, record};
 
     record! {
@@ -207,6 +237,15 @@ mod options {
             /// Rate of the gripper; 1 is the whole stroke in a second.
             rate: f64 = RATE => Number(0.5);
         }
+        /// Options of closing on an object.
+        GraspOptions: "softvt.GraspOptions" as "arm:grasp" {
+            /// Rate of the gripper; 1 is the whole stroke in a second.
+            rate: f64 = RATE => Number(0.5);
+            /// Measured distance of the gels at which closing stops. A tactile servo ignores it.
+            width: Option<f64> = Type::Number("m", Range::closed(0.0, MAX_WIDTH));
+            /// Normal force on each pad at which closing stops. A tactile servo ignores it.
+            force: Option<f64> = Type::Number("N", Range::POSITIVE);
+        }
         /// Options of releasing an object.
         ReleaseOptions: "softvt.ReleaseOptions" as "arm:release" {
             /// Rate of the gripper; 1 is the whole stroke in a second.
@@ -216,7 +255,7 @@ mod options {
         }
     }
 }
-use options::{MotionOptions, RateOptions, ReleaseOptions};
+use options::{GraspOptions, MotionOptions, RateOptions, ReleaseOptions};
 
 /// The measurements of the arm. Commanded values are kept by the arm's Lua code, from these on.
 #[derive(Clone)]
@@ -247,7 +286,7 @@ class! {
             gripping: "boolean" { get(_, _) { false } }
             /// Measured distance of the gels, m.
             width: "number" { get(_, this) { this.read(|view| view.width_m) } }
-            /// Normal force on the left and the right pad, N.
+            /// Normal force on the left and the right pad, N, from objects and parts of every kind.
             force: "number[]" { get(_, this) { this.read(|view| view.pad_force_n) } }
             /// Under --policy fixed-closure: the ranges within which the instances of an asset differ. The expert then
             /// closes to one closure for all of them (experts.fixed_closure). nil under other policies.
@@ -270,9 +309,10 @@ class! {
             fn move_by(offset: [f64; 3] = Type::vector(3, "m"), options: MotionOptions) -> [];
             /// Closes or opens to a closure.
             fn close_to(closure: f64 = CLOSURE, options: RateOptions) -> [];
-            /// Closes on an object. A binary gripper, which is either open or closed, closes here and not in close_to. A
-            /// tactile servo closes until both fingers show a firm grasp, whatever closure is given.
-            fn grasp(closure: f64 = CLOSURE, options: RateOptions) -> [];
+            /// Closes on an object, to a closure or until the width or the force of the options is reached. A binary
+            /// gripper, which is either open or closed, closes here and not in close_to. A tactile servo closes until both
+            /// fingers show a firm grasp, whatever closure is given.
+            fn grasp(closure: f64 = CLOSURE, options: GraspOptions) -> [];
             /// Releases an object by opening, by default wide.
             fn release(options: ReleaseOptions) -> [];
             /// Opens the gripper.
@@ -282,6 +322,8 @@ class! {
             fn tactile() -> ["softvt.Fingers"];
             /// Holds the last command for a time.
             fn wait(seconds: f64 = Type::Number("s", Range::closed(0.0, 600.0))) -> [];
+            /// Notes a number, such as the width of a grip, in the episode's record and in the manifest of a dataset.
+            fn note(name: String = Type::Name, value: f64 = Type::Number("", Range::ANY)) -> [];
             /// Ends the expert. The last command stays, and the episode's record and the results contain the reason.
             fn give_up(reason: String) -> [];
         }

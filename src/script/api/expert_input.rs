@@ -89,6 +89,8 @@ pub(crate) struct ExpertCommand {
     pub closure: f64,
     /// True while the gripper should hold an object: the command of a binary gripper.
     pub gripping: bool,
+    /// End of the motion that the command belongs to, robot base frame.
+    pub goal_b: Option<Pose>,
 }
 
 /// Input of an expert at a control step, with a complaint about its last command if the arm cannot reach it.
@@ -112,11 +114,7 @@ fn expert_view(sim: &Simulation, time_s: f64) -> ExpertView {
         tcp_b: sim.robot.tool_b(&sim.world),
         width_m: sim.robot.width(&sim.world),
         closure: sim.robot.closure(),
-        pad_force_n: sim
-            .objects
-            .iter()
-            .map(|object| sim.pad_contacts(object))
-            .fold([0.0; 2], |sum, pads| [sum[0] + pads[0].normal_force, sum[1] + pads[1].normal_force]),
+        pad_force_n: sim.pad_normal_forces(),
         instances: None,
         objects: (0..sim.objects.len())
             .filter(|&index| sim.objects[index].part.is_none())
@@ -159,8 +157,8 @@ const MAX_LAG_STEPS: u32 = 20;
 /// Detects commands that the arm cannot reach. A policy may command anything; in a script it is a mistake.
 #[derive(Debug, Default)]
 pub(crate) struct TrackingErrorMonitor {
-    /// Last command, robot base frame.
-    pub command_b: Option<Pose>,
+    /// Last command.
+    pub command: Option<ExpertCommand>,
     /// Control steps for which the tool has been away from its commands.
     steps: u32,
 }
@@ -168,17 +166,39 @@ pub(crate) struct TrackingErrorMonitor {
 impl TrackingErrorMonitor {
     /// A complaint for the script once the tool has been away for a second from a pose that it cannot reach.
     fn complaint(&mut self, sim: &Simulation) -> Option<String> {
-        let command_b = self.command_b?;
+        let ExpertCommand { pose_b: command_b, goal_b, .. } = self.command?;
         let error = PoseDifference::between(&sim.robot.tool_b(&sim.world), &command_b);
         self.steps = if TRACKING_LIMIT.contains(&error) { 0 } else { self.steps + 1 };
         if self.steps < MAX_LAG_STEPS {
             return None;
         }
         self.steps = 0;
-        let miss = sim.robot.solve_ik(&sim.world, &command_b).err()?;
-        let is_away = miss.distance > TRACKING_LIMIT.distance || miss.angle > TRACKING_LIMIT.angle;
-        is_away.then(|| unreachable_message(&miss, &sim.robot.base_w))
+        let unreachable = |pose_b: &Pose| {
+            let miss = sim.robot.solve_ik(&sim.world, pose_b).err()?;
+            let is_away = miss.distance > TRACKING_LIMIT.distance || miss.angle > TRACKING_LIMIT.angle;
+            is_away.then_some(miss)
+        };
+        let miss = unreachable(&command_b)?;
+        let base_w = &sim.robot.base_w;
+        // The command is a point on the way to what the script asked for.
+        Some(match goal_b.filter(|goal_b| *goal_b != command_b) {
+            None => unreachable_message(&miss, base_w),
+            Some(goal_b) => match unreachable(&goal_b) {
+                Some(goal_miss) => unreachable_message(&goal_miss, base_w),
+                None => format!(
+                    "the straight line to {} leads through an {}",
+                    position(&goal_b, base_w),
+                    unreachable_message(&miss, base_w)
+                ),
+            },
+        })
     }
+}
+
+/// Position of a pose of the base frame in the world frame, as scripts give it.
+fn position(pose_b: &Pose, base_w: &Pose) -> String {
+    let at = base_w.transform_point(&pose_b.translation.vector.into());
+    format!("({:.3}, {:.3}, {:.3}) m", at.x, at.y, at.z)
 }
 
 /// Positions are in the world frame, as in scripts.

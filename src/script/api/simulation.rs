@@ -50,8 +50,7 @@ choice! { Side { "left" => Left, "right" => Right } }
 pub(crate) fn settings(lua: &Lua, label: &str, table: Option<&Table>) -> mlua::Result<Settings> {
     let Some(table) = table else { return Ok(Settings::default()) };
     let settings: Settings = deserialize(lua, label, &Value::Table(table.clone()))?;
-    settings.validate().map_err(|e| fail(lua, format!("{label}: {e}")))?;
-    Ok(settings)
+    settings.validated().map_err(|e| fail(lua, format!("{label}: {e}")))
 }
 
 /// The settings of a simulation: those of the script, then those of the command line.
@@ -326,8 +325,8 @@ output! {
         joints: "table<string, number>" = lua.create_table_from(
             inner.sim.parts(index).map(|(instance, part)| (part.name.as_str(), inner.sim.joint(instance)))
         )?;
-        /// Normal force of the left and the right pad on a movable object, N.
-        pad_force: "number[]?" = inner.pad_contacts(index).map(|pads| pads.map(|pad| pad.normal_force).to_vec());
+        /// Normal force of the left and the right pad on the object, N.
+        pad_force: "number[]" = inner.sim.pad_normal_forces_on(inner.object(index)).to_vec();
         /// Distance that a movable object has slid on the left and the right pad, mm.
         slip_mm: "number[]?" = inner.pad_contacts(index).map(|pads| pads.map(|pad| 1e3 * pad.travel).to_vec());
         /// Deformation D of a soft body, %.

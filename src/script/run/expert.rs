@@ -1,6 +1,6 @@
 //! Experts as controllers of a rollout.
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 use crate::{
     api::{
@@ -65,6 +65,10 @@ impl Controller for ExpertController {
         self.coroutine.gave_up.as_deref()
     }
 
+    fn notes(&self) -> BTreeMap<String, f64> {
+        self.coroutine.notes()
+    }
+
     fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, PolicyError> {
         let tactile = observation.tactile.as_ref().and_then(|tactile| tactile.frames.last());
         self.coroutine.set_readings(tactile.cloned());
@@ -72,6 +76,10 @@ impl Controller for ExpertController {
         input.view.instances = (self.mode == GripMode::FixedClosure).then_some(self.instances);
         let vm = &self.instance.vm;
         let _deadline = vm.call_deadline();
+        // A pose out of reach fails this episode; in others the objects lie elsewhere.
+        if let Some(complaint) = input.complaint.take() {
+            self.coroutine.abort(&vm.lua, &complaint, |error| vm.explain(error).to_string());
+        }
         let command = self.coroutine.next_command(&vm.lua, input, &mut self.monitor);
         let command = command.map_err(|error| PolicyError::Script(vm.explain(&error).to_string()))?;
         Ok(command.map(|command| {
