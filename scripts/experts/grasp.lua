@@ -13,6 +13,10 @@ local UNDER, FINGER_CLEARANCE = 0.0015, 0.004
 local FINGER_STIFFNESS = 2000
 -- Step of the rotations tried for clearance.
 local STEP = math.rad(7.5)
+-- Distance of each gel from the object at which closing becomes slow, m, and rate until there, 1/s.
+local CONTACT_CLEARANCE, FAST_RATE = 0.002, 0.6
+-- Width by which a command may exceed that of its grip, m.
+local COMMAND_MARGIN = 0.002
 -- Squeeze of a rigid object: the target width is below its width by this much, m.
 local SQUEEZE = 0.012
 
@@ -54,6 +58,14 @@ function grasp.width(object)
   return object.hints.grasp_width_m or math.min(object.size[1], object.size[2])
 end
 
+-- Why the gripper cannot grasp an object, whatever the pose; nil if it can.
+function grasp.problem(object)
+  local width = grasp.width(object)
+  if width >= STROKE then
+    return ("is %.0f mm wide where the fingers grasp it, and the gripper opens %.0f mm"):format(1e3 * width, 1e3 * STROKE)
+  end
+end
+
 -- The safe window of an object: the loosest and the tightest grip as { width, force }, with the measured width of the gels (m)
 -- and the force per pad at rest (N). The window of an asset is scaled to the instance. Its tight end is a strain: the width scales
 -- with the size, the force with area and stiffness. Its loose end carries the weight, by an indentation that grows with weight
@@ -77,23 +89,22 @@ function grasp.window(object)
   }
 end
 
+-- The grip at a share of the safe window: 0 is the loosest, 1 the tightest. Without a window it is the squeeze of a rigid object,
+-- given as a command: its force is 0.
+function grasp.target(object, share)
+  local window = grasp.window(object)
+  if not window then return { width = grasp.width(object) - SQUEEZE, force = 0 } end
+  local function between(key) return window.loose[key] + share * (window.tight[key] - window.loose[key]) end
+  return { width = between "width", force = between "force" }
+end
+
 -- The closure whose command holds a grip: each finger is a spring, which the force on its pad displaces from its target.
 function grasp.command(grip)
   return math.max(0, math.min(1, 1 - (grip.width - 2 * grip.force / FINGER_STIFFNESS) / STROKE))
 end
 
--- The closure for a grasp: the middle of the calibrated window; without a calibration, the squeeze of a rigid object.
-function grasp.closure(object)
-  local known = calibrated[object.asset]
-  if known and known.lower and object.scale == 1 then return known.lower + 0.5 * (known.at_tau - known.lower) end
-  local window = grasp.window(object)
-  if window then return (grasp.command(window.loose) + grasp.command(window.tight)) / 2 end
-  local width = grasp.width(object)
-  if width >= STROKE then
-    error(("pick_place: %s is %.0f mm wide where the fingers grasp it; the gripper opens 80 mm"):format(object.name, 1e3 * width), 0)
-  end
-  return math.min(1, 1 - (width - SQUEEZE) / STROKE)
-end
+-- The command for the middle of the safe window.
+function grasp.closure(object) return grasp.command(grasp.target(object, 0.5)) end
 
 -- The closure at which each gel is `clearance` (m, default 4 mm) away from the object, for approach and release.
 function grasp.clear_closure(object, clearance)
@@ -141,6 +152,21 @@ local function candidates(object, height, offset)
     end
   end
   return list
+end
+
+-- Closes on an object as a person would: fast to a clearance at which nothing is touched, then slowly to the grip. `options`:
+-- closing_speed (m/s, of the width), stop ("width": at the measured width of the grip; "touch": when both pads press with its
+-- force) and closure (a command instead of a grip).
+function grasp.close(arm, object, grip, options)
+  local rate = options.closing_speed / STROKE
+  arm:close_to(math.max(arm.closure, grasp.clear_closure(object, CONTACT_CLEARANCE)), { rate = FAST_RATE })
+  if options.closure then return arm:grasp(options.closure, { rate = rate }) end
+  local most = grasp.command(grip)
+  if grip.force == 0 then return arm:grasp(most, { rate = rate }) end
+  -- The stop follows what is measured. The command is bounded, should the object give way or a pad miss it.
+  most = math.min(1, most + COMMAND_MARGIN / STROKE)
+  if options.stop == "touch" then return arm:grasp(most, { rate = rate, force = grip.force }) end
+  arm:grasp(most, { rate = rate, width = grip.width })
 end
 
 -- Returns the grasp pose, the closure during the approach (as open as possible) and the clearance of the fingers, m. The

@@ -1,11 +1,20 @@
 -- Picks an object up and places it on or in another: approach, grasp, lift, carry, place, release, retreat.
 --
 --   expert = pick_place { object = "left", target = "plate" }
+--
+-- The grip is drawn uniformly from the middle of the safe window (`window`, 0.8 of it), so that demonstrations do not tell one width
+-- per object. The hand closes slowly from before first contact (`closing_speed`, 0.008 m/s). `stop = "touch"` ends closing by
+-- the force on the pads instead of the width of the gels. `closure` commands one closure instead.
 local grasp = require "experts.grasp"
 local route = require "experts.route"
 local fixed_closure = require "experts.fixed_closure"
 
-local FIELDS = { object = "string", target = "string", closure = "number?", speed = "number?" }
+local FIELDS = {
+  object = "string", target = "string", closure = "number?", speed = "number?", window = "number?", stop = "string?",
+  closing_speed = "number?",
+}
+-- Default share of the safe window, and speed of closing in contact, m/s.
+local WINDOW, CLOSING_SPEED = 0.8, 0.008
 -- Clearance above obstacles while carrying, above the target at release, and around the fingers, m.
 local CARRY_CLEARANCE, RELEASE_HEIGHT, FINGER_CLEARANCE = 0.025, 0.001, 0.002
 -- Fraction of a lift that a held object must follow.
@@ -18,7 +27,7 @@ local SPEED_SPREAD, GRASP_SPREAD = 0.12, 0.0015
 local function spread(most) return (2 * math.random() - 1) * most end
 
 -- Grasps the object and lifts it off its support. Returns true and the grasp height (m), or false and the reason.
-local function pick(arm, scene, spec, pace)
+local function pick(arm, scene, spec, pace, share)
   local object = scene:object(spec.object)
   local height = grasp.height(object)
   local at, opening, clearance = grasp.choose(scene, object, height, { spread(GRASP_SPREAD), spread(GRASP_SPREAD) })
@@ -29,8 +38,10 @@ local function pick(arm, scene, spec, pace)
   arm:move_to(at, { speed = 0.25 * pace, closure = opening })
   arm:wait(0.1)
   local before = scene:object(spec.object).centre[3]
-  arm:grasp(spec.closure or grasp.closure(object), { rate = 0.6 })
+  local grip = grasp.target(object, share)
+  grasp.close(arm, object, grip, { closing_speed = spec.closing_speed, stop = spec.stop, closure = spec.closure })
   arm:wait(0.3)
+  arm:note("grip_width_mm", 1e3 * arm.width)
   -- Straight up first.
   arm:move_by({ 0, 0, 0.05 }, { speed = 0.2 * pace })
   if scene:object(spec.object).centre[3] - before > MIN_LIFT_FRACTION * 0.05 then return true, height end
@@ -93,11 +104,31 @@ local function place(arm, scene, spec, height, pace)
   arm:move_by({ 0, 0, math.max(0.08, over - target_pose.z) }, { speed = 0.25 * pace })
 end
 
+-- The specification with its defaults. An error names the field.
+local function complete(spec)
+  local full = {}
+  for key, value in pairs(spec) do full[key] = value end
+  full.window, full.stop = spec.window or WINDOW, spec.stop or "width"
+  full.closing_speed = spec.closing_speed or CLOSING_SPEED
+  local function refuse(key, expected)
+    error(("pick_place: %s: expected %s, got %s"):format(key, expected, tostring(full[key])), 3)
+  end
+  if full.window < 0 or full.window > 1 then refuse("window", "a share in 0..1") end
+  if full.stop ~= "width" and full.stop ~= "touch" then refuse("stop", '"width" or "touch"') end
+  if full.closing_speed <= 0 or full.closing_speed > 0.2 then refuse("closing_speed", "m/s in 0..0.2, above 0") end
+  return full
+end
+
 return function(spec)
   softvt.check_fields("pick_place", spec, FIELDS)
+  spec = complete(spec)
   return function(arm, scene)
     local spec = arm.instances and with_fixed_closure(spec, arm, scene) or spec
     local pace = (spec.speed or 1) * (1 + spread(SPEED_SPREAD))
+    local share = 0.5 + spread(0.5 * spec.window)
+    local problem = grasp.problem(scene:object(spec.object))
+    if problem then arm:give_up(spec.object .. " " .. problem) end
+    if not spec.closure and grasp.window(scene:object(spec.object)) then arm:note("grip_share", share) end
     local first, reason = scene:object(spec.object).centre, nil
     for _ = 1, ATTEMPTS do
       -- An object that has slid or rolled away is not followed.
@@ -106,7 +137,7 @@ return function(spec)
       if moved > MAX_DISPLACEMENT then
         arm:give_up(("%s has moved by %.0f mm; grasping it again is not attempted"):format(spec.object, 1e3 * moved))
       end
-      local held, result = pick(arm, scene, spec, pace)
+      local held, result = pick(arm, scene, spec, pace, share)
       if held then return place(arm, scene, spec, result, pace) end
       reason = result
       -- Release, retreat and try again.

@@ -1,6 +1,6 @@
 //! Experts that give up leave their reason in the record and in the results.
 
-use crate::support::Small;
+use crate::support::{Project, Small};
 
 #[test]
 fn the_reason_of_give_up_is_recorded() {
@@ -28,4 +28,26 @@ fn without_give_up_there_is_no_reason() {
     assert!(!output.out.contains("gave up") && !output.err.contains("gave up"), "{}", output.out);
     assert!(project.lines("run/episodes.jsonl")[0].get("gave_up").is_none());
     assert!(project.json("run/summary.json").get("gave_up").is_none());
+}
+
+#[test]
+fn an_object_too_wide_for_the_hand_is_given_up_before_the_approach() {
+    let wide =
+        Small { shape: "softvt.shape.box { size = { 0.12, 0.1, 0.04 } }:grounded()", ..Small::default() };
+    let expert = "expert = require('experts.pick_place') { object = 'cube', target = 'post' } }";
+    let text = wide.text().replace("expert = function(arm, scene) arm:wait(1) end }", expert);
+    let project = Project::new(&[("x.lua", &text)]);
+    project.succeeds("x.lua --out run");
+    let record = &project.lines("run/episodes.jsonl")[0];
+    let reason = "cube is 100 mm wide where the fingers grasp it, and the gripper opens 80 mm";
+    assert_eq!((&record["gave_up"], &record["outcome"]["kind"]), (&reason.into(), &"timeout".into()));
+    assert!(record["d_peak"].as_f64().is_some_and(|d| d < 0.1), "the hand never touched it: {record}");
+}
+
+#[test]
+fn notes_of_an_expert_are_in_its_record() {
+    let project = Small { expert: "arm:note('grip_width_mm', 31.5)", ..Small::default() }.project();
+    project.succeeds("x.lua --out run");
+    assert_eq!(project.lines("run/episodes.jsonl")[0]["notes"]["grip_width_mm"], 31.5);
+    assert!(project.succeeds("replay run 0/0").out.contains("byte-identical"));
 }
