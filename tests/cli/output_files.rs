@@ -26,7 +26,10 @@ fn lists_are_printed_as_text_and_as_json() {
     assert!(of_suite[1]["prompt"].as_str().is_some_and(|p| p.starts_with("pick up the left white spiral")));
     assert!(json("assets").iter().filter(|a| a["name"] == "plate" || a["name"] == "sesame_bun").count() == 2);
     let names = |what: &str| json(what).iter().map(|row| row["name"].clone()).collect::<Vec<_>>();
-    assert_eq!(names("policies")[..6], ["expert", "expert-binary", "fixed-closure", "tactile-servo", "noop", "random"]);
+    assert_eq!(
+        names("policies")[..6],
+        ["expert", "expert-binary", "fixed-closure", "tactile-servo", "noop", "random"]
+    );
     assert!(names("policies").contains(&"scripts/policies/hold.lua".into()));
     assert_eq!(names("profiles")[..4], ["vision", "visuo_tactile", "softvtbench", "libero"]);
     assert!(names("profiles").contains(&"scripts/profiles/libero.lua".into()));
