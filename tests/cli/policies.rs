@@ -91,6 +91,17 @@ fn nan_actions_fail_only_their_episode() {
     assert!(lines[1]["privileged"].is_null(), "it sees observations alone");
     assert_eq!(project.json("run/summary.json")["privileged"], false);
     assert!(project.json("run/softvtbench/summary.json")["privileged"].is_null());
+    let only = project.softvt("x.lua --policy p.lua --episodes 1 --threads 1 --out only");
+    assert_eq!(only.code, 3, "{}", only.err);
+    assert!(
+        only.err.contains("no episode is valid: the policy's actions were refused in 1 episode, first: "),
+        "{}",
+        only.err
+    );
+    assert!(only.out.contains("task 0 episode 0: invalid: the action"), "{}", only.out);
+    project.succeeds("report only --out page");
+    let page = project.text("page/report.html");
+    assert!(page.contains("not finite") && !page.contains("dropped at"), "nothing was dropped");
 }
 
 #[test]

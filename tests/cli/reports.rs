@@ -228,3 +228,34 @@ fn merged_shards_are_byte_identical_to_one_run() {
         assert_eq!((&summary["episodes"], &summary["privileged"]), (&3.into(), &true.into()));
     }
 }
+
+#[test]
+fn damaged_actions_are_found_by_merge_and_restored_by_resume() {
+    let project = Small { task: "budget_steps = 8", expert: "arm:close_to(1)", ..Small::default() }.project();
+    let line = |shard: u32| format!("x.lua --episodes 2 --out part_{shard} --shard {shard}/2");
+    (1..=2).for_each(|shard| drop(project.succeeds(&line(shard))));
+    let path = "part_1/actions/task_000/episode_00000.npy";
+    let whole = fs::read(project.path(path)).expect("written");
+    let mut changed = whole.clone();
+    let last = changed.len() - 1;
+    changed[last] ^= 1;
+    for (bytes, problem) in
+        [(&changed[..], "its SHA-256 differs"), (&whole[..whole.len() - 56], "do not fill the shape")]
+    {
+        project.write(path, bytes);
+        let refused = project.refusal("merge all part_1 part_2");
+        assert!(refused.starts_with(path) && refused.contains(problem), "{refused}");
+        let resumed = project.succeeds(&format!("{} --resume", line(1)));
+        assert!(resumed.err.contains(path) && resumed.err.contains(problem), "{}", resumed.err);
+        assert!(fs::read(project.path(path)).expect("restored") == whole);
+    }
+    fs::remove_file(project.path(path)).expect("removed");
+    assert!(project.refusal("merge all part_1 part_2").contains(path));
+    let lines = project.text("part_2/episodes.jsonl");
+    project.write("part_2/episodes.jsonl", lines.repeat(2).as_bytes());
+    assert!(
+        project
+            .refusal("report part_2 --out page")
+            .starts_with("part_2/episodes.jsonl:2: task 0 episode 1 occurs twice")
+    );
+}

@@ -33,7 +33,7 @@ pub struct Scores {
     /// TSR, the task success rate: Goal Success.
     #[serde(default)]
     pub tsr: Rate,
-    /// DSR, the deformation-safe success rate: Goal Success with D_peak ≤ τ, whether dropped or not. Null where no target
+    /// DSR of SoftVTBench's later release: Goal Success with D_peak ≤ τ, whether dropped or not. Null where no target
     /// deforms, its rate where none was judged.
     #[serde(default)]
     pub dsr: Option<Rate>,
