@@ -102,10 +102,11 @@ mod tests {
     }
 
     #[test]
-    fn a_body_that_only_turns_keeps_its_energy() {
+    fn a_body_that_only_turns_keeps_its_energy_and_angular_momentum() {
         for throw in throws().into_iter().filter(|t| t.stretch == 0.0) {
             let flight = flight(&throw);
-            assert!((flight.kept - 1.0).abs() < 1e-6, "{throw:?}: {flight:?}");
+            let kept = (flight.kept - 1.0).abs() < 1e-6 && flight.spin_change < 1e-9;
+            assert!(kept, "{throw:?}: {flight:?}");
         }
     }
 }
