@@ -169,6 +169,7 @@
 ---@field reset? fun(task: softvt.TaskBrief) Called when the episode begins.
 ---@field act fun(obs: softvt.Observation): softvt.Action|softvt.Action[] Returns the action of this control step, or a list of actions for the next ones.
 ---@field replan? integer Number of actions of a list that are executed before act is called again, unless --replan gives another; all by default. Expects a whole number in 1..10000.
+---@field privileged? boolean True to let the policy use limits and materials of objects: softvt.calibration, assets, and the modules calibrated and experts. Its results say that it is privileged. Default false.
 
 ---The observations of a policy; nothing else is computed.
 ---@class softvt.Observes
@@ -505,6 +506,12 @@
 ---@class softvt.RateOptions
 ---@field rate? number Rate of the gripper; 1 is the whole stroke in a second. Expects a number (1/s) above 0. Default 0.5.
 
+---Options of closing on an object.
+---@class softvt.GraspOptions
+---@field rate? number Rate of the gripper; 1 is the whole stroke in a second. Expects a number (1/s) above 0. Default 0.5.
+---@field width? number Measured distance of the gels at which closing stops. A tactile servo ignores it. Expects metres in 0..0.08.
+---@field force? number Normal force on each pad at which closing stops. A tactile servo ignores it. Expects a number (N) above 0.
+
 ---Options of releasing an object.
 ---@class softvt.ReleaseOptions
 ---@field rate? number Rate of the gripper; 1 is the whole stroke in a second. Expects a number (1/s) above 0. Default 0.5.
@@ -785,7 +792,7 @@ function Simulation:tool() end
 ---@field fingerprint string Fingerprint of its asset.
 ---@field joint number? Joint value of a part, m or rad.
 ---@field joints table<string, number> Joint values of an articulated object by part, m or rad.
----@field pad_force number[]? Normal force of the left and the right pad on a movable object, N.
+---@field pad_force number[] Normal force of the left and the right pad on the object, N.
 ---@field slip_mm number[]? Distance that a movable object has slid on the left and the right pad, mm.
 ---@field d_pct number? Deformation D of a soft body, %.
 ---@field d_peak_pct number? Largest D since settling, %.
@@ -1087,7 +1094,7 @@ local InstanceRanges = {}
 ---@field closure number Last commanded closure: 0 is open, 1 is closed.
 ---@field gripping boolean True from a call of grasp to the next call of release or open.
 ---@field width number Measured distance of the gels, m.
----@field force number[] Normal force on the left and the right pad, N.
+---@field force number[] Normal force on the left and the right pad, N, from objects and parts of every kind.
 ---@field instances softvt.InstanceRanges? Under --policy fixed-closure: the ranges within which the instances of an asset differ. The expert then closes to one closure for all of them (experts.fixed_closure). nil under other policies.
 ---@field time number Time since the start, s.
 ---@field dt number Length of a control step, s.
@@ -1113,9 +1120,9 @@ function Arm:move_by(offset, options) end
 ---@param options? softvt.RateOptions
 function Arm:close_to(closure, options) end
 
----Closes on an object. A binary gripper, which is either open or closed, closes here and not in close_to. A tactile servo closes until both fingers show a firm grasp, whatever closure is given.
+---Closes on an object, to a closure or until the width or the force of the options is reached. A binary gripper, which is either open or closed, closes here and not in close_to. A tactile servo closes until both fingers show a firm grasp, whatever closure is given.
 ---@param closure number
----@param options? softvt.RateOptions
+---@param options? softvt.GraspOptions
 function Arm:grasp(closure, options) end
 
 ---Releases an object by opening, by default wide.
@@ -1133,6 +1140,11 @@ function Arm:tactile() end
 ---Holds the last command for a time.
 ---@param seconds number
 function Arm:wait(seconds) end
+
+---Notes a number, such as the width of a grip, in the episode's record and in the manifest of a dataset.
+---@param name string
+---@param value number
+function Arm:note(name, value) end
 
 ---Ends the expert. The last command stays, and the episode's record and the results contain the reason.
 ---@param reason string
