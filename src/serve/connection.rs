@@ -131,9 +131,16 @@ impl<'a> Connection<'a> {
     pub(super) fn close(mut self) {
         let cancelled = || self.cancel.load(Ordering::Relaxed);
         let code = if cancelled() { CloseCode::Away } else { CloseCode::Normal };
-        let _ = self.socket.close(Some(CloseFrame { code, reason: "".into() }));
+        let deadline = Instant::now() + CLOSE_DRAIN_TIMEOUT;
+        let mut sent = self.socket.close(Some(CloseFrame { code, reason: "".into() }));
+        // The stream interrupts a write once per poll interval.
+        while matches!(&sent, Err(tungstenite::Error::Io(error)) if is_wait(error))
+            && Instant::now() < deadline
+        {
+            sent = self.socket.flush();
+        }
         // The system would discard the last message if data remained unread.
-        let (deadline, stream) = (Instant::now() + CLOSE_DRAIN_TIMEOUT, self.socket.get_mut());
+        let stream = self.socket.get_mut();
         let mut discarded = vec![0; 1 << 16];
         while Instant::now() < deadline && !cancelled() {
             match stream.read(&mut discarded) {

@@ -72,7 +72,10 @@ fn rigid_suites_refuse_soft_targets() {
     let expected = "x.lua:6: the target of task 0, cube, is soft, but suite one has object_type = \"rigid\"; set \"deformable\"";
     assert_eq!(project.refusal("check x.lua"), expected);
     assert_eq!(project.refusal("x.lua"), expected);
-    project.succeeds("check x.lua --twin rigid");
+    assert_eq!(
+        project.refusal("check x.lua --twin rigid"),
+        "x.lua: --twin: the objects of this suite are rigid already; leave it out"
+    );
 }
 
 #[test]

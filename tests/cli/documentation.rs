@@ -65,11 +65,11 @@ fn runs(project: &Project, words: &str) -> CliOutput {
     output
 }
 
-/// Safety Success of a run that printed JSON, %.
-fn safety(output: &str) -> f64 {
+/// Safety Success of a run that printed JSON, %; `None` if no episode could be judged.
+fn safety(output: &str) -> Option<f64> {
     let summary: serde_json::Value = serde_json::from_str(output).expect("JSON");
     assert_eq!(summary["goal_success_rate"]["rate"], 100.0, "the goal is reached");
-    summary["safety_success_rate"]["rate"].as_f64().expect("a rate")
+    summary["safety_success_rate"]["rate"].as_f64()
 }
 
 #[test]
@@ -94,7 +94,11 @@ fn the_tutorial_leads_to_a_safe_suite() {
         }
     }
     assert!(files >= 5 && commands >= 6, "{files} files, {commands} commands");
-    assert_eq!(rates, [0.0, 100.0], "nothing is safe before the calibration, everything after it");
+    assert_eq!(
+        rates,
+        [None, Some(100.0)],
+        "nothing is judged before the calibration, everything is safe after it"
+    );
     assert!(
         project.path("assets/calibration/brick.json").exists() && project.path("seen/episode.mp4").exists()
     );
@@ -109,7 +113,7 @@ fn the_readmes_suite_and_object_work() {
     files.iter().for_each(|f| project.write(f.file().unwrap_or_default(), f.text.as_bytes()));
     project.succeeds("check my_suite.lua");
     let output = project.succeeds("my_suite.lua --episodes 1 --json --out run");
-    assert_eq!(safety(&output.out), 0.0);
+    assert_eq!(safety(&output.out), None);
     assert!(output.err.contains("jelly is not calibrated"), "{}", output.err);
     // The page shows this message.
     let text = files[0].text.replace("hold_s", "holds");

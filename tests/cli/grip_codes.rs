@@ -39,7 +39,8 @@ fn the_pads_press_with_the_commanded_force() {
         }
     }
     let most = (60..160).map(|step| 0.5 * force(step).iter().sum::<f64>()).fold(0.0, f64::max);
-    assert!(most < 3.3, "no overshoot on the way: {most} N");
+    // The bound of the gripper's own tests: a tenth of the force, and 0.1 N.
+    assert!(most < 1.1 * 3.0 + 0.1, "overshoot: {most} N");
     assert_eq!(force(228), [0.0; 2], "opened");
     assert!(project.succeeds("replay run 0/0").out.contains("byte-identical"));
 }

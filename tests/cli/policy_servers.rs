@@ -231,9 +231,8 @@ fn the_grip_code_of_a_run_is_stated_and_compared_with_that_of_the_server() {
     let message = project.refusal("x.lua --out other --policy noop --gripper force");
     assert!(message.contains("--gripper: applies to policy servers only"), "{message}");
     let address = stating("force");
-    project.succeeds(&format!(
-        "x.lua --policy {address} --profile vision --gripper force --set robot.gripper.effort=2 --out strong"
-    ));
+    let words = "--profile vision --gripper force --set robot.gripper.effort=2 --out strong";
+    assert_eq!(project.softvt(&format!("x.lua --policy {address} {words}")).code, 3, "no episode is valid");
     let outcome = project.lines("strong/episodes.jsonl")[0]["outcome"]["message"].clone();
     assert!(outcome.as_str().is_some_and(|text| text.contains("2.5 N; expected 0 to 2 N")), "{outcome}");
 }
@@ -401,9 +400,16 @@ fn a_dying_server_loses_no_finished_episode() {
     assert!(output.err.contains("1 of 3 episodes are in run"), "{}", output.err);
     let output = run(&broken, &address, "--episodes 3 --resume");
     assert_eq!(output.code, 0, "{}", output.err);
-    for file in ["run.json", "episodes.jsonl", "summary.json", "softvtbench/episodes.csv"] {
+    for file in ["episodes.jsonl", "summary.json", "softvtbench/episodes.csv"] {
         assert_eq!(broken.text(&format!("run/{file}")), whole.text(&format!("run/{file}")), "{file}");
     }
+    // The two commands ran in different folders.
+    let manifest = |project: &Project| {
+        let mut manifest = project.json("run/run.json");
+        manifest["folder"].take();
+        manifest
+    };
+    assert_eq!(manifest(&broken), manifest(&whole));
     let again = run(&broken, &address, "--episodes 3");
     assert!(again.code == 0 && again.err.contains("already complete"), "{}", again.err);
     // Files of finished episodes are restored from the actions, without the policy; without actions they are reported as lost.

@@ -14,14 +14,12 @@ pub fn stiff() -> Outcome {
 
 #[cfg(test)]
 mod tests {
-    use softvt::physics::world::StepFailure;
-
     use super::*;
 
     #[test]
-    fn a_squeeze_of_78_per_cent_stays_finite_and_ends_as_inverted() {
+    fn a_squeeze_of_78_per_cent_is_computed_to_its_end() {
         let ours = crushed();
-        assert!(matches!(ours.failure, Some(StepFailure::Inverted { .. })), "{:?}", ours.failure);
+        assert!(ours.failure.is_none(), "{:?}", ours.failure);
         assert!(ours.d_peak_pct.is_finite() && ours.d_peak_pct > 5.0 && ours.d_peak_pct < 40.0, "{ours:?}");
     }
 

@@ -134,8 +134,10 @@ pub(crate) struct GivenFlag {
 pub(crate) fn check(command: &str, config: &RunConfig, plan: &Plan) -> Result<(), CliError> {
     let kind = PlanKind::of(plan);
     // A command that accepts no plan of this kind says so itself.
-    let given = if accepts(command, kind) { &config.script.given[..] } else { &[] };
-    for flag in given {
+    if !accepts(command, kind) {
+        return Ok(());
+    }
+    for flag in &config.script.given {
         let acts_on = acts_on(command, &flag.id).unwrap_or_default();
         if !acts_on.contains(&kind) {
             let kinds: Vec<&str> = acts_on.iter().map(|kind| kind.plural()).collect();

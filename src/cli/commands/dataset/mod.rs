@@ -21,6 +21,7 @@ use softvt_dataset::{
     DatasetError,
     card::Card,
     check,
+    layout::DATASET,
     lerobot::{self, ExportConfig, LeRobotVersion},
     stats,
 };
@@ -146,6 +147,8 @@ fn run_export(args: ExportArgs) -> Result<(), CliError> {
     check_complete(&args.path)?;
     let gripper = match args.gripper {
         Some(code) => code,
+        // A folder without a card is refused by the export.
+        None if !args.path.join(DATASET).is_file() => GripCode::default(),
         None => Card::read(&args.path).map_err(CliError::input)?.gripper.unwrap_or_default(),
     };
     let config = ExportConfig {
