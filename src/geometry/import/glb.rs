@@ -162,7 +162,7 @@ impl Attributes {
             check(TEXCOORD, uvs, is_texture_coordinate, "VEC2 of floats or unsigned integers")?;
         }
         let corners = indices.as_ref().unwrap_or(&positions).count();
-        if corners % 3 != 0 {
+        if !corners.is_multiple_of(3) {
             let attribute = if indices.is_some() { INDICES } else { POSITION };
             let found = format!("has {corners} elements");
             return Err(accessor_error(mesh, attribute, &found, "three per triangle"));
