@@ -311,7 +311,7 @@ local suite = softvt.suite { name = "one", object_type = "deformable", variation
                         }
                         (_, false) => {
                             message.contains(&format!("softvt {command} needs a "))
-                                || message.contains(&format!("{long}: applies to policy servers"))
+                                || message.contains(&format!("{long}: applies to "))
                         }
                     };
                     assert!(is_clear, "{command} {sample}: {message}");
