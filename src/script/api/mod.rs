@@ -175,7 +175,7 @@ pub(crate) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
     for record in constructors() {
         let constructor = lua.create_function(move |lua, value: Value| {
             // A policy that ran the files of assets would learn their materials.
-            if std::ptr::eq(record, SoftMaterial::RECORD) {
+            if record.constructor() == SoftMaterial::RECORD.constructor() {
                 check_privilege(lua, "softvt.soft")?;
             }
             make(lua, record, &value)

@@ -112,6 +112,7 @@ fn wrong_calls_get_messages_in_terms_of_the_lua_interface() {
             "softvt.Measurements",
             "softvt.TactileReading",
             "softvt.Envelope",
+            "softvt.InstanceRanges",
             "softvt.List",
             "softvt.TaskBrief",
             "softvt.Observation",
