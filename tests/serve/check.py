@@ -73,7 +73,7 @@ def an_experts_actions_reach_the_goal_with_the_record_of_its_run(env):
         rewards.append(reward)
     assert rewards == [0.0] * (len(actions) - 1) + [1.0], "the reward comes with the goal"
     assert terminated and not truncated and info["success"]
-    for key in ("policy", "camera_inside", "gave_up", "privileged"):
+    for key in ("policy", "camera_inside", "gave_up", "notes", "privileged"):
         expected.pop(key, None)
         info["record"].pop(key, None)
     assert info["record"] == expected, (info["record"], expected)
