@@ -59,14 +59,14 @@ fn multiply(k: &[f64; 576], u: &[f64; 24]) -> [f64; 24] {
     p
 }
 
-/// Smallest det F over the 2×2×2 Gauss points of a voxel of edge `h` (m); ≤ 0 means inverted.
+/// Slopes of an element's positions along each axis: each at the four Gauss positions on the other two axes, the lower
+/// axis first.
 ///
 /// A column of F is the slope along one axis: the mean of the four edges in that direction, weighted by the position
 /// of the point across them. So it has only four values per element.
-pub fn min_det(x: &Corners, h: f64) -> f64 {
+fn gauss_slopes(x: &Corners, h: f64) -> [[Vec3; 4]; 3] {
     let near = 0.5 + 0.5 / 3f64.sqrt();
-    // Columns along axis 0, 1, 2, each at the four Gauss positions on the other two axes (the lower axis first).
-    let slopes: [[Vec3; 4]; 3] = std::array::from_fn(|axis| {
+    std::array::from_fn(|axis| {
         let (i, j) = (1 << ((axis == 0) as usize), 4 >> ((axis == 2) as usize));
         let edge = |corner: usize| (x[corner + (1 << axis)] - x[corner]) / h;
         let along = |a: Vec3, b: Vec3| [a * near + b * (1.0 - near), a * (1.0 - near) + b * near];
@@ -74,7 +74,21 @@ pub fn min_det(x: &Corners, h: f64) -> f64 {
         let high = along(edge(j), edge(i + j));
         let (first, second) = (along(low[0], high[0]), along(low[1], high[1]));
         [first[0], second[0], first[1], second[1]]
-    });
+    })
+}
+
+/// Deformation gradients at the 2×2×2 Gauss points of a voxel of edge `h` (m).
+pub fn gauss_gradients(x: &Corners, h: f64) -> [Mat3; 8] {
+    let slopes = gauss_slopes(x, h);
+    std::array::from_fn(|g| {
+        let (x, y, z) = (g & 1, g >> 1 & 1, g >> 2);
+        Mat3::from_columns(&[slopes[0][y + 2 * z], slopes[1][x + 2 * z], slopes[2][x + 2 * y]])
+    })
+}
+
+/// Smallest det F over the 2×2×2 Gauss points of a voxel of edge `h` (m); ≤ 0 means inverted.
+pub fn min_det(x: &Corners, h: f64) -> f64 {
+    let slopes = gauss_slopes(x, h);
     let det = |g: usize| {
         let (x, y, z) = (g & 1, g >> 1 & 1, g >> 2);
         slopes[0][y + 2 * z].dot(&slopes[1][x + 2 * z].cross(&slopes[2][x + 2 * y]))
@@ -161,6 +175,9 @@ mod tests {
             let det = |xi: &Vec3| deformation_gradient(&x, &hex8::gradients(xi, H)).determinant();
             let plain = gauss_points().iter().map(det).fold(f64::INFINITY, f64::min);
             prop_assert!((min_det(&x, H) - plain).abs() < 1e-12);
+            for (xi, f) in gauss_points().iter().zip(gauss_gradients(&x, H)) {
+                prop_assert!((f - deformation_gradient(&x, &hex8::gradients(xi, H))).norm() < 1e-12);
+            }
         }
 
         #[test]

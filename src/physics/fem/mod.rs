@@ -12,6 +12,8 @@ pub mod element;
 pub mod force;
 pub mod rigid_motion;
 pub mod rotation;
+pub mod strain;
 pub mod system;
 
 pub use body::{ElasticMaterial, FemModel, FemState, MinDetF};
+pub use strain::{CrushedShares, StrainLimits, StrainMeter};

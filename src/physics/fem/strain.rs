@@ -1,0 +1,291 @@
+//! Compressive strain of a soft body at its Gauss points, and the share of its volume beyond a strain.
+//!
+//! The strain is `ε = 1 − σ_min(F)`: the engineering (Biot) strain of the most shortened direction, invariant to
+//! rotations. `σ_min` has the sign of `det F`, so that an inverted point has a strain above 1. A point counts with an
+//! eighth of its voxel's filled volume. Voxels filled by less than a tenth are not counted.
+
+use super::{
+    body::{FemModel, FemState},
+    force::{Corners, gauss_gradients},
+};
+use softvt_geometry::Mat3;
+
+/// Fill fraction below which a voxel is not counted.
+const MIN_COUNTED_FILL: f64 = 0.1;
+/// Gauss points of an element.
+const POINTS: usize = 8;
+
+/// Compressive strain `1 − σ_min(F)` of a deformation gradient.
+pub fn compressive_strain(f: &Mat3) -> f64 {
+    // A matrix that is not finite has no singular values.
+    let smallest = f.try_svd(false, false, f64::EPSILON, 0).map_or(f64::NAN, |svd| svd.singular_values.min());
+    1.0 - smallest * if f.determinant() < 0.0 { -1.0 } else { 1.0 }
+}
+
+/// Cauchy–Green tensor of a deformation gradient, and whether the gradient is inverted.
+struct Stretch {
+    xx: f64,
+    yy: f64,
+    zz: f64,
+    xy: f64,
+    xz: f64,
+    yz: f64,
+    is_inverted: bool,
+}
+
+impl Stretch {
+    fn new(f: &Mat3) -> Self {
+        let (x, y, z) = (f.column(0), f.column(1), f.column(2));
+        Self {
+            xx: x.dot(&x),
+            yy: y.dot(&y),
+            zz: z.dot(&z),
+            xy: x.dot(&y),
+            xz: x.dot(&z),
+            yz: y.dot(&z),
+            is_inverted: f.determinant() < 0.0,
+        }
+    }
+
+    /// True if the compressive strain is above `strain`: `FᵀF − (1 − strain)² I` is not positive semidefinite, or
+    /// det F is negative. Exact up to rounding, by the pivots of the LDLᵀ factorisation.
+    fn is_beyond(&self, strain: f64) -> bool {
+        let shift = (1.0 - strain) * (1.0 - strain);
+        let first = self.xx - shift;
+        // Each pivot is tested in the negated form, so that a value that is not a number counts as beyond.
+        if self.is_inverted || !(first > 0.0) {
+            return true;
+        }
+        let (l_y, l_z) = (self.xy / first, self.xz / first);
+        let second = self.yy - shift - l_y * self.xy;
+        if !(second > 0.0) {
+            return true;
+        }
+        let rest = self.yz - l_z * self.xy;
+        !(self.zz - shift - l_z * self.xz - rest * rest / second >= 0.0)
+    }
+}
+
+/// Two limits on the compressive strain of a material, each in (0, 1]; `None` if the material does not state it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StrainLimits {
+    /// Strain at which cell walls buckle; reversible in an elastomer.
+    pub collapse: Option<f64>,
+    /// Strain that leaves damage after release.
+    pub damage: Option<f64>,
+}
+
+/// Shares of the volume (0..=1) beyond each of the [`StrainLimits`]; `None` where there is no limit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CrushedShares {
+    /// Share that is beyond the collapse strain now.
+    pub collapsed: Option<f64>,
+    /// Share that has ever been beyond the damage strain.
+    pub damaged: Option<f64>,
+}
+
+/// Measures the strains of a body, and accumulates its damage.
+#[derive(Clone, Debug)]
+pub struct StrainMeter {
+    /// Share of the counted volume of one Gauss point of each element; 0 for elements that are not counted.
+    share: Vec<f64>,
+    limits: StrainLimits,
+    /// One bit per Gauss point that has been beyond the damage strain.
+    damaged: Vec<u8>,
+}
+
+impl StrainMeter {
+    /// A meter of an undamaged body of `model`.
+    pub fn new(model: &FemModel, limits: StrainLimits) -> Self {
+        let fills = model.mesh.occupancy.iter().map(|fill| fill.fraction());
+        let counted = fills.map(|fill| if fill >= MIN_COUNTED_FILL { fill } else { 0.0 });
+        let counted: Vec<f64> = counted.collect();
+        let total = POINTS as f64 * counted.iter().sum::<f64>();
+        let share = counted.iter().map(|fill| fill / total.max(f64::MIN_POSITIVE)).collect();
+        Self { share, limits, damaged: vec![0; counted.len()] }
+    }
+
+    /// Takes in the present state: shares of the volume beyond each limit. Does not allocate.
+    pub fn update(&mut self, state: &FemState) -> CrushedShares {
+        let StrainLimits { collapse, damage } = self.limits;
+        if collapse.is_none() && damage.is_none() {
+            return CrushedShares::default();
+        }
+        let (mut collapsed, mut damaged) = (0.0, 0.0);
+        for (element, share) in self.share.iter().enumerate().filter(|(_, share)| **share > 0.0) {
+            let before = self.damaged[element];
+            let mut now = Marks { collapsed: 0, damaged: before };
+            for (point, f) in gradients_of(state, element).iter().enumerate() {
+                let stretch = Stretch::new(f);
+                now.collapsed |= u8::from(collapse.is_some_and(|limit| stretch.is_beyond(limit))) << point;
+                now.damaged |= u8::from(damage.is_some_and(|limit| stretch.is_beyond(limit))) << point;
+            }
+            self.damaged[element] = now.damaged;
+            collapsed += share * f64::from(now.collapsed.count_ones());
+            damaged += share * f64::from(now.damaged.count_ones());
+        }
+        CrushedShares { collapsed: collapse.map(|_| collapsed), damaged: damage.map(|_| damaged) }
+    }
+
+    /// Share of the volume (0..=1) that is beyond `strain` now.
+    pub fn share_beyond(&self, state: &FemState, strain: f64) -> f64 {
+        let counted = self.share.iter().enumerate().filter(|(_, share)| **share > 0.0);
+        let beyond = counted.map(|(element, share)| {
+            let points = gradients_of(state, element).iter().filter(|f| Stretch::new(f).is_beyond(strain)).count();
+            share * points as f64
+        });
+        beyond.sum()
+    }
+
+    /// Strain that all but `tail` (0..1) of the volume stays below: `tail` 0.05 is the 95th percentile. NaN if a strain
+    /// is not finite or no voxel is counted.
+    pub fn percentile(&self, state: &FemState, tail: f64) -> f64 {
+        let counted = self.share.iter().enumerate().filter(|(_, share)| **share > 0.0);
+        let mut points: Vec<WeightedStrain> = counted
+            .flat_map(|(element, share)| {
+                let weighted = |f: &Mat3| WeightedStrain { strain: compressive_strain(f), share: *share };
+                gradients_of(state, element).map(|f| weighted(&f))
+            })
+            .collect();
+        if points.iter().any(|point| !point.strain.is_finite()) {
+            return f64::NAN;
+        }
+        points.sort_by(|a, b| b.strain.total_cmp(&a.strain));
+        let mut above = 0.0;
+        let reached = points.iter().find(|point| {
+            above += point.share;
+            above > tail
+        });
+        reached.map_or(f64::NAN, |point| point.strain)
+    }
+}
+
+/// Bits of the Gauss points of an element beyond each limit.
+struct Marks {
+    collapsed: u8,
+    damaged: u8,
+}
+
+/// Strain of a point with its share of the volume.
+struct WeightedStrain {
+    strain: f64,
+    share: f64,
+}
+
+/// Deformation gradients at the Gauss points of an element.
+fn gradients_of(state: &FemState, element: usize) -> [Mat3; POINTS] {
+    let mesh = &state.model.mesh;
+    let nodes = &mesh.elements[element];
+    let x: Corners = std::array::from_fn(|c| state.x[nodes[c] as usize]);
+    gauss_gradients(&x, mesh.edge)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::fem::ElasticMaterial;
+    use softvt_geometry::{Pose, Quat, Vec3, samples::SampleSpec, shape::Shape};
+
+    const MATERIAL: ElasticMaterial = ElasticMaterial { youngs_pa: 3e4, poisson: 0.3, density: 200.0 };
+
+    fn state_of(shape: &Shape) -> FemState {
+        let model = FemModel::from_shape(shape, 1e-4, MATERIAL, 6, &SampleSpec::default()).unwrap();
+        FemState::new(model, &Pose::identity())
+    }
+
+    fn cube() -> FemState {
+        state_of(&Shape::Box { half: Vec3::repeat(0.025) })
+    }
+
+    fn deformed(mut state: FemState, f: &Mat3) -> FemState {
+        state.x.iter_mut().for_each(|x| *x = f * *x);
+        state
+    }
+
+    #[test]
+    fn a_homogeneous_compression_has_its_strain_everywhere_in_any_rotation() {
+        let stretch = Mat3::from_diagonal(&Vec3::new(1.07, 0.8, 1.05));
+        for turn in [Vec3::zeros(), Vec3::new(0.3, -1.0, 2.0), Vec3::new(3.1, 0.0, 0.0)] {
+            let rotation = *Quat::from_scaled_axis(turn).to_rotation_matrix().matrix();
+            let state = deformed(cube(), &(rotation * stretch));
+            let meter = StrainMeter::new(&state.model, StrainLimits::default());
+            assert!((meter.percentile(&state, 0.05) - 0.2).abs() < 1e-12);
+            assert_eq!(meter.share_beyond(&state, 0.2 + 1e-9), 0.0);
+            assert!((meter.share_beyond(&state, 0.2 - 1e-9) - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_linear_gradient_of_strain_gives_its_quantiles() {
+        // u = −a y²/2 along y: the strain a·y at height y, bilinear within a voxel up to second order.
+        let mut state = cube();
+        let slope = 0.2 / 0.025;
+        for x in &mut state.x {
+            let y = x.y + 0.025;
+            x.y -= 0.25 * slope * y * y;
+        }
+        let meter = StrainMeter::new(&state.model, StrainLimits::default());
+        // Voxels have one strain each along y: (2k + 1)/12 of the largest, 0.2.
+        let expected = 0.2 * 11.0 / 12.0;
+        assert!((meter.percentile(&state, 0.05) - expected).abs() < 1e-9, "{}", meter.percentile(&state, 0.05));
+        assert!((meter.share_beyond(&state, 0.1) - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn damage_stays_when_the_body_recovers_and_collapse_does_not() {
+        let rest = cube();
+        let pressed = deformed(rest.clone(), &Mat3::from_diagonal(&Vec3::new(1.0, 1.0, 0.7)));
+        let limits = StrainLimits { collapse: Some(0.1), damage: Some(0.25) };
+        let mut meter = StrainMeter::new(&rest.model, limits);
+        let at_rest = meter.update(&rest);
+        assert_eq!((at_rest.collapsed, at_rest.damaged), (Some(0.0), Some(0.0)));
+        let shares = meter.update(&pressed);
+        assert!((shares.collapsed.unwrap() - 1.0).abs() < 1e-12 && (shares.damaged.unwrap() - 1.0).abs() < 1e-12);
+        let released = meter.update(&rest);
+        assert_eq!(released.collapsed, Some(0.0));
+        assert!((released.damaged.unwrap() - 1.0).abs() < 1e-12);
+        let mut none = StrainMeter::new(&rest.model, StrainLimits::default());
+        assert_eq!(none.update(&pressed), CrushedShares::default());
+    }
+
+    #[test]
+    fn an_inverted_body_is_beyond_every_strain() {
+        let state = deformed(cube(), &Mat3::from_diagonal(&Vec3::new(1.0, 1.0, -1.2)));
+        let meter = StrainMeter::new(&state.model, StrainLimits::default());
+        assert!((meter.share_beyond(&state, 1.0) - 1.0).abs() < 1e-12);
+        // The smallest singular value is that of the axes that are not stretched, with the sign of det F.
+        assert!((meter.percentile(&state, 0.05) - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn voxels_that_are_nearly_empty_are_not_counted_and_the_shares_sum_to_one() {
+        let state = state_of(&Shape::Sphere { radius: 0.025 });
+        let meter = StrainMeter::new(&state.model, StrainLimits::default());
+        let total: f64 = meter.share.iter().map(|share| 8.0 * share).sum();
+        assert!((total - 1.0).abs() < 1e-12, "{total}");
+        for (share, fill) in meter.share.iter().zip(&state.model.mesh.occupancy) {
+            assert_eq!(*share > 0.0, fill.fraction() >= 0.1);
+        }
+    }
+
+    #[test]
+    fn a_state_that_is_not_finite_has_no_percentile_and_is_beyond() {
+        let mut state = cube();
+        state.x.iter_mut().for_each(|x| x.y = f64::NAN);
+        let meter = StrainMeter::new(&state.model, StrainLimits::default());
+        assert!(meter.percentile(&state, 0.05).is_nan());
+        assert!((meter.share_beyond(&state, 0.9) - 1.0).abs() < 1e-12);
+    }
+
+    proptest! {
+        #[test]
+        fn the_test_by_pivots_agrees_with_the_singular_values(e in prop::collection::vec(-1.0f64..1.0, 9), strain in 0.01f64..0.99) {
+            let f = Mat3::identity() + Mat3::from_column_slice(&e);
+            let found = compressive_strain(&f);
+            prop_assume!((found - strain).abs() > 1e-9);
+            prop_assert_eq!(Stretch::new(&f).is_beyond(strain), found > strain);
+        }
+    }
+}
