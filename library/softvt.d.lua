@@ -100,6 +100,8 @@
 ---@field density number Density. Expects a number (kg/m³) above 0.
 ---@field resolution? integer Voxels along the longest edge of the bounding box. Expects a whole number in 1..64. Default 6.
 ---@field grasp_spacing? number Spacing of contact samples where a gripper can reach. Expects metres in 0.0001..0.02. Default 0.00075.
+---@field collapse_strain? number Compressive strain at which cell walls buckle and a plateau of stress begins; a calibration presses no further. Expects a number in above 0..1.
+---@field damage_strain? number Compressive strain that leaves a visible crack or set. Expects a number in above 0..1.
 
 ---A free rigid body of uniform density.
 ---@class softvt.Rigid
@@ -230,6 +232,11 @@
 ---@field rayleigh_stiffness? number Stiffness-proportional Rayleigh damping. Expects seconds in 0..1. Default 0.005.
 ---@field gravity? number[] Gravity; {0, 0, -9.81} by default. Expects a list of 3 numbers (m/s²).
 ---@field sleeping? boolean True if bodies at rest fall asleep. Default true.
+
+---Returns the fingerprint of an asset: a hash of its shape, material and friction. Calibrations refer to it.
+---@param asset softvt.Asset
+---@return string
+function softvt.fingerprint(asset) end
 
 ---Builds a scene with the robot and lets it settle. Deformation refers to the settled shapes.
 ---@class softvt.SimulateSpec
@@ -454,6 +461,12 @@
 ---@field position number[] Position of its frame. Expects a list of 3 numbers (m).
 ---@field axis_angle? number[] Orientation; none by default. Expects a list of 3 numbers (rad).
 
+---A gel pad of the robot on a rigid carrier that solid:move_to moves.
+---@class softvt.WorldGelPad
+---@field name? string Name in messages. Default "gel pad".
+---@field position number[] Position of its apex. Expects a list of 3 numbers (m).
+---@field axis_angle? number[] Orientation. Without one, the gel faces +x and its long side is vertical. Expects a list of 3 numbers (rad).
+
 ---Renders the image of a camera, by default third_person.
 ---@class softvt.Render
 ---@field camera? string A camera of the scene. Default "third_person".
@@ -642,6 +655,11 @@ function World:kinematic(spec) end
 ---@return softvt.Solid
 function World:static(spec) end
 
+---Adds a gel pad of the robot, with the shape and the default contact law of its fingers, on a carrier that solid:move_to moves. Its frame is at the apex of the gel, which faces along x.
+---@param spec softvt.WorldGelPad
+---@return softvt.Solid
+function World:gel_pad(spec) end
+
 ---Makes one time step. Returns false and the reason once the state is invalid.
 ---@return boolean
 ---@return string?
@@ -698,6 +716,16 @@ function Body:asleep() end
 ---Returns the deformation against the reference shape.
 ---@return softvt.Deformation
 function Body:deformation() end
+
+---Returns the compressive strain that `percent` of the volume stays below: 1 − σ_min(F) at the Gauss points, weighted by volume.
+---@param percent number
+---@return number
+function Body:strain_percentile(percent) end
+
+---Returns the share of the volume, %, with a compressive strain above `strain`.
+---@param strain number
+---@return number
+function Body:volume_beyond_pct(strain) end
 
 ---Returns the size of the bounding box of the nodes, m.
 ---@return number[]

@@ -4,6 +4,7 @@
 //! over a control step.
 
 use softvt_geometry::{Pose, Vec3};
+use softvt_physics::fem::CrushedShares;
 
 use super::deformation::Deformation;
 
@@ -65,6 +66,8 @@ pub struct Evidence<'a> {
     pub robot_impulse_ns: f64,
     /// State of the target.
     pub target: BodyEvidence,
+    /// Shares of the target's volume beyond the strain limits of its material.
+    pub crushed: CrushedShares,
     /// States of the other movable bodies, the one at the goal included, in the same order in every step.
     pub others: &'a [BodyEvidence],
     /// State of the object at the goal.

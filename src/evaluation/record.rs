@@ -184,6 +184,13 @@ pub struct Verdict {
     /// Stage at which an episode without Goal Success ended; null with it.
     #[serde(default)]
     pub failed_stage: Option<Stage>,
+    /// Largest share of the target's volume that was beyond the collapse strain of its material at one time, %; null
+    /// for a rigid target and for a material without that strain.
+    #[serde(default)]
+    pub collapsed_volume_pct: Option<f64>,
+    /// Share of the target's volume that was ever beyond the damage strain of its material, %; null as above.
+    #[serde(default)]
+    pub damaged_volume_pct: Option<f64>,
     /// True if the first object that was lifted is not the target.
     pub wrong_instance: bool,
     /// κ of the benchmark, the share of D_ref that is allowed; null without a calibration.

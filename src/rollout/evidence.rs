@@ -10,8 +10,13 @@ use softvt_evaluation::{
     safety::DeformationLimit,
 };
 use softvt_geometry::{Pose, Vec3};
-use softvt_physics::{BodyId, ContactPartner, world::ContactSummary};
+use softvt_physics::{
+    BodyId, ContactPartner,
+    fem::{CrushedShares, StrainLimits, StrainMeter},
+    world::ContactSummary,
+};
 use softvt_robot::gripper::target_width;
+use softvt_scene::{Body, SoftMaterial};
 
 /// Collects the evidence of an episode: the target, its goal, the other movable objects, and their settled shapes.
 #[derive(Clone, Debug)]
@@ -22,6 +27,7 @@ pub(super) struct EvidenceCollector {
     others: Vec<usize>,
     references: Vec<Option<ReferenceShape>>,
     bodies: Vec<BodyEvidence>,
+    crushed: Option<StrainMeter>,
 }
 
 impl EvidenceCollector {
@@ -41,7 +47,14 @@ impl EvidenceCollector {
             .collect();
         let others: Vec<usize> = (0..sim.objects.len()).filter(is_other).collect();
         let bodies = Vec::with_capacity(others.len());
-        Self { target, goal, others, references, bodies }
+        let crushed = match (sim.objects[target].body, &sim.objects[target].asset.body) {
+            (BodyId::Soft(index), Body::Soft(SoftMaterial { collapse_strain, damage_strain, .. })) => {
+                let limits = StrainLimits { collapse: *collapse_strain, damage: *damage_strain };
+                Some(StrainMeter::new(&sim.world.soft(index).state.model, limits))
+            }
+            _ => None,
+        };
+        Self { target, goal, others, references, bodies, crushed }
     }
 
     /// The other movable objects as they settled, with their deformation limits by name.
@@ -82,6 +95,10 @@ impl EvidenceCollector {
         bodies.extend(self.others.iter().map(|&i| self.body(sim, i)));
         self.bodies = bodies;
         let target = &sim.objects[self.target];
+        let crushed = match (&mut self.crushed, target.body) {
+            (Some(meter), BodyId::Soft(index)) => meter.update(&sim.world.soft(index).state),
+            _ => CrushedShares::default(),
+        };
         let goal = &sim.objects[self.goal];
         let from_goal = partners(goal).map(|partner| upward(&sim.contact(target, partner))).sum::<f64>();
         let from_robot = sim
@@ -103,6 +120,7 @@ impl EvidenceCollector {
             }),
             robot_impulse_ns: from_robot * dt,
             target: self.body(sim, self.target),
+            crushed,
             goal: GoalEvidence {
                 pose_w: sim.pose(goal) * Pose::from(goal.foot_o()),
                 support_impulse_ns: from_goal * dt,

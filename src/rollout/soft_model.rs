@@ -167,8 +167,15 @@ mod tests {
     const RADIUS: f64 = 0.03;
 
     fn ball() -> (Shape, SoftMaterial) {
-        let material =
-            SoftMaterial { youngs_pa: 3e4, poisson: 0.4, density: 300.0, resolution: 4, grasp_spacing: 4e-3 };
+        let material = SoftMaterial {
+            youngs_pa: 3e4,
+            poisson: 0.4,
+            density: 300.0,
+            resolution: 4,
+            grasp_spacing: 4e-3,
+            collapse_strain: None,
+            damage_strain: None,
+        };
         (Shape::Sphere { radius: RADIUS }, material)
     }
 

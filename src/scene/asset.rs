@@ -1,6 +1,6 @@
 //! Assets: kinds of objects with shape, body, friction and appearance; articulated objects and their joints.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{collections::BTreeMap, fmt, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 
@@ -30,7 +30,7 @@ pub enum Body {
 }
 
 /// Isotropic linear-elastic material of a soft body, and its discretisation.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Serialize, Deserialize)]
 pub struct SoftMaterial {
     /// Young's modulus, Pa; the shipped pastries have 2.5e4 to 2.2e5.
     pub youngs_pa: f64,
@@ -42,11 +42,43 @@ pub struct SoftMaterial {
     pub resolution: usize,
     /// Spacing of the contact samples on surfaces that a gripper can reach (|n_z| ≤ 0.7 in the object frame), m.
     pub grasp_spacing: f64,
+    /// Compressive strain, in (0, 1], at which cell walls buckle and a plateau of stress begins.
+    #[serde(default)]
+    pub collapse_strain: Option<f64>,
+    /// Compressive strain, in (0, 1], that leaves a visible crack or set.
+    #[serde(default)]
+    pub damage_strain: Option<f64>,
+}
+
+/// Fingerprints of assets hash this text. Strains that are not stated do not appear, so that a material without them keeps
+/// its calibration.
+impl fmt::Debug for SoftMaterial {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut text = f.debug_struct("SoftMaterial");
+        text.field("youngs_pa", &self.youngs_pa)
+            .field("poisson", &self.poisson)
+            .field("density", &self.density)
+            .field("resolution", &self.resolution)
+            .field("grasp_spacing", &self.grasp_spacing);
+        let strains = [("collapse_strain", self.collapse_strain), ("damage_strain", self.damage_strain)];
+        for (name, strain) in strains.iter().filter(|(_, strain)| strain.is_some()) {
+            text.field(name, strain);
+        }
+        text.finish()
+    }
 }
 
 impl SoftMaterial {
     /// Largest allowed resolution.
     pub const MAX_RESOLUTION: usize = 64;
+
+    /// Strain up to which the material is stable and undamaged: the smaller of its two limits.
+    pub fn stable_strain(&self) -> Option<f64> {
+        match (self.collapse_strain, self.damage_strain) {
+            (Some(collapse), Some(damage)) => Some(collapse.min(damage)),
+            (one, other) => one.or(other),
+        }
+    }
 }
 
 /// A kind of object, which scenes place any number of times.

@@ -64,6 +64,8 @@ mod tests {
                 density: 300.0,
                 resolution: 6,
                 grasp_spacing: 7.5e-4,
+                collapse_strain: Some(0.1),
+                damage_strain: None,
             }),
             friction: Friction::default(),
             visuals: vec![Visual::default()],
@@ -91,6 +93,7 @@ mod tests {
         assert!(changed(&|a| a.friction.static_mu = 0.7));
         assert!(soft(&|m| m.youngs_pa = 2.1e4) && soft(&|m| m.poisson = 0.3) && soft(&|m| m.density = 301.0));
         assert!(soft(&|m| m.resolution = 7));
+        assert!(soft(&|m| m.collapse_strain = None) && soft(&|m| m.damage_strain = Some(0.1)));
         assert!(!changed(&|a| a.name = "roll".into()));
         assert!(!changed(&|a| a.visuals.clear()));
         let brush = || Shape::Sphere { radius: 0.02 };
@@ -123,5 +126,16 @@ mod tests {
             rounded("a1.5 { x: -0.0, n: 12, y: 1.25e-7 }"),
             "a1.5 { x: 0.000000e0, n: 12, y: 1.250000e-7 }"
         );
+    }
+
+    #[test]
+    fn a_strain_that_is_not_stated_leaves_no_trace_in_the_hashed_text() {
+        let Body::Soft(material) = bun().body else { unreachable!() };
+        let plain = SoftMaterial { collapse_strain: None, ..material.clone() };
+        assert_eq!(
+            format!("{plain:?}"),
+            "SoftMaterial { youngs_pa: 20000.0, poisson: 0.4, density: 300.0, resolution: 6, grasp_spacing: 0.00075 }"
+        );
+        assert!(format!("{material:?}").ends_with(", collapse_strain: Some(0.1) }"));
     }
 }

@@ -18,6 +18,8 @@
 //!     density: 300.0,
 //!     resolution: 10,
 //!     grasp_spacing: 7.5e-4,
+//!     collapse_strain: Some(0.1),
+//!     damage_strain: Some(0.4),
 //! };
 //! let soft = Asset {
 //!     name: "bun".to_owned(),

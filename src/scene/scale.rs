@@ -151,8 +151,15 @@ mod tests {
     use softvt_physics::contact::Friction;
 
     fn ball() -> Object {
-        let material =
-            SoftMaterial { youngs_pa: 2e4, poisson: 0.4, density: 300.0, resolution: 6, grasp_spacing: 1e-3 };
+        let material = SoftMaterial {
+            youngs_pa: 2e4,
+            poisson: 0.4,
+            density: 300.0,
+            resolution: 6,
+            grasp_spacing: 1e-3,
+            collapse_strain: None,
+            damage_strain: None,
+        };
         let gradient = Mask::Gradient { axis: [0.0, 0.0, 1.0], from_m: 0.01, to_m: 0.05 };
         let layer =
             VisualLayer { mask: gradient, albedo: [0.9; 3], roughness: 0.5, opacity: 1.0, relief_m: 1e-4 };

@@ -3,7 +3,8 @@
 //! Order of evaluation in one physics step ([`Judge::observe`]); names of thresholds are those of [`SuccessCriteria`]:
 //!
 //! 1. **Deformation.** Peaks of D of the target and of the other soft bodies. A step without a measured D of a soft
-//!    target is counted in `missing_deformation`.
+//!    target is counted in `missing_deformation`. Peaks of the target's shares of volume beyond the collapse and the
+//!    damage strain of its material; they do not enter the success criteria.
 //! 2. **Missing evidence.** If another number is not finite, the step is counted in `missing_evidence`, NoDrop becomes
 //!    false, and the rest is skipped.
 //! 3. **Contact.** A pad touches if its normal force on the target exceeds `touch_force_n`; the rest of the robot
@@ -28,6 +29,7 @@
 //! ```
 //! use softvt_evaluation::{criteria::SuccessCriteria, deformation::ReferenceShape, evidence::{BodyEvidence, Evidence, GoalEvidence, GripperEvidence, PadEvidence}, goal::GoalRegion, judge::{Judge, JudgeConfig}, record::Outcome, safety::DeformationLimit};
 //! use softvt_geometry::{Aabb, Pose, Vec3};
+//! use softvt_physics::fem::CrushedShares;
 //!
 //! let (dt_s, weight_n) = (1.0 / 60.0, 0.3);
 //! let mut judge = Judge::new(JudgeConfig {
@@ -62,6 +64,7 @@
 //!             robot_impulse_ns: 0.0,
 //!             deformation: reference.measure(&stretched).ok(),
 //!         },
+//!         crushed: CrushedShares { collapsed: Some(0.0), damaged: None },
 //!         others: &[],
 //!         goal: GoalEvidence { pose_w: Pose::identity(), support_impulse_ns: weight_n * dt_s },
 //!     });
@@ -74,6 +77,7 @@
 //! ```
 
 use softvt_geometry::Aabb;
+use softvt_physics::fem::CrushedShares;
 
 use super::{
     criteria::SuccessCriteria,
@@ -176,6 +180,7 @@ pub struct Judge {
     peaks_other: Vec<PeakDeformation>,
     first_wrong_contact: Option<FirstContact>,
     stage: StageMonitor,
+    crushed: CrushedShares,
     missing_evidence: u64,
     time_s: f64,
 }
@@ -200,6 +205,7 @@ impl Judge {
             peak: PeakDeformation::default(),
             peak_weighted: PeakDeformation::default(),
             peak_max: PeakDeformation::default(),
+            crushed: CrushedShares::default(),
             missing_evidence: 0,
             time_s: 0.0,
         }
@@ -299,6 +305,8 @@ impl Judge {
             others_ok,
             first_wrong_contact,
             failed_stage: (!goal).then_some(self.stage.stage),
+            collapsed_volume_pct: self.crushed.collapsed.map(|share| 100.0 * share),
+            damaged_volume_pct: self.crushed.damaged.map(|share| 100.0 * share),
             wrong_instance: self.is_other_first == Some(true),
             kappa: limit.map(|l| l.kappa),
             tau: limit.map(|l| l.tau_pct()),
@@ -327,6 +335,11 @@ impl Judge {
             self.peak.update(d.map(|d| d.rms_pct));
             self.peak_weighted.update(d.map(|d| d.weighted_pct));
             self.peak_max.update(d.map(|d| d.max_pct));
+            let larger = |peak: Option<f64>, now: Option<f64>| peak.into_iter().chain(now).reduce(f64::max);
+            self.crushed = CrushedShares {
+                collapsed: larger(self.crushed.collapsed, evidence.crushed.collapsed),
+                damaged: larger(self.crushed.damaged, evidence.crushed.damaged),
+            };
         }
     }
 

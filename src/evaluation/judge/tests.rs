@@ -5,6 +5,7 @@ use crate::{
     stage::Stage,
 };
 use softvt_geometry::{Aabb, Pose, Quat, Vec3};
+use softvt_physics::fem::CrushedShares;
 
 const DT: f64 = 1.0 / 60.0;
 const WEIGHT_N: f64 = 0.3;
@@ -75,6 +76,7 @@ impl Replay {
                 pads: [PadEvidence::default(); 2],
                 robot_impulse_ns: 0.0,
                 target: lying(-0.2, 0.2),
+                crushed: CrushedShares { collapsed: Some(0.02), damaged: None },
                 others: &others,
                 goal: GoalEvidence { pose_w: Pose::identity(), support_impulse_ns: 0.0 },
             };
@@ -308,4 +310,17 @@ fn a_failed_episode_names_its_stage() {
     assert_eq!(stage(&replay), Some(Stage::Release));
     replay.rest(30, 0.0);
     assert_eq!(replay.verdict(Outcome::Completed).failed_stage, None);
+}
+
+#[test]
+fn the_crushed_volume_is_the_largest_over_the_episode_and_null_without_a_limit() {
+    let mut replay = Replay::new(config());
+    for share in [0.0, 0.08, 0.03] {
+        replay.steps(3, |e| e.crushed = CrushedShares { collapsed: Some(share), damaged: Some(0.5 * share) });
+    }
+    let verdict = replay.verdict(Outcome::Timeout);
+    assert_eq!((verdict.collapsed_volume_pct, verdict.damaged_volume_pct), (Some(8.0), Some(4.0)));
+    let mut rigid = Replay::new(JudgeConfig { is_target_soft: false, ..config() });
+    rigid.steps(3, |_| ());
+    assert_eq!(rigid.verdict(Outcome::Timeout).collapsed_volume_pct, None);
 }

@@ -77,6 +77,12 @@ pub struct Scores {
     pub deformation: Distribution,
     /// Peak D of the valid episodes that reached the goal, %.
     pub deformation_goal: Distribution,
+    /// Largest share of the target's volume beyond its collapse strain, over all valid episodes, %.
+    #[serde(default)]
+    pub collapsed_volume: Distribution,
+    /// Share of the target's volume that was ever beyond its damage strain, over all valid episodes, %.
+    #[serde(default)]
+    pub damaged_volume: Distribution,
 }
 
 /// Smallest and largest τ of some episodes, %.
@@ -221,6 +227,9 @@ impl Scores {
         }
         let taus = || soft.iter().filter_map(|r| r.verdict.tau);
         let tau_range = taus().reduce(f64::min).zip(taus().reduce(f64::max));
+        let over_valid = |value: fn(&EpisodeRecord) -> Option<f64>| {
+            Distribution::from_values(valid.iter().filter_map(|r| value(r)).collect())
+        };
         Self {
             episodes: records.len(),
             invalid: records.len() - valid.len(),
@@ -256,6 +265,8 @@ impl Scores {
                 soft.iter().filter(|r| !r.outcome.is_valid()).count(),
             ),
             deformation_goal: Distribution::from_values(peaks(|r| r.verdict.goal)),
+            collapsed_volume: over_valid(|r| r.verdict.collapsed_volume_pct),
+            damaged_volume: over_valid(|r| r.verdict.damaged_volume_pct),
         }
     }
 }

@@ -131,7 +131,8 @@ impl StrainMeter {
     pub fn share_beyond(&self, state: &FemState, strain: f64) -> f64 {
         let counted = self.share.iter().enumerate().filter(|(_, share)| **share > 0.0);
         let beyond = counted.map(|(element, share)| {
-            let points = gradients_of(state, element).iter().filter(|f| Stretch::new(f).is_beyond(strain)).count();
+            let points =
+                gradients_of(state, element).iter().filter(|f| Stretch::new(f).is_beyond(strain)).count();
             share * points as f64
         });
         beyond.sum()
@@ -229,7 +230,11 @@ mod tests {
         let meter = StrainMeter::new(&state.model, StrainLimits::default());
         // Voxels have one strain each along y: (2k + 1)/12 of the largest, 0.2.
         let expected = 0.2 * 11.0 / 12.0;
-        assert!((meter.percentile(&state, 0.05) - expected).abs() < 1e-9, "{}", meter.percentile(&state, 0.05));
+        assert!(
+            (meter.percentile(&state, 0.05) - expected).abs() < 1e-9,
+            "{}",
+            meter.percentile(&state, 0.05)
+        );
         assert!((meter.share_beyond(&state, 0.1) - 0.5).abs() < 1e-12);
     }
 
@@ -242,7 +247,9 @@ mod tests {
         let at_rest = meter.update(&rest);
         assert_eq!((at_rest.collapsed, at_rest.damaged), (Some(0.0), Some(0.0)));
         let shares = meter.update(&pressed);
-        assert!((shares.collapsed.unwrap() - 1.0).abs() < 1e-12 && (shares.damaged.unwrap() - 1.0).abs() < 1e-12);
+        assert!(
+            (shares.collapsed.unwrap() - 1.0).abs() < 1e-12 && (shares.damaged.unwrap() - 1.0).abs() < 1e-12
+        );
         let released = meter.update(&rest);
         assert_eq!(released.collapsed, Some(0.0));
         assert!((released.damaged.unwrap() - 1.0).abs() < 1e-12);

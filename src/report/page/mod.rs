@@ -16,8 +16,8 @@ use super::{
     condition_effects::{condition_effects, effects_table},
     run_summary::RunSummary,
     tables::{
-        ResultTable, TEXT_COLUMNS, bootstrap_table, deformation_table, kappa_table, main_table, stage_table,
-        task_table,
+        ResultTable, TEXT_COLUMNS, bootstrap_table, crushed_table, deformation_table, kappa_table,
+        main_table, stage_table, task_table,
     },
 };
 
@@ -141,6 +141,7 @@ fn deformation(runs: &[RunSummary]) -> Option<Markup> {
                 figure { (figures::by_asset(run)) }
             }
         }
+        @if let Some(crushed) = crushed_table(runs) { (table(&crushed)) }
         h3 { "Strictness of the threshold" }
         (table(&kappas))
         figure {

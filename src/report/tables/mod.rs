@@ -120,6 +120,38 @@ pub fn deformation_table(runs: &[RunSummary]) -> Option<ResultTable> {
     )
 }
 
+/// Volume of the target beyond the strain limits of its material; `None` if no material states them.
+pub fn crushed_table(runs: &[RunSummary]) -> Option<ResultTable> {
+    let row = |run: &RunSummary| {
+        let scores = &run.summary.scores;
+        let figures = [&scores.collapsed_volume, &scores.damaged_volume]
+            .into_iter()
+            .flat_map(|volume| [volume.mean, volume.median, volume.p95].map(|x| decimal(x, 2)));
+        let head = [run.summary.suite.clone(), run.method.clone()];
+        head.into_iter().chain(figures).chain([scores.collapsed_volume.n.to_string()]).collect()
+    };
+    let is_stated = |run: &RunSummary| {
+        run.summary.scores.collapsed_volume.n > 0 || run.summary.scores.damaged_volume.n > 0
+    };
+    let table = soft_table(
+        runs,
+        "Volume of the target beyond the strain limits of its material over all valid episodes, %: the largest share beyond the collapse strain at one time, and the share that was ever beyond the damage strain.",
+        strings([
+            "Suite",
+            "Method",
+            "Collapsed, mean",
+            "Median",
+            "P95",
+            "Damaged, mean",
+            "Median",
+            "P95",
+            "Episodes",
+        ]),
+        row,
+    );
+    table.filter(|_| runs.iter().any(is_stated))
+}
+
 /// Safety Success at several κ; `None` if all suites are rigid.
 pub fn kappa_table(runs: &[RunSummary]) -> Option<ResultTable> {
     let row = |run: &RunSummary| {
@@ -131,7 +163,7 @@ pub fn kappa_table(runs: &[RunSummary]) -> Option<ResultTable> {
     let heads = KAPPAS.map(|kappa| format!("κ = {kappa}"));
     soft_table(
         runs,
-        "Safety Success, % of episodes, where the threshold is κ times the largest stable deformation (0.5 is nominal).",
+        "Safety Success, % of episodes, where the threshold is κ times D_ref (0.5 is nominal).",
         strings(["Suite", "Method"]).into_iter().chain(heads).collect(),
         row,
     )
@@ -220,6 +252,7 @@ pub fn all_tables(runs: &[RunSummary]) -> Vec<ResultTable> {
     let mut all = vec![main_table(runs)];
     all.extend(effects_table(&condition_effects(runs)));
     all.extend(deformation_table(runs));
+    all.extend(crushed_table(runs));
     all.extend(kappa_table(runs));
     all.extend(stage_table(runs));
     all.extend(bootstrap_table(runs));

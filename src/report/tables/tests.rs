@@ -14,7 +14,7 @@ fn rigid_suites_have_no_safety_and_privileged_policies_are_marked_in_every_table
         stored("b", "expert", vec![rigid]),
     ]);
     let all = all_tables(&runs);
-    assert_eq!(all.len(), 5);
+    assert_eq!(all.len(), 6);
     for table in &all {
         let marked = |text: &String| text.contains("expert (privileged)");
         assert!(marked(&table.caption) || table.rows.iter().all(|row| row.iter().any(marked)), "{table:?}");
@@ -40,6 +40,8 @@ fn rigid_suites_have_no_safety_and_privileged_policies_are_marked_in_every_table
             "–"
         ])]
     );
+    let crushed = ["suite", "expert (privileged)", "1.25", "1.25", "1.25", "0.50", "0.50", "0.50", "1"];
+    assert_eq!(all[2].rows, [strings(crushed)]);
 }
 
 #[test]

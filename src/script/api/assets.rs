@@ -10,7 +10,9 @@ use super::{
     visuals::visuals_of,
 };
 use crate::{
-    schema::{FromChecked, Range, Record, RecordType, Type, one_of, record, record_of},
+    schema::{
+        Constructed, FromChecked, Range, Record, RecordType, Type, functions, one_of, record, record_of,
+    },
     vm::error::fail,
 };
 use softvt_physics::contact::Friction;
@@ -20,6 +22,7 @@ use softvt_scene::{Asset, Body, SoftMaterial, Visual};
 pub(crate) const COEFFICIENT: Type = Type::Number("", Range::closed(0.0, 10.0));
 pub(crate) const PASCALS: Type = Type::Number("Pa", Range::POSITIVE);
 pub(crate) const POISSON: Type = Type::Number("", Range::below(0.0, 0.5));
+pub(crate) const STRAIN: Type = Type::Number("", Range::above(0.0, 1.0));
 pub(crate) const DENSITY: Type = Type::Number("kg/m³", Range::POSITIVE);
 
 record_of! {
@@ -42,6 +45,11 @@ record_of! {
         resolution: usize = Type::Integer(Range::closed(1.0, SoftMaterial::MAX_RESOLUTION as f64)) => Integer(6);
         /// Spacing of contact samples where a gripper can reach.
         grasp_spacing: f64 = Type::Number("m", Range::closed(0.0001, 0.02)) => Number(0.00075);
+        /// Compressive strain at which cell walls buckle and a plateau of stress begins; a calibration presses no
+        /// further.
+        collapse_strain: Option<f64> = STRAIN;
+        /// Compressive strain that leaves a visible crack or set.
+        damage_strain: Option<f64> = STRAIN;
     }
 }
 
@@ -114,5 +122,12 @@ impl AssetSpec {
             friction: *friction,
             hints: self.hints.clone(),
         })
+    }
+}
+
+functions! {
+    FUNCTIONS {
+        /// Returns the fingerprint of an asset: a hash of its shape, material and friction. Calibrations refer to it.
+        fn fingerprint(lua, asset: Constructed<AssetSpec>) -> ["string"] { asset.asset(lua)?.fingerprint() }
     }
 }

@@ -112,6 +112,7 @@ pub(crate) fn functions() -> impl Iterator<Item = &'static Function> {
         FUNCTIONS,
         tasks::FUNCTIONS,
         world::FUNCTIONS,
+        assets::FUNCTIONS,
         simulation::FUNCTIONS,
         envelope::FUNCTIONS,
         image::FUNCTIONS,

@@ -9,7 +9,7 @@ use std::{
 use cpu_time::ThreadTime;
 use mlua::Lua;
 
-use super::{experiment_input, shapes::LuaShape};
+use super::{assets::STRAIN, experiment_input, shapes::LuaShape};
 use crate::{
     schema::{Constructed, Range, Type, class, functions, output, record},
     vm::{
@@ -24,9 +24,11 @@ use softvt_evaluation::deformation::{Deformation, ReferenceShape};
 use softvt_geometry::{Pose, Quat, Vec3, shape::Shape};
 use softvt_physics::{
     BodyId, ColliderId, KinematicId, PhysicsParams, SoftId, World,
-    contact::Friction,
+    contact::{Collider, Friction, SurfaceStiffness},
+    fem::{FemState, StrainLimits, StrainMeter},
     world::{ContactSummary, SoftBody, StepFailure},
 };
+use softvt_robot::{PadSpec, pads::PadSurface};
 use softvt_rollout::{cancel, soft_model};
 use softvt_scene::SoftMaterial;
 
@@ -35,6 +37,7 @@ const BYTES_PER_WORLD: usize = 16 << 10;
 const BYTES_PER_SOLID: usize = 4 << 10;
 
 const POSITION: Type = Type::vector(3, "m");
+const PERCENT: Type = Type::Number("%", Range::closed(0.0, 100.0));
 const AXIS_ANGLE: Type = Type::vector(3, "rad");
 
 record! {
@@ -49,6 +52,18 @@ record! {
         /// Position of its frame.
         position: [f64; 3] = POSITION;
         /// Orientation; none by default.
+        axis_angle: Option<[f64; 3]> = AXIS_ANGLE;
+    }
+}
+
+record! {
+    /// A gel pad of the robot on a rigid carrier that solid:move_to moves.
+    WorldGelPadSpec: "softvt.WorldGelPad" as "world:gel_pad" {
+        /// Name in messages.
+        name: String => Text("gel pad");
+        /// Position of its apex.
+        position: [f64; 3] = POSITION;
+        /// Orientation. Without one, the gel faces +x and its long side is vertical.
         axis_angle: Option<[f64; 3]> = AXIS_ANGLE;
     }
 }
@@ -115,6 +130,7 @@ impl fmt::Display for Timing {
 struct Inner {
     world: World,
     references: Vec<ReferenceShape>,
+    strains: Vec<StrainMeter>,
     failed: Option<StepFailure>,
     newton_total: u64,
     newton_max: u32,
@@ -128,6 +144,14 @@ type SharedWorld = Arc<Mutex<Inner>>;
 fn pose(position: [f64; 3], axis_angle: Option<[f64; 3]>) -> Pose {
     let rotation = axis_angle.map_or(Quat::identity(), |turn| Quat::from_scaled_axis(Vec3::from(turn)));
     Pose::from_parts(Vec3::from(position).into(), rotation)
+}
+
+/// Pad frame on a carrier whose x axis is the direction in which the gel faces and whose z axis is along its long side.
+fn gel_pose_on_carrier() -> Pose {
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    // Half a turn about the bisector of x and z exchanges the two axes.
+    let turn = Quat::new_unchecked(nalgebra::Quaternion::new(0.0, half, 0.0, half));
+    Pose::from_parts(Vec3::zeros().into(), turn)
 }
 
 functions! {
@@ -154,6 +178,7 @@ functions! {
             LuaWorld(Arc::new(Mutex::new(Inner {
                 world: World::new(params, gravity),
                 references: Vec::new(),
+                strains: Vec::new(),
                 failed: None,
                 newton_total: 0,
                 newton_max: 0,
@@ -187,8 +212,10 @@ impl LuaWorld {
         };
         let reserved = reserve_in_world(lua, model.bytes())?;
         let reference = ReferenceShape::new(&model.mesh.nodes, &model.mass).map_err(|e| wrong(&e))?;
+        let strains = StrainMeter::new(&model, StrainLimits::default());
         let id = inner.world.add_soft(name, model, Some(Arc::new(shape.clone())), &pose, friction);
         inner.references.push(reference);
+        inner.strains.push(strains);
         inner.reserved.push(reserved);
         Ok(LuaBody { world: self.0.clone(), id })
     }
@@ -206,6 +233,22 @@ impl LuaWorld {
         };
         let collider = world.add_shape(&spec.name, parent, pose, spec.shape.shape(), spec.friction);
         Ok(LuaSolid { world: self.0.clone(), kinematic, collider })
+    }
+
+    fn add_gel_pad(&self, lua: &Lua, spec: &WorldGelPadSpec) -> mlua::Result<LuaSolid> {
+        let surface = Arc::new(PadSurface::default());
+        let law = PadSpec::default();
+        let friction = Friction { static_mu: law.static_mu, dynamic_mu: law.dynamic_mu };
+        let stiffness = SurfaceStiffness { normal: law.normal_modulus, shear: law.tangential_modulus };
+        let reserved = reserve_in_world(lua, BYTES_PER_SOLID)?;
+        let mut inner = lock(&self.0);
+        inner.reserved.push(reserved);
+        let world = &mut inner.world;
+        let carrier = world.add_kinematic(pose(spec.position, spec.axis_angle));
+        let parent = BodyId::Kinematic(carrier);
+        let collider = Collider::new(&spec.name, parent, gel_pose_on_carrier(), surface, friction, stiffness);
+        let collider = world.add_collider(collider);
+        Ok(LuaSolid { world: self.0.clone(), kinematic: Some(carrier), collider })
     }
 
     /// Makes one step; returns true, or false and the reason why the state of the world is invalid.
@@ -253,6 +296,9 @@ class! {
             fn kinematic(lua, this, spec: WorldSolidSpec) -> ["softvt.Solid"] { this.add_solid(lua, &spec, true)? }
             /// Adds a solid that never moves.
             fn static(lua, this, spec: WorldSolidSpec) -> ["softvt.Solid"] { this.add_solid(lua, &spec, false)? }
+            /// Adds a gel pad of the robot, with the shape and the default contact law of its fingers, on a carrier that
+            /// solid:move_to moves. Its frame is at the apex of the gel, which faces along x.
+            fn gel_pad(lua, this, spec: WorldGelPadSpec) -> ["softvt.Solid"] { this.add_gel_pad(lua, &spec)? }
             /// Makes one time step. Returns false and the reason once the state is invalid.
             fn step(lua, this) -> ["boolean", "string?"] { this.step(lua)? }
             /// Returns the simulated time, s.
@@ -282,6 +328,11 @@ pub(crate) struct LuaBody {
 impl LuaBody {
     fn read<T>(&self, read: impl FnOnce(&SoftBody) -> T) -> T {
         read(lock(&self.world).world.soft(self.id))
+    }
+
+    fn strain<T>(&self, read: impl FnOnce(&StrainMeter, &FemState) -> T) -> T {
+        let inner = lock(&self.world);
+        read(&inner.strains[self.id.index()], &inner.world.soft(self.id).state)
     }
 
     fn contact(&self, lua: &Lua, method: &str, solid: &LuaSolid) -> mlua::Result<ContactSummary> {
@@ -323,6 +374,16 @@ class! {
             fn asleep(_, this) -> ["boolean"] { this.read(SoftBody::is_asleep) }
             /// Returns the deformation against the reference shape.
             fn deformation(lua, this) -> ["softvt.Deformation"] { deformation_table(lua, &this.deformation(lua)?)? }
+            /// Returns the compressive strain that `percent` of the volume stays below: 1 − σ_min(F) at the Gauss points,
+            /// weighted by volume.
+            fn strain_percentile(lua, this, percent: f64 = PERCENT) -> ["number"] {
+                let strain = this.strain(|meter, state| meter.percentile(state, 1.0 - percent / 100.0));
+                finite(strain).ok_or_else(|| fail(lua, "body:strain_percentile: the body has no finite strain"))?
+            }
+            /// Returns the share of the volume, %, with a compressive strain above `strain`.
+            fn volume_beyond_pct(_, this, strain: f64 = STRAIN) -> ["number"] {
+                100.0 * this.strain(|meter, state| meter.share_beyond(state, strain))
+            }
             /// Returns the size of the bounding box of the nodes, m.
             fn extent(lua, this) -> ["number[]"] { list(lua, &this.deformation(lua)?.bbox_m)? }
             /// Sets the reference shape of deformation: the rest shape (at the start) or the present one.

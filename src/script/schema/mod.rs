@@ -161,6 +161,11 @@ impl Range {
         Self { min, max, above_min: false, below_max: true }
     }
 
+    /// From `min` (excluded) to `max` (included).
+    pub const fn above(min: f64, max: f64) -> Self {
+        Self { min, max, above_min: true, below_max: false }
+    }
+
     /// From `min` to `max`, both included; an end that is `None` is open.
     pub fn between(min: Option<f64>, max: Option<f64>) -> Self {
         Self::closed(min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY))
