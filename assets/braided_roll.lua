@@ -25,7 +25,7 @@ return softvt.asset {
   name = "braided_roll",
   shape = braid:subtract(TABLE_TOP, 4 * mm),
   -- At six voxels a length, three across, the braid is half again too stiff between pads; at twelve it is 5 % so.
-  body = softvt.soft { youngs_pa = 90e3, poisson = 0.37, density = 300, resolution = 12 },
+  body = softvt.soft { youngs_pa = 90e3, poisson = 0.37, density = 300, resolution = 12, collapse_strain = 0.10, damage_strain = 0.30 },
   hints = { grasp_height_m = 19 * mm },
   visuals = {
     material.crust { base = { 0.74, 0.405, 0.115 }, top = { 0.50, 0.21, 0.035 }, browning = 0.8, foot = { 0.80, 0.555, 0.27 }, sheen = 0.30, seed = 41 },

@@ -15,7 +15,7 @@ return softvt.asset {
   name = "capsule",
   shape = pill:subtract(table_top, 2 * mm):paint { material = 1, region = half },
   -- Squeezed by a fifth it is within 8 % of twelve voxels a length; at six voxels it would be 11 % too stiff.
-  body = softvt.soft { youngs_pa = 30e3, poisson = 0.40, density = 200, resolution = 8 },
+  body = softvt.soft { youngs_pa = 30e3, poisson = 0.40, density = 200, resolution = 8, collapse_strain = 0.10, damage_strain = 0.60 },
   hints = { grasp_height_m = HEIGHT / 2 },
   visuals = {
     material.silicone { base = { 0.80, 0.76, 0.70 }, seed = 161 },

@@ -37,7 +37,7 @@ return softvt.asset {
   name = "curved_layered",
   shape = layered:translate(0, middle, 0),
   -- Squeezed by a fifth it is within 5 % of 14 voxels a length in force and deformation; at six voxels D would be 30 % too large.
-  body = softvt.soft { youngs_pa = 130e3, poisson = 0.38, density = 340, resolution = 10 },
+  body = softvt.soft { youngs_pa = 130e3, poisson = 0.38, density = 340, resolution = 10, collapse_strain = 0.08, damage_strain = 0.07 },
   hints = { grasp_height_m = 18.5 * mm },
   visuals = { crust },
 }

@@ -18,7 +18,7 @@ local seeded = bun:bumps {
 return softvt.asset {
   name = "sesame_bun",
   shape = seeded:paint { material = 1 }:paint { material = 0, region = bun:round(0.25 * mm) },
-  body = softvt.soft { youngs_pa = 45e3, poisson = 0.34, density = 220 },
+  body = softvt.soft { youngs_pa = 45e3, poisson = 0.34, density = 220, collapse_strain = 0.10, damage_strain = 0.35 },
   hints = { grasp_height_m = 22 * mm },
   visuals = {
     material.crust { base = { 0.70, 0.27, 0.045 }, top = { 0.50, 0.155, 0.022 }, foot = { 0.80, 0.50, 0.20 }, sheen = 0.26, seed = 51 },

@@ -35,7 +35,7 @@ return softvt.asset {
   name = "spiral_roll",
   shape = oval:ridges(spiral):ridges(pleats):subtract(table_top)
     :paint { material = 1, region = upper }:paint { material = 2, region = groove },
-  body = softvt.soft { youngs_pa = 60e3, poisson = 0.35, density = 240 },
+  body = softvt.soft { youngs_pa = 60e3, poisson = 0.35, density = 240, collapse_strain = 0.10, damage_strain = 0.25 },
   hints = { grasp_height_m = 20 * mm },
   visuals = {
     case,

@@ -17,7 +17,7 @@ local ramp = softvt.shape.prism {
 return softvt.asset {
   name = "wedge",
   shape = ramp:round(EDGE),
-  body = softvt.soft { youngs_pa = 50e3, poisson = 0.40, density = 220 },
+  body = softvt.soft { youngs_pa = 50e3, poisson = 0.40, density = 220, collapse_strain = 0.07, damage_strain = 0.50 },
   hints = { grasp_height_m = 21.5 * mm },
   visuals = { material.foam { base = { 0.10, 0.42, 0.16 }, seed = 151 } },
 }

@@ -36,7 +36,7 @@ return softvt.asset {
   name = "yellow_roll",
   shape = lie(roll):subtract(table_top, 2 * mm):paint { material = 1, region = cream },
   -- Squeezed by a fifth it is 1 % softer than at twelve voxels a length; at six voxels it would be 9 % too stiff.
-  body = softvt.soft { youngs_pa = 55e3, poisson = 0.34, density = 230, resolution = 8 },
+  body = softvt.soft { youngs_pa = 55e3, poisson = 0.34, density = 230, resolution = 8, collapse_strain = 0.08, damage_strain = 0.20 },
   hints = { grasp_height_m = 22.5 * mm },
   visuals = {
     material.floured(skin, { seed = 125, opacity = 0.6, size_m = 6 * mm }),

@@ -246,13 +246,16 @@ function softvt.fingerprint(asset) end
 ---@field seed? integer Part of the seed; by default that of the run, --seed. Expects a whole number in 0..1000000000.
 ---@field settings? table<string, table<string, any>> Changed settings of physics, robot and tactile sensors: { physics = {…}, robot = {…}, tactile = {…} }. Those of the command line, --set, take precedence in experiments.
 
----Returns the results of a calibration: the lower bound of closure, the deformation limit τ, and the files to write.
+---Returns the results of a calibration: the safe window, the deformation limit τ, and the files to write.
 ---@class softvt.EnvelopeSpec
 ---@field asset string Name of the asset.
+---@field protocol? "press"|"hand" How the rows were measured. Default "press".
 ---@field kappa? number Safety factor κ of the deformation limit τ = κ D_ref. Expects a number in 0..1. Default 0.5.
----@field fingerprint? string Fingerprint of the calibrated asset, as simulation:measure returns it. Results for another object of that name then do not use the calibration.
----@field holds table<string, any>[] Rows closure, trials, held, slip_mm, d_peak_pct of the scan for the lower bound.
----@field sweep table<string, any>[] Rows closure, gripper_width_mm, d_peak_pct, force_n, min_det_f, node_speed_m_s, both_pads, slip_mm, stable of the compression sweep.
+---@field stable_strain? number Stable strain of the material, at which 5 % of the volume ends the press. Expects a number in above 0..1.
+---@field ended? string Why the sweep ended, if its last row does not tell.
+---@field fingerprint? string Fingerprint of the calibrated asset, as softvt.fingerprint returns it. Results for another object of that name then do not use the calibration.
+---@field holds table<string, any>[] Rows width_mm, closure, trials, held, slip_mm of the scan for the loose end.
+---@field sweep table<string, any>[] Rows width_mm, closure, d_pct, force_n, strain_p95, min_det_f, node_speed_m_s, both_pads, slip_mm, stable of the compression sweep.
 
 ---Returns an image of one colour: `softvt.image { width = 640, height = 480, colour = { 255, 255, 255 } }`.
 ---@class softvt.NewImage
@@ -840,14 +843,27 @@ local Measurements = {}
 ---@field depth_mm number Largest depth of the indentation, mm.
 local TactileReading = {}
 
+---The safe window of an object. An end is nil if the scans do not reach it.
+---@class softvt.SafeWindow
+---@field width_lower_mm number? Loose end: the widest width between the gels at which every hold trial held, mm.
+---@field width_at_tau_mm number? Tight end: the width at which the deformation reaches τ, mm.
+---@field force_lower_n number? Force per pad at the loose end, N.
+---@field force_at_tau_n number? Force per pad at the tight end, N.
+---@field extent_mm number? Extent of the window, mm; nil if it is empty.
+local SafeWindow = {}
+
 ---Results of a calibration.
 ---@class softvt.Envelope
----@field lower number? Smallest closure that holds the object.
----@field closure_at_tau number? Closure at which the deformation reaches τ.
----@field safe_window boolean True if the lower bound is below closure_at_tau.
+---@field protocol string How it was measured: "press" or "hand".
+---@field window softvt.SafeWindow The safe window.
+---@field width_contact_mm number? Widest width at which both pads touched, mm.
+---@field width_at_d_ref_mm number? Width at D_ref, mm.
 ---@field tau number? Deformation limit τ, %.
----@field d_ref number? Largest stable deformation D_ref, %.
----@field text string A plot of deformation over closure as text.
+---@field d_ref number? Reference deformation D_ref, %.
+---@field stable_strain number? Stable strain of the material.
+---@field censored string? Why the sweep ended before the stable strain; nil if it did not.
+---@field text string The envelope in three lines.
+---@field plot string A plot of deformation over width as SVG.
 ---@field sweep string The rows of the sweep as JSON lines.
 ---@field json string The calibration file as JSON text.
 ---@field table table The same as a table.
@@ -1394,7 +1410,7 @@ function softvt.world(spec) end
 ---@return softvt.Simulation
 function softvt.simulate(spec) end
 
----Returns the results of a calibration: the lower bound of closure, the deformation limit τ, and the files to write.
+---Returns the results of a calibration: the safe window, the deformation limit τ, and the files to write.
 ---@param spec softvt.EnvelopeSpec
 ---@return softvt.Envelope
 function softvt.envelope(spec) end

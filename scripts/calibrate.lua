@@ -1,200 +1,150 @@
--- Calibrates soft assets by the protocol of the SoftVTBench paper (appendix C.3), with the expert's grasp.
---
--- Lower bound: the smallest closure, from loose to tight, at which five grasp–lift–hold trials succeed. Trials are displaced by
--- up to 5 mm and 10°. Upper bound: the settled object is squeezed in place, step by step. D_ref is the largest stable
--- deformation, and τ = κ D_ref. A second squeeze between the last stable and the first unstable step uses steps an eighth as
--- large, so that D_ref does not depend on the step.
+-- Calibrates soft assets: the limit τ on D, and the safe window of widths between the gels.
 --
 --   softvt scripts/calibrate.lua --asset spiral_roll,sesame_bun
+--   softvt scripts/calibrate.lua --asset spiral_roll --check-ends       trials with the robot's hand at both ends of the window
+--   softvt scripts/calibrate.lua --asset spiral_roll --sweep-protocol hand    the sweep of the SoftVTBench paper instead
 --
--- Writes assets/calibration/<asset>.json, the rows of the sweep in SoftVTBench's fields, the plot of the envelope, and
--- scripts/calibrated.lua. If all standard assets are calibrated, it also writes docs/calibration.md with all plots.
+-- --sweep-protocol press (the default) tests the object alone, between two gel pads on rigid carriers (scripts/calibration/press.lua).
+-- It closes in steps of the width until 5 % of the volume is beyond the stable strain of the material: the smaller of its
+-- collapse_strain and damage_strain. D_ref is D at that width, interpolated, and τ = κ D_ref. A press that ends earlier is censored: the
+-- file says why, and D_ref is a lower bound. The loose end of the window is the widest width at which five trials with the expert's
+-- grasp hold while the pads lift; the tight end is the width at which D reaches τ.
+--
+-- --sweep-protocol hand is the sweep of the paper (appendix C.3) with the robot's hand (scripts/calibration/hand.lua): its D_ref is the
+-- largest stable D up to a closed hand.
+--
+-- Writes assets/calibration/<asset>.json, the rows of the sweep, the plot and the text of the envelope, and scripts/calibrated.lua.
+-- If all standard assets are calibrated, it also writes docs/calibration.md. With --scale, --resolution or --check-ends it measures only
+-- and writes nothing.
 local calibration_page = require "calibration_page"
-local grasp = require "experts.grasp"
+local hand = require "calibration.hand"
 local known = require "calibrated"
+local press = require "calibration.press"
 local soft_assets = require("asset_names").soft
-local table_top = require "assets.table"
 
 local opt = softvt.options {
   asset = { default = soft_assets, help = "assets to calibrate" },
-  step = { default = 0.02, min = 0.002, max = 0.2, help = "step of the closure" },
-  trials = { default = 5, integer = true, min = 1, max = 100, help = "hold trials at each closure" },
-  hold_s = { default = 2, unit = "s", min = 0.1, max = 60, help = "duration of a trial's hold" },
-  kappa = { default = 0.5, min = 0.05, max = 1, help = "τ as a fraction of the largest stable deformation" },
+  sweep_protocol = { default = "press", choices = { "press", "hand" }, help = "press test of the object alone, or the paper's sweep with the robot's hand" },
+  kappa = { default = 0.5, min = 0.05, max = 1, help = "τ as a fraction of D_ref" },
+  step_mm = { default = 0.5, unit = "mm", min = 0.02, max = 5, help = "press: step of the width" },
+  within_mm = { default = 0.05, unit = "mm", min = 0.005, max = 1, help = "press: accuracy of the loose end" },
+  scale = { default = 1, min = 0.5, max = 2, help = "press: size of the object; measures only" },
+  resolution = { default = 0, integer = true, min = 0, max = 64, help = "press: voxels along the longest edge; measures only (0: the asset's own)" },
+  check_ends = { default = false, help = "run trials with the robot's hand 5 % inside and outside of the calibrated window; measures only" },
+  trials = { default = 100, integer = true, min = 1, max = 1000, help = "hand: hold trials at each end with --check-ends (5 at each closure with --sweep-protocol hand)" },
+  step = { default = 0.02, min = 0.002, max = 0.2, help = "hand: step of the closure" },
+  hold_s = { default = 1, unit = "s", min = 0.1, max = 60, help = "hand: duration of a trial's hold" },
 }
 
 -- Episodes use only files that were read when the plan was made, so every asset is required here.
 local assets = {}
 for _, name in ipairs(opt.asset) do assets[name] = require("assets." .. name) end
 
-local OFFSET, TURN = 0.005, math.rad(10)  -- largest displacement of trials, m and rad
-local LIFT, SLIP_MM = 0.10, 2             -- lift, m; slip that fails a trial, mm
-local REST_S, REST_SPEED = 0.5, 0.005     -- duration and node speed of a squeeze at rest, s and m/s
-local REST_TIMEOUT_S = 3                  -- largest time until a squeeze is at rest, s
-local FINE = 8                            -- fine steps per step
-local BEYOND = 3                          -- closures tried beyond the first that holds, for the plot
-local CONTACT_N = 1e-3                    -- pad force that counts as contact, N
+local HAND_TRIALS = 5     -- trials at each closure of the paper's scan
+local BATCH = 10          -- trials of a point of --check-ends
+local END_SHARE = 0.05    -- distance from an end of the window, as a share of the window
 
--- A layout of the object alone on the table. The displacement of a trial is drawn with the scene, so it depends only on the asset and
--- the index of the trial, not on the closure.
-local function single_object(name, displacement)
-  return softvt.layout("calibrate_" .. name, function(scene, rng)
-    scene:add { name = "table", asset = table_top, position = { 0, 0, 0 } }
-    scene:add { name = "object", asset = assets[name], at = { -0.05, 0 } }
-    if displacement then
-      displacement.offset = { rng:uniform(-OFFSET, OFFSET), rng:uniform(-OFFSET, OFFSET) }
-      displacement.turn = rng:uniform(-TURN, TURN)
-    end
-  end)
-end
-
--- Grasps the object at a closure, as the expert does, displaced by `displacement`.
-local function grasp_at(closure, displacement)
-  return function(arm, scene)
-    local object = scene:object "object"
-    local height = grasp.height(object)
-    local at = grasp.pose(object, height, displacement and displacement.offset, displacement and displacement.turn)
-    arm:move_to(at:translated { 0, 0, 0.08 }, { speed = 0.6, angular_speed = 3 })
-    arm:move_to(at, { speed = 0.25 })
-    arm:wait(0.1)
-    arm:grasp(closure, { rate = 0.6 })
-    arm:wait(0.3)
-  end
-end
-
-local function lift(arm) arm:move_by({ 0, 0, LIFT }, { speed = 0.25 }) end
-
--- The largest closure on the grid of steps at which the gels do not touch the object.
-local function first_closure(name, step)
-  local view
-  softvt.simulate { layout = single_object(name) }:drive(function(arm, scene)
-    view = scene:object "object"
-    arm:wait(0.05)
-  end)
-  return math.floor((1 - grasp.width(view) / 0.08) / step) * step
-end
-
--- Distance by which the object has fallen behind the tool since `before`, mm.
-local function lag_mm(sim, before)
-  local tool, seen = sim:tool(), sim:measure "object"
-  return 1e3 * ((tool[3] - before.tool) - (seen.height_m - before.height))
-end
-
-local function heights(sim) return { tool = (sim:tool())[3], height = sim:measure "object".height_m } end
-
--- Grasp–lift–hold trial `k`. Returns whether it held, the slip (mm) and the peak D (%).
-local function hold_trial(name, closure, k, hold_s)
-  local displacement = {}
-  local sim = softvt.simulate { layout = single_object(name, displacement), episode = k }
-  local ok = sim:drive(grasp_at(closure, displacement))
-  local before = heights(sim)
-  ok = ok and sim:drive(lift)
-  -- An object that was not lifted by now is not held.
-  if ok and lag_mm(sim, before) < 0.5e3 * LIFT then ok = sim:wait(hold_s) end
-  local slip = math.abs(lag_mm(sim, before))
-  local seen = sim:measure "object"
-  return { held = ok and slip <= SLIP_MM, slip_mm = slip, d_peak_pct = seen.d_peak_pct }
-end
-
-local function scan_holds(name, first, o)
-  local rows, beyond = {}, 0
-  local closure = first
-  while closure <= 1 and beyond <= BEYOND do
-    local row = { asset = name, kind = "hold", closure = closure, trials = o.trials, held = 0, slip_mm = 0, d_peak_pct = 0 }
-    for k = 1, o.trials do
-      local result = hold_trial(name, closure, k, o.hold_s)
-      if result.held then row.held = row.held + 1 end
-      row.slip_mm = math.max(row.slip_mm, result.slip_mm)
-      row.d_peak_pct = math.max(row.d_peak_pct, result.d_peak_pct)
-    end
+local function append(rows, kind, name, found)
+  for _, row in ipairs(found) do
+    row.asset, row.kind = name, kind
     rows[#rows + 1] = row
-    if row.held == row.trials then beyond = beyond + 1 end
-    closure = closure + o.step
   end
-  return rows
 end
 
--- One step of a squeeze: closes further and waits until the object is at rest or the timeout passes. Speed, det F and contact of
--- a row are those of the last REST_S seconds.
-local function squeeze(sim, name, closure)
-  local row = { asset = name, kind = "sweep", closure = closure, stable = false }
-  local ok, problem = sim:drive(function(arm) arm:close_to(closure, { rate = 0.2 }) end)
-  local elapsed_s, resting_s = 0, 0
-  while ok and resting_s < REST_S and elapsed_s < REST_TIMEOUT_S do
-    ok, problem = sim:wait(0.05)
-    elapsed_s = elapsed_s + 0.05
-    local seen = sim:measure "object"
-    local touching = math.min(table.unpack(seen.pad_force)) > CONTACT_N
-    if resting_s == 0 then row.min_det_f, row.node_speed_m_s, row.both_pads = math.huge, 0, true end
-    row.min_det_f = math.min(row.min_det_f, seen.min_det_f or 1)
-    row.node_speed_m_s = math.max(row.node_speed_m_s, seen.speed)
-    row.both_pads = row.both_pads and touching
-    resting_s = seen.speed < REST_SPEED and resting_s + 0.05 or 0
-  end
-  if not ok then return nil, problem end
-  local seen = sim:measure "object"
-  row.gripper_width_mm = 1e3 * seen.width_m
-  row.fingerprint = seen.fingerprint
-  row.d_peak_pct = seen.d_peak_pct
-  row.force_n = 0.5 * (seen.pad_force[1] + seen.pad_force[2])
-  row.slip_mm = math.max(table.unpack(seen.slip_mm))
-  row.stable = softvt.stable {
-    closure = closure, gripper_width_mm = row.gripper_width_mm, d_peak_pct = row.d_peak_pct, force_n = row.force_n,
-    min_det_f = row.min_det_f, node_speed_m_s = row.node_speed_m_s, both_pads = row.both_pads, slip_mm = row.slip_mm,
-    stable = false,
+-- Rows of a press test: first the sweep, then holds between its contact and τ.
+local function press_asset(name, o)
+  local change = { scale = o.scale, resolution = o.resolution > 0 and o.resolution or nil }
+  local asset, rows = assets[name], {}
+  local sweep, ended = press.sweep(asset, 1e-3 * o.step_mm, change)
+  append(rows, "sweep", name, sweep)
+  local found = softvt.envelope {
+    asset = name, kappa = o.kappa, stable_strain = press.stable_strain(asset.body), ended = ended, holds = {}, sweep = sweep,
   }
-  return row
-end
-
--- Squeezes from `first` in steps of `step` and appends the rows. Ends at the first unstable squeeze after a stable one, at a failed
--- physics step, or with the gripper closed. Returns the last stable closure, and true if an unstable one followed.
-local function sweep(name, first, step, rows)
-  local sim = softvt.simulate { layout = single_object(name) }
-  sim:drive(grasp_at(first))
-  local last
-  local closure = first
-  while closure <= 1 + 1e-9 do
-    local row = squeeze(sim, name, math.min(closure, 1))
-    if not row then return last, true end
-    rows[#rows + 1] = row
-    if row.stable then last = row.closure elseif last then return last, true end
-    closure = closure + step
+  local at_tau, contact = found.window.width_at_tau_mm, found.width_contact_mm
+  if at_tau and contact then
+    local narrowest = found.width_at_d_ref_mm
+    append(rows, "hold", name, press.loose_end(asset, 1e-3 * at_tau, 1e-3 * contact, 1e-3 * narrowest, 1e-3 * o.within_mm, change))
   end
-  return last, false
-end
-
--- The holds and the sweep of each asset are separate points, so that they run in parallel.
-local function run(point, o)
-  local name = point.asset
-  local first = first_closure(name, o.step)
-  if point.part == "hold" then return scan_holds(name, first, o) end
-  local rows = {}
-  local last, more = sweep(name, first, o.step, rows)
-  if last and more then sweep(name, last + o.step / FINE, o.step / FINE, rows) end
+  for _, row in ipairs(rows) do row.ended = ended end
   return rows
 end
 
--- The rows of one kind, reduced to the fields of the envelope.
+-- A batch of trials at an end of the window: `share` of the window inside of it, or outside if negative.
+local function check_end(point, o)
+  local window = known[point.asset]
+  if not window then
+    error(("calibrate: %s has no calibrated window; run softvt scripts/calibrate.lua --asset %s first"):format(point.asset, point.asset), 0)
+  end
+  local extent, rise = window.width_lower - window.width_at_tau, window.force_at_tau - window.force_lower
+  local from = point.at == "loose" and 0 or 1
+  local along = from + (point.at == "loose" and 1 or -1) * (point.side == "inside" and END_SHARE or -END_SHARE)
+  local width, force = window.width_lower - along * extent, math.max(0, window.force_lower + along * rise)
+  local closure = hand.closure_at(width, force)
+  local held, d_peak_pct = hand.trials(assets[point.asset], closure, point.first, point.last, o.hold_s)
+  return {
+    asset = point.asset, kind = point.at .. " " .. point.side, width_mm = 1e3 * width, closure = closure,
+    trials = point.last - point.first + 1, held = held, d_pct = d_peak_pct,
+  }
+end
+
+local function run(point, o)
+  if point.at then return check_end(point, o) end
+  if o.sweep_protocol == "press" then return press_asset(point.asset, o) end
+  local rows = {}
+  if point.part == "hold" then
+    append(rows, "hold", point.asset, hand.holds(assets[point.asset], o.step, HAND_TRIALS, o.hold_s))
+  else
+    append(rows, "sweep", point.asset, hand.sweep(assets[point.asset], o.step))
+  end
+  return rows
+end
+
+local function points(o)
+  local list = {}
+  for _, name in ipairs(o.asset) do
+    if o.check_ends then
+      for _, at in ipairs { "loose", "tight" } do
+        for _, side in ipairs { "inside", "outside" } do
+          for first = 1, o.trials, BATCH do
+            list[#list + 1] = { asset = name, at = at, side = side, first = first, last = math.min(o.trials, first + BATCH - 1) }
+          end
+        end
+      end
+    elseif o.sweep_protocol == "press" then
+      list[#list + 1] = { asset = name, part = "press" }
+    else
+      for _, part in ipairs { "hold", "sweep" } do list[#list + 1] = { asset = name, part = part } end
+    end
+  end
+  return list
+end
+
+local ROW_FIELDS = {
+  hold = { "width_mm", "closure", "trials", "held", "slip_mm" },
+  sweep = { "width_mm", "closure", "d_pct", "force_n", "strain_p95", "min_det_f", "node_speed_m_s", "both_pads", "slip_mm", "stable" },
+}
+
+-- The rows of one kind, reduced to the fields of the envelope, and why the sweep ended.
 local function pick(rows, name, kind)
-  local picked = {}
+  local picked, ended = {}, nil
   for _, row in ipairs(rows) do
     if row.asset == name and row.kind == kind then
       local copy = {}
-      for key, value in pairs(row) do copy[key] = value end
-      copy.asset, copy.kind, copy.fingerprint = nil, nil, nil
-      picked[#picked + 1] = copy
+      for _, key in ipairs(ROW_FIELDS[kind]) do copy[key] = row[key] end
+      picked[#picked + 1], ended = copy, row.ended
     end
   end
-  return picked
+  return picked, ended
 end
 
-local function library_of(closures)
+local function library_of(windows)
   local lines = {
-    "-- Calibrated closures per asset: the smallest that holds, and the one at which D equals τ.",
-    "-- Written by scripts/calibrate.lua; experts close to a value in between.", "return {",
+    "-- Calibrated windows per asset: widths between the gels (m) at first contact, at the loose end and at τ, and the forces per pad",
+    "-- (N) at the two ends. Written by scripts/calibrate.lua; experts grasp at a width in between.", "return {",
   }
-  for name, c in pairs(closures) do
-    lines[#lines + 1] = ("  %s = { lower = %.4f, at_tau = %.4f },"):format(name, c.lower, c.at_tau)
+  for name, w in pairs(windows) do
+    lines[#lines + 1] = ("  %s = { width_contact = %.6f, width_lower = %.6f, width_at_tau = %.6f, force_lower = %.5f, force_at_tau = %.5f },"):format(
+      name, w.width_contact, w.width_lower, w.width_at_tau, w.force_lower, w.force_at_tau)
   end
   lines[#lines + 1] = "}\n"
   return table.concat(lines, "\n")
@@ -208,48 +158,85 @@ local function complete(found)
   return true
 end
 
-local function finish(rows, o)
-  local files, text, closures, envelope_of = {}, {}, {}, {}
-  for name, closure in pairs(known) do closures[name] = closure end
-  for _, name in ipairs(o.asset) do
-    local fingerprint
-    for _, row in ipairs(rows) do
-      if row.asset == name then fingerprint = row.fingerprint or fingerprint end
+-- Why an asset has no safe window, with the mend; nil if it has one.
+local function empty_window(name, found)
+  local window = found.window
+  if window.extent_mm then return nil end
+  local tight = window.width_at_tau_mm and ("D passes τ at %.2f mm"):format(window.width_at_tau_mm) or "the sweep does not reach τ"
+  local loose = window.width_lower_mm and ("friction carries it only from %.2f mm inward"):format(window.width_lower_mm)
+    or "friction carries it at no width"
+  return ("%s has no safe window: %s, and %s; give it more friction, less density, or a larger collapse_strain or damage_strain"):format(
+    name, tight, loose)
+end
+
+local function three_kappas(found)
+  if not found.d_ref then return "" end
+  return ("τ at κ 0.3, 0.5, 0.7: %.3f, %.3f, %.3f %%\n"):format(0.3 * found.d_ref, 0.5 * found.d_ref, 0.7 * found.d_ref)
+end
+
+local function warning(name, found)
+  if not found.censored then return "" end
+  return ("warning: the press of %s is censored: %s. State collapse_strain in its softvt.soft.\n"):format(name, found.censored)
+end
+
+-- Held trials per asset and end, over all batches.
+local function ends_text(rows)
+  local order, sums = {}, {}
+  for _, row in ipairs(rows) do
+    local key = row.asset .. " " .. row.kind
+    if not sums[key] then
+      order[#order + 1] = key
+      sums[key] = { held = 0, trials = 0, d = 0 }
     end
-    local found = softvt.envelope {
-      asset = name, kappa = o.kappa, fingerprint = fingerprint,
-      holds = pick(rows, name, "hold"), sweep = pick(rows, name, "sweep"),
-    }
-    files[("assets/calibration/%s.json"):format(name)] = found.json
-    files[("assets/calibration/%s.sweep.jsonl"):format(name)] = found.sweep
-    files[("assets/calibration/%s.txt"):format(name)] = found.text
-    envelope_of[name] = found
-    text[#text + 1] = found.text
-    if found.d_ref then
-      text[#text + 1] = ("τ at κ 0.3, 0.5, 0.7: %.3f, %.3f, %.3f %%\n"):format(
-        0.3 * found.d_ref, 0.5 * found.d_ref, 0.7 * found.d_ref)
-    end
-    closures[name] = found.safe_window and { lower = found.lower, at_tau = found.closure_at_tau } or nil
+    local sum = sums[key]
+    sum.held, sum.trials, sum.d = sum.held + row.held, sum.trials + row.trials, math.max(sum.d, row.d_pct)
   end
-  files["scripts/calibrated.lua"] = library_of(closures)
+  local lines = {}
+  for _, key in ipairs(order) do
+    local sum = sums[key]
+    lines[#lines + 1] = ("%s: %d of %d held, largest D %.3f %%"):format(key, sum.held, sum.trials, sum.d)
+  end
+  return table.concat(lines, "\n") .. "\n"
+end
+
+local function finish(rows, o)
+  if o.check_ends then return { text = ends_text(rows) } end
+  local files, text, windows, envelope_of, empty = {}, {}, {}, {}, {}
+  for name, window in pairs(known) do windows[name] = window end
+  for _, name in ipairs(o.asset) do
+    local sweep, ended = pick(rows, name, "sweep")
+    local found = softvt.envelope {
+      asset = name, protocol = o.sweep_protocol, kappa = o.kappa, fingerprint = softvt.fingerprint(assets[name]), ended = ended,
+      stable_strain = o.sweep_protocol == "press" and press.stable_strain(assets[name].body) or nil,
+      holds = pick(rows, name, "hold"), sweep = sweep,
+    }
+    local at = "assets/calibration/" .. name
+    files[at .. ".json"], files[at .. ".sweep.jsonl"], files[at .. ".svg"], files[at .. ".txt"] = found.json, found.sweep, found.plot, found.text
+    envelope_of[name] = found
+    text[#text + 1] = found.text .. three_kappas(found) .. warning(name, found)
+    empty[#empty + 1] = empty_window(name, found)
+    local window = found.window
+    windows[name] = window.extent_mm and {
+      width_contact = 1e-3 * found.width_contact_mm, width_lower = 1e-3 * window.width_lower_mm,
+      width_at_tau = 1e-3 * window.width_at_tau_mm, force_lower = window.force_lower_n, force_at_tau = window.force_at_tau_n,
+    } or nil
+  end
+  text = table.concat(text, "\n")
+  if o.scale ~= 1 or o.resolution > 0 then return { text = text } end
+  if #empty > 0 then error("calibrate: " .. table.concat(empty, "\n"), 0) end
+  files["scripts/calibrated.lua"] = library_of(windows)
   if complete(envelope_of) then files["docs/calibration.md"] = calibration_page(soft_assets, envelope_of) end
-  return { text = table.concat(text, "\n"), files = files }
+  return { text = text, files = files }
 end
 
 return softvt.experiment {
   name = "calibrate",
   options = opt,
-  points = function(o)
-    local points = {}
-    for _, name in ipairs(o.asset) do
-      for _, part in ipairs { "hold", "sweep" } do points[#points + 1] = { asset = name, part = part } end
-    end
-    return points
-  end,
+  points = points,
   run = run,
   finish = finish,
   columns = {
-    "asset", "kind", "closure", "held", "trials", "stable", "gripper_width_mm", "d_peak_pct", "force_n", "min_det_f",
-    "node_speed_m_s", "both_pads", "slip_mm",
+    "asset", "kind", "width_mm", "closure", "held", "trials", "stable", "d_pct", "force_n", "strain_p95", "min_det_f", "node_speed_m_s",
+    "both_pads", "slip_mm",
   },
 }

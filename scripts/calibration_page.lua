@@ -1,15 +1,22 @@
 -- Text of docs/calibration.md: the safe envelope of each soft asset.
+local checks = require "calibration_checks"
 
 local HEAD = [[
 # Safe envelopes of the soft assets
 
-Generated together with `assets/calibration/` by `softvt scripts/calibrate.lua`, which documents the method. Each plot shows peak D
-(% of the bounding-box diagonal) over the closure of the gripper: `●` a stable squeeze, `○` an unstable one, `╌` τ. The rows below
-show the results of five grasp–lift–hold trials (`+` all held, `~` some, `-` none) and the zones: `░` too loose, `█` safe window,
-`▓` too tight. The expert closes to the middle of the safe window.
+Generated together with `assets/calibration/` by `softvt scripts/calibrate.lua`, which documents the method: a press test of the object
+alone, between two gel pads of the robot at a prescribed width. D_ref is D at the width at which 5 % of the volume is beyond the *stable
+strain* of the material, and τ = κ D_ref with κ = 0.5. Each object is safe at widths between the *loose* end, up to which friction carries it,
+and the *tight* end, at which D reaches τ. Forces are those per pad at rest. [assets.md](assets.md) gives the strains with their sources.
 
-| asset | D_ref % | τ % | holds from | τ at |
-|---|---|---|---|---|
+| asset | stable strain | D_ref % | τ % | κ 0.3 | κ 0.7 | loose mm | tight mm | window mm | force N | censored |
+|---|---|---|---|---|---|---|---|---|---|---|
+]]
+
+local MIDDLE = [[
+
+Each plot shows D (% of the bounding-box diagonal) over the width. Dots are stable squeezes, rings unstable ones; dashed lines are τ and
+D_ref, and the band is the safe window.
 ]]
 
 -- Returns the page for `names`; `found` maps each name to a result of softvt.envelope or softvt.calibration.
@@ -18,9 +25,15 @@ return function(names, found)
   local rows, plots = {}, {}
   for _, name in ipairs(names) do
     local known = found[name]
-    rows[#rows + 1] = ("| [%s](#%s) | %s | %s | %s | %s |\n"):format(
-      name, name, number("%.3f", known.d_ref), number("%.3f", known.tau), number("%.2f", known.lower), number("%.3f", known.closure_at_tau))
-    plots[#plots + 1] = ("\n## %s\n\n```text\n%s```\n"):format(name, known.text)
+    local window, d_ref = known.window, known.d_ref
+    local force = number("%.2f", window.force_lower_n) .. " to " .. number("%.2f", window.force_at_tau_n)
+    local cells = {
+      ("[%s](#%s)"):format(name, name), number("%.2f", known.stable_strain), number("%.3f", d_ref), number("%.3f", known.tau),
+      number("%.3f", d_ref and 0.3 * d_ref), number("%.3f", d_ref and 0.7 * d_ref), number("%.2f", window.width_lower_mm),
+      number("%.2f", window.width_at_tau_mm), number("%.2f", window.extent_mm), force, known.censored or "no",
+    }
+    rows[#rows + 1] = "| " .. table.concat(cells, " | ") .. " |\n"
+    plots[#plots + 1] = ("\n## %s\n\n![](../assets/calibration/%s.svg)\n\n```text\n%s```\n"):format(name, name, known.text)
   end
-  return HEAD .. table.concat(rows) .. table.concat(plots)
+  return HEAD .. table.concat(rows) .. checks .. MIDDLE .. table.concat(plots)
 end

@@ -74,11 +74,6 @@ function grasp.window(object)
   local known = calibrated[object.asset]
   if not known then return nil end
   local size, stiffness, density = object.scale or 1, object.youngs_factor or 1, object.density_factor or 1
-  if known.lower then
-    -- Closures are commands, which fingers without load reach.
-    local function unloaded(closure) return { width = STROKE * (1 - closure) * size, force = 0 } end
-    return { loose = unloaded(known.lower), tight = unloaded(known.at_tau) }
-  end
   -- Between a flat contact (linear) and a sphere's (Hertz: indentation by the power 2/3 of the force), whichever is larger.
   local load = density * size / stiffness
   load = math.max(load, load ^ (2 / 3))

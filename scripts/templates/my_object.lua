@@ -13,8 +13,9 @@ local loaf = softvt.shape.box { size = { 40 * mm, 24 * mm, 18 * mm } }:round(8 *
 return softvt.asset {
   name = "my_object",
   shape = loaf,
-  -- Young's modulus (Pa), Poisson's ratio, density (kg/m³). Alternatives: softvt.rigid { density = 400 }, softvt.static {}.
-  body = softvt.soft { youngs_pa = 60e3, poisson = 0.35, density = 250 },
+  -- Young's modulus (Pa), Poisson's ratio, density (kg/m³), and the compressive strains at which the material collapses and is
+  -- damaged, which limit its calibration. Alternatives: softvt.rigid { density = 400 }, softvt.static {}.
+  body = softvt.soft { youngs_pa = 60e3, poisson = 0.35, density = 250, collapse_strain = 0.10, damage_strain = 0.30 },
   -- One visual material for each painted part of the shape; this shape has one part.
   visuals = { material.crust { seed = 7 } },
 }

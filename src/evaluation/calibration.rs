@@ -1,11 +1,16 @@
-//! Safe interaction envelope of an asset: from the closure that just holds it to the closure that deforms it by τ.
+//! Safe interaction envelope of an asset: from the width that just holds it to the width that deforms it by τ.
 //!
-//! - Lower bound: the smallest closure at which every grasp–lift–hold trial held.
-//! - Upper bound: the closure at which D reaches τ = κ·D_ref in the compression sweep. D_ref is the largest deformation
-//!   of a *stable* squeeze ([`SweepRow::meets_criteria`]; SoftVTBench, appendix C.3).
+//! Widths are measured between the apexes of the gels, forces per pad at rest. `softvt scripts/calibrate.lua` runs both
+//! scans, by one of two protocols:
 //!
-//! Closure is 0 with the gripper open (80 mm) and 1 with the gels in contact. `softvt
-//! scripts/calibrate.lua` runs both scans.
+//! - [`Protocol::Press`], a press test of the object alone. D_ref is D at the widest press at which 5 % of the body's
+//!   volume has a compressive strain beyond the material's *stable strain*, interpolated between two rows of the sweep.
+//!   A sweep that ends earlier is *censored*: D_ref is then the largest stable D, a lower bound.
+//! - [`Protocol::Hand`], the sweep of SoftVTBench (appendix C.3) with the robot's hand: D_ref is the largest D of a
+//!   stable squeeze.
+//!
+//! The loose end of the envelope is the widest width at which every hold trial held, down to the narrowest one tried. The
+//! tight end is the width at which D reaches τ = κ·D_ref.
 
 use serde::{Deserialize, Serialize};
 
@@ -18,32 +23,54 @@ const MAX_NODE_SPEED_M_S: f64 = 0.005;
 /// Exclusive upper bound of the slip in a stable squeeze, mm.
 const MAX_SLIP_MM: f64 = 2.0;
 
-/// Trials at one closure of the lower-bound scan.
+/// How an asset was calibrated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Protocol {
+    /// A press test of the object alone, up to the stable strain of its material.
+    #[default]
+    Press,
+    /// Squeezes by the robot's hand, up to the largest stable deformation.
+    Hand,
+}
+
+/// Hold trials at one width.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HoldRow {
-    /// Commanded closure, 0 (open) to 1 (closed).
-    pub closure: f64,
-    /// Number of trials at this closure.
+    /// Width, mm.
+    pub width_mm: f64,
+    /// Commanded closure, 0 (open) to 1 (closed); only for the robot's hand.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub closure: Option<f64>,
+    /// Number of trials at this width.
     pub trials: u32,
     /// Number of trials that held without slip or drop.
     pub held: u32,
     /// Largest slip over the trials, mm.
     pub slip_mm: f64,
-    /// Largest peak D over the trials, %.
-    pub d_peak_pct: f64,
 }
 
-/// Squeeze at one closure of the compression sweep.
+impl HoldRow {
+    fn all_held(&self) -> bool {
+        self.trials > 0 && self.held == self.trials
+    }
+}
+
+/// Squeeze at one width of the compression sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SweepRow {
-    /// Commanded closure, 0 (open) to 1 (closed).
-    pub closure: f64,
-    /// Measured apex-to-apex width, mm.
-    pub gripper_width_mm: f64,
-    /// Peak D while squeezing, %.
-    pub d_peak_pct: f64,
+    /// Width, mm.
+    pub width_mm: f64,
+    /// Commanded closure, 0 (open) to 1 (closed); only for the robot's hand.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub closure: Option<f64>,
+    /// D at rest in the press, peak D with the robot's hand, %.
+    pub d_pct: f64,
     /// Mean normal force per pad at rest, N.
     pub force_n: f64,
+    /// Compressive strain that 95 % of the volume stays below; only in the press.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub strain_p95: Option<f64>,
     /// Smallest det F over all Gauss points and steps.
     pub min_det_f: f64,
     /// Largest node speed over the observation window at rest, m/s.
@@ -57,78 +84,190 @@ pub struct SweepRow {
 }
 
 impl SweepRow {
-    /// True if the squeeze is stable: both pads touch, no element is nearly inverted, no node moves at rest and the
-    /// object does not slip, within the bounds of this module. `stable` is not read. A squeeze with a number that is not
-    /// finite is not stable.
-    pub fn meets_criteria(&self) -> bool {
-        self.both_pads
-            && self.d_peak_pct.is_finite()
-            && self.min_det_f > MIN_DET_F
-            && self.node_speed_m_s < MAX_NODE_SPEED_M_S
-            && self.slip_mm < MAX_SLIP_MM
+    /// Reason why the squeeze is not stable; `None` if both pads touch, no element is nearly inverted, no node moves at
+    /// rest and the object does not slip, within the bounds of this module. `stable` is not read. A squeeze with a number
+    /// that is not finite is not stable.
+    pub fn instability(&self) -> Option<&'static str> {
+        if !self.both_pads {
+            Some("a pad does not touch the object")
+        } else if !(self.d_pct.is_finite() && self.strain_p95.is_none_or(f64::is_finite)) {
+            Some("the deformation cannot be measured")
+        } else if !(self.min_det_f > MIN_DET_F) {
+            Some("an element is nearly inverted")
+        } else if !(self.node_speed_m_s < MAX_NODE_SPEED_M_S) {
+            Some("the object does not come to rest")
+        } else if !(self.slip_mm < MAX_SLIP_MM) {
+            Some("the object slips out of the pads")
+        } else {
+            None
+        }
     }
+}
+
+/// The two ends of the safe window. An end is null if the scans do not reach it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SafeWindow {
+    /// Loose end: the widest width at which every trial held, mm.
+    pub width_lower_mm: Option<f64>,
+    /// Tight end: the width at which D reaches τ, mm.
+    pub width_at_tau_mm: Option<f64>,
+    /// Force per pad at the loose end, N.
+    pub force_lower_n: Option<f64>,
+    /// Force per pad at the tight end, N.
+    pub force_at_tau_n: Option<f64>,
+}
+
+impl SafeWindow {
+    /// Extent of the window, mm; `None` if it is empty or an end is unknown.
+    pub fn extent_mm(&self) -> Option<f64> {
+        let extent = self.width_lower_mm? - self.width_at_tau_mm?;
+        (extent > 0.0).then_some(extent)
+    }
+}
+
+/// What a calibration measured, from which an [`Envelope`] follows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Scans {
+    /// How the rows were measured.
+    pub protocol: Protocol,
+    /// Stable strain of the material; `None` if it states no limit, and for the robot's hand.
+    pub stable_strain: Option<f64>,
+    /// Why the sweep ended, if its last row does not tell.
+    pub ended: Option<String>,
+    /// Hold trials, in any order.
+    pub holds: Vec<HoldRow>,
+    /// Compression sweep, in any order.
+    pub sweep: Vec<SweepRow>,
 }
 
 /// Envelope of an asset, with the rows it was computed from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Envelope {
-    /// Smallest closure at which every trial held; null without one.
-    pub closure_lower: Option<f64>,
-    /// Closure at which D reaches τ; null if the sweep does not reach it.
-    pub closure_at_tau: Option<f64>,
-    /// Closure of the row that gave D_ref; null without a stable squeeze.
-    pub closure_at_d_ref: Option<f64>,
-    /// Lower-bound scan, by increasing closure.
+    /// How the rows were measured.
+    pub protocol: Protocol,
+    /// Stable strain of the material: the smaller of its collapse and damage strain.
+    pub stable_strain: Option<f64>,
+    /// Why the sweep ended before the stable strain; null if it did not. D_ref is then a lower bound.
+    pub censored: Option<String>,
+    /// D_ref, %; null without a stable squeeze.
+    pub d_ref_pct: Option<f64>,
+    /// Width at D_ref, mm.
+    pub width_at_d_ref_mm: Option<f64>,
+    /// Widest width at which both pads touched, mm.
+    pub width_contact_mm: Option<f64>,
+    /// The safe window.
+    pub window: SafeWindow,
+    /// Hold trials, by decreasing width.
     pub holds: Vec<HoldRow>,
-    /// Compression sweep, by increasing closure.
+    /// Compression sweep, by decreasing width.
     pub sweep: Vec<SweepRow>,
 }
 
+/// D_ref of a sweep, with its width.
+struct Reference {
+    d_pct: f64,
+    width_mm: f64,
+}
+
 impl Envelope {
-    /// Sorts the rows by closure and computes the bounds.
-    pub fn new(mut holds: Vec<HoldRow>, mut sweep: Vec<SweepRow>, kappa: f64) -> Self {
-        holds.sort_by(|a, b| a.closure.total_cmp(&b.closure));
-        sweep.sort_by(|a, b| a.closure.total_cmp(&b.closure));
-        let limit = deformation_limit(&sweep, kappa);
-        let reference = limit.and_then(|l| {
-            sweep.iter().find(|row| row.stable && round_to_six_decimals(row.d_peak_pct) == l.d_ref_pct)
-        });
+    /// Sorts the rows by width and computes the bounds.
+    pub fn new(scans: Scans, kappa: f64) -> Self {
+        let Scans { protocol, stable_strain, ended, mut holds, mut sweep } = scans;
+        holds.sort_by(|a, b| b.width_mm.total_cmp(&a.width_mm));
+        sweep.sort_by(|a, b| b.width_mm.total_cmp(&a.width_mm));
+        let at_strain = stable_strain.and_then(|strain| reference_at_strain(&sweep, strain));
+        let censored = match (protocol, &at_strain) {
+            (Protocol::Press, None) => Some(ended.unwrap_or_else(|| reason_of_end(&sweep, stable_strain))),
+            (Protocol::Press, Some(_)) | (Protocol::Hand, _) => None,
+        };
+        let reference = at_strain.or_else(|| largest_stable(&sweep));
+        let limit = reference.as_ref().and_then(|found| limit_of(found.d_pct, kappa));
+        let width_lower_mm = loose_end(&holds);
+        let width_at_tau_mm = limit.and_then(|limit| width_at(&sweep, limit.tau_pct()));
         Self {
-            closure_lower: holds
-                .iter()
-                .find(|row| row.trials > 0 && row.held == row.trials)
-                .map(|row| row.closure),
-            closure_at_tau: limit.and_then(|l| closure_at(&sweep, l.tau_pct())),
-            closure_at_d_ref: reference.map(|row| row.closure),
+            protocol,
+            stable_strain,
+            censored,
+            d_ref_pct: limit.map(|limit| limit.d_ref_pct),
+            width_at_d_ref_mm: reference.map(|found| found.width_mm),
+            width_contact_mm: sweep.iter().find(|row| row.both_pads).map(|row| row.width_mm),
+            window: SafeWindow {
+                width_lower_mm,
+                width_at_tau_mm,
+                force_lower_n: width_lower_mm.and_then(|width| force_at(&sweep, width)),
+                force_at_tau_n: width_at_tau_mm.and_then(|width| force_at(&sweep, width)),
+            },
             holds,
             sweep,
         }
     }
 
-    /// True if some closure both holds the object and stays below τ.
-    pub fn has_safe_window(&self) -> bool {
-        match (self.closure_lower, self.closure_at_tau) {
-            (Some(lower), Some(upper)) => lower < upper,
-            _ => false,
-        }
+    /// Deformation limit τ = κ·D_ref; `None` without a stable squeeze.
+    pub fn limit(&self, kappa: f64) -> Option<DeformationLimit> {
+        limit_of(self.d_ref_pct?, kappa)
     }
 }
 
-/// Deformation limit of a sweep: D_ref is the largest D of a stable row, rounded to six decimals. `None` if no stable
-/// row has a deformation above zero.
-pub fn deformation_limit(sweep: &[SweepRow], kappa: f64) -> Option<DeformationLimit> {
-    let stable = sweep.iter().filter(|row| row.stable && row.d_peak_pct.is_finite());
-    let largest = stable.map(|row| row.d_peak_pct).fold(0.0_f64, f64::max);
-    (largest > 0.0).then_some(DeformationLimit { d_ref_pct: round_to_six_decimals(largest), kappa })
+fn limit_of(d_pct: f64, kappa: f64) -> Option<DeformationLimit> {
+    let d_ref_pct = round_to_six_decimals(d_pct);
+    (d_ref_pct > 0.0).then_some(DeformationLimit { d_ref_pct, kappa })
 }
 
-/// Closure at which D first reaches `d_pct`, linear between the rows; `sweep` by increasing closure. `None` if the
-/// first row is above it or no row reaches it.
-fn closure_at(sweep: &[SweepRow], d_pct: f64) -> Option<f64> {
-    sweep.windows(2).find(|pair| pair[0].d_peak_pct <= d_pct && pair[1].d_peak_pct >= d_pct).map(|pair| {
-        let rise = pair[1].d_peak_pct - pair[0].d_peak_pct;
-        let share = if rise > 0.0 { (d_pct - pair[0].d_peak_pct) / rise } else { 0.0 };
-        pair[0].closure + share * (pair[1].closure - pair[0].closure)
+/// D at which the 95th percentile of the strain reaches `strain`, linear between two stable rows. `None` if no stable row
+/// reaches it, or the row before it is not stable.
+fn reference_at_strain(sweep: &[SweepRow], strain: f64) -> Option<Reference> {
+    let reached = sweep.iter().position(|row| row.strain_p95.is_some_and(|p95| p95 >= strain))?;
+    let (before, after) = (sweep.get(reached.checked_sub(1)?)?, &sweep[reached]);
+    if !(before.stable && after.stable) {
+        return None;
+    }
+    let (low, high) = (before.strain_p95?, after.strain_p95?);
+    let share = if high > low { (strain - low) / (high - low) } else { 1.0 };
+    let between = |from: f64, to: f64| from + share * (to - from);
+    Some(Reference {
+        d_pct: between(before.d_pct, after.d_pct),
+        width_mm: between(before.width_mm, after.width_mm),
+    })
+}
+
+/// The stable row with the largest D.
+fn largest_stable(sweep: &[SweepRow]) -> Option<Reference> {
+    let stable = sweep.iter().filter(|row| row.stable && row.d_pct.is_finite());
+    let largest = stable.max_by(|a, b| a.d_pct.total_cmp(&b.d_pct))?;
+    Some(Reference { d_pct: largest.d_pct, width_mm: largest.width_mm })
+}
+
+fn reason_of_end(sweep: &[SweepRow], stable_strain: Option<f64>) -> String {
+    let last = sweep.last().and_then(SweepRow::instability);
+    let default = match stable_strain {
+        Some(_) => "the sweep ended before the stable strain",
+        None => "the material states no collapse_strain",
+    };
+    last.unwrap_or(default).to_owned()
+}
+
+/// Narrowest run of widths at which every trial held: its widest width. `None` if trials failed at the narrowest one.
+fn loose_end(holds: &[HoldRow]) -> Option<f64> {
+    let held = holds.iter().rev().take_while(|row| row.all_held());
+    held.last().map(|row| row.width_mm)
+}
+
+/// Width at which D first reaches `d_pct`, linear between the rows; `sweep` by decreasing width. `None` if the first row
+/// is above it or no row reaches it.
+fn width_at(sweep: &[SweepRow], d_pct: f64) -> Option<f64> {
+    sweep.windows(2).find(|pair| pair[0].d_pct <= d_pct && pair[1].d_pct >= d_pct).map(|pair| {
+        let rise = pair[1].d_pct - pair[0].d_pct;
+        let share = if rise > 0.0 { (d_pct - pair[0].d_pct) / rise } else { 0.0 };
+        pair[0].width_mm + share * (pair[1].width_mm - pair[0].width_mm)
+    })
+}
+
+/// Force per pad at a width, linear between the rows; `sweep` by decreasing width. `None` outside of the sweep.
+fn force_at(sweep: &[SweepRow], width_mm: f64) -> Option<f64> {
+    sweep.windows(2).find(|pair| pair[0].width_mm >= width_mm && pair[1].width_mm <= width_mm).map(|pair| {
+        let step = pair[0].width_mm - pair[1].width_mm;
+        let share = if step > 0.0 { (pair[0].width_mm - width_mm) / step } else { 0.0 };
+        pair[0].force_n + share * (pair[1].force_n - pair[0].force_n)
     })
 }
 
@@ -136,16 +275,18 @@ fn closure_at(sweep: &[SweepRow], d_pct: f64) -> Option<f64> {
 pub(crate) mod tests {
     use super::*;
 
-    pub(crate) fn hold(closure: f64, held: u32) -> HoldRow {
-        HoldRow { closure, trials: 5, held, slip_mm: 0.1, d_peak_pct: 0.5 }
+    pub(crate) fn hold(width_mm: f64, held: u32) -> HoldRow {
+        HoldRow { width_mm, closure: None, trials: 5, held, slip_mm: 0.1 }
     }
 
-    pub(crate) fn squeeze(closure: f64, d: f64, stable: bool) -> SweepRow {
+    /// A squeeze from 50 mm, with a strain of a tenth of D.
+    pub(crate) fn squeeze(width_mm: f64, d_pct: f64, stable: bool) -> SweepRow {
         SweepRow {
-            closure,
-            gripper_width_mm: 80.0 * (1.0 - closure),
-            d_peak_pct: d,
-            force_n: 2.0,
+            width_mm,
+            closure: None,
+            d_pct,
+            force_n: 0.5 * (50.0 - width_mm),
+            strain_p95: Some(0.1 * d_pct),
             min_det_f: 0.6,
             node_speed_m_s: 1e-4,
             both_pads: true,
@@ -154,52 +295,82 @@ pub(crate) mod tests {
         }
     }
 
-    #[test]
-    fn the_envelope_is_from_the_loosest_reliable_hold_to_the_closure_at_tau() {
-        let holds = vec![hold(0.34, 5), hold(0.30, 0), hold(0.32, 4)];
+    /// A press test of an object 50 mm wide that reaches its stable strain of 0.3 at 44.5 mm, and holds from `lower` on.
+    pub(crate) fn scans(lower: f64) -> Scans {
+        let holds = [49.0, 48.0, 47.0, 46.0].map(|width| hold(width, if width <= lower { 5 } else { 2 }));
         let sweep = vec![
-            squeeze(0.3, 0.0, true),
-            squeeze(0.4, 1.0, true),
-            squeeze(0.5, 3.0, true),
-            squeeze(0.6, 9.0, false),
+            squeeze(50.0, 0.0, true),
+            squeeze(48.0, 1.0, true),
+            squeeze(46.0, 2.0, true),
+            squeeze(44.0, 10.0 / 3.0, true),
         ];
-        let envelope = Envelope::new(holds, sweep, 0.5);
-        assert_eq!(envelope.closure_lower, Some(0.34));
-        assert_eq!(envelope.closure_at_d_ref, Some(0.5));
-        assert!(
-            (envelope.closure_at_tau.unwrap() - 0.425).abs() < 1e-12,
-            "D = 1.5 lies a quarter of the way"
-        );
-        assert!(envelope.has_safe_window());
-        assert_eq!(
-            deformation_limit(&envelope.sweep, 0.5),
-            Some(DeformationLimit { d_ref_pct: 3.0, kappa: 0.5 })
-        );
+        Scans { stable_strain: Some(0.3), holds: holds.into(), sweep, ..Scans::default() }
     }
 
     #[test]
-    fn without_a_stable_squeeze_or_a_reliable_hold_there_is_no_window() {
-        let envelope = Envelope::new(vec![hold(0.3, 4)], vec![squeeze(0.3, 1.0, false)], 0.5);
-        assert_eq!((envelope.closure_lower, envelope.closure_at_tau), (None, None));
-        assert!(!envelope.has_safe_window());
-        assert_eq!(deformation_limit(&envelope.sweep, 0.5), None);
-        let late =
-            Envelope::new(vec![hold(0.5, 5)], vec![squeeze(0.3, 0.0, true), squeeze(0.4, 2.0, true)], 0.5);
-        assert!(!late.has_safe_window(), "it holds only beyond the limit");
+    fn the_reference_is_interpolated_where_the_strain_reaches_the_stable_strain() {
+        let envelope = Envelope::new(scans(48.0), 0.5);
+        assert_eq!(envelope.d_ref_pct, Some(3.0));
+        assert!((envelope.width_at_d_ref_mm.unwrap() - 44.5).abs() < 1e-12);
+        assert_eq!(envelope.censored, None);
+        let window = envelope.window;
+        assert_eq!((window.width_lower_mm, window.width_at_tau_mm), (Some(48.0), Some(47.0)));
+        assert_eq!((window.force_lower_n, window.force_at_tau_n), (Some(1.0), Some(1.5)));
+        assert_eq!((window.extent_mm(), envelope.width_contact_mm), (Some(1.0), Some(50.0)));
+    }
+
+    #[test]
+    fn a_sweep_that_ends_before_the_stable_strain_is_censored_with_its_reason() {
+        let reason = |change: &dyn Fn(&mut Scans)| {
+            let mut scans = scans(48.0);
+            change(&mut scans);
+            let envelope = Envelope::new(scans, 0.5);
+            (envelope.censored.unwrap_or_default(), envelope.d_ref_pct)
+        };
+        let unrest = reason(&|scans| {
+            (scans.sweep[3].stable, scans.sweep[3].node_speed_m_s) = (false, 0.1);
+        });
+        assert_eq!(unrest, ("the object does not come to rest".into(), Some(2.0)));
+        let short = reason(&|scans| drop(scans.sweep.pop()));
+        assert_eq!(short, ("the sweep ended before the stable strain".into(), Some(2.0)));
+        let told = reason(&|scans| (scans.sweep.pop(), scans.ended = Some("inverted".into())).1);
+        assert_eq!(told.0, "inverted");
+        let nameless = reason(&|scans| scans.stable_strain = None);
+        assert_eq!(nameless.0, "the material states no collapse_strain");
+        let hand = reason(&|scans| (scans.protocol, scans.stable_strain) = (Protocol::Hand, None));
+        assert_eq!(hand, (String::new(), Some(3.333333)), "the hand's D_ref is its largest stable D");
+    }
+
+    #[test]
+    fn the_loose_end_is_above_no_width_at_which_a_trial_failed() {
+        let lower =
+            |holds: Vec<HoldRow>| Envelope::new(Scans { holds, ..scans(48.0) }, 0.5).window.width_lower_mm;
+        assert_eq!(lower(vec![hold(47.0, 5), hold(49.0, 5), hold(48.0, 4)]), Some(47.0));
+        assert_eq!(lower(vec![hold(47.0, 4), hold(48.0, 5)]), None);
+        assert_eq!(lower(vec![]), None);
+    }
+
+    #[test]
+    fn an_envelope_whose_ends_have_crossed_has_no_extent() {
+        let envelope = Envelope::new(scans(46.0), 0.5);
+        assert_eq!((envelope.window.width_lower_mm, envelope.window.extent_mm()), (Some(46.0), None));
+        let none = Envelope::new(Scans { sweep: vec![squeeze(49.0, 1.0, false)], ..scans(48.0) }, 0.5);
+        assert_eq!((none.d_ref_pct, none.window.width_at_tau_mm, none.limit(0.5)), (None, None, None));
     }
 
     #[test]
     fn every_criterion_of_stability_counts() {
-        let row = squeeze(0.3, 1.0, false);
-        assert!(row.meets_criteria());
+        let row = squeeze(40.0, 1.0, false);
+        assert_eq!(row.instability(), None);
         for bad in [
             SweepRow { min_det_f: 0.1, ..row.clone() },
+            SweepRow { min_det_f: f64::NAN, ..row.clone() },
             SweepRow { node_speed_m_s: 0.005, ..row.clone() },
             SweepRow { both_pads: false, ..row.clone() },
             SweepRow { slip_mm: 2.0, ..row.clone() },
-            SweepRow { d_peak_pct: f64::NAN, ..row.clone() },
+            SweepRow { d_pct: f64::NAN, ..row.clone() },
         ] {
-            assert!(!bad.meets_criteria(), "{bad:?}");
+            assert!(bad.instability().is_some(), "{bad:?}");
         }
     }
 }

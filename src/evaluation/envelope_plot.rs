@@ -1,195 +1,241 @@
-//! Plain-text plot of the safe interaction envelope of an asset: D over closure, with the lower bound and τ.
+//! The safe interaction envelope of an asset in three lines of text, and as an SVG plot of D over the width.
 
 use super::{
-    calibration::{Envelope, HoldRow},
+    calibration::{Envelope, Protocol, SweepRow},
     safety::DeformationLimit,
 };
 
-/// Columns of the plot without labels.
-const WIDTH: usize = 72;
-/// Rows of the plot without axis.
-const HEIGHT: usize = 12;
-/// Columns of the labels to the left of the plot.
-const MARGIN: usize = 9;
+/// Size of the image, px.
+const WIDTH: f64 = 640.0;
+const HEIGHT: f64 = 300.0;
+/// Margins around the plotting area, px.
+const LEFT: f64 = 64.0;
+const RIGHT: f64 = 16.0;
+const TOP: f64 = 34.0;
+const BOTTOM: f64 = 46.0;
+/// Intervals between the labels of the width.
+const TICKS: u32 = 5;
 
-/// Horizontal axis: closures from `low` to `high`.
-struct PlotAxis {
-    low: f64,
-    high: f64,
+/// The envelope in three lines: the safe window, τ, and the end of the sweep.
+pub fn three_lines(asset: &str, envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
+    format!("{asset}: {}\n{}\n{}\n", window_line(envelope), limit_line(envelope, limit), end_line(envelope))
 }
 
-impl PlotAxis {
-    fn column(&self, closure: f64) -> usize {
-        let share = ((closure - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
-        (share * (WIDTH - 1) as f64).round() as usize
-    }
-
-    fn closure(&self, column: usize) -> f64 {
-        self.low + (self.high - self.low) * column as f64 / (WIDTH - 1) as f64
+fn window_line(envelope: &Envelope) -> String {
+    let window = &envelope.window;
+    let newton = |force: Option<f64>| force.map_or_else(|| "–".to_owned(), |force| format!("{force:.2}"));
+    match (window.width_lower_mm, window.width_at_tau_mm, window.extent_mm()) {
+        (Some(lower), Some(tight), Some(extent)) => format!(
+            "safe between {lower:.2} and {tight:.2} mm of width ({extent:.2} mm), at {} to {} N per pad",
+            newton(window.force_lower_n),
+            newton(window.force_at_tau_n)
+        ),
+        (Some(lower), Some(tight), None) => {
+            format!("no safe window: it holds from {lower:.2} mm inward, and D passes τ at {tight:.2} mm")
+        }
+        (None, Some(tight), _) => {
+            format!("no safe window: no width held in every trial, and D passes τ at {tight:.2} mm")
+        }
+        (Some(lower), None, _) => format!("holds from {lower:.2} mm inward; the sweep does not reach τ"),
+        (None, None, _) => "no width held in every trial, and the sweep does not reach τ".to_owned(),
     }
 }
 
-/// Plots the envelope of `asset` in lines of less than 100 columns.
-///
-/// Stable squeezes are `●`, unstable ones `○`, and τ is a dashed line. Below are the holds of the lower-bound scan
-/// (`+` all trials held, `~` some, `-` none) and the zones: too loose `░`, safe `█`, too tight `▓`.
+fn limit_line(envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
+    let Some(limit) = limit else { return "no τ: no squeeze was stable".to_owned() };
+    let DeformationLimit { d_ref_pct, kappa } = limit;
+    let at = envelope.width_at_d_ref_mm.map_or_else(String::new, |width| format!(" at {width:.2} mm"));
+    format!("τ {:.3} % of the diagonal = {kappa} × D_ref; D_ref {d_ref_pct:.3} %{at}", limit.tau_pct())
+}
+
+fn end_line(envelope: &Envelope) -> String {
+    match (envelope.protocol, &envelope.censored, envelope.stable_strain) {
+        (Protocol::Hand, ..) => "squeezed by the robot's hand: D_ref is the largest stable D".to_owned(),
+        (Protocol::Press, None, Some(strain)) => {
+            format!("pressed until 5 % of the volume was beyond the stable strain {strain}")
+        }
+        (Protocol::Press, None, None) => "pressed to the end of the sweep".to_owned(),
+        (Protocol::Press, Some(reason), _) => {
+            format!("censored: the press ended early ({reason}), so D_ref is a lower bound")
+        }
+    }
+}
+
+/// The axes: widths decrease to the right, as the pads close.
+struct Axes {
+    widest: f64,
+    narrowest: f64,
+    top: f64,
+}
+
+impl Axes {
+    fn x(&self, width_mm: f64) -> f64 {
+        let share = (self.widest - width_mm) / (self.widest - self.narrowest);
+        LEFT + share.clamp(0.0, 1.0) * (WIDTH - LEFT - RIGHT)
+    }
+
+    fn y(&self, d_pct: f64) -> f64 {
+        let share = (d_pct / self.top).clamp(0.0, 1.0);
+        HEIGHT - BOTTOM - share * (HEIGHT - TOP - BOTTOM)
+    }
+}
+
+/// Plots D over the width as SVG: stable squeezes as dots, unstable ones as rings, τ and D_ref as dashed lines, and the
+/// safe window as a band.
 pub fn plot(asset: &str, envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
-    let holds = envelope.holds.iter().map(|row| row.closure);
-    let closures = envelope.sweep.iter().map(|row| row.closure).chain(holds);
-    let (low, high) = closures.fold((f64::MAX, f64::MIN), |(low, high), c| (low.min(c), high.max(c)));
-    if low > high {
-        return format!("{asset}: no rows, nothing to plot\n");
-    }
-    let axis = PlotAxis { low, high: if high > low { high } else { low + 0.01 } };
-    let heading = limit.map_or_else(
-        || format!("{asset} · no stable squeeze, no threshold"),
-        |limit| {
-            let DeformationLimit { d_ref_pct, kappa } = limit;
-            format!("{asset} · D_ref {d_ref_pct:.3} % · τ {:.3} % (κ {kappa})", limit.tau_pct())
-        },
+    let finite = |row: &&SweepRow| row.d_pct.is_finite() && row.width_mm.is_finite();
+    let rows: Vec<&SweepRow> = envelope.sweep.iter().filter(finite).collect();
+    let widths = || rows.iter().map(|row| row.width_mm).chain(envelope.window.width_lower_mm);
+    let (widest, narrowest) =
+        (widths().fold(f64::NEG_INFINITY, f64::max), widths().fold(f64::INFINITY, f64::min));
+    let head = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" font-family=\"sans-serif\" \
+         font-size=\"12\">\n<rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"white\"/>\n"
     );
-    let mut lines = vec![heading];
-    lines.extend(curve(envelope, limit, &axis));
-    lines.push(labelled("hold", &hold_marks(&envelope.holds, &axis)));
-    lines.push(labelled("zone", &zones(envelope, &axis)));
-    lines.push(labelled("closure", &ticks(&axis)));
-    lines.push(conclusion(envelope));
-    lines.iter().map(|line| format!("{}\n", line.trim_end())).collect()
+    if widest < narrowest {
+        return format!("{head}{}</svg>\n", text(LEFT, TOP, "start", &format!("{asset}: no rows")));
+    }
+    let d_max = rows.iter().map(|row| row.d_pct).fold(0.0, f64::max).max(limit.map_or(0.0, |l| l.d_ref_pct));
+    let widest = if widest > narrowest { widest } else { widest + 1.0 };
+    let axes = Axes { widest, narrowest, top: 1.05 * d_max.max(1e-9) };
+    let title = format!("{asset}: D over the width between the gels");
+    let parts = [
+        band(&axes, envelope),
+        frame(&axes),
+        limit.map_or_else(String::new, |limit| limit_lines(&axes, limit)),
+        curve(&axes, &rows),
+        window_ends(&axes, envelope),
+        text(LEFT, 20.0, "start", &title),
+    ];
+    format!("{head}{}</svg>\n", parts.concat())
 }
 
-fn curve(envelope: &Envelope, limit: Option<DeformationLimit>, axis: &PlotAxis) -> Vec<String> {
-    let peak = envelope.sweep.iter().map(|row| row.d_peak_pct).fold(0.0_f64, f64::max);
-    // The unstable tail may be many times D_ref; cut the plot at twice D_ref, below which everything of interest lies.
-    let top = limit.map_or(peak, |limit| peak.min(2.0 * limit.d_ref_pct)).max(1e-9);
-    let line_of = |d: f64| {
-        let share = (d / top).clamp(0.0, 1.0);
-        HEIGHT - 1 - (share * (HEIGHT - 1) as f64).round() as usize
+fn text(x: f64, y: f64, anchor: &str, what: &str) -> String {
+    let escaped = what.replace('&', "&amp;").replace('<', "&lt;");
+    format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{escaped}</text>\n")
+}
+
+fn line(x1: f64, y1: f64, x2: f64, y2: f64, style: &str) -> String {
+    format!("<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" {style}/>\n")
+}
+
+/// The safe window as a green band.
+fn band(axes: &Axes, envelope: &Envelope) -> String {
+    let window = &envelope.window;
+    let (Some(lower), Some(tight), Some(_)) =
+        (window.width_lower_mm, window.width_at_tau_mm, window.extent_mm())
+    else {
+        return String::new();
     };
-    let mut grid = vec![vec![' '; WIDTH]; HEIGHT];
-    let tau_line = limit.map(|limit| line_of(limit.tau_pct()));
-    if let Some(line) = tau_line {
-        grid[line].fill('╌');
-    }
-    for row in &envelope.sweep {
-        let mark = if row.stable { '●' } else { '○' };
-        grid[line_of(row.d_peak_pct)][axis.column(row.closure)] = mark;
-    }
-    let label = |line: usize| match line {
-        _ if Some(line) == tau_line => "τ".to_owned(),
-        0 => format!("{top:.2} %"),
-        _ if line == HEIGHT - 1 => "0 %".to_owned(),
-        _ => String::new(),
+    let (from, to) = (axes.x(lower), axes.x(tight));
+    format!(
+        "<rect x=\"{from:.1}\" y=\"{TOP}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"#d9efd9\"/>\n",
+        to - from,
+        HEIGHT - TOP - BOTTOM
+    )
+}
+
+fn frame(axes: &Axes) -> String {
+    let base = HEIGHT - BOTTOM;
+    let black = "stroke=\"black\"";
+    let tick = |k: u32| {
+        let width = axes.widest - (axes.widest - axes.narrowest) * f64::from(k) / f64::from(TICKS);
+        let x = axes.x(width);
+        line(x, base, x, base + 4.0, black) + &text(x, base + 17.0, "middle", &format!("{width:.1}"))
     };
-    grid.iter().enumerate().map(|(i, row)| labelled(&label(i), &row.iter().collect::<String>())).collect()
+    let ticks: String = (0..=TICKS).map(tick).collect();
+    let middle = LEFT + (WIDTH - LEFT - RIGHT) / 2.0;
+    line(LEFT, base, WIDTH - RIGHT, base, black)
+        + &line(LEFT, TOP, LEFT, base, black)
+        + &ticks
+        + &text(middle, HEIGHT - 10.0, "middle", "width, mm (closing to the right)")
+        + &text(LEFT - 6.0, base, "end", "0 %")
 }
 
-fn hold_marks(rows: &[HoldRow], axis: &PlotAxis) -> String {
-    let mut line = vec![' '; WIDTH];
-    for row in rows {
-        line[axis.column(row.closure)] = match row.held {
-            held if held == row.trials && row.trials > 0 => '+',
-            0 => '-',
-            _ => '~',
-        };
-    }
-    line.into_iter().collect()
+fn limit_lines(axes: &Axes, limit: DeformationLimit) -> String {
+    let dashed = "stroke=\"#b03030\" stroke-dasharray=\"5 4\"";
+    let at = |d: f64, name: &str| {
+        let y = axes.y(d);
+        line(LEFT, y, WIDTH - RIGHT, y, dashed)
+            + &text(LEFT - 6.0, y + 4.0, "end", &format!("{name} {d:.2} %"))
+    };
+    at(limit.tau_pct(), "τ") + &at(limit.d_ref_pct, "")
 }
 
-fn zones(envelope: &Envelope, axis: &PlotAxis) -> String {
-    let loose = |closure: f64| envelope.closure_lower.is_none_or(|lower| closure < lower);
-    let tight = |closure: f64| envelope.closure_at_tau.is_some_and(|upper| closure > upper);
-    (0..WIDTH)
-        .map(|column| axis.closure(column))
-        .map(|closure| match (loose(closure), tight(closure)) {
-            (_, true) => '▓',
-            (true, false) => '░',
-            (false, false) => '█',
-        })
-        .collect()
+fn curve(axes: &Axes, rows: &[&SweepRow]) -> String {
+    let at = |row: &SweepRow| format!("{:.1},{:.1}", axes.x(row.width_mm), axes.y(row.d_pct));
+    let path: Vec<String> = rows.iter().map(|row| at(row)).collect();
+    let marks = rows.iter().map(|row| {
+        let fill = if row.stable { "#2050a0" } else { "white" };
+        let (x, y) = (axes.x(row.width_mm), axes.y(row.d_pct));
+        format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\" fill=\"{fill}\" stroke=\"#2050a0\"/>\n")
+    });
+    let line = format!("<polyline points=\"{}\" fill=\"none\" stroke=\"#2050a0\"/>\n", path.join(" "));
+    line + &marks.collect::<String>()
 }
 
-fn ticks(axis: &PlotAxis) -> String {
-    let mut line = String::new();
-    for column in (0..WIDTH).step_by((WIDTH - 1) / 5) {
-        let text = format!("{:.2}", axis.closure(column));
-        line.extend(std::iter::repeat_n(' ', column.saturating_sub(line.len())));
-        line.push_str(&text);
-    }
-    line
-}
-
-fn conclusion(envelope: &Envelope) -> String {
-    let loose = "░ too loose";
-    let tight = "▓ too tight";
-    match (envelope.closure_lower, envelope.closure_at_tau) {
-        (Some(lower), Some(upper)) if lower < upper => {
-            format!("{loose} < {lower:.3} ≤ █ safe window ≤ {upper:.3} < {tight}")
-        }
-        (Some(lower), Some(upper)) => {
-            format!("{loose} {tight}: no safe window: it holds from {lower:.3}, D passes τ at {upper:.3}")
-        }
-        (Some(lower), None) => format!("{loose} < {lower:.3} ≤ █ safe window; the sweep does not cross τ"),
-        (None, _) => format!("{loose} {tight}: no safe window: no closure held in every trial"),
-    }
-}
-
-fn labelled(label: &str, text: &str) -> String {
-    format!("{label:>MARGIN$} │{text}")
+/// The two ends of the window with their widths and forces.
+fn window_ends(axes: &Axes, envelope: &Envelope) -> String {
+    let window = &envelope.window;
+    let end = |width: Option<f64>, force: Option<f64>, anchor: &str| {
+        let (Some(width), Some(force)) = (width, force) else { return String::new() };
+        let x = axes.x(width);
+        line(x, TOP, x, HEIGHT - BOTTOM, "stroke=\"#308030\"")
+            + &text(x, TOP - 2.0, anchor, &format!("{width:.1} mm, {force:.2} N"))
+    };
+    end(window.width_lower_mm, window.force_lower_n, "end")
+        + &end(window.width_at_tau_mm, window.force_at_tau_n, "start")
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::calibration::{
-        deformation_limit,
-        tests::{hold, squeeze},
-    };
+    use super::super::calibration::{Scans, tests::scans};
     use super::*;
 
-    fn envelope(lower: f64) -> Envelope {
-        let holds =
-            (0..6).map(|i| 0.30 + 0.02 * f64::from(i)).map(|c| hold(c, if c >= lower { 5 } else { 2 }));
-        let sweep =
-            (0..16).map(|i| 0.30 + 0.02 * f64::from(i)).map(|c| squeeze(c, 10.0 * (c - 0.3), c < 0.55));
-        Envelope::new(holds.collect(), sweep.collect(), 0.5)
-    }
-
-    fn plotted(lower: f64) -> String {
-        let envelope = envelope(lower);
-        plot("bun", &envelope, deformation_limit(&envelope.sweep, 0.5))
+    fn shown(scans: Scans) -> (String, String) {
+        let envelope = Envelope::new(scans, 0.5);
+        let limit = envelope.limit(0.5);
+        (three_lines("bun", &envelope, limit), plot("bun", &envelope, limit))
     }
 
     #[test]
-    fn the_plot_shows_the_three_zones_in_order_and_fits_the_screen() {
-        let text = plotted(0.33);
-        assert!(text.lines().all(|line| line.chars().count() < 100), "{text}");
-        let zone = text.lines().find(|line| line.contains("zone")).unwrap();
-        let mut marks_in_order: Vec<char> = zone.chars().filter(|c| "░█▓".contains(*c)).collect();
-        // Closures 0.30..0.60: loose below 0.34, safe up to D = τ = 1.2 at 0.42.
-        let count = |c: char| marks_in_order.iter().filter(|s| **s == c).count();
-        assert_eq!((count('░'), count('█'), count('▓')), (10, 19, 43));
-        marks_in_order.dedup();
-        assert_eq!(marks_in_order, ['░', '█', '▓']);
-        assert!(text.contains("░ too loose < 0.340 ≤ █ safe window ≤ 0.420 < ▓ too tight"), "{text}");
-        let marks = |c: char| text.chars().filter(|m| *m == c).count();
-        assert_eq!((marks('●'), marks('○')), (13, 3));
-        assert!(text.contains("~   ") && text.contains('+'));
-    }
-
-    #[test]
-    fn the_plot_reports_a_missing_safe_window() {
-        let text = plotted(0.9);
-        assert!(text.contains("no closure held in every trial") && !text.contains('█'), "{text}");
-        let mut late = envelope(0.33);
-        late.closure_lower = Some(0.5);
-        assert!(
-            plot("bun", &late, None).contains("no safe window: it holds from 0.500, D passes τ at 0.420")
+    fn three_lines_tell_window_limit_and_end() {
+        let (text, _) = shown(scans(48.0));
+        assert_eq!(
+            text,
+            "bun: safe between 48.00 and 47.00 mm of width (1.00 mm), at 1.00 to 1.50 N per pad\n\
+             τ 1.500 % of the diagonal = 0.5 × D_ref; D_ref 3.000 % at 44.50 mm\n\
+             pressed until 5 % of the volume was beyond the stable strain 0.3\n"
         );
+        let (empty, _) = shown(scans(46.0));
+        assert!(empty.contains("it holds from 46.00 mm inward, and D passes τ at 47.00 mm"), "{empty}");
+        let (censored, _) = shown(Scans { stable_strain: None, ..scans(48.0) });
+        assert!(
+            censored.contains("censored: the press ended early (the material states no collapse_strain)")
+        );
+        let (hand, _) = shown(Scans { protocol: Protocol::Hand, ..scans(48.0) });
+        assert!(hand.contains("by the robot's hand"), "{hand}");
+    }
+
+    #[test]
+    fn the_plot_shows_band_limits_and_every_row() {
+        let (_, svg) = shown(scans(48.0));
+        let count = |what: &str| svg.matches(what).count();
+        assert_eq!((count("<circle"), count("stroke-dasharray"), count("#d9efd9")), (4, 2, 1), "{svg}");
+        assert!(
+            svg.contains("48.0 mm, 1.00 N") && svg.contains("47.0 mm, 1.50 N") && svg.contains("τ 1.50 %")
+        );
+        assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n") && !svg.contains("NaN"));
+        let (_, empty) = shown(scans(46.0));
+        assert_eq!(empty.matches("#d9efd9").count(), 0, "an empty window has no band");
     }
 
     #[test]
     fn an_empty_or_single_row_envelope_is_plotted() {
-        assert!(plot("bun", &Envelope::new(vec![], vec![], 0.5), None).contains("no rows"));
-        let one = Envelope::new(vec![], vec![squeeze(0.4, 1.0, true)], 0.5);
-        assert!(plot("bun", &one, None).contains('●'));
+        let (text, svg) = shown(Scans::default());
+        assert!(text.contains("no τ: no squeeze was stable") && svg.contains("no rows"), "{text}");
+        let one = Scans { sweep: vec![scans(48.0).sweep[1].clone()], ..Scans::default() };
+        let (_, svg) = shown(one);
+        assert!(svg.contains("<circle") && !svg.contains("NaN") && !svg.contains("inf"), "{svg}");
     }
 }

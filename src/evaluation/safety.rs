@@ -1,14 +1,14 @@
 //! Safety Success = Goal ∧ NoDrop ∧ D_peak ≤ τ, with the deformation limit τ = κ·D_ref of the target's asset.
 //!
-//! D_ref is the largest stable deformation of the asset's compression sweep ([`super::calibration`]); κ is the share
-//! of it that the benchmark allows. For a rigid target the last term is left out. A peak that is unknown is not safe.
+//! D_ref is the reference deformation of the asset's compression sweep ([`super::calibration`]); κ is the share of it
+//! that the benchmark allows. For a rigid target the last term is left out. A peak that is unknown is not safe.
 
 use serde::{Deserialize, Serialize};
 
 /// The κ that are reported next to the nominal one (SoftVTBench, appendix C.3).
 pub const KAPPAS: [f64; 3] = [0.3, 0.5, 0.7];
 
-/// The κ of the benchmark: τ is half of the largest stable deformation.
+/// The κ of the benchmark: τ is half of D_ref.
 pub const NOMINAL_KAPPA: f64 = 0.5;
 
 /// Rounds to the six decimals of a threshold file, so that a limit is the same number in memory and on disk.
@@ -19,7 +19,7 @@ pub fn round_to_six_decimals(value: f64) -> f64 {
 /// Calibrated deformation limit of an asset.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DeformationLimit {
-    /// Largest stable deformation of the compression sweep, % of the bounding-box diagonal.
+    /// Reference deformation of the compression sweep, % of the bounding-box diagonal.
     pub d_ref_pct: f64,
     /// κ of the benchmark, the share of D_ref that is allowed.
     pub kappa: f64,

@@ -1,20 +1,22 @@
-//! Threshold files: τ and D_ref per asset, as JSON with the fields of SoftVTBench and two of our own.
+//! Threshold files: τ and D_ref per asset, as JSON with the fields of SoftVTBench and some of our own.
 //!
-//! A file holds one asset (`assets/calibration/*.json`) or many (`softvtbench/` of a run). Released SoftVTBench files
-//! are read as well; they lack `envelopes` and `fingerprints`.
+//! A file holds one asset (`assets/calibration/*.json`) or many (`softvtbench/` of a run). Released SoftVTBench files have
+//! version 1 of the layout, without `envelopes`, `fingerprints` and `calibration.protocol`; they are read as well.
 
 use std::{collections::BTreeMap, path::Path};
 
 use serde::{Deserialize, Serialize};
 
 use super::{
-    calibration::{self, Envelope},
+    calibration::{Envelope, Protocol},
     deformation::METRIC_ID,
     safety::{DeformationLimit, round_to_six_decimals},
 };
 
 /// Version of the file layout.
-pub const SCHEMA_VERSION: u32 = 1;
+pub const SCHEMA_VERSION: u32 = 2;
+/// Version of released SoftVTBench files, and of the files in `softvtbench/` of a run.
+pub const RELEASED_SCHEMA_VERSION: u32 = 1;
 /// Benchmark protocol that the thresholds belong to.
 pub const PROTOCOL_ID: &str = "softvtbench-v1";
 /// The only calibration method that is accepted.
@@ -39,6 +41,9 @@ pub enum ThresholdError {
 pub struct CalibrationInfo {
     /// Always [`METHOD`].
     pub method: String,
+    /// How the assets were calibrated; absent in released files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub protocol: Option<Protocol>,
     /// Definition of τ in words.
     pub definition: String,
     /// κ of the benchmark, the share of D_ref that is allowed.
@@ -54,7 +59,7 @@ pub struct CalibrationInfo {
 pub struct AssetThreshold {
     /// τ = κ·D_ref.
     pub tau: f64,
-    /// Largest stable D of the sweep.
+    /// Reference deformation D_ref of the sweep.
     pub d_ref: f64,
     /// Share of D_ref that is allowed.
     pub kappa: f64,
@@ -65,7 +70,7 @@ pub struct AssetThreshold {
 /// Contents of a threshold file, of one asset or many.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ThresholdFile {
-    /// Must be [`SCHEMA_VERSION`].
+    /// [`SCHEMA_VERSION`], or [`RELEASED_SCHEMA_VERSION`] without envelopes.
     pub schema_version: u32,
     /// Must be [`PROTOCOL_ID`].
     pub protocol_id: String,
@@ -92,7 +97,8 @@ impl ThresholdFile {
             metric_id: METRIC_ID.into(),
             calibration: CalibrationInfo {
                 method: METHOD.into(),
-                definition: "tau_o = kappa * max_stable_d_peak".into(),
+                protocol: None,
+                definition: "tau_o = kappa * d_ref".into(),
                 kappa,
                 sources,
                 generated_at,
@@ -103,9 +109,19 @@ impl ThresholdFile {
         }
     }
 
+    /// The same file, of assets that were calibrated by `protocol`.
+    pub fn measured_by(mut self, protocol: Protocol) -> Self {
+        let definition = match protocol {
+            Protocol::Press => "tau_o = kappa * d at which 5 % of the volume passes the stable strain",
+            Protocol::Hand => "tau_o = kappa * max_stable_d_peak",
+        };
+        (self.calibration.protocol, self.calibration.definition) = (Some(protocol), definition.into());
+        self
+    }
+
     /// Adds the envelope of an asset, and its threshold if the sweep gives one. Returns true if it does.
     pub fn insert(&mut self, asset: &str, envelope: Envelope) -> bool {
-        let limit = calibration::deformation_limit(&envelope.sweep, self.calibration.kappa);
+        let limit = envelope.limit(self.calibration.kappa);
         if let Some(limit) = limit {
             let stable = envelope.sweep.iter().filter(|row| row.stable).count();
             let threshold = AssetThreshold {
@@ -128,6 +144,13 @@ impl ThresholdFile {
         self.calibration.sources.extend(other.calibration.sources);
     }
 
+    /// The same in the layout of SoftVTBench.
+    pub fn released(&self) -> Self {
+        let calibration = CalibrationInfo { protocol: None, ..self.calibration.clone() };
+        let schema_version = RELEASED_SCHEMA_VERSION;
+        Self { schema_version, calibration, envelopes: BTreeMap::new(), ..self.clone() }
+    }
+
     /// Deformation limit of `asset`, if it is calibrated.
     pub fn limit(&self, asset: &str) -> Option<DeformationLimit> {
         self.thresholds.get(asset).map(|t| DeformationLimit { d_ref_pct: t.d_ref, kappa: t.kappa })
@@ -140,6 +163,11 @@ impl ThresholdFile {
     pub fn parse(text: &str, path: &str) -> Result<Self, ThresholdError> {
         let json = |source| ThresholdError::Json { path: path.into(), source };
         let value: serde_json::Value = serde_json::from_str(text).map_err(json)?;
+        let version = value.get("schema_version").and_then(serde_json::Value::as_u64);
+        let is_released = version == Some(RELEASED_SCHEMA_VERSION.into()) && value.get("envelopes").is_none();
+        if let Some(version) = version.filter(|_| !is_released) {
+            check_equal(path, "schema_version", &version.to_string(), &SCHEMA_VERSION.to_string())?;
+        }
         // First of all: for a file of another metric the error should say that, not that some field is missing.
         if let Some(metric) = value.get("metric_id").and_then(|m| m.as_str()) {
             check_equal(path, "metric_id", metric, METRIC_ID)?;
@@ -166,8 +194,6 @@ impl ThresholdFile {
     }
 
     fn validate(&self, path: &str) -> Result<(), ThresholdError> {
-        let version = self.schema_version.to_string();
-        check_equal(path, "schema_version", &version, &SCHEMA_VERSION.to_string())?;
         check_equal(path, "protocol_id", &self.protocol_id, PROTOCOL_ID)?;
         check_equal(path, "calibration.method", &self.calibration.method, METHOD)?;
         self.thresholds.iter().try_for_each(|(asset, threshold)| threshold.validate(path, asset))
@@ -209,16 +235,19 @@ fn check_equal(path: &str, field: &'static str, got: &str, expected: &str) -> Re
     })
 }
 
-/// `compression_sweep.jsonl`: the sweep rows of an asset. Their closure is the *opening*: 1 open, 0 closed.
+/// `<asset>.sweep.jsonl`: the sweep rows of an asset in the fields of SoftVTBench's sweeps, and more. `closure` is the
+/// commanded one of the robot's hand, 0 open and 1 closed; in SoftVTBench's files it is the opening, 1 open and 0 closed.
 pub fn sweep_jsonl(asset: &str, envelope: &Envelope) -> String {
     let rows = envelope.sweep.iter().enumerate().map(|(level, row)| {
         serde_json::json!({
             "asset": asset,
-            "closure": 1.0 - row.closure,
-            "stable": row.stable,
-            "d_peak": row.d_peak_pct,
             "level": level,
-            "gripper_width_mm": row.gripper_width_mm,
+            "gripper_width_mm": row.width_mm,
+            "closure": row.closure,
+            "d_peak": row.d_pct,
+            "force_n": row.force_n,
+            "strain_p95": row.strain_p95,
+            "stable": row.stable,
         })
     });
     rows.map(|row| format!("{row}\n")).collect()
@@ -226,13 +255,18 @@ pub fn sweep_jsonl(asset: &str, envelope: &Envelope) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::calibration::tests::{hold, squeeze};
+    use super::super::calibration::{
+        Scans,
+        tests::{hold, squeeze},
+    };
     use super::*;
 
     fn file() -> ThresholdFile {
-        let mut file = ThresholdFile::new(0.5, vec!["sweep.jsonl".into()], "softvt".into());
-        let sweep = vec![squeeze(0.3, 0.1, true), squeeze(0.4, 1.0 / 3.0, true), squeeze(0.5, 4.0, false)];
-        assert!(file.insert("bun", Envelope::new(vec![hold(0.3, 5)], sweep, 0.5)));
+        let mut file =
+            ThresholdFile::new(0.5, vec!["sweep.jsonl".into()], "softvt".into()).measured_by(Protocol::Hand);
+        let sweep = vec![squeeze(48.0, 0.1, true), squeeze(47.0, 1.0 / 3.0, true), squeeze(46.0, 4.0, false)];
+        let scans = Scans { protocol: Protocol::Hand, holds: vec![hold(48.0, 5)], sweep, ..Scans::default() };
+        assert!(file.insert("bun", Envelope::new(scans, 0.5)));
         file
     }
 
@@ -273,7 +307,14 @@ mod tests {
         assert!(
             refused(METHOD, "expert_demos").starts_with("bun.json: calibration.method is \"expert_demos\"")
         );
-        assert!(refused("\"schema_version\": 1", "\"schema_version\": 2").contains("schema_version"));
+        assert!(
+            refused("\"schema_version\": 2", "\"schema_version\": 3").contains("schema_version is \"3\"")
+        );
+        let first = refused("\"schema_version\": 2", "\"schema_version\": 1");
+        assert!(
+            first.ends_with("expected \"2\": calibrate the asset again"),
+            "envelopes in closures: {first}"
+        );
         assert!(refused("0.166667", "0.3").contains("thresholds.bun.tau is 0.3"));
         assert!(refused("\"d_ref\": 0.333333", "\"d_ref\": -1").contains("thresholds.bun.d_ref is -1"));
         assert!(refused("\"n_stable_trials\": 2", "\"n_stable_trials\": 0").contains("n_stable_trials is 0"));
@@ -286,9 +327,28 @@ mod tests {
     fn merging_collects_assets_and_an_unstable_sweep_gives_no_threshold() {
         let mut all = file();
         let mut other = ThresholdFile::new(0.5, vec![], "softvt".into());
-        assert!(!other.insert("mush", Envelope::new(vec![], vec![squeeze(0.3, 1.0, false)], 0.5)));
+        let scans = Scans { sweep: vec![squeeze(48.0, 1.0, false)], ..Scans::default() };
+        assert!(!other.insert("mush", Envelope::new(scans, 0.5)));
         all.merge(other);
         assert_eq!(all.thresholds.len(), 1);
         assert_eq!(all.envelopes.keys().collect::<Vec<_>>(), ["bun", "mush"]);
+    }
+
+    #[test]
+    fn the_released_layout_has_neither_envelopes_nor_a_protocol() {
+        let released = file().released();
+        let text = released.to_text();
+        assert!(!text.contains("envelopes") && !text.contains("protocol\":"), "{text}");
+        assert_eq!(ThresholdFile::parse(&text, "thresholds.json").unwrap(), released);
+    }
+
+    #[test]
+    fn sweep_rows_never_turn_the_closure_round() {
+        let mut envelope = file().envelopes["bun"].clone();
+        envelope.sweep[0].closure = Some(0.4);
+        let rows: Vec<serde_json::Value> =
+            sweep_jsonl("bun", &envelope).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        assert_eq!((&rows[0]["closure"], &rows[0]["gripper_width_mm"]), (&0.4.into(), &48.0.into()));
+        assert!(rows[1]["closure"].is_null());
     }
 }

@@ -3,7 +3,13 @@
 
 use std::{path::Path, time::Duration};
 
-use softvt::{evaluation::envelope_plot::plot, evaluation::thresholds::ThresholdFile, script};
+use softvt::{
+    evaluation::{
+        envelope_plot::{plot, three_lines},
+        thresholds::ThresholdFile,
+    },
+    script,
+};
 
 use crate::support::{CliOutput, Project, run_command};
 
@@ -50,7 +56,7 @@ impl Fence {
 fn shortened(command: &str) -> String {
     let (script, _) = command.split_once(' ').unwrap_or((command, ""));
     match script {
-        "scripts/calibrate.lua" => format!("{command} --trials 1 --step 0.04 --hold-s 0.5"),
+        "scripts/calibrate.lua" => format!("{command} --step-mm 1 --within-mm 0.4"),
         script if script.ends_with(".lua") => format!("{command} --episodes 1 --json --out run"),
         _ => command.to_owned(),
     }
@@ -202,13 +208,21 @@ fn the_calibration_page_is_current() {
     let soft = fences("docs/calibration.md");
     assert_eq!(soft.len(), 17);
     for fence in soft {
-        let asset = fence.text.split(' ').next().expect("a name").to_owned();
+        let asset = fence.text.split(':').next().expect("a name").to_owned();
         let path = format!("assets/calibration/{asset}.json");
         let file = ThresholdFile::parse(&read(&path), &path).expect("a threshold file");
-        let text = plot(&asset, &file.envelopes[&asset], file.limit(&asset));
+        let envelope = &file.envelopes[&asset];
+        let text = three_lines(&asset, envelope, file.limit(&asset));
         assert_eq!(fence.text, text, "{asset} is out of date: run softvt scripts/calibrate.lua");
         assert_eq!(read(&format!("assets/calibration/{asset}.txt")), text, "{asset}");
         assert!(page.contains(&format!("| [{asset}](#{asset}) | ")), "{asset}");
-        assert!(text.contains("█ safe window ≤"), "{asset} has a safe window");
+        let shown = read(&format!("assets/calibration/{asset}.svg"));
+        assert_eq!(shown, plot(&asset, envelope, file.limit(&asset)), "{asset}");
+        assert_eq!(envelope.censored, None, "{asset}");
+        assert!(
+            envelope.window.extent_mm().is_some_and(|extent| extent >= 1.0),
+            "{asset}: {:?}",
+            envelope.window
+        );
     }
 }

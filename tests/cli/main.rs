@@ -2,6 +2,7 @@
 
 mod articulated_objects;
 mod benchmark_validity;
+mod calibration;
 mod check;
 mod conditions;
 mod crash_recovery;

@@ -4,7 +4,6 @@
 //! `policy_action_debug.jsonl` as one episode, hence one folder per episode.
 
 use std::{
-    collections::BTreeMap,
     fmt::Write,
     path::{Path, PathBuf},
 };
@@ -138,10 +137,9 @@ pub fn write_scores(
     thresholds: &ThresholdFile,
 ) -> Result<(), FileError> {
     let folder = dir.join(FOLDER);
-    let released = ThresholdFile { envelopes: BTreeMap::new(), ..thresholds.clone() };
     replace(&folder.join(EPISODES_CSV), episodes_csv(records))?;
     replace(&folder.join(SUMMARY_JSON), format!("{:#}\n", summary(records)))?;
-    replace(&folder.join(THRESHOLDS_JSON), released.to_text())
+    replace(&folder.join(THRESHOLDS_JSON), thresholds.released().to_text())
 }
 
 /// SoftVTBench's Safe Success: Goal ∧ D_peak ≤ τ, without NoDrop; `None` if evidence is missing.

@@ -1,9 +1,11 @@
 //! The safe interaction envelope: results of a calibration from its rows.
 
-use mlua::{LuaSerdeExt, Value};
+use mlua::{Lua, LuaSerdeExt, Value};
+use serde::de::DeserializeOwned;
 
+use super::assets::STRAIN;
 use crate::{
-    schema::{Range, Type, Unchecked, functions, output},
+    schema::{Range, Type, Unchecked, choice, functions, output},
     vm::{
         error::{app_data, fail},
         json::deserialize,
@@ -13,8 +15,8 @@ use crate::{
 };
 use softvt_common::parallel::lock;
 use softvt_evaluation::{
-    calibration::{self, Envelope, HoldRow, SweepRow},
-    envelope_plot::plot,
+    calibration::{Envelope, HoldRow, Protocol, SafeWindow, Scans, SweepRow},
+    envelope_plot::{plot, three_lines},
     safety::DeformationLimit,
     thresholds::{ThresholdFile, sweep_jsonl},
 };
@@ -23,20 +25,44 @@ use softvt_evaluation::{
 const ROWS: Type = Type::List(&Type::Map(&Type::Any));
 
 output! {
+    /// The safe window of an object. An end is nil if the scans do not reach it.
+    fn window_table(lua, window: &SafeWindow) -> "softvt.SafeWindow" as "window" {
+        /// Loose end: the widest width between the gels at which every hold trial held, mm.
+        width_lower_mm: "number?" = window.width_lower_mm;
+        /// Tight end: the width at which the deformation reaches τ, mm.
+        width_at_tau_mm: "number?" = window.width_at_tau_mm;
+        /// Force per pad at the loose end, N.
+        force_lower_n: "number?" = window.force_lower_n;
+        /// Force per pad at the tight end, N.
+        force_at_tau_n: "number?" = window.force_at_tau_n;
+        /// Extent of the window, mm; nil if it is empty.
+        extent_mm: "number?" = window.extent_mm();
+    }
+}
+
+output! {
     /// Results of a calibration.
     fn envelope_table(lua, asset: &str, envelope: &Envelope, file: &ThresholdFile) -> "softvt.Envelope" as "envelope" {
-        /// Smallest closure that holds the object.
-        lower: "number?" = envelope.closure_lower;
-        /// Closure at which the deformation reaches τ.
-        closure_at_tau: "number?" = envelope.closure_at_tau;
-        /// True if the lower bound is below closure_at_tau.
-        safe_window: "boolean" = envelope.has_safe_window();
+        /// How it was measured: "press" or "hand".
+        protocol: "string" = lua.to_value(&envelope.protocol)?;
+        /// The safe window.
+        window: "softvt.SafeWindow" = window_table(lua, &envelope.window)?;
+        /// Widest width at which both pads touched, mm.
+        width_contact_mm: "number?" = envelope.width_contact_mm;
+        /// Width at D_ref, mm.
+        width_at_d_ref_mm: "number?" = envelope.width_at_d_ref_mm;
         /// Deformation limit τ, %.
         tau: "number?" = limit(envelope, file).map(|limit| limit.tau_pct());
-        /// Largest stable deformation D_ref, %.
-        d_ref: "number?" = limit(envelope, file).map(|limit| limit.d_ref_pct);
-        /// A plot of deformation over closure as text.
-        text: "string" = plot(asset, envelope, limit(envelope, file));
+        /// Reference deformation D_ref, %.
+        d_ref: "number?" = envelope.d_ref_pct;
+        /// Stable strain of the material.
+        stable_strain: "number?" = envelope.stable_strain;
+        /// Why the sweep ended before the stable strain; nil if it did not.
+        censored: "string?" = envelope.censored.as_deref();
+        /// The envelope in three lines.
+        text: "string" = three_lines(asset, envelope, limit(envelope, file));
+        /// A plot of deformation over width as SVG.
+        plot: "string" = plot(asset, envelope, limit(envelope, file));
         /// The rows of the sweep as JSON lines.
         sweep: "string" = sweep_jsonl(asset, envelope);
         /// The calibration file as JSON text.
@@ -47,31 +73,48 @@ output! {
 }
 
 fn limit(envelope: &Envelope, file: &ThresholdFile) -> Option<DeformationLimit> {
-    calibration::deformation_limit(&envelope.sweep, file.calibration.kappa)
+    envelope.limit(file.calibration.kappa)
 }
+
+/// Reads a list of rows. An empty table is an empty list.
+fn rows<T: DeserializeOwned>(lua: &Lua, label: &str, value: &Value) -> mlua::Result<Vec<T>> {
+    match value {
+        Value::Table(table) if table.is_empty() => Ok(Vec::new()),
+        value => deserialize(lua, label, value),
+    }
+}
+
+choice! { Protocol { "press" => Press, "hand" => Hand } }
 
 functions! {
     FUNCTIONS {
-        /// Returns the results of a calibration: the lower bound of closure, the deformation limit τ, and the files to write.
+        /// Returns the results of a calibration: the safe window, the deformation limit τ, and the files to write.
         fn envelope(lua) takes spec "softvt.EnvelopeSpec" {
             /// Name of the asset.
             asset: String = Type::Name;
+            /// How the rows were measured.
+            protocol: Protocol => Text("press");
             /// Safety factor κ of the deformation limit τ = κ D_ref.
             kappa: f64 = Type::Number("", Range::closed(0.0, 1.0)) => Number(0.5);
-            /// Fingerprint of the calibrated asset, as simulation:measure returns it. Results for another object of that
+            /// Stable strain of the material, at which 5 % of the volume ends the press.
+            stable_strain: Option<f64> = STRAIN;
+            /// Why the sweep ended, if its last row does not tell.
+            ended: Option<String>;
+            /// Fingerprint of the calibrated asset, as softvt.fingerprint returns it. Results for another object of that
             /// name then do not use the calibration.
             fingerprint: Option<String>;
-            /// Rows closure, trials, held, slip_mm, d_peak_pct of the scan for the lower bound.
+            /// Rows width_mm, closure, trials, held, slip_mm of the scan for the loose end.
             holds: Value = ROWS;
-            /// Rows closure, gripper_width_mm, d_peak_pct, force_n, min_det_f, node_speed_m_s, both_pads, slip_mm, stable
+            /// Rows width_mm, closure, d_pct, force_n, strain_p95, min_det_f, node_speed_m_s, both_pads, slip_mm, stable
             /// of the compression sweep.
             sweep: Value = ROWS;
         } -> ["softvt.Envelope"] {
-            let holds: Vec<HoldRow> = deserialize(lua, "softvt.envelope: holds", &holds)?;
-            let sweep: Vec<SweepRow> = deserialize(lua, "softvt.envelope: sweep", &sweep)?;
-            let envelope = Envelope::new(holds, sweep, kappa);
+            let holds: Vec<HoldRow> = rows(lua, "softvt.envelope: holds", &holds)?;
+            let sweep: Vec<SweepRow> = rows(lua, "softvt.envelope: sweep", &sweep)?;
+            let envelope = Envelope::new(Scans { protocol, stable_strain, ended, holds, sweep }, kappa);
             let made_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
-            let mut file = ThresholdFile::new(kappa, vec![format!("{asset}.sweep.jsonl")], made_by);
+            let mut file = ThresholdFile::new(kappa, vec![format!("{asset}.sweep.jsonl")], made_by)
+                .measured_by(protocol);
             file.insert(&asset, envelope.clone());
             if let Some(fingerprint) = fingerprint {
                 file.fingerprints.insert(asset.clone(), fingerprint);
@@ -101,7 +144,7 @@ functions! {
         /// Returns true if a row of a compression sweep is a stable squeeze.
         fn stable(lua, row: Unchecked = Type::Table("table")) -> ["boolean"] {
             let row: SweepRow = deserialize(lua, "softvt.stable", &row.0)?;
-            row.meets_criteria()
+            row.instability().is_none()
         }
     }
 }

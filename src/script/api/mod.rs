@@ -149,6 +149,7 @@ pub(crate) static CLASSES: &[&Class] = &[
     simulation::LuaSimulation::CLASS,
     &simulation::measurements::CLASS,
     &simulation::tactile_table::CLASS,
+    &envelope::window_table::CLASS,
     &envelope::envelope_table::CLASS,
     image::LuaImage::CLASS,
     pose::LuaPose::CLASS,

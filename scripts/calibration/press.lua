@@ -1,0 +1,225 @@
+-- A press test of one soft object on the table: two gel pads of the robot on rigid carriers grip it where and along the axis that
+-- the expert does. The width between the gels is prescribed and the force is not limited, so that no setting of the robot matters.
+local grasp = require "experts.grasp"
+local table_top = require "assets.table"
+
+local press = {}
+
+local CLEARANCE = 4e-3                      -- gap between each gel and the object at the start, m
+local CONTACT_STEP = 5e-5                   -- step of the width until first contact, m
+local CLOSING = 0.02                        -- speed at which each pad closes in the sweep, m/s
+local GRASPING = 0.024                      -- speed at which each pad closes in a hold trial, as the expert, m/s
+local REST_SPEED, REST_S = 5e-4, 0.15       -- largest node speed of an object at rest, and for how long, m/s and s
+local REST_TIMEOUT_S = 3                    -- longest wait for rest, s
+local SETTLE_SPEED, SETTLE_S = 1e-3, 0.5    -- the same for the object alone on the table
+local CONTACT_N = 1e-3                      -- force per pad that counts as contact, N
+local PERCENTILE = 95                       -- share of the volume that stays below the reported strain, %
+local LIFT, LIFT_SPEED = 0.05, 0.224        -- the expert's lift at its largest pace, m and m/s
+local HOLD_S, SLIP_MM = 1, 2                -- hold after the lift, and the slip that fails a trial, s and mm
+local SPREAD = 1.5e-3                       -- the expert's spread of the grasp in each horizontal direction, m
+
+-- Grasps of the hold trials: in the middle, and at the corners of the expert's spread.
+local OFFSETS = { { 0, 0 }, { SPREAD, SPREAD }, { -SPREAD, SPREAD }, { SPREAD, -SPREAD }, { -SPREAD, -SPREAD } }
+
+-- The asset at another size or resolution: { shape, body, friction, object }. `object` is what experts see of it.
+local function instance(asset, change)
+  local scale, from = change.scale or 1, asset.body
+  local shape = scale == 1 and asset.shape or asset.shape:scale(scale, scale, scale)
+  local low, high = shape:bounds()
+  local hints = {}
+  for name, value in pairs(asset.hints or {}) do hints[name] = name:match "_m$" and scale * value or value end
+  local size = { high[1] - low[1], high[2] - low[2], high[3] - low[3] }
+  return {
+    shape = shape, friction = asset.friction,
+    body = softvt.soft {
+      youngs_pa = from.youngs_pa, poisson = from.poisson, density = from.density, grasp_spacing = from.grasp_spacing,
+      resolution = change.resolution or from.resolution, collapse_strain = from.collapse_strain, damage_strain = from.damage_strain,
+    },
+    object = { name = asset.name, asset = asset.name, size = size, centre = { 0, 0, size[3] / 2 }, yaw = 0, hints = hints, scale = scale },
+  }
+end
+
+-- Strain up to which a material is stable and undamaged; nil if it states none.
+function press.stable_strain(body)
+  if body.collapse_strain and body.damage_strain then return math.min(body.collapse_strain, body.damage_strain) end
+  return body.collapse_strain or body.damage_strain
+end
+
+local Bench = {}
+Bench.__index = Bench
+
+-- Sets where the pads are after the next step: `width` apart and `rise` above the grasp, m.
+function Bench:place(width, rise)
+  self.width, self.rise = width, rise
+  for _, pad in ipairs(self.pads) do
+    pad.solid:move_to(self:pad_position(pad.side), { 0, 0, pad.facing })
+  end
+end
+
+function Bench:pad_position(side)
+  local reach = side * self.width / 2
+  return { self.at[1] + reach * self.axis[1], self.at[2] + reach * self.axis[2], self.at[3] + self.rise }
+end
+
+-- Makes one step. Returns false once the physics has failed; `problem` then says why.
+function Bench:step()
+  local ok
+  ok, self.problem = self.world:step()
+  if ok then self.min_det_f = math.min(self.min_det_f, self.body:min_det_f() or 1) end
+  return ok
+end
+
+-- Closes to `width`, each pad at `speed`.
+function Bench:close_to(width, speed)
+  local from = self.width
+  local count = math.max(1, math.ceil((from - width) / (2 * speed) / self.dt))
+  for k = 1, count do
+    self:place(from + (width - from) * k / count, self.rise)
+    if not self:step() then return false end
+  end
+  return true
+end
+
+-- Waits until no node has been faster than `speed` for `seconds`. Returns the largest node speed in that time (or in the last
+-- `seconds` before the timeout), or nil if the physics failed.
+function Bench:rest(speed, seconds)
+  local elapsed, resting, fastest = 0, 0, 0
+  while resting < seconds - 1e-9 and elapsed < REST_TIMEOUT_S do
+    if not self:step() then return nil end
+    local now = self.body:speed()
+    elapsed = elapsed + self.dt
+    if now >= speed then
+      resting, fastest = 0, elapsed > REST_TIMEOUT_S - seconds and math.max(fastest, now) or 0
+    else
+      resting, fastest = resting + self.dt, math.max(fastest, now)
+    end
+  end
+  return fastest
+end
+
+function Bench:force(index) return self.body:force(self.pads[index].solid) end
+
+function Bench:slip_mm() return math.max(self.body:travel(self.pads[1].solid), self.body:travel(self.pads[2].solid)) end
+
+function Bench:both_touch() return math.min(self:force(1), self:force(2)) > CONTACT_N end
+
+-- A settled object between open pads, displaced by `offset` (m) from the expert's grasp. `change` has the fields scale,
+-- resolution and dt, all optional.
+function press.bench(asset, change, offset)
+  local made = instance(asset, change or {})
+  local object, dt = made.object, change and change.dt or 1 / 60
+  local world = softvt.world { sleeping = false, dt = dt }
+  world:static { name = "table", shape = softvt.shape.box { size = { 1, 1, 0.1 } }, friction = table_top.friction, position = { 0, 0, -0.05 } }
+  local yaw = grasp.long_axis_yaw(object)
+  local bench = setmetatable({
+    world = world, dt = dt, object = object, stable_strain = press.stable_strain(made.body), min_det_f = math.huge, pads = {},
+    width = grasp.width(object) + 2 * CLEARANCE, rise = 0, axis = { -math.sin(yaw), math.cos(yaw) },
+    at = { offset and offset[1] or 0, offset and offset[2] or 0, grasp.height(object) },
+    body = world:soft { name = asset.name, shape = made.shape, body = made.body, friction = made.friction, position = { 0, 0, 0 } },
+  }, Bench)
+  for index, side in ipairs { -1, 1 } do
+    local facing = yaw - side * math.pi / 2
+    local solid = world:gel_pad { position = bench:pad_position(side), axis_angle = { 0, 0, facing } }
+    bench.pads[index] = { side = side, facing = facing, solid = solid }
+  end
+  bench:place(bench.width, 0)
+  if not bench:rest(SETTLE_SPEED, SETTLE_S) then error(("press: %s does not settle: %s"):format(asset.name, bench.problem), 0) end
+  bench.body:set_reference "now"
+  return bench
+end
+
+-- One row of the sweep: closes to `width` (m) and waits for rest. Returns nil if the physics failed.
+local function squeeze(bench, width)
+  local fastest = bench:close_to(width, CLOSING) and bench:rest(REST_SPEED, REST_S)
+  if not fastest then return nil end
+  local row = {
+    width_mm = 1e3 * width, d_pct = bench.body:deformation().rms_pct, force_n = 0.5 * (bench:force(1) + bench:force(2)),
+    strain_p95 = bench.body:strain_percentile(PERCENTILE), min_det_f = bench.min_det_f, node_speed_m_s = fastest,
+    both_pads = bench:both_touch(), slip_mm = bench:slip_mm(), stable = false,
+  }
+  row.stable = softvt.stable(row)
+  return row
+end
+
+-- Closes in steps of `step` (m) until both pads touch. Returns the width, or nil and why there is no contact.
+local function find_contact(bench, step)
+  while not bench:both_touch() do
+    if bench.width <= step then return nil, "the pads have met" end
+    if not bench:close_to(bench.width - step, CLOSING) then return nil, bench.problem end
+  end
+  return bench.width
+end
+
+-- Presses from first contact inward in steps of `step` (m) until the 95th percentile of the strain has reached the stable strain,
+-- or the press is no longer stable. Returns the rows, and why the sweep ended if the rows do not tell.
+function press.sweep(asset, step, change)
+  local bench, rows, touched = press.bench(asset, change), {}, false
+  local width, problem = find_contact(bench, CONTACT_STEP)
+  while width and width > 0 do
+    local row = squeeze(bench, width)
+    if not row then return rows, bench.problem end
+    rows[#rows + 1] = row
+    if touched and not row.stable then return rows end
+    touched = touched or row.stable
+    if bench.stable_strain and row.strain_p95 >= bench.stable_strain then return rows end
+    -- Widths after the first are multiples of the step.
+    width = (math.ceil(width / step - 1e-6) - 1) * step
+  end
+  return rows, problem or "the pads have met"
+end
+
+-- Minimum-jerk time scaling on [0, 1] (Flash and Hogan, 1985), and its largest slope.
+local function smooth(u) return u * u * u * (10 + u * (6 * u - 15)) end
+local PEAK = 1.875
+
+-- A trial at `width` (m): grasps as fast as the expert does, lifts and holds. Returns whether it held, and the slip, mm.
+local function hold(asset, width, offset, change)
+  local bench = press.bench(asset, change, offset)
+  local ok = bench:close_to(width, GRASPING) and bench:rest(REST_SPEED, REST_S)
+  local before = bench.body:centre()[3]
+  local count = math.ceil(PEAK * LIFT / LIFT_SPEED / bench.dt)
+  for k = 1, count + math.ceil(HOLD_S / bench.dt) do
+    if not ok then break end
+    bench:place(width, LIFT * smooth(math.min(1, k / count)))
+    ok = bench:step()
+    -- An object that was left behind is not waited for.
+    if k == count and bench.body:centre()[3] - before < 0.5 * LIFT then break end
+  end
+  local slip_mm = 1e3 * math.abs(LIFT - (bench.body:centre()[3] - before))
+  return ok and bench.rise == LIFT and slip_mm <= SLIP_MM, slip_mm
+end
+
+-- Hold trials at `width` (m), until one fails.
+local function holds_at(asset, width, change)
+  local row = { width_mm = 1e3 * width, trials = 0, held = 0, slip_mm = 0 }
+  for _, offset in ipairs(OFFSETS) do
+    local held, slip_mm = hold(asset, width, offset, change)
+    row.trials, row.slip_mm = row.trials + 1, math.max(row.slip_mm, slip_mm)
+    if not held then break end
+    row.held = row.held + 1
+  end
+  return row
+end
+
+-- Finds the widest width between `narrow` and `wide` (m) at which all trials hold, by bisection to `within` (m). If they do not
+-- hold at `narrow`, it looks down to `narrowest`. Returns the rows of all widths tried.
+function press.loose_end(asset, narrow, wide, narrowest, within, change)
+  local rows = {}
+  local function all_hold(width)
+    local row = holds_at(asset, width, change)
+    rows[#rows + 1] = row
+    return row.held == row.trials
+  end
+  if not all_hold(narrow) then
+    wide, narrow = narrow, narrowest
+    if not all_hold(narrow) then return rows end
+  end
+  while wide - narrow > within do
+    -- On a grid of 10 µm, so that widths have few digits.
+    local middle = math.floor(0.5e5 * (wide + narrow) + 0.5) / 1e5
+    if all_hold(middle) then narrow = middle else wide = middle end
+  end
+  return rows
+end
+
+return press
