@@ -34,6 +34,6 @@ return softvt.asset {
   shape = slashed,
   -- Squeezed by a fifth it is within 8 % of 18 voxels a length; at eight voxels, three across, it would be 14 % too stiff.
   body = softvt.soft { youngs_pa = 35e3, poisson = 0.32, density = 200, resolution = 12, collapse_strain = 0.10, damage_strain = 0.35 },
-  hints = { grasp_height_m = 19 * mm },
+  hints = { grasp_height_m = 19 * mm, carry_pace = 0.5 },
   visuals = { material.floured(crust, { seed = 15, opacity = 0.25 }) },
 }

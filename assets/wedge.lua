@@ -18,6 +18,6 @@ return softvt.asset {
   name = "wedge",
   shape = ramp:round(EDGE),
   body = softvt.soft { youngs_pa = 50e3, poisson = 0.40, density = 220, collapse_strain = 0.07, damage_strain = 0.50 },
-  hints = { grasp_height_m = 21.5 * mm },
+  hints = { grasp_height_m = 21.5 * mm, grasp_offset_m = -7 * mm },
   visuals = { material.foam { base = { 0.10, 0.42, 0.16 }, seed = 151 } },
 }

@@ -8,7 +8,7 @@
 -- It closes in steps of the width until 5 % of the volume is beyond the stable strain of the material: the smaller of its
 -- collapse_strain and damage_strain. D_ref is D at that width, interpolated, and τ = κ D_ref. A press that ends earlier is censored: the
 -- file says why, and D_ref is a lower bound. The loose end of the window is the widest width at which five trials with the expert's
--- grasp hold while the pads lift; the tight end is the width at which D reaches τ.
+-- grasp hold while the pads lift; the tight end is the widest width at which D reaches τ in the press or in those trials.
 --
 -- --sweep-protocol hand is the sweep of the paper (appendix C.3) with the robot's hand (scripts/calibration/hand.lua): its D_ref is the
 -- largest stable D up to a closed hand.
@@ -63,7 +63,9 @@ local function press_asset(name, o)
   local at_tau, contact = found.window.width_at_tau_mm, found.width_contact_mm
   if at_tau and contact then
     local narrowest = found.width_at_d_ref_mm
-    append(rows, "hold", name, press.loose_end(asset, 1e-3 * at_tau, 1e-3 * contact, 1e-3 * narrowest, 1e-3 * o.within_mm, change))
+    local holds = press.loose_end(asset, 1e-3 * at_tau, 1e-3 * contact, 1e-3 * narrowest, 1e-3 * o.within_mm, change)
+    press.carried_end(asset, holds, found.tau, change)
+    append(rows, "hold", name, holds)
   end
   for _, row in ipairs(rows) do row.ended = ended end
   return rows
@@ -120,7 +122,7 @@ local function points(o)
 end
 
 local ROW_FIELDS = {
-  hold = { "width_mm", "closure", "trials", "held", "slip_mm" },
+  hold = { "width_mm", "closure", "trials", "held", "slip_mm", "d_peak_pct" },
   sweep = { "width_mm", "closure", "d_pct", "force_n", "strain_p95", "min_det_f", "node_speed_m_s", "both_pads", "slip_mm", "stable" },
 }
 
@@ -139,12 +141,13 @@ end
 
 local function library_of(windows)
   local lines = {
-    "-- Calibrated windows per asset: widths between the gels (m) at first contact, at the loose end and at τ, and the forces per pad",
-    "-- (N) at the two ends. Written by scripts/calibrate.lua; experts grasp at a width in between.", "return {",
+    "-- Calibrated windows per asset: widths between the gels (m) at first contact, at the loose end and at τ, the forces per pad (N) at",
+    "-- the two ends, and the share of τ that the object reaches by bending while it is carried. Written by scripts/calibrate.lua; experts",
+    "-- grasp at a width in between.", "return {",
   }
   for name, w in pairs(windows) do
-    lines[#lines + 1] = ("  %s = { width_contact = %.6f, width_lower = %.6f, width_at_tau = %.6f, force_lower = %.5f, force_at_tau = %.5f },"):format(
-      name, w.width_contact, w.width_lower, w.width_at_tau, w.force_lower, w.force_at_tau)
+    lines[#lines + 1] = ("  %s = { width_contact = %.6f, width_lower = %.6f, width_at_tau = %.6f, force_lower = %.5f, force_at_tau = %.5f, bending = %.4f },"):format(
+      name, w.width_contact, w.width_lower, w.width_at_tau, w.force_lower, w.force_at_tau, w.bending)
   end
   lines[#lines + 1] = "}\n"
   return table.concat(lines, "\n")
@@ -174,9 +177,16 @@ local function three_kappas(found)
   return ("τ at κ 0.3, 0.5, 0.7: %.3f, %.3f, %.3f %%\n"):format(0.3 * found.d_ref, 0.5 * found.d_ref, 0.7 * found.d_ref)
 end
 
-local function warning(name, found)
-  if not found.censored then return "" end
-  return ("warning: the press of %s is censored: %s. State collapse_strain in its softvt.soft.\n"):format(name, found.censored)
+local function warnings(name, found)
+  local text = ""
+  if found.censored then
+    text = ("warning: the press of %s is censored: %s. State collapse_strain in its softvt.soft.\n"):format(name, found.censored)
+  end
+  if found.carried_d and found.tau and found.carried_d > found.tau then
+    text = text .. ("warning: carried, %s bends beyond τ at every width (D %.3f %% at least). Carry it slowly (the hint carry_pace), or make it shorter, stiffer or lighter.\n"):format(
+      name, found.carried_d)
+  end
+  return text
 end
 
 -- Held trials per asset and end, over all batches.
@@ -213,12 +223,13 @@ local function finish(rows, o)
     local at = "assets/calibration/" .. name
     files[at .. ".json"], files[at .. ".sweep.jsonl"], files[at .. ".svg"], files[at .. ".txt"] = found.json, found.sweep, found.plot, found.text
     envelope_of[name] = found
-    text[#text + 1] = found.text .. three_kappas(found) .. warning(name, found)
+    text[#text + 1] = found.text .. three_kappas(found) .. warnings(name, found)
     empty[#empty + 1] = empty_window(name, found)
     local window = found.window
     windows[name] = window.extent_mm and {
       width_contact = 1e-3 * found.width_contact_mm, width_lower = 1e-3 * window.width_lower_mm,
       width_at_tau = 1e-3 * window.width_at_tau_mm, force_lower = window.force_lower_n, force_at_tau = window.force_at_tau_n,
+      bending = found.carried_d and found.carried_d / found.tau or 0,
     } or nil
   end
   text = table.concat(text, "\n")
@@ -236,7 +247,7 @@ return softvt.experiment {
   run = run,
   finish = finish,
   columns = {
-    "asset", "kind", "width_mm", "closure", "held", "trials", "stable", "d_pct", "force_n", "strain_p95", "min_det_f", "node_speed_m_s",
+    "asset", "kind", "width_mm", "closure", "held", "trials", "d_peak_pct", "stable", "d_pct", "force_n", "strain_p95", "min_det_f", "node_speed_m_s",
     "both_pads", "slip_mm",
   },
 }

@@ -7,10 +7,12 @@ local HEAD = [[
 Generated together with `assets/calibration/` by `softvt scripts/calibrate.lua`, which documents the method: a press test of the object
 alone, between two gel pads of the robot at a prescribed width. D_ref is D at the width at which 5 % of the volume is beyond the *stable
 strain* of the material, and τ = κ D_ref with κ = 0.5. Each object is safe at widths between the *loose* end, up to which friction carries it,
-and the *tight* end, at which D reaches τ. Forces are those per pad at rest. [assets.md](assets.md) gives the strains with their sources.
+and the *tight* end, at which D reaches τ, pressed on the table or carried. Forces are those per pad at rest. *Carried D* is the smallest
+peak of D while the object was lifted and held; an object that bends beyond τ there cannot be carried safely, whatever the grip.
+[assets.md](assets.md) gives the strains with their sources.
 
-| asset | stable strain | D_ref % | τ % | κ 0.3 | κ 0.7 | loose mm | tight mm | window mm | force N | censored |
-|---|---|---|---|---|---|---|---|---|---|---|
+| asset | stable strain | D_ref % | τ % | κ 0.3 | κ 0.7 | loose mm | tight mm | window mm | force N | carried D % | censored |
+|---|---|---|---|---|---|---|---|---|---|---|---|
 ]]
 
 local MIDDLE = [[
@@ -30,7 +32,8 @@ return function(names, found)
     local cells = {
       ("[%s](#%s)"):format(name, name), number("%.2f", known.stable_strain), number("%.3f", d_ref), number("%.3f", known.tau),
       number("%.3f", d_ref and 0.3 * d_ref), number("%.3f", d_ref and 0.7 * d_ref), number("%.2f", window.width_lower_mm),
-      number("%.2f", window.width_at_tau_mm), number("%.2f", window.extent_mm), force, known.censored or "no",
+      number("%.2f", window.width_at_tau_mm), number("%.2f", window.extent_mm), force, number("%.3f", known.carried_d),
+      known.censored or "no",
     }
     rows[#rows + 1] = "| " .. table.concat(cells, " | ") .. " |\n"
     plots[#plots + 1] = ("\n## %s\n\n![](../assets/calibration/%s.svg)\n\n```text\n%s```\n"):format(name, name, known.text)

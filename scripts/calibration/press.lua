@@ -14,8 +14,9 @@ local REST_TIMEOUT_S = 3                    -- longest wait for rest, s
 local SETTLE_SPEED, SETTLE_S = 1e-3, 0.5    -- the same for the object alone on the table
 local CONTACT_N = 1e-3                      -- force per pad that counts as contact, N
 local PERCENTILE = 95                       -- share of the volume that stays below the reported strain, %
-local LIFT, LIFT_SPEED = 0.05, 0.224        -- the expert's lift at its largest pace, m and m/s
+local LIFT, LIFT_SPEED = 0.05, 0.224        -- the expert's lift at its largest pace, m and m/s (times grasp.carry_pace)
 local HOLD_S, SLIP_MM = 1, 2                -- hold after the lift, and the slip that fails a trial, s and mm
+local REFINEMENTS = 2                       -- hold trials near τ, for the tight end
 local SPREAD = 1.5e-3                       -- the expert's spread of the grasp in each horizontal direction, m
 
 -- Grasps of the hold trials: in the middle, and at the corners of the expert's spread.
@@ -65,7 +66,10 @@ end
 function Bench:step()
   local ok
   ok, self.problem = self.world:step()
-  if ok then self.min_det_f = math.min(self.min_det_f, self.body:min_det_f() or 1) end
+  if ok then
+    self.min_det_f = math.min(self.min_det_f, self.body:min_det_f() or 1)
+    self.d_peak_pct = self.d_peak_pct and math.max(self.d_peak_pct, self.body:deformation().rms_pct)
+  end
   return ok
 end
 
@@ -114,7 +118,7 @@ function press.bench(asset, change, offset)
   local bench = setmetatable({
     world = world, dt = dt, object = object, stable_strain = press.stable_strain(made.body), min_det_f = math.huge, pads = {},
     width = grasp.width(object) + 2 * CLEARANCE, rise = 0, axis = { -math.sin(yaw), math.cos(yaw) },
-    at = { offset and offset[1] or 0, offset and offset[2] or 0, grasp.height(object) },
+    at = grasp.pose(object, grasp.height(object), offset).position,
     body = world:soft { name = asset.name, shape = made.shape, body = made.body, friction = made.friction, position = { 0, 0, 0 } },
   }, Bench)
   for index, side in ipairs { -1, 1 } do
@@ -172,12 +176,13 @@ end
 local function smooth(u) return u * u * u * (10 + u * (6 * u - 15)) end
 local PEAK = 1.875
 
--- A trial at `width` (m): grasps as fast as the expert does, lifts and holds. Returns whether it held, and the slip, mm.
+-- A trial at `width` (m): grasps as fast as the expert does, lifts and holds. Returns whether it held, the slip (mm) and the peak D (%).
 local function hold(asset, width, offset, change)
   local bench = press.bench(asset, change, offset)
+  bench.d_peak_pct = 0
   local ok = bench:close_to(width, GRASPING) and bench:rest(REST_SPEED, REST_S)
   local before = bench.body:centre()[3]
-  local count = math.ceil(PEAK * LIFT / LIFT_SPEED / bench.dt)
+  local count = math.ceil(PEAK * LIFT / (LIFT_SPEED * grasp.carry_pace(bench.object)) / bench.dt)
   for k = 1, count + math.ceil(HOLD_S / bench.dt) do
     if not ok then break end
     bench:place(width, LIFT * smooth(math.min(1, k / count)))
@@ -186,20 +191,24 @@ local function hold(asset, width, offset, change)
     if k == count and bench.body:centre()[3] - before < 0.5 * LIFT then break end
   end
   local slip_mm = 1e3 * math.abs(LIFT - (bench.body:centre()[3] - before))
-  return ok and bench.rise == LIFT and slip_mm <= SLIP_MM, slip_mm
+  return ok and bench.rise == LIFT and slip_mm <= SLIP_MM, slip_mm, bench.d_peak_pct
 end
 
 -- Hold trials at `width` (m), until one fails.
 local function holds_at(asset, width, change)
-  local row = { width_mm = 1e3 * width, trials = 0, held = 0, slip_mm = 0 }
+  local row = { width_mm = 1e3 * width, trials = 0, held = 0, slip_mm = 0, d_peak_pct = 0 }
   for _, offset in ipairs(OFFSETS) do
-    local held, slip_mm = hold(asset, width, offset, change)
+    local held, slip_mm, d_peak_pct = hold(asset, width, offset, change)
     row.trials, row.slip_mm = row.trials + 1, math.max(row.slip_mm, slip_mm)
+    row.d_peak_pct = math.max(row.d_peak_pct, d_peak_pct)
     if not held then break end
     row.held = row.held + 1
   end
   return row
 end
+
+-- On a grid of 10 µm, so that widths have few digits.
+local function rounded(width) return math.floor(1e5 * width + 0.5) / 1e5 end
 
 -- Finds the widest width between `narrow` and `wide` (m) at which all trials hold, by bisection to `within` (m). If they do not
 -- hold at `narrow`, it looks down to `narrowest`. Returns the rows of all widths tried.
@@ -215,11 +224,30 @@ function press.loose_end(asset, narrow, wide, narrowest, within, change)
     if not all_hold(narrow) then return rows end
   end
   while wide - narrow > within do
-    -- On a grid of 10 µm, so that widths have few digits.
-    local middle = math.floor(0.5e5 * (wide + narrow) + 0.5) / 1e5
+    local middle = rounded(0.5 * (wide + narrow))
     if all_hold(middle) then narrow = middle else wide = middle end
   end
   return rows
+end
+
+-- Finds where the peak D of hold trials passes `tau_pct`, by linear interpolation between the two nearest widths in `rows`, which
+-- are those of loose_end. Appends the trials made on the way.
+function press.carried_end(asset, rows, tau_pct, change)
+  for _ = 1, REFINEMENTS do
+    local below, above
+    for _, row in ipairs(rows) do
+      if row.held == row.trials then
+        if row.d_peak_pct <= tau_pct and (not below or row.width_mm < below.width_mm) then below = row end
+        if row.d_peak_pct > tau_pct and (not above or row.width_mm > above.width_mm) then above = row end
+      end
+    end
+    -- The press alone decides if no trial passes τ; the window is empty if all do.
+    if not (below and above) then return end
+    local share = (tau_pct - below.d_peak_pct) / (above.d_peak_pct - below.d_peak_pct)
+    local width = rounded(1e-3 * (below.width_mm + share * (above.width_mm - below.width_mm)))
+    if width == rounded(1e-3 * below.width_mm) or width == rounded(1e-3 * above.width_mm) then return end
+    rows[#rows + 1] = holds_at(asset, width, change)
+  end
 end
 
 return press

@@ -39,11 +39,14 @@ function grasp.sides(object)
 end
 
 -- A grasp pose across the object's shorter horizontal side. `height` is the height of the tool centre point above the
--- object's lowest point; `offset` (m) and `turn` (rad) displace the grasp, for trials.
+-- object's lowest point; `offset` (m) and `turn` (rad) displace the grasp, for trials. The hint grasp_offset_m displaces it along the
+-- longer side, from the centre towards where most of the mass is.
 function grasp.pose(object, height, offset, turn)
   local yaw = grasp.long_axis_yaw(object) + (turn or 0)
   local x, y = object.centre[1], object.centre[2]
   if offset then x, y = x + offset[1], y + offset[2] end
+  local along, axis = object.hints.grasp_offset_m, grasp.long_axis_yaw(object)
+  if along then x, y = x + along * math.cos(axis), y + along * math.sin(axis) end
   return softvt.pose { position = { x, y, grasp.bottom(object) + height }, yaw = wrap_half_turn(yaw) }
 end
 
@@ -58,6 +61,10 @@ function grasp.width(object)
   return object.hints.grasp_width_m or math.min(object.size[1], object.size[2])
 end
 
+-- Speed of carrying an object, as a share of the usual one. A long object is carried slowly, so that it does not bend much more than
+-- by its weight.
+function grasp.carry_pace(object) return object.hints.carry_pace or 1 end
+
 -- Why the gripper cannot grasp an object, whatever the pose; nil if it can.
 function grasp.problem(object)
   local width = grasp.width(object)
@@ -69,7 +76,8 @@ end
 -- The safe window of an object: the loosest and the tightest grip as { width, force }, with the measured width of the gels (m)
 -- and the force per pad at rest (N). The window of an asset is scaled to the instance. Its tight end is a strain: the width scales
 -- with the size, the force with area and stiffness. Its loose end carries the weight, by an indentation that grows with weight
--- over stiffness. Nil without a calibration.
+-- over stiffness. Bending by the weight adds to the squeeze in D as perpendicular vectors do, so it leaves less of τ to the grip of a
+-- soft or heavy instance. Nil without a calibration.
 function grasp.window(object)
   local known = calibrated[object.asset]
   if not known then return nil end
@@ -78,10 +86,16 @@ function grasp.window(object)
   local load = density * size / stiffness
   load = math.max(load, load ^ (2 / 3))
   local indentation = (known.width_contact - known.width_lower) * load
-  return {
-    loose = { width = size * (known.width_contact - indentation), force = known.force_lower * density * size ^ 3 },
-    tight = { width = size * known.width_at_tau, force = known.force_at_tau * stiffness * size ^ 2 },
+  local loose = { width = size * (known.width_contact - indentation), force = known.force_lower * density * size ^ 3 }
+  local left = (1 - (known.bending * density * size / stiffness) ^ 2) / (1 - known.bending ^ 2)
+  -- No window is left to an instance that bends beyond τ: its loosest grip does least harm.
+  if left <= 0 then return { loose = loose, tight = loose } end
+  local share = math.min(1, math.sqrt(left))
+  local tight = {
+    width = size * (known.width_contact - share * (known.width_contact - known.width_at_tau)),
+    force = share * known.force_at_tau * stiffness * size ^ 2,
   }
+  return { loose = loose, tight = tight.width < loose.width and tight or loose }
 end
 
 -- The grip at a share of the safe window: 0 is the loosest, 1 the tightest. Without a window it is the squeeze of a rigid object,

@@ -43,7 +43,7 @@ local function pick(arm, scene, spec, pace, share)
   arm:wait(0.3)
   arm:note("grip_width_mm", 1e3 * arm.width)
   -- Straight up first.
-  arm:move_by({ 0, 0, 0.05 }, { speed = 0.2 * pace })
+  arm:move_by({ 0, 0, 0.05 }, { speed = 0.2 * pace * grasp.carry_pace(object) })
   if scene:object(spec.object).centre[3] - before > MIN_LIFT_FRACTION * 0.05 then return true, height end
   return false, "was not lifted by the grasp"
 end
@@ -91,6 +91,7 @@ end
 
 local function place(arm, scene, spec, height, pace)
   local object = scene:object(spec.object)
+  pace = pace * grasp.carry_pace(object)
   local target_pose = release_pose(arm, scene, spec, height)
   local carried = { object = object, below = height }
   local over = math.max(target_pose.z + 0.03, route.carry_height(scene, arm.pose.position, target_pose.position, carried, CARRY_CLEARANCE))

@@ -10,7 +10,9 @@
 //!   stable squeeze.
 //!
 //! The loose end of the envelope is the widest width at which every hold trial held, down to the narrowest one tried. The
-//! tight end is the width at which D reaches τ = κ·D_ref.
+//! tight end is the widest width at which D reaches τ = κ·D_ref, in the sweep or in the hold trials: an object that is
+//! carried also bends under its weight, and bulges where the support held it. An object that bends beyond τ in every hold
+//! trial has the tight end of the sweep; its carried D tells.
 
 use serde::{Deserialize, Serialize};
 
@@ -48,6 +50,9 @@ pub struct HoldRow {
     pub held: u32,
     /// Largest slip over the trials, mm.
     pub slip_mm: f64,
+    /// Largest D over the trials, from the first contact to the end of the hold, %.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub d_peak_pct: Option<f64>,
 }
 
 impl HoldRow {
@@ -109,7 +114,7 @@ impl SweepRow {
 pub struct SafeWindow {
     /// Loose end: the widest width at which every trial held, mm.
     pub width_lower_mm: Option<f64>,
-    /// Tight end: the width at which D reaches τ, mm.
+    /// Tight end: the widest width at which D reaches τ, pressed or carried, mm.
     pub width_at_tau_mm: Option<f64>,
     /// Force per pad at the loose end, N.
     pub force_lower_n: Option<f64>,
@@ -155,6 +160,9 @@ pub struct Envelope {
     pub width_at_d_ref_mm: Option<f64>,
     /// Widest width at which both pads touched, mm.
     pub width_contact_mm: Option<f64>,
+    /// Smallest peak D of the object while it was carried, over the widths at which every trial held, %.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub carried_d_pct: Option<f64>,
     /// The safe window.
     pub window: SafeWindow,
     /// Hold trials, by decreasing width.
@@ -183,7 +191,10 @@ impl Envelope {
         let reference = at_strain.or_else(|| largest_stable(&sweep));
         let limit = reference.as_ref().and_then(|found| limit_of(found.d_pct, kappa));
         let width_lower_mm = loose_end(&holds);
-        let width_at_tau_mm = limit.and_then(|limit| width_at(&sweep, limit.tau_pct()));
+        let width_at_tau_mm = limit.and_then(|limit| {
+            let ends = [pressed_end(&sweep, limit.tau_pct()), carried_end(&holds, limit.tau_pct())];
+            ends.into_iter().flatten().reduce(f64::max)
+        });
         Self {
             protocol,
             stable_strain,
@@ -191,6 +202,7 @@ impl Envelope {
             d_ref_pct: limit.map(|limit| limit.d_ref_pct),
             width_at_d_ref_mm: reference.map(|found| found.width_mm),
             width_contact_mm: sweep.iter().find(|row| row.both_pads).map(|row| row.width_mm),
+            carried_d_pct: carried(&holds).map(|point| point.d_pct).reduce(f64::min),
             window: SafeWindow {
                 width_lower_mm,
                 width_at_tau_mm,
@@ -200,6 +212,11 @@ impl Envelope {
             holds,
             sweep,
         }
+    }
+
+    /// True if the object bends beyond τ when it is carried, at every width.
+    pub fn bends_beyond(&self, limit: DeformationLimit) -> bool {
+        self.carried_d_pct.is_some_and(|d_pct| d_pct > limit.tau_pct())
     }
 
     /// Deformation limit τ = κ·D_ref; `None` without a stable squeeze.
@@ -252,14 +269,42 @@ fn loose_end(holds: &[HoldRow]) -> Option<f64> {
     held.last().map(|row| row.width_mm)
 }
 
-/// Width at which D first reaches `d_pct`, linear between the rows; `sweep` by decreasing width. `None` if the first row
-/// is above it or no row reaches it.
-fn width_at(sweep: &[SweepRow], d_pct: f64) -> Option<f64> {
-    sweep.windows(2).find(|pair| pair[0].d_pct <= d_pct && pair[1].d_pct >= d_pct).map(|pair| {
-        let rise = pair[1].d_pct - pair[0].d_pct;
-        let share = if rise > 0.0 { (d_pct - pair[0].d_pct) / rise } else { 0.0 };
-        pair[0].width_mm + share * (pair[1].width_mm - pair[0].width_mm)
-    })
+/// A width with the D measured there.
+#[derive(Clone, Copy)]
+struct Point {
+    width_mm: f64,
+    d_pct: f64,
+}
+
+/// Width between two points at which D is `d_pct`, linear.
+fn width_between(wide: Point, narrow: Point, d_pct: f64) -> f64 {
+    let rise = narrow.d_pct - wide.d_pct;
+    let share = if rise > 0.0 { (d_pct - wide.d_pct) / rise } else { 0.0 };
+    wide.width_mm + share * (narrow.width_mm - wide.width_mm)
+}
+
+/// Width at which D of the press first reaches `d_pct`; `sweep` by decreasing width. `None` if the first row is above it or
+/// no row reaches it.
+fn pressed_end(sweep: &[SweepRow], d_pct: f64) -> Option<f64> {
+    let points: Vec<_> =
+        sweep.iter().map(|row| Point { width_mm: row.width_mm, d_pct: row.d_pct }).collect();
+    let pair = points.windows(2).find(|pair| pair[0].d_pct <= d_pct && pair[1].d_pct >= d_pct)?;
+    Some(width_between(pair[0], pair[1], d_pct))
+}
+
+/// Peak D of the object while it was carried, at the widths at which every trial held.
+fn carried(holds: &[HoldRow]) -> impl Iterator<Item = Point> {
+    let held = holds.iter().filter(|row| row.all_held());
+    held.filter_map(|row| Some(Point { width_mm: row.width_mm, d_pct: row.d_peak_pct? }))
+}
+
+/// Width below which the peak D of the carried object is above `d_pct`; `holds` by decreasing width. `None` if it is so at no
+/// width or at every width.
+fn carried_end(holds: &[HoldRow], d_pct: f64) -> Option<f64> {
+    let points: Vec<_> = carried(holds).collect();
+    points.last().filter(|narrowest| narrowest.d_pct > d_pct)?;
+    let pair = points.windows(2).rev().find(|pair| pair[0].d_pct <= d_pct)?;
+    Some(width_between(pair[0], pair[1], d_pct))
 }
 
 /// Force per pad at a width, linear between the rows; `sweep` by decreasing width. `None` outside of the sweep.
@@ -276,7 +321,7 @@ pub(crate) mod tests {
     use super::*;
 
     pub(crate) fn hold(width_mm: f64, held: u32) -> HoldRow {
-        HoldRow { width_mm, closure: None, trials: 5, held, slip_mm: 0.1 }
+        HoldRow { width_mm, closure: None, trials: 5, held, slip_mm: 0.1, d_peak_pct: None }
     }
 
     /// A squeeze from 50 mm, with a strain of a tenth of D.
@@ -348,6 +393,23 @@ pub(crate) mod tests {
         assert_eq!(lower(vec![hold(47.0, 5), hold(49.0, 5), hold(48.0, 4)]), Some(47.0));
         assert_eq!(lower(vec![hold(47.0, 4), hold(48.0, 5)]), None);
         assert_eq!(lower(vec![]), None);
+    }
+
+    #[test]
+    fn the_tight_end_is_where_the_carried_object_reaches_the_limit_if_that_is_wider() {
+        let tight = |d_at_47: f64| {
+            let carried = |width, d| HoldRow { d_peak_pct: Some(d), ..hold(width, 5) };
+            let holds = vec![carried(47.0, d_at_47), carried(48.0, 1.1), carried(49.0, 0.7)];
+            Envelope::new(Scans { holds, ..scans(48.0) }, 0.5).window.width_at_tau_mm.unwrap()
+        };
+        // τ is 1.5 %, which the sweep reaches at 47 mm.
+        assert!((tight(1.9) - 47.5).abs() < 1e-12);
+        assert!((tight(1.4) - 47.0).abs() < 1e-12);
+        let above = HoldRow { d_peak_pct: Some(1.6), ..hold(48.0, 5) };
+        let bending = Envelope::new(Scans { holds: vec![above], ..scans(48.0) }, 0.5);
+        assert_eq!(bending.window.width_at_tau_mm, Some(47.0), "the tight end of the sweep");
+        assert_eq!(bending.carried_d_pct, Some(1.6));
+        assert!(bending.bends_beyond(bending.limit(0.5).unwrap()));
     }
 
     #[test]

@@ -18,13 +18,19 @@ const TICKS: u32 = 5;
 
 /// The envelope in three lines: the safe window, τ, and the end of the sweep.
 pub fn three_lines(asset: &str, envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
-    format!("{asset}: {}\n{}\n{}\n", window_line(envelope), limit_line(envelope, limit), end_line(envelope))
+    format!("{asset}: {}\n{}\n{}\n", window_line(envelope, limit), limit_line(envelope, limit), end_line(envelope))
 }
 
-fn window_line(envelope: &Envelope) -> String {
+fn window_line(envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
     let window = &envelope.window;
     let newton = |force: Option<f64>| force.map_or_else(|| "–".to_owned(), |force| format!("{force:.2}"));
+    let bending = limit.is_some_and(|limit| envelope.bends_beyond(limit));
     match (window.width_lower_mm, window.width_at_tau_mm, window.extent_mm()) {
+        (Some(lower), Some(tight), Some(extent)) if bending => format!(
+            "held from {lower:.2} mm and pressed to τ at {tight:.2} mm of width ({extent:.2} mm), but carried it bends \
+             beyond τ (D {:.3} % at least)",
+            envelope.carried_d_pct.unwrap_or(f64::NAN)
+        ),
         (Some(lower), Some(tight), Some(extent)) => format!(
             "safe between {lower:.2} and {tight:.2} mm of width ({extent:.2} mm), at {} to {} N per pad",
             newton(window.force_lower_n),
@@ -207,6 +213,10 @@ mod tests {
              τ 1.500 % of the diagonal = 0.5 × D_ref; D_ref 3.000 % at 44.50 mm\n\
              pressed until 5 % of the volume was beyond the stable strain 0.3\n"
         );
+        let mut bending = scans(48.0);
+        bending.holds.iter_mut().for_each(|row| row.d_peak_pct = Some(1.6));
+        let (bending, _) = shown(bending);
+        assert!(bending.contains("carried it bends beyond τ (D 1.600 % at least)"), "{bending}");
         let (empty, _) = shown(scans(46.0));
         assert!(empty.contains("it holds from 46.00 mm inward, and D passes τ at 47.00 mm"), "{empty}");
         let (censored, _) = shown(Scans { stable_strain: None, ..scans(48.0) });

@@ -29,7 +29,7 @@ output! {
     fn window_table(lua, window: &SafeWindow) -> "softvt.SafeWindow" as "window" {
         /// Loose end: the widest width between the gels at which every hold trial held, mm.
         width_lower_mm: "number?" = window.width_lower_mm;
-        /// Tight end: the width at which the deformation reaches τ, mm.
+        /// Tight end: the widest width at which the deformation reaches τ, pressed or carried, mm.
         width_at_tau_mm: "number?" = window.width_at_tau_mm;
         /// Force per pad at the loose end, N.
         force_lower_n: "number?" = window.force_lower_n;
@@ -55,6 +55,8 @@ output! {
         tau: "number?" = limit(envelope, file).map(|limit| limit.tau_pct());
         /// Reference deformation D_ref, %.
         d_ref: "number?" = envelope.d_ref_pct;
+        /// Smallest peak deformation of the object while it was carried in a hold trial, %.
+        carried_d: "number?" = envelope.carried_d_pct;
         /// Stable strain of the material.
         stable_strain: "number?" = envelope.stable_strain;
         /// Why the sweep ended before the stable strain; nil if it did not.
@@ -103,7 +105,7 @@ functions! {
             /// Fingerprint of the calibrated asset, as softvt.fingerprint returns it. Results for another object of that
             /// name then do not use the calibration.
             fingerprint: Option<String>;
-            /// Rows width_mm, closure, trials, held, slip_mm of the scan for the loose end.
+            /// Rows width_mm, closure, trials, held, slip_mm, d_peak_pct of the scan for the loose end.
             holds: Value = ROWS;
             /// Rows width_mm, closure, d_pct, force_n, strain_p95, min_det_f, node_speed_m_s, both_pads, slip_mm, stable
             /// of the compression sweep.
