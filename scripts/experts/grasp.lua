@@ -87,7 +87,9 @@ function grasp.window(object)
   load = math.max(load, load ^ (2 / 3))
   local indentation = (known.width_contact - known.width_lower) * load
   local loose = { width = size * (known.width_contact - indentation), force = known.force_lower * density * size ^ 3 }
-  local left = (1 - (known.bending * density * size / stiffness) ^ 2) / (1 - known.bending ^ 2)
+  -- An object that bends beyond τ at its nominal size has the window of the press.
+  local bending = known.bending < 1 and known.bending or 0
+  local left = (1 - (bending * density * size / stiffness) ^ 2) / (1 - bending ^ 2)
   -- No window is left to an instance that bends beyond τ: its loosest grip does least harm.
   if left <= 0 then return { loose = loose, tight = loose } end
   local share = math.min(1, math.sqrt(left))

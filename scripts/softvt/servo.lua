@@ -9,7 +9,7 @@ local min = math.min
 -- at 0.3 N.
 local HELD, TOUCHED = 0.08, 0.01
 -- Change of closure per control step after first contact, and in response to shear (0.5 mm and 1 mm of width).
-local FINE, TIGHTEN = 0.00625, 0.0125
+local FINE, TIGHTEN = 0.002, 0.003
 -- Smallest ratio of residual to outward shear of a held object. In a sliding grasp the shear is at least three times the
 -- residual at the friction of a gel.
 local RATIO = 1

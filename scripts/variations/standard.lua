@@ -5,8 +5,8 @@
 return softvt.variation {
   name = "standard",
   size = { 0.88, 1.12 },
-  stiffness = { 0.5, 2 },
-  density = { 0.6, 1.8 },
+  stiffness = { 0.7, 2.1 },
+  density = { 0.5, 1.2 },
   -- The pads' friction is the larger one, so that this counts where an object slides on its support.
   friction = { 0.7, 1.4 },
   colour = 0.1,
