@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     episode_id::EpisodeId,
     record::EpisodeRecord,
+    stage::Stage,
     statistics::{Z95, mean, stratified_bootstrap},
 };
 
@@ -74,10 +75,16 @@ pub fn d_over_tau(record: &EpisodeRecord) -> Option<f64> {
 }
 
 /// Differences of the second run from the first. An invalid episode succeeds at nothing and has no deformation.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+///
+/// A quantity is compared over the pairs in which both episodes have it. Runs of earlier versions lack some, which then
+/// have no pairs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PairedComparison {
     /// Number of episodes that both runs have.
     pub pairs: usize,
+    /// Number of those that are invalid in at least one run.
+    #[serde(default)]
+    pub invalid_pairs: usize,
     /// Goal Success, %.
     pub goal: PairedDifference,
     /// NoDrop, %.
@@ -93,6 +100,27 @@ pub struct PairedComparison {
     /// Time over τ where both runs have one, s.
     #[serde(default)]
     pub time_over_tau_s: PairedDifference,
+    /// Episodes in which the robot touched a movable object other than the target, %; invalid ones included.
+    #[serde(default)]
+    pub wrong_contact: PairedDifference,
+    /// Stages at which episodes without Goal Success ended; invalid ones included.
+    #[serde(default)]
+    pub failed_stages: PairedStages,
+    /// Mean D within the episode, %.
+    #[serde(default)]
+    pub d_mean: PairedDifference,
+    /// D at the end of the episode, %.
+    #[serde(default)]
+    pub d_final: PairedDifference,
+    /// 95th percentile of D within the episode, %.
+    #[serde(default)]
+    pub d_p95: PairedDifference,
+    /// Largest share of the target's volume beyond its collapse strain, %.
+    #[serde(default)]
+    pub collapsed_volume_pct: PairedDifference,
+    /// Share of the target's volume that was ever beyond its damage strain, %.
+    #[serde(default)]
+    pub damaged_volume_pct: PairedDifference,
     /// Peak D where both runs have one, % of the diagonal.
     pub d_peak: PairedDifference,
     /// Peak D over τ where both runs have both.
@@ -107,11 +135,18 @@ impl PairedComparison {
             PairedDifference::from_successes(pairs.iter().map(|pair| [holds(pair.first), holds(pair.second)]))
         };
         let mean = |value: fn(&EpisodeRecord) -> Option<f64>| {
-            let both = |pair: &EpisodePair| Some([value(pair.first)?, value(pair.second)?]);
+            let of_valid = |record: &EpisodeRecord| value(record).filter(|_| record.outcome.is_valid());
+            let both = |pair: &EpisodePair| Some([of_valid(pair.first)?, of_valid(pair.second)?]);
             PairedDifference::from_values(pairs.iter().filter_map(both))
         };
+        let with_harm = || pairs.iter().filter(|pair| pair.first.has_harm() && pair.second.has_harm());
+        let touches_other = |r: &EpisodeRecord| r.verdict.first_wrong_contact.is_some();
         Self {
             pairs: pairs.len(),
+            invalid_pairs: pairs
+                .iter()
+                .filter(|pair| !(pair.first.outcome.is_valid() && pair.second.outcome.is_valid()))
+                .count(),
             goal: rate(|r| r.verdict.goal),
             no_drop: rate(|r| r.verdict.no_drop),
             safety: rate(|r| r.verdict.safety),
@@ -126,14 +161,60 @@ impl PairedComparison {
                     .iter()
                     .filter_map(|pair| Some([pair.first.verdict.others_ok?, pair.second.verdict.others_ok?])),
             ),
-            time_over_tau_s: mean(|r| r.verdict.time_over_tau_s.filter(|_| r.outcome.is_valid())),
+            time_over_tau_s: mean(|r| r.verdict.time_over_tau_s),
+            wrong_contact: PairedDifference::from_failures(
+                with_harm().map(|pair| [pair.first, pair.second].map(touches_other)),
+            ),
+            failed_stages: PairedStages::new(
+                with_harm().map(|pair| [pair.first, pair.second].map(|r| r.verdict.failed_stage)),
+            ),
+            d_mean: mean(|r| r.verdict.d_mean),
+            d_final: mean(|r| r.verdict.d_final),
+            d_p95: mean(|r| r.verdict.d_p95),
+            collapsed_volume_pct: mean(|r| r.verdict.collapsed_volume_pct),
+            damaged_volume_pct: mean(|r| r.verdict.damaged_volume_pct),
             d_peak: mean(d_peak),
             d_over_tau: mean(d_over_tau),
         }
     }
 }
 
-/// Difference of a success rate (%) or of the mean of a lower-is-better quantity over the same episodes of two runs.
+/// Stages at which the same episodes of two runs failed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PairedStages {
+    /// Number of episodes in which both runs recorded stages.
+    pub n: usize,
+    /// Number of failed episodes of the first run, by stage.
+    pub first: BTreeMap<Stage, usize>,
+    /// Number of failed episodes of the second run, by stage.
+    pub second: BTreeMap<Stage, usize>,
+    /// Number of episodes in which the second run completed more stages.
+    pub better: usize,
+    /// Number of episodes in which the first run completed more stages.
+    pub worse: usize,
+}
+
+impl PairedStages {
+    /// Compares the stage of failure of each episode in the first and in the second run, `None` after Goal Success.
+    pub fn new(pairs: impl IntoIterator<Item = [Option<Stage>; 2]>) -> Self {
+        let mut stages = Self::default();
+        // Stages are in order, and Goal Success comes after all of them.
+        let completed = |failed: Option<Stage>| failed.map_or(Stage::ALL.len(), |stage| stage as usize);
+        for [first, second] in pairs {
+            stages.n += 1;
+            for (counts, failed) in [(&mut stages.first, first), (&mut stages.second, second)] {
+                if let Some(stage) = failed {
+                    *counts.entry(stage).or_insert(0) += 1;
+                }
+            }
+            stages.better += usize::from(completed(second) > completed(first));
+            stages.worse += usize::from(completed(second) < completed(first));
+        }
+        stages
+    }
+}
+
+/// Difference of a rate (%) or of the mean of a lower-is-better quantity over the same episodes of two runs.
 ///
 /// # Example
 ///
@@ -157,9 +238,9 @@ pub struct PairedDifference {
     pub first: Option<f64>,
     /// Rate (%) or mean of the second run.
     pub second: Option<f64>,
-    /// Number of episodes in which the second run alone succeeds, or has less.
+    /// Number of episodes in which the second run alone succeeds, the first alone fails, or the second has less.
     pub better: usize,
-    /// Number of episodes in which the first run alone succeeds, or has less.
+    /// Number of episodes in which the first run alone succeeds, the second alone fails, or the first has less.
     pub worse: usize,
     /// Number of the other episodes.
     pub same: usize,
@@ -197,6 +278,12 @@ impl PairedDifference {
             interval95: (n > 0).then(|| agresti_min(n, better, worse).map(points)),
             p: Some(mcnemar(better, worse)),
         }
+    }
+
+    /// Compares a failure, whose rate should be low, of each episode in the first and in the second run.
+    pub fn from_failures(pairs: impl IntoIterator<Item = [bool; 2]>) -> Self {
+        let rates = Self::from_successes(pairs);
+        Self { better: rates.worse, worse: rates.better, ..rates }
     }
 
     /// Compares a lower-is-better quantity of each episode in the first and in the second run.
@@ -241,7 +328,7 @@ fn mcnemar(better: usize, worse: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{Outcome, tests::sample};
+    use crate::record::{Outcome, WrongContact, tests::sample};
 
     /// Goal, safety and D of each episode; τ is 1.
     fn run(episodes: &[(bool, bool, f64)]) -> Vec<EpisodeRecord> {
@@ -292,6 +379,85 @@ mod tests {
         assert_eq!((paired.d_over_tau.difference, paired.d_peak.n), (None, 1));
         after.iter_mut().for_each(|record| record.header.id.base_seed = 5);
         assert!(pair_episodes(&before, &after).is_empty(), "other initial states");
+    }
+
+    /// What the records of this version have in addition to [`run`].
+    fn with_harm(mut record: EpisodeRecord, contact: bool, failed_stage: Option<Stage>) -> EpisodeRecord {
+        let v = &mut record.verdict;
+        (v.d_mean, v.d_final, v.d_p95, v.time_over_tau_s) = (Some(0.25), Some(0.0), Some(0.5), Some(1.5));
+        v.first_wrong_contact = contact.then(|| WrongContact { time_s: 2.0, object: "bun".to_owned() });
+        v.others_ok = Some(!contact);
+        v.failed_stage = failed_stage;
+        record
+    }
+
+    #[test]
+    fn harm_and_stages_are_paired_and_invalid_episodes_have_no_values() {
+        let base = run(&[(true, true, 0.5), (false, false, 0.5), (false, false, 0.5), (true, true, 0.5)]);
+        let side = |rows: [(bool, Option<Stage>); 4]| -> Vec<EpisodeRecord> {
+            base.iter()
+                .zip(rows)
+                .map(|(record, (contact, stage))| with_harm(record.clone(), contact, stage))
+                .collect()
+        };
+        let before =
+            side([(true, None), (true, Some(Stage::Grasp)), (false, Some(Stage::Reach)), (false, None)]);
+        let mut after = side([
+            (false, None),
+            (true, Some(Stage::Carry)),
+            (false, Some(Stage::Reach)),
+            (true, Some(Stage::Place)),
+        ]);
+        after[0].verdict.d_mean = Some(0.75);
+        after[3].verdict.collapsed_volume_pct = Some(9.0);
+        // An invalid episode touched something and has a stage; it has no D, no volume, and unknown harm.
+        after[3].outcome = Outcome::Invalid { reason: "inverted".into(), step: 3, node: None };
+        after[3].verdict.others_ok = None;
+        let paired = PairedComparison::from_pairs(&pair_episodes(&before, &after));
+        assert_eq!((paired.pairs, paired.invalid_pairs), (4, 1));
+        let contact = paired.wrong_contact;
+        assert_eq!((contact.first, contact.second, counts(contact)), (Some(50.0), Some(50.0), [1, 1, 2]));
+        let d = paired.d_mean;
+        assert_eq!((d.n, d.better, d.worse), (3, 0, 1));
+        assert_eq!((d.first, d.second), (Some(0.25), Some(1.25 / 3.0)));
+        let [last, p95, over] = [paired.d_final, paired.d_p95, paired.time_over_tau_s];
+        assert_eq!([last, p95, over].map(|of| (of.n, of.same)), [(3, 3); 3]);
+        let volumes = [paired.collapsed_volume_pct, paired.damaged_volume_pct];
+        assert_eq!(
+            volumes.map(|of| (of.n, of.first, of.second)),
+            [(3, Some(1.25), Some(1.25)), (3, Some(0.5), Some(0.5))]
+        );
+        assert_eq!((paired.others_ok.n, counts(paired.others_ok)), (3, [1, 0, 2]));
+        let stages = paired.failed_stages;
+        assert_eq!(stages.first, BTreeMap::from([(Stage::Reach, 1), (Stage::Grasp, 1)]));
+        assert_eq!(stages.second, BTreeMap::from([(Stage::Reach, 1), (Stage::Carry, 1), (Stage::Place, 1)]));
+        assert_eq!((stages.n, stages.better, stages.worse), (4, 1, 1));
+    }
+
+    #[test]
+    fn a_run_of_an_earlier_version_has_no_pairs_of_new_quantities() {
+        let new: Vec<_> = run(&[(true, true, 0.5), (false, false, 0.5)])
+            .into_iter()
+            .map(|r| with_harm(r, true, None))
+            .collect();
+        let mut old = new.clone();
+        for record in &mut old {
+            record.remove_new_fields();
+        }
+        for pairs in [pair_episodes(&old, &new), pair_episodes(&new, &old)] {
+            let paired = PairedComparison::from_pairs(&pairs);
+            assert_eq!((paired.goal.n, paired.d_peak.n, paired.failed_stages.n), (2, 2, 0));
+            let new = [paired.d_mean, paired.d_final, paired.d_p95, paired.wrong_contact, paired.others_ok];
+            let volumes = [paired.collapsed_volume_pct, paired.damaged_volume_pct];
+            assert!(new.into_iter().chain(volumes).all(|of| of.n == 0 && of.first.is_none()), "{paired:?}");
+        }
+        // A table of conditions that an earlier version wrote has fewer keys.
+        let mut json =
+            serde_json::to_value(PairedComparison::from_pairs(&pair_episodes(&old, &old))).unwrap();
+        for key in ["invalid_pairs", "wrong_contact", "failed_stages", "d_mean", "d_final", "d_p95"] {
+            json.as_object_mut().unwrap().remove(key);
+        }
+        assert_eq!(serde_json::from_value::<PairedComparison>(json).unwrap().pairs, 2);
     }
 
     #[test]

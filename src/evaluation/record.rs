@@ -291,6 +291,7 @@ impl EpisodeRecord {
         let v = &mut self.verdict;
         (v.d_mean, v.d_final, v.d_p95, v.time_over_tau_s) = (None, None, None, None);
         (v.others_ok, v.first_wrong_contact, v.failed_stage) = (None, None, None);
+        (v.collapsed_volume_pct, v.damaged_volume_pct) = (None, None);
         v.others.clear();
     }
 

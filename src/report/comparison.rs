@@ -8,9 +8,11 @@ use super::stored_run::StoredRun;
 use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
 use softvt_evaluation::{
     paired_stats::{
-        EpisodeKey, EpisodePair, PairedComparison, PairedDifference, group_by_task, pair_episodes,
+        EpisodeKey, EpisodePair, PairedComparison, PairedDifference, PairedStages, group_by_task,
+        pair_episodes,
     },
     record::{EpisodeHeader, EpisodeRecord},
+    stage::Stage,
     summary::method_label,
 };
 
@@ -230,10 +232,17 @@ pub fn table(comparison: &Comparison) -> String {
     }
     table.rule();
     push(&mut table, "all", &comparison.all);
-    push_harm(&mut table, &comparison.all);
+    push_details(&mut table, comparison.deformable, &comparison.all);
     table.rule();
     table.line(LEGEND);
-    table.line("Goal is TSR · DSR: goal with D within τ · others: no other soft object above its own τ");
+    table.line("Goal is TSR · DSR: goal with D within τ · failed: better where more stages were completed");
+    table.line("N/A: no pair of episodes has it in both runs");
+    if comparison.all.invalid_pairs > 0 {
+        table.line(format!(
+            "{} with an invalid episode: failed in success rates; without D, time over τ and volumes",
+            counted(comparison.all.invalid_pairs, "pair")
+        ));
+    }
     if comparison.unmatched > 0 {
         let verb = if comparison.unmatched == 1 { "was" } else { "were" };
         let episodes = counted(comparison.unmatched, "episode");
@@ -252,15 +261,47 @@ pub(super) const COLUMNS: [TextColumn; 9] = {
     [Left(29), Left(9), Right(6), Right(7), Right(7), Right(17), Right(6), Right(5), Right(5)]
 };
 
-/// Appends rows of DSR, harm to others and time over τ, where both runs have them.
-fn push_harm(table: &mut TextTable, paired: &PairedComparison) {
-    for (measure, difference, digits) in [
-        ("DSR, %", paired.dsr, 1),
-        ("others, %", paired.others_ok, 1),
-        ("over τ, s", paired.time_over_tau_s, 2),
-    ] {
-        if difference.n > 0 {
-            push_difference(table, "", measure, &difference, digits);
+/// Appends the rows that only the table of all episodes has. Without a pair that has the quantity, a row is N/A.
+fn push_details(table: &mut TextTable, deformable: bool, paired: &PairedComparison) {
+    let of_soft_targets = [
+        ("DSR", "%", &paired.dsr, 1),
+        ("D mean", "%", &paired.d_mean, 2),
+        ("D final", "%", &paired.d_final, 2),
+        ("D P95", "%", &paired.d_p95, 2),
+        ("time over τ", "s", &paired.time_over_tau_s, 2),
+        ("collapsed volume", "%", &paired.collapsed_volume_pct, 2),
+        ("damaged volume", "%", &paired.damaged_volume_pct, 2),
+    ];
+    let of_all = [
+        ("others within their τ", "%", &paired.others_ok, 1),
+        ("touched other objects", "%", &paired.wrong_contact, 1),
+    ];
+    for (name, unit, difference, digits) in of_soft_targets.into_iter().filter(|_| deformable).chain(of_all) {
+        match difference.n {
+            0 => table.row([name, unit, "N/A", "N/A"]),
+            _ => push_difference(table, name, unit, difference, digits),
+        }
+    }
+    push_stages(table, &paired.failed_stages);
+}
+
+/// Appends the number of failed episodes, in total and by stage.
+fn push_stages(table: &mut TextTable, stages: &PairedStages) {
+    const UNIT: &str = "episodes";
+    if stages.n == 0 {
+        return table.row(["failed at any stage", UNIT, "N/A", "N/A"]);
+    }
+    let counts = |name: String, first: usize, second: usize| {
+        let difference = second as f64 - first as f64;
+        [name, UNIT.to_owned(), first.to_string(), second.to_string(), signed(Some(difference), 0)]
+    };
+    let [first, second] = [&stages.first, &stages.second];
+    let total = counts("failed at any stage".to_owned(), first.values().sum(), second.values().sum());
+    table.row(total.into_iter().chain([String::new(), stages.better.to_string(), stages.worse.to_string()]));
+    for stage in Stage::ALL {
+        let [first, second] = [first, second].map(|of| of.get(&stage).copied().unwrap_or(0));
+        if first + second > 0 {
+            table.row(counts(format!("  {}", stage.name()), first, second));
         }
     }
 }
@@ -308,4 +349,81 @@ fn signed(value: Option<f64>, digits: usize) -> String {
 
 fn interval(bounds: Option<[f64; 2]>, digits: usize) -> String {
     bounds.map_or_else(|| "–".to_owned(), |[low, high]| format!("[{low:+.digits$}, {high:+.digits$}]"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{run_summary::tests::stored, sample_record};
+    use softvt_evaluation::record::{Outcome, WrongContact};
+
+    /// A run of three episodes with these stages of failure.
+    fn run(dir: &str, d_mean: f64, stages: [Option<Stage>; 3]) -> StoredRun {
+        let record = |(episode, failed_stage): (usize, Option<Stage>)| {
+            let mut record = sample_record();
+            record.header.id.episode = episode as u32;
+            let v = &mut record.verdict;
+            (v.goal, v.failed_stage) = (failed_stage.is_none(), failed_stage);
+            (v.d_mean, v.d_final, v.d_p95) = (Some(d_mean), Some(0.1), Some(0.3));
+            (v.time_over_tau_s, v.others_ok) = (Some(0.5), Some(true));
+            record
+        };
+        stored(dir, "pi", stages.into_iter().enumerate().map(record).collect())
+    }
+
+    /// The rows below "all" by their first word.
+    fn words(text: &str, name: &str) -> Vec<String> {
+        let (_, all) = text.split_once("\nall ").expect("all episodes");
+        let row = all.lines().find(|line| line.trim_start().starts_with(name)).unwrap_or_default();
+        let cells = row.trim_start().trim_start_matches(name).split_whitespace();
+        cells.map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn the_table_has_the_rows_of_the_summary() {
+        let first = run("a", 0.25, [Some(Stage::Reach), Some(Stage::Grasp), None]);
+        let mut second = run("b", 0.5, [Some(Stage::Carry), None, None]);
+        second.records[0].verdict.first_wrong_contact =
+            Some(WrongContact { time_s: 1.0, object: "bun".to_owned() });
+        second.records[2].outcome = Outcome::Invalid { reason: "inverted".into(), step: 3, node: None };
+        let text = table(&compare(&[first], &[second]).expect("the same episodes"));
+        assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
+        assert_eq!(words(&text, "D mean"), ["%", "0.25", "0.50", "+0.25", "–", "0", "2"], "{text}");
+        assert_eq!(words(&text, "D final")[..4], ["%", "0.10", "0.10", "+0.00"]);
+        assert_eq!(words(&text, "D P95")[..4], ["%", "0.30", "0.30", "+0.00"]);
+        assert_eq!(words(&text, "time over τ")[..4], ["s", "0.50", "0.50", "+0.00"]);
+        assert_eq!(words(&text, "collapsed volume")[..3], ["%", "1.25", "1.25"]);
+        assert_eq!(words(&text, "damaged volume")[..3], ["%", "0.50", "0.50"]);
+        assert_eq!(words(&text, "others within their τ")[..3], ["%", "100.0", "100.0"]);
+        let touched = words(&text, "touched other objects");
+        assert_eq!(touched[..4], ["%", "0.0", "33.3", "+33.3"]);
+        assert_eq!(touched[touched.len() - 3..], ["0", "1", "1.000"]);
+        assert_eq!(words(&text, "failed at any stage"), ["episodes", "2", "1", "-1", "2", "0"]);
+        assert_eq!(words(&text, "reach"), ["episodes", "1", "0", "-1"]);
+        assert_eq!(words(&text, "carry"), ["episodes", "0", "1", "+1"]);
+        assert!(words(&text, "place").is_empty(), "{text}");
+        assert!(text.contains("1 pair with an invalid episode: failed in success rates"), "{text}");
+    }
+
+    #[test]
+    fn rows_that_one_run_lacks_are_not_applicable() {
+        let new = run("a", 0.25, [None; 3]);
+        let mut old = new.clone();
+        old.records.iter_mut().for_each(EpisodeRecord::remove_new_fields);
+        let text = table(&compare(&[old], &[new]).expect("the same episodes"));
+        for name in [
+            "D mean",
+            "D final",
+            "D P95",
+            "collapsed volume",
+            "damaged volume",
+            "others within their τ",
+            "touched other objects",
+            "failed at any stage",
+        ] {
+            assert_eq!(words(&text, name)[1..], ["N/A", "N/A"], "{name}: {text}");
+        }
+        assert_eq!(words(&text, "DSR")[..3], ["%", "100.0", "100.0"]);
+        assert!(!text.contains("invalid episode"), "{text}");
+    }
 }

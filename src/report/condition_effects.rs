@@ -199,7 +199,7 @@ impl ConditionEffects {
 
     /// Goal and Safety Success of the unchanged run, percent.
     pub fn unchanged(&self) -> [Option<f64>; 2] {
-        let first = self.effects.first().map(|effect| effect.differences);
+        let first = self.effects.first().map(|effect| &effect.differences);
         [first.and_then(|first| first.goal.first), first.and_then(|first| first.safety.first)]
     }
 }
