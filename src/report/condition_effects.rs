@@ -5,11 +5,13 @@ use std::collections::BTreeMap;
 
 use super::{
     run_summary::RunSummary,
+    stored_run::RunChange,
     tables::{ResultTable, strings},
 };
 use softvt_evaluation::{
     paired_stats::{EpisodePair, PairedComparison, PairedDifference, pair_episodes},
     record::EpisodeRecord,
+    statistics::Rate,
 };
 
 /// The conditions of a suite and a policy.
@@ -28,29 +30,11 @@ pub struct ConditionEffects {
 /// A condition against the unchanged run.
 #[derive(Clone, Debug)]
 pub struct ConditionEffect {
-    /// What is changed, such as `target_mass`.
-    pub factor: String,
-    /// Its value, if one number is changed.
-    pub value: Option<f64>,
-    /// Factor and value.
-    pub label: String,
+    pub change: RunChange,
+    /// Goal and Safety Success under the condition.
+    pub goal: Rate,
+    pub safety: Rate,
     pub differences: PairedComparison,
-}
-
-/// What a run changes; `None` for an unchanged one.
-fn change(run: &RunSummary) -> Option<(String, Option<f64>, String)> {
-    let run = &run.run;
-    let twin = run.is_rigid_twin().then(|| "rigid twin".to_owned());
-    let changes: Vec<String> = run.changes("shifts").chain(run.changes("set")).chain(twin).collect();
-    let label = changes.join(", ");
-    match &changes[..] {
-        [] => None,
-        [single] => match single.split_once('=') {
-            Some((factor, value)) => Some((factor.to_owned(), value.parse().ok(), label)),
-            None => Some((single.clone(), None, label)),
-        },
-        _ => Some(("several".to_owned(), None, label)),
-    }
 }
 
 /// The records of a run under the name of the soft original.
@@ -64,35 +48,34 @@ fn records_of_original(run: &RunSummary) -> Vec<EpisodeRecord> {
 
 /// The effects of all conditions among `runs` whose unchanged run is there too, exactly once.
 pub fn condition_effects(runs: &[RunSummary]) -> Vec<ConditionEffects> {
-    let key = |run: &RunSummary| {
-        let run = &run.run;
-        let text = |field: &str| run.manifest[field].to_string();
-        [run.original_suite().to_owned(), text("policy"), text("seed"), text("split"), text("vary")]
-    };
     let mut groups: BTreeMap<_, Vec<&RunSummary>> = BTreeMap::new();
     for run in runs {
-        groups.entry(key(run)).or_default().push(run);
+        groups.entry(run.run.condition_group()).or_default().push(run);
     }
     groups.values().filter_map(|group| effects_of_group(group)).collect()
 }
 
 fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
-    let mut unchanged = group.iter().filter(|run| change(run).is_none());
+    let mut unchanged = group.iter().filter(|run| run.run.change().is_none());
     let (reference, None) = (unchanged.next()?, unchanged.next()) else { return None };
     let reference_records = records_of_original(reference);
     let mut effects = Vec::new();
     let mut changed: BTreeMap<_, Vec<EpisodeRecord>> = BTreeMap::new();
     for run in group {
-        let Some((factor, value, label)) = change(run) else { continue };
+        let Some(change) = run.run.change() else { continue };
         let records = records_of_original(run);
         let pairs = pair_episodes(&reference_records, &records);
         if pairs.is_empty() {
             continue;
         }
+        let rate = |test: fn(&EpisodeRecord) -> bool| {
+            let succeeds = |pair: &&EpisodePair| pair.second.outcome.is_valid() && test(pair.second);
+            Rate::new(pairs.iter().filter(succeeds).count(), pairs.len())
+        };
         effects.push(ConditionEffect {
-            factor,
-            value,
-            label,
+            change,
+            goal: rate(|record| record.verdict.goal),
+            safety: rate(|record| record.verdict.safety),
             differences: PairedComparison::from_pairs(&pairs),
         });
         for EpisodePair { first, second } in pairs {
@@ -102,10 +85,7 @@ fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
     if effects.is_empty() {
         return None;
     }
-    effects.sort_by(|a, b| {
-        let by_value = || a.value.unwrap_or(f64::NAN).total_cmp(&b.value.unwrap_or(f64::NAN));
-        a.factor.cmp(&b.factor).then_with(by_value).then_with(|| a.label.cmp(&b.label))
-    });
+    effects.sort_by(|a, b| a.change.compare(&b.change));
     let mean = |test: fn(&EpisodeRecord) -> bool| {
         let percent = |record: &EpisodeRecord| {
             if record.outcome.is_valid() && test(record) { 100.0 } else { 0.0 }
@@ -144,7 +124,7 @@ pub fn effects_table(effects: &[ConditionEffects]) -> Option<ResultTable> {
             let PairedComparison { pairs, goal, safety, d_over_tau, .. } = &effect.differences;
             rows.push(vec![
                 name.clone(),
-                effect.label.clone(),
+                effect.change.label.clone(),
                 pairs.to_string(),
                 signed(goal, 1),
                 signed(safety, 1),
@@ -169,7 +149,7 @@ pub fn effects_table(effects: &[ConditionEffects]) -> Option<ResultTable> {
     })
 }
 
-/// Values of a factor with at least two, for its trend: value, Goal and Safety Success in percent.
+/// Values of a factor with at least two, for its trend.
 #[derive(Clone, Debug)]
 pub struct Trend {
     pub factor: String,
@@ -179,8 +159,8 @@ pub struct Trend {
 #[derive(Clone, Copy, Debug)]
 pub struct TrendPoint {
     pub value: f64,
-    pub goal: f64,
-    pub safety: f64,
+    pub goal: Rate,
+    pub safety: Rate,
 }
 
 impl ConditionEffects {
@@ -188,13 +168,12 @@ impl ConditionEffects {
     pub fn trends(&self) -> Vec<Trend> {
         let of_factor = |effects: &[ConditionEffect]| {
             let point = |effect: &ConditionEffect| {
-                let PairedComparison { goal, safety, .. } = effect.differences;
-                Some(TrendPoint { value: effect.value?, goal: goal.second?, safety: safety.second? })
+                Some(TrendPoint { value: effect.change.value?, goal: effect.goal, safety: effect.safety })
             };
             let points: Vec<TrendPoint> = effects.iter().filter_map(point).collect();
-            (points.len() > 1).then(|| Trend { factor: effects[0].factor.clone(), points })
+            (points.len() > 1).then(|| Trend { factor: effects[0].change.factor.clone(), points })
         };
-        self.effects.chunk_by(|a, b| a.factor == b.factor).filter_map(of_factor).collect()
+        self.effects.chunk_by(|a, b| a.change.factor == b.change.factor).filter_map(of_factor).collect()
     }
 
     /// Goal and Safety Success of the unchanged run, percent.
@@ -243,7 +222,7 @@ mod tests {
         ]);
         let all = condition_effects(&runs);
         let [effects] = &all[..] else { panic!("one suite: {all:?}") };
-        let labels: Vec<&str> = effects.effects.iter().map(|effect| effect.label.as_str()).collect();
+        let labels: Vec<&str> = effects.effects.iter().map(|effect| effect.change.label.as_str()).collect();
         assert_eq!(labels, ["mass=1.25", "mass=2.5", "rigid twin"]);
         let safety = effects.effects[1].differences.safety;
         assert_eq!((safety.n, safety.difference), (4, Some(-50.0)));
@@ -252,7 +231,8 @@ mod tests {
         assert!((mean - (100.0 * 7.0 / 12.0 - 75.0)).abs() < 1e-9, "{mean}");
         let trends = effects.trends();
         assert_eq!((trends.len(), trends[0].factor.as_str(), trends[0].points.len()), (1, "mass", 2));
-        assert_eq!(trends[0].points.iter().map(|point| point.safety).collect::<Vec<_>>(), [50.0, 25.0]);
+        let safety = trends[0].points.iter().map(|point| point.safety).collect::<Vec<_>>();
+        assert_eq!(safety, [Rate::new(2, 4), Rate::new(1, 4)]);
         let table = effects_table(&all).expect("effects");
         assert_eq!(table.rows.len(), 4);
         assert!(table.rows[1][4].starts_with("-50.0 ["), "{:?}", table.rows);

@@ -1,6 +1,6 @@
 //! [`RunSummary`]: a run with its results and a distinct name.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::stored_run::StoredRun;
 use softvt_common::text::decimal;
@@ -26,12 +26,24 @@ pub struct UnsafeEpisode<'a> {
     pub reason: String,
 }
 
-/// Summarises runs, sorted by suite. A folder given twice counts once.
+/// Summarises runs, sorted by suite. A run under conditions follows its unchanged run, in the order of factors and
+/// values. A folder given twice counts once.
 pub fn summarize_runs(mut runs: Vec<StoredRun>) -> Vec<RunSummary> {
     let mut seen = BTreeSet::new();
     runs.retain(|run| seen.insert(run.dir.canonicalize().unwrap_or_else(|_| run.dir.clone())));
+    let mut groups: BTreeMap<[String; 5], usize> = BTreeMap::new();
+    for (position, run) in runs.iter().enumerate() {
+        groups.entry(run.condition_group()).or_insert(position);
+    }
     let mut all: Vec<RunSummary> = runs.into_iter().map(summarize).collect();
-    all.sort_by(|a, b| a.summary.suite.cmp(&b.summary.suite));
+    all.sort_by(|a, b| {
+        let group = |run: &RunSummary| groups.get(&run.run.condition_group());
+        let by_change = || match (a.run.change(), b.run.change()) {
+            (Some(a), Some(b)) => a.compare(&b),
+            (a, b) => a.is_some().cmp(&b.is_some()),
+        };
+        a.summary.suite.cmp(&b.summary.suite).then_with(|| group(a).cmp(&group(b))).then_with(by_change)
+    });
     let names: Vec<String> = all.iter().map(RunSummary::name).collect();
     for (run, name) in all.iter_mut().zip(&names) {
         if names.iter().filter(|other| *other == name).count() > 1 {
@@ -141,6 +153,24 @@ pub(super) mod tests {
             "episodes": records.len(), "shifts": [], "set": [], "arguments": [],
         });
         StoredRun { dir: Path::new(dir).into(), manifest, records, is_finished: true, is_truncated: false }
+    }
+
+    #[test]
+    fn conditions_follow_their_unchanged_run_in_the_order_of_values() {
+        let run = |dir: &str, policy: &str, shift: Option<(&str, f64)>| {
+            let mut run = stored(dir, policy, vec![sample_record()]);
+            run.manifest["shifts"] = json!(shift.into_iter().collect::<Vec<_>>());
+            run
+        };
+        let runs = vec![
+            run("a", "pi", Some(("mass", 10.0))),
+            run("b", "pi", Some(("mass", 2.5))),
+            run("c", "noop", None),
+            run("d", "pi", None),
+            run("e", "pi", Some(("light", 2.0))),
+        ];
+        let names: Vec<String> = summarize_runs(runs).into_iter().map(|run| run.method).collect();
+        assert_eq!(names, ["pi", "pi · light=2.0", "pi · mass=2.5", "pi · mass=10.0", "noop"]);
     }
 
     #[test]

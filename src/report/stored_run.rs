@@ -1,6 +1,7 @@
 //! [`StoredRun`]: a finished or unfinished run, read from its folder.
 
 use std::{
+    cmp::Ordering,
     collections::BTreeMap,
     fs, io,
     path::{Path, PathBuf},
@@ -61,6 +62,28 @@ pub fn remove_folder(manifest: &mut Value) {
     }
 }
 
+/// What a run changes of its suite.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunChange {
+    /// Name of the changed factor, such as `mass`; `several` for more than one.
+    pub factor: String,
+    /// Its value, if one number is changed.
+    pub value: Option<f64>,
+    /// All changes, such as `mass=2`.
+    pub label: String,
+}
+
+impl RunChange {
+    /// Order by factor, then by value; changes without a number come last.
+    pub fn compare(&self, other: &Self) -> Ordering {
+        let value = |change: &Self| change.value.unwrap_or(f64::NAN);
+        self.factor
+            .cmp(&other.factor)
+            .then_with(|| value(self).total_cmp(&value(other)))
+            .then_with(|| self.label.cmp(&other.label))
+    }
+}
+
 impl StoredRun {
     /// Text field of `run.json`; empty if missing.
     pub fn text(&self, field: &str) -> &str {
@@ -114,6 +137,28 @@ impl StoredRun {
             let value = pair[1].as_str().map_or_else(|| pair[1].to_string(), str::to_owned);
             format!("{}={value}", pair[0].as_str().unwrap_or_default())
         })
+    }
+
+    /// What the run changes; `None` for a suite as it is.
+    pub fn change(&self) -> Option<RunChange> {
+        let twin = self.is_rigid_twin().then(|| "rigid twin".to_owned());
+        let changes: Vec<String> = self.changes("shifts").chain(self.changes("set")).chain(twin).collect();
+        let label = changes.join(", ");
+        let (factor, value) = match &changes[..] {
+            [] => return None,
+            [single] => match single.split_once('=') {
+                Some((factor, value)) => (factor, value.parse().ok()),
+                None => (single.as_str(), None),
+            },
+            _ => ("several", None),
+        };
+        Some(RunChange { factor: factor.to_owned(), value, label })
+    }
+
+    /// What the run under a condition and its unchanged run have in common.
+    pub fn condition_group(&self) -> [String; 5] {
+        let text = |field: &str| self.manifest[field].to_string();
+        [self.original_suite().to_owned(), text("policy"), text("seed"), text("split"), text("vary")]
     }
 
     /// Warnings for a reader of the results, one sentence each.

@@ -8,6 +8,7 @@ use crate::{
     condition_effects::{ConditionEffects, Trend, TrendPoint},
     run_summary::RunSummary,
 };
+use softvt_common::text::{format_number, shortened};
 use softvt_evaluation::{
     paired_stats::d_over_tau,
     record::EpisodeRecord,
@@ -219,61 +220,151 @@ fn distribution_mark(of: &Distribution, max: f64) -> Markup {
     }
 }
 
-/// Goal and Safety Success over the values of each factor: one plot per factor.
+/// Goal and Safety Success over the values of each factor: one plot per factor, side by side.
 pub(super) fn trends(suite: &ConditionEffects) -> Markup {
     html! {
-        p.legend {
-            span.key { (curve_swatch("curve c0")) "Goal Success" }
-            span.key { (curve_swatch("curve c2")) "Safety Success" }
-        }
-        @for trend in suite.trends() {
-            p.suite { (trend.factor) }
-            (trend_plot(&trend, suite.unchanged()))
+        p.legend { @for series in SERIES { span.key { (series_swatch(&series)) (series.name) } } }
+        div.panels {
+            @for trend in suite.trends() {
+                div {
+                    p.suite { (trend.factor) }
+                    (trend_plot(&trend, suite.unchanged()))
+                }
+            }
         }
     }
 }
 
-fn curve_swatch(class: &str) -> Markup {
+/// A rate in the plots of trends.
+struct Series {
+    class: &'static str,
+    name: &'static str,
+    rate: fn(&TrendPoint) -> Rate,
+    /// Corner radius of the marks, px: round or nearly square.
+    mark_radius: f64,
+    /// Shift of lines and marks, px, so that equal rates stay apart.
+    shift: [f64; 2],
+}
+
+const SERIES: [Series; 2] = [
+    Series {
+        class: "series goal",
+        name: "Goal Success",
+        rate: |point| point.goal,
+        mark_radius: 0.5 * MARK,
+        shift: [-4.0, -1.5],
+    },
+    Series {
+        class: "series safety",
+        name: "Safety Success",
+        rate: |point| point.safety,
+        mark_radius: 1.0,
+        shift: [4.0, 1.5],
+    },
+];
+
+/// Edge length of a mark, px.
+const MARK: f64 = 8.0;
+/// Ratio of the largest to the smallest value from which an axis is logarithmic.
+const LOG_RATIO: f64 = 20.0;
+/// Largest length of a factor's name at its axis.
+const MAX_AXIS_NAME: usize = 30;
+/// Smallest distance of labelled values, as a fraction of the width.
+const LABEL_DISTANCE: f64 = 0.14;
+
+fn series_swatch(series: &Series) -> Markup {
     html! {
-        svg.swatch width="30" height="12" aria-hidden="true" { line class=(class) x1="1" x2="29" y1="6" y2="6" {} }
+        svg.swatch width="30" height="12" aria-hidden="true" {
+            g class=(series.class) {
+                line x1="1" x2="29" y1="6" y2="6" {}
+                (mark(series, "50%", 6.0))
+            }
+        }
     }
+}
+
+fn mark(series: &Series, at: &str, height: f64) -> Markup {
+    let offset = format!("translate({} {})", -0.5 * MARK, -0.5 * MARK);
+    html! { rect x=(at) y=(y(height)) width=(MARK) height=(MARK) rx=(series.mark_radius) transform=(offset) {} }
 }
 
 fn trend_plot(trend: &Trend, unchanged: [Option<f64>; 2]) -> Markup {
     let points = &trend.points;
     let (low, high) = (points[0].value, points[points.len() - 1].value);
+    let is_log = low > 0.0 && high / low >= LOG_RATIO;
+    let scale = |value: f64| if is_log { value.ln() } else { value };
+    let extent = (scale(high) - scale(low)).max(f64::MIN_POSITIVE);
     // The ends stay clear of the borders, where the labels would be cut off.
-    let at = |value: f64| 0.08 + 0.84 * (value - low) / (high - low).max(f64::MIN_POSITIVE);
-    type Rate = fn(&TrendPoint) -> f64;
-    let rates: [(&str, Rate); 2] = [("curve c0", |point| point.goal), ("curve c2", |point| point.safety)];
+    let at = |value: f64| 0.08 + 0.84 * (scale(value) - scale(low)) / extent;
+    let name = shortened(&trend.factor, MAX_AXIS_NAME);
+    let mut labelled: Vec<f64> = Vec::new();
+    for TrendPoint { value, .. } in points {
+        if labelled.last().is_none_or(|last| at(*value) - at(*last) >= LABEL_DISTANCE) {
+            labelled.push(*value);
+        }
+    }
     let label = format!("Goal and Safety Success over {}; the numbers are in the table above", trend.factor);
     html! {
-        svg.plot width="100%" height=(PLOT_HEIGHT + 22.0) role="img" aria-label=(label) {
-            @for quarter in 0..=4 {
-                @let height = level(25.0 * f64::from(quarter));
-                line.grid x1="0" x2="100%" y1=(y(height)) y2=(y(height)) {}
-                @if quarter > 0 { text.tick x="0" y=(y(height - 3.0)) { (25 * quarter) " %" } }
-            }
-            @for ((class, rate), unchanged) in rates.iter().zip(unchanged) {
-                @if let Some(unchanged) = unchanged {
-                    g class=(class) {
-                        line stroke-dasharray="4 4" x1="0" x2="100%" y1=(y(level(unchanged))) y2=(y(level(unchanged))) {}
-                    }
+        div.axes {
+            (rate_axis(40.0))
+            svg.plot width="100%" height=(PLOT_HEIGHT + 40.0) role="img" aria-label=(label) {
+                (rate_grid())
+                @for (series, unchanged) in SERIES.iter().zip(unchanged) { (trend_series(series, points, &at, unchanged)) }
+                @for value in labelled {
+                    text.tick x=(x(at(value))) y=(y(PLOT_HEIGHT + 16.0)) text-anchor="middle" { (format_number(value)) }
                 }
-                g class=(class) {
-                    @for pair in points.windows(2) {
-                        line x1=(x(at(pair[0].value))) x2=(x(at(pair[1].value))) y1=(y(level(rate(&pair[0])))) y2=(y(level(rate(&pair[1])))) {}
-                    }
-                    @for point in points {
-                        circle cx=(x(at(point.value))) cy=(y(level(rate(point)))) r="3" {}
-                    }
+                text.tick x="50%" y=(y(PLOT_HEIGHT + 34.0)) text-anchor="middle" {
+                    "value of " (name) @if is_log { ", log scale" }
                 }
-            }
-            @for point in points {
-                text.tick x=(x(at(point.value))) y=(y(PLOT_HEIGHT + 16.0)) text-anchor="middle" { (short(point.value)) }
             }
         }
     }
+}
+
+/// The line of the unchanged run, and the rate at each value with its interval.
+fn trend_series(
+    series: &Series,
+    points: &[TrendPoint],
+    at: impl Fn(f64) -> f64,
+    unchanged: Option<f64>,
+) -> Markup {
+    let [right, down] = series.shift;
+    let rates: Vec<(String, f64, [f64; 2])> = points
+        .iter()
+        .filter_map(|point| {
+            let rate = (series.rate)(point);
+            Some((x(at(point.value)), level(rate.rate?), rate.wilson95?.map(level)))
+        })
+        .collect();
+    html! {
+        @if let Some(height) = unchanged.map(|rate| y(level(rate) + down)) {
+            g class=(series.class) { line.unchanged x1="0" x2="100%" y1=(height) y2=(height) {} }
+        }
+        g class=(series.class) transform=(format!("translate({right} {down})")) {
+            @for pair in rates.windows(2) { line x1=(pair[0].0) x2=(pair[1].0) y1=(y(pair[0].1)) y2=(y(pair[1].1)) {} }
+            @for (at, height, [low, high]) in &rates {
+                line.whisker x1=(at) x2=(at) y1=(y(*low)) y2=(y(*high)) {}
+                (mark(series, at, *height))
+            }
+        }
+    }
+}
+
+/// Labels of rates left of a plot; `below` is the height of what is below the plot, px.
+fn rate_axis(below: f64) -> Markup {
+    html! {
+        svg width="100%" height=(PLOT_HEIGHT + below) aria-hidden="true" {
+            @for percent in [0, 25, 50, 75, 100] {
+                text.tick x="100%" y=(y(level(f64::from(percent)) + 4.0)) text-anchor="end" { (percent) " %" }
+            }
+        }
+    }
+}
+
+/// Horizontal lines at the rates of [`rate_axis`].
+fn rate_grid() -> Markup {
+    let heights = (0..=4).map(|quarter| y(level(25.0 * f64::from(quarter))));
+    html! { @for height in heights { line.grid x1="0" x2="100%" y1=(height) y2=(height) {} } }
 }
 
 /// Safety Success over the strictness of the thresholds: one plot per suite, one line per run.
@@ -291,16 +382,15 @@ pub(super) fn kappa_curves(runs: &[RunSummary]) -> Markup {
 fn kappa_plot(suite: &str, runs: &[&RunSummary]) -> Markup {
     let label = format!("Safety Success over kappa, {suite}; the numbers are in the table above");
     html! {
-        svg.plot width="100%" height=(PLOT_HEIGHT + 22.0) role="img" aria-label=(label) {
-            @for quarter in 0..=4 {
-                @let at = level(25.0 * f64::from(quarter));
-                line.grid x1="0" x2="100%" y1=(y(at)) y2=(y(at)) {}
-                @if quarter > 0 { text.tick x="0" y=(y(at - 3.0)) { (25 * quarter) " %" } }
-            }
-            line.limit x1="50%" x2="50%" y1=(y(level(100.0))) y2=(y(level(0.0))) {}
-            @for (i, run) in runs.iter().enumerate() { (curve(run, i)) }
-            @for (i, label) in ["κ = 0", "0.2", "0.4", "0.6", "0.8", "1"].iter().enumerate() {
-                (tick(i, 5, &y(PLOT_HEIGHT + 16.0), label))
+        div.axes {
+            (rate_axis(22.0))
+            svg.plot width="100%" height=(PLOT_HEIGHT + 22.0) role="img" aria-label=(label) {
+                (rate_grid())
+                line.limit x1="50%" x2="50%" y1=(y(level(100.0))) y2=(y(level(0.0))) {}
+                @for (i, run) in runs.iter().enumerate() { (curve(run, i)) }
+                @for (i, label) in ["κ = 0", "0.2", "0.4", "0.6", "0.8", "1"].iter().enumerate() {
+                    (tick(i, 5, &y(PLOT_HEIGHT + 16.0), label))
+                }
             }
         }
     }
@@ -319,7 +409,7 @@ fn curve_key(run: &RunSummary, index: usize) -> Markup {
 
 /// Height of a rate in the plot of curves.
 fn level(percent: f64) -> f64 {
-    let top = 18.0;
+    let top = 8.0;
     top + (PLOT_HEIGHT - top) * (1.0 - percent / 100.0)
 }
 

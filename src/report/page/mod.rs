@@ -30,6 +30,7 @@ pub fn page(runs: &[RunSummary], out: &Path) -> String {
     let title = format!("softvt: {}", suites(runs).join(", "));
     let lead = format!("{} in {}", counted(episodes, "episode"), counted(runs.len(), "run"));
     let is_soft = runs.iter().any(RunSummary::is_soft);
+    let has_conditions = !condition_effects(runs).is_empty();
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
@@ -46,6 +47,7 @@ pub fn page(runs: &[RunSummary], out: &Path) -> String {
                     p.lead { (lead) " · softvt " (env!("CARGO_PKG_VERSION")) }
                     nav aria-label="Contents" {
                         a href="#results" { "Results" }
+                        @if has_conditions { a href="#conditions" { "Conditions" } }
                         @if is_soft { a href="#deformation" { "Deformation" } }
                         a href="#tasks" { "Tasks" }
                         a href="#failures" { "Unsafe episodes" }
@@ -118,8 +120,8 @@ fn conditions(runs: &[RunSummary]) -> Option<Markup> {
             figure {
                 (figures::trends(suite))
                 figcaption {
-                    "Goal and Safety Success over the value of each factor: " (suite.suite) ", " (suite.method)
-                    ". Dashed lines are the unchanged run."
+                    "Goal and Safety Success, % of the episodes, over the value of each factor: " (suite.suite) ", " (suite.method)
+                    ". Values are in the unit of the shift or setting. Whiskers are 95 % Wilson intervals; dashed lines are the unchanged run. Marks are shifted so that both rates are visible."
                 }
             }
         }

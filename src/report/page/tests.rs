@@ -114,6 +114,44 @@ fn the_page_is_self_contained_and_accessible() {
     assert!(page.contains("softvt view x.lua --task 0 --episode 1 --policy expert --seed 11 --out seen"));
 }
 
+/// A run of 20 episodes under a shift, every second of which is unsafe.
+fn shifted(dir: &str, shift: Option<(&str, f64)>) -> StoredRun {
+    let mut run = stored(dir, "pi", episodes("soft", 20));
+    run.manifest["shifts"] = json!(shift.into_iter().collect::<Vec<_>>());
+    run
+}
+
+#[test]
+fn trends_have_intervals_and_named_axes() {
+    let page = render(vec![
+        shifted("b", Some(("mass", 2.5))),
+        shifted("c", Some(("mass", 1.25))),
+        shifted("d", Some(("stiffness", 0.1))),
+        shifted("e", Some(("stiffness", 10.0))),
+        shifted("a", None),
+    ]);
+    assert_well_formed(&page);
+    assert!(page.contains("href=\"#conditions\""), "the contents list the section");
+    let (_, figure) = page.split_once("class=\"panels\"").expect("a figure of trends");
+    let (figure, _) = figure.split_once("</figure>").expect("it ends");
+    let panels: Vec<&str> = figure.split("class=\"axes\"").skip(1).collect();
+    let [mass, stiffness] = panels[..] else { panic!("two factors: {figure}") };
+    for panel in panels {
+        // Two rates at two values, each with an interval, and the unchanged run.
+        assert_eq!(
+            (panel.matches("whisker").count(), panel.matches("class=\"unchanged\"").count()),
+            (4, 2),
+            "{panel}"
+        );
+        assert!([">0 %<", ">50 %<", ">100 %<"].iter().all(|label| panel.contains(label)), "{panel}");
+    }
+    assert!(mass.contains("value of mass<") && mass.find(">1.25<") < mass.find(">2.5<"), "{mass}");
+    assert!(stiffness.contains("value of stiffness, log scale<"), "{stiffness}");
+    // The unchanged run comes first in the tables and figures.
+    assert!(page.find("pi · mass=1.25") < page.find("pi · mass=2.5"), "{page}");
+    assert!(page.find("<td class=\"text\">pi</td>") < page.find("pi · mass=1.25"), "{page}");
+}
+
 #[test]
 fn stills_are_embedded_and_link_to_their_videos() {
     let root = tempfile::tempdir().unwrap();
