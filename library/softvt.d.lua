@@ -233,11 +233,6 @@
 ---@field gravity? number[] Gravity; {0, 0, -9.81} by default. Expects a list of 3 numbers (m/s²).
 ---@field sleeping? boolean True if bodies at rest fall asleep. Default true.
 
----Returns the fingerprint of an asset: a hash of its shape, material and friction. Calibrations refer to it.
----@param asset softvt.Asset
----@return string
-function softvt.fingerprint(asset) end
-
 ---Builds a scene with the robot and lets it settle. Deformation refers to the settled shapes.
 ---@class softvt.SimulateSpec
 ---@field layout softvt.Layout Initial scene.
@@ -823,7 +818,7 @@ function Simulation:tool() end
 ---@field fingerprint string Fingerprint of its asset.
 ---@field joint number? Joint value of a part, m or rad.
 ---@field joints table<string, number> Joint values of an articulated object by part, m or rad.
----@field pad_force number[] Normal force of the left and the right pad on the object, N.
+---@field pad_force number[] Sum of the normal forces at the contact points of the left and the right gel pad on the object, N; see arm.force.
 ---@field slip_mm number[]? Distance that a movable object has slid on the left and the right pad, mm.
 ---@field d_pct number? Deformation D of a soft body, %.
 ---@field d_peak_pct number? Largest D since settling, %.
@@ -839,7 +834,7 @@ local Measurements = {}
 ---@field initial number[][] Positions of the 99 markers on the untouched gel, px, row by row.
 ---@field present number[][] Their present positions, px.
 ---@field markers softvt.Markers The markers with the measures of their displacements.
----@field force number[] True force on the gel, N, pad frame; a pressing body makes z negative.
+---@field force number[] True force on the gel, N, pad frame: the vector sum over its contact points, friction included. A pressing body makes z negative.
 ---@field depth_mm number Largest depth of the indentation, mm.
 local TactileReading = {}
 
@@ -1138,7 +1133,7 @@ local InstanceRanges = {}
 ---@field closure number Last commanded closure: 0 is open, 1 is closed.
 ---@field gripping boolean True from a call of grasp to the next call of release or open.
 ---@field width number Measured distance of the gels, m.
----@field force number[] Normal force on the left and the right pad, N, from objects and parts of every kind.
+---@field force number[] Sum of the normal forces at all contact points of the left and the right gel pad, N, whatever touches it; forces on the cases of the fingers do not count. On the edge of a pad the normals are oblique, and the sum is larger than the pressing force, which is -sim:tactile(side).force[3].
 ---@field instances softvt.InstanceRanges? Under --policy fixed-closure: the ranges within which the instances of an asset differ. The expert then closes to one closure for all of them (experts.fixed_closure). nil under other policies.
 ---@field time number Time since the start, s.
 ---@field dt number Length of a control step, s.
@@ -1404,6 +1399,11 @@ function softvt.layout(name, build) end
 ---@param spec? softvt.WorldSpec
 ---@return softvt.World
 function softvt.world(spec) end
+
+---Returns the fingerprint of an asset: a hash of its shape, material and friction. Calibrations refer to it.
+---@param asset softvt.Asset
+---@return string
+function softvt.fingerprint(asset) end
 
 ---Builds a scene with the robot and lets it settle. Deformation refers to the settled shapes.
 ---@param spec softvt.SimulateSpec

@@ -341,7 +341,8 @@ impl Simulation {
 /// Normal force at the points of a patch that touch the partners of interest, N.
 fn normal_force(patch: &ContactPatch, is_of_interest: impl Fn(ContactPartner) -> bool) -> f64 {
     let points = patch.points.iter().filter(|point| is_of_interest(point.partner));
-    points.map(|point| point.pressure * point.area).sum()
+    // The sum of no numbers is −0 in Rust, which would be printed.
+    points.fold(0.0, |sum, point| sum + point.pressure * point.area)
 }
 
 /// `file:line` where the object of a name, or the object of the part of that name, was placed.

@@ -67,44 +67,85 @@ fn invalid_joints_and_parts_are_refused() {
     assert_snapshot!(refusal(TRAY, "chest.drawer"), @r#"x.lua:13: task.goal.target: unknown object "chest.drawer"; did you mean "chest.tray"?"#);
 }
 
-/// Grips the handle of a drawer of the standard cabinet and reads the forces.
+/// Forces of the pads on the handle of a drawer of the standard cabinet. Point `grip`: both pads hold the bar. Point `edge`:
+/// the hand comes wide open, so that the lower finger stops at the handle below and the edge of a pad meets the bar
+/// obliquely; nothing has friction.
 const HANDLE: &str = r#"local floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 2, 2, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} }
 local wooden_cabinet = require "assets.wooden_cabinet"
-local layout = softvt.layout("handle", function(scene)
-  scene:add { name = "floor", asset = floor, position = { 0, 0, 0 } }
-  scene:add { name = "cabinet", asset = wooden_cabinet, at = { 0, 0.25 } }
-end)
+local function layout(name, has_friction)
+  return softvt.layout(name, function(scene)
+    scene:add { name = "floor", asset = floor, position = { 0, 0, 0 } }
+    scene:add { name = "cabinet", asset = wooden_cabinet, at = { 0, 0.25 } }
+    for _, object in ipairs(scene.objects) do
+      if not has_friction then object.dynamic_mu, object.static_mu = 0, 0 end
+    end
+  end)
+end
+local FRICTIONLESS = { robot = { pads = { static_mu = 0, dynamic_mu = 0 } } }
+local CASES = {
+  grip = { scene = { layout = layout("rough", true) }, opening = 0.5 },
+  edge = { scene = { layout = layout("smooth", false), settings = FRICTIONLESS }, opening = 0 },
+}
 return softvt.experiment {
-  name = "handle", grid = { closure = { 0.95 } },
+  name = "handle", grid = { case = { "grip", "edge" } },
   run = function(point)
-    local sim, row = softvt.simulate { layout = layout }, nil
+    local case, row = CASES[point.case], { case = point.case }
+    local sim = softvt.simulate(case.scene)
     assert(sim:drive(function(arm, scene)
       local cabinet, drawer = scene:object "cabinet", scene:part("cabinet", "top_drawer")
       local x, y = cabinet.centre[1], 0.25 - drawer.hints.handle_out_m
       -- The fingers point forward, above and below the bar.
       local grip = softvt.pose { position = { x, y, drawer.hints.handle_height_m }, quaternion = { 0.7071, -0.7071, 0, 0 } }
+      arm:close_to(case.opening)
       arm:move_to(grip:translated { 0, -0.08, 0 }, { speed = 0.3 })
       arm:move_to(grip, { speed = 0.1 })
-      arm:close_to(point.closure)
+      arm:close_to(0.95)
       arm:wait(1)
-      row = { width_mm = 1e3 * arm.width, left = arm.force[1], right = arm.force[2] }
+      row.arm = { arm.force[1], arm.force[2] }
     end))
-    local on = sim:measure "cabinet.top_drawer".pad_force
-    row.on_left, row.on_right = on[1], on[2]
-    row.felt_left, row.felt_right = -sim:tactile "left".force[3], -sim:tactile "right".force[3]
+    row.on = { 0, 0 }
+    for _, name in ipairs { "floor", "cabinet", "cabinet.top_drawer", "cabinet.middle_drawer", "cabinet.bottom_drawer" } do
+      local on = sim:measure(name).pad_force
+      row.on = { row.on[1] + on[1], row.on[2] + on[2] }
+    end
+    row.handle = sim:measure "cabinet.top_drawer".pad_force
+    row.gel = { sim:tactile "left".force, sim:tactile "right".force }
     return row
   end,
 }
 "#;
 
+/// Numbers of a list.
+fn numbers(list: &serde_json::Value) -> Vec<f64> {
+    list.as_array().into_iter().flatten().filter_map(serde_json::Value::as_f64).collect()
+}
+
 #[test]
-fn forces_on_a_drawers_handle_are_measured() {
+fn pad_forces_are_the_normal_forces_at_all_contacts_of_a_pad() {
     let output = Project::new(&[("handle.lua", HANDLE)]).succeeds("handle.lua --json");
-    let row: serde_json::Value = serde_json::from_str(output.out.trim()).expect("a row");
-    let number = |key: &str| row[key].as_f64().unwrap_or_else(|| panic!("{key} in {row}"));
-    // In this pose the drawer rests against the right pad alone.
-    assert!(number("right") > 1.0 && number("felt_right") > 1.0, "{row}");
-    for side in ["left", "right"] {
-        assert_eq!(number(&format!("on_{side}")), number(side), "{side}: {row}");
+    assert!(!output.out.contains("[-0.0,"), "{}", output.out);
+    let rows: Vec<serde_json::Value> =
+        output.out.lines().map(|line| serde_json::from_str(line).expect("a row")).collect();
+    let case = |name: &str| rows.iter().find(|row| row["case"] == name).expect("both cases");
+    for side in 0..2 {
+        let row = case("grip");
+        let force = numbers(&row["arm"])[side];
+        assert!(force > 1.0, "both pads hold the bar: {row}");
+        // Each pad touches the handle alone.
+        assert_eq!(numbers(&row["handle"])[side], force, "{row}");
+        assert_eq!(numbers(&row["on"])[side], force, "{row}");
+        // The normals of a bar of 4.5 mm radius, 0.4 mm deep in the gel, are within 25° of the pressing direction.
+        let pressing = -numbers(&row["gel"][side])[2];
+        assert!(force >= pressing && force < 1.03 * pressing, "{row}");
     }
+    let row = case("edge");
+    let side =
+        (0..2).max_by(|a, b| numbers(&row["arm"])[*a].total_cmp(&numbers(&row["arm"])[*b])).unwrap_or(0);
+    let (force, gel) = (numbers(&row["arm"])[side], numbers(&row["gel"][side]));
+    assert!(force > 1.0 && numbers(&row["on"])[side] == force, "{row}");
+    // Without friction the force on the gel is the vector sum of the normal forces, here of nearly one direction.
+    let resultant = gel.iter().map(|component| component * component).sum::<f64>().sqrt();
+    assert!(resultant <= force && force < 1.02 * resultant, "{row}");
+    // That direction is oblique: the component along the pad's axis is much smaller.
+    assert!(force > 1.5 * -gel[2], "{row}");
 }

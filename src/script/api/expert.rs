@@ -286,7 +286,9 @@ class! {
             gripping: "boolean" { get(_, _) { false } }
             /// Measured distance of the gels, m.
             width: "number" { get(_, this) { this.read(|view| view.width_m) } }
-            /// Normal force on the left and the right pad, N, from objects and parts of every kind.
+            /// Sum of the normal forces at all contact points of the left and the right gel pad, N, whatever touches it; forces
+            /// on the cases of the fingers do not count. On the edge of a pad the normals are oblique, and the sum is larger
+            /// than the pressing force, which is -sim:tactile(side).force[3].
             force: "number[]" { get(_, this) { this.read(|view| view.pad_force_n) } }
             /// Under --policy fixed-closure: the ranges within which the instances of an asset differ. The expert then
             /// closes to one closure for all of them (experts.fixed_closure). nil under other policies.

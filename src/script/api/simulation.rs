@@ -299,7 +299,8 @@ output! {
         present: "number[][]" = positions(lua, &reading.markers.current)?;
         /// The markers with the measures of their displacements.
         markers: "softvt.Markers" = LuaMarkers::new(reading.markers);
-        /// True force on the gel, N, pad frame; a pressing body makes z negative.
+        /// True force on the gel, N, pad frame: the vector sum over its contact points, friction included. A pressing body makes
+        /// z negative.
         force: "number[]" = lua.create_sequence_from(force.iter().copied())?;
         /// Largest depth of the indentation, mm.
         depth_mm: "number" = reading.field.as_ref().map_or(0.0, |field| 1e3 * field.depth());
@@ -325,7 +326,7 @@ output! {
         joints: "table<string, number>" = lua.create_table_from(
             inner.sim.parts(index).map(|(instance, part)| (part.name.as_str(), inner.sim.joint(instance)))
         )?;
-        /// Normal force of the left and the right pad on the object, N.
+        /// Sum of the normal forces at the contact points of the left and the right gel pad on the object, N; see arm.force.
         pad_force: "number[]" = inner.sim.pad_normal_forces_on(inner.object(index)).to_vec();
         /// Distance that a movable object has slid on the left and the right pad, mm.
         slip_mm: "number[]?" = inner.pad_contacts(index).map(|pads| pads.map(|pad| 1e3 * pad.travel).to_vec());
