@@ -58,7 +58,15 @@ mod tests {
     use softvt_physics::contact::Friction;
 
     fn doubts(youngs_pa: f64, density: f64) -> Vec<String> {
-        let material = SoftMaterial { youngs_pa, poisson: 0.3, density, resolution: 6, grasp_spacing: 1e-3, collapse_strain: None, damage_strain: None };
+        let material = SoftMaterial {
+            youngs_pa,
+            poisson: 0.3,
+            density,
+            resolution: 6,
+            grasp_spacing: 1e-3,
+            collapse_strain: None,
+            damage_strain: None,
+        };
         let asset = Asset {
             name: "bun".into(),
             shape: Shape::Box { half: Vec3::repeat(0.02) },
