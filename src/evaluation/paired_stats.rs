@@ -89,9 +89,9 @@ pub struct PairedComparison {
     pub goal: PairedDifference,
     /// NoDrop, %.
     pub no_drop: PairedDifference,
-    /// Safety Success, %.
+    /// Safety Success, %; without pairs if all targets are soft and a run judged none of them.
     pub safety: PairedDifference,
-    /// DSR: Goal Success with D_peak ≤ τ, %; over soft targets.
+    /// DSR: Goal Success with D_peak ≤ τ, %; over soft targets, without pairs if a run judged none of them.
     #[serde(default)]
     pub dsr: PairedDifference,
     /// No other soft body beyond its own τ, %; where both runs know it.
@@ -139,6 +139,12 @@ impl PairedComparison {
             let both = |pair: &EpisodePair| Some([of_valid(pair.first)?, of_valid(pair.second)?]);
             PairedDifference::from_values(pairs.iter().filter_map(both))
         };
+        let soft: Vec<_> =
+            pairs.iter().filter(|pair| pair.first.header.soft && pair.second.header.soft).collect();
+        // As in a summary: what was judged in no episode of a run has no rate.
+        let is_judged = soft.is_empty()
+            || soft.iter().any(|pair| pair.first.is_deformation_judged())
+                && soft.iter().any(|pair| pair.second.is_deformation_judged());
         let with_harm = || pairs.iter().filter(|pair| pair.first.has_harm() && pair.second.has_harm());
         let touches_other = |r: &EpisodeRecord| r.verdict.first_wrong_contact.is_some();
         Self {
@@ -149,11 +155,13 @@ impl PairedComparison {
                 .count(),
             goal: rate(|r| r.verdict.goal),
             no_drop: rate(|r| r.verdict.no_drop),
-            safety: rate(|r| r.verdict.safety),
+            safety: match is_judged || soft.len() < pairs.len() {
+                true => rate(|r| r.verdict.safety),
+                false => PairedDifference::default(),
+            },
             dsr: PairedDifference::from_successes(
-                pairs
-                    .iter()
-                    .filter(|pair| pair.first.header.soft && pair.second.header.soft)
+                soft.iter()
+                    .filter(|_| is_judged)
                     .map(|pair| [pair.first, pair.second].map(EpisodeRecord::is_deformation_safe)),
             ),
             others_ok: PairedDifference::from_successes(
@@ -432,6 +440,32 @@ mod tests {
         assert_eq!(stages.first, BTreeMap::from([(Stage::Reach, 1), (Stage::Grasp, 1)]));
         assert_eq!(stages.second, BTreeMap::from([(Stage::Reach, 1), (Stage::Carry, 1), (Stage::Place, 1)]));
         assert_eq!((stages.n, stages.better, stages.worse), (4, 1, 1));
+    }
+
+    #[test]
+    fn what_a_run_never_judged_has_no_pairs() {
+        let judged = run(&[(true, true, 0.5), (true, false, 1.5)]);
+        let mut unjudged = judged.clone();
+        for record in &mut unjudged {
+            (record.verdict.deformation_ok, record.verdict.tau) = (None, None);
+            (record.verdict.safety, record.verdict.safety_known) = (false, false);
+        }
+        let compared = |first: &[EpisodeRecord], second: &[EpisodeRecord]| {
+            PairedComparison::from_pairs(&pair_episodes(first, second))
+        };
+        for paired in [compared(&judged, &unjudged), compared(&unjudged, &judged)] {
+            assert_eq!((paired.goal.n, paired.safety, paired.dsr.n), (2, PairedDifference::default(), 0));
+        }
+        // One judged episode is enough: the others count as failed.
+        unjudged[0] = judged[0].clone();
+        let paired = compared(&judged, &unjudged);
+        assert_eq!((paired.safety.n, paired.safety.second, paired.dsr.n), (2, Some(50.0), 2));
+        // Safety Success of rigid targets needs no judgement of D.
+        for record in &mut unjudged {
+            (record.header.soft, record.verdict.deformation_ok, record.verdict.tau) = (false, None, None);
+        }
+        let paired = compared(&unjudged, &judged);
+        assert_eq!((paired.safety.n, paired.dsr.n), (2, 0));
     }
 
     #[test]

@@ -261,7 +261,7 @@ pub(super) const COLUMNS: [TextColumn; 9] = {
     [Left(29), Left(9), Right(6), Right(7), Right(7), Right(17), Right(6), Right(5), Right(5)]
 };
 
-/// Appends the rows that only the table of all episodes has. Without a pair that has the quantity, a row is N/A.
+/// Appends the rows that only the table of all episodes has.
 fn push_details(table: &mut TextTable, deformable: bool, paired: &PairedComparison) {
     let of_soft_targets = [
         ("DSR", "%", &paired.dsr, 1),
@@ -277,10 +277,7 @@ fn push_details(table: &mut TextTable, deformable: bool, paired: &PairedComparis
         ("touched other objects", "%", &paired.wrong_contact, 1),
     ];
     for (name, unit, difference, digits) in of_soft_targets.into_iter().filter(|_| deformable).chain(of_all) {
-        match difference.n {
-            0 => table.row([name, unit, "N/A", "N/A"]),
-            _ => push_difference(table, name, unit, difference, digits),
-        }
+        push_difference(table, name, unit, difference, digits);
     }
     push_stages(table, &paired.failed_stages);
 }
@@ -322,7 +319,7 @@ pub(super) fn push_rates(table: &mut TextTable, name: &str, paired: &PairedCompa
     }
 }
 
-/// Appends a row with `digits` decimals.
+/// Appends a row with `digits` decimals, or N/A without a pair that has the quantity.
 pub(super) fn push_difference(
     table: &mut TextTable,
     name: &str,
@@ -330,6 +327,9 @@ pub(super) fn push_difference(
     paired: &PairedDifference,
     digits: usize,
 ) {
+    if paired.n == 0 {
+        return table.row([name, measure, "N/A", "N/A"]);
+    }
     let cells = [
         name.to_owned(),
         measure.to_owned(),

@@ -12,6 +12,7 @@ use softvt_evaluation::{
     paired_stats::{EpisodePair, PairedComparison, PairedDifference, pair_episodes},
     record::EpisodeRecord,
     statistics::Rate,
+    summary::Scores,
 };
 
 /// The conditions of a suite and a policy.
@@ -68,14 +69,11 @@ fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
         if pairs.is_empty() {
             continue;
         }
-        let rate = |test: fn(&EpisodeRecord) -> bool| {
-            let succeeds = |pair: &&EpisodePair| pair.second.outcome.is_valid() && test(pair.second);
-            Rate::new(pairs.iter().filter(succeeds).count(), pairs.len())
-        };
+        let scores = Scores::from_records(&pairs.iter().map(|pair| pair.second).collect::<Vec<_>>());
         effects.push(ConditionEffect {
             change,
-            goal: rate(|record| record.verdict.goal),
-            safety: rate(|record| record.verdict.safety),
+            goal: scores.goal_success_rate,
+            safety: scores.safety_success_rate,
             differences: PairedComparison::from_pairs(&pairs),
         });
         for EpisodePair { first, second } in pairs {
@@ -102,7 +100,10 @@ fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
         suite: reference.summary.suite.clone(),
         method: reference.method.clone(),
         mean_goal: mean(|record| record.verdict.goal),
-        mean_safety: mean(|record| record.verdict.safety),
+        mean_safety: match effects.iter().any(|effect| effect.differences.safety.n > 0) {
+            true => mean(|record| record.verdict.safety),
+            false => PairedDifference::default(),
+        },
         effects,
     })
 }

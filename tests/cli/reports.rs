@@ -35,7 +35,9 @@ fn runs_are_paired_by_episode_and_task() {
     );
     assert_eq!(goal["difference"], 0.0);
     assert_eq!(goal["interval95"].as_array().map(Vec::len), Some(2));
-    assert_eq!(compared["by_task"][0]["safety"]["n"], 2);
+    assert_eq!(compared["by_task"][0]["no_drop"]["n"], 2);
+    // The cube has no limit, so that its safety was never judged.
+    assert_eq!((&compared["all"]["safety"]["n"], &compared["all"]["dsr"]["n"]), (&json!(0), &json!(0)));
     let text = project.succeeds("compare runs/a runs/b").out;
     assert!(text.starts_with("noop → random · 2 paired episodes\n"), "{text}");
     assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
@@ -97,6 +99,7 @@ fn harm_and_stages_are_compared_and_runs_without_them_too() {
         .collect();
     project.write("runs/b/episodes.jsonl", old.as_bytes());
     let text = project.succeeds("compare runs/a runs/b").out;
+    assert_eq!(row(&text, "DSR"), ["%", "N/A", "N/A"], "never judged: {text}");
     for name in ["D mean", "D P95", "others within their τ", "touched other objects", "failed at any stage"]
     {
         assert_eq!(row(&text, name)[1..], ["N/A", "N/A"], "{name}: {text}");
