@@ -27,7 +27,7 @@ local opt = softvt.options {
   sweep_protocol = { default = "press", choices = { "press", "hand" }, help = "press test of the object alone, or the paper's sweep with the robot's hand" },
   kappa = { default = 0.5, min = 0.05, max = 1, help = "τ as a fraction of D_ref" },
   step_mm = { default = 0.5, unit = "mm", min = 0.02, max = 5, help = "press: step of the width" },
-  within_mm = { default = 0.05, unit = "mm", min = 0.005, max = 1, help = "press: accuracy of the loose end" },
+  within_mm = { default = 0.02, unit = "mm", min = 0.005, max = 1, help = "press: accuracy of the loose end" },
   scale = { default = 1, min = 0.5, max = 2, help = "press: size of the object; measures only" },
   resolution = { default = 0, integer = true, min = 0, max = 64, help = "press: voxels along the longest edge; measures only (0: the asset's own)" },
   check_ends = { default = false, help = "run trials with the robot's hand 5 % inside and outside of the calibrated window; measures only" },

@@ -6,9 +6,11 @@ local table_top = require "assets.table"
 local hand = {}
 
 local STROKE, FINGER_KP = 0.08, 2000      -- opening of the hand, m; default stiffness of a finger's drive, N/m
-local OFFSET, TURN = 0.005, math.rad(10)  -- largest displacement of trials, m and rad
-local SPREAD = 1.5e-3                     -- the expert's spread of the grasp, m
-local LIFT, SLIP_MM = 0.10, 2             -- lift, m; slip that fails a trial, mm
+local SLIP_MM = 2                         -- slip that fails a trial, mm
+-- Displacement of a grasp, up to `offset` (m) and `turn` (rad), and height (m) and speed (m/s) of the lift: the expert's lift at its
+-- largest pace, and that of the paper's trials.
+local EXPERT = { offset = 2.5e-4, turn = 0, lift = 0.05, speed = 0.224 }
+local PAPER = { offset = 0.005, turn = math.rad(10), lift = 0.10, speed = 0.25 }
 local REST_S, REST_SPEED = 0.5, 0.005     -- duration and node speed of a squeeze at rest, s and m/s
 local REST_TIMEOUT_S = 3                  -- largest time until a squeeze is at rest, s
 local FINE = 8                            -- fine steps per step
@@ -63,23 +65,23 @@ end
 local function heights(sim) return { tool = (sim:tool())[3], height = sim:measure "object".height_m } end
 
 -- Grasp–lift–hold trial `k`. Returns whether it held, the slip (mm), the peak D (%) and the width (mm) after the grasp.
-local function hold_trial(asset, closure, k, o)
+local function hold_trial(asset, closure, k, trial, hold_s)
   local displacement = {}
-  local sim = softvt.simulate { layout = single_object(asset, displacement, o.offset, o.turn), episode = k }
-  local ok = sim:drive(grasp_at(closure, displacement))
+  local sim = softvt.simulate { layout = single_object(asset, displacement, trial.offset, trial.turn), episode = k }
+  local ok, pace = sim:drive(grasp_at(closure, displacement)), grasp.carry_pace(asset)
   local width_mm, before = 1e3 * sim:measure "object".width_m, heights(sim)
-  ok = ok and sim:drive(function(arm) arm:move_by({ 0, 0, LIFT }, { speed = o.speed }) end)
+  ok = ok and sim:drive(function(arm) arm:move_by({ 0, 0, trial.lift }, { speed = trial.speed * pace }) end)
   -- An object that was not lifted by now is not held.
-  if ok and lag_mm(sim, before) < 0.5e3 * LIFT then ok = sim:wait(o.hold_s) end
+  if ok and lag_mm(sim, before) < 0.5e3 * trial.lift then ok = sim:wait(hold_s) end
   local slip = math.abs(lag_mm(sim, before))
   return { held = ok and slip <= SLIP_MM, slip_mm = slip, d_peak_pct = sim:measure "object".d_peak_pct, width_mm = width_mm }
 end
 
--- Trials `first` to `last` at a closure with the expert's spread and lift. Returns how many held, and the largest peak D, %.
+-- Trials `first` to `last` at a closure with the expert's lift. Returns how many held, and the largest peak D, %.
 function hand.trials(asset, closure, first, last, hold_s)
   local held, d_peak_pct = 0, 0
   for k = first, last do
-    local result = hold_trial(asset, closure, k, { offset = SPREAD, turn = 0, speed = 0.2, hold_s = hold_s })
+    local result = hold_trial(asset, closure, k, EXPERT, hold_s)
     if result.held then held = held + 1 end
     d_peak_pct = math.max(d_peak_pct, result.d_peak_pct)
   end
@@ -92,7 +94,7 @@ function hand.holds(asset, step, trials, hold_s)
   while closure <= 1 and beyond <= BEYOND do
     local row = { closure = closure, trials = trials, held = 0, slip_mm = 0, width_mm = 0 }
     for k = 1, trials do
-      local result = hold_trial(asset, closure, k, { offset = OFFSET, turn = TURN, speed = 0.25, hold_s = hold_s })
+      local result = hold_trial(asset, closure, k, PAPER, hold_s)
       if result.held then row.held = row.held + 1 end
       row.slip_mm, row.width_mm = math.max(row.slip_mm, result.slip_mm), row.width_mm + result.width_mm / trials
     end

@@ -6,7 +6,7 @@ local table_top = require "assets.table"
 local press = {}
 
 local CLEARANCE = 4e-3                      -- gap between each gel and the object at the start, m
-local CONTACT_STEP = 5e-5                   -- step of the width until first contact, m
+local CONTACT_STEP = 5e-5                   -- step of the width until both pads touch, at rest too, m
 local CLOSING = 0.02                        -- speed at which each pad closes in the sweep, m/s
 local GRASPING = 0.024                      -- speed at which each pad closes in a hold trial, as the expert, m/s
 local REST_SPEED, REST_S = 5e-4, 0.15       -- largest node speed of an object at rest, and for how long, m/s and s
@@ -17,9 +17,9 @@ local PERCENTILE = 95                       -- share of the volume that stays be
 local LIFT, LIFT_SPEED = 0.05, 0.224        -- the expert's lift at its largest pace, m and m/s (times grasp.carry_pace)
 local HOLD_S, SLIP_MM = 1, 2                -- hold after the lift, and the slip that fails a trial, s and mm
 local REFINEMENTS = 2                       -- hold trials near τ, for the tight end
-local SPREAD = 1.5e-3                       -- the expert's spread of the grasp in each horizontal direction, m
+local SPREAD = 2.5e-4                        -- displacement of hold trials in each horizontal direction, m
 
--- Grasps of the hold trials: in the middle, and at the corners of the expert's spread.
+-- Grasps of the hold trials: in the middle, and displaced along both diagonals.
 local OFFSETS = { { 0, 0 }, { SPREAD, SPREAD }, { -SPREAD, SPREAD }, { SPREAD, -SPREAD }, { -SPREAD, -SPREAD } }
 
 -- The asset at another size or resolution: { shape, body, friction, object }. `object` is what experts see of it.
@@ -166,8 +166,8 @@ function press.sweep(asset, step, change)
     if touched and not row.stable then return rows end
     touched = touched or row.stable
     if bench.stable_strain and row.strain_p95 >= bench.stable_strain then return rows end
-    -- Widths after the first are multiples of the step.
-    width = (math.ceil(width / step - 1e-6) - 1) * step
+    -- Once both pads touch at rest, widths are multiples of the step.
+    width = touched and (math.ceil(width / step - 1e-6) - 1) * step or width - CONTACT_STEP
   end
   return rows, problem or "the pads have met"
 end

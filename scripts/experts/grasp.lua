@@ -63,7 +63,7 @@ end
 
 -- Speed of carrying an object, as a share of the usual one. A long object is carried slowly, so that it does not bend much more than
 -- by its weight.
-function grasp.carry_pace(object) return object.hints.carry_pace or 1 end
+function grasp.carry_pace(object) return object.hints and object.hints.carry_pace or 1 end
 
 -- Why the gripper cannot grasp an object, whatever the pose; nil if it can.
 function grasp.problem(object)
