@@ -249,7 +249,7 @@
 ---@field stable_strain? number Stable strain of the material, at which 5 % of the volume ends the press. Expects a number in above 0..1.
 ---@field ended? string Why the sweep ended, if its last row does not tell.
 ---@field fingerprint? string Fingerprint of the calibrated asset, as softvt.fingerprint returns it. Results for another object of that name then do not use the calibration.
----@field holds table<string, any>[] Rows width_mm, closure, trials, held, slip_mm of the scan for the loose end.
+---@field holds table<string, any>[] Rows width_mm, closure, trials, held, slip_mm, d_peak_pct of the scan for the loose end.
 ---@field sweep table<string, any>[] Rows width_mm, closure, d_pct, force_n, strain_p95, min_det_f, node_speed_m_s, both_pads, slip_mm, stable of the compression sweep.
 
 ---Returns an image of one colour: `softvt.image { width = 640, height = 480, colour = { 255, 255, 255 } }`.
@@ -841,7 +841,7 @@ local TactileReading = {}
 ---The safe window of an object. An end is nil if the scans do not reach it.
 ---@class softvt.SafeWindow
 ---@field width_lower_mm number? Loose end: the widest width between the gels at which every hold trial held, mm.
----@field width_at_tau_mm number? Tight end: the width at which the deformation reaches τ, mm.
+---@field width_at_tau_mm number? Tight end: the widest width at which the deformation reaches τ, pressed or carried, mm.
 ---@field force_lower_n number? Force per pad at the loose end, N.
 ---@field force_at_tau_n number? Force per pad at the tight end, N.
 ---@field extent_mm number? Extent of the window, mm; nil if it is empty.
@@ -855,6 +855,7 @@ local SafeWindow = {}
 ---@field width_at_d_ref_mm number? Width at D_ref, mm.
 ---@field tau number? Deformation limit τ, %.
 ---@field d_ref number? Reference deformation D_ref, %.
+---@field carried_d number? Smallest peak deformation of the object while it was carried in a hold trial, %.
 ---@field stable_strain number? Stable strain of the material.
 ---@field censored string? Why the sweep ended before the stable strain; nil if it did not.
 ---@field text string The envelope in three lines.
