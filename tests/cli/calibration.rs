@@ -36,11 +36,13 @@ fn the_limit_is_the_objects_own_and_its_calibration_repeats_bit_for_bit() {
     let number = |value: &serde_json::Value| value.as_f64().unwrap_or_else(|| panic!("a number: {value}"));
     let window = &envelope["window"];
     let extent = number(&window["width_lower_mm"]) - number(&window["width_at_tau_mm"]);
-    assert!(extent > 0.2 && number(&envelope["width_contact_mm"]) <= 30.5, "{window}");
+    assert!(extent > 0.2 && number(&envelope["width_contact_mm"]) <= 36.0, "{window}");
     assert!(number(&window["force_at_tau_n"]) > number(&window["force_lower_n"]), "{window}");
     assert!(project.text("scripts/calibrated.lua").contains("brick = { width_contact = "));
+    assert_eq!(calibrated("--threads 2"), first);
     // The robot's settings do not enter.
-    assert_eq!(calibrated("--threads 2 --set robot.gripper.effort=20"), first);
+    let message = project.refusal(&format!("{QUICK} --set robot.gripper.effort=20 --out again"));
+    assert!(message.contains("simulates no robot") && message.contains("changes nothing"), "{message}");
 }
 
 #[test]

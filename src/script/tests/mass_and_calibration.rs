@@ -39,7 +39,7 @@ fn volume_and_mass_are_those_of_closed_forms() {
 #[test]
 fn a_calibration_is_read_when_the_plan_is_made_and_no_later() {
     let library = "local c = softvt.calibration 'sphere'\n\
-        error(('%s %.2f %.2f %s'):format(c.safe_window, c.lower, c.tau, softvt.calibration 'nothing_like_it'), 0)";
+        error(('%s %.2f %s'):format(c.window.extent_mm > 1, c.tau, softvt.calibration 'nothing_like_it'), 0)";
     let text = message_of(library);
     assert!(text.starts_with("true ") && text.ends_with(" nil"), "{text}");
     let wrong = error_of("softvt.calibration '../x'");
