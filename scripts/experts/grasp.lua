@@ -81,6 +81,9 @@ end
 function grasp.window(object)
   local known = calibrated[object.asset]
   if not known then return nil end
+  if not known.bending then
+    error(("calibrated: the window of %s is of an older version; run softvt scripts/calibrate.lua --asset %s"):format(object.asset, object.asset), 0)
+  end
   local size, stiffness, density = object.scale or 1, object.youngs_factor or 1, object.density_factor or 1
   -- Between a flat contact (linear) and a sphere's (Hertz: indentation by the power 2/3 of the force), whichever is larger.
   local load = density * size / stiffness
