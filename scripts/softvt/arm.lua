@@ -102,7 +102,9 @@ function Arm:grasp(closure, options)
   end
   end_servo(self)
   self.wants_readings = true
-  self.holds = servo.close(self.closure, options.rate * host.dt, function(next)
+  -- A grasp is repeated, and then firmer, if the hand opened without a release.
+  self.failures = self.failures and self.failures + 1 or 0
+  self.holds = servo.close(self.closure, options.rate * host.dt, self.failures, function(next)
     self:command(self.target, next)
     return fingers.readings()
   end)
@@ -110,7 +112,7 @@ end
 
 -- Releases an object by opening to options.closure (default: fully open).
 function Arm:release(options)
-  self.gripping = false
+  self.gripping, self.failures = false, nil
   end_servo(self)
   self:close_to(options.closure, { rate = options.rate })
 end

@@ -8,11 +8,13 @@ local min = math.min
 -- Residual of the markers in a firm grasp and at first contact, px. Flat dough gives 0.08 px at 0.6 N, round dough and a carton
 -- at 0.3 N.
 local HELD, TOUCHED = 0.08, 0.01
--- Change of closure per control step after first contact, and in response to shear (0.5 mm and 1 mm of width).
-local FINE, TIGHTEN = 0.002, 0.003
+-- Change of closure per control step after first contact, and in response to shear (0.16 mm and 0.5 mm of width).
+local FINE, TIGHTEN = 0.002, 0.00625
+-- Factor on HELD after a grasp that has failed: the edge of a hard object shows much residual at little force.
+local FIRMER = 3
 -- Smallest ratio of residual to outward shear of a held object. In a sliding grasp the shear is at least three times the
 -- residual at the friction of a gel.
-local RATIO = 1
+local RATIO = 0.5
 
 local function least(fingers, measure) return min(measure(fingers.left.markers), measure(fingers.right.markers)) end
 
@@ -25,10 +27,10 @@ local function touched(fingers) return fingers.left.markers:rms_residual() > TOU
 local function margin(markers) return markers:rms_residual() - RATIO * markers:outward_shear() end
 
 -- Closes by `rate` per control step until both fingers show a firm grasp or the gripper is closed. `step` sends a closure and returns the
--- finger readings of the next control step.
-function servo.close(closure, rate, step)
-  local fingers = step(closure)
-  while closure < 1 and least(fingers, residual) < HELD do
+-- finger readings of the next control step; `failures` counts the grasps that have failed before.
+function servo.close(closure, rate, failures, step)
+  local held, fingers = HELD * FIRMER ^ failures, step(closure)
+  while closure < 1 and least(fingers, residual) < held do
     closure = min(1, closure + (touched(fingers) and FINE or rate))
     fingers = step(closure)
   end

@@ -120,7 +120,7 @@ impl TactileSensor {
     /// Reading of a contact. `scratch` saves allocations and does not influence the result.
     ///
     /// # Errors
-    /// A number of the contact is not finite, or a force presses but no skin lies over the pad.
+    /// A number of the contact is not finite, or a force presses but no skin is given.
     pub fn read(
         &self,
         contact: &TactileContact,

@@ -62,21 +62,21 @@ pub struct GelField {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum ContactError {
-    #[error("the pad is pressed with {force} N, but no skin of the {skins} given lies over it")]
-    NoSkin { force: f64, skins: usize },
+    #[error("the pad is pressed with {force} N, but no skin is given")]
+    NoSkin { force: f64 },
     #[error("the pad's {field} is {value}; expected a finite number{condition}")]
     BadNumber { field: &'static str, value: f64, condition: &'static str },
 }
 
 impl GelField {
-    /// Solves a contact; `None`, at no cost, if nothing presses.
+    /// Solves a contact; `None` if nothing presses, or only beside the grid.
     ///
     /// The skins are pressed in until the pressure carries the normal force of the wrench; then the shear is
     /// found that carries its tangential force and twist. Nothing is kept from one call to the next:
     /// `scratch` only saves allocations.
     ///
     /// # Errors
-    /// A number is not finite, or there is a pressing force but no skin over the pad.
+    /// A number is not finite, or there is a pressing force but no skin.
     pub fn solve(
         gel: &Gel,
         contact: &TactileContact,
@@ -93,8 +93,13 @@ impl GelField {
             body.add_to(gel, &mut scratch.compliance);
         }
         let mut height_map = HeightMap::new(gel, skins);
-        let normal = solve_normal_contact(gel, &height_map.gaps(gel), wrench.normal(), scratch)
-            .ok_or_else(|| ContactError::NoSkin { force: wrench.normal(), skins: skins.len() })?;
+        if skins.is_empty() {
+            return Err(ContactError::NoSkin { force: wrench.normal() });
+        }
+        // A skin that passes beside the grid, such as a rim at the edge of the pad, leaves no imprint.
+        let Some(normal) = solve_normal_contact(gel, &height_map.gaps(gel), wrench.normal(), scratch) else {
+            return Ok(None);
+        };
         let load = Vec3::new(wrench.force.x, wrench.force.y, wrench.moment.z);
         let tangential = solve_tangential_contact(gel, &normal.pressure, &load, *friction, scratch);
         let displacement = surface_displacement(gel, &normal.pressure, &tangential.traction, scratch);
