@@ -286,8 +286,7 @@ fn width_between(wide: Point, narrow: Point, d_pct: f64) -> f64 {
 /// Width at which D of the press first reaches `d_pct`; `sweep` by decreasing width. `None` if the first row is above it or
 /// no row reaches it.
 fn pressed_end(sweep: &[SweepRow], d_pct: f64) -> Option<f64> {
-    let points: Vec<_> =
-        sweep.iter().map(|row| Point { width_mm: row.width_mm, d_pct: row.d_pct }).collect();
+    let points: Vec<_> = sweep.iter().map(|row| Point { width_mm: row.width_mm, d_pct: row.d_pct }).collect();
     let pair = points.windows(2).find(|pair| pair[0].d_pct <= d_pct && pair[1].d_pct >= d_pct)?;
     Some(width_between(pair[0], pair[1], d_pct))
 }

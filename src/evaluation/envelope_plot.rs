@@ -18,7 +18,12 @@ const TICKS: u32 = 5;
 
 /// The envelope in three lines: the safe window, τ, and the end of the sweep.
 pub fn three_lines(asset: &str, envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
-    format!("{asset}: {}\n{}\n{}\n", window_line(envelope, limit), limit_line(envelope, limit), end_line(envelope))
+    format!(
+        "{asset}: {}\n{}\n{}\n",
+        window_line(envelope, limit),
+        limit_line(envelope, limit),
+        end_line(envelope)
+    )
 }
 
 fn window_line(envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
