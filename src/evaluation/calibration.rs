@@ -93,15 +93,19 @@ impl SweepRow {
     /// rest and the object does not slip, within the bounds of this module. `stable` is not read. A squeeze with a number
     /// that is not finite is not stable.
     pub fn instability(&self) -> Option<&'static str> {
+        // A value that is not a number is within no bound.
+        let is_intact = self.min_det_f > MIN_DET_F;
+        let is_at_rest = self.node_speed_m_s < MAX_NODE_SPEED_M_S;
+        let is_held = self.slip_mm < MAX_SLIP_MM;
         if !self.both_pads {
             Some("a pad does not touch the object")
         } else if !(self.d_pct.is_finite() && self.strain_p95.is_none_or(f64::is_finite)) {
             Some("the deformation cannot be measured")
-        } else if !(self.min_det_f > MIN_DET_F) {
+        } else if !is_intact {
             Some("an element is nearly inverted")
-        } else if !(self.node_speed_m_s < MAX_NODE_SPEED_M_S) {
+        } else if !is_at_rest {
             Some("the object does not come to rest")
-        } else if !(self.slip_mm < MAX_SLIP_MM) {
+        } else if !is_held {
             Some("the object slips out of the pads")
         } else {
             None
@@ -375,7 +379,7 @@ pub(crate) mod tests {
             (scans.sweep[3].stable, scans.sweep[3].node_speed_m_s) = (false, 0.1);
         });
         assert_eq!(unrest, ("the object does not come to rest".into(), Some(2.0)));
-        let short = reason(&|scans| drop(scans.sweep.pop()));
+        let short = reason(&|scans| scans.sweep.truncate(3));
         assert_eq!(short, ("the sweep ended before the stable strain".into(), Some(2.0)));
         let told = reason(&|scans| (scans.sweep.pop(), scans.ended = Some("inverted".into())).1);
         assert_eq!(told.0, "inverted");

@@ -52,17 +52,13 @@ impl Stretch {
     fn is_beyond(&self, strain: f64) -> bool {
         let shift = (1.0 - strain) * (1.0 - strain);
         let first = self.xx - shift;
-        // Each pivot is tested in the negated form, so that a value that is not a number counts as beyond.
-        if self.is_inverted || !(first > 0.0) {
-            return true;
-        }
         let (l_y, l_z) = (self.xy / first, self.xz / first);
         let second = self.yy - shift - l_y * self.xy;
-        if !(second > 0.0) {
-            return true;
-        }
         let rest = self.yz - l_z * self.xy;
-        !(self.zz - shift - l_z * self.xz - rest * rest / second >= 0.0)
+        let third = self.zz - shift - l_z * self.xz - rest * rest / second;
+        // A value that is not a number counts as beyond.
+        let is_within = first > 0.0 && second > 0.0 && third >= 0.0;
+        self.is_inverted || !is_within
     }
 }
 

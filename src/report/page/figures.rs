@@ -309,7 +309,7 @@ fn trend_plot(trend: &Trend, unchanged: [Option<f64>; 2]) -> Markup {
             (rate_axis(40.0))
             svg.plot width="100%" height=(PLOT_HEIGHT + 40.0) role="img" aria-label=(label) {
                 (rate_grid())
-                @for (series, unchanged) in SERIES.iter().zip(unchanged) { (trend_series(series, points, &at, unchanged)) }
+                @for (series, unchanged) in SERIES.iter().zip(unchanged) { (trend_series(series, points, at, unchanged)) }
                 @for value in labelled {
                     text.tick x=(x(at(value))) y=(y(PLOT_HEIGHT + 16.0)) text-anchor="middle" { (format_number(value)) }
                 }
