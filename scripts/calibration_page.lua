@@ -1,28 +1,33 @@
 -- Text of docs/calibration.md: the safe envelope of each soft asset.
-local checks = require "calibration_checks"
-
 local HEAD = [[
 # Safe envelopes of the soft assets
 
 Generated together with `assets/calibration/` by `softvt scripts/calibrate.lua`, which documents the method: a press test of the object
 alone, between two gel pads of the robot at a prescribed width. D_ref is D at the width at which 5 % of the volume is beyond the *stable
-strain* of the material, and τ = κ D_ref with κ = 0.5. Each object is safe at widths between the *loose* end, up to which friction carries it,
+strain* of the material, and τ = κ D_ref. Each object is safe at widths between the *loose* end, up to which friction carries it,
 and the *tight* end, at which D reaches τ, pressed on the table or carried. Forces are those per pad at rest. *Carried D* is the smallest
-peak of D while the object was lifted and held; an object that bends beyond τ there cannot be carried safely, whatever the grip.
-[assets.md](assets.md) gives the strains with their sources.
+peak of D while the object was lifted and held; an object with a carried D above τ cannot be carried safely, whatever the grip.
+[assets.md](assets.md) gives the strains with their sources, [calibration_checks.md](calibration_checks.md) how the results depend on step,
+resolution and size, and trials at the ends of the windows.
 
+
+]]
+
+local TABLE = [[
 | asset | stable strain | D_ref % | τ % | κ 0.3 | κ 0.7 | loose mm | tight mm | window mm | force N | carried D % | censored |
 |---|---|---|---|---|---|---|---|---|---|---|---|
 ]]
 
 local MIDDLE = [[
 
-Each plot shows D (% of the bounding-box diagonal) over the width. Dots are stable squeezes, rings unstable ones; dashed lines are τ and
-D_ref, and the band is the safe window.
+Each plot shows D (% of the bounding-box diagonal) over the width. Dots are stable squeezes, rings unstable ones; diamonds are peaks of D
+in hold trials, filled if all trials held; dashed lines are τ and D_ref, and the band is the safe window.
 ]]
 
--- Returns the page for `names`; `found` maps each name to a result of softvt.envelope or softvt.calibration.
-return function(names, found)
+local PROTOCOLS = { press = "Sweep: press test", hand = "Sweep: the robot's hand, where D_ref is the largest stable D" }
+
+-- Returns the page for `names`; `found` maps each name to a result of softvt.envelope. `o` has the fields sweep_protocol and kappa.
+return function(names, found, o)
   local function number(format, value) return value and format:format(value) or "–" end
   local rows, plots = {}, {}
   for _, name in ipairs(names) do
@@ -38,5 +43,5 @@ return function(names, found)
     rows[#rows + 1] = "| " .. table.concat(cells, " | ") .. " |\n"
     plots[#plots + 1] = ("\n## %s\n\n![](../assets/calibration/%s.svg)\n\n```text\n%s```\n"):format(name, name, known.text)
   end
-  return HEAD .. table.concat(rows) .. checks .. MIDDLE .. table.concat(plots)
+  return HEAD .. ("\n%s; κ = %g.\n\n"):format(PROTOCOLS[o.sweep_protocol], o.kappa) .. TABLE .. table.concat(rows) .. MIDDLE .. table.concat(plots)
 end

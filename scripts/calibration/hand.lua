@@ -2,20 +2,18 @@
 -- (appendix C.3), and trials that check the ends of a window found by another protocol.
 local grasp = require "experts.grasp"
 local table_top = require "assets.table"
+local trial = require "calibration.trial"
 
 local hand = {}
 
-local STROKE, FINGER_KP = 0.08, 2000      -- opening of the hand, m; default stiffness of a finger's drive, N/m
-local SLIP_MM = 2                         -- slip that fails a trial, mm
--- Displacement of a grasp, up to `offset` (m) and `turn` (rad), and height (m) and speed (m/s) of the lift: the expert's lift at its
--- largest pace, and that of the paper's trials.
-local EXPERT = { offset = 2.5e-4, turn = 0, lift = 0.05, speed = 0.224 }
+-- Displacement of a grasp, up to `offset` (m) and `turn` (rad), and height (m) and speed (m/s) of the lift: the expert's lift, and
+-- that of the paper's trials.
+local EXPERT = { offset = trial.DISPLACEMENT, turn = 0, lift = trial.LIFT, speed = trial.SPEED }
 local PAPER = { offset = 0.005, turn = math.rad(10), lift = 0.10, speed = 0.25 }
 local REST_S, REST_SPEED = 0.5, 0.005     -- duration and node speed of a squeeze at rest, s and m/s
 local REST_TIMEOUT_S = 3                  -- largest time until a squeeze is at rest, s
 local FINE = 8                            -- fine steps per step
 local BEYOND = 3                          -- closures tried beyond the first that holds
-local CONTACT_N = 1e-3                    -- pad force that counts as contact, N
 
 -- A layout of the object alone on the table. The displacement of a trial, up to `offset` (m) and `turn` (rad), is drawn with the
 -- scene, so it depends only on the asset and the index of the trial.
@@ -43,9 +41,6 @@ local function grasp_at(closure, displacement)
   end
 end
 
--- The closure that commands a finger's drive so that the gels come to rest `width` (m) apart at `force` (N) per pad.
-function hand.closure_at(width, force) return 1 - (width - 2 * force / FINGER_KP) / STROKE end
-
 -- The largest closure on the grid of steps at which the gels do not touch the object.
 local function first_closure(asset, step)
   local view
@@ -53,7 +48,7 @@ local function first_closure(asset, step)
     view = scene:object "object"
     arm:wait(0.05)
   end)
-  return math.floor((1 - grasp.width(view) / STROKE) / step) * step
+  return math.floor(grasp.clear_closure(view, 0) / step) * step
 end
 
 -- Distance by which the object has fallen behind the tool since `before`, mm.
@@ -65,21 +60,21 @@ end
 local function heights(sim) return { tool = (sim:tool())[3], height = sim:measure "object".height_m } end
 
 -- Grasp–lift–hold trial `k`. Returns whether it held, the slip (mm), the peak D (%) and the width (mm) after the grasp.
-local function hold_trial(asset, closure, k, trial, hold_s)
+local function hold_trial(asset, closure, k, how, hold_s)
   local displacement = {}
-  local sim = softvt.simulate { layout = single_object(asset, displacement, trial.offset, trial.turn), episode = k }
+  local sim = softvt.simulate { layout = single_object(asset, displacement, how.offset, how.turn), episode = k }
   local ok, pace = sim:drive(grasp_at(closure, displacement)), grasp.carry_pace(asset)
   local width_mm, before = 1e3 * sim:measure "object".width_m, heights(sim)
-  ok = ok and sim:drive(function(arm) arm:move_by({ 0, 0, trial.lift }, { speed = trial.speed * pace }) end)
+  ok = ok and sim:drive(function(arm) arm:move_by({ 0, 0, how.lift }, { speed = how.speed * pace }) end)
   -- An object that was not lifted by now is not held.
-  if ok and lag_mm(sim, before) < 0.5e3 * trial.lift then ok = sim:wait(hold_s) end
+  if ok and lag_mm(sim, before) < 0.5e3 * how.lift then ok = sim:wait(hold_s) end
   local slip = math.abs(lag_mm(sim, before))
-  return { held = ok and slip <= SLIP_MM, slip_mm = slip, d_peak_pct = sim:measure "object".d_peak_pct, width_mm = width_mm }
+  return { held = ok and slip <= trial.SLIP_MM, slip_mm = slip, d_peak_pct = sim:measure "object".d_peak_pct, width_mm = width_mm }
 end
 
--- Trials `first` to `last` at a closure with the expert's lift. Returns how many held, and the largest peak D, %.
-function hand.trials(asset, closure, first, last, hold_s)
-  local held, d_peak_pct = 0, 0
+-- Trials `first` to `last` of a grip { width, force } with the expert's lift. Returns how many held, and the largest peak D, %.
+function hand.trials(asset, grip, first, last, hold_s)
+  local closure, held, d_peak_pct = grasp.command(grip), 0, 0
   for k = first, last do
     local result = hold_trial(asset, closure, k, EXPERT, hold_s)
     if result.held then held = held + 1 end
@@ -115,7 +110,7 @@ local function squeeze(sim, closure)
     ok = sim:wait(0.05)
     elapsed_s = elapsed_s + 0.05
     local seen = sim:measure "object"
-    local touching = math.min(table.unpack(seen.pad_force)) > CONTACT_N
+    local touching = math.min(table.unpack(seen.pad_force)) > trial.CONTACT_N
     if resting_s == 0 then row.min_det_f, row.node_speed_m_s, row.both_pads = math.huge, 0, true end
     row.min_det_f = math.min(row.min_det_f, seen.min_det_f or 1)
     row.node_speed_m_s = math.max(row.node_speed_m_s, seen.speed)

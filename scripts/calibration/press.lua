@@ -2,6 +2,7 @@
 -- the expert does. The width between the gels is prescribed and the force is not limited, so that no setting of the robot matters.
 local grasp = require "experts.grasp"
 local table_top = require "assets.table"
+local trial = require "calibration.trial"
 
 local press = {}
 
@@ -12,23 +13,27 @@ local GRASPING = 0.024                      -- speed at which each pad closes in
 local REST_SPEED, REST_S = 5e-4, 0.15       -- largest node speed of an object at rest, and for how long, m/s and s
 local REST_TIMEOUT_S = 3                    -- longest wait for rest, s
 local SETTLE_SPEED, SETTLE_S = 1e-3, 0.5    -- the same for the object alone on the table
-local CONTACT_N = 1e-3                      -- force per pad that counts as contact, N
 local PERCENTILE = 95                       -- share of the volume that stays below the reported strain, %
-local LIFT, LIFT_SPEED = 0.05, 0.224        -- the expert's lift at its largest pace, m and m/s (times grasp.carry_pace)
-local HOLD_S, SLIP_MM = 1, 2                -- hold after the lift, and the slip that fails a trial, s and mm
+local UNSTABLE = 20                         -- rows before the first stable one that end a sweep
+local HOLD_S = 1                            -- hold after the lift, s
 local REFINEMENTS = 2                       -- hold trials near τ, for the tight end
-local SPREAD = 2.5e-4                        -- displacement of hold trials in each horizontal direction, m
 
 -- Grasps of the hold trials: in the middle, and displaced along both diagonals.
-local OFFSETS = { { 0, 0 }, { SPREAD, SPREAD }, { -SPREAD, SPREAD }, { SPREAD, -SPREAD }, { -SPREAD, -SPREAD } }
+local OFFSETS = { { 0, 0 } }
+for _, x in ipairs { 1, -1 } do
+  for _, y in ipairs { 1, -1 } do OFFSETS[#OFFSETS + 1] = { x * trial.DISPLACEMENT, y * trial.DISPLACEMENT } end
+end
+
+-- Widths are multiples of 10 µm, so that they have few digits.
+local function rounded(width) return math.floor(1e5 * width + 0.5) / 1e5 end
+local function in_mm(width) return math.floor(1e5 * width + 0.5) / 100 end
 
 -- The asset at another size or resolution: { shape, body, friction, object }. `object` is what experts see of it.
 local function instance(asset, change)
   local scale, from = change.scale or 1, asset.body
   local shape = scale == 1 and asset.shape or asset.shape:scale(scale, scale, scale)
   local low, high = shape:bounds()
-  local hints = {}
-  for name, value in pairs(asset.hints or {}) do hints[name] = name:match "_m$" and scale * value or value end
+  local hints = grasp.scaled_hints(asset.hints or {}, scale)
   local size = { high[1] - low[1], high[2] - low[2], high[3] - low[3] }
   return {
     shape = shape, friction = asset.friction,
@@ -36,14 +41,10 @@ local function instance(asset, change)
       youngs_pa = from.youngs_pa, poisson = from.poisson, density = from.density, grasp_spacing = from.grasp_spacing,
       resolution = change.resolution or from.resolution, collapse_strain = from.collapse_strain, damage_strain = from.damage_strain,
     },
+    -- Centred above the origin, on the table.
+    position = { -0.5 * (low[1] + high[1]), -0.5 * (low[2] + high[2]), -low[3] },
     object = { name = asset.name, asset = asset.name, size = size, centre = { 0, 0, size[3] / 2 }, yaw = 0, hints = hints, scale = scale },
   }
-end
-
--- Strain up to which a material is stable and undamaged; nil if it states none.
-function press.stable_strain(body)
-  if body.collapse_strain and body.damage_strain then return math.min(body.collapse_strain, body.damage_strain) end
-  return body.collapse_strain or body.damage_strain
 end
 
 local Bench = {}
@@ -85,7 +86,7 @@ function Bench:close_to(width, speed)
 end
 
 -- Waits until no node has been faster than `speed` for `seconds`. Returns the largest node speed in that time (or in the last
--- `seconds` before the timeout), or nil if the physics failed.
+-- `seconds` before the timeout) and whether it rests, or nil if the physics failed.
 function Bench:rest(speed, seconds)
   local elapsed, resting, fastest = 0, 0, 0
   while resting < seconds - 1e-9 and elapsed < REST_TIMEOUT_S do
@@ -98,28 +99,30 @@ function Bench:rest(speed, seconds)
       resting, fastest = resting + self.dt, math.max(fastest, now)
     end
   end
-  return fastest
+  return fastest, resting >= seconds - 1e-9
 end
 
 function Bench:force(index) return self.body:force(self.pads[index].solid) end
 
 function Bench:slip_mm() return math.max(self.body:travel(self.pads[1].solid), self.body:travel(self.pads[2].solid)) end
 
-function Bench:both_touch() return math.min(self:force(1), self:force(2)) > CONTACT_N end
+function Bench:both_touch() return math.min(self:force(1), self:force(2)) > trial.CONTACT_N end
 
--- A settled object between open pads, displaced by `offset` (m) from the expert's grasp. `change` has the fields scale,
--- resolution and dt, all optional.
+-- A settled object between open pads, displaced by `offset` (m) from the expert's grasp, or nil and why there is none. `change` has
+-- the fields scale and resolution, both optional.
 function press.bench(asset, change, offset)
   local made = instance(asset, change or {})
-  local object, dt = made.object, change and change.dt or 1 / 60
-  local world = softvt.world { sleeping = false, dt = dt }
+  local object = made.object
+  local world = softvt.world { sleeping = false }
   world:static { name = "table", shape = softvt.shape.box { size = { 1, 1, 0.1 } }, friction = table_top.friction, position = { 0, 0, -0.05 } }
-  local yaw = grasp.long_axis_yaw(object)
+  local problem = grasp.problem(object)
+  if problem then return nil, "it " .. problem end
+  local yaw = grasp.hand_yaw(object)
   local bench = setmetatable({
-    world = world, dt = dt, object = object, stable_strain = press.stable_strain(made.body), min_det_f = math.huge, pads = {},
+    world = world, dt = world:dt(), object = object, min_det_f = math.huge, pads = {},
     width = grasp.width(object) + 2 * CLEARANCE, rise = 0, axis = { -math.sin(yaw), math.cos(yaw) },
     at = grasp.pose(object, grasp.height(object), offset).position,
-    body = world:soft { name = asset.name, shape = made.shape, body = made.body, friction = made.friction, position = { 0, 0, 0 } },
+    body = world:soft { name = asset.name, shape = made.shape, body = made.body, friction = made.friction, position = made.position },
   }, Bench)
   for index, side in ipairs { -1, 1 } do
     local facing = yaw - side * math.pi / 2
@@ -127,7 +130,8 @@ function press.bench(asset, change, offset)
     bench.pads[index] = { side = side, facing = facing, solid = solid }
   end
   bench:place(bench.width, 0)
-  if not bench:rest(SETTLE_SPEED, SETTLE_S) then error(("press: %s does not settle: %s"):format(asset.name, bench.problem), 0) end
+  local _, rests = bench:rest(SETTLE_SPEED, SETTLE_S)
+  if not rests then return nil, "it does not come to rest on the table" .. (bench.problem and ": " .. bench.problem or "") end
   bench.body:set_reference "now"
   return bench
 end
@@ -137,7 +141,7 @@ local function squeeze(bench, width)
   local fastest = bench:close_to(width, CLOSING) and bench:rest(REST_SPEED, REST_S)
   if not fastest then return nil end
   local row = {
-    width_mm = 1e3 * width, d_pct = bench.body:deformation().rms_pct, force_n = 0.5 * (bench:force(1) + bench:force(2)),
+    width_mm = in_mm(width), d_pct = bench.body:deformation().rms_pct, force_n = 0.5 * (bench:force(1) + bench:force(2)),
     strain_p95 = bench.body:strain_percentile(PERCENTILE), min_det_f = bench.min_det_f, node_speed_m_s = fastest,
     both_pads = bench:both_touch(), slip_mm = bench:slip_mm(), stable = false,
   }
@@ -149,54 +153,64 @@ end
 local function find_contact(bench, step)
   while not bench:both_touch() do
     if bench.width <= step then return nil, "the pads have met" end
-    if not bench:close_to(bench.width - step, CLOSING) then return nil, bench.problem end
+    if not bench:close_to(rounded(bench.width - step), CLOSING) then return nil, bench.problem end
   end
   return bench.width
 end
 
 -- Presses from first contact inward in steps of `step` (m) until the 95th percentile of the strain has reached the stable strain,
--- or the press is no longer stable. Returns the rows, and why the sweep ended if the rows do not tell.
+-- or the press is no longer stable. Returns { rows, stable_strain, ended }: `ended` says why the sweep ended if the rows do not tell.
 function press.sweep(asset, step, change)
-  local bench, rows, touched = press.bench(asset, change), {}, false
-  local width, problem = find_contact(bench, CONTACT_STEP)
+  local bench, problem = press.bench(asset, change)
+  if not bench then return { rows = {}, ended = problem } end
+  local sweep = { rows = {}, stable_strain = bench.body:stable_strain() }
+  local rows, touched, width = sweep.rows, false, nil
+  width, sweep.ended = find_contact(bench, CONTACT_STEP)
   while width and width > 0 do
     local row = squeeze(bench, width)
-    if not row then return rows, bench.problem end
+    if not row then
+      sweep.ended = bench.problem
+      return sweep
+    end
     rows[#rows + 1] = row
-    if touched and not row.stable then return rows end
+    if not row.stable and (touched or #rows >= UNSTABLE) then return sweep end
     touched = touched or row.stable
-    if bench.stable_strain and row.strain_p95 >= bench.stable_strain then return rows end
+    if sweep.stable_strain and row.strain_p95 >= sweep.stable_strain then return sweep end
     -- Once both pads touch at rest, widths are multiples of the step.
-    width = touched and (math.ceil(width / step - 1e-6) - 1) * step or width - CONTACT_STEP
+    width = rounded(touched and (math.ceil(width / step - 1e-6) - 1) * step or width - CONTACT_STEP)
   end
-  return rows, problem or "the pads have met"
+  sweep.ended = sweep.ended or "the pads have met"
+  return sweep
 end
 
 -- Minimum-jerk time scaling on [0, 1] (Flash and Hogan, 1985), and its largest slope.
 local function smooth(u) return u * u * u * (10 + u * (6 * u - 15)) end
 local PEAK = 1.875
 
--- A trial at `width` (m): grasps as fast as the expert does, lifts and holds. Returns whether it held, the slip (mm) and the peak D (%).
+-- A trial at `width` (m): grasps as fast as the expert does, lifts and holds. Returns whether it held, the slip on the pads (mm) and
+-- the peak D (%).
 local function hold(asset, width, offset, change)
-  local bench = press.bench(asset, change, offset)
+  local bench, problem = press.bench(asset, change, offset)
+  if not bench then error(("press: %s: %s"):format(asset.name, problem), 0) end
   bench.d_peak_pct = 0
   local ok = bench:close_to(width, GRASPING) and bench:rest(REST_SPEED, REST_S)
-  local before = bench.body:centre()[3]
-  local count = math.ceil(PEAK * LIFT / (LIFT_SPEED * grasp.carry_pace(bench.object)) / bench.dt)
+  local before, slid = bench.body:centre()[3], bench:slip_mm()
+  local count = math.ceil(PEAK * trial.LIFT / (trial.SPEED * grasp.carry_pace(bench.object)) / bench.dt)
   for k = 1, count + math.ceil(HOLD_S / bench.dt) do
     if not ok then break end
-    bench:place(width, LIFT * smooth(math.min(1, k / count)))
-    ok = bench:step()
-    -- An object that was left behind is not waited for.
-    if k == count and bench.body:centre()[3] - before < 0.5 * LIFT then break end
+    bench:place(width, trial.LIFT * smooth(math.min(1, k / count)))
+    -- An object that the pads have lost is not waited for.
+    ok = bench:step() and bench:both_touch()
   end
-  local slip_mm = 1e3 * math.abs(LIFT - (bench.body:centre()[3] - before))
-  return ok and bench.rise == LIFT and slip_mm <= SLIP_MM, slip_mm, bench.d_peak_pct
+  local fallen_mm, slip_mm = 1e3 * (bench.rise - (bench.body:centre()[3] - before)), bench:slip_mm() - slid
+  -- An object that the pads have lost has slipped by as much as it has stayed behind.
+  if not ok or fallen_mm > 0.5e3 * trial.LIFT then return false, math.max(slip_mm, fallen_mm), bench.d_peak_pct end
+  return slip_mm <= trial.SLIP_MM, slip_mm, bench.d_peak_pct
 end
 
 -- Hold trials at `width` (m), until one fails.
 local function holds_at(asset, width, change)
-  local row = { width_mm = 1e3 * width, trials = 0, held = 0, slip_mm = 0, d_peak_pct = 0 }
+  local row = { width_mm = in_mm(width), trials = 0, held = 0, slip_mm = 0, d_peak_pct = 0 }
   for _, offset in ipairs(OFFSETS) do
     local held, slip_mm, d_peak_pct = hold(asset, width, offset, change)
     row.trials, row.slip_mm = row.trials + 1, math.max(row.slip_mm, slip_mm)
@@ -206,9 +220,6 @@ local function holds_at(asset, width, change)
   end
   return row
 end
-
--- On a grid of 10 µm, so that widths have few digits.
-local function rounded(width) return math.floor(1e5 * width + 0.5) / 1e5 end
 
 -- Finds the widest width between `narrow` and `wide` (m) at which all trials hold, by bisection to `within` (m). If they do not
 -- hold at `narrow`, it looks down to `narrowest`. Returns the rows of all widths tried.

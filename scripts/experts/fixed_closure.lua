@@ -10,11 +10,10 @@ local function log_uniform(range, share) return range[1] * (range[2] / range[1])
 
 -- The same object as another instance of its asset.
 local function instance(object, scale, youngs_factor, density_factor)
-  local ratio, hints, size = scale / object.scale, {}, {}
-  for name, value in pairs(object.hints) do hints[name] = name:sub(-2) == "_m" and value * ratio or value end
+  local ratio, size = scale / object.scale, {}
   for axis = 1, 3 do size[axis] = object.size[axis] * ratio end
   return {
-    name = object.name, asset = object.asset, hints = hints, size = size, scale = scale,
+    name = object.name, asset = object.asset, hints = grasp.scaled_hints(object.hints, ratio), size = size, scale = scale,
     youngs_factor = object.youngs_factor and youngs_factor, density_factor = object.density_factor and density_factor,
   }
 end

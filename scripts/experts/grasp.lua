@@ -30,6 +30,9 @@ end
 -- Yaw of an object's longer horizontal side, rad. The fingers close across it.
 function grasp.long_axis_yaw(object) return object.yaw + (object.size[1] < object.size[2] and math.pi / 2 or 0) end
 
+-- Yaw of the hand in a grasp: across the shorter side, or across the rim where it is farthest along x.
+function grasp.hand_yaw(object) return object.hints.grasp_rim_m and -math.pi / 2 or grasp.long_axis_yaw(object) end
+
 -- Height of an object's lowest point, m.
 function grasp.bottom(object) return object.centre[3] - object.size[3] / 2 end
 
@@ -42,9 +45,10 @@ end
 -- object's lowest point; `offset` (m) and `turn` (rad) displace the grasp, for trials. The hint grasp_offset_m displaces it along the
 -- longer side, from the centre towards where most of the mass is.
 function grasp.pose(object, height, offset, turn)
-  local yaw = grasp.long_axis_yaw(object) + (turn or 0)
+  local yaw = grasp.hand_yaw(object) + (turn or 0)
   local x, y = object.centre[1], object.centre[2]
   if offset then x, y = x + offset[1], y + offset[2] end
+  x = x + (object.hints.grasp_rim_m or 0)
   local along, axis = object.hints.grasp_offset_m, grasp.long_axis_yaw(object)
   if along then x, y = x + along * math.cos(axis), y + along * math.sin(axis) end
   return softvt.pose { position = { x, y, grasp.bottom(object) + height }, yaw = wrap_half_turn(yaw) }
@@ -63,7 +67,18 @@ end
 
 -- Speed of carrying an object, as a share of the usual one. A long object is carried slowly, so that it does not bend much more than
 -- by its weight.
-function grasp.carry_pace(object) return object.hints and object.hints.carry_pace or 1 end
+function grasp.carry_pace(object)
+  local pace = object.hints and object.hints.carry_pace or 1
+  if pace <= 0 or pace > 1 then error(("the hint carry_pace of %s: expected a number in 0..1, above 0, got %g"):format(object.name, pace), 0) end
+  return pace
+end
+
+-- The hints of an object that is `factor` times as large: lengths, whose names end in _m, scale with it.
+function grasp.scaled_hints(hints, factor)
+  local scaled = {}
+  for name, value in pairs(hints) do scaled[name] = name:sub(-2) == "_m" and factor * value or value end
+  return scaled
+end
 
 -- Why the gripper cannot grasp an object, whatever the pose; nil if it can.
 function grasp.problem(object)
@@ -76,12 +91,12 @@ end
 -- The safe window of an object: the loosest and the tightest grip as { width, force }, with the measured width of the gels (m)
 -- and the force per pad at rest (N). The window of an asset is scaled to the instance. Its tight end is a strain: the width scales
 -- with the size, the force with area and stiffness. Its loose end carries the weight, by an indentation that grows with weight
--- over stiffness. Bending by the weight adds to the squeeze in D as perpendicular vectors do, so it leaves less of τ to the grip of a
--- soft or heavy instance. Nil without a calibration.
+-- over stiffness. The deformation by the weight adds to that of the squeeze in D as perpendicular vectors do, so it leaves less of τ
+-- to the grip of a soft or heavy instance. Nil without a calibration.
 function grasp.window(object)
   local known = calibrated[object.asset]
   if not known then return nil end
-  if not known.bending then
+  if not known.carried then
     error(("calibrated: the window of %s is of an older version; run softvt scripts/calibrate.lua --asset %s"):format(object.asset, object.asset), 0)
   end
   local size, stiffness, density = object.scale or 1, object.youngs_factor or 1, object.density_factor or 1
@@ -90,10 +105,10 @@ function grasp.window(object)
   load = math.max(load, load ^ (2 / 3))
   local indentation = (known.width_contact - known.width_lower) * load
   local loose = { width = size * (known.width_contact - indentation), force = known.force_lower * density * size ^ 3 }
-  -- An object that bends beyond τ at its nominal size has the window of the press.
-  local bending = known.bending < 1 and known.bending or 0
-  local left = (1 - (bending * density * size / stiffness) ^ 2) / (1 - bending ^ 2)
-  -- No window is left to an instance that bends beyond τ: its loosest grip does least harm.
+  -- An asset whose carried D exceeds τ has the window of the press alone.
+  local carried = known.carried < 1 and known.carried or 0
+  local left = (1 - (carried * density * size / stiffness) ^ 2) / (1 - carried ^ 2)
+  -- No window is left to an instance whose carried D exceeds τ: its loosest grip does least harm.
   if left <= 0 then return { loose = loose, tight = loose } end
   local share = math.min(1, math.sqrt(left))
   local tight = {

@@ -92,6 +92,16 @@ local function close_until(self, closure, options)
   end
 end
 
+-- Distance within which a grasp repeats the last one, m.
+local SAME_PLACE = 0.04
+
+-- Number of grasps that have failed here: those since the last release or grasp elsewhere.
+local function failed_grasps(self)
+  local before = self.grasped_at
+  self.grasped_at = self.target
+  return before and before:distance(self.target) < SAME_PLACE and self.failures + 1 or 0
+end
+
 -- Closes on an object: to the given closure, or with the tactile servo until the fingers report a firm grasp. A binary gripper
 -- closes fully here, and not in close_to.
 function Arm:grasp(closure, options)
@@ -102,8 +112,7 @@ function Arm:grasp(closure, options)
   end
   end_servo(self)
   self.wants_readings = true
-  -- A grasp is repeated, and then firmer, if the hand opened without a release.
-  self.failures = self.failures and self.failures + 1 or 0
+  self.failures = failed_grasps(self)
   self.holds = servo.close(self.closure, options.rate * host.dt, self.failures, function(next)
     self:command(self.target, next)
     return fingers.readings()
@@ -112,7 +121,7 @@ end
 
 -- Releases an object by opening to options.closure (default: fully open).
 function Arm:release(options)
-  self.gripping, self.failures = false, nil
+  self.gripping, self.grasped_at = false, nil
   end_servo(self)
   self:close_to(options.closure, { rate = options.rate })
 end

@@ -10,8 +10,8 @@ local min = math.min
 local HELD, TOUCHED = 0.08, 0.01
 -- Change of closure per control step after first contact, and in response to shear (0.16 mm and 0.5 mm of width).
 local FINE, TIGHTEN = 0.002, 0.00625
--- Factor on HELD after a grasp that has failed: the edge of a hard object shows much residual at little force.
-local FIRMER = 3
+-- Factor on HELD per grasp that has failed, and how many count: the edge of a hard object shows much residual at little force.
+local FIRMER, MOST_FAILURES = 3, 2
 -- Smallest ratio of residual to outward shear of a held object. In a sliding grasp the shear is at least three times the
 -- residual at the friction of a gel.
 local RATIO = 0.5
@@ -27,9 +27,9 @@ local function touched(fingers) return fingers.left.markers:rms_residual() > TOU
 local function margin(markers) return markers:rms_residual() - RATIO * markers:outward_shear() end
 
 -- Closes by `rate` per control step until both fingers show a firm grasp or the gripper is closed. `step` sends a closure and returns the
--- finger readings of the next control step; `failures` counts the grasps that have failed before.
+-- finger readings of the next control step; `failures` counts the grasps that have failed here.
 function servo.close(closure, rate, failures, step)
-  local held, fingers = HELD * FIRMER ^ failures, step(closure)
+  local held, fingers = HELD * FIRMER ^ min(failures, MOST_FAILURES), step(closure)
   while closure < 1 and least(fingers, residual) < held do
     closure = min(1, closure + (touched(fingers) and FINE or rate))
     fingers = step(closure)

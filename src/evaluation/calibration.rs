@@ -10,9 +10,9 @@
 //!   stable squeeze.
 //!
 //! The loose end of the envelope is the widest width at which every hold trial held, down to the narrowest one tried. The
-//! tight end is the widest width at which D reaches τ = κ·D_ref, in the sweep or in the hold trials: an object that is
-//! carried also bends under its weight, and bulges where the support held it. An object that bends beyond τ in every hold
-//! trial has the tight end of the sweep; its carried D tells.
+//! tight end is the widest width at which D reaches τ = κ·D_ref, in the sweep or in the hold trials: a carried object also
+//! deforms by its weight. If D passes τ in every hold trial, the tight end is that of the sweep; the carried D of the
+//! envelope is then above τ.
 
 use serde::{Deserialize, Serialize};
 
@@ -24,6 +24,8 @@ const MIN_DET_F: f64 = 0.1;
 const MAX_NODE_SPEED_M_S: f64 = 0.005;
 /// Exclusive upper bound of the slip in a stable squeeze, mm.
 const MAX_SLIP_MM: f64 = 2.0;
+/// Smallest extent of a safe window, mm: the accuracy of its loose end.
+const MIN_EXTENT_MM: f64 = 0.02;
 
 /// How an asset was calibrated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -127,10 +129,10 @@ pub struct SafeWindow {
 }
 
 impl SafeWindow {
-    /// Extent of the window, mm; `None` if it is empty or an end is unknown.
+    /// Extent of the window, mm; `None` if it is below 0.02 mm or an end is unknown.
     pub fn extent_mm(&self) -> Option<f64> {
         let extent = self.width_lower_mm? - self.width_at_tau_mm?;
-        (extent > 0.0).then_some(extent)
+        (extent >= MIN_EXTENT_MM).then_some(extent)
     }
 }
 
@@ -192,34 +194,42 @@ impl Envelope {
             (Protocol::Press, None) => Some(ended.unwrap_or_else(|| reason_of_end(&sweep, stable_strain))),
             (Protocol::Press, Some(_)) | (Protocol::Hand, _) => None,
         };
-        let reference = at_strain.or_else(|| largest_stable(&sweep));
+        let starts_beyond = protocol == Protocol::Press && is_beyond(sweep.first(), stable_strain);
+        let reference = at_strain.or_else(|| largest_stable(&sweep).filter(|_| !starts_beyond));
         let limit = reference.as_ref().and_then(|found| limit_of(found.d_pct, kappa));
         let width_lower_mm = loose_end(&holds);
         let width_at_tau_mm = limit.and_then(|limit| {
             let ends = [pressed_end(&sweep, limit.tau_pct()), carried_end(&holds, limit.tau_pct())];
-            ends.into_iter().flatten().reduce(f64::max)
+            ends.into_iter().flatten().reduce(f64::max).map(round_to_six_decimals)
         });
         Self {
             protocol,
             stable_strain,
             censored,
             d_ref_pct: limit.map(|limit| limit.d_ref_pct),
-            width_at_d_ref_mm: reference.map(|found| found.width_mm),
+            width_at_d_ref_mm: reference.map(|found| round_to_six_decimals(found.width_mm)),
             width_contact_mm: sweep.iter().find(|row| row.both_pads).map(|row| row.width_mm),
-            carried_d_pct: carried(&holds).map(|point| point.d_pct).reduce(f64::min),
+            carried_d_pct: carried(&holds)
+                .map(|point| point.d_pct)
+                .reduce(f64::min)
+                .map(round_to_six_decimals),
             window: SafeWindow {
                 width_lower_mm,
                 width_at_tau_mm,
-                force_lower_n: width_lower_mm.and_then(|width| force_at(&sweep, width)),
-                force_at_tau_n: width_at_tau_mm.and_then(|width| force_at(&sweep, width)),
+                force_lower_n: width_lower_mm
+                    .and_then(|width| force_at(&sweep, width))
+                    .map(round_to_six_decimals),
+                force_at_tau_n: width_at_tau_mm
+                    .and_then(|width| force_at(&sweep, width))
+                    .map(round_to_six_decimals),
             },
             holds,
             sweep,
         }
     }
 
-    /// True if the object bends beyond τ when it is carried, at every width.
-    pub fn bends_beyond(&self, limit: DeformationLimit) -> bool {
+    /// True if D of the carried object passes τ at every width.
+    pub fn exceeds_when_carried(&self, limit: DeformationLimit) -> bool {
         self.carried_d_pct.is_some_and(|d_pct| d_pct > limit.tau_pct())
     }
 
@@ -258,7 +268,16 @@ fn largest_stable(sweep: &[SweepRow]) -> Option<Reference> {
     Some(Reference { d_pct: largest.d_pct, width_mm: largest.width_mm })
 }
 
+/// True if 5 % of the volume is beyond the stable strain in a row.
+fn is_beyond(row: Option<&SweepRow>, stable_strain: Option<f64>) -> bool {
+    let strains = row.and_then(|row| row.strain_p95).zip(stable_strain);
+    strains.is_some_and(|(p95, strain)| p95 >= strain)
+}
+
 fn reason_of_end(sweep: &[SweepRow], stable_strain: Option<f64>) -> String {
+    if is_beyond(sweep.first(), stable_strain) {
+        return "5 % of the volume is beyond the stable strain before the pads touch".to_owned();
+    }
     let last = sweep.last().and_then(SweepRow::instability);
     let default = match stable_strain {
         Some(_) => "the sweep ended before the stable strain",
@@ -383,6 +402,13 @@ pub(crate) mod tests {
         assert_eq!(short, ("the sweep ended before the stable strain".into(), Some(2.0)));
         let told = reason(&|scans| (scans.sweep.pop(), scans.ended = Some("inverted".into())).1);
         assert_eq!(told.0, "inverted");
+        let sagging = reason(&|scans| scans.stable_strain = Some(1e-9));
+        assert_eq!(sagging.1, Some(1e-8), "beyond in the second row");
+        let collapsed = reason(&|scans| scans.sweep[0].strain_p95 = Some(0.4));
+        assert_eq!(
+            collapsed,
+            ("5 % of the volume is beyond the stable strain before the pads touch".into(), None)
+        );
         let nameless = reason(&|scans| scans.stable_strain = None);
         assert_eq!(nameless.0, "the material states no collapse_strain");
         let hand = reason(&|scans| (scans.protocol, scans.stable_strain) = (Protocol::Hand, None));
@@ -409,16 +435,22 @@ pub(crate) mod tests {
         assert!((tight(1.9) - 47.5).abs() < 1e-12);
         assert!((tight(1.4) - 47.0).abs() < 1e-12);
         let above = HoldRow { d_peak_pct: Some(1.6), ..hold(48.0, 5) };
-        let bending = Envelope::new(Scans { holds: vec![above], ..scans(48.0) }, 0.5);
-        assert_eq!(bending.window.width_at_tau_mm, Some(47.0), "the tight end of the sweep");
-        assert_eq!(bending.carried_d_pct, Some(1.6));
-        assert!(bending.bends_beyond(bending.limit(0.5).unwrap()));
+        let heavy = Envelope::new(Scans { holds: vec![above], ..scans(48.0) }, 0.5);
+        assert_eq!(heavy.window.width_at_tau_mm, Some(47.0), "the tight end of the sweep");
+        assert_eq!(heavy.carried_d_pct, Some(1.6));
+        assert!(heavy.exceeds_when_carried(heavy.limit(0.5).unwrap()));
     }
 
     #[test]
     fn an_envelope_whose_ends_have_crossed_has_no_extent() {
         let envelope = Envelope::new(scans(46.0), 0.5);
         assert_eq!((envelope.window.width_lower_mm, envelope.window.extent_mm()), (Some(46.0), None));
+        let extent = |tight| {
+            let ends = (Some(47.0), Some(tight));
+            SafeWindow { width_lower_mm: ends.0, width_at_tau_mm: ends.1, ..SafeWindow::default() }
+                .extent_mm()
+        };
+        assert_eq!((extent(46.99), extent(46.5)), (None, Some(0.5)), "an extent below the accuracy");
         let none = Envelope::new(Scans { sweep: vec![squeeze(49.0, 1.0, false)], ..scans(48.0) }, 0.5);
         assert_eq!((none.d_ref_pct, none.window.width_at_tau_mm, none.limit(0.5)), (None, None, None));
     }

@@ -1,7 +1,7 @@
 //! The safe interaction envelope of an asset in three lines of text, and as an SVG plot of D over the width.
 
 use super::{
-    calibration::{Envelope, Protocol, SweepRow},
+    calibration::{Envelope, HoldRow, Protocol, SweepRow},
     safety::DeformationLimit,
 };
 
@@ -29,11 +29,21 @@ pub fn three_lines(asset: &str, envelope: &Envelope, limit: Option<DeformationLi
 fn window_line(envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
     let window = &envelope.window;
     let newton = |force: Option<f64>| force.map_or_else(|| "–".to_owned(), |force| format!("{force:.2}"));
-    let bending = limit.is_some_and(|limit| envelope.bends_beyond(limit));
+    let exceeds = limit.is_some_and(|limit| envelope.exceeds_when_carried(limit));
+    let loose = match window.width_lower_mm {
+        Some(lower) => format!("it holds from {lower:.2} mm inward"),
+        None if envelope.holds.is_empty() => "no hold trial was run".to_owned(),
+        None => "no width held in every trial".to_owned(),
+    };
+    let tight = match window.width_at_tau_mm {
+        Some(tight) => format!("D passes τ at {tight:.2} mm"),
+        None if limit.is_none() => "there is no τ".to_owned(),
+        None => "the sweep does not reach τ".to_owned(),
+    };
     match (window.width_lower_mm, window.width_at_tau_mm, window.extent_mm()) {
-        (Some(lower), Some(tight), Some(extent)) if bending => format!(
-            "held from {lower:.2} mm and pressed to τ at {tight:.2} mm of width ({extent:.2} mm), but carried it bends \
-             beyond τ (D {:.3} % at least)",
+        (Some(lower), Some(tight), Some(extent)) if exceeds => format!(
+            "held from {lower:.2} mm and pressed to τ at {tight:.2} mm of width ({extent:.2} mm), but D of the carried \
+             object exceeds τ at every width ({:.3} % at least)",
             envelope.carried_d_pct.unwrap_or(f64::NAN)
         ),
         (Some(lower), Some(tight), Some(extent)) => format!(
@@ -41,14 +51,7 @@ fn window_line(envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
             newton(window.force_lower_n),
             newton(window.force_at_tau_n)
         ),
-        (Some(lower), Some(tight), None) => {
-            format!("no safe window: it holds from {lower:.2} mm inward, and D passes τ at {tight:.2} mm")
-        }
-        (None, Some(tight), _) => {
-            format!("no safe window: no width held in every trial, and D passes τ at {tight:.2} mm")
-        }
-        (Some(lower), None, _) => format!("holds from {lower:.2} mm inward; the sweep does not reach τ"),
-        (None, None, _) => "no width held in every trial, and the sweep does not reach τ".to_owned(),
+        _ => format!("no safe window: {loose}, and {tight}"),
     }
 }
 
@@ -91,8 +94,8 @@ impl Axes {
     }
 }
 
-/// Plots D over the width as SVG: stable squeezes as dots, unstable ones as rings, τ and D_ref as dashed lines, and the
-/// safe window as a band.
+/// Plots D over the width as SVG: stable squeezes as dots, unstable ones as rings, peak D of hold trials as diamonds
+/// (filled if every trial held), τ and D_ref as dashed lines, and the safe window as a band.
 pub fn plot(asset: &str, envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
     let finite = |row: &&SweepRow| row.d_pct.is_finite() && row.width_mm.is_finite();
     let rows: Vec<&SweepRow> = envelope.sweep.iter().filter(finite).collect();
@@ -109,12 +112,14 @@ pub fn plot(asset: &str, envelope: &Envelope, limit: Option<DeformationLimit>) -
     let d_max = rows.iter().map(|row| row.d_pct).fold(0.0, f64::max).max(limit.map_or(0.0, |l| l.d_ref_pct));
     let widest = if widest > narrowest { widest } else { widest + 1.0 };
     let axes = Axes { widest, narrowest, top: 1.05 * d_max.max(1e-9) };
-    let title = format!("{asset}: D over the width between the gels");
+    let trials = if has_carried(envelope) { "; diamonds: lifted and held" } else { "" };
+    let title = format!("{asset}: D over the width between the gels{trials}");
     let parts = [
         band(&axes, envelope),
         frame(&axes),
         limit.map_or_else(String::new, |limit| limit_lines(&axes, limit)),
         curve(&axes, &rows),
+        carried(&axes, &envelope.holds),
         window_ends(&axes, envelope),
         text(LEFT, 20.0, "start", &title),
     ];
@@ -185,6 +190,25 @@ fn curve(axes: &Axes, rows: &[&SweepRow]) -> String {
     line + &marks.collect::<String>()
 }
 
+fn has_carried(envelope: &Envelope) -> bool {
+    envelope.holds.iter().any(|row| row.d_peak_pct.is_some())
+}
+
+/// Peak D of the hold trials. Those beyond the axes are left out.
+fn carried(axes: &Axes, holds: &[HoldRow]) -> String {
+    let marks = holds.iter().filter_map(|row| {
+        let d_pct = row.d_peak_pct.filter(|d| *d <= axes.top && row.width_mm <= axes.widest)?;
+        let fill = if row.trials > 0 && row.held == row.trials { "#c07020" } else { "white" };
+        let (x, y) = (axes.x(row.width_mm), axes.y(d_pct));
+        let (left, right, top, bottom) = (x - 4.0, x + 4.0, y - 4.0, y + 4.0);
+        Some(format!(
+            "<polygon points=\"{left:.1},{y:.1} {x:.1},{top:.1} {right:.1},{y:.1} {x:.1},{bottom:.1}\" fill=\"{fill}\" \
+             stroke=\"#c07020\"/>\n"
+        ))
+    });
+    marks.collect()
+}
+
 /// The two ends of the window with their widths and forces.
 fn window_ends(axes: &Axes, envelope: &Envelope) -> String {
     let window = &envelope.window;
@@ -218,10 +242,13 @@ mod tests {
              τ 1.500 % of the diagonal = 0.5 × D_ref; D_ref 3.000 % at 44.50 mm\n\
              pressed until 5 % of the volume was beyond the stable strain 0.3\n"
         );
-        let mut bending = scans(48.0);
-        bending.holds.iter_mut().for_each(|row| row.d_peak_pct = Some(1.6));
-        let (bending, _) = shown(bending);
-        assert!(bending.contains("carried it bends beyond τ (D 1.600 % at least)"), "{bending}");
+        let mut heavy = scans(48.0);
+        heavy.holds.iter_mut().for_each(|row| row.d_peak_pct = Some(1.6));
+        let (heavy, svg) = shown(heavy);
+        assert!(heavy.contains("carried object exceeds τ at every width (1.600 % at least)"), "{heavy}");
+        assert_eq!(svg.matches("<polygon").count(), 4, "every hold trial is plotted");
+        let (untried, _) = shown(Scans { holds: vec![], ..scans(48.0) });
+        assert!(untried.contains("no safe window: no hold trial was run, and D passes τ"), "{untried}");
         let (empty, _) = shown(scans(46.0));
         assert!(empty.contains("it holds from 46.00 mm inward, and D passes τ at 47.00 mm"), "{empty}");
         let (censored, _) = shown(Scans { stable_strain: None, ..scans(48.0) });

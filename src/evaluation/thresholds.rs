@@ -67,6 +67,10 @@ pub struct AssetThreshold {
     pub n_stable_trials: u32,
 }
 
+/// Definition of τ, and that of files with several κ or protocols.
+const DEFINITION: &str = "tau_o = kappa * d_ref";
+const MIXED_DEFINITION: &str = "tau_o = kappa_o * d_ref_o, with kappa and protocol of each asset";
+
 /// Contents of a threshold file, of one asset or many.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ThresholdFile {
@@ -98,7 +102,7 @@ impl ThresholdFile {
             calibration: CalibrationInfo {
                 method: METHOD.into(),
                 protocol: None,
-                definition: "tau_o = kappa * d_ref".into(),
+                definition: DEFINITION.into(),
                 kappa,
                 sources,
                 generated_at,
@@ -136,8 +140,18 @@ impl ThresholdFile {
         limit.is_some()
     }
 
-    /// Adds the assets of another file; assets of the same name are replaced.
+    /// Adds the assets of another file; assets of the same name are replaced. An empty file takes over how the other was
+    /// calibrated; κ and protocol of files that differ are those of each asset.
     pub fn merge(&mut self, other: Self) {
+        let CalibrationInfo { protocol, definition, kappa, .. } = &mut self.calibration;
+        let theirs = &other.calibration;
+        if self.envelopes.is_empty() && self.thresholds.is_empty() {
+            (*protocol, *kappa) = (theirs.protocol, theirs.kappa);
+            definition.clone_from(&theirs.definition);
+        } else if (*protocol, &*definition, *kappa) != (theirs.protocol, &theirs.definition, theirs.kappa) {
+            *protocol = None;
+            *definition = MIXED_DEFINITION.into();
+        }
         self.thresholds.extend(other.thresholds);
         self.envelopes.extend(other.envelopes);
         self.fingerprints.extend(other.fingerprints);
@@ -332,6 +346,10 @@ mod tests {
         all.merge(other);
         assert_eq!(all.thresholds.len(), 1);
         assert_eq!(all.envelopes.keys().collect::<Vec<_>>(), ["bun", "mush"]);
+        assert_eq!(all.calibration.definition, MIXED_DEFINITION, "of another κ");
+        let mut copy = ThresholdFile::new(0.9, vec![], "softvt".into());
+        copy.merge(file());
+        assert_eq!((copy.calibration.kappa, copy.calibration.protocol), (0.5, file().calibration.protocol));
     }
 
     #[test]

@@ -53,7 +53,7 @@ fn a_material_without_strains_is_calibrated_with_a_warning() {
 }
 
 #[test]
-fn a_strain_out_of_range_and_an_empty_window_are_refused() {
+fn a_strain_out_of_range_is_refused() {
     for (strain, got) in
         [("collapse_strain = 0", "0"), ("damage_strain = 1.5", "1.5"), ("damage_strain = -0.1", "-0.1")]
     {
@@ -61,9 +61,96 @@ fn a_strain_out_of_range_and_an_empty_window_are_refused() {
         assert!(message.starts_with("assets/brick.lua:4: asset.body"), "{message}");
         assert!(message.contains("above 0") && message.ends_with(&format!("got {got}")), "{message}");
     }
-    let message = brick("collapse_strain = 0.002").refusal(QUICK);
+}
+
+#[test]
+fn assets_without_a_window_are_told_with_the_files_of_all_assets() {
+    let project = brick("collapse_strain = 0.002");
+    let sound = project.text("assets/brick.lua").replace("0.002", "0.12").replace("'brick'", "'sound'");
+    let wide = sound.replace("'sound'", "'wide'").replace("0.04, 0.03, 0.024", "0.09, 0.085, 0.024");
+    let sagging = sound.replace("'sound'", "'sagging'").replace("4e4", "4e2").replace("0.12", "0.004");
+    for (name, text) in [("sound", &sound), ("wide", &wide), ("sagging", &sagging)] {
+        project.write(&format!("assets/{name}.lua"), text.as_bytes());
+    }
+    let message = project.problem(&QUICK.replace("brick", "brick,sound,wide,sagging"));
+    for part in [
+        "brick: no safe window: ",
+        ", and D passes τ at ",
+        "wide: no safe window: no hold trial was run, and there is no τ",
+        "sagging: no safe window: no hold trial was run",
+        "Give these assets more friction",
+    ] {
+        assert!(message.contains(part), "{part}: {message}");
+    }
+    assert!(!message.contains("sound:"), "{message}");
+    for name in ["brick", "sound", "wide", "sagging"] {
+        assert!(project.path(&format!("assets/calibration/{name}.svg")).exists(), "{name}");
+    }
+    let reason = |name: &str| {
+        let file = project.json(&format!("assets/calibration/{name}.json"));
+        file["envelopes"][name]["censored"].as_str().unwrap_or_default().to_owned()
+    };
+    assert!(reason("wide").contains("91 mm wide where the fingers grasp it"), "{}", reason("wide"));
     assert!(
-        message.contains("brick has no safe window: D passes τ at ") && message.contains("more friction"),
+        reason("sagging").contains("beyond the stable strain before the pads touch"),
+        "{}",
+        reason("sagging")
+    );
+    let windows = project.text("scripts/calibrated.lua");
+    assert!(windows.contains("sound = {") && !windows.contains("brick = {") && !windows.contains("wide = {"));
+}
+
+#[test]
+fn windows_of_an_older_version_are_left_out() {
+    let project = brick("collapse_strain = 0.12");
+    let old = "return { cube = { width_contact = 0.056, width_lower = 0.055, width_at_tau = 0.053, force_lower = 0.1, force_at_tau = 1 } }\n";
+    project.write("scripts/calibrated.lua", old.as_bytes());
+    let output = project.succeeds(QUICK);
+    assert!(output.out.contains("windows of an older version, which are left out: cube"), "{}", output.out);
+    assert!(!project.text("scripts/calibrated.lua").contains("cube = "));
+    project.write("scripts/calibrated.lua", old.as_bytes());
+    let message = project.refusal("scripts/check_calibration.lua --asset cube --part ends --trials 1");
+    assert!(message.contains("cube has no calibrated window, or one of an older version"), "{message}");
+}
+
+#[test]
+fn the_place_of_the_shape_and_the_step_of_the_physics_do_not_change_the_limit() {
+    let limit = |place: &str, words: &str| {
+        let project = brick("collapse_strain = 0.12");
+        let moved = project.text("assets/brick.lua").replace(":grounded()", place);
+        project.write("assets/brick.lua", moved.as_bytes());
+        project.succeeds(&format!("{QUICK} --out run {words}"));
+        let file = project.json("run/assets/calibration/brick.json");
+        file["thresholds"]["brick"]["tau"].as_f64().expect("a limit")
+    };
+    let nominal = limit(":grounded()", "");
+    assert!((limit(":grounded():translate(0.006, 0.004, 0)", "") / nominal - 1.0).abs() < 1e-3);
+    let fine = limit(":grounded()", "--set physics.dt=0.01");
+    assert!((fine / nominal - 1.0).abs() < 0.02, "{fine} and {nominal}");
+}
+
+#[test]
+fn a_calibration_refuses_what_does_nothing_and_what_would_replace_the_limits() {
+    let project = brick("collapse_strain = 0.12");
+    for (words, part) in [
+        ("--sweep-protocol hand --step-mm 1 --out run", "--step-mm does nothing with --sweep-protocol hand"),
+        ("--trials 3", "--trials does nothing with --sweep-protocol press"),
+        ("--sweep-protocol hand", "--sweep-protocol hand: give --out DIR"),
+        ("--kappa 0.3", "--kappa 0.3: give --out DIR"),
+        ("--asset brick,brick", "--asset names brick twice"),
+        ("--asset table", "table is not soft"),
+    ] {
+        let asset = if words.contains("--asset") { "" } else { "--asset brick " };
+        let message = project.refusal(&format!("scripts/calibrate.lua {asset}{words}"));
+        assert!(message.contains(part), "{words}: {message}");
+    }
+    let slow = project
+        .text("assets/brick.lua")
+        .replace("name = 'brick',", "name = 'brick', hints = { carry_pace = 0 },");
+    project.write("assets/brick.lua", slow.as_bytes());
+    let message = project.refusal(QUICK);
+    assert!(
+        message.contains("the hint carry_pace of brick: expected a number in 0..1, above 0, got 0"),
         "{message}"
     );
 }

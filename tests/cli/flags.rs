@@ -105,6 +105,41 @@ fn an_experiment_writes_its_rows_and_its_command_line() {
 }
 
 #[test]
+fn an_option_of_a_script_acts_or_is_refused() {
+    let declared = |only_with: &str| {
+        format!(
+            "local opt = softvt.options {{ mode = {{ default = 'fast', choices = {{ 'fast', 'slow' }} }}, \
+             wait_s = {{ default = 1, unit = 's', only_with = {{ {only_with} }}, help = 'pause' }}, \
+             kappa = {{ default = 0.5, needs_out = true }} }}\n\
+             return softvt.experiment {{ name = 'e', options = opt, grid = {{ x = {{ 1 }} }}, \
+             run = function(point, o) return {{ wait = o.wait_s }} end, \
+             finish = function() return {{ files = {{ ['n.txt'] = 'n' }}, problem = opt.kappa == 1 and 'one is too much' or nil }} end }}\n"
+        )
+    };
+    let project =
+        Project::new(&[("x.lua", &declared("mode = 'slow'")), ("y.lua", &declared("speed = 'slow'"))]);
+    let refused = project.refusal("x.lua --wait-s 2");
+    assert!(
+        refused.contains("option --wait-s does nothing with --mode fast; leave it out, or give --mode slow"),
+        "{refused}"
+    );
+    assert!(refused.starts_with("x.lua:1: "), "{refused}");
+    project.succeeds("x.lua --mode slow --wait-s 2");
+    let help = project.succeeds("x.lua --help").out;
+    assert!(help.contains("pause, only with --mode slow"), "{help}");
+    let wrong = project.refusal("y.lua");
+    assert!(wrong.contains("options.wait_s.only_with: speed is not an option of the script"), "{wrong}");
+    let changed = project.refusal("x.lua --kappa 0.3");
+    assert!(changed.contains("--kappa 0.3: give --out DIR"), "{changed}");
+    project.succeeds("x.lua --kappa 0.3 --out run");
+    // A problem is told after the files are written.
+    let problem = project.problem("x.lua --kappa 1 --out worse");
+    assert!(problem.ends_with("x.lua: one is too much"), "{problem}");
+    assert_eq!(project.text("worse/n.txt"), "n");
+    assert!(project.path("worse/run.json").exists());
+}
+
+#[test]
 fn a_folder_with_other_files_is_refused() {
     let project = Small { task: "budget_steps = 1", ..Small::default() }.project();
     project.write("mine/notes.txt", b"mine");

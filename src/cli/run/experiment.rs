@@ -22,7 +22,7 @@ use softvt_common::{
 };
 use softvt_report::run_folder::{RUN, RunFolder};
 use softvt_rollout::cancel;
-use softvt_script::{Experiment, ExperimentInput, ExperimentRow, LoadedScript};
+use softvt_script::{Experiment, ExperimentInput, ExperimentRow, LoadedScript, OptionSpec};
 
 /// The rows of an experiment, one JSON object per line.
 const ROWS: &str = "rows.jsonl";
@@ -50,7 +50,7 @@ struct ExperimentManifest<'a> {
 /// the script are written into that folder.
 ///
 /// # Errors
-/// The script fails, a setting or the seed changes nothing, or a file cannot be written.
+/// The script fails or tells a problem, a setting or the seed changes nothing, or a file cannot be written.
 pub(crate) fn run(config: &RunConfig, loaded: &LoadedScript) -> Result<(), CliError> {
     let Plan::Experiment { name, points, columns, has_finish } = &loaded.plan else {
         return Err(config.error("the script returned no experiment"));
@@ -62,7 +62,7 @@ pub(crate) fn run(config: &RunConfig, loaded: &LoadedScript) -> Result<(), CliEr
     let input = ExperimentInput::new(config.settings.clone(), config.script.seed);
     let input = Arc::new(input.map_err(|error| config.error(error))?);
     if *has_finish && out.is_none() {
-        refuse_changed_project_files(config)?;
+        refuse_changed_project_files(config, loaded)?;
     }
     // Opening an experiment runs the whole script, so each thread takes an idle one before it opens another.
     let idle: Mutex<Vec<Experiment>> = Mutex::default();
@@ -103,8 +103,12 @@ pub(crate) fn run(config: &RunConfig, loaded: &LoadedScript) -> Result<(), CliEr
     }
     outcome?;
     input.check_used().map_err(|error| config.error(error))?;
-    let finish = take()?.finish(&rows)?;
+    // The rows are kept if finish fails.
     print_rows(config, &rows, columns)?;
+    if let Some(dir) = out {
+        files::write_json_lines(&dir.join(ROWS), &rows)?;
+    }
+    let finish = take()?.finish(&rows)?;
     if let Some(text) = finish.text.filter(|_| !config.flags.json) {
         print(&format!("{text}\n"))?;
     }
@@ -115,8 +119,8 @@ pub(crate) fn run(config: &RunConfig, loaded: &LoadedScript) -> Result<(), CliEr
         return Err(config.error(format!("finish.files: {reserved} is written by softvt; give another path")));
     }
     finish.files.iter().try_for_each(|(relative, bytes)| write(&base, relative, bytes))?;
-    let Some(dir) = out else { return Ok(()) };
-    files::write_json_lines(&dir.join(ROWS), &rows)?;
+    let outcome = finish.problem.map_or(Ok(()), |problem| Err(config.error(problem)));
+    let Some(dir) = out else { return outcome };
     let options = loaded.options.iter();
     let manifest = ExperimentManifest {
         softvt: env!("CARGO_PKG_VERSION"),
@@ -129,17 +133,18 @@ pub(crate) fn run(config: &RunConfig, loaded: &LoadedScript) -> Result<(), CliEr
         set: &config.settings,
         sources: loaded.sources.bundle.hashes(),
     };
-    run_manifest::write_new(dir, &manifest)
+    run_manifest::write_new(dir, &manifest)?;
+    outcome
 }
 
-/// Refuses to write files into the project that were made with changed settings or another seed: they would be taken for
-/// the nominal ones, such as the calibration of an asset.
-fn refuse_changed_project_files(config: &RunConfig) -> Result<(), CliError> {
-    let flag = match (config.settings.first(), config.script.seed) {
-        (Some((path, _)), _) => format!("--set {path}"),
-        (None, seed) if seed != 0 => "--seed".to_owned(),
-        _ => return Ok(()),
-    };
+/// Refuses to write files into the project that were made with changed settings, another seed or an option that says so:
+/// they would be taken for the nominal ones, such as the calibration of an asset.
+fn refuse_changed_project_files(config: &RunConfig, loaded: &LoadedScript) -> Result<(), CliError> {
+    let setting = config.settings.first().map(|(path, _)| format!("--set {path}"));
+    let seed = || (config.script.seed != 0).then(|| "--seed".to_owned());
+    let changed = |option: &&OptionSpec| option.needs_out && option.value != option.default;
+    let option = || loaded.options.iter().find(changed).map(|o| format!("{} {}", o.flag(), o.value));
+    let Some(flag) = setting.or_else(seed).or_else(option) else { return Ok(()) };
     Err(config.error(format!(
         "{flag}: give --out DIR: this experiment can write files, and those made with it must not replace the files of \
          the project"

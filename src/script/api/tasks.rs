@@ -177,11 +177,13 @@ record! {
         text: Option<String>;
         /// Files to write, by relative path: text as it is, images as PNG, tables as JSON with sorted keys.
         files: BTreeMap<String, Value> = Type::Map(&Type::OneOf(&[
-            Type::Text,
+            Type::Line,
             Type::Object("softvt.Image"),
             Type::Map(&Type::Any),
             Type::List(&Type::Any),
         ])) => Empty;
+        /// What is wrong with the results. The files are written, then the command fails with this message.
+        problem: Option<String>;
     }
 }
 

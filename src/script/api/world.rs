@@ -131,6 +131,7 @@ struct Inner {
     world: World,
     references: Vec<ReferenceShape>,
     strains: Vec<StrainMeter>,
+    stable_strains: Vec<Option<f64>>,
     failed: Option<StepFailure>,
     newton_total: u64,
     newton_max: u32,
@@ -179,6 +180,7 @@ functions! {
                 world: World::new(params, gravity),
                 references: Vec::new(),
                 strains: Vec::new(),
+                stable_strains: Vec::new(),
                 failed: None,
                 newton_total: 0,
                 newton_max: 0,
@@ -216,6 +218,7 @@ impl LuaWorld {
         let id = inner.world.add_soft(name, model, Some(Arc::new(shape.clone())), &pose, friction);
         inner.references.push(reference);
         inner.strains.push(strains);
+        inner.stable_strains.push(body.stable_strain());
         inner.reserved.push(reserved);
         Ok(LuaBody { world: self.0.clone(), id })
     }
@@ -301,6 +304,8 @@ class! {
             fn gel_pad(lua, this, spec: WorldGelPadSpec) -> ["softvt.Solid"] { this.add_gel_pad(lua, &spec)? }
             /// Makes one time step. Returns false and the reason once the state is invalid.
             fn step(lua, this) -> ["boolean", "string?"] { this.step(lua)? }
+            /// Returns the time step, s.
+            fn dt(_, this) -> ["number"] { lock(&this.0).world.params.dt }
             /// Returns the simulated time, s.
             fn time(_, this) -> ["number"] { lock(&this.0).world.time() }
             /// Returns the mean and the largest number of Newton iterations per step.
@@ -374,6 +379,9 @@ class! {
             fn asleep(_, this) -> ["boolean"] { this.read(SoftBody::is_asleep) }
             /// Returns the deformation against the reference shape.
             fn deformation(lua, this) -> ["softvt.Deformation"] { deformation_table(lua, &this.deformation(lua)?)? }
+            /// Returns the strain up to which its material is stable and undamaged: the smaller of collapse_strain and
+            /// damage_strain; nil if it states none.
+            fn stable_strain(_, this) -> ["number?"] { lock(&this.world).stable_strains[this.id.index()] }
             /// Returns the compressive strain that `percent` of the volume stays below: 1 − σ_min(F) at the Gauss points,
             /// weighted by volume.
             fn strain_percentile(lua, this, percent: f64 = PERCENT) -> ["number"] {

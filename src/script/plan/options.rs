@@ -1,6 +1,9 @@
 //! Options that a script declares, and the command line that sets them.
 
-use std::sync::{Arc, Mutex};
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Mutex},
+};
 
 use mlua::{Lua, LuaSerdeExt, Value};
 use serde::{Deserialize, Serialize};
@@ -34,6 +37,11 @@ record! {
         choices: Option<Vec<String>>;
         /// Description for --help.
         help: String => Text("");
+        /// Values of other options without which this one does nothing: { sweep_protocol = "hand" }. It is then refused.
+        only_with: Option<BTreeMap<String, Value>>;
+        /// True if files that are made with another value than the default must not replace those of the project: such a
+        /// value then needs --out.
+        needs_out: bool => Boolean(false);
     }
 }
 
@@ -70,6 +78,10 @@ pub struct OptionSpec {
     pub range: Range,
     /// Allowed strings; any if empty.
     pub choices: Vec<String>,
+    /// Values of other options without which this one does nothing, by name.
+    pub only_with: BTreeMap<String, OptionValue>,
+    /// True if files that are made with another value than the default must not replace those of the project.
+    pub needs_out: bool,
 }
 
 impl OptionSpec {
@@ -92,6 +104,13 @@ impl OptionSpec {
             OptionValue::Numbers(_) => format!("numbers joined by commas{}{unit}", self.range.describe()),
             OptionValue::Texts(_) => "strings joined by commas".into(),
         }
+    }
+
+    /// The options without which this one does nothing: ", only with --sweep-protocol hand", or nothing.
+    pub fn condition(&self, options: &[Self]) -> String {
+        let flag = |name: &str| options.iter().find(|o| o.name == name).map_or_else(String::new, Self::flag);
+        let parts = self.only_with.iter().map(|(name, value)| format!(", only with {} {value}", flag(name)));
+        parts.collect()
     }
 
     /// Parses a value of the command line.
@@ -128,6 +147,8 @@ pub(crate) struct OptionSession {
     /// Words of the command line; `None` for those that an option has consumed.
     arguments: Vec<Option<String>>,
     pub declared: Vec<OptionSpec>,
+    /// Names of the options that the command line sets.
+    given: Vec<String>,
 }
 
 /// An argument is not a value of its option.
@@ -139,12 +160,16 @@ enum ArgumentError {
     Invalid { flag: String, expected: String, text: String },
     #[error("option {0} is given twice; give it once")]
     Twice(String),
+    #[error("option {flag} does nothing with {other} {value}; leave it out, or give {other} {needed}")]
+    NoEffect { flag: String, other: String, value: OptionValue, needed: OptionValue },
+    #[error("options.{option}.only_with: {other} is not an option of the script")]
+    Undeclared { option: String, other: String },
 }
 
 impl OptionSession {
     pub(crate) fn new(argv: &[String]) -> SharedOptions {
         let arguments = argv.iter().cloned().map(Some).collect();
-        Arc::new(Mutex::new(Self { arguments, declared: Vec::new() }))
+        Arc::new(Mutex::new(Self { arguments, declared: Vec::new(), given: Vec::new() }))
     }
 
     /// Fails if there is an argument that no option has consumed.
@@ -162,6 +187,26 @@ impl OptionSession {
             None if flags.is_empty() => error.hint("the script declares no options of its own"),
             None => error.hint(format!("the script declares {}", flags.join(", "))),
         })
+    }
+
+    /// Fails if the command line sets an option that does nothing with the values of the others.
+    fn check_effects(&self) -> Result<(), ArgumentError> {
+        let needs =
+            self.declared.iter().flat_map(|option| option.only_with.iter().map(move |need| (option, need)));
+        for (option, (name, needed)) in needs {
+            let Some(other) = self.declared.iter().find(|other| other.name == *name) else {
+                return Err(ArgumentError::Undeclared { option: option.name.clone(), other: name.clone() });
+            };
+            if other.value != *needed && self.given.contains(&option.name) {
+                return Err(ArgumentError::NoEffect {
+                    flag: option.flag(),
+                    other: other.flag(),
+                    value: other.value.clone(),
+                    needed: needed.clone(),
+                });
+            }
+        }
+        Ok(())
     }
 
     /// Consumes the arguments that set `spec` and returns its value, if any.
@@ -223,6 +268,7 @@ functions! {
                 names.push(spec.name.clone());
                 lock(&session).declared.push(spec);
             }
+            lock(&session).check_effects().map_err(|error| fail(lua, error.to_string()))?;
             strict_table(lua, "options", values, names)?
         }
     }
@@ -261,6 +307,8 @@ fn declare(lua: &Lua, session: &mut OptionSession, key: &Value, value: &Value) -
         default,
         range: Range::between(record.min, record.max),
         choices: record.choices.unwrap_or_default(),
+        only_with: needed_values(lua, &name, record.only_with.unwrap_or_default())?,
+        needs_out: record.needs_out,
         name,
     };
     if spec.parse(&spec.default.to_string()).is_none() {
@@ -271,8 +319,22 @@ fn declare(lua: &Lua, session: &mut OptionSession, key: &Value, value: &Value) -
     }
     if let Some(value) = session.consume(&spec).map_err(|error| fail(lua, error.to_string()))? {
         spec.value = value;
+        session.given.push(spec.name.clone());
     }
     Ok(spec)
+}
+
+/// Values of `only_with` of the option `name`.
+fn needed_values(
+    lua: &Lua,
+    name: &str,
+    values: BTreeMap<String, Value>,
+) -> mlua::Result<BTreeMap<String, OptionValue>> {
+    let value = |(other, value): (String, Value)| {
+        let message = format!("options.{name}.only_with.{other}: expected a number, string or boolean");
+        Ok((other, lua.from_value(value).map_err(|_| fail(lua, message))?))
+    };
+    values.into_iter().map(value).collect()
 }
 
 impl std::fmt::Display for OptionValue {

@@ -31,6 +31,8 @@ pub struct ExperimentSummary {
     pub text: Option<String>,
     /// Files to write: relative path without `..`, and bytes.
     pub files: Vec<(String, Vec<u8>)>,
+    /// What is wrong with the results.
+    pub problem: Option<String>,
 }
 
 /// A virtual machine that runs points of an experiment; every thread needs its own.
@@ -148,7 +150,7 @@ fn read_summary(lua: &Lua, value: &Value) -> mlua::Result<ExperimentSummary> {
         }
         files.push((path, file_content(lua, &content)?));
     }
-    Ok(ExperimentSummary { text: spec.text, files })
+    Ok(ExperimentSummary { text: spec.text, files, problem: spec.problem })
 }
 
 /// The bytes of a file: text as it is, images as PNG, other data as JSON.

@@ -1,0 +1,183 @@
+-- Checks calibrations: how D_ref and τ depend on the step, the resolution and the size, and whether the ends of the windows act.
+--
+--   softvt scripts/check_calibration.lua                                  all standard soft assets
+--   softvt scripts/check_calibration.lua --asset cube --part ends --trials 20
+--
+-- --part numerics repeats the sweep of the press with half of the step, at resolutions 6 and 12, and with the object at 0.9 and 1.1 of
+-- its size. --part ends runs trials with the robot's hand and the expert's lift, 5 % of the window inside and outside of each end.
+-- If all standard assets are checked in both parts, it writes docs/calibration_checks.md.
+local hand = require "calibration.hand"
+local known = require "calibrated"
+local press = require "calibration.press"
+local soft_assets = require("asset_names").soft
+
+local opt = softvt.options {
+  asset = { default = soft_assets, help = "assets to check" },
+  part = { default = { "numerics", "ends" }, choices = { "numerics", "ends" }, help = "what to check" },
+  step_mm = { default = 0.5, unit = "mm", min = 0.04, max = 5, help = "numerics: step of the width, which is halved" },
+  trials = { default = 100, integer = true, min = 1, max = 1000, help = "ends: hold trials at each side of each end" },
+}
+
+local parts = {}
+for _, part in ipairs(opt.part) do parts[part] = true end
+
+local assets, calibrations = {}, {}
+for _, name in ipairs(opt.asset) do
+  if assets[name] then error(("check_calibration: --asset names %s twice"):format(name), 0) end
+  assets[name] = require("assets." .. name)
+  if tostring(assets[name].body) ~= "softvt.soft" then error(("check_calibration: %s is not soft"):format(name), 0) end
+  calibrations[name] = softvt.calibration(name)
+  if parts.ends and not (calibrations[name] and known[name] and known[name].carried) then
+    error(("check_calibration: %s has no calibrated window, or one of an older version; run softvt scripts/calibrate.lua --asset %s first"):format(
+      name, name), 0)
+  end
+end
+
+local KAPPA = 0.5
+local END_SHARE = 0.05    -- distance from an end of the window, as a share of the window
+local BATCH = 10          -- trials of a point
+local HOLD_S = 1          -- hold after the lift, s
+
+-- Changes of the sweep by name, in the order of the page.
+local CHANGES = {
+  { name = "nominal" }, { name = "half_step", step = 0.5 }, { name = "resolution_6", resolution = 6 },
+  { name = "resolution_12", resolution = 12 }, { name = "scale_0.9", scale = 0.9 }, { name = "scale_1.1", scale = 1.1 },
+}
+
+-- D_ref of the sweep with one change.
+local function numerics(point, o)
+  local change = point.change
+  local sweep = press.sweep(assets[point.asset], 1e-3 * o.step_mm * (change.step or 1), change)
+  local found = softvt.envelope {
+    asset = point.asset, kappa = KAPPA, stable_strain = sweep.stable_strain, ended = sweep.ended, sweep = sweep.rows, holds = {},
+  }
+  return { asset = point.asset, check = change.name, d_ref_pct = found.d_ref, censored = found.censored }
+end
+
+-- A batch of trials at an end of the window: a share of the window inside of it, or outside.
+local function ends(point)
+  local window = known[point.asset]
+  local inward = (point.at == "loose" and 1 or -1) * (point.side == "inside" and END_SHARE or -END_SHARE)
+  local along = (point.at == "loose" and 0 or 1) + inward
+  local grip = {
+    width = window.width_lower + along * (window.width_at_tau - window.width_lower),
+    force = math.max(0, window.force_lower + along * (window.force_at_tau - window.force_lower)),
+  }
+  local held, d_peak_pct = hand.trials(assets[point.asset], grip, point.first, point.last, HOLD_S)
+  return {
+    asset = point.asset, check = point.at .. "_" .. point.side, width_mm = 1e3 * grip.width, trials = point.last - point.first + 1,
+    held = held, d_peak_pct = d_peak_pct,
+  }
+end
+
+local function points(o)
+  local list = {}
+  for _, name in ipairs(o.asset) do
+    for _, change in ipairs(parts.numerics and CHANGES or {}) do list[#list + 1] = { asset = name, change = change } end
+    for _, at in ipairs(parts.ends and { "loose", "tight" } or {}) do
+      for _, side in ipairs { "inside", "outside" } do
+        for first = 1, o.trials, BATCH do
+          list[#list + 1] = { asset = name, at = at, side = side, first = first, last = math.min(o.trials, first + BATCH - 1) }
+        end
+      end
+    end
+  end
+  return list
+end
+
+-- The rows of each asset and check; batches of trials are added up.
+local function by_asset(rows)
+  local found = {}
+  for _, row in ipairs(rows) do
+    local of_asset = found[row.asset] or {}
+    found[row.asset] = of_asset
+    local sum = of_asset[row.check]
+    if sum then
+      sum.held, sum.trials, sum.d_peak_pct = sum.held + row.held, sum.trials + row.trials, math.max(sum.d_peak_pct, row.d_peak_pct)
+    else
+      of_asset[row.check] = row
+    end
+  end
+  return found
+end
+
+local function table_of(header, names, cells)
+  local lines = { "| " .. table.concat(header, " | ") .. " |", "|" .. ("---|"):rep(#header) }
+  for _, name in ipairs(names) do lines[#lines + 1] = "| " .. table.concat(cells(name), " | ") .. " |" end
+  return table.concat(lines, "\n") .. "\n"
+end
+
+-- Change of D_ref from one row to another, %.
+local function change_of(from, to)
+  if not (from.d_ref_pct and to.d_ref_pct) then return "–" end
+  return ("%+.1f"):format(100 * (to.d_ref_pct / from.d_ref_pct - 1)) .. (to.censored and " (censored)" or "")
+end
+
+local function numerics_table(found, names)
+  return table_of(
+    { "asset", "D_ref %", "half step, %", "resolution 6 → 12, %", "size 0.9, %", "size 1.1, %" }, names,
+    function(name)
+      local rows = found[name]
+      local nominal = rows.nominal
+      return {
+        name, nominal.d_ref_pct and ("%.3f"):format(nominal.d_ref_pct) or "–", change_of(nominal, rows.half_step),
+        change_of(rows.resolution_6, rows.resolution_12), change_of(nominal, rows["scale_0.9"]), change_of(nominal, rows["scale_1.1"]),
+      }
+    end)
+end
+
+local function ends_table(found, names)
+  local function held(row) return ("%d of %d"):format(row.held, row.trials) end
+  return table_of(
+    { "asset", "held, loose inside", "held, loose outside", "τ %", "largest D %, tight inside", "largest D %, tight outside" }, names,
+    function(name)
+      local rows = found[name]
+      return {
+        name, held(rows.loose_inside), held(rows.loose_outside), ("%.3f"):format(calibrations[name].tau), ("%.3f"):format(rows.tight_inside.d_peak_pct),
+        ("%.3f"):format(rows.tight_outside.d_peak_pct),
+      }
+    end)
+end
+
+local HEAD = [[
+# Checks of the calibration
+
+Generated by `softvt scripts/check_calibration.lua`.
+
+## Numerical parameters
+
+Change of D_ref, and so of τ, with half of the step of the width; from resolution 6 to 12; and with the object at 0.9 and 1.1 of its size.
+
+]]
+local ENDS = [[
+
+## Ends of the window
+
+Trials with the robot's hand and the expert's lift, 5 % of the window inside and outside of each end.
+
+]]
+
+-- True if all standard assets are in `found`.
+local function complete(found)
+  for _, name in ipairs(soft_assets) do
+    if not found[name] then return false end
+  end
+  return true
+end
+
+return softvt.experiment {
+  name = "check_calibration",
+  options = opt,
+  points = points,
+  run = function(point, o) return point.change and numerics(point, o) or ends(point) end,
+  finish = function(rows, o)
+    local found, text = by_asset(rows), {}
+    if parts.numerics then text[#text + 1] = numerics_table(found, o.asset) end
+    if parts.ends then text[#text + 1] = ends_table(found, o.asset) end
+    local is_page = parts.numerics and parts.ends and complete(found)
+    return {
+      text = table.concat(text, "\n"), files = is_page and { ["docs/calibration_checks.md"] = HEAD .. text[1] .. ENDS .. text[2] } or {},
+    }
+  end,
+  columns = { "asset", "check", "d_ref_pct", "censored", "width_mm", "trials", "held", "d_peak_pct" },
+}
