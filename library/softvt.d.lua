@@ -216,6 +216,7 @@
 ---@class softvt.Finish
 ---@field text? string Printed after the rows.
 ---@field files? table<string, string|softvt.Image|table<string, any>|any[]> Files to write, by relative path: text as it is, images as PNG, tables as JSON with sorted keys.
+---@field problem? string Fault of the results. The files are written, then the command fails with this message.
 
 ---A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame, and a closure or a grip force. Give either axis_angle or quaternion, and either closure or force.
 ---@class softvt.Action
@@ -244,7 +245,7 @@
 ---Returns the results of a calibration: the safe window, the deformation limit τ, and the files to write.
 ---@class softvt.EnvelopeSpec
 ---@field asset string Name of the asset.
----@field protocol? "press"|"hand" How the rows were measured. Default "press".
+---@field protocol? "press"|"hand" Protocol by which the rows were measured. Default "press".
 ---@field kappa? number Safety factor κ of the deformation limit τ = κ D_ref. Expects a number in 0..1. Default 0.5.
 ---@field stable_strain? number Stable strain of the material, at which 5 % of the volume ends the press. Expects a number in above 0..1.
 ---@field ended? string Why the sweep ended, if its last row does not tell.
@@ -279,6 +280,8 @@
 ---@field max? number Highest number. Expects a number.
 ---@field choices? string[] The allowed strings; any by default.
 ---@field help? string Description for --help. Default "".
+---@field only_with? table<string, any> Values of other options without which this one does nothing: { sweep_protocol = "hand" }. It is then refused.
+---@field needs_out? boolean True if files that are made with another value than the default must not replace those of the project: such a value then needs --out. Default false.
 
 ---A box centred on the origin.
 ---@class softvt.BoxSpec
@@ -663,6 +666,10 @@ function World:gel_pad(spec) end
 ---@return string?
 function World:step() end
 
+---Returns the time step, s.
+---@return number
+function World:dt() end
+
 ---Returns the simulated time, s.
 ---@return number
 function World:time() end
@@ -714,6 +721,10 @@ function Body:asleep() end
 ---Returns the deformation against the reference shape.
 ---@return softvt.Deformation
 function Body:deformation() end
+
+---Returns the strain up to which its material is stable and undamaged: the smaller of collapse_strain and damage_strain; nil if it states none.
+---@return number?
+function Body:stable_strain() end
 
 ---Returns the compressive strain that `percent` of the volume stays below: 1 − σ_min(F) at the Gauss points, weighted by volume.
 ---@param percent number
@@ -849,7 +860,7 @@ local SafeWindow = {}
 
 ---Results of a calibration.
 ---@class softvt.Envelope
----@field protocol string How it was measured: "press" or "hand".
+---@field protocol string Protocol: "press" or "hand".
 ---@field window softvt.SafeWindow The safe window.
 ---@field width_contact_mm number? Widest width at which both pads touched, mm.
 ---@field width_at_d_ref_mm number? Width at D_ref, mm.

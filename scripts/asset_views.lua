@@ -40,7 +40,7 @@ function views.held(asset, lift)
   local ok, why = sim:drive(function(arm, scene)
     local object = scene:object "object"
     local at = grasp.pose(object, grasp.height(object))
-    if object.hints.grasp_rim_m then at = grasp.choose(scene, object, grasp.height(object)) end
+    if object.hints.grasp_rim_m then at = grasp.choose(scene, object, grasp.height(object)).pose end
     arm:move_to(at:translated { 0, 0, 0.08 }, { speed = 0.6, angular_speed = 3 })
     arm:move_to(at, { speed = 0.25 })
     arm:grasp(grasp.closure(object), { rate = 0.6 })

@@ -96,7 +96,7 @@ local shifts = {
           is_free = scene:distance_to_objects(x, y) > radius + CLEARANCE
           if is_free then break end
         end
-        if not is_free then error(("shift distractors: no room for object %d; give fewer"):format(k)) end
+        if not is_free then error(("shift distractors: no free place for object %d; give fewer"):format(k)) end
         scene:add { name = "extra_" .. k, asset = EXTRAS[k], at = { x, y } }
       end
     end,

@@ -152,7 +152,7 @@ local function grasp_rotations(object)
   return list
 end
 
--- Candidate grasp poses, best first: { pose, cost }.
+-- Candidate grasp poses, best first: { pose, cost, turn }. `turn` is the rotation of the hand from across the shorter side, rad.
 local function candidates(object, height, offset)
   local list, hints = {}, object.hints
   if hints.grasp_rim_m then
@@ -165,7 +165,9 @@ local function candidates(object, height, offset)
       -- The side of the rim that is nearer to the robot is reached with the arm less stretched.
       local stretch = 8 * (x - object.centre[1])
       for _, up in ipairs { 0, 0.003, 0.006 } do
-        list[#list + 1] = { softvt.pose { position = { x, y, bottom + height + up }, yaw = yaw }, math.abs(yaw) + stretch + 300 * up }
+        list[#list + 1] = {
+          pose = softvt.pose { position = { x, y, bottom + height + up }, yaw = yaw }, cost = math.abs(yaw) + stretch + 300 * up, turn = 0,
+        }
       end
     end
   else
@@ -175,7 +177,7 @@ local function candidates(object, height, offset)
     for _, along in ipairs { 0, slack, -slack } do
       for _, turn in ipairs(grasp_rotations(object)) do
         local at = { (offset and offset[1] or 0) + along * math.cos(yaw), (offset and offset[2] or 0) + along * math.sin(yaw) }
-        list[#list + 1] = { grasp.pose(object, height, at, turn), 2 * math.abs(turn) + 100 * math.abs(along) }
+        list[#list + 1] = { pose = grasp.pose(object, height, at, turn), cost = 2 * math.abs(turn) + 100 * math.abs(along), turn = turn }
       end
       if slack < 0.005 then break end
     end
@@ -198,8 +200,8 @@ function grasp.close(arm, object, grip, options)
   arm:grasp(most, { rate = rate, width = grip.width })
 end
 
--- Returns the grasp pose, the closure during the approach (as open as possible) and the clearance of the fingers, m. The
--- clearance is negative if the hand would touch something. No other object may be between the fingers as they close: a
+-- Returns the best grasp: its pose, its `turn` from across the shorter side (rad), the closure during the approach (as open as
+-- possible) and the clearance of the fingers (m), negative if the hand would touch something. No other object may be between the fingers as they close: a
 -- finger outside a drawer's front would pull the drawer along.
 function grasp.choose(scene, object, height, offset)
   local best
@@ -207,18 +209,17 @@ function grasp.choose(scene, object, height, offset)
   -- Narrowest opening first: the clearance of a closing motion is that of its narrowest point.
   local openings = { grasp.clear_closure(object, 0.005), grasp.clear_closure(object, 0.010), 0 }
   for _, candidate in ipairs(candidates(object, height, offset)) do
-    local pose, cost = candidate[1], candidate[2]
     local clearance = math.huge
     for _, opening in ipairs(openings) do
-      clearance = math.min(clearance, (scene:clearance(pose, { width = STROKE * (1 - opening), ignore = ignore })))
+      clearance = math.min(clearance, (scene:clearance(candidate.pose, { width = STROKE * (1 - opening), ignore = ignore })))
       -- Clearance beyond the required one has no value.
-      local score = math.min(clearance, FINGER_CLEARANCE) * 1e3 - 0.1 * cost - opening
+      local score = math.min(clearance, FINGER_CLEARANCE) * 1e3 - 0.1 * candidate.cost - opening
       if not best or score > best.score then
-        best = { pose = pose, closure = opening, clearance = clearance, score = score }
+        best = { pose = candidate.pose, turn = candidate.turn, closure = opening, clearance = clearance, score = score }
       end
     end
   end
-  return best.pose, best.closure, best.clearance
+  return best
 end
 
 return grasp

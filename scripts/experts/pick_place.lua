@@ -3,8 +3,9 @@
 --   expert = pick_place { object = "left", target = "plate" }
 --
 -- The grip is drawn uniformly from the middle of the safe window (`window`, 0.8 of it), so that demonstrations do not tell one width
--- per object. The hand closes slowly from before first contact (`closing_speed`, 0.008 m/s). `stop = "touch"` ends closing by
--- the force on the pads instead of the width of the gels. `closure` commands one closure instead.
+-- per object. The hand closes slowly from before first contact (`closing_speed`, 0.008 m/s). `stop = "touch"` ends closing by the force
+-- on the pads instead of the width of the gels; a hand that is turned from across the shorter side always stops by force. `closure`
+-- commands one closure instead.
 local grasp = require "experts.grasp"
 local route = require "experts.route"
 local fixed_closure = require "experts.fixed_closure"
@@ -30,8 +31,9 @@ local function spread(most) return (2 * math.random() - 1) * most end
 local function pick(arm, scene, spec, pace, share)
   local object = scene:object(spec.object)
   local height = grasp.height(object)
-  local at, opening, clearance = grasp.choose(scene, object, height, { spread(GRASP_SPREAD), spread(GRASP_SPREAD) })
-  if clearance < 0 then return false, "leaves no clearance for the hand" end
+  local chosen = grasp.choose(scene, object, height, { spread(GRASP_SPREAD), spread(GRASP_SPREAD) })
+  local at, opening = chosen.pose, chosen.closure
+  if chosen.clearance < 0 then return false, "leaves no clearance for the hand" end
   local over = route.approach_height(scene, arm.pose.position, at, 0.05, FINGER_CLEARANCE)
   arm:move_to(arm.target:at { arm.target.x, arm.target.y, math.max(over, arm.target.z) }, { speed = 0.4 * pace })
   arm:move_to(at:at { at.x, at.y, over }, { speed = 0.4 * pace, closure = opening })
@@ -39,7 +41,9 @@ local function pick(arm, scene, spec, pace, share)
   arm:wait(0.1)
   local before = scene:object(spec.object).centre[3]
   local grip = grasp.target(object, share)
-  grasp.close(arm, object, grip, { closing_speed = spec.closing_speed, stop = spec.stop, closure = spec.closure })
+  -- The width of a grip is that across the shorter side; a hand that is turned from it stops by force.
+  local stop = chosen.turn == 0 and spec.stop or "touch"
+  grasp.close(arm, object, grip, { closing_speed = spec.closing_speed, stop = stop, closure = spec.closure })
   arm:wait(0.3)
   arm:note("grip_width_mm", 1e3 * arm.width)
   -- Straight up first.

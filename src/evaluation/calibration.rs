@@ -27,7 +27,7 @@ const MAX_SLIP_MM: f64 = 2.0;
 /// Smallest extent of a safe window, mm: the accuracy of its loose end.
 const MIN_EXTENT_MM: f64 = 0.02;
 
-/// How an asset was calibrated.
+/// Protocol of a calibration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Protocol {
@@ -136,10 +136,10 @@ impl SafeWindow {
     }
 }
 
-/// What a calibration measured, from which an [`Envelope`] follows.
+/// Measurements of a calibration, from which an [`Envelope`] follows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scans {
-    /// How the rows were measured.
+    /// Protocol by which the rows were measured.
     pub protocol: Protocol,
     /// Stable strain of the material; `None` if it states no limit, and for the robot's hand.
     pub stable_strain: Option<f64>,
@@ -154,7 +154,7 @@ pub struct Scans {
 /// Envelope of an asset, with the rows it was computed from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Envelope {
-    /// How the rows were measured.
+    /// Protocol by which the rows were measured.
     pub protocol: Protocol,
     /// Stable strain of the material: the smaller of its collapse and damage strain.
     pub stable_strain: Option<f64>,

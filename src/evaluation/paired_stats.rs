@@ -389,7 +389,7 @@ mod tests {
         assert!(pair_episodes(&before, &after).is_empty(), "other initial states");
     }
 
-    /// What the records of this version have in addition to [`run`].
+    /// Fields of records of this version in addition to those of [`run`].
     fn with_harm(mut record: EpisodeRecord, contact: bool, failed_stage: Option<Stage>) -> EpisodeRecord {
         let v = &mut record.verdict;
         (v.d_mean, v.d_final, v.d_p95, v.time_over_tau_s) = (Some(0.25), Some(0.0), Some(0.5), Some(1.5));

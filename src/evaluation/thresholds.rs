@@ -41,7 +41,7 @@ pub enum ThresholdError {
 pub struct CalibrationInfo {
     /// Always [`METHOD`].
     pub method: String,
-    /// How the assets were calibrated; absent in released files.
+    /// Protocol of the calibration; absent in released files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub protocol: Option<Protocol>,
     /// Definition of τ in words.

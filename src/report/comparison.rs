@@ -43,7 +43,7 @@ pub struct Comparison {
     pub unmatched: usize,
     /// Fields of `run.json`, other than the policy, in which the runs differ.
     pub unlike: Vec<String>,
-    /// How a suite is paired with its rigid twin, one sentence per pair; empty for runs of the same suites.
+    /// Pairs of a suite and its rigid twin, one sentence per pair; empty for runs of the same suites.
     pub pairing: Vec<String>,
     /// One sentence per run with missing episodes.
     pub partial: Vec<String>,

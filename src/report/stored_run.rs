@@ -62,7 +62,7 @@ pub fn remove_folder(manifest: &mut Value) {
     }
 }
 
-/// What a run changes of its suite.
+/// Changes that a run makes to its suite.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunChange {
     /// Name of the changed factor, such as `mass`; `several` for more than one.
@@ -139,7 +139,7 @@ impl StoredRun {
         })
     }
 
-    /// What the run changes; `None` for a suite as it is.
+    /// Changes to the suite; `None` for a suite as it is.
     pub fn change(&self) -> Option<RunChange> {
         let twin = self.is_rigid_twin().then(|| "rigid twin".to_owned());
         let changes: Vec<String> = self.changes("shifts").chain(self.changes("set")).chain(twin).collect();
@@ -155,7 +155,7 @@ impl StoredRun {
         Some(RunChange { factor: factor.to_owned(), value, label })
     }
 
-    /// What the run under a condition and its unchanged run have in common.
+    /// Settings that the run under a condition and its unchanged run share.
     pub fn condition_group(&self) -> [String; 5] {
         let text = |field: &str| self.manifest[field].to_string();
         [self.original_suite().to_owned(), text("policy"), text("seed"), text("split"), text("vary")]

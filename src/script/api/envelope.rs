@@ -43,7 +43,7 @@ output! {
 output! {
     /// Results of a calibration.
     fn envelope_table(lua, asset: &str, envelope: &Envelope, file: &ThresholdFile) -> "softvt.Envelope" as "envelope" {
-        /// How it was measured: "press" or "hand".
+        /// Protocol: "press" or "hand".
         protocol: "string" = lua.to_value(&envelope.protocol)?;
         /// The safe window.
         window: "softvt.SafeWindow" = window_table(lua, &envelope.window)?;
@@ -94,7 +94,7 @@ functions! {
         fn envelope(lua) takes spec "softvt.EnvelopeSpec" {
             /// Name of the asset.
             asset: String = Type::Name;
-            /// How the rows were measured.
+            /// Protocol by which the rows were measured.
             protocol: Protocol => Text("press");
             /// Safety factor κ of the deformation limit τ = κ D_ref.
             kappa: f64 = Type::Number("", Range::closed(0.0, 1.0)) => Number(0.5);

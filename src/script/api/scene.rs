@@ -100,7 +100,7 @@ pub(crate) struct LuaScene {
     assets: Arc<Mutex<Vec<ReadAsset>>>,
 }
 
-/// What a shift sees and changes of the task.
+/// The task as a shift sees and changes it.
 struct SceneTask {
     /// Scene name of the goal's object.
     object: String,

@@ -182,7 +182,7 @@ record! {
             Type::Map(&Type::Any),
             Type::List(&Type::Any),
         ])) => Empty;
-        /// What is wrong with the results. The files are written, then the command fails with this message.
+        /// Fault of the results. The files are written, then the command fails with this message.
         problem: Option<String>;
     }
 }

@@ -31,7 +31,7 @@ pub struct ExperimentSummary {
     pub text: Option<String>,
     /// Files to write: relative path without `..`, and bytes.
     pub files: Vec<(String, Vec<u8>)>,
-    /// What is wrong with the results.
+    /// Fault of the results; the files are valid.
     pub problem: Option<String>,
 }
 
