@@ -38,7 +38,7 @@ local function instance(asset, change)
   return {
     shape = shape, friction = asset.friction,
     body = softvt.soft {
-      youngs_pa = from.youngs_pa, poisson = from.poisson, density = from.density, grasp_spacing = from.grasp_spacing,
+      youngs_pa = from.youngs_pa, poisson = from.poisson, density = from.density, grasp_spacing = scale * from.grasp_spacing,
       resolution = change.resolution or from.resolution, collapse_strain = from.collapse_strain, damage_strain = from.damage_strain,
     },
     -- Centred above the origin, on the table.
