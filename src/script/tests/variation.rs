@@ -245,7 +245,7 @@ return suite(pair)
 #[test]
 fn the_fixed_closure_is_safe_for_most_instances_and_independent_of_the_one_at_hand() {
     let project = project(FIXED_CLOSURE);
-    let window = "return { ball = { width_contact = 0.060, width_lower = 0.0585, width_at_tau = 0.0535, force_lower = 0.1, force_at_tau = 0.8, bending = 0.2 } }";
+    let window = "return { ball = { width_contact = 0.060, width_lower = 0.0585, width_at_tau = 0.0535, force_lower = 0.1, force_at_tau = 0.8, carried = 0.2 } }";
     project.write("scripts/calibrated.lua", window.as_bytes());
     project.load("x.lua", &[]).unwrap_or_else(|error| panic!("{error}"));
 }
