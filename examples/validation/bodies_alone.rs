@@ -48,9 +48,10 @@ pub fn element(report: &mut Report) {
 pub fn extremes(report: &mut Report) {
     heading("Extremes", "");
     let crushed = extremes::crushed();
-    let failure = crushed.failure.as_ref().map_or("nothing".to_owned(), ToString::to_string);
+    let failure =
+        crushed.failure.as_ref().map_or("reaches its end".to_owned(), |failure| format!("fails: {failure}"));
     println!(
-        "Gap 11 mm at 10 kPa: largest D {:.2} %, least det F {:.3}, ends with \"{failure}\".",
+        "Gap 11 mm at 10 kPa: largest D {:.2} %, least det F {:.3}, the run {failure}.",
         crushed.d_peak_pct, crushed.min_det_f
     );
     let stiff = extremes::stiff();
