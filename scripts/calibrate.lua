@@ -14,15 +14,15 @@
 --
 -- Writes assets/calibration/<asset>.json, the rows of the sweep, the plot and the text of the envelope, and scripts/calibrated.lua.
 -- If all standard assets are calibrated, it also writes docs/calibration.md. scripts/check_calibration.lua checks the results.
+local asset_names = require "asset_names"
 local calibration_page = require "calibration_page"
 local hand = require "calibration.hand"
 local known = require "calibrated"
 local press = require "calibration.press"
-local soft_assets = require("asset_names").soft
 
 local PRESS, HAND = { sweep_protocol = "press" }, { sweep_protocol = "hand" }
 local opt = softvt.options {
-  asset = { default = soft_assets, help = "assets to calibrate" },
+  asset = { default = asset_names.soft, help = "assets to calibrate" },
   sweep_protocol = {
     default = "press", choices = { "press", "hand" }, needs_out = true,
     help = "press test of the object alone, or the paper's sweep with the robot's hand",
@@ -154,14 +154,6 @@ end
 
 local EMPTY_WINDOW = "Give these assets more friction, less density, or a larger collapse_strain or damage_strain."
 
--- True if all standard assets are in `found`.
-local function complete(found)
-  for _, name in ipairs(soft_assets) do
-    if not found[name] then return false end
-  end
-  return true
-end
-
 local function finish(rows, o)
   local files, text, found, problems = {}, {}, {}, {}
   local windows, dropped = former_windows()
@@ -178,7 +170,7 @@ local function finish(rows, o)
       table.concat(dropped, ", "))
   end
   files["scripts/calibrated.lua"] = library_of(windows)
-  if complete(found) then files["docs/calibration.md"] = calibration_page(soft_assets, found, o) end
+  if asset_names.has_all_soft(found) then files["docs/calibration.md"] = calibration_page(asset_names.soft, found, o) end
   local problem
   if #problems > 0 then
     problem = ("calibrate: %s\n%s Their files are written, without a window for experts."):format(table.concat(problems, "\n"), EMPTY_WINDOW)

@@ -6,13 +6,13 @@
 -- --part numerics repeats the sweep of the press with half of the step, at resolutions 6 and 12, and with the object at 0.9 and 1.1 of
 -- its size. --part ends runs trials with the robot's hand and the expert's lift, 5 % of the window inside and outside of each end.
 -- If all standard assets are checked in both parts, it writes docs/calibration_checks.md.
+local asset_names = require "asset_names"
 local hand = require "calibration.hand"
 local known = require "calibrated"
 local press = require "calibration.press"
-local soft_assets = require("asset_names").soft
 
 local opt = softvt.options {
-  asset = { default = soft_assets, help = "assets to check" },
+  asset = { default = asset_names.soft, help = "assets to check" },
   part = { default = { "numerics", "ends" }, choices = { "numerics", "ends" }, help = "what to check" },
   step_mm = { default = 0.5, unit = "mm", min = 0.04, max = 5, help = "numerics: step of the width, which is halved" },
   trials = { default = 100, integer = true, min = 1, max = 1000, help = "ends: hold trials at each side of each end" },
@@ -160,14 +160,6 @@ Trials with the robot's hand and the expert's lift, 5 % of the window inside and
 
 ]]
 
--- True if all standard assets are in `found`.
-local function complete(found)
-  for _, name in ipairs(soft_assets) do
-    if not found[name] then return false end
-  end
-  return true
-end
-
 return softvt.experiment {
   name = "check_calibration",
   options = opt,
@@ -177,7 +169,7 @@ return softvt.experiment {
     local found, text = by_asset(rows), {}
     if parts.numerics then text[#text + 1] = numerics_table(found, o.asset) end
     if parts.ends then text[#text + 1] = ends_table(found, o.asset) end
-    local is_page = parts.numerics and parts.ends and complete(found)
+    local is_page = parts.numerics and parts.ends and asset_names.has_all_soft(found)
     return {
       text = table.concat(text, "\n"), files = is_page and { ["docs/calibration_checks.md"] = HEAD .. text[1] .. ENDS .. text[2] } or {},
     }
