@@ -19,6 +19,7 @@ local calibration_page = require "calibration_page"
 local hand = require "calibration.hand"
 local known = require "calibrated"
 local press = require "calibration.press"
+local soft_asset = require "calibration.soft_asset"
 
 local PRESS, HAND = { sweep_protocol = "press" }, { sweep_protocol = "hand" }
 local opt = softvt.options {
@@ -37,11 +38,7 @@ local opt = softvt.options {
 
 -- Episodes use only files that were read when the plan was made, so every asset is required here.
 local assets = {}
-for _, name in ipairs(opt.asset) do
-  if assets[name] then error(("calibrate: --asset names %s twice"):format(name), 0) end
-  assets[name] = require("assets." .. name)
-  if tostring(assets[name].body) ~= "softvt.soft" then error(("calibrate: %s is not soft: only a body of softvt.soft deforms"):format(name), 0) end
-end
+for _, name in ipairs(opt.asset) do assets[name] = soft_asset("calibrate", name, assets) end
 
 -- The envelope of rows of the kinds "sweep", "hold" and "end" (why the sweep ended) of one asset.
 local function envelope(name, rows, o)
@@ -142,8 +139,8 @@ end
 local function warnings(name, found)
   local text = ""
   if found.censored then
-    local mend = found.stable_strain and "" or " State collapse_strain in its softvt.soft."
-    text = ("warning: the press of %s is censored: %s.%s\n"):format(name, found.censored, mend)
+    local remedy = found.stable_strain and "" or " State collapse_strain in its softvt.soft."
+    text = ("warning: the press of %s is censored: %s.%s\n"):format(name, found.censored, remedy)
   end
   if found.carried_d and found.tau and found.carried_d > found.tau then
     text = text .. ("warning: D of the carried %s exceeds τ at every width (%.3f %% at least). Carry it slowly (the hint carry_pace), or make it stiffer, lighter or, if it bends, shorter.\n"):format(
@@ -152,7 +149,12 @@ local function warnings(name, found)
   return text
 end
 
-local EMPTY_WINDOW = "Give these assets more friction, less density, or a larger collapse_strain or damage_strain."
+-- Why an asset has no window, from the first line of its envelope.
+local function problem_of(found)
+  local line = found.text:match "[^\n]*"
+  if found.censored then return ("%s (the press ended early: %s)"):format(line, found.censored) end
+  return line .. "; give it more friction, less density, or a larger collapse_strain or damage_strain"
+end
 
 local function finish(rows, o)
   local files, text, found, problems = {}, {}, {}, {}
@@ -163,7 +165,7 @@ local function finish(rows, o)
     files[at .. ".json"], files[at .. ".sweep.jsonl"], files[at .. ".svg"], files[at .. ".txt"] = one.json, one.sweep, one.plot, one.text
     found[name], windows[name] = one, window_of(one)
     text[#text + 1] = one.text .. three_kappas(one) .. warnings(name, one)
-    if not windows[name] then problems[#problems + 1] = one.text:match "[^\n]*" end
+    if not windows[name] then problems[#problems + 1] = problem_of(one) end
   end
   if #dropped > 0 then
     text[#text + 1] = ("warning: scripts/calibrated.lua had windows of an older version, which are left out: %s. Calibrate these too."):format(
@@ -173,7 +175,7 @@ local function finish(rows, o)
   if asset_names.has_all_soft(found) then files["docs/calibration.md"] = calibration_page(asset_names.soft, found, o) end
   local problem
   if #problems > 0 then
-    problem = ("calibrate: %s\n%s Their files are written, without a window for experts."):format(table.concat(problems, "\n"), EMPTY_WINDOW)
+    problem = ("calibrate: %s\nThe files are written, without windows of these assets for experts."):format(table.concat(problems, "\n"))
   end
   return { text = table.concat(text, "\n"), files = files, problem = problem }
 end
@@ -186,6 +188,6 @@ return softvt.experiment {
   finish = finish,
   columns = {
     "asset", "kind", "width_mm", "closure", "held", "trials", "d_peak_pct", "stable", "d_pct", "force_n", "strain_p95", "min_det_f", "node_speed_m_s",
-    "both_pads", "slip_mm",
+    "both_pads", "slip_mm", "ended",
   },
 }

@@ -9,8 +9,6 @@ and the *tight* end, at which D reaches τ, pressed on the table or carried. For
 peak of D while the object was lifted and held; an object with a carried D above τ cannot be carried safely, whatever the grip.
 [assets.md](assets.md) gives the strains with their sources, [calibration_checks.md](calibration_checks.md) how the results depend on step,
 resolution and size, and trials at the ends of the windows.
-
-
 ]]
 
 local TABLE = [[

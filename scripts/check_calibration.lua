@@ -10,26 +10,33 @@ local asset_names = require "asset_names"
 local hand = require "calibration.hand"
 local known = require "calibrated"
 local press = require "calibration.press"
+local soft_asset = require "calibration.soft_asset"
 
 local opt = softvt.options {
   asset = { default = asset_names.soft, help = "assets to check" },
-  part = { default = { "numerics", "ends" }, choices = { "numerics", "ends" }, help = "what to check" },
-  step_mm = { default = 0.5, unit = "mm", min = 0.04, max = 5, help = "numerics: step of the width, which is halved" },
-  trials = { default = 100, integer = true, min = 1, max = 1000, help = "ends: hold trials at each side of each end" },
+  part = { default = { "numerics", "ends" }, choices = { "numerics", "ends" }, help = "checks" },
+  step_mm = {
+    default = 0.5, unit = "mm", min = 0.04, max = 5, only_with = { part = "numerics" }, needs_out = true,
+    help = "step of the width, which is halved",
+  },
+  trials = {
+    default = 100, integer = true, min = 1, max = 1000, only_with = { part = "ends" }, needs_out = true,
+    help = "hold trials at each side of each end",
+  },
 }
-
 local parts = {}
 for _, part in ipairs(opt.part) do parts[part] = true end
 
 local assets, calibrations = {}, {}
 for _, name in ipairs(opt.asset) do
-  if assets[name] then error(("check_calibration: --asset names %s twice"):format(name), 0) end
-  assets[name] = require("assets." .. name)
-  if tostring(assets[name].body) ~= "softvt.soft" then error(("check_calibration: %s is not soft"):format(name), 0) end
-  calibrations[name] = softvt.calibration(name)
-  if parts.ends and not (calibrations[name] and known[name] and known[name].carried) then
-    error(("check_calibration: %s has no calibrated window, or one of an older version; run softvt scripts/calibrate.lua --asset %s first"):format(
-      name, name), 0)
+  assets[name], calibrations[name] = soft_asset("check_calibration", name, assets), softvt.calibration(name)
+  if parts.ends then
+    local found = calibrations[name]
+    local is_present = found and found.table.fingerprints and found.table.fingerprints[name] == softvt.fingerprint(assets[name])
+    if not (is_present and known[name] and known[name].carried) then
+      error(("check_calibration: %s has no calibrated window, or one of another shape, material, friction or version; run softvt scripts/calibrate.lua --asset %s first"):format(
+        name, name), 0)
+    end
   end
 end
 
@@ -54,19 +61,29 @@ local function numerics(point, o)
   return { asset = point.asset, check = change.name, d_ref_pct = found.d_ref, censored = found.censored }
 end
 
+-- Force per pad (N) at a width (mm) in the sweep of the press, whose rows are by decreasing width; 0 before contact.
+local function force_at(sweep, width_mm)
+  for k = 2, #sweep do
+    local wide, narrow = sweep[k - 1], sweep[k]
+    if wide.width_mm >= width_mm and narrow.width_mm <= width_mm then
+      local share = (wide.width_mm - width_mm) / (wide.width_mm - narrow.width_mm)
+      return wide.force_n + share * (narrow.force_n - wide.force_n)
+    end
+  end
+  return 0
+end
+
 -- A batch of trials at an end of the window: a share of the window inside of it, or outside.
 local function ends(point)
-  local window = known[point.asset]
+  local name, window = point.asset, known[point.asset]
   local inward = (point.at == "loose" and 1 or -1) * (point.side == "inside" and END_SHARE or -END_SHARE)
   local along = (point.at == "loose" and 0 or 1) + inward
-  local grip = {
-    width = window.width_lower + along * (window.width_at_tau - window.width_lower),
-    force = math.max(0, window.force_lower + along * (window.force_at_tau - window.force_lower)),
-  }
-  local held, d_peak_pct = hand.trials(assets[point.asset], grip, point.first, point.last, HOLD_S)
+  local width = window.width_lower + along * (window.width_at_tau - window.width_lower)
+  local grip = { width = width, force = force_at(calibrations[name].table.envelopes[name].sweep, 1e3 * width) }
+  local held, d_peak_pct, width_mm = hand.trials(assets[name], grip, point.first, point.last, HOLD_S)
   return {
-    asset = point.asset, check = point.at .. "_" .. point.side, width_mm = 1e3 * grip.width, trials = point.last - point.first + 1,
-    held = held, d_peak_pct = d_peak_pct,
+    asset = name, check = point.at .. "_" .. point.side, width_mm = width_mm, trials = point.last - point.first + 1, held = held,
+    d_peak_pct = d_peak_pct,
   }
 end
 
@@ -109,9 +126,9 @@ end
 
 -- Change of D_ref from one row to another, %.
 local function change_of(from, to)
-  if not (from.d_ref_pct and to.d_ref_pct) then return "–" end
+  if not (from.d_ref_pct and to.d_ref_pct) then return "no D_ref: " .. (from.censored or to.censored or "") end
   local text = ("%+.1f"):format(100 * (to.d_ref_pct / from.d_ref_pct - 1)):gsub("^[+-]0%.0$", "0.0")
-  return text .. (to.censored and " (censored)" or "")
+  return text .. ((from.censored or to.censored) and " (censored)" or "")
 end
 
 local function numerics_table(found, names)
@@ -147,7 +164,7 @@ Generated by `softvt scripts/check_calibration.lua`.
 
 ## Numerical parameters
 
-Change of D_ref, and so of τ, with half of the step of the width; from resolution 6 to 12; and with the object at 0.9 and 1.1 of its size.
+Change of D_ref, and so of τ, with half of the step of the width of %g mm; from resolution 6 to 12; and with the object at 0.9 and 1.1 of its size.
 The resolution is the number of voxels along the longest edge, so that 6 are few across a long object; each asset is judged at its own. The
 pads keep their size, so that they cover more of a smaller object.
 
@@ -156,7 +173,8 @@ local ENDS = [[
 
 ## Ends of the window
 
-Trials with the robot's hand and the expert's lift, 5 % of the window inside and outside of each end.
+Trials with the robot's hand and the expert's lift, 5 % of the window inside and outside of each end. The hand is commanded to the width
+and force of the press there.
 
 ]]
 
@@ -171,7 +189,7 @@ return softvt.experiment {
     if parts.ends then text[#text + 1] = ends_table(found, o.asset) end
     local is_page = parts.numerics and parts.ends and asset_names.has_all_soft(found)
     return {
-      text = table.concat(text, "\n"), files = is_page and { ["docs/calibration_checks.md"] = HEAD .. text[1] .. ENDS .. text[2] } or {},
+      text = table.concat(text, "\n"), files = is_page and { ["docs/calibration_checks.md"] = HEAD:format(o.step_mm) .. text[1] .. ENDS .. text[2] } or {},
     }
   end,
   columns = { "asset", "check", "d_ref_pct", "censored", "width_mm", "trials", "held", "d_peak_pct" },

@@ -72,15 +72,16 @@ local function hold_trial(asset, closure, k, how, hold_s)
   return { held = ok and slip <= trial.SLIP_MM, slip_mm = slip, d_peak_pct = sim:measure "object".d_peak_pct, width_mm = width_mm }
 end
 
--- Trials `first` to `last` of a grip { width, force } with the expert's lift. Returns how many held, and the largest peak D, %.
+-- Trials `first` to `last` of a grip { width, force } with the expert's lift. Returns the number that held, the largest peak D (%) and the
+-- mean width of the gels (mm).
 function hand.trials(asset, grip, first, last, hold_s)
-  local closure, held, d_peak_pct = grasp.command(grip), 0, 0
+  local closure, held, d_peak_pct, width_mm = grasp.command(grip), 0, 0, 0
   for k = first, last do
     local result = hold_trial(asset, closure, k, EXPERT, hold_s)
     if result.held then held = held + 1 end
-    d_peak_pct = math.max(d_peak_pct, result.d_peak_pct)
+    d_peak_pct, width_mm = math.max(d_peak_pct, result.d_peak_pct), width_mm + result.width_mm / (last - first + 1)
   end
-  return held, d_peak_pct
+  return held, d_peak_pct, width_mm
 end
 
 -- Hold trials from loose to tight in steps of `step` of the closure; the paper's scan for the lower bound.

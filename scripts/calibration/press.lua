@@ -108,21 +108,22 @@ function Bench:slip_mm() return math.max(self.body:travel(self.pads[1].solid), s
 
 function Bench:both_touch() return math.min(self:force(1), self:force(2)) > trial.CONTACT_N end
 
--- A settled object between open pads, displaced by `offset` (m) from the expert's grasp, or nil and why there is none. `change` has
--- the fields scale and resolution, both optional.
+-- A settled object between open pads, displaced by `offset` (m) from the expert's grasp. Returns the bench, or nil and the reason why the
+-- object cannot be pressed; then the stable strain of its material. `change` has the fields scale and resolution, both optional.
 function press.bench(asset, change, offset)
   local made = instance(asset, change or {})
   local object = made.object
   local world = softvt.world { sleeping = false }
   world:static { name = "table", shape = softvt.shape.box { size = { 1, 1, 0.1 } }, friction = table_top.friction, position = { 0, 0, -0.05 } }
-  local problem = grasp.problem(object)
-  if problem then return nil, "it " .. problem end
+  local body = world:soft { name = asset.name, shape = made.shape, body = made.body, friction = made.friction, position = made.position }
+  local problem, stable_strain = grasp.problem(object), body:stable_strain()
+  if problem then return nil, "it " .. problem, stable_strain end
   local yaw = grasp.hand_yaw(object)
   local bench = setmetatable({
     world = world, dt = world:dt(), object = object, min_det_f = math.huge, pads = {},
     width = grasp.width(object) + 2 * CLEARANCE, rise = 0, axis = { -math.sin(yaw), math.cos(yaw) },
     at = grasp.pose(object, grasp.height(object), offset).position,
-    body = world:soft { name = asset.name, shape = made.shape, body = made.body, friction = made.friction, position = made.position },
+    body = body,
   }, Bench)
   for index, side in ipairs { -1, 1 } do
     local facing = yaw - side * math.pi / 2
@@ -131,9 +132,11 @@ function press.bench(asset, change, offset)
   end
   bench:place(bench.width, 0)
   local _, rests = bench:rest(SETTLE_SPEED, SETTLE_S)
-  if not rests then return nil, "it does not come to rest on the table" .. (bench.problem and ": " .. bench.problem or "") end
+  if not rests then
+    return nil, "it does not come to rest between the open pads" .. (bench.problem and ": " .. bench.problem or ""), stable_strain
+  end
   bench.body:set_reference "now"
-  return bench
+  return bench, nil, stable_strain
 end
 
 -- One row of the sweep: closes to `width` (m) and waits for rest. Returns nil if the physics failed.
@@ -161,10 +164,10 @@ end
 -- Presses from first contact inward in steps of `step` (m) until the 95th percentile of the strain has reached the stable strain,
 -- or the press is no longer stable. Returns { rows, stable_strain, ended }: `ended` says why the sweep ended if the rows do not tell.
 function press.sweep(asset, step, change)
-  local bench, problem = press.bench(asset, change)
-  if not bench then return { rows = {}, ended = problem } end
-  local sweep = { rows = {}, stable_strain = bench.body:stable_strain() }
-  local rows, touched, width = sweep.rows, false, nil
+  local bench, problem, stable_strain = press.bench(asset, change)
+  local sweep = { rows = {}, stable_strain = stable_strain, ended = problem }
+  if not bench then return sweep end
+  local rows, width, index = sweep.rows, nil, nil
   width, sweep.ended = find_contact(bench, CONTACT_STEP)
   while width and width > 0 do
     local row = squeeze(bench, width)
@@ -173,11 +176,11 @@ function press.sweep(asset, step, change)
       return sweep
     end
     rows[#rows + 1] = row
-    if not row.stable and (touched or #rows >= UNSTABLE) then return sweep end
-    touched = touched or row.stable
+    if not row.stable and (index or #rows >= UNSTABLE) then return sweep end
     if sweep.stable_strain and row.strain_p95 >= sweep.stable_strain then return sweep end
     -- Once both pads touch at rest, widths are multiples of the step.
-    width = rounded(touched and (math.ceil(width / step - 1e-6) - 1) * step or width - CONTACT_STEP)
+    if index or row.stable then index = (index or math.ceil(width / step - 1e-6)) - 1 end
+    width = rounded(index and index * step or width - CONTACT_STEP)
   end
   sweep.ended = sweep.ended or "the pads have met"
   return sweep
@@ -236,6 +239,7 @@ function press.loose_end(asset, narrow, wide, narrowest, within, change)
   end
   while wide - narrow > within do
     local middle = rounded(0.5 * (wide + narrow))
+    if middle == wide or middle == narrow then break end
     if all_hold(middle) then narrow = middle else wide = middle end
   end
   return rows

@@ -135,16 +135,17 @@ end
 -- The command for the middle of the safe window.
 function grasp.closure(object) return grasp.command(grasp.target(object, 0.5)) end
 
--- The closure at which each gel is `clearance` (m, default 4 mm) away from the object, for approach and release.
-function grasp.clear_closure(object, clearance)
-  return math.max(0, 1 - (grasp.width(object) + 2 * (clearance or 0.004)) / STROKE)
+-- The closure at which each gel is `clearance` (m, default 4 mm) away from the object, for approach and release. `width` (m, default
+-- that of a nominal grasp) is the distance of the gels at first contact.
+function grasp.clear_closure(object, clearance, width)
+  return math.max(0, 1 - ((width or grasp.width(object)) + 2 * (clearance or 0.004)) / STROKE)
 end
 
--- Rotations of the hand to try, best first, rad: around the narrow side, or all around a round object.
+-- Rotations of the hand to try, rad: around the shorter side, or all around a square or round object.
 local function grasp_rotations(object)
   local list = { 0 }
   local long, short = grasp.sides(object)
-  -- A box rotated by more would be wider than the gripper opens.
+  -- A longer box rotated by more would be wider than the gripper opens.
   local most = long < 1.1 * short and math.pi / 2 or math.rad(15)
   for k = 1, math.floor(most / STEP + 1e-9) do
     list[#list + 1], list[#list + 2] = k * STEP, -k * STEP
@@ -152,7 +153,13 @@ local function grasp_rotations(object)
   return list
 end
 
--- Candidate grasp poses, best first: { pose, cost, turn }. `turn` is the rotation of the hand from across the shorter side, rad.
+-- Cost of a rotation: least along or across the object, since the hand grasps the edges of a square object in between.
+local function turn_cost(turn)
+  local off = math.abs(turn)
+  return 0.5 * off + 3 * math.min(off, math.pi / 2 - off)
+end
+
+-- Candidate grasps: { pose, is_nominal, cost }. A nominal grasp is where the calibration presses: at the centre, across the shorter side.
 local function candidates(object, height, offset)
   local list, hints = {}, object.hints
   if hints.grasp_rim_m then
@@ -165,9 +172,8 @@ local function candidates(object, height, offset)
       -- The side of the rim that is nearer to the robot is reached with the arm less stretched.
       local stretch = 8 * (x - object.centre[1])
       for _, up in ipairs { 0, 0.003, 0.006 } do
-        list[#list + 1] = {
-          pose = softvt.pose { position = { x, y, bottom + height + up }, yaw = yaw }, cost = math.abs(yaw) + stretch + 300 * up, turn = 0,
-        }
+        local pose = softvt.pose { position = { x, y, bottom + height + up }, yaw = yaw }
+        list[#list + 1] = { pose = pose, is_nominal = true, cost = math.abs(yaw) + stretch + 300 * up }
       end
     end
   else
@@ -177,7 +183,10 @@ local function candidates(object, height, offset)
     for _, along in ipairs { 0, slack, -slack } do
       for _, turn in ipairs(grasp_rotations(object)) do
         local at = { (offset and offset[1] or 0) + along * math.cos(yaw), (offset and offset[2] or 0) + along * math.sin(yaw) }
-        list[#list + 1] = { pose = grasp.pose(object, height, at, turn), cost = 2 * math.abs(turn) + 100 * math.abs(along), turn = turn }
+        list[#list + 1] = {
+          pose = grasp.pose(object, height, at, turn), is_nominal = turn == 0 and along == 0,
+          cost = turn_cost(turn) + 100 * math.abs(along),
+        }
       end
       if slack < 0.005 then break end
     end
@@ -187,35 +196,48 @@ end
 
 -- Closes on an object as a person would: fast to a clearance at which nothing is touched, then slowly to the grip. `options`:
 -- closing_speed (m/s, of the width), stop ("width": at the measured width of the grip; "touch": when both pads press with its
--- force) and closure (a command instead of a grip).
+-- force), closure (a command instead of a grip) and width (distance of the gels at first contact, m).
 function grasp.close(arm, object, grip, options)
   local rate = options.closing_speed / STROKE
-  arm:close_to(math.max(arm.closure, grasp.clear_closure(object, CONTACT_CLEARANCE)), { rate = FAST_RATE })
+  arm:close_to(math.max(arm.closure, grasp.clear_closure(object, CONTACT_CLEARANCE, options.width)), { rate = FAST_RATE })
   if options.closure then return arm:grasp(options.closure, { rate = rate }) end
   local most = grasp.command(grip)
   if grip.force == 0 then return arm:grasp(most, { rate = rate }) end
-  -- The stop follows what is measured. The command is bounded, should the object give way or a pad miss it.
+  -- The command is bounded, in case the object yields or a pad misses it.
   most = math.min(1, most + COMMAND_MARGIN / STROKE)
   if options.stop == "touch" then return arm:grasp(most, { rate = rate, force = grip.force }) end
   arm:grasp(most, { rate = rate, width = grip.width })
 end
 
--- Returns the best grasp: its pose, its `turn` from across the shorter side (rad), the closure during the approach (as open as
--- possible) and the clearance of the fingers (m), negative if the hand would touch something. No other object may be between the fingers as they close: a
--- finger outside a drawer's front would pull the drawer along.
+-- Distance of the gels at first contact in a grasp that is not nominal, m: the open hand can close by its clearance from the object on
+-- each side.
+local function contact_width(scene, object, pose)
+  local others = {}
+  for _, other in ipairs(scene:objects()) do
+    if other.name ~= object.name then others[#others + 1] = other.name end
+  end
+  return STROKE - 2 * math.max(0, (scene:clearance(pose, { width = STROKE, ignore = others })))
+end
+
+-- Returns the best grasp: { pose, width, is_nominal, closure, clearance }. `width` is the distance of the gels at first contact (m),
+-- `closure` that of the approach, as open as possible, and `clearance` that of the fingers (m), negative if the hand would touch
+-- something. No other object may be between the fingers as they close: a finger outside a drawer's front would pull the drawer along.
 function grasp.choose(scene, object, height, offset)
   local best
   local ignore = object.hints.grasp_rim_m and {} or { object.name }
-  -- Narrowest opening first: the clearance of a closing motion is that of its narrowest point.
-  local openings = { grasp.clear_closure(object, 0.005), grasp.clear_closure(object, 0.010), 0 }
   for _, candidate in ipairs(candidates(object, height, offset)) do
-    local clearance = math.huge
+    local pose, clearance = candidate.pose, math.huge
+    local width = candidate.is_nominal and grasp.width(object) or contact_width(scene, object, pose)
+    -- Narrowest opening first: the clearance of a closing motion is that of its narrowest point.
+    local openings = { grasp.clear_closure(object, 0.005, width), grasp.clear_closure(object, 0.010, width), 0 }
     for _, opening in ipairs(openings) do
-      clearance = math.min(clearance, (scene:clearance(candidate.pose, { width = STROKE * (1 - opening), ignore = ignore })))
+      clearance = math.min(clearance, (scene:clearance(pose, { width = STROKE * (1 - opening), ignore = ignore })))
       -- Clearance beyond the required one has no value.
       local score = math.min(clearance, FINGER_CLEARANCE) * 1e3 - 0.1 * candidate.cost - opening
       if not best or score > best.score then
-        best = { pose = candidate.pose, turn = candidate.turn, closure = opening, clearance = clearance, score = score }
+        best = {
+          pose = pose, width = width, is_nominal = candidate.is_nominal, closure = opening, clearance = clearance, score = score,
+        }
       end
     end
   end

@@ -4,8 +4,8 @@
 --
 -- The grip is drawn uniformly from the middle of the safe window (`window`, 0.8 of it), so that demonstrations do not tell one width
 -- per object. The hand closes slowly from before first contact (`closing_speed`, 0.008 m/s). `stop = "touch"` ends closing by the force
--- on the pads instead of the width of the gels; a hand that is turned from across the shorter side always stops by force. `closure`
--- commands one closure instead.
+-- on the pads instead of the width of the gels, as does a grasp that is turned or off-centre for want of clearance. `closure` commands
+-- one closure instead.
 local grasp = require "experts.grasp"
 local route = require "experts.route"
 local fixed_closure = require "experts.fixed_closure"
@@ -27,13 +27,13 @@ local SPEED_SPREAD, GRASP_SPREAD = 0.12, 0.0015
 
 local function spread(most) return (2 * math.random() - 1) * most end
 
--- Grasps the object and lifts it off its support. Returns true and the grasp height (m), or false and the reason.
+-- Grasps the object and lifts it off its support. Returns the grasp { height, width } (m), or nil and the reason.
 local function pick(arm, scene, spec, pace, share)
   local object = scene:object(spec.object)
   local height = grasp.height(object)
   local chosen = grasp.choose(scene, object, height, { spread(GRASP_SPREAD), spread(GRASP_SPREAD) })
   local at, opening = chosen.pose, chosen.closure
-  if chosen.clearance < 0 then return false, "leaves no clearance for the hand" end
+  if chosen.clearance < 0 then return nil, "leaves no clearance for the hand" end
   local over = route.approach_height(scene, arm.pose.position, at, 0.05, FINGER_CLEARANCE)
   arm:move_to(arm.target:at { arm.target.x, arm.target.y, math.max(over, arm.target.z) }, { speed = 0.4 * pace })
   arm:move_to(at:at { at.x, at.y, over }, { speed = 0.4 * pace, closure = opening })
@@ -41,15 +41,15 @@ local function pick(arm, scene, spec, pace, share)
   arm:wait(0.1)
   local before = scene:object(spec.object).centre[3]
   local grip = grasp.target(object, share)
-  -- The width of a grip is that across the shorter side; a hand that is turned from it stops by force.
-  local stop = chosen.turn == 0 and spec.stop or "touch"
-  grasp.close(arm, object, grip, { closing_speed = spec.closing_speed, stop = stop, closure = spec.closure })
+  -- The width of a grip is that where the calibration presses; elsewhere the hand stops by force.
+  local stop = chosen.is_nominal and spec.stop or "touch"
+  grasp.close(arm, object, grip, { closing_speed = spec.closing_speed, stop = stop, closure = spec.closure, width = chosen.width })
   arm:wait(0.3)
   arm:note("grip_width_mm", 1e3 * arm.width)
   -- Straight up first.
   arm:move_by({ 0, 0, 0.05 }, { speed = 0.2 * pace * grasp.carry_pace(object) })
-  if scene:object(spec.object).centre[3] - before > MIN_LIFT_FRACTION * 0.05 then return true, height end
-  return false, "was not lifted by the grasp"
+  if scene:object(spec.object).centre[3] - before > MIN_LIFT_FRACTION * 0.05 then return { height = height, width = chosen.width } end
+  return nil, "was not lifted by the grasp"
 end
 
 -- Rotations of the hand for placing, smallest first, rad.
@@ -66,10 +66,10 @@ local function place_rotations(object, target)
 end
 
 -- The release pose: the object above the centre of the target, as low as the clearance of the hand allows.
-local function release_pose(arm, scene, spec, height)
+local function release_pose(arm, scene, spec, held)
   local object, target = scene:object(spec.object), scene:object(spec.target)
-  local surface = grasp.bottom(target) + (target.hints.surface_m or target.size[3]) + height + RELEASE_HEIGHT
-  local width = 0.08 * (1 - grasp.clear_closure(object))
+  local surface = grasp.bottom(target) + (target.hints.surface_m or target.size[3]) + held.height + RELEASE_HEIGHT
+  local width = 0.08 * (1 - grasp.clear_closure(object, nil, held.width))
   -- The object's offset from the tool rotates with the hand.
   local dx, dy = object.centre[1] - arm.pose.x, object.centre[2] - arm.pose.y
   local best, rotations = nil, place_rotations(object, target)
@@ -93,18 +93,19 @@ local function with_fixed_closure(spec, arm, scene)
   return full
 end
 
-local function place(arm, scene, spec, height, pace)
+-- Carries the object of a grasp { height, width } to the target and releases it there.
+local function place(arm, scene, spec, held, pace)
   local object = scene:object(spec.object)
   pace = pace * grasp.carry_pace(object)
-  local target_pose = release_pose(arm, scene, spec, height)
-  local carried = { object = object, below = height }
+  local target_pose = release_pose(arm, scene, spec, held)
+  local carried = { object = object, below = held.height }
   local over = math.max(target_pose.z + 0.03, route.carry_height(scene, arm.pose.position, target_pose.position, carried, CARRY_CLEARANCE))
   arm:move_to(arm.target:at { arm.target.x, arm.target.y, math.max(over, arm.target.z) }, { speed = 0.25 * pace })
   arm:move_to(target_pose:at { target_pose.x, target_pose.y, over }, { speed = 0.4 * pace })
   arm:move_to(target_pose, { speed = 0.2 * pace })
   arm:wait(0.2)
   -- Opens only as far as needed, since a rim or a wall may be close.
-  arm:release { closure = grasp.clear_closure(object), rate = 0.4 }
+  arm:release { closure = grasp.clear_closure(object, nil, held.width), rate = 0.4 }
   arm:wait(0.1)
   arm:move_by({ 0, 0, math.max(0.08, over - target_pose.z) }, { speed = 0.25 * pace })
 end
@@ -142,9 +143,9 @@ return function(spec)
       if moved > MAX_DISPLACEMENT then
         arm:give_up(("%s has moved by %.0f mm; grasping it again is not attempted"):format(spec.object, 1e3 * moved))
       end
-      local held, result = pick(arm, scene, spec, pace, share)
-      if held then return place(arm, scene, spec, result, pace) end
-      reason = result
+      local held
+      held, reason = pick(arm, scene, spec, pace, share)
+      if held then return place(arm, scene, spec, held, pace) end
       -- Release, retreat and try again.
       arm:open()
       arm:move_by({ 0, 0, 0.03 }, { speed = 0.25 })

@@ -90,7 +90,7 @@ fn with_script_options(
     let flags = command.get_arguments().filter_map(|arg| arg.get_long()).map(str::to_owned);
     let reserved: Vec<String> = flags.chain(["help".into(), "version".into()]).collect();
     for option in options {
-        let arg = script_arg(option, &option.condition(options));
+        let arg = script_arg(option, &option.help(options));
         if let Some(long) = arg.get_long().filter(|long| reserved.iter().any(|flag| flag == long)) {
             return Err(CliError::input(format!(
                 "the script declares the option --{long}, which is a flag of softvt; rename it"
@@ -114,14 +114,14 @@ fn script_arg_id(option: &OptionSpec) -> String {
     format!("{SCRIPT_ARG}{}", option.name)
 }
 
-fn script_arg(option: &OptionSpec, condition: &str) -> Arg {
+fn script_arg(option: &OptionSpec, help: &str) -> Arg {
     let default = match &option.default {
         OptionValue::Text(text) => format!("{text:?}"),
         other => other.to_string(),
     };
     let arg = Arg::new(script_arg_id(option))
         .long(option.flag().trim_start_matches("--").to_owned())
-        .help(format!("{}{condition} [{}; default {default}]", option.help, option.expects()))
+        .help(format!("{help} [{}; default {default}]", option.expects()))
         .help_heading("Options of the script");
     match option.default {
         OptionValue::Flag(_) => {

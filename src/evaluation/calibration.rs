@@ -58,7 +58,7 @@ pub struct HoldRow {
 }
 
 impl HoldRow {
-    fn all_held(&self) -> bool {
+    pub(crate) fn all_held(&self) -> bool {
         self.trials > 0 && self.held == self.trials
     }
 }

@@ -51,12 +51,19 @@ fn window_line(envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
             newton(window.force_lower_n),
             newton(window.force_at_tau_n)
         ),
+        (Some(lower), Some(tight_mm), None) if lower > tight_mm => format!(
+            "no safe window: {loose}, and {tight}; {:.3} mm are less than the accuracy of its ends",
+            lower - tight_mm
+        ),
         _ => format!("no safe window: {loose}, and {tight}"),
     }
 }
 
 fn limit_line(envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
-    let Some(limit) = limit else { return "no τ: no squeeze was stable".to_owned() };
+    let Some(limit) = limit else {
+        let is_stable = envelope.sweep.iter().any(|row| row.stable);
+        return if is_stable { "no τ: D_ref is unknown" } else { "no τ: no squeeze was stable" }.to_owned();
+    };
     let DeformationLimit { d_ref_pct, kappa } = limit;
     let at = envelope.width_at_d_ref_mm.map_or_else(String::new, |width| format!(" at {width:.2} mm"));
     format!("τ {:.3} % of the diagonal = {kappa} × D_ref; D_ref {d_ref_pct:.3} %{at}", limit.tau_pct())
@@ -70,7 +77,8 @@ fn end_line(envelope: &Envelope) -> String {
         }
         (Protocol::Press, None, None) => "pressed to the end of the sweep".to_owned(),
         (Protocol::Press, Some(reason), _) => {
-            format!("censored: the press ended early ({reason}), so D_ref is a lower bound")
+            let bound = if envelope.d_ref_pct.is_some() { ", so D_ref is a lower bound" } else { "" };
+            format!("censored: the press ended early ({reason}){bound}")
         }
     }
 }
@@ -109,7 +117,9 @@ pub fn plot(asset: &str, envelope: &Envelope, limit: Option<DeformationLimit>) -
     if widest < narrowest {
         return format!("{head}{}</svg>\n", text(LEFT, TOP, "start", &format!("{asset}: no rows")));
     }
-    let d_max = rows.iter().map(|row| row.d_pct).fold(0.0, f64::max).max(limit.map_or(0.0, |l| l.d_ref_pct));
+    let held = envelope.holds.iter().filter(|row| row.all_held()).filter_map(|row| row.d_peak_pct);
+    let d_max = rows.iter().map(|row| row.d_pct).chain(held).fold(0.0, f64::max);
+    let d_max = d_max.max(limit.map_or(0.0, |limit| limit.d_ref_pct));
     let widest = if widest > narrowest { widest } else { widest + 1.0 };
     let axes = Axes { widest, narrowest, top: 1.05 * d_max.max(1e-9) };
     let trials = if has_carried(envelope) { "; diamonds: lifted and held" } else { "" };
@@ -194,11 +204,11 @@ fn has_carried(envelope: &Envelope) -> bool {
     envelope.holds.iter().any(|row| row.d_peak_pct.is_some())
 }
 
-/// Peak D of the hold trials. Those beyond the axes are left out.
+/// Peak D of the hold trials. Failed ones beyond the axes are left out.
 fn carried(axes: &Axes, holds: &[HoldRow]) -> String {
     let marks = holds.iter().filter_map(|row| {
         let d_pct = row.d_peak_pct.filter(|d| *d <= axes.top && row.width_mm <= axes.widest)?;
-        let fill = if row.trials > 0 && row.held == row.trials { "#c07020" } else { "white" };
+        let fill = if row.all_held() { "#c07020" } else { "white" };
         let (x, y) = (axes.x(row.width_mm), axes.y(d_pct));
         let (left, right, top, bottom) = (x - 4.0, x + 4.0, y - 4.0, y + 4.0);
         Some(format!(
@@ -224,7 +234,10 @@ fn window_ends(axes: &Axes, envelope: &Envelope) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::calibration::{Scans, tests::scans};
+    use super::super::calibration::{
+        Scans,
+        tests::{hold, scans},
+    };
     use super::*;
 
     fn shown(scans: Scans) -> (String, String) {
@@ -247,6 +260,16 @@ mod tests {
         let (heavy, svg) = shown(heavy);
         assert!(heavy.contains("carried object exceeds τ at every width (1.600 % at least)"), "{heavy}");
         assert_eq!(svg.matches("<polygon").count(), 4, "every hold trial is plotted");
+        let mut bending = scans(48.0);
+        bending
+            .holds
+            .iter_mut()
+            .for_each(|row| row.d_peak_pct = Some(if row.all_held() { 9.0 } else { 99.0 }));
+        let held = bending.holds.iter().filter(|row| row.all_held()).count();
+        let (_, svg) = shown(bending);
+        assert_eq!(svg.matches("<polygon").count(), held, "the axes reach to all that held");
+        let (narrow, _) = shown(Scans { holds: vec![hold(47.01, 5), hold(48.0, 2)], ..scans(48.0) });
+        assert!(narrow.contains("47.00 mm; 0.010 mm are less than the accuracy of its ends"), "{narrow}");
         let (untried, _) = shown(Scans { holds: vec![], ..scans(48.0) });
         assert!(untried.contains("no safe window: no hold trial was run, and D passes τ"), "{untried}");
         let (empty, _) = shown(scans(46.0));

@@ -76,9 +76,9 @@ fn assets_without_a_window_are_told_with_the_files_of_all_assets() {
     for part in [
         "brick: no safe window: ",
         ", and D passes τ at ",
-        "wide: no safe window: no hold trial was run, and there is no τ",
-        "sagging: no safe window: no hold trial was run",
-        "Give these assets more friction",
+        "give it more friction",
+        "wide: no safe window: no hold trial was run, and there is no τ (the press ended early: it is 91 mm wide",
+        "sagging: no safe window: no hold trial was run, and there is no τ (the press ended early: 5 % of the volume",
     ] {
         assert!(message.contains(part), "{part}: {message}");
     }
@@ -96,6 +96,7 @@ fn assets_without_a_window_are_told_with_the_files_of_all_assets() {
         "{}",
         reason("sagging")
     );
+    assert!(!project.text("assets/calibration/wide.txt").contains("lower bound"));
     let windows = project.text("scripts/calibrated.lua");
     assert!(windows.contains("sound = {") && !windows.contains("brick = {") && !windows.contains("wide = {"));
 }
@@ -109,8 +110,8 @@ fn windows_of_an_older_version_are_left_out() {
     assert!(output.out.contains("windows of an older version, which are left out: cube"), "{}", output.out);
     assert!(!project.text("scripts/calibrated.lua").contains("cube = "));
     project.write("scripts/calibrated.lua", old.as_bytes());
-    let message = project.refusal("scripts/check_calibration.lua --asset cube --part ends --trials 1");
-    assert!(message.contains("cube has no calibrated window, or one of an older version"), "{message}");
+    let message = project.refusal("scripts/check_calibration.lua --asset cube --part ends --out checked");
+    assert!(message.contains("cube has no calibrated window, or one of another shape"), "{message}");
 }
 
 #[test]
@@ -127,6 +128,47 @@ fn the_place_of_the_shape_and_the_step_of_the_physics_do_not_change_the_limit() 
     assert!((limit(":grounded():translate(0.006, 0.004, 0)", "") / nominal - 1.0).abs() < 1e-3);
     let fine = limit(":grounded()", "--set physics.dt=0.01");
     assert!((fine / nominal - 1.0).abs() < 0.02, "{fine} and {nominal}");
+}
+
+#[test]
+fn any_step_and_accuracy_end_a_calibration() {
+    // Widths are multiples of 0.01 mm, which these are not.
+    let project = brick("collapse_strain = 0.05");
+    for words in ["--step-mm 0.125 --within-mm 0.5", "--step-mm 0.333 --within-mm 0.01"] {
+        project.succeeds(&format!("scripts/calibrate.lua --asset brick {words} --out run{}", words.len()));
+    }
+}
+
+#[test]
+fn a_calibration_is_checked_for_the_object_that_was_calibrated() {
+    let project = brick("collapse_strain = 0.12");
+    project.succeeds(QUICK);
+    let check = "scripts/check_calibration.lua --asset brick --trials 1 --step-mm 1";
+    let out = project.succeeds(&format!("{check} --out checked --json")).out;
+    let rows: Vec<serde_json::Value> =
+        out.lines().map(|line| serde_json::from_str(line).expect("a row")).collect();
+    let row = |check: &str| {
+        rows.iter().find(|row| row["check"] == check).unwrap_or_else(|| panic!("{check}: {out}"))
+    };
+    let d_ref = |check: &str| row(check)["d_ref_pct"].as_f64().expect("D_ref");
+    assert!((d_ref("half_step") / d_ref("nominal") - 1.0).abs() < 0.05);
+    assert_ne!(d_ref("resolution_6"), d_ref("resolution_12"));
+    assert_eq!((&row("loose_outside")["held"], &row("tight_inside")["held"]), (&0.into(), &1.into()));
+    for (words, part) in [
+        ("--part numerics --trials 3", "--trials does nothing with --part numerics"),
+        ("--part ends --step-mm 2", "--step-mm does nothing with --part ends"),
+        ("--trials 3", "--trials 3: give --out DIR"),
+    ] {
+        let message = project.refusal(&format!("scripts/check_calibration.lua --asset brick {words}"));
+        assert!(message.contains(part), "{words}: {message}");
+    }
+    let softer = project.text("assets/brick.lua").replace("4e4", "1e4");
+    project.write("assets/brick.lua", softer.as_bytes());
+    let message = project.refusal(&format!("{check} --out stale"));
+    assert!(
+        message.contains("brick has no calibrated window, or one of another shape, material"),
+        "{message}"
+    );
 }
 
 #[test]

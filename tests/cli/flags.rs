@@ -129,6 +129,19 @@ fn an_option_of_a_script_acts_or_is_refused() {
     assert!(help.contains("pause, only with --mode slow"), "{help}");
     let wrong = project.refusal("y.lua");
     assert!(wrong.contains("options.wait_s.only_with: speed is not an option of the script"), "{wrong}");
+    let listed = |words: &str| {
+        let text = "local opt = softvt.options { n = { default = 4, integer = true }, part = { default = { 'a', 'b' }, choices = { 'a', 'b' } }, \
+                    with_n = { default = 1, only_with = { n = 4 } }, with_b = { default = 1, only_with = { part = 'b' } } }\n\
+                    return softvt.experiment { name = 'e', options = opt, grid = { x = { 1 } }, run = function() return { x = 1 } end }\n";
+        Project::new(&[("z.lua", text)]).softvt(&format!("z.lua {words}"))
+    };
+    for (words, code) in
+        [("--with-n 2", 0), ("--with-n 2 --n 5", 2), ("--with-b 2", 0), ("--with-b 2 --part a", 2)]
+    {
+        assert_eq!(listed(words).code, code, "{words}: {}", listed(words).err);
+    }
+    let misspelt = Project::new(&[("x.lua", &declared("mode = 'slwo'"))]).refusal("x.lua");
+    assert!(misspelt.contains("options.wait_s.only_with.mode: expected one of fast, slow"), "{misspelt}");
     let changed = project.refusal("x.lua --kappa 0.3");
     assert!(changed.contains("--kappa 0.3: give --out DIR"), "{changed}");
     project.succeeds("x.lua --kappa 0.3 --out run");

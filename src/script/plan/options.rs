@@ -37,7 +37,8 @@ record! {
         choices: Option<Vec<String>>;
         /// Description for --help.
         help: String => Text("");
-        /// Values of other options without which this one does nothing: { sweep_protocol = "hand" }. It is then refused.
+        /// Values of other options without which this one does nothing, and is refused: { sweep_protocol = "hand" }. A list
+        /// must contain the value.
         only_with: Option<BTreeMap<String, Value>>;
         /// True if files that are made with another value than the default must not replace those of the project: such a
         /// value then needs --out.
@@ -78,8 +79,8 @@ pub struct OptionSpec {
     pub range: Range,
     /// Allowed strings; any if empty.
     pub choices: Vec<String>,
-    /// Values of other options without which this one does nothing, by name.
-    pub only_with: BTreeMap<String, OptionValue>,
+    /// Values of other options, as on the command line, without which this one does nothing; by name.
+    pub only_with: BTreeMap<String, String>,
     /// True if files that are made with another value than the default must not replace those of the project.
     pub needs_out: bool,
 }
@@ -106,11 +107,13 @@ impl OptionSpec {
         }
     }
 
-    /// The options without which this one does nothing: ", only with --sweep-protocol hand", or nothing.
-    pub fn condition(&self, options: &[Self]) -> String {
+    /// The description, and the options without which this one does nothing: "pause, only with --mode slow".
+    pub fn help(&self, options: &[Self]) -> String {
         let flag = |name: &str| options.iter().find(|o| o.name == name).map_or_else(String::new, Self::flag);
-        let parts = self.only_with.iter().map(|(name, value)| format!(", only with {} {value}", flag(name)));
-        parts.collect()
+        let conditions =
+            self.only_with.iter().map(|(name, value)| format!("only with {} {value}", flag(name)));
+        let help = Some(self.help.clone()).filter(|help| !help.is_empty());
+        help.into_iter().chain(conditions).collect::<Vec<_>>().join(", ")
     }
 
     /// Parses a value of the command line.
@@ -161,9 +164,11 @@ enum ArgumentError {
     #[error("option {0} is given twice; give it once")]
     Twice(String),
     #[error("option {flag} does nothing with {other} {value}; leave it out, or give {other} {needed}")]
-    NoEffect { flag: String, other: String, value: OptionValue, needed: OptionValue },
+    NoEffect { flag: String, other: String, value: OptionValue, needed: String },
     #[error("options.{option}.only_with: {other} is not an option of the script")]
     Undeclared { option: String, other: String },
+    #[error("options.{option}.only_with.{other}: expected {expected}, got {needed:?}")]
+    Impossible { option: String, other: String, expected: String, needed: String },
 }
 
 impl OptionSession {
@@ -194,10 +199,17 @@ impl OptionSession {
         let needs =
             self.declared.iter().flat_map(|option| option.only_with.iter().map(move |need| (option, need)));
         for (option, (name, needed)) in needs {
-            let Some(other) = self.declared.iter().find(|other| other.name == *name) else {
-                return Err(ArgumentError::Undeclared { option: option.name.clone(), other: name.clone() });
+            let undeclared =
+                || ArgumentError::Undeclared { option: option.name.clone(), other: name.clone() };
+            let other = self.declared.iter().find(|other| other.name == *name).ok_or_else(undeclared)?;
+            let impossible = || ArgumentError::Impossible {
+                option: option.name.clone(),
+                other: name.clone(),
+                expected: other.expects(),
+                needed: needed.clone(),
             };
-            if other.value != *needed && self.given.contains(&option.name) {
+            let wanted = other.parse(needed).ok_or_else(impossible)?;
+            if !other.value.contains(&wanted) && self.given.contains(&option.name) {
                 return Err(ArgumentError::NoEffect {
                     flag: option.flag(),
                     other: other.flag(),
@@ -324,17 +336,29 @@ fn declare(lua: &Lua, session: &mut OptionSession, key: &Value, value: &Value) -
     Ok(spec)
 }
 
-/// Values of `only_with` of the option `name`.
+/// Values of `only_with` of the option `name`, as on the command line.
 fn needed_values(
     lua: &Lua,
     name: &str,
     values: BTreeMap<String, Value>,
-) -> mlua::Result<BTreeMap<String, OptionValue>> {
+) -> mlua::Result<BTreeMap<String, String>> {
     let value = |(other, value): (String, Value)| {
         let message = format!("options.{name}.only_with.{other}: expected a number, string or boolean");
-        Ok((other, lua.from_value(value).map_err(|_| fail(lua, message))?))
+        let value: OptionValue = lua.from_value(value).map_err(|_| fail(lua, message))?;
+        Ok((other, value.to_string()))
     };
     values.into_iter().map(value).collect()
+}
+
+impl OptionValue {
+    /// True if this is `other`, or a list with all of its entries.
+    fn contains(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Numbers(all), Self::Numbers(some)) => some.iter().all(|one| all.contains(one)),
+            (Self::Texts(all), Self::Texts(some)) => some.iter().all(|one| all.contains(one)),
+            _ => self == other,
+        }
+    }
 }
 
 impl std::fmt::Display for OptionValue {
