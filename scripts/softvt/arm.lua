@@ -92,8 +92,8 @@ local function close_until(self, closure, options)
   end
 end
 
--- Distance within which a grasp repeats the last one, m.
-local SAME_PLACE = 0.04
+-- Distance within which a grasp repeats the last one, m: the other side of a rim may be grasped the next time.
+local SAME_PLACE = 0.12
 
 -- Number of grasps that have failed here: those since the last release or grasp elsewhere.
 local function failed_grasps(self)
