@@ -280,7 +280,7 @@
 ---@field max? number Highest number. Expects a number.
 ---@field choices? string[] The allowed strings; any by default.
 ---@field help? string Description for --help. Default "".
----@field only_with? table<string, any> Values of other options without which this one does nothing: { sweep_protocol = "hand" }. It is then refused.
+---@field only_with? table<string, any> Values of other options without which this one does nothing, and is refused: { sweep_protocol = "hand" }. A list must contain the value.
 ---@field needs_out? boolean True if files that are made with another value than the default must not replace those of the project: such a value then needs --out. Default false.
 
 ---A box centred on the origin.
