@@ -1437,6 +1437,12 @@ function softvt.calibration(asset) end
 ---@return boolean
 function softvt.stable(row) end
 
+---Returns the force per pad (N) at a width (mm), linear between the rows of a compression sweep by decreasing width; nil outside of the sweep.
+---@param sweep table<string, any>[]
+---@param width_mm number
+---@return number?
+function softvt.force_at(sweep, width_mm) end
+
 ---Returns an image of one colour: `softvt.image { width = 640, height = 480, colour = { 255, 255, 255 } }`.
 ---@param spec softvt.NewImage
 ---@return softvt.Image

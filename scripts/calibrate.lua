@@ -16,6 +16,7 @@
 -- If all standard assets are calibrated, it also writes docs/calibration.md. scripts/check_calibration.lua checks the results.
 local asset_names = require "asset_names"
 local calibration_page = require "calibration_page"
+local grasp = require "experts.grasp"
 local hand = require "calibration.hand"
 local known = require "calibrated"
 local press = require "calibration.press"
@@ -126,7 +127,7 @@ end
 local function former_windows()
   local windows, dropped = {}, {}
   for name, window in pairs(known) do
-    if window.carried then windows[name] = window elseif not assets[name] then dropped[#dropped + 1] = name end
+    if grasp.has_window(name) then windows[name] = window elseif not assets[name] then dropped[#dropped + 1] = name end
   end
   return windows, dropped
 end

@@ -7,6 +7,7 @@
 -- its size. --part ends runs trials with the robot's hand and the expert's lift, 5 % of the window inside and outside of each end.
 -- If all standard assets are checked in both parts, it writes docs/calibration_checks.md.
 local asset_names = require "asset_names"
+local grasp = require "experts.grasp"
 local hand = require "calibration.hand"
 local known = require "calibrated"
 local press = require "calibration.press"
@@ -33,14 +34,13 @@ for _, name in ipairs(opt.asset) do
   if parts.ends then
     local found = calibrations[name]
     local is_present = found and found.table.fingerprints and found.table.fingerprints[name] == softvt.fingerprint(assets[name])
-    if not (is_present and known[name] and known[name].carried) then
+    if not (is_present and grasp.has_window(name)) then
       error(("check_calibration: %s has no calibrated window, or one of another shape, material, friction or version; run softvt scripts/calibrate.lua --asset %s first"):format(
         name, name), 0)
     end
   end
 end
 
-local KAPPA = 0.5
 local END_SHARE = 0.05    -- distance from an end of the window, as a share of the window
 local BATCH = 10          -- trials of a point
 local HOLD_S = 1          -- hold after the lift, s
@@ -56,21 +56,9 @@ local function numerics(point, o)
   local change = point.change
   local sweep = press.sweep(assets[point.asset], 1e-3 * o.step_mm * (change.step or 1), change)
   local found = softvt.envelope {
-    asset = point.asset, kappa = KAPPA, stable_strain = sweep.stable_strain, ended = sweep.ended, sweep = sweep.rows, holds = {},
+    asset = point.asset, stable_strain = sweep.stable_strain, ended = sweep.ended, sweep = sweep.rows, holds = {},
   }
   return { asset = point.asset, check = change.name, d_ref_pct = found.d_ref, censored = found.censored }
-end
-
--- Force per pad (N) at a width (mm) in the sweep of the press, whose rows are by decreasing width; 0 before contact.
-local function force_at(sweep, width_mm)
-  for k = 2, #sweep do
-    local wide, narrow = sweep[k - 1], sweep[k]
-    if wide.width_mm >= width_mm and narrow.width_mm <= width_mm then
-      local share = (wide.width_mm - width_mm) / (wide.width_mm - narrow.width_mm)
-      return wide.force_n + share * (narrow.force_n - wide.force_n)
-    end
-  end
-  return 0
 end
 
 -- A batch of trials at an end of the window: a share of the window inside of it, or outside.
@@ -79,7 +67,8 @@ local function ends(point)
   local inward = (point.at == "loose" and 1 or -1) * (point.side == "inside" and END_SHARE or -END_SHARE)
   local along = (point.at == "loose" and 0 or 1) + inward
   local width = window.width_lower + along * (window.width_at_tau - window.width_lower)
-  local grip = { width = width, force = force_at(calibrations[name].table.envelopes[name].sweep, 1e3 * width) }
+  -- Before contact there is no force.
+  local grip = { width = width, force = softvt.force_at(calibrations[name].table.envelopes[name].sweep, 1e3 * width) or 0 }
   local held, d_peak_pct, width_mm = hand.trials(assets[name], grip, point.first, point.last, HOLD_S)
   return {
     asset = name, check = point.at .. "_" .. point.side, width_mm = width_mm, trials = point.last - point.first + 1, held = held,

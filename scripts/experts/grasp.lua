@@ -88,6 +88,12 @@ function grasp.problem(object)
   end
 end
 
+-- True if an asset has a calibrated window of this version.
+function grasp.has_window(asset)
+  local known = calibrated[asset]
+  return known ~= nil and known.carried ~= nil
+end
+
 -- The safe window of an object: the loosest and the tightest grip as { width, force }, with the measured width of the gels (m)
 -- and the force per pad at rest (N). The window of an asset is scaled to the instance. Its tight end is a strain: the width scales
 -- with the size, the force with area and stiffness. Its loose end carries the weight, by an indentation that grows with weight
@@ -96,7 +102,7 @@ end
 function grasp.window(object)
   local known = calibrated[object.asset]
   if not known then return nil end
-  if not known.carried then
+  if not grasp.has_window(object.asset) then
     error(("calibrated: the window of %s is of an older version; run softvt scripts/calibrate.lua --asset %s"):format(object.asset, object.asset), 0)
   end
   local size, stiffness, density = object.scale or 1, object.youngs_factor or 1, object.density_factor or 1
@@ -209,13 +215,18 @@ function grasp.close(arm, object, grip, options)
   arm:grasp(most, { rate = rate, width = grip.width })
 end
 
--- Distance of the gels at first contact in a grasp that is not nominal, m: the open hand can close by its clearance from the object on
--- each side.
-local function contact_width(scene, object, pose)
-  local others = {}
+-- Names of all objects of a scene but one.
+local function others_than(object, scene)
+  local names = {}
   for _, other in ipairs(scene:objects()) do
-    if other.name ~= object.name then others[#others + 1] = other.name end
+    if other.name ~= object.name then names[#names + 1] = other.name end
   end
+  return names
+end
+
+-- Distance of the gels at first contact in a grasp that is not nominal, m: the open hand can close by its clearance from the object on
+-- each side. `others` are the names of the other objects.
+local function contact_width(scene, pose, others)
   return STROKE - 2 * math.max(0, (scene:clearance(pose, { width = STROKE, ignore = others })))
 end
 
@@ -224,10 +235,10 @@ end
 -- something. No other object may be between the fingers as they close: a finger outside a drawer's front would pull the drawer along.
 function grasp.choose(scene, object, height, offset)
   local best
-  local ignore = object.hints.grasp_rim_m and {} or { object.name }
+  local others, ignore = others_than(object, scene), object.hints.grasp_rim_m and {} or { object.name }
   for _, candidate in ipairs(candidates(object, height, offset)) do
     local pose, clearance = candidate.pose, math.huge
-    local width = candidate.is_nominal and grasp.width(object) or contact_width(scene, object, pose)
+    local width = candidate.is_nominal and grasp.width(object) or contact_width(scene, pose, others)
     -- Narrowest opening first: the clearance of a closing motion is that of its narrowest point.
     local openings = { grasp.clear_closure(object, 0.005, width), grasp.clear_closure(object, 0.010, width), 0 }
     for _, opening in ipairs(openings) do

@@ -90,7 +90,7 @@ fn with_script_options(
     let flags = command.get_arguments().filter_map(|arg| arg.get_long()).map(str::to_owned);
     let reserved: Vec<String> = flags.chain(["help".into(), "version".into()]).collect();
     for option in options {
-        let arg = script_arg(option, &option.help(options));
+        let arg = script_arg(option, &option.help_text(options));
         if let Some(long) = arg.get_long().filter(|long| reserved.iter().any(|flag| flag == long)) {
             return Err(CliError::input(format!(
                 "the script declares the option --{long}, which is a flag of softvt; rename it"

@@ -216,12 +216,8 @@ impl Envelope {
             window: SafeWindow {
                 width_lower_mm,
                 width_at_tau_mm,
-                force_lower_n: width_lower_mm
-                    .and_then(|width| force_at(&sweep, width))
-                    .map(round_to_six_decimals),
-                force_at_tau_n: width_at_tau_mm
-                    .and_then(|width| force_at(&sweep, width))
-                    .map(round_to_six_decimals),
+                force_lower_n: width_lower_mm.and_then(|width| force_at(&sweep, width)),
+                force_at_tau_n: width_at_tau_mm.and_then(|width| force_at(&sweep, width)),
             },
             holds,
             sweep,
@@ -329,12 +325,13 @@ fn carried_end(holds: &[HoldRow], d_pct: f64) -> Option<f64> {
     Some(width_between(pair[0], pair[1], d_pct))
 }
 
-/// Force per pad at a width, linear between the rows; `sweep` by decreasing width. `None` outside of the sweep.
-fn force_at(sweep: &[SweepRow], width_mm: f64) -> Option<f64> {
+/// Force per pad at a width in N, to six decimals, linear between the rows; `sweep` by decreasing width. `None` outside of
+/// the sweep.
+pub fn force_at(sweep: &[SweepRow], width_mm: f64) -> Option<f64> {
     sweep.windows(2).find(|pair| pair[0].width_mm >= width_mm && pair[1].width_mm <= width_mm).map(|pair| {
         let step = pair[0].width_mm - pair[1].width_mm;
         let share = if step > 0.0 { (pair[0].width_mm - width_mm) / step } else { 0.0 };
-        pair[0].force_n + share * (pair[1].force_n - pair[0].force_n)
+        round_to_six_decimals(pair[0].force_n + share * (pair[1].force_n - pair[0].force_n))
     })
 }
 

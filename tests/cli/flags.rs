@@ -145,7 +145,7 @@ fn an_option_of_a_script_acts_or_is_refused() {
     let changed = project.refusal("x.lua --kappa 0.3");
     assert!(changed.contains("--kappa 0.3: give --out DIR"), "{changed}");
     project.succeeds("x.lua --kappa 0.3 --out run");
-    // A problem is told after the files are written.
+    // A problem is reported after the files are written.
     let problem = project.problem("x.lua --kappa 1 --out worse");
     assert!(problem.ends_with("x.lua: one is too much"), "{problem}");
     assert_eq!(project.text("worse/n.txt"), "n");

@@ -30,6 +30,7 @@ mod serve;
 mod shut_hand;
 mod support;
 mod tactile_forces;
+mod turned_grasp;
 mod usage;
 mod varied_suites;
 mod view;

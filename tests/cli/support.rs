@@ -87,14 +87,10 @@ impl Project {
 
     /// The message for results with a problem. Standard output must have them.
     pub fn problem(&self, words: &str) -> String {
-        problem(self.softvt(words), words)
+        let output = self.softvt(words);
+        assert_ne!(output.out, "", "softvt {words}\n{}", output.err);
+        refusal(CliOutput { out: String::new(), ..output }, words)
     }
-}
-
-/// The message of a command that prints its results and then fails because of them.
-pub fn problem(output: CliOutput, words: &str) -> String {
-    assert_ne!(output.out, "", "softvt {words}\n{}", output.err);
-    refusal(CliOutput { out: String::new(), ..output }, words)
 }
 
 pub fn run_command(mut command: Command) -> CliOutput {

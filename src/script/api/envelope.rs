@@ -15,7 +15,7 @@ use crate::{
 };
 use softvt_common::parallel::lock;
 use softvt_evaluation::{
-    calibration::{Envelope, HoldRow, Protocol, SafeWindow, Scans, SweepRow},
+    calibration::{Envelope, HoldRow, Protocol, SafeWindow, Scans, SweepRow, force_at},
     envelope_plot::{plot, three_lines},
     safety::DeformationLimit,
     thresholds::{ThresholdFile, sweep_jsonl},
@@ -147,6 +147,11 @@ functions! {
         fn stable(lua, row: Unchecked = Type::Table("table")) -> ["boolean"] {
             let row: SweepRow = deserialize(lua, "softvt.stable", &row.0)?;
             row.instability().is_none()
+        }
+        /// Returns the force per pad (N) at a width (mm), linear between the rows of a compression sweep by decreasing
+        /// width; nil outside of the sweep.
+        fn force_at(lua, sweep: Unchecked = ROWS, width_mm: f64 = Type::Number("mm", Range::closed(0.0, 1000.0))) -> ["number?"] {
+            force_at(&rows::<SweepRow>(lua, "softvt.force_at", &sweep.0)?, width_mm)
         }
     }
 }

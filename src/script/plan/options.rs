@@ -108,7 +108,7 @@ impl OptionSpec {
     }
 
     /// The description, and the options without which this one does nothing: "pause, only with --mode slow".
-    pub fn help(&self, options: &[Self]) -> String {
+    pub fn help_text(&self, options: &[Self]) -> String {
         let flag = |name: &str| options.iter().find(|o| o.name == name).map_or_else(String::new, Self::flag);
         let conditions =
             self.only_with.iter().map(|(name, value)| format!("only with {} {value}", flag(name)));

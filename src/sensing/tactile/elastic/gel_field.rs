@@ -69,7 +69,7 @@ pub enum ContactError {
 }
 
 impl GelField {
-    /// Solves a contact; `None` if nothing presses, or only beside the grid.
+    /// Solves a contact; `None` if nothing presses, or only outside the grid.
     ///
     /// The skins are pressed in until the pressure carries the normal force of the wrench; then the shear is
     /// found that carries its tangential force and twist. Nothing is kept from one call to the next:
@@ -96,7 +96,7 @@ impl GelField {
         if skins.is_empty() {
             return Err(ContactError::NoSkin { force: wrench.normal() });
         }
-        // A skin that passes beside the grid, such as a rim at the edge of the pad, leaves no imprint.
+        // A skin that passes outside the grid, such as a rim at the edge of the pad, leaves no imprint.
         let Some(normal) = solve_normal_contact(gel, &height_map.gaps(gel), wrench.normal(), scratch) else {
             return Ok(None);
         };
