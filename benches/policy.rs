@@ -148,7 +148,7 @@ fn overheads(profile: &str) -> Vec<f64> {
     let mut took = Vec::new();
     let policy = Timed { inner: remote, took: &mut took };
     let mut driver =
-        ChunkedPolicy::new(Box::new(policy), TaskBrief { suite, task: 0, prompt, episode: 0 }, 10);
+        ChunkedPolicy::new(Box::new(policy), TaskBrief { suite, task: 0, prompt, episode: 0, seed: 0 }, 10);
     let started = Episode::start(spec, &AssetCache::default(), &SensorAssets::default()).expect("it starts");
     started.run(&mut driver).expect("it runs");
     drop(driver);

@@ -64,7 +64,7 @@ fn main() {
         ("no streams", SensorStreams::default()),
         ("cameras", SensorStreams { cameras: cameras.clone(), ..SensorStreams::default() }),
         ("touch", SensorStreams { tactile: true, ..SensorStreams::default() }),
-        ("all streams", SensorStreams { cameras, tactile: true, force: true }),
+        ("all streams", SensorStreams { cameras, tactile: true, force: true, ..SensorStreams::default() }),
     ];
     println!("{:<12} {:>10} {:>12} {:>12}", "case", "simulated", "CPU s / s", "× real time");
     for (name, streams) in cases {

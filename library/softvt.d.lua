@@ -184,14 +184,17 @@
 ---@field name string Name in results, unless --name gives another.
 ---@field inputs softvt.Input[] Observations that are sent, in order.
 ---@field actions softvt.ActionEncoding Meaning of the actions.
+---@field observe_every_step? boolean True to send an observation in every control step, for policies with a history of their own. Those without a need for actions have wants_actions = false in the identity of the request; any reply answers them. Default false.
 
 ---One entry of the observations that are sent to a policy server.
 ---@class softvt.Input
 ---@field keys string[] Keys under which it is sent.
----@field source "camera"|"state"|"prompt"|"tactile_image"|"tactile"|"marker_motion"|"force" Content: the image of a camera; numbers of the robot's state; the prompt; the mosaic of 8 tactile images of both fingers; the latest image of one finger; the first and the last 8 marker positions; the last 8 true forces on the gels.
----@field camera? string For camera: its name in the scene.
----@field half_turn? boolean For camera: true to rotate the image by 180°.
----@field parts? ("position"|"axis_angle"|"quaternion_wxyz"|"quaternion_xyzw"|"joints"|"gripper_width"|"finger_position"|"finger_pair"|"closure")[] For state: its parts in order, of 3, 3, 4, 4, 7, 1, 1, 2 and 1 numbers, in m and rad in the base frame.
+---@field source "camera"|"depth"|"segmentation"|"state"|"prompt"|"tactile_image"|"tactile"|"marker_motion"|"force"|"query"|"query_seed" Content: the image of a camera, its depth (m), or the object at each pixel; numbers of the robot's state; the prompt; the mosaic of 8 tactile images of both fingers; the image of one finger; the initial and the last marker positions; the last true forces on the gels; the identity of the request, a map; a seed for policies that draw random numbers, equal whenever a run is repeated.
+---@field camera? string For camera, depth and segmentation: the camera's name in the scene.
+---@field half_turn? boolean For camera, depth and segmentation: true to rotate the image by 180°.
+---@field parts? ("position"|"axis_angle"|"quaternion_wxyz"|"quaternion_xyzw"|"joints"|"joint_velocities"|"joint_torques"|"gripper_width"|"finger_position"|"finger_pair"|"closure")[] For state: its parts in order, in m, rad, rad/s and N m, of 3 numbers (position, axis_angle), 4 (quaternions), 7 (joints, joint_velocities, joint_torques), 2 (finger_pair) and 1.
+---@field frames? integer Number of control steps in the entry, the present one last, along a first axis; not for prompt and tactile_image. By default the present step without that axis, and 8 steps of marker_motion and force. The start of an episode repeats its first step. Expects a whole number in 1..32.
+---@field markers? "dots"|"arrows"|"black_arrows" For tactile and tactile_image: style in which the markers are drawn into the images; not drawn by default.
 ---@field layout? "rows"|"columns" For tactile_image: the left finger above the right one (rows, the default) or left of it.
 ---@field finger? "left"|"right" For tactile: the finger.
 
@@ -211,6 +214,13 @@
 ---@field closed? number Value that closes it; not for code = "force". Expects a number.
 ---@field code? "continuous"|"binary"|"two-width"|"force" What the value commands. continuous: a closure in proportion between open and closed, the default. binary: closed beyond the middle, else open. two-width: open, or the width that the answers give just after closing, held until one opens. force: a grip force in N at which closing stops; below 0 opens.
 ---@field binary? boolean True for code = "binary".
+---@field latch? softvt.GripLatch For code = "binary": limits at which the gripper closes and opens, instead of the middle.
+
+---Hysteresis of a binary gripper, in values of the seventh number.
+---@class softvt.GripLatch
+---@field close number Value from which on, towards that of the closed gripper, an answer closes. Expects a number.
+---@field open number Value from which on, towards that of the open gripper, an answer opens. Expects a number.
+---@field hold_steps? integer Control steps for which a change is kept, whatever is answered. Expects a whole number in 0..10000. Default 0.
 
 ---Summary of an experiment.
 ---@class softvt.Finish
@@ -240,7 +250,7 @@
 ---@field suite? string Part of the seed. Default "experiment".
 ---@field episode? integer Part of the seed. Expects a whole number in 0..1000000000. Default 0.
 ---@field seed? integer Part of the seed; by default that of the run, --seed. Expects a whole number in 0..1000000000.
----@field settings? table<string, table<string, any>> Changed settings of physics, robot and tactile sensors: { physics = {…}, robot = {…}, tactile = {…} }. Those of the command line, --set, take precedence in experiments.
+---@field settings? table<string, table<string, any>> Changed settings of physics, robot, tactile sensors and cameras: { physics = {…}, robot = {…} }. Those of the command line, --set, take precedence in experiments.
 
 ---Returns the results of a calibration: the safe window, the deformation limit τ, and the files to write.
 ---@class softvt.EnvelopeSpec

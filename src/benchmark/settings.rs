@@ -7,6 +7,7 @@ use softvt_common::text::{RangeError, format_number};
 use softvt_evaluation::criteria::SuccessCriteria;
 use softvt_physics::PhysicsParams;
 use softvt_robot::RobotSpec;
+use softvt_scene::CameraSettings;
 use softvt_sensing::tactile::TactileSpec;
 
 /// Control period, s: policies act, and results are recorded, at 20 Hz.
@@ -60,6 +61,8 @@ pub struct Settings {
     pub criteria: SuccessCriteria,
     /// The tactile sensors.
     pub tactile: TactileSpec,
+    /// The cameras.
+    pub cameras: CameraSettings,
 }
 
 impl Settings {
@@ -144,6 +147,7 @@ impl Settings {
         self.robot.validate()?;
         self.criteria.validate()?;
         self.tactile.validate()?;
+        self.cameras.validate()?;
         self.physics.validate()?;
         let dt = self.physics.dt;
         let exact = CONTROL_DT / f64::from(steps_per_control(dt));

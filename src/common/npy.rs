@@ -75,6 +75,12 @@ impl NpyArray {
         Self { dtype: "|u1".to_owned(), shape, data }
     }
 
+    /// Array of unsigned 16-bit numbers.
+    pub fn from_u16(shape: Vec<usize>, values: impl IntoIterator<Item = u16>) -> Self {
+        let data = values.into_iter().flat_map(u16::to_le_bytes).collect();
+        Self { dtype: "<u2".to_owned(), shape, data }
+    }
+
     /// Array of single-precision numbers.
     pub fn from_f32(shape: Vec<usize>, values: impl IntoIterator<Item = f32>) -> Self {
         let data = values.into_iter().flat_map(f32::to_le_bytes).collect();

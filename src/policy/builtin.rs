@@ -49,9 +49,9 @@ impl Policy for RandomPolicy {
     }
 
     fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError> {
-        let axis_angle_b = *self.axis_angle_b.get_or_insert(observation.ee_axis_angle_b);
+        let axis_angle_b = *self.axis_angle_b.get_or_insert(observation.robot.ee_axis_angle_b);
         let step = Vec3::from_fn(|_, _| MAX_STEP * (2.0 * uniform(&mut self.rng) - 1.0));
-        let mut position_b = observation.ee_position_b + step;
+        let mut position_b = observation.robot.ee_position_b + step;
         // Above the table top and below the shoulder: the walk would get stuck at the table.
         position_b.z = position_b.z.clamp(0.03, 0.5);
         if uniform(&mut self.rng) < CLOSURE_CHANGE {
@@ -113,5 +113,5 @@ fn held(command: ToolCommand) -> ToolCommand {
 
 /// The measured tool pose with the gripper open.
 fn tool_pose(observation: &Observation) -> Action {
-    Action::new(observation.ee_position_b, observation.ee_axis_angle_b, 0.0)
+    Action::new(observation.robot.ee_position_b, observation.robot.ee_axis_angle_b, 0.0)
 }

@@ -4,13 +4,14 @@ use image::{RgbImage, imageops};
 use rmpv::Value;
 
 use super::{
-    Observation,
-    msgpack::pack_array,
-    profile::{InputSource, Profile, StatePart},
+    CameraImage, Observation, QueryId, RobotState,
+    msgpack::{map, pack_array},
+    observation::last,
+    profile::{InputSource, Profile, ProfileInput, StatePart},
 };
 use softvt_common::npy::NpyArray;
 use softvt_robot::rotation;
-use softvt_sensing::tactile::{HISTORY_LENGTH, MARKER_COUNT};
+use softvt_sensing::tactile::MARKER_COUNT;
 
 /// Content of an entry of an observation, before it is packed.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,6 +20,8 @@ pub enum ObservationEntry {
     Array(NpyArray),
     /// The instruction.
     Text(String),
+    /// A seed, or the identity of a request.
+    Query(Value),
 }
 
 impl ObservationEntry {
@@ -27,47 +30,119 @@ impl ObservationEntry {
         match self {
             Self::Array(array) => pack_array(array, bin_keys),
             Self::Text(text) => Value::from(text),
+            Self::Query(value) => value,
         }
     }
 }
 
-/// Content of an entry, in the type and shape given at [`InputSource`]. `None` if the observation lacks its stream.
-pub fn content(observation: &Observation, source: &InputSource) -> Option<ObservationEntry> {
-    let array = match source {
+/// Content of an entry, in the type and shape given at [`InputSource`]; [`ProfileInput::frames`] adds an axis. `None` if
+/// the observation lacks its stream, or `query` is needed and missing.
+pub fn content(
+    observation: &Observation,
+    input: &ProfileInput,
+    query: Option<&QueryId>,
+) -> Option<ObservationEntry> {
+    let steps = input.steps();
+    let array = match &input.source {
         InputSource::Prompt => return Some(ObservationEntry::Text(observation.prompt.clone())),
+        InputSource::Query => return Some(ObservationEntry::Query(query_map(query?))),
+        InputSource::QuerySeed => return Some(ObservationEntry::Query(query?.seed().into())),
         InputSource::Camera { camera, half_turn } => {
-            let image = observation.camera(camera)?;
-            image_array(if *half_turn { imageops::rotate180(image) } else { image.clone() })
+            let turned = |one: &CameraImage| match half_turn {
+                true => imageops::rotate180(&one.image),
+                false => one.image.clone(),
+            };
+            let images = observation.camera_images(camera, steps);
+            stacked(input, images.into_iter().map(|one| image_array(turned(one))))?
+        }
+        InputSource::Depth { camera, half_turn } => {
+            let depth = |one: &CameraImage| {
+                let numbers = turned(one.depth.as_ref()?, *half_turn);
+                Some(NpyArray::from_f32(shape_of(one), numbers))
+            };
+            let images = observation.camera_images(camera, steps);
+            stacked(input, images.into_iter().filter_map(depth))?
+        }
+        InputSource::Segmentation { camera, half_turn } => {
+            let objects = |one: &CameraImage| {
+                let numbers = turned(one.segmentation.as_ref()?, *half_turn);
+                Some(NpyArray::from_u16(shape_of(one), numbers))
+            };
+            let images = observation.camera_images(camera, steps);
+            stacked(input, images.into_iter().filter_map(objects))?
         }
         InputSource::State { parts } => {
-            let numbers: Vec<f32> = parts.iter().flat_map(|part| state(observation, *part)).collect();
-            NpyArray::from_f32(vec![numbers.len()], numbers)
+            let row = |robot: &RobotState| {
+                let numbers: Vec<f32> = parts.iter().flat_map(|part| state(robot, *part)).collect();
+                NpyArray::from_f32(vec![numbers.len()], numbers)
+            };
+            stacked(input, observation.robot_states(steps).into_iter().map(row))?
         }
-        InputSource::TactileImage { layout } => image_array(observation.tactile.as_ref()?.mosaic(*layout)),
-        InputSource::Tactile { finger } => {
-            image_array(observation.tactile.as_ref()?.now()?[finger.index()].image.clone())
+        InputSource::TactileImage { layout, markers } => {
+            image_array(observation.tactile.as_ref()?.mosaic(*layout, *markers))
+        }
+        InputSource::Tactile { finger, markers } => {
+            let frames = observation.tactile.as_ref()?.last(steps);
+            let images = frames.into_iter().map(|frame| {
+                let frame = &frame[finger.index()];
+                markers.map_or_else(|| frame.image.clone(), |style| frame.with_markers(style))
+            });
+            stacked(input, images.map(image_array))?
         }
         InputSource::MarkerMotion => {
-            let rows = observation.tactile.as_ref()?.marker_motion();
+            let rows = observation.tactile.as_ref()?.marker_motion(steps);
             NpyArray::from_f32(vec![rows.len(), 2 * MARKER_COUNT, 2], rows.into_iter().flatten().flatten())
         }
         InputSource::Force => {
-            let past = &observation.force_history;
-            // A short history starts with copies of its oldest entry.
-            let rows = (0..HISTORY_LENGTH)
-                .map(|place| past.get((place + past.len()).saturating_sub(HISTORY_LENGTH)));
-            let rows: Option<Vec<&[f64; 6]>> = rows.collect();
-            NpyArray::from_f32(vec![HISTORY_LENGTH, 6], rows?.into_iter().flatten().map(|x| *x as f32))
+            let past: Vec<&[f64; 6]> = observation.force_history.iter().collect();
+            let rows = last(&past, steps);
+            NpyArray::from_f32(vec![rows.len(), 6], rows.into_iter().flatten().map(|x| *x as f32))
         }
     };
     Some(ObservationEntry::Array(array))
 }
 
+/// The arrays of all steps along a first axis if the input has one, else the only array. `None` if there are none.
+fn stacked(input: &ProfileInput, steps: impl Iterator<Item = NpyArray>) -> Option<NpyArray> {
+    let mut all = steps.collect::<Vec<_>>();
+    match input.frames {
+        None => all.pop(),
+        Some(_) => {
+            let NpyArray { dtype, shape, .. } = all.first()?;
+            let shape = [&[all.len()], shape.as_slice()].concat();
+            let dtype = dtype.clone();
+            Some(NpyArray { dtype, shape, data: all.into_iter().flat_map(|one| one.data).collect() })
+        }
+    }
+}
+
+/// The pixels of an image, rotated by 180° if asked for.
+fn turned<T: Copy>(pixels: &[T], half_turn: bool) -> Vec<T> {
+    if half_turn { pixels.iter().rev().copied().collect() } else { pixels.to_vec() }
+}
+
+fn shape_of(image: &CameraImage) -> Vec<usize> {
+    vec![image.image.height() as usize, image.image.width() as usize]
+}
+
+fn query_map(query: &QueryId) -> Value {
+    map([
+        ("suite", Value::from(query.suite.as_str())),
+        ("task", Value::from(query.task as u64)),
+        ("episode", Value::from(query.episode)),
+        ("run_seed", Value::from(query.run_seed)),
+        ("step", Value::from(query.step)),
+        ("query", Value::from(query.query)),
+        ("seed", Value::from(query.seed())),
+        ("wants_actions", Value::from(query.wants_actions)),
+    ])
+}
+
 /// The observation as a msgpack map in openpi's format.
-pub fn openpi(observation: &Observation, profile: &Profile) -> Value {
+pub fn openpi(observation: &Observation, profile: &Profile, query: &QueryId) -> Value {
     let mut entries = Vec::new();
     for input in &profile.inputs {
-        let Some(content) = content(observation, &input.source) else { continue };
+        let Some(content) = content(observation, input, Some(query)) else { continue };
         let Some((last, others)) = input.keys.split_last() else { continue };
         let value = content.into_value(true);
         entries.extend(others.iter().map(|key| (Value::from(key.as_str()), value.clone())));
@@ -82,7 +157,7 @@ pub fn image_array(image: RgbImage) -> NpyArray {
     NpyArray::from_bytes(shape, image.into_raw())
 }
 
-fn state(o: &Observation, part: StatePart) -> Vec<f32> {
+fn state(o: &RobotState, part: StatePart) -> Vec<f32> {
     let quaternion = || rotation::from_axis_angle(&o.ee_axis_angle_b).into_inner();
     let numbers: Vec<f64> = match part {
         StatePart::Position => o.ee_position_b.iter().copied().collect(),
@@ -96,6 +171,8 @@ fn state(o: &Observation, part: StatePart) -> Vec<f32> {
             vec![q.i, q.j, q.k, q.w]
         }
         StatePart::Joints => o.joints.to_vec(),
+        StatePart::JointVelocities => o.joint_velocities.to_vec(),
+        StatePart::JointTorques => o.joint_torques.to_vec(),
         StatePart::GripperWidth => vec![o.gripper_width_m],
         StatePart::FingerPosition => vec![0.5 * o.gripper_width_m],
         StatePart::FingerPair => vec![0.5 * o.gripper_width_m, -0.5 * o.gripper_width_m],

@@ -1,5 +1,7 @@
 //! The interface of a policy: its trait, the description of an episode, and commands.
 
+use sha2::{Digest, Sha256};
+
 use super::{Observation, SensorStreams};
 use softvt_evaluation::episode_id::EpisodeIndex;
 use softvt_geometry::Vec3;
@@ -75,6 +77,13 @@ pub enum GripCommand {
     Closure(f64),
     /// The closure of an answer in the code two-width, see [`WidthLatch`](super::WidthLatch).
     TwoWidth(f64),
+    /// Open or closed with the whole effort, with hysteresis, see [`GripSwitch`](super::GripSwitch).
+    Latched {
+        /// True to close, false to open, `None` to stay.
+        closes: Option<bool>,
+        /// Control steps for which a change is kept whatever is answered.
+        hold_steps: u32,
+    },
     /// A grip force, N, at which closing stops; opens below 0.
     Force(f64),
 }
@@ -114,6 +123,59 @@ pub struct TaskBrief {
     pub prompt: String,
     /// Index of the episode in its split.
     pub episode: u32,
+    /// Seed of the run. It may influence the random numbers of a policy alone.
+    pub seed: u64,
+}
+
+/// Identity of a request for actions, for policies that draw random numbers: the same request of a repeated or resumed run
+/// has the same identity, whatever the number of threads.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct QueryId {
+    /// Name of the suite.
+    pub suite: String,
+    /// Index of the task in the suite.
+    pub task: usize,
+    /// Index of the episode in its split.
+    pub episode: u32,
+    /// Seed of the run.
+    pub run_seed: u64,
+    /// Control step of the episode.
+    pub step: u32,
+    /// Number of earlier requests for actions in the episode.
+    pub query: u32,
+    /// False if the observation is sent for the history of the policy alone, and no action is expected.
+    pub wants_actions: bool,
+}
+
+impl QueryId {
+    /// The first request of an episode.
+    pub fn first(brief: &TaskBrief) -> Self {
+        let TaskBrief { suite, task, episode, seed, .. } = brief;
+        Self {
+            suite: suite.clone(),
+            task: *task,
+            episode: *episode,
+            run_seed: *seed,
+            wants_actions: true,
+            ..Self::default()
+        }
+    }
+
+    /// Seed of the request, by the key of SoftVTBench's release v0.2: the first four bytes, big-endian, of the SHA-256 of
+    /// the parts joined by the byte 0x1f. A demonstration is named demo_K there, K being the episode here.
+    pub fn seed(&self) -> u32 {
+        let demo = format!("demo_{}", self.episode);
+        let parts = [self.run_seed.to_string(), self.suite.clone(), self.task.to_string(), demo];
+        let episode = seed_of("episode", &parts);
+        seed_of("inference", &[episode.to_string(), self.query.to_string()])
+    }
+}
+
+fn seed_of(kind: &str, parts: &[String]) -> u32 {
+    let all = ["softvtbench-sha256-u32-v1", kind].into_iter().chain(parts.iter().map(String::as_str));
+    let text = all.collect::<Vec<_>>().join("\x1f");
+    let hash = Sha256::digest(text.as_bytes());
+    u32::from_be_bytes([hash[0], hash[1], hash[2], hash[3]])
 }
 
 impl TaskBrief {
@@ -204,9 +266,9 @@ impl PolicyError {
 ///     }
 ///
 ///     fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError> {
-///         let mut position_b = observation.ee_position_b;
+///         let mut position_b = observation.robot.ee_position_b;
 ///         position_b.z -= 0.005;
-///         Ok(Action::new(position_b, observation.ee_axis_angle_b, 0.0).into())
+///         Ok(Action::new(position_b, observation.robot.ee_axis_angle_b, 0.0).into())
 ///     }
 /// }
 /// ```
@@ -224,6 +286,17 @@ pub trait Policy: Send {
     fn reset(&mut self, _brief: &TaskBrief) -> Result<(), PolicyError> {
         Ok(())
     }
+    /// True if [`observe`](Self::observe) is to be called in every control step without a call of [`act`](Self::act).
+    fn observes_every_step(&self) -> bool {
+        false
+    }
+    /// Receives the observation of a control step in which no commands are needed.
+    ///
+    /// # Errors
+    /// See [`PolicyError`].
+    fn observe(&mut self, _observation: &Observation) -> Result<(), PolicyError> {
+        Ok(())
+    }
     /// Commands of the next control steps.
     ///
     /// # Errors
@@ -235,5 +308,21 @@ pub trait Policy: Send {
     /// The policy finds that its earlier commands are not valid; the episode is then not recorded.
     fn finish(&mut self) -> Result<(), PolicyError> {
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seeds_are_those_of_the_released_key() {
+        // Computed with Python's hashlib from the description of the release.
+        let brief =
+            TaskBrief { suite: "object_soft".into(), task: 3, prompt: String::new(), episode: 80, seed: 11 };
+        let first = QueryId::first(&brief);
+        let second = QueryId { query: 1, step: 10, ..first.clone() };
+        assert_eq!((first.seed(), second.seed()), (1_728_023_119, 3_567_768_914));
+        assert_eq!(QueryId { step: 5, ..second.clone() }.seed(), second.seed(), "the step does not matter");
     }
 }

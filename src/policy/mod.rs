@@ -4,6 +4,7 @@
 pub mod builtin;
 pub mod decode;
 pub mod encode;
+mod grip_switch;
 mod interface;
 pub mod msgpack;
 mod observation;
@@ -13,9 +14,12 @@ pub mod remote;
 pub mod transport;
 mod width_latch;
 
+pub use grip_switch::GripSwitch;
 pub use interface::{
-    Action, ActionChunk, GripCommand, Policy, PolicyError, TaskBrief, ToolCommand, ToolMotion,
+    Action, ActionChunk, GripCommand, Policy, PolicyError, QueryId, TaskBrief, ToolCommand, ToolMotion,
 };
-pub use observation::{CameraImage, Observation, PadForce, SensorStreams, TactileFrame, TactileHistory};
+pub use observation::{
+    CameraImage, Observation, PadForce, PastStep, RobotState, SensorStreams, TactileFrame, TactileHistory,
+};
 pub use osc::CommandResolver;
 pub use width_latch::WidthLatch;

@@ -7,7 +7,7 @@ use image::RgbImage;
 
 use softvt_geometry::Vec3;
 use softvt_sensing::tactile::{
-    HISTORY_LENGTH, MARKER_COUNT, Markers, MosaicLayout, PadWrench, Taxels, mosaic, mosaic_cell,
+    HISTORY_LENGTH, MARKER_COUNT, MarkerStyle, Markers, MosaicLayout, PadWrench, Taxels, mosaic, mosaic_cell,
 };
 
 /// Sensor streams of an observation. Streams that are not requested are never computed.
@@ -20,6 +20,44 @@ pub struct SensorStreams {
     /// True to request the true forces at the pads. No real sensor measures them, so
     /// results are marked `force_observed`.
     pub force: bool,
+    /// True to request the depth of every pixel of the cameras.
+    pub depth: bool,
+    /// True to request the object at every pixel of the cameras.
+    pub segmentation: bool,
+    /// Number of earlier control steps whose robot state and camera images are requested.
+    pub past_steps: usize,
+}
+
+/// Proprioception: what the robot measures of itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RobotState {
+    /// Tool position in the robot base frame, m.
+    pub ee_position_b: Vec3,
+    /// Tool orientation in the base frame as axis-angle, rad.
+    pub ee_axis_angle_b: Vec3,
+    /// Arm joint angles, rad.
+    pub joints: [f64; 7],
+    /// Arm joint velocities, rad/s.
+    pub joint_velocities: [f64; 7],
+    /// Torques of the arm's drives in the last physics step, N m. Gravity is compensated and not part of them.
+    pub joint_torques: [f64; 7],
+    /// Measured gripper width, m: 0 to 0.08 between the apexes of the gels.
+    pub gripper_width_m: f64,
+    /// Closure last commanded, 0 (open) ..= 1 (closed).
+    pub closure: f64,
+}
+
+impl RobotState {
+    /// A robot at rest with the tool at the origin of the base frame and the gripper open.
+    pub const ORIGIN: Self = Self {
+        ee_position_b: Vec3::new(0.0, 0.0, 0.0),
+        ee_axis_angle_b: Vec3::new(0.0, 0.0, 0.0),
+        joints: [0.0; 7],
+        joint_velocities: [0.0; 7],
+        joint_torques: [0.0; 7],
+        gripper_width_m: 0.08,
+        closure: 0.0,
+    };
 }
 
 /// Observation of a control step.
@@ -30,20 +68,14 @@ pub struct SensorStreams {
 pub struct Observation {
     /// Time since the start of the episode, s.
     pub time_s: f64,
-    /// Tool position in the robot base frame, m.
-    pub ee_position_b: Vec3,
-    /// Tool orientation in the base frame as axis-angle, rad.
-    pub ee_axis_angle_b: Vec3,
-    /// Arm joint angles, rad.
-    pub joints: [f64; 7],
-    /// Measured gripper width, m: 0 to 0.08 between the apexes of the gels.
-    pub gripper_width_m: f64,
-    /// Closure last commanded, 0 (open) ..= 1 (closed).
-    pub closure: f64,
+    /// Proprioception.
+    pub robot: RobotState,
     /// The instruction.
     pub prompt: String,
     /// Images of the requested cameras, in the order of [`SensorStreams::cameras`].
-    pub cameras: Vec<CameraImage>,
+    pub cameras: Vec<Arc<CameraImage>>,
+    /// The last [`SensorStreams::past_steps`] control steps before this one, oldest first; fewer at the start of an episode.
+    pub past: Vec<PastStep>,
     /// Tactile images and markers of the last control steps, if requested.
     pub tactile: Option<TactileHistory>,
     /// True forces at the left and right pad, if requested.
@@ -51,6 +83,15 @@ pub struct Observation {
     /// Forces on the left and the right gel in the last 1 to 8 control steps, oldest first, if requested: (x, y, z)
     /// of each, N, in the frame of the pad.
     pub force_history: Vec<[f64; 6]>,
+}
+
+/// An earlier control step of an observation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PastStep {
+    /// Proprioception.
+    pub robot: RobotState,
+    /// Images of the requested cameras.
+    pub cameras: Vec<Arc<CameraImage>>,
 }
 
 /// A camera image: rows from the top, sRGB, 8 bits per channel. A camera that enters an object during an episode sees
@@ -61,6 +102,11 @@ pub struct CameraImage {
     pub name: String,
     /// The image in the camera's size, by default 224 × 224.
     pub image: RgbImage,
+    /// Depth along the optical axis, m, height × width, if requested; infinite in the background.
+    pub depth: Option<Vec<f32>>,
+    /// Object at each pixel, height × width, if requested: its number in the scene, from 1; 0 in the background, 1000 for
+    /// the robot.
+    pub segmentation: Option<Vec<u16>>,
 }
 
 /// One finger's sensor at one control step.
@@ -97,12 +143,35 @@ impl Observation {
     pub fn camera(&self, name: &str) -> Option<&RgbImage> {
         self.cameras.iter().find(|camera| camera.name == name).map(|camera| &camera.image)
     }
+
+    /// The robot's state in the last `count` control steps, this one last. A short past repeats its oldest step.
+    pub fn robot_states(&self, count: usize) -> Vec<&RobotState> {
+        let all: Vec<_> = self.past.iter().map(|step| &step.robot).chain([&self.robot]).collect();
+        last(&all, count)
+    }
+
+    /// A camera's image in the last `count` control steps, this one last. A short past repeats its oldest step. Empty
+    /// if it was not requested.
+    pub fn camera_images(&self, name: &str, count: usize) -> Vec<&CameraImage> {
+        let steps = self.past.iter().map(|step| &step.cameras).chain([&self.cameras]);
+        let all: Vec<&CameraImage> = steps
+            .filter_map(|cameras| cameras.iter().find(|camera| camera.name == name).map(Arc::as_ref))
+            .collect();
+        last(&all, count)
+    }
 }
 
 impl TactileFrame {
     /// A frame from the output of a sensor. The cell is computed here, while the image is in the processor's cache.
     pub fn new(image: RgbImage, untouched: Arc<RgbImage>, markers: Markers) -> Self {
         Self { cell: mosaic_cell(&image), image, untouched, markers }
+    }
+
+    /// The image with the markers drawn into it.
+    pub fn with_markers(&self, style: MarkerStyle) -> RgbImage {
+        let mut image = self.image.clone();
+        self.markers.draw(&mut image, style);
+        image
     }
 
     /// Absolute difference from the image without contact, per pixel and channel.
@@ -121,25 +190,40 @@ impl TactileHistory {
         self.frames.last().map(AsRef::as_ref)
     }
 
-    /// The 4 × 4 mosaic of both fingers' images, 224 × 224.
-    pub fn mosaic(&self, layout: MosaicLayout) -> RgbImage {
-        let [left, right] =
-            [0, 1].map(|side| self.frames.iter().map(|frame| &frame[side].cell).collect::<Vec<_>>());
-        mosaic([&left, &right], layout)
+    /// The 4 × 4 mosaic of both fingers' images, 224 × 224, with the markers drawn in a style if there is one.
+    pub fn mosaic(&self, layout: MosaicLayout, markers: Option<MarkerStyle>) -> RgbImage {
+        let frames = self.last(HISTORY_LENGTH);
+        let drawn = markers.map(|style| {
+            [0, 1].map(|side| {
+                frames.iter().map(|frame| mosaic_cell(&frame[side].with_markers(style))).collect()
+            })
+        });
+        let cells: [Vec<&RgbImage>; 2] = match &drawn {
+            Some(drawn) => drawn.each_ref().map(|cells: &Vec<RgbImage>| cells.iter().collect()),
+            None => [0, 1].map(|side| frames.iter().map(|frame| &frame[side].cell).collect()),
+        };
+        mosaic([&cells[0], &cells[1]], layout)
     }
 
-    /// Marker positions in the shape (1 + 8, 198, 2) of SoftVTBench's policies, px: initial positions of the
-    /// left and right markers, then the positions in the last 8 control steps, oldest first. A short history
+    /// The frames of the last `count` control steps, oldest first. A short history repeats its oldest frame.
+    pub fn last(&self, count: usize) -> Vec<&[TactileFrame; 2]> {
+        last(&self.frames.iter().map(Arc::as_ref).collect::<Vec<_>>(), count)
+    }
+
+    /// Marker positions in the shape (1 + count, 198, 2) of SoftVTBench's policies, px: initial positions of the
+    /// left and right markers, then the positions in the last `count` control steps, oldest first. A short history
     /// repeats its oldest frame.
-    pub fn marker_motion(&self) -> Vec<[[f32; 2]; 2 * MARKER_COUNT]> {
+    pub fn marker_motion(&self, count: usize) -> Vec<[[f32; 2]; 2 * MARKER_COUNT]> {
         let row = |frame: &[TactileFrame; 2], when: usize| -> [[f32; 2]; 2 * MARKER_COUNT] {
             std::array::from_fn(|m| frame[m / MARKER_COUNT].markers.to_array()[when][m % MARKER_COUNT])
         };
         let Some(first) = self.frames.first() else { return Vec::new() };
-        let last = (0..HISTORY_LENGTH).filter_map(|place| {
-            let frame = self.frames.get((place + self.frames.len()).saturating_sub(HISTORY_LENGTH))?;
-            Some(row(frame, 1))
-        });
+        let last = self.last(count).into_iter().map(|frame| row(frame, 1));
         std::iter::once(row(first, 0)).chain(last).collect()
     }
+}
+
+/// The last `count` entries. Too few begin with copies of the oldest.
+pub(crate) fn last<T: Copy>(all: &[T], count: usize) -> Vec<T> {
+    (0..count).filter_map(|place| all.get((place + all.len()).saturating_sub(count)).copied()).collect()
 }

@@ -6,7 +6,7 @@
 //! distance that it does cover. The equation x'' = kp (g − x) − kd x' has the solution x(t) = g + e^{−ωt} ((x₀ − g) +
 //! (v₀ + ω (x₀ − g)) t) with ω = √kp. Position and rotation vector both follow it.
 
-use super::{Action, GripCommand, Observation, ToolCommand, ToolMotion, WidthLatch};
+use super::{Action, GripCommand, GripSwitch, Observation, ToolCommand, ToolMotion, WidthLatch};
 use softvt_benchmark::CONTROL_DT;
 use softvt_geometry::{Quat, Vec3};
 use softvt_robot::rotation;
@@ -22,6 +22,7 @@ pub struct CommandResolver {
     velocity: Vec3,
     angular_velocity: Vec3,
     latch: WidthLatch,
+    switch: GripSwitch,
 }
 
 impl CommandResolver {
@@ -30,6 +31,7 @@ impl CommandResolver {
         let (closure, force_n) = match command.grip {
             GripCommand::Closure(closure) => (closure, None),
             GripCommand::TwoWidth(answer) => (self.latch.closure(answer), None),
+            GripCommand::Latched { closes, hold_steps } => (self.switch.closure(closes, hold_steps), None),
             GripCommand::Force(force) if force < 0.0 => (0.0, None),
             GripCommand::Force(force) => (1.0, Some(force)),
         };
@@ -46,8 +48,8 @@ impl CommandResolver {
                     let moved = spring(&translation_b, &mut self.velocity);
                     (moved, spring(&rotation_b, &mut self.angular_velocity))
                 };
-                let orientation_b = rotation::from_axis_angle(&observation.ee_axis_angle_b);
-                goal(observation.ee_position_b, orientation_b, translation_b, rotation_b, closure)
+                let orientation_b = rotation::from_axis_angle(&observation.robot.ee_axis_angle_b);
+                goal(observation.robot.ee_position_b, orientation_b, translation_b, rotation_b, closure)
             }
         };
         Action { force_n, ..pose }

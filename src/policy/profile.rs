@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{GripCommand, SensorStreams};
 use softvt_robot::Side;
-use softvt_sensing::tactile::MosaicLayout;
+use softvt_sensing::tactile::{HISTORY_LENGTH, MarkerStyle, MosaicLayout};
 
 /// Names of the cameras that every scene has.
 const CAMERAS: [&str; 2] = ["third_person", "wrist"];
@@ -21,7 +21,13 @@ pub struct Profile {
     pub inputs: Vec<ProfileInput>,
     /// Encoding of the actions.
     pub actions: ActionEncoding,
+    /// True to send an observation in every control step, also in those in which no action is needed.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub observe_every_step: bool,
 }
+
+/// Maximum number of control steps of an input.
+pub const MAX_FRAMES: usize = 32;
 
 /// One entry of an observation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,9 +36,27 @@ pub struct ProfileInput {
     pub keys: Vec<String>,
     /// Content of the entry.
     pub source: InputSource,
+    /// Number of control steps in the entry, the present one last, along its first axis. `None`: the present step
+    /// alone without that axis, or all 8 steps of markers and forces.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frames: Option<usize>,
 }
 
 impl ProfileInput {
+    /// An input of the present step.
+    pub fn new(keys: Vec<String>, source: InputSource) -> Self {
+        Self { keys, source, frames: None }
+    }
+
+    /// Number of control steps that it needs.
+    pub fn steps(&self) -> usize {
+        let default = match self.source {
+            InputSource::MarkerMotion | InputSource::Force => HISTORY_LENGTH,
+            _ => 1,
+        };
+        self.frames.unwrap_or(default)
+    }
+
     /// The shortest of its keys.
     pub fn shortest_key(&self) -> &str {
         self.keys.iter().min_by_key(|key| key.len()).map_or("", String::as_str)
@@ -50,6 +74,21 @@ pub enum InputSource {
         /// True to rotate the image by 180°, as in LIBERO's data.
         half_turn: bool,
     },
+    /// Depth of a camera image along the optical axis, m, float32 (height, width); infinite in the background.
+    Depth {
+        /// Name of the camera.
+        camera: String,
+        /// True to rotate the image by 180°.
+        half_turn: bool,
+    },
+    /// Object at each pixel of a camera image, uint16 (height, width): its number in the scene, from 1; 0 in the
+    /// background, 1000 for the robot.
+    Segmentation {
+        /// Name of the camera.
+        camera: String,
+        /// True to rotate the image by 180°.
+        half_turn: bool,
+    },
     /// State of the robot, float32 (n).
     State {
         /// Parts of the vector, in order.
@@ -61,17 +100,28 @@ pub enum InputSource {
     TactileImage {
         /// Assignment of cells to fingers.
         layout: MosaicLayout,
+        /// Style in which the markers are drawn into the images; `None` for images without markers.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        markers: Option<MarkerStyle>,
     },
     /// The last tactile image of one finger, uint8 (240, 320, 3).
     Tactile {
         /// The finger.
         finger: Side,
+        /// Style in which the markers are drawn into the image; `None` for an image without markers.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        markers: Option<MarkerStyle>,
     },
-    /// Initial and last 8 positions of the markers of both fingers, float32 (9, 198, 2), px.
+    /// Initial and last positions of the markers of both fingers, float32 (1 + frames, 198, 2), px.
     MarkerMotion,
-    /// True forces on the left and the right gel in the last 8 control steps, float32 (8, 6), N, pad frame. No
+    /// True forces on the left and the right gel in the last control steps, float32 (frames, 6), N, pad frame. No
     /// real sensor measures them.
     Force,
+    /// Identity of the request, a map; see [`QueryId`](super::QueryId).
+    Query,
+    /// Seed of the request for policies that draw random numbers, an integer below 2³²; see
+    /// [`QueryId::seed`](super::QueryId::seed).
+    QuerySeed,
 }
 
 /// A part of a state vector.
@@ -88,6 +138,10 @@ pub enum StatePart {
     QuaternionXyzw,
     /// Arm joint angles, rad (7).
     Joints,
+    /// Arm joint velocities, rad/s (7).
+    JointVelocities,
+    /// Torques of the arm's drives, N m, without gravity, which is compensated (7).
+    JointTorques,
     /// Distance between the gels, m: 0 to 0.08 (1).
     GripperWidth,
     /// Position of one finger, half the gripper width, m: 0 to 0.04 (1).
@@ -104,7 +158,7 @@ impl StatePart {
         match self {
             Self::Position | Self::AxisAngle => 3,
             Self::QuaternionWxyz | Self::QuaternionXyzw => 4,
-            Self::Joints => 7,
+            Self::Joints | Self::JointVelocities | Self::JointTorques => 7,
             Self::FingerPair => 2,
             Self::GripperWidth | Self::FingerPosition | Self::Closure => 1,
         }
@@ -223,6 +277,19 @@ pub struct GripperValues {
     pub closed: f64,
     /// What the value commands.
     pub code: GripCode,
+    /// For [`GripCode::Binary`]: hysteresis, instead of the middle between both values.
+    pub latch: Option<GripLatch>,
+}
+
+/// Hysteresis of a binary gripper, as SoftVTBench's release v0.2 decodes continuous answers.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GripLatch {
+    /// Value from which on, towards that of the closed gripper, an answer closes.
+    pub close: f64,
+    /// Value from which on, towards that of the open gripper, an answer opens.
+    pub open: f64,
+    /// Control steps for which a change is kept whatever is answered.
+    pub hold_steps: u32,
 }
 
 /// [`GripperValues`] as files contain them.
@@ -236,27 +303,44 @@ struct GripperValuesFile {
     /// Missing in files of version 0.1.
     #[serde(default)]
     code: Option<GripCode>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    latch: Option<GripLatch>,
 }
 
 impl From<GripperValuesFile> for GripperValues {
-    fn from(GripperValuesFile { open, closed, binary, code }: GripperValuesFile) -> Self {
+    fn from(GripperValuesFile { open, closed, binary, code, latch }: GripperValuesFile) -> Self {
         let stated = if binary { GripCode::Binary } else { GripCode::Continuous };
-        Self { open, closed, code: code.unwrap_or(stated) }
+        Self { open, closed, code: code.unwrap_or(stated), latch }
     }
 }
 
 impl From<GripperValues> for GripperValuesFile {
-    fn from(GripperValues { open, closed, code }: GripperValues) -> Self {
-        Self { open, closed, binary: code == GripCode::Binary, code: Some(code) }
+    fn from(GripperValues { open, closed, code, latch }: GripperValues) -> Self {
+        Self { open, closed, binary: code == GripCode::Binary, code: Some(code), latch }
     }
 }
 
 impl GripperValues {
     /// Grip forces in N; below 0 opens.
-    pub const FORCE: Self = Self { open: -1.0, closed: 1.0, code: GripCode::Force };
+    pub const FORCE: Self = Self { open: -1.0, closed: 1.0, code: GripCode::Force, latch: None };
+
+    /// Closures between the values of the open and the closed gripper.
+    pub const fn new(open: f64, closed: f64) -> Self {
+        Self { open, closed, code: GripCode::Continuous, latch: None }
+    }
 
     /// The command of a value.
     pub fn command(&self, value: f64) -> GripCommand {
+        if let (GripCode::Binary, Some(GripLatch { close, open, hold_steps })) = (self.code, self.latch) {
+            let towards_closed = |limit: f64| (value - limit) * (self.closed - self.open) >= 0.0;
+            let towards_open = |limit: f64| (value - limit) * (self.closed - self.open) <= 0.0;
+            let closes = match (towards_closed(close), towards_open(open)) {
+                (true, _) => Some(true),
+                (false, true) => Some(false),
+                (false, false) => None,
+            };
+            return GripCommand::Latched { closes, hold_steps };
+        }
         match self.code {
             GripCode::Continuous | GripCode::Binary => GripCommand::Closure(self.closure(value)),
             GripCode::TwoWidth => GripCommand::TwoWidth(self.closure(value)),
@@ -278,18 +362,24 @@ impl GripperValues {
     /// The same values in another code. `None` if there are none: a force says nothing about a closure.
     pub fn with_code(self, code: GripCode) -> Option<Self> {
         match (self.code, code) {
+            (own, code) if own == code => Some(self),
             (_, GripCode::Force) => Some(Self::FORCE),
             (GripCode::Force, _) => None,
-            _ => Some(Self { code, ..self }),
+            _ => Some(Self { code, latch: None, ..self }),
         }
     }
 }
 
 /// Built-in profiles and their descriptions.
-pub const PROFILES: [(&str, &str); 4] = [
+pub const PROFILES: [(&str, &str); 6] = [
     ("vision", "both cameras, state, prompt; absolute pose; gripper open or closed (binary)"),
     ("visuo_tactile", "vision plus tactile images and markers of 8 frames; continuous gripper"),
     ("softvtbench", "keys and units of the released SoftVTBench client, with true forces (force_observed)"),
+    (
+        "softvtbench_v02",
+        "those of SoftVTBench's release v0.2: markers of 2 steps, drawn into the tactile images",
+    ),
+    ("softvtbench_v02_latched", "the same with its gripper: open or closed fully, with hysteresis"),
     ("libero", "LIBERO's interface: images rotated by 180°, 8 state numbers, delta poses"),
 ];
 
@@ -299,18 +389,22 @@ impl Profile {
         let both = |name: &str| vec![format!("observation/{name}"), name.to_owned()];
         let plain = |camera: &str| InputSource::Camera { camera: camera.to_owned(), half_turn: false };
         let finger = vec![StatePart::Position, StatePart::AxisAngle, StatePart::FingerPosition];
-        let input = |keys: Vec<String>, source| ProfileInput { keys, source };
+        let input = ProfileInput::new;
         let mut inputs = vec![
             input(both("image"), plain(CAMERAS[0])),
             input(both("wrist_image"), plain(CAMERAS[1])),
             input(both("state"), InputSource::State { parts: finger }),
             input(vec!["prompt".to_owned()], InputSource::Prompt),
         ];
+        let mosaic = |markers| InputSource::TactileImage { layout: MosaicLayout::Rows, markers };
         let tactile = [
-            input(both("tactile_image"), InputSource::TactileImage { layout: MosaicLayout::Rows }),
+            input(both("tactile_image"), mosaic(None)),
             input(both("tactile_marker_motion"), InputSource::MarkerMotion),
         ];
-        let closure = GripperValues { open: 0.0, closed: 1.0, code: GripCode::Continuous };
+        let force = || input(both("tactile_gripper_force"), InputSource::Force);
+        // Finger positions, m.
+        let fingers = |code| GripperValues { code, ..GripperValues::new(0.04, 0.0) };
+        let closure = GripperValues::new(0.0, 1.0);
         let absolute = |gripper| ActionEncoding::new(PoseEncoding::Absolute, gripper);
         let actions = match name {
             "vision" => absolute(GripperValues { code: GripCode::Binary, ..closure }),
@@ -320,10 +414,20 @@ impl Profile {
             }
             "softvtbench" => {
                 inputs.extend(tactile);
-                inputs.push(input(both("tactile_gripper_force"), InputSource::Force));
+                inputs.push(force());
                 inputs[3].keys.push("observation/prompt".to_owned());
-                // Commanded position of each finger, m.
-                absolute(GripperValues { open: 0.04, closed: 0.0, code: GripCode::Continuous })
+                absolute(fingers(GripCode::Continuous))
+            }
+            "softvtbench_v02" | "softvtbench_v02_latched" => {
+                inputs.push(input(both("tactile_image"), mosaic(Some(MarkerStyle::BlackArrows))));
+                let motion = input(both("tactile_marker_motion"), InputSource::MarkerMotion);
+                inputs.push(ProfileInput { frames: Some(2), ..motion });
+                inputs.push(force());
+                let latch = GripLatch { close: 0.0398, open: 0.03995, hold_steps: 10 };
+                absolute(match name {
+                    "softvtbench_v02" => fingers(GripCode::Continuous),
+                    _ => GripperValues { latch: Some(latch), ..fingers(GripCode::Binary) },
+                })
             }
             "libero" => {
                 let turned =
@@ -335,12 +439,14 @@ impl Profile {
                 inputs[..3].iter_mut().for_each(|input| input.keys.truncate(1));
                 ActionEncoding::new(
                     PoseEncoding::DeltaOsc { translation_m: 0.05, rotation_rad: 0.5 },
-                    GripperValues { open: -1.0, closed: 1.0, code: GripCode::Binary },
+                    GripperValues { code: GripCode::Binary, ..GripperValues::new(-1.0, 1.0) },
                 )
             }
             _ => return None,
         };
-        Some(Self { name: name.to_owned(), inputs, actions })
+        inputs.push(input(vec!["softvt".to_owned()], InputSource::Query));
+        inputs.push(input(vec!["__softvtbench_rng_seed".to_owned()], InputSource::QuerySeed));
+        Some(Self { name: name.to_owned(), inputs, actions, observe_every_step: false })
     }
 
     /// Sensor streams that its inputs need.
@@ -348,8 +454,14 @@ impl Profile {
         let mut streams = SensorStreams::default();
         for input in &self.inputs {
             match &input.source {
-                InputSource::Camera { camera, .. } if !streams.cameras.contains(camera) => {
-                    streams.cameras.push(camera.clone());
+                InputSource::Camera { camera, .. }
+                | InputSource::Depth { camera, .. }
+                | InputSource::Segmentation { camera, .. } => {
+                    if !streams.cameras.contains(camera) {
+                        streams.cameras.push(camera.clone());
+                    }
+                    streams.depth |= matches!(input.source, InputSource::Depth { .. });
+                    streams.segmentation |= matches!(input.source, InputSource::Segmentation { .. });
                 }
                 InputSource::TactileImage { .. }
                 | InputSource::Tactile { .. }
@@ -357,8 +469,12 @@ impl Profile {
                     streams.tactile = true;
                 }
                 InputSource::Force => streams.force = true,
-                InputSource::Camera { .. } | InputSource::State { .. } | InputSource::Prompt => {}
+                InputSource::State { .. }
+                | InputSource::Prompt
+                | InputSource::Query
+                | InputSource::QuerySeed => {}
             }
+            streams.past_steps = streams.past_steps.max(input.steps() - 1);
         }
         streams
     }
@@ -410,6 +526,23 @@ mod tests {
         assert_eq!(serde_json::from_str::<GripperValues>(&text).unwrap(), widths);
         assert_eq!(GripCode::named("two-width"), Some(GripCode::TwoWidth));
         assert_eq!(GripCode::named("twowidth"), None);
+    }
+
+    #[test]
+    fn a_latched_gripper_has_two_limits() {
+        let gripper = Profile::named("softvtbench_v02_latched").unwrap().actions.gripper;
+        let closes = |value| match gripper.command(value) {
+            GripCommand::Latched { closes, hold_steps: 10 } => closes,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(
+            [0.0, 0.0398, 0.0399, 0.03995, 0.04].map(closes),
+            [Some(true), Some(true), None, Some(false), Some(false)]
+        );
+        let text = serde_json::to_string(&gripper).unwrap();
+        assert_eq!(serde_json::from_str::<GripperValues>(&text).unwrap(), gripper);
+        assert_eq!(gripper.with_code(GripCode::Binary), Some(gripper));
+        assert_eq!(gripper.with_code(GripCode::Continuous).unwrap().latch, None);
     }
 
     #[test]

@@ -74,7 +74,7 @@ impl Controller for ChunkedPolicy<'_> {
     }
 
     fn wants_observation(&self) -> bool {
-        self.remaining.is_empty()
+        self.remaining.is_empty() || self.policy.observes_every_step()
     }
 
     fn act(&mut self, _sim: &Simulation, observation: &Observation) -> Result<Option<Action>, PolicyError> {
@@ -85,6 +85,8 @@ impl Controller for ChunkedPolicy<'_> {
             let ActionChunk { mut commands } = self.policy.act(observation)?;
             commands.truncate(self.replan);
             self.remaining = commands.into();
+        } else if self.policy.observes_every_step() {
+            self.policy.observe(observation)?;
         }
         let Some(command) = self.remaining.pop_front() else {
             return Err(PolicyError::Response("has no action at all".to_owned()));

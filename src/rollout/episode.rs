@@ -387,16 +387,12 @@ impl Episode {
     /// # Errors
     /// A sensor stream cannot be computed.
     pub fn observe(&mut self, streams: &SensorStreams) -> Result<Observation, EpisodeError> {
-        let tool = self.sim.robot.tool_b(&self.sim.world);
         let proprioceptive = Observation {
             time_s: self.time(),
-            ee_position_b: tool.translation.vector,
-            ee_axis_angle_b: rotation::axis_angle(&tool.rotation),
-            joints: self.sim.robot.q(&self.sim.world),
-            gripper_width_m: self.sim.robot.width(&self.sim.world),
-            closure: self.sim.robot.closure(),
+            robot: self.sim.robot.state(&self.sim.world),
             prompt: self.spec.task.prompt.clone(),
             cameras: Vec::new(),
+            past: Vec::new(),
             tactile: None,
             forces: None,
             force_history: Vec::new(),
@@ -446,7 +442,7 @@ impl Episode {
             recorded.frames.push(frame.clone());
             recorded.d_pct.push(d_pct);
         }
-        self.history.push(frame);
+        self.history.push(frame, self.sim.robot.state(&self.sim.world), self.streams.past_steps);
     }
 
     fn time(&self) -> f64 {

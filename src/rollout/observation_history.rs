@@ -4,12 +4,19 @@ use std::{collections::VecDeque, sync::Arc};
 
 use super::{sensor_assets::SensingError, sensors::SensorSuite};
 use softvt_physics::world::WorldSnapshot;
-use softvt_policy::{CameraImage, Observation, SensorStreams, TactileFrame, TactileHistory};
+use softvt_policy::{
+    CameraImage, Observation, PastStep, RobotState, SensorStreams, TactileFrame, TactileHistory,
+};
 use softvt_sensing::tactile::HISTORY_LENGTH;
 
 #[derive(Clone, Debug)]
 struct HistoryEntry {
     frame: WorldSnapshot,
+    robot: RobotState,
+    /// Camera images, once they were requested.
+    cameras: Option<Vec<Arc<CameraImage>>>,
+    /// True if a requested image was taken inside an object.
+    camera_inside: bool,
     /// Tactile frames of both fingers, once they were requested.
     tactile: Option<Arc<[TactileFrame; 2]>>,
 }
@@ -23,12 +30,18 @@ pub(super) struct ObservationHistory {
 }
 
 impl ObservationHistory {
-    /// Appends the state after a control step.
-    pub(super) fn push(&mut self, frame: WorldSnapshot) {
-        if self.entries.len() == HISTORY_LENGTH {
+    /// Appends the state after a control step; `past_steps` earlier ones may be requested.
+    pub(super) fn push(&mut self, frame: WorldSnapshot, robot: RobotState, past_steps: usize) {
+        while self.entries.len() >= HISTORY_LENGTH.max(past_steps + 1) {
             self.entries.pop_front();
         }
-        self.entries.push_back(HistoryEntry { frame, tactile: None });
+        self.entries.push_back(HistoryEntry {
+            frame,
+            robot,
+            cameras: None,
+            camera_inside: false,
+            tactile: None,
+        });
     }
 
     /// Adds the requested streams to an observation that has none.
@@ -38,20 +51,18 @@ impl ObservationHistory {
         proprioceptive: Observation,
         streams: &SensorStreams,
     ) -> Result<Observation, SensingError> {
-        let Some(HistoryEntry { frame, .. }) = self.entries.back() else { return Ok(proprioceptive) };
-        let mut cameras = Vec::with_capacity(streams.cameras.len());
-        let mut inside = false;
-        for name in &streams.cameras {
-            let camera = sensors.camera(name)?.clone();
-            let rendered = sensors.render(frame, &camera)?;
-            inside |= rendered.inside.is_some();
-            cameras.push(CameraImage { name: camera.name, image: rendered.into_rgb_image() });
+        let first = self.entries.len().saturating_sub(streams.past_steps + 1);
+        let mut steps = Vec::with_capacity(streams.past_steps + 1);
+        for entry in self.entries.iter_mut().skip(first) {
+            steps.push(PastStep { robot: entry.robot, cameras: entry.images(sensors, streams)? });
         }
-        self.camera_inside += u32::from(inside);
+        let Some(PastStep { cameras, .. }) = steps.pop() else { return Ok(proprioceptive) };
+        self.camera_inside += self.entries.back().map_or(0, |entry| u32::from(entry.camera_inside));
+        let Some(HistoryEntry { frame, .. }) = self.entries.back() else { return Ok(proprioceptive) };
         let forces = streams.force.then(|| SensorSuite::pad_forces(frame));
         let force_history = if streams.force { self.forces() } else { Vec::new() };
         let tactile = if streams.tactile { Some(self.tactile(sensors)?) } else { None };
-        Ok(Observation { cameras, tactile, forces, force_history, ..proprioceptive })
+        Ok(Observation { cameras, past: steps, tactile, forces, force_history, ..proprioceptive })
     }
 
     /// Forces on the left and right pad in the last states, N.
@@ -65,8 +76,8 @@ impl ObservationHistory {
 
     /// Tactile frames of the last states; each is computed once.
     fn tactile(&mut self, sensors: &mut SensorSuite) -> Result<TactileHistory, SensingError> {
-        let mut frames = Vec::with_capacity(HISTORY_LENGTH);
-        for HistoryEntry { frame, tactile } in &mut self.entries {
+        let mut frames = Vec::with_capacity(self.entries.len());
+        for HistoryEntry { frame, tactile, .. } in &mut self.entries {
             let both = match tactile.take() {
                 Some(both) => both,
                 None => Arc::new(sensors.tactile_frames(frame)?),
@@ -75,5 +86,30 @@ impl ObservationHistory {
             *tactile = Some(both);
         }
         Ok(TactileHistory { frames })
+    }
+}
+
+impl HistoryEntry {
+    /// Images of the requested cameras. Those of a state are rendered once.
+    fn images(
+        &mut self,
+        sensors: &mut SensorSuite,
+        streams: &SensorStreams,
+    ) -> Result<Vec<Arc<CameraImage>>, SensingError> {
+        if let Some(images) = self.cameras.as_ref().filter(|images| images.len() == streams.cameras.len()) {
+            return Ok(images.clone());
+        }
+        let mut images = Vec::with_capacity(streams.cameras.len());
+        for name in &streams.cameras {
+            let camera = sensors.camera(name)?.clone();
+            let rendered = sensors.render(&self.frame, &camera)?;
+            self.camera_inside |= rendered.inside.is_some();
+            let depth = streams.depth.then(|| rendered.depth.clone());
+            let segmentation = streams.segmentation.then(|| rendered.segmentation.clone());
+            let image = rendered.into_rgb_image();
+            images.push(Arc::new(CameraImage { name: camera.name, image, depth, segmentation }));
+        }
+        self.cameras = Some(images.clone());
+        Ok(images)
     }
 }

@@ -8,12 +8,14 @@ use softvt_physics::{
     contact::{Collider, Friction, SurfaceStiffness},
     world::JointDrive,
 };
+use softvt_policy::RobotState;
 use softvt_robot::{
     RobotSpec, Side,
     gripper::{self, FingerState, GripTarget, GripperSetpoint},
     ik::DiffIk,
     pads::{self, PadSurface},
     panda::{self, ARM_DOFS},
+    rotation,
 };
 
 /// The robot of a simulation: an articulation with position drives, which follows commands of the tool pose
@@ -141,6 +143,22 @@ impl RobotInstance {
     pub fn width(&self, world: &World) -> f64 {
         let q = &world.articulation(self.articulation).state.q;
         gripper::width([q[ARM_DOFS], q[ARM_DOFS + 1]])
+    }
+
+    /// What the robot measures of itself.
+    pub fn state(&self, world: &World) -> RobotState {
+        let articulation = world.articulation(self.articulation);
+        let torque = |i: usize| articulation.drives()[i].as_ref().map_or(0.0, |drive| drive.force);
+        let tool_b = self.tool_b(world);
+        RobotState {
+            ee_position_b: tool_b.translation.vector,
+            ee_axis_angle_b: rotation::axis_angle(&tool_b.rotation),
+            joints: self.q(world),
+            joint_velocities: std::array::from_fn(|i| articulation.state.v[i]),
+            joint_torques: std::array::from_fn(torque),
+            gripper_width_m: self.width(world),
+            closure: self.closure(),
+        }
     }
 
     /// Closure of the last command that the robot has responded to, 0..=1; 1 for a grip force.

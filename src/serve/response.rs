@@ -90,7 +90,7 @@ pub(super) fn transition(
 
 fn encoded(observation: &Observation, profile: &Profile) -> Value {
     let entry = |input: &ProfileInput| {
-        Some((input.shortest_key().into(), content(observation, &input.source)?.into_value(true)))
+        Some((input.shortest_key().into(), content(observation, input, None)?.into_value(true)))
     };
     Value::Map(profile.inputs.iter().filter_map(entry).collect())
 }

@@ -12,7 +12,7 @@ use softvt_policy::{
     msgpack::map,
     profile::{
         ACTION_LEN, ActionEncoding, ActionUnits, GripCode, GripperValues, InputSource, PoseEncoding,
-        StatePart,
+        ProfileInput, StatePart,
     },
 };
 
@@ -22,18 +22,22 @@ const MAX_POSITION_M: f64 = 2.0;
 const MAX_ANGLE: f64 = PI + 1e-3;
 /// Bound of marker positions, px; larger than a tactile image.
 const MAX_MARKER_PX: f64 = 1e4;
+/// Bound of joint velocities, rad/s, and of the torques of their drives, N m; larger than what the arm reaches.
+const MAX_JOINT_SPEED: f64 = 1e3;
+const MAX_TORQUE: f64 = 1e3;
 /// Bound of forces, N.
 const MAX_FORCE_N: f64 = 1e6;
 
 /// Space of the observations. `first` is an example, which gives the shapes.
 pub(super) fn observation(config: &ServerConfig, first: &Observation) -> Value {
     let entries = config.profile.inputs.iter().filter_map(|input| {
-        let space = match content(first, &input.source)? {
+        let space = match content(first, input, None)? {
+            ObservationEntry::Query(_) => return None,
             ObservationEntry::Text(_) => text(config),
             ObservationEntry::Array(array) => {
-                let high = largest(&input.source);
+                let high = largest(input);
                 let low = match array.dtype.as_str() {
-                    "|u1" => vec![0.0],
+                    "|u1" | "<u2" => vec![0.0],
                     _ => high.iter().map(|x| -x).collect(),
                 };
                 array_space(&array.dtype, &array.shape, low, high)
@@ -57,7 +61,7 @@ pub(super) fn action(encoding: &ActionEncoding, effort_n: f64) -> Value {
     let end = |i: usize, sign: f64| (sign * scale[i].signum() * most[i] - offset[i]) / scale[i];
     let mut low: Vec<f64> = (0..most.len()).map(|i| end(i, -1.0)).collect();
     let mut high: Vec<f64> = (0..most.len()).map(|i| end(i, 1.0)).collect();
-    let GripperValues { open, closed, code } = encoding.gripper;
+    let GripperValues { open, closed, code, .. } = encoding.gripper;
     low.push(open.min(closed));
     high.push(if code == GripCode::Force { effort_n } else { open.max(closed) });
     array_space("<f8", &[ACTION_LEN], low, high)
@@ -82,14 +86,17 @@ fn array_space(dtype: &str, shape: &[usize], low: Vec<f64>, high: Vec<f64>) -> V
 }
 
 /// Largest magnitude of all elements, or of each.
-fn largest(source: &InputSource) -> Vec<f64> {
-    match source {
+fn largest(input: &ProfileInput) -> Vec<f64> {
+    match &input.source {
         InputSource::State { parts } => {
-            parts.iter().flat_map(|part| vec![max_magnitude(*part); part.count()]).collect()
+            let one = parts.iter().flat_map(|part| vec![max_magnitude(*part); part.count()]);
+            one.collect::<Vec<_>>().repeat(input.steps())
         }
+        InputSource::Depth { .. } => vec![f64::INFINITY],
+        InputSource::Segmentation { .. } => vec![f64::from(u16::MAX)],
         InputSource::MarkerMotion => vec![MAX_MARKER_PX],
         InputSource::Force => vec![MAX_FORCE_N],
-        InputSource::Prompt => vec![f64::INFINITY],
+        InputSource::Prompt | InputSource::Query | InputSource::QuerySeed => vec![f64::INFINITY],
         InputSource::Camera { .. } | InputSource::TactileImage { .. } | InputSource::Tactile { .. } => {
             vec![255.0]
         }
@@ -102,6 +109,8 @@ fn max_magnitude(part: StatePart) -> f64 {
         StatePart::Position => MAX_POSITION_M,
         StatePart::AxisAngle => MAX_ANGLE,
         StatePart::Joints => 2.0 * PI,
+        StatePart::JointVelocities => MAX_JOINT_SPEED,
+        StatePart::JointTorques => MAX_TORQUE,
         // Quaternions, the closure, and widths in metres.
         _ => 1.0 + 1e-3,
     }

@@ -10,7 +10,7 @@ use softvt::{
         record::EpisodeRecord,
         summary::SuiteSummary,
     },
-    policy::{Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief},
+    policy::{Action, ActionChunk, Observation, Policy, PolicyError, RobotState, SensorStreams, TaskBrief},
     report::terminal,
     rollout::{AssetCache, ChunkedPolicy, Episode, EpisodeSpec, SensorAssets, SensorSuite, Simulation},
     script::{self, LoadedScript},
@@ -40,7 +40,7 @@ impl Policy for &mut RecordingPolicy {
 
     fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError> {
         self.seen.push(observation.clone());
-        let (position_b, axis_angle_b) = (observation.ee_position_b, observation.ee_axis_angle_b);
+        let (position_b, axis_angle_b) = (observation.robot.ee_position_b, observation.robot.ee_axis_angle_b);
         Ok(Action::new(position_b, axis_angle_b, 0.0).into())
     }
 }
@@ -56,7 +56,7 @@ fn played(project: &Project, streams: SensorStreams) -> Result<(Vec<Observation>
     let episode =
         Episode::start(spec, &AssetCache::default(), &SensorAssets::default()).map_err(|e| e.to_string())?;
     let mut witness = RecordingPolicy { streams, seen: Vec::new() };
-    let brief = TaskBrief { suite: "one".into(), task: 0, prompt: "wait".into(), episode: 0 };
+    let brief = TaskBrief { suite: "one".into(), task: 0, prompt: "wait".into(), episode: 0, seed: 0 };
     let mut driver = ChunkedPolicy::new(Box::new(&mut witness), brief, 1);
     let outcome = episode.run(&mut driver).map_err(|e| e.to_string());
     drop(driver);
@@ -74,8 +74,12 @@ fn shown(streams: SensorStreams) -> Result<Vec<Observation>, String> {
 
 #[test]
 fn policies_get_the_requested_streams_only() {
-    let all =
-        SensorStreams { cameras: vec!["wrist".into(), "third_person".into()], tactile: true, force: true };
+    let all = SensorStreams {
+        cameras: vec!["wrist".into(), "third_person".into()],
+        tactile: true,
+        force: true,
+        ..SensorStreams::default()
+    };
     let seen = shown(all.clone()).expect("shown");
     assert_eq!(seen.len(), 10);
     for (step, observation) in seen.iter().enumerate() {
@@ -85,22 +89,55 @@ fn policies_get_the_requested_streams_only() {
         let tactile = observation.tactile.as_ref().expect("asked for");
         assert_eq!(tactile.frames.len(), (step + 1).min(8));
         assert_eq!(tactile.now().expect("a frame")[0].image.dimensions(), (320, 240));
-        assert_eq!(tactile.mosaic(MosaicLayout::Rows).dimensions(), (224, 224));
-        assert_eq!(tactile.marker_motion().len(), 9);
+        assert_eq!(tactile.mosaic(MosaicLayout::Rows, None).dimensions(), (224, 224));
+        assert_eq!(tactile.marker_motion(8).len(), 9);
         assert_eq!(
-            tactile.marker_motion()[0][99..],
-            tactile.marker_motion()[0][..99],
+            tactile.marker_motion(8)[0][99..],
+            tactile.marker_motion(8)[0][..99],
             "both fingers start alike"
         );
         let forces = observation.forces.as_ref().expect("asked for");
         assert_eq!((forces[0].wrench.normal(), forces[1].taxels.shape), (0.0, [25, 21]));
-        assert!((0.0..=0.0805).contains(&observation.gripper_width_m));
+        assert!((0.0..=0.0805).contains(&observation.robot.gripper_width_m));
         assert_eq!(observation.prompt, "wait");
     }
     assert_eq!(seen, shown(all).expect("shown"), "the same bytes again");
     let blind = shown(SensorStreams::default()).expect("shown");
     assert!(blind.iter().all(|o| o.cameras.is_empty() && o.tactile.is_none() && o.forces.is_none()));
-    assert_eq!(blind[9].joints, seen[9].joints, "looking changes nothing");
+    assert_eq!(blind[9].robot.joints, seen[9].robot.joints, "looking changes nothing");
+}
+
+#[test]
+fn earlier_steps_are_those_that_were_observed_then() {
+    let streams = SensorStreams {
+        cameras: vec!["wrist".into()],
+        past_steps: 2,
+        depth: true,
+        segmentation: true,
+        ..SensorStreams::default()
+    };
+    let seen = shown(streams).expect("shown");
+    for (step, observation) in seen.iter().enumerate() {
+        assert_eq!(observation.past.len(), step.min(2));
+        for (back, past) in observation.past.iter().rev().enumerate() {
+            let then = &seen[step - 1 - back];
+            assert_eq!((&past.robot, &past.cameras), (&then.robot, &then.cameras));
+        }
+        let camera = &observation.cameras[0];
+        let (depth, objects) =
+            (camera.depth.as_ref().expect("depth"), camera.segmentation.as_ref().expect("objects"));
+        assert_eq!((depth.len(), objects.len()), (224 * 224, 224 * 224));
+        assert!(
+            depth.iter().zip(objects).all(|(depth, object)| (*depth < 5.0) == (*object > 0)),
+            "step {step}"
+        );
+    }
+    let now = &seen[9];
+    let widths = |count| now.robot_states(count).iter().map(|robot| robot.joints[1]).collect::<Vec<_>>();
+    assert_eq!(widths(3), [7, 8, 9].map(|step| seen[step].robot.joints[1]));
+    assert_eq!(seen[0].robot_states(3), [&seen[0].robot; 3], "the first step is repeated");
+    let blind = shown(SensorStreams { past_steps: 2, ..SensorStreams::default() }).expect("shown");
+    assert_eq!((blind[9].past.len(), &blind[9].past[0].robot), (2, &seen[7].robot));
 }
 
 #[test]
@@ -216,19 +253,18 @@ fn left_and_right_are_those_of_the_image() {
 fn an_observation_has_no_field_for_hidden_state() {
     let observation = shown(SensorStreams::default()).expect("shown").swap_remove(0);
     // Every field by name, so that a new one must be added here; none may be hidden state.
-    let Observation {
-        time_s: _,
+    let Observation { time_s: _, robot, prompt: _, cameras: _, past, tactile: _, forces, force_history } =
+        observation;
+    let RobotState {
         ee_position_b: _,
         ee_axis_angle_b: _,
         joints: _,
+        joint_velocities: _,
+        joint_torques: _,
         gripper_width_m: _,
         closure: _,
-        prompt: _,
-        cameras: _,
-        tactile: _,
-        forces,
-        force_history,
-    } = observation;
+    } = robot;
+    assert!(past.is_empty());
     assert!(
         forces.is_none() && force_history.is_empty(),
         "true forces only for those who ask, and their results say so"

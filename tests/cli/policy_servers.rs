@@ -481,3 +481,130 @@ fn lines_of_another_run_are_refused() {
     let message = project.refusal("x.lua --policy noop --require safety>=90");
     assert!(message.contains("a share of 1"), "{message}");
 }
+
+/// A profile with entries of several control steps, and of every kind of image.
+const HISTORY: &str = r#"return softvt.profile {
+  name = "history",
+  inputs = {
+    { keys = { "observation/state" }, source = "state", parts = { "position", "axis_angle", "closure" } },
+    { keys = { "two" }, source = "camera", camera = "wrist", frames = 2 },
+    { keys = { "one" }, source = "camera", camera = "wrist", frames = 1 },
+    { keys = { "depth" }, source = "depth", camera = "wrist" },
+    { keys = { "objects" }, source = "segmentation", camera = "wrist", frames = 3 },
+    { keys = { "arm" }, source = "state", parts = { "joints", "joint_velocities", "joint_torques" }, frames = 4 },
+    { keys = { "markers" }, source = "marker_motion", frames = 2 },
+    { keys = { "drawn" }, source = "tactile", finger = "left", markers = "black_arrows", frames = 2 },
+    { keys = { "mosaic" }, source = "tactile_image", markers = "dots" },
+    { keys = { "id" }, source = "query" },
+    { keys = { "seed" }, source = "query_seed" },
+  },
+  actions = { pose = "absolute", gripper = { open = 0, closed = 1 } },
+OBSERVE}"#;
+
+/// The entry of a map.
+fn entry<'a>(map: &'a Value, key: &str) -> &'a Value {
+    let is = |name: &Value| name.as_str() == Some(key) || name.as_slice() == Some(key.as_bytes());
+    &map.as_map().expect("a map").iter().find(|(name, _)| is(name)).unwrap_or_else(|| panic!("no {key}")).1
+}
+
+fn shape(observation: &Value, key: &str) -> Vec<u64> {
+    let shape = entry(entry(observation, key), "shape").as_array().expect("a list");
+    shape.iter().filter_map(Value::as_u64).collect()
+}
+
+fn bytes<'a>(observation: &'a Value, key: &str) -> &'a [u8] {
+    entry(entry(observation, key), "data").as_slice().expect("bytes")
+}
+
+/// The messages that a server gets in an episode of 12 steps in chunks of 5, with the metadata `greeting`.
+fn messages(greeting: Value, observe: &str, words: &str) -> (Vec<Value>, CliOutput) {
+    let seen = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
+    let kept = seen.clone();
+    let address = server(9, move |_, mut socket| {
+        let _ = socket.send(packed(&greeting));
+        while let Some(message) = observation(&mut socket) {
+            let wants = entry(entry(&message, "id"), "wants_actions").as_bool().expect("stated");
+            let reply = if wants { hold(&message, 50) } else { packed(&Value::Map(Vec::new())) };
+            kept.lock().expect("kept").push(message);
+            if socket.send(reply).is_err() {
+                return;
+            }
+        }
+    });
+    let project = project();
+    project.write("history.lua", HISTORY.replace("OBSERVE", observe).as_bytes());
+    let output = project.softvt(&format!(
+        "x.lua --policy {address} --profile history.lua --threads 1 --replan 5 --policy-timeout 20 --out run --episodes 1 {words}"
+    ));
+    let messages = seen.lock().expect("kept").clone();
+    (messages, output)
+}
+
+#[test]
+fn entries_have_as_many_control_steps_as_the_profile_asks_for() {
+    let (messages, output) = messages(Value::Map(Vec::new()), "", "--seed 11");
+    assert_eq!((output.code, messages.len()), (0, 3), "{}", output.err);
+    let edge = 224;
+    for message in &messages {
+        for (key, expected) in [
+            ("two", vec![2, edge, edge, 3]),
+            ("one", vec![1, edge, edge, 3]),
+            ("depth", vec![edge, edge]),
+            ("objects", vec![3, edge, edge]),
+            ("arm", vec![4, 21]),
+            ("markers", vec![3, 198, 2]),
+            ("drawn", vec![2, 240, 320, 3]),
+            ("mosaic", vec![edge, edge, 3]),
+        ] {
+            assert_eq!(shape(message, key), expected, "{key}");
+        }
+        let (two, one) = (bytes(message, "two"), bytes(message, "one"));
+        assert_eq!(&two[one.len()..], one, "the present step is the last");
+    }
+    let two = bytes(&messages[0], "two");
+    assert_eq!(two[..two.len() / 2], two[two.len() / 2..], "the first step is repeated");
+    let ids: Vec<_> = messages.iter().map(|message| entry(message, "id")).collect();
+    let numbers =
+        |key: &str| ids.iter().map(|id| entry(id, key).as_u64().expect("a number")).collect::<Vec<_>>();
+    assert_eq!((numbers("query"), numbers("step")), (vec![0, 1, 2], vec![0, 5, 10]));
+    assert_eq!(
+        (numbers("task"), numbers("episode"), numbers("run_seed")),
+        (vec![0; 3], vec![0; 3], vec![11; 3])
+    );
+    let seeds: Vec<_> =
+        messages.iter().map(|message| entry(message, "seed").as_u64().expect("a seed")).collect();
+    assert_eq!(seeds, numbers("seed"));
+    assert!(seeds[0] != seeds[1] && seeds.iter().all(|seed| *seed < 1 << 32), "{seeds:?}");
+    assert_eq!(entry(ids[0], "suite"), &text("one"));
+}
+
+#[test]
+fn a_server_or_a_profile_may_ask_for_an_observation_in_every_control_step() {
+    let asks = Value::Map(vec![(text("observe_every_step"), Value::Boolean(true))]);
+    let by_server = messages(asks, "", "");
+    let by_profile = messages(Value::Map(Vec::new()), "  observe_every_step = true,\n", "");
+    for (messages, output) in [&by_server, &by_profile] {
+        assert_eq!((output.code, messages.len()), (0, 12), "{}", output.err);
+        let wants = |message: &Value| entry(entry(message, "id"), "wants_actions").as_bool();
+        let asked: Vec<usize> = (0..12).filter(|step| wants(&messages[*step]) == Some(true)).collect();
+        assert_eq!(asked, [0, 5, 10]);
+        for step in 1..12 {
+            let (before, now) = (bytes(&messages[step - 1], "one"), bytes(&messages[step], "two"));
+            assert_eq!(&now[..before.len()], before, "step {step}");
+            assert_eq!(entry(entry(&messages[step], "id"), "step").as_u64(), Some(step as u64));
+        }
+    }
+    assert_eq!(by_server.0, by_profile.0);
+    let wrong = Value::Map(vec![(text("observe_every_step"), text("yes"))]);
+    let (_, output) = messages(wrong, "", "");
+    assert_eq!(output.code, 3);
+    assert!(
+        output.err.contains("observe_every_step in its metadata; expected true or false"),
+        "{}",
+        output.err
+    );
+    let (_, output) =
+        messages(Value::Map(Vec::new()), "  observe_every_step = true,\n", "--protocol vla-eval");
+    assert_eq!(output.code, 2);
+    assert!(output.err.contains("observe_every_step needs --protocol openpi"), "{}", output.err);
+}

@@ -350,7 +350,7 @@ mod tests {
 
         fn act(&mut self, seen: &Observation) -> Result<ActionChunk, PolicyError> {
             seen.forces.as_ref().ok_or(PolicyError::Action("no forces".to_owned()))?;
-            Ok(Action::new(seen.ee_position_b, seen.ee_axis_angle_b, 0.0).into())
+            Ok(Action::new(seen.robot.ee_position_b, seen.robot.ee_axis_angle_b, 0.0).into())
         }
     }
 

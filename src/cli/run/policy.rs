@@ -253,6 +253,12 @@ impl PolicyConfig {
                 let (profile, sources) = load_profile_of(args)?;
                 let profile_name = args.profile.as_deref().unwrap_or(DEFAULT_PROFILE);
                 let place = format!("--profile {profile_name}: inputs");
+                if profile.observe_every_step && args.protocol == Some(Protocol::VlaEval) {
+                    return Err(CliError::input(format!(
+                        "--profile {profile_name}: observe_every_step needs --protocol openpi; in vla-eval's protocol every \
+                         observation is a request for actions"
+                    )));
+                }
                 Self {
                     name: profile.name.clone(),
                     replan: replan.or(Some(DEFAULT_REPLAN)),

@@ -128,11 +128,20 @@ impl<'a> SuiteRun<'a> {
         if self.config.is_rigid_twin() {
             (opened.scene, opened.nominal) = (opened.scene.rigid_twin(), opened.nominal.rigid_twin());
         }
+        for scene in [&mut opened.scene, &mut opened.nominal] {
+            self.settings.cameras.apply(&mut scene.cameras);
+        }
         Ok(opened)
     }
 
     pub(crate) fn brief(&self, task: &Task, episode: u32) -> TaskBrief {
-        TaskBrief { suite: self.name.clone(), task: task.id, prompt: task.prompt.clone(), episode }
+        TaskBrief {
+            suite: self.name.clone(),
+            task: task.id,
+            prompt: task.prompt.clone(),
+            episode,
+            seed: self.config.script.seed,
+        }
     }
 
     /// True if the policy has access to ground-truth state, or had it when its actions were recorded.

@@ -36,8 +36,8 @@ const MEASURED_TOLERANCE: f64 = 1e-4;
 /// Range of finger positions, m, with some slack.
 const FINGER_RANGE: [f64; 2] = [-0.001, 0.045];
 /// The two encodings of the gripper in actions.
-const FINGER_POSITION: GripperValues = GripperValues { open: 0.04, closed: 0.0, code: GripCode::Continuous };
-const SIGN: GripperValues = GripperValues { open: 1.0, closed: -1.0, code: GripCode::Binary };
+const FINGER_POSITION: GripperValues = GripperValues::new(0.04, 0.0);
+const SIGN: GripperValues = GripperValues { code: GripCode::Binary, ..GripperValues::new(1.0, -1.0) };
 
 /// An action of 7 numbers.
 struct RecordedAction {

@@ -130,6 +130,8 @@ pub(super) struct PolicyConnection {
     socket: WebSocket<PollingStream>,
     /// Number of the last message sent (vla-eval).
     pub(super) seq: u64,
+    /// True if the server asked for an observation in every control step.
+    pub(super) observes_every_step: bool,
     /// Number of the last ping sent.
     pings: u64,
 }
@@ -144,7 +146,15 @@ impl PolicyConnection {
         let mut pause = FIRST_PAUSE;
         loop {
             let reason = match connect(&request, server, deadline) {
-                Ok(socket) => return Ok(Self { server: server.clone(), socket, seq: 0, pings: 0 }),
+                Ok(socket) => {
+                    return Ok(Self {
+                        server: server.clone(),
+                        socket,
+                        seq: 0,
+                        observes_every_step: false,
+                        pings: 0,
+                    });
+                }
                 Err(ConnectError::Final(error)) => return Err(error),
                 Err(ConnectError::Retry(reason)) => reason,
             };

@@ -13,10 +13,11 @@ use rmpv::Value;
 use self::connection::PolicyConnection;
 pub use self::connection::{PolicyServer, Protocol};
 use super::{
-    ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief, decode, encode,
+    ActionChunk, Observation, Policy, PolicyError, QueryId, SensorStreams, TaskBrief, decode, encode,
     msgpack::{entry, kind},
     profile::{GripCode, Profile},
 };
+use softvt_benchmark::CONTROL_DT;
 use softvt_common::parallel::lock;
 
 /// Pool of connections to one policy server: one per running episode, reused by later episodes.
@@ -71,12 +72,14 @@ pub struct RemotePolicy {
     connections: Arc<PolicyConnections>,
     /// `None` before the first episode and after a failure.
     connection: Option<PolicyConnection>,
+    /// Identity of the next message.
+    query: QueryId,
 }
 
 impl RemotePolicy {
     /// A policy that takes its connection from a pool when an episode begins.
     pub fn new(connections: Arc<PolicyConnections>) -> Self {
-        Self { connections, connection: None }
+        Self { connections, connection: None, query: QueryId::default() }
     }
 }
 
@@ -96,24 +99,45 @@ impl Policy for RemotePolicy {
             vla_eval::start(&mut connection, brief, deadline)?;
         }
         self.connection = Some(connection);
+        self.query = QueryId::first(brief);
         Ok(())
+    }
+
+    fn observes_every_step(&self) -> bool {
+        let asks = self.connection.as_ref().is_some_and(|connection| connection.observes_every_step);
+        asks || self.connections.server.profile.observe_every_step
+    }
+
+    fn observe(&mut self, observation: &Observation) -> Result<(), PolicyError> {
+        let Some(connection) = &mut self.connection else { return Ok(()) };
+        self.query.step = step_of(observation);
+        let query = QueryId { wants_actions: false, ..self.query.clone() };
+        let sent = acknowledge_openpi(connection, observation, &query);
+        if sent.is_err() {
+            self.connection = None;
+        }
+        sent
     }
 
     fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError> {
         let protocol = self.connections.server.protocol;
         let mut current = self.connection.take();
-        // openpi's servers keep no state of an episode: the connection can be replaced between two requests.
+        // openpi's servers keep no state of an episode: the connection can be replaced between two requests. Those that
+        // observe every step do.
         if protocol == Protocol::Openpi
+            && !self.observes_every_step()
             && let Some(connection) = &mut current
             && !connection.is_open()?
         {
             current = None;
         }
         let mut connection = current.map_or_else(|| self.connections.take(), Ok)?;
+        self.query.step = step_of(observation);
         let chunk = match protocol {
-            Protocol::Openpi => infer_openpi(&mut connection, observation),
-            Protocol::VlaEval => vla_eval::infer(&mut connection, observation),
+            Protocol::Openpi => infer_openpi(&mut connection, observation, &self.query),
+            Protocol::VlaEval => vla_eval::infer(&mut connection, observation, &self.query),
         };
+        self.query.query += 1;
         // After a failure a response may still be on its way: the connection is not used again.
         if matches!(chunk, Ok(_) | Err(PolicyError::Action(_))) {
             self.connection = Some(connection);
@@ -135,6 +159,11 @@ impl Policy for RemotePolicy {
     }
 }
 
+/// The control step of an observation, from 0.
+fn step_of(observation: &Observation) -> u32 {
+    (observation.time_s / CONTROL_DT).round() as u32
+}
+
 /// openpi's protocol: receives the metadata that the server sends first.
 fn greet_openpi(connection: &mut PolicyConnection, deadline: Instant) -> Result<(), PolicyError> {
     let metadata = connection.receive(deadline)?;
@@ -142,7 +171,24 @@ fn greet_openpi(connection: &mut PolicyConnection, deadline: Instant) -> Result<
         let what = format!("sent {} first; openpi servers send a map of metadata", kind(&metadata));
         return Err(connection.server.error(&what));
     }
+    connection.observes_every_step = observes_every_step(&connection.server, &metadata)?;
     check_grip_code(&connection.server, &metadata)
+}
+
+/// True if the entry `observe_every_step` of a server's metadata asks for an observation in every control step.
+///
+/// # Errors
+/// It is neither true nor false.
+fn observes_every_step(server: &PolicyServer, metadata: &Value) -> Result<bool, PolicyError> {
+    let Some(stated) = entry(metadata, "observe_every_step").filter(|value| !value.is_nil()) else {
+        return Ok(false);
+    };
+    stated.as_bool().ok_or_else(|| {
+        server.error(&format!(
+            "has {} as observe_every_step in its metadata; expected true or false",
+            kind(stated)
+        ))
+    })
 }
 
 /// Checks the grip code that a server states in the entry `gripper` of its metadata, if it does.
@@ -177,12 +223,31 @@ fn check_grip_code(server: &PolicyServer, metadata: &Value) -> Result<(), Policy
 fn infer_openpi(
     connection: &mut PolicyConnection,
     observation: &Observation,
+    query: &QueryId,
 ) -> Result<ActionChunk, PolicyError> {
+    let response = ask_openpi(connection, observation, query)?;
+    decode::chunk(&response, &connection.server.profile.actions)
+}
+
+/// openpi's protocol: sends an observation for the history of the policy. Its reply says nothing.
+fn acknowledge_openpi(
+    connection: &mut PolicyConnection,
+    observation: &Observation,
+    query: &QueryId,
+) -> Result<(), PolicyError> {
+    ask_openpi(connection, observation, query).map(|_| ())
+}
+
+fn ask_openpi(
+    connection: &mut PolicyConnection,
+    observation: &Observation,
+    query: &QueryId,
+) -> Result<Value, PolicyError> {
     let deadline = connection.server.deadline();
-    connection.send(&encode::openpi(observation, &connection.server.profile), deadline)?;
+    connection.send(&encode::openpi(observation, &connection.server.profile, query), deadline)?;
     let response = connection.receive(deadline)?;
     connection.check_silence(deadline)?;
-    decode::chunk(&response, &connection.server.profile.actions)
+    Ok(response)
 }
 
 #[cfg(test)]

@@ -13,11 +13,10 @@ use tungstenite::{Message, WebSocket, accept};
 
 use super::*;
 use crate::{
-    GripCommand,
+    GripCommand, RobotState,
     msgpack::{map, pack},
     profile::{ActionEncoding, GripperValues, InputSource, PoseEncoding, ProfileInput, StatePart},
 };
-use softvt_geometry::Vec3;
 
 type Socket = WebSocket<TcpStream>;
 
@@ -72,11 +71,12 @@ fn chunk(closure: f64) -> Value {
 
 fn policy_server(url: String, code: GripCode, timeout: Duration) -> PolicyServer {
     let state = InputSource::State { parts: vec![StatePart::Position] };
-    let gripper = GripperValues { open: 0.0, closed: 1.0, code };
+    let gripper = GripperValues { code, ..GripperValues::new(0.0, 1.0) };
     let profile = Profile {
         name: "state".to_owned(),
-        inputs: vec![ProfileInput { keys: vec!["state".to_owned()], source: state }],
+        inputs: vec![ProfileInput::new(vec!["state".to_owned()], state)],
         actions: ActionEncoding::new(PoseEncoding::Absolute, gripper),
+        observe_every_step: false,
     };
     PolicyServer { url, protocol: Protocol::Openpi, profile, timeout, api_key: None, cancel: &CANCEL }
 }
@@ -84,13 +84,10 @@ fn policy_server(url: String, code: GripCode, timeout: Duration) -> PolicyServer
 fn observation() -> Observation {
     Observation {
         time_s: 0.0,
-        ee_position_b: Vec3::zeros(),
-        ee_axis_angle_b: Vec3::zeros(),
-        joints: [0.0; 7],
-        gripper_width_m: 0.08,
-        closure: 0.0,
+        robot: RobotState::ORIGIN,
         prompt: String::new(),
         cameras: Vec::new(),
+        past: Vec::new(),
         tactile: None,
         forces: None,
         force_history: Vec::new(),
@@ -104,7 +101,7 @@ fn episode(
     pause: Duration,
 ) -> Result<Vec<f64>, String> {
     let mut policy = RemotePolicy::new(connections.clone());
-    let brief = TaskBrief { suite: "one".to_owned(), task: 0, prompt: String::new(), episode: 0 };
+    let brief = TaskBrief { suite: "one".to_owned(), task: 0, prompt: String::new(), episode: 0, seed: 0 };
     let mut run = || {
         policy.reset(&brief)?;
         let mut closures = Vec::new();

@@ -10,7 +10,7 @@ use rmpv::Value;
 
 use super::connection::PolicyConnection;
 use crate::{
-    ActionChunk, Observation, PolicyError, TaskBrief, decode,
+    ActionChunk, Observation, PolicyError, QueryId, TaskBrief, decode,
     encode::content,
     msgpack::{entry, map, names},
     profile::{InputSource, Profile},
@@ -65,8 +65,9 @@ pub(super) fn end(connection: &mut PolicyConnection, deadline: Instant) -> Resul
 pub(super) fn infer(
     connection: &mut PolicyConnection,
     observation: &Observation,
+    query: &QueryId,
 ) -> Result<ActionChunk, PolicyError> {
-    let payload = encoded(observation, &connection.server.profile);
+    let payload = encoded(observation, &connection.server.profile, query);
     let deadline = connection.server.deadline();
     send(connection, "observation", payload, deadline)?;
     loop {
@@ -91,12 +92,11 @@ pub(super) fn infer(
 }
 
 /// Encodes an observation: images under the names of their cameras, other entries under the first of their keys.
-fn encoded(observation: &Observation, profile: &Profile) -> Value {
+fn encoded(observation: &Observation, profile: &Profile, query: &QueryId) -> Value {
     let (mut images, mut rest) = (Vec::new(), Vec::new());
     for input in &profile.inputs {
-        let Some(value) = content(observation, &input.source).map(|content| content.into_value(false)) else {
-            continue;
-        };
+        let entry = content(observation, input, Some(query)).map(|content| content.into_value(false));
+        let Some(value) = entry else { continue };
         let key = |name: &str| name.rsplit('/').next().unwrap_or(name).to_owned();
         let own = input.keys.first().map_or(String::new(), |name| key(name));
         match &input.source {
@@ -107,7 +107,12 @@ fn encoded(observation: &Observation, profile: &Profile) -> Value {
             InputSource::TactileImage { .. } | InputSource::Tactile { .. } => images.push((own, value)),
             InputSource::State { .. } => rest.push(("states".to_owned(), value)),
             InputSource::Prompt => rest.push(("task_description".to_owned(), value)),
-            InputSource::MarkerMotion | InputSource::Force => rest.push((own, value)),
+            InputSource::Depth { .. }
+            | InputSource::Segmentation { .. }
+            | InputSource::MarkerMotion
+            | InputSource::Force
+            | InputSource::Query
+            | InputSource::QuerySeed => rest.push((own, value)),
         }
     }
     rest.insert(0, ("images".to_owned(), map(images)));

@@ -72,17 +72,17 @@ class! {
             /// Time since the policy took over, s.
             time: "number" { get(_, this) { this.0.time_s } }
             /// Tool position, m.
-            position: "number[]" { get(_, this) { this.0.ee_position_b } }
+            position: "number[]" { get(_, this) { this.0.robot.ee_position_b } }
             /// Tool orientation as axis-angle, rad.
-            axis_angle: "number[]" { get(_, this) { this.0.ee_axis_angle_b } }
+            axis_angle: "number[]" { get(_, this) { this.0.robot.ee_axis_angle_b } }
             /// Tool orientation as quaternion w, x, y, z with w ≥ 0.
-            quaternion: "number[]" { get(_, this) { wxyz(&rotation::from_axis_angle(&this.0.ee_axis_angle_b)) } }
+            quaternion: "number[]" { get(_, this) { wxyz(&rotation::from_axis_angle(&this.0.robot.ee_axis_angle_b)) } }
             /// The seven joint angles of the arm, rad.
-            joints: "number[]" { get(_, this) { this.0.joints } }
+            joints: "number[]" { get(_, this) { this.0.robot.joints } }
             /// Measured distance of the gels, 0 to 0.08 m.
-            width: "number" { get(_, this) { this.0.gripper_width_m } }
+            width: "number" { get(_, this) { this.0.robot.gripper_width_m } }
             /// Last commanded closure: 0 is open, 1 is closed.
-            closure: "number" { get(_, this) { this.0.closure } }
+            closure: "number" { get(_, this) { this.0.robot.closure } }
             /// The instruction.
             prompt: "string" { get(_, this) { this.0.prompt.clone() } }
             /// Tactile sensors; requires observes.tactile.

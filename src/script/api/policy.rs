@@ -6,10 +6,10 @@ use crate::schema::{Range, Record, RecordType, Type, choice, record, record_of};
 use softvt_policy::{
     SensorStreams,
     decode::MAX_CHUNK_LEN,
-    profile::{GripCode, StatePart},
+    profile::{GripCode, GripLatch, MAX_FRAMES, StatePart},
 };
 use softvt_robot::Side;
-use softvt_sensing::tactile::MosaicLayout;
+use softvt_sensing::tactile::{MarkerStyle, MosaicLayout};
 
 const STEP: Type = Type::Number("", Range { max: 10.0, ..Range::POSITIVE });
 
@@ -20,7 +20,7 @@ record! {
         /// Name in results, unless --name gives another.
         name: String = Type::Name;
         /// Observations of the policy.
-        observes: SensorStreams;
+        observes: ObservesSpec;
         /// Called when the episode begins.
         reset: Option<Function> = Type::Function("fun(task: softvt.TaskBrief)");
         /// Returns the action of this control step, or a list of actions for the next ones.
@@ -50,16 +50,24 @@ record! {
     InputSpec: "softvt.Input" as "profile.inputs" {
         /// Keys under which it is sent.
         keys: Vec<String>;
-        /// Content: the image of a camera; numbers of the robot's state; the prompt; the mosaic of 8 tactile images of both
-        /// fingers; the latest image of one finger; the first and the last 8 marker positions; the last 8 true forces on
-        /// the gels.
+        /// Content: the image of a camera, its depth (m), or the object at each pixel; numbers of the robot's state; the
+        /// prompt; the mosaic of 8 tactile images of both fingers; the image of one finger; the initial and the last
+        /// marker positions; the last true forces on the gels; the identity of the request, a map; a seed for policies
+        /// that draw random numbers, equal whenever a run is repeated.
         source: InputKind;
-        /// For camera: its name in the scene.
+        /// For camera, depth and segmentation: the camera's name in the scene.
         camera: Option<String> = Type::Name;
-        /// For camera: true to rotate the image by 180°.
+        /// For camera, depth and segmentation: true to rotate the image by 180°.
         half_turn: Option<bool>;
-        /// For state: its parts in order, of 3, 3, 4, 4, 7, 1, 1, 2 and 1 numbers, in m and rad in the base frame.
+        /// For state: its parts in order, in m, rad, rad/s and N m, of 3 numbers (position, axis_angle), 4 (quaternions), 7
+        /// (joints, joint_velocities, joint_torques), 2 (finger_pair) and 1.
         parts: Option<Vec<StatePart>>;
+        /// Number of control steps in the entry, the present one last, along a first axis; not for prompt and tactile_image.
+        /// By default the present step without that axis, and 8 steps of marker_motion and force. The start of an episode
+        /// repeats its first step.
+        frames: Option<usize> = Type::Integer(Range::closed(1.0, MAX_FRAMES as f64));
+        /// For tactile and tactile_image: style in which the markers are drawn into the images; not drawn by default.
+        markers: Option<MarkerStyle>;
         /// For tactile_image: the left finger above the right one (rows, the default) or left of it.
         layout: Option<MosaicLayout>;
         /// For tactile: the finger.
@@ -96,6 +104,8 @@ record! {
         code: Option<GripCode>;
         /// True for code = "binary".
         binary: Option<bool>;
+        /// For code = "binary": limits at which the gripper closes and opens, instead of the middle.
+        latch: Option<GripLatch>;
     }
     /// The messages of a policy server: the observations it gets and the meaning of its actions. The file given to --profile
     /// returns one.
@@ -106,12 +116,15 @@ record! {
         inputs: Vec<InputSpec>;
         /// Meaning of the actions.
         actions: ActionEncodingSpec;
+        /// True to send an observation in every control step, for policies with a history of their own. Those without a
+        /// need for actions have wants_actions = false in the identity of the request; any reply answers them.
+        observe_every_step: bool => Boolean(false);
     }
 }
 
-record_of! {
+record! {
     /// The observations of a policy; nothing else is computed.
-    SensorStreams: "softvt.Observes" as "policy.observes" {
+    ObservesSpec: "softvt.Observes" as "policy.observes" {
         /// Names of cameras of the scene.
         cameras: Vec<String> = Type::List(&Type::Name) => Empty;
         /// True to get the tactile images and markers of the fingers.
@@ -121,28 +134,58 @@ record_of! {
     }
 }
 
+record_of! {
+    /// Hysteresis of a binary gripper, in values of the seventh number.
+    GripLatch: "softvt.GripLatch" as "profile.actions.gripper.latch" {
+        /// Value from which on, towards that of the closed gripper, an answer closes.
+        close: f64;
+        /// Value from which on, towards that of the open gripper, an answer opens.
+        open: f64;
+        /// Control steps for which a change is kept, whatever is answered.
+        hold_steps: u32 = Type::Integer(Range::closed(0.0, 10_000.0)) => Integer(0);
+    }
+}
+
+impl ObservesSpec {
+    pub(crate) fn streams(&self) -> SensorStreams {
+        let Self { cameras, tactile, force } = self;
+        SensorStreams {
+            cameras: cameras.clone(),
+            tactile: *tactile,
+            force: *force,
+            ..SensorStreams::default()
+        }
+    }
+}
+
 choice! {
     /// The content of an input.
     enum InputKind {
         "camera" => Camera,
+        "depth" => Depth,
+        "segmentation" => Segmentation,
         "state" => State,
         "prompt" => Prompt,
         "tactile_image" => TactileImage,
         "tactile" => Tactile,
         "marker_motion" => MarkerMotion,
         "force" => Force,
+        "query" => Query,
+        "query_seed" => QuerySeed,
     }
 }
 
 choice! {
     GripCode { "continuous" => Continuous, "binary" => Binary, "two-width" => TwoWidth, "force" => Force }
 }
+choice! { MarkerStyle { "dots" => Dots, "arrows" => Arrows, "black_arrows" => BlackArrows } }
 choice! { MosaicLayout { "rows" => Rows, "columns" => Columns } }
 choice! {
     StatePart {
         "position" => Position, "axis_angle" => AxisAngle,
         "quaternion_wxyz" => QuaternionWxyz, "quaternion_xyzw" => QuaternionXyzw,
-        "joints" => Joints, "gripper_width" => GripperWidth, "finger_position" => FingerPosition,
+        "joints" => Joints, "joint_velocities" => JointVelocities, "joint_torques" => JointTorques,
+        "gripper_width" => GripperWidth, "finger_position" => FingerPosition,
         "finger_pair" => FingerPair, "closure" => Closure,
     }
 }

@@ -96,7 +96,9 @@ impl LuaSimulation {
         let scene = LuaScene::new(empty_scene());
         let wear_seed = WearSeed::new(&seed);
         layout.build.call::<()>((scene.clone(), LuaRng::new(seed, RandomStream::Layout)))?;
-        let scene = Arc::new(lock(&scene.scene).clone());
+        let mut scene = lock(&scene.scene).clone();
+        settings.cameras.apply(&mut scene.cameras);
+        let scene = Arc::new(scene);
         let clock = app_data::<Clock>(lua)?;
         let _pause = clock.pause();
         if lua.app_data_ref::<Caches>().is_none() {
@@ -146,7 +148,7 @@ functions! {
             episode: u32 = EPISODE => Integer(0);
             /// Part of the seed; by default that of the run, --seed.
             seed: Option<u64> = EPISODE;
-            /// Changed settings of physics, robot and tactile sensors: { physics = {…}, robot = {…}, tactile = {…} }.
+            /// Changed settings of physics, robot, tactile sensors and cameras: { physics = {…}, robot = {…} }.
             /// Those of the command line, --set, take precedence in experiments.
             settings: Option<Table> = SETTINGS;
         } -> ["softvt.Simulation"] {

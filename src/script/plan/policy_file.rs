@@ -64,9 +64,9 @@ impl PolicyFile {
                 let observes_at = origin_of_key(&instance.vm.lua, &policy.table, &["observes", "cameras"]);
                 Ok((policy.spec, observes_at))
             })?;
-        let PolicySpec { name, observes: streams, replan, privileged, .. } = spec;
+        let PolicySpec { name, observes, replan, privileged, .. } = spec;
         let observes_at = observes_at.map_or_else(|| sources.main.clone(), |line| line.to_string());
-        Ok(Self { name, replan, streams, privileged, observes_at, sources })
+        Ok(Self { name, replan, streams: observes.streams(), privileged, observes_at, sources })
     }
 
     /// Starts the policy of an episode in a virtual machine of its own.

@@ -14,7 +14,8 @@ use crate::{
     vm::{Limits, error::ScriptError, source_map::fail_at_key},
 };
 use softvt_policy::profile::{
-    ActionEncoding, ActionUnits, GripCode, GripperValues, InputSource, PoseEncoding, Profile, ProfileInput,
+    ActionEncoding, ActionUnits, GripCode, GripLatch, GripperValues, InputSource, PoseEncoding, Profile,
+    ProfileInput,
 };
 
 /// Reads the profile at `path`. Also returns the SHA-256 of every file that was read, by name.
@@ -56,22 +57,31 @@ impl ProfileReader<'_> {
         if inputs.is_empty() {
             return Err(self.wrong("inputs", "inputs: nothing would be sent; give at least one".to_owned()));
         }
-        Ok(Profile { name: self.spec.name.clone(), inputs, actions: self.actions(&self.spec.actions)? })
+        Ok(Profile {
+            name: self.spec.name.clone(),
+            inputs,
+            actions: self.actions(&self.spec.actions)?,
+            observe_every_step: self.spec.observe_every_step,
+        })
     }
 
     fn input(&self, place: &str, entry: &InputSpec) -> mlua::Result<ProfileInput> {
-        let InputSpec { keys, source, camera, half_turn, parts, layout, finger } = entry;
+        let InputSpec { keys, source, camera, half_turn, parts, layout, finger, markers, frames } = entry;
         if keys.is_empty() {
             return Err(self.wrong("keys", format!("{place}.keys: give at least one")));
         }
         let (name, own): (_, &[&str]) = match source {
-            InputKind::Camera => ("camera", &["camera", "half_turn"]),
-            InputKind::State => ("state", &["parts"]),
+            InputKind::Camera => ("camera", &["camera", "half_turn", "frames"]),
+            InputKind::Depth => ("depth", &["camera", "half_turn", "frames"]),
+            InputKind::Segmentation => ("segmentation", &["camera", "half_turn", "frames"]),
+            InputKind::State => ("state", &["parts", "frames"]),
             InputKind::Prompt => ("prompt", &[]),
-            InputKind::TactileImage => ("tactile_image", &["layout"]),
-            InputKind::Tactile => ("tactile", &["finger"]),
-            InputKind::MarkerMotion => ("marker_motion", &[]),
-            InputKind::Force => ("force", &[]),
+            InputKind::TactileImage => ("tactile_image", &["layout", "markers"]),
+            InputKind::Tactile => ("tactile", &["finger", "markers", "frames"]),
+            InputKind::MarkerMotion => ("marker_motion", &["frames"]),
+            InputKind::Force => ("force", &["frames"]),
+            InputKind::Query => ("query", &[]),
+            InputKind::QuerySeed => ("query_seed", &[]),
         };
         let given = [
             ("camera", camera.is_some()),
@@ -79,6 +89,8 @@ impl ProfileReader<'_> {
             ("parts", parts.is_some()),
             ("layout", layout.is_some()),
             ("finger", finger.is_some()),
+            ("markers", markers.is_some()),
+            ("frames", frames.is_some()),
         ];
         if let Some((key, _)) = given.iter().find(|(key, is_given)| *is_given && !own.contains(key)) {
             let message = format!("{place}.{key}: a source {name:?} has none; leave it out");
@@ -86,22 +98,30 @@ impl ProfileReader<'_> {
         }
         let missing =
             |key: &str| self.wrong("source", format!("{place}.{key}: missing; a source {name:?} needs it"));
+        let (camera, half_turn) =
+            (|| camera.clone().ok_or_else(|| missing("camera")), half_turn.unwrap_or(false));
         let source = match source {
-            InputKind::Camera => InputSource::Camera {
-                camera: camera.clone().ok_or_else(|| missing("camera"))?,
-                half_turn: half_turn.unwrap_or(false),
-            },
+            InputKind::Camera => InputSource::Camera { camera: camera()?, half_turn },
+            InputKind::Depth => InputSource::Depth { camera: camera()?, half_turn },
+            InputKind::Segmentation => InputSource::Segmentation { camera: camera()?, half_turn },
             InputKind::State => {
                 let parts = parts.clone().filter(|parts| !parts.is_empty());
                 InputSource::State { parts: parts.ok_or_else(|| missing("parts"))? }
             }
             InputKind::Prompt => InputSource::Prompt,
-            InputKind::TactileImage => InputSource::TactileImage { layout: layout.unwrap_or_default() },
-            InputKind::Tactile => InputSource::Tactile { finger: finger.ok_or_else(|| missing("finger"))? },
+            InputKind::TactileImage => {
+                InputSource::TactileImage { layout: layout.unwrap_or_default(), markers: *markers }
+            }
+            InputKind::Tactile => {
+                let finger = finger.ok_or_else(|| missing("finger"))?;
+                InputSource::Tactile { finger, markers: *markers }
+            }
             InputKind::MarkerMotion => InputSource::MarkerMotion,
             InputKind::Force => InputSource::Force,
+            InputKind::Query => InputSource::Query,
+            InputKind::QuerySeed => InputSource::QuerySeed,
         };
-        Ok(ProfileInput { keys: keys.clone(), source })
+        Ok(ProfileInput { keys: keys.clone(), source, frames: *frames })
     }
 
     fn actions(&self, spec: &ActionEncodingSpec) -> mlua::Result<ActionEncoding> {
@@ -140,6 +160,32 @@ impl ProfileReader<'_> {
         Ok(ActionEncoding { pose, gripper: self.gripper(&spec.gripper)?, units, length: spec.length })
     }
 
+    /// The hysteresis of a binary gripper, if the profile states one.
+    fn latch(
+        &self,
+        spec: &GripperValuesSpec,
+        open: f64,
+        closed: f64,
+        code: GripCode,
+    ) -> mlua::Result<Option<GripLatch>> {
+        let Some(latch) = spec.latch else { return Ok(None) };
+        let wrong = |what: String| self.wrong("latch", format!("actions.gripper.latch: {what}"));
+        if code != GripCode::Binary {
+            return Err(wrong("only code = \"binary\" has one; leave it out".to_owned()));
+        }
+        let along = |value: f64| (value - open) / (closed - open);
+        let is_ordered =
+            0.0 <= along(latch.open) && along(latch.open) < along(latch.close) && along(latch.close) <= 1.0;
+        if !is_ordered {
+            let (first, second) = (latch.open, latch.close);
+            let what = format!(
+                "expected open {open}, latch.open, latch.close, closed {closed} in this order, got {first} and {second}"
+            );
+            return Err(wrong(what));
+        }
+        Ok(Some(latch))
+    }
+
     fn gripper(&self, spec: &GripperValuesSpec) -> mlua::Result<GripperValues> {
         let wrong = |key: &str, what: &str| self.wrong(key, format!("actions.gripper.{key}: {what}"));
         let code = match (spec.code, spec.binary) {
@@ -162,6 +208,10 @@ impl ProfileReader<'_> {
         if open == closed {
             return Err(wrong("closed", &format!("is {closed} like open; nothing could close")));
         }
-        Ok(GripperValues { open, closed, code })
+        Ok(GripperValues {
+            code,
+            latch: self.latch(spec, open, closed, code)?,
+            ..GripperValues::new(open, closed)
+        })
     }
 }

@@ -10,8 +10,8 @@ use softvt_benchmark::seed::EpisodeSeed;
 use softvt_evaluation::episode_id::Split;
 use softvt_geometry::Vec3;
 use softvt_policy::{
-    Action, ActionChunk, CameraImage, GripCommand, Observation, Policy, PolicyError, TactileFrame,
-    TactileHistory, TaskBrief, ToolCommand, ToolMotion,
+    Action, ActionChunk, CameraImage, GripCommand, Observation, Policy, PolicyError, RobotState,
+    TactileFrame, TactileHistory, TaskBrief, ToolCommand, ToolMotion,
     profile::{GripCode, Profile},
 };
 use softvt_sensing::tactile::Markers;
@@ -37,13 +37,17 @@ fn observation() -> Observation {
     let now = Arc::new([finger([-0.5, 0.25], 40), finger([0.5, 0.0], 0)]);
     Observation {
         time_s: 1.5,
-        ee_position_b: Vec3::new(0.5, -0.125, 0.25),
-        ee_axis_angle_b: Vec3::new(std::f64::consts::PI, 0.0, 0.0),
-        joints: [0.0, 0.5, 0.0, -2.0, 0.0, 2.5, 0.75],
-        gripper_width_m: 0.0625,
-        closure: 0.25,
+        robot: RobotState {
+            ee_position_b: Vec3::new(0.5, -0.125, 0.25),
+            ee_axis_angle_b: Vec3::new(std::f64::consts::PI, 0.0, 0.0),
+            joints: [0.0, 0.5, 0.0, -2.0, 0.0, 2.5, 0.75],
+            gripper_width_m: 0.0625,
+            closure: 0.25,
+            ..RobotState::ORIGIN
+        },
         prompt: "take it".into(),
-        cameras: vec![CameraImage { name: "wrist".into(), image }],
+        cameras: vec![Arc::new(CameraImage { name: "wrist".into(), image, depth: None, segmentation: None })],
+        past: Vec::new(),
         tactile: Some(TactileHistory { frames: vec![before, now] }),
         forces: None,
         force_history: Vec::new(),
@@ -51,7 +55,7 @@ fn observation() -> Observation {
 }
 
 fn brief() -> TaskBrief {
-    TaskBrief { suite: "one".into(), task: 3, prompt: "take it".into(), episode: 7 }
+    TaskBrief { suite: "one".into(), task: 3, prompt: "take it".into(), episode: 7, seed: 0 }
 }
 
 const OBSERVES: &str = "observes = { cameras = { 'wrist' }, tactile = true }";

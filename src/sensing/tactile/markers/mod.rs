@@ -60,10 +60,8 @@ impl Markers {
         for (from, to) in self.initial.iter().zip(&self.current) {
             match style {
                 MarkerStyle::Dots => capsule(rgb, *to, *to, DOT_RADIUS, [20, 20, 24]),
-                MarkerStyle::Arrows => {
-                    let tip = [0, 1].map(|a| from[a] + ARROW_GAIN * (to[a] - from[a]));
-                    arrow(rgb, *from, tip);
-                }
+                MarkerStyle::Arrows => ArrowStyle::YELLOW.draw(rgb, *from, *to),
+                MarkerStyle::BlackArrows => ArrowStyle::BLACK.draw(rgb, *from, *to),
             }
         }
     }
@@ -123,25 +121,40 @@ pub enum MarkerStyle {
     Dots,
     /// A yellow arrow from the initial towards the current position, three times as long as the motion.
     Arrows,
+    /// A black arrow, twice as long as the motion and 2 px wide, as in SoftVTBench's release v0.2.
+    BlackArrows,
 }
 
-/// Length of a drawn arrow over that of the motion, which is mostly below a few pixels.
-const ARROW_GAIN: f32 = 3.0;
 /// Radius of a dot, px.
 const DOT_RADIUS: f32 = 2.6;
-/// Half the width of the line of an arrow, px.
-const LINE_RADIUS: f32 = 0.8;
 
-fn arrow(rgb: &mut [u8], from: [f32; 2], tip: [f32; 2]) {
-    let colour = [255, 230, 40];
-    let (dx, dy) = (tip[0] - from[0], tip[1] - from[1]);
-    let length = dx.hypot(dy);
-    capsule(rgb, from, tip, LINE_RADIUS, colour);
-    if length > 1.0 {
-        let head = (0.4 * length).min(5.0) / length;
-        for side in [-0.6, 0.6] {
-            let end = [tip[0] - head * (dx - side * dy), tip[1] - head * (dy + side * dx)];
-            capsule(rgb, tip, end, LINE_RADIUS, colour);
+/// Drawing of an arrow.
+struct ArrowStyle {
+    colour: [u8; 3],
+    /// Length of a drawn arrow over that of the motion, which is mostly below a few pixels.
+    gain: f32,
+    /// Half the width of the line, px.
+    line_radius: f32,
+    /// Length of the head over that of the arrow.
+    head: f32,
+}
+
+impl ArrowStyle {
+    const YELLOW: Self = Self { colour: [255, 230, 40], gain: 3.0, line_radius: 0.8, head: 0.4 };
+    const BLACK: Self = Self { colour: [0, 0, 0], gain: 2.0, line_radius: 1.0, head: 0.2 };
+
+    /// Draws the motion of a marker.
+    fn draw(&self, rgb: &mut [u8], from: [f32; 2], to: [f32; 2]) {
+        let tip = [0, 1].map(|a| from[a] + self.gain * (to[a] - from[a]));
+        let (dx, dy) = (tip[0] - from[0], tip[1] - from[1]);
+        let length = dx.hypot(dy);
+        capsule(rgb, from, tip, self.line_radius, self.colour);
+        if length > 1.0 {
+            let head = (self.head * length).min(5.0) / length;
+            for side in [-0.6, 0.6] {
+                let end = [tip[0] - head * (dx - side * dy), tip[1] - head * (dy + side * dx)];
+                capsule(rgb, tip, end, self.line_radius, self.colour);
+            }
         }
     }
 }
