@@ -1,0 +1,138 @@
+"""Commands: record, train, serve, evaluate, study."""
+
+import argparse
+import asyncio
+import sys
+from pathlib import Path
+
+from . import UserError
+
+CODES = ["continuous", "binary", "two-width", "force"]
+
+
+def _record(args: argparse.Namespace) -> None:
+    from .evaluate import camera_flags, run_softvt
+
+    run_softvt(["record", args.suite, "--out", str(args.out), "--demos", str(args.demos), *camera_flags(args.edge), *args.flags])
+
+
+def _train(args: argparse.Namespace) -> None:
+    from .checkpoint import device_of
+    from .data import load
+    from .inputs import Shape
+    from .train import TrainOptions, train
+
+    device = device_of(args.device)
+    shape = Shape(has_touch=args.touch, head=args.head, frames=args.frames, edge=args.edge)
+    demos = load(args.recordings, args.gripper, args.edge)
+    options = TrainOptions(shape, args.gripper, args.steps, args.batch, args.seed, device)
+    train(demos, options, args.out, {"recordings": [recording.name for recording in args.recordings]})
+
+
+def _serve(args: argparse.Namespace) -> None:
+    from .checkpoint import device_of, load
+    from .infer import BATCH, Answering
+    from .serve import serve
+
+    device = device_of(args.device)
+    checkpoint = load(args.checkpoint, device)
+    metadata = {"gripper": checkpoint.code, "profile": checkpoint.policy.shape.profile, "trained": checkpoint.about}
+    asyncio.run(serve(Answering(checkpoint, device), BATCH, metadata, args.host, args.port))
+
+
+def _evaluate(args: argparse.Namespace) -> None:
+    from .checkpoint import device_of, load
+    from .evaluate import Evaluation, evaluate
+
+    device_of(args.device)
+    checkpoint = load(args.checkpoint, device_of("cpu"))
+    shape, name = checkpoint.policy.shape, args.name or args.checkpoint.stem
+    evaluate(Evaluation(args.checkpoint, shape, checkpoint.code, args.scripts, name, args.out, args.flags, args.device))
+
+
+def _study(args: argparse.Namespace) -> None:
+    from .study import Study, run
+
+    options = {key: value for key, value in vars(args).items() if key not in ("command", "run", "flags")}
+    run(Study(**options, flags=tuple(args.flags)))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="softvt-baselines", description=__doc__, epilog="Flags after -- are those of softvt.")
+    commands = parser.add_subparsers(dest="command", required=True)
+
+    def command(name: str, run, help: str) -> argparse.ArgumentParser:
+        sub = commands.add_parser(name, help=help, description=help, formatter_class=argparse.ArgumentDefaultsHelpFormatter)
+        sub.set_defaults(run=run)
+        return sub
+
+    def with_device(sub: argparse.ArgumentParser) -> None:
+        sub.add_argument("--device", default="cuda", help="device of torch; cpu for a small trial")
+
+    record = command("record", _record, "record demonstrations of a suite with pictures of the size that policies see")
+    record.add_argument("suite", help="suite of softvt")
+    record.add_argument("--out", type=Path, required=True, help="folder of the recording")
+    record.add_argument("--demos", type=int, default=50, help="demonstrations per task")
+    record.add_argument("--edge", type=int, default=128, help="width and height of the pictures, pixels")
+
+    train = command("train", _train, "train a policy")
+    train.add_argument("recordings", type=Path, nargs="+", help="folders of softvt record")
+    train.add_argument("--out", type=Path, required=True, help="checkpoint to write")
+    train.add_argument("--touch", action="store_true", help="give the policy the markers of both fingers")
+    train.add_argument("--gripper", default="continuous", choices=CODES, help="grip code")
+    train.add_argument("--head", default="regression", choices=["regression", "flow"], help="how actions are predicted")
+    train.add_argument("--frames", type=int, default=1, choices=[1, 2], help="control steps whose pictures and states the policy sees")
+    train.add_argument("--edge", type=int, default=128, help="width and height of the pictures, pixels; a multiple of 32")
+    train.add_argument("--steps", type=int, default=10000, help="training steps")
+    train.add_argument("--batch", type=int, default=256, help="samples per step")
+    train.add_argument("--seed", type=int, default=0, help="seed of the weights and batches")
+    with_device(train)
+
+    serve = command("serve", _serve, "serve a checkpoint in openpi's protocol")
+    serve.add_argument("checkpoint", type=Path)
+    serve.add_argument("--host", default="127.0.0.1")
+    serve.add_argument("--port", type=int, default=8000, help="0 takes a free one")
+    with_device(serve)
+
+    evaluate = command("evaluate", _evaluate, "serve a checkpoint and evaluate it on suites of softvt")
+    evaluate.add_argument("checkpoint", type=Path)
+    evaluate.add_argument("scripts", nargs="+", help="suites or conditions of softvt")
+    evaluate.add_argument("--out", type=Path, required=True, help="folder of the runs")
+    evaluate.add_argument("--name", help="name of the policy in results; by default that of the checkpoint")
+    with_device(evaluate)
+
+    study = command("study", _study, "record, train and evaluate every combination of suites, inputs, grip codes and seeds")
+    study.add_argument("suites", nargs="+", help="names of standard suites")
+    study.add_argument("--out", type=Path, required=True, help="folder of the study")
+    study.add_argument("--inputs", nargs="+", default=["vo", "vt"], choices=["vo", "vt"], help="vision only, vision and touch")
+    study.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2], help="training seeds")
+    study.add_argument("--codes", nargs="+", default=["continuous"], choices=CODES, help="grip codes")
+    study.add_argument("--replans", type=int, nargs="+", default=[4], help="actions executed of each answer")
+    study.add_argument("--demos", type=int, default=50, help="demonstrations per task")
+    study.add_argument("--steps", type=int, default=10000, help="training steps")
+    study.add_argument("--episodes", type=int, default=50, help="episodes per task")
+    study.add_argument("--edge", type=int, default=128, help="width and height of the pictures, pixels")
+    study.add_argument("--per-gpu", type=int, default=1, help="policies that are trained on one GPU at a time")
+    return parser
+
+
+def main() -> int:
+    words = sys.argv[1:]
+    at = words.index("--") if "--" in words else len(words)
+    parser = _parser()
+    args = parser.parse_args(words[:at])
+    args.flags = words[at + 1 :]
+    if args.flags and args.command not in ("record", "evaluate", "study"):
+        parser.error(f"{args.command} does not run softvt and takes no flags after --")
+    try:
+        args.run(args)
+    except UserError as error:
+        print(f"softvt-baselines: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,90 @@
+"""Checkpoints: weights, the shape of the network, normalisation, and what the policy was trained with."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from . import UserError
+from .data import Statistics
+from .inputs import Shape
+from .model import Policy
+from .numbers import Standard
+
+VERSION = 1
+
+
+@dataclass
+class Checkpoint:
+    """A trained policy."""
+
+    policy: Policy
+    statistics: Statistics
+    code: str  # grip code of its answers
+    prompts: list[str]
+    about: dict  # how it was trained
+
+
+def save(path: Path, checkpoint: Checkpoint) -> None:
+    """Writes a checkpoint, its weights in half precision."""
+    one, statistics = checkpoint, checkpoint.statistics
+    content = {
+        "version": VERSION,
+        "shape": one.policy.shape.to_dict(),
+        "weights": {name: value.detach().cpu().half() for name, value in one.policy.state_dict().items()},
+        "statistics": {
+            "state": [torch.from_numpy(statistics.state.mean), torch.from_numpy(statistics.state.std)],
+            "action": [torch.from_numpy(statistics.action.mean), torch.from_numpy(statistics.action.std)],
+            "marker_scale": statistics.marker_scale,
+            "axis": torch.from_numpy(statistics.axis),
+        },
+        "code": one.code,
+        "prompts": one.prompts,
+        "about": one.about,
+    }
+    part = path.with_suffix(".part")
+    torch.save(content, part)
+    part.rename(path)
+
+
+def load(path: Path, device: torch.device) -> Checkpoint:
+    """Reads a checkpoint.
+
+    Raises UserError if the file is missing, no checkpoint of this version, or of another shape.
+    """
+    if not path.is_file():
+        raise UserError(f"{path}: no such checkpoint; softvt-baselines train writes one")
+    try:
+        content = torch.load(path, map_location="cpu", weights_only=True)
+        if content["version"] != VERSION:
+            raise UserError(f"{path}: a checkpoint of version {content['version']}, expected {VERSION}; train it again")
+        shape = Shape(**{key: tuple(value) if isinstance(value, list) else value for key, value in content["shape"].items()})
+        stated = content["statistics"]
+        numbers = {name: Standard(*(part.numpy() for part in stated[name])) for name in ("state", "action")}
+        statistics = Statistics(numbers["state"], numbers["action"], float(stated["marker_scale"]), stated["axis"].numpy())
+        code, prompts, about = content["code"], content["prompts"], content["about"]
+        policy = Policy(shape)
+        policy.load_state_dict({name: value.float() for name, value in content["weights"].items()})
+    except UserError:
+        raise
+    except KeyError as missing:
+        raise UserError(f"{path}: the checkpoint has no {missing.args[0]}; train it again") from None
+    except Exception as error:  # torch reports broken and foreign files in many ways
+        reason = " ".join(str(error).split())[:200]
+        raise UserError(f"{path}: not a checkpoint of this package: {reason}") from None
+    if not (np.isfinite(statistics.action.std).all() and (statistics.action.std > 0).all()):
+        raise UserError(f"{path}: the normalisation of its actions is not valid; train it again")
+    return Checkpoint(policy.to(device).eval(), statistics, code, list(prompts), dict(about))
+
+
+def device_of(name: str) -> torch.device:
+    """The device of a name. Raises UserError if it is not there."""
+    if name.startswith("cuda") and not torch.cuda.is_available():
+        raise UserError("no CUDA GPU is available; pass --device cpu for a small trial")
+    try:
+        device = torch.device(name)
+        torch.zeros(1, device=device)
+    except RuntimeError as error:
+        raise UserError(f"--device {name}: {str(error).splitlines()[0]}") from None
+    return device

@@ -1,0 +1,207 @@
+"""Demonstrations of `softvt record`, as arrays.
+
+The first reader of a recording packs it: pictures at the edge that policies see, and all numbers, as numpy files in
+`RECORDING/packed_EDGE/`. Later readers map these files into memory.
+"""
+
+import hashlib
+import json
+import os
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+from PIL import Image
+
+from . import UserError
+from .numbers import Standard, fold, mean_axis
+
+# The grip codes and the streams that hold the actions in them.
+ACTIONS = {"continuous": "actions", "binary": "actions_binary", "two-width": "actions_two_width", "force": "actions_force"}
+# Pictures by their keys in an observation, and their streams.
+CAMERAS = {"image": "agentview_rgb", "wrist_image": "eye_in_hand_rgb"}
+# Motion below which a step is idle: of the position (m), of the rotation vector (rad), and of the gripper as a share of its range in
+# the recording. Of several idle steps in a row so many are kept.
+IDLE_MOTION, IDLE_TURN, IDLE_GRIP, IDLE_KEPT = 0.0005, 0.005, 0.002, 2
+# Length of the marker displacements of a step: finger, marker, (x, y).
+MARKERS = 2 * 99 * 2
+
+
+@dataclass
+class Demonstrations:
+    """All demonstrations, one after the other: M recorded steps, of which N are trained on."""
+
+    pictures: dict[str, np.ndarray]  # per camera (M, edge, edge, 3) uint8
+    state: np.ndarray  # (M, 7): tool position (m), rotation vector, finger position (m); folded
+    markers: np.ndarray  # (M, 396) px: displacements of the markers of both fingers
+    actions: np.ndarray  # (N, 7): tool position, rotation vector, gripper in the grip code; folded
+    row: np.ndarray  # (N,) index among the recorded steps
+    start: np.ndarray  # (N,) index of the first recorded step of the same demonstration
+    last: np.ndarray  # (N,) index of the last of the N steps of the same demonstration
+    prompts: list[str]
+    prompt: np.ndarray  # (N,) index of the prompt of each step
+    axis: np.ndarray  # (3,) the side of the rotation vectors
+
+
+def displacements(motion: np.ndarray) -> np.ndarray:
+    """Displacements (T, 396) of the markers, px, of gripper_marker_motion (T, finger, initial and present, marker, xy)."""
+    return (motion[:, :, 1] - motion[:, :, 0]).reshape(len(motion), -1)
+
+
+def shrink(pictures: np.ndarray, edge: int) -> np.ndarray:
+    """Pictures (T, h, w, 3) with an edge of `edge` pixels, each the mean of its area."""
+    if pictures.shape[1:3] == (edge, edge):
+        return pictures
+    small = [Image.fromarray(picture).resize((edge, edge), Image.Resampling.BOX) for picture in pictures]
+    return np.stack([np.asarray(picture) for picture in small])
+
+
+def moving_steps(actions: np.ndarray, grip_range: float) -> np.ndarray:
+    """True for the steps of a demonstration (T, 7) that are kept.
+
+    An expert that waits teaches a policy without memory to wait forever, since its observation does not change meanwhile.
+    """
+    kept, last, idle = np.ones(len(actions), bool), actions[0], 0
+    for step, action in enumerate(actions[1:], 1):
+        change = np.abs(action - last)
+        moves = np.linalg.norm(change[:3]) > IDLE_MOTION or np.linalg.norm(change[3:6]) > IDLE_TURN
+        moves = moves or change[6] > IDLE_GRIP * grip_range
+        idle = 0 if moves else idle + 1
+        kept[step] = idle <= IDLE_KEPT
+        last = action if moves else last
+    return kept
+
+
+@dataclass
+class _Job:
+    """A demonstration, and the row of its first step in the packed files."""
+
+    file: Path
+    name: str
+    steps: int
+    row: int
+    folder: Path
+    edge: int
+
+
+def _pack_one(job: _Job) -> dict[str, np.ndarray | str]:
+    """Writes the pictures of a demonstration to their rows, and returns its numbers."""
+    rows = slice(job.row, job.row + job.steps)
+    with h5py.File(job.file) as file:
+        demo = file["data"][job.name]
+        obs = demo["obs"]
+        if missing := [stream for stream in CAMERAS.values() if stream not in obs]:
+            raise UserError(f"{job.file}: {job.name} has no pictures ({', '.join(missing)}): it was recorded with --images video")
+        for camera, stream in CAMERAS.items():
+            np.load(job.folder / f"{camera}.npy", mmap_mode="r+")[rows] = shrink(obs[stream][:], job.edge)
+        actions = {stream: demo[stream][:].astype(np.float32) for stream in ACTIONS.values() if stream in demo}
+        return actions | {
+            "state": obs["state"][:].astype(np.float32),
+            "markers": displacements(obs["gripper_marker_motion"][:]),
+            "prompt": str(demo.attrs["language"]),
+        }
+
+
+def _demonstrations(recording: Path) -> list[tuple[Path, str, int]]:
+    """File, name and number of steps of each demonstration."""
+    found = []
+    for path in sorted((recording / "hdf5").glob("*.hdf5")):
+        with h5py.File(path) as file:
+            names = sorted(file["data"], key=lambda name: int(name.rsplit("_", 1)[1]))
+            found += [(path, name, int(file["data"][name].attrs["num_samples"])) for name in names]
+    return found
+
+
+def pack(recording: Path, edge: int, processes: int) -> Path:
+    """Packs a recording unless that was done before. Returns the folder of the packed files.
+
+    Raises UserError if the recording is incomplete or has no pictures.
+    """
+    card = recording / "dataset.json"
+    if not card.is_file():
+        raise UserError(f"{recording} is no complete recording of softvt: it has no dataset.json")
+    identity = hashlib.sha256(card.read_bytes()).hexdigest()
+    folder = recording / f"packed_{edge}"
+    if (folder / "identity").is_file() and (folder / "identity").read_text() == identity:
+        return folder
+    demos = _demonstrations(recording)
+    if not demos:
+        raise UserError(f"{recording}: no demonstrations")
+    folder.mkdir(exist_ok=True)
+    (folder / "identity").unlink(missing_ok=True)
+    ends = np.cumsum([steps for _, _, steps in demos])
+    for camera in CAMERAS:
+        np.lib.format.open_memmap(folder / f"{camera}.npy", "w+", np.uint8, (int(ends[-1]), edge, edge, 3))
+    jobs = [_Job(path, name, steps, int(end) - steps, folder, edge) for (path, name, steps), end in zip(demos, ends)]
+    with ProcessPoolExecutor(processes) as pool:
+        numbers = list(pool.map(_pack_one, jobs))
+    streams = set.intersection(*(set(one) for one in numbers)) - {"prompt"}
+    arrays = {stream: np.concatenate([one[stream] for one in numbers]) for stream in sorted(streams)}
+    prompts = np.array([one["prompt"] for one in numbers])
+    np.savez(folder / "numbers.npz", lengths=[steps for _, _, steps in demos], prompts=prompts, **arrays)
+    (folder / "identity").write_text(identity)
+    return folder
+
+
+def _check_grip_code(recording: Path, code: str, packed) -> None:
+    """Raises UserError if the recording was made for another grip code, or has no actions in this one."""
+    stated = json.loads((recording / "recording.json").read_text()).get("gripper")
+    if stated and stated != code:
+        raise UserError(f"{recording} was recorded for the grip code {stated}: pass --gripper {stated}")
+    if ACTIONS[code] not in packed:
+        raise UserError(f"{recording} has no {ACTIONS[code]}, the actions in the grip code {code}: record it again")
+
+
+def load(recordings: list[Path], code: str, edge: int) -> Demonstrations:
+    """Reads all demonstrations of recordings.
+
+    Raises UserError if a recording is incomplete, or lacks the pictures or the grip code.
+    """
+    folders = [pack(recording, edge, os.cpu_count() or 1) for recording in recordings]
+    packed = [np.load(folder / "numbers.npz") for folder in folders]
+    for recording, numbers in zip(recordings, packed):
+        _check_grip_code(recording, code, numbers)
+
+    def joined(stream: str) -> np.ndarray:
+        return np.concatenate([numbers[stream] for numbers in packed])
+
+    def pictures(camera: str) -> np.ndarray:
+        mapped = [np.load(folder / f"{camera}.npy", mmap_mode="r") for folder in folders]
+        return mapped[0] if len(mapped) == 1 else np.concatenate(mapped)
+
+    recorded, names, actions = joined("lengths"), joined("prompts"), joined(ACTIONS[code])
+    axis = mean_axis(actions[:, 3:6])
+    actions = fold(actions, axis)
+    grip_range = float(np.ptp(actions[:, 6]))
+    moving = [moving_steps(one, grip_range) for one in np.split(actions, np.cumsum(recorded)[:-1])]
+    kept, lengths = np.concatenate(moving), np.array([mask.sum() for mask in moving])
+    prompts = sorted(set(names.tolist()))
+    return Demonstrations(
+        pictures={camera: pictures(camera) for camera in CAMERAS},
+        state=fold(joined("state"), axis),
+        markers=joined("markers"),
+        actions=actions[kept],
+        row=np.flatnonzero(kept),
+        start=np.repeat(np.cumsum(recorded) - recorded, lengths),
+        last=np.repeat(np.cumsum(lengths) - 1, lengths),
+        prompts=prompts,
+        prompt=np.repeat([prompts.index(name) for name in names], lengths),
+        axis=axis,
+    )
+
+
+@dataclass
+class Statistics:
+    """Normalisation of the inputs and answers of a policy."""
+
+    state: Standard
+    action: Standard
+    marker_scale: float  # px
+    axis: np.ndarray  # (3,) the side of the rotation vectors
+
+    @classmethod
+    def of(cls, demos: Demonstrations) -> "Statistics":
+        scale = float(np.sqrt(np.square(demos.markers, dtype=np.float64).mean()) + 1e-6)
+        return cls(Standard.of(demos.state), Standard.of(demos.actions), scale, demos.axis)

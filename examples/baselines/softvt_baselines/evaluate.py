@@ -1,0 +1,70 @@
+"""Evaluation: serves a checkpoint and runs softvt against it."""
+
+import os
+import re
+import subprocess
+import sys
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from . import UserError
+from .inputs import Shape
+
+
+def softvt_binary() -> str:
+    """The command softvt, or what SOFTVT names."""
+    return os.environ.get("SOFTVT", "softvt")
+
+
+def run_softvt(words: list[str]) -> None:
+    """Runs softvt. Raises UserError if it is not installed or fails; its own message is on standard error."""
+    try:
+        code = subprocess.run([softvt_binary(), *words]).returncode
+    except FileNotFoundError:
+        raise UserError("softvt was not found; install it (cargo install --path .), or set SOFTVT to its path") from None
+    if code != 0:
+        raise UserError(f"softvt {' '.join(words)} ended with exit code {code}")
+
+
+def camera_flags(edge: int) -> list[str]:
+    """Settings with which softvt renders pictures of `edge` pixels."""
+    return ["--set", f"cameras.width={edge}", "--set", f"cameras.height={edge}"]
+
+
+@contextmanager
+def served(path: Path, device: str):
+    """A server of a checkpoint in a process of its own; gives its address."""
+    words = [sys.executable, "-m", "softvt_baselines", "serve", str(path), "--device", device, "--port", "0"]
+    server = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+    try:
+        for line in server.stdout:
+            if found := re.search(r"ws://\S+", line):
+                yield found.group()
+                return
+        raise UserError(f"the server of {path} did not start")
+    finally:
+        server.terminate()
+        server.wait()
+
+
+@dataclass
+class Evaluation:
+    """A checkpoint, and the suites on which it is evaluated."""
+
+    checkpoint: Path
+    shape: Shape
+    code: str  # grip code
+    scripts: list[str]  # suites or conditions of softvt
+    name: str  # of the policy in results
+    out: Path
+    flags: list[str]  # further flags of softvt
+    device: str
+
+
+def evaluate(one: Evaluation) -> None:
+    """Evaluates a checkpoint on all scripts, each in a folder below `out`."""
+    own = ["--profile", one.shape.profile, "--gripper", one.code, "--name", one.name, *camera_flags(one.shape.edge)]
+    with served(one.checkpoint, one.device) as address:
+        for script in one.scripts:
+            run_softvt([script, "--policy", address, *own, "--out", str(one.out / Path(script).stem), *one.flags])

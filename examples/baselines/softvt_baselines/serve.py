@@ -1,0 +1,62 @@
+"""A policy server in openpi's protocol: metadata first, then a chunk of actions per observation.
+
+Observations of all connections that wait at the same time are answered together.
+"""
+
+import asyncio
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from openpi_client import msgpack_numpy
+from websockets.asyncio.server import serve as listen
+from websockets.exceptions import ConnectionClosed
+
+from . import UserError
+
+# Answers a batch of observations: a chunk of actions each, or an error for its client.
+Answers = Callable[[list[dict]], list[np.ndarray | UserError]]
+
+
+@dataclass
+class _Request:
+    obs: dict
+    answer: asyncio.Future
+
+
+async def _answer_all(queue: asyncio.Queue, answers: Answers, batch_size: int) -> None:
+    while True:
+        batch = [await queue.get()]
+        while len(batch) < batch_size and not queue.empty():
+            batch.append(queue.get_nowait())
+        found = await asyncio.to_thread(answers, [request.obs for request in batch])
+        for request, answer in zip(batch, found, strict=True):
+            if not request.answer.cancelled():
+                request.answer.set_result(answer)
+
+
+async def serve(answers: Answers, batch_size: int, metadata: dict, host: str, port: int) -> None:
+    """Serves until it is cancelled. Port 0 takes a free one; the first line of output names it."""
+    queue: asyncio.Queue[_Request] = asyncio.Queue()
+
+    async def converse(socket) -> None:
+        try:
+            await socket.send(msgpack_numpy.packb(metadata))
+            async for message in socket:
+                request = _Request(msgpack_numpy.unpackb(message), asyncio.get_running_loop().create_future())
+                await queue.put(request)
+                answer = await request.answer
+                if isinstance(answer, UserError):
+                    await socket.send(str(answer))  # text is an error message
+                    return
+                await socket.send(msgpack_numpy.packb({"actions": answer}))
+        except ConnectionClosed:
+            return
+        except Exception:
+            await socket.send(traceback.format_exc())
+            raise
+
+    async with listen(converse, host, port, compression=None, max_size=64 << 20) as server:
+        print(f"serving on ws://{host}:{server.sockets[0].getsockname()[1]}", flush=True)
+        await _answer_all(queue, answers, batch_size)

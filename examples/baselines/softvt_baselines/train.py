@@ -1,0 +1,122 @@
+"""Training: all demonstrations lie in the memory of the device, and batches are drawn there."""
+
+import copy
+import math
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from . import prompts
+from .checkpoint import Checkpoint, save
+from .data import CAMERAS, Demonstrations, Statistics
+from .inputs import Shape
+from .model import Policy
+
+# Training, after ACT: learning rate and its last share, weight decay, warm-up (steps), decay of the averaged weights.
+RATE, LAST_RATE, WEIGHT_DECAY, WARM_UP, AVERAGE = 3e-4, 0.02, 1e-4, 300, 0.999
+# Augmentation: random shift of a picture (share of its edge), brightness, noise on the standardised state.
+SHIFT, BRIGHTNESS, STATE_NOISE = 0.045, 0.1, 0.02
+REPORT = 200  # steps between two lines of the log
+
+
+@dataclass
+class TrainOptions:
+    shape: Shape
+    code: str
+    steps: int
+    batch: int
+    seed: int
+    device: torch.device
+
+
+class Batches:
+    """Batches of observations and chunks of actions, drawn on the device."""
+
+    def __init__(self, demos: Demonstrations, statistics: Statistics, options: TrainOptions):
+        def on_device(array: np.ndarray) -> Tensor:
+            return torch.tensor(array, device=options.device)
+
+        self.shape, self.device = options.shape, options.device
+        self.pictures = {camera: on_device(demos.pictures[camera]) for camera in CAMERAS}
+        self.state = on_device(statistics.state.apply(demos.state))
+        self.actions = on_device(statistics.action.apply(demos.actions))
+        self.row, self.start, self.last = on_device(demos.row), on_device(demos.start), on_device(demos.last)
+        self.prompts = on_device(np.array([prompts.encode(prompt) for prompt in demos.prompts]))
+        self.prompt = on_device(demos.prompt)
+        if self.shape.has_touch:
+            self.markers = on_device((demos.markers / statistics.marker_scale).astype(np.float16))
+        self.random = torch.Generator(options.device).manual_seed(options.seed)
+
+    def _past(self, steps: Tensor, back: tuple[int, ...]) -> Tensor:
+        """Recorded steps (B, len(back)) before some steps, at the earliest the first of their demonstrations."""
+        earlier = self.row[steps][:, None] - torch.tensor(back, device=self.device)
+        return torch.maximum(earlier, self.start[steps][:, None])
+
+    def _shifted(self, pictures: Tensor) -> Tensor:
+        """Pictures (B, F, E, E, 3), each group of frames moved by a few pixels, with the border repeated."""
+        batch, _, edge = pictures.shape[:3]
+        most = round(SHIFT * edge)
+        moves = torch.randint(-most, most + 1, (2, batch, 1), generator=self.random, device=self.device)
+        rows, columns = ((torch.arange(edge, device=self.device) + move).clamp(0, edge - 1) for move in moves)
+        groups = torch.arange(batch, device=self.device)[:, None, None]
+        return pictures.transpose(1, 2).transpose(2, 3)[groups, rows[:, :, None], columns[:, None, :]].permute(0, 3, 1, 2, 4)
+
+    def draw(self, count: int) -> tuple[dict[str, Tensor], Tensor, Tensor]:
+        """Observations, chunks of actions (count, chunk, 7), and which of these lie within the demonstration."""
+        steps = torch.randint(len(self.actions), (count,), generator=self.random, device=self.device)
+        frames = self._past(steps, tuple(range(self.shape.frames - 1, -1, -1)))
+        obs = {"prompt": self.prompts[self.prompt[steps]]}
+        for camera, pictures in self.pictures.items():
+            shifted = self._shifted(pictures[frames])
+            light = 1 + BRIGHTNESS * (2 * torch.rand((count, 1, 1, 1, 1), generator=self.random, device=self.device) - 1)
+            obs[camera] = (shifted * light).clamp(0, 255).byte()
+        noise = torch.randn((count, self.shape.frames, self.shape.state), generator=self.random, device=self.device)
+        obs["state"] = self.state[frames] + STATE_NOISE * noise
+        if self.shape.has_touch:
+            obs["markers"] = self.markers[self._past(steps, self.shape.marker_steps)].float()
+        ahead = steps[:, None] + torch.arange(self.shape.chunk, device=self.device)
+        return obs, self.actions[ahead.clamp(max=len(self.actions) - 1)], ahead <= self.last[steps][:, None]
+
+
+def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict) -> None:
+    """Trains a policy and writes its checkpoint to `path`, and the log beside it."""
+    torch.manual_seed(options.seed)
+    torch.set_float32_matmul_precision("high")
+    statistics = Statistics.of(demos)
+    batches = Batches(demos, statistics, options)
+    policy = Policy(options.shape).to(options.device, memory_format=torch.channels_last)
+    averaged = copy.deepcopy(policy).requires_grad_(False)
+    optimizer = torch.optim.AdamW(policy.parameters(), RATE, weight_decay=WEIGHT_DECAY, fused=options.device.type == "cuda")
+
+    def rate(step: int) -> float:
+        cosine = LAST_RATE + (1 - LAST_RATE) * 0.5 * (1 + math.cos(math.pi * step / options.steps))
+        return min(1, (step + 1) / WARM_UP) * cosine
+
+    schedule = torch.optim.lr_scheduler.LambdaLR(optimizer, rate)
+    started, total = time.monotonic(), torch.zeros((), device=options.device)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with open(path.with_suffix(".log"), "w") as log:
+        for step in range(1, options.steps + 1):
+            obs, actions, is_step = batches.draw(options.batch)
+            with torch.autocast(options.device.type, torch.bfloat16, enabled=options.device.type == "cuda"):
+                loss = policy.loss(obs, actions, is_step)
+            loss.backward()
+            torch.nn.utils.clip_grad_norm_(policy.parameters(), 1.0)
+            optimizer.step()
+            optimizer.zero_grad(set_to_none=True)
+            schedule.step()
+            decay = min(AVERAGE, step / (step + 10))
+            torch._foreach_lerp_(list(averaged.parameters()), list(policy.parameters()), 1 - decay)
+            total += loss.detach()
+            if step % REPORT == 0 or step == options.steps:
+                count = (step - 1) % REPORT + 1
+                line = f"{path.stem}: step {step} of {options.steps}, loss {total.item() / count:.4f}, {time.monotonic() - started:.0f} s"
+                print(line, flush=True)
+                print(line, file=log, flush=True)
+                total.zero_()
+    about = about | {"steps": options.steps, "batch": options.batch, "seed": options.seed, "recorded_steps": len(demos.state), "trained_steps": len(demos.actions)}
+    save(path, Checkpoint(averaged, statistics, options.code, demos.prompts, about))

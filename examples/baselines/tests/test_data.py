@@ -1,0 +1,169 @@
+"""Reading demonstrations, normalisation, prompts and grip codes. Needs no learning library."""
+
+import json
+import tempfile
+import unittest
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from softvt_baselines import UserError, prompts
+from softvt_baselines.data import ACTIONS, CAMERAS, Statistics, displacements, load, moving_steps, shrink
+from softvt_baselines.inputs import Shape, read
+from softvt_baselines.numbers import Standard, fold, mean_axis
+
+STEPS = 12
+
+
+def rotation(vector: np.ndarray) -> np.ndarray:
+    """Rotation matrix of a rotation vector, by Rodrigues' formula."""
+    angle = np.linalg.norm(vector)
+    x, y, z = vector / angle
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def recording(folder: Path, demos: int = 2, without: tuple[str, ...] = (), gripper: str | None = None) -> Path:
+    """A recording of one task with simple numbers, as softvt record leaves it."""
+    (folder / "hdf5").mkdir(parents=True)
+    with h5py.File(folder / "hdf5" / "suite_task0_demo.hdf5", "w") as file:
+        for index in range(demos):
+            demo = file.create_group(f"data/demo_{index}")
+            demo.attrs["num_samples"], demo.attrs["language"] = STEPS, "pick up the left bun"
+            actions = np.zeros((STEPS, 7))
+            actions[:, 0], actions[:, 3], actions[:, 6] = 0.01 * np.arange(STEPS), 3.1, 0.1 * index
+            streams = {f"obs/{stream}": np.full((STEPS, 8, 8, 3), 10 * index, np.uint8) for stream in CAMERAS.values()}
+            streams |= {stream: actions for stream in ACTIONS.values()}
+            streams["obs/state"] = actions
+            streams["obs/gripper_marker_motion"] = np.zeros((STEPS, 2, 2, 99, 2), np.float32)
+            for name, values in streams.items():
+                if name not in without:
+                    demo[name] = values
+    (folder / "dataset.json").write_text("{}")
+    (folder / "recording.json").write_text(json.dumps({"gripper": gripper} if gripper else {}))
+    return folder
+
+
+class Recordings(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.folder = Path(scratch.name)
+
+    def refused(self, words: str, *arguments) -> None:
+        with self.assertRaises(UserError) as caught:
+            load(*arguments)
+        self.assertIn(words, str(caught.exception))
+
+    def test_all_steps_are_read_in_order(self):
+        demos = load([recording(self.folder / "a")], "continuous", 4)
+        self.assertEqual(demos.pictures["image"].shape, (2 * STEPS, 4, 4, 3))
+        self.assertEqual(demos.pictures["image"][:, 0, 0, 0].tolist(), [0] * STEPS + [10] * STEPS)
+        self.assertEqual((demos.start[0], demos.start[-1], demos.last[0], demos.last[-1]), (0, STEPS, STEPS - 1, 2 * STEPS - 1))
+        np.testing.assert_allclose(demos.actions[STEPS:, 6], 0.1)
+        self.assertEqual(demos.prompts, ["pick up the left bun"])
+        again = load([self.folder / "a", recording(self.folder / "b")], "force", 4)
+        self.assertEqual((len(again.actions), again.start[-1]), (4 * STEPS, 3 * STEPS))
+
+    def test_what_is_missing_is_named(self):
+        self.refused("no dataset.json", [self.folder], "continuous", 4)
+        self.refused("--images video", [recording(self.folder / "a", without=("obs/agentview_rgb",))], "continuous", 4)
+        self.refused("no actions_force", [recording(self.folder / "b", without=("actions_force",))], "force", 4)
+        self.refused("--gripper force", [recording(self.folder / "c", gripper="force")], "continuous", 4)
+
+    def test_a_new_recording_in_the_same_folder_is_packed_again(self):
+        folder = recording(self.folder / "a")
+        load([folder], "continuous", 4)
+        (folder / "dataset.json").write_text('{"demonstrations": 3}')
+        (folder / "hdf5" / "suite_task0_demo.hdf5").unlink()
+        self.refused("no demonstrations", [folder], "continuous", 4)
+
+
+class Numbers(unittest.TestCase):
+    def test_folded_vectors_are_the_same_rotations_on_one_side(self):
+        random = np.random.default_rng(0)
+        rows = np.zeros((50, 7), np.float32)
+        rows[:, 3:6] = random.normal([3.1, 0.1, 0], 0.05, (50, 3)) * random.choice([-1, 1], (50, 1))
+        axis = mean_axis(rows[:, 3:6])
+        folded = fold(rows, axis)
+        self.assertTrue((folded[:, 3:6] @ axis > 0).all())
+        for before, after in zip(rows[:, 3:6], folded[:, 3:6]):
+            np.testing.assert_allclose(rotation(before), rotation(after), atol=1e-5)
+
+    def test_standardised_numbers_return(self):
+        rows = np.array([[1.0, 5.0], [3.0, 5.0]], np.float32)
+        standard = Standard.of(rows)
+        np.testing.assert_allclose(standard.apply(rows), [[-1, 0], [1, 0]])
+        np.testing.assert_allclose(standard.invert(standard.apply(rows)), rows)
+
+    def test_pictures_shrink_to_the_mean_of_their_area(self):
+        picture = np.zeros((1, 4, 4, 3), np.uint8)
+        picture[0, :2, :2] = [[[0], [100]], [[200], [100]]]
+        self.assertEqual(shrink(picture, 2)[0, :, :, 0].tolist(), [[100, 0], [0, 0]])
+
+    def test_waiting_is_left_out_after_two_steps(self):
+        actions = np.zeros((10, 7))
+        actions[5:, 6] = 0.5
+        self.assertEqual(moving_steps(actions, 0.5).tolist(), [True] * 3 + [False] * 2 + [True] * 3 + [False] * 2)
+        slow = np.zeros((10, 7))
+        slow[:, 0] = 0.0003 * np.arange(10)
+        self.assertTrue(moving_steps(slow, 1.0).all(), "slow motion is not waiting")
+
+    def test_displacements_are_those_of_both_fingers(self):
+        motion = np.zeros((1, 2, 2, 99, 2), np.float32)
+        motion[0, 1, 1, 98, 1] = 3
+        self.assertEqual(displacements(motion)[0].nonzero()[0].tolist(), [395])
+
+
+class Prompts(unittest.TestCase):
+    def test_words_and_pairs_are_hashed_alike_in_every_process(self):
+        self.assertEqual(prompts.ngrams("Pick up, the bun"), ["pick", "up", "the", "bun", "pick up", "up the", "the bun"])
+        self.assertEqual(prompts.encode("bun")[:2], [1 + 1280313264 % (prompts.BUCKETS - 1), 0])
+        left, right = set(prompts.encode("the left bun")), set(prompts.encode("the right bun"))
+        self.assertTrue(left - right and right - left and left & right)
+
+    def test_unknown_prompts_are_refused_and_paraphrases_are_not(self):
+        vocabulary = prompts.Vocabulary(["pick up the left bun and place it in the basket"])
+        self.assertIsNone(vocabulary.problem("put the left bun in the basket"))
+        self.assertIn("was not trained for the prompt 'open a drawer'", vocabulary.problem("open a drawer"))
+        self.assertIn("empty prompt", vocabulary.problem(""))
+
+
+class Inputs(unittest.TestCase):
+    def setUp(self):
+        standard = Standard(np.zeros(7, np.float32), np.ones(7, np.float32))
+        self.statistics = Statistics(standard, standard, 2.0, np.array([1, 0, 0], np.float32))
+        self.vocabulary = prompts.Vocabulary(["take it"])
+        motion = np.zeros((9, 198, 2), np.float32)
+        motion[8] = 6
+        self.obs = {camera: np.zeros((8, 8, 3), np.uint8) for camera in CAMERAS}
+        self.obs |= {"state": np.array([0, 0, 0, -3.1, 0, 0, 0.04], np.float32), "prompt": "take it", "softvt": {"seed": 7}}
+        self.obs["tactile_marker_motion"] = motion
+
+    def read(self, shape: Shape, **changes) -> dict:
+        return read(self.obs | changes, shape, self.statistics, self.vocabulary)
+
+    def test_an_observation_becomes_the_inputs_of_the_network(self):
+        shape = Shape(has_touch=True, edge=4)
+        found = self.read(shape)
+        self.assertEqual(found["image"].shape, (1, 1, 4, 4, 3))
+        np.testing.assert_allclose(found["state"][0, 0, 3], 2 * np.pi - 3.1, rtol=1e-6)
+        self.assertEqual((found["markers"][0, 0].max(), found["markers"][0, 1].max()), (0, 3))
+        np.testing.assert_array_equal(found["noise"], self.read(shape)["noise"])
+        self.assertFalse((found["noise"] == self.read(shape, softvt={"seed": 8})["noise"]).all())
+
+    def test_what_does_not_fit_is_named(self):
+        for shape, changes, words in [
+            (Shape(True), {"tactile_marker_motion": None}, "no tactile_marker_motion; use the profile visuo_tactile"),
+            (Shape(False, frames=2), {}, "image has the shape (8, 8, 3), expected 2 frames"),
+            (Shape(False), {"prompt": "fly away"}, "was not trained for the prompt"),
+        ]:
+            obs = {key: value for key, value in (self.obs | changes).items() if value is not None}
+            with self.assertRaises(UserError) as caught:
+                read(obs, shape, self.statistics, self.vocabulary)
+            self.assertIn(words, str(caught.exception))
+
+
+if __name__ == "__main__":
+    unittest.main()
