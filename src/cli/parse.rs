@@ -16,7 +16,7 @@ use softvt_common::text;
 use softvt_script::{OptionSpec, OptionValue};
 
 /// Flags that select the policy. `softvt serve` refuses them: there the client is the policy.
-const POLICY_FLAGS: [&str; 5] = ["policy", "protocol", "replan", "policy_timeout", "name"];
+const POLICY_FLAGS: [&str; 4] = ["policy", "protocol", "replan", "policy_timeout"];
 
 /// Parses the command line. Returns `None` if it asked for help or the version, which is then printed.
 ///

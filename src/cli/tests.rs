@@ -105,7 +105,13 @@ fn section(path: &str, command: &mut Command, shared: &[SharedFlags]) -> String 
                 if listed.len() == flags.help.len() {
                     format!("[{heading}](#{anchor})")
                 } else {
-                    format!("{} of [{heading}](#{anchor})", listed.join(" and "))
+                    let names = match listed.split_last() {
+                        Some((last, others)) if !others.is_empty() => {
+                            format!("{} and {last}", others.join(", "))
+                        }
+                        _ => listed.concat(),
+                    };
+                    format!("{names} of [{heading}](#{anchor})")
                 }
             })
             .collect();

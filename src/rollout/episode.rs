@@ -533,7 +533,8 @@ impl Episode {
         EpisodeRecord { header: self.spec.header.clone(), outcome, verdict: self.verdict(), stats }
     }
 
-    fn finish(self, gave_up: Option<String>) -> FinishedEpisode {
+    /// Ends the episode: its record with what belongs to it. `gave_up` is as for [`record`](Self::record).
+    pub fn finish(self, gave_up: Option<String>) -> FinishedEpisode {
         let record = self.record(gave_up);
         let recording = self.recorded.map(|RecordedStates { frames, d_pct }| StateRecording {
             sensors: self.sensors,

@@ -19,13 +19,15 @@ struct HistoryEntry {
     camera_inside: bool,
     /// Tactile frames of both fingers, once they were requested.
     tactile: Option<Arc<[TactileFrame; 2]>>,
+    /// True if the state is counted as one that was observed from inside an object.
+    is_counted: bool,
 }
 
 /// States of the last control steps, oldest first.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ObservationHistory {
     entries: VecDeque<HistoryEntry>,
-    /// Number of observations with an image from inside an object.
+    /// Number of states whose observation had an image from inside an object. A state that is observed again counts once.
     pub camera_inside: u32,
 }
 
@@ -41,6 +43,7 @@ impl ObservationHistory {
             cameras: None,
             camera_inside: false,
             tactile: None,
+            is_counted: false,
         });
     }
 
@@ -57,8 +60,11 @@ impl ObservationHistory {
             steps.push(PastStep { robot: entry.robot, cameras: entry.images(sensors, streams)? });
         }
         let Some(PastStep { cameras, .. }) = steps.pop() else { return Ok(proprioceptive) };
-        self.camera_inside += self.entries.back().map_or(0, |entry| u32::from(entry.camera_inside));
-        let Some(HistoryEntry { frame, .. }) = self.entries.back() else { return Ok(proprioceptive) };
+        let Some(HistoryEntry { frame, camera_inside, is_counted, .. }) = self.entries.back_mut() else {
+            return Ok(proprioceptive);
+        };
+        self.camera_inside += u32::from(*camera_inside && !*is_counted);
+        *is_counted |= *camera_inside;
         let forces = streams.force.then(|| SensorSuite::pad_forces(frame));
         let force_history = if streams.force { self.forces() } else { Vec::new() };
         let tactile = if streams.tactile { Some(self.tactile(sensors)?) } else { None };

@@ -4,7 +4,7 @@ use super::access::AccessRules;
 use softvt_benchmark::Suite;
 use softvt_evaluation::episode_id::{EpisodeId, Split};
 use softvt_policy::{PolicyError, profile::Profile};
-use softvt_rollout::{Episode, EpisodeError};
+use softvt_rollout::{Episode, EpisodeError, FinishedEpisode};
 
 /// A request cannot be executed. The message is sent to the client.
 #[derive(Debug, thiserror::Error)]
@@ -18,6 +18,9 @@ pub enum RequestError {
     /// The episode cannot be simulated or observed.
     #[error(transparent)]
     Episode(#[from] EpisodeError),
+    /// A finished episode cannot be recorded.
+    #[error("the episode is over, but it cannot be recorded: {0}")]
+    Record(String),
 }
 
 impl From<String> for RequestError {
@@ -28,6 +31,19 @@ impl From<String> for RequestError {
 
 /// Starts an episode: builds its scene and lets it settle.
 pub(super) type StartEpisode<'a> = Box<dyn Fn(&EpisodeId) -> Result<Episode, RequestError> + Sync + 'a>;
+
+/// Reports an episode that can no longer be recorded, with the reason.
+type ReportLost<'a> = Box<dyn Fn(&EpisodeId, &str) + Sync + 'a>;
+
+/// Records episodes of a run that clients step to their end. `docs/serve.md` says which ones.
+pub struct EpisodeRecorder<'a> {
+    /// True if an episode belongs to the run and had no record when the server started.
+    pub selects: Box<dyn Fn(&EpisodeId) -> bool + Sync + 'a>,
+    /// Records a selected episode; it is called at most once for each.
+    pub record: Box<dyn Fn(FinishedEpisode) -> Result<(), RequestError> + Sync + 'a>,
+    /// Reports a selected episode that can no longer be recorded, with the reason.
+    pub report_lost: ReportLost<'a>,
+}
 
 /// Suites and settings of a server.
 pub struct ServerConfig<'a> {
@@ -49,6 +65,8 @@ pub struct ServerConfig<'a> {
     pub access: AccessRules,
     /// Starts an episode.
     pub start_episode: StartEpisode<'a>,
+    /// Records finished episodes; `None` if nothing is recorded.
+    pub recorder: Option<EpisodeRecorder<'a>>,
 }
 
 impl ServerConfig<'_> {

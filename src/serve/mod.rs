@@ -3,6 +3,7 @@
 #![warn(unreachable_pub)]
 
 mod access;
+mod attempts;
 mod config;
 mod connection;
 mod render_budget;
@@ -14,6 +15,6 @@ mod spaces;
 mod state;
 
 pub use access::AccessRules;
-pub use config::{RequestError, ServerConfig};
+pub use config::{EpisodeRecorder, RequestError, ServerConfig};
 pub use response::hello;
 pub use server::{listen, serve};

@@ -6,6 +6,7 @@ use super::{
     config::{RequestError, ServerConfig},
     state::{ActionRow, EpisodeState},
 };
+use softvt_benchmark::Suite;
 use softvt_evaluation::episode_id::{EpisodeId, Split};
 use softvt_policy::{
     msgpack::{NumberArray, entry, kind, names, numbers},
@@ -104,11 +105,21 @@ fn episode_id(fields: &RequestFields, config: &ServerConfig) -> Result<EpisodeId
             .map_err(|error| fields.error(&format!("split is {:?}; {error}", shortened(&name))))?,
     };
     if !suite.tasks.iter().any(|known| known.id == task) {
-        let last = suite.tasks.len().saturating_sub(1);
-        let message = format!("task {task}: suite {} has the tasks 0 to {last}", suite.name);
+        let message = format!("task {task}: suite {} has the {}", suite.name, task_list(suite));
         return Err(fields.error(&message));
     }
     Ok(EpisodeId { suite: suite.name.clone(), task, episode, base_seed, split })
+}
+
+/// The tasks of a suite that are served, for messages.
+fn task_list(suite: &Suite) -> String {
+    let ids: Vec<usize> = suite.tasks.iter().map(|task| task.id).collect();
+    let last = ids.len().saturating_sub(1);
+    if ids.iter().copied().eq(0..ids.len()) {
+        return format!("tasks 0 to {last}");
+    }
+    let ids: Vec<String> = ids.iter().map(ToString::to_string).collect();
+    format!("served tasks {}", ids.join(", "))
 }
 
 fn step(fields: &RequestFields) -> Result<Request, RequestError> {

@@ -24,6 +24,15 @@ const PROTOCOL: u32 = 1;
 /// Field of a record that depends on how often the client requested images, not on its actions.
 const OBSERVATION_DEPENDENT: &str = "camera_inside";
 
+/// What a step did.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Executed {
+    /// Number of actions that were executed.
+    pub count: usize,
+    /// Whether the episode, which is over, was recorded; `None` before its end, and if the server records nothing.
+    pub recorded: Option<bool>,
+}
+
 /// A response of a type.
 pub(super) fn typed(kind: &str, entries: impl IntoIterator<Item = (&'static str, Value)>) -> Value {
     map([("type", Value::from(kind))].into_iter().chain(entries))
@@ -53,6 +62,7 @@ pub fn hello(config: &ServerConfig, first: &Observation) -> Value {
         "privileged": config.privileged,
         "seed": config.seed,
         "split": config.split.name(),
+        "records": config.recorder.is_some(),
         "control_hz": 1.0 / CONTROL_DT,
     });
     let Value::Map(mut entries) = from_json(&about) else { return typed("hello", []) };
@@ -62,7 +72,7 @@ pub fn hello(config: &ServerConfig, first: &Observation) -> Value {
     Value::Map(std::iter::once(kind).chain(entries).collect())
 }
 
-/// The current observation, reward and info of an episode. `executed` is the number of actions that a step executed.
+/// The current observation, reward and info of an episode. `executed` is what a step did.
 ///
 /// # Errors
 /// A sensor stream cannot be computed.
@@ -70,7 +80,7 @@ pub(super) fn transition(
     kind: &str,
     live: &mut LiveEpisode,
     config: &ServerConfig,
-    executed: Option<usize>,
+    executed: Option<Executed>,
 ) -> Result<Value, RequestError> {
     let observation = live.observe(config)?;
     let succeeded = live.has_succeeded();
@@ -100,7 +110,7 @@ fn info(
     live: &LiveEpisode,
     config: &ServerConfig,
     observation: &Observation,
-    executed: Option<usize>,
+    executed: Option<Executed>,
 ) -> Value {
     let mut info = Map::new();
     let mut put = |name: &str, value| info.insert(name.to_owned(), value);
@@ -109,8 +119,11 @@ fn info(
     put("step", json!(live.state.actions.len()));
     put("time_s", json!(observation.time_s));
     put("success", json!(live.has_succeeded()));
-    if let Some(count) = executed {
+    if let Some(Executed { count, recorded }) = executed {
         put("carried_out", json!(count));
+        if let Some(recorded) = recorded {
+            put("recorded", json!(recorded));
+        }
     }
     if config.privileged {
         put("state", json!(live.episode.trace()));

@@ -15,6 +15,7 @@ use tungstenite::http::StatusCode;
 
 use super::{
     access::Refusal,
+    attempts::Attempts,
     config::ServerConfig,
     connection::{Connection, HANDSHAKE_TIMEOUT, ReceiveError},
     render_budget::RenderBudget,
@@ -55,6 +56,7 @@ struct ServerState<'a> {
     max_clients: usize,
     clients: AtomicUsize,
     render_budget: RenderBudget,
+    attempts: Attempts<'a>,
     cancel: &'a AtomicBool,
 }
 
@@ -67,7 +69,8 @@ pub fn serve(
     cancel: &AtomicBool,
 ) {
     let (clients, render_budget) = (AtomicUsize::new(0), RenderBudget::default());
-    let state = ServerState { config, hello, max_clients, clients, render_budget, cancel };
+    let attempts = Attempts::new(config.recorder.as_ref());
+    let state = ServerState { config, hello, max_clients, clients, render_budget, attempts, cancel };
     let connections = AtomicUsize::new(0);
     thread::scope(|scope| {
         while !cancel.load(Ordering::Relaxed) {
@@ -181,7 +184,7 @@ fn run_session(mut connection: Connection, state: &ServerState) {
     if connection.send(&state.hello).is_err() {
         return;
     }
-    let mut session = ClientSession::new(state.config, &state.render_budget, state.cancel);
+    let mut session = ClientSession::new(state.config, &state.render_budget, &state.attempts, state.cancel);
     loop {
         let (response, is_last) = match connection.recv() {
             Ok(message) => respond(&mut session, state.config, &message),

@@ -8,10 +8,11 @@ use std::{
 use rmpv::Value;
 
 use super::{
+    attempts::{Attempt, Attempts},
     config::{RequestError, ServerConfig},
     render_budget::{MAX_RENDER_PIXELS, RenderBudget},
     request::Request,
-    response,
+    response::{self, Executed},
     state::{ActionRow, EpisodeState, LiveEpisode},
 };
 use softvt_policy::{encode::image_array, msgpack::pack_array};
@@ -24,24 +25,31 @@ const MAX_SNAPSHOTS: usize = 4;
 pub(super) struct ClientSession<'a> {
     config: &'a ServerConfig<'a>,
     render_budget: &'a RenderBudget,
+    attempts: &'a Attempts<'a>,
     cancel: &'a AtomicBool,
     live: Option<LiveEpisode>,
     /// Copies of earlier states, the most recently used one last.
     snapshots: VecDeque<LiveEpisode>,
+    /// The attempt at the episode that will be recorded, if it is one.
+    attempt: Option<Attempt<'a>>,
 }
 
 impl<'a> ClientSession<'a> {
-    /// A session without an episode. Its images wait for `render_budget`; `cancel` interrupts long requests.
+    /// A session without an episode. Its images wait for `render_budget`; `attempts` are those of all clients; `cancel`
+    /// interrupts long requests.
     pub(super) fn new(
         config: &'a ServerConfig<'a>,
         render_budget: &'a RenderBudget,
+        attempts: &'a Attempts<'a>,
         cancel: &'a AtomicBool,
     ) -> Self {
-        Self { config, render_budget, cancel, live: None, snapshots: VecDeque::new() }
+        let snapshots = VecDeque::new();
+        Self { config, render_budget, attempts, cancel, live: None, snapshots, attempt: None }
     }
 
     /// Discards the episode, whose state may be inconsistent after a panic.
     pub(super) fn discard_episode(&mut self) {
+        self.attempt = None;
         self.live = None;
     }
 
@@ -75,6 +83,9 @@ impl<'a> ClientSession<'a> {
 
     /// Brings the episode to a state: from the nearest copy that leads to it, or from the start of the episode.
     fn go_to(&mut self, state: &EpisodeState) -> Result<(), RequestError> {
+        if !state.actions.is_empty() {
+            self.attempts.exclude(&state.id, "a client restored a state of it");
+        }
         let copies = self.snapshots.iter().chain(&self.live);
         let candidates = copies.filter_map(|copy| Some((copy.state.steps_to(state)?, copy)));
         let mut live = match candidates.min_by_key(|(steps, _)| *steps) {
@@ -95,6 +106,7 @@ impl<'a> ClientSession<'a> {
                 format!("set_state: the episode ends after {executed} of the state's {all} actions");
             return Err(message.into());
         }
+        self.attempt = None;
         self.live = Some(live);
         Ok(())
     }
@@ -119,12 +131,31 @@ impl<'a> ClientSession<'a> {
             let live = self.live("step")?;
             live.advance(config, row)?;
             executed += 1;
-            if live.episode.outcome().is_some() {
+            let (count, is_over) = (live.state.actions.len(), live.episode.outcome().is_some());
+            if count == 1 {
+                let id = live.state.id.clone();
+                self.attempt = self.attempts.begin(&id);
+            }
+            if is_over {
                 break;
             }
         }
+        let recorded = self.record_if_over()?;
         let config = self.config;
-        response::transition("step", self.live("step")?, config, Some(executed))
+        response::transition("step", self.live("step")?, config, Some(Executed { count: executed, recorded }))
+    }
+
+    /// Records the episode if it is over and this attempt at it counts. Returns whether it was recorded; `None` before the
+    /// end, and if the server records nothing.
+    fn record_if_over(&mut self) -> Result<Option<bool>, RequestError> {
+        let Some(live) = self.live.as_ref().filter(|live| live.episode.outcome().is_some()) else {
+            return Ok(None);
+        };
+        match (&self.config.recorder, self.attempt.take()) {
+            (None, _) => Ok(None),
+            (Some(_), None) => Ok(Some(false)),
+            (Some(_), Some(attempt)) => attempt.record(&live.episode).map(Some),
+        }
     }
 
     fn render(

@@ -27,6 +27,7 @@ mod policy_servers;
 mod reports;
 mod script_timeouts;
 mod serve;
+mod served_runs;
 mod shut_hand;
 mod support;
 mod tactile_forces;

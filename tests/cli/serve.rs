@@ -3,7 +3,7 @@
 use std::{
     io::{BufRead, BufReader, Read, Write},
     net::{Shutdown, TcpListener, TcpStream},
-    process::{Child, Command, Stdio},
+    process::{Child, ChildStdout, Command, Stdio},
     time::Duration,
 };
 
@@ -11,11 +11,12 @@ use assert_cmd::cargo::cargo_bin;
 use rmpv::Value;
 use tungstenite::{Error, Message, WebSocket};
 
-use crate::support::{Project, Small};
+use crate::support::{CliOutput, Project, Small};
 
 /// A server that ends with the test.
 pub struct Server {
     child: Child,
+    output: BufReader<ChildStdout>,
     address: String,
 }
 
@@ -37,9 +38,10 @@ impl Server {
             .spawn()
             .expect("started");
         let mut line = String::new();
-        BufReader::new(child.stdout.take().expect("an output")).read_line(&mut line).expect("a line");
+        let mut output = BufReader::new(child.stdout.take().expect("an output"));
+        output.read_line(&mut line).expect("a line");
         let address = line.trim().strip_prefix("ws://").unwrap_or_else(|| panic!("no address: {line:?}"));
-        Self { address: address.to_owned(), child }
+        Self { address: address.to_owned(), child, output }
     }
 
     fn stream(&self) -> TcpStream {
@@ -56,6 +58,23 @@ impl Server {
         let hello = client.hear();
         assert_eq!(text(&hello, "type"), "hello");
         (client, hello)
+    }
+
+    /// Ends the server by Ctrl-C, and returns what it printed after its address.
+    #[cfg(unix)]
+    pub fn interrupt(self) -> CliOutput {
+        let id = self.child.id().to_string();
+        assert!(Command::new("kill").args(["-INT", &id]).status().expect("kill runs").success());
+        self.wait()
+    }
+
+    /// Waits until the server has ended, and returns what it printed after its address.
+    pub fn wait(mut self) -> CliOutput {
+        let (mut out, mut err) = (String::new(), String::new());
+        self.output.read_to_string(&mut out).expect("text");
+        self.child.stderr.take().expect("messages").read_to_string(&mut err).expect("text");
+        let code = self.child.wait().expect("ended").code().unwrap_or(-1);
+        CliOutput { code, out, err }
     }
 
     fn healthy(&self) -> bool {

@@ -1,6 +1,7 @@
 """Tests of scripts/python/softvt_gym.py and its server. Arguments: the binary, the folder of an expert's run."""
 
 import json
+import subprocess
 import sys
 import warnings
 
@@ -81,6 +82,28 @@ def an_experts_actions_reach_the_goal_with_the_record_of_its_run(env):
     print(f"    state {expected['state_hash']} after {len(actions)} steps, D_peak {expected['d_peak']:.2f} %")
 
 
+def a_recorded_run_has_the_records_of_the_expert(out):
+    actions = np.load(f"{RUN}/actions/task_000/episode_00000.npy")
+    env = SoftVTEnv.launch(SUITE, "--task", "0", "--episodes", "1", "--out", out, softvt=BINARY)
+    try:
+        assert env.about["records"]
+        env.reset(seed=0, options={"task": 0, "episode": 0})
+        infos = [env.step(action)[4] for action in actions]
+        assert infos[-1]["recorded"] and not any("recorded" in info for info in infos[:-1])
+    finally:
+        env.close()
+    records = []
+    for run in (out, RUN):
+        with open(f"{run}/episodes.jsonl", encoding="utf-8") as lines:
+            record = json.loads(lines.read())
+        for key in ("policy", "camera_inside", "gave_up", "notes", "privileged"):
+            record.pop(key, None)
+        records.append(record)
+    assert records[0] == records[1], records
+    for command in (["replay", out, "0/0"], ["compare", out, RUN], ["report", out, "--out", f"{out}-report"]):
+        subprocess.run([BINARY, *command], check=True, stdout=subprocess.DEVNULL)
+
+
 def unprivileged_clients_receive_no_true_state(env):
     _, info = env.reset(seed=0)
     received = set(info)
@@ -108,6 +131,8 @@ def main():
         unprivileged_clients_receive_no_true_state(env)
     finally:
         env.close()
+    print("a recorded run has the records of the expert", flush=True)
+    a_recorded_run_has_the_records_of_the_expert(f"{RUN}-served")
 
 
 main()

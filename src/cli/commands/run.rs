@@ -15,7 +15,10 @@ use crate::{
         experiment, plan_flags,
         policy::PolicyArgs,
         requirement,
-        selection::{check_distinct_out_dirs, path_component, select_episodes, select_tasks},
+        selection::{
+            check_distinct_out_dirs, check_parent_folder, path_component, run_dir, select_episodes,
+            select_tasks,
+        },
         suite_run::{SuiteRun, find_replay_source},
     },
 };
@@ -23,7 +26,7 @@ use softvt_benchmark::Plan;
 use softvt_common::text::counted;
 use softvt_evaluation::record::{EpisodeRecord, Outcome};
 use softvt_policy::profile::Profile;
-use softvt_report::{run_folder::RunFolder, terminal};
+use softvt_report::terminal;
 
 /// A safety-aware visuo-tactile manipulation benchmark for soft objects, on an ordinary CPU
 #[derive(Clone, Debug, Parser)]
@@ -69,12 +72,8 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
             }
             let (mut summaries, mut failed) = (Vec::new(), None);
             for suite in plan.suites() {
-                let name = config.suite_name(suite);
-                let out = match &flags.out {
-                    Some(dir) if is_list => dir.join(path_component(&name)),
-                    Some(dir) => dir.clone(),
-                    None => next_run_dir(config, &name),
-                };
+                let out = run_dir(config, suite, is_list)
+                    .unwrap_or_else(|| next_run_dir(config, &config.suite_name(suite)));
                 let tasks = select_tasks(config, suite)?;
                 let jobs = select_episodes(config, suite, &tasks);
                 let mut run = SuiteRun::new(config, &loaded, suite, jobs, out)?;
@@ -101,12 +100,6 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
         }
         Plan::Experiment { .. } => experiment::run(config, &loaded),
     }
-}
-
-/// Checks `--out` of a plan that writes several run folders.
-fn check_parent_folder(config: &RunConfig) -> Result<(), CliError> {
-    let Some(dir) = &config.flags.out else { return Ok(()) };
-    RunFolder::check_parent(dir).map_err(|error| config.error(error))
 }
 
 /// The error of a policy whose actions could be executed in no episode, such as one that answers NaN.

@@ -9,14 +9,17 @@ use crate::{
     error::CliError,
     output::print,
     run::{
-        config::{RunConfig, RunFlags, ScriptArgs},
-        episode_list::EpisodeList,
-        policy::{PolicyArgs, PolicyConfig, load_profile_of},
-        selection::{needs_suites, suites_of},
+        config::{RunConfig, RunFlags, ScriptArgs, Shard, parse_count, parse_folder},
+        policy::{PolicyArgs, PolicyConfig},
+        selection::{
+            check_distinct_out_dirs, check_parent_folder, needs_suites, run_dir, select_episodes,
+            select_tasks, suites_of,
+        },
+        served_runs::ServedRuns,
         suite_run::SuiteRun,
     },
 };
-use softvt_benchmark::Suite;
+use softvt_benchmark::{Plan, Suite};
 use softvt_evaluation::episode_id::{EpisodeId, EpisodeIndex, Split};
 use softvt_policy::Observation;
 use softvt_rollout::cancel;
@@ -50,42 +53,53 @@ pub(crate) struct ServeArgs {
     /// Send clients the true state: poses, deformation, contact forces, limits, verdict
     #[arg(long)]
     privileged: bool,
-    // Only the profile and the gripper mode apply: the client is the policy. The other flags are hidden and refused.
+    /// Serve only these tasks: indices or parts of prompts, separated by commas
+    #[arg(long = "task", value_name = "TASK", value_delimiter = ',')]
+    tasks: Vec<String>,
+    /// Record the episodes that clients step to their end in a run folder; a list of suites has one folder per suite inside
+    #[arg(long, value_name = "DIR", value_parser = parse_folder)]
+    out: Option<PathBuf>,
+    /// Continue the run in --out, if there is one
+    #[arg(long, requires = "out")]
+    resume: bool,
+    /// Episodes per task of the run in --out [default: set by the suite]
+    #[arg(long, value_name = "N", value_parser = parse_count)]
+    episodes: Option<u32>,
+    /// Record only the I-th of N parts of the run; softvt merge combines them
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    // Only the profile, the grip code and the name apply: the client is the policy. The other flags are hidden and refused.
     #[command(flatten)]
     policy: PolicyArgs,
 }
 
+/// Flags about the run in `--out`, by their identifiers in clap.
+const RUN_FLAGS: [&str; 3] = ["episodes", "shard", "name"];
+
 /// Serves the suites of a script until the process is interrupted.
 ///
 /// # Errors
-/// The script has no suite, its first episode cannot be rendered, or the address is not available; in
-/// the end, the interrupt.
+/// The script has no suite, its first episode cannot be rendered, the address is not available, or `--out` holds something
+/// else; in the end, the interrupt.
 pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
-    let config = RunConfig::new(args.script.clone(), RunFlags::default())?;
-    let mut policy = PolicyConfig::external("client");
-    policy.privileged = args.privileged;
-    let config = config.with_policy(policy);
-    let (profile, _) = load_profile_of(&args.policy)?;
+    let flags = RunFlags {
+        tasks: args.tasks.clone(),
+        episodes: args.episodes,
+        out: args.out.clone(),
+        resume: args.resume,
+        shard: args.shard,
+        ..RunFlags::default()
+    };
+    let config = RunConfig::new(args.script.clone(), flags)?
+        .with_policy(PolicyConfig::client(&args.policy, args.privileged)?);
     let loaded = config.load_checked("serve")?;
     let suites = suites_of(&loaded.plan);
     if suites.iter().all(|suite| suite.tasks.is_empty()) {
         return Err(needs_suites("serve", &config));
     }
+    check_run_flags(&config)?;
     let listener = listen(&args)?;
-    let mut runs = Vec::new();
-    for suite in suites {
-        let mut run =
-            SuiteRun::new(&config, &loaded, suite, EpisodeList::listed(Vec::new()), PathBuf::new())?;
-        // Only privileged clients receive the limits.
-        run.reads_limits = args.privileged;
-        for task in &suite.tasks {
-            let opened = run.open_episode(&run.episode_id(task, 0))?;
-            let limits = run.limits_of(task, &opened.scene)?;
-            run.calibration_files.report(EpisodeIndex { task: task.id, episode: 0 }, &limits);
-        }
-        runs.push(run);
-    }
-    let named = |suite: &Suite| Suite { name: config.suite_name(suite), ..suite.clone() };
+    let runs = prepare(&config, &loaded, args.split)?;
     let start_episode = |id: &EpisodeId| {
         let found = runs.iter().find(|run| run.name == id.suite);
         let run = found.ok_or_else(|| format!("unknown suite {:?}", id.suite))?;
@@ -95,9 +109,12 @@ pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
         run.start_episode(task, &id).map_err(|error| RequestError::Invalid(error.message))
     };
     let address = listener.local_addr().map_err(|error| CliError::input(error).prefixed(&args.host))?;
-    let server_config = ServerConfig {
-        suites: suites.iter().map(named).collect(),
-        profile,
+    let profile = config.policy.profile().ok_or_else(|| CliError::input("there is no profile to serve"))?;
+    // Declared here, since the configuration of the server borrows it.
+    let served;
+    let mut server_config = ServerConfig {
+        suites: suites.iter().map(|suite| served_suite(&config, suite)).collect::<Result<_, _>>()?,
+        profile: profile.clone(),
         effort_n: runs.iter().map(|run| run.settings.robot.gripper.effort).fold(f64::INFINITY, f64::min),
         privileged: args.privileged,
         seed: config.script.seed,
@@ -105,11 +122,78 @@ pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
         fingerprint: provenance_hash(&config, &loaded),
         access: AccessRules::new(&args.host, address, token(&args)?),
         start_episode: Box::new(start_episode),
+        recorder: None,
     };
-    let hello = softvt_serve::hello(&server_config, &first_observation(&config, &server_config)?);
+    let first = first_observation(&config, &server_config)?;
+    served = config.flags.out.as_ref().map(|_| ServedRuns::open(&config, &runs)).transpose()?;
+    server_config.recorder = served.as_ref().map(ServedRuns::recorder);
+    let hello = softvt_serve::hello(&server_config, &first);
     print(&format!("ws://{address}\n"))?;
     softvt_serve::serve(&listener, &server_config, hello, usize::from(args.threads), &cancel::FLAG);
-    Err(CliError::interrupted("interrupted"))
+    drop(server_config);
+    match served {
+        Some(served) => served.finish(),
+        None => Err(CliError::interrupted("interrupted")),
+    }
+}
+
+/// Refuses flags about the run in `--out` without `--out`.
+fn check_run_flags(config: &RunConfig) -> Result<(), CliError> {
+    let given = &config.script.given;
+    match given.iter().find(|flag| RUN_FLAGS.contains(&flag.id.as_str())) {
+        Some(flag) if config.flags.out.is_none() => Err(CliError::input(format!(
+            "--{}: applies to the run in --out; add --out DIR, or leave it out",
+            flag.long
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// The suites with all that their episodes need. Their scenes are checked, completely so if episodes are recorded.
+///
+/// # Errors
+/// A suite, shift, setting, scene or calibration file that is not valid.
+fn prepare<'a>(
+    config: &'a RunConfig,
+    loaded: &'a LoadedScript,
+    split: Split,
+) -> Result<Vec<SuiteRun<'a>>, CliError> {
+    let suites = suites_of(&loaded.plan);
+    let is_list = matches!(loaded.plan, Plan::Suites { .. });
+    if config.flags.out.is_some() {
+        check_distinct_out_dirs(config, suites)?;
+    }
+    if is_list {
+        check_parent_folder(config)?;
+    }
+    let mut runs = Vec::new();
+    for suite in suites {
+        let tasks = select_tasks(config, suite)?;
+        let jobs = select_episodes(config, suite, &tasks);
+        let out = run_dir(config, suite, is_list);
+        let mut run = SuiteRun::new(config, loaded, suite, jobs, out.clone().unwrap_or_default())?;
+        run.split = split;
+        // Otherwise only privileged clients receive the limits.
+        run.reads_limits = config.policy.privileged || out.is_some();
+        if out.is_some() {
+            run.prepare(&tasks)?;
+        } else {
+            for task in &tasks {
+                let opened = run.open_episode(&run.episode_id(task, 0))?;
+                let limits = run.limits_of(task, &opened.scene)?;
+                run.calibration_files.report(EpisodeIndex { task: task.id, episode: 0 }, &limits);
+            }
+        }
+        runs.push(run);
+    }
+    Ok(runs)
+}
+
+/// A suite as clients see it: its name in results, the selected tasks, and the number of episodes of a run.
+fn served_suite(config: &RunConfig, suite: &Suite) -> Result<Suite, CliError> {
+    let tasks = select_tasks(config, suite)?.into_iter().cloned().collect();
+    let episodes = config.flags.episodes.unwrap_or(suite.episodes);
+    Ok(Suite { name: config.suite_name(suite), tasks, episodes, ..suite.clone() })
 }
 
 /// The token that clients have to send.

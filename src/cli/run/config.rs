@@ -251,7 +251,7 @@ pub(crate) fn parse_folder(word: &str) -> Result<PathBuf, String> {
 }
 
 /// Parses a count of at least one.
-fn parse_count(word: &str) -> Result<u32, String> {
+pub(crate) fn parse_count(word: &str) -> Result<u32, String> {
     let count = word.parse().ok().filter(|count| *count > 0);
     count.ok_or_else(|| format!("expected a whole number of at least 1 and at most {}", u32::MAX))
 }

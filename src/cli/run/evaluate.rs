@@ -17,6 +17,7 @@ use crate::{
 use softvt_benchmark::Task;
 use softvt_common::{files, parallel, text::counted};
 use softvt_evaluation::{
+    episode_id::EpisodeIndex,
     record::{EpisodeRecord, Outcome},
     summary::SuiteSummary,
 };
@@ -31,12 +32,6 @@ use softvt_rollout::{FinishedEpisode, cancel};
 pub(crate) struct SuiteResult {
     pub summary: SuiteSummary,
     pub records: Vec<EpisodeRecord>,
-}
-
-impl SuiteResult {
-    fn new(run: &SuiteRun, records: Vec<EpisodeRecord>) -> Self {
-        Self { summary: SuiteSummary::from_records(&run.name, &run.config.policy.name, &records), records }
-    }
 }
 
 /// A simulated episode, and the result of rendering it.
@@ -115,15 +110,28 @@ impl<'a> RunLog<'a> {
             cancel::requested,
             |position| simulate(jobs.job(position)),
             |_, SimulatedEpisode { finished, rendered }| {
-                // The line comes after all other files, so that every listed episode is complete.
-                write(&finished)?;
-                self.folder.append(&finished.record)?;
-                progress.tick(&line(&finished.record));
-                report_unrendered(&finished, rendered);
-                self.records.push(finished.record);
+                let (index, message) = (finished.record.header.id.index(), line(&finished.record));
+                self.add(finished, &write)?;
+                progress.tick(&message);
+                report_unrendered(index, rendered);
                 Ok(())
             },
         )
+    }
+
+    /// Writes the files of a finished episode, and then its line, so that every listed episode is complete.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub(crate) fn add(
+        &mut self,
+        finished: FinishedEpisode,
+        write: impl Fn(&FinishedEpisode) -> Result<(), CliError>,
+    ) -> Result<(), CliError> {
+        write(&finished)?;
+        self.folder.append(&finished.record)?;
+        self.records.push(finished.record);
+        Ok(())
     }
 
     /// Sorts the records and the lines of the folder.
@@ -143,14 +151,28 @@ impl<'a> RunLog<'a> {
         Ok(self.folder.discard()?)
     }
 
+    /// Sorts the episodes of a complete evaluation and writes its results.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub(crate) fn write_results(&mut self) -> Result<(), CliError> {
+        self.sort()?;
+        let calibrations = self.run.calibrations.clone().unwrap_or_default();
+        softvtbench_files::write_scores(&self.run.out, &self.records, &calibrations.merged)?;
+        self.write_summary()
+    }
+
     /// Writes the summary. A folder with a summary counts as finished.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub(crate) fn finish(self) -> Result<SuiteResult, CliError> {
-        let result = SuiteResult::new(self.run, self.records);
-        files::write_json(&self.run.out.join(SUMMARY), &result.summary)?;
-        Ok(result)
+    pub(crate) fn write_summary(&self) -> Result<(), CliError> {
+        Ok(files::write_json(&self.run.out.join(SUMMARY), &self.summary())?)
+    }
+
+    /// Summary of the episodes so far.
+    pub(crate) fn summary(&self) -> SuiteSummary {
+        SuiteSummary::from_records(&self.run.name, &self.run.config.policy.name, &self.records)
     }
 }
 
@@ -192,7 +214,7 @@ pub(crate) fn run_suite(run: &SuiteRun, tasks: &[&Task]) -> Result<SuiteResult, 
         && log.records.iter().all(|record| artifacts.missing(record).is_empty())
     {
         eprint_notice(format!("{out} is already complete"));
-        return Ok(SuiteResult::new(run, log.records));
+        return Ok(SuiteResult { summary: log.summary(), records: log.records });
     }
     let simulate = |job: EpisodeJob| {
         let mut finished = run.run_episode(job, artifacts.may_render(job.episode), &run.controllers)?;
@@ -213,12 +235,9 @@ pub(crate) fn run_suite(run: &SuiteRun, tasks: &[&Task]) -> Result<SuiteResult, 
             with_kept(outcome, &kept, &format!("; continue with --resume --out {out}"))?;
         }
     }
-    log.sort()?;
-    let calibrations = run.calibrations.clone().unwrap_or_default();
-    softvtbench_files::write_scores(&run.out, &log.records, &calibrations.merged)?;
-    let result = log.finish()?;
+    log.write_results()?;
     eprint_notice(out);
-    Ok(result)
+    Ok(SuiteResult { summary: log.summary(), records: log.records })
 }
 
 /// True if a folder contains a finished run.
@@ -227,14 +246,14 @@ pub(crate) fn is_finished(dir: &Path) -> bool {
 }
 
 /// Reports an episode whose video could not be written. The episode counts nevertheless.
-fn report_unrendered(finished: &FinishedEpisode, rendered: Result<(), CliError>) {
+fn report_unrendered(index: EpisodeIndex, rendered: Result<(), CliError>) {
     if let Err(error) = rendered {
-        eprint_notice(format!("no video of {}: {}", finished.record.header.id.index(), error.message));
+        eprint_notice(format!("no video of {index}: {}", error.message));
     }
 }
 
 /// Formats an episode as one line of progress.
-fn episode_line(record: &EpisodeRecord) -> String {
+pub(crate) fn episode_line(record: &EpisodeRecord) -> String {
     let verdict = &record.verdict;
     let d = verdict.d_peak.map_or(String::new(), |d| format!(", D {d:.2} %"));
     let outcome = match &record.outcome {
@@ -253,11 +272,11 @@ fn episode_line(record: &EpisodeRecord) -> String {
 }
 
 /// Restores requested files of finished episodes that are missing: by the recorded actions, or without these by the
-/// policy unless it is a server. Files that cannot be restored are reported; the results of their episodes stay.
+/// policy unless it is in another program. Files that cannot be restored are reported; the results of their episodes stay.
 ///
 /// # Errors
 /// An episode cannot be run, or a file cannot be written.
-fn restore_artifacts(run: &SuiteRun, records: &[EpisodeRecord]) -> Result<(), CliError> {
+pub(crate) fn restore_artifacts(run: &SuiteRun, records: &[EpisodeRecord]) -> Result<(), CliError> {
     let artifacts = run.artifacts();
     let incomplete = records.iter().filter(|record| !artifacts.missing(record).is_empty());
     let has_actions = |record: &EpisodeRecord| artifacts.has_actions(record);
@@ -268,7 +287,7 @@ fn restore_artifacts(run: &SuiteRun, records: &[EpisodeRecord]) -> Result<(), Cl
         }
     }
     let (restorable, lost): (Vec<_>, Vec<_>) =
-        incomplete.partition(|record| has_actions(record) || run.config.policy.server().is_none());
+        incomplete.partition(|record| has_actions(record) || run.config.policy.profile().is_none());
     if let Some(first) = lost.first() {
         eprint_notice(format!(
             "{} finished episodes lack their actions, so their files cannot be restored (first: {}); their results stay",
@@ -294,7 +313,7 @@ fn restore_artifacts(run: &SuiteRun, records: &[EpisodeRecord]) -> Result<(), Cl
         |_, simulated| {
             let Some(SimulatedEpisode { finished, rendered }) = simulated else { return Ok(()) };
             artifacts.write(&finished)?;
-            report_unrendered(&finished, rendered);
+            report_unrendered(finished.record.header.id.index(), rendered);
             Ok(())
         },
     )

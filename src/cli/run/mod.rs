@@ -15,5 +15,6 @@ pub(crate) mod replay;
 pub(crate) mod requirement;
 pub(crate) mod run_manifest;
 pub(crate) mod selection;
+pub(crate) mod served_runs;
 pub(crate) mod stored_folder;
 pub(crate) mod suite_run;

@@ -97,10 +97,19 @@ static DECISIONS: &[Decision] = &[
         acts_on: SUITES,
     },
     Decision { commands: &["dataset import"], flags: &["layout"], acts_on: SUITES },
-    Decision { commands: &["serve"], flags: POLICY_SERVER, acts_on: &[] },
+    Decision {
+        commands: &["serve"],
+        flags: &["policy", "protocol", "replan", "policy_timeout"],
+        acts_on: &[],
+    },
     Decision {
         commands: &["serve"],
         flags: &["profile", "gripper", "host", "port", "threads", "split", "privileged", "token"],
+        acts_on: SUITES,
+    },
+    Decision {
+        commands: &["serve"],
+        flags: &["name", "tasks", "episodes", "shard", "out", "resume"],
         acts_on: SUITES,
     },
 ];

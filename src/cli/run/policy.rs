@@ -28,6 +28,8 @@ const API_KEY: &str = "SOFTVT_API_KEY";
 const DEFAULT_REPLAN: usize = 10;
 /// Timeout of a policy server, unless `--policy-timeout` is given.
 const DEFAULT_TIMEOUT: Duration = Duration::from_secs(60);
+/// Name of the clients of `softvt serve` in results, unless `--name` is given.
+const CLIENT: &str = "client";
 /// Profile of a policy server unless `--profile` names another.
 const DEFAULT_PROFILE: &str = "visuo_tactile";
 
@@ -185,7 +187,9 @@ enum PolicyKind {
     Server(Arc<PolicyServer>),
     /// Repeats the actions of recorded runs.
     Recorded(Arc<RecordedRuns>),
-    /// The actions come from elsewhere: a client, a dataset or a single recorded episode.
+    /// A client of `softvt serve`, with the encoding of its observations and actions.
+    Client(Arc<Profile>),
+    /// The actions come from elsewhere: a dataset or a single recorded episode.
     External,
 }
 
@@ -252,19 +256,19 @@ impl PolicyConfig {
             PolicyArg::Server(url) => {
                 let (profile, sources) = load_profile_of(args)?;
                 let profile_name = args.profile.as_deref().unwrap_or(DEFAULT_PROFILE);
-                let place = format!("--profile {profile_name}: inputs");
                 if profile.observe_every_step && args.protocol == Some(Protocol::VlaEval) {
                     return Err(CliError::input(format!(
                         "--profile {profile_name}: observe_every_step needs --protocol openpi; in vla-eval's protocol every \
                          observation is a request for actions"
                     )));
                 }
+                let declared = declared_streams(args, &profile);
                 Self {
                     name: profile.name.clone(),
                     replan: replan.or(Some(DEFAULT_REPLAN)),
                     file: None,
                     sources,
-                    declared: Some(DeclaredStreams { place, streams: profile.streams() }),
+                    declared: Some(declared),
                     privileged: false,
                     kind: PolicyKind::Server(Arc::new(PolicyServer {
                         url: url.clone(),
@@ -299,6 +303,23 @@ impl PolicyConfig {
         Ok(Self::new(PolicyKind::Builtin(policy), policy.name()))
     }
 
+    /// The clients of `softvt serve`. `privileged` clients receive the true state.
+    ///
+    /// # Errors
+    /// A file that is not a valid profile.
+    pub(crate) fn client(args: &PolicyArgs, privileged: bool) -> Result<Self, CliError> {
+        let (profile, sources) = load_profile_of(args)?;
+        Ok(Self {
+            name: args.name.clone().unwrap_or_else(|| CLIENT.to_owned()),
+            replan: None,
+            file: None,
+            sources,
+            declared: Some(declared_streams(args, &profile)),
+            privileged,
+            kind: PolicyKind::Client(Arc::new(profile)),
+        })
+    }
+
     /// Actions that come from elsewhere, under a name such as `replay`.
     pub(crate) fn external(name: &str) -> Self {
         Self::new(PolicyKind::External, name.to_owned())
@@ -316,6 +337,20 @@ impl PolicyConfig {
     pub(crate) fn server(&self) -> Option<&PolicyServer> {
         match &self.kind {
             PolicyKind::Server(server) => Some(server),
+            _ => None,
+        }
+    }
+
+    /// True for the clients of `softvt serve`.
+    pub(crate) fn is_client(&self) -> bool {
+        matches!(self.kind, PolicyKind::Client(_))
+    }
+
+    /// Encoding of the observations and actions of a policy in another program.
+    pub(crate) fn profile(&self) -> Option<&Profile> {
+        match &self.kind {
+            PolicyKind::Server(server) => Some(&server.profile),
+            PolicyKind::Client(profile) => Some(profile),
             _ => None,
         }
     }
@@ -362,12 +397,18 @@ impl PolicyConfig {
                 }
                 (PolicyKind::Builtin(expert), _) => Box::new(expert_controller(opened, *expert)?),
                 // The provider of the actions replaces this factory.
-                (PolicyKind::External | PolicyKind::Server(_), _) => {
+                (PolicyKind::External | PolicyKind::Client(_) | PolicyKind::Server(_), _) => {
                     chunked(Box::new(RecordedPolicy::new(Vec::new(), None)), 1)
                 }
             })
         })
     }
+}
+
+/// The sensors that a profile observes.
+fn declared_streams(args: &PolicyArgs, profile: &Profile) -> DeclaredStreams {
+    let name = args.profile.as_deref().unwrap_or(DEFAULT_PROFILE);
+    DeclaredStreams { place: format!("--profile {name}: inputs"), streams: profile.streams() }
 }
 
 /// Starts the expert of a task.

@@ -171,7 +171,8 @@ impl<'a> SuiteRecording<'a> {
         let kept = format!("{} in {out}; continue with --resume", counted(kept, "demonstration"));
         with_kept(outcome, &kept, "")?;
         self.check_demo_counts(&log.records)?;
-        Ok(log.finish()?.records)
+        log.write_summary()?;
+        Ok(log.records)
     }
 
     /// Runs attempts until every task has its demonstrations or has used up its attempts.

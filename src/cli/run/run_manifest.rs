@@ -40,12 +40,15 @@ pub(crate) struct RunManifest<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     twin_of: Option<&'a str>,
     policy: &'a str,
-    /// Profile of a policy server.
+    /// Profile of a policy server, or of the clients of `softvt serve`.
     #[serde(skip_serializing_if = "Option::is_none")]
     profile: Option<&'a Profile>,
     /// Grip code of the profile.
     #[serde(skip_serializing_if = "Option::is_none")]
     gripper: Option<GripCode>,
+    /// True if clients of `softvt serve` have stepped the episodes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    served: Option<bool>,
     /// File of a policy in Lua. Its SHA-256 is among the sources.
     #[serde(skip_serializing_if = "Option::is_none")]
     policy_file: Option<&'a str>,
@@ -97,8 +100,9 @@ impl<'a> RunManifest<'a> {
             vary: config.script.vary.as_ref().map(|file| file.display().to_string()),
             twin_of: run.suite.twin_of.as_deref(),
             policy: &config.policy.name,
-            profile: config.policy.server().map(|server| &server.profile),
-            gripper: config.policy.server().map(|server| server.profile.actions.gripper.code),
+            profile: config.policy.profile(),
+            gripper: config.policy.profile().map(|profile| profile.actions.gripper.code),
+            served: config.policy.is_client().then_some(true),
             policy_file: config.policy.file.as_deref(),
             replayed: run.replay_source.as_ref(),
             imported: Some(&run.imported[..]).filter(|files| !files.is_empty()),

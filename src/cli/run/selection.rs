@@ -1,12 +1,13 @@
 //! Selection of suites, tasks and episodes by the command line, and the folders they are written to.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, path::PathBuf};
 
 use crate::{
     error::CliError,
     run::{config::RunConfig, episode_list::EpisodeList},
 };
 use softvt_benchmark::{Plan, Suite, Task};
+use softvt_report::run_folder::RunFolder;
 
 /// The suites of a plan that is a suite or a list of suites; empty for other plans.
 pub(crate) fn suites_of(plan: &Plan) -> &[Suite] {
@@ -101,6 +102,21 @@ pub(crate) fn check_distinct_out_dirs(config: &RunConfig, suites: &[Suite]) -> R
             path_component(&suite.name)
         )))
     })
+}
+
+/// Folder of a suite's run in `--out`: that folder itself, or one inside of it for a list of suites.
+pub(crate) fn run_dir(config: &RunConfig, suite: &Suite, is_list: bool) -> Option<PathBuf> {
+    let dir = config.flags.out.as_ref()?;
+    Some(if is_list { dir.join(path_component(&config.suite_name(suite))) } else { dir.clone() })
+}
+
+/// Checks `--out` of a plan that writes several run folders.
+///
+/// # Errors
+/// The folder holds something other than runs.
+pub(crate) fn check_parent_folder(config: &RunConfig) -> Result<(), CliError> {
+    let Some(dir) = &config.flags.out else { return Ok(()) };
+    RunFolder::check_parent(dir).map_err(|error| config.error(error))
 }
 
 /// Replaces characters of a name that a script could use to leave the output folder.

@@ -335,7 +335,10 @@ impl<'a> SuiteRun<'a> {
                 connections.check().map_err(policy_failure)?;
             }
             let brief = TaskBrief { prompt: opened.prompt.clone(), ..self.brief(task, first) };
-            let streams = (self.controllers)(opened, brief)?.streams();
+            let controller = (self.controllers)(opened, brief)?;
+            // A client of `softvt serve` has no controller here.
+            let declared = self.config.policy.declared.as_ref();
+            let streams = declared.map_or_else(|| controller.streams(), |declared| declared.streams.clone());
             self.force_observed |= streams.force;
             self.check_streams(scene, streams, task, first).map_err(|error| self.episode_error(&error))?;
         }

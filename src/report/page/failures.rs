@@ -130,6 +130,8 @@ fn view_commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
         add("--episode", id.episode.to_string());
     }
     let policy = match (manifest["policy_file"].as_str(), manifest["replayed"]["run"].as_str()) {
+        // A client of `softvt serve` cannot be called; its actions can be repeated.
+        _ if manifest["served"] == true => run.dir.display().to_string(),
         // The address of a remote policy is not stored in run.json.
         _ if manifest["profile"].is_object() => "ws://HOST:PORT".to_owned(),
         (Some(path), _) | (None, Some(path)) => located(path),

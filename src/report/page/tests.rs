@@ -114,6 +114,17 @@ fn the_page_is_self_contained_and_accessible() {
     assert!(page.contains("softvt view x.lua --task 0 --episode 1 --policy expert --seed 11 --out seen"));
 }
 
+#[test]
+fn an_episode_of_a_client_is_viewed_by_its_actions() {
+    let mut run = stored("runs/mine", "client", episodes("soft", 4));
+    run.manifest["profile"] = json!({ "name": "vision" });
+    let remote = render(vec![run.clone()]);
+    assert!(remote.contains("--policy ws://HOST:PORT"), "a policy server");
+    run.manifest["served"] = json!(true);
+    let page = render(vec![run]);
+    assert!(page.contains("--episode 1 --policy runs/mine --seed 11"), "{page}");
+}
+
 /// A run of 20 episodes under a shift, every second of which is unsafe.
 fn shifted(dir: &str, shift: Option<(&str, f64)>) -> StoredRun {
     let mut run = stored(dir, "pi", episodes("soft", 20));

@@ -1,0 +1,174 @@
+//! `softvt serve --out`: one run folder per suite, with the episodes that clients step to their end.
+
+use std::{collections::BTreeSet, path::Path, sync::Mutex};
+
+use crate::{
+    error::CliError,
+    output::{eprint_notice, print},
+    run::{
+        config::RunConfig,
+        evaluate::{RunLog, episode_line, restore_artifacts, with_kept},
+        run_manifest::RunManifest,
+        selection::select_tasks,
+        suite_run::SuiteRun,
+    },
+};
+use softvt_common::{parallel::lock, text::counted};
+use softvt_evaluation::episode_id::{EpisodeId, EpisodeIndex};
+use softvt_report::{run_folder::RunFolder, terminal};
+use softvt_rollout::{FinishedEpisode, cancel};
+use softvt_serve::{EpisodeRecorder, RequestError};
+
+/// The run folders of a server.
+pub(crate) struct ServedRuns<'a> {
+    config: &'a RunConfig,
+    runs: Vec<ServedRun<'a>>,
+    /// The first error of writing a file. The server ends then.
+    failure: Mutex<Option<CliError>>,
+}
+
+/// The run folder of one suite.
+struct ServedRun<'a> {
+    run: &'a SuiteRun<'a>,
+    /// Episodes that were in the folder when the server started.
+    resumed: BTreeSet<EpisodeIndex>,
+    log: Mutex<RunLog<'a>>,
+}
+
+impl<'a> ServedRuns<'a> {
+    /// Creates the folders of prepared runs, or opens them with `--resume`.
+    ///
+    /// # Errors
+    /// A folder holds another run or anything else, or cannot be written. No empty folder is left then.
+    pub(crate) fn open(config: &'a RunConfig, runs: &'a [SuiteRun<'a>]) -> Result<Self, CliError> {
+        let mut opened = Self { config, runs: Vec::new(), failure: Mutex::default() };
+        for run in runs {
+            match ServedRun::open(run) {
+                Ok(run) => opened.runs.push(run),
+                Err(error) => {
+                    opened.discard_empty()?;
+                    return Err(error);
+                }
+            }
+        }
+        Ok(opened)
+    }
+
+    /// What the server calls to record episodes.
+    pub(crate) fn recorder(&self) -> EpisodeRecorder<'_> {
+        EpisodeRecorder {
+            selects: Box::new(|id| self.find(&id.suite).is_some_and(|run| run.selects(id))),
+            record: Box::new(|finished| self.record(finished)),
+            report_lost: Box::new(|id, reason| {
+                // An interrupt ends all episodes.
+                if !cancel::requested() {
+                    let (suite, index) = (&id.suite, id.index());
+                    eprint_notice(format!(
+                        "{suite}: {index} will not be recorded: {reason}; a server with --resume takes it again"
+                    ));
+                }
+            }),
+        }
+    }
+
+    fn find(&self, suite: &str) -> Option<&ServedRun<'a>> {
+        self.runs.iter().find(|served| served.run.name == suite)
+    }
+
+    /// Writes the files of an episode. After an error the server ends.
+    fn record(&self, finished: FinishedEpisode) -> Result<(), RequestError> {
+        let suite = &finished.record.header.id.suite;
+        let served =
+            self.find(suite).ok_or_else(|| RequestError::Record(format!("unknown suite {suite}")))?;
+        served.add(finished).map_err(|error| {
+            let message = error.message.clone();
+            lock(&self.failure).get_or_insert(error);
+            cancel::request();
+            RequestError::Record(message)
+        })
+    }
+
+    /// Sorts the episodes of the folders and prints the results. A folder without an episode is removed, so that the same
+    /// command works again.
+    ///
+    /// # Errors
+    /// A file could not be written; otherwise the interrupt, which ends every server.
+    pub(crate) fn finish(self) -> Result<(), CliError> {
+        let (config, failure) = (self.config, lock(&self.failure).take());
+        let (mut recorded, mut requested, mut tables) = (0, 0, String::new());
+        let mut outcome = failure.map_or(Ok(()), Err);
+        for served in self.runs {
+            let (run, mut log) = (served.run, served.log.into_inner().unwrap_or_else(|log| log.into_inner()));
+            recorded += log.records.len();
+            requested += run.jobs.len();
+            outcome = outcome.and(if log.records.is_empty() {
+                log.discard()
+            } else {
+                let sorted = log.sort();
+                tables += &terminal::table(&log.summary());
+                sorted
+            });
+        }
+        print(&tables)?;
+        if recorded == 0 {
+            return with_kept(outcome, "no episode was recorded", "");
+        }
+        let out = config.flags.out.as_deref().unwrap_or(Path::new("")).display();
+        let kept = format!("{recorded} of {} are in {out}", counted(requested, "episode"));
+        let is_partial = recorded < requested;
+        let hint = if is_partial { format!("; continue with --resume --out {out}") } else { String::new() };
+        with_kept(outcome, &kept, &hint)
+    }
+
+    /// Removes the folders without episodes.
+    fn discard_empty(self) -> Result<(), CliError> {
+        for served in self.runs {
+            let log = served.log.into_inner().unwrap_or_else(|log| log.into_inner());
+            if log.records.is_empty() {
+                log.discard()?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<'a> ServedRun<'a> {
+    fn open(run: &'a SuiteRun<'a>) -> Result<Self, CliError> {
+        let config = run.config;
+        let tasks = select_tasks(config, run.suite)?;
+        let manifest = RunManifest::new(run, &tasks, config.flags.episodes.unwrap_or(run.suite.episodes));
+        let opened = match config.flags.resume {
+            true => RunFolder::resume(&run.out),
+            false => RunFolder::create(&run.out).map(|folder| (folder, Vec::new())),
+        };
+        let (folder, records) = opened.map_err(|error| config.error(error))?;
+        let mut log = RunLog::new(run, folder, records, &manifest)?;
+        restore_artifacts(run, &log.records)?;
+        let resumed = log.records.iter().map(|record| record.header.id.index()).collect();
+        write_if_complete(run, &mut log)?;
+        Ok(Self { run, resumed, log: Mutex::new(log) })
+    }
+
+    /// True if an episode is one of the run that the folder did not have when the server started.
+    fn selects(&self, id: &EpisodeId) -> bool {
+        let (run, index) = (self.run, id.index());
+        let is_own = id.base_seed == run.config.script.seed && id.split == run.split;
+        is_own && run.jobs.find(index).is_some() && !self.resumed.contains(&index)
+    }
+
+    /// Writes the files of an episode, and after the last one those of the whole run.
+    fn add(&self, finished: FinishedEpisode) -> Result<(), CliError> {
+        let (run, mut log) = (self.run, lock(&self.log));
+        let message = episode_line(&finished.record);
+        let artifacts = run.artifacts();
+        log.add(finished, |finished| artifacts.write(finished))?;
+        eprint_notice(format!("{} [{}/{}] {message}", run.name, log.records.len(), run.jobs.len()));
+        write_if_complete(run, &mut log)
+    }
+}
+
+/// Writes the results of a run that has all of its episodes.
+fn write_if_complete(run: &SuiteRun, log: &mut RunLog) -> Result<(), CliError> {
+    let is_complete = !log.records.is_empty() && log.records.len() == run.jobs.len();
+    if is_complete { log.write_results() } else { Ok(()) }
+}

@@ -1,0 +1,146 @@
+//! Attempts of clients at the episodes that the server records.
+//!
+//! An episode is recorded at most once, and a client cannot choose among several results: only the attempt that executes
+//! the first action of the episode on this server counts, and only if it steps the episode from its reset to its end.
+
+use std::{collections::BTreeMap, fmt, sync::Mutex};
+
+use super::config::{EpisodeRecorder, RequestError};
+use softvt_common::parallel::lock;
+use softvt_evaluation::episode_id::EpisodeId;
+use softvt_rollout::Episode;
+
+/// State of the one attempt at an episode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum AttemptState {
+    InProgress,
+    /// Recorded, or lost.
+    Over,
+}
+
+/// The attempts of all clients.
+pub(super) struct Attempts<'a> {
+    recorder: Option<&'a EpisodeRecorder<'a>>,
+    /// Episodes of the run in which an action was executed.
+    states: Mutex<BTreeMap<EpisodeId, AttemptState>>,
+}
+
+/// The attempt at an episode that counts. An attempt that is dropped before its end is lost.
+pub(super) struct Attempt<'a> {
+    id: EpisodeId,
+    recorder: &'a EpisodeRecorder<'a>,
+    attempts: &'a Attempts<'a>,
+}
+
+impl<'a> Attempts<'a> {
+    /// No attempt yet. Without a recorder none is ever begun.
+    pub(super) fn new(recorder: Option<&'a EpisodeRecorder<'a>>) -> Self {
+        Self { recorder, states: Mutex::default() }
+    }
+
+    /// The attempt at an episode whose first action was executed after a reset. `None` if an earlier one exists, or the
+    /// episode is not one that the server records.
+    pub(super) fn begin(&'a self, id: &EpisodeId) -> Option<Attempt<'a>> {
+        let recorder = self.recorder.filter(|recorder| (recorder.selects)(id))?;
+        let mut states = lock(&self.states);
+        if states.contains_key(id) {
+            return None;
+        }
+        states.insert(id.clone(), AttemptState::InProgress);
+        Some(Attempt { id: id.clone(), recorder, attempts: self })
+    }
+
+    /// Ends the attempt at an episode, also one that another client has begun, or rules out a later one.
+    pub(super) fn exclude(&self, id: &EpisodeId, reason: &str) {
+        let Some(recorder) = self.recorder.filter(|recorder| (recorder.selects)(id)) else { return };
+        if self.end(id) != Some(AttemptState::Over) {
+            (recorder.report_lost)(id, reason);
+        }
+    }
+
+    /// Ends the attempt at an episode, and returns its state before.
+    fn end(&self, id: &EpisodeId) -> Option<AttemptState> {
+        lock(&self.states).insert(id.clone(), AttemptState::Over)
+    }
+}
+
+impl Attempt<'_> {
+    /// Records the episode, which is over. Returns false if the attempt was lost before.
+    ///
+    /// # Errors
+    /// The recorder fails.
+    pub(super) fn record(self, episode: &Episode) -> Result<bool, RequestError> {
+        if self.attempts.end(&self.id) != Some(AttemptState::InProgress) {
+            return Ok(false);
+        }
+        (self.recorder.record)(episode.clone().finish(None))?;
+        Ok(true)
+    }
+}
+
+impl Drop for Attempt<'_> {
+    fn drop(&mut self) {
+        if self.attempts.end(&self.id) == Some(AttemptState::InProgress) {
+            (self.recorder.report_lost)(&self.id, "its client left it before its end");
+        }
+    }
+}
+
+impl fmt::Debug for Attempt<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Attempt").field("id", &self.id).finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use softvt_evaluation::episode_id::Split;
+
+    fn id(episode: u32) -> EpisodeId {
+        EpisodeId { suite: "one".to_owned(), task: 0, episode, base_seed: 0, split: Split::Validation }
+    }
+
+    /// Runs `test` on the attempts of a server that records the episodes below 10; returns the reports of lost ones.
+    fn reports(test: impl Fn(&Attempts)) -> Vec<String> {
+        let lost = Mutex::new(Vec::new());
+        let recorder = EpisodeRecorder {
+            selects: Box::new(|id| id.episode < 10),
+            record: Box::new(|_| Ok(())),
+            report_lost: Box::new(|id, reason| {
+                lost.lock().unwrap().push(format!("{}: {reason}", id.episode));
+            }),
+        };
+        test(&Attempts::new(Some(&recorder)));
+        drop(recorder);
+        lost.into_inner().unwrap()
+    }
+
+    #[test]
+    fn only_the_first_attempt_at_an_episode_counts() {
+        let lost = reports(|attempts| {
+            let first = attempts.begin(&id(0));
+            assert!(first.is_some());
+            assert!(attempts.begin(&id(0)).is_none(), "another client");
+            assert!(attempts.begin(&id(1)).is_some(), "another episode");
+            assert!(attempts.begin(&id(10)).is_none(), "an episode that is not recorded");
+            drop(first);
+            assert!(attempts.begin(&id(0)).is_none(), "after an attempt that was left");
+        });
+        assert_eq!(lost, ["1: its client left it before its end", "0: its client left it before its end"]);
+    }
+
+    #[test]
+    fn an_episode_that_was_reached_by_a_state_is_not_recorded() {
+        let lost = reports(|attempts| {
+            let first = attempts.begin(&id(0));
+            for episode in [0, 0, 1, 10] {
+                attempts.exclude(&id(episode), "restored");
+            }
+            drop(first);
+            assert!(attempts.begin(&id(1)).is_none());
+        });
+        assert_eq!(lost, ["0: restored", "1: restored"], "each is reported once");
+        assert!(Attempts::new(None).begin(&id(0)).is_none(), "without a recorder");
+    }
+}
