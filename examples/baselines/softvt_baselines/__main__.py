@@ -23,9 +23,11 @@ def _train(args: argparse.Namespace) -> None:
     from .train import TrainOptions, train
 
     device = device_of(args.device)
+    if args.edge % 32:
+        raise UserError(f"--edge {args.edge}: expected a multiple of 32 pixels")
     shape = Shape(has_touch=args.touch, head=args.head, frames=args.frames, edge=args.edge)
     demos = load(args.recordings, args.gripper, args.edge)
-    options = TrainOptions(shape, args.gripper, args.steps, args.batch, args.seed, device)
+    options = TrainOptions(shape, args.gripper, args.steps, args.batch, args.seed, device, args.compile)
     train(demos, options, args.out, {"recordings": [recording.name for recording in args.recordings]})
 
 
@@ -86,6 +88,7 @@ def _parser() -> argparse.ArgumentParser:
     train.add_argument("--steps", type=int, default=10000, help="training steps")
     train.add_argument("--batch", type=int, default=256, help="samples per step")
     train.add_argument("--seed", type=int, default=0, help="seed of the weights and batches")
+    train.add_argument("--compile", action="store_true", help="compile the network: a minute more at first, faster then")
     with_device(train)
 
     serve = command("serve", _serve, "serve a checkpoint in openpi's protocol")
@@ -112,6 +115,7 @@ def _parser() -> argparse.ArgumentParser:
     study.add_argument("--steps", type=int, default=10000, help="training steps")
     study.add_argument("--episodes", type=int, default=50, help="episodes per task")
     study.add_argument("--edge", type=int, default=128, help="width and height of the pictures, pixels")
+    study.add_argument("--compile", action="store_true", help="compile the networks")
     study.add_argument("--per-gpu", type=int, default=1, help="policies that are trained on one GPU at a time")
     return parser
 

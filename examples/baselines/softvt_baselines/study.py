@@ -30,6 +30,7 @@ class Study:
     episodes: int
     edge: int = 128
     per_gpu: int = 1  # policies that are trained on one GPU at a time
+    compile: bool = False  # compile the networks
     flags: tuple[str, ...] = ()  # further flags of the evaluations
 
 
@@ -60,8 +61,8 @@ def _run_job(job: Job, study: Study, gpu: int | None, threads: int) -> None:
     checkpoint = study.out / "checkpoints" / f"{job.name}.pt"
     log = study.out / "logs" / f"{job.name}.log"
     if not checkpoint.is_file():
-        touch = ["--touch"] if job.inputs == "vt" else []
-        shape = ["--gripper", job.code, "--edge", str(study.edge), "--steps", str(study.steps), "--seed", str(job.seed), *touch]
+        switches = ["--touch"] * (job.inputs == "vt") + ["--compile"] * study.compile
+        shape = ["--gripper", job.code, "--edge", str(study.edge), "--steps", str(study.steps), "--seed", str(job.seed), *switches]
         _call(["train", str(study.out / "data" / job.suite), "--out", str(checkpoint), "--device", device, *shape], log, gpu)
     for replan in study.replans:
         name = f"{job.name}-r{replan}"

@@ -31,6 +31,7 @@ class TrainOptions:
     batch: int
     seed: int
     device: torch.device
+    is_compiled: bool = False  # compile the network, which takes a minute and needs a C compiler
 
 
 class Batches:
@@ -90,6 +91,7 @@ def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict)
     batches = Batches(demos, statistics, options)
     policy = Policy(options.shape).to(options.device, memory_format=torch.channels_last)
     averaged = copy.deepcopy(policy).requires_grad_(False)
+    loss_of = torch.compile(policy.loss) if options.is_compiled else policy.loss
     optimizer = torch.optim.AdamW(policy.parameters(), RATE, weight_decay=WEIGHT_DECAY, fused=options.device.type == "cuda")
 
     def rate(step: int) -> float:
@@ -103,7 +105,7 @@ def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict)
         for step in range(1, options.steps + 1):
             obs, actions, is_step = batches.draw(options.batch)
             with torch.autocast(options.device.type, torch.bfloat16, enabled=options.device.type == "cuda"):
-                loss = policy.loss(obs, actions, is_step)
+                loss = loss_of(obs, actions, is_step)
             loss.backward()
             torch.nn.utils.clip_grad_norm_(policy.parameters(), 1.0)
             optimizer.step()

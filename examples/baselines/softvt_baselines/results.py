@@ -1,0 +1,97 @@
+"""Results of runs of softvt: rates per policy, and paired differences between policies."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from . import UserError
+
+# Resamples of a bootstrap, and its seed.
+RESAMPLES, SEED = 10_000, 0
+
+
+@dataclass
+class Run:
+    """Outcomes of the episodes of a run, in the order of tasks and episodes."""
+
+    suite: str
+    policy: str
+    task: np.ndarray  # (N,)
+    episode: np.ndarray  # (N,)
+    goal: np.ndarray  # (N,) 1 if the goal was reached
+    safety: np.ndarray  # (N,) 1 if also safely
+    ratio: np.ndarray  # (N,) peak D over the limit; infinite if the episode is invalid, NaN if there is no limit
+    stage: list[str | None]  # stage in which the episode failed
+
+
+def load(folder: Path) -> Run:
+    """Reads a run folder. Raises UserError if it is not finished."""
+    if not (folder / "summary.json").is_file():
+        raise UserError(f"{folder}: not a finished run: it has no summary.json; repeat its command with --resume")
+    rows = [json.loads(line) for line in (folder / "episodes.jsonl").read_text().splitlines()]
+    rows.sort(key=lambda row: (row["task"], row["episode"]))
+
+    def ratio(row: dict) -> float:
+        if row["outcome"]["kind"] == "invalid":
+            return np.inf
+        return row["d_peak"] / row["tau"] if row.get("tau") and row.get("d_peak") is not None else np.nan
+
+    def column(key: str) -> np.ndarray:
+        return np.array([float(bool(row[key])) for row in rows])
+
+    return Run(
+        suite=rows[0]["suite"],
+        policy=rows[0]["policy"],
+        task=np.array([row["task"] for row in rows]),
+        episode=np.array([row["episode"] for row in rows]),
+        goal=column("goal"),
+        safety=column("safety"),
+        ratio=np.array([ratio(row) for row in rows]),
+        stage=[row.get("failed_stage") for row in rows],
+    )
+
+
+@dataclass
+class Estimate:
+    """A mean with its 95 % interval, in percent or percentage points."""
+
+    mean: float
+    low: float
+    high: float
+
+    def text(self, signed: bool = False) -> str:
+        sign = "+" if signed else ""
+        return f"{self.mean:{sign}.1f} [{self.low:{sign}.1f}, {self.high:{sign}.1f}]"
+
+
+def _bootstrap(values: np.ndarray, task: np.ndarray) -> Estimate:
+    """The mean of one number per episode, with the percentile interval of a bootstrap that redraws the episodes of each task."""
+    random = np.random.default_rng(SEED)
+    sums = np.zeros(RESAMPLES)
+    for one in np.unique(task):
+        own = values[task == one]
+        sums += own[random.integers(len(own), size=(RESAMPLES, len(own)))].sum(axis=1)
+    low, high = np.percentile(sums / len(values), [2.5, 97.5])
+    return Estimate(100 * values.mean(), 100 * low, 100 * high)
+
+
+def _same_episodes(runs: list[Run]) -> None:
+    first = runs[0]
+    for run in runs[1:]:
+        if not (np.array_equal(run.task, first.task) and np.array_equal(run.episode, first.episode) and run.suite == first.suite):
+            raise UserError(f"{run.policy} and {first.policy} were not evaluated on the same episodes")
+
+
+def rate(runs: list[Run], measure: str) -> Estimate:
+    """The rate of `goal` or `safety` over the runs of a policy with several training seeds."""
+    _same_episodes(runs)
+    return _bootstrap(np.mean([getattr(run, measure) for run in runs], axis=0), runs[0].task)
+
+
+def difference(first: list[Run], second: list[Run], measure: str) -> Estimate:
+    """The rate of the second policy minus that of the first on the same episodes, each averaged over its training seeds."""
+    _same_episodes(first + second)
+    means = [np.mean([getattr(run, measure) for run in runs], axis=0) for runs in (first, second)]
+    return _bootstrap(means[1] - means[0], first[0].task)

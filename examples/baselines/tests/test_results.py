@@ -1,0 +1,64 @@
+"""Rates and paired differences."""
+
+import json
+import tempfile
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+from softvt_baselines import UserError
+from softvt_baselines.results import difference, load, rate
+
+
+def run(folder: Path, safe: np.ndarray, suite: str = "one") -> Path:
+    """A run of ten tasks; `safe` is (10, episodes)."""
+    folder.mkdir()
+    rows = [
+        {"suite": suite, "policy": folder.name, "task": task, "episode": episode, "goal": True, "safety": bool(is_safe), "tau": 0.5,
+         "d_peak": 0.25, "outcome": {"kind": "invalid" if not is_safe else "completed"}}
+        for (task, episode), is_safe in np.ndenumerate(safe)
+    ]
+    (folder / "episodes.jsonl").write_text("".join(json.dumps(row) + "\n" for row in reversed(rows)))
+    (folder / "summary.json").write_text("{}")
+    return folder
+
+
+class Results(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.folder = Path(scratch.name)
+
+    def test_rates_are_means_over_seeds_with_an_interval_that_covers(self):
+        random = np.random.default_rng(1)
+        runs = [load(run(self.folder / f"s{seed}", random.random((10, 50)) < 0.8)) for seed in range(3)]
+        safety = rate(runs, "safety")
+        self.assertAlmostEqual(safety.mean, 100 * np.mean([one.safety.mean() for one in runs]))
+        # Three independent draws of 500: a standard error of 1.03 points.
+        self.assertAlmostEqual((safety.high - safety.low) / 3.92, 1.03, delta=0.12)
+        self.assertEqual(rate(runs, "goal").text(), "100.0 [100.0, 100.0]")
+        self.assertEqual(sorted(set(runs[0].ratio)), [0.5, np.inf])
+
+    def test_differences_are_paired(self):
+        safe = np.random.default_rng(2).random((10, 50)) < 0.5
+        better = safe.copy()
+        better[:, :10] = True
+        first, second = load(run(self.folder / "a", safe)), load(run(self.folder / "b", better))
+        found = difference([first], [second], "safety")
+        self.assertAlmostEqual(found.mean, 100 * (better.mean() - safe.mean()))
+        self.assertLess(found.high - found.low, 6, "the episodes in common cancel")
+        self.assertTrue(found.text(signed=True).startswith("+"))
+
+    def test_runs_that_cannot_be_compared_are_refused(self):
+        safe = np.ones((10, 2), bool)
+        first, other = load(run(self.folder / "a", safe)), load(run(self.folder / "b", safe, suite="two"))
+        with self.assertRaises(UserError):
+            difference([first], [other], "safety")
+        (run(self.folder / "c", safe) / "summary.json").unlink()
+        with self.assertRaises(UserError):
+            load(self.folder / "c")
+
+
+if __name__ == "__main__":
+    unittest.main()
