@@ -35,7 +35,10 @@ fn lists_are_printed_as_text_and_as_json() {
         ["expert", "expert-binary", "fixed-closure", "tactile-servo", "noop", "random"]
     );
     assert!(names("policies").contains(&"scripts/policies/hold.lua".into()));
-    assert_eq!(names("profiles")[..4], ["vision", "visuo_tactile", "softvtbench", "libero"]);
+    assert_eq!(
+        names("profiles")[..6],
+        ["vision", "visuo_tactile", "softvtbench", "softvtbench_v02", "softvtbench_v02_latched", "libero"]
+    );
     assert!(names("profiles").contains(&"scripts/profiles/libero.lua".into()));
     for what in ["suites", "tasks", "assets", "policies", "profiles"] {
         assert_eq!(
