@@ -8,6 +8,8 @@ return softvt.profile {
     { keys = { "observation/wrist_image" }, source = "camera", camera = "wrist", half_turn = true },
     { keys = { "observation/state" }, source = "state", parts = { "position", "axis_angle", "finger_pair" } },
     { keys = { "prompt" }, source = "prompt" },
+    { keys = { "softvt" }, source = "query" },
+    { keys = { "__softvtbench_rng_seed" }, source = "query_seed" },
   },
   actions = {
     pose = "delta_osc", translation_m = 0.05, rotation_rad = 0.5,

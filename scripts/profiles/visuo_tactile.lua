@@ -13,6 +13,8 @@ return softvt.profile {
     { keys = { "prompt" }, source = "prompt" },
     { keys = both "tactile_image", source = "tactile_image" },
     { keys = both "tactile_marker_motion", source = "marker_motion" },
+    { keys = { "softvt" }, source = "query" },
+    { keys = { "__softvtbench_rng_seed" }, source = "query_seed" },
   },
   actions = { pose = "absolute", gripper = { open = 0, closed = 1 } },
 }
