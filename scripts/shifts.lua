@@ -150,6 +150,7 @@ shifts.perturbations = {
   { name = "gel wear", set = { ["tactile.wear.gain"] = 0.7, ["tactile.wear.offset_px"] = 0.5, ["tactile.wear.dead_share"] = 0.2 } },
   { name = "latency 50 ms", set = { ["robot.latency"] = 1 } },
   { name = "latency 150 ms", set = { ["robot.latency"] = 3 } },
+  { name = "disturbance 3 mm", set = { ["robot.disturbance.position"] = 0.003, ["robot.disturbance.rotation"] = 0.01 } },
   { name = "rigid twin", rigid_twin = true },
 }
 

@@ -36,11 +36,13 @@ pub enum RandomStream {
     Script,
     /// Choices of a policy in Lua.
     Policy,
+    /// Disturbance of the robot's motion.
+    Disturbance,
 }
 
 impl RandomStream {
     /// Every stream with the name that scripts use.
-    const NAMES: [(Self, &str); 11] = [
+    const NAMES: [(Self, &str); 12] = [
         (Self::Layout, "layout"),
         (Self::Arm, "arm"),
         (Self::Material, "material"),
@@ -52,6 +54,7 @@ impl RandomStream {
         (Self::Expert, "expert"),
         (Self::Script, "script"),
         (Self::Policy, "policy"),
+        (Self::Disturbance, "disturbance"),
     ];
 
     /// The stream of this name in scripts.

@@ -20,6 +20,8 @@ pub struct RobotSpec {
     pub ik: IkSpec,
     /// Delay between a command and the robot's response, control steps of 0.05 s.
     pub latency: u32,
+    /// Random offset of the executed poses from the commanded ones.
+    pub disturbance: DisturbanceSpec,
 }
 
 /// Longest [`RobotSpec::latency`], control steps: 5 s.
@@ -45,6 +47,9 @@ impl RobotSpec {
         positive("gripper.speed", gripper.speed, "m/s")?;
         positive("gripper.finger_mass", gripper.finger_mass, "kg")?;
         within("latency", f64::from(self.latency), f64::from(MAX_LATENCY))?;
+        within("disturbance.position", self.disturbance.position, 0.05)?;
+        within("disturbance.rotation", self.disturbance.rotation, 0.5)?;
+        positive("disturbance.duration", self.disturbance.duration, "s")?;
         positive("ik.lambda", ik.lambda, "1")?;
         within("ik.posture_gain", ik.posture_gain, 1.0)?;
         positive("pads.normal_modulus", pads.normal_modulus, "Pa/m")?;
@@ -139,6 +144,28 @@ pub struct IkSpec {
 impl Default for IkSpec {
     fn default() -> Self {
         Self { lambda: 0.01, posture_gain: 0.0 }
+    }
+}
+
+/// Random offset between the commanded and the executed tool pose: a stationary Gauss–Markov process per axis (Gardiner,
+/// *Stochastic Methods*, 2009, 4.5.4), different in every episode. Off by default.
+///
+/// Demonstrations that are recorded with it hold the expert's commands, not the disturbed ones, and so show how to correct
+/// deviations (Laskey et al., *DART*, 2017).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DisturbanceSpec {
+    /// Standard deviation of the position along each axis, m.
+    pub position: f64,
+    /// Standard deviation of the rotation about each axis, rad.
+    pub rotation: f64,
+    /// Time after which the correlation of the offset has fallen to 1/e, s; positive.
+    pub duration: f64,
+}
+
+impl Default for DisturbanceSpec {
+    fn default() -> Self {
+        Self { position: 0.0, rotation: 0.0, duration: 0.5 }
     }
 }
 

@@ -9,6 +9,7 @@ use super::{
     build_error::BuildError,
     cancel,
     controller::Controller,
+    disturbance::Disturbance,
     evidence::{EvidenceCollector, lowest},
     observation_history::ObservationHistory,
     sensor_assets::{SensingError, SensorAssets},
@@ -221,6 +222,7 @@ pub struct Episode {
     trace: Vec<StepTrace>,
     frames: Vec<ScoreFrame>,
     actions: Vec<Action>,
+    disturbance: Disturbance,
     sensors: SensorSuite,
     history: ObservationHistory,
     recorded: Option<RecordedStates>,
@@ -278,8 +280,10 @@ impl Episode {
         let judge = settled_judge(&spec, &sim, &evidence, target, goal);
         let tool = sim.robot.tool_b(&sim.world);
         let start_hold = Action::new(tool.translation.vector, rotation::axis_angle(&tool.rotation), 0.0);
-        let wear_seed = WearSeed::new(&EpisodeSeed::new(&spec.header.id, &spec.task.layout));
-        let sensors = SensorSuite::new(&sim, &spec.settings.tactile, sensor_assets).with_wear_seed(wear_seed);
+        let seed = EpisodeSeed::new(&spec.header.id, &spec.task.layout);
+        let disturbance = Disturbance::new(&spec.settings.robot.disturbance, &seed);
+        let sensors = SensorSuite::new(&sim, &spec.settings.tactile, sensor_assets)
+            .with_wear_seed(WearSeed::new(&seed));
         let recorded = spec.record_states.then(RecordedStates::default);
         Ok(Self {
             spec,
@@ -295,6 +299,7 @@ impl Episode {
             trace: Vec::new(),
             frames: Vec::new(),
             actions: Vec::new(),
+            disturbance,
             sensors,
             history: ObservationHistory::default(),
             recorded,
@@ -453,7 +458,8 @@ impl Episode {
         let rotation = rotation::from_axis_angle(&action.axis_angle_b);
         let pose_b = Pose::from_parts(action.position_b.into(), rotation);
         let grip = action.force_n.map_or(GripTarget::Closure(action.closure), GripTarget::Force);
-        self.sim.robot.command(&mut self.sim.world, &pose_b, grip);
+        let executed_b = self.disturbance.apply(&pose_b);
+        self.sim.robot.command(&mut self.sim.world, &executed_b, grip);
         self.steps += 1;
         let mut worst: Option<Deformation> = None;
         for _ in 0..steps_per_control(self.spec.settings.physics.dt) {

@@ -71,6 +71,7 @@ mod build;
 mod build_error;
 pub mod cancel;
 mod controller;
+mod disturbance;
 mod episode;
 mod evidence;
 mod observation_history;

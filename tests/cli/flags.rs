@@ -323,6 +323,38 @@ fn latency_delays_the_response_by_control_steps() {
 }
 
 #[test]
+fn a_disturbance_moves_the_robot_and_not_its_commands() {
+    let small = Small { expert: "arm:wait(1)", ..Small::default() };
+    let project = small.project();
+    let run = |out: &str, words: &str| {
+        project.succeeds(&format!("x.lua --trace --out {out} {words}"));
+        let heights: Vec<f64> = project
+            .lines(&format!("{out}/trace/task_000/episode_00000.jsonl"))
+            .iter()
+            .map(|step| step["ee_position_b"][2].as_f64().expect("a height"))
+            .collect();
+        let actions = std::fs::read(project.path(&format!("{out}/actions/task_000/episode_00000.npy")));
+        (heights, actions.expect("actions"))
+    };
+    let disturbed = "--set robot.disturbance.position=0.005";
+    let (plain, commands) = run("plain", "");
+    let (moved, same_commands) = run("moved", disturbed);
+    let spread = |heights: &[f64]| {
+        let (low, high) = heights.iter().fold((f64::MAX, f64::MIN), |(l, h), z| (l.min(*z), h.max(*z)));
+        high - low
+    };
+    assert!(spread(&plain) < 1e-4 && spread(&moved) > 3e-3, "{plain:?} {moved:?}");
+    assert_eq!(commands, same_commands, "a demonstration holds what was commanded");
+    assert_eq!(run("again", disturbed).0, moved);
+    project.succeeds("replay moved 0/0");
+    assert!(
+        project
+            .refusal("x.lua --out bad --set robot.disturbance.duration=0")
+            .contains("robot.disturbance.duration: expected a positive number (s), got 0")
+    );
+}
+
+#[test]
 fn a_rigid_twin_is_paired_with_its_soft_original() {
     let text = Small { task: "budget_steps = 1", ..Small::default() }.text();
     let twin = "local soft = require \"x\"\nreturn softvt.suite { name = \"one_twin\", object_type = \"rigid\", twin_of = soft.name, variation = soft.variation, episodes = soft.episodes, tasks = soft.tasks }\n";
