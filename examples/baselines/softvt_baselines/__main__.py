@@ -11,9 +11,9 @@ CODES = ["continuous", "binary", "two-width", "force"]
 
 
 def _record(args: argparse.Namespace) -> None:
-    from .evaluate import camera_flags, run_softvt
+    from .evaluate import recording_flags, run_softvt
 
-    run_softvt(["record", args.suite, "--out", str(args.out), "--demos", str(args.demos), *camera_flags(args.edge), *args.flags])
+    run_softvt(["record", args.suite, "--out", str(args.out), *recording_flags(args.demos, args.edge, args.disturbance), *args.flags])
 
 
 def _train(args: argparse.Namespace) -> None:
@@ -71,11 +71,15 @@ def _parser() -> argparse.ArgumentParser:
     def with_device(sub: argparse.ArgumentParser) -> None:
         sub.add_argument("--device", default="cuda", help="device of torch; cpu for a small trial")
 
+    def with_disturbance(sub: argparse.ArgumentParser) -> None:
+        sub.add_argument("--disturbance", type=float, default=0.002, help="random deviation of the robot while recording, m")
+
     record = command("record", _record, "record demonstrations of a suite with pictures of the size that policies see")
     record.add_argument("suite", help="suite of softvt")
     record.add_argument("--out", type=Path, required=True, help="folder of the recording")
     record.add_argument("--demos", type=int, default=50, help="demonstrations per task")
     record.add_argument("--edge", type=int, default=128, help="width and height of the pictures, pixels")
+    with_disturbance(record)
 
     train = command("train", _train, "train a policy")
     train.add_argument("recordings", type=Path, nargs="+", help="folders of softvt record")
@@ -115,6 +119,7 @@ def _parser() -> argparse.ArgumentParser:
     study.add_argument("--steps", type=int, default=10000, help="training steps")
     study.add_argument("--episodes", type=int, default=50, help="episodes per task")
     study.add_argument("--edge", type=int, default=128, help="width and height of the pictures, pixels")
+    with_disturbance(study)
     study.add_argument("--compile", action="store_true", help="compile the networks")
     study.add_argument("--per-gpu", type=int, default=1, help="policies that are trained on one GPU at a time")
     return parser

@@ -16,15 +16,17 @@ import numpy as np
 from PIL import Image
 
 from . import UserError
-from .numbers import Standard, fold, mean_axis
+from .numbers import Standard, fold, mean_axis, reference
 
 # The grip codes and the streams that hold the actions in them.
 ACTIONS = {"continuous": "actions", "binary": "actions_binary", "two-width": "actions_two_width", "force": "actions_force"}
 # Pictures by their keys in an observation, and their streams.
 CAMERAS = {"image": "agentview_rgb", "wrist_image": "eye_in_hand_rgb"}
 # Motion below which a step is idle: of the position (m), of the rotation vector (rad), and of the gripper as a share of its range in
-# the recording. Of several idle steps in a row so many are kept.
-IDLE_MOTION, IDLE_TURN, IDLE_GRIP, IDLE_KEPT = 0.0005, 0.005, 0.002, 2
+# the recording.
+IDLE_MOTION, IDLE_TURN, IDLE_GRIP = 0.0005, 0.005, 0.002
+# Smallest deviations by which actions are divided: of the position (m), the rotation vector (rad), and the gripper.
+LEAST_SPREAD = np.array([0.001] * 3 + [0.01] * 3 + [0])
 # Length of the marker displacements of a step: finger, marker, (x, y).
 MARKERS = 2 * 99 * 2
 
@@ -63,13 +65,12 @@ def moving_steps(actions: np.ndarray, grip_range: float) -> np.ndarray:
 
     An expert that waits teaches a policy without memory to wait forever, since its observation does not change meanwhile.
     """
-    kept, last, idle = np.ones(len(actions), bool), actions[0], 0
+    kept, last = np.ones(len(actions), bool), actions[0]
     for step, action in enumerate(actions[1:], 1):
         change = np.abs(action - last)
         moves = np.linalg.norm(change[:3]) > IDLE_MOTION or np.linalg.norm(change[3:6]) > IDLE_TURN
         moves = moves or change[6] > IDLE_GRIP * grip_range
-        idle = 0 if moves else idle + 1
-        kept[step] = idle <= IDLE_KEPT
+        kept[step] = moves
         last = action if moves else last
     return kept
 
@@ -194,14 +195,27 @@ def load(recordings: list[Path], code: str, edge: int) -> Demonstrations:
 
 @dataclass
 class Statistics:
-    """Normalisation of the inputs and answers of a policy."""
+    """Normalisation of the inputs and answers of a policy.
+
+    Answers are relative to the pose of the tool in the observation: a policy that is to hold still then answers 0, instead of a
+    pose which it knows to a few millimetres only. The first actions of a chunk differ less from the present pose than the last
+    ones, and are standardised each on their own.
+    """
 
     state: Standard
-    action: Standard
+    action: Standard  # of shape (chunk, 7)
     marker_scale: float  # px
     axis: np.ndarray  # (3,) the side of the rotation vectors
 
     @classmethod
-    def of(cls, demos: Demonstrations) -> "Statistics":
+    def of(cls, demos: Demonstrations, chunk: int) -> "Statistics":
         scale = float(np.sqrt(np.square(demos.markers, dtype=np.float64).mean()) + 1e-6)
-        return cls(Standard.of(demos.state), Standard.of(demos.actions), scale, demos.axis)
+        steps, present = np.arange(len(demos.actions)), reference(demos.state[demos.row])
+        ahead: list[Standard] = []
+        for k in range(chunk):
+            inside = steps + k <= demos.last
+            changes = demos.actions[steps[inside] + k] - present[inside]
+            # Demonstrations may be shorter than a chunk.
+            ahead.append(Standard.of(changes, LEAST_SPREAD) if inside.any() else ahead[-1])
+        action = Standard(np.stack([one.mean for one in ahead]), np.stack([one.std for one in ahead]))
+        return cls(Standard.of(demos.state), action, scale, demos.axis)

@@ -32,6 +32,12 @@ def camera_flags(edge: int) -> list[str]:
     return ["--set", f"cameras.width={edge}", "--set", f"cameras.height={edge}"]
 
 
+def recording_flags(demos: int, edge: int, disturbance: float) -> list[str]:
+    """Flags of softvt record. `disturbance` is the deviation of the robot from the commands, m and 4 rad/m."""
+    moves = ["--set", f"robot.disturbance.position={disturbance}", "--set", f"robot.disturbance.rotation={4 * disturbance}"]
+    return ["--demos", str(demos), "--no-privileged", *camera_flags(edge), *moves]
+
+
 @contextmanager
 def served(path: Path, device: str):
     """A server of a checkpoint in a process of its own; gives its address."""

@@ -39,4 +39,5 @@ class Answering:
         padded = inputs + inputs[:1] * (BATCH - len(inputs))
         tensors = {key: torch.from_numpy(np.concatenate([one[key] for one in padded])).to(self.device) for key in padded[0]}
         answers = self.checkpoint.policy.act(tensors, tensors["noise"]).float().cpu().numpy()
-        return self.checkpoint.statistics.action.invert(answers[: len(inputs)])
+        changes = self.checkpoint.statistics.action.invert(answers[: len(inputs)])
+        return changes + np.concatenate([one["reference"] for one in inputs])

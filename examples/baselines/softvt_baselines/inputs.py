@@ -7,7 +7,7 @@ import numpy as np
 
 from . import UserError, prompts
 from .data import CAMERAS, Statistics, shrink
-from .numbers import fold
+from .numbers import fold, reference
 
 # Row of tactile_marker_motion (9, 198, 2) with the present positions; row 0 has the initial ones.
 NOW = 8
@@ -39,7 +39,8 @@ class Shape:
 
 
 def read(obs: dict, shape: Shape, statistics: Statistics, vocabulary: prompts.Vocabulary) -> dict[str, np.ndarray]:
-    """The inputs of a network for an observation, and the noise for a flow, each with a first axis of length 1.
+    """The inputs of a network for an observation, the noise for a flow, and what its answer is relative to, each with a first
+    axis of length 1.
 
     Raises UserError if an entry is missing or has another shape, or the prompt was not trained.
     """
@@ -59,7 +60,8 @@ def read(obs: dict, shape: Shape, statistics: Statistics, vocabulary: prompts.Vo
         return array
 
     inputs = {camera: shrink(frames(camera, 3), shape.edge)[None] for camera in CAMERAS}
-    inputs["state"] = statistics.state.apply(fold(frames("state", 1)[None], statistics.axis))
+    states = fold(frames("state", 1)[None], statistics.axis)
+    inputs["state"], inputs["reference"] = statistics.state.apply(states), reference(states[:, -1:])
     inputs["prompt"] = np.array([prompts.encode(obs["prompt"])])
     random = np.random.default_rng(obs["softvt"]["seed"])
     inputs["noise"] = random.standard_normal((1, shape.chunk, shape.action), np.float32)

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Columns of a state and of an action that hold the rotation vector.
-ROTATION = slice(3, 6)
+# Columns of a state and of an action that hold the rotation vector, and the column of the gripper.
+ROTATION, GRIPPER = slice(3, 6), 6
 
 
 def mean_axis(rotations: np.ndarray) -> np.ndarray:
@@ -29,6 +29,13 @@ def fold(rows: np.ndarray, axis: np.ndarray) -> np.ndarray:
     return folded
 
 
+def reference(states: np.ndarray) -> np.ndarray:
+    """What is subtracted from the actions (…, 7) that follow on states (…, 7): the pose of the tool, and 0 for the gripper."""
+    poses = states.copy()
+    poses[..., GRIPPER] = 0
+    return poses
+
+
 @dataclass
 class Standard:
     """Mean and standard deviation per component."""
@@ -37,10 +44,11 @@ class Standard:
     std: np.ndarray
 
     @classmethod
-    def of(cls, rows: np.ndarray) -> "Standard":
-        """Those of rows (N, D). A component that never changes has the deviation 1."""
+    def of(cls, rows: np.ndarray, least: np.ndarray | float = 0.0) -> "Standard":
+        """Those of rows (N, D), the deviations at least `least`. A component that never changes has the deviation 1."""
         std = rows.std(axis=0)
-        return cls(rows.mean(axis=0).astype(np.float32), np.where(std < 1e-6, 1, std).astype(np.float32))
+        std = np.where(std < 1e-6, 1, np.maximum(std, least))
+        return cls(rows.mean(axis=0).astype(np.float32), std.astype(np.float32))
 
     def apply(self, rows: np.ndarray) -> np.ndarray:
         return (rows - self.mean) / self.std

@@ -3,16 +3,20 @@
 Everything that is complete in the folder of the study is kept, so a study that was interrupted continues.
 """
 
+import itertools
 import os
 import queue
 import subprocess
 import sys
-import threading
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from . import UserError
-from .evaluate import camera_flags, run_softvt
+from .data import pack
+from .evaluate import recording_flags, run_softvt
 
 
 @dataclass
@@ -29,6 +33,7 @@ class Study:
     steps: int
     episodes: int
     edge: int = 128
+    disturbance: float = 0.002  # m
     per_gpu: int = 1  # policies that are trained on one GPU at a time
     compile: bool = False  # compile the networks
     flags: tuple[str, ...] = ()  # further flags of the evaluations
@@ -56,59 +61,87 @@ def _call(words: list[str], log: Path, gpu: int | None = None) -> None:
         raise UserError(f"{' '.join(words[:2])}: exit code {code}: {''.join(last)}; see {log}")
 
 
-def _run_job(job: Job, study: Study, gpu: int | None, threads: int) -> None:
-    device = "cpu" if gpu is None else "cuda"
+def _train(job: Job, study: Study, gpu: int | None) -> None:
     checkpoint = study.out / "checkpoints" / f"{job.name}.pt"
-    log = study.out / "logs" / f"{job.name}.log"
-    if not checkpoint.is_file():
-        switches = ["--touch"] * (job.inputs == "vt") + ["--compile"] * study.compile
-        shape = ["--gripper", job.code, "--edge", str(study.edge), "--steps", str(study.steps), "--seed", str(job.seed), *switches]
-        _call(["train", str(study.out / "data" / job.suite), "--out", str(checkpoint), "--device", device, *shape], log, gpu)
-    for replan in study.replans:
-        name = f"{job.name}-r{replan}"
-        flags = ["--replan", str(replan), "--episodes", str(study.episodes), "--threads", str(threads), "--resume", *study.flags]
-        run = ["--out", str(study.out / "runs" / name), "--name", name, "--device", device]
-        _call(["evaluate", str(checkpoint), f"suites/{job.suite}.lua", *run, "--", *flags], log, gpu)
-        print(f"evaluated {name}", flush=True)
+    if checkpoint.is_file():
+        return
+    switches = ["--touch"] * (job.inputs == "vt") + ["--compile"] * study.compile
+    shape = ["--gripper", job.code, "--edge", str(study.edge), "--steps", str(study.steps), "--seed", str(job.seed), *switches]
+    words = ["train", str(study.out / "data" / job.suite), "--out", str(checkpoint), "--device", _device(gpu), *shape]
+    _call(words, study.out / "logs" / f"{job.name}.log", gpu)
+
+
+def _evaluate(job: Job, replan: int, study: Study, threads: int, gpu: int | None) -> None:
+    name = f"{job.name}-r{replan}"
+    words = ["evaluate", str(study.out / "checkpoints" / f"{job.name}.pt"), f"suites/{job.suite}.lua"]
+    words += ["--out", str(study.out / "runs" / name), "--name", name, "--device", _device(gpu)]
+    flags = ["--replan", str(replan), "--episodes", str(study.episodes), "--threads", str(threads), "--resume", *study.flags]
+    _call([*words, "--", *flags], study.out / "logs" / f"{name}.log", gpu)
+    print(f"evaluated {name}", flush=True)
+
+
+def _device(gpu: int | None) -> str:
+    return "cpu" if gpu is None else "cuda"
+
+
+class _Workers:
+    """Threads that take jobs in the order in which they were added. Each has a GPU, which several may share."""
+
+    def __init__(self, gpus: list[int | None]):
+        self.pool = ThreadPoolExecutor(len(gpus))
+        self.free: queue.SimpleQueue[int | None] = queue.SimpleQueue()
+        self.jobs: list[Future] = []
+        for gpu in gpus:
+            self.free.put(gpu)
+
+    def add(self, work: Callable[[int | None], None]) -> None:
+        def run() -> None:
+            gpu = self.free.get()
+            try:
+                work(gpu)
+            except UserError as error:
+                print(error, file=sys.stderr, flush=True)
+                raise
+            finally:
+                self.free.put(gpu)
+
+        self.jobs.append(self.pool.submit(run))
+
+    def problems(self) -> list[str]:
+        """Waits for all jobs. Returns the errors."""
+        return [str(error) for job in self.jobs if (error := job.exception())]
 
 
 def run(study: Study) -> None:
-    """Runs a study. Raises UserError naming the jobs that failed."""
+    """Runs a study: evaluations of the first policies beside the training of the next ones.
+
+    Raises UserError naming what failed.
+    """
     import torch
 
-    gpus: list[int | None] = list(range(torch.cuda.device_count())) * study.per_gpu or [None]
+    gpus: list[int | None] = list(range(torch.cuda.device_count())) or [None]
     threads = max(1, (os.cpu_count() or 1) // len(gpus))
     for folder in ("data", "logs", "runs", "checkpoints"):
         (study.out / folder).mkdir(parents=True, exist_ok=True)
-    jobs: queue.Queue[Job | None] = queue.Queue()
-    problems: list[str] = []
+    training, evaluation = _Workers(gpus * study.per_gpu), _Workers(gpus)
 
-    def work(gpu: int | None) -> None:
-        while job := jobs.get():
-            try:
-                _run_job(job, study, gpu, threads)
-            except UserError as error:
-                problems.append(f"{job.name}: {error}")
-                print(problems[-1], file=sys.stderr, flush=True)
+    def add(job: Job) -> None:
+        def train(gpu: int | None) -> None:
+            _train(job, study, gpu)
+            # Evaluations begin while later policies are trained.
+            for replan in study.replans:
+                evaluation.add(partial(_evaluate, job, replan, study, threads))
 
-    workers = [threading.Thread(target=work, args=(gpu,)) for gpu in gpus]
-    for worker in workers:
-        worker.start()
-    try:
-        for suite in study.suites:
-            recording = study.out / "data" / suite
-            if not (recording / "dataset.json").is_file():
-                flags = ["--out", str(recording), "--demos", str(study.demos), "--no-privileged", "--resume"]
-                run_softvt(["record", f"suites/{suite}.lua", *flags, *camera_flags(study.edge)])
-            print(f"recorded {suite}", flush=True)
-            for seed in study.seeds:
-                for code in study.codes:
-                    for inputs in study.inputs:
-                        jobs.put(Job(suite, inputs, code, seed))
-    finally:
-        for _ in workers:
-            jobs.put(None)
-        for worker in workers:
-            worker.join()
-    if problems:
-        raise UserError(f"{len(problems)} policies are not complete: {'; '.join(problems)}")
+        training.add(train)
+
+    for suite in study.suites:
+        recording = study.out / "data" / suite
+        if not (recording / "dataset.json").is_file():
+            flags = ["--out", str(recording), "--resume", *recording_flags(study.demos, study.edge, study.disturbance)]
+            run_softvt(["record", f"suites/{suite}.lua", *flags])
+        pack(recording, study.edge, os.cpu_count() or 1)
+        print(f"recorded {suite}", flush=True)
+        for seed, code, inputs in itertools.product(study.seeds, study.codes, study.inputs):
+            add(Job(suite, inputs, code, seed))
+    if problems := training.problems() + evaluation.problems():
+        raise UserError(f"{len(problems)} policies or runs are not complete: {'; '.join(problems)}")

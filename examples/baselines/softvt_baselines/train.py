@@ -15,11 +15,14 @@ from .checkpoint import Checkpoint, save
 from .data import CAMERAS, Demonstrations, Statistics
 from .inputs import Shape
 from .model import Policy
+from .numbers import reference
 
 # Training, after ACT: learning rate and its last share, weight decay, warm-up (steps), decay of the averaged weights.
 RATE, LAST_RATE, WEIGHT_DECAY, WARM_UP, AVERAGE = 3e-4, 0.02, 1e-4, 300, 0.999
-# Augmentation: random shift of a picture (share of its edge), brightness, noise on the standardised state.
-SHIFT, BRIGHTNESS, STATE_NOISE = 0.045, 0.1, 0.02
+# Augmentation: random shift of a picture (share of its edge), brightness.
+SHIFT, BRIGHTNESS = 0.045, 0.1
+# Noise of the state: position (m), rotation vector (rad), finger (m). Actions stay where they are, so it teaches to return.
+STATE_NOISE = [0.002] * 3 + [0.01] * 3 + [0.0001]
 REPORT = 200  # steps between two lines of the log
 
 
@@ -43,8 +46,10 @@ class Batches:
 
         self.shape, self.device = options.shape, options.device
         self.pictures = {camera: on_device(demos.pictures[camera]) for camera in CAMERAS}
-        self.state = on_device(statistics.state.apply(demos.state))
-        self.actions = on_device(statistics.action.apply(demos.actions))
+        self.state, self.actions = on_device(demos.state), on_device(demos.actions)
+        self.state_mean, self.state_std = on_device(statistics.state.mean), on_device(statistics.state.std)
+        self.action_mean, self.action_std = on_device(statistics.action.mean), on_device(statistics.action.std)
+        self.noise, self.is_pose = on_device(np.float32(STATE_NOISE)), on_device(reference(np.ones(7, np.float32)))
         self.row, self.start, self.last = on_device(demos.row), on_device(demos.start), on_device(demos.last)
         self.prompts = on_device(np.array([prompts.encode(prompt) for prompt in demos.prompts]))
         self.prompt = on_device(demos.prompt)
@@ -75,19 +80,21 @@ class Batches:
             shifted = self._shifted(pictures[frames])
             light = 1 + BRIGHTNESS * (2 * torch.rand((count, 1, 1, 1, 1), generator=self.random, device=self.device) - 1)
             obs[camera] = (shifted * light).clamp(0, 255).byte()
-        noise = torch.randn((count, self.shape.frames, self.shape.state), generator=self.random, device=self.device)
-        obs["state"] = self.state[frames] + STATE_NOISE * noise
+        noise = torch.randn((count, 1, self.shape.state), generator=self.random, device=self.device)
+        states = self.state[frames] + self.noise * noise
+        obs["state"] = (states - self.state_mean) / self.state_std
         if self.shape.has_touch:
             obs["markers"] = self.markers[self._past(steps, self.shape.marker_steps)].float()
         ahead = steps[:, None] + torch.arange(self.shape.chunk, device=self.device)
-        return obs, self.actions[ahead.clamp(max=len(self.actions) - 1)], ahead <= self.last[steps][:, None]
+        changes = self.actions[ahead.clamp(max=len(self.actions) - 1)] - states[:, -1:] * self.is_pose
+        return obs, (changes - self.action_mean) / self.action_std, ahead <= self.last[steps][:, None]
 
 
 def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict) -> None:
     """Trains a policy and writes its checkpoint to `path`, and the log beside it."""
     torch.manual_seed(options.seed)
     torch.set_float32_matmul_precision("high")
-    statistics = Statistics.of(demos)
+    statistics = Statistics.of(demos, options.shape.chunk)
     batches = Batches(demos, statistics, options)
     policy = Policy(options.shape).to(options.device, memory_format=torch.channels_last)
     averaged = copy.deepcopy(policy).requires_grad_(False)

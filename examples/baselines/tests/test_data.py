@@ -11,7 +11,7 @@ import numpy as np
 from softvt_baselines import UserError, prompts
 from softvt_baselines.data import ACTIONS, CAMERAS, Statistics, displacements, load, moving_steps, shrink
 from softvt_baselines.inputs import Shape, read
-from softvt_baselines.numbers import Standard, fold, mean_axis
+from softvt_baselines.numbers import Standard, fold, mean_axis, reference
 
 STEPS = 12
 
@@ -97,18 +97,28 @@ class Numbers(unittest.TestCase):
         np.testing.assert_allclose(standard.apply(rows), [[-1, 0], [1, 0]])
         np.testing.assert_allclose(standard.invert(standard.apply(rows)), rows)
 
+    def test_actions_are_relative_to_the_tool_and_standardised_by_their_place_in_a_chunk(self):
+        with tempfile.TemporaryDirectory() as scratch:
+            demos = load([recording(Path(scratch) / "a")], "continuous", 4)
+        action = Statistics.of(demos, STEPS + 1).action
+        np.testing.assert_allclose(action.mean[:STEPS, 0], 0.01 * np.arange(STEPS), atol=1e-6)
+        np.testing.assert_allclose(action.mean[:, 6], 0.05, atol=1e-6)
+        np.testing.assert_array_equal(action.mean[STEPS], action.mean[STEPS - 1], "no demonstration is that long")
+        self.assertTrue((action.std > 0).all())
+        self.assertEqual(reference(np.full((2, 7), 3.0))[1].tolist(), [3.0] * 6 + [0.0])
+
     def test_pictures_shrink_to_the_mean_of_their_area(self):
         picture = np.zeros((1, 4, 4, 3), np.uint8)
         picture[0, :2, :2] = [[[0], [100]], [[200], [100]]]
         self.assertEqual(shrink(picture, 2)[0, :, :, 0].tolist(), [[100, 0], [0, 0]])
 
-    def test_waiting_is_left_out_after_two_steps(self):
+    def test_waiting_is_left_out(self):
         actions = np.zeros((10, 7))
         actions[5:, 6] = 0.5
-        self.assertEqual(moving_steps(actions, 0.5).tolist(), [True] * 3 + [False] * 2 + [True] * 3 + [False] * 2)
+        self.assertEqual(moving_steps(actions, 0.5).tolist(), [True] + [False] * 4 + [True] + [False] * 4)
         slow = np.zeros((10, 7))
         slow[:, 0] = 0.0003 * np.arange(10)
-        self.assertTrue(moving_steps(slow, 1.0).all(), "slow motion is not waiting")
+        self.assertEqual(moving_steps(slow, 1.0).tolist(), [True, False] * 5, "slow motion is not waiting")
 
     def test_displacements_are_those_of_both_fingers(self):
         motion = np.zeros((1, 2, 2, 99, 2), np.float32)
@@ -149,6 +159,8 @@ class Inputs(unittest.TestCase):
         found = self.read(shape)
         self.assertEqual(found["image"].shape, (1, 1, 4, 4, 3))
         np.testing.assert_allclose(found["state"][0, 0, 3], 2 * np.pi - 3.1, rtol=1e-6)
+        self.assertEqual(found["reference"].shape, (1, 1, 7))
+        self.assertEqual(found["reference"][0, 0, 6], 0)
         self.assertEqual((found["markers"][0, 0].max(), found["markers"][0, 1].max()), (0, 3))
         np.testing.assert_array_equal(found["noise"], self.read(shape)["noise"])
         self.assertFalse((found["noise"] == self.read(shape, softvt={"seed": 8})["noise"]).all())
