@@ -1,4 +1,4 @@
-"""Commands: record, train, serve, evaluate, study."""
+"""Commands: record, train, serve, evaluate, study, page."""
 
 import argparse
 import asyncio
@@ -59,6 +59,12 @@ def _study(args: argparse.Namespace) -> None:
     run(Study(**options, flags=tuple(args.flags)))
 
 
+def _page(args: argparse.Namespace) -> None:
+    from .page import write
+
+    write(args.studies, args.docs)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="softvt-baselines", description=__doc__, epilog="Flags after -- are those of softvt.")
     commands = parser.add_subparsers(dest="command", required=True)
@@ -115,6 +121,8 @@ def _parser() -> argparse.ArgumentParser:
     study.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2], help="training seeds")
     study.add_argument("--codes", nargs="+", default=["continuous"], choices=CODES, help="grip codes")
     study.add_argument("--replans", type=int, nargs="+", default=[4], help="actions executed of each answer")
+    study.add_argument("--shifts", action="store_true", help="evaluate also under the nine conditions of suites/shifts.lua")
+    study.add_argument("--references", nargs="*", default=["expert", "tactile-servo", "fixed-closure"], help="built-in policies for comparison")
     study.add_argument("--demos", type=int, default=50, help="demonstrations per task")
     study.add_argument("--steps", type=int, default=10000, help="training steps")
     study.add_argument("--episodes", type=int, default=50, help="episodes per task")
@@ -122,6 +130,10 @@ def _parser() -> argparse.ArgumentParser:
     with_disturbance(study)
     study.add_argument("--compile", action="store_true", help="compile the networks")
     study.add_argument("--per-gpu", type=int, default=1, help="policies that are trained on one GPU at a time")
+
+    page = command("page", _page, "write the tables and the figure of studies into docs/baselines.md")
+    page.add_argument("studies", type=Path, nargs="*", help="folders of studies to collect; none: those that were collected")
+    page.add_argument("--docs", type=Path, default=Path("docs"), help="folder of the documentation")
     return parser
 
 

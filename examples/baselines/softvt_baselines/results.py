@@ -1,5 +1,6 @@
 """Results of runs of softvt: rates per policy, and paired differences between policies."""
 
+import csv
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +9,9 @@ import numpy as np
 
 from . import UserError
 
+# File with the outcomes of the episodes of a run that was collected, and its columns.
+OUTCOMES = "outcomes.csv"
+COLUMNS = ["task", "episode", "goal", "no_drop", "safety", "ratio", "stage"]
 # Resamples of a bootstrap, and its seed.
 RESAMPLES, SEED = 10_000, 0
 
@@ -16,41 +20,57 @@ RESAMPLES, SEED = 10_000, 0
 class Run:
     """Outcomes of the episodes of a run, in the order of tasks and episodes."""
 
+    name: str
     suite: str
-    policy: str
     task: np.ndarray  # (N,)
     episode: np.ndarray  # (N,)
     goal: np.ndarray  # (N,) 1 if the goal was reached
+    no_drop: np.ndarray  # (N,) 1 if nothing was dropped
     safety: np.ndarray  # (N,) 1 if also safely
     ratio: np.ndarray  # (N,) peak D over the limit; infinite if the episode is invalid, NaN if there is no limit
-    stage: list[str | None]  # stage in which the episode failed
+    stage: list[str]  # stage in which the episode failed, or ""
+
+
+def _ratio(row: dict) -> float:
+    if row["outcome"]["kind"] == "invalid":
+        return np.inf
+    return row["d_peak"] / row["tau"] if row.get("tau") and row.get("d_peak") is not None else np.nan
 
 
 def load(folder: Path) -> Run:
-    """Reads a run folder. Raises UserError if it is not finished."""
+    """Reads a run folder of softvt, or a collected one. Raises UserError if it is not finished."""
     if not (folder / "summary.json").is_file():
         raise UserError(f"{folder}: not a finished run: it has no summary.json; repeat its command with --resume")
-    rows = [json.loads(line) for line in (folder / "episodes.jsonl").read_text().splitlines()]
-    rows.sort(key=lambda row: (row["task"], row["episode"]))
+    if (folder / OUTCOMES).is_file():
+        with open(folder / OUTCOMES, newline="") as file:
+            rows = list(csv.DictReader(file))
+    else:
+        rows = [json.loads(line) for line in (folder / "episodes.jsonl").read_text().splitlines()]
+        rows = [row | {"ratio": _ratio(row), "stage": row.get("failed_stage") or ""} for row in rows]
+        rows.sort(key=lambda row: (row["task"], row["episode"]))
 
-    def ratio(row: dict) -> float:
-        if row["outcome"]["kind"] == "invalid":
-            return np.inf
-        return row["d_peak"] / row["tau"] if row.get("tau") and row.get("d_peak") is not None else np.nan
+    def column(key: str, kind: type) -> np.ndarray:
+        return np.array([kind(row[key]) for row in rows])
 
-    def column(key: str) -> np.ndarray:
-        return np.array([float(bool(row[key])) for row in rows])
-
+    rates = {key: column(key, int).astype(float) for key in ("goal", "no_drop", "safety")}
     return Run(
-        suite=rows[0]["suite"],
-        policy=rows[0]["policy"],
-        task=np.array([row["task"] for row in rows]),
-        episode=np.array([row["episode"] for row in rows]),
-        goal=column("goal"),
-        safety=column("safety"),
-        ratio=np.array([ratio(row) for row in rows]),
-        stage=[row.get("failed_stage") for row in rows],
+        name=folder.name,
+        suite=json.loads((folder / "summary.json").read_text())["suite"],
+        task=column("task", int),
+        episode=column("episode", int),
+        ratio=column("ratio", float),
+        stage=[row["stage"] for row in rows],
+        **rates,
     )
+
+
+def save(run: Run, folder: Path) -> None:
+    """Writes the outcomes of a run into a folder."""
+    with open(folder / OUTCOMES, "w", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(COLUMNS)
+        for row in zip(run.task, run.episode, run.goal, run.no_drop, run.safety, run.ratio, run.stage):
+            table.writerow([*map(int, row[:5]), f"{row[5]:.4g}", row[6]])
 
 
 @dataclass
@@ -81,11 +101,11 @@ def _same_episodes(runs: list[Run]) -> None:
     first = runs[0]
     for run in runs[1:]:
         if not (np.array_equal(run.task, first.task) and np.array_equal(run.episode, first.episode) and run.suite == first.suite):
-            raise UserError(f"{run.policy} and {first.policy} were not evaluated on the same episodes")
+            raise UserError(f"{run.name} and {first.name} were not evaluated on the same episodes")
 
 
 def rate(runs: list[Run], measure: str) -> Estimate:
-    """The rate of `goal` or `safety` over the runs of a policy with several training seeds."""
+    """The rate of `goal`, `no_drop` or `safety` over the runs of a policy with several training seeds."""
     _same_episodes(runs)
     return _bootstrap(np.mean([getattr(run, measure) for run in runs], axis=0), runs[0].task)
 

@@ -19,6 +19,10 @@ from .data import pack
 from .evaluate import recording_flags, run_softvt
 
 
+# Script that runs a suite under conditions.
+SHIFTS = "shifts"
+
+
 @dataclass
 class Study:
     """What a study compares. Every combination is one policy."""
@@ -35,6 +39,8 @@ class Study:
     edge: int = 128
     disturbance: float = 0.002  # m
     per_gpu: int = 1  # policies that are trained on one GPU at a time
+    shifts: bool = False  # evaluate also under the standard conditions of suites/shifts.lua, with the first of `replans`
+    references: tuple[str, ...] = ()  # built-in policies that are evaluated as well
     compile: bool = False  # compile the networks
     flags: tuple[str, ...] = ()  # further flags of the evaluations
 
@@ -71,12 +77,20 @@ def _train(job: Job, study: Study, gpu: int | None) -> None:
     _call(words, study.out / "logs" / f"{job.name}.log", gpu)
 
 
-def _evaluate(job: Job, replan: int, study: Study, threads: int, gpu: int | None) -> None:
+def _evaluate(job: Job, replan: int, script: str, study: Study, threads: int, gpu: int | None) -> None:
     name = f"{job.name}-r{replan}"
-    words = ["evaluate", str(study.out / "checkpoints" / f"{job.name}.pt"), f"suites/{job.suite}.lua"]
+    words = ["evaluate", str(study.out / "checkpoints" / f"{job.name}.pt"), f"suites/{script}.lua"]
     words += ["--out", str(study.out / "runs" / name), "--name", name, "--device", _device(gpu)]
     flags = ["--replan", str(replan), "--episodes", str(study.episodes), "--threads", str(threads), "--resume", *study.flags]
-    _call([*words, "--", *flags], study.out / "logs" / f"{name}.log", gpu)
+    flags += ["--suite", job.suite] * (script == SHIFTS)
+    _call([*words, "--", *flags], study.out / "logs" / f"{name}-{script}.log", gpu)
+    print(f"evaluated {name} on {script}", flush=True)
+
+
+def _evaluate_reference(suite: str, policy: str, study: Study, threads: int, gpu: int | None) -> None:
+    name = f"{suite}-{policy}"
+    run_softvt([f"suites/{suite}.lua", "--policy", policy, "--out", str(study.out / "runs" / name), "--name", name]
+               + ["--episodes", str(study.episodes), "--threads", str(threads), "--resume", *study.flags])
     print(f"evaluated {name}", flush=True)
 
 
@@ -130,7 +144,9 @@ def run(study: Study) -> None:
             _train(job, study, gpu)
             # Evaluations begin while later policies are trained.
             for replan in study.replans:
-                evaluation.add(partial(_evaluate, job, replan, study, threads))
+                evaluation.add(partial(_evaluate, job, replan, job.suite, study, threads))
+            if study.shifts:
+                evaluation.add(partial(_evaluate, job, study.replans[0], SHIFTS, study, threads))
 
         training.add(train)
 
@@ -141,6 +157,8 @@ def run(study: Study) -> None:
             run_softvt(["record", f"suites/{suite}.lua", *flags])
         pack(recording, study.edge, os.cpu_count() or 1)
         print(f"recorded {suite}", flush=True)
+        for policy in study.references:
+            evaluation.add(partial(_evaluate_reference, suite, policy, study, threads))
         for seed, code, inputs in itertools.product(study.seeds, study.codes, study.inputs):
             add(Job(suite, inputs, code, seed))
     if problems := training.problems() + evaluation.problems():

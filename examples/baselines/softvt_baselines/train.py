@@ -22,7 +22,7 @@ RATE, LAST_RATE, WEIGHT_DECAY, WARM_UP, AVERAGE = 3e-4, 0.02, 1e-4, 300, 0.999
 # Augmentation: random shift of a picture (share of its edge), brightness.
 SHIFT, BRIGHTNESS = 0.045, 0.1
 # Noise of the state: position (m), rotation vector (rad), finger (m). Actions stay where they are, so it teaches to return.
-STATE_NOISE = [0.002] * 3 + [0.01] * 3 + [0.0001]
+STATE_NOISE = [0.005] * 3 + [0.02] * 3 + [0.0001]
 REPORT = 200  # steps between two lines of the log
 
 

@@ -8,19 +8,19 @@ from pathlib import Path
 import numpy as np
 
 from softvt_baselines import UserError
-from softvt_baselines.results import difference, load, rate
+from softvt_baselines.results import difference, load, rate, save
 
 
 def run(folder: Path, safe: np.ndarray, suite: str = "one") -> Path:
     """A run of ten tasks; `safe` is (10, episodes)."""
     folder.mkdir()
     rows = [
-        {"suite": suite, "policy": folder.name, "task": task, "episode": episode, "goal": True, "safety": bool(is_safe), "tau": 0.5,
+        {"suite": suite, "policy": folder.name, "task": task, "episode": episode, "goal": True, "no_drop": True, "safety": bool(is_safe), "tau": 0.5,
          "d_peak": 0.25, "outcome": {"kind": "invalid" if not is_safe else "completed"}}
         for (task, episode), is_safe in np.ndenumerate(safe)
     ]
     (folder / "episodes.jsonl").write_text("".join(json.dumps(row) + "\n" for row in reversed(rows)))
-    (folder / "summary.json").write_text("{}")
+    (folder / "summary.json").write_text(json.dumps({"suite": suite}))
     return folder
 
 
@@ -49,6 +49,14 @@ class Results(unittest.TestCase):
         self.assertAlmostEqual(found.mean, 100 * (better.mean() - safe.mean()))
         self.assertLess(found.high - found.low, 6, "the episodes in common cancel")
         self.assertTrue(found.text(signed=True).startswith("+"))
+
+    def test_collected_outcomes_are_those_of_the_run(self):
+        before = load(run(self.folder / "a", np.random.default_rng(3).random((10, 5)) < 0.5))
+        (self.folder / "a" / "episodes.jsonl").unlink()
+        save(before, self.folder / "a")
+        after = load(self.folder / "a")
+        for key in ("task", "episode", "goal", "no_drop", "safety", "ratio", "stage"):
+            np.testing.assert_array_equal(getattr(before, key), getattr(after, key))
 
     def test_runs_that_cannot_be_compared_are_refused(self):
         safe = np.ones((10, 2), bool)

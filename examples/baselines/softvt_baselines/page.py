@@ -1,0 +1,171 @@
+"""The page of a study: collects its runs, and writes tables and figures of those that were collected."""
+
+import re
+import shutil
+from collections import defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from . import UserError, results
+from .results import Estimate, Run
+
+# The tables stand between these lines of the page.
+BEGIN, END = "<!-- tables: softvt-baselines page -->", "<!-- end of tables -->"
+LEARNED = re.compile(r"(?P<suite>\w+)-(?P<inputs>v[ot])-(?P<code>[a-z-]+)-s(?P<seed>\d+)-r(?P<replan>\d+)(?P<condition>\+.*)?")
+REFERENCES = {"expert": "expert (privileged)", "tactile-servo": "tactile servo (privileged)", "fixed-closure": "fixed closure (privileged)"}
+MEASURES = ["goal", "no_drop", "safety"]
+
+
+@dataclass(frozen=True, order=True)
+class Policy:
+    """What the runs of several training seeds have in common."""
+
+    suite: str
+    code: str
+    replan: int
+    inputs: str  # "vo", "vt"
+    condition: str = ""
+
+
+def collect(study: Path, into: Path) -> None:
+    """Copies the summaries and outcomes of the finished runs of a study. Raises UserError if there are none."""
+    found = sorted(study.glob("runs/**/summary.json"))
+    if not found:
+        raise UserError(f"{study}: no finished runs; softvt-baselines study makes them")
+    for summary in found:
+        if summary.parent.name == "softvtbench":
+            continue
+        name, *inner = summary.parent.relative_to(study / "runs").parts
+        # A run is in a folder of its suite; one of a condition also in one of the condition.
+        folder = into / "+".join([name, *inner[1:]])
+        folder.mkdir(parents=True, exist_ok=True)
+        shutil.copy(summary, folder)
+        results.save(results.load(summary.parent), folder)
+
+
+def _grouped(folder: Path) -> tuple[dict[Policy, list[Run]], dict[tuple[str, str], Run]]:
+    """The collected runs of learned policies by policy, and those of the references by suite and name."""
+    learned, references = defaultdict(list), {}
+    for path in sorted(folder.glob("*/summary.json")):
+        run = results.load(path.parent)
+        if found := LEARNED.fullmatch(run.name):
+            part = found.groupdict()
+            policy = Policy(part["suite"], part["code"], int(part["replan"]), part["inputs"], (part["condition"] or "")[1:])
+            learned[policy].append(run)
+        elif run.name.removeprefix(f"{run.suite}-") in REFERENCES:
+            references[run.suite, run.name.removeprefix(f"{run.suite}-")] = run
+        else:
+            raise UserError(f"{path.parent}: not named as a run of a study")
+    return learned, references
+
+
+def _table(heading: list[str], rows: list[list[str]]) -> str:
+    lines = [heading, ["---"] * len(heading), *rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines) + "\n"
+
+
+def _row(name: str, runs: list[Run], replan: str) -> list[str]:
+    ratio = np.concatenate([run.ratio for run in runs])
+    low, median, high = np.nanpercentile(np.minimum(ratio, 99), [5, 50, 95])
+    rates = [results.rate(runs, measure).text() for measure in MEASURES]
+    return [name, replan, str(len(runs)), str(len(runs[0].task)), *rates, f"{median:.2f} [{low:.2f}, {high:.2f}]"]
+
+
+def _name(policy: Policy) -> str:
+    return f"{policy.inputs.upper()}, {policy.code}"
+
+
+def _pairs(learned: dict[Policy, list[Run]]) -> list[tuple[Policy, list[Run], list[Run]]]:
+    """VO and VT of the same suite, grip code, replanning and condition, both with the same number of seeds."""
+    pairs = []
+    for policy, touch in sorted(learned.items()):
+        vision = learned.get(Policy(policy.suite, policy.code, policy.replan, "vo", policy.condition), [])
+        if policy.inputs == "vt" and len(vision) == len(touch):
+            pairs.append((policy, vision, touch))
+    return pairs
+
+
+def tables(folder: Path) -> str:
+    """All tables, in Markdown."""
+    learned, references = _grouped(folder)
+    text = ""
+    for suite in sorted({policy.suite for policy in learned} | {suite for suite, _ in references}):
+        text += f"### `{suite}`\n\n"
+        rows = [_row(_name(policy), runs, str(policy.replan)) for policy, runs in sorted(learned.items()) if (policy.suite, policy.condition) == (suite, "")]
+        rows += [_row(shown, [references[suite, name]], "") for name, shown in REFERENCES.items() if (suite, name) in references]
+        text += _table(["policy", "replan", "seeds", "episodes", "Goal, %", "NoDrop, %", "Safety, %", "D/τ"], rows)
+    differences = [
+        [f"`{policy.suite}`", policy.code, str(policy.replan), str(len(touch)), policy.condition or "none"]
+        + [results.difference(vision, touch, measure).text(signed=True) for measure in MEASURES]
+        for policy, vision, touch in _pairs(learned)
+    ]
+    if differences:
+        text += "### VT minus VO, on the same episodes\n\n"
+        text += _table(["suite", "grip code", "replan", "seeds", "shift", *(f"{measure}, points" for measure in ("Goal", "NoDrop", "Safety"))], differences)
+    return text
+
+
+def figure(folder: Path, path: Path) -> None:
+    """Goal and Safety of each policy with continuous closure, and the distribution of D/τ, by suite."""
+    import matplotlib
+
+    matplotlib.use("svg")
+    # Equal files for equal numbers.
+    matplotlib.rcParams.update({"svg.hashsalt": "softvt", "svg.fonttype": "none", "font.size": 8})
+    from matplotlib import pyplot
+
+    learned, references = _grouped(folder)
+    suites = sorted({policy.suite for policy in learned if not policy.condition})
+    if not suites:
+        raise UserError(f"{folder}: no runs of learned policies")
+    colours = {"goal": "#9db8d2", "safety": "#1f5a94"}
+    shown, axes = pyplot.subplots(2, len(suites), figsize=(3.6 * len(suites), 5), squeeze=False, layout="constrained")
+    for column, suite in enumerate(suites):
+        groups = {
+            f"{policy.inputs.upper()}, {policy.replan}": runs
+            for policy, runs in sorted(learned.items())
+            if (policy.suite, policy.code, policy.condition) == (suite, "continuous", "")
+        }
+        groups |= {name: [references[suite, name]] for name in REFERENCES if (suite, name) in references}
+        top, bottom = axes[0][column], axes[1][column]
+        for place, measure in enumerate(("goal", "safety")):
+            rates = [results.rate(runs, measure) for runs in groups.values()]
+            at = np.arange(len(rates)) + 0.4 * place - 0.2
+            top.bar(at, [rate.mean for rate in rates], 0.38, color=colours[measure], label=measure.capitalize())
+            top.errorbar(at, [rate.mean for rate in rates], _bars(rates), fmt="none", ecolor="black", elinewidth=0.8)
+        top.set(title=suite, ylim=(0, 105), ylabel="% of episodes")
+        top.set_xticks(range(len(groups)), groups, rotation=60, ha="right")
+        top.legend(loc="lower right")
+        for name, runs in groups.items():
+            ratio = np.sort(np.concatenate([run.ratio for run in runs]))
+            bottom.step(ratio, 100 * np.arange(1, len(ratio) + 1) / len(ratio), where="post", label=name, linewidth=1)
+        bottom.axvline(1, color="black", linewidth=0.8, linestyle=":")
+        bottom.set(xlim=(0, 3), ylim=(0, 100), xlabel="peak D/τ", ylabel="% of episodes below")
+        bottom.legend(fontsize=6)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    shown.savefig(path, metadata={"Date": None})
+    pyplot.close(shown)
+
+
+def _bars(rates: list[Estimate]) -> np.ndarray:
+    """Lengths of error bars below and above."""
+    return np.array([[rate.mean - rate.low for rate in rates], [rate.high - rate.mean for rate in rates]]).clip(min=0)
+
+
+def write(studies: list[Path], docs: Path) -> None:
+    """Collects studies into DOCS/baselines, and writes the tables into DOCS/baselines.md and the figure beside the other images.
+
+    Raises UserError if the page has no place for the tables.
+    """
+    page, folder = docs / "baselines.md", docs / "baselines"
+    text = page.read_text() if page.is_file() else f"{BEGIN}\n{END}\n"
+    if not (text.count(BEGIN) == text.count(END) == 1 and text.index(BEGIN) < text.index(END)):
+        raise UserError(f"{page}: expected the lines {BEGIN} and {END} once each, around the tables")
+    for study in studies:
+        collect(study, folder)
+    found = tables(folder)
+    figure(folder, docs / "images" / "baselines.svg")
+    before, after = text.split(BEGIN)[0], text.split(END)[1]
+    page.write_text(f"{before}{BEGIN}\n\n{found}{END}{after}")

@@ -1,0 +1,62 @@
+"""The page of a study."""
+
+import tempfile
+import unittest
+from pathlib import Path
+
+import numpy as np
+from test_results import run
+
+from softvt_baselines import UserError, page
+
+
+class Pages(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.study, self.docs = Path(scratch.name) / "study", Path(scratch.name) / "docs"
+        self.docs.mkdir()
+        random = np.random.default_rng(0)
+        for inputs, rate in (("vo", 0.5), ("vt", 0.9)):
+            for seed in range(2):
+                self.run_of(f"one-{inputs}-continuous-s{seed}-r4/one", random.random((10, 5)) < rate)
+        self.run_of("one-expert", np.ones((10, 5), bool))
+
+    def run_of(self, path: str, safe: np.ndarray) -> None:
+        folder = self.study / "runs" / path
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        run(folder, safe, suite="one")
+
+    def test_tables_and_figure_are_repeatable_from_what_was_collected(self):
+        (self.docs / "baselines.md").write_text(f"before\n{page.BEGIN}\nold\n{page.END}\nafter\n")
+        page.write([self.study], self.docs)
+        text = (self.docs / "baselines.md").read_text()
+        self.assertTrue(text.startswith("before\n") and text.endswith("after\n") and "old" not in text)
+        self.assertIn("| VT, continuous | 4 | 2 | 50 | 100.0 [100.0, 100.0] |", text)
+        self.assertIn("| expert (privileged) |  | 1 | 50 | 100.0", text)
+        difference = text.split("VT minus VO")[1]
+        self.assertIn("| `one` | continuous | 4 | 2 | none | +0.0 [+0.0, +0.0] |", difference)
+        figure = (self.docs / "images" / "baselines.svg").read_bytes()
+        page.write([], self.docs)
+        self.assertEqual((self.docs / "baselines.md").read_text(), text)
+        self.assertEqual((self.docs / "images" / "baselines.svg").read_bytes(), figure)
+
+    def test_runs_under_a_condition_are_rows_of_their_own(self):
+        for inputs in ("vo", "vt"):
+            self.run_of(f"one-{inputs}-continuous-s0-r4/shifts/light x2", np.ones((10, 5), bool))
+        page.collect(self.study, self.docs)
+        text = page.tables(self.docs)
+        self.assertIn("| `one` | continuous | 4 | 1 | light x2 |", text)
+
+    def test_what_is_missing_is_named(self):
+        with self.assertRaises(UserError) as caught:
+            page.write([self.docs], self.docs)
+        self.assertIn("no finished runs", str(caught.exception))
+        (self.docs / "baselines.md").write_text("no place")
+        with self.assertRaises(UserError) as caught:
+            page.write([self.study], self.docs)
+        self.assertIn(page.BEGIN, str(caught.exception))
+
+
+if __name__ == "__main__":
+    unittest.main()
