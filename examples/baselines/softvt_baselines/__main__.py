@@ -25,8 +25,9 @@ def _train(args: argparse.Namespace) -> None:
     device = device_of(args.device)
     if args.edge % 32:
         raise UserError(f"--edge {args.edge}: expected a multiple of 32 pixels")
-    shape = Shape(has_touch=args.touch, head=args.head, frames=args.frames, edge=args.edge)
-    demos = load(args.recordings, args.gripper, args.edge)
+    inputs = {"has_touch": args.touch or args.tactile_pictures, "has_tactile_pictures": args.tactile_pictures}
+    shape = Shape(**inputs, head=args.head, frames=args.frames, edge=args.edge)
+    demos = load(args.recordings, args.gripper, args.edge, args.tactile_pictures)
     options = TrainOptions(shape, args.gripper, args.steps, args.batch, args.seed, device, args.compile)
     train(demos, options, args.out, {"recordings": [recording.name for recording in args.recordings]})
 
@@ -91,6 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     train.add_argument("recordings", type=Path, nargs="+", help="folders of softvt record")
     train.add_argument("--out", type=Path, required=True, help="checkpoint to write")
     train.add_argument("--touch", action="store_true", help="give the policy the markers of both fingers")
+    train.add_argument("--tactile-pictures", action="store_true", help="give it the markers and the tactile pictures of both fingers")
     train.add_argument("--gripper", default="continuous", choices=CODES, help="grip code")
     train.add_argument("--head", default="regression", choices=["regression", "flow"], help="how actions are predicted")
     train.add_argument("--frames", type=int, default=1, choices=[1, 2], help="control steps whose pictures and states the policy sees")

@@ -20,8 +20,9 @@ from .numbers import Standard, fold, mean_axis, reference
 
 # The grip codes and the streams that hold the actions in them.
 ACTIONS = {"continuous": "actions", "binary": "actions_binary", "two-width": "actions_two_width", "force": "actions_force"}
-# Pictures by their keys in an observation, and their streams.
+# Pictures by their keys in an observation, and their streams: of the cameras, and of the tactile sensors.
 CAMERAS = {"image": "agentview_rgb", "wrist_image": "eye_in_hand_rgb"}
+TACTILE = {"left_tactile_image": "gsmini_left_tactile_rgb", "right_tactile_image": "gsmini_right_tactile_rgb"}
 # Motion below which a step is idle: of the position (m), of the rotation vector (rad), and of the gripper as a share of its range in
 # the recording.
 IDLE_MOTION, IDLE_TURN, IDLE_GRIP = 0.0005, 0.005, 0.002
@@ -35,7 +36,7 @@ MARKERS = 2 * 99 * 2
 class Demonstrations:
     """All demonstrations, one after the other: M recorded steps, of which N are trained on."""
 
-    pictures: dict[str, np.ndarray]  # per camera (M, edge, edge, 3) uint8
+    pictures: dict[str, np.ndarray]  # per key (M, edge, edge, 3) uint8
     state: np.ndarray  # (M, 7): tool position (m), rotation vector, finger position (m); folded
     markers: np.ndarray  # (M, 396) px: displacements of the markers of both fingers
     actions: np.ndarray  # (N, 7): tool position, rotation vector, gripper in the grip code; folded
@@ -85,6 +86,7 @@ class _Job:
     row: int
     folder: Path
     edge: int
+    streams: dict[str, str]  # of pictures, by key
 
 
 def _pack_one(job: _Job) -> dict[str, np.ndarray | str]:
@@ -93,10 +95,10 @@ def _pack_one(job: _Job) -> dict[str, np.ndarray | str]:
     with h5py.File(job.file) as file:
         demo = file["data"][job.name]
         obs = demo["obs"]
-        if missing := [stream for stream in CAMERAS.values() if stream not in obs]:
+        if missing := [stream for stream in job.streams.values() if stream not in obs]:
             raise UserError(f"{job.file}: {job.name} has no pictures ({', '.join(missing)}): it was recorded with --images video")
-        for camera, stream in CAMERAS.items():
-            np.load(job.folder / f"{camera}.npy", mmap_mode="r+")[rows] = shrink(obs[stream][:], job.edge)
+        for key, stream in job.streams.items():
+            np.load(job.folder / f"{key}.npy", mmap_mode="r+")[rows] = shrink(obs[stream][:], job.edge)
         actions = {stream: demo[stream][:].astype(np.float32) for stream in ACTIONS.values() if stream in demo}
         return actions | {
             "state": obs["state"][:].astype(np.float32),
@@ -115,8 +117,9 @@ def _demonstrations(recording: Path) -> list[tuple[Path, str, int]]:
     return found
 
 
-def pack(recording: Path, edge: int, processes: int) -> Path:
-    """Packs a recording unless that was done before. Returns the folder of the packed files.
+def pack(recording: Path, edge: int, processes: int, has_tactile: bool = False) -> Path:
+    """Packs a recording, with its tactile pictures if they are asked for, unless that was done before. Returns the folder of the
+    packed files.
 
     Raises UserError if the recording is incomplete or has no pictures.
     """
@@ -124,7 +127,8 @@ def pack(recording: Path, edge: int, processes: int) -> Path:
     if not card.is_file():
         raise UserError(f"{recording} is no complete recording of softvt: it has no dataset.json")
     identity = hashlib.sha256(card.read_bytes()).hexdigest()
-    folder = recording / f"packed_{edge}"
+    streams = CAMERAS | TACTILE if has_tactile else CAMERAS
+    folder = recording / (f"packed_{edge}_tactile" if has_tactile else f"packed_{edge}")
     if (folder / "identity").is_file() and (folder / "identity").read_text() == identity:
         return folder
     demos = _demonstrations(recording)
@@ -133,9 +137,9 @@ def pack(recording: Path, edge: int, processes: int) -> Path:
     folder.mkdir(exist_ok=True)
     (folder / "identity").unlink(missing_ok=True)
     ends = np.cumsum([steps for _, _, steps in demos])
-    for camera in CAMERAS:
-        np.lib.format.open_memmap(folder / f"{camera}.npy", "w+", np.uint8, (int(ends[-1]), edge, edge, 3))
-    jobs = [_Job(path, name, steps, int(end) - steps, folder, edge) for (path, name, steps), end in zip(demos, ends)]
+    for key in streams:
+        np.lib.format.open_memmap(folder / f"{key}.npy", "w+", np.uint8, (int(ends[-1]), edge, edge, 3))
+    jobs = [_Job(path, name, steps, int(end) - steps, folder, edge, streams) for (path, name, steps), end in zip(demos, ends)]
     with ProcessPoolExecutor(processes) as pool:
         numbers = list(pool.map(_pack_one, jobs))
     streams = set.intersection(*(set(one) for one in numbers)) - {"prompt"}
@@ -155,12 +159,12 @@ def _check_grip_code(recording: Path, code: str, packed) -> None:
         raise UserError(f"{recording} has no {ACTIONS[code]}, the actions in the grip code {code}: record it again")
 
 
-def load(recordings: list[Path], code: str, edge: int) -> Demonstrations:
-    """Reads all demonstrations of recordings.
+def load(recordings: list[Path], code: str, edge: int, has_tactile: bool = False) -> Demonstrations:
+    """Reads all demonstrations of recordings, with their tactile pictures if they are asked for.
 
     Raises UserError if a recording is incomplete, or lacks the pictures or the grip code.
     """
-    folders = [pack(recording, edge, os.cpu_count() or 1) for recording in recordings]
+    folders = [pack(recording, edge, os.cpu_count() or 1, has_tactile) for recording in recordings]
     packed = [np.load(folder / "numbers.npz") for folder in folders]
     for recording, numbers in zip(recordings, packed):
         _check_grip_code(recording, code, numbers)
@@ -168,8 +172,8 @@ def load(recordings: list[Path], code: str, edge: int) -> Demonstrations:
     def joined(stream: str) -> np.ndarray:
         return np.concatenate([numbers[stream] for numbers in packed])
 
-    def pictures(camera: str) -> np.ndarray:
-        mapped = [np.load(folder / f"{camera}.npy", mmap_mode="r") for folder in folders]
+    def pictures(key: str) -> np.ndarray:
+        mapped = [np.load(folder / f"{key}.npy", mmap_mode="r") for folder in folders]
         return mapped[0] if len(mapped) == 1 else np.concatenate(mapped)
 
     recorded, names, actions = joined("lengths"), joined("prompts"), joined(ACTIONS[code])
@@ -180,7 +184,7 @@ def load(recordings: list[Path], code: str, edge: int) -> Demonstrations:
     kept, lengths = np.concatenate(moving), np.array([mask.sum() for mask in moving])
     prompts = sorted(set(names.tolist()))
     return Demonstrations(
-        pictures={camera: pictures(camera) for camera in CAMERAS},
+        pictures={key: pictures(key) for key in (CAMERAS | TACTILE if has_tactile else CAMERAS)},
         state=fold(joined("state"), axis),
         markers=joined("markers"),
         actions=actions[kept],

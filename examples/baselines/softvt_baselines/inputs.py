@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from . import UserError, prompts
-from .data import CAMERAS, Statistics, shrink
+from .data import CAMERAS, TACTILE, Statistics, shrink
 from .numbers import fold, reference
 
 # Row of tactile_marker_motion (9, 198, 2) with the present positions; row 0 has the initial ones.
@@ -17,7 +17,7 @@ NOW = 8
 class Shape:
     """Inputs and size of a network."""
 
-    has_touch: bool
+    has_touch: bool  # the markers of both fingers
     head: str = "regression"  # or "flow"
     frames: int = 1  # control steps whose pictures and states are seen
     edge: int = 128  # pixels of a picture
@@ -27,15 +27,23 @@ class Shape:
     action: int = 7
     state: int = 7
     marker_steps: tuple[int, ...] = (4, 0)  # steps before the present one whose markers are seen
+    has_tactile_pictures: bool = False  # besides the markers
 
     def to_dict(self) -> dict:
         return asdict(self)
 
     @property
+    def pictures(self) -> list[str]:
+        """Keys of the pictures."""
+        return [*CAMERAS, *TACTILE] if self.has_tactile_pictures else [*CAMERAS]
+
+    @property
     def profile(self) -> str:
         """The profile of softvt with these inputs: a name, or a file."""
-        name = "visuo_tactile" if self.has_touch else "vision"
-        return name if self.frames == 1 else str(Path(__file__).parent / "profiles" / f"{name}_history.lua")
+        name = "tactile_pictures" if self.has_tactile_pictures else "visuo_tactile" if self.has_touch else "vision"
+        if self.frames == 1 and not self.has_tactile_pictures:
+            return name
+        return str(Path(__file__).parent / "profiles" / (f"{name}_history.lua" if self.frames > 1 else f"{name}.lua"))
 
 
 def read(obs: dict, shape: Shape, statistics: Statistics, vocabulary: prompts.Vocabulary) -> dict[str, np.ndarray]:
@@ -44,7 +52,7 @@ def read(obs: dict, shape: Shape, statistics: Statistics, vocabulary: prompts.Vo
 
     Raises UserError if an entry is missing or has another shape, or the prompt was not trained.
     """
-    needed = [*CAMERAS, "state", "prompt", "softvt"] + ["tactile_marker_motion"] * shape.has_touch
+    needed = [*shape.pictures, "state", "prompt", "softvt"] + ["tactile_marker_motion"] * shape.has_touch
     if missing := [key for key in needed if key not in obs]:
         raise UserError(f"the observation has no {', '.join(missing)}; use the profile {shape.profile}")
     if problem := vocabulary.problem(obs["prompt"]):
@@ -59,7 +67,7 @@ def read(obs: dict, shape: Shape, statistics: Statistics, vocabulary: prompts.Vo
             raise UserError(f"{key} has the shape {np.shape(obs[key])}, expected {expected}; use the profile {shape.profile}")
         return array
 
-    inputs = {camera: shrink(frames(camera, 3), shape.edge)[None] for camera in CAMERAS}
+    inputs = {key: shrink(frames(key, 3), shape.edge)[None] for key in shape.pictures}
     states = fold(frames("state", 1)[None], statistics.axis)
     inputs["state"], inputs["reference"] = statistics.state.apply(states), reference(states[:, -1:])
     inputs["prompt"] = np.array([prompts.encode(obs["prompt"])])

@@ -9,7 +9,7 @@ from torch import Tensor, nn
 from torchvision.models import resnet18
 
 from . import prompts
-from .data import CAMERAS, MARKERS
+from .data import MARKERS
 from .inputs import Shape
 
 # Steps of the integration of a flow.
@@ -29,9 +29,9 @@ class Tokens(nn.Module):
         super().__init__()
         self.shape = shape
         width, cells = shape.width, (shape.edge // 32) ** 2
-        self.cameras = nn.ModuleDict({camera: _pictures_encoder() for camera in CAMERAS})
-        self.project = nn.ModuleDict({camera: nn.Linear(512, width) for camera in CAMERAS})
-        self.place = nn.ParameterDict({camera: nn.Parameter(0.02 * torch.randn(shape.frames, cells, width)) for camera in CAMERAS})
+        self.pictures = nn.ModuleDict({key: _pictures_encoder() for key in shape.pictures})
+        self.project = nn.ModuleDict({key: nn.Linear(512, width) for key in shape.pictures})
+        self.place = nn.ParameterDict({key: nn.Parameter(0.02 * torch.randn(shape.frames, cells, width)) for key in shape.pictures})
         self.state = nn.Sequential(nn.Linear(shape.state, width), nn.GELU(), nn.Linear(width, width))
         self.state_place = nn.Parameter(0.02 * torch.randn(shape.frames, width))
         # N-grams that were never trained add nothing, since all start at zero.
@@ -46,11 +46,11 @@ class Tokens(nn.Module):
         """Tokens (B, T, width) of pictures (B, frames, edge, edge, 3) uint8, standardised states (B, frames, 7), prompt
         buckets (B, L), and with touch scaled markers (B, steps, 396)."""
         tokens = []
-        for camera, net in self.cameras.items():
-            batch, frames = obs[camera].shape[:2]
-            planes = obs[camera].flatten(0, 1).permute(0, 3, 1, 2).float() / 127.5 - 1
+        for key, net in self.pictures.items():
+            batch, frames = obs[key].shape[:2]
+            planes = obs[key].flatten(0, 1).permute(0, 3, 1, 2).float() / 127.5 - 1
             cells = net(planes.contiguous(memory_format=torch.channels_last)).flatten(2).transpose(1, 2)
-            cells = self.project[camera](cells).unflatten(0, (batch, frames)) + self.place[camera]
+            cells = self.project[key](cells).unflatten(0, (batch, frames)) + self.place[key]
             tokens.append(cells.flatten(1, 2))
         tokens.append(self.state(obs["state"]) + self.state_place)
         tokens.append(self.prompt(self.ngrams(obs["prompt"])).unsqueeze(1))

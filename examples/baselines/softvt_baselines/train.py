@@ -12,7 +12,7 @@ from torch import Tensor
 
 from . import prompts
 from .checkpoint import Checkpoint, save
-from .data import CAMERAS, Demonstrations, Statistics
+from .data import Demonstrations, Statistics
 from .inputs import Shape
 from .model import Policy
 from .numbers import reference
@@ -45,7 +45,7 @@ class Batches:
             return torch.tensor(array, device=options.device)
 
         self.shape, self.device = options.shape, options.device
-        self.pictures = {camera: on_device(demos.pictures[camera]) for camera in CAMERAS}
+        self.pictures = {key: on_device(demos.pictures[key]) for key in options.shape.pictures}
         self.state, self.actions = on_device(demos.state), on_device(demos.actions)
         self.state_mean, self.state_std = on_device(statistics.state.mean), on_device(statistics.state.std)
         self.action_mean, self.action_std = on_device(statistics.action.mean), on_device(statistics.action.std)
@@ -76,10 +76,10 @@ class Batches:
         steps = torch.randint(len(self.actions), (count,), generator=self.random, device=self.device)
         frames = self._past(steps, tuple(range(self.shape.frames - 1, -1, -1)))
         obs = {"prompt": self.prompts[self.prompt[steps]]}
-        for camera, pictures in self.pictures.items():
+        for key, pictures in self.pictures.items():
             shifted = self._shifted(pictures[frames])
             light = 1 + BRIGHTNESS * (2 * torch.rand((count, 1, 1, 1, 1), generator=self.random, device=self.device) - 1)
-            obs[camera] = (shifted * light).clamp(0, 255).byte()
+            obs[key] = (shifted * light).clamp(0, 255).byte()
         noise = torch.randn((count, 1, self.shape.state), generator=self.random, device=self.device)
         states = self.state[frames] + self.noise * noise
         obs["state"] = (states - self.state_mean) / self.state_std

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 
 from softvt_baselines import UserError, prompts
-from softvt_baselines.data import ACTIONS, CAMERAS, Statistics, displacements, load, moving_steps, shrink
+from softvt_baselines.data import ACTIONS, CAMERAS, TACTILE, Statistics, displacements, load, moving_steps, shrink
 from softvt_baselines.inputs import Shape, read
 from softvt_baselines.numbers import Standard, fold, mean_axis, reference
 
@@ -34,6 +34,7 @@ def recording(folder: Path, demos: int = 2, without: tuple[str, ...] = (), gripp
             actions = np.zeros((STEPS, 7))
             actions[:, 0], actions[:, 3], actions[:, 6] = 0.01 * np.arange(STEPS), 3.1, 0.1 * index
             streams = {f"obs/{stream}": np.full((STEPS, 8, 8, 3), 10 * index, np.uint8) for stream in CAMERAS.values()}
+            streams |= {f"obs/{stream}": np.full((STEPS, 6, 8, 3), 20 * index, np.uint8) for stream in TACTILE.values()}
             streams |= {stream: actions for stream in ACTIONS.values()}
             streams["obs/state"] = actions
             streams["obs/gripper_marker_motion"] = np.zeros((STEPS, 2, 2, 99, 2), np.float32)

@@ -10,7 +10,7 @@ from test_data import recording
 
 from softvt_baselines import UserError
 from softvt_baselines.checkpoint import device_of, load
-from softvt_baselines.data import CAMERAS
+from softvt_baselines.data import CAMERAS, TACTILE
 from softvt_baselines.data import load as load_demonstrations
 from softvt_baselines.infer import Answering
 from softvt_baselines.inputs import Shape
@@ -24,7 +24,7 @@ class Policies(unittest.TestCase):
         scratch = tempfile.TemporaryDirectory()
         self.addCleanup(scratch.cleanup)
         self.folder = Path(scratch.name)
-        self.demos = load_demonstrations([recording(self.folder / "data")], "continuous", 32)
+        self.demos = load_demonstrations([recording(self.folder / "data")], "continuous", 32, has_tactile=True)
 
     def trained(self, shape: Shape) -> Path:
         path = self.folder / "policy.pt"
@@ -35,13 +35,18 @@ class Policies(unittest.TestCase):
         random = np.random.default_rng(seed)
         frames = () if shape.frames == 1 else (shape.frames,)
         obs = {camera: random.integers(0, 255, (*frames, 32, 32, 3), np.uint8) for camera in CAMERAS}
+        obs |= {key: random.integers(0, 255, (*frames, 24, 32, 3), np.uint8) for key in TACTILE}
         state = np.broadcast_to(np.array([0, 0, 0, 3.1, 0, 0, 0.04], np.float32), (*frames, 7))
         motion = random.normal(0, 1, (9, 198, 2)).astype(np.float32)
         return obs | {"state": state, "prompt": "pick up the left bun", "softvt": {"seed": seed}, "tactile_marker_motion": motion}
 
     def test_every_kind_of_policy_trains_and_answers_whatever_else_is_in_the_batch(self):
-        for has_touch, head, frames in [(False, "regression", 1), (True, "regression", 1), (True, "flow", 2)]:
-            shape = Shape(has_touch, head, frames, edge=32, chunk=5, width=32, layers=1)
+        for has_touch, head, frames, has_pictures in [
+            (False, "regression", 1, False),
+            (True, "regression", 1, True),
+            (True, "flow", 2, False),
+        ]:
+            shape = Shape(has_touch, head, frames, edge=32, chunk=5, width=32, layers=1, has_tactile_pictures=has_pictures)
             answering = Answering(load(self.trained(shape), CPU), CPU)
             observations = [self.observation(shape, seed) for seed in range(5)]
             together = answering(observations)
