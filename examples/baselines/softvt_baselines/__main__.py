@@ -40,7 +40,7 @@ def _serve(args: argparse.Namespace) -> None:
     device = device_of(args.device)
     checkpoint = load(args.checkpoint, device)
     metadata = {"gripper": checkpoint.code, "profile": checkpoint.policy.shape.profile, "trained": checkpoint.about}
-    asyncio.run(serve(Answering(checkpoint, device), BATCH, metadata, args.host, args.port))
+    asyncio.run(serve(Answering(checkpoint, device, args.blend), BATCH, metadata, args.host, args.port))
 
 
 def _evaluate(args: argparse.Namespace) -> None:
@@ -50,7 +50,7 @@ def _evaluate(args: argparse.Namespace) -> None:
     device_of(args.device)
     checkpoint = load(args.checkpoint, device_of("cpu"))
     shape, name = checkpoint.policy.shape, args.name or args.checkpoint.stem
-    evaluate(Evaluation(args.checkpoint, shape, checkpoint.code, args.scripts, name, args.out, args.flags, args.device))
+    evaluate(Evaluation(args.checkpoint, shape, checkpoint.code, args.scripts, name, args.out, args.flags, args.device, args.blend))
 
 
 def _study(args: argparse.Namespace) -> None:
@@ -77,6 +77,9 @@ def _parser() -> argparse.ArgumentParser:
 
     def with_device(sub: argparse.ArgumentParser) -> None:
         sub.add_argument("--device", default="cuda", help="device of torch; cpu for a small trial")
+
+    def with_blend(sub: argparse.ArgumentParser) -> None:
+        sub.add_argument("--blend", type=float, default=0.5, help="share of the actions planned before in those of an answer, 0 to 1")
 
     def with_disturbance(sub: argparse.ArgumentParser) -> None:
         sub.add_argument("--disturbance", type=float, default=0.002, help="random deviation of the robot while recording, m")
@@ -108,6 +111,7 @@ def _parser() -> argparse.ArgumentParser:
     serve.add_argument("--host", default="127.0.0.1")
     serve.add_argument("--port", type=int, default=8000, help="0 takes a free one")
     with_device(serve)
+    with_blend(serve)
 
     evaluate = command("evaluate", _evaluate, "serve a checkpoint and evaluate it on suites of softvt")
     evaluate.add_argument("checkpoint", type=Path)
@@ -115,6 +119,7 @@ def _parser() -> argparse.ArgumentParser:
     evaluate.add_argument("--out", type=Path, required=True, help="folder of the runs")
     evaluate.add_argument("--name", help="name of the policy in results; by default that of the checkpoint")
     with_device(evaluate)
+    with_blend(evaluate)
 
     study = command("study", _study, "record, train and evaluate every combination of suites, inputs, grip codes and seeds")
     study.add_argument("suites", nargs="+", help="names of standard suites")
@@ -130,6 +135,7 @@ def _parser() -> argparse.ArgumentParser:
     study.add_argument("--episodes", type=int, default=50, help="episodes per task")
     study.add_argument("--edge", type=int, default=128, help="width and height of the pictures, pixels")
     with_disturbance(study)
+    with_blend(study)
     study.add_argument("--compile", action="store_true", help="compile the networks")
     study.add_argument("--per-gpu", type=int, default=1, help="policies that are trained on one GPU at a time")
 

@@ -39,9 +39,9 @@ def recording_flags(demos: int, edge: int, disturbance: float) -> list[str]:
 
 
 @contextmanager
-def served(path: Path, device: str):
+def served(path: Path, device: str, blend: float):
     """A server of a checkpoint in a process of its own; gives its address."""
-    words = [sys.executable, "-m", "softvt_baselines", "serve", str(path), "--device", device, "--port", "0"]
+    words = [sys.executable, "-m", "softvt_baselines", "serve", str(path), "--device", device, "--blend", str(blend), "--port", "0"]
     server = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
     try:
         for line in server.stdout:
@@ -66,11 +66,12 @@ class Evaluation:
     out: Path
     flags: list[str]  # further flags of softvt
     device: str
+    blend: float  # share of the last answer in the next one
 
 
 def evaluate(one: Evaluation) -> None:
     """Evaluates a checkpoint on all scripts, each in a folder below `out`."""
     own = ["--profile", one.shape.profile, "--gripper", one.code, "--name", one.name, *camera_flags(one.shape.edge)]
-    with served(one.checkpoint, one.device) as address:
+    with served(one.checkpoint, one.device, one.blend) as address:
         for script in one.scripts:
             run_softvt([script, "--policy", address, *own, "--out", str(one.out / Path(script).stem), *one.flags])

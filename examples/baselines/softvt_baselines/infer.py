@@ -6,34 +6,50 @@ import torch
 from . import UserError, prompts
 from .checkpoint import Checkpoint
 from .inputs import read
+from .serve import Plan, Request
 
 BATCH = 16  # observations that are answered together
 
 
+def blended(actions: np.ndarray, step: int, last: Plan | None, share: float) -> np.ndarray:
+    """Actions (chunk, 7) from a step on, with a share of those that the last answer had planned for the same steps.
+
+    A policy that plans anew every few steps then moves without jerks, as with the temporal ensemble of ACT (Zhao et al., 2023).
+    """
+    if last is None or not 0 < step - last.step < len(last.actions):
+        return actions
+    planned, found = last.actions[step - last.step :], actions.copy()
+    found[: len(planned)] += share * (planned - found[: len(planned)])
+    return found
+
+
 class Answering:
-    """Runs a checkpoint.
+    """Runs a checkpoint. `blend` is the share of the last answer in the next one.
 
     Every batch has the same size, padded with copies, and kernels are deterministic: an answer does not depend on the other
     observations that are answered with it, so that runs are repeatable to the byte.
     """
 
-    def __init__(self, checkpoint: Checkpoint, device: torch.device):
-        self.checkpoint, self.device = checkpoint, device
+    def __init__(self, checkpoint: Checkpoint, device: torch.device, blend: float = 0.0):
+        self.checkpoint, self.device, self.blend = checkpoint, device, blend
         self.vocabulary = prompts.Vocabulary(checkpoint.prompts)
         torch.backends.cudnn.benchmark = False
         torch.backends.cudnn.deterministic = True
 
-    def __call__(self, batch: list[dict]) -> list[np.ndarray | UserError]:
-        """A chunk (chunk, 7) per observation, or the reason why there is none; at most BATCH observations."""
+    def __call__(self, batch: list[Request]) -> list[np.ndarray | UserError]:
+        """A chunk (chunk, 7) per request, or the reason why there is none; at most BATCH requests."""
         inputs: list[dict | UserError] = []
-        for obs in batch:
+        for request in batch:
             try:
-                inputs.append(read(obs, self.checkpoint.policy.shape, self.checkpoint.statistics, self.vocabulary))
+                inputs.append(read(request.obs, self.checkpoint.policy.shape, self.checkpoint.statistics, self.vocabulary))
             except UserError as error:
                 inputs.append(error)
         valid = [one for one in inputs if isinstance(one, dict)]
         chunks = iter(self._chunks(valid) if valid else [])
-        return [next(chunks) if isinstance(one, dict) else one for one in inputs]
+        return [
+            blended(next(chunks), request.obs["softvt"]["step"], request.last, self.blend) if isinstance(one, dict) else one
+            for request, one in zip(batch, inputs)
+        ]
 
     def _chunks(self, inputs: list[dict[str, np.ndarray]]) -> np.ndarray:
         padded = inputs + inputs[:1] * (BATCH - len(inputs))

@@ -55,7 +55,8 @@ class Tokens(nn.Module):
         tokens.append(self.state(obs["state"]) + self.state_place)
         tokens.append(self.prompt(self.ngrams(obs["prompt"])).unsqueeze(1))
         if self.shape.has_touch:
-            tokens.append(self.touch(obs["markers"]) + self.touch_place)
+            # A firm grasp moves the markers ten times as far as a first contact, which is to be seen as well.
+            tokens.append(self.touch(obs["markers"].asinh()) + self.touch_place)
         return torch.cat(tokens, 1)
 
 

@@ -4,7 +4,7 @@ import re
 import zlib
 
 # Number of buckets, and of n-grams that are kept of a prompt. Bucket 0 is padding.
-BUCKETS, LENGTH = 16384, 64
+BUCKETS, LENGTH = 4096, 64
 
 
 def words(prompt: str) -> list[str]:

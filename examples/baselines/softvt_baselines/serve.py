@@ -15,13 +15,31 @@ from websockets.exceptions import ConnectionClosed
 
 from . import UserError
 
-# Answers a batch of observations: a chunk of actions each, or an error for its client.
-Answers = Callable[[list[dict]], list[np.ndarray | UserError]]
 
 
 @dataclass
-class _Request:
+class Plan:
+    """The last answer of a connection, which runs one episode after the other."""
+
+    step: int  # control step of its first action
+    actions: np.ndarray  # (chunk, 7)
+
+
+@dataclass
+class Request:
+    """An observation, and the answer to the one before it; None at the start of an episode."""
+
     obs: dict
+    last: Plan | None
+
+
+# Answers a batch of requests: a chunk of actions each, or an error for its client.
+Answers = Callable[[list[Request]], list[np.ndarray | UserError]]
+
+
+@dataclass
+class _Pending:
+    request: Request
     answer: asyncio.Future
 
 
@@ -30,27 +48,31 @@ async def _answer_all(queue: asyncio.Queue, answers: Answers, batch_size: int) -
         batch = [await queue.get()]
         while len(batch) < batch_size and not queue.empty():
             batch.append(queue.get_nowait())
-        found = await asyncio.to_thread(answers, [request.obs for request in batch])
-        for request, answer in zip(batch, found, strict=True):
-            if not request.answer.cancelled():
-                request.answer.set_result(answer)
+        found = await asyncio.to_thread(answers, [pending.request for pending in batch])
+        for pending, answer in zip(batch, found, strict=True):
+            if not pending.answer.cancelled():
+                pending.answer.set_result(answer)
 
 
 async def serve(answers: Answers, batch_size: int, metadata: dict, host: str, port: int) -> None:
     """Serves until it is cancelled. Port 0 takes a free one; the first line of output names it."""
-    queue: asyncio.Queue[_Request] = asyncio.Queue()
+    queue: asyncio.Queue[_Pending] = asyncio.Queue()
 
     async def converse(socket) -> None:
+        last = None
         try:
             await socket.send(msgpack_numpy.packb(metadata))
             async for message in socket:
-                request = _Request(msgpack_numpy.unpackb(message), asyncio.get_running_loop().create_future())
-                await queue.put(request)
-                answer = await request.answer
+                obs = msgpack_numpy.unpackb(message)
+                step = obs.get("softvt", {}).get("step", 0)
+                pending = _Pending(Request(obs, last if step > 0 else None), asyncio.get_running_loop().create_future())
+                await queue.put(pending)
+                answer = await pending.answer
                 if isinstance(answer, UserError):
                     await socket.send(str(answer))  # text is an error message
                     return
                 await socket.send(msgpack_numpy.packb({"actions": answer}))
+                last = Plan(step, answer)
         except ConnectionClosed:
             return
         except Exception:

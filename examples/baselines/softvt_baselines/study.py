@@ -38,6 +38,7 @@ class Study:
     episodes: int
     edge: int = 128
     disturbance: float = 0.002  # m
+    blend: float = 0.5  # share of the last answer in the next one
     per_gpu: int = 1  # policies that are trained on one GPU at a time
     shifts: bool = False  # evaluate also under the standard conditions of suites/shifts.lua, with the first of `replans`
     references: tuple[str, ...] = ()  # built-in policies that are evaluated as well
@@ -80,7 +81,7 @@ def _train(job: Job, study: Study, gpu: int | None) -> None:
 def _evaluate(job: Job, replan: int, script: str, study: Study, threads: int, gpu: int | None) -> None:
     name = f"{job.name}-r{replan}"
     words = ["evaluate", str(study.out / "checkpoints" / f"{job.name}.pt"), f"suites/{script}.lua"]
-    words += ["--out", str(study.out / "runs" / name), "--name", name, "--device", _device(gpu)]
+    words += ["--out", str(study.out / "runs" / name), "--name", name, "--device", _device(gpu), "--blend", str(study.blend)]
     flags = ["--replan", str(replan), "--episodes", str(study.episodes), "--threads", str(threads), "--resume", *study.flags]
     flags += ["--suite", job.suite] * (script == SHIFTS)
     _call([*words, "--", *flags], study.out / "logs" / f"{name}-{script}.log", gpu)

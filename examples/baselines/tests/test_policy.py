@@ -12,8 +12,9 @@ from softvt_baselines import UserError
 from softvt_baselines.checkpoint import device_of, load
 from softvt_baselines.data import CAMERAS, TACTILE
 from softvt_baselines.data import load as load_demonstrations
-from softvt_baselines.infer import Answering
+from softvt_baselines.infer import Answering, blended
 from softvt_baselines.inputs import Shape
+from softvt_baselines.serve import Plan, Request
 from softvt_baselines.train import TrainOptions, train
 
 CPU = torch.device("cpu")
@@ -38,7 +39,7 @@ class Policies(unittest.TestCase):
         obs |= {key: random.integers(0, 255, (*frames, 24, 32, 3), np.uint8) for key in TACTILE}
         state = np.broadcast_to(np.array([0, 0, 0, 3.1, 0, 0, 0.04], np.float32), (*frames, 7))
         motion = random.normal(0, 1, (9, 198, 2)).astype(np.float32)
-        return obs | {"state": state, "prompt": "pick up the left bun", "softvt": {"seed": seed}, "tactile_marker_motion": motion}
+        return obs | {"state": state, "prompt": "pick up the left bun", "softvt": {"seed": seed, "step": 0}, "tactile_marker_motion": motion}
 
     def test_every_kind_of_policy_trains_and_answers_whatever_else_is_in_the_batch(self):
         for has_touch, head, frames, has_pictures in [
@@ -49,13 +50,21 @@ class Policies(unittest.TestCase):
             shape = Shape(has_touch, head, frames, edge=32, chunk=5, width=32, layers=1, has_tactile_pictures=has_pictures)
             answering = Answering(load(self.trained(shape), CPU), CPU)
             observations = [self.observation(shape, seed) for seed in range(5)]
-            together = answering(observations)
+            requests = [Request(observation, None) for observation in observations]
+            together = answering(requests)
             self.assertEqual(together[0].shape, (5, 7))
-            for observation, answer in zip(observations, together):
-                np.testing.assert_array_equal(answering([observation])[0], answer)
-            wrong = answering([observations[0] | {"prompt": "fly away"}, observations[1]])
+            for request, answer in zip(requests, together):
+                np.testing.assert_array_equal(answering([request])[0], answer)
+            wrong = answering([Request(observations[0] | {"prompt": "fly away"}, None), requests[1]])
             self.assertIsInstance(wrong[0], UserError)
             np.testing.assert_array_equal(wrong[1], together[1])
+
+    def test_an_answer_keeps_a_share_of_what_was_planned_for_the_same_steps(self):
+        planned, fresh = np.arange(5.0)[:, None] * np.ones(7), np.zeros((5, 7))
+        found = blended(fresh, 12, Plan(10, planned), 0.5)
+        self.assertEqual(found[:, 0].tolist(), [1, 1.5, 2, 0, 0])
+        for step, last in [(12, None), (10, Plan(10, planned)), (0, Plan(10, planned)), (15, Plan(10, planned))]:
+            np.testing.assert_array_equal(blended(fresh, step, last, 0.5), fresh)
 
     def test_training_is_repeatable(self):
         shape = Shape(False, edge=32, chunk=5, width=32, layers=1)
