@@ -13,7 +13,7 @@ CODES = ["continuous", "binary", "two-width", "force"]
 def _record(args: argparse.Namespace) -> None:
     from .evaluate import recording_flags, run_softvt
 
-    run_softvt(["record", args.suite, "--out", str(args.out), *recording_flags(args.demos, args.edge, args.disturbance), *args.flags])
+    run_softvt(["record", args.suite, "--out", str(args.out), *recording_flags(args.demos, args.edge, args.teacher, args.disturbance), *args.flags])
 
 
 def _train(args: argparse.Namespace) -> None:
@@ -26,9 +26,9 @@ def _train(args: argparse.Namespace) -> None:
     if args.edge % 32:
         raise UserError(f"--edge {args.edge}: expected a multiple of 32 pixels")
     inputs = {"has_touch": args.touch or args.tactile_pictures, "has_tactile_pictures": args.tactile_pictures}
-    shape = Shape(**inputs, head=args.head, frames=args.frames, edge=args.edge)
+    shape = Shape(**inputs, code=args.gripper, head=args.head, frames=args.frames, edge=args.edge)
     demos = load(args.recordings, args.gripper, args.edge, args.tactile_pictures)
-    options = TrainOptions(shape, args.gripper, args.steps, args.batch, args.seed, device, args.compile)
+    options = TrainOptions(shape, args.steps, args.batch, args.seed, device, args.compile)
     train(demos, options, args.out, {"recordings": [recording.name for recording in args.recordings]})
 
 
@@ -39,18 +39,18 @@ def _serve(args: argparse.Namespace) -> None:
 
     device = device_of(args.device)
     checkpoint = load(args.checkpoint, device)
-    metadata = {"gripper": checkpoint.code, "profile": checkpoint.policy.shape.profile, "trained": checkpoint.about}
+    metadata = {"gripper": checkpoint.policy.shape.code, "trained": checkpoint.about}
     asyncio.run(serve(Answering(checkpoint, device, args.blend), BATCH, metadata, args.host, args.port))
 
 
 def _evaluate(args: argparse.Namespace) -> None:
-    from .checkpoint import device_of, load
+    from .checkpoint import device_of, load, profile_of
     from .evaluate import Evaluation, evaluate
 
     device_of(args.device)
     checkpoint = load(args.checkpoint, device_of("cpu"))
-    shape, name = checkpoint.policy.shape, args.name or args.checkpoint.stem
-    evaluate(Evaluation(args.checkpoint, shape, checkpoint.code, args.scripts, name, args.out, args.flags, args.device, args.blend))
+    profile, edge, name = profile_of(args.checkpoint), checkpoint.policy.shape.edge, args.name or args.checkpoint.stem
+    evaluate(Evaluation(args.checkpoint, profile, edge, args.scripts, name, args.out, args.flags, args.device, args.blend))
 
 
 def _study(args: argparse.Namespace) -> None:
@@ -81,7 +81,8 @@ def _parser() -> argparse.ArgumentParser:
     def with_blend(sub: argparse.ArgumentParser) -> None:
         sub.add_argument("--blend", type=float, default=0.5, help="share of the actions planned before in those of an answer, 0 to 1")
 
-    def with_disturbance(sub: argparse.ArgumentParser) -> None:
+    def with_teacher(sub: argparse.ArgumentParser) -> None:
+        sub.add_argument("--teacher", default="expert", choices=["expert", "tactile-servo"], help="policy that demonstrates")
         sub.add_argument("--disturbance", type=float, default=0.002, help="random deviation of the robot while recording, m")
 
     record = command("record", _record, "record demonstrations of a suite with pictures of the size that policies see")
@@ -89,7 +90,7 @@ def _parser() -> argparse.ArgumentParser:
     record.add_argument("--out", type=Path, required=True, help="folder of the recording")
     record.add_argument("--demos", type=int, default=50, help="demonstrations per task")
     record.add_argument("--edge", type=int, default=128, help="width and height of the pictures, pixels")
-    with_disturbance(record)
+    with_teacher(record)
 
     train = command("train", _train, "train a policy")
     train.add_argument("recordings", type=Path, nargs="+", help="folders of softvt record")
@@ -134,7 +135,7 @@ def _parser() -> argparse.ArgumentParser:
     study.add_argument("--steps", type=int, default=10000, help="training steps")
     study.add_argument("--episodes", type=int, default=50, help="episodes per task")
     study.add_argument("--edge", type=int, default=128, help="width and height of the pictures, pixels")
-    with_disturbance(study)
+    with_teacher(study)
     with_blend(study)
     study.add_argument("--compile", action="store_true", help="compile the networks")
     study.add_argument("--per-gpu", type=int, default=1, help="policies that are trained on one GPU at a time")

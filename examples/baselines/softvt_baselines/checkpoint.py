@@ -12,7 +12,7 @@ from .inputs import Shape
 from .model import Policy
 from .numbers import Standard
 
-VERSION = 2
+VERSION = 3
 
 
 @dataclass
@@ -21,13 +21,12 @@ class Checkpoint:
 
     policy: Policy
     statistics: Statistics
-    code: str  # grip code of its answers
     prompts: list[str]
     about: dict  # how it was trained
 
 
 def save(path: Path, checkpoint: Checkpoint) -> None:
-    """Writes a checkpoint, its weights in half precision."""
+    """Writes a checkpoint, its weights in half precision, and beside it the profile of softvt for its inputs."""
     one, statistics = checkpoint, checkpoint.statistics
     content = {
         "version": VERSION,
@@ -39,13 +38,18 @@ def save(path: Path, checkpoint: Checkpoint) -> None:
             "marker_scale": statistics.marker_scale,
             "axis": torch.from_numpy(statistics.axis),
         },
-        "code": one.code,
         "prompts": one.prompts,
         "about": one.about,
     }
     part = path.with_suffix(".part")
     torch.save(content, part)
     part.rename(path)
+    profile_of(path).write_text(one.policy.shape.profile(path.stem))
+
+
+def profile_of(path: Path) -> Path:
+    """The profile of softvt for a checkpoint."""
+    return path.with_suffix(".lua")
 
 
 def load(path: Path, device: torch.device) -> Checkpoint:
@@ -63,7 +67,7 @@ def load(path: Path, device: torch.device) -> Checkpoint:
         stated = content["statistics"]
         numbers = {name: Standard(*(part.numpy() for part in stated[name])) for name in ("state", "action")}
         statistics = Statistics(numbers["state"], numbers["action"], float(stated["marker_scale"]), stated["axis"].numpy())
-        code, prompts, about = content["code"], content["prompts"], content["about"]
+        prompts, about = content["prompts"], content["about"]
         policy = Policy(shape)
         policy.load_state_dict({name: value.float() for name, value in content["weights"].items()})
     except UserError:
@@ -75,7 +79,7 @@ def load(path: Path, device: torch.device) -> Checkpoint:
         raise UserError(f"{path}: not a checkpoint of this package: {reason}") from None
     if not (np.isfinite(statistics.action.std).all() and (statistics.action.std > 0).all()):
         raise UserError(f"{path}: the normalisation of its actions is not valid; train it again")
-    return Checkpoint(policy.to(device).eval(), statistics, code, list(prompts), dict(about))
+    return Checkpoint(policy.to(device).eval(), statistics, list(prompts), dict(about))
 
 
 def device_of(name: str) -> torch.device:

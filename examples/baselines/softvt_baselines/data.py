@@ -27,7 +27,7 @@ TACTILE = {"left_tactile_image": "gsmini_left_tactile_rgb", "right_tactile_image
 # the recording.
 IDLE_MOTION, IDLE_TURN, IDLE_GRIP = 0.0005, 0.005, 0.002
 # Smallest deviations by which actions are divided: of the position (m), the rotation vector (rad), and the gripper.
-LEAST_SPREAD = np.array([0.001] * 3 + [0.01] * 3 + [0])
+LEAST_SPREAD = np.array([0.001] * 3 + [0.01] * 3 + [0.002])
 # Length of the marker displacements of a step: finger, marker, (x, y).
 MARKERS = 2 * 99 * 2
 
@@ -37,7 +37,7 @@ class Demonstrations:
     """All demonstrations, one after the other: M recorded steps, of which N are trained on."""
 
     pictures: dict[str, np.ndarray]  # per key (M, edge, edge, 3) uint8
-    state: np.ndarray  # (M, 7): tool position (m), rotation vector, finger position (m); folded
+    state: np.ndarray  # (M, 7): tool position (m), rotation vector, finger position (m); folded; (M, 8) with the commanded closure
     markers: np.ndarray  # (M, 396) px: displacements of the markers of both fingers
     actions: np.ndarray  # (N, 7): tool position, rotation vector, gripper in the grip code; folded
     row: np.ndarray  # (N,) index among the recorded steps
@@ -51,6 +51,20 @@ class Demonstrations:
 def displacements(motion: np.ndarray) -> np.ndarray:
     """Displacements (T, 396) of the markers, px, of gripper_marker_motion (T, finger, initial and present, marker, xy)."""
     return (motion[:, :, 1] - motion[:, :, 0]).reshape(len(motion), -1)
+
+
+def states(code: str, state: np.ndarray, closure: np.ndarray) -> np.ndarray:
+    """The states (T, 7 or 8) of policies with a grip code. `closure` (T, 1) is the commanded one."""
+    return np.concatenate([state, closure], 1) if has_closure(code) else state
+
+
+def has_closure(code: str) -> bool:
+    """True if policies with a grip code see the commanded closure.
+
+    The fingers stop before the closure that is commanded, the more so the firmer the grip. A policy that sees only where they are
+    would close further with every answer.
+    """
+    return code == "continuous"
 
 
 def shrink(pictures: np.ndarray, edge: int) -> np.ndarray:
@@ -102,6 +116,7 @@ def _pack_one(job: _Job) -> dict[str, np.ndarray | str]:
         actions = {stream: demo[stream][:].astype(np.float32) for stream in ACTIONS.values() if stream in demo}
         return actions | {
             "state": obs["state"][:].astype(np.float32),
+            "closure": obs["gripper_closure"][:].astype(np.float32),
             "markers": displacements(obs["gripper_marker_motion"][:]),
             "prompt": str(demo.attrs["language"]),
         }
@@ -185,7 +200,7 @@ def load(recordings: list[Path], code: str, edge: int, has_tactile: bool = False
     prompts = sorted(set(names.tolist()))
     return Demonstrations(
         pictures={key: pictures(key) for key in (CAMERAS | TACTILE if has_tactile else CAMERAS)},
-        state=fold(joined("state"), axis),
+        state=fold(states(code, joined("state"), joined("closure")), axis),
         markers=joined("markers"),
         actions=actions[kept],
         row=np.flatnonzero(kept),
@@ -201,8 +216,8 @@ def load(recordings: list[Path], code: str, edge: int, has_tactile: bool = False
 class Statistics:
     """Normalisation of the inputs and answers of a policy.
 
-    Answers are relative to the pose of the tool in the observation: a policy that is to hold still then answers 0, instead of a
-    pose which it knows to a few millimetres only. The first actions of a chunk differ less from the present pose than the last
+    Answers are relative to the observation (numbers.reference): a policy that is to hold still then answers 0, instead of a pose
+    which it knows to a few millimetres only. The first actions of a chunk differ less from the present pose than the last
     ones, and are standardised each on their own.
     """
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from . import UserError
-from .inputs import Shape
 
 
 def softvt_binary() -> str:
@@ -32,10 +31,11 @@ def camera_flags(edge: int) -> list[str]:
     return ["--set", f"cameras.width={edge}", "--set", f"cameras.height={edge}"]
 
 
-def recording_flags(demos: int, edge: int, disturbance: float) -> list[str]:
-    """Flags of softvt record. `disturbance` is the deviation of the robot from the commands, m and 4 rad/m."""
+def recording_flags(demos: int, edge: int, teacher: str, disturbance: float) -> list[str]:
+    """Flags of softvt record. `teacher` is a built-in policy; `disturbance` is the deviation of the robot from its commands, m and
+    4 rad/m."""
     moves = ["--set", f"robot.disturbance.position={disturbance}", "--set", f"robot.disturbance.rotation={4 * disturbance}"]
-    return ["--demos", str(demos), "--no-privileged", *camera_flags(edge), *moves]
+    return ["--policy", teacher, "--demos", str(demos), "--no-privileged", *camera_flags(edge), *moves]
 
 
 @contextmanager
@@ -59,8 +59,8 @@ class Evaluation:
     """A checkpoint, and the suites on which it is evaluated."""
 
     checkpoint: Path
-    shape: Shape
-    code: str  # grip code
+    profile: Path
+    edge: int  # pixels of a picture
     scripts: list[str]  # suites or conditions of softvt
     name: str  # of the policy in results
     out: Path
@@ -70,8 +70,10 @@ class Evaluation:
 
 
 def evaluate(one: Evaluation) -> None:
-    """Evaluates a checkpoint on all scripts, each in a folder below `out`."""
-    own = ["--profile", one.shape.profile, "--gripper", one.code, "--name", one.name, *camera_flags(one.shape.edge)]
+    """Evaluates a checkpoint on all scripts, each in a folder below `out`. Raises UserError if its profile is missing."""
+    if not one.profile.is_file():
+        raise UserError(f"{one.profile}: no such profile; train writes it beside the checkpoint")
+    own = ["--profile", str(one.profile), "--name", one.name, *camera_flags(one.edge)]
     with served(one.checkpoint, one.device, one.blend) as address:
         for script in one.scripts:
             run_softvt([script, "--policy", address, *own, "--out", str(one.out / Path(script).stem), *one.flags])

@@ -1,16 +1,17 @@
 """What a policy sees: the shape of its inputs, and how observations of softvt become them."""
 
+import json
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 import numpy as np
 
 from . import UserError, prompts
-from .data import CAMERAS, TACTILE, Statistics, shrink
+from .data import CAMERAS, TACTILE, Statistics, has_closure, shrink
 from .numbers import fold, reference
 
 # Row of tactile_marker_motion (9, 198, 2) with the present positions; row 0 has the initial ones.
 NOW = 8
+USE_PROFILE = "use the profile that train wrote beside the checkpoint"
 
 
 @dataclass
@@ -18,6 +19,7 @@ class Shape:
     """Inputs and size of a network."""
 
     has_touch: bool  # the markers of both fingers
+    code: str = "continuous"  # grip code of its answers
     head: str = "regression"  # or "flow"
     frames: int = 1  # control steps whose pictures and states are seen
     edge: int = 128  # pixels of a picture
@@ -25,7 +27,6 @@ class Shape:
     width: int = 384
     layers: int = 4  # of the encoder and of the decoder
     action: int = 7
-    state: int = 7
     marker_steps: tuple[int, ...] = (4, 0)  # steps before the present one whose markers are seen
     has_tactile_pictures: bool = False  # besides the markers
 
@@ -38,12 +39,33 @@ class Shape:
         return [*CAMERAS, *TACTILE] if self.has_tactile_pictures else [*CAMERAS]
 
     @property
-    def profile(self) -> str:
-        """The profile of softvt with these inputs: a name, or a file."""
-        name = "tactile_pictures" if self.has_tactile_pictures else "visuo_tactile" if self.has_touch else "vision"
-        if self.frames == 1 and not self.has_tactile_pictures:
-            return name
-        return str(Path(__file__).parent / "profiles" / (f"{name}_history.lua" if self.frames > 1 else f"{name}.lua"))
+    def state(self) -> int:
+        """Numbers of a state."""
+        return 8 if has_closure(self.code) else 7
+
+    def profile(self, name: str) -> str:
+        """The profile of softvt with these inputs, in Lua."""
+        history = f", frames = {self.frames}" if self.frames > 1 else ""
+        parts = ["position", "axis_angle", "finger_position"] + ["closure"] * has_closure(self.code)
+        inputs = {
+            "image": 'source = "camera", camera = "third_person"' + history,
+            "wrist_image": 'source = "camera", camera = "wrist"' + history,
+            "left_tactile_image": 'source = "tactile", finger = "left"' + history,
+            "right_tactile_image": 'source = "tactile", finger = "right"' + history,
+            "state": f'source = "state", parts = {{ {", ".join(map(json.dumps, parts))} }}' + history,
+            "prompt": 'source = "prompt"',
+            "softvt": 'source = "query"',
+            "tactile_marker_motion": 'source = "marker_motion"',
+        }
+        lines = "".join(f'    {{ keys = {{ "{key}" }}, {inputs[key]} }},\n' for key in self.keys)
+        ends = "" if self.code == "force" else "open = 0, closed = 1, "
+        actions = f'{{ pose = "absolute", gripper = {{ {ends}code = "{self.code}" }} }}'
+        return f"return softvt.profile {{\n  name = {json.dumps(name)},\n  inputs = {{\n{lines}  }},\n  actions = {actions},\n}}\n"
+
+    @property
+    def keys(self) -> list[str]:
+        """Keys of an observation."""
+        return [*self.pictures, "state", "prompt", "softvt"] + ["tactile_marker_motion"] * self.has_touch
 
 
 def read(obs: dict, shape: Shape, statistics: Statistics, vocabulary: prompts.Vocabulary) -> dict[str, np.ndarray]:
@@ -52,9 +74,8 @@ def read(obs: dict, shape: Shape, statistics: Statistics, vocabulary: prompts.Vo
 
     Raises UserError if an entry is missing or has another shape, or the prompt was not trained.
     """
-    needed = [*shape.pictures, "state", "prompt", "softvt"] + ["tactile_marker_motion"] * shape.has_touch
-    if missing := [key for key in needed if key not in obs]:
-        raise UserError(f"the observation has no {', '.join(missing)}; use the profile {shape.profile}")
+    if missing := [key for key in shape.keys if key not in obs]:
+        raise UserError(f"the observation has no {', '.join(missing)}; {USE_PROFILE}")
     if problem := vocabulary.problem(obs["prompt"]):
         raise UserError(problem)
 
@@ -64,11 +85,13 @@ def read(obs: dict, shape: Shape, statistics: Statistics, vocabulary: prompts.Vo
         array = array[None] if array.ndim == axes else array
         if array.ndim != axes + 1 or len(array) != shape.frames:
             expected = f"{shape.frames} frames" if shape.frames > 1 else "one frame"
-            raise UserError(f"{key} has the shape {np.shape(obs[key])}, expected {expected}; use the profile {shape.profile}")
+            raise UserError(f"{key} has the shape {np.shape(obs[key])}, expected {expected}; {USE_PROFILE}")
         return array
 
     inputs = {key: shrink(frames(key, 3), shape.edge)[None] for key in shape.pictures}
     states = fold(frames("state", 1)[None], statistics.axis)
+    if states.shape[-1] != shape.state:
+        raise UserError(f"state has {states.shape[-1]} numbers, expected {shape.state}; {USE_PROFILE}")
     inputs["state"], inputs["reference"] = statistics.state.apply(states), reference(states[:, -1:])
     inputs["prompt"] = np.array([prompts.encode(obs["prompt"])])
     random = np.random.default_rng(obs["softvt"]["seed"])

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Columns of a state and of an action that hold the rotation vector, and the column of the gripper.
-ROTATION, GRIPPER = slice(3, 6), 6
+# Columns of a state and of an action that hold the rotation vector, the column of the gripper, and that of the commanded closure,
+# which only some states have.
+ROTATION, GRIPPER, CLOSURE = slice(3, 6), 6, 7
 
 
 def mean_axis(rotations: np.ndarray) -> np.ndarray:
@@ -15,7 +16,7 @@ def mean_axis(rotations: np.ndarray) -> np.ndarray:
 
 
 def fold(rows: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    """Writes the rotation vectors of rows (…, 7) on the side of `axis`.
+    """Writes the rotation vectors of rows (…, 7 or 8) on the side of `axis`.
 
     A rotation by θ about n is one by 2π − θ about −n. The tool points down, so θ is near π, and nearly equal rotations can
     have opposite vectors.
@@ -29,11 +30,14 @@ def fold(rows: np.ndarray, axis: np.ndarray) -> np.ndarray:
     return folded
 
 
-def reference(states: np.ndarray) -> np.ndarray:
-    """What is subtracted from the actions (…, 7) that follow on states (…, 7): the pose of the tool, and 0 for the gripper."""
-    poses = states.copy()
-    poses[..., GRIPPER] = 0
-    return poses
+def reference(states):
+    """What is subtracted from the actions (…, 7) that follow on states (…, 7 or 8), arrays or tensors: the pose of the tool, and
+    the commanded closure, or 0 without it."""
+    has_closure = states.shape[-1] > CLOSURE
+    found = states[..., [0, 1, 2, 3, 4, 5, CLOSURE if has_closure else GRIPPER]]
+    if not has_closure:
+        found[..., GRIPPER] = 0
+    return found
 
 
 @dataclass

@@ -37,6 +37,7 @@ class Study:
     steps: int
     episodes: int
     edge: int = 128
+    teacher: str = "expert"  # built-in policy that demonstrates
     disturbance: float = 0.002  # m
     blend: float = 0.5  # share of the last answer in the next one
     per_gpu: int = 1  # policies that are trained on one GPU at a time
@@ -154,7 +155,7 @@ def run(study: Study) -> None:
     for suite in study.suites:
         recording = study.out / "data" / suite
         if not (recording / "dataset.json").is_file():
-            flags = ["--out", str(recording), "--resume", *recording_flags(study.demos, study.edge, study.disturbance)]
+            flags = ["--out", str(recording), "--resume", *recording_flags(study.demos, study.edge, study.teacher, study.disturbance)]
             run_softvt(["record", f"suites/{suite}.lua", *flags])
         pack(recording, study.edge, os.cpu_count() or 1)
         print(f"recorded {suite}", flush=True)

@@ -21,15 +21,14 @@ from .numbers import reference
 RATE, LAST_RATE, WEIGHT_DECAY, WARM_UP, AVERAGE = 3e-4, 0.02, 1e-4, 300, 0.999
 # Augmentation: random shift of a picture (share of its edge), brightness.
 SHIFT, BRIGHTNESS = 0.045, 0.1
-# Noise of the state: position (m), rotation vector (rad), finger (m). Actions stay where they are, so it teaches to return.
-STATE_NOISE = [0.005] * 3 + [0.02] * 3 + [0.0001]
+# Noise of the state: position (m), rotation vector (rad), finger (m), commanded closure. Actions stay where they are, so it teaches to return.
+STATE_NOISE = [0.005] * 3 + [0.02] * 3 + [0.0001, 0]
 REPORT = 200  # steps between two lines of the log
 
 
 @dataclass
 class TrainOptions:
     shape: Shape
-    code: str
     steps: int
     batch: int
     seed: int
@@ -49,7 +48,7 @@ class Batches:
         self.state, self.actions = on_device(demos.state), on_device(demos.actions)
         self.state_mean, self.state_std = on_device(statistics.state.mean), on_device(statistics.state.std)
         self.action_mean, self.action_std = on_device(statistics.action.mean), on_device(statistics.action.std)
-        self.noise, self.is_pose = on_device(np.float32(STATE_NOISE)), on_device(reference(np.ones(7, np.float32)))
+        self.noise = on_device(np.float32(STATE_NOISE[: self.shape.state]))
         self.row, self.start, self.last = on_device(demos.row), on_device(demos.start), on_device(demos.last)
         self.prompts = on_device(np.array([prompts.encode(prompt) for prompt in demos.prompts]))
         self.prompt = on_device(demos.prompt)
@@ -86,7 +85,7 @@ class Batches:
         if self.shape.has_touch:
             obs["markers"] = self.markers[self._past(steps, self.shape.marker_steps)].float()
         ahead = steps[:, None] + torch.arange(self.shape.chunk, device=self.device)
-        changes = self.actions[ahead.clamp(max=len(self.actions) - 1)] - states[:, -1:] * self.is_pose
+        changes = self.actions[ahead.clamp(max=len(self.actions) - 1)] - reference(states[:, -1:])
         return obs, (changes - self.action_mean) / self.action_std, ahead <= self.last[steps][:, None]
 
 
@@ -128,4 +127,4 @@ def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict)
                 print(line, file=log, flush=True)
                 total.zero_()
     about = about | {"steps": options.steps, "batch": options.batch, "seed": options.seed, "recorded_steps": len(demos.state), "trained_steps": len(demos.actions)}
-    save(path, Checkpoint(averaged, statistics, options.code, demos.prompts, about))
+    save(path, Checkpoint(averaged, statistics, demos.prompts, about))

@@ -36,7 +36,7 @@ def recording(folder: Path, demos: int = 2, without: tuple[str, ...] = (), gripp
             streams = {f"obs/{stream}": np.full((STEPS, 8, 8, 3), 10 * index, np.uint8) for stream in CAMERAS.values()}
             streams |= {f"obs/{stream}": np.full((STEPS, 6, 8, 3), 20 * index, np.uint8) for stream in TACTILE.values()}
             streams |= {stream: actions for stream in ACTIONS.values()}
-            streams["obs/state"] = actions
+            streams["obs/state"], streams["obs/gripper_closure"] = actions, np.full((STEPS, 1), 0.1 * index)
             streams["obs/gripper_marker_motion"] = np.zeros((STEPS, 2, 2, 99, 2), np.float32)
             for name, values in streams.items():
                 if name not in without:
@@ -98,15 +98,18 @@ class Numbers(unittest.TestCase):
         np.testing.assert_allclose(standard.apply(rows), [[-1, 0], [1, 0]])
         np.testing.assert_allclose(standard.invert(standard.apply(rows)), rows)
 
-    def test_actions_are_relative_to_the_tool_and_standardised_by_their_place_in_a_chunk(self):
+    def test_actions_are_relative_and_standardised_by_their_place_in_a_chunk(self):
         with tempfile.TemporaryDirectory() as scratch:
-            demos = load([recording(Path(scratch) / "a")], "continuous", 4)
-        action = Statistics.of(demos, STEPS + 1).action
+            folder = recording(Path(scratch) / "a")
+            actions = {code: Statistics.of(load([folder], code, 4), STEPS + 1).action for code in ("continuous", "force")}
+        action = actions["force"]
         np.testing.assert_allclose(action.mean[:STEPS, 0], 0.01 * np.arange(STEPS), atol=1e-6)
         np.testing.assert_allclose(action.mean[:, 6], 0.05, atol=1e-6)
         np.testing.assert_array_equal(action.mean[STEPS], action.mean[STEPS - 1], "no demonstration is that long")
+        np.testing.assert_allclose(actions["continuous"].mean[:, 6], 0, atol=1e-6, err_msg="relative to the commanded closure")
         self.assertTrue((action.std > 0).all())
         self.assertEqual(reference(np.full((2, 7), 3.0))[1].tolist(), [3.0] * 6 + [0.0])
+        self.assertEqual(reference(np.arange(8.0)).tolist(), [0, 1, 2, 3, 4, 5, 7])
 
     def test_pictures_shrink_to_the_mean_of_their_area(self):
         picture = np.zeros((1, 4, 4, 3), np.uint8)
@@ -143,13 +146,13 @@ class Prompts(unittest.TestCase):
 
 class Inputs(unittest.TestCase):
     def setUp(self):
-        standard = Standard(np.zeros(7, np.float32), np.ones(7, np.float32))
+        standard = Standard(np.zeros(8, np.float32), np.ones(8, np.float32))
         self.statistics = Statistics(standard, standard, 2.0, np.array([1, 0, 0], np.float32))
         self.vocabulary = prompts.Vocabulary(["take it"])
         motion = np.zeros((9, 198, 2), np.float32)
         motion[8] = 6
         self.obs = {camera: np.zeros((8, 8, 3), np.uint8) for camera in CAMERAS}
-        self.obs |= {"state": np.array([0, 0, 0, -3.1, 0, 0, 0.04], np.float32), "prompt": "take it", "softvt": {"seed": 7}}
+        self.obs |= {"state": np.array([0, 0, 0, -3.1, 0, 0, 0.04, 0.3], np.float32), "prompt": "take it", "softvt": {"seed": 7}}
         self.obs["tactile_marker_motion"] = motion
 
     def read(self, shape: Shape, **changes) -> dict:
@@ -161,16 +164,17 @@ class Inputs(unittest.TestCase):
         self.assertEqual(found["image"].shape, (1, 1, 4, 4, 3))
         np.testing.assert_allclose(found["state"][0, 0, 3], 2 * np.pi - 3.1, rtol=1e-6)
         self.assertEqual(found["reference"].shape, (1, 1, 7))
-        self.assertEqual(found["reference"][0, 0, 6], 0)
+        self.assertEqual(found["reference"][0, 0, 6], np.float32(0.3))
         self.assertEqual((found["markers"][0, 0].max(), found["markers"][0, 1].max()), (0, 3))
         np.testing.assert_array_equal(found["noise"], self.read(shape)["noise"])
         self.assertFalse((found["noise"] == self.read(shape, softvt={"seed": 8})["noise"]).all())
 
     def test_what_does_not_fit_is_named(self):
         for shape, changes, words in [
-            (Shape(True), {"tactile_marker_motion": None}, "no tactile_marker_motion; use the profile visuo_tactile"),
+            (Shape(True), {"tactile_marker_motion": None}, "no tactile_marker_motion; use the profile"),
             (Shape(False, frames=2), {}, "image has the shape (8, 8, 3), expected 2 frames"),
             (Shape(False), {"prompt": "fly away"}, "was not trained for the prompt"),
+            (Shape(False, "force"), {}, "state has 8 numbers, expected 7; use the profile"),
         ]:
             obs = {key: value for key, value in (self.obs | changes).items() if value is not None}
             with self.assertRaises(UserError) as caught:

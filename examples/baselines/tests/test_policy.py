@@ -29,7 +29,7 @@ class Policies(unittest.TestCase):
 
     def trained(self, shape: Shape) -> Path:
         path = self.folder / "policy.pt"
-        train(self.demos, TrainOptions(shape, "continuous", 2, 4, 0, CPU), path, {})
+        train(self.demos, TrainOptions(shape, 2, 4, 0, CPU), path, {})
         return path
 
     def observation(self, shape: Shape, seed: int) -> dict:
@@ -37,7 +37,7 @@ class Policies(unittest.TestCase):
         frames = () if shape.frames == 1 else (shape.frames,)
         obs = {camera: random.integers(0, 255, (*frames, 32, 32, 3), np.uint8) for camera in CAMERAS}
         obs |= {key: random.integers(0, 255, (*frames, 24, 32, 3), np.uint8) for key in TACTILE}
-        state = np.broadcast_to(np.array([0, 0, 0, 3.1, 0, 0, 0.04], np.float32), (*frames, 7))
+        state = np.broadcast_to(np.array([0, 0, 0, 3.1, 0, 0, 0.04, 0], np.float32), (*frames, 8))
         motion = random.normal(0, 1, (9, 198, 2)).astype(np.float32)
         return obs | {"state": state, "prompt": "pick up the left bun", "softvt": {"seed": seed, "step": 0}, "tactile_marker_motion": motion}
 
@@ -47,7 +47,7 @@ class Policies(unittest.TestCase):
             (True, "regression", 1, True),
             (True, "flow", 2, False),
         ]:
-            shape = Shape(has_touch, head, frames, edge=32, chunk=5, width=32, layers=1, has_tactile_pictures=has_pictures)
+            shape = Shape(has_touch, head=head, frames=frames, edge=32, chunk=5, width=32, layers=1, has_tactile_pictures=has_pictures)
             answering = Answering(load(self.trained(shape), CPU), CPU)
             observations = [self.observation(shape, seed) for seed in range(5)]
             requests = [Request(observation, None) for observation in observations]
