@@ -9,8 +9,6 @@ from . import UserError, prompts
 from .data import CAMERAS, TACTILE, Statistics, has_closure, shrink
 from .numbers import fold, reference
 
-# Row of tactile_marker_motion (9, 198, 2) with the present positions; row 0 has the initial ones.
-NOW = 8
 USE_PROFILE = "use the profile that train wrote beside the checkpoint"
 
 
@@ -55,12 +53,17 @@ class Shape:
             "state": f'source = "state", parts = {{ {", ".join(map(json.dumps, parts))} }}' + history,
             "prompt": 'source = "prompt"',
             "softvt": 'source = "query"',
-            "tactile_marker_motion": 'source = "marker_motion"',
+            "tactile_marker_motion": f'source = "marker_motion", frames = {self.marker_rows - 1}',
         }
         lines = "".join(f'    {{ keys = {{ "{key}" }}, {inputs[key]} }},\n' for key in self.keys)
         ends = "" if self.code == "force" else "open = 0, closed = 1, "
         actions = f'{{ pose = "absolute", gripper = {{ {ends}code = "{self.code}" }} }}'
         return f"return softvt.profile {{\n  name = {json.dumps(name)},\n  inputs = {{\n{lines}  }},\n  actions = {actions},\n}}\n"
+
+    @property
+    def marker_rows(self) -> int:
+        """Length of tactile_marker_motion (rows, 198, 2): the initial positions of the markers, and those of the last steps."""
+        return max(self.marker_steps) + 2
 
     @property
     def keys(self) -> list[str]:
@@ -98,6 +101,8 @@ def read(obs: dict, shape: Shape, statistics: Statistics, vocabulary: prompts.Vo
     inputs["noise"] = random.standard_normal((1, shape.chunk, shape.action), np.float32)
     if shape.has_touch:
         motion = np.array(obs["tactile_marker_motion"])
-        rows = [motion[NOW - back] - motion[0] for back in shape.marker_steps]
+        if len(motion) != shape.marker_rows:
+            raise UserError(f"tactile_marker_motion has the shape {motion.shape}, expected {shape.marker_rows} rows; {USE_PROFILE}")
+        rows = [motion[-1 - back] - motion[0] for back in shape.marker_steps]
         inputs["markers"] = np.stack(rows).reshape(1, len(rows), -1) / np.float32(statistics.marker_scale)
     return inputs

@@ -136,7 +136,8 @@ def run(study: Study) -> None:
     import torch
 
     gpus: list[int | None] = list(range(torch.cuda.device_count())) or [None]
-    threads = max(1, (os.cpu_count() or 1) // len(gpus))
+    # Threads that wait for answers leave their core to others.
+    threads = max(1, 2 * (os.cpu_count() or 1) // len(gpus))
     for folder in ("data", "logs", "runs", "checkpoints"):
         (study.out / folder).mkdir(parents=True, exist_ok=True)
     training, evaluation = _Workers(gpus * study.per_gpu), _Workers(gpus)

@@ -149,8 +149,8 @@ class Inputs(unittest.TestCase):
         standard = Standard(np.zeros(8, np.float32), np.ones(8, np.float32))
         self.statistics = Statistics(standard, standard, 2.0, np.array([1, 0, 0], np.float32))
         self.vocabulary = prompts.Vocabulary(["take it"])
-        motion = np.zeros((9, 198, 2), np.float32)
-        motion[8] = 6
+        motion = np.zeros((6, 198, 2), np.float32)
+        motion[5] = 6
         self.obs = {camera: np.zeros((8, 8, 3), np.uint8) for camera in CAMERAS}
         self.obs |= {"state": np.array([0, 0, 0, -3.1, 0, 0, 0.04, 0.3], np.float32), "prompt": "take it", "softvt": {"seed": 7}}
         self.obs["tactile_marker_motion"] = motion

@@ -38,7 +38,7 @@ class Policies(unittest.TestCase):
         obs = {camera: random.integers(0, 255, (*frames, 32, 32, 3), np.uint8) for camera in CAMERAS}
         obs |= {key: random.integers(0, 255, (*frames, 24, 32, 3), np.uint8) for key in TACTILE}
         state = np.broadcast_to(np.array([0, 0, 0, 3.1, 0, 0, 0.04, 0], np.float32), (*frames, 8))
-        motion = random.normal(0, 1, (9, 198, 2)).astype(np.float32)
+        motion = random.normal(0, 1, (6, 198, 2)).astype(np.float32)
         return obs | {"state": state, "prompt": "pick up the left bun", "softvt": {"seed": seed, "step": 0}, "tactile_marker_motion": motion}
 
     def test_every_kind_of_policy_trains_and_answers_whatever_else_is_in_the_batch(self):
