@@ -1,4 +1,4 @@
-"""Policies learned from softvt's demonstrations: record, train, evaluate, page."""
+"""Policies learned from softvt's demonstrations: record, train, serve, evaluate, study, page."""
 
 
 class UserError(Exception):

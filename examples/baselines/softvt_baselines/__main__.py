@@ -8,6 +8,7 @@ from pathlib import Path
 from . import UserError
 
 CODES = ["continuous", "binary", "two-width", "force"]
+REFERENCES = ["expert", "tactile-servo", "fixed-closure"]
 
 
 def _record(args: argparse.Namespace) -> None:
@@ -23,8 +24,9 @@ def _train(args: argparse.Namespace) -> None:
     from .train import TrainOptions, train
 
     device = device_of(args.device)
-    if args.edge % 32:
-        raise UserError(f"--edge {args.edge}: expected a multiple of 32 pixels")
+    if args.out.is_dir():
+        raise UserError(f"--out {args.out}: expected a file, this is a folder")
+    args.out.parent.mkdir(parents=True, exist_ok=True)
     inputs = {"has_touch": args.touch or args.tactile_pictures, "has_tactile_pictures": args.tactile_pictures}
     shape = Shape(**inputs, code=args.gripper, head=args.head, frames=args.frames, edge=args.edge)
     demos = load(args.recordings, args.gripper, args.edge, args.tactile_pictures)
@@ -66,6 +68,34 @@ def _page(args: argparse.Namespace) -> None:
     write(args.studies, args.docs)
 
 
+def _positive(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"expected 1 or more, got {text}")
+    return value
+
+
+def _edge(text: str) -> int:
+    value = _positive(text)
+    if value % 32:
+        raise argparse.ArgumentTypeError(f"expected a multiple of 32 pixels, got {text}")
+    return value
+
+
+def _share(text: str) -> float:
+    value = float(text)
+    if not 0 <= value < 1:
+        raise argparse.ArgumentTypeError(f"expected a number from 0 to below 1, got {text}")
+    return value
+
+
+def _length(text: str) -> float:
+    value = float(text)
+    if not 0 <= value <= 0.05:
+        raise argparse.ArgumentTypeError(f"expected 0 to 0.05 m, got {text}")
+    return value
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="softvt-baselines", description=__doc__, epilog="Flags after -- are those of softvt.")
     commands = parser.add_subparsers(dest="command", required=True)
@@ -79,17 +109,17 @@ def _parser() -> argparse.ArgumentParser:
         sub.add_argument("--device", default="cuda", help="device of torch; cpu for a small trial")
 
     def with_blend(sub: argparse.ArgumentParser) -> None:
-        sub.add_argument("--blend", type=float, default=0.5, help="share of the actions planned before in those of an answer, 0 to 1")
+        sub.add_argument("--blend", type=_share, default=0.5, help="share of what was planned before in an answer, from 0 to below 1")
 
     def with_teacher(sub: argparse.ArgumentParser) -> None:
         sub.add_argument("--teacher", default="expert", choices=["expert", "tactile-servo"], help="policy that demonstrates")
-        sub.add_argument("--disturbance", type=float, default=0.002, help="random deviation of the robot while recording, m")
+        sub.add_argument("--disturbance", type=_length, default=0.002, help="standard deviation of the robot from its commands while recording, m; of its rotation 4 rad per m")
 
     record = command("record", _record, "record demonstrations of a suite with pictures of the size that policies see")
     record.add_argument("suite", help="suite of softvt")
     record.add_argument("--out", type=Path, required=True, help="folder of the recording")
-    record.add_argument("--demos", type=int, default=50, help="demonstrations per task")
-    record.add_argument("--edge", type=int, default=128, help="width and height of the pictures, pixels")
+    record.add_argument("--demos", type=_positive, default=50, help="demonstrations per task")
+    record.add_argument("--edge", type=_edge, default=128, help="width and height of the pictures, pixels")
     with_teacher(record)
 
     train = command("train", _train, "train a policy")
@@ -100,9 +130,9 @@ def _parser() -> argparse.ArgumentParser:
     train.add_argument("--gripper", default="continuous", choices=CODES, help="grip code")
     train.add_argument("--head", default="regression", choices=["regression", "flow"], help="how actions are predicted")
     train.add_argument("--frames", type=int, default=1, choices=[1, 2], help="control steps whose pictures and states the policy sees")
-    train.add_argument("--edge", type=int, default=128, help="width and height of the pictures, pixels; a multiple of 32")
-    train.add_argument("--steps", type=int, default=10000, help="training steps")
-    train.add_argument("--batch", type=int, default=256, help="samples per step")
+    train.add_argument("--edge", type=_edge, default=128, help="width and height of the pictures, pixels; a multiple of 32")
+    train.add_argument("--steps", type=_positive, default=10000, help="training steps")
+    train.add_argument("--batch", type=_positive, default=256, help="samples per step")
     train.add_argument("--seed", type=int, default=0, help="seed of the weights and batches")
     train.add_argument("--compile", action="store_true", help="compile the network: a minute more at first, faster then")
     with_device(train)
@@ -128,17 +158,17 @@ def _parser() -> argparse.ArgumentParser:
     study.add_argument("--inputs", nargs="+", default=["vo", "vt"], choices=["vo", "vt"], help="vision only, vision and touch")
     study.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2], help="training seeds")
     study.add_argument("--codes", nargs="+", default=["continuous"], choices=CODES, help="grip codes")
-    study.add_argument("--replans", type=int, nargs="+", default=[4], help="actions executed of each answer")
+    study.add_argument("--replans", type=_positive, nargs="+", default=[4], help="actions executed of each answer")
     study.add_argument("--shifts", action="store_true", help="evaluate also under the nine conditions of suites/shifts.lua")
-    study.add_argument("--references", nargs="*", default=["expert", "tactile-servo", "fixed-closure"], help="built-in policies for comparison")
-    study.add_argument("--demos", type=int, default=50, help="demonstrations per task")
-    study.add_argument("--steps", type=int, default=10000, help="training steps")
-    study.add_argument("--episodes", type=int, default=50, help="episodes per task")
-    study.add_argument("--edge", type=int, default=128, help="width and height of the pictures, pixels")
+    study.add_argument("--references", nargs="*", default=REFERENCES, choices=REFERENCES, help="built-in policies for comparison")
+    study.add_argument("--demos", type=_positive, default=50, help="demonstrations per task")
+    study.add_argument("--steps", type=_positive, default=10000, help="training steps")
+    study.add_argument("--episodes", type=_positive, default=50, help="episodes per task")
+    study.add_argument("--edge", type=_edge, default=128, help="width and height of the pictures, pixels")
     with_teacher(study)
     with_blend(study)
     study.add_argument("--compile", action="store_true", help="compile the networks")
-    study.add_argument("--per-gpu", type=int, default=1, help="policies that are trained on one GPU at a time")
+    study.add_argument("--per-gpu", type=_positive, default=1, help="policies that are trained on one GPU at a time")
 
     page = command("page", _page, "write the tables and the figure of studies into docs/baselines.md")
     page.add_argument("studies", type=Path, nargs="*", help="folders of studies to collect; none: those that were collected")

@@ -41,21 +41,21 @@ def save(path: Path, checkpoint: Checkpoint) -> None:
         "prompts": one.prompts,
         "about": one.about,
     }
-    part = path.with_suffix(".part")
+    profile_of(path).write_text(one.policy.shape.profile(path.stem))
+    part = path.with_name(f"{path.name}.part")
     torch.save(content, part)
     part.rename(path)
-    profile_of(path).write_text(one.policy.shape.profile(path.stem))
 
 
 def profile_of(path: Path) -> Path:
     """The profile of softvt for a checkpoint."""
-    return path.with_suffix(".lua")
+    return path.with_name(f"{path.name}.lua")
 
 
 def load(path: Path, device: torch.device) -> Checkpoint:
     """Reads a checkpoint.
 
-    Raises UserError if the file is missing, no checkpoint of this version, or of another shape.
+    Raises UserError if the file is missing, is not a checkpoint of this version, or does not fit its stated shape.
     """
     if not path.is_file():
         raise UserError(f"{path}: no such checkpoint; softvt-baselines train writes one")

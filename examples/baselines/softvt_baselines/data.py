@@ -7,6 +7,7 @@ The first reader of a recording packs it: pictures at the edge that policies see
 import hashlib
 import json
 import os
+import shutil
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +29,8 @@ TACTILE = {"left_tactile_image": "gsmini_left_tactile_rgb", "right_tactile_image
 IDLE_MOTION, IDLE_TURN, IDLE_GRIP = 0.0005, 0.005, 0.002
 # Smallest deviations by which actions are divided: of the position (m), the rotation vector (rad), and the gripper.
 LEAST_SPREAD = np.array([0.001] * 3 + [0.01] * 3 + [0.002])
+# Version of the packed files.
+PACKED = 2
 # Length of the marker displacements of a step: finger, marker, (x, y).
 MARKERS = 2 * 99 * 2
 
@@ -112,6 +115,8 @@ def _pack_one(job: _Job) -> dict[str, np.ndarray | str]:
         if missing := [stream for stream in job.streams.values() if stream not in obs]:
             raise UserError(f"{job.file}: {job.name} has no pictures ({', '.join(missing)}): it was recorded with --images video")
         for key, stream in job.streams.items():
+            if key in CAMERAS and (height := obs[stream].shape[1]) != job.edge:
+                raise UserError(f"{job.file}: pictures of {height} pixels; record with --edge {job.edge}, or train with --edge {height}")
             np.load(job.folder / f"{key}.npy", mmap_mode="r+")[rows] = shrink(obs[stream][:], job.edge)
         actions = {stream: demo[stream][:].astype(np.float32) for stream in ACTIONS.values() if stream in demo}
         return actions | {
@@ -122,13 +127,23 @@ def _pack_one(job: _Job) -> dict[str, np.ndarray | str]:
         }
 
 
+def _read_one(job: _Job) -> dict[str, np.ndarray | str]:
+    try:
+        return _pack_one(job)
+    except (OSError, KeyError, ValueError) as error:
+        raise UserError(f"{job.file}: {job.name} cannot be read: {error}") from None
+
+
 def _demonstrations(recording: Path) -> list[tuple[Path, str, int]]:
     """File, name and number of steps of each demonstration."""
     found = []
     for path in sorted((recording / "hdf5").glob("*.hdf5")):
-        with h5py.File(path) as file:
-            names = sorted(file["data"], key=lambda name: int(name.rsplit("_", 1)[1]))
-            found += [(path, name, int(file["data"][name].attrs["num_samples"])) for name in names]
+        try:
+            with h5py.File(path) as file:
+                names = sorted(file["data"], key=lambda name: int(name.rsplit("_", 1)[1]))
+                found += [(path, name, int(file["data"][name].attrs["num_samples"])) for name in names]
+        except (OSError, KeyError, ValueError) as error:
+            raise UserError(f"{path}: not a file of demonstrations: {error}") from None
     return found
 
 
@@ -141,7 +156,7 @@ def pack(recording: Path, edge: int, processes: int, has_tactile: bool = False) 
     card = recording / "dataset.json"
     if not card.is_file():
         raise UserError(f"{recording} is no complete recording of softvt: it has no dataset.json")
-    identity = hashlib.sha256(card.read_bytes()).hexdigest()
+    identity = f"{PACKED} {hashlib.sha256(card.read_bytes()).hexdigest()}"
     streams = CAMERAS | TACTILE if has_tactile else CAMERAS
     folder = recording / (f"packed_{edge}_tactile" if has_tactile else f"packed_{edge}")
     if (folder / "identity").is_file() and (folder / "identity").read_text() == identity:
@@ -149,25 +164,34 @@ def pack(recording: Path, edge: int, processes: int, has_tactile: bool = False) 
     demos = _demonstrations(recording)
     if not demos:
         raise UserError(f"{recording}: no demonstrations")
-    folder.mkdir(exist_ok=True)
-    (folder / "identity").unlink(missing_ok=True)
+    # Other processes may pack the same recording.
+    done, folder = folder, recording / f"{folder.name}.{os.getpid()}.part"
+    folder.mkdir()
     ends = np.cumsum([steps for _, _, steps in demos])
     for key in streams:
         np.lib.format.open_memmap(folder / f"{key}.npy", "w+", np.uint8, (int(ends[-1]), edge, edge, 3))
     jobs = [_Job(path, name, steps, int(end) - steps, folder, edge, streams) for (path, name, steps), end in zip(demos, ends)]
     with ProcessPoolExecutor(processes) as pool:
-        numbers = list(pool.map(_pack_one, jobs))
-    streams = set.intersection(*(set(one) for one in numbers)) - {"prompt"}
-    arrays = {stream: np.concatenate([one[stream] for one in numbers]) for stream in sorted(streams)}
+        numbers = list(pool.map(_read_one, jobs))
+    common = set.intersection(*(set(one) for one in numbers)) - {"prompt"}
+    arrays = {stream: np.concatenate([one[stream] for one in numbers]) for stream in sorted(common)}
     prompts = np.array([one["prompt"] for one in numbers])
     np.savez(folder / "numbers.npz", lengths=[steps for _, _, steps in demos], prompts=prompts, **arrays)
     (folder / "identity").write_text(identity)
-    return folder
+    shutil.rmtree(done, ignore_errors=True)
+    try:
+        folder.rename(done)
+    except OSError:  # another process was first
+        shutil.rmtree(folder)
+    return done
 
 
 def _check_grip_code(recording: Path, code: str, packed) -> None:
     """Raises UserError if the recording was made for another grip code, or has no actions in this one."""
-    stated = json.loads((recording / "recording.json").read_text()).get("gripper")
+    card = recording / "recording.json"
+    if not card.is_file():
+        raise UserError(f"{recording} is no complete recording of softvt: it has no recording.json")
+    stated = json.loads(card.read_text()).get("gripper")
     if stated and stated != code:
         raise UserError(f"{recording} was recorded for the grip code {stated}: pass --gripper {stated}")
     if ACTIONS[code] not in packed:

@@ -1,5 +1,6 @@
 """Evaluation: serves a checkpoint and runs softvt against it."""
 
+import hashlib
 import os
 import re
 import subprocess
@@ -73,7 +74,12 @@ def evaluate(one: Evaluation) -> None:
     """Evaluates a checkpoint on all scripts, each in a folder below `out`. Raises UserError if its profile is missing."""
     if not one.profile.is_file():
         raise UserError(f"{one.profile}: no such profile; train writes it beside the checkpoint")
-    own = ["--profile", str(one.profile), "--name", one.name, *camera_flags(one.edge)]
+    # softvt refuses to continue a run with another profile, and so with other weights.
+    weights = hashlib.sha256(one.checkpoint.read_bytes()).hexdigest()
+    profile = one.out / "profile.lua"
+    one.out.mkdir(parents=True, exist_ok=True)
+    profile.write_text(f"{one.profile.read_text()}-- Weights {weights}, blend {one.blend}.\n")
+    own = ["--profile", str(profile), "--name", one.name, *camera_flags(one.edge)]
     with served(one.checkpoint, one.device, one.blend) as address:
         for script in one.scripts:
             run_softvt([script, "--policy", address, *own, "--out", str(one.out / Path(script).stem), *one.flags])

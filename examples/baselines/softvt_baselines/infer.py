@@ -5,21 +5,22 @@ import torch
 
 from . import UserError, prompts
 from .checkpoint import Checkpoint
+from .data import has_closure
 from .inputs import read
 from .serve import Plan, Request
 
 BATCH = 16  # observations that are answered together
 
 
-def blended(actions: np.ndarray, step: int, last: Plan | None, share: float) -> np.ndarray:
-    """Actions (chunk, 7) from a step on, with a share of those that the last answer had planned for the same steps.
+def blended(actions: np.ndarray, step: int, last: Plan | None, shares: np.ndarray) -> np.ndarray:
+    """Actions (chunk, 7) from a step on, with a share (7,) of those that the last answer had planned for the same steps.
 
     A policy that plans anew every few steps then moves without jerks, as with the temporal ensemble of ACT (Zhao et al., 2023).
     """
     if last is None or not 0 < step - last.step < len(last.actions):
         return actions
     planned, found = last.actions[step - last.step :], actions.copy()
-    found[: len(planned)] += share * (planned - found[: len(planned)])
+    found[: len(planned)] += shares * (planned - found[: len(planned)])
     return found
 
 
@@ -31,7 +32,9 @@ class Answering:
     """
 
     def __init__(self, checkpoint: Checkpoint, device: torch.device, blend: float = 0.0):
-        self.checkpoint, self.device, self.blend = checkpoint, device, blend
+        self.checkpoint, self.device = checkpoint, device
+        # The number of the gripper is blended where it is a closure; elsewhere it switches.
+        self.shares = np.float32([blend] * 6 + [blend if has_closure(checkpoint.policy.shape.code) else 0])
         self.vocabulary = prompts.Vocabulary(checkpoint.prompts)
         torch.backends.cudnn.benchmark = False
         torch.backends.cudnn.deterministic = True
@@ -47,7 +50,7 @@ class Answering:
         valid = [one for one in inputs if isinstance(one, dict)]
         chunks = iter(self._chunks(valid) if valid else [])
         return [
-            blended(next(chunks), request.obs["softvt"]["step"], request.last, self.blend) if isinstance(one, dict) else one
+            blended(next(chunks), request.obs["softvt"]["step"], request.last, self.shares) if isinstance(one, dict) else one
             for request, one in zip(batch, inputs)
         ]
 

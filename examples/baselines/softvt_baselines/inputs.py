@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from . import UserError, prompts
-from .data import CAMERAS, TACTILE, Statistics, has_closure, shrink
+from .data import CAMERAS, MARKERS, TACTILE, Statistics, has_closure, shrink
 from .numbers import fold, reference
 
 USE_PROFILE = "use the profile that train wrote beside the checkpoint"
@@ -58,7 +58,7 @@ class Shape:
         lines = "".join(f'    {{ keys = {{ "{key}" }}, {inputs[key]} }},\n' for key in self.keys)
         ends = "" if self.code == "force" else "open = 0, closed = 1, "
         actions = f'{{ pose = "absolute", gripper = {{ {ends}code = "{self.code}" }} }}'
-        return f"return softvt.profile {{\n  name = {json.dumps(name)},\n  inputs = {{\n{lines}  }},\n  actions = {actions},\n}}\n"
+        return f"return softvt.profile {{\n  name = {json.dumps(name, ensure_ascii=False)},\n  inputs = {{\n{lines}  }},\n  actions = {actions},\n}}\n"
 
     @property
     def marker_rows(self) -> int:
@@ -79,7 +79,9 @@ def read(obs: dict, shape: Shape, statistics: Statistics, vocabulary: prompts.Vo
     """
     if missing := [key for key in shape.keys if key not in obs]:
         raise UserError(f"the observation has no {', '.join(missing)}; {USE_PROFILE}")
-    if problem := vocabulary.problem(obs["prompt"]):
+    if missing := [key for key in ("seed", "step") if key not in obs["softvt"]]:
+        raise UserError(f"softvt in the observation has no {', '.join(missing)}; {USE_PROFILE}")
+    if problem := vocabulary.problem(str(obs["prompt"])):
         raise UserError(problem)
 
     def frames(key: str, axes: int) -> np.ndarray:
@@ -91,18 +93,26 @@ def read(obs: dict, shape: Shape, statistics: Statistics, vocabulary: prompts.Vo
             raise UserError(f"{key} has the shape {np.shape(obs[key])}, expected {expected}; {USE_PROFILE}")
         return array
 
-    inputs = {key: shrink(frames(key, 3), shape.edge)[None] for key in shape.pictures}
+    inputs = {}
+    for key in shape.pictures:
+        pictures = frames(key, 3)
+        if pictures.dtype != np.uint8 or pictures.shape[3] != 3:
+            raise UserError(f"{key} is {pictures.dtype} with {pictures.shape[3]} channels, expected uint8 with 3")
+        if key in CAMERAS and pictures.shape[1:3] != (shape.edge, shape.edge):
+            size = f"--set cameras.width={shape.edge} --set cameras.height={shape.edge}"
+            raise UserError(f"{key} has {pictures.shape[2]} x {pictures.shape[1]} pixels; the policy needs softvt {size}")
+        inputs[key] = shrink(pictures, shape.edge)[None]
     states = fold(frames("state", 1)[None], statistics.axis)
     if states.shape[-1] != shape.state:
         raise UserError(f"state has {states.shape[-1]} numbers, expected {shape.state}; {USE_PROFILE}")
     inputs["state"], inputs["reference"] = statistics.state.apply(states), reference(states[:, -1:])
-    inputs["prompt"] = np.array([prompts.encode(obs["prompt"])])
+    inputs["prompt"] = np.array([prompts.encode(str(obs["prompt"]))])
     random = np.random.default_rng(obs["softvt"]["seed"])
     inputs["noise"] = random.standard_normal((1, shape.chunk, shape.action), np.float32)
     if shape.has_touch:
         motion = np.array(obs["tactile_marker_motion"])
-        if len(motion) != shape.marker_rows:
-            raise UserError(f"tactile_marker_motion has the shape {motion.shape}, expected {shape.marker_rows} rows; {USE_PROFILE}")
+        if motion.shape != (expected := (shape.marker_rows, MARKERS // 2, 2)):
+            raise UserError(f"tactile_marker_motion has the shape {motion.shape}, expected {expected}; {USE_PROFILE}")
         rows = [motion[-1 - back] - motion[0] for back in shape.marker_steps]
         inputs["markers"] = np.stack(rows).reshape(1, len(rows), -1) / np.float32(statistics.marker_scale)
     return inputs

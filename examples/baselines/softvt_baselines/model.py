@@ -43,7 +43,7 @@ class Tokens(nn.Module):
             self.touch_place = nn.Parameter(0.02 * torch.randn(len(shape.marker_steps), width))
 
     def forward(self, obs: dict[str, Tensor]) -> Tensor:
-        """Tokens (B, T, width) of pictures (B, frames, edge, edge, 3) uint8, standardised states (B, frames, 7), prompt
+        """Tokens (B, T, width) of pictures (B, frames, edge, edge, 3) uint8, standardised states (B, frames, 7 or 8), prompt
         buckets (B, L), and with touch scaled markers (B, steps, 396)."""
         tokens = []
         for key, net in self.pictures.items():

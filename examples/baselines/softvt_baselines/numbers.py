@@ -49,9 +49,9 @@ class Standard:
 
     @classmethod
     def of(cls, rows: np.ndarray, least: np.ndarray | float = 0.0) -> "Standard":
-        """Those of rows (N, D), the deviations at least `least`. A component that never changes has the deviation 1."""
-        std = rows.std(axis=0)
-        std = np.where(std < 1e-6, 1, np.maximum(std, least))
+        """Those of rows (N, D), the deviations at least `least`. Without it, a component that never changes has the deviation 1."""
+        std = np.maximum(rows.std(axis=0), least)
+        std = np.where(std < 1e-6, 1, std)
         return cls(rows.mean(axis=0).astype(np.float32), std.astype(np.float32))
 
     def apply(self, rows: np.ndarray) -> np.ndarray:

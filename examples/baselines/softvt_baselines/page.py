@@ -3,7 +3,7 @@
 import re
 import shutil
 from collections import defaultdict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,8 @@ BEGIN, END = "<!-- tables: softvt-baselines page -->", "<!-- end of tables -->"
 LEARNED = re.compile(r"(?P<suite>\w+)-(?P<inputs>v[ot])-(?P<code>[a-z-]+)-s(?P<seed>\d+)-r(?P<replan>\d+)(?P<condition>\+.*)?")
 REFERENCES = {"expert": "expert (privileged)", "tactile-servo": "tactile servo (privileged)", "fixed-closure": "fixed closure (privileged)"}
 MEASURES = ["goal", "no_drop", "safety"]
+# The condition of suites/shifts.lua that changes nothing.
+UNCHANGED = "reference"
 
 
 @dataclass(frozen=True, order=True)
@@ -38,11 +40,17 @@ def collect(study: Path, into: Path) -> None:
         if summary.parent.name == "softvtbench":
             continue
         name, *inner = summary.parent.relative_to(study / "runs").parts
+        if not _is_known(name):
+            raise UserError(f"{summary.parent}: not named as a run of a study")
         # A run is in a folder of its suite; one of a condition also in one of the condition.
         folder = into / "+".join([name, *inner[1:]])
         folder.mkdir(parents=True, exist_ok=True)
         shutil.copy(summary, folder)
         results.save(results.load(summary.parent), folder)
+
+
+def _is_known(name: str) -> bool:
+    return bool(LEARNED.fullmatch(name)) or any(name.endswith(f"-{reference}") for reference in REFERENCES)
 
 
 def _grouped(folder: Path) -> tuple[dict[Policy, list[Run]], dict[tuple[str, str], Run]]:
@@ -68,9 +76,12 @@ def _table(heading: list[str], rows: list[list[str]]) -> str:
 
 def _row(name: str, runs: list[Run], replan: str) -> list[str]:
     ratio = np.concatenate([run.ratio for run in runs])
-    low, median, high = np.nanpercentile(np.minimum(ratio, 99), [5, 50, 95])
+    shown = "–"
+    if not np.isnan(ratio).all():
+        low, median, high = np.nanpercentile(np.minimum(ratio, 99), [5, 50, 95])
+        shown = f"{median:.2f} [{low:.2f}, {high:.2f}]"
     rates = [results.rate(runs, measure).text() for measure in MEASURES]
-    return [name, replan, str(len(runs)), str(len(runs[0].task)), *rates, f"{median:.2f} [{low:.2f}, {high:.2f}]"]
+    return [name, replan, str(len(runs)), str(len(runs[0].task)), *rates, shown]
 
 
 def _name(policy: Policy) -> str:
@@ -90,7 +101,7 @@ def _pairs(learned: dict[Policy, list[Run]]) -> list[tuple[Policy, list[Run], li
 def tables(folder: Path) -> str:
     """All tables, in Markdown."""
     learned, references = _grouped(folder)
-    text = ""
+    text = "Rates are means over the training seeds; intervals (95 %, bootstrap) are over the episodes, for these seeds.\n\n"
     for suite in sorted({policy.suite for policy in learned} | {suite for suite, _ in references}):
         text += f"### `{suite}`\n\n"
         rows = [_row(_name(policy), runs, str(policy.replan)) for policy, runs in sorted(learned.items()) if (policy.suite, policy.condition) == (suite, "")]
@@ -100,11 +111,28 @@ def tables(folder: Path) -> str:
         [f"`{policy.suite}`", policy.code, str(policy.replan), str(len(touch)), policy.condition or "none"]
         + [results.difference(vision, touch, measure).text(signed=True) for measure in MEASURES]
         for policy, vision, touch in _pairs(learned)
+        if policy.condition != UNCHANGED
     ]
     if differences:
         text += "### VT minus VO, on the same episodes\n\n"
         text += _table(["suite", "grip code", "replan", "seeds", "shift", *(f"{measure}, points" for measure in ("Goal", "NoDrop", "Safety"))], differences)
+    if shifted := _shifts(learned):
+        text += "### Shifts\n\nThe change is that against the same policy without a shift, on the same episodes.\n\n"
+        text += _table(["suite", "policy", "replan", "seeds", "shift", "Goal, %", "Safety, %", "change of Safety, points"], shifted)
     return text
+
+
+def _shifts(learned: dict[Policy, list[Run]]) -> list[list[str]]:
+    """Rows of the policies under conditions."""
+    rows = []
+    for policy, runs in sorted(learned.items()):
+        if not policy.condition or policy.condition == UNCHANGED:
+            continue
+        unchanged = learned.get(replace(policy, condition=UNCHANGED), [])
+        change = results.difference(unchanged, runs, "safety").text(signed=True) if len(unchanged) == len(runs) else "–"
+        rates = [results.rate(runs, measure).text() for measure in ("goal", "safety")]
+        rows.append([f"`{policy.suite}`", _name(policy), str(policy.replan), str(len(runs)), policy.condition, *rates, change])
+    return rows
 
 
 def figure(folder: Path, path: Path) -> None:

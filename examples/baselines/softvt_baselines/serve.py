@@ -15,11 +15,13 @@ from websockets.exceptions import ConnectionClosed
 
 from . import UserError
 
+# Episodes whose last answers are kept.
+EPISODES = 4096
 
 
 @dataclass
 class Plan:
-    """The last answer of a connection, which runs one episode after the other."""
+    """The last answer in an episode."""
 
     step: int  # control step of its first action
     actions: np.ndarray  # (chunk, 7)
@@ -48,23 +50,37 @@ async def _answer_all(queue: asyncio.Queue, answers: Answers, batch_size: int) -
         batch = [await queue.get()]
         while len(batch) < batch_size and not queue.empty():
             batch.append(queue.get_nowait())
-        found = await asyncio.to_thread(answers, [pending.request for pending in batch])
+        try:
+            found = await asyncio.to_thread(answers, [pending.request for pending in batch])
+        except Exception as error:
+            traceback.print_exc()
+            found = [UserError(f"the policy failed: {type(error).__name__}: {error}")] * len(batch)
         for pending, answer in zip(batch, found, strict=True):
             if not pending.answer.cancelled():
                 pending.answer.set_result(answer)
 
 
+def _episode(obs: dict) -> tuple:
+    """The episode of an observation. softvt may continue one over another connection."""
+    query = obs.get("softvt", {})
+    return tuple(query.get(key) for key in ("suite", "run_seed", "task", "episode"))
+
+
 async def serve(answers: Answers, batch_size: int, metadata: dict, host: str, port: int) -> None:
-    """Serves until it is cancelled. Port 0 takes a free one; the first line of output names it."""
+    """Serves the policies of one run at a time until it is cancelled. Port 0 takes a free one; the first line of output names it.
+
+    Raises UserError if the address is not free or not valid.
+    """
     queue: asyncio.Queue[_Pending] = asyncio.Queue()
+    plans: dict[tuple, Plan] = {}
 
     async def converse(socket) -> None:
-        last = None
         try:
             await socket.send(msgpack_numpy.packb(metadata))
             async for message in socket:
                 obs = msgpack_numpy.unpackb(message)
-                step = obs.get("softvt", {}).get("step", 0)
+                step, episode = obs.get("softvt", {}).get("step", 0), _episode(obs)
+                last = plans.pop(episode, None)
                 pending = _Pending(Request(obs, last if step > 0 else None), asyncio.get_running_loop().create_future())
                 await queue.put(pending)
                 answer = await pending.answer
@@ -72,13 +88,19 @@ async def serve(answers: Answers, batch_size: int, metadata: dict, host: str, po
                     await socket.send(str(answer))  # text is an error message
                     return
                 await socket.send(msgpack_numpy.packb({"actions": answer}))
-                last = Plan(step, answer)
+                plans[episode] = Plan(step, answer)
+                if len(plans) > EPISODES:
+                    del plans[next(iter(plans))]
         except ConnectionClosed:
             return
         except Exception:
             await socket.send(traceback.format_exc())
             raise
 
-    async with listen(converse, host, port, compression=None, max_size=64 << 20) as server:
+    try:
+        server = await listen(converse, host, port, compression=None, max_size=64 << 20, ping_interval=None)
+    except (OSError, OverflowError) as error:
+        raise UserError(f"cannot serve on {host}, port {port}: {error}") from None
+    async with server:
         print(f"serving on ws://{host}:{server.sockets[0].getsockname()[1]}", flush=True)
         await _answer_all(queue, answers, batch_size)

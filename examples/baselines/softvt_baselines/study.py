@@ -1,9 +1,10 @@
-"""The study of docs/baselines.md: records suites, trains the policies of a list on all GPUs, and evaluates them.
+"""A study: records suites, trains the policies of a list on all GPUs, and evaluates them.
 
 Everything that is complete in the folder of the study is kept, so a study that was interrupted continues.
 """
 
 import itertools
+import json
 import os
 import queue
 import subprocess
@@ -21,6 +22,8 @@ from .evaluate import recording_flags, run_softvt
 
 # Script that runs a suite under conditions.
 SHIFTS = "shifts"
+# Options that all results in the folder of a study have in common.
+SAME = ["demos", "steps", "edge", "teacher", "disturbance", "blend", "episodes"]
 
 
 @dataclass
@@ -44,7 +47,7 @@ class Study:
     shifts: bool = False  # evaluate also under the standard conditions of suites/shifts.lua, with the first of `replans`
     references: tuple[str, ...] = ()  # built-in policies that are evaluated as well
     compile: bool = False  # compile the networks
-    flags: tuple[str, ...] = ()  # further flags of the evaluations
+    flags: tuple[str, ...] = ()  # further flags of the evaluations of learned policies
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,9 @@ class Job:
 
 def _call(words: list[str], log: Path, gpu: int | None = None) -> None:
     """Runs a command of this package with its output in a log."""
-    environment = os.environ | ({} if gpu is None else {"CUDA_VISIBLE_DEVICES": str(gpu)})
+    visible = [name for name in os.environ.get("CUDA_VISIBLE_DEVICES", "").split(",") if name]
+    own = {} if gpu is None else {"CUDA_VISIBLE_DEVICES": visible[gpu] if visible else str(gpu)}
+    environment = os.environ | own
     with open(log, "a") as file:
         code = subprocess.run([sys.executable, "-m", "softvt_baselines", *words], stdout=file, stderr=file, env=environment).returncode
     if code != 0:
@@ -91,8 +96,8 @@ def _evaluate(job: Job, replan: int, script: str, study: Study, threads: int, gp
 
 def _evaluate_reference(suite: str, policy: str, study: Study, threads: int, gpu: int | None) -> None:
     name = f"{suite}-{policy}"
-    run_softvt([f"suites/{suite}.lua", "--policy", policy, "--out", str(study.out / "runs" / name), "--name", name]
-               + ["--episodes", str(study.episodes), "--threads", str(threads), "--resume", *study.flags])
+    words = [f"suites/{suite}.lua", "--policy", policy, "--out", str(study.out / "runs" / name), "--name", name]
+    run_softvt([*words, "--episodes", str(study.episodes), "--threads", str(threads), "--resume"])
     print(f"evaluated {name}", flush=True)
 
 
@@ -127,6 +132,30 @@ class _Workers:
         """Waits for all jobs. Returns the errors."""
         return [str(error) for job in self.jobs if (error := job.exception())]
 
+    def cancel(self) -> None:
+        """Drops the jobs that have not begun."""
+        self.pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _check_options(study: Study) -> None:
+    """Raises UserError if the folder has results of a study with other options."""
+    path, options = study.out / "study.json", {key: getattr(study, key) for key in SAME}
+    if not path.is_file():
+        path.write_text(json.dumps(options, indent=1) + "\n")
+        return
+    before = json.loads(path.read_text())
+    if changed := [f"{key} {before.get(key)}, now {value}" for key, value in options.items() if before.get(key) != value]:
+        raise UserError(f"{study.out} has a study with other options ({'; '.join(changed)}); choose another --out")
+
+
+def _record(suite: str, study: Study) -> None:
+    recording = study.out / "data" / suite
+    if not (recording / "dataset.json").is_file():
+        flags = ["--out", str(recording), "--resume", *recording_flags(study.demos, study.edge, study.teacher, study.disturbance)]
+        run_softvt(["record", f"suites/{suite}.lua", *flags])
+    pack(recording, study.edge, os.cpu_count() or 1)
+    print(f"recorded {suite}", flush=True)
+
 
 def run(study: Study) -> None:
     """Runs a study: evaluations of the first policies beside the training of the next ones.
@@ -140,6 +169,7 @@ def run(study: Study) -> None:
     threads = max(1, 2 * (os.cpu_count() or 1) // len(gpus))
     for folder in ("data", "logs", "runs", "checkpoints"):
         (study.out / folder).mkdir(parents=True, exist_ok=True)
+    _check_options(study)
     training, evaluation = _Workers(gpus * study.per_gpu), _Workers(gpus)
 
     def add(job: Job) -> None:
@@ -153,16 +183,22 @@ def run(study: Study) -> None:
 
         training.add(train)
 
-    for suite in study.suites:
-        recording = study.out / "data" / suite
-        if not (recording / "dataset.json").is_file():
-            flags = ["--out", str(recording), "--resume", *recording_flags(study.demos, study.edge, study.teacher, study.disturbance)]
-            run_softvt(["record", f"suites/{suite}.lua", *flags])
-        pack(recording, study.edge, os.cpu_count() or 1)
-        print(f"recorded {suite}", flush=True)
-        for policy in study.references:
-            evaluation.add(partial(_evaluate_reference, suite, policy, study, threads))
-        for seed, code, inputs in itertools.product(study.seeds, study.codes, study.inputs):
-            add(Job(suite, inputs, code, seed))
-    if problems := training.problems() + evaluation.problems():
-        raise UserError(f"{len(problems)} policies or runs are not complete: {'; '.join(problems)}")
+    problems = []
+    try:
+        for suite in study.suites:
+            try:
+                _record(suite, study)
+            except UserError as error:
+                problems.append(str(error))
+                continue
+            for policy in study.references:
+                evaluation.add(partial(_evaluate_reference, suite, policy, study, threads))
+            for seed, code, inputs in itertools.product(study.seeds, study.codes, study.inputs):
+                add(Job(suite, inputs, code, seed))
+        problems += training.problems() + evaluation.problems()
+    except KeyboardInterrupt:
+        training.cancel()
+        evaluation.cancel()
+        raise
+    if problems:
+        raise UserError(f"{len(problems)} recordings, policies or runs are not complete: {'; '.join(problems)}")

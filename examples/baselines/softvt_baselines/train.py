@@ -90,7 +90,7 @@ class Batches:
 
 
 def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict) -> None:
-    """Trains a policy and writes its checkpoint to `path`, and the log beside it."""
+    """Trains a policy and writes its checkpoint to `path`, with the log and the profile beside it."""
     torch.manual_seed(options.seed)
     torch.set_float32_matmul_precision("high")
     statistics = Statistics.of(demos, options.shape.chunk)
@@ -106,8 +106,7 @@ def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict)
 
     schedule = torch.optim.lr_scheduler.LambdaLR(optimizer, rate)
     started, total = time.monotonic(), torch.zeros((), device=options.device)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with open(path.with_suffix(".log"), "w") as log:
+    with open(path.with_name(f"{path.name}.log"), "w") as log:
         for step in range(1, options.steps + 1):
             obs, actions, is_step = batches.draw(options.batch)
             with torch.autocast(options.device.type, torch.bfloat16, enabled=options.device.type == "cuda"):
@@ -118,7 +117,8 @@ def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict)
             optimizer.zero_grad(set_to_none=True)
             schedule.step()
             decay = min(AVERAGE, step / (step + 10))
-            torch._foreach_lerp_(list(averaged.parameters()), list(policy.parameters()), 1 - decay)
+            with torch.no_grad():
+                torch._foreach_lerp_(list(averaged.parameters()), list(policy.parameters()), 1 - decay)
             total += loss.detach()
             if step % REPORT == 0 or step == options.steps:
                 count = (step - 1) % REPORT + 1

@@ -24,7 +24,7 @@ def rotation(vector: np.ndarray) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
-def recording(folder: Path, demos: int = 2, without: tuple[str, ...] = (), gripper: str | None = None) -> Path:
+def recording(folder: Path, demos: int = 2, without: tuple[str, ...] = (), gripper: str | None = None, edge: int = 4) -> Path:
     """A recording of one task with simple numbers, as softvt record leaves it."""
     (folder / "hdf5").mkdir(parents=True)
     with h5py.File(folder / "hdf5" / "suite_task0_demo.hdf5", "w") as file:
@@ -33,7 +33,7 @@ def recording(folder: Path, demos: int = 2, without: tuple[str, ...] = (), gripp
             demo.attrs["num_samples"], demo.attrs["language"] = STEPS, "pick up the left bun"
             actions = np.zeros((STEPS, 7))
             actions[:, 0], actions[:, 3], actions[:, 6] = 0.01 * np.arange(STEPS), 3.1, 0.1 * index
-            streams = {f"obs/{stream}": np.full((STEPS, 8, 8, 3), 10 * index, np.uint8) for stream in CAMERAS.values()}
+            streams = {f"obs/{stream}": np.full((STEPS, edge, edge, 3), 10 * index, np.uint8) for stream in CAMERAS.values()}
             streams |= {f"obs/{stream}": np.full((STEPS, 6, 8, 3), 20 * index, np.uint8) for stream in TACTILE.values()}
             streams |= {stream: actions for stream in ACTIONS.values()}
             streams["obs/state"], streams["obs/gripper_closure"] = actions, np.full((STEPS, 1), 0.1 * index)
@@ -42,7 +42,8 @@ def recording(folder: Path, demos: int = 2, without: tuple[str, ...] = (), gripp
                 if name not in without:
                     demo[name] = values
     (folder / "dataset.json").write_text("{}")
-    (folder / "recording.json").write_text(json.dumps({"gripper": gripper} if gripper else {}))
+    if gripper != "":
+        (folder / "recording.json").write_text(json.dumps({"gripper": gripper} if gripper else {}))
     return folder
 
 
@@ -71,6 +72,9 @@ class Recordings(unittest.TestCase):
         self.refused("no dataset.json", [self.folder], "continuous", 4)
         self.refused("--images video", [recording(self.folder / "a", without=("obs/agentview_rgb",))], "continuous", 4)
         self.refused("no actions_force", [recording(self.folder / "b", without=("actions_force",))], "force", 4)
+        self.refused("record with --edge 32, or train with --edge 4", [recording(self.folder / "d")], "continuous", 32)
+        self.refused("recording.json", [recording(self.folder / "e", gripper="")], "continuous", 4)
+        self.refused("gripper_closure", [recording(self.folder / "f", without=("obs/gripper_closure",))], "continuous", 4)
         self.refused("--gripper force", [recording(self.folder / "c", gripper="force")], "continuous", 4)
 
     def test_a_new_recording_in_the_same_folder_is_packed_again(self):
@@ -151,8 +155,8 @@ class Inputs(unittest.TestCase):
         self.vocabulary = prompts.Vocabulary(["take it"])
         motion = np.zeros((6, 198, 2), np.float32)
         motion[5] = 6
-        self.obs = {camera: np.zeros((8, 8, 3), np.uint8) for camera in CAMERAS}
-        self.obs |= {"state": np.array([0, 0, 0, -3.1, 0, 0, 0.04, 0.3], np.float32), "prompt": "take it", "softvt": {"seed": 7}}
+        self.obs = {camera: np.zeros((4, 4, 3), np.uint8) for camera in CAMERAS}
+        self.obs |= {"state": np.array([0, 0, 0, -3.1, 0, 0, 0.04, 0.3], np.float32), "prompt": "take it", "softvt": {"seed": 7, "step": 0}}
         self.obs["tactile_marker_motion"] = motion
 
     def read(self, shape: Shape, **changes) -> dict:
@@ -167,14 +171,16 @@ class Inputs(unittest.TestCase):
         self.assertEqual(found["reference"][0, 0, 6], np.float32(0.3))
         self.assertEqual((found["markers"][0, 0].max(), found["markers"][0, 1].max()), (0, 3))
         np.testing.assert_array_equal(found["noise"], self.read(shape)["noise"])
-        self.assertFalse((found["noise"] == self.read(shape, softvt={"seed": 8})["noise"]).all())
+        self.assertFalse((found["noise"] == self.read(shape, softvt={"seed": 8, "step": 0})["noise"]).all())
 
     def test_what_does_not_fit_is_named(self):
         for shape, changes, words in [
-            (Shape(True), {"tactile_marker_motion": None}, "no tactile_marker_motion; use the profile"),
-            (Shape(False, frames=2), {}, "image has the shape (8, 8, 3), expected 2 frames"),
-            (Shape(False), {"prompt": "fly away"}, "was not trained for the prompt"),
-            (Shape(False, "force"), {}, "state has 8 numbers, expected 7; use the profile"),
+            (Shape(True, edge=4), {"tactile_marker_motion": None}, "no tactile_marker_motion; use the profile"),
+            (Shape(False, frames=2), {}, "image has the shape (4, 4, 3), expected 2 frames"),
+            (Shape(False, edge=32), {}, "--set cameras.width=32"),
+            (Shape(False, edge=4), {"softvt": {"step": 0}}, "no seed"),
+            (Shape(False, edge=4), {"prompt": "fly away"}, "was not trained for the prompt"),
+            (Shape(False, "force", edge=4), {}, "state has 8 numbers, expected 7; use the profile"),
         ]:
             obs = {key: value for key, value in (self.obs | changes).items() if value is not None}
             with self.assertRaises(UserError) as caught:

@@ -44,9 +44,19 @@ class Pages(unittest.TestCase):
     def test_runs_under_a_condition_are_rows_of_their_own(self):
         for inputs in ("vo", "vt"):
             self.run_of(f"one-{inputs}-continuous-s0-r4/shifts/light x2", np.ones((10, 5), bool))
+            self.run_of(f"one-{inputs}-continuous-s0-r4/shifts/reference", np.zeros((10, 5), bool))
         page.collect(self.study, self.docs)
         text = page.tables(self.docs)
         self.assertIn("| `one` | continuous | 4 | 1 | light x2 |", text)
+        self.assertNotIn("reference", text)
+        self.assertIn("| `one` | VT, continuous | 4 | 1 | light x2 | 100.0 [100.0, 100.0] | 100.0 [100.0, 100.0] | +100.0", text)
+
+    def test_foreign_runs_are_refused_and_not_collected(self):
+        self.run_of("something", np.ones((10, 5), bool))
+        with self.assertRaises(UserError) as caught:
+            page.write([self.study], self.docs)
+        self.assertIn("not named as a run of a study", str(caught.exception))
+        self.assertFalse((self.docs / "baselines" / "something").exists())
 
     def test_what_is_missing_is_named(self):
         with self.assertRaises(UserError) as caught:

@@ -25,7 +25,7 @@ class Policies(unittest.TestCase):
         scratch = tempfile.TemporaryDirectory()
         self.addCleanup(scratch.cleanup)
         self.folder = Path(scratch.name)
-        self.demos = load_demonstrations([recording(self.folder / "data")], "continuous", 32, has_tactile=True)
+        self.demos = load_demonstrations([recording(self.folder / "data", edge=32)], "continuous", 32, has_tactile=True)
 
     def trained(self, shape: Shape) -> Path:
         path = self.folder / "policy.pt"
@@ -61,10 +61,10 @@ class Policies(unittest.TestCase):
 
     def test_an_answer_keeps_a_share_of_what_was_planned_for_the_same_steps(self):
         planned, fresh = np.arange(5.0)[:, None] * np.ones(7), np.zeros((5, 7))
-        found = blended(fresh, 12, Plan(10, planned), 0.5)
+        found = blended(fresh, 12, Plan(10, planned), np.full(7, 0.5))
         self.assertEqual(found[:, 0].tolist(), [1, 1.5, 2, 0, 0])
         for step, last in [(12, None), (10, Plan(10, planned)), (0, Plan(10, planned)), (15, Plan(10, planned))]:
-            np.testing.assert_array_equal(blended(fresh, step, last, 0.5), fresh)
+            np.testing.assert_array_equal(blended(fresh, step, last, np.full(7, 0.5)), fresh)
 
     def test_training_is_repeatable(self):
         shape = Shape(False, edge=32, chunk=5, width=32, layers=1)

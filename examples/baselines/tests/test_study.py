@@ -1,0 +1,76 @@
+"""The order of a study and what happens when a part fails. Needs no learning library: commands are replaced."""
+
+import sys
+import tempfile
+import types
+import unittest
+from pathlib import Path
+from unittest import mock
+
+from softvt_baselines import UserError, study
+
+
+class Studies(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.out = Path(scratch.name)
+        self.calls = []
+        cuda = types.SimpleNamespace(device_count=lambda: 0)
+        for patch in (
+            mock.patch.dict(sys.modules, {"torch": types.SimpleNamespace(cuda=cuda)}),
+            mock.patch.object(study, "_call", self.call),
+            mock.patch.object(study, "run_softvt", self.run_softvt),
+            mock.patch.object(study, "pack", lambda *_: None),
+        ):
+            patch.start()
+            self.addCleanup(patch.stop)
+        self.failing = ""
+
+    def call(self, words, log, gpu=None):
+        self.calls.append(" ".join(words[:1] + words[words.index("--out") + 1 :][:1]).replace(f"{self.out}/", ""))
+        if self.failing and self.failing in self.calls[-1]:
+            raise UserError("it failed")
+        if words[0] == "train":
+            Path(words[words.index("--out") + 1]).touch()
+
+    def run_softvt(self, words):
+        self.calls.append(" ".join(words[:2]))
+        if self.failing and self.failing in self.calls[-1]:
+            raise UserError("it failed")
+
+    def study(self, **changes) -> study.Study:
+        options = dict(suites=["one"], inputs=["vo", "vt"], seeds=[0], codes=["continuous"], replans=[4, 10], out=self.out, demos=1)
+        return study.Study(**options | dict(steps=2, episodes=1) | changes)
+
+    def test_every_policy_is_trained_once_and_evaluated_with_every_replan(self):
+        study.run(self.study(references=("expert",), shifts=True))
+        self.assertEqual(self.calls[0], "record suites/one.lua")
+        runs = sorted(call for call in self.calls if call.startswith("evaluate"))
+        expected = [f"evaluate runs/one-{inputs}-continuous-s0-r{replan}" for inputs in ("vo", "vt") for replan in (10, 4, 4)]
+        self.assertEqual(runs, expected)
+        study.run(self.study(references=("expert",), shifts=True))
+        self.assertEqual(len([call for call in self.calls if call.startswith("train")]), 2)
+
+    def test_what_fails_is_named_and_the_rest_goes_on(self):
+        self.failing = "train checkpoints/one-vo"
+        with self.assertRaises(UserError) as caught:
+            study.run(self.study())
+        self.assertIn("1 recordings, policies or runs are not complete: it failed", str(caught.exception))
+        self.assertIn("evaluate runs/one-vt-continuous-s0-r10", self.calls)
+
+    def test_a_suite_that_cannot_be_recorded_does_not_stop_the_others(self):
+        self.failing = "suites/one"
+        with self.assertRaises(UserError):
+            study.run(self.study(suites=["one", "two"]))
+        self.assertIn("evaluate runs/two-vt-continuous-s0-r4", self.calls)
+
+    def test_other_options_need_another_folder(self):
+        study.run(self.study())
+        with self.assertRaises(UserError) as caught:
+            study.run(self.study(steps=3))
+        self.assertIn("steps 2, now 3", str(caught.exception))
+
+
+if __name__ == "__main__":
+    unittest.main()
