@@ -15,7 +15,7 @@ BATCH = 16  # observations that are answered together
 def blended(actions: np.ndarray, step: int, last: Plan | None, shares: np.ndarray) -> np.ndarray:
     """Actions (chunk, 7) from a step on, with a share (7,) of those that the last answer had planned for the same steps.
 
-    A policy that plans anew every few steps then moves without jerks, as with the temporal ensemble of ACT (Zhao et al., 2023).
+    A policy that replans every few steps then moves without jerks, as with the temporal ensemble of ACT (Zhao et al., 2023).
     """
     if last is None or not 0 < step - last.step < len(last.actions):
         return actions
