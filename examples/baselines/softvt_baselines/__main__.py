@@ -3,6 +3,7 @@
 import argparse
 import asyncio
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from . import UserError
@@ -68,32 +69,25 @@ def _page(args: argparse.Namespace) -> None:
     write(args.studies, args.docs)
 
 
-def _positive(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"expected 1 or more, got {text}")
-    return value
+def _number(kind: type, is_valid: Callable[[float], bool], expected: str) -> Callable[[str], float]:
+    """The type of an option that takes some numbers only."""
+
+    def parse(text: str) -> float:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = None
+        if value is None or not is_valid(value):
+            raise argparse.ArgumentTypeError(f"expected {expected}, got {text}")
+        return value
+
+    return parse
 
 
-def _edge(text: str) -> int:
-    value = _positive(text)
-    if value % 32:
-        raise argparse.ArgumentTypeError(f"expected a multiple of 32 pixels, got {text}")
-    return value
-
-
-def _share(text: str) -> float:
-    value = float(text)
-    if not 0 <= value < 1:
-        raise argparse.ArgumentTypeError(f"expected a number from 0 to below 1, got {text}")
-    return value
-
-
-def _length(text: str) -> float:
-    value = float(text)
-    if not 0 <= value <= 0.05:
-        raise argparse.ArgumentTypeError(f"expected 0 to 0.05 m, got {text}")
-    return value
+_positive = _number(int, lambda value: value >= 1, "a whole number, 1 or more")
+_edge = _number(int, lambda value: value >= 32 and value % 32 == 0, "a multiple of 32 pixels")
+_share = _number(float, lambda value: 0 <= value < 1, "a number from 0 to below 1")
+_length = _number(float, lambda value: 0 <= value <= 0.05, "0 to 0.05 m")
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -26,7 +26,7 @@ class Checkpoint:
 
 
 def save(path: Path, checkpoint: Checkpoint) -> None:
-    """Writes a checkpoint, its weights in half precision, and beside it the profile of softvt for its inputs."""
+    """Writes a checkpoint, its weights in half precision, and next to it the profile of softvt for its inputs."""
     one, statistics = checkpoint, checkpoint.statistics
     content = {
         "version": VERSION,

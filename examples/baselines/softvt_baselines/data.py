@@ -11,6 +11,7 @@ import shutil
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import h5py
 import numpy as np
@@ -54,11 +55,6 @@ class Demonstrations:
 def displacements(motion: np.ndarray) -> np.ndarray:
     """Displacements (T, 396) of the markers, px, of gripper_marker_motion (T, finger, initial and present, marker, xy)."""
     return (motion[:, :, 1] - motion[:, :, 0]).reshape(len(motion), -1)
-
-
-def states(code: str, state: np.ndarray, closure: np.ndarray) -> np.ndarray:
-    """The states (T, 7 or 8) of policies with a grip code. `closure` (T, 1) is the commanded one."""
-    return np.concatenate([state, closure], 1) if has_closure(code) else state
 
 
 def has_closure(code: str) -> bool:
@@ -165,8 +161,22 @@ def pack(recording: Path, edge: int, processes: int, has_tactile: bool = False) 
     if not demos:
         raise UserError(f"{recording}: no demonstrations")
     # Other processes may pack the same recording.
-    done, folder = folder, recording / f"{folder.name}.{os.getpid()}.part"
-    folder.mkdir()
+    with TemporaryDirectory(dir=recording, prefix="packing_") as scratch:
+        part = Path(scratch) / folder.name
+        part.mkdir()
+        _write_packed(part, demos, edge, streams, processes)
+        (part / "identity").write_text(identity)
+        shutil.rmtree(folder, ignore_errors=True)
+        try:
+            part.rename(folder)
+        except OSError:
+            if not folder.is_dir():  # else another process was first
+                raise
+    return folder
+
+
+def _write_packed(folder: Path, demos: list[tuple[Path, str, int]], edge: int, streams: dict[str, str], processes: int) -> None:
+    """Writes the pictures and numbers of demonstrations (file, name, steps)."""
     ends = np.cumsum([steps for _, _, steps in demos])
     for key in streams:
         np.lib.format.open_memmap(folder / f"{key}.npy", "w+", np.uint8, (int(ends[-1]), edge, edge, 3))
@@ -177,13 +187,6 @@ def pack(recording: Path, edge: int, processes: int, has_tactile: bool = False) 
     arrays = {stream: np.concatenate([one[stream] for one in numbers]) for stream in sorted(common)}
     prompts = np.array([one["prompt"] for one in numbers])
     np.savez(folder / "numbers.npz", lengths=[steps for _, _, steps in demos], prompts=prompts, **arrays)
-    (folder / "identity").write_text(identity)
-    shutil.rmtree(done, ignore_errors=True)
-    try:
-        folder.rename(done)
-    except OSError:  # another process was first
-        shutil.rmtree(folder)
-    return done
 
 
 def _check_grip_code(recording: Path, code: str, packed) -> None:
@@ -215,7 +218,9 @@ def load(recordings: list[Path], code: str, edge: int, has_tactile: bool = False
         mapped = [np.load(folder / f"{key}.npy", mmap_mode="r") for folder in folders]
         return mapped[0] if len(mapped) == 1 else np.concatenate(mapped)
 
-    recorded, names, actions = joined("lengths"), joined("prompts"), joined(ACTIONS[code])
+    recorded, names, actions, state = joined("lengths"), joined("prompts"), joined(ACTIONS[code]), joined("state")
+    if has_closure(code):
+        state = np.concatenate([state, joined("closure")], 1)
     axis = mean_axis(actions[:, 3:6])
     actions = fold(actions, axis)
     grip_range = float(np.ptp(actions[:, 6]))
@@ -224,7 +229,7 @@ def load(recordings: list[Path], code: str, edge: int, has_tactile: bool = False
     prompts = sorted(set(names.tolist()))
     return Demonstrations(
         pictures={key: pictures(key) for key in (CAMERAS | TACTILE if has_tactile else CAMERAS)},
-        state=fold(states(code, joined("state"), joined("closure")), axis),
+        state=fold(state, axis),
         markers=joined("markers"),
         actions=actions[kept],
         row=np.flatnonzero(kept),

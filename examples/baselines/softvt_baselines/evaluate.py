@@ -73,7 +73,7 @@ class Evaluation:
 def evaluate(one: Evaluation) -> None:
     """Evaluates a checkpoint on all scripts, each in a folder below `out`. Raises UserError if its profile is missing."""
     if not one.profile.is_file():
-        raise UserError(f"{one.profile}: no such profile; train writes it beside the checkpoint")
+        raise UserError(f"{one.profile}: no such profile; train writes it next to the checkpoint")
     # softvt refuses to continue a run with another profile, and so with other weights.
     weights = hashlib.sha256(one.checkpoint.read_bytes()).hexdigest()
     profile = one.out / "profile.lua"

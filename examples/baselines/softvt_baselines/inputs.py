@@ -9,7 +9,7 @@ from . import UserError, prompts
 from .data import CAMERAS, MARKERS, TACTILE, Statistics, has_closure, shrink
 from .numbers import fold, reference
 
-USE_PROFILE = "use the profile that train wrote beside the checkpoint"
+USE_PROFILE = "use the profile that train wrote next to the checkpoint"
 
 
 @dataclass

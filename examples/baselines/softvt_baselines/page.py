@@ -39,18 +39,23 @@ def collect(study: Path, into: Path) -> None:
     for summary in found:
         if summary.parent.name == "softvtbench":
             continue
+        # Runs are in NAME (references), NAME/SUITE, or NAME/SCRIPT/CONDITION.
         name, *inner = summary.parent.relative_to(study / "runs").parts
-        if not _is_known(name):
-            raise UserError(f"{summary.parent}: not named as a run of a study")
-        # A run is in a folder of its suite; one of a condition also in one of the condition.
-        folder = into / "+".join([name, *inner[1:]])
+        folder, run = into / "+".join([name, *inner[1:]]), results.load(summary.parent)
+        _identify(folder, run.suite)
         folder.mkdir(parents=True, exist_ok=True)
         shutil.copy(summary, folder)
-        results.save(results.load(summary.parent), folder)
+        results.save(run, folder)
 
 
-def _is_known(name: str) -> bool:
-    return bool(LEARNED.fullmatch(name)) or any(name.endswith(f"-{reference}") for reference in REFERENCES)
+def _identify(folder: Path, suite: str) -> Policy | str:
+    """The policy of a collected run: a learned one, or the name of a reference. Raises UserError for other runs."""
+    if found := LEARNED.fullmatch(folder.name):
+        part = found.groupdict()
+        return Policy(part["suite"], part["code"], int(part["replan"]), part["inputs"], (part["condition"] or "")[1:])
+    if (reference := folder.name.removeprefix(f"{suite}-")) in REFERENCES:
+        return reference
+    raise UserError(f"{folder}: not named as a run of a study")
 
 
 def _grouped(folder: Path) -> tuple[dict[Policy, list[Run]], dict[tuple[str, str], Run]]:
@@ -58,14 +63,11 @@ def _grouped(folder: Path) -> tuple[dict[Policy, list[Run]], dict[tuple[str, str
     learned, references = defaultdict(list), {}
     for path in sorted(folder.glob("*/summary.json")):
         run = results.load(path.parent)
-        if found := LEARNED.fullmatch(run.name):
-            part = found.groupdict()
-            policy = Policy(part["suite"], part["code"], int(part["replan"]), part["inputs"], (part["condition"] or "")[1:])
+        policy = _identify(path.parent, run.suite)
+        if isinstance(policy, Policy):
             learned[policy].append(run)
-        elif run.name.removeprefix(f"{run.suite}-") in REFERENCES:
-            references[run.suite, run.name.removeprefix(f"{run.suite}-")] = run
         else:
-            raise UserError(f"{path.parent}: not named as a run of a study")
+            references[run.suite, policy] = run
     return learned, references
 
 

@@ -60,18 +60,13 @@ async def _answer_all(queue: asyncio.Queue, answers: Answers, batch_size: int) -
                 pending.answer.set_result(answer)
 
 
-def _episode(obs: dict) -> tuple:
-    """The episode of an observation. softvt may continue one over another connection."""
-    query = obs.get("softvt", {})
-    return tuple(query.get(key) for key in ("suite", "run_seed", "task", "episode"))
-
-
 async def serve(answers: Answers, batch_size: int, metadata: dict, host: str, port: int) -> None:
     """Serves the policies of one run at a time until it is cancelled. Port 0 takes a free one; the first line of output names it.
 
     Raises UserError if the address is not free or not valid.
     """
     queue: asyncio.Queue[_Pending] = asyncio.Queue()
+    # By suite, seed, task and episode: softvt may continue an episode over another connection.
     plans: dict[tuple, Plan] = {}
 
     async def converse(socket) -> None:
@@ -79,7 +74,8 @@ async def serve(answers: Answers, batch_size: int, metadata: dict, host: str, po
             await socket.send(msgpack_numpy.packb(metadata))
             async for message in socket:
                 obs = msgpack_numpy.unpackb(message)
-                step, episode = obs.get("softvt", {}).get("step", 0), _episode(obs)
+                query = obs.get("softvt", {})
+                step, episode = query.get("step", 0), tuple(query.get(key) for key in ("suite", "run_seed", "task", "episode"))
                 last = plans.pop(episode, None)
                 pending = _Pending(Request(obs, last if step > 0 else None), asyncio.get_running_loop().create_future())
                 await queue.put(pending)

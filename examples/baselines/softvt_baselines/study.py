@@ -19,7 +19,6 @@ from . import UserError
 from .data import pack
 from .evaluate import recording_flags, run_softvt
 
-
 # Script that runs a suite under conditions.
 SHIFTS = "shifts"
 # Options that all results in the folder of a study have in common.

@@ -90,7 +90,7 @@ class Batches:
 
 
 def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict) -> None:
-    """Trains a policy and writes its checkpoint to `path`, with the log and the profile beside it."""
+    """Trains a policy and writes its checkpoint to `path`, with the log and the profile next to it."""
     torch.manual_seed(options.seed)
     torch.set_float32_matmul_precision("high")
     statistics = Statistics.of(demos, options.shape.chunk)
