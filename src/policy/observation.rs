@@ -24,8 +24,10 @@ pub struct SensorStreams {
     pub depth: bool,
     /// True to request the object at every pixel of the cameras.
     pub segmentation: bool,
-    /// Number of earlier control steps whose robot state and camera images are requested.
+    /// Number of earlier control steps whose robot state is requested.
     pub past_steps: usize,
+    /// Number of earlier control steps whose camera images are requested, at most `past_steps`.
+    pub past_images: usize,
 }
 
 /// Proprioception: what the robot measures of itself.
@@ -90,7 +92,7 @@ pub struct Observation {
 pub struct PastStep {
     /// Proprioception.
     pub robot: RobotState,
-    /// Images of the requested cameras.
+    /// Images of the requested cameras; empty if only the state of this step was requested.
     pub cameras: Vec<Arc<CameraImage>>,
 }
 

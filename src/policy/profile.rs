@@ -453,10 +453,13 @@ impl Profile {
     pub fn streams(&self) -> SensorStreams {
         let mut streams = SensorStreams::default();
         for input in &self.inputs {
+            let past_steps = input.steps() - 1;
+            streams.past_steps = streams.past_steps.max(past_steps);
             match &input.source {
                 InputSource::Camera { camera, .. }
                 | InputSource::Depth { camera, .. }
                 | InputSource::Segmentation { camera, .. } => {
+                    streams.past_images = streams.past_images.max(past_steps);
                     if !streams.cameras.contains(camera) {
                         streams.cameras.push(camera.clone());
                     }
@@ -474,7 +477,6 @@ impl Profile {
                 | InputSource::Query
                 | InputSource::QuerySeed => {}
             }
-            streams.past_steps = streams.past_steps.max(input.steps() - 1);
         }
         streams
     }
@@ -498,6 +500,8 @@ mod tests {
         assert_eq!(streams("vision").cameras, CAMERAS);
         assert!(!streams("vision").tactile && !streams("visuo_tactile").force);
         assert!(streams("visuo_tactile").tactile && streams("softvtbench").force);
+        let visuo_tactile = streams("visuo_tactile");
+        assert_eq!((visuo_tactile.past_steps, visuo_tactile.past_images), (7, 0));
     }
 
     #[test]

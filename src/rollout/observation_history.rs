@@ -54,10 +54,12 @@ impl ObservationHistory {
         proprioceptive: Observation,
         streams: &SensorStreams,
     ) -> Result<Observation, SensingError> {
-        let first = self.entries.len().saturating_sub(streams.past_steps + 1);
+        let first = |past: usize| self.entries.len().saturating_sub(past + 1);
+        let (first_state, first_image) = (first(streams.past_steps), first(streams.past_images));
         let mut steps = Vec::with_capacity(streams.past_steps + 1);
-        for entry in self.entries.iter_mut().skip(first) {
-            steps.push(PastStep { robot: entry.robot, cameras: entry.images(sensors, streams)? });
+        for (index, entry) in self.entries.iter_mut().enumerate().skip(first_state) {
+            let cameras = if index >= first_image { entry.images(sensors, streams)? } else { Vec::new() };
+            steps.push(PastStep { robot: entry.robot, cameras });
         }
         let Some(PastStep { cameras, .. }) = steps.pop() else { return Ok(proprioceptive) };
         let Some(HistoryEntry { frame, camera_inside, is_counted, .. }) = self.entries.back_mut() else {
