@@ -81,5 +81,6 @@ def evaluate(one: Evaluation) -> None:
     profile.write_text(f"{one.profile.read_text()}-- Weights {weights}, blend {one.blend}.\n")
     own = ["--profile", str(profile), "--name", one.name, *camera_flags(one.edge)]
     with served(one.checkpoint, one.device, one.blend) as address:
+        os.nice(10)  # inherited by softvt, whose threads wait for the server
         for script in one.scripts:
             run_softvt([script, "--policy", address, *own, "--out", str(one.out / Path(script).stem), *one.flags])

@@ -7,6 +7,7 @@ from . import UserError, prompts
 from .checkpoint import Checkpoint
 from .data import has_closure
 from .inputs import read
+from .model import Policy
 from .serve import Plan, Request
 
 BATCH = 16  # observations that are answered together
@@ -38,6 +39,7 @@ class Answering:
         self.vocabulary = prompts.Vocabulary(checkpoint.prompts)
         torch.backends.cudnn.benchmark = False
         torch.backends.cudnn.deterministic = True
+        self.graph: Graph | None = None
 
     def __call__(self, batch: list[Request]) -> list[np.ndarray | UserError]:
         """A chunk (chunk, 7) per request, or the reason why there is none; at most BATCH requests."""
@@ -57,6 +59,36 @@ class Answering:
     def _chunks(self, inputs: list[dict[str, np.ndarray]]) -> np.ndarray:
         padded = inputs + inputs[:1] * (BATCH - len(inputs))
         tensors = {key: torch.from_numpy(np.concatenate([one[key] for one in padded])).to(self.device) for key in padded[0]}
-        answers = self.checkpoint.policy.act(tensors, tensors["noise"]).float().cpu().numpy()
+        answers = self._act(tensors).float().cpu().numpy()
         changes = self.checkpoint.statistics.action.invert(answers[: len(inputs)])
         return changes + np.concatenate([one["reference"] for one in inputs])
+
+    def _act(self, inputs: dict[str, torch.Tensor]) -> torch.Tensor:
+        if self.device.type != "cuda":
+            return self.checkpoint.policy.act(inputs, inputs["noise"])
+        if self.graph is None:
+            self.graph = Graph(self.checkpoint.policy, inputs)
+        return self.graph(inputs)
+
+
+class Graph:
+    """A policy captured as a CUDA graph: its kernels start without waiting for the processor, which simulates meanwhile."""
+
+    def __init__(self, policy: Policy, inputs: dict[str, torch.Tensor]):
+        """Captures a policy for inputs of these shapes."""
+        self.inputs = {key: value.clone() for key, value in inputs.items()}
+        stream = torch.cuda.Stream()
+        stream.wait_stream(torch.cuda.current_stream())
+        with torch.cuda.stream(stream):
+            for _ in range(3):  # libraries allocate their memory in the first calls
+                policy.act(self.inputs, self.inputs["noise"])
+        torch.cuda.current_stream().wait_stream(stream)
+        self.graph = torch.cuda.CUDAGraph()
+        with torch.cuda.graph(self.graph):
+            self.answers = policy.act(self.inputs, self.inputs["noise"])
+
+    def __call__(self, inputs: dict[str, torch.Tensor]) -> torch.Tensor:
+        for key, value in inputs.items():
+            self.inputs[key].copy_(value)
+        self.graph.replay()
+        return self.answers
