@@ -152,8 +152,8 @@ impl Observation {
         last(&all, count)
     }
 
-    /// A camera's image in the last `count` control steps, this one last. A short past repeats its oldest step. Empty
-    /// if it was not requested.
+    /// A camera's image in the last `count` control steps, this one last. A short past, or one of which fewer images
+    /// were requested ([`SensorStreams::past_images`]), repeats its oldest image. Empty if none was requested.
     pub fn camera_images(&self, name: &str, count: usize) -> Vec<&CameraImage> {
         let steps = self.past.iter().map(|step| &step.cameras).chain([&self.cameras]);
         let all: Vec<&CameraImage> = steps

@@ -66,9 +66,10 @@ class Answering:
     def _act(self, inputs: dict[str, torch.Tensor]) -> torch.Tensor:
         if self.device.type != "cuda":
             return self.checkpoint.policy.act(inputs, inputs["noise"])
-        if self.graph is None:
-            self.graph = Graph(self.checkpoint.policy, inputs)
-        return self.graph(inputs)
+        with torch.cuda.device(self.device):
+            if self.graph is None:
+                self.graph = Graph(self.checkpoint.policy, inputs)
+            return self.graph(inputs)
 
 
 class Graph:
