@@ -105,16 +105,22 @@ def _parser() -> argparse.ArgumentParser:
     def with_blend(sub: argparse.ArgumentParser) -> None:
         sub.add_argument("--blend", type=_share, default=0.5, help="share of what was planned before in an answer, from 0 to below 1")
 
-    def with_teacher(sub: argparse.ArgumentParser) -> None:
+    def with_edge(sub: argparse.ArgumentParser) -> None:
+        sub.add_argument("--edge", type=_edge, default=128, help="width and height of the pictures, pixels; a multiple of 32")
+
+    def with_steps(sub: argparse.ArgumentParser) -> None:
+        sub.add_argument("--steps", type=_positive, default=6000, help="training steps")
+
+    def with_recording(sub: argparse.ArgumentParser) -> None:
+        sub.add_argument("--demos", type=_positive, default=75, help="demonstrations per task")
+        with_edge(sub)
         sub.add_argument("--teacher", default="expert", choices=["expert", "tactile-servo"], help="policy that demonstrates")
         sub.add_argument("--disturbance", type=_length, default=0.002, help="standard deviation of the robot from its commands while recording, m; of its rotation 4 rad per m")
 
     record = command("record", _record, "record demonstrations of a suite with pictures of the size that policies see")
     record.add_argument("suite", help="suite of softvt")
     record.add_argument("--out", type=Path, required=True, help="folder of the recording")
-    record.add_argument("--demos", type=_positive, default=75, help="demonstrations per task")
-    record.add_argument("--edge", type=_edge, default=128, help="width and height of the pictures, pixels")
-    with_teacher(record)
+    with_recording(record)
 
     train = command("train", _train, "train a policy")
     train.add_argument("recordings", type=Path, nargs="+", help="folders of softvt record")
@@ -124,8 +130,8 @@ def _parser() -> argparse.ArgumentParser:
     train.add_argument("--gripper", default="continuous", choices=CODES, help="grip code")
     train.add_argument("--head", default="regression", choices=["regression", "flow"], help="how actions are predicted")
     train.add_argument("--frames", type=int, default=1, choices=[1, 2], help="control steps whose pictures and states the policy sees")
-    train.add_argument("--edge", type=_edge, default=128, help="width and height of the pictures, pixels; a multiple of 32")
-    train.add_argument("--steps", type=_positive, default=6000, help="training steps")
+    with_edge(train)
+    with_steps(train)
     train.add_argument("--batch", type=_positive, default=256, help="samples per step")
     train.add_argument("--seed", type=int, default=0, help="seed of the weights and batches")
     train.add_argument("--compile", action="store_true", help="compile the network: a minute more at first, faster then")
@@ -155,11 +161,9 @@ def _parser() -> argparse.ArgumentParser:
     study.add_argument("--replans", type=_positive, nargs="+", default=[4], help="actions executed of each answer")
     study.add_argument("--shifts", action="store_true", help="evaluate also under the nine conditions of suites/shifts.lua")
     study.add_argument("--references", nargs="*", default=REFERENCES, choices=REFERENCES, help="built-in policies for comparison")
-    study.add_argument("--demos", type=_positive, default=75, help="demonstrations per task")
-    study.add_argument("--steps", type=_positive, default=6000, help="training steps")
+    with_steps(study)
     study.add_argument("--episodes", type=_positive, default=50, help="episodes per task")
-    study.add_argument("--edge", type=_edge, default=128, help="width and height of the pictures, pixels")
-    with_teacher(study)
+    with_recording(study)
     with_blend(study)
     study.add_argument("--compile", action="store_true", help="compile the networks")
     study.add_argument("--per-gpu", type=_positive, default=1, help="policies that are trained on one GPU at a time")
