@@ -1,16 +1,18 @@
 -- Checks calibrations: how D_ref and τ depend on the step, the resolution and the size, and whether the ends of the windows act.
 --
 --   softvt scripts/check_calibration.lua                                  all standard soft assets
---   softvt scripts/check_calibration.lua --asset cube --part ends --trials 20
+--   softvt scripts/check_calibration.lua --asset cube --part ends --trials 20 --out checked
 --
 -- --part numerics repeats the sweep of the press with half of the step, at resolutions 6 and 12, and with the object at 0.9 and 1.1 of
--- its size. --part ends runs trials with the robot's hand and the expert's lift, 5 % of the window inside and outside of each end.
+-- its size. --part ends runs trials with the robot's hand and the expert's lift, 5 % of the window inside and outside of each end, displaced
+-- as in the calibration and as the expert displaces its grasps.
 -- If all standard assets are checked in both parts, it writes docs/calibration_checks.md.
 local asset_names = require "asset_names"
 local grasp = require "experts.grasp"
 local hand = require "calibration.hand"
 local known = require "calibrated"
 local press = require "calibration.press"
+local trial = require "calibration.trial"
 local soft_asset = require "calibration.soft_asset"
 
 local opt = softvt.options {
@@ -22,7 +24,11 @@ local opt = softvt.options {
   },
   trials = {
     default = 100, integer = true, min = 1, max = 1000, only_with = { part = "ends" }, needs_out = true,
-    help = "hold trials at each side of each end",
+    help = "hold trials at each side of each end, displaced as in the calibration",
+  },
+  expert_trials = {
+    default = 20, integer = true, min = 1, max = 1000, only_with = { part = "ends" }, needs_out = true,
+    help = "hold trials at each side of each end, displaced as the expert displaces its grasps",
   },
 }
 local parts = {}
@@ -44,6 +50,9 @@ end
 local END_SHARE = 0.05    -- distance from an end of the window, as a share of the window
 local BATCH = 10          -- trials of a point
 local HOLD_S = 1          -- hold after the lift, s
+-- Largest displacements of the grasps, m: that of the calibration and that of the expert; and the options with their trials.
+local SPREADS = { trial.DISPLACEMENT, grasp.SPREAD }
+local TRIALS = { "trials", "expert_trials" }
 
 -- Changes of the sweep by name, in the order of the page.
 local CHANGES = {
@@ -69,10 +78,10 @@ local function ends(point)
   local width = window.width_lower + along * (window.width_at_tau - window.width_lower)
   -- Before contact there is no force.
   local grip = { width = width, force = softvt.force_at(calibrations[name].table.envelopes[name].sweep, 1e3 * width) or 0 }
-  local held, d_peak_pct, width_mm = hand.trials(assets[name], grip, point.first, point.last, HOLD_S)
+  local held, d_peak_pct, width_mm = hand.trials(assets[name], grip, point.first, point.last, point.spread, HOLD_S)
   return {
-    asset = name, check = point.at .. "_" .. point.side, width_mm = width_mm, trials = point.last - point.first + 1, held = held,
-    d_peak_pct = d_peak_pct,
+    asset = name, check = point.at .. "_" .. point.side, spread_mm = 1e3 * point.spread, width_mm = width_mm,
+    trials = point.last - point.first + 1, held = held, d_peak_pct = d_peak_pct,
   }
 end
 
@@ -82,8 +91,13 @@ local function points(o)
     for _, change in ipairs(parts.numerics and CHANGES or {}) do list[#list + 1] = { asset = name, change = change } end
     for _, at in ipairs(parts.ends and { "loose", "tight" } or {}) do
       for _, side in ipairs { "inside", "outside" } do
-        for first = 1, o.trials, BATCH do
-          list[#list + 1] = { asset = name, at = at, side = side, first = first, last = math.min(o.trials, first + BATCH - 1) }
+        for index, spread in ipairs(SPREADS) do
+          local trials = o[TRIALS[index]]
+          for first = 1, trials, BATCH do
+            list[#list + 1] = {
+              asset = name, at = at, side = side, spread = spread, first = first, last = math.min(trials, first + BATCH - 1),
+            }
+          end
         end
       end
     end
@@ -91,17 +105,20 @@ local function points(o)
   return list
 end
 
+-- The key of a check; those of the ends are made with grasps displaced by up to `spread_mm`.
+local function key(check, spread_mm) return spread_mm and ("%s %g"):format(check, spread_mm) or check end
+
 -- The rows of each asset and check; batches of trials are added up.
 local function by_asset(rows)
   local found = {}
   for _, row in ipairs(rows) do
     local of_asset = found[row.asset] or {}
     found[row.asset] = of_asset
-    local sum = of_asset[row.check]
+    local sum = of_asset[key(row.check, row.spread_mm)]
     if sum then
       sum.held, sum.trials, sum.d_peak_pct = sum.held + row.held, sum.trials + row.trials, math.max(sum.d_peak_pct, row.d_peak_pct)
     else
-      of_asset[row.check] = row
+      of_asset[key(row.check, row.spread_mm)] = row
     end
   end
   return found
@@ -135,13 +152,20 @@ end
 
 local function ends_table(found, names)
   local function held(row) return ("%d of %d"):format(row.held, row.trials) end
+  local function largest(row) return ("%.3f"):format(row.d_peak_pct) end
+  -- `show` of one side of an end, for each displacement.
+  local function of_end(show, rows, at, side)
+    local shown = {}
+    for _, spread in ipairs(SPREADS) do shown[#shown + 1] = show(rows[key(at .. "_" .. side, 1e3 * spread)]) end
+    return table.concat(shown, ", ")
+  end
   return table_of(
     { "asset", "held, loose inside", "held, loose outside", "τ %", "largest D %, tight inside", "largest D %, tight outside" }, names,
     function(name)
       local rows = found[name]
       return {
-        name, held(rows.loose_inside), held(rows.loose_outside), ("%.3f"):format(calibrations[name].tau), ("%.3f"):format(rows.tight_inside.d_peak_pct),
-        ("%.3f"):format(rows.tight_outside.d_peak_pct),
+        name, of_end(held, rows, "loose", "inside"), of_end(held, rows, "loose", "outside"), ("%.3f"):format(calibrations[name].tau),
+        of_end(largest, rows, "tight", "inside"), of_end(largest, rows, "tight", "outside"),
       }
     end)
 end
@@ -163,7 +187,9 @@ local ENDS = [[
 ## Ends of the window
 
 Trials with the robot's hand and the expert's lift, 5 % of the window inside and outside of each end. The hand is commanded to the width
-and force of the press there.
+and force of the press there. Trials differ in the place of the grasp alone: it is displaced in each horizontal direction by up to
+%g mm, as in the press that found the window (before the comma), and by up to %g mm, as the expert displaces its own grasps (after
+the comma). The hand is not turned.
 
 ]]
 
@@ -178,8 +204,8 @@ return softvt.experiment {
     if parts.ends then text[#text + 1] = ends_table(found, o.asset) end
     local is_page = parts.numerics and parts.ends and asset_names.has_all_soft(found)
     return {
-      text = table.concat(text, "\n"), files = is_page and { ["docs/calibration_checks.md"] = HEAD:format(o.step_mm) .. text[1] .. ENDS .. text[2] } or {},
+      text = table.concat(text, "\n"), files = is_page and { ["docs/calibration_checks.md"] = HEAD:format(o.step_mm) .. text[1] .. ENDS:format(1e3 * SPREADS[1], 1e3 * SPREADS[2]) .. text[2] } or {},
     }
   end,
-  columns = { "asset", "check", "d_ref_pct", "censored", "width_mm", "trials", "held", "d_peak_pct" },
+  columns = { "asset", "check", "d_ref_pct", "censored", "spread_mm", "width_mm", "trials", "held", "d_peak_pct" },
 }

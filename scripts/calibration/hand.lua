@@ -6,9 +6,9 @@ local trial = require "calibration.trial"
 
 local hand = {}
 
--- Displacement of a grasp, up to `offset` (m) and `turn` (rad), and height (m) and speed (m/s) of the lift: the expert's lift, and
--- that of the paper's trials.
-local EXPERT = { offset = trial.DISPLACEMENT, turn = 0, lift = trial.LIFT, speed = trial.SPEED }
+-- Displacement of a grasp, up to `offset` (m) and `turn` (rad), and height (m) and speed (m/s) of the lift: the expert's lift with an
+-- offset, and the paper's trials.
+local function expert(offset) return { offset = offset, turn = 0, lift = trial.LIFT, speed = trial.SPEED } end
 local PAPER = { offset = 0.005, turn = math.rad(10), lift = 0.10, speed = 0.25 }
 local REST_S, REST_SPEED = 0.5, 0.005     -- duration and node speed of a squeeze at rest, s and m/s
 local REST_TIMEOUT_S = 3                  -- largest time until a squeeze is at rest, s
@@ -72,12 +72,12 @@ local function hold_trial(asset, closure, k, how, hold_s)
   return { held = ok and slip <= trial.SLIP_MM, slip_mm = slip, d_peak_pct = sim:measure "object".d_peak_pct, width_mm = width_mm }
 end
 
--- Trials `first` to `last` of a grip { width, force } with the expert's lift. Returns the number that held, the largest peak D (%) and the
--- mean width of the gels (mm).
-function hand.trials(asset, grip, first, last, hold_s)
-  local closure, held, d_peak_pct, width_mm = grasp.command(grip), 0, 0, 0
+-- Trials `first` to `last` of a grip { width, force } with the expert's lift, displaced by up to `offset` (m) in each horizontal direction.
+-- Returns the number that held, the largest peak D (%) and the mean width of the gels (mm).
+function hand.trials(asset, grip, first, last, offset, hold_s)
+  local closure, how, held, d_peak_pct, width_mm = grasp.command(grip), expert(offset), 0, 0, 0
   for k = first, last do
-    local result = hold_trial(asset, closure, k, EXPERT, hold_s)
+    local result = hold_trial(asset, closure, k, how, hold_s)
     if result.held then held = held + 1 end
     d_peak_pct, width_mm = math.max(d_peak_pct, result.d_peak_pct), width_mm + result.width_mm / (last - first + 1)
   end

@@ -1,7 +1,8 @@
 -- Grasps from above with a known closure: across the object's narrow side or by its rim, where the hand has clearance.
 local calibrated = require "calibrated"
 
-local grasp = {}
+-- SPREAD: largest displacement of an expert's grasp in each horizontal direction, m, so that demonstrations differ.
+local grasp = { SPREAD = 0.0015 }
 
 -- Full stroke of the gripper, m.
 local STROKE = 0.08

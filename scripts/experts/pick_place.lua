@@ -22,8 +22,8 @@ local CARRY_CLEARANCE, RELEASE_HEIGHT, FINGER_CLEARANCE = 0.025, 0.001, 0.002
 local MIN_LIFT_FRACTION = 0.5
 -- Grasp attempts, and the largest displacement of the object before an attempt, m.
 local ATTEMPTS, MAX_DISPLACEMENT = 3, 0.08
--- Random variation of the speed (relative) and of the grasp position (m), so that demonstrations differ.
-local SPEED_SPREAD, GRASP_SPREAD = 0.12, 0.0015
+-- Random variation of the speed (relative), so that demonstrations differ.
+local SPEED_SPREAD = 0.12
 
 local function spread(most) return (2 * math.random() - 1) * most end
 
@@ -31,7 +31,7 @@ local function spread(most) return (2 * math.random() - 1) * most end
 local function pick(arm, scene, spec, pace, share)
   local object = scene:object(spec.object)
   local height = grasp.height(object)
-  local chosen = grasp.choose(scene, object, height, { spread(GRASP_SPREAD), spread(GRASP_SPREAD) })
+  local chosen = grasp.choose(scene, object, height, { spread(grasp.SPREAD), spread(grasp.SPREAD) })
   local at, opening = chosen.pose, chosen.closure
   if chosen.clearance < 0 then return nil, "leaves no clearance for the hand" end
   local over = route.approach_height(scene, arm.pose.position, at, 0.05, FINGER_CLEARANCE)

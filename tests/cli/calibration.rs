@@ -143,13 +143,19 @@ fn any_step_and_accuracy_end_a_calibration() {
 fn a_calibration_is_checked_for_the_object_that_was_calibrated() {
     let project = brick("collapse_strain = 0.12");
     project.succeeds(QUICK);
-    let check = "scripts/check_calibration.lua --asset brick --trials 1 --step-mm 1";
+    let check = "scripts/check_calibration.lua --asset brick --trials 1 --expert-trials 1 --step-mm 1";
     let out = project.succeeds(&format!("{check} --out checked --json")).out;
     let rows: Vec<serde_json::Value> =
         out.lines().map(|line| serde_json::from_str(line).expect("a row")).collect();
     let row = |check: &str| {
         rows.iter().find(|row| row["check"] == check).unwrap_or_else(|| panic!("{check}: {out}"))
     };
+    // Both ends are tried with the displacements of the calibration and with those of the expert's grasps.
+    for check in ["loose_inside", "loose_outside", "tight_inside", "tight_outside"] {
+        let spreads: Vec<_> =
+            rows.iter().filter(|row| row["check"] == check).map(|row| row["spread_mm"].as_f64()).collect();
+        assert_eq!(spreads, [Some(0.25), Some(1.5)], "{check}");
+    }
     let d_ref = |check: &str| row(check)["d_ref_pct"].as_f64().expect("D_ref");
     assert!((d_ref("half_step") / d_ref("nominal") - 1.0).abs() < 0.05);
     assert_ne!(d_ref("resolution_6"), d_ref("resolution_12"));
