@@ -2,7 +2,7 @@
 
 import re
 import shutil
-from collections import defaultdict
+from collections import Counter, defaultdict
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,6 +16,8 @@ BEGIN, END = "<!-- tables: softvt-baselines page -->", "<!-- end of tables -->"
 LEARNED = re.compile(r"(?P<suite>\w+)-(?P<inputs>v[ot])-(?P<code>[a-z-]+)-s(?P<seed>\d+)-r(?P<replan>\d+)(?P<condition>\+.*)?")
 REFERENCES = {"expert": "expert (privileged)", "tactile-servo": "tactile servo (privileged)", "fixed-closure": "fixed closure (privileged)"}
 MEASURES = ["goal", "no_drop", "safety"]
+# Stages of an episode, in their order.
+STAGES = ["reach", "grasp", "lift", "carry", "place", "release"]
 # The condition of suites/shifts.lua that changes nothing.
 UNCHANGED = "reference"
 
@@ -61,7 +63,7 @@ def _identify(folder: Path, suite: str) -> Policy | str:
 def _grouped(folder: Path) -> tuple[dict[Policy, list[Run]], dict[tuple[str, str], Run]]:
     """The collected runs of learned policies by policy, and those of the references by suite and name."""
     learned, references = defaultdict(list), {}
-    for path in sorted(folder.glob("*/summary.json")):
+    for path in sorted(folder.glob(f"*/{results.OUTCOMES}")):
         run = results.load(path.parent)
         policy = _identify(path.parent, run.suite)
         if isinstance(policy, Policy):
@@ -83,7 +85,8 @@ def _row(name: str, runs: list[Run], replan: str) -> list[str]:
         low, median, high = np.nanpercentile(np.minimum(ratio, 99), [5, 50, 95])
         shown = f"{median:.2f} [{low:.2f}, {high:.2f}]"
     rates = [results.rate(runs, measure).text() for measure in MEASURES]
-    return [name, replan, str(len(runs)), str(len(runs[0].task)), *rates, shown]
+    episodes = str(len(runs[0].task)) + ("" if all(run.is_finished for run in runs) else " (interrupted)")
+    return [name, replan, str(len(runs)), episodes, *rates, shown]
 
 
 def _name(policy: Policy) -> str:
@@ -109,19 +112,58 @@ def tables(folder: Path) -> str:
         rows = [_row(_name(policy), runs, str(policy.replan)) for policy, runs in sorted(learned.items()) if (policy.suite, policy.condition) == (suite, "")]
         rows += [_row(shown, [references[suite, name]], "") for name, shown in REFERENCES.items() if (suite, name) in references]
         text += _table(["policy", "replan", "seeds", "episodes", "Goal, %", "NoDrop, %", "Safety, %", "D/τ"], rows)
-    differences = [
-        [f"`{policy.suite}`", policy.code, str(policy.replan), str(len(touch)), policy.condition or "none"]
-        + [results.difference(vision, touch, measure).text(signed=True) for measure in MEASURES]
-        for policy, vision, touch in _pairs(learned)
-        if policy.condition != UNCHANGED
-    ]
-    if differences:
-        text += "### VT minus VO, on the same episodes\n\n"
-        text += _table(["suite", "grip code", "replan", "seeds", "shift", *(f"{measure}, points" for measure in ("Goal", "NoDrop", "Safety"))], differences)
+    pairs = [pair for pair in _pairs(learned) if pair[0].condition != UNCHANGED]
+    if pairs:
+        text += "### VT minus VO, on the episodes that both have\n\n*Both succeed*: Safety of the episodes in which both reach the goal.\n\n"
+        measures = [f"{measure}, points" for measure in ("Goal", "NoDrop", "Safety")]
+        heading = ["suite", "grip code", "replan", "seeds", "shift", "episodes", *measures, "both succeed", "Safety there, points"]
+        text += _table(heading, [_difference(*pair) for pair in pairs])
+    for policy, vision, touch in pairs:
+        if not policy.condition:
+            text += f"### `{policy.suite}`, {policy.code}, replan {policy.replan}: by task and by stage\n\n"
+            text += "Safety by task, and the stages in which episodes without success ended, on the episodes that both have.\n\n"
+            text += _by_task(vision, touch) + _by_stage(vision, touch)
     if shifted := _shifts(learned):
         text += "### Shifts\n\nThe change is that against the same policy without a shift, on the same episodes.\n\n"
         text += _table(["suite", "policy", "replan", "seeds", "shift", "Goal, %", "Safety, %", "change of Safety, points"], shifted)
     return text
+
+
+def _difference(policy: Policy, vision: list[Run], touch: list[Run]) -> list[str]:
+    """The row of a pair in the table of differences."""
+    common = results.in_common(vision + touch)
+    vision, touch = common[: len(vision)], common[len(vision) :]
+    shown = [results.difference(vision, touch, measure).text(signed=True) for measure in MEASURES]
+    succeed, there = "–", "–"
+    # With several seeds, success differs from seed to seed.
+    if len(touch) == 1:
+        both = (vision[0].goal * touch[0].goal).astype(bool)
+        succeed = str(both.sum())
+        there = results.difference([vision[0].where(both)], [touch[0].where(both)], "safety").text(signed=True) if both.any() else "–"
+    return [f"`{policy.suite}`", policy.code, str(policy.replan), str(len(touch)), policy.condition or "none", str(len(touch[0].task)), *shown, succeed, there]
+
+
+def _by_task(vision: list[Run], touch: list[Run]) -> str:
+    common = results.in_common(vision + touch)
+    assets = {task: asset for run in common for task, asset in run.assets.items()}
+
+    def safety(runs: list[Run], task: int) -> str:
+        return f"{100 * np.mean([run.safety[run.task == task].mean() for run in runs]):.0f}"
+
+    rows = [
+        [str(task), assets.get(task, "–"), str((common[0].task == task).sum()), safety(common[: len(vision)], task), safety(common[len(vision) :], task)]
+        for task in np.unique(common[0].task)
+    ]
+    return _table(["task", "asset", "episodes", "Safety of VO, %", "Safety of VT, %"], rows)
+
+
+def _by_stage(vision: list[Run], touch: list[Run]) -> str:
+    common = results.in_common(vision + touch)
+    counts = [Counter(stage for run in runs for stage in run.stage) for runs in (common[: len(vision)], common[len(vision) :])]
+    firm = [sum(int(((run.goal == 1) & (run.ratio > 1)).sum()) for run in runs) for runs in (common[: len(vision)], common[len(vision) :])]
+    rows = [[f"failed at *{stage}*", *(str(count[stage]) for count in counts)] for stage in STAGES if any(count[stage] for count in counts)]
+    rows.append(["success beyond the limit", *map(str, firm)])
+    return _table(["episodes", "VO", "VT"], rows)
 
 
 def _shifts(learned: dict[Policy, list[Run]]) -> list[list[str]]:

@@ -2,7 +2,7 @@
 
 import csv
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +29,13 @@ class Run:
     safety: np.ndarray  # (N,) 1 if also safely
     ratio: np.ndarray  # (N,) peak D over the limit; infinite if the episode is invalid, NaN if there is no limit
     stage: list[str]  # stage in which the episode failed, or ""
+    assets: dict[int, str]  # asset of the target by task, as far as the summary has it
+    is_finished: bool = True
+
+    def where(self, chosen: np.ndarray) -> "Run":
+        """The chosen episodes."""
+        columns = {key: getattr(self, key)[chosen] for key in ("task", "episode", "goal", "no_drop", "safety", "ratio")}
+        return replace(self, **columns, stage=[stage for stage, is_chosen in zip(self.stage, chosen) if is_chosen])
 
 
 def _ratio(row: dict) -> float:
@@ -38,9 +45,14 @@ def _ratio(row: dict) -> float:
 
 
 def load(folder: Path) -> Run:
-    """Reads a run folder of softvt, or a collected one. Raises UserError if it is not finished."""
-    if not (folder / "summary.json").is_file():
+    """Reads a run folder of softvt, which must be finished, or a collected one, whose run may have been interrupted.
+
+    Raises UserError if there is neither.
+    """
+    is_finished = (folder / "summary.json").is_file()
+    if not is_finished and not (folder / OUTCOMES).is_file():
         raise UserError(f"{folder}: not a finished run: it has no summary.json; repeat its command with --resume")
+    summary = json.loads((folder / "summary.json").read_text()) if is_finished else {}
     if (folder / OUTCOMES).is_file():
         with open(folder / OUTCOMES, newline="") as file:
             rows = list(csv.DictReader(file))
@@ -55,7 +67,10 @@ def load(folder: Path) -> Run:
     rates = {key: column(key, int).astype(float) for key in ("goal", "no_drop", "safety")}
     return Run(
         name=folder.name,
-        suite=json.loads((folder / "summary.json").read_text())["suite"],
+        # An interrupted run has the name of its suite first in its own.
+        suite=summary["suite"] if is_finished else folder.name.split("-")[0],
+        assets={task["task"]: task["asset"] for task in summary.get("by_task", [])},
+        is_finished=is_finished,
         task=column("task", int),
         episode=column("episode", int),
         ratio=column("ratio", float),
@@ -102,6 +117,13 @@ def _same_episodes(runs: list[Run]) -> None:
     for run in runs[1:]:
         if not (np.array_equal(run.task, first.task) and np.array_equal(run.episode, first.episode) and run.suite == first.suite):
             raise UserError(f"{run.name} and {first.name} were not evaluated on the same episodes")
+
+
+def in_common(runs: list[Run]) -> list[Run]:
+    """The same runs with the episodes that all of them have."""
+    keys = [list(zip(run.task.tolist(), run.episode.tolist())) for run in runs]
+    common = set.intersection(*map(set, keys))
+    return [run.where(np.array([key in common for key in own], dtype=bool)) for run, own in zip(runs, keys)]
 
 
 def rate(runs: list[Run], measure: str) -> Estimate:

@@ -1,5 +1,6 @@
 """The page of a study."""
 
+import shutil
 import tempfile
 import unittest
 from pathlib import Path
@@ -35,7 +36,7 @@ class Pages(unittest.TestCase):
         self.assertIn("| VT, continuous | 4 | 2 | 50 | 100.0 [100.0, 100.0] |", text)
         self.assertIn("| expert (privileged) |  | 1 | 50 | 100.0", text)
         difference = text.split("VT minus VO")[1]
-        self.assertIn("| `one` | continuous | 4 | 2 | none | +0.0 [+0.0, +0.0] |", difference)
+        self.assertIn("| `one` | continuous | 4 | 2 | none | 50 | +0.0 [+0.0, +0.0] |", difference)
         figure = (self.docs / "images" / "baselines.svg").read_bytes()
         page.write([], self.docs)
         self.assertEqual((self.docs / "baselines.md").read_text(), text)
@@ -50,6 +51,25 @@ class Pages(unittest.TestCase):
         self.assertIn("| `one` | continuous | 4 | 1 | light x2 |", text)
         self.assertNotIn("reference", text)
         self.assertIn("| `one` | VT, continuous | 4 | 1 | light x2 | 100.0 [100.0, 100.0] | 100.0 [100.0, 100.0] | +100.0", text)
+
+    def test_an_interrupted_run_that_was_collected_is_compared_on_the_episodes_that_both_have(self):
+        page.collect(self.study, self.docs)
+        collected = self.docs / "one-vo-continuous-s0-r4"
+        (collected / "summary.json").unlink()
+        lines = (collected / "outcomes.csv").read_text().splitlines()
+        (collected / "outcomes.csv").write_text("\n".join(lines[:-7]) + "\n")
+        for inputs in ("vo", "vt"):
+            shutil.rmtree(self.docs / f"one-{inputs}-continuous-s1-r4")
+        text = page.tables(self.docs)
+        self.assertIn("| VO, continuous | 4 | 1 | 43 (interrupted) |", text)
+        self.assertIn("| VT, continuous | 4 | 1 | 50 |", text)
+        self.assertIn("| `one` | continuous | 4 | 1 | none | 43 |", text)
+        self.assertIn("| 8 | – | 3 |", text.split("by task and by stage")[1])
+
+    def test_the_published_page_is_that_of_the_published_outcomes(self):
+        docs = Path(__file__).parents[3] / "docs"
+        published = (docs / "baselines.md").read_text().split(page.BEGIN)[1].split(page.END)[0]
+        self.assertEqual(published.strip(), page.tables(docs / "baselines").strip())
 
     def test_foreign_runs_are_refused_and_not_collected(self):
         self.run_of("something", np.ones((10, 5), bool))
