@@ -1,0 +1,96 @@
+//! The published tables of results are those of the committed summaries.
+
+#[path = "../examples/results/collected.rs"]
+mod collected;
+#[path = "../examples/results/tables.rs"]
+mod tables;
+
+use std::{fs, path::Path};
+
+use serde_json::json;
+
+/// Root of the repository.
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+
+#[test]
+fn the_published_tables_are_those_of_the_summaries() {
+    let root = Path::new(ROOT);
+    let (results, labels) =
+        (collected::read(root).expect("summaries"), collected::labels(root).expect("labels"));
+    let readme = fs::read_to_string(root.join("README.md")).expect("a README");
+    let expected =
+        tables::replaced(&readme, &tables::overview(&results, &labels)).expect("a place for the tables");
+    assert_eq!(readme, expected, "run .ci/regenerate results");
+    let page = fs::read_to_string(root.join(tables::PAGE)).expect("a page");
+    assert_eq!(page, tables::page(&results, &labels), "run .ci/regenerate results");
+}
+
+/// Writes a run of `suite` with two episodes, of which one is safe.
+fn run(folder: &Path, script: &str, suite: &str, policy: &str) {
+    fs::create_dir_all(folder).expect("a folder");
+    let rate = |rate: f64| json!({ "rate": rate, "wilson95": [rate / 2.0, rate] });
+    let files = [
+        ("run.json", json!({ "softvt": "1", "seed": 3, "script": script, "suite": suite }).to_string()),
+        (
+            "summary.json",
+            json!({
+                "suite": suite, "policy": policy, "privileged": true, "episodes": 2, "invalid": 0, "by_task": [{}],
+                "goal_success_rate": rate(100.0), "no_drop_rate": rate(100.0), "safety_success_rate": rate(50.0),
+            })
+            .to_string(),
+        ),
+        (
+            "episodes.jsonl",
+            [(0.1, 4.0, 1.5), (0.4, 6.0, 2.5)]
+                .map(|(d, time, grip)| {
+                    json!({ "d_peak": d, "tau": 0.2, "goal_time_s": time, "grip_ratio": grip }).to_string() + "\n"
+                })
+                .concat(),
+        ),
+    ];
+    for (name, text) in files {
+        fs::write(folder.join(name), text).expect("a file");
+    }
+}
+
+#[test]
+fn rows_and_columns_follow_the_runs() {
+    let home = tempfile::tempdir().expect("a folder");
+    let root = home.path();
+    let out = root.join("controllers");
+    let suites = ["one_varied", "two"].map(|suite| {
+        let rows = [("reference", None), ("size-seen", Some("size-seen"))].map(|(condition, policy)| {
+            let folder = format!("{suite}/{condition}");
+            run(&out.join(&folder), "suites/controllers.lua", suite, policy.unwrap_or("expert"));
+            json!({ "condition": condition, "policy": policy, "outcome": { "folder": folder } })
+        });
+        json!({ "suite": suite, "rows": rows })
+    });
+    fs::write(out.join("conditions.json"), json!({ "suites": suites }).to_string()).expect("a file");
+    for policy in ["expert", "binary"] {
+        run(&root.join(policy).join("one"), "suites/all.lua", "one", policy);
+        collected::add(root, &root.join(policy)).expect("runs of a list of suites");
+    }
+    collected::add(root, &out).expect("runs of conditions");
+    // Adding them again replaces them.
+    collected::add(root, &out).expect("runs of conditions");
+    let results = collected::read(root).expect("summaries");
+    let labels = json!({ "size-seen": "sees the size" });
+    let overview = tables::overview(&results, &labels);
+    assert_eq!(
+        overview,
+        "`softvt suites/controllers.lua --episodes 2`: 2 episodes per cell. Goal / Safety in %, with the 95 % interval of Safety. No episode was invalid. \
+         All controllers plan from ground-truth state (*privileged*).\n\n\
+         |  | One-Varied | Two |\n|---|---|---|\n\
+         | `expert` | 100.0 / 50.0 [25.0, 50.0] | 100.0 / 50.0 [25.0, 50.0] |\n\
+         | `size-seen`: sees the size | 100.0 / 50.0 [25.0, 50.0] | 100.0 / 50.0 [25.0, 50.0] |\n\n\
+         `softvt suites/all.lua --episodes 2 --policy NAME` for each controller: 2 episodes per cell. Goal / Safety in %, with the 95 % interval of Safety. No episode was invalid. All controllers \
+         plan from ground-truth state (*privileged*).\n\n\
+         |  | One |\n|---|---|\n\
+         | `expert` | 100.0 / 50.0 [25.0, 50.0] |\n| `binary` | 100.0 / 50.0 [25.0, 50.0] |\n"
+    );
+    // Medians of D/τ 0.5 and 2, of grip ratios 1.5 and 2.5, and of times 4 and 6 s.
+    assert!(tables::page(&results, &labels).contains("| 50.0 [25.0, 50.0] | 1.25 | 2.00 | 5.0 |"));
+    let error = collected::add(root, &root.join("docs")).expect_err("no run");
+    assert!(error.contains("no finished run"), "{error}");
+}
