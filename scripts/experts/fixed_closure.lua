@@ -1,5 +1,5 @@
--- The best single closure for all instances of an asset: what a policy that knows the kind of an object, but neither sees nor feels
--- how large, stiff and heavy this one is, can do at best.
+-- The best single closure for all instances of an asset, for a controller that knows the kind of an object, but neither sees nor feels how
+-- large, stiff and heavy this one is.
 local grasp = require "experts.grasp"
 
 -- Instances per factor. Each stands for an equal share of the draws.
