@@ -43,8 +43,10 @@ pub struct RobotState {
     pub joint_velocities: [f64; 7],
     /// Torques of the arm's drives in the last physics step, N m. Gravity is compensated and not part of them.
     pub joint_torques: [f64; 7],
-    /// Measured gripper width, m: 0 to 0.08 between the apexes of the gels.
+    /// Exact gripper width, m: 0 to 0.08 between the apexes of the gels.
     pub gripper_width_m: f64,
+    /// Gripper width with the errors of a real hand (settings `robot.width_sensor`), m.
+    pub sensed_width_m: f64,
     /// Closure last commanded, 0 (open) ..= 1 (closed).
     pub closure: f64,
 }
@@ -58,6 +60,7 @@ impl RobotState {
         joint_velocities: [0.0; 7],
         joint_torques: [0.0; 7],
         gripper_width_m: 0.08,
+        sensed_width_m: 0.08,
         closure: 0.0,
     };
 }

@@ -18,4 +18,4 @@ pub use clearance::{Clearance, Obstacle, clearance};
 pub use gripper::GripperSetpoint;
 pub use ik::{DiffIk, UnreachablePose};
 pub use pads::{CollisionBox, PadSurface};
-pub use spec::{ArmSpec, DisturbanceSpec, GripperSpec, IkSpec, PadSpec, RobotSpec, Side};
+pub use spec::{ArmSpec, DisturbanceSpec, GripperSpec, IkSpec, PadSpec, RobotSpec, Side, WidthSensorSpec};

@@ -18,6 +18,8 @@ pub struct RobotSpec {
     pub pads: PadSpec,
     /// Inverse kinematics.
     pub ik: IkSpec,
+    /// Errors of the measured gripper width.
+    pub width_sensor: WidthSensorSpec,
     /// Delay between a command and the robot's response, control steps of 0.05 s.
     pub latency: u32,
     /// Random offset of the executed poses from the commanded ones.
@@ -50,6 +52,9 @@ impl RobotSpec {
         within("disturbance.position", self.disturbance.position, 0.05)?;
         within("disturbance.rotation", self.disturbance.rotation, 0.5)?;
         positive("disturbance.duration", self.disturbance.duration, "s")?;
+        within("width_sensor.resolution", self.width_sensor.resolution, 0.01)?;
+        within("width_sensor.offset", self.width_sensor.offset, 0.01)?;
+        within("width_sensor.noise", self.width_sensor.noise, 0.01)?;
         positive("ik.lambda", ik.lambda, "1")?;
         within("ik.posture_gain", ik.posture_gain, 1.0)?;
         positive("pads.normal_modulus", pads.normal_modulus, "Pa/m")?;
@@ -106,6 +111,30 @@ pub struct GripperSpec {
 impl Default for GripperSpec {
     fn default() -> Self {
         Self { kp: 2000.0, kd: 100.0, effort: 70.0, speed: 0.2, finger_mass: 0.1 }
+    }
+}
+
+/// Errors of the gripper width that policies measure: an offset, noise, then rounding to steps. The drives use the exact
+/// width.
+///
+/// The default has the steps of a Robotiq 2F-85 (0.4 mm at the fingertips, instruction manual; no figure of the Franka
+/// Hand was found) and an offset of half the largest error that Mecademic states for the MEGP 25 (0.5 mm, manual of
+/// firmware 11.3, `GetRtGripperPos`), as the standard deviation. Noise before rounding is off: averaging it would measure
+/// less than a step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct WidthSensorSpec {
+    /// Step of the measured width, m; 0 for none.
+    pub resolution: f64,
+    /// Standard deviation of the error that is constant in an episode, m.
+    pub offset: f64,
+    /// Standard deviation of the noise, new in every control step, m.
+    pub noise: f64,
+}
+
+impl Default for WidthSensorSpec {
+    fn default() -> Self {
+        Self { resolution: 4e-4, offset: 2.5e-4, noise: 0.0 }
     }
 }
 

@@ -13,9 +13,9 @@ use super::{
     evidence::{EvidenceCollector, lowest},
     observation_history::ObservationHistory,
     sensor_assets::{SensingError, SensorAssets},
+    sensor_noise::SensorSeed,
     sensors::{SensorSuite, StateRecording, check_sensors},
     simulation::{ObjectInstance, SettleError, Simulation, state_hash},
-    tactile_wear::WearSeed,
     trace::StepTrace,
 };
 use sha2::{Digest, Sha256};
@@ -282,8 +282,8 @@ impl Episode {
         let start_hold = Action::new(tool.translation.vector, rotation::axis_angle(&tool.rotation), 0.0);
         let seed = EpisodeSeed::new(&spec.header.id, &spec.task.layout);
         let disturbance = Disturbance::new(&spec.settings.robot.disturbance, &seed);
-        let sensors = SensorSuite::new(&sim, &spec.settings.tactile, sensor_assets)
-            .with_wear_seed(WearSeed::new(&seed));
+        let sensors =
+            SensorSuite::new(&sim, &spec.settings.tactile, sensor_assets).with_seed(SensorSeed::new(&seed));
         let recorded = spec.record_states.then(RecordedStates::default);
         Ok(Self {
             spec,
@@ -394,7 +394,7 @@ impl Episode {
     pub fn observe(&mut self, streams: &SensorStreams) -> Result<Observation, EpisodeError> {
         let proprioceptive = Observation {
             time_s: self.time(),
-            robot: self.sim.robot.state(&self.sim.world),
+            robot: self.sim.robot.state(&self.sim.world, self.sensors.seed()),
             prompt: self.spec.task.prompt.clone(),
             cameras: Vec::new(),
             past: Vec::new(),
@@ -447,7 +447,8 @@ impl Episode {
             recorded.frames.push(frame.clone());
             recorded.d_pct.push(d_pct);
         }
-        self.history.push(frame, self.sim.robot.state(&self.sim.world), self.streams.past_steps);
+        let robot = self.sim.robot.state(&self.sim.world, self.sensors.seed());
+        self.history.push(frame, robot, self.streams.past_steps);
     }
 
     fn time(&self) -> f64 {

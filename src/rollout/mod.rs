@@ -78,11 +78,11 @@ mod observation_history;
 mod robot_instance;
 mod scene_doubts;
 mod sensor_assets;
+mod sensor_noise;
 mod sensors;
 mod shared_cache;
 mod simulation;
 mod soft_model;
-mod tactile_wear;
 mod trace;
 
 pub use asset_cache::AssetCache;
@@ -92,11 +92,11 @@ pub use episode::{Episode, EpisodeError, EpisodeSpec, FinishedEpisode, ScoreFram
 pub use robot_instance::RobotInstance;
 pub use scene_doubts::scene_doubts;
 pub use sensor_assets::{SensingError, SensorAssets};
+pub use sensor_noise::SensorSeed;
 pub use sensors::{
     BodyConfiguration, CAMERA_IMAGE_SUFFIXES, Proprioception, ROBOT_SEGMENTATION_ID, SensorSuite,
     StateRecording, TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES, check_sensors,
 };
 pub use simulation::{ArticulatedPart, ObjectInstance, SettleError, Simulation, state_hash};
 pub use soft_model::soft_model;
-pub use tactile_wear::WearSeed;
 pub use trace::{ObjectTrace, StepTrace};

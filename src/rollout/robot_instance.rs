@@ -2,6 +2,7 @@
 
 use std::{collections::VecDeque, sync::Arc};
 
+use super::sensor_noise::SensorSeed;
 use softvt_geometry::{Pose, Vec3, shape::Shape};
 use softvt_physics::{
     ArticulationId, ColliderId, LinkId, World,
@@ -139,14 +140,15 @@ impl RobotInstance {
             .vector
     }
 
-    /// Measured gripper width, m.
+    /// Exact gripper width, m.
     pub fn width(&self, world: &World) -> f64 {
         let q = &world.articulation(self.articulation).state.q;
         gripper::width([q[ARM_DOFS], q[ARM_DOFS + 1]])
     }
 
-    /// What the robot measures of itself.
-    pub fn state(&self, world: &World) -> RobotState {
+    /// What the robot measures of itself. `seed` is that of the errors of its width sensor.
+    pub fn state(&self, world: &World, seed: SensorSeed) -> RobotState {
+        let width = self.width(world);
         let articulation = world.articulation(self.articulation);
         let torque = |i: usize| articulation.drives()[i].as_ref().map_or(0.0, |drive| drive.force);
         let tool_b = self.tool_b(world);
@@ -156,7 +158,8 @@ impl RobotInstance {
             joints: self.q(world),
             joint_velocities: std::array::from_fn(|i| articulation.state.v[i]),
             joint_torques: std::array::from_fn(torque),
-            gripper_width_m: self.width(world),
+            gripper_width_m: width,
+            sensed_width_m: seed.sensed_width(&self.spec.width_sensor, width, world.step_count()),
             closure: self.closure(),
         }
     }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use super::{
     sensor_assets::{SensingError, SensorAssets},
+    sensor_noise::SensorSeed,
     simulation::{ObjectInstance, Simulation},
-    tactile_wear::WearSeed,
 };
 use softvt_benchmark::CONTROL_DT;
 use softvt_geometry::{Pose, Vec3};
@@ -16,7 +16,7 @@ use softvt_physics::{
 };
 use softvt_policy::{PadForce, SensorStreams, TactileFrame};
 use softvt_robot::{
-    RobotSpec, Side,
+    RobotSpec, Side, gripper,
     ik::DiffIk,
     pads,
     panda::{self, ARM_DOFS},
@@ -47,7 +47,7 @@ pub struct SensorSuite {
     render_scene: Option<Arc<RenderScene>>,
     renderer: Renderer,
     gel_scratch: GelScratch,
-    wear_seed: WearSeed,
+    seed: SensorSeed,
 }
 
 /// A clone shares the meshes but has its own working memory.
@@ -63,7 +63,7 @@ impl Clone for SensorSuite {
             render_scene: self.render_scene.clone(),
             renderer: Renderer::default(),
             gel_scratch: GelScratch::default(),
-            wear_seed: self.wear_seed,
+            seed: self.seed,
         }
     }
 }
@@ -96,13 +96,18 @@ impl SensorSuite {
             render_scene: None,
             renderer: Renderer::default(),
             gel_scratch: GelScratch::default(),
-            wear_seed: WearSeed::default(),
+            seed: SensorSeed::default(),
         }
     }
 
-    /// The same sensors with the noise and wear of an episode.
-    pub fn with_wear_seed(self, wear_seed: WearSeed) -> Self {
-        Self { wear_seed, ..self }
+    /// The same sensors with the errors of an episode.
+    pub fn with_seed(self, seed: SensorSeed) -> Self {
+        Self { seed, ..self }
+    }
+
+    /// Seed of the errors of the sensors.
+    pub(super) fn seed(&self) -> SensorSeed {
+        self.seed
     }
 
     /// The current state, with all that sensors need of it.
@@ -324,7 +329,7 @@ impl SensorSuite {
             substrate: if placed.len() == 1 { substrate } else { None },
         };
         let mut reading = sensor.read(&contact, &mut self.gel_scratch)?;
-        self.wear_seed.apply(&self.spec.wear, side, frame.step, &sensor.untouched_image, &mut reading);
+        self.seed.apply_wear(&self.spec.wear, side, frame.step, &sensor.untouched_image, &mut reading);
         Ok(reading)
     }
 
@@ -332,10 +337,13 @@ impl SensorSuite {
     pub fn proprioception(&self, frame: &WorldSnapshot) -> Proprioception {
         let q = &frame.joints[self.articulation.index()];
         let joints = std::array::from_fn(|i| q[i]);
+        let fingers = [q[ARM_DOFS], q[ARM_DOFS + 1]];
+        let width = gripper::width(fingers);
         Proprioception {
             tool_b: DiffIk::new(&self.robot.ik, joints, CONTROL_DT).tool_pose(&joints),
             joints,
-            fingers: [q[ARM_DOFS], q[ARM_DOFS + 1]],
+            fingers,
+            sensed_width_m: self.seed.sensed_width(&self.robot.width_sensor, width, frame.step),
         }
     }
 
@@ -457,6 +465,8 @@ pub struct Proprioception {
     pub joints: [f64; ARM_DOFS],
     /// Positions of the left and right finger, m: 0 (closed) to 0.04.
     pub fingers: [f64; 2],
+    /// Gripper width as policies measure it, m.
+    pub sensed_width_m: f64,
 }
 
 /// Configuration of a body.

@@ -143,6 +143,38 @@ fn earlier_steps_are_those_that_were_observed_then() {
 }
 
 #[test]
+fn sensor_noise_is_the_same_whenever_a_step_is_observed() {
+    let with = |wear: &str| {
+        let text = short().text().replace("episodes = 1,", &format!("episodes = 1, {wear}"));
+        let project = Project::new(&[("x.lua", &text)]);
+        let streams = SensorStreams { tactile: true, past_steps: 3, ..SensorStreams::default() };
+        played(&project, streams).expect("played").0
+    };
+    let noisy = with("settings = { tactile = { wear = { noise_px = 0.1, image_noise = 1 } } },");
+    let exact = with("");
+    for (step, observation) in noisy.iter().enumerate() {
+        let history = &observation.tactile.as_ref().expect("asked for").frames;
+        for (back, frame) in history.iter().rev().enumerate() {
+            let then = noisy[step - back].tactile.as_ref().expect("asked for");
+            assert_eq!(Some(frame.as_ref()), then.now(), "step {step}, {back} steps back");
+        }
+        for (back, past) in observation.past.iter().rev().enumerate() {
+            assert_eq!(past.robot, noisy[step - 1 - back].robot);
+        }
+        let plain = exact[step].tactile.as_ref().expect("asked for").now().expect("a frame");
+        let [left, right] = history.last().expect("a frame").as_ref();
+        assert_eq!(plain[0].markers.initial, plain[0].markers.current, "off: nothing touches");
+        assert_eq!(plain[0].image, *plain[0].untouched);
+        assert_ne!(left.markers.current, right.markers.current);
+        assert_ne!(left.image, plain[0].image);
+        assert_eq!(observation.robot, exact[step].robot, "noise of one sensor moves no other");
+        let RobotState { sensed_width_m, gripper_width_m, .. } = observation.robot;
+        assert!(sensed_width_m != gripper_width_m && (sensed_width_m - gripper_width_m).abs() < 2e-3);
+    }
+    assert_eq!(noisy, with("settings = { tactile = { wear = { noise_px = 0.1, image_noise = 1 } } },"));
+}
+
+#[test]
 fn results_record_whether_true_forces_were_observed() {
     for force in [false, true] {
         let streams = SensorStreams { force, ..SensorStreams::default() };
@@ -264,6 +296,7 @@ fn an_observation_has_no_field_for_hidden_state() {
         joint_velocities: _,
         joint_torques: _,
         gripper_width_m: _,
+        sensed_width_m: _,
         closure: _,
     } = robot;
     assert!(past.is_empty());

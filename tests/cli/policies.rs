@@ -54,6 +54,32 @@ fn results_do_not_depend_on_threads_or_interruptions() {
 }
 
 #[test]
+fn policies_see_sensor_noise_that_does_not_depend_on_threads() {
+    // It moves by the noise of the markers.
+    let policy = project(
+        "return softvt.policy { name = 'feels', observes = { tactile = true }, act = function(obs)
+  local motion = obs.tactile.left.markers:mean()
+  local p = obs.position
+  return { position = { p[1] + 0.01 * motion[1], p[2], p[3] }, axis_angle = obs.axis_angle, closure = 0 }
+end }
+",
+    );
+    let line = "x.lua --policy p.lua --episodes 3";
+    let noise = "--set tactile.wear.noise_px=0.1 --set tactile.wear.image_noise=1";
+    policy.succeeds(&format!("{line} --threads 1 --out exact"));
+    policy.succeeds(&format!("{line} --threads 1 --out off --set tactile.wear.noise_px=0"));
+    policy.succeeds(&format!("{line} --threads 1 --out one {noise}"));
+    policy.succeeds(&format!("{line} --threads 2 --out two {noise}"));
+    policy.succeeds(&format!("{line} --threads 1 --out seeded --seed 1 {noise}"));
+    let [exact, off, one, two, seeded] = ["exact", "off", "one", "two", "seeded"].map(|out| {
+        std::fs::read(policy.path(&format!("{out}/actions/task_000/episode_00000.npy"))).expect("actions")
+    });
+    assert_eq!((&exact, &one), (&off, &two));
+    assert!(one != exact && one != seeded);
+    assert!(policy.succeeds("replay one 0/2").out.contains("byte-identical"));
+}
+
+#[test]
 fn a_failing_policy_ends_the_run_and_keeps_finished_episodes() {
     let good = "return { position = obs.position, axis_angle = obs.axis_angle, closure = 0 }";
     for (bad, output) in [

@@ -36,7 +36,7 @@ use softvt_evaluation::{deformation::ReferenceShape, episode_id::Split};
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::BodyId;
 use softvt_robot::{Side, gripper::GripTarget, rotation};
-use softvt_rollout::{AssetCache, SensingError, SensorAssets, SensorSuite, Simulation, WearSeed, cancel};
+use softvt_rollout::{AssetCache, SensingError, SensorAssets, SensorSeed, SensorSuite, Simulation, cancel};
 use softvt_sensing::tactile::{MarkerStyle, PadWrench, TactileReading};
 
 const EPISODE: Type = Type::Integer(Range::closed(0.0, 1e9));
@@ -94,7 +94,7 @@ impl LuaSimulation {
     /// Builds the scene of a layout and lets it settle.
     fn new(lua: &Lua, layout: &LayoutSpec, seed: EpisodeSeed, settings: &Settings) -> mlua::Result<Self> {
         let scene = LuaScene::new(empty_scene());
-        let wear_seed = WearSeed::new(&seed);
+        let sensor_seed = SensorSeed::new(&seed);
         layout.build.call::<()>((scene.clone(), LuaRng::new(seed, RandomStream::Layout)))?;
         let mut scene = lock(&scene.scene).clone();
         settings.cameras.apply(&mut scene.cameras);
@@ -129,7 +129,7 @@ impl LuaSimulation {
             physics_steps: 0,
             failed: None,
             clock: clock.clone(),
-            sensors: SensorSuite::new(&sim, &settings.tactile, &caches.sensors).with_wear_seed(wear_seed),
+            sensors: SensorSuite::new(&sim, &settings.tactile, &caches.sensors).with_seed(sensor_seed),
             sim,
             _reserved: reserved,
         }))))
