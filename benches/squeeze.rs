@@ -67,7 +67,7 @@ impl Scene {
         let params =
             PhysicsParams { rayleigh_stiffness: 2e-3, sleeping, dt: case.dt, ..PhysicsParams::default() };
         let mut world = World::new(params, Vec3::new(0.0, 0.0, -9.81));
-        let grip = Friction { static_mu: 1.2, dynamic_mu: 1.2 };
+        let grip = Friction::new(1.2, 1.2);
         let body =
             world.add_soft("cube", model, None, &Pose::translation(0.0, 0.0, 0.5 * EDGE), Friction::NONE);
         let table = Shape::Box { half: Vec3::new(0.5, 0.5, 0.05) };

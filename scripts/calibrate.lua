@@ -12,13 +12,12 @@
 -- --sweep-protocol hand is the sweep of the paper (appendix C.3) with the robot's hand (scripts/calibration/hand.lua): its D_ref is the
 -- largest stable D up to a closed hand.
 --
--- Writes assets/calibration/<asset>.json, the rows of the sweep, the plot and the text of the envelope, and scripts/calibrated.lua.
--- If all standard assets are calibrated, it also writes docs/calibration.md. scripts/check_calibration.lua checks the results.
+-- The press is repeated at other sizes and stiffnesses, from which limits and windows of instances follow (softvt.grip_window).
+--
+-- Writes assets/calibration/<asset>.json, the rows of the sweep, the plot and the text of the envelope. If all standard assets are calibrated, it also writes docs/calibration.md. scripts/check_calibration.lua checks the results.
 local asset_names = require "asset_names"
 local calibration_page = require "calibration_page"
-local grasp = require "experts.grasp"
 local hand = require "calibration.hand"
-local known = require "calibrated"
 local press = require "calibration.press"
 local soft_asset = require "calibration.soft_asset"
 
@@ -41,17 +40,38 @@ local opt = softvt.options {
 local assets = {}
 for _, name in ipairs(opt.asset) do assets[name] = soft_asset("calibrate", name, assets) end
 
--- The envelope of rows of the kinds "sweep", "hold" and "end" (why the sweep ended) of one asset.
+-- Presses of each asset for its instances: as it is, at the ends of the sizes that the standard variations draw, and at other
+-- stiffnesses, with half of the step.
+local VARIANTS = {
+  { 1, 1 }, { 0.88, 1 }, { 1.12, 1 }, { 1, 0.3 }, { 1, 3 }, { 1, 10 },
+}
+
+-- The rows of one variant, as softvt.envelope takes them.
+local function variant_rows(rows)
+  local kept = {}
+  for k, row in ipairs(rows) do
+    kept[k] = { width_mm = row.width_mm, d_pct = row.d_pct, force_n = row.force_n, strain_p95 = row.strain_p95 }
+  end
+  return kept
+end
+
+-- The envelope of rows of the kinds "sweep", "hold", "variant" and "end" (why the sweep ended) of one asset.
 local function envelope(name, rows, o)
-  local holds, sweep, last = {}, {}, {}
+  local of = { sweep = {}, hold = {}, variant = {}, ["end"] = {} }
   for _, row in ipairs(rows) do
-    if row.asset == name then
-      if row.kind == "end" then last = row else table.insert(row.kind == "hold" and holds or sweep, row) end
+    if row.asset == name then table.insert(of[row.kind], row) end
+  end
+  local holds, sweep, last, variants = of.hold, of.sweep, of["end"][1] or {}, {}
+  for _, factors in ipairs(VARIANTS) do
+    local scale, youngs, found = factors[1], factors[2], {}
+    for _, row in ipairs(of.variant) do
+      if row.scale == scale and row.youngs_factor == youngs then found[#found + 1] = row end
     end
+    if #found > 0 then variants[#variants + 1] = { scale = scale, youngs_factor = youngs, rows = variant_rows(found) } end
   end
   return softvt.envelope {
     asset = name, protocol = o.sweep_protocol, kappa = o.kappa, fingerprint = softvt.fingerprint(assets[name]), ended = last.ended,
-    stable_strain = last.stable_strain, holds = holds, sweep = sweep,
+    stable_strain = last.stable_strain, holds = holds, sweep = sweep, variants = variants,
   }
 end
 
@@ -60,6 +80,18 @@ local function append(rows, kind, name, found)
     row.asset, row.kind = name, kind
     rows[#rows + 1] = row
   end
+end
+
+-- Rows of the press of a variant.
+local function press_variant(name, factors, o)
+  local change = { scale = factors[1], youngs_factor = factors[2] }
+  local rows, stable = {}, {}
+  for _, row in ipairs(press.sweep(assets[name], 0.5e-3 * o.step_mm, change).rows) do
+    if row.stable then stable[#stable + 1] = row end
+  end
+  append(rows, "variant", name, stable)
+  for _, row in ipairs(rows) do row.scale, row.youngs_factor = change.scale, change.youngs_factor end
+  return rows
 end
 
 -- Rows of a press test: the sweep, then holds between its contact and τ.
@@ -82,6 +114,8 @@ local function run(point, o)
   local rows, asset = {}, assets[point.asset]
   if point.part == "press" then
     return press_asset(point.asset, o)
+  elseif point.part == "variant" then
+    return press_variant(point.asset, point.factors, o)
   elseif point.part == "hold" then
     append(rows, "hold", point.asset, hand.holds(asset, o.step, o.trials, o.hold_s))
   else
@@ -96,40 +130,11 @@ local function points(o)
     for _, part in ipairs(o.sweep_protocol == "press" and { "press" } or { "hold", "sweep" }) do
       list[#list + 1] = { asset = name, part = part }
     end
+    for _, factors in ipairs(o.sweep_protocol == "press" and VARIANTS or {}) do
+      list[#list + 1] = { asset = name, part = "variant", factors = factors }
+    end
   end
   return list
-end
-
-local function library_of(windows)
-  local lines = {
-    "-- Calibrated windows per asset: widths between the gels (m) at first contact, at the loose end and at τ, the forces per pad (N) at",
-    "-- the two ends, and the smallest D of the carried object as a share of τ. Written by scripts/calibrate.lua; experts grasp at a width",
-    "-- in between.", "return {",
-  }
-  for name, w in pairs(windows) do
-    lines[#lines + 1] = ("  %s = { width_contact = %.6f, width_lower = %.6f, width_at_tau = %.6f, force_lower = %.5f, force_at_tau = %.5f, carried = %.4f },"):format(
-      name, w.width_contact, w.width_lower, w.width_at_tau, w.force_lower, w.force_at_tau, w.carried)
-  end
-  lines[#lines + 1] = "}\n"
-  return table.concat(lines, "\n")
-end
-
--- The window of an envelope for experts; nil if it is empty.
-local function window_of(found)
-  local window = found.window
-  return window.extent_mm and {
-    width_contact = 1e-3 * found.width_contact_mm, width_lower = 1e-3 * window.width_lower_mm, width_at_tau = 1e-3 * window.width_at_tau_mm,
-    force_lower = window.force_lower_n, force_at_tau = window.force_at_tau_n, carried = found.carried_d and found.carried_d / found.tau or 0,
-  } or nil
-end
-
--- The windows of the assets that are not calibrated now, and the names of those of an older version, which cannot be used.
-local function former_windows()
-  local windows, dropped = {}, {}
-  for name, window in pairs(known) do
-    if grasp.has_window(name) then windows[name] = window elseif not assets[name] then dropped[#dropped + 1] = name end
-  end
-  return windows, dropped
 end
 
 local function three_kappas(found)
@@ -159,20 +164,14 @@ end
 
 local function finish(rows, o)
   local files, text, found, problems = {}, {}, {}, {}
-  local windows, dropped = former_windows()
   for _, name in ipairs(o.asset) do
     local one = envelope(name, rows, o)
     local at = "assets/calibration/" .. name
     files[at .. ".json"], files[at .. ".sweep.jsonl"], files[at .. ".svg"], files[at .. ".txt"] = one.json, one.sweep, one.plot, one.text
-    found[name], windows[name] = one, window_of(one)
+    found[name] = one
     text[#text + 1] = one.text .. three_kappas(one) .. warnings(name, one)
-    if not windows[name] then problems[#problems + 1] = problem_of(one) end
+    if not one.window.extent_mm then problems[#problems + 1] = problem_of(one) end
   end
-  if #dropped > 0 then
-    text[#text + 1] = ("warning: scripts/calibrated.lua had windows of an older version, which are left out: %s. Calibrate these too."):format(
-      table.concat(dropped, ", "))
-  end
-  files["scripts/calibrated.lua"] = library_of(windows)
   if asset_names.has_all_soft(found) then files["docs/calibration.md"] = calibration_page(asset_names.soft, found, o) end
   local problem
   if #problems > 0 then
@@ -189,6 +188,6 @@ return softvt.experiment {
   finish = finish,
   columns = {
     "asset", "kind", "width_mm", "closure", "held", "trials", "d_peak_pct", "stable", "d_pct", "force_n", "strain_p95", "min_det_f", "node_speed_m_s",
-    "both_pads", "slip_mm", "ended",
+    "both_pads", "slip_mm", "scale", "youngs_factor", "ended",
   },
 }

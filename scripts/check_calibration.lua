@@ -8,9 +8,7 @@
 -- as in the calibration and as the expert displaces its grasps.
 -- If all standard assets are checked in both parts, it writes docs/calibration_checks.md.
 local asset_names = require "asset_names"
-local grasp = require "experts.grasp"
 local hand = require "calibration.hand"
-local known = require "calibrated"
 local press = require "calibration.press"
 local trial = require "calibration.trial"
 local soft_asset = require "calibration.soft_asset"
@@ -40,7 +38,7 @@ for _, name in ipairs(opt.asset) do
   if parts.ends then
     local found = calibrations[name]
     local is_present = found and found.table.fingerprints and found.table.fingerprints[name] == softvt.fingerprint(assets[name])
-    if not (is_present and grasp.has_window(name)) then
+    if not (is_present and softvt.grip_window { asset = name }) then
       error(("check_calibration: %s has no calibrated window, or one of another shape, material, friction or version; run softvt scripts/calibrate.lua --asset %s first"):format(
         name, name), 0)
     end
@@ -72,10 +70,10 @@ end
 
 -- A batch of trials at an end of the window: a share of the window inside of it, or outside.
 local function ends(point)
-  local name, window = point.asset, known[point.asset]
+  local name, window = point.asset, softvt.grip_window { asset = point.asset }
   local inward = (point.at == "loose" and 1 or -1) * (point.side == "inside" and END_SHARE or -END_SHARE)
   local along = (point.at == "loose" and 0 or 1) + inward
-  local width = window.width_lower + along * (window.width_at_tau - window.width_lower)
+  local width = window.loose.width + along * (window.tight.width - window.loose.width)
   -- Before contact there is no force.
   local grip = { width = width, force = softvt.force_at(calibrations[name].table.envelopes[name].sweep, 1e3 * width) or 0 }
   local held, d_peak_pct, width_mm = hand.trials(assets[name], grip, point.first, point.last, point.spread, HOLD_S)

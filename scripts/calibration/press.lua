@@ -28,18 +28,22 @@ end
 local function rounded(width) return math.floor(1e5 * width + 0.5) / 1e5 end
 local function in_mm(width) return math.floor(1e5 * width + 0.5) / 100 end
 
--- The asset at another size or resolution: { shape, body, friction, object }. `object` is what experts see of it.
+-- The asset at another size, resolution, stiffness, density or stable strain: { shape, body, friction, object }. `object` is what
+-- experts see of it.
 local function instance(asset, change)
   local scale, from = change.scale or 1, asset.body
   local shape = scale == 1 and asset.shape or asset.shape:scale(scale, scale, scale)
   local low, high = shape:bounds()
   local hints = grasp.scaled_hints(asset.hints or {}, scale)
   local size = { high[1] - low[1], high[2] - low[2], high[3] - low[3] }
+  local youngs, density, strain = change.youngs_factor or 1, change.density_factor or 1, change.strain_factor or 1
+  local function changed(value) return value and strain * value end
   return {
     shape = shape, friction = asset.friction,
     body = softvt.soft {
-      youngs_pa = from.youngs_pa, poisson = from.poisson, density = from.density, grasp_spacing = scale * from.grasp_spacing,
-      resolution = change.resolution or from.resolution, collapse_strain = from.collapse_strain, damage_strain = from.damage_strain,
+      youngs_pa = youngs * from.youngs_pa, poisson = from.poisson, density = density * from.density, grasp_spacing = scale * from.grasp_spacing,
+      resolution = change.resolution or from.resolution, collapse_strain = changed(from.collapse_strain),
+      damage_strain = changed(from.damage_strain),
     },
     -- Centred above the origin, on the table.
     position = { -0.5 * (low[1] + high[1]), -0.5 * (low[2] + high[2]), -low[3] },
@@ -109,7 +113,8 @@ function Bench:slip_mm() return math.max(self.body:travel(self.pads[1].solid), s
 function Bench:both_touch() return math.min(self:force(1), self:force(2)) > trial.CONTACT_N end
 
 -- A settled object between open pads, displaced by `offset` (m) from the expert's grasp. Returns the bench, or nil and the reason why the
--- object cannot be pressed; then the stable strain of its material. `change` has the fields scale and resolution, both optional.
+-- object cannot be pressed; then the stable strain of its material. `change` has the optional fields scale, resolution, youngs_factor,
+-- density_factor and strain_factor.
 function press.bench(asset, change, offset)
   local made = instance(asset, change or {})
   local object = made.object

@@ -1,6 +1,4 @@
 -- Grasps from above with a known closure: across the object's narrow side or by its rim, where the hand has clearance.
-local calibrated = require "calibrated"
-
 -- SPREAD: largest displacement of an expert's grasp in each horizontal direction, m, so that demonstrations differ.
 local grasp = { SPREAD = 0.0015 }
 
@@ -89,40 +87,12 @@ function grasp.problem(object)
   end
 end
 
--- True if an asset has a calibrated window of this version.
-function grasp.has_window(asset)
-  local known = calibrated[asset]
-  return known ~= nil and known.carried ~= nil
-end
-
--- The safe window of an object: the loosest and the tightest grip as { width, force }, with the measured width of the gels (m)
--- and the force per pad at rest (N). The window of an asset is scaled to the instance. Its tight end is a strain: the width scales
--- with the size, the force with area and stiffness. Its loose end carries the weight, by an indentation that grows with weight
--- over stiffness. The deformation by the weight adds to that of the squeeze in D as perpendicular vectors do, so it leaves less of τ
--- to the grip of a soft or heavy instance. Nil without a calibration.
+-- The safe window of an object (softvt.GripWindow), that of its asset scaled to the instance. Nil without a calibration.
 function grasp.window(object)
-  local known = calibrated[object.asset]
-  if not known then return nil end
-  if not grasp.has_window(object.asset) then
-    error(("calibrated: the window of %s is of an older version; run softvt scripts/calibrate.lua --asset %s"):format(object.asset, object.asset), 0)
-  end
-  local size, stiffness, density = object.scale or 1, object.youngs_factor or 1, object.density_factor or 1
-  -- Between a flat contact (linear) and a sphere's (Hertz: indentation by the power 2/3 of the force), whichever is larger.
-  local load = density * size / stiffness
-  load = math.max(load, load ^ (2 / 3))
-  local indentation = (known.width_contact - known.width_lower) * load
-  local loose = { width = size * (known.width_contact - indentation), force = known.force_lower * density * size ^ 3 }
-  -- An asset whose carried D exceeds τ has the window of the press alone.
-  local carried = known.carried < 1 and known.carried or 0
-  local left = (1 - (carried * density * size / stiffness) ^ 2) / (1 - carried ^ 2)
-  -- No window is left to an instance whose carried D exceeds τ: its loosest grip does least harm.
-  if left <= 0 then return { loose = loose, tight = loose } end
-  local share = math.min(1, math.sqrt(left))
-  local tight = {
-    width = size * (known.width_contact - share * (known.width_contact - known.width_at_tau)),
-    force = share * known.force_at_tau * stiffness * size ^ 2,
+  return softvt.grip_window {
+    asset = object.asset, scale = object.scale, youngs_factor = object.youngs_factor, density_factor = object.density_factor,
+    strain_factor = object.strain_factor, coating = object.coating,
   }
-  return { loose = loose, tight = tight.width < loose.width and tight or loose }
 end
 
 -- The grip at a share of the safe window: 0 is the loosest, 1 the tightest. Without a window it is the squeeze of a rigid object,

@@ -38,11 +38,13 @@ pub enum RandomStream {
     Policy,
     /// Disturbance of the robot's motion.
     Disturbance,
+    /// Properties of objects that do not show.
+    Hidden,
 }
 
 impl RandomStream {
     /// Every stream with the name that scripts use.
-    const NAMES: [(Self, &str); 12] = [
+    const NAMES: [(Self, &str); 13] = [
         (Self::Layout, "layout"),
         (Self::Arm, "arm"),
         (Self::Material, "material"),
@@ -55,6 +57,7 @@ impl RandomStream {
         (Self::Script, "script"),
         (Self::Policy, "policy"),
         (Self::Disturbance, "disturbance"),
+        (Self::Hidden, "hidden"),
     ];
 
     /// The stream of this name in scripts.

@@ -1,12 +1,20 @@
 //! Variation of the soft objects, the light and the cameras of a suite from episode to episode.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use super::seed::{EpisodeSeed, RandomStream, uniform};
-use softvt_scene::{CameraVariation, LightVariation, ObjectVariation, Scene, SceneVariation};
+use softvt_common::text::format_number;
+use softvt_evaluation::{
+    episode_id::{EpisodeId, Split},
+    instance::{InstanceFactors, InstanceModel},
+};
+use softvt_robot::spec::PadSpec;
+use softvt_scene::{
+    Asset, Body, CameraVariation, HiddenProperties, LightVariation, Object, ObjectVariation, Scene, SceneVariation,
+};
 
 /// Ends of the range of a factor; both are positive.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -18,6 +26,11 @@ pub struct FactorRange {
 }
 
 impl FactorRange {
+    /// True if a factor is within the range, ends included.
+    fn contains(self, factor: f64) -> bool {
+        (self.min..=self.max).contains(&factor)
+    }
+
     /// The range of a factor that changes nothing.
     pub const ONE: Self = Self { min: 1.0, max: 1.0 };
 
@@ -30,6 +43,76 @@ impl FactorRange {
         self.min * (self.max / self.min).powf(uniform(rng))
     }
 }
+
+/// Exponent of the stable strain over age: stale crumb is stiffer and cracks at a smaller strain. About 0.7 by the measurements
+/// of Cornford, Axford and Elton (1964) and Scanlon, Sapirstein and Fahloul (2000).
+const STALING_EXPONENT: f64 = 0.7;
+
+/// Largest share of its limit that an instance may deform by its own weight when it is carried. Beyond it no grip is reliably safe.
+const MAX_CARRIED: f64 = 0.5;
+
+/// Draws of an object before its ranges count as empty.
+const MAX_DRAWS: u32 = 10_000;
+
+/// Ranges of the properties of soft objects that do not show. All but `window_ratio` are drawn log-uniform.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HiddenRanges {
+    /// Relative density a of the foam: density ∝ a and Young's modulus ∝ a² (Gibson and Ashby, open cells).
+    pub aeration: FactorRange,
+    /// Age s: Young's modulus ∝ s, stable strain ∝ s^−0.7.
+    pub staling: FactorRange,
+    /// Factor on the mass.
+    pub filling: FactorRange,
+    /// Static friction of every pair with the object.
+    pub coating: FactorRange,
+    /// Kept instances: largest over smallest safe grip force.
+    pub window_ratio: FactorRange,
+}
+
+/// No instance within the ranges of a variation can be kept, or its window is unknown.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DrawError {
+    /// The scene has no object that the variation changes.
+    #[error("has no soft object")]
+    NoSoftObject,
+    /// The asset has no calibrated window for the condition on it.
+    #[error(
+        "asset {asset} has no calibrated window, by which the variation {variation:?} selects instances; run softvt \
+         scripts/calibrate.lua --asset {asset}"
+    )]
+    NoWindow {
+        /// Name of the asset.
+        asset: String,
+        /// Name of the variation.
+        variation: String,
+    },
+    /// The condition on the window keeps none of [`MAX_DRAWS`] draws.
+    #[error(
+        "variation {variation:?}: none of {MAX_DRAWS} instances of asset {asset} has a safe window with a ratio of forces in \
+         {range}; widen window_ratio, filling or coating"
+    )]
+    NoInstance {
+        /// Name of the asset.
+        asset: String,
+        /// Name of the variation.
+        variation: String,
+        /// The range of the ratio.
+        range: String,
+    },
+    /// A drawn strain is not a strain.
+    #[error("variation {variation:?}: staling gives {asset} a strain of {strain}, above 1; begin staling at 1")]
+    Strain {
+        /// Name of the asset.
+        asset: String,
+        /// Name of the variation.
+        variation: String,
+        /// The strain.
+        strain: String,
+    },
+}
+
+/// The calibrated instances of an asset, if it is calibrated. Only variations with hidden properties ask.
+pub type ModelOf<'a> = dyn Fn(&Asset) -> Option<Arc<InstanceModel>> + 'a;
 
 /// Ranges from which the objects, the light and the cameras of an episode are drawn.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -52,31 +135,39 @@ pub struct VariationRanges {
     pub camera_offset_m: f64,
     /// Largest rotation of a camera about each of its axes, rad.
     pub camera_rotation_rad: f64,
+    /// Properties that do not show.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hidden: Option<HiddenRanges>,
 }
 
 impl VariationRanges {
     /// Draws the variation of an episode. Each factor has a stream of its own, except stiffness, density and friction,
     /// which are drawn from that of the material. Soft objects are drawn in the order of the scene.
-    pub fn draw(&self, seed: &EpisodeSeed, scene: &Scene) -> SceneVariation {
-        let [mut size, mut material, mut colour, mut light, mut camera] = [
-            RandomStream::Size,
-            RandomStream::Material,
-            RandomStream::Colour,
-            RandomStream::Light,
-            RandomStream::Camera,
-        ]
-        .map(|stream| seed.stream(stream));
-        let around_zero = |rng: &mut ChaCha8Rng, most: f64| most * (2.0 * uniform(rng) - 1.0);
+    ///
+    /// With hidden properties, everything but size, colour and looks is drawn again until the window of the instance is within
+    /// `window_ratio`, so that neither size nor colour depends on what is hidden.
+    ///
+    /// # Errors
+    /// The scene has no soft object, or no instance can be kept.
+    pub fn draw(
+        &self,
+        seed: &EpisodeSeed,
+        scene: &Scene,
+        model_of: &ModelOf<'_>,
+    ) -> Result<SceneVariation, DrawError> {
+        let mut streams = InstanceStreams::of(seed);
+        let [mut colour, mut light, mut camera] =
+            [RandomStream::Colour, RandomStream::Light, RandomStream::Camera].map(|stream| seed.stream(stream));
         let mut objects = BTreeMap::new();
         for object in scene.objects.iter().filter(|object| SceneVariation::applies_to(&object.asset.body)) {
             let drawn = ObjectVariation {
-                scale: self.size.uniform(&mut size),
-                youngs_factor: self.stiffness.log_uniform(&mut material),
-                density_factor: self.density.log_uniform(&mut material),
-                friction_factor: self.friction.log_uniform(&mut material),
                 colour: std::array::from_fn(|_| 1.0 + around_zero(&mut colour, self.colour)),
+                ..self.draw_instance(&mut streams, &object.nominal, &factors_in_layout(object), model_of)?
             };
             objects.insert(object.name.clone(), drawn);
+        }
+        if objects.is_empty() {
+            return Err(DrawError::NoSoftObject);
         }
         let mut cameras = BTreeMap::new();
         for moved in scene.cameras.iter().filter(|camera| SceneVariation::moves(camera.mount)) {
@@ -87,6 +178,131 @@ impl VariationRanges {
             cameras.insert(moved.name.clone(), drawn);
         }
         let light = LightVariation { strength: self.light.log_uniform(&mut light) };
-        SceneVariation { objects, light, cameras }
+        Ok(SceneVariation { objects, light, cameras })
     }
+
+    /// Draws `count` instances of an asset as episodes do, from streams of their own that no episode uses: the statistics of
+    /// the suite, for controllers that know these but not the instance.
+    ///
+    /// # Errors
+    /// No instance can be kept.
+    pub fn sample(
+        &self,
+        suite: &str,
+        asset: &Asset,
+        count: u32,
+        model_of: &ModelOf<'_>,
+    ) -> Result<Vec<ObjectVariation>, DrawError> {
+        let id = EpisodeId { suite: suite.into(), task: 0, episode: 0, base_seed: 0, split: Split::Experiment };
+        let mut streams = InstanceStreams::of(&EpisodeSeed::new(&id, &asset.name));
+        (0..count)
+            .map(|_| self.draw_instance(&mut streams, asset, &InstanceFactors::NOMINAL, model_of))
+            .collect()
+    }
+
+    fn draw_instance(
+        &self,
+        streams: &mut InstanceStreams,
+        asset: &Asset,
+        layout: &InstanceFactors,
+        model_of: &ModelOf<'_>,
+    ) -> Result<ObjectVariation, DrawError> {
+        let scale = self.size.uniform(&mut streams.size);
+        let mut draw_material = || ObjectVariation {
+            scale,
+            youngs_factor: self.stiffness.log_uniform(&mut streams.material),
+            density_factor: self.density.log_uniform(&mut streams.material),
+            friction_factor: self.friction.log_uniform(&mut streams.material),
+            colour: [1.0; 3],
+            hidden: None,
+        };
+        let Some(ranges) = &self.hidden else { return Ok(draw_material()) };
+        let names = || (asset.name.clone(), self.name.clone());
+        let no_window = || {
+            let (asset, variation) = names();
+            DrawError::NoWindow { asset, variation }
+        };
+        let model = model_of(asset).ok_or_else(no_window)?;
+        for draws in 1..=MAX_DRAWS {
+            let material = draw_material();
+            let (drawn, mut hidden) = ranges.draw(&mut streams.hidden, material);
+            if let Some(strain) = too_large(asset, hidden.strain_factor) {
+                let (asset, variation) = names();
+                return Err(DrawError::Strain { asset, variation, strain: format_number(strain) });
+            }
+            let factors = InstanceFactors {
+                scale: layout.scale * scale,
+                youngs: layout.youngs * drawn.youngs_factor,
+                density: layout.density * drawn.density_factor,
+                strain: hidden.strain_factor,
+                friction: hidden.coating / PadSpec::default().static_mu,
+            };
+            let window = model.window(&factors).ok_or_else(no_window)?;
+            if window.carried <= MAX_CARRIED && ranges.window_ratio.contains(window.ratio()) {
+                (hidden.window_ratio, hidden.draws) = (window.ratio(), draws);
+                return Ok(ObjectVariation { hidden: Some(hidden), ..drawn });
+            }
+        }
+        let (asset, variation) = names();
+        let FactorRange { min, max } = ranges.window_ratio;
+        Err(DrawError::NoInstance { asset, variation, range: format!("{}..{}", format_number(min), format_number(max)) })
+    }
+}
+
+impl HiddenRanges {
+    /// Draws the properties, and the material that they give to an instance of `material`.
+    fn draw(&self, rng: &mut ChaCha8Rng, material: ObjectVariation) -> (ObjectVariation, HiddenProperties) {
+        let hidden = HiddenProperties {
+            aeration: self.aeration.log_uniform(rng),
+            staling: self.staling.log_uniform(rng),
+            strain_factor: 1.0,
+            filling: self.filling.log_uniform(rng),
+            coating: self.coating.log_uniform(rng),
+            window_ratio: 1.0,
+            draws: 1,
+        };
+        let drawn = ObjectVariation {
+            youngs_factor: material.youngs_factor * hidden.aeration.powi(2) * hidden.staling,
+            density_factor: material.density_factor * hidden.aeration * hidden.filling,
+            ..material
+        };
+        (drawn, HiddenProperties { strain_factor: hidden.staling.powf(-STALING_EXPONENT), ..hidden })
+    }
+}
+
+/// Streams from which instances are drawn.
+struct InstanceStreams {
+    size: ChaCha8Rng,
+    material: ChaCha8Rng,
+    hidden: ChaCha8Rng,
+}
+
+impl InstanceStreams {
+    fn of(seed: &EpisodeSeed) -> Self {
+        let [size, material, hidden] =
+            [RandomStream::Size, RandomStream::Material, RandomStream::Hidden].map(|stream| seed.stream(stream));
+        Self { size, material, hidden }
+    }
+}
+
+/// What a layout has changed of an object.
+fn factors_in_layout(object: &Object) -> InstanceFactors {
+    InstanceFactors {
+        scale: object.scale,
+        youngs: object.youngs_factor().unwrap_or(1.0),
+        density: object.density_factor().unwrap_or(1.0),
+        ..InstanceFactors::NOMINAL
+    }
+}
+
+/// A number in −most..most.
+fn around_zero(rng: &mut ChaCha8Rng, most: f64) -> f64 {
+    most * (2.0 * uniform(rng) - 1.0)
+}
+
+/// The strain of a material that `factor` makes larger than 1.
+fn too_large(asset: &Asset, factor: f64) -> Option<f64> {
+    let Body::Soft(material) = &asset.body else { return None };
+    let strains = [material.collapse_strain, material.damage_strain];
+    strains.into_iter().flatten().map(|strain| factor * strain).find(|strain| *strain > 1.0)
 }

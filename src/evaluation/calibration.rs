@@ -16,7 +16,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::safety::{DeformationLimit, round_to_six_decimals};
+use super::{
+    instance::VariantSweep,
+    safety::{DeformationLimit, round_to_six_decimals},
+};
 
 /// Exclusive lower bound of det F in a stable squeeze.
 const MIN_DET_F: f64 = 0.1;
@@ -149,6 +152,8 @@ pub struct Scans {
     pub holds: Vec<HoldRow>,
     /// Compression sweep, in any order.
     pub sweep: Vec<SweepRow>,
+    /// Presses at other sizes and stiffnesses.
+    pub variants: Vec<VariantSweep>,
 }
 
 /// Envelope of an asset, with the rows it was computed from.
@@ -175,6 +180,9 @@ pub struct Envelope {
     pub holds: Vec<HoldRow>,
     /// Compression sweep, by decreasing width.
     pub sweep: Vec<SweepRow>,
+    /// Presses at other sizes and stiffnesses, for the limits and windows of instances ([`super::instance`]).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub variants: Vec<VariantSweep>,
 }
 
 /// D_ref of a sweep, with its width.
@@ -186,7 +194,7 @@ struct Reference {
 impl Envelope {
     /// Sorts the rows by width and computes the bounds.
     pub fn new(scans: Scans, kappa: f64) -> Self {
-        let Scans { protocol, stable_strain, ended, mut holds, mut sweep } = scans;
+        let Scans { protocol, stable_strain, ended, mut holds, mut sweep, variants } = scans;
         holds.sort_by(|a, b| b.width_mm.total_cmp(&a.width_mm));
         sweep.sort_by(|a, b| b.width_mm.total_cmp(&a.width_mm));
         let at_strain = stable_strain.and_then(|strain| reference_at_strain(&sweep, strain));
@@ -221,6 +229,7 @@ impl Envelope {
             },
             holds,
             sweep,
+            variants,
         }
     }
 

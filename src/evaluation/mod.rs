@@ -25,6 +25,7 @@
 //! | At which stage did the episode fail? | [`stage`] |
 //! | Goal, NoDrop and deformation limit together | [`safety`] |
 //! | Where does the limit τ of an asset come from? | [`calibration`], [`thresholds`], [`envelope_plot`] |
+//! | What limit and window has another instance of an asset? | [`instance`] |
 //! | Every threshold of the judge | [`criteria`] |
 //! | Rates, intervals, paired tests | [`statistics`], [`paired_stats`], [`summary`] |
 //!
@@ -39,6 +40,7 @@ pub mod envelope_plot;
 pub mod episode_id;
 pub mod evidence;
 pub mod goal;
+pub mod instance;
 pub mod judge;
 pub mod paired_stats;
 pub mod record;

@@ -184,7 +184,7 @@ impl RobotInstance {
 
 fn add_pad(world: &mut World, spec: &RobotSpec, articulation: ArticulationId, side: Side) -> ColliderId {
     let link = LinkId { articulation, index: panda::finger_link(side) };
-    let friction = Friction { static_mu: spec.pads.static_mu, dynamic_mu: spec.pads.dynamic_mu };
+    let friction = Friction::new(spec.pads.static_mu, spec.pads.dynamic_mu);
     let stiffness =
         SurfaceStiffness { normal: spec.pads.normal_modulus, shear: spec.pads.tangential_modulus };
     let name = if side == Side::Left { "left pad" } else { "right pad" };

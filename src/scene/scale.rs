@@ -57,6 +57,20 @@ impl Object {
         }
     }
 
+    /// Stable strain of the material relative to that of the asset; `None` if it is not a soft body that states one.
+    pub fn strain_factor(&self) -> Option<f64> {
+        match (&self.asset.body, &self.nominal.body) {
+            (Body::Soft(own), Body::Soft(nominal)) => Some(own.stable_strain()? / nominal.stable_strain()?),
+            _ => None,
+        }
+    }
+
+    /// Static coefficient of its coating; `None` without one.
+    pub fn coating(&self) -> Option<f64> {
+        let friction = self.asset.friction;
+        friction.coated.then_some(friction.static_mu)
+    }
+
     /// Density relative to that of the asset; `None` if it is neither a soft nor a rigid body.
     pub fn density_factor(&self) -> Option<f64> {
         Some(self.asset.density()? / self.nominal.density()?)

@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use softvt_geometry::{Pose, Quat, Vec3};
+use softvt_physics::contact::Friction;
 
-use super::{Body, CameraMount, Scene};
+use super::{Body, CameraMount, Object, Scene};
 use std::sync::Arc;
 
 /// Factors that make an instance of an asset another object of the same kind.
@@ -22,6 +23,48 @@ pub struct ObjectVariation {
     pub friction_factor: f64,
     /// Factors on the colours, linear RGB.
     pub colour: [f64; 3],
+    /// Properties that do not show, whose effects on stiffness and density the factors above contain.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hidden: Option<HiddenProperties>,
+}
+
+impl ObjectVariation {
+    /// Changes an object. Sizes and material numbers are multiplied.
+    pub fn apply(&self, object: &mut Object) {
+        object.set_scale(object.scale * self.scale);
+        let asset = Arc::make_mut(&mut object.asset);
+        asset.friction.static_mu *= self.friction_factor;
+        asset.friction.dynamic_mu *= self.friction_factor;
+        if let Body::Soft(material) = &mut asset.body {
+            material.youngs_pa *= self.youngs_factor;
+            material.density *= self.density_factor;
+            if let Some(hidden) = self.hidden {
+                let strains = [&mut material.collapse_strain, &mut material.damage_strain];
+                strains.into_iter().flatten().for_each(|strain| *strain *= hidden.strain_factor);
+                asset.friction = Friction::coated(hidden.coating);
+            }
+        }
+        asset.visuals.iter_mut().for_each(|visual| visual.tint(self.colour));
+    }
+}
+
+/// Properties of a soft object that do not show.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HiddenProperties {
+    /// Relative density of the foam: a factor on the density, and by its square on Young's modulus.
+    pub aeration: f64,
+    /// Factor on Young's modulus by age.
+    pub staling: f64,
+    /// Factor on the collapse and the damage strain by age.
+    pub strain_factor: f64,
+    /// Factor on the mass.
+    pub filling: f64,
+    /// Static friction of every pair with the object.
+    pub coating: f64,
+    /// Largest over smallest safe grip force.
+    pub window_ratio: f64,
+    /// Number of draws until this one was kept.
+    pub draws: u32,
 }
 
 /// Factors on the light of a scene.
@@ -67,15 +110,7 @@ impl SceneVariation {
     pub fn apply(&self, scene: &mut Scene) {
         for object in &mut scene.objects {
             let Some(drawn) = self.objects.get(&object.name) else { continue };
-            object.set_scale(object.scale * drawn.scale);
-            let asset = Arc::make_mut(&mut object.asset);
-            if let Body::Soft(material) = &mut asset.body {
-                material.youngs_pa *= drawn.youngs_factor;
-                material.density *= drawn.density_factor;
-            }
-            asset.friction.static_mu *= drawn.friction_factor;
-            asset.friction.dynamic_mu *= drawn.friction_factor;
-            asset.visuals.iter_mut().for_each(|visual| visual.tint(drawn.colour));
+            drawn.apply(object);
         }
         scene.lighting.key.strength *= self.light.strength;
         scene.lighting.sky.strength *= self.light.strength;

@@ -38,7 +38,8 @@ fn the_limit_is_the_objects_own_and_its_calibration_repeats_bit_for_bit() {
     let extent = number(&window["width_lower_mm"]) - number(&window["width_at_tau_mm"]);
     assert!(extent > 0.2 && number(&envelope["width_contact_mm"]) <= 36.0, "{window}");
     assert!(number(&window["force_at_tau_n"]) > number(&window["force_lower_n"]), "{window}");
-    assert!(project.text("scripts/calibrated.lua").contains("brick = { width_contact = "));
+    let variants = envelope["variants"].as_array().expect("presses of variants");
+    assert!(variants.len() == 6 && variants.iter().all(|variant| variant["rows"].as_array().is_some_and(|rows| rows.len() > 5)));
     assert_eq!(calibrated("--threads 2"), first);
     // The robot's settings do not enter.
     let message = project.refusal(&format!("{QUICK} --set robot.gripper.effort=20 --out again"));
@@ -97,21 +98,6 @@ fn assets_without_a_window_are_told_with_the_files_of_all_assets() {
         reason("sagging")
     );
     assert!(!project.text("assets/calibration/wide.txt").contains("lower bound"));
-    let windows = project.text("scripts/calibrated.lua");
-    assert!(windows.contains("sound = {") && !windows.contains("brick = {") && !windows.contains("wide = {"));
-}
-
-#[test]
-fn windows_of_an_older_version_are_left_out() {
-    let project = brick("collapse_strain = 0.12");
-    let old = "return { cube = { width_contact = 0.056, width_lower = 0.055, width_at_tau = 0.053, force_lower = 0.1, force_at_tau = 1 } }\n";
-    project.write("scripts/calibrated.lua", old.as_bytes());
-    let output = project.succeeds(QUICK);
-    assert!(output.out.contains("windows of an older version, which are left out: cube"), "{}", output.out);
-    assert!(!project.text("scripts/calibrated.lua").contains("cube = "));
-    project.write("scripts/calibrated.lua", old.as_bytes());
-    let message = project.refusal("scripts/check_calibration.lua --asset cube --part ends --out checked");
-    assert!(message.contains("cube has no calibrated window, or one of another shape"), "{message}");
 }
 
 #[test]

@@ -9,7 +9,7 @@ pub use crate::bodies::GRAVITY;
 
 /// Surfaces with both coefficients.
 pub fn friction(static_mu: f64, dynamic_mu: f64) -> Friction {
-    Friction { static_mu, dynamic_mu }
+    Friction::new(static_mu, dynamic_mu)
 }
 
 /// A world that never sleeps, with gravity along −z.

@@ -185,7 +185,7 @@ impl Scene {
             ..PhysicsParams::default()
         };
         let mut world = World::new(params, Vec3::zeros());
-        let friction = |mu: f64| Friction { static_mu: mu, dynamic_mu: mu };
+        let friction = |mu: f64| Friction::new(mu, mu);
         let (smooth, rough) = (friction(0.0), friction(options.friction));
         let height = 0.5 * options.body.width();
         world.add_soft("body", rest.clone(), None, &Pose::translation(0.0, 0.0, height), smooth);

@@ -2,7 +2,8 @@
 //!
 //! A limit is looked up for every soft object that the scene of an episode has, by the name of its asset and the
 //! fingerprint of the asset as its file defines it. A layout or shift that changes stiffness, density, friction, colour or
-//! scale leaves the limit valid ([`Object::departure`]).
+//! scale leaves the limit valid ([`Object::departure`]). An instance with another stable strain has a limit of its own, read
+//! off the press of the asset.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -14,6 +15,7 @@ use crate::{error::CliError, output::eprint_notice};
 use softvt_common::{files, parallel::lock, text::counted};
 use softvt_evaluation::{
     episode_id::EpisodeIndex,
+    instance::{InstanceFactors, InstanceModel},
     safety::{DeformationLimit, NOMINAL_KAPPA},
     thresholds::ThresholdFile,
 };
@@ -40,6 +42,25 @@ struct CalibrationFile {
     path: String,
     sha256: String,
     thresholds: ThresholdFile,
+}
+
+impl CalibrationFile {
+    /// Limit of an object: that of its asset, and with a stable strain of its own that of the instance.
+    fn limit(&self, object: &Object) -> Option<DeformationLimit> {
+        let name = &object.nominal.name;
+        let of_asset = self.thresholds.limit(name)?;
+        let strain = object.strain_factor().unwrap_or(1.0);
+        if strain == 1.0 {
+            return Some(of_asset);
+        }
+        let factors = InstanceFactors {
+            scale: object.scale,
+            youngs: object.youngs_factor().unwrap_or(1.0),
+            strain,
+            ..InstanceFactors::NOMINAL
+        };
+        InstanceModel::new(self.thresholds.envelopes.get(name)?, of_asset.kappa).limit(&factors)
+    }
 }
 
 /// Limits of the soft objects of one scene.
@@ -90,7 +111,7 @@ impl CalibrationFiles {
         if let Some(change) = object.departure() {
             return Ok(Err(MissingLimit::OtherObject { change }));
         }
-        Ok(file.thresholds.limit(&asset.name).ok_or(MissingLimit::NoStableRow { path }))
+        Ok(file.limit(object).ok_or(MissingLimit::NoStableRow { path }))
     }
 
     /// The calibration file of an asset, if there is one.

@@ -1,6 +1,9 @@
 //! Colliders: surfaces of everything but soft bodies, attached to a body or to the world.
 
-use std::{fmt::Debug, sync::Arc};
+use std::{
+    fmt::{self, Debug},
+    sync::Arc,
+};
 
 use serde::{Deserialize, Serialize};
 
@@ -38,31 +41,68 @@ impl ContactSurface for Shape {
     }
 }
 
-/// Coulomb friction coefficients of a surface; a pair of surfaces takes the larger of each.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// Coulomb friction coefficients of a surface. A pair of surfaces takes the larger of each, unless one is coated.
+#[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Friction {
     /// Static coefficient.
     pub static_mu: f64,
     /// Dynamic coefficient, not above the static one.
     pub dynamic_mu: f64,
+    /// True for a layer on the surface, such as flour, oil or glaze: it separates the surfaces, so that its coefficients are
+    /// those of any pair.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub coated: bool,
+}
+
+/// Fingerprints of assets hash this text. A surface without a coating has that of the coefficients alone.
+impl Debug for Friction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut text = f.debug_struct("Friction");
+        text.field("static_mu", &self.static_mu).field("dynamic_mu", &self.dynamic_mu);
+        if self.coated {
+            text.field("coated", &true);
+        }
+        text.finish()
+    }
 }
 
 impl Default for Friction {
     /// 0.6 / 0.5, that of every object and surface but the pads.
     fn default() -> Self {
-        Self { static_mu: 0.6, dynamic_mu: 0.5 }
+        Self::new(0.6, 0.5)
     }
 }
 
 impl Friction {
     /// No friction at all.
-    pub const NONE: Self = Self { static_mu: 0.0, dynamic_mu: 0.0 };
+    pub const NONE: Self = Self::new(0.0, 0.0);
 
-    /// The coefficients of a pair.
+    /// Dynamic over static coefficient of a coating: that of the pads.
+    const COATING_RATIO: f64 = 0.8;
+
+    /// A surface without a coating.
+    pub const fn new(static_mu: f64, dynamic_mu: f64) -> Self {
+        Self { static_mu, dynamic_mu, coated: false }
+    }
+
+    /// A coated surface, by the static coefficient of the coating.
+    pub const fn coated(static_mu: f64) -> Self {
+        Self { static_mu, dynamic_mu: Self::COATING_RATIO * static_mu, coated: true }
+    }
+
+    /// The coefficients of a pair: those of the coating, the more slippery one if both are coated, and without a coating the
+    /// larger ones.
     pub fn with(&self, other: &Self) -> Self {
+        let pick: fn(f64, f64) -> f64 = match (self.coated, other.coated) {
+            (true, false) => return *self,
+            (false, true) => return *other,
+            (true, true) => f64::min,
+            (false, false) => f64::max,
+        };
         Self {
-            static_mu: self.static_mu.max(other.static_mu),
-            dynamic_mu: self.dynamic_mu.max(other.dynamic_mu),
+            static_mu: pick(self.static_mu, other.static_mu),
+            dynamic_mu: pick(self.dynamic_mu, other.dynamic_mu),
+            coated: self.coated,
         }
     }
 }

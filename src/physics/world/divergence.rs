@@ -99,7 +99,7 @@ mod tests {
         let material = ElasticMaterial { youngs_pa: 3e4, poisson: 0.4, density: 300.0 };
         let model = FemModel::from_shape(&shape, 0.05_f64.powi(3), material, 2, &SampleSpec::default());
         let mut world = World::new(PhysicsParams::default(), Vec3::zeros());
-        let mu = Friction { static_mu: 0.6, dynamic_mu: 0.5 };
+        let mu = Friction::new(0.6, 0.5);
         world.add_soft("bun", model.expect("a mesh"), None, &Pose::identity(), mu);
         world
     }

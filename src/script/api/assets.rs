@@ -15,6 +15,7 @@ use crate::{
     },
     vm::error::fail,
 };
+use super::envelope::find_calibration;
 use softvt_physics::contact::Friction;
 use softvt_scene::{Asset, Body, SoftMaterial, Visual};
 
@@ -26,12 +27,14 @@ pub(crate) const STRAIN: Type = Type::Number("", Range::above(0.0, 1.0));
 pub(crate) const DENSITY: Type = Type::Number("kg/m³", Range::POSITIVE);
 
 record_of! {
-    /// Coulomb friction of a surface. A pair of surfaces has the larger of each coefficient.
+    /// Coulomb friction of a surface. A pair of surfaces has the larger of each coefficient, unless one is coated.
     Friction: "softvt.Friction" as "friction" {
         /// Static coefficient.
         static_mu: f64 = COEFFICIENT => Number(0.6);
         /// Dynamic coefficient, at most the static one.
         dynamic_mu: f64 = COEFFICIENT => Number(0.5);
+        /// True for a layer on the surface (flour, oil, glaze), whose coefficients are those of any pair.
+        coated: bool => Boolean(false);
     }
     /// A finite-element soft body of linear-elastic, isotropic material.
     SoftMaterial: "softvt.Soft" as "asset.body", constructor "softvt.soft" {
@@ -65,7 +68,7 @@ record! {
     ScenerySpec: "softvt.Scenery" as "asset.body", constructor "softvt.scenery" {}
     /// A kind of object. Its shape at rest has its lowest point at z = 0 and its centre on the z axis (see
     /// softvt.Shape:grounded).
-    AssetSpec: "softvt.Asset" as "asset", constructor "softvt.asset", relations check_friction {
+    AssetSpec: "softvt.Asset" as "asset", constructor "softvt.asset", relations check_asset {
         /// Name in results and calibration files.
         name: String = Type::Name;
         /// Shape, in metres.
@@ -91,10 +94,11 @@ one_of! {
 pub(crate) static CONSTRUCTORS: &[&Record] =
     &[AssetSpec::RECORD, SoftMaterial::RECORD, RigidSpec::RECORD, StaticSpec::RECORD, ScenerySpec::RECORD];
 
-fn check_friction(lua: &Lua, _: &Record, asset: &Table) -> mlua::Result<()> {
-    let Friction { static_mu, dynamic_mu } = FromChecked::from_checked(asset.raw_get("friction")?, lua)?;
+fn check_asset(lua: &Lua, _: &Record, asset: &Table) -> mlua::Result<()> {
+    let Friction { static_mu, dynamic_mu, .. } = FromChecked::from_checked(asset.raw_get("friction")?, lua)?;
     if dynamic_mu <= static_mu {
-        return Ok(());
+        // An episode can use only files that were found when the script was loaded.
+        return find_calibration(lua, &asset.raw_get::<String>("name")?);
     }
     let message = format!(
         "asset.friction: dynamic_mu {dynamic_mu} is above static_mu {static_mu}; give the larger one to static_mu"

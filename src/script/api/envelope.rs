@@ -1,25 +1,170 @@
-//! The safe interaction envelope: results of a calibration from its rows.
+//! The safe interaction envelope: results of a calibration from its rows, and the windows of instances.
 
-use mlua::{Lua, LuaSerdeExt, Value};
+use std::{
+    cell::RefCell,
+    collections::BTreeMap,
+    sync::{Arc, Mutex},
+};
+
+use mlua::{Lua, LuaSerdeExt, Table, Value};
 use serde::de::DeserializeOwned;
 
-use super::assets::STRAIN;
+use super::{
+    assets::{AssetSpec, STRAIN},
+    scene::COATING,
+    tasks::VariationSpec,
+};
 use crate::{
-    schema::{Range, Type, Unchecked, choice, functions, output},
+    schema::{Constructed, Range, Type, Unchecked, choice, functions, output},
     vm::{
         error::{app_data, fail},
         json::deserialize,
-        library::{FoundFile, SharedLibrary},
+        library::{FoundFile, LibraryError, SharedLibrary},
         privilege::check_privilege,
     },
 };
+use softvt_benchmark::variation::{DrawError, ModelOf, VariationRanges};
 use softvt_common::parallel::lock;
 use softvt_evaluation::{
     calibration::{Envelope, HoldRow, Protocol, SafeWindow, Scans, SweepRow, force_at},
     envelope_plot::{plot, three_lines},
+    instance::{Grip, GripWindow, InstanceFactors, InstanceModel, VariantSweep},
     safety::DeformationLimit,
     thresholds::{ThresholdFile, sweep_jsonl},
 };
+use softvt_robot::spec::PadSpec;
+use softvt_geometry::Pose;
+use softvt_scene::{Asset, Object};
+
+/// Largest number of instances of a sample.
+pub(crate) const MAX_SAMPLE: f64 = 10_000.0;
+/// A factor between an instance and its asset.
+const FACTOR: Type = Type::Number("", Range::POSITIVE);
+
+/// Calibrated assets of a virtual machine, by name.
+#[derive(Clone, Default)]
+struct CalibratedAssets(Arc<Mutex<BTreeMap<String, Option<CalibratedAsset>>>>);
+
+/// A calibrated asset, as its instances need it.
+#[derive(Clone)]
+pub(crate) struct CalibratedAsset {
+    /// Limits and windows of its instances.
+    pub model: Arc<InstanceModel>,
+    /// Fingerprint of the asset that was calibrated.
+    fingerprint: Option<String>,
+}
+
+/// The calibration of an asset, read once per virtual machine; `None` if it has none.
+pub(crate) fn calibrated_asset(lua: &Lua, asset: &str) -> mlua::Result<Option<CalibratedAsset>> {
+    if lua.app_data_ref::<CalibratedAssets>().is_none() {
+        lua.set_app_data(CalibratedAssets::default());
+    }
+    let assets = app_data::<CalibratedAssets>(lua)?;
+    if let Some(known) = lock(&assets.0).get(asset) {
+        return Ok(known.clone());
+    }
+    let found = calibration_file(lua, "softvt.grip_window", asset)?.and_then(|(_, file)| {
+        let model = Arc::new(InstanceModel::new(file.envelopes.get(asset)?, file.calibration.kappa));
+        Some(CalibratedAsset { model, fingerprint: file.fingerprints.get(asset).cloned() })
+    });
+    lock(&assets.0).insert(asset.to_owned(), found.clone());
+    Ok(found)
+}
+
+/// Calls `draw` with the calibrated instances of assets.
+///
+/// # Errors
+/// A calibration cannot be read. The inner error is that of `draw`.
+pub(crate) fn draw<T>(
+    lua: &Lua,
+    draw: impl FnOnce(&ModelOf<'_>) -> Result<T, DrawError>,
+) -> mlua::Result<Result<T, DrawError>> {
+    let broken = RefCell::new(None);
+    let drawn = draw(&|asset| match calibrated_asset(lua, &asset.name) {
+        // A calibration of another version of the asset does not count, as for its limit.
+        Ok(found) => found
+            .filter(|found| found.fingerprint.as_ref().is_none_or(|known| *known == asset.fingerprint()))
+            .map(|found| found.model),
+        Err(error) => {
+            broken.replace(Some(error));
+            None
+        }
+    });
+    match broken.into_inner() {
+        Some(error) => Err(error),
+        None => Ok(drawn),
+    }
+}
+
+/// Draws `count` instances of an asset as the suite does; see [`VariationRanges::sample`].
+pub(crate) fn sample(
+    lua: &Lua,
+    suite: &str,
+    ranges: Option<&VariationRanges>,
+    asset: &Asset,
+    count: u32,
+) -> mlua::Result<Vec<Table>> {
+    let mut object = Object::new(&asset.name, Arc::new(asset.clone()), Pose::identity());
+    let Some(ranges) = ranges else {
+        return (0..count).map(|_| instance_state(lua, &object)).collect();
+    };
+    let drawn = draw(lua, |model_of| ranges.sample(suite, asset, count, model_of))?;
+    let drawn = drawn.map_err(|error| fail(lua, error.to_string()))?;
+    let nominal = object.clone();
+    drawn.iter().map(|one| {
+        object.clone_from(&nominal);
+        one.apply(&mut object);
+        instance_state(lua, &object)
+    }).collect()
+}
+
+output! {
+    /// An instance of an asset, with the fields that a grasp needs of an object.
+    fn instance_state(lua, object: &Object) -> "softvt.InstanceState" as "instance" {
+        /// Name of its asset.
+        asset: "string" = object.asset.name.as_str();
+        /// Edge lengths of its bounding box at rest, m.
+        size: "number[]" = lua.create_sequence_from(object.asset.shape.bounds().size().iter().copied())?;
+        /// Size relative to that of its asset.
+        scale: "number" = object.scale;
+        /// Young's modulus relative to that of its asset; nil unless soft.
+        youngs_factor: "number?" = object.youngs_factor();
+        /// Density relative to that of its asset; nil unless soft or rigid.
+        density_factor: "number?" = object.density_factor();
+        /// Stable strain relative to that of its asset; nil unless soft.
+        strain_factor: "number?" = object.strain_factor();
+        /// Static friction of its coating; nil without one.
+        coating: "number?" = object.coating();
+        /// Numbers of its asset for experts, as those of an object.
+        hints: "table<string, number>" = lua.create_table_from(
+            object.asset.hints.iter().map(|(name, value)| (name.as_str(), *value))
+        )?;
+    }
+}
+
+fn calibration_path(asset: &str) -> String {
+    format!("assets/calibration/{asset}.json")
+}
+
+/// Finds the calibration of an asset, so that the episodes of the script have it. An asset that is made during an episode has
+/// none unless it was found before.
+pub(crate) fn find_calibration(lua: &Lua, asset: &str) -> mlua::Result<()> {
+    let library = app_data::<SharedLibrary>(lua)?;
+    match lock(&library).optional_data(&calibration_path(asset)) {
+        Ok(_) | Err(LibraryError::LateFile { .. }) => Ok(()),
+        Err(error) => Err(fail(lua, format!("asset {asset:?}: {error}"))),
+    }
+}
+
+/// Reads assets/calibration/<asset>.json; returns its path as messages show it and its content.
+fn calibration_file(lua: &Lua, label: &str, asset: &str) -> mlua::Result<Option<(String, ThresholdFile)>> {
+    let library = app_data::<SharedLibrary>(lua)?;
+    let found = lock(&library).optional_data(&calibration_path(asset)).map_err(|e| fail(lua, format!("{label}: {e}")))?;
+    let Some(FoundFile { name: path, bytes }) = found else { return Ok(None) };
+    let file = ThresholdFile::parse(&String::from_utf8_lossy(&bytes), &path)
+        .map_err(|e| fail(lua, format!("{label}: {e}")))?;
+    Ok(Some((path, file)))
+}
 
 /// Type of a list of rows.
 const ROWS: Type = Type::List(&Type::Map(&Type::Any));
@@ -74,6 +219,30 @@ output! {
     }
 }
 
+output! {
+    /// A grip at rest.
+    fn grip_table(lua, grip: &Grip) -> "softvt.Grip" as "grip" {
+        /// Distance of the gels, m.
+        width: "number" = grip.width_m;
+        /// Normal force per pad, N.
+        force: "number" = grip.force_n;
+    }
+}
+
+output! {
+    /// The safe window of an instance.
+    fn grip_window_table(lua, window: &GripWindow) -> "softvt.GripWindow" as "window" {
+        /// The loosest grip that holds.
+        loose: "softvt.Grip" = grip_table(lua, &window.loose)?;
+        /// The tightest grip whose carried object stays within τ; that of the loose end if none does.
+        tight: "softvt.Grip" = grip_table(lua, &window.tight)?;
+        /// D that the weight of the carried object causes, as a share of τ.
+        carried: "number" = window.carried;
+        /// Deformation limit τ of the instance, %.
+        tau: "number" = window.tau_pct;
+    }
+}
+
 fn limit(envelope: &Envelope, file: &ThresholdFile) -> Option<DeformationLimit> {
     envelope.limit(file.calibration.kappa)
 }
@@ -110,10 +279,15 @@ functions! {
             /// Rows width_mm, closure, d_pct, force_n, strain_p95, min_det_f, node_speed_m_s, both_pads, slip_mm, stable
             /// of the compression sweep.
             sweep: Value = ROWS;
+            /// Presses at other sizes and stiffnesses: { scale, youngs_factor, rows }, with the rows width_mm, d_pct, force_n,
+            /// strain_p95.
+            variants: Value = ROWS => Empty;
         } -> ["softvt.Envelope"] {
             let holds: Vec<HoldRow> = rows(lua, "softvt.envelope: holds", &holds)?;
             let sweep: Vec<SweepRow> = rows(lua, "softvt.envelope: sweep", &sweep)?;
-            let envelope = Envelope::new(Scans { protocol, stable_strain, ended, holds, sweep }, kappa);
+            let variants: Vec<VariantSweep> = rows(lua, "softvt.envelope: variants", &variants)?;
+            let scans = Scans { protocol, stable_strain, ended, holds, sweep, variants };
+            let envelope = Envelope::new(scans, kappa);
             let made_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
             let mut file = ThresholdFile::new(kappa, vec![format!("{asset}.sweep.jsonl")], made_by)
                 .measured_by(protocol);
@@ -127,14 +301,9 @@ functions! {
         fn calibration(lua, asset: String = Type::Name) -> ["softvt.Envelope?"] {
             let label = "softvt.calibration";
             check_privilege(lua, label)?;
-            let path = format!("assets/calibration/{asset}.json");
-            let library = app_data::<SharedLibrary>(lua)?;
-            let found = lock(&library).optional_data(&path);
-            match found.map_err(|e| fail(lua, format!("{label}: {e}")))? {
+            match calibration_file(lua, label, &asset)? {
                 None => None,
-                Some(FoundFile { name: path, bytes }) => {
-                    let file = ThresholdFile::parse(&String::from_utf8_lossy(&bytes), &path)
-                        .map_err(|e| fail(lua, format!("{label}: {e}")))?;
+                Some((path, file)) => {
                     let Some(envelope) = file.envelopes.get(&asset) else {
                         let message = format!("{label}: {path} has no rows of {asset}; calibrate it again");
                         return Err(fail(lua, message));
@@ -142,6 +311,44 @@ functions! {
                     Some(envelope_table(lua, &asset, envelope, &file)?)
                 }
             }
+        }
+        /// Returns the safe window of an instance of a calibrated asset; nil without a window. Experts see the factors as fields of their
+        /// objects.
+        fn grip_window(lua) takes spec "softvt.Instance" {
+            /// Name of the asset.
+            asset: String = Type::Name;
+            /// Factor on the size.
+            scale: f64 = FACTOR => Number(1.0);
+            /// Factor on Young's modulus.
+            youngs_factor: f64 = FACTOR => Number(1.0);
+            /// Factor on the density.
+            density_factor: f64 = FACTOR => Number(1.0);
+            /// Factor on the stable strain.
+            strain_factor: f64 = FACTOR => Number(1.0);
+            /// Static friction of its coating.
+            coating: Option<f64> = COATING;
+        } -> ["softvt.GripWindow?"] {
+            check_privilege(lua, "softvt.grip_window")?;
+            let friction = coating.map_or(1.0, |mu| mu / PadSpec::default().static_mu);
+            let factors = InstanceFactors { scale, youngs: youngs_factor, density: density_factor, strain: strain_factor, friction };
+            let found = calibrated_asset(lua, &asset)?.and_then(|asset| asset.model.window(&factors));
+            found.map(|window| grip_window_table(lua, &window)).transpose()?
+        }
+        /// Returns instances of an asset as the episodes of a suite draw them, from a random stream that no episode uses. Without a
+        /// variation each is the asset itself.
+        fn sample_instances(lua) takes spec "softvt.Sample" {
+            /// The asset.
+            asset: Constructed<AssetSpec>;
+            /// Variation of the suite.
+            variation: Option<Constructed<VariationSpec>>;
+            /// Name of the suite; part of the seed.
+            suite: String = Type::Name;
+            /// Number of instances.
+            count: u32 = Type::Integer(Range::closed(1.0, MAX_SAMPLE));
+        } -> ["softvt.InstanceState[]"] {
+            check_privilege(lua, "softvt.sample_instances")?;
+            let ranges = variation.map(|variation| variation.ranges());
+            sample(lua, &suite, ranges.as_ref(), &asset.asset(lua)?, count)?
         }
         /// Returns true if a row of a compression sweep is a stable squeeze.
         fn stable(lua, row: Unchecked = Type::Table("table")) -> ["boolean"] {

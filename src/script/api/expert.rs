@@ -5,11 +5,12 @@ use std::{
     sync::{Arc, Mutex},
 };
 
-use mlua::{Function, Lua, MultiValue, Table, Thread, Value, chunk::ChunkMode};
+use mlua::{Function, IntoLua, Lua, MultiValue, Table, Thread, Value, chunk::ChunkMode};
 
 use super::{
+    envelope::{MAX_SAMPLE, sample},
     expert_input::{
-        ExpertCommand, ExpertInput, ExpertView, InstanceRanges, ObjectView, TrackingErrorMonitor,
+        ExpertCommand, ExpertInput, ExpertView, ObjectView, SuiteInstances, TrackingErrorMonitor,
     },
     index_of,
     observation::{FingerReadings, fingers},
@@ -290,11 +291,12 @@ class! {
             /// on the cases of the fingers do not count. On the edge of a pad the normals are oblique, and the sum is larger
             /// than the pressing force, which is -sim:tactile(side).force[3].
             force: "number[]" { get(_, this) { this.read(|view| view.pad_force_n) } }
-            /// Under --policy fixed-closure: the ranges within which the instances of an asset differ. The expert then
-            /// closes to one closure for all of them (experts.fixed_closure). nil under other policies.
-            instances: "softvt.InstanceRanges?" {
+            /// Under --policy fixed-closure: the instances that the suite can draw. The expert then closes to one closure for all
+            /// of them (experts.fixed_closure). nil under other policies.
+            instances: "softvt.Instances?" {
                 get(lua, this) {
-                    this.read(|view| view.instances).map(|ranges| instance_ranges(lua, &ranges)).transpose()?
+                    let instances = this.read(|view| view.instances.clone());
+                    instances.map(|instances| LuaInstances { instances, view: this.0.clone() }).into_lua(lua)?
                 }
             }
             /// Time since the start, s.
@@ -332,15 +334,34 @@ class! {
     }
 }
 
-output! {
-    /// Smallest and largest factors by which the instances of an asset differ.
-    fn instance_ranges(lua, ranges: &InstanceRanges) -> "softvt.InstanceRanges" as "instances" {
-        /// Factors on the size, uniform.
-        size: "number[]" = lua.create_sequence_from([ranges.size.min, ranges.size.max])?;
-        /// Factors on Young's modulus, log-uniform.
-        stiffness: "number[]" = lua.create_sequence_from([ranges.stiffness.min, ranges.stiffness.max])?;
-        /// Factors on the density, log-uniform.
-        density: "number[]" = lua.create_sequence_from([ranges.density.min, ranges.density.max])?;
+/// `softvt.Instances`.
+#[derive(Clone)]
+pub(crate) struct LuaInstances {
+    instances: Arc<SuiteInstances>,
+    view: SharedView,
+}
+
+class! {
+    /// The instances that the suite can draw, for a controller that must not know which one it has.
+    LuaInstances: "softvt.Instances" {
+        label(_) { "instances".to_owned() }
+        methods {
+            /// Returns instances of an object's asset, drawn as the suite draws them, from a random stream that no episode uses: the
+            /// same in every episode. Without a variation each is the asset itself.
+            fn sample(
+                lua,
+                this,
+                object: String,
+                count: u32 = Type::Integer(Range::closed(1.0, MAX_SAMPLE))
+            ) -> ["softvt.InstanceState[]"] {
+                let nominal = find(lua, "instances:sample", "object", &lock(&this.view).objects, &object)?.nominal.clone();
+                let SuiteInstances { suite, ranges } = &*this.instances;
+                match nominal {
+                    Some(asset) => sample(lua, suite, ranges.as_ref(), &asset, count)?,
+                    None => Vec::new(),
+                }
+            }
+        }
     }
 }
 
@@ -434,6 +455,10 @@ output! {
         youngs_factor: "number?" = object.youngs_factor;
         /// Density relative to that of its asset; nil unless soft or rigid.
         density_factor: "number?" = object.density_factor;
+        /// Stable strain relative to that of its asset; nil unless soft.
+        strain_factor: "number?" = object.strain_factor;
+        /// Static friction of its coating, which is that of every pair with it; nil without one.
+        coating: "number?" = object.coating;
         /// Rotation about the vertical, rad.
         yaw: "number" = object.yaw;
         /// Numbers of its asset for experts; those whose names end in _m are lengths and follow the scale.

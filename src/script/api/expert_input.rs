@@ -2,10 +2,7 @@
 
 use std::sync::Arc;
 
-use softvt_benchmark::{
-    CONTROL_DT,
-    variation::{FactorRange, VariationRanges},
-};
+use softvt_benchmark::{CONTROL_DT, variation::VariationRanges};
 use softvt_geometry::{Aabb, Pose, Vec3};
 use softvt_robot::ik::{PoseDifference, PoseTolerance, UnreachablePose};
 use softvt_rollout::{ObjectInstance, Simulation};
@@ -18,12 +15,18 @@ pub(crate) struct ObjectView {
     pub name: String,
     /// Shape, material and hints of this instance.
     pub asset: Arc<Asset>,
+    /// The asset as its file defines it; `None` for a part.
+    pub nominal: Option<Arc<Asset>>,
     /// Size relative to that of the asset.
     pub scale: f64,
     /// Young's modulus relative to that of the asset; `None` unless soft.
     pub youngs_factor: Option<f64>,
     /// Density relative to that of the asset; `None` unless soft or rigid.
     pub density_factor: Option<f64>,
+    /// Stable strain relative to that of the asset; `None` unless soft.
+    pub strain_factor: Option<f64>,
+    /// Static friction of its coating; `None` without one.
+    pub coating: Option<f64>,
     /// Object frame in the world.
     pub pose_w: Pose,
     /// Bounds of its shape at rest, object frame.
@@ -54,30 +57,19 @@ pub(crate) struct ExpertView {
     pub closure: f64,
     /// Normal force on the left and the right pad, N.
     pub pad_force_n: [f64; 2],
-    /// Ranges of the instances that one closure has to hold, for an expert that must not know the instance.
-    pub instances: Option<InstanceRanges>,
+    /// The instances of the suite, for an expert that must not know this one.
+    pub instances: Option<Arc<SuiteInstances>>,
     /// The objects, in the order of the scene.
     pub objects: Vec<ObjectView>,
 }
 
-/// Ranges of factors by which the instances of an asset differ.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct InstanceRanges {
-    pub size: FactorRange,
-    pub stiffness: FactorRange,
-    pub density: FactorRange,
-}
-
-impl InstanceRanges {
-    /// The ranges of a suite; every instance is the asset itself without a variation.
-    pub(crate) fn new(variation: Option<&VariationRanges>) -> Self {
-        let of = |range: fn(&VariationRanges) -> FactorRange| variation.map_or(FactorRange::ONE, range);
-        Self {
-            size: of(|ranges| ranges.size),
-            stiffness: of(|ranges| ranges.stiffness),
-            density: of(|ranges| ranges.density),
-        }
-    }
+/// The instances of a suite: what a controller may know that must not know the instance.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct SuiteInstances {
+    /// Name of the suite.
+    pub suite: String,
+    /// Its variation; without one every object is its asset.
+    pub ranges: Option<VariationRanges>,
 }
 
 /// Command of an expert for one control step.
@@ -138,6 +130,9 @@ fn object_view(sim: &Simulation, object: &ObjectInstance, name: &str) -> ObjectV
         scale: placed.map_or(1.0, |placed| placed.scale),
         youngs_factor: placed.and_then(Object::youngs_factor),
         density_factor: placed.and_then(Object::density_factor),
+        strain_factor: placed.and_then(Object::strain_factor),
+        coating: placed.and_then(Object::coating),
+        nominal: placed.map(|placed| placed.nominal.clone()),
         pose_w: pose,
         bounds,
         centre_w,

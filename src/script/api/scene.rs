@@ -34,6 +34,8 @@ const MAX_COORDINATE: f64 = 1e3;
 
 const POSITION: Type = Type::Vector(3, "m, world", COORDINATE);
 const COORDINATE: Range = Range::closed(-MAX_COORDINATE, MAX_COORDINATE);
+/// Static coefficient of a coating.
+pub(crate) const COATING: Type = Type::Number("", Range::above(0.0, 10.0));
 /// Uniform scales of objects.
 const SCALE: Type = Type::Number("", Range::closed(0.1, 10.0));
 const CORNER: Type = Type::vector(3, "m, world");
@@ -459,6 +461,12 @@ class! {
             dynamic_mu: COEFFICIENT => {
                 get(_, this) { this.read(|object| object.asset.friction.dynamic_mu) }
                 set(lua, this, value: f64) { this.change_friction(lua, |friction| friction.dynamic_mu = value); }
+            }
+            /// Static coefficient of a coating (flour, oil, glaze), which is that of every pair with this object; the dynamic one is
+            /// 0.8 of it. Nil without a coating.
+            coating: COATING => {
+                get(_, this) { this.read(|object| object.coating()) }
+                set(lua, this, value: f64) { this.change_friction(lua, |friction| *friction = Friction::coated(value)); }
             }
         }
         methods {

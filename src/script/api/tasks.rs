@@ -13,7 +13,7 @@ use crate::{
 };
 use softvt_benchmark::{
     ObjectType, REFERENCE, Variation,
-    variation::{FactorRange, VariationRanges},
+    variation::{FactorRange, HiddenRanges, VariationRanges},
 };
 
 /// Type of a layout's function.
@@ -22,6 +22,8 @@ const BUILD: Type = Type::Function("fun(scene: softvt.Scene, rng: softvt.Rng)");
 pub(crate) const EXPERT: Type = Type::Function("fun(arm: softvt.Arm, scene: softvt.SceneState)");
 /// Smallest and largest factor.
 const FACTORS: Type = Type::Vector(2, "", Range::closed(0.1, 10.0));
+/// Smallest and largest static coefficient of a coating.
+const COATINGS: Type = Type::Vector(2, "", Range::above(0.0, 10.0));
 const HOLD: Type = Type::Number("s", Range::closed(0.0, 10.0));
 /// Type of a table of settings.
 pub(crate) const SETTINGS: Type = Type::Map(&Type::Map(&Type::Any));
@@ -106,6 +108,24 @@ record! {
         camera_offset: f64 = Type::Number("m", Range::closed(0.0, 1.0));
         /// Largest rotation of these cameras about each of their axes.
         camera_rotation: f64 = Type::Number("rad", Range::closed(0.0, 1.0));
+        /// Properties of the soft objects that do not show.
+        hidden: Option<HiddenSpec>;
+    }
+    /// Ranges of properties that do not show, drawn log-uniform for each soft object. Size, colour and looks do not depend on them.
+    /// An instance is drawn again until the ratio of its largest to its smallest safe grip force is within window_ratio; objects need
+    /// a calibration for that. Policies never see these numbers; records have them.
+    HiddenSpec: "softvt.Hidden" as "variation.hidden", relations check_hidden {
+        /// Relative density of the foam: a factor on the density, and by its square on Young's modulus.
+        aeration: [f64; 2] = FACTORS;
+        /// Age: a factor on Young's modulus; the collapse and damage strains shrink by its power 0.7, and τ of the instance
+        /// with them.
+        staling: [f64; 2] = FACTORS;
+        /// Factor on the mass.
+        filling: [f64; 2] = FACTORS;
+        /// Static friction of a coating (flour, oil, glaze), which acts between the object and everything that it touches.
+        coating: [f64; 2] = COATINGS;
+        /// Largest over smallest safe grip force of the instances that are kept, at least 1.
+        window_ratio: [f64; 2] = Type::Vector(2, "", Range::closed(1.0, 1000.0));
     }
     /// A set of tasks that are reported together.
     SuiteSpec: "softvt.Suite" as "suite", constructor "softvt.suite" {
@@ -247,7 +267,16 @@ functions! {
 }
 
 fn check_variation(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<()> {
-    for key in ["size", "stiffness", "density", "friction", "light"] {
+    check_ends(lua, record, table, &["size", "stiffness", "density", "friction", "light"])
+}
+
+fn check_hidden(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<()> {
+    check_ends(lua, record, table, &["aeration", "staling", "filling", "coating", "window_ratio"])
+}
+
+/// Checks that the ends of ranges are in order.
+fn check_ends(lua: &Lua, record: &Record, table: &Table, keys: &[&'static str]) -> mlua::Result<()> {
+    for &key in keys {
         let [min, max] = table.raw_get::<[f64; 2]>(key)?;
         if min > max {
             let message = format!("the smallest factor {min} comes first and is above {max}; swap them");
@@ -275,6 +304,13 @@ impl VariationSpec {
             light: range(self.light),
             camera_offset_m: self.camera_offset,
             camera_rotation_rad: self.camera_rotation,
+            hidden: self.hidden.as_ref().map(|hidden| HiddenRanges {
+                aeration: range(hidden.aeration),
+                staling: range(hidden.staling),
+                filling: range(hidden.filling),
+                coating: range(hidden.coating),
+                window_ratio: range(hidden.window_ratio),
+            }),
         }
     }
 }

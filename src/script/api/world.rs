@@ -241,7 +241,7 @@ impl LuaWorld {
     fn add_gel_pad(&self, lua: &Lua, spec: &WorldGelPadSpec) -> mlua::Result<LuaSolid> {
         let surface = Arc::new(PadSurface::default());
         let law = PadSpec::default();
-        let friction = Friction { static_mu: law.static_mu, dynamic_mu: law.dynamic_mu };
+        let friction = Friction::new(law.static_mu, law.dynamic_mu);
         let stiffness = SurfaceStiffness { normal: law.normal_modulus, shear: law.tangential_modulus };
         let reserved = reserve_in_world(lua, BYTES_PER_SOLID)?;
         let mut inner = lock(&self.0);

@@ -7,7 +7,8 @@ use mlua::{Function, Lua, Value};
 use super::expert::{ExpertController, GripMode};
 use crate::{
     api::{
-        expert_input::InstanceRanges,
+        envelope::draw,
+        expert_input::SuiteInstances,
         random::LuaRng,
         scene::{LuaScene, empty_scene},
         tasks::GoalSpec,
@@ -22,7 +23,7 @@ use crate::{
 use softvt_benchmark::{
     Shift, ShiftValue,
     seed::{EpisodeSeed, RandomStream},
-    variation::VariationRanges,
+    variation::{DrawError, VariationRanges},
 };
 use softvt_common::{
     parallel::lock,
@@ -46,8 +47,7 @@ pub struct EpisodeSetup {
     pub seed: EpisodeSeed,
     instance: Arc<ScriptInstance>,
     expert: Option<Function>,
-    /// Ranges within which the objects of the suite vary.
-    instances: InstanceRanges,
+    instances: Arc<SuiteInstances>,
 }
 
 impl EpisodeSetup {
@@ -101,8 +101,8 @@ impl SceneBuilder {
         let mut current = LuaScene::new(empty_scene());
         let rng = LuaRng::new(seed.clone(), RandomStream::Layout);
         vm.call::<()>(&task.layout.build, (current.clone(), rng))?;
-        let varied = self.ranges.get(&id.suite).map(|ranges| vary(&mut lock(&current.scene), ranges, &seed));
-        let variation = varied.transpose().map_err(|what| ScriptError::new(vm.main(), what))?;
+        let varied = self.ranges.get(&id.suite).map(|ranges| vary(&vm.lua, &mut lock(&current.scene), ranges, &seed));
+        let variation = varied.transpose().map_err(|error| vm.explain(&error))?;
         let mut nominal = lock(&current.scene).clone();
         current = current.for_task(task.goal.object(), &task.prompt);
         let declared = suite.shifts.as_slice();
@@ -122,7 +122,8 @@ impl SceneBuilder {
         let largest = self.ranges.get(&id.suite).map_or(1.0, |ranges| ranges.size.max);
         check_width(&scene, task.goal.object(), variation.as_ref(), largest)?;
         let (instance, expert) = (self.instance.clone(), task.expert.clone());
-        let instances = InstanceRanges::new(self.ranges.get(&id.suite));
+        let ranges = self.ranges.get(&id.suite).cloned();
+        let instances = Arc::new(SuiteInstances { suite: id.suite.clone(), ranges });
         Ok(EpisodeSetup { scene, nominal, variation, prompt, seed, instance, expert, instances })
     }
 
@@ -154,16 +155,19 @@ impl SceneBuilder {
 /// Draws and applies the variation of an episode.
 ///
 /// # Errors
-/// The scene has nothing that the variation changes; the message is a fragment.
-fn vary(scene: &mut Scene, ranges: &VariationRanges, seed: &EpisodeSeed) -> Result<SceneVariation, String> {
-    let drawn = ranges.draw(seed, scene);
-    if drawn.objects.is_empty() {
-        return Err(format!(
-            "layout {:?} of suite {:?} has no soft object, and the variation {:?} changes soft objects; vary a suite of \
-             soft objects",
-            seed.layout, seed.suite, ranges.name
-        ));
-    }
+/// The scene has nothing that the variation changes, or no instance can be drawn.
+fn vary(lua: &Lua, scene: &mut Scene, ranges: &VariationRanges, seed: &EpisodeSeed) -> mlua::Result<SceneVariation> {
+    let drawn = draw(lua, |model_of| ranges.draw(seed, scene, model_of))?;
+    let drawn = drawn.map_err(|error| {
+        let subject = format!("layout {:?} of suite {:?}", seed.layout, seed.suite);
+        fail(lua, match error {
+            DrawError::NoSoftObject => format!(
+                "{subject} {error}, and the variation {:?} changes soft objects; vary a suite of soft objects",
+                ranges.name
+            ),
+            _ => format!("{subject}: {error}"),
+        })
+    })?;
     drawn.apply(scene);
     Ok(drawn)
 }

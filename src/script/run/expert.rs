@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use crate::{
     api::{
         expert::{Coroutine, FingerAccess},
-        expert_input::{ExpertInput, InstanceRanges, TrackingErrorMonitor},
+        expert_input::{ExpertInput, SuiteInstances, TrackingErrorMonitor},
     },
     plan::ScriptInstance,
 };
@@ -36,7 +36,7 @@ pub struct ExpertController {
     /// True while the gripper should hold an object, as last commanded.
     pub is_gripping: bool,
     monitor: TrackingErrorMonitor,
-    instances: InstanceRanges,
+    instances: Arc<SuiteInstances>,
 }
 
 impl ExpertController {
@@ -44,7 +44,7 @@ impl ExpertController {
         instance: Arc<ScriptInstance>,
         function: mlua::Function,
         mode: GripMode,
-        instances: InstanceRanges,
+        instances: Arc<SuiteInstances>,
     ) -> Self {
         let access = if mode == GripMode::TactileServo { FingerAccess::Servo } else { FingerAccess::None };
         let (coroutine, monitor) = (Coroutine::new(function, access), TrackingErrorMonitor::default());
@@ -73,7 +73,7 @@ impl Controller for ExpertController {
         let tactile = observation.tactile.as_ref().and_then(|tactile| tactile.frames.last());
         self.coroutine.set_readings(tactile.cloned());
         let mut input = ExpertInput::new(sim, observation.time_s, &mut self.monitor);
-        input.view.instances = (self.mode == GripMode::FixedClosure).then_some(self.instances);
+        input.view.instances = (self.mode == GripMode::FixedClosure).then(|| self.instances.clone());
         let vm = &self.instance.vm;
         let _deadline = vm.call_deadline();
         // A pose out of reach fails this episode; in others the objects lie elsewhere.
