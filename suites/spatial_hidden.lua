@@ -32,5 +32,6 @@ return softvt.suite {
   episodes = 5,
   tasks = tasks,
   shifts = shifts.soft,
+  teacher = "tactile-servo",
   vary = require "variations.hidden",
 }

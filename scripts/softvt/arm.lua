@@ -12,14 +12,14 @@ local PEAK = 1.875
 local function smooth(u) return u * u * u * (10 + u * (6 * u - 15)) end
 
 -- Ends the tactile servo and its readings.
-local function end_servo(self) self.holds, self.wants_readings = nil, false end
+local function end_servo(self) self.grip, self.wants_readings = nil, false end
 
 -- Sends one command and returns at the next control step, or raises the error that the host reports. While the servo holds an
 -- object it may close further than commanded.
 function Arm:command(pose, closure)
-  if self.holds then
-    self.holds = servo.keep(max(self.holds, closure), fingers.readings())
-    closure = self.holds
+  if self.grip then
+    servo.keep(self.grip, fingers.readings())
+    closure = max(self.grip.closure, closure)
   end
   self.target, self.closure = pose, closure
   local refusal = yield(self.target, self.closure, self.gripping, nil, self.wants_readings, self.goal)
@@ -102,21 +102,31 @@ local function failed_grasps(self)
   return before and before:distance(self.target) < SAME_PLACE and self.failures + 1 or 0
 end
 
--- Closes on an object: to the given closure, or with the tactile servo until the fingers report a firm grasp. A binary gripper
--- closes fully here, and not in close_to.
-function Arm:grasp(closure, options)
-  self.gripping = true
-  if not fingers.servo then
-    if options.width or options.force then return close_until(self, closure, options) end
-    return self:close_to(closure, options)
-  end
+-- Direction from the right finger to the left one of a hand at a pose, in the world frame.
+local function towards_left(pose)
+  local w, x, y, z = table.unpack(pose.quaternion)
+  return { 2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x) }
+end
+
+-- Grasps with the tactile servo, which lifts the hand by a few millimetres, moves it sideways and returns to the height of the grasp.
+local function feel(self)
   end_servo(self)
   self.wants_readings = true
   self.failures = failed_grasps(self)
-  self.holds = servo.close(self.closure, options.rate * host.dt, self.failures, function(next)
-    self:command(self.target, next)
+  local at, left = self.target, towards_left(self.target)
+  self.grip = servo.grasp(self.closure, self.failures, function(closure, height, shift)
+    self:command(at:translated { shift * left[1], shift * left[2], shift * left[3] + height }, closure)
     return fingers.readings()
   end)
+end
+
+-- Closes on an object: to the given closure, or with the tactile servo, which feels how firmly the object must be held. A binary
+-- gripper closes fully here, and not in close_to.
+function Arm:grasp(closure, options)
+  self.gripping = true
+  if fingers.servo then return feel(self) end
+  if options.width or options.force then return close_until(self, closure, options) end
+  self:close_to(closure, options)
 end
 
 -- Releases an object by opening to options.closure (default: fully open).

@@ -1,46 +1,179 @@
--- A tactile servo. It closes until the markers of both fingers show a firm grasp, and closes slightly more whenever the outward
--- shear of the markers exceeds their residual. Its parameters describe the gels only, not the object's closure,
--- stiffness, mass or friction, and are the same for a bun and a can.
+-- A tactile servo: a hand that feels how firmly it must hold. It closes until both gels touch, lifts until the gels slide along the
+-- object, and tightens while it lifts. The shear of a sliding gel grows with the force; that of a held object is its weight. Where
+-- the shear stops growing, the grip is the least one that holds. The hand tightens beyond it by a margin, goes back down and closes to
+-- that grip. Its readings are the markers and its own closure. Its parameters describe gels and markers only, not the object.
 local servo = {}
 
-local min = math.min
+local max, min, ceil = math.max, math.min, math.ceil
 
--- Residual of the markers in a firm grasp and at first contact, px. Flat dough gives 0.08 px at 0.6 N, round dough and a carton
--- at 0.3 N.
-local HELD, TOUCHED = 0.08, 0.01
--- Change of closure per control step after first contact, and in response to shear (0.16 mm and 0.5 mm of width).
-local FINE, TIGHTEN = 0.002, 0.00625
--- Factor on HELD per grasp that has failed, and how many count: the edge of a hard object shows much residual at little force.
-local FIRMER, MOST_FAILURES = 3, 2
--- Smallest ratio of residual to outward shear of a held object. In a sliding grasp the shear is at least three times the
--- residual at the friction of a gel.
-local RATIO = 0.5
+-- Change of closure per mm of width between the gels.
+local MM = 1 / 80
 
-local function least(fingers, measure) return min(measure(fingers.left.markers), measure(fingers.right.markers)) end
+-- Noise of the mean motion along x of the markers of both fingers, px: 0.1 px per marker.
+local NOISE = 0.007
+-- Divergence of the markers of a gel that is touched (about 0.08 N), and control steps over which it is averaged.
+local TOUCHED, WINDOW = 4e-4, 5
+-- Closing until both gels touch, mm per control step, and after FAR mm without a touch. The hand then opens by BACK mm, since a touch
+-- is noticed late; the gels began to touch about LATE mm before.
+local APPROACH, FAR_APPROACH, FAR, BACK, LATE = 0.1, 0.4, 15, 0.25, 0.5
+-- Lifting until the gels slide, mm per control step, the growth of the shear over 4 steps that tells that they stick, px, and the
+-- largest height, mm.
+local LIFT, STICKS, LIFT_MOST = 0.1, 0.015, 3
+-- Tightening: share of the closure since touch per control step, from small to large shears; shear that counts as large, px; and
+-- the smallest change, mm.
+local SLOW, FAST, STRONG, FINEST = 0.015, 0.025, 0.15, 0.02
+-- Stiffness of a light contact in shear, px per mm, the factor by which lifting exceeds what sliding needs, bounds of
+-- lifting over closing, and the largest height of the trial lift, mm.
+local STIFFNESS, SURE, LEAST_RISE, MOST_RISE, HIGHEST = 0.35, 2, 0.4, 1.5, 8
+-- The shear has stopped growing if a line with a bend fits better by this many variances of the noise, the force has since
+-- grown by SEEN, and the shear at the bend is at least LEAST px. CONFIRM readings must confirm it.
+local EVIDENCE, SEEN, LEAST, CONFIRM = 24, 1.25, 0.03, 12
+-- Force of the grip over the least one that holds, and the factor per grasp that has failed here, of which MOST_FAILURES count.
+local MARGIN, FIRMER, MOST_FAILURES = 1.4, 1.15, 2
+-- Going down with a loosened grip: share of the grip, mm per control step; and closing to the grip, mm per control step.
+local LOOSENED, DOWN, CLOSING = 0.3, 0.2, 0.15
+-- While it holds: share of the shear over divergence of a sliding gel at which the grip becomes firmer, readings averaged, the
+-- change as a share of the grip, and the largest number of changes.
+local SLIPPING, KEPT, TIGHTEN, MOST_CHANGES = 0.95, 4, 0.04, 6
 
-local function residual(markers) return markers:rms_residual() end
-
--- True if an object touches either finger.
-local function touched(fingers) return fingers.left.markers:rms_residual() > TOUCHED or fingers.right.markers:rms_residual() > TOUCHED end
-
--- Residual in excess of the outward shear, px. Negative if the object is being pulled out of the finger.
-local function margin(markers) return markers:rms_residual() - RATIO * markers:outward_shear() end
-
--- Closes by `rate` per control step until both fingers show a firm grasp or the gripper is closed. `step` sends a closure and returns the
--- finger readings of the next control step; `failures` counts the grasps that have failed here.
-function servo.close(closure, rate, failures, step)
-  local held, fingers = HELD * FIRMER ^ min(failures, MOST_FAILURES), step(closure)
-  while closure < 1 and least(fingers, residual) < held do
-    closure = min(1, closure + (touched(fingers) and FINE or rate))
-    fingers = step(closure)
-  end
-  return closure
+-- Mean motion of the markers of both fingers towards the fingertips, px, and the divergence of each: its load.
+local function read(fingers)
+  local left, right = fingers.left.markers, fingers.right.markers
+  return -0.5 * (left:mean()[1] + right:mean()[1]), left:divergence(), right:divergence()
 end
 
--- Returns the closure that keeps the grasp, given the finger readings.
-function servo.keep(closure, fingers)
-  if least(fingers, margin) >= 0 then return closure end
-  return min(1, closure + TIGHTEN)
+-- Mean of the last `count` numbers of a list.
+local function recent(list, count)
+  local sum, first = 0, max(1, #list - count + 1)
+  for i = first, #list do sum = sum + list[i] end
+  return sum / (#list - first + 1)
+end
+
+local Trial = {}
+Trial.__index = Trial
+
+-- Closes by `closing` mm, rises by `rising` mm and shifts the hand by `shifting` mm towards the left finger, in one control step.
+function Trial:move(closing, rising, shifting)
+  self.closure = max(0, min(1, self.closure + closing * MM))
+  self.height, self.shift = self.height + rising, self.shift + shifting
+  local n = #self.shear + 1
+  self.shear[n], self.left[n], self.right[n] = read(self.step(self.closure, 1e-3 * self.height, 1e-3 * self.shift))
+  self.closures[n] = self.closure
+end
+
+-- Closes until both gels touch. The hand follows the gel that touches first, so that it does not push the object.
+function Trial:approach()
+  local start, left, right = self.closure, false, false
+  while self.closure < 1 and not (left and right) do
+    local shifting = left == right and 0 or 0.5 * APPROACH * (left and 1 or -1)
+    local is_far = self.closure - start > FAR * MM and not (left or right)
+    self:move(is_far and FAR_APPROACH or APPROACH, 0, shifting)
+    left, right = recent(self.left, WINDOW) > TOUCHED, recent(self.right, WINDOW) > TOUCHED
+  end
+  self.touch = self.closure - LATE * MM
+  for _ = 1, 4 do self:move(-BACK / 4, 0, 0) end
+end
+
+-- Lifts until the gels slide along the object or carry it.
+function Trial:slide()
+  local count, before = 0, 0
+  repeat
+    if count % 4 == 0 then before = recent(self.shear, 4) end
+    self:move(0, LIFT, 0)
+    count = count + 1
+  until self.height > LIFT_MOST or (count >= 8 and count % 4 == 0 and recent(self.shear, 4) - before < STICKS)
+end
+
+-- Where the shear has stopped growing since reading `first`: { closure, slope, shear }; nil if it still grows. Fits
+-- shear = p + b min(0, closure - bend) by least squares, for a bend at each reading; touch counts as a reading without shear.
+function Trial:bend(first)
+  local shear, closures, last, best, line = self.shear, self.closures, #self.shear, nil, nil
+  for k = first, last do
+    local bend = closures[k]
+    local x0 = min(0, self.touch - bend)
+    local n, sx, sxx, sy, sxy, syy = 1, x0, x0 * x0, 0, 0, 0
+    for i = first, last do
+      local x, y = min(0, closures[i] - bend), shear[i]
+      n, sx, sxx, sy, sxy, syy = n + 1, sx + x, sxx + x * x, sy + y, sxy + x * y, syy + y * y
+    end
+    local b = (n * sxy - sx * sy) / (n * sxx - sx * sx)
+    local p = (sy - b * sx) / n
+    line = { closure = bend, slope = b, shear = p, error = syy - p * sy - b * sxy }
+    if not best or line.error < best.error then best = line end
+  end
+  local missing = best and best.slope * (self.closure - best.closure) or 0
+  if missing > 0 and best.shear > LEAST and missing > (SEEN - 1) * best.shear and line.error - best.error > EVIDENCE * NOISE ^ 2 then
+    return best
+  end
+end
+
+-- Tightens and lifts until the shear stops growing. Returns the least grip that holds as Trial:bend does, or nil.
+function Trial:tighten(margin)
+  local first = #self.shear + 3
+  while self.closure < 1 and self.height < HIGHEST do
+    local shear, grip = max(0, recent(self.shear, WINDOW)), (self.closure - self.touch) / MM
+    local closing = max(FINEST, max(SLOW, min(FAST, FAST * shear / STRONG)) * grip)
+    local rising = max(LEAST_RISE, min(MOST_RISE, SURE * shear / grip / STIFFNESS)) * closing
+    local left, right = recent(self.left, WINDOW), recent(self.right, WINDOW)
+    self:move(closing, rising, 0.5 * closing * max(-1, min(1, (left - right) / max(TOUCHED, left + right))))
+    local found = self:bend(first)
+    if found then
+      local wanted = self.touch + margin * (found.closure - self.touch)
+      for _ = 1, CONFIRM do self:move(max(0, min(closing, (wanted - self.closure) / MM)), 0.03, 0) end
+      found = self:bend(first)
+      if found then return found end
+    end
+  end
+end
+
+-- Goes back down with a loosened grip, and closes to the grip.
+function Trial:settle(grip)
+  local loosened, top = self.touch + LOOSENED * (grip - self.touch), self.height
+  for k = 5, 1, -1 do self:move((loosened - self.closure) / MM / k, 0, 0) end
+  for k = ceil(top / DOWN), 1, -1 do self:move(0, -self.height / k, 0) end
+  for k = max(5, ceil((grip - self.closure) / MM / CLOSING)), 1, -1 do self:move((grip - self.closure) / MM / k, 0, 0) end
+end
+
+-- Shear over load of the sliding gels at a closure.
+function Trial:sliding_ratio(closure)
+  local shear, load = 0, 0
+  for i, at in ipairs(self.closures) do
+    if self.shear[i] > 0 and at > self.touch + 0.8 * (closure - self.touch) and at <= closure then
+      shear, load = shear + self.shear[i], load + 0.5 * (self.left[i] + self.right[i])
+    end
+  end
+  return load > 0 and shear / load or math.huge
+end
+
+-- Grasps what is between the fingers. `closure` is where they are, and `failures` counts the grasps that have failed here. `step` sends a closure with a height and a shift of the hand towards its left
+-- finger, m, and returns the finger readings of the next control step. Returns the grip, for servo.keep.
+function servo.grasp(closure, failures, step)
+  local trial = setmetatable({
+    step = step, closure = closure, height = 0, shift = 0, shear = {}, left = {}, right = {}, closures = {},
+  }, Trial)
+  local margin = MARGIN * FIRMER ^ min(failures, MOST_FAILURES)
+  trial:approach()
+  trial:slide()
+  local least = trial:tighten(margin)
+  local grip = { closure = trial.closure, touch = trial.touch, ratio = math.huge, shear = 0, changes = 0, shears = {}, loads = {} }
+  if least then
+    grip.closure = min(1, least.closure + (margin - 1) * least.shear / least.slope)
+    grip.ratio, grip.shear = trial:sliding_ratio(least.closure), least.shear
+  end
+  trial:settle(grip.closure)
+  return grip
+end
+
+-- Keeps a grip while the object is carried, given the finger readings: tightens it slightly if the shear comes near that of sliding.
+function servo.keep(grip, fingers)
+  local n = #grip.shears + 1
+  local shear, left, right = read(fingers)
+  grip.shears[n], grip.loads[n] = shear, 0.5 * (left + right)
+  if n < KEPT or grip.changes >= MOST_CHANGES then return end
+  shear = recent(grip.shears, KEPT)
+  if shear > 0.5 * grip.shear and shear > SLIPPING * grip.ratio * recent(grip.loads, KEPT) then
+    grip.closure, grip.changes = min(1, grip.closure + TIGHTEN * (grip.closure - grip.touch)), grip.changes + 1
+  end
 end
 
 return servo

@@ -19,6 +19,24 @@ pub enum ObjectType {
     Rigid,
 }
 
+/// Policy that demonstrates the tasks of a suite.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Teacher {
+    /// The scripted expert, which knows the object.
+    #[default]
+    Expert,
+    /// The expert with a hand that feels how firmly it must hold.
+    TactileServo,
+}
+
+impl Teacher {
+    /// True for the scripted expert.
+    pub fn is_expert(&self) -> bool {
+        *self == Self::Expert
+    }
+}
+
 /// The factor that varies between the tasks of a suite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -108,6 +126,9 @@ pub struct Suite {
     /// The suite of soft objects whose rigid twin this is; its initial states are those of that suite.
     #[serde(default)]
     pub twin_of: Option<String>,
+    /// Policy whose demonstrations are recorded.
+    #[serde(default, skip_serializing_if = "Teacher::is_expert")]
+    pub teacher: Teacher,
 }
 
 /// Value of a [`Shift`] in a run; `[name, value]` in files.

@@ -127,3 +127,22 @@ fn folders_with_other_files_are_refused() {
     assert!(project.refusal("record stuck.lua --out new").contains("lost"));
     assert!(!project.path("new").exists(), "nothing is left of a mistake");
 }
+
+#[test]
+fn the_teacher_of_a_suite_demonstrates_unless_a_policy_is_given() {
+    let taught = SUITE.replace("episodes = 1,", "episodes = 1, teacher = \"tactile-servo\",");
+    let project = Project::new(&[("x.lua", &taught), SOLIDS]);
+    for (flag, policy) in [("", "tactile-servo"), ("--policy expert", "expert"), ("--policy noop", "noop")] {
+        project.succeeds(&format!("record x.lua --demos 1 {flag} --out {policy} --threads 1"));
+        assert_eq!(project.json(&format!("{policy}/attempts/one/run.json"))["policy"], policy);
+    }
+    // An evaluation is not taught.
+    project.succeeds("x.lua --out run");
+    assert_eq!(project.json("run/run.json")["policy"], "expert");
+    project.write("x.lua", taught.replace("tactile-servo", "noop").as_bytes());
+    let message = project.refusal("record x.lua --demos 1 --out none");
+    assert!(
+        message.contains("suite.teacher: expected one of \"expert\", \"tactile-servo\", got \"noop\""),
+        "{message}"
+    );
+}

@@ -284,7 +284,7 @@ const GREEDY: &str = "local c = scene:object('cube').centre
 
 #[test]
 fn the_tactile_servo_stops_at_contact() {
-    let project = Small { task: "budget_steps = 120", expert: GREEDY, ..Small::default() }.project();
+    let project = Small { task: "budget_steps = 400", expert: GREEDY, ..Small::default() }.project();
     let mut d = Vec::new();
     for policy in ["expert", "tactile-servo"] {
         let output = project.succeeds(&format!("x.lua --policy {policy} --threads 1 --out {policy}"));

@@ -8,14 +8,15 @@ use serde_json::json;
 use crate::{
     error::CliError,
     run::{
-        config::ScriptArgs,
+        config::{RunConfig, ScriptArgs},
         episode_list::EpisodeList,
-        policy::{PolicyArgs, expert_controller},
+        policy::{PolicyArgs, PolicyConfig, expert_controller},
         recording::{GripLog, RecordingArgs, SuiteRecording, record_all},
         selection::{select_suites, select_tasks},
         suite_run::SuiteRun,
     },
 };
+use softvt_benchmark::Suite;
 use softvt_common::parallel;
 use softvt_evaluation::episode_id::EpisodeIndex;
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
@@ -73,16 +74,21 @@ pub(super) fn run(args: RecordArgs) -> Result<(), CliError> {
     if let Some(code) = recording.gripper {
         request["gripper"] = json!(code);
     }
+    let taught = |suite: &Suite| {
+        let policy = PolicyConfig::load(&policy.taught_by(suite.teacher))?;
+        Ok::<_, CliError>(config.clone().with_policy(policy))
+    };
+    let configs: Vec<RunConfig> = suites.iter().map(taught).collect::<Result<_, _>>()?;
     record_all(recording, &request, || {
-        let prepare = |suite| {
-            let tasks = select_tasks(&config, suite)?;
+        let prepare = |(suite, config)| {
+            let tasks = select_tasks(config, suite)?;
             let jobs = EpisodeList::of_tasks(&tasks, max_attempts, None);
-            SuiteRecording::new(&config, recording, &loaded, suite, tasks, jobs, Some(demos), |run, log| {
+            SuiteRecording::new(config, recording, &loaded, suite, tasks, jobs, Some(demos), |run, log| {
                 record_grips(run, log);
                 Ok(())
             })
         };
-        suites.iter().map(prepare).collect()
+        suites.iter().zip(&configs).map(prepare).collect()
     })
 }
 

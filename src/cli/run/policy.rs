@@ -10,7 +10,7 @@ use std::{
 use clap::{Args, ValueEnum, value_parser};
 
 use crate::{error::CliError, run::recorded_runs::RecordedRuns};
-use softvt_benchmark::seed::RandomStream;
+use softvt_benchmark::{Teacher, seed::RandomStream};
 use softvt_common::text;
 use softvt_dataset::layout::is_dataset;
 use softvt_policy::{
@@ -36,9 +36,9 @@ const DEFAULT_PROFILE: &str = "visuo_tactile";
 // The policy, and how it is connected. A doc comment would replace the description of the commands.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct PolicyArgs {
-    /// Policy that controls the robot: a name (softvt list policies), a Lua file, a server such as ws://host:8000, or a run folder whose actions are repeated
-    #[arg(long, value_name = "POLICY", default_value = "expert", value_parser = parse_policy)]
-    policy: PolicyArg,
+    /// Policy that controls the robot: a name (softvt list policies), a Lua file, a server such as ws://host:8000, or a run folder whose actions are repeated [default: expert; softvt record: the suite's teacher]
+    #[arg(long, value_name = "POLICY", value_parser = parse_policy)]
+    policy: Option<PolicyArg>,
     /// Observations and action encoding of a policy server: a name (softvt list profiles) or a Lua file [default: visuo_tactile]
     #[arg(long, value_name = "PROFILE", value_parser = parse_profile)]
     profile: Option<String>,
@@ -62,7 +62,21 @@ pub(crate) struct PolicyArgs {
 impl PolicyArgs {
     /// The grip code that exports of a recording use. It is not that of a profile unless the policy is a server.
     pub(crate) fn take_export_code(&mut self) -> Option<GripCode> {
-        if matches!(self.policy, PolicyArg::Server(_)) { self.gripper } else { self.gripper.take() }
+        if matches!(self.policy, Some(PolicyArg::Server(_))) { self.gripper } else { self.gripper.take() }
+    }
+
+    /// The policy that is loaded.
+    fn policy(&self) -> PolicyArg {
+        self.policy.clone().unwrap_or(PolicyArg::Builtin(BuiltinPolicy::Expert))
+    }
+
+    /// These arguments for a suite of a teacher, which `--policy` replaces.
+    pub(crate) fn taught_by(&self, teacher: Teacher) -> Self {
+        let builtin = match teacher {
+            Teacher::Expert => BuiltinPolicy::Expert,
+            Teacher::TactileServo => BuiltinPolicy::TactileServo,
+        };
+        Self { policy: Some(self.policy.clone().unwrap_or(PolicyArg::Builtin(builtin))), ..self.clone() }
     }
 }
 
@@ -87,7 +101,7 @@ pub(crate) enum BuiltinPolicy {
     ExpertBinary,
     /// the same expert, with one closure for all instances of an asset (privileged)
     FixedClosure,
-    /// the same expert, closing until the tactile markers show a firm grasp (privileged)
+    /// the same expert, feeling in the tactile markers how firmly it must hold (privileged)
     TactileServo,
     /// holds still with the gripper open
     Noop,
@@ -238,7 +252,7 @@ impl PolicyConfig {
     pub(crate) fn load(args: &PolicyArgs) -> Result<Self, CliError> {
         refuse_flags_without_effect(args)?;
         let replan = args.replan.map(usize::from);
-        let mut policy = match &args.policy {
+        let mut policy = match &args.policy() {
             PolicyArg::Builtin(policy) => Self::new(PolicyKind::Builtin(*policy), policy.name()),
             PolicyArg::Lua(path) => {
                 let file = PolicyFile::load(path)?;
@@ -452,8 +466,9 @@ pub(crate) fn load_profile_of(args: &PolicyArgs) -> Result<(Profile, BTreeMap<St
 
 /// Refuses flags that the selected policy would ignore.
 fn refuse_flags_without_effect(args: &PolicyArgs) -> Result<(), CliError> {
-    let is_server = matches!(args.policy, PolicyArg::Server(_));
-    let is_lua = matches!(args.policy, PolicyArg::Lua(_));
+    let policy = args.policy();
+    let is_server = matches!(policy, PolicyArg::Server(_));
+    let is_lua = matches!(policy, PolicyArg::Lua(_));
     let flags = [
         ("--profile", args.profile.is_some() && !is_server),
         ("--protocol", args.protocol.is_some() && !is_server),
@@ -463,7 +478,7 @@ fn refuse_flags_without_effect(args: &PolicyArgs) -> Result<(), CliError> {
     ];
     let Some((flag, _)) = flags.into_iter().find(|(_, is_ignored)| *is_ignored) else { return Ok(()) };
     let kinds = if flag == "--replan" { "policy servers and Lua policies" } else { "policy servers" };
-    let policy = args.policy.word();
+    let policy = policy.word();
     Err(CliError::input(format!("{flag}: applies to {kinds} only; --policy {policy} ignores it")))
 }
 
@@ -473,7 +488,7 @@ mod tests {
 
     fn args(policy: PolicyArg) -> PolicyArgs {
         PolicyArgs {
-            policy,
+            policy: Some(policy),
             name: None,
             profile: None,
             protocol: None,

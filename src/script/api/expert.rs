@@ -31,7 +31,7 @@ pub(crate) enum FingerAccess {
     None,
     /// `arm:tactile` returns readings.
     Readings,
-    /// In addition, `arm:grasp` closes until the readings show a firm grasp.
+    /// In addition, `arm:grasp` feels in the readings how firmly the object must be held.
     Servo,
 }
 
@@ -314,8 +314,9 @@ class! {
             /// Closes or opens to a closure.
             fn close_to(closure: f64 = CLOSURE, options: RateOptions) -> [];
             /// Closes on an object, to a closure or until the width or the force of the options is reached. A binary
-            /// gripper, which is either open or closed, closes here and not in close_to. A tactile servo closes until both
-            /// fingers show a firm grasp, whatever closure is given.
+            /// gripper, which is either open or closed, closes here and not in close_to. A tactile servo lifts the
+            /// hand by a few millimetres, finds the least grip that holds, goes back down and closes to that grip and a margin,
+            /// whatever closure is given.
             fn grasp(closure: f64 = CLOSURE, options: GraspOptions) -> [];
             /// Releases an object by opening, by default wide.
             fn release(options: ReleaseOptions) -> [];

@@ -12,7 +12,7 @@ use crate::{
     vm::{error::fail, value::describe},
 };
 use softvt_benchmark::{
-    ObjectType, REFERENCE, Variation,
+    ObjectType, REFERENCE, Teacher, Variation,
     variation::{FactorRange, HiddenRanges, VariationRanges},
 };
 
@@ -29,6 +29,7 @@ const HOLD: Type = Type::Number("s", Range::closed(0.0, 10.0));
 pub(crate) const SETTINGS: Type = Type::Map(&Type::Map(&Type::Any));
 
 choice! { ObjectType { "deformable" => Deformable, "rigid" => Rigid } }
+choice! { Teacher { "expert" => Expert, "tactile-servo" => TactileServo } }
 choice! { Variation { "object" => Object, "spatial" => Spatial } }
 
 record! {
@@ -148,6 +149,9 @@ record! {
         /// Name of the suite of soft objects whose rigid twin this is. All soft bodies become rigid, with the same shape,
         /// mass and looks; initial states are those of that suite, so tasks and layouts must be its own.
         twin_of: Option<String> = Type::Name;
+        /// Policy whose demonstrations softvt record keeps unless --policy names another: that of the hidden suites is
+        /// "tactile-servo", which shows how a grip is found. By default the expert.
+        teacher: Option<Teacher>;
     }
     /// A difference between a run and its reference: other shifts, settings or another policy, with the same tasks, initial
     /// states and seeds.

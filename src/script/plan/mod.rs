@@ -338,6 +338,7 @@ fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Suite> {
         vary: spec.vary.as_ref().map(|vary| vary.ranges()),
         settings: settings(lua, "suite.settings", spec.settings.as_ref())?,
         twin_of: twin_of(lua, spec)?,
+        teacher: spec.teacher.unwrap_or_default(),
     })
 }
 

@@ -22,7 +22,7 @@ pub enum GripMode {
     Binary,
     /// The closure that is best for all instances that a variation can draw of the object's asset.
     FixedClosure,
-    /// Closes until the tactile sensors show a firm grasp, wherever the expert grasps.
+    /// Feels with the tactile sensors how firmly the object must be held, wherever the expert grasps.
     TactileServo,
 }
 

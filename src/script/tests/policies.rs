@@ -239,7 +239,7 @@ fn files_without_a_policy_are_reported() {
 
 #[test]
 fn the_shipped_policies_act() {
-    for name in ["hold", "touch_and_close"] {
+    for name in ["hold", "touch_and_close", "feel_and_lift"] {
         let path = format!("{}/../../scripts/policies/{name}.lua", env!("CARGO_MANIFEST_DIR"));
         let file = PolicyFile::load(path.as_ref()).unwrap();
         assert_eq!(file.name, name);
