@@ -12,6 +12,7 @@
 ---@field vary? softvt.Variation Ranges from which the soft objects, the light and the cameras of every episode are drawn.
 ---@field settings? table<string, table<string, any>> Changed settings of physics, robot and judge: { physics = {…}, robot = {…}, criteria = {…} }.
 ---@field twin_of? string Name of the suite of soft objects whose rigid twin this is. All soft bodies become rigid, with the same shape, mass and looks; initial states are those of that suite, so tasks and layouts must be its own.
+---@field teacher? "expert"|"tactile-servo" Policy whose demonstrations softvt record keeps unless --policy names another: that of the hidden suites is "tactile-servo", which shows how a grip is found. By default the expert.
 
 ---A task of a suite.
 ---@class softvt.Task
@@ -1181,7 +1182,7 @@ function Arm:move_by(offset, options) end
 ---@param options? softvt.RateOptions
 function Arm:close_to(closure, options) end
 
----Closes on an object, to a closure or until the width or the force of the options is reached. A binary gripper, which is either open or closed, closes here and not in close_to. A tactile servo closes until both fingers show a firm grasp, whatever closure is given.
+---Closes on an object, to a closure or until the width or the force of the options is reached. A binary gripper, which is either open or closed, closes here and not in close_to. A tactile servo lifts the hand by a few millimetres, finds the least grip that holds, goes back down and closes to that grip and a margin, whatever closure is given.
 ---@param closure number
 ---@param options? softvt.GraspOptions
 function Arm:grasp(closure, options) end

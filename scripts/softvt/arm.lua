@@ -38,11 +38,14 @@ function Arm:tactile()
   return fingers.readings()
 end
 
+-- Factor on the duration of a motion with an object that the tactile servo holds: its grip has little to spare for acceleration.
+local CAREFUL = 1.3
+
 local function travel(self, pose, options, closure)
   local from, start = self.target, self.closure
   if closure < start then end_servo(self) end
   local metres, radians = from:distance(pose)
-  local seconds = PEAK * max(metres / options.speed, radians / options.angular_speed)
+  local seconds = PEAK * max(metres / options.speed, radians / options.angular_speed) * (self.grip and CAREFUL or 1)
   local steps = max(1, ceil(seconds / host.dt))
   self.goal = pose
   for step = 1, steps do

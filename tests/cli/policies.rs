@@ -300,6 +300,34 @@ fn the_tactile_servo_stops_at_contact() {
     assert!(project.succeeds("replay tactile-servo 0/0").out.contains("byte-identical"));
 }
 
+/// Peak force on a pad, N, as a policy lifts a cube of a material that starts below the hand.
+fn peak_force_of_lifting(policy: &str, material: &'static str) -> f64 {
+    let project = Small {
+        shape: "softvt.shape.box { size = { 0.05, 0.05, 0.05 } }:grounded()",
+        material,
+        at: "at = { -0.187, -0.005 }",
+        task: "budget_steps = 500",
+        ..Small::default()
+    }
+    .project();
+    let output = project.succeeds(&format!("x.lua --policy {policy} --threads 1 --out run"));
+    let episode = &project.lines("run/episodes.jsonl")[0];
+    assert_eq!(episode["failed_stage"], "carry", "{}", output.err);
+    assert_eq!(episode["no_drop"], true, "{}", output.err);
+    episode["peak_pad_force_n"].as_f64().expect("a number")
+}
+
+#[test]
+fn a_policy_feels_how_firmly_it_must_hold() {
+    let policy = "scripts/policies/feel_and_lift.lua";
+    let light = peak_force_of_lifting(policy, "youngs_pa = 2e4, poisson = 0.3, density = 300");
+    let heavy = peak_force_of_lifting(policy, "youngs_pa = 2e4, poisson = 0.3, density = 1800");
+    // The force that holds the heavy cube at the friction of a sliding pad, 1.2. Contact alone takes about 0.4 N.
+    let least = 0.05_f64.powi(3) * 1800.0 * 9.81 / (2.0 * 1.2);
+    assert!(light < 0.6, "{light} N for a light cube");
+    assert!((1.05..2.0).contains(&(heavy / least)), "{heavy} N for a heavy cube, which {least} N hold");
+}
+
 #[test]
 fn arm_tactile_is_refused_where_it_is_not_available() {
     let project = Small { expert: "arm:tactile()", ..Small::default() }.project();

@@ -127,6 +127,9 @@ class Numbers(unittest.TestCase):
         slow = np.zeros((10, 7))
         slow[:, 0] = 0.0003 * np.arange(10)
         self.assertEqual(moving_steps(slow, 1.0).tolist(), [True, False] * 5, "slow motion is not waiting")
+        felt = np.zeros((60, 7))
+        felt[:, 6], felt[:, 2] = 0.4 + 0.00025 * np.arange(60), 2e-5 * np.arange(60)
+        self.assertGreater(moving_steps(felt, 1.0).sum(), 6, "nor is tightening by 0.02 mm per step while the hand rises")
 
     def test_displacements_are_those_of_both_fingers(self):
         motion = np.zeros((1, 2, 2, 99, 2), np.float32)
