@@ -9,7 +9,7 @@ return softvt.profile {
   inputs = {
     { keys = both "image", source = "camera", camera = "third_person" },
     { keys = both "wrist_image", source = "camera", camera = "wrist" },
-    { keys = both "state", source = "state", parts = { "position", "axis_angle", "finger_position" } },
+    { keys = both "state", source = "state", parts = { "position", "axis_angle", "sensed_finger_position" } },
     { keys = { "prompt" }, source = "prompt" },
     { keys = both "tactile_image", source = "tactile_image" },
     { keys = both "tactile_marker_motion", source = "marker_motion" },

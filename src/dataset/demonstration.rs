@@ -162,6 +162,9 @@ fn observed(recording: &StateRecording, actions: &[Action]) -> Vec<DataStream> {
         DataStream::f64("obs/arm_joint_pos", &[7], each(&|i| states[i].joints.to_vec())).unit("rad", ""),
         DataStream::f64("obs/gripper_pos", &[2], each(&|i| states[i].fingers.to_vec())).unit("m", ""),
         DataStream::f64("obs/gripper_width", &[1], each(&|i| vec![width(i)])).unit("m", ""),
+        DataStream::f64("obs/gripper_width_sensed", &[1], each(&|i| vec![states[i].sensed_width_m]))
+            .unit("m", "")
+            .attribute("meaning", "the width with the steps and the offset of a real hand"),
         DataStream::f64("obs/gripper_close_norm", &[1], each(&|i| vec![1.0 - width(i) / MAX_WIDTH]))
             .unit("1", "")
             .attribute("meaning", "measured: 1 - width / 0.08 m"),

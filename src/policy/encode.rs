@@ -175,6 +175,8 @@ fn state(o: &RobotState, part: StatePart) -> Vec<f32> {
         StatePart::JointTorques => o.joint_torques.to_vec(),
         StatePart::GripperWidth => vec![o.gripper_width_m],
         StatePart::FingerPosition => vec![0.5 * o.gripper_width_m],
+        StatePart::SensedWidth => vec![o.sensed_width_m],
+        StatePart::SensedFingerPosition => vec![0.5 * o.sensed_width_m],
         StatePart::FingerPair => vec![0.5 * o.gripper_width_m, -0.5 * o.gripper_width_m],
         StatePart::Closure => vec![o.closure],
     };

@@ -142,10 +142,14 @@ pub enum StatePart {
     JointVelocities,
     /// Torques of the arm's drives, N m, without gravity, which is compensated (7).
     JointTorques,
-    /// Distance between the gels, m: 0 to 0.08 (1).
+    /// Exact distance between the gels, m: 0 to 0.08 (1).
     GripperWidth,
-    /// Position of one finger, half the gripper width, m: 0 to 0.04 (1).
+    /// Exact position of one finger, half the gripper width, m: 0 to 0.04 (1).
     FingerPosition,
+    /// Distance between the gels with the errors of a real hand, m (1).
+    SensedWidth,
+    /// Half of [`SensedWidth`](Self::SensedWidth), m (1).
+    SensedFingerPosition,
     /// Positions of both fingers in robosuite's convention, m: half the gripper width and its negative (2).
     FingerPair,
     /// Closure last commanded, 0 to 1 (1).
@@ -160,7 +164,11 @@ impl StatePart {
             Self::QuaternionWxyz | Self::QuaternionXyzw => 4,
             Self::Joints | Self::JointVelocities | Self::JointTorques => 7,
             Self::FingerPair => 2,
-            Self::GripperWidth | Self::FingerPosition | Self::Closure => 1,
+            Self::GripperWidth
+            | Self::FingerPosition
+            | Self::SensedWidth
+            | Self::SensedFingerPosition
+            | Self::Closure => 1,
         }
     }
 }
@@ -371,8 +379,12 @@ impl GripperValues {
 }
 
 /// Built-in profiles and their descriptions.
-pub const PROFILES: [(&str, &str); 6] = [
+pub const PROFILES: [(&str, &str); 7] = [
     ("vision", "both cameras, state, prompt; absolute pose; gripper open or closed (binary)"),
+    (
+        "vision_drives",
+        "vision with the exact finger position and the commanded closure, whose gap is the grip force; continuous gripper",
+    ),
     ("visuo_tactile", "vision plus tactile images and markers of 8 frames; continuous gripper"),
     ("softvtbench", "keys and units of the released SoftVTBench client, with true forces (force_observed)"),
     (
@@ -388,12 +400,19 @@ impl Profile {
     pub fn named(name: &str) -> Option<Self> {
         let both = |name: &str| vec![format!("observation/{name}"), name.to_owned()];
         let plain = |camera: &str| InputSource::Camera { camera: camera.to_owned(), half_turn: false };
-        let finger = vec![StatePart::Position, StatePart::AxisAngle, StatePart::FingerPosition];
+        let state = |hand: &[StatePart]| InputSource::State {
+            parts: [&[StatePart::Position, StatePart::AxisAngle], hand].concat(),
+        };
+        // SoftVTBench's interfaces and LIBERO's have the exact position of the fingers.
+        let finger = match name {
+            "vision" | "visuo_tactile" => StatePart::SensedFingerPosition,
+            _ => StatePart::FingerPosition,
+        };
         let input = ProfileInput::new;
         let mut inputs = vec![
             input(both("image"), plain(CAMERAS[0])),
             input(both("wrist_image"), plain(CAMERAS[1])),
-            input(both("state"), InputSource::State { parts: finger }),
+            input(both("state"), state(&[finger])),
             input(vec!["prompt".to_owned()], InputSource::Prompt),
         ];
         let mosaic = |markers| InputSource::TactileImage { layout: MosaicLayout::Rows, markers };
@@ -408,6 +427,10 @@ impl Profile {
         let absolute = |gripper| ActionEncoding::new(PoseEncoding::Absolute, gripper);
         let actions = match name {
             "vision" => absolute(GripperValues { code: GripCode::Binary, ..closure }),
+            "vision_drives" => {
+                inputs[2].source = state(&[StatePart::FingerPosition, StatePart::Closure]);
+                absolute(closure)
+            }
             "visuo_tactile" => {
                 inputs.extend(tactile);
                 absolute(closure)
@@ -434,8 +457,7 @@ impl Profile {
                     |camera: &str| InputSource::Camera { camera: camera.to_owned(), half_turn: true };
                 inputs[0].source = turned(CAMERAS[0]);
                 inputs[1].source = turned(CAMERAS[1]);
-                let parts = vec![StatePart::Position, StatePart::AxisAngle, StatePart::FingerPair];
-                inputs[2].source = InputSource::State { parts };
+                inputs[2].source = state(&[StatePart::FingerPair]);
                 inputs[..3].iter_mut().for_each(|input| input.keys.truncate(1));
                 ActionEncoding::new(
                     PoseEncoding::DeltaOsc { translation_m: 0.05, rotation_rad: 0.5 },
@@ -502,6 +524,21 @@ mod tests {
         assert!(streams("visuo_tactile").tactile && streams("softvtbench").force);
         let visuo_tactile = streams("visuo_tactile");
         assert_eq!((visuo_tactile.past_steps, visuo_tactile.past_images), (7, 0));
+    }
+
+    #[test]
+    fn only_vision_drives_has_the_command_and_the_exact_width() {
+        let hand = |name| match &Profile::named(name).unwrap().inputs[2].source {
+            InputSource::State { parts } => parts[2..].to_vec(),
+            other => panic!("{other:?}"),
+        };
+        for name in ["vision", "visuo_tactile"] {
+            assert_eq!(hand(name), [StatePart::SensedFingerPosition], "{name}");
+        }
+        assert_eq!(hand("vision_drives"), [StatePart::FingerPosition, StatePart::Closure]);
+        for name in ["softvtbench", "softvtbench_v02"] {
+            assert_eq!(hand(name), [StatePart::FingerPosition], "{name}");
+        }
     }
 
     #[test]

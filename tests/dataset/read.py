@@ -9,7 +9,7 @@ import numpy as np
 
 SHAPES = {
     "actions": (7,), "actions_binary": (7,), "rewards": (), "dones": (), "timestamps": (),
-    "obs/eef_pose": (7,), "obs/state": (7,), "obs/arm_joint_pos": (7,), "obs/gripper_pos": (2,), "obs/gripper_width": (1,),
+    "obs/eef_pose": (7,), "obs/state": (7,), "obs/arm_joint_pos": (7,), "obs/gripper_pos": (2,), "obs/gripper_width": (1,), "obs/gripper_width_sensed": (1,),
     "obs/gripper_close_norm": (1,), "obs/gripper_closure": (1,), "obs/gripper_marker_motion": (2, 2, 99, 2),
 }
 PICTURES = {
@@ -56,6 +56,8 @@ def numbers(demo, steps):
         assert np.allclose(turn(q), rodrigues(v), atol=1e-9)
     width = demo["obs/gripper_width"][:, 0]
     assert np.allclose(width, demo["obs/gripper_pos"][:].sum(axis=1)) and np.allclose(state[:, 6], width / 2)
+    sensed = demo["obs/gripper_width_sensed"][:, 0]
+    assert np.allclose(sensed / 4e-4, np.round(sensed / 4e-4)) and np.abs(sensed - width).max() < 2e-3, "steps of 0.4 mm and an offset"
     assert np.allclose(demo["obs/gripper_close_norm"][:, 0], 1 - width / 0.08)
     assert np.allclose(demo["obs/gripper_closure"][1:, 0], actions[:-1, 6]), "what was commanded last"
     assert np.allclose(np.diff(demo["timestamps"][:]), 0.05)

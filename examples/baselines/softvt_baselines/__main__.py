@@ -9,6 +9,7 @@ from pathlib import Path
 from . import UserError
 
 CODES = ["continuous", "binary", "two-width", "force"]
+INPUTS = {"vo": "vision only", "vp": "vision and drives", "vt": "vision and touch", "vpt": "all three"}
 REFERENCES = ["expert", "tactile-servo", "fixed-closure"]
 
 
@@ -28,9 +29,9 @@ def _train(args: argparse.Namespace) -> None:
     if args.out.is_dir():
         raise UserError(f"--out {args.out}: expected a file, this is a folder")
     args.out.parent.mkdir(parents=True, exist_ok=True)
-    inputs = {"has_touch": args.touch or args.tactile_pictures, "has_tactile_pictures": args.tactile_pictures}
+    inputs = {"has_touch": args.touch or args.tactile_pictures, "has_tactile_pictures": args.tactile_pictures, "has_drives": args.drives}
     shape = Shape(**inputs, code=args.gripper, head=args.head, frames=args.frames, edge=args.edge)
-    demos = load(args.recordings, args.gripper, args.edge, args.tactile_pictures)
+    demos = load(args.recordings, args.gripper, args.edge, args.tactile_pictures, args.drives)
     options = TrainOptions(shape, args.steps, args.batch, args.seed, device, args.compile)
     train(demos, options, args.out, {"recordings": [recording.name for recording in args.recordings]})
 
@@ -127,6 +128,7 @@ def _parser() -> argparse.ArgumentParser:
     train.add_argument("--out", type=Path, required=True, help="checkpoint to write")
     train.add_argument("--touch", action="store_true", help="give the policy the markers of both fingers")
     train.add_argument("--tactile-pictures", action="store_true", help="give it the markers and the tactile pictures of both fingers")
+    train.add_argument("--drives", action="store_true", help="give it the exact finger position and the commanded closure, whose gap is the grip force")
     train.add_argument("--gripper", default="continuous", choices=CODES, help="grip code")
     train.add_argument("--head", default="regression", choices=["regression", "flow"], help="how actions are predicted")
     train.add_argument("--frames", type=int, default=1, choices=[1, 2], help="control steps whose pictures and states the policy sees")
@@ -155,7 +157,7 @@ def _parser() -> argparse.ArgumentParser:
     study = command("study", _study, "record, train and evaluate every combination of suites, inputs, grip codes and seeds")
     study.add_argument("suites", nargs="+", help="names of standard suites")
     study.add_argument("--out", type=Path, required=True, help="folder of the study")
-    study.add_argument("--inputs", nargs="+", default=["vo", "vt"], choices=["vo", "vt"], help="vision only, vision and touch")
+    study.add_argument("--inputs", nargs="+", default=["vo", "vp", "vt"], choices=[*INPUTS], help=f"inputs: {', '.join(f'{name} {what}' for name, what in INPUTS.items())}")
     study.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2], help="training seeds")
     study.add_argument("--codes", nargs="+", default=["continuous"], choices=CODES, help="grip codes")
     study.add_argument("--replans", type=_positive, nargs="+", default=[4], help="actions executed of each answer")

@@ -31,7 +31,7 @@ IDLE_MOTION, IDLE_TURN, IDLE_GRIP = 0.0005, 0.005, 0.002
 # Smallest deviations by which actions are divided: of the position (m), the rotation vector (rad), and the gripper.
 LEAST_SPREAD = np.array([0.001] * 3 + [0.01] * 3 + [0.002])
 # Version of the packed files.
-PACKED = 2
+PACKED = 3
 # Length of the marker displacements of a step: finger, marker, (x, y).
 MARKERS = 2 * 99 * 2
 
@@ -41,7 +41,7 @@ class Demonstrations:
     """All demonstrations, one after the other: M recorded steps, of which N are trained on."""
 
     pictures: dict[str, np.ndarray]  # per key (M, edge, edge, 3) uint8
-    state: np.ndarray  # (M, 7): tool position (m), rotation vector, finger position (m); folded; (M, 8) with the commanded closure
+    state: np.ndarray  # (M, 7): tool position (m), rotation vector, finger position (m); folded; (M, 8) with the drives
     markers: np.ndarray  # (M, 396) px: displacements of the markers of both fingers
     actions: np.ndarray  # (N, 7): tool position, rotation vector, gripper in the grip code; folded
     row: np.ndarray  # (N,) index among the recorded steps
@@ -50,6 +50,7 @@ class Demonstrations:
     prompts: list[str]
     prompt: np.ndarray  # (N,) index of the prompt of each step
     axis: np.ndarray  # (3,) the side of the rotation vectors
+    is_relative: bool  # True if the closure of an answer is relative to the commanded one
 
 
 def displacements(motion: np.ndarray) -> np.ndarray:
@@ -57,13 +58,21 @@ def displacements(motion: np.ndarray) -> np.ndarray:
     return (motion[:, :, 1] - motion[:, :, 0]).reshape(len(motion), -1)
 
 
-def has_closure(code: str) -> bool:
-    """True if policies with a grip code see the commanded closure.
+def is_relative(code: str, has_drives: bool) -> bool:
+    """True if the closure of an answer is relative to the commanded one.
 
-    The fingers stop before the closure that is commanded, the more so the firmer the grip. A policy that sees only where they are
-    would close further with every answer.
+    The fingers stop before the closure that is commanded, the more so the firmer the grip. An answer relative to where they are
+    would close further each time, so that without the drives it is absolute.
     """
-    return code == "continuous"
+    return has_drives and code == "continuous"
+
+
+def with_hand(state: np.ndarray, sensed_width: np.ndarray, closure: np.ndarray, has_drives: bool) -> np.ndarray:
+    """States (M, 7) with what a policy sees of the hand: with the drives its exact finger position and (M, 8) the commanded closure,
+    else the finger position with the steps and the offset of a real sensor."""
+    if has_drives:
+        return np.concatenate([state, closure], 1)
+    return np.concatenate([state[:, :6], 0.5 * sensed_width], 1)
 
 
 def shrink(pictures: np.ndarray, edge: int) -> np.ndarray:
@@ -118,6 +127,7 @@ def _pack_one(job: _Job) -> dict[str, np.ndarray | str]:
         return actions | {
             "state": obs["state"][:].astype(np.float32),
             "closure": obs["gripper_closure"][:].astype(np.float32),
+            "sensed_width": obs["gripper_width_sensed"][:].astype(np.float32),
             "markers": displacements(obs["gripper_marker_motion"][:]),
             "prompt": str(demo.attrs["language"]),
         }
@@ -201,8 +211,8 @@ def _check_grip_code(recording: Path, code: str, packed) -> None:
         raise UserError(f"{recording} has no {ACTIONS[code]}, the actions in the grip code {code}: record it again")
 
 
-def load(recordings: list[Path], code: str, edge: int, has_tactile: bool = False) -> Demonstrations:
-    """Reads all demonstrations of recordings, with their tactile pictures if they are asked for.
+def load(recordings: list[Path], code: str, edge: int, has_tactile: bool = False, has_drives: bool = False) -> Demonstrations:
+    """Reads all demonstrations of recordings, with their tactile pictures and the drives of the fingers if they are asked for.
 
     Raises UserError if a recording is incomplete, or lacks the pictures or the grip code.
     """
@@ -218,9 +228,8 @@ def load(recordings: list[Path], code: str, edge: int, has_tactile: bool = False
         mapped = [np.load(folder / f"{key}.npy", mmap_mode="r") for folder in folders]
         return mapped[0] if len(mapped) == 1 else np.concatenate(mapped)
 
-    recorded, names, actions, state = joined("lengths"), joined("prompts"), joined(ACTIONS[code]), joined("state")
-    if has_closure(code):
-        state = np.concatenate([state, joined("closure")], 1)
+    recorded, names, actions = joined("lengths"), joined("prompts"), joined(ACTIONS[code])
+    state = with_hand(joined("state"), joined("sensed_width"), joined("closure"), has_drives)
     axis = mean_axis(actions[:, 3:6])
     actions = fold(actions, axis)
     grip_range = float(np.ptp(actions[:, 6]))
@@ -238,6 +247,7 @@ def load(recordings: list[Path], code: str, edge: int, has_tactile: bool = False
         prompts=prompts,
         prompt=np.repeat([prompts.index(name) for name in names], lengths),
         axis=axis,
+        is_relative=is_relative(code, has_drives),
     )
 
 
@@ -258,7 +268,7 @@ class Statistics:
     @classmethod
     def of(cls, demos: Demonstrations, chunk: int) -> "Statistics":
         scale = float(np.sqrt(np.square(demos.markers, dtype=np.float64).mean()) + 1e-6)
-        steps, present = np.arange(len(demos.actions)), reference(demos.state[demos.row])
+        steps, present = np.arange(len(demos.actions)), reference(demos.state[demos.row], demos.is_relative)
         ahead: list[Standard] = []
         for k in range(chunk):
             inside = steps + k <= demos.last

@@ -5,7 +5,6 @@ import torch
 
 from . import UserError, prompts
 from .checkpoint import Checkpoint
-from .data import has_closure
 from .inputs import read
 from .model import Policy
 from .serve import Plan, Request
@@ -35,7 +34,7 @@ class Answering:
     def __init__(self, checkpoint: Checkpoint, device: torch.device, blend: float = 0.0):
         self.checkpoint, self.device = checkpoint, device
         # The number of the gripper is blended where it is a closure; elsewhere it switches.
-        self.shares = np.float32([blend] * 6 + [blend if has_closure(checkpoint.policy.shape.code) else 0])
+        self.shares = np.float32([blend] * 6 + [blend if checkpoint.policy.shape.code == "continuous" else 0])
         self.vocabulary = prompts.Vocabulary(checkpoint.prompts)
         torch.backends.cudnn.benchmark = False
         torch.backends.cudnn.deterministic = True

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from . import UserError, prompts
-from .data import CAMERAS, MARKERS, TACTILE, Statistics, has_closure, shrink
+from .data import CAMERAS, MARKERS, TACTILE, Statistics, is_relative, shrink
 from .numbers import fold, reference
 
 USE_PROFILE = "use the profile that train wrote next to the checkpoint"
@@ -27,6 +27,7 @@ class Shape:
     action: int = 7
     marker_steps: tuple[int, ...] = (4, 0)  # steps before the present one whose markers are seen
     has_tactile_pictures: bool = False  # besides the markers
+    has_drives: bool = False  # the exact finger position and the commanded closure, whose gap is the grip force
 
     def to_dict(self) -> dict:
         return asdict(self)
@@ -39,12 +40,18 @@ class Shape:
     @property
     def state(self) -> int:
         """Numbers of a state."""
-        return 8 if has_closure(self.code) else 7
+        return 8 if self.has_drives else 7
+
+    @property
+    def is_relative(self) -> bool:
+        """True if the closure of an answer is relative to the commanded one."""
+        return is_relative(self.code, self.has_drives)
 
     def profile(self, name: str) -> str:
         """The profile of softvt with these inputs, in Lua."""
         history = f", frames = {self.frames}" if self.frames > 1 else ""
-        parts = ["position", "axis_angle", "finger_position"] + ["closure"] * has_closure(self.code)
+        hand = ["finger_position", "closure"] if self.has_drives else ["sensed_finger_position"]
+        parts = ["position", "axis_angle", *hand]
         inputs = {
             "image": 'source = "camera", camera = "third_person"' + history,
             "wrist_image": 'source = "camera", camera = "wrist"' + history,
@@ -105,7 +112,7 @@ def read(obs: dict, shape: Shape, statistics: Statistics, vocabulary: prompts.Vo
     states = fold(frames("state", 1)[None], statistics.axis)
     if states.shape[-1] != shape.state:
         raise UserError(f"state has {states.shape[-1]} numbers, expected {shape.state}; {USE_PROFILE}")
-    inputs["state"], inputs["reference"] = statistics.state.apply(states), reference(states[:, -1:])
+    inputs["state"], inputs["reference"] = statistics.state.apply(states), reference(states[:, -1:], shape.is_relative)
     inputs["prompt"] = np.array([prompts.encode(str(obs["prompt"]))])
     random = np.random.default_rng(obs["softvt"]["seed"])
     inputs["noise"] = random.standard_normal((1, shape.chunk, shape.action), np.float32)

@@ -30,12 +30,11 @@ def fold(rows: np.ndarray, axis: np.ndarray) -> np.ndarray:
     return folded
 
 
-def reference(states):
+def reference(states, is_relative: bool):
     """What is subtracted from the actions (…, 7) that follow on states (…, 7 or 8), arrays or tensors: the pose of the tool, and
-    the commanded closure, or 0 without it."""
-    has_closure = states.shape[-1] > CLOSURE
-    found = states[..., [0, 1, 2, 3, 4, 5, CLOSURE if has_closure else GRIPPER]]
-    if not has_closure:
+    the commanded closure if the answer is relative to it, else 0."""
+    found = states[..., [0, 1, 2, 3, 4, 5, CLOSURE if is_relative else GRIPPER]]
+    if not is_relative:
         found[..., GRIPPER] = 0
     return found
 

@@ -13,8 +13,10 @@ from .results import Estimate, Run
 
 # The tables stand between these lines of the page.
 BEGIN, END = "<!-- tables: softvt-baselines page -->", "<!-- end of tables -->"
-LEARNED = re.compile(r"(?P<suite>\w+)-(?P<inputs>v[ot])-(?P<code>[a-z-]+)-s(?P<seed>\d+)-r(?P<replan>\d+)(?P<condition>\+.*)?")
+LEARNED = re.compile(r"(?P<suite>\w+)-(?P<inputs>vo|vp|vt|vpt)-(?P<code>[a-z-]+)-s(?P<seed>\d+)-r(?P<replan>\d+)(?P<condition>\+.*)?")
 REFERENCES = {"expert": "expert (privileged)", "tactile-servo": "tactile servo (privileged)", "fixed-closure": "fixed closure (privileged)"}
+# The inputs with which others are compared: what they add is the difference.
+WITHOUT = {"vp": "vo", "vt": "vo", "vpt": "vp"}
 MEASURES = ["goal", "no_drop", "safety"]
 # Stages of an episode, in their order.
 STAGES = ["reach", "grasp", "lift", "carry", "place", "release"]
@@ -29,7 +31,7 @@ class Policy:
     suite: str
     code: str
     replan: int
-    inputs: str  # "vo", "vt"
+    inputs: str  # "vo", "vp", "vt", "vpt"
     condition: str = ""
 
 
@@ -94,12 +96,13 @@ def _name(policy: Policy) -> str:
 
 
 def _pairs(learned: dict[Policy, list[Run]]) -> list[tuple[Policy, list[Run], list[Run]]]:
-    """VO and VT of the same suite, grip code, replanning and condition, both with the same number of seeds."""
+    """Policies with a further input (WITHOUT), and their runs without and with it: of the same suite, grip code, replanning and
+    condition, and with the same number of seeds."""
     pairs = []
-    for policy, touch in sorted(learned.items()):
-        vision = learned.get(Policy(policy.suite, policy.code, policy.replan, "vo", policy.condition), [])
-        if policy.inputs == "vt" and len(vision) == len(touch):
-            pairs.append((policy, vision, touch))
+    for policy, more in sorted(learned.items()):
+        fewer = learned.get(replace(policy, inputs=WITHOUT.get(policy.inputs, "")), [])
+        if len(fewer) == len(more):
+            pairs.append((policy, fewer, more))
     return pairs
 
 
@@ -114,56 +117,62 @@ def tables(folder: Path) -> str:
         text += _table(["policy", "replan", "seeds", "episodes", "Goal, %", "NoDrop, %", "Safety, %", "D/τ"], rows)
     pairs = [pair for pair in _pairs(learned) if pair[0].condition != UNCHANGED]
     if pairs:
-        text += "### VT minus VO, on the episodes that both have\n\n*Both succeed*: Safety of the episodes in which both reach the goal.\n\n"
+        text += "### Differences, on the episodes that both have\n\n*Both succeed*: Safety of the episodes in which both reach the goal.\n\n"
         measures = [f"{measure}, points" for measure in ("Goal", "NoDrop", "Safety")]
-        heading = ["suite", "grip code", "replan", "seeds", "shift", "episodes", *measures, "both succeed", "Safety there, points"]
+        heading = ["suite", "inputs", "grip code", "replan", "seeds", "shift", "episodes", *measures, "both succeed", "Safety there, points"]
         text += _table(heading, [_difference(*pair) for pair in pairs])
-    for policy, vision, touch in pairs:
+    for policy, fewer, more in pairs:
         if not policy.condition:
-            text += f"### `{policy.suite}`, {policy.code}, replan {policy.replan}: by task and by stage\n\n"
+            text += f"### `{policy.suite}`, {_compared(policy)}, {policy.code}, replan {policy.replan}: by task and by stage\n\n"
             text += "Safety by task, and the stages in which episodes without success ended, on the episodes that both have.\n\n"
-            text += _by_task(vision, touch) + _by_stage(vision, touch)
+            text += _by_task(policy, fewer, more) + _by_stage(policy, fewer, more)
     if shifted := _shifts(learned):
         text += "### Shifts\n\nThe change is that against the same policy without a shift, on the same episodes.\n\n"
         text += _table(["suite", "policy", "replan", "seeds", "shift", "Goal, %", "Safety, %", "change of Safety, points"], shifted)
     return text
 
 
-def _difference(policy: Policy, vision: list[Run], touch: list[Run]) -> list[str]:
+def _compared(policy: Policy) -> str:
+    return f"{policy.inputs.upper()} − {WITHOUT[policy.inputs].upper()}"
+
+
+def _difference(policy: Policy, fewer: list[Run], more: list[Run]) -> list[str]:
     """The row of a pair in the table of differences."""
-    common = results.in_common(vision + touch)
-    vision, touch = common[: len(vision)], common[len(vision) :]
-    shown = [results.difference(vision, touch, measure).text(signed=True) for measure in MEASURES]
+    common = results.in_common(fewer + more)
+    fewer, more = common[: len(fewer)], common[len(fewer) :]
+    shown = [results.difference(fewer, more, measure).text(signed=True) for measure in MEASURES]
     succeed, there = "–", "–"
     # With several seeds, success differs from seed to seed.
-    if len(touch) == 1:
-        both = (vision[0].goal * touch[0].goal).astype(bool)
+    if len(more) == 1:
+        both = (fewer[0].goal * more[0].goal).astype(bool)
         succeed = str(both.sum())
-        there = results.difference([vision[0].where(both)], [touch[0].where(both)], "safety").text(signed=True) if both.any() else "–"
-    return [f"`{policy.suite}`", policy.code, str(policy.replan), str(len(touch)), policy.condition or "none", str(len(touch[0].task)), *shown, succeed, there]
+        there = results.difference([fewer[0].where(both)], [more[0].where(both)], "safety").text(signed=True) if both.any() else "–"
+    names = [f"`{policy.suite}`", _compared(policy), policy.code, str(policy.replan), str(len(more)), policy.condition or "none"]
+    return [*names, str(len(more[0].task)), *shown, succeed, there]
 
 
-def _by_task(vision: list[Run], touch: list[Run]) -> str:
-    common = results.in_common(vision + touch)
+def _by_task(policy: Policy, fewer: list[Run], more: list[Run]) -> str:
+    common = results.in_common(fewer + more)
     assets = {task: asset for run in common for task, asset in run.assets.items()}
 
     def safety(runs: list[Run], task: int) -> str:
         return f"{100 * np.mean([run.safety[run.task == task].mean() for run in runs]):.0f}"
 
     rows = [
-        [str(task), assets.get(task, "–"), str((common[0].task == task).sum()), safety(common[: len(vision)], task), safety(common[len(vision) :], task)]
+        [str(task), assets.get(task, "–"), str((common[0].task == task).sum()), safety(common[: len(fewer)], task), safety(common[len(fewer) :], task)]
         for task in np.unique(common[0].task)
     ]
-    return _table(["task", "asset", "episodes", "Safety of VO, %", "Safety of VT, %"], rows)
+    names = (WITHOUT[policy.inputs].upper(), policy.inputs.upper())
+    return _table(["task", "asset", "episodes", *(f"Safety of {name}, %" for name in names)], rows)
 
 
-def _by_stage(vision: list[Run], touch: list[Run]) -> str:
-    common = results.in_common(vision + touch)
-    counts = [Counter(stage for run in runs for stage in run.stage) for runs in (common[: len(vision)], common[len(vision) :])]
-    firm = [sum(int(((run.goal == 1) & (run.ratio > 1)).sum()) for run in runs) for runs in (common[: len(vision)], common[len(vision) :])]
+def _by_stage(policy: Policy, fewer: list[Run], more: list[Run]) -> str:
+    common = results.in_common(fewer + more)
+    counts = [Counter(stage for run in runs for stage in run.stage) for runs in (common[: len(fewer)], common[len(fewer) :])]
+    firm = [sum(int(((run.goal == 1) & (run.ratio > 1)).sum()) for run in runs) for runs in (common[: len(fewer)], common[len(fewer) :])]
     rows = [[f"failed at *{stage}*", *(str(count[stage]) for count in counts)] for stage in STAGES if any(count[stage] for count in counts)]
     rows.append(["success beyond the limit", *map(str, firm)])
-    return _table(["episodes", "VO", "VT"], rows)
+    return _table(["episodes", WITHOUT[policy.inputs].upper(), policy.inputs.upper()], rows)
 
 
 def _shifts(learned: dict[Policy, list[Run]]) -> list[list[str]]:

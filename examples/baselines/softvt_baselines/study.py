@@ -30,7 +30,7 @@ class Study:
     """What a study compares. Every combination is one policy."""
 
     suites: list[str]
-    inputs: list[str]  # "vo", "vt"
+    inputs: list[str]  # "vo", "vp", "vt", "vpt": vision only, with the drives, with touch, with both
     seeds: list[int]
     codes: list[str]
     replans: list[int]
@@ -77,7 +77,7 @@ def _train(job: Job, study: Study, gpu: int | None) -> None:
     checkpoint = study.out / "checkpoints" / f"{job.name}.pt"
     if checkpoint.is_file():
         return
-    switches = ["--touch"] * (job.inputs == "vt") + ["--compile"] * study.compile
+    switches = ["--touch"] * ("t" in job.inputs) + ["--drives"] * ("p" in job.inputs) + ["--compile"] * study.compile
     shape = ["--gripper", job.code, "--edge", str(study.edge), "--steps", str(study.steps), "--seed", str(job.seed), *switches]
     words = ["train", str(study.out / "data" / job.suite), "--out", str(checkpoint), "--device", _device(gpu), *shape]
     _call(words, study.out / "logs" / f"{job.name}.log", gpu)

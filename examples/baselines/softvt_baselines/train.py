@@ -85,7 +85,7 @@ class Batches:
         if self.shape.has_touch:
             obs["markers"] = self.markers[self._past(steps, self.shape.marker_steps)].float()
         ahead = steps[:, None] + torch.arange(self.shape.chunk, device=self.device)
-        changes = self.actions[ahead.clamp(max=len(self.actions) - 1)] - reference(states[:, -1:])
+        changes = self.actions[ahead.clamp(max=len(self.actions) - 1)] - reference(states[:, -1:], self.shape.is_relative)
         return obs, (changes - self.action_mean) / self.action_std, ahead <= self.last[steps][:, None]
 
 

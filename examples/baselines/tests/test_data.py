@@ -37,6 +37,7 @@ def recording(folder: Path, demos: int = 2, without: tuple[str, ...] = (), gripp
             streams |= {f"obs/{stream}": np.full((STEPS, 6, 8, 3), 20 * index, np.uint8) for stream in TACTILE.values()}
             streams |= {stream: actions for stream in ACTIONS.values()}
             streams["obs/state"], streams["obs/gripper_closure"] = actions, np.full((STEPS, 1), 0.1 * index)
+            streams["obs/gripper_width_sensed"] = np.full((STEPS, 1), 0.04 * index)
             streams["obs/gripper_marker_motion"] = np.zeros((STEPS, 2, 2, 99, 2), np.float32)
             for name, values in streams.items():
                 if name not in without:
@@ -68,13 +69,25 @@ class Recordings(unittest.TestCase):
         again = load([self.folder / "a", recording(self.folder / "b")], "force", 4)
         self.assertEqual((len(again.actions), again.start[-1]), (4 * STEPS, 3 * STEPS))
 
+    def test_the_exact_width_and_the_command_are_seen_with_the_drives_only(self):
+        folder = recording(self.folder / "a")
+        vision, drives = load([folder], "continuous", 4), load([folder], "continuous", 4, has_drives=True)
+        self.assertEqual((vision.state.shape, vision.is_relative), ((2 * STEPS, 7), False))
+        np.testing.assert_allclose(vision.state[STEPS:, 6], 0.02, rtol=1e-6, err_msg="half the sensed width")
+        self.assertEqual((drives.state.shape, drives.is_relative), ((2 * STEPS, 8), True))
+        np.testing.assert_allclose(drives.state[STEPS:, 6:], 0.1, rtol=1e-6)
+        self.assertIn('parts = { "position", "axis_angle", "sensed_finger_position" }', Shape(True).profile("vt"))
+        self.assertIn('parts = { "position", "axis_angle", "finger_position", "closure" }', Shape(True, has_drives=True).profile("vpt"))
+        self.assertFalse(load([folder], "force", 4, has_drives=True).is_relative, "a force is no change of a closure")
+
     def test_what_is_missing_is_named(self):
         self.refused("no dataset.json", [self.folder], "continuous", 4)
         self.refused("--images video", [recording(self.folder / "a", without=("obs/agentview_rgb",))], "continuous", 4)
         self.refused("no actions_force", [recording(self.folder / "b", without=("actions_force",))], "force", 4)
         self.refused("record with --edge 32, or train with --edge 4", [recording(self.folder / "d")], "continuous", 32)
         self.refused("recording.json", [recording(self.folder / "e", gripper="")], "continuous", 4)
-        self.refused("gripper_closure", [recording(self.folder / "f", without=("obs/gripper_closure",))], "continuous", 4)
+        for stream in ("gripper_closure", "gripper_width_sensed"):
+            self.refused(stream, [recording(self.folder / stream, without=(f"obs/{stream}",))], "continuous", 4)
         self.refused("--gripper force", [recording(self.folder / "c", gripper="force")], "continuous", 4)
 
     def test_a_new_recording_in_the_same_folder_is_packed_again(self):
@@ -105,15 +118,15 @@ class Numbers(unittest.TestCase):
     def test_actions_are_relative_and_standardised_by_their_place_in_a_chunk(self):
         with tempfile.TemporaryDirectory() as scratch:
             folder = recording(Path(scratch) / "a")
-            actions = {code: Statistics.of(load([folder], code, 4), STEPS + 1).action for code in ("continuous", "force")}
+            actions = {code: Statistics.of(load([folder], code, 4, has_drives=True), STEPS + 1).action for code in ("continuous", "force")}
         action = actions["force"]
         np.testing.assert_allclose(action.mean[:STEPS, 0], 0.01 * np.arange(STEPS), atol=1e-6)
         np.testing.assert_allclose(action.mean[:, 6], 0.05, atol=1e-6)
         np.testing.assert_array_equal(action.mean[STEPS], action.mean[STEPS - 1], "no demonstration is that long")
         np.testing.assert_allclose(actions["continuous"].mean[:, 6], 0, atol=1e-6, err_msg="relative to the commanded closure")
         self.assertTrue((action.std > 0).all())
-        self.assertEqual(reference(np.full((2, 7), 3.0))[1].tolist(), [3.0] * 6 + [0.0])
-        self.assertEqual(reference(np.arange(8.0)).tolist(), [0, 1, 2, 3, 4, 5, 7])
+        self.assertEqual(reference(np.full((2, 7), 3.0), False)[1].tolist(), [3.0] * 6 + [0.0])
+        self.assertEqual(reference(np.arange(8.0), True).tolist(), [0, 1, 2, 3, 4, 5, 7])
 
     def test_pictures_shrink_to_the_mean_of_their_area(self):
         picture = np.zeros((1, 4, 4, 3), np.uint8)
@@ -166,7 +179,7 @@ class Inputs(unittest.TestCase):
         return read(self.obs | changes, shape, self.statistics, self.vocabulary)
 
     def test_an_observation_becomes_the_inputs_of_the_network(self):
-        shape = Shape(has_touch=True, edge=4)
+        shape = Shape(has_touch=True, edge=4, has_drives=True)
         found = self.read(shape)
         self.assertEqual(found["image"].shape, (1, 1, 4, 4, 3))
         np.testing.assert_allclose(found["state"][0, 0, 3], 2 * np.pi - 3.1, rtol=1e-6)
@@ -183,7 +196,7 @@ class Inputs(unittest.TestCase):
             (Shape(False, edge=32), {}, "--set cameras.width=32"),
             (Shape(False, edge=4), {"softvt": {"step": 0}}, "no seed"),
             (Shape(False, edge=4), {"prompt": "fly away"}, "was not trained for the prompt"),
-            (Shape(False, "force", edge=4), {}, "state has 8 numbers, expected 7; use the profile"),
+            (Shape(False, edge=4), {}, "state has 8 numbers, expected 7; use the profile"),
         ]:
             obs = {key: value for key, value in (self.obs | changes).items() if value is not None}
             with self.assertRaises(UserError) as caught:

@@ -18,7 +18,7 @@ class Pages(unittest.TestCase):
         self.study, self.docs = Path(scratch.name) / "study", Path(scratch.name) / "docs"
         self.docs.mkdir()
         random = np.random.default_rng(0)
-        for inputs, rate in (("vo", 0.5), ("vt", 0.9)):
+        for inputs, rate in (("vo", 0.5), ("vp", 0.7), ("vt", 0.9), ("vpt", 0.9)):
             for seed in range(2):
                 self.run_of(f"one-{inputs}-continuous-s{seed}-r4/one", random.random((10, 5)) < rate)
         self.run_of("one-expert", np.ones((10, 5), bool))
@@ -35,8 +35,10 @@ class Pages(unittest.TestCase):
         self.assertTrue(text.startswith("before\n") and text.endswith("after\n") and "old" not in text)
         self.assertIn("| VT, continuous | 4 | 2 | 50 | 100.0 [100.0, 100.0] |", text)
         self.assertIn("| expert (privileged) |  | 1 | 50 | 100.0", text)
-        difference = text.split("VT minus VO")[1]
-        self.assertIn("| `one` | continuous | 4 | 2 | none | 50 | +0.0 [+0.0, +0.0] |", difference)
+        difference = text.split("### Differences")[1]
+        for pair in ("VP − VO", "VT − VO", "VPT − VP"):
+            self.assertIn(f"| `one` | {pair} | continuous | 4 | 2 | none | 50 | +0.0 [+0.0, +0.0] |", difference)
+        self.assertEqual(difference.count("| `one` |"), 3)
         figure = (self.docs / "images" / "baselines.svg").read_bytes()
         page.write([], self.docs)
         self.assertEqual((self.docs / "baselines.md").read_text(), text)
@@ -48,7 +50,7 @@ class Pages(unittest.TestCase):
             self.run_of(f"one-{inputs}-continuous-s0-r4/shifts/reference", np.zeros((10, 5), bool))
         page.collect(self.study, self.docs)
         text = page.tables(self.docs)
-        self.assertIn("| `one` | continuous | 4 | 1 | light x2 |", text)
+        self.assertIn("| `one` | VT − VO | continuous | 4 | 1 | light x2 |", text)
         self.assertNotIn("reference", text)
         self.assertIn("| `one` | VT, continuous | 4 | 1 | light x2 | 100.0 [100.0, 100.0] | 100.0 [100.0, 100.0] | +100.0", text)
 
@@ -58,12 +60,15 @@ class Pages(unittest.TestCase):
         (collected / "summary.json").unlink()
         lines = (collected / "outcomes.csv").read_text().splitlines()
         (collected / "outcomes.csv").write_text("\n".join(lines[:-7]) + "\n")
+        for inputs in ("vp", "vpt"):
+            for seed in range(2):
+                shutil.rmtree(self.docs / f"one-{inputs}-continuous-s{seed}-r4")
         for inputs in ("vo", "vt"):
             shutil.rmtree(self.docs / f"one-{inputs}-continuous-s1-r4")
         text = page.tables(self.docs)
         self.assertIn("| VO, continuous | 4 | 1 | 43 (interrupted) |", text)
         self.assertIn("| VT, continuous | 4 | 1 | 50 |", text)
-        self.assertIn("| `one` | continuous | 4 | 1 | none | 43 |", text)
+        self.assertIn("| `one` | VT − VO | continuous | 4 | 1 | none | 43 |", text)
         self.assertIn("| 8 | – | 3 |", text.split("by task and by stage")[1])
 
     def test_the_published_page_is_that_of_the_published_outcomes(self):

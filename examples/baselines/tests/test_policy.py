@@ -25,7 +25,7 @@ class Policies(unittest.TestCase):
         scratch = tempfile.TemporaryDirectory()
         self.addCleanup(scratch.cleanup)
         self.folder = Path(scratch.name)
-        self.demos = load_demonstrations([recording(self.folder / "data", edge=32)], "continuous", 32, has_tactile=True)
+        self.demos = load_demonstrations([recording(self.folder / "data", edge=32)], "continuous", 32, has_tactile=True, has_drives=True)
 
     def trained(self, shape: Shape) -> Path:
         path = self.folder / "policy.pt"
@@ -47,7 +47,7 @@ class Policies(unittest.TestCase):
             (True, "regression", 1, True),
             (True, "flow", 2, False),
         ]:
-            shape = Shape(has_touch, head=head, frames=frames, edge=32, chunk=5, width=32, layers=1, has_tactile_pictures=has_pictures)
+            shape = Shape(has_touch, head=head, frames=frames, edge=32, chunk=5, width=32, layers=1, has_tactile_pictures=has_pictures, has_drives=True)
             answering = Answering(load(self.trained(shape), CPU), CPU)
             observations = [self.observation(shape, seed) for seed in range(5)]
             requests = [Request(observation, None) for observation in observations]
@@ -67,13 +67,13 @@ class Policies(unittest.TestCase):
             np.testing.assert_array_equal(blended(fresh, step, last, np.full(7, 0.5)), fresh)
 
     def test_training_is_repeatable(self):
-        shape = Shape(False, edge=32, chunk=5, width=32, layers=1)
+        shape = Shape(False, edge=32, chunk=5, width=32, layers=1, has_drives=True)
         first = torch.load(self.trained(shape), weights_only=True)["weights"]
         second = torch.load(self.trained(shape), weights_only=True)["weights"]
         self.assertTrue(all(torch.equal(first[name], second[name]) for name in first))
 
     def test_broken_checkpoints_are_refused(self):
-        path = self.trained(Shape(False, edge=32, chunk=5, width=32, layers=1))
+        path = self.trained(Shape(False, edge=32, chunk=5, width=32, layers=1, has_drives=True))
         content = torch.load(path, weights_only=True)
 
         def refused(words: str, **changes) -> None:

@@ -15,7 +15,7 @@ class Studies(unittest.TestCase):
         scratch = tempfile.TemporaryDirectory()
         self.addCleanup(scratch.cleanup)
         self.out = Path(scratch.name)
-        self.calls = []
+        self.calls, self.switches = [], {}
         cuda = types.SimpleNamespace(device_count=lambda: 0)
         for patch in (
             mock.patch.dict(sys.modules, {"torch": types.SimpleNamespace(cuda=cuda)}),
@@ -32,6 +32,7 @@ class Studies(unittest.TestCase):
         if self.failing and self.failing in self.calls[-1]:
             raise UserError("it failed")
         if words[0] == "train":
+            self.switches[Path(words[words.index("--out") + 1]).stem.split("-")[1]] = {word for word in words if word in ("--touch", "--drives")}
             Path(words[words.index("--out") + 1]).touch()
 
     def run_softvt(self, words):
@@ -51,6 +52,10 @@ class Studies(unittest.TestCase):
         self.assertEqual(runs, expected)
         study.run(self.study(references=("expert",), shifts=True))
         self.assertEqual(len([call for call in self.calls if call.startswith("train")]), 2)
+
+    def test_inputs_are_switches_of_training(self):
+        study.run(self.study(inputs=["vo", "vp", "vt", "vpt"]))
+        self.assertEqual(self.switches, {"vo": set(), "vp": {"--drives"}, "vt": {"--touch"}, "vpt": {"--drives", "--touch"}})
 
     def test_what_fails_is_named_and_the_rest_goes_on(self):
         self.failing = "train checkpoints/one-vo"

@@ -31,7 +31,7 @@ pub struct Findings {
 }
 
 /// Streams of every demonstration, with their shape per step.
-const REQUIRED_STREAMS: [(&str, &[usize]); 13] = [
+const REQUIRED_STREAMS: [(&str, &[usize]); 14] = [
     ("actions", &[7]),
     ("actions_binary", &[7]),
     ("rewards", &[]),
@@ -42,6 +42,7 @@ const REQUIRED_STREAMS: [(&str, &[usize]); 13] = [
     ("obs/arm_joint_pos", &[7]),
     ("obs/gripper_pos", &[2]),
     ("obs/gripper_width", &[1]),
+    ("obs/gripper_width_sensed", &[1]),
     ("obs/gripper_close_norm", &[1]),
     ("obs/gripper_closure", &[1]),
     ("obs/gripper_marker_motion", &[2, 2, MARKER_COUNT, 2]),

@@ -41,6 +41,7 @@ fn demonstration(salt: f64) -> Demonstration {
             zeros("obs/arm_joint_pos", &[7]),
             zeros("obs/gripper_pos", &[2]),
             zeros("obs/gripper_width", &[1]),
+            zeros("obs/gripper_width_sensed", &[1]),
             zeros("obs/gripper_close_norm", &[1]),
             zeros("obs/gripper_closure", &[1]),
         ],

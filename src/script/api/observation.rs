@@ -20,15 +20,19 @@ use softvt_sensing::tactile::{MarkerFlow, MarkerPositions, Markers};
 
 /// `softvt.Observation`.
 #[derive(Clone)]
-pub(crate) struct LuaObservation(Arc<Observation>);
+pub(crate) struct LuaObservation {
+    observation: Arc<Observation>,
+    /// True if the policy observes the finger drives.
+    drives: bool,
+}
 
 impl LuaObservation {
-    pub(crate) fn new(observation: &Observation) -> Self {
-        Self(Arc::new(observation.clone()))
+    pub(crate) fn new(observation: &Observation, drives: bool) -> Self {
+        Self { observation: Arc::new(observation.clone()), drives }
     }
 
     fn tactile(&self, lua: &Lua, key: &str) -> mlua::Result<&TactileHistory> {
-        self.0.tactile.as_ref().ok_or_else(|| not_observed(lua, key, "tactile = true"))
+        self.observation.tactile.as_ref().ok_or_else(|| not_observed(lua, key, "tactile = true"))
     }
 }
 
@@ -70,21 +74,34 @@ class! {
         label(_) { "obs".to_owned() }
         fields {
             /// Time since the policy took over, s.
-            time: "number" { get(_, this) { this.0.time_s } }
+            time: "number" { get(_, this) { this.observation.time_s } }
             /// Tool position, m.
-            position: "number[]" { get(_, this) { this.0.robot.ee_position_b } }
+            position: "number[]" { get(_, this) { this.observation.robot.ee_position_b } }
             /// Tool orientation as axis-angle, rad.
-            axis_angle: "number[]" { get(_, this) { this.0.robot.ee_axis_angle_b } }
+            axis_angle: "number[]" { get(_, this) { this.observation.robot.ee_axis_angle_b } }
             /// Tool orientation as quaternion w, x, y, z with w ≥ 0.
-            quaternion: "number[]" { get(_, this) { wxyz(&rotation::from_axis_angle(&this.0.robot.ee_axis_angle_b)) } }
+            quaternion: "number[]" { get(_, this) { wxyz(&rotation::from_axis_angle(&this.observation.robot.ee_axis_angle_b)) } }
             /// The seven joint angles of the arm, rad.
-            joints: "number[]" { get(_, this) { this.0.robot.joints } }
-            /// Measured distance of the gels, 0 to 0.08 m.
-            width: "number" { get(_, this) { this.0.robot.gripper_width_m } }
-            /// Last commanded closure: 0 is open, 1 is closed.
-            closure: "number" { get(_, this) { this.0.robot.closure } }
+            joints: "number[]" { get(_, this) { this.observation.robot.joints } }
+            /// Measured distance of the gels, 0 to 0.08 m, with the steps and the offset of a real hand; exact with
+            /// observes.drives.
+            width: "number" {
+                get(_, this) {
+                    let robot = &this.observation.robot;
+                    if this.drives { robot.gripper_width_m } else { robot.sensed_width_m }
+                }
+            }
+            /// Last commanded closure, 0 open to 1 closed; requires observes.drives.
+            closure: "number" {
+                get(lua, this) {
+                    if !this.drives {
+                        return Err(not_observed(lua, "closure", "drives = true"));
+                    }
+                    this.observation.robot.closure
+                }
+            }
             /// The instruction.
-            prompt: "string" { get(_, this) { this.0.prompt.clone() } }
+            prompt: "string" { get(_, this) { this.observation.prompt.clone() } }
             /// Tactile sensors; requires observes.tactile.
             tactile: "softvt.Fingers" {
                 get(lua, this) {
@@ -102,7 +119,7 @@ class! {
             /// True forces on the gels; requires observes.force.
             force: "softvt.Forces" {
                 get(lua, this) {
-                    let pads = this.0.forces.as_ref().ok_or_else(|| not_observed(lua, "force", "force = true"))?;
+                    let pads = this.observation.forces.as_ref().ok_or_else(|| not_observed(lua, "force", "force = true"))?;
                     forces(lua, pads)?
                 }
             }
@@ -110,10 +127,10 @@ class! {
         methods {
             /// Returns the image of a camera in observes.cameras, 224 × 224 unless the scene defines another size.
             fn camera(lua, this, name: String) -> ["softvt.Image"] {
-                let names = this.0.cameras.iter().map(|camera| camera.name.as_str());
-                match this.0.camera(&name) {
+                let names = this.observation.cameras.iter().map(|camera| camera.name.as_str());
+                match this.observation.camera(&name) {
                     Some(image) => LuaImage::new(lua, image.clone())?,
-                    None if this.0.cameras.is_empty() => {
+                    None if this.observation.cameras.is_empty() => {
                         return Err(not_observed(lua, "camera", "cameras = { … }"));
                     }
                     None => return Err(fail(lua, format!("obs:camera: {}", unknown_name("camera", &name, names)))),

@@ -60,7 +60,8 @@ record! {
         /// For camera, depth and segmentation: true to rotate the image by 180°.
         half_turn: Option<bool>;
         /// For state: its parts in order, in m, rad, rad/s and N m, of 3 numbers (position, axis_angle), 4 (quaternions), 7
-        /// (joints, joint_velocities, joint_torques), 2 (finger_pair) and 1.
+        /// (joints, joint_velocities, joint_torques), 2 (finger_pair) and 1. The sensed width has the steps and the offset of
+        /// a real hand; the gap between the exact one and the commanded closure is the grip force.
         parts: Option<Vec<StatePart>>;
         /// Number of control steps in the entry, the present one last, along a first axis; not for prompt and tactile_image.
         /// By default the present step without that axis, and 8 steps of marker_motion and force. The start of an episode
@@ -129,6 +130,9 @@ record! {
         cameras: Vec<String> = Type::List(&Type::Name) => Empty;
         /// True to get the tactile images and markers of the fingers.
         tactile: bool => Boolean(false);
+        /// True to get the commanded closure and the exact width, whose gap is the grip force: 1 mm per N. Without it, the width
+        /// has the steps and the offset of a real hand.
+        drives: bool => Boolean(false);
         /// True to get the true forces on the gels, which no real sensor gives; results then say force_observed.
         force: bool => Boolean(false);
     }
@@ -148,7 +152,7 @@ record_of! {
 
 impl ObservesSpec {
     pub(crate) fn streams(&self) -> SensorStreams {
-        let Self { cameras, tactile, force } = self;
+        let Self { cameras, tactile, force, drives: _ } = self;
         SensorStreams {
             cameras: cameras.clone(),
             tactile: *tactile,
@@ -186,6 +190,7 @@ choice! {
         "quaternion_wxyz" => QuaternionWxyz, "quaternion_xyzw" => QuaternionXyzw,
         "joints" => Joints, "joint_velocities" => JointVelocities, "joint_torques" => JointTorques,
         "gripper_width" => GripperWidth, "finger_position" => FingerPosition,
+        "sensed_width" => SensedWidth, "sensed_finger_position" => SensedFingerPosition,
         "finger_pair" => FingerPair, "closure" => Closure,
     }
 }

@@ -36,6 +36,8 @@ pub struct PolicyFile {
     pub replan: Option<usize>,
     /// Observations of the policy.
     pub streams: SensorStreams,
+    /// True if the policy observes the finger drives: the exact width and the commanded closure.
+    pub drives: bool,
     /// True if the policy has access to limits and materials of objects.
     pub privileged: bool,
     /// File and line of the declaration of its cameras.
@@ -66,7 +68,8 @@ impl PolicyFile {
             })?;
         let PolicySpec { name, observes, replan, privileged, .. } = spec;
         let observes_at = observes_at.map_or_else(|| sources.main.clone(), |line| line.to_string());
-        Ok(Self { name, replan, streams: observes.streams(), privileged, observes_at, sources })
+        let (streams, drives) = (observes.streams(), observes.drives);
+        Ok(Self { name, replan, streams, drives, privileged, observes_at, sources })
     }
 
     /// Starts the policy of an episode in a virtual machine of its own.
@@ -117,7 +120,7 @@ impl Policy for LuaPolicy {
     }
 
     fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError> {
-        let response = self.instance.vm.call(&self.act, LuaObservation::new(observation));
+        let response = self.instance.vm.call(&self.act, LuaObservation::new(observation, self.file.drives));
         self.chunk(&response.map_err(script_error)?)
     }
 }

@@ -42,6 +42,7 @@ fn observation() -> Observation {
             ee_axis_angle_b: Vec3::new(std::f64::consts::PI, 0.0, 0.0),
             joints: [0.0, 0.5, 0.0, -2.0, 0.0, 2.5, 0.75],
             gripper_width_m: 0.0625,
+            sensed_width_m: 0.0624,
             closure: 0.25,
             ..RobotState::ORIGIN
         },
@@ -58,7 +59,7 @@ fn brief() -> TaskBrief {
     TaskBrief { suite: "one".into(), task: 3, prompt: "take it".into(), episode: 7, seed: 0 }
 }
 
-const OBSERVES: &str = "observes = { cameras = { 'wrist' }, tactile = true }";
+const OBSERVES: &str = "observes = { cameras = { 'wrist' }, tactile = true, drives = true }";
 const POSE: &str = "position = { 0.5, 0, 0.25 }, axis_angle = { 3, 0, 0 }";
 
 /// A policy whose `act` is `body`, in an episode.
@@ -110,6 +111,18 @@ fn observations_have_the_values_of_the_simulation() {
         let chunk = act(&format!("{check}\nreturn {{ {POSE}, closure = 0 }}"));
         assert!(chunk.is_ok(), "{check}: {chunk:?}");
     }
+}
+
+#[test]
+fn a_policy_without_the_drives_has_no_command_and_the_width_of_a_real_hand() {
+    let text = |body: &str| format!("return softvt.policy {{ name = 'p', act = function(obs)\n{body}\nend }}");
+    let (_project, mut policy) =
+        start(&text(&format!("assert(obs.width == 0.0624) return {{ {POSE}, closure = 0 }}")));
+    policy.act(&observation()).unwrap();
+    let (_project, mut policy) = start(&text("return obs.closure"));
+    let message = policy.act(&observation()).unwrap_err().to_string();
+    let expected = "p.lua:2: obs.closure: the policy does not observe it; declare observes = { drives = true }";
+    assert!(message.ends_with(expected), "{message}");
 }
 
 #[test]
@@ -275,17 +288,24 @@ fn the_built_in_profiles_can_be_written_in_lua() {
         (tactile, ""),
         ("closed = 1 }", "closed = 1, binary = true }"),
     ];
+    let drives = [
+        ("name = \"visuo_tactile\"", "name = \"vision_drives\""),
+        (tactile, ""),
+        ("\"sensed_finger_position\"", "\"finger_position\", \"closure\""),
+    ];
     let force = format!("{tactile}\n{{ keys = both \"tactile_gripper_force\", source = \"force\" }},");
     let released = [
         ("name = \"visuo_tactile\"", "name = \"softvtbench\""),
         ("{ \"prompt\" }", "{ \"prompt\", \"observation/prompt\" }"),
         (tactile, force.as_str()),
         ("open = 0, closed = 1", "open = 0.04, closed = 0"),
+        ("\"sensed_finger_position\"", "\"finger_position\""),
     ];
     for (name, text) in [
         ("libero", changed("libero", &[])),
         ("visuo_tactile", changed("visuo_tactile", &[])),
         ("vision", changed("visuo_tactile", &vision)),
+        ("vision_drives", changed("visuo_tactile", &drives)),
         ("softvtbench", changed("visuo_tactile", &released)),
     ] {
         assert_eq!(profile(&text).unwrap(), Profile::named(name).unwrap());
