@@ -147,8 +147,11 @@ fn overheads(profile: &str) -> Vec<f64> {
     let (suite, prompt) = (spec.header.id.suite.clone(), spec.task.prompt.clone());
     let mut took = Vec::new();
     let policy = Timed { inner: remote, took: &mut took };
-    let mut driver =
-        ChunkedPolicy::new(Box::new(policy), TaskBrief { suite, task: 0, prompt, episode: 0, seed: 0 }, 10);
+    let mut driver = ChunkedPolicy::new(
+        Box::new(policy),
+        TaskBrief { suite, task: 0, prompt, episode: 0, seed: 0, alias: None },
+        10,
+    );
     let started = Episode::start(spec, &AssetCache::default(), &SensorAssets::default()).expect("it starts");
     started.run(&mut driver).expect("it runs");
     drop(driver);

@@ -70,6 +70,57 @@ impl RandomStream {
     }
 }
 
+/// Secret of a judged run: the draws of its episodes derive from it, and results hold a hash of it only.
+#[derive(Clone, PartialEq, Eq)]
+pub struct SecretSeed([u8; 32]);
+
+/// Shows the hash, not the secret.
+impl std::fmt::Debug for SecretSeed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "SecretSeed({})", self.hash())
+    }
+}
+
+impl SecretSeed {
+    /// The secret of a file's content.
+    pub fn new(content: &[u8]) -> Self {
+        Self(sha256(&[b"softvt secret seed", content]))
+    }
+
+    /// SHA-256 of the secret, for results.
+    pub fn hash(&self) -> String {
+        hex(&sha256(&[b"softvt seed hash", &self.0]))
+    }
+
+    /// The seed that results hold: the first 48 bits of the hash, which every reader of JSON represents exactly.
+    pub fn public_seed(&self) -> u64 {
+        let hash = sha256(&[b"softvt seed hash", &self.0]);
+        hash[..6].iter().fold(0, |number, byte| (number << 8) | u64::from(*byte))
+    }
+
+    /// Name of an episode that reveals neither the episode nor its draws, 32 hexadecimal digits.
+    pub fn episode_name(&self, suite: &str, task: usize, episode: u32) -> String {
+        let (task, episode) = (task.to_string(), episode.to_string());
+        let parts =
+            [&b"softvt episode name"[..], &self.0, suite.as_bytes(), task.as_bytes(), episode.as_bytes()];
+        hex(&sha256(&parts)[..16])
+    }
+}
+
+/// SHA-256 of parts, each preceded by its length, so that different lists never collide.
+fn sha256(parts: &[&[u8]]) -> [u8; 32] {
+    let mut hash = Sha256::new();
+    for part in parts {
+        hash.update((part.len() as u64).to_le_bytes());
+        hash.update(part);
+    }
+    hash.finalize().into()
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 /// Source of the random streams of an episode: all values on which its initial state depends. Unlike an [`EpisodeId`]
 /// it has a layout in place of the task, because tasks that share a layout share their initial states.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -84,6 +135,8 @@ pub struct EpisodeSeed {
     pub base_seed: u64,
     /// List of episodes that `episode` counts in.
     pub split: Split,
+    /// Secret of a judged run.
+    pub secret: Option<SecretSeed>,
 }
 
 impl EpisodeSeed {
@@ -95,7 +148,13 @@ impl EpisodeSeed {
             episode: id.episode,
             base_seed: id.base_seed,
             split: id.split,
+            secret: None,
         }
+    }
+
+    /// The same seed in a judged run.
+    pub fn with_secret(self, secret: Option<&SecretSeed>) -> Self {
+        Self { secret: secret.cloned(), ..self }
     }
 
     /// Random generator of a stream, at its start.
@@ -103,19 +162,20 @@ impl EpisodeSeed {
         let split = self.split.name();
         let episode = self.episode.to_string();
         let base_seed = self.base_seed.to_string();
-        keyed_rng(&["softvt episode", &self.suite, &self.layout, &episode, &base_seed, split, stream.name()])
+        let parts: [&str; 7] =
+            ["softvt episode", &self.suite, &self.layout, &episode, &base_seed, split, stream.name()];
+        let parts = parts.map(str::as_bytes);
+        match &self.secret {
+            None => ChaCha8Rng::from_seed(sha256(&parts)),
+            Some(SecretSeed(key)) => ChaCha8Rng::from_seed(sha256(&[&parts[..], &[&key[..]]].concat())),
+        }
     }
 }
 
 /// Random generator keyed by the hash of `parts`. The hash includes their lengths, so that
 /// different lists never collide.
 pub fn keyed_rng(parts: &[&str]) -> ChaCha8Rng {
-    let mut hash = Sha256::new();
-    for part in parts {
-        hash.update((part.len() as u64).to_le_bytes());
-        hash.update(part.as_bytes());
-    }
-    ChaCha8Rng::from_seed(hash.finalize().into())
+    ChaCha8Rng::from_seed(sha256(&parts.iter().map(|part| part.as_bytes()).collect::<Vec<_>>()))
 }
 
 /// Uniform in [0, 1), 53 bits.
@@ -167,6 +227,7 @@ mod tests {
             episode: 3,
             base_seed: 7,
             split: Split::Validation,
+            secret: None,
         }
     }
 
@@ -183,6 +244,22 @@ mod tests {
         assert!(others.iter().all(|other| first(other, RandomStream::Layout) != base));
         assert_ne!(first(&seed(), RandomStream::Arm), base);
         assert_eq!(first(&seed(), RandomStream::Layout), base);
+    }
+
+    #[test]
+    fn a_secret_moves_every_stream_and_its_hash_does_not_give_it_away() {
+        let first =
+            |secret: Option<&SecretSeed>| seed().with_secret(secret).stream(RandomStream::Size).next_u64();
+        let [a, b] = [b"one".as_slice(), b"one\n"].map(SecretSeed::new);
+        assert!(first(None) != first(Some(&a)) && first(Some(&a)) != first(Some(&b)));
+        assert_eq!(first(Some(&a)), first(Some(&SecretSeed::new(b"one"))));
+        assert!(a.hash() != b.hash() && a.public_seed() != b.public_seed() && a.public_seed() < 1 << 48);
+        // The public seed does not give these draws.
+        let public = EpisodeSeed { base_seed: a.public_seed(), ..seed() };
+        assert_ne!(public.stream(RandomStream::Size).next_u64(), first(Some(&a)));
+        let names = [a.episode_name("s", 1, 2), a.episode_name("s", 12, 0), b.episode_name("s", 1, 2)];
+        assert!(names[0] != names[1] && names[0] != names[2] && names[0].len() == 32);
+        assert!(!format!("{a:?}").contains(&hex(&a.0)), "debug output is printed in panics");
     }
 
     #[test]

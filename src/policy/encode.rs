@@ -126,16 +126,21 @@ fn shape_of(image: &CameraImage) -> Vec<usize> {
 }
 
 fn query_map(query: &QueryId) -> Value {
-    map([
-        ("suite", Value::from(query.suite.as_str())),
-        ("task", Value::from(query.task as u64)),
-        ("episode", Value::from(query.episode)),
-        ("run_seed", Value::from(query.run_seed)),
+    let identity = match &query.alias {
+        Some(alias) => vec![("id", Value::from(alias.as_str()))],
+        None => vec![
+            ("suite", Value::from(query.suite.as_str())),
+            ("task", Value::from(query.task as u64)),
+            ("episode", Value::from(query.episode)),
+            ("run_seed", Value::from(query.run_seed)),
+        ],
+    };
+    map(identity.into_iter().chain([
         ("step", Value::from(query.step)),
         ("query", Value::from(query.query)),
         ("seed", Value::from(query.seed())),
         ("wants_actions", Value::from(query.wants_actions)),
-    ])
+    ]))
 }
 
 /// The observation as a msgpack map in openpi's format.

@@ -125,12 +125,17 @@ pub struct TaskBrief {
     pub episode: u32,
     /// Seed of the run. It may influence the random numbers of a policy alone.
     pub seed: u64,
+    /// Name of the episode in a judged run. Policies then receive it in place of suite, task, episode and seed, from which
+    /// the draws of other runs can be computed.
+    pub alias: Option<String>,
 }
 
 /// Identity of a request for actions, for policies that draw random numbers: the same request of a repeated or resumed run
 /// has the same identity, whatever the number of threads.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct QueryId {
+    /// Name of the episode in a judged run, which is sent in place of suite, task, episode and run seed.
+    pub alias: Option<String>,
     /// Name of the suite.
     pub suite: String,
     /// Index of the task in the suite.
@@ -150,8 +155,9 @@ pub struct QueryId {
 impl QueryId {
     /// The first request of an episode.
     pub fn first(brief: &TaskBrief) -> Self {
-        let TaskBrief { suite, task, episode, seed, .. } = brief;
+        let TaskBrief { suite, task, episode, seed, alias, .. } = brief;
         Self {
+            alias: alias.clone(),
             suite: suite.clone(),
             task: *task,
             episode: *episode,
@@ -162,11 +168,17 @@ impl QueryId {
     }
 
     /// Seed of the request, by the key of SoftVTBench's release v0.2: the first four bytes, big-endian, of the SHA-256 of
-    /// the parts joined by the byte 0x1f. A demonstration is named demo_K there, K being the episode here.
+    /// the parts joined by the byte 0x1f. A demonstration is named demo_K there, K being the episode here. In a judged run
+    /// the only part of an episode is its alias.
     pub fn seed(&self) -> u32 {
         let demo = format!("demo_{}", self.episode);
-        let parts = [self.run_seed.to_string(), self.suite.clone(), self.task.to_string(), demo];
-        let episode = seed_of("episode", &parts);
+        let episode = match &self.alias {
+            Some(alias) => seed_of("episode", std::slice::from_ref(alias)),
+            None => seed_of(
+                "episode",
+                &[self.run_seed.to_string(), self.suite.clone(), self.task.to_string(), demo],
+            ),
+        };
         seed_of("inference", &[episode.to_string(), self.query.to_string()])
     }
 }
@@ -318,8 +330,14 @@ mod tests {
     #[test]
     fn seeds_are_those_of_the_released_key() {
         // Computed with Python's hashlib from the description of the release.
-        let brief =
-            TaskBrief { suite: "object_soft".into(), task: 3, prompt: String::new(), episode: 80, seed: 11 };
+        let brief = TaskBrief {
+            suite: "object_soft".into(),
+            task: 3,
+            prompt: String::new(),
+            episode: 80,
+            seed: 11,
+            alias: None,
+        };
         let first = QueryId::first(&brief);
         let second = QueryId { query: 1, step: 10, ..first.clone() };
         assert_eq!((first.seed(), second.seed()), (1_728_023_119, 3_567_768_914));

@@ -78,7 +78,9 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
     let [first, second] = &twins;
     let count = |runs: &[StoredRun]| -> usize { runs.iter().map(|run| run.records.len()).sum() };
     let pairs = pair_episodes(records(first), records(second));
-    if pairs.is_empty() {
+    // A public seed may equal that of the results of a judged run, whose draws are others.
+    let hashes = |runs: &[StoredRun]| runs.iter().map(seed_hash).collect::<BTreeSet<_>>();
+    if pairs.is_empty() || hashes(first).is_disjoint(&hashes(second)) {
         return Err(no_common_episode(first, second));
     }
     let task = |pairs: &[EpisodePair]| {
@@ -159,11 +161,17 @@ fn check_unique(runs: &[StoredRun]) -> Result<(), CompareError> {
     Ok(())
 }
 
+/// Hash of the secret seed of a judged run.
+fn seed_hash(run: &StoredRun) -> String {
+    run.manifest["seed_hash"].as_str().unwrap_or("none").to_owned()
+}
+
 /// The error about two runs without common episodes, with the property in which they differ.
 fn no_common_episode(first: &[StoredRun], second: &[StoredRun]) -> CompareError {
     type Property = fn(&StoredRun) -> String;
-    let properties: [(&str, Property); 4] = [
+    let properties: [(&str, Property); 5] = [
         ("suite", |run| run.suite().to_owned()),
+        ("seed hash", seed_hash),
         ("seed", |run| run.manifest["seed"].to_string()),
         ("split", |run| run.text("split").to_owned()),
         ("tasks", |run| run.manifest["tasks"].to_string()),

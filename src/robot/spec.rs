@@ -114,8 +114,8 @@ impl Default for GripperSpec {
     }
 }
 
-/// Errors of the gripper width that policies measure: an offset, noise, then rounding to steps. The drives use the exact
-/// width.
+/// Errors of the gripper width that policies measure: an offset, noise, then rounding to steps. Drives and experts use the
+/// exact width.
 ///
 /// The default has the steps of a Robotiq 2F-85 (0.4 mm at the fingertips, instruction manual; no figure of the Franka
 /// Hand was found) and an offset of half the largest error that Mecademic states for the MEGP 25 (0.5 mm, manual of

@@ -20,7 +20,12 @@ use super::{
 };
 use sha2::{Digest, Sha256};
 
-use softvt_benchmark::{GoalKind, Task, seed::EpisodeSeed, settings::Settings, steps_per_control};
+use softvt_benchmark::{
+    GoalKind, Task,
+    seed::{EpisodeSeed, SecretSeed},
+    settings::Settings,
+    steps_per_control,
+};
 use softvt_evaluation::{
     deformation::{Deformation, ReferenceShape},
     episode_id::EpisodeId,
@@ -63,6 +68,8 @@ pub struct EpisodeSpec {
     pub record_trace: bool,
     /// True if traces hold the node positions of soft bodies.
     pub trace_nodes: bool,
+    /// Secret of a judged run.
+    pub secret: Option<SecretSeed>,
 }
 
 impl EpisodeSpec {
@@ -97,6 +104,7 @@ impl EpisodeSpec {
             record_states: false,
             record_trace: false,
             trace_nodes: false,
+            secret: None,
         }
     }
 
@@ -280,7 +288,7 @@ impl Episode {
         let judge = settled_judge(&spec, &sim, &evidence, target, goal);
         let tool = sim.robot.tool_b(&sim.world);
         let start_hold = Action::new(tool.translation.vector, rotation::axis_angle(&tool.rotation), 0.0);
-        let seed = EpisodeSeed::new(&spec.header.id, &spec.task.layout);
+        let seed = EpisodeSeed::new(&spec.header.id, &spec.task.layout).with_secret(spec.secret.as_ref());
         let disturbance = Disturbance::new(&spec.settings.robot.disturbance, &seed);
         let sensors =
             SensorSuite::new(&sim, &spec.settings.tactile, sensor_assets).with_seed(SensorSeed::new(&seed));

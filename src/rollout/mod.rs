@@ -58,7 +58,7 @@
 //! let spec = EpisodeSpec::new(id, "noop", &task, &scene.clone(), scene, &Settings::default());
 //! let episode = Episode::start(spec, &AssetCache::default(), &SensorAssets::default())?;
 //!
-//! let brief = TaskBrief { suite, task: 0, prompt: task.prompt.clone(), episode: 0, seed: 0 };
+//! let brief = TaskBrief { suite, task: 0, prompt: task.prompt.clone(), episode: 0, seed: 0, alias: None };
 //! let finished = episode.run(&mut ChunkedPolicy::new(Box::<NoopPolicy>::default(), brief, 1))?;
 //! assert_eq!(finished.record.outcome, Outcome::Timeout);
 //! assert_eq!(finished.record.stats.steps, 3);

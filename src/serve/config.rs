@@ -57,6 +57,8 @@ pub struct ServerConfig<'a> {
     pub privileged: bool,
     /// Base seed of requests without one.
     pub seed: u64,
+    /// True if draws derive from a secret seed; requests then cannot name another.
+    pub has_secret_seed: bool,
     /// Split of requests without one.
     pub split: Split,
     /// Hash of the scripts, shifts, settings and version. States of servers with another hash are refused.

@@ -98,6 +98,9 @@ fn episode_id(fields: &RequestFields, config: &ServerConfig) -> Result<EpisodeId
     let task = fields.required("task", fields.integer("task", u64::from(u32::MAX))?)? as usize;
     let episode = fields.required("episode", fields.integer("episode", u64::from(u32::MAX))?)? as u32;
     let base_seed = fields.integer("seed", u64::MAX)?.unwrap_or(config.seed);
+    if config.has_secret_seed && base_seed != config.seed {
+        return Err(fields.error("seed: the seed of this server is secret; leave it out"));
+    }
     let split = match fields.text("split")? {
         None => config.split,
         Some(name) => name

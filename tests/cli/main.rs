@@ -18,6 +18,7 @@ mod initial_state_coverage;
 mod interrupt;
 mod invalid_scenes;
 mod invalid_scripts;
+mod judged_runs;
 mod judging;
 mod lerobot_export;
 mod observations;

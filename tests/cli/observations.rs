@@ -56,7 +56,8 @@ fn played(project: &Project, streams: SensorStreams) -> Result<(Vec<Observation>
     let episode =
         Episode::start(spec, &AssetCache::default(), &SensorAssets::default()).map_err(|e| e.to_string())?;
     let mut witness = RecordingPolicy { streams, seen: Vec::new() };
-    let brief = TaskBrief { suite: "one".into(), task: 0, prompt: "wait".into(), episode: 0, seed: 0 };
+    let brief =
+        TaskBrief { suite: "one".into(), task: 0, prompt: "wait".into(), episode: 0, seed: 0, alias: None };
     let mut driver = ChunkedPolicy::new(Box::new(&mut witness), brief, 1);
     let outcome = episode.run(&mut driver).map_err(|e| e.to_string());
     drop(driver);

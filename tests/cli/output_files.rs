@@ -36,8 +36,16 @@ fn lists_are_printed_as_text_and_as_json() {
     );
     assert!(names("policies").contains(&"scripts/policies/hold.lua".into()));
     assert_eq!(
-        names("profiles")[..6],
-        ["vision", "visuo_tactile", "softvtbench", "softvtbench_v02", "softvtbench_v02_latched", "libero"]
+        names("profiles")[..7],
+        [
+            "vision",
+            "vision_drives",
+            "visuo_tactile",
+            "softvtbench",
+            "softvtbench_v02",
+            "softvtbench_v02_latched",
+            "libero"
+        ]
     );
     assert!(names("profiles").contains(&"scripts/profiles/libero.lua".into()));
     for what in ["suites", "tasks", "assets", "policies", "profiles"] {

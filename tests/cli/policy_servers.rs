@@ -261,7 +261,7 @@ fn invalid_addresses_are_input_errors() {
     let message = project.refusal("x.lua --out run --policy exprt");
     assert!(message.contains("did you mean expert"), "{message}");
     let message = project.refusal("x.lua --out run --policy ws://127.0.0.1:9 --profile pi");
-    assert!(message.contains("possible values: vision, visuo_tactile"), "{message}");
+    assert!(message.contains("possible values: vision, vision_drives"), "{message}");
 }
 
 #[test]
@@ -455,6 +455,53 @@ fn profiles_determine_the_inputs() {
     let (released, summary, _) = entries("softvtbench", "");
     assert!(released.iter().any(|k| k == "tactile_gripper_force"));
     assert_eq!(summary["force_observed"], true);
+}
+
+#[test]
+fn a_judged_run_names_its_episodes_to_the_server_by_hashes_alone() {
+    let identities = |words: &str| {
+        let seen = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
+        let kept = seen.clone();
+        let address = server(9, move |_, socket| {
+            answering(socket, |_, observation| {
+                let entries = observation.as_map().expect("a map").iter();
+                let identity =
+                    entries.clone().find(|(key, _)| key.as_str() == Some("softvt")).expect("it is sent");
+                let seed = entries
+                    .clone()
+                    .find(|(key, _)| key.as_str() == Some("__softvtbench_rng_seed"))
+                    .expect("sent");
+                kept.lock().unwrap().push((identity.1.clone(), seed.1.clone()));
+                Some(hold(observation, 4))
+            });
+        });
+        let project = project();
+        project.write("secret", b"correct horse battery staple");
+        let output = run(&project, &address, &format!("--episodes 2 --replan 4 {words}"));
+        assert_eq!(output.code, 0, "{}", output.err);
+        let seen = seen.lock().unwrap().clone();
+        seen
+    };
+    let entry = |identity: &Value, name: &str| -> Option<Value> {
+        let entries = identity.as_map().expect("a map");
+        entries.iter().find(|(key, _)| key.as_str() == Some(name)).map(|(_, value)| value.clone())
+    };
+    let judged = identities("--seed-file secret");
+    assert_eq!(judged.len(), 6, "three requests in each of two episodes");
+    let ids: std::collections::BTreeSet<String> =
+        judged.iter().map(|(identity, _)| entry(identity, "id").expect("a name").to_string()).collect();
+    assert_eq!(ids.len(), 2, "a name per episode");
+    let seeds: std::collections::BTreeSet<String> = judged.iter().map(|(_, seed)| seed.to_string()).collect();
+    assert_eq!(seeds.len(), 6, "a seed per request");
+    for (identity, seed) in &judged {
+        let names: Vec<_> =
+            identity.as_map().expect("a map").iter().map(|(key, _)| key.as_str().unwrap()).collect();
+        assert_eq!(names, ["id", "step", "query", "seed", "wants_actions"]);
+        assert_eq!(entry(identity, "seed").as_ref(), Some(seed));
+    }
+    assert_eq!(judged, identities("--seed-file secret"), "the same requests again");
+    let open = identities("");
+    assert!(entry(&open[0].0, "suite").is_some() && entry(&open[0].0, "id").is_none());
 }
 
 #[test]

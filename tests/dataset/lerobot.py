@@ -108,7 +108,8 @@ def compare(table, demo, numbers, pattern, gripper):
     assert (held["episode_index"] == episode).all() and (held["task_index"] == task).all()
     for name in ("state", "actions", "tactile_marker_motion"):
         held[name] = stacked(table[name])
-    assert (held["state"] == demo["obs/state"][:].astype(np.float32)).all()
+    state = np.hstack([demo["obs/state"][:, :6], 0.5 * demo["obs/gripper_width_sensed"][:]])
+    assert (held["state"] == state.astype(np.float32)).all()
     assert (held["actions"] == demo[STREAMS[gripper]][:].astype(np.float32)).all()
     assert (held["tactile_marker_motion"] == markers(demo)).all()
     for name, stream in PICTURES.items():

@@ -11,8 +11,10 @@ use crate::{
     error::{CliError, Exit},
     output::print,
     run::{
+        config::read_secret,
         replay::{
-            DemoRef, StoredManifest, check_complete, demos_of, difference, report_replays, simulate_demos,
+            DemoRef, SecretFile, StoredManifest, check_complete, demos_of, difference, report_replays,
+            simulate_demos,
         },
         stored_folder::{enter_for_dataset, enter_for_run},
     },
@@ -35,6 +37,9 @@ pub(crate) struct ReplayArgs {
     run: PathBuf,
     /// TASK/EPISODE, or the line number in episodes.jsonl, from 0
     episode: EpisodeSelector,
+    /// Secret seed of a judged run
+    #[arg(long, value_name = "FILE")]
+    seed_file: Option<PathBuf>,
 }
 
 /// An episode of a run, or a demonstration of a dataset.
@@ -66,7 +71,15 @@ impl FromStr for EpisodeSelector {
 /// The run cannot be read, its scripts have changed since, or (exit code 1) the result differs.
 pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
     let dir = &args.run;
+    let secret = args
+        .seed_file
+        .as_ref()
+        .map(|path| Ok::<_, CliError>(SecretFile { path: path.clone(), secret: read_secret(path)? }));
+    let secret = secret.transpose()?;
     if is_dataset(dir) {
+        if secret.is_some() {
+            return Err(CliError::input("--seed-file: demonstrations have no secret seed; leave it out"));
+        }
         check_complete(dir)?;
         let demos = [find_demo(&enter_for_dataset(dir)?, args.episode)?];
         return report_replays(&demos, &simulate_demos(&demos)?);
@@ -84,7 +97,7 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
     let index = record.header.id.index();
     let dir = enter_for_run(stored)?;
     let path = actions::path(&dir, index);
-    let manifest = StoredManifest { path: &dir, manifest: &stored.manifest };
+    let manifest = StoredManifest { path: &dir, manifest: &stored.manifest, secret: secret.as_ref() };
     let simulated = manifest.simulate(record, actions::read(&path)?)?;
     match difference(record, &simulated)? {
         None => print(&format!("{index}: byte-identical, final state {}\n", simulated.stats.state_hash)),

@@ -19,7 +19,7 @@ use crate::{
         suite_run::SuiteRun,
     },
 };
-use softvt_benchmark::{Plan, Suite};
+use softvt_benchmark::{Plan, Suite, seed::SecretSeed};
 use softvt_evaluation::episode_id::{EpisodeId, EpisodeIndex, Split};
 use softvt_policy::Observation;
 use softvt_rollout::cancel;
@@ -118,6 +118,7 @@ pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
         effort_n: runs.iter().map(|run| run.settings.robot.gripper.effort).fold(f64::INFINITY, f64::min),
         privileged: args.privileged,
         seed: config.script.seed,
+        has_secret_seed: config.secret.is_some(),
         split: args.split,
         fingerprint: provenance_hash(&config, &loaded),
         access: AccessRules::new(&args.host, address, token(&args)?),
@@ -234,7 +235,8 @@ fn provenance_hash(config: &RunConfig, loaded: &LoadedScript) -> String {
         config.script.options,
         config.shifts,
         config.settings,
-        config.is_rigid_twin()
+        config.is_rigid_twin(),
+        config.secret.as_ref().map(SecretSeed::hash)
     ]);
     softvt_script::sha256(all.to_string().as_bytes())
 }

@@ -220,13 +220,16 @@ fn write(
     tables: &[ConditionTable],
     out: &Path,
 ) -> Result<(), CliError> {
-    let document = json!({
+    let mut document = json!({
         "softvt": env!("CARGO_PKG_VERSION"),
         "script": loaded.sources.main,
         "policy": config.policy.name,
         "seed": config.script.seed,
         "suites": tables,
     });
+    if let Some(secret) = &config.secret {
+        document["seed_hash"] = json!(secret.hash());
+    }
     let text = format!("{document:#}\n");
     let path = out.join(FILE);
     replace(&path, &text)?;

@@ -1,11 +1,17 @@
 //! Flags of runs, and the configuration of a run: its flags with their values checked and its policy loaded.
 
-use std::{fmt, path::PathBuf, str::FromStr};
+use std::{
+    fmt,
+    io::ErrorKind,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
 
 use clap::{Args, ValueEnum, value_parser};
 
 use crate::{
     error::CliError,
+    output::eprint_notice,
     run::{
         episode_artifacts::VideoSelection,
         plan_flags::{self, GivenFlag},
@@ -13,7 +19,7 @@ use crate::{
         requirement::Requirement,
     },
 };
-use softvt_benchmark::{ShiftValue, Suite};
+use softvt_benchmark::{ShiftValue, Suite, seed::SecretSeed};
 use softvt_script::{LoadedScript, STANDARD_VARIATION};
 
 // The script, and changes of its scenes and their physics. A doc comment would replace the description of the commands
@@ -32,6 +38,9 @@ pub(crate) struct ScriptArgs {
     /// Base seed
     #[arg(long, value_name = "S", default_value = "0", allow_hyphen_values = true, value_parser = parse_seed)]
     pub seed: u64,
+    /// Secret base seed of a judged run: any file, such as 32 random bytes. Results hold its hash: docs/policies.md#judged-runs
+    #[arg(long, value_name = "FILE", conflicts_with = "seed")]
+    pub seed_file: Option<PathBuf>,
     /// Scene changes that the suite declares, such as stiffness=0.5
     #[arg(long = "shift", value_name = "NAME=VALUE", value_delimiter = ',')]
     pub shifts: Vec<String>,
@@ -151,20 +160,26 @@ pub(crate) struct RunConfig {
     pub shifts: Vec<ShiftValue>,
     /// Changed settings by path and value.
     pub settings: Vec<(String, String)>,
+    /// Secret of a judged run. `script.seed` is then its public seed.
+    pub secret: Option<SecretSeed>,
 }
 
 impl RunConfig {
     /// A run under the expert.
     ///
     /// # Errors
-    /// A shift or setting that is not `NAME=VALUE`.
-    pub(crate) fn new(script: ScriptArgs, flags: RunFlags) -> Result<Self, CliError> {
+    /// A shift or setting that is not `NAME=VALUE`, or a seed file that cannot be read.
+    pub(crate) fn new(mut script: ScriptArgs, flags: RunFlags) -> Result<Self, CliError> {
+        let secret = script.seed_file.as_deref().map(read_secret).transpose()?;
+        if let Some(secret) = &secret {
+            script.seed = secret.public_seed();
+        }
         let in_file = |error: CliError| error.prefixed(script.file.display());
         let shifts = script.shifts.iter().map(|word| parse_shift(word)).collect::<Result<_, _>>();
         let shifts = shifts.map_err(in_file)?;
         let settings = script.settings.iter().map(|word| parse_pair("--set", word)).collect::<Result<_, _>>();
         let settings = settings.map_err(in_file)?;
-        Ok(Self { script, policy: PolicyConfig::default(), flags, shifts, settings })
+        Ok(Self { script, policy: PolicyConfig::default(), flags, shifts, settings, secret })
     }
 
     pub(crate) fn with_policy(self, policy: PolicyConfig) -> Self {
@@ -192,6 +207,7 @@ impl RunConfig {
         let mut loaded = softvt_script::load(&self.script.file, &self.script.options)?;
         plan_flags::check(command, self, &loaded.plan)?;
         self.apply_variation(&mut loaded)?;
+        loaded.secret.clone_from(&self.secret);
         Ok(loaded)
     }
 
@@ -202,6 +218,7 @@ impl RunConfig {
     pub(crate) fn load_script(&self) -> Result<LoadedScript, CliError> {
         let mut loaded = softvt_script::load(&self.script.file, &self.script.options)?;
         self.apply_variation(&mut loaded)?;
+        loaded.secret.clone_from(&self.secret);
         Ok(loaded)
     }
 
@@ -234,6 +251,33 @@ impl RunConfig {
         let twin = if self.is_rigid_twin() { "_rigid_twin" } else { "" };
         format!("{}{varied}{twin}", suite.name)
     }
+}
+
+/// Shortest seed file that is not easily guessed from its hash, bytes.
+const MIN_SECRET_BYTES: usize = 16;
+
+/// The secret in a seed file.
+///
+/// # Errors
+/// The file cannot be read, or is empty.
+pub(crate) fn read_secret(path: &Path) -> Result<SecretSeed, CliError> {
+    let refuse = |what: String| CliError::input(format!("--seed-file {}: {what}", path.display()));
+    let make = "write one, for example: head -c 32 /dev/urandom > FILE";
+    let content = std::fs::read(path).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => refuse(format!("there is no such file; {make}")),
+        _ => refuse(error.to_string()),
+    })?;
+    if content.is_empty() {
+        return Err(refuse(format!("the file is empty; {make}")));
+    }
+    if content.len() < MIN_SECRET_BYTES {
+        eprint_notice(format!(
+            "warning: --seed-file {}: {} bytes may be guessed from their hash in the results; {make}",
+            path.display(),
+            content.len()
+        ));
+    }
+    Ok(SecretSeed::new(&content))
 }
 
 /// Number of threads: the requested one, or that of the processors.

@@ -71,7 +71,15 @@ const SCENE: &[&str] = &["seed", "settings", "shifts", "twin", "vary"];
 /// commands refuse plans of other kinds as such.
 static DECISIONS: &[Decision] = &[
     Decision { commands: &[RUN, "check"], flags: &["seed", "settings"], acts_on: ALL },
-    Decision { commands: &[RUN, "check"], flags: &["shifts", "twin", "vary"], acts_on: EPISODES },
+    Decision {
+        commands: &[RUN, "check"],
+        flags: &["shifts", "twin", "vary", "seed_file"],
+        acts_on: EPISODES,
+    },
+    Decision { commands: &["view"], flags: &["seed_file"], acts_on: &[Suite] },
+    Decision { commands: &["serve"], flags: &["seed_file"], acts_on: SUITES },
+    // Demonstrations are public: what is learned from them is judged elsewhere.
+    Decision { commands: &["record", "dataset import"], flags: &["seed_file"], acts_on: &[] },
     Decision { commands: &[RUN, "check"], flags: POLICY_SERVER, acts_on: EPISODES },
     Decision { commands: &[RUN, "check"], flags: &["profile", "gripper"], acts_on: EPISODES },
     Decision { commands: &[RUN], flags: &["threads", "out", "json"], acts_on: ALL },
@@ -179,6 +187,7 @@ mod tests {
     /// A valid value of a flag, with the flags that it requires.
     const SAMPLES: &[(&str, &str)] = &[
         ("seed", "--seed 1"),
+        ("seed_file", "--seed-file Cargo.toml"),
         ("settings", "--set physics.sleeping=false"),
         ("shifts", "--shift mass=2"),
         ("twin", "--twin rigid"),

@@ -90,6 +90,10 @@ impl RecordingArgs {
     /// # Errors
     /// A shift or setting that is not valid.
     pub(crate) fn run_config(&self, script: ScriptArgs, tasks: Vec<String>) -> Result<RunConfig, CliError> {
+        if script.seed_file.is_some() {
+            let what = "demonstrations are public, and so need no secret seed; use --seed";
+            return Err(CliError::input(format!("--seed-file: {what}")));
+        }
         // The contact streams of a demonstration come from the trace.
         let (threads, trace) = (self.threads, Some(TraceDetail::State));
         RunConfig::new(script, RunFlags { tasks, threads, trace, ..RunFlags::default() })

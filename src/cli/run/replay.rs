@@ -20,7 +20,7 @@ use crate::{
         suite_run::SuiteRun,
     },
 };
-use softvt_benchmark::Suite;
+use softvt_benchmark::{Suite, seed::SecretSeed};
 use softvt_common::{parallel, text::counted};
 use softvt_dataset::{
     TaskFile,
@@ -80,6 +80,14 @@ pub(crate) fn difference(
 pub(crate) struct StoredManifest<'a> {
     pub path: &'a Path,
     pub manifest: &'a Value,
+    /// Secret of a judged run, with the file that holds it.
+    pub secret: Option<&'a SecretFile>,
+}
+
+/// The secret in a seed file.
+pub(crate) struct SecretFile {
+    pub path: PathBuf,
+    pub secret: SecretSeed,
 }
 
 impl StoredManifest<'_> {
@@ -130,7 +138,39 @@ impl StoredManifest<'_> {
         };
         let flags = RunFlags { tasks: vec![task.to_string()], ..RunFlags::default() };
         let policy = PolicyConfig::external("replay");
-        Ok(RunConfig { script, policy, flags, settings: self.field("set")?, shifts: self.field("shifts")? })
+        let secret = self.secret()?.cloned();
+        Ok(RunConfig {
+            script,
+            policy,
+            flags,
+            settings: self.field("set")?,
+            shifts: self.field("shifts")?,
+            secret,
+        })
+    }
+
+    /// The secret of the run, if it was judged with one.
+    ///
+    /// # Errors
+    /// The secret is missing, is that of another run, or was given for a run without one.
+    fn secret(&self) -> Result<Option<&SecretSeed>, CliError> {
+        let path = self.path.display();
+        match (self.manifest["seed_hash"].as_str(), self.secret) {
+            (None, None) => Ok(None),
+            (Some(hash), Some(given)) if given.secret.hash() == hash => Ok(Some(&given.secret)),
+            (Some(hash), Some(given)) => Err(CliError::input(format!(
+                "--seed-file {}: its hash is {}, that of {path} is {hash}",
+                given.path.display(),
+                given.secret.hash()
+            ))),
+            (Some(_), None) => Err(CliError::input(format!(
+                "{path}: the run was judged with a secret seed; add --seed-file FILE, the file with that seed"
+            ))),
+            (None, Some(given)) => Err(CliError::input(format!(
+                "--seed-file {}: {path} has no secret seed; leave it out",
+                given.path.display()
+            ))),
+        }
     }
 
     fn split(&self) -> Result<Split, CliError> {
@@ -268,7 +308,7 @@ fn replay_demo(demo: &DemoRef) -> Result<DemoReplay, CliError> {
     let record = file.record(demo.demo)?;
     let environment = file.environment()?;
     let actions = file.actions(demo.demo)?;
-    let stored = StoredManifest { path: &demo.file, manifest: &environment["env_kwargs"] };
+    let stored = StoredManifest { path: &demo.file, manifest: &environment["env_kwargs"], secret: None };
     let simulated = stored.simulate(&record, actions)?;
     Ok(DemoReplay {
         difference: difference(&record, &simulated)?,

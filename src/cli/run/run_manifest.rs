@@ -12,7 +12,7 @@ use crate::{
     error::CliError,
     run::{recorded_runs::ReplaySource, suite_run::SuiteRun},
 };
-use softvt_benchmark::{ShiftValue, Task, settings::Settings, variation::VariationRanges};
+use softvt_benchmark::{ShiftValue, Task, seed::SecretSeed, settings::Settings, variation::VariationRanges};
 use softvt_common::files;
 use softvt_dataset::card::Imported;
 use softvt_policy::profile::{GripCode, Profile};
@@ -63,6 +63,9 @@ pub(crate) struct RunManifest<'a> {
     replan: Option<usize>,
     privileged: bool,
     seed: u64,
+    /// Hash of the secret of a judged run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seed_hash: Option<String>,
     split: &'a str,
     tasks: Vec<usize>,
     /// Episodes per task.
@@ -109,6 +112,7 @@ impl<'a> RunManifest<'a> {
             replan: config.policy.replan,
             privileged: run.is_privileged(),
             seed: config.script.seed,
+            seed_hash: config.secret.as_ref().map(SecretSeed::hash),
             split: run.split.name(),
             tasks: tasks.iter().map(|task| task.id).collect(),
             episodes,

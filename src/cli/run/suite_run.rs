@@ -134,6 +134,12 @@ impl<'a> SuiteRun<'a> {
         Ok(opened)
     }
 
+    /// Name of an episode of a judged run.
+    fn alias(&self, task: &Task, episode: u32) -> Option<String> {
+        let secret = self.config.secret.as_ref()?;
+        Some(secret.episode_name(&self.name, task.id, episode))
+    }
+
     pub(crate) fn brief(&self, task: &Task, episode: u32) -> TaskBrief {
         TaskBrief {
             suite: self.name.clone(),
@@ -141,6 +147,7 @@ impl<'a> SuiteRun<'a> {
             prompt: task.prompt.clone(),
             episode,
             seed: self.config.script.seed,
+            alias: self.alias(task, episode),
         }
     }
 
@@ -292,6 +299,7 @@ impl<'a> SuiteRun<'a> {
         let (policy, scene) = (&self.config.policy.name, opened.scene.clone());
         let task = &Task { prompt: opened.prompt.clone(), ..task.clone() };
         let mut spec = EpisodeSpec::new(id, policy, task, &opened.nominal, scene, &self.settings);
+        spec.secret.clone_from(&self.config.secret);
         spec.header.privileged = self.is_privileged();
         spec.header.variation = opened.variation.clone().map(Box::new);
         spec.header.origin = origin.cloned().map(Box::new);

@@ -66,11 +66,15 @@ impl<'a> EpisodeData<'a> {
         let mut state = reader.floats("obs/state", &[VECTOR_LENGTH])?;
         let sensed = "obs/gripper_width_sensed";
         if !reader.has(sensed)? {
-            let what = "missing: an earlier version recorded no sensed width; record the demonstrations again";
+            let what =
+                "missing: an earlier version recorded no sensed width; record the demonstrations again";
             return Err(reader.file.error(reader.demo, sensed, what));
         }
         let widths = reader.floats(sensed, &[1])?;
-        state.chunks_exact_mut(VECTOR_LENGTH).zip(widths).for_each(|(row, width)| row[VECTOR_LENGTH - 1] = 0.5 * width);
+        state
+            .chunks_exact_mut(VECTOR_LENGTH)
+            .zip(widths)
+            .for_each(|(row, width)| row[VECTOR_LENGTH - 1] = 0.5 * width);
         let actions = reader.floats(actions, &[VECTOR_LENGTH])?;
         let markers = marker_rows(&reader.floats("obs/gripper_marker_motion", &[2, 2, MARKER_COUNT, 2])?);
         let images = reader.image_columns(config.version, selection.image_sizes, is_cancelled)?;

@@ -101,7 +101,14 @@ fn episode(
     pause: Duration,
 ) -> Result<Vec<f64>, String> {
     let mut policy = RemotePolicy::new(connections.clone());
-    let brief = TaskBrief { suite: "one".to_owned(), task: 0, prompt: String::new(), episode: 0, seed: 0 };
+    let brief = TaskBrief {
+        suite: "one".to_owned(),
+        task: 0,
+        prompt: String::new(),
+        episode: 0,
+        seed: 0,
+        alias: None,
+    };
     let mut run = || {
         policy.reset(&brief)?;
         let mut closures = Vec::new();

@@ -47,13 +47,16 @@ pub(super) fn start(
     brief: &TaskBrief,
     deadline: Instant,
 ) -> Result<(), PolicyError> {
-    let task = map([
-        ("name", Value::from(brief.prompt.as_str())),
-        ("suite", Value::from(brief.suite.as_str())),
-        ("task_id", Value::from(brief.task as u64)),
-        ("episode_idx", Value::from(brief.episode)),
-    ]);
-    send(connection, "episode_start", map([("task", task)]), deadline)
+    let mut task = vec![("name", Value::from(brief.prompt.as_str()))];
+    match &brief.alias {
+        Some(alias) => task.push(("id", Value::from(alias.as_str()))),
+        None => task.extend([
+            ("suite", Value::from(brief.suite.as_str())),
+            ("task_id", Value::from(brief.task as u64)),
+            ("episode_idx", Value::from(brief.episode)),
+        ]),
+    }
+    send(connection, "episode_start", map([("task", map(task))]), deadline)
 }
 
 /// Ends an episode.

@@ -123,6 +123,7 @@ fn view_commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
     }
     // The value of this flag follows an equals sign.
     view.extend(manifest["vary"].as_str().map(|file| format!("--vary={file}")));
+    let is_judged = manifest["seed_hash"].is_string();
     let mut add = |flag: &str, value: String| view.extend([flag.to_owned(), value]);
     add("--task", id.task.to_string());
     // Defaults are omitted.
@@ -138,7 +139,9 @@ fn view_commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
         (None, None) => run.text("policy").to_owned(),
     };
     add("--policy", policy);
-    if id.base_seed > 0 {
+    if is_judged {
+        add("--seed-file", "FILE".to_owned());
+    } else if id.base_seed > 0 {
         add("--seed", id.base_seed.to_string());
     }
     if let Some(twin) = manifest["twin"].as_str() {
@@ -152,7 +155,12 @@ fn view_commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
     let replayed = quoted(&run.dir.display().to_string());
     [
         format!("softvt view {}", view.join(" ")),
-        format!("softvt replay {replayed} {}/{}", id.task, id.episode),
+        format!(
+            "softvt replay {replayed} {}/{}{}",
+            id.task,
+            id.episode,
+            if is_judged { " --seed-file FILE" } else { "" }
+        ),
     ]
 }
 

@@ -199,7 +199,7 @@ fn settings(summary: &RunSummary) -> Markup {
         ("Script", command_line(&manifest["script"], &manifest["arguments"])),
         ("Policy", summary.summary.method_label()),
         ("softvt", value_text(&manifest["softvt"])),
-        ("Seed, split", format!("{}, {}", value_text(&manifest["seed"]), value_text(&manifest["split"]))),
+        ("Seed, split", format!("{}, {}", seed_text(manifest), value_text(&manifest["split"]))),
         ("Episodes", format!("{} of {}", summary.run.records.len(), summary.run.requested_episodes())),
         ("Shifts", pairs(&manifest["shifts"])),
         ("Settings changed", pairs(&manifest["set"])),
@@ -213,6 +213,12 @@ fn settings(summary: &RunSummary) -> Markup {
             details.inner { summary { "run.json" } pre { (format!("{manifest:#}")) } }
         }
     }
+}
+
+/// The seed of a run. That of a judged run is secret; its hash identifies it.
+fn seed_text(manifest: &Value) -> String {
+    let hash = manifest["seed_hash"].as_str();
+    hash.map_or_else(|| value_text(&manifest["seed"]), |hash| format!("secret, SHA-256 {hash}"))
 }
 
 fn value_text(value: &Value) -> String {

@@ -56,14 +56,16 @@ output! {
 output! {
     /// The episode that begins.
     fn task_brief(lua, brief: &TaskBrief) -> "softvt.TaskBrief" as "task" {
-        /// Name of the suite.
-        suite: "string" = brief.suite.as_str();
-        /// Index of the task, from 0.
-        task: "integer" = brief.task;
+        /// Name of the suite; nil in a judged run.
+        suite: "string?" = brief.alias.is_none().then_some(brief.suite.as_str());
+        /// Index of the task, from 0; nil in a judged run.
+        task: "integer?" = brief.alias.is_none().then_some(brief.task);
         /// The instruction.
         prompt: "string" = brief.prompt.as_str();
-        /// Index of the episode, from 0.
-        episode: "integer" = brief.episode;
+        /// Index of the episode, from 0; nil in a judged run.
+        episode: "integer?" = brief.alias.is_none().then_some(brief.episode);
+        /// Name of the episode in a judged run (--seed-file), from which its draws cannot be computed.
+        id: "string?" = brief.alias.as_deref();
     }
 }
 

@@ -28,7 +28,7 @@ use crate::{
 };
 use options::{OptionSession, OptionSpec, SharedOptions};
 use softvt_benchmark::{
-    Condition, Goal, GoalKind, ObjectType, Plan, Shift, ShiftValue, Suite, Task, Variation,
+    Condition, Goal, GoalKind, ObjectType, Plan, Shift, ShiftValue, Suite, Task, Variation, seed::SecretSeed,
 };
 use softvt_common::{parallel::lock, text::unknown_name};
 
@@ -90,6 +90,8 @@ pub struct LoadedScript {
     pub plan: Plan,
     /// The declared options, with their values.
     pub options: Vec<OptionSpec>,
+    /// Secret of a judged run, from which the draws of its episodes derive.
+    pub secret: Option<SecretSeed>,
 }
 
 /// Loads the script at `path` with its own arguments of the command line, and makes its plan. Standard scripts that are not
@@ -120,7 +122,7 @@ pub fn load_with(path: &Path, argv: &[String], limits: &Limits) -> Result<Loaded
         let options = lock(&instance.options).declared.clone();
         Ok((options, instance.plan().map_err(|e| instance.vm.explain(&e))?))
     })?;
-    Ok(LoadedScript { sources, plan, options })
+    Ok(LoadedScript { sources, plan, options, secret: None })
 }
 
 /// The options that the script at `path` declares, for `--help`. If the script fails, those declared before.

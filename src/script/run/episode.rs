@@ -22,7 +22,7 @@ use crate::{
 };
 use softvt_benchmark::{
     Shift, ShiftValue,
-    seed::{EpisodeSeed, RandomStream},
+    seed::{EpisodeSeed, RandomStream, SecretSeed},
     variation::{DrawError, VariationRanges},
 };
 use softvt_common::{
@@ -74,6 +74,7 @@ pub struct SceneBuilder {
     instance: Arc<ScriptInstance>,
     /// Ranges of the suites that vary, by name.
     ranges: BTreeMap<String, VariationRanges>,
+    secret: Option<SecretSeed>,
 }
 
 impl SceneBuilder {
@@ -84,7 +85,7 @@ impl SceneBuilder {
     pub fn open(loaded: &LoadedScript) -> Result<Self, ScriptError> {
         let suites = loaded.plan.suites().iter();
         let ranges = suites.filter_map(|suite| Some((suite.name.clone(), suite.vary.clone()?))).collect();
-        Ok(Self { instance: Arc::new(loaded.sources.instance()?), ranges })
+        Ok(Self { instance: Arc::new(loaded.sources.instance()?), ranges, secret: loaded.secret.clone() })
     }
 
     /// Builds the initial scene of an episode.
@@ -96,7 +97,8 @@ impl SceneBuilder {
         let FoundTask { suite, task } = self.instance.find_task(&id.suite, id.task)?;
         // A twin has the initial states of the suite whose twin it is.
         let seed_suite = suite.twin_of.clone().unwrap_or_else(|| id.suite.clone());
-        let seed = EpisodeSeed { suite: seed_suite, ..EpisodeSeed::new(id, &task.layout.name) };
+        let seed = EpisodeSeed::new(id, &task.layout.name).with_secret(self.secret.as_ref());
+        let seed = EpisodeSeed { suite: seed_suite, ..seed };
         vm.random.reseed(seed.stream(RandomStream::Script));
         let mut current = LuaScene::new(empty_scene());
         let rng = LuaRng::new(seed.clone(), RandomStream::Layout);

@@ -18,7 +18,7 @@ use softvt_sensing::tactile::Markers;
 
 fn seed(episode: u32) -> EpisodeSeed {
     let (suite, layout) = ("one".to_owned(), "one".to_owned());
-    EpisodeSeed { suite, layout, episode, base_seed: 0, split: Split::Validation }
+    EpisodeSeed { suite, layout, episode, base_seed: 0, split: Split::Validation, secret: None }
 }
 
 /// A finger whose markers have all moved by `by` px, with an image that is `lit` brighter than the untouched one.
@@ -56,7 +56,7 @@ fn observation() -> Observation {
 }
 
 fn brief() -> TaskBrief {
-    TaskBrief { suite: "one".into(), task: 3, prompt: "take it".into(), episode: 7, seed: 0 }
+    TaskBrief { suite: "one".into(), task: 3, prompt: "take it".into(), episode: 7, seed: 0, alias: None }
 }
 
 const OBSERVES: &str = "observes = { cameras = { 'wrist' }, tactile = true, drives = true }";
@@ -115,13 +115,15 @@ fn observations_have_the_values_of_the_simulation() {
 
 #[test]
 fn a_policy_without_the_drives_has_no_command_and_the_width_of_a_real_hand() {
-    let text = |body: &str| format!("return softvt.policy {{ name = 'p', act = function(obs)\n{body}\nend }}");
+    let text =
+        |body: &str| format!("return softvt.policy {{ name = 'p', act = function(obs)\n{body}\nend }}");
     let (_project, mut policy) =
         start(&text(&format!("assert(obs.width == 0.0624) return {{ {POSE}, closure = 0 }}")));
     policy.act(&observation()).unwrap();
     let (_project, mut policy) = start(&text("return obs.closure"));
     let message = policy.act(&observation()).unwrap_err().to_string();
-    let expected = "p.lua:2: obs.closure: the policy does not observe it; declare observes = { drives = true }";
+    let expected =
+        "p.lua:2: obs.closure: the policy does not observe it; declare observes = { drives = true }";
     assert!(message.ends_with(expected), "{message}");
 }
 
