@@ -178,6 +178,7 @@
 ---@class softvt.Observes
 ---@field cameras? string[] Names of cameras of the scene.
 ---@field tactile? boolean True to get the tactile images and markers of the fingers. Default false.
+---@field drives? boolean True to get the commanded closure and the exact width, whose gap is the grip force: 1 mm per N. Without it, the width has the steps and the offset of a real hand. Default false.
 ---@field force? boolean True to get the true forces on the gels, which no real sensor gives; results then say force_observed. Default false.
 
 ---The messages of a policy server: the observations it gets and the meaning of its actions. The file given to --profile returns one.
@@ -193,7 +194,7 @@
 ---@field source "camera"|"depth"|"segmentation"|"state"|"prompt"|"tactile_image"|"tactile"|"marker_motion"|"force"|"query"|"query_seed" Content: the image of a camera, its depth (m), or the object at each pixel; numbers of the robot's state; the prompt; the mosaic of 8 tactile images of both fingers; the image of one finger; the initial and the last marker positions; the last true forces on the gels; the identity of the request, a map; a seed for policies that draw random numbers, equal whenever a run is repeated.
 ---@field camera? string For camera, depth and segmentation: the camera's name in the scene.
 ---@field half_turn? boolean For camera, depth and segmentation: true to rotate the image by 180°.
----@field parts? ("position"|"axis_angle"|"quaternion_wxyz"|"quaternion_xyzw"|"joints"|"joint_velocities"|"joint_torques"|"gripper_width"|"finger_position"|"finger_pair"|"closure")[] For state: its parts in order, in m, rad, rad/s and N m, of 3 numbers (position, axis_angle), 4 (quaternions), 7 (joints, joint_velocities, joint_torques), 2 (finger_pair) and 1.
+---@field parts? ("position"|"axis_angle"|"quaternion_wxyz"|"quaternion_xyzw"|"joints"|"joint_velocities"|"joint_torques"|"gripper_width"|"finger_position"|"sensed_width"|"sensed_finger_position"|"finger_pair"|"closure")[] For state: its parts in order, in m, rad, rad/s and N m, of 3 numbers (position, axis_angle), 4 (quaternions), 7 (joints, joint_velocities, joint_torques), 2 (finger_pair) and 1. The sensed width has the steps and the offset of a real hand; the gap between the exact one and the commanded closure is the grip force.
 ---@field frames? integer Number of control steps in the entry, the present one last, along a first axis; not for prompt and tactile_image. By default the present step without that axis, and 8 steps of marker_motion and force. The start of an episode repeats its first step. Expects a whole number in 1..32.
 ---@field markers? "dots"|"arrows"|"black_arrows" For tactile and tactile_image: style in which the markers are drawn into the images; not drawn by default.
 ---@field layout? "rows"|"columns" For tactile_image: the left finger above the right one (rows, the default) or left of it.
@@ -1218,10 +1219,11 @@ local List = {}
 
 ---The episode that begins.
 ---@class softvt.TaskBrief
----@field suite string Name of the suite.
----@field task integer Index of the task, from 0.
+---@field suite string? Name of the suite; nil in a judged run.
+---@field task integer? Index of the task, from 0; nil in a judged run.
 ---@field prompt string The instruction.
----@field episode integer Index of the episode, from 0.
+---@field episode integer? Index of the episode, from 0; nil in a judged run.
+---@field id string? Name of the episode in a judged run (--seed-file), from which its draws cannot be computed.
 local TaskBrief = {}
 
 ---The observation of a policy at a control step. Poses are of the tool centre point in the robot's base frame. The true state of the scene is not part of it.
@@ -1231,8 +1233,8 @@ local TaskBrief = {}
 ---@field axis_angle number[] Tool orientation as axis-angle, rad.
 ---@field quaternion number[] Tool orientation as quaternion w, x, y, z with w ≥ 0.
 ---@field joints number[] The seven joint angles of the arm, rad.
----@field width number Measured distance of the gels, 0 to 0.08 m.
----@field closure number Last commanded closure: 0 is open, 1 is closed.
+---@field width number Measured distance of the gels, 0 to 0.08 m, with the steps and the offset of a real hand; exact with observes.drives.
+---@field closure number Last commanded closure, 0 open to 1 closed; requires observes.drives.
 ---@field prompt string The instruction.
 ---@field tactile softvt.Fingers Tactile sensors; requires observes.tactile.
 ---@field tactile_history softvt.Fingers[] Tactile sensors in the last 1 to 8 control steps, oldest first; requires observes.tactile.

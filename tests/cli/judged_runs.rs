@@ -62,18 +62,18 @@ fn results_hold_the_hash_of_the_seed_and_only_who_has_the_file_can_repeat_them()
             .collect()
     };
     project.succeeds(&format!("{line} --seed {public} --out public"));
-    project.succeeds(&format!("{line} --seed-file other --out other"));
-    let [one, open, other] = ["one", "public", "other"].map(states);
+    project.succeeds(&format!("{line} --seed-file other --out foreign"));
+    let [one, open, other] = ["one", "public", "foreign"].map(states);
     assert!(
         one.iter().all(|state| !open.contains(state) && !other.contains(state)),
         "{one:?} {open:?} {other:?}"
     );
 
     let message = project.refusal(&format!("{line} --seed-file other --resume --out one"));
-    assert!(message.contains("belongs to another run: seed"), "{message}");
+    assert!(message.contains("belongs to another run"), "{message}");
     project.succeeds(&format!("{line} --seed-file secret --resume --out one"));
     for (files, expected) in
-        [("one two", None), ("one other", Some("seed hash")), ("one public", Some("seed hash"))]
+        [("one two", None), ("one foreign", Some("seed hash")), ("one public", Some("seed hash"))]
     {
         let compared = project.softvt(&format!("compare {files}"));
         match expected {
@@ -108,7 +108,7 @@ fn shards_of_a_judged_run_merge_if_they_have_one_seed() {
     assert_eq!(project.text("merged/episodes.jsonl"), project.text("whole/episodes.jsonl"));
     assert_eq!(project.json("merged/run.json")["seed_hash"], project.json("whole/run.json")["seed_hash"]);
     let message = project.refusal("merge wrong a c");
-    assert!(message.contains("seed"), "{message}");
+    assert!(message.contains("a shard of another run"), "{message}");
 }
 
 #[test]
@@ -157,7 +157,7 @@ fn seed_files_that_are_no_secret_are_refused() {
         ("x.lua --seed-file .", "--seed-file .: "),
         ("x.lua --seed-file secret --seed 1", "cannot be used with"),
         ("record x.lua --seed-file secret --out d", "--seed-file: demonstrations are public"),
-        ("replay x --seed-file none", "--seed-file none: there is no such file"),
+        ("replay x 0 --seed-file none", "--seed-file none: there is no such file"),
         ("scripts/rest_check.lua --seed-file secret", "--seed-file: applies to "),
     ] {
         let output = project.softvt(words);
