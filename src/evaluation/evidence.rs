@@ -47,7 +47,8 @@ pub struct BodyEvidence {
 pub struct GoalEvidence {
     /// Pose of its object frame (origin at the centre of its footprint).
     pub pose_w: Pose,
-    /// Upward impulse from it on the target in this step, N s.
+    /// Upward impulse on the target in this step from it and, if the target must be placed inside, from objects in it that
+    /// it carries, N s.
     pub support_impulse_ns: f64,
 }
 

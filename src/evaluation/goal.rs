@@ -3,7 +3,7 @@
 //! Once per control step the target *rests at the goal* if
 //! 1. its centre is over (`On`) or inside (`Inside`) the [`GoalRegion`],
 //! 2. at least [`support_share`](SuccessCriteria::support_share) of its weight, mean over the control step, is carried
-//!    by the object at the goal (`On`), or by anything but the robot (`Inside`),
+//!    by the object at the goal, or (`Inside`) by objects in it that it carries in turn,
 //! 3. no part of the robot pressed on it at any physics step of the control step.
 //!
 //! The goal is reached when this held for ⌈hold time / control step⌉ control steps in a row, at
@@ -11,6 +11,9 @@
 //! counts as dropped ([`super::drop::DropReason::LeftGoal`]).
 
 use softvt_geometry::{Aabb, Pose, Vec3};
+
+/// Cosine of the largest angle between the z axis of a container and the vertical, 45°.
+const MIN_UPRIGHT: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 use super::criteria::SuccessCriteria;
 
@@ -22,9 +25,9 @@ pub enum GoalRegion {
         /// Radius of the cylinder, m.
         radius_m: f64,
     },
-    /// Inside the object: centre between its walls, carried by anything in there (its floor, other objects).
+    /// Inside the object: centre in its cavity, carried by it or by objects in it.
     Inside {
-        /// Space between the walls, up to the rim, m.
+        /// Box around the cavity ([`softvt_geometry::cavity`]), up to the top of the object, m.
         space: Aabb,
     },
 }
@@ -34,7 +37,7 @@ impl GoalRegion {
     /// by `margin_m` on every side.
     ///
     /// `On` is a horizontal distance in the world frame, independent of the object's tilt and height. `Inside`
-    /// is a box in the frame of the object.
+    /// is a box in the frame of the object, whose z axis must be within 45° of the vertical.
     pub fn contains(&self, object_w: &Pose, centre_w: &Vec3, margin_m: f64) -> bool {
         match self {
             Self::On { radius_m } => {
@@ -43,7 +46,8 @@ impl GoalRegion {
             }
             Self::Inside { space } => {
                 let p = object_w.inverse_transform_point(&(*centre_w).into());
-                (0..3).all(|i| p[i] >= space.min[i] - margin_m && p[i] <= space.max[i] + margin_m)
+                let is_upright = (object_w.rotation * Vec3::z()).z >= MIN_UPRIGHT;
+                is_upright && space.loosened(margin_m).contains(&p.coords)
             }
         }
     }
@@ -160,6 +164,17 @@ mod tests {
         assert!(basket.contains(&Pose::identity(), &at(0.09, 0.03), 0.0));
         assert!(!basket.contains(&turned, &at(0.09, 0.03), 0.0));
         assert!(!basket.contains(&Pose::identity(), &at(0.0, 0.09), 0.0), "above the rim");
+    }
+
+    #[test]
+    fn a_tipped_container_has_no_inside() {
+        let space = Aabb { min: Vec3::new(-0.1, -0.1, 0.0), max: Vec3::new(0.1, 0.1, 0.2) };
+        let basket = GoalRegion::Inside { space };
+        for (degrees, contains) in [(0.0, true), (44.0, true), (46.0, false), (90.0, false), (180.0, false)] {
+            let tipped = Pose::rotation(Vec3::x() * f64::to_radians(degrees));
+            let centre = (tipped * nalgebra::Point3::new(0.0, 0.0, 0.1)).coords;
+            assert_eq!(basket.contains(&tipped, &centre, 0.0), contains, "{degrees}°");
+        }
     }
 
     #[test]

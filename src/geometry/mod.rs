@@ -6,6 +6,7 @@
 #![warn(missing_docs, unreachable_pub)]
 
 mod aabb;
+pub mod cavity;
 pub mod convex;
 pub mod hex8;
 pub mod import;

@@ -9,6 +9,7 @@ use super::{
 };
 use softvt_geometry::{
     Aabb, Pose, Vec3,
+    cavity::cavity,
     mass::{MassProperties, approximate_mass_properties, mass_properties},
     shape::Shape,
 };
@@ -30,6 +31,7 @@ pub struct AssetCache {
     masses: SharedCache<Shape, MassProperties>,
     solids: SharedCache<Shape, Arc<CollisionGeometry>>,
     walls: SharedCache<Shape, Option<f64>>,
+    cavities: SharedCache<Shape, Option<Aabb>>,
     /// True to compute masses and contact samples approximately.
     approximate: bool,
 }
@@ -61,6 +63,11 @@ impl AssetCache {
     /// Typical thickness of the thin walls of a shape, m; see [`thin_wall`].
     pub(super) fn wall(&self, shape: &Shape) -> Option<f64> {
         of_shape(&self.walls, shape, || thin_wall(shape))
+    }
+
+    /// Box around the cavity of a shape, object frame; see [`cavity`].
+    pub(super) fn cavity(&self, shape: &Shape) -> Option<Aabb> {
+        of_shape(&self.cavities, shape, || cavity(shape))
     }
 
     /// A collider of a hard shape at `pose_in_parent` on `parent`.

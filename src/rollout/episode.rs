@@ -11,30 +11,31 @@ use super::{
     controller::Controller,
     disturbance::Disturbance,
     evidence::{EvidenceCollector, lowest},
+    goal_in_scene::GoalInScene,
     observation_history::ObservationHistory,
     sensor_assets::{SensingError, SensorAssets},
     sensor_noise::SensorSeed,
     sensors::{SensorSuite, StateRecording, check_sensors},
-    simulation::{ObjectInstance, SettleError, Simulation, state_hash},
+    simulation::{SettleError, Simulation, placed_at, state_hash},
     trace::StepTrace,
 };
 use sha2::{Digest, Sha256};
 
 use softvt_benchmark::{
-    GoalKind, Task,
+    Goal, GoalKind, Task,
     seed::{EpisodeSeed, SecretSeed},
     settings::Settings,
     steps_per_control,
 };
+use softvt_common::text::format_number;
 use softvt_evaluation::{
     deformation::{Deformation, ReferenceShape},
     episode_id::EpisodeId,
-    goal::GoalRegion,
     judge::{Judge, JudgeConfig},
     record::{EpisodeHeader, EpisodeRecord, Outcome, RolloutStats, Verdict},
     safety::DeformationLimit,
 };
-use softvt_geometry::{Aabb, Pose, Vec3};
+use softvt_geometry::{Pose, Vec3};
 use softvt_physics::{
     BodyId,
     world::{StepFailure, WorldSnapshot},
@@ -175,6 +176,56 @@ pub enum EpisodeError {
         /// Names in the scene.
         have: String,
     },
+    /// The goal is inside an object that holds nothing.
+    #[error(
+        "task {task}: goal.target {target} has no cavity, and softvt.inside needs one: a floor and walls all around, \
+         upright as the asset is declared; use softvt.on, or a container"
+    )]
+    NoCavity {
+        /// Task index.
+        task: usize,
+        /// Name in the goal.
+        target: String,
+        /// `file:line` where the object was placed; empty if no script placed it.
+        placed_at: String,
+    },
+    /// Nothing has to carry the object of the goal.
+    #[error(
+        "task {task}: {object} weighs {} N under scene.gravity = {{ {}, {}, {} }}, and a goal judges what carries it; \
+         gravity must point down, and the weight exceed {} N (criteria.touch_force_n)",
+        format_number(*.weight_n), format_number(.gravity.x), format_number(.gravity.y), format_number(.gravity.z),
+        format_number(*.least_n)
+    )]
+    Weightless {
+        /// Task index.
+        task: usize,
+        /// Object of the goal.
+        object: String,
+        /// Its weight, N.
+        weight_n: f64,
+        /// Weight that it must exceed, N.
+        least_n: f64,
+        /// Gravity of the scene, m/s².
+        gravity: Vec3,
+        /// `file:line` where the object was placed; empty if no script placed it.
+        placed_at: String,
+    },
+    /// The goal holds before the robot moves.
+    #[error(
+        "task {task}, episode {episode}: the goal already holds at the start: {} rests {} {} before the robot moves; \
+         place it elsewhere",
+        .goal.object, match .goal.kind { GoalKind::On => "on", GoalKind::Inside => "in" }, .goal.target
+    )]
+    GoalHolds {
+        /// Task index.
+        task: usize,
+        /// Episode index.
+        episode: u32,
+        /// The goal.
+        goal: Goal,
+        /// `file:line` where its object was placed; empty if no script placed it.
+        placed_at: String,
+    },
     /// Data of a sensor cannot be computed.
     #[error("task {task}, episode {episode}: {source}")]
     Sense {
@@ -202,6 +253,9 @@ impl EpisodeError {
     pub fn place(&self) -> Option<&str> {
         match self {
             Self::Settle { source, .. } => source.place(),
+            Self::NoCavity { placed_at, .. }
+            | Self::Weightless { placed_at, .. }
+            | Self::GoalHolds { placed_at, .. } => Some(placed_at.as_str()).filter(|place| !place.is_empty()),
             _ => None,
         }
     }
@@ -268,24 +322,23 @@ impl Episode {
             .map_err(|source| spec.sense_error(source))?;
         let mut sim =
             Simulation::new(spec.scene.clone(), &spec.settings.physics, &spec.settings.robot, cache)?;
-        let find = |role, name: &str| {
-            sim.objects.iter().position(|o| o.name == name).ok_or_else(|| EpisodeError::NoObject {
-                task: spec.task.id,
-                role,
-                name: name.to_owned(),
-                layout: spec.task.layout.clone(),
-                have: sim.objects.iter().map(|o| o.name.as_str()).collect::<Vec<_>>().join(", "),
-            })
-        };
-        let (target, goal) =
-            (find("object", &spec.task.goal.object)?, find("target", &spec.task.goal.target)?);
+        let goal = GoalInScene::find(&spec.task, &spec.settings.criteria, &sim, cache)?;
+        let target = goal.object;
         sim.settle().map_err(|source| EpisodeError::Settle {
             layout: spec.task.layout.clone(),
             episode: spec.header.id.episode,
             source,
         })?;
-        let evidence = EvidenceCollector::new(&sim, target, goal);
-        let judge = settled_judge(&spec, &sim, &evidence, target, goal);
+        let evidence = EvidenceCollector::new(&sim, &goal, spec.settings.criteria.support_share);
+        let judge = settled_judge(&spec, &sim, &evidence, &goal);
+        if judge.rests_at_goal(&evidence.clone().collect(&sim, 0.0)) {
+            return Err(EpisodeError::GoalHolds {
+                task: spec.task.id,
+                episode: spec.header.id.episode,
+                goal: spec.task.goal.clone(),
+                placed_at: placed_at(&spec.scene, &spec.task.goal.object),
+            });
+        }
         let tool = sim.robot.tool_b(&sim.world);
         let start_hold = Action::new(tool.translation.vector, rotation::axis_angle(&tool.rotation), 0.0);
         let seed = EpisodeSeed::new(&spec.header.id, &spec.task.layout).with_secret(spec.secret.as_ref());
@@ -619,53 +672,28 @@ fn check_action(action: &Action, effort_n: f64) -> Result<(), ActionError> {
     }
 }
 
-/// The judge of an episode, for its settled state. `target` and `goal` are indices of objects.
+/// The judge of an episode, for its settled state.
 fn settled_judge(
     spec: &EpisodeSpec,
     sim: &Simulation,
     evidence: &EvidenceCollector,
-    target: usize,
-    goal: usize,
+    goal: &GoalInScene,
 ) -> Judge {
+    let target = &sim.objects[goal.object];
     Judge::new(JudgeConfig {
         criteria: spec.settings.criteria.clone(),
         workspace: spec.scene.workspace,
-        goal: goal_region(spec.task.goal.kind, &sim.objects[goal]),
+        goal: goal.region,
         hold_s: spec.task.goal.hold_s,
         dt_s: spec.settings.physics.dt,
         steps_per_control: steps_per_control(spec.settings.physics.dt),
-        target_weight_n: weight(sim, target),
-        is_target_soft: matches!(sim.objects[target].body, BodyId::Soft(_)),
-        limit: spec.limits.get(&sim.objects[target].name).copied(),
-        target_lowest_z_w: lowest(sim, &sim.objects[target]),
+        target_weight_n: sim.weight(target),
+        is_target_soft: matches!(target.body, BodyId::Soft(_)),
+        limit: spec.limits.get(&target.name).copied(),
+        target_lowest_z_w: lowest(sim, target),
         others: evidence.other_bodies(sim, &spec.limits),
         max_steps: spec.task.budget_steps as usize * steps_per_control(spec.settings.physics.dt) as usize,
     })
-}
-
-/// Region in which the target must rest, in the goal object's frame at its foot.
-fn goal_region(kind: GoalKind, object: &ObjectInstance) -> GoalRegion {
-    let bounds = object.bounds;
-    match kind {
-        GoalKind::On => GoalRegion::On { radius_m: 0.5 * bounds.size().xy().min() },
-        GoalKind::Inside => {
-            let wall = object.asset.hints.get("wall_m").copied().unwrap_or(0.0);
-            let inset = Vec3::new(wall, wall, 0.0);
-            let foot = object.foot_o();
-            let (min, max) = (bounds.min + inset - foot, bounds.max - inset - foot);
-            GoalRegion::Inside { space: Aabb { min, max } }
-        }
-    }
-}
-
-/// Weight of an object, N.
-fn weight(sim: &Simulation, object: usize) -> f64 {
-    let mass = match sim.objects[object].body {
-        BodyId::Soft(index) => sim.world.soft(index).state.model.total_mass(),
-        BodyId::Rigid(index) => sim.world.rigid(index).state.mass,
-        BodyId::Link(_) | BodyId::Kinematic(_) | BodyId::World => 0.0,
-    };
-    mass * sim.scene.gravity.norm()
 }
 
 #[cfg(test)]

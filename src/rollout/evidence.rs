@@ -2,10 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use super::simulation::{ObjectInstance, Simulation};
+use super::{
+    goal_in_scene::GoalInScene,
+    simulation::{ObjectInstance, Simulation},
+};
 use softvt_evaluation::{
     deformation::{Deformation, ReferenceShape},
     evidence::{BodyEvidence, Evidence, GoalEvidence, GripperEvidence, PadEvidence},
+    goal::GoalRegion,
     judge::OtherBody,
     safety::DeformationLimit,
 };
@@ -23,6 +27,9 @@ use softvt_scene::{Body, SoftMaterial};
 pub(super) struct EvidenceCollector {
     target: usize,
     goal: usize,
+    region: GoalRegion,
+    /// Share of its weight that must act on what carries an object.
+    support_share: f64,
     /// Movable objects that are not the target.
     others: Vec<usize>,
     references: Vec<Option<ReferenceShape>>,
@@ -31,8 +38,9 @@ pub(super) struct EvidenceCollector {
 }
 
 impl EvidenceCollector {
-    /// Takes the current, settled state as the reference of deformation. `target` and `goal` are indices of objects.
-    pub(super) fn new(sim: &Simulation, target: usize, goal: usize) -> Self {
+    /// Takes the current, settled state as the reference of deformation.
+    pub(super) fn new(sim: &Simulation, goal: &GoalInScene, support_share: f64) -> Self {
+        let &GoalInScene { object: target, target: goal, region } = goal;
         let is_other = |i: &usize| *i != target && sim.objects[*i].body.is_free();
         let references = sim
             .objects
@@ -54,7 +62,7 @@ impl EvidenceCollector {
             }
             _ => None,
         };
-        Self { target, goal, others, references, bodies, crushed }
+        Self { target, goal, region, support_share, others, references, bodies, crushed }
     }
 
     /// The other movable objects as they settled, with their deformation limits by name.
@@ -100,7 +108,9 @@ impl EvidenceCollector {
             _ => CrushedShares::default(),
         };
         let goal = &sim.objects[self.goal];
-        let from_goal = partners(goal).map(|partner| upward(&sim.contact(target, partner))).sum::<f64>();
+        let goal_w = foot_pose(sim, goal);
+        let carriers = self.carriers(sim, &goal_w);
+        let from_goal = carriers.iter().map(|&carrier| carried(sim, carrier, self.target)).sum::<f64>();
         let from_robot = sim
             .robot
             .body
@@ -121,12 +131,29 @@ impl EvidenceCollector {
             robot_impulse_ns: from_robot * dt,
             target: self.body(sim, self.target),
             crushed,
-            goal: GoalEvidence {
-                pose_w: sim.pose(goal) * Pose::from(goal.foot_o()),
-                support_impulse_ns: from_goal * dt,
-            },
+            goal: GoalEvidence { pose_w: goal_w, support_impulse_ns: from_goal * dt },
             others: &self.bodies,
         }
+    }
+
+    /// Indices of the objects whose support of the target counts: the one at the goal and, for a container, the objects in
+    /// it that it carries, directly or by one another.
+    fn carriers(&self, sim: &Simulation, goal_w: &Pose) -> Vec<usize> {
+        let mut carriers = vec![self.goal];
+        if !matches!(self.region, GoalRegion::Inside { .. }) {
+            return carriers;
+        }
+        let is_in = |&&index: &&usize| {
+            index != self.goal && self.region.contains(goal_w, &sim.centre(&sim.objects[index]), 0.0)
+        };
+        let mut rest: Vec<usize> = self.others.iter().filter(is_in).copied().collect();
+        while let Some(place) = rest.iter().position(|&index| {
+            let upward: f64 = carriers.iter().map(|&carrier| carried(sim, carrier, index)).sum();
+            upward >= self.support_share * sim.weight(&sim.objects[index])
+        }) {
+            carriers.push(rest.remove(place));
+        }
+        carriers
     }
 
     fn body(&self, sim: &Simulation, index: usize) -> BodyEvidence {
@@ -156,6 +183,17 @@ fn partners(object: &ObjectInstance) -> impl Iterator<Item = ContactPartner> + '
         _ => None,
     };
     object.colliders.iter().map(|&c| ContactPartner::Collider(c)).chain(soft)
+}
+
+/// Upward force of one object on another, N; both are indices.
+fn carried(sim: &Simulation, carrier: usize, object: usize) -> f64 {
+    let object = &sim.objects[object];
+    partners(&sim.objects[carrier]).map(|partner| upward(&sim.contact(object, partner))).sum()
+}
+
+/// Pose of the frame of an object at its foot, world.
+pub(super) fn foot_pose(sim: &Simulation, object: &ObjectInstance) -> Pose {
+    sim.pose(object) * Pose::from(object.foot_o())
 }
 
 /// Upward part of a force, N.

@@ -19,8 +19,8 @@
 //! use softvt_rollout::{AssetCache, ChunkedPolicy, Episode, EpisodeSpec, SensorAssets};
 //! use softvt_scene::{Asset, Body, Lighting, Object, Scene};
 //!
-//! // A cube of 4 cm rests on a table top of 5 cm, whose upper side is at z = 0.
-//! let cuboid = |name: &str, size: Vec3, z: f64, body| {
+//! // A cube of 4 cm and a slab rest on a table top of 5 cm, whose upper side is at z = 0.
+//! let cuboid = |name: &str, size: Vec3, [y, z]: [f64; 2], body| {
 //!     let asset = Asset {
 //!         name: name.to_owned(),
 //!         // The lowest point of an asset is at z = 0.
@@ -30,12 +30,13 @@
 //!         visuals: Vec::new(),
 //!         hints: Default::default(),
 //!     };
-//!     Object::new(name, Arc::new(asset), Pose::translation(0.0, 0.0, z))
+//!     Object::new(name, Arc::new(asset), Pose::translation(0.0, y, z))
 //! };
 //! let scene = Scene {
 //!     objects: vec![
-//!         cuboid("table", Vec3::new(0.4, 0.4, 0.05), -0.05, Body::Static),
-//!         cuboid("cube", Vec3::repeat(0.04), 0.0, Body::Rigid { density: 500.0 }),
+//!         cuboid("table", Vec3::new(0.4, 0.4, 0.05), [0.0, -0.05], Body::Static),
+//!         cuboid("slab", Vec3::new(0.1, 0.1, 0.01), [0.1, 0.0], Body::Static),
+//!         cuboid("cube", Vec3::repeat(0.04), [-0.1, 0.0], Body::Rigid { density: 500.0 }),
 //!     ],
 //!     base_w: Pose::translation(-0.66, 0.0, 0.012),
 //!     start_q: [0.0, -0.19, 0.0, -2.4, 0.0, 2.25, 0.79],
@@ -44,7 +45,7 @@
 //!     lighting: Lighting::default(),
 //!     cameras: Vec::new(),
 //! };
-//! let (object, target) = ("cube".to_owned(), "table".to_owned());
+//! let (object, target) = ("cube".to_owned(), "slab".to_owned());
 //! let task = Task {
 //!     id: 0,
 //!     prompt: "do nothing".to_owned(),
@@ -74,6 +75,7 @@ mod controller;
 mod disturbance;
 mod episode;
 mod evidence;
+mod goal_in_scene;
 mod observation_history;
 mod robot_instance;
 mod scene_doubts;
@@ -89,6 +91,7 @@ pub use asset_cache::AssetCache;
 pub use build_error::BuildError;
 pub use controller::{ChunkedPolicy, Controller};
 pub use episode::{Episode, EpisodeError, EpisodeSpec, FinishedEpisode, ScoreFrame, checksum, target_asset};
+pub use goal_in_scene::check_goal;
 pub use robot_instance::RobotInstance;
 pub use scene_doubts::scene_doubts;
 pub use sensor_assets::{SensingError, SensorAssets};

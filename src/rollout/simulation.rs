@@ -287,6 +287,16 @@ impl Simulation {
         }
     }
 
+    /// Weight of an object, N; 0 for fixed objects and parts.
+    pub fn weight(&self, object: &ObjectInstance) -> f64 {
+        let mass = match object.body {
+            BodyId::Soft(index) => self.world.soft(index).state.model.total_mass(),
+            BodyId::Rigid(index) => self.world.rigid(index).state.mass,
+            BodyId::Link(_) | BodyId::Kinematic(_) | BodyId::World => 0.0,
+        };
+        mass * self.scene.gravity.norm()
+    }
+
     /// Parts of the object of an index.
     pub fn parts(&self, index: usize) -> impl Iterator<Item = (&ObjectInstance, &ArticulatedPart)> {
         let parts = self.objects.iter().filter_map(|object| Some((object, object.part.as_ref()?)));
@@ -346,7 +356,7 @@ fn normal_force(patch: &ContactPatch, is_of_interest: impl Fn(ContactPartner) ->
 }
 
 /// `file:line` where the object of a name, or the object of the part of that name, was placed.
-fn placed_at(scene: &Scene, name: &str) -> String {
+pub(super) fn placed_at(scene: &Scene, name: &str) -> String {
     let whole = name.split('.').next().unwrap_or(name);
     let object = scene.objects.iter().find(|object| object.name == whole);
     object.map_or(String::new(), |object| object.placed_at.clone())

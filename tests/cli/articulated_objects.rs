@@ -2,7 +2,7 @@
 
 use insta::assert_snapshot;
 
-use crate::support::Project;
+use crate::support::{Project, SOLIDS};
 
 /// A chest of one tray, open by 50 mm, with a block in it. Line 5 is the joint, 14 the expert.
 fn suite(joint: &str, target: &str, expert: &str) -> Project {
@@ -30,15 +30,34 @@ return softvt.suite {{ name = "one", object_type = "rigid", variation = "spatial
 const TRAY: &str =
     "softvt.slider { axis = { 0, -1, 0 }, lower = 0, upper = 0.08, damping = 2, friction = 1 }";
 
+/// A chest whose tray is at the height of the fingers, with a block that a push moves to the middle of the tray.
+fn goal(target: &str) -> bool {
+    let text = format!(
+        r#"local solids = require "solids"
+local slab = softvt.shape.box {{ size = {{ 0.06, 0.2, 0.01 }} }}
+local chest = softvt.asset {{ name = "chest", shape = slab:grounded(), body = softvt.articulated {{ parts = {{ {{ name = "tray", shape = slab:translate(0, 0, 0.02), density = 500,
+  joint = {TRAY} }} }} }} }}
+local layout = softvt.layout("one", function(scene)
+  local x, y = table.unpack(solids.shelf_at)
+  scene:add {{ name = "floor", asset = solids.floor, position = {{ 0, 0, 0 }} }}
+  scene:add {{ name = "chest", asset = chest, position = {{ x, y, 0.24 }} }}
+  scene:add {{ name = "block", asset = solids.cube, position = solids.cube_at }}
+end)
+return softvt.suite {{ name = "one", object_type = "rigid", variation = "spatial", episodes = 1, tasks = {{
+  softvt.task {{ prompt = "push", layout = layout, budget_steps = 40, goal = softvt.on {{ object = "block", target = "{target}" }},
+    expert = function(arm) solids.push(arm) arm:wait(1) end }},
+}} }}
+"#
+    );
+    let project = Project::new(&[("x.lua", &text), SOLIDS]);
+    project.succeeds("x.lua --out run");
+    let lines = project.lines("run/episodes.jsonl");
+    assert_eq!(lines.len(), 1);
+    lines[0]["goal"].as_bool().expect("a verdict")
+}
+
 #[test]
 fn goals_can_name_a_part() {
-    let goal = |target: &str| {
-        let project = suite(TRAY, target, "arm:wait(1)");
-        project.succeeds("x.lua --policy noop --out run");
-        let lines = project.lines("run/episodes.jsonl");
-        assert_eq!(lines.len(), 1);
-        lines[0]["goal"].as_bool().expect("a verdict")
-    };
     assert!(goal("chest.tray"));
     assert!(!goal("chest"), "the base does not carry it");
 }

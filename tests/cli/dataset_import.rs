@@ -7,19 +7,19 @@ use softvt::dataset::{StreamValues, TaskFile};
 
 use crate::support::{Project, SOLIDS};
 
-/// A rigid cube on a slab. Waiting reaches the goal.
+/// A rigid cube on a shelf. A push reaches the goal.
 const SUITE: &str = r#"
 local solids = require "solids"
 local layout = softvt.layout("one", function(scene)
-  local x = 0.01 * math.random()
+  local x, y, z = table.unpack(solids.cube_at)
   scene:add { name = "floor", asset = solids.floor, position = { 0, 0, 0 } }
-  scene:add { name = "slab", asset = solids.slab, position = { 0, 0.2, 0 } }
-  scene:add { name = "cube", asset = solids.cube, position = { x, 0.2, 0.02 } }
-  scene:add { name = "other", asset = solids.cube, position = { 0, 0, 0 } }
+  scene:add { name = "shelf", asset = solids.shelf, position = solids.shelf_at }
+  scene:add { name = "cube", asset = solids.cube, position = { x + 0.005 * math.random(), y, z } }
+  scene:add { name = "other", asset = solids.cube, position = { x, -0.15, z } }
 end)
 local function task(prompt)
-  return softvt.task { prompt = prompt, layout = layout, goal = softvt.on { object = "cube", target = "slab" }, budget_steps = 30,
-    expert = function(arm, scene) arm:wait(1) end }
+  return softvt.task { prompt = prompt, layout = layout, goal = softvt.on { object = "cube", target = "shelf" }, budget_steps = 30,
+    expert = function(arm, scene) solids.push(arm) arm:wait(1) end }
 end
 return softvt.suite { name = "one", object_type = "rigid", variation = "spatial", episodes = 1,
   tasks = { task "wait", task "wait longer" } }
@@ -39,11 +39,11 @@ struct SyntheticFile<'a> {
     language: &'a str,
     /// Position of the cube.
     cube: [f64; 2],
-    /// Number of poses at the initial tool position; the later ones are zeros.
-    still: usize,
+    /// Number of poses of a push; the later ones are zeros.
+    poses: usize,
 }
 
-/// Writes a file with one demonstration that holds the arm still.
+/// Writes a file with one demonstration, which pushes the cube if it is where the layout has it.
 fn write(from: &Path, into: &Path, content: &SyntheticFile) {
     let read = TaskFile::open(from).expect("a file");
     let numbers = |name: &str| match read.stream(0, name).expect("a stream").values {
@@ -56,11 +56,16 @@ fn write(from: &Path, into: &Path, content: &SyntheticFile) {
     let demo = data.create_group("demo_0").expect("a group");
     demo.set_attr_string("language", content.language).expect("written");
     let observed = demo.create_group("obs").expect("a group");
-    let steps = 12;
+    let steps = 24;
     let put = |group: &rust_hdf5::H5Group, name: &str, row: &[f64]| {
-        let all: Vec<f64> = (0..steps)
-            .flat_map(|i| if i < content.still { row.to_vec() } else { vec![0.0; row.len()] })
-            .collect();
+        let row_of = |step: usize| {
+            let mut row = if step < content.poses { row.to_vec() } else { vec![0.0; row.len()] };
+            if name == "eef_pose" {
+                row[1] -= if step < 8 { 0.02 } else { 0.005 };
+            }
+            row
+        };
+        let all: Vec<f64> = (0..steps).flat_map(row_of).collect();
         let array = group.new_dataset::<f64>().shape([steps, row.len()]).create(name).expect("an array");
         array.write_raw(&all).expect("written");
     };
@@ -99,11 +104,11 @@ fn own_demonstrations_end_in_the_same_states() {
 fn objects_start_where_the_file_has_them() {
     let project = recorded();
     let make = |name: &str, cube: [f64; 2]| {
-        write(&project.path(OWN), &project.path(name), &SyntheticFile { language: "Wait.", cube, still: 12 });
+        write(&project.path(OWN), &project.path(name), &SyntheticFile { language: "Wait.", cube, poses: 24 });
     };
-    make("on.hdf5", [0.02, 0.21]);
-    make("far.hdf5", [0.0, 0.4]);
-    make("inside.hdf5", [0.0, 0.0]);
+    make("on.hdf5", [-0.18, 0.01]);
+    make("far.hdf5", [-0.187, 0.11]);
+    make("inside.hdf5", [-0.187, -0.14]);
     let words = "dataset import x.lua on.hdf5 far.hdf5 inside.hdf5 --out made --images video";
     let output = project.succeeds(words);
     assert!(output.err.contains("could not start") && output.err.contains("overlap"), "{}", output.err);
@@ -115,7 +120,7 @@ fn objects_start_where_the_file_has_them() {
         "{task}"
     );
     let line = &project.lines("made/manifest.jsonl")[0];
-    assert_eq!(line["origin"]["start"]["places"][0]["xy"], serde_json::json!([0.02, 0.21]), "{line}");
+    assert_eq!(line["origin"]["start"]["places"][0]["xy"], serde_json::json!([-0.18, 0.01]), "{line}");
     // All attempts can be replayed, including those that did not start.
     for attempt in 0..3 {
         let again = project.succeeds(&format!("replay made/attempts/one 0/{attempt}"));
@@ -128,10 +133,11 @@ fn objects_start_where_the_file_has_them() {
 #[test]
 fn invalid_imports_are_refused_and_write_nothing() {
     let project = recorded();
-    let make = |name: &str, language: &str, still: usize| {
-        write(&project.path(OWN), &project.path(name), &SyntheticFile { language, cube: [0.0, 0.2], still });
+    let make = |name: &str, language: &str, poses: usize| {
+        let content = SyntheticFile { language, cube: [-0.187, 0.012], poses };
+        write(&project.path(OWN), &project.path(name), &content);
     };
-    make("odd.hdf5", "sing", 12);
+    make("odd.hdf5", "sing", 24);
     make("torn.hdf5", "wait", 9);
     project.write("short.hdf5", &std::fs::read(project.path(OWN)).expect("read")[..900]);
     project.write("mine/notes.txt", b"mine");

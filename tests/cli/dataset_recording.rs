@@ -4,18 +4,18 @@ use std::{collections::BTreeMap, fs, path::Path};
 
 use crate::support::{Project, SOLIDS};
 
-/// A rigid cube on a slab, or next to it in some attempts. Waiting reaches the goal in the former.
+/// A rigid cube on a shelf, or on the floor in some attempts. A push reaches the goal in the former.
 const SUITE: &str = r#"
 local solids = require "solids"
 local layout = softvt.layout("one", function(scene)
   local beside = math.random() < 0.4
   scene:add { name = "floor", asset = solids.floor, position = { 0, 0, 0 } }
-  scene:add { name = "slab", asset = solids.slab, position = { 0, 0.2, 0 } }
-  scene:add { name = "cube", asset = solids.cube, position = { 0, beside and 0.35 or 0.2, beside and 0 or 0.02 } }
+  scene:add { name = "shelf", asset = solids.shelf, position = solids.shelf_at }
+  scene:add { name = "cube", asset = solids.cube, position = beside and { 0, 0.35, 0 } or solids.cube_at }
 end)
 return softvt.suite { name = "one", object_type = "rigid", variation = "spatial", episodes = 1, tasks = {
-  softvt.task { prompt = "wait", layout = layout, goal = softvt.on { object = "cube", target = "slab" }, budget_steps = 30,
-    expert = function(arm, scene) arm:wait(1) end },
+  softvt.task { prompt = "wait", layout = layout, goal = softvt.on { object = "cube", target = "shelf" }, budget_steps = 30,
+    expert = function(arm, scene) solids.push(arm) arm:wait(1) end },
 } }
 "#;
 
@@ -48,7 +48,7 @@ fn the_first_good_attempts_are_kept() {
     let card = project.json("a/dataset.json");
     let task = &card["tasks"][0];
     let attempts = task["attempts"].as_u64().expect("a count");
-    let rejected = task["rejected"]["goal not reached"].as_u64().expect("some start next to the slab");
+    let rejected = task["rejected"]["goal not reached"].as_u64().expect("some start on the floor");
     assert_eq!((task["demos"].as_u64(), attempts), (Some(3), 3 + rejected), "{task}");
     assert!(output.contains(&format!("3 demonstrations from {attempts} attempts")), "{output}");
     let lines = project.lines("a/attempts/one/episodes.jsonl");

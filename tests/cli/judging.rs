@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::support::Project;
+use crate::support::{Project, SOLIDS};
 
 /// A rigid block in the mirrored layout of the standard suite, written as a user would.
 const BLOCKS: &str = r#"
@@ -48,23 +48,23 @@ fn rigid_targets_need_no_deformation_limit() {
     }
 }
 
-/// A suite in which `upper` rests on `lower` from the start.
+/// A suite in which a push moves `upper` to the middle of `lower`, on which it rests, on a pillar.
 fn stack(upper: &str, lower: &str) -> String {
     format!(
         r#"
 local soft, rigid, static = softvt.soft {{ youngs_pa = 3e4, poisson = 0.3, density = 300 }}, softvt.rigid {{ density = 300 }}, softvt.static {{}}
-local function block(name, edge, body)
-  return softvt.asset {{ name = name, shape = softvt.shape.box {{ size = {{ edge, edge, 0.04 }} }}:grounded(), body = body }}
-end
-local floor = softvt.asset {{ name = "floor", shape = softvt.shape.box {{ size = {{ 1, 1, 0.05 }} }}:translate(0, 0, -0.025), body = static }}
+local solids = require "solids"
+local x, y, z = table.unpack(solids.shelf_at)
 local layout = softvt.layout("stack", function(scene)
-  scene:add {{ name = "floor", asset = floor, position = {{ 0, 0, 0 }} }}
-  scene:add {{ name = "lower", asset = block("lower", 0.06, {lower}), position = {{ 0, 0.1, 0 }} }}
-  scene:add {{ name = "upper", asset = block("upper", 0.04, {upper}), position = {{ 0, 0.1, 0.0401 }} }}
-  scene:add {{ name = "far", asset = block("far", 0.04, rigid), position = {{ 0, -0.2, 0 }} }}
+  scene:add {{ name = "floor", asset = solids.floor, position = {{ 0, 0, 0 }} }}
+  scene:add {{ name = "pillar", asset = solids.solid("pillar", {{ 0.06, 0.14, 0.225 }}, static), position = solids.shelf_at }}
+  scene:add {{ name = "lower", asset = solids.solid("lower", {{ 0.06, 0.14, 0.04 }}, {lower}), position = {{ x, y, 0.225 }} }}
+  scene:add {{ name = "upper", asset = solids.solid("upper", {{ 0.04, 0.04, 0.04 }}, {upper}), position = {{ x, y + 0.034, 0.2651 }} }}
+  scene:add {{ name = "far", asset = solids.solid("far", {{ 0.04, 0.04, 0.04 }}, rigid), position = {{ 0, -0.2, 0 }} }}
 end)
 local function task(on)
-  return softvt.task {{ prompt = on, layout = layout, goal = softvt.on {{ object = "upper", target = on }}, budget_steps = 20 }}
+  return softvt.task {{ prompt = on, layout = layout, goal = softvt.on {{ object = "upper", target = on }}, budget_steps = 24,
+    expert = function(arm) solids.push(arm) arm:wait(1) end }}
 end
 return softvt.suite {{ name = "stack", object_type = "deformable", variation = "spatial", episodes = 1, tasks = {{ task "lower", task "far" }} }}
 "#
@@ -81,8 +81,8 @@ fn objects_are_supported_by_what_they_rest_on() {
         ("rigid", "rigid"),
         ("rigid", "static"),
     ] {
-        let project = Project::new(&[("x.lua", &stack(upper, lower))]);
-        project.succeeds("x.lua --policy noop --out run");
+        let project = Project::new(&[("x.lua", &stack(upper, lower)), SOLIDS]);
+        project.succeeds("x.lua --out run");
         let episodes = project.lines("run/episodes.jsonl");
         let goals: Vec<&Value> = episodes.iter().map(|e| &e["goal"]).collect();
         assert_eq!(goals, [true, false], "{upper} on {lower}: {episodes:#?}");
@@ -96,7 +96,7 @@ fn objects_are_supported_by_what_they_rest_on() {
                 "no limit: {e:#}"
             );
         }
-        assert!(episodes[0]["failed_stage"].is_null() && episodes[1]["failed_stage"] == "reach");
+        assert!(episodes[0]["failed_stage"].is_null() && episodes[1]["failed_stage"] == "grasp");
     }
 }
 
@@ -114,13 +114,14 @@ fn calibration(fingerprint: &str) -> String {
 fn cubes(stiffness: &str) -> [(&'static str, String); 2] {
     let layout = format!(
         r#"
-local floor = softvt.asset {{ name = "floor", shape = softvt.shape.box {{ size = {{ 1, 1, 0.05 }} }}:translate(0, 0, -0.025), body = softvt.static {{}} }}
+local solids = require "solids"
 local layout = softvt.layout("one", function(scene, rng)
   local episode = rng:uniform(0, 1)
   local cube = softvt.asset {{ name = "cube", shape = softvt.shape.box {{ size = {{ 0.04, 0.04, 0.04 }} }}:grounded(),
     body = softvt.soft {{ youngs_pa = {stiffness}, poisson = 0.3, density = 300 }} }}
-  scene:add {{ name = "floor", asset = floor, position = {{ 0, 0, 0 }} }}
-  scene:add {{ name = "cube", asset = cube, at = {{ 0, 0.1 }} }}
+  scene:add {{ name = "floor", asset = solids.floor, position = {{ 0, 0, 0 }} }}
+  scene:add {{ name = "shelf", asset = solids.shelf, position = solids.shelf_at }}
+  scene:add {{ name = "cube", asset = cube, position = solids.cube_at }}
 end)
 "#
     );
@@ -128,7 +129,8 @@ end)
   return { fingerprint = softvt.simulate { layout = layout }:measure "cube".fingerprint }
 end }"#;
     let suite = r#"return softvt.suite { name = "one", object_type = "deformable", variation = "spatial", episodes = 2, tasks = {
-  softvt.task { prompt = "lie", layout = layout, goal = softvt.on { object = "cube", target = "floor" }, budget_steps = 12 },
+  softvt.task { prompt = "push", layout = layout, goal = softvt.on { object = "cube", target = "shelf" }, budget_steps = 24,
+    expert = function(arm) solids.push(arm) arm:wait(1) end },
 }, shifts = { softvt.shift { name = "soft", default = 1, apply = function(scene, x)
   scene:object "cube".youngs_pa = x * scene:object "cube".youngs_pa
 end } } }"#;
@@ -136,7 +138,7 @@ end } } }"#;
 }
 
 fn safe(project: &Project, words: &str) -> Vec<bool> {
-    project.succeeds(&format!("x.lua --policy noop --out run {words}"));
+    project.succeeds(&format!("x.lua --out run {words}"));
     let safe = project.lines("run/episodes.jsonl").iter().map(|e| e["safety"] == true).collect();
     std::fs::remove_dir_all(project.path("run")).expect("removed");
     safe
@@ -144,7 +146,8 @@ fn safe(project: &Project, words: &str) -> Vec<bool> {
 
 #[test]
 fn limits_apply_only_to_the_calibrated_object() {
-    let project = Project::new(&cubes("2e4").each_ref().map(|(path, text)| (*path, text.as_str())));
+    let project = Project::new(&[SOLIDS]);
+    cubes("2e4").iter().for_each(|(path, text)| project.write(path, text.as_bytes()));
     let row: Value = serde_json::from_str(&project.succeeds("who.lua --json").out).expect("a row");
     let fingerprint = row["fingerprint"].as_str().expect("a text");
     project.write("assets/calibration/cube.json", calibration(fingerprint).as_bytes());
@@ -167,37 +170,38 @@ local function cube(name, edge)
   return softvt.asset { name = name, shape = softvt.shape.box { size = { edge, edge, edge } }:grounded(),
     body = softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300 } }
 end
-return { cube = cube("cube", 0.04), small = cube("small", 0.03),
-  floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 1, 1, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} } }
+return { cube = cube("cube", 0.04), small = cube("small", 0.03) }
 "#;
     let suite = format!(
         r#"
-local assets = require "cubes"
+local assets, solids = require "cubes", require "solids"
 local function layout(name, place)
   return softvt.layout(name, function(scene, rng)
-    scene:add {{ name = "floor", asset = assets.floor, position = {{ 0, 0, 0 }} }}
+    scene:add {{ name = "floor", asset = solids.floor, position = {{ 0, 0, 0 }} }}
+    scene:add {{ name = "shelf", asset = solids.shelf, position = solids.shelf_at }}
     place(scene, rng:uniform(0, 1))
   end)
 end
-local function add(scene, asset) scene:add {{ name = "cube", asset = assets[asset], at = {{ 0, 0.1 }} }} end
+local function add(scene, asset) scene:add {{ name = "cube", asset = assets[asset], position = solids.cube_at }} end
 local drawn = layout("drawn", function(scene, u) add(scene, u < 0.5 and "cube" or "small") end)
 local changed = layout("changed", function(scene, u) add(scene, "cube") local cube = scene:object "cube" {change} end)
 local function task(layout)
-  return softvt.task {{ prompt = layout.name, layout = layout, goal = softvt.on {{ object = "cube", target = "floor" }}, budget_steps = 12 }}
+  return softvt.task {{ prompt = layout.name, layout = layout, goal = softvt.on {{ object = "cube", target = "shelf" }}, budget_steps = 24,
+    expert = function(arm) solids.push(arm) arm:wait(1) end }}
 end
 return softvt.suite {{ name = "one", object_type = "deformable", variation = "spatial", episodes = 4, tasks = {{ task(drawn), task(changed) }} }}
 "#
     );
     let who = r#"
-local assets = require "cubes"
+local assets, solids = require "cubes", require "solids"
 return softvt.experiment { name = "who", grid = { asset = { "cube", "small" } }, run = function(point)
   local layout = softvt.layout("one", function(scene)
-    scene:add { name = "floor", asset = assets.floor, position = { 0, 0, 0 } }
+    scene:add { name = "floor", asset = solids.floor, position = { 0, 0, 0 } }
     scene:add { name = "cube", asset = assets[point.asset], at = { 0, 0.1 } }
   end)
   return { asset = point.asset, fingerprint = softvt.simulate { layout = layout }:measure "cube".fingerprint }
 end }"#;
-    let project = Project::new(&[("cubes.lua", library), ("x.lua", &suite), ("who.lua", who)]);
+    let project = Project::new(&[("cubes.lua", library), ("x.lua", &suite), ("who.lua", who), SOLIDS]);
     for line in project.succeeds("who.lua --json").out.lines() {
         let row: Value = serde_json::from_str(line).expect("a row");
         let [asset, fingerprint] = ["asset", "fingerprint"].map(|key| row[key].as_str().expect("a text"));
@@ -212,7 +216,7 @@ fn a_limit_holds_for_every_instance_of_its_asset() {
     let project = calibrated(
         "cube.youngs_pa = 2e4 * (1 + u) cube.density = 200 + 100 * u cube.static_mu = 0.9 cube.dynamic_mu = 0.7 + 0.1 * u",
     );
-    let output = project.succeeds("x.lua --policy noop --out run");
+    let output = project.succeeds("x.lua --out run");
     let episodes = project.lines("run/episodes.jsonl");
     assert!(episodes.iter().all(|e| e["tau"] == 1.0 && e["safety"] == true), "{episodes:#?}");
     let assets: std::collections::BTreeSet<&str> =
@@ -229,7 +233,7 @@ fn another_object_has_no_limit_and_check_and_run_say_so() {
     let check = project.succeeds("check x.lua");
     let line = check.err.lines().find(|line| line.contains(warning)).expect("a warning of the check");
     assert!(line.starts_with("softvt: task 1 episode "), "{line}");
-    let run = project.succeeds("x.lua --policy noop --out run");
+    let run = project.succeeds("x.lua --out run");
     assert!(run.err.contains(line), "{}", run.err);
     let episodes = project.lines("run/episodes.jsonl");
     let judged = |task: u64| episodes.iter().filter(|e| e["task"] == task && e["tau"] == 1.0).count();

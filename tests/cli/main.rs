@@ -3,6 +3,7 @@
 mod articulated_objects;
 mod benchmark_validity;
 mod calibration;
+mod cheats;
 mod check;
 mod conditions;
 mod crash_recovery;

@@ -5,7 +5,9 @@ use std::{fs, path::PathBuf, time::Duration};
 use assert_cmd::{Command, cargo::cargo_bin_cmd};
 use serde_json::Value;
 
-/// `solids.lua` for small scenes: a floor, a slab, a cube that rests stably on it, and a function for others.
+/// `solids.lua` for small scenes: a floor, a slab, a cube that rests stably on it, and a function for others. For goals that
+/// are reached within a second: a shelf, the place of a cube on it that is between the open fingers at the start, and the
+/// motion that pushes the cube to the middle of the shelf.
 pub const SOLIDS: (&str, &str) = (
     "solids.lua",
     r#"
@@ -17,6 +19,12 @@ return {
   floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 2, 2, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} },
   slab = solid("slab", { 0.1, 0.1, 0.02 }, softvt.static {}),
   cube = solid("cube", { 0.04, 0.04, 0.04 }, softvt.rigid { density = 300 }),
+  shelf = solid("shelf", { 0.06, 0.3, 0.265 }, softvt.static {}),
+  shelf_at = { -0.187, -0.022, 0 }, cube_at = { -0.187, 0.012, 0.265 },
+  push = function(arm)
+    arm:move_by({ 0, -0.02, 0 }, { speed = 0.2 })
+    arm:move_by({ 0, 0.015, 0 }, { speed = 0.2 })
+  end,
 }
 "#,
 );

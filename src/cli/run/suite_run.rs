@@ -23,7 +23,7 @@ use softvt_evaluation::{
 use softvt_policy::{PolicyError, SensorStreams, TaskBrief, remote::PolicyConnections};
 use softvt_rollout::{
     AssetCache, BuildError, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SensorAssets, SensorSuite,
-    Simulation, cancel, check_sensors,
+    Simulation, cancel, check_goal, check_sensors,
 };
 use softvt_scene::{Body, Scene};
 use softvt_script::{EpisodeSetup, LoadedScript, SceneBuilder};
@@ -371,7 +371,8 @@ impl<'a> SuiteRun<'a> {
         }
     }
 
-    /// Builds the first scene of a task and checks all that can be checked before anything moves.
+    /// Builds the first scene of a task and checks all that can be checked before anything moves. It settles only if
+    /// the goal may hold at the start.
     ///
     /// # Errors
     /// A scene or sensor that is not valid.
@@ -384,6 +385,12 @@ impl<'a> SuiteRun<'a> {
             check_sensors(&scene, &settings.tactile, &self.sensor_assets).map_err(sense)?;
             let sim = Simulation::new(scene.clone(), &settings.physics, &settings.robot, &self.assets)?;
             sim.check_support()?;
+            if check_goal(task, &settings.criteria, &sim, &self.assets)? {
+                // Whether it holds is known once the scene has settled, with masses and contacts that are not approximate.
+                let id = self.episode_id(task, 0);
+                let spec = EpisodeSpec::new(id, "noop", task, &scene, Scene::clone(&scene), settings);
+                Episode::start(spec, &AssetCache::default(), &self.sensor_assets)?;
+            }
             let mut sensors = SensorSuite::new(&sim, &settings.tactile, &self.sensor_assets);
             sensors.check_camera_positions(&SensorSuite::frame(&sim)).map_err(sense)
         };

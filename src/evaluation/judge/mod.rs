@@ -250,6 +250,14 @@ impl Judge {
         self.goal.reached_s.is_some()
     }
 
+    /// True if the target rests at the goal: in its region, and carried. For a state that has settled before the episode.
+    pub fn rests_at_goal(&self, evidence: &Evidence<'_>) -> bool {
+        let config = &self.config;
+        let needed_ns = config.criteria.support_share * config.target_weight_n * config.dt_s;
+        config.goal.contains(&evidence.goal.pose_w, &evidence.target.centre_w, 0.0)
+            && evidence.goal.support_impulse_ns >= needed_ns
+    }
+
     /// The first drop so far.
     pub fn first_drop(&self) -> Option<DropEvent> {
         self.drops.first
@@ -396,10 +404,7 @@ impl Judge {
     fn observe_goal(&mut self, evidence: &Evidence<'_>, is_touched: bool) -> bool {
         self.control_step.steps += 1;
         self.control_step.is_touched |= is_touched;
-        self.control_step.support_ns += match self.config.goal {
-            GoalRegion::On { .. } => evidence.goal.support_impulse_ns,
-            GoalRegion::Inside { .. } => evidence.target.support_impulse_ns,
-        };
+        self.control_step.support_ns += evidence.goal.support_impulse_ns;
         if self.control_step.steps < self.config.steps_per_control {
             return false;
         }

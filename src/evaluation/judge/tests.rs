@@ -158,11 +158,18 @@ fn a_plate_that_carries_less_than_half_or_a_hand_that_touches_prevents_rest() {
 }
 
 #[test]
-fn in_a_basket_others_may_carry_it() {
+fn in_a_basket_only_the_basket_carries() {
     let space = Aabb { min: Vec3::new(-0.1, -0.1, 0.0), max: Vec3::new(0.1, 0.1, 0.08) };
-    let mut replay = Replay::new(JudgeConfig { goal: GoalRegion::Inside { space }, ..config() });
-    replay.steps(27, |e| e.target = lying(0.0, 0.2));
-    assert!(replay.judge.is_goal_reached());
+    let inside = || Replay::new(JudgeConfig { goal: GoalRegion::Inside { space }, ..config() });
+    for (share, reached) in [(0.0, false), (0.4, false), (0.6, true)] {
+        let mut replay = inside();
+        replay.steps(27, |e| {
+            // It also rests on the table.
+            e.target = lying(0.0, 0.2);
+            e.goal.support_impulse_ns = share * WEIGHT_N * DT;
+        });
+        assert_eq!(replay.judge.is_goal_reached(), reached, "{share}");
+    }
 }
 
 #[test]

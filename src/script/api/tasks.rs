@@ -49,7 +49,8 @@ record! {
         /// Time that it must stay there.
         hold_s: f64 = HOLD => Number(0.4);
     }
-    /// The object rests inside the target's walls, released, for a time.
+    /// The object rests in the target's cavity, carried by it or by objects in it, released, for a time. The cavity is the
+    /// space in which its shape holds water.
     InsideSpec: "softvt.Inside" as "task.goal", constructor "softvt.inside" {
         /// Scene name of the object.
         object: String;

@@ -30,7 +30,8 @@ use softvt_common::{
     text::{format_number, unknown_name},
 };
 use softvt_evaluation::episode_id::EpisodeId;
-use softvt_robot::gripper::MAX_WIDTH;
+use softvt_geometry::{Aabb, Vec3};
+use softvt_robot::{gripper::MAX_WIDTH, panda};
 use softvt_scene::{Body, Scene, SceneVariation};
 
 /// An episode as its script describes it: the scene that the layout builds, and the expert of the task.
@@ -121,6 +122,8 @@ impl SceneBuilder {
             (scene, nominal) = (scene.rigid_twin(), nominal.rigid_twin());
         }
         check_goal(&vm.lua, &task.goal, &scene).map_err(|e| vm.explain(&e))?;
+        check_workspace(&scene)
+            .map_err(|what| vm.explain(&fail_at_key(&vm.lua, &task.layout.table, "build", what)))?;
         let largest = self.ranges.get(&id.suite).map_or(1.0, |ranges| ranges.size.max);
         check_width(&scene, task.goal.object(), variation.as_ref(), largest)?;
         let (instance, expert) = (self.instance.clone(), task.expert.clone());
@@ -198,6 +201,38 @@ fn check_width(
         1e3 * MAX_WIDTH
     );
     Err(ScriptError::new(object.placed_at.as_str(), message))
+}
+
+/// Checks that the workspace is a box, and that the arm reaches it.
+///
+/// # Errors
+/// What is wrong with it.
+fn check_workspace(scene: &Scene) -> Result<(), String> {
+    let Aabb { min, max } = scene.workspace;
+    let corner = |p: &Vec3| {
+        let [x, y, z] = [p.x, p.y, p.z].map(format_number);
+        format!("{{ {x}, {y}, {z} }}")
+    };
+    if let Some(axis) = (0..3).find(|&i| min[i] >= max[i]) {
+        return Err(format!(
+            "scene.workspace_min {} is not below scene.workspace_max {} along {}",
+            corner(&min),
+            corner(&max),
+            ["x", "y", "z"][axis]
+        ));
+    }
+    let base = scene.base_w.translation.vector;
+    let distance = scene.workspace.distance(&Aabb { min: base, max: base });
+    if distance <= panda::REACH {
+        return Ok(());
+    }
+    Err(format!(
+        "scene.base {} is {} m from the workspace, and the arm reaches {} m; move the base, or \
+         scene.workspace_min and scene.workspace_max",
+        corner(&base),
+        format_number((1e3 * distance).round() / 1e3),
+        format_number(panda::REACH)
+    ))
 }
 
 /// Message about a shift that a suite does not declare.

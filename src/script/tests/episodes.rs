@@ -366,3 +366,31 @@ fn an_expert_can_query_the_clearance_of_a_hand() {
         "{message}"
     );
 }
+
+#[test]
+fn the_workspace_is_a_box_within_reach_of_the_arm() {
+    let open = |set: &str| {
+        let project = Project::new(&[(
+            "x.lua",
+            &(SUITE.replace("scene:add {", &format!("{set} scene:add {{")) + "return suite()"),
+        )]);
+        let loaded = project.load("x.lua", &[]).unwrap();
+        let opened = EpisodeSetup::open(&loaded, &episode_id(0, 1), &[]);
+        opened.map(|_| ()).map_err(|e| e.to_string().rsplit('/').next().unwrap_or_default().to_owned())
+    };
+    let line = SUITE.lines().position(|line| line.contains("softvt.layout")).unwrap() + 1;
+    assert_eq!(open("scene.workspace_min = { -0.5, -0.6, -0.05 }"), Ok(()));
+    assert_eq!(
+        open("scene.workspace_min = { 0, 0.7, 0 }"),
+        Err(format!(
+            "x.lua:{line}: scene.workspace_min {{ 0, 0.7, 0 }} is not below scene.workspace_max {{ 0.5, 0.6, 1 }} along y"
+        ))
+    );
+    assert_eq!(
+        open("scene.base = { 999, 0, 0 }"),
+        Err(format!(
+            "x.lua:{line}: scene.base {{ 999, 0, 0 }} is 998.5 m from the workspace, and the arm reaches 1.188 m; move \
+             the base, or scene.workspace_min and scene.workspace_max"
+        ))
+    );
+}
