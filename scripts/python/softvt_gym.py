@@ -11,13 +11,15 @@ Observations are a dict with the keys of the server's profile; actions are seven
 step that reaches the goal and 0 otherwise. `info` has the step and the success, and with --privileged the true state.
 """
 
+import atexit
 import subprocess
+from urllib.parse import urlsplit
 
 import gymnasium
 import msgpack
 import numpy as np
 from gymnasium import spaces
-from websocket import create_connection
+from websocket import WebSocketException, create_connection
 
 
 class SoftVTEnv(gymnasium.Env):
@@ -32,8 +34,7 @@ class SoftVTEnv(gymnasium.Env):
         """
         self.url, self.render_mode, self.camera = url, render_mode, camera
         self._server = None
-        headers = {"Authorization": f"Bearer {token}"} if token else {}
-        self._socket = create_connection(url, header=headers)
+        self._socket = _connect(url, token)
         self.about = self._receive()
         self.observation_space = spaces.Dict(
             {key: _space(entry) for key, entry in self.about["observation_space"].items()}
@@ -43,10 +44,10 @@ class SoftVTEnv(gymnasium.Env):
 
     @classmethod
     def launch(cls, script, *flags, softvt="softvt", **arguments):
-        """Starts a server that ends with the environment. `flags` are arguments of `softvt serve`."""
-        server = subprocess.Popen(
-            [softvt, "serve", script, "--port", "0", *flags], stdout=subprocess.PIPE, text=True
-        )
+        """Starts a server that ends with the environment, or with this process. `flags` are arguments of `softvt serve`."""
+        command = [softvt, "serve", script, "--port", "0", "--until-stdin-closes", *flags]
+        # The system closes the pipe however this process ends, and the server ends with the pipe.
+        server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         url = server.stdout.readline().strip()
         if not url:
             raise RuntimeError(f"softvt serve ended with exit code {server.wait()}; its message is above")
@@ -56,6 +57,7 @@ class SoftVTEnv(gymnasium.Env):
             _end(server)
             raise
         env._server = server
+        atexit.register(env.close)
         return env
 
     def reset(self, *, seed=None, options=None):
@@ -98,6 +100,7 @@ class SoftVTEnv(gymnasium.Env):
         if socket is not None:
             socket.close()
         if server is not None:
+            atexit.unregister(self.close)
             _end(server)
 
     def _request(self, kind, **fields):
@@ -113,9 +116,24 @@ class SoftVTEnv(gymnasium.Env):
         return response
 
 
+def _connect(url, token):
+    try:
+        return create_connection(url, header={"Authorization": f"Bearer {token}"} if token else {})
+    except (OSError, WebSocketException) as error:
+        port = urlsplit(url).port or 80
+        raise ConnectionError(
+            f"no softvt server answers at {url} ({error}); start one with `softvt serve FILE.lua --port {port}`, "
+            "or with SoftVTEnv.launch(FILE.lua)"
+        ) from error
+
+
 def _end(server):
-    server.terminate()
-    server.wait()
+    server.stdin.close()
+    try:
+        server.wait(timeout=60)
+    except subprocess.TimeoutExpired:
+        server.kill()
+        server.wait()
     server.stdout.close()
 
 

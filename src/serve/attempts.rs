@@ -2,6 +2,7 @@
 //!
 //! An episode is recorded at most once, and a client cannot choose among several results: only the attempt that executes
 //! the first action of the episode on this server counts, and only if it steps the episode from its reset to its end.
+//! Until then no other client can step the episode, so that none tries out actions for it.
 
 use std::{collections::BTreeMap, fmt, sync::Mutex};
 
@@ -48,6 +49,23 @@ impl<'a> Attempts<'a> {
         }
         states.insert(id.clone(), AttemptState::InProgress);
         Some(Attempt { id: id.clone(), recorder, attempts: self })
+    }
+
+    /// Checks that no client but that of the attempt `own` has begun an attempt at the episode that is not over.
+    ///
+    /// # Errors
+    /// Another client has.
+    pub(super) fn check_free(&self, id: &EpisodeId, own: Option<&Attempt<'_>>) -> Result<(), RequestError> {
+        let is_own = own.is_some_and(|attempt| attempt.id == *id);
+        match lock(&self.states).get(id) {
+            Some(AttemptState::InProgress) if !is_own => Err(format!(
+                "step: task {}, episode {} is being recorded for another client; step it when that client is done, or \
+                 another episode",
+                id.task, id.episode
+            )
+            .into()),
+            _ => Ok(()),
+        }
     }
 
     /// Ends the attempt at an episode, also one that another client has begun, or rules out a later one.
@@ -128,6 +146,23 @@ mod tests {
             assert!(attempts.begin(&id(0)).is_none(), "after an attempt that was left");
         });
         assert_eq!(lost, ["1: its client left it before its end", "0: its client left it before its end"]);
+    }
+
+    #[test]
+    fn no_other_client_steps_an_episode_during_an_attempt() {
+        let lost = reports(|attempts| {
+            let is_free = |episode, own| attempts.check_free(&id(episode), own).is_ok();
+            assert!(is_free(0, None), "before the attempt");
+            let first = attempts.begin(&id(0));
+            assert!(is_free(0, first.as_ref()), "its own client");
+            assert!(!is_free(0, None), "another client");
+            let other = attempts.begin(&id(1));
+            assert!(!is_free(0, other.as_ref()), "a client with an attempt at another episode");
+            assert!(is_free(2, None), "another episode");
+            drop(first);
+            assert!(is_free(0, None), "after the attempt");
+        });
+        assert_eq!(lost.len(), 2);
     }
 
     #[test]

@@ -128,6 +128,11 @@ impl<'a> ClientSession<'a> {
         for row in rows {
             self.check_cancel()?;
             let config = self.config;
+            let (attempts, own) = (self.attempts, self.attempt.take());
+            let live = self.live("step")?;
+            let is_free = attempts.check_free(&live.state.id, own.as_ref());
+            self.attempt = own;
+            is_free?;
             let live = self.live("step")?;
             live.advance(config, row)?;
             executed += 1;

@@ -33,6 +33,7 @@ impl Server {
             .current_dir(project.path(""))
             .args(["serve", "x.lua", "--port", "0"])
             .args(words.split_whitespace())
+            .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
@@ -58,6 +59,11 @@ impl Server {
         let hello = client.hear();
         assert_eq!(text(&hello, "type"), "hello");
         (client, hello)
+    }
+
+    /// Closes the standard input of the server.
+    pub fn close_stdin(&mut self) {
+        drop(self.child.stdin.take());
     }
 
     /// Ends the server by Ctrl-C, and returns what it printed after its address.
@@ -198,6 +204,22 @@ fn a_client_runs_an_episode_to_its_end() {
     assert_eq!(client.reset(), start, "the same start again");
     assert_eq!(text(&client.ask(&of("close")), "type"), "close");
     assert!(client.0.read().is_ok_and(|m| m.is_close()));
+}
+
+#[test]
+fn a_server_ends_with_its_standard_input_if_asked_to() {
+    let project = project();
+    let mut server = Server::start(&project, "--profile vision --until-stdin-closes");
+    server.client().0.reset();
+    server.close_stdin();
+    let output = server.wait();
+    assert_eq!((output.code, output.out.as_str()), (0, ""), "{}", output.err);
+    assert!(!output.err.contains("interrupt"), "{}", output.err);
+
+    let mut other = Server::start(&project, "--profile vision");
+    other.close_stdin();
+    std::thread::sleep(Duration::from_millis(300));
+    other.client().0.reset();
 }
 
 #[test]

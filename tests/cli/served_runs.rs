@@ -241,6 +241,35 @@ fn an_episode_to_which_a_client_returned_is_not_recorded() {
 }
 
 #[test]
+fn nobody_practises_beside_an_open_attempt() {
+    let project = project();
+    let mut server = serve(&project, "--episodes 2 --out served --until-stdin-closes");
+    let actions = recorded(&project, "random", 0);
+    let (mut client, _) = server.client();
+    let (mut scout, _) = server.client();
+    reset(&mut scout, 0, &[]);
+    reset(&mut client, 0, &[]);
+    step(&mut client, &actions[..3]);
+    let request = [("type", "step".into()), ("actions", array(&[1, 7], &actions[0]))];
+    let answer = scout.ask(&map(&request));
+    assert_eq!(
+        get(&answer, "error").as_str(),
+        Some(
+            "step: task 0, episode 0 is being recorded for another client; step it when that client is done, or another \
+             episode"
+        )
+    );
+    // The scout may run another episode meanwhile, and this one afterwards.
+    assert!(run_episode(&project, &mut scout, 1));
+    assert!(is_recorded(&mut client, &actions[3..]));
+    assert!(!run_episode(&project, &mut scout, 0));
+    server.close_stdin();
+    let output = server.wait();
+    assert_eq!(output.code, 0, "{}", output.err);
+    assert!(output.err.ends_with("softvt: 2 of 2 episodes are in served\n"), "{}", output.err);
+}
+
+#[test]
 fn shards_of_several_servers_are_merged() {
     let project = project();
     for shard in 1..=2_u32 {

@@ -1,8 +1,11 @@
 """Tests of scripts/python/softvt_gym.py and its server. Arguments: the binary, the folder of an expert's run."""
 
 import json
+import os
+import signal
 import subprocess
 import sys
+import time
 import warnings
 
 import gymnasium
@@ -104,6 +107,47 @@ def a_recorded_run_has_the_records_of_the_expert(out):
         subprocess.run([BINARY, *command], check=True, stdout=subprocess.DEVNULL)
 
 
+def the_server_of_launch_ends_with_its_python_process():
+    launch = f"""
+import os, signal, sys
+from softvt_gym import SoftVTEnv
+env = SoftVTEnv.launch({SUITE!r}, "--task", "0", softvt={BINARY!r})
+print(env._server.pid, flush=True)
+"""
+    endings = {
+        "at its last line": ("", 0),
+        "by an exception": ("raise ValueError", 1),
+        "by SIGTERM": ("os.kill(os.getpid(), signal.SIGTERM)", -signal.SIGTERM),
+        "by SIGKILL": ("os.kill(os.getpid(), signal.SIGKILL)", -signal.SIGKILL),
+    }
+    for how, (last, code) in endings.items():
+        ended = subprocess.run([sys.executable, "-c", launch + last], capture_output=True, text=True)
+        assert ended.returncode == code, (how, ended)
+        server, deadline = int(ended.stdout), time.monotonic() + 60
+        while is_running(server):
+            assert time.monotonic() < deadline, f"the server runs on after Python ended {how}"
+            time.sleep(0.05)
+
+
+def is_running(process):
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    # A zombie has ended; its new parent need not have noticed yet.
+    with open(f"/proc/{process}/stat", encoding="utf-8") as stat:
+        return stat.read().rsplit(")", 1)[1].split()[0] != "Z"
+
+
+def a_missing_server_is_named_with_a_command():
+    try:
+        SoftVTEnv("ws://127.0.0.1:9")
+    except ConnectionError as error:
+        assert "ws://127.0.0.1:9" in str(error) and "softvt serve FILE.lua --port 9" in str(error), error
+    else:
+        raise AssertionError("something listens on port 9")
+
+
 def unprivileged_clients_receive_no_true_state(env):
     _, info = env.reset(seed=0)
     received = set(info)
@@ -131,6 +175,9 @@ def main():
         unprivileged_clients_receive_no_true_state(env)
     finally:
         env.close()
+    for check in (a_missing_server_is_named_with_a_command, the_server_of_launch_ends_with_its_python_process):
+        print(check.__name__.replace("_", " "), flush=True)
+        check()
     print("a recorded run has the records of the expert", flush=True)
     a_recorded_run_has_the_records_of_the_expert(f"{RUN}-served")
 

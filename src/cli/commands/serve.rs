@@ -1,13 +1,19 @@
 //! `softvt serve`: episodes of suites for external clients.
 
-use std::{io::ErrorKind, net::TcpListener, path::PathBuf};
+use std::{
+    io::{self, ErrorKind},
+    net::TcpListener,
+    path::PathBuf,
+    sync::atomic::{AtomicBool, Ordering},
+    thread,
+};
 
 use clap::{Args, value_parser};
 use serde_json::json;
 
 use crate::{
-    error::CliError,
-    output::print,
+    error::{CliError, Exit},
+    output::{eprint_notice, print},
     run::{
         config::{RunConfig, RunFlags, ScriptArgs, Shard, parse_count, parse_folder},
         policy::{PolicyArgs, PolicyConfig},
@@ -53,6 +59,9 @@ pub(crate) struct ServeArgs {
     /// Send clients the true state: poses, deformation, contact forces, limits, verdict
     #[arg(long)]
     privileged: bool,
+    /// End when standard input closes, as a pipe does when the process that started the server ends
+    #[arg(long)]
+    until_stdin_closes: bool,
     /// Serve only these tasks: indices or parts of prompts, separated by commas
     #[arg(long = "task", value_name = "TASK", value_delimiter = ',')]
     tasks: Vec<String>,
@@ -76,12 +85,40 @@ pub(crate) struct ServeArgs {
 /// Flags about the run in `--out`, by their identifiers in clap.
 const RUN_FLAGS: [&str; 3] = ["episodes", "shard", "name"];
 
-/// Serves the suites of a script until the process is interrupted.
+/// True once standard input has closed under `--until-stdin-closes`.
+static STDIN_CLOSED: AtomicBool = AtomicBool::new(false);
+
+/// Serves the suites of a script until the process is interrupted, or its standard input closes.
 ///
 /// # Errors
 /// The script has no suite, its first episode cannot be rendered, the address is not available, or `--out` holds something
 /// else; in the end, the interrupt.
 pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
+    if args.until_stdin_closes {
+        watch_stdin()?;
+    }
+    match serve(args) {
+        Err(end) if end.exit == Exit::Interrupted && STDIN_CLOSED.load(Ordering::Relaxed) => {
+            // Without recorded episodes there is nothing to say: the client ended the server.
+            end.message.strip_prefix("interrupted; ").into_iter().for_each(eprint_notice);
+            Ok(())
+        }
+        other => other,
+    }
+}
+
+/// Requests the end of the server once standard input has closed.
+fn watch_stdin() -> Result<(), CliError> {
+    let watch = || {
+        let _ = io::copy(&mut io::stdin().lock(), &mut io::sink());
+        STDIN_CLOSED.store(true, Ordering::Relaxed);
+        cancel::request();
+    };
+    let started = thread::Builder::new().name("stdin".to_owned()).spawn(watch);
+    started.map(drop).map_err(|error| CliError::input(error).prefixed("--until-stdin-closes"))
+}
+
+fn serve(args: ServeArgs) -> Result<(), CliError> {
     let flags = RunFlags {
         tasks: args.tasks.clone(),
         episodes: args.episodes,
