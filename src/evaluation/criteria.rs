@@ -23,8 +23,12 @@ pub struct SuccessCriteria {
     pub free_fall_m: f64,
     /// Excess of the commanded over the measured gripper width that counts as a release command, m.
     pub release_margin_m: f64,
-    /// Largest allowed travel of a held contact patch along a pad, m. Reported as NoSlip, not part of NoDrop.
+    /// Largest allowed travel of a held contact patch along a pad, m: NoSlip, which is not part of NoDrop.
     pub slip_m: f64,
+    /// True if Safety Success needs NoSlip.
+    pub require_no_slip: bool,
+    /// Largest grip ratio of a gentle grip.
+    pub gentle_ratio: f64,
     /// Minimum share of the target's weight that the goal must carry, 0 to 1.
     pub support_share: f64,
     /// Distance of the centre beyond the goal's edge at which a placed object has left the goal, m.
@@ -45,6 +49,8 @@ impl Default for SuccessCriteria {
             free_fall_m: 0.050,
             release_margin_m: 0.005,
             slip_m: 0.002,
+            require_no_slip: false,
+            gentle_ratio: 2.0,
             support_share: 0.5,
             leave_margin_m: 0.005,
             goal_v1_on_m: 0.10,
@@ -67,6 +73,7 @@ impl SuccessCriteria {
             ("free_fall_m", self.free_fall_m),
             ("release_margin_m", self.release_margin_m),
             ("slip_m", self.slip_m),
+            ("gentle_ratio", self.gentle_ratio),
             ("support_share", self.support_share),
             ("leave_margin_m", self.leave_margin_m),
             ("goal_v1_on_m", self.goal_v1_on_m),

@@ -42,6 +42,17 @@ pub struct BodyEvidence {
     pub deformation: Option<Deformation>,
 }
 
+/// Load of the grip on the target.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GripEvidence {
+    /// Impulse of the whole robot on the target in this step, N s.
+    pub load_ns: Vec3,
+    /// Unit vector along which the pads close.
+    pub axis_w: Vec3,
+    /// Dynamic friction of pad and target.
+    pub dynamic_mu: f64,
+}
+
 /// State of the object that the target must be placed on or in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GoalEvidence {
@@ -65,6 +76,8 @@ pub struct Evidence<'a> {
     pub pads: [PadEvidence; 2],
     /// Normal impulse in this step between the target and the rest of the robot (hand, fingers, sensor cases), N s.
     pub robot_impulse_ns: f64,
+    /// Load of the grip.
+    pub grip: GripEvidence,
     /// State of the target.
     pub target: BodyEvidence,
     /// Shares of the target's volume beyond the strain limits of its material.
@@ -86,9 +99,10 @@ impl Evidence<'_> {
         });
         let pads = self.pads.iter().flat_map(|pad| [pad.normal_impulse_ns, pad.travel_m]);
         let (pose, gripper) = (self.goal.pose_w.to_homogeneous(), &self.gripper);
-        let impulses = [self.robot_impulse_ns, self.goal.support_impulse_ns];
+        let impulses = [self.robot_impulse_ns, self.goal.support_impulse_ns, self.grip.dynamic_mu];
         let rest = [self.time_s, gripper.width_m, gripper.commanded_width_m].into_iter().chain(impulses);
-        let vectors = self.hand_w.iter().chain(pose.iter()).copied();
+        let grip = self.grip.load_ns.iter().chain(self.grip.axis_w.iter());
+        let vectors = self.hand_w.iter().chain(pose.iter()).chain(grip).copied();
         bodies.chain(pads).chain(rest).chain(vectors).all(f64::is_finite)
     }
 }

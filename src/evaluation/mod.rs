@@ -41,6 +41,7 @@ pub mod episode_id;
 pub mod evidence;
 pub mod goal;
 pub mod instance;
+pub mod grip;
 pub mod judge;
 pub mod paired_stats;
 pub mod record;

@@ -94,6 +94,18 @@ pub struct PairedComparison {
     /// DSR: Goal Success with D_peak ≤ τ, %; over soft targets, without pairs if a run judged none of them.
     #[serde(default)]
     pub dsr: PairedDifference,
+    /// Goal Success with contact of both pads throughout the carry, %.
+    #[serde(default)]
+    pub contact_success: PairedDifference,
+    /// Contact success with Safety Success and NoSlip, %.
+    #[serde(default)]
+    pub contact_safety: PairedDifference,
+    /// Goal Success with a gentle grip, %.
+    #[serde(default)]
+    pub gentle: PairedDifference,
+    /// Largest force on a pad over the least that holds the target.
+    #[serde(default)]
+    pub grip_ratio: PairedDifference,
     /// No other soft body beyond its own τ, %; where both runs know it.
     #[serde(default)]
     pub others_ok: PairedDifference,
@@ -139,6 +151,11 @@ impl PairedComparison {
             let both = |pair: &EpisodePair| Some([of_valid(pair.first)?, of_valid(pair.second)?]);
             PairedDifference::from_values(pairs.iter().filter_map(both))
         };
+        let recorded = |value: fn(&EpisodeRecord) -> Option<bool>| {
+            let holds = |r: &EpisodeRecord| Some(value(r)? && r.outcome.is_valid());
+            let both = |pair: &EpisodePair| Some([holds(pair.first)?, holds(pair.second)?]);
+            PairedDifference::from_successes(pairs.iter().filter_map(both))
+        };
         let soft: Vec<_> =
             pairs.iter().filter(|pair| pair.first.header.soft && pair.second.header.soft).collect();
         // As in a summary: what was judged in no episode of a run has no rate.
@@ -164,6 +181,10 @@ impl PairedComparison {
                     .filter(|_| is_judged)
                     .map(|pair| [pair.first, pair.second].map(EpisodeRecord::is_deformation_safe)),
             ),
+            contact_success: recorded(|r| r.verdict.contact_success),
+            contact_safety: recorded(|r| r.verdict.contact_safety),
+            gentle: recorded(|r| r.verdict.gentle),
+            grip_ratio: mean(|r| r.verdict.grip_ratio),
             others_ok: PairedDifference::from_successes(
                 pairs
                     .iter()

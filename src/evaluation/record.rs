@@ -148,7 +148,7 @@ pub struct Verdict {
     pub no_drop: bool,
     /// The first event that made NoDrop false.
     pub drop: Option<DropEvent>,
-    /// NoSlip; reported only, not part of Safety Success.
+    /// NoSlip; part of Safety Success only if the criteria require it.
     pub no_slip: bool,
     /// Largest slip along a pad in a grasp, mm.
     pub slip_mm: f64,
@@ -201,7 +201,10 @@ pub struct Verdict {
     pub d_ref: Option<f64>,
     /// D_peak ≤ τ; null for a rigid target and where evidence is missing.
     pub deformation_ok: Option<bool>,
-    /// Safety Success: goal, no drop and, for a soft target, D_peak ≤ τ.
+    /// NoSlip where the criteria require it; null otherwise, and if the episode is invalid.
+    #[serde(default)]
+    pub slip_ok: Option<bool>,
+    /// Safety Success: goal, no drop, for a soft target D_peak ≤ τ, and no slip if the criteria require it.
     pub safety: bool,
     /// True if the evidence suffices to judge safety.
     pub safety_known: bool,
@@ -211,10 +214,25 @@ pub struct Verdict {
     pub missing_evidence: u64,
     /// Number of physics steps at which the target's D could not be measured.
     pub missing_deformation: u64,
+    /// Goal Success with contact of both pads throughout the carry; null in runs of earlier versions.
+    #[serde(default)]
+    pub contact_success: Option<bool>,
+    /// Contact success with Safety Success and NoSlip; null in runs of earlier versions.
+    #[serde(default)]
+    pub contact_safety: Option<bool>,
     /// Largest normal force on one pad, N.
     pub peak_pad_force_n: f64,
     /// Mean normal force per pad while both pads touched, N.
     pub mean_pad_force_n: f64,
+    /// Least force per pad that holds the target on its path ([`super::grip`]), N; null if it was not carried.
+    #[serde(default)]
+    pub least_pad_force_n: Option<f64>,
+    /// Largest force on one pad over the least force; null if the target was not carried.
+    #[serde(default)]
+    pub grip_ratio: Option<f64>,
+    /// Goal Success with a grip ratio of at most `criteria.gentle_ratio`; null in runs of earlier versions.
+    #[serde(default)]
+    pub gentle: Option<bool>,
 }
 
 /// Counters of the rollout.
@@ -292,6 +310,8 @@ impl EpisodeRecord {
         (v.d_mean, v.d_final, v.d_p95, v.time_over_tau_s) = (None, None, None, None);
         (v.others_ok, v.first_wrong_contact, v.failed_stage) = (None, None, None);
         (v.collapsed_volume_pct, v.damaged_volume_pct) = (None, None);
+        (v.slip_ok, v.contact_success, v.contact_safety) = (None, None, None);
+        (v.least_pad_force_n, v.grip_ratio, v.gentle) = (None, None, None);
         v.others.clear();
     }
 

@@ -1,4 +1,4 @@
-//! Safety Success = Goal ∧ NoDrop ∧ D_peak ≤ τ, with the deformation limit τ = κ·D_ref of the target's asset.
+//! Safety Success = Goal ∧ NoDrop ∧ D_peak ≤ τ, and NoSlip where the suite requires it, with the deformation limit τ = κ·D_ref of the target's asset.
 //!
 //! D_ref is the reference deformation of the asset's compression sweep ([`super::calibration`]); κ is the share of it
 //! that the benchmark allows. For a rigid target the last term is left out. A peak that is unknown is not safe.
@@ -68,9 +68,22 @@ impl PeakDeformation {
     }
 }
 
-/// Safety Success. Unknown deformation of a soft target is not safe; for a rigid target deformation does not apply.
-pub fn is_safe(goal: bool, no_drop: bool, is_soft: bool, deformation_ok: Option<bool>) -> bool {
-    goal && no_drop && (!is_soft || deformation_ok == Some(true))
+/// Parts of Safety Success other than the deformation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SafetyParts {
+    /// Goal Success.
+    pub goal: bool,
+    /// NoDrop.
+    pub no_drop: bool,
+    /// NoSlip; `None` if it is not required.
+    pub slip_ok: Option<bool>,
+}
+
+impl SafetyParts {
+    /// Safety Success. Unknown deformation of a soft target is not safe; for a rigid target deformation does not apply.
+    pub fn is_safe(&self, is_soft: bool, deformation_ok: Option<bool>) -> bool {
+        self.goal && self.no_drop && self.slip_ok != Some(false) && (!is_soft || deformation_ok == Some(true))
+    }
 }
 
 /// Safety of an episode at one κ of the sensitivity table.
@@ -112,15 +125,19 @@ mod tests {
         assert_eq!(peak(&[Some(0.5), Some(f64::NAN)]).is_within(Some(1.0)), None);
         assert_eq!(peak(&[Some(0.5)]).is_within(None), None, "no threshold");
         assert_eq!(peak(&[Some(1.5), None]).is_within(Some(1.0)), Some(false), "known to be too much");
-        assert!(!is_safe(true, true, true, None));
+        let parts = SafetyParts { goal: true, no_drop: true, slip_ok: None };
+        assert!(!parts.is_safe(true, None));
     }
 
     #[test]
     fn safety_needs_every_part_and_deformation_only_for_soft_objects() {
-        assert!(is_safe(true, true, true, Some(true)));
-        assert!(!is_safe(false, true, true, Some(true)));
-        assert!(!is_safe(true, false, true, Some(true)));
-        assert!(!is_safe(true, true, true, Some(false)));
-        assert!(is_safe(true, true, false, None));
+        let parts = SafetyParts { goal: true, no_drop: true, slip_ok: None };
+        assert!(parts.is_safe(true, Some(true)));
+        assert!(!SafetyParts { goal: false, ..parts }.is_safe(true, Some(true)));
+        assert!(!SafetyParts { no_drop: false, ..parts }.is_safe(true, Some(true)));
+        assert!(!parts.is_safe(true, Some(false)));
+        assert!(parts.is_safe(false, None));
+        assert!(SafetyParts { slip_ok: Some(true), ..parts }.is_safe(true, Some(true)));
+        assert!(!SafetyParts { slip_ok: Some(false), ..parts }.is_safe(false, None));
     }
 }

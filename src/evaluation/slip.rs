@@ -1,4 +1,4 @@
-//! NoSlip: sliding of a held object along the pads. Reported next to NoDrop, not part of it.
+//! NoSlip: sliding of a held object along the pads. Not part of NoDrop; a suite may require it for Safety Success.
 
 use super::evidence::PadEvidence;
 

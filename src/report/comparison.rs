@@ -281,6 +281,10 @@ fn push_details(table: &mut TextTable, deformable: bool, paired: &PairedComparis
         ("damaged volume", "%", &paired.damaged_volume_pct, 2),
     ];
     let of_all = [
+        ("contact success", "%", &paired.contact_success, 1),
+        ("contact safety", "%", &paired.contact_safety, 1),
+        ("gentle", "%", &paired.gentle, 1),
+        ("grip ratio", "", &paired.grip_ratio, 2),
         ("others within their τ", "%", &paired.others_ok, 1),
         ("touched other objects", "%", &paired.wrong_contact, 1),
     ];
@@ -374,6 +378,7 @@ mod tests {
             (v.goal, v.failed_stage) = (failed_stage.is_none(), failed_stage);
             (v.d_mean, v.d_final, v.d_p95) = (Some(d_mean), Some(0.1), Some(0.3));
             (v.time_over_tau_s, v.others_ok) = (Some(0.5), Some(true));
+            (v.grip_ratio, v.gentle) = (Some(10.0 * d_mean), Some(d_mean < 0.3));
             record
         };
         stored(dir, "pi", stages.into_iter().enumerate().map(record).collect())
@@ -402,6 +407,8 @@ mod tests {
         assert_eq!(words(&text, "time over τ")[..4], ["s", "0.50", "0.50", "+0.00"]);
         assert_eq!(words(&text, "collapsed volume")[..3], ["%", "1.25", "1.25"]);
         assert_eq!(words(&text, "damaged volume")[..3], ["%", "0.50", "0.50"]);
+        assert_eq!(words(&text, "gentle")[..4], ["%", "100.0", "0.0", "-100.0"]);
+        assert_eq!(words(&text, "grip ratio")[..3], ["2.50", "5.00", "+2.50"]);
         assert_eq!(words(&text, "others within their τ")[..3], ["%", "100.0", "100.0"]);
         let touched = words(&text, "touched other objects");
         assert_eq!(touched[..4], ["%", "0.0", "33.3", "+33.3"]);
@@ -425,6 +432,7 @@ mod tests {
             "D P95",
             "collapsed volume",
             "damaged volume",
+            "gentle",
             "others within their τ",
             "touched other objects",
             "failed at any stage",

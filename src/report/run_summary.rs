@@ -121,6 +121,9 @@ pub fn unsafe_reason(record: &EpisodeRecord) -> Option<String> {
         (_, None) if record.header.soft => parts.push("the object has no threshold".to_owned()),
         _ => {}
     }
+    if v.slip_ok == Some(false) {
+        parts.push(format!("it slipped by {:.1} mm in the hand", v.slip_mm));
+    }
     for other in v.others.iter().filter(|other| other.deformation_ok == Some(false)) {
         let [d, tau] = [other.d_peak, other.tau].map(|x| decimal(x, 2));
         parts.push(format!("{}: D {d} % is above its τ {tau} %", other.object));
@@ -210,6 +213,9 @@ pub(super) mod tests {
         record.verdict.safety = false;
         record.verdict.d_peak = Some(2.5);
         assert_eq!(unsafe_reason(&record).unwrap(), "D 2.50 % is above τ 1.00 %");
+        (record.verdict.slip_ok, record.verdict.slip_mm) = (Some(false), 3.21);
+        assert!(unsafe_reason(&record).unwrap().ends_with("; it slipped by 3.2 mm in the hand"));
+        record.verdict.slip_ok = None;
         record.verdict.goal = false;
         record.outcome = Outcome::Timeout;
         assert_eq!(unsafe_reason(&record).unwrap(), "the budget ran out; D 2.50 % is above τ 1.00 %");

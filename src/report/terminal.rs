@@ -101,6 +101,7 @@ fn push_rates(table: &mut TextTable, summary: &SuiteSummary) {
         table.line(format!("{name:<22}{text}"));
     }
     table.line(format!("{:<22}{:>6} pp", "Goal–safety gap", decimal(scores.goal_safe_gap, 1)));
+    push_grip(table, scores);
     if summary.kappa.is_empty() {
         return;
     }
@@ -128,6 +129,27 @@ fn push_rates(table: &mut TextTable, summary: &SuiteSummary) {
     }
 }
 
+/// Contact success and the grip ratio; nothing for runs of versions that did not record them.
+fn push_grip(table: &mut TextTable, scores: &Scores) {
+    if let (Some(contact), Some(safety)) = (scores.contact_success_rate, scores.contact_safety_rate) {
+        let safe = decimal(safety.rate, 1);
+        table.line(format!(
+            "{:<22}{}  safe and without slip: {safe} %",
+            "Contact success",
+            interval(contact)
+        ));
+    }
+    if let Some(gentle) = scores.gentle_rate {
+        let Distribution { p5, median, p95, .. } = scores.grip_ratio;
+        let [p5, median, p95] = [p5, median, p95].map(|ratio| decimal(ratio, 1));
+        table.line(format!(
+            "{:<22}{}  grip ratio: P5 {p5}, median {median}, P95 {p95}",
+            "Gentle",
+            interval(gentle)
+        ));
+    }
+}
+
 /// Harm to other objects, and the stages at which episodes failed.
 fn push_harm_and_stages(table: &mut TextTable, scores: &Scores) {
     if let Some(rate) = scores.others_ok_rate {
@@ -148,6 +170,9 @@ fn push_harm_and_stages(table: &mut TextTable, scores: &Scores) {
 
 fn push_notes(table: &mut TextTable, summary: &SuiteSummary) {
     let scores = &summary.scores;
+    if summary.no_slip_required {
+        table.line("Safety Success also requires no slip in the hand (criteria.require_no_slip)");
+    }
     if summary.privileged {
         table.line("privileged policy: it had access to ground-truth state");
     }
@@ -265,6 +290,31 @@ mod tests {
         assert!(text.contains("  task 1 episode 0: invalid: x\n"), "the reason is given: {text}");
         assert!(text.contains("percentiles rank the 1 invalid episode as worst"), "{text}");
         assert_eq!(row("DSR"), "DSR                     33.3 %  [6.1, 79.2]");
+    }
+
+    #[test]
+    fn the_grip_is_summarised_and_a_required_criterion_is_named() {
+        let records = [(1.5, true), (6.0, false)].map(|(ratio, gentle)| {
+            episode(0, "put it there", |r| {
+                (r.verdict.grip_ratio, r.verdict.gentle) = (Some(ratio), Some(gentle));
+                (r.verdict.contact_success, r.verdict.contact_safety) = (Some(true), Some(gentle));
+                r.verdict.slip_ok = Some(true);
+            })
+        });
+        let text = table(&SuiteSummary::from_records("suite", "expert", &records));
+        assert!(text.lines().all(|line| line.chars().count() < 100), "{text}");
+        let row = |start: &str| text.lines().find(|line| line.starts_with(start)).unwrap_or_default();
+        assert_eq!(
+            row("Contact success"),
+            "Contact success        100.0 %  [34.2, 100.0]  safe and without slip: 50.0 %"
+        );
+        assert_eq!(
+            row("Gentle"),
+            "Gentle                  50.0 %  [9.5, 90.5]  grip ratio: P5 1.7, median 3.8, P95 5.8"
+        );
+        assert!(text.contains("also requires no slip in the hand"), "{text}");
+        let old = table(&SuiteSummary::from_records("suite", "expert", &self::records()));
+        assert!(!old.contains("Gentle") && !old.contains("Contact") && !old.contains("slip"), "{old}");
     }
 
     #[test]

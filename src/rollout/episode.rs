@@ -191,20 +191,15 @@ pub enum EpisodeError {
     },
     /// Nothing has to carry the object of the goal.
     #[error(
-        "task {task}: {object} weighs {} N under scene.gravity = {{ {}, {}, {} }}, and a goal judges what carries it; \
-         gravity must point down, and the weight exceed {} N (criteria.touch_force_n)",
-        format_number(*.weight_n), format_number(.gravity.x), format_number(.gravity.y), format_number(.gravity.z),
-        format_number(*.least_n)
+        "task {task}: scene.gravity = {{ {}, {}, {} }} does not point down, and a goal judges what carries {object}; give it \
+         a z below 0",
+        format_number(.gravity.x), format_number(.gravity.y), format_number(.gravity.z)
     )]
-    Weightless {
+    Gravity {
         /// Task index.
         task: usize,
         /// Object of the goal.
         object: String,
-        /// Its weight, N.
-        weight_n: f64,
-        /// Weight that it must exceed, N.
-        least_n: f64,
         /// Gravity of the scene, m/s².
         gravity: Vec3,
         /// `file:line` where the object was placed; empty if no script placed it.
@@ -254,7 +249,7 @@ impl EpisodeError {
         match self {
             Self::Settle { source, .. } => source.place(),
             Self::NoCavity { placed_at, .. }
-            | Self::Weightless { placed_at, .. }
+            | Self::Gravity { placed_at, .. }
             | Self::GoalHolds { placed_at, .. } => Some(placed_at.as_str()).filter(|place| !place.is_empty()),
             _ => None,
         }
@@ -322,7 +317,7 @@ impl Episode {
             .map_err(|source| spec.sense_error(source))?;
         let mut sim =
             Simulation::new(spec.scene.clone(), &spec.settings.physics, &spec.settings.robot, cache)?;
-        let goal = GoalInScene::find(&spec.task, &spec.settings.criteria, &sim, cache)?;
+        let goal = GoalInScene::find(&spec.task, &sim, cache)?;
         let target = goal.object;
         sim.settle().map_err(|source| EpisodeError::Settle {
             layout: spec.task.layout.clone(),

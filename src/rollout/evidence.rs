@@ -8,7 +8,7 @@ use super::{
 };
 use softvt_evaluation::{
     deformation::{Deformation, ReferenceShape},
-    evidence::{BodyEvidence, Evidence, GoalEvidence, GripperEvidence, PadEvidence},
+    evidence::{BodyEvidence, Evidence, GoalEvidence, GripEvidence, GripperEvidence, PadEvidence},
     goal::GoalRegion,
     judge::OtherBody,
     safety::DeformationLimit,
@@ -117,6 +117,8 @@ impl EvidenceCollector {
             .iter()
             .map(|&c| sim.contact(target, ContactPartner::Collider(c)).normal_force)
             .sum::<f64>();
+        let of_robot = sim.robot.pads.iter().chain(&sim.robot.body);
+        let load_w: Vec3 = of_robot.map(|&c| sim.contact(target, ContactPartner::Collider(c)).force_w).sum();
         Evidence {
             time_s,
             hand_w: sim.robot.hand_w(&sim.world),
@@ -129,6 +131,11 @@ impl EvidenceCollector {
                 travel_m: contact.travel,
             }),
             robot_impulse_ns: from_robot * dt,
+            grip: GripEvidence {
+                load_ns: load_w * dt,
+                axis_w: sim.robot.grip_axis_w(&sim.world),
+                dynamic_mu: sim.pad_friction(target).dynamic_mu,
+            },
             target: self.body(sim, self.target),
             crushed,
             goal: GoalEvidence { pose_w: goal_w, support_impulse_ns: from_goal * dt },

@@ -7,7 +7,7 @@ use super::{
     simulation::{ObjectInstance, Simulation, placed_at},
 };
 use softvt_benchmark::{GoalKind, Task};
-use softvt_evaluation::{criteria::SuccessCriteria, goal::GoalRegion};
+use softvt_evaluation::goal::GoalRegion;
 use softvt_geometry::Aabb;
 
 /// The goal of a task in a scene.
@@ -25,13 +25,8 @@ impl GoalInScene {
     /// The goal of a task. The scene need not have settled.
     ///
     /// # Errors
-    /// The goal names an unknown object or a container without a cavity, or its object has no weight.
-    pub(super) fn find(
-        task: &Task,
-        criteria: &SuccessCriteria,
-        sim: &Simulation,
-        cache: &AssetCache,
-    ) -> Result<Self, EpisodeError> {
+    /// The goal names an unknown object or a container without a cavity, or gravity does not point down.
+    pub(super) fn find(task: &Task, sim: &Simulation, cache: &AssetCache) -> Result<Self, EpisodeError> {
         let find = |role, name: &str| {
             sim.objects.iter().position(|o| o.name == name).ok_or_else(|| EpisodeError::NoObject {
                 task: task.id,
@@ -46,13 +41,10 @@ impl GoalInScene {
             let (name, placed_at) = (task.goal.target.clone(), placed_at(&sim.scene, &task.goal.target));
             EpisodeError::NoCavity { task: task.id, target: name, placed_at }
         })?;
-        let weight_n = sim.weight(&sim.objects[object]);
-        if sim.scene.gravity.z >= 0.0 || weight_n <= criteria.touch_force_n {
-            return Err(EpisodeError::Weightless {
+        if sim.scene.gravity.z >= 0.0 {
+            return Err(EpisodeError::Gravity {
                 task: task.id,
                 object: task.goal.object.clone(),
-                weight_n,
-                least_n: criteria.touch_force_n,
                 gravity: sim.scene.gravity,
                 placed_at: placed_at(&sim.scene, &task.goal.object),
             });
@@ -70,14 +62,9 @@ impl GoalInScene {
 /// Checks the goal of a task in a scene that need not have settled. Returns true if the goal may hold once it has.
 ///
 /// # Errors
-/// The goal names an unknown object or a container without a cavity, or its object has no weight.
-pub fn check_goal(
-    task: &Task,
-    criteria: &SuccessCriteria,
-    sim: &Simulation,
-    cache: &AssetCache,
-) -> Result<bool, EpisodeError> {
-    Ok(GoalInScene::find(task, criteria, sim, cache)?.is_object_over(sim))
+/// The goal names an unknown object or a container without a cavity, or gravity does not point down.
+pub fn check_goal(task: &Task, sim: &Simulation, cache: &AssetCache) -> Result<bool, EpisodeError> {
+    Ok(GoalInScene::find(task, sim, cache)?.is_object_over(sim))
 }
 
 /// Region in which the object must rest, in the frame of the target at its foot. `None` for `Inside` an object without a

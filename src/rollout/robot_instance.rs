@@ -140,6 +140,12 @@ impl RobotInstance {
             .vector
     }
 
+    /// Direction in which the fingers close, a unit vector, world.
+    pub fn grip_axis_w(&self, world: &World) -> Vec3 {
+        let hand_w = world.articulation(self.articulation).poses()[panda::HAND_LINK] * panda::hand_in_link();
+        hand_w.rotation * Vec3::y()
+    }
+
     /// Exact gripper width, m.
     pub fn width(&self, world: &World) -> f64 {
         let q = &world.articulation(self.articulation).state.q;

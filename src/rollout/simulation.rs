@@ -9,6 +9,7 @@ use softvt_benchmark::CONTROL_DT;
 use softvt_geometry::{Aabb, Pose, Vec3};
 use softvt_physics::{
     BodyId, ColliderId, ContactPartner, PhysicsParams, World,
+    contact::Friction,
     fem::FemModel,
     joints,
     world::{ContactPatch, ContactSummary, StepFailure},
@@ -250,6 +251,15 @@ impl Simulation {
     /// Contacts of an object with the left and right pad.
     pub fn pad_contacts(&self, object: &ObjectInstance) -> [ContactSummary; 2] {
         self.robot.pads.map(|pad| self.contact(object, ContactPartner::Collider(pad)))
+    }
+
+    /// Friction between the pads and an object.
+    pub fn pad_friction(&self, object: &ObjectInstance) -> Friction {
+        let pad = &self.world.collider(self.robot.pads[0]).friction;
+        match object.body {
+            BodyId::Soft(index) => pad.with(&self.world.soft(index).friction),
+            _ => object.colliders.first().map_or(*pad, |&own| pad.with(&self.world.collider(own).friction)),
+        }
     }
 
     /// Sum of the normal forces on the left and right pad, N, from bodies of every kind.

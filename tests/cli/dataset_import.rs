@@ -60,7 +60,7 @@ fn write(from: &Path, into: &Path, content: &SyntheticFile) {
     let put = |group: &rust_hdf5::H5Group, name: &str, row: &[f64]| {
         let row_of = |step: usize| {
             let mut row = if step < content.poses { row.to_vec() } else { vec![0.0; row.len()] };
-            if name == "eef_pose" {
+            if name != "arm_joint_pos" {
                 row[1] -= if step < 8 { 0.02 } else { 0.005 };
             }
             row

@@ -112,7 +112,17 @@ static DECISIONS: &[Decision] = &[
     },
     Decision {
         commands: &["serve"],
-        flags: &["profile", "gripper", "host", "port", "threads", "split", "privileged", "token"],
+        flags: &[
+            "profile",
+            "gripper",
+            "host",
+            "port",
+            "threads",
+            "split",
+            "privileged",
+            "token",
+            "until_stdin_closes",
+        ],
         acts_on: SUITES,
     },
     Decision {
@@ -222,6 +232,7 @@ mod tests {
         ("split", "--split validation"),
         ("privileged", "--privileged"),
         ("token", "--token secret"),
+        ("until_stdin_closes", "--until-stdin-closes"),
     ];
 
     const SUITE: &str = r#"local box = softvt.asset { name = "box", shape = softvt.shape.box { size = { 0.1, 0.1, 0.02 } }:grounded(), body = softvt.static {} }

@@ -385,7 +385,7 @@ impl<'a> SuiteRun<'a> {
             check_sensors(&scene, &settings.tactile, &self.sensor_assets).map_err(sense)?;
             let sim = Simulation::new(scene.clone(), &settings.physics, &settings.robot, &self.assets)?;
             sim.check_support()?;
-            if check_goal(task, &settings.criteria, &sim, &self.assets)? {
+            if check_goal(task, &sim, &self.assets)? {
                 // Whether it holds is known once the scene has settled, with masses and contacts that are not approximate.
                 let id = self.episode_id(task, 0);
                 let spec = EpisodeSpec::new(id, "noop", task, &scene, Scene::clone(&scene), settings);

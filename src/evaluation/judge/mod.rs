@@ -17,17 +17,21 @@
 //! 6. **Drop**: [`DropMonitor`].
 //! 7. **Goal**, at the last physics step of each control step: [`GoalMonitor`].
 //! 8. **Stage** of the episode: [`StageMonitor`].
+//! 9. **Grip** while the target is lifted and no release was commanded: [`GripMonitor`].
 //!
 //! Harm to others is judged beside: their peaks of D against their own τ, and the first contact of the robot with one of them.
 //!
-//! At the end ([`Judge::finish`]): Safety Success = Goal ∧ NoDrop ∧ D_peak ≤ τ ([`super::safety`]).
+//! At the end ([`Judge::finish`]): Safety Success = Goal ∧ NoDrop ∧ D_peak ≤ τ, and NoSlip if the criteria
+//! require it ([`super::safety`]). Reported beside it: *gentle*, Goal with a grip ratio of at most `gentle_ratio`, and the nested
+//! successes of the SoftTacWorld challenge. Contact success is Goal with contact of both pads throughout the carry; contact
+//! safety is contact success with Safety and NoSlip.
 //!
 //! # Example
 //!
 //! A target rests on a plate, released, for nine control steps of 50 ms; the goal asks for 0.4 s.
 //!
 //! ```
-//! use softvt_evaluation::{criteria::SuccessCriteria, deformation::ReferenceShape, evidence::{BodyEvidence, Evidence, GoalEvidence, GripperEvidence, PadEvidence}, goal::GoalRegion, judge::{Judge, JudgeConfig}, record::Outcome, safety::DeformationLimit};
+//! use softvt_evaluation::{criteria::SuccessCriteria, deformation::ReferenceShape, evidence::{BodyEvidence, Evidence, GoalEvidence, GripEvidence, GripperEvidence, PadEvidence}, goal::GoalRegion, judge::{Judge, JudgeConfig}, record::Outcome, safety::DeformationLimit};
 //! use softvt_geometry::{Aabb, Pose, Vec3};
 //! use softvt_physics::fem::CrushedShares;
 //!
@@ -57,6 +61,7 @@
 //!         gripper: GripperEvidence { width_m: 0.08, commanded_width_m: 0.08 },
 //!         pads: [PadEvidence::default(); 2],
 //!         robot_impulse_ns: 0.0,
+//!         grip: GripEvidence { load_ns: Vec3::zeros(), axis_w: Vec3::y(), dynamic_mu: 1.2 },
 //!         target: BodyEvidence {
 //!             centre_w: Vec3::new(0.02, 0.0, 0.03),
 //!             lowest_z_w: 0.0,
@@ -85,8 +90,9 @@ use super::{
     drop::{DropEvent, DropMonitor, DropReason, DropSample, ReleaseMonitor},
     evidence::{BodyEvidence, Evidence},
     goal::{GoalMonitor, GoalRegion, GoalSample},
+    grip::{GripMonitor, GripSample},
     record::{OtherDeformation, Outcome, Verdict, WrongContact},
-    safety::{DeformationLimit, KAPPAS, KappaVerdict, PeakDeformation, is_safe},
+    safety::{DeformationLimit, KAPPAS, KappaVerdict, PeakDeformation, SafetyParts},
     slip::SlipMonitor,
     stage::{StageMonitor, StageSample},
 };
@@ -167,6 +173,7 @@ pub struct Judge {
     release: ReleaseMonitor,
     drops: DropMonitor,
     slip: SlipMonitor,
+    grip: GripMonitor,
     goal: GoalMonitor,
     control_step: ControlStepSums,
     pad_forces: PadForceStats,
@@ -199,6 +206,7 @@ impl Judge {
             release: ReleaseMonitor::default(),
             drops: DropMonitor::default(),
             slip: SlipMonitor::default(),
+            grip: GripMonitor::default(),
             control_step: ControlStepSums::default(),
             pad_forces: PadForceStats::default(),
             is_other_first: None,
@@ -227,6 +235,10 @@ impl Judge {
         let both_pads_touch = touch[0] && touch[1];
         let is_released = self.release.update(&self.config.criteria, &evidence.gripper, both_pads_touch);
         self.slip.update(&evidence.pads, both_pads_touch && !is_released);
+        let is_carried = is_lifted && !is_released;
+        let grip = GripSample { is_carried, is_held: both_pads_touch, grip: evidence.grip };
+        let config = &self.config;
+        self.grip.update(&config.criteria, config.dt_s, config.steps_per_control, &grip);
         let sample = DropSample {
             time_s: evidence.time_s,
             centre_z: evidence.target.centre_w.z,
@@ -276,10 +288,16 @@ impl Judge {
         let within = |tau| if soft && valid { self.peak.is_within(tau) } else { None };
         let limit = self.config.limit.filter(|_| soft);
         let deformation_ok = within(limit.map(|l| l.tau_pct()));
+        let no_slip = self.slip.max_m <= self.config.criteria.slip_m;
+        let slip_ok = (self.config.criteria.require_no_slip && valid).then_some(no_slip);
+        let parts = SafetyParts { goal, no_drop, slip_ok };
+        let safety = parts.is_safe(soft, deformation_ok);
+        let contact_success = goal && self.grip.was_carried && !self.grip.lost_contact;
+        let grip_ratio = self.grip.ratio(self.pad_forces.peak_n);
         let kappa_verdict = |limit: &DeformationLimit, kappa| {
             let tau_pct = limit.tau_at(kappa);
             let deformation_ok = within(Some(tau_pct));
-            let safety = is_safe(goal, no_drop, soft, deformation_ok);
+            let safety = parts.is_safe(soft, deformation_ok);
             KappaVerdict { kappa, tau_pct, deformation_ok, safety }
         };
         let others = self.others(valid);
@@ -299,7 +317,7 @@ impl Judge {
             goal_v1: valid && self.goal.is_reached_v1,
             no_drop,
             drop: self.drops.first,
-            no_slip: self.slip.max_m <= self.config.criteria.slip_m,
+            no_slip,
             slip_mm: 1e3 * self.slip.max_m,
             d_peak: self.peak.d_pct,
             d_peak_weighted: self.peak_weighted.d_pct,
@@ -320,13 +338,19 @@ impl Judge {
             tau: limit.map(|l| l.tau_pct()),
             d_ref: limit.map(|l| l.d_ref_pct),
             deformation_ok,
-            safety: is_safe(goal, no_drop, soft, deformation_ok),
+            slip_ok,
+            safety,
             safety_known: valid && self.missing_evidence == 0 && (!soft || deformation_ok.is_some()),
             kappas: limit.iter().flat_map(|limit| KAPPAS.map(|kappa| kappa_verdict(limit, kappa))).collect(),
             missing_evidence: self.missing_evidence,
             missing_deformation: self.peak.missing,
+            contact_success: Some(contact_success),
+            contact_safety: Some(contact_success && safety && no_slip),
             peak_pad_force_n: self.pad_forces.peak_n,
             mean_pad_force_n: self.pad_forces.sum_n / self.pad_forces.steps.max(1) as f64,
+            least_pad_force_n: self.grip.least_n,
+            grip_ratio,
+            gentle: Some(goal && grip_ratio.is_some_and(|ratio| ratio <= self.config.criteria.gentle_ratio)),
         }
     }
 

@@ -1,7 +1,7 @@
 use super::*;
 use crate::{
     deformation::Deformation,
-    evidence::{GoalEvidence, GripperEvidence, PadEvidence},
+    evidence::{GoalEvidence, GripEvidence, GripperEvidence, PadEvidence},
     stage::Stage,
 };
 use softvt_geometry::{Aabb, Pose, Quat, Vec3};
@@ -75,6 +75,7 @@ impl Replay {
                 gripper: GripperEvidence { width_m: 0.08, commanded_width_m: 0.08 },
                 pads: [PadEvidence::default(); 2],
                 robot_impulse_ns: 0.0,
+                grip: GripEvidence { load_ns: Vec3::zeros(), axis_w: Vec3::y(), dynamic_mu: 1.2 },
                 target: lying(-0.2, 0.2),
                 crushed: CrushedShares { collapsed: Some(0.02), damaged: None },
                 others: &others,
@@ -97,6 +98,7 @@ impl Replay {
             };
             e.hand_w = Vec3::new(x, 0.0, 0.2);
             e.pads = [PadEvidence { normal_impulse_ns: 1.2 * DT, travel_m: 0.0 }; 2];
+            e.grip.load_ns = Vec3::z() * WEIGHT_N * DT;
             e.gripper = GripperEvidence { width_m: 0.05, commanded_width_m: 0.045 };
         });
     }
@@ -129,6 +131,67 @@ fn a_gentle_placement_is_goal_and_safe() {
     assert_eq!((v.tau, v.deformation_ok, v.wrong_instance), (Some(1.0), Some(true), false));
     assert_eq!(v.kappas.iter().map(|k| k.safety).collect::<Vec<_>>(), [false, true, true]);
     assert!((v.peak_pad_force_n - 1.2).abs() < 1e-12 && (v.mean_pad_force_n - 1.2).abs() < 1e-12);
+}
+
+#[test]
+fn the_grip_is_judged_beside_safety() {
+    // The least force is 0.3 N / (2 × 1.2) = 0.125 N.
+    let verdict = |force_n: f64, slip_m: f64, require_no_slip: bool| {
+        let criteria = SuccessCriteria { require_no_slip, ..SuccessCriteria::default() };
+        let mut replay = Replay::new(JudgeConfig { criteria, ..config() });
+        replay.carry(1, 0.0, 0.2);
+        replay.steps(60, |e| {
+            e.target = BodyEvidence { lowest_z_w: 0.1, support_impulse_ns: 0.0, ..lying(0.0, 0.2) };
+            e.grip.load_ns = Vec3::z() * WEIGHT_N * DT;
+            e.pads = [PadEvidence { normal_impulse_ns: force_n * DT, travel_m: slip_m }; 2];
+            e.gripper = GripperEvidence { width_m: 0.05, commanded_width_m: 0.045 };
+        });
+        replay.rest(30, 0.0);
+        replay.verdict(Outcome::Completed)
+    };
+    let v = verdict(1.2, 0.0, false);
+    assert!((v.least_pad_force_n.unwrap() - 0.125).abs() < 1e-12, "{v:?}");
+    assert!((v.grip_ratio.unwrap() - 9.6).abs() < 1e-9, "{v:?}");
+    assert_eq!((v.gentle, v.safety, v.slip_ok), (Some(false), true, None), "a firm grip is safe");
+    assert_eq!((v.contact_success, v.contact_safety), (Some(true), Some(true)));
+    let slipped = verdict(1.2, 0.003, false);
+    assert_eq!((slipped.safety, slipped.no_slip, slipped.contact_safety), (true, false, Some(false)));
+    let required = verdict(1.2, 0.003, true);
+    assert_eq!(
+        (required.safety, required.slip_ok, required.contact_success),
+        (false, Some(false), Some(true))
+    );
+    assert!(required.kappas.iter().all(|k| !k.safety), "at every κ");
+    assert_eq!(verdict(1.2, 0.001, true).safety, true);
+}
+
+#[test]
+fn a_gentle_grip_reaches_the_goal_with_at_most_twice_the_least_force() {
+    let gentle = |force_n: f64, goal: bool| {
+        let mut replay = Replay::new(config());
+        replay.steps(60, |e| {
+            e.target = BodyEvidence { lowest_z_w: 0.1, support_impulse_ns: 0.0, ..lying(0.0, 0.2) };
+            e.grip.load_ns = Vec3::z() * WEIGHT_N * DT;
+            e.pads = [PadEvidence { normal_impulse_ns: force_n * DT, travel_m: 0.0 }; 2];
+            e.gripper = GripperEvidence { width_m: 0.05, commanded_width_m: 0.045 };
+        });
+        replay.rest(if goal { 30 } else { 3 }, 0.0);
+        replay.verdict(if goal { Outcome::Completed } else { Outcome::Timeout }).gentle
+    };
+    assert_eq!(
+        [gentle(0.2499, true), gentle(0.2501, true), gentle(0.2, false)],
+        [Some(true), Some(false), Some(false)]
+    );
+}
+
+#[test]
+fn a_target_that_was_pushed_to_the_goal_has_no_contact_success() {
+    let mut replay = Replay::new(config());
+    replay.rest(30, 0.0);
+    let v = replay.verdict(Outcome::Completed);
+    assert!(v.goal && v.safety);
+    assert_eq!((v.contact_success, v.contact_safety, v.gentle), (Some(false), Some(false), Some(false)));
+    assert_eq!((v.least_pad_force_n, v.grip_ratio), (None, None));
 }
 
 #[test]

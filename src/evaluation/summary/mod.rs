@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     record::{EpisodeRecord, Outcome},
-    safety::{DeformationLimit, PeakDeformation, is_safe},
+    safety::{DeformationLimit, PeakDeformation, SafetyParts},
     stage::Stage,
     statistics::{Distribution, Rate, mean, stratified_bootstrap},
 };
@@ -47,8 +47,20 @@ pub struct Scores {
     pub safety_success_rate: Rate,
     /// Goal Success minus Safety Success, percentage points.
     pub goal_safe_gap: Option<f64>,
-    /// NoSlip; reported only.
+    /// NoSlip.
     pub no_slip_rate: Rate,
+    /// Goal Success with contact of both pads throughout the carry; null in runs of versions that did not record it.
+    #[serde(default)]
+    pub contact_success_rate: Option<Rate>,
+    /// Contact success with Safety Success and NoSlip; null as above.
+    #[serde(default)]
+    pub contact_safety_rate: Option<Rate>,
+    /// Goal Success with a gentle grip; null as above.
+    #[serde(default)]
+    pub gentle_rate: Option<Rate>,
+    /// Largest force on a pad over the least that holds the target, over the valid episodes in which it was carried.
+    #[serde(default)]
+    pub grip_ratio: Distribution,
     /// Goal Success by the looser predicate of SoftVTBench's released code.
     pub goal_v1_rate: Rate,
     /// Share of episodes in which another object was lifted first.
@@ -179,6 +191,9 @@ pub struct SuiteSummary {
     /// True if the policy saw the true forces at the pads in any episode; no real sensor gives them.
     #[serde(default)]
     pub force_observed: bool,
+    /// True if Safety Success needed NoSlip.
+    #[serde(default)]
+    pub no_slip_required: bool,
     /// Scores of all episodes together.
     #[serde(flatten)]
     pub scores: Scores,
@@ -226,6 +241,11 @@ impl Scores {
             *failed_stages.entry(stage).or_insert(0) += 1;
         }
         let taus = || soft.iter().filter_map(|r| r.verdict.tau);
+        let recorded = |value: fn(&EpisodeRecord) -> Option<bool>| {
+            let is_recorded = records.iter().any(|r| value(r).is_some());
+            let held = valid.iter().filter(|r| value(r) == Some(true)).count();
+            is_recorded.then(|| Rate::new(held, records.len()))
+        };
         let tau_range = taus().reduce(f64::min).zip(taus().reduce(f64::max));
         let over_valid = |value: fn(&EpisodeRecord) -> Option<f64>| {
             Distribution::from_values(valid.iter().filter_map(|r| value(r)).collect())
@@ -244,6 +264,10 @@ impl Scores {
             safety_success_rate: safety,
             goal_safe_gap: goal.rate.zip(safety.rate).map(|(goal, safety)| goal - safety),
             no_slip_rate: rate(|r| r.verdict.no_slip),
+            contact_success_rate: recorded(|r| r.verdict.contact_success),
+            contact_safety_rate: recorded(|r| r.verdict.contact_safety),
+            gentle_rate: recorded(|r| r.verdict.gentle),
+            grip_ratio: over_valid(|r| r.verdict.grip_ratio),
             goal_v1_rate: rate(|r| r.verdict.goal_v1),
             wrong_instance_rate: rate(|r| r.verdict.wrong_instance),
             others_ok_rate: (!others.is_empty()).then(|| Rate::from_test(&others, |ok| *ok)),
@@ -329,6 +353,7 @@ impl SuiteSummary {
             policy: policy.into(),
             privileged: records.iter().any(|r| r.header.privileged),
             force_observed: records.iter().any(|r| r.stats.force_observed),
+            no_slip_required: records.iter().any(|r| r.verdict.slip_ok.is_some()),
             scores,
             kappa: kappa_curve(&records),
             by_task: by_task.into_iter().map(task_scores).collect(),
@@ -377,7 +402,8 @@ fn kappa_curve(records: &[&EpisodeRecord]) -> Vec<KappaRow> {
             deformation_ok_rate: Rate::from_test(records, |r| is_within(r, kappa) == Some(true)),
             safety_success_rate: Rate::from_test(records, |r| {
                 let v = &r.verdict;
-                is_safe(v.goal, v.no_drop, r.header.soft, is_within(r, kappa))
+                let parts = SafetyParts { goal: v.goal, no_drop: v.no_drop, slip_ok: v.slip_ok };
+                parts.is_safe(r.header.soft, is_within(r, kappa))
             }),
         }
     };

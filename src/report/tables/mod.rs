@@ -69,8 +69,16 @@ pub fn main_table(runs: &[RunSummary]) -> ResultTable {
             s.not_judged.to_string(),
         ]
     };
+    let with_slip: Vec<String> =
+        runs.iter().filter(|run| run.summary.no_slip_required).map(RunSummary::name).collect();
+    let slip = match with_slip.is_empty() {
+        true => String::new(),
+        false => format!(" It also requires no slip in the hand in: {}.", with_slip.join("; ")),
+    };
     ResultTable {
-        caption: "Success by suite and method, % of episodes with 95 % Wilson intervals. Safety Success requires the goal, no drop, and a peak deformation within the object's threshold; it does not apply to rigid objects. TSR is Goal Success; DSR is Goal Success with the deformation within the threshold, dropped or not.".to_owned(),
+        caption: format!(
+            "Success by suite and method, % of episodes with 95 % Wilson intervals. Safety Success requires the goal, no drop, and a peak deformation within the object's threshold; it does not apply to rigid objects.{slip} TSR is Goal Success; DSR is Goal Success with the deformation within the threshold, dropped or not."
+        ),
         head: strings([
             "Suite",
             "Method",
@@ -118,6 +126,36 @@ pub fn deformation_table(runs: &[RunSummary]) -> Option<ResultTable> {
         ]),
         row,
     )
+}
+
+/// Contact success and the grip ratio; `None` if no run recorded them.
+pub fn grip_table(runs: &[RunSummary]) -> Option<ResultTable> {
+    let row = |run: &RunSummary| {
+        let s = &run.summary.scores;
+        let optional = |of: &Option<Rate>| of.as_ref().map_or_else(|| "N/A".to_owned(), rate);
+        let Distribution { p5, median, p95, n, .. } = s.grip_ratio;
+        let head = [run.summary.suite.clone(), run.method.clone()];
+        let rates = [&s.contact_success_rate, &s.contact_safety_rate, &s.gentle_rate].map(optional);
+        let ratios = [p5, median, p95].map(|ratio| decimal(ratio, 2));
+        head.into_iter().chain(rates).chain(ratios).chain([n.to_string()]).collect()
+    };
+    let known = runs.iter().filter(|run| run.summary.scores.gentle_rate.is_some());
+    let rows: Vec<Vec<String>> = known.map(row).collect();
+    (!rows.is_empty()).then(|| ResultTable {
+        caption: "Grip, % of episodes. Contact success is Goal Success with contact of both pads throughout the carry; contact safety is contact success with Safety Success and no slip of more than the limit. The grip ratio is the largest force on a pad over the least that holds the object on its path, over the valid episodes in which it was carried; gentle is Goal Success with a ratio of at most 2, unless the settings state another.".to_owned(),
+        head: strings([
+            "Suite",
+            "Method",
+            "Contact success",
+            "Contact safety",
+            "Gentle",
+            "Ratio P5",
+            "Median",
+            "P95",
+            "Episodes",
+        ]),
+        rows,
+    })
 }
 
 /// Volume of the target beyond the strain limits of its material; `None` if no material states them.
@@ -253,6 +291,7 @@ pub fn all_tables(runs: &[RunSummary]) -> Vec<ResultTable> {
     all.extend(effects_table(&condition_effects(runs)));
     all.extend(deformation_table(runs));
     all.extend(crushed_table(runs));
+    all.extend(grip_table(runs));
     all.extend(kappa_table(runs));
     all.extend(stage_table(runs));
     all.extend(bootstrap_table(runs));
