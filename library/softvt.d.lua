@@ -33,7 +33,7 @@
 ---@field target string Scene name of the target, or of a part of it (cabinet.top_drawer).
 ---@field hold_s? number Time that it must stay there. Expects seconds in 0..10. Default 0.4.
 
----The object rests inside the target's walls, released, for a time.
+---The object rests in the target's cavity, carried by it or by objects in it, released, for a time. The cavity is the space in which its shape holds water.
 ---@class softvt.Inside
 ---@field object string Scene name of the object.
 ---@field target string Scene name of the target, or of a part of it (cabinet.top_drawer).
@@ -1332,7 +1332,7 @@ function softvt.task(spec) end
 ---@return softvt.On
 function softvt.on(spec) end
 
----The object rests inside the target's walls, released, for a time.
+---The object rests in the target's cavity, carried by it or by objects in it, released, for a time. The cavity is the space in which its shape holds water.
 ---@param spec softvt.Inside
 ---@return softvt.Inside
 function softvt.inside(spec) end
