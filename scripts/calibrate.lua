@@ -43,7 +43,7 @@ for _, name in ipairs(opt.asset) do assets[name] = soft_asset("calibrate", name,
 -- Presses of each asset for its instances: as it is, at the ends of the sizes that the standard variations draw, and at other
 -- stiffnesses, with half of the step.
 local VARIANTS = {
-  { 1, 1 }, { 0.88, 1 }, { 1.12, 1 }, { 1, 0.3 }, { 1, 3 }, { 1, 10 },
+  { 1, 1 }, { 0.88, 1 }, { 1.12, 1 }, { 1, 0.3 }, { 1, 3 }, { 1, 10 }, { 1, 30 },
 }
 
 -- The rows of one variant, as softvt.envelope takes them.

@@ -6,26 +6,38 @@
 --
 -- Also counts the draws: an instance is kept if its largest safe grip force is 1.5 to 2.2 times its smallest. Writes docs/instance_checks.md
 -- if all kinds are checked.
+local suite = require "suites.object_hidden"
 local hidden = require "variations.hidden"
 local press = require "calibration.press"
 local soft_asset = require "calibration.soft_asset"
 
-local KINDS = {
-  "steamed_bun", "spiral_roll", "yellow_roll", "golden_bun", "sesame_bun", "small_ridged_roll", "cube", "cylinder", "sphere", "capsule",
-}
 -- Step of the press, m, and number of instances for the statistics of the draws.
 local STEP, SAMPLE = 2.5e-4, 1000
 
+local kinds = {}
+for k, task in ipairs(suite.tasks) do kinds[k] = task.goal.object end
+
 local opt = softvt.options {
-  asset = { default = KINDS, help = "assets to check" },
+  asset = { default = kinds, help = "assets to check" },
   count = { default = 6, integer = true, min = 1, max = 1000, needs_out = true, help = "instances pressed per asset" },
 }
+
+local PAGE = [[
+# Checks of the limits of instances
+
+The objects of the hidden suites differ from their assets in size, stiffness, density and stable strain, so each has a limit τ of its own. It is read
+off the presses that the calibration stores (`src/evaluation/instance.rs`). `softvt scripts/check_instances.lua` draws instances as
+the suites do, presses each in the simulation, and compares τ of that press with the one that episodes are judged by. An instance is kept if the
+ratio of its largest to its smallest safe grip force is 1.5 to 2.2; the share of the draws that is kept is that of %d instances, and %d
+instances of each asset are pressed.
+
+]]
 
 local assets = {}
 for _, name in ipairs(opt.asset) do assets[name] = soft_asset("check_instances", name, assets) end
 
 local function sample(name, count)
-  return softvt.sample_instances { asset = assets[name], variation = hidden, suite = "object_hidden", count = count }
+  return softvt.sample_instances { asset = assets[name], variation = hidden, suite = suite.name, count = count }
 end
 
 local function run(point, o)
@@ -48,6 +60,30 @@ local function run(point, o)
   }
 end
 
+-- Row of the page about one asset: the share of the draws that is kept, the largest error of τ, and its kept instances.
+local function summary(name, rows)
+  local draws, worst, count = 0, 0, 0
+  for _, one in ipairs(sample(name, SAMPLE)) do draws = draws + one.draws end
+  for _, row in ipairs(rows) do
+    if row.asset == name then
+      count = count + 1
+      -- A press that ends early has no τ to compare with.
+      worst = math.max(worst, row.error_pct and math.abs(row.error_pct) or math.huge)
+    end
+  end
+  return ("| %s | %.1f | %d | %.1f |"):format(name, 100 * SAMPLE / draws, count, worst)
+end
+
+local function finish(rows, o)
+  local lines = {}
+  for k, name in ipairs(o.asset) do lines[k] = summary(name, rows) end
+  local header = "| asset | draws kept, % | instances pressed | largest error of τ, % |\n|---|---|---|---|\n"
+  local text = header .. table.concat(lines, "\n") .. "\n"
+  if #o.asset < #kinds then return { text = text } end
+  local page = PAGE:format(SAMPLE, o.count) .. text
+  return { text = text, files = { ["docs/instance_checks.md"] = page } }
+end
+
 local function points(o)
   local list = {}
   for _, name in ipairs(o.asset) do
@@ -61,5 +97,6 @@ return softvt.experiment {
   options = opt,
   points = points,
   run = run,
+  finish = finish,
   columns = { "asset", "scale", "youngs_factor", "strain_factor", "tau_pressed_pct", "tau_judged_pct", "error_pct", "censored" },
 }

@@ -20,7 +20,7 @@ for k, object in ipairs(objects) do
       prompt = ("pick up the %s %s and place it on the plate"):format(side, object.description),
       layout = layout,
       goal = softvt.on { object = side, target = "plate", hold_s = 0.4 },
-      expert = pick_place { object = side, target = "plate", stop = "touch", window = 0.3 },
+      expert = pick_place { object = side, target = "plate", stop = "touch", share = 0.2, window = 0.2 },
     }
   end
 end
@@ -34,4 +34,6 @@ return softvt.suite {
   shifts = shifts.soft,
   teacher = "tactile-servo",
   vary = require "variations.hidden",
+  -- Noise of a real GelSight Mini (docs/tactile.md).
+  settings = { tactile = { wear = { noise_px = 0.1, image_noise = 0.7 } } },
 }

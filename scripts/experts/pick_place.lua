@@ -2,8 +2,8 @@
 --
 --   expert = pick_place { object = "left", target = "plate" }
 --
--- The grip is drawn uniformly from the middle of the safe window (`window`, 0.8 of it), so that demonstrations do not tell one width
--- per object. The hand closes slowly from before first contact (`closing_speed`, 0.008 m/s). `stop = "touch"` ends closing by the force
+-- The grip is drawn uniformly from a part of the safe window (`window`, 0.8 of it, around `share`, its middle), so that demonstrations do
+-- not tell one width per object. The hand closes slowly from before first contact (`closing_speed`, 0.008 m/s). `stop = "touch"` ends closing by the force
 -- on the pads instead of the width of the gels, as does a grasp that is turned or off-centre for want of clearance. `closure` commands
 -- one closure instead.
 local grasp = require "experts.grasp"
@@ -11,11 +11,11 @@ local route = require "experts.route"
 local fixed_closure = require "experts.fixed_closure"
 
 local FIELDS = {
-  object = "string", target = "string", closure = "number?", speed = "number?", window = "number?", stop = "string?",
+  object = "string", target = "string", closure = "number?", speed = "number?", window = "number?", share = "number?", stop = "string?",
   closing_speed = "number?",
 }
--- Default share of the safe window, and speed of closing in contact, m/s.
-local WINDOW, CLOSING_SPEED = 0.8, 0.008
+-- Default part of the safe window and its middle (0 is the loose end, 1 the tight one), and speed of closing in contact, m/s.
+local WINDOW, MIDDLE, CLOSING_SPEED = 0.8, 0.5, 0.008
 -- Clearance above obstacles while carrying, above the target at release, and around the fingers, m.
 local CARRY_CLEARANCE, RELEASE_HEIGHT, FINGER_CLEARANCE = 0.025, 0.001, 0.002
 -- Fraction of a lift that a held object must follow.
@@ -115,11 +115,13 @@ local function complete(spec)
   local full = {}
   for key, value in pairs(spec) do full[key] = value end
   full.window, full.stop = spec.window or WINDOW, spec.stop or "width"
-  full.closing_speed = spec.closing_speed or CLOSING_SPEED
+  full.closing_speed, full.share = spec.closing_speed or CLOSING_SPEED, spec.share or MIDDLE
   local function refuse(key, expected)
     error(("pick_place: %s: expected %s, got %s"):format(key, expected, tostring(full[key])), 3)
   end
   if full.window < 0 or full.window > 1 then refuse("window", "a share in 0..1") end
+  local room = 0.5 * full.window
+  if full.share < room or full.share > 1 - room then refuse("share", ("a share in %g..%g, so that the part is within the window"):format(room, 1 - room)) end
   if full.stop ~= "width" and full.stop ~= "touch" then refuse("stop", '"width" or "touch"') end
   if full.closing_speed <= 0 or full.closing_speed > 0.2 then refuse("closing_speed", "m/s in 0..0.2, above 0") end
   return full
@@ -131,7 +133,7 @@ return function(spec)
   return function(arm, scene)
     local spec = arm.instances and with_fixed_closure(spec, arm, scene) or spec
     local pace = (spec.speed or 1) * (1 + spread(SPEED_SPREAD))
-    local share = 0.5 + spread(0.5 * spec.window)
+    local share = spec.share + spread(0.5 * spec.window)
     local problem = grasp.problem(scene:object(spec.object))
     if problem then arm:give_up(spec.object .. " " .. problem) end
     if not spec.closure and grasp.window(scene:object(spec.object)) then arm:note("grip_share", share) end

@@ -13,7 +13,8 @@ use softvt_evaluation::{
 };
 use softvt_robot::spec::PadSpec;
 use softvt_scene::{
-    Asset, Body, CameraVariation, HiddenProperties, LightVariation, Object, ObjectVariation, Scene, SceneVariation,
+    Asset, Body, CameraVariation, HiddenProperties, LightVariation, Object, ObjectVariation, Scene,
+    SceneVariation,
 };
 
 /// Ends of the range of a factor; both are positive.
@@ -100,7 +101,9 @@ pub enum DrawError {
         range: String,
     },
     /// A drawn strain is not a strain.
-    #[error("variation {variation:?}: staling gives {asset} a strain of {strain}, above 1; begin staling at 1")]
+    #[error(
+        "variation {variation:?}: staling gives {asset} a strain of {strain}, above 1; begin staling at 1"
+    )]
     Strain {
         /// Name of the asset.
         asset: String,
@@ -157,7 +160,8 @@ impl VariationRanges {
     ) -> Result<SceneVariation, DrawError> {
         let mut streams = InstanceStreams::of(seed);
         let [mut colour, mut light, mut camera] =
-            [RandomStream::Colour, RandomStream::Light, RandomStream::Camera].map(|stream| seed.stream(stream));
+            [RandomStream::Colour, RandomStream::Light, RandomStream::Camera]
+                .map(|stream| seed.stream(stream));
         let mut objects = BTreeMap::new();
         for object in scene.objects.iter().filter(|object| SceneVariation::applies_to(&object.asset.body)) {
             let drawn = ObjectVariation {
@@ -193,7 +197,8 @@ impl VariationRanges {
         count: u32,
         model_of: &ModelOf<'_>,
     ) -> Result<Vec<ObjectVariation>, DrawError> {
-        let id = EpisodeId { suite: suite.into(), task: 0, episode: 0, base_seed: 0, split: Split::Experiment };
+        let id =
+            EpisodeId { suite: suite.into(), task: 0, episode: 0, base_seed: 0, split: Split::Experiment };
         let mut streams = InstanceStreams::of(&EpisodeSeed::new(&id, &asset.name));
         (0..count)
             .map(|_| self.draw_instance(&mut streams, asset, &InstanceFactors::NOMINAL, model_of))
@@ -245,7 +250,11 @@ impl VariationRanges {
         }
         let (asset, variation) = names();
         let FactorRange { min, max } = ranges.window_ratio;
-        Err(DrawError::NoInstance { asset, variation, range: format!("{}..{}", format_number(min), format_number(max)) })
+        Err(DrawError::NoInstance {
+            asset,
+            variation,
+            range: format!("{}..{}", format_number(min), format_number(max)),
+        })
     }
 }
 
@@ -279,8 +288,8 @@ struct InstanceStreams {
 
 impl InstanceStreams {
     fn of(seed: &EpisodeSeed) -> Self {
-        let [size, material, hidden] =
-            [RandomStream::Size, RandomStream::Material, RandomStream::Hidden].map(|stream| seed.stream(stream));
+        let [size, material, hidden] = [RandomStream::Size, RandomStream::Material, RandomStream::Hidden]
+            .map(|stream| seed.stream(stream));
         Self { size, material, hidden }
     }
 }

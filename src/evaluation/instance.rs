@@ -155,7 +155,8 @@ impl InstanceModel {
             Some(VariantRow { width_mm: row.width_mm, d_pct: row.d_pct, force_n: row.force_n, strain_p95 })
         };
         let stable = envelope.sweep.iter().filter(|row| row.stable);
-        let variant = |sweep: &VariantSweep| Curve::new(sweep.rows.iter().copied(), sweep.scale, sweep.youngs_factor);
+        let variant =
+            |sweep: &VariantSweep| Curve::new(sweep.rows.iter().copied(), sweep.scale, sweep.youngs_factor);
         let (mut nominal, mut sizes, mut stiffnesses) = (None, Vec::new(), Vec::new());
         for sweep in &envelope.variants {
             match (sweep.scale == 1.0, sweep.youngs_factor == 1.0) {
@@ -224,8 +225,10 @@ impl InstanceModel {
     /// D of the asset at a width between the gels, mm.
     fn nominal_d_at(&self, width_mm: f64) -> Option<f64> {
         let rows = &self.nominal.rows;
-        let pair = rows.windows(2).find(|pair| pair[0].width_mm >= width_mm && pair[1].width_mm <= width_mm)?;
-        let share = (pair[0].width_mm - width_mm) / (pair[0].width_mm - pair[1].width_mm).max(f64::MIN_POSITIVE);
+        let pair =
+            rows.windows(2).find(|pair| pair[0].width_mm >= width_mm && pair[1].width_mm <= width_mm)?;
+        let share =
+            (pair[0].width_mm - width_mm) / (pair[0].width_mm - pair[1].width_mm).max(f64::MIN_POSITIVE);
         Some(pair[0].d_pct + share * (pair[1].d_pct - pair[0].d_pct))
     }
 
@@ -284,7 +287,8 @@ mod tests {
             SweepRow { force_n, strain_p95: Some(strain_p95), ..squeeze(width_mm, d_pct, true) }
         });
         let holds = vec![hold(49.0, 5), HoldRow { d_peak_pct: Some(1.0), ..hold(48.0, 5) }];
-        let scans = Scans { stable_strain: Some(0.1), holds, sweep: sweep.collect(), variants, ..Scans::default() };
+        let scans =
+            Scans { stable_strain: Some(0.1), holds, sweep: sweep.collect(), variants, ..Scans::default() };
         Envelope::new(scans, 0.5)
     }
 
@@ -349,7 +353,11 @@ mod tests {
         };
         assert_eq!(d_ref(1.0, 1.0, 1.0), 10.0);
         assert_eq!((d_ref(0.8, 1.0, 1.0), d_ref(0.9, 1.0, 1.0), d_ref(1.1, 1.0, 1.0)), (12.0, 11.0, 9.5));
-        assert_eq!((d_ref(1.0, 10f64.sqrt(), 0.5), d_ref(0.5, 1.0, 1.0)), (5.25, 12.0), "the nearest end beyond");
+        assert_eq!(
+            (d_ref(1.0, 10f64.sqrt(), 0.5), d_ref(0.5, 1.0, 1.0)),
+            (5.25, 12.0),
+            "the nearest end beyond"
+        );
         assert_eq!(d_ref(0.8, 10.0, 1.0), 13.2);
     }
 }

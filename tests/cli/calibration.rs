@@ -39,7 +39,10 @@ fn the_limit_is_the_objects_own_and_its_calibration_repeats_bit_for_bit() {
     assert!(extent > 0.2 && number(&envelope["width_contact_mm"]) <= 36.0, "{window}");
     assert!(number(&window["force_at_tau_n"]) > number(&window["force_lower_n"]), "{window}");
     let variants = envelope["variants"].as_array().expect("presses of variants");
-    assert!(variants.len() == 6 && variants.iter().all(|variant| variant["rows"].as_array().is_some_and(|rows| rows.len() > 5)));
+    assert!(
+        variants.len() == 7
+            && variants.iter().all(|variant| variant["rows"].as_array().is_some_and(|rows| rows.len() > 5))
+    );
     assert_eq!(calibrated("--threads 2"), first);
     // The robot's settings do not enter.
     let message = project.refusal(&format!("{QUICK} --set robot.gripper.effort=20 --out again"));

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use mlua::{Lua, Table};
 
+use super::envelope::find_calibration;
 use super::{
     joints::{self, ArticulatedSpec},
     shapes::LuaShape,
@@ -15,7 +16,6 @@ use crate::{
     },
     vm::error::fail,
 };
-use super::envelope::find_calibration;
 use softvt_physics::contact::Friction;
 use softvt_scene::{Asset, Body, SoftMaterial, Visual};
 

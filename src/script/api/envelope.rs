@@ -32,8 +32,8 @@ use softvt_evaluation::{
     safety::DeformationLimit,
     thresholds::{ThresholdFile, sweep_jsonl},
 };
-use softvt_robot::spec::PadSpec;
 use softvt_geometry::Pose;
+use softvt_robot::spec::PadSpec;
 use softvt_scene::{Asset, Object};
 
 /// Largest number of instances of a sample.
@@ -106,21 +106,24 @@ pub(crate) fn sample(
 ) -> mlua::Result<Vec<Table>> {
     let mut object = Object::new(&asset.name, Arc::new(asset.clone()), Pose::identity());
     let Some(ranges) = ranges else {
-        return (0..count).map(|_| instance_state(lua, &object)).collect();
+        return (0..count).map(|_| instance_state(lua, &object, 1)).collect();
     };
     let drawn = draw(lua, |model_of| ranges.sample(suite, asset, count, model_of))?;
     let drawn = drawn.map_err(|error| fail(lua, error.to_string()))?;
     let nominal = object.clone();
-    drawn.iter().map(|one| {
-        object.clone_from(&nominal);
-        one.apply(&mut object);
-        instance_state(lua, &object)
-    }).collect()
+    drawn
+        .iter()
+        .map(|one| {
+            object.clone_from(&nominal);
+            one.apply(&mut object);
+            instance_state(lua, &object, one.hidden.map_or(1, |hidden| hidden.draws))
+        })
+        .collect()
 }
 
 output! {
     /// An instance of an asset, with the fields that a grasp needs of an object.
-    fn instance_state(lua, object: &Object) -> "softvt.InstanceState" as "instance" {
+    fn instance_state(lua, object: &Object, draws: u32) -> "softvt.InstanceState" as "instance" {
         /// Name of its asset.
         asset: "string" = object.asset.name.as_str();
         /// Edge lengths of its bounding box at rest, m.
@@ -135,6 +138,8 @@ output! {
         strain_factor: "number?" = object.strain_factor();
         /// Static friction of its coating; nil without one.
         coating: "number?" = object.coating();
+        /// Number of draws until it was kept.
+        draws: "number" = draws;
         /// Numbers of its asset for experts, as those of an object.
         hints: "table<string, number>" = lua.create_table_from(
             object.asset.hints.iter().map(|(name, value)| (name.as_str(), *value))
@@ -159,7 +164,9 @@ pub(crate) fn find_calibration(lua: &Lua, asset: &str) -> mlua::Result<()> {
 /// Reads assets/calibration/<asset>.json; returns its path as messages show it and its content.
 fn calibration_file(lua: &Lua, label: &str, asset: &str) -> mlua::Result<Option<(String, ThresholdFile)>> {
     let library = app_data::<SharedLibrary>(lua)?;
-    let found = lock(&library).optional_data(&calibration_path(asset)).map_err(|e| fail(lua, format!("{label}: {e}")))?;
+    let found = lock(&library)
+        .optional_data(&calibration_path(asset))
+        .map_err(|e| fail(lua, format!("{label}: {e}")))?;
     let Some(FoundFile { name: path, bytes }) = found else { return Ok(None) };
     let file = ThresholdFile::parse(&String::from_utf8_lossy(&bytes), &path)
         .map_err(|e| fail(lua, format!("{label}: {e}")))?;

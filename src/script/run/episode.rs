@@ -104,7 +104,8 @@ impl SceneBuilder {
         let mut current = LuaScene::new(empty_scene());
         let rng = LuaRng::new(seed.clone(), RandomStream::Layout);
         vm.call::<()>(&task.layout.build, (current.clone(), rng))?;
-        let varied = self.ranges.get(&id.suite).map(|ranges| vary(&vm.lua, &mut lock(&current.scene), ranges, &seed));
+        let varied =
+            self.ranges.get(&id.suite).map(|ranges| vary(&vm.lua, &mut lock(&current.scene), ranges, &seed));
         let variation = varied.transpose().map_err(|error| vm.explain(&error))?;
         let mut nominal = lock(&current.scene).clone();
         current = current.for_task(task.goal.object(), &task.prompt);
@@ -161,7 +162,12 @@ impl SceneBuilder {
 ///
 /// # Errors
 /// The scene has nothing that the variation changes, or no instance can be drawn.
-fn vary(lua: &Lua, scene: &mut Scene, ranges: &VariationRanges, seed: &EpisodeSeed) -> mlua::Result<SceneVariation> {
+fn vary(
+    lua: &Lua,
+    scene: &mut Scene,
+    ranges: &VariationRanges,
+    seed: &EpisodeSeed,
+) -> mlua::Result<SceneVariation> {
     let drawn = draw(lua, |model_of| ranges.draw(seed, scene, model_of))?;
     let drawn = drawn.map_err(|error| {
         let subject = format!("layout {:?} of suite {:?}", seed.layout, seed.suite);

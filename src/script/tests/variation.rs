@@ -274,7 +274,8 @@ fn hidden_properties_change_material_limit_and_surface_within_the_window() {
         let setup = open(&loaded, 0, episode).expect("an episode");
         for (name, drawn) in &setup.variation.as_ref().expect("varied").objects {
             let (object, hidden) = (object(&setup, name), drawn.hidden.expect("hidden"));
-            let near = |value: Option<f64>, expected: f64| (value.expect("soft") / expected - 1.0).abs() < 1e-9;
+            let near =
+                |value: Option<f64>, expected: f64| (value.expect("soft") / expected - 1.0).abs() < 1e-9;
             assert!((1.5..=2.2).contains(&hidden.window_ratio) && hidden.draws >= 1);
             assert!(near(object.youngs_factor(), hidden.aeration.powi(2) * hidden.staling));
             assert!(near(object.density_factor(), hidden.aeration * hidden.filling));
@@ -289,7 +290,8 @@ fn hidden_properties_change_material_limit_and_surface_within_the_window() {
 #[test]
 fn size_and_looks_do_not_depend_on_what_is_hidden() {
     let drawn = |change: &str| {
-        let project = project(&format!("{HIDDEN} {change} return suite(placed(sphere), softvt.variation(ranges))"));
+        let project =
+            project(&format!("{HIDDEN} {change} return suite(placed(sphere), softvt.variation(ranges))"));
         let loaded = project.load("x.lua", &[]).expect("a suite");
         let setup = open(&loaded, 0, 7).expect("an episode");
         setup.variation.expect("varied").objects.into_values().collect::<Vec<_>>()
@@ -308,13 +310,23 @@ fn ranges_that_leave_no_instance_are_refused_with_the_remedy() {
         refusal(&format!("{HIDDEN} {change} return suite(placed(sphere), softvt.variation(ranges))"))
     };
     let message = refusal("ranges.hidden.window_ratio = { 900, 1000 }");
-    assert!(message.contains("none of 10000 instances of asset sphere") && message.contains("widen"), "{message}");
+    assert!(
+        message.contains("none of 10000 instances of asset sphere") && message.contains("widen"),
+        "{message}"
+    );
     let message = refusal("ranges.hidden.window_ratio = { 0.5, 2 }");
     assert!(message.starts_with("x.lua:") && message.contains("hidden.window_ratio"), "{message}");
     let message = refusal("sphere = require 'assets.steamed_bun' ranges.hidden.staling = { 0.1, 0.1 }");
-    assert!(message.contains("staling gives steamed_bun a strain of") && message.contains("above 1"), "{message}");
+    assert!(
+        message.contains("staling gives steamed_bun a strain of") && message.contains("above 1"),
+        "{message}"
+    );
     let message = refusal("ranges.hidden.coating = { 1.5, 0.2 }");
     assert!(message.contains("variation.hidden.coating: the smallest factor 1.5 comes first"), "{message}");
     let message = refusal("sphere = soft");
-    assert!(message.contains("asset ball has no calibrated window") && message.contains("calibrate.lua --asset ball"), "{message}");
+    assert!(
+        message.contains("asset ball has no calibrated window")
+            && message.contains("calibrate.lua --asset ball"),
+        "{message}"
+    );
 }
