@@ -1,4 +1,4 @@
-//! NoSlip: sliding of a held object along the pads. Not part of NoDrop; a suite may require it for Safety Success.
+//! NoSlip: sliding of a held object along the pads. Reported next to NoDrop; a suite may make Safety Success depend on it.
 
 use super::evidence::PadEvidence;
 
@@ -6,26 +6,55 @@ use super::evidence::PadEvidence;
 ///
 /// Each grasp starts at zero again. The result is the maximum over both pads, all steps and all grasps, so motion
 /// back does not reduce it. NoSlip holds if it is at most [`super::criteria::SuccessCriteria::slip_m`].
+///
+/// A hand that opens lets the object slide before the pads leave it. That slip counts only if the hand stops opening, so that
+/// the release itself is not slip, and loosening a grip until it slips is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SlipMonitor {
     /// Largest slip on either pad in any grasp so far, m.
     pub max_m: f64,
+    /// Largest slip since the hand began to open, m.
+    opening_m: f64,
     start_m: Option<[f64; 2]>,
 }
 
 impl SlipMonitor {
-    /// Takes in one physics step: the left and right pad, and whether they hold the target, that is, both press on it
-    /// and no release was commanded.
-    pub fn update(&mut self, pads: &[PadEvidence; 2], is_held: bool) {
+    /// Takes in one physics step: the left and right pad, whether they hold the target, that is, both press on it and no
+    /// release was commanded, and whether the hand is being opened.
+    pub fn update(&mut self, pads: &[PadEvidence; 2], is_held: bool, is_opening: bool) {
         if !is_held {
-            self.start_m = None;
+            (self.start_m, self.opening_m) = (None, 0.0);
             return;
         }
         let travel = pads.map(|pad| pad.travel_m);
         let start = *self.start_m.get_or_insert(travel);
         for (now, start) in travel.iter().zip(&start) {
-            self.max_m = self.max_m.max((now - start).abs());
+            self.opening_m = self.opening_m.max((now - start).abs());
         }
+        if !is_opening {
+            self.max_m = self.max_m.max(std::mem::take(&mut self.opening_m));
+        }
+    }
+}
+
+/// Detects that the gripper is being opened: its commanded width has grown within the last control step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OpeningMonitor {
+    commanded_width_m: Option<f64>,
+    /// Physics steps since the width grew.
+    steps: Option<u32>,
+}
+
+impl OpeningMonitor {
+    /// Takes in the commanded width (m) of one physics step. Commands change every `steps_per_control` steps.
+    pub fn update(&mut self, commanded_width_m: f64, steps_per_control: u32) -> bool {
+        let before = self.commanded_width_m.replace(commanded_width_m).unwrap_or(commanded_width_m);
+        self.steps = match (commanded_width_m > before, commanded_width_m < before) {
+            (true, _) => Some(0),
+            (_, true) => None,
+            _ => self.steps.map(|steps| steps + 1),
+        };
+        self.steps.is_some_and(|steps| steps < steps_per_control)
     }
 }
 
@@ -33,36 +62,53 @@ impl SlipMonitor {
 mod tests {
     use super::*;
 
-    /// Largest slip (m) over steps with the travel of both pads (mm) and whether they hold the target.
-    fn slip(steps: &[([f64; 2], bool)]) -> f64 {
+    /// One step: travel of both pads (mm), whether they hold the target, and whether the hand opens.
+    type Step = ([f64; 2], bool, bool);
+
+    /// Largest slip (mm) over steps.
+    fn slip_mm(steps: &[Step]) -> f64 {
         let mut slip = SlipMonitor::default();
-        for (travel_mm, is_held) in steps {
+        for (travel_mm, is_held, is_opening) in steps {
             let pads = travel_mm.map(|mm| PadEvidence { normal_impulse_ns: 0.05, travel_m: mm * 1e-3 });
-            slip.update(&pads, *is_held);
+            slip.update(&pads, *is_held, *is_opening);
         }
-        slip.max_m
+        1e3 * slip.max_m
     }
+
+    const HELD: bool = true;
 
     #[test]
     fn slip_counts_from_the_closure_and_takes_the_worse_pad() {
-        let max_m = slip(&[([3.0, 1.0], true), ([3.5, 1.2], true), ([3.6, 3.1], true)]);
-        assert!((max_m - 2.1e-3).abs() < 1e-12);
+        let steps = [([3.0, 1.0], HELD, false), ([3.5, 1.2], HELD, false), ([3.6, 3.1], HELD, false)];
+        assert!((slip_mm(&steps) - 2.1).abs() < 1e-9);
     }
 
     #[test]
-    fn opening_the_hand_is_not_slip() {
-        assert_eq!(slip(&[([0.0, 0.0], true), ([9.0, 9.0], false)]), 0.0);
+    fn opening_the_hand_until_it_releases_is_not_slip() {
+        assert_eq!(slip_mm(&[([0.0, 0.0], HELD, false), ([9.0, 9.0], false, false)]), 0.0);
+        let slid = ([4.0, 4.0], HELD, true);
+        assert_eq!(slip_mm(&[([0.0, 0.0], HELD, false), slid, ([9.0, 9.0], false, true)]), 0.0);
+    }
+
+    #[test]
+    fn loosening_a_grip_until_it_slips_is_slip() {
+        let slid = ([4.0, 4.0], HELD, true);
+        assert!((slip_mm(&[([0.0, 0.0], HELD, false), slid, ([4.0, 4.0], HELD, false)]) - 4.0).abs() < 1e-9);
     }
 
     #[test]
     fn a_regrasp_starts_at_zero_and_the_largest_slip_stays() {
-        let max_m = slip(&[
-            ([0.0, 0.0], true),
-            ([1.5, 0.0], true),
-            ([5.0, 5.0], false),
-            ([7.0, 7.0], true),
-            ([7.5, 7.0], true),
-        ]);
-        assert!((max_m - 1.5e-3).abs() < 1e-12);
+        let held = |mm| (mm, HELD, false);
+        let steps =
+            [held([0.0, 0.0]), held([1.5, 0.0]), ([5.0, 5.0], false, true), held([7.0, 7.0]), held([7.5, 7.0])];
+        assert!((slip_mm(&steps) - 1.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_hand_opens_from_the_growth_of_its_command_until_a_control_step_without() {
+        let mut opening = OpeningMonitor::default();
+        let widths = [20.0, 20.0, 21.0, 21.0, 21.0, 22.0, 22.0, 22.0, 22.0, 21.0, 21.0];
+        let seen = widths.map(|width| opening.update(1e-3 * width, 3));
+        assert_eq!(seen, [false, false, true, true, true, true, true, true, false, false, false]);
     }
 }

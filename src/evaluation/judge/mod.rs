@@ -93,7 +93,7 @@ use super::{
     grip::{GripMonitor, GripSample},
     record::{OtherDeformation, Outcome, Verdict, WrongContact},
     safety::{DeformationLimit, KAPPAS, KappaVerdict, PeakDeformation, SafetyParts},
-    slip::SlipMonitor,
+    slip::{OpeningMonitor, SlipMonitor},
     stage::{StageMonitor, StageSample},
 };
 
@@ -173,6 +173,7 @@ pub struct Judge {
     release: ReleaseMonitor,
     drops: DropMonitor,
     slip: SlipMonitor,
+    opening: OpeningMonitor,
     grip: GripMonitor,
     goal: GoalMonitor,
     control_step: ControlStepSums,
@@ -206,6 +207,7 @@ impl Judge {
             release: ReleaseMonitor::default(),
             drops: DropMonitor::default(),
             slip: SlipMonitor::default(),
+            opening: OpeningMonitor::default(),
             grip: GripMonitor::default(),
             control_step: ControlStepSums::default(),
             pad_forces: PadForceStats::default(),
@@ -234,7 +236,8 @@ impl Judge {
         let is_lifted = self.observe_lift(evidence);
         let both_pads_touch = touch[0] && touch[1];
         let is_released = self.release.update(&self.config.criteria, &evidence.gripper, both_pads_touch);
-        self.slip.update(&evidence.pads, both_pads_touch && !is_released);
+        let is_opening = self.opening.update(evidence.gripper.commanded_width_m, self.config.steps_per_control);
+        self.slip.update(&evidence.pads, both_pads_touch && !is_released, is_opening);
         let is_carried = is_lifted && !is_released;
         let grip = GripSample { is_carried, is_held: both_pads_touch, grip: evidence.grip };
         let config = &self.config;
