@@ -1,12 +1,20 @@
--- Controllers that differ in their grip alone, on the varied suites: the same expert knows the object (reference), closes by touch,
--- closes to one closure per kind of object, or fully. Prints one table per suite.
+-- Controllers that differ in their grip alone: the same expert knows the object (reference), closes by touch, or knows no more than
+-- what shows of it and the statistics of the suite. The best of those without touch says what a suite needs. Prints one table.
 --
 --   softvt suites/controllers.lua --episodes 50
 return softvt.conditions {
   name = "controllers",
-  suites = { require "suites.object_varied", require "suites.spatial_varied" },
+  suites = {
+    require "suites.object_varied", require "suites.spatial_varied", require "suites.object_hidden", require "suites.spatial_hidden",
+  },
   conditions = {
     { name = "tactile-servo", policy = "tactile-servo" },
+    { name = "look-retry", policy = "look-retry" },
+    { name = "size-seen", policy = "size-seen" },
+    { name = "contact-depth", policy = "contact-depth" },
+    { name = "drives", policy = "drives" },
+    { name = "one-force", policy = "one-force" },
+    { name = "one-force-for-all", policy = "one-force-for-all" },
     { name = "fixed-closure", policy = "fixed-closure" },
     { name = "expert-binary", policy = "expert-binary" },
   },

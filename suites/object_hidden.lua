@@ -34,6 +34,7 @@ return softvt.suite {
   name = "object_hidden",
   object_type = "deformable",
   variation = "object",
+  needs = "touch",
   episodes = 5,
   tasks = tasks,
   shifts = shifts.soft,

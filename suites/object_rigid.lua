@@ -18,6 +18,7 @@ return softvt.suite {
   name = "object_rigid",
   object_type = "rigid",
   variation = "object",
+  needs = "nothing",
   episodes = 5,
   tasks = tasks,
   shifts = shifts.rigid,

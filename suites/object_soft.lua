@@ -31,6 +31,7 @@ return softvt.suite {
   name = "object_soft",
   object_type = "deformable",
   variation = "object",
+  needs = "nothing",
   episodes = 5,
   tasks = tasks,
   shifts = shifts.soft,

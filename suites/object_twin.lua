@@ -8,6 +8,7 @@ return softvt.suite {
   object_type = "rigid",
   twin_of = soft.name,
   variation = soft.variation,
+  needs = "nothing",
   episodes = soft.episodes,
   tasks = soft.tasks,
   shifts = shifts.rigid,

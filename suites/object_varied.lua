@@ -7,6 +7,7 @@ return softvt.suite {
   name = "object_varied",
   object_type = "deformable",
   variation = "object",
+  needs = "size",
   episodes = 5,
   tasks = object_soft.tasks,
   shifts = object_soft.shifts,

@@ -29,6 +29,7 @@ return softvt.suite {
   name = "spatial_hidden",
   object_type = "deformable",
   variation = "spatial",
+  needs = "touch",
   episodes = 5,
   tasks = tasks,
   shifts = shifts.soft,

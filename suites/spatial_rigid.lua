@@ -23,6 +23,7 @@ return softvt.suite {
   name = "spatial_rigid",
   object_type = "rigid",
   variation = "spatial",
+  needs = "nothing",
   episodes = 5,
   tasks = tasks,
   shifts = shifts.rigid,

@@ -28,6 +28,7 @@ return softvt.suite {
   name = "spatial_soft",
   object_type = "deformable",
   variation = "spatial",
+  needs = "nothing",
   episodes = 5,
   tasks = tasks,
   shifts = shifts.soft,

@@ -7,6 +7,7 @@ return softvt.suite {
   name = "spatial_varied",
   object_type = "deformable",
   variation = "spatial",
+  needs = "size",
   episodes = 5,
   tasks = spatial_soft.tasks,
   shifts = spatial_soft.shifts,

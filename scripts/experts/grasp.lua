@@ -171,12 +171,17 @@ local function candidates(object, height, offset)
   return list
 end
 
+-- Closes fast to a clearance at which nothing is touched. `width` is the distance of the gels at first contact, m.
+function grasp.approach(arm, object, width)
+  arm:close_to(math.max(arm.closure, grasp.clear_closure(object, CONTACT_CLEARANCE, width)), { rate = FAST_RATE })
+end
+
 -- Closes on an object as a person would: fast to a clearance at which nothing is touched, then slowly to the grip. `options`:
 -- closing_speed (m/s, of the width), stop ("width": at the measured width of the grip; "touch": when both pads press with its
 -- force), closure (a command instead of a grip) and width (distance of the gels at first contact, m).
 function grasp.close(arm, object, grip, options)
   local rate = options.closing_speed / STROKE
-  arm:close_to(math.max(arm.closure, grasp.clear_closure(object, CONTACT_CLEARANCE, options.width)), { rate = FAST_RATE })
+  grasp.approach(arm, object, options.width)
   if options.closure then return arm:grasp(options.closure, { rate = rate }) end
   local most = grasp.command(grip)
   if grip.force == 0 then return arm:grasp(most, { rate = rate }) end
@@ -197,7 +202,7 @@ end
 
 -- Distance of the gels at first contact in a grasp that is not nominal, m: the open hand can close by its clearance from the object on
 -- each side. `others` are the names of the other objects.
-local function contact_width(scene, pose, others)
+local function first_contact(scene, pose, others)
   return STROKE - 2 * math.max(0, (scene:clearance(pose, { width = STROKE, ignore = others })))
 end
 
@@ -209,7 +214,7 @@ function grasp.choose(scene, object, height, offset)
   local others, ignore = others_than(object, scene), object.hints.grasp_rim_m and {} or { object.name }
   for _, candidate in ipairs(candidates(object, height, offset)) do
     local pose, clearance = candidate.pose, math.huge
-    local width = candidate.is_nominal and grasp.width(object) or contact_width(scene, pose, others)
+    local width = candidate.is_nominal and grasp.width(object) or first_contact(scene, pose, others)
     -- Narrowest opening first: the clearance of a closing motion is that of its narrowest point.
     local openings = { grasp.clear_closure(object, 0.005, width), grasp.clear_closure(object, 0.010, width), 0 }
     for _, opening in ipairs(openings) do

@@ -8,7 +8,7 @@
 -- one closure instead.
 local grasp = require "experts.grasp"
 local route = require "experts.route"
-local fixed_closure = require "experts.fixed_closure"
+local blind_grips = require "experts.blind_grips"
 
 local FIELDS = {
   object = "string", target = "string", closure = "number?", speed = "number?", window = "number?", share = "number?", stop = "string?",
@@ -27,8 +27,9 @@ local SPEED_SPREAD = 0.12
 
 local function spread(most) return (2 * math.random() - 1) * most end
 
--- Grasps the object and lifts it off its support. Returns the grasp { height, width } (m), or nil and the reason.
-local function pick(arm, scene, spec, pace, share)
+-- Grasps the object and lifts it off its support; `close` is the grip of a controller in place of the expert's. Returns the grasp
+-- { height, width } (m), or nil and the reason.
+local function pick(arm, scene, spec, pace, share, close)
   local object = scene:object(spec.object)
   local height = grasp.height(object)
   local chosen = grasp.choose(scene, object, height, { spread(grasp.SPREAD), spread(grasp.SPREAD) })
@@ -40,10 +41,13 @@ local function pick(arm, scene, spec, pace, share)
   arm:move_to(at, { speed = 0.25 * pace, closure = opening })
   arm:wait(0.1)
   local before = scene:object(spec.object).centre[3]
-  local grip = grasp.target(object, share)
-  -- The width of a grip is that where the calibration presses; elsewhere the hand stops by force.
-  local stop = chosen.is_nominal and spec.stop or "touch"
-  grasp.close(arm, object, grip, { closing_speed = spec.closing_speed, stop = stop, closure = spec.closure, width = chosen.width })
+  if close then
+    close(arm, scene, chosen)
+  else
+    -- The width of a grip is that where the calibration presses; elsewhere the hand stops by force.
+    local grip, stop = grasp.target(object, share), chosen.is_nominal and spec.stop or "touch"
+    grasp.close(arm, object, grip, { closing_speed = spec.closing_speed, stop = stop, closure = spec.closure, width = chosen.width })
+  end
   arm:wait(0.3)
   arm:note("grip_width_mm", 1e3 * arm.width)
   -- Straight up first.
@@ -86,13 +90,6 @@ local function release_pose(arm, scene, spec, held)
   return best.pose
 end
 
--- The same specification with one closure for all instances of the asset, for an expert that must not know which one it is.
-local function with_fixed_closure(spec, arm, scene)
-  local full = { closure = fixed_closure(scene:object(spec.object), arm.instances) }
-  for key, value in pairs(spec) do full[key] = value end
-  return full
-end
-
 -- Carries the object of a grasp { height, width } to the target and releases it there.
 local function place(arm, scene, spec, held, pace)
   local object = scene:object(spec.object)
@@ -131,12 +128,13 @@ return function(spec)
   softvt.check_fields("pick_place", spec, FIELDS)
   spec = complete(spec)
   return function(arm, scene)
-    local spec = arm.instances and with_fixed_closure(spec, arm, scene) or spec
     local pace = (spec.speed or 1) * (1 + spread(SPEED_SPREAD))
     local share = spec.share + spread(0.5 * spec.window)
     local problem = grasp.problem(scene:object(spec.object))
     if problem then arm:give_up(spec.object .. " " .. problem) end
-    if not spec.closure and grasp.window(scene:object(spec.object)) then arm:note("grip_share", share) end
+    local controller = arm.grip_controller
+    local close = controller and blind_grips.controller(controller, arm.instances, scene:object(spec.object))
+    if not (spec.closure or close) and grasp.window(scene:object(spec.object)) then arm:note("grip_share", share) end
     local first, reason = scene:object(spec.object).centre, nil
     for _ = 1, ATTEMPTS do
       -- An object that has slid or rolled away is not followed.
@@ -146,7 +144,7 @@ return function(spec)
         arm:give_up(("%s has moved by %.0f mm; grasping it again is not attempted"):format(spec.object, 1e3 * moved))
       end
       local held
-      held, reason = pick(arm, scene, spec, pace, share)
+      held, reason = pick(arm, scene, spec, pace, share, close)
       if held then return place(arm, scene, spec, held, pace) end
       -- Release, retreat and try again.
       arm:open()

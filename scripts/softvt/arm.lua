@@ -127,6 +127,10 @@ end
 -- gripper closes fully here, and not in close_to.
 function Arm:grasp(closure, options)
   self.gripping = true
+  if host.grip_controller and not self.knows_controller then
+    check.refuse(("arm:grasp: the expert has no grip for --policy %s; let it read arm.grip_controller, as experts.pick_place does, or choose another policy"):format(
+      host.grip_controller))
+  end
   if fingers.servo then return feel(self) end
   if options.width or options.force then return close_until(self, closure, options) end
   self:close_to(closure, options)
@@ -157,6 +161,7 @@ function Arm:note(name, value) note(name, value) end
 -- Ends the expert with a reason. The last command stays in effect, and the coroutine is not resumed.
 function Arm:give_up(reason) yield(self.target, self.closure, self.gripping, reason) end
 
+-- An expert that reads the name of the controller is taken to follow it.
 local own = { target = true, closure = true, gripping = true }
 local state, methods, arm = { target = host.target, closure = host.closure, gripping = host.gripping, wants_readings = false }, {}, nil
 
@@ -171,6 +176,7 @@ setmetatable(state, { __index = Arm })
 
 arm = setmetatable({}, {
   __index = function(_, key)
+    if key == "grip_controller" then state.knows_controller = true end
     if own[key] then return state[key] end
     return methods[key] or host[key]
   end,

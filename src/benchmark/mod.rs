@@ -47,6 +47,18 @@ pub enum Variation {
     Spatial,
 }
 
+/// What a controller has to know of an instance to grip it safely.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Needs {
+    /// Nothing but its kind: one closure per kind suffices.
+    Nothing,
+    /// Its size, which shows.
+    Size,
+    /// What does not show and has to be felt.
+    Touch,
+}
+
 /// Success condition of a task: `object` rests at `target`, released, for `hold_s`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Goal {
@@ -112,6 +124,9 @@ pub struct Suite {
     pub object_type: ObjectType,
     /// Factor that varies between its tasks.
     pub variation: Variation,
+    /// What a safe grip needs, if the suite states it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub needs: Option<Needs>,
     /// Default number of episodes per task.
     pub episodes: u32,
     /// The tasks, in order.

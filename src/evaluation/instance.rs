@@ -75,6 +75,8 @@ pub struct GripWindow {
     pub loose: Grip,
     /// The tightest grip whose carried object stays within τ; equal to `loose` if none does.
     pub tight: Grip,
+    /// Distance of the gels at first contact, m.
+    pub contact_m: f64,
     /// D that the weight of the carried object causes, over τ.
     pub carried: f64,
     /// τ of the instance, %.
@@ -139,6 +141,7 @@ pub struct InstanceModel {
     stable_strain: Option<f64>,
     /// Smallest peak D of the asset while it was carried, %.
     carried_d_pct: f64,
+    width_contact_mm: Option<f64>,
     window: SafeWindow,
     nominal: Curve,
     /// At other sizes and nominal stiffness, by increasing size.
@@ -172,6 +175,7 @@ impl InstanceModel {
             limit: envelope.limit(kappa),
             stable_strain: envelope.stable_strain.filter(|_| envelope.censored.is_none()),
             carried_d_pct: envelope.carried_d_pct.unwrap_or(0.0),
+            width_contact_mm: envelope.width_contact_mm,
             window: envelope.window,
             // The same press in finer steps, if there is one.
             nominal: nominal.unwrap_or_else(|| Curve::new(stable.filter_map(row), 1.0, 1.0)),
@@ -219,7 +223,8 @@ impl InstanceModel {
         let loose = grip(loose_n)?;
         let tight_n = if left > 0.0 { force_unit * force_at(d_tight)? } else { 0.0 };
         let tight = if tight_n > loose_n { grip(tight_n)? } else { loose };
-        Some(GripWindow { loose, tight, carried, tau_pct: tau })
+        let contact_m = 1e-3 * scale * self.width_contact_mm?;
+        Some(GripWindow { loose, tight, contact_m, carried, tau_pct: tau })
     }
 
     /// D of the asset at a width between the gels, mm.

@@ -68,6 +68,9 @@ pub struct ConditionRow {
     /// Policy in place of that of the reference; absent for the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub policy: Option<String>,
+    /// True if the policy is a bound of what can be done without touch.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub blind: bool,
     /// Null if the condition could have no effect and was not run.
     pub outcome: Option<ConditionOutcome>,
     /// Reason for not running it; null if it was run.
@@ -124,6 +127,76 @@ pub fn table(suite: &ConditionTable) -> String {
     table.text + &changes.text
 }
 
+/// Suites side by side in [`controllers_table`].
+const SUITES_PER_TABLE: usize = 4;
+
+/// True if the conditions differ from the reference in the policy alone.
+pub fn compares_policies(tables: &[ConditionTable]) -> bool {
+    let others = || tables.iter().flat_map(|table| table.rows.iter().skip(1));
+    others().next().is_some()
+        && others()
+            .all(|row| row.policy.is_some() && row.shift.is_empty() && row.set.is_empty() && !row.rigid_twin)
+}
+
+/// Plain-text tables of policies by suite, of at most 100 columns, for conditions that differ in the policy alone. All suites
+/// have the same rows. Under each the best policy without touch.
+pub fn controllers_table(tables: &[ConditionTable]) -> String {
+    tables.chunks(SUITES_PER_TABLE).map(controllers_of_suites).collect()
+}
+
+fn controllers_of_suites(suites: &[ConditionTable]) -> String {
+    let mut columns = vec![TextColumn::Left(22)];
+    columns.resize(1 + suites.len(), TextColumn::Right(18));
+    let mut table = TextTable::new(columns);
+    let episodes = suites.iter().flat_map(|suite| &suite.rows).filter_map(|row| row.outcome.as_ref());
+    let episodes = counted(episodes.map(|outcome| outcome.episodes).max().unwrap_or(0), "episode");
+    table.line(format!("Goal / Safety Success, % · {episodes} each"));
+    table.rule();
+    table.row(std::iter::once("controller").chain(suites.iter().map(|suite| suite.suite.as_str())));
+    table.rule();
+    let rows = suites.first().map_or(0, |suite| suite.rows.len());
+    for index in 0..rows {
+        let name = |row: &ConditionRow, policy: &str| match (index, row.blind) {
+            (0, _) => policy.to_owned(),
+            (_, true) => format!("{} *", row.condition),
+            (_, false) => row.condition.clone(),
+        };
+        let first = name(&suites[0].rows[index], &suites[0].policy);
+        let cells = suites.iter().map(|suite| {
+            suite.rows[index].outcome.as_ref().map_or_else(
+                || "N/A".to_owned(),
+                |outcome| {
+                    let [goal, safety] = [outcome.goal_success_rate, outcome.safety_success_rate];
+                    format!("{} / {:>5}", decimal(goal.rate, 1), decimal(safety.rate, 1))
+                },
+            )
+        });
+        table.row(std::iter::once(first).chain(cells));
+    }
+    table.rule();
+    if suites.iter().flat_map(|suite| &suite.rows).any(|row| row.blind) {
+        table.line("* without touch: knows what shows of an object and the statistics of the suite");
+        for suite in suites {
+            table.line(format!("best without touch, {}: {}", suite.suite, best_blind(suite)));
+        }
+    }
+    table.text
+}
+
+/// The policy without touch that is safe most often, with the interval of its Safety Success.
+fn best_blind(suite: &ConditionTable) -> String {
+    let safety =
+        |row: &ConditionRow| row.outcome.as_ref().and_then(|outcome| outcome.safety_success_rate.rate);
+    let blind = suite.rows.iter().filter(|row| row.blind);
+    let best = blind.max_by(|a, b| safety(a).unwrap_or(-1.0).total_cmp(&safety(b).unwrap_or(-1.0)));
+    let Some((row, outcome)) = best.and_then(|row| Some((row, row.outcome.as_ref()?))) else {
+        return "N/A".to_owned();
+    };
+    let Rate { rate, wilson95, .. } = outcome.safety_success_rate;
+    let interval = wilson95.map_or(String::new(), |[low, high]| format!(" [{low:.1}, {high:.1}]"));
+    format!("{}, Safety {} %{interval}", row.condition, decimal(rate, 1))
+}
+
 fn cells(row: &ConditionRow, deformable: bool) -> [String; 6] {
     let Some(outcome) = &row.outcome else {
         return [&row.condition, "N/A", "N/A", "N/A", "N/A", "N/A"].map(str::to_owned);
@@ -154,6 +227,7 @@ mod tests {
             shift: Vec::new(),
             set: Vec::new(),
             policy: None,
+            blind: false,
             outcome,
             not_applicable,
         }
@@ -181,6 +255,7 @@ mod tests {
         };
         assert_eq!(words("reference"), ["reference", "100.0", "100.0", "100.0", "0.333", "0"]);
         assert_eq!(words("heavy  "), ["heavy", "100.0", "100.0", "0.0", "1.500", "0"]);
+        assert!(!compares_policies(&[suite]));
         let (_, against) = text.split_once("change from the reference").unwrap();
         let rows: Vec<&str> = against.lines().skip_while(|line| !line.starts_with("heavy")).take(4).collect();
         let cell = |row: usize, columns: &[&str]| {
@@ -193,5 +268,48 @@ mod tests {
             text.contains("a condition with a name that is very lo…")
                 && text.contains(": N/A, nothing in it deforms")
         );
+    }
+
+    #[test]
+    fn policies_are_one_row_each_and_the_best_without_touch_is_named() {
+        let outcome = |safe: &[bool]| {
+            let records = safe.iter().map(|safe| {
+                let mut record = sample_record();
+                record.verdict.safety = *safe;
+                record
+            });
+            ConditionOutcome::new("x".into(), &records.collect::<Vec<_>>(), None)
+        };
+        let suite = |name: &str| {
+            let policy = |condition: &str, blind, safe: &[bool]| ConditionRow {
+                policy: Some(condition.into()),
+                blind,
+                ..row(condition, Some(outcome(safe)))
+            };
+            ConditionTable {
+                suite: name.into(),
+                policy: "expert".into(),
+                deformable: true,
+                rows: vec![
+                    row("reference", Some(outcome(&[true, true]))),
+                    policy("servo", false, &[true, true]),
+                    policy("loose", true, &[false, false]),
+                    policy("middle", true, &[true, false]),
+                ],
+            }
+        };
+        let suites = ["buns", "rolls", "cubes", "a suite with a long name", "loaves"].map(suite);
+        assert!(compares_policies(&suites));
+        let text = controllers_table(&suites);
+        assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
+        let lines = |start: &str| text.lines().filter(|line| line.starts_with(start)).collect::<Vec<_>>();
+        assert_eq!(lines("expert").len(), 2, "five suites take two tables: {text}");
+        let words: Vec<&str> = lines("middle *")[1].split_whitespace().collect();
+        assert_eq!(words, ["middle", "*", "100.0", "/", "50.0"]);
+        assert_eq!(
+            lines("best without touch, rolls"),
+            ["best without touch, rolls: middle, Safety 50.0 % [9.5, 90.5]"]
+        );
+        assert!(lines("reference").is_empty(), "{text}");
     }
 }

@@ -60,6 +60,7 @@ pub use asset::{Asset, Body, Joint, JointMotion, Part, SoftMaterial, part_poses}
 pub use camera::{Camera, CameraMount, CameraSettings};
 pub use decal::{GlyphCoverage, LabelLine, MAX_LETTERS, TextDecal, Typeface};
 pub use light::{KeyLight, Lighting, Sky};
+pub use scale::LENGTH_HINT;
 pub use variation::{CameraVariation, HiddenProperties, LightVariation, ObjectVariation, SceneVariation};
 pub use visual::{Mask, Visual, VisualLayer};
 

@@ -12,7 +12,7 @@ use super::{
 };
 
 /// Ending of the names of hints that are lengths.
-const LENGTH_HINT: &str = "_m";
+pub const LENGTH_HINT: &str = "_m";
 
 impl Object {
     /// True if the object can have another size. An articulated one cannot: the range, damping and friction of its

@@ -23,7 +23,7 @@ pub use plan::{
 pub use run::{
     episode::{EpisodeSetup, SceneBuilder, ShiftError, check_shift},
     experiment::{Experiment, ExperimentRow, ExperimentSummary},
-    expert::{ExpertController, GripMode},
+    expert::{ExpertController, GripController, GripMode},
 };
 pub use schema::Range;
 pub use vm::{

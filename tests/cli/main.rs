@@ -6,6 +6,7 @@ mod calibration;
 mod cheats;
 mod check;
 mod conditions;
+mod controllers;
 mod crash_recovery;
 mod dataset_import;
 mod dataset_recording;

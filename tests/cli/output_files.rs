@@ -18,6 +18,9 @@ fn lists_are_printed_as_text_and_as_json() {
     };
     let suites = json("suites");
     assert!(suites.iter().any(|s| s["name"] == "spatial_soft" && s["tasks"] == 10 && s["episodes"] == 5));
+    let needs = |name: &str| suites.iter().find(|s| s["name"] == name).map(|s| s["needs"].clone());
+    assert_eq!(needs("object_soft"), Some("nothing".into()));
+    assert_eq!(needs("spatial_varied"), Some("size".into()));
     assert!(suites.iter().any(|s| s["name"] == "all" && s["tasks"] == 40 && s["file"] == "suites/all.lua"));
     let tasks = json("tasks");
     assert_eq!(
@@ -31,8 +34,21 @@ fn lists_are_printed_as_text_and_as_json() {
     assert!(json("assets").iter().filter(|a| a["name"] == "plate" || a["name"] == "sesame_bun").count() == 2);
     let names = |what: &str| json(what).iter().map(|row| row["name"].clone()).collect::<Vec<_>>();
     assert_eq!(
-        names("policies")[..6],
-        ["expert", "expert-binary", "fixed-closure", "tactile-servo", "noop", "random"]
+        names("policies")[..12],
+        [
+            "expert",
+            "expert-binary",
+            "tactile-servo",
+            "fixed-closure",
+            "size-seen",
+            "contact-depth",
+            "one-force",
+            "one-force-for-all",
+            "drives",
+            "look-retry",
+            "noop",
+            "random"
+        ]
     );
     assert!(names("policies").contains(&"scripts/policies/hold.lua".into()));
     assert_eq!(

@@ -86,10 +86,34 @@ fn conditions_may_name_a_built_in_policy() {
     let policy = |folder: &str| project.lines(&format!("run/{folder}/episodes.jsonl"))[0]["policy"].clone();
     assert_eq!((policy("reference"), policy("other")), (Value::from("expert"), Value::from("noop")));
     assert_eq!(project.json("run/conditions.json")["suites"][0]["rows"][1]["policy"], "noop");
+    let printed = project.succeeds("trial.lua --out other").out;
+    assert!(printed.contains("controller") && !printed.contains("change from the reference"), "{printed}");
+    project.write("trial.lua", plan("size-seen").as_bytes());
+    let printed = project.succeeds("trial.lua --out blind").out;
+    assert!(
+        printed.contains("\nother *") && printed.contains("best without touch, one: other, Safety"),
+        "{printed}"
+    );
     project.write("trial.lua", plan("exprt").as_bytes());
     let message = project.refusal("trial.lua --out again");
     assert!(
         message.contains("condition \"other\": policy:") && message.contains("did you mean expert?"),
         "{message}"
     );
+}
+
+#[test]
+fn an_expert_that_ignores_the_controller_is_refused_at_its_grasp() {
+    let project = Small { expert: "arm:grasp(0.5)", ..Small::default() }.project();
+    let message = project.refusal("x.lua --policy size-seen --out run");
+    assert!(
+        message.contains("x.lua:12") && message.contains("has no grip for --policy size-seen"),
+        "{message}"
+    );
+    let expert = "local name = arm.grip_controller arm:note(\"length\", #name) arm:grasp(0.5)";
+    let project = Small { expert, ..Small::default() }.project();
+    project.succeeds("x.lua --policy contact-depth --out run");
+    assert_eq!(project.lines("run/episodes.jsonl")[0]["notes"]["length"], 13.0);
+    let manifest = project.json("run/run.json");
+    assert_eq!((&manifest["privileged"], &manifest["policy"]), (&true.into(), &"contact-depth".into()));
 }

@@ -106,7 +106,8 @@ fn suite_row(path: &str, plan: &Plan) -> Option<Value> {
         Plan::Conditions { name, .. } => name.clone(),
         Plan::Suites { .. } | Plan::Experiment { .. } => stem(path),
     };
-    let mut row = json!({ "name": name, "file": path, "tasks": tasks, "episodes": episodes });
+    let needs = if let Plan::Suite(suite) = plan { suite.needs } else { None };
+    let mut row = json!({ "name": name, "file": path, "tasks": tasks, "episodes": episodes, "needs": needs });
     if !matches!(plan, Plan::Suite(_)) {
         row["suites"] = json!(names);
     }

@@ -19,10 +19,12 @@ use softvt_benchmark::{Condition, ObjectType, REFERENCE, Suite, Task};
 use softvt_common::{files::replace, text};
 use softvt_evaluation::summary::method_label;
 use softvt_report::{
-    condition_table::{ConditionOutcome, ConditionRow, ConditionTable, table},
+    condition_table::{
+        ConditionOutcome, ConditionRow, ConditionTable, compares_policies, controllers_table, table,
+    },
     run_folder::RunFolder,
 };
-use softvt_script::LoadedScript;
+use softvt_script::{GripMode, LoadedScript};
 
 /// Name of the file with the comparison of all suites, in the folder above all runs.
 const FILE: &str = "conditions.json";
@@ -63,10 +65,14 @@ pub(crate) fn run(
     let mut tables = Vec::new();
     for ((suite, cases), (runs, tasks)) in suites.iter().zip(&cases).zip(prepared) {
         let compared = compare_conditions(config, suite, cases, runs, &tasks)?;
-        if !config.flags.json {
-            print(&table(&compared))?;
-        }
         tables.push(compared);
+        // Policies are printed side by side, once all have run.
+        if !config.flags.json && !compares_policies(&tables) {
+            print(&table(&tables[tables.len() - 1]))?;
+        }
+    }
+    if !config.flags.json && compares_policies(&tables) {
+        print(&controllers_table(&tables))?;
     }
     write(config, loaded, &tables, out)
 }
@@ -205,6 +211,7 @@ fn compare_conditions(
             shift: case.condition.shift.clone(),
             set: case.condition.set.clone(),
             policy: case.condition.policy.clone(),
+            blind: is_blind(&case.config.policy),
             outcome,
             not_applicable: case.not_applicable.clone(),
         });
@@ -212,6 +219,11 @@ fn compare_conditions(
     let deformable = suite.object_type == ObjectType::Deformable && !config.is_rigid_twin();
     let policy = method_label(&config.policy.name, config.policy.privileged, force_observed);
     Ok(ConditionTable { suite: config.suite_name(suite), policy, deformable, rows })
+}
+
+/// True for a bound of what can be done without touch.
+fn is_blind(policy: &PolicyConfig) -> bool {
+    matches!(policy.expert(), Some(GripMode::Controller(controller)) if controller.is_blind())
 }
 
 fn write(

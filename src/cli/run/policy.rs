@@ -20,7 +20,7 @@ use softvt_policy::{
     remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},
 };
 use softvt_rollout::{ChunkedPolicy, Controller, cancel};
-use softvt_script::{EpisodeSetup, ExpertController, GripMode, PolicyFile, load_profile};
+use softvt_script::{EpisodeSetup, ExpertController, GripController, GripMode, PolicyFile, load_profile};
 
 /// Environment variable with the key of a policy server. A flag would show it to other users of the machine.
 const API_KEY: &str = "SOFTVT_API_KEY";
@@ -99,10 +99,22 @@ pub(crate) enum BuiltinPolicy {
     Expert,
     /// the same expert with a gripper that is either open or closed (privileged)
     ExpertBinary,
-    /// the same expert, with one closure for all instances of an asset (privileged)
-    FixedClosure,
     /// the same expert, feeling in the tactile markers how firmly it must hold (privileged)
     TactileServo,
+    /// the same expert without touch: one closure per kind of object (privileged)
+    FixedClosure,
+    /// the same expert without touch: the best closure for the size of the object (privileged)
+    SizeSeen,
+    /// the same expert without touch: the best indentation after first contact (privileged)
+    ContactDepth,
+    /// the same expert without touch: the best force per kind of object (privileged)
+    OneForce,
+    /// the same expert without touch: the best force for all objects of the suite (privileged)
+    OneForceForAll,
+    /// the same expert without touch: reads the width and the force of the finger drives (privileged)
+    Drives,
+    /// the same expert without touch: lifts, looks whether the object follows, and closes further (privileged)
+    LookRetry,
     /// holds still with the gripper open
     Noop,
     /// moves at random
@@ -123,9 +135,21 @@ impl BuiltinPolicy {
         self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
     }
 
-    /// True for scripted experts, which have access to ground-truth state.
-    fn is_expert(self) -> bool {
-        matches!(self, Self::Expert | Self::ExpertBinary | Self::FixedClosure | Self::TactileServo)
+    /// How the gripper is controlled, for scripted experts, which have access to ground-truth state.
+    fn grip_mode(self) -> Option<GripMode> {
+        Some(match self {
+            Self::Expert => GripMode::Commanded,
+            Self::ExpertBinary => GripMode::Binary,
+            Self::TactileServo => GripMode::TactileServo,
+            Self::FixedClosure => GripMode::Controller(GripController::FixedClosure),
+            Self::SizeSeen => GripMode::Controller(GripController::SizeSeen),
+            Self::ContactDepth => GripMode::Controller(GripController::ContactDepth),
+            Self::OneForce => GripMode::Controller(GripController::OneForce),
+            Self::OneForceForAll => GripMode::Controller(GripController::OneForceForAll),
+            Self::Drives => GripMode::Controller(GripController::Drives),
+            Self::LookRetry => GripMode::Controller(GripController::LookRetry),
+            Self::Noop | Self::Random => return None,
+        })
     }
 }
 
@@ -241,7 +265,7 @@ impl Default for PolicyConfig {
 
 impl PolicyConfig {
     fn new(kind: PolicyKind, name: String) -> Self {
-        let privileged = matches!(kind, PolicyKind::Builtin(policy) if policy.is_expert());
+        let privileged = matches!(kind, PolicyKind::Builtin(policy) if policy.grip_mode().is_some());
         Self { kind, name, replan: None, file: None, sources: BTreeMap::new(), declared: None, privileged }
     }
 
@@ -339,10 +363,10 @@ impl PolicyConfig {
         Self::new(PolicyKind::External, name.to_owned())
     }
 
-    /// The scripted expert. `None` for other policies.
-    pub(crate) fn expert(&self) -> Option<BuiltinPolicy> {
+    /// How a scripted expert controls the gripper. `None` for other policies.
+    pub(crate) fn expert(&self) -> Option<GripMode> {
         match self.kind {
-            PolicyKind::Builtin(policy) if policy.is_expert() => Some(policy),
+            PolicyKind::Builtin(policy) => policy.grip_mode(),
             _ => None,
         }
     }
@@ -409,7 +433,10 @@ impl PolicyConfig {
                     let seed = rand::RngCore::next_u64(&mut opened.seed.stream(RandomStream::Script));
                     chunked(Box::new(builtin::RandomPolicy::new(seed)), 1)
                 }
-                (PolicyKind::Builtin(expert), _) => Box::new(expert_controller(opened, *expert)?),
+                (PolicyKind::Builtin(expert), _) => {
+                    let mode = expert.grip_mode().unwrap_or(GripMode::Commanded);
+                    Box::new(expert_controller(opened, mode)?)
+                }
                 // The provider of the actions replaces this factory.
                 (PolicyKind::External | PolicyKind::Client(_) | PolicyKind::Server(_), _) => {
                     chunked(Box::new(RecordedPolicy::new(Vec::new(), None)), 1)
@@ -429,16 +456,7 @@ fn declared_streams(args: &PolicyArgs, profile: &Profile) -> DeclaredStreams {
 ///
 /// # Errors
 /// The task has none, or its script fails.
-pub(crate) fn expert_controller(
-    opened: EpisodeSetup,
-    policy: BuiltinPolicy,
-) -> Result<ExpertController, CliError> {
-    let mode = match policy {
-        BuiltinPolicy::TactileServo => GripMode::TactileServo,
-        BuiltinPolicy::ExpertBinary => GripMode::Binary,
-        BuiltinPolicy::FixedClosure => GripMode::FixedClosure,
-        _ => GripMode::Commanded,
-    };
+pub(crate) fn expert_controller(opened: EpisodeSetup, mode: GripMode) -> Result<ExpertController, CliError> {
     opened.expert(mode).ok_or_else(|| CliError::input("the task has no expert"))
 }
 
@@ -504,6 +522,9 @@ mod tests {
             let policy = PolicyConfig::load(&args(parse_policy(&name).unwrap())).unwrap();
             assert_eq!(policy.name, name);
             assert_eq!(policy.privileged, !["noop", "random"].contains(&name.as_str()));
+            if let Some(GripMode::Controller(controller)) = policy.expert() {
+                assert_eq!(controller.name(), name, "experts read the name of the policy");
+            }
         }
     }
 

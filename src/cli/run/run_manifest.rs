@@ -12,7 +12,9 @@ use crate::{
     error::CliError,
     run::{recorded_runs::ReplaySource, suite_run::SuiteRun},
 };
-use softvt_benchmark::{ShiftValue, Task, seed::SecretSeed, settings::Settings, variation::VariationRanges};
+use softvt_benchmark::{
+    Needs, ShiftValue, Task, seed::SecretSeed, settings::Settings, variation::VariationRanges,
+};
 use softvt_common::files;
 use softvt_dataset::card::Imported;
 use softvt_policy::profile::{GripCode, Profile};
@@ -36,6 +38,9 @@ pub(crate) struct RunManifest<'a> {
     /// File of `--vary`.
     #[serde(skip_serializing_if = "Option::is_none")]
     vary: Option<String>,
+    /// What a safe grip needs, if the suite states it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    needs: Option<Needs>,
     /// The suite whose rigid twin this one is.
     #[serde(skip_serializing_if = "Option::is_none")]
     twin_of: Option<&'a str>,
@@ -101,6 +106,8 @@ impl<'a> RunManifest<'a> {
             twin: config.is_rigid_twin().then_some("rigid"),
             variation: run.suite.vary.as_ref(),
             vary: config.script.vary.as_ref().map(|file| file.display().to_string()),
+            // Of the suite as it is: neither of its twin, nor with another variation.
+            needs: run.suite.needs.filter(|_| config.script.vary.is_none() && !config.is_rigid_twin()),
             twin_of: run.suite.twin_of.as_deref(),
             policy: &config.policy.name,
             profile: config.policy.profile(),

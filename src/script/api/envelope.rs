@@ -32,9 +32,9 @@ use softvt_evaluation::{
     safety::DeformationLimit,
     thresholds::{ThresholdFile, sweep_jsonl},
 };
-use softvt_geometry::Pose;
+use softvt_geometry::Vec3;
 use softvt_robot::spec::PadSpec;
-use softvt_scene::{Asset, Object};
+use softvt_scene::{Asset, HiddenProperties, LENGTH_HINT, ObjectVariation};
 
 /// Largest number of instances of a sample.
 pub(crate) const MAX_SAMPLE: f64 = 10_000.0;
@@ -80,7 +80,9 @@ pub(crate) fn draw<T>(
     draw: impl FnOnce(&ModelOf<'_>) -> Result<T, DrawError>,
 ) -> mlua::Result<Result<T, DrawError>> {
     let broken = RefCell::new(None);
-    let drawn = draw(&|asset| match calibrated_asset(lua, &asset.name) {
+    // A fingerprint takes milliseconds, and a sample asks for one asset many times.
+    let known = RefCell::new(BTreeMap::<*const Asset, Option<Arc<InstanceModel>>>::new());
+    let find = |asset: &Asset| match calibrated_asset(lua, &asset.name) {
         // A calibration of another version of the asset does not count, as for its limit.
         Ok(found) => found
             .filter(|found| found.fingerprint.as_ref().is_none_or(|known| *known == asset.fingerprint()))
@@ -89,6 +91,9 @@ pub(crate) fn draw<T>(
             broken.replace(Some(error));
             None
         }
+    };
+    let drawn = draw(&|asset| {
+        known.borrow_mut().entry(std::ptr::from_ref(asset)).or_insert_with(|| find(asset)).clone()
     });
     match broken.into_inner() {
         Some(error) => Err(error),
@@ -104,46 +109,57 @@ pub(crate) fn sample(
     asset: &Asset,
     count: u32,
 ) -> mlua::Result<Vec<Table>> {
-    let mut object = Object::new(&asset.name, Arc::new(asset.clone()), Pose::identity());
-    let Some(ranges) = ranges else {
-        return (0..count).map(|_| instance_state(lua, &object, 1)).collect();
-    };
+    let size = asset.shape.bounds().size();
+    let state = |drawn: Option<&ObjectVariation>| instance_state(lua, &Instance { asset, size, drawn });
+    let Some(ranges) = ranges else { return (0..count).map(|_| state(None)).collect() };
     let drawn = draw(lua, |model_of| ranges.sample(suite, asset, count, model_of))?;
     let drawn = drawn.map_err(|error| fail(lua, error.to_string()))?;
-    let nominal = object.clone();
-    drawn
-        .iter()
-        .map(|one| {
-            object.clone_from(&nominal);
-            one.apply(&mut object);
-            instance_state(lua, &object, one.hidden.map_or(1, |hidden| hidden.draws))
-        })
-        .collect()
+    drawn.iter().map(|one| state(Some(one))).collect()
+}
+
+/// An instance by what it differs in from its asset.
+pub(crate) struct Instance<'a> {
+    asset: &'a Asset,
+    /// Edge lengths of the bounding box of the asset, m.
+    size: Vec3,
+    drawn: Option<&'a ObjectVariation>,
+}
+
+impl Instance<'_> {
+    /// A factor of the draw; 1 for the asset itself.
+    fn factor(&self, of: impl Fn(&ObjectVariation) -> f64) -> f64 {
+        self.drawn.map_or(1.0, of)
+    }
+
+    fn hidden(&self) -> Option<HiddenProperties> {
+        self.drawn?.hidden
+    }
 }
 
 output! {
     /// An instance of an asset, with the fields that a grasp needs of an object.
-    fn instance_state(lua, object: &Object, draws: u32) -> "softvt.InstanceState" as "instance" {
+    fn instance_state(lua, instance: &Instance<'_>) -> "softvt.InstanceState" as "instance" {
         /// Name of its asset.
-        asset: "string" = object.asset.name.as_str();
+        asset: "string" = instance.asset.name.as_str();
         /// Edge lengths of its bounding box at rest, m.
-        size: "number[]" = lua.create_sequence_from(object.asset.shape.bounds().size().iter().copied())?;
+        size: "number[]" = lua.create_sequence_from((instance.size * instance.factor(|one| one.scale)).iter().copied())?;
         /// Size relative to that of its asset.
-        scale: "number" = object.scale;
-        /// Young's modulus relative to that of its asset; nil unless soft.
-        youngs_factor: "number?" = object.youngs_factor();
-        /// Density relative to that of its asset; nil unless soft or rigid.
-        density_factor: "number?" = object.density_factor();
-        /// Stable strain relative to that of its asset; nil unless soft.
-        strain_factor: "number?" = object.strain_factor();
+        scale: "number" = instance.factor(|one| one.scale);
+        /// Young's modulus relative to that of its asset.
+        youngs_factor: "number" = instance.factor(|one| one.youngs_factor);
+        /// Density relative to that of its asset.
+        density_factor: "number" = instance.factor(|one| one.density_factor);
+        /// Stable strain relative to that of its asset.
+        strain_factor: "number" = instance.hidden().map_or(1.0, |hidden| hidden.strain_factor);
         /// Static friction of its coating; nil without one.
-        coating: "number?" = object.coating();
-        /// Number of draws until it was kept.
-        draws: "number" = draws;
+        coating: "number?" = instance.hidden().map(|hidden| hidden.coating);
+        /// Number of draws until an instance could be kept.
+        draws: "integer" = instance.hidden().map_or(1, |hidden| hidden.draws);
         /// Numbers of its asset for experts, as those of an object.
-        hints: "table<string, number>" = lua.create_table_from(
-            object.asset.hints.iter().map(|(name, value)| (name.as_str(), *value))
-        )?;
+        hints: "table<string, number>" = lua.create_table_from(instance.asset.hints.iter().map(|(name, value)| {
+            let factor = if name.ends_with(LENGTH_HINT) { instance.factor(|one| one.scale) } else { 1.0 };
+            (name.as_str(), factor * value)
+        }))?;
     }
 }
 
@@ -243,6 +259,8 @@ output! {
         loose: "softvt.Grip" = grip_table(lua, &window.loose)?;
         /// The tightest grip whose carried object stays within τ; that of the loose end if none does.
         tight: "softvt.Grip" = grip_table(lua, &window.tight)?;
+        /// Distance of the gels at first contact, m.
+        contact: "number" = window.contact_m;
         /// D that the weight of the carried object causes, as a share of τ.
         carried: "number" = window.carried;
         /// Deformation limit τ of the instance, %.

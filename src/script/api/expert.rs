@@ -15,15 +15,16 @@ use super::{
     index_of,
     observation::{FingerReadings, fingers},
     pose::LuaPose,
+    tasks::SuiteSpec,
 };
 use crate::{
-    schema::{ApiObject, Range, Type, class, object::arguments, output},
-    vm::{base_library, error::fail, library::embedded, value::number},
+    schema::{ApiObject, Constructed, Range, Type, class, functions, object::arguments, output},
+    vm::{base_library, error::fail, library::embedded, privilege::check_privilege, value::number},
 };
 use softvt_common::parallel::lock;
 use softvt_geometry::Pose;
 use softvt_robot::{Obstacle, clearance, gripper::MAX_WIDTH};
-use softvt_scene::Body;
+use softvt_scene::{Asset, Body};
 
 /// Access of an expert to the tactile sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -291,12 +292,14 @@ class! {
             /// on the cases of the fingers do not count. On the edge of a pad the normals are oblique, and the sum is larger
             /// than the pressing force, which is -sim:tactile(side).force[3].
             force: "number[]" { get(_, this) { this.read(|view| view.pad_force_n) } }
-            /// Under --policy fixed-closure: the instances that the suite can draw. The expert then closes to one closure for all
-            /// of them (experts.fixed_closure). nil under other policies.
+            /// Name of the controller that takes the place of the expert's own grip, such as "size-seen" under --policy size-seen
+            /// (experts.blind_grips). nil under policies that have none.
+            grip_controller: "string?" { get(_, this) { this.read(|view| view.grip_controller.map(str::to_owned)) } }
+            /// With a grip_controller, which must not know the instance: the instances that the suite can draw. nil without.
             instances: "softvt.Instances?" {
                 get(lua, this) {
                     let instances = this.read(|view| view.instances.clone());
-                    instances.map(|instances| LuaInstances { instances, view: this.0.clone() }).into_lua(lua)?
+                    instances.map(|instances| LuaInstances::new(instances, Some(this.0.clone()))).into_lua(lua)?
                 }
             }
             /// Time since the start, s.
@@ -339,29 +342,75 @@ class! {
 #[derive(Clone)]
 pub(crate) struct LuaInstances {
     instances: Arc<SuiteInstances>,
-    view: SharedView,
+    /// The scene of an episode.
+    view: Option<SharedView>,
+    /// Assets of the goals of the suite, once they are known.
+    kinds: Arc<Mutex<Option<Vec<Arc<Asset>>>>>,
+}
+
+impl LuaInstances {
+    fn new(instances: Arc<SuiteInstances>, view: Option<SharedView>) -> Self {
+        Self { instances, view, kinds: Arc::default() }
+    }
+
+    fn kinds(&self) -> mlua::Result<Vec<Arc<Asset>>> {
+        if let Some(kinds) = &*lock(&self.kinds) {
+            return Ok(kinds.clone());
+        }
+        // The layouts are Lua: nothing is locked while they run.
+        let kinds = self.instances.kinds()?;
+        *lock(&self.kinds) = Some(kinds.clone());
+        Ok(kinds)
+    }
+
+    /// The asset of an object of the scene or the kind of a name. `None` for a part, which has no asset of its own.
+    fn asset(&self, lua: &Lua, name: &str) -> mlua::Result<Option<Arc<Asset>>> {
+        if let Some(view) = &self.view {
+            let view = lock(view);
+            if let Some(object) = view.objects.iter().find(|object| object.name == name) {
+                return Ok(object.nominal.clone());
+            }
+        }
+        let kinds = self.kinds()?;
+        let names = kinds.iter().map(|kind| kind.name.as_str());
+        Ok(Some(kinds[index_of(lua, "instances:sample", "kind", names, name)?].clone()))
+    }
 }
 
 class! {
-    /// The instances that the suite can draw, for a controller that must not know which one it has.
+    /// The instances that a suite can draw, for a controller that must not know which one it has.
     LuaInstances: "softvt.Instances" {
         label(_) { "instances".to_owned() }
         methods {
-            /// Returns instances of an object's asset, drawn as the suite draws them, from a random stream that no episode uses: the
-            /// same in every episode. Without a variation each is the asset itself.
+            /// Returns the names of the assets of the objects of all goals of the suite, each once.
+            fn kinds(_, this) -> ["string[]"] {
+                this.kinds()?.iter().map(|kind| kind.name.clone()).collect::<Vec<_>>()
+            }
+            /// Returns instances of the asset of an object in the scene, or of a kind, drawn as the suite draws them, from a random stream
+            /// that no episode uses: the same in every episode. Without a variation each is the asset itself.
             fn sample(
                 lua,
                 this,
                 object: String,
                 count: u32 = Type::Integer(Range::closed(1.0, MAX_SAMPLE))
             ) -> ["softvt.InstanceState[]"] {
-                let nominal = find(lua, "instances:sample", "object", &lock(&this.view).objects, &object)?.nominal.clone();
-                let SuiteInstances { suite, ranges } = &*this.instances;
-                match nominal {
+                let SuiteInstances { suite, ranges, .. } = &*this.instances;
+                match this.asset(lua, &object)? {
                     Some(asset) => sample(lua, suite, ranges.as_ref(), &asset, count)?,
                     None => Vec::new(),
                 }
             }
+        }
+    }
+}
+
+functions! {
+    FUNCTIONS {
+        /// Returns the instances that a suite can draw, by its own variation.
+        fn instances(lua, suite: Constructed<SuiteSpec>) -> ["softvt.Instances"] {
+            check_privilege(lua, "softvt.instances")?;
+            let ranges = suite.vary.as_ref().map(|vary| vary.ranges());
+            LuaInstances::new(Arc::new(SuiteInstances::new(&suite, ranges)), None)
         }
     }
 }

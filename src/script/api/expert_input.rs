@@ -2,7 +2,19 @@
 
 use std::sync::Arc;
 
-use softvt_benchmark::{CONTROL_DT, variation::VariationRanges};
+use super::{
+    random::LuaRng,
+    scene::{LuaScene, empty_scene},
+    tasks::{SuiteSpec, TaskSpec},
+};
+use crate::schema::Constructed;
+use softvt_benchmark::{
+    CONTROL_DT,
+    seed::{EpisodeSeed, RandomStream},
+    variation::VariationRanges,
+};
+use softvt_common::parallel::lock;
+use softvt_evaluation::episode_id::{EpisodeId, Split};
 use softvt_geometry::{Aabb, Pose, Vec3};
 use softvt_robot::ik::{PoseDifference, PoseTolerance, UnreachablePose};
 use softvt_rollout::{ObjectInstance, Simulation};
@@ -57,7 +69,9 @@ pub(crate) struct ExpertView {
     pub closure: f64,
     /// Normal force on the left and the right pad, N.
     pub pad_force_n: [f64; 2],
-    /// The instances of the suite, for an expert that must not know this one.
+    /// Controller of the gripper in place of the expert's own grip.
+    pub grip_controller: Option<&'static str>,
+    /// The instances of the suite, for a controller that must not know this one.
     pub instances: Option<Arc<SuiteInstances>>,
     /// The objects, in the order of the scene.
     pub objects: Vec<ObjectView>,
@@ -70,6 +84,56 @@ pub(crate) struct SuiteInstances {
     pub suite: String,
     /// Its variation; without one every object is its asset.
     pub ranges: Option<VariationRanges>,
+    /// Objects of the goals of its tasks.
+    pub goals: Vec<GoalObject>,
+}
+
+/// The object of a task's goal.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct GoalObject {
+    /// Name of the layout that places it, and its function.
+    pub layout: String,
+    pub build: mlua::Function,
+    /// Scene name.
+    pub name: String,
+}
+
+impl SuiteInstances {
+    /// The instances of a suite with these ranges, which may be others than its own.
+    pub(crate) fn new(suite: &SuiteSpec, ranges: Option<VariationRanges>) -> Self {
+        let goal = |task: &Constructed<TaskSpec>| GoalObject {
+            layout: task.layout.name.clone(),
+            build: task.layout.build.clone(),
+            name: task.goal.object().to_owned(),
+        };
+        Self { suite: suite.name.clone(), ranges, goals: suite.tasks.iter().map(goal).collect() }
+    }
+
+    /// The assets of the objects of all goals, each once, as their files define them.
+    ///
+    /// # Errors
+    /// A layout fails.
+    pub(crate) fn kinds(&self) -> mlua::Result<Vec<Arc<Asset>>> {
+        let id = EpisodeId {
+            suite: self.suite.clone(),
+            task: 0,
+            episode: 0,
+            base_seed: 0,
+            split: Split::Experiment,
+        };
+        let mut kinds: Vec<Arc<Asset>> = Vec::new();
+        for goal in &self.goals {
+            let scene = LuaScene::new(empty_scene());
+            let rng = LuaRng::new(EpisodeSeed::new(&id, &goal.layout), RandomStream::Layout);
+            goal.build.call::<()>((scene.clone(), rng))?;
+            let scene = lock(&scene.scene);
+            let Some(object) = scene.objects.iter().find(|object| object.name == goal.name) else { continue };
+            if !kinds.iter().any(|kind| kind.name == object.nominal.name) {
+                kinds.push(object.nominal.clone());
+            }
+        }
+        Ok(kinds)
+    }
 }
 
 /// Command of an expert for one control step.
@@ -107,6 +171,7 @@ fn expert_view(sim: &Simulation, time_s: f64) -> ExpertView {
         width_m: sim.robot.width(&sim.world),
         closure: sim.robot.closure(),
         pad_force_n: sim.pad_normal_forces(),
+        grip_controller: None,
         instances: None,
         objects: (0..sim.objects.len())
             .filter(|&index| sim.objects[index].part.is_none())

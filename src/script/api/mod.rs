@@ -115,6 +115,7 @@ pub(crate) fn functions() -> impl Iterator<Item = &'static Function> {
         assets::FUNCTIONS,
         simulation::FUNCTIONS,
         envelope::FUNCTIONS,
+        expert::FUNCTIONS,
         image::FUNCTIONS,
         pose::FUNCTIONS,
         shapes::FUNCTIONS,

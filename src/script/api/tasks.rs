@@ -12,7 +12,7 @@ use crate::{
     vm::{error::fail, value::describe},
 };
 use softvt_benchmark::{
-    ObjectType, REFERENCE, Teacher, Variation,
+    Needs, ObjectType, REFERENCE, Teacher, Variation,
     variation::{FactorRange, HiddenRanges, VariationRanges},
 };
 
@@ -29,6 +29,7 @@ const HOLD: Type = Type::Number("s", Range::closed(0.0, 10.0));
 pub(crate) const SETTINGS: Type = Type::Map(&Type::Map(&Type::Any));
 
 choice! { ObjectType { "deformable" => Deformable, "rigid" => Rigid } }
+choice! { Needs { "nothing" => Nothing, "size" => Size, "touch" => Touch } }
 choice! { Teacher { "expert" => Expert, "tactile-servo" => TactileServo } }
 choice! { Variation { "object" => Object, "spatial" => Spatial } }
 
@@ -137,6 +138,9 @@ record! {
         object_type: ObjectType;
         /// Difference between the tasks.
         variation: Variation;
+        /// What a controller has to know of an instance to grip it safely, as softvt list suites prints it: "nothing" but its
+        /// kind, its "size", or what only "touch" tells. softvt scripts/blind_bounds.lua estimates it.
+        needs: Option<Needs>;
         /// Default number of episodes per task.
         episodes: u32 = Type::Integer(Range::closed(1.0, 1e6)) => Integer(5);
         /// The tasks, in order.

@@ -334,6 +334,7 @@ fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Suite> {
         name,
         object_type: spec.object_type,
         variation: spec.variation,
+        needs: spec.needs,
         episodes: spec.episodes,
         tasks,
         shifts: shifts.collect(),

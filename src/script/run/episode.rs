@@ -129,7 +129,7 @@ impl SceneBuilder {
         check_width(&scene, task.goal.object(), variation.as_ref(), largest)?;
         let (instance, expert) = (self.instance.clone(), task.expert.clone());
         let ranges = self.ranges.get(&id.suite).cloned();
-        let instances = Arc::new(SuiteInstances { suite: id.suite.clone(), ranges });
+        let instances = Arc::new(SuiteInstances::new(&suite, ranges));
         Ok(EpisodeSetup { scene, nominal, variation, prompt, seed, instance, expert, instances })
     }
 

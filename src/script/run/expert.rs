@@ -20,10 +20,50 @@ pub enum GripMode {
     Commanded,
     /// Either open or closed.
     Binary,
-    /// The closure that is best for all instances that a variation can draw of the object's asset.
-    FixedClosure,
+    /// That of a controller that does not know the instance, if the expert has one of its name.
+    Controller(GripController),
     /// Feels with the tactile sensors how firmly the object must be held, wherever the expert grasps.
     TactileServo,
+}
+
+/// Controllers of the gripper that know what shows of an object and the instances that the suite draws, in place of the instance
+/// itself. Experts implement them in Lua.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GripController {
+    /// One closure per asset.
+    FixedClosure,
+    /// A closure per asset and size.
+    SizeSeen,
+    /// An indentation after first contact.
+    ContactDepth,
+    /// A grip force per asset.
+    OneForce,
+    /// One grip force for all assets of a suite.
+    OneForceForAll,
+    /// The width and the force that the drives of the fingers measure.
+    Drives,
+    /// Grasps that are repeated until the object follows the hand.
+    LookRetry,
+}
+
+impl GripController {
+    /// Name, as experts read it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::FixedClosure => "fixed-closure",
+            Self::SizeSeen => "size-seen",
+            Self::ContactDepth => "contact-depth",
+            Self::OneForce => "one-force",
+            Self::OneForceForAll => "one-force-for-all",
+            Self::Drives => "drives",
+            Self::LookRetry => "look-retry",
+        }
+    }
+
+    /// True for a bound of what a policy without touch can do.
+    pub fn is_blind(self) -> bool {
+        self != Self::LookRetry
+    }
 }
 
 /// Drives a rollout by a Lua expert in a virtual machine of its own; after its end the last command stays.
@@ -73,7 +113,10 @@ impl Controller for ExpertController {
         let tactile = observation.tactile.as_ref().and_then(|tactile| tactile.frames.last());
         self.coroutine.set_readings(tactile.cloned());
         let mut input = ExpertInput::new(sim, observation.time_s, &mut self.monitor);
-        input.view.instances = (self.mode == GripMode::FixedClosure).then(|| self.instances.clone());
+        if let GripMode::Controller(controller) = self.mode {
+            input.view.grip_controller = Some(controller.name());
+            input.view.instances = Some(self.instances.clone());
+        }
         let vm = &self.instance.vm;
         let _deadline = vm.call_deadline();
         // A pose out of reach fails this episode; in others the objects lie elsewhere.
@@ -86,7 +129,7 @@ impl Controller for ExpertController {
             self.is_gripping = command.gripping;
             let closure = match self.mode {
                 GripMode::Binary => f64::from(u8::from(command.gripping)),
-                GripMode::Commanded | GripMode::FixedClosure | GripMode::TactileServo => command.closure,
+                GripMode::Commanded | GripMode::Controller(_) | GripMode::TactileServo => command.closure,
             };
             let orientation = rotation::axis_angle(&command.pose_b.rotation);
             Action::new(command.pose_b.translation.vector, orientation, closure)

@@ -56,6 +56,7 @@ fn view() -> ExpertView {
         width_m: 0.08,
         closure: 0.0,
         pad_force_n: [0.0; 2],
+        grip_controller: None,
         instances: None,
         objects: vec![ball()],
     }

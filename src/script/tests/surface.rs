@@ -113,7 +113,6 @@ fn wrong_calls_get_messages_in_terms_of_the_lua_interface() {
             "softvt.TactileReading",
             "softvt.SafeWindow",
             "softvt.Envelope",
-            "softvt.InstanceRanges",
             "softvt.List",
             "softvt.TaskBrief",
             "softvt.Observation",

@@ -87,6 +87,6 @@ pub(crate) fn check_module(lua: &Lua, name: &str, file: &str) -> mlua::Result<()
     let stem = path.file_stem().and_then(|stem| stem.to_str());
     let is_privileged = of_folder("assets")
         || stem == Some("calibrated")
-        || of_folder("experts") && matches!(stem, Some("grasp" | "pick_place" | "fixed_closure"));
+        || of_folder("experts") && matches!(stem, Some("grasp" | "pick_place" | "blind_grips"));
     if is_privileged { check_privilege(lua, &format!("require {name:?}")) } else { Ok(()) }
 }

@@ -1,0 +1,66 @@
+//! The order of the reference controllers: what a suite needs of a grip, by arithmetic and by episodes.
+
+use serde_json::Value;
+
+use crate::support::Project;
+
+/// Controllers without touch.
+const BLIND: [&str; 6] =
+    ["fixed-closure", "size-seen", "contact-depth", "one-force", "one-force-for-all", "drives"];
+
+/// Mean over the kinds of a suite by column of `scripts/blind_bounds.lua`.
+fn bounds(suite: &str) -> impl Fn(&str) -> f64 {
+    let project = Project::new(&[]);
+    let words = format!("scripts/blind_bounds.lua --suite {suite} --instances 400 --json");
+    let text = project.succeeds(&words).out;
+    let rows: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).expect("a row")).collect();
+    assert!(rows.len() >= 5, "{text}");
+    move |column: &str| {
+        let values = rows.iter().map(|row| row[column].as_f64().unwrap_or_else(|| panic!("{column}: {row}")));
+        values.sum::<f64>() / rows.len() as f64
+    }
+}
+
+#[test]
+fn the_varied_suite_needs_the_size_and_the_hidden_ones_touch_by_arithmetic() {
+    let varied = bounds("object_varied");
+    assert!(varied("fixed-closure") < 60.0 && varied("size-seen") > 95.0, "the size suffices");
+    for suite in ["object_hidden", "spatial_hidden"] {
+        let hidden = bounds(suite);
+        for controller in BLIND {
+            let share = hidden(controller);
+            assert!(share < 60.0, "{suite}: {controller} is safe for {share:.1} % of the instances");
+        }
+        assert!(hidden("felt") > 95.0, "{suite}: {:.1} %", hidden("felt"));
+        assert!((1.5..=2.2).contains(&hidden("force_ratio")), "{suite}: {}", hidden("force_ratio"));
+        assert!((1.0..100.0).contains(&hidden("kept_pct")), "{suite}: {}", hidden("kept_pct"));
+    }
+}
+
+/// Number of safe episodes of a policy on the first episode of every task of Object-Hidden.
+fn safe_episodes(policy: &str) -> usize {
+    let project = Project::new(&[]);
+    project.succeeds(&format!("suites/object_hidden.lua --episodes 1 --policy {policy} --out run"));
+    let episodes = project.lines("run/episodes.jsonl");
+    assert_eq!(episodes.len(), 10);
+    episodes.iter().filter(|episode| episode["safety"] == true).count()
+}
+
+#[test]
+fn no_controller_without_touch_is_nearly_as_safe_as_the_expert_where_touch_is_needed() {
+    let expert = safe_episodes("expert");
+    assert!(expert >= 9, "the expert is safe in {expert} of 10 episodes");
+    for policy in ["size-seen", "contact-depth", "one-force"] {
+        let safe = safe_episodes(policy);
+        assert!(safe + 2 <= expert, "{policy} is safe in {safe} of 10 episodes, the expert in {expert}");
+    }
+}
+
+#[test]
+fn bounds_of_suites_that_have_none_are_refused() {
+    let project = Project::new(&[]);
+    let message = project.refusal("scripts/blind_bounds.lua --suite object_rigid");
+    assert!(message.contains("no goal object of these suites has a calibrated window"), "{message}");
+    let message = project.refusal("scripts/blind_bounds.lua --suite all");
+    assert!(message.contains("suites/all.lua returns a list of suites"), "{message}");
+}
