@@ -207,7 +207,7 @@
 ---@field rotation_rad? number For delta and delta_osc: the rotation of a share of 1, rad. Expects a number in above 0..10.
 ---@field scale? number[] Factors on the first six numbers, applied first. Expects a list of 6 numbers.
 ---@field offset? number[] Offsets added after that. Expects a list of 6 numbers.
----@field length? integer Length that an action must have, padding included; any from 7 by default. Expects a whole number in 7..4096.
+---@field length? integer Length that an action must have, padding included; by default 7, or 32 as openpi's models pad them. Expects a whole number in 7..4096.
 ---@field gripper? softvt.GripperValues The seventh number.
 
 ---The seventh number of an action.

@@ -8,7 +8,8 @@
     env.close()
 
 Observations are a dict with the keys of the server's profile; actions are seven numbers in its encoding. The reward is 1 in the
-step that reaches the goal and 0 otherwise. `info` has the step and the success, and with --privileged the true state.
+step that reaches the goal and 0 otherwise. `info` has the step, the success and the numbers of actions out of reach (`far_commands`) and of grip values out of range
+(`clamped_grips`), and with --privileged the true state.
 """
 
 import atexit

@@ -45,6 +45,7 @@ pub mod instance;
 pub mod judge;
 pub mod paired_stats;
 pub mod record;
+pub mod record_check;
 pub mod safety;
 pub mod slip;
 pub mod stage;

@@ -1,13 +1,15 @@
 //! Record of one episode: one line of `episodes.jsonl`.
 //!
 //! [`EpisodeRecord`] flattens four parts into one JSON object: the [`EpisodeHeader`] with its id, its [`Outcome`], the
-//! [`Verdict`] of the judge and the [`RolloutStats`].
+//! [`Verdict`] of the judge and the [`RolloutStats`]. [`super::record_check`] reads a record: what follows from other fields
+//! is checked there.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, fmt};
 
 use serde::{Deserialize, Serialize, Serializer, ser::SerializeMap};
 
 use super::{drop::DropEvent, episode_id::EpisodeId, safety::KappaVerdict, stage::Stage};
+use softvt_common::text::decimal;
 use softvt_scene::{InitialState, SceneVariation};
 
 /// End of a rollout.
@@ -17,7 +19,7 @@ pub enum Outcome {
     /// The goal held for long enough.
     Completed,
     /// The budget of control steps was spent.
-    Timeout,
+    Budget,
     /// The physics state became invalid.
     Invalid {
         /// One of "inverted", "not_finite", "not_converged", "too_fast", "too_hard" …
@@ -37,7 +39,7 @@ pub enum Outcome {
 impl Outcome {
     /// True if the evidence of the rollout can be judged.
     pub fn is_valid(&self) -> bool {
-        matches!(self, Self::Completed | Self::Timeout)
+        matches!(self, Self::Completed | Self::Budget)
     }
 }
 
@@ -235,6 +237,26 @@ pub struct Verdict {
     pub gentle: Option<bool>,
 }
 
+/// A command that is out of reach of one step of the inverse kinematics.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FarCommand {
+    /// Commanded position of the tool in the base frame, m.
+    pub position_m: [f64; 3],
+    /// Distance from the tool, m.
+    pub distance_m: f64,
+    /// Angle from the orientation of the tool, rad.
+    pub angle_rad: f64,
+}
+
+impl fmt::Display for FarCommand {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let short = |x: f64| decimal(Some(x), 3).trim_end_matches('0').trim_end_matches('.').to_owned();
+        let position = self.position_m.map(short).join(", ");
+        let (distance, angle) = (short(self.distance_m), short(self.angle_rad));
+        write!(f, "({position}) m, {distance} m and {angle} rad from the tool")
+    }
+}
+
 /// Counters of the rollout.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RolloutStats {
@@ -259,6 +281,12 @@ pub struct RolloutStats {
     /// reaches (0.2 m, 0.6 rad): out of reach, or in the wrong frame or unit.
     #[serde(default)]
     pub far_commands: u32,
+    /// The first of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub first_far_command: Option<FarCommand>,
+    /// Number of control steps whose grip value was outside of its range by more than a tenth of it, and was clamped.
+    #[serde(default)]
+    pub clamped_grips: u32,
     /// Reason given by the controller for aborting the episode, if it did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gave_up: Option<String>,
@@ -271,6 +299,18 @@ pub struct RolloutStats {
     pub actions_sha256: Option<String>,
     /// Hash of the final state, hexadecimal.
     pub state_hash: String,
+}
+
+impl RolloutStats {
+    /// What of the commands was not executed as given, one phrase each.
+    pub fn command_notes(&self) -> Vec<String> {
+        let first = self.first_far_command.map_or(String::new(), |first| format!(", first: {first}"));
+        let far = (self.far_commands > 0)
+            .then(|| format!("{} of {} commands were out of reach{first}", self.far_commands, self.steps));
+        let clamped = (self.clamped_grips > 0)
+            .then(|| format!("{} of {} grip values were out of range", self.clamped_grips, self.steps));
+        far.into_iter().chain(clamped).collect()
+    }
 }
 
 /// One episode. Fields keep their order, and numbers every bit, through JSON.
@@ -306,6 +346,7 @@ impl EpisodeRecord {
     /// Removes the fields that records of version 0.1 lack, for the comparison with such a record.
     pub fn remove_new_fields(&mut self) {
         self.stats.actions_sha256 = None;
+        (self.stats.first_far_command, self.stats.clamped_grips) = (None, 0);
         let v = &mut self.verdict;
         (v.d_mean, v.d_final, v.d_p95, v.time_over_tau_s) = (None, None, None, None);
         (v.others_ok, v.first_wrong_contact, v.failed_stage) = (None, None, None);
@@ -332,6 +373,17 @@ pub(crate) mod tests {
     /// A successful, safe soft episode.
     pub(crate) fn sample() -> EpisodeRecord {
         serde_json::from_str(include_str!("../../tests/data/episode_record.json")).expect("a valid record")
+    }
+
+    #[test]
+    fn commands_that_were_not_executed_as_given_are_told() {
+        let mut stats = sample().stats;
+        assert!(stats.command_notes().is_empty());
+        (stats.far_commands, stats.clamped_grips) = (168, 3);
+        stats.first_far_command =
+            Some(FarCommand { position_m: [467.0, 4.25, -260.0], distance_m: 534.5104, angle_rad: 0.0 });
+        let far = "168 of 168 commands were out of reach, first: (467, 4.25, -260) m, 534.51 m and 0 rad from the tool";
+        assert_eq!(stats.command_notes(), [far, "3 of 168 grip values were out of range"]);
     }
 
     #[test]

@@ -12,8 +12,11 @@ use softvt_geometry::Vec3;
 /// Number of actions from which on a chunk is rejected as a mistake.
 pub const MAX_CHUNK_LEN: usize = 10_000;
 
+/// Length to which openpi's models pad actions (`action_dim` in its `pi0_config.py`).
+pub const PADDED_ACTION_LEN: usize = 32;
+
 /// Decodes a response: a map whose entry `actions` (or `action`) has the shape (horizon, n), (1, horizon, n) or
-/// (n), n ≥ 7.
+/// (n). Without a length in the profile, n is 7, or 32 with padding.
 ///
 /// ```
 /// use rmpv::Value;
@@ -43,7 +46,7 @@ pub fn chunk(response: &Value, encoding: &ActionEncoding) -> Result<ActionChunk,
         .map_err(|error| PolicyError::Response(format!("has {error} as actions; expected numbers")))?;
     let wrong = |problem: &str| {
         PolicyError::Response(format!(
-            "has actions of shape {shape:?}: {problem}; expected (horizon, {ACTION_LEN} or more)"
+            "has actions of shape {shape:?}: {problem}; expected ({ACTION_LEN}), (horizon, {ACTION_LEN}) or (1, horizon, {ACTION_LEN})"
         ))
     };
     let (horizon, width) = match shape[..] {
@@ -57,8 +60,18 @@ pub fn chunk(response: &Value, encoding: &ActionEncoding) -> Result<ActionChunk,
         (_, ..ACTION_LEN) => return Err(wrong("too few numbers per action")),
         _ => {}
     }
-    if let Some(length) = encoding.length.filter(|length| *length != width) {
-        return Err(wrong(&format!("the profile requires {length} numbers per action")));
+    match encoding.length {
+        Some(length) if length != width => {
+            return Err(wrong(&format!("the profile requires {length} numbers per action")));
+        }
+        // Eight numbers may be a position, a quaternion and a gripper: more than seven have to be known as padding.
+        None if ![ACTION_LEN, PADDED_ACTION_LEN].contains(&width) => {
+            return Err(wrong(&format!(
+                "{width} numbers per action are neither {ACTION_LEN} nor the {PADDED_ACTION_LEN} of openpi's padding; if the \
+                 others are padding, a profile states length = {width}"
+            )));
+        }
+        _ => {}
     }
     let rows = values.chunks_exact(width).filter_map(<[f64]>::first_chunk);
     Ok(ActionChunk { commands: rows.map(|row| command(row, encoding)).collect::<Result<_, _>>()? })
@@ -121,6 +134,8 @@ mod tests {
             (reply(vec![0, 7], 0.0), "no action at all"),
             (reply(vec![10, 6], 0.0), "[10, 6]: too few numbers"),
             (reply(vec![2, 3, 7], 0.0), "not rows"),
+            (reply(vec![10, 8], 0.0), "8 numbers per action are neither 7 nor the 32"),
+            (reply(vec![8], 0.0), "a profile states length = 8"),
             (Value::from("hi"), "is text"),
             (Value::Map(vec![("state".into(), 1.into())]), "no entry actions; it has state"),
             (Value::Map(vec![("actions".into(), "x".into())]), "has text as actions"),
@@ -166,6 +181,8 @@ mod tests {
     fn a_profile_with_a_length_refuses_actions_of_another_length() {
         let code = ActionEncoding { length: Some(32), ..Profile::named("visuo_tactile").unwrap().actions };
         assert_eq!(chunk(&reply(vec![2, 32], 0.25), &code).unwrap().commands.len(), 2);
+        let eight = ActionEncoding { length: Some(8), ..code.clone() };
+        assert_eq!(chunk(&reply(vec![2, 8], 0.25), &eight).unwrap().commands.len(), 2);
         match chunk(&reply(vec![2, 7], 0.25), &code) {
             Err(PolicyError::Response(message)) => assert!(message.contains("32 numbers"), "{message}"),
             other => panic!("{other:?}"),

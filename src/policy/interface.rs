@@ -13,7 +13,7 @@ pub struct Action {
     pub position_b: Vec3,
     /// Absolute tool orientation in the base frame as axis-angle, rad.
     pub axis_angle_b: Vec3,
-    /// Gripper closure, 0 (open) ..= 1 (closed).
+    /// Gripper closure, 0 (open) ..= 1 (closed). The hand clamps others, which the record counts.
     pub closure: f64,
     /// Grip force at which closing stops, N, at most the effort of the gripper. `None` closes to `closure` whatever the
     /// force; with a force `closure` is 1.
@@ -73,7 +73,7 @@ pub enum ToolMotion {
 /// Command of the gripper in a [`ToolCommand`], as the grip code of a profile reads it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum GripCommand {
-    /// A closure, 0 (open) ..= 1 (closed).
+    /// A closure, 0 (open) ..= 1 (closed); clamped by the hand.
     Closure(f64),
     /// The closure of an answer in the code two-width, see [`WidthLatch`](super::WidthLatch).
     TwoWidth(f64),

@@ -184,7 +184,7 @@ pub struct ActionEncoding {
     /// Conversion of the first six numbers to the units of `pose`, if they differ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units: Option<ActionUnits>,
-    /// Required length of an action including padding. `None` accepts every length from seven.
+    /// Required length of an action including padding. `None` accepts 7, and 32 as openpi's models pad them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub length: Option<usize>,
 }
@@ -328,6 +328,11 @@ impl From<GripperValues> for GripperValuesFile {
     }
 }
 
+/// Share of its range by which a grip value may lie outside: answers of learned policies overshoot a little.
+const GRIP_OVERSHOOT: f64 = 0.1;
+/// Largest magnitude of a closure outside of 0..=1.
+const MAX_CLOSURE: f64 = 1e3;
+
 impl GripperValues {
     /// Grip forces in N; below 0 opens.
     pub const FORCE: Self = Self { open: -1.0, closed: 1.0, code: GripCode::Force, latch: None };
@@ -356,10 +361,16 @@ impl GripperValues {
         }
     }
 
-    /// Closure of a value, 0 (open) ..= 1 (closed).
+    /// Closure of a value, 0 (open) ..= 1 (closed). A value that lies outside of its range by more than a tenth of it gives a
+    /// closure outside as well: the episode counts it, and the hand clamps it.
     pub fn closure(&self, value: f64) -> f64 {
+        let share = (value - self.open) / (self.closed - self.open);
+        let is_mistake = share < -GRIP_OVERSHOOT || share > 1.0 + GRIP_OVERSHOOT;
+        if is_mistake && self.code != GripCode::Force {
+            return share.clamp(-MAX_CLOSURE, MAX_CLOSURE);
+        }
         // Adding 0.0 turns −0.0 into 0.0.
-        let share = ((value - self.open) / (self.closed - self.open)).clamp(0.0, 1.0) + 0.0;
+        let share = share.clamp(0.0, 1.0) + 0.0;
         match self.code {
             GripCode::Binary => f64::from(u8::from(share > 0.5)),
             GripCode::Force => f64::from(u8::from(value >= 0.0)),
@@ -546,11 +557,21 @@ mod tests {
         let fingers = Profile::named("softvtbench").unwrap().actions.gripper;
         assert_eq!((fingers.closure(0.04), fingers.closure(0.0), fingers.closure(0.02)), (0.0, 1.0, 0.5));
         assert!(fingers.closure(0.04).is_sign_positive());
-        assert_eq!((fingers.closure(0.3), fingers.closure(-1.0)), (0.0, 1.0));
+        assert_eq!((fingers.closure(0.042), fingers.closure(-0.001)), (0.0, 1.0), "an overshoot");
         let libero = Profile::named("libero").unwrap().actions.gripper;
         assert_eq!((libero.closure(-0.2), libero.closure(0.2)), (0.0, 1.0));
         let closure = Profile::named("visuo_tactile").unwrap().actions.gripper;
         assert_eq!(closure.closure(0.37), 0.37);
+    }
+
+    #[test]
+    fn values_far_outside_of_their_range_give_closures_outside() {
+        let closure = Profile::named("visuo_tactile").unwrap().actions.gripper;
+        assert_eq!([255.0, -3.0, 1.05, -0.05].map(|x| closure.closure(x)), [255.0, -3.0, 1.0, 0.0]);
+        let binary = Profile::named("vision").unwrap().actions.gripper;
+        assert_eq!([255.0, -3.0, 0.7].map(|x| binary.closure(x)), [255.0, -3.0, 1.0]);
+        assert_eq!(closure.closure(1e300), 1e3);
+        assert_eq!(GripperValues::FORCE.command(9.0), GripCommand::Force(9.0));
     }
 
     #[test]

@@ -1,10 +1,17 @@
 //! Paired comparison of two runs, episode by episode, and its plain-text table.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::{Path, PathBuf},
+};
 
 use serde::Serialize;
+use serde_json::Value;
 
-use super::stored_run::StoredRun;
+use super::{
+    stored_run::StoredRun,
+    terminal::{TaskName, task_names},
+};
 use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
 use softvt_evaluation::{
     paired_stats::{
@@ -25,9 +32,17 @@ pub struct TaskDifferences {
     pub suite: String,
     pub task: usize,
     pub prompt: String,
+    /// Asset of the object.
+    pub asset: String,
     /// The second run minus the first.
     #[serde(flatten)]
     pub differences: PairedComparison,
+}
+
+impl TaskDifferences {
+    fn name(&self) -> TaskName<'_> {
+        TaskName { prompt: &self.prompt, asset: &self.asset }
+    }
 }
 
 /// Comparison of two runs.
@@ -37,6 +52,8 @@ pub struct Comparison {
     pub first: String,
     /// Policy of the second run.
     pub second: String,
+    /// Headings of both runs: their policies, or their folders if the policies have one name.
+    pub headings: [String; 2],
     /// True if any target deforms.
     pub deformable: bool,
     /// Number of episodes present in only one run.
@@ -84,14 +101,16 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
         return Err(no_common_episode(first, second));
     }
     let task = |pairs: &[EpisodePair]| {
-        let EpisodeHeader { id, prompt, .. } = &pairs[0].first.header;
+        let EpisodeHeader { id, prompt, asset, .. } = &pairs[0].first.header;
         let differences = PairedComparison::from_pairs(pairs);
-        TaskDifferences { suite: id.suite.clone(), task: id.task, prompt: prompt.clone(), differences }
+        let (suite, asset) = (id.suite.clone(), asset.clone());
+        TaskDifferences { suite, task: id.task, prompt: prompt.clone(), asset, differences }
     };
     let all = || first.iter().chain(second);
     Ok(Comparison {
         first: policies(first),
         second: policies(second),
+        headings: headings(first, second),
         deformable: pairs.iter().any(|pair| pair.first.header.soft),
         unmatched: count(first) + count(second) - 2 * pairs.len(),
         unlike: differing_fields(first, second),
@@ -200,21 +219,55 @@ fn policies(runs: &[StoredRun]) -> String {
     joined(&runs.iter().map(label).collect())
 }
 
-/// Fields of `run.json` about the conditions of a run in which two runs of one suite differ.
+/// Names of both runs that differ, for the headings of their columns.
+fn headings(first: &[StoredRun], second: &[StoredRun]) -> [String; 2] {
+    let sides = [first, second];
+    let policies = sides.map(|runs| joined(&runs.iter().map(|run| run.text("policy").to_owned()).collect()));
+    let folder = |runs: &[StoredRun]| match runs {
+        [run] => run.dir.clone(),
+        // The runs of several suites are in one folder.
+        _ => runs.first().and_then(|run| run.dir.parent()).map_or_else(PathBuf::new, Path::to_owned),
+    };
+    let name = |path: PathBuf| path.file_name().map(|name| name.to_string_lossy().into_owned());
+    let folders = sides.map(|runs| name(folder(runs)).unwrap_or_default());
+    let both = ["first", "second"].map(str::to_owned);
+    [policies, folders].into_iter().find(|[a, b]| a != b).unwrap_or(both)
+}
+
+/// Fields of `run.json` about the conditions of a run in which two runs of one suite differ. Of files and limits, those
+/// that both runs read are compared, since a run of fewer tasks reads fewer; the differing ones follow in brackets.
 fn differing_fields(first: &[StoredRun], second: &[StoredRun]) -> Vec<String> {
     const CONDITION_FIELDS: [&str; 8] =
         ["softvt", "twin", "variation", "shifts", "options", "settings", "sources", "thresholds"];
+    /// Fields with an entry per file or asset.
+    const KEYED_FIELDS: [&str; 2] = ["sources", "thresholds"];
     let mut found = BTreeSet::new();
     for a in first {
         let Some(b) = second.iter().find(|b| b.suite() == a.suite()) else { continue };
-        found.extend(CONDITION_FIELDS.into_iter().filter(|field| a.manifest[*field] != b.manifest[*field]));
+        for field in CONDITION_FIELDS {
+            let (a, b) = (&a.manifest[field], &b.manifest[field]);
+            if a == b {
+                continue;
+            }
+            let (Some(own), Some(other), true) =
+                (a.as_object(), b.as_object(), KEYED_FIELDS.contains(&field))
+            else {
+                found.insert(field.to_owned());
+                continue;
+            };
+            let is_other = |(name, value): &(&String, &Value)| other.get(*name).is_some_and(|x| x != *value);
+            let names: Vec<&str> = own.iter().filter(is_other).map(|(name, _)| name.as_str()).collect();
+            if !names.is_empty() {
+                found.insert(format!("{field} ({})", names.join(", ")));
+            }
+        }
     }
-    found.into_iter().map(str::to_owned).collect()
+    found.into_iter().collect()
 }
 
 /// The comparison as a plain-text table of at most 100 columns.
 pub fn table(comparison: &Comparison) -> String {
-    let mut table = TextTable::new(COLUMNS);
+    let mut table = TextTable::new(NAMED_COLUMNS);
     table.line(format!(
         "{} → {} · {}",
         shortened(&comparison.first, POLICY_WIDTH),
@@ -222,7 +275,8 @@ pub fn table(comparison: &Comparison) -> String {
         counted(comparison.all.pairs, "paired episode")
     ));
     table.rule();
-    push_headings(&mut table, "", "first", "second");
+    let [first, second] = comparison.headings.each_ref().map(|name| shortened(name, HEADING_WIDTH));
+    push_headings(&mut table, "", &first, &second);
     let push = |table: &mut TextTable, name: &str, differences: &PairedComparison| {
         push_rates(table, name, differences);
         if comparison.deformable {
@@ -230,13 +284,14 @@ pub fn table(comparison: &Comparison) -> String {
         }
     };
     let mut suite = "";
-    for task in &comparison.by_task {
+    let tasks: Vec<TaskName> = comparison.by_task.iter().map(TaskDifferences::name).collect();
+    for (task, name) in comparison.by_task.iter().zip(task_names(&tasks)) {
         if task.suite != suite {
             suite = &task.suite;
             table.rule();
             table.line(shortened(suite, TextTable::WIDTH));
         }
-        push(&mut table, &format!("{:>3} {}", task.task, task.prompt), &task.differences);
+        push(&mut table, &format!("{:>3} {name}", task.task), &task.differences);
     }
     table.rule();
     push(&mut table, "all", &comparison.all);
@@ -263,10 +318,29 @@ pub fn table(comparison: &Comparison) -> String {
     table.text
 }
 
+/// Width of a run's name in the headings, columns.
+const HEADING_WIDTH: usize = 10;
+
+/// As [`COLUMNS`], wide enough for the names of runs.
+const NAMED_COLUMNS: [TextColumn; 9] = {
+    use TextColumn::{Left, Right};
+    [
+        Left(21),
+        Left(9),
+        Right(HEADING_WIDTH),
+        Right(HEADING_WIDTH),
+        Right(7),
+        Right(17),
+        Right(6),
+        Right(5),
+        Right(6),
+    ]
+};
+
 /// Columns of a table of differences: name, measure, both values, difference, interval, better, worse and p.
 pub(super) const COLUMNS: [TextColumn; 9] = {
     use TextColumn::{Left, Right};
-    [Left(29), Left(9), Right(6), Right(7), Right(7), Right(17), Right(6), Right(5), Right(5)]
+    [Left(28), Left(9), Right(6), Right(7), Right(7), Right(17), Right(6), Right(5), Right(6)]
 };
 
 /// Appends the rows that only the table of all episodes has.
@@ -316,7 +390,7 @@ fn push_stages(table: &mut TextTable, stages: &PairedStages) {
 }
 
 /// Legend of the rows.
-pub(super) const LEGEND: &str = "diff.: second minus first · 95 % intervals: Agresti and Min for rates, bootstrap for D (n ≥ 10)\nbetter, worse: number of episodes; a lower D is better · p: McNemar's exact test";
+pub(super) const LEGEND: &str = "diff.: second column minus first · 95 % intervals: Agresti and Min for rates, bootstrap for D (n ≥ 10)\nbetter, worse: number of episodes; a lower D is better · p: McNemar's exact test";
 
 /// Appends the column headings, with `name` above the names of the rows.
 pub(super) fn push_headings(table: &mut TextTable, name: &str, first: &str, second: &str) {
@@ -352,7 +426,12 @@ pub(super) fn push_difference(
         paired.better.to_string(),
         paired.worse.to_string(),
     ];
-    table.row(cells.into_iter().chain(paired.p.map(|p| format!("{p:.3}"))));
+    table.row(cells.into_iter().chain(paired.p.map(probability)));
+}
+
+/// A p-value with three decimals.
+fn probability(p: f64) -> String {
+    if p < 0.001 { "<0.001".to_owned() } else { format!("{p:.3}") }
 }
 
 fn signed(value: Option<f64>, digits: usize) -> String {
@@ -365,6 +444,8 @@ fn interval(bounds: Option<[f64; 2]>, digits: usize) -> String {
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::*;
     use crate::{run_summary::tests::stored, sample_record};
     use softvt_evaluation::record::{Outcome, WrongContact};
@@ -418,6 +499,42 @@ mod tests {
         assert_eq!(words(&text, "carry"), ["episodes", "0", "1", "+1"]);
         assert!(words(&text, "place").is_empty(), "{text}");
         assert!(text.contains("1 pair with an invalid episode: failed in success rates"), "{text}");
+    }
+
+    #[test]
+    fn only_files_and_limits_that_both_runs_have_are_compared() {
+        let mut whole = run("a", 0.25, [None; 3]);
+        let mut part = run("b", 0.25, [None; 3]);
+        whole.manifest["sources"] = json!({ "x.lua": "1", "y.lua": "2", "z.lua": "3" });
+        part.manifest["sources"] = json!({ "x.lua": "1", "y.lua": "2" });
+        whole.manifest["thresholds"] = json!({ "bun": 1.0, "pie": 2.0 });
+        part.manifest["thresholds"] = json!({ "bun": 1.0 });
+        let unlike = |part: &StoredRun| compare(&[whole.clone()], &[part.clone()]).expect("pairs").unlike;
+        assert_eq!(unlike(&part), [""; 0]);
+        part.manifest["sources"]["y.lua"] = json!("9");
+        part.manifest["thresholds"]["bun"] = json!(1.5);
+        assert_eq!(unlike(&part), ["sources (y.lua)", "thresholds (bun)"]);
+        part.manifest["settings"] = json!({ "robot": 1 });
+        assert_eq!(unlike(&part)[0], "settings");
+    }
+
+    #[test]
+    fn columns_have_the_names_of_the_runs() {
+        let heads = |a: &StoredRun, b: &StoredRun| {
+            compare(std::slice::from_ref(a), std::slice::from_ref(b)).expect("pairs").headings
+        };
+        let (a, mut b) = (run("runs/a", 0.25, [None; 3]), run("runs/b", 0.25, [None; 3]));
+        assert_eq!(heads(&a, &b), ["a", "b"], "one policy in two folders");
+        b.manifest["policy"] = json!("servo");
+        assert_eq!(heads(&a, &b), ["pi", "servo"]);
+        let text = table(&compare(&[a], &[b]).expect("pairs"));
+        let head: Vec<&str> = text.lines().nth(2).unwrap_or_default().split_whitespace().collect();
+        assert_eq!(head[..3], ["pi", "servo", "diff."], "{text}");
+    }
+
+    #[test]
+    fn small_probabilities_are_bounds() {
+        assert_eq!([0.25, 0.001, 0.0009, 0.0].map(probability), ["0.250", "0.001", "<0.001", "<0.001"]);
     }
 
     #[test]

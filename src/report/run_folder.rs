@@ -12,7 +12,7 @@ use std::{
 
 use super::softvtbench_files;
 use softvt_common::files::{self, FileError};
-use softvt_evaluation::record::EpisodeRecord;
+use softvt_evaluation::{record::EpisodeRecord, record_check::RecordError};
 
 /// One line per episode.
 pub const EPISODES: &str = "episodes.jsonl";
@@ -40,8 +40,8 @@ pub enum RunFolderError {
     #[error(transparent)]
     File(#[from] FileError),
     /// `line` counts from 1.
-    #[error("{path}:{line}: not an episode record: {source}")]
-    BadLine { path: String, line: usize, source: serde_json::Error },
+    #[error("{path}:{line}: {source}")]
+    BadLine { path: String, line: usize, source: RecordError },
 }
 
 /// The folder of a run in progress, locked against other processes.
@@ -238,7 +238,7 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Vec<EpisodeRecord>, RunFolderError
     let whole = lines[..lines.len() - 1].iter().enumerate().filter(|(_, line)| !line.is_empty());
     let bad_line =
         |i: usize, source| RunFolderError::BadLine { path: path.display().to_string(), line: i + 1, source };
-    whole.map(|(i, line)| serde_json::from_slice(line).map_err(|source| bad_line(i, source))).collect()
+    whole.map(|(i, line)| EpisodeRecord::from_json(line).map_err(|source| bad_line(i, source))).collect()
 }
 
 #[cfg(test)]

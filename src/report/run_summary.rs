@@ -98,8 +98,8 @@ pub fn unsafe_reason(record: &EpisodeRecord) -> Option<String> {
             parts.push(format!("invalid: {reason} at physics step {step}"))
         }
         Outcome::Error { message } => parts.push(message.clone()),
-        Outcome::Timeout if !v.goal => parts.push("the budget ran out".to_owned()),
-        Outcome::Timeout | Outcome::Completed => {}
+        Outcome::Budget if !v.goal => parts.push("the budget ran out".to_owned()),
+        Outcome::Budget | Outcome::Completed => {}
     }
     if let Some(why) = &record.stats.gave_up {
         parts.push(format!("gave up: {why}"));
@@ -217,7 +217,7 @@ pub(super) mod tests {
         assert!(unsafe_reason(&record).unwrap().ends_with("; it slipped by 3.2 mm in the hand"));
         record.verdict.slip_ok = None;
         record.verdict.goal = false;
-        record.outcome = Outcome::Timeout;
+        record.outcome = Outcome::Budget;
         assert_eq!(unsafe_reason(&record).unwrap(), "the budget ran out; D 2.50 % is above τ 1.00 %");
         record.stats.gave_up = Some("it slipped".into());
         assert!(unsafe_reason(&record).unwrap().contains("; gave up: it slipped;"));

@@ -2,7 +2,7 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    fs,
+    fs, io,
     path::{Path, PathBuf},
 };
 
@@ -73,16 +73,29 @@ pub fn merge(out: &Path, dirs: &[PathBuf]) -> Result<Vec<SuiteSummary>, MergeErr
     let merged: Vec<MergedRun> =
         suites.values().map(|shards| MergedRun::new(shards)).collect::<Result<_, _>>()?;
     let temp = files::temp_path(out);
-    let mut summaries = Vec::new();
-    for run in &merged {
-        let folder = match (in_subfolders, run.shards[0].dir.file_name()) {
-            (true, Some(name)) => temp.join(name),
-            _ => temp.clone(),
-        };
-        summaries.push(run.write(&folder)?);
+    remove_folder_if_present(&temp)?;
+    let write = || {
+        let mut summaries = Vec::new();
+        for run in &merged {
+            let folder = match (in_subfolders, run.shards[0].dir.file_name()) {
+                (true, Some(name)) => temp.join(name),
+                _ => temp.clone(),
+            };
+            summaries.push(run.write(&folder)?);
+        }
+        files::rename(&temp, out)?;
+        Ok(summaries)
+    };
+    // The disk may be full: the space is freed.
+    write().inspect_err(|_: &MergeError| drop(remove_folder_if_present(&temp)))
+}
+
+/// Removes the folder that an earlier merge left when it was killed.
+fn remove_folder_if_present(dir: &Path) -> Result<(), FileError> {
+    match fs::remove_dir_all(dir) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(FileError::io("remove", dir)(error)),
+        _ => Ok(()),
     }
-    files::rename(&temp, out)?;
-    Ok(summaries)
 }
 
 /// A run composed of shards.

@@ -230,6 +230,10 @@ fn load_one(dir: &Path) -> Result<StoredRun, StoredRunError> {
         ["softvt", "script", "suite", "policy"].iter().try_for_each(|field| has(field, Value::is_string))?;
         has("tasks", Value::is_array)?;
         has("episodes", Value::is_u64)?;
+        if !is_shard(&manifest["shard"]) {
+            let what = format!("its shard is {}; expected I/N with 1 <= I <= N", manifest["shard"]);
+            return Err(invalid(what));
+        }
         let mut records = read_episodes(dir)?;
         check_unique(dir, &records)?;
         records.sort_by_key(|r| r.header.id.index());
@@ -240,6 +244,14 @@ fn load_one(dir: &Path) -> Result<StoredRun, StoredRunError> {
         true => error,
         false => StoredRunError::Version { error: Box::new(error), version },
     })
+}
+
+/// True for a shard I/N with 1 ≤ I ≤ N, and for the null of a whole run.
+fn is_shard(shard: &Value) -> bool {
+    let Some(text) = shard.as_str() else { return shard.is_null() };
+    let numbers =
+        text.split_once('/').and_then(|(i, n)| Some((i.parse::<u32>().ok()?, n.parse::<u32>().ok()?)));
+    numbers.is_some_and(|(index, count)| (1..=count).contains(&index))
 }
 
 /// Checks that no episode has two lines, since it would count twice.
@@ -259,6 +271,27 @@ fn check_unique(dir: &Path, records: &[EpisodeRecord]) -> Result<(), StoredRunEr
 mod tests {
     use super::*;
     use crate::sample_record;
+
+    #[test]
+    fn shards_that_do_not_exist_are_refused() {
+        let root = tempfile::tempdir().unwrap();
+        let load_shard = |shard: Value| {
+            let manifest = serde_json::json!({
+                "softvt": VERSION, "script": "x.lua", "suite": "suite", "policy": "expert", "tasks": [0], "episodes": 1,
+                "shard": shard,
+            });
+            files::write_json(&root.path().join(RUN), &manifest).unwrap();
+            files::write_json_lines(&root.path().join(EPISODES), &[sample_record()]).unwrap();
+            load(root.path())
+        };
+        assert!(load_shard(Value::Null).is_ok() && load_shard("2/2".into()).is_ok());
+        for shard in ["99/2", "0/0", "0/2", "x/2", "2"] {
+            let error = load_shard(shard.into()).unwrap_err().to_string();
+            let expected = format!("run.json is not a valid run file: its shard is \"{shard}\"");
+            assert!(error.contains(&expected), "{error}");
+        }
+        assert!(load_shard(1.into()).is_err());
+    }
 
     #[test]
     fn doubled_lines_are_refused() {

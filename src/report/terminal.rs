@@ -4,7 +4,9 @@ use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
 use softvt_evaluation::{
     safety::KAPPAS,
     statistics::{Distribution, Rate},
-    summary::{AbortedEpisode, EpisodeDeformation, InvalidEpisode, Scores, SuiteSummary, TauRange},
+    summary::{
+        AbortedEpisode, CommandCounts, EpisodeDeformation, InvalidEpisode, Scores, SuiteSummary, TauRange,
+    },
 };
 
 /// Columns: index and prompt of the task, three rates, four figures of D, τ and the number of invalid episodes.
@@ -40,9 +42,10 @@ pub fn table(summary: &SuiteSummary) -> String {
     table.rule();
     table.row(["#", "task", "Goal", "NoDrop", "Safety", "D mean", "P5", "median", "P95", "τ", "invalid"]);
     table.rule();
-    let prompts: Vec<&str> = summary.by_task.iter().map(|t| t.prompt.as_str()).collect();
-    for (task, name) in summary.by_task.iter().zip(distinct_parts(&prompts)) {
-        table.row(cells(&task.task.to_string(), name, &task.scores, is_soft));
+    let named: Vec<TaskName> =
+        summary.by_task.iter().map(|task| TaskName { prompt: &task.prompt, asset: &task.asset }).collect();
+    for (task, name) in summary.by_task.iter().zip(task_names(&named)) {
+        table.row(cells(&task.task.to_string(), &name, &task.scores, is_soft));
     }
     table.rule();
     table.row(cells("", "all", scores, is_soft));
@@ -181,6 +184,7 @@ fn push_notes(table: &mut TextTable, summary: &SuiteSummary) {
             "force_observed policy: it observed ground-truth forces at the pads, which no real sensor measures",
         );
     }
+    push_commands(table, &summary.commands);
     if scores.safety_unknown > 0 {
         table.line(format!(
             "safety could not be judged in {} (no threshold, or D not measured); counted as unsafe",
@@ -213,6 +217,23 @@ fn push_notes(table: &mut TextTable, summary: &SuiteSummary) {
     }
 }
 
+/// Commands that were not executed as given.
+fn push_commands(table: &mut TextTable, commands: &CommandCounts) {
+    let of = |count: u64, what: &str, episodes: usize| {
+        format!("{count} of {} {what} in {}", commands.steps, counted(episodes, "episode"))
+    };
+    if commands.far > 0 {
+        table.line(of(commands.far, "commands were out of reach", commands.far_episodes));
+        if let Some(first) = commands.first_far {
+            table.line(format!("  first: {first}"));
+        }
+    }
+    if commands.clamped_grips > 0 {
+        let grips = of(commands.clamped_grips, "grip values were out of range", commands.clamped_episodes);
+        table.line(format!("{grips}; the hand clamped them"));
+    }
+}
+
 fn interval(rate: Rate) -> String {
     let bounds = rate.wilson95.map(|[low, high]| format!("  [{low:.1}, {high:.1}]")).unwrap_or_default();
     let by_task = rate
@@ -220,6 +241,26 @@ fn interval(rate: Rate) -> String {
         .map(|[low, high]| format!("  bootstrap by task [{low:.1}, {high:.1}]"))
         .unwrap_or_default();
     format!("{:>6} %{bounds}{by_task}", decimal(rate.rate, 1))
+}
+
+/// Fields from which a task gets its name in a table.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TaskName<'a> {
+    /// Instruction given to the policy.
+    pub prompt: &'a str,
+    /// Asset of the object.
+    pub asset: &'a str,
+}
+
+/// Short names of tasks: the parts in which their prompts differ, with the asset where those of several tasks coincide.
+pub(crate) fn task_names(tasks: &[TaskName]) -> Vec<String> {
+    let prompts: Vec<&str> = tasks.iter().map(|task| task.prompt).collect();
+    let parts = distinct_parts(&prompts);
+    let name = |(part, task): (&&str, &TaskName)| match parts.iter().filter(|other| *other == part).count() {
+        1 => (*part).to_owned(),
+        _ => format!("{part} ({})", task.asset),
+    };
+    parts.iter().zip(tasks).map(name).collect()
 }
 
 /// The prompts without the whole words with which all of them begin or end.
@@ -243,7 +284,7 @@ fn distinct_parts<'a>(prompts: &[&'a str]) -> Vec<&'a str> {
 mod tests {
     use super::*;
     use crate::sample_record;
-    use softvt_evaluation::record::{EpisodeRecord, Outcome};
+    use softvt_evaluation::record::{EpisodeRecord, FarCommand, Outcome};
 
     fn episode(task: usize, prompt: &str, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
         let mut record = sample_record();
@@ -353,9 +394,33 @@ mod tests {
     }
 
     #[test]
+    fn commands_that_were_not_executed_as_given_are_shown() {
+        let far = episode(0, "lift it", |r| {
+            (r.stats.far_commands, r.stats.clamped_grips) = (100, 7);
+            let position_m = [467.0, 4.0, 260.0];
+            r.stats.first_far_command = Some(FarCommand { position_m, distance_m: 534.5, angle_rad: 0.0 });
+        });
+        let text = table(&SuiteSummary::from_records("suite", "pi", &[far, episode(0, "lift it", |_| ())]));
+        let lines = "100 of 336 commands were out of reach in 1 episode\n  first: (467, 4, 260) m, 534.5 m and 0 rad from the tool\n";
+        assert!(text.contains(lines), "{text}");
+        assert!(
+            text.contains("7 of 336 grip values were out of range in 1 episode; the hand clamped"),
+            "{text}"
+        );
+    }
+
+    #[test]
     fn an_empty_run_has_a_table() {
         let text = table(&SuiteSummary::from_records("suite", "expert", &[]));
         assert!(text.contains("0 episodes"), "{text}");
+    }
+
+    #[test]
+    fn equal_prompts_are_told_apart_by_their_assets() {
+        let task = |prompt, asset| TaskName { prompt, asset };
+        let tasks =
+            [task("lift a roll", "bun"), task("lift a pastry", "croissant"), task("lift a pastry", "eclair")];
+        assert_eq!(task_names(&tasks), ["roll", "pastry (croissant)", "pastry (eclair)"]);
     }
 
     #[test]

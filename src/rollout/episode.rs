@@ -32,7 +32,7 @@ use softvt_evaluation::{
     deformation::{Deformation, ReferenceShape},
     episode_id::EpisodeId,
     judge::{Judge, JudgeConfig},
-    record::{EpisodeHeader, EpisodeRecord, Outcome, RolloutStats, Verdict},
+    record::{EpisodeHeader, EpisodeRecord, FarCommand, Outcome, RolloutStats, Verdict},
     safety::DeformationLimit,
 };
 use softvt_geometry::{Pose, Vec3};
@@ -286,6 +286,8 @@ pub struct Episode {
     /// Streams that will be requested.
     streams: SensorStreams,
     far_commands: u32,
+    first_far_command: Option<FarCommand>,
+    clamped_grips: u32,
 }
 
 /// Number of Newton steps so far.
@@ -361,6 +363,8 @@ impl Episode {
             recorded,
             streams: SensorStreams::default(),
             far_commands: 0,
+            first_far_command: None,
+            clamped_grips: 0,
             outcome: None,
         })
     }
@@ -423,7 +427,11 @@ impl Episode {
             return Some(Outcome::Error { message: error.to_string() });
         }
         self.actions.push(*action);
-        self.far_commands += u32::from(is_far(&self.sim.robot.tool_b(&self.sim.world), action));
+        if let Some(far) = far_command(&self.sim.robot.tool_b(&self.sim.world), action) {
+            self.far_commands += 1;
+            self.first_far_command.get_or_insert(far);
+        }
+        self.clamped_grips += u32::from((action.closure - 0.5).abs() > 0.5 + CLOSURE_ROUNDING);
         if let Err(failure) = self.control_step(action) {
             return Some(self.invalid(&failure));
         }
@@ -436,7 +444,16 @@ impl Episode {
         if self.judge.is_goal_reached() {
             return Some(Outcome::Completed);
         }
-        (self.steps >= self.spec.task.budget_steps).then_some(Outcome::Timeout)
+        if self.steps < self.spec.task.budget_steps {
+            return None;
+        }
+        match self.first_far_command.filter(|_| self.far_commands == self.steps) {
+            Some(first) => {
+                let error = ActionError::OutOfReach { steps: self.steps, first };
+                Some(Outcome::Error { message: error.to_string() })
+            }
+            None => Some(Outcome::Budget),
+        }
     }
 
     fn control_error(&self, source: PolicyError) -> EpisodeError {
@@ -556,9 +573,9 @@ impl Episode {
         Outcome::Invalid { reason: reason.to_owned(), step: self.physics_steps, node }
     }
 
-    /// The verdict so far. An episode that has not ended is judged as a timeout.
+    /// The verdict so far. An episode that has not ended is judged as if its budget were spent.
     pub fn verdict(&self) -> Verdict {
-        self.judge.clone().finish(self.outcome.as_ref().unwrap_or(&Outcome::Timeout))
+        self.judge.clone().finish(self.outcome.as_ref().unwrap_or(&Outcome::Budget))
     }
 
     /// The current state as an entry of a trace.
@@ -575,6 +592,16 @@ impl Episode {
         )
     }
 
+    /// Number of commands so far that were out of reach.
+    pub fn far_commands(&self) -> u32 {
+        self.far_commands
+    }
+
+    /// Number of grip values so far that were out of range.
+    pub fn clamped_grips(&self) -> u32 {
+        self.clamped_grips
+    }
+
     /// The record so far. `gave_up` is the reason why the controller aborted, if it did.
     pub fn record(&self, gave_up: Option<String>) -> EpisodeRecord {
         let soft = matches!(self.sim.objects[self.target].body, BodyId::Soft(_));
@@ -587,12 +614,14 @@ impl Episode {
             force_observed: self.streams.force,
             camera_inside: self.history.camera_inside,
             far_commands: self.far_commands,
+            first_far_command: self.first_far_command,
+            clamped_grips: self.clamped_grips,
             gave_up,
             notes: BTreeMap::new(),
             actions_sha256: Some(checksum(&self.actions)),
             state_hash: state_hash(&self.sim),
         };
-        let outcome = self.outcome.clone().unwrap_or(Outcome::Timeout);
+        let outcome = self.outcome.clone().unwrap_or(Outcome::Budget);
         EpisodeRecord { header: self.spec.header.clone(), outcome, verdict: self.verdict(), stats }
     }
 
@@ -625,15 +654,22 @@ pub fn checksum(actions: &[Action]) -> String {
     hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// True if a command is farther from the tool than one step of the inverse kinematics reaches; both in the base frame.
-fn is_far(tool_b: &Pose, action: &Action) -> bool {
+/// The command, if it is farther from the tool than one step of the inverse kinematics reaches; both in the base frame.
+fn far_command(tool_b: &Pose, action: &Action) -> Option<FarCommand> {
     let turn = rotation::error(
         &rotation::from_axis_angle(&rotation::axis_angle(&tool_b.rotation)),
         &rotation::from_axis_angle(&action.axis_angle_b),
     );
     let error = PoseDifference { translation: action.position_b - tool_b.translation.vector, rotation: turn };
-    !LINEARISATION_RANGE.contains(&error)
+    (!LINEARISATION_RANGE.contains(&error)).then(|| FarCommand {
+        position_m: action.position_b.into(),
+        distance_m: error.translation.norm(),
+        angle_rad: error.rotation.norm(),
+    })
 }
+
+/// Rounding error of a closure.
+const CLOSURE_ROUNDING: f64 = 1e-6;
 
 /// Largest magnitude of the numbers of an action, m and rad. The squares of larger ones may overflow.
 const MAX_ACTION: f64 = 1e6;
@@ -650,6 +686,11 @@ enum ActionError {
          than 0 to open"
     )]
     GripForce { force_n: f64, effort_n: f64 },
+    #[error(
+        "all {steps} commands were out of reach, first: {first}; expected positions in m and axis-angles in rad, in the \
+         robot's base frame"
+    )]
+    OutOfReach { steps: u32, first: FarCommand },
 }
 
 /// Checks that the numbers of an action are finite and plausible, and a grip force within the effort of the gripper.

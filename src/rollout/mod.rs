@@ -61,7 +61,7 @@
 //!
 //! let brief = TaskBrief { suite, task: 0, prompt: task.prompt.clone(), episode: 0, seed: 0, alias: None };
 //! let finished = episode.run(&mut ChunkedPolicy::new(Box::<NoopPolicy>::default(), brief, 1))?;
-//! assert_eq!(finished.record.outcome, Outcome::Timeout);
+//! assert_eq!(finished.record.outcome, Outcome::Budget);
 //! assert_eq!(finished.record.stats.steps, 3);
 //! # Ok::<(), softvt_rollout::EpisodeError>(())
 //! ```

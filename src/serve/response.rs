@@ -119,6 +119,8 @@ fn info(
     put("step", json!(live.state.actions.len()));
     put("time_s", json!(observation.time_s));
     put("success", json!(live.has_succeeded()));
+    put("far_commands", json!(live.episode.far_commands()));
+    put("clamped_grips", json!(live.episode.clamped_grips()));
     if let Some(Executed { count, recorded }) = executed {
         put("carried_out", json!(count));
         if let Some(recorded) = recorded {

@@ -26,7 +26,7 @@ fn noop_and_random_never_succeed() {
     for policy in ["noop", "random"] {
         let episodes = episodes(&format!("--policy {policy}"));
         assert!(all(&episodes, "goal", false) && all(&episodes, "safety", false), "{policy}: {episodes:?}");
-        assert!(episodes.iter().all(|e| e["outcome"]["kind"] == "timeout"), "{policy}: {episodes:?}");
+        assert!(episodes.iter().all(|e| e["outcome"]["kind"] == "budget"), "{policy}: {episodes:?}");
     }
 }
 

@@ -16,7 +16,7 @@ fn the_reason_of_give_up_is_recorded() {
     assert!(output.out.contains(list), "{}", output.out);
     for (episode, record) in project.lines("run/episodes.jsonl").iter().enumerate() {
         assert_eq!((&record["episode"], &record["gave_up"]), (&episode.into(), &"too slippery".into()));
-        assert_eq!(record["outcome"]["kind"], "timeout", "the last command stayed to the end");
+        assert_eq!(record["outcome"]["kind"], "budget", "the last command stayed to the end");
     }
     assert_eq!(project.json("run/summary.json")["gave_up"][1]["reason"], "too slippery");
 }
@@ -40,7 +40,7 @@ fn an_object_too_wide_for_the_hand_is_given_up_before_the_approach() {
     project.succeeds("x.lua --out run");
     let record = &project.lines("run/episodes.jsonl")[0];
     let reason = "cube is 100 mm wide where the fingers grasp it, and the gripper opens 80 mm";
-    assert_eq!((&record["gave_up"], &record["outcome"]["kind"]), (&reason.into(), &"timeout".into()));
+    assert_eq!((&record["gave_up"], &record["outcome"]["kind"]), (&reason.into(), &"budget".into()));
     assert!(record["d_peak"].as_f64().is_some_and(|d| d < 0.1), "the hand never touched it: {record}");
 }
 

@@ -79,6 +79,35 @@ fn lists_are_printed_as_text_and_as_json() {
 }
 
 #[test]
+fn texts_of_any_length_are_cut_off_in_tables() {
+    let long = r#"return softvt.experiment { name = "e", grid = { i = { 1 } },
+      run = function() return { [("k"):rep(70000)] = 1, text = ("x"):rep(70000) } end }"#;
+    let suite = Small::default().text().replace(r#"prompt = "wait""#, r#"prompt = ("wait "):rep(20000)"#);
+    let project = Project::new(&[("e.lua", long), ("suites/long.lua", &suite)]);
+    for command in ["e.lua", "list tasks"] {
+        let table = project.succeeds(command).out;
+        assert!(table.contains('…') && table.lines().all(|line| line.chars().count() < 1000), "{command}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn names_of_files_do_not_control_the_terminal() {
+    let script = r#"return softvt.experiment { name = "e", grid = { i = { 1 } }, run = function() return { x = 1 } end,
+      finish = function() return { files = { ["a\27[2Jb"] = "x" } } end }"#;
+    let project = Project::new(&[("e.lua", script), ("x.lua", &Small::default().text())]);
+    let output = project.softvt("e.lua --out out");
+    assert_eq!(output.code, 2, "{}", output.err);
+    assert!(
+        output.err.contains("holds a control character") && !output.err.contains('\u{1b}'),
+        "{}",
+        output.err
+    );
+    let output = project.softvt("x.lua --policy noop --out a\u{1b}[2Jb");
+    assert!(output.err.contains("a\\u{1b}[2Jb") && !output.err.contains('\u{1b}'), "{}", output.err);
+}
+
+#[test]
 fn init_keeps_an_existing_settings_file() {
     let project = Project::new(&[]);
     project.succeeds("init new/folder");
@@ -107,7 +136,7 @@ fn a_run_writes_all_its_files() {
     let fields = "suite task prompt layout episode seed split policy asset soft outcome goal no_drop no_slip d_peak tau \
                   deformation_ok safety steps time_s min_det_f newton_mean newton_max state_hash";
     has(&episodes[0], &fields.split_whitespace().collect::<Vec<_>>());
-    assert_eq!((&episodes[0]["steps"], &episodes[0]["outcome"]["kind"]), (&40.into(), &"timeout".into()));
+    assert_eq!((&episodes[0]["steps"], &episodes[0]["outcome"]["kind"]), (&40.into(), &"budget".into()));
     let summary = project.json("run/summary.json");
     let printed: Value = serde_json::from_str(&output.out).expect("JSON and nothing else");
     assert_eq!(printed, summary);

@@ -113,7 +113,7 @@ fn nan_actions_fail_only_their_episode() {
         "{}",
         lines[0]
     );
-    assert_eq!(lines[1]["outcome"]["kind"], "timeout");
+    assert_eq!(lines[1]["outcome"]["kind"], "budget");
     assert!(lines[1]["privileged"].is_null(), "it sees observations alone");
     assert_eq!(project.json("run/summary.json")["privileged"], false);
     assert!(project.json("run/softvtbench/summary.json")["privileged"].is_null());

@@ -373,7 +373,7 @@ fn nan_replies_fail_only_their_episode() {
         lines[0]
     );
     assert_eq!((lines[0]["steps"].as_u64(), lines[0]["safety"].as_bool()), (Some(5), Some(false)));
-    assert_eq!(lines[1]["outcome"]["kind"], "timeout");
+    assert_eq!(lines[1]["outcome"]["kind"], "budget");
     assert!(project.succeeds("replay run 0/0").out.contains("byte-identical"));
 }
 
@@ -384,8 +384,55 @@ fn unreachable_poses_are_counted() {
     });
     let project = project();
     let output = run(&project, &address, "");
+    assert_eq!(output.code, 3, "no command could be executed: {}", output.err);
+    let record = &project.lines("run/episodes.jsonl")[0];
+    assert_eq!((&record["far_commands"], &record["clamped_grips"]), (&12.into(), &12.into()));
+    assert_eq!((&record["outcome"]["kind"], &record["safety"]), (&"error".into(), &false.into()));
+    let message = "all 12 commands were out of reach, first: (50, 0, -3) m";
+    assert!(record["outcome"]["message"].as_str().is_some_and(|text| text.starts_with(message)), "{record}");
+    assert!(output.err.contains(message), "{}", output.err);
+    assert!(project.succeeds("replay run 0/0").out.contains("byte-identical"));
+}
+
+#[test]
+fn commands_that_are_not_executed_as_given_are_shown() {
+    let address = server(9, |_, socket| {
+        answering(socket, |count, seen| match count {
+            0 => Some(hold(seen, 6)),
+            _ => Some(packed(&actions(6, [50.0, 0.0, -3.0, 0.0, 0.0, 0.0, 255.0]))),
+        });
+    });
+    let project = project();
+    let output = run(&project, &address, "--replan 6");
     assert_eq!(output.code, 0, "{}", output.err);
-    assert_eq!(project.lines("run/episodes.jsonl")[0]["far_commands"], 12);
+    let far = "; 6 of 12 commands were out of reach, first: (50, 0, -3) m, 50.";
+    assert!(output.err.contains(far), "{}", output.err);
+    assert!(output.err.contains("; 6 of 12 grip values were out of range"), "{}", output.err);
+    for line in [
+        "6 of 12 commands were out of reach in 1 episode",
+        "6 of 12 grip values were out of range in 1 episode",
+    ] {
+        assert!(output.out.contains(line), "{}", output.out);
+    }
+    project.succeeds("report run --out page");
+    for page in ["page/report.md", "page/report.html"] {
+        let text = project.text(page);
+        assert!(
+            text.contains("Commands that were not executed as given") && text.contains("(50, 0, -3) m"),
+            "{page}"
+        );
+    }
+}
+
+#[test]
+fn actions_of_eight_numbers_need_a_profile_that_states_their_length() {
+    let eight = || Value::Map(vec![(text("actions"), array("<f4", &[5, 8], vec![0; 160]))]);
+    let address = server(9, move |_, socket| answering(socket, |_, _| Some(packed(&eight()))));
+    let refused = fails(&address, "");
+    assert!(
+        refused.contains("8 numbers per action are neither 7 nor the 32 of openpi's padding"),
+        "{refused}"
+    );
 }
 
 #[test]

@@ -274,6 +274,43 @@ fn lost_files_are_restored_byte_identically() {
 }
 
 #[test]
+fn records_that_contradict_themselves_are_refused_by_name() {
+    let project = Small { task: "budget_steps = 8", ..Small::default() }.project();
+    let run = |shard: u32| format!("x.lua --episodes 2 --out part_{shard} --shard {shard}/2");
+    (1..=2).for_each(|shard| drop(project.succeeds(&run(shard))));
+    let (lines, manifest) = (project.text("part_1/episodes.jsonl"), project.text("part_1/run.json"));
+    let readers = [
+        "report part_1 --out page".to_owned(),
+        "compare part_2 part_1".to_owned(),
+        "merge all part_1 part_2".to_owned(),
+        "replay part_1 0/0".to_owned(),
+        format!("{} --resume", run(1)),
+    ];
+    for (from, to, problem) in [
+        (r#""goal":false"#, r#""goal":true"#, "goal is true, and the outcome is not completed"),
+        (r#""newton_mean":"#, r#""newton_mean":-"#, "newton_mean is -"),
+        (r#""d_peak_other":"#, r#""d_peak_gther":"#, "unknown key d_peak_gther"),
+    ] {
+        let changed = lines.replacen(from, to, 1);
+        assert_ne!(changed, lines);
+        project.write("part_1/episodes.jsonl", changed.as_bytes());
+        for reader in &readers {
+            let refused = project.refusal(reader);
+            assert!(refused.contains("part_1/episodes.jsonl:1: ") && refused.contains(problem), "{refused}");
+        }
+    }
+    project.write("part_1/episodes.jsonl", lines.as_bytes());
+    project.write("part_1/run.json", manifest.replace(r#""1/2""#, r#""99/2""#).as_bytes());
+    let refused = project.refusal("merge all part_1 part_2");
+    assert!(refused.contains("part_1/run.json") && refused.contains(r#"its shard is "99/2""#), "{refused}");
+    // A merge that fails while it writes leaves nothing.
+    project.write("part_1/run.json", manifest.as_bytes());
+    project.write("part_1/softvtbench/thresholds.json", b"{");
+    project.refusal("merge all part_1 part_2");
+    assert!(!project.path("all.part").exists() && !project.path("all").exists());
+}
+
+#[test]
 fn merged_shards_are_byte_identical_to_one_run() {
     let project = Small { task: "budget_steps = 8", ..Small::default() }.project();
     for (twin, name) in [("", "soft"), ("--twin rigid", "rigid")] {

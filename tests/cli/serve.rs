@@ -187,7 +187,7 @@ fn a_client_runs_an_episode_to_its_end() {
     assert_eq!(keys(get(&start, "observation")), ["image", "wrist_image", "state", "prompt"]);
     let mut info = keys(get(&start, "info"));
     info.sort_unstable();
-    assert_eq!(info, ["episode", "step", "success", "task", "time_s"]);
+    assert_eq!(info, ["clamped_grips", "episode", "far_commands", "step", "success", "task", "time_s"]);
     let middle = client.ask(&step(11));
     assert_eq!(get(&middle, "truncated").as_bool(), Some(false));
     assert_eq!(get(get(&middle, "info"), "carried_out").as_u64(), Some(11));
@@ -223,6 +223,19 @@ fn a_server_ends_with_its_standard_input_if_asked_to() {
 }
 
 #[test]
+fn info_counts_commands_out_of_reach_and_grip_values_out_of_range() {
+    let project = project();
+    let server = Server::start(&project, "--profile vision");
+    let (mut client, _) = server.client();
+    client.reset();
+    client.ask(&step(2));
+    let far = [500.0, 4.0, 260.0, 0.0, 0.0, 0.0, 255.0];
+    let after = client.ask(&map(&[("type", "step".into()), ("actions", array(&[3, 7], &far.repeat(3)))]));
+    let count = |name| get(get(&after, "info"), name).as_u64();
+    assert_eq!((count("step"), count("far_commands"), count("clamped_grips")), (Some(5), Some(3), Some(3)));
+}
+
+#[test]
 fn privileged_clients_receive_the_true_state() {
     let project = project();
     let server = Server::start(&project, "--profile vision --privileged --seed 3 --split demonstration");
@@ -235,7 +248,7 @@ fn privileged_clients_receive_the_true_state() {
     assert!(get(get(&info, "state"), "pad_force_n").is_array());
     assert!(get(get(&info, "verdict"), "d_peak").is_f64());
     let record = get(&info, "record");
-    assert_eq!((text(record, "split"), text(get(record, "outcome"), "kind")), ("demonstration", "timeout"));
+    assert_eq!((text(record, "split"), text(get(record, "outcome"), "kind")), ("demonstration", "budget"));
     assert_eq!(get(record, "seed").as_u64(), Some(3));
 }
 
@@ -552,4 +565,5 @@ fn an_interrupt_closes_the_server() {
     server.child.stderr.take().expect("messages").read_to_string(&mut err).expect("text");
     assert_eq!(code, Some(130), "{err}");
     assert!(!err.contains("panicked") && !err.contains("did not finish"), "{err}");
+    assert!(!err.contains("interrupted") && !err.contains("finishing"), "nothing is lost: {err}");
 }

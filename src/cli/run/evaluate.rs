@@ -267,8 +267,15 @@ pub(crate) fn episode_line(record: &EpisodeRecord) -> String {
         _ => format!("failed{d}"),
     };
     let stats = &record.stats;
-    let reason = stats.gave_up.as_ref().map_or(String::new(), |reason| format!("; gave up: {reason}"));
-    format!("{}: {outcome}, {:.1} s{reason}", record.header.id.index(), stats.time_s)
+    let mut line = format!("{}: {outcome}, {:.1} s", record.header.id.index(), stats.time_s);
+    if let Some(reason) = &stats.gave_up {
+        line += &format!("; gave up: {reason}");
+    }
+    // The message of an error says it already.
+    if !matches!(record.outcome, Outcome::Error { .. }) {
+        stats.command_notes().iter().for_each(|note| line += &format!("; {note}"));
+    }
+    line
 }
 
 /// Restores requested files of finished episodes that are missing: by the recorded actions, or without these by the

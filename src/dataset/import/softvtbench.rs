@@ -77,7 +77,8 @@ pub(super) fn demo(reader: DemoReader, header: &Header) -> Result<ForeignDemo, D
     let is_measured = fingers_are_measured(reader, &actions)?;
     let command = |action: &RecordedAction| {
         let position_b = action.position() - action.rotation() * offset_t;
-        ToolCommand::from(Action::new(position_b, action.axis_angle(), gripper.closure(action.gripper())))
+        let closure = gripper.closure(action.gripper()).clamp(0.0, 1.0);
+        ToolCommand::from(Action::new(position_b, action.axis_angle(), closure))
     };
     let start = initial_joints(reader)?;
     Ok(ForeignDemo {

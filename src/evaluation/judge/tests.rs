@@ -215,7 +215,7 @@ fn a_plate_that_carries_less_than_half_or_a_hand_that_touches_prevents_rest() {
             e.pads[0].normal_impulse_ns = pad;
             e.robot_impulse_ns = case;
         });
-        let v = replay.verdict(Outcome::Timeout);
+        let v = replay.verdict(Outcome::Budget);
         assert!(!v.goal && v.goal_v1 && v.no_drop && !v.safety, "{share} {pad} {case}");
     }
 }
@@ -254,7 +254,7 @@ fn lifting_the_other_instance_first_is_reported() {
     replay.steps(1, |_| ());
     replay.other = lying(0.3, 0.1);
     replay.carry(10, 0.0, 0.2);
-    let v = replay.verdict(Outcome::Timeout);
+    let v = replay.verdict(Outcome::Budget);
     assert!(v.wrong_instance);
     assert_eq!(v.d_peak_other, Some(0.4));
 }
@@ -335,7 +335,7 @@ fn the_goal_may_be_lifted_first_and_its_deformation_counts_as_that_of_others() {
     let v = replay.verdict(Outcome::Completed);
     assert_eq!((v.others_ok, v.first_wrong_contact), (Some(true), None));
     let alone = JudgeConfig { others: Vec::new(), ..self::config() };
-    assert_eq!(Judge::new(alone).finish(&Outcome::Timeout).others_ok, Some(true));
+    assert_eq!(Judge::new(alone).finish(&Outcome::Budget).others_ok, Some(true));
 }
 
 #[test]
@@ -346,7 +346,7 @@ fn the_first_contact_with_another_object_is_kept() {
     replay.rest(1, 0.0);
     replay.other.robot_impulse_ns = 2.0 * DT;
     replay.rest(2, 0.0);
-    let contact = replay.verdict(Outcome::Timeout).first_wrong_contact.expect("a contact");
+    let contact = replay.verdict(Outcome::Budget).first_wrong_contact.expect("a contact");
     assert_eq!(contact.object, "other");
     assert!((contact.time_s - 8.0 * DT).abs() < 1e-12, "a touch below the threshold is none: {contact:?}");
 }
@@ -357,18 +357,18 @@ fn the_series_of_deformation_is_summarised() {
     for d in [0.4, 1.2, 1.6, 0.8] {
         replay.carry(1, -0.2, d);
     }
-    let v = replay.verdict(Outcome::Timeout);
+    let v = replay.verdict(Outcome::Budget);
     assert_eq!((v.d_mean, v.d_final), (Some(1.0), Some(0.8)));
     assert!((v.d_p95.unwrap() - 1.54).abs() < 1e-9 && v.d_peak == Some(1.6), "{v:?}");
     assert!((v.time_over_tau_s.unwrap() - 2.0 * DT).abs() < 1e-12, "τ is 1: {v:?}");
     let mut replay = Replay::new(JudgeConfig { limit: None, ..config() });
     replay.carry(3, 0.0, 0.4);
-    assert_eq!(replay.verdict(Outcome::Timeout).time_over_tau_s, None);
+    assert_eq!(replay.verdict(Outcome::Budget).time_over_tau_s, None);
 }
 
 #[test]
 fn a_failed_episode_names_its_stage() {
-    let stage = |replay: &Replay| replay.judge.clone().finish(&Outcome::Timeout).failed_stage;
+    let stage = |replay: &Replay| replay.judge.clone().finish(&Outcome::Budget).failed_stage;
     let mut replay = Replay::new(config());
     replay.rest(2, -0.2);
     assert_eq!(stage(&replay), Some(Stage::Reach));
@@ -388,9 +388,9 @@ fn the_crushed_volume_is_the_largest_over_the_episode_and_null_without_a_limit()
     for share in [0.0, 0.08, 0.03] {
         replay.steps(3, |e| e.crushed = CrushedShares { collapsed: Some(share), damaged: Some(0.5 * share) });
     }
-    let verdict = replay.verdict(Outcome::Timeout);
+    let verdict = replay.verdict(Outcome::Budget);
     assert_eq!((verdict.collapsed_volume_pct, verdict.damaged_volume_pct), (Some(8.0), Some(4.0)));
     let mut rigid = Replay::new(JudgeConfig { is_target_soft: false, ..config() });
     rigid.steps(3, |_| ());
-    assert_eq!(rigid.verdict(Outcome::Timeout).collapsed_volume_pct, None);
+    assert_eq!(rigid.verdict(Outcome::Budget).collapsed_volume_pct, None);
 }

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    record::{EpisodeRecord, Outcome},
+    record::{EpisodeRecord, FarCommand, Outcome},
     safety::{DeformationLimit, PeakDeformation, SafetyParts},
     stage::Stage,
     statistics::{Distribution, Rate, mean, stratified_bootstrap},
@@ -178,6 +178,38 @@ pub struct InvalidEpisode {
     pub reason: String,
 }
 
+/// Commands of the policy that were not executed as given.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CommandCounts {
+    /// Number of all commands.
+    pub steps: u64,
+    /// Number of commands that were out of reach.
+    pub far: u64,
+    /// Number of episodes with such a command.
+    pub far_episodes: usize,
+    /// The first such command of the first of these episodes.
+    pub first_far: Option<FarCommand>,
+    /// Number of grip values that were out of range, and clamped.
+    pub clamped_grips: u64,
+    /// Number of episodes with such a value.
+    pub clamped_episodes: usize,
+}
+
+impl CommandCounts {
+    /// Counts of some episodes.
+    fn from_records(records: &[&EpisodeRecord]) -> Self {
+        let stats = || records.iter().map(|r| &r.stats);
+        Self {
+            steps: stats().map(|s| u64::from(s.steps)).sum(),
+            far: stats().map(|s| u64::from(s.far_commands)).sum(),
+            far_episodes: stats().filter(|s| s.far_commands > 0).count(),
+            first_far: stats().find_map(|s| s.first_far_command),
+            clamped_grips: stats().map(|s| u64::from(s.clamped_grips)).sum(),
+            clamped_episodes: stats().filter(|s| s.clamped_grips > 0).count(),
+        }
+    }
+}
+
 /// Contents of `summary.json`: one suite, one policy.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SuiteSummary {
@@ -194,6 +226,9 @@ pub struct SuiteSummary {
     /// True if Safety Success needed NoSlip.
     #[serde(default)]
     pub no_slip_required: bool,
+    /// Commands that were not executed as given.
+    #[serde(default)]
+    pub commands: CommandCounts,
     /// Scores of all episodes together.
     #[serde(flatten)]
     pub scores: Scores,
@@ -341,7 +376,7 @@ impl SuiteSummary {
             let reason = match &r.outcome {
                 Outcome::Invalid { reason, step, .. } => format!("{reason} at physics step {step}"),
                 Outcome::Error { message } => message.clone(),
-                Outcome::Completed | Outcome::Timeout => return None,
+                Outcome::Completed | Outcome::Budget => return None,
             };
             Some(InvalidEpisode { task, episode, reason })
         };
@@ -354,6 +389,7 @@ impl SuiteSummary {
             privileged: records.iter().any(|r| r.header.privileged),
             force_observed: records.iter().any(|r| r.stats.force_observed),
             no_slip_required: records.iter().any(|r| r.verdict.slip_ok.is_some()),
+            commands: CommandCounts::from_records(&records),
             scores,
             kappa: kappa_curve(&records),
             by_task: by_task.into_iter().map(task_scores).collect(),

@@ -18,7 +18,7 @@ fn records() -> Vec<EpisodeRecord> {
         }),
         episode(1, 0, |r| {
             r.header.asset = "roll".into();
-            r.outcome = Outcome::Timeout;
+            r.outcome = Outcome::Budget;
             (r.verdict.goal, r.verdict.safety, r.verdict.d_peak) = (false, false, Some(0.7));
         }),
         episode(1, 1, |r| {

@@ -16,8 +16,8 @@ use super::{
     condition_effects::{condition_effects, effects_table},
     run_summary::RunSummary,
     tables::{
-        ResultTable, TEXT_COLUMNS, bootstrap_table, crushed_table, deformation_table, kappa_table,
-        main_table, stage_table, task_table,
+        ResultTable, TEXT_COLUMNS, bootstrap_table, command_table, crushed_table, deformation_table,
+        kappa_table, main_table, stage_table, task_table,
     },
 };
 
@@ -107,6 +107,7 @@ fn results(runs: &[RunSummary]) -> Markup {
         }
         @if let Some(bootstrap) = bootstrap_table(runs) { (table(&bootstrap)) }
         @if let Some(stages) = stage_table(runs) { (table(&stages)) }
+        @if let Some(commands) = command_table(runs) { (table(&commands)) }
     }
 }
 

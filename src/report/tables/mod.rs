@@ -173,7 +173,7 @@ pub fn crushed_table(runs: &[RunSummary]) -> Option<ResultTable> {
     };
     let table = soft_table(
         runs,
-        "Volume of the target beyond the strain limits of its material over all valid episodes, %: the largest share beyond the collapse strain at one time, and the share that was ever beyond the damage strain.",
+        "Volume of the object beyond the strain limits of its material over all valid episodes, %: the largest share beyond the collapse strain at one time, and the share that was ever beyond the damage strain.",
         strings([
             "Suite",
             "Method",
@@ -219,13 +219,19 @@ fn soft_table(
 
 /// Results per task of a run.
 pub fn task_table(run: &RunSummary) -> ResultTable {
+    let tasks = &run.summary.by_task;
+    // Several tasks may have one prompt.
+    let prompt = |task: &TaskScores| match tasks.iter().filter(|other| other.prompt == task.prompt).count() {
+        1 => task.prompt.clone(),
+        _ => format!("{} ({})", task.prompt, task.asset),
+    };
     let row = |task: &TaskScores| {
         let s = &task.scores;
         let not_applicable = || "N/A".to_owned();
         let is_soft = run.is_soft();
         vec![
             task.task.to_string(),
-            task.prompt.clone(),
+            prompt(task),
             s.episodes.to_string(),
             rate(&s.goal_success_rate),
             rate(&s.no_drop_rate),
@@ -263,6 +269,39 @@ pub fn stage_table(runs: &[RunSummary]) -> Option<ResultTable> {
     })
 }
 
+/// Commands that were not executed as given; `None` without any.
+pub fn command_table(runs: &[RunSummary]) -> Option<ResultTable> {
+    let row = |run: &RunSummary| {
+        let commands = &run.summary.commands;
+        vec![
+            run.summary.suite.clone(),
+            run.method.clone(),
+            commands.steps.to_string(),
+            commands.far.to_string(),
+            commands.far_episodes.to_string(),
+            commands.clamped_grips.to_string(),
+            commands.clamped_episodes.to_string(),
+            commands.first_far.map_or_else(|| "–".to_owned(), |first| first.to_string()),
+        ]
+    };
+    let is_affected = |run: &&RunSummary| run.summary.commands.far + run.summary.commands.clamped_grips > 0;
+    let rows: Vec<Vec<String>> = runs.iter().filter(is_affected).map(row).collect();
+    (!rows.is_empty()).then(|| ResultTable {
+        caption: "Commands that were not executed as given: poses out of reach of one control step, and grip values out of their range, which the hand clamps. Many of them mean another unit or frame.".to_owned(),
+        head: strings([
+            "Suite",
+            "Method",
+            "Commands",
+            "Out of reach",
+            "Episodes",
+            "Grips out of range",
+            "Episodes",
+            "First out of reach",
+        ]),
+        rows,
+    })
+}
+
 /// Task-stratified bootstrap intervals of the rates and of the mean D; `None` if no run has enough episodes.
 pub fn bootstrap_table(runs: &[RunSummary]) -> Option<ResultTable> {
     let bounds = |bounds: Option<[f64; 2]>, digits: usize| {
@@ -294,6 +333,7 @@ pub fn all_tables(runs: &[RunSummary]) -> Vec<ResultTable> {
     all.extend(grip_table(runs));
     all.extend(kappa_table(runs));
     all.extend(stage_table(runs));
+    all.extend(command_table(runs));
     all.extend(bootstrap_table(runs));
     all.extend(runs.iter().map(task_table));
     all

@@ -88,7 +88,7 @@ record! {
         scale: Option<[f64; 6]>;
         /// Offsets added after that.
         offset: Option<[f64; 6]>;
-        /// Length that an action must have, padding included; any from 7 by default.
+        /// Length that an action must have, padding included; by default 7, or 32 as openpi's models pad them.
         length: Option<usize> = Type::Integer(Range::closed(7.0, 4096.0));
         /// The seventh number.
         gripper: GripperValuesSpec;

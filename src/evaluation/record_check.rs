@@ -1,0 +1,320 @@
+//! Reading of an episode record: a line that contradicts itself, or holds a key that no record has, is refused.
+
+use serde_json::Value;
+
+use super::{
+    record::{EpisodeRecord, OtherDeformation, Outcome},
+    safety::{DeformationLimit, PeakDeformation, is_safe},
+};
+
+/// A text is not the record of an episode.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum RecordError {
+    #[error("not an episode record: {0}")]
+    Json(#[from] serde_json::Error),
+    #[error("not an episode record: unknown key {0}")]
+    UnknownKey(String),
+    #[error("the record contradicts itself: {0}; it was changed after the episode, or damaged")]
+    Contradiction(String),
+}
+
+/// Tolerance of sums and means, relative to 1.
+const TOLERANCE: f64 = 1e-9;
+
+impl EpisodeRecord {
+    /// Reads a record from its JSON, such as a line of `episodes.jsonl`.
+    ///
+    /// # Errors
+    /// The text is not a record, has an unknown key, or contradicts itself.
+    pub fn from_json(text: &[u8]) -> Result<Self, RecordError> {
+        let record: Self = serde_json::from_slice(text)?;
+        // serde cannot refuse unknown keys in flattened structs.
+        let (read, known) = (serde_json::from_slice(text)?, serde_json::to_value(&record)?);
+        if let Some(key) = unknown_key(&read, &known) {
+            return Err(RecordError::UnknownKey(key));
+        }
+        record.check().map_err(RecordError::Contradiction)?;
+        Ok(record)
+    }
+
+    /// Checks that the numbers are in their ranges, and that what follows from other fields does.
+    ///
+    /// # Errors
+    /// A contradiction, in words.
+    pub fn check(&self) -> Result<(), String> {
+        self.check_ranges()?;
+        self.check_goal()?;
+        self.check_deformation()?;
+        self.check_others()
+    }
+
+    fn check_ranges(&self) -> Result<(), String> {
+        let (v, s) = (&self.verdict, &self.stats);
+        let not_negative = [
+            ("time_s", Some(s.time_s)),
+            ("newton_mean", Some(s.newton_mean)),
+            ("slip_mm", Some(v.slip_mm)),
+            ("peak_pad_force_n", Some(v.peak_pad_force_n)),
+            ("mean_pad_force_n", Some(v.mean_pad_force_n)),
+            ("goal_time_s", v.goal_time_s),
+            ("d_peak", v.d_peak),
+            ("d_peak_weighted", v.d_peak_weighted),
+            ("d_peak_max", v.d_peak_max),
+            ("d_mean", v.d_mean),
+            ("d_final", v.d_final),
+            ("d_p95", v.d_p95),
+            ("d_peak_other", v.d_peak_other),
+            ("time_over_tau_s", v.time_over_tau_s),
+            ("collapsed_volume_pct", v.collapsed_volume_pct),
+            ("damaged_volume_pct", v.damaged_volume_pct),
+            ("kappa", v.kappa),
+            ("tau", v.tau),
+            ("d_ref", v.d_ref),
+        ];
+        for (name, number) in not_negative {
+            if let Some(x) = number.filter(|x| !(x.is_finite() && *x >= 0.0)) {
+                return Err(format!("{name} is {x}, and no such number is below 0"));
+            }
+        }
+        let is_above = |a: f64, b: f64| a > b + TOLERANCE * (1.0 + b.abs());
+        let ordered = [
+            ("mean_pad_force_n", Some(v.mean_pad_force_n), "peak_pad_force_n", Some(v.peak_pad_force_n)),
+            ("goal_time_s", v.goal_time_s, "time_s", Some(s.time_s)),
+            ("time_over_tau_s", v.time_over_tau_s, "time_s", Some(s.time_s)),
+            ("drop.time_s", v.drop.map(|drop| drop.time_s), "time_s", Some(s.time_s)),
+            ("d_mean", v.d_mean, "d_peak", v.d_peak),
+            ("d_final", v.d_final, "d_peak", v.d_peak),
+            ("d_p95", v.d_p95, "d_peak", v.d_peak),
+            ("d_peak", v.d_peak, "d_peak_max", v.d_peak_max),
+            ("collapsed_volume_pct", v.collapsed_volume_pct, "100", Some(100.0)),
+            ("damaged_volume_pct", v.damaged_volume_pct, "100", Some(100.0)),
+            ("kappa", v.kappa, "1", Some(1.0)),
+            ("far_commands", Some(f64::from(s.far_commands)), "steps", Some(f64::from(s.steps))),
+            ("clamped_grips", Some(f64::from(s.clamped_grips)), "steps", Some(f64::from(s.steps))),
+        ];
+        for (low_name, low, high_name, high) in ordered {
+            if let Some((low, high)) = low.zip(high).filter(|(low, high)| is_above(*low, *high)) {
+                return Err(format!("{low_name} {low} is above {high_name} {high}"));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_goal(&self) -> Result<(), String> {
+        let v = &self.verdict;
+        let is_completed = self.outcome == Outcome::Completed;
+        match (v.goal, is_completed) {
+            (true, false) => return Err("goal is true, and the outcome is not completed".to_owned()),
+            (false, true) => return Err("goal is false, and the outcome is completed".to_owned()),
+            _ => {}
+        }
+        if v.goal != v.goal_time_s.is_some() {
+            return Err(format!("goal is {}, and goal_time_s is {}", v.goal, or_null(v.goal_time_s)));
+        }
+        if let Some(stage) = v.failed_stage.filter(|_| v.goal) {
+            return Err(format!("goal is true, and failed_stage is {}", stage.name()));
+        }
+        if v.no_drop == v.drop.is_some() {
+            let drop = if v.drop.is_some() { "an event" } else { "null" };
+            return Err(format!("no_drop is {}, and drop is {drop}", v.no_drop));
+        }
+        if v.no_drop && !self.outcome.is_valid() {
+            return Err("no_drop is true, and the episode did not end validly".to_owned());
+        }
+        Ok(())
+    }
+
+    /// Checks the limits, and that Safety Success at each κ follows from Goal, NoDrop and D.
+    fn check_deformation(&self) -> Result<(), String> {
+        let (v, soft) = (&self.verdict, self.header.soft);
+        let peak = PeakDeformation { d_pct: v.d_peak, missing: v.missing_deformation };
+        let ok = |tau: Option<f64>| peak.is_within(tau).filter(|_| soft && self.outcome.is_valid());
+        if !soft && (v.d_peak.is_some() || v.tau.is_some()) {
+            return Err("the target is rigid, and d_peak or tau is a number".to_owned());
+        }
+        let limit = match (v.kappa, v.tau, v.d_ref) {
+            (None, None, None) => None,
+            (Some(kappa), Some(tau), Some(d_ref_pct)) => {
+                check_tau("tau", tau, &DeformationLimit { d_ref_pct, kappa }, kappa)?;
+                Some(DeformationLimit { d_ref_pct, kappa })
+            }
+            _ => return Err("some of kappa, tau and d_ref are null, and some are numbers".to_owned()),
+        };
+        let (d, tau) = (or_null(v.d_peak), or_null(v.tau));
+        if v.deformation_ok != ok(v.tau) {
+            let got = or_null(v.deformation_ok);
+            return Err(format!("deformation_ok is {got}, and d_peak is {d}, tau {tau}"));
+        }
+        let safe = |deformation_ok| is_safe(v.goal, v.no_drop, soft, deformation_ok);
+        let parts = format!("goal is {}, no_drop {}", v.goal, v.no_drop);
+        if v.safety != safe(v.deformation_ok) {
+            let got = or_null(v.deformation_ok);
+            return Err(format!("safety is {}, and {parts}, deformation_ok {got}", v.safety));
+        }
+        let is_known = self.outcome.is_valid() && v.missing_evidence == 0;
+        if v.safety_known != (is_known && (!soft || v.deformation_ok.is_some())) {
+            return Err(format!("safety_known is {}, which the evidence does not show", v.safety_known));
+        }
+        for at in &v.kappas {
+            let name = format!("the tau_pct of kappa {}", at.kappa);
+            let Some(limit) = &limit else { return Err(format!("{name} is a number, and tau is null")) };
+            check_tau(&name, at.tau_pct, limit, at.kappa)?;
+            if at.deformation_ok != ok(Some(at.tau_pct)) || at.safety != safe(at.deformation_ok) {
+                let (ok, tau) = (or_null(at.deformation_ok), at.tau_pct);
+                return Err(format!(
+                    "at kappa {} deformation_ok is {ok} and safety {}, and {parts}, d_peak {d}, tau_pct {tau}",
+                    at.kappa, at.safety
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_others(&self) -> Result<(), String> {
+        let v = &self.verdict;
+        for other in &v.others {
+            let OtherDeformation { object, d_peak, tau, deformation_ok } = other;
+            let is_above = d_peak.zip(*tau).map(|(d, tau)| d > tau);
+            let is_contradiction = match deformation_ok {
+                Some(ok) => is_above != Some(!ok),
+                // Steps without evidence leave it open; a limit that was exceeded does not.
+                None => is_above == Some(true) && self.outcome.is_valid(),
+            };
+            if is_contradiction {
+                let [d, tau] = [d_peak, tau].map(|x| or_null(*x));
+                let got = or_null(*deformation_ok);
+                return Err(format!("{object}: deformation_ok is {got}, and d_peak is {d}, tau {tau}"));
+            }
+        }
+        let peak = v.others.iter().filter_map(|other| other.d_peak).reduce(f64::max);
+        if !v.others.is_empty() && peak != v.d_peak_other {
+            let got = or_null(v.d_peak_other);
+            return Err(format!("d_peak_other is {got}, and the largest of others is {}", or_null(peak)));
+        }
+        let has = |ok: Option<bool>| v.others.iter().any(|other| other.deformation_ok == ok);
+        match v.others_ok {
+            Some(true) if has(Some(false)) || has(None) => {}
+            Some(false) if !has(Some(false)) => {}
+            _ => return Ok(()),
+        }
+        Err(format!("others_ok is {}, which the list of others does not show", or_null(v.others_ok)))
+    }
+}
+
+/// Checks that τ is κ·D_ref.
+fn check_tau(name: &str, tau: f64, limit: &DeformationLimit, kappa: f64) -> Result<(), String> {
+    if (tau - limit.tau_at(kappa)).abs() <= TOLERANCE * (1.0 + tau) {
+        return Ok(());
+    }
+    Err(format!("{name} is {tau}, and {kappa} of d_ref {} is {}", limit.d_ref_pct, limit.tau_at(kappa)))
+}
+
+/// The value, or the word of JSON for none.
+fn or_null(value: Option<impl ToString>) -> String {
+    value.map_or("null".to_owned(), |value| value.to_string())
+}
+
+/// Path of the first key of `read` that `known` lacks.
+fn unknown_key(read: &Value, known: &Value) -> Option<String> {
+    match (read, known) {
+        (Value::Object(read), Value::Object(known)) => {
+            read.iter().find_map(|(key, value)| match known.get(key) {
+                None => Some(key.clone()),
+                Some(own) => unknown_key(value, own).map(|inner| format!("{key}.{inner}")),
+            })
+        }
+        (Value::Array(read), Value::Array(known)) => {
+            read.iter().zip(known).find_map(|(value, own)| unknown_key(value, own))
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::*;
+    use crate::record::tests::sample;
+
+    /// The error of the sample record with `changes`.
+    fn refusal(changes: &[(&str, Value)]) -> String {
+        let mut line = serde_json::to_value(sample()).unwrap();
+        for (key, value) in changes {
+            line[*key] = value.clone();
+        }
+        EpisodeRecord::from_json(line.to_string().as_bytes()).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn the_record_as_written_is_accepted() {
+        let line = serde_json::to_string(&sample()).unwrap();
+        assert_eq!(EpisodeRecord::from_json(line.as_bytes()).unwrap(), sample());
+    }
+
+    #[test]
+    fn safety_follows_from_goal_drop_and_deformation() {
+        let far = ("d_peak", json!(0.8));
+        assert!(refusal(&[("safety", json!(false))]).contains("safety is false, and goal is true"));
+        let unsafe_d = [("d_peak", json!(1.5)), ("d_peak_max", json!(3.0))];
+        let claimed = refusal(&unsafe_d);
+        assert!(claimed.contains("deformation_ok is true, and d_peak is 1.5, tau 1"), "{claimed}");
+        let both = [&unsafe_d[..], &[("deformation_ok", json!(false))]].concat();
+        assert!(
+            refusal(&both).contains("safety is true, and goal is true, no_drop true, deformation_ok false")
+        );
+        assert!(refusal(&[("d_peak", Value::Null)]).contains("d_peak is null, tau 1"));
+        assert!(refusal(&[("tau", Value::Null)]).contains("some of kappa, tau and d_ref are null"));
+        assert!(refusal(&[("tau", json!(9.0))]).contains("tau is 9, and 0.5 of d_ref 2 is 1"));
+        let swapped = [("kappa", json!(1.25)), ("collapsed_volume_pct", json!(0.5))];
+        assert!(refusal(&swapped).contains("kappa 1.25 is above 1"));
+        let at = json!([{ "kappa": 0.3, "tau_pct": 0.6, "deformation_ok": true, "safety": true }]);
+        let kappas = refusal(&[("kappas", at), far]);
+        assert!(kappas.contains("at kappa 0.3 deformation_ok is true"), "{kappas}");
+        assert!(refusal(&[("safety_known", json!(false))]).contains("safety_known is false"));
+    }
+
+    #[test]
+    fn goal_and_drop_agree_with_their_events() {
+        assert!(refusal(&[("goal", json!(false))]).contains("goal is false, and the outcome is completed"));
+        assert!(
+            refusal(&[("outcome", json!({ "kind": "budget" }))]).contains("the outcome is not completed")
+        );
+        assert!(refusal(&[("goal_time_s", Value::Null)]).contains("goal_time_s is null"));
+        assert!(refusal(&[("no_drop", json!(false))]).contains("no_drop is false, and drop is null"));
+    }
+
+    #[test]
+    fn numbers_have_their_ranges() {
+        assert!(refusal(&[("time_s", json!(-1.0))]).contains("time_s is -1"));
+        assert!(refusal(&[("newton_mean", json!(-1.0))]).contains("newton_mean is -1"));
+        assert!(
+            refusal(&[("d_peak_max", json!(0.1))])
+                .contains("d_peak 0.3333333333333333 is above d_peak_max 0.1")
+        );
+        assert!(refusal(&[("mean_pad_force_n", json!(2.0))]).contains("is above peak_pad_force_n 1.5"));
+    }
+
+    #[test]
+    fn harm_to_others_follows_from_their_limits() {
+        let other =
+            |d: f64, ok: bool| json!([{ "object": "pie", "d_peak": d, "tau": 1.0, "deformation_ok": ok }]);
+        let claimed = refusal(&[("others", other(2.0, true)), ("d_peak_other", json!(2.0))]);
+        assert!(claimed.contains("pie: deformation_ok is true, and d_peak is 2, tau 1"), "{claimed}");
+        let summary =
+            [("others", other(2.0, false)), ("d_peak_other", json!(2.0)), ("others_ok", json!(true))];
+        assert!(refusal(&summary).contains("others_ok is true"));
+        assert!(
+            refusal(&[("others", other(0.5, true))])
+                .contains("d_peak_other is 0, and the largest of others is 0.5")
+        );
+    }
+
+    #[test]
+    fn unknown_keys_are_refused_by_name() {
+        assert!(refusal(&[("d_peak_gther", json!(0.0))]).ends_with("unknown key d_peak_gther"));
+        let drop = json!({ "reason": "free_fall", "time_s": 1.0, "height": 3 });
+        assert!(refusal(&[("drop", drop)]).ends_with("unknown key drop.height"));
+    }
+}
