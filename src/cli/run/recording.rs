@@ -37,6 +37,7 @@ use softvt_common::{
 use softvt_dataset::{
     Demonstration,
     card::{Card, TaskCount, rejection_counts},
+    check,
     demonstration_writer::DemonstrationWriter,
     layout::{self, DATASET, MANIFEST, PARTS, RECORDING, TaskPaths, VIDEO_STREAMS},
     manifest::{self, ManifestEntry},
@@ -140,6 +141,12 @@ impl<'a> SuiteRecording<'a> {
         demos: Option<u32>,
         customize: impl FnOnce(&mut SuiteRun<'a>, &GripLog) -> Result<(), CliError>,
     ) -> Result<Self, CliError> {
+        let script = &loaded.sources.main;
+        if !check::is_script_path(script) {
+            return Err(CliError::input(format!(
+                "{script}: a recording names its script, and its path must not contain \"..\"; start softvt in a folder above it"
+            )));
+        }
         let folder_name = path_component(&config.suite_name(suite));
         let mut run = SuiteRun::new(config, loaded, suite, jobs, layout::attempts(&args.out, &folder_name))?;
         run.split = Split::Demonstration;

@@ -1,6 +1,11 @@
 //! Consistency checks of a dataset: files, shapes, values, and relations between streams.
 
-use std::{collections::BTreeMap, path::Path};
+use std::{
+    collections::BTreeMap,
+    path::{Component, Path},
+};
+
+use serde_json::Value;
 
 use super::{
     DatasetError, StreamValues, TaskFile,
@@ -11,7 +16,7 @@ use super::{
     video,
 };
 use softvt_benchmark::{CONTROL_DT, CONTROL_HZ};
-use softvt_common::files::FileError;
+use softvt_common::{files::FileError, text::counted};
 use softvt_geometry::{Quat, Vec3};
 use softvt_policy::profile::GripCode;
 use softvt_robot::rotation;
@@ -143,7 +148,10 @@ fn check_videos(findings: &mut Findings, root: &Path, entry: &ManifestEntry) {
 }
 
 fn check_demonstrations(findings: &mut Findings, file: &TaskFile) {
-    findings.take(file.environment());
+    if let Some(environment) = findings.take(file.environment()) {
+        check_script(findings, file, &environment);
+    }
+    let steps_before = findings.steps;
     for &demo in &file.demos {
         findings.demos += 1;
         let (names, steps) = (file.names(demo), file.steps(demo));
@@ -168,6 +176,28 @@ fn check_demonstrations(findings: &mut Findings, file: &TaskFile) {
             check.check_relations();
         }
     }
+    let (steps, demos) = (findings.steps - steps_before, file.demos.len());
+    for (name, count, unit) in [("total", steps, "step"), ("num_demos", demos, "demonstration")] {
+        if !file.has_count(name, count) {
+            let what = format!("another number than the {} of the file", counted(count, unit));
+            findings.add(&file.path, &format!("/data, attribute {name}"), what);
+        }
+    }
+}
+
+/// Checks the path of the script that a replay of the file runs.
+fn check_script(findings: &mut Findings, file: &TaskFile, environment: &Value) {
+    let script = environment["env_kwargs"]["script"].as_str().unwrap_or_default();
+    let key = "/data, attribute env_args, script";
+    if !is_script_path(script) {
+        let what = format!("{script:?} leads out of the folder; expected a path without \"..\"");
+        findings.add(&file.path, key, what);
+    }
+}
+
+/// True for a path that does not leave its folder through `..`: a recording can name a script by it.
+pub fn is_script_path(script: &str) -> bool {
+    Path::new(script).components().all(|part| part != Component::ParentDir)
 }
 
 /// A demonstration that is being checked.

@@ -2,6 +2,7 @@
 
 use std::{fs, path::PathBuf};
 
+use rust_hdf5::{H5File, Selection};
 use serde_json::json;
 
 use super::*;
@@ -162,4 +163,106 @@ fn a_file_truncated_anywhere_is_reported_by_name() {
     let none = folder.path().join("none.hdf5");
     let missing = TaskFile::open(&none).err().unwrap().to_string();
     assert!(missing.starts_with("cannot read"), "it is missing");
+}
+
+/// The findings of a file whose group `/data/demo_0` `change` has modified.
+fn changed(change: impl Fn(&H5File)) -> String {
+    let (_folder, path) = write(&demonstration(0.0), "task.hdf5");
+    let hdf5 = H5File::open_rw(&path).unwrap();
+    change(&hdf5);
+    hdf5.close().unwrap();
+    match file(&path) {
+        Ok(findings) => findings.problems.join("\n"),
+        Err(error) => error.to_string(),
+    }
+}
+
+fn demo_0(file: &H5File) -> rust_hdf5::H5Group {
+    file.root_group().group("data").unwrap().group("demo_0").unwrap()
+}
+
+#[test]
+fn a_group_that_contains_itself_is_refused_by_name() {
+    let looped = changed(|file| demo_0(file).link("loop", "/data").unwrap());
+    assert!(
+        looped.contains("/data/demo_0/loop: it is a link to /data; expected the data itself"),
+        "{looped}"
+    );
+    let obs = changed(|file| demo_0(file).group("obs").unwrap().link("obs", "/data/demo_0/obs").unwrap());
+    assert!(obs.contains("/data/demo_0/obs/obs: it is a link to /data/demo_0/obs"), "{obs}");
+}
+
+#[test]
+fn deep_and_numerous_groups_are_refused() {
+    let deep = changed(|file| {
+        (0..20).fold(demo_0(file), |group, _| group.create_group("g").unwrap());
+    });
+    assert!(deep.contains("/g/g: its groups are nested more than 16 deep"), "{deep}");
+    let many = changed(|file| {
+        let group = demo_0(file).create_group("many").unwrap();
+        (0..4100).for_each(|i| drop(group.create_group(&i.to_string()).unwrap()));
+    });
+    assert!(many.contains("more than 4096 groups and datasets"), "{many}");
+}
+
+#[test]
+fn arrays_without_end_are_refused_before_they_are_read() {
+    let add = |shape: &[usize], chunk: &[usize]| {
+        changed(|file| drop(demo_0(file).new_dataset::<f32>().shape(shape).chunk(chunk).create("x").unwrap()))
+    };
+    let rank = add(&[2; 32], &[1; 32]);
+    assert!(rank.contains("/data/demo_0/x: it has 32 axes; at most 8 are read"), "{rank}");
+    let size = add(&[STEPS, 1 << 40], &[1, 1 << 20]);
+    assert!(size.contains("/data/demo_0/x: its shape [9, 1099511627776] is above 2 GiB"), "{size}");
+    let chunks = add(&[1 << 14, 1 << 14], &[1, 1]);
+    assert!(chunks.contains("/data/demo_0/x: it has 268435456 chunks"), "{chunks}");
+}
+
+#[test]
+fn data_in_other_files_are_refused() {
+    let linked = changed(|file| {
+        file.delete_dataset("data/demo_0/rewards").unwrap();
+        demo_0(file).create_external_link("rewards", "x.hdf5", "/y").unwrap();
+    });
+    assert!(linked.contains("/data/demo_0/rewards: it is a link to /y in the file x.hdf5"), "{linked}");
+    let soft = changed(|file| {
+        file.delete_dataset("data/demo_0/rewards").unwrap();
+        demo_0(file).create_soft_link("rewards", "/data/demo_0/dones").unwrap();
+    });
+    assert!(soft.contains("/data/demo_0/rewards: it is a link to /data/demo_0/dones"), "{soft}");
+    let mapped = changed(|file| {
+        demo_0(file)
+            .new_dataset::<f64>()
+            .shape([STEPS])
+            .virtual_mapping(Selection::All, "x.hdf5", "/y", Selection::All)
+            .create("x")
+            .unwrap();
+    });
+    assert!(
+        mapped.contains("/data/demo_0/x: it is a virtual array: its numbers lie in other files"),
+        "{mapped}"
+    );
+}
+
+#[test]
+fn counts_and_scripts_of_another_file_are_refused() {
+    let problems = |script: &str, total: usize, demos: usize| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("task.hdf5");
+        let environment = json!({ "env_name": "softvt", "env_kwargs": { "script": script } });
+        let demonstration = demonstration(0.0);
+        write_file(&path, &environment, total, demos, |writer| {
+            writer.write_attributes(0, &demonstration.record, STEPS)?;
+            writer.write_streams(0, &demonstration)
+        })
+        .unwrap();
+        file(&path).unwrap().problems.join("\n")
+    };
+    assert_eq!(problems("suites/object_soft.lua", STEPS, 1), "");
+    let script = problems("../../../etc/passwd", STEPS, 1);
+    assert!(script.contains("env_args, script: \"../../../etc/passwd\" leads out of the folder"), "{script}");
+    assert!(problems("suites/../../x.lua", STEPS, 1).contains("env_args, script"));
+    let counts = problems("x.lua", usize::MAX, 1 << 62);
+    assert!(counts.contains("attribute total: another number than the 9 steps of the file"), "{counts}");
+    assert!(counts.contains("attribute num_demos: another number than the 1 demonstration"), "{counts}");
 }

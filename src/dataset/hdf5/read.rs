@@ -10,7 +10,10 @@ use std::{
 use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group, Hdf5Error};
 use serde_json::Value;
 
-use super::super::{DataStream, DatasetError, Demonstration, StreamValues, demonstration::actions_stream};
+use super::{
+    super::{DataStream, DatasetError, Demonstration, StreamValues, demonstration::actions_stream},
+    limits::{self, ListError},
+};
 use softvt_common::files::FileError;
 use softvt_evaluation::record::EpisodeRecord;
 use softvt_policy::{Action, profile::GripCode};
@@ -76,7 +79,11 @@ impl TaskFile {
             Some(_) => {}
         }
         let file = H5File::open(path).map_err(DatasetError::hdf5(path, "/"))?;
-        let data = file.root_group().group("data").map_err(DatasetError::hdf5(path, "/data"))?;
+        let root = file.root_group();
+        if let Some(what) = limits::link(&root, "data") {
+            return Err(DatasetError::content(path, "/data", what));
+        }
+        let data = root.group("data").map_err(DatasetError::hdf5(path, "/data"))?;
         let names = data.group_names().map_err(DatasetError::hdf5(path, "/data"))?;
         let mut demos = Vec::new();
         for name in names.iter().filter(|name| name.starts_with("demo_")) {
@@ -123,6 +130,9 @@ impl TaskFile {
             return Err(DatasetError::content(&self.path, "/data", what));
         }
         let name = format!("demo_{demo}");
+        if let Some(what) = limits::link(&self.data, &name) {
+            return Err(DatasetError::content(&self.path, format!("/data/{name}"), what));
+        }
         self.data.group(&name).map_err(DatasetError::hdf5(&self.path, format!("/data/{name}")))
     }
 
@@ -145,8 +155,8 @@ impl TaskFile {
             Ok(environment) if environment["env_name"] == "softvt" => error,
             _ => DatasetError::not_recorded_by_softvt(&self.path, format!("/data/demo_{demo}")),
         })?;
-        serde_json::from_str(&text)
-            .map_err(|e| DatasetError::content(&self.path, key, format!("not a record of softvt: {e}")))
+        EpisodeRecord::from_json(text.as_bytes())
+            .map_err(|error| DatasetError::content(&self.path, key, error.to_string()))
     }
 
     /// Number of control steps of a demonstration.
@@ -160,6 +170,14 @@ impl TaskFile {
     /// Text attribute of `/data`, if present.
     pub(crate) fn file_attribute(&self, name: &str) -> Option<String> {
         self.data.attr_string(name).ok()
+    }
+
+    /// True if the attribute of `/data` of this name is the integer `expected`. rust-hdf5 returns the number of a group as
+    /// text: its bytes up to the first that is 0.
+    pub(crate) fn has_count(&self, name: &str, expected: usize) -> bool {
+        let bytes = (expected as u64).to_le_bytes();
+        let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+        self.file_attribute(name).is_some_and(|text| text == String::from_utf8_lossy(&bytes[..end]))
     }
 
     /// True if a demonstration has a dataset of this name, readable or not.
@@ -186,14 +204,30 @@ impl TaskFile {
         self.subgroup(demo, Some(path)).and_then(|group| group.group_names().ok()).unwrap_or_default()
     }
 
+    /// Opens a dataset of a demonstration.
+    ///
+    /// # Errors
+    /// The dataset is missing, a link, or too large to be read.
     pub(crate) fn dataset(&self, demo: usize, name: &str) -> Result<H5Dataset, DatasetError> {
-        self.group(demo)?;
+        let mut group = self.group(demo)?;
+        for (at, _) in name.match_indices('/').chain([(name.len(), "")]) {
+            let last = name[..at].rsplit('/').next().unwrap_or(name);
+            if let Some(what) = limits::link(&group, last) {
+                return Err(self.error(demo, &name[..at], what));
+            }
+            let Ok(inner) = group.group(last) else { break };
+            group = inner;
+        }
         let key = format!("data/demo_{demo}/{name}");
-        self.file.dataset(&key).map_err(|error| {
+        let failed = self.failed(demo, name);
+        let data = self.file.dataset(&key).map_err(|error| {
             // The library's error for a missing name depends on the program that wrote the group.
-            let error = if self.is_listed(demo, name) { error } else { Hdf5Error::NotFound(key.clone()) };
-            self.failed(demo, name)(error)
-        })
+            failed(if self.is_listed(demo, name) { error } else { Hdf5Error::NotFound(key.clone()) })
+        })?;
+        match limits::array_refusal(&data).map_err(failed)? {
+            Some(what) => Err(self.error(demo, name, what)),
+            None => Ok(data),
+        }
     }
 
     /// Shape of a dataset of a demonstration.
@@ -207,12 +241,12 @@ impl TaskFile {
     /// Paths of all datasets of a demonstration, relative to it.
     ///
     /// # Errors
-    /// The file is damaged.
+    /// The file is damaged, or its groups are too deep, too many, or links.
     pub fn names(&self, demo: usize) -> Result<Vec<String>, DatasetError> {
-        let mut names = Vec::new();
-        collect_names(&self.group(demo)?, "", &mut names)
-            .map_err(DatasetError::hdf5(&self.path, format!("/data/demo_{demo}")))?;
-        Ok(names)
+        limits::dataset_names(&self.group(demo)?).map_err(|error| match error {
+            ListError::Refused(refused) => self.error(demo, &refused.name, refused.what),
+            ListError::Hdf5(error) => DatasetError::hdf5(&self.path, format!("/data/demo_{demo}"))(error),
+        })
     }
 
     /// Reads a stream of a demonstration with its attributes.
@@ -223,9 +257,9 @@ impl TaskFile {
         let data = self.dataset(demo, name)?;
         let failed = self.failed(demo, name);
         let values = match self.number_type(demo, name, &data)? {
-            NumberType::F32 => data.read_raw().map(StreamValues::F32),
-            NumberType::U8 => data.read_raw().map(StreamValues::U8),
-            _ => data.read_numeric_as().map(StreamValues::F64),
+            NumberType::F32 => data.read_raw().map(StreamValues::F32).map_err(&failed),
+            NumberType::U8 => data.read_raw().map(StreamValues::U8).map_err(&failed),
+            _ => self.read_f64(demo, name, &data).map(StreamValues::F64),
         };
         let mut attributes = Vec::new();
         for name in data.attr_names().map_err(&failed)? {
@@ -235,7 +269,7 @@ impl TaskFile {
             }
         }
         let row_shape = data.shape().get(1..).unwrap_or_default().to_vec();
-        Ok(DataStream { name: name.to_owned(), row_shape, values: values.map_err(failed)?, attributes })
+        Ok(DataStream { name: name.to_owned(), row_shape, values: values?, attributes })
     }
 
     /// Type of the numbers of a dataset.
@@ -253,13 +287,21 @@ impl TaskFile {
         })
     }
 
+    /// Reads all numbers of an array as `f64`.
+    fn read_f64(&self, demo: usize, name: &str, data: &H5Dataset) -> Result<Vec<f64>, DatasetError> {
+        match limits::size_refusal(&data.shape(), size_of::<f64>()) {
+            Some(what) => Err(self.error(demo, name, what)),
+            None => data.read_numeric_as().map_err(self.failed(demo, name)),
+        }
+    }
+
     /// Reads a stream as `f64`.
     ///
     /// # Errors
     /// As [`TaskFile::stream`].
     pub fn array(&self, demo: usize, name: &str) -> Result<FloatArray, DatasetError> {
         let data = self.dataset(demo, name)?;
-        let values = data.read_numeric_as().map_err(self.failed(demo, name))?;
+        let values = self.read_f64(demo, name, &data)?;
         Ok(FloatArray { values, shape: data.shape() })
     }
 
@@ -369,12 +411,4 @@ fn superblock_end(head: &[u8]) -> Option<u64> {
         return Some(0);
     }
     Some(u64::from_le_bytes(head.get(at..at + 8)?.try_into().ok()?))
-}
-
-fn collect_names(group: &H5Group, above: &str, names: &mut Vec<String>) -> rust_hdf5::Result<()> {
-    names.extend(group.dataset_names()?.iter().map(|name| format!("{above}{name}")));
-    for inner in group.group_names()? {
-        collect_names(&group.group(&inner)?, &format!("{above}{inner}/"), names)?;
-    }
-    Ok(())
 }
