@@ -12,12 +12,20 @@ mod run;
 #[cfg(test)]
 mod tests;
 
-use std::{panic, process::ExitCode, sync::Arc, thread, time::Duration};
+use std::{
+    panic,
+    process::ExitCode,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread,
+    time::Duration,
+};
 
 use error::{CliError, Exit};
 use output::eprint_notice;
 
-use softvt_common::text;
 use softvt_rollout::cancel;
 
 /// Time after Ctrl-C in which a command must finish its current step. A C function of Lua may never return.
@@ -34,7 +42,7 @@ pub fn main() -> ExitCode {
         Ok(Ok(())) => Exit::Success,
         Ok(Err(error)) => {
             if !error.message.is_empty() {
-                eprint_notice(text::escape_control(&error.message));
+                eprint_notice(&error.message);
             }
             error.exit
         }
@@ -46,7 +54,7 @@ pub fn main() -> ExitCode {
 fn run_process() -> Result<(), CliError> {
     // Finished episodes are already on disk, and nothing can interrupt a C function of Lua that does not return.
     softvt_script::set_stuck_handler(Arc::new(|message| {
-        text::eprint_line(&format!("softvt: {message}"));
+        eprint_notice(message);
         std::process::exit(2);
     }));
     handle_interrupts();
@@ -61,6 +69,9 @@ fn run_process() -> Result<(), CliError> {
     }
 }
 
+/// Set by a command that has nothing to tell when it is interrupted: a server that its client ends.
+pub(crate) static QUIET_INTERRUPT: AtomicBool = AtomicBool::new(false);
+
 /// Makes the first Ctrl-C finish the current step and keep its results, and the second end the process at once.
 fn handle_interrupts() {
     let exit = || std::process::exit(Exit::Interrupted as i32);
@@ -68,7 +79,9 @@ fn handle_interrupts() {
         if cancel::request() {
             exit();
         }
-        eprint_notice("finishing the current step; press Ctrl-C again to quit");
+        if !QUIET_INTERRUPT.load(Ordering::Relaxed) {
+            eprint_notice("finishing the current step; press Ctrl-C again to quit");
+        }
         thread::spawn(move || {
             thread::sleep(SHUTDOWN_TIMEOUT);
             eprint_notice(format!(

@@ -115,7 +115,7 @@ pub fn replace(path: &Path, content: impl AsRef<[u8]>) -> Result<(), FileError> 
     file.and_then(|mut file| file.write_all(content.as_ref()))
         .inspect_err(|_| drop(fs::remove_file(&temp)))
         .map_err(FileError::io("write", path))?;
-    persist(&temp, path)
+    persist(&temp, path).inspect_err(|_| drop(fs::remove_file(&temp)))
 }
 
 /// Replaces `path` by `value` as indented JSON; see [`replace`].

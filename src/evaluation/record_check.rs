@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::{
     record::{EpisodeRecord, OtherDeformation, Outcome},
-    safety::{DeformationLimit, PeakDeformation, is_safe},
+    safety::{DeformationLimit, PeakDeformation, SafetyParts},
 };
 
 /// A text is not the record of an episode.
@@ -146,7 +146,8 @@ impl EpisodeRecord {
             let got = or_null(v.deformation_ok);
             return Err(format!("deformation_ok is {got}, and d_peak is {d}, tau {tau}"));
         }
-        let safe = |deformation_ok| is_safe(v.goal, v.no_drop, soft, deformation_ok);
+        let required = SafetyParts { goal: v.goal, no_drop: v.no_drop, slip_ok: v.slip_ok };
+        let safe = |deformation_ok| required.is_safe(soft, deformation_ok);
         let parts = format!("goal is {}, no_drop {}", v.goal, v.no_drop);
         if v.safety != safe(v.deformation_ok) {
             let got = or_null(v.deformation_ok);

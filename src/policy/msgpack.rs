@@ -4,6 +4,8 @@
 //! keys of type bin; vla-eval's keys are of type str. The reader accepts both, numpy scalars
 //! (`__npgeneric__`) and nested lists.
 
+use std::collections::HashSet;
+
 use rmpv::Value;
 
 use softvt_common::npy::{NpyArray, element_size};
@@ -73,6 +75,8 @@ pub enum MsgpackError {
     Truncated,
     #[error("too long: more than {MAX_VALUES} values")]
     TooManyValues,
+    #[error("ambiguous: a map has the key {0:?} twice")]
+    DuplicateKey(String),
 }
 
 /// A value is not an array of numbers. The text says what it is instead.
@@ -124,15 +128,40 @@ pub fn pack(value: &Value) -> Vec<u8> {
 /// Decodes a message, which must be exactly one value. The values are counted before memory is allocated for them.
 ///
 /// # Errors
-/// The bytes are not one valid value, or hold too many values.
+/// The bytes are not one valid value, hold too many values, or a map in them has a key twice.
 pub fn unpack(mut bytes: &[u8]) -> Result<Value, MsgpackError> {
     use rmpv::decode::{Error, read_value_with_max_depth};
     count_values(bytes)?;
     match read_value_with_max_depth(&mut bytes, MAX_DEPTH) {
-        Ok(value) if bytes.is_empty() => Ok(value),
+        Ok(value) if bytes.is_empty() => match duplicate_key(&value) {
+            Some(key) => Err(MsgpackError::DuplicateKey(key)),
+            None => Ok(value),
+        },
         Ok(_) => Err(MsgpackError::TrailingBytes(bytes.len())),
         Err(Error::DepthLimitExceeded) => Err(MsgpackError::TooDeep),
         Err(Error::InvalidMarkerRead(_) | Error::InvalidDataRead(_)) => Err(MsgpackError::Truncated),
+    }
+}
+
+/// A key that a map in `value` has twice. Keys of type str and bin with the same bytes are the same, as in [`entry`].
+fn duplicate_key(value: &Value) -> Option<String> {
+    match value {
+        Value::Array(items) => items.iter().find_map(duplicate_key),
+        Value::Map(entries) => {
+            let mut seen = HashSet::new();
+            entries.iter().find_map(|(key, value)| {
+                let bytes = match key {
+                    Value::String(text) => text.as_bytes(),
+                    Value::Binary(bytes) => bytes,
+                    _ => return duplicate_key(value),
+                };
+                match seen.insert(bytes) {
+                    true => duplicate_key(value),
+                    false => Some(String::from_utf8_lossy(bytes).into_owned()),
+                }
+            })
+        }
+        _ => None,
     }
 }
 
@@ -350,5 +379,17 @@ mod tests {
             ("shape".into(), Value::Array(vec![u64::MAX.into(), 2.into()])),
         ]);
         assert!(numbers(&huge).is_err());
+    }
+
+    #[test]
+    fn a_map_with_a_key_twice_is_refused() {
+        let message = |keys: [Value; 2]| {
+            let inner = Value::Map(keys.map(|key| (key, Value::from(1))).to_vec());
+            unpack(&pack(&map([("request", Value::Array(vec![inner]))])))
+        };
+        assert!(message(["type".into(), "task".into()]).is_ok());
+        let twice = MsgpackError::DuplicateKey("type".to_owned());
+        assert_eq!(message(["type".into(), "type".into()]), Err(twice.clone()));
+        assert_eq!(message(["type".into(), Value::Binary(b"type".to_vec())]), Err(twice));
     }
 }

@@ -45,6 +45,10 @@ impl AccessRules {
     /// Checks the headers of a handshake.
     pub(super) fn check(&self, request: &Request) -> Result<(), Refusal> {
         let headers = request.headers();
+        // RFC 9112, 3.2; the first header would say nothing about the second.
+        if headers.get_all(header::HOST).iter().nth(1).is_some() {
+            return Err(Refusal::new(StatusCode::BAD_REQUEST, "the request has several Host headers\n"));
+        }
         let host = text(headers, &header::HOST).unwrap_or_default();
         // Programs send no origin, or that of the server itself.
         if headers.contains_key(header::ORIGIN) && !is_same_site(headers, &host) {
@@ -74,6 +78,10 @@ impl AccessRules {
 
     /// True if the value of a header `Host` names this server. The port is not compared, since a tunnel may change it.
     fn is_own_name(&self, host: &str) -> bool {
+        // A Host header has no user (RFC 9110, 7.2).
+        if host.contains('@') {
+            return false;
+        }
         let Some(name) = host.parse::<Uri>().ok().and_then(|uri| uri.host().map(str::to_ascii_lowercase))
         else {
             return false;
@@ -135,10 +143,23 @@ mod tests {
         for host in ["127.0.0.1:8765", "localhost:9000", "LOCALHOST", "[::1]:8765", "127.0.0.5"] {
             assert_eq!(status(&local, &[("Host", host)]), 200, "{host}");
         }
-        for host in ["evil.example:8765", "192.0.2.1:8765", "localhost.evil.example", "", "0.0.0.0:8765"] {
+        for host in [
+            "user@127.0.0.1",
+            "@127.0.0.1:8765",
+            "evil.example:8765",
+            "192.0.2.1:8765",
+            "localhost.evil.example",
+            "",
+            "0.0.0.0:8765",
+        ] {
             assert_eq!(status(&local, &[("Host", host)]), 403, "{host}");
         }
         assert_eq!(status(&local, &[]), 403);
+        let own = ("Host", "127.0.0.1:8765");
+        for other in [("Host", "evil.example"), own] {
+            assert_eq!(status(&local, &[own, other]), 400);
+            assert_eq!(status(&rules("127.0.0.1", "127.0.0.1", Some("t")), &[own, other]), 400);
+        }
         let any = rules("0.0.0.0", "0.0.0.0", None);
         for (host, expected) in
             [("192.0.2.1:8765", 200), ("0.0.0.0:8765", 200), ("localhost", 200), ("robot.lab:8765", 403)]

@@ -12,6 +12,7 @@ use clap::{Args, value_parser};
 use serde_json::json;
 
 use crate::{
+    QUIET_INTERRUPT,
     error::{CliError, Exit},
     output::{eprint_notice, print},
     run::{
@@ -167,11 +168,13 @@ fn serve(args: ServeArgs) -> Result<(), CliError> {
     server_config.recorder = served.as_ref().map(ServedRuns::recorder);
     let hello = softvt_serve::hello(&server_config, &first);
     print(&format!("ws://{address}\n"))?;
+    // Without results to keep, the end of a server is no event.
+    QUIET_INTERRUPT.store(served.is_none(), Ordering::Relaxed);
     softvt_serve::serve(&listener, &server_config, hello, usize::from(args.threads), &cancel::FLAG);
     drop(server_config);
     match served {
         Some(served) => served.finish(),
-        None => Err(CliError::interrupted("interrupted")),
+        None => Err(CliError::interrupted("")),
     }
 }
 

@@ -142,7 +142,10 @@ fn read_summary(lua: &Lua, value: &Value) -> mlua::Result<ExperimentSummary> {
     let mut files = Vec::new();
     for (path, content) in spec.files {
         let is_inside =
-            |part: &str| !part.is_empty() && part != "." && part != ".." && !part.contains(['\\', ':', '\0']);
+            |part: &str| !part.is_empty() && part != "." && part != ".." && !part.contains(['\\', ':']);
+        if has_control(&path) {
+            return Err(fail(lua, format!("finish.files: {path:?} holds a control character; leave it out")));
+        }
         if !path.split('/').all(is_inside) {
             let message =
                 format!("finish.files: {path:?} leads out of the folder; give a path without \"..\"");
@@ -151,6 +154,11 @@ fn read_summary(lua: &Lua, value: &Value) -> mlua::Result<ExperimentSummary> {
         files.push((path, file_content(lua, &content)?));
     }
     Ok(ExperimentSummary { text: spec.text, files, problem: spec.problem })
+}
+
+/// True if a path would control a terminal, or span several lines.
+fn has_control(path: &str) -> bool {
+    path.contains(char::is_control)
 }
 
 /// The bytes of a file: text as it is, images as PNG, other data as JSON.
