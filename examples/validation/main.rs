@@ -52,28 +52,23 @@ between two flat sharp pads of 22 × 22 mm, friction 1.2, 60 Hz, sleeping off: 0
 `tests/reference`, same mesh, law and samples.
 ";
 
-/// Bounds that are not met, and the reasons as far as known.
+/// Reasons of misses, and limits of the method without a row of their own.
 const MISSES: &str = "
 ## Misses
 
-- In contact, the step's tangent brakes the rotation of a strained body: its null space has the rotations of the rest shape.
-  The brake is zero at rest. Bodies in flight conserve angular momentum.
-- Converged truth: pads of 24 mm, and pads half a voxel off, are beyond 15 % at resolution 6 (16 % at most).
-- Resolutions 18 and 24 are compared by their small-strain stiffness only; their squeezes take minutes.
-- Speed (`softvt scripts/squeeze.lua --gap-mm 42`): 0.12 to 0.14 CPU s per simulated second (target 0.05);
-  a whole suite runs about 11 times faster than real time on one core (target 25).
+*Summary* marks the bounds that are missed. Their reasons, as far as known, and what has no row:
+
+- What moves is damped by β + dt (*Time step*). A soft ball therefore rolls slower than a rigid one. Besides, the ball of voxels
+  has to lift itself from one flat to the next, so that it stands still on small slopes. In contact, the step's tangent also brakes the rotation
+  of a strained body: its null space has the rotations of the rest shape. Bodies in flight conserve angular momentum.
+- The way of a stopping drawer is short by up to half a step of its speed: positions are first-order in the step.
+- Soft bodies at resolution 6 are too stiff between pads of 24 mm, and where the edges of the pads are between nodes.
+- *Converged truth* has cubes alone, and resolutions 18 and 24 by their small-strain stiffness only; their squeezes take minutes.
 - Surfaces at grazing incidence of the key light receive no shadow from objects nearer than a few millimetres, and moving
   objects cast none outside of the sphere with a fine shadow map (0.85 m).
-- Speed of images (`cargo bench --bench render`), ms on one thread, measured (target): third-person 224² 7.5 (3), wrist 224²
-  11.7 (4), third-person 1024² 65 (25), without its cached background 130 (60), wrist 512² 36 (20). Shadow filtering and
-  rasterisation take a tenth to a fifth each; the rest is evenly spread.
-- Speed of tactile sensing (`cargo bench --bench tactile`): a gel field of many slipping ridges takes 1.2 ms (target 1), an
-  image 1.40 to 1.47 ms (target 1.4).
-- The closed loop with every stream at every control step (`cargo bench --bench streams`): 1.8 times real time (target 4);
-  without streams it is 11, with tactile images alone 5.5. A policy that is queried every ten steps has its images rendered
-  only then.
-- Tactile images have cast shadows only on request (14 to 46 ms per image). Images were not compared across machines; on one
-  machine, the number of threads does not change a byte.
+- Images were not compared across machines; on one machine, the number of threads does not change a byte.
+
+Speed is measured by `cargo bench`; [benches/RESULTS.md](../benches/RESULTS.md) has the baseline.
 ";
 
 fn main() {

@@ -1,10 +1,10 @@
 //! Headings, tables and the summary of the page.
 
-/// A result and its bound.
+/// A result and its bound, if it has one.
 struct Claim {
     what: String,
     worst: f64,
-    bound: f64,
+    bound: Option<f64>,
 }
 
 #[derive(Default)]
@@ -15,16 +15,34 @@ pub struct Report {
 impl Report {
     /// Records the worst of `values` (by magnitude) against a bound.
     pub fn claim(&mut self, what: &str, values: impl IntoIterator<Item = f64>, bound: f64) {
+        self.record(what, values, Some(bound));
+    }
+
+    /// Records the worst of `values` (by magnitude), for which there is no bound.
+    pub fn unbounded(&mut self, what: &str, values: impl IntoIterator<Item = f64>) {
+        self.record(what, values, None);
+    }
+
+    fn record(&mut self, what: &str, values: impl IntoIterator<Item = f64>, bound: Option<f64>) {
         let worst = values.into_iter().map(f64::abs).fold(0.0, f64::max);
         self.claims.push(Claim { what: what.to_owned(), worst, bound });
     }
 
     pub fn print(&self) {
-        heading("Summary", "The worst result of each section against its bound; \"missed\" is a defect.");
+        heading(
+            "Summary",
+            "The worst result of each claim against its bound. Relative errors are shares of 1. Columns of the tables above that are not \
+             named here have no bound.",
+        );
         header(&["claim", "worst", "bound", ""]);
         for c in &self.claims {
-            let verdict = if c.worst <= c.bound { "reached" } else { "**missed**" };
-            row(&[c.what.clone(), short(c.worst), short(c.bound), verdict.to_owned()]);
+            let verdict = c.bound.map_or("", |bound| if c.worst <= bound { "reached" } else { "**missed**" });
+            row(&[
+                c.what.clone(),
+                short(c.worst),
+                c.bound.map_or("none".to_owned(), short),
+                verdict.to_owned(),
+            ]);
         }
     }
 }

@@ -46,6 +46,10 @@ pub fn statics(report: &mut Report) {
             compared.iter().filter(light).map(Compared::capacity_error),
             0.03,
         );
+        report.unbounded(
+            &format!("{group}: firm grasps, on the scale of capacity"),
+            compared.iter().filter(firm).map(Compared::capacity_error),
+        );
     }
 }
 
@@ -96,7 +100,12 @@ pub fn truth(report: &mut Report) {
     }
     for resolution in [6, 12] {
         for (pad, offset) in [(18.0, 0.0), (20.0, 0.0), (24.0, 0.0), (22.0, 4.1667)] {
-            truth_row(resolution, pad, offset, truth_of(pad, offset));
+            let errors = truth_row(resolution, pad, offset, truth_of(pad, offset));
+            report.claim(
+                &format!("resolution {resolution}, pads of {pad} mm at {offset} mm, against converged truth"),
+                errors,
+                0.15,
+            );
         }
     }
     for (name, moved) in [("wider", false), ("moved", true)] {

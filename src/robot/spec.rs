@@ -30,11 +30,6 @@ pub struct RobotSpec {
 const MAX_LATENCY: u32 = 100;
 
 impl RobotSpec {
-    /// The profile `paper`: a finger force limit of 200 N, as in the paper's simulator.
-    pub fn paper() -> Self {
-        Self { gripper: GripperSpec { effort: 200.0, ..GripperSpec::default() }, ..Self::default() }
-    }
-
     /// Checks that every number is finite and in its range.
     ///
     /// # Errors
@@ -100,7 +95,7 @@ pub struct GripperSpec {
     pub kp: f64,
     /// Damping, N s/m; positive.
     pub kd: f64,
-    /// Largest force per finger, N. The real hand holds 70 N continuously (Franka Emika, Hand data sheet).
+    /// Largest force per finger, N. The real hand holds 70 N continuously (Franka Emika, Hand data sheet); the paper's simulator has 200 N.
     pub effort: f64,
     /// Speed at which the target of each finger moves, m/s.
     pub speed: f64,
@@ -225,7 +220,6 @@ mod tests {
     #[test]
     fn defaults_are_valid_and_invalid_numbers_are_named() {
         RobotSpec::default().validate().expect("defaults");
-        RobotSpec::paper().validate().expect("paper");
         let mut spec = RobotSpec::default();
         spec.gripper.kp = -1.0;
         assert_eq!(

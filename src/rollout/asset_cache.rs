@@ -135,15 +135,21 @@ const RAYS: usize = 12;
 /// Typical thickness of the walls of a shape that are thinner than [`MIN_PART_WALL`], m. `None` if at most a tenth of
 /// the surface has such walls.
 fn thin_wall(shape: &Shape) -> Option<f64> {
-    let hits = outer_points(shape);
     let steps = (MIN_PART_WALL / WALL_STEP).round() as usize;
+    thin_parts(shape, WALL_STEP, steps, THIN_SHARE)
+}
+
+/// Typical thickness of what is thinner than `steps` steps of `step` (m) below the surface of a shape, m. `None` if at most this
+/// share of the surface has so little behind it.
+pub(super) fn thin_parts(shape: &Shape, step: f64, steps: usize, share: f64) -> Option<f64> {
+    let hits = outer_points(shape);
     let under = |p: &Vec3| {
         let normal = shape.distance_and_normal(p).1;
-        let mut depths = (1..steps).map(|step| WALL_STEP * step as f64);
+        let mut depths = (1..steps).map(|index| step * index as f64);
         depths.find(|depth| shape.distance(&(p - normal * *depth)) > 0.0)
     };
     let mut thin: Vec<f64> = hits.iter().filter_map(under).collect();
-    if thin.len() as f64 <= THIN_SHARE * hits.len() as f64 {
+    if thin.len() as f64 <= share * hits.len() as f64 {
         return None;
     }
     thin.sort_by(f64::total_cmp);

@@ -4,18 +4,49 @@ use std::collections::BTreeSet;
 
 use softvt_benchmark::Task;
 use softvt_robot::gripper::MAX_WIDTH;
-use softvt_scene::{Asset, Scene};
+use softvt_scene::{Asset, Body, Scene, SoftMaterial};
 
-/// Doubts about a scene of a task, one line each: units of materials, and a target that the gripper cannot grasp.
+use crate::asset_cache::thin_parts;
+
+/// Doubts about a scene of a task, one line each: units of materials, soft bodies of few voxels, and a target that the gripper cannot
+/// grasp.
 pub fn scene_doubts(task: &Task, scene: &Scene) -> BTreeSet<String> {
     let doubts = |asset: &Asset| {
         let name = asset.name.clone();
-        asset.unit_doubts().into_iter().map(move |doubt| format!("asset {name}: {doubt}"))
+        asset
+            .unit_doubts()
+            .into_iter()
+            .chain(voxel_doubt(asset))
+            .map(move |doubt| format!("asset {name}: {doubt}"))
     };
     let mut all: BTreeSet<String> = scene.objects.iter().flat_map(|object| doubts(&object.asset)).collect();
     let target = scene.objects.iter().find(|object| object.name == task.goal.object);
     all.extend(target.and_then(|target| width_doubt(&target.asset)));
     all
+}
+
+/// Voxels across a soft body below which its forces can be wrong by more than half.
+const MIN_VOXELS: f64 = 2.0;
+/// Depths at which a body is probed, per [`MIN_VOXELS`] voxels.
+const PROBES: usize = 10;
+
+/// The thickness of a soft body of which more than half of the surface has less than [`MIN_VOXELS`] voxels behind it.
+fn voxel_doubt(asset: &Asset) -> Option<String> {
+    let Body::Soft(material) = &asset.body else { return None };
+    let edge = asset.shape.bounds().size().max() / material.resolution.max(1) as f64;
+    let thickness = thin_parts(&asset.shape, MIN_VOXELS * edge / PROBES as f64, PROBES, 0.5)?;
+    let needed = (material.resolution as f64 * MIN_VOXELS * edge / thickness).ceil();
+    let fix = if needed <= SoftMaterial::MAX_RESOLUTION as f64 {
+        format!("resolution = {needed} gives it two")
+    } else {
+        "make it thicker".to_owned()
+    };
+    Some(format!(
+        "most of it is less than two voxels thick ({:.1} mm, a voxel is {:.1} mm), so that its stiffness can be wrong by more than \
+         half; {fix}",
+        1e3 * thickness,
+        1e3 * edge
+    ))
 }
 
 /// The width where the stock experts grasp an object, if it exceeds the opening of the gripper.

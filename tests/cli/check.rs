@@ -100,6 +100,20 @@ fn a_soft_body_of_two_pieces_is_refused() {
 }
 
 #[test]
+fn a_soft_body_of_few_voxels_across_is_doubted() {
+    let tube = |material: &'static str| {
+        let shape = "softvt.shape.cylinder { radius = 0.03, height = 0.04 }\
+                     :subtract(softvt.shape.cylinder { radius = 0.02, height = 0.1 }):grounded()";
+        Small { shape, material, ..Small::default() }.project().succeeds("check x.lua").err
+    };
+    let coarse = tube("youngs_pa = 4e4, poisson = 0.3, density = 300, resolution = 8");
+    let expected = "asset cube: most of it is less than two voxels thick (10";
+    assert!(coarse.contains(expected) && coarse.contains("a voxel is 7.5 mm"), "{coarse}");
+    let fine = tube("youngs_pa = 4e4, poisson = 0.3, density = 300, resolution = 16");
+    assert!(!fine.contains("voxels"), "{fine}");
+}
+
+#[test]
 fn implausible_units_and_wide_objects_are_doubted() {
     let doubts = |small: Small| small.project().succeeds("check x.lua").err;
     let light =

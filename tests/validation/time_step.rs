@@ -1,6 +1,25 @@
-//! Equilibria at 60, 120 and 240 Hz.
+//! What depends on the time step: not the equilibria, but motion, which the step of implicit Euler damps like a larger β.
 
-use crate::support::{Body, Outcome, Squeeze, run};
+use softvt::{
+    geometry::{Pose, Vec3, samples::SampleSpec},
+    physics::{BodyId, PhysicsParams, World, contact::Friction, fem::ElasticMaterial},
+};
+
+use crate::{
+    bodies::{GRAVITY, fem_model},
+    support::{Body, Outcome, Scene, Squeeze, run},
+};
+
+/// Rates of the experiments in motion, Hz.
+pub const RATES: [f64; 3] = [60.0, 120.0, 240.0];
+
+/// β of the benchmark, s.
+pub const BETA: f64 = 5e-3;
+
+/// The β with which β + dt at a rate (Hz) is that of the benchmark at 60 Hz, s.
+pub fn compensated(rate: f64) -> f64 {
+    BETA + 1.0 / 60.0 - 1.0 / rate
+}
 
 /// The squeezes whose step is halved, with the change allowed.
 pub fn cases() -> [(&'static str, Squeeze, f64); 4] {
@@ -17,6 +36,64 @@ pub fn cases() -> [(&'static str, Squeeze, f64); 4] {
 /// The squeeze at 60, 120 and 240 Hz.
 pub fn refined(options: &Squeeze) -> [Outcome; 3] {
     [60.0, 120.0, 240.0].map(|rate| run(&Squeeze { dt: 1.0 / rate, ..*options }))
+}
+
+/// Peak of D over D at rest of a long soft body that is lifted by 0.1 m at once with 0.3 m/s.
+pub fn lifted(rate: f64, beta: f64) -> f64 {
+    let body = Body::Capsule { radius: 0.02, length: 0.16 };
+    let options = Squeeze {
+        body,
+        resolution: 12,
+        youngs_pa: 3e4,
+        poisson: 0.3,
+        density: 200.0,
+        beta,
+        dt: 1.0 / rate,
+        ..Squeeze::default()
+    }
+    .gap_mm(37.0);
+    let (mut scene, lift_s) = (Scene::new(&options), 0.1 / 0.3);
+    let (mut peak, mut last) = (0.0f64, 0.0);
+    for step in 1..=((options.lift_at() + lift_s + 1.5) * rate).round() as usize {
+        let since = step as f64 / rate - options.lift_at();
+        let hand = Pose::translation(0.0, 0.0, 0.3 * since.clamp(0.0, lift_s));
+        last = scene.step(&hand).expect("a step that converges").d_pct;
+        peak = peak.max(last);
+    }
+    peak / last
+}
+
+/// Speed of a soft ball after 3 s on a slope of `slope` rad, m/s. It starts at rest.
+pub fn rolled(rate: f64, beta: f64, slope: f64) -> f64 {
+    let (radius, material) = (0.025, ElasticMaterial { youngs_pa: 3e4, poisson: 0.4, density: 300.0 });
+    let body = Body::Sphere { radius };
+    let params = PhysicsParams {
+        dt: 1.0 / rate,
+        rayleigh_stiffness: beta,
+        sleeping: false,
+        ..PhysicsParams::default()
+    };
+    let mut world = World::new(params, GRAVITY * Vec3::new(slope.sin(), 0.0, -slope.cos()));
+    let friction = Friction::new(0.6, 0.5);
+    let model = fem_model(&body.shape(), material, 6, &SampleSpec::default());
+    world.add_soft("ball", model, None, &Pose::translation(0.0, 0.0, radius), friction);
+    let ground = softvt::geometry::shape::Shape::cuboid(Vec3::new(4.0, 1.0, 0.1));
+    world.add_shape("ground", BodyId::World, Pose::translation(0.0, 0.0, -0.05), &ground, friction);
+    let steps = (3.0 * rate).round() as usize;
+    let mut before = 0.0;
+    for step in 1..=steps {
+        world.step().expect("a step that converges");
+        // The mean over the last half second, since a ball of voxels rolls unevenly.
+        if step == steps - (0.5 * rate).round() as usize {
+            before = world.soft_bodies()[0].state.centre().x;
+        }
+    }
+    (world.soft_bodies()[0].state.centre().x - before) / 0.5
+}
+
+/// Speed of a rigid ball after the same time, m/s: 5/7 g sin(slope) t, at the middle of the last half second.
+pub fn rolled_rigid(slope: f64) -> f64 {
+    5.0 / 7.0 * GRAVITY * slope.sin() * 2.75
 }
 
 #[cfg(test)]
@@ -36,5 +113,21 @@ mod tests {
                 assert!(spread < bound, "{name}: {key} {value:?}");
             }
         }
+    }
+
+    #[test]
+    fn the_swing_of_a_lifted_body_depends_on_beta_plus_the_step_alone() {
+        let [slow, _, fast] = RATES.map(|rate| lifted(rate, compensated(rate)));
+        assert!((fast / slow - 1.0).abs() < 0.05, "{slow} at 60 Hz, {fast} at 240 Hz");
+        // With the same β a smaller step damps less.
+        let less = lifted(240.0, BETA);
+        assert!(less > 1.03 * slow, "{slow} at 60 Hz, {less} at 240 Hz");
+    }
+
+    #[test]
+    fn a_soft_ball_rolls_down_a_slope_slower_than_a_rigid_one() {
+        let slope = 3f64.to_radians();
+        let (soft, rigid) = (rolled(60.0, BETA, slope), rolled_rigid(slope));
+        assert!(soft > 0.0 && soft < rigid, "{soft} m/s, a rigid ball {rigid} m/s");
     }
 }
