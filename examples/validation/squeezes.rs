@@ -12,7 +12,7 @@ use crate::{
 pub fn statics(report: &mut Report) {
     heading(
         "Static squeeze",
-        "Ours is the end of the moving squeeze, the reference a static equilibrium. Where friction cannot hold, both are of \
+        "Ours is the end of the moving squeeze, the reference a static equilibrium. If friction cannot hold, both are of \
          sticking pads. *Capacity error*: of the hold force, over the force whose friction just carries the weight.",
     );
     header(&[

@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::error::CliError;
 use softvt_common::text;
 
-/// Prints to standard output with control characters escaped. A closed pipe (`| head -1`) is no error: the reader has
+/// Prints to standard output with control characters escaped. A closed pipe (`| head -1`) is accepted: the reader has
 /// what it wants.
 ///
 /// # Errors

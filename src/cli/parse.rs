@@ -158,7 +158,7 @@ fn flags_of(command: &clap::Command) -> Vec<GivenFlag> {
     flags
 }
 
-/// Those of `flags` that are given.
+/// The given ones of `flags`.
 fn given_flags(matches: &ArgMatches, flags: &[GivenFlag]) -> Vec<GivenFlag> {
     let is_known = |flag: &GivenFlag| matches.try_contains_id(&flag.id).is_ok();
     flags.iter().filter(|flag| is_known(flag) && is_given(matches, &flag.id)).cloned().collect()

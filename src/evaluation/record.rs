@@ -62,7 +62,7 @@ pub struct EpisodeHeader {
     pub asset: String,
     /// True if the target is a soft body.
     pub soft: bool,
-    /// What the variation of the suite changed in the scene, if it varies. The policy does not see it.
+    /// Changes of the scene by the variation of the suite, if it varies. The policy does not see them.
     #[serde(default)]
     pub variation: Option<Box<SceneVariation>>,
     /// Foreign demonstration that the episode re-executes, if any.

@@ -229,7 +229,7 @@ impl AssetThreshold {
         if (self.tau - round_to_six_decimals(self.kappa * self.d_ref)).abs() > 1.5e-6 {
             return range("tau", self.tau, "kappa times d_ref");
         }
-        // D_ref is the largest D of a stable squeeze, so without one there is none.
+        // D_ref is the largest D of a stable squeeze, so without one it does not exist.
         if self.n_stable_trials == 0 {
             return range("n_stable_trials", 0.0, "at least 1");
         }

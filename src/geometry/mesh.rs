@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::Vec3;
 
-/// A triangle mesh.
+/// A triangle mesh with vertices and triangles by index.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Mesh {
     /// Vertex positions, object frame, m.

@@ -90,7 +90,7 @@ fn with_materials(shape: &Shape, mut mesh: Mesh, normals: Vec<Vec3>) -> SurfaceM
 }
 
 /// Splits a quad into two triangles. Surface nets split along the shorter diagonal, which may bridge a sharp edge.
-/// Where the normals differ, the diagonal with its midpoint nearer to the surface is used.
+/// If the normals differ, the diagonal with its midpoint nearer to the surface is used.
 fn split(shape: &Shape, vertices: &[Vec3], normals: &[Vec3], quad: &[u32]) -> [[u32; 3]; 2] {
     let (first, second) = ([quad[0], quad[1], quad[2]], [quad[3], quad[4], quad[5]]);
     let at = |v: u32| &normals[v as usize];

@@ -67,7 +67,7 @@ pub struct VoxelMesh {
 /// A material point, by its element and local coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Embedding {
-    /// Element index.
+    /// Index of the element in the mesh.
     pub element: u32,
     /// Local coordinates in the element, nominally in `[0, 1]³`.
     pub local: Vec3,

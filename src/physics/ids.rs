@@ -47,14 +47,14 @@ typed_id! {
     KinematicId, Kinematic
 }
 typed_id! {
-    /// A collider.
+    /// Index of a collider in its world.
     ColliderId
 }
 
 /// A link of an articulation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct LinkId {
-    /// The articulation.
+    /// Articulation that has the link.
     pub articulation: ArticulationId,
     /// Index of the link in its tree, which is also that of the joint that carries it.
     pub index: usize,
@@ -66,9 +66,9 @@ pub struct LinkId {
 pub enum BodyId {
     /// The world: it never moves.
     World,
-    /// A kinematic frame.
+    /// A frame that is moved from outside.
     Kinematic(KinematicId),
-    /// A soft body.
+    /// A soft body, by its nodes.
     Soft(SoftId),
     /// A free rigid body, by its object frame.
     Rigid(RigidId),
@@ -107,7 +107,7 @@ impl From<LinkId> for BodyId {
 pub enum ContactPartner {
     /// A collider.
     Collider(ColliderId),
-    /// A soft body.
+    /// The surface of a soft body.
     Soft(SoftId),
 }
 

@@ -102,7 +102,7 @@ pub fn content(
     Some(ObservationEntry::Array(array))
 }
 
-/// The arrays of all steps along a first axis if the input has one, else the only array. `None` if there are none.
+/// The arrays of all steps along a first axis if the input has one, else the only array. `None` without an array.
 fn stacked(input: &ProfileInput, steps: impl Iterator<Item = NpyArray>) -> Option<NpyArray> {
     let mut all = steps.collect::<Vec<_>>();
     match input.frames {

@@ -51,7 +51,7 @@ pub struct ToolCommand {
 /// Motion of the tool in a [`ToolCommand`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ToolMotion {
-    /// An absolute pose.
+    /// A pose in the robot's base frame.
     Pose {
         /// Position in the base frame, m.
         position_b: Vec3,
@@ -231,9 +231,9 @@ pub enum PolicyError {
     /// The address of the server is invalid: an error in the user's input.
     #[error("--policy {url}: {problem}; expected ws://HOST:PORT")]
     Address {
-        /// The address.
+        /// Address as it was given.
         url: String,
-        /// The problem.
+        /// Reason why it is not valid.
         problem: String,
     },
     /// The response does not have the form that the profile defines. The text continues "the policy's reply".
@@ -285,7 +285,7 @@ impl PolicyError {
 /// }
 /// ```
 pub trait Policy: Send {
-    /// Name in results.
+    /// Name of the policy in results.
     fn name(&self) -> &str;
     /// Sensor streams of its observations. Other streams are not computed.
     fn streams(&self) -> SensorStreams {

@@ -117,7 +117,7 @@ pub fn map<K: Into<Value>>(entries: impl IntoIterator<Item = (K, Value)>) -> Val
     Value::Map(entries.into_iter().map(|(key, value)| (key.into(), value)).collect())
 }
 
-/// Encodes a value.
+/// Encodes a value as msgpack.
 pub fn pack(value: &Value) -> Vec<u8> {
     let mut bytes = Vec::new();
     // Writing to a vector does not fail.
@@ -186,7 +186,7 @@ fn count_values(mut bytes: &[u8]) -> Result<usize, MsgpackError> {
     Ok(counted)
 }
 
-/// What follows the first bytes of an encoded value: data of its own, and other values.
+/// Counts of the bytes and of the values that follow the first bytes of an encoded value.
 struct ValueHeader {
     data_bytes: usize,
     children: usize,

@@ -106,7 +106,7 @@ pub enum InputSource {
     },
     /// The last tactile image of one finger, uint8 (240, 320, 3).
     Tactile {
-        /// The finger.
+        /// Finger whose sensor is read.
         finger: Side,
         /// Style in which the markers are drawn into the image; `None` for an image without markers.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -192,14 +192,14 @@ pub struct ActionEncoding {
 /// Affine conversion `scale · number + offset` of the first six numbers of an action.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ActionUnits {
-    /// Factors.
+    /// Factors of the first six numbers.
     pub scale: [f64; 6],
     /// Offsets, m and rad.
     pub offset: [f64; 6],
 }
 
 impl ActionUnits {
-    /// No conversion.
+    /// SI units already: nothing is converted.
     pub const IDENTITY: Self = Self { scale: [1.0; 6], offset: [0.0; 6] };
 }
 
@@ -255,7 +255,7 @@ pub enum GripCode {
 }
 
 impl GripCode {
-    /// All codes.
+    /// All codes, in the order of the documentation.
     pub const ALL: [Self; 4] = [Self::Continuous, Self::Binary, Self::TwoWidth, Self::Force];
 
     /// Name in flags and files.
@@ -283,7 +283,7 @@ pub struct GripperValues {
     pub open: f64,
     /// Value of the closed gripper. For [`GripCode::Force`] values are forces, N.
     pub closed: f64,
-    /// What the value commands.
+    /// Meaning of the value.
     pub code: GripCode,
     /// For [`GripCode::Binary`]: hysteresis, instead of the middle between both values.
     pub latch: Option<GripLatch>,
@@ -378,7 +378,7 @@ impl GripperValues {
         }
     }
 
-    /// The same values in another code. `None` if there are none: a force says nothing about a closure.
+    /// The same values in another code. `None` if the codes have no values in common: a force says nothing about a closure.
     pub fn with_code(self, code: GripCode) -> Option<Self> {
         match (self.code, code) {
             (own, code) if own == code => Some(self),

@@ -23,7 +23,7 @@ pub const POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// Failure of an operation: that of the websocket, or the reason of the caller to wait no longer.
 #[derive(Debug)]
 pub enum TransportError<E> {
-    /// The connection failed.
+    /// Reading from or writing to the socket failed.
     Socket(Error),
     /// `on_wait` returned this error.
     Aborted(E),
@@ -61,7 +61,7 @@ impl PollingStream {
         self.stream.set_nonblocking(nonblocking)
     }
 
-    /// The stream.
+    /// The stream below the websocket.
     pub fn tcp(&self) -> &TcpStream {
         &self.stream
     }

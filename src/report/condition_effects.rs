@@ -116,7 +116,7 @@ fn signed(difference: &PairedDifference, digits: usize) -> String {
     difference.difference.map_or_else(|| "–".to_owned(), |value| format!("{value:+.digits$}{interval}"))
 }
 
-/// The table of all effects; `None` if there are none.
+/// The table of all effects; `None` without any.
 pub fn effects_table(effects: &[ConditionEffects]) -> Option<ResultTable> {
     let mut rows = Vec::new();
     for suite in effects {

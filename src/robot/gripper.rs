@@ -44,7 +44,7 @@ pub enum GripTarget {
     Force(f64),
 }
 
-/// What the drives of both fingers measured in the last step.
+/// Measurements of the drives of both fingers in the last step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FingerState {
     /// Distance between the gel apexes, m.

@@ -142,7 +142,7 @@ pub struct PadSpec {
     pub normal_modulus: f64,
     /// Shear stress per tangential displacement, Pa/m.
     pub tangential_modulus: f64,
-    /// Static friction coefficient.
+    /// Friction coefficient while the pad sticks.
     pub static_mu: f64,
     /// Dynamic friction coefficient, not above the static one.
     pub dynamic_mu: f64,
@@ -154,7 +154,7 @@ impl Default for PadSpec {
     }
 }
 
-/// Differential inverse kinematics.
+/// Differential inverse kinematics by damped least squares.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct IkSpec {

@@ -40,7 +40,7 @@ pub enum BuildError {
         /// The cause.
         source: JointTreeError,
     },
-    /// Two objects overlap.
+    /// Two objects overlap by more than contact allows.
     #[error(
         "objects {first} and {second}{} overlap by {} mm at the start; move them apart",
         placed(.second_at),

@@ -120,7 +120,7 @@ pub fn target_asset<'a>(scene: &'a Scene, task: &Task) -> Option<&'a Arc<Asset>>
     scene.objects.iter().find(|object| object.name == *name).map(|object| &object.asset)
 }
 
-/// A finished episode.
+/// Record and actions of a finished episode.
 #[derive(Debug)]
 pub struct FinishedEpisode {
     /// The record.
@@ -231,7 +231,7 @@ pub enum EpisodeError {
         /// The cause.
         source: SensingError,
     },
-    /// The controller failed.
+    /// The controller or its connection failed.
     #[error("task {task}, episode {episode}: {source}")]
     Control {
         /// Task index.

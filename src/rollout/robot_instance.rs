@@ -23,7 +23,7 @@ use softvt_robot::{
 /// by differential inverse kinematics.
 #[derive(Clone, Debug)]
 pub struct RobotInstance {
-    /// Parameters.
+    /// Parameters with which it was built.
     pub spec: RobotSpec,
     /// Articulation in the world.
     pub articulation: ArticulationId,
@@ -152,7 +152,7 @@ impl RobotInstance {
         gripper::width([q[ARM_DOFS], q[ARM_DOFS + 1]])
     }
 
-    /// What the robot measures of itself. `seed` is that of the errors of its width sensor.
+    /// Measurements of the robot's own sensors. `seed` is that of the errors of its width sensor.
     pub fn state(&self, world: &World, seed: SensorSeed) -> RobotState {
         let width = self.width(world);
         let articulation = world.articulation(self.articulation);

@@ -26,7 +26,7 @@ pub enum SensingError {
     /// An error about a camera that a script has set.
     #[error("{at}: {source}")]
     Set {
-        /// File and line.
+        /// File and line of the setting.
         at: String,
         /// The cause.
         source: Box<SensingError>,
@@ -44,7 +44,7 @@ pub enum SensingError {
     /// The scene has no camera of a name.
     #[error("there is no camera {name:?}; the scene has {have}")]
     NoCamera {
-        /// The requested name.
+        /// Name that no camera has.
         name: String,
         /// Names of the scene's cameras.
         have: String,

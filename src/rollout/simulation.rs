@@ -83,7 +83,7 @@ pub enum SettleError {
          it rests on, or make it lie stably"
     )]
     Moving {
-        /// The fastest object.
+        /// Object that moves fastest.
         object: String,
         /// Its speed, mm/s.
         speed_mm: f64,
@@ -96,7 +96,7 @@ pub enum SettleError {
          {fallen:.1} m lower; place it above a support"
     )]
     Fell {
-        /// The object.
+        /// Object that fell out of the scene.
         object: String,
         /// Distance that it has fallen, m.
         fallen: f64,
@@ -109,7 +109,7 @@ pub enum SettleError {
     /// A physics step failed.
     #[error("settling failed: {failure}")]
     Failed {
-        /// The failure.
+        /// Failure of the physics step.
         failure: StepFailure,
         /// `file:line` where the failing object was placed; empty if unknown.
         placed_at: String,

@@ -21,7 +21,7 @@ pub struct StepTrace {
     pub joints: [f64; 7],
     /// Measured gripper width, m.
     pub gripper_width_m: f64,
-    /// Commanded closure.
+    /// Commanded closure, 0 open to 1 closed.
     pub closure: f64,
     /// Normal force of the left and right pad on the target, N.
     pub pad_force_n: [f64; 2],
@@ -35,14 +35,14 @@ pub struct StepTrace {
     pub energy_j: [f64; 3],
     /// Newton iterations of the last physics step.
     pub newton: u32,
-    /// All movable objects.
+    /// All movable objects, in the order of the scene.
     pub objects: Vec<ObjectTrace>,
 }
 
 /// State of an object after a control step.
 #[derive(Clone, Debug, Serialize)]
 pub struct ObjectTrace {
-    /// Scene name.
+    /// Name of the object in the scene.
     pub name: String,
     /// Position of its frame, m, world.
     pub position_w: [f64; 3],

@@ -83,7 +83,7 @@ pub struct CameraVariation {
     pub rotation_rad: [f64; 3],
 }
 
-/// What a variation changed in a scene.
+/// Changes of a scene by a variation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SceneVariation {
     /// By name in the scene.

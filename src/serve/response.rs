@@ -24,12 +24,12 @@ const PROTOCOL: u32 = 1;
 /// Field of a record that depends on how often the client requested images, not on its actions.
 const OBSERVATION_DEPENDENT: &str = "camera_inside";
 
-/// What a step did.
+/// Result of a step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Executed {
     /// Number of actions that were executed.
     pub count: usize,
-    /// Whether the episode, which is over, was recorded; `None` before its end, and if the server records nothing.
+    /// True if the finished episode was recorded; `None` before its end, and if the server records nothing.
     pub recorded: Option<bool>,
 }
 

@@ -165,6 +165,6 @@ fn pad_forces_are_the_normal_forces_at_all_contacts_of_a_pad() {
     // Without friction the force on the gel is the vector sum of the normal forces, here of nearly one direction.
     let resultant = gel.iter().map(|component| component * component).sum::<f64>().sqrt();
     assert!(resultant <= force && force < 1.02 * resultant, "{row}");
-    // That direction is oblique: the component along the pad's axis is much smaller.
+    // The direction is oblique: the component along the pad's axis is much smaller.
     assert!(force > 1.5 * -gel[2], "{row}");
 }

@@ -87,7 +87,7 @@ fn objects_are_supported_by_what_they_rest_on() {
         let goals: Vec<&Value> = episodes.iter().map(|e| &e["goal"]).collect();
         assert_eq!(goals, [true, false], "{upper} on {lower}: {episodes:#?}");
         assert!(episodes.iter().all(|e| e["no_drop"] == true), "{upper} on {lower}: {episodes:#?}");
-        // What the target does to a soft support is recorded, whether or not that is the goal.
+        // Harm of the target to a soft support is recorded, also if the support is not the goal.
         for e in &episodes {
             assert_eq!(e["d_peak_other"].is_number(), lower == "soft", "{upper} on {lower}: {e:#}");
             assert_eq!(

@@ -46,7 +46,7 @@ fn step(client: &mut Client, actions: &[[f64; 7]]) -> Value {
     get(&answer, "info").clone()
 }
 
-/// Whether the episode that these actions end was recorded.
+/// True if the episode that these actions end was recorded.
 fn is_recorded(client: &mut Client, actions: &[[f64; 7]]) -> bool {
     get(&step(client, actions), "recorded").as_bool().expect("the episode is over")
 }

@@ -1,4 +1,4 @@
-//! Standard soft objects in a shut hand: crushed, but upright and at rest.
+//! Standard soft objects in a fully closed hand: flattened, but upright and at rest.
 
 use crate::support::Project;
 

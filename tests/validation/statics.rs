@@ -12,7 +12,7 @@ pub struct Compared {
 }
 
 impl Compared {
-    /// Runs the squeeze of a row. Where friction cannot hold, the row's hold columns are those of sticking pads, so the
+    /// Runs the squeeze of a row. If friction cannot hold, the row's hold columns are those of sticking pads, so the
     /// pads stick.
     pub fn new(row: Row) -> Self {
         let mut options = row.squeeze();

@@ -41,7 +41,7 @@ class Answering:
         self.graph: Graph | None = None
 
     def __call__(self, batch: list[Request]) -> list[np.ndarray | UserError]:
-        """A chunk (chunk, 7) per request, or the reason why there is none; at most BATCH requests."""
+        """A chunk (chunk, 7) per request, or the reason why one is missing; at most BATCH requests."""
         inputs: list[dict | UserError] = []
         for request in batch:
             try:

@@ -36,7 +36,7 @@ class Policy:
 
 
 def collect(study: Path, into: Path) -> None:
-    """Copies the summaries and outcomes of the finished runs of a study. Raises UserError if there are none."""
+    """Copies the summaries and outcomes of the finished runs of a study. Raises UserError without any."""
     found = sorted(study.glob("runs/**/summary.json"))
     if not found:
         raise UserError(f"{study}: no finished runs; softvt-baselines study makes them")

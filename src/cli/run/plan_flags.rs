@@ -132,7 +132,7 @@ static DECISIONS: &[Decision] = &[
     },
 ];
 
-/// The kinds of plan on which a flag of a command acts. `None` if nobody has decided it.
+/// The kinds of plan on which a flag of a command acts. `None` if that is undecided.
 fn acts_on(command: &str, flag: &str) -> Option<&'static [PlanKind]> {
     let decision = DECISIONS
         .iter()

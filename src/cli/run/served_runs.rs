@@ -54,7 +54,7 @@ impl<'a> ServedRuns<'a> {
         Ok(opened)
     }
 
-    /// What the server calls to record episodes.
+    /// Interface of the server to the recorded runs.
     pub(crate) fn recorder(&self) -> EpisodeRecorder<'_> {
         EpisodeRecorder {
             selects: Box::new(|id| self.find(&id.suite).is_some_and(|run| run.selects(id))),

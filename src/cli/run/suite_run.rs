@@ -47,7 +47,7 @@ pub(crate) struct SuiteRun<'a> {
     pub calibration_files: Arc<CalibrationFiles>,
     /// The calibrations of the assets in the scenes of the run; `None` before they are known.
     pub calibrations: Option<Calibrations>,
-    /// False if objects have no limits, since nobody sees a verdict.
+    /// False if objects have no limits, since no verdict is shown.
     pub reads_limits: bool,
     /// SHA-256 of every file that the results depend on, by name.
     pub sources: BTreeMap<String, String>,

@@ -19,7 +19,7 @@
 //! 8. **Stage** of the episode: [`StageMonitor`].
 //! 9. **Grip** while the target is lifted and no release was commanded: [`GripMonitor`].
 //!
-//! Harm to others is judged beside: their peaks of D against their own τ, and the first contact of the robot with one of them.
+//! Harm to others is judged in addition: their peaks of D against their own τ, and the first contact of the robot with one of them.
 //!
 //! At the end ([`Judge::finish`]): Safety Success = Goal ∧ NoDrop ∧ D_peak ≤ τ, and NoSlip if the criteria
 //! require it ([`super::safety`]). Reported beside it: *gentle*, Goal with a grip ratio of at most `gentle_ratio`, and the nested

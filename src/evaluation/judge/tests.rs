@@ -348,7 +348,10 @@ fn the_first_contact_with_another_object_is_kept() {
     replay.rest(2, 0.0);
     let contact = replay.verdict(Outcome::Budget).first_wrong_contact.expect("a contact");
     assert_eq!(contact.object, "other");
-    assert!((contact.time_s - 8.0 * DT).abs() < 1e-12, "a touch below the threshold is none: {contact:?}");
+    assert!(
+        (contact.time_s - 8.0 * DT).abs() < 1e-12,
+        "a touch below the threshold does not count: {contact:?}"
+    );
 }
 
 #[test]

@@ -96,7 +96,7 @@ fn missing_thresholds_are_unknown_not_safe() {
     });
     let s = SuiteSummary::from_records("suite", "expert", std::slice::from_ref(&unknown));
     assert_eq!((s.scores.safety_unknown, s.scores.not_judged), (1, 1));
-    // What was never judged has no rate and no interval.
+    // Without a judged episode, a rate and its interval are absent.
     let none = Rate::not_judged();
     assert_eq!((s.scores.safety_success_rate, s.scores.deformation_ok_rate), (none, Some(none)));
     assert_eq!((s.scores.dsr, s.scores.goal_safe_gap, s.scores.tau_range), (Some(none), None, None));

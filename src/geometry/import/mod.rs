@@ -18,7 +18,7 @@ pub struct ImportOptions {
     pub z_up: bool,
 }
 
-/// Supported file formats.
+/// Formats of mesh files that are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MeshFormat {
     /// Wavefront OBJ, `.obj`.

@@ -31,7 +31,6 @@ impl SignedDistance {
         Self::new(value / length.max(0.2), gradient / length)
     }
 
-    /// The complement.
     pub(super) fn inverted(self) -> Self {
         Self::new(-self.distance, -self.normal)
     }

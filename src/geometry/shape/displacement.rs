@@ -8,9 +8,9 @@ use crate::{Vec3, hex8};
 /// A height field over a surface; positive heights raise it outwards.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Displacement {
-    /// Regular ridges.
+    /// Ridges at a regular pitch.
     Ridges(Ridges),
-    /// Scattered bumps.
+    /// Bumps on a jittered lattice.
     Bumps(Bumps),
 }
 

@@ -68,28 +68,28 @@ pub enum Shape {
     Mesh(Arc<MeshSolid>),
     /// A rigidly transformed shape.
     Placed {
-        /// The inner shape.
+        /// Shape in its own frame.
         shape: Arc<Shape>,
         /// Frame of the inner shape in this frame.
         pose: Pose,
     },
     /// A shape scaled along the axes.
     Scaled {
-        /// The inner shape.
+        /// Shape before it is scaled.
         shape: Arc<Shape>,
         /// Factors along x, y, z; all positive.
         scale: Vec3,
     },
     /// A shape offset outwards, which rounds its convex edges.
     Rounded {
-        /// The inner shape.
+        /// Shape whose surface is offset.
         shape: Arc<Shape>,
         /// Offset, m.
         radius: f64,
     },
     /// A hollow shape: all points up to `thickness` below the surface.
     Shell {
-        /// The outer shape.
+        /// Shape whose surface is the outer side.
         shape: Arc<Shape>,
         /// Thickness of the wall, m.
         thickness: f64,
@@ -100,9 +100,9 @@ pub enum Shape {
     Intersect(Vec<Shape>),
     /// All points in `from` but not in `cut`.
     Subtract {
-        /// Minuend.
+        /// Shape that keeps what is outside of `cut`.
         from: Arc<Shape>,
-        /// Subtrahend.
+        /// Shape that is cut out of `from`.
         cut: Arc<Shape>,
     },
     /// A union with filleted seams (quadratic polynomial blend).
@@ -114,16 +114,16 @@ pub enum Shape {
     },
     /// A difference with rounded edges.
     SmoothSubtract {
-        /// Minuend.
+        /// Shape that keeps what is outside of `cut`.
         from: Arc<Shape>,
-        /// Subtrahend.
+        /// Shape that is cut out of `from`.
         cut: Arc<Shape>,
         /// Width of the blend, m.
         blend: f64,
     },
     /// A shape twisted about an axis through the origin.
     Twist {
-        /// The straight shape.
+        /// Shape before it is twisted.
         shape: Arc<Shape>,
         /// Axis of the twist.
         axis: Axis,
@@ -132,7 +132,7 @@ pub enum Shape {
     },
     /// A shape whose axis is bent into an arc; the origin is fixed.
     Bend {
-        /// The straight shape.
+        /// Shape before it is bent.
         shape: Arc<Shape>,
         /// The axis that becomes an arc.
         along: Axis,
@@ -143,16 +143,16 @@ pub enum Shape {
     },
     /// A shape with a displaced surface.
     Displace {
-        /// The smooth shape.
+        /// Shape without the height fields.
         shape: Arc<Shape>,
         /// Height fields; their heights add up.
         reliefs: Vec<Displacement>,
     },
     /// A shape with another material, everywhere or in a region.
     Paint {
-        /// The shape.
+        /// Shape whose surface gets the material.
         shape: Arc<Shape>,
-        /// Material id.
+        /// Id of the visual material.
         material: u16,
         /// Region with the material; `None` for everywhere.
         region: Option<Arc<Shape>>,
@@ -314,7 +314,6 @@ pub struct TreeSize {
 const EVALUATIONS: f64 = 3.0;
 
 impl Shape {
-    /// The direct children.
     pub(super) fn children(&self) -> Vec<&Self> {
         match self {
             Self::Placed { shape, .. }

@@ -3,7 +3,7 @@
 
 use crate::{Mat3, Vec3};
 
-/// A coordinate axis.
+/// A coordinate axis of a shape's frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
     /// The x axis.

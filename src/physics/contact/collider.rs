@@ -44,9 +44,9 @@ impl ContactSurface for Shape {
 /// Coulomb friction coefficients of a surface. A pair of surfaces takes the larger of each, unless one is coated.
 #[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Friction {
-    /// Static coefficient.
+    /// Coefficient of a surface that sticks.
     pub static_mu: f64,
-    /// Dynamic coefficient, not above the static one.
+    /// Coefficient of a surface that slides, not above the static one.
     pub dynamic_mu: f64,
     /// True for a layer on the surface, such as flour, oil or glaze: it separates the surfaces, so that its coefficients are
     /// those of any pair.

@@ -18,7 +18,7 @@ use softvt_geometry::{
 /// Geometry of a collider for contact with other colliders, in the collider's frame.
 #[derive(Debug)]
 pub enum CollisionGeometry {
-    /// A rigid shape.
+    /// A rigid shape with its features.
     Rigid(Box<RigidShape>),
     /// A compliant skin: it meets rigid shapes at its samples, and no other skin.
     Gel(Vec<GelSample>),
@@ -40,7 +40,7 @@ pub struct RigidShape {
 pub struct GelSample {
     /// Position, m.
     pub p: Vec3,
-    /// Outward unit normal.
+    /// Unit normal, out of the body.
     pub normal: Vec3,
     /// Area that it represents, m².
     pub area: f64,

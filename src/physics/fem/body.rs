@@ -38,7 +38,7 @@ const MIN_CHECKED_FILL: f64 = 0.2;
 pub struct SampleGroup {
     /// The nodes, of which the first `count` are used.
     pub nodes: [u32; 8],
-    /// Number of nodes.
+    /// How many entries of `nodes` are used.
     pub count: usize,
     /// First sample of the group.
     pub first: usize,
@@ -62,13 +62,13 @@ pub struct ContactSample {
 pub struct FemModel {
     /// The undeformed voxel mesh, object frame.
     pub mesh: VoxelMesh,
-    /// The material.
+    /// Elastic constants and density of all elements.
     pub material: ElasticMaterial,
     /// Lumped node masses, kg; they sum to density × volume.
     pub mass: Vec<f64>,
     /// Contact samples, ordered by group.
     pub samples: Vec<ContactSample>,
-    /// Groups of samples.
+    /// Consecutive samples on the same nodes.
     pub groups: Vec<SampleGroup>,
     /// Square root of the mean sample area, m: the typical spacing.
     pub spacing: f64,
@@ -227,7 +227,7 @@ fn group_samples(mesh: &VoxelMesh, samples: Vec<SurfaceSample>) -> (Vec<ContactS
 pub struct MinDetF {
     /// Determinant of the deformation gradient; 1 at rest, ≤ 0 for an inverted element.
     pub det_f: f64,
-    /// The element.
+    /// Index of the element with this determinant.
     pub element: usize,
 }
 
@@ -236,7 +236,7 @@ pub struct MinDetF {
 /// After changing `x`, call [`FemState::update_elastic`].
 #[derive(Clone, Debug)]
 pub struct FemState {
-    /// The model.
+    /// Mesh, masses and stiffness, shared by equal bodies.
     pub model: Arc<FemModel>,
     /// Node positions, m, world.
     pub x: Vec<Vec3>,

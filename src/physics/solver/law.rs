@@ -116,7 +116,6 @@ pub(super) enum LinearSegment {
 }
 
 impl ScalarConstraint {
-    /// Force without limits.
     fn unlimited(&self, dt: f64, v: f64) -> f64 {
         self.stiffness * self.error + self.damping * self.target_velocity
             - (self.stiffness * dt + self.damping) * v

@@ -106,7 +106,6 @@ impl NewtonProgress {
 struct PassResidual {
     /// Sum of the absolute changes against the previous pass.
     change: f64,
-    /// Sum.
     total: f64,
 }
 

@@ -9,7 +9,7 @@ use softvt_geometry::Vec3;
 /// not check this, but fails to converge otherwise.
 #[derive(Clone, Debug, Default)]
 pub struct VelocityBlock {
-    /// Number of velocities.
+    /// Number of velocities of the block.
     pub dim: usize,
     /// `A`, `dim × dim`, column-major. Only the lower triangle is read.
     pub matrix: Vec<f64>,
@@ -27,7 +27,7 @@ pub struct VelocityBlock {
 /// Jacobian of a rigid frame: its motion as a linear function of the velocities of one block.
 #[derive(Clone, Debug)]
 pub struct FrameJacobian {
-    /// The block.
+    /// Index of the block that moves the frame.
     pub block: usize,
     /// `6 × dim`, column-major: linear velocity of the frame's origin, then angular velocity, world.
     pub jacobian: Vec<f64>,
@@ -42,7 +42,7 @@ pub enum Endpoint {
     Known,
     /// A weighted mean of up to eight nodes of a block, with the weights in the points.
     Nodes {
-        /// The block.
+        /// Index of the soft body's block.
         block: usize,
         /// Index of the first of three velocities of each node.
         at: [u32; 8],
@@ -60,7 +60,7 @@ pub struct ContactCluster {
     pub a: Endpoint,
     /// The side that the normals point away from.
     pub b: Endpoint,
-    /// First point.
+    /// Index of the first of its points.
     pub first: usize,
     /// One past the last point.
     pub last: usize,
@@ -105,7 +105,7 @@ pub struct ContactPoint {
 /// A spring–damper with a force limit on one velocity of one block: a joint drive, a stop, a speed limit, dry friction.
 #[derive(Clone, Copy, Debug)]
 pub struct ScalarConstraint {
-    /// The block.
+    /// Index of the block with the velocity.
     pub block: usize,
     /// Index of the velocity in the block.
     pub index: usize,
@@ -132,11 +132,11 @@ pub struct ContactProblem {
     pub dt: f64,
     /// Dissipation time of the contact springs, s.
     pub dissipation_time: f64,
-    /// Velocity blocks.
+    /// Blocks without coupling, other than by contacts.
     pub blocks: Vec<VelocityBlock>,
     /// Jacobians of the rigid frames that endpoints refer to.
     pub frames: Vec<FrameJacobian>,
-    /// Contact clusters.
+    /// Groups of points between the same two endpoints.
     pub clusters: Vec<ContactCluster>,
     /// Points of all clusters.
     pub points: Vec<ContactPoint>,

@@ -159,9 +159,7 @@ fn build_fronts(structure: &[Vec<u32>], inner: usize, total: usize) -> Vec<Front
 
 /// Adjacent columns that are eliminated in one front (a relaxed supernode).
 struct Group {
-    /// First position.
     first: usize,
-    /// Number of positions.
     pivots: usize,
     /// Rows below them, ascending.
     below: Vec<u32>,

@@ -97,7 +97,7 @@ pub enum StepFailure {
     Diverged {
         /// Step, counted from 1.
         step: u64,
-        /// Residual over tolerance.
+        /// Residual of the last iteration over the tolerance.
         residual_ratio: f64,
     },
     /// A node position is NaN or infinite.
@@ -264,7 +264,7 @@ impl World {
         &self.colliders
     }
 
-    /// A soft body.
+    /// The soft body with this id.
     pub fn soft(&self, id: SoftId) -> &SoftBody {
         &self.soft[id.index()]
     }
@@ -286,7 +286,7 @@ impl World {
         &mut self.rigid[id.index()]
     }
 
-    /// An articulation.
+    /// The articulation with this id.
     pub fn articulation(&self, id: ArticulationId) -> &Articulation {
         &self.articulations[id.index()]
     }
@@ -301,12 +301,12 @@ impl World {
         &self.articulation(id.articulation).poses[id.index]
     }
 
-    /// A kinematic frame.
+    /// The kinematic frame with this id.
     pub fn kinematic(&self, id: KinematicId) -> &KinematicFrame {
         &self.kinematic[id.index()]
     }
 
-    /// A collider.
+    /// The collider with this id.
     pub fn collider(&self, id: ColliderId) -> &Collider {
         &self.colliders[id.index()]
     }

@@ -47,7 +47,7 @@ impl WorldSnapshot {
 /// All contacts of one collider, in the collider's frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContactPatch {
-    /// The collider.
+    /// Collider to which the points belong.
     pub collider: ColliderId,
     /// Its points with a normal impulse.
     pub points: Vec<PatchPoint>,
@@ -65,7 +65,7 @@ pub struct SampleFace {
 /// One point of a contact patch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PatchPoint {
-    /// The other side.
+    /// The surface that the collider touches.
     pub partner: ContactPartner,
     /// The sample of the other side, if that is a soft body.
     pub face: Option<SampleFace>,
@@ -90,7 +90,7 @@ pub struct PatchPoint {
 /// Energies of a world, J.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Energy {
-    /// Kinetic.
+    /// Kinetic energy of all bodies, J.
     pub kinetic: f64,
     /// Elastic, of soft bodies.
     pub elastic: f64,
@@ -99,7 +99,7 @@ pub struct Energy {
 }
 
 impl Energy {
-    /// The sum.
+    /// Sum of the three, J.
     pub fn total(&self) -> f64 {
         self.kinetic + self.elastic + self.potential
     }

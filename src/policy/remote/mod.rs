@@ -28,7 +28,7 @@ pub struct PolicyConnections {
 }
 
 impl PolicyConnections {
-    /// An empty pool.
+    /// A pool without connections, which are opened on demand.
     pub fn new(server: PolicyServer) -> Self {
         Self { server, idle: Mutex::new(Vec::new()) }
     }

@@ -18,7 +18,6 @@ use crate::{
 
 const VERSION: u64 = 1;
 
-/// Exchanges greetings.
 pub(super) fn greet(connection: &mut PolicyConnection, deadline: Instant) -> Result<(), PolicyError> {
     let version = concat!("softvt ", env!("CARGO_PKG_VERSION"));
     let hello = map([
@@ -41,7 +40,6 @@ pub(super) fn greet(connection: &mut PolicyConnection, deadline: Instant) -> Res
     }
 }
 
-/// Starts an episode.
 pub(super) fn start(
     connection: &mut PolicyConnection,
     brief: &TaskBrief,
@@ -59,12 +57,10 @@ pub(super) fn start(
     send(connection, "episode_start", map([("task", map(task))]), deadline)
 }
 
-/// Ends an episode.
 pub(super) fn end(connection: &mut PolicyConnection, deadline: Instant) -> Result<(), PolicyError> {
     send(connection, "episode_end", Value::Map(Vec::new()), deadline)
 }
 
-/// Requests a chunk.
 pub(super) fn infer(
     connection: &mut PolicyConnection,
     observation: &Observation,

@@ -318,7 +318,7 @@ pub fn bootstrap_table(runs: &[RunSummary]) -> Option<ResultTable> {
     let known = runs.iter().filter(|run| run.summary.scores.tsr.bootstrap95.is_some());
     let rows: Vec<Vec<String>> = known.map(row).collect();
     (!rows.is_empty()).then(|| ResultTable {
-        caption: "95 % intervals by the bootstrap within tasks, %: beside the Wilson intervals, which take all episodes as independent.".to_owned(),
+        caption: "95 % intervals by the bootstrap within tasks, %: in addition to the Wilson intervals, which take all episodes as independent.".to_owned(),
         head: strings(["Suite", "Method", "TSR", "NoDrop", "Safety Success", "DSR", "D mean"]),
         rows,
     })

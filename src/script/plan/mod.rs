@@ -32,7 +32,7 @@ use softvt_benchmark::{
 };
 use softvt_common::{parallel::lock, text::unknown_name};
 
-/// What the main file of a script is.
+/// Kind of the main file of a script.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ScriptKind {
     /// A plan or a profile.

@@ -40,7 +40,7 @@ pub struct EpisodeSetup {
     pub scene: Scene,
     /// Initial scene before the shifts; deformation limits are those of its objects.
     pub nominal: Scene,
-    /// What the variation of the suite changed in the scene of the layout, if the suite varies.
+    /// Changes of the layout's scene by the variation of the suite, if it varies.
     pub variation: Option<SceneVariation>,
     /// Instruction to the policy, which a shift may have changed.
     pub prompt: String,

@@ -43,7 +43,7 @@ pub(crate) fn triangle_index(id: u32) -> usize {
 pub(crate) const ROWS_PER_PIXEL: usize = 5;
 /// Index of the centre's row.
 pub(crate) const CENTRE_ROW: usize = 2;
-/// Position of each row's sample within the pixel. No two share a row or column, so edges of
+/// Position of each row's sample within the pixel. Each has a row and a column of its own, so edges of
 /// every slope are antialiased.
 pub(crate) const SAMPLE_OFFSETS: [[f32; 2]; ROWS_PER_PIXEL] =
     [[0.375, 0.125], [0.875, 0.375], [0.5, 0.5], [0.125, 0.625], [0.625, 0.875]];

@@ -46,7 +46,7 @@ pub(in super::super) struct Rim {
 pub(in super::super) struct SurfaceFeatures {
     /// Points on sharp convex corners and edges.
     pub corners: Vec<Vec3>,
-    /// Convex circles.
+    /// Circular edges of convex solids.
     pub rims: Vec<Rim>,
     /// Samples of flat and nearly flat regions, and of finely rounded edges.
     pub flat_samples: Vec<FlatSample>,

@@ -82,7 +82,6 @@ struct FeatureOverlap {
     height_b: f64,
     /// Area, m².
     area: f64,
-    /// Identifier.
     feature: u32,
 }
 

@@ -12,7 +12,6 @@ const PREFER_FACES_M: f64 = 1e-6;
 /// The same for edge against edge, relative to the gap: nearly parallel edges repeat the direction of a face.
 const PREFER_FACES_SHARE: f64 = 0.01;
 
-/// A contact normal.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ContactNormal {
     /// Unit, from the first primitive to the second, world.

@@ -193,7 +193,6 @@ impl RenderMesh {
 pub(crate) struct RenderSolid {
     /// Volume occupied by the solid.
     pub(crate) shape: Shape,
-    /// Its surface.
     pub(crate) mesh: Mesh,
     /// Edge of the cells of the surface mesher, m; 0 for an explicit mesh.
     cell_m: f64,

@@ -39,7 +39,7 @@ pub(crate) struct BackgroundTile {
     n: TileChannels,
     /// Share of the pixel that this surface has; emptied by [`finish`](Self::finish).
     max_share: Vec<f32>,
-    /// Bounds of these surfaces in the world and in the frame of the moving shadows, inverted if there are none.
+    /// Bounds of these surfaces in the world and in the frame of the moving shadows, inverted without any.
     bounds: [Bounds; 2],
     pub(crate) samples: TileSamples,
 }

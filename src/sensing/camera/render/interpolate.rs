@@ -64,7 +64,7 @@ impl<'a> TriangleInterpolator<'a> {
         }
     }
 
-    /// Surface points at eight pixels in a row, all of which this triangle covers; (x, y) is the centre of the first.
+    /// Surface points at eight neighbouring pixels, all of which this triangle covers; (x, y) is the centre of the first.
     pub(crate) fn row(&self, lens: &Lens, x: f32, y: f32) -> SurfaceSamples {
         let (first, right) = (lens.ray(x, y), lens.right.cast());
         let weights = self

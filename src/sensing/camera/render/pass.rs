@@ -25,7 +25,7 @@ const BOUNDS_MARGIN: f32 = 1.1;
 /// Lowest and highest corner of a bounding box.
 pub(crate) type Bounds = [V3; 2];
 
-/// Bounds of points; inverted if there are none.
+/// Bounds of points; inverted without any.
 pub(crate) fn bounds_of(points: impl IntoIterator<Item = V3>) -> Bounds {
     points.into_iter().fold([V3::repeat(f32::MAX), V3::repeat(f32::MIN)], |b, p| [b[0].inf(&p), b[1].sup(&p)])
 }

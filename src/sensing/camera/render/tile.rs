@@ -171,7 +171,6 @@ pub(crate) struct TileResolver<'a, 'p, S> {
     pass: &'p RenderPass<'a>,
     rect: TileRect,
     samples: &'p TileSamples,
-    /// Receives the colours.
     sink: &'p mut S,
     /// Receives depth and segmentation.
     image: &'p mut RenderedImage,
