@@ -99,8 +99,13 @@ mod tests {
     #[test]
     fn a_regrasp_starts_at_zero_and_the_largest_slip_stays() {
         let held = |mm| (mm, HELD, false);
-        let steps =
-            [held([0.0, 0.0]), held([1.5, 0.0]), ([5.0, 5.0], false, true), held([7.0, 7.0]), held([7.5, 7.0])];
+        let steps = [
+            held([0.0, 0.0]),
+            held([1.5, 0.0]),
+            ([5.0, 5.0], false, true),
+            held([7.0, 7.0]),
+            held([7.5, 7.0]),
+        ];
         assert!((slip_mm(&steps) - 1.5).abs() < 1e-9);
     }
 

@@ -236,7 +236,8 @@ impl Judge {
         let is_lifted = self.observe_lift(evidence);
         let both_pads_touch = touch[0] && touch[1];
         let is_released = self.release.update(&self.config.criteria, &evidence.gripper, both_pads_touch);
-        let is_opening = self.opening.update(evidence.gripper.commanded_width_m, self.config.steps_per_control);
+        let is_opening =
+            self.opening.update(evidence.gripper.commanded_width_m, self.config.steps_per_control);
         self.slip.update(&evidence.pads, both_pads_touch && !is_released, is_opening);
         let is_carried = is_lifted && !is_released;
         let grip = GripSample { is_carried, is_held: both_pads_touch, grip: evidence.grip };

@@ -176,7 +176,7 @@ fn a_gentle_grip_reaches_the_goal_with_at_most_twice_the_least_force() {
             e.gripper = GripperEvidence { width_m: 0.05, commanded_width_m: 0.045 };
         });
         replay.rest(if goal { 30 } else { 3 }, 0.0);
-        replay.verdict(if goal { Outcome::Completed } else { Outcome::Timeout }).gentle
+        replay.verdict(if goal { Outcome::Completed } else { Outcome::Budget }).gentle
     };
     assert_eq!(
         [gentle(0.2499, true), gentle(0.2501, true), gentle(0.2, false)],
