@@ -59,6 +59,15 @@
 ---@field light number[] Factors on the strength of lamp and sky, log-uniform. Expects a list of 2 numbers in 0.1..10.
 ---@field camera_offset number Largest displacement along each axis of the cameras that are fixed to the world. Expects metres in 0..1.
 ---@field camera_rotation number Largest rotation of these cameras about each of their axes. Expects radians in 0..1.
+---@field hidden? softvt.Hidden Properties of the soft objects that do not show.
+
+---Ranges of properties that do not show, drawn log-uniform for each soft object. Size, colour and looks do not depend on them. An instance is drawn again until the ratio of its largest to its smallest safe grip force is within window_ratio; objects need a calibration for that. Policies never see these numbers; records have them.
+---@class softvt.Hidden
+---@field aeration number[] Relative density of the foam: a factor on the density, and by its square on Young's modulus. Expects a list of 2 numbers in 0.1..10.
+---@field staling number[] Age: a factor on Young's modulus; the collapse and damage strains shrink by its power 0.7, and τ of the instance with them. Expects a list of 2 numbers in 0.1..10.
+---@field filling number[] Factor on the mass. Expects a list of 2 numbers in 0.1..10.
+---@field coating number[] Static friction of a coating (flour, oil, glaze), which acts between the object and everything that it touches. Expects a list of 2 numbers in above 0..10.
+---@field window_ratio number[] Largest over smallest safe grip force of the instances that are kept, at least 1. Expects a list of 2 numbers in 1..1000.
 
 ---Runs suites as they are, then under each condition, and compares them episode by episode.
 ---@class softvt.Conditions
@@ -160,10 +169,11 @@
 ---Scenery: it is drawn and casts shadows, but has no contact.
 ---@class softvt.Scenery
 
----Coulomb friction of a surface. A pair of surfaces has the larger of each coefficient.
+---Coulomb friction of a surface. A pair of surfaces has the larger of each coefficient, unless one is coated.
 ---@class softvt.Friction
 ---@field static_mu? number Static coefficient. Expects a number in 0..10. Default 0.6.
 ---@field dynamic_mu? number Dynamic coefficient, at most the static one. Expects a number in 0..10. Default 0.5.
+---@field coated? boolean True for a layer on the surface (flour, oil, glaze), whose coefficients are those of any pair. Default false.
 
 ---A policy, as the file given to --policy returns it. Every episode has a virtual machine of its own, in which the file runs again; math.random is seeded by the episode.
 ---@class softvt.Policy
@@ -172,7 +182,8 @@
 ---@field reset? fun(task: softvt.TaskBrief) Called when the episode begins.
 ---@field act fun(obs: softvt.Observation): softvt.Action|softvt.Action[] Returns the action of this control step, or a list of actions for the next ones.
 ---@field replan? integer Number of actions of a list that are executed before act is called again, unless --replan gives another; all by default. Expects a whole number in 1..10000.
----@field privileged? boolean True to let the policy use limits and materials of objects: softvt.calibration, assets, and the modules calibrated and experts. Its results say that it is privileged. Default false.
+---@field gripper? "continuous"|"binary"|"two-width"|"force" Grip code, which says what the closure of an action commands, unless --gripper gives another: a closure (continuous); open, or above 0.5 closed with the whole effort (binary); open, or the width given just after closing (two-width). For force, actions have force. By default an action has closure, which is continuous, or force.
+---@field privileged? boolean True to let the policy use limits and materials of objects: softvt.calibration, assets, and the modules strain_sources and experts. Its results say that it is privileged. Default false.
 
 ---The observations of a policy; nothing else is computed.
 ---@class softvt.Observes
@@ -235,7 +246,7 @@
 ---@field position number[] Position. Expects a list of 3 numbers (m, base frame).
 ---@field axis_angle? number[] Orientation as axis-angle. Expects a list of 3 numbers (rad, base frame).
 ---@field quaternion? number[] Orientation as quaternion. Expects a list of 4 numbers (w, x, y, z, base frame).
----@field closure? number Gripper closure: 0 is open, 1 is closed. Expects a number in 0..1.
+---@field closure? number Gripper closure: 0 is open, 1 is closed. The grip code of the policy says what it commands. Expects a number in 0..1.
 ---@field force? number Grip force at which closing stops, at most robot.gripper.effort; below 0 opens. Expects a number (N).
 
 ---Returns an empty world: soft bodies among fixed or prescribed solids, without a robot. Settings of the command line, --set physics.…, take precedence in experiments.
@@ -264,6 +275,23 @@
 ---@field fingerprint? string Fingerprint of the calibrated asset, as softvt.fingerprint returns it. Results for another object of that name then do not use the calibration.
 ---@field holds table<string, any>[] Rows width_mm, closure, trials, held, slip_mm, d_peak_pct of the scan for the loose end.
 ---@field sweep table<string, any>[] Rows width_mm, closure, d_pct, force_n, strain_p95, min_det_f, node_speed_m_s, both_pads, slip_mm, stable of the compression sweep.
+---@field variants? table<string, any>[] Presses at other sizes and stiffnesses: { scale, youngs_factor, rows }, with the rows width_mm, d_pct, force_n, strain_p95.
+
+---Returns the safe window of an instance of a calibrated asset; nil without a window. Experts see the factors as fields of their objects.
+---@class softvt.Instance
+---@field asset string Name of the asset.
+---@field scale? number Factor on the size. Expects a number above 0. Default 1.
+---@field youngs_factor? number Factor on Young's modulus. Expects a number above 0. Default 1.
+---@field density_factor? number Factor on the density. Expects a number above 0. Default 1.
+---@field strain_factor? number Factor on the stable strain. Expects a number above 0. Default 1.
+---@field coating? number Static friction of its coating. Expects a number in above 0..10.
+
+---Returns instances of an asset as the episodes of a suite draw them, from a random stream that no episode uses. Without a variation each is the asset itself.
+---@class softvt.Sample
+---@field asset softvt.Asset The asset.
+---@field variation? softvt.Variation Variation of the suite.
+---@field suite string Name of the suite; part of the seed.
+---@field count integer Number of instances. Expects a whole number in 1..10000.
 
 ---Returns an image of one colour: `softvt.image { width = 640, height = 480, colour = { 255, 255, 255 } }`.
 ---@class softvt.NewImage
@@ -498,7 +526,7 @@
 ---@field asset softvt.Asset Asset of the object.
 ---@field at? number[] Position x, y; the object rests on the table, or on the object that `on` names. Expects a list of 2 numbers in -1000..1000 (m, world).
 ---@field position? number[] Position of its origin: its lowest point, on the centre line. Expects a list of 3 numbers in -1000..1000 (m, world).
----@field yaw? number Rotation about the vertical. Expects radians. Default 0.
+---@field yaw? number Rotation about the vertical. Expects radians in -6.2832..6.2832. Default 0.
 ---@field on? string Scene name of the object or part (cabinet.top_drawer) that it rests on (with at).
 ---@field scale? number Size relative to that of the asset. Its material stays, and its mass follows as the cube. Expects a number in 0.1..10. Default 1.
 ---@field joints? table<string, number> Start values of an articulated object's joints by part; 0, or the nearest limit, by default.
@@ -888,6 +916,32 @@ local SafeWindow = {}
 ---@field table table The same as a table.
 local Envelope = {}
 
+---A grip at rest.
+---@class softvt.Grip
+---@field width number Distance of the gels, m.
+---@field force number Normal force per pad, N.
+local Grip = {}
+
+---The safe window of an instance.
+---@class softvt.GripWindow
+---@field loose softvt.Grip The loosest grip that holds.
+---@field tight softvt.Grip The tightest grip whose carried object stays within τ; that of the loose end if none does.
+---@field carried number D that the weight of the carried object causes, as a share of τ.
+---@field tau number Deformation limit τ of the instance, %.
+local GripWindow = {}
+
+---An instance of an asset, with the fields that a grasp needs of an object.
+---@class softvt.InstanceState
+---@field asset string Name of its asset.
+---@field size number[] Edge lengths of its bounding box at rest, m.
+---@field scale number Size relative to that of its asset.
+---@field youngs_factor number? Young's modulus relative to that of its asset; nil unless soft.
+---@field density_factor number? Density relative to that of its asset; nil unless soft or rigid.
+---@field strain_factor number? Stable strain relative to that of its asset; nil unless soft.
+---@field coating number? Static friction of its coating; nil without one.
+---@field hints table<string, number> Numbers of its asset for experts, as those of an object.
+local InstanceState = {}
+
 ---An image of 8-bit sRGB pixels. Regions are x, y, width, height in pixels from the top left.
 ---@class softvt.Image
 ---@field width integer Width, pixels.
@@ -1083,13 +1137,14 @@ local Material = {}
 ---@field materials softvt.Material[] The base materials of its visuals, by material id.
 ---@field joints table<string, number> Start values of its joints by part, m or rad.
 ---@field position number[] Position of its origin: its lowest point, on the centre line. Expects a list of 3 numbers in -1000..1000 (m, world).
----@field yaw number Rotation about the vertical. Expects radians.
+---@field yaw number Rotation about the vertical. Expects radians in -6.2832..6.2832.
 ---@field scale number Size relative to that of its asset. Material numbers stay, and the mass follows as the cube. Expects a number in 0.1..10.
 ---@field density number Density of a soft or rigid body. Expects a number (kg/m³) above 0.
 ---@field youngs_pa number Young's modulus of a soft body. Expects pascals above 0.
 ---@field poisson number Poisson's ratio of a soft body. Expects a number in 0..below 0.5.
 ---@field static_mu number Static coefficient of friction. Expects a number in 0..10.
 ---@field dynamic_mu number Dynamic coefficient of friction. Expects a number in 0..10.
+---@field coating number Static coefficient of a coating (flour, oil, glaze), which is that of every pair with this object; the dynamic one is 0.8 of it. Nil without a coating. Expects a number in above 0..10.
 local Object = {}
 
 ---Returns the mass of a soft or rigid body, of one moving part of an articulated object, or of all its moving parts, kg; nil for what never moves.
@@ -1136,6 +1191,8 @@ function SceneState:clearance(pose, options) end
 ---@field scale number Size relative to that of its asset. `size` and hints in metres are those of the object itself.
 ---@field youngs_factor number? Young's modulus relative to that of its asset; nil unless soft.
 ---@field density_factor number? Density relative to that of its asset; nil unless soft or rigid.
+---@field strain_factor number? Stable strain relative to that of its asset; nil unless soft.
+---@field coating number? Static friction of its coating, which is that of every pair with it; nil without one.
 ---@field yaw number Rotation about the vertical, rad.
 ---@field hints table<string, number> Numbers of its asset for experts; those whose names end in _m are lengths and follow the scale.
 ---@field joint number? Joint value of a part, m or rad.
@@ -1143,12 +1200,15 @@ function SceneState:clearance(pose, options) end
 ---@field parts table<string, softvt.ObjectState> Parts of an articulated object by name.
 local ObjectState = {}
 
----Smallest and largest factors by which the instances of an asset differ.
----@class softvt.InstanceRanges
----@field size number[] Factors on the size, uniform.
----@field stiffness number[] Factors on Young's modulus, log-uniform.
----@field density number[] Factors on the density, log-uniform.
-local InstanceRanges = {}
+---The instances that the suite can draw, for a controller that must not know which one it has.
+---@class softvt.Instances
+local Instances = {}
+
+---Returns instances of an object's asset, drawn as the suite draws them, from a random stream that no episode uses: the same in every episode. Without a variation each is the asset itself.
+---@param object string
+---@param count integer
+---@return softvt.InstanceState[]
+function Instances:sample(object, count) end
 
 ---The robot arm as an expert controls it. Each motion takes as many control steps as it needs.
 ---@class softvt.Arm
@@ -1158,7 +1218,7 @@ local InstanceRanges = {}
 ---@field gripping boolean True from a call of grasp to the next call of release or open.
 ---@field width number Measured distance of the gels, m.
 ---@field force number[] Sum of the normal forces at all contact points of the left and the right gel pad, N, whatever touches it; forces on the cases of the fingers do not count. On the edge of a pad the normals are oblique, and the sum is larger than the pressing force, which is -sim:tactile(side).force[3].
----@field instances softvt.InstanceRanges? Under --policy fixed-closure: the ranges within which the instances of an asset differ. The expert then closes to one closure for all of them (experts.fixed_closure). nil under other policies.
+---@field instances softvt.Instances? Under --policy fixed-closure: the instances that the suite can draw. The expert then closes to one closure for all of them (experts.fixed_closure). nil under other policies.
 ---@field time number Time since the start, s.
 ---@field dt number Length of a control step, s.
 local Arm = {}
@@ -1444,6 +1504,16 @@ function softvt.envelope(spec) end
 ---@param asset string
 ---@return softvt.Envelope?
 function softvt.calibration(asset) end
+
+---Returns the safe window of an instance of a calibrated asset; nil without a window. Experts see the factors as fields of their objects.
+---@param spec softvt.Instance
+---@return softvt.GripWindow?
+function softvt.grip_window(spec) end
+
+---Returns instances of an asset as the episodes of a suite draw them, from a random stream that no episode uses. Without a variation each is the asset itself.
+---@param spec softvt.Sample
+---@return softvt.InstanceState[]
+function softvt.sample_instances(spec) end
 
 ---Returns true if a row of a compression sweep is a stable squeeze.
 ---@param row table

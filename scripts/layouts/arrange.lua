@@ -6,6 +6,8 @@ local JOINT = 0.02
 -- Half extents of the hand along and across the closing direction, with a margin, and the height that it passes above when
 -- it grasps low, m.
 local PALM, LOW = { 0.108, 0.036 }, 0.05
+-- Distance from the origin beyond which no object of a scene lies, m.
+local FAR = 3
 -- Draws per object, draws of the other objects per placement of the graspable ones, and placements before an error.
 local DRAWS, REDRAWS, PLACEMENTS = 60, 40, 20
 
@@ -13,6 +15,25 @@ local FIELDS = {
   name = "string", asset = "table", at = "table", yaw = "number?",
   position_range = "number?", yaw_range = "number?", clearance = "number?", reachable = "boolean?",
 }
+
+-- Checks the arguments of the function `name` of this file; errors are at the line that called it.
+local function check(name, arguments, types)
+  softvt.check_fields(name, arguments, types)
+  local function wrong(k, key, message) error(("%s: objects[%d].%s: %s"):format(name, k, key, message), 4) end
+  for k, object in ipairs(arguments.objects) do
+    softvt.check_fields(("%s: objects[%d]"):format(name, k), object, FIELDS)
+    for i = 1, 2 do
+      local at = object.at[i]
+      if type(at) ~= "number" then wrong(k, "at", "expected a list of 2 numbers, x and y") end
+      if math.abs(at) > FAR then wrong(k, "at", ("(%g, %g) m is out of the scene; lengths are in metres"):format(at, object.at[2])) end
+    end
+    for _, key in ipairs { "yaw", "yaw_range" } do
+      if math.abs(object[key] or 0) > 2 * math.pi then
+        wrong(k, key, ("expected radians up to a full turn, got %g; math.rad converts degrees"):format(object[key]))
+      end
+    end
+  end
+end
 
 -- Adds normal noise to the arm's initial joint angles.
 function arrange.arm(scene, rng)
@@ -97,18 +118,8 @@ local function place_all(rng, objects, others, reachable, clearance)
   return all
 end
 
--- Draws positions of `objects` and returns a list of { x, y, yaw } in the same order. Each object is a table:
---
---   name, asset, at = { x, y } (m), yaw (rad)
---   position_range   largest displacement in x and y, in either direction, m
---   yaw_range        largest rotation in either direction, rad
---   clearance        distance to all other objects, m; at least the argument `clearance`
---   reachable        true if a hand must be able to grasp it from above
---
--- Reachable objects are drawn first and keep their positions while the others are redrawn. Their distribution therefore
--- does not depend on the other objects.
-function arrange.scatter(rng, objects, clearance)
-  for k, object in ipairs(objects) do softvt.check_fields(("arrange.scatter: objects[%d]"):format(k), object, FIELDS) end
+-- See arrange.scatter; the function `name` has checked the arguments.
+local function scatter(name, rng, objects, clearance)
   for _ = 1, PLACEMENTS do
     local first = place_all(rng, objects, {}, true, clearance)
     for _ = 1, first and REDRAWS or 0 do
@@ -121,13 +132,33 @@ function arrange.scatter(rng, objects, clearance)
       end
     end
   end
-  error("arrange.scatter: no arrangement found; place the objects further apart", 2)
+  error(name .. ": no arrangement found; place the objects further apart, or give smaller ones (lengths are in metres)", 3)
+end
+
+-- Draws positions of `objects` and returns a list of { x, y, yaw } in the same order. Each object is a table:
+--
+--   name, asset, at = { x, y } (m), yaw (rad)
+--   position_range   largest displacement in x and y, in either direction, m
+--   yaw_range        largest rotation in either direction, rad
+--   clearance        distance to all other objects, m; at least the argument `clearance`
+--   reachable        true if a hand must be able to grasp it from above
+--
+-- Reachable objects are drawn first and keep their positions while the others are redrawn. Their distribution therefore
+-- does not depend on the other objects.
+function arrange.scatter(rng, objects, clearance)
+  check("arrange.scatter", { rng = rng, objects = objects, clearance = clearance },
+    { rng = "userdata", objects = "table", clearance = "number" })
+  -- No tail call: the level of errors counts this function.
+  local places = scatter("arrange.scatter", rng, objects, clearance)
+  return places
 end
 
 -- Draws positions as arrange.scatter does and adds the objects to the scene.
 function arrange.add(scene, rng, objects, clearance)
-  for k, at in ipairs(arrange.scatter(rng, objects, clearance)) do
-    scene:add { name = objects[k].name, asset = objects[k].asset, at = { at.x, at.y }, yaw = at.yaw }
+  check("arrange.add", { scene = scene, rng = rng, objects = objects, clearance = clearance },
+    { scene = "userdata", rng = "userdata", objects = "table", clearance = "number" })
+  for k, at in ipairs(scatter("arrange.add", rng, objects, clearance)) do
+    scene:add { name = objects[k].name, asset = objects[k].asset, at = { at.x, at.y }, yaw = math.fmod(at.yaw, 2 * math.pi) }
   end
 end
 

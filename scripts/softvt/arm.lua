@@ -23,7 +23,10 @@ function Arm:command(pose, closure)
   end
   self.target, self.closure = pose, closure
   local refusal = yield(self.target, self.closure, self.gripping, nil, self.wants_readings, self.goal)
-  if refusal then check.refuse(refusal) end
+  if refusal then
+    self.goal = nil
+    check.refuse(refusal)
+  end
 end
 
 -- Returns the readings of the fingers in this control step. They are computed on request only, from the next step on.

@@ -93,6 +93,14 @@ impl Settings {
         Ok(changed.physics)
     }
 
+    /// Checks that the fields at dotted paths exist and can take their values, whatever the values of others.
+    ///
+    /// # Errors
+    /// A field does not exist, or its value has a wrong type.
+    pub fn check_fields(&self, fields: &[(String, String)]) -> Result<(), SettingsError> {
+        fields.iter().try_for_each(|(path, value)| self.replaced(path, value).map(|_| ()))
+    }
+
     fn replaced(&self, path: &str, value: &str) -> Result<Self, SettingsError> {
         let path = &current_path(path);
         let refused = |e: serde_json::Error| refusal(path, value, &e.to_string());
@@ -121,12 +129,17 @@ impl Settings {
             (Value::Object(_), _) => {
                 return Err(SettingsError::Group { path: path.clone(), fields: fields(at) });
             }
+            (present, Ok(value)) if present.is_u64() => whole_number(path, &value)?,
             (_, Ok(value)) => value,
             (Value::String(_), Err(_)) => Value::String(value.to_owned()),
             (present, Err(_)) => match fraction(value).filter(|_| present.is_number()) {
                 Some(number) => json!(number),
                 None => {
-                    let expected = if present.is_boolean() { "true or false" } else { "a number" };
+                    let expected = match present.is_boolean() {
+                        true => "true or false",
+                        false if present.is_u64() => count_of(path),
+                        false => "a number",
+                    };
                     return Err(SettingsError::Type {
                         path: path.clone(),
                         expected,
@@ -192,6 +205,27 @@ fn current_path(path: &str) -> String {
 /// Names the kind of a setting that can be of several: `tactile.optics.model`.
 const MODEL: &str = "model";
 
+/// A whole number, which scripts may write as 2.0.
+fn whole_number(path: &str, value: &Value) -> Result<Value, SettingsError> {
+    const LARGEST: f64 = (1_u64 << f64::MANTISSA_DIGITS) as f64;
+    match value.as_f64().filter(|number| number.fract() == 0.0 && (0.0..=LARGEST).contains(number)) {
+        Some(number) => Ok(json!(number as u64)),
+        None => Err(SettingsError::Type {
+            path: path.to_owned(),
+            expected: count_of(path),
+            value: value.to_string(),
+        }),
+    }
+}
+
+/// The values of a whole-number setting, for messages.
+fn count_of(path: &str) -> &'static str {
+    match path {
+        "robot.latency" => "a whole number of control steps",
+        _ => "a whole number",
+    }
+}
+
 /// A number written as a fraction: `1/60`.
 fn fraction(text: &str) -> Option<f64> {
     let (numerator, denominator) = text.split_once('/')?;
@@ -244,6 +278,16 @@ mod tests {
             settings.with("physics.dt.x", "1").expect_err("a field of a number").to_string(),
             "no setting \"physics.dt.x\"; physics.dt is a single value"
         );
+        for whole in ["2", "2.0", "2e0"] {
+            assert_eq!(settings.with("robot.latency", whole).expect("a whole number").robot.latency, 2);
+        }
+        for refused in ["2.5", "-1", "true", "fast", "1e30"] {
+            let message = settings.with("robot.latency", refused).expect_err(refused).to_string();
+            assert!(
+                message.starts_with("robot.latency: expected a whole number of control steps, got"),
+                "{message}"
+            );
+        }
         assert!(settings.with("physics.dt", "-1").is_err_and(|e| e.to_string().contains("physics.dt")));
         let pads =
             |mu: &str| ["static_mu", "dynamic_mu"].map(|key| (format!("robot.pads.{key}"), mu.to_owned()));

@@ -11,7 +11,9 @@ use softvt_geometry::{
     Aabb, Pose, Vec3,
     cavity::cavity,
     mass::{MassProperties, approximate_mass_properties, mass_properties},
+    pieces::SeparatePieces,
     shape::Shape,
+    voxel::{VoxelSpec, voxel_mesh},
 };
 use softvt_physics::{
     BodyId, World,
@@ -32,9 +34,13 @@ pub struct AssetCache {
     solids: SharedCache<Shape, Arc<CollisionGeometry>>,
     walls: SharedCache<Shape, Option<f64>>,
     cavities: SharedCache<Shape, Option<Aabb>>,
+    pieces: SharedCache<Shape, Option<SeparatePieces>>,
     /// True to compute masses and contact samples approximately.
     approximate: bool,
 }
+
+/// Voxels along the longest edge by which the pieces of a rigid body are counted.
+const PIECES_RESOLUTION: usize = 24;
 
 /// The cached value of a shape.
 fn of_shape<V: Clone>(cache: &SharedCache<Shape, V>, shape: &Shape, compute: impl FnOnce() -> V) -> V {
@@ -68,6 +74,14 @@ impl AssetCache {
     /// Box around the cavity of a shape, object frame; see [`cavity`].
     pub(super) fn cavity(&self, shape: &Shape) -> Option<Aabb> {
         of_shape(&self.cavities, shape, || cavity(shape))
+    }
+
+    /// Separate pieces of a shape; gaps below a voxel are not seen.
+    pub(super) fn pieces(&self, shape: &Shape) -> Option<SeparatePieces> {
+        of_shape(&self.pieces, shape, || {
+            let mesh = voxel_mesh(shape, &VoxelSpec { resolution: PIECES_RESOLUTION }).ok()?;
+            SeparatePieces::find(&mesh)
+        })
     }
 
     /// A collider of a hard shape at `pose_in_parent` on `parent`.

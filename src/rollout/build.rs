@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use super::{
     asset_cache::{AssetCache, MIN_PART_WALL},
-    build_error::BuildError,
+    build_error::{BuildError, tenths_of_mm},
     simulation::{ArticulatedPart, ObjectInstance},
+    soft_model::MAX_NODES,
 };
 use softvt_common::text::format_number;
 use softvt_geometry::{Pose, Vec3};
@@ -41,11 +42,6 @@ fn thin_walls(object: &Object, description: &str, min: f64) -> BuildError {
     let what =
         format!("{description}, expected at least {min} mm: other bodies may pass through thinner ones");
     BuildError::Material { asset: object.asset.name.clone(), what }
-}
-
-/// A thickness in mm, to a tenth.
-fn tenths_of_mm(metres: f64) -> String {
-    format_number((1e4 * metres).round() / 10.0)
 }
 
 /// Tolerated initial overlap, m. Contact forces resolve it while the objects settle.
@@ -87,7 +83,12 @@ pub(super) fn check_overlap(world: &mut World, scene: &Scene) -> Result<(), Buil
         return Err(BuildError::InRobot { object, part, depth: deepest.depth }.of(&scene.objects[index]));
     }
     let place = |index: Option<usize>| index.map_or(String::new(), |i| scene.objects[i].placed_at.clone());
+    // Most objects are placed by the lowest point of their shape, on something.
+    let free = first.0.map(|index| &scene.objects[index].asset);
+    let free = free.filter(|asset| matches!(asset.body, Body::Soft(_) | Body::Rigid { .. }));
+    let lowest = free.map_or(0.0, |asset| -asset.shape.bounds().min.z);
     let error = BuildError::Overlap {
+        below_origin: Some(lowest).filter(|lowest| *lowest >= 0.5 * deepest.depth && *lowest > MAX_OVERLAP),
         first: first.1,
         second: second.1,
         second_at: place(second.0),
@@ -144,6 +145,11 @@ fn add(
     let (body, colliders) = match &asset.body {
         Body::Soft(material) => {
             let model = cache.model(object, material)?;
+            let others = instances.iter().filter_map(|instance| instance.model.as_ref());
+            let nodes = model.mesh.nodes.len() + others.map(|model| model.mesh.nodes.len()).sum::<usize>();
+            if nodes > MAX_NODES {
+                return Err(BuildError::Nodes(nodes));
+            }
             fem_model = Some(model.clone());
             let surface: Arc<dyn ContactSurface> = Arc::new(asset.shape.clone());
             let id = world.add_soft(&object.name, model, Some(surface), &object.pose_w, asset.friction);

@@ -1,5 +1,6 @@
 //! Errors of building a scene.
 
+use super::soft_model::too_many;
 use softvt_common::text::format_number;
 use softvt_geometry::voxel::VoxelMeshError;
 use softvt_physics::{joints::JointTreeError, rigid::RigidError};
@@ -32,6 +33,9 @@ pub enum BuildError {
         /// The problem and the expected range.
         what: String,
     },
+    /// More nodes than can be simulated.
+    #[error("the soft bodies of the scene have {}", too_many(*.0))]
+    Nodes(usize),
     /// The joints do not form a valid tree.
     #[error("object {object}: {source}")]
     Joints {
@@ -42,9 +46,10 @@ pub enum BuildError {
     },
     /// Two objects overlap by more than contact allows.
     #[error(
-        "objects {first} and {second}{} overlap by {} mm at the start; move them apart",
+        "objects {first} and {second}{} overlap by {} mm at the start; {}",
         placed(.second_at),
-        format_number((1e4 * .depth).round() / 10.0)
+        tenths_of_mm(*.depth),
+        overlap_remedy(.first, *.below_origin)
     )]
     Overlap {
         /// Name of the object that was placed last.
@@ -55,6 +60,8 @@ pub enum BuildError {
         second_at: String,
         /// Penetration depth, m.
         depth: f64,
+        /// Distance from the origin of the first object to the lowest point of its shape, m, if that explains the overlap.
+        below_origin: Option<f64>,
     },
     /// An object overlaps the base of the robot.
     #[error("object {0} starts inside of the robot's base; move it away")]
@@ -62,7 +69,7 @@ pub enum BuildError {
     /// An object overlaps the hand of the robot.
     #[error(
         "object {object} starts inside of the robot's hand ({part}), {} mm deep; move it away, or the arm (scene.start_q)",
-        format_number((1e4 * .depth).round() / 10.0)
+        tenths_of_mm(*.depth)
     )]
     InRobot {
         /// Object name.
@@ -73,8 +80,20 @@ pub enum BuildError {
         depth: f64,
     },
     /// An object would fall out of the world.
-    #[error("object {0} has nothing below it; place it above a support")]
-    NothingBelow(String),
+    #[error(
+        "object {object} at ({}, {}) m has nothing below it; place it above a support{}",
+        format_number(*.x),
+        format_number(*.y),
+        if .x.hypot(*.y) > FAR { "; lengths are in metres" } else { "" }
+    )]
+    NothingBelow {
+        /// Object name.
+        object: String,
+        /// Position in the world, m.
+        x: f64,
+        /// Position in the world, m.
+        y: f64,
+    },
     /// An error about an object that a script placed.
     #[error("{place}: {source}")]
     At {
@@ -86,6 +105,24 @@ pub enum BuildError {
     /// Two objects have the same name.
     #[error("the scene has two objects named {0}; names must be unique")]
     DuplicateName(String),
+}
+
+/// Distance beyond which a position is most likely in another unit, m.
+const FAR: f64 = 3.0;
+
+/// A length in mm with one decimal.
+pub(super) fn tenths_of_mm(metres: f64) -> String {
+    format_number((1e4 * metres).round() / 10.0)
+}
+
+fn overlap_remedy(first: &str, below_origin: Option<f64>) -> String {
+    match below_origin {
+        Some(below) => format!(
+            "the shape of {first} reaches {} mm below its origin: end it with :grounded(), or move the objects apart",
+            tenths_of_mm(below)
+        ),
+        None => "move them apart".to_owned(),
+    }
 }
 
 fn placed(at: &str) -> String {

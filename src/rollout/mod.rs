@@ -101,5 +101,5 @@ pub use sensors::{
     StateRecording, TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES, check_sensors,
 };
 pub use simulation::{ArticulatedPart, ObjectInstance, SettleError, Simulation, state_hash};
-pub use soft_model::soft_model;
+pub use soft_model::{cost_doubt, soft_model};
 pub use trace::{ObjectTrace, StepTrace};

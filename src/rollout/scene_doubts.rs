@@ -2,21 +2,22 @@
 
 use std::collections::BTreeSet;
 
+use super::asset_cache::{AssetCache, thin_parts};
 use softvt_benchmark::Task;
+use softvt_geometry::pieces::SeparatePieces;
 use softvt_robot::gripper::MAX_WIDTH;
 use softvt_scene::{Asset, Body, Scene, SoftMaterial};
 
-use crate::asset_cache::thin_parts;
-
-/// Doubts about a scene of a task, one line each: units of materials, soft bodies of few voxels, and a target that the gripper cannot
-/// grasp.
-pub fn scene_doubts(task: &Task, scene: &Scene) -> BTreeSet<String> {
+/// Doubts about a scene of a task, one line each: materials, soft bodies of few voxels, rigid bodies of several pieces, and a target
+/// that the gripper cannot grasp.
+pub fn scene_doubts(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSet<String> {
     let doubts = |asset: &Asset| {
         let name = asset.name.clone();
         asset
-            .unit_doubts()
+            .doubts()
             .into_iter()
             .chain(voxel_doubt(asset))
+            .chain(pieces_doubt(asset, cache))
             .map(move |doubt| format!("asset {name}: {doubt}"))
     };
     let mut all: BTreeSet<String> = scene.objects.iter().flat_map(|object| doubts(&object.asset)).collect();
@@ -47,6 +48,20 @@ fn voxel_doubt(asset: &Asset) -> Option<String> {
         1e3 * thickness,
         1e3 * edge
     ))
+}
+
+/// A doubt about a rigid body of several pieces.
+fn pieces_doubt(asset: &Asset, cache: &AssetCache) -> Option<String> {
+    if !matches!(asset.body, Body::Rigid { .. }) {
+        return None;
+    }
+    cache.pieces(&asset.shape).map(|SeparatePieces { count, gap }| {
+        format!(
+            "its shape has {count} separate pieces, {:.0} mm apart, which move as one rigid body; join them, or make each \
+             an asset of its own",
+            1e3 * gap
+        )
+    })
 }
 
 /// The width where the stock experts grasp an object, if it exceeds the opening of the gripper.

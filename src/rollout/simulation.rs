@@ -346,7 +346,8 @@ impl Simulation {
                     && below.min.z < own.min.z
             };
             if object.body.is_free() && !self.objects.iter().zip(&boxes).any(supports) {
-                let error = BuildError::NothingBelow(object.name.clone());
+                let at = object.start_w.translation.vector;
+                let error = BuildError::NothingBelow { object: object.name.clone(), x: at.x, y: at.y };
                 let placed = self.scene.objects.iter().find(|placed| placed.name == object.name);
                 return Err(match placed {
                     Some(placed) => error.of(placed),

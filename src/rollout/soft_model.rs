@@ -11,11 +11,46 @@ use softvt_geometry::{
     shape::Shape,
     voxel::{SurfaceSample, VoxelMesh, VoxelSpec, voxel_mesh},
 };
-use softvt_physics::fem::{ElasticMaterial, FemModel};
+use softvt_physics::{
+    World,
+    fem::{ElasticMaterial, FemModel},
+};
 use softvt_scene::SoftMaterial;
 
 /// Factor on the spacing of contact samples for approximate models.
 const APPROXIMATE_SPACING: f64 = 4.0;
+
+/// Largest number of nodes of the soft bodies of a scene: those of a cube of 33 voxels per edge.
+pub(super) const MAX_NODES: usize = 40_000;
+/// Number of nodes from which on a scene is slow enough for a warning.
+const SLOW_NODES: usize = 8_000;
+
+/// The end of a message about `nodes` nodes, which are too many.
+pub(super) fn too_many(nodes: usize) -> String {
+    format!("{}, expected at most {MAX_NODES}; give a lower resolution", cost_of(nodes))
+}
+
+/// A number of nodes with the memory and the processor time that they need, as far as they are known beforehand.
+fn cost_of(nodes: usize) -> String {
+    format!(
+        "{nodes} nodes, which need about {} GB and {} s of processor time per simulated second",
+        two_digits(1e-9 * FemModel::estimated_bytes(nodes)),
+        two_digits(FemModel::estimated_seconds(nodes))
+    )
+}
+
+fn two_digits(number: f64) -> String {
+    let unit = 10f64.powf(number.log10().floor() - 1.0);
+    format_number(((number / unit).round() * unit * 1e6).round() / 1e6)
+}
+
+/// A doubt about a scene whose soft bodies are slow to simulate.
+pub fn cost_doubt(world: &World) -> Option<String> {
+    let nodes = world.soft_bodies().iter().map(|soft| soft.state.model.mesh.nodes.len()).sum();
+    let cost =
+        || format!("the soft bodies of the scene have {}; a lower resolution is faster", cost_of(nodes));
+    (nodes > SLOW_NODES).then(cost)
+}
 
 /// Builds the finite-element model of a soft body. `name` identifies the asset in error messages.
 ///
@@ -53,6 +88,10 @@ impl SoftGeometry {
         };
         let mesh = voxel_mesh(shape, &VoxelSpec { resolution: material.resolution })
             .map_err(|source| BuildError::Geometry { asset: name.to_owned(), source })?;
+        if mesh.nodes.len() > MAX_NODES {
+            let what = format!("its voxel mesh has {}", too_many(mesh.nodes.len()));
+            return Err(BuildError::Material { asset: name.to_owned(), what });
+        }
         check_connected(name, &mesh)?;
         let samples = surface_samples(shape, &mesh, &SampleSpec { grasp_spacing, ..SampleSpec::default() });
         Ok(Self { mesh, samples, volume })

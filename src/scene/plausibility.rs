@@ -1,6 +1,7 @@
-//! Material values that are valid numbers and most likely in another unit.
+//! Materials that are valid and most likely a mistake.
 
 use super::{Asset, Body, Part, SoftMaterial};
+use softvt_common::text::format_number;
 
 /// Smallest plausible Young's modulus, Pa: soft gels have some hundred.
 const MIN_YOUNGS_PA: f64 = 300.0;
@@ -10,17 +11,41 @@ const MAX_YOUNGS_PA: f64 = 1e9;
 const MIN_DENSITY: f64 = 5.0;
 const MAX_DENSITY: f64 = 23_000.0;
 
+/// Acceleration of gravity, m/s².
+const GRAVITY: f64 = 9.81;
+/// Compression by its own weight from which on a body hardly stands.
+const MAX_SAG: f64 = 0.15;
+
 impl Asset {
-    /// Doubts about the units of its material, one sentence each.
-    pub fn unit_doubts(&self) -> Vec<String> {
+    /// Doubts about its material, one sentence each.
+    pub fn doubts(&self) -> Vec<String> {
         match &self.body {
-            Body::Soft(SoftMaterial { youngs_pa, density, .. }) => {
-                youngs_doubt(*youngs_pa).into_iter().chain(density_doubt(*density)).collect()
+            Body::Soft(material @ SoftMaterial { youngs_pa, density, .. }) => {
+                let units = youngs_doubt(*youngs_pa).into_iter().chain(density_doubt(*density));
+                units.chain(self.sag_doubt(material)).collect()
             }
             Body::Rigid { density } => density_doubt(*density).into_iter().collect(),
             Body::Articulated(parts) => parts.iter().filter_map(part_doubt).collect(),
             Body::Static | Body::Scenery => Vec::new(),
         }
+    }
+
+    /// A doubt about a soft body that is compressed by its own weight: ρ g h / 2 E for an upright block of height h.
+    fn sag_doubt(&self, material: &SoftMaterial) -> Option<String> {
+        let SoftMaterial { youngs_pa, density, .. } = material;
+        let height = self.shape.bounds().size().z;
+        let sag = density * GRAVITY * height / (2.0 * youngs_pa);
+        let left = match sag {
+            ..MAX_SAG => return None,
+            ..0.8 => format!("sags to about {:.0} % of its height", 100.0 * (1.0 - sag)),
+            _ => "collapses".to_owned(),
+        };
+        Some(format!(
+            "it {left} under its own weight ({} mm high, {} kg/m³, {} Pa); youngs_pa is in pascals, density in kg/m³",
+            format_number((1e3 * height).round()),
+            format_number(*density),
+            format_number(*youngs_pa)
+        ))
     }
 }
 
@@ -75,7 +100,7 @@ mod tests {
             visuals: Vec::new(),
             hints: Default::default(),
         };
-        asset.unit_doubts()
+        asset.doubts()
     }
 
     #[test]
@@ -85,5 +110,17 @@ mod tests {
         assert!(both[0].contains("did you mean 40 kPa, youngs_pa = 40000?"), "{both:?}");
         assert!(both[1].contains("did you mean 0.3 g/cm³, density = 300?"), "{both:?}");
         assert_eq!(doubts(1e3, 20.0), [""; 0], "a soft, light foam");
+    }
+
+    #[test]
+    fn a_body_that_its_weight_compresses_is_doubted() {
+        assert_eq!(doubts(5e3, 1000.0), [""; 0]);
+        // ρ g h / 2 E = 0.39.
+        let sagging = doubts(500.0, 1000.0);
+        assert!(
+            sagging[0].starts_with("it sags to about 61 % of its height under its own weight"),
+            "{sagging:?}"
+        );
+        assert!(doubts(25.0, 300.0)[1].starts_with("it collapses under its own weight"));
     }
 }

@@ -246,7 +246,7 @@ folder, its parent folder and the current folder, then in the library inside the
 `pairs` iterates over numbers, strings and booleans in order; the order of other keys, and of `next`, is not defined.
 `tostring` returns the type of a table or function, never an address. `print` writes to standard error, up to 1 MiB. Memory
 and time are limited: 256 MiB of Lua values, 512 MiB of images, shapes and masks, shapes of at most 2000 parts, masks of at
-most 200.
+most 200, 4 KiB per name or prompt, 1 MiB per `load`, and 64 MiB in what a script returns.
 
 A list that belongs to an object (`scene.base`, `material.albedo`, `scene.objects`) is not a copy: a number written to it is
 checked and takes effect at once, and the error of a read-only list says what to do instead. Results of methods, and tables

@@ -36,9 +36,9 @@ fn invalid_scenes_are_found_without_settling() {
     });
     assert_snapshot!(inside, @"x.lua: task 0, episode 0: x.lua:6: camera in: position: it is inside cube; move it out");
     let beside = of(Small { at: "position = { 0, -1, 0 }", ..Small::default() });
-    assert_snapshot!(beside, @"x.lua:6: object cube has nothing below it; place it above a support");
+    assert_snapshot!(beside, @"x.lua:6: object cube at (0, -1) m has nothing below it; place it above a support");
     let below = of(Small { at: "position = { 0, 0.1, -0.3 }", ..Small::default() });
-    assert_snapshot!(below, @"x.lua:6: object cube has nothing below it; place it above a support");
+    assert_snapshot!(below, @"x.lua:6: object cube at (0, 0.1) m has nothing below it; place it above a support");
     let base = of(Small { at: "position = { -0.6, 0, 0.05 }", ..Small::default() });
     assert_snapshot!(base, @"x.lua:6: object cube starts inside of the robot's base; move it away");
     let dust = of(Small {
@@ -132,4 +132,48 @@ fn implausible_units_and_wide_objects_are_doubted() {
     });
     assert!(wide.contains("asset cube: it is 100 mm wide, and the gripper opens 80 mm"), "{wide}");
     assert!(!doubts(Small::default()).contains("warning"));
+    let soft =
+        doubts(Small { material: "youngs_pa = 600, poisson = 0.3, density = 900", ..Small::default() });
+    assert!(soft.contains("asset cube: it sags to about 71 % of its height under its own weight"), "{soft}");
+    let ball = "softvt.shape.sphere { radius = 0.02 }";
+    let text = Small::default()
+        .text()
+        .replace(Small::default().shape, &format!("{ball}:union({ball}:translate(0.06, 0, 0)):grounded()"))
+        .replace("softvt.soft { youngs_pa = 2e4, poisson = 0.3,", "softvt.rigid {");
+    let pieces = Project::new(&[("x.lua", &text)]).succeeds("check x.lua").err;
+    assert!(pieces.contains("asset cube: its shape has 2 separate pieces, "), "{pieces}");
+}
+
+#[test]
+fn a_scene_of_too_many_nodes_is_refused_with_its_cost() {
+    let of_resolution = |resolution: u32| {
+        let material = format!(
+            "resolution = {resolution}, grasp_spacing = 0.01, youngs_pa = 2e4, poisson = 0.3, density"
+        );
+        let text = Small::default().text().replace("youngs_pa = 2e4, poisson = 0.3, density", &material);
+        Project::new(&[("x.lua", &text)])
+    };
+    let refused = of_resolution(40).refusal("check x.lua");
+    assert!(
+        refused.starts_with("x.lua:6: asset cube: its voxel mesh has 68921 nodes, which need about ")
+            && refused.ends_with(
+                " s of processor time per simulated second, expected at most 40000; give a lower resolution"
+            ),
+        "{refused}"
+    );
+    let slow = of_resolution(21).succeeds("check x.lua").err;
+    assert!(
+        slow.contains("task 0: the soft bodies of the scene have 10648 nodes, which need about "),
+        "{slow}"
+    );
+    assert!(!of_resolution(12).succeeds("check x.lua").err.contains("nodes"));
+    // Two bodies share the limit.
+    let project = of_resolution(28);
+    let pair = "scene:add { name = \"post\"";
+    let text = project
+        .text("x.lua")
+        .replace(pair, &format!("scene:add {{ name = \"twin\", asset = cube, at = {{ 0, -0.1 }} }} {pair}"));
+    project.write("x.lua", text.as_bytes());
+    let both = project.refusal("check x.lua");
+    assert!(both.starts_with("x.lua:7: the soft bodies of the scene have 48778 nodes"), "{both}");
 }

@@ -1,8 +1,14 @@
 //! Conditions: each suite unchanged and under each condition, compared episode by episode.
 
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
 use serde_json::Value;
 
-use crate::support::{Project, Small};
+use crate::support::{Project, Small, run_command};
 
 /// The small suite with shifts, under the given conditions.
 fn project(conditions: &str, object_type: &str) -> Project {
@@ -99,7 +105,7 @@ fn invalid_conditions_are_reported_before_anything_runs() {
         ),
         (
             "{ name = \"a\", set = { [\"robot.gripper.efort\"] = 2 } }",
-            "suites/trial.lua: --set: no setting \"robot.gripper.efort\"",
+            "suites/trial.lua:1: condition \"a\": set: no setting \"robot.gripper.efort\"",
         ),
         ("{ name = \"a\", shift = { mass = -1 } }", "shift mass: expected a number in 0.01..100"),
         ("{ name = \"a\" },\n{ name = \"a\" }", "is the name of another condition; give another"),
@@ -136,4 +142,86 @@ fn conditions_are_checked_and_listed() {
         (&Value::from(10), &Value::from("suites/shifts.lua"))
     );
     assert!(project.succeeds("check suites/shifts.lua --suite one").out.contains("mass x1.75"));
+}
+
+/// The shipped files that return conditions, by their paths in the repository.
+fn shipped() -> Vec<String> {
+    fn collect(folder: &Path, found: &mut Vec<PathBuf>) {
+        for entry in fs::read_dir(folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            match path.is_dir() {
+                true => collect(&path, found),
+                false => found.push(path),
+            }
+        }
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = Vec::new();
+    ["suites", "scripts"].iter().for_each(|folder| collect(&root.join(folder), &mut files));
+    let has_conditions = |path: &PathBuf| {
+        path.extension().is_some_and(|extension| extension == "lua")
+            && fs::read_to_string(path).is_ok_and(|text| text.contains("softvt.conditions {"))
+    };
+    let relative = |path: &PathBuf| path.strip_prefix(root).expect("below").display().to_string();
+    files.iter().filter(|path| has_conditions(path)).map(relative).collect()
+}
+
+#[test]
+fn every_shipped_list_of_conditions_can_be_checked() {
+    let files = shipped();
+    assert!(files.len() >= 2 && files.contains(&"suites/shifts.lua".to_owned()), "{files:?}");
+    let project = Project::new(&[]);
+    for file in files {
+        // The names of all lists that the file knows.
+        let help = project.succeeds(&format!("{file} --help")).out;
+        let lists = help.split_once("--conditions").map(|(_, text)| {
+            let (_, choices) = text.split_once("one of ").unwrap_or_else(|| panic!("{file}: {help}"));
+            choices.split(['\n', ')', ';']).next().unwrap_or_default().replace(", ", ",")
+        });
+        let flag = lists.map_or(String::new(), |lists| format!(" --conditions {lists}"));
+        assert!(file != "suites/shifts.lua" || flag.contains("perturbations"), "{flag}: {help}");
+        let mut command = project.command(&format!("check {file}{flag}"));
+        command.timeout(Duration::from_secs(600));
+        let output = run_command(command);
+        assert_eq!(output.code, 0, "{file}{flag}\n{}", output.err);
+    }
+    // The option of suites/shifts.lua names all lists of scripts/shifts.lua.
+    project.write(
+        "all.lua",
+        b"for key, list in pairs(require 'shifts') do
+  local is_list = #list > 0 and not rawget(list[1], 'apply')
+  assert(not is_list or key == 'conditions' or key == 'all_objects' or key == 'perturbations', key)
+end
+return softvt.experiment { name = 'all', grid = { a = { 1 } }, run = function() return {} end }",
+    );
+    project.succeeds("check all.lua");
+}
+
+#[test]
+fn whole_numbers_of_settings_are_named_by_their_field() {
+    let project = project("{ name = \"late\", set = { [\"robot.latency\"] = 4 / 2 } }", "deformable");
+    project.succeeds("check suites/trial.lua");
+    let trial = project.text("suites/trial.lua");
+    let refused = |value: &str| {
+        project.write("suites/trial.lua", trial.replace("4 / 2", value).as_bytes());
+        project.refusal("check suites/trial.lua")
+    };
+    assert_eq!(
+        refused("2.5"),
+        "suites/trial.lua:1: condition \"late\": set: robot.latency: expected a whole number of control steps, got \"2.5\""
+    );
+    let suite = project.text("suites/one.lua");
+    let settings = |value: &str| {
+        let declared = format!("settings = {{ robot = {{ latency = {value} }} }}, episodes = 2,");
+        project.write("suites/one.lua", suite.replacen("episodes = 2,", &declared, 1).as_bytes());
+    };
+    settings("6 / 3");
+    project.succeeds("check suites/one.lua");
+    settings("2.5");
+    let message = project.refusal("check suites/one.lua");
+    assert!(
+        message
+            .contains("suite.settings.robot.latency: expected a whole number of control steps, got \"2.5\""),
+        "{message}"
+    );
 }

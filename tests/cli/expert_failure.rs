@@ -51,3 +51,22 @@ fn notes_of_an_expert_are_in_its_record() {
     assert_eq!(project.lines("run/episodes.jsonl")[0]["notes"]["grip_width_mm"], 31.5);
     assert!(project.succeeds("replay run 0/0").out.contains("byte-identical"));
 }
+
+#[test]
+fn an_expert_that_asks_for_nothing_possible_says_so_at_once() {
+    let reason = |expert: &'static str| {
+        let project = Small { expert, ..Small::default() }.project();
+        project.succeeds("x.lua --out run");
+        project.lines("run/episodes.jsonl")[0]["gave_up"].as_str().expect("a reason").to_owned()
+    };
+    let far = reason("arm:move_to(softvt.pose { position = { 40, 20, 200 } })");
+    assert!(
+        far.starts_with("x.lua:12: unreachable pose: the tool gets no nearer to (40.000, 20.000, 200.000) m")
+            && far.ends_with("; positions are in metres"),
+        "{far}"
+    );
+    let idle = reason("return");
+    let expected =
+        "x.lua:12: the expert ended without a command; it is called once and returns when the task is done";
+    assert_eq!(idle, expected);
+}

@@ -44,3 +44,35 @@ fn the_pads_press_with_the_commanded_force() {
     assert_eq!(force(228), [0.0; 2], "opened");
     assert!(project.succeeds("replay run 0/0").out.contains("byte-identical"));
 }
+
+#[test]
+fn the_grip_code_of_a_lua_policy_is_its_own_or_that_of_the_command_line() {
+    // 0.6 is closed in the code binary.
+    let policy = |declared: &str| {
+        format!(
+            "return softvt.policy {{ name = 'p', {declared} act = function(obs)
+  return {{ position = obs.position, axis_angle = obs.axis_angle, closure = 0.6 }} end }}"
+        )
+    };
+    let project = Small { task: "budget_steps = 10", ..Small::default() }.project();
+    project.write("plain.lua", policy("").as_bytes());
+    project.write("binary.lua", policy("gripper = 'binary',").as_bytes());
+    for (name, words, code, closure) in [
+        ("a", "plain.lua", None, 0.6),
+        ("b", "binary.lua", Some("binary"), 1.0),
+        ("c", "plain.lua --gripper binary", Some("binary"), 1.0),
+        ("d", "binary.lua --gripper continuous", Some("continuous"), 0.6),
+    ] {
+        let output = project.succeeds(&format!("x.lua --policy {words} --trace --out {name}"));
+        assert_eq!(project.json(&format!("{name}/run.json"))["gripper"].as_str(), code, "{words}");
+        assert_eq!(output.err.contains("gripper: "), code.is_some(), "{words}: {}", output.err);
+        let trace = project.lines(&format!("{name}/trace/task_000/episode_00000.jsonl"));
+        assert_eq!(trace[3]["closure"].as_f64(), Some(closure), "{words}: {}", trace[3]);
+    }
+    let message = project.refusal("x.lua --policy plain.lua --gripper force --out e");
+    assert!(
+        message
+            .contains("plain.lua:1: policy.act: the grip code of the policy is \"force\"; give force alone"),
+        "{message}"
+    );
+}

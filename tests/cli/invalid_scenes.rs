@@ -73,8 +73,48 @@ fn overlaps_are_reported_with_depth_and_place() {
 fn sizes_in_millimetres_are_recognized() {
     let shape = "softvt.shape.box { size = { 40, 40, 40 } }:grounded()";
     let message = Small { shape, ..Small::default() }.project().refusal("x.lua --out run");
-    assert!(message.starts_with("x.lua:6: asset cube: it is 40 × 40 × 40 m, about"), "{message}");
-    assert!(message.contains("sizes are in metres"), "{message}");
+    assert_snapshot!(message, @"x.lua:3: asset.shape: is 40 × 40 × 40 m, expected at most 10 m; lengths are in metres (softvt.mesh takes scale = 0.001 for mm)");
+}
+
+#[test]
+fn mistakes_of_a_layout_are_reported_at_its_own_line() {
+    let refused_call = |call: &str| {
+        let text = Small::default()
+            .text()
+            .replace("scene:add { name = \"cube\", asset = cube, at = { 0, 0.1 } }", call);
+        let text = text.replace("function(scene)", "function(scene, rng)");
+        let text = text.replacen("local floor", "local arrange = require 'layouts.arrange' local floor", 1);
+        crate::support::Project::new(&[("x.lua", &text)]).refusal("check x.lua")
+    };
+    let refused = |arguments: &str| refused_call(&format!("arrange.add(scene, rng, {arguments})"));
+    assert_snapshot!(refused("{ { name = 'cube', asset = cube, at = { 0, 0.1 } } }"), @"x.lua:6: arrange.add.clearance: expected a number, got nil");
+    assert_snapshot!(refused("{ { nam = 'cube', asset = cube, at = { 0, 0.1 } } }, 0.02"), @r#"x.lua:6: arrange.add: objects[1]: unknown key "nam"; did you mean "name"?"#);
+    assert_snapshot!(refused("{ { name = 'cube', asset = cube, at = { 40, 140 } } }, 0.02"), @"x.lua:6: arrange.add: objects[1].at: (40, 140) m is out of the scene; lengths are in metres");
+    assert_snapshot!(refused("{ { name = 'cube', asset = cube, at = { 0, 0.1 }, yaw_range = 60 } }, 0.02"), @"x.lua:6: arrange.add: objects[1].yaw_range: expected radians up to a full turn, got 60; math.rad converts degrees");
+    assert_snapshot!(refused("{ { name = 'cube', asset = cube, at = { 0.9, 0.9 } } }, 0.02"), @"x.lua:6: object cube at (0.9, 0.9) m has nothing below it; place it above a support");
+    let far = refused_call("scene:add { name = 'cube', asset = cube, at = { 40, 140 } }");
+    assert_snapshot!(far, @"x.lua:6: object cube at (40, 140) m has nothing below it; place it above a support; lengths are in metres");
+    let turned = refused_call("scene:add { name = 'cube', asset = cube, at = { 0, 0.1 }, yaw = 60 }");
+    assert_snapshot!(turned, @"x.lua:6: scene:add.yaw: expected radians in -6.2832..6.2832, got 60; math.rad converts degrees");
+    let sunk = Small { shape: "softvt.shape.box { size = { 0.04, 0.04, 0.04 } }", ..Small::default() };
+    assert_snapshot!(sunk.project().refusal("check x.lua"), @"x.lua:6: objects cube and floor (placed at x.lua:5) overlap by 20 mm at the start; the shape of cube reaches 20 mm below its origin: end it with :grounded(), or move the objects apart");
+    let unknown = Small { at: "at = plac(0)", ..Small::default() };
+    let text = format!("local function place(x) return {{ x, 0 }} end {}", unknown.text());
+    let message = crate::support::Project::new(&[("x.lua", &text)]).refusal("check x.lua");
+    assert_snapshot!(message, @r#"x.lua:6: attempt to call a nil value (global 'plac'); did you mean "place"?"#);
+}
+
+#[test]
+fn a_layout_keeps_materials_near_those_of_the_assets() {
+    let refused = |change: &str| {
+        let at = "at = { 0, 0.1 } }";
+        let text = Small::default().text().replace(at, &format!("{at} {change}"));
+        crate::support::Project::new(&[("x.lua", &text)])
+    };
+    let cube = "scene:object 'cube'";
+    assert_snapshot!(refused(&format!("{cube}.youngs_pa = 1e9")).refusal("check x.lua"), @r#"x.lua:6: object.youngs_pa: the layout gives "cube" 50000 times the youngs_pa of its asset "cube", expected in 0.1..10; declare an asset of that material, or a shift"#);
+    assert_snapshot!(refused(&format!("{cube}:scale_mass(0.01)")).refusal("x.lua --out run"), @r#"x.lua:6: object.density: the layout gives "cube" 0.01 times the density of its asset "cube", expected in 0.1..10; declare an asset of that material, or a shift"#);
+    refused(&format!("{cube}.youngs_pa = 2e5 {cube}.density = 30")).succeeds("check x.lua");
 }
 
 #[test]
@@ -145,7 +185,7 @@ fn an_unreachable_pose_fails_its_episode_and_names_the_pose_that_was_asked_for()
 #[test]
 fn an_expert_may_catch_an_unreachable_pose() {
     let sent = gave_up("arm:command(softvt.pose { position = { 2, 0, 0.3 } }, 0)");
-    assert!(sent.starts_with("x.lua: unreachable pose: the tool gets no nearer to (2.000,"), "{sent}");
+    assert!(sent.starts_with("x.lua:12: unreachable pose: the tool gets no nearer to (2.000,"), "{sent}");
     let expert = "pcall(arm.move_to, arm, softvt.pose { position = { 2, 0, 0.3 } }) arm:wait(5)";
     let project = Small { expert, ..Small::default() }.project();
     project.succeeds("x.lua --out run");

@@ -227,7 +227,10 @@ fn flags_without_effect_are_refused() {
         ),
         ("--protocol vla-eval", "--protocol: applies to policy servers only; --policy expert ignores it"),
         ("--policy random --profile vision", "--profile: applies to policy servers only"),
-        ("--policy p.lua --gripper binary", "--gripper: applies to policy servers only; --policy p.lua"),
+        (
+            "--policy noop --gripper binary",
+            "--gripper: applies to policy servers and Lua policies only; --policy noop",
+        ),
         ("--policy q.lua", "q.lua: no such file"),
         ("--policy profile.lua", "profile.lua:"),
         (
@@ -338,4 +341,19 @@ fn arm_tactile_is_refused_where_it_is_not_available() {
         ),
         "{message}"
     );
+}
+
+#[test]
+fn a_policy_cannot_be_privileged_in_its_episodes_alone() {
+    let body = "act = function(obs) print('granted: ' .. tostring((pcall(softvt.soft, { youngs_pa = 1e4, poisson = 0.3, density = 300 }))))
+return { position = obs.position, axis_angle = obs.axis_angle, closure = 0 } end";
+    // The message about a missing module differed between loading and episodes.
+    let project = project(&format!(
+        "local _, why = pcall(require, 'no_such_module')
+local in_episode = tostring(why):find('was not loaded', 1, true) ~= nil
+return softvt.policy {{ name = 'flip', privileged = in_episode, {body} }}"
+    ));
+    let output = project.succeeds("x.lua --policy p.lua --threads 1 --out run");
+    assert!(output.err.contains("granted: false") && !output.err.contains("granted: true"), "{}", output.err);
+    assert_eq!(project.json("run/run.json")["privileged"], false);
 }

@@ -100,8 +100,9 @@ fn check_first_scenes(run: &SuiteRun, tasks: &[&Task]) -> Result<BTreeSet<String
         let builder = taken.map_or_else(|| SceneBuilder::open(run.loaded), Ok)?;
         let setup = builder.build(&run.episode_id(task, 0), &run.config.shifts)?;
         parallel::lock(&idle).push(builder);
-        let doubts = scene_doubts(task, &setup.scene);
-        run.check_scene(task, setup.scene)?;
+        let mut doubts = scene_doubts(task, &setup.scene, &run.assets);
+        let of_task = |doubt: String| format!("task {}: {doubt}", task.id);
+        doubts.extend(run.check_scene(task, setup.scene)?.map(of_task));
         Ok(doubts)
     };
     parallel::run(tasks.len(), run.config.threads(), cancel::requested, check, |_, found| {

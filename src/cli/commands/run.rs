@@ -57,9 +57,9 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
     let (config, loaded) =
         RunConfig::new(args.script, args.flags)?.load_plan(plan_flags::RUN, &args.policy)?;
     let (config, flags) = (&config, &config.flags);
-    if let Some(server) = config.policy.server() {
-        let Profile { name, actions, .. } = &server.profile;
-        eprint_notice(format!("gripper: {} (profile {name})", actions.gripper.code.name()));
+    if let Some(code) = config.policy.gripper {
+        let profile = config.policy.profile().map(|Profile { name, .. }| format!(" (profile {name})"));
+        eprint_notice(format!("gripper: {}{}", code.name(), profile.unwrap_or_default()));
     }
     check_video_episodes(config, &loaded.plan)?;
     check_recorded_episodes(config, &loaded.plan)?;

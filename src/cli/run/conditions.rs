@@ -136,6 +136,13 @@ fn condition_cases(
             changed.script.twin = Some(Twin::Rigid);
         }
         let not_applicable = not_applicable(condition, object_type);
+        // Settings of the command line are checked with the reference.
+        if not_applicable.is_none() && suite.settings.with_all(&config.settings).is_ok() {
+            suite.settings.with_all(&changed.settings).map_err(|error| {
+                let place = format!("suite {}, condition {:?}", suite.name, condition.name);
+                config.error(format!("set: {error}")).within(&place)
+            })?;
+        }
         cases.push(ConditionCase { condition: condition.clone(), folder, config: changed, not_applicable });
     }
     Ok(cases)

@@ -45,7 +45,7 @@ pub(crate) struct PolicyArgs {
     /// Protocol of a policy server [default: openpi]
     #[arg(long, value_name = "PROTOCOL")]
     protocol: Option<Protocol>,
-    /// Grip code, the meaning of an action's seventh number, in place of that of the profile: docs/policies.md
+    /// Grip code, the meaning of an action's gripper value, in place of that of the profile or the Lua policy: docs/policies.md
     #[arg(long, value_name = "CODE")]
     gripper: Option<GripCode>,
     /// Actions executed from each predicted chunk [default: 10 for servers]
@@ -60,9 +60,10 @@ pub(crate) struct PolicyArgs {
 }
 
 impl PolicyArgs {
-    /// The grip code that exports of a recording use. It is not that of a profile unless the policy is a server.
+    /// The grip code that exports of a recording use. Policies that are neither servers nor in Lua have none of their own.
     pub(crate) fn take_export_code(&mut self) -> Option<GripCode> {
-        if matches!(self.policy, Some(PolicyArg::Server(_))) { self.gripper } else { self.gripper.take() }
+        let has_code = matches!(self.policy, Some(PolicyArg::Server(_) | PolicyArg::Lua(_)));
+        if has_code { self.gripper } else { self.gripper.take() }
     }
 
     /// The policy that is loaded.
@@ -247,6 +248,8 @@ pub(crate) struct PolicyConfig {
     pub name: String,
     /// Actions executed from each chunk, for policies that predict chunks.
     pub replan: Option<usize>,
+    /// Grip code of the actions, if the profile, the file or the command line states one.
+    pub gripper: Option<GripCode>,
     /// File of a policy in Lua, as messages name it.
     pub file: Option<String>,
     /// SHA-256 of the files of the policy or of its profile, by name.
@@ -266,7 +269,16 @@ impl Default for PolicyConfig {
 impl PolicyConfig {
     fn new(kind: PolicyKind, name: String) -> Self {
         let privileged = matches!(kind, PolicyKind::Builtin(policy) if policy.grip_mode().is_some());
-        Self { kind, name, replan: None, file: None, sources: BTreeMap::new(), declared: None, privileged }
+        Self {
+            kind,
+            name,
+            replan: None,
+            gripper: None,
+            file: None,
+            sources: BTreeMap::new(),
+            declared: None,
+            privileged,
+        }
     }
 
     /// Loads the policy that the arguments select.
@@ -284,6 +296,7 @@ impl PolicyConfig {
                 Self {
                     name: file.name.clone(),
                     replan: replan.or(file.replan),
+                    gripper: args.gripper.or(file.gripper),
                     file: Some(file.sources.main.clone()),
                     sources: file.sources.bundle.hashes(),
                     declared: Some(DeclaredStreams { place, streams: file.streams.clone() }),
@@ -304,6 +317,7 @@ impl PolicyConfig {
                 Self {
                     name: profile.name.clone(),
                     replan: replan.or(Some(DEFAULT_REPLAN)),
+                    gripper: Some(profile.actions.gripper.code),
                     file: None,
                     sources,
                     declared: Some(declared),
@@ -350,6 +364,7 @@ impl PolicyConfig {
         Ok(Self {
             name: args.name.clone().unwrap_or_else(|| CLIENT.to_owned()),
             replan: None,
+            gripper: Some(profile.actions.gripper.code),
             file: None,
             sources,
             declared: Some(declared_streams(args, &profile)),
@@ -409,7 +424,7 @@ impl PolicyConfig {
         is_rigid_twin: bool,
     ) -> ControllerFactory {
         let (kind, suite) = (self.kind.clone(), suite.to_owned());
-        let replan = self.replan.unwrap_or(usize::MAX);
+        let (replan, gripper) = (self.replan.unwrap_or(usize::MAX), self.gripper);
         Box::new(move |opened, brief| {
             let chunked = |policy: Box<dyn Policy>, replan| -> Box<dyn Controller> {
                 Box::new(ChunkedPolicy::new(policy, brief.clone(), replan))
@@ -423,7 +438,7 @@ impl PolicyConfig {
                     chunked(Box::new(RecordedPolicy::from_actions(&actions, None)), 1)
                 }
                 (PolicyKind::Lua(file), _) => {
-                    let policy = file.start(&opened.seed)?;
+                    let policy = file.start(&opened.seed, gripper)?;
                     chunked(Box::new(policy), replan)
                 }
                 (PolicyKind::Builtin(BuiltinPolicy::Noop), _) => {
@@ -490,12 +505,13 @@ fn refuse_flags_without_effect(args: &PolicyArgs) -> Result<(), CliError> {
     let flags = [
         ("--profile", args.profile.is_some() && !is_server),
         ("--protocol", args.protocol.is_some() && !is_server),
-        ("--gripper", args.gripper.is_some() && !is_server),
+        ("--gripper", args.gripper.is_some() && !is_server && !is_lua),
         ("--policy-timeout", args.policy_timeout.is_some() && !is_server),
         ("--replan", args.replan.is_some() && !is_server && !is_lua),
     ];
     let Some((flag, _)) = flags.into_iter().find(|(_, is_ignored)| *is_ignored) else { return Ok(()) };
-    let kinds = if flag == "--replan" { "policy servers and Lua policies" } else { "policy servers" };
+    let of_both = ["--replan", "--gripper"].contains(&flag);
+    let kinds = if of_both { "policy servers and Lua policies" } else { "policy servers" };
     let policy = policy.word();
     Err(CliError::input(format!("{flag}: applies to {kinds} only; --policy {policy} ignores it")))
 }
@@ -550,13 +566,13 @@ mod tests {
             message(PolicyArgs { replan: Some(3), ..noop() }),
             "--replan: applies to policy servers and Lua policies only; --policy noop ignores it"
         );
+        assert_eq!(
+            message(PolicyArgs { gripper: Some(GripCode::Binary), ..noop() }),
+            "--gripper: applies to policy servers and Lua policies only; --policy noop ignores it"
+        );
         for (flag, args) in [
             ("--profile", PolicyArgs { profile: Some("vision".into()), ..noop() }),
             ("--protocol", PolicyArgs { protocol: Some(Protocol::VlaEval), ..noop() }),
-            (
-                "--gripper",
-                PolicyArgs { gripper: Some(GripCode::Binary), ..args(PolicyArg::Lua("x.lua".into())) },
-            ),
             ("--policy-timeout", PolicyArgs { policy_timeout: Some(DEFAULT_TIMEOUT), ..args(servo) }),
         ] {
             assert!(message(args).starts_with(&format!("{flag}: applies to policy servers only")));

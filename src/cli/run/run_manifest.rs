@@ -111,7 +111,7 @@ impl<'a> RunManifest<'a> {
             twin_of: run.suite.twin_of.as_deref(),
             policy: &config.policy.name,
             profile: config.policy.profile(),
-            gripper: config.policy.profile().map(|profile| profile.actions.gripper.code),
+            gripper: config.policy.gripper,
             served: config.policy.is_client().then_some(true),
             policy_file: config.policy.file.as_deref(),
             replayed: run.replay_source.as_ref(),

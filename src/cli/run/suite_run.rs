@@ -23,7 +23,7 @@ use softvt_evaluation::{
 use softvt_policy::{PolicyError, SensorStreams, TaskBrief, remote::PolicyConnections};
 use softvt_rollout::{
     AssetCache, BuildError, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SensorAssets, SensorSuite,
-    Simulation, cancel, check_goal, check_sensors,
+    Simulation, cancel, check_goal, check_sensors, cost_doubt,
 };
 use softvt_scene::{Body, Scene};
 use softvt_script::{EpisodeSetup, LoadedScript, SceneBuilder};
@@ -372,16 +372,16 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// Builds the first scene of a task and checks all that can be checked before anything moves. It settles only if
-    /// the goal may hold at the start.
+    /// the goal may hold at the start. Returns a doubt about its cost.
     ///
     /// # Errors
     /// A scene or sensor that is not valid.
-    pub(crate) fn check_scene(&self, task: &Task, scene: Scene) -> Result<(), CliError> {
+    pub(crate) fn check_scene(&self, task: &Task, scene: Scene) -> Result<Option<String>, CliError> {
         self.check_object_type(task, &scene)?;
         let scene = Arc::new(if self.config.is_rigid_twin() { scene.rigid_twin() } else { scene });
         let settings = &self.settings;
         let sense = |source| EpisodeError::Sense { task: task.id, episode: 0, source };
-        let check = || -> Result<(), EpisodeError> {
+        let check = || -> Result<Option<String>, EpisodeError> {
             check_sensors(&scene, &settings.tactile, &self.sensor_assets).map_err(sense)?;
             let sim = Simulation::new(scene.clone(), &settings.physics, &settings.robot, &self.assets)?;
             sim.check_support()?;
@@ -392,7 +392,8 @@ impl<'a> SuiteRun<'a> {
                 Episode::start(spec, &AssetCache::default(), &self.sensor_assets)?;
             }
             let mut sensors = SensorSuite::new(&sim, &settings.tactile, &self.sensor_assets);
-            sensors.check_camera_positions(&SensorSuite::frame(&sim)).map_err(sense)
+            sensors.check_camera_positions(&SensorSuite::frame(&sim)).map_err(sense)?;
+            Ok(cost_doubt(&sim.world))
         };
         check().map_err(|error| self.episode_error(&error))
     }

@@ -87,7 +87,21 @@ pub struct FemModel {
 /// exponent is that of the fill of nested dissection.
 const FACTOR_BYTES: f64 = 2048.0;
 
+/// Processor time of a simulated second (60 steps) of a body of n nodes at rest on a support over n^(3/2), s: of the order
+/// of that of cubes of 6 to 24 voxels per edge.
+const SECONDS: f64 = 8e-6;
+
 impl FemModel {
+    /// Estimated memory of the factor of a body of so many nodes, bytes.
+    pub fn estimated_bytes(nodes: usize) -> f64 {
+        FACTOR_BYTES * (nodes as f64).powf(4.0 / 3.0)
+    }
+
+    /// Estimated processor time of a simulated second of a body of so many nodes, s.
+    pub fn estimated_seconds(nodes: usize) -> f64 {
+        SECONDS * (nodes as f64).powf(1.5)
+    }
+
     /// Estimated memory of a body after its first step, bytes.
     pub fn bytes(&self) -> usize {
         let (nodes, elements) = (self.mesh.nodes.len(), self.mesh.elements.len());
@@ -95,7 +109,7 @@ impl FemModel {
             + elements * (size_of::<[u32; 8]>() + size_of::<OccupancyMask>() + 2 * size_of::<Mat3>())
             + self.samples.len() * size_of::<ContactSample>()
             + self.stiffness.len() * size_of::<Stiffness>();
-        own + (FACTOR_BYTES * (nodes as f64).powf(4.0 / 3.0)) as usize
+        own + Self::estimated_bytes(nodes) as usize
     }
 
     /// Builds the model of a shape with `resolution` voxels along its longest edge.

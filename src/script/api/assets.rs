@@ -12,10 +12,12 @@ use super::{
 };
 use crate::{
     schema::{
-        Constructed, FromChecked, Range, Record, RecordType, Type, functions, one_of, record, record_of,
+        Constructed, FromChecked, Range, Record, RecordType, Type, check::invalid, functions, one_of, record,
+        record_of,
     },
     vm::error::fail,
 };
+use softvt_common::text::format_number;
 use softvt_physics::contact::Friction;
 use softvt_scene::{Asset, Body, SoftMaterial, Visual};
 
@@ -94,7 +96,20 @@ one_of! {
 pub(crate) static CONSTRUCTORS: &[&Record] =
     &[AssetSpec::RECORD, SoftMaterial::RECORD, RigidSpec::RECORD, StaticSpec::RECORD, ScenerySpec::RECORD];
 
-fn check_asset(lua: &Lua, _: &Record, asset: &Table) -> mlua::Result<()> {
+/// Longest side of an object that a robot handles, m. More is nearly always another unit.
+const MAX_SIZE: f64 = 10.0;
+
+fn check_asset(lua: &Lua, record: &Record, asset: &Table) -> mlua::Result<()> {
+    let shape: LuaShape = FromChecked::from_checked(asset.raw_get("shape")?, lua)?;
+    let body: BodySpec = FromChecked::from_checked(asset.raw_get("body")?, lua)?;
+    let size = shape.copy().bounds().size();
+    if matches!(body, BodySpec::Soft(_) | BodySpec::Rigid(_)) && size.max() > MAX_SIZE {
+        let [x, y, z] = [size.x, size.y, size.z].map(|side| format_number((1e3 * side).round() / 1e3));
+        let message = format!(
+            "is {x} × {y} × {z} m, expected at most {MAX_SIZE} m; lengths are in metres (softvt.mesh takes scale = 0.001 for mm)"
+        );
+        return Err(invalid(lua, record.label, "shape", message));
+    }
     let Friction { static_mu, dynamic_mu, .. } = FromChecked::from_checked(asset.raw_get("friction")?, lua)?;
     if dynamic_mu <= static_mu {
         // An episode can use only files that were found when the script was loaded.

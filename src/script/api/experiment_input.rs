@@ -2,7 +2,7 @@
 
 use std::sync::{
     Arc,
-    atomic::{AtomicBool, Ordering},
+    atomic::{AtomicBool, AtomicUsize, Ordering},
 };
 
 use mlua::Lua;
@@ -19,6 +19,8 @@ pub struct ExperimentInput {
     has_simulation: AtomicBool,
     has_world: AtomicBool,
     has_random: AtomicBool,
+    /// Text of all rows so far, bytes.
+    row_text: AtomicUsize,
 }
 
 /// A part of the command line that would change nothing.
@@ -84,6 +86,11 @@ impl ExperimentInput {
     /// Key of the random numbers of a point.
     pub(crate) fn point_key(&self, index: usize) -> [String; 2] {
         [index.to_string(), self.seed.to_string()]
+    }
+
+    /// Adds the text of a row; returns that of all rows, bytes.
+    pub(crate) fn count_row_text(&self, bytes: usize) -> usize {
+        self.row_text.fetch_add(bytes, Ordering::Relaxed) + bytes
     }
 
     pub(crate) fn record_random(&self) {

@@ -97,8 +97,12 @@ impl Coroutine {
         if self.gave_up.is_some() {
             return Ok(None);
         }
+        let is_first = self.running.is_none();
         let values = self.resume(lua, view)?;
         if self.waiting().is_none() {
+            if is_first {
+                self.gave_up = Some(self.no_command_message());
+            }
             return Ok(None);
         }
         let mut values = values.into_iter();
@@ -124,25 +128,45 @@ impl Coroutine {
         }
     }
 
+    /// The reason of an expert that ended in its first step.
+    fn no_command_message(&self) -> String {
+        let info = self.function.info();
+        let file = info.source.as_deref().and_then(|source| source.strip_prefix('@')).unwrap_or("the script");
+        let line = info.line_defined.map_or(String::new(), |line| format!(":{line}"));
+        format!(
+            "{file}{line}: the expert ended without a command; it is called once and returns when the task is done"
+        )
+    }
+
     /// The coroutine, if it waits for the next control step.
     fn waiting(&self) -> Option<&Thread> {
         self.running.as_ref().map(|(thread, _)| thread).filter(|thread| thread.is_resumable())
     }
 
-    /// Ends the expert as `arm:give_up` does, with `complaint` and the line of the script as the reason.
+    /// Ends the expert as `arm:give_up` does, with `complaint` and the line of the script as the reason, unless the script
+    /// catches the error.
     pub(crate) fn abort(&mut self, lua: &Lua, complaint: &str, explain: impl Fn(&mlua::Error) -> String) {
-        if self.gave_up.is_none() {
-            let error = self.refuse(lua, complaint);
-            self.gave_up = Some(explain(&error).chars().take(MAX_REASON_CHARS).collect());
+        if self.gave_up.is_some() {
+            return;
         }
+        let error = match self.raise(complaint) {
+            Some(Ok(_)) => return,
+            Some(Err(error)) => error,
+            None => fail(lua, complaint),
+        };
+        self.gave_up = Some(explain(&error).chars().take(MAX_REASON_CHARS).collect());
     }
 
     /// Raises `complaint` where the script waits for the next control step, and returns the error.
     pub(crate) fn refuse(&mut self, lua: &Lua, complaint: &str) -> mlua::Error {
-        let waiting = self.waiting().filter(|_| self.gave_up.is_none());
-        let raised = waiting.and_then(|thread| thread.resume::<MultiValue>(complaint).err());
         // A script that is over, or that catches errors, has no line to show.
-        raised.unwrap_or_else(|| fail(lua, complaint))
+        self.raise(complaint).and_then(Result::err).unwrap_or_else(|| fail(lua, complaint))
+    }
+
+    /// Raises `complaint` where the script waits; `None` if it does not wait.
+    fn raise(&self, complaint: &str) -> Option<mlua::Result<MultiValue>> {
+        let waiting = self.waiting().filter(|_| self.gave_up.is_none())?;
+        Some(waiting.resume(complaint))
     }
 
     fn resume(&mut self, lua: &Lua, view: &ExpertView) -> mlua::Result<MultiValue> {

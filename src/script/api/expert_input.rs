@@ -214,6 +214,11 @@ const TRACKING_LIMIT: PoseTolerance = PoseTolerance { distance: 0.02, angle: 0.2
 /// A fast motion lags for fewer steps, and its command is found to be reachable otherwise.
 const MAX_LAG_STEPS: u32 = 20;
 
+/// Distance from the robot's base that the tool never reaches, m.
+const FAR: f64 = 2.0;
+/// Distance from the robot's base that a script gives in another unit by mistake, m.
+const OTHER_UNIT: f64 = 5.0;
+
 /// Detects commands that the arm cannot reach. A policy may command anything; in a script it is a mistake.
 #[derive(Debug, Default)]
 pub(crate) struct TrackingErrorMonitor {
@@ -227,19 +232,26 @@ impl TrackingErrorMonitor {
     /// A complaint for the script once the tool has been away for a second from a pose that it cannot reach.
     fn complaint(&mut self, sim: &Simulation) -> Option<String> {
         let ExpertCommand { pose_b: command_b, goal_b, .. } = self.command?;
+        let unreachable = |pose_b: &Pose| {
+            let miss = sim.robot.solve_ik(&sim.world, pose_b).err()?;
+            let is_away = miss.distance > TRACKING_LIMIT.distance || miss.angle > TRACKING_LIMIT.angle;
+            is_away.then_some(miss)
+        };
+        let base_w = &sim.robot.base_w;
+        // A motion to a far end may take minutes until the arm lags behind it.
+        let end_b = goal_b.unwrap_or(command_b);
+        if end_b.translation.vector.norm() > FAR
+            && let Some(miss) = unreachable(&end_b)
+        {
+            return Some(unreachable_message(&miss, base_w));
+        }
         let error = PoseDifference::between(&sim.robot.tool_b(&sim.world), &command_b);
         self.steps = if TRACKING_LIMIT.contains(&error) { 0 } else { self.steps + 1 };
         if self.steps < MAX_LAG_STEPS {
             return None;
         }
         self.steps = 0;
-        let unreachable = |pose_b: &Pose| {
-            let miss = sim.robot.solve_ik(&sim.world, pose_b).err()?;
-            let is_away = miss.distance > TRACKING_LIMIT.distance || miss.angle > TRACKING_LIMIT.angle;
-            is_away.then_some(miss)
-        };
         let miss = unreachable(&command_b)?;
-        let base_w = &sim.robot.base_w;
         // The command is a point on the way to what the script asked for.
         Some(match goal_b.filter(|goal_b| *goal_b != command_b) {
             None => unreachable_message(&miss, base_w),
@@ -265,9 +277,10 @@ fn position(pose_b: &Pose, base_w: &Pose) -> String {
 fn unreachable_message(miss: &UnreachablePose, base_w: &Pose) -> String {
     let target = base_w.transform_point(&miss.target_b.into());
     let base = base_w.translation.vector;
+    let unit = if miss.target_b.norm() > OTHER_UNIT { "; positions are in metres" } else { "" };
     format!(
         "unreachable pose: the tool gets no nearer to ({:.3}, {:.3}, {:.3}) m than {:.0} mm and {:.0}°; bring it nearer to \
-         the robot's base at ({:.3}, {:.3}, {:.3}) m or turn it towards straight down",
+         the robot's base at ({:.3}, {:.3}, {:.3}) m or turn it towards straight down{unit}",
         target.x,
         target.y,
         target.z,

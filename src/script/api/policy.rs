@@ -28,8 +28,13 @@ record! {
         /// Number of actions of a list that are executed before act is called again, unless --replan gives another; all
         /// by default.
         replan: Option<usize> = Type::Integer(Range::closed(1.0, MAX_CHUNK_LEN as f64));
+        /// Grip code, which says what the closure of an action commands, unless --gripper gives another: a closure
+        /// (continuous); open, or above 0.5 closed with the whole effort (binary); open, or the width given just after
+        /// closing (two-width). For force, actions have force. By default an action has closure, which is continuous, or
+        /// force.
+        gripper: Option<GripCode>;
         /// True to let the policy use limits and materials of objects: softvt.calibration, assets, and the modules
-        /// calibrated and experts. Its results say that it is privileged.
+        /// strain_sources and experts. Its results say that it is privileged.
         privileged: bool => Boolean(false);
     }
     /// A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame, and a closure or
@@ -41,7 +46,7 @@ record! {
         axis_angle: Option<[f64; 3]> = Type::vector(3, "rad, base frame");
         /// Orientation as quaternion.
         quaternion: Option<[f64; 4]> = Type::Quaternion("base frame");
-        /// Gripper closure: 0 is open, 1 is closed.
+        /// Gripper closure: 0 is open, 1 is closed. The grip code of the policy says what it commands.
         closure: Option<f64> = Type::Number("", Range::closed(0.0, 1.0));
         /// Grip force at which closing stops, at most robot.gripper.effort; below 0 opens.
         force: Option<f64> = Type::Number("N", Range::ANY);

@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     schema::{Constructed, Range, Type, class, object::fixed_list, record},
-    vm::error::{current_line, fail},
+    vm::error::{author_line, fail},
 };
 use softvt_common::{parallel::lock, text::format_number};
 use softvt_geometry::{Aabb, Pose, Quat, Vec3};
@@ -36,6 +36,9 @@ const POSITION: Type = Type::Vector(3, "m, world", COORDINATE);
 const COORDINATE: Range = Range::closed(-MAX_COORDINATE, MAX_COORDINATE);
 /// Static coefficient of a coating.
 pub(crate) const COATING: Type = Type::Number("", Range::above(0.0, 10.0));
+/// Rotation about the vertical. Larger ones are given in degrees by mistake.
+pub(crate) const YAW: Type = Type::Number("rad", Range::closed(-FULL_TURN, FULL_TURN));
+const FULL_TURN: f64 = 6.2832;
 /// Uniform scales of objects.
 const SCALE: Type = Type::Number("", Range::closed(0.1, 10.0));
 const CORNER: Type = Type::vector(3, "m, world");
@@ -65,7 +68,7 @@ record! {
         /// Position of its origin: its lowest point, on the centre line.
         position: Option<[f64; 3]> = POSITION;
         /// Rotation about the vertical.
-        yaw: f64 = Type::Number("rad", Range::ANY) => Number(0.0);
+        yaw: f64 = YAW => Number(0.0);
         /// Scene name of the object or part (cabinet.top_drawer) that it rests on (with at).
         on: Option<String>;
         /// Size relative to that of the asset. Its material stays, and its mass follows as the cube.
@@ -185,7 +188,7 @@ impl LuaScene {
         let at = position(lua, &scene, &spec)?;
         let rotation = Quat::from_axis_angle(&Vec3::z_axis(), spec.yaw);
         let joints = joints::start_values(lua, &asset, spec.joints.as_ref())?;
-        let placed_at = current_line(lua).map(|line| line.to_string()).unwrap_or_default();
+        let placed_at = author_line(lua).map(|line| line.to_string()).unwrap_or_default();
         let pose_w = Pose::from_parts(at.into(), rotation);
         let mut object = Object { joints, placed_at, ..Object::new(&name, asset, pose_w) };
         if spec.scale != 1.0 {
@@ -423,7 +426,7 @@ class! {
             /// Position of its origin: its lowest point, on the centre line.
             position: POSITION => pose_w.translation.vector;
             /// Rotation about the vertical.
-            yaw: Type::Number("rad", Range::ANY) => {
+            yaw: YAW => {
                 get(_, this) { this.read(|object| object.pose_w.rotation.euler_angles().2) }
                 set(lua, this, yaw: f64) {
                     let rotation = Quat::from_axis_angle(&Vec3::z_axis(), yaw);

@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use mlua::{Function, Lua, Table, Value};
+use serde_json::Value as Json;
 
 use super::{
     cameras::IMAGE_EDGE,
@@ -20,7 +21,7 @@ use crate::{
     schema::{Constructed, Range, Type, choice, class, functions, output},
     vm::{
         error::{app_data, fail},
-        json::deserialize,
+        json::{deserialize, to_json},
         memory_budget::{Reservation, reserve_in_world},
         value::finite,
         watchdog::Clock,
@@ -28,7 +29,7 @@ use crate::{
 };
 use softvt_benchmark::{
     seed::{EpisodeSeed, RandomStream},
-    settings::Settings,
+    settings::{Settings, SettingsError},
     steps_per_control,
 };
 use softvt_common::parallel::lock;
@@ -49,8 +50,31 @@ choice! { Side { "left" => Left, "right" => Right } }
 /// Reads a table of settings; `label` names it in messages.
 pub(crate) fn settings(lua: &Lua, label: &str, table: Option<&Table>) -> mlua::Result<Settings> {
     let Some(table) = table else { return Ok(Settings::default()) };
-    let settings: Settings = deserialize(lua, label, &Value::Table(table.clone()))?;
+    let value = Value::Table(table.clone());
+    let settings: Settings = deserialize(lua, label, &value).map_err(|error| {
+        // The message of a single field names it.
+        let data = to_json(lua, &value, label).unwrap_or_default();
+        let wrong = leaves(String::new(), &data).into_iter().find_map(|field| {
+            match Settings::default().check_fields(&[field]) {
+                Err(error @ SettingsError::Type { .. }) => Some(error),
+                _ => None,
+            }
+        });
+        wrong.map_or(error, |wrong| fail(lua, format!("{label}.{wrong}")))
+    })?;
     settings.validated().map_err(|e| fail(lua, format!("{label}: {e}")))
+}
+
+/// The single values of settings, with their dotted paths.
+fn leaves(path: String, data: &Json) -> Vec<(String, String)> {
+    match data {
+        Json::Object(group) => {
+            let below = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+            group.iter().flat_map(|(key, value)| leaves(below(key), value)).collect()
+        }
+        Json::String(text) => vec![(path, text.clone())],
+        other => vec![(path, other.to_string())],
+    }
 }
 
 /// The settings of a simulation: those of the script, then those of the command line.

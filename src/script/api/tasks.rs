@@ -203,7 +203,7 @@ record! {
     /// Summary of an experiment.
     FinishSpec: "softvt.Finish" as "finish" {
         /// Printed after the rows.
-        text: Option<String>;
+        text: Option<String> = Type::Line;
         /// Files to write, by relative path: text as it is, images as PNG, tables as JSON with sorted keys.
         files: BTreeMap<String, Value> = Type::Map(&Type::OneOf(&[
             Type::Line,
@@ -212,7 +212,7 @@ record! {
             Type::List(&Type::Any),
         ])) => Empty;
         /// Fault of the results. The files are written, then the command fails with this message.
-        problem: Option<String>;
+        problem: Option<String> = Type::Line;
     }
 }
 

@@ -5,9 +5,13 @@ pub(crate) mod policy_file;
 pub(crate) mod profile_file;
 pub(crate) mod variation_file;
 
-use std::{path::Path, sync::Arc};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+    sync::Arc,
+};
 
-use mlua::{Lua, Value};
+use mlua::{Lua, Table, Value};
 
 use crate::{
     api::{
@@ -19,16 +23,17 @@ use crate::{
     schema::{Constructed, FromChecked, HasTable, Record, RecordType, is_constructed, strict_table},
     vm::{
         Limits, Vm,
-        error::{ScriptError, fail},
+        error::{ScriptError, fail, fail_at},
         json::to_json,
         library::{Bundle, Library},
-        source_map::fail_at_key,
+        source_map::{fail_at_key, origin_of_key},
         value::{describe, describe_constructed, sorted_pairs},
     },
 };
 use options::{OptionSession, OptionSpec, SharedOptions};
 use softvt_benchmark::{
     Condition, Goal, GoalKind, ObjectType, Plan, Shift, ShiftValue, Suite, Task, Variation, seed::SecretSeed,
+    settings::Settings,
 };
 use softvt_common::{parallel::lock, text::unknown_name};
 
@@ -168,8 +173,28 @@ impl ScriptInstance {
             instance.vm.privilege.expect_declaration();
         }
         instance.result = instance.vm.run_main()?;
+        instance.check_result_size().map_err(|e| instance.vm.explain(&e))?;
         lock(&instance.options).check_all_consumed(main)?;
         Ok(instance)
+    }
+
+    /// Checks the size of the result before it is copied: tables and texts count each time that they are used.
+    fn check_result_size(&self) -> mlua::Result<()> {
+        let Some(Value::Table(result)) = &self.result else { return Ok(()) };
+        let lua = &self.vm.lua;
+        let mut size = ResultSize { left: MAX_RESULT_BYTES, path: Vec::new() };
+        match size.take_table(result)? {
+            true => Ok(()),
+            false => {
+                let limit = MAX_RESULT_BYTES >> 20;
+                let message = format!(
+                    "the script returns more than {limit} MiB of tables and texts, where each counts as often as it is used; \
+                     return fewer or shorter ones"
+                );
+                let place = size.path.iter().rev().find_map(|table| origin_of_key(lua, table, &[]));
+                Err(fail_at(lua, place, message))
+            }
+        }
     }
 
     /// True if the main file returned the result of the constructor of `record`.
@@ -218,17 +243,20 @@ impl ScriptInstance {
             let plans = "softvt.suite{…}, softvt.experiment{…} or a list of suites";
             fail(lua, format!("a script returns a plan ({plans}), got {got}"))
         })?;
+        if self.result::<ConditionsSpec>()?.is_none() {
+            let mut names = BTreeSet::new();
+            for spec in &specs {
+                if !names.insert(spec.name.as_str()) {
+                    let message = format!("two suites are named {:?}; rename one", spec.name);
+                    return Err(fail_at_key(lua, &spec.table, "name", message));
+                }
+            }
+        }
         let mut suites = specs.iter().map(|spec| suite(lua, spec)).collect::<mlua::Result<Vec<_>>>()?;
         if let Some(spec) = self.result::<ConditionsSpec>()? {
-            let conditions = spec.conditions.iter().map(|condition| self::condition(lua, condition));
-            let conditions = conditions.collect::<mlua::Result<_>>()?;
+            let condition = |condition| self::condition(lua, &spec.table, condition);
+            let conditions = spec.conditions.iter().map(condition).collect::<mlua::Result<_>>()?;
             return Ok(Plan::Conditions { name: spec.spec.name, suites, conditions });
-        }
-        for (index, spec) in specs.iter().enumerate() {
-            if specs[..index].iter().any(|other| other.name == spec.name) {
-                let message = format!("two suites are named {:?}; rename one", spec.name);
-                return Err(fail_at_key(lua, &spec.table, "name", message));
-            }
         }
         Ok(match self.returned(SuiteSpec::RECORD) {
             true => Plan::Suite(Box::new(suites.remove(0))),
@@ -276,6 +304,43 @@ impl ScriptInstance {
     }
 }
 
+/// Largest result of a main file, bytes.
+const MAX_RESULT_BYTES: usize = 64 << 20;
+/// Bytes that an entry of a table counts in addition to its texts.
+const BYTES_PER_ENTRY: usize = 32;
+/// Depth to which tables are counted; plans are less deep.
+const MAX_RESULT_DEPTH: usize = 16;
+
+/// The size that is left for the result of a main file.
+struct ResultSize {
+    left: usize,
+    /// The table that is counted, after those that contain it.
+    path: Vec<Table>,
+}
+
+impl ResultSize {
+    /// Subtracts a table with all tables below it. False if it is too large; `path` then leads to the excess.
+    fn take_table(&mut self, table: &Table) -> mlua::Result<bool> {
+        self.path.push(table.clone());
+        for entry in table.pairs::<Value, Value>() {
+            let (key, value) = entry?;
+            let text = |value: &Value| value.as_string().map_or(0, |text| text.as_bytes().len());
+            let Some(left) = self.left.checked_sub(BYTES_PER_ENTRY + text(&key) + text(&value)) else {
+                return Ok(false);
+            };
+            self.left = left;
+            if let Value::Table(inner) = &value
+                && self.path.len() < MAX_RESULT_DEPTH
+                && !self.take_table(inner)?
+            {
+                return Ok(false);
+            }
+        }
+        self.path.pop();
+        Ok(true)
+    }
+}
+
 /// The declarations of a task and its suite.
 pub(crate) struct FoundTask {
     pub suite: Constructed<SuiteSpec>,
@@ -293,7 +358,8 @@ fn install(vm: &Vm, options: &SharedOptions) -> mlua::Result<()> {
     strict_table(lua, "softvt", vm.api.clone(), names).map(|_| ())
 }
 
-fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Suite> {
+/// The suite of a declaration.
+pub(crate) fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Suite> {
     let name = spec.name.clone();
     if spec.tasks.is_empty() {
         let message = format!("suite.tasks: suite {name:?} has no tasks; give at least one");
@@ -304,16 +370,16 @@ fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Suite> {
         Variation::Spatial => 500,
     };
     let mut tasks: Vec<Task> = Vec::new();
+    let mut known = BTreeMap::new();
     for (id, task) in spec.tasks.iter().enumerate() {
         let table = &task.table;
         let task = self::task(lua, id, task, budget)?;
-        let words = |task: &Task| task.prompt.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
-        let is_same = |known: &&Task| words(known) == words(&task) && known.layout == task.layout;
-        if let Some(twin) = tasks.iter().find(is_same) {
+        let words: Vec<_> = task.prompt.split_whitespace().map(str::to_owned).collect();
+        if let Some(twin) = known.insert((words, task.layout.clone()), id) {
             let message = format!(
-                "task.prompt: tasks {} and {id} of suite {name:?} are both {:?} in the layout {:?}; a policy could not \
+                "task.prompt: tasks {twin} and {id} of suite {name:?} are both {:?} in the layout {:?}; a policy could not \
                  distinguish them",
-                twin.id, task.prompt, task.layout
+                task.prompt, task.layout
             );
             return Err(fail_at_key(lua, table, "prompt", message));
         }
@@ -376,7 +442,8 @@ fn task(lua: &Lua, id: usize, spec: &TaskSpec, budget: u32) -> mlua::Result<Task
     })
 }
 
-fn condition(lua: &Lua, spec: &ConditionSpec) -> mlua::Result<Condition> {
+/// A condition of the list `list`.
+fn condition(lua: &Lua, list: &Table, spec: &ConditionSpec) -> mlua::Result<Condition> {
     let shift =
         spec.shift.iter().map(|(name, value)| ShiftValue { name: name.clone(), value: *value }).collect();
     let mut set = Vec::new();
@@ -384,11 +451,18 @@ fn condition(lua: &Lua, spec: &ConditionSpec) -> mlua::Result<Condition> {
         let text = match &value {
             Value::String(text) => text.to_string_lossy(),
             // Counts must stay whole: JSON would write 2 as 2.0.
-            Value::Integer(number) => number.to_string(),
+            Value::Number(number) if number.fract() == 0.0 && number.abs() < 9e15 => {
+                (*number as i64).to_string()
+            }
             other => to_json(lua, other, "conditions.set")?.to_string(),
         };
         set.push((key.to_string()?, text));
     }
+    // Ranges may depend on the settings of the suite and are checked with them.
+    Settings::default().check_fields(&set).map_err(|error| {
+        let message = format!("condition {:?}: set: {error}", spec.name);
+        fail_at_key(lua, list, "conditions", message)
+    })?;
     Ok(Condition {
         name: spec.name.clone(),
         shift,

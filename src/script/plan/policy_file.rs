@@ -16,15 +16,16 @@ use crate::{
         Limits,
         error::ScriptError,
         list::plain,
-        source_map::origin_of_key,
+        source_map::{fail_at_key, origin_of_key},
         value::{describe, literal, number},
     },
 };
 use softvt_benchmark::seed::{EpisodeSeed, RandomStream};
 use softvt_geometry::Vec3;
 use softvt_policy::{
-    ActionChunk, GripCommand, Observation, Policy, PolicyError, SensorStreams, TaskBrief, ToolCommand,
-    ToolMotion, decode::MAX_CHUNK_LEN,
+    ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief, ToolCommand, ToolMotion,
+    decode::MAX_CHUNK_LEN,
+    profile::{GripCode, GripperValues},
 };
 use softvt_robot::rotation;
 
@@ -34,6 +35,8 @@ pub struct PolicyFile {
     pub name: String,
     /// Number of actions of a list that are executed, if the file sets it.
     pub replan: Option<usize>,
+    /// Grip code, if the file declares one.
+    pub gripper: Option<GripCode>,
     /// Observations of the policy.
     pub streams: SensorStreams,
     /// True if the policy observes the finger drives: the exact width and the commanded closure.
@@ -66,21 +69,46 @@ impl PolicyFile {
                 let observes_at = origin_of_key(&instance.vm.lua, &policy.table, &["observes", "cameras"]);
                 Ok((policy.spec, observes_at))
             })?;
-        let PolicySpec { name, observes, replan, privileged, .. } = spec;
+        let PolicySpec { name, observes, replan, gripper, privileged, .. } = spec;
         let observes_at = observes_at.map_or_else(|| sources.main.clone(), |line| line.to_string());
         let (streams, drives) = (observes.streams(), observes.drives);
-        Ok(Self { name, replan, streams, drives, privileged, observes_at, sources })
+        Ok(Self { name, replan, gripper, streams, drives, privileged, observes_at, sources })
     }
 
-    /// Starts the policy of an episode in a virtual machine of its own.
+    /// Starts the policy of an episode in a virtual machine of its own. Its actions are read in the grip code `gripper`,
+    /// or in that of the file.
     ///
     /// # Errors
-    /// If the file fails.
-    pub fn start(&self, seed: &EpisodeSeed) -> Result<LuaPolicy, ScriptError> {
+    /// If the file fails, or declares something else than when it was loaded.
+    pub fn start(&self, seed: &EpisodeSeed, gripper: Option<GripCode>) -> Result<LuaPolicy, ScriptError> {
         let instance = self.sources.instance()?;
-        let PolicySpec { act, reset, .. } = instance.policy()?.spec;
+        let policy = instance.policy()?;
+        self.check_declaration(&instance, &policy)?;
+        let PolicySpec { act, reset, .. } = policy.spec;
         instance.vm.random.reseed(seed.stream(RandomStream::Policy));
-        Ok(LuaPolicy { file: self.clone(), instance, act, reset })
+        let gripper = gripper.or(self.gripper);
+        Ok(LuaPolicy { file: self.clone(), instance, act, reset, gripper })
+    }
+
+    /// Checks that the file declares in an episode what it declared when it was loaded, which its results state.
+    fn check_declaration(
+        &self,
+        instance: &ScriptInstance,
+        again: &Constructed<PolicySpec>,
+    ) -> Result<(), ScriptError> {
+        let changed = [
+            ("name", again.name != self.name),
+            ("privileged", again.privileged != self.privileged),
+            ("observes", again.observes.streams() != self.streams || again.observes.drives != self.drives),
+            ("replan", again.replan != self.replan),
+            ("gripper", again.gripper != self.gripper),
+        ];
+        let Some((key, _)) = changed.into_iter().find(|(_, is_changed)| *is_changed) else { return Ok(()) };
+        let message = format!(
+            "policy.{key}: the file gave another value when it was loaded; declare the same each time that the file runs"
+        );
+        let vm = &instance.vm;
+        Err(vm.explain(&fail_at_key(&vm.lua, &again.table, key, message)))
     }
 }
 
@@ -101,6 +129,8 @@ pub struct LuaPolicy {
     instance: ScriptInstance,
     act: Function,
     reset: Option<Function>,
+    /// Grip code of the actions; any that an action shows by its fields if `None`.
+    gripper: Option<GripCode>,
 }
 
 impl Policy for LuaPolicy {
@@ -187,13 +217,20 @@ impl LuaPolicy {
             (None, Some(wxyz)) => rotation::axis_angle(&rotation_from_wxyz(wxyz).unwrap_or_default()),
             _ => return Err(ValidationError::new("give either axis_angle or quaternion")),
         };
-        let grip = match (spec.closure, spec.force) {
-            (Some(closure), None) => GripCommand::Closure(closure),
-            (None, Some(force)) => GripCommand::Force(force),
-            _ => return Err(ValidationError::new("give either closure or force")),
+        let (code, value) = match (self.gripper, spec.closure, spec.force) {
+            (None, Some(closure), None) => (GripCode::Continuous, closure),
+            (None | Some(GripCode::Force), None, Some(force)) => (GripCode::Force, force),
+            (Some(code), Some(closure), None) if code != GripCode::Force => (code, closure),
+            (None, ..) => return Err(ValidationError::new("give either closure or force")),
+            (Some(code), ..) => {
+                let field = if code == GripCode::Force { "force" } else { "closure" };
+                let message = format!("the grip code of the policy is {:?}; give {field} alone", code.name());
+                return Err(ValidationError::new(message));
+            }
         };
+        let values = GripperValues { code, ..GripperValues::new(0.0, 1.0) };
         let motion = ToolMotion::Pose { position_b: Vec3::from(spec.position), axis_angle_b };
-        Ok(ToolCommand { motion, grip })
+        Ok(ToolCommand { motion, grip: values.command(value) })
     }
 
     /// True if a field of an action is NaN or infinite: that fails the episode and not the run.

@@ -11,17 +11,17 @@ use crate::{
         expert_input::SuiteInstances,
         random::LuaRng,
         scene::{LuaScene, empty_scene},
-        tasks::GoalSpec,
+        tasks::{GoalSpec, SuiteSpec},
     },
-    plan::{FoundTask, LoadedScript, ScriptInstance},
-    schema::{HasTable, Range},
+    plan::{self, FoundTask, LoadedScript, ScriptInstance},
+    schema::{Constructed, HasTable, Range},
     vm::{
         error::{ScriptError, fail},
         source_map::fail_at_key,
     },
 };
 use softvt_benchmark::{
-    Shift, ShiftValue,
+    Shift, ShiftValue, Suite,
     seed::{EpisodeSeed, RandomStream, SecretSeed},
     variation::{DrawError, VariationRanges},
 };
@@ -73,8 +73,8 @@ impl EpisodeSetup {
 /// changes is seen by the next.
 pub struct SceneBuilder {
     instance: Arc<ScriptInstance>,
-    /// Ranges of the suites that vary, by name.
-    ranges: BTreeMap<String, VariationRanges>,
+    /// The suites of the plan, by name.
+    suites: BTreeMap<String, Suite>,
     secret: Option<SecretSeed>,
 }
 
@@ -84,9 +84,9 @@ impl SceneBuilder {
     /// # Errors
     /// If the script fails.
     pub fn open(loaded: &LoadedScript) -> Result<Self, ScriptError> {
-        let suites = loaded.plan.suites().iter();
-        let ranges = suites.filter_map(|suite| Some((suite.name.clone(), suite.vary.clone()?))).collect();
-        Ok(Self { instance: Arc::new(loaded.sources.instance()?), ranges, secret: loaded.secret.clone() })
+        let suites = loaded.plan.suites().iter().map(|suite| (suite.name.clone(), suite.clone()));
+        let instance = Arc::new(loaded.sources.instance()?);
+        Ok(Self { instance, suites: suites.collect(), secret: loaded.secret.clone() })
     }
 
     /// Builds the initial scene of an episode.
@@ -96,6 +96,8 @@ impl SceneBuilder {
     pub fn build(&self, id: &EpisodeId, shifts: &[ShiftValue]) -> Result<EpisodeSetup, ScriptError> {
         let vm = &self.instance.vm;
         let FoundTask { suite, task } = self.instance.find_task(&id.suite, id.task)?;
+        self.check_suite(&suite).map_err(|e| vm.explain(&e))?;
+        let ranges = self.suites.get(&id.suite).and_then(|suite| suite.vary.as_ref());
         // A twin has the initial states of the suite whose twin it is.
         let seed_suite = suite.twin_of.clone().unwrap_or_else(|| id.suite.clone());
         let seed = EpisodeSeed::new(id, &task.layout.name).with_secret(self.secret.as_ref());
@@ -104,8 +106,8 @@ impl SceneBuilder {
         let mut current = LuaScene::new(empty_scene());
         let rng = LuaRng::new(seed.clone(), RandomStream::Layout);
         vm.call::<()>(&task.layout.build, (current.clone(), rng))?;
-        let varied =
-            self.ranges.get(&id.suite).map(|ranges| vary(&vm.lua, &mut lock(&current.scene), ranges, &seed));
+        check_materials(&lock(&current.scene))?;
+        let varied = ranges.map(|ranges| vary(&vm.lua, &mut lock(&current.scene), ranges, &seed));
         let variation = varied.transpose().map_err(|error| vm.explain(&error))?;
         let mut nominal = lock(&current.scene).clone();
         current = current.for_task(task.goal.object(), &task.prompt);
@@ -125,12 +127,29 @@ impl SceneBuilder {
         check_goal(&vm.lua, &task.goal, &scene).map_err(|e| vm.explain(&e))?;
         check_workspace(&scene)
             .map_err(|what| vm.explain(&fail_at_key(&vm.lua, &task.layout.table, "build", what)))?;
-        let largest = self.ranges.get(&id.suite).map_or(1.0, |ranges| ranges.size.max);
+        let largest = ranges.map_or(1.0, |ranges| ranges.size.max);
         check_width(&scene, task.goal.object(), variation.as_ref(), largest)?;
         let (instance, expert) = (self.instance.clone(), task.expert.clone());
-        let ranges = self.ranges.get(&id.suite).cloned();
+        let ranges = ranges.cloned();
         let instances = Arc::new(SuiteInstances::new(&suite, ranges));
         Ok(EpisodeSetup { scene, nominal, variation, prompt, seed, instance, expert, instances })
+    }
+
+    /// Checks that the script declares the suite of the plan again.
+    fn check_suite(&self, spec: &Constructed<SuiteSpec>) -> mlua::Result<()> {
+        let lua = &self.instance.vm.lua;
+        let again = plan::suite(lua, spec)?;
+        // The variation may be that of the command line.
+        let is_same = |planned: &Suite| *planned == Suite { vary: planned.vary.clone(), ..again.clone() };
+        if self.suites.get(&spec.name).is_some_and(is_same) {
+            return Ok(());
+        }
+        let message = format!(
+            "suite {:?} differs from that of the plan, which the same file gave before; return the same suite each time that \
+             the file runs",
+            spec.name
+        );
+        Err(fail_at_key(lua, &spec.table, "tasks", message))
     }
 
     /// The result of a shift's function: a scene, or nothing if it changed the given one.
@@ -181,6 +200,30 @@ fn vary(
     })?;
     drawn.apply(scene);
     Ok(drawn)
+}
+
+/// Factors by which a layout may change the material of an object: those that a variation may draw.
+const MATERIAL_FACTORS: Range = Range::closed(0.1, 10.0);
+
+/// Checks the materials that the layout has changed. Limits of D stay those of the asset, and records have the factors of
+/// shifts and variations alone.
+fn check_materials(scene: &Scene) -> Result<(), ScriptError> {
+    for object in &scene.objects {
+        let factors = [("youngs_pa", object.youngs_factor()), ("density", object.density_factor())];
+        for (key, factor) in factors {
+            let Some(factor) = factor.filter(|factor| !MATERIAL_FACTORS.holds(*factor)) else { continue };
+            let message = format!(
+                "object.{key}: the layout gives {:?} {} times the {key} of its asset {:?}, expected{}; declare an asset of \
+                 that material, or a shift",
+                object.name,
+                format_number(factor),
+                object.nominal.name,
+                MATERIAL_FACTORS.describe()
+            );
+            return Err(ScriptError::new(object.placed_at.as_str(), message));
+        }
+    }
+    Ok(())
 }
 
 /// Checks that an object that was scaled fits between the fingers. `largest` is the largest factor that the variation can

@@ -116,7 +116,7 @@ impl Experiment {
         if vm.random.has_drawn() {
             self.input.record_random();
         }
-        rows(&vm.lua, &result).map_err(|e| vm.explain(&e))
+        rows(&vm.lua, &result, &self.input).map_err(|e| vm.explain(&e))
     }
 
     /// Passes all rows, in the order of points, to the experiment's `finish`.
@@ -134,12 +134,25 @@ impl Experiment {
     }
 }
 
+/// Text of a row, with its keys, bytes.
+fn text_bytes(row: &ExperimentRow) -> usize {
+    fn of(value: &Json) -> usize {
+        match value {
+            Json::String(text) => text.len(),
+            Json::Array(items) => items.iter().map(of).sum(),
+            Json::Object(entries) => text_bytes(entries),
+            _ => 0,
+        }
+    }
+    row.iter().map(|(key, value)| key.len() + of(value)).sum()
+}
+
 fn read_summary(lua: &Lua, value: &Value) -> mlua::Result<ExperimentSummary> {
     if value.is_nil() {
         return Ok(ExperimentSummary::default());
     }
     let spec = FinishSpec::from_checked(Value::Table(validate(lua, FinishSpec::RECORD, value)?), lua)?;
-    let mut files = Vec::new();
+    let (mut files, mut bytes) = (Vec::new(), 0);
     for (path, content) in spec.files {
         let is_inside =
             |part: &str| !part.is_empty() && part != "." && part != ".." && !part.contains(['\\', ':']);
@@ -151,7 +164,16 @@ fn read_summary(lua: &Lua, value: &Value) -> mlua::Result<ExperimentSummary> {
                 format!("finish.files: {path:?} leads out of the folder; give a path without \"..\"");
             return Err(fail(lua, message));
         }
-        files.push((path, file_content(lua, &content)?));
+        let content = file_content(lua, &content)?;
+        bytes += content.len();
+        if bytes > MAX_FILES_BYTES {
+            let limit = MAX_FILES_BYTES >> 20;
+            return Err(fail(
+                lua,
+                format!("finish.files: take more than {limit} MiB; write fewer or smaller ones"),
+            ));
+        }
+        files.push((path, content));
     }
     Ok(ExperimentSummary { text: spec.text, files, problem: spec.problem })
 }
@@ -174,9 +196,34 @@ fn file_content(lua: &Lua, content: &Value) -> mlua::Result<Vec<u8>> {
     Ok((text + "\n").into_bytes())
 }
 
-fn rows(lua: &Lua, result: &Value) -> mlua::Result<Vec<ExperimentRow>> {
+/// Text in one row, bytes.
+const MAX_ROW_TEXT: usize = 1 << 20;
+/// Text in all rows of an experiment, bytes; they are kept until its end.
+const MAX_ROWS_TEXT: usize = 256 << 20;
+/// All files of an experiment together, bytes.
+const MAX_FILES_BYTES: usize = 256 << 20;
+
+fn rows(lua: &Lua, result: &Value, input: &ExperimentInput) -> mlua::Result<Vec<ExperimentRow>> {
     let row = |value: &Value| match to_json(lua, value, "experiment.run: row")? {
-        Json::Object(map) => Ok(map),
+        Json::Object(map) => {
+            let bytes = text_bytes(&map);
+            let too_much = |what: &str, limit: usize| {
+                let limit = limit >> 20;
+                Err(fail(
+                    lua,
+                    format!(
+                        "experiment.run: {what} more than {limit} MiB of text; return long texts as finish.files"
+                    ),
+                ))
+            };
+            if bytes > MAX_ROW_TEXT {
+                return too_much("a row has", MAX_ROW_TEXT);
+            }
+            if input.count_row_text(bytes) > MAX_ROWS_TEXT {
+                return too_much("the rows have", MAX_ROWS_TEXT);
+            }
+            Ok(map)
+        }
         _ => {
             let message =
                 format!("experiment.run: expected a row or a list of rows, got {}", describe(value));

@@ -14,6 +14,9 @@ use softvt_common::text::{suggest, unknown_name};
 /// Numbers whose largest magnitude is smaller have no direction.
 pub(crate) const MIN_LENGTH: f64 = 1e-9;
 
+/// Longest prompt, name or other short text, bytes. Plans copy texts, which scripts may share.
+const MAX_TEXT_BYTES: usize = 4096;
+
 impl Type {
     /// Checks `value` and returns it as it is stored: numbers converted, lists of the host as plain tables, nested tables
     /// as copies with their defaults.
@@ -24,7 +27,15 @@ impl Type {
         {
             return Err(ValidationError::new(format!("expected UTF-8 text, got {}", describe(value))));
         }
-        let wrong = || self.expected(&describe(value));
+        let wrong = || {
+            let error = self.expected(&describe(value));
+            match (self, number(value)) {
+                (Self::Number("rad", _), Some(_)) => {
+                    ValidationError::new(format!("{}; math.rad converts degrees", error.message))
+                }
+                _ => error,
+            }
+        };
         let kept = |accepted: bool| if accepted { Ok(value.clone()) } else { Err(wrong()) };
         match (self, value) {
             (Self::Number(_, range), _) => {
@@ -32,6 +43,11 @@ impl Type {
             }
             (Self::Integer(range), _) => {
                 whole(value).filter(|n| range.holds(*n as f64)).map(Value::Integer).ok_or_else(wrong)
+            }
+            (Self::Text, Value::String(text)) if text.as_bytes().len() > MAX_TEXT_BYTES => {
+                let message =
+                    format!("expected a text of at most {MAX_TEXT_BYTES} bytes, got {}", describe(value));
+                Err(ValidationError::new(message))
             }
             (Self::Text, Value::String(text)) => kept(!text.as_bytes().is_empty()),
             (Self::Name, Value::String(text)) => kept(is_name(&text.to_string_lossy())),

@@ -395,3 +395,17 @@ fn the_workspace_is_a_box_within_reach_of_the_arm() {
         ))
     );
 }
+
+#[test]
+fn an_episode_of_another_suite_than_that_of_the_plan_is_refused() {
+    let text = format!("{SUITE}return suite()");
+    let project = Project::new(&[("x.lua", &text)]);
+    let mut loaded = project.load("x.lua", &[]).expect("a suite");
+    let id = EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };
+    assert!(EpisodeSetup::open(&loaded, &id, &[]).is_ok());
+    let Plan::Suite(suite) = &mut loaded.plan else { panic!("a suite") };
+    suite.tasks[0].goal.target = "ball".into();
+    let Err(error) = EpisodeSetup::open(&loaded, &id, &[]) else { panic!("another goal") };
+    assert!(error.message.starts_with("suite \"test\" differs from that of the plan"), "{error}");
+    assert!(error.line.is_some(), "{error}");
+}

@@ -277,3 +277,45 @@ fn a_file_that_never_ends_is_refused() {
         "suites/big.lua:1: is not UTF-8 text; save the file as UTF-8"
     );
 }
+
+#[test]
+fn texts_that_are_shared_are_counted_each_time() {
+    let piece = "local n, piece = 0, ('local a = 1 '):rep(1e4)";
+    let pieces = "load(function() n = n + 1 return n <= 100 and piece or nil end)";
+    refused(&format!("{piece}\n{pieces}"), "x.lua:3: load: the text is longer than 1 MiB; load it in parts");
+    refused("local text = ('-'):rep(2e6)\nload(text)", "x.lua:3: load: the text is longer than 1 MiB");
+    assert_eq!(run("return { a = load('return 7')() }"), Ok("[{\"a\":7}]".into()));
+    refused(
+        "return { a = ('x'):rep(6e5), b = ('x'):rep(6e5) }",
+        "experiment.run: a row has more than 1 MiB of text; return long texts as finish.files",
+    );
+    refused(
+        "local row, rows = { a = ('x'):rep(1e6) }, {} for i = 1, 300 do rows[i] = row end return rows",
+        "experiment.run: the rows have more than 256 MiB of text",
+    );
+    let long = SUITE.replace("prompt = \"lift the ball\"", "prompt = ('x'):rep(5000)");
+    let message = error_of(&(long + "return suite()"));
+    assert!(
+        message.starts_with("suites/x.lua:13: task.prompt: expected a text of at most 4096 bytes, got \"xxx"),
+        "{message}"
+    );
+    // A list of the same suite, whose tasks are all the same.
+    let many = SUITE.replace("prompt = \"lift the ball\"", "prompt = ('x'):rep(4000)");
+    let many = many
+        .replace("tasks = { softvt.task {", "tasks = many(softvt.task {")
+        .replace("    } },\n  }\nend", "    }),\n  }\nend");
+    let many =
+        format!("local function many(x) local t = {{}} for i = 1, 2000 do t[i] = x end return t end\n{many}");
+    for result in ["return suite()", "return many(suite())"] {
+        let project = Project::new(&[("x.lua", &format!("{many}{result}"))]);
+        let limits = Limits { load: Duration::from_secs(20), memory_bytes: 64 << 20, ..limits() };
+        let message = project.load_with("x.lua", &[], &limits).unwrap_err().to_string();
+        let expected = match result {
+            "return suite()" => "task.prompt: tasks 0 and 1 of suite \"test\" are both",
+            _ => {
+                "the script returns more than 64 MiB of tables and texts, where each counts as often as it is used"
+            }
+        };
+        assert!(message.contains(expected) && message.contains("x.lua:1"), "{message}");
+    }
+}

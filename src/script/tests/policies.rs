@@ -11,7 +11,7 @@ use softvt_evaluation::episode_id::Split;
 use softvt_geometry::Vec3;
 use softvt_policy::{
     Action, ActionChunk, CameraImage, GripCommand, Observation, Policy, PolicyError, RobotState,
-    TactileFrame, TactileHistory, TaskBrief, ToolCommand, ToolMotion,
+    SensorStreams, TactileFrame, TactileHistory, TaskBrief, ToolCommand, ToolMotion,
     profile::{GripCode, Profile},
 };
 use softvt_sensing::tactile::Markers;
@@ -71,7 +71,7 @@ fn policy(body: &str) -> (Project, LuaPolicy) {
 fn start(text: &str) -> (Project, LuaPolicy) {
     let project = Project::new(&[("p.lua", text)]);
     let file = PolicyFile::load_with(&project.path("p.lua"), &limits()).unwrap();
-    let policy = file.start(&seed(0)).unwrap();
+    let policy = file.start(&seed(0), None).unwrap();
     (project, policy)
 }
 
@@ -219,7 +219,7 @@ fn an_episode_is_a_function_of_its_seed_and_no_other_episode() {
     let project = Project::new(&[("p.lua", &text)]);
     let file = PolicyFile::load_with(&project.path("p.lua"), &limits()).unwrap();
     let episode = |number: u32| -> Vec<ToolCommand> {
-        let mut policy = file.start(&seed(number)).unwrap();
+        let mut policy = file.start(&seed(number), None).unwrap();
         policy.reset(&brief()).unwrap();
         (0..3).flat_map(|_| policy.act(&observation()).unwrap().commands).collect()
     };
@@ -258,7 +258,7 @@ fn the_shipped_policies_act() {
         let path = format!("{}/../../scripts/policies/{name}.lua", env!("CARGO_MANIFEST_DIR"));
         let file = PolicyFile::load(path.as_ref()).unwrap();
         assert_eq!(file.name, name);
-        let mut policy = file.start(&seed(0)).unwrap();
+        let mut policy = file.start(&seed(0), None).unwrap();
         policy.reset(&brief()).unwrap();
         let chunk = policy.act(&observation()).unwrap();
         let ToolMotion::Pose { position_b, .. } = chunk.commands[0].motion else { panic!("a pose") };
@@ -393,7 +393,7 @@ fn limits_and_materials_are_refused_to_a_policy_that_does_not_declare_them() {
     };
     let declared = |more: &str| format!("return softvt.policy {{ name = 'p', {more} act = function() end }}");
     for access in [
-        "require 'calibrated'",
+        "require 'strain_sources'",
         "require 'experts.grasp'",
         "require 'experts.pick_place'",
         "require 'assets.cube'",
@@ -418,4 +418,121 @@ fn limits_and_materials_are_refused_to_a_policy_that_does_not_declare_them() {
     );
     let error = late.act(&observation()).expect_err("no limit").to_string();
     assert!(error.contains("softvt.calibration: a policy has no access"), "{error}");
+}
+
+#[test]
+fn a_copy_of_a_hidden_module_is_refused_under_any_name() {
+    let hidden = |path: &str| std::str::from_utf8(crate::embedded(path).expect("embedded")).expect("text");
+    let own = "return { strains = { 0.1, 0.2 } }";
+    let policy = |module: &str| {
+        format!("local x = require '{module}'\nreturn softvt.policy {{ name = 'p', act = function() end }}")
+    };
+    let load = |module: &str| {
+        let project = Project::new(&[
+            ("p.lua", &policy(module)),
+            ("strains.lua", hidden("scripts/strain_sources.lua")),
+            ("bun.lua", hidden("assets/steamed_bun.lua")),
+            ("scripts/strain_sources.lua", own),
+            ("copied.lua", own),
+            ("other.lua", "return { strains = { 0.1, 0.3 } }"),
+        ]);
+        #[cfg(unix)]
+        std::os::unix::fs::symlink(project.path("scripts/strain_sources.lua"), project.path("link.lua"))
+            .unwrap();
+        PolicyFile::load_with(&project.path("p.lua"), &Limits { load: Duration::from_secs(10), ..limits() })
+            .map(|file| file.privileged)
+            .map_err(|error| error.to_string())
+    };
+    for module in [
+        "strains",
+        "bun",
+        "copied",
+        "strain_sources",
+        #[cfg(unix)]
+        "link",
+    ] {
+        let message = load(module).expect_err(module);
+        let expected = format!("p.lua:1: require \"{module}\": a policy has no access to limits");
+        assert!(message.contains(&expected), "{message}");
+    }
+    assert_eq!(load("other"), Ok(false));
+}
+
+#[test]
+fn a_policy_declares_the_same_in_every_episode() {
+    let text = "return softvt.policy { name = 'p',\nprivileged = false, act = function() end }";
+    let project = Project::new(&[("p.lua", text)]);
+    let file = PolicyFile::load_with(&project.path("p.lua"), &limits()).unwrap();
+    assert!(file.start(&seed(0), None).is_ok());
+    for (loaded, key, line) in [
+        (PolicyFile { privileged: true, ..file.clone() }, "privileged", 2),
+        (PolicyFile { name: "q".into(), ..file.clone() }, "name", 1),
+        (PolicyFile { replan: Some(2), ..file.clone() }, "replan", 1),
+        (PolicyFile { gripper: Some(GripCode::Binary), ..file.clone() }, "gripper", 1),
+        (
+            PolicyFile { streams: SensorStreams { force: true, ..SensorStreams::default() }, ..file.clone() },
+            "observes",
+            1,
+        ),
+    ] {
+        let Err(error) = loaded.start(&seed(0), None) else { panic!("{key} has changed") };
+        let expected = format!("policy.{key}: the file gave another value when it was loaded");
+        assert!(error.message.starts_with(&expected) && error.line == Some(line), "{error}");
+    }
+}
+
+#[test]
+fn a_policy_cannot_tell_an_episode_from_its_loading() {
+    // The texts of errors are all that a file learns about the disk.
+    let text = "local said = ''
+for _, request in ipairs { 'no_such_module', '../p', 'broken' } do said = said .. select(2, pcall(require, request)) end
+said = said .. select(2, pcall(softvt.mesh, { file = 'no_such_mesh.stl' })) .. select(2, pcall(softvt.mesh, { file = 'folder/cut.stl' }))
+return softvt.policy { name = ('p_%d'):format(#said), act = function() error(said) end }";
+    let project = Project::new(&[("p.lua", text), ("broken.lua", "x = = 1"), ("folder/cut.stl", "solid")]);
+    let file = PolicyFile::load_with(&project.path("p.lua"), &limits()).unwrap();
+    let mut policy = file.start(&seed(0), None).expect("the same texts, of the same length");
+    let said = policy.act(&observation()).expect_err("it ends in an error").to_string();
+    assert!(said.contains("no no_such_module.lua in") && !said.contains("was not loaded"), "{said}");
+}
+
+#[test]
+fn a_policy_commands_in_each_of_the_four_grip_codes() {
+    let grip = |declared: &str, flag: Option<GripCode>, action: &str| {
+        let text = format!(
+            "return softvt.policy {{ name = 'p', {declared} act = function() return {{ {POSE}, {action} }} end }}"
+        );
+        let project = Project::new(&[("p.lua", &text)]);
+        let file = PolicyFile::load_with(&project.path("p.lua"), &limits()).unwrap();
+        let chunk = file.start(&seed(0), flag).unwrap().act(&observation());
+        chunk.map(|chunk| chunk.commands[0].grip).map_err(|error| error.to_string())
+    };
+    let (half, force) = ("closure = 0.6", "force = 2.5");
+    for (declared, flag, action, expected) in [
+        ("", None, half, GripCommand::Closure(0.6)),
+        ("", None, force, GripCommand::Force(2.5)),
+        ("gripper = 'continuous',", None, half, GripCommand::Closure(0.6)),
+        ("gripper = 'binary',", None, half, GripCommand::Closure(1.0)),
+        ("gripper = 'binary',", None, "closure = 0.5", GripCommand::Closure(0.0)),
+        ("gripper = 'two-width',", None, half, GripCommand::TwoWidth(0.6)),
+        ("gripper = 'force',", None, force, GripCommand::Force(2.5)),
+        ("gripper = 'binary',", Some(GripCode::TwoWidth), half, GripCommand::TwoWidth(0.6)),
+        ("", Some(GripCode::Binary), half, GripCommand::Closure(1.0)),
+    ] {
+        assert_eq!(grip(declared, flag, action), Ok(expected), "{declared} {flag:?} {action}");
+    }
+    for (declared, flag, action, expected) in [
+        ("gripper = 'force',", None, half, "the grip code of the policy is \"force\"; give force alone"),
+        ("gripper = 'binary',", None, force, "the grip code of the policy is \"binary\"; give closure alone"),
+        ("", Some(GripCode::Force), half, "the grip code of the policy is \"force\"; give force alone"),
+        ("", None, "closure = 0, force = 1", "give either closure or force"),
+    ] {
+        let message = grip(declared, flag, action).expect_err(expected);
+        assert!(message.contains(&format!("p.lua:1: policy.act: {expected}")), "{message}");
+    }
+    let wrong = Project::new(&[(
+        "p.lua",
+        "return softvt.policy { name = 'p', gripper = 'twowidth', act = function() end }",
+    )]);
+    let error = PolicyFile::load_with(&wrong.path("p.lua"), &limits()).unwrap_err().to_string();
+    assert!(error.contains("did you mean \"two-width\"?"), "{error}");
 }

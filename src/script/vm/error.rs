@@ -4,6 +4,8 @@ use std::fmt;
 
 use mlua::{Lua, debug::Debug};
 
+use super::library::embedded;
+
 /// A line of a script.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct SourceLine {
@@ -212,6 +214,23 @@ pub(crate) fn current_line(lua: &Lua) -> Option<SourceLine> {
         }
         level += 1;
     }
+}
+
+/// Line of the innermost function on the stack that is the author's own, and not of the embedded library below `scripts/`.
+/// Without one, the outermost.
+pub(crate) fn author_line(lua: &Lua) -> Option<SourceLine> {
+    let main = app_data::<MainFile>(lua).map(|main| main.0).unwrap_or_default();
+    let is_library = |file: &str| {
+        let path = file.rfind("scripts/").map(|at| &file[at..]);
+        file != main && path.is_some_and(|path| embedded(path).is_some())
+    };
+    let mut lines = (0..).map_while(|level| lua.inspect_stack(level, SourceLine::running)).flatten();
+    let mut outermost = None;
+    let own = lines.find(|line| {
+        outermost = Some(line.clone());
+        !is_library(&line.file)
+    });
+    own.or(outermost)
 }
 
 /// An error at the line of the script that is running.

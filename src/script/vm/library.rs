@@ -11,7 +11,10 @@ use std::{
 use include_dir::{Dir, include_dir};
 use sha2::{Digest, Sha256};
 
-use super::error::{ScriptError, SourceLine};
+use super::{
+    error::{ScriptError, SourceLine},
+    privilege::is_hidden_path,
+};
 use softvt_common::text::suggest;
 
 /// The embedded folders, by their names in the repository.
@@ -20,6 +23,9 @@ static EMBEDDED: [(&str, Dir<'_>); 3] = [
     ("suites", include_dir!("$CARGO_MANIFEST_DIR/../../suites")),
     ("assets", include_dir!("$CARGO_MANIFEST_DIR/../../assets")),
 ];
+
+/// Requests that may fail in one script.
+const MAX_REFUSED: usize = 1000;
 
 /// Largest file that is read, bytes.
 const MAX_BYTES: u64 = 64 << 20;
@@ -33,6 +39,11 @@ pub struct Bundle {
     pub served: BTreeMap<String, String>,
     /// Data files that were requested and not found.
     pub absent: BTreeSet<String>,
+    /// Messages about the modules and data files that could not be used. An episode repeats them, so that a script cannot
+    /// tell an episode from the run that made its plan.
+    pub refused: BTreeMap<String, String>,
+    /// Names of the modules with limits or materials of objects, of those that a policy requested.
+    pub hidden: BTreeSet<String>,
 }
 
 /// SHA-256 in lower-case hexadecimal.
@@ -73,6 +84,10 @@ pub(crate) enum LibraryError {
     OutsideLink(String),
     #[error("{file}: {source}")]
     Read { file: String, source: io::Error },
+    #[error("{0}")]
+    Again(String),
+    #[error("{request:?}: more than {MAX_REFUSED} modules and files were requested that are not there")]
+    TooMany { request: String },
 }
 
 /// A file that was found.
@@ -125,6 +140,31 @@ impl Library {
 
     /// Finds the file of a module (`experts.pick_place`).
     pub(crate) fn module(&mut self, module: &str) -> Result<FoundFile, LibraryError> {
+        self.repeatable(module, |library| library.find_module(module))
+    }
+
+    /// The result of `find`, or the message with which the same request failed before.
+    fn repeatable<T>(
+        &mut self,
+        key: &str,
+        find: impl FnOnce(&mut Self) -> Result<T, LibraryError>,
+    ) -> Result<T, LibraryError> {
+        if let Some(message) = self.bundle.refused.get(key) {
+            return Err(LibraryError::Again(message.clone()));
+        }
+        if self.bundle.refused.len() >= MAX_REFUSED && !self.bundle.served.contains_key(key) {
+            return Err(LibraryError::TooMany { request: key.into() });
+        }
+        let found = find(self);
+        if let Err(error) = &found
+            && !self.is_frozen
+        {
+            self.bundle.refused.insert(key.into(), error.to_string());
+        }
+        found
+    }
+
+    fn find_module(&mut self, module: &str) -> Result<FoundFile, LibraryError> {
         let is_plain = |part: &str| {
             !part.is_empty() && part.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-')
         };
@@ -153,6 +193,43 @@ impl Library {
         }
     }
 
+    /// True if a module has limits or materials of objects: by its path, and by its content, since a link or a copy may
+    /// have any name.
+    pub(crate) fn is_hidden(&mut self, file: &FoundFile) -> bool {
+        if self.is_frozen || self.bundle.hidden.contains(&file.name) {
+            return self.bundle.hidden.contains(&file.name);
+        }
+        let path = Path::new(&file.name);
+        let is_hidden = is_hidden_path(path)
+            || path.canonicalize().is_ok_and(|real| is_hidden_path(&real))
+            || self.is_copy_of_hidden(&file.bytes);
+        if is_hidden {
+            self.bundle.hidden.insert(file.name.clone());
+        }
+        is_hidden
+    }
+
+    /// True if a hidden file of the embedded library or below the roots has this content.
+    fn is_copy_of_hidden(&self, bytes: &[u8]) -> bool {
+        let known: Vec<String> = ["scripts", "assets"]
+            .into_iter()
+            .flat_map(embedded_scripts)
+            .filter(|path| is_hidden_path(Path::new(path)))
+            .collect();
+        if known.iter().any(|path| embedded(path) == Some(bytes)) {
+            return true;
+        }
+        let is_same = |path: PathBuf| {
+            fs::metadata(&path).is_ok_and(|file| file.len() == bytes.len() as u64)
+                && read(&path).is_ok_and(|other| other == bytes)
+        };
+        self.roots.iter().any(|root| {
+            let assets = fs::read_dir(root.join("assets")).into_iter().flatten().flatten();
+            let assets = assets.map(|entry| entry.path());
+            assets.chain(known.iter().map(|path| root.join(path))).any(is_same)
+        })
+    }
+
     /// Finds a data file (a mesh) by its relative path: next to the Lua file `requester` first, then below the roots.
     pub(crate) fn data(&mut self, path: &str, requester: Option<&str>) -> Result<FoundFile, LibraryError> {
         let is_inside =
@@ -167,13 +244,15 @@ impl Library {
         let key = format!("{}:{path}", folder.unwrap_or_default());
         let hint = "build the shape in the file itself";
         let late = || LibraryError::LateFile { path: path.into(), hint };
-        let found = self.find(&key, sibling, &[path.to_string()], late)?;
-        found.ok_or_else(|| {
-            let searched = match requester {
-                Some(requester) => format!("next to {requester}, nor in {}", self.root_names()),
-                None => format!("in {}", self.root_names()),
-            };
-            LibraryError::NoFile { path: path.into(), searched }
+        self.repeatable(&key, |library| {
+            let found = library.find(&key, sibling, &[path.to_string()], late)?;
+            found.ok_or_else(|| {
+                let searched = match requester {
+                    Some(requester) => format!("next to {requester}, nor in {}", library.root_names()),
+                    None => format!("in {}", library.root_names()),
+                };
+                LibraryError::NoFile { path: path.into(), searched }
+            })
         })
     }
 
@@ -183,7 +262,7 @@ impl Library {
             return Ok(None);
         }
         let late = || LibraryError::LateFile { path: path.into(), hint: "request it at the top of the file" };
-        let found = self.find(path, None, &[path.to_string()], late)?;
+        let found = self.repeatable(path, |library| library.find(path, None, &[path.to_string()], late))?;
         if found.is_none() {
             self.bundle.absent.insert(path.to_string());
         }
@@ -316,7 +395,9 @@ fn missing(main: &Path, name: &str) -> ScriptError {
     let entries = fs::read_dir(folder_of(main)).into_iter().flatten().flatten();
     known.extend(entries.map(|e| display(&e.path())).filter(|n| n.ends_with(".lua")));
     let error = ScriptError::new(name, "no such file");
-    match suggest(name, known.iter().map(String::as_str)) {
+    let stem = |path: &str| Path::new(path).file_stem().map(std::ffi::OsStr::to_os_string);
+    let same_stem = known.iter().filter(|path| stem(path) == stem(name)).max().map(String::as_str);
+    match same_stem.or_else(|| suggest(name, known.iter().map(String::as_str))) {
         Some(close) => error.hint(format!("did you mean {close}?")),
         None => error.hint("give the path of a Lua file; `softvt list suites` shows the standard ones"),
     }

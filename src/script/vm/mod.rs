@@ -11,6 +11,7 @@ pub(crate) mod value;
 pub(crate) mod watchdog;
 
 use std::{
+    collections::BTreeSet,
     sync::{
         Arc, Mutex, OnceLock,
         atomic::{AtomicUsize, Ordering},
@@ -34,11 +35,14 @@ use watchdog::{Clock, Deadline, OnStuck};
 use softvt_benchmark::seed;
 use softvt_common::{
     parallel::lock,
-    text::{eprint_line, escape_control},
+    text::{eprint_line, escape_control, suggest},
 };
 
 /// Bytes that a virtual machine may print; later output is dropped.
 const MAX_PRINTED_BYTES: usize = 1 << 20;
+
+/// Largest text that `load` compiles, bytes.
+const MAX_CHUNK_BYTES: usize = 1 << 20;
 
 /// Registry key of the base library as it was before scripts could change it.
 const BASE_LIBRARY: &str = "softvt base library";
@@ -113,7 +117,23 @@ impl VmState {
         let files: Vec<String> = lock(&self.library).bundle.files.keys().cloned().collect();
         let raised = lock(&self.raised).clone();
         let memory_bytes = self.limits.memory_bytes;
-        ErrorTranslator { main: &self.main, files: &files, raised, memory_bytes }.explain(error)
+        let error = ErrorTranslator { main: &self.main, files: &files, raised, memory_bytes }.explain(error);
+        match self.close_name(&error) {
+            Some(close) if error.hint.is_none() => error.hint(format!("did you mean {close:?}?")),
+            _ => error,
+        }
+    }
+
+    /// A word of the file that is close to the unknown global name of an error.
+    fn close_name(&self, error: &ScriptError) -> Option<String> {
+        let (_, rest) = error.message.split_once("a nil value (global '")?;
+        let (unknown, _) = rest.split_once('\'')?;
+        let text = lock(&self.library).text(&error.file).ok()?;
+        let words: BTreeSet<&str> = text
+            .split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))
+            .filter(|word| !word.is_empty() && *word != unknown)
+            .collect();
+        suggest(unknown, words.into_iter()).map(str::to_owned)
     }
 }
 
@@ -281,13 +301,23 @@ fn load(
     if !matches!(env, Value::Nil | Value::Table(_)) {
         return wrong("a table as env", &env);
     }
+    let mut append = |piece: &LuaString| match bytes.len() + piece.as_bytes().len() > MAX_CHUNK_BYTES {
+        true => {
+            let limit = MAX_CHUNK_BYTES >> 20;
+            Err(fail(lua, format!("load: the text is longer than {limit} MiB; load it in parts")))
+        }
+        false => {
+            bytes.extend_from_slice(&piece.as_bytes());
+            Ok(())
+        }
+    };
     match chunk {
-        Value::String(text) => bytes.extend_from_slice(&text.as_bytes()),
+        Value::String(text) => append(&text)?,
         Value::Function(pieces) => {
             while let Value::String(piece) = pieces.call::<Value>(())?
                 && !piece.as_bytes().is_empty()
             {
-                bytes.extend_from_slice(&piece.as_bytes());
+                append(&piece)?;
             }
         }
         other => return wrong("a string or function", &other),
@@ -314,7 +344,7 @@ fn require(lua: &Lua, loaded: &Table, name: &Value) -> mlua::Result<Value> {
     let name = name.to_string_lossy();
     let library = app_data::<SharedLibrary>(lua)?;
     let file = lock(&library).module(&name).map_err(|error| fail(lua, error.to_string()))?;
-    check_module(lua, &name, &file.name)?;
+    check_module(lua, &name, &file)?;
     let text = lua_text(&file.name, &file.bytes).map_err(mlua::Error::external)?;
     let file = file.name.as_str();
     match loaded.get::<Value>(file)? {

@@ -11,7 +11,10 @@ use std::{
 
 use mlua::Lua;
 
-use super::error::{app_data, fail};
+use super::{
+    error::{app_data, fail},
+    library::{FoundFile, SharedLibrary},
+};
 use softvt_common::parallel::lock;
 
 /// The access of one virtual machine, as data of its Lua state.
@@ -76,17 +79,27 @@ pub(crate) fn check_privilege(lua: &Lua, what: &str) -> mlua::Result<()> {
     }
 }
 
-/// [`check_privilege`] of a module that a script requires, found in `file`: assets, calibrated windows, and the experts
-/// that use them.
+/// [`check_privilege`] of a module that a script requires, found in `file`.
 ///
 /// # Errors
 /// As [`check_privilege`].
-pub(crate) fn check_module(lua: &Lua, name: &str, file: &str) -> mlua::Result<()> {
-    let path = Path::new(file);
+pub(crate) fn check_module(lua: &Lua, name: &str, file: &FoundFile) -> mlua::Result<()> {
+    // The comparison of contents reads other files, which plans need not wait for.
+    let access = app_data::<PrivilegedAccess>(lua)?;
+    if matches!(*lock(&access.0), Access::Granted) {
+        return Ok(());
+    }
+    let library = app_data::<SharedLibrary>(lua)?;
+    let is_hidden = lock(&library).is_hidden(file);
+    if is_hidden { check_privilege(lua, &format!("require {name:?}")) } else { Ok(()) }
+}
+
+/// True if the Lua file at `path` has limits or materials of objects: assets, strains of materials, and the experts that use
+/// them.
+pub(crate) fn is_hidden_path(path: &Path) -> bool {
     let of_folder = |folder: &str| path.parent().is_some_and(|parent| parent.ends_with(folder));
     let stem = path.file_stem().and_then(|stem| stem.to_str());
-    let is_privileged = of_folder("assets")
-        || stem == Some("calibrated")
-        || of_folder("experts") && matches!(stem, Some("grasp" | "pick_place" | "blind_grips"));
-    if is_privileged { check_privilege(lua, &format!("require {name:?}")) } else { Ok(()) }
+    of_folder("assets")
+        || stem == Some("strain_sources")
+        || of_folder("experts") && matches!(stem, Some("grasp" | "pick_place" | "blind_grips"))
 }
