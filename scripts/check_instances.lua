@@ -4,7 +4,7 @@
 --   softvt scripts/check_instances.lua                          every kind of the hidden suites
 --   softvt scripts/check_instances.lua --asset cube --count 20
 --
--- Also counts the draws: an instance is kept if its largest safe grip force is 1.5 to 2.2 times its smallest. Writes docs/instance_checks.md
+-- Also counts the draws: an instance is kept if its largest safe grip force is 1.3 to 1.8 times its smallest. Writes docs/instance_checks.md
 -- if all kinds are checked.
 local suite = require "suites.object_hidden"
 local hidden = require "variations.hidden"
@@ -28,7 +28,7 @@ local PAGE = [[
 The objects of the hidden suites differ from their assets in size, stiffness, density and stable strain, so each has a limit τ of its own. It is read
 off the presses that the calibration stores (`src/evaluation/instance.rs`). `softvt scripts/check_instances.lua` draws instances as
 the suites do, presses each in the simulation, and compares τ of that press with the one that episodes are judged by. An instance is kept if the
-ratio of its largest to its smallest safe grip force is 1.5 to 2.2; the share of the draws that is kept is that of %d instances, and %d
+ratio of its largest to its smallest safe grip force is 1.3 to 1.8; the share of the draws that is kept is that of %d instances, and %d
 instances of each asset are pressed.
 
 ]]

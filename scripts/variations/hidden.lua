@@ -15,7 +15,7 @@ return softvt.variation {
     staling = { 1, 6 },
     filling = { 1, 4 },
     coating = { 0.2, 1.5 },
-    window_ratio = { 1.5, 2.2 },
+    window_ratio = { 1.3, 1.8 },
   },
   colour = standard.colour,
   light = standard.light,
