@@ -82,7 +82,7 @@ pub fn time_step(report: &mut Report) {
 /// Prints what depends on the step: the swing of a lifted body, and the speed of a rolling one.
 fn moving(report: &mut Report) {
     println!(
-        "\nPeak of D over D at rest of a long body (capsule of 40 × 160 mm, 30 kPa) that is lifted by 0.1 m at once with 0.3 m/s, at {} Hz. \
+        "\nPeak of D over D at rest of a long body (capsule of 40 × 160 mm, 30 kPa) that is lifted by 0.1 m in 0.4 s, at {} Hz. \
          Speed of a soft ball of 50 mm (30 kPa) after 3 s on a slope, m/s, beside that of a rigid one.\n",
         time_step::RATES.map(|rate| rate.to_string()).join(", ")
     );

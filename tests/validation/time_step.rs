@@ -7,7 +7,7 @@ use softvt::{
 
 use crate::{
     bodies::{GRAVITY, fem_model},
-    support::{Body, Outcome, Scene, Squeeze, run},
+    support::{Body, Outcome, Scene, Squeeze, quintic, run},
 };
 
 /// Rates of the experiments in motion, Hz.
@@ -38,7 +38,7 @@ pub fn refined(options: &Squeeze) -> [Outcome; 3] {
     [60.0, 120.0, 240.0].map(|rate| run(&Squeeze { dt: 1.0 / rate, ..*options }))
 }
 
-/// Peak of D over D at rest of a long soft body that is lifted by 0.1 m at once with 0.3 m/s.
+/// Peak of D over D at rest of a long soft body that is lifted by 0.1 m in 0.4 s.
 pub fn lifted(rate: f64, beta: f64) -> f64 {
     let body = Body::Capsule { radius: 0.02, length: 0.16 };
     let options = Squeeze {
@@ -52,11 +52,11 @@ pub fn lifted(rate: f64, beta: f64) -> f64 {
         ..Squeeze::default()
     }
     .gap_mm(37.0);
-    let (mut scene, lift_s) = (Scene::new(&options), 0.1 / 0.3);
+    let (mut scene, lift_s) = (Scene::new(&options), 0.4);
     let (mut peak, mut last) = (0.0f64, 0.0);
     for step in 1..=((options.lift_at() + lift_s + 1.5) * rate).round() as usize {
         let since = step as f64 / rate - options.lift_at();
-        let hand = Pose::translation(0.0, 0.0, 0.3 * since.clamp(0.0, lift_s));
+        let hand = Pose::translation(0.0, 0.0, 0.1 * quintic(since / lift_s));
         last = scene.step(&hand).expect("a step that converges").d_pct;
         peak = peak.max(last);
     }
