@@ -88,7 +88,9 @@ fn moving(report: &mut Report) {
     );
     header(&["motion", "β = 5 ms", "β + dt = 21.7 ms", "rigid"]);
     let same = |_: f64| time_step::BETA;
-    let cells = |found: [f64; 3]| found.map(|value| format!("{value:.3}")).join(", ");
+    // Zero without a sign.
+    let shown = |value: f64| format!("{:.3}", (1e3 * value).round() / 1e3 + 0.0);
+    let cells = |found: [f64; 3]| found.map(shown).join(", ");
     let [with_beta, with_sum] = [&same as &dyn Fn(f64) -> f64, &time_step::compensated]
         .map(|beta| time_step::RATES.map(|rate| time_step::lifted(rate, beta(rate))));
     row(&["long body, lifted".to_owned(), cells(with_beta), cells(with_sum), String::new()]);
