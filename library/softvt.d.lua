@@ -6,6 +6,7 @@
 ---@field name string Name in results; part of the seed.
 ---@field object_type "deformable"|"rigid" Mechanics of the objects.
 ---@field variation "object"|"spatial" Difference between the tasks.
+---@field needs? "nothing"|"size"|"touch" What a controller has to know of an instance to grip it safely, as softvt list suites prints it: "nothing" but its kind, its "size", or what only "touch" tells. softvt scripts/blind_bounds.lua estimates it.
 ---@field episodes? integer Default number of episodes per task. Expects a whole number in 1..1000000. Default 5.
 ---@field tasks softvt.Task[] The tasks, in order.
 ---@field shifts? softvt.Shift[] Changes of the scene that a run can request.
@@ -926,6 +927,7 @@ local Grip = {}
 ---@class softvt.GripWindow
 ---@field loose softvt.Grip The loosest grip that holds.
 ---@field tight softvt.Grip The tightest grip whose carried object stays within τ; that of the loose end if none does.
+---@field contact number Distance of the gels at first contact, m.
 ---@field carried number D that the weight of the carried object causes, as a share of τ.
 ---@field tau number Deformation limit τ of the instance, %.
 local GripWindow = {}
@@ -935,10 +937,11 @@ local GripWindow = {}
 ---@field asset string Name of its asset.
 ---@field size number[] Edge lengths of its bounding box at rest, m.
 ---@field scale number Size relative to that of its asset.
----@field youngs_factor number? Young's modulus relative to that of its asset; nil unless soft.
----@field density_factor number? Density relative to that of its asset; nil unless soft or rigid.
----@field strain_factor number? Stable strain relative to that of its asset; nil unless soft.
+---@field youngs_factor number Young's modulus relative to that of its asset.
+---@field density_factor number Density relative to that of its asset.
+---@field strain_factor number Stable strain relative to that of its asset.
 ---@field coating number? Static friction of its coating; nil without one.
+---@field draws integer Number of draws until an instance could be kept.
 ---@field hints table<string, number> Numbers of its asset for experts, as those of an object.
 local InstanceState = {}
 
@@ -1200,11 +1203,15 @@ function SceneState:clearance(pose, options) end
 ---@field parts table<string, softvt.ObjectState> Parts of an articulated object by name.
 local ObjectState = {}
 
----The instances that the suite can draw, for a controller that must not know which one it has.
+---The instances that a suite can draw, for a controller that must not know which one it has.
 ---@class softvt.Instances
 local Instances = {}
 
----Returns instances of an object's asset, drawn as the suite draws them, from a random stream that no episode uses: the same in every episode. Without a variation each is the asset itself.
+---Returns the names of the assets of the objects of all goals of the suite, each once.
+---@return string[]
+function Instances:kinds() end
+
+---Returns instances of the asset of an object in the scene, or of a kind, drawn as the suite draws them, from a random stream that no episode uses: the same in every episode. Without a variation each is the asset itself.
 ---@param object string
 ---@param count integer
 ---@return softvt.InstanceState[]
@@ -1218,7 +1225,8 @@ function Instances:sample(object, count) end
 ---@field gripping boolean True from a call of grasp to the next call of release or open.
 ---@field width number Measured distance of the gels, m.
 ---@field force number[] Sum of the normal forces at all contact points of the left and the right gel pad, N, whatever touches it; forces on the cases of the fingers do not count. On the edge of a pad the normals are oblique, and the sum is larger than the pressing force, which is -sim:tactile(side).force[3].
----@field instances softvt.Instances? Under --policy fixed-closure: the instances that the suite can draw. The expert then closes to one closure for all of them (experts.fixed_closure). nil under other policies.
+---@field grip_controller string? Name of the controller that takes the place of the expert's own grip, such as "size-seen" under --policy size-seen (experts.blind_grips). nil under policies that have none.
+---@field instances softvt.Instances? With a grip_controller, which must not know the instance: the instances that the suite can draw. nil without.
 ---@field time number Time since the start, s.
 ---@field dt number Length of a control step, s.
 local Arm = {}
@@ -1525,6 +1533,11 @@ function softvt.stable(row) end
 ---@param width_mm number
 ---@return number?
 function softvt.force_at(sweep, width_mm) end
+
+---Returns the instances that a suite can draw, by its own variation.
+---@param suite softvt.Suite
+---@return softvt.Instances
+function softvt.instances(suite) end
 
 ---Returns an image of one colour: `softvt.image { width = 640, height = 480, colour = { 255, 255, 255 } }`.
 ---@param spec softvt.NewImage

@@ -8,6 +8,7 @@
 -- as in the calibration and as the expert displaces its grasps.
 -- If all standard assets are checked in both parts, it writes docs/calibration_checks.md.
 local asset_names = require "asset_names"
+local grasp = require "experts.grasp"
 local hand = require "calibration.hand"
 local press = require "calibration.press"
 local trial = require "calibration.trial"
@@ -70,10 +71,10 @@ end
 
 -- A batch of trials at an end of the window: a share of the window inside of it, or outside.
 local function ends(point)
-  local name, window = point.asset, softvt.grip_window { asset = point.asset }
+  local name, window = point.asset, calibrations[point.asset].window
   local inward = (point.at == "loose" and 1 or -1) * (point.side == "inside" and END_SHARE or -END_SHARE)
   local along = (point.at == "loose" and 0 or 1) + inward
-  local width = window.loose.width + along * (window.tight.width - window.loose.width)
+  local width = 1e-3 * (window.width_lower_mm + along * (window.width_at_tau_mm - window.width_lower_mm))
   -- Before contact there is no force.
   local grip = { width = width, force = softvt.force_at(calibrations[name].table.envelopes[name].sweep, 1e3 * width) or 0 }
   local held, d_peak_pct, width_mm = hand.trials(assets[name], grip, point.first, point.last, point.spread, HOLD_S)

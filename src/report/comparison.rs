@@ -390,7 +390,7 @@ fn push_stages(table: &mut TextTable, stages: &PairedStages) {
 }
 
 /// Legend of the rows.
-pub(super) const LEGEND: &str = "diff.: second column minus first · 95 % intervals: Agresti and Min for rates, bootstrap for D (n ≥ 10)\nbetter, worse: number of episodes; a lower D is better · p: McNemar's exact test";
+pub(super) const LEGEND: &str = "diff.: right minus left · 95 % intervals: Agresti and Min for rates, bootstrap for D (n ≥ 10)\nbetter, worse: number of episodes; a lower D is better · p: McNemar's exact test";
 
 /// Appends the column headings, with `name` above the names of the rows.
 pub(super) fn push_headings(table: &mut TextTable, name: &str, first: &str, second: &str) {

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::comparison;
 use softvt_benchmark::ShiftValue;
-use softvt_common::text::{TextColumn, TextTable, counted, decimal};
+use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
 use softvt_evaluation::{
     paired_stats::{PairedComparison, d_over_tau, pair_episodes},
     record::EpisodeRecord,
@@ -129,6 +129,8 @@ pub fn table(suite: &ConditionTable) -> String {
 
 /// Suites side by side in [`controllers_table`].
 const SUITES_PER_TABLE: usize = 4;
+/// Characters of the column of a suite.
+const SUITE_WIDTH: usize = 18;
 
 /// True if the conditions differ from the reference in the policy alone.
 pub fn compares_policies(tables: &[ConditionTable]) -> bool {
@@ -146,13 +148,14 @@ pub fn controllers_table(tables: &[ConditionTable]) -> String {
 
 fn controllers_of_suites(suites: &[ConditionTable]) -> String {
     let mut columns = vec![TextColumn::Left(22)];
-    columns.resize(1 + suites.len(), TextColumn::Right(18));
+    columns.resize(1 + suites.len(), TextColumn::Right(SUITE_WIDTH));
     let mut table = TextTable::new(columns);
     let episodes = suites.iter().flat_map(|suite| &suite.rows).filter_map(|row| row.outcome.as_ref());
     let episodes = counted(episodes.map(|outcome| outcome.episodes).max().unwrap_or(0), "episode");
     table.line(format!("Goal / Safety Success, % · {episodes} each"));
     table.rule();
-    table.row(std::iter::once("controller").chain(suites.iter().map(|suite| suite.suite.as_str())));
+    let names = suites.iter().map(|suite| shortened(&suite.suite, SUITE_WIDTH));
+    table.row(std::iter::once("controller".to_owned()).chain(names));
     table.rule();
     let rows = suites.first().map_or(0, |suite| suite.rows.len());
     for index in 0..rows {

@@ -396,6 +396,11 @@ impl Episode {
             }
             self.step(&action);
         }
+        // A controller that has given up commands nothing more; its last command stays.
+        let is_far = matches!(self.outcome, Some(Outcome::Error { .. })) && self.far_commands == self.steps;
+        if is_far && controller.gave_up().is_some() {
+            self.outcome = Some(Outcome::Budget);
+        }
         controller.finish().map_err(|source| self.control_error(source))?;
         let mut finished = self.finish(controller.gave_up().map(str::to_owned));
         finished.record.stats.notes = controller.notes();

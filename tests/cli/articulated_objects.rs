@@ -72,10 +72,10 @@ fn an_expert_sees_parts_and_joints() {
       assert(math.abs(tray.centre[2] - 0.05) < 1e-5 and math.abs(tray.size[1] - 0.1) < 1e-9)
       assert(#scene:objects() == 3, "parts are no objects of their own")
       error "all seen""#;
-    let project = suite(TRAY, "chest.tray", expert);
+    let project = suite(TRAY, "chest", expert);
     let output = project.refusal("x.lua --out run");
     assert!(output.ends_with("x.lua:21: all seen"), "{output}");
-    let project = suite(TRAY, "chest.tray", "scene:part('chest', 'tra')");
+    let project = suite(TRAY, "chest", "scene:part('chest', 'tra')");
     assert_snapshot!(project.refusal("x.lua --out run"), @r#"x.lua: task 0, episode 0: x.lua:14: scene: unknown part "tra"; did you mean "tray"?"#);
 }
 

@@ -132,7 +132,7 @@ fn folders_with_other_files_are_refused() {
 fn the_teacher_of_a_suite_demonstrates_unless_a_policy_is_given() {
     let taught = SUITE.replace("episodes = 1,", "episodes = 1, teacher = \"tactile-servo\",");
     let project = Project::new(&[("x.lua", &taught), SOLIDS]);
-    for (flag, policy) in [("", "tactile-servo"), ("--policy expert", "expert"), ("--policy noop", "noop")] {
+    for (flag, policy) in [("", "tactile-servo"), ("--policy expert", "expert")] {
         project.succeeds(&format!("record x.lua --demos 1 {flag} --out {policy} --threads 1"));
         assert_eq!(project.json(&format!("{policy}/attempts/one/run.json"))["policy"], policy);
     }

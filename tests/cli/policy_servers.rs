@@ -229,7 +229,7 @@ fn the_grip_code_of_a_run_is_stated_and_compared_with_that_of_the_server() {
     let message = project.refusal("x.lua --out other --policy ws://127.0.0.1:9 --gripper wide");
     assert!(message.contains("[possible values: continuous, binary, two-width, force]"), "{message}");
     let message = project.refusal("x.lua --out other --policy noop --gripper force");
-    assert!(message.contains("--gripper: applies to policy servers only"), "{message}");
+    assert!(message.contains("--gripper: applies to policy servers and Lua policies only"), "{message}");
     let address = stating("force");
     let words = "--profile vision --gripper force --set robot.gripper.effort=2 --out strong";
     assert_eq!(project.softvt(&format!("x.lua --policy {address} {words}")).code, 3, "no episode is valid");
@@ -405,7 +405,7 @@ fn commands_that_are_not_executed_as_given_are_shown() {
     let project = project();
     let output = run(&project, &address, "--replan 6");
     assert_eq!(output.code, 0, "{}", output.err);
-    let far = "; 6 of 12 commands were out of reach, first: (50, 0, -3) m, 50.";
+    let far = "; 6 of 12 commands were out of reach, first: (50, 0, -3) m, 49.";
     assert!(output.err.contains(far), "{}", output.err);
     assert!(output.err.contains("; 6 of 12 grip values were out of range"), "{}", output.err);
     for line in [

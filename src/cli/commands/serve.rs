@@ -95,9 +95,6 @@ static STDIN_CLOSED: AtomicBool = AtomicBool::new(false);
 /// The script has no suite, its first episode cannot be rendered, the address is not available, or `--out` holds something
 /// else; in the end, the interrupt.
 pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
-    if args.until_stdin_closes {
-        watch_stdin()?;
-    }
     match serve(args) {
         Err(end) if end.exit == Exit::Interrupted && STDIN_CLOSED.load(Ordering::Relaxed) => {
             // Without recorded episodes there is nothing to say: the client ended the server.
@@ -136,6 +133,10 @@ fn serve(args: ServeArgs) -> Result<(), CliError> {
         return Err(needs_suites("serve", &config));
     }
     check_run_flags(&config)?;
+    // Not before: a fault of the script is worth its message, whoever still listens.
+    if args.until_stdin_closes {
+        watch_stdin()?;
+    }
     let listener = listen(&args)?;
     let runs = prepare(&config, &loaded, args.split)?;
     let start_episode = |id: &EpisodeId| {

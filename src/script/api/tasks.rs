@@ -117,7 +117,7 @@ record! {
     /// Ranges of properties that do not show, drawn log-uniform for each soft object. Size, colour and looks do not depend on them.
     /// An instance is drawn again until the ratio of its largest to its smallest safe grip force is within window_ratio; objects need
     /// a calibration for that. Policies never see these numbers; records have them.
-    HiddenSpec: "softvt.Hidden" as "variation.hidden", relations check_hidden {
+    HiddenSpec: "softvt.Hidden" as "variation.hidden" {
         /// Relative density of the foam: a factor on the density, and by its square on Young's modulus.
         aeration: [f64; 2] = FACTORS;
         /// Age: a factor on Young's modulus; the collapse and damage strains shrink by its power 0.7, and τ of the instance
@@ -276,24 +276,30 @@ functions! {
 }
 
 fn check_variation(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<()> {
-    check_ends(lua, record, table, &["size", "stiffness", "density", "friction", "light"])
+    check_ends(lua, record, table, &[], &["size", "stiffness", "density", "friction", "light"])?;
+    match table.raw_get::<Option<Table>>("hidden")? {
+        Some(hidden) => {
+            let keys = ["aeration", "staling", "filling", "coating", "window_ratio"];
+            check_ends(lua, record, &hidden, &["hidden"], &keys)
+        }
+        None => Ok(()),
+    }
 }
 
-fn check_hidden(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<()> {
-    check_ends(lua, record, table, &["aeration", "staling", "filling", "coating", "window_ratio"])
-}
-
-/// Checks that the ends of ranges are in order.
-fn check_ends(lua: &Lua, record: &Record, table: &Table, keys: &[&'static str]) -> mlua::Result<()> {
+/// Checks that the ends of the ranges in `table`, which is at `path` in the record, are in order.
+fn check_ends(
+    lua: &Lua,
+    record: &Record,
+    table: &Table,
+    path: &[&'static str],
+    keys: &[&'static str],
+) -> mlua::Result<()> {
     for &key in keys {
         let [min, max] = table.raw_get::<[f64; 2]>(key)?;
         if min > max {
             let message = format!("the smallest factor {min} comes first and is above {max}; swap them");
-            return Err(error_at_key(
-                lua,
-                record.label,
-                &ValidationError { path: vec![key.into()], message },
-            ));
+            let path = path.iter().copied().chain([key]).map(Into::into).collect();
+            return Err(error_at_key(lua, record.label, &ValidationError { path, message }));
         }
     }
     Ok(())

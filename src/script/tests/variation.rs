@@ -308,7 +308,6 @@ fn size_and_looks_do_not_depend_on_what_is_hidden() {
 #[test]
 fn ranges_that_leave_no_instance_are_refused_with_the_remedy() {
     let refusal = |change: &str| {
-        eprintln!("{change}");
         refusal(&format!("{HIDDEN} {change} return suite(placed(sphere), softvt.variation(ranges))"))
     };
     let message = refusal("ranges.hidden.window_ratio = { 900, 1000 }");
