@@ -365,7 +365,7 @@ impl GripperValues {
     /// closure outside as well: the episode counts it, and the hand clamps it.
     pub fn closure(&self, value: f64) -> f64 {
         let share = (value - self.open) / (self.closed - self.open);
-        let is_mistake = share < -GRIP_OVERSHOOT || share > 1.0 + GRIP_OVERSHOOT;
+        let is_mistake = !(-GRIP_OVERSHOOT..=1.0 + GRIP_OVERSHOOT).contains(&share);
         if is_mistake && self.code != GripCode::Force {
             return share.clamp(-MAX_CLOSURE, MAX_CLOSURE);
         }

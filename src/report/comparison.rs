@@ -509,7 +509,8 @@ mod tests {
         part.manifest["sources"] = json!({ "x.lua": "1", "y.lua": "2" });
         whole.manifest["thresholds"] = json!({ "bun": 1.0, "pie": 2.0 });
         part.manifest["thresholds"] = json!({ "bun": 1.0 });
-        let unlike = |part: &StoredRun| compare(&[whole.clone()], &[part.clone()]).expect("pairs").unlike;
+        let unlike =
+            |part: &StoredRun| compare(&[whole.clone()], std::slice::from_ref(part)).expect("pairs").unlike;
         assert_eq!(unlike(&part), [""; 0]);
         part.manifest["sources"]["y.lua"] = json!("9");
         part.manifest["thresholds"]["bun"] = json!(1.5);

@@ -526,8 +526,8 @@ fn a_judged_run_names_its_episodes_to_the_server_by_hashes_alone() {
         project.write("secret", b"correct horse battery staple");
         let output = run(&project, &address, &format!("--episodes 2 --replan 4 {words}"));
         assert_eq!(output.code, 0, "{}", output.err);
-        let seen = seen.lock().unwrap().clone();
-        seen
+        let seen = seen.lock().unwrap();
+        seen.clone()
     };
     let entry = |identity: &Value, name: &str| -> Option<Value> {
         let entries = identity.as_map().expect("a map");

@@ -38,6 +38,7 @@ const COORDINATE: Range = Range::closed(-MAX_COORDINATE, MAX_COORDINATE);
 pub(crate) const COATING: Type = Type::Number("", Range::above(0.0, 10.0));
 /// Rotation about the vertical. Larger ones are given in degrees by mistake.
 pub(crate) const YAW: Type = Type::Number("rad", Range::closed(-FULL_TURN, FULL_TURN));
+#[expect(clippy::approx_constant, reason = "messages show it")]
 const FULL_TURN: f64 = 6.2832;
 /// Uniform scales of objects.
 const SCALE: Type = Type::Number("", Range::closed(0.1, 10.0));
