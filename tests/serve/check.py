@@ -153,7 +153,7 @@ def unprivileged_clients_receive_no_true_state(env):
     received = set(info)
     _, _, _, _, info = env.step(env.action_space.sample())
     received |= set(info)
-    assert received == {"task", "episode", "step", "time_s", "success", "carried_out"}, received
+    assert received == {"task", "episode", "step", "time_s", "success", "carried_out", "far_commands", "clamped_grips"}, received
 
 
 def main():
