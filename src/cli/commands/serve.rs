@@ -133,7 +133,7 @@ fn serve(args: ServeArgs) -> Result<(), CliError> {
         return Err(needs_suites("serve", &config));
     }
     check_run_flags(&config)?;
-    // Not before: a fault of the script is worth its message, whoever still listens.
+    // After the checks, so that an error of the script is reported even if standard input is closed already.
     if args.until_stdin_closes {
         watch_stdin()?;
     }
