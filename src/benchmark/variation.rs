@@ -87,7 +87,7 @@ pub enum DrawError {
         /// Name of the variation.
         variation: String,
     },
-    /// The condition on the window keeps none of [`MAX_DRAWS`] draws.
+    /// The condition on the window keeps none of `MAX_DRAWS` draws.
     #[error(
         "variation {variation:?}: none of {MAX_DRAWS} instances of asset {asset} has a safe window with a ratio of forces in \
          {range}; widen window_ratio, filling or coating"
