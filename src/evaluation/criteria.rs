@@ -23,7 +23,7 @@ pub struct SuccessCriteria {
     pub free_fall_m: f64,
     /// Excess of the commanded over the measured gripper width that counts as a release command, m.
     pub release_margin_m: f64,
-    /// Largest allowed travel of a held contact patch along a pad, m: NoSlip, which is not part of NoDrop.
+    /// Largest allowed travel of the contact patch along a pad while the pads carry the object, m: NoSlip, which is not part of NoDrop.
     pub slip_m: f64,
     /// True if Safety Success needs NoSlip.
     pub require_no_slip: bool,

@@ -1,11 +1,13 @@
-//! NoSlip: sliding of a held object along the pads. Reported next to NoDrop; a suite may make Safety Success depend on it.
+//! NoSlip: sliding of a carried object along the pads. Reported next to NoDrop; a suite may make Safety Success depend on it.
 
 use super::evidence::PadEvidence;
 
-/// Measures slip: the travel of the contact patch along a pad since both pads closed on the target.
+/// Measures slip: the travel of the contact patch along a pad since the pads alone carried the target. Pads that slide along an
+/// object on its support, as those of a hand that feels for its weight, do not slip.
 ///
-/// Each grasp starts at zero again. The result is the maximum over both pads, all steps and all grasps, so motion
-/// back does not reduce it. NoSlip holds if it is at most [`super::criteria::SuccessCriteria::slip_m`].
+/// Each time that the object leaves its support starts at zero again. The result is the maximum over both pads, all steps and all
+/// such times, so motion back does not reduce it. NoSlip holds if it is at most
+/// [`super::criteria::SuccessCriteria::slip_m`].
 ///
 /// A hand that opens lets the object slide before the pads leave it. That slip counts only if the hand stops opening, so that
 /// the release itself is not slip, and loosening a grip until it slips is.
@@ -19,10 +21,10 @@ pub struct SlipMonitor {
 }
 
 impl SlipMonitor {
-    /// Takes in one physics step: the left and right pad, whether they hold the target, that is, both press on it and no
-    /// release was commanded, and whether the hand is being opened.
-    pub fn update(&mut self, pads: &[PadEvidence; 2], is_held: bool, is_opening: bool) {
-        if !is_held {
+    /// Takes in one physics step: the left and right pad, whether they alone carry the target, that is, both press on it, nothing
+    /// supports it and no release was commanded, and whether the hand is being opened.
+    pub fn update(&mut self, pads: &[PadEvidence; 2], is_carried: bool, is_opening: bool) {
+        if !is_carried {
             (self.start_m, self.opening_m) = (None, 0.0);
             return;
         }
@@ -62,49 +64,52 @@ impl OpeningMonitor {
 mod tests {
     use super::*;
 
-    /// One step: travel of both pads (mm), whether they hold the target, and whether the hand opens.
+    /// One step: travel of both pads (mm), whether they carry the target, and whether the hand opens.
     type Step = ([f64; 2], bool, bool);
 
     /// Largest slip (mm) over steps.
     fn slip_mm(steps: &[Step]) -> f64 {
         let mut slip = SlipMonitor::default();
-        for (travel_mm, is_held, is_opening) in steps {
+        for (travel_mm, is_carried, is_opening) in steps {
             let pads = travel_mm.map(|mm| PadEvidence { normal_impulse_ns: 0.05, travel_m: mm * 1e-3 });
-            slip.update(&pads, *is_held, *is_opening);
+            slip.update(&pads, *is_carried, *is_opening);
         }
         1e3 * slip.max_m
     }
 
-    const HELD: bool = true;
+    const CARRIED: bool = true;
 
     #[test]
-    fn slip_counts_from_the_closure_and_takes_the_worse_pad() {
-        let steps = [([3.0, 1.0], HELD, false), ([3.5, 1.2], HELD, false), ([3.6, 3.1], HELD, false)];
+    fn slip_counts_from_the_support_and_takes_the_worse_pad() {
+        let steps =
+            [([3.0, 1.0], CARRIED, false), ([3.5, 1.2], CARRIED, false), ([3.6, 3.1], CARRIED, false)];
         assert!((slip_mm(&steps) - 2.1).abs() < 1e-9);
     }
 
     #[test]
     fn opening_the_hand_until_it_releases_is_not_slip() {
-        assert_eq!(slip_mm(&[([0.0, 0.0], HELD, false), ([9.0, 9.0], false, false)]), 0.0);
-        let slid = ([4.0, 4.0], HELD, true);
-        assert_eq!(slip_mm(&[([0.0, 0.0], HELD, false), slid, ([9.0, 9.0], false, true)]), 0.0);
+        assert_eq!(slip_mm(&[([0.0, 0.0], CARRIED, false), ([9.0, 9.0], false, false)]), 0.0);
+        let slid = ([4.0, 4.0], CARRIED, true);
+        assert_eq!(slip_mm(&[([0.0, 0.0], CARRIED, false), slid, ([9.0, 9.0], false, true)]), 0.0);
     }
 
     #[test]
     fn loosening_a_grip_until_it_slips_is_slip() {
-        let slid = ([4.0, 4.0], HELD, true);
-        assert!((slip_mm(&[([0.0, 0.0], HELD, false), slid, ([4.0, 4.0], HELD, false)]) - 4.0).abs() < 1e-9);
+        let slid = ([4.0, 4.0], CARRIED, true);
+        assert!(
+            (slip_mm(&[([0.0, 0.0], CARRIED, false), slid, ([4.0, 4.0], CARRIED, false)]) - 4.0).abs() < 1e-9
+        );
     }
 
     #[test]
-    fn a_regrasp_starts_at_zero_and_the_largest_slip_stays() {
-        let held = |mm| (mm, HELD, false);
+    fn another_lift_starts_at_zero_and_the_largest_slip_stays() {
+        let carried = |mm| (mm, CARRIED, false);
         let steps = [
-            held([0.0, 0.0]),
-            held([1.5, 0.0]),
+            carried([0.0, 0.0]),
+            carried([1.5, 0.0]),
             ([5.0, 5.0], false, true),
-            held([7.0, 7.0]),
-            held([7.5, 7.0]),
+            carried([7.0, 7.0]),
+            carried([7.5, 7.0]),
         ];
         assert!((slip_mm(&steps) - 1.5).abs() < 1e-9);
     }

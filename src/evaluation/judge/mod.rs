@@ -12,8 +12,8 @@
 //! 4. **Lift.** A body is lifted if it is not supported and its lowest point is more than `lift_height_m` above its
 //!    settled height. The first body that is lifted decides `wrong_instance`; the target, if several are lifted in one
 //!    step.
-//! 5. **Release** and **slip**: [`ReleaseMonitor`], [`SlipMonitor`]. The target is held while both pads touch it and no
-//!    release was commanded.
+//! 5. **Release** and **slip**: [`ReleaseMonitor`], [`SlipMonitor`]. The pads carry the target while both touch it, it is not
+//!    supported and no release was commanded.
 //! 6. **Drop**: [`DropMonitor`].
 //! 7. **Goal**, at the last physics step of each control step: [`GoalMonitor`].
 //! 8. **Stage** of the episode: [`StageMonitor`].
@@ -238,7 +238,8 @@ impl Judge {
         let is_released = self.release.update(&self.config.criteria, &evidence.gripper, both_pads_touch);
         let is_opening =
             self.opening.update(evidence.gripper.commanded_width_m, self.config.steps_per_control);
-        self.slip.update(&evidence.pads, both_pads_touch && !is_released, is_opening);
+        let is_supported = self.is_supported(&evidence.target);
+        self.slip.update(&evidence.pads, both_pads_touch && !is_supported && !is_released, is_opening);
         let is_carried = is_lifted && !is_released;
         let grip = GripSample { is_carried, is_held: both_pads_touch, grip: evidence.grip };
         let config = &self.config;
@@ -251,7 +252,7 @@ impl Judge {
             is_touched: touch[0] || touch[1],
             is_touched_by_body: evidence.robot_impulse_ns / self.config.dt_s
                 > self.config.criteria.touch_force_n,
-            is_supported: self.is_supported(&evidence.target),
+            is_supported,
             is_released,
             is_in_workspace: self.config.workspace.contains(&evidence.target.centre_w),
         };

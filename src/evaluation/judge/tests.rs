@@ -306,6 +306,7 @@ fn slip_is_reported_and_does_not_affect_safety() {
     let mut replay = Replay::new(config());
     replay.carry(10, 0.0, 0.5);
     replay.steps(1, |e| {
+        e.target = BodyEvidence { lowest_z_w: 0.1, support_impulse_ns: 0.0, ..lying(0.0, 0.5) };
         e.pads = [PadEvidence { normal_impulse_ns: DT, travel_m: 0.0021 }; 2];
         e.gripper = GripperEvidence { width_m: 0.05, commanded_width_m: 0.045 };
     });
@@ -313,6 +314,22 @@ fn slip_is_reported_and_does_not_affect_safety() {
     let v = replay.verdict(Outcome::Completed);
     assert!(!v.no_slip && (v.slip_mm - 2.1).abs() < 1e-9);
     assert!(v.safety);
+}
+
+#[test]
+fn pads_that_slide_along_a_supported_object_do_not_slip() {
+    let slip_mm = |support_impulse_ns: f64| {
+        let mut replay = Replay::new(config());
+        for travel_m in [0.0, 0.004] {
+            replay.steps(1, |e| {
+                e.target = BodyEvidence { support_impulse_ns, ..lying(0.0, 0.2) };
+                e.pads = [PadEvidence { normal_impulse_ns: DT, travel_m }; 2];
+                e.gripper = GripperEvidence { width_m: 0.05, commanded_width_m: 0.045 };
+            });
+        }
+        replay.verdict(Outcome::Completed).slip_mm
+    };
+    assert_eq!((slip_mm(0.1 * WEIGHT_N * DT), slip_mm(0.0)), (0.0, 4.0));
 }
 
 #[test]
