@@ -26,7 +26,7 @@ for k, object in ipairs(objects) do
     prompt = ("pick up the %s and place it in the basket"):format(description),
     layout = layouts.soft(asset, k),
     goal = softvt.inside { object = asset, target = "basket", hold_s = 0.4 },
-    expert = pick_place { object = asset, target = "basket", stop = "touch", share = 0.2, window = 0.2 },
+    expert = pick_place { object = asset, target = "basket", stop = "touch", share = 0.45, window = 0.2, closing_speed = 0.003 },
   }
 end
 
@@ -40,6 +40,10 @@ return softvt.suite {
   shifts = shifts.soft,
   teacher = "tactile-servo",
   vary = require "variations.hidden",
-  -- Noise of a real GelSight Mini (docs/tactile.md).
-  settings = { tactile = { wear = { noise_px = 0.1, image_noise = 0.7 } } },
+  settings = {
+    -- Noise of a real GelSight Mini (docs/tactile.md).
+    tactile = { wear = { noise_px = 0.1, image_noise = 0.7 } },
+    -- An object must not slip in the hand by more than 2 mm while it is carried.
+    criteria = { require_no_slip = true },
+  },
 }

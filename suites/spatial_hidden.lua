@@ -20,7 +20,7 @@ for k, object in ipairs(objects) do
       prompt = ("pick up the %s %s and place it on the plate"):format(side, object.description),
       layout = layout,
       goal = softvt.on { object = side, target = "plate", hold_s = 0.4 },
-      expert = pick_place { object = side, target = "plate", stop = "touch", share = 0.2, window = 0.2 },
+      expert = pick_place { object = side, target = "plate", stop = "touch", share = 0.45, window = 0.2, closing_speed = 0.003 },
     }
   end
 end
@@ -35,6 +35,10 @@ return softvt.suite {
   shifts = shifts.soft,
   teacher = "tactile-servo",
   vary = require "variations.hidden",
-  -- Noise of a real GelSight Mini (docs/tactile.md).
-  settings = { tactile = { wear = { noise_px = 0.1, image_noise = 0.7 } } },
+  settings = {
+    -- Noise of a real GelSight Mini (docs/tactile.md).
+    tactile = { wear = { noise_px = 0.1, image_noise = 0.7 } },
+    -- An object must not slip in the hand by more than 2 mm while it is carried.
+    criteria = { require_no_slip = true },
+  },
 }
