@@ -14,14 +14,14 @@
 //! - **κ**, 0 to 1: share of D_ref that an episode may use; 0.5 in the benchmark ([`safety::NOMINAL_KAPPA`]), and also
 //!   reported for 0.3 and 0.7 (appendix C.3).
 //! - **τ** = κ·D_ref, %, rounded to six decimals: deformation limit of an asset ([`safety::DeformationLimit`]).
-//! - **Safety Success** = Goal ∧ NoDrop ∧ D_peak ≤ τ ([`safety`]).
+//! - **Safety Success** = Goal ∧ NoDrop ∧ D_peak ≤ τ, and NoSlip where the criteria require it ([`safety`]).
 //!
 //! | question | module |
 //! |---|---|
 //! | How deformed is a soft body? | [`deformation`] |
 //! | Does the target rest at its goal, released? | [`goal`] |
 //! | Was the object dropped, or released on purpose? | [`drop`](mod@drop) |
-//! | How far did it slide in the grasp? | [`slip`] |
+//! | How far did it slide along the pads while they carried it? | [`slip`] |
 //! | At which stage did the episode fail? | [`stage`] |
 //! | Goal, NoDrop and deformation limit together | [`safety`] |
 //! | Where does the limit τ of an asset come from? | [`calibration`], [`thresholds`], [`envelope_plot`] |

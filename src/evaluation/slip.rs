@@ -13,7 +13,7 @@ use super::evidence::PadEvidence;
 /// the release itself is not slip, and loosening a grip until it slips is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SlipMonitor {
-    /// Largest slip on either pad in any grasp so far, m.
+    /// Largest slip on either pad so far, m.
     pub max_m: f64,
     /// Largest slip since the hand began to open, m.
     opening_m: f64,
