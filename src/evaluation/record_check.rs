@@ -46,6 +46,7 @@ impl EpisodeRecord {
         self.check_ranges()?;
         self.check_goal()?;
         self.check_deformation()?;
+        self.check_grip()?;
         self.check_others()
     }
 
@@ -57,6 +58,7 @@ impl EpisodeRecord {
             ("slip_mm", Some(v.slip_mm)),
             ("peak_pad_force_n", Some(v.peak_pad_force_n)),
             ("mean_pad_force_n", Some(v.mean_pad_force_n)),
+            ("least_pad_force_n", v.least_pad_force_n),
             ("goal_time_s", v.goal_time_s),
             ("d_peak", v.d_peak),
             ("d_peak_weighted", v.d_peak_weighted),
@@ -168,6 +170,42 @@ impl EpisodeRecord {
                     at.kappa, at.safety
                 ));
             }
+        }
+        Ok(())
+    }
+
+    /// Checks the grip ratio, and the verdicts that follow from Goal, Safety and NoSlip.
+    fn check_grip(&self) -> Result<(), String> {
+        let v = &self.verdict;
+        let ratio = v.least_pad_force_n.filter(|least| *least > 0.0).map(|least| v.peak_pad_force_n / least);
+        let is_equal = match (v.grip_ratio, ratio) {
+            (Some(a), Some(b)) => (a - b).abs() <= TOLERANCE * (1.0 + b),
+            (a, b) => a.is_none() && b.is_none(),
+        };
+        if !is_equal {
+            let (got, least) = (or_null(v.grip_ratio), or_null(v.least_pad_force_n));
+            let peak = v.peak_pad_force_n;
+            return Err(format!(
+                "grip_ratio is {got}, and peak_pad_force_n is {peak}, least_pad_force_n {least}"
+            ));
+        }
+        if let Some(slip_ok) = v.slip_ok.filter(|ok| *ok != v.no_slip || !self.outcome.is_valid()) {
+            return Err(format!("slip_ok is {slip_ok}, and no_slip is {}", v.no_slip));
+        }
+        if v.gentle == Some(true) && !(v.goal && v.grip_ratio.is_some()) {
+            return Err(format!(
+                "gentle is true, and goal is {}, grip_ratio {}",
+                v.goal,
+                or_null(v.grip_ratio)
+            ));
+        }
+        if v.contact_success == Some(true) && !v.goal {
+            return Err("contact_success is true, and goal is false".to_owned());
+        }
+        if v.contact_safety != v.contact_success.map(|contact| contact && v.safety && v.no_slip) {
+            let [safety, success] = [v.contact_safety, v.contact_success].map(or_null);
+            let parts = format!("safety {}, no_slip {}", v.safety, v.no_slip);
+            return Err(format!("contact_safety is {safety}, and contact_success is {success}, {parts}"));
         }
         Ok(())
     }
@@ -295,6 +333,29 @@ mod tests {
                 .contains("d_peak 0.3333333333333333 is above d_peak_max 0.1")
         );
         assert!(refusal(&[("mean_pad_force_n", json!(2.0))]).contains("is above peak_pad_force_n 1.5"));
+    }
+
+    #[test]
+    fn verdicts_on_the_grip_follow_from_forces_goal_and_slip() {
+        let claimed = refusal(&[("grip_ratio", json!(1.01))]);
+        assert!(claimed.contains("grip_ratio is 1.01, and peak_pad_force_n is 1.5"), "{claimed}");
+        assert!(refusal(&[("least_pad_force_n", json!(-1.0))]).contains("least_pad_force_n is -1"));
+        let missed = [("goal", json!(false)), ("outcome", json!({ "kind": "budget" }))];
+        let missed = [&missed[..], &[("goal_time_s", Value::Null), ("safety", json!(false))]].concat();
+        let of =
+            |changes: &[(&str, Value)]| refusal(&[&missed[..], &[("kappas", json!([]))], changes].concat());
+        let gentle = of(&[
+            ("gentle", json!(true)),
+            ("contact_success", json!(false)),
+            ("contact_safety", json!(false)),
+        ]);
+        assert!(gentle.contains("gentle is true, and goal is false"), "{gentle}");
+        let contact = of(&[("gentle", json!(false)), ("contact_success", json!(true))]);
+        assert!(contact.contains("contact_success is true, and goal is false"), "{contact}");
+        let safe = refusal(&[("contact_success", json!(true)), ("contact_safety", json!(false))]);
+        assert!(safe.contains("contact_safety is false, and contact_success is true"), "{safe}");
+        let slip = refusal(&[("slip_ok", json!(false))]);
+        assert!(slip.contains("slip_ok is false") || slip.contains("safety is true"), "{slip}");
     }
 
     #[test]

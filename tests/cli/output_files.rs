@@ -21,7 +21,7 @@ fn lists_are_printed_as_text_and_as_json() {
     let needs = |name: &str| suites.iter().find(|s| s["name"] == name).map(|s| s["needs"].clone());
     assert_eq!(needs("object_soft"), Some("nothing".into()));
     assert_eq!(needs("spatial_varied"), Some("size".into()));
-    assert!(suites.iter().any(|s| s["name"] == "all" && s["tasks"] == 40 && s["file"] == "suites/all.lua"));
+    assert!(suites.iter().any(|s| s["name"] == "all" && s["tasks"] == 60 && s["file"] == "suites/all.lua"));
     let tasks = json("tasks");
     assert_eq!(
         tasks.len(),

@@ -1,5 +1,7 @@
 //! Result tables of runs, as markdown and as LaTeX with booktabs. Names come from scripts and are escaped.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::{
     condition_effects::{condition_effects, effects_table},
     run_summary::RunSummary,
@@ -52,6 +54,21 @@ fn episodes(run: &RunSummary) -> String {
     }
 }
 
+/// What a safe grip needs in the suites that state it: "A safe grip needs touch in: object_hidden."
+fn needs(runs: &[RunSummary]) -> String {
+    let mut suites: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for run in runs {
+        if let Some(needs) = run.run.manifest["needs"].as_str() {
+            suites.entry(needs).or_default().insert(&run.summary.suite);
+        }
+    }
+    let sentence = |(needs, suites): (&str, BTreeSet<&str>)| {
+        let names: Vec<&str> = suites.into_iter().collect();
+        format!(" A safe grip needs {needs} in: {}.", names.join(", "))
+    };
+    suites.into_iter().map(sentence).collect()
+}
+
 /// The paper's main table: Goal and Safety Success by suite and method.
 pub fn main_table(runs: &[RunSummary]) -> ResultTable {
     let row = |run: &RunSummary| {
@@ -75,9 +92,10 @@ pub fn main_table(runs: &[RunSummary]) -> ResultTable {
         true => String::new(),
         false => format!(" It also requires no slip in the hand in: {}.", with_slip.join("; ")),
     };
+    let needs = needs(runs);
     ResultTable {
         caption: format!(
-            "Success by suite and method, % of episodes with 95 % Wilson intervals. Safety Success requires the goal, no drop, and a peak deformation within the object's threshold; it does not apply to rigid objects.{slip} TSR is Goal Success; DSR is Goal Success with the deformation within the threshold, dropped or not."
+            "Success by suite and method, % of episodes with 95 % Wilson intervals. Safety Success requires the goal, no drop, and a peak deformation within the object's threshold; it does not apply to rigid objects.{slip}{needs} TSR is Goal Success; DSR is Goal Success with the deformation within the threshold, dropped or not."
         ),
         head: strings([
             "Suite",
