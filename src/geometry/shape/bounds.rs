@@ -25,8 +25,8 @@ impl Shape {
         }
     }
 
-    /// True if a cheap test proves that the shape is more than `reach` (m) away from `p`.
-    pub(super) fn is_farther(&self, p: &Vec3, reach: f64) -> bool {
+    /// True if a cheap test proves that the shape is more than `reach` (m) away from `p`; false leaves it open.
+    pub fn is_farther(&self, p: &Vec3, reach: f64) -> bool {
         let reach = reach.max(0.0);
         let beyond = |across2: f64, radius: f64| across2 > (radius + reach).powi(2);
         match self {
@@ -37,6 +37,7 @@ impl Shape {
             }
             Self::Placed { shape, pose } => shape.is_farther(&to_local(pose, p), reach),
             Self::Paint { shape, .. } => shape.is_farther(p, reach),
+            Self::Union(parts) => parts.iter().all(|part| part.is_farther(p, reach)),
             _ => false,
         }
     }

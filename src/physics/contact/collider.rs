@@ -19,6 +19,10 @@ pub trait ContactSurface: Debug + Send + Sync {
     /// Signed distance, outward normal and coverage for a square sample of edge `spacing` (m) at `p`
     /// with outward normal `facing`.
     fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> Contact;
+    /// True if a cheap test proves that the solid is more than `reach` (m) away from `p`; false leaves it open.
+    fn is_farther(&self, _p: &Vec3, _reach: f64) -> bool {
+        false
+    }
     /// A box around the solid.
     fn bounds(&self) -> Aabb;
     /// Geometry for contact with other colliders. Without it, the surface touches soft bodies only.
@@ -30,6 +34,10 @@ pub trait ContactSurface: Debug + Send + Sync {
 impl ContactSurface for Shape {
     fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> Contact {
         Self::contact(self, p, facing, spacing)
+    }
+
+    fn is_farther(&self, p: &Vec3, reach: f64) -> bool {
+        Self::is_farther(self, p, reach)
     }
 
     fn bounds(&self) -> Aabb {

@@ -120,6 +120,11 @@ pub fn detect(
         if !nodes.bounds.intersects(&near_surface) {
             continue;
         }
+        // A patch contacts a face from half its edge beyond that of the face.
+        let (centre, radius) = (nodes.bounds.centre(), 0.5 * nodes.bounds.size().norm());
+        if collider.surface.is_farther(&centre, margin.max(reach).max(ahead) + group.spacing + radius) {
+            continue;
+        }
         let mut is_near = false;
         for sample in group.first..group.last {
             let candidate = test_sample(body, collider, &frame, &nodes, index, sample, &near_surface);

@@ -44,6 +44,8 @@ pub struct SampleGroup {
     pub first: usize,
     /// One past its last sample.
     pub last: usize,
+    /// Edge of its largest patch, m.
+    pub spacing: f64,
 }
 
 /// A contact sample: a quadrature point of the surface, embedded in the mesh.
@@ -223,14 +225,17 @@ fn group_samples(mesh: &VoxelMesh, samples: Vec<SurfaceSample>) -> (Vec<ContactS
             let mut nodes = [0; 8];
             let element = mesh.elements[key.0 as usize];
             corners.iter().enumerate().for_each(|(i, &c)| nodes[i] = element[c]);
-            groups.push(SampleGroup { nodes, count: corners.len(), first: out.len(), last: out.len() });
+            let (first, last) = (out.len(), out.len());
+            groups.push(SampleGroup { nodes, count: corners.len(), first, last, spacing: 0.0 });
         }
         let all = surface.at.weights();
         let mut weights = [0.0; 8];
         corners.iter().enumerate().for_each(|(i, &c)| weights[i] = all[c]);
+        let spacing = surface.area.sqrt();
         out.push(ContactSample { surface, weights });
         if let Some(group) = groups.last_mut() {
             group.last = out.len();
+            group.spacing = group.spacing.max(spacing);
         }
     }
     (out, groups)
