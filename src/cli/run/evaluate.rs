@@ -262,6 +262,9 @@ pub(crate) fn episode_line(record: &EpisodeRecord) -> String {
         _ if verdict.safety => format!("safe{d}"),
         _ if verdict.goal => match (verdict.deformation_ok, verdict.d_peak, verdict.tau) {
             (Some(false), Some(d), Some(tau)) => format!("goal reached, unsafe (D {d:.2} % > τ {tau:.2} %)"),
+            _ if verdict.no_drop && verdict.slip_ok == Some(false) => {
+                format!("goal reached, unsafe (slipped by {:.1} mm){d}", verdict.slip_mm)
+            }
             _ => format!("goal reached, unsafe{d}"),
         },
         _ => format!("failed{d}"),

@@ -406,6 +406,7 @@ fn rejection(record: &EpisodeRecord) -> Option<String> {
         _ if !verdict.goal => "goal not reached",
         _ if !verdict.no_drop => "dropped",
         _ if verdict.deformation_ok == Some(false) => "deformed too much",
+        _ if verdict.slip_ok == Some(false) => "slipped in the hand",
         _ if record.header.soft && verdict.tau.is_none() => "without a known limit of deformation",
         _ => "not safe",
     };

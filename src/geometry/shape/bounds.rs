@@ -1,5 +1,7 @@
 //! Bounding boxes of shapes.
 
+use std::sync::{Mutex, PoisonError};
+
 use super::{
     combine::SignedDistance,
     displacement::Displacement,
@@ -8,8 +10,16 @@ use super::{
 };
 use crate::{Aabb, Vec3};
 
+/// Bounds that were found by a search, the most recently used last. Scripts make the same assets anew for every episode.
+static FOUND: Mutex<Vec<(Shape, Aabb)>> = Mutex::new(Vec::new());
+
+/// Largest number of bounds that are kept.
+const MOST_FOUND: usize = 128;
+
 /// Cells along the longest edge in the search for the extreme points of a composite shape.
 const CELLS: f64 = 40.0;
+/// Step of the first pass of that search, cells.
+const COARSE: usize = 3;
 
 impl Shape {
     /// The tight bounding box.
@@ -21,8 +31,30 @@ impl Shape {
         let corner = |sign: f64| Some(Vec3::new(exact(0, sign)?, exact(1, sign)?, exact(2, sign)?));
         match (corner(-1.0), corner(1.0)) {
             (Some(min), Some(max)) => Aabb { min, max },
-            _ => self.search_bounds(),
+            _ => self.known_bounds(),
         }
+    }
+
+    /// Those of [`Self::search_bounds`], from [`FOUND`] if they were found before.
+    fn known_bounds(&self) -> Aabb {
+        let found = || FOUND.lock().unwrap_or_else(PoisonError::into_inner);
+        let keep = |list: &mut Vec<(Self, Aabb)>, entry: (Self, Aabb)| {
+            if list.len() == MOST_FOUND {
+                list.remove(0);
+            }
+            list.push(entry);
+        };
+        let mut list = found();
+        if let Some(at) = list.iter().position(|(shape, _)| shape == self) {
+            let entry = list.remove(at);
+            let bounds = entry.1;
+            keep(&mut list, entry);
+            return bounds;
+        }
+        drop(list);
+        let bounds = self.search_bounds();
+        keep(&mut found(), (self.clone(), bounds));
+        bounds
     }
 
     /// True if a cheap test proves that the shape is more than `reach` (m) away from `p`; false leaves it open.
@@ -120,22 +152,36 @@ impl Shape {
         let reach = self.loose_bounds();
         let cell = reach.size().max() / CELLS;
         let count = reach.size().map(|edge| (edge / cell).ceil() as usize + 1);
+        let grid = |index: usize| {
+            let step = [index % count.x, index / count.x % count.y, index / count.x / count.y];
+            (step, reach.min + Vec3::from(step.map(|k| k as f64)) * cell)
+        };
+        let near = |p: &Vec3| {
+            let is_near = self.distance(p).abs() <= 1.5 * cell;
+            is_near.then(|| self.project(p, 2.0 * cell)).flatten()
+        };
+        let total = count.x * count.y * count.z;
+        // A part of the points bounds the extremes from below, so that most others need no projection.
+        let mut least = [f64::NEG_INFINITY; 6];
+        for (step, p) in (0..total).map(grid) {
+            if step.iter().all(|k| k % COARSE == 0)
+                && let Some(q) = near(&p)
+            {
+                (0..6).for_each(|side| least[side] = least[side].max(outward(side).dot(&q)));
+            }
+        }
         let mut extremes: [Option<Vec3>; 6] = [None; 6];
-        for index in 0..count.x * count.y * count.z {
-            let step = Vec3::new(
-                (index % count.x) as f64,
-                (index / count.x % count.y) as f64,
-                (index / count.x / count.y) as f64,
-            );
-            let p = reach.min + step * cell;
-            if self.distance(&p).abs() > 1.5 * cell {
+        for (_, p) in (0..total).map(grid) {
+            // The projection of a point is at most two cells away.
+            if (0..6).all(|side| outward(side).dot(&p) + 2.0 * cell < least[side]) {
                 continue;
             }
-            let Some(q) = self.project(&p, 2.0 * cell) else { continue };
+            let Some(q) = near(&p) else { continue };
             for (side, extreme) in extremes.iter_mut().enumerate() {
                 let height = |v: &Vec3| outward(side).dot(v);
                 if extreme.is_none_or(|e| height(&q) > height(&e)) {
                     *extreme = Some(q);
+                    least[side] = least[side].max(height(&q));
                 }
             }
         }
