@@ -48,13 +48,18 @@ fn safe_episodes(policy: &str) -> usize {
 }
 
 #[test]
-fn no_controller_without_touch_is_nearly_as_safe_as_the_expert_where_touch_is_needed() {
-    let expert = safe_episodes("expert");
+fn only_the_expert_and_a_hand_that_feels_are_safe_where_touch_is_needed() {
+    let [expert, servo, binary] = ["expert", "tactile-servo", "expert-binary"].map(safe_episodes);
     assert!(expert >= 9, "the expert is safe in {expert} of 10 episodes");
+    assert!(servo >= 8, "tactile-servo is safe in {servo} of 10 episodes");
+    assert_eq!(binary, 0, "a hand that closes fully is safe in {binary} of 10 episodes");
     let mut total = 0;
     for policy in ["size-seen", "contact-depth", "one-force"] {
         let safe = safe_episodes(policy);
-        assert!(safe < expert, "{policy} is safe in {safe} of 10 episodes, the expert in {expert}");
+        assert!(
+            safe < servo.min(expert),
+            "{policy} is safe in {safe} of 10 episodes, tactile-servo in {servo}"
+        );
         total += safe;
     }
     assert!(total <= 18, "controllers without touch are safe in {total} of 30 episodes");
