@@ -210,12 +210,12 @@ fn arrays_without_end_are_refused_before_they_are_read() {
     let add = |shape: &[usize], chunk: &[usize]| {
         changed(|file| drop(demo_0(file).new_dataset::<f32>().shape(shape).chunk(chunk).create("x").unwrap()))
     };
-    let rank = add(&[2; 32], &[1; 32]);
+    let rank = add(&[1; 32], &[1; 32]);
     assert!(rank.contains("/data/demo_0/x: it has 32 axes; at most 8 are read"), "{rank}");
     let size = add(&[STEPS, 1 << 40], &[1, 1 << 20]);
     assert!(size.contains("/data/demo_0/x: its shape [9, 1099511627776] is above 2 GiB"), "{size}");
-    let chunks = add(&[1 << 14, 1 << 14], &[1, 1]);
-    assert!(chunks.contains("/data/demo_0/x: it has 268435456 chunks"), "{chunks}");
+    let chunks = add(&[1 << 11, 1 << 11], &[1, 1]);
+    assert!(chunks.contains("/data/demo_0/x: it has 4194304 chunks"), "{chunks}");
 }
 
 #[test]
