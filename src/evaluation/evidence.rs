@@ -1,7 +1,6 @@
 //! Input of the judge after every physics step: plain numbers in the world frame, hidden from policies.
 //!
-//! Forces enter as impulses (force times the length of the physics step), so that they may be summed
-//! over a control step.
+//! Forces are means over the step.
 
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::fem::CrushedShares;
@@ -11,8 +10,8 @@ use super::deformation::Deformation;
 /// Contact between one gripper pad and the target.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PadEvidence {
-    /// Normal impulse between pad and target in this step, N s.
-    pub normal_impulse_ns: f64,
+    /// Normal force between pad and target, N.
+    pub normal_force_n: f64,
     /// Distance that the contact patch has slid along the pad since this contact began, m.
     pub travel_m: f64,
 }
@@ -33,11 +32,11 @@ pub struct BodyEvidence {
     pub centre_w: Vec3,
     /// Height of the lowest point, m.
     pub lowest_z_w: f64,
-    /// Sum of the upward impulses on the body in this step from everything but the robot, N s. A sleeping body keeps
+    /// Sum of the upward forces on the body from everything but the robot, N. A sleeping body keeps
     /// the value with which it fell asleep.
-    pub support_impulse_ns: f64,
-    /// Normal impulse on the body in this step from all parts of the robot, pads included, N s.
-    pub robot_impulse_ns: f64,
+    pub support_force_n: f64,
+    /// Normal force on the body from all parts of the robot, pads included, N.
+    pub robot_force_n: f64,
     /// Present deformation; `None` for a rigid body, and for a soft one when it could not be measured.
     pub deformation: Option<Deformation>,
 }
@@ -45,8 +44,8 @@ pub struct BodyEvidence {
 /// Load of the grip on the target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GripEvidence {
-    /// Impulse of the whole robot on the target in this step, N s.
-    pub load_ns: Vec3,
+    /// Force of the whole robot on the target, N.
+    pub load_n: Vec3,
     /// Unit vector along which the pads close.
     pub axis_w: Vec3,
     /// Dynamic friction of pad and target.
@@ -58,9 +57,9 @@ pub struct GripEvidence {
 pub struct GoalEvidence {
     /// Pose of its object frame (origin at the centre of its footprint).
     pub pose_w: Pose,
-    /// Upward impulse on the target in this step from it and, if the target must be placed inside, from objects in it that
-    /// it carries, N s.
-    pub support_impulse_ns: f64,
+    /// Upward force on the target from it and, if the target must be placed inside, from objects in it that
+    /// it carries, N.
+    pub support_force_n: f64,
 }
 
 /// State at the end of one physics step.
@@ -74,8 +73,8 @@ pub struct Evidence<'a> {
     pub gripper: GripperEvidence,
     /// Left and right pad against the target.
     pub pads: [PadEvidence; 2],
-    /// Normal impulse in this step between the target and the rest of the robot (hand, fingers, sensor cases), N s.
-    pub robot_impulse_ns: f64,
+    /// Normal force between the target and the rest of the robot (hand, fingers, sensor cases), N.
+    pub robot_force_n: f64,
     /// Load of the grip.
     pub grip: GripEvidence,
     /// State of the target.
@@ -95,13 +94,13 @@ impl Evidence<'_> {
         let bodies = self.others.iter().chain([&self.target]);
         let bodies = bodies.flat_map(|body| {
             let centre = body.centre_w;
-            [centre.x, centre.y, centre.z, body.lowest_z_w, body.support_impulse_ns, body.robot_impulse_ns]
+            [centre.x, centre.y, centre.z, body.lowest_z_w, body.support_force_n, body.robot_force_n]
         });
-        let pads = self.pads.iter().flat_map(|pad| [pad.normal_impulse_ns, pad.travel_m]);
+        let pads = self.pads.iter().flat_map(|pad| [pad.normal_force_n, pad.travel_m]);
         let (pose, gripper) = (self.goal.pose_w.to_homogeneous(), &self.gripper);
-        let impulses = [self.robot_impulse_ns, self.goal.support_impulse_ns, self.grip.dynamic_mu];
-        let rest = [self.time_s, gripper.width_m, gripper.commanded_width_m].into_iter().chain(impulses);
-        let grip = self.grip.load_ns.iter().chain(self.grip.axis_w.iter());
+        let forces = [self.robot_force_n, self.goal.support_force_n, self.grip.dynamic_mu];
+        let rest = [self.time_s, gripper.width_m, gripper.commanded_width_m].into_iter().chain(forces);
+        let grip = self.grip.load_n.iter().chain(self.grip.axis_w.iter());
         let vectors = self.hand_w.iter().chain(pose.iter()).chain(grip).copied();
         bodies.chain(pads).chain(rest).chain(vectors).all(f64::is_finite)
     }

@@ -48,7 +48,7 @@ struct LoadSum {
     steps: u32,
     /// Number of steps in which the object was carried by both pads.
     carried: u32,
-    load_ns: Vec3,
+    load_n: Vec3,
 }
 
 impl GripMonitor {
@@ -67,7 +67,7 @@ impl GripMonitor {
         let sum = &mut self.control_step;
         sum.steps += 1;
         sum.carried += u32::from(*is_carried && *is_held);
-        sum.load_ns += grip.load_ns;
+        sum.load_n += grip.load_n;
         if sum.steps < steps_per_control {
             return;
         }
@@ -75,7 +75,7 @@ impl GripMonitor {
         if sum.carried < sum.steps {
             return;
         }
-        let load_n = sum.load_ns / (f64::from(sum.steps) * dt_s);
+        let load_n = sum.load_n / f64::from(sum.steps);
         let along_n = load_n.dot(&grip.axis_w);
         let across_n = (load_n - along_n * grip.axis_w).norm();
         let least_n = across_n / (2.0 * grip.dynamic_mu) + 0.5 * along_n.abs();
@@ -97,7 +97,7 @@ mod tests {
     const DT: f64 = 1.0 / 60.0;
 
     fn sample(load_n: [f64; 3], is_held: bool) -> GripSample {
-        let grip = GripEvidence { load_ns: Vec3::from(load_n) * DT, axis_w: Vec3::y(), dynamic_mu: 1.2 };
+        let grip = GripEvidence { load_n: Vec3::from(load_n), axis_w: Vec3::y(), dynamic_mu: 1.2 };
         GripSample { is_carried: true, is_held, grip }
     }
 

@@ -71,7 +71,7 @@ mod tests {
     fn slip_mm(steps: &[Step]) -> f64 {
         let mut slip = SlipMonitor::default();
         for (travel_mm, is_carried, is_opening) in steps {
-            let pads = travel_mm.map(|mm| PadEvidence { normal_impulse_ns: 0.05, travel_m: mm * 1e-3 });
+            let pads = travel_mm.map(|mm| PadEvidence { normal_force_n: 3.0, travel_m: mm * 1e-3 });
             slip.update(&pads, *is_carried, *is_opening);
         }
         1e3 * slip.max_m

@@ -97,7 +97,6 @@ impl EvidenceCollector {
 
     /// The evidence of the last physics step.
     pub(super) fn collect<'a>(&'a mut self, sim: &Simulation, time_s: f64) -> Evidence<'a> {
-        let dt = sim.world.params.dt;
         let mut bodies = std::mem::take(&mut self.bodies);
         bodies.clear();
         bodies.extend(self.others.iter().map(|&i| self.body(sim, i)));
@@ -127,18 +126,18 @@ impl EvidenceCollector {
                 commanded_width_m: target_width(sim.robot.closure()),
             },
             pads: sim.pad_contacts(target).map(|contact| PadEvidence {
-                normal_impulse_ns: contact.normal_force * dt,
+                normal_force_n: contact.normal_force,
                 travel_m: contact.travel,
             }),
-            robot_impulse_ns: from_robot * dt,
+            robot_force_n: from_robot,
             grip: GripEvidence {
-                load_ns: load_w * dt,
+                load_n: load_w,
                 axis_w: sim.robot.grip_axis_w(&sim.world),
                 dynamic_mu: sim.pad_friction(target).dynamic_mu,
             },
             target: self.body(sim, self.target),
             crushed,
-            goal: GoalEvidence { pose_w: goal_w, support_impulse_ns: from_goal * dt },
+            goal: GoalEvidence { pose_w: goal_w, support_force_n: from_goal },
             others: &self.bodies,
         }
     }
@@ -176,8 +175,8 @@ impl EvidenceCollector {
         BodyEvidence {
             centre_w: sim.centre(object),
             lowest_z_w: lowest(sim, object),
-            support_impulse_ns: support * sim.world.params.dt,
-            robot_impulse_ns: from_robot * sim.world.params.dt,
+            support_force_n: support,
+            robot_force_n: from_robot,
             deformation: self.deformation(sim, index),
         }
     }

@@ -60,18 +60,18 @@
 //!         hand_w: Vec3::new(0.0, 0.0, 0.3),
 //!         gripper: GripperEvidence { width_m: 0.08, commanded_width_m: 0.08 },
 //!         pads: [PadEvidence::default(); 2],
-//!         robot_impulse_ns: 0.0,
-//!         grip: GripEvidence { load_ns: Vec3::zeros(), axis_w: Vec3::y(), dynamic_mu: 1.2 },
+//!         robot_force_n: 0.0,
+//!         grip: GripEvidence { load_n: Vec3::zeros(), axis_w: Vec3::y(), dynamic_mu: 1.2 },
 //!         target: BodyEvidence {
 //!             centre_w: Vec3::new(0.02, 0.0, 0.03),
 //!             lowest_z_w: 0.0,
-//!             support_impulse_ns: weight_n * dt_s,
-//!             robot_impulse_ns: 0.0,
+//!             support_force_n: weight_n,
+//!             robot_force_n: 0.0,
 //!             deformation: reference.measure(&stretched).ok(),
 //!         },
 //!         crushed: CrushedShares { collapsed: Some(0.0), damaged: None },
 //!         others: &[],
-//!         goal: GoalEvidence { pose_w: Pose::identity(), support_impulse_ns: weight_n * dt_s },
+//!         goal: GoalEvidence { pose_w: Pose::identity(), support_force_n: weight_n },
 //!     });
 //! }
 //! let verdict = judge.finish(&Outcome::Completed);
@@ -153,7 +153,7 @@ struct FirstContact {
 #[derive(Clone, Copy, Debug, Default)]
 struct ControlStepSums {
     steps: u32,
-    support_ns: f64,
+    support_n: f64,
     is_touched: bool,
 }
 
@@ -250,8 +250,7 @@ impl Judge {
             hand_z: evidence.hand_w.z,
             is_lifted,
             is_touched: touch[0] || touch[1],
-            is_touched_by_body: evidence.robot_impulse_ns / self.config.dt_s
-                > self.config.criteria.touch_force_n,
+            is_touched_by_body: evidence.robot_force_n > self.config.criteria.touch_force_n,
             is_supported,
             is_released,
             is_in_workspace: self.config.workspace.contains(&evidence.target.centre_w),
@@ -270,9 +269,9 @@ impl Judge {
     /// True if the target rests at the goal: in its region, and carried. For a state that has settled before the episode.
     pub fn rests_at_goal(&self, evidence: &Evidence<'_>) -> bool {
         let config = &self.config;
-        let needed_ns = config.criteria.support_share * config.target_weight_n * config.dt_s;
+        let needed_n = config.criteria.support_share * config.target_weight_n;
         config.goal.contains(&evidence.goal.pose_w, &evidence.target.centre_w, 0.0)
-            && evidence.goal.support_impulse_ns >= needed_ns
+            && evidence.goal.support_force_n >= needed_n
     }
 
     /// The first drop so far.
@@ -396,16 +395,16 @@ impl Judge {
     }
 
     fn observe_wrong_contact(&mut self, evidence: &Evidence<'_>) {
-        let least_ns = self.config.criteria.touch_force_n * self.config.dt_s;
+        let least_n = self.config.criteria.touch_force_n;
         if self.first_wrong_contact.is_none() {
-            let touched = evidence.others.iter().position(|body| body.robot_impulse_ns > least_ns);
+            let touched = evidence.others.iter().position(|body| body.robot_force_n > least_n);
             self.first_wrong_contact = touched.map(|other| FirstContact { time_s: evidence.time_s, other });
         }
     }
 
     /// Returns true for each pad that touches the target.
     fn observe_pads(&mut self, evidence: &Evidence<'_>) -> [bool; 2] {
-        let forces = evidence.pads.map(|pad| pad.normal_impulse_ns / self.config.dt_s);
+        let forces = evidence.pads.map(|pad| pad.normal_force_n);
         let touch = forces.map(|force| force > self.config.criteria.touch_force_n);
         self.pad_forces.peak_n = forces.iter().fold(self.pad_forces.peak_n, |peak, force| peak.max(*force));
         if touch[0] && touch[1] {
@@ -433,19 +432,19 @@ impl Judge {
     fn observe_goal(&mut self, evidence: &Evidence<'_>, is_touched: bool) -> bool {
         self.control_step.steps += 1;
         self.control_step.is_touched |= is_touched;
-        self.control_step.support_ns += evidence.goal.support_impulse_ns;
+        self.control_step.support_n += evidence.goal.support_force_n;
         if self.control_step.steps < self.config.steps_per_control {
             return false;
         }
         let sums = std::mem::take(&mut self.control_step);
         let (criteria, region) = (&self.config.criteria, &self.config.goal);
         let (pose, centre) = (&evidence.goal.pose_w, &evidence.target.centre_w);
-        let weight_ns = self.config.target_weight_n * self.config.dt_s * f64::from(sums.steps);
+        let weight_n = self.config.target_weight_n * f64::from(sums.steps);
         let sample = GoalSample {
             time_s: evidence.time_s,
             is_inside: region.contains(pose, centre, 0.0),
             is_inside_with_margin: region.contains(pose, centre, criteria.leave_margin_m),
-            is_supported: sums.support_ns >= criteria.support_share * weight_ns,
+            is_supported: sums.support_n >= criteria.support_share * weight_n,
             is_touched: sums.is_touched,
             is_inside_v1: region.contains_v1(criteria, pose, centre),
         };
@@ -456,7 +455,7 @@ impl Judge {
     }
 
     fn is_supported(&self, body: &BodyEvidence) -> bool {
-        body.support_impulse_ns > self.config.criteria.touch_force_n * self.config.dt_s
+        body.support_force_n > self.config.criteria.touch_force_n
     }
 }
 

@@ -47,8 +47,8 @@ fn lying(x: f64, d_pct: f64) -> BodyEvidence {
     BodyEvidence {
         centre_w: Vec3::new(x, 0.0, 0.03),
         lowest_z_w: 0.0,
-        support_impulse_ns: WEIGHT_N * DT,
-        robot_impulse_ns: 0.0,
+        support_force_n: WEIGHT_N,
+        robot_force_n: 0.0,
         deformation: Some(deformed(d_pct)),
     }
 }
@@ -74,12 +74,12 @@ impl Replay {
                 hand_w: Vec3::new(-0.2, 0.0, 0.1),
                 gripper: GripperEvidence { width_m: 0.08, commanded_width_m: 0.08 },
                 pads: [PadEvidence::default(); 2],
-                robot_impulse_ns: 0.0,
-                grip: GripEvidence { load_ns: Vec3::zeros(), axis_w: Vec3::y(), dynamic_mu: 1.2 },
+                robot_force_n: 0.0,
+                grip: GripEvidence { load_n: Vec3::zeros(), axis_w: Vec3::y(), dynamic_mu: 1.2 },
                 target: lying(-0.2, 0.2),
                 crushed: CrushedShares { collapsed: Some(0.02), damaged: None },
                 others: &others,
-                goal: GoalEvidence { pose_w: Pose::identity(), support_impulse_ns: 0.0 },
+                goal: GoalEvidence { pose_w: Pose::identity(), support_force_n: 0.0 },
             };
             make(&mut evidence);
             self.judge.observe(&evidence);
@@ -92,13 +92,13 @@ impl Replay {
             e.target = BodyEvidence {
                 centre_w: Vec3::new(x, 0.0, 0.13),
                 lowest_z_w: 0.1,
-                support_impulse_ns: 0.0,
-                robot_impulse_ns: 0.0,
+                support_force_n: 0.0,
+                robot_force_n: 0.0,
                 deformation: Some(deformed(d_pct)),
             };
             e.hand_w = Vec3::new(x, 0.0, 0.2);
-            e.pads = [PadEvidence { normal_impulse_ns: 1.2 * DT, travel_m: 0.0 }; 2];
-            e.grip.load_ns = Vec3::z() * WEIGHT_N * DT;
+            e.pads = [PadEvidence { normal_force_n: 1.2, travel_m: 0.0 }; 2];
+            e.grip.load_n = Vec3::z() * WEIGHT_N;
             e.gripper = GripperEvidence { width_m: 0.05, commanded_width_m: 0.045 };
         });
     }
@@ -107,7 +107,7 @@ impl Replay {
     fn rest(&mut self, n: u32, x: f64) {
         self.steps(n, |e| {
             e.target = lying(x, 0.2);
-            e.goal.support_impulse_ns = 0.6 * WEIGHT_N * DT;
+            e.goal.support_force_n = 0.6 * WEIGHT_N;
         });
     }
 
@@ -141,9 +141,9 @@ fn the_grip_is_judged_beside_safety() {
         let mut replay = Replay::new(JudgeConfig { criteria, ..config() });
         replay.carry(1, 0.0, 0.2);
         replay.steps(60, |e| {
-            e.target = BodyEvidence { lowest_z_w: 0.1, support_impulse_ns: 0.0, ..lying(0.0, 0.2) };
-            e.grip.load_ns = Vec3::z() * WEIGHT_N * DT;
-            e.pads = [PadEvidence { normal_impulse_ns: force_n * DT, travel_m: slip_m }; 2];
+            e.target = BodyEvidence { lowest_z_w: 0.1, support_force_n: 0.0, ..lying(0.0, 0.2) };
+            e.grip.load_n = Vec3::z() * WEIGHT_N;
+            e.pads = [PadEvidence { normal_force_n: force_n, travel_m: slip_m }; 2];
             e.gripper = GripperEvidence { width_m: 0.05, commanded_width_m: 0.045 };
         });
         replay.rest(30, 0.0);
@@ -170,9 +170,9 @@ fn a_gentle_grip_reaches_the_goal_with_at_most_twice_the_least_force() {
     let gentle = |force_n: f64, goal: bool| {
         let mut replay = Replay::new(config());
         replay.steps(60, |e| {
-            e.target = BodyEvidence { lowest_z_w: 0.1, support_impulse_ns: 0.0, ..lying(0.0, 0.2) };
-            e.grip.load_ns = Vec3::z() * WEIGHT_N * DT;
-            e.pads = [PadEvidence { normal_impulse_ns: force_n * DT, travel_m: 0.0 }; 2];
+            e.target = BodyEvidence { lowest_z_w: 0.1, support_force_n: 0.0, ..lying(0.0, 0.2) };
+            e.grip.load_n = Vec3::z() * WEIGHT_N;
+            e.pads = [PadEvidence { normal_force_n: force_n, travel_m: 0.0 }; 2];
             e.gripper = GripperEvidence { width_m: 0.05, commanded_width_m: 0.045 };
         });
         replay.rest(if goal { 30 } else { 3 }, 0.0);
@@ -211,9 +211,9 @@ fn a_plate_that_carries_less_than_half_or_a_hand_that_touches_prevents_rest() {
         let mut replay = Replay::new(config());
         replay.steps(60, |e| {
             e.target = lying(0.0, 0.2);
-            e.goal.support_impulse_ns = share * WEIGHT_N * DT;
-            e.pads[0].normal_impulse_ns = pad;
-            e.robot_impulse_ns = case;
+            e.goal.support_force_n = share * WEIGHT_N;
+            e.pads[0].normal_force_n = pad;
+            e.robot_force_n = case;
         });
         let v = replay.verdict(Outcome::Budget);
         assert!(!v.goal && v.goal_v1 && v.no_drop && !v.safety, "{share} {pad} {case}");
@@ -229,7 +229,7 @@ fn in_a_basket_only_the_basket_carries() {
         replay.steps(27, |e| {
             // It also rests on the table.
             e.target = lying(0.0, 0.2);
-            e.goal.support_impulse_ns = share * WEIGHT_N * DT;
+            e.goal.support_force_n = share * WEIGHT_N;
         });
         assert_eq!(replay.judge.is_goal_reached(), reached, "{share}");
     }
@@ -250,7 +250,7 @@ fn leaving_the_goal_after_entering_it_is_a_drop_even_if_it_comes_back() {
 #[test]
 fn lifting_the_other_instance_first_is_reported() {
     let mut replay = Replay::new(config());
-    replay.other = BodyEvidence { lowest_z_w: 0.006, support_impulse_ns: 0.0, ..lying(0.3, 0.4) };
+    replay.other = BodyEvidence { lowest_z_w: 0.006, support_force_n: 0.0, ..lying(0.3, 0.4) };
     replay.steps(1, |_| ());
     replay.other = lying(0.3, 0.1);
     replay.carry(10, 0.0, 0.2);
@@ -306,8 +306,8 @@ fn slip_is_reported_and_does_not_affect_safety() {
     let mut replay = Replay::new(config());
     replay.carry(10, 0.0, 0.5);
     replay.steps(1, |e| {
-        e.target = BodyEvidence { lowest_z_w: 0.1, support_impulse_ns: 0.0, ..lying(0.0, 0.5) };
-        e.pads = [PadEvidence { normal_impulse_ns: DT, travel_m: 0.0021 }; 2];
+        e.target = BodyEvidence { lowest_z_w: 0.1, support_force_n: 0.0, ..lying(0.0, 0.5) };
+        e.pads = [PadEvidence { normal_force_n: 1.0, travel_m: 0.0021 }; 2];
         e.gripper = GripperEvidence { width_m: 0.05, commanded_width_m: 0.045 };
     });
     replay.rest(30, 0.0);
@@ -318,18 +318,18 @@ fn slip_is_reported_and_does_not_affect_safety() {
 
 #[test]
 fn pads_that_slide_along_a_supported_object_do_not_slip() {
-    let slip_mm = |support_impulse_ns: f64| {
+    let slip_mm = |support_force_n: f64| {
         let mut replay = Replay::new(config());
         for travel_m in [0.0, 0.004] {
             replay.steps(1, |e| {
-                e.target = BodyEvidence { support_impulse_ns, ..lying(0.0, 0.2) };
-                e.pads = [PadEvidence { normal_impulse_ns: DT, travel_m }; 2];
+                e.target = BodyEvidence { support_force_n, ..lying(0.0, 0.2) };
+                e.pads = [PadEvidence { normal_force_n: 1.0, travel_m }; 2];
                 e.gripper = GripperEvidence { width_m: 0.05, commanded_width_m: 0.045 };
             });
         }
         replay.verdict(Outcome::Completed).slip_mm
     };
-    assert_eq!((slip_mm(0.1 * WEIGHT_N * DT), slip_mm(0.0)), (0.0, 4.0));
+    assert_eq!((slip_mm(0.1 * WEIGHT_N), slip_mm(0.0)), (0.0, 4.0));
 }
 
 #[test]
@@ -337,7 +337,7 @@ fn the_goal_may_be_lifted_first_and_its_deformation_counts_as_that_of_others() {
     let mut config = config();
     config.others[0].is_goal = true;
     let mut replay = Replay::new(config.clone());
-    replay.other = BodyEvidence { lowest_z_w: 0.1, support_impulse_ns: 0.0, ..lying(0.3, 2.0) };
+    replay.other = BodyEvidence { lowest_z_w: 0.1, support_force_n: 0.0, ..lying(0.3, 2.0) };
     replay.rest(30, 0.0);
     let v = replay.verdict(Outcome::Completed);
     assert!(!v.wrong_instance && v.safety, "harm to others is reported, not part of Safety Success");
@@ -359,9 +359,9 @@ fn the_goal_may_be_lifted_first_and_its_deformation_counts_as_that_of_others() {
 fn the_first_contact_with_another_object_is_kept() {
     let mut replay = Replay::new(config());
     replay.rest(6, 0.0);
-    replay.other.robot_impulse_ns = 0.001 * DT;
+    replay.other.robot_force_n = 0.001;
     replay.rest(1, 0.0);
-    replay.other.robot_impulse_ns = 2.0 * DT;
+    replay.other.robot_force_n = 2.0;
     replay.rest(2, 0.0);
     let contact = replay.verdict(Outcome::Budget).first_wrong_contact.expect("a contact");
     assert_eq!(contact.object, "other");
