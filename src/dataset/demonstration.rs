@@ -4,6 +4,7 @@ use softvt_benchmark::CONTROL_DT;
 use softvt_evaluation::record::EpisodeRecord;
 use softvt_policy::{Action, profile::GripCode};
 use softvt_robot::{
+    GripTarget,
     gripper::{self, MAX_WIDTH},
     rotation,
 };
@@ -90,7 +91,7 @@ impl Demonstration {
 
     /// The actions with their seventh number in a grip code. `None` if the recording does not have it.
     fn actions_in(&self, code: GripCode) -> Option<DataStream> {
-        let closures: Vec<f64> = self.actions.iter().map(|action| action.closure).collect();
+        let closures: Vec<f64> = self.actions.iter().map(|action| action.closure()).collect();
         let (grip, meaning) = match code {
             GripCode::Continuous => (closures, "continuous closure: 1 - commanded width / 0.08 m"),
             GripCode::Binary => {
@@ -107,7 +108,9 @@ impl Demonstration {
             ),
         };
         let rows = self.actions.iter().zip(grip);
-        let rows = rows.flat_map(|(action, closure)| Action { closure, ..*action }.to_array()).collect();
+        let rows = rows
+            .flat_map(|(action, closure)| Action { grip: GripTarget::Closure(closure), ..*action }.to_array())
+            .collect();
         let unit = if code == GripCode::Force { "m, rad, N" } else { "m, rad, 1" };
         let stream = DataStream::f64(actions_stream(code), &[7], rows)
             .unit(unit, BASE)
@@ -145,7 +148,8 @@ fn observed(recording: &StateRecording, actions: &[Action]) -> Vec<DataStream> {
     let each =
         |numbers: &dyn Fn(usize) -> Vec<f64>| (0..states.len()).flat_map(numbers).collect::<Vec<f64>>();
     let width = |i: usize| gripper::width(states[i].fingers);
-    let commanded = |i: usize| i.checked_sub(1).map_or(0.0, |before| actions[before].closure.clamp(0.0, 1.0));
+    let commanded =
+        |i: usize| i.checked_sub(1).map_or(0.0, |before| actions[before].closure().clamp(0.0, 1.0));
     let pose = each(&|i| pose_row(&states[i].tool_b).to_vec());
     let state = each(&|i| {
         let tool = states[i].tool_b;

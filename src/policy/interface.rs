@@ -5,6 +5,7 @@ use sha2::{Digest, Sha256};
 use super::{Observation, SensorStreams};
 use softvt_evaluation::episode_id::EpisodeIndex;
 use softvt_geometry::Vec3;
+use softvt_robot::GripTarget;
 
 /// Command of one control step: where the tool and the gripper should be at its end.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,23 +14,37 @@ pub struct Action {
     pub position_b: Vec3,
     /// Absolute tool orientation in the base frame as axis-angle, rad.
     pub axis_angle_b: Vec3,
-    /// Gripper closure, 0 (open) ..= 1 (closed). The hand clamps others, which the record counts.
-    pub closure: f64,
-    /// Grip force at which closing stops, N, at most the effort of the gripper. `None` closes to `closure` whatever the
-    /// force; with a force `closure` is 1.
-    pub force_n: Option<f64>,
+    /// Target of the gripper. The hand clamps closures outside of 0..=1, which the record counts; a grip force is at most the
+    /// effort of the gripper.
+    pub grip: GripTarget,
 }
 
 impl Action {
     /// An action that commands a closure.
     pub fn new(position_b: Vec3, axis_angle_b: Vec3, closure: f64) -> Self {
-        Self { position_b, axis_angle_b, closure, force_n: None }
+        Self { position_b, axis_angle_b, grip: GripTarget::Closure(closure) }
+    }
+
+    /// Gripper closure, 0 (open) ..= 1 (closed); 1 with a grip force.
+    pub fn closure(&self) -> f64 {
+        match self.grip {
+            GripTarget::Closure(closure) => closure,
+            GripTarget::Force(_) => 1.0,
+        }
+    }
+
+    /// Grip force at which closing stops, N; `None` for a closure.
+    pub fn force_n(&self) -> Option<f64> {
+        match self.grip {
+            GripTarget::Closure(_) => None,
+            GripTarget::Force(force_n) => Some(force_n),
+        }
     }
 
     /// Position, axis-angle and closure: the row of an action in recorded files.
     pub fn to_array(self) -> [f64; 7] {
         let (p, r) = (self.position_b, self.axis_angle_b);
-        [p.x, p.y, p.z, r.x, r.y, r.z, self.closure]
+        [p.x, p.y, p.z, r.x, r.y, r.z, self.closure()]
     }
 
     /// Inverse of [`Self::to_array`], without a grip force.
@@ -90,10 +105,13 @@ pub enum GripCommand {
 
 impl From<Action> for ToolCommand {
     fn from(action: Action) -> Self {
-        let Action { position_b, axis_angle_b, closure, force_n } = action;
+        let Action { position_b, axis_angle_b, grip } = action;
         Self {
             motion: ToolMotion::Pose { position_b, axis_angle_b },
-            grip: force_n.map_or(GripCommand::Closure(closure), GripCommand::Force),
+            grip: match grip {
+                GripTarget::Closure(closure) => GripCommand::Closure(closure),
+                GripTarget::Force(force_n) => GripCommand::Force(force_n),
+            },
         }
     }
 }

@@ -22,4 +22,5 @@ pub use observation::{
     CameraImage, Observation, PadForce, PastStep, RobotState, SensorStreams, TactileFrame, TactileHistory,
 };
 pub use osc::CommandResolver;
+pub use softvt_robot::GripTarget;
 pub use width_latch::WidthLatch;

@@ -9,7 +9,7 @@
 use super::{Action, GripCommand, GripSwitch, Observation, ToolCommand, ToolMotion, WidthLatch};
 use softvt_benchmark::CONTROL_DT;
 use softvt_geometry::{Quat, Vec3};
-use softvt_robot::rotation;
+use softvt_robot::{GripTarget, rotation};
 
 /// Stiffness of the spring, 1/s².
 const KP: f64 = 150.0;
@@ -28,17 +28,19 @@ pub struct CommandResolver {
 impl CommandResolver {
     /// The action that `command` means in the control step of `observation`.
     pub fn resolve(&mut self, observation: &Observation, command: ToolCommand) -> Action {
-        let (closure, force_n) = match command.grip {
-            GripCommand::Closure(closure) => (closure, None),
-            GripCommand::TwoWidth(answer) => (self.latch.closure(answer), None),
-            GripCommand::Latched { closes, hold_steps } => (self.switch.closure(closes, hold_steps), None),
-            GripCommand::Force(force) if force < 0.0 => (0.0, None),
-            GripCommand::Force(force) => (1.0, Some(force)),
+        let grip = match command.grip {
+            GripCommand::Closure(closure) => GripTarget::Closure(closure),
+            GripCommand::TwoWidth(answer) => GripTarget::Closure(self.latch.closure(answer)),
+            GripCommand::Latched { closes, hold_steps } => {
+                GripTarget::Closure(self.switch.closure(closes, hold_steps))
+            }
+            GripCommand::Force(force) if force < 0.0 => GripTarget::Closure(0.0),
+            GripCommand::Force(force) => GripTarget::Force(force),
         };
-        let pose = match command.motion {
+        match command.motion {
             ToolMotion::Pose { position_b, axis_angle_b } => {
                 self.stop();
-                Action::new(position_b, axis_angle_b, closure)
+                Action { position_b, axis_angle_b, grip }
             }
             ToolMotion::Delta { full, translation_b, rotation_b } => {
                 let (translation_b, rotation_b) = if full {
@@ -49,10 +51,9 @@ impl CommandResolver {
                     (moved, spring(&rotation_b, &mut self.angular_velocity))
                 };
                 let orientation_b = rotation::from_axis_angle(&observation.robot.ee_axis_angle_b);
-                goal(observation.robot.ee_position_b, orientation_b, translation_b, rotation_b, closure)
+                goal(observation.robot.ee_position_b, orientation_b, translation_b, rotation_b, grip)
             }
-        };
-        Action { force_n, ..pose }
+        }
     }
 
     fn stop(&mut self) {
@@ -67,10 +68,10 @@ pub fn goal(
     orientation_b: Quat,
     translation_b: Vec3,
     rotation_b: Vec3,
-    closure: f64,
+    grip: GripTarget,
 ) -> Action {
     let orientation = rotation::from_axis_angle(&rotation_b) * orientation_b;
-    Action::new(position_b + translation_b, rotation::axis_angle(&orientation), closure)
+    Action { position_b: position_b + translation_b, axis_angle_b: rotation::axis_angle(&orientation), grip }
 }
 
 /// Distance that the spring covers in a control step towards a goal at `step`. Updates its velocity.

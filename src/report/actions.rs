@@ -12,7 +12,7 @@ use softvt_common::{
     npy::{NpyArray, NpyError},
 };
 use softvt_evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord};
-use softvt_policy::Action;
+use softvt_policy::{Action, GripTarget};
 use softvt_rollout::checksum;
 
 /// Numbers per action, without and with a grip force.
@@ -51,8 +51,8 @@ pub fn path(dir: &Path, index: EpisodeIndex) -> PathBuf {
 /// # Errors
 /// The file cannot be written.
 pub fn write(path: &Path, actions: &[Action]) -> Result<(), FileError> {
-    let has_force = actions.iter().any(|action| action.force_n.is_some());
-    let force = |action: &Action| has_force.then_some(action.force_n.unwrap_or(NO_FORCE));
+    let has_force = actions.iter().any(|action| action.force_n().is_some());
+    let force = |action: &Action| has_force.then_some(action.force_n().unwrap_or(NO_FORCE));
     let numbers = actions.iter().flat_map(|action| action.to_array().into_iter().chain(force(action)));
     let width = if has_force { WIDTH_WITH_FORCE } else { WIDTH };
     replace(path, NpyArray::from_f64(vec![actions.len(), width], numbers).to_npy())
@@ -77,9 +77,10 @@ pub fn read(path: &Path) -> Result<Vec<Action>, ActionsError> {
     if !numbers.iter().all(|x| x.is_finite()) {
         return Err(ActionsError::NotFinite { path });
     }
-    let action = |row: &[f64]| Action {
-        force_n: row.get(WIDTH).copied().filter(|force| *force >= 0.0),
-        ..Action::from_array(std::array::from_fn(|i| row[i]))
+    let action = |row: &[f64]| {
+        let closing = Action::from_array(std::array::from_fn(|i| row[i]));
+        let force = row.get(WIDTH).copied().filter(|force| *force >= 0.0);
+        Action { grip: force.map_or(closing.grip, GripTarget::Force), ..closing }
     };
     Ok(numbers.chunks_exact(width).map(action).collect())
 }
@@ -120,7 +121,7 @@ mod tests {
         write(&at, &actions).unwrap();
         verify(root.path(), &record).unwrap();
         let mut changed = actions;
-        changed[1].closure = 0.25;
+        changed[1].grip = GripTarget::Closure(0.25);
         write(&at, &changed).unwrap();
         assert!(problem(&record).contains("episode_00000.npy: its SHA-256 differs"), "{}", problem(&record));
         write(&at, &actions[..2]).unwrap();
@@ -157,7 +158,8 @@ mod tests {
         }
         write(&at, &[]).unwrap();
         assert_eq!(read(&at).unwrap(), []);
-        let forces = [None, Some(0.0), Some(3.5)].map(|force_n| Action { force_n, ..one(1) });
+        let forces = [GripTarget::Closure(1.0), GripTarget::Force(0.0), GripTarget::Force(3.5)]
+            .map(|grip| Action { grip, ..one(1) });
         write(&at, &forces).unwrap();
         assert_eq!(read(&at).unwrap(), forces);
     }

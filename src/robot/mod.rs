@@ -15,7 +15,7 @@ pub mod rotation;
 pub mod spec;
 
 pub use clearance::{Clearance, Obstacle, clearance};
-pub use gripper::GripperSetpoint;
+pub use gripper::{GripTarget, GripperSetpoint};
 pub use ik::{DiffIk, UnreachablePose};
 pub use pads::{CollisionBox, PadSurface};
 pub use spec::{ArmSpec, DisturbanceSpec, GripperSpec, IkSpec, PadSpec, RobotSpec, Side, WidthSensorSpec};

@@ -43,7 +43,6 @@ use softvt_physics::{
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
 use softvt_robot::{
     Side,
-    gripper::GripTarget,
     ik::{LINEARISATION_RANGE, PoseDifference},
     rotation,
 };
@@ -436,7 +435,7 @@ impl Episode {
             self.far_commands += 1;
             self.first_far_command.get_or_insert(far);
         }
-        self.clamped_grips += u32::from((action.closure - 0.5).abs() > 0.5 + CLOSURE_ROUNDING);
+        self.clamped_grips += u32::from((action.closure() - 0.5).abs() > 0.5 + CLOSURE_ROUNDING);
         if let Err(failure) = self.control_step(action) {
             return Some(self.invalid(&failure));
         }
@@ -536,9 +535,8 @@ impl Episode {
     fn control_step(&mut self, action: &Action) -> Result<(), StepFailure> {
         let rotation = rotation::from_axis_angle(&action.axis_angle_b);
         let pose_b = Pose::from_parts(action.position_b.into(), rotation);
-        let grip = action.force_n.map_or(GripTarget::Closure(action.closure), GripTarget::Force);
         let executed_b = self.disturbance.apply(&pose_b);
-        self.sim.robot.command(&mut self.sim.world, &executed_b, grip);
+        self.sim.robot.command(&mut self.sim.world, &executed_b, action.grip);
         self.steps += 1;
         let mut worst: Option<Deformation> = None;
         for _ in 0..steps_per_control(self.spec.settings.physics.dt) {
@@ -653,7 +651,7 @@ impl Episode {
 /// SHA-256 of actions, as little-endian float64 numbers; hexadecimal.
 pub fn checksum(actions: &[Action]) -> String {
     let mut hash = Sha256::new();
-    for number in actions.iter().flat_map(|action| action.to_array().into_iter().chain(action.force_n)) {
+    for number in actions.iter().flat_map(|action| action.to_array().into_iter().chain(action.force_n())) {
         hash.update(number.to_le_bytes());
     }
     hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
@@ -700,7 +698,7 @@ enum ActionError {
 
 /// Checks that the numbers of an action are finite and plausible, and a grip force within the effort of the gripper.
 fn check_action(action: &Action, effort_n: f64) -> Result<(), ActionError> {
-    if let Some(force_n) = action.force_n.filter(|force| !(0.0..=effort_n).contains(force)) {
+    if let Some(force_n) = action.force_n().filter(|force| !(0.0..=effort_n).contains(force)) {
         return Err(ActionError::GripForce { force_n, effort_n });
     }
     let action = action.to_array();
@@ -740,6 +738,7 @@ fn settled_judge(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use softvt_robot::GripTarget;
 
     #[test]
     fn far_commands_are_accepted_and_implausible_ones_are_refused() {
@@ -748,7 +747,7 @@ mod tests {
         assert_eq!(refusal(action(-1e5)), Ok(()));
         assert!(refusal(action(1e308)).is_err_and(|error| error.contains("not a pose")));
         assert!(refusal(action(f64::NAN)).is_err_and(|error| error.contains("not finite")));
-        let force = |force_n| refusal(Action { force_n: Some(force_n), ..action(0.5) });
+        let force = |force_n| refusal(Action { grip: GripTarget::Force(force_n), ..action(0.5) });
         assert_eq!(force(70.0), Ok(()));
         assert!(
             force(70.1)

@@ -130,7 +130,7 @@ fn rows_are_the_inputs_of_a_policy() {
         assert_eq!(numbers(field(row, "tactile_marker_motion")), kept, "step {step}");
         touched |= kept[396..792] != kept[792..];
         let (p, r) = (action.position_b, action.axis_angle_b);
-        let command = [p.x, p.y, p.z, r.x, r.y, r.z, action.closure];
+        let command = [p.x, p.y, p.z, r.x, r.y, r.z, action.closure()];
         assert_eq!(numbers(field(row, "actions")), command.map(|x| x as f32), "step {step}");
         answer = client.ask(&map(&[("type", "step".into()), ("actions", array(&[1, 7], &command))]));
     }

@@ -234,7 +234,7 @@ impl<'a> SuiteRecording<'a> {
         let Some(mut states) = states.filter(|_| rejection(&finished.record).is_none()) else {
             return Ok(finished);
         };
-        let commanded_grip = || finished.actions.iter().map(|action| action.closure > 0.5).collect();
+        let commanded_grip = || finished.actions.iter().map(|action| action.closure() > 0.5).collect();
         let mut is_holding: Vec<bool> = recorded_grip.unwrap_or_else(commanded_grip);
         // The recorded grip can have fewer entries than there are steps, or more. The last one continues.
         is_holding.resize(finished.actions.len(), is_holding.last().copied().unwrap_or_default());

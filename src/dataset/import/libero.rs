@@ -19,7 +19,7 @@ use softvt_policy::{
     Action, GripCommand, ToolCommand, ToolMotion, decode, osc,
     profile::{ActionEncoding, PoseEncoding, Profile},
 };
-use softvt_robot::{ik::ArmAngles, rotation};
+use softvt_robot::{GripTarget, ik::ArmAngles, rotation};
 
 /// Tolerance of the range −1..1 of actions, for single precision.
 const ACTION_TOLERANCE: f64 = 1e-5;
@@ -262,8 +262,13 @@ pub(super) fn goals(tool_b: &[Pose], steps: &[ToolCommand]) -> Vec<ToolCommand> 
         if rotation_b != Vec3::zeros() {
             goal_rotation = pose.rotation;
         }
-        let Action { position_b, axis_angle_b, .. } =
-            osc::goal(pose.translation.vector, goal_rotation, translation_b, rotation_b, 0.0);
+        let Action { position_b, axis_angle_b, .. } = osc::goal(
+            pose.translation.vector,
+            goal_rotation,
+            translation_b,
+            rotation_b,
+            GripTarget::Closure(0.0),
+        );
         goal_rotation = rotation::from_axis_angle(&axis_angle_b);
         ToolCommand { motion: ToolMotion::Pose { position_b, axis_angle_b }, ..*step }
     };

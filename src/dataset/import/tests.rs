@@ -168,7 +168,7 @@ fn liberos_steps_become_the_goals_of_its_controller() {
     // The states are from before each action, the observations from after it.
     for (k, action) in poses(&demo).iter().enumerate() {
         assert!(off(action, &tool(k), k) < 1e-9, "step {k}");
-        assert_eq!(action.closure, f64::from(u8::from(k >= 3)));
+        assert_eq!(action.closure(), f64::from(u8::from(k >= 3)));
     }
     assert_eq!(demo.gripper_closed, [false, false, false, true, true, true]);
     assert_eq!(
@@ -284,12 +284,12 @@ fn softvtbenchs_poses_are_transformed_from_its_tool_to_ours() {
         let away = action.position_b - tool(k).translation.vector;
         let turned = rotation::from_axis_angle(&action.axis_angle_b).angle_to(&tool(k).rotation);
         assert!(away.norm() < 1e-9 && turned < 1e-7, "step {k}: {away}");
-        assert!((action.closure - if k < 3 { 0.0 } else { 0.25 }).abs() < 1e-12);
+        assert!((action.closure() - if k < 3 { 0.0 } else { 0.25 }).abs() < 1e-12);
     }
     assert_eq!(demo.gripper_closed, [false, false, false, false, true, true]);
     // The measured closure of fingers stopped by a rigid object implies no force.
     demo.close_fully_on_rigid_object();
-    let percent: Vec<f64> = poses(&demo).iter().map(|a| (100.0 * a.closure).round()).collect();
+    let percent: Vec<f64> = poses(&demo).iter().map(|a| (100.0 * a.closure()).round()).collect();
     assert_eq!(percent, [0.0, 0.0, 0.0, 25.0, 100.0, 100.0]);
 }
 
