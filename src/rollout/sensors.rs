@@ -485,7 +485,8 @@ pub struct StateRecording {
     pub sensors: SensorSuite,
     /// The settled state and the state after each control step.
     pub frames: Vec<WorldSnapshot>,
-    /// The target's deformation in each frame, % of the settled diagonal; `None` for a rigid target.
+    /// The target's largest D over the physics steps of each control step, % of the settled diagonal, after 0 for the settled state;
+    /// `None` for a rigid target.
     pub d_pct: Vec<Option<f64>>,
 }
 
