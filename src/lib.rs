@@ -17,7 +17,7 @@ pub use softvt_benchmark as benchmark;
 #[doc(inline)]
 pub use softvt_cli as cli;
 #[doc(inline)]
-pub use softvt_common::{files, npy, parallel, text};
+pub use softvt_common::{cancel, episode_id, files, npy, parallel, text};
 #[doc(inline)]
 pub use softvt_dataset as dataset;
 #[doc(inline)]

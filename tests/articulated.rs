@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use softvt::{
-    evaluation::episode_id::{EpisodeId, Split},
+    episode_id::{EpisodeId, Split},
     geometry::Vec3,
     physics::{BodyId, ContactPartner, LinkId, world::JointDrive},
     rollout::{AssetCache, ObjectInstance, SensorAssets, SensorSuite, Simulation, state_hash},

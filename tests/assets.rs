@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, path::Path, sync::Arc};
 
 use softvt::{
     benchmark::{Goal, GoalKind, Plan},
-    evaluation::episode_id::{EpisodeId, Split},
+    episode_id::{EpisodeId, Split},
     geometry::{
         Pose, Vec3,
         mass::mass_properties,

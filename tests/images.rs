@@ -6,7 +6,7 @@ use std::{path::PathBuf, sync::Arc};
 
 use softvt::{
     benchmark::Plan,
-    evaluation::episode_id::{EpisodeId, Split},
+    episode_id::{EpisodeId, Split},
     geometry::{Pose, Quat, Vec3, shape::Shape},
     physics::{BodyId, PhysicsParams},
     robot::RobotSpec,

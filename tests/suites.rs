@@ -5,7 +5,7 @@ use std::{collections::BTreeSet, path::Path};
 
 use softvt::{
     benchmark::{Goal, GoalKind, Plan, ShiftValue, Suite, Task},
-    evaluation::episode_id::{EpisodeId, Split},
+    episode_id::{EpisodeId, Split},
     geometry::{Pose, Vec3, shape::Shape},
     scene::{Body, Object, Scene, part_poses},
     script::{self, EpisodeSetup, LoadedScript},

@@ -2,7 +2,7 @@
 
 use softvt::{
     benchmark::Plan,
-    evaluation::episode_id::{EpisodeId, Split},
+    episode_id::{EpisodeId, Split},
     rollout::EpisodeSpec,
     script::{self, EpisodeSetup, ExpertController, GripMode, LoadedScript},
 };

@@ -9,7 +9,7 @@ use rand_chacha::{
 };
 use sha2::{Digest, Sha256};
 
-use softvt_evaluation::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, Split};
 
 /// Purpose of a stream of random numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,11 +6,9 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use super::seed::{EpisodeSeed, RandomStream, uniform};
+use softvt_common::episode_id::{EpisodeId, Split};
 use softvt_common::text::format_number;
-use softvt_evaluation::{
-    episode_id::{EpisodeId, Split},
-    instance::{InstanceFactors, InstanceModel},
-};
+use softvt_evaluation::instance::{InstanceFactors, InstanceModel};
 use softvt_robot::spec::PadSpec;
 use softvt_scene::{
     Asset, Body, CameraVariation, HiddenProperties, LightVariation, Object, ObjectVariation, Scene,

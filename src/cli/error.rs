@@ -1,6 +1,6 @@
 //! Errors that end a command, with their exit codes.
 
-use softvt_rollout::cancel;
+use softvt_common::cancel;
 
 /// Exit codes, the same for every command. `docs/cli.md` lists them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -26,7 +26,7 @@ use std::{
 use error::{CliError, Exit};
 use output::eprint_notice;
 
-use softvt_rollout::cancel;
+use softvt_common::cancel;
 
 /// Time after Ctrl-C in which a command must finish its current step. A C function of Lua may never return.
 const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(3);

@@ -1,7 +1,9 @@
-//! Functions for all layers: atomic [`files`], numpy files ([`npy`]), jobs on threads ([`parallel`]), numbers and [`text`]
-//! in messages.
+//! What all layers share: the identity of an episode ([`episode_id`]), the flag that ends long loops ([`cancel`]), atomic
+//! [`files`], numpy files ([`npy`]), jobs on threads ([`parallel`]), numbers and [`text`] in messages.
 #![warn(missing_docs, unreachable_pub)]
 
+pub mod cancel;
+pub mod episode_id;
 pub mod files;
 pub mod npy;
 pub mod parallel;

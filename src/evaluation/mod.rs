@@ -37,7 +37,6 @@ pub mod criteria;
 pub mod deformation;
 pub mod drop;
 pub mod envelope_plot;
-pub mod episode_id;
 pub mod evidence;
 pub mod goal;
 pub mod grip;

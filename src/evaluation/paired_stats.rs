@@ -9,11 +9,11 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    episode_id::EpisodeId,
     record::EpisodeRecord,
     stage::Stage,
     statistics::{Z95, mean, stratified_bootstrap},
 };
+use softvt_common::episode_id::EpisodeId;
 
 /// One episode in both runs.
 #[derive(Clone, Copy, Debug)]

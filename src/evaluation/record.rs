@@ -8,7 +8,8 @@ use std::{collections::BTreeMap, fmt};
 
 use serde::{Deserialize, Serialize, Serializer, ser::SerializeMap};
 
-use super::{drop::DropEvent, episode_id::EpisodeId, safety::KappaVerdict, stage::Stage};
+use super::{drop::DropEvent, safety::KappaVerdict, stage::Stage};
+use softvt_common::episode_id::EpisodeId;
 use softvt_common::text::decimal;
 use softvt_scene::{InitialState, SceneVariation};
 

@@ -3,7 +3,7 @@
 use sha2::{Digest, Sha256};
 
 use super::{Observation, SensorStreams};
-use softvt_evaluation::episode_id::EpisodeIndex;
+use softvt_common::episode_id::EpisodeIndex;
 use softvt_geometry::Vec3;
 use softvt_robot::GripTarget;
 

@@ -7,11 +7,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{
     files::{FileError, replace},
     npy::{NpyArray, NpyError},
 };
-use softvt_evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord};
+use softvt_evaluation::record::EpisodeRecord;
 use softvt_policy::{Action, GripTarget};
 use softvt_rollout::checksum;
 

@@ -14,9 +14,9 @@ use super::{
     softvtbench_files,
     stored_run::{StoredRun, StoredRunError, load, remove_folder},
 };
+use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::files::{self, FileError};
 use softvt_evaluation::{
-    episode_id::EpisodeIndex,
     record::EpisodeRecord,
     summary::SuiteSummary,
     thresholds::{ThresholdError, ThresholdFile},

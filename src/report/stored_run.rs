@@ -10,8 +10,9 @@ use std::{
 use serde_json::Value;
 
 use super::run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, is_truncated, read_episodes};
+use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::files::{self, FileError};
-use softvt_evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord};
+use softvt_evaluation::record::EpisodeRecord;
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 

@@ -47,7 +47,7 @@ impl Disturbance {
 
 #[cfg(test)]
 mod tests {
-    use softvt_evaluation::episode_id::{EpisodeId, Split};
+    use softvt_common::episode_id::{EpisodeId, Split};
 
     use super::*;
 

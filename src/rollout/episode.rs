@@ -7,7 +7,6 @@ use image::RgbImage;
 use super::{
     asset_cache::AssetCache,
     build_error::BuildError,
-    cancel,
     controller::Controller,
     disturbance::Disturbance,
     evidence::{EvidenceCollector, lowest},
@@ -20,6 +19,7 @@ use super::{
     trace::StepTrace,
 };
 use sha2::{Digest, Sha256};
+use softvt_common::cancel;
 
 use softvt_benchmark::{
     Goal, GoalKind, Task,
@@ -27,10 +27,10 @@ use softvt_benchmark::{
     settings::Settings,
     steps_per_control,
 };
+use softvt_common::episode_id::EpisodeId;
 use softvt_common::text::format_number;
 use softvt_evaluation::{
     deformation::{Deformation, ReferenceShape},
-    episode_id::EpisodeId,
     judge::{Judge, JudgeConfig},
     record::{EpisodeHeader, EpisodeRecord, FarCommand, Outcome, RolloutStats, Verdict},
     safety::DeformationLimit,
@@ -373,7 +373,7 @@ impl Episode {
     ///
     /// # Errors
     /// The controller fails with an error that is not confined to the episode, a sensor stream cannot be computed, or the
-    /// process is [cancelled](super::cancel).
+    /// process is [cancelled](softvt_common::cancel).
     pub fn run(mut self, controller: &mut dyn Controller) -> Result<FinishedEpisode, EpisodeError> {
         let mut action = self.start_hold;
         let streams = controller.streams();

@@ -12,7 +12,8 @@
 //! use std::sync::Arc;
 //!
 //! use softvt_benchmark::{Goal, GoalKind, Task, settings::Settings};
-//! use softvt_evaluation::{episode_id::{EpisodeId, Split}, record::Outcome};
+//! use softvt_common::episode_id::{EpisodeId, Split};
+//! use softvt_evaluation::record::Outcome;
 //! use softvt_geometry::{Aabb, Pose, Vec3, shape::Shape};
 //! use softvt_physics::contact::Friction;
 //! use softvt_policy::{TaskBrief, builtin::NoopPolicy};
@@ -70,7 +71,6 @@
 mod asset_cache;
 mod build;
 mod build_error;
-pub mod cancel;
 mod controller;
 mod disturbance;
 mod episode;

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use sha2::{Digest, Sha256};
 
-use super::{asset_cache::AssetCache, build, build_error::BuildError, cancel, robot_instance::RobotInstance};
+use super::{asset_cache::AssetCache, build, build_error::BuildError, robot_instance::RobotInstance};
 use softvt_benchmark::CONTROL_DT;
+use softvt_common::cancel;
 use softvt_geometry::{Aabb, Pose, Vec3};
 use softvt_physics::{
     BodyId, ColliderId, ContactPartner, PhysicsParams, World,

@@ -7,8 +7,8 @@
 use std::{collections::BTreeMap, fmt, sync::Mutex};
 
 use super::config::{EpisodeRecorder, RequestError};
+use softvt_common::episode_id::EpisodeId;
 use softvt_common::parallel::lock;
-use softvt_evaluation::episode_id::EpisodeId;
 use softvt_rollout::Episode;
 
 /// State of the one attempt at an episode.
@@ -113,7 +113,7 @@ impl fmt::Debug for Attempt<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use softvt_evaluation::episode_id::Split;
+    use softvt_common::episode_id::Split;
 
     fn id(episode: u32) -> EpisodeId {
         EpisodeId { suite: "one".to_owned(), task: 0, episode, base_seed: 0, split: Split::Validation }

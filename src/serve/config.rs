@@ -2,7 +2,7 @@
 
 use super::access::AccessRules;
 use softvt_benchmark::Suite;
-use softvt_evaluation::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, Split};
 use softvt_policy::{PolicyError, profile::Profile};
 use softvt_rollout::{Episode, EpisodeError, FinishedEpisode};
 

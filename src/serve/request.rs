@@ -7,7 +7,7 @@ use super::{
     state::{ActionRow, EpisodeState},
 };
 use softvt_benchmark::Suite;
-use softvt_evaluation::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, Split};
 use softvt_policy::{
     msgpack::{NumberArray, entry, kind, names, numbers},
     profile::ACTION_LEN,

@@ -4,8 +4,9 @@
 use rmpv::Value;
 
 use super::config::{RequestError, ServerConfig};
+use softvt_common::episode_id::EpisodeId;
 use softvt_common::npy::NpyArray;
-use softvt_evaluation::{episode_id::EpisodeId, record::Outcome};
+use softvt_evaluation::record::Outcome;
 use softvt_policy::{
     CommandResolver, Observation, SensorStreams, decode,
     msgpack::{map, pack_array},
@@ -109,7 +110,7 @@ impl LiveEpisode {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use softvt_evaluation::episode_id::Split;
+    use softvt_common::episode_id::Split;
 
     fn state(episode: u32, actions: &[f64]) -> EpisodeState {
         let (suite, split) = ("one".to_owned(), Split::Validation);

@@ -5,7 +5,7 @@ use std::{path::Path, sync::Arc};
 
 use softvt::{
     benchmark::{Plan, settings::Settings},
-    evaluation::episode_id::{EpisodeId, Split},
+    episode_id::{EpisodeId, Split},
     rollout::{AssetCache, Simulation, state_hash},
     scene::Scene,
     script::{self, EpisodeSetup, LoadedScript},

@@ -5,11 +5,8 @@ use std::{path::Path, sync::Arc};
 
 use softvt::{
     benchmark::{Plan, settings::Settings},
-    evaluation::{
-        episode_id::{EpisodeId, Split},
-        record::EpisodeRecord,
-        summary::SuiteSummary,
-    },
+    episode_id::{EpisodeId, Split},
+    evaluation::{record::EpisodeRecord, summary::SuiteSummary},
     policy::{Action, ActionChunk, Observation, Policy, PolicyError, RobotState, SensorStreams, TaskBrief},
     report::terminal,
     rollout::{AssetCache, ChunkedPolicy, Episode, EpisodeSpec, SensorAssets, SensorSuite, Simulation},

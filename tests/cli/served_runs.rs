@@ -4,7 +4,7 @@
 use std::fs;
 
 use rmpv::Value;
-use softvt::{evaluation::episode_id::EpisodeIndex, policy::Action, report::actions};
+use softvt::{episode_id::EpisodeIndex, policy::Action, report::actions};
 
 use crate::{
     serve::{Client, Server, array, get, map, of},

@@ -17,11 +17,12 @@ use crate::{
     },
 };
 use softvt_benchmark::{Goal, GoalKind, Plan, Task};
+use softvt_common::cancel;
 use softvt_common::{
     parallel,
     text::{self, counted},
 };
-use softvt_rollout::{AssetCache, SensorAssets, cancel, scene_doubts};
+use softvt_rollout::{AssetCache, SensorAssets, scene_doubts};
 use softvt_script::{ExperimentInput, SceneBuilder};
 
 /// Check a script without running it

@@ -17,8 +17,8 @@ use crate::{
     },
 };
 use softvt_benchmark::Suite;
+use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::parallel;
-use softvt_evaluation::episode_id::EpisodeIndex;
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
 use softvt_rollout::{Controller, Simulation};
 use softvt_script::ExpertController;

@@ -19,12 +19,13 @@ use crate::{
         stored_folder::{enter_for_dataset, enter_for_run},
     },
 };
+use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::text::counted;
 use softvt_dataset::{
     layout::is_dataset,
     manifest::{self, ManifestEntry},
 };
-use softvt_evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord};
+use softvt_evaluation::record::EpisodeRecord;
 use softvt_report::{
     actions,
     stored_run::{self, StoredRun},

@@ -27,9 +27,9 @@ use crate::{
     },
 };
 use softvt_benchmark::{Plan, Suite, seed::SecretSeed};
-use softvt_evaluation::episode_id::{EpisodeId, EpisodeIndex, Split};
+use softvt_common::cancel;
+use softvt_common::episode_id::{EpisodeId, EpisodeIndex, Split};
 use softvt_policy::Observation;
-use softvt_rollout::cancel;
 use softvt_script::LoadedScript;
 use softvt_serve::{AccessRules, RequestError, ServerConfig};
 

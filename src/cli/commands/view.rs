@@ -16,9 +16,9 @@ use crate::{
     },
 };
 use softvt_benchmark::Plan;
+use softvt_common::cancel;
 use softvt_common::files;
 use softvt_report::video::{Caption, worst_state, write_stills, write_video, write_video_frame};
-use softvt_rollout::cancel;
 
 /// Render one episode: a video, and stills of every camera and tactile sensor
 #[derive(Args, Clone, Debug)]

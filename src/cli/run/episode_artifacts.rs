@@ -6,14 +6,16 @@ use std::{
 };
 
 use crate::error::CliError;
+use softvt_common::cancel;
+use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::files;
-use softvt_evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord};
+use softvt_evaluation::record::EpisodeRecord;
 use softvt_report::{
     actions,
     softvtbench_files::{self, DebugFrame, DebugShape},
     video::{self, Caption},
 };
-use softvt_rollout::{FinishedEpisode, ScoreFrame, cancel};
+use softvt_rollout::{FinishedEpisode, ScoreFrame};
 
 /// Episodes of a run that become videos.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use softvt_benchmark::Task;
-use softvt_evaluation::episode_id::EpisodeIndex;
+use softvt_common::episode_id::EpisodeIndex;
 
 use crate::run::config::Shard;
 

@@ -15,9 +15,10 @@ use crate::{
     },
 };
 use softvt_benchmark::Task;
+use softvt_common::cancel;
+use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{files, parallel, text::counted};
 use softvt_evaluation::{
-    episode_id::EpisodeIndex,
     record::{EpisodeRecord, Outcome},
     summary::SuiteSummary,
 };
@@ -26,7 +27,7 @@ use softvt_report::{
     run_folder::{EPISODES, RUN, RunFolder, SUMMARY},
     softvtbench_files,
 };
-use softvt_rollout::{FinishedEpisode, cancel};
+use softvt_rollout::FinishedEpisode;
 
 /// The episodes of a finished run, in order, with their summary.
 pub(crate) struct SuiteResult {

@@ -15,13 +15,13 @@ use crate::{
     run::{config::RunConfig, run_manifest},
 };
 use softvt_benchmark::Plan;
+use softvt_common::cancel;
 use softvt_common::{
     files::{self, replace},
     parallel,
     text::counted,
 };
 use softvt_report::run_folder::{RUN, RunFolder};
-use softvt_rollout::cancel;
 use softvt_script::{Experiment, ExperimentInput, ExperimentRow, LoadedScript, OptionSpec};
 
 /// The rows of an experiment, one JSON object per line.

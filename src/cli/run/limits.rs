@@ -12,9 +12,9 @@ use std::{
 };
 
 use crate::{error::CliError, output::eprint_notice};
+use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{files, parallel::lock, text::counted};
 use softvt_evaluation::{
-    episode_id::EpisodeIndex,
     instance::{InstanceFactors, InstanceModel},
     safety::{DeformationLimit, NOMINAL_KAPPA},
     thresholds::ThresholdFile,

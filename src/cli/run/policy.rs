@@ -11,6 +11,7 @@ use clap::{Args, ValueEnum, value_parser};
 
 use crate::{error::CliError, run::recorded_runs::RecordedRuns};
 use softvt_benchmark::{Teacher, seed::RandomStream};
+use softvt_common::cancel;
 use softvt_common::text;
 use softvt_dataset::layout::is_dataset;
 use softvt_policy::{
@@ -19,7 +20,7 @@ use softvt_policy::{
     profile::{GripCode, PROFILES, Profile},
     remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},
 };
-use softvt_rollout::{ChunkedPolicy, Controller, cancel};
+use softvt_rollout::{ChunkedPolicy, Controller};
 use softvt_script::{EpisodeSetup, ExpertController, GripController, GripMode, PolicyFile, load_profile};
 
 /// Environment variable with the key of a policy server. A flag would show it to other users of the machine.

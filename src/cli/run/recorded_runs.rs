@@ -6,8 +6,8 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::{error::CliError, run::episode_list::EpisodeList};
+use softvt_common::episode_id::{EpisodeIndex, Split};
 use softvt_common::files::FileError;
-use softvt_evaluation::episode_id::{EpisodeIndex, Split};
 use softvt_policy::{Action, TaskBrief};
 use softvt_report::{
     actions,

@@ -29,6 +29,8 @@ use crate::{
     },
 };
 use softvt_benchmark::{CONTROL_HZ, Suite, Task};
+use softvt_common::cancel;
+use softvt_common::episode_id::{EpisodeIndex, Split};
 use softvt_common::{
     files::{self, FileError},
     parallel,
@@ -43,13 +45,10 @@ use softvt_dataset::{
     manifest::{self, ManifestEntry},
     merge_parts,
 };
-use softvt_evaluation::{
-    episode_id::{EpisodeIndex, Split},
-    record::{EpisodeRecord, Origin, Outcome},
-};
+use softvt_evaluation::record::{EpisodeRecord, Origin, Outcome};
 use softvt_policy::{builtin::RecordedPolicy, profile::GripCode};
 use softvt_report::{actions, run_folder::RunFolder};
-use softvt_rollout::{ChunkedPolicy, EpisodeError, FinishedEpisode, SettleError, cancel};
+use softvt_rollout::{ChunkedPolicy, EpisodeError, FinishedEpisode, SettleError};
 use softvt_scene::InitialState;
 use softvt_script::LoadedScript;
 

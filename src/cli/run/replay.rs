@@ -21,18 +21,17 @@ use crate::{
     },
 };
 use softvt_benchmark::{Suite, seed::SecretSeed};
+use softvt_common::cancel;
+use softvt_common::episode_id::Split;
 use softvt_common::{parallel, text::counted};
 use softvt_dataset::{
     TaskFile,
     layout::{DATASET, RECORDING},
     manifest,
 };
-use softvt_evaluation::{
-    episode_id::Split,
-    record::{EpisodeRecord, Outcome},
-};
+use softvt_evaluation::record::{EpisodeRecord, Outcome};
 use softvt_policy::{Action, builtin::RecordedPolicy};
-use softvt_rollout::{ChunkedPolicy, cancel};
+use softvt_rollout::ChunkedPolicy;
 use softvt_script::LoadedScript;
 
 /// A controller factory that repeats the actions of a recorded episode, and its error if it ended with one.

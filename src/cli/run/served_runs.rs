@@ -13,10 +13,11 @@ use crate::{
         suite_run::SuiteRun,
     },
 };
+use softvt_common::cancel;
+use softvt_common::episode_id::{EpisodeId, EpisodeIndex};
 use softvt_common::{parallel::lock, text::counted};
-use softvt_evaluation::episode_id::{EpisodeId, EpisodeIndex};
 use softvt_report::{run_folder::RunFolder, terminal};
-use softvt_rollout::{FinishedEpisode, cancel};
+use softvt_rollout::FinishedEpisode;
 use softvt_serve::{EpisodeRecorder, RequestError};
 
 /// The run folders of a server.

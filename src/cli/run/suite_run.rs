@@ -14,16 +14,15 @@ use crate::{
     },
 };
 use softvt_benchmark::{ObjectType, ShiftValue, Suite, Task, settings::Settings};
+use softvt_common::cancel;
+use softvt_common::episode_id::{EpisodeId, EpisodeIndex, Split};
 use softvt_common::{parallel, text::unknown_name};
 use softvt_dataset::card::Imported;
-use softvt_evaluation::{
-    episode_id::{EpisodeId, EpisodeIndex, Split},
-    record::Origin,
-};
+use softvt_evaluation::record::Origin;
 use softvt_policy::{PolicyError, SensorStreams, TaskBrief, remote::PolicyConnections};
 use softvt_rollout::{
     AssetCache, BuildError, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SensorAssets, SensorSuite,
-    Simulation, cancel, check_goal, check_sensors, cost_doubt,
+    Simulation, check_goal, check_sensors, cost_doubt,
 };
 use softvt_scene::{Body, Scene};
 use softvt_script::{EpisodeSetup, LoadedScript, SceneBuilder};

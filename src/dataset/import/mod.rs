@@ -18,8 +18,8 @@ use sha2::{Digest, Sha256};
 
 use self::demo_reader::DemoReader;
 use super::{DatasetError, TaskFile};
+use softvt_common::episode_id::Split;
 use softvt_common::files::FileError;
-use softvt_evaluation::episode_id::Split;
 use softvt_policy::ToolCommand;
 
 pub use foreign::{

@@ -10,8 +10,9 @@ use crate::{
     run_summary::{RunSummary, UnsafeEpisode},
     video::{still_path, video_path},
 };
+use softvt_common::episode_id::EpisodeId;
 use softvt_common::text::counted;
-use softvt_evaluation::{episode_id::EpisodeId, record::EpisodeHeader};
+use softvt_evaluation::record::EpisodeHeader;
 
 /// Largest number of episodes listed per run.
 const MAX_LISTED: usize = 60;

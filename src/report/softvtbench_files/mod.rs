@@ -11,10 +11,10 @@ use std::{
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use softvt_common::episode_id::{EpisodeId, EpisodeIndex};
 use softvt_common::files::{self, FileError, replace};
 use softvt_evaluation::{
     deformation::{METRIC_ID, ReferenceShape},
-    episode_id::{EpisodeId, EpisodeIndex},
     record::{EpisodeHeader, EpisodeRecord},
     statistics::{Rate, quantile},
     thresholds::ThresholdFile,

@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 use image::{ImageBuffer, ImageError, Luma, RgbImage};
 
 use softvt_benchmark::{CONTROL_DT, CONTROL_HZ};
+use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{
     files::{FileError, replace},
     text::format_number,
 };
 use softvt_dataset::video::{VideoError, VideoWriter};
-use softvt_evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord};
+use softvt_evaluation::record::EpisodeRecord;
 use softvt_physics::world::WorldSnapshot;
 use softvt_rollout::{
     CAMERA_IMAGE_SUFFIXES, SensingError, StateRecording, TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES,

@@ -13,8 +13,8 @@ use softvt_benchmark::{
     seed::{EpisodeSeed, RandomStream},
     variation::VariationRanges,
 };
+use softvt_common::episode_id::{EpisodeId, Split};
 use softvt_common::parallel::lock;
-use softvt_evaluation::episode_id::{EpisodeId, Split};
 use softvt_geometry::{Aabb, Pose, Vec3};
 use softvt_robot::ik::{PoseDifference, PoseTolerance, UnreachablePose};
 use softvt_rollout::{ObjectInstance, Simulation};

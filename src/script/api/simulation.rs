@@ -32,12 +32,14 @@ use softvt_benchmark::{
     settings::{Settings, SettingsError},
     steps_per_control,
 };
+use softvt_common::cancel;
+use softvt_common::episode_id::Split;
 use softvt_common::parallel::lock;
-use softvt_evaluation::{deformation::ReferenceShape, episode_id::Split};
+use softvt_evaluation::deformation::ReferenceShape;
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::BodyId;
 use softvt_robot::{Side, gripper::GripTarget, rotation};
-use softvt_rollout::{AssetCache, SensingError, SensorAssets, SensorSeed, SensorSuite, Simulation, cancel};
+use softvt_rollout::{AssetCache, SensingError, SensorAssets, SensorSeed, SensorSuite, Simulation};
 use softvt_sensing::tactile::{MarkerStyle, PadWrench, TactileReading};
 
 const EPISODE: Type = Type::Integer(Range::closed(0.0, 1e9));

@@ -19,6 +19,7 @@ use crate::{
         watchdog::Clock,
     },
 };
+use softvt_common::cancel;
 use softvt_common::parallel::lock;
 use softvt_evaluation::deformation::{Deformation, ReferenceShape};
 use softvt_geometry::{Pose, Quat, Vec3, shape::Shape};
@@ -29,7 +30,7 @@ use softvt_physics::{
     world::{ContactSummary, SoftBody, StepFailure},
 };
 use softvt_robot::{PadSpec, pads::PadSurface};
-use softvt_rollout::{cancel, soft_model};
+use softvt_rollout::soft_model;
 use softvt_scene::SoftMaterial;
 
 /// Approximate memory of a world and of one of its solids.

@@ -25,11 +25,11 @@ use softvt_benchmark::{
     seed::{EpisodeSeed, RandomStream, SecretSeed},
     variation::{DrawError, VariationRanges},
 };
+use softvt_common::episode_id::EpisodeId;
 use softvt_common::{
     parallel::lock,
     text::{format_number, unknown_name},
 };
-use softvt_evaluation::episode_id::EpisodeId;
 use softvt_geometry::{Aabb, Vec3};
 use softvt_robot::{gripper::MAX_WIDTH, panda};
 use softvt_scene::{Body, Scene, SceneVariation};

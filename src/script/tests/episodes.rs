@@ -7,7 +7,7 @@ use crate::{
     check_shift,
 };
 use softvt_benchmark::{Plan, ShiftValue};
-use softvt_evaluation::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, Split};
 use softvt_geometry::{Pose, Vec3, shape::Shape};
 use softvt_rollout::Controller;
 use softvt_scene::{Asset, Body};

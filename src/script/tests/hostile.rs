@@ -7,7 +7,7 @@ use std::sync::{
 
 use super::*;
 use crate::Experiment;
-use softvt_evaluation::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, Split};
 
 /// Runs `text` in an experiment; returns its rows as JSON, or the message.
 fn run(text: &str) -> Result<String, String> {

@@ -1,6 +1,6 @@
 use super::*;
 use crate::EpisodeSetup;
-use softvt_evaluation::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, Split};
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::joints;
 use softvt_rollout::{AssetCache, Simulation};

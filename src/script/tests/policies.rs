@@ -7,7 +7,7 @@ use image::{Rgb, RgbImage};
 use super::*;
 use crate::{LuaPolicy, PolicyFile, load_profile};
 use softvt_benchmark::seed::EpisodeSeed;
-use softvt_evaluation::episode_id::Split;
+use softvt_common::episode_id::Split;
 use softvt_geometry::Vec3;
 use softvt_policy::{
     Action, ActionChunk, CameraImage, GripCommand, Observation, Policy, PolicyError, RobotState,

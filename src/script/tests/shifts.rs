@@ -4,7 +4,7 @@ use std::{path::Path, time::Duration};
 
 use crate::{EpisodeSetup, Limits, LoadedScript, load_with};
 use softvt_benchmark::{Plan, ShiftValue};
-use softvt_evaluation::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, Split};
 use softvt_scene::{Body, Scene};
 
 fn loaded(suite: &str) -> LoadedScript {

@@ -9,7 +9,7 @@ use crate::{
     plan::options,
     schema::{Function, Record},
 };
-use softvt_evaluation::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, Split};
 
 /// Makes an object of each class, calls everything with everything, and returns the messages.
 const SCRIPT: &str = include_str!("surface.lua");

@@ -3,7 +3,7 @@
 use super::*;
 use crate::{EpisodeSetup, load_variation};
 use softvt_benchmark::Plan;
-use softvt_evaluation::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, Split};
 use softvt_scene::Object;
 
 const ASSETS: &str = r#"

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{Project, SUITE, error_of};
 use crate::EpisodeSetup;
-use softvt_evaluation::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, Split};
 use softvt_scene::{Body, Mask, Visual};
 
 fn with_visuals(visuals: &str) -> String {

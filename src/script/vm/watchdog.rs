@@ -18,8 +18,8 @@ use cpu_time::{ProcessTime, ThreadTime};
 use mlua::{HookTriggers, Lua, VmState};
 
 use super::error::{ScriptError, SourceLine, current_line};
+use softvt_common::cancel;
 use softvt_common::parallel::lock;
-use softvt_rollout::cancel;
 
 /// Instructions between two checks of the clock; about 0.3 ms.
 const HOOK_INTERVAL: u32 = 20_000;

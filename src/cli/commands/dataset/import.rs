@@ -23,12 +23,13 @@ use crate::{
     },
 };
 use softvt_benchmark::Task;
+use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{parallel, text::counted};
 use softvt_dataset::{
     card::Imported,
     import::{self, ForeignDemo, ForeignFile, InitialCondition},
 };
-use softvt_evaluation::{episode_id::EpisodeIndex, record::Origin};
+use softvt_evaluation::record::Origin;
 use softvt_policy::{ToolCommand, builtin::RecordedPolicy};
 use softvt_rollout::{ChunkedPolicy, target_asset};
 use softvt_scene::{Body, InitialState};

@@ -16,6 +16,7 @@ use crate::{
         stored_folder::enter_for_dataset,
     },
 };
+use softvt_common::cancel;
 use softvt_common::{files, text::counted};
 use softvt_dataset::{
     DatasetError,
@@ -26,7 +27,6 @@ use softvt_dataset::{
     stats,
 };
 use softvt_policy::profile::GripCode;
-use softvt_rollout::cancel;
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum DatasetCommand {
