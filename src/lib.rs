@@ -25,6 +25,8 @@ pub use softvt_evaluation as evaluation;
 #[doc(inline)]
 pub use softvt_geometry as geometry;
 #[doc(inline)]
+pub use softvt_media as media;
+#[doc(inline)]
 pub use softvt_physics as physics;
 #[doc(inline)]
 pub use softvt_policy as policy;

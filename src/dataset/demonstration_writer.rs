@@ -10,9 +10,9 @@ use super::{
     DatasetError, Demonstration,
     hdf5::{ChunkedSteps, Hdf5Writer, write_file},
     layout::IMAGE_STREAMS,
-    video::VideoWriter,
 };
 use softvt_benchmark::CONTROL_HZ;
+use softvt_media::video::VideoWriter;
 use softvt_rollout::StateRecording;
 use softvt_scene::Camera;
 use softvt_sensing::tactile::{MarkerStyle, Markers};

@@ -4,8 +4,8 @@ use std::{fmt::Display, path::Path};
 
 use rust_hdf5::Hdf5Error;
 
-use super::video::VideoError;
 use softvt_common::files::FileError;
+use softvt_media::video::VideoError;
 use softvt_rollout::SensingError;
 
 /// Error of reading, writing or rendering demonstrations. Messages name the file and the key in it.

@@ -20,7 +20,6 @@ pub mod manifest;
 mod privileged;
 pub mod stats;
 mod stream;
-pub mod video;
 
 pub use demonstration::Demonstration;
 pub use error::DatasetError;

@@ -2,10 +2,9 @@
 //! demand.
 //!
 //! [`camera`] renders colour, depth and segmentation images, [`tactile`] simulates the GelSight Mini of each finger,
-//! and [`panda`] holds the meshes of the robot that the cameras see. [`canvas`] draws captions and charts next to their images.
+//! and [`panda`] holds the meshes of the robot that the cameras see.
 #![warn(missing_docs, unreachable_pub)]
 
 pub mod camera;
-pub mod canvas;
 pub mod panda;
 pub mod tactile;

@@ -13,11 +13,11 @@ use super::{
     demonstration::actions_stream,
     layout::{IMAGE_STREAMS, MANIFEST},
     manifest::{self, ManifestEntry},
-    video,
 };
 use softvt_benchmark::{CONTROL_DT, CONTROL_HZ};
 use softvt_common::{files::FileError, text::counted};
 use softvt_geometry::{Quat, Vec3};
+use softvt_media::video;
 use softvt_policy::profile::GripCode;
 use softvt_robot::rotation;
 use softvt_sensing::tactile::MARKER_COUNT;

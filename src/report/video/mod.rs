@@ -11,8 +11,11 @@ use softvt_common::{
     files::{FileError, replace},
     text::format_number,
 };
-use softvt_dataset::video::{VideoError, VideoWriter};
 use softvt_evaluation::record::EpisodeRecord;
+use softvt_media::{
+    canvas::{Canvas, Rgb8},
+    video::{VideoError, VideoWriter},
+};
 use softvt_physics::world::WorldSnapshot;
 use softvt_rollout::{
     CAMERA_IMAGE_SUFFIXES, SensingError, StateRecording, TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES,
@@ -20,7 +23,6 @@ use softvt_rollout::{
 use softvt_scene::Camera;
 use softvt_sensing::{
     camera::{RenderedImage, encode_png},
-    canvas::{Canvas, Rgb8},
     tactile::{MarkerStyle, TactileReading},
 };
 

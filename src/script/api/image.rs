@@ -13,8 +13,8 @@ use crate::{
     },
 };
 use softvt_common::{parallel::lock, text::format_number};
+use softvt_media::canvas::Canvas;
 use softvt_sensing::camera::resize;
-use softvt_sensing::canvas::Canvas;
 
 /// Longest text that is written on an image, bytes.
 const MAX_TEXT_BYTES: usize = 1000;
