@@ -3,7 +3,10 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use softvt_common::text::{RangeError, format_number};
+use softvt_common::{
+    settings::{Setting, SettingField},
+    text::{RangeError, format_number},
+};
 use softvt_evaluation::criteria::SuccessCriteria;
 use softvt_physics::PhysicsParams;
 use softvt_robot::RobotSpec;
@@ -57,7 +60,6 @@ pub struct Settings {
     /// The robot.
     pub robot: RobotSpec,
     /// Thresholds of the judge.
-    #[serde(alias = "rules")]
     pub criteria: SuccessCriteria,
     /// The tactile sensors.
     pub tactile: TactileSpec,
@@ -66,6 +68,15 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// All settings, for documentation.
+    pub fn list() -> Vec<Setting> {
+        let physics = Setting::list::<PhysicsParams>("physics");
+        let robot = Setting::list::<RobotSpec>("robot");
+        let criteria = Setting::list::<SuccessCriteria>("criteria");
+        let tactile = Setting::list::<TactileSpec>("tactile");
+        [physics, robot, criteria, tactile, Setting::list::<CameraSettings>("cameras")].concat()
+    }
+
     /// The same with the fields at dotted paths set, such as `robot.pads.static_mu` to `0`. Ranges that depend on each
     /// other are checked once all fields are set.
     ///
@@ -89,7 +100,7 @@ impl Settings {
         for (path, value) in fields {
             changed = changed.replaced(path, value)?;
         }
-        changed.physics.validate()?;
+        changed.physics.check("physics")?;
         Ok(changed.physics)
     }
 
@@ -102,7 +113,6 @@ impl Settings {
     }
 
     fn replaced(&self, path: &str, value: &str) -> Result<Self, SettingsError> {
-        let path = &current_path(path);
         let refused = |e: serde_json::Error| refusal(path, value, &e.to_string());
         let mut tree = serde_json::to_value(self).map_err(refused)?;
         let mut at = &mut tree;
@@ -112,10 +122,10 @@ impl Settings {
             at = at.get_mut(key).ok_or_else(|| {
                 let group = parents.join(".");
                 match known.is_empty() {
-                    true => SettingsError::NotAGroup { path: path.clone(), parent: group },
+                    true => SettingsError::NotAGroup { path: path.to_owned(), parent: group },
                     false => {
                         let group = if group.is_empty() { "the root".to_owned() } else { group };
-                        SettingsError::UnknownField { path: path.clone(), group, known }
+                        SettingsError::UnknownField { path: path.to_owned(), group, known }
                     }
                 }
             })?;
@@ -127,7 +137,7 @@ impl Settings {
             // A setting with several models can be given by the name of a model alone.
             (Value::Object(known), Err(_)) if known.contains_key(MODEL) => json!({ MODEL: value }),
             (Value::Object(_), _) => {
-                return Err(SettingsError::Group { path: path.clone(), fields: fields(at) });
+                return Err(SettingsError::Group { path: path.to_owned(), fields: fields(at) });
             }
             (present, Ok(value)) if present.is_u64() => whole_number(path, &value)?,
             (_, Ok(value)) => value,
@@ -141,7 +151,7 @@ impl Settings {
                         false => "a number",
                     };
                     return Err(SettingsError::Type {
-                        path: path.clone(),
+                        path: path.to_owned(),
                         expected,
                         value: value.to_owned(),
                     });
@@ -158,10 +168,10 @@ impl Settings {
     /// The first parameter out of range.
     pub fn validated(mut self) -> Result<Self, SettingsError> {
         self.robot.validate()?;
-        self.criteria.validate()?;
+        self.criteria.check("criteria")?;
         self.tactile.validate()?;
-        self.cameras.validate()?;
-        self.physics.validate()?;
+        self.cameras.check("cameras")?;
+        self.physics.check("physics")?;
         let dt = self.physics.dt;
         let exact = CONTROL_DT / f64::from(steps_per_control(dt));
         let error = (dt / exact - 1.0).abs();
@@ -180,27 +190,6 @@ impl Settings {
 
 /// Largest relative difference of a physics step that was rounded from the exact one.
 const ROUNDING: f64 = 5e-4;
-
-/// Former paths of settings and what they are called now. The same keys are serde aliases, for settings
-/// in tables and files.
-const RENAMED: [(&str, &str); 7] = [
-    ("rules", "criteria"),
-    ("physics.alpha", "physics.rayleigh_mass"),
-    ("physics.beta", "physics.rayleigh_stiffness"),
-    ("physics.tau", "physics.dissipation_time"),
-    ("physics.sleep_after", "physics.sleep_delay"),
-    ("physics.inverted_after", "physics.max_inverted_time"),
-    ("physics.most_speed", "physics.max_speed"),
-];
-
-/// A path with its former keys replaced by the present ones.
-fn current_path(path: &str) -> String {
-    let renamed = RENAMED.iter().find_map(|(former, now)| {
-        let rest = path.strip_prefix(former)?;
-        (rest.is_empty() || rest.starts_with('.')).then(|| format!("{now}{rest}"))
-    });
-    renamed.unwrap_or_else(|| path.to_owned())
-}
 
 /// Names the kind of a setting that can be of several: `tactile.optics.model`.
 const MODEL: &str = "model";
@@ -330,17 +319,6 @@ mod tests {
         }
         let effort = Settings::default().with("robot.gripper.effort", "1/4").expect("a number");
         assert_eq!(effort.robot.gripper.effort, 0.25);
-    }
-
-    #[test]
-    fn former_names_of_settings_are_accepted() {
-        let settings = Settings::default();
-        let changed = settings.with("criteria.slip_m", "0.001").expect("a setting");
-        assert_eq!(settings.with("rules.slip_m", "0.001"), Ok(changed.clone()));
-        let damped = settings.with("physics.rayleigh_mass", "2.5");
-        assert_eq!(settings.with("physics.alpha", "2.5"), damped);
-        let former: Settings = serde_json::from_str(r#"{"rules":{"slip_m":0.001}}"#).expect("a setting");
-        assert_eq!(former, changed);
     }
 
     #[test]

@@ -1,5 +1,5 @@
 //! What all layers share: the identity of an episode ([`episode_id`]), the flag that ends long loops ([`cancel`]), atomic
-//! [`files`], numpy files ([`npy`]), jobs on threads ([`parallel`]), numbers and [`text`] in messages.
+//! [`files`], declarations of [`settings`](mod@settings), numpy files ([`npy`]), jobs on threads ([`parallel`]), numbers and [`text`] in messages.
 #![warn(missing_docs, unreachable_pub)]
 
 pub mod cancel;
@@ -7,4 +7,5 @@ pub mod episode_id;
 pub mod files;
 pub mod npy;
 pub mod parallel;
+pub mod settings;
 pub mod text;

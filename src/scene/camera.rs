@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use nalgebra::Quaternion;
 use serde::{Deserialize, Serialize};
 
-use softvt_common::text::{RangeError, check_range};
+use softvt_common::settings::SettingRange::Between;
 use softvt_geometry::{Pose, Quat, Vec3};
 
 /// Frame to which a camera is attached.
@@ -44,30 +44,18 @@ pub struct Camera {
     pub set_at: Option<String>,
 }
 
-/// Size of the images of all cameras (settings `cameras.*`). The vertical field of view stays.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct CameraSettings {
-    /// Width, pixels; `None` for that of the scene.
-    pub width: Option<usize>,
-    /// Height, pixels; `None` for that of the scene.
-    pub height: Option<usize>,
+softvt_common::settings! {
+    /// Size of the images of all cameras (settings `cameras.*`). The vertical field of view stays.
+    #[derive(Copy, Eq)]
+    pub struct CameraSettings {
+        /// Width, pixels; `None` for that of the scene.
+        width: Option<usize> = None, "pixels", Between(1.0, MAX_IMAGE_EDGE);
+        /// Height, pixels; `None` for that of the scene.
+        height: Option<usize> = None, "pixels", Between(1.0, MAX_IMAGE_EDGE);
+    }
 }
 
 impl CameraSettings {
-    /// Checks the ranges of all parameters.
-    ///
-    /// # Errors
-    /// The first parameter out of range.
-    pub fn validate(&self) -> Result<(), RangeError> {
-        let check = |path, pixels: Option<usize>| {
-            let pixels = pixels.map_or(1.0, |pixels| pixels as f64);
-            check_range(path, pixels, 1.0..=MAX_IMAGE_EDGE as f64, "pixels in 1..4096")
-        };
-        check("cameras.width", self.width)?;
-        check("cameras.height", self.height)
-    }
-
     /// Gives all cameras of a scene this size.
     pub fn apply(&self, cameras: &mut [Camera]) {
         for camera in cameras {
@@ -78,7 +66,7 @@ impl CameraSettings {
 }
 
 /// Largest width and height of an image, pixels.
-const MAX_IMAGE_EDGE: usize = 4096;
+const MAX_IMAGE_EDGE: f64 = 4096.0;
 
 /// Vertical field of view (rad) of a lens with this focal length and aperture height, both in the same unit.
 fn fovy_from_lens(focal: f64, aperture: f64) -> f64 {

@@ -4,85 +4,73 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use softvt_common::text::{RangeError, check_range};
+use softvt_common::{
+    settings::{Declaration, Setting, SettingField, SettingRange::Between},
+    text::RangeError,
+};
 use softvt_geometry::Vec3;
 use softvt_robot::PadSurface;
 
 /// Width and height of a tactile image, px.
 pub const IMAGE_SIZE: [usize; 2] = [320, 240];
 
-/// Parameters of a tactile sensor; the default is the GelSight Mini of the benchmark.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct TactileSpec {
-    /// Material of the gel and the grid on which it is solved.
-    pub gel: GelSpec,
-    /// View of the camera.
-    pub view: Pinhole,
-    /// Model of the colour image.
-    pub optics: OpticsModel,
-    /// True to draw cast shadows; with the `polynomial` optics only.
-    pub shadows: bool,
-    /// Model of the marker motion.
-    pub markers: MarkerModel,
-    /// Noise and wear of both sensors.
-    pub wear: WearSpec,
-}
-
-/// Noise and wear of a tactile sensor: what a policy observes of it. The forces of the contact are unchanged.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct WearSpec {
-    /// Standard deviation of the noise of each marker coordinate in each image, px.
-    pub noise_px: f64,
-    /// Standard deviation of the constant offset of each marker coordinate, px.
-    pub offset_px: f64,
-    /// Factor on the displacements of the markers and on the changes of the image.
-    pub gain: f64,
-    /// Share of the markers that do not follow the gel.
-    pub dead_share: f64,
-    /// Standard deviation of the noise of each colour value in each image, of 255.
-    pub image_noise: f64,
-}
-
-impl Default for WearSpec {
-    fn default() -> Self {
-        Self { noise_px: 0.0, offset_px: 0.0, gain: 1.0, dead_share: 0.0, image_noise: 0.0 }
+softvt_common::settings! {
+    /// Parameters of a tactile sensor; the default is the GelSight Mini of the benchmark.
+    pub struct TactileSpec {
+        /// Material of the gel and the grid on which it is solved.
+        gel: GelSpec;
+        /// View of the camera.
+        view: Pinhole;
+        /// Model of the colour image.
+        optics: OpticsModel;
+        /// True to draw cast shadows; with the `polynomial` optics only.
+        shadows: bool = false;
+        /// Model of the marker motion.
+        markers: MarkerModel;
+        /// Noise and wear of both sensors.
+        wear: WearSpec;
     }
 }
 
-/// Material and grid of the gel. Its shape is [`softvt_robot::PadSurface`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct GelSpec {
-    /// Shear modulus, Pa. 0.145 MPa: twice the C10 identified on a GelSight Mini (Helmut et al., arXiv 2411.03315).
-    pub shear_modulus: f64,
-    /// Poisson's ratio.
-    pub poisson: f64,
-    /// Edge of a grid cell, m.
-    pub cell: f64,
-}
-
-impl Default for GelSpec {
-    fn default() -> Self {
-        Self { shear_modulus: 1.45e5, poisson: 0.475, cell: 4e-4 }
+softvt_common::settings! {
+    /// Noise and wear of a tactile sensor: what a policy observes of it. The forces of the contact are unchanged.
+    #[derive(Copy)]
+    pub struct WearSpec {
+        /// Standard deviation of the noise of each marker coordinate in each image, px.
+        noise_px: f64 = 0.0, "px", Between(0.0, 20.0);
+        /// Standard deviation of the constant offset of each marker coordinate, px.
+        offset_px: f64 = 0.0, "px", Between(0.0, 20.0);
+        /// Factor on the displacements of the markers and on the changes of the image.
+        gain: f64 = 1.0, "", Between(0.0, 10.0);
+        /// Share of the markers that do not follow the gel.
+        dead_share: f64 = 0.0, "", Between(0.0, 1.0);
+        /// Standard deviation of the noise of each colour value in each image, of 255.
+        image_noise: f64 = 0.0, "of 255", Between(0.0, 128.0);
     }
 }
 
-/// Camera of the sensor: a pinhole behind the apex of the gel that looks out along the pad's +z. Image x (right) is
-/// the pad's x, image y (down) the pad's y; `docs/tactile.md` draws the frames.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Pinhole {
-    /// Edge of a pixel on the plane of the apex, m. 0.0634 mm at 320×240 (GelSight's own figure).
-    pub pitch: f64,
-    /// Distance of the pinhole from the apex, m.
-    pub lens: f64,
+softvt_common::settings! {
+    /// Material and grid of the gel. Its shape is [`softvt_robot::PadSurface`].
+    #[derive(Copy)]
+    pub struct GelSpec {
+        /// Shear modulus, Pa. 0.145 MPa: twice the C10 identified on a GelSight Mini (Helmut et al., arXiv 2411.03315).
+        shear_modulus: f64 = 1.45e5, "Pa", Between(1e2, 1e9);
+        /// Poisson's ratio.
+        poisson: f64 = 0.475, "", Between(0.0, 0.499);
+        /// Edge of a grid cell, m.
+        cell: f64 = 4e-4, "m", Between(1e-4, 5e-4);
+    }
 }
 
-impl Default for Pinhole {
-    fn default() -> Self {
-        Self { pitch: 6.34e-5, lens: 2.6e-2 }
+softvt_common::settings! {
+    /// Camera of the sensor: a pinhole behind the apex of the gel that looks out along the pad's +z. Image x (right) is
+    /// the pad's x, image y (down) the pad's y; `docs/tactile.md` draws the frames.
+    #[derive(Copy)]
+    pub struct Pinhole {
+        /// Edge of a pixel on the plane of the apex, m. 0.0634 mm at 320×240 (GelSight's own figure).
+        pitch: f64 = 6.34e-5, "m", Between(1e-5, 2e-4);
+        /// Distance of the pinhole from the apex, m.
+        lens: f64 = 2.6e-2, "m", Between(5e-3, 1.0);
     }
 }
 
@@ -141,25 +129,20 @@ pub enum MarkerModel {
     Fots(FotsSpec),
 }
 
-/// Constants of the marker law of FOTS.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct FotsSpec {
-    /// Decay of the dilation, 1/px².
-    pub dilate: f64,
-    /// Decay of the shear, 1/px².
-    pub shear: f64,
-    /// Decay of the twist, 1/px².
-    pub twist: f64,
-    /// Scale of the image, pixels per millimetre.
-    pub scale: f64,
-    /// Factor on the depths in mm: 1 in FOTS, 0.1 in the port that SoftVTBench uses.
-    pub height_factor: f64,
-}
-
-impl Default for FotsSpec {
-    fn default() -> Self {
-        Self { dilate: 0.00125, shear: 0.00021, twist: 0.00038, scale: 19.58, height_factor: 0.1 }
+softvt_common::settings! {
+    /// Constants of the marker law of FOTS.
+    #[derive(Copy)]
+    pub struct FotsSpec {
+        /// Decay of the dilation, 1/px².
+        dilate: f64 = 0.00125, "1/px²", Between(0.0, 1.0);
+        /// Decay of the shear, 1/px².
+        shear: f64 = 0.00021, "1/px²", Between(0.0, 1.0);
+        /// Decay of the twist, 1/px².
+        twist: f64 = 0.00038, "1/px²", Between(0.0, 1.0);
+        /// Scale of the image, pixels per millimetre.
+        scale: f64 = 19.58, "px/mm", Between(1.0, 1000.0);
+        /// Factor on the depths in mm: 1 in FOTS, 0.1 in the port that SoftVTBench uses.
+        height_factor: f64 = 0.1, "", Between(0.0, 100.0);
     }
 }
 
@@ -169,34 +152,39 @@ impl TactileSpec {
     /// # Errors
     /// Names the first parameter out of its range, its value and the range.
     pub fn validate(&self) -> Result<(), RangeError> {
-        let (gel, view) = (&self.gel, &self.view);
-        let between = |field, value, low: f64, high: f64, expected| {
-            check_range(&format!("tactile.{field}"), value, low..=high, expected)
-        };
-        between("gel.shear_modulus", gel.shear_modulus, 1e2, 1e9, "Pa in 1e2..1e9")?;
-        between("gel.poisson", gel.poisson, 0.0, 0.499, "0..0.499")?;
-        between("gel.cell", gel.cell, 1e-4, 5e-4, "m in 0.0001..0.0005")?;
-        between("view.pitch", view.pitch, 1e-5, 2e-4, "m in 1e-5..2e-4")?;
-        between("view.lens", view.lens, 5e-3, 1.0, "m in 0.005..1")?;
-        let wear = &self.wear;
-        between("wear.noise_px", wear.noise_px, 0.0, 20.0, "px in 0..20")?;
-        between("wear.offset_px", wear.offset_px, 0.0, 20.0, "px in 0..20")?;
-        between("wear.gain", wear.gain, 0.0, 10.0, "0..10")?;
-        between("wear.dead_share", wear.dead_share, 0.0, 1.0, "0..1")?;
-        between("wear.image_noise", wear.image_noise, 0.0, 128.0, "0..128")?;
+        self.check("tactile")?;
         if self.shadows && self.optics != OpticsModel::Polynomial {
             let expected = "false with the model \"taxim\", whose images have no shadows";
             let (path, value) = ("tactile.shadows".into(), "true".into());
             return Err(RangeError { path, expected: expected.into(), value });
         }
-        if let MarkerModel::Fots(fots) = &self.markers {
-            between("markers.dilate", fots.dilate, 0.0, 1.0, "1/px² in 0..1")?;
-            between("markers.shear", fots.shear, 0.0, 1.0, "1/px² in 0..1")?;
-            between("markers.twist", fots.twist, 0.0, 1.0, "1/px² in 0..1")?;
-            between("markers.scale", fots.scale, 1.0, 1000.0, "px/mm in 1..1000")?;
-            between("markers.height_factor", fots.height_factor, 0.0, 100.0, "0..100")?;
-        }
         Ok(())
+    }
+}
+
+impl SettingField for OpticsModel {
+    fn describe(&self, declaration: &Declaration<'_>, list: &mut Vec<Setting>) {
+        let values = "polynomial, or { model = \"taxim\", tables = folder }".to_owned();
+        list.push(declaration.setting("polynomial", values));
+    }
+
+    fn check_declared(&self, _: &Declaration<'_>) -> Result<(), RangeError> {
+        Ok(())
+    }
+}
+
+impl SettingField for MarkerModel {
+    fn describe(&self, declaration: &Declaration<'_>, list: &mut Vec<Setting>) {
+        let values = "elastic, or fots with the constants below".to_owned();
+        list.push(declaration.setting("elastic", values));
+        FotsSpec::default().describe(declaration, list);
+    }
+
+    fn check_declared(&self, declaration: &Declaration<'_>) -> Result<(), RangeError> {
+        match self {
+            Self::Elastic => Ok(()),
+            Self::Fots(fots) => fots.check_declared(declaration),
+        }
     }
 }
 
@@ -211,7 +199,7 @@ mod tests {
         let mut spec = TactileSpec::default();
         spec.view.pitch = f64::NAN;
         let message = spec.validate().expect_err("NaN").to_string();
-        assert_eq!(message, "tactile.view.pitch: expected m in 1e-5..2e-4, got NaN");
+        assert_eq!(message, "tactile.view.pitch: expected 1e-5 to 2e-4 (m), got NaN");
         let optics = OpticsModel::Taxim { tables: "x".into() };
         let spec = TactileSpec { shadows: true, optics, ..TactileSpec::default() };
         let message = spec.validate().expect_err("shadows of Taxim").to_string();
