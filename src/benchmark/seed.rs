@@ -121,14 +121,16 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Source of the random streams of an episode: all values on which its initial state depends. Unlike an [`EpisodeId`]
-/// it has a layout in place of the task, because tasks that share a layout share their initial states.
+/// Source of the random streams of an episode: all values on which its initial state depends. Tasks that share a layout share
+/// their initial states, except for what does not show of the objects.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EpisodeSeed {
     /// Name of the suite.
     pub suite: String,
     /// Name of the layout; the tasks of a mirrored pair share it.
     pub layout: String,
+    /// Index of the task, on which what does not show depends: an attempt at one task of a pair must not tell it for the other.
+    pub task: usize,
     /// Index of the episode in its split.
     pub episode: u32,
     /// Seed of the run.
@@ -145,6 +147,7 @@ impl EpisodeSeed {
         Self {
             suite: id.suite.clone(),
             layout: layout.to_owned(),
+            task: id.task,
             episode: id.episode,
             base_seed: id.base_seed,
             split: id.split,
@@ -162,9 +165,13 @@ impl EpisodeSeed {
         let split = self.split.name();
         let episode = self.episode.to_string();
         let base_seed = self.base_seed.to_string();
-        let parts: [&str; 7] =
-            ["softvt episode", &self.suite, &self.layout, &episode, &base_seed, split, stream.name()];
-        let parts = parts.map(str::as_bytes);
+        let mut parts =
+            vec!["softvt episode", &self.suite, &self.layout, &episode, &base_seed, split, stream.name()];
+        let task = self.task.to_string();
+        if stream == RandomStream::Hidden {
+            parts.push(&task);
+        }
+        let parts: Vec<&[u8]> = parts.into_iter().map(str::as_bytes).collect();
         match &self.secret {
             None => ChaCha8Rng::from_seed(sha256(&parts)),
             Some(SecretSeed(key)) => ChaCha8Rng::from_seed(sha256(&[&parts[..], &[&key[..]]].concat())),
@@ -224,6 +231,7 @@ mod tests {
         EpisodeSeed {
             suite: "s".into(),
             layout: "l".into(),
+            task: 1,
             episode: 3,
             base_seed: 7,
             split: Split::Validation,
@@ -243,6 +251,9 @@ mod tests {
         ];
         assert!(others.iter().all(|other| first(other, RandomStream::Layout) != base));
         assert_ne!(first(&seed(), RandomStream::Arm), base);
+        let other_task = EpisodeSeed { task: 2, ..seed() };
+        assert_eq!(first(&other_task, RandomStream::Material), first(&seed(), RandomStream::Material));
+        assert_ne!(first(&other_task, RandomStream::Hidden), first(&seed(), RandomStream::Hidden));
         assert_eq!(first(&seed(), RandomStream::Layout), base);
     }
 

@@ -12,8 +12,8 @@ use super::deformation::Deformation;
 pub struct PadEvidence {
     /// Normal force between pad and target, N.
     pub normal_force_n: f64,
-    /// Distance that the contact patch has slid along the pad since this contact began, m.
-    pub travel_m: f64,
+    /// Speed at which the contact patch slides along the pad, m/s.
+    pub slip_speed_m_s: f64,
 }
 
 /// Opening of the gripper.
@@ -96,7 +96,7 @@ impl Evidence<'_> {
             let centre = body.centre_w;
             [centre.x, centre.y, centre.z, body.lowest_z_w, body.support_force_n, body.robot_force_n]
         });
-        let pads = self.pads.iter().flat_map(|pad| [pad.normal_force_n, pad.travel_m]);
+        let pads = self.pads.iter().flat_map(|pad| [pad.normal_force_n, pad.slip_speed_m_s]);
         let (pose, gripper) = (self.goal.pose_w.to_homogeneous(), &self.gripper);
         let forces = [self.robot_force_n, self.goal.support_force_n, self.grip.dynamic_mu];
         let rest = [self.time_s, gripper.width_m, gripper.commanded_width_m].into_iter().chain(forces);

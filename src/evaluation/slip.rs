@@ -2,44 +2,68 @@
 
 use super::evidence::PadEvidence;
 
-/// Measures slip: the travel of the contact patch along a pad since the pads alone carried the target. Pads that slide along an
-/// object on its support, as those of a hand that feels for its weight, do not slip.
+/// Measures slip: the distance that the contact patch slides along a pad while the pads alone carry the target. Pads that slide along
+/// an object on its support, as those of a hand that feels for its weight, do not slip.
 ///
-/// Each time that the object leaves its support starts at zero again. The result is the maximum over both pads, all steps and all
-/// such times, so motion back does not reduce it. NoSlip holds if it is at most
-/// [`super::criteria::SuccessCriteria::slip_m`].
+/// Distances add up over the episode, so that neither a motion back nor another grasp reduces them; the worse pad counts. NoSlip holds
+/// if the sum is at most [`super::criteria::SuccessCriteria::slip_m`].
 ///
-/// A hand that opens lets the object slide before the pads leave it. That slip counts only if the hand stops opening, so that
-/// the release itself is not slip, and loosening a grip until it slips is.
+/// A hand that opens lets the object slide before the pads leave it. That sliding does not count if the pads leave it within
+/// [`RELEASE_S`] of the begin of the opening.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SlipMonitor {
-    /// Largest slip on either pad so far, m.
-    pub max_m: f64,
-    /// Largest slip since the hand began to open, m.
-    opening_m: f64,
-    start_m: Option<[f64; 2]>,
+    /// Distance slid along each pad, m.
+    slid_m: [f64; 2],
+    /// The same while the hand has been opening, m.
+    opening_m: [f64; 2],
+    /// Time for which it has been opening, s.
+    opening_s: f64,
+}
+
+/// Longest duration of an opening whose sliding belongs to the release, s.
+pub const RELEASE_S: f64 = 1.0;
+
+/// One physics step as [`SlipMonitor`] reads it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SlipSample {
+    /// Left and right pad.
+    pub pads: [PadEvidence; 2],
+    /// True if both pads touch the target and no release was commanded.
+    pub is_held: bool,
+    /// True if something else than the robot supports it.
+    pub is_supported: bool,
+    /// True if the hand is being opened.
+    pub is_opening: bool,
 }
 
 impl SlipMonitor {
-    /// Takes in one physics step: the left and right pad, whether they alone carry the target, that is, both press on it, nothing
-    /// supports it and no release was commanded, and whether the hand is being opened.
-    pub fn update(&mut self, pads: &[PadEvidence; 2], is_carried: bool, is_opening: bool) {
-        if !is_carried {
-            (self.start_m, self.opening_m) = (None, 0.0);
+    /// Takes in one physics step of `dt_s`.
+    pub fn update(&mut self, dt_s: f64, sample: &SlipSample) {
+        if !sample.is_held {
+            (self.opening_m, self.opening_s) = ([0.0; 2], 0.0);
             return;
         }
-        let travel = pads.map(|pad| pad.travel_m);
-        let start = *self.start_m.get_or_insert(travel);
-        for (now, start) in travel.iter().zip(&start) {
-            self.opening_m = self.opening_m.max((now - start).abs());
+        self.opening_s = if sample.is_opening { self.opening_s + dt_s } else { 0.0 };
+        for ((pad, slid), opening) in sample.pads.iter().zip(&mut self.slid_m).zip(&mut self.opening_m) {
+            if !sample.is_supported {
+                *opening += pad.slip_speed_m_s * dt_s;
+            }
+            if !sample.is_opening || self.opening_s > RELEASE_S {
+                *slid += std::mem::take(opening);
+            }
         }
-        if !is_opening {
-            self.max_m = self.max_m.max(std::mem::take(&mut self.opening_m));
-        }
+    }
+
+    /// Slip so far, m.
+    pub fn slip_m(&self) -> f64 {
+        self.slid_m[0].max(self.slid_m[1])
     }
 }
 
-/// Detects that the gripper is being opened: its commanded width has grown within the last control step.
+/// Smallest growth of the commanded width per control step of a hand that opens, m.
+const LEAST_OPENING_M: f64 = 1e-4;
+
+/// Detects that the gripper is being opened: its commanded width has grown by [`LEAST_OPENING_M`] or more within the last control step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OpeningMonitor {
     commanded_width_m: Option<f64>,
@@ -51,9 +75,9 @@ impl OpeningMonitor {
     /// Takes in the commanded width (m) of one physics step. Commands change every `steps_per_control` steps.
     pub fn update(&mut self, commanded_width_m: f64, steps_per_control: u32) -> bool {
         let before = self.commanded_width_m.replace(commanded_width_m).unwrap_or(commanded_width_m);
-        self.steps = match (commanded_width_m > before, commanded_width_m < before) {
-            (true, _) => Some(0),
-            (_, true) => None,
+        self.steps = match commanded_width_m - before {
+            growth if growth >= LEAST_OPENING_M => Some(0),
+            growth if growth < 0.0 => None,
             _ => self.steps.map(|steps| steps + 1),
         };
         self.steps.is_some_and(|steps| steps < steps_per_control)
@@ -64,54 +88,57 @@ impl OpeningMonitor {
 mod tests {
     use super::*;
 
-    /// One step: travel of both pads (mm), whether they carry the target, and whether the hand opens.
-    type Step = ([f64; 2], bool, bool);
+    const DT: f64 = 1.0 / 60.0;
 
-    /// Largest slip (mm) over steps.
-    fn slip_mm(steps: &[Step]) -> f64 {
+    /// Some physics steps in the same state: their number, the speeds of both pads (mm/s), whether the pads hold the target, whether
+    /// it is supported, and whether the hand opens.
+    #[derive(Clone, Copy)]
+    struct Steps(u32, [f64; 2], bool, bool, bool);
+
+    /// Slip after some steps, mm.
+    fn slip_mm(all: &[Steps]) -> f64 {
         let mut slip = SlipMonitor::default();
-        for (travel_mm, is_carried, is_opening) in steps {
-            let pads = travel_mm.map(|mm| PadEvidence { normal_force_n: 3.0, travel_m: mm * 1e-3 });
-            slip.update(&pads, *is_carried, *is_opening);
+        for &Steps(count, speeds_mm_s, is_held, is_supported, is_opening) in all {
+            let pads =
+                speeds_mm_s.map(|speed| PadEvidence { normal_force_n: 3.0, slip_speed_m_s: 1e-3 * speed });
+            let sample = SlipSample { pads, is_held, is_supported, is_opening };
+            (0..count).for_each(|_| slip.update(DT, &sample));
         }
-        1e3 * slip.max_m
+        1e3 * slip.slip_m()
     }
 
-    const CARRIED: bool = true;
+    fn near(a: f64, b: f64) -> bool {
+        (a - b).abs() < 1e-9
+    }
+
+    const CARRIED: Steps = Steps(60, [1.0, 2.0], true, false, false);
 
     #[test]
-    fn slip_counts_from_the_support_and_takes_the_worse_pad() {
-        let steps =
-            [([3.0, 1.0], CARRIED, false), ([3.5, 1.2], CARRIED, false), ([3.6, 3.1], CARRIED, false)];
-        assert!((slip_mm(&steps) - 2.1).abs() < 1e-9);
+    fn sliding_adds_up_while_the_pads_alone_carry_and_the_worse_pad_counts() {
+        let supported = Steps(60, [9.0; 2], true, true, false);
+        assert!(near(slip_mm(&[supported, CARRIED]), 2.0));
+        // Put down, or touched by a wall, and lifted again.
+        assert!(near(slip_mm(&[CARRIED, supported, CARRIED]), 4.0));
+        let let_go = Steps(6, [0.0; 2], false, true, false);
+        assert!(near(slip_mm(&[CARRIED, let_go, CARRIED]), 4.0));
     }
 
     #[test]
     fn opening_the_hand_until_it_releases_is_not_slip() {
-        assert_eq!(slip_mm(&[([0.0, 0.0], CARRIED, false), ([9.0, 9.0], false, false)]), 0.0);
-        let slid = ([4.0, 4.0], CARRIED, true);
-        assert_eq!(slip_mm(&[([0.0, 0.0], CARRIED, false), slid, ([9.0, 9.0], false, true)]), 0.0);
+        let slides = Steps(30, [20.0; 2], true, false, true);
+        let released = Steps(6, [0.0; 2], false, false, true);
+        assert_eq!(slip_mm(&[slides, released]), 0.0);
+        let settles = Steps(6, [20.0; 2], true, true, true);
+        assert_eq!(slip_mm(&[slides, settles, released]), 0.0);
     }
 
     #[test]
-    fn loosening_a_grip_until_it_slips_is_slip() {
-        let slid = ([4.0, 4.0], CARRIED, true);
-        assert!(
-            (slip_mm(&[([0.0, 0.0], CARRIED, false), slid, ([4.0, 4.0], CARRIED, false)]) - 4.0).abs() < 1e-9
-        );
-    }
-
-    #[test]
-    fn another_lift_starts_at_zero_and_the_largest_slip_stays() {
-        let carried = |mm| (mm, CARRIED, false);
-        let steps = [
-            carried([0.0, 0.0]),
-            carried([1.5, 0.0]),
-            ([5.0, 5.0], false, true),
-            carried([7.0, 7.0]),
-            carried([7.5, 7.0]),
-        ];
-        assert!((slip_mm(&steps) - 1.5).abs() < 1e-9);
+    fn opening_that_does_not_release_or_takes_long_is_slip() {
+        let slides = Steps(30, [4.0; 2], true, false, true);
+        assert!(near(slip_mm(&[slides, Steps(1, [0.0; 2], true, false, false)]), 2.0));
+        assert!(near(slip_mm(&[slides, Steps(1, [0.0; 2], true, true, false)]), 2.0), "put down and held");
+        let released = Steps(6, [0.0; 2], false, false, true);
+        assert!(near(slip_mm(&[slides, slides, slides, released]), 6.0), "1.5 s");
     }
 
     #[test]
@@ -120,5 +147,7 @@ mod tests {
         let widths = [20.0, 20.0, 21.0, 21.0, 21.0, 22.0, 22.0, 22.0, 22.0, 21.0, 21.0];
         let seen = widths.map(|width| opening.update(1e-3 * width, 3));
         assert_eq!(seen, [false, false, true, true, true, true, true, true, false, false, false]);
+        let mut creeping = OpeningMonitor::default();
+        assert!((0..100).all(|step| !creeping.update(0.02 + 1e-9 * f64::from(step), 1)));
     }
 }

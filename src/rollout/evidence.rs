@@ -127,7 +127,8 @@ impl EvidenceCollector {
             },
             pads: sim.pad_contacts(target).map(|contact| PadEvidence {
                 normal_force_n: contact.normal_force,
-                travel_m: contact.travel,
+                // A sleeping body keeps the contacts with which it fell asleep.
+                slip_speed_m_s: if sim.is_asleep(target) { 0.0 } else { contact.slip_speed },
             }),
             robot_force_n: from_robot,
             grip: GripEvidence {

@@ -249,6 +249,16 @@ impl Simulation {
         self.world.contact(object.body, partner)
     }
 
+    /// True if the body of an object sleeps.
+    pub fn is_asleep(&self, object: &ObjectInstance) -> bool {
+        match object.body {
+            BodyId::Soft(index) => self.world.soft(index).is_asleep(),
+            BodyId::Rigid(index) => self.world.rigid(index).is_asleep(),
+            BodyId::Link(link) => self.world.articulation(link.articulation).is_asleep(),
+            BodyId::World | BodyId::Kinematic(_) => false,
+        }
+    }
+
     /// Contacts of an object with the left and right pad.
     pub fn pad_contacts(&self, object: &ObjectInstance) -> [ContactSummary; 2] {
         self.robot.pads.map(|pad| self.contact(object, ContactPartner::Collider(pad)))

@@ -102,11 +102,9 @@ fn object(sim: &Simulation, evidence: &EvidenceCollector, index: usize, with_nod
     let instance = &sim.objects[index];
     let pose = sim.pose(instance);
     let q = rotation::canonical(&pose.rotation);
-    let (soft, asleep) = match instance.body {
-        BodyId::Soft(index) => (Some(sim.world.soft(index)), sim.world.soft(index).is_asleep()),
-        BodyId::Rigid(index) => (None, sim.world.rigid(index).is_asleep()),
-        BodyId::Link(link) => (None, sim.world.articulation(link.articulation).is_asleep()),
-        BodyId::World | BodyId::Kinematic(_) => (None, false),
+    let soft = match instance.body {
+        BodyId::Soft(index) => Some(sim.world.soft(index)),
+        _ => None,
     };
     let contacts = sim.world.contacts(instance.body).iter();
     ObjectTrace {
@@ -115,7 +113,7 @@ fn object(sim: &Simulation, evidence: &EvidenceCollector, index: usize, with_nod
         quaternion_w: [q.w, q.i, q.j, q.k],
         d_pct: evidence.deformation(sim, index).map(|d| d.rms_pct),
         min_det_f: soft.map(|s| s.min_det_f.det_f),
-        asleep,
+        asleep: sim.is_asleep(instance),
         touches: contacts.map(|contact| sim.world.partner_name(contact.partner).to_owned()).collect(),
         nodes: soft.filter(|_| with_nodes).map(|s| s.state.x.iter().map(|x| (*x).into()).collect()),
     }

@@ -93,7 +93,7 @@ use super::{
     grip::{GripMonitor, GripSample},
     record::{OtherDeformation, Outcome, Verdict, WrongContact},
     safety::{DeformationLimit, KAPPAS, KappaVerdict, PeakDeformation, SafetyParts},
-    slip::{OpeningMonitor, SlipMonitor},
+    slip::{OpeningMonitor, SlipMonitor, SlipSample},
     stage::{StageMonitor, StageSample},
 };
 
@@ -239,7 +239,9 @@ impl Judge {
         let is_opening =
             self.opening.update(evidence.gripper.commanded_width_m, self.config.steps_per_control);
         let is_supported = self.is_supported(&evidence.target);
-        self.slip.update(&evidence.pads, both_pads_touch && !is_supported && !is_released, is_opening);
+        let is_held = both_pads_touch && !is_released;
+        let slip = SlipSample { pads: evidence.pads, is_held, is_supported, is_opening };
+        self.slip.update(self.config.dt_s, &slip);
         let is_carried = is_lifted && !is_released;
         let grip = GripSample { is_carried, is_held: both_pads_touch, grip: evidence.grip };
         let config = &self.config;
@@ -292,7 +294,7 @@ impl Judge {
         let within = |tau| if soft && valid { self.peak.is_within(tau) } else { None };
         let limit = self.config.limit.filter(|_| soft);
         let deformation_ok = within(limit.map(|l| l.tau_pct()));
-        let no_slip = self.slip.max_m <= self.config.criteria.slip_m;
+        let no_slip = self.slip.slip_m() <= self.config.criteria.slip_m;
         let slip_ok = (self.config.criteria.require_no_slip && valid).then_some(no_slip);
         let parts = SafetyParts { goal, no_drop, slip_ok };
         let safety = parts.is_safe(soft, deformation_ok);
@@ -322,7 +324,7 @@ impl Judge {
             no_drop,
             drop: self.drops.first,
             no_slip,
-            slip_mm: 1e3 * self.slip.max_m,
+            slip_mm: 1e3 * self.slip.slip_m(),
             d_peak: self.peak.d_pct,
             d_peak_weighted: self.peak_weighted.d_pct,
             d_peak_max: self.peak_max.d_pct,

@@ -1,6 +1,6 @@
 //! Observation of a world: copies of its state, contact forces and energies.
 
-use super::{BodyContact, World, state::ContactSummary};
+use super::{BodyContact, World, contact_points::EndStretch, state::ContactSummary};
 use crate::{
     ids::{BodyId, ColliderId, ContactPartner, LinkId, RigidId, SoftId},
     joints::{kinetic_energy, potential_energy},
@@ -266,7 +266,10 @@ fn add_point(contacts: &mut Vec<BodyContact>, partner: ContactPartner, side: Sid
     let force = point.normal_impulse / dt;
     sum.points += 1;
     sum.slipping_points += usize::from(point.is_slipping);
-    sum.travel = (sum.travel * sum.normal_force + travel * force) / (sum.normal_force + force);
+    let mean =
+        |before: f64, value: f64| (before * sum.normal_force + value * force) / (sum.normal_force + force);
+    (sum.travel, sum.slip_speed) =
+        (mean(sum.travel, travel), mean(sum.slip_speed, EndStretch::new(point, dt).slipped / dt));
     sum.normal_force += force;
     sum.force_w += sign * (point.normal * point.normal_impulse + point.shear_impulse) / dt;
     sum.capacity += point.mu * force;

@@ -181,7 +181,7 @@ functions! {
             let settings = simulation_settings(lua, settings.as_ref())?;
             let seed = seed.unwrap_or_else(|| experiment_input::base_seed(lua));
             let (layout_name, split) = (layout.name.clone(), Split::Experiment);
-            let seed = EpisodeSeed { suite, layout: layout_name, episode, base_seed: seed, split, secret: None };
+            let seed = EpisodeSeed { suite, layout: layout_name, task: 0, episode, base_seed: seed, split, secret: None };
             LuaSimulation::new(lua, &layout, seed, &settings)?
         }
     }

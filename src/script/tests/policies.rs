@@ -18,7 +18,7 @@ use softvt_sensing::tactile::Markers;
 
 fn seed(episode: u32) -> EpisodeSeed {
     let (suite, layout) = ("one".to_owned(), "one".to_owned());
-    EpisodeSeed { suite, layout, episode, base_seed: 0, split: Split::Validation, secret: None }
+    EpisodeSeed { suite, layout, task: 0, episode, base_seed: 0, split: Split::Validation, secret: None }
 }
 
 /// A finger whose markers have all moved by `by` px, with an image that is `lit` brighter than the untouched one.
