@@ -30,8 +30,9 @@ local STIFFNESS, SURE, LEAST_RISE, MOST_RISE, HIGHEST = 0.35, 2, 0.4, 1.5, 8
 local EVIDENCE, SEEN, LEAST, CONFIRM = 24, 1.25, 0.03, 12
 -- Force of the grip over the least one that holds, and the factor per grasp that has failed here, of which MOST_FAILURES count.
 local MARGIN, FIRMER, MOST_FAILURES = 1.4, 1.15, 2
--- Going down with a loosened grip: share of the grip, mm per control step; and closing to the grip, mm per control step.
-local LOOSENED, DOWN, CLOSING = 0.3, 0.2, 0.15
+-- Going down: distance below where the object was lifted, mm; share of the grip from there on, mm per control step; and closing to
+-- the grip, mm per control step.
+local LANDING, LOOSENED, DOWN, CLOSING = 0.3, 0.3, 0.2, 0.15
 -- While it holds: share of the shear over divergence of a sliding gel at which the grip becomes firmer, readings averaged, the
 -- change as a share of the grip, and the largest number of changes.
 local SLIPPING, KEPT, TIGHTEN, MOST_CHANGES = 0.95, 4, 0.04, 6
@@ -58,7 +59,7 @@ function Trial:move(closing, rising, shifting)
   self.height, self.shift = self.height + rising, self.shift + shifting
   local n = #self.shear + 1
   self.shear[n], self.left[n], self.right[n] = read(self.step(self.closure, 1e-3 * self.height, 1e-3 * self.shift))
-  self.closures[n] = self.closure
+  self.closures[n], self.heights[n] = self.closure, self.height
 end
 
 -- Closes until both gels touch. The hand follows the gel that touches first, so that it does not push the object.
@@ -84,7 +85,7 @@ function Trial:slide()
   until self.height > LIFT_MOST or (count >= 8 and count % 4 == 0 and recent(self.shear, 4) - before < STICKS)
 end
 
--- Where the shear has stopped growing since reading `first`: { closure, slope, shear }; nil if it still grows. Fits
+-- Where the shear has stopped growing since reading `first`: { closure, height, slope, shear }; nil if it still grows. Fits
 -- shear = p + b min(0, closure - bend) by least squares, for a bend at each reading; touch counts as a reading without shear.
 function Trial:bend(first)
   local shear, closures, last, best, line = self.shear, self.closures, #self.shear, nil, nil
@@ -98,7 +99,7 @@ function Trial:bend(first)
     end
     local b = (n * sxy - sx * sy) / (n * sxx - sx * sx)
     local p = (sy - b * sx) / n
-    line = { closure = bend, slope = b, shear = p, error = syy - p * sy - b * sxy }
+    line = { closure = bend, height = self.heights[k], slope = b, shear = p, error = syy - p * sy - b * sxy }
     if not best or line.error < best.error then best = line end
   end
   local missing = best and best.slope * (self.closure - best.closure) or 0
@@ -126,11 +127,12 @@ function Trial:tighten(margin)
   end
 end
 
--- Goes back down with a loosened grip, and closes to the grip.
-function Trial:settle(grip)
-  local loosened, top = self.touch + LOOSENED * (grip - self.touch), self.height
+-- Puts the object down from above `height` (mm), goes back down with a loosened grip, and closes to the grip.
+function Trial:settle(grip, height)
+  local loosened, low = self.touch + LOOSENED * (grip - self.touch), max(0, height - LANDING)
+  for k = ceil((self.height - low) / DOWN), 1, -1 do self:move(0, (low - self.height) / k, 0) end
   for k = 5, 1, -1 do self:move((loosened - self.closure) / MM / k, 0, 0) end
-  for k = ceil(top / DOWN), 1, -1 do self:move(0, -self.height / k, 0) end
+  for k = ceil(self.height / DOWN), 1, -1 do self:move(0, -self.height / k, 0) end
   for k = max(5, ceil((grip - self.closure) / MM / CLOSING)), 1, -1 do self:move((grip - self.closure) / MM / k, 0, 0) end
 end
 
@@ -149,7 +151,7 @@ end
 -- finger, m, and returns the finger readings of the next control step. Returns the grip, for servo.keep.
 function servo.grasp(closure, failures, step)
   local trial = setmetatable({
-    step = step, closure = closure, height = 0, shift = 0, shear = {}, left = {}, right = {}, closures = {},
+    step = step, closure = closure, height = 0, shift = 0, shear = {}, left = {}, right = {}, closures = {}, heights = {},
   }, Trial)
   local margin = MARGIN * FIRMER ^ min(failures, MOST_FAILURES)
   trial:approach()
@@ -160,7 +162,7 @@ function servo.grasp(closure, failures, step)
     grip.closure = min(1, least.closure + (margin - 1) * least.shear / least.slope)
     grip.ratio, grip.shear = trial:sliding_ratio(least.closure), least.shear
   end
-  trial:settle(grip.closure)
+  trial:settle(grip.closure, least and least.height or trial.height)
   return grip
 end
 
