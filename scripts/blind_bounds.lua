@@ -24,7 +24,7 @@ end
 if #kinds == 0 then error("--suite: no goal object of these suites has a calibrated window; run softvt scripts/calibrate.lua first", 0) end
 
 -- A hand that feels: margin over the least force that holds the instance, and its relative error (1 sd).
-local MARGIN, ERROR = 1.3, 0.1
+local MARGIN, ERROR = 1.2, 0.07
 
 -- Share of a sample that is safe with the margin over its least force, known with the error: the mean over quantiles of the error.
 local function felt(sample)

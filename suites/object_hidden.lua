@@ -1,5 +1,5 @@
 -- Object-Hidden: soft objects to put into the basket, as in Object-Soft. How stiff, brittle, heavy and slippery each is does not show and
--- differs from episode to episode, and the safe grip forces of each lie within a factor of about two.
+-- differs from episode to episode, and the safe grip forces of each lie within a factor of 1.25 to 1.5.
 local layouts = require "layouts.floor"
 local pick_place = require "experts.pick_place"
 local shifts = require "shifts"

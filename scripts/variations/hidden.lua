@@ -1,5 +1,5 @@
 -- The hidden variation: besides size and looks, every object differs in properties that do not show. Its safe grip forces lie
--- within a factor of about two, and where they lie has to be felt.
+-- within a factor of 1.25 to 1.5, and where they lie has to be felt.
 --
 --   softvt suites/object_soft.lua --vary=scripts/variations/hidden.lua
 local standard = require "variations.standard"
@@ -15,7 +15,7 @@ return softvt.variation {
     staling = { 1, 6 },
     filling = { 1, 4 },
     coating = { 0.2, 1.5 },
-    window_ratio = { 1.3, 1.8 },
+    window_ratio = { 1.25, 1.5 },
   },
   colour = standard.colour,
   light = standard.light,

@@ -76,6 +76,16 @@ pub struct Setting {
 }
 
 impl Setting {
+    /// The default in words.
+    pub fn default_text(&self) -> String {
+        match &self.default {
+            Value::Null => "that of the scene".to_owned(),
+            Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), format_number),
+            Value::String(text) => text.clone(),
+            other => other.to_string(),
+        }
+    }
+
     /// All settings of a group at a path.
     pub fn list<T: SettingField + Default>(path: &str) -> Vec<Self> {
         let mut list = Vec::new();
@@ -101,7 +111,12 @@ impl Declaration<'_> {
     /// The setting with this default and these values.
     pub fn setting(&self, default: impl Serialize, values: String) -> Setting {
         let default = serde_json::to_value(default).unwrap_or_default();
-        Setting { path: self.path.to_owned(), default, values, about: self.about.trim().to_owned() }
+        Setting {
+            path: self.path.to_owned(),
+            default,
+            values,
+            about: self.about.split_whitespace().collect::<Vec<_>>().join(" "),
+        }
     }
 
     fn number(&self, of: &str) -> String {

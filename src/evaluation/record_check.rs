@@ -19,6 +19,18 @@ pub enum RecordError {
     Contradiction(String),
 }
 
+/// Keys that a record leaves out at their default.
+const OMITTED: [&str; 8] = [
+    "privileged",
+    "variation",
+    "origin",
+    "others",
+    "first_far_command",
+    "gave_up",
+    "notes",
+    "actions_sha256",
+];
+
 /// Tolerance of sums and means, relative to 1.
 const TOLERANCE: f64 = 1e-9;
 
@@ -30,7 +42,8 @@ impl EpisodeRecord {
     pub fn from_json(text: &[u8]) -> Result<Self, RecordError> {
         let record: Self = serde_json::from_slice(text)?;
         // serde cannot refuse unknown keys in flattened structs.
-        let (read, known) = (serde_json::from_slice(text)?, serde_json::to_value(&record)?);
+        let (read, mut known) = (serde_json::from_slice(text)?, serde_json::to_value(&record)?);
+        OMITTED.iter().for_each(|key| known[*key] = known[*key].take());
         if let Some(key) = unknown_key(&read, &known) {
             return Err(RecordError::UnknownKey(key));
         }
@@ -290,6 +303,10 @@ mod tests {
     fn the_record_as_written_is_accepted() {
         let line = serde_json::to_string(&sample()).unwrap();
         assert_eq!(EpisodeRecord::from_json(line.as_bytes()).unwrap(), sample());
+        // As other programs may write it.
+        let mut whole = serde_json::to_value(sample()).unwrap();
+        (whole["gave_up"], whole["variation"]) = (Value::Null, Value::Null);
+        assert_eq!(EpisodeRecord::from_json(whole.to_string().as_bytes()).unwrap(), sample());
     }
 
     #[test]

@@ -210,7 +210,20 @@ impl ThresholdFile {
     fn validate(&self, path: &str) -> Result<(), ThresholdError> {
         check_equal(path, "protocol_id", &self.protocol_id, PROTOCOL_ID)?;
         check_equal(path, "calibration.method", &self.calibration.method, METHOD)?;
-        self.thresholds.iter().try_for_each(|(asset, threshold)| threshold.validate(path, asset))
+        self.thresholds.iter().try_for_each(|(asset, threshold)| {
+            threshold.validate(path, asset)?;
+            let envelope = self.envelopes.get(asset).and_then(|envelope| envelope.d_ref_pct);
+            match envelope.is_some_and(|d_ref| (d_ref - threshold.d_ref).abs() > 1.5e-6) {
+                true => Err(ThresholdError::Range {
+                    path: path.into(),
+                    asset: asset.clone(),
+                    field: "d_ref",
+                    value: threshold.d_ref,
+                    expected: "d_ref_pct of its envelope",
+                }),
+                false => Ok(()),
+            }
+        })
     }
 }
 
@@ -330,6 +343,11 @@ mod tests {
             "envelopes in closures: {first}"
         );
         assert!(refused("0.166667", "0.3").contains("thresholds.bun.tau is 0.3"));
+        let envelope = refused("\"d_ref_pct\": 0.333333", "\"d_ref_pct\": 0.2");
+        assert!(
+            envelope.contains("thresholds.bun.d_ref is 0.333333, expected d_ref_pct of its envelope"),
+            "{envelope}"
+        );
         assert!(refused("\"d_ref\": 0.333333", "\"d_ref\": -1").contains("thresholds.bun.d_ref is -1"));
         assert!(refused("\"n_stable_trials\": 2", "\"n_stable_trials\": 0").contains("n_stable_trials is 0"));
         assert!(refused("{", "").contains("not a threshold file"));

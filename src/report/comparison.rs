@@ -255,14 +255,24 @@ fn differing_fields(first: &[StoredRun], second: &[StoredRun]) -> Vec<String> {
                 found.insert(field.to_owned());
                 continue;
             };
-            let is_other = |(name, value): &(&String, &Value)| other.get(*name).is_some_and(|x| x != *value);
-            let names: Vec<&str> = own.iter().filter(is_other).map(|(name, _)| name.as_str()).collect();
+            let other: BTreeMap<&str, &Value> = other.iter().map(|(name, value)| (in_project(name), value)).collect();
+            let own = own.iter().map(|(name, value)| (in_project(name), value));
+            let is_other = |(name, value): &(&str, &Value)| other.get(name).is_some_and(|x| x != value);
+            let names: Vec<&str> = own.filter(is_other).map(|(name, _)| name).collect();
             if !names.is_empty() {
                 found.insert(format!("{field} ({})", names.join(", ")));
             }
         }
     }
     found.into_iter().collect()
+}
+
+/// The path of a file in its project, whatever the folder from which a run named it: `../scripts/shifts.lua` is `scripts/shifts.lua`.
+fn in_project(path: &str) -> &str {
+    let folders = ["scripts/", "suites/", "assets/"];
+    let starts = folders.iter().filter_map(|folder| path.find(folder));
+    let start = starts.filter(|at| *at == 0 || path[..*at].ends_with('/')).min();
+    start.map_or(path, |at| &path[at..])
 }
 
 /// The comparison as a plain-text table of at most 100 columns.
@@ -513,6 +523,8 @@ mod tests {
             |part: &StoredRun| compare(&[whole.clone()], std::slice::from_ref(part)).expect("pairs").unlike;
         assert_eq!(unlike(&part), [""; 0]);
         part.manifest["sources"]["y.lua"] = json!("9");
+        assert_eq!(in_project("../a/scripts/experts/grasp.lua"), "scripts/experts/grasp.lua");
+        assert_eq!((in_project("x.lua"), in_project("my_suites/x.lua")), ("x.lua", "my_suites/x.lua"));
         part.manifest["thresholds"]["bun"] = json!(1.5);
         assert_eq!(unlike(&part), ["sources (y.lua)", "thresholds (bun)"]);
         part.manifest["settings"] = json!({ "robot": 1 });

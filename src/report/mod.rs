@@ -6,6 +6,7 @@ pub mod comparison;
 pub mod condition_effects;
 pub mod condition_table;
 pub mod page;
+pub mod run_check;
 pub mod run_folder;
 pub mod run_summary;
 pub mod shard_merge;

@@ -9,7 +9,10 @@ use std::{
 
 use serde_json::Value;
 
-use super::run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, is_truncated, read_episodes};
+use super::{
+    run_check::contradiction,
+    run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, is_truncated, read_episodes},
+};
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::files::{self, FileError};
 use softvt_evaluation::record::EpisodeRecord;
@@ -52,6 +55,8 @@ pub enum StoredRunError {
     None { dir: String },
     #[error("{path}:{line}: {episode} occurs twice (first in line {first}): remove one of the lines")]
     DuplicateEpisode { path: String, line: usize, first: usize, episode: EpisodeIndex },
+    #[error("{path}:{line}: the record contradicts {RUN}: {what}; one of the two was changed after the run")]
+    Contradiction { path: String, line: usize, what: String },
     #[error("{path} is not a valid run file: {what}")]
     Manifest { path: String, what: String },
 }
@@ -237,6 +242,7 @@ fn load_one(dir: &Path) -> Result<StoredRun, StoredRunError> {
         }
         let mut records = read_episodes(dir)?;
         check_unique(dir, &records)?;
+        check_records(dir, &manifest, &records)?;
         records.sort_by_key(|r| r.header.id.index());
         let (is_finished, is_truncated) = (dir.join(SUMMARY).is_file(), is_truncated(dir));
         Ok(StoredRun { dir: dir.to_owned(), manifest: manifest.clone(), records, is_finished, is_truncated })
@@ -253,6 +259,17 @@ fn is_shard(shard: &Value) -> bool {
     let numbers =
         text.split_once('/').and_then(|(i, n)| Some((i.parse::<u32>().ok()?, n.parse::<u32>().ok()?)));
     numbers.is_some_and(|(index, count)| (1..=count).contains(&index))
+}
+
+/// Checks that the records, in the order of their lines, are of the run of this manifest.
+fn check_records(dir: &Path, manifest: &Value, records: &[EpisodeRecord]) -> Result<(), StoredRunError> {
+    let wrong = |(number, record)| Some((number + 1, contradiction(manifest, record)?));
+    match records.iter().enumerate().find_map(wrong) {
+        None => Ok(()),
+        Some((line, what)) => {
+            Err(StoredRunError::Contradiction { path: dir.join(EPISODES).display().to_string(), line, what })
+        }
+    }
 }
 
 /// Checks that no episode has two lines, since it would count twice.

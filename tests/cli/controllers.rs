@@ -31,9 +31,9 @@ fn the_varied_suite_needs_the_size_and_the_hidden_ones_touch_by_arithmetic() {
             let share = hidden(controller);
             assert!(share < 60.0, "{suite}: {controller} is safe for {share:.1} % of the instances");
         }
-        // A grip of 1.3 times the least force is at the tight end of the narrowest windows.
+        // The least force is known to 7 %, and the narrowest windows end a little above the grip.
         assert!(hidden("felt") > 85.0, "{suite}: {:.1} %", hidden("felt"));
-        assert!((1.3..=1.8).contains(&hidden("force_ratio")), "{suite}: {}", hidden("force_ratio"));
+        assert!((1.25..=1.5).contains(&hidden("force_ratio")), "{suite}: {}", hidden("force_ratio"));
         assert!((1.0..100.0).contains(&hidden("kept_pct")), "{suite}: {}", hidden("kept_pct"));
     }
 }

@@ -1,4 +1,4 @@
-//! `softvt list`: suites, tasks, assets, policies and profiles, in the working folder and in the binary.
+//! `softvt list`: suites, tasks, assets, policies and profiles, in the working folder and in the binary, and settings.
 
 use std::{collections::BTreeSet, path::Path};
 
@@ -10,14 +10,15 @@ use crate::{
     output::{print, print_json, text_columns},
     run::policy::BuiltinPolicy,
 };
-use softvt_benchmark::{Plan, Task};
+use softvt_benchmark::{Plan, Task, settings::Settings};
+use softvt_common::settings::Setting;
 use softvt_policy::profile::PROFILES;
 
-/// List suites, tasks, assets, policies or profiles
+/// List suites, tasks, assets, policies, profiles or settings
 #[derive(Args, Debug)]
 pub(crate) struct ListArgs {
     /// Kind of items to list
-    #[arg(value_name = "suites|tasks|assets|policies|profiles")]
+    #[arg(value_name = "suites|tasks|assets|policies|profiles|settings")]
     what: ListKind,
     /// Print JSON
     #[arg(long)]
@@ -31,6 +32,7 @@ enum ListKind {
     Assets,
     Policies,
     Profiles,
+    Settings,
 }
 
 /// Lists what the arguments ask for.
@@ -44,6 +46,7 @@ pub(super) fn run(args: &ListArgs) -> Result<(), CliError> {
             let built_in = PROFILES.iter().map(|(name, about)| ((*name).to_owned(), (*about).to_owned()));
             named(built_in, "scripts/profiles")
         }
+        ListKind::Settings => Settings::list().iter().map(setting_row).collect(),
         ListKind::Assets => {
             scripts("assets").iter().map(|path| json!({ "name": stem(path), "file": path })).collect()
         }
@@ -90,9 +93,17 @@ fn first_sentence(path: &str) -> String {
         text.or_else(|| String::from_utf8(softvt_script::embedded(path)?.to_vec()).ok()).unwrap_or_default();
     let comment = text.lines().map_while(|line| line.strip_prefix("--")).map(str::trim);
     let comment: Vec<&str> = comment.take_while(|line| !line.is_empty()).collect();
-    let comment = comment.join(" ");
-    let sentence = comment.split_once(". ").map_or(comment.as_str(), |(first, _)| first);
-    sentence.trim_end_matches('.').to_owned()
+    first_of(&comment.join(" ")).to_owned()
+}
+
+fn setting_row(setting: &Setting) -> Value {
+    let Setting { path, values, about, .. } = setting;
+    json!({ "name": path, "default": setting.default_text(), "values": values, "about": first_of(about) })
+}
+
+/// The first sentence of a text.
+fn first_of(text: &str) -> &str {
+    text.split_once(". ").map_or(text, |(first, _)| first).trim_end_matches('.')
 }
 
 /// A suite, or a file of several suites with their names.

@@ -2,7 +2,7 @@
 
 use std::{
     fmt,
-    io::ErrorKind,
+    io::{ErrorKind, Read},
     path::{Path, PathBuf},
     str::FromStr,
 };
@@ -255,6 +255,8 @@ impl RunConfig {
 
 /// Shortest seed file that is not easily guessed from its hash, bytes.
 const MIN_SECRET_BYTES: usize = 16;
+/// Largest size of the file.
+const MAX_SECRET_BYTES: u64 = 1 << 20;
 
 /// The secret in a seed file.
 ///
@@ -263,10 +265,17 @@ const MIN_SECRET_BYTES: usize = 16;
 pub(crate) fn read_secret(path: &Path) -> Result<SecretSeed, CliError> {
     let refuse = |what: String| CliError::input(format!("--seed-file {}: {what}", path.display()));
     let make = "write one, for example: head -c 32 /dev/urandom > FILE";
-    let content = std::fs::read(path).map_err(|error| match error.kind() {
+    let mut content = Vec::new();
+    // Devices such as /dev/urandom have no end.
+    let read =
+        std::fs::File::open(path).and_then(|file| file.take(MAX_SECRET_BYTES + 1).read_to_end(&mut content));
+    read.map_err(|error| match error.kind() {
         ErrorKind::NotFound => refuse(format!("there is no such file; {make}")),
         _ => refuse(error.to_string()),
     })?;
+    if content.len() as u64 > MAX_SECRET_BYTES {
+        return Err(refuse(format!("it has more than {MAX_SECRET_BYTES} bytes; {make}")));
+    }
     if content.is_empty() {
         return Err(refuse(format!("the file is empty; {make}")));
     }

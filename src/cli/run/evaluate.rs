@@ -24,6 +24,7 @@ use softvt_evaluation::{
 };
 use softvt_report::{
     actions,
+    run_check::contradiction,
     run_folder::{EPISODES, RUN, RunFolder, SUMMARY},
     softvtbench_files,
 };
@@ -60,13 +61,14 @@ impl<'a> RunLog<'a> {
         manifest: &impl Serialize,
     ) -> Result<Self, CliError> {
         let log = Self { run, folder, records };
-        log.check_records()?;
+        log.check_records(manifest)?;
         run_manifest::write(&log.folder, manifest)?;
         Ok(log)
     }
 
-    /// Checks that all records are episodes of this run, each at most once.
-    fn check_records(&self) -> Result<(), CliError> {
+    /// Checks that all records are episodes of the run of this manifest, each at most once.
+    fn check_records(&self, manifest: &impl Serialize) -> Result<(), CliError> {
+        let manifest = serde_json::to_value(manifest).unwrap_or_default();
         let (run, config) = (self.run, self.run.config);
         let path = run.out.join(EPISODES).display().to_string();
         if !self.records.is_empty() && self.folder.read(RUN)?.is_none() {
@@ -81,9 +83,11 @@ impl<'a> RunLog<'a> {
                 && id.base_seed == config.script.seed
                 && header.policy == config.policy.name;
             let problem = if !is_own || run.jobs.find(index).is_none() {
-                "belongs to another run"
+                "belongs to another run".to_owned()
             } else if !seen.insert(index) {
-                "occurs twice"
+                "occurs twice".to_owned()
+            } else if let Some(what) = contradiction(&manifest, record) {
+                format!("contradicts {RUN}: {what}; it was changed after the episode")
             } else {
                 continue;
             };

@@ -1,0 +1,104 @@
+//! What the records of a run must agree with in its `run.json`: criteria, limits, and whether the policy saw the true state.
+//!
+//! A run whose files were changed consistently passes. Only `softvt replay`, which simulates its episodes again, proves a run.
+
+use serde_json::Value;
+
+use softvt_benchmark::CONTROL_DT;
+use softvt_evaluation::{criteria::SuccessCriteria, record::EpisodeRecord};
+
+/// Differences that rounding explains, relative to 1.
+const ROUNDING: f64 = 1e-6;
+
+/// How a record contradicts the run of this manifest; `None` if it does not. Manifests of earlier versions without the
+/// fields are not compared.
+pub fn contradiction(manifest: &Value, record: &EpisodeRecord) -> Option<String> {
+    let (v, s) = (&record.verdict, &record.stats);
+    let is_valid = record.outcome.is_valid();
+    if let Some(privileged) =
+        manifest["privileged"].as_bool().filter(|known| *known != record.header.privileged)
+    {
+        return Some(format!("privileged is {}, and that of the run {privileged}", record.header.privileged));
+    }
+    let expected_s = f64::from(s.steps) * CONTROL_DT;
+    if is_valid && (s.time_s - expected_s).abs() > ROUNDING {
+        return Some(format!("time_s is {}, and {} steps take {expected_s} s", s.time_s, s.steps));
+    }
+    if let Some(tau) = nominal_tau(manifest, record).filter(|tau| v.tau.is_some_and(|own| differ(own, *tau)))
+    {
+        let own = v.tau.unwrap_or_default();
+        return Some(format!("tau is {own}, and that of {} in the run {tau}", record.header.asset));
+    }
+    let criteria: SuccessCriteria = serde_json::from_value(manifest["settings"]["criteria"].clone()).ok()?;
+    let slip_mm = 1e3 * criteria.slip_m;
+    if v.no_slip != (v.slip_mm <= slip_mm) && differ(v.slip_mm, slip_mm) {
+        return Some(format!(
+            "no_slip is {}, and slip_mm {}; the run allows {slip_mm} mm",
+            v.no_slip, v.slip_mm
+        ));
+    }
+    if is_valid && v.slip_ok.is_some() != criteria.require_no_slip {
+        let required = criteria.require_no_slip;
+        let is_null = if v.slip_ok.is_none() { "null" } else { "not null" };
+        return Some(format!("slip_ok is {is_null}, and criteria.require_no_slip of the run {required}"));
+    }
+    let ratio = v.grip_ratio.unwrap_or(f64::INFINITY);
+    let is_gentle = v.goal && ratio <= criteria.gentle_ratio;
+    if v.gentle.is_some_and(|gentle| gentle != is_gentle) && differ(ratio, criteria.gentle_ratio) {
+        return Some(format!("gentle is {}, and goal is {}, grip_ratio {ratio}", !is_gentle, v.goal));
+    }
+    None
+}
+
+/// τ of the target's asset in the run. Instances with properties that do not show have limits of their own.
+fn nominal_tau(manifest: &Value, record: &EpisodeRecord) -> Option<f64> {
+    let drawn = record.header.variation.iter().flat_map(|variation| variation.objects.values());
+    if drawn.into_iter().any(|object| object.hidden.is_some()) {
+        return None;
+    }
+    manifest["thresholds"][&record.header.asset].as_f64()
+}
+
+fn differ(a: f64, b: f64) -> bool {
+    !((a - b).abs() <= ROUNDING * (1.0 + b.abs()))
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+    use crate::sample_record;
+
+    #[test]
+    fn records_must_agree_with_criteria_limits_and_inputs_of_their_run() {
+        let record = {
+            let mut record = sample_record();
+            record.stats.time_s = f64::from(record.stats.steps) * CONTROL_DT;
+            record
+        };
+        let criteria = SuccessCriteria {
+            require_no_slip: record.verdict.slip_ok.is_some(),
+            ..SuccessCriteria::default()
+        };
+        let manifest = json!({
+            "privileged": record.header.privileged, "settings": { "criteria": criteria },
+            "thresholds": { &record.header.asset: record.verdict.tau },
+        });
+        assert_eq!(contradiction(&manifest, &record), None);
+        assert_eq!(contradiction(&json!({}), &record), None, "of an earlier version");
+        let of = |change: &dyn Fn(&mut EpisodeRecord)| {
+            let mut changed = record.clone();
+            change(&mut changed);
+            contradiction(&manifest, &changed).unwrap_or_default()
+        };
+        assert!(of(&|r| r.verdict.slip_mm = 5.0).contains("no_slip is true, and slip_mm 5"));
+        assert!(of(&|r| r.verdict.slip_ok = Some(true)).contains("slip_ok is not null"));
+        assert!(of(&|r| r.stats.steps += 5).contains("steps take"));
+        assert!(of(&|r| r.header.privileged = !r.header.privileged).starts_with("privileged is"));
+        let of_gentle = of(&|r| (r.verdict.gentle, r.verdict.grip_ratio) = (Some(true), Some(9.0)));
+        assert!(of_gentle.contains("gentle is true"), "{of_gentle}");
+        let limit = of(&|r| r.verdict.tau = r.verdict.tau.map(|tau| 100.0 * tau));
+        assert!(limit.starts_with("tau is 100, and that of"), "{limit}");
+    }
+}
