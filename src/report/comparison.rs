@@ -255,7 +255,8 @@ fn differing_fields(first: &[StoredRun], second: &[StoredRun]) -> Vec<String> {
                 found.insert(field.to_owned());
                 continue;
             };
-            let other: BTreeMap<&str, &Value> = other.iter().map(|(name, value)| (in_project(name), value)).collect();
+            let other: BTreeMap<&str, &Value> =
+                other.iter().map(|(name, value)| (in_project(name), value)).collect();
             let own = own.iter().map(|(name, value)| (in_project(name), value));
             let is_other = |(name, value): &(&str, &Value)| other.get(name).is_some_and(|x| x != value);
             let names: Vec<&str> = own.filter(is_other).map(|(name, _)| name).collect();

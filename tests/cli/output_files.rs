@@ -74,7 +74,7 @@ fn lists_are_printed_as_text_and_as_json() {
     assert!(
         project
             .refusal("list robots")
-            .contains("[possible values: suites, tasks, assets, policies, profiles]")
+            .contains("[possible values: suites, tasks, assets, policies, profiles, settings]")
     );
 }
 

@@ -115,7 +115,7 @@ def _parser() -> argparse.ArgumentParser:
     def with_recording(sub: argparse.ArgumentParser) -> None:
         sub.add_argument("--demos", type=_positive, default=75, help="demonstrations per task")
         with_edge(sub)
-        sub.add_argument("--teacher", default="expert", choices=["expert", "tactile-servo"], help="policy that demonstrates")
+        sub.add_argument("--teacher", default="suite", choices=["suite", "expert", "tactile-servo"], help="policy that demonstrates; suite: that of the suite")
         sub.add_argument("--disturbance", type=_length, default=0.002, help="standard deviation of the robot from its commands while recording, m; of its rotation 4 rad per m")
 
     record = command("record", _record, "record demonstrations of a suite with pictures of the size that policies see")

@@ -33,10 +33,11 @@ def camera_flags(edge: int) -> list[str]:
 
 
 def recording_flags(demos: int, edge: int, teacher: str, disturbance: float) -> list[str]:
-    """Flags of softvt record. `teacher` is a built-in policy; `disturbance` is the deviation of the robot from its commands, m and
+    """Flags of softvt record. `teacher` is a built-in policy, or "suite" for that of the suite; `disturbance` is the deviation of the robot from its commands, m and
     4 rad/m."""
     moves = ["--set", f"robot.disturbance.position={disturbance}", "--set", f"robot.disturbance.rotation={4 * disturbance}"]
-    return ["--policy", teacher, "--demos", str(demos), "--no-privileged", *camera_flags(edge), *moves]
+    demonstrates = [] if teacher == "suite" else ["--policy", teacher]
+    return [*demonstrates, "--demos", str(demos), "--no-privileged", *camera_flags(edge), *moves]
 
 
 @contextmanager

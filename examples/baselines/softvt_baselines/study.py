@@ -39,7 +39,7 @@ class Study:
     steps: int
     episodes: int
     edge: int = 128
-    teacher: str = "expert"  # built-in policy that demonstrates
+    teacher: str = "suite"  # built-in policy that demonstrates; "suite": that of the suite
     disturbance: float = 0.002  # m
     blend: float = 0.5  # share of the last answer in the next one
     per_gpu: int = 1  # policies that are trained on one GPU at a time

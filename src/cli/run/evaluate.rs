@@ -61,14 +61,14 @@ impl<'a> RunLog<'a> {
         manifest: &impl Serialize,
     ) -> Result<Self, CliError> {
         let log = Self { run, folder, records };
-        log.check_records(manifest)?;
+        log.check_records()?;
         run_manifest::write(&log.folder, manifest)?;
+        log.check_contradictions(manifest)?;
         Ok(log)
     }
 
-    /// Checks that all records are episodes of the run of this manifest, each at most once.
-    fn check_records(&self, manifest: &impl Serialize) -> Result<(), CliError> {
-        let manifest = serde_json::to_value(manifest).unwrap_or_default();
+    /// Checks that all records are episodes of this run, each at most once.
+    fn check_records(&self) -> Result<(), CliError> {
         let (run, config) = (self.run, self.run.config);
         let path = run.out.join(EPISODES).display().to_string();
         if !self.records.is_empty() && self.folder.read(RUN)?.is_none() {
@@ -83,15 +83,29 @@ impl<'a> RunLog<'a> {
                 && id.base_seed == config.script.seed
                 && header.policy == config.policy.name;
             let problem = if !is_own || run.jobs.find(index).is_none() {
-                "belongs to another run".to_owned()
+                "belongs to another run"
             } else if !seen.insert(index) {
-                "occurs twice".to_owned()
-            } else if let Some(what) = contradiction(&manifest, record) {
-                format!("contradicts {RUN}: {what}; it was changed after the episode")
+                "occurs twice"
             } else {
                 continue;
             };
             return Err(CliError::input(format!("{path}:{}: {index} {problem}", number + 1)));
+        }
+        Ok(())
+    }
+
+    /// Checks that no record contradicts the manifest of the run.
+    fn check_contradictions(&self, manifest: &impl Serialize) -> Result<(), CliError> {
+        let manifest = serde_json::to_value(manifest).unwrap_or_default();
+        for (number, record) in self.records.iter().enumerate() {
+            if let Some(what) = contradiction(&manifest, record) {
+                let at = self.run.out.join(EPISODES);
+                return Err(CliError::input(format!(
+                    "{}:{}: the record contradicts {RUN}: {what}; it was changed after the episode",
+                    at.display(),
+                    number + 1
+                )));
+            }
         }
         Ok(())
     }

@@ -199,7 +199,7 @@ mod tests {
         let mut spec = TactileSpec::default();
         spec.view.pitch = f64::NAN;
         let message = spec.validate().expect_err("NaN").to_string();
-        assert_eq!(message, "tactile.view.pitch: expected 1e-5 to 2e-4 (m), got NaN");
+        assert_eq!(message, "tactile.view.pitch: expected 0.00001 to 0.0002 (m), got NaN");
         let optics = OpticsModel::Taxim { tables: "x".into() };
         let spec = TactileSpec { shadows: true, optics, ..TactileSpec::default() };
         let message = spec.validate().expect_err("shadows of Taxim").to_string();
