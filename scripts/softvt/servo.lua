@@ -29,7 +29,7 @@ local STIFFNESS, SURE, LEAST_RISE, MOST_RISE, HIGHEST = 0.35, 2, 0.4, 1.5, 8
 -- grown by SEEN, and the shear at the bend is at least LEAST px. CONFIRM readings must confirm it.
 local EVIDENCE, SEEN, LEAST, CONFIRM = 24, 1.25, 0.03, 12
 -- Force of the grip over the least one that holds, and the factor per grasp that has failed here, of which MOST_FAILURES count.
-local MARGIN, FIRMER, MOST_FAILURES = 1.33, 1.15, 2
+local MARGIN, FIRMER, MOST_FAILURES = 1.29, 1.15, 2
 -- Going down: distance below where the object was lifted, mm; share of the grip from there on, mm per control step; and closing to
 -- the grip, mm per control step.
 local LANDING, LOOSENED, DOWN, CLOSING = 0.3, 0.3, 0.2, 0.15
