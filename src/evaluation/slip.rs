@@ -63,7 +63,7 @@ impl SlipMonitor {
 /// Smallest growth of the commanded width per control step of a hand that opens, m.
 const LEAST_OPENING_M: f64 = 1e-4;
 
-/// Detects that the gripper is being opened: its commanded width has grown by [`LEAST_OPENING_M`] or more within the last control step.
+/// Detects that the gripper is being opened: its commanded width has grown by `LEAST_OPENING_M` or more within the last control step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OpeningMonitor {
     commanded_width_m: Option<f64>,

@@ -60,7 +60,7 @@ fn nominal_tau(manifest: &Value, record: &EpisodeRecord) -> Option<f64> {
 }
 
 fn differ(a: f64, b: f64) -> bool {
-    !((a - b).abs() <= ROUNDING * (1.0 + b.abs()))
+    (a - b).abs() > ROUNDING * (1.0 + b.abs())
 }
 
 #[cfg(test)]
