@@ -184,7 +184,7 @@ impl SettingField for bool {
     }
 }
 
-/// Declares a group of settings, see [`settings`](crate::settings).
+/// Declares a group of settings, see the [module](mod@crate::settings).
 ///
 /// A field is `name: type = default, unit, range;`. Switches have neither unit nor range, and groups no default either.
 #[macro_export]
