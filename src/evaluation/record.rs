@@ -153,7 +153,7 @@ pub struct Verdict {
     pub drop: Option<DropEvent>,
     /// NoSlip; part of Safety Success only if the criteria require it.
     pub no_slip: bool,
-    /// Largest slip along a pad while the pads alone carried the target, mm.
+    /// Distance that the target slid along a pad while the pads alone carried it, mm; the worse pad.
     pub slip_mm: f64,
     /// Peak D of the target, %; null for a rigid one.
     pub d_peak: Option<f64>,
