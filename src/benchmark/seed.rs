@@ -122,14 +122,15 @@ fn hex(bytes: &[u8]) -> String {
 }
 
 /// Source of the random streams of an episode: all values on which its initial state depends. Tasks that share a layout share
-/// their initial states, except for what does not show of the objects.
+/// their initial states, except for the hidden properties of objects.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EpisodeSeed {
     /// Name of the suite.
     pub suite: String,
     /// Name of the layout; the tasks of a mirrored pair share it.
     pub layout: String,
-    /// Index of the task, on which what does not show depends: an attempt at one task of a pair must not tell it for the other.
+    /// Index of the task. Hidden properties depend on it, so that an attempt at one task of a mirrored pair does not reveal those of
+    /// the other.
     pub task: usize,
     /// Index of the episode in its split.
     pub episode: u32,

@@ -29,7 +29,7 @@ use super::text::{NOT_NEGATIVE, POSITIVE, RangeError, check_range, format_number
 /// Values that a number may have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SettingRange {
-    /// Above 0.
+    /// Greater than 0.
     Positive,
     /// 0 or more.
     NotNegative,
@@ -67,11 +67,11 @@ impl SettingRange {
 pub struct Setting {
     /// Dotted path, as `--set` takes it.
     pub path: String,
-    /// Its value unless a suite or a run changes it; null where it follows from the scene.
+    /// Value unless a suite or a run changes it; null where it follows from the scene.
     pub default: Value,
-    /// Its values, in words.
+    /// Allowed values, in words.
     pub values: String,
-    /// What it means.
+    /// Meaning.
     pub about: String,
 }
 
@@ -103,7 +103,7 @@ pub struct Declaration<'a> {
     pub unit: &'a str,
     /// Range of a number.
     pub range: Option<SettingRange>,
-    /// What it means.
+    /// Meaning.
     pub about: &'a str,
 }
 
