@@ -4,12 +4,12 @@ local layouts = require "layouts.floor"
 local pick_place = require "experts.pick_place"
 local shifts = require "shifts"
 
--- Kinds whose limit and window are known well at any size and stiffness. The long kinds bend by their own weight, and D of the wedge grows
--- as it is lifted.
+-- Kinds whose limit and window are known well at any size and stiffness. The long kinds bend by their own weight, D of the wedge grows
+-- as it is lifted, and τ of the oval loaf jumps where another of its ridges meets a pad.
 local objects = {
   { "steamed_bun", "pale cream round steamed-bun pastry" },
   { "spiral_roll", "white spiral pastry with ridged frosting" },
-  { "oval_loaf", "oval loaf pastry" },
+  { "yellow_roll", "yellow roll pastry" },
   { "golden_bun", "golden round bun pastry" },
   { "sesame_bun", "orange round bun pastry with sesame speckles" },
   { "small_ridged_roll", "small ridged pastry" },
