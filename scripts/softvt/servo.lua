@@ -24,12 +24,15 @@ local LIFT, STICKS, LIFT_MOST = 0.1, 0.015, 3
 local SLOW, FAST, STRONG, FINEST = 0.015, 0.025, 0.15, 0.02
 -- Stiffness of a light contact in shear, px per mm, the factor by which lifting exceeds what sliding needs, bounds of
 -- lifting over closing, and the largest height of the trial lift, mm.
-local STIFFNESS, SURE, LEAST_RISE, MOST_RISE, HIGHEST = 0.35, 2, 0.4, 1.5, 8
+local STIFFNESS, SURE, LEAST_RISE, MOST_RISE, HIGHEST = 0.35, 2, 0.4, 1.5, 12
 -- The shear has stopped growing if a line with a bend fits better by this many variances of the noise, the force has since
 -- grown by SEEN, and the shear at the bend is at least LEAST px. CONFIRM readings must confirm it.
 local EVIDENCE, SEEN, LEAST, CONFIRM = 24, 1.25, 0.03, 12
+-- Test of a bend: the hand goes up and down by TRIAL mm. The shear of a held object is its weight and stays above the share HELD of that
+-- at the bend; gels that slide lose it on the way down.
+local TRIAL, HELD = 1, 0.6
 -- Force of the grip over the least one that holds, and the factor per grasp that has failed here, of which MOST_FAILURES count.
-local MARGIN, FIRMER, MOST_FAILURES = 1.29, 1.15, 2
+local MARGIN, FIRMER, MOST_FAILURES = 1.25, 1.15, 2
 -- Going down: distance below where the object was lifted, mm; share of the grip from there on, mm per control step; and closing to
 -- the grip, mm per control step.
 local LANDING, LOOSENED, DOWN, CLOSING = 0.3, 0.3, 0.2, 0.15
@@ -108,6 +111,16 @@ function Trial:bend(first)
   end
 end
 
+-- Whether the object is held, for a bend of the shear.
+function Trial:holds(bend)
+  local count = ceil(TRIAL / LIFT)
+  for _ = 1, count do self:move(0, LIFT, 0) end
+  for _ = 1, count do self:move(0, -LIFT, 0) end
+  if recent(self.shear, 3) > HELD * bend.shear then return true end
+  for _ = 1, count do self:move(0, LIFT, 0) end
+  return false
+end
+
 -- Tightens and lifts until the shear stops growing. Returns the least grip that holds as Trial:bend does, or nil.
 function Trial:tighten(margin)
   local first = #self.shear + 3
@@ -122,7 +135,8 @@ function Trial:tighten(margin)
       local wanted = self.touch + margin * (found.closure - self.touch)
       for _ = 1, CONFIRM do self:move(max(0, min(closing, (wanted - self.closure) / MM)), 0.03, 0) end
       found = self:bend(first)
-      if found then return found end
+      if found and self:holds(found) then return found end
+      if found then first = #self.shear + 3 end
     end
   end
 end
