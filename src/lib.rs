@@ -2,13 +2,13 @@
 //!
 //! Each module is a crate, `softvt-geometry` to `softvt-cli`; this crate re-exports them. They form layers, and each
 //! uses only those before it: [`geometry`] → [`physics`] → [`scene`], [`robot`] → [`sensing`], [`evaluation`] →
-//! [`benchmark`] → [`policy`] → [`rollout`] → [`dataset`] → [`report`], [`script`], [`serve`] → [`cli`].
+//! [`benchmark`] → [`policy`] → [`rollout`] → [`dataset`] → [`report`], [`script`], [`serve`] → [`runner`] → [`cli`].
 //! `docs/architecture.md` draws them and follows one episode. All of them may use [`text`] (numbers and text in
 //! messages), [`files`] (atomic files), [`npy`] (numpy files) and [`parallel`] (jobs on threads).
 //!
 //! Examples: a dropped cube and a squeezed cube in [`physics::world`], distances in [`geometry::shape`], kinematics
 //! in [`robot`], a rendered image in [`sensing::camera`], a tactile image in [`sensing::tactile`], the verdict on
-//! an episode in [`evaluation::judge`].
+//! an episode in [`evaluation::judge`], a run of a suite in [`runner`]. `docs/library.md` has them together.
 //!
 //! Units are SI throughout; a name carries its unit where it is not SI or not obvious. Frames are suffixes:
 //! `_w` world, `_b` robot base, `_h` hand, `_p` pad, `_o` object.
@@ -36,6 +36,8 @@ pub use softvt_report as report;
 pub use softvt_robot as robot;
 #[doc(inline)]
 pub use softvt_rollout as rollout;
+#[doc(inline)]
+pub use softvt_runner as runner;
 #[doc(inline)]
 pub use softvt_scene as scene;
 #[doc(inline)]

@@ -1,6 +1,9 @@
 //! Errors that end a command, with their exit codes.
 
+use std::error::Error;
+
 use softvt_common::cancel;
+use softvt_runner::{Cause, RunError};
 
 /// Exit codes, the same for every command. `docs/cli.md` lists them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,7 +24,7 @@ pub(crate) enum Exit {
 
 /// An error that ends a command: an exit code and a message for standard error.
 ///
-/// It is no [`std::error::Error`], so that every such error can become one by `?`: an error of the input.
+/// It is no [`std::error::Error`], so that every such error can become one by `?`: an error of the input, unless it is a [`RunError`] with another cause.
 #[derive(Debug)]
 pub(crate) struct CliError {
     pub exit: Exit,
@@ -29,9 +32,14 @@ pub(crate) struct CliError {
     pub message: String,
 }
 
-impl<E: std::error::Error> From<E> for CliError {
+impl<E: Error + 'static> From<E> for CliError {
     fn from(error: E) -> Self {
-        Self::input(error)
+        let of_run = (&error as &dyn Error).downcast_ref::<RunError>();
+        match of_run.map(|error| error.cause) {
+            None | Some(Cause::Input) => Self::input(error),
+            Some(Cause::Policy) => Self::new(Exit::Policy, error),
+            Some(Cause::Interrupt) => Self::interrupted(error),
+        }
     }
 }
 
@@ -53,15 +61,5 @@ impl CliError {
     /// Puts `prefix` and a colon before the message.
     pub(crate) fn prefixed(self, prefix: impl std::fmt::Display) -> Self {
         Self { message: format!("{prefix}: {}", self.message), ..self }
-    }
-
-    /// Names the part of the request that failed, in parentheses after the message.
-    pub(crate) fn within(self, part: &str) -> Self {
-        Self { message: format!("{} ({part})", self.message), ..self }
-    }
-
-    /// Adds a line to the message.
-    pub(crate) fn with_line(self, line: &str) -> Self {
-        Self { message: format!("{}\n{line}", self.message), ..self }
     }
 }

@@ -1,14 +1,17 @@
 //! The `softvt` command.
 //!
-//! `commands` has one file per command, with its arguments; `parse` fills them in from the command line; `run` is the
-//! engine that the commands share.
+//! `commands` has one file per command; `args` are the arguments that several of them take; `parse` fills them in from the
+//! command line. What a command does is in the crates below: runs are in `softvt-runner`.
 #![warn(unreachable_pub)]
 
+mod args;
 mod commands;
 mod error;
 mod output;
 mod parse;
-mod run;
+mod plan_flags;
+mod replays;
+mod requirement;
 #[cfg(test)]
 mod tests;
 

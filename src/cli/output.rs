@@ -1,11 +1,20 @@
 //! Standard output and progress.
 
-use std::io::{self, IsTerminal, Write};
+use std::{
+    io::{self, IsTerminal, Write},
+    path::Path,
+    sync::Mutex,
+};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::error::CliError;
-use softvt_common::text;
+use softvt_common::{
+    parallel::lock,
+    text::{self, counted},
+};
+use softvt_dataset::card::rejection_counts;
+use softvt_runner::{Observer, recording::RecordingSummary};
 
 /// Prints to standard output with control characters escaped. A closed pipe (`| head -1`) is accepted: the reader has
 /// what it wants.
@@ -49,6 +58,30 @@ pub(crate) fn text_columns(rows: &[Vec<String>], is_right_aligned: impl Fn(usize
     lines.iter().map(|line| format!("{}\n", line.trim_end())).collect()
 }
 
+/// Prints what a recording in the folder `out` contains. `None` is a recording that was complete before.
+///
+/// # Errors
+/// As [`print`].
+pub(crate) fn print_recording(out: &Path, summary: Option<RecordingSummary>) -> Result<(), CliError> {
+    let Some(summary) = summary else {
+        eprint_notice(format!("{} is already complete", out.display()));
+        return Ok(());
+    };
+    for task in &summary.tasks {
+        print(&format!(
+            "{} task {}: {} from {}, {}, {:.1} MB; not kept: {}\n",
+            task.suite,
+            task.task,
+            counted(task.demos, "demonstration"),
+            counted(task.attempts, "attempt"),
+            counted(task.samples, "step"),
+            (task.hdf5_bytes + task.video_bytes) as f64 / 1e6,
+            rejection_counts(&task.rejected)
+        ))?;
+    }
+    print(&format!("{}\n", summary.manifest.display()))
+}
+
 /// Prints a message of the program to standard error, after `softvt: `, with control characters escaped.
 pub(crate) fn eprint_notice(message: impl std::fmt::Display) {
     text::eprint_line(&text::escape_control(&format!("softvt: {message}")));
@@ -87,6 +120,32 @@ impl Progress {
             }
             None => text::eprint_line(&format!("[{}/{}] {message}", self.done, self.total)),
         }
+    }
+}
+
+/// Shows the progress and the messages of runs on standard error.
+#[derive(Default)]
+pub(crate) struct Console {
+    progress: Mutex<Option<Progress>>,
+}
+
+impl Observer for Console {
+    fn notice(&self, message: &str) {
+        eprint_notice(message);
+    }
+
+    fn begin(&self, total: usize, what: &str) {
+        *lock(&self.progress) = Some(Progress::new(total, what));
+    }
+
+    fn advance(&self, line: &str) {
+        if let Some(progress) = &mut *lock(&self.progress) {
+            progress.tick(line);
+        }
+    }
+
+    fn end(&self) {
+        *lock(&self.progress) = None;
     }
 }
 

@@ -10,7 +10,7 @@ use super::{
     commands::{Command, run::RunArgs},
     error::CliError,
     output::print,
-    run::plan_flags::GivenFlag,
+    plan_flags::GivenFlag,
 };
 use softvt_common::text;
 use softvt_script::{OptionSpec, OptionValue};

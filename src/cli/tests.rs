@@ -7,9 +7,9 @@ use std::{collections::BTreeMap, fmt::Write, fs, path::Path};
 use clap::{Arg, Args, Command, Subcommand};
 
 use super::{
+    args::{PolicyArgs, ScriptArgs},
     commands,
     parse::clap_command,
-    run::{config::ScriptArgs, policy::PolicyArgs},
 };
 
 const PAGE: &str = "docs/cli.md";

@@ -10,9 +10,25 @@ use softvt_evaluation::{criteria::SuccessCriteria, record::EpisodeRecord};
 /// Differences that rounding explains, relative to 1.
 const ROUNDING: f64 = 1e-6;
 
+/// A record that contradicts the manifest of its run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Contradiction {
+    /// Line of the record, from 1.
+    pub line: usize,
+    /// What differs.
+    pub what: String,
+}
+
+/// The first of the records, in the order of their lines, that contradicts the manifest of their run.
+pub fn first_contradiction(manifest: &Value, records: &[EpisodeRecord]) -> Option<Contradiction> {
+    let found =
+        |(number, record)| Some(Contradiction { line: number + 1, what: contradiction(manifest, record)? });
+    records.iter().enumerate().find_map(found)
+}
+
 /// How a record contradicts the run of this manifest; `None` if it does not. Manifests of earlier versions without the
 /// fields are not compared.
-pub fn contradiction(manifest: &Value, record: &EpisodeRecord) -> Option<String> {
+fn contradiction(manifest: &Value, record: &EpisodeRecord) -> Option<String> {
     let (v, s) = (&record.verdict, &record.stats);
     let is_valid = record.outcome.is_valid();
     if let Some(privileged) =

@@ -10,7 +10,7 @@ use std::{
 use serde_json::Value;
 
 use super::{
-    run_check::contradiction,
+    run_check::{Contradiction, first_contradiction},
     run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, is_truncated, read_episodes},
 };
 use softvt_common::episode_id::EpisodeIndex;
@@ -263,13 +263,9 @@ fn is_shard(shard: &Value) -> bool {
 
 /// Checks that the records, in the order of their lines, are of the run of this manifest.
 fn check_records(dir: &Path, manifest: &Value, records: &[EpisodeRecord]) -> Result<(), StoredRunError> {
-    let wrong = |(number, record)| Some((number + 1, contradiction(manifest, record)?));
-    match records.iter().enumerate().find_map(wrong) {
-        None => Ok(()),
-        Some((line, what)) => {
-            Err(StoredRunError::Contradiction { path: dir.join(EPISODES).display().to_string(), line, what })
-        }
-    }
+    first_contradiction(manifest, records).map_or(Ok(()), |Contradiction { line, what }| {
+        Err(StoredRunError::Contradiction { path: dir.join(EPISODES).display().to_string(), line, what })
+    })
 }
 
 /// Checks that no episode has two lines, since it would count twice.

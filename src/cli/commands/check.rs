@@ -5,24 +5,21 @@ use std::{collections::BTreeSet, path::PathBuf, sync::Mutex};
 use clap::Args;
 
 use crate::{
+    args::{PolicyArgs, Request, ScriptArgs},
     error::CliError,
     output::{eprint_notice, print},
-    run::{
-        conditions,
-        config::{RunConfig, RunFlags, ScriptArgs},
-        episode_list::EpisodeList,
-        policy::PolicyArgs,
-        selection::{check_distinct_out_dirs, select_episodes},
-        suite_run::SuiteRun,
-    },
 };
-use softvt_benchmark::{Goal, GoalKind, Plan, Task};
+use softvt_benchmark::{Goal, GoalKind, Plan, REFERENCE, Task};
 use softvt_common::cancel;
 use softvt_common::{
     parallel,
     text::{self, counted},
 };
 use softvt_rollout::{AssetCache, SensorAssets, scene_doubts};
+use softvt_runner::{
+    EpisodeList, SuiteRun, conditions,
+    selection::{check_distinct_out_dirs, select_episodes},
+};
 use softvt_script::{ExperimentInput, SceneBuilder};
 
 /// Check a script without running it
@@ -41,8 +38,7 @@ pub(crate) struct CheckArgs {
 /// # Errors
 /// The first thing that is not valid.
 pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
-    let config = RunConfig::new(args.script, RunFlags::default())?;
-    let (config, loaded) = &config.load_plan("check", &args.policy)?;
+    let (config, loaded) = &Request::new(args.script)?.load_plan("check", &args.policy)?;
     let plan = &loaded.plan;
     check_distinct_out_dirs(config, plan.suites())?;
     let (assets, sensor_assets) = (AssetCache::approximate(), SensorAssets::default());
@@ -53,14 +49,18 @@ pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
     }
     match plan {
         Plan::Suite(_) | Plan::Suites { .. } => {}
-        Plan::Conditions { suites, conditions, .. } => conditions::check(config, loaded, suites, conditions)?,
+        Plan::Conditions { suites, conditions, .. } => {
+            conditions::check(config, loaded, suites, conditions)?;
+            let names: Vec<&str> = conditions.iter().map(|condition| condition.name.as_str()).collect();
+            print(&format!("conditions: {REFERENCE}, {}\n", text::escape_control(&names.join(", "))))?;
+        }
         Plan::Experiment { name, points, .. } => {
-            ExperimentInput::new(config.settings.clone(), config.script.seed)
+            ExperimentInput::new(config.settings.clone(), config.seed)
                 .map_err(|error| config.error(error))?;
             print(&format!("experiment {name}: {}, not run by this check\n", counted(*points, "point")))?;
         }
     }
-    print(&format!("{}: OK\n", config.script.file.display()))
+    print(&format!("{}: OK\n", config.file.display()))
 }
 
 fn check_suite(mut run: SuiteRun) -> Result<(), CliError> {

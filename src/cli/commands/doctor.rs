@@ -7,14 +7,10 @@ use serde::Deserialize;
 use crate::{
     error::{CliError, Exit},
     output::print,
-    run::{
-        config::{RunConfig, ScriptArgs, thread_count},
-        episode_list::{EpisodeJob, EpisodeList},
-        suite_run::SuiteRun,
-    },
 };
 use softvt_benchmark::Plan;
 use softvt_evaluation::record::EpisodeRecord;
+use softvt_runner::{EpisodeJob, EpisodeList, RunConfig, SuiteRun, thread_count};
 
 /// `assets/golden.json`: an episode whose final state is published.
 #[derive(Deserialize)]
@@ -50,9 +46,8 @@ pub(super) fn run() -> Result<(), CliError> {
 
 /// Runs the golden episode and writes nothing.
 fn run_golden(golden: &GoldenEpisode) -> Result<EpisodeRecord, CliError> {
-    let script = ScriptArgs { file: golden.script.clone().into(), ..ScriptArgs::default() };
-    let config = RunConfig { script, ..RunConfig::default() };
-    let loaded = config.load_script()?;
+    let config = RunConfig { file: golden.script.clone().into(), ..RunConfig::default() };
+    let loaded = config.load()?;
     let Plan::Suite(suite) = &loaded.plan else {
         return Err(CliError::input(format!("{} is not a suite", golden.script)));
     };

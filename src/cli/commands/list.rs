@@ -8,11 +8,11 @@ use serde_json::{Value, json};
 use crate::{
     error::CliError,
     output::{print, print_json, text_columns},
-    run::policy::BuiltinPolicy,
 };
 use softvt_benchmark::{Plan, Task, settings::Settings};
 use softvt_common::settings::Setting;
 use softvt_policy::profile::PROFILES;
+use softvt_runner::BuiltinPolicy;
 
 /// List suites, tasks, assets, policies, profiles or settings
 #[derive(Args, Debug)]
@@ -41,7 +41,12 @@ enum ListKind {
 /// A suite in the working folder cannot be loaded.
 pub(super) fn run(args: &ListArgs) -> Result<(), CliError> {
     let rows = match args.what {
-        ListKind::Policies => named(BuiltinPolicy::descriptions(), "scripts/policies"),
+        ListKind::Policies => {
+            let built_in = BuiltinPolicy::ALL
+                .into_iter()
+                .map(|policy| (policy.name().to_owned(), policy.about().to_owned()));
+            named(built_in, "scripts/policies")
+        }
         ListKind::Profiles => {
             let built_in = PROFILES.iter().map(|(name, about)| ((*name).to_owned(), (*about).to_owned()));
             named(built_in, "scripts/profiles")

@@ -1,4 +1,4 @@
-//! One file per command. Commands do not use each other; what they share is in [`super::run`].
+//! One file per command. Commands do not use each other.
 //!
 //! The doc comments of the structs and fields of arguments are the help text that `--help` prints.
 
@@ -16,7 +16,7 @@ mod view;
 
 use clap::Subcommand;
 
-use super::{error::CliError, run::config::ScriptArgs};
+use super::{args::ScriptArgs, error::CliError};
 
 // A doc comment would replace the description of the program.
 #[derive(Debug, Subcommand)]

@@ -6,21 +6,20 @@ use clap::{Args, value_parser};
 use serde_json::json;
 
 use crate::{
+    args::{PolicyArgs, RecordingArgs, ScriptArgs},
     error::CliError,
-    run::{
-        config::{RunConfig, ScriptArgs},
-        episode_list::EpisodeList,
-        policy::{PolicyArgs, PolicyConfig, expert_controller},
-        recording::{GripLog, RecordingArgs, SuiteRecording, record_all},
-        selection::{select_suites, select_tasks},
-        suite_run::SuiteRun,
-    },
+    output::print_recording,
 };
 use softvt_benchmark::Suite;
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::parallel;
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
 use softvt_rollout::{Controller, Simulation};
+use softvt_runner::{
+    EpisodeList, PolicyConfig, RunConfig, SuiteRun, expert_controller,
+    recording::{GripLog, SuiteRecording, record_all},
+    selection::{select_suites, select_tasks},
+};
 use softvt_script::ExpertController;
 
 /// Attempts per demonstration, unless `--attempts` is given.
@@ -55,20 +54,19 @@ pub(crate) struct RecordArgs {
 /// The script has no suite, the folder contains something else, an attempt or a file fails, or too
 /// few attempts are good.
 pub(super) fn run(args: RecordArgs) -> Result<(), CliError> {
-    let (mut policy, mut recording, demos) = (args.policy, args.recording, args.demos);
-    recording.gripper = policy.take_export_code();
-    let recording = &recording;
-    let config = recording.run_config(args.script, args.tasks)?;
+    let (mut policy, demos) = (args.policy, args.demos);
+    let recording = &args.recording.options(policy.take_export_code());
+    let request = args.recording.request(args.script, args.tasks)?;
     let default_attempts = demos.saturating_mul(ATTEMPTS_PER_DEMO).max(MIN_ATTEMPTS);
     let max_attempts = args.attempts.unwrap_or(default_attempts);
-    let (config, loaded) = config.load_plan("record", &policy)?;
+    let (config, loaded) = request.load_plan("record", &policy)?;
     let suites = select_suites("record", &config, &loaded.plan)?;
     let names: Vec<String> = suites.iter().map(|suite| config.suite_name(suite)).collect();
     let mut request = json!({
         "softvt": env!("CARGO_PKG_VERSION"),
         "demos": demos,
-        "pictures": recording.has_hdf5_images(),
-        "privileged": !recording.no_privileged,
+        "pictures": recording.has_images,
+        "privileged": recording.has_privileged,
         "suites": names,
     });
     if let Some(code) = recording.gripper {
@@ -79,7 +77,7 @@ pub(super) fn run(args: RecordArgs) -> Result<(), CliError> {
         Ok::<_, CliError>(config.clone().with_policy(policy))
     };
     let configs: Vec<RunConfig> = suites.iter().map(taught).collect::<Result<_, _>>()?;
-    record_all(recording, &request, || {
+    let recorded = record_all(recording, &request, || {
         let prepare = |(suite, config)| {
             let tasks = select_tasks(config, suite)?;
             let jobs = EpisodeList::of_tasks(&tasks, max_attempts, None);
@@ -89,7 +87,8 @@ pub(super) fn run(args: RecordArgs) -> Result<(), CliError> {
             })
         };
         suites.iter().zip(&configs).map(prepare).collect()
-    })
+    })?;
+    print_recording(&recording.out, recorded)
 }
 
 /// Makes the experts of a run record their intent into `log`. Other policies are left unchanged.

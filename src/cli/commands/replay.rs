@@ -3,21 +3,15 @@
 use std::{
     path::{Path, PathBuf},
     str::FromStr,
+    sync::Arc,
 };
 
 use clap::Args;
 
 use crate::{
     error::{CliError, Exit},
-    output::print,
-    run::{
-        config::read_secret,
-        replay::{
-            DemoRef, SecretFile, StoredManifest, check_complete, demos_of, difference, report_replays,
-            simulate_demos,
-        },
-        stored_folder::{enter_for_dataset, enter_for_run},
-    },
+    output::{Console, print},
+    replays::report_replays,
 };
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::text::counted;
@@ -29,6 +23,11 @@ use softvt_evaluation::record::EpisodeRecord;
 use softvt_report::{
     actions,
     stored_run::{self, StoredRun},
+};
+use softvt_runner::{
+    Observer, read_secret,
+    replay::{DemoRef, SecretFile, StoredManifest, check_complete, demos_of, difference, simulate_demos},
+    stored_folder::{enter_for_dataset, enter_for_run},
 };
 
 /// Simulate a recorded episode again; exit code 0 if the result is byte-identical
@@ -72,18 +71,18 @@ impl FromStr for EpisodeSelector {
 /// The run cannot be read, its scripts have changed since, or (exit code 1) the result differs.
 pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
     let dir = &args.run;
-    let secret = args
-        .seed_file
-        .as_ref()
-        .map(|path| Ok::<_, CliError>(SecretFile { path: path.clone(), secret: read_secret(path)? }));
+    let observer: Arc<dyn Observer> = Arc::new(Console::default());
+    let secret = args.seed_file.as_ref().map(|path| {
+        Ok::<_, CliError>(SecretFile { path: path.clone(), secret: read_secret(path, &*observer)? })
+    });
     let secret = secret.transpose()?;
     if is_dataset(dir) {
         if secret.is_some() {
             return Err(CliError::input("--seed-file: demonstrations have no secret seed; leave it out"));
         }
         check_complete(dir)?;
-        let demos = [find_demo(&enter_for_dataset(dir)?, args.episode)?];
-        return report_replays(&demos, &simulate_demos(&demos)?);
+        let demos = [find_demo(&enter_for_dataset(dir, &*observer)?, args.episode)?];
+        return report_replays(&demos, &simulate_demos(&demos, &observer)?);
     }
     let stored = stored_run::load(dir)?;
     let [stored] = &stored[..] else {
@@ -96,9 +95,10 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
     };
     let record = find_episode(stored, args.episode)?;
     let index = record.header.id.index();
-    let dir = enter_for_run(stored)?;
+    let dir = enter_for_run(stored, &*observer)?;
     let path = actions::path(&dir, index);
-    let manifest = StoredManifest { path: &dir, manifest: &stored.manifest, secret: secret.as_ref() };
+    let manifest =
+        StoredManifest { path: &dir, manifest: &stored.manifest, secret: secret.as_ref(), observer };
     let simulated = manifest.simulate(record, actions::read(&path)?)?;
     match difference(record, &simulated)? {
         None => print(&format!("{index}: byte-identical, final state {}\n", simulated.stats.state_hash)),

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::{
+    args::parse_folder,
     error::CliError,
     output::{eprint_notice, print, print_json},
-    run::config::parse_folder,
 };
 use softvt_common::files;
 use softvt_report::{

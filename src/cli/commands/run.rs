@@ -1,32 +1,35 @@
 //! `softvt FILE.lua`: the plan of a script.
 
-use std::path::PathBuf;
+use std::{collections::BTreeSet, path::Path};
 
 use clap::Parser;
 
 use crate::{
+    args::{PolicyArgs, Request, RunFlags, ScriptArgs},
     error::{CliError, Exit},
-    output::{eprint_notice, print, print_json},
-    run::{
-        conditions,
-        config::{RunConfig, RunFlags, ScriptArgs},
-        episode_artifacts::VideoSelection,
-        evaluate::run_suite,
-        experiment, plan_flags,
-        policy::PolicyArgs,
-        requirement,
-        selection::{
-            check_distinct_out_dirs, check_parent_folder, path_component, run_dir, select_episodes,
-            select_tasks,
-        },
-        suite_run::{SuiteRun, find_replay_source},
-    },
+    output::{eprint_notice, print, print_json, text_columns},
+    plan_flags, requirement,
 };
-use softvt_benchmark::Plan;
+use serde_json::Value;
+
+use softvt_benchmark::{Condition, Plan, Suite};
 use softvt_common::text::counted;
-use softvt_evaluation::record::{EpisodeRecord, Outcome};
+use softvt_evaluation::{
+    record::{EpisodeRecord, Outcome},
+    summary::SuiteSummary,
+};
 use softvt_policy::profile::Profile;
-use softvt_report::terminal;
+use softvt_report::{
+    condition_table::{ConditionTable, compares_policies, controllers_table, table},
+    terminal,
+};
+use softvt_runner::{
+    RunConfig, Runner, VideoSelection, conditions,
+    experiment::{self, ExperimentOutput},
+    find_replay_source,
+    selection::{check_distinct_out_dirs, check_parent_folder, next_run_dir, select_episodes, select_tasks},
+};
+use softvt_script::{ExperimentRow, LoadedScript};
 
 /// A safety-aware visuo-tactile manipulation benchmark for soft objects, on an ordinary CPU
 #[derive(Clone, Debug, Parser)]
@@ -54,9 +57,9 @@ pub(crate) struct RunArgs {
 /// # Errors
 /// The script, a flag, the folder or the policy is not valid, or an episode fails.
 pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
-    let (config, loaded) =
-        RunConfig::new(args.script, args.flags)?.load_plan(plan_flags::RUN, &args.policy)?;
-    let (config, flags) = (&config, &config.flags);
+    let (json, requirements) = (args.flags.json, args.flags.requirements.clone());
+    let request = Request::new(args.script)?.with(|config| args.flags.apply(config));
+    let (config, loaded) = &request.load_plan(plan_flags::RUN, &args.policy)?;
     if let Some(code) = config.policy.gripper {
         let profile = config.policy.profile().map(|Profile { name, .. }| format!(" (profile {name})"));
         eprint_notice(format!("gripper: {}{}", code.name(), profile.unwrap_or_default()));
@@ -66,40 +69,61 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
     match &loaded.plan {
         plan @ (Plan::Suite(_) | Plan::Suites { .. }) => {
             let is_list = matches!(plan, Plan::Suites { .. });
-            check_distinct_out_dirs(config, plan.suites())?;
-            if is_list {
-                check_parent_folder(config)?;
-            }
-            let (mut summaries, mut failed) = (Vec::new(), None);
-            for suite in plan.suites() {
-                let out = run_dir(config, suite, is_list)
-                    .unwrap_or_else(|| next_run_dir(config, &config.suite_name(suite)));
-                let tasks = select_tasks(config, suite)?;
-                let jobs = select_episodes(config, suite, &tasks);
-                let mut run = SuiteRun::new(config, &loaded, suite, jobs, out)?;
-                run.prepare(&tasks)?;
-                let result = run_suite(&run, &tasks)?;
-                failed = failed.or_else(|| all_actions_refused(&result.records));
-                summaries.push(result.summary);
-            }
+            let results = Runner::with_config(loaded, config.clone()).numbered().run(|_| ())?;
+            let failed = results.iter().find_map(|result| all_actions_refused(&result.records));
+            let summaries: Vec<SuiteSummary> = results.into_iter().map(|result| result.summary).collect();
             match &summaries[..] {
-                [summary] if flags.json && !is_list => print_json(summary),
-                summaries if flags.json => print_json(&summaries),
+                [summary] if json && !is_list => print_json(summary),
+                summaries if json => print_json(&summaries),
                 summaries => summaries.iter().try_for_each(|summary| print(&terminal::table(summary))),
             }?;
             match failed {
                 Some(error) => Err(error),
-                None => requirement::check(&flags.requirements, &summaries),
+                None => requirement::check(&requirements, &summaries),
             }
         }
         Plan::Conditions { name, suites, conditions } => {
             check_distinct_out_dirs(config, suites)?;
             check_parent_folder(config)?;
-            let out = flags.out.clone().unwrap_or_else(|| next_run_dir(config, name));
-            conditions::run(config, &loaded, suites, conditions, &out)
+            let out = config.out.clone().unwrap_or_else(|| next_run_dir(config, name));
+            run_conditions(config, loaded, suites, conditions, &out, json)
         }
-        Plan::Experiment { .. } => experiment::run(config, &loaded),
+        Plan::Experiment { columns, .. } => {
+            experiment::run(config, loaded, |output| -> Result<(), CliError> {
+                match output {
+                    ExperimentOutput::Rows(rows) => print_rows(rows, columns, json),
+                    ExperimentOutput::Text(_) if json => Ok(()),
+                    ExperimentOutput::Text(text) => print(&format!("{text}\n")),
+                }
+            })
+        }
     }
+}
+
+/// Runs suites under conditions and prints their tables: policies side by side once all have run, other conditions after
+/// each suite.
+fn run_conditions(
+    config: &RunConfig,
+    loaded: &LoadedScript,
+    suites: &[Suite],
+    conditions: &[Condition],
+    out: &Path,
+    json: bool,
+) -> Result<(), CliError> {
+    let print_last = |tables: &[ConditionTable]| -> Result<(), CliError> {
+        match tables.last() {
+            Some(last) if !json && !compares_policies(tables) => print(&table(last)),
+            _ => Ok(()),
+        }
+    };
+    let results = conditions::run(config, loaded, suites, conditions, out, print_last)?;
+    if json {
+        print_json(&results.document)?;
+    } else if compares_policies(&results.tables) {
+        print(&controllers_table(&results.tables))?;
+    }
+    eprint_notice(out.join(conditions::FILE).display());
+    Ok(())
 }
 
 /// The error of a policy whose actions could be executed in no episode, such as one that answers NaN.
@@ -120,9 +144,9 @@ fn all_actions_refused(records: &[EpisodeRecord]) -> Option<CliError> {
 
 /// Checks that every suite has the episodes that `--video` selects.
 fn check_video_episodes(config: &RunConfig, plan: &Plan) -> Result<(), CliError> {
-    let Some(VideoSelection::Episodes(selected)) = &config.flags.video else { return Ok(()) };
+    let Some(VideoSelection::Episodes(selected)) = &config.video else { return Ok(()) };
     for suite in plan.suites() {
-        let episodes = config.flags.episodes.unwrap_or(suite.episodes);
+        let episodes = config.episodes.unwrap_or(suite.episodes);
         if let Some(beyond) = selected.iter().find(|episode| **episode >= episodes) {
             let available = match episodes {
                 1 => "only episode 0".to_owned(),
@@ -131,7 +155,8 @@ fn check_video_episodes(config: &RunConfig, plan: &Plan) -> Result<(), CliError>
             return Err(config.error(format!(
                 "--video={beyond}: suite {} runs {available} of each task; select one of them, or raise --episodes",
                 suite.name
-            )));
+            ))
+            .into());
         }
     }
     Ok(())
@@ -139,7 +164,7 @@ fn check_video_episodes(config: &RunConfig, plan: &Plan) -> Result<(), CliError>
 
 /// Checks that the recorded actions cover every episode of every suite.
 fn check_recorded_episodes(config: &RunConfig, plan: &Plan) -> Result<(), CliError> {
-    if config.policy.recorded().is_none() {
+    if !config.policy.is_recorded() {
         return Ok(());
     }
     for suite in plan.suites() {
@@ -149,11 +174,33 @@ fn check_recorded_episodes(config: &RunConfig, plan: &Plan) -> Result<(), CliErr
     Ok(())
 }
 
-/// The first folder `runs/<name>-<policy>-NNN` that does not exist.
-fn next_run_dir(config: &RunConfig, name: &str) -> PathBuf {
-    let (name, policy) = (path_component(name), path_component(&config.policy.name));
-    (1..)
-        .map(|number| PathBuf::from(format!("runs/{name}-{policy}-{number:03}")))
-        .find(|dir| !dir.exists())
-        .unwrap_or_default()
+/// Prints rows as JSON lines or as a table.
+///
+/// # Errors
+/// As [`print`].
+fn print_rows(rows: &[ExperimentRow], columns: &[String], json: bool) -> Result<(), CliError> {
+    if json {
+        return rows.iter().try_for_each(|row| print(&format!("{}\n", serde_json::json!(row))));
+    }
+    if rows.is_empty() {
+        return Ok(());
+    }
+    let all: BTreeSet<&String> = rows.iter().flat_map(|row| row.keys()).collect();
+    let columns: Vec<&String> =
+        if columns.is_empty() { all.into_iter().collect() } else { columns.iter().collect() };
+    let header = columns.iter().map(ToString::to_string).collect();
+    let cells = rows.iter().map(|row| columns.iter().map(|column| format_cell(row.get(*column))).collect());
+    let lines: Vec<Vec<String>> = std::iter::once(header).chain(cells).collect();
+    print(&text_columns(&lines, |_| true))
+}
+
+fn format_cell(value: Option<&Value>) -> String {
+    match value {
+        None | Some(Value::Null) => "-".to_owned(),
+        Some(Value::String(text)) => text.clone(),
+        Some(Value::Number(number)) => number.as_f64().map_or(number.to_string(), |x| {
+            format!("{x:.5}").trim_end_matches('0').trim_end_matches('.').to_owned()
+        }),
+        Some(other) => other.to_string(),
+    }
 }

@@ -13,23 +13,22 @@ use serde_json::json;
 
 use crate::{
     QUIET_INTERRUPT,
+    args::{PolicyArgs, Request, ScriptArgs, parse_count, parse_folder},
     error::{CliError, Exit},
     output::{eprint_notice, print},
-    run::{
-        config::{RunConfig, RunFlags, ScriptArgs, Shard, parse_count, parse_folder},
-        policy::{PolicyArgs, PolicyConfig},
-        selection::{
-            check_distinct_out_dirs, check_parent_folder, needs_suites, run_dir, select_episodes,
-            select_tasks, suites_of,
-        },
-        served_runs::ServedRuns,
-        suite_run::SuiteRun,
-    },
 };
 use softvt_benchmark::{Plan, Suite, seed::SecretSeed};
 use softvt_common::cancel;
-use softvt_common::episode_id::{EpisodeId, EpisodeIndex, Split};
+use softvt_common::episode_id::{EpisodeId, Split};
 use softvt_policy::Observation;
+use softvt_report::terminal;
+use softvt_runner::{
+    PolicyConfig, RunConfig, ServedRuns, Shard, SuiteRun,
+    selection::{
+        check_distinct_out_dirs, check_parent_folder, needs_suites, run_dir, select_episodes, select_tasks,
+        suites_of,
+    },
+};
 use softvt_script::LoadedScript;
 use softvt_serve::{AccessRules, RequestError, ServerConfig};
 
@@ -117,28 +116,29 @@ fn watch_stdin() -> Result<(), CliError> {
 }
 
 fn serve(args: ServeArgs) -> Result<(), CliError> {
-    let flags = RunFlags {
+    let policy = PolicyConfig::client(&args.policy.options(), args.privileged)?;
+    let request = Request::new(args.script.clone())?.with(|config| RunConfig {
+        policy,
         tasks: args.tasks.clone(),
         episodes: args.episodes,
         out: args.out.clone(),
         resume: args.resume,
         shard: args.shard,
-        ..RunFlags::default()
-    };
-    let config = RunConfig::new(args.script.clone(), flags)?
-        .with_policy(PolicyConfig::client(&args.policy, args.privileged)?);
-    let loaded = config.load_checked("serve")?;
+        ..config
+    });
+    let loaded = request.load("serve")?;
+    let config = &request.config;
     let suites = suites_of(&loaded.plan);
     if suites.iter().all(|suite| suite.tasks.is_empty()) {
-        return Err(needs_suites("serve", &config));
+        return Err(needs_suites("serve", config).into());
     }
-    check_run_flags(&config)?;
+    check_run_flags(&request)?;
     // After the checks, so that an error of the script is reported even if standard input is closed already.
     if args.until_stdin_closes {
         watch_stdin()?;
     }
     let listener = listen(&args)?;
-    let runs = prepare(&config, &loaded, args.split)?;
+    let runs = prepare(config, &loaded, args.split)?;
     let start_episode = |id: &EpisodeId| {
         let found = runs.iter().find(|run| run.name == id.suite);
         let run = found.ok_or_else(|| format!("unknown suite {:?}", id.suite))?;
@@ -152,20 +152,20 @@ fn serve(args: ServeArgs) -> Result<(), CliError> {
     // Declared here, since the configuration of the server borrows it.
     let served;
     let mut server_config = ServerConfig {
-        suites: suites.iter().map(|suite| served_suite(&config, suite)).collect::<Result<_, _>>()?,
+        suites: suites.iter().map(|suite| served_suite(config, suite)).collect::<Result<_, _>>()?,
         profile: profile.clone(),
         effort_n: runs.iter().map(|run| run.settings.robot.gripper.effort).fold(f64::INFINITY, f64::min),
         privileged: args.privileged,
-        seed: config.script.seed,
+        seed: config.seed,
         has_secret_seed: config.secret.is_some(),
         split: args.split,
-        fingerprint: provenance_hash(&config, &loaded),
+        fingerprint: provenance_hash(config, &loaded),
         access: AccessRules::new(&args.host, address, token(&args)?),
         start_episode: Box::new(start_episode),
         recorder: None,
     };
-    let first = first_observation(&config, &server_config)?;
-    served = config.flags.out.as_ref().map(|_| ServedRuns::open(&config, &runs)).transpose()?;
+    let first = first_observation(config, &server_config)?;
+    served = config.out.as_ref().map(|_| ServedRuns::open(config, &runs)).transpose()?;
     server_config.recorder = served.as_ref().map(ServedRuns::recorder);
     let hello = softvt_serve::hello(&server_config, &first);
     print(&format!("ws://{address}\n"))?;
@@ -174,16 +174,19 @@ fn serve(args: ServeArgs) -> Result<(), CliError> {
     softvt_serve::serve(&listener, &server_config, hello, usize::from(args.threads), &cancel::FLAG);
     drop(server_config);
     match served {
-        Some(served) => served.finish(),
+        Some(served) => {
+            let (summaries, outcome) = served.finish();
+            summaries.iter().try_for_each(|summary| print(&terminal::table(summary)))?;
+            Ok(outcome?)
+        }
         None => Err(CliError::interrupted("")),
     }
 }
 
 /// Refuses flags about the run in `--out` without `--out`.
-fn check_run_flags(config: &RunConfig) -> Result<(), CliError> {
-    let given = &config.script.given;
-    match given.iter().find(|flag| RUN_FLAGS.contains(&flag.id.as_str())) {
-        Some(flag) if config.flags.out.is_none() => Err(CliError::input(format!(
+fn check_run_flags(request: &Request) -> Result<(), CliError> {
+    match request.given().iter().find(|flag| RUN_FLAGS.contains(&flag.id.as_str())) {
+        Some(flag) if request.config.out.is_none() => Err(CliError::input(format!(
             "--{}: applies to the run in --out; add --out DIR, or leave it out",
             flag.long
         ))),
@@ -202,7 +205,7 @@ fn prepare<'a>(
 ) -> Result<Vec<SuiteRun<'a>>, CliError> {
     let suites = suites_of(&loaded.plan);
     let is_list = matches!(loaded.plan, Plan::Suites { .. });
-    if config.flags.out.is_some() {
+    if config.out.is_some() {
         check_distinct_out_dirs(config, suites)?;
     }
     if is_list {
@@ -220,11 +223,7 @@ fn prepare<'a>(
         if out.is_some() {
             run.prepare(&tasks)?;
         } else {
-            for task in &tasks {
-                let opened = run.open_episode(&run.episode_id(task, 0))?;
-                let limits = run.limits_of(task, &opened.scene)?;
-                run.calibration_files.report(EpisodeIndex { task: task.id, episode: 0 }, &limits);
-            }
+            run.report_limits(&tasks)?;
         }
         runs.push(run);
     }
@@ -234,7 +233,7 @@ fn prepare<'a>(
 /// A suite as clients see it: its name in results, the selected tasks, and the number of episodes of a run.
 fn served_suite(config: &RunConfig, suite: &Suite) -> Result<Suite, CliError> {
     let tasks = select_tasks(config, suite)?.into_iter().cloned().collect();
-    let episodes = config.flags.episodes.unwrap_or(suite.episodes);
+    let episodes = config.episodes.unwrap_or(suite.episodes);
     Ok(Suite { name: config.suite_name(suite), tasks, episodes, ..suite.clone() })
 }
 
@@ -273,10 +272,10 @@ fn provenance_hash(config: &RunConfig, loaded: &LoadedScript) -> String {
     let all = json!([
         env!("CARGO_PKG_VERSION"),
         loaded.sources.bundle.hashes(),
-        config.script.options,
+        config.options,
         config.shifts,
         config.settings,
-        config.is_rigid_twin(),
+        config.rigid_twin,
         config.secret.as_ref().map(SecretSeed::hash)
     ]);
     softvt_script::sha256(all.to_string().as_bytes())
@@ -296,5 +295,5 @@ fn first_observation(config: &RunConfig, server: &ServerConfig) -> Result<Observ
     let mut episode = (server.start_episode)(&id)?;
     let streams = server.profile.streams();
     episode.begin(streams.clone());
-    episode.observe(&streams).map_err(|error| config.error(error))
+    Ok(episode.observe(&streams).map_err(|error| config.error(error))?)
 }

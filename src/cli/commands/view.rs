@@ -5,20 +5,15 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::{
+    args::{PolicyArgs, Request, ScriptArgs, parse_folder},
     error::CliError,
     output::print,
-    run::{
-        config::{RunConfig, RunFlags, ScriptArgs, parse_folder},
-        episode_list::{EpisodeJob, EpisodeList},
-        policy::PolicyArgs,
-        selection::select_tasks,
-        suite_run::SuiteRun,
-    },
 };
 use softvt_benchmark::Plan;
 use softvt_common::cancel;
 use softvt_common::files;
 use softvt_report::video::{Caption, worst_state, write_stills, write_video, write_video_frame};
+use softvt_runner::{EpisodeJob, EpisodeList, RunConfig, SuiteRun, selection::select_tasks};
 
 /// Render one episode: a video, and stills of every camera and tactile sensor
 #[derive(Args, Clone, Debug)]
@@ -48,19 +43,24 @@ pub(crate) struct ViewArgs {
 /// # Errors
 /// The script is not a suite, the task or episode fails, or a file cannot be rendered or written.
 pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
-    let flags = RunFlags { tasks: vec![args.task.clone()], ..RunFlags::default() };
-    let (config, loaded) = RunConfig::new(args.script, flags)?.load_plan("view", &args.policy)?;
+    let tasks = vec![args.task.clone()];
+    let request = Request::new(args.script)?.with(|config| RunConfig { tasks, ..config });
+    let (config, loaded) = request.load_plan("view", &args.policy)?;
     let Plan::Suite(suite) = &loaded.plan else {
-        return Err(config.error("softvt view needs a single suite; name a file that returns softvt.suite"));
+        return Err(config
+            .error("softvt view needs a single suite; name a file that returns softvt.suite")
+            .into());
     };
     let tasks = select_tasks(&config, suite)?;
     let [task] = tasks[..] else {
         let matches: Vec<String> = tasks.iter().map(|task| task.id.to_string()).collect();
-        return Err(config.error(format!(
-            "--task {:?} matches the tasks {}; select one by its index",
-            args.task,
-            matches.join(", ")
-        )));
+        return Err(config
+            .error(format!(
+                "--task {:?} matches the tasks {}; select one by its index",
+                args.task,
+                matches.join(", ")
+            ))
+            .into());
     };
     let dir = &args.out;
     let job = EpisodeJob { task, episode: args.episode };

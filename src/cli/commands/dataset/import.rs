@@ -11,16 +11,9 @@ use serde_json::json;
 
 use super::task_matching::{MatchedDemo, match_demos};
 use crate::{
+    args::{RecordingArgs, ScriptArgs},
     error::CliError,
-    output::eprint_notice,
-    run::{
-        config::ScriptArgs,
-        episode_list::{EpisodeJob, EpisodeList},
-        policy::PolicyConfig,
-        recording::{GripLog, RecordingArgs, SuiteRecording, record_all},
-        selection::select_suites,
-        suite_run::SuiteRun,
-    },
+    output::print_recording,
 };
 use softvt_benchmark::Task;
 use softvt_common::episode_id::EpisodeIndex;
@@ -32,6 +25,11 @@ use softvt_dataset::{
 use softvt_evaluation::record::Origin;
 use softvt_policy::{ToolCommand, builtin::RecordedPolicy};
 use softvt_rollout::{ChunkedPolicy, target_asset};
+use softvt_runner::{
+    EpisodeJob, EpisodeList, PolicyConfig, RunError, SuiteRun,
+    recording::{GripLog, SuiteRecording, record_all},
+    selection::select_suites,
+};
 use softvt_scene::{Body, InitialState};
 
 /// Re-execute demonstrations of robomimic, LIBERO, SoftVTBench or softvt in a suite, and record the safe ones that reach the goal
@@ -62,10 +60,10 @@ pub(crate) struct ImportArgs {
 /// The script has no suite, a file is not valid or matches no task, the folder contains something else, an attempt or a
 /// file fails, or no demonstration is kept.
 pub(super) fn run(args: ImportArgs) -> Result<(), CliError> {
-    let recording = &args.recording;
-    let config =
-        &recording.run_config(args.script, args.tasks)?.with_policy(PolicyConfig::external("import"));
-    let loaded = config.load_checked("dataset import")?;
+    let recording = &args.recording.options(None);
+    let request = args.recording.request(args.script, args.tasks)?;
+    let loaded = request.load("dataset import")?;
+    let config = &request.config.with_policy(PolicyConfig::external("import"));
     let suites = select_suites("dataset import", config, &loaded.plan)?;
     let files: Vec<ForeignFile> =
         args.files.iter().map(|path| import::read(path)).collect::<Result<_, _>>()?;
@@ -78,14 +76,14 @@ pub(super) fn run(args: ImportArgs) -> Result<(), CliError> {
         "imported": sources,
         "attempts": args.attempts,
         "layout": args.layout,
-        "task": config.flags.tasks,
-        "pictures": recording.has_hdf5_images(),
-        "privileged": !recording.no_privileged,
+        "task": config.tasks,
+        "pictures": recording.has_images,
+        "privileged": recording.has_privileged,
         "suites": names,
     });
-    record_all(recording, &request, || {
+    let recorded = record_all(recording, &request, || {
         for Imported { file, layout, demos, commands, .. } in &sources {
-            eprint_notice(format!("{file}: {layout}, {}: {commands}", counted(*demos, "demonstration")));
+            config.notice(format!("{file}: {layout}, {}: {commands}", counted(*demos, "demonstration")));
         }
         let mut recordings = Vec::new();
         for (index, suite) in suites.iter().enumerate() {
@@ -113,7 +111,8 @@ pub(super) fn run(args: ImportArgs) -> Result<(), CliError> {
             )?);
         }
         Ok(recordings)
-    })
+    })?;
+    print_recording(&recording.out, recorded)
 }
 
 /// Describes the files for `recording.json` and the dataset card.
@@ -152,7 +151,7 @@ fn replay_demos(
     grip_log: &GripLog,
     demos: &[&MatchedDemo],
     use_layout: bool,
-) -> Result<(), CliError> {
+) -> Result<(), RunError> {
     let mut commands: BTreeMap<EpisodeIndex, Vec<ToolCommand>> = BTreeMap::new();
     let (mut placed, mut foreign) = (0, 0);
     for matched in demos {
@@ -177,7 +176,7 @@ fn replay_demos(
         Ok(Box::new(ChunkedPolicy::new(Box::new(RecordedPolicy::new(commands, None)), brief, 1)))
     });
     if foreign > 0 {
-        eprint_notice(format!(
+        run.config.notice(format!(
             "{}: in {placed} of {foreign} demonstrations objects start where the file has them, in the others where the \
              layout puts them",
             run.suite.name
@@ -191,7 +190,7 @@ fn initial_state(
     run: &SuiteRun,
     matched: &MatchedDemo,
     use_layout: bool,
-) -> Result<(InitialState, ForeignDemo), CliError> {
+) -> Result<(InitialState, ForeignDemo), RunError> {
     let mut demo = matched.demo.clone();
     let (joints, poses) = match &matched.demo.initial_condition {
         InitialCondition::SoftvtEpisode { start, .. } => {

@@ -3,18 +3,15 @@
 mod import;
 mod task_matching;
 
-use std::path::PathBuf;
+use std::{path::PathBuf, sync::Arc};
 
 use clap::{Args, Subcommand, value_parser};
 
 use crate::{
+    args::parse_folder,
     error::CliError,
-    output::{Progress, eprint_notice, print, print_json},
-    run::{
-        config::{parse_folder, thread_count},
-        replay::{DemoRef, check_complete, demos_of, report_replays, simulate_demos},
-        stored_folder::enter_for_dataset,
-    },
+    output::{Console, Progress, eprint_notice, print, print_json},
+    replays::report_replays,
 };
 use softvt_common::cancel;
 use softvt_common::{files, text::counted};
@@ -27,6 +24,12 @@ use softvt_dataset::{
     stats,
 };
 use softvt_policy::profile::GripCode;
+use softvt_runner::{
+    Observer,
+    replay::{DemoRef, check_complete, demos_of, simulate_demos},
+    stored_folder::enter_for_dataset,
+    thread_count,
+};
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum DatasetCommand {
@@ -117,11 +120,12 @@ fn run_check(args: &DatasetCheckArgs) -> Result<(), CliError> {
             counted(findings.problems.len(), "problem")
         )));
     }
+    let observer: Arc<dyn Observer> = Arc::new(Console::default());
     let demos = match args.replays {
         0 => Vec::new(),
-        count => sample(&demos_of(&enter_for_dataset(path)?)?, count),
+        count => sample(&demos_of(&enter_for_dataset(path, &*observer)?)?, count),
     };
-    let replays = simulate_demos(&demos)?;
+    let replays = simulate_demos(&demos, &observer)?;
     let is_ok = replays.iter().all(|replay| replay.difference.is_none());
     print(&format!(
         "{}, {}, {}{}\n",

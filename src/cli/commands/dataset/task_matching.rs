@@ -2,12 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::{
-    error::CliError,
-    run::{config::RunConfig, selection::select_tasks},
-};
+use crate::error::CliError;
 use softvt_benchmark::{Suite, Task};
 use softvt_dataset::import::{ForeignDemo, ForeignFile, ForeignLayout, ForeignTask, InitialCondition};
+use softvt_runner::{RunConfig, selection::select_tasks};
 
 /// A task of one of several suites.
 #[derive(Clone, Copy, Debug)]
@@ -65,7 +63,7 @@ pub(super) fn match_demos<'a>(
                     demo,
                     format!(
                         "--task {}: it was recorded by softvt and is of task{id}; leave --task out",
-                        config.flags.tasks.join(",")
+                        config.tasks.join(",")
                     ),
                 ));
             }
@@ -114,7 +112,7 @@ fn refuse(file: &ForeignFile, demo: &ForeignDemo, message: String) -> CliError {
 /// # Errors
 /// It selects none or several.
 fn forced_task<'a>(config: &RunConfig, suites: &'a [Suite]) -> Result<Option<SuiteTask<'a>>, CliError> {
-    if config.flags.tasks.is_empty() {
+    if config.tasks.is_empty() {
         return Ok(None);
     }
     let mut found = Vec::new();
@@ -127,19 +125,20 @@ fn forced_task<'a>(config: &RunConfig, suites: &'a [Suite]) -> Result<Option<Sui
     }
     match (&found[..], error) {
         ([task], _) => Ok(Some(*task)),
-        ([], Some(error)) => Err(error),
+        ([], Some(error)) => Err(error.into()),
         _ => Err(config.error(format!(
             "--task {}: matches {} tasks; select the one of the demonstrations, or leave --task out to match their \
              instructions",
-            config.flags.tasks.join(","),
+            config.tasks.join(","),
             found.len()
-        ))),
+        ))
+        .into()),
     }
 }
 
 /// The attempt number of a demonstration of softvt.
 fn own_attempt(config: &RunConfig, file: &ForeignFile, demo: &ForeignDemo) -> Result<Option<u32>, CliError> {
-    let own = config.script.seed;
+    let own = config.seed;
     match &demo.initial_condition {
         InitialCondition::OtherSimulator { .. } => Ok(None),
         InitialCondition::SoftvtEpisode { seed, attempt, .. } if *seed == own => Ok(Some(*attempt)),
@@ -217,7 +216,7 @@ fn no_task(config: &RunConfig, suites: &[Suite], file: &ForeignFile, demo: &Fore
         (None, Some(id)) => Some(format!("task {id}")),
         (None, None) => None,
     };
-    let script = config.script.file.display();
+    let script = config.file.display();
     let problem = match (task, suite) {
         (Some(task), Some(suite)) => {
             format!("it is of {task} of the suite {suite}, and {script} has no such task")

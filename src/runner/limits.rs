@@ -11,7 +11,7 @@ use std::{
     sync::{Arc, Mutex},
 };
 
-use crate::{error::CliError, output::eprint_notice};
+use crate::{error::RunError, observer::Observer};
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{files, parallel::lock, text::counted};
 use softvt_evaluation::{
@@ -25,12 +25,12 @@ use softvt_scene::{Body, Object, Scene};
 const MAX_PARENT_FOLDERS: usize = 3;
 
 /// The calibration files of a script. Each is read when an object first needs it.
-#[derive(Debug)]
 pub(crate) struct CalibrationFiles {
     script: PathBuf,
     read: Mutex<BTreeMap<String, Option<Arc<CalibrationFile>>>>,
-    /// Messages about missing limits that were printed.
+    /// Messages about missing limits that were told.
     reported: Mutex<BTreeSet<String>>,
+    observer: Arc<dyn Observer>,
 }
 
 /// A calibration file of one asset.
@@ -75,15 +75,15 @@ pub(crate) struct SceneLimits {
 }
 
 impl CalibrationFiles {
-    pub(crate) fn new(script: &Path) -> Self {
-        Self { script: script.to_owned(), read: Mutex::default(), reported: Mutex::default() }
+    pub(crate) fn new(script: &Path, observer: Arc<dyn Observer>) -> Self {
+        Self { script: script.to_owned(), read: Mutex::default(), reported: Mutex::default(), observer }
     }
 
     /// Limits of the soft objects of a scene. `target` is the object that the goal is about.
     ///
     /// # Errors
     /// A calibration file that is not valid.
-    pub(crate) fn limits_of(&self, scene: &Scene, target: &str) -> Result<SceneLimits, CliError> {
+    pub(crate) fn limits_of(&self, scene: &Scene, target: &str) -> Result<SceneLimits, RunError> {
         let mut found = SceneLimits::default();
         for object in scene.objects.iter().filter(|object| matches!(object.asset.body, Body::Soft(_))) {
             found.assets.insert(object.nominal.name.clone());
@@ -97,7 +97,7 @@ impl CalibrationFiles {
         Ok(found)
     }
 
-    fn limit_of(&self, object: &Object) -> Result<Result<DeformationLimit, MissingLimit>, CliError> {
+    fn limit_of(&self, object: &Object) -> Result<Result<DeformationLimit, MissingLimit>, RunError> {
         let asset = &object.nominal;
         let Some(file) = self.file(&asset.name)? else {
             return Ok(Err(MissingLimit::NotCalibrated { path: relative_path(&asset.name) }));
@@ -115,14 +115,14 @@ impl CalibrationFiles {
     }
 
     /// The calibration file of an asset, if there is one.
-    fn file(&self, asset: &str) -> Result<Option<Arc<CalibrationFile>>, CliError> {
+    fn file(&self, asset: &str) -> Result<Option<Arc<CalibrationFile>>, RunError> {
         let mut read = lock(&self.read);
         if let Some(known) = read.get(asset) {
             return Ok(known.clone());
         }
         let relative_path = relative_path(asset);
         let file = find_file(&self.script, &relative_path)?
-            .map(|ProjectFile { text, path }| -> Result<_, CliError> {
+            .map(|ProjectFile { text, path }| -> Result<_, RunError> {
                 let thresholds = ThresholdFile::parse(&text, &path)?;
                 let sha256 = softvt_script::sha256(text.as_bytes());
                 Ok(Arc::new(CalibrationFile { relative_path, path, sha256, thresholds }))
@@ -132,11 +132,11 @@ impl CalibrationFiles {
         Ok(file)
     }
 
-    /// Prints the messages of a scene about missing limits, each once per run.
+    /// Tells the messages of a scene about missing limits, each once per run.
     pub(crate) fn report(&self, index: EpisodeIndex, limits: &SceneLimits) {
         for message in &limits.missing {
             if lock(&self.reported).insert(message.clone()) {
-                eprint_notice(format!("{index}: {message}"));
+                self.observer.notice(&format!("{index}: {message}"));
             }
         }
     }
@@ -213,7 +213,7 @@ impl LimitScan {
         }
     }
 
-    /// Prints each missing limit, and the episodes concerned unless all are.
+    /// Tells each missing limit, and the episodes concerned unless all are.
     pub(crate) fn report(&self, files: &CalibrationFiles) {
         for (message, Affected { first, count }) in &self.missing {
             if !lock(&files.reported).insert(message.clone()) {
@@ -224,8 +224,8 @@ impl LimitScan {
                 others => format!(" and {}", counted(others, "other episode")),
             };
             match *count == self.scenes {
-                true => eprint_notice(message),
-                false => eprint_notice(format!("{first}{others}: {message}")),
+                true => files.observer.notice(message),
+                false => files.observer.notice(&format!("{first}{others}: {message}")),
             }
         }
     }
@@ -273,7 +273,7 @@ struct ProjectFile {
 }
 
 /// Reads a file from the folders above the script, the working folder or the embedded library, in this order.
-fn find_file(script: &Path, relative_path: &str) -> Result<Option<ProjectFile>, CliError> {
+fn find_file(script: &Path, relative_path: &str) -> Result<Option<ProjectFile>, RunError> {
     let parents = script.parent().into_iter().flat_map(Path::ancestors).take(MAX_PARENT_FOLDERS);
     for root in parents.chain([Path::new("")]) {
         let path = root.join(relative_path);

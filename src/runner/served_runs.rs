@@ -3,29 +3,27 @@
 use std::{collections::BTreeSet, path::Path, sync::Mutex};
 
 use crate::{
-    error::CliError,
-    output::{eprint_notice, print},
-    run::{
-        config::RunConfig,
-        evaluate::{RunLog, episode_line, restore_artifacts, with_kept},
-        run_manifest::RunManifest,
-        selection::select_tasks,
-        suite_run::SuiteRun,
-    },
+    config::RunConfig,
+    error::RunError,
+    evaluate::{RunLog, episode_line, restore_artifacts, with_kept},
+    run_manifest::RunManifest,
+    selection::select_tasks,
+    suite_run::SuiteRun,
 };
 use softvt_common::cancel;
 use softvt_common::episode_id::{EpisodeId, EpisodeIndex};
 use softvt_common::{parallel::lock, text::counted};
-use softvt_report::{run_folder::RunFolder, terminal};
+use softvt_evaluation::summary::SuiteSummary;
+use softvt_report::run_folder::RunFolder;
 use softvt_rollout::FinishedEpisode;
 use softvt_serve::{EpisodeRecorder, RequestError};
 
 /// The run folders of a server.
-pub(crate) struct ServedRuns<'a> {
+pub struct ServedRuns<'a> {
     config: &'a RunConfig,
     runs: Vec<ServedRun<'a>>,
     /// The first error of writing a file. The server ends then.
-    failure: Mutex<Option<CliError>>,
+    failure: Mutex<Option<RunError>>,
 }
 
 /// The run folder of one suite.
@@ -41,7 +39,7 @@ impl<'a> ServedRuns<'a> {
     ///
     /// # Errors
     /// A folder holds another run or anything else, or cannot be written. No empty folder is left then.
-    pub(crate) fn open(config: &'a RunConfig, runs: &'a [SuiteRun<'a>]) -> Result<Self, CliError> {
+    pub fn open(config: &'a RunConfig, runs: &'a [SuiteRun<'a>]) -> Result<Self, RunError> {
         let mut opened = Self { config, runs: Vec::new(), failure: Mutex::default() };
         for run in runs {
             match ServedRun::open(run) {
@@ -56,7 +54,7 @@ impl<'a> ServedRuns<'a> {
     }
 
     /// Interface of the server to the recorded runs.
-    pub(crate) fn recorder(&self) -> EpisodeRecorder<'_> {
+    pub fn recorder(&self) -> EpisodeRecorder<'_> {
         EpisodeRecorder {
             selects: Box::new(|id| self.find(&id.suite).is_some_and(|run| run.selects(id))),
             record: Box::new(|finished| self.record(finished)),
@@ -64,7 +62,7 @@ impl<'a> ServedRuns<'a> {
                 // An interrupt ends all episodes.
                 if !cancel::requested() {
                     let (suite, index) = (&id.suite, id.index());
-                    eprint_notice(format!(
+                    self.config.notice(format!(
                         "{suite}: {index} will not be recorded: {reason}; a server with --resume takes it again"
                     ));
                 }
@@ -89,14 +87,11 @@ impl<'a> ServedRuns<'a> {
         })
     }
 
-    /// Sorts the episodes of the folders and prints the results. A folder without an episode is removed, so that the same
-    /// command works again.
-    ///
-    /// # Errors
-    /// A file could not be written; otherwise the interrupt, which ends every server.
-    pub(crate) fn finish(self) -> Result<(), CliError> {
+    /// Sorts the episodes of the folders. A folder without an episode is removed, so that the same command works again.
+    /// Returns the results of the others, and why the server ended: a file that could not be written, or an interrupt.
+    pub fn finish(self) -> (Vec<SuiteSummary>, Result<(), RunError>) {
         let (config, failure) = (self.config, lock(&self.failure).take());
-        let (mut recorded, mut requested, mut tables) = (0, 0, String::new());
+        let (mut recorded, mut requested, mut summaries) = (0, 0, Vec::new());
         let mut outcome = failure.map_or(Ok(()), Err);
         for served in self.runs {
             let (run, mut log) = (served.run, served.log.into_inner().unwrap_or_else(|log| log.into_inner()));
@@ -106,23 +101,22 @@ impl<'a> ServedRuns<'a> {
                 log.discard()
             } else {
                 let sorted = log.sort();
-                tables += &terminal::table(&log.summary());
+                summaries.push(log.summary());
                 sorted
             });
         }
-        print(&tables)?;
         if recorded == 0 {
-            return with_kept(outcome, "no episode was recorded", "");
+            return (summaries, with_kept(outcome, "no episode was recorded", ""));
         }
-        let out = config.flags.out.as_deref().unwrap_or(Path::new("")).display();
+        let out = config.out.as_deref().unwrap_or(Path::new("")).display();
         let kept = format!("{recorded} of {} are in {out}", counted(requested, "episode"));
         let is_partial = recorded < requested;
         let hint = if is_partial { format!("; continue with --resume --out {out}") } else { String::new() };
-        with_kept(outcome, &kept, &hint)
+        (summaries, with_kept(outcome, &kept, &hint))
     }
 
     /// Removes the folders without episodes.
-    fn discard_empty(self) -> Result<(), CliError> {
+    fn discard_empty(self) -> Result<(), RunError> {
         for served in self.runs {
             let log = served.log.into_inner().unwrap_or_else(|log| log.into_inner());
             if log.records.is_empty() {
@@ -134,11 +128,11 @@ impl<'a> ServedRuns<'a> {
 }
 
 impl<'a> ServedRun<'a> {
-    fn open(run: &'a SuiteRun<'a>) -> Result<Self, CliError> {
+    fn open(run: &'a SuiteRun<'a>) -> Result<Self, RunError> {
         let config = run.config;
         let tasks = select_tasks(config, run.suite)?;
-        let manifest = RunManifest::new(run, &tasks, config.flags.episodes.unwrap_or(run.suite.episodes));
-        let opened = match config.flags.resume {
+        let manifest = RunManifest::new(run, &tasks, config.episodes_of(run.suite));
+        let opened = match config.resume {
             true => RunFolder::resume(&run.out),
             false => RunFolder::create(&run.out).map(|folder| (folder, Vec::new())),
         };
@@ -153,23 +147,23 @@ impl<'a> ServedRun<'a> {
     /// True if an episode is one of the run that the folder did not have when the server started.
     fn selects(&self, id: &EpisodeId) -> bool {
         let (run, index) = (self.run, id.index());
-        let is_own = id.base_seed == run.config.script.seed && id.split == run.split;
+        let is_own = id.base_seed == run.config.seed && id.split == run.split;
         is_own && run.jobs.find(index).is_some() && !self.resumed.contains(&index)
     }
 
     /// Writes the files of an episode, and after the last one those of the whole run.
-    fn add(&self, finished: FinishedEpisode) -> Result<(), CliError> {
+    fn add(&self, finished: FinishedEpisode) -> Result<(), RunError> {
         let (run, mut log) = (self.run, lock(&self.log));
         let message = episode_line(&finished.record);
         let artifacts = run.artifacts();
         log.add(finished, |finished| artifacts.write(finished))?;
-        eprint_notice(format!("{} [{}/{}] {message}", run.name, log.records.len(), run.jobs.len()));
+        run.config.notice(format!("{} [{}/{}] {message}", run.name, log.records.len(), run.jobs.len()));
         write_if_complete(run, &mut log)
     }
 }
 
 /// Writes the results of a run that has all of its episodes.
-fn write_if_complete(run: &SuiteRun, log: &mut RunLog) -> Result<(), CliError> {
+fn write_if_complete(run: &SuiteRun, log: &mut RunLog) -> Result<(), RunError> {
     let is_complete = !log.records.is_empty() && log.records.len() == run.jobs.len();
     if is_complete { log.write_results() } else { Ok(()) }
 }

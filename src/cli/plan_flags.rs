@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::{error::CliError, run::config::RunConfig};
+use crate::{args::Request, error::CliError};
 use softvt_benchmark::{ObjectType, Plan};
 
 /// Kind of a plan.
@@ -158,26 +158,25 @@ pub(crate) struct GivenFlag {
 ///
 /// # Errors
 /// The first such flag.
-pub(crate) fn check(command: &str, config: &RunConfig, plan: &Plan) -> Result<(), CliError> {
-    let kind = PlanKind::of(plan);
+pub(crate) fn check(command: &str, request: &Request, plan: &Plan) -> Result<(), CliError> {
+    let (kind, config) = (PlanKind::of(plan), &request.config);
     // A command that accepts no plan of this kind says so itself.
     if !accepts(command, kind) {
         return Ok(());
     }
-    for flag in &config.script.given {
+    for flag in request.given() {
         let acts_on = acts_on(command, &flag.id).unwrap_or_default();
         if !acts_on.contains(&kind) {
             let kinds: Vec<&str> = acts_on.iter().map(|kind| kind.plural()).collect();
             let kinds = if kinds.is_empty() { "no plan".to_owned() } else { kinds.join(", ") };
-            return Err(config.error(format!(
-                "--{}: applies to {kinds}, and this file is {kind}; leave it out",
-                flag.long
-            )));
+            let message =
+                format!("--{}: applies to {kinds}, and this file is {kind}; leave it out", flag.long);
+            return Err(config.error(message).into());
         }
     }
     let suites = plan.suites();
-    if config.is_rigid_twin() && suites.iter().all(|suite| suite.object_type == ObjectType::Rigid) {
-        return Err(config.error("--twin: the objects of this suite are rigid already; leave it out"));
+    if config.rigid_twin && suites.iter().all(|suite| suite.object_type == ObjectType::Rigid) {
+        return Err(config.error("--twin: the objects of this suite are rigid already; leave it out").into());
     }
     Ok(())
 }

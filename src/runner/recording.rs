@@ -12,21 +12,17 @@ use std::{
     sync::{Arc, Mutex},
 };
 
-use clap::{Args, ValueEnum, value_parser};
 use serde_json::{Value, json};
 
 use crate::{
-    error::CliError,
-    output::{eprint_notice, print},
-    run::{
-        config::{RunConfig, RunFlags, ScriptArgs, TraceDetail, parse_folder},
-        episode_list::{EpisodeJob, EpisodeList},
-        evaluate::{RunLog, SimulatedEpisode, with_kept},
-        policy::ControllerFactory,
-        run_manifest::{self, RunManifest},
-        selection::path_component,
-        suite_run::SuiteRun,
-    },
+    config::RunConfig,
+    episode_list::{EpisodeJob, EpisodeList},
+    error::RunError,
+    evaluate::{RunLog, SimulatedEpisode, with_kept},
+    policy::ControllerFactory,
+    run_manifest::{self, RunManifest},
+    selection::path_component,
+    suite_run::SuiteRun,
 };
 use softvt_benchmark::{CONTROL_HZ, Suite, Task};
 use softvt_common::cancel;
@@ -55,62 +51,26 @@ use softvt_script::LoadedScript;
 /// Prefix of the error of an attempt that could not start from the state of its demonstration.
 const START_FAILED: &str = "cannot reproduce the initial state: ";
 
-// Flags of all commands that create datasets.
-#[derive(Args, Clone, Debug)]
-pub(crate) struct RecordingArgs {
-    /// Output folder: a new one, or with --resume that of an interrupted recording
-    #[arg(long, value_name = "DIR", value_parser = parse_folder)]
+/// What a recording contains, and where it goes.
+#[derive(Clone, Debug)]
+pub struct RecordingOptions {
+    /// Output folder: a new one, or with `resume` that of an interrupted recording.
     pub out: PathBuf,
-    /// Storage of images: in the HDF5 files and as videos, or only as videos
-    #[arg(long, value_name = "WHERE", default_value = "hdf5")]
-    pub images: ImageStorage,
-    /// Leave out the true state: node positions, deformation, contacts, forces
-    #[arg(long)]
-    pub no_privileged: bool,
-    /// Number of threads; the dataset does not depend on it [default: number of processors]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
-    pub threads: Option<u16>,
-    /// Continue the interrupted recording in --out, if there is one
-    #[arg(long)]
+    /// True if images go into the HDF5 files too; they are in the videos anyway.
+    pub has_images: bool,
+    /// True to add the true state: node positions, deformation, contacts, forces.
+    pub has_privileged: bool,
     pub resume: bool,
     /// Grip code of exports that name none.
-    #[arg(skip)]
     pub gripper: Option<GripCode>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum ImageStorage {
-    Hdf5,
-    Video,
-}
-
-impl RecordingArgs {
-    /// The configuration of the attempts, under the expert.
-    ///
-    /// # Errors
-    /// A shift or setting that is not valid.
-    pub(crate) fn run_config(&self, script: ScriptArgs, tasks: Vec<String>) -> Result<RunConfig, CliError> {
-        if script.seed_file.is_some() {
-            let what = "demonstrations are public, and so need no secret seed; use --seed";
-            return Err(CliError::input(format!("--seed-file: {what}")));
-        }
-        // The contact streams of a demonstration come from the trace.
-        let (threads, trace) = (self.threads, Some(TraceDetail::State));
-        RunConfig::new(script, RunFlags { tasks, threads, trace, ..RunFlags::default() })
-    }
-
-    /// True if images go into the HDF5 files too.
-    pub(crate) fn has_hdf5_images(&self) -> bool {
-        self.images == ImageStorage::Hdf5
-    }
-}
-
 /// Per attempt and control step: true if the gripper is intended to hold.
-pub(crate) type GripLog = Arc<Mutex<BTreeMap<EpisodeIndex, Vec<bool>>>>;
+pub type GripLog = Arc<Mutex<BTreeMap<EpisodeIndex, Vec<bool>>>>;
 
 /// A suite that is being recorded: rounds of attempts, the files of the good ones, and one merged file per task.
-pub(crate) struct SuiteRecording<'a> {
-    args: &'a RecordingArgs,
+pub struct SuiteRecording<'a> {
+    options: &'a RecordingOptions,
     /// The attempts.
     run: SuiteRun<'a>,
     tasks: Vec<&'a Task>,
@@ -130,24 +90,25 @@ impl<'a> SuiteRecording<'a> {
     ///
     /// # Errors
     /// A setting or scene that is not valid.
-    pub(crate) fn new(
+    pub fn new(
         config: &'a RunConfig,
-        args: &'a RecordingArgs,
+        options: &'a RecordingOptions,
         loaded: &'a LoadedScript,
         suite: &'a Suite,
         tasks: Vec<&'a Task>,
         jobs: EpisodeList<'a>,
         demos: Option<u32>,
-        customize: impl FnOnce(&mut SuiteRun<'a>, &GripLog) -> Result<(), CliError>,
-    ) -> Result<Self, CliError> {
+        customize: impl FnOnce(&mut SuiteRun<'a>, &GripLog) -> Result<(), RunError>,
+    ) -> Result<Self, RunError> {
         let script = &loaded.sources.main;
         if !check::is_script_path(script) {
-            return Err(CliError::input(format!(
+            return Err(RunError::input(format!(
                 "{script}: a recording names its script, and its path must not contain \"..\"; start softvt in a folder above it"
             )));
         }
         let folder_name = path_component(&config.suite_name(suite));
-        let mut run = SuiteRun::new(config, loaded, suite, jobs, layout::attempts(&args.out, &folder_name))?;
+        let mut run =
+            SuiteRun::new(config, loaded, suite, jobs, layout::attempts(&options.out, &folder_name))?;
         run.split = Split::Demonstration;
         run.renders_episodes = true;
         let grip_log = GripLog::default();
@@ -157,7 +118,7 @@ impl<'a> SuiteRecording<'a> {
         let episodes = demos.unwrap_or(attempts.max().unwrap_or_default() as u32);
         let manifest = json!(RunManifest::new(&run, &tasks, episodes));
         let environment = json!({ "env_name": "softvt", "type": 2, "env_kwargs": manifest });
-        Ok(Self { args, run, tasks, folder_name, demos, grip_log, manifest, environment })
+        Ok(Self { options, run, tasks, folder_name, demos, grip_log, manifest, environment })
     }
 
     /// Records all tasks of the suite, and returns the records of all attempts.
@@ -165,7 +126,7 @@ impl<'a> SuiteRecording<'a> {
     /// # Errors
     /// The folder contains other attempts, an attempt or a file fails, or too few attempts are good.
     /// Finished attempts are kept.
-    fn record(&self) -> Result<Vec<EpisodeRecord>, CliError> {
+    fn record(&self) -> Result<Vec<EpisodeRecord>, RunError> {
         let (folder, records) = RunFolder::resume(&self.run.out)?;
         let mut log = RunLog::new(&self.run, folder, records, &self.manifest)?;
         let outcome = match self.run_rounds(&mut log) {
@@ -177,7 +138,7 @@ impl<'a> SuiteRecording<'a> {
         };
         log.sort()?;
         let kept = log.records.iter().filter(|record| rejection(record).is_none()).count();
-        let out = self.args.out.display();
+        let out = self.options.out.display();
         let kept = format!("{} in {out}; continue with --resume", counted(kept, "demonstration"));
         with_kept(outcome, &kept, "")?;
         self.check_demo_counts(&log.records)?;
@@ -186,7 +147,7 @@ impl<'a> SuiteRecording<'a> {
     }
 
     /// Runs attempts until every task has its demonstrations or has used up its attempts.
-    fn run_rounds(&self, log: &mut RunLog) -> Result<(), CliError> {
+    fn run_rounds(&self, log: &mut RunLog) -> Result<(), RunError> {
         let write_actions = |finished: &FinishedEpisode| {
             let path = actions::path(&self.run.out, finished.record.header.id.index());
             Ok(actions::write(&path, &finished.actions)?)
@@ -226,7 +187,7 @@ impl<'a> SuiteRecording<'a> {
     }
 
     /// Runs an attempt and, if it is good, writes the files of its demonstration.
-    fn record_attempt(&self, job: EpisodeJob) -> Result<FinishedEpisode, CliError> {
+    fn record_attempt(&self, job: EpisodeJob) -> Result<FinishedEpisode, RunError> {
         let mut finished = self.run_attempt(job)?;
         let recorded_grip = parallel::lock(&self.grip_log).remove(&job.index());
         let states = finished.recording.take();
@@ -237,13 +198,13 @@ impl<'a> SuiteRecording<'a> {
         let mut is_holding: Vec<bool> = recorded_grip.unwrap_or_else(commanded_grip);
         // The recorded grip can have fewer entries than there are steps, or more. The last one continues.
         is_holding.resize(finished.actions.len(), is_holding.last().copied().unwrap_or_default());
-        let demonstration = Demonstration::new(&finished, &states, is_holding, !self.args.no_privileged);
+        let demonstration = Demonstration::new(&finished, &states, is_holding, self.options.has_privileged);
         let (paths, attempt) = (self.paths(job.task.id), job.episode);
         let writer = DemonstrationWriter {
             hdf5: paths.part(attempt, "hdf5"),
             videos: VIDEO_STREAMS.map(|video| paths.part(attempt, &format!("{video}.mp4"))),
             preview: paths.part(attempt, "preview.mp4"),
-            store_images: self.args.has_hdf5_images(),
+            store_images: self.options.has_images,
             environment: &self.environment,
         };
         writer.write(&mut states, demonstration, cancel::requested)?;
@@ -252,7 +213,7 @@ impl<'a> SuiteRecording<'a> {
 
     /// Simulates an attempt. One that cannot start from the state of its foreign demonstration becomes a failed attempt
     /// from the state of the layout.
-    fn run_attempt(&self, job: EpisodeJob) -> Result<FinishedEpisode, CliError> {
+    fn run_attempt(&self, job: EpisodeJob) -> Result<FinishedEpisode, RunError> {
         let run = &self.run;
         let origin = run.origins.get(&job.index());
         let error = match (run.run_episode_from(job, origin, true, &run.controllers)?, origin) {
@@ -276,11 +237,11 @@ impl<'a> SuiteRecording<'a> {
 
     /// Paths of the files of a task.
     fn paths(&self, task: usize) -> TaskPaths {
-        TaskPaths { root: self.args.out.clone(), suite: self.folder_name.clone(), task }
+        TaskPaths { root: self.options.out.clone(), suite: self.folder_name.clone(), task }
     }
 
     /// Merges the demonstrations of a task into one file, unless it exists, and removes their parts.
-    fn merge_task(&self, task: usize, kept: &[&EpisodeRecord]) -> Result<(), CliError> {
+    fn merge_task(&self, task: usize, kept: &[&EpisodeRecord]) -> Result<(), RunError> {
         let paths = self.paths(task);
         if !paths.hdf5().is_file() {
             for (demo, record) in kept.iter().enumerate() {
@@ -303,7 +264,7 @@ impl<'a> SuiteRecording<'a> {
     ///
     /// # Errors
     /// The tasks that have too few, with the reasons for which attempts were not kept.
-    fn check_demo_counts(&self, records: &[EpisodeRecord]) -> Result<(), CliError> {
+    fn check_demo_counts(&self, records: &[EpisodeRecord]) -> Result<(), RunError> {
         let Some(required) = self.demos.map(|demos| demos as usize) else { return Ok(()) };
         let short =
             self.tasks.iter().map(|task| self.count(task, records)).filter(|count| count.demos < required);
@@ -325,7 +286,7 @@ impl<'a> SuiteRecording<'a> {
         Err(self.run.config.error(format!(
             "{}\nthe good ones are in {}; continue with --resume and more --attempts, or fix the expert",
             short.join("\n"),
-            self.args.out.display()
+            self.options.out.display()
         )))
     }
 
@@ -353,7 +314,7 @@ impl<'a> SuiteRecording<'a> {
 }
 
 /// Moves a part to its final path, unless an interrupted recording has done so already.
-fn move_part(part: &Path, path: &Path) -> Result<(), CliError> {
+fn move_part(part: &Path, path: &Path) -> Result<(), RunError> {
     if !part.is_file() && path.is_file() {
         return Ok(());
     }
@@ -423,39 +384,46 @@ fn attempt_line(record: &EpisodeRecord) -> String {
     format!("task {} attempt {}: {result}, {:.1} s", id.task, id.episode, record.stats.time_s)
 }
 
-/// Records a dataset. `request` describes it in `recording.json`; `prepare` returns its prepared suites.
+/// What a recording contains.
+pub struct RecordingSummary {
+    pub tasks: Vec<TaskCount>,
+    /// File that lists all demonstrations.
+    pub manifest: PathBuf,
+}
+
+/// Records a dataset. `request` describes it in `recording.json`; `prepare` returns its prepared suites. Returns `None` if the
+/// folder contains this very dataset already.
 ///
 /// # Errors
 /// The folder contains something else, an attempt or a file fails, or too few attempts are good.
-pub(crate) fn record_all<'a>(
-    args: &'a RecordingArgs,
+pub fn record_all<'a>(
+    options: &'a RecordingOptions,
     request: &Value,
-    prepare: impl FnOnce() -> Result<Vec<SuiteRecording<'a>>, CliError>,
-) -> Result<(), CliError> {
-    let root = &args.out;
-    if check_folder(root, args.resume, request)? {
-        eprint_notice(format!("{} is already complete", root.display()));
-        return Ok(());
+    prepare: impl FnOnce() -> Result<Vec<SuiteRecording<'a>>, RunError>,
+) -> Result<Option<RecordingSummary>, RunError> {
+    let root = &options.out;
+    if check_folder(root, options.resume, request)? {
+        return Ok(None);
     }
     let missing = files::missing_folders(root);
     // Preparation takes long, so a folder that cannot be written to is reported first.
-    let prepared = files::create_writable_folder(root).map_err(CliError::from).and_then(|()| prepare());
+    let prepared = files::create_writable_folder(root).map_err(RunError::from).and_then(|()| prepare());
     let suites = prepared.inspect_err(|_| files::remove_empty_folders(&missing))?;
     files::replace(&root.join(RECORDING), format!("{request:#}\n"))?;
     let mut records = Vec::new();
     for suite in &suites {
         records.push(suite.record().inspect_err(|_| remove_if_empty(root, &missing))?);
     }
-    write_summary(args, &suites, &records)
+    write_summary(options, &suites, &records).map(Some)
 }
 
 /// Checks that a dataset can be recorded into a folder. Returns true if it contains this very recording, complete.
 ///
 /// # Errors
 /// The folder contains another recording, something else, or this recording incomplete without `resume`.
-fn check_folder(root: &Path, resume: bool, request: &Value) -> Result<bool, CliError> {
+fn check_folder(root: &Path, resume: bool, request: &Value) -> Result<bool, RunError> {
     let path = root.join(RECORDING);
-    let refuse = |message: String| Err(CliError::input(format!("--out {}: {message}", root.display())));
+    let refuse = |message: String| Err(RunError::input(format!("--out {}: {message}", root.display())));
     if root.exists() && !root.is_dir() {
         return refuse("not a folder; select a new folder".to_owned());
     }
@@ -470,7 +438,7 @@ fn check_folder(root: &Path, resume: bool, request: &Value) -> Result<bool, CliE
         };
     }
     let stored: Value = serde_json::from_str(&files::read_text(&path)?)
-        .map_err(|e| CliError::input(format!("{} is not a softvt recording: {e}", path.display())))?;
+        .map_err(|e| RunError::input(format!("{} is not a softvt recording: {e}", path.display())))?;
     let command = |request: &Value| match request.get("imported") {
         Some(_) => "softvt dataset import",
         None => "softvt record",
@@ -506,16 +474,16 @@ fn remove_if_empty(root: &Path, missing: &[PathBuf]) {
     }
 }
 
-/// Writes manifest and card, and prints what the dataset contains.
+/// Writes manifest and card.
 ///
 /// # Errors
 /// No demonstration was kept, or a file cannot be written.
 fn write_summary(
-    args: &RecordingArgs,
+    options: &RecordingOptions,
     suites: &[SuiteRecording],
     records: &[Vec<EpisodeRecord>],
-) -> Result<(), CliError> {
-    let root = &args.out;
+) -> Result<RecordingSummary, RunError> {
+    let root = &options.out;
     let (mut entries, mut tasks) = (Vec::new(), Vec::new());
     let size = |path: &Path| fs::metadata(path).map_or(0, |metadata| metadata.len());
     for (suite, records) in suites.iter().zip(records) {
@@ -539,7 +507,7 @@ fn write_summary(
             .iter()
             .map(|task| format!("{} task {}: {}", task.suite, task.task, rejection_counts(&task.rejected)))
             .collect();
-        return Err(CliError::input(format!(
+        return Err(RunError::input(format!(
             "no demonstration was kept: {}; all attempts are in {}/attempts",
             reasons.join("; "),
             root.display()
@@ -550,26 +518,14 @@ fn write_summary(
     let card = Card {
         softvt: env!("CARGO_PKG_VERSION").to_owned(),
         fps: CONTROL_HZ,
-        has_images: args.has_hdf5_images(),
-        has_privileged: !args.no_privileged,
-        gripper: args.gripper,
+        has_images: options.has_images,
+        has_privileged: options.has_privileged,
+        gripper: options.gripper,
         imported: suites.first().map(|suite| suite.run.imported.clone()).unwrap_or_default(),
         tasks,
     };
     card.write(root)?;
-    for task in &card.tasks {
-        print(&format!(
-            "{} task {}: {} from {}, {}, {:.1} MB; not kept: {}\n",
-            task.suite,
-            task.task,
-            counted(task.demos, "demonstration"),
-            counted(task.attempts, "attempt"),
-            counted(task.samples, "step"),
-            (task.hdf5_bytes + task.video_bytes) as f64 / 1e6,
-            rejection_counts(&task.rejected)
-        ))?;
-    }
-    print(&format!("{}\n", root.join(MANIFEST).display()))
+    Ok(RecordingSummary { tasks: card.tasks, manifest: root.join(MANIFEST) })
 }
 
 #[cfg(test)]

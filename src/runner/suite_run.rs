@@ -3,15 +3,13 @@
 use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 
 use crate::{
-    error::{CliError, Exit},
-    run::{
-        config::{RunConfig, TraceDetail},
-        episode_artifacts::EpisodeArtifacts,
-        episode_list::{EpisodeJob, EpisodeList},
-        limits::{CalibrationFiles, Calibrations, LimitScan, SceneLimits},
-        policy::{ControllerFactory, DeclaredStreams},
-        recorded_runs::{RecordedRuns, ReplaySource},
-    },
+    config::{RunConfig, TraceDetail},
+    episode_artifacts::EpisodeArtifacts,
+    episode_list::{EpisodeJob, EpisodeList},
+    error::{Cause, RunError},
+    limits::{CalibrationFiles, Calibrations, LimitScan, SceneLimits},
+    policy::{ControllerFactory, DeclaredStreams},
+    recorded_runs::{RecordedRuns, ReplaySource},
 };
 use softvt_benchmark::{ObjectType, ShiftValue, Suite, Task, settings::Settings};
 use softvt_common::cancel;
@@ -34,7 +32,7 @@ const MAX_SCANNED_EPISODES: usize = 100;
 ///
 /// [`SuiteRun::prepare`] checks the scenes and reads the limits. [`run_suite`](super::evaluate::run_suite) then runs all
 /// episodes into the folder; other commands run single episodes with [`SuiteRun::run_episode`].
-pub(crate) struct SuiteRun<'a> {
+pub struct SuiteRun<'a> {
     pub config: &'a RunConfig,
     pub loaded: &'a LoadedScript,
     pub suite: &'a Suite,
@@ -43,9 +41,9 @@ pub(crate) struct SuiteRun<'a> {
     pub settings: Settings,
     pub jobs: EpisodeList<'a>,
     /// Files with the deformation limits of the objects.
-    pub calibration_files: Arc<CalibrationFiles>,
+    pub(crate) calibration_files: Arc<CalibrationFiles>,
     /// The calibrations of the assets in the scenes of the run; `None` before they are known.
-    pub calibrations: Option<Calibrations>,
+    pub(crate) calibrations: Option<Calibrations>,
     /// False if objects have no limits, since no verdict is shown.
     pub reads_limits: bool,
     /// SHA-256 of every file that the results depend on, by name.
@@ -74,13 +72,13 @@ impl<'a> SuiteRun<'a> {
     ///
     /// # Errors
     /// A setting or shift that does not exist, or whose value is out of range; recorded actions that do not fit.
-    pub(crate) fn new(
+    pub fn new(
         config: &'a RunConfig,
         loaded: &'a LoadedScript,
         suite: &'a Suite,
         jobs: EpisodeList<'a>,
         out: PathBuf,
-    ) -> Result<Self, CliError> {
+    ) -> Result<Self, RunError> {
         let settings = suite.settings.with_all(&config.settings);
         let settings = settings.map_err(|error| config.error(format!("--set: {error}")))?;
         for ShiftValue { name, value } in &config.shifts {
@@ -99,7 +97,7 @@ impl<'a> SuiteRun<'a> {
             name: config.suite_name(suite),
             settings,
             jobs,
-            calibration_files: Arc::new(CalibrationFiles::new(&config.script.file)),
+            calibration_files: Arc::new(CalibrationFiles::new(&config.file, config.observer.clone())),
             calibrations: None,
             reads_limits: true,
             sources,
@@ -108,12 +106,12 @@ impl<'a> SuiteRun<'a> {
             assets: AssetCache::default(),
             sensor_assets: SensorAssets::default(),
             out,
-            renders_episodes: config.flags.video.is_some(),
+            renders_episodes: config.video.is_some(),
             split: Split::Validation,
             controllers: config.policy.controller_factory(
                 connections.clone(),
                 &suite.name,
-                config.is_rigid_twin(),
+                config.rigid_twin,
             ),
             connections,
             origins: BTreeMap::new(),
@@ -122,9 +120,9 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// Builds the scene of an episode: its layout, the shifts, and the rigid twin if requested.
-    pub(crate) fn open_episode(&self, id: &EpisodeId) -> Result<EpisodeSetup, CliError> {
+    pub fn open_episode(&self, id: &EpisodeId) -> Result<EpisodeSetup, RunError> {
         let mut opened = EpisodeSetup::open(self.loaded, id, &self.config.shifts)?;
-        if self.config.is_rigid_twin() {
+        if self.config.rigid_twin {
             (opened.scene, opened.nominal) = (opened.scene.rigid_twin(), opened.nominal.rigid_twin());
         }
         for scene in [&mut opened.scene, &mut opened.nominal] {
@@ -139,35 +137,35 @@ impl<'a> SuiteRun<'a> {
         Some(secret.episode_name(&self.name, task.id, episode))
     }
 
-    pub(crate) fn brief(&self, task: &Task, episode: u32) -> TaskBrief {
+    pub fn brief(&self, task: &Task, episode: u32) -> TaskBrief {
         TaskBrief {
             suite: self.name.clone(),
             task: task.id,
             prompt: task.prompt.clone(),
             episode,
-            seed: self.config.script.seed,
+            seed: self.config.seed,
             alias: self.alias(task, episode),
         }
     }
 
     /// True if the policy has access to ground-truth state, or had it when its actions were recorded.
-    pub(crate) fn is_privileged(&self) -> bool {
+    pub fn is_privileged(&self) -> bool {
         self.config.policy.privileged || self.replay_source.as_ref().is_some_and(|source| source.privileged)
     }
 
     /// Id of an episode of the run. The suite has its name in the script, which may differ from that in results.
-    pub(crate) fn episode_id(&self, task: &Task, episode: u32) -> EpisodeId {
+    pub fn episode_id(&self, task: &Task, episode: u32) -> EpisodeId {
         EpisodeId {
             suite: self.suite.name.clone(),
             task: task.id,
             episode,
-            base_seed: self.config.script.seed,
+            base_seed: self.config.seed,
             split: self.split,
         }
     }
 
     /// Takes over the limits of another run of the same suite, whose layouts are the same.
-    pub(crate) fn copy_limits(&mut self, other: &Self) {
+    pub fn copy_limits(&mut self, other: &Self) {
         self.calibration_files.clone_from(&other.calibration_files);
         self.calibrations.clone_from(&other.calibrations);
         self.sources.clone_from(&other.sources);
@@ -177,11 +175,24 @@ impl<'a> SuiteRun<'a> {
     ///
     /// # Errors
     /// A calibration file that is not valid.
-    pub(crate) fn limits_of(&self, task: &Task, scene: &Scene) -> Result<SceneLimits, CliError> {
+    pub(crate) fn limits_of(&self, task: &Task, scene: &Scene) -> Result<SceneLimits, RunError> {
         match self.reads_limits {
             true => self.calibration_files.limits_of(scene, &task.goal.object),
             false => Ok(SceneLimits::default()),
         }
+    }
+
+    /// Tells which objects of the first episode of each task have no limit.
+    ///
+    /// # Errors
+    /// A scene or calibration file that is not valid.
+    pub fn report_limits(&self, tasks: &[&Task]) -> Result<(), RunError> {
+        for task in tasks {
+            let opened = self.open_episode(&self.episode_id(task, 0))?;
+            let limits = self.limits_of(task, &opened.scene)?;
+            self.calibration_files.report(EpisodeIndex { task: task.id, episode: 0 }, &limits);
+        }
+        Ok(())
     }
 
     /// Builds the scenes of the first episodes of each task, keeps the calibrations of their assets, and reports objects
@@ -189,7 +200,7 @@ impl<'a> SuiteRun<'a> {
     ///
     /// # Errors
     /// A calibration file that is not valid.
-    pub(crate) fn scan_limits(&mut self, tasks: &[&Task]) -> Result<(), CliError> {
+    pub fn scan_limits(&mut self, tasks: &[&Task]) -> Result<(), RunError> {
         if self.calibrations.is_some() || !self.reads_limits {
             return Ok(());
         }
@@ -212,12 +223,10 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// Limits in the first episodes of a task. All shards of a run look at the same episodes.
-    fn scan_task(&self, task: &Task) -> Result<BTreeMap<EpisodeIndex, SceneLimits>, CliError> {
+    fn scan_task(&self, task: &Task) -> Result<BTreeMap<EpisodeIndex, SceneLimits>, RunError> {
         let of_task = self.jobs.episodes_of(task.id);
-        let episodes: Vec<u32> = match self.config.flags.shard {
-            Some(_) => (0..self.config.flags.episodes.unwrap_or(self.suite.episodes))
-                .take(MAX_SCANNED_EPISODES)
-                .collect(),
+        let episodes: Vec<u32> = match self.config.shard {
+            Some(_) => (0..self.config.episodes_of(self.suite)).take(MAX_SCANNED_EPISODES).collect(),
             None => of_task.take(MAX_SCANNED_EPISODES).collect(),
         };
         let mut found = BTreeMap::new();
@@ -226,7 +235,7 @@ impl<'a> SuiteRun<'a> {
             let Ok(opened) = builder.build(&self.episode_id(task, episode), &self.config.shifts) else {
                 break;
             };
-            let scene = if self.config.is_rigid_twin() { opened.scene.rigid_twin() } else { opened.scene };
+            let scene = if self.config.rigid_twin { opened.scene.rigid_twin() } else { opened.scene };
             found.insert(EpisodeIndex { task: task.id, episode }, self.limits_of(task, &scene)?);
         }
         Ok(found)
@@ -234,7 +243,7 @@ impl<'a> SuiteRun<'a> {
 
     /// Files of the episodes, other than their lines in `episodes.jsonl`.
     pub(crate) fn artifacts(&self) -> EpisodeArtifacts<'_> {
-        let flags = &self.config.flags;
+        let flags = self.config;
         EpisodeArtifacts { dir: &self.out, trace: flags.trace.is_some(), video: flags.video.as_ref() }
     }
 
@@ -243,12 +252,12 @@ impl<'a> SuiteRun<'a> {
     ///
     /// # Errors
     /// The script, the scene or the controller fails.
-    pub(crate) fn run_episode(
+    pub fn run_episode(
         &self,
         job: EpisodeJob<'_>,
         keep_states: bool,
         controllers: &ControllerFactory,
-    ) -> Result<FinishedEpisode, CliError> {
+    ) -> Result<FinishedEpisode, RunError> {
         let origin = self.origins.get(&job.index());
         self.run_episode_from(job, origin, keep_states, controllers)?.map_err(|e| self.episode_error(&e))
     }
@@ -257,13 +266,13 @@ impl<'a> SuiteRun<'a> {
     ///
     /// # Errors
     /// The script or the controller does not start. The inner result: the scene is not valid, or the episode fails.
-    pub(crate) fn run_episode_from(
+    pub fn run_episode_from(
         &self,
         job: EpisodeJob<'_>,
         origin: Option<&Origin>,
         keep_states: bool,
         controllers: &ControllerFactory,
-    ) -> Result<Result<FinishedEpisode, EpisodeError>, CliError> {
+    ) -> Result<Result<FinishedEpisode, EpisodeError>, RunError> {
         let (spec, opened) = self.spec(job.task, &self.episode_id(job.task, job.episode), origin)?;
         let brief = TaskBrief { prompt: opened.prompt.clone(), ..self.brief(job.task, job.episode) };
         let mut controller = controllers(opened, brief)?;
@@ -276,7 +285,7 @@ impl<'a> SuiteRun<'a> {
     ///
     /// # Errors
     /// The script or the scene fails.
-    pub(crate) fn start_episode(&self, task: &Task, id: &EpisodeId) -> Result<Episode, CliError> {
+    pub fn start_episode(&self, task: &Task, id: &EpisodeId) -> Result<Episode, RunError> {
         let (spec, _) = self.spec(task, id, None)?;
         Episode::start(spec, &self.assets, &self.sensor_assets).map_err(|e| self.episode_error(&e))
     }
@@ -287,7 +296,7 @@ impl<'a> SuiteRun<'a> {
         task: &Task,
         id: &EpisodeId,
         origin: Option<&Origin>,
-    ) -> Result<(EpisodeSpec, EpisodeSetup), CliError> {
+    ) -> Result<(EpisodeSpec, EpisodeSetup), RunError> {
         let mut opened = self.open_episode(id)?;
         if let Some(origin) = origin {
             origin.start.apply(&mut opened.scene);
@@ -302,26 +311,26 @@ impl<'a> SuiteRun<'a> {
         spec.header.privileged = self.is_privileged();
         spec.header.variation = opened.variation.clone().map(Box::new);
         spec.header.origin = origin.cloned().map(Box::new);
-        let record_trace = self.config.flags.trace.is_some();
-        let trace_nodes = self.config.flags.trace == Some(TraceDetail::Nodes);
+        let record_trace = self.config.trace.is_some();
+        let trace_nodes = self.config.trace == Some(TraceDetail::Nodes);
         Ok((EpisodeSpec { limits: limits.by_object, record_trace, trace_nodes, ..spec }, opened))
     }
 
     /// Converts the error of an episode, with its place in the script.
-    pub(crate) fn episode_error(&self, error: &EpisodeError) -> CliError {
-        let exit = match error {
+    pub fn episode_error(&self, error: &EpisodeError) -> RunError {
+        let cause = match error {
             // An error after the interrupt may be its consequence.
-            _ if cancel::requested() => Exit::Interrupted,
-            EpisodeError::Control { source, .. } if source.is_of_server() => Exit::Policy,
-            _ => Exit::Input,
+            _ if cancel::requested() => Cause::Interrupt,
+            EpisodeError::Control { source, .. } if source.is_of_server() => Cause::Policy,
+            _ => Cause::Input,
         };
         let message = match (error, error.place()) {
             // The message of this one begins with file and line.
             (EpisodeError::Build(BuildError::At { .. }), _) => error.to_string(),
             (_, Some(place)) => format!("{place}: {error}"),
-            (_, None) => format!("{}: {error}", self.config.script.file.display()),
+            (_, None) => format!("{}: {error}", self.config.file.display()),
         };
-        CliError { exit, message }
+        RunError { cause, message }
     }
 
     /// Connects to the policy server, renders once what the policy observes at the start of the first episode of each task,
@@ -329,7 +338,7 @@ impl<'a> SuiteRun<'a> {
     ///
     /// # Errors
     /// A layout, calibration file, camera, light or tactile sensor that is not valid; a server that cannot be reached.
-    pub(crate) fn prepare(&mut self, tasks: &[&Task]) -> Result<(), CliError> {
+    pub fn prepare(&mut self, tasks: &[&Task]) -> Result<(), RunError> {
         let mut has_changed = false;
         for task in tasks {
             let first = self.jobs.episodes_of(task.id).next().unwrap_or(0);
@@ -356,7 +365,7 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// Refuses shifts that change neither the scene nor the prompt of any task, unless their values are the nominal ones.
-    fn refuse_shifts_without_effect(&self) -> Result<(), CliError> {
+    fn refuse_shifts_without_effect(&self) -> Result<(), RunError> {
         let is_nominal = |shift: &ShiftValue| {
             let declared = self.suite.shifts.iter().find(|declared| declared.name == shift.name);
             declared.is_some_and(|declared| declared.default == shift.value)
@@ -375,9 +384,9 @@ impl<'a> SuiteRun<'a> {
     ///
     /// # Errors
     /// A scene or sensor that is not valid.
-    pub(crate) fn check_scene(&self, task: &Task, scene: Scene) -> Result<Option<String>, CliError> {
+    pub fn check_scene(&self, task: &Task, scene: Scene) -> Result<Option<String>, RunError> {
         self.check_object_type(task, &scene)?;
-        let scene = Arc::new(if self.config.is_rigid_twin() { scene.rigid_twin() } else { scene });
+        let scene = Arc::new(if self.config.rigid_twin { scene.rigid_twin() } else { scene });
         let settings = &self.settings;
         let sense = |source| EpisodeError::Sense { task: task.id, episode: 0, source };
         let check = || -> Result<Option<String>, EpisodeError> {
@@ -398,26 +407,26 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// Checks that the scene has the cameras that the file of the policy declares.
-    fn check_declared_cameras(&self, scene: &Scene, task: &Task) -> Result<(), CliError> {
+    fn check_declared_cameras(&self, scene: &Scene, task: &Task) -> Result<(), RunError> {
         let Some(DeclaredStreams { place, streams }) = &self.config.policy.declared else { return Ok(()) };
         let missing = streams.cameras.iter().find(|name| scene.camera(name).is_none());
         missing.map_or(Ok(()), |name| {
             let known = scene.cameras.iter().map(|camera| camera.name.as_str());
             let unknown = unknown_name("camera", name, known);
-            Err(CliError::input(format!("{place}: {unknown} (scene of task {})", task.id)))
+            Err(RunError::input(format!("{place}: {unknown} (scene of task {})", task.id)))
         })
     }
 
     /// Checks that a suite of rigid objects, whose tables have no deformation, has no soft target.
-    fn check_object_type(&self, task: &Task, scene: &Scene) -> Result<(), CliError> {
-        if self.suite.object_type != ObjectType::Rigid || self.config.is_rigid_twin() {
+    fn check_object_type(&self, task: &Task, scene: &Scene) -> Result<(), RunError> {
+        if self.suite.object_type != ObjectType::Rigid || self.config.rigid_twin {
             return Ok(());
         }
         let name = &task.goal.object;
         let target = scene.objects.iter().find(|object| object.name == *name);
         match target.filter(|object| matches!(object.asset.body, Body::Soft(_))) {
             None => Ok(()),
-            Some(target) => Err(CliError::input(format!(
+            Some(target) => Err(RunError::input(format!(
                 "{}: the target of task {}, {name}, is soft, but suite {} has object_type = \"rigid\"; set \
                  \"deformable\"",
                 target.placed_at, task.id, self.suite.name
@@ -453,21 +462,20 @@ impl<'a> SuiteRun<'a> {
 ///
 /// # Errors
 /// The run is of another suite, seed, split or twin, or lacks episodes.
-pub(crate) fn find_replay_source(
+pub fn find_replay_source(
     config: &RunConfig,
     suite: &Suite,
     jobs: &EpisodeList,
-) -> Result<Option<ReplaySource>, CliError> {
-    let source = |recorded: &RecordedRuns| {
-        recorded.replay_source(&suite.name, config.is_rigid_twin(), config.script.seed, jobs)
-    };
+) -> Result<Option<ReplaySource>, RunError> {
+    let source =
+        |recorded: &RecordedRuns| recorded.replay_source(&suite.name, config.rigid_twin, config.seed, jobs);
     config.policy.recorded().map(source).transpose()
 }
 
 /// Converts the error of a policy server.
-fn policy_failure(error: PolicyError) -> CliError {
+fn policy_failure(error: PolicyError) -> RunError {
     match error {
-        PolicyError::Interrupted | PolicyError::Address { .. } => CliError::input(error),
-        other => CliError::new(Exit::Policy, other),
+        PolicyError::Interrupted | PolicyError::Address { .. } => RunError::input(error),
+        other => RunError::new(Cause::Policy, other),
     }
 }

@@ -5,14 +5,12 @@ use std::{collections::BTreeSet, path::Path};
 use serde::Serialize;
 
 use crate::{
-    error::{CliError, Exit},
-    output::{Progress, eprint_notice},
-    run::{
-        episode_list::{EpisodeJob, EpisodeList},
-        replay::{difference, replay_factory, with_policy_fields},
-        run_manifest::{self, RunManifest},
-        suite_run::SuiteRun,
-    },
+    config::RunConfig,
+    episode_list::{EpisodeJob, EpisodeList},
+    error::{Cause, RunError},
+    replay::{difference, replay_factory, with_policy_fields},
+    run_manifest::{self, RunManifest},
+    suite_run::SuiteRun,
 };
 use softvt_benchmark::Task;
 use softvt_common::cancel;
@@ -24,14 +22,14 @@ use softvt_evaluation::{
 };
 use softvt_report::{
     actions,
-    run_check::contradiction,
+    run_check::{Contradiction, first_contradiction},
     run_folder::{EPISODES, RUN, RunFolder, SUMMARY},
     softvtbench_files,
 };
 use softvt_rollout::FinishedEpisode;
 
 /// The episodes of a finished run, in order, with their summary.
-pub(crate) struct SuiteResult {
+pub struct SuiteResult {
     pub summary: SuiteSummary,
     pub records: Vec<EpisodeRecord>,
 }
@@ -39,7 +37,7 @@ pub(crate) struct SuiteResult {
 /// A simulated episode, and the result of rendering it.
 pub(crate) struct SimulatedEpisode {
     pub finished: FinishedEpisode,
-    pub rendered: Result<(), CliError>,
+    pub rendered: Result<(), RunError>,
 }
 
 /// The folder of a run in progress, and the records of its finished episodes.
@@ -59,7 +57,7 @@ impl<'a> RunLog<'a> {
         folder: RunFolder,
         records: Vec<EpisodeRecord>,
         manifest: &impl Serialize,
-    ) -> Result<Self, CliError> {
+    ) -> Result<Self, RunError> {
         let log = Self { run, folder, records };
         log.check_records()?;
         run_manifest::write(&log.folder, manifest)?;
@@ -68,20 +66,19 @@ impl<'a> RunLog<'a> {
     }
 
     /// Checks that all records are episodes of this run, each at most once.
-    fn check_records(&self) -> Result<(), CliError> {
+    fn check_records(&self) -> Result<(), RunError> {
         let (run, config) = (self.run, self.run.config);
         let path = run.out.join(EPISODES).display().to_string();
         if !self.records.is_empty() && self.folder.read(RUN)?.is_none() {
-            return Err(CliError::input(format!(
+            return Err(RunError::input(format!(
                 "{path}: there is no {RUN} next to it, so its run is not known"
             )));
         }
         let mut seen = BTreeSet::new();
         for (number, record) in self.records.iter().enumerate() {
             let (header, id, index) = (&record.header, &record.header.id, record.header.id.index());
-            let is_own = id.suite == run.name
-                && id.base_seed == config.script.seed
-                && header.policy == config.policy.name;
+            let is_own =
+                id.suite == run.name && id.base_seed == config.seed && header.policy == config.policy.name;
             let problem = if !is_own || run.jobs.find(index).is_none() {
                 "belongs to another run"
             } else if !seen.insert(index) {
@@ -89,25 +86,20 @@ impl<'a> RunLog<'a> {
             } else {
                 continue;
             };
-            return Err(CliError::input(format!("{path}:{}: {index} {problem}", number + 1)));
+            return Err(RunError::input(format!("{path}:{}: {index} {problem}", number + 1)));
         }
         Ok(())
     }
 
     /// Checks that no record contradicts the manifest of the run.
-    fn check_contradictions(&self, manifest: &impl Serialize) -> Result<(), CliError> {
+    fn check_contradictions(&self, manifest: &impl Serialize) -> Result<(), RunError> {
         let manifest = serde_json::to_value(manifest).unwrap_or_default();
-        for (number, record) in self.records.iter().enumerate() {
-            if let Some(what) = contradiction(&manifest, record) {
-                let at = self.run.out.join(EPISODES);
-                return Err(CliError::input(format!(
-                    "{}:{}: the record contradicts {RUN}: {what}; it was changed after the episode",
-                    at.display(),
-                    number + 1
-                )));
-            }
-        }
-        Ok(())
+        first_contradiction(&manifest, &self.records).map_or(Ok(()), |Contradiction { line, what }| {
+            Err(RunError::input(format!(
+                "{}:{line}: the record contradicts {RUN}: {what}; it was changed after the episode",
+                self.run.out.join(EPISODES).display()
+            )))
+        })
     }
 
     /// Runs jobs. Writes the files of each finished episode, and then its line.
@@ -118,24 +110,28 @@ impl<'a> RunLog<'a> {
         &mut self,
         name: &str,
         jobs: &EpisodeList<'j>,
-        simulate: impl Fn(EpisodeJob<'j>) -> Result<SimulatedEpisode, CliError> + Sync,
-        write: impl Fn(&FinishedEpisode) -> Result<(), CliError>,
-        line: fn(&EpisodeRecord) -> String,
-    ) -> Result<(), CliError> {
-        let mut progress = Progress::new(jobs.len(), name);
-        parallel::run(
+        simulate: impl Fn(EpisodeJob<'j>) -> Result<SimulatedEpisode, RunError> + Sync,
+        write: impl Fn(&FinishedEpisode) -> Result<(), RunError>,
+        mut line: impl FnMut(&EpisodeRecord) -> String,
+    ) -> Result<(), RunError> {
+        let config = self.run.config;
+        let observer = &config.observer;
+        observer.begin(jobs.len(), name);
+        let outcome = parallel::run(
             jobs.len(),
-            self.run.config.threads(),
+            config.threads(),
             cancel::requested,
             |position| simulate(jobs.job(position)),
             |_, SimulatedEpisode { finished, rendered }| {
                 let (index, message) = (finished.record.header.id.index(), line(&finished.record));
                 self.add(finished, &write)?;
-                progress.tick(&message);
-                report_unrendered(index, rendered);
+                observer.advance(&message);
+                report_unrendered(config, index, rendered);
                 Ok(())
             },
-        )
+        );
+        observer.end();
+        outcome
     }
 
     /// Writes the files of a finished episode, and then its line, so that every listed episode is complete.
@@ -145,8 +141,8 @@ impl<'a> RunLog<'a> {
     pub(crate) fn add(
         &mut self,
         finished: FinishedEpisode,
-        write: impl Fn(&FinishedEpisode) -> Result<(), CliError>,
-    ) -> Result<(), CliError> {
+        write: impl Fn(&FinishedEpisode) -> Result<(), RunError>,
+    ) -> Result<(), RunError> {
         write(&finished)?;
         self.folder.append(&finished.record)?;
         self.records.push(finished.record);
@@ -157,7 +153,7 @@ impl<'a> RunLog<'a> {
     ///
     /// # Errors
     /// The folder cannot be written.
-    pub(crate) fn sort(&mut self) -> Result<(), CliError> {
+    pub(crate) fn sort(&mut self) -> Result<(), RunError> {
         self.records.sort_by_key(|record| record.header.id.index());
         Ok(self.folder.write_in_order(&self.records)?)
     }
@@ -166,7 +162,7 @@ impl<'a> RunLog<'a> {
     ///
     /// # Errors
     /// A file cannot be removed.
-    pub(crate) fn discard(self) -> Result<(), CliError> {
+    pub(crate) fn discard(self) -> Result<(), RunError> {
         Ok(self.folder.discard()?)
     }
 
@@ -174,7 +170,7 @@ impl<'a> RunLog<'a> {
     ///
     /// # Errors
     /// A file cannot be written.
-    pub(crate) fn write_results(&mut self) -> Result<(), CliError> {
+    pub(crate) fn write_results(&mut self) -> Result<(), RunError> {
         self.sort()?;
         let calibrations = self.run.calibrations.clone().unwrap_or_default();
         softvtbench_files::write_scores(&self.run.out, &self.records, &calibrations.merged)?;
@@ -185,7 +181,7 @@ impl<'a> RunLog<'a> {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub(crate) fn write_summary(&self) -> Result<(), CliError> {
+    pub(crate) fn write_summary(&self) -> Result<(), RunError> {
         Ok(files::write_json(&self.run.out.join(SUMMARY), &self.summary())?)
     }
 
@@ -199,26 +195,31 @@ impl<'a> RunLog<'a> {
 ///
 /// # Errors
 /// The outcome is an error, or the run was interrupted.
-pub(crate) fn with_kept(outcome: Result<(), CliError>, kept: &str, hint: &str) -> Result<(), CliError> {
+pub(crate) fn with_kept(outcome: Result<(), RunError>, kept: &str, hint: &str) -> Result<(), RunError> {
     match outcome {
         // An error from before the interrupt has its own exit code and is reported as it is.
-        Err(error) if error.exit != Exit::Interrupted => Err(error.with_line(kept)),
+        Err(error) if error.cause != Cause::Interrupt => Err(error.with_line(kept)),
         Ok(()) if !cancel::requested() => Ok(()),
-        _ => Err(CliError::interrupted(format!("interrupted; {kept}{hint}"))),
+        _ => Err(RunError::interrupted(format!("interrupted; {kept}{hint}"))),
     }
 }
 
-/// Runs the episodes of a prepared suite into its folder. Episodes that are there already are kept.
+/// Runs the episodes of a prepared suite into its folder, and calls `on_episode` for each, in the order in which they end.
+/// Episodes that are there already are kept.
 ///
 /// # Errors
 /// The folder contains another run, or one that may not be resumed; a script, policy or file fails; or the run is
 /// interrupted. Finished episodes are kept.
-pub(crate) fn run_suite(run: &SuiteRun, tasks: &[&Task]) -> Result<SuiteResult, CliError> {
+pub(crate) fn run_suite(
+    run: &SuiteRun,
+    tasks: &[&Task],
+    on_episode: &mut dyn FnMut(&EpisodeRecord),
+) -> Result<SuiteResult, RunError> {
     let config = run.config;
-    let manifest = RunManifest::new(run, tasks, config.flags.episodes.unwrap_or(run.suite.episodes));
+    let manifest = RunManifest::new(run, tasks, config.episodes_of(run.suite));
     // The same command again on a finished folder changes nothing, even without --resume.
     let finished = is_finished(&run.out) && run_manifest::is_in(&run.out, &manifest)?;
-    let opened = match config.flags.resume || finished {
+    let opened = match config.resume || finished {
         true => RunFolder::resume(&run.out),
         false => RunFolder::create(&run.out).map(|folder| (folder, Vec::new())),
     };
@@ -232,7 +233,7 @@ pub(crate) fn run_suite(run: &SuiteRun, tasks: &[&Task]) -> Result<SuiteResult, 
         && softvtbench_files::has_scores(&run.out)
         && log.records.iter().all(|record| artifacts.missing(record).is_empty())
     {
-        eprint_notice(format!("{out} is already complete"));
+        config.notice(format!("{out} is already complete"));
         return Ok(SuiteResult { summary: log.summary(), records: log.records });
     }
     let simulate = |job: EpisodeJob| {
@@ -241,10 +242,14 @@ pub(crate) fn run_suite(run: &SuiteRun, tasks: &[&Task]) -> Result<SuiteResult, 
         Ok(SimulatedEpisode { finished, rendered })
     };
     let outcome = restore_artifacts(run, &log.records).and_then(|()| {
-        log.run_jobs(&run.name, &remaining, simulate, |finished| artifacts.write(finished), episode_line)
+        let line = |record: &EpisodeRecord| {
+            on_episode(record);
+            episode_line(record)
+        };
+        log.run_jobs(&run.name, &remaining, simulate, |finished| artifacts.write(finished), line)
     });
     match outcome {
-        Err(error) if error.exit != Exit::Interrupted && log.records.is_empty() => {
+        Err(error) if error.cause != Cause::Interrupt && log.records.is_empty() => {
             log.discard()?;
             return Err(error);
         }
@@ -255,8 +260,40 @@ pub(crate) fn run_suite(run: &SuiteRun, tasks: &[&Task]) -> Result<SuiteResult, 
         }
     }
     log.write_results()?;
-    eprint_notice(out);
+    config.notice(out);
     Ok(SuiteResult { summary: log.summary(), records: log.records })
+}
+
+/// Runs the episodes of a prepared suite and writes nothing. Calls `on_episode` for each, in the order in which they end.
+///
+/// # Errors
+/// A script or policy fails, or a request to stop.
+pub(crate) fn run_episodes(
+    run: &SuiteRun,
+    on_episode: &mut dyn FnMut(&EpisodeRecord),
+) -> Result<SuiteResult, RunError> {
+    let (config, mut records) = (run.config, Vec::new());
+    config.observer.begin(run.jobs.len(), &run.name);
+    let outcome = parallel::run(
+        run.jobs.len(),
+        config.threads(),
+        cancel::requested,
+        |position| run.run_episode(run.jobs.job(position), false, &run.controllers),
+        |_, finished| {
+            on_episode(&finished.record);
+            config.observer.advance(&episode_line(&finished.record));
+            records.push(finished.record);
+            Ok(())
+        },
+    );
+    config.observer.end();
+    outcome?;
+    if cancel::requested() {
+        return Err(RunError::interrupted("interrupted"));
+    }
+    records.sort_by_key(|record| record.header.id.index());
+    let summary = SuiteSummary::from_records(&run.name, &config.policy.name, &records);
+    Ok(SuiteResult { summary, records })
 }
 
 /// True if a folder contains a finished run.
@@ -265,9 +302,9 @@ pub(crate) fn is_finished(dir: &Path) -> bool {
 }
 
 /// Reports an episode whose video could not be written. The episode counts nevertheless.
-fn report_unrendered(index: EpisodeIndex, rendered: Result<(), CliError>) {
+fn report_unrendered(config: &RunConfig, index: EpisodeIndex, rendered: Result<(), RunError>) {
     if let Err(error) = rendered {
-        eprint_notice(format!("no video of {index}: {}", error.message));
+        config.notice(format!("no video of {index}: {}", error.message));
     }
 }
 
@@ -305,27 +342,27 @@ pub(crate) fn episode_line(record: &EpisodeRecord) -> String {
 ///
 /// # Errors
 /// An episode cannot be run, or a file cannot be written.
-pub(crate) fn restore_artifacts(run: &SuiteRun, records: &[EpisodeRecord]) -> Result<(), CliError> {
+pub(crate) fn restore_artifacts(run: &SuiteRun, records: &[EpisodeRecord]) -> Result<(), RunError> {
     let artifacts = run.artifacts();
     let incomplete = records.iter().filter(|record| !artifacts.missing(record).is_empty());
     let has_actions = |record: &EpisodeRecord| artifacts.has_actions(record);
     for record in records {
         let path = actions::path(&run.out, record.header.id.index());
         if let (true, Err(damage)) = (path.is_file(), actions::verify(&run.out, record)) {
-            eprint_notice(damage);
+            run.config.notice(damage);
         }
     }
     let (restorable, lost): (Vec<_>, Vec<_>) =
         incomplete.partition(|record| has_actions(record) || run.config.policy.profile().is_none());
     if let Some(first) = lost.first() {
-        eprint_notice(format!(
+        run.config.notice(format!(
             "{} finished episodes lack their actions, so their files cannot be restored (first: {}); their results stay",
             lost.len(),
             first.header.id.index()
         ));
     }
     if let Some(path) = restorable.first().and_then(|record| artifacts.missing(record).into_iter().next()) {
-        eprint_notice(format!(
+        run.config.notice(format!(
             "restoring files of {} (first: {})",
             counted(restorable.len(), "finished episode"),
             path.display()
@@ -342,7 +379,7 @@ pub(crate) fn restore_artifacts(run: &SuiteRun, records: &[EpisodeRecord]) -> Re
         |_, simulated| {
             let Some(SimulatedEpisode { finished, rendered }) = simulated else { return Ok(()) };
             artifacts.write(&finished)?;
-            report_unrendered(finished.record.header.id.index(), rendered);
+            report_unrendered(run.config, finished.record.header.id.index(), rendered);
             Ok(())
         },
     )
@@ -353,7 +390,7 @@ fn simulate_again(
     run: &SuiteRun,
     record: &EpisodeRecord,
     has_actions: bool,
-) -> Result<Option<SimulatedEpisode>, CliError> {
+) -> Result<Option<SimulatedEpisode>, RunError> {
     let (index, artifacts) = (record.header.id.index(), run.artifacts());
     let Some(job) = run.jobs.find(index) else { return Ok(None) };
     let keep_states = artifacts.may_render(index.episode);
@@ -366,7 +403,7 @@ fn simulate_again(
     };
     finished.record = with_policy_fields(finished.record, record);
     if let Some(difference) = difference(record, &finished.record)? {
-        eprint_notice(format!(
+        run.config.notice(format!(
             "files of {index} are not restored: the simulation differs from its record ({difference}); its results stay"
         ));
         return Ok(None);
@@ -378,7 +415,6 @@ fn simulate_again(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::config::{RunConfig, ScriptArgs};
     use softvt_benchmark::Plan;
     use softvt_policy::{Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief};
     use softvt_rollout::{ChunkedPolicy, Controller};
@@ -402,15 +438,14 @@ mod tests {
         }
     }
 
-    fn force_observer(_: EpisodeSetup, brief: TaskBrief) -> Result<Box<dyn Controller>, CliError> {
+    fn force_observer(_: EpisodeSetup, brief: TaskBrief) -> Result<Box<dyn Controller>, RunError> {
         Ok(Box::new(ChunkedPolicy::new(Box::new(ForceObserver), brief, 1)))
     }
 
     #[test]
     fn every_file_of_a_run_records_whether_the_policy_observed_true_forces() {
-        let script = ScriptArgs { file: "suites/spatial_soft.lua".into(), ..ScriptArgs::default() };
-        let config = RunConfig { script, ..RunConfig::default() };
-        let loaded = config.load_script().expect("it loads");
+        let config = RunConfig { file: "suites/spatial_soft.lua".into(), ..RunConfig::default() };
+        let loaded = config.load().expect("it loads");
         let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
         let mut suite = suite.clone();
         suite.tasks.truncate(1);
@@ -425,7 +460,7 @@ mod tests {
                 run.controllers = Box::new(force_observer);
             }
             run.prepare(&tasks).expect("the scenes are valid");
-            run_suite(&run, &tasks).expect("it runs");
+            run_suite(&run, &tasks, &mut |_| ()).expect("it runs");
             for file in [RUN, EPISODES, SUMMARY] {
                 let text = std::fs::read_to_string(dir.join(file)).expect("written");
                 let value: serde_json::Value = serde_json::from_str(&text).expect("one document");

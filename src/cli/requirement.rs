@@ -122,7 +122,7 @@ mod tests {
     fn summary(safe: usize, of: usize) -> SuiteSummary {
         let records: Vec<_> = (0..of)
             .map(|i| {
-                let record = include_str!("../../../tests/data/episode_record.json");
+                let record = include_str!("../../tests/data/episode_record.json");
                 let mut record: EpisodeRecord = serde_json::from_str(record).expect("a valid record");
                 record.header.id.episode = i as u32;
                 record.verdict.safety = i < safe;

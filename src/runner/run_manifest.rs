@@ -9,8 +9,8 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::{
-    error::CliError,
-    run::{recorded_runs::ReplaySource, suite_run::SuiteRun},
+    error::RunError,
+    {recorded_runs::ReplaySource, suite_run::SuiteRun},
 };
 use softvt_benchmark::{
     Needs, ShiftValue, Task, seed::SecretSeed, settings::Settings, variation::VariationRanges,
@@ -103,11 +103,11 @@ impl<'a> RunManifest<'a> {
             softvt: env!("CARGO_PKG_VERSION"),
             script: run.loaded.sources.main.clone(),
             suite: &run.suite.name,
-            twin: config.is_rigid_twin().then_some("rigid"),
+            twin: config.rigid_twin.then_some("rigid"),
             variation: run.suite.vary.as_ref(),
-            vary: config.script.vary.as_ref().map(|file| file.display().to_string()),
+            vary: config.vary.as_ref().map(|file| file.display().to_string()),
             // Of the suite as it is: neither of its twin, nor with another variation.
-            needs: run.suite.needs.filter(|_| config.script.vary.is_none() && !config.is_rigid_twin()),
+            needs: run.suite.needs.filter(|_| config.vary.is_none() && !config.rigid_twin),
             twin_of: run.suite.twin_of.as_deref(),
             policy: &config.policy.name,
             profile: config.policy.profile(),
@@ -118,15 +118,15 @@ impl<'a> RunManifest<'a> {
             imported: Some(&run.imported[..]).filter(|files| !files.is_empty()),
             replan: config.policy.replan,
             privileged: run.is_privileged(),
-            seed: config.script.seed,
+            seed: config.seed,
             seed_hash: config.secret.as_ref().map(SecretSeed::hash),
             split: run.split.name(),
             tasks: tasks.iter().map(|task| task.id).collect(),
             episodes,
-            shard: config.flags.shard.map(|shard| shard.to_string()),
+            shard: config.shard.map(|shard| shard.to_string()),
             shifts: &config.shifts,
             options: options.map(|option| (option.name.clone(), format!("{:?}", option.value))).collect(),
-            arguments: &config.script.options,
+            arguments: &config.options,
             set: &config.settings,
             settings: &run.settings,
             sources: run.sources.clone(),
@@ -149,7 +149,7 @@ struct LocatedManifest<'a, M> {
 ///
 /// # Errors
 /// The file cannot be written.
-pub(crate) fn write_new(dir: &Path, manifest: &impl Serialize) -> Result<(), CliError> {
+pub(crate) fn write_new(dir: &Path, manifest: &impl Serialize) -> Result<(), RunError> {
     let folder = std::env::current_dir().map(|dir| dir.display().to_string()).unwrap_or_default();
     Ok(files::write_json(&dir.join(RUN), &LocatedManifest { manifest, folder })?)
 }
@@ -158,18 +158,18 @@ pub(crate) fn write_new(dir: &Path, manifest: &impl Serialize) -> Result<(), Cli
 ///
 /// # Errors
 /// The file cannot be written, or belongs to another run.
-pub(crate) fn write(folder: &RunFolder, manifest: &impl Serialize) -> Result<(), CliError> {
+pub(crate) fn write(folder: &RunFolder, manifest: &impl Serialize) -> Result<(), RunError> {
     let path = folder.path().join(RUN);
     let Some(stored) = folder.read(RUN)? else {
         return write_new(folder.path(), manifest);
     };
     let path = path.display();
     let mut stored: Value = serde_json::from_str(&stored)
-        .map_err(|error| CliError::input(format!("{path} is not a valid run file: {error}")))?;
+        .map_err(|error| RunError::input(format!("{path} is not a valid run file: {error}")))?;
     stored_run::remove_folder(&mut stored);
     match difference(&stored, &json!(manifest)) {
         None => Ok(()),
-        Some(what) => Err(CliError::input(format!(
+        Some(what) => Err(RunError::input(format!(
             "{path} belongs to another run: {what}; resume it with its original arguments, or select another --out"
         ))),
     }
@@ -179,7 +179,7 @@ pub(crate) fn write(folder: &RunFolder, manifest: &impl Serialize) -> Result<(),
 ///
 /// # Errors
 /// The file cannot be read.
-pub(crate) fn is_in(dir: &Path, manifest: &RunManifest) -> Result<bool, CliError> {
+pub(crate) fn is_in(dir: &Path, manifest: &RunManifest) -> Result<bool, RunError> {
     let text = files::read_text(&dir.join(RUN))?;
     Ok(serde_json::from_str::<Value>(&text).is_ok_and(|mut stored| {
         stored_run::remove_folder(&mut stored);

@@ -2,32 +2,27 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::{
-    error::CliError,
-    output::{eprint_notice, print},
-    run::{
-        config::{RunConfig, Twin},
-        evaluate::{is_finished, run_suite},
-        policy::PolicyConfig,
-        selection::{path_component, select_episodes, select_tasks},
-        suite_run::SuiteRun,
-    },
+    config::RunConfig,
+    error::RunError,
+    evaluate::{is_finished, run_suite},
+    policy::PolicyConfig,
+    selection::{path_component, select_episodes, select_tasks},
+    suite_run::SuiteRun,
 };
 use softvt_benchmark::{Condition, ObjectType, REFERENCE, Suite, Task};
 use softvt_common::{files::replace, text};
 use softvt_evaluation::summary::method_label;
 use softvt_report::{
-    condition_table::{
-        ConditionOutcome, ConditionRow, ConditionTable, compares_policies, controllers_table, table,
-    },
+    condition_table::{ConditionOutcome, ConditionRow, ConditionTable},
     run_folder::RunFolder,
 };
 use softvt_script::{GripMode, LoadedScript};
 
 /// Name of the file with the comparison of all suites, in the folder above all runs.
-const FILE: &str = "conditions.json";
+pub const FILE: &str = "conditions.json";
 
 /// A suite under one condition, or the unchanged reference.
 struct ConditionCase {
@@ -40,19 +35,28 @@ struct ConditionCase {
     not_applicable: Option<String>,
 }
 
-/// Runs every suite unchanged and under each condition, and prints one table per suite. All scenes and folders are
-/// checked before the first episode runs.
+/// Results of all suites under all conditions.
+pub struct ConditionResults {
+    /// One table per suite.
+    pub tables: Vec<ConditionTable>,
+    /// Content of `conditions.json`.
+    pub document: Value,
+}
+
+/// Runs every suite unchanged and under each condition. All scenes and folders are checked before the first episode runs.
+/// `on_suite` is called with the tables so far after each suite.
 ///
 /// # Errors
 /// A condition that does not fit a suite, a folder that contains a run, or an episode that fails.
 /// Finished runs are kept.
-pub(crate) fn run(
+pub fn run<E: From<RunError>>(
     config: &RunConfig,
     loaded: &LoadedScript,
     suites: &[Suite],
     conditions: &[Condition],
     out: &Path,
-) -> Result<(), CliError> {
+    mut on_suite: impl FnMut(&[ConditionTable]) -> Result<(), E>,
+) -> Result<ConditionResults, E> {
     let cases: Vec<Vec<ConditionCase>> = suites
         .iter()
         .map(|suite| condition_cases(config, suite, conditions, suites.len() > 1))
@@ -66,34 +70,28 @@ pub(crate) fn run(
     for ((suite, cases), (runs, tasks)) in suites.iter().zip(&cases).zip(prepared) {
         let compared = compare_conditions(config, suite, cases, runs, &tasks)?;
         tables.push(compared);
-        // Policies are printed side by side, once all have run.
-        if !config.flags.json && !compares_policies(&tables) {
-            print(&table(&tables[tables.len() - 1]))?;
-        }
+        on_suite(&tables)?;
     }
-    if !config.flags.json && compares_policies(&tables) {
-        print(&controllers_table(&tables))?;
-    }
-    write(config, loaded, &tables, out)
+    let document = write(config, loaded, &tables, out)?;
+    Ok(ConditionResults { tables, document })
 }
 
 /// Checks that every condition can be applied to every suite, on the first task of each.
 ///
 /// # Errors
 /// The first condition or scene that is not valid.
-pub(crate) fn check(
+pub fn check(
     config: &RunConfig,
     loaded: &LoadedScript,
     suites: &[Suite],
     conditions: &[Condition],
-) -> Result<(), CliError> {
+) -> Result<(), RunError> {
     for suite in suites {
         let first: Vec<&Task> = suite.tasks.iter().take(1).collect();
         let cases = condition_cases(config, suite, conditions, false)?;
         prepare_runs(loaded, suite, &cases, &first, Path::new(""))?;
     }
-    let names: Vec<&str> = conditions.iter().map(|condition| condition.name.as_str()).collect();
-    print(&format!("conditions: {REFERENCE}, {}\n", text::escape_control(&names.join(", "))))
+    Ok(())
 }
 
 /// The reference and all conditions of a suite, in folders below one of the suite if there are several suites.
@@ -102,8 +100,8 @@ fn condition_cases(
     suite: &Suite,
     conditions: &[Condition],
     has_suite_folder: bool,
-) -> Result<Vec<ConditionCase>, CliError> {
-    let object_type = if config.is_rigid_twin() { ObjectType::Rigid } else { suite.object_type };
+) -> Result<Vec<ConditionCase>, RunError> {
+    let object_type = if config.rigid_twin { ObjectType::Rigid } else { suite.object_type };
     let parent = match has_suite_folder {
         true => format!("{}/", path_component(&config.suite_name(suite))),
         false => String::new(),
@@ -129,11 +127,11 @@ fn condition_cases(
         changed.shifts.extend(condition.shift.iter().cloned());
         changed.settings.extend(condition.set.iter().cloned());
         if let Some(name) = &condition.policy {
-            changed.policy = PolicyConfig::builtin(name)
+            changed.policy = PolicyConfig::named(name)
                 .map_err(|error| config.error(format!("condition {:?}: policy: {error}", condition.name)))?;
         }
         if condition.rigid_twin {
-            changed.script.twin = Some(Twin::Rigid);
+            changed.rigid_twin = true;
         }
         let not_applicable = not_applicable(condition, object_type);
         // Settings of the command line are checked with the reference.
@@ -166,20 +164,20 @@ fn prepare_runs<'a>(
     cases: &'a [ConditionCase],
     tasks: &[&'a Task],
     out: &Path,
-) -> Result<Vec<Option<SuiteRun<'a>>>, CliError> {
+) -> Result<Vec<Option<SuiteRun<'a>>>, RunError> {
     let mut runs: Vec<Option<SuiteRun>> = Vec::new();
     for case in cases {
         if case.not_applicable.is_some() {
             runs.push(None);
             continue;
         }
-        let in_case = |error: CliError| match case.condition.name == REFERENCE {
+        let in_case = |error: RunError| match case.condition.name == REFERENCE {
             true => error,
             false => error.within(&format!("suite {}, condition {:?}", suite.name, case.condition.name)),
         };
         let dir: PathBuf = out.join(&case.folder);
         // A finished run is left unchanged, and an interrupted one is continued on request.
-        if !(case.config.flags.resume || is_finished(&dir)) {
+        if !(case.config.resume || is_finished(&dir)) {
             RunFolder::check_vacant(&dir).map_err(|error| case.config.error(error))?;
         }
         let jobs = select_episodes(&case.config, suite, tasks);
@@ -199,15 +197,15 @@ fn compare_conditions(
     cases: &[ConditionCase],
     runs: Vec<Option<SuiteRun>>,
     tasks: &[&Task],
-) -> Result<ConditionTable, CliError> {
+) -> Result<ConditionTable, RunError> {
     let (mut reference, mut force_observed) = (None, false);
     let mut rows = Vec::new();
     for (case, run) in cases.iter().zip(runs) {
         let mut outcome = None;
         if let Some(run) = run {
             let (name, number) = (text::escape_control(&case.condition.name), rows.len() + 1);
-            eprint_notice(format!("{}, {name} ({number} of {})", suite.name, cases.len()));
-            let result = run_suite(&run, tasks)?;
+            config.notice(format!("{}, {name} ({number} of {})", suite.name, cases.len()));
+            let result = run_suite(&run, tasks, &mut |_| ())?;
             outcome = Some(ConditionOutcome::new(case.folder.clone(), &result.records, reference.as_deref()));
             reference.get_or_insert(result.records);
             force_observed |= result.summary.force_observed;
@@ -223,7 +221,7 @@ fn compare_conditions(
             not_applicable: case.not_applicable.clone(),
         });
     }
-    let deformable = suite.object_type == ObjectType::Deformable && !config.is_rigid_twin();
+    let deformable = suite.object_type == ObjectType::Deformable && !config.rigid_twin;
     let policy = method_label(&config.policy.name, config.policy.privileged, force_observed);
     Ok(ConditionTable { suite: config.suite_name(suite), policy, deformable, rows })
 }
@@ -238,23 +236,17 @@ fn write(
     loaded: &LoadedScript,
     tables: &[ConditionTable],
     out: &Path,
-) -> Result<(), CliError> {
+) -> Result<Value, RunError> {
     let mut document = json!({
         "softvt": env!("CARGO_PKG_VERSION"),
         "script": loaded.sources.main,
         "policy": config.policy.name,
-        "seed": config.script.seed,
+        "seed": config.seed,
         "suites": tables,
     });
     if let Some(secret) = &config.secret {
         document["seed_hash"] = json!(secret.hash());
     }
-    let text = format!("{document:#}\n");
-    let path = out.join(FILE);
-    replace(&path, &text)?;
-    if config.flags.json {
-        print(&text)?;
-    }
-    eprint_notice(path.display());
-    Ok(())
+    replace(&out.join(FILE), format!("{document:#}\n"))?;
+    Ok(document)
 }

@@ -3,14 +3,14 @@
 use std::{collections::BTreeSet, path::PathBuf};
 
 use crate::{
-    error::CliError,
-    run::{config::RunConfig, episode_list::EpisodeList},
+    error::RunError,
+    {config::RunConfig, episode_list::EpisodeList},
 };
 use softvt_benchmark::{Plan, Suite, Task};
 use softvt_report::run_folder::RunFolder;
 
 /// The suites of a plan that is a suite or a list of suites; empty for other plans.
-pub(crate) fn suites_of(plan: &Plan) -> &[Suite] {
+pub fn suites_of(plan: &Plan) -> &[Suite] {
     match plan {
         Plan::Suite(_) | Plan::Suites { .. } => plan.suites(),
         Plan::Conditions { .. } | Plan::Experiment { .. } => &[],
@@ -18,7 +18,7 @@ pub(crate) fn suites_of(plan: &Plan) -> &[Suite] {
 }
 
 /// An error about a plan without the suites that a command needs.
-pub(crate) fn needs_suites(command: &str, config: &RunConfig) -> CliError {
+pub fn needs_suites(command: &str, config: &RunConfig) -> RunError {
     config.error(format!(
         "softvt {command} needs a suite or a list of suites; name a file that returns softvt.suite"
     ))
@@ -28,11 +28,7 @@ pub(crate) fn needs_suites(command: &str, config: &RunConfig) -> CliError {
 ///
 /// # Errors
 /// The plan is neither a suite nor a list of suites with distinct folders.
-pub(crate) fn select_suites<'a>(
-    command: &str,
-    config: &RunConfig,
-    plan: &'a Plan,
-) -> Result<&'a [Suite], CliError> {
+pub fn select_suites<'a>(command: &str, config: &RunConfig, plan: &'a Plan) -> Result<&'a [Suite], RunError> {
     let suites = suites_of(plan);
     check_distinct_out_dirs(config, suites)?;
     if matches!(plan, Plan::Suite(_) | Plan::Suites { .. }) {
@@ -46,10 +42,10 @@ pub(crate) fn select_suites<'a>(
 ///
 /// # Errors
 /// A word that matches no task, or a task without an expert where the expert is the policy.
-pub(crate) fn select_tasks<'a>(config: &RunConfig, suite: &'a Suite) -> Result<Vec<&'a Task>, CliError> {
+pub fn select_tasks<'a>(config: &RunConfig, suite: &'a Suite) -> Result<Vec<&'a Task>, RunError> {
     let refuse = |message: String| Err(config.error(message));
     let mut selected: Vec<&Task> = Vec::new();
-    for word in &config.flags.tasks {
+    for word in &config.tasks {
         if word.trim().is_empty() {
             return refuse(format!("--task: expected an index or part of a prompt, got {word:?}"));
         }
@@ -71,7 +67,7 @@ pub(crate) fn select_tasks<'a>(config: &RunConfig, suite: &'a Suite) -> Result<V
             ));
         }
     }
-    if config.flags.tasks.is_empty() {
+    if config.tasks.is_empty() {
         selected.extend(&suite.tasks);
     }
     selected.sort_by_key(|task| task.id);
@@ -83,16 +79,16 @@ pub(crate) fn select_tasks<'a>(config: &RunConfig, suite: &'a Suite) -> Result<V
 }
 
 /// All episodes of the tasks, or those of the shard.
-pub(crate) fn select_episodes<'a>(config: &RunConfig, suite: &Suite, tasks: &[&'a Task]) -> EpisodeList<'a> {
-    let episodes = config.flags.episodes.unwrap_or(suite.episodes);
-    EpisodeList::of_tasks(tasks, episodes, config.flags.shard)
+pub fn select_episodes<'a>(config: &RunConfig, suite: &Suite, tasks: &[&'a Task]) -> EpisodeList<'a> {
+    let episodes = config.episodes_of(suite);
+    EpisodeList::of_tasks(tasks, episodes, config.shard)
 }
 
 /// Checks that every suite gets an output folder of its own.
 ///
 /// # Errors
 /// Two suites whose names become the same path component.
-pub(crate) fn check_distinct_out_dirs(config: &RunConfig, suites: &[Suite]) -> Result<(), CliError> {
+pub fn check_distinct_out_dirs(config: &RunConfig, suites: &[Suite]) -> Result<(), RunError> {
     let mut folders = BTreeSet::new();
     let duplicate = suites.iter().find(|suite| !folders.insert(path_component(&suite.name)));
     duplicate.map_or(Ok(()), |suite| {
@@ -105,8 +101,8 @@ pub(crate) fn check_distinct_out_dirs(config: &RunConfig, suites: &[Suite]) -> R
 }
 
 /// Folder of a suite's run in `--out`: that folder itself, or one inside of it for a list of suites.
-pub(crate) fn run_dir(config: &RunConfig, suite: &Suite, is_list: bool) -> Option<PathBuf> {
-    let dir = config.flags.out.as_ref()?;
+pub fn run_dir(config: &RunConfig, suite: &Suite, is_list: bool) -> Option<PathBuf> {
+    let dir = config.out.as_ref()?;
     Some(if is_list { dir.join(path_component(&config.suite_name(suite))) } else { dir.clone() })
 }
 
@@ -114,12 +110,21 @@ pub(crate) fn run_dir(config: &RunConfig, suite: &Suite, is_list: bool) -> Optio
 ///
 /// # Errors
 /// The folder holds something other than runs.
-pub(crate) fn check_parent_folder(config: &RunConfig) -> Result<(), CliError> {
-    let Some(dir) = &config.flags.out else { return Ok(()) };
+pub fn check_parent_folder(config: &RunConfig) -> Result<(), RunError> {
+    let Some(dir) = &config.out else { return Ok(()) };
     RunFolder::check_parent(dir).map_err(|error| config.error(error))
 }
 
 /// Replaces characters of a name that a script could use to leave the output folder.
-pub(crate) fn path_component(name: &str) -> String {
+pub fn path_component(name: &str) -> String {
     name.replace(|c: char| !(c.is_alphanumeric() || c == '_' || c == '-'), "_")
+}
+
+/// The first folder `runs/<name>-<policy>-NNN` that does not exist.
+pub fn next_run_dir(config: &RunConfig, name: &str) -> PathBuf {
+    let (name, policy) = (path_component(name), path_component(&config.policy.name));
+    (1..)
+        .map(|number| PathBuf::from(format!("runs/{name}-{policy}-{number:03}")))
+        .find(|dir| !dir.exists())
+        .unwrap_or_default()
 }

@@ -5,7 +5,7 @@ use std::{
     str::FromStr,
 };
 
-use crate::error::CliError;
+use crate::error::RunError;
 use softvt_common::cancel;
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::files;
@@ -19,7 +19,7 @@ use softvt_rollout::{FinishedEpisode, ScoreFrame};
 
 /// Episodes of a run that become videos.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum VideoSelection {
+pub enum VideoSelection {
     /// All that are not safe.
     Failed,
     All,
@@ -99,7 +99,7 @@ impl EpisodeArtifacts<'_> {
     ///
     /// # Errors
     /// A file cannot be written.
-    pub(crate) fn write(&self, finished: &FinishedEpisode) -> Result<(), CliError> {
+    pub(crate) fn write(&self, finished: &FinishedEpisode) -> Result<(), RunError> {
         let header = &finished.record.header;
         let index = header.id.index();
         if self.trace {
@@ -116,7 +116,7 @@ impl EpisodeArtifacts<'_> {
     ///
     /// # Errors
     /// An image cannot be rendered or written.
-    pub(crate) fn render(&self, finished: &mut FinishedEpisode) -> Result<(), CliError> {
+    pub(crate) fn render(&self, finished: &mut FinishedEpisode) -> Result<(), RunError> {
         let (record, Some(mut states)) = (&finished.record, finished.recording.take()) else { return Ok(()) };
         if !self.is_rendered(record) {
             return Ok(());

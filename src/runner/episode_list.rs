@@ -5,24 +5,24 @@ use std::ops::Range;
 use softvt_benchmark::Task;
 use softvt_common::episode_id::EpisodeIndex;
 
-use crate::run::config::Shard;
+use crate::config::Shard;
 
 /// An episode to run.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct EpisodeJob<'a> {
+pub struct EpisodeJob<'a> {
     pub task: &'a Task,
     pub episode: u32,
 }
 
 impl EpisodeJob<'_> {
-    pub(crate) fn index(&self) -> EpisodeIndex {
+    pub fn index(&self) -> EpisodeIndex {
         EpisodeIndex { task: self.task.id, episode: self.episode }
     }
 }
 
 /// Episodes in the order in which they run. A position in the list counts from 0.
 #[derive(Clone, Debug)]
-pub(crate) struct EpisodeList<'a> {
+pub struct EpisodeList<'a> {
     all: Episodes<'a>,
     /// Positions that are left out, ascending.
     omitted: Vec<usize>,
@@ -41,17 +41,17 @@ enum Episodes<'a> {
 
 impl<'a> EpisodeList<'a> {
     /// Episodes `0..episodes` of each task, task by task; with `shard` only those of this part.
-    pub(crate) fn of_tasks(tasks: &[&'a Task], episodes: u32, shard: Option<Shard>) -> Self {
+    pub fn of_tasks(tasks: &[&'a Task], episodes: u32, shard: Option<Shard>) -> Self {
         Self { all: Episodes::Range { tasks: tasks.to_vec(), episodes, shard }, omitted: Vec::new() }
     }
 
     /// These episodes.
-    pub(crate) fn listed(jobs: Vec<EpisodeJob<'a>>) -> Self {
+    pub fn listed(jobs: Vec<EpisodeJob<'a>>) -> Self {
         Self { all: Episodes::Listed(jobs), omitted: Vec::new() }
     }
 
     /// The list without these episodes.
-    pub(crate) fn without(&self, done: impl Iterator<Item = EpisodeIndex>) -> Self {
+    pub fn without(&self, done: impl Iterator<Item = EpisodeIndex>) -> Self {
         let mut omitted: Vec<usize> = done.filter_map(|index| self.all.position(index)).collect();
         omitted.extend(&self.omitted);
         omitted.sort_unstable();
@@ -59,16 +59,16 @@ impl<'a> EpisodeList<'a> {
         Self { all: self.all.clone(), omitted }
     }
 
-    pub(crate) fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         self.all.len() - self.omitted.len()
     }
 
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
     /// The episode at a position below [`EpisodeList::len`].
-    pub(crate) fn job(&self, position: usize) -> EpisodeJob<'a> {
+    pub fn job(&self, position: usize) -> EpisodeJob<'a> {
         // The k-th omitted position has k before it, so the number of remaining ones before it does not decrease with k.
         let mut before = (0, self.omitted.len());
         while before.0 < before.1 {
@@ -81,18 +81,18 @@ impl<'a> EpisodeList<'a> {
         self.all.job(position + before.0)
     }
 
-    pub(crate) fn iter(&self) -> impl Iterator<Item = EpisodeJob<'a>> + '_ {
+    pub fn iter(&self) -> impl Iterator<Item = EpisodeJob<'a>> + '_ {
         (0..self.len()).map(|position| self.job(position))
     }
 
     /// The episode with this index, if the list has it.
-    pub(crate) fn find(&self, index: EpisodeIndex) -> Option<EpisodeJob<'a>> {
+    pub fn find(&self, index: EpisodeIndex) -> Option<EpisodeJob<'a>> {
         let position = self.all.position(index)?;
         self.omitted.binary_search(&position).is_err().then(|| self.all.job(position))
     }
 
     /// Numbers of the episodes of a task, ascending.
-    pub(crate) fn episodes_of(&self, task: usize) -> impl Iterator<Item = u32> + '_ {
+    pub fn episodes_of(&self, task: usize) -> impl Iterator<Item = u32> + '_ {
         let positions =
             self.all.positions_of(task).filter(|position| self.omitted.binary_search(position).is_err());
         let jobs = positions.map(|position| self.all.job(position));

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use crate::{error::CliError, run::episode_list::EpisodeList};
+use crate::{episode_list::EpisodeList, error::RunError};
 use softvt_common::episode_id::{EpisodeIndex, Split};
 use softvt_common::files::FileError;
 use softvt_policy::{Action, TaskBrief};
@@ -20,14 +20,14 @@ const MAX_LISTED: usize = 3;
 
 /// The runs in a folder, at most one of each suite.
 #[derive(Debug)]
-pub(crate) struct RecordedRuns {
+pub struct RecordedRuns {
     dir: PathBuf,
     runs: Vec<StoredRun>,
 }
 
 /// The run whose actions are repeated, as `run.json` names it.
 #[derive(Clone, Debug, Serialize)]
-pub(crate) struct ReplaySource {
+pub struct ReplaySource {
     /// The folder, as it was typed.
     pub run: String,
     /// Name of the recorded policy.
@@ -45,8 +45,8 @@ impl RecordedRuns {
     ///
     /// # Errors
     /// The folder contains no run, or one cannot be read.
-    pub(crate) fn load(dir: &Path) -> Result<Self, CliError> {
-        let runs = stored_run::load(dir).map_err(|error| CliError::input(error).prefixed("--policy"))?;
+    pub fn load(dir: &Path) -> Result<Self, RunError> {
+        let runs = stored_run::load(dir).map_err(|error| RunError::input(error).prefixed("--policy"))?;
         Ok(Self { dir: dir.to_owned(), runs })
     }
 
@@ -58,17 +58,17 @@ impl RecordedRuns {
     ///
     /// # Errors
     /// The run is of another suite, seed, split or twin, or lacks some of `episodes`.
-    pub(crate) fn replay_source(
+    pub fn replay_source(
         &self,
         suite: &str,
         is_twin: bool,
         base_seed: u64,
         requested: &EpisodeList,
-    ) -> Result<ReplaySource, CliError> {
+    ) -> Result<ReplaySource, RunError> {
         let run = self.run_of(suite, is_twin).ok_or_else(|| {
             let available: Vec<String> =
                 self.runs.iter().map(|run| suite_label(run.text("suite"), is_rigid_twin(run))).collect();
-            CliError::input(format!(
+            RunError::input(format!(
                 "--policy {}: no run of suite {}; available: {}",
                 self.dir.display(),
                 suite_label(suite, is_twin),
@@ -76,7 +76,7 @@ impl RecordedRuns {
             ))
         })?;
         let refuse =
-            |message: String| Err(CliError::input(format!("--policy {}: {message}", run.dir.display())));
+            |message: String| Err(RunError::input(format!("--policy {}: {message}", run.dir.display())));
         let seed = run.manifest["seed"].as_u64();
         if seed != Some(base_seed) {
             let seed = seed.map_or("unknown".to_owned(), |seed| seed.to_string());
@@ -114,12 +114,7 @@ impl RecordedRuns {
     ///
     /// # Errors
     /// The actions cannot be read.
-    pub(crate) fn actions(
-        &self,
-        suite: &str,
-        is_twin: bool,
-        brief: &TaskBrief,
-    ) -> Result<Vec<Action>, CliError> {
+    pub fn actions(&self, suite: &str, is_twin: bool, brief: &TaskBrief) -> Result<Vec<Action>, RunError> {
         let dir = self.run_of(suite, is_twin).map_or(&self.dir, |run| &run.dir);
         Ok(actions::read(&actions::path(dir, brief.index()))?)
     }

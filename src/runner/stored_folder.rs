@@ -8,7 +8,7 @@ use std::{
 
 use serde_json::Value;
 
-use crate::{error::CliError, output::eprint_notice, run::replay::demos_of};
+use crate::{error::RunError, observer::Observer, replay::demos_of};
 use softvt_common::files::{self, FileError};
 use softvt_dataset::{TaskFile, layout::ATTEMPTS};
 use softvt_report::{run_folder::RUN, stored_run::StoredRun};
@@ -18,8 +18,8 @@ use softvt_report::{run_folder::RUN, stored_run::StoredRun};
 ///
 /// # Errors
 /// The script is in none of the folders.
-pub(crate) fn enter_for_run(run: &StoredRun) -> Result<PathBuf, CliError> {
-    enter(&run.dir, run.text("script"), run.manifest["folder"].as_str())
+pub fn enter_for_run(run: &StoredRun, observer: &dyn Observer) -> Result<PathBuf, RunError> {
+    enter(&run.dir, run.text("script"), run.manifest["folder"].as_str(), observer)
 }
 
 /// Makes the folder of a recording the working folder, unless its script is in the present one. Returns the path of the
@@ -27,15 +27,15 @@ pub(crate) fn enter_for_run(run: &StoredRun) -> Result<PathBuf, CliError> {
 ///
 /// # Errors
 /// The dataset cannot be read, or the script is in none of the folders.
-pub(crate) fn enter_for_dataset(path: &Path) -> Result<PathBuf, CliError> {
+pub fn enter_for_dataset(path: &Path, observer: &dyn Observer) -> Result<PathBuf, RunError> {
     let Some(demo) = demos_of(path)?.into_iter().next() else { return Ok(path.to_owned()) };
     let environment = TaskFile::open(&demo.file)?.environment()?;
     let folder = recording_folder(&demo.file)?;
-    enter(path, environment["env_kwargs"]["script"].as_str().unwrap_or_default(), folder.as_deref())
+    enter(path, environment["env_kwargs"]["script"].as_str().unwrap_or_default(), folder.as_deref(), observer)
 }
 
 /// The folder in which the recording of an HDF5 file was made, as its attempts state it.
-fn recording_folder(file: &Path) -> Result<Option<String>, CliError> {
+fn recording_folder(file: &Path) -> Result<Option<String>, RunError> {
     let file = std::path::absolute(file).map_err(FileError::io("locate", file))?;
     let attempts = file.ancestors().map(|folder| folder.join(ATTEMPTS)).find(|folder| folder.is_dir());
     let suites = attempts.and_then(|attempts| fs::read_dir(attempts).ok());
@@ -49,7 +49,12 @@ fn recording_folder(file: &Path) -> Result<Option<String>, CliError> {
 
 /// Makes the folder that has `script` the working folder: the present one, `stored`, or one above `path`. Returns `path`
 /// from there.
-fn enter(path: &Path, script: &str, stored: Option<&str>) -> Result<PathBuf, CliError> {
+fn enter(
+    path: &Path,
+    script: &str,
+    stored: Option<&str>,
+    observer: &dyn Observer,
+) -> Result<PathBuf, RunError> {
     if Path::new(script).is_file() {
         return Ok(path.to_owned());
     }
@@ -57,14 +62,14 @@ fn enter(path: &Path, script: &str, stored: Option<&str>) -> Result<PathBuf, Cli
     let folders = stored.map(Path::new).into_iter().chain(absolute.ancestors().skip(1));
     if let Some(folder) = folders.into_iter().find(|folder| folder.join(script).is_file()) {
         std::env::set_current_dir(folder).map_err(FileError::io("enter the folder", folder))?;
-        eprint_notice(format!("using {script} in {}", folder.display()));
+        observer.notice(&format!("using {script} in {}", folder.display()));
         return Ok(absolute);
     }
     if softvt_script::embedded(script).is_some() {
         return Ok(path.to_owned());
     }
     let made_in = stored.map_or(String::new(), |folder| format!(" nor in {folder}, where it was made"));
-    Err(CliError::input(format!(
+    Err(RunError::input(format!(
         "{}: its script {script} is neither in the working folder{made_in}; change to the folder that contains it",
         path.display()
     )))

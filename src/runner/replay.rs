@@ -3,27 +3,26 @@
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
 use crate::{
-    error::{CliError, Exit},
-    output::print,
-    run::{
-        config::{RunConfig, RunFlags, ScriptArgs, Twin, thread_count},
-        episode_list::{EpisodeJob, EpisodeList},
-        policy::{ControllerFactory, PolicyConfig},
-        run_manifest,
-        selection::{select_tasks, suites_of},
-        suite_run::SuiteRun,
-    },
+    config::{RunConfig, thread_count},
+    episode_list::{EpisodeJob, EpisodeList},
+    error::RunError,
+    observer::Observer,
+    policy::{ControllerFactory, PolicyConfig},
+    run_manifest,
+    selection::{select_tasks, suites_of},
+    suite_run::SuiteRun,
 };
 use softvt_benchmark::{Suite, seed::SecretSeed};
 use softvt_common::cancel;
 use softvt_common::episode_id::Split;
-use softvt_common::{parallel, text::counted};
+use softvt_common::parallel;
 use softvt_dataset::{
     TaskFile,
     layout::{DATASET, RECORDING},
@@ -64,10 +63,7 @@ pub(crate) fn with_policy_fields(mut simulated: EpisodeRecord, record: &EpisodeR
 ///
 /// # Errors
 /// A record cannot be written as JSON.
-pub(crate) fn difference(
-    recorded: &EpisodeRecord,
-    simulated: &EpisodeRecord,
-) -> Result<Option<String>, CliError> {
+pub fn difference(recorded: &EpisodeRecord, simulated: &EpisodeRecord) -> Result<Option<String>, RunError> {
     if serde_json::to_string(recorded)? == serde_json::to_string(simulated)? {
         return Ok(None);
     }
@@ -76,15 +72,16 @@ pub(crate) fn difference(
 }
 
 /// A run or dataset file, and the content of its `run.json`.
-pub(crate) struct StoredManifest<'a> {
+pub struct StoredManifest<'a> {
     pub path: &'a Path,
     pub manifest: &'a Value,
     /// Secret of a judged run, with the file that holds it.
     pub secret: Option<&'a SecretFile>,
+    pub observer: Arc<dyn Observer>,
 }
 
 /// The secret in a seed file.
-pub(crate) struct SecretFile {
+pub struct SecretFile {
     pub path: PathBuf,
     pub secret: SecretSeed,
 }
@@ -94,14 +91,10 @@ impl StoredManifest<'_> {
     ///
     /// # Errors
     /// The scripts have changed since, or the episode cannot be run.
-    pub(crate) fn simulate(
-        &self,
-        record: &EpisodeRecord,
-        actions: Vec<Action>,
-    ) -> Result<EpisodeRecord, CliError> {
+    pub fn simulate(&self, record: &EpisodeRecord, actions: Vec<Action>) -> Result<EpisodeRecord, RunError> {
         let index = record.header.id.index();
         let config = self.config(index.task)?;
-        let loaded = config.load_script()?;
+        let loaded = config.load()?;
         let suite = self.suite(&loaded)?;
         let tasks = select_tasks(&config, suite)?;
         let job = EpisodeJob { task: tasks[0], episode: index.episode };
@@ -118,33 +111,28 @@ impl StoredManifest<'_> {
         self.manifest[field].as_str().unwrap_or_default()
     }
 
-    fn field<T: DeserializeOwned>(&self, field: &str) -> Result<T, CliError> {
+    fn field<T: DeserializeOwned>(&self, field: &str) -> Result<T, RunError> {
         serde_json::from_value(self.manifest[field].clone()).map_err(|_| {
             let path = self.path.display();
-            CliError::input(format!("{path}/run.json has no valid field {field:?}; it is of another version"))
+            RunError::input(format!("{path}/run.json has no valid field {field:?}; it is of another version"))
         })
     }
 
     /// The configuration of the run, for one task and with a policy whose actions come from elsewhere.
-    fn config(&self, task: usize) -> Result<RunConfig, CliError> {
-        let script = ScriptArgs {
+    fn config(&self, task: usize) -> Result<RunConfig, RunError> {
+        Ok(RunConfig {
             file: self.text("script").into(),
             options: self.field("arguments")?,
             seed: self.field("seed")?,
-            twin: self.manifest["twin"].is_string().then_some(Twin::Rigid),
-            vary: self.manifest["vary"].as_str().map(PathBuf::from),
-            ..ScriptArgs::default()
-        };
-        let flags = RunFlags { tasks: vec![task.to_string()], ..RunFlags::default() };
-        let policy = PolicyConfig::external("replay");
-        let secret = self.secret()?.cloned();
-        Ok(RunConfig {
-            script,
-            policy,
-            flags,
+            secret: self.secret()?.cloned(),
             settings: self.field("set")?,
             shifts: self.field("shifts")?,
-            secret,
+            rigid_twin: self.manifest["twin"].is_string(),
+            vary: self.manifest["vary"].as_str().map(PathBuf::from),
+            policy: PolicyConfig::external("replay"),
+            tasks: vec![task.to_string()],
+            observer: self.observer.clone(),
+            ..RunConfig::default()
         })
     }
 
@@ -152,40 +140,40 @@ impl StoredManifest<'_> {
     ///
     /// # Errors
     /// The secret is missing, is that of another run, or was given for a run without one.
-    fn secret(&self) -> Result<Option<&SecretSeed>, CliError> {
+    fn secret(&self) -> Result<Option<&SecretSeed>, RunError> {
         let path = self.path.display();
         match (self.manifest["seed_hash"].as_str(), self.secret) {
             (None, None) => Ok(None),
             (Some(hash), Some(given)) if given.secret.hash() == hash => Ok(Some(&given.secret)),
-            (Some(hash), Some(given)) => Err(CliError::input(format!(
+            (Some(hash), Some(given)) => Err(RunError::input(format!(
                 "--seed-file {}: its hash is {}, that of {path} is {hash}",
                 given.path.display(),
                 given.secret.hash()
             ))),
-            (Some(_), None) => Err(CliError::input(format!(
+            (Some(_), None) => Err(RunError::input(format!(
                 "{path}: the run was judged with a secret seed; add --seed-file FILE, the file with that seed"
             ))),
-            (None, Some(given)) => Err(CliError::input(format!(
+            (None, Some(given)) => Err(RunError::input(format!(
                 "--seed-file {}: {path} has no secret seed; leave it out",
                 given.path.display()
             ))),
         }
     }
 
-    fn split(&self) -> Result<Split, CliError> {
+    fn split(&self) -> Result<Split, RunError> {
         let name = self.text("split");
-        name.parse().map_err(|_| CliError::input(format!("{}: unknown split {name:?}", self.path.display())))
+        name.parse().map_err(|_| RunError::input(format!("{}: unknown split {name:?}", self.path.display())))
     }
 
-    fn suite<'a>(&self, loaded: &'a LoadedScript) -> Result<&'a Suite, CliError> {
+    fn suite<'a>(&self, loaded: &'a LoadedScript) -> Result<&'a Suite, RunError> {
         let name = self.text("suite");
         let suite = suites_of(&loaded.plan).iter().find(|suite| suite.name == name);
         suite
-            .ok_or_else(|| CliError::input(format!("{} no longer has a suite {name:?}", self.text("script"))))
+            .ok_or_else(|| RunError::input(format!("{} no longer has a suite {name:?}", self.text("script"))))
     }
 
     /// Checks that scripts and thresholds are those of the stored run.
-    fn check_sources(&self, run: &SuiteRun) -> Result<(), CliError> {
+    fn check_sources(&self, run: &SuiteRun) -> Result<(), RunError> {
         let now = json!(run.sources);
         let before = self.manifest["sources"].as_object().into_iter().flatten();
         let changed: Vec<&str> = before
@@ -195,7 +183,7 @@ impl StoredManifest<'_> {
         if changed.is_empty() {
             return Ok(());
         }
-        Err(CliError::input(format!(
+        Err(RunError::input(format!(
             "{}: {} changed since the run; restore the earlier version, or run again",
             self.path.display(),
             changed.join(", ")
@@ -205,27 +193,27 @@ impl StoredManifest<'_> {
 
 /// A demonstration: its file, and its number in the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct DemoRef {
+pub struct DemoRef {
     pub file: PathBuf,
     pub demo: usize,
 }
 
 /// Result of the re-simulation of a demonstration.
-pub(crate) struct DemoReplay {
+pub struct DemoReplay {
     /// Hash of the final state.
-    state_hash: String,
+    pub state_hash: String,
     /// First difference from the recording. `None` if they are byte-identical.
     pub difference: Option<String>,
-    goal_reached: bool,
+    pub goal_reached: bool,
 }
 
 /// Checks that the recording in a folder is complete.
 ///
 /// # Errors
 /// The recording was interrupted.
-pub(crate) fn check_complete(path: &Path) -> Result<(), CliError> {
+pub fn check_complete(path: &Path) -> Result<(), RunError> {
     if path.is_dir() && path.join(RECORDING).is_file() && !path.join(DATASET).is_file() {
-        return Err(CliError::input(format!(
+        return Err(RunError::input(format!(
             "{}: the recording was interrupted; complete it with softvt record … --resume --out {0}",
             path.display()
         )));
@@ -237,7 +225,7 @@ pub(crate) fn check_complete(path: &Path) -> Result<(), CliError> {
 ///
 /// # Errors
 /// The manifest or file cannot be read.
-pub(crate) fn demos_of(path: &Path) -> Result<Vec<DemoRef>, CliError> {
+pub fn demos_of(path: &Path) -> Result<Vec<DemoRef>, RunError> {
     if path.is_dir() {
         let entries = manifest::read(path)?;
         let demos =
@@ -252,62 +240,35 @@ pub(crate) fn demos_of(path: &Path) -> Result<Vec<DemoRef>, CliError> {
 ///
 /// # Errors
 /// A demonstration cannot be simulated.
-pub(crate) fn simulate_demos(demos: &[DemoRef]) -> Result<Vec<DemoReplay>, CliError> {
+pub fn simulate_demos(demos: &[DemoRef], observer: &Arc<dyn Observer>) -> Result<Vec<DemoReplay>, RunError> {
     let mut replays: BTreeMap<usize, DemoReplay> = BTreeMap::new();
     parallel::run(
         demos.len(),
         thread_count(None),
         cancel::requested,
-        |index| replay_demo(&demos[index]),
+        |index| replay_demo(&demos[index], observer),
         |index, replay| {
             replays.insert(index, replay);
             Ok(())
         },
     )?;
     if cancel::requested() {
-        return Err(CliError::interrupted("interrupted"));
+        return Err(RunError::interrupted("interrupted"));
     }
     Ok(replays.into_values().collect())
 }
 
-/// Prints for each demonstration whether its re-simulation is byte-identical, and how many reach the goal.
-///
-/// # Errors
-/// A result differs (exit code 1).
-pub(crate) fn report_replays(demos: &[DemoRef], replays: &[DemoReplay]) -> Result<(), CliError> {
-    for (DemoRef { file, demo }, replay) in demos.iter().zip(replays) {
-        let result = match &replay.difference {
-            None => format!("byte-identical, final state {}", replay.state_hash),
-            Some(difference) => format!("differs: {difference}"),
-        };
-        print(&format!("{} demo_{demo}: {result}\n", file.display()))?;
-    }
-    let all = demos.len();
-    let identical = replays.iter().filter(|replay| replay.difference.is_none()).count();
-    let reached = replays.iter().filter(|replay| replay.goal_reached).count();
-    if all > 1 {
-        print(&format!(
-            "replayed by their actions alone: {identical} of {all} byte-identical, {reached} of {all} reach the goal\n"
-        ))?;
-    }
-    if identical == all {
-        return Ok(());
-    }
-    Err(CliError::new(
-        Exit::Internal,
-        format!(
-            "replaying {} gave another result; softvt doctor checks whether this machine computes the published results",
-            counted(all - identical, "demonstration")
-        ),
-    ))
-}
-
-fn replay_demo(demo: &DemoRef) -> Result<DemoReplay, CliError> {
+fn replay_demo(demo: &DemoRef, observer: &Arc<dyn Observer>) -> Result<DemoReplay, RunError> {
     let file = TaskFile::open(&demo.file)?;
     let record = file.record(demo.demo)?;
     let environment = file.environment()?;
     let actions = file.actions(demo.demo)?;
-    let stored = StoredManifest { path: &demo.file, manifest: &environment["env_kwargs"], secret: None };
+    let stored = StoredManifest {
+        path: &demo.file,
+        manifest: &environment["env_kwargs"],
+        secret: None,
+        observer: observer.clone(),
+    };
     let simulated = stored.simulate(&record, actions)?;
     Ok(DemoReplay {
         difference: difference(&record, &simulated)?,

@@ -1,0 +1,344 @@
+//! Arguments that several commands take, and the configuration of a run that they state.
+//!
+//! The doc comments of the fields are the help text that `--help` prints.
+
+use std::{path::PathBuf, sync::Arc, time::Duration};
+
+use clap::{Args, ValueEnum, value_parser};
+
+use crate::{
+    error::CliError,
+    output::Console,
+    plan_flags::{self, GivenFlag},
+    requirement::Requirement,
+};
+use softvt_benchmark::{ShiftValue, Teacher};
+use softvt_policy::{profile::GripCode, remote::Protocol};
+use softvt_runner::{
+    PolicyConfig, PolicyOptions, PolicySource, RunConfig, Shard, TraceDetail, VideoSelection, parse_profile,
+    read_secret, recording::RecordingOptions,
+};
+use softvt_script::{LoadedScript, STANDARD_VARIATION};
+
+// The script, and changes of its scenes and their physics. A doc comment would replace the description of the commands
+// that this struct is flattened into.
+#[derive(Args, Clone, Debug, Default)]
+pub(crate) struct ScriptArgs {
+    /// Script that returns the plan: a suite, a list of suites, conditions or an experiment
+    #[arg(value_name = "FILE.lua")]
+    pub file: PathBuf,
+    /// Values of the options that the script declares, as `--name=value`. Filled in after parsing.
+    #[arg(skip)]
+    pub options: Vec<String>,
+    /// Flags of the command that are given. Filled in after parsing.
+    #[arg(skip)]
+    pub given: Vec<GivenFlag>,
+    /// Base seed
+    #[arg(long, value_name = "S", default_value = "0", allow_hyphen_values = true, value_parser = parse_seed)]
+    pub seed: u64,
+    /// Secret base seed of a judged run: any file, such as 32 random bytes. Results hold its hash: docs/policies.md#judged-runs
+    #[arg(long, value_name = "FILE", conflicts_with = "seed")]
+    pub seed_file: Option<PathBuf>,
+    /// Scene changes that the suite declares, such as stiffness=0.5
+    #[arg(long = "shift", value_name = "NAME=VALUE", value_delimiter = ',')]
+    pub shifts: Vec<String>,
+    /// Make every soft object rigid, with the same shape, mass and appearance
+    #[arg(long, value_name = "KIND")]
+    pub twin: Option<Twin>,
+    /// Vary the soft objects, the light and the cameras from episode to episode: by a Lua file, or by the standard ranges (scripts/variations/standard.lua)
+    #[arg(long, value_name = "FILE.lua", num_args = 0..=1, require_equals = true, default_missing_value = STANDARD_VARIATION)]
+    pub vary: Option<PathBuf>,
+    /// Change a setting, such as robot.gripper.effort=20
+    #[arg(long = "set", value_name = "PATH=VALUE")]
+    pub settings: Vec<String>,
+}
+
+/// Variants of a suite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Twin {
+    Rigid,
+}
+
+// The episodes of a run, and its output.
+#[derive(Args, Clone, Debug, Default)]
+pub(crate) struct RunFlags {
+    /// Run only these tasks: indices or parts of prompts, separated by commas
+    #[arg(long = "task", value_name = "TASK", value_delimiter = ',')]
+    pub tasks: Vec<String>,
+    /// Episodes per task [default: set by the suite]
+    #[arg(long, value_name = "N", value_parser = parse_count)]
+    pub episodes: Option<u32>,
+    /// Number of threads; results do not depend on it [default: number of processors]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Record every control step; =nodes adds node positions
+    #[arg(long, value_name = "DETAIL", num_args = 0..=1, require_equals = true, default_missing_value = "state")]
+    pub trace: Option<TraceArg>,
+    /// Render videos of unsafe episodes; =all for all, =0,3 for these episodes of each task
+    #[arg(long, value_name = "WHICH", num_args = 0..=1, require_equals = true, default_missing_value = "failed")]
+    pub video: Option<VideoSelection>,
+    /// Output folder; must not already contain a run [default: the next runs/<suite>-<policy>-NNN]
+    #[arg(long, value_name = "DIR", value_parser = parse_folder)]
+    pub out: Option<PathBuf>,
+    /// Continue the interrupted run in --out, if there is one
+    #[arg(long, requires = "out")]
+    pub resume: bool,
+    /// Run the I-th of N parts; softvt merge combines them
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<Shard>,
+    /// Condition on the results of each suite, such as "safety>=0.9"; exit code 99 if it does not hold
+    #[arg(long = "require", value_name = "CONDITION")]
+    pub requirements: Vec<Requirement>,
+    /// Print JSON: an object for a suite or for conditions, an array for a list of suites, one line per row of an experiment
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Detail of `--trace`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TraceArg {
+    State,
+    Nodes,
+}
+
+impl From<TraceArg> for TraceDetail {
+    fn from(detail: TraceArg) -> Self {
+        match detail {
+            TraceArg::State => Self::State,
+            TraceArg::Nodes => Self::Nodes,
+        }
+    }
+}
+
+impl RunFlags {
+    /// Adds the episodes and the output to a configuration.
+    pub(crate) fn apply(self, config: RunConfig) -> RunConfig {
+        RunConfig {
+            tasks: self.tasks,
+            episodes: self.episodes,
+            shard: self.shard,
+            threads: self.threads,
+            trace: self.trace.map(TraceDetail::from),
+            video: self.video,
+            out: self.out,
+            resume: self.resume,
+            ..config
+        }
+    }
+}
+
+/// A configuration, and the flags that were given for it.
+pub(crate) struct Request {
+    pub config: RunConfig,
+    given: Vec<GivenFlag>,
+}
+
+impl Request {
+    /// The script and the changes of its scenes.
+    ///
+    /// # Errors
+    /// A shift or setting that is not `NAME=VALUE`, or a seed file that cannot be read.
+    pub(crate) fn new(script: ScriptArgs) -> Result<Self, CliError> {
+        let observer = Arc::new(Console::default());
+        let secret = script.seed_file.as_deref().map(|path| read_secret(path, &*observer)).transpose()?;
+        let in_file = |error: CliError| error.prefixed(script.file.display());
+        let shifts = script.shifts.iter().map(|word| parse_shift(word)).collect::<Result<_, _>>();
+        let settings = script.settings.iter().map(|word| parse_pair("--set", word)).collect::<Result<_, _>>();
+        let config = RunConfig {
+            shifts: shifts.map_err(in_file)?,
+            settings: settings.map_err(in_file)?,
+            seed: secret.as_ref().map_or(script.seed, |secret| secret.public_seed()),
+            secret,
+            rigid_twin: script.twin.is_some(),
+            file: script.file,
+            options: script.options,
+            vary: script.vary,
+            observer,
+            ..RunConfig::default()
+        };
+        Ok(Self { config, given: script.given })
+    }
+
+    /// With a changed configuration.
+    pub(crate) fn with(self, change: impl FnOnce(RunConfig) -> RunConfig) -> Self {
+        Self { config: change(self.config), ..self }
+    }
+
+    /// True if a flag was given, by its identifier in clap.
+    pub(crate) fn given(&self) -> &[GivenFlag] {
+        &self.given
+    }
+
+    /// Loads the script and refuses flags of `command` that would do nothing for its plan.
+    ///
+    /// # Errors
+    /// The script fails or returns no plan; a flag without effect.
+    pub(crate) fn load(&self, command: &str) -> Result<LoadedScript, CliError> {
+        let config = &self.config;
+        let loaded = softvt_script::load(&config.file, &config.options)?;
+        plan_flags::check(command, self, &loaded.plan)?;
+        Ok(config.prepare_script(loaded)?)
+    }
+
+    /// Loads the script, refuses flags of `command` that would do nothing for its plan, and then loads the policy.
+    ///
+    /// # Errors
+    /// The script fails or returns no plan; a flag without effect; a policy that cannot be loaded.
+    pub(crate) fn load_plan(
+        self,
+        command: &str,
+        policy: &PolicyArgs,
+    ) -> Result<(RunConfig, LoadedScript), CliError> {
+        let loaded = self.load(command)?;
+        Ok((self.config.with_policy(PolicyConfig::load(&policy.options())?), loaded))
+    }
+}
+
+// The policy, and how it is connected. A doc comment would replace the description of the commands.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct PolicyArgs {
+    /// Policy that controls the robot: a name (softvt list policies), a Lua file, a server such as ws://host:8000, or a run folder whose actions are repeated [default: expert; softvt record: the suite's teacher]
+    #[arg(long, value_name = "POLICY", value_parser = clap::value_parser!(PolicySource))]
+    policy: Option<PolicySource>,
+    /// Observations and action encoding of a policy server: a name (softvt list profiles) or a Lua file [default: visuo_tactile]
+    #[arg(long, value_name = "PROFILE", value_parser = parse_profile)]
+    profile: Option<String>,
+    /// Protocol of a policy server [default: openpi]
+    #[arg(long, value_name = "PROTOCOL")]
+    protocol: Option<Protocol>,
+    /// Grip code, the meaning of an action's gripper value, in place of that of the profile or the Lua policy: docs/policies.md
+    #[arg(long, value_name = "CODE")]
+    gripper: Option<GripCode>,
+    /// Actions executed from each predicted chunk [default: 10 for servers]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..))]
+    replan: Option<u16>,
+    /// Timeout in seconds, for connecting and for each reply [default: 60]
+    #[arg(long, value_name = "SECONDS", value_parser = parse_timeout)]
+    policy_timeout: Option<Duration>,
+    /// Policy name shown in the results
+    #[arg(long, value_name = "NAME", value_parser = parse_name)]
+    name: Option<String>,
+}
+
+impl PolicyArgs {
+    pub(crate) fn options(&self) -> PolicyOptions {
+        PolicyOptions {
+            source: self.policy.clone().unwrap_or_default(),
+            profile: self.profile.clone(),
+            protocol: self.protocol,
+            gripper: self.gripper,
+            replan: self.replan,
+            timeout: self.policy_timeout,
+            name: self.name.clone(),
+        }
+    }
+
+    /// The options for a suite of a teacher, which `--policy` replaces.
+    pub(crate) fn taught_by(&self, teacher: Teacher) -> PolicyOptions {
+        let source = self.policy.clone().unwrap_or_else(|| teacher.into());
+        PolicyOptions { source, ..self.options() }
+    }
+
+    /// The grip code that exports of a recording use. Policies that are neither servers nor in Lua have none of their own.
+    pub(crate) fn take_export_code(&mut self) -> Option<GripCode> {
+        let has_code = matches!(self.policy, Some(PolicySource::Server(_) | PolicySource::Lua(_)));
+        if has_code { self.gripper } else { self.gripper.take() }
+    }
+}
+
+// Flags of all commands that create datasets.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct RecordingArgs {
+    /// Output folder: a new one, or with --resume that of an interrupted recording
+    #[arg(long, value_name = "DIR", value_parser = parse_folder)]
+    pub out: PathBuf,
+    /// Storage of images: in the HDF5 files and as videos, or only as videos
+    #[arg(long, value_name = "WHERE", default_value = "hdf5")]
+    pub images: ImageStorage,
+    /// Leave out the true state: node positions, deformation, contacts, forces
+    #[arg(long)]
+    pub no_privileged: bool,
+    /// Number of threads; the dataset does not depend on it [default: number of processors]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Continue the interrupted recording in --out, if there is one
+    #[arg(long)]
+    pub resume: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ImageStorage {
+    Hdf5,
+    Video,
+}
+
+impl RecordingArgs {
+    /// The recording, and the configuration of its attempts under the expert.
+    ///
+    /// # Errors
+    /// A shift or setting that is not valid.
+    pub(crate) fn request(&self, script: ScriptArgs, tasks: Vec<String>) -> Result<Request, CliError> {
+        if script.seed_file.is_some() {
+            let what = "demonstrations are public, and so need no secret seed; use --seed";
+            return Err(CliError::input(format!("--seed-file: {what}")));
+        }
+        // The contact streams of a demonstration come from the trace.
+        let (threads, trace) = (self.threads, Some(TraceDetail::State));
+        Ok(Request::new(script)?.with(|config| RunConfig { tasks, threads, trace, ..config }))
+    }
+
+    pub(crate) fn options(&self, gripper: Option<GripCode>) -> RecordingOptions {
+        RecordingOptions {
+            out: self.out.clone(),
+            has_images: self.images == ImageStorage::Hdf5,
+            has_privileged: !self.no_privileged,
+            resume: self.resume,
+            gripper,
+        }
+    }
+}
+
+/// Parses the path of an output folder.
+pub(crate) fn parse_folder(word: &str) -> Result<PathBuf, String> {
+    if word.trim().is_empty() {
+        return Err("expected a folder; \".\" is the working folder".to_owned());
+    }
+    Ok(word.into())
+}
+
+/// Parses a count of at least one.
+pub(crate) fn parse_count(word: &str) -> Result<u32, String> {
+    let count = word.parse().ok().filter(|count| *count > 0);
+    count.ok_or_else(|| format!("expected a whole number of at least 1 and at most {}", u32::MAX))
+}
+
+fn parse_seed(word: &str) -> Result<u64, String> {
+    word.parse().map_err(|_| format!("expected a whole number in 0..{}", u64::MAX))
+}
+
+fn parse_pair(flag: &str, word: &str) -> Result<(String, String), CliError> {
+    match word.split_once('=') {
+        Some((name, value)) if !name.is_empty() && !value.is_empty() => {
+            Ok((name.to_owned(), value.to_owned()))
+        }
+        _ => Err(CliError::input(format!("{flag}: expected NAME=VALUE, got {word:?}"))),
+    }
+}
+
+fn parse_shift(word: &str) -> Result<ShiftValue, CliError> {
+    let (name, value) = parse_pair("--shift", word)?;
+    match value.parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(ShiftValue { name, value: number }),
+        _ => Err(CliError::input(format!("--shift {name}: expected a number, got {value:?}"))),
+    }
+}
+
+fn parse_timeout(word: &str) -> Result<Duration, String> {
+    let seconds = word.parse().ok().filter(|seconds| (0.01..=86_400.0).contains(seconds));
+    seconds.map(Duration::from_secs_f64).ok_or_else(|| "expected seconds in 0.01..86400".to_owned())
+}
+
+fn parse_name(word: &str) -> Result<String, String> {
+    let is_valid = !word.trim().is_empty() && word.len() <= 80 && !word.chars().any(char::is_control);
+    if is_valid { Ok(word.to_owned()) } else { Err("expected a name of 1 to 80 characters".to_owned()) }
+}

@@ -1,0 +1,258 @@
+//! What a run is of: script, changes of its scenes, policy, episodes and output.
+
+use std::{
+    fmt,
+    io::{ErrorKind, Read},
+    path::{Path, PathBuf},
+    str::FromStr,
+    sync::Arc,
+};
+
+use crate::{
+    episode_artifacts::VideoSelection,
+    error::RunError,
+    observer::{Observer, Silent},
+    policy::PolicyConfig,
+};
+use softvt_benchmark::{ShiftValue, Suite, seed::SecretSeed};
+use softvt_script::LoadedScript;
+
+/// Detail of the trace of an episode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TraceDetail {
+    /// Poses, forces and deformation of every control step.
+    State,
+    /// The positions of all nodes too.
+    Nodes,
+}
+
+/// One of `count` parts of a run, numbered from 1: every `count`-th episode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    index: usize,
+    count: usize,
+}
+
+impl Shard {
+    /// Part `index` of `count`; `None` unless 1 ≤ `index` ≤ `count`.
+    pub fn new(index: usize, count: usize) -> Option<Self> {
+        (1..=count).contains(&index).then_some(Self { index, count })
+    }
+
+    /// True if the shard contains the `job`-th episode of the whole run, counted from 0.
+    pub(crate) fn contains(&self, job: usize) -> bool {
+        job % self.count == self.index - 1
+    }
+
+    /// Number of episodes of the shard, of `all` in the whole run.
+    pub(crate) fn len(&self, all: usize) -> usize {
+        (all + self.count - self.index) / self.count
+    }
+
+    /// Number in the whole run of the episode at a position in the shard, both from 0.
+    pub(crate) fn number(&self, position: usize) -> usize {
+        position * self.count + self.index - 1
+    }
+
+    /// Position in the shard of one of its episodes by its number in the whole run.
+    pub(crate) fn position(&self, number: usize) -> usize {
+        number / self.count
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        let shard = word.split_once('/').and_then(|(i, n)| Self::new(i.parse().ok()?, n.parse().ok()?));
+        shard.ok_or_else(|| "expected I/N with I in 1..N, such as 2/8".to_owned())
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.count)
+    }
+}
+
+/// Configuration of the runs of a script. The default runs the expert on all episodes of the suites as they are.
+#[derive(Clone)]
+pub struct RunConfig {
+    /// The script, as messages name it.
+    pub file: PathBuf,
+    /// Values of the options that the script declares, as `--name=value`.
+    pub options: Vec<String>,
+    /// Base seed; that of a secret is its public seed.
+    pub seed: u64,
+    /// Secret of a judged run.
+    pub secret: Option<SecretSeed>,
+    /// Shifts by name and value.
+    pub shifts: Vec<ShiftValue>,
+    /// Changed settings by path and value.
+    pub settings: Vec<(String, String)>,
+    /// True if soft objects are made rigid.
+    pub rigid_twin: bool,
+    /// File with the ranges within which the episodes vary, in place of those of the suite.
+    pub vary: Option<PathBuf>,
+    pub policy: PolicyConfig,
+    /// Indices or parts of prompts of the tasks to run; all if empty.
+    pub tasks: Vec<String>,
+    /// Episodes per task; by default the number that the suite states.
+    pub episodes: Option<u32>,
+    /// The part of the episodes to run; by default all.
+    pub shard: Option<Shard>,
+    /// Number of threads; results do not depend on it. By default that of the processors.
+    pub threads: Option<u16>,
+    pub trace: Option<TraceDetail>,
+    pub video: Option<VideoSelection>,
+    /// Output folder.
+    pub out: Option<PathBuf>,
+    /// True to continue an interrupted run in the output folder.
+    pub resume: bool,
+    pub observer: Arc<dyn Observer>,
+}
+
+impl Default for RunConfig {
+    fn default() -> Self {
+        Self {
+            file: PathBuf::new(),
+            options: Vec::new(),
+            seed: 0,
+            secret: None,
+            shifts: Vec::new(),
+            settings: Vec::new(),
+            rigid_twin: false,
+            vary: None,
+            policy: PolicyConfig::default(),
+            tasks: Vec::new(),
+            episodes: None,
+            shard: None,
+            threads: None,
+            trace: None,
+            video: None,
+            out: None,
+            resume: false,
+            observer: Arc::new(Silent),
+        }
+    }
+}
+
+impl RunConfig {
+    /// The script of a file, as it is.
+    pub fn of(file: impl Into<PathBuf>) -> Self {
+        Self { file: file.into(), ..Self::default() }
+    }
+
+    pub fn with_policy(self, policy: PolicyConfig) -> Self {
+        Self { policy, ..self }
+    }
+
+    /// Loads the script with its options, its variation and the secret.
+    ///
+    /// # Errors
+    /// The script fails or returns no plan.
+    pub fn load(&self) -> Result<LoadedScript, RunError> {
+        let loaded = softvt_script::load(&self.file, &self.options)?;
+        self.prepare_script(loaded)
+    }
+
+    /// A loaded script whose suites vary as the configuration says.
+    ///
+    /// # Errors
+    /// A variation that is not valid, or does not fit a suite.
+    pub fn prepare_script(&self, mut loaded: LoadedScript) -> Result<LoadedScript, RunError> {
+        if let Some(file) = &self.vary {
+            let (ranges, _) = softvt_script::load_variation(file)
+                .map_err(|error| RunError::from(error).prefixed("--vary"))?;
+            loaded.vary(&ranges).map_err(|error| self.error(format!("--vary: {error}")))?;
+        }
+        loaded.secret.clone_from(&self.secret);
+        Ok(loaded)
+    }
+
+    /// An error about the script.
+    pub fn error(&self, message: impl fmt::Display) -> RunError {
+        RunError::input(message).prefixed(self.file.display())
+    }
+
+    pub fn notice(&self, message: impl fmt::Display) {
+        self.observer.notice(&message.to_string());
+    }
+
+    /// Number of threads.
+    pub fn threads(&self) -> usize {
+        thread_count(self.threads)
+    }
+
+    /// Episodes per task of a suite.
+    pub fn episodes_of(&self, suite: &Suite) -> u32 {
+        self.episodes.unwrap_or(suite.episodes)
+    }
+
+    /// Name of a suite in results. A suite that `vary` varies and a rigid twin have names of their own, though the
+    /// places of their objects are those of the suite.
+    pub fn suite_name(&self, suite: &Suite) -> String {
+        let varied = if self.vary.is_some() { "_varied" } else { "" };
+        let twin = if self.rigid_twin { "_rigid_twin" } else { "" };
+        format!("{}{varied}{twin}", suite.name)
+    }
+}
+
+/// Shortest seed file that is not easily guessed from its hash, bytes.
+const MIN_SECRET_BYTES: usize = 16;
+/// Largest size of the file.
+const MAX_SECRET_BYTES: u64 = 1 << 20;
+
+/// The secret in a seed file. Warns of one that is easily guessed.
+///
+/// # Errors
+/// The file cannot be read, or is empty.
+pub fn read_secret(path: &Path, observer: &dyn Observer) -> Result<SecretSeed, RunError> {
+    let refuse = |what: String| RunError::input(format!("--seed-file {}: {what}", path.display()));
+    let make = "write one, for example: head -c 32 /dev/urandom > FILE";
+    let mut content = Vec::new();
+    // Devices such as /dev/urandom have no end.
+    let read =
+        std::fs::File::open(path).and_then(|file| file.take(MAX_SECRET_BYTES + 1).read_to_end(&mut content));
+    read.map_err(|error| match error.kind() {
+        ErrorKind::NotFound => refuse(format!("there is no such file; {make}")),
+        _ => refuse(error.to_string()),
+    })?;
+    if content.len() as u64 > MAX_SECRET_BYTES {
+        return Err(refuse(format!("it has more than {MAX_SECRET_BYTES} bytes; {make}")));
+    }
+    if content.is_empty() {
+        return Err(refuse(format!("the file is empty; {make}")));
+    }
+    if content.len() < MIN_SECRET_BYTES {
+        observer.notice(&format!(
+            "warning: --seed-file {}: {} bytes may be guessed from their hash in the results; {make}",
+            path.display(),
+            content.len()
+        ));
+    }
+    Ok(SecretSeed::new(&content))
+}
+
+/// Number of threads: the requested one, or that of the processors.
+pub fn thread_count(requested: Option<u16>) -> usize {
+    let available = || std::thread::available_parallelism().map_or(1, |n| n.get());
+    requested.map_or_else(available, usize::from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shards_partition_the_episodes() {
+        let shards: Vec<Shard> = (1..=3).map(|i| format!("{i}/3").parse().unwrap()).collect();
+        for job in 0..20 {
+            assert_eq!(shards.iter().filter(|shard| shard.contains(job)).count(), 1);
+        }
+        for word in ["0/3", "4/3", "1", "a/b", "1/0", "-1/3"] {
+            assert!(word.parse::<Shard>().is_err(), "{word}");
+        }
+        assert_eq!(shards[1].to_string(), "2/3");
+    }
+}

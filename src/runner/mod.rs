@@ -1,0 +1,39 @@
+//! Runs: the episodes of suites under a policy, into folders that can be continued, merged, replayed and reported.
+//!
+//! A [`Runner`] runs the suites of a script, [`conditions`] runs them under changes, [`recording`] makes datasets of them, and
+//! [`replay`] simulates recorded episodes again. [`SuiteRun`] is below all of them: a suite with everything that its episodes
+//! need. Nothing here prints: progress and messages go to an [`Observer`].
+
+pub mod conditions;
+mod config;
+mod episode_artifacts;
+mod episode_list;
+mod error;
+mod evaluate;
+pub mod experiment;
+mod limits;
+mod observer;
+mod policy;
+mod recorded_runs;
+pub mod recording;
+pub mod replay;
+mod run_manifest;
+mod runner;
+pub mod selection;
+mod served_runs;
+pub mod stored_folder;
+mod suite_run;
+
+pub use config::{RunConfig, Shard, TraceDetail, read_secret, thread_count};
+pub use episode_artifacts::VideoSelection;
+pub use episode_list::{EpisodeJob, EpisodeList};
+pub use error::{Cause, RunError};
+pub use evaluate::SuiteResult;
+pub use observer::{Observer, Silent};
+pub use policy::{
+    BuiltinPolicy, ControllerFactory, PolicyConfig, PolicyOptions, PolicySource, expert_controller,
+    parse_profile,
+};
+pub use runner::Runner;
+pub use served_runs::ServedRuns;
+pub use suite_run::{SuiteRun, find_replay_source};

@@ -1,0 +1,126 @@
+//! [`Runner`]: the suites of a script under a policy.
+
+use std::{path::PathBuf, sync::Arc};
+
+use crate::{
+    config::{RunConfig, Shard},
+    error::RunError,
+    evaluate::{SuiteResult, run_episodes, run_suite},
+    observer::Observer,
+    policy::PolicyConfig,
+    selection::{check_parent_folder, next_run_dir, run_dir, select_episodes, select_suites, select_tasks},
+    suite_run::SuiteRun,
+};
+use softvt_benchmark::Plan;
+use softvt_evaluation::record::EpisodeRecord;
+use softvt_script::LoadedScript;
+
+/// Runs the suites of a loaded script. Without an output folder, nothing is written.
+///
+/// ```
+/// use softvt_runner::{PolicyConfig, RunConfig, Runner};
+///
+/// let loaded = RunConfig::of("suites/spatial_soft.lua").load()?;
+/// let results = Runner::new(&loaded).policy(PolicyConfig::named("noop")?).tasks(["0"]).episodes(1).run(|_| ())?;
+/// assert_eq!(results[0].records.len(), 1);
+/// assert!(!results[0].records[0].verdict.goal);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone)]
+pub struct Runner<'a> {
+    loaded: &'a LoadedScript,
+    config: RunConfig,
+    is_numbered: bool,
+}
+
+impl<'a> Runner<'a> {
+    /// All episodes of the suites, under the expert.
+    pub fn new(loaded: &'a LoadedScript) -> Self {
+        Self::with_config(
+            loaded,
+            RunConfig { file: loaded.sources.main.clone().into(), ..RunConfig::default() },
+        )
+    }
+
+    /// The episodes of a configuration.
+    pub fn with_config(loaded: &'a LoadedScript, config: RunConfig) -> Self {
+        Self { loaded, config, is_numbered: false }
+    }
+
+    fn change(mut self, change: impl FnOnce(&mut RunConfig)) -> Self {
+        change(&mut self.config);
+        self
+    }
+
+    pub fn policy(self, policy: PolicyConfig) -> Self {
+        self.change(|config| config.policy = policy)
+    }
+
+    /// Only these tasks: indices or parts of prompts.
+    pub fn tasks<T: ToString>(self, tasks: impl IntoIterator<Item = T>) -> Self {
+        self.change(|config| config.tasks = tasks.into_iter().map(|task| task.to_string()).collect())
+    }
+
+    /// Episodes per task.
+    pub fn episodes(self, count: u32) -> Self {
+        self.change(|config| config.episodes = Some(count))
+    }
+
+    /// Only one part of the episodes.
+    pub fn shard(self, shard: Shard) -> Self {
+        self.change(|config| config.shard = Some(shard))
+    }
+
+    /// Number of threads; results do not depend on it.
+    pub fn threads(self, count: u16) -> Self {
+        self.change(|config| config.threads = Some(count))
+    }
+
+    /// Folder of the run, or of one run per suite for a list of suites.
+    pub fn out(self, folder: impl Into<PathBuf>) -> Self {
+        self.change(|config| config.out = Some(folder.into()))
+    }
+
+    /// Continues an interrupted run in the output folder.
+    pub fn resume(self) -> Self {
+        self.change(|config| config.resume = true)
+    }
+
+    /// Where progress and messages go.
+    pub fn observer(self, observer: Arc<dyn Observer>) -> Self {
+        self.change(|config| config.observer = observer)
+    }
+
+    /// Writes into the next folder `runs/SUITE-POLICY-NNN` of the working folder if there is no output folder.
+    pub fn numbered(self) -> Self {
+        Self { is_numbered: true, ..self }
+    }
+
+    /// Runs the episodes, and calls `on_episode` for each, in the order in which they end. Returns the results of each suite.
+    ///
+    /// # Errors
+    /// The script has no suite; a scene, a setting or the policy is not valid; a folder contains something else; or a request
+    /// to stop. Finished episodes are kept in the output folder.
+    pub fn run(&self, mut on_episode: impl FnMut(&EpisodeRecord)) -> Result<Vec<SuiteResult>, RunError> {
+        let (config, plan) = (&self.config, &self.loaded.plan);
+        let is_list = matches!(plan, Plan::Suites { .. });
+        let suites = select_suites("run", config, plan)?;
+        if is_list {
+            check_parent_folder(config)?;
+        }
+        let mut results = Vec::new();
+        for suite in suites {
+            let numbered = || self.is_numbered.then(|| next_run_dir(config, &config.suite_name(suite)));
+            let out = run_dir(config, suite, is_list).or_else(numbered);
+            let tasks = select_tasks(config, suite)?;
+            let jobs = select_episodes(config, suite, &tasks);
+            let mut run = SuiteRun::new(config, self.loaded, suite, jobs, out.clone().unwrap_or_default())?;
+            run.prepare(&tasks)?;
+            results.push(match out {
+                Some(_) => run_suite(&run, &tasks, &mut on_episode)?,
+                None => run_episodes(&run, &mut on_episode)?,
+            });
+        }
+        Ok(results)
+    }
+}
