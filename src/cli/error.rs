@@ -36,7 +36,9 @@ impl<E: Error + 'static> From<E> for CliError {
     fn from(error: E) -> Self {
         let of_run = (&error as &dyn Error).downcast_ref::<RunError>();
         match of_run.map(|error| error.cause) {
-            None | Some(Cause::Input) => Self::input(error),
+            None => Self::input(error),
+            // Of a run that failed before an interrupt.
+            Some(Cause::Input) => Self::new(Exit::Input, error),
             Some(Cause::Policy) => Self::new(Exit::Policy, error),
             Some(Cause::Interrupt) => Self::interrupted(error),
         }

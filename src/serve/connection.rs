@@ -118,13 +118,21 @@ impl<'a> Connection<'a> {
         }
     }
 
-    /// Sends a message.
+    /// Sends a message, also when the server is cancelled: it may be the reason of its end.
     ///
     /// # Errors
     /// The connection failed, or the client does not accept the message in time.
     pub(super) fn send(&mut self, value: &Value) -> Result<(), TransportError<Aborted>> {
-        let deadline = Instant::now() + WRITE_TIMEOUT;
-        transport::send(&mut self.socket, value, || may_go_on(self.cancel, deadline))
+        let cancel = self.cancel;
+        let mut deadline = Instant::now() + WRITE_TIMEOUT;
+        let mut was_cancelled = false;
+        transport::send(&mut self.socket, value, || {
+            if cancel.load(Ordering::Relaxed) && !was_cancelled {
+                was_cancelled = true;
+                deadline = deadline.min(Instant::now() + CLOSE_DRAIN_TIMEOUT);
+            }
+            if Instant::now() > deadline { Err(Aborted) } else { Ok(()) }
+        })
     }
 
     /// Closes the connection after the client has received the last message.
