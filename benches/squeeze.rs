@@ -122,7 +122,7 @@ impl Scene {
             }
         }
         out.force_hold = self.force();
-        out.factorizations = self.world.soft(self.body).system.factorizations;
+        out.factorizations = self.world.soft(self.body).factorizations();
         out
     }
 }

@@ -46,3 +46,8 @@ pub use softvt_script as script;
 pub use softvt_sensing as sensing;
 #[doc(inline)]
 pub use softvt_serve as serve;
+
+/// The examples of the page.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/library.md")]
+struct LibraryPage;

@@ -1,7 +1,7 @@
 //! The `softvt` command.
 //!
 //! `commands` has one file per command; `args` are the arguments that several of them take; `parse` fills them in from the
-//! command line. What a command does is in the crates below: runs are in `softvt-runner`.
+//! command line. Runs are in the crate `softvt-runner`.
 #![warn(unreachable_pub)]
 
 mod args;

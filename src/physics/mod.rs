@@ -1,7 +1,7 @@
 //! Mechanics: soft bodies, rigid bodies, articulations, contact, and the one convex solve that moves them all.
 //!
 //! [`World`] owns the state, and [`World::step`] is the algorithm: its documentation has examples. The modules below
-//! it can be used on their own: [`fem`] (corotational finite elements), [`rigid`], [`joints`] (articulated dynamics),
+//! it can be used on their own: [`fem`] (corotational finite elements), [`rigid`], [`joints`] (articulated dynamics) and
 //! [`contact`] (detection), [`solver`] (the convex problem of a step) and [`sparse`] (multifrontal Cholesky). No
 //! module here depends on scripts, files or images.
 #![warn(missing_docs, unreachable_pub)]
@@ -12,10 +12,11 @@ pub mod ids;
 pub mod joints;
 pub mod params;
 pub mod rigid;
-pub mod solver;
-pub mod sparse;
+mod solver;
+mod sparse;
 pub mod world;
 
 pub use ids::{ArticulationId, BodyId, ColliderId, ContactPartner, KinematicId, LinkId, RigidId, SoftId};
 pub use params::PhysicsParams;
+pub use solver::SolverStats;
 pub use world::World;

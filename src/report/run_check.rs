@@ -15,7 +15,7 @@ const ROUNDING: f64 = 1e-6;
 pub struct Contradiction {
     /// Line of the record, from 1.
     pub line: usize,
-    /// What differs.
+    /// The fields that disagree, and their values.
     pub what: String,
 }
 

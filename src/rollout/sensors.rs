@@ -7,6 +7,7 @@ use super::{
     sensor_assets::{SensingError, SensorAssets},
     sensor_noise::SensorSeed,
     simulation::{ObjectInstance, Simulation},
+    soft_model::elastic_material,
 };
 use softvt_benchmark::CONTROL_DT;
 use softvt_geometry::{Pose, Vec3};
@@ -452,7 +453,7 @@ fn is_in_contact(object: &ObjectInstance, patch: &ContactPatch) -> bool {
 /// Compliance of a soft body to a gel in ridges too fine for its elements.
 fn substrate_of(object: &ObjectInstance) -> Option<SubstrateCompliance> {
     let (Body::Soft(material), Some(model)) = (&object.asset.body, &object.model) else { return None };
-    let modulus = material.youngs_pa / (1.0 - material.poisson * material.poisson);
+    let modulus = elastic_material(material).plane_strain_modulus();
     Some(SubstrateCompliance { modulus, resolved: 2.0 * model.mesh.edge })
 }
 

@@ -13,7 +13,7 @@ use softvt_geometry::{
 };
 use softvt_physics::{
     World,
-    fem::{ElasticMaterial, FemModel},
+    fem::{ElasticMaterial, FemModel, MaterialError},
 };
 use softvt_scene::SoftMaterial;
 
@@ -100,11 +100,7 @@ impl SoftGeometry {
     /// The model of a body of this shape at `scale` times the size. Its deformations under proportional loads are those
     /// of the unscaled body, up to rounding.
     pub(super) fn model(&self, material: &SoftMaterial, scale: f64) -> Arc<FemModel> {
-        let law = ElasticMaterial {
-            youngs_pa: material.youngs_pa,
-            poisson: material.poisson,
-            density: material.density,
-        };
+        let law = elastic_material(material);
         if scale == 1.0 {
             return FemModel::new(self.mesh.clone(), law, self.volume, self.samples.clone());
         }
@@ -126,23 +122,14 @@ fn check_connected(name: &str, mesh: &VoxelMesh) -> Result<(), BuildError> {
 
 /// Checks the parameters of a material.
 pub(super) fn check_material(name: &str, m: &SoftMaterial) -> Result<(), BuildError> {
-    let wrong = |what: String| Err(BuildError::Material { asset: name.to_owned(), what });
-    if !(m.youngs_pa > 0.0 && m.youngs_pa.is_finite()) {
-        return wrong(format!(
-            "Young's modulus is {} Pa, expected a positive number",
-            format_number(m.youngs_pa)
-        ));
-    }
-    if !(0.0..0.5).contains(&m.poisson) {
-        return wrong(format!(
-            "Poisson's ratio is {}, expected 0 <= poisson < 0.5",
-            format_number(m.poisson)
-        ));
-    }
-    if !(m.density > 0.0 && m.density.is_finite()) {
-        return wrong(format!("density is {} kg/m³, expected a positive number", format_number(m.density)));
-    }
-    Ok(())
+    let wrong =
+        |error: MaterialError| BuildError::Material { asset: name.to_owned(), what: error.to_string() };
+    elastic_material(m).check().map_err(wrong)
+}
+
+/// The elasticity and density of a material.
+pub(super) fn elastic_material(m: &SoftMaterial) -> ElasticMaterial {
+    ElasticMaterial { youngs_pa: m.youngs_pa, poisson: m.poisson, density: m.density }
 }
 
 /// Maximum number of contact samples of one body. More take minutes to compute; nearly always the size

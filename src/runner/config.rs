@@ -1,4 +1,4 @@
-//! What a run is of: script, changes of its scenes, policy, episodes and output.
+//! [`RunConfig`]: the script of a run, changes of its scenes, policy, episodes and output.
 
 use std::{
     fmt,

@@ -2,7 +2,7 @@
 
 use softvt_common::{cancel, files::FileError};
 
-/// What caused a [`RunError`].
+/// Causes of a [`RunError`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
     /// A script, an argument or a file that is not valid.

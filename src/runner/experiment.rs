@@ -44,7 +44,7 @@ struct ExperimentManifest<'a> {
     sources: BTreeMap<String, String>,
 }
 
-/// What an experiment returns.
+/// Results of an experiment, as they become known.
 pub enum ExperimentOutput<'a> {
     /// The rows of all points, in order; after an interrupt those of the finished points.
     Rows(&'a [ExperimentRow]),

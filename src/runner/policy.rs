@@ -57,7 +57,7 @@ impl PolicyOptions {
     }
 }
 
-/// Where a policy comes from.
+/// Sources of policies.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PolicySource {
     Builtin(BuiltinPolicy),

@@ -8,10 +8,7 @@ use softvt::{
         shape::Shape,
         voxel::{VoxelSpec, voxel_mesh},
     },
-    physics::fem::{
-        ElasticMaterial, FemModel, FemState,
-        element::{lame_lambda, shear_modulus},
-    },
+    physics::fem::{ElasticMaterial, FemModel, FemState},
 };
 
 use crate::support::GRAVITY;
@@ -51,7 +48,8 @@ pub fn patch() -> (f64, f64) {
     };
     let eigen = (f.transpose() * f).symmetric_eigen();
     let strain = eigen.eigenvalues.map(|l| l.sqrt() - 1.0);
-    let (lambda, mu) = (lame_lambda(YOUNGS, POISSON), shear_modulus(YOUNGS, POISSON));
+    let material = body.model.material;
+    let (lambda, mu) = (material.lame_lambda(), material.shear_modulus());
     let exact = 0.05f64.powi(3) * (mu * strain.norm_squared() + 0.5 * lambda * strain.sum().powi(2));
     (largest(true) / largest(false), body.elastic_energy / exact - 1.0)
 }

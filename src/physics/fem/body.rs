@@ -6,6 +6,7 @@ use super::{
     densification::{self, Densification},
     element::{self, Stiffness},
     force::{self, Corners, elastic},
+    material::ElasticMaterial,
     rotation::polar,
 };
 use softvt_geometry::{
@@ -16,17 +17,6 @@ use softvt_geometry::{
         Embedding, OccupancyMask, SUBCELLS, SurfaceSample, VoxelMesh, VoxelMeshError, VoxelSpec, voxel_mesh,
     },
 };
-
-/// Isotropic, linearly elastic material.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ElasticMaterial {
-    /// Young's modulus, Pa.
-    pub youngs_pa: f64,
-    /// Poisson's ratio, 0 ≤ ν < 0.5.
-    pub poisson: f64,
-    /// Density, kg/m³.
-    pub density: f64,
-}
 
 /// Smallest mass of a node relative to that of a full interior node.
 const MIN_MASS_RATIO: f64 = 1e-3;
@@ -153,8 +143,7 @@ impl FemModel {
                 }
             })
             .collect();
-        let stiffness =
-            fills.iter().map(|f| element::stiffness(h, f, material.youngs_pa, material.poisson)).collect();
+        let stiffness = fills.iter().map(|f| element::stiffness(h, f, &material)).collect();
         let spacing = (samples.iter().map(|s| s.area).sum::<f64>() / samples.len().max(1) as f64).sqrt();
         let (samples, groups) = group_samples(&mesh, samples);
         Arc::new(Self {

@@ -18,9 +18,9 @@
 //! positive semidefinite, and not below the exact one while `J ≥ 0`, so that a linearised step does not overshoot.
 
 use super::{
-    body::ElasticMaterial,
-    element::{gauss_points, lame_lambda, shear_modulus},
+    element::gauss_points,
     force::{Corners, Elastic, deformation_gradient},
+    material::ElasticMaterial,
 };
 use softvt_geometry::{Mat3, Vec3, hex8};
 
@@ -80,8 +80,7 @@ fn cofactor(f: &Mat3) -> Mat3 {
 impl Densification {
     /// The law for voxels of edge `h` (m).
     pub fn new(material: &ElasticMaterial, h: f64) -> Self {
-        let ElasticMaterial { youngs_pa, poisson, .. } = *material;
-        let modulus = lame_lambda(youngs_pa, poisson) + 2.0 * shear_modulus(youngs_pa, poisson);
+        let modulus = material.constrained_modulus();
         Self { scale: modulus * h.powi(3) / 8.0, gradients: gauss_points().map(|xi| hex8::gradients(&xi, h)) }
     }
 

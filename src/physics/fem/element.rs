@@ -5,6 +5,7 @@
 //! partly filled one at the centres of its filled sub-cells, plus [`GHOST`] of the full stiffness, so that an almost
 //! empty voxel stays regular.
 
+use super::material::ElasticMaterial;
 use softvt_geometry::{
     Vec3, hex8,
     voxel::{OccupancyMask, SUBCELLS},
@@ -51,20 +52,10 @@ pub fn material_share(fill: &OccupancyMask) -> f64 {
     if *fill == OccupancyMask::full() { 1.0 } else { fill.fraction() + GHOST }
 }
 
-/// First Lamé parameter λ, Pa.
-pub fn lame_lambda(youngs: f64, poisson: f64) -> f64 {
-    youngs * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson))
-}
-
-/// Shear modulus μ, Pa.
-pub fn shear_modulus(youngs: f64, poisson: f64) -> f64 {
-    youngs / (2.0 * (1.0 + poisson))
-}
-
 /// Stiffness of a voxel of edge `h` of which `fill` is material.
-pub fn stiffness(h: f64, fill: &OccupancyMask, youngs: f64, poisson: f64) -> Stiffness {
+pub fn stiffness(h: f64, fill: &OccupancyMask, material: &ElasticMaterial) -> Stiffness {
     let gauss: Vec<(Vec3, f64)> = gauss_points().iter().map(|xi| (*xi, h.powi(3) / 8.0)).collect();
-    let full = integrate(&gauss, h, youngs, poisson);
+    let full = integrate(&gauss, h, material);
     if *fill == OccupancyMask::full() {
         return full;
     }
@@ -73,14 +64,14 @@ pub fn stiffness(h: f64, fill: &OccupancyMask, youngs: f64, poisson: f64) -> Sti
         .filter(|&cell| fill.contains(cell))
         .map(|cell| (OccupancyMask::centre(cell), h.powi(3) / cells as f64))
         .collect();
-    let mut part = integrate(&points, h, youngs, poisson);
+    let mut part = integrate(&points, h, material);
     part.iter_mut().zip(full.iter()).for_each(|(k, ghost)| *k += GHOST * ghost);
     part
 }
 
 /// `Σ w Bᵀ C B` over the points, with the dilatation averaged over them.
-fn integrate(points: &[(Vec3, f64)], h: f64, youngs: f64, poisson: f64) -> Stiffness {
-    let (lambda, mu) = (lame_lambda(youngs, poisson), shear_modulus(youngs, poisson));
+fn integrate(points: &[(Vec3, f64)], h: f64, material: &ElasticMaterial) -> Stiffness {
+    let (lambda, mu) = (material.lame_lambda(), material.shear_modulus());
     let volume: f64 = points.iter().map(|(_, w)| w).sum();
     let mut mean = [Vec3::zeros(); 8];
     for (xi, w) in points {
@@ -133,7 +124,11 @@ mod tests {
 
     #[test]
     fn rigid_motion_needs_no_force_and_stiffness_is_symmetric() {
-        let k = stiffness(0.01, &OccupancyMask::full(), 3e4, 0.45);
+        let k = stiffness(
+            0.01,
+            &OccupancyMask::full(),
+            &ElasticMaterial { youngs_pa: 3e4, poisson: 0.45, density: 1.0 },
+        );
         let scale = k.iter().cloned().fold(0.0, f64::max);
         for u in [field(0.01, |_| Vec3::x()), field(0.01, |x| Vec3::new(0.3, -0.2, 0.5).cross(&x) * 100.0)] {
             assert!(apply(&k, &u).iter().all(|f| f.abs() < 1e-12 * scale));
@@ -147,14 +142,15 @@ mod tests {
 
     #[test]
     fn uniform_strain_stores_the_energy_of_hookes_law() {
-        let (h, youngs, poisson) = (0.013_f64, 4e4, 0.3);
-        let (lambda, mu) = (lame_lambda(youngs, poisson), shear_modulus(youngs, poisson));
+        let h = 0.013_f64;
+        let material = ElasticMaterial { youngs_pa: 4e4, poisson: 0.3, density: 1.0 };
+        let (lambda, mu) = (material.lame_lambda(), material.shear_modulus());
         let grad = nalgebra::Matrix3::new(1e-3, 2e-3, -1e-3, 0.5e-3, -2e-3, 1e-3, 1e-3, 0.0, 1.5e-3);
         let strain = (grad + grad.transpose()) * 0.5;
         let exact =
             0.5 * h.powi(3) * (lambda * f64::powi(strain.trace(), 2) + 2.0 * mu * strain.norm_squared());
         let u = field(h, |x| grad * x);
-        let k = stiffness(h, &OccupancyMask::full(), youngs, poisson);
+        let k = stiffness(h, &OccupancyMask::full(), &material);
         let energy: f64 = 0.5 * apply(&k, &u).iter().zip(u).map(|(f, u)| f * u).sum::<f64>();
         assert!((energy / exact - 1.0).abs() < 1e-12, "{energy} vs {exact}");
     }
@@ -186,7 +182,7 @@ mod tests {
             .for_each(|cell| half.insert(cell));
         let u = field(0.01, |x| Vec3::new(x.x, 0.0, 0.0));
         let energy = |fill: &OccupancyMask| {
-            let k = stiffness(0.01, fill, 1e4, 0.2);
+            let k = stiffness(0.01, fill, &ElasticMaterial { youngs_pa: 1e4, poisson: 0.2, density: 1.0 });
             apply(&k, &u).iter().zip(u).map(|(f, u)| f * u).sum::<f64>()
         };
         assert!((energy(&half) / energy(&OccupancyMask::full()) - 0.5 - GHOST).abs() < 1e-12);

@@ -99,8 +99,9 @@ pub fn min_det(x: &Corners, h: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fem::element::{
-        gauss_points, lame_lambda, material_share, mean_gradients, shear_modulus, stiffness,
+    use crate::fem::{
+        ElasticMaterial,
+        element::{gauss_points, material_share, mean_gradients, stiffness},
     };
     use proptest::prelude::*;
     use softvt_geometry::{
@@ -109,6 +110,7 @@ mod tests {
     };
 
     const H: f64 = 0.01;
+    const MATERIAL: ElasticMaterial = ElasticMaterial { youngs_pa: 3e4, poisson: 0.4, density: 1.0 };
 
     fn cube() -> Corners {
         std::array::from_fn(|a| hex8::corner(a) * H)
@@ -130,7 +132,7 @@ mod tests {
     }
 
     fn evaluate(x: &Corners, fill: &OccupancyMask, last: Mat3) -> Elastic {
-        elastic(x, &cube(), &mean_gradients(H, fill), &stiffness(H, fill, 3e4, 0.4), last)
+        elastic(x, &cube(), &mean_gradients(H, fill), &stiffness(H, fill, &MATERIAL), last)
     }
 
     fn bent(e: &[f64]) -> Corners {
@@ -154,8 +156,7 @@ mod tests {
 
     #[test]
     fn homogeneous_strain_stores_the_energy_of_the_filled_part_at_any_rotation() {
-        let (youngs, poisson) = (3e4, 0.4);
-        let (lambda, mu) = (lame_lambda(youngs, poisson), shear_modulus(youngs, poisson));
+        let (lambda, mu) = (MATERIAL.lame_lambda(), MATERIAL.shear_modulus());
         let stretch = Mat3::new(0.7, 0.1, 0.0, 0.1, 1.2, -0.05, 0.0, -0.05, 0.9);
         let strain = stretch - Mat3::identity();
         let density = mu * strain.norm_squared() + 0.5 * lambda * strain.trace().powi(2);
@@ -185,7 +186,7 @@ mod tests {
             e in prop::collection::vec(-0.2f64..0.2, 24), kind in 0usize..4,
         ) {
             let (x, fill) = (bent(&e), fills()[kind]);
-            let (g, k0) = (mean_gradients(H, &fill), stiffness(H, &fill, 3e4, 0.4));
+            let (g, k0) = (mean_gradients(H, &fill), stiffness(H, &fill, &MATERIAL));
             let evaluate = |x: &Corners, last: Mat3| elastic(x, &cube(), &g, &k0, last);
             let at = evaluate(&x, Mat3::identity());
             let scale = at.force.iter().map(|f| f.norm()).fold(0.0, f64::max);

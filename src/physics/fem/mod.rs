@@ -10,10 +10,12 @@ pub mod body;
 pub mod densification;
 pub mod element;
 pub mod force;
+pub mod material;
 pub mod rigid_motion;
 pub mod rotation;
 pub mod strain;
-pub mod system;
+pub(crate) mod system;
 
-pub use body::{ElasticMaterial, FemModel, FemState, MinDetF};
+pub use body::{FemModel, FemState, MinDetF};
+pub use material::{ElasticMaterial, MaterialError};
 pub use strain::{CrushedShares, StrainLimits, StrainMeter};

@@ -23,7 +23,7 @@ const RETAIN_STEPS: u64 = 10;
 
 /// Coefficients of `A`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepCoefficients {
+pub(crate) struct StepCoefficients {
     /// Time step, s.
     pub dt: f64,
     /// Mass-proportional damping, 1/s.
@@ -34,7 +34,7 @@ pub struct StepCoefficients {
 
 /// The factored system of one body.
 #[derive(Clone, Debug)]
-pub struct VelocitySystem {
+pub(crate) struct VelocitySystem {
     blocks: Blocks,
     plan: Option<SymbolicFactor>,
     factor: CholeskyFactor,
@@ -178,7 +178,7 @@ fn corner_pairs() -> impl Iterator<Item = (usize, usize)> {
 
 impl VelocitySystem {
     /// The system of a body, not factored yet.
-    pub fn new(rest: &FemModel) -> Self {
+    pub(crate) fn new(rest: &FemModel) -> Self {
         let nodes = rest.mesh.nodes.len();
         Self {
             blocks: Blocks::new(rest),
@@ -199,27 +199,27 @@ impl VelocitySystem {
     }
 
     /// Marks a node as possibly in contact at `step` (counted from 1): it is retained for some steps.
-    pub fn mark(&mut self, node: u32, step: u64) {
+    pub(crate) fn mark(&mut self, node: u32, step: u64) {
         self.last_used[node as usize] = step;
     }
 
     /// Nodes of the reduced system, ascending.
-    pub fn retained(&self) -> &[u32] {
+    pub(crate) fn retained(&self) -> &[u32] {
         &self.retained
     }
 
     /// A number that changes whenever the retained nodes do.
-    pub fn retained_version(&self) -> u64 {
+    pub(crate) fn retained_version(&self) -> u64 {
         self.retained_version
     }
 
     /// Index of a node among the retained ones.
-    pub fn retained_index(&self, node: u32) -> usize {
+    pub(crate) fn retained_index(&self, node: u32) -> usize {
         self.retained_index[node as usize] as usize
     }
 
     /// Updates retained nodes and factor for the body and the marks of `step`. False if `A` is not positive definite.
-    pub fn prepare(&mut self, body: &FemState, c: &StepCoefficients, step: u64) -> bool {
+    pub(crate) fn prepare(&mut self, body: &FemState, c: &StepCoefficients, step: u64) -> bool {
         let new_plan = self.update_retained(step);
         if new_plan || self.plan.is_none() {
             self.plan =
@@ -281,7 +281,7 @@ impl VelocitySystem {
     /// lower triangle, world frame.
     ///
     /// Returning it by [`VelocitySystem::return_matrix`] saves its computation in the next step.
-    pub fn take_matrix(&mut self) -> Vec<f64> {
+    pub(crate) fn take_matrix(&mut self) -> Vec<f64> {
         let mut matrix = std::mem::take(&mut self.schur_w);
         if let Some(plan) = self.plan.as_ref().filter(|_| matrix.is_empty()) {
             let side = 3 * plan.retained;
@@ -292,12 +292,12 @@ impl VelocitySystem {
     }
 
     /// Returns the unchanged matrix of [`VelocitySystem::take_matrix`].
-    pub fn return_matrix(&mut self, matrix: Vec<f64>) {
+    pub(crate) fn return_matrix(&mut self, matrix: Vec<f64>) {
         self.schur_w = matrix;
     }
 
     /// Reduces momenta `b` (per node, N s, world) to the right-hand side of the retained nodes (3 per node).
-    pub fn reduce(&mut self, b: &[Vec3], rhs: &mut [f64]) {
+    pub(crate) fn reduce(&mut self, b: &[Vec3], rhs: &mut [f64]) {
         let Some(plan) = &self.plan else { return };
         for (chunk, &node) in self.work.chunks_exact_mut(3).zip(&plan.order) {
             chunk.copy_from_slice(self.frame.tr_mul(&b[node as usize]).as_slice());
@@ -310,7 +310,7 @@ impl VelocitySystem {
     }
 
     /// Computes the velocities of all nodes from those of the retained ones (m/s, world, 3 per node).
-    pub fn complete(&mut self, retained: &[f64], v: &mut [Vec3]) {
+    pub(crate) fn complete(&mut self, retained: &[f64], v: &mut [Vec3]) {
         let Some(plan) = &self.plan else { return };
         let inner = 3 * (plan.order.len() - plan.retained);
         for (chunk, v) in self.work[inner..].chunks_exact_mut(3).zip(retained.chunks_exact(3)) {

@@ -17,7 +17,8 @@ mod newton;
 mod problem;
 mod secant;
 
-pub use newton::{Solver, SolverFailure, SolverStats};
-pub use problem::{
+pub(crate) use newton::Solver;
+pub use newton::SolverStats;
+pub(crate) use problem::{
     ContactCluster, ContactPoint, ContactProblem, Endpoint, FrameJacobian, ScalarConstraint, VelocityBlock,
 };

@@ -48,7 +48,7 @@ pub struct SolverStats {
 /// The solve did not converge.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("the island of block {block} did not converge: residual {residual_ratio:.1e} times the tolerance")]
-pub struct SolverFailure {
+pub(crate) struct SolverFailure {
     /// The first block of the island that failed.
     pub block: usize,
     /// Norm of the scaled gradient over the tolerance.
@@ -60,7 +60,7 @@ pub struct SolverFailure {
 /// A clone continues identically. Results depend on the sequence of problems, because kept factors influence the path
 /// of convergence within the tolerance.
 #[derive(Clone, Debug, Default)]
-pub struct Solver {
+pub(crate) struct Solver {
     v: Vec<f64>,
     trial: Vec<f64>,
     step: Vec<f64>,
@@ -116,7 +116,7 @@ impl Solver {
     /// # Errors
     /// An island did not converge, which happens if a block is not positive definite or a value is not finite. The
     /// results are void then.
-    pub fn solve(&mut self, problem: &mut ContactProblem) -> Result<SolverStats, SolverFailure> {
+    pub(crate) fn solve(&mut self, problem: &mut ContactProblem) -> Result<SolverStats, SolverFailure> {
         let mut stats = SolverStats::default();
         self.factorizations = 0;
         for island in islands(problem) {

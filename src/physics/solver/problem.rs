@@ -8,7 +8,7 @@ use softvt_geometry::Vec3;
 /// body its 6×6 inertia, for an articulation its mass matrix. It must be symmetric positive definite; the solver does
 /// not check this, but fails to converge otherwise.
 #[derive(Clone, Debug, Default)]
-pub struct VelocityBlock {
+pub(crate) struct VelocityBlock {
     /// Number of velocities of the block.
     pub dim: usize,
     /// `A`, `dim × dim`, column-major. Only the lower triangle is read.
@@ -26,7 +26,7 @@ pub struct VelocityBlock {
 
 /// Jacobian of a rigid frame: its motion as a linear function of the velocities of one block.
 #[derive(Clone, Debug)]
-pub struct FrameJacobian {
+pub(crate) struct FrameJacobian {
     /// Index of the block that moves the frame.
     pub block: usize,
     /// `6 × dim`, column-major: linear velocity of the frame's origin, then angular velocity, world.
@@ -37,7 +37,7 @@ pub struct FrameJacobian {
 
 /// One side of a contact cluster.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Endpoint {
+pub(crate) enum Endpoint {
     /// A body whose velocity is known; it is part of the points' `drift`.
     Known,
     /// A weighted mean of up to eight nodes of a block, with the weights in the points.
@@ -55,7 +55,7 @@ pub enum Endpoint {
 
 /// Contact points between the same two endpoints.
 #[derive(Clone, Copy, Debug)]
-pub struct ContactCluster {
+pub(crate) struct ContactCluster {
     /// The side that the normals point to.
     pub a: Endpoint,
     /// The side that the normals point away from.
@@ -68,7 +68,7 @@ pub struct ContactCluster {
 
 /// One contact point. Its relative velocity is `v_a − v_b − drift`.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct ContactPoint {
+pub(crate) struct ContactPoint {
     /// Weights of `a`'s nodes.
     pub weights_a: [f64; 8],
     /// Weights of `b`'s nodes.
@@ -104,7 +104,7 @@ pub struct ContactPoint {
 
 /// A spring–damper with a force limit on one velocity of one block: a joint drive, a stop, a speed limit, dry friction.
 #[derive(Clone, Copy, Debug)]
-pub struct ScalarConstraint {
+pub(crate) struct ScalarConstraint {
     /// Index of the block with the velocity.
     pub block: usize,
     /// Index of the velocity in the block.
@@ -127,7 +127,7 @@ pub struct ScalarConstraint {
 
 /// A whole problem; its buffers are reused between steps.
 #[derive(Clone, Debug, Default)]
-pub struct ContactProblem {
+pub(crate) struct ContactProblem {
     /// Time step, s.
     pub dt: f64,
     /// Dissipation time of the contact springs, s.
@@ -146,7 +146,7 @@ pub struct ContactProblem {
 
 impl ContactProblem {
     /// Empties the problem, keeping its allocations.
-    pub fn clear(&mut self, dt: f64, dissipation_time: f64) {
+    pub(crate) fn clear(&mut self, dt: f64, dissipation_time: f64) {
         self.dt = dt;
         self.dissipation_time = dissipation_time;
         self.blocks.clear();

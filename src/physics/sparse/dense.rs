@@ -20,7 +20,7 @@ const WIDE: usize = 4;
 ///
 /// Afterwards those columns hold `L` and the trailing block its Schur complement. Returns false if a pivot is not
 /// positive; `a` is void then. The upper triangle is neither read nor preserved.
-pub fn partial_cholesky(a: &mut [f64], n: usize, k: usize) -> bool {
+pub(crate) fn partial_cholesky(a: &mut [f64], n: usize, k: usize) -> bool {
     let mut packed = Vec::with_capacity(PANEL * n.next_multiple_of(ROWS));
     for start in (0..k).step_by(PANEL) {
         let end = (start + PANEL).min(k);
@@ -117,7 +117,7 @@ fn wide_columns(a: &[f64], n: usize, column: usize, from: usize) -> [&[f64]; WID
 
 /// Solves `L y = b` in place for the first `k` columns of `l` (`n` rows), and subtracts
 /// their contribution from `b[k..n]`.
-pub fn forward(l: &[f64], n: usize, k: usize, b: &mut [f64]) {
+pub(crate) fn forward(l: &[f64], n: usize, k: usize, b: &mut [f64]) {
     let mut j = 0;
     while j + WIDE <= k {
         for c in j..j + WIDE {
@@ -142,7 +142,7 @@ pub fn forward(l: &[f64], n: usize, k: usize, b: &mut [f64]) {
 }
 
 /// Solves `Lᵀ x = y` in place for the first `k` columns of `l`, given `x[k..n]`.
-pub fn backward(l: &[f64], n: usize, k: usize, x: &mut [f64]) {
+pub(crate) fn backward(l: &[f64], n: usize, k: usize, x: &mut [f64]) {
     let whole = k - k % WIDE;
     for j in (whole..k).rev() {
         x[j] = (x[j] - dot(&l[j * n + j + 1..(j + 1) * n], &x[j + 1..n])) / l[j * n + j];
@@ -161,7 +161,7 @@ pub fn backward(l: &[f64], n: usize, k: usize, x: &mut [f64]) {
 }
 
 /// Dot product in four lanes: a fixed order of summation that vectorises.
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
     let mut lanes = [0.0; 4];
     for (a, b) in a.iter().zip(b) {
@@ -195,7 +195,7 @@ fn dot_columns([a, b, c, d]: [&[f64]; WIDE], x: &[f64]) -> [f64; WIDE] {
 }
 
 /// `y = A x` for a symmetric matrix of which only the lower triangle is read.
-pub fn symmetric_multiply(a: &[f64], n: usize, x: &[f64], y: &mut [f64]) {
+pub(crate) fn symmetric_multiply(a: &[f64], n: usize, x: &[f64], y: &mut [f64]) {
     y[..n].fill(0.0);
     let whole = n - n % WIDE;
     for j in (0..whole).step_by(WIDE) {

@@ -11,10 +11,10 @@
 //! result could depend on the machine. Here all sums have a fixed order, and products are added by fused
 //! multiply–add, which is exactly rounded everywhere.
 
-pub mod dense;
+pub(crate) mod dense;
 mod dissection;
 mod numeric;
 mod symbolic;
 
-pub use numeric::{BlockMatrix, CholeskyFactor};
-pub use symbolic::SymbolicFactor;
+pub(crate) use numeric::{BlockMatrix, CholeskyFactor};
+pub(crate) use symbolic::SymbolicFactor;

@@ -4,7 +4,7 @@ use super::{SymbolicFactor, dense};
 
 /// Cholesky factor of a block matrix, for one [`SymbolicFactor`] at a time. Its buffers are reused.
 #[derive(Clone, Debug, Default)]
-pub struct CholeskyFactor {
+pub(crate) struct CholeskyFactor {
     panels: Vec<f64>,
     stack: Vec<f64>,
     front: Vec<f64>,
@@ -13,7 +13,7 @@ pub struct CholeskyFactor {
 }
 
 /// A symmetric matrix of 3×3 blocks over a graph of nodes.
-pub trait BlockMatrix {
+pub(crate) trait BlockMatrix {
     /// Calls `visit(other, block, is_transposed)` for the diagonal block of `node` and for each neighbour. The block is
     /// `A[other, node]`, column-major, or its transpose.
     fn column(&self, node: u32, visit: &mut dyn FnMut(u32, &[f64; 9], bool));
@@ -22,7 +22,7 @@ pub trait BlockMatrix {
 impl CholeskyFactor {
     /// Factors `matrix`. Afterwards [`CholeskyFactor::schur`] is the Schur complement of the retained nodes. Returns
     /// false if the matrix is not positive definite.
-    pub fn refill(&mut self, plan: &SymbolicFactor, matrix: &dyn BlockMatrix) -> bool {
+    pub(crate) fn refill(&mut self, plan: &SymbolicFactor, matrix: &dyn BlockMatrix) -> bool {
         self.panels.resize(plan.factor_len, 0.0);
         self.stack.resize(plan.stack_len, 0.0);
         self.front.resize(plan.largest * plan.largest, 0.0);
@@ -79,13 +79,13 @@ impl CholeskyFactor {
     }
 
     /// Schur complement of the retained nodes: side `3 · retained`, column-major, lower triangle.
-    pub fn schur(&self) -> &[f64] {
+    pub(crate) fn schur(&self) -> &[f64] {
         &self.schur
     }
 
     /// Forward substitution on `b` (in elimination order, 3 per position). Its retained part becomes
     /// the reduced right-hand side.
-    pub fn forward(&mut self, plan: &SymbolicFactor, b: &mut [f64]) {
+    pub(crate) fn forward(&mut self, plan: &SymbolicFactor, b: &mut [f64]) {
         for front in plan.fronts.iter().filter(|f| f.pivots > 0) {
             let (n, k) = (3 * front.rows.len(), 3 * front.pivots);
             let work = &mut self.gather[..n];
@@ -96,7 +96,7 @@ impl CholeskyFactor {
     }
 
     /// Backward substitution: completes a forward-substituted vector to the solution, given the retained part of `x`.
-    pub fn backward(&mut self, plan: &SymbolicFactor, x: &mut [f64]) {
+    pub(crate) fn backward(&mut self, plan: &SymbolicFactor, x: &mut [f64]) {
         for front in plan.fronts.iter().rev().filter(|f| f.pivots > 0) {
             let (n, k) = (3 * front.rows.len(), 3 * front.pivots);
             let work = &mut self.gather[..n];

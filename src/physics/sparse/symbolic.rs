@@ -4,7 +4,7 @@ use super::dissection;
 
 /// Structure of the factorization for one pattern and one retained set.
 #[derive(Clone, Debug)]
-pub struct SymbolicFactor {
+pub(crate) struct SymbolicFactor {
     /// Node at each position of the elimination order; the retained nodes are last, in ascending order.
     pub order: Vec<u32>,
     /// Position of each node.
@@ -46,7 +46,7 @@ const MERGE_SMALL: usize = 3;
 impl SymbolicFactor {
     /// Analyses the graph `neighbours` (symmetric, without self loops, ascending lists), retaining the nodes `retained`
     /// (ascending). `places` are lattice coordinates, in which neighbours differ by at most one along each axis.
-    pub fn new(neighbours: &[Vec<u32>], places: &[[i32; 3]], retained: &[u32]) -> Self {
+    pub(crate) fn new(neighbours: &[Vec<u32>], places: &[[i32; 3]], retained: &[u32]) -> Self {
         let order = elimination_order(places, retained);
         let inner = order.len() - retained.len();
         let structure = column_structure(neighbours, &order, inner);

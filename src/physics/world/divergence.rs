@@ -71,11 +71,10 @@ fn total_normal_force(soft: &SoftBody) -> f64 {
 /// Contact forces either change the body's momentum or are balanced by its stress. The first part is at most the
 /// force that reverses all of its mass at the largest speed within one step, 2 m v / dt. The second is at most a
 /// pressure over its whole surface: an upright element is compressed by less than its length, which the constrained
-/// modulus M = E (1 − ν) / ((1 + ν)(1 − 2ν)) turns into less than M, and the damping within one step into less than M
+/// modulus M = λ + 2μ turns into less than M, and the damping within one step into less than M
 /// β / dt. Twice that allows for shear, and for densification of the whole surface to a volume ratio of 0.13.
 fn force_limit(model: &FemModel, params: &PhysicsParams) -> f64 {
-    let (youngs, nu) = (model.material.youngs_pa, model.material.poisson);
-    let constrained = youngs * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu));
+    let constrained = model.material.constrained_modulus();
     let surface = model.samples.len() as f64 * model.spacing * model.spacing;
     let inertial = 2.0 * model.total_mass() * params.max_speed / params.dt;
     inertial + 2.0 * constrained * (1.0 + params.rayleigh_stiffness / params.dt) * surface

@@ -192,6 +192,17 @@ impl World {
         found.map_or(ContactSummary::default(), |contact| contact.summary)
     }
 
+    /// Contact of `body` with all colliders of another body, or with the surface of a soft one; as [`World::contact`].
+    pub fn contact_with(&self, body: impl Into<BodyId>, other: impl Into<BodyId>) -> ContactSummary {
+        let other = other.into();
+        let belongs = |partner: ContactPartner| match partner {
+            ContactPartner::Collider(id) => self.collider(id).parent == other,
+            ContactPartner::Soft(id) => other == BodyId::Soft(id),
+        };
+        let of_other = self.contacts(body).iter().filter(|contact| belongs(contact.partner));
+        of_other.map(|contact| contact.summary).fold(ContactSummary::default(), ContactSummary::joined)
+    }
+
     /// All contacts of `body` in the last step in which it was awake; empty for anything but free bodies.
     pub fn contacts(&self, body: impl Into<BodyId>) -> &[BodyContact] {
         match body.into() {

@@ -31,6 +31,24 @@ pub struct ContactSummary {
 }
 
 impl ContactSummary {
+    /// Both contacts as one.
+    pub(super) fn joined(self, other: Self) -> Self {
+        let normal_force = self.normal_force + other.normal_force;
+        let mean = |a: f64, b: f64| match normal_force > 0.0 {
+            true => (self.normal_force * a + other.normal_force * b) / normal_force,
+            false => 0.0,
+        };
+        Self {
+            points: self.points + other.points,
+            slipping_points: self.slipping_points + other.slipping_points,
+            normal_force,
+            force_w: self.force_w + other.force_w,
+            capacity: self.capacity + other.capacity,
+            travel: mean(self.travel, other.travel),
+            slip_speed: mean(self.slip_speed, other.slip_speed),
+        }
+    }
+
     /// Shear force, N; exact if all normals of the patch agree.
     pub fn shear(&self) -> f64 {
         (self.force_w.norm_squared() - self.normal_force.powi(2)).max(0.0).sqrt()
@@ -63,7 +81,7 @@ pub struct SoftBody {
     pub min_det_f: MinDetF,
     pub(super) contacts: Vec<BodyContact>,
     /// Factored velocity system, reduced to the nodes in contact.
-    pub system: VelocitySystem,
+    pub(crate) system: VelocitySystem,
     pub(super) history: ContactHistory,
     /// Steps taken awake: the clock of `history` and of the retained nodes, which stops during sleep.
     pub(super) steps_awake: u64,
@@ -71,6 +89,11 @@ pub struct SoftBody {
 }
 
 impl SoftBody {
+    /// Number of factorisations of its velocity system so far.
+    pub fn factorizations(&self) -> u64 {
+        self.system.factorizations
+    }
+
     /// True while it sleeps: it is skipped until a nearby body moves.
     pub fn is_asleep(&self) -> bool {
         self.sleep.is_asleep
