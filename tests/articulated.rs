@@ -8,7 +8,7 @@ use softvt::{
     physics::{BodyId, ContactPartner, LinkId, world::JointDrive},
     rollout::{AssetCache, ObjectInstance, SensorAssets, SensorSuite, Simulation, state_hash},
     scene::{Asset, Camera, Scene},
-    script::{self, EpisodeSetup},
+    script::{self, EpisodeSetup, SceneChanges},
     sensing::tactile::TactileSpec,
 };
 
@@ -39,7 +39,7 @@ fn scene() -> Scene {
     let loaded = script::load(&path, &[]).unwrap_or_else(|e| panic!("{e}"));
     let id =
         EpisodeId { suite: "kitchen".into(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };
-    EpisodeSetup::open(&loaded, &id, &[]).unwrap_or_else(|e| panic!("{e}")).scene
+    EpisodeSetup::open(&loaded, &id, &SceneChanges::default()).unwrap_or_else(|e| panic!("{e}")).scene
 }
 
 /// The simulation of the scene, settled.

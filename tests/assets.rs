@@ -13,7 +13,7 @@ use softvt::{
     },
     rollout::{AssetCache, Simulation},
     scene::{Asset, Body, Mask, Scene},
-    script::{self, EpisodeSetup, LoadedScript},
+    script::{self, EpisodeSetup, LoadedScript, SceneChanges},
 };
 
 /// Reference data of a soft asset.
@@ -67,7 +67,7 @@ fn suite() -> LoadedScript {
 fn scene(loaded: &LoadedScript, task: usize, episode: u32) -> Scene {
     let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
     let id = EpisodeId { suite: suite.name.clone(), task, episode, base_seed: 0, split: Split::Validation };
-    EpisodeSetup::open(loaded, &id, &[]).unwrap_or_else(|e| panic!("{e}")).scene
+    EpisodeSetup::open(loaded, &id, &SceneChanges::default()).unwrap_or_else(|e| panic!("{e}")).scene
 }
 
 /// Assets by name, including the table.

@@ -46,7 +46,9 @@ fn the_first_task_of_spatial_soft_matches_its_reference() {
     let Plan::Suite(suite) = &loaded.plan else { panic!("it is a suite") };
     let id =
         EpisodeId { suite: suite.name.clone(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };
-    let scene = script::EpisodeSetup::open(&loaded, &id, &[]).expect("the suite opens").scene;
+    let scene = script::EpisodeSetup::open(&loaded, &id, &script::SceneChanges::default())
+        .expect("the suite opens")
+        .scene;
     let sim = Simulation::new(
         Arc::new(scene),
         &PhysicsParams::default(),

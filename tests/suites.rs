@@ -8,7 +8,7 @@ use softvt::{
     episode_id::{EpisodeId, Split},
     geometry::{Pose, Vec3, shape::Shape},
     scene::{Body, Object, Scene, part_poses},
-    script::{self, EpisodeSetup, LoadedScript},
+    script::{self, EpisodeSetup, LoadedScript, SceneChanges},
 };
 
 /// Episodes per task at the scale of the paper.
@@ -82,7 +82,7 @@ fn suite(loaded: &LoadedScript) -> &Suite {
 fn open(loaded: &LoadedScript, task: usize, episode: u32, split: Split) -> Scene {
     let suite = suite(loaded).name.clone();
     let id = EpisodeId { suite, task, episode, base_seed: 0, split };
-    EpisodeSetup::open(loaded, &id, &[]).unwrap_or_else(|e| panic!("{e}")).scene
+    EpisodeSetup::open(loaded, &id, &SceneChanges::default()).unwrap_or_else(|e| panic!("{e}")).scene
 }
 
 fn object<'a>(scene: &'a Scene, name: &str) -> &'a Object {
@@ -406,7 +406,8 @@ fn a_mass_shift_scales_the_mass_of_all_moving_bodies_and_nothing_else() {
             let suite = suite(&loaded).name.clone();
             let split = Split::Validation;
             let id = EpisodeId { suite, task, episode: 0, base_seed: 0, split };
-            EpisodeSetup::open(&loaded, &id, &shifts).unwrap_or_else(|e| panic!("{e}"))
+            EpisodeSetup::open(&loaded, &id, &SceneChanges { shifts, ..SceneChanges::default() })
+                .unwrap_or_else(|e| panic!("{e}"))
         };
         let EpisodeSetup { scene: heavy, nominal, .. } = shifted(&[("mass", 2.5)]);
         let mut moving = 0;

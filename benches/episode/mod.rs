@@ -4,7 +4,7 @@ use softvt::{
     benchmark::Plan,
     episode_id::{EpisodeId, Split},
     rollout::EpisodeSpec,
-    script::{self, EpisodeSetup, ExpertController, GripMode, LoadedScript},
+    script::{self, EpisodeSetup, ExpertController, GripMode, LoadedScript, SceneChanges},
 };
 
 /// The suite.
@@ -21,7 +21,7 @@ pub fn open(loaded: &LoadedScript, task: usize, film: bool) -> (EpisodeSpec, Exp
     let Plan::Suite(suite) = &loaded.plan else { panic!("{SUITE} is a suite") };
     let id =
         EpisodeId { suite: suite.name.clone(), task, episode: 0, base_seed: 0, split: Split::Validation };
-    let opened = EpisodeSetup::open(loaded, &id, &[]).expect("it opens");
+    let opened = EpisodeSetup::open(loaded, &id, &SceneChanges::default()).expect("it opens");
     let mut spec = EpisodeSpec {
         record_states: film,
         ..EpisodeSpec::new(

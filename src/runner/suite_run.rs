@@ -23,7 +23,7 @@ use softvt_rollout::{
     Simulation, check_goal, check_sensors, cost_doubt,
 };
 use softvt_scene::{Body, Scene};
-use softvt_script::{EpisodeSetup, LoadedScript, SceneBuilder};
+use softvt_script::{EpisodeSetup, LoadedScript, SceneBuilder, SceneChanges};
 
 /// Episodes per task whose scenes are built before a run, to find all assets and the limits that are missing.
 const MAX_SCANNED_EPISODES: usize = 100;
@@ -119,16 +119,21 @@ impl<'a> SuiteRun<'a> {
         })
     }
 
-    /// Builds the scene of an episode: its layout, the shifts, and the rigid twin if requested.
+    /// Builds the scene of an episode with the changes of the run.
+    ///
+    /// # Errors
+    /// The script fails, or a scene is not valid.
     pub fn open_episode(&self, id: &EpisodeId) -> Result<EpisodeSetup, RunError> {
-        let mut opened = EpisodeSetup::open(self.loaded, id, &self.config.shifts)?;
-        if self.config.rigid_twin {
-            (opened.scene, opened.nominal) = (opened.scene.rigid_twin(), opened.nominal.rigid_twin());
+        Ok(EpisodeSetup::open(self.loaded, id, &self.changes())?)
+    }
+
+    /// Changes of all scenes of the run.
+    pub fn changes(&self) -> SceneChanges {
+        SceneChanges {
+            shifts: self.config.shifts.clone(),
+            rigid_twin: self.config.rigid_twin,
+            cameras: self.settings.cameras,
         }
-        for scene in [&mut opened.scene, &mut opened.nominal] {
-            self.settings.cameras.apply(&mut scene.cameras);
-        }
-        Ok(opened)
     }
 
     /// Name of an episode of a judged run.
@@ -231,12 +236,10 @@ impl<'a> SuiteRun<'a> {
         };
         let mut found = BTreeMap::new();
         let Ok(builder) = SceneBuilder::open(self.loaded) else { return Ok(found) };
+        let changes = self.changes();
         for episode in episodes {
-            let Ok(opened) = builder.build(&self.episode_id(task, episode), &self.config.shifts) else {
-                break;
-            };
-            let scene = if self.config.rigid_twin { opened.scene.rigid_twin() } else { opened.scene };
-            found.insert(EpisodeIndex { task: task.id, episode }, self.limits_of(task, &scene)?);
+            let Ok(opened) = builder.build(&self.episode_id(task, episode), &changes) else { break };
+            found.insert(EpisodeIndex { task: task.id, episode }, self.limits_of(task, &opened.scene)?);
         }
         Ok(found)
     }
@@ -379,14 +382,14 @@ impl<'a> SuiteRun<'a> {
         }
     }
 
-    /// Builds the first scene of a task and checks all that can be checked before anything moves. It settles only if
+    /// Checks the first scene of a task as far as it can be checked before anything moves. It settles only if
     /// the goal may hold at the start. Returns a doubt about its cost.
     ///
     /// # Errors
     /// A scene or sensor that is not valid.
     pub fn check_scene(&self, task: &Task, scene: Scene) -> Result<Option<String>, RunError> {
         self.check_object_type(task, &scene)?;
-        let scene = Arc::new(if self.config.rigid_twin { scene.rigid_twin() } else { scene });
+        let scene = Arc::new(scene);
         let settings = &self.settings;
         let sense = |source| EpisodeError::Sense { task: task.id, episode: 0, source };
         let check = || -> Result<Option<String>, EpisodeError> {

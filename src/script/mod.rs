@@ -21,7 +21,7 @@ pub use plan::{
     variation_file::{STANDARD_VARIATION, VaryError, load_variation},
 };
 pub use run::{
-    episode::{EpisodeSetup, SceneBuilder, ShiftError, check_shift},
+    episode::{EpisodeSetup, SceneBuilder, SceneChanges, ShiftError, check_shift},
     experiment::{Experiment, ExperimentRow, ExperimentSummary},
     expert::{ExpertController, GripController, GripMode},
 };

@@ -8,7 +8,7 @@ use softvt::{
     episode_id::{EpisodeId, Split},
     rollout::{AssetCache, Simulation, state_hash},
     scene::Scene,
-    script::{self, EpisodeSetup, LoadedScript},
+    script::{self, EpisodeSetup, LoadedScript, SceneChanges},
 };
 
 use crate::support::SPATIAL_SOFT;
@@ -24,7 +24,7 @@ fn loaded() -> LoadedScript {
 fn scene(loaded: &LoadedScript, task: usize, episode: u32, base_seed: u64) -> Scene {
     let id =
         EpisodeId { suite: "spatial_soft".to_owned(), task, episode, base_seed, split: Split::Validation };
-    EpisodeSetup::open(loaded, &id, &[]).expect("the episode opens").scene
+    EpisodeSetup::open(loaded, &id, &SceneChanges::default()).expect("the episode opens").scene
 }
 
 /// Position offsets (m) and yaw angles (rad) of both instances, and joint angles, over many layouts.

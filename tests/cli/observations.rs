@@ -46,7 +46,8 @@ impl Policy for &mut RecordingPolicy {
 fn played(project: &Project, streams: SensorStreams) -> Result<(Vec<Observation>, EpisodeRecord), String> {
     let loaded = script::load(&project.path("x.lua"), &[]).expect("it loads");
     let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
-    let opened = script::EpisodeSetup::open(&loaded, &episode_id("one", 0), &[]).expect("it opens");
+    let opened = script::EpisodeSetup::open(&loaded, &episode_id("one", 0), &script::SceneChanges::default())
+        .expect("it opens");
     let (id, scene) = (episode_id(&suite.name, 0), opened.scene.clone());
     let spec = EpisodeSpec::new(id, "witness", &suite.tasks[0], &opened.nominal, scene, &suite.settings);
     assert_eq!((spec.header.asset.as_str(), spec.header.soft), ("cube", true));
@@ -259,9 +260,13 @@ fn left_and_right_are_those_of_the_image() {
     let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
     let (settings, rests, looks) = (Settings::default(), AssetCache::default(), SensorAssets::default());
     for task in &suite.tasks {
-        let scene = script::EpisodeSetup::open(&loaded, &episode_id("spatial_soft", task.id), &[])
-            .expect("it opens")
-            .scene;
+        let scene = script::EpisodeSetup::open(
+            &loaded,
+            &episode_id("spatial_soft", task.id),
+            &script::SceneChanges::default(),
+        )
+        .expect("it opens")
+        .scene;
         let sim =
             Simulation::new(Arc::new(scene), &settings.physics, &settings.robot, &rests).expect("it builds");
         let mut senses = SensorSuite::new(&sim, &settings.tactile, &looks);

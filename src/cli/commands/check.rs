@@ -99,7 +99,7 @@ fn check_first_scenes(run: &SuiteRun, tasks: &[&Task]) -> Result<BTreeSet<String
         let task = tasks[job];
         let taken = parallel::lock(&idle).pop();
         let builder = taken.map_or_else(|| SceneBuilder::open(run.loaded), Ok)?;
-        let setup = builder.build(&run.episode_id(task, 0), &run.config.shifts)?;
+        let setup = builder.build(&run.episode_id(task, 0), &run.changes())?;
         parallel::lock(&idle).push(builder);
         let mut doubts = scene_doubts(task, &setup.scene, &run.assets);
         let of_task = |doubt: String| format!("task {}: {doubt}", task.id);

@@ -32,13 +32,25 @@ use softvt_common::{
 };
 use softvt_geometry::{Aabb, Vec3};
 use softvt_robot::{gripper::MAX_WIDTH, panda};
-use softvt_scene::{Body, Scene, SceneVariation};
+use softvt_scene::{Body, CameraSettings, Scene, SceneVariation};
+
+/// Changes of a scene between its layout and the start of an episode, applied in the order of the fields. The variation comes
+/// before them: limits and initial states are those of the varied scene.
+#[derive(Clone, Debug, Default)]
+pub struct SceneChanges {
+    /// Shifts by name and value, in the order in which they apply.
+    pub shifts: Vec<ShiftValue>,
+    /// True if soft objects become rigid.
+    pub rigid_twin: bool,
+    /// Size of all camera images.
+    pub cameras: CameraSettings,
+}
 
 /// An episode as its script describes it: the scene that the layout builds, and the expert of the task.
 pub struct EpisodeSetup {
     /// Initial scene.
     pub scene: Scene,
-    /// Initial scene before the shifts; deformation limits are those of its objects.
+    /// The same without the shifts; deformation limits are those of its objects.
     pub nominal: Scene,
     /// Changes of the layout's scene by the variation of the suite, if it varies.
     pub variation: Option<SceneVariation>,
@@ -52,13 +64,12 @@ pub struct EpisodeSetup {
 }
 
 impl EpisodeSetup {
-    /// Runs the sources of `loaded` in a new virtual machine, builds the scene and applies the shifts in
-    /// order.
+    /// Runs the sources of `loaded` in a new virtual machine, builds the scene and applies the changes.
     ///
     /// # Errors
     /// If the suite, the task or a shift is unknown, or the script fails.
-    pub fn open(loaded: &LoadedScript, id: &EpisodeId, shifts: &[ShiftValue]) -> Result<Self, ScriptError> {
-        SceneBuilder::open(loaded)?.build(id, shifts)
+    pub fn open(loaded: &LoadedScript, id: &EpisodeId, changes: &SceneChanges) -> Result<Self, ScriptError> {
+        SceneBuilder::open(loaded)?.build(id, changes)
     }
 
     /// The controller that runs the expert of the task; `None` if the task has no expert.
@@ -93,7 +104,7 @@ impl SceneBuilder {
     ///
     /// # Errors
     /// As [`EpisodeSetup::open`].
-    pub fn build(&self, id: &EpisodeId, shifts: &[ShiftValue]) -> Result<EpisodeSetup, ScriptError> {
+    pub fn build(&self, id: &EpisodeId, changes: &SceneChanges) -> Result<EpisodeSetup, ScriptError> {
         let vm = &self.instance.vm;
         let FoundTask { suite, task } = self.instance.find_task(&id.suite, id.task)?;
         self.check_suite(&suite).map_err(|e| vm.explain(&e))?;
@@ -112,7 +123,7 @@ impl SceneBuilder {
         let mut nominal = lock(&current.scene).clone();
         current = current.for_task(task.goal.object(), &task.prompt);
         let declared = suite.shifts.as_slice();
-        for ShiftValue { name, value } in shifts {
+        for ShiftValue { name, value } in &changes.shifts {
             let Some(shift) = declared.iter().find(|shift| shift.name == *name) else {
                 let names = declared.iter().map(|shift| shift.name.as_str());
                 return Err(ScriptError::new(vm.main(), unknown_shift(name, names)));
@@ -121,8 +132,11 @@ impl SceneBuilder {
         }
         let prompt = current.prompt().unwrap_or_else(|| task.prompt.clone());
         let mut scene = lock(&current.scene).clone();
-        if suite.twin_of.is_some() {
+        if suite.twin_of.is_some() || changes.rigid_twin {
             (scene, nominal) = (scene.rigid_twin(), nominal.rigid_twin());
+        }
+        for scene in [&mut scene, &mut nominal] {
+            changes.cameras.apply(&mut scene.cameras);
         }
         check_goal(&vm.lua, &task.goal, &scene).map_err(|e| vm.explain(&e))?;
         check_workspace(&scene)

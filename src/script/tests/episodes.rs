@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use super::*;
 use crate::{
-    EpisodeSetup, ExpertController, GripMode,
+    EpisodeSetup, ExpertController, GripMode, SceneChanges,
     api::expert_input::{ExpertCommand, ExpertView, ObjectView},
     check_shift,
 };
@@ -65,7 +65,7 @@ fn view() -> ExpertView {
 fn expert(body: &str) -> (Project, ExpertController) {
     let project = project(&format!("return suite(function(arm, scene) {body} end)"));
     let loaded = project.load("x.lua", &[]).unwrap();
-    let setup = EpisodeSetup::open(&loaded, &episode_id(0, 1), &[]).unwrap();
+    let setup = EpisodeSetup::open(&loaded, &episode_id(0, 1), &SceneChanges::default()).unwrap();
     (project, setup.expert(GripMode::Commanded).unwrap())
 }
 
@@ -104,7 +104,9 @@ fn a_list_of_suites_is_a_plan_and_tasks_are_found_by_name() {
     assert!(matches!(&loaded.plan, Plan::Suites { suites } if suites.len() == 1));
     let open = |suite: &str, task| {
         let id = EpisodeId { suite: suite.into(), task, ..episode_id(0, 1) };
-        EpisodeSetup::open(&loaded, &id, &[]).map(|e| e.scene.objects.len()).map_err(|e| (e.message, e.hint))
+        EpisodeSetup::open(&loaded, &id, &SceneChanges::default())
+            .map(|e| e.scene.objects.len())
+            .map_err(|e| (e.message, e.hint))
     };
     assert_eq!(open("test", 0), Ok(2));
     assert_eq!(open("tst", 0), Err(("unknown suite \"tst\"; did you mean \"test\"?".into(), None)));
@@ -117,7 +119,9 @@ fn a_list_of_suites_is_a_plan_and_tasks_are_found_by_name() {
 #[test]
 fn an_episode_depends_on_its_seed_alone() {
     let loaded = project("return suite()").load("x.lua", &[]).unwrap();
-    let scene = |episode, seed| EpisodeSetup::open(&loaded, &episode_id(episode, seed), &[]).unwrap().scene;
+    let scene = |episode, seed| {
+        EpisodeSetup::open(&loaded, &episode_id(episode, seed), &SceneChanges::default()).unwrap().scene
+    };
     assert_eq!(scene(0, 1), scene(0, 1));
     assert_ne!(scene(0, 1).objects[0].pose_w, scene(1, 1).objects[0].pose_w);
     assert_ne!(scene(0, 1).objects[0].pose_w, scene(0, 2).objects[0].pose_w);
@@ -131,7 +135,7 @@ fn an_episode_runs_on_the_files_of_its_plan() {
     let project = project("return suite()");
     let loaded = project.load("x.lua", &[]).unwrap();
     project.write("x.lua", b"error('changed')");
-    assert!(EpisodeSetup::open(&loaded, &episode_id(0, 1), &[]).is_ok());
+    assert!(EpisodeSetup::open(&loaded, &episode_id(0, 1), &SceneChanges::default()).is_ok());
 }
 
 #[test]
@@ -145,7 +149,13 @@ fn shifts_change_the_scene_and_are_strict() {
         let project = shift(body);
         let loaded = project.load("x.lua", &[]).unwrap();
         let shifts = [ShiftValue { name: name.into(), value: 0.5 }];
-        EpisodeSetup::open(&loaded, &episode_id(0, 1), &shifts).map(|e| e.scene).map_err(|e| e.message)
+        EpisodeSetup::open(
+            &loaded,
+            &episode_id(0, 1),
+            &SceneChanges { shifts: shifts.into(), ..SceneChanges::default() },
+        )
+        .map(|e| e.scene)
+        .map_err(|e| e.message)
     };
     let soften = "local o = scene:object 'ball' o.youngs_pa = o.youngs_pa * value return scene";
     let scene = open(soften, "stiffness").unwrap();
@@ -176,7 +186,13 @@ fn the_library_scales_stiffness_and_mass() {
     let loaded = project.load("x.lua", &[]).unwrap();
     assert!(loaded.sources.bundle.files.contains_key("scripts/shifts.lua"));
     let shifts = [("stiffness", 0.5), ("mass", 2.0)].map(|(name, value)| (name.to_owned(), value).into());
-    let scene = EpisodeSetup::open(&loaded, &episode_id(0, 1), &shifts).unwrap().scene;
+    let scene = EpisodeSetup::open(
+        &loaded,
+        &episode_id(0, 1),
+        &SceneChanges { shifts: shifts.into(), ..SceneChanges::default() },
+    )
+    .unwrap()
+    .scene;
     let Body::Soft(soft) = &scene.objects[0].asset.body else { panic!("the ball is soft") };
     assert_eq!((soft.youngs_pa, soft.density), (20e3, 400.0));
     let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
@@ -202,7 +218,7 @@ fn unreachable_goals_are_reported_at_their_line() {
         let project = project(&text);
         let loaded = project.load("x.lua", &[]).unwrap();
         let folder = format!("{}/", project.path("").display()).replace("//", "/");
-        let opened = EpisodeSetup::open(&loaded, &episode_id(0, 1), &[]).map(|_| ());
+        let opened = EpisodeSetup::open(&loaded, &episode_id(0, 1), &SceneChanges::default()).map(|_| ());
         opened.map_err(|e| e.to_string().replace(&folder, ""))
     };
     let line = SUITE.lines().count() + 8;
@@ -246,7 +262,7 @@ fn the_arm_starts_within_its_joint_limits() {
         )]);
         let loaded = project.load("x.lua", &[]).unwrap();
         let folder = format!("{}/", project.path("").display()).replace("//", "/");
-        EpisodeSetup::open(&loaded, &episode_id(0, 1), &[])
+        EpisodeSetup::open(&loaded, &episode_id(0, 1), &SceneChanges::default())
             .map(|e| e.scene.start_q)
             .map_err(|e| e.to_string().replace(&folder, ""))
     };
@@ -290,7 +306,7 @@ fn an_object_can_stand_on_another() {
         scene:add { name = 'b', asset = ball, at = { 0.1, 0 } }\n\
         scene:add { name = 'a', asset = ball, at = { 0.1, 0 }, on = 'b' }\nend) } } }";
     let loaded = project(text).load("x.lua", &[]).unwrap();
-    let scene = EpisodeSetup::open(&loaded, &episode_id(0, 1), &[]).unwrap().scene;
+    let scene = EpisodeSetup::open(&loaded, &episode_id(0, 1), &SceneChanges::default()).unwrap().scene;
     assert!((scene.objects[1].pose_w.translation.z - 0.06).abs() < 1e-6);
     assert!(std::sync::Arc::ptr_eq(&scene.objects[0].asset, &scene.objects[1].asset));
 }
@@ -376,7 +392,7 @@ fn the_workspace_is_a_box_within_reach_of_the_arm() {
             &(SUITE.replace("scene:add {", &format!("{set} scene:add {{")) + "return suite()"),
         )]);
         let loaded = project.load("x.lua", &[]).unwrap();
-        let opened = EpisodeSetup::open(&loaded, &episode_id(0, 1), &[]);
+        let opened = EpisodeSetup::open(&loaded, &episode_id(0, 1), &SceneChanges::default());
         opened.map(|_| ()).map_err(|e| e.to_string().rsplit('/').next().unwrap_or_default().to_owned())
     };
     let line = SUITE.lines().position(|line| line.contains("softvt.layout")).unwrap() + 1;
@@ -402,10 +418,12 @@ fn an_episode_of_another_suite_than_that_of_the_plan_is_refused() {
     let project = Project::new(&[("x.lua", &text)]);
     let mut loaded = project.load("x.lua", &[]).expect("a suite");
     let id = EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };
-    assert!(EpisodeSetup::open(&loaded, &id, &[]).is_ok());
+    assert!(EpisodeSetup::open(&loaded, &id, &SceneChanges::default()).is_ok());
     let Plan::Suite(suite) = &mut loaded.plan else { panic!("a suite") };
     suite.tasks[0].goal.target = "ball".into();
-    let Err(error) = EpisodeSetup::open(&loaded, &id, &[]) else { panic!("another goal") };
+    let Err(error) = EpisodeSetup::open(&loaded, &id, &SceneChanges::default()) else {
+        panic!("another goal")
+    };
     assert!(error.message.starts_with("suite \"test\" differs from that of the plan"), "{error}");
     assert!(error.line.is_some(), "{error}");
 }

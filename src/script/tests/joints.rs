@@ -1,5 +1,5 @@
 use super::*;
-use crate::EpisodeSetup;
+use crate::{EpisodeSetup, SceneChanges};
 use softvt_common::episode_id::{EpisodeId, Split};
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::joints;
@@ -34,7 +34,9 @@ fn open(text: &str) -> Result<Scene, String> {
     let loaded = project.load("x.lua", &[]).map_err(|e| e.message)?;
     let id = EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 1, split: Split::Validation };
     let folder = format!("{}/", project.path("").display()).replace("//", "/");
-    EpisodeSetup::open(&loaded, &id, &[]).map(|e| e.scene).map_err(|e| e.to_string().replace(&folder, ""))
+    EpisodeSetup::open(&loaded, &id, &SceneChanges::default())
+        .map(|e| e.scene)
+        .map_err(|e| e.to_string().replace(&folder, ""))
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::{path::Path, time::Duration};
 
-use crate::{EpisodeSetup, Limits, LoadedScript, load_with};
+use crate::{EpisodeSetup, Limits, LoadedScript, SceneChanges, load_with};
 use softvt_benchmark::{Plan, ShiftValue};
 use softvt_common::episode_id::{EpisodeId, Split};
 use softvt_scene::{Body, Scene};
@@ -18,7 +18,7 @@ fn episode(loaded: &LoadedScript, suite: &str, task: usize, shifts: &[(&str, f64
     let id = EpisodeId { suite: suite.to_owned(), task, episode: 3, base_seed: 1, split: Split::Validation };
     let shift = |(name, value): &(&str, f64)| ShiftValue { name: (*name).to_owned(), value: *value };
     let shifts: Vec<ShiftValue> = shifts.iter().map(shift).collect();
-    EpisodeSetup::open(loaded, &id, &shifts).expect("a scene")
+    EpisodeSetup::open(loaded, &id, &SceneChanges { shifts, ..SceneChanges::default() }).expect("a scene")
 }
 
 /// The objects whose density or Young's modulus a shift has multiplied by `factor`. All others must be unchanged.

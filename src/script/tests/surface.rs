@@ -134,7 +134,7 @@ fn in_layout(text: &str) -> String {
     let loaded = project.load("x.lua", &[]).unwrap();
     let id = EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };
     let folder = format!("{}/", project.path("").display()).replace("//", "/");
-    match crate::EpisodeSetup::open(&loaded, &id, &[]) {
+    match crate::EpisodeSetup::open(&loaded, &id, &crate::SceneChanges::default()) {
         Ok(_) => String::new(),
         Err(error) => error.to_string().replace(&folder, ""),
     }

@@ -1,7 +1,7 @@
 //! Scales of objects, and suites whose objects vary from episode to episode.
 
 use super::*;
-use crate::{EpisodeSetup, load_variation};
+use crate::{EpisodeSetup, SceneChanges, load_variation};
 use softvt_benchmark::Plan;
 use softvt_common::episode_id::{EpisodeId, Split};
 use softvt_scene::Object;
@@ -36,7 +36,7 @@ fn project(rest: &str) -> Project {
 
 fn open(loaded: &LoadedScript, task: usize, episode: u32) -> Result<EpisodeSetup, ScriptError> {
     let id = EpisodeId { suite: "test".into(), task, episode, base_seed: 3, split: Split::Validation };
-    EpisodeSetup::open(loaded, &id, &[])
+    EpisodeSetup::open(loaded, &id, &SceneChanges::default())
 }
 
 fn opened(rest: &str) -> EpisodeSetup {

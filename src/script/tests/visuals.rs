@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{Project, SUITE, error_of};
-use crate::EpisodeSetup;
+use crate::{EpisodeSetup, SceneChanges};
 use softvt_common::episode_id::{EpisodeId, Split};
 use softvt_scene::{Body, Mask, Visual};
 
@@ -25,7 +25,7 @@ fn read(visuals: &str) -> Vec<Visual> {
     );
     let project = Project::new(&[("suites/x.lua", &(with_visuals(visuals) + &text + "\nreturn suite()"))]);
     let loaded = project.load("suites/x.lua", &[]).unwrap();
-    let scene = EpisodeSetup::open(&loaded, &first(), &[]).unwrap().scene;
+    let scene = EpisodeSetup::open(&loaded, &first(), &SceneChanges::default()).unwrap().scene;
     assert_eq!(scene.objects[0].asset.body, Body::Scenery);
     scene.objects[0].asset.visuals.clone()
 }
@@ -172,7 +172,8 @@ fn painted_shapes_need_a_visual_per_material_or_none_at_all() {
         let text = asset + &SUITE.replace("scene:add { name = \"ball\",", add) + "\nreturn suite()";
         let project = Project::new(&[("suites/x.lua", &text)]);
         let loaded = project.load("suites/x.lua", &[]).unwrap();
-        EpisodeSetup::open(&loaded, &first(), &[]).map(|episode| episode.scene.objects[0].asset.visuals.len())
+        EpisodeSetup::open(&loaded, &first(), &SceneChanges::default())
+            .map(|episode| episode.scene.objects[0].asset.visuals.len())
     };
     assert_eq!(painted("").unwrap(), 3);
     let looks = |count: usize| format!("visuals = {{ {} }},", "{ albedo = { 1, 1, 1 } },".repeat(count));
