@@ -11,6 +11,7 @@ mod episode_list;
 mod error;
 mod evaluate;
 pub mod experiment;
+pub mod import;
 mod limits;
 mod observer;
 mod policy;

@@ -129,7 +129,7 @@ impl BuiltinPolicy {
         }
     }
 
-    /// What it does, in one line.
+    /// Description, in one line.
     pub fn about(self) -> &'static str {
         match self {
             Self::Expert => {

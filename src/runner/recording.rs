@@ -51,7 +51,7 @@ use softvt_script::LoadedScript;
 /// Prefix of the error of an attempt that could not start from the state of its demonstration.
 const START_FAILED: &str = "cannot reproduce the initial state: ";
 
-/// What a recording contains, and where it goes.
+/// Contents and folder of a recording.
 #[derive(Clone, Debug)]
 pub struct RecordingOptions {
     /// Output folder: a new one, or with `resume` that of an interrupted recording.

@@ -13,7 +13,7 @@ use softvt_geometry::{
     Pose, Vec3, mass::mass_properties, samples::SampleSpec, shape::Shape, voxel::VoxelMeshError,
 };
 
-/// What [`World::insert`] takes.
+/// A description of a body that [`World::insert`] takes.
 pub trait Insert {
     /// Identifier of the inserted body, or why it cannot be made.
     type Output;

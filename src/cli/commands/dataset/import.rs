@@ -1,36 +1,18 @@
-//! `softvt dataset import`: demonstrations of other simulators, re-executed in a suite. Those that are safe and reach
-//! the goal are recorded.
+//! `softvt dataset import`: demonstrations of other simulators, re-executed in a suite.
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    path::PathBuf,
-};
+use std::path::PathBuf;
 
 use clap::{Args, value_parser};
-use serde_json::json;
 
-use super::task_matching::{MatchedDemo, match_demos};
 use crate::{
     args::{RecordingArgs, ScriptArgs},
     error::CliError,
     output::print_recording,
 };
-use softvt_benchmark::Task;
-use softvt_common::episode_id::EpisodeIndex;
-use softvt_common::{parallel, text::counted};
-use softvt_dataset::{
-    card::Imported,
-    import::{self, ForeignDemo, ForeignFile, InitialCondition},
-};
-use softvt_evaluation::record::Origin;
-use softvt_policy::{ToolCommand, builtin::RecordedPolicy};
-use softvt_rollout::{ChunkedPolicy, target_asset};
 use softvt_runner::{
-    EpisodeJob, EpisodeList, PolicyConfig, RunError, SuiteRun,
-    recording::{GripLog, SuiteRecording, record_all},
-    selection::select_suites,
+    PolicyConfig,
+    import::{self, ImportOptions},
 };
-use softvt_scene::{Body, InitialState};
 
 /// Re-execute demonstrations of robomimic, LIBERO, SoftVTBench or softvt in a suite, and record the safe ones that reach the goal
 #[derive(Args, Clone, Debug)]
@@ -57,159 +39,12 @@ pub(crate) struct ImportArgs {
 /// Imports the demonstrations that the arguments name.
 ///
 /// # Errors
-/// The script has no suite, a file is not valid or matches no task, the folder contains something else, an attempt or a
-/// file fails, or no demonstration is kept.
+/// As [`import::import`].
 pub(super) fn run(args: ImportArgs) -> Result<(), CliError> {
     let recording = &args.recording.options(None);
     let request = args.recording.request(args.script, args.tasks)?;
     let loaded = request.load("dataset import")?;
-    let config = &request.config.with_policy(PolicyConfig::external("import"));
-    let suites = select_suites("dataset import", config, &loaded.plan)?;
-    let files: Vec<ForeignFile> =
-        args.files.iter().map(|path| import::read(path)).collect::<Result<_, _>>()?;
-    let sources = describe_files(&files)?;
-    let matched = match_demos(config, suites, &files, args.attempts.unwrap_or(u32::MAX))?;
-    let names: BTreeSet<String> =
-        matched.iter().map(|demo| config.suite_name(&suites[demo.task.suite])).collect();
-    let request = json!({
-        "softvt": env!("CARGO_PKG_VERSION"),
-        "imported": sources,
-        "attempts": args.attempts,
-        "layout": args.layout,
-        "task": config.tasks,
-        "pictures": recording.has_images,
-        "privileged": recording.has_privileged,
-        "suites": names,
-    });
-    let recorded = record_all(recording, &request, || {
-        for Imported { file, layout, demos, commands, .. } in &sources {
-            config.notice(format!("{file}: {layout}, {}: {commands}", counted(*demos, "demonstration")));
-        }
-        let mut recordings = Vec::new();
-        for (index, suite) in suites.iter().enumerate() {
-            let demos: Vec<&MatchedDemo> = matched.iter().filter(|demo| demo.task.suite == index).collect();
-            if demos.is_empty() {
-                continue;
-            }
-            let mut jobs: Vec<EpisodeJob> =
-                demos.iter().map(|demo| EpisodeJob { task: demo.task.task, episode: demo.attempt }).collect();
-            jobs.sort_by_key(|job| (suite.tasks.iter().position(|task| task.id == job.task.id), job.episode));
-            let mut tasks: Vec<&Task> = jobs.iter().map(|job| job.task).collect();
-            tasks.dedup_by_key(|task| task.id);
-            recordings.push(SuiteRecording::new(
-                config,
-                recording,
-                &loaded,
-                suite,
-                tasks,
-                EpisodeList::listed(jobs),
-                None,
-                |run, log| {
-                    run.imported = sources.clone();
-                    replay_demos(run, log, &demos, args.layout)
-                },
-            )?);
-        }
-        Ok(recordings)
-    })?;
-    print_recording(&recording.out, recorded)
-}
-
-/// Describes the files for `recording.json` and the dataset card.
-///
-/// # Errors
-/// Two files have the same content.
-fn describe_files(files: &[ForeignFile]) -> Result<Vec<Imported>, CliError> {
-    let mut seen: BTreeMap<&str, &ForeignFile> = BTreeMap::new();
-    for file in files {
-        if let Some(twin) = seen.insert(&file.sha256, file) {
-            return Err(CliError::input(format!(
-                "{} and {} are byte-identical; name one of them",
-                twin.path.display(),
-                file.path.display()
-            )));
-        }
-    }
-    let describe = |file: &ForeignFile| Imported {
-        file: file_name(file),
-        sha256: file.sha256.clone(),
-        layout: file.layout.name().to_owned(),
-        demos: file.demos.len(),
-        commands: file.demos.first().map_or(String::new(), |demo| demo.command_source.to_owned()),
-    };
-    Ok(files.iter().map(describe).collect())
-}
-
-fn file_name(file: &ForeignFile) -> String {
-    file.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
-}
-
-/// Makes the episodes of a run re-execute the demonstrations, each from its own initial state. With `use_layout`
-/// objects start where the layout puts them.
-fn replay_demos(
-    run: &mut SuiteRun,
-    grip_log: &GripLog,
-    demos: &[&MatchedDemo],
-    use_layout: bool,
-) -> Result<(), RunError> {
-    let mut commands: BTreeMap<EpisodeIndex, Vec<ToolCommand>> = BTreeMap::new();
-    let (mut placed, mut foreign) = (0, 0);
-    for matched in demos {
-        let index = EpisodeIndex { task: matched.task.task.id, episode: matched.attempt };
-        let (start, demo) = initial_state(run, matched, use_layout)?;
-        foreign += usize::from(matches!(demo.initial_condition, InitialCondition::OtherSimulator { .. }));
-        placed += usize::from(!start.places.is_empty());
-        let origin = Origin {
-            file: file_name(matched.file),
-            sha256: matched.file.sha256.clone(),
-            demo: demo.name.clone(),
-            layout: matched.file.layout.name().to_owned(),
-            start,
-        };
-        run.origins.insert(index, origin);
-        commands.insert(index, demo.commands);
-        parallel::lock(grip_log).insert(index, demo.gripper_closed);
-    }
-    run.controllers = Box::new(move |_, brief| {
-        let index = brief.index();
-        let commands = commands.get(&index).cloned().unwrap_or_default();
-        Ok(Box::new(ChunkedPolicy::new(Box::new(RecordedPolicy::new(commands, None)), brief, 1)))
-    });
-    if foreign > 0 {
-        run.config.notice(format!(
-            "{}: in {placed} of {foreign} demonstrations objects start where the file has them, in the others where the \
-             layout puts them",
-            run.suite.name
-        ));
-    }
-    Ok(())
-}
-
-/// The initial state of a demonstration in the suite, and the demonstration adapted to the suite.
-fn initial_state(
-    run: &SuiteRun,
-    matched: &MatchedDemo,
-    use_layout: bool,
-) -> Result<(InitialState, ForeignDemo), RunError> {
-    let mut demo = matched.demo.clone();
-    let (joints, poses) = match &matched.demo.initial_condition {
-        InitialCondition::SoftvtEpisode { start, .. } => {
-            let places = if use_layout { Vec::new() } else { start.places.clone() };
-            return Ok((InitialState { places, ..*start }, demo));
-        }
-        InitialCondition::OtherSimulator { joints, objects } => {
-            (*joints, if use_layout { &[][..] } else { objects })
-        }
-    };
-    let mut start = InitialState { joints, places: Vec::new() };
-    if poses.is_empty() && !demo.is_stopped_by_object.contains(&true) {
-        return Ok((start, demo));
-    }
-    let task = matched.task.task;
-    let opened = run.open_episode(&run.episode_id(task, matched.attempt))?;
-    start.places = import::match_objects(&opened.scene, &task.goal.object, poses);
-    if target_asset(&opened.scene, task).is_some_and(|asset| matches!(asset.body, Body::Rigid { .. })) {
-        demo.close_fully_on_rigid_object();
-    }
-    Ok((start, demo))
+    let config = request.config.with_policy(PolicyConfig::external("import"));
+    let options = ImportOptions { attempts: args.attempts, layout: args.layout };
+    print_recording(&recording.out, import::import(&config, &loaded, &args.files, options, recording)?)
 }

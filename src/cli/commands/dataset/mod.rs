@@ -1,7 +1,6 @@
 //! `softvt dataset`: inspection, export and import of demonstrations.
 
 mod import;
-mod task_matching;
 
 use std::{path::PathBuf, sync::Arc};
 

@@ -2,10 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::error::CliError;
+use crate::{config::RunConfig, error::RunError, selection::select_tasks};
 use softvt_benchmark::{Suite, Task};
 use softvt_dataset::import::{ForeignDemo, ForeignFile, ForeignLayout, ForeignTask, InitialCondition};
-use softvt_runner::{RunConfig, selection::select_tasks};
 
 /// A task of one of several suites.
 #[derive(Clone, Copy, Debug)]
@@ -47,7 +46,7 @@ pub(super) fn match_demos<'a>(
     suites: &'a [Suite],
     files: &'a [ForeignFile],
     max: u32,
-) -> Result<Vec<MatchedDemo<'a>>, CliError> {
+) -> Result<Vec<MatchedDemo<'a>>, RunError> {
     let forced = forced_task(config, suites)?;
     let mut found: Vec<MatchedDemo> = Vec::new();
     let mut counts: BTreeMap<TaskKey, u32> = BTreeMap::new();
@@ -103,15 +102,15 @@ pub(super) fn match_demos<'a>(
     Ok(found)
 }
 
-fn refuse(file: &ForeignFile, demo: &ForeignDemo, message: String) -> CliError {
-    CliError::input(format!("{}: {}: {message}", file.path.display(), demo.name))
+fn refuse(file: &ForeignFile, demo: &ForeignDemo, message: String) -> RunError {
+    RunError::input(format!("{}: {}: {message}", file.path.display(), demo.name))
 }
 
 /// The task that `--task` selects, if it is given.
 ///
 /// # Errors
 /// It selects none or several.
-fn forced_task<'a>(config: &RunConfig, suites: &'a [Suite]) -> Result<Option<SuiteTask<'a>>, CliError> {
+fn forced_task<'a>(config: &RunConfig, suites: &'a [Suite]) -> Result<Option<SuiteTask<'a>>, RunError> {
     if config.tasks.is_empty() {
         return Ok(None);
     }
@@ -125,19 +124,18 @@ fn forced_task<'a>(config: &RunConfig, suites: &'a [Suite]) -> Result<Option<Sui
     }
     match (&found[..], error) {
         ([task], _) => Ok(Some(*task)),
-        ([], Some(error)) => Err(error.into()),
+        ([], Some(error)) => Err(error),
         _ => Err(config.error(format!(
             "--task {}: matches {} tasks; select the one of the demonstrations, or leave --task out to match their \
              instructions",
             config.tasks.join(","),
             found.len()
-        ))
-        .into()),
+        ))),
     }
 }
 
 /// The attempt number of a demonstration of softvt.
-fn own_attempt(config: &RunConfig, file: &ForeignFile, demo: &ForeignDemo) -> Result<Option<u32>, CliError> {
+fn own_attempt(config: &RunConfig, file: &ForeignFile, demo: &ForeignDemo) -> Result<Option<u32>, RunError> {
     let own = config.seed;
     match &demo.initial_condition {
         InitialCondition::OtherSimulator { .. } => Ok(None),
@@ -164,7 +162,7 @@ fn task_of<'a>(
     suites: &'a [Suite],
     file: &ForeignFile,
     demo: &ForeignDemo,
-) -> Result<SuiteTask<'a>, CliError> {
+) -> Result<SuiteTask<'a>, RunError> {
     let ForeignTask { suite: named, id, prompts } = &demo.task;
     let name = named.as_ref().map(|name| normalized(&name.replace('-', "_")));
     let is_named = |suite: &Suite| name.as_ref() == Some(&normalized(&config.suite_name(suite)));
@@ -209,7 +207,7 @@ fn task_of<'a>(
     }
 }
 
-fn no_task(config: &RunConfig, suites: &[Suite], file: &ForeignFile, demo: &ForeignDemo) -> CliError {
+fn no_task(config: &RunConfig, suites: &[Suite], file: &ForeignFile, demo: &ForeignDemo) -> RunError {
     let ForeignTask { suite, id, prompts } = &demo.task;
     let task = match (prompts.first(), id) {
         (Some(prompt), _) => Some(format!("{prompt:?}")),
