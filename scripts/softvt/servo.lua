@@ -1,7 +1,7 @@
 -- A tactile servo: a hand that feels how firmly it must hold. It closes until both gels touch, lifts until the gels slide along the
 -- object, and tightens while it lifts. The shear of a sliding gel grows with the force; that of a held object is its weight. Where
--- the shear stops growing, the grip is the least one that holds. The hand tightens beyond it by a margin, goes back down and closes to
--- that grip. Its readings are the markers and its own closure. Its parameters describe gels and markers only, not the object.
+-- the shear stops growing, the grip is the least one that holds, if the hand can go down a little and the object stays with it. The
+-- hand tightens beyond that grip by a margin, goes back down and closes to it. Its readings are the markers and its own closure. Its parameters describe gels and markers only, not the object.
 local servo = {}
 
 local max, min, ceil = math.max, math.min, math.ceil
@@ -111,8 +111,8 @@ function Trial:bend(first)
   end
 end
 
--- Whether the object is held, for a bend of the shear.
-function Trial:holds(bend)
+-- Goes up and down to test whether the object is held, for a bend of the shear; stays up if it is not.
+function Trial:test_hold(bend)
   local count = ceil(TRIAL / LIFT)
   for _ = 1, count do self:move(0, LIFT, 0) end
   for _ = 1, count do self:move(0, -LIFT, 0) end
@@ -135,7 +135,7 @@ function Trial:tighten(margin)
       local wanted = self.touch + margin * (found.closure - self.touch)
       for _ = 1, CONFIRM do self:move(max(0, min(closing, (wanted - self.closure) / MM)), 0.03, 0) end
       found = self:bend(first)
-      if found and self:holds(found) then return found end
+      if found and self:test_hold(found) then return found end
       if found then first = #self.shear + 3 end
     end
   end

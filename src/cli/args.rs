@@ -15,8 +15,8 @@ use crate::{
 use softvt_benchmark::{ShiftValue, Teacher};
 use softvt_policy::{profile::GripCode, remote::Protocol};
 use softvt_runner::{
-    PolicyConfig, PolicyOptions, PolicySource, RunConfig, Shard, TraceDetail, VideoSelection, parse_profile,
-    read_secret, recording::RecordingOptions,
+    LoadedRun, PolicyConfig, PolicyOptions, PolicySource, RunConfig, Shard, TraceDetail, VideoSelection,
+    parse_profile, read_secret, recording::RecordingOptions,
 };
 use softvt_script::{LoadedScript, STANDARD_VARIATION};
 
@@ -164,7 +164,7 @@ impl Request {
         Self { config: change(self.config), ..self }
     }
 
-    /// True if a flag was given, by its identifier in clap.
+    /// The flags that were given.
     pub(crate) fn given(&self) -> &[GivenFlag] {
         &self.given
     }
@@ -184,13 +184,9 @@ impl Request {
     ///
     /// # Errors
     /// The script fails or returns no plan; a flag without effect; a policy that cannot be loaded.
-    pub(crate) fn load_plan(
-        self,
-        command: &str,
-        policy: &PolicyArgs,
-    ) -> Result<(RunConfig, LoadedScript), CliError> {
-        let loaded = self.load(command)?;
-        Ok((self.config.with_policy(PolicyConfig::load(&policy.options())?), loaded))
+    pub(crate) fn load_plan(self, command: &str, policy: &PolicyArgs) -> Result<LoadedRun, CliError> {
+        let script = self.load(command)?;
+        Ok(LoadedRun { config: self.config.with_policy(PolicyConfig::load(&policy.options())?), script })
     }
 }
 
@@ -198,7 +194,7 @@ impl Request {
 #[derive(Args, Clone, Debug)]
 pub(crate) struct PolicyArgs {
     /// Policy that controls the robot: a name (softvt list policies), a Lua file, a server such as ws://host:8000, or a run folder whose actions are repeated [default: expert; softvt record: the suite's teacher]
-    #[arg(long, value_name = "POLICY", value_parser = clap::value_parser!(PolicySource))]
+    #[arg(long, value_name = "POLICY")]
     policy: Option<PolicySource>,
     /// Observations and action encoding of a policy server: a name (softvt list profiles) or a Lua file [default: visuo_tactile]
     #[arg(long, value_name = "PROFILE", value_parser = parse_profile)]
@@ -221,6 +217,7 @@ pub(crate) struct PolicyArgs {
 }
 
 impl PolicyArgs {
+    /// The policy and its options.
     pub(crate) fn options(&self) -> PolicyOptions {
         PolicyOptions {
             source: self.policy.clone().unwrap_or_default(),
@@ -287,6 +284,7 @@ impl RecordingArgs {
         Ok(Request::new(script)?.with(|config| RunConfig { tasks, threads, trace, ..config }))
     }
 
+    /// The recording, with the grip code of exports that name none.
     pub(crate) fn options(&self, gripper: Option<GripCode>) -> RecordingOptions {
         RecordingOptions {
             out: self.out.clone(),

@@ -2,8 +2,7 @@
 //!
 //! [`World`] owns the state, and [`World::step`] is the algorithm: its documentation has examples. The modules below
 //! it can be used on their own: [`fem`] (corotational finite elements), [`rigid`], [`joints`] (articulated dynamics) and
-//! [`contact`] (detection), [`solver`] (the convex problem of a step) and [`sparse`] (multifrontal Cholesky). No
-//! module here depends on scripts, files or images.
+//! [`contact`] (detection). No module here depends on scripts, files or images.
 #![warn(missing_docs, unreachable_pub)]
 
 pub mod contact;

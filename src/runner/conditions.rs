@@ -9,7 +9,7 @@ use crate::{
     error::RunError,
     evaluate::{is_finished, run_suite},
     policy::PolicyConfig,
-    selection::{path_component, select_episodes, select_tasks},
+    selection::{check_episodes, path_component, select_episodes, select_tasks},
     suite_run::SuiteRun,
 };
 use softvt_benchmark::{Condition, ObjectType, REFERENCE, Suite, Task};
@@ -35,16 +35,8 @@ struct ConditionCase {
     not_applicable: Option<String>,
 }
 
-/// Results of all suites under all conditions.
-pub struct ConditionResults {
-    /// One table per suite.
-    pub tables: Vec<ConditionTable>,
-    /// Content of `conditions.json`.
-    pub document: Value,
-}
-
 /// Runs every suite unchanged and under each condition. All scenes and folders are checked before the first episode runs.
-/// `on_suite` is called with the tables so far after each suite.
+/// `on_suite` is called with the tables so far after each suite. Returns the content of `conditions.json`.
 ///
 /// # Errors
 /// A condition that does not fit a suite, a folder that contains a run, or an episode that fails.
@@ -56,7 +48,8 @@ pub fn run<E: From<RunError>>(
     conditions: &[Condition],
     out: &Path,
     mut on_suite: impl FnMut(&[ConditionTable]) -> Result<(), E>,
-) -> Result<ConditionResults, E> {
+) -> Result<Value, E> {
+    check_episodes(config, suites)?;
     let cases: Vec<Vec<ConditionCase>> = suites
         .iter()
         .map(|suite| condition_cases(config, suite, conditions, suites.len() > 1))
@@ -72,8 +65,7 @@ pub fn run<E: From<RunError>>(
         tables.push(compared);
         on_suite(&tables)?;
     }
-    let document = write(config, loaded, &tables, out)?;
-    Ok(ConditionResults { tables, document })
+    Ok(write(config, loaded, &tables, out)?)
 }
 
 /// Checks that every condition can be applied to every suite, on the first task of each.

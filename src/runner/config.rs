@@ -75,6 +75,14 @@ impl fmt::Display for Shard {
     }
 }
 
+/// A configuration and its script.
+pub struct LoadedRun {
+    /// What is run.
+    pub config: RunConfig,
+    /// The script, loaded as the configuration says.
+    pub script: LoadedScript,
+}
+
 /// Configuration of the runs of a script. The default runs the expert on all episodes of the suites as they are.
 #[derive(Clone)]
 pub struct RunConfig {
@@ -94,6 +102,7 @@ pub struct RunConfig {
     pub rigid_twin: bool,
     /// File with the ranges within which the episodes vary, in place of those of the suite.
     pub vary: Option<PathBuf>,
+    /// Policy that controls the robot.
     pub policy: PolicyConfig,
     /// Indices or parts of prompts of the tasks to run; all if empty.
     pub tasks: Vec<String>,
@@ -103,12 +112,15 @@ pub struct RunConfig {
     pub shard: Option<Shard>,
     /// Number of threads; results do not depend on it. By default that of the processors.
     pub threads: Option<u16>,
+    /// Detail of the recorded control steps; by default none are recorded.
     pub trace: Option<TraceDetail>,
+    /// Episodes that become videos.
     pub video: Option<VideoSelection>,
-    /// Output folder.
+    /// Folder of the results. Without one, a [`Runner`](super::Runner) writes nothing.
     pub out: Option<PathBuf>,
     /// True to continue an interrupted run in the output folder.
     pub resume: bool,
+    /// Receiver of progress and messages.
     pub observer: Arc<dyn Observer>,
 }
 
@@ -143,6 +155,7 @@ impl RunConfig {
         Self { file: file.into(), ..Self::default() }
     }
 
+    /// This configuration with another policy.
     pub fn with_policy(self, policy: PolicyConfig) -> Self {
         Self { policy, ..self }
     }
@@ -151,9 +164,9 @@ impl RunConfig {
     ///
     /// # Errors
     /// The script fails or returns no plan.
-    pub fn load(&self) -> Result<LoadedScript, RunError> {
-        let loaded = softvt_script::load(&self.file, &self.options)?;
-        self.prepare_script(loaded)
+    pub fn load(self) -> Result<LoadedRun, RunError> {
+        let script = softvt_script::load(&self.file, &self.options)?;
+        Ok(LoadedRun { script: self.prepare_script(script)?, config: self })
     }
 
     /// A loaded script whose suites vary as the configuration says.
@@ -175,12 +188,12 @@ impl RunConfig {
         RunError::input(message).prefixed(self.file.display())
     }
 
-    pub fn notice(&self, message: impl fmt::Display) {
+    pub(crate) fn notice(&self, message: impl fmt::Display) {
         self.observer.notice(&message.to_string());
     }
 
-    /// Number of threads.
-    pub fn threads(&self) -> usize {
+    /// The number of threads to use.
+    pub fn thread_count(&self) -> usize {
         thread_count(self.threads)
     }
 

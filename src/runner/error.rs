@@ -17,11 +17,14 @@ pub enum Cause {
 #[derive(Debug, thiserror::Error)]
 #[error("{message}")]
 pub struct RunError {
+    /// Its cause, which decides the exit code of a command.
     pub cause: Cause,
+    /// Text for a user.
     pub message: String,
 }
 
 impl RunError {
+    /// An error with this cause.
     pub fn new(cause: Cause, message: impl ToString) -> Self {
         Self { cause, message: message.to_string() }
     }
@@ -32,6 +35,7 @@ impl RunError {
         Self::new(cause, message)
     }
 
+    /// A run that ended by a request to stop.
     pub fn interrupted(message: impl ToString) -> Self {
         Self::new(Cause::Interrupt, message)
     }

@@ -119,14 +119,13 @@ impl<'a> RunLog<'a> {
         observer.begin(jobs.len(), name);
         let outcome = parallel::run(
             jobs.len(),
-            config.threads(),
+            config.thread_count(),
             cancel::requested,
             |position| simulate(jobs.job(position)),
             |_, SimulatedEpisode { finished, rendered }| {
-                let (index, message) = (finished.record.header.id.index(), line(&finished.record));
-                self.add(finished, &write)?;
-                observer.advance(&message);
-                report_unrendered(config, index, rendered);
+                let record = self.add(finished, &write)?;
+                observer.advance(&line(record));
+                report_unrendered(config, record.header.id.index(), rendered);
                 Ok(())
             },
         );
@@ -142,11 +141,11 @@ impl<'a> RunLog<'a> {
         &mut self,
         finished: FinishedEpisode,
         write: impl Fn(&FinishedEpisode) -> Result<(), RunError>,
-    ) -> Result<(), RunError> {
+    ) -> Result<&EpisodeRecord, RunError> {
         write(&finished)?;
         self.folder.append(&finished.record)?;
         self.records.push(finished.record);
-        Ok(())
+        Ok(&self.records[self.records.len() - 1])
     }
 
     /// Sorts the records and the lines of the folder.
@@ -204,8 +203,8 @@ pub(crate) fn with_kept(outcome: Result<(), RunError>, kept: &str, hint: &str) -
     }
 }
 
-/// Runs the episodes of a prepared suite into its folder, and calls `on_episode` for each, in the order in which they end.
-/// Episodes that are there already are kept.
+/// Runs the episodes of a prepared suite into its folder, and calls `on_episode` for each one that it has run and written, in
+/// the order in which they end. Episodes that are there already are kept.
 ///
 /// # Errors
 /// The folder contains another run, or one that may not be resumed; a script, policy or file fails; or the run is
@@ -276,7 +275,7 @@ pub(crate) fn run_episodes(
     config.observer.begin(run.jobs.len(), &run.name);
     let outcome = parallel::run(
         run.jobs.len(),
-        config.threads(),
+        config.thread_count(),
         cancel::requested,
         |position| run.run_episode(run.jobs.job(position), false, &run.controllers),
         |_, finished| {
@@ -370,7 +369,7 @@ pub(crate) fn restore_artifacts(run: &SuiteRun, records: &[EpisodeRecord]) -> Re
     }
     parallel::run(
         restorable.len(),
-        run.config.threads(),
+        run.config.thread_count(),
         cancel::requested,
         |index| {
             let record = restorable[index];
@@ -415,6 +414,7 @@ fn simulate_again(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::LoadedRun;
     use softvt_benchmark::Plan;
     use softvt_policy::{Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief};
     use softvt_rollout::{ChunkedPolicy, Controller};
@@ -444,8 +444,8 @@ mod tests {
 
     #[test]
     fn every_file_of_a_run_records_whether_the_policy_observed_true_forces() {
-        let config = RunConfig { file: "suites/spatial_soft.lua".into(), ..RunConfig::default() };
-        let loaded = config.load().expect("it loads");
+        let loaded = RunConfig::of("suites/spatial_soft.lua").load().expect("it loads");
+        let LoadedRun { config, script: loaded } = loaded;
         let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
         let mut suite = suite.clone();
         suite.tasks.truncate(1);

@@ -8,10 +8,7 @@ use std::{
 
 use serde::Serialize;
 
-use crate::{
-    error::RunError,
-    {config::RunConfig, run_manifest},
-};
+use crate::{config::RunConfig, error::RunError, run_manifest};
 use softvt_benchmark::Plan;
 use softvt_common::cancel;
 use softvt_common::{
@@ -84,7 +81,7 @@ pub fn run<E: From<RunError>>(
     config.observer.begin(points, name);
     let outcome = parallel::run(
         points,
-        config.threads(),
+        config.thread_count(),
         cancel::requested,
         |point| {
             let experiment = take()?;

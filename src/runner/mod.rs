@@ -25,16 +25,16 @@ mod served_runs;
 pub mod stored_folder;
 mod suite_run;
 
-pub use config::{RunConfig, Shard, TraceDetail, read_secret, thread_count};
+pub use config::{LoadedRun, RunConfig, Shard, TraceDetail, read_secret, thread_count};
 pub use episode_artifacts::VideoSelection;
 pub use episode_list::{EpisodeJob, EpisodeList};
 pub use error::{Cause, RunError};
 pub use evaluate::SuiteResult;
 pub use observer::{Observer, Silent};
 pub use policy::{
-    BuiltinPolicy, ControllerFactory, PolicyConfig, PolicyOptions, PolicySource, expert_controller,
-    parse_profile,
+    BuiltinPolicy, ControllerFactory, DeclaredStreams, PolicyConfig, PolicyOptions, PolicySource,
+    expert_controller, parse_profile,
 };
 pub use runner::Runner;
 pub use served_runs::ServedRuns;
-pub use suite_run::{SuiteRun, find_replay_source};
+pub use suite_run::SuiteRun;

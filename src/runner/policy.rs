@@ -413,7 +413,7 @@ impl PolicyConfig {
     }
 
     /// The server of the policy, if it has one.
-    pub fn server(&self) -> Option<&PolicyServer> {
+    pub(crate) fn server(&self) -> Option<&PolicyServer> {
         match &self.kind {
             PolicyKind::Server(server) => Some(server),
             _ => None,
@@ -421,7 +421,7 @@ impl PolicyConfig {
     }
 
     /// True for the clients of `softvt serve`.
-    pub fn is_client(&self) -> bool {
+    pub(crate) fn is_client(&self) -> bool {
         matches!(self.kind, PolicyKind::Client(_))
     }
 
@@ -435,7 +435,7 @@ impl PolicyConfig {
     }
 
     /// True if the policy repeats the actions of recorded runs.
-    pub fn is_recorded(&self) -> bool {
+    pub(crate) fn is_recorded(&self) -> bool {
         self.recorded().is_some()
     }
 

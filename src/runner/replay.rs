@@ -10,7 +10,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
 use crate::{
-    config::{RunConfig, thread_count},
+    config::{LoadedRun, RunConfig, thread_count},
     episode_list::{EpisodeJob, EpisodeList},
     error::RunError,
     observer::Observer,
@@ -94,7 +94,7 @@ impl StoredManifest<'_> {
     pub fn simulate(&self, record: &EpisodeRecord, actions: Vec<Action>) -> Result<EpisodeRecord, RunError> {
         let index = record.header.id.index();
         let config = self.config(index.task)?;
-        let loaded = config.load()?;
+        let LoadedRun { config, script: loaded } = config.load()?;
         let suite = self.suite(&loaded)?;
         let tasks = select_tasks(&config, suite)?;
         let job = EpisodeJob { task: tasks[0], episode: index.episode };

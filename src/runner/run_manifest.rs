@@ -8,10 +8,7 @@ use std::{
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::{
-    error::RunError,
-    {recorded_runs::ReplaySource, suite_run::SuiteRun},
-};
+use crate::{error::RunError, recorded_runs::ReplaySource, suite_run::SuiteRun};
 use softvt_benchmark::{
     Needs, ShiftValue, Task, seed::SecretSeed, settings::Settings, variation::VariationRanges,
 };

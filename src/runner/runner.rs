@@ -3,12 +3,15 @@
 use std::{path::PathBuf, sync::Arc};
 
 use crate::{
-    config::{RunConfig, Shard},
+    config::{LoadedRun, RunConfig, Shard},
     error::RunError,
     evaluate::{SuiteResult, run_episodes, run_suite},
     observer::Observer,
     policy::PolicyConfig,
-    selection::{check_parent_folder, next_run_dir, run_dir, select_episodes, select_suites, select_tasks},
+    selection::{
+        check_episodes, check_parent_folder, next_run_dir, run_dir, select_episodes, select_suites,
+        select_tasks,
+    },
     suite_run::SuiteRun,
 };
 use softvt_benchmark::Plan;
@@ -28,23 +31,15 @@ use softvt_script::LoadedScript;
 /// ```
 #[derive(Clone)]
 pub struct Runner<'a> {
-    loaded: &'a LoadedScript,
+    script: &'a LoadedScript,
     config: RunConfig,
     is_numbered: bool,
 }
 
 impl<'a> Runner<'a> {
-    /// All episodes of the suites, under the expert.
-    pub fn new(loaded: &'a LoadedScript) -> Self {
-        Self::with_config(
-            loaded,
-            RunConfig { file: loaded.sources.main.clone().into(), ..RunConfig::default() },
-        )
-    }
-
     /// The episodes of a configuration.
-    pub fn with_config(loaded: &'a LoadedScript, config: RunConfig) -> Self {
-        Self { loaded, config, is_numbered: false }
+    pub fn new(loaded: &'a LoadedRun) -> Self {
+        Self { script: &loaded.script, config: loaded.config.clone(), is_numbered: false }
     }
 
     fn change(mut self, change: impl FnOnce(&mut RunConfig)) -> Self {
@@ -52,6 +47,7 @@ impl<'a> Runner<'a> {
         self
     }
 
+    /// Another policy than that of the configuration.
     pub fn policy(self, policy: PolicyConfig) -> Self {
         self.change(|config| config.policy = policy)
     }
@@ -96,15 +92,21 @@ impl<'a> Runner<'a> {
         Self { is_numbered: true, ..self }
     }
 
-    /// Runs the episodes, and calls `on_episode` for each, in the order in which they end. Returns the results of each suite.
+    /// Runs the episodes, and calls `on_episode` for each one that it has run, in the order in which they end. Returns the
+    /// results of each suite, with the episodes that the output folder had before.
     ///
     /// # Errors
-    /// The script has no suite; a scene, a setting or the policy is not valid; a folder contains something else; or a request
-    /// to stop. Finished episodes are kept in the output folder.
+    /// The script has no suite; a scene, a setting or the policy is not valid; a folder contains something else; a trace, a video
+    /// or a resumed run without an output folder; or a request to stop. Finished episodes are kept in the output folder.
     pub fn run(&self, mut on_episode: impl FnMut(&EpisodeRecord)) -> Result<Vec<SuiteResult>, RunError> {
-        let (config, plan) = (&self.config, &self.loaded.plan);
+        let (config, plan) = (&self.config, &self.script.plan);
         let is_list = matches!(plan, Plan::Suites { .. });
         let suites = select_suites("run", config, plan)?;
+        let needs_folder = config.trace.is_some() || config.video.is_some() || config.resume;
+        if needs_folder && config.out.is_none() && !self.is_numbered {
+            return Err(config.error("a trace, a video and a resumed run need an output folder"));
+        }
+        check_episodes(config, suites)?;
         if is_list {
             check_parent_folder(config)?;
         }
@@ -114,7 +116,7 @@ impl<'a> Runner<'a> {
             let out = run_dir(config, suite, is_list).or_else(numbered);
             let tasks = select_tasks(config, suite)?;
             let jobs = select_episodes(config, suite, &tasks);
-            let mut run = SuiteRun::new(config, self.loaded, suite, jobs, out.clone().unwrap_or_default())?;
+            let mut run = SuiteRun::new(config, self.script, suite, jobs, out.clone().unwrap_or_default())?;
             run.prepare(&tasks)?;
             results.push(match out {
                 Some(_) => run_suite(&run, &tasks, &mut on_episode)?,

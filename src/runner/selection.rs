@@ -3,8 +3,8 @@
 use std::{collections::BTreeSet, path::PathBuf};
 
 use crate::{
-    error::RunError,
-    {config::RunConfig, episode_list::EpisodeList},
+    config::RunConfig, episode_artifacts::VideoSelection, episode_list::EpisodeList, error::RunError,
+    suite_run::find_replay_source,
 };
 use softvt_benchmark::{Plan, Suite, Task};
 use softvt_report::run_folder::RunFolder;
@@ -116,7 +116,7 @@ pub fn check_parent_folder(config: &RunConfig) -> Result<(), RunError> {
 }
 
 /// Replaces characters of a name that a script could use to leave the output folder.
-pub fn path_component(name: &str) -> String {
+pub(crate) fn path_component(name: &str) -> String {
     name.replace(|c: char| !(c.is_alphanumeric() || c == '_' || c == '-'), "_")
 }
 
@@ -127,4 +127,33 @@ pub fn next_run_dir(config: &RunConfig, name: &str) -> PathBuf {
         .map(|number| PathBuf::from(format!("runs/{name}-{policy}-{number:03}")))
         .find(|dir| !dir.exists())
         .unwrap_or_default()
+}
+
+/// Checks that every suite has the episodes that are to become videos, and that recorded actions cover all of its episodes.
+///
+/// # Errors
+/// The first suite that lacks an episode.
+pub(crate) fn check_episodes(config: &RunConfig, suites: &[Suite]) -> Result<(), RunError> {
+    for suite in suites {
+        check_video_episodes(config, suite)?;
+    }
+    for suite in suites.iter().filter(|_| config.policy.is_recorded()) {
+        let jobs = select_episodes(config, suite, &select_tasks(config, suite)?);
+        find_replay_source(config, suite, &jobs)?;
+    }
+    Ok(())
+}
+
+fn check_video_episodes(config: &RunConfig, suite: &Suite) -> Result<(), RunError> {
+    let Some(VideoSelection::Episodes(selected)) = &config.video else { return Ok(()) };
+    let episodes = config.episodes_of(suite);
+    let Some(beyond) = selected.iter().find(|episode| **episode >= episodes) else { return Ok(()) };
+    let available = match episodes {
+        1 => "only episode 0".to_owned(),
+        count => format!("episodes 0 to {}", count.saturating_sub(1)),
+    };
+    Err(config.error(format!(
+        "--video={beyond}: suite {} runs {available} of each task; select one of them, or raise --episodes",
+        suite.name
+    )))
 }

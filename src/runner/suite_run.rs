@@ -30,8 +30,8 @@ const MAX_SCANNED_EPISODES: usize = 100;
 
 /// A suite with everything that its episodes need.
 ///
-/// [`SuiteRun::prepare`] checks the scenes and reads the limits. [`run_suite`](super::evaluate::run_suite) then runs all
-/// episodes into the folder; other commands run single episodes with [`SuiteRun::run_episode`].
+/// [`SuiteRun::prepare`] checks the scenes and reads the limits; then [`SuiteRun::run_episode`] runs single episodes. A
+/// [`Runner`](super::Runner) does both for all episodes.
 pub struct SuiteRun<'a> {
     pub config: &'a RunConfig,
     pub loaded: &'a LoadedScript,
@@ -59,7 +59,7 @@ pub struct SuiteRun<'a> {
     /// True if the policy observes the true forces on the pads.
     pub force_observed: bool,
     pub split: Split,
-    pub connections: Option<Arc<PolicyConnections>>,
+    pub(crate) connections: Option<Arc<PolicyConnections>>,
     /// Demonstrations of other simulators that the episodes re-execute.
     pub origins: BTreeMap<EpisodeIndex, Origin>,
     /// Files of those demonstrations.
@@ -142,7 +142,7 @@ impl<'a> SuiteRun<'a> {
         Some(secret.episode_name(&self.name, task.id, episode))
     }
 
-    pub fn brief(&self, task: &Task, episode: u32) -> TaskBrief {
+    pub(crate) fn brief(&self, task: &Task, episode: u32) -> TaskBrief {
         TaskBrief {
             suite: self.name.clone(),
             task: task.id,
@@ -154,7 +154,7 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// True if the policy has access to ground-truth state, or had it when its actions were recorded.
-    pub fn is_privileged(&self) -> bool {
+    pub(crate) fn is_privileged(&self) -> bool {
         self.config.policy.privileged || self.replay_source.as_ref().is_some_and(|source| source.privileged)
     }
 
@@ -170,7 +170,7 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// Takes over the limits of another run of the same suite, whose layouts are the same.
-    pub fn copy_limits(&mut self, other: &Self) {
+    pub(crate) fn copy_limits(&mut self, other: &Self) {
         self.calibration_files.clone_from(&other.calibration_files);
         self.calibrations.clone_from(&other.calibrations);
         self.sources.clone_from(&other.sources);
@@ -212,7 +212,7 @@ impl<'a> SuiteRun<'a> {
         let mut scan = LimitScan::default();
         parallel::run(
             tasks.len(),
-            self.config.threads(),
+            self.config.thread_count(),
             cancel::requested,
             |job| self.scan_task(tasks[job]),
             |_, found| {
@@ -246,8 +246,8 @@ impl<'a> SuiteRun<'a> {
 
     /// Files of the episodes, other than their lines in `episodes.jsonl`.
     pub(crate) fn artifacts(&self) -> EpisodeArtifacts<'_> {
-        let flags = self.config;
-        EpisodeArtifacts { dir: &self.out, trace: flags.trace.is_some(), video: flags.video.as_ref() }
+        let RunConfig { trace, video, .. } = self.config;
+        EpisodeArtifacts { dir: &self.out, trace: trace.is_some(), video: video.as_ref() }
     }
 
     /// Runs one episode, from the start of its foreign demonstration if it has one. With `keep_states` the
@@ -465,7 +465,7 @@ impl<'a> SuiteRun<'a> {
 ///
 /// # Errors
 /// The run is of another suite, seed, split or twin, or lacks episodes.
-pub fn find_replay_source(
+pub(crate) fn find_replay_source(
     config: &RunConfig,
     suite: &Suite,
     jobs: &EpisodeList,

@@ -27,6 +27,8 @@ const MAX_MESSAGE_BYTES: usize = 4 << 20;
 pub(super) const HANDSHAKE_TIMEOUT: Duration = Duration::from_secs(10);
 /// Time limit for sending a response. Generous, since the client may be paused in a debugger.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(60);
+/// Time for a message to a client once the server is cancelled.
+const CANCELLED_TIMEOUT: Duration = Duration::from_secs(1);
 /// Time for which incoming data is discarded after the end, so that the client receives the last response.
 const CLOSE_DRAIN_TIMEOUT: Duration = Duration::from_secs(3);
 /// Idle time before a ping is sent; pings to a dead host eventually fail the connection.
@@ -129,7 +131,7 @@ impl<'a> Connection<'a> {
         transport::send(&mut self.socket, value, || {
             if cancel.load(Ordering::Relaxed) && !was_cancelled {
                 was_cancelled = true;
-                deadline = deadline.min(Instant::now() + CLOSE_DRAIN_TIMEOUT);
+                deadline = deadline.min(Instant::now() + CANCELLED_TIMEOUT);
             }
             if Instant::now() > deadline { Err(Aborted) } else { Ok(()) }
         })

@@ -17,7 +17,7 @@ use softvt_common::{
 };
 use softvt_rollout::{AssetCache, SensorAssets, scene_doubts};
 use softvt_runner::{
-    EpisodeList, SuiteRun, conditions,
+    EpisodeList, LoadedRun, SuiteRun, conditions,
     selection::{check_distinct_out_dirs, select_episodes},
 };
 use softvt_script::{ExperimentInput, SceneBuilder};
@@ -38,7 +38,8 @@ pub(crate) struct CheckArgs {
 /// # Errors
 /// The first thing that is not valid.
 pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
-    let (config, loaded) = &Request::new(args.script)?.load_plan("check", &args.policy)?;
+    let LoadedRun { config, script: loaded } =
+        &Request::new(args.script)?.load_plan("check", &args.policy)?;
     let plan = &loaded.plan;
     check_distinct_out_dirs(config, plan.suites())?;
     let (assets, sensor_assets) = (AssetCache::approximate(), SensorAssets::default());
@@ -106,7 +107,7 @@ fn check_first_scenes(run: &SuiteRun, tasks: &[&Task]) -> Result<BTreeSet<String
         doubts.extend(run.check_scene(task, setup.scene)?.map(of_task));
         Ok(doubts)
     };
-    parallel::run(tasks.len(), run.config.threads(), cancel::requested, check, |_, found| {
+    parallel::run(tasks.len(), run.config.thread_count(), cancel::requested, check, |_, found| {
         doubts.extend(found);
         Ok(())
     })?;

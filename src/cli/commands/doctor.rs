@@ -1,16 +1,19 @@
 //! `softvt doctor`: versions, the machine, and a comparison of the physics with the published bits.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use serde::Deserialize;
 
 use crate::{
     error::{CliError, Exit},
-    output::print,
+    output::{Console, print},
 };
 use softvt_benchmark::Plan;
 use softvt_evaluation::record::EpisodeRecord;
-use softvt_runner::{EpisodeJob, EpisodeList, RunConfig, SuiteRun, thread_count};
+use softvt_runner::{EpisodeJob, EpisodeList, LoadedRun, RunConfig, SuiteRun, thread_count};
 
 /// `assets/golden.json`: an episode whose final state is published.
 #[derive(Deserialize)]
@@ -46,8 +49,8 @@ pub(super) fn run() -> Result<(), CliError> {
 
 /// Runs the golden episode and writes nothing.
 fn run_golden(golden: &GoldenEpisode) -> Result<EpisodeRecord, CliError> {
-    let config = RunConfig { file: golden.script.clone().into(), ..RunConfig::default() };
-    let loaded = config.load()?;
+    let config = RunConfig { observer: Arc::new(Console::default()), ..RunConfig::of(&golden.script) };
+    let LoadedRun { config, script: loaded } = config.load()?;
     let Plan::Suite(suite) = &loaded.plan else {
         return Err(CliError::input(format!("{} is not a suite", golden.script)));
     };

@@ -16,7 +16,7 @@ use softvt_common::parallel;
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
 use softvt_rollout::{Controller, Simulation};
 use softvt_runner::{
-    EpisodeList, PolicyConfig, RunConfig, SuiteRun, expert_controller,
+    EpisodeList, LoadedRun, PolicyConfig, RunConfig, SuiteRun, expert_controller,
     recording::{GripLog, SuiteRecording, record_all},
     selection::{select_suites, select_tasks},
 };
@@ -59,7 +59,7 @@ pub(super) fn run(args: RecordArgs) -> Result<(), CliError> {
     let request = args.recording.request(args.script, args.tasks)?;
     let default_attempts = demos.saturating_mul(ATTEMPTS_PER_DEMO).max(MIN_ATTEMPTS);
     let max_attempts = args.attempts.unwrap_or(default_attempts);
-    let (config, loaded) = request.load_plan("record", &policy)?;
+    let LoadedRun { config, script: loaded } = request.load_plan("record", &policy)?;
     let suites = select_suites("record", &config, &loaded.plan)?;
     let names: Vec<String> = suites.iter().map(|suite| config.suite_name(suite)).collect();
     let mut request = json!({

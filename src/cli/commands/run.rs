@@ -3,6 +3,7 @@
 use std::{collections::BTreeSet, path::Path};
 
 use clap::Parser;
+use serde_json::Value;
 
 use crate::{
     args::{PolicyArgs, Request, RunFlags, ScriptArgs},
@@ -10,8 +11,6 @@ use crate::{
     output::{eprint_notice, print, print_json, text_columns},
     plan_flags, requirement,
 };
-use serde_json::Value;
-
 use softvt_benchmark::{Condition, Plan, Suite};
 use softvt_common::text::counted;
 use softvt_evaluation::{
@@ -24,10 +23,9 @@ use softvt_report::{
     terminal,
 };
 use softvt_runner::{
-    RunConfig, Runner, VideoSelection, conditions,
+    LoadedRun, RunConfig, Runner, conditions,
     experiment::{self, ExperimentOutput},
-    find_replay_source,
-    selection::{check_distinct_out_dirs, check_parent_folder, next_run_dir, select_episodes, select_tasks},
+    selection::{check_distinct_out_dirs, check_parent_folder, next_run_dir},
 };
 use softvt_script::{ExperimentRow, LoadedScript};
 
@@ -59,17 +57,16 @@ pub(crate) struct RunArgs {
 pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
     let (json, requirements) = (args.flags.json, args.flags.requirements.clone());
     let request = Request::new(args.script)?.with(|config| args.flags.apply(config));
-    let (config, loaded) = &request.load_plan(plan_flags::RUN, &args.policy)?;
+    let run = request.load_plan(plan_flags::RUN, &args.policy)?;
+    let LoadedRun { config, script: loaded } = &run;
     if let Some(code) = config.policy.gripper {
         let profile = config.policy.profile().map(|Profile { name, .. }| format!(" (profile {name})"));
         eprint_notice(format!("gripper: {}{}", code.name(), profile.unwrap_or_default()));
     }
-    check_video_episodes(config, &loaded.plan)?;
-    check_recorded_episodes(config, &loaded.plan)?;
     match &loaded.plan {
         plan @ (Plan::Suite(_) | Plan::Suites { .. }) => {
             let is_list = matches!(plan, Plan::Suites { .. });
-            let results = Runner::with_config(loaded, config.clone()).numbered().run(|_| ())?;
+            let results = Runner::new(&run).numbered().run(|_| ())?;
             let failed = results.iter().find_map(|result| all_actions_refused(&result.records));
             let summaries: Vec<SuiteSummary> = results.into_iter().map(|result| result.summary).collect();
             match &summaries[..] {
@@ -112,15 +109,15 @@ fn run_conditions(
 ) -> Result<(), CliError> {
     let print_last = |tables: &[ConditionTable]| -> Result<(), CliError> {
         match tables.last() {
-            Some(last) if !json && !compares_policies(tables) => print(&table(last)),
+            _ if json => Ok(()),
+            Some(last) if !compares_policies(tables) => print(&table(last)),
+            Some(_) if tables.len() == suites.len() => print(&controllers_table(tables)),
             _ => Ok(()),
         }
     };
-    let results = conditions::run(config, loaded, suites, conditions, out, print_last)?;
+    let document = conditions::run(config, loaded, suites, conditions, out, print_last)?;
     if json {
-        print_json(&results.document)?;
-    } else if compares_policies(&results.tables) {
-        print(&controllers_table(&results.tables))?;
+        print_json(&document)?;
     }
     eprint_notice(out.join(conditions::FILE).display());
     Ok(())
@@ -140,38 +137,6 @@ fn all_actions_refused(records: &[EpisodeRecord]) -> Option<CliError> {
             format!("no episode is valid: the policy's actions were refused in {count}, first: {first}"),
         )
     })
-}
-
-/// Checks that every suite has the episodes that `--video` selects.
-fn check_video_episodes(config: &RunConfig, plan: &Plan) -> Result<(), CliError> {
-    let Some(VideoSelection::Episodes(selected)) = &config.video else { return Ok(()) };
-    for suite in plan.suites() {
-        let episodes = config.episodes.unwrap_or(suite.episodes);
-        if let Some(beyond) = selected.iter().find(|episode| **episode >= episodes) {
-            let available = match episodes {
-                1 => "only episode 0".to_owned(),
-                count => format!("episodes 0 to {}", count.saturating_sub(1)),
-            };
-            return Err(config.error(format!(
-                "--video={beyond}: suite {} runs {available} of each task; select one of them, or raise --episodes",
-                suite.name
-            ))
-            .into());
-        }
-    }
-    Ok(())
-}
-
-/// Checks that the recorded actions cover every episode of every suite.
-fn check_recorded_episodes(config: &RunConfig, plan: &Plan) -> Result<(), CliError> {
-    if !config.policy.is_recorded() {
-        return Ok(());
-    }
-    for suite in plan.suites() {
-        let jobs = select_episodes(config, suite, &select_tasks(config, suite)?);
-        find_replay_source(config, suite, &jobs)?;
-    }
-    Ok(())
 }
 
 /// Prints rows as JSON lines or as a table.

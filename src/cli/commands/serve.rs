@@ -116,8 +116,9 @@ fn watch_stdin() -> Result<(), CliError> {
 }
 
 fn serve(args: ServeArgs) -> Result<(), CliError> {
+    let request = Request::new(args.script.clone())?;
     let policy = PolicyConfig::client(&args.policy.options(), args.privileged)?;
-    let request = Request::new(args.script.clone())?.with(|config| RunConfig {
+    let request = request.with(|config| RunConfig {
         policy,
         tasks: args.tasks.clone(),
         episodes: args.episodes,
@@ -233,7 +234,7 @@ fn prepare<'a>(
 /// A suite as clients see it: its name in results, the selected tasks, and the number of episodes of a run.
 fn served_suite(config: &RunConfig, suite: &Suite) -> Result<Suite, CliError> {
     let tasks = select_tasks(config, suite)?.into_iter().cloned().collect();
-    let episodes = config.episodes.unwrap_or(suite.episodes);
+    let episodes = config.episodes_of(suite);
     Ok(Suite { name: config.suite_name(suite), tasks, episodes, ..suite.clone() })
 }
 

@@ -46,7 +46,7 @@ pub struct RigidBodyBuilder {
     density: f64,
 }
 
-/// A finite-element soft body.
+/// A finite-element soft body. A shape of several pieces is one body whose pieces move apart.
 #[derive(Clone, Debug)]
 pub struct SoftBodyBuilder {
     placed: Placed,

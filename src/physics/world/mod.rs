@@ -189,7 +189,7 @@ impl World {
         body.insert(self)
     }
 
-    /// Advances everything by `seconds`, in whole steps.
+    /// Advances everything by `seconds`, rounded to whole steps.
     ///
     /// # Errors
     /// As [`World::step`].
