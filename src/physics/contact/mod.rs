@@ -3,7 +3,7 @@
 //!
 //! Soft bodies touch with the samples of their surface: colliders by [`detect`], other soft bodies by
 //! [`detect_soft`]. Colliders touch each other by [`CollisionGeometry::find_contacts`]. The contacts become contact points of
-//! the [solver](super::solver) in [`World`](super::World).
+//! the solver in [`World`](super::World).
 
 mod collider;
 mod contact_history;
