@@ -77,7 +77,7 @@ impl fmt::Display for Shard {
 
 /// A configuration and its script.
 pub struct LoadedRun {
-    /// What is run.
+    /// The configuration from which the script was loaded.
     pub config: RunConfig,
     /// The script, loaded as the configuration says.
     pub script: LoadedScript,

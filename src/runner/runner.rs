@@ -82,7 +82,7 @@ impl<'a> Runner<'a> {
         self.change(|config| config.resume = true)
     }
 
-    /// Where progress and messages go.
+    /// Receiver of progress and messages.
     pub fn observer(self, observer: Arc<dyn Observer>) -> Self {
         self.change(|config| config.observer = observer)
     }

@@ -1,4 +1,4 @@
-//! Selection of suites, tasks and episodes by the command line, and the folders they are written to.
+//! Selection of suites, tasks and episodes by a [`RunConfig`], and the folders of their results.
 
 use std::{collections::BTreeSet, path::PathBuf};
 

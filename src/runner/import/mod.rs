@@ -31,7 +31,7 @@ use softvt_scene::{Body, InitialState};
 use softvt_script::LoadedScript;
 use task_matching::{MatchedDemo, match_demos};
 
-/// How demonstrations are imported.
+/// Options of an import of demonstrations.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ImportOptions {
     /// Maximum number of demonstrations per task, in order; by default all.
