@@ -9,7 +9,6 @@ Copy it to src/openpi/training/misc/softvt_config.py and add to src/openpi/train
 import dataclasses
 
 import numpy as np
-
 import openpi.models.model as _model
 import openpi.models.pi0_config as pi0_config
 import openpi.training.weight_loaders as weight_loaders
@@ -80,9 +79,7 @@ class SoftVTOutputs(_transforms.DataTransformFn):
 
 def get_softvt_configs():
     # Here, since config.py imports this file.
-    from openpi.training.config import DataConfig
-    from openpi.training.config import SimpleDataConfig
-    from openpi.training.config import TrainConfig
+    from openpi.training.config import DataConfig, SimpleDataConfig, TrainConfig
 
     model = pi0_config.Pi0Config(
         pi05=True,
@@ -104,9 +101,7 @@ def get_softvt_configs():
                 ),
                 base_config=DataConfig(
                     prompt_from_task=True,
-                    repack_transforms=_transforms.Group(
-                        inputs=[_transforms.RepackTransform({key: key for key in keys})]
-                    ),
+                    repack_transforms=_transforms.Group(inputs=[_transforms.RepackTransform({key: key for key in keys})]),
                 ),
             ),
             weight_loader=weight_loaders.CheckpointWeightLoader("gs://openpi-assets/checkpoints/pi05_base/params"),

@@ -37,9 +37,7 @@ class SoftVTEnv(gymnasium.Env):
         self._server = None
         self._socket = _connect(url, token)
         self.about = self._receive()
-        self.observation_space = spaces.Dict(
-            {key: _space(entry) for key, entry in self.about["observation_space"].items()}
-        )
+        self.observation_space = spaces.Dict({key: _space(entry) for key, entry in self.about["observation_space"].items()})
         self.action_space = _space(self.about["action_space"])
         self._next = {"task": 0, "episode": 0}
 

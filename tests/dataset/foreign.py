@@ -1,4 +1,5 @@
 """Writes demonstrations that softvt recorded as LIBERO, robomimic and SoftVTBench write theirs, with h5py as they do."""
+
 import json
 import sys
 
@@ -10,8 +11,13 @@ BASE = np.array([-0.66, 0.0, 0.912])
 OURS = np.array([-0.66, 0.0, 0.012])
 # From the tool to robosuite's grip site, along the tool.
 SITE = -0.0069
-NAMES = {"bowl": "akita_black_bowl_1", "other_bowl": "akita_black_bowl_2", "ramekin": "glazed_rim_porcelain_ramekin_1",
-         "cookies": "cookies_1", "plate": "plate_1"}
+NAMES = {
+    "bowl": "akita_black_bowl_1",
+    "other_bowl": "akita_black_bowl_2",
+    "ramekin": "glazed_rim_porcelain_ramekin_1",
+    "cookies": "cookies_1",
+    "plate": "plate_1",
+}
 
 
 def matrix(v):
@@ -84,13 +90,25 @@ def libero(source, target):
             into.create_dataset("dones", data=ends)
             into.attrs["num_samples"] = steps
             links = "".join(f'<body name="robot0_link{i}"><joint name="robot0_joint{i}" axis="0 0 1"/>' for i in range(1, 8))
-            hand = '<body name="gripper0_leftfinger"><joint type="slide" name="l"/></body><body name="r"><joint type="slide" name="r"/></body>'
-            bodies = "".join(f'<body name="{thing}_main" pos="0 0 0"><joint type="free" name="{thing}_joint0"/></body>' for thing, _ in things)
-            into.attrs["model_file"] = (f'<mujoco model="base"><worldbody><geom name="floor"/><body name="robot0_base" pos="-0.66 0 0.912">'
-                                        f'{links}{hand}{"</body>" * 7}</body>{bodies}</worldbody></mujoco>')
+            hand = (
+                '<body name="gripper0_leftfinger"><joint type="slide" name="l"/></body><body name="r"><joint type="slide" name="r"/></body>'
+            )
+            bodies = "".join(
+                f'<body name="{thing}_main" pos="0 0 0"><joint type="free" name="{thing}_joint0"/></body>' for thing, _ in things
+            )
+            into.attrs["model_file"] = (
+                f'<mujoco model="base"><worldbody><geom name="floor"/><body name="robot0_base" pos="-0.66 0 0.912">'
+                f"{links}{hand}{'</body>' * 7}</body>{bodies}</worldbody></mujoco>"
+            )
             language = demo.attrs["language"]
-        kwargs = {"robots": ["Panda"], "control_freq": 20, "controller_configs": {"type": "OSC_POSE", "output_max": [0.05] * 3 + [0.5] * 3, "control_delta": True}}
-        data.attrs["env_args"] = json.dumps({"type": 1, "env_name": "Libero_Tabletop_Manipulation", "problem_name": "libero_tabletop_manipulation", "env_kwargs": kwargs})
+        kwargs = {
+            "robots": ["Panda"],
+            "control_freq": 20,
+            "controller_configs": {"type": "OSC_POSE", "output_max": [0.05] * 3 + [0.5] * 3, "control_delta": True},
+        }
+        data.attrs["env_args"] = json.dumps(
+            {"type": 1, "env_name": "Libero_Tabletop_Manipulation", "problem_name": "libero_tabletop_manipulation", "env_kwargs": kwargs}
+        )
         data.attrs["env_name"] = "Libero_Tabletop_Manipulation"
         data.attrs["problem_info"] = json.dumps({"problem_name": "x", "language_instruction": language.upper()})
         data.attrs["bddl_file_name"] = "bddl_files/libero_spatial/" + language.replace(" ", "_") + ".bddl"

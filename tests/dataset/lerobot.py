@@ -1,5 +1,6 @@
 """Reads what softvt exported of a recording with pyarrow, pandas and Pillow, and compares it with the recording's HDF5 files:
 the schema that LeRobot expects, every row, and every figure of the statistics, worked out once more by numpy."""
+
 import io
 import json
 import pathlib
@@ -40,14 +41,23 @@ def info(root, version, episodes, frames, tasks):
     found = json.loads((root / "meta/info.json").read_text())
     features = found.pop("features")
     expected = {
-        "codebase_version": version, "robot_type": "franka", "total_episodes": episodes, "total_frames": frames,
-        "total_tasks": tasks, "chunks_size": 1000, "fps": 20, "splits": {"train": f"0:{episodes}"}, "video_path": None,
+        "codebase_version": version,
+        "robot_type": "franka",
+        "total_episodes": episodes,
+        "total_frames": frames,
+        "total_tasks": tasks,
+        "chunks_size": 1000,
+        "fps": 20,
+        "splits": {"train": f"0:{episodes}"},
+        "video_path": None,
     }
     expected |= {
-        "v2.1": {"total_videos": 0, "total_chunks": 1,
-                 "data_path": "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"},
-        "v3.0": {"data_files_size_in_mb": 100, "video_files_size_in_mb": 200,
-                 "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"},
+        "v2.1": {"total_videos": 0, "total_chunks": 1, "data_path": "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"},
+        "v3.0": {
+            "data_files_size_in_mb": 100,
+            "video_files_size_in_mb": 200,
+            "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
+        },
     }[version]
     assert found == expected, found
     assert list(features) == ORDER
@@ -85,7 +95,7 @@ def mosaic(demo, step):
         for place in range(8):
             small = Image.fromarray(pictures[max(0, step - 7 + place)]).resize((56, 56), Image.Resampling.BILINEAR)
             row, column = 2 * finger + place // 4, place % 4
-            sheet[56 * row:56 * row + 56, 56 * column:56 * column + 56] = small
+            sheet[56 * row : 56 * row + 56, 56 * column : 56 * column + 56] = small
     return sheet
 
 
@@ -200,8 +210,14 @@ def version_30(data, root, gripper):
         held = compare(table, demo, (number, first, prompts.index(entry["language"])), "frame-{:06d}.png", gripper)
         stored, steps = episodes[number], table.num_rows
         expected = {
-            "episode_index": number, "tasks": [entry["language"]], "length": steps, "data/chunk_index": 0, "data/file_index": at,
-            "dataset_from_index": first, "dataset_to_index": first + steps, "meta/episodes/chunk_index": 0,
+            "episode_index": number,
+            "tasks": [entry["language"]],
+            "length": steps,
+            "data/chunk_index": 0,
+            "data/file_index": at,
+            "dataset_from_index": first,
+            "dataset_to_index": first + steps,
+            "meta/episodes/chunk_index": 0,
             "meta/episodes/file_index": 0,
         }
         assert expected == {key: value for key, value in stored.items() if not key.startswith("stats/")}, stored

@@ -1,5 +1,6 @@
 """Puts exported rows and what softvt sends through examples/openpi/softvt_config.py, with as little of openpi as it touches:
 stand-ins for the classes that it makes. Says nothing of openpi itself."""
+
 import dataclasses
 import enum
 import importlib.util

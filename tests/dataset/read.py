@@ -1,4 +1,5 @@
 """Reads a data set that softvt recorded with h5py, PyAV and numpy, and says what is not as docs/data.md says it is."""
+
 import json
 import pathlib
 import sys
@@ -8,13 +9,26 @@ import h5py
 import numpy as np
 
 SHAPES = {
-    "actions": (7,), "actions_binary": (7,), "rewards": (), "dones": (), "timestamps": (),
-    "obs/eef_pose": (7,), "obs/state": (7,), "obs/arm_joint_pos": (7,), "obs/gripper_pos": (2,), "obs/gripper_width": (1,), "obs/gripper_width_sensed": (1,),
-    "obs/gripper_close_norm": (1,), "obs/gripper_closure": (1,), "obs/gripper_marker_motion": (2, 2, 99, 2),
+    "actions": (7,),
+    "actions_binary": (7,),
+    "rewards": (),
+    "dones": (),
+    "timestamps": (),
+    "obs/eef_pose": (7,),
+    "obs/state": (7,),
+    "obs/arm_joint_pos": (7,),
+    "obs/gripper_pos": (2,),
+    "obs/gripper_width": (1,),
+    "obs/gripper_width_sensed": (1,),
+    "obs/gripper_close_norm": (1,),
+    "obs/gripper_closure": (1,),
+    "obs/gripper_marker_motion": (2, 2, 99, 2),
 }
 PICTURES = {
-    "agentview_rgb": (224, 224, 3), "eye_in_hand_rgb": (224, 224, 3),
-    "gsmini_left_tactile_rgb": (240, 320, 3), "gsmini_right_tactile_rgb": (240, 320, 3),
+    "agentview_rgb": (224, 224, 3),
+    "eye_in_hand_rgb": (224, 224, 3),
+    "gsmini_left_tactile_rgb": (240, 320, 3),
+    "gsmini_right_tactile_rgb": (240, 320, 3),
 }
 TEXTS = ["language", "task_suite", "asset_name", "metadata_json", "state_hash"]
 
@@ -29,9 +43,13 @@ def frames(path):
 def turn(q):
     """Rotation matrix of a quaternion w x y z."""
     w, x, y, z = q
-    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def rodrigues(v):

@@ -1,10 +1,10 @@
 """Recomputes a few committed rows (<= 60 s) and compares them: `python check.py`; exit status 1 if one differs."""
+
 import json
 import os
 import sys
 
 import numpy as np
-
 from make_rows import CAPSULE, CUBE, HERE, squeeze
 from softref import elements, small_strain
 from softref.squeeze import Squeeze

@@ -1,4 +1,5 @@
 """Makes the committed rows: `python make_rows.py [GROUP …]` writes rows/GROUP.jsonl and prints the seconds it took."""
+
 import json
 import os
 import sys
@@ -63,8 +64,7 @@ def refined_round_rows():
 
 def variant_rows():
     """Other sizes, materials, pads, resolutions and friction."""
-    yield from squeeze([39, 38, 34], shape="cube", size_m=0.04, youngs_pa=1e4, poisson=0.45, density=500.0, pad_m=0.018,
-                       resolution=5)
+    yield from squeeze([39, 38, 34], shape="cube", size_m=0.04, youngs_pa=1e4, poisson=0.45, density=500.0, pad_m=0.018, resolution=5)
     yield from squeeze([49.5, 48, 44], **CUBE, friction=0.6)
     yield from squeeze([48, 44], **CUBE, youngs_pa=1e5, poisson=0.3, resolution=8)
     yield from squeeze([48, 42], **CUBE, pad_m=0.040)

@@ -4,6 +4,7 @@ A sample of area A under coverage c in 0..1 and gap phi < 0 feels f_n = k (-phi)
 spring f_t = -k/2 (t - anchor), bounded by mu f_n. The anchor is where the sample was, in the collider's frame, at the
 end of the load step before it touched; a slipping anchor is dragged so that k/2 |t - anchor| = mu f_n.
 """
+
 import numpy as np
 
 TANGENTIAL = 0.5

@@ -10,6 +10,7 @@ g_a being the mean of the shape gradients over the points that integrate K0, wit
 B-bar: Hughes, The Finite Element Method, 2000, 4.5.2. Corotation: Mueller & Gross 2004; the term q follows from
 differentiating the polar decomposition (RtdF - dFtR = [(tr S I - S) w]x for dR = R [w]x).
 """
+
 import numpy as np
 
 CORNERS = np.array([[c & 1, c >> 1 & 1, c >> 2 & 1] for c in range(8)], float)
@@ -69,7 +70,7 @@ def bbar_stiffness(points, volumes, edge, youngs, poisson):
         b = np.zeros((6, 24))
         for a in range(8):
             x, y, z = g[a]
-            b[:, 3 * a:3 * a + 3] = [[x, 0, 0], [0, y, 0], [0, 0, z], [y, x, 0], [0, z, y], [z, 0, x]]
+            b[:, 3 * a : 3 * a + 3] = [[x, 0, 0], [0, y, 0], [0, 0, z], [y, x, 0], [0, z, y], [z, 0, x]]
         b[:3] += (mean_div - d) / 3.0
         stiffness += v * b.T @ elastic @ b
     return 0.5 * (stiffness + stiffness.T)
@@ -142,21 +143,20 @@ class Corotated:
         """The second derivative of U (n, 24, 24)."""
         n, g = len(st["r"]), self.g
         y, p, q, s, inv = st["y"], st["p"], st["q"], st["s"], st["inv"]
-        gx = cross_matrix(g)                                      # d -> g_a x d_a
-        w = inv @ gx.transpose(0, 2, 1, 3).reshape(n, 3, 24)       # spin of R per nodal motion
+        gx = cross_matrix(g)  # d -> g_a x d_a
+        w = inv @ gx.transpose(0, 2, 1, 3).reshape(n, 3, 24)  # spin of R per nodal motion
         jy = np.eye(24) + cross_matrix(y).reshape(n, 24, 3) @ w
         jp = self.k0 @ jy
         yc, pc = cross_matrix(y), cross_matrix(p)
-        jm = np.einsum("naij,najk->nik", yc, jp.reshape(n, 8, 3, 24)) - np.einsum(
-            "naij,najk->nik", pc, jy.reshape(n, 8, 3, 24))
+        jm = np.einsum("naij,najk->nik", yc, jp.reshape(n, 8, 3, 24)) - np.einsum("naij,najk->nik", pc, jy.reshape(n, 8, 3, 24))
         # dS = D - [w]S with D = sum d_a g_a^T; dA q = tr(dS) q - dS q
         gq = np.einsum("naj,nj->na", g, q)
         dq = np.zeros((n, 3, 24))
         for a in range(8):
-            dq[:, :, 3 * a:3 * a + 3] = gq[:, a, None, None] * np.eye(3)
+            dq[:, :, 3 * a : 3 * a + 3] = gq[:, a, None, None] * np.eye(3)
         sq = np.einsum("nij,nj->ni", s, q)
-        dsq = dq + cross_matrix(sq) @ w                           # -[w] S q = [Sq] w
-        trace = g.reshape(n, 24)                                  # tr([w]S) = 0 for symmetric S
+        dsq = dq + cross_matrix(sq) @ w  # -[w] S q = [Sq] w
+        trace = g.reshape(n, 24)  # tr([w]S) = 0 for symmetric S
         jaq = q[:, :, None] * trace[:, None, :] - dsq
         jq = inv @ (jm - jaq)
         t = p - np.cross(q[:, None], g)

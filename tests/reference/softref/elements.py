@@ -1,4 +1,5 @@
 """Element rows: patch test, bar, cantilever, and the clamped corotated squeeze published outside softvt."""
+
 import numpy as np
 
 from .element import CORNERS, Corotated, full_stiffness, polar
@@ -39,8 +40,15 @@ def patch():
     stress = lam * np.trace(e) * np.eye(3) + 2 * mu * e
     k0, us = full_stiffness(mesh.edge, E, NU), u[mesh.elements].reshape(-1, 24)
     energy = 0.5 * np.einsum("ni,ij,nj->", us, k0, us)
-    return [dict(test="patch", grad_u=g.tolist(), max_rel_disp_error=float(np.abs(u - x @ g.T).max() / np.abs(u).max()),
-                 energy_j=energy, energy_exact_j=0.5 * float(np.tensordot(stress, e)) * 0.05**3)]
+    return [
+        dict(
+            test="patch",
+            grad_u=g.tolist(),
+            max_rel_disp_error=float(np.abs(u - x @ g.T).max() / np.abs(u).max()),
+            energy_j=energy,
+            energy_exact_j=0.5 * float(np.tensordot(stress, e)) * 0.05**3,
+        )
+    ]
 
 
 def bar():
@@ -55,8 +63,17 @@ def bar():
         value = np.r_[0.0 * lo, 0 * hi + eps * 0.1, 0.0 * y0, 0.0 * z0]
         u, f = _linear(mesh, E, NU, fixed, value)
         side = np.where(x[:, 1] > w - 1e-9)[0]
-        rows.append(dict(test="bar", n=n, strain=eps, e_recovered_pa=float(f[hi, 0].sum() / (w * w * eps)),
-                         nu_recovered=float(-u[side, 1].mean() / w / eps), e_pa=E, nu=NU))
+        rows.append(
+            dict(
+                test="bar",
+                n=n,
+                strain=eps,
+                e_recovered_pa=float(f[hi, 0].sum() / (w * w * eps)),
+                nu_recovered=float(-u[side, 1].mean() / w / eps),
+                e_pa=E,
+                nu=NU,
+            )
+        )
     return rows
 
 
@@ -76,8 +93,20 @@ def cantilever():
             clamped = np.where(x[:, 0] < 1e-9)[0]
             u, _ = _linear(mesh, youngs, nu, (3 * clamped[:, None] + np.arange(3)).ravel(), 0.0, load)
             tip = -u[x[:, 0] > length - 1e-9, 2].mean()
-            rows.append(dict(test="cantilever", n_across=n, nu=nu, e_pa=youngs, length_m=length, height_m=h, density=RHO,
-                             tip_m=float(tip), timoshenko_m=exact, ratio=float(tip / exact)))
+            rows.append(
+                dict(
+                    test="cantilever",
+                    n_across=n,
+                    nu=nu,
+                    e_pa=youngs,
+                    length_m=length,
+                    height_m=h,
+                    density=RHO,
+                    tip_m=float(tip),
+                    timoshenko_m=exact,
+                    ratio=float(tip / exact),
+                )
+            )
     return rows
 
 
@@ -100,8 +129,10 @@ class _PerPoint:
         return self.volume * np.einsum("npij,npjk,pak->nai", r, stress, self.points)
 
 
-PUBLISHED = {"without": {48: 1.024, 46: 1.996, 44: 2.915, 42: 3.780, 38: 5.345, 34: 6.697, 30: 7.856},
-             "gauss": {48: 1.022, 46: 1.989, 44: 2.899, 42: 3.751, 38: 5.281, 34: 6.582, 30: 7.675}}
+PUBLISHED = {
+    "without": {48: 1.024, 46: 1.996, 44: 2.915, 42: 3.780, 38: 5.345, 34: 6.697, 30: 7.856},
+    "gauss": {48: 1.022, 46: 1.989, 44: 2.899, 42: 3.751, 38: 5.281, 34: 6.582, 30: 7.675},
+}
 
 
 def clamped(law, resolution=6, edge=0.05, pad=0.022, gaps=(48, 46, 44, 42, 38, 34, 30)):
@@ -117,6 +148,7 @@ def clamped(law, resolution=6, edge=0.05, pad=0.022, gaps=(48, 46, 44, 42, 38, 3
     def force(now):
         f, st = body.force(now, law == "exact")
         return (body.gather_t @ points.gradient(now[mesh.elements]).ravel() if law == "gauss" else f), st
+
     free = np.setdiff1d(np.arange(x.size), held)
     now, rows, squeeze = x.copy(), [], 0.0
     for gap in gaps:
@@ -132,9 +164,18 @@ def clamped(law, resolution=6, edge=0.05, pad=0.022, gaps=(48, 46, 44, 42, 38, 3
                 now = now + du.reshape(-1, 3)
                 f, st = force(now)
             squeeze = target
-        rows.append(dict(test="clamped", law=law, gap_mm=gap, force_n=float(f.reshape(-1, 3)[lo, 0].sum()),
-                         residual_n=float(np.linalg.norm(f[free])), published_n=PUBLISHED.get(law, {}).get(gap),
-                         d_pct=deformation(x, now), min_det_f=float(body.batch.min_det(now[mesh.elements]).min())))
+        rows.append(
+            dict(
+                test="clamped",
+                law=law,
+                gap_mm=gap,
+                force_n=float(f.reshape(-1, 3)[lo, 0].sum()),
+                residual_n=float(np.linalg.norm(f[free])),
+                published_n=PUBLISHED.get(law, {}).get(gap),
+                d_pct=deformation(x, now),
+                min_det_f=float(body.batch.min_det(now[mesh.elements]).min()),
+            )
+        )
     return rows
 
 

@@ -1,4 +1,5 @@
 """Deformation metric."""
+
 import numpy as np
 
 

@@ -1,4 +1,5 @@
 """Voxel meshes of softvt's rule, and surface samples with areas. Bodies rest on z = 0, centred on the z axis."""
+
 import numpy as np
 
 from .element import CORNERS, SUB, SUBPOINTS, weights
@@ -56,7 +57,7 @@ class Mesh:
 
 def from_cells(cells, edge, origin, inside, body=None):
     """Mesh of the given integer cells (m, 3), nodes compact in x-fastest order."""
-    corner = (cells[:, None] + CORNERS[None].astype(int))
+    corner = cells[:, None] + CORNERS[None].astype(int)
     flat, inverse = np.unique(corner.reshape(-1, 3)[:, ::-1], axis=0, return_inverse=True)
     nodes = origin + flat[:, ::-1] * edge
     return Mesh(nodes, inverse.reshape(-1, 8), edge, inside, body)
@@ -82,6 +83,7 @@ def block(count, edge):
 
 def cube(edge):
     """A cube; each face a regular grid of cell-centred samples (only the faces x = +-edge/2 and z = 0 can touch)."""
+
     def samples(spacing):
         n = int(np.ceil(edge / spacing - 1e-9))
         c = (np.arange(n) + 0.5) / n * edge - edge / 2
@@ -90,12 +92,19 @@ def cube(edge):
         points = np.concatenate([np.c_[-half, a, b + edge / 2], np.c_[half, a, b + edge / 2], np.c_[a, b, 0 * a]])
         cell = edge / n
         return points, np.full(len(points), cell**2), np.full(len(points), cell)
-    return Body(lambda p: (np.abs(p[:, 0]) < edge / 2) & (np.abs(p[:, 1]) < edge / 2) & (p[:, 2] > 0) & (p[:, 2] < edge),
-                [edge] * 3, edge**3, samples, "cube")
+
+    return Body(
+        lambda p: (np.abs(p[:, 0]) < edge / 2) & (np.abs(p[:, 1]) < edge / 2) & (p[:, 2] > 0) & (p[:, 2] < edge),
+        [edge] * 3,
+        edge**3,
+        samples,
+        "cube",
+    )
 
 
 def _round(profile, length):
     """Samples of a surface of revolution about y: `profile(s)` gives (y, r) over arc length s in 0..length."""
+
     def samples(spacing):
         n = int(np.ceil(length / spacing))
         n += n % 2
@@ -110,6 +119,7 @@ def _round(profile, length):
             areas.append(np.full(ring, area))
             cells.append(np.full(ring, np.sqrt(area)))
         return np.concatenate(points), np.concatenate(areas), np.concatenate(cells)
+
     return samples
 
 
@@ -117,14 +127,20 @@ def _lifted(samples, radius):
     def moved(spacing):
         points, areas, cells = samples(spacing)
         return points + [0, 0, radius], areas, cells
+
     return moved
 
 
 def sphere(radius):
     """A sphere."""
     surface = _round(lambda s: (-radius * np.cos(s / radius), radius * np.sin(s / radius)), np.pi * radius)
-    return Body(lambda p: np.linalg.norm(p - [0, 0, radius], axis=1) < radius, [2 * radius] * 3,
-                4 / 3 * np.pi * radius**3, _lifted(surface, radius), "sphere")
+    return Body(
+        lambda p: np.linalg.norm(p - [0, 0, radius], axis=1) < radius,
+        [2 * radius] * 3,
+        4 / 3 * np.pi * radius**3,
+        _lifted(surface, radius),
+        "sphere",
+    )
 
 
 def capsule(radius, total):
@@ -143,12 +159,23 @@ def capsule(radius, total):
         q = p - [0, 0, radius]
         q[:, 1] -= np.clip(q[:, 1], -mid / 2, mid / 2)
         return np.linalg.norm(q, axis=1) < radius
-    return Body(inside, [2 * radius, total, 2 * radius], np.pi * radius**2 * mid + 4 / 3 * np.pi * radius**3,
-                _lifted(_round(profile, 2 * cap + mid), radius), "capsule")
+
+    return Body(
+        inside,
+        [2 * radius, total, 2 * radius],
+        np.pi * radius**2 * mid + 4 / 3 * np.pi * radius**3,
+        _lifted(_round(profile, 2 * cap + mid), radius),
+        "capsule",
+    )
 
 
 def cylinder(radius, length):
     """A cylinder lying along y; its flat ends touch nothing and carry no samples."""
     surface = _round(lambda s: (s - length / 2, radius), length)
-    return Body(lambda p: (np.hypot(p[:, 0], p[:, 2] - radius) < radius) & (np.abs(p[:, 1]) < length / 2),
-                [2 * radius, length, 2 * radius], np.pi * radius**2 * length, _lifted(surface, radius), "cylinder")
+    return Body(
+        lambda p: (np.hypot(p[:, 0], p[:, 2] - radius) < radius) & (np.abs(p[:, 1]) < length / 2),
+        [2 * radius, length, 2 * radius],
+        np.pi * radius**2 * length,
+        _lifted(surface, radius),
+        "cylinder",
+    )

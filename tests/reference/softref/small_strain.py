@@ -1,4 +1,5 @@
 """Linear small-strain pad stiffness of the cube, sticking pads by samples with coverage: no gravity, no table."""
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -10,8 +11,13 @@ from .statics import Elastic, factor
 
 # Converged stiffness (N/m) and D (%/mm) by pad (mm) and offset along one axis (mm): the outside reference for the centred
 # 22 mm pad, rows/truth.jsonl (finest, good to 0.4 %) for the others.
-TRUTH = {(22.0, 0.0): (620.0, 0.212), (18.0, 0.0): (483.6, 0.1878), (20.0, 0.0): (551.6, 0.1997),
-         (24.0, 0.0): (696.4, 0.2256), (22.0, 4.1667): (615.9, 0.2089)}
+TRUTH = {
+    (22.0, 0.0): (620.0, 0.212),
+    (18.0, 0.0): (483.6, 0.1878),
+    (20.0, 0.0): (551.6, 0.1997),
+    (24.0, 0.0): (696.4, 0.2256),
+    (22.0, 4.1667): (615.9, 0.2089),
+}
 
 
 def row(resolution, pad=0.022, offset=(0.0, 0.0), near_rigid=False, edge=0.05, youngs=3e4, poisson=0.4):
@@ -50,8 +56,16 @@ def row(resolution, pad=0.022, offset=(0.0, 0.0), near_rigid=False, edge=0.05, y
     shift = sorted(round(1e3 * abs(o), 4) for o in offset)
     truth = TRUTH.get((round(1e3 * pad, 4), shift[1])) if shift[0] == 0 else None
     d7 = deformation(x[lattice], (x + u)[lattice])
-    return dict(test="small_strain", resolution=resolution, pad_mm=round(1e3 * pad, 4),
-                pad_offset_mm=[round(1e3 * o, 4) for o in offset], contact="near_rigid" if near_rigid else "softvt",
-                stiffness_n_per_m=stiffness, stiffness_error_pct=100 * (stiffness / truth[0] - 1) if truth else None,
-                d_pct_per_mm_7cubed=d7, d_error_pct=100 * (d7 / truth[1] - 1) if truth else None,
-                d_pct_per_mm=deformation(x, x + u), d_volume_pct_per_mm=deformation(x, x + u, mesh.lumps))
+    return dict(
+        test="small_strain",
+        resolution=resolution,
+        pad_mm=round(1e3 * pad, 4),
+        pad_offset_mm=[round(1e3 * o, 4) for o in offset],
+        contact="near_rigid" if near_rigid else "softvt",
+        stiffness_n_per_m=stiffness,
+        stiffness_error_pct=100 * (stiffness / truth[0] - 1) if truth else None,
+        d_pct_per_mm_7cubed=d7,
+        d_error_pct=100 * (d7 / truth[1] - 1) if truth else None,
+        d_pct_per_mm=deformation(x, x + u),
+        d_volume_pct_per_mm=deformation(x, x + u, mesh.lumps),
+    )

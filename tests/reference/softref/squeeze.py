@@ -1,4 +1,5 @@
 """The two-pad squeeze: rest on the table, close the pads step by step, take the table away."""
+
 import numpy as np
 
 from . import mesh as meshes
@@ -6,9 +7,12 @@ from .contact import Face
 from .measure import deformation
 from .statics import NotConverged, Scene
 
-BODIES = {"cube": lambda o: meshes.cube(o["size_m"]), "sphere": lambda o: meshes.sphere(o["radius_m"]),
-          "capsule": lambda o: meshes.capsule(o["radius_m"], o["length_m"]),
-          "cylinder": lambda o: meshes.cylinder(o["radius_m"], o["length_m"])}
+BODIES = {
+    "cube": lambda o: meshes.cube(o["size_m"]),
+    "sphere": lambda o: meshes.sphere(o["radius_m"]),
+    "capsule": lambda o: meshes.capsule(o["radius_m"], o["length_m"]),
+    "cylinder": lambda o: meshes.cylinder(o["radius_m"], o["length_m"]),
+}
 STICK = 1e3
 
 
@@ -17,8 +21,20 @@ class Squeeze:
     density, friction, resolution, pad_m, pad_offset_m (y, z), step_m of the gap, spacing_m of the samples."""
 
     def __init__(self, **options):
-        o = self.o = dict(youngs_pa=3e4, poisson=0.4, density=300.0, friction=1.2, resolution=6, pad_m=0.022,
-                          pad_offset_m=(0.0, 0.0), step_m=1e-4, spacing_m=0.75e-3) | options
+        o = self.o = (
+            dict(
+                youngs_pa=3e4,
+                poisson=0.4,
+                density=300.0,
+                friction=1.2,
+                resolution=6,
+                pad_m=0.022,
+                pad_offset_m=(0.0, 0.0),
+                step_m=1e-4,
+                spacing_m=0.75e-3,
+            )
+            | options
+        )
         body = BODIES[o["shape"]](o)
         self.mesh = meshes.voxel_mesh(body, o["resolution"])
         mirrors = {0: 0.0} | ({1: 0.0} if o["pad_offset_m"][0] == 0 else {})
@@ -68,10 +84,16 @@ class Squeeze:
         lumps = self.mesh.lumps
         real = self.mesh.fill[s.elastic.reps] >= 0.2
         det = s.elastic.batch.min_det(x[s.elastic.corners])
-        return dict(force_n=pad["normal"] / 2, friction_z_n=float(pad["force"][2]) / 2, table_n=float(table["force"][2]),
-                    d_pct=deformation(self.mesh.nodes, x), d_volume_pct=deformation(self.mesh.nodes, x, lumps),
-                    min_det_f=float(det[real].min()), slipping=pad["slipping"],
-                    centre_z_m=float(lumps @ x[:, 2] / lumps.sum()))
+        return dict(
+            force_n=pad["normal"] / 2,
+            friction_z_n=float(pad["force"][2]) / 2,
+            table_n=float(table["force"][2]),
+            d_pct=deformation(self.mesh.nodes, x),
+            d_volume_pct=deformation(self.mesh.nodes, x, lumps),
+            min_det_f=float(det[real].min()),
+            slipping=pad["slipping"],
+            centre_z_m=float(lumps @ x[:, 2] / lumps.sum()),
+        )
 
     def lift(self, mu, most=8e-3):
         """Lowers the table until it carries nothing; None if the body slides down with it (nothing holds it)."""
@@ -109,22 +131,45 @@ class Squeeze:
         self.close(gap)
         grip = self.state()
         o, s = self.o, self.scene
-        out = dict(test="squeeze", shape=o["shape"], resolution=o["resolution"], gap_mm=round(1e3 * gap, 4),
-                   pad_mm=round(1e3 * o["pad_m"], 4), pad_offset_mm=[round(1e3 * v, 4) for v in o["pad_offset_m"]],
-                   youngs_pa=o["youngs_pa"], poisson=o["poisson"], density=o["density"], friction=o["friction"],
-                   nodes=len(self.mesh.nodes), elements=len(self.mesh.elements), weight_n=s.weight_n,
-                   diagonal_nodes_mm=1e3 * self.mesh.diagonal(), diagonal_skin_mm=1e3 * float(np.linalg.norm(s.body.size)))
+        out = dict(
+            test="squeeze",
+            shape=o["shape"],
+            resolution=o["resolution"],
+            gap_mm=round(1e3 * gap, 4),
+            pad_mm=round(1e3 * o["pad_m"], 4),
+            pad_offset_mm=[round(1e3 * v, 4) for v in o["pad_offset_m"]],
+            youngs_pa=o["youngs_pa"],
+            poisson=o["poisson"],
+            density=o["density"],
+            friction=o["friction"],
+            nodes=len(self.mesh.nodes),
+            elements=len(self.mesh.elements),
+            weight_n=s.weight_n,
+            diagonal_nodes_mm=1e3 * self.mesh.diagonal(),
+            diagonal_skin_mm=1e3 * float(np.linalg.norm(s.body.size)),
+        )
         out |= {f"{k}_m": o[f"{k}_m"] for k in ("size", "radius", "length") if f"{k}_m" in o}
-        out |= dict(force_grip_n=grip["force_n"], d_grip_pct=grip["d_pct"], d_grip_volume_pct=grip["d_volume_pct"],
-                    min_det_f_grip=grip["min_det_f"], slipping_grip=grip["slipping"], table_grip_n=grip["table_n"])
+        out |= dict(
+            force_grip_n=grip["force_n"],
+            d_grip_pct=grip["d_pct"],
+            d_grip_volume_pct=grip["d_volume_pct"],
+            min_det_f_grip=grip["min_det_f"],
+            slipping_grip=grip["slipping"],
+            table_grip_n=grip["table_n"],
+        )
         if not lift:
             return out
         hold = self.lift(o["friction"])
         stick = hold or self.lift(STICK)
         out |= dict(holds=hold is not None, hold_branch="coulomb" if hold else "stick")
         if stick:
-            out |= dict(force_hold_n=stick["force_n"], d_hold_pct=stick["d_pct"], d_hold_volume_pct=stick["d_volume_pct"],
-                        min_det_f_hold=stick["min_det_f"], slipping_hold=stick["slipping"],
-                        sag_mm=1e3 * (grip["centre_z_m"] - stick["centre_z_m"]),
-                        capacity_over_weight=2 * o["friction"] * stick["force_n"] / s.weight_n)
+            out |= dict(
+                force_hold_n=stick["force_n"],
+                d_hold_pct=stick["d_pct"],
+                d_hold_volume_pct=stick["d_volume_pct"],
+                min_det_f_hold=stick["min_det_f"],
+                slipping_hold=stick["slipping"],
+                sag_mm=1e3 * (grip["centre_z_m"] - stick["centre_z_m"]),
+                capacity_over_weight=2 * o["friction"] * stick["force_n"] / s.weight_n,
+            )
         return out

@@ -1,4 +1,5 @@
 """Newton's method for a corotated soft body between flat faces, load step by load step."""
+
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
@@ -104,8 +105,9 @@ class Scene:
     def answers(self, q):
         """Contact of each face at q."""
         x = (self.x_rest + self.jacobian @ q).reshape(-1, 3)
-        return x, {k: contact.respond(f, self.memory[k], x, self.area, self.cell, self.c_modulus, self.mu[k])
-                   for k, f in self.faces.items()}
+        return x, {
+            k: contact.respond(f, self.memory[k], x, self.area, self.cell, self.c_modulus, self.mu[k]) for k, f in self.faces.items()
+        }
 
     def residual(self, q):
         """Unbalanced force in q, and what the tangent needs."""
@@ -126,8 +128,9 @@ class Scene:
         idx = np.where(np.any(slope != 0, axis=(1, 2)))[0]
         rows = (3 * idx[:, None] + np.arange(3)).ravel()
         j = self.jacobian[rows]
-        d = sp.bsr_matrix((slope[idx] * self.share[idx, None, None], np.arange(len(idx)), np.arange(len(idx) + 1)),
-                          (3 * len(idx), 3 * len(idx)))
+        d = sp.bsr_matrix(
+            (slope[idx] * self.share[idx, None, None], np.arange(len(idx)), np.arange(len(idx) + 1)), (3 * len(idx), 3 * len(idx))
+        )
         return self.elastic.tangent(st, exact) + (j.T @ (d @ j)).tocsc()
 
     def solve(self, most=40):
@@ -135,7 +138,7 @@ class Scene:
         q = self.q.copy()
         r, st, x, answers = self.residual(q)
         norm = np.linalg.norm(r)
-        for it in range(most):
+        for _ in range(most):
             if norm < TOLERANCE:
                 break
             dq = -factor(self.tangent(st, answers)).solve(r)

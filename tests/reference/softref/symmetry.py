@@ -1,4 +1,5 @@
 """Mirror symmetry as a linear reduction: u = T q, and orbits with their sizes as weights."""
+
 import numpy as np
 import scipy.sparse as sp
 

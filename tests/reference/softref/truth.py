@@ -3,6 +3,7 @@
 No voxels and no contact law here: this is what softvt's voxel solution is judged against. One fourth (pad offset in y)
 or one eighth of the cube is meshed; the squeeze axis is x and both pads move by 0.5 mm.
 """
+
 import numpy as np
 import scipy.sparse as sp
 from scipy.interpolate import RegularGridInterpolator
@@ -69,8 +70,9 @@ def solve(pad, offset_y, first, ratio, edge=0.05, youngs=3e4, poisson=0.4):
     node = np.stack([np.ravel_multi_index((cell + [c & 1, c >> 1 & 1, c >> 2 & 1]).T, shape) for c in range(8)], 1)
     p = np.stack(np.meshgrid(x, y, z, indexing="ij"), -1).reshape(-1, 3)
     dof = (3 * node[:, :, None] + np.arange(3)).reshape(-1, 24)
-    k = sp.csr_matrix((_stiffness(size, youngs, poisson).ravel(),
-                       (np.repeat(dof, 24, 1).ravel(), np.tile(dof, (1, 24)).ravel())), (p.size, p.size))
+    k = sp.csr_matrix(
+        (_stiffness(size, youngs, poisson).ravel(), (np.repeat(dof, 24, 1).ravel(), np.tile(dof, (1, 24)).ravel())), (p.size, p.size)
+    )
     under = (p[:, 0] > half - 1e-12) & (np.abs(p[:, 1] - offset_y) < pad / 2 + 1e-9) & (p[:, 2] < pad / 2 + 1e-9)
     held = np.zeros(p.shape, bool)
     for axis in (0, 2) if offset_y else (0, 1, 2):
@@ -102,5 +104,13 @@ def rows(levels=((2e-4, 1.5), (1e-4, 1.4))):
     for pad, offset in ((22, 0.0), (18, 0.0), (20, 0.0), (24, 0.0), (22, 50 / 12)):
         for first, ratio in levels:
             k, d, nodes = solve(1e-3 * pad, 1e-3 * offset, first, ratio)
-            yield dict(test="truth", pad_mm=float(pad), pad_offset_y_mm=offset, first_cell_mm=1e3 * first, ratio=ratio,
-                       nodes=nodes, stiffness_n_per_m=float(k), d_pct_per_mm_7cubed=d)
+            yield dict(
+                test="truth",
+                pad_mm=float(pad),
+                pad_offset_y_mm=offset,
+                first_cell_mm=1e3 * first,
+                ratio=ratio,
+                nodes=nodes,
+                stiffness_n_per_m=float(k),
+                d_pct_per_mm_7cubed=d,
+            )

@@ -6,7 +6,6 @@ import unittest
 from pathlib import Path
 
 import numpy as np
-
 from softvt_baselines import UserError
 from softvt_baselines.results import difference, load, rate, save
 
@@ -15,8 +14,18 @@ def run(folder: Path, safe: np.ndarray, suite: str = "one") -> Path:
     """A run of ten tasks; `safe` is (10, episodes)."""
     folder.mkdir()
     rows = [
-        {"suite": suite, "policy": folder.name, "task": task, "episode": episode, "goal": True, "no_drop": True, "safety": bool(is_safe), "tau": 0.5,
-         "d_peak": 0.25, "outcome": {"kind": "invalid" if not is_safe else "completed"}}
+        {
+            "suite": suite,
+            "policy": folder.name,
+            "task": task,
+            "episode": episode,
+            "goal": True,
+            "no_drop": True,
+            "safety": bool(is_safe),
+            "tau": 0.5,
+            "d_peak": 0.25,
+            "outcome": {"kind": "invalid" if not is_safe else "completed"},
+        }
         for (task, episode), is_safe in np.ndenumerate(safe)
     ]
     (folder / "episodes.jsonl").write_text("".join(json.dumps(row) + "\n" for row in reversed(rows)))

@@ -127,5 +127,11 @@ def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict)
                 print(line, flush=True)
                 print(line, file=log, flush=True)
                 total.zero_()
-    about = about | {"steps": options.steps, "batch": options.batch, "seed": options.seed, "recorded_steps": len(demos.state), "trained_steps": len(demos.actions)}
+    about = about | {
+        "steps": options.steps,
+        "batch": options.batch,
+        "seed": options.seed,
+        "recorded_steps": len(demos.state),
+        "trained_steps": len(demos.actions),
+    }
     save(path, Checkpoint(averaged, statistics, demos.prompts, about))

@@ -112,14 +112,31 @@ def tables(folder: Path) -> str:
     text = "Rates are means over the training seeds; intervals (95 %, bootstrap) are over the episodes, for these seeds.\n\n"
     for suite in sorted({policy.suite for policy in learned} | {suite for suite, _ in references}):
         text += f"### `{suite}`\n\n"
-        rows = [_row(_name(policy), runs, str(policy.replan)) for policy, runs in sorted(learned.items()) if (policy.suite, policy.condition) == (suite, "")]
+        rows = [
+            _row(_name(policy), runs, str(policy.replan))
+            for policy, runs in sorted(learned.items())
+            if (policy.suite, policy.condition) == (suite, "")
+        ]
         rows += [_row(shown, [references[suite, name]], "") for name, shown in REFERENCES.items() if (suite, name) in references]
         text += _table(["policy", "replan", "seeds", "episodes", "Goal, %", "NoDrop, %", "Safety, %", "D/τ"], rows)
     pairs = [pair for pair in _pairs(learned) if pair[0].condition != UNCHANGED]
     if pairs:
-        text += "### Differences, on the episodes that both have\n\n*Both succeed*: Safety of the episodes in which both reach the goal.\n\n"
+        text += (
+            "### Differences, on the episodes that both have\n\n*Both succeed*: Safety of the episodes in which both reach the goal.\n\n"
+        )
         measures = [f"{measure}, points" for measure in ("Goal", "NoDrop", "Safety")]
-        heading = ["suite", "inputs", "grip code", "replan", "seeds", "shift", "episodes", *measures, "both succeed", "Safety there, points"]
+        heading = [
+            "suite",
+            "inputs",
+            "grip code",
+            "replan",
+            "seeds",
+            "shift",
+            "episodes",
+            *measures,
+            "both succeed",
+            "Safety there, points",
+        ]
         text += _table(heading, [_difference(*pair) for pair in pairs])
     for policy, fewer, more in pairs:
         if not policy.condition:
@@ -159,7 +176,13 @@ def _by_task(policy: Policy, fewer: list[Run], more: list[Run]) -> str:
         return f"{100 * np.mean([run.safety[run.task == task].mean() for run in runs]):.0f}"
 
     rows = [
-        [str(task), assets.get(task, "–"), str((common[0].task == task).sum()), safety(common[: len(fewer)], task), safety(common[len(fewer) :], task)]
+        [
+            str(task),
+            assets.get(task, "–"),
+            str((common[0].task == task).sum()),
+            safety(common[: len(fewer)], task),
+            safety(common[len(fewer) :], task),
+        ]
         for task in np.unique(common[0].task)
     ]
     names = (WITHOUT[policy.inputs].upper(), policy.inputs.upper())

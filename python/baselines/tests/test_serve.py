@@ -5,10 +5,9 @@ import unittest
 
 import numpy as np
 from openpi_client import msgpack_numpy
-from websockets.asyncio.client import connect
-
 from softvt_baselines import UserError
 from softvt_baselines.serve import Request, serve
+from websockets.asyncio.client import connect
 
 PORT = 18790
 
@@ -16,7 +15,7 @@ PORT = 18790
 def answer(request: Request):
     """The number of an observation, and 100 more if there was an answer before in the episode."""
     if request.obs["prompt"] == "break":
-        1 / 0
+        raise ZeroDivisionError
     if request.obs["prompt"] == "fly":
         return UserError("no such prompt")
     return np.full((2, 7), request.obs["number"] + (100 if request.last else 0), np.float32)

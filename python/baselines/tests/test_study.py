@@ -32,7 +32,9 @@ class Studies(unittest.TestCase):
         if self.failing and self.failing in self.calls[-1]:
             raise UserError("it failed")
         if words[0] == "train":
-            self.switches[Path(words[words.index("--out") + 1]).stem.split("-")[1]] = {word for word in words if word in ("--touch", "--drives")}
+            self.switches[Path(words[words.index("--out") + 1]).stem.split("-")[1]] = {
+                word for word in words if word in ("--touch", "--drives")
+            }
             Path(words[words.index("--out") + 1]).touch()
 
     def run_softvt(self, words):

@@ -6,8 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from test_data import recording
-
 from softvt_baselines import UserError
 from softvt_baselines.checkpoint import device_of, load
 from softvt_baselines.data import CAMERAS, TACTILE
@@ -16,6 +14,7 @@ from softvt_baselines.infer import Answering, blended
 from softvt_baselines.inputs import Shape
 from softvt_baselines.serve import Plan, Request
 from softvt_baselines.train import TrainOptions, train
+from test_data import recording
 
 CPU = torch.device("cpu")
 
@@ -39,7 +38,12 @@ class Policies(unittest.TestCase):
         obs |= {key: random.integers(0, 255, (*frames, 24, 32, 3), np.uint8) for key in TACTILE}
         state = np.broadcast_to(np.array([0, 0, 0, 3.1, 0, 0, 0.04, 0], np.float32), (*frames, 8))
         motion = random.normal(0, 1, (6, 198, 2)).astype(np.float32)
-        return obs | {"state": state, "prompt": "pick up the left bun", "softvt": {"seed": seed, "step": 0}, "tactile_marker_motion": motion}
+        return obs | {
+            "state": state,
+            "prompt": "pick up the left bun",
+            "softvt": {"seed": seed, "step": 0},
+            "tactile_marker_motion": motion,
+        }
 
     def test_every_kind_of_policy_trains_and_answers_whatever_else_is_in_the_batch(self):
         for has_touch, head, frames, has_pictures in [
@@ -47,7 +51,17 @@ class Policies(unittest.TestCase):
             (True, "regression", 1, True),
             (True, "flow", 2, False),
         ]:
-            shape = Shape(has_touch, head=head, frames=frames, edge=32, chunk=5, width=32, layers=1, has_tactile_pictures=has_pictures, has_drives=True)
+            shape = Shape(
+                has_touch,
+                head=head,
+                frames=frames,
+                edge=32,
+                chunk=5,
+                width=32,
+                layers=1,
+                has_tactile_pictures=has_pictures,
+                has_drives=True,
+            )
             answering = Answering(load(self.trained(shape), CPU), CPU)
             observations = [self.observation(shape, seed) for seed in range(5)]
             requests = [Request(observation, None) for observation in observations]

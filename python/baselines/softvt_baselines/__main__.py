@@ -16,7 +16,9 @@ REFERENCES = ["expert", "tactile-servo", "fixed-closure"]
 def _record(args: argparse.Namespace) -> None:
     from .evaluate import recording_flags, run_softvt
 
-    run_softvt(["record", args.suite, "--out", str(args.out), *recording_flags(args.demos, args.edge, args.teacher, args.disturbance), *args.flags])
+    run_softvt(
+        ["record", args.suite, "--out", str(args.out), *recording_flags(args.demos, args.edge, args.teacher, args.disturbance), *args.flags]
+    )
 
 
 def _train(args: argparse.Namespace) -> None:
@@ -115,8 +117,18 @@ def _parser() -> argparse.ArgumentParser:
     def with_recording(sub: argparse.ArgumentParser) -> None:
         sub.add_argument("--demos", type=_positive, default=75, help="demonstrations per task")
         with_edge(sub)
-        sub.add_argument("--teacher", default="suite", choices=["suite", "expert", "tactile-servo"], help="policy that demonstrates; suite: that of the suite")
-        sub.add_argument("--disturbance", type=_length, default=0.002, help="standard deviation of the robot from its commands while recording, m; of its rotation 4 rad per m")
+        sub.add_argument(
+            "--teacher",
+            default="suite",
+            choices=["suite", "expert", "tactile-servo"],
+            help="policy that demonstrates; suite: that of the suite",
+        )
+        sub.add_argument(
+            "--disturbance",
+            type=_length,
+            default=0.002,
+            help="standard deviation of the robot from its commands while recording, m; of its rotation 4 rad per m",
+        )
 
     record = command("record", _record, "record demonstrations of a suite with pictures of the size that policies see")
     record.add_argument("suite", help="suite of softvt")
@@ -128,7 +140,9 @@ def _parser() -> argparse.ArgumentParser:
     train.add_argument("--out", type=Path, required=True, help="checkpoint to write")
     train.add_argument("--touch", action="store_true", help="give the policy the markers of both fingers")
     train.add_argument("--tactile-pictures", action="store_true", help="give it the markers and the tactile pictures of both fingers")
-    train.add_argument("--drives", action="store_true", help="give it the exact finger position and the commanded closure, whose gap is the grip force")
+    train.add_argument(
+        "--drives", action="store_true", help="give it the exact finger position and the commanded closure, whose gap is the grip force"
+    )
     train.add_argument("--gripper", default="continuous", choices=CODES, help="grip code")
     train.add_argument("--head", default="regression", choices=["regression", "flow"], help="how actions are predicted")
     train.add_argument("--frames", type=int, default=1, choices=[1, 2], help="control steps whose pictures and states the policy sees")
@@ -157,7 +171,13 @@ def _parser() -> argparse.ArgumentParser:
     study = command("study", _study, "record, train and evaluate every combination of suites, inputs, grip codes and seeds")
     study.add_argument("suites", nargs="+", help="names of standard suites")
     study.add_argument("--out", type=Path, required=True, help="folder of the study")
-    study.add_argument("--inputs", nargs="+", default=["vo", "vp", "vt"], choices=[*INPUTS], help=f"inputs: {', '.join(f'{name} {what}' for name, what in INPUTS.items())}")
+    study.add_argument(
+        "--inputs",
+        nargs="+",
+        default=["vo", "vp", "vt"],
+        choices=[*INPUTS],
+        help=f"inputs: {', '.join(f'{name} {what}' for name, what in INPUTS.items())}",
+    )
     study.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2], help="training seeds")
     study.add_argument("--codes", nargs="+", default=["continuous"], choices=CODES, help="grip codes")
     study.add_argument("--replans", type=_positive, nargs="+", default=[4], help="actions executed of each answer")

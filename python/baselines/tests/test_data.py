@@ -7,7 +7,6 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-
 from softvt_baselines import UserError, prompts
 from softvt_baselines.data import ACTIONS, CAMERAS, TACTILE, Statistics, displacements, load, moving_steps, shrink
 from softvt_baselines.inputs import Shape, read

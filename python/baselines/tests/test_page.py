@@ -6,9 +6,8 @@ import unittest
 from pathlib import Path
 
 import numpy as np
-from test_results import run
-
 from softvt_baselines import UserError, page
+from test_results import run
 
 
 class Pages(unittest.TestCase):
