@@ -5,10 +5,12 @@ use std::{hint::black_box, time::Instant};
 
 use softvt::{
     geometry::Vec3,
-    robot::PadSurface,
+    robot::{
+        PadSurface,
+        tactile::{MarkerModel, TactileSpec},
+    },
     sensing::tactile::{
-        Gel, GelField, GelScratch, MarkerModel, Markers, PadWrench, PolynomialOptics, SkinMesh,
-        TactileContact, TactileSpec,
+        Gel, GelField, GelScratch, Markers, PadWrench, PolynomialOptics, SkinMesh, TactileContact,
     },
 };
 

@@ -2,7 +2,7 @@
 //!
 //! Each module is a crate, `softvt-geometry` to `softvt-cli`; this crate re-exports them. They form layers, and each
 //! uses only those before it: [`geometry`] → [`physics`] → [`scene`], [`robot`] → [`sensing`], [`evaluation`] →
-//! [`benchmark`] → [`policy`] → [`rollout`] → [`dataset`] → [`report`], [`script`], [`serve`] → [`runner`] → [`cli`].
+//! [`records`], [`benchmark`] → [`policy`] → [`rollout`] → [`dataset`] → [`report`], [`script`], [`serve`] → [`runner`] → [`cli`].
 //! `docs/architecture.md` draws them and follows one episode. All of them may use [`text`] (numbers and text in
 //! messages), [`files`] (atomic files), [`npy`] (numpy files) and [`parallel`] (jobs on threads).
 //!
@@ -30,6 +30,8 @@ pub use softvt_media as media;
 pub use softvt_physics as physics;
 #[doc(inline)]
 pub use softvt_policy as policy;
+#[doc(inline)]
+pub use softvt_records as records;
 #[doc(inline)]
 pub use softvt_report as report;
 #[doc(inline)]

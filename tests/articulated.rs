@@ -6,10 +6,10 @@ use softvt::{
     episode_id::{EpisodeId, Split},
     geometry::Vec3,
     physics::{BodyId, ContactPartner, LinkId, world::JointDrive},
+    robot::tactile::TactileSpec,
     rollout::{AssetCache, ObjectInstance, SensorAssets, SensorSuite, Simulation, state_hash},
     scene::{Asset, Camera, Scene},
     script::{self, EpisodeSetup, SceneChanges},
-    sensing::tactile::TactileSpec,
 };
 
 /// A cabinet facing −y with its top drawer open, a bowl of 107 mm in the drawer, and a stove.

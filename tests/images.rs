@@ -9,14 +9,11 @@ use softvt::{
     episode_id::{EpisodeId, Split},
     geometry::{Pose, Quat, Vec3, shape::Shape},
     physics::{BodyId, PhysicsParams},
-    robot::RobotSpec,
+    robot::{RobotSpec, tactile::TactileSpec},
     rollout::{AssetCache, SensorAssets, SensorSuite, Simulation},
     scene::{Camera, Lighting, Mask, Visual, VisualLayer},
     script,
-    sensing::{
-        camera::{FrameView, RenderMesh, RenderObject, RenderScene, RenderedImage, Renderer},
-        tactile::TactileSpec,
-    },
+    sensing::camera::{FrameView, RenderMesh, RenderObject, RenderScene, RenderedImage, Renderer},
 };
 
 /// Compares an image with its reference, or writes the reference.

@@ -10,8 +10,8 @@ use softvt_common::{
 use softvt_evaluation::criteria::SuccessCriteria;
 use softvt_physics::PhysicsParams;
 use softvt_robot::RobotSpec;
+use softvt_robot::tactile::TactileSpec;
 use softvt_scene::CameraSettings;
-use softvt_sensing::tactile::TactileSpec;
 
 /// Control period, s: policies act, and results are recorded, at 20 Hz.
 pub const CONTROL_DT: f64 = 0.05;
@@ -281,7 +281,7 @@ fn refusal(path: &str, value: &str, error: &str) -> SettingsError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use softvt_sensing::tactile::{FotsSpec, MarkerModel, OpticsModel};
+    use softvt_robot::tactile::{FotsSpec, MarkerModel, OpticsModel};
 
     impl Settings {
         fn with(&self, path: &str, value: &str) -> Result<Self, SettingsError> {

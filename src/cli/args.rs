@@ -10,10 +10,10 @@ use crate::{
     error::CliError,
     output::Console,
     plan_flags::{self, GivenFlag},
-    requirement::Requirement,
 };
 use softvt_benchmark::{ShiftValue, Teacher};
 use softvt_policy::{profile::GripCode, remote::Protocol};
+use softvt_records::requirement::Requirement;
 use softvt_runner::{
     LoadedRun, PolicyConfig, PolicyOptions, PolicySource, RunConfig, Shard, TraceDetail, VideoSelection,
     parse_profile, read_secret, recording::RecordingOptions,

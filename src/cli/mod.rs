@@ -11,7 +11,6 @@ mod output;
 mod parse;
 mod plan_flags;
 mod replays;
-mod requirement;
 #[cfg(test)]
 mod tests;
 

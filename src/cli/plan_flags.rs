@@ -48,15 +48,6 @@ impl fmt::Display for PlanKind {
     }
 }
 
-/// The kinds of plan on which flags of commands act.
-struct Decision {
-    commands: &'static [&'static str],
-    /// Identifiers of the flags, as clap has them: the names of the fields of the arguments.
-    flags: &'static [&'static str],
-    /// Empty for flags that are always refused.
-    acts_on: &'static [PlanKind],
-}
-
 const ALL: &[PlanKind] = &[Suite, Suites, Conditions, Experiment];
 /// Plans that run episodes.
 const EPISODES: &[PlanKind] = &[Suite, Suites, Conditions];
@@ -64,85 +55,31 @@ const SUITES: &[PlanKind] = &[Suite, Suites];
 
 /// The command without a name: `softvt FILE.lua`.
 pub(crate) const RUN: &str = "softvt";
-const POLICY_SERVER: &[&str] = &["policy", "protocol", "replan", "policy_timeout", "name"];
-const SCENE: &[&str] = &["seed", "settings", "shifts", "twin", "vary"];
+/// The commands that take plans of all kinds. The others refuse plans of other kinds than theirs, and all of their flags act.
+const COMMANDS: [&str; 2] = [RUN, "check"];
 
-/// Every flag of every command that loads a plan. `check` accepts what a run accepts and validates it; the other
-/// commands refuse plans of other kinds as such.
-static DECISIONS: &[Decision] = &[
-    Decision { commands: &[RUN, "check"], flags: &["seed", "settings"], acts_on: ALL },
-    Decision {
-        commands: &[RUN, "check"],
-        flags: &["shifts", "twin", "vary", "seed_file"],
-        acts_on: EPISODES,
-    },
-    Decision { commands: &["view"], flags: &["seed_file"], acts_on: &[Suite] },
-    Decision { commands: &["serve"], flags: &["seed_file"], acts_on: SUITES },
-    // Demonstrations are public: what is learned from them is judged elsewhere.
-    Decision { commands: &["record", "dataset import"], flags: &["seed_file"], acts_on: &[] },
-    Decision { commands: &[RUN, "check"], flags: POLICY_SERVER, acts_on: EPISODES },
-    Decision { commands: &[RUN, "check"], flags: &["profile", "gripper"], acts_on: EPISODES },
-    Decision { commands: &[RUN], flags: &["threads", "out", "json"], acts_on: ALL },
-    Decision {
-        commands: &[RUN],
-        flags: &["tasks", "episodes", "trace", "video", "resume", "shard"],
-        acts_on: EPISODES,
-    },
-    Decision { commands: &[RUN], flags: &["requirements"], acts_on: SUITES },
-    Decision { commands: &["view"], flags: SCENE, acts_on: &[Suite] },
-    Decision { commands: &["view"], flags: POLICY_SERVER, acts_on: &[Suite] },
-    Decision {
-        commands: &["view"],
-        flags: &["profile", "gripper", "task", "episode", "native", "out"],
-        acts_on: &[Suite],
-    },
-    Decision { commands: &["record", "serve", "dataset import"], flags: SCENE, acts_on: SUITES },
-    Decision { commands: &["record"], flags: POLICY_SERVER, acts_on: SUITES },
-    Decision { commands: &["record"], flags: &["profile", "gripper", "demos"], acts_on: SUITES },
-    Decision {
-        commands: &["record", "dataset import"],
-        flags: &["tasks", "attempts", "out", "images", "no_privileged", "threads", "resume"],
-        acts_on: SUITES,
-    },
-    Decision { commands: &["dataset import"], flags: &["layout"], acts_on: SUITES },
-    Decision {
-        commands: &["serve"],
-        flags: &["policy", "protocol", "replan", "policy_timeout"],
-        acts_on: &[],
-    },
-    Decision {
-        commands: &["serve"],
-        flags: &[
-            "profile",
-            "gripper",
-            "host",
-            "port",
-            "threads",
-            "split",
-            "privileged",
-            "token",
-            "until_stdin_closes",
-        ],
-        acts_on: SUITES,
-    },
-    Decision {
-        commands: &["serve"],
-        flags: &["name", "tasks", "episodes", "shard", "out", "resume"],
-        acts_on: SUITES,
-    },
-];
-
-/// The kinds of plan on which a flag of a command acts. `None` if that is undecided.
-fn acts_on(command: &str, flag: &str) -> Option<&'static [PlanKind]> {
-    let decision = DECISIONS
-        .iter()
-        .find(|decision| decision.commands.contains(&command) && decision.flags.contains(&flag))?;
-    Some(decision.acts_on)
+/// Flags, and the kinds of plan on which they act.
+struct Effect {
+    /// Identifiers of the flags, as clap has them: the names of the fields of the arguments.
+    flags: &'static [&'static str],
+    acts_on: &'static [PlanKind],
 }
 
-/// True if some flag of a command acts on plans of this kind.
-fn accepts(command: &str, kind: PlanKind) -> bool {
-    DECISIONS.iter().any(|decision| decision.commands.contains(&command) && decision.acts_on.contains(&kind))
+/// Every flag of the [`COMMANDS`].
+static EFFECTS: [Effect; 5] = [
+    Effect { flags: &["seed", "settings", "threads", "out", "json"], acts_on: ALL },
+    Effect { flags: &["shifts", "twin", "vary", "seed_file"], acts_on: EPISODES },
+    Effect {
+        flags: &["policy", "profile", "protocol", "gripper", "replan", "policy_timeout", "name"],
+        acts_on: EPISODES,
+    },
+    Effect { flags: &["tasks", "episodes", "shard", "trace", "video", "resume"], acts_on: EPISODES },
+    Effect { flags: &["requirements"], acts_on: SUITES },
+];
+
+/// The kinds of plan on which a flag of the [`COMMANDS`] acts. `None` if the table above lacks it.
+fn acts_on(flag: &str) -> Option<&'static [PlanKind]> {
+    EFFECTS.iter().find(|effect| effect.flags.contains(&flag)).map(|effect| effect.acts_on)
 }
 
 /// A flag on the command line.
@@ -160,22 +97,18 @@ pub(crate) struct GivenFlag {
 /// The first such flag.
 pub(crate) fn check(command: &str, request: &Request, plan: &Plan) -> Result<(), CliError> {
     let (kind, config) = (PlanKind::of(plan), &request.config);
-    // A command that accepts no plan of this kind says so itself.
-    if !accepts(command, kind) {
-        return Ok(());
-    }
-    for flag in request.given() {
-        let acts_on = acts_on(command, &flag.id).unwrap_or_default();
-        if !acts_on.contains(&kind) {
-            let kinds: Vec<&str> = acts_on.iter().map(|kind| kind.plural()).collect();
-            let kinds = if kinds.is_empty() { "no plan".to_owned() } else { kinds.join(", ") };
-            let message =
-                format!("--{}: applies to {kinds}, and this file is {kind}; leave it out", flag.long);
-            return Err(config.error(message).into());
-        }
+    let refused = |flag: &&GivenFlag| !acts_on(&flag.id).unwrap_or_default().contains(&kind);
+    if let Some(flag) = request.given().iter().filter(|_| COMMANDS.contains(&command)).find(refused) {
+        let kinds: Vec<&str> =
+            acts_on(&flag.id).unwrap_or_default().iter().map(|kind| kind.plural()).collect();
+        let (long, kinds) = (&flag.long, kinds.join(", "));
+        return Err(config
+            .error(format!("--{long}: applies to {kinds}, and this file is {kind}; leave it out"))
+            .into());
     }
     let suites = plan.suites();
-    if config.rigid_twin && suites.iter().all(|suite| suite.object_type == ObjectType::Rigid) {
+    let all_rigid = suites.iter().all(|suite| suite.object_type == ObjectType::Rigid);
+    if config.rigid_twin && !suites.is_empty() && all_rigid {
         return Err(config.error("--twin: the objects of this suite are rigid already; leave it out").into());
     }
     Ok(())
@@ -183,9 +116,7 @@ pub(crate) fn check(command: &str, request: &Request, plan: &Plan) -> Result<(),
 
 #[cfg(test)]
 mod tests {
-    use std::{collections::BTreeSet, fs, path::Path};
-
-    use clap::Command;
+    use std::fs;
 
     use super::*;
     use crate::{
@@ -193,11 +124,9 @@ mod tests {
         parse::{clap_command, parse},
     };
 
-    /// A valid value of a flag, with the flags that it requires.
+    /// A valid value of each flag that does not act on all plans.
     const SAMPLES: &[(&str, &str)] = &[
-        ("seed", "--seed 1"),
         ("seed_file", "--seed-file Cargo.toml"),
-        ("settings", "--set physics.sleeping=false"),
         ("shifts", "--shift mass=2"),
         ("twin", "--twin rigid"),
         ("vary", "--vary"),
@@ -208,47 +137,19 @@ mod tests {
         ("name", "--name other"),
         ("profile", "--profile vision"),
         ("gripper", "--gripper binary"),
-        ("threads", "--threads 1"),
-        ("out", "--out OUT"),
-        ("json", "--json"),
         ("tasks", "--task 0"),
-        ("task", "--task 0"),
         ("episodes", "--episodes 1"),
-        ("episode", "--episode 0"),
         ("trace", "--trace"),
         ("video", "--video"),
         ("resume", "--resume --out OUT"),
         ("shard", "--shard 1/2"),
         ("requirements", "--require safety>=0"),
-        ("native", "--native"),
-        ("demos", "--demos 1"),
-        ("attempts", "--attempts 1"),
-        ("images", "--images video"),
-        ("no_privileged", "--no-privileged"),
-        ("layout", "--layout"),
-        ("host", "--host 127.0.0.1"),
-        ("port", "--port 0"),
-        ("split", "--split validation"),
-        ("privileged", "--privileged"),
-        ("token", "--token secret"),
-        ("until_stdin_closes", "--until-stdin-closes"),
     ];
 
-    const SUITE: &str = r#"local box = softvt.asset { name = "box", shape = softvt.shape.box { size = { 0.1, 0.1, 0.02 } }:grounded(), body = softvt.static {} }
-local layout = softvt.layout("one", function(scene)
-  scene:add { name = "a", asset = box, position = { 0, 0, 0 } }
-  scene:add { name = "b", asset = box, position = { 0, 0.3, 0 } }
-end)
-local task = softvt.task { prompt = "wait", layout = layout, goal = softvt.on { object = "a", target = "b" }, budget_steps = 1 }
-local suite = softvt.suite { name = "one", object_type = "deformable", variation = "object", episodes = 1, tasks = { task } }
-"#;
-
-    const PLANS: [(PlanKind, &str); 4] = [
-        (Suite, "return suite"),
-        (Suites, "return { suite }"),
+    const PLANS: [(PlanKind, &str); 2] = [
         (
             Conditions,
-            "return softvt.conditions { name = 'c', suites = { suite }, conditions = { { name = 'x' } } }",
+            "return softvt.conditions { name = 'c', suites = { require 'suites.object_soft' }, conditions = { { name = 'x' } } }",
         ),
         (
             Experiment,
@@ -256,93 +157,59 @@ local suite = softvt.suite { name = "one", object_type = "deformable", variation
         ),
     ];
 
-    /// The commands that load a plan, with their flags.
-    fn commands_with_plans() -> Vec<(String, Vec<String>)> {
-        fn collect(name: &str, command: &Command, found: &mut Vec<(String, Vec<String>)>) {
-            let arguments: Vec<_> = command.get_arguments().collect();
-            if arguments.iter().any(|arg| arg.get_id() == "file") {
-                let flags = arguments.iter().filter(|arg| arg.get_long().is_some());
-                let flags = flags.map(|arg| arg.get_id().to_string());
-                found.push((
-                    name.to_owned(),
-                    flags.filter(|id| !["help", "version"].contains(&id.as_str())).collect(),
-                ));
-            }
-            for subcommand in command.get_subcommands() {
-                let path = if name == RUN { String::new() } else { format!("{name} ") };
-                collect(&(path + subcommand.get_name()), subcommand, found);
-            }
-        }
-        let mut found = Vec::new();
-        collect(RUN, &clap_command(), &mut found);
-        found
+    /// The flags of a command.
+    fn flags(command: &str) -> Vec<String> {
+        let root = clap_command();
+        let command = root.find_subcommand(command).unwrap_or(&root);
+        let named = command.get_arguments().filter(|arg| arg.get_long().is_some());
+        named
+            .map(|arg| arg.get_id().to_string())
+            .filter(|id| !["help", "version"].contains(&id.as_str()))
+            .collect()
     }
 
     #[test]
-    fn every_flag_has_a_decision_and_every_decision_a_flag() {
-        let commands = commands_with_plans();
-        assert!(commands.len() >= 6, "{commands:?}");
-        let mut decided = BTreeSet::new();
-        for (command, flags) in &commands {
-            for flag in flags {
+    fn every_flag_is_in_the_table() {
+        for command in COMMANDS {
+            for flag in flags(command) {
                 assert!(
-                    acts_on(command, flag).is_some(),
-                    "softvt {command}: decide in plan_flags.rs on which plans the flag {flag} acts"
+                    acts_on(&flag).is_some(),
+                    "{command}: say in plan_flags.rs on which plans {flag} acts"
                 );
-                decided.insert((command.as_str(), flag.as_str()));
             }
         }
-        for decision in DECISIONS {
-            for command in decision.commands {
-                for flag in decision.flags {
-                    assert!(decided.contains(&(*command, *flag)), "{command} has no flag {flag}");
-                }
-            }
+        for flag in EFFECTS.iter().flat_map(|effect| effect.flags) {
+            assert!(flags(RUN).iter().any(|known| known == flag), "there is no flag {flag}");
         }
-    }
-
-    /// Runs a command in this process. `script` is the file of the plan, and what it writes goes to `root`.
-    fn run(command: &str, script: &Path, sample: &str, root: &Path) -> Result<(), CliError> {
-        let required = match command {
-            "view" | "record" | "dataset import" if !sample.contains("--out") => " --out OUT",
-            _ => "",
-        };
-        let files = if command == "dataset import" { " absent.hdf5" } else { "" };
-        let command = if command == RUN { String::new() } else { format!("{command} ") };
-        let line = format!("softvt {command}{} {sample}{required}{files}", script.display());
-        let out = root.join("out").display().to_string();
-        let words: Vec<String> = line.split_whitespace().map(|word| word.replace("OUT", &out)).collect();
-        parse(&words)?.map_or(Ok(()), |command| command.run())
     }
 
     #[test]
     fn a_flag_without_effect_is_refused_for_every_kind_of_plan() {
         let root = tempfile::tempdir().expect("a folder");
+        let (script, out) = (root.path().join("plan.lua"), root.path().join("out").display().to_string());
         for (kind, plan) in PLANS {
-            let script = root.path().join("plan.lua");
-            fs::write(&script, format!("{SUITE}{plan}\n")).expect("written");
-            for (command, flags) in commands_with_plans() {
-                for flag in flags {
-                    let sample = SAMPLES.iter().find(|(known, _)| *known == flag);
-                    let (_, sample) = sample.unwrap_or_else(|| panic!("give a sample of the flag {flag}"));
-                    if acts_on(&command, &flag).is_some_and(|kinds| kinds.contains(&kind)) {
-                        continue;
-                    }
-                    let error = run(&command, &script, sample, root.path()).expect_err(&flag);
-                    let message = &error.message;
-                    assert_eq!(error.exit, Exit::Input, "{command} {sample}: {message}");
+            fs::write(&script, plan).expect("written");
+            for command in COMMANDS {
+                let known = flags(command);
+                let acts = |flag: &str| acts_on(flag).is_some_and(|kinds| kinds.contains(&kind));
+                for (_, sample) in
+                    SAMPLES.iter().filter(|(flag, _)| known.iter().any(|id| id == flag) && !acts(flag))
+                {
+                    let name = command.trim_start_matches(RUN);
+                    let line = format!("softvt {name} {} {sample}", script.display());
+                    let words: Vec<String> =
+                        line.split_whitespace().map(|word| word.replace("OUT", &out)).collect();
+                    let refused =
+                        parse(&words).and_then(|command| command.map_or(Ok(()), |command| command.run()));
+                    let error = refused.expect_err(sample);
                     let long = sample.split_whitespace().next().unwrap_or_default();
-                    let is_clear = match (acts_on(&command, &flag), accepts(&command, kind)) {
-                        (Some([]), _) => message.starts_with(&format!("{long}: ")),
-                        (_, true) => {
-                            message.contains(&format!("{long}: ")) && message.contains(&kind.to_string())
-                        }
-                        (_, false) => {
-                            message.contains(&format!("softvt {command} needs a "))
-                                || message.contains(&format!("{long}: applies to "))
-                        }
-                    };
-                    assert!(is_clear, "{command} {sample}: {message}");
+                    assert_eq!(error.exit, Exit::Input, "{line}: {}", error.message);
+                    let (flag, kind) = (format!("{long}: applies to "), format!("this file is {kind}"));
+                    assert!(
+                        error.message.contains(&flag) && error.message.contains(&kind),
+                        "{}",
+                        error.message
+                    );
                 }
             }
         }

@@ -1,8 +1,8 @@
 //! [`Demonstration`]: a rollout as training data, without its images.
 
 use softvt_benchmark::CONTROL_DT;
-use softvt_evaluation::record::EpisodeRecord;
 use softvt_policy::{Action, profile::GripCode};
+use softvt_records::record::EpisodeRecord;
 use softvt_robot::{
     GripTarget,
     gripper::{self, MAX_WIDTH},

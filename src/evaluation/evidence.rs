@@ -3,7 +3,6 @@
 //! Forces are means over the step.
 
 use softvt_geometry::{Pose, Vec3};
-use softvt_physics::fem::CrushedShares;
 
 use super::deformation::Deformation;
 
@@ -23,6 +22,15 @@ pub struct GripperEvidence {
     pub width_m: f64,
     /// Commanded distance between the apexes of the two gels, m.
     pub commanded_width_m: f64,
+}
+
+/// Shares of the volume (0..=1) of a soft body beyond two strains of its material; `None` where it does not state them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CrushedShares {
+    /// Share that is beyond the collapse strain now.
+    pub collapsed: Option<f64>,
+    /// Share that has ever been beyond the damage strain.
+    pub damaged: Option<f64>,
 }
 
 /// State of one movable body.

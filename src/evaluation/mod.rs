@@ -2,8 +2,7 @@
 //!
 //! Everything here is a small pure function or state machine on plain numbers; the simulator is one source of
 //! them, a motion-capture system could be another. [`judge::Judge`] takes one [`evidence::Evidence`] per
-//! physics step and returns a [`record::Verdict`] at the end. Verdicts go into [`record::EpisodeRecord`]s, and
-//! those into a [`summary::SuiteSummary`].
+//! physics step and returns a [`verdict::Verdict`] at the end.
 //!
 //! Quantities, as SoftVTBench defines them:
 //!
@@ -27,7 +26,7 @@
 //! | Where does the limit τ of an asset come from? | [`calibration`], [`thresholds`], [`envelope_plot`] |
 //! | What limit and window has another instance of an asset? | [`instance`] |
 //! | Every threshold of the judge | [`criteria`] |
-//! | Rates, intervals, paired tests | [`statistics`], [`paired_stats`], [`summary`] |
+//! | Rates and intervals | [`statistics`] |
 //!
 //! The metrics are those of SoftVTBench; `docs/decisions.md` lists the choices made where the paper is silent.
 #![warn(missing_docs, unreachable_pub)]
@@ -42,12 +41,9 @@ pub mod goal;
 pub mod grip;
 pub mod instance;
 pub mod judge;
-pub mod paired_stats;
-pub mod record;
-pub mod record_check;
 pub mod safety;
 pub mod slip;
 pub mod stage;
 pub mod statistics;
-pub mod summary;
 pub mod thresholds;
+pub mod verdict;

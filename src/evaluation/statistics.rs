@@ -7,7 +7,7 @@ use rand_chacha::{
 use serde::{Deserialize, Serialize};
 
 /// Quantile of the normal distribution for a two-sided 95 % interval.
-pub(super) const Z95: f64 = 1.959_963_984_540_054;
+pub const Z95: f64 = 1.959_963_984_540_054;
 
 /// Share of episodes with its uncertainty, in percent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

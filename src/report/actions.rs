@@ -12,8 +12,8 @@ use softvt_common::{
     files::{FileError, replace},
     npy::{NpyArray, NpyError},
 };
-use softvt_evaluation::record::EpisodeRecord;
 use softvt_policy::{Action, GripTarget};
+use softvt_records::record::EpisodeRecord;
 use softvt_rollout::checksum;
 
 /// Numbers per action, without and with a grip force.

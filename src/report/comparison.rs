@@ -13,13 +13,13 @@ use super::{
     terminal::{TaskName, task_names},
 };
 use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
-use softvt_evaluation::{
+use softvt_evaluation::stage::Stage;
+use softvt_records::{
     paired_stats::{
         EpisodeKey, EpisodePair, PairedComparison, PairedDifference, PairedStages, group_by_task,
         pair_episodes,
     },
     record::{EpisodeHeader, EpisodeRecord},
-    stage::Stage,
     summary::method_label,
 };
 
@@ -459,7 +459,7 @@ mod tests {
 
     use super::*;
     use crate::{run_summary::tests::stored, sample_record};
-    use softvt_evaluation::record::{Outcome, WrongContact};
+    use softvt_evaluation::verdict::{Outcome, WrongContact};
 
     /// A run of three episodes with these stages of failure.
     fn run(dir: &str, d_mean: f64, stages: [Option<Stage>; 3]) -> StoredRun {

@@ -8,10 +8,10 @@ use super::{
     stored_run::RunChange,
     tables::{ResultTable, strings},
 };
-use softvt_evaluation::{
+use softvt_evaluation::statistics::Rate;
+use softvt_records::{
     paired_stats::{EpisodePair, PairedComparison, PairedDifference, pair_episodes},
     record::EpisodeRecord,
-    statistics::Rate,
     summary::Scores,
 };
 

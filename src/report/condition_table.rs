@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 use super::comparison;
 use softvt_benchmark::ShiftValue;
 use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
-use softvt_evaluation::{
+use softvt_evaluation::statistics::{Distribution, Rate};
+use softvt_records::{
     paired_stats::{PairedComparison, d_over_tau, pair_episodes},
     record::EpisodeRecord,
-    statistics::{Distribution, Rate},
     summary::Scores,
 };
 

@@ -18,6 +18,6 @@ pub mod video;
 
 /// A successful, safe soft episode.
 #[cfg(test)]
-pub(crate) fn sample_record() -> softvt_evaluation::record::EpisodeRecord {
+pub(crate) fn sample_record() -> softvt_records::record::EpisodeRecord {
     serde_json::from_str(include_str!("../../tests/data/episode_record.json")).expect("a valid record")
 }

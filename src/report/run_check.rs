@@ -5,7 +5,8 @@
 use serde_json::Value;
 
 use softvt_benchmark::CONTROL_DT;
-use softvt_evaluation::{criteria::SuccessCriteria, record::EpisodeRecord};
+use softvt_evaluation::criteria::SuccessCriteria;
+use softvt_records::record::EpisodeRecord;
 
 /// Differences that rounding explains, relative to 1.
 const ROUNDING: f64 = 1e-6;

@@ -12,7 +12,7 @@ use std::{
 
 use super::softvtbench_files;
 use softvt_common::files::{self, FileError};
-use softvt_evaluation::{record::EpisodeRecord, record_check::RecordError};
+use softvt_records::{record::EpisodeRecord, record_check::RecordError};
 
 /// One line per episode.
 pub const EPISODES: &str = "episodes.jsonl";

@@ -4,11 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::stored_run::StoredRun;
 use softvt_common::text::decimal;
-use softvt_evaluation::{
-    drop::DropReason,
-    record::{EpisodeRecord, Outcome},
-    summary::SuiteSummary,
-};
+use softvt_evaluation::{drop::DropReason, verdict::Outcome};
+use softvt_records::{record::EpisodeRecord, summary::SuiteSummary};
 
 /// A run with its results.
 #[derive(Clone, Debug)]

@@ -16,11 +16,8 @@ use super::{
 };
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::files::{self, FileError};
-use softvt_evaluation::{
-    record::EpisodeRecord,
-    summary::SuiteSummary,
-    thresholds::{ThresholdError, ThresholdFile},
-};
+use softvt_evaluation::thresholds::{ThresholdError, ThresholdFile};
+use softvt_records::{record::EpisodeRecord, summary::SuiteSummary};
 
 /// Error of merging shards.
 #[derive(Debug, thiserror::Error)]

@@ -15,7 +15,7 @@ use super::{
 };
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::files::{self, FileError};
-use softvt_evaluation::record::EpisodeRecord;
+use softvt_records::record::EpisodeRecord;
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 

@@ -4,9 +4,9 @@ use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
 use softvt_evaluation::{
     safety::KAPPAS,
     statistics::{Distribution, Rate},
-    summary::{
-        AbortedEpisode, CommandCounts, EpisodeDeformation, InvalidEpisode, Scores, SuiteSummary, TauRange,
-    },
+};
+use softvt_records::summary::{
+    AbortedEpisode, CommandCounts, EpisodeDeformation, InvalidEpisode, Scores, SuiteSummary, TauRange,
 };
 
 /// Columns: index and prompt of the task, three rates, four figures of D, τ and the number of invalid episodes.
@@ -284,7 +284,8 @@ fn distinct_parts<'a>(prompts: &[&'a str]) -> Vec<&'a str> {
 mod tests {
     use super::*;
     use crate::sample_record;
-    use softvt_evaluation::record::{EpisodeRecord, FarCommand, Outcome};
+    use softvt_evaluation::verdict::Outcome;
+    use softvt_records::record::{EpisodeRecord, FarCommand};
 
     fn episode(task: usize, prompt: &str, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
         let mut record = sample_record();

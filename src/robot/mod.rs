@@ -13,6 +13,7 @@ pub mod pads;
 pub mod panda;
 pub mod rotation;
 pub mod spec;
+pub mod tactile;
 
 pub use clearance::{Clearance, Obstacle, clearance};
 pub use gripper::{GripTarget, GripperSetpoint};

@@ -32,8 +32,8 @@ use softvt_common::text::format_number;
 use softvt_evaluation::{
     deformation::{Deformation, ReferenceShape},
     judge::{Judge, JudgeConfig},
-    record::{EpisodeHeader, EpisodeRecord, FarCommand, Outcome, RolloutStats, Verdict},
     safety::DeformationLimit,
+    verdict::{Outcome, Verdict},
 };
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::{
@@ -41,6 +41,7 @@ use softvt_physics::{
     world::{StepFailure, WorldSnapshot},
 };
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
+use softvt_records::record::{EpisodeHeader, EpisodeRecord, FarCommand, RolloutStats};
 use softvt_robot::{
     Side,
     ik::{LINEARISATION_RANGE, PoseDifference},

@@ -8,7 +8,9 @@ use super::{
 };
 use softvt_evaluation::{
     deformation::{Deformation, ReferenceShape},
-    evidence::{BodyEvidence, Evidence, GoalEvidence, GripEvidence, GripperEvidence, PadEvidence},
+    evidence::{
+        BodyEvidence, CrushedShares, Evidence, GoalEvidence, GripEvidence, GripperEvidence, PadEvidence,
+    },
     goal::GoalRegion,
     judge::OtherBody,
     safety::DeformationLimit,
@@ -16,7 +18,7 @@ use softvt_evaluation::{
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::{
     BodyId, ContactPartner,
-    fem::{CrushedShares, StrainLimits, StrainMeter},
+    fem::{StrainLimits, StrainMeter},
     world::ContactSummary,
 };
 use softvt_robot::gripper::target_width;
@@ -103,7 +105,10 @@ impl EvidenceCollector {
         self.bodies = bodies;
         let target = &sim.objects[self.target];
         let crushed = match (&mut self.crushed, target.body) {
-            (Some(meter), BodyId::Soft(index)) => meter.update(&sim.world.soft(index).state),
+            (Some(meter), BodyId::Soft(index)) => {
+                meter.update(&sim.world.soft(index).state);
+                CrushedShares { collapsed: meter.collapsed(), damaged: meter.damaged() }
+            }
             _ => CrushedShares::default(),
         };
         let goal = &sim.objects[self.goal];

@@ -13,7 +13,7 @@
 //!
 //! use softvt_benchmark::{Goal, GoalKind, Task, settings::Settings};
 //! use softvt_common::episode_id::{EpisodeId, Split};
-//! use softvt_evaluation::record::Outcome;
+//! use softvt_evaluation::verdict::Outcome;
 //! use softvt_geometry::{Aabb, Pose, Vec3, shape::Shape};
 //! use softvt_physics::contact::Friction;
 //! use softvt_policy::{TaskBrief, builtin::NoopPolicy};

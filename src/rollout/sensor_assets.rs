@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use super::shared_cache::SharedCache;
 use softvt_geometry::voxel::VoxelMesh;
+use softvt_robot::tactile::TactileSpec;
 use softvt_scene::{Asset, Camera};
 use softvt_sensing::{
     camera::{CameraError, RenderMesh},
     panda::RobotMeshes,
-    tactile::{ContactError, TactileSensor, TactileSensorError, TactileSkin, TactileSpec},
+    tactile::{ContactError, TactileSensor, TactileSensorError, TactileSkin},
 };
 
 /// Data of a sensor cannot be computed.

@@ -7,8 +7,9 @@
 use softvt_benchmark::seed::{
     EpisodeSeed, RandomStream, keyed_rng, rough_normal, standard_normal, uniform, uniform_integer,
 };
+use softvt_robot::tactile::WearSpec;
 use softvt_robot::{Side, WidthSensorSpec, gripper::MAX_WIDTH};
-use softvt_sensing::tactile::{TactileReading, WearSpec};
+use softvt_sensing::tactile::TactileReading;
 
 /// Seed of the sensor errors of an episode.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -78,9 +79,8 @@ impl SensorSeed {
 
 #[cfg(test)]
 mod tests {
-    use softvt_sensing::tactile::{
-        GelScratch, Markers, PadWrench, TactileContact, TactileSensor, TactileSpec,
-    };
+    use softvt_robot::tactile::TactileSpec;
+    use softvt_sensing::tactile::{GelScratch, Markers, PadWrench, TactileContact, TactileSensor};
 
     use super::*;
 

@@ -16,6 +16,7 @@ use softvt_physics::{
     world::{ContactPatch, WorldSnapshot},
 };
 use softvt_policy::{PadForce, SensorStreams, TactileFrame};
+use softvt_robot::tactile::{OpticsModel, TactileSpec};
 use softvt_robot::{
     RobotSpec, Side, gripper,
     ik::DiffIk,
@@ -29,8 +30,8 @@ use softvt_sensing::{
         check_light,
     },
     tactile::{
-        GelScratch, OpticsModel, PadWrench, SkinMesh, SubstrateCompliance, TactileContact, TactileReading,
-        TactileSkin, TactileSpec, Taxels, patch_friction,
+        GelScratch, PadWrench, SkinMesh, SubstrateCompliance, TactileContact, TactileReading, TactileSkin,
+        Taxels, patch_friction,
     },
 };
 

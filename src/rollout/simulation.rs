@@ -251,12 +251,7 @@ impl Simulation {
 
     /// True if the body of an object sleeps.
     pub fn is_asleep(&self, object: &ObjectInstance) -> bool {
-        match object.body {
-            BodyId::Soft(index) => self.world.soft(index).is_asleep(),
-            BodyId::Rigid(index) => self.world.rigid(index).is_asleep(),
-            BodyId::Link(link) => self.world.articulation(link.articulation).is_asleep(),
-            BodyId::World | BodyId::Kinematic(_) => false,
-        }
+        self.world.is_asleep(object.body)
     }
 
     /// Contacts of an object with the left and right pad.
@@ -310,12 +305,7 @@ impl Simulation {
 
     /// Weight of an object, N; 0 for fixed objects and parts.
     pub fn weight(&self, object: &ObjectInstance) -> f64 {
-        let mass = match object.body {
-            BodyId::Soft(index) => self.world.soft(index).state.model.total_mass(),
-            BodyId::Rigid(index) => self.world.rigid(index).state.mass,
-            BodyId::Link(_) | BodyId::Kinematic(_) | BodyId::World => 0.0,
-        };
-        mass * self.scene.gravity.norm()
+        self.world.mass(object.body).map_or(0.0, |mass| mass * self.scene.gravity.norm())
     }
 
     /// Parts of the object of an index.
@@ -335,9 +325,8 @@ impl Simulation {
     /// Pose of the object frame in the world. For a soft body: its mean rotation and translation.
     pub fn pose(&self, object: &ObjectInstance) -> Pose {
         match object.body {
-            BodyId::Soft(index) => self.world.soft(index).state.mean_pose(),
-            BodyId::Rigid(index) => self.world.rigid(index).state.object_w(),
-            BodyId::Link(link) => self.world.link_pose(link) * object.joint_frame_o().inverse(),
+            BodyId::Soft(_) | BodyId::Rigid(_) => self.world.pose(object.body),
+            BodyId::Link(_) => self.world.pose(object.body) * object.joint_frame_o().inverse(),
             BodyId::World | BodyId::Kinematic(_) => object.start_w,
         }
     }

@@ -14,7 +14,7 @@ use crate::{
 };
 use softvt_benchmark::{Condition, ObjectType, REFERENCE, Suite, Task};
 use softvt_common::{files::replace, text};
-use softvt_evaluation::summary::method_label;
+use softvt_records::summary::method_label;
 use softvt_report::{
     condition_table::{ConditionOutcome, ConditionRow, ConditionTable},
     run_folder::RunFolder,

@@ -15,6 +15,7 @@ use crate::{
     policy::PolicyConfig,
 };
 use softvt_benchmark::{ShiftValue, Suite, seed::SecretSeed};
+use softvt_common::{cancel, parallel};
 use softvt_script::LoadedScript;
 
 /// Detail of the trace of an episode.
@@ -195,6 +196,27 @@ impl RunConfig {
     /// The number of threads to use.
     pub fn thread_count(&self) -> usize {
         thread_count(self.threads)
+    }
+
+    /// Runs the jobs `0..count` on the threads of the configuration until one fails or a stop is requested. `finish` takes
+    /// each result and returns the line that tells the observer.
+    ///
+    /// # Errors
+    /// A job or `finish` fails.
+    pub(crate) fn run_jobs<T: Send>(
+        &self,
+        name: &str,
+        count: usize,
+        job: impl Fn(usize) -> Result<T, RunError> + Sync,
+        mut finish: impl FnMut(usize, T) -> Result<String, RunError>,
+    ) -> Result<(), RunError> {
+        self.observer.begin(count, name);
+        let outcome = parallel::run(count, self.thread_count(), cancel::requested, job, |number, result| {
+            self.observer.advance(&finish(number, result)?);
+            Ok(())
+        });
+        self.observer.end();
+        outcome
     }
 
     /// Episodes per task of a suite.

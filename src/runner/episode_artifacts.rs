@@ -9,7 +9,7 @@ use crate::error::RunError;
 use softvt_common::cancel;
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::files;
-use softvt_evaluation::record::EpisodeRecord;
+use softvt_records::record::EpisodeRecord;
 use softvt_report::{
     actions,
     softvtbench_files::{self, DebugFrame, DebugShape},

@@ -16,10 +16,8 @@ use softvt_benchmark::Task;
 use softvt_common::cancel;
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{files, parallel, text::counted};
-use softvt_evaluation::{
-    record::{EpisodeRecord, Outcome},
-    summary::SuiteSummary,
-};
+use softvt_evaluation::verdict::Outcome;
+use softvt_records::{record::EpisodeRecord, summary::SuiteSummary};
 use softvt_report::{
     actions,
     run_check::{Contradiction, first_contradiction},
@@ -114,23 +112,12 @@ impl<'a> RunLog<'a> {
         write: impl Fn(&FinishedEpisode) -> Result<(), RunError>,
         mut line: impl FnMut(&EpisodeRecord) -> String,
     ) -> Result<(), RunError> {
-        let config = self.run.config;
-        let observer = &config.observer;
-        observer.begin(jobs.len(), name);
-        let outcome = parallel::run(
-            jobs.len(),
-            config.thread_count(),
-            cancel::requested,
-            |position| simulate(jobs.job(position)),
-            |_, SimulatedEpisode { finished, rendered }| {
-                let record = self.add(finished, &write)?;
-                observer.advance(&line(record));
-                report_unrendered(config, record.header.id.index(), rendered);
-                Ok(())
-            },
-        );
-        observer.end();
-        outcome
+        let (config, simulate) = (self.run.config, |position| simulate(jobs.job(position)));
+        config.run_jobs(name, jobs.len(), simulate, |_, SimulatedEpisode { finished, rendered }| {
+            let record = self.add(finished, &write)?;
+            report_unrendered(config, record.header.id.index(), rendered);
+            Ok(line(record))
+        })
     }
 
     /// Writes the files of a finished episode, and then its line, so that every listed episode is complete.
@@ -272,21 +259,13 @@ pub(crate) fn run_episodes(
     on_episode: &mut dyn FnMut(&EpisodeRecord),
 ) -> Result<SuiteResult, RunError> {
     let (config, mut records) = (run.config, Vec::new());
-    config.observer.begin(run.jobs.len(), &run.name);
-    let outcome = parallel::run(
-        run.jobs.len(),
-        config.thread_count(),
-        cancel::requested,
-        |position| run.run_episode(run.jobs.job(position), false, &run.controllers),
-        |_, finished| {
-            on_episode(&finished.record);
-            config.observer.advance(&episode_line(&finished.record));
-            records.push(finished.record);
-            Ok(())
-        },
-    );
-    config.observer.end();
-    outcome?;
+    let simulate = |position| run.run_episode(run.jobs.job(position), false, &run.controllers);
+    config.run_jobs(&run.name, run.jobs.len(), simulate, |_, finished: FinishedEpisode| {
+        on_episode(&finished.record);
+        let line = episode_line(&finished.record);
+        records.push(finished.record);
+        Ok(line)
+    })?;
     if cancel::requested() {
         return Err(RunError::interrupted("interrupted"));
     }

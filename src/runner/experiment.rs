@@ -78,28 +78,21 @@ pub fn run<E: From<RunError>>(
         None => Experiment::open_with(loaded, &input).map_err(RunError::from),
     };
     let mut rows: Vec<Vec<ExperimentRow>> = vec![Vec::new(); points];
-    config.observer.begin(points, name);
-    let outcome = parallel::run(
-        points,
-        config.thread_count(),
-        cancel::requested,
-        |point| {
-            let experiment = take()?;
-            let rows = experiment.run(point)?;
-            // A script can catch the error of an interrupt and return a row that is not valid.
-            if cancel::requested() {
-                return Err(RunError::interrupted("interrupted"));
-            }
-            parallel::lock(&idle).push(experiment);
-            Ok(rows)
-        },
-        |point, found| {
-            config.observer.advance(&format!("point {point}: {}", counted(found.len(), "row")));
-            rows[point] = found;
-            Ok(())
-        },
-    );
-    config.observer.end();
+    let run_point = |point| {
+        let experiment = take()?;
+        let rows = experiment.run(point)?;
+        // A script can catch the error of an interrupt and return a row that is not valid.
+        if cancel::requested() {
+            return Err(RunError::interrupted("interrupted"));
+        }
+        parallel::lock(&idle).push(experiment);
+        Ok(rows)
+    };
+    let outcome = config.run_jobs(name, points, run_point, |point, found: Vec<ExperimentRow>| {
+        let line = format!("point {point}: {}", counted(found.len(), "row"));
+        rows[point] = found;
+        Ok(line)
+    });
     let done = rows.iter().filter(|rows| !rows.is_empty()).count();
     let rows: Vec<ExperimentRow> = rows.into_iter().flatten().collect();
     if cancel::requested() {

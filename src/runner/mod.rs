@@ -8,6 +8,7 @@ pub mod conditions;
 mod config;
 mod episode_artifacts;
 mod episode_list;
+pub mod episode_selector;
 mod error;
 mod evaluate;
 pub mod experiment;
@@ -22,6 +23,7 @@ mod run_manifest;
 mod runner;
 pub mod selection;
 mod served_runs;
+mod serving;
 pub mod stored_folder;
 mod suite_run;
 
@@ -37,4 +39,5 @@ pub use policy::{
 };
 pub use runner::Runner;
 pub use served_runs::ServedRuns;
+pub use serving::{check_served, first_observation, prepare_served, server_config};
 pub use suite_run::SuiteRun;

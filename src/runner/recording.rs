@@ -41,8 +41,9 @@ use softvt_dataset::{
     manifest::{self, ManifestEntry},
     merge_parts,
 };
-use softvt_evaluation::record::{EpisodeRecord, Origin, Outcome};
+use softvt_evaluation::verdict::Outcome;
 use softvt_policy::{builtin::RecordedPolicy, profile::GripCode};
+use softvt_records::record::{EpisodeRecord, Origin};
 use softvt_report::{actions, run_folder::RunFolder};
 use softvt_rollout::{ChunkedPolicy, EpisodeError, FinishedEpisode, SettleError};
 use softvt_scene::InitialState;

@@ -28,8 +28,9 @@ use softvt_dataset::{
     layout::{DATASET, RECORDING},
     manifest,
 };
-use softvt_evaluation::record::{EpisodeRecord, Outcome};
+use softvt_evaluation::verdict::Outcome;
 use softvt_policy::{Action, builtin::RecordedPolicy};
+use softvt_records::record::EpisodeRecord;
 use softvt_rollout::ChunkedPolicy;
 use softvt_script::LoadedScript;
 

@@ -15,7 +15,7 @@ use crate::{
     suite_run::SuiteRun,
 };
 use softvt_benchmark::Plan;
-use softvt_evaluation::record::EpisodeRecord;
+use softvt_records::record::EpisodeRecord;
 use softvt_script::LoadedScript;
 
 /// Runs the suites of a loaded script. Without an output folder, nothing is written.

@@ -13,7 +13,7 @@ use crate::{
 use softvt_common::cancel;
 use softvt_common::episode_id::{EpisodeId, EpisodeIndex};
 use softvt_common::{parallel::lock, text::counted};
-use softvt_evaluation::summary::SuiteSummary;
+use softvt_records::summary::SuiteSummary;
 use softvt_report::run_folder::RunFolder;
 use softvt_rollout::FinishedEpisode;
 use softvt_serve::{EpisodeRecorder, RequestError};

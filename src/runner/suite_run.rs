@@ -16,8 +16,8 @@ use softvt_common::cancel;
 use softvt_common::episode_id::{EpisodeId, EpisodeIndex, Split};
 use softvt_common::{parallel, text::unknown_name};
 use softvt_dataset::card::Imported;
-use softvt_evaluation::record::Origin;
 use softvt_policy::{PolicyError, SensorStreams, TaskBrief, remote::PolicyConnections};
+use softvt_records::record::Origin;
 use softvt_rollout::{
     AssetCache, BuildError, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SensorAssets, SensorSuite,
     Simulation, check_goal, check_sensors, cost_doubt,

@@ -1,6 +1,6 @@
 //! Assets: kinds of objects with shape, body, friction and appearance; articulated objects and their joints.
 
-use std::{collections::BTreeMap, fmt, sync::Arc};
+use std::{collections::BTreeMap, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 
@@ -30,7 +30,7 @@ pub enum Body {
 }
 
 /// Isotropic linear-elastic material of a soft body, and its discretisation.
-#[derive(Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SoftMaterial {
     /// Young's modulus, Pa; the shipped pastries have 2.5e4 to 2.2e5.
     pub youngs_pa: f64,
@@ -48,24 +48,6 @@ pub struct SoftMaterial {
     /// Compressive strain, in (0, 1], that leaves a visible crack or set.
     #[serde(default)]
     pub damage_strain: Option<f64>,
-}
-
-/// Fingerprints of assets hash this text. Strains that are not stated do not appear, so that a material without them keeps
-/// its calibration.
-impl fmt::Debug for SoftMaterial {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut text = f.debug_struct("SoftMaterial");
-        text.field("youngs_pa", &self.youngs_pa)
-            .field("poisson", &self.poisson)
-            .field("density", &self.density)
-            .field("resolution", &self.resolution)
-            .field("grasp_spacing", &self.grasp_spacing);
-        let strains = [("collapse_strain", self.collapse_strain), ("damage_strain", self.damage_strain)];
-        for (name, strain) in strains.iter().filter(|(_, strain)| strain.is_some()) {
-            text.field(name, strain);
-        }
-        text.finish()
-    }
 }
 
 impl SoftMaterial {

@@ -1,45 +1,100 @@
 //! Fingerprints of assets: short hashes that are equal only for mechanically equal assets.
 
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-use super::asset::{Asset, Body, Part};
+use super::asset::{Asset, Body, Joint, Part, SoftMaterial};
+use softvt_geometry::shape::Shape;
+use softvt_physics::contact::Friction;
+
+/// What enters the fingerprint of an asset. Calibration files store the hashes: the names of these fields, and of those of
+/// the types below them, must not change.
+#[derive(Serialize)]
+struct Mechanics<'a> {
+    shape: Shape,
+    body: BodyMechanics<'a>,
+    friction: Friction,
+}
+
+#[derive(Serialize)]
+enum BodyMechanics<'a> {
+    Soft(&'a SoftMaterial),
+    Rigid { density: f64 },
+    Articulated(Vec<PartMechanics<'a>>),
+    Static,
+    Scenery,
+}
+
+#[derive(Serialize)]
+struct PartMechanics<'a> {
+    shape: Shape,
+    density: f64,
+    parent: Option<usize>,
+    joint: &'a Joint,
+}
+
+impl<'a> PartMechanics<'a> {
+    fn new(part: &'a Part) -> Self {
+        let Part { asset, density, parent, joint, .. } = part;
+        Self { shape: asset.shape.unpainted(), density: *density, parent: *parent, joint }
+    }
+}
 
 impl Asset {
     /// Hash of everything that a calibration depends on: shape, body with its material and resolution, and friction.
     ///
-    /// 16 hexadecimal digits of a SHA-256. Appearance, hints and name do not enter. Numbers enter with seven
+    /// 16 hexadecimal digits of the SHA-256 of a canonical JSON text. Appearance, hints and name do not enter. Numbers have seven
     /// significant digits, since trigonometric functions differ between platforms in the last bits.
     pub fn fingerprint(&self) -> String {
         let body = match &self.body {
+            Body::Soft(material) => BodyMechanics::Soft(material),
+            Body::Rigid { density } => BodyMechanics::Rigid { density: *density },
             Body::Articulated(parts) => {
-                let bare = |part: &Part| {
-                    (part.asset.shape.unpainted(), part.density, part.parent, part.joint.clone())
-                };
-                format!("{:?}", parts.iter().map(bare).collect::<Vec<_>>())
+                BodyMechanics::Articulated(parts.iter().map(PartMechanics::new).collect())
             }
-            body => format!("{body:?}"),
+            Body::Static => BodyMechanics::Static,
+            Body::Scenery => BodyMechanics::Scenery,
         };
-        // Calibration files store these hashes: the `Debug` text of the types below must not change.
-        let text = format!("({:?}, {body}, {:?})", self.shape.unpainted(), self.friction);
-        let digest = Sha256::digest(rounded(&text).as_bytes());
-        digest.iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+        let mechanics = Mechanics { shape: self.shape.unpainted(), body, friction: self.friction };
+        let mut text = String::new();
+        write_canonical(&serde_json::to_value(mechanics).unwrap_or_default(), &mut text);
+        Sha256::digest(text).iter().take(8).map(|byte| format!("{byte:02x}")).collect()
     }
 }
 
-/// Rewrites all numbers with a fraction or an exponent in `text` with seven significant digits.
-fn rounded(text: &str) -> String {
-    let is_separator = |c: char| !(c.is_alphanumeric() || "._-".contains(c));
-    let round = |piece: &str| {
-        let token = piece.trim_end_matches(is_separator);
-        match token.parse::<f64>() {
+/// Writes JSON with sorted keys, without spaces, and with seven significant digits of numbers that are not integers.
+/// Numbers that are not finite are null.
+fn write_canonical(value: &Value, text: &mut String) {
+    match value {
+        Value::Number(number) if number.is_f64() => {
+            let x = number.as_f64().unwrap_or_default();
             // Adding zero turns -0.0 into 0.0.
-            Ok(x) if token.contains(['.', 'e']) => {
-                format!("{:.6e}{}", if x.abs() < 1e-12 { 0.0 } else { x + 0.0 }, &piece[token.len()..])
-            }
-            _ => piece.to_owned(),
+            *text += &format!("{:.6e}", if x.abs() < 1e-12 { 0.0 } else { x + 0.0 });
         }
-    };
-    text.split_inclusive(is_separator).map(round).collect()
+        Value::Array(values) => {
+            text.push('[');
+            for (index, value) in values.iter().enumerate() {
+                text.push_str(if index > 0 { "," } else { "" });
+                write_canonical(value, text);
+            }
+            text.push(']');
+        }
+        Value::Object(fields) => {
+            let sorted: BTreeMap<_, _> = fields.iter().collect();
+            text.push('{');
+            for (index, (key, value)) in sorted.into_iter().enumerate() {
+                text.push_str(if index > 0 { "," } else { "" });
+                *text += &Value::from(key.as_str()).to_string();
+                text.push(':');
+                write_canonical(value, text);
+            }
+            text.push('}');
+        }
+        Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => *text += &value.to_string(),
+    }
 }
 
 #[cfg(test)]
@@ -121,21 +176,11 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_rounded_while_words_and_integers_are_kept() {
-        assert_eq!(
-            rounded("a1.5 { x: -0.0, n: 12, y: 1.25e-7 }"),
-            "a1.5 { x: 0.000000e0, n: 12, y: 1.250000e-7 }"
-        );
-    }
-
-    #[test]
-    fn a_strain_that_is_not_stated_leaves_no_trace_in_the_hashed_text() {
-        let Body::Soft(material) = bun().body else { unreachable!() };
-        let plain = SoftMaterial { collapse_strain: None, ..material.clone() };
-        assert_eq!(
-            format!("{plain:?}"),
-            "SoftMaterial { youngs_pa: 20000.0, poisson: 0.4, density: 300.0, resolution: 6, grasp_spacing: 0.00075 }"
-        );
-        assert!(format!("{material:?}").ends_with(", collapse_strain: Some(0.1) }"));
+    fn keys_are_sorted_and_numbers_rounded_while_words_and_integers_are_kept() {
+        let value =
+            serde_json::json!({ "y": [1.25e-7, null, f64::INFINITY], "a\"": "1.5", "n": 12, "x": -0.0 });
+        let mut text = String::new();
+        write_canonical(&value, &mut text);
+        assert_eq!(text, r#"{"a\"":"1.5","n":12,"x":0.000000e0,"y":[1.250000e-7,null,null]}"#);
     }
 }

@@ -2,14 +2,19 @@
 
 use std::fmt::Write;
 
+use serde_json::Value;
+
 use super::{
-    api::{self, shapes::SHAPES, visuals::MASKS},
+    api::{self, shapes::SHAPES, tasks::SETTINGS_CLASS, visuals::MASKS},
     plan::options,
     schema::{
         Class, Field, FieldDefault, Function, Record, Signature, Type,
         object::{Access, LuaField, Param},
     },
 };
+
+use softvt_benchmark::settings::Settings;
+use softvt_common::settings::Setting;
 
 /// Name of the stub file that `softvt init` writes.
 pub const STUB_FILE: &str = "library/softvt.d.lua";
@@ -122,6 +127,14 @@ pub fn stubs() -> String {
         }
         out.push('\n');
     }
+    for SettingGroup { class, fields } in setting_groups(&Settings::list()) {
+        let about = "Settings; those that are left out keep their values. docs/settings.md lists all.";
+        let _ = writeln!(out, "---{about}\n---@class {class}");
+        for SettingField { name, lua_type, details } in fields {
+            let _ = writeln!(out, "---@field {name}? {lua_type}{details}");
+        }
+        out.push('\n');
+    }
     for class in api::CLASSES {
         stub_class(&mut out, class);
     }
@@ -141,6 +154,56 @@ pub fn stubs() -> String {
     out.truncate(out.trim_end().len());
     out.push('\n');
     out
+}
+
+/// A group of settings: a class of the stubs.
+struct SettingGroup {
+    class: String,
+    fields: Vec<SettingField>,
+}
+
+struct SettingField {
+    name: String,
+    lua_type: String,
+    details: String,
+}
+
+/// The groups of settings, each before those inside of it.
+fn setting_groups(settings: &[Setting]) -> Vec<SettingGroup> {
+    let mut groups: Vec<SettingGroup> = Vec::new();
+    for setting in settings {
+        let (mut class, mut rest) = (SETTINGS_CLASS.to_owned(), setting.path.as_str());
+        loop {
+            let (name, inner) =
+                rest.split_once('.').map_or((rest, None), |(name, inner)| (name, Some(inner)));
+            let index = groups.iter().position(|group| group.class == class).unwrap_or_else(|| {
+                groups.push(SettingGroup { class: class.clone(), fields: Vec::new() });
+                groups.len() - 1
+            });
+            let fields = &mut groups[index].fields;
+            let own = format!("{class}.{name}");
+            let (lua_type, details) = match (inner, &setting.default) {
+                (Some(_), _) => (own.clone(), String::new()),
+                (None, Value::Bool(_)) => ("boolean".to_owned(), setting_details(setting)),
+                (None, Value::String(_)) => ("string|table".to_owned(), setting_details(setting)),
+                (None, _) => ("number".to_owned(), setting_details(setting)),
+            };
+            match fields.iter_mut().find(|field| field.name == name) {
+                None => fields.push(SettingField { name: name.to_owned(), lua_type, details }),
+                // A model is selected by its name, or by a table with its constants.
+                Some(model) if model.lua_type == "string|table" => model.lua_type = format!("string|{own}"),
+                Some(_) => {}
+            }
+            let Some(inner) = inner else { break };
+            (class, rest) = (own, inner);
+        }
+    }
+    groups
+}
+
+fn setting_details(setting: &Setting) -> String {
+    let about = setting.about.trim_end_matches('.');
+    format!(" {about}. Expects {}. Default {}.", setting.values, setting.default_text())
 }
 
 fn stub_class(out: &mut String, class: &Class) {

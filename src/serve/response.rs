@@ -11,7 +11,7 @@ use super::{
     state::LiveEpisode,
 };
 use softvt_benchmark::{CONTROL_DT, Task};
-use softvt_evaluation::record::Outcome;
+use softvt_evaluation::verdict::Outcome;
 use softvt_policy::{
     Observation,
     encode::content,

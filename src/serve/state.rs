@@ -6,7 +6,7 @@ use rmpv::Value;
 use super::config::{RequestError, ServerConfig};
 use softvt_common::episode_id::EpisodeId;
 use softvt_common::npy::NpyArray;
-use softvt_evaluation::record::Outcome;
+use softvt_evaluation::verdict::Outcome;
 use softvt_policy::{
     CommandResolver, Observation, SensorStreams, decode,
     msgpack::{map, pack_array},

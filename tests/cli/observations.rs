@@ -6,8 +6,8 @@ use std::{path::Path, sync::Arc};
 use softvt::{
     benchmark::{Plan, settings::Settings},
     episode_id::{EpisodeId, Split},
-    evaluation::{record::EpisodeRecord, summary::SuiteSummary},
     policy::{Action, ActionChunk, Observation, Policy, PolicyError, RobotState, SensorStreams, TaskBrief},
+    records::{record::EpisodeRecord, summary::SuiteSummary},
     report::terminal,
     rollout::{AssetCache, ChunkedPolicy, Episode, EpisodeSpec, SensorAssets, SensorSuite, Simulation},
     script::{self, LoadedScript},

@@ -3,8 +3,8 @@
 
 use softvt::{
     geometry::Vec3,
-    robot::PadSurface,
-    sensing::tactile::{Gel, GelField, GelScratch, PadWrench, SkinMesh, TactileContact, TactileSpec},
+    robot::{PadSurface, tactile::TactileSpec},
+    sensing::tactile::{Gel, GelField, GelScratch, PadWrench, SkinMesh, TactileContact},
 };
 
 /// Radius of the ball, m.

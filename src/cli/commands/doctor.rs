@@ -12,7 +12,7 @@ use crate::{
     output::{Console, print},
 };
 use softvt_benchmark::Plan;
-use softvt_evaluation::record::EpisodeRecord;
+use softvt_records::record::EpisodeRecord;
 use softvt_runner::{EpisodeJob, EpisodeList, LoadedRun, RunConfig, SuiteRun, thread_count};
 
 /// `assets/golden.json`: an episode whose final state is published.

@@ -1,10 +1,6 @@
 //! `softvt replay RUN EPISODE`: simulation of a recorded episode, compared with its record byte by byte.
 
-use std::{
-    path::{Path, PathBuf},
-    str::FromStr,
-    sync::Arc,
-};
+use std::{path::PathBuf, sync::Arc};
 
 use clap::Args;
 
@@ -13,20 +9,13 @@ use crate::{
     output::{Console, print},
     replays::report_replays,
 };
-use softvt_common::episode_id::EpisodeIndex;
-use softvt_common::text::counted;
-use softvt_dataset::{
-    layout::is_dataset,
-    manifest::{self, ManifestEntry},
-};
-use softvt_evaluation::record::EpisodeRecord;
-use softvt_report::{
-    actions,
-    stored_run::{self, StoredRun},
-};
+use softvt_dataset::layout::is_dataset;
+use softvt_report::{actions, stored_run};
 use softvt_runner::{
-    Observer, read_secret,
-    replay::{DemoRef, SecretFile, StoredManifest, check_complete, demos_of, difference, simulate_demos},
+    Observer,
+    episode_selector::EpisodeSelector,
+    read_secret,
+    replay::{SecretFile, StoredManifest, check_complete, difference, simulate_demos},
     stored_folder::{enter_for_dataset, enter_for_run},
 };
 
@@ -40,29 +29,6 @@ pub(crate) struct ReplayArgs {
     /// Secret seed of a judged run
     #[arg(long, value_name = "FILE")]
     seed_file: Option<PathBuf>,
-}
-
-/// An episode of a run, or a demonstration of a dataset.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum EpisodeSelector {
-    /// Line number in `episodes.jsonl` or in the manifest, from 0.
-    Line(usize),
-    /// `TASK/EPISODE`.
-    Episode { task: usize, episode: u32 },
-}
-
-impl FromStr for EpisodeSelector {
-    type Err = String;
-
-    fn from_str(word: &str) -> Result<Self, String> {
-        let pair = word.split_once('/').and_then(|(task, episode)| {
-            Some(Self::Episode { task: task.parse().ok()?, episode: episode.parse().ok()? })
-        });
-        let found = pair.or_else(|| word.parse().ok().map(Self::Line));
-        found.ok_or_else(|| {
-            "expected TASK/EPISODE such as 3/0, or a line number of episodes.jsonl, from 0".to_owned()
-        })
-    }
 }
 
 /// Simulates an episode of a run or a demonstration of a dataset again, by its recorded actions.
@@ -81,7 +47,7 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
             return Err(CliError::input("--seed-file: demonstrations have no secret seed; leave it out"));
         }
         check_complete(dir)?;
-        let demos = [find_demo(&enter_for_dataset(dir, &*observer)?, args.episode)?];
+        let demos = [args.episode.find_demo(&enter_for_dataset(dir, &*observer)?)?];
         return report_replays(&demos, &simulate_demos(&demos, &observer)?);
     }
     let stored = stored_run::load(dir)?;
@@ -93,7 +59,7 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
             names.join(", ")
         )));
     };
-    let record = find_episode(stored, args.episode)?;
+    let record = args.episode.find_record(stored)?;
     let index = record.header.id.index();
     let dir = enter_for_run(stored, &*observer)?;
     let path = actions::path(&dir, index);
@@ -108,56 +74,5 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
                 "{index} differs: {difference}; softvt doctor checks whether this machine computes the published results"
             ),
         )),
-    }
-}
-
-fn find_episode(stored: &StoredRun, selector: EpisodeSelector) -> Result<&EpisodeRecord, CliError> {
-    let found = match selector {
-        EpisodeSelector::Line(line) => stored.records.get(line),
-        EpisodeSelector::Episode { task, episode } => {
-            let index = EpisodeIndex { task, episode };
-            stored.records.iter().find(|record| record.header.id.index() == index)
-        }
-    };
-    found.ok_or_else(|| {
-        CliError::input(format!(
-            "{} has no such episode; it has {}: select one by TASK/EPISODE, or by its line number from 0",
-            stored.dir.display(),
-            counted(stored.records.len(), "episode")
-        ))
-    })
-}
-
-fn find_demo(path: &Path, selector: EpisodeSelector) -> Result<DemoRef, CliError> {
-    let demos = demos_of(path)?;
-    let count = demos.len();
-    let not_found = || {
-        CliError::input(format!(
-            "{} has no such demonstration; it has {count}: select one by TASK/DEMO, or by its number from 0",
-            path.display()
-        ))
-    };
-    match selector {
-        EpisodeSelector::Line(line) => demos.into_iter().nth(line).ok_or_else(not_found),
-        EpisodeSelector::Episode { task, episode } if path.is_dir() => {
-            let entries = manifest::read(path)?;
-            let matches = |entry: &&ManifestEntry| entry.task_id == task && entry.demo_id == episode as usize;
-            let found: Vec<&ManifestEntry> = entries.iter().filter(matches).collect();
-            match found[..] {
-                [entry] => Ok(DemoRef { file: path.join(&entry.hdf5_path), demo: entry.demo_id }),
-                [] => Err(not_found()),
-                _ => {
-                    let files: Vec<&str> = found.iter().map(|entry| entry.hdf5_path.as_str()).collect();
-                    Err(CliError::input(format!(
-                        "{}: several suites have a task {task}; select one of the files {}",
-                        path.display(),
-                        files.join(", ")
-                    )))
-                }
-            }
-        }
-        EpisodeSelector::Episode { episode, .. } => {
-            Ok(DemoRef { file: path.to_owned(), demo: episode as usize })
-        }
     }
 }

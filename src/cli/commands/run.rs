@@ -9,15 +9,13 @@ use crate::{
     args::{PolicyArgs, Request, RunFlags, ScriptArgs},
     error::{CliError, Exit},
     output::{eprint_notice, print, print_json, text_columns},
-    plan_flags, requirement,
+    plan_flags,
 };
 use softvt_benchmark::{Condition, Plan, Suite};
 use softvt_common::text::counted;
-use softvt_evaluation::{
-    record::{EpisodeRecord, Outcome},
-    summary::SuiteSummary,
-};
+use softvt_evaluation::verdict::Outcome;
 use softvt_policy::profile::Profile;
+use softvt_records::{record::EpisodeRecord, requirement::Requirement, summary::SuiteSummary};
 use softvt_report::{
     condition_table::{ConditionTable, compares_policies, controllers_table, table},
     terminal,
@@ -76,7 +74,7 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
             }?;
             match failed {
                 Some(error) => Err(error),
-                None => requirement::check(&requirements, &summaries),
+                None => check_requirements(&requirements, &summaries),
             }
         }
         Plan::Conditions { name, suites, conditions } => {
@@ -121,6 +119,16 @@ fn run_conditions(
     }
     eprint_notice(out.join(conditions::FILE).display());
     Ok(())
+}
+
+/// Checks all requirements on all suites.
+///
+/// # Errors
+/// The requirements that are not met.
+fn check_requirements(requirements: &[Requirement], summaries: &[SuiteSummary]) -> Result<(), CliError> {
+    let of_suite = |summary| requirements.iter().filter_map(move |requirement| requirement.unmet(summary));
+    let unmet: Vec<String> = summaries.iter().flat_map(of_suite).collect();
+    if unmet.is_empty() { Ok(()) } else { Err(CliError::new(Exit::RequirementNotMet, unmet.join("\n"))) }
 }
 
 /// The error of a policy whose actions could be executed in no episode, such as one that answers NaN.

@@ -9,7 +9,6 @@ use std::{
 };
 
 use clap::{Args, value_parser};
-use serde_json::json;
 
 use crate::{
     QUIET_INTERRUPT,
@@ -17,20 +16,13 @@ use crate::{
     error::{CliError, Exit},
     output::{eprint_notice, print},
 };
-use softvt_benchmark::{Plan, Suite, seed::SecretSeed};
-use softvt_common::cancel;
-use softvt_common::episode_id::{EpisodeId, Split};
-use softvt_policy::Observation;
+use softvt_common::{cancel, episode_id::Split};
 use softvt_report::terminal;
 use softvt_runner::{
-    PolicyConfig, RunConfig, ServedRuns, Shard, SuiteRun,
-    selection::{
-        check_distinct_out_dirs, check_parent_folder, needs_suites, run_dir, select_episodes, select_tasks,
-        suites_of,
-    },
+    PolicyConfig, RunConfig, ServedRuns, Shard, check_served, first_observation, prepare_served,
+    server_config,
 };
-use softvt_script::LoadedScript;
-use softvt_serve::{AccessRules, RequestError, ServerConfig};
+use softvt_serve::AccessRules;
 
 /// Environment variable with the token of the server. A flag shows it to other users of the machine.
 const TOKEN: &str = "SOFTVT_TOKEN";
@@ -129,42 +121,19 @@ fn serve(args: ServeArgs) -> Result<(), CliError> {
     });
     let loaded = request.load("serve")?;
     let config = &request.config;
-    let suites = suites_of(&loaded.plan);
-    if suites.iter().all(|suite| suite.tasks.is_empty()) {
-        return Err(needs_suites("serve", config).into());
-    }
+    check_served(config, &loaded)?;
     check_run_flags(&request)?;
     // After the checks, so that an error of the script is reported even if standard input is closed already.
     if args.until_stdin_closes {
         watch_stdin()?;
     }
     let listener = listen(&args)?;
-    let runs = prepare(config, &loaded, args.split)?;
-    let start_episode = |id: &EpisodeId| {
-        let found = runs.iter().find(|run| run.name == id.suite);
-        let run = found.ok_or_else(|| format!("unknown suite {:?}", id.suite))?;
-        let task = run.suite.tasks.iter().find(|task| task.id == id.task);
-        let task = task.ok_or_else(|| format!("unknown task {}", id.task))?;
-        let id = EpisodeId { suite: run.suite.name.clone(), ..id.clone() };
-        run.start_episode(task, &id).map_err(|error| RequestError::Invalid(error.message))
-    };
+    let runs = prepare_served(config, &loaded, args.split)?;
     let address = listener.local_addr().map_err(|error| CliError::input(error).prefixed(&args.host))?;
-    let profile = config.policy.profile().ok_or_else(|| CliError::input("there is no profile to serve"))?;
     // Declared here, since the configuration of the server borrows it.
     let served;
-    let mut server_config = ServerConfig {
-        suites: suites.iter().map(|suite| served_suite(config, suite)).collect::<Result<_, _>>()?,
-        profile: profile.clone(),
-        effort_n: runs.iter().map(|run| run.settings.robot.gripper.effort).fold(f64::INFINITY, f64::min),
-        privileged: args.privileged,
-        seed: config.seed,
-        has_secret_seed: config.secret.is_some(),
-        split: args.split,
-        fingerprint: provenance_hash(config, &loaded),
-        access: AccessRules::new(&args.host, address, token(&args)?),
-        start_episode: Box::new(start_episode),
-        recorder: None,
-    };
+    let access = AccessRules::new(&args.host, address, token(&args)?);
+    let mut server_config = server_config(config, &loaded, &runs, access)?;
     let first = first_observation(config, &server_config)?;
     served = config.out.as_ref().map(|_| ServedRuns::open(config, &runs)).transpose()?;
     server_config.recorder = served.as_ref().map(ServedRuns::recorder);
@@ -195,49 +164,6 @@ fn check_run_flags(request: &Request) -> Result<(), CliError> {
     }
 }
 
-/// The suites with all that their episodes need. Their scenes are checked, completely so if episodes are recorded.
-///
-/// # Errors
-/// A suite, shift, setting, scene or calibration file that is not valid.
-fn prepare<'a>(
-    config: &'a RunConfig,
-    loaded: &'a LoadedScript,
-    split: Split,
-) -> Result<Vec<SuiteRun<'a>>, CliError> {
-    let suites = suites_of(&loaded.plan);
-    let is_list = matches!(loaded.plan, Plan::Suites { .. });
-    if config.out.is_some() {
-        check_distinct_out_dirs(config, suites)?;
-    }
-    if is_list {
-        check_parent_folder(config)?;
-    }
-    let mut runs = Vec::new();
-    for suite in suites {
-        let tasks = select_tasks(config, suite)?;
-        let jobs = select_episodes(config, suite, &tasks);
-        let out = run_dir(config, suite, is_list);
-        let mut run = SuiteRun::new(config, loaded, suite, jobs, out.clone().unwrap_or_default())?;
-        run.split = split;
-        // Otherwise only privileged clients receive the limits.
-        run.reads_limits = config.policy.privileged || out.is_some();
-        if out.is_some() {
-            run.prepare(&tasks)?;
-        } else {
-            run.report_limits(&tasks)?;
-        }
-        runs.push(run);
-    }
-    Ok(runs)
-}
-
-/// A suite as clients see it: its name in results, the selected tasks, and the number of episodes of a run.
-fn served_suite(config: &RunConfig, suite: &Suite) -> Result<Suite, CliError> {
-    let tasks = select_tasks(config, suite)?.into_iter().cloned().collect();
-    let episodes = config.episodes_of(suite);
-    Ok(Suite { name: config.suite_name(suite), tasks, episodes, ..suite.clone() })
-}
-
 /// The token that clients have to send.
 fn token(args: &ServeArgs) -> Result<Option<String>, CliError> {
     let from_environment = || std::env::var(TOKEN).ok().filter(|token| !token.is_empty());
@@ -266,35 +192,4 @@ fn listen(args: &ServeArgs) -> Result<TcpListener, CliError> {
             _ => format!("--host {host}: cannot listen on this address: {error}"),
         })
     })
-}
-
-/// Hash of all that determines an episode, except its index and the actions of the client.
-fn provenance_hash(config: &RunConfig, loaded: &LoadedScript) -> String {
-    let all = json!([
-        env!("CARGO_PKG_VERSION"),
-        loaded.sources.bundle.hashes(),
-        config.options,
-        config.shifts,
-        config.settings,
-        config.rigid_twin,
-        config.secret.as_ref().map(SecretSeed::hash)
-    ]);
-    softvt_script::sha256(all.to_string().as_bytes())
-}
-
-/// The first observation of the first episode. It reports invalid scenes and sensors before a client connects.
-fn first_observation(config: &RunConfig, server: &ServerConfig) -> Result<Observation, CliError> {
-    let first = server.suites.iter().find_map(|suite| Some((suite, suite.tasks.first()?)));
-    let (suite, task) = first.ok_or_else(|| CliError::input("there is no task to serve"))?;
-    let id = EpisodeId {
-        suite: suite.name.clone(),
-        task: task.id,
-        episode: 0,
-        base_seed: server.seed,
-        split: server.split,
-    };
-    let mut episode = (server.start_episode)(&id)?;
-    let streams = server.profile.streams();
-    episode.begin(streams.clone());
-    Ok(episode.observe(&streams).map_err(|error| config.error(error))?)
 }

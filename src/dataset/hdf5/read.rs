@@ -15,8 +15,8 @@ use super::{
     limits::{self, ListError},
 };
 use softvt_common::files::FileError;
-use softvt_evaluation::record::EpisodeRecord;
 use softvt_policy::{Action, profile::GripCode};
+use softvt_records::record::EpisodeRecord;
 
 /// The HDF5 file of a task, with the demonstrations `/data/demo_0`, `/data/demo_1`, …
 pub struct TaskFile {

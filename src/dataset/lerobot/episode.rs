@@ -11,9 +11,10 @@ use super::{
 };
 use crate::{DatasetError, ImageBlock, TaskFile, demonstration::actions_stream, layout::IMAGE_STREAMS};
 use softvt_benchmark::CONTROL_HZ;
+use softvt_robot::tactile::IMAGE_SIZE;
 use softvt_sensing::{
     camera::encode_png,
-    tactile::{HISTORY_LENGTH, IMAGE_SIZE, MARKER_COUNT, MosaicLayout, mosaic, mosaic_cell},
+    tactile::{HISTORY_LENGTH, MARKER_COUNT, MosaicLayout, mosaic, mosaic_cell},
 };
 
 /// Images decompressed at once: whole chunks of the file.

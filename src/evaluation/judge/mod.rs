@@ -31,9 +31,8 @@
 //! A target rests on a plate, released, for nine control steps of 50 ms; the goal asks for 0.4 s.
 //!
 //! ```
-//! use softvt_evaluation::{criteria::SuccessCriteria, deformation::ReferenceShape, evidence::{BodyEvidence, Evidence, GoalEvidence, GripEvidence, GripperEvidence, PadEvidence}, goal::GoalRegion, judge::{Judge, JudgeConfig}, record::Outcome, safety::DeformationLimit};
+//! use softvt_evaluation::{criteria::SuccessCriteria, deformation::ReferenceShape, evidence::{BodyEvidence, CrushedShares, Evidence, GoalEvidence, GripEvidence, GripperEvidence, PadEvidence}, goal::GoalRegion, judge::{Judge, JudgeConfig}, safety::DeformationLimit, verdict::Outcome};
 //! use softvt_geometry::{Aabb, Pose, Vec3};
-//! use softvt_physics::fem::CrushedShares;
 //!
 //! let (dt_s, weight_n) = (1.0 / 60.0, 0.3);
 //! let mut judge = Judge::new(JudgeConfig {
@@ -82,19 +81,18 @@
 //! ```
 
 use softvt_geometry::Aabb;
-use softvt_physics::fem::CrushedShares;
 
 use super::{
     criteria::SuccessCriteria,
     deformation::series::DeformationSeries,
     drop::{DropEvent, DropMonitor, DropReason, DropSample, ReleaseMonitor},
-    evidence::{BodyEvidence, Evidence},
+    evidence::{BodyEvidence, CrushedShares, Evidence},
     goal::{GoalMonitor, GoalRegion, GoalSample},
     grip::{GripMonitor, GripSample},
-    record::{OtherDeformation, Outcome, Verdict, WrongContact},
     safety::{DeformationLimit, KAPPAS, KappaVerdict, PeakDeformation, SafetyParts},
     slip::{OpeningMonitor, SlipMonitor, SlipSample},
     stage::{StageMonitor, StageSample},
+    verdict::{OtherDeformation, Outcome, Verdict, WrongContact},
 };
 
 /// Parameters of a [`Judge`], known once the scene has settled.

@@ -5,7 +5,6 @@ use crate::{
     stage::Stage,
 };
 use softvt_geometry::{Aabb, Pose, Quat, Vec3};
-use softvt_physics::fem::CrushedShares;
 
 const DT: f64 = 1.0 / 60.0;
 const WEIGHT_N: f64 = 0.3;

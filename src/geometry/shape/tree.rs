@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use serde::Serialize;
+
 use super::{
     displacement::Displacement, mesh_solid::MeshSolid, polygon::Polygon, validate::ShapeError, warp::Axis,
 };
@@ -15,9 +17,8 @@ use crate::{
 /// Shapes are built by chaining (`Shape::cuboid(size).rounded(r).translated(v)`) and share their parts. The
 /// constructors accept any numbers; [`Shape::validate`] checks the tree.
 ///
-/// Fingerprints of assets hash the `Debug` text of shapes, so the names of variants and fields are
-/// part of file formats.
-#[derive(Clone, Debug, PartialEq)]
+/// Fingerprints of assets hash the serialised tree, so the names of variants and fields are part of file formats.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Shape {
     /// A box centred on the origin.
     Box {

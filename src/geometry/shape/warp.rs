@@ -1,10 +1,12 @@
 //! Coordinate axes, and the inverse maps of warps along them: from a point of the warped shape to the point of the
 //! straight one, with the Jacobian that transforms gradients.
 
+use serde::Serialize;
+
 use crate::{Mat3, Vec3};
 
 /// A coordinate axis of a shape's frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Axis {
     /// The x axis.
     X,

@@ -1,9 +1,6 @@
 //! Colliders: surfaces of everything but soft bodies, attached to a body or to the world.
 
-use std::{
-    fmt::{self, Debug},
-    sync::Arc,
-};
+use std::{fmt::Debug, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 
@@ -50,7 +47,7 @@ impl ContactSurface for Shape {
 }
 
 /// Coulomb friction coefficients of a surface. A pair of surfaces takes the larger of each, unless one is coated.
-#[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Friction {
     /// Coefficient of a surface that sticks.
     pub static_mu: f64,
@@ -60,18 +57,6 @@ pub struct Friction {
     /// those of any pair.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub coated: bool,
-}
-
-/// Fingerprints of assets hash this text. A surface without a coating has that of the coefficients alone.
-impl Debug for Friction {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut text = f.debug_struct("Friction");
-        text.field("static_mu", &self.static_mu).field("dynamic_mu", &self.dynamic_mu);
-        if self.coated {
-            text.field("coated", &true);
-        }
-        text.finish()
-    }
 }
 
 impl Default for Friction {

@@ -18,4 +18,4 @@ pub(crate) mod system;
 
 pub use body::{FemModel, FemState, MinDetF};
 pub use material::{ElasticMaterial, MaterialError};
-pub use strain::{CrushedShares, StrainLimits, StrainMeter};
+pub use strain::{StrainLimits, StrainMeter};

@@ -71,21 +71,16 @@ pub struct StrainLimits {
     pub damage: Option<f64>,
 }
 
-/// Shares of the volume (0..=1) beyond each of the [`StrainLimits`]; `None` where there is no limit.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct CrushedShares {
-    /// Share that is beyond the collapse strain now.
-    pub collapsed: Option<f64>,
-    /// Share that has ever been beyond the damage strain.
-    pub damaged: Option<f64>,
-}
-
 /// Measures the strains of a body, and accumulates its damage.
 #[derive(Clone, Debug)]
 pub struct StrainMeter {
     /// Share of the counted volume of one Gauss point of each element; 0 for elements that are not counted.
     share: Vec<f64>,
     limits: StrainLimits,
+    /// Share of the volume that is beyond the collapse strain now.
+    collapsed_share: f64,
+    /// Share of the volume that has ever been beyond the damage strain.
+    damaged_share: f64,
     /// One bit per Gauss point that has been beyond the damage strain.
     damaged: Vec<u8>,
 }
@@ -98,14 +93,25 @@ impl StrainMeter {
         let counted: Vec<f64> = counted.collect();
         let total = POINTS as f64 * counted.iter().sum::<f64>();
         let share = counted.iter().map(|fill| fill / total.max(f64::MIN_POSITIVE)).collect();
-        Self { share, limits, damaged: vec![0; counted.len()] }
+        Self { share, limits, collapsed_share: 0.0, damaged_share: 0.0, damaged: vec![0; counted.len()] }
     }
 
-    /// Takes in the present state: shares of the volume beyond each limit. Does not allocate.
-    pub fn update(&mut self, state: &FemState) -> CrushedShares {
+    /// Share of the volume (0..=1) that was beyond the collapse strain in the state of the last update; `None` without that
+    /// limit.
+    pub fn collapsed(&self) -> Option<f64> {
+        self.limits.collapse.map(|_| self.collapsed_share)
+    }
+
+    /// Share of the volume (0..=1) that has ever been beyond the damage strain; `None` without that limit.
+    pub fn damaged(&self) -> Option<f64> {
+        self.limits.damage.map(|_| self.damaged_share)
+    }
+
+    /// Takes in the present state. Does not allocate.
+    pub fn update(&mut self, state: &FemState) {
         let StrainLimits { collapse, damage } = self.limits;
         if collapse.is_none() && damage.is_none() {
-            return CrushedShares::default();
+            return;
         }
         let (mut collapsed, mut damaged) = (0.0, 0.0);
         for (element, share) in self.share.iter().enumerate().filter(|(_, share)| **share > 0.0) {
@@ -120,7 +126,7 @@ impl StrainMeter {
             collapsed += share * f64::from(now.collapsed.count_ones());
             damaged += share * f64::from(now.damaged.count_ones());
         }
-        CrushedShares { collapsed: collapse.map(|_| collapsed), damaged: damage.map(|_| damaged) }
+        (self.collapsed_share, self.damaged_share) = (collapsed, damaged);
     }
 
     /// Share of the volume (0..=1) that is beyond `strain` now.
@@ -240,17 +246,17 @@ mod tests {
         let pressed = deformed(rest.clone(), &Mat3::from_diagonal(&Vec3::new(1.0, 1.0, 0.7)));
         let limits = StrainLimits { collapse: Some(0.1), damage: Some(0.25) };
         let mut meter = StrainMeter::new(&rest.model, limits);
-        let at_rest = meter.update(&rest);
-        assert_eq!((at_rest.collapsed, at_rest.damaged), (Some(0.0), Some(0.0)));
-        let shares = meter.update(&pressed);
-        assert!(
-            (shares.collapsed.unwrap() - 1.0).abs() < 1e-12 && (shares.damaged.unwrap() - 1.0).abs() < 1e-12
-        );
-        let released = meter.update(&rest);
-        assert_eq!(released.collapsed, Some(0.0));
-        assert!((released.damaged.unwrap() - 1.0).abs() < 1e-12);
+        meter.update(&rest);
+        assert_eq!((meter.collapsed(), meter.damaged()), (Some(0.0), Some(0.0)));
+        meter.update(&pressed);
+        let whole = |share: Option<f64>| (share.unwrap() - 1.0).abs() < 1e-12;
+        assert!(whole(meter.collapsed()) && whole(meter.damaged()));
+        meter.update(&rest);
+        assert_eq!(meter.collapsed(), Some(0.0));
+        assert!(whole(meter.damaged()));
         let mut none = StrainMeter::new(&rest.model, StrainLimits::default());
-        assert_eq!(none.update(&pressed), CrushedShares::default());
+        none.update(&pressed);
+        assert_eq!((none.collapsed(), none.damaged()), (None, None));
     }
 
     #[test]

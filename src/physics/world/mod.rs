@@ -46,7 +46,7 @@ mod state;
 
 use crate::{
     contact::{Collider, ColliderMotion, DetectionLimits},
-    ids::{ArticulationId, ColliderId, ContactPartner, KinematicId, LinkId, RigidId, SoftId},
+    ids::{ArticulationId, BodyId, ColliderId, ContactPartner, KinematicId, LinkId, RigidId, SoftId},
     params::PhysicsParams,
     solver::{ContactProblem, Solver, SolverStats},
 };
@@ -289,6 +289,37 @@ impl World {
     /// Link frame of a link after the last step, world.
     pub fn link_pose(&self, id: LinkId) -> &Pose {
         &self.articulation(id.articulation).poses[id.index]
+    }
+
+    /// Pose of a body in the world: the mean pose of a soft body, the object frame of a rigid one, the frame of a link or of a
+    /// kinematic body, the identity for the world itself.
+    pub fn pose(&self, body: impl Into<BodyId>) -> Pose {
+        match body.into() {
+            BodyId::Soft(id) => self.soft(id).state.mean_pose(),
+            BodyId::Rigid(id) => self.rigid(id).state.object_w(),
+            BodyId::Link(id) => *self.link_pose(id),
+            BodyId::Kinematic(id) => self.kinematic(id).pose,
+            BodyId::World => Pose::identity(),
+        }
+    }
+
+    /// Mass of a soft or free rigid body, kg; `None` for bodies that gravity does not move.
+    pub fn mass(&self, body: impl Into<BodyId>) -> Option<f64> {
+        match body.into() {
+            BodyId::Soft(id) => Some(self.soft(id).state.model.total_mass()),
+            BodyId::Rigid(id) => Some(self.rigid(id).state.mass),
+            BodyId::Link(_) | BodyId::Kinematic(_) | BodyId::World => None,
+        }
+    }
+
+    /// True if a body, or the articulation of a link, rests and is not integrated until something moves it.
+    pub fn is_asleep(&self, body: impl Into<BodyId>) -> bool {
+        match body.into() {
+            BodyId::Soft(id) => self.soft(id).is_asleep(),
+            BodyId::Rigid(id) => self.rigid(id).is_asleep(),
+            BodyId::Link(id) => self.articulation(id.articulation).is_asleep(),
+            BodyId::World | BodyId::Kinematic(_) => false,
+        }
     }
 
     /// The kinematic frame with this id.

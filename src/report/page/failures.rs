@@ -12,7 +12,7 @@ use crate::{
 };
 use softvt_common::episode_id::EpisodeId;
 use softvt_common::text::counted;
-use softvt_evaluation::record::EpisodeHeader;
+use softvt_records::record::EpisodeHeader;
 
 /// Largest number of episodes listed per run.
 const MAX_LISTED: usize = 60;

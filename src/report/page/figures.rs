@@ -9,11 +9,8 @@ use crate::{
     run_summary::RunSummary,
 };
 use softvt_common::text::{format_number, shortened};
-use softvt_evaluation::{
-    paired_stats::d_over_tau,
-    record::EpisodeRecord,
-    statistics::{Distribution, Rate},
-};
+use softvt_evaluation::statistics::{Distribution, Rate};
+use softvt_records::{paired_stats::d_over_tau, record::EpisodeRecord};
 
 /// Height of a bar, and distance between bars, pixels.
 const BAR_HEIGHT: f64 = 12.0;

@@ -8,7 +8,7 @@ use crate::{
     run_summary::{summarize_runs, tests::stored},
     stored_run::StoredRun,
 };
-use softvt_evaluation::record::EpisodeRecord;
+use softvt_records::record::EpisodeRecord;
 
 const HOSTILE: &str = "<script>alert('x')</script>\"&lt; | \\input{x}";
 

@@ -15,11 +15,11 @@ use softvt_common::episode_id::{EpisodeId, EpisodeIndex};
 use softvt_common::files::{self, FileError, replace};
 use softvt_evaluation::{
     deformation::{METRIC_ID, ReferenceShape},
-    record::{EpisodeHeader, EpisodeRecord},
     statistics::{Rate, quantile},
     thresholds::ThresholdFile,
 };
 use softvt_geometry::Vec3;
+use softvt_records::record::{EpisodeHeader, EpisodeRecord};
 
 /// Folder within a run folder.
 pub const FOLDER: &str = "softvtbench";

@@ -12,8 +12,8 @@ use softvt_evaluation::{
     safety::KAPPAS,
     stage::Stage,
     statistics::{Distribution, Rate},
-    summary::{EpisodeDeformation, Scores, TaskScores},
 };
+use softvt_records::summary::{EpisodeDeformation, Scores, TaskScores};
 
 /// Number of columns, from the left, that hold text; the others hold numbers.
 pub(super) const TEXT_COLUMNS: usize = 2;

@@ -11,12 +11,12 @@ use softvt_common::{
     files::{FileError, replace},
     text::format_number,
 };
-use softvt_evaluation::record::EpisodeRecord;
 use softvt_media::{
     canvas::{Canvas, Rgb8},
     video::{VideoError, VideoWriter},
 };
 use softvt_physics::world::WorldSnapshot;
+use softvt_records::record::EpisodeRecord;
 use softvt_rollout::{
     CAMERA_IMAGE_SUFFIXES, SensingError, StateRecording, TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES,
 };

@@ -24,8 +24,8 @@ use softvt_dataset::{
     card::Imported,
     import::{self, ForeignDemo, ForeignFile, InitialCondition},
 };
-use softvt_evaluation::record::Origin;
 use softvt_policy::{ToolCommand, builtin::RecordedPolicy};
+use softvt_records::record::Origin;
 use softvt_rollout::{ChunkedPolicy, target_asset};
 use softvt_scene::{Body, InitialState};
 use softvt_script::LoadedScript;

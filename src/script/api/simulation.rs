@@ -174,7 +174,7 @@ functions! {
             episode: u32 = EPISODE => Integer(0);
             /// Part of the seed; by default that of the run, --seed.
             seed: Option<u64> = EPISODE;
-            /// Changed settings of physics, robot, tactile sensors and cameras: { physics = {…}, robot = {…} }.
+            /// Changed settings of physics, robot, tactile sensors and cameras (docs/settings.md): { physics = {…}, robot = {…} }.
             /// Those of the command line, --set, take precedence in experiments.
             settings: Option<Table> = SETTINGS;
         } -> ["softvt.Simulation"] {

@@ -26,7 +26,9 @@ const FACTORS: Type = Type::Vector(2, "", Range::closed(0.1, 10.0));
 const COATINGS: Type = Type::Vector(2, "", Range::above(0.0, 10.0));
 const HOLD: Type = Type::Number("s", Range::closed(0.0, 10.0));
 /// Type of a table of settings.
-pub(crate) const SETTINGS: Type = Type::Map(&Type::Map(&Type::Any));
+pub(crate) const SETTINGS: Type = Type::Table(SETTINGS_CLASS);
+/// Class of the settings in the editor stubs, which list them group by group.
+pub(crate) const SETTINGS_CLASS: &str = "softvt.Settings";
 
 choice! { ObjectType { "deformable" => Deformable, "rigid" => Rigid } }
 choice! { Needs { "nothing" => Nothing, "size" => Size, "touch" => Touch } }
@@ -149,7 +151,7 @@ record! {
         shifts: Vec<Constructed<ShiftSpec>> => Empty;
         /// Ranges from which the soft objects, the light and the cameras of every episode are drawn.
         vary: Option<Constructed<VariationSpec>>;
-        /// Changed settings of physics, robot and judge: { physics = {…}, robot = {…}, criteria = {…} }.
+        /// Changed settings (docs/settings.md): { physics = {…}, robot = {…}, criteria = {…}, tactile = {…}, cameras = {…} }.
         settings: Option<Table> = SETTINGS;
         /// Name of the suite of soft objects whose rigid twin this is. All soft bodies become rigid, with the same shape,
         /// mass and looks; initial states are those of that suite, so tasks and layouts must be its own.

@@ -15,7 +15,6 @@ pub mod image;
 pub mod markers;
 mod sensor;
 mod skin;
-mod spec;
 #[cfg(test)]
 mod tests;
 
@@ -28,5 +27,4 @@ pub use self::{
     markers::{MARKER_COUNT, MarkerFlow, MarkerPositions, MarkerStyle, Markers},
     sensor::{TactileReading, TactileSensor, TactileSensorError},
     skin::TactileSkin,
-    spec::{FotsSpec, GelSpec, IMAGE_SIZE, MarkerModel, OpticsModel, Pinhole, TactileSpec, WearSpec},
 };

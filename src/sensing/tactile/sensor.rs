@@ -8,10 +8,10 @@ use super::{
     elastic::{ContactError, Gel, GelField, GelScratch, TactileContact},
     image::{OpticsError, PolynomialOptics, TaximOptics},
     markers::{MarkerStyle, Markers},
-    spec::{MarkerModel, OpticsModel, TactileSpec},
 };
 use softvt_common::{npy::NpzError, text::RangeError};
 use softvt_robot::PadSurface;
+use softvt_robot::tactile::{MarkerModel, OpticsModel, TactileSpec};
 
 /// Reasons why a sensor cannot be created.
 #[derive(Debug, thiserror::Error)]
@@ -41,7 +41,8 @@ enum OpticsBackend {
 ///
 /// ```
 /// use softvt_geometry::Vec3;
-/// use softvt_sensing::tactile::{GelScratch, TactileContact, PadWrench, SkinMesh, TactileSensor, TactileSpec};
+/// use softvt_robot::tactile::TactileSpec;
+/// use softvt_sensing::tactile::{GelScratch, PadWrench, SkinMesh, TactileContact, TactileSensor};
 ///
 /// let sensor = TactileSensor::new(&TactileSpec::default())?;
 /// // A grid of 21 × 21 vertices, 0.4 mm apart; the triangles face the gel.

@@ -6,9 +6,8 @@ use std::path::Path;
 
 use image::{RgbImage, imageops::replace};
 
-use super::{
-    GelScratch, MarkerStyle, PadWrench, TactileContact, TactileSensor, TactileSpec, elastic::tests::graph,
-};
+use super::{GelScratch, MarkerStyle, PadWrench, TactileContact, TactileSensor, elastic::tests::graph};
+use softvt_robot::tactile::TactileSpec;
 
 /// Image of a contact, and next to it the motion of its markers.
 fn imprint(height: impl Fn(f64, f64) -> f64, wrench: PadWrench) -> RgbImage {

@@ -12,7 +12,7 @@
 //! m changes its sign near α = 2: long waves of pressure squeeze a nearly incompressible layer outwards, where a half
 //! space is drawn inwards.
 
-use super::super::spec::GelSpec;
+use softvt_robot::tactile::GelSpec;
 
 /// Displacement of the surface per unit of traction at one wave number k, m/Pa.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,12 +4,12 @@ use nalgebra::Vector2;
 use rustfft::num_complex::Complex32;
 
 use super::{
-    super::spec::{GelSpec, Pinhole, TactileSpec},
     elastic_layer::LayerResponse,
     fourier::{FftBuffers, PaddedFft},
 };
 use softvt_common::text::RangeError;
 use softvt_robot::PadSurface;
+use softvt_robot::tactile::{GelSpec, Pinhole, TactileSpec};
 
 /// Grid over the pad, kernels of the bonded layer and view of the camera: everything that is computed once per sensor.
 ///

@@ -4,7 +4,6 @@
 //! disc of 1.5 mm. Depth and outward displacement of the sphere are checked in `tests/validation/gel.rs`.
 
 use super::{
-    super::spec::TactileSpec,
     ContactError, Gel, GelField, GelScratch, PadWrench, SkinMesh, TactileContact, cubic_taps,
     gel::LayerKernels,
     gel_field::surface_displacement,
@@ -12,6 +11,7 @@ use super::{
 };
 use softvt_geometry::Vec3;
 use softvt_robot::PadSurface;
+use softvt_robot::tactile::TactileSpec;
 
 /// Vertices and triangles of a skin in the pad frame.
 pub(in super::super) struct TestSkin {

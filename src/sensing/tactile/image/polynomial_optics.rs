@@ -6,13 +6,11 @@ use image::{Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    super::{
-        elastic::{Gel, GelField},
-        spec::IMAGE_SIZE,
-    },
+    super::elastic::{Gel, GelField},
     shadow::{Led, ShadowCaster},
     visible_surface::{MIN_SLOPE, VisibleSurface},
 };
+use softvt_robot::tactile::IMAGE_SIZE;
 
 /// Coefficients of the GelSight Mini, written by `examples/fit_gelsight.rs`.
 const GELSIGHT_MINI: &str = include_str!("../../../../assets/gelsight/mini.json");

@@ -2,7 +2,7 @@
 
 use super::{
     super::{
-        PadWrench, TactileSpec,
+        PadWrench,
         elastic::{
             Gel,
             tests::{TestSkin, graph, pressed},
@@ -11,6 +11,7 @@ use super::{
     PolynomialOptics,
 };
 use softvt_robot::PadSurface;
+use softvt_robot::tactile::TactileSpec;
 
 fn gel() -> Gel {
     Gel::new(&TactileSpec::default(), PadSurface::default()).expect("default numbers")

@@ -6,10 +6,8 @@
 
 use std::ops::Range;
 
-use super::super::{
-    elastic::{Gel, GelField, cubic_taps},
-    spec::IMAGE_SIZE,
-};
+use super::super::elastic::{Gel, GelField, cubic_taps};
+use softvt_robot::tactile::IMAGE_SIZE;
 
 /// Displacement of the surface along z at each pixel of a window of the image, m; zero outside the window.
 #[derive(Clone, Debug, Default)]

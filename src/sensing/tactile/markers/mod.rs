@@ -7,11 +7,9 @@ mod tests;
 use nalgebra::Vector2;
 
 pub use self::flow::MarkerFlow;
-use super::{
-    elastic::{Gel, GelField},
-    spec::{FotsSpec, IMAGE_SIZE, MarkerModel},
-};
+use super::elastic::{Gel, GelField};
 use softvt_geometry::Vec3;
+use softvt_robot::tactile::{FotsSpec, IMAGE_SIZE, MarkerModel};
 
 /// Number of markers: 9 rows of 11.
 pub const MARKER_COUNT: usize = 99;

@@ -2,7 +2,7 @@
 
 use super::{
     super::{
-        FotsSpec, MarkerModel, PadWrench, TactileSpec,
+        PadWrench,
         elastic::{
             Gel,
             tests::{graph, pressed},
@@ -11,6 +11,7 @@ use super::{
     MarkerStyle, Markers,
 };
 use softvt_robot::PadSurface;
+use softvt_robot::tactile::{FotsSpec, MarkerModel, TactileSpec};
 
 fn gel() -> Gel {
     Gel::new(&TactileSpec::default(), PadSurface::default()).expect("default numbers")

@@ -10,11 +10,9 @@ use std::{f64::consts::PI, path::Path};
 
 use image::{Rgb, RgbImage};
 
-use super::super::{
-    elastic::{Gel, GelField},
-    spec::IMAGE_SIZE,
-};
+use super::super::elastic::{Gel, GelField};
 use softvt_common::npy::{NpzError, read_npz_of};
+use softvt_robot::tactile::IMAGE_SIZE;
 
 /// σ of the blurs of the pyramid, px of 320 × 240 (kernel sizes 201, 101, 51, 21, 11 and 5 at 640 × 480).
 const PYRAMID: [f32; 6] = [15.25, 7.75, 4.0, 1.75, 1.0, 0.55];

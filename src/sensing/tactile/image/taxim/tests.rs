@@ -4,11 +4,12 @@ use std::{fs, io::Write, path::Path};
 
 use super::*;
 use crate::tactile::{
-    PadWrench, TactileSpec,
+    PadWrench,
     elastic::tests::{graph, pressed},
 };
 use softvt_common::npy::NpyArray;
 use softvt_robot::PadSurface;
+use softvt_robot::tactile::TactileSpec;
 
 const BINS: usize = 125;
 

@@ -8,11 +8,12 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{
-    record::{EpisodeRecord, FarCommand, Outcome},
+use super::record::{EpisodeRecord, FarCommand};
+use softvt_evaluation::{
     safety::{DeformationLimit, PeakDeformation, SafetyParts},
     stage::Stage,
     statistics::{Distribution, Rate, mean, stratified_bootstrap},
+    verdict::Outcome,
 };
 
 /// Number of intervals of the κ curve between 0 and 1.

@@ -8,12 +8,12 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{
-    record::EpisodeRecord,
+use super::record::EpisodeRecord;
+use softvt_common::episode_id::EpisodeId;
+use softvt_evaluation::{
     stage::Stage,
     statistics::{Z95, mean, stratified_bootstrap},
 };
-use softvt_common::episode_id::EpisodeId;
 
 /// One episode in both runs.
 #[derive(Clone, Copy, Debug)]
@@ -250,7 +250,7 @@ impl PairedStages {
 /// Of 100 episodes, 4 succeed in the first run only, 12 in the second only and 50 in both.
 ///
 /// ```
-/// use softvt_evaluation::paired_stats::PairedDifference;
+/// use softvt_records::paired_stats::PairedDifference;
 ///
 /// let pairs = (0..100).map(|i| [i < 4 || i >= 50, i >= 4 && i < 16 || i >= 50]);
 /// let safety = PairedDifference::from_successes(pairs);
@@ -277,7 +277,7 @@ pub struct PairedDifference {
     pub difference: Option<f64>,
     /// 95 % interval of the difference: of a rate by Agresti & Min (2005); of a mean by the percentile bootstrap over
     /// episodes (Efron, 1979), from a fixed seed, null for fewer than
-    /// [`MIN_BOOTSTRAP_VALUES`](super::statistics::MIN_BOOTSTRAP_VALUES) episodes.
+    /// [`MIN_BOOTSTRAP_VALUES`](softvt_evaluation::statistics::MIN_BOOTSTRAP_VALUES) episodes.
     pub interval95: Option<[f64; 2]>,
     /// Exact two-sided p-value of McNemar's test of a rate (binomial on the episodes that differ); absent for a mean.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -357,7 +357,8 @@ fn mcnemar(better: usize, worse: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{Outcome, WrongContact, tests::sample};
+    use crate::record::tests::sample;
+    use softvt_evaluation::verdict::{Outcome, WrongContact};
 
     /// Goal, safety and D of each episode; τ is 1.
     fn run(episodes: &[(bool, bool, f64)]) -> Vec<EpisodeRecord> {

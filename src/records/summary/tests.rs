@@ -1,5 +1,6 @@
 use super::*;
-use crate::record::{Outcome, WrongContact, tests::sample};
+use crate::record::tests::sample;
+use softvt_evaluation::verdict::{Outcome, WrongContact};
 
 fn episode(task: usize, index: u32, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
     let mut record = sample();

@@ -2,9 +2,10 @@
 
 use serde_json::Value;
 
-use super::{
-    record::{EpisodeRecord, OtherDeformation, Outcome},
+use super::record::EpisodeRecord;
+use softvt_evaluation::{
     safety::{DeformationLimit, PeakDeformation, SafetyParts},
+    verdict::{OtherDeformation, Outcome},
 };
 
 /// A text is not the record of an episode.

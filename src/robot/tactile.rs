@@ -1,15 +1,15 @@
-//! Parameters of a tactile sensor (settings `tactile.*`).
+//! Parameters of the tactile sensors at the finger tips (settings `tactile.*`), and the view of their cameras.
 
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+use super::PadSurface;
 use softvt_common::{
     settings::{Declaration, Setting, SettingField, SettingRange::Between},
     text::RangeError,
 };
 use softvt_geometry::Vec3;
-use softvt_robot::PadSurface;
 
 /// Width and height of a tactile image, px.
 pub const IMAGE_SIZE: [usize; 2] = [320, 240];
@@ -50,7 +50,7 @@ softvt_common::settings! {
 }
 
 softvt_common::settings! {
-    /// Material and grid of the gel. Its shape is [`softvt_robot::PadSurface`].
+    /// Material and grid of the gel. Its shape is [`PadSurface`].
     #[derive(Copy)]
     pub struct GelSpec {
         /// Shear modulus, Pa. 0.145 MPa: twice the C10 identified on a GelSight Mini (Helmut et al., arXiv 2411.03315).
@@ -86,7 +86,7 @@ impl Pinhole {
     }
 
     /// Position along an axis of the centre of pixel `p`, m on the plane of the apex.
-    pub(super) fn pixel_centre(&self, axis: usize, p: usize) -> f64 {
+    pub fn pixel_centre(&self, axis: usize, p: usize) -> f64 {
         (p as f64 + 0.5 - 0.5 * IMAGE_SIZE[axis] as f64) * self.pitch
     }
 
@@ -108,10 +108,10 @@ impl Pinhole {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "model", rename_all = "snake_case", deny_unknown_fields)]
 pub enum OpticsModel {
-    /// Polynomial of the surface's slope, fitted to a real GelSight Mini ([`super::PolynomialOptics`]).
+    /// Polynomial of the surface's slope, fitted to a real GelSight Mini.
     #[default]
     Polynomial,
-    /// Pipeline of Taxim (Si & Yuan, RA-L 2022) with calibration tables of the user ([`super::TaximOptics`]).
+    /// Pipeline of Taxim (Si & Yuan, RA-L 2022) with calibration tables of the user.
     Taxim {
         /// Folder with `polycalib.npz` and `dataPack.npz`.
         tables: PathBuf,
@@ -191,7 +191,7 @@ impl SettingField for MarkerModel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use softvt_robot::{Side, pads::pad_pose_in_finger};
+    use crate::{Side, pads::pad_pose_in_finger};
 
     #[test]
     fn defaults_are_valid_and_bad_numbers_are_named() {

@@ -1,19 +1,16 @@
-//! `--require`: conditions on the results of suites.
+//! Conditions on the results of a suite, such as `safety>=0.9`.
 
 use std::str::FromStr;
 
-use crate::error::{CliError, Exit};
-use softvt_evaluation::{
-    statistics::Rate,
-    summary::{Scores, SuiteSummary},
-};
+use super::summary::{Scores, SuiteSummary};
+use softvt_evaluation::statistics::Rate;
 
 /// Slack of comparisons, so that a rate of 90 % meets 0.9 whatever its last bit.
 const TOLERANCE: f64 = 1e-12;
 
 /// A condition on the results of a suite, such as `safety>=0.9`.
 #[derive(Clone, Debug)]
-pub(crate) struct Requirement {
+pub struct Requirement {
     /// As it was typed.
     text: String,
     metric: &'static Metric,
@@ -22,7 +19,7 @@ pub(crate) struct Requirement {
     bound: f64,
 }
 
-/// A result that `--require` can name.
+/// A result that a requirement can name.
 #[derive(Debug)]
 struct Metric {
     name: &'static str,
@@ -89,21 +86,9 @@ impl FromStr for Requirement {
     }
 }
 
-/// Checks all requirements on all suites.
-///
-/// # Errors
-/// The requirements that are not met.
-pub(crate) fn check(requirements: &[Requirement], summaries: &[SuiteSummary]) -> Result<(), CliError> {
-    let unmet = summaries
-        .iter()
-        .flat_map(|summary| requirements.iter().filter_map(move |requirement| requirement.unmet(summary)));
-    let unmet: Vec<String> = unmet.collect();
-    if unmet.is_empty() { Ok(()) } else { Err(CliError::new(Exit::RequirementNotMet, unmet.join("\n"))) }
-}
-
 impl Requirement {
     /// Describes how a suite violates the requirement. `None` if it does not.
-    fn unmet(&self, summary: &SuiteSummary) -> Option<String> {
+    pub fn unmet(&self, summary: &SuiteSummary) -> Option<String> {
         let (suite, text, name) = (&summary.suite, &self.text, self.metric.name);
         let Some(value) = (self.metric.value)(&summary.scores) else {
             return Some(format!("{suite}: {text}: {name} is not defined for this suite"));
@@ -115,9 +100,8 @@ impl Requirement {
 
 #[cfg(test)]
 mod tests {
-    use softvt_evaluation::record::EpisodeRecord;
-
     use super::*;
+    use crate::record::EpisodeRecord;
 
     fn summary(safe: usize, of: usize) -> SuiteSummary {
         let records: Vec<_> = (0..of)

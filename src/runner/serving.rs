@@ -1,0 +1,139 @@
+//! The suites of a script as a server offers them to clients.
+
+use serde_json::json;
+
+use crate::{
+    config::RunConfig,
+    error::RunError,
+    selection::{
+        check_distinct_out_dirs, check_parent_folder, needs_suites, run_dir, select_episodes, select_tasks,
+        suites_of,
+    },
+    suite_run::SuiteRun,
+};
+use softvt_benchmark::{Plan, Suite, seed::SecretSeed};
+use softvt_common::episode_id::{EpisodeId, Split};
+use softvt_policy::Observation;
+use softvt_script::LoadedScript;
+use softvt_serve::{AccessRules, RequestError, ServerConfig};
+
+/// Checks that a script has a task to serve.
+///
+/// # Errors
+/// It has none.
+pub fn check_served(config: &RunConfig, loaded: &LoadedScript) -> Result<(), RunError> {
+    let is_empty = suites_of(&loaded.plan).iter().all(|suite| suite.tasks.is_empty());
+    if is_empty { Err(needs_suites("serve", config)) } else { Ok(()) }
+}
+
+/// The suites with all that their episodes need. Their scenes are checked, completely so if episodes are recorded.
+///
+/// # Errors
+/// A suite, shift, setting, scene or calibration file that is not valid.
+pub fn prepare_served<'a>(
+    config: &'a RunConfig,
+    loaded: &'a LoadedScript,
+    split: Split,
+) -> Result<Vec<SuiteRun<'a>>, RunError> {
+    let suites = suites_of(&loaded.plan);
+    let is_list = matches!(loaded.plan, Plan::Suites { .. });
+    if config.out.is_some() {
+        check_distinct_out_dirs(config, suites)?;
+    }
+    if is_list {
+        check_parent_folder(config)?;
+    }
+    let mut runs = Vec::new();
+    for suite in suites {
+        let tasks = select_tasks(config, suite)?;
+        let jobs = select_episodes(config, suite, &tasks);
+        let out = run_dir(config, suite, is_list);
+        let mut run = SuiteRun::new(config, loaded, suite, jobs, out.clone().unwrap_or_default())?;
+        run.split = split;
+        // Otherwise only privileged clients receive the limits.
+        run.reads_limits = config.policy.privileged || out.is_some();
+        if out.is_some() {
+            run.prepare(&tasks)?;
+        } else {
+            run.report_limits(&tasks)?;
+        }
+        runs.push(run);
+    }
+    Ok(runs)
+}
+
+/// Configuration of a server of prepared runs, which records nothing.
+///
+/// # Errors
+/// A task that does not exist, or a policy without a profile.
+pub fn server_config<'a>(
+    config: &'a RunConfig,
+    loaded: &LoadedScript,
+    runs: &'a [SuiteRun<'a>],
+    access: AccessRules,
+) -> Result<ServerConfig<'a>, RunError> {
+    let start_episode = |id: &EpisodeId| {
+        let found = runs.iter().find(|run| run.name == id.suite);
+        let run = found.ok_or_else(|| format!("unknown suite {:?}", id.suite))?;
+        let task = run.suite.tasks.iter().find(|task| task.id == id.task);
+        let task = task.ok_or_else(|| format!("unknown task {}", id.task))?;
+        let id = EpisodeId { suite: run.suite.name.clone(), ..id.clone() };
+        run.start_episode(task, &id).map_err(|error| RequestError::Invalid(error.message))
+    };
+    let profile = config.policy.profile().ok_or_else(|| RunError::input("there is no profile to serve"))?;
+    let suites = runs.iter().map(|run| served_suite(config, run.suite)).collect::<Result<_, _>>()?;
+    Ok(ServerConfig {
+        suites,
+        profile: profile.clone(),
+        effort_n: runs.iter().map(|run| run.settings.robot.gripper.effort).fold(f64::INFINITY, f64::min),
+        privileged: config.policy.privileged,
+        seed: config.seed,
+        has_secret_seed: config.secret.is_some(),
+        split: runs.first().map_or(Split::Validation, |run| run.split),
+        fingerprint: provenance_hash(config, loaded),
+        access,
+        start_episode: Box::new(start_episode),
+        recorder: None,
+    })
+}
+
+/// The first observation of the first episode. It reports invalid scenes and sensors before a client connects.
+///
+/// # Errors
+/// The scene or a sensor is not valid.
+pub fn first_observation(config: &RunConfig, server: &ServerConfig) -> Result<Observation, RunError> {
+    let first = server.suites.iter().find_map(|suite| Some((suite, suite.tasks.first()?)));
+    let (suite, task) = first.ok_or_else(|| RunError::input("there is no task to serve"))?;
+    let id = EpisodeId {
+        suite: suite.name.clone(),
+        task: task.id,
+        episode: 0,
+        base_seed: server.seed,
+        split: server.split,
+    };
+    let mut episode = (server.start_episode)(&id).map_err(RunError::input)?;
+    let streams = server.profile.streams();
+    episode.begin(streams.clone());
+    episode.observe(&streams).map_err(|error| config.error(error))
+}
+
+/// A suite as clients see it: its name in results, the selected tasks, and the number of episodes of a run.
+fn served_suite(config: &RunConfig, suite: &Suite) -> Result<Suite, RunError> {
+    let tasks = select_tasks(config, suite)?.into_iter().cloned().collect();
+    let episodes = config.episodes_of(suite);
+    Ok(Suite { name: config.suite_name(suite), tasks, episodes, ..suite.clone() })
+}
+
+/// Hash of all that determines an episode, except its index and the actions of the client.
+fn provenance_hash(config: &RunConfig, loaded: &LoadedScript) -> String {
+    let all = json!([
+        env!("CARGO_PKG_VERSION"),
+        loaded.sources.bundle.hashes(),
+        config.options,
+        config.shifts,
+        config.settings,
+        config.rigid_twin,
+        config.secret.as_ref().map(SecretSeed::hash)
+    ]);
+    softvt_script::sha256(all.to_string().as_bytes())
+}
