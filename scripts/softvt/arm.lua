@@ -11,16 +11,13 @@ local PEAK = 1.875
 -- Minimum-jerk time scaling on [0, 1] (Flash and Hogan, 1985).
 local function smooth(u) return u * u * u * (10 + u * (6 * u - 15)) end
 
--- Ends the tactile servo and its readings.
-local function end_servo(self) self.grip, self.wants_readings = nil, false end
+-- Lets go of what the tactile servo holds.
+local function end_servo(self) self.grip = nil end
 
--- Sends one command and returns at the next control step, or raises the error that the host reports. While the servo holds an
--- object it may close further than commanded.
+-- Sends one command and returns at the next control step, or raises the error that the host reports. The hand keeps the closure
+-- that the servo found.
 function Arm:command(pose, closure)
-  if self.grip then
-    servo.keep(self.grip, fingers.readings())
-    closure = max(self.grip.closure, closure)
-  end
+  if self.grip then closure = max(self.grip, closure) end
   self.target, self.closure = pose, closure
   local refusal = yield(self.target, self.closure, self.gripping, nil, self.wants_readings, self.goal)
   if refusal then
@@ -124,6 +121,7 @@ local function feel(self)
     self:command(at:translated { shift * left[1], shift * left[2], shift * left[3] + height }, closure)
     return fingers.readings()
   end)
+  self.wants_readings = false
 end
 
 -- Closes on an object: to the given closure, or with the tactile servo, which feels how firmly the object must be held. A binary

@@ -1,7 +1,8 @@
 -- A tactile servo: a hand that feels how firmly it must hold. It closes until both gels touch, lifts until the gels slide along the
 -- object, and tightens while it lifts. The shear of a sliding gel grows with the force; that of a held object is its weight. Where
 -- the shear stops growing, the grip is the least one that holds, if the hand can go down a little and the object stays with it. The
--- hand tightens beyond that grip by a margin, goes back down and closes to it. Its readings are the markers and its own closure. Its parameters describe gels and markers only, not the object.
+-- hand tightens beyond that grip by a margin, goes back down, closes to it, and keeps it. Its readings are the markers and its own
+-- closure. Its parameters describe gels and markers only, not the object.
 local servo = {}
 
 local max, min, ceil = math.max, math.min, math.ceil
@@ -27,7 +28,7 @@ local SLOW, FAST, STRONG, FINEST = 0.015, 0.025, 0.15, 0.02
 local STIFFNESS, SURE, LEAST_RISE, MOST_RISE, HIGHEST = 0.35, 2, 0.4, 1.5, 12
 -- The shear has stopped growing if a line with a bend fits better by this many variances of the noise, the force has since
 -- grown by SEEN, and the shear at the bend is at least LEAST px. CONFIRM readings must confirm it.
-local EVIDENCE, SEEN, LEAST, CONFIRM = 24, 1.25, 0.03, 12
+local EVIDENCE, SEEN, LEAST, CONFIRM = 14, 1.2, 0.03, 12
 -- Test of a bend: the hand goes up and down by TRIAL mm. The shear of a held object is its weight and stays above the share HELD of that
 -- at the bend; gels that slide lose it on the way down.
 local TRIAL, HELD = 1, 0.6
@@ -36,9 +37,6 @@ local MARGIN, FIRMER, MOST_FAILURES = 1.25, 1.15, 2
 -- Going down: distance below where the object was lifted, mm; share of the grip from there on, mm per control step; and closing to
 -- the grip, mm per control step.
 local LANDING, LOOSENED, DOWN, CLOSING = 0.3, 0.3, 0.2, 0.15
--- While it holds: share of the shear over divergence of a sliding gel at which the grip becomes firmer, readings averaged, the
--- change as a share of the grip, and the largest number of changes.
-local SLIPPING, KEPT, TIGHTEN, MOST_CHANGES = 0.95, 4, 0.04, 6
 
 -- Mean motion of the markers of both fingers towards the fingertips, px, and the divergence of each: its load.
 local function read(fingers)
@@ -150,19 +148,9 @@ function Trial:settle(grip, height)
   for k = max(5, ceil((grip - self.closure) / MM / CLOSING)), 1, -1 do self:move((grip - self.closure) / MM / k, 0, 0) end
 end
 
--- Shear over load of the sliding gels at a closure.
-function Trial:sliding_ratio(closure)
-  local shear, load = 0, 0
-  for i, at in ipairs(self.closures) do
-    if self.shear[i] > 0 and at > self.touch + 0.8 * (closure - self.touch) and at <= closure then
-      shear, load = shear + self.shear[i], load + 0.5 * (self.left[i] + self.right[i])
-    end
-  end
-  return load > 0 and shear / load or math.huge
-end
-
--- Grasps what is between the fingers. `closure` is where they are, and `failures` counts the grasps that have failed here. `step` sends a closure with a height and a shift of the hand towards its left
--- finger, m, and returns the finger readings of the next control step. Returns the grip, for servo.keep.
+-- Grasps what is between the fingers. `closure` is where they are, and `failures` counts the grasps that have failed here. `step` sends a
+-- closure with a height and a shift of the hand towards its left finger, m, and returns the finger readings of the next control step.
+-- Returns the closure of the grip.
 function servo.grasp(closure, failures, step)
   local trial = setmetatable({
     step = step, closure = closure, height = 0, shift = 0, shear = {}, left = {}, right = {}, closures = {}, heights = {},
@@ -171,25 +159,9 @@ function servo.grasp(closure, failures, step)
   trial:approach()
   trial:slide()
   local least = trial:tighten(margin)
-  local grip = { closure = trial.closure, touch = trial.touch, ratio = math.huge, shear = 0, changes = 0, shears = {}, loads = {} }
-  if least then
-    grip.closure = min(1, least.closure + (margin - 1) * least.shear / least.slope)
-    grip.ratio, grip.shear = trial:sliding_ratio(least.closure), least.shear
-  end
-  trial:settle(grip.closure, least and least.height or trial.height)
+  local grip = least and min(1, least.closure + (margin - 1) * least.shear / least.slope) or trial.closure
+  trial:settle(grip, least and least.height or trial.height)
   return grip
-end
-
--- Keeps a grip while the object is carried, given the finger readings: tightens it slightly if the shear comes near that of sliding.
-function servo.keep(grip, fingers)
-  local n = #grip.shears + 1
-  local shear, left, right = read(fingers)
-  grip.shears[n], grip.loads[n] = shear, 0.5 * (left + right)
-  if n < KEPT or grip.changes >= MOST_CHANGES then return end
-  shear = recent(grip.shears, KEPT)
-  if shear > 0.5 * grip.shear and shear > SLIPPING * grip.ratio * recent(grip.loads, KEPT) then
-    grip.closure, grip.changes = min(1, grip.closure + TIGHTEN * (grip.closure - grip.touch)), grip.changes + 1
-  end
 end
 
 return servo
