@@ -11,6 +11,7 @@ from torchvision.models import resnet18
 from . import prompts
 from .data import MARKERS
 from .inputs import Shape
+from .numbers import GRIPPER
 
 # Steps of the integration of a flow.
 FLOW_STEPS = 10
@@ -87,7 +88,8 @@ class Policy(nn.Module):
         return self.answer(self.decoder(queries, memory))
 
     def loss(self, obs: dict[str, Tensor], actions: Tensor, is_step: Tensor) -> Tensor:
-        """Mean error over the steps of a chunk that lie within the demonstration; `is_step` is (B, chunk)."""
+        """Mean error (2,) of all numbers and of the gripper's alone, over the steps of a chunk that lie within the demonstration;
+        `is_step` is (B, chunk)."""
         memory = self.encoder(self.tokens(obs))
         if self.shape.head == "regression":
             error = (self._decode(memory) - actions).abs()
@@ -95,7 +97,8 @@ class Policy(nn.Module):
             noise, time = torch.randn_like(actions), torch.rand(len(actions), device=actions.device)
             noisy = torch.lerp(noise, actions, time[:, None, None])
             error = (self._decode(memory, noisy, time) - (actions - noise)).square()
-        return (error.mean(-1) * is_step).sum() / is_step.sum()
+        both = torch.stack([error.mean(-1), error[..., GRIPPER]])
+        return (both * is_step).sum((1, 2)) / is_step.sum()
 
     @torch.no_grad()
     def act(self, obs: dict[str, Tensor], noise: Tensor) -> Tensor:

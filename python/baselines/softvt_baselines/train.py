@@ -106,13 +106,13 @@ def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict)
         return min(1, (step + 1) / WARM_UP) * cosine
 
     schedule = torch.optim.lr_scheduler.LambdaLR(optimizer, rate)
-    started, total = time.monotonic(), torch.zeros((), device=options.device)
+    started, total = time.monotonic(), torch.zeros(2, device=options.device)
     with open(path.with_name(f"{path.name}.log"), "w") as log:
         for step in range(1, options.steps + 1):
             obs, actions, is_step = batches.draw(options.batch)
             with torch.autocast(options.device.type, torch.bfloat16, enabled=options.device.type == "cuda"):
                 loss = loss_of(obs, actions, is_step)
-            loss.backward()
+            loss[0].backward()
             torch.nn.utils.clip_grad_norm_(policy.parameters(), 1.0)
             optimizer.step()
             optimizer.zero_grad(set_to_none=True)
@@ -123,7 +123,8 @@ def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict)
             total += loss.detach()
             if step % REPORT == 0 or step == options.steps:
                 count = (step - 1) % REPORT + 1
-                line = f"{path.stem}: step {step} of {options.steps}, loss {total.item() / count:.4f}, {time.monotonic() - started:.0f} s"
+                loss, grip = (total / count).tolist()
+                line = f"{path.stem}: step {step} of {options.steps}, loss {loss:.4f}, gripper {grip:.4f}, {time.monotonic() - started:.0f} s"
                 print(line, flush=True)
                 print(line, file=log, flush=True)
                 total.zero_()
