@@ -136,7 +136,6 @@ pub struct Distribution {
     /// Number of values, which the mean is over; 0 of an empty list.
     pub n: usize,
     /// Number of invalid episodes, which rank above all values.
-    #[serde(default)]
     pub invalid: usize,
     /// 95 % interval of the mean by [`stratified_bootstrap`] over tasks; absent where it is not computed.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -83,16 +83,12 @@ pub struct Verdict {
     /// Peak of the largest node displacement of the target, %.
     pub d_peak_max: Option<f64>,
     /// Mean D of the target over all physics steps, %.
-    #[serde(default)]
     pub d_mean: Option<f64>,
     /// D of the target at the last physics step, %.
-    #[serde(default)]
     pub d_final: Option<f64>,
     /// 95th percentile of the target's D over all physics steps, %.
-    #[serde(default)]
     pub d_p95: Option<f64>,
     /// Time for which the target's D exceeded τ, s; null without a limit.
-    #[serde(default)]
     pub time_over_tau_s: Option<f64>,
     /// Peak D over the other soft bodies, the object at the goal included, %.
     pub d_peak_other: Option<f64>,
@@ -100,20 +96,15 @@ pub struct Verdict {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub others: Vec<OtherDeformation>,
     /// No other soft body exceeded its own τ; null where that is unknown.
-    #[serde(default)]
     pub others_ok: Option<bool>,
     /// First contact of the robot with a movable object that is not the target; null without one.
-    #[serde(default)]
     pub first_wrong_contact: Option<WrongContact>,
     /// Stage at which an episode without Goal Success ended; null with it.
-    #[serde(default)]
     pub failed_stage: Option<Stage>,
     /// Largest share of the target's volume that was beyond the collapse strain of its material at one time, %; null
     /// for a rigid target and for a material without that strain.
-    #[serde(default)]
     pub collapsed_volume_pct: Option<f64>,
     /// Share of the target's volume that was ever beyond the damage strain of its material, %; null as above.
-    #[serde(default)]
     pub damaged_volume_pct: Option<f64>,
     /// True if the first object that was lifted is not the target.
     pub wrong_instance: bool,
@@ -126,7 +117,6 @@ pub struct Verdict {
     /// D_peak ≤ τ; null for a rigid target and where evidence is missing.
     pub deformation_ok: Option<bool>,
     /// NoSlip where the criteria require it; null otherwise, and if the episode is invalid.
-    #[serde(default)]
     pub slip_ok: Option<bool>,
     /// Safety Success: goal, no drop, for a soft target D_peak ≤ τ, and no slip if the criteria require it.
     pub safety: bool,
@@ -138,23 +128,18 @@ pub struct Verdict {
     pub missing_evidence: u64,
     /// Number of physics steps at which the target's D could not be measured.
     pub missing_deformation: u64,
-    /// Goal Success with contact of both pads throughout the carry; null in runs of earlier versions.
-    #[serde(default)]
-    pub contact_success: Option<bool>,
-    /// Contact success with Safety Success and NoSlip; null in runs of earlier versions.
-    #[serde(default)]
-    pub contact_safety: Option<bool>,
+    /// Goal Success with contact of both pads throughout the carry.
+    pub contact_success: bool,
+    /// Contact success with Safety Success and NoSlip.
+    pub contact_safety: bool,
     /// Largest normal force on one pad, N.
     pub peak_pad_force_n: f64,
     /// Mean normal force per pad while both pads touched, N.
     pub mean_pad_force_n: f64,
     /// Least force per pad that holds the target on its path ([`super::grip`]), N; null if it was not carried.
-    #[serde(default)]
     pub least_pad_force_n: Option<f64>,
     /// Largest force on one pad over the least force; null if the target was not carried.
-    #[serde(default)]
     pub grip_ratio: Option<f64>,
-    /// Goal Success with a grip ratio of at most `criteria.gentle_ratio`; null in runs of earlier versions.
-    #[serde(default)]
-    pub gentle: Option<bool>,
+    /// Goal Success with a grip ratio of at most `criteria.gentle_ratio`.
+    pub gentle: bool,
 }

@@ -76,14 +76,12 @@ pub fn d_over_tau(record: &EpisodeRecord) -> Option<f64> {
 
 /// Differences of the second run from the first. An invalid episode succeeds at nothing and has no deformation.
 ///
-/// A quantity is compared over the pairs in which both episodes have it. Runs of earlier versions lack some, which then
-/// have no pairs.
+/// A quantity is compared over the pairs in which both episodes have it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PairedComparison {
     /// Number of episodes that both runs have.
     pub pairs: usize,
     /// Number of those that are invalid in at least one run.
-    #[serde(default)]
     pub invalid_pairs: usize,
     /// Goal Success, %.
     pub goal: PairedDifference,
@@ -92,46 +90,32 @@ pub struct PairedComparison {
     /// Safety Success, %; without pairs if all targets are soft and a run judged none of them.
     pub safety: PairedDifference,
     /// DSR: Goal Success with D_peak ≤ τ, %; over soft targets, without pairs if a run judged none of them.
-    #[serde(default)]
     pub dsr: PairedDifference,
     /// Goal Success with contact of both pads throughout the carry, %.
-    #[serde(default)]
     pub contact_success: PairedDifference,
     /// Contact success with Safety Success and NoSlip, %.
-    #[serde(default)]
     pub contact_safety: PairedDifference,
     /// Goal Success with a gentle grip, %.
-    #[serde(default)]
     pub gentle: PairedDifference,
     /// Largest force on a pad over the least that holds the target.
-    #[serde(default)]
     pub grip_ratio: PairedDifference,
     /// No other soft body beyond its own τ, %; where both runs know it.
-    #[serde(default)]
     pub others_ok: PairedDifference,
     /// Time over τ where both runs have one, s.
-    #[serde(default)]
     pub time_over_tau_s: PairedDifference,
     /// Episodes in which the robot touched a movable object other than the target, %; invalid ones included.
-    #[serde(default)]
     pub wrong_contact: PairedDifference,
     /// Stages at which episodes without Goal Success ended; invalid ones included.
-    #[serde(default)]
     pub failed_stages: PairedStages,
     /// Mean D within the episode, %.
-    #[serde(default)]
     pub d_mean: PairedDifference,
     /// D at the end of the episode, %.
-    #[serde(default)]
     pub d_final: PairedDifference,
     /// 95th percentile of D within the episode, %.
-    #[serde(default)]
     pub d_p95: PairedDifference,
     /// Largest share of the target's volume beyond its collapse strain, %.
-    #[serde(default)]
     pub collapsed_volume_pct: PairedDifference,
     /// Share of the target's volume that was ever beyond its damage strain, %.
-    #[serde(default)]
     pub damaged_volume_pct: PairedDifference,
     /// Peak D where both runs have one, % of the diagonal.
     pub d_peak: PairedDifference,
@@ -151,18 +135,12 @@ impl PairedComparison {
             let both = |pair: &EpisodePair| Some([of_valid(pair.first)?, of_valid(pair.second)?]);
             PairedDifference::from_values(pairs.iter().filter_map(both))
         };
-        let recorded = |value: fn(&EpisodeRecord) -> Option<bool>| {
-            let holds = |r: &EpisodeRecord| Some(value(r)? && r.outcome.is_valid());
-            let both = |pair: &EpisodePair| Some([holds(pair.first)?, holds(pair.second)?]);
-            PairedDifference::from_successes(pairs.iter().filter_map(both))
-        };
         let soft: Vec<_> =
             pairs.iter().filter(|pair| pair.first.header.soft && pair.second.header.soft).collect();
         // As in a summary: what was judged in no episode of a run has no rate.
         let is_judged = soft.is_empty()
             || soft.iter().any(|pair| pair.first.is_deformation_judged())
                 && soft.iter().any(|pair| pair.second.is_deformation_judged());
-        let with_harm = || pairs.iter().filter(|pair| pair.first.has_harm() && pair.second.has_harm());
         let touches_other = |r: &EpisodeRecord| r.verdict.first_wrong_contact.is_some();
         Self {
             pairs: pairs.len(),
@@ -181,9 +159,9 @@ impl PairedComparison {
                     .filter(|_| is_judged)
                     .map(|pair| [pair.first, pair.second].map(EpisodeRecord::is_deformation_safe)),
             ),
-            contact_success: recorded(|r| r.verdict.contact_success),
-            contact_safety: recorded(|r| r.verdict.contact_safety),
-            gentle: recorded(|r| r.verdict.gentle),
+            contact_success: rate(|r| r.verdict.contact_success),
+            contact_safety: rate(|r| r.verdict.contact_safety),
+            gentle: rate(|r| r.verdict.gentle),
             grip_ratio: mean(|r| r.verdict.grip_ratio),
             others_ok: PairedDifference::from_successes(
                 pairs
@@ -192,10 +170,10 @@ impl PairedComparison {
             ),
             time_over_tau_s: mean(|r| r.verdict.time_over_tau_s),
             wrong_contact: PairedDifference::from_failures(
-                with_harm().map(|pair| [pair.first, pair.second].map(touches_other)),
+                pairs.iter().map(|pair| [pair.first, pair.second].map(touches_other)),
             ),
             failed_stages: PairedStages::new(
-                with_harm().map(|pair| [pair.first, pair.second].map(|r| r.verdict.failed_stage)),
+                pairs.iter().map(|pair| [pair.first, pair.second].map(|r| r.verdict.failed_stage)),
             ),
             d_mean: mean(|r| r.verdict.d_mean),
             d_final: mean(|r| r.verdict.d_final),
@@ -488,32 +466,6 @@ mod tests {
         }
         let paired = compared(&unjudged, &judged);
         assert_eq!((paired.safety.n, paired.dsr.n), (2, 0));
-    }
-
-    #[test]
-    fn a_run_of_an_earlier_version_has_no_pairs_of_new_quantities() {
-        let new: Vec<_> = run(&[(true, true, 0.5), (false, false, 0.5)])
-            .into_iter()
-            .map(|r| with_harm(r, true, None))
-            .collect();
-        let mut old = new.clone();
-        for record in &mut old {
-            record.remove_new_fields();
-        }
-        for pairs in [pair_episodes(&old, &new), pair_episodes(&new, &old)] {
-            let paired = PairedComparison::from_pairs(&pairs);
-            assert_eq!((paired.goal.n, paired.d_peak.n, paired.failed_stages.n), (2, 2, 0));
-            let new = [paired.d_mean, paired.d_final, paired.d_p95, paired.wrong_contact, paired.others_ok];
-            let volumes = [paired.collapsed_volume_pct, paired.damaged_volume_pct];
-            assert!(new.into_iter().chain(volumes).all(|of| of.n == 0 && of.first.is_none()), "{paired:?}");
-        }
-        // A table of conditions that an earlier version wrote has fewer keys.
-        let mut json =
-            serde_json::to_value(PairedComparison::from_pairs(&pair_episodes(&old, &old))).unwrap();
-        for key in ["invalid_pairs", "wrong_contact", "failed_stages", "d_mean", "d_final", "d_p95"] {
-            json.as_object_mut().unwrap().remove(key);
-        }
-        assert_eq!(serde_json::from_value::<PairedComparison>(json).unwrap().pairs, 2);
     }
 
     #[test]

@@ -33,10 +33,8 @@ pub struct EpisodeHeader {
     /// True if the target is a soft body.
     pub soft: bool,
     /// Changes of the scene by the variation of the suite, if it varies. The policy does not see them.
-    #[serde(default)]
     pub variation: Option<Box<SceneVariation>>,
     /// Foreign demonstration that the episode re-executes, if any.
-    #[serde(default)]
     pub origin: Option<Box<Origin>>,
 }
 
@@ -117,21 +115,17 @@ pub struct RolloutStats {
     /// Largest number of Newton iterations in one physics step.
     pub newton_max: u32,
     /// True if the policy saw the true forces at the pads, which no real sensor gives.
-    #[serde(default)]
     pub force_observed: bool,
     /// Number of observations with an image of a camera that was inside an object; it shows the
     /// scene beyond that object.
-    #[serde(default)]
     pub camera_inside: u32,
     /// Number of control steps whose command was farther from the tool than one step of the inverse kinematics
     /// reaches (0.2 m, 0.6 rad): out of reach, or in the wrong frame or unit.
-    #[serde(default)]
     pub far_commands: u32,
     /// The first of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub first_far_command: Option<FarCommand>,
     /// Number of control steps whose grip value was outside of its range by more than a tenth of it, and was clamped.
-    #[serde(default)]
     pub clamped_grips: u32,
     /// Reason given by the controller for aborting the episode, if it did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -139,10 +133,8 @@ pub struct RolloutStats {
     /// Numbers noted by the controller, such as the grip that an expert chose.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub notes: BTreeMap<String, f64>,
-    /// SHA-256 of the actions, as the float64 numbers of their file (little-endian), hexadecimal; absent in runs of earlier
-    /// versions.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub actions_sha256: Option<String>,
+    /// SHA-256 of the actions, as the float64 numbers of their file (little-endian), hexadecimal.
+    pub actions_sha256: String,
     /// Hash of the final state, hexadecimal.
     pub state_hash: String,
 }
@@ -187,28 +179,6 @@ impl EpisodeRecord {
             true => self.verdict.deformation_ok.is_some(),
             false => self.verdict.tau.is_some(),
         }
-    }
-
-    /// Removes the fields that records of version 0.1 lack, for the comparison with such a record.
-    pub fn remove_new_fields(&mut self) {
-        self.stats.actions_sha256 = None;
-        (self.stats.first_far_command, self.stats.clamped_grips) = (None, 0);
-        let v = &mut self.verdict;
-        (v.d_mean, v.d_final, v.d_p95, v.time_over_tau_s) = (None, None, None, None);
-        (v.others_ok, v.first_wrong_contact, v.failed_stage) = (None, None, None);
-        (v.collapsed_volume_pct, v.damaged_volume_pct) = (None, None);
-        (v.slip_ok, v.contact_success, v.contact_safety) = (None, None, None);
-        (v.least_pad_force_n, v.grip_ratio, v.gentle) = (None, None, None);
-        v.others.clear();
-    }
-
-    /// True if harm to other objects was recorded; runs of earlier versions have no such fields.
-    pub(crate) fn has_harm(&self) -> bool {
-        let v = &self.verdict;
-        v.others_ok.is_some()
-            || v.failed_stage.is_some()
-            || v.d_mean.is_some()
-            || v.first_wrong_contact.is_some()
     }
 }
 

@@ -21,16 +21,8 @@ pub enum RecordError {
 }
 
 /// Keys that a record leaves out at their default.
-const OMITTED: [&str; 8] = [
-    "privileged",
-    "variation",
-    "origin",
-    "others",
-    "first_far_command",
-    "gave_up",
-    "notes",
-    "actions_sha256",
-];
+const OMITTED: [&str; 7] =
+    ["privileged", "variation", "origin", "others", "first_far_command", "gave_up", "notes"];
 
 /// Tolerance of sums and means, relative to 1.
 const TOLERANCE: f64 = 1e-9;
@@ -206,20 +198,21 @@ impl EpisodeRecord {
         if let Some(slip_ok) = v.slip_ok.filter(|ok| *ok != v.no_slip || !self.outcome.is_valid()) {
             return Err(format!("slip_ok is {slip_ok}, and no_slip is {}", v.no_slip));
         }
-        if v.gentle == Some(true) && !(v.goal && v.grip_ratio.is_some()) {
+        if v.gentle && !(v.goal && v.grip_ratio.is_some()) {
             return Err(format!(
                 "gentle is true, and goal is {}, grip_ratio {}",
                 v.goal,
                 or_null(v.grip_ratio)
             ));
         }
-        if v.contact_success == Some(true) && !v.goal {
+        if v.contact_success && !v.goal {
             return Err("contact_success is true, and goal is false".to_owned());
         }
-        if v.contact_safety != v.contact_success.map(|contact| contact && v.safety && v.no_slip) {
-            let [safety, success] = [v.contact_safety, v.contact_success].map(or_null);
-            let parts = format!("safety {}, no_slip {}", v.safety, v.no_slip);
-            return Err(format!("contact_safety is {safety}, and contact_success is {success}, {parts}"));
+        if v.contact_safety != (v.contact_success && v.safety && v.no_slip) {
+            return Err(format!(
+                "contact_safety is {}, and contact_success is {}, safety {}, no_slip {}",
+                v.contact_safety, v.contact_success, v.safety, v.no_slip
+            ));
         }
         Ok(())
     }

@@ -86,8 +86,7 @@ pub fn read(path: &Path) -> Result<Vec<Action>, ActionsError> {
     Ok(numbers.chunks_exact(width).map(action).collect())
 }
 
-/// Checks that the file of an episode below the run folder `dir` holds the actions of its record. Records of earlier
-/// versions have no checksum; of these the number of actions is compared.
+/// Checks that the file of an episode below the run folder `dir` holds the actions of its record.
 ///
 /// # Errors
 /// The file is missing, cut or changed.
@@ -98,9 +97,9 @@ pub fn verify(dir: &Path, record: &EpisodeRecord) -> Result<(), ActionsError> {
     if actions.len() != steps {
         return Err(ActionsError::Count { path, actions: actions.len(), steps });
     }
-    match &record.stats.actions_sha256 {
-        Some(expected) if *expected != checksum(&actions) => Err(ActionsError::Checksum { path }),
-        _ => Ok(()),
+    match record.stats.actions_sha256 == checksum(&actions) {
+        true => Ok(()),
+        false => Err(ActionsError::Checksum { path }),
     }
 }
 
@@ -115,7 +114,7 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let actions = [Action::new(Vec3::x(), Vec3::z(), 0.5); 3];
         let mut record = sample_record();
-        (record.stats.steps, record.stats.actions_sha256) = (3, Some(checksum(&actions)));
+        (record.stats.steps, record.stats.actions_sha256) = (3, checksum(&actions));
         let at = path(root.path(), record.header.id.index());
         let problem = |record: &EpisodeRecord| verify(root.path(), record).unwrap_err().to_string();
         assert!(problem(&record).contains("episode_00000.npy"), "a missing file is named");
@@ -126,7 +125,6 @@ mod tests {
         write(&at, &changed).unwrap();
         assert!(problem(&record).contains("episode_00000.npy: its SHA-256 differs"), "{}", problem(&record));
         write(&at, &actions[..2]).unwrap();
-        record.stats.actions_sha256 = None;
         assert!(
             problem(&record).contains("it has 2 actions, and the episode 3 steps"),
             "{}",

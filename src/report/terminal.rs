@@ -132,25 +132,15 @@ fn push_rates(table: &mut TextTable, summary: &SuiteSummary) {
     }
 }
 
-/// Contact success and the grip ratio; nothing for runs of versions that did not record them.
+/// Contact success and the grip ratio.
 fn push_grip(table: &mut TextTable, scores: &Scores) {
-    if let (Some(contact), Some(safety)) = (scores.contact_success_rate, scores.contact_safety_rate) {
-        let safe = decimal(safety.rate, 1);
-        table.line(format!(
-            "{:<22}{}  safe and without slip: {safe} %",
-            "Contact success",
-            interval(contact)
-        ));
-    }
-    if let Some(gentle) = scores.gentle_rate {
-        let Distribution { p5, median, p95, .. } = scores.grip_ratio;
-        let [p5, median, p95] = [p5, median, p95].map(|ratio| decimal(ratio, 1));
-        table.line(format!(
-            "{:<22}{}  grip ratio: P5 {p5}, median {median}, P95 {p95}",
-            "Gentle",
-            interval(gentle)
-        ));
-    }
+    let (contact, safe) =
+        (interval(scores.contact_success_rate), decimal(scores.contact_safety_rate.rate, 1));
+    table.line(format!("{:<22}{contact}  safe and without slip: {safe} %", "Contact success"));
+    let Distribution { p5, median, p95, .. } = scores.grip_ratio;
+    let [p5, median, p95] = [p5, median, p95].map(|ratio| decimal(ratio, 1));
+    let gentle = interval(scores.gentle_rate);
+    table.line(format!("{:<22}{gentle}  grip ratio: P5 {p5}, median {median}, P95 {p95}", "Gentle"));
 }
 
 /// Harm to other objects, and the stages at which episodes failed.
@@ -162,9 +152,7 @@ fn push_harm_and_stages(table: &mut TextTable, scores: &Scores) {
         };
         table.line(format!("{:<22}{}{unknown}", "Others within their τ", interval(rate)));
     }
-    if let Some(rate) = scores.wrong_contact_rate {
-        table.line(format!("{:<22}{}", "Touched other objects", interval(rate)));
-    }
+    table.line(format!("{:<22}{}", "Touched other objects", interval(scores.wrong_contact_rate)));
     if !scores.failed_stages.is_empty() {
         let stages = scores.failed_stages.iter().map(|(stage, count)| format!("{} {count}", stage.name()));
         table.line(format!("{:<22}{}", "Failed while", stages.collect::<Vec<_>>().join(" · ")));
@@ -338,8 +326,8 @@ mod tests {
     fn the_grip_is_summarised_and_a_required_criterion_is_named() {
         let records = [(1.5, true), (6.0, false)].map(|(ratio, gentle)| {
             episode(0, "put it there", |r| {
-                (r.verdict.grip_ratio, r.verdict.gentle) = (Some(ratio), Some(gentle));
-                (r.verdict.contact_success, r.verdict.contact_safety) = (Some(true), Some(gentle));
+                (r.verdict.grip_ratio, r.verdict.gentle) = (Some(ratio), gentle);
+                (r.verdict.contact_success, r.verdict.contact_safety) = (true, gentle);
                 r.verdict.slip_ok = Some(true);
             })
         });

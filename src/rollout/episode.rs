@@ -622,7 +622,7 @@ impl Episode {
             clamped_grips: self.clamped_grips,
             gave_up,
             notes: BTreeMap::new(),
-            actions_sha256: Some(checksum(&self.actions)),
+            actions_sha256: checksum(&self.actions),
             state_hash: state_hash(&self.sim),
         };
         let outcome = self.outcome.clone().unwrap_or(Outcome::Budget);

@@ -54,9 +54,6 @@ pub(crate) fn with_policy_fields(mut simulated: EpisodeRecord, record: &EpisodeR
     simulated.stats.camera_inside = record.stats.camera_inside;
     simulated.stats.gave_up.clone_from(&record.stats.gave_up);
     simulated.stats.notes.clone_from(&record.stats.notes);
-    if record.stats.actions_sha256.is_none() {
-        simulated.remove_new_fields();
-    }
     simulated
 }
 

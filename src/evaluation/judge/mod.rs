@@ -348,13 +348,13 @@ impl Judge {
             kappas: limit.iter().flat_map(|limit| KAPPAS.map(|kappa| kappa_verdict(limit, kappa))).collect(),
             missing_evidence: self.missing_evidence,
             missing_deformation: self.peak.missing,
-            contact_success: Some(contact_success),
-            contact_safety: Some(contact_success && safety && no_slip),
+            contact_success,
+            contact_safety: contact_success && safety && no_slip,
             peak_pad_force_n: self.pad_forces.peak_n,
             mean_pad_force_n: self.pad_forces.sum_n / self.pad_forces.steps.max(1) as f64,
             least_pad_force_n: self.grip.least_n,
             grip_ratio,
-            gentle: Some(goal && grip_ratio.is_some_and(|ratio| ratio <= self.config.criteria.gentle_ratio)),
+            gentle: goal && grip_ratio.is_some_and(|ratio| ratio <= self.config.criteria.gentle_ratio),
         }
     }
 

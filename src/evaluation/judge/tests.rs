@@ -151,15 +151,12 @@ fn the_grip_is_judged_beside_safety() {
     let v = verdict(1.2, 0.0, false);
     assert!((v.least_pad_force_n.unwrap() - 0.125).abs() < 1e-12, "{v:?}");
     assert!((v.grip_ratio.unwrap() - 9.6).abs() < 1e-9, "{v:?}");
-    assert_eq!((v.gentle, v.safety, v.slip_ok), (Some(false), true, None), "a firm grip is safe");
-    assert_eq!((v.contact_success, v.contact_safety), (Some(true), Some(true)));
+    assert_eq!((v.gentle, v.safety, v.slip_ok), (false, true, None), "a firm grip is safe");
+    assert_eq!((v.contact_success, v.contact_safety), (true, true));
     let slipped = verdict(1.2, 0.003, false);
-    assert_eq!((slipped.safety, slipped.no_slip, slipped.contact_safety), (true, false, Some(false)));
+    assert_eq!((slipped.safety, slipped.no_slip, slipped.contact_safety), (true, false, false));
     let required = verdict(1.2, 0.003, true);
-    assert_eq!(
-        (required.safety, required.slip_ok, required.contact_success),
-        (false, Some(false), Some(true))
-    );
+    assert_eq!((required.safety, required.slip_ok, required.contact_success), (false, Some(false), true));
     assert!(required.kappas.iter().all(|k| !k.safety), "at every κ");
     assert!(verdict(1.2, 0.001, true).safety);
 }
@@ -177,10 +174,7 @@ fn a_gentle_grip_reaches_the_goal_with_at_most_twice_the_least_force() {
         replay.rest(if goal { 30 } else { 3 }, 0.0);
         replay.verdict(if goal { Outcome::Completed } else { Outcome::Budget }).gentle
     };
-    assert_eq!(
-        [gentle(0.2499, true), gentle(0.2501, true), gentle(0.2, false)],
-        [Some(true), Some(false), Some(false)]
-    );
+    assert_eq!([gentle(0.2499, true), gentle(0.2501, true), gentle(0.2, false)], [true, false, false]);
 }
 
 #[test]
@@ -189,7 +183,7 @@ fn a_target_that_was_pushed_to_the_goal_has_no_contact_success() {
     replay.rest(30, 0.0);
     let v = replay.verdict(Outcome::Completed);
     assert!(v.goal && v.safety);
-    assert_eq!((v.contact_success, v.contact_safety, v.gentle), (Some(false), Some(false), Some(false)));
+    assert_eq!((v.contact_success, v.contact_safety, v.gentle), (false, false, false));
     assert_eq!((v.least_pad_force_n, v.grip_ratio), (None, None));
 }
 

@@ -29,14 +29,11 @@ pub struct Scores {
     /// Number of valid episodes whose safety could not be judged, for lack of a threshold or of evidence.
     pub safety_unknown: usize,
     /// Number of episodes with a soft target whose deformation was not judged, for lack of a limit or of evidence.
-    #[serde(default)]
     pub not_judged: usize,
     /// TSR, the task success rate: Goal Success.
-    #[serde(default)]
     pub tsr: Rate,
     /// DSR of SoftVTBench's later release: Goal Success with D_peak ≤ τ, whether dropped or not. Null where no target
     /// deforms, its rate where none was judged.
-    #[serde(default)]
     pub dsr: Option<Rate>,
     /// Rate of Goal Success over all episodes.
     pub goal_success_rate: Rate,
@@ -50,17 +47,13 @@ pub struct Scores {
     pub goal_safe_gap: Option<f64>,
     /// NoSlip.
     pub no_slip_rate: Rate,
-    /// Goal Success with contact of both pads throughout the carry; null in runs of versions that did not record it.
-    #[serde(default)]
-    pub contact_success_rate: Option<Rate>,
-    /// Contact success with Safety Success and NoSlip; null as above.
-    #[serde(default)]
-    pub contact_safety_rate: Option<Rate>,
-    /// Goal Success with a gentle grip; null as above.
-    #[serde(default)]
-    pub gentle_rate: Option<Rate>,
+    /// Goal Success with contact of both pads throughout the carry.
+    pub contact_success_rate: Rate,
+    /// Contact success with Safety Success and NoSlip.
+    pub contact_safety_rate: Rate,
+    /// Goal Success with a gentle grip.
+    pub gentle_rate: Rate,
     /// Largest force on a pad over the least that holds the target, over the valid episodes in which it was carried.
-    #[serde(default)]
     pub grip_ratio: Distribution,
     /// Goal Success by the looser predicate of SoftVTBench's released code.
     pub goal_v1_rate: Rate,
@@ -68,33 +61,24 @@ pub struct Scores {
     pub wrong_instance_rate: Rate,
     /// Share of valid episodes in which no other soft body exceeded its own τ, of those in which that is known; null
     /// where it is never known.
-    #[serde(default)]
     pub others_ok_rate: Option<Rate>,
     /// Number of valid episodes in which harm to other soft bodies is unknown.
-    #[serde(default)]
     pub others_unknown: usize,
-    /// Share of episodes in which the robot touched a movable object other than the target; null in runs of versions
-    /// that did not record it.
-    #[serde(default)]
-    pub wrong_contact_rate: Option<Rate>,
+    /// Share of episodes in which the robot touched a movable object other than the target.
+    pub wrong_contact_rate: Rate,
     /// Number of episodes without Goal Success by the stage at which they ended.
-    #[serde(default)]
     pub failed_stages: BTreeMap<Stage, usize>,
     /// Smallest and largest τ that was applied, %; null without any.
-    #[serde(default)]
     pub tau_range: Option<TauRange>,
     /// Deformation within the episodes.
-    #[serde(default)]
     pub within_episodes: EpisodeDeformation,
     /// Peak D of all episodes with a soft target, %; invalid ones rank as worst.
     pub deformation: Distribution,
     /// Peak D of the valid episodes that reached the goal, %.
     pub deformation_goal: Distribution,
     /// Largest share of the target's volume beyond its collapse strain, over all valid episodes, %.
-    #[serde(default)]
     pub collapsed_volume: Distribution,
     /// Share of the target's volume that was ever beyond its damage strain, over all valid episodes, %.
-    #[serde(default)]
     pub damaged_volume: Distribution,
 }
 
@@ -219,16 +203,12 @@ pub struct SuiteSummary {
     /// Name of the policy.
     pub policy: String,
     /// True if the policy saw the true state in any episode, as experts do.
-    #[serde(default)]
     pub privileged: bool,
     /// True if the policy saw the true forces at the pads in any episode; no real sensor gives them.
-    #[serde(default)]
     pub force_observed: bool,
     /// True if Safety Success needed NoSlip.
-    #[serde(default)]
     pub no_slip_required: bool,
     /// Commands that were not executed as given.
-    #[serde(default)]
     pub commands: CommandCounts,
     /// Scores of all episodes together.
     #[serde(flatten)]
@@ -277,11 +257,6 @@ impl Scores {
             *failed_stages.entry(stage).or_insert(0) += 1;
         }
         let taus = || soft.iter().filter_map(|r| r.verdict.tau);
-        let recorded = |value: fn(&EpisodeRecord) -> Option<bool>| {
-            let is_recorded = records.iter().any(|r| value(r).is_some());
-            let held = valid.iter().filter(|r| value(r) == Some(true)).count();
-            is_recorded.then(|| Rate::new(held, records.len()))
-        };
         let tau_range = taus().reduce(f64::min).zip(taus().reduce(f64::max));
         let over_valid = |value: fn(&EpisodeRecord) -> Option<f64>| {
             Distribution::from_values(valid.iter().filter_map(|r| value(r)).collect())
@@ -300,18 +275,15 @@ impl Scores {
             safety_success_rate: safety,
             goal_safe_gap: goal.rate.zip(safety.rate).map(|(goal, safety)| goal - safety),
             no_slip_rate: rate(|r| r.verdict.no_slip),
-            contact_success_rate: recorded(|r| r.verdict.contact_success),
-            contact_safety_rate: recorded(|r| r.verdict.contact_safety),
-            gentle_rate: recorded(|r| r.verdict.gentle),
+            contact_success_rate: rate(|r| r.verdict.contact_success),
+            contact_safety_rate: rate(|r| r.verdict.contact_safety),
+            gentle_rate: rate(|r| r.verdict.gentle),
             grip_ratio: over_valid(|r| r.verdict.grip_ratio),
             goal_v1_rate: rate(|r| r.verdict.goal_v1),
             wrong_instance_rate: rate(|r| r.verdict.wrong_instance),
             others_ok_rate: (!others.is_empty()).then(|| Rate::from_test(&others, |ok| *ok)),
             others_unknown: valid.len() - others.len(),
-            wrong_contact_rate: records
-                .iter()
-                .any(|r| r.has_harm())
-                .then(|| Rate::from_test(records, |r| r.verdict.first_wrong_contact.is_some())),
+            wrong_contact_rate: Rate::from_test(records, |r| r.verdict.first_wrong_contact.is_some()),
             failed_stages,
             tau_range: tau_range.map(|(min, max)| TauRange { min, max }),
             within_episodes: EpisodeDeformation {

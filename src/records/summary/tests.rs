@@ -122,10 +122,10 @@ fn harm_and_stages_are_counted() {
         ],
     );
     assert_eq!((s.scores.others_ok_rate.unwrap().rate, s.scores.others_unknown), (Some(50.0), 1));
-    assert!((s.scores.wrong_contact_rate.unwrap().rate.unwrap() - 100.0 / 3.0).abs() < 1e-9);
+    assert!((s.scores.wrong_contact_rate.rate.unwrap() - 100.0 / 3.0).abs() < 1e-9);
     assert_eq!(s.scores.failed_stages, [(Stage::Lift, 1)].into());
-    let old = SuiteSummary::from_records("suite", "expert", &[episode(0, 0, |_| ())]);
-    assert_eq!((old.scores.others_ok_rate, old.scores.wrong_contact_rate), (None, None));
+    let alone = SuiteSummary::from_records("suite", "expert", &[episode(0, 0, |_| ())]);
+    assert_eq!((alone.scores.others_ok_rate, alone.scores.wrong_contact_rate.rate), (None, Some(0.0)));
     let many: Vec<_> =
         (0..20).map(|i| episode(i as usize % 2, i / 2, |r| r.verdict.goal = i % 4 != 0)).collect();
     let s = SuiteSummary::from_records("suite", "expert", &many);

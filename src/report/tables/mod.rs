@@ -146,19 +146,17 @@ pub fn deformation_table(runs: &[RunSummary]) -> Option<ResultTable> {
     )
 }
 
-/// Contact success and the grip ratio; `None` if no run recorded them.
+/// Contact success and the grip ratio; `None` without a run.
 pub fn grip_table(runs: &[RunSummary]) -> Option<ResultTable> {
     let row = |run: &RunSummary| {
         let s = &run.summary.scores;
-        let optional = |of: &Option<Rate>| of.as_ref().map_or_else(|| "N/A".to_owned(), rate);
         let Distribution { p5, median, p95, n, .. } = s.grip_ratio;
         let head = [run.summary.suite.clone(), run.method.clone()];
-        let rates = [&s.contact_success_rate, &s.contact_safety_rate, &s.gentle_rate].map(optional);
+        let rates = [&s.contact_success_rate, &s.contact_safety_rate, &s.gentle_rate].map(rate);
         let ratios = [p5, median, p95].map(|ratio| decimal(ratio, 2));
         head.into_iter().chain(rates).chain(ratios).chain([n.to_string()]).collect()
     };
-    let known = runs.iter().filter(|run| run.summary.scores.gentle_rate.is_some());
-    let rows: Vec<Vec<String>> = known.map(row).collect();
+    let rows: Vec<Vec<String>> = runs.iter().map(row).collect();
     (!rows.is_empty()).then(|| ResultTable {
         caption: "Grip, % of episodes. Contact success is Goal Success with contact of both pads throughout the carry; contact safety is contact success with Safety Success and no slip of more than the limit. The grip ratio is the largest force on a pad over the least that holds the object on its path, over the valid episodes in which it was carried; gentle is Goal Success with a ratio of at most 2, unless the settings state another.".to_owned(),
         head: strings([
@@ -265,19 +263,17 @@ pub fn task_table(run: &RunSummary) -> ResultTable {
     }
 }
 
-/// Harm to other objects, and the stages at which episodes failed; `None` if no run recorded them.
+/// Harm to other objects, and the stages at which episodes failed; `None` without a run.
 pub fn stage_table(runs: &[RunSummary]) -> Option<ResultTable> {
     let row = |run: &RunSummary| {
         let s = &run.summary.scores;
         let optional = |of: &Option<Rate>| of.as_ref().map_or_else(|| "N/A".to_owned(), rate);
         let head = [run.summary.suite.clone(), run.method.clone()];
-        let harm =
-            [optional(&s.others_ok_rate), s.others_unknown.to_string(), optional(&s.wrong_contact_rate)];
+        let harm = [optional(&s.others_ok_rate), s.others_unknown.to_string(), rate(&s.wrong_contact_rate)];
         let stages = Stage::ALL.map(|stage| s.failed_stages.get(&stage).copied().unwrap_or(0).to_string());
         head.into_iter().chain(harm).chain(stages).collect()
     };
-    let known = runs.iter().filter(|run| run.summary.scores.wrong_contact_rate.is_some());
-    let rows: Vec<Vec<String>> = known.map(row).collect();
+    let rows: Vec<Vec<String>> = runs.iter().map(row).collect();
     let stages = Stage::ALL.map(Stage::name);
     let head = ["Suite", "Method", "Others within their τ", "Unknown", "Touched others"];
     (!rows.is_empty()).then(|| ResultTable {
