@@ -10,7 +10,7 @@ use softvt::{
     geometry::{Pose, Quat, Vec3, shape::Shape},
     physics::{BodyId, PhysicsParams},
     robot::{RobotSpec, tactile::TactileSpec},
-    rollout::{AssetCache, SensorAssets, SensorSuite, Simulation},
+    rollout::{AssetCache, SensorAssets, Sensors, Simulation},
     scene::{Camera, Lighting, Mask, Visual, VisualLayer},
     script,
     sensing::camera::{FrameView, RenderMesh, RenderObject, RenderScene, RenderedImage, Renderer},
@@ -54,9 +54,9 @@ fn the_first_task_of_spatial_soft_matches_its_reference() {
     )
     .expect("the scene builds");
     let assets = SensorAssets::default();
-    let new_sensors = || SensorSuite::new(&sim, &TactileSpec::default(), &assets);
+    let new_sensors = || Sensors::new(&sim, &TactileSpec::default(), &assets);
     let mut sensors = new_sensors();
-    let frame = SensorSuite::frame(&sim);
+    let frame = Sensors::frame(&sim);
     for name in ["third_person", "wrist"] {
         let camera = sensors.camera(name).expect("the scene has it").clone().with_edge(224);
         let image = sensors.render(&frame, &camera).expect("an image");

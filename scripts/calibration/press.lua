@@ -108,7 +108,7 @@ end
 
 function Bench:force(index) return self.body:force(self.pads[index].solid) end
 
-function Bench:slip_mm() return math.max(self.body:travel(self.pads[1].solid), self.body:travel(self.pads[2].solid)) end
+function Bench:slip_mm() return math.max(self.body:slip_mm(self.pads[1].solid), self.body:slip_mm(self.pads[2].solid)) end
 
 function Bench:both_touch() return math.min(self:force(1), self:force(2)) > trial.CONTACT_N end
 

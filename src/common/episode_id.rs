@@ -44,7 +44,7 @@ impl fmt::Display for EpisodeIndex {
     }
 }
 
-/// Unlimited list of episodes; the lists of two splits have no episode in common. Ordered by name.
+/// Which seeds an episode draws from. Two splits have no episode in common.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Split {

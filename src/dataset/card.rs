@@ -1,4 +1,4 @@
-//! [`Card`]: contents of a dataset, as `dataset.json` and as a human-readable `README.md`.
+//! [`DatasetCard`]: contents of a dataset, as `dataset.json` and as a human-readable `README.md`.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -46,7 +46,7 @@ pub struct Imported {
 
 /// Contents of a dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Card {
+pub struct DatasetCard {
     /// Version of softvt that recorded it.
     pub softvt: String,
     /// Control steps per second.
@@ -66,7 +66,7 @@ pub struct Card {
     pub tasks: Vec<TaskCount>,
 }
 
-impl Card {
+impl DatasetCard {
     /// Number of demonstrations.
     pub fn demos(&self) -> usize {
         self.tasks.iter().map(|task| task.demos).sum()

@@ -8,7 +8,7 @@ use softvt_robot::{
     gripper::{self, MAX_WIDTH},
     rotation,
 };
-use softvt_rollout::{FinishedEpisode, SensorSuite, StateRecording};
+use softvt_rollout::{FinishedEpisode, Sensors, StateRecording};
 use softvt_sensing::tactile::{MARKER_COUNT, Markers};
 
 use super::{
@@ -135,7 +135,7 @@ pub(crate) fn actions_stream(code: GripCode) -> &'static str {
 fn grip_forces(recording: &StateRecording, steps: usize) -> Vec<f64> {
     let after = recording.frames.iter().skip(1).chain(recording.frames.last());
     let force = |frame| {
-        let pads = SensorSuite::pad_forces(frame);
+        let pads = Sensors::pad_forces(frame);
         pads.iter().map(|pad| pad.wrench.normal().max(0.0)).sum::<f64>() / pads.len() as f64
     };
     after.take(steps).map(force).collect()

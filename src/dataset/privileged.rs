@@ -4,7 +4,7 @@ use softvt_evaluation::deformation::METRIC_ID;
 use softvt_geometry::Vec3;
 use softvt_policy::PadForce;
 use softvt_rollout::{
-    BodyConfiguration, FinishedEpisode, ScoreFrame, SensorSuite, StateRecording, StepTrace,
+    BodyConfiguration, ControlStepScore, FinishedEpisode, Sensors, StateRecording, StepTrace,
 };
 
 use super::stream::{DataStream, StreamValues, pose_row};
@@ -21,8 +21,7 @@ pub(super) fn streams(finished: &FinishedEpisode, recording: &StateRecording) ->
 /// Loads of the pads, and SoftVTBench's actions with forces.
 fn forces(finished: &FinishedEpisode, recording: &StateRecording) -> Vec<DataStream> {
     let steps = finished.actions.len();
-    let loads: Vec<[PadForce; 2]> =
-        recording.frames.iter().take(steps).map(SensorSuite::pad_forces).collect();
+    let loads: Vec<[PadForce; 2]> = recording.frames.iter().take(steps).map(Sensors::pad_forces).collect();
     let of = |pick: &dyn Fn(&PadForce) -> Vec3| -> Vec<f64> {
         loads.iter().flatten().flat_map(|pad| <[f64; 3]>::from(pick(pad))).collect()
     };
@@ -76,11 +75,12 @@ fn deformation(finished: &FinishedEpisode) -> Vec<DataStream> {
     let Some(reference) = &finished.reference else { return Vec::new() };
     let at_rest: [f64; 3] = reference.bbox_m().into();
     let frames = &finished.frames;
-    let of = |pick: &dyn Fn(&ScoreFrame) -> Option<f64>| {
+    let of = |pick: &dyn Fn(&ControlStepScore) -> Option<f64>| {
         shifted(frames, vec![0.0], |frame| vec![pick(frame).unwrap_or(f64::NAN)])
     };
-    let size =
-        |f: &ScoreFrame| f.deformation.map_or(vec![f64::NAN; 3], |d| d.bbox_m.iter().copied().collect());
+    let size = |f: &ControlStepScore| {
+        f.deformation.map_or(vec![f64::NAN; 3], |d| d.bbox_m.iter().copied().collect())
+    };
     let percent = |name: &str, numbers| {
         DataStream::f64(format!("privileged/soft_extras/{name}"), &[], numbers)
             .unit("% of the settled bounding box's diagonal", "")

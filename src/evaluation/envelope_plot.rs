@@ -17,7 +17,7 @@ const BOTTOM: f64 = 46.0;
 const TICKS: u32 = 5;
 
 /// The envelope in three lines: the safe window, τ, and the end of the sweep.
-pub fn three_lines(asset: &str, envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
+pub fn summary_text(asset: &str, envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
     format!(
         "{asset}: {}\n{}\n{}\n",
         window_line(envelope, limit),
@@ -243,7 +243,7 @@ mod tests {
     fn shown(scans: Scans) -> (String, String) {
         let envelope = Envelope::new(scans, 0.5);
         let limit = envelope.limit(0.5);
-        (three_lines("bun", &envelope, limit), plot("bun", &envelope, limit))
+        (summary_text("bun", &envelope, limit), plot("bun", &envelope, limit))
     }
 
     #[test]

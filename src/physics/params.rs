@@ -23,7 +23,7 @@ softvt_common::settings! {
         /// Tangential over normal contact stiffness. Mindlin (1949) gives 0.5 to 0.8 for solids; creep does
         /// not depend on it.
         shear_ratio: f64 = 0.5, "", Positive;
-        /// Gap below which a sample becomes a contact point, m; fast samples do so within 1.5 steps of approach.
+        /// Gap below which a sample becomes a contact point, m. A sample that will reach the surface within 1.5 steps becomes one as well.
         margin: f64 = 2e-4, "m", Positive;
         /// Speed below which a body may fall asleep, m/s.
         sleep_speed: f64 = 1e-4, "m/s", NotNegative;

@@ -57,13 +57,13 @@ pub struct Comparison {
     /// True if any target deforms.
     pub deformable: bool,
     /// Number of episodes present in only one run.
-    pub unmatched: usize,
+    pub unpaired: usize,
     /// Fields of `run.json`, other than the policy, in which the runs differ.
-    pub unlike: Vec<String>,
+    pub differing_settings: Vec<String>,
     /// Pairs of a suite and its rigid twin, one sentence per pair; empty for runs of the same suites.
     pub pairing: Vec<String>,
     /// One sentence per run with missing episodes.
-    pub partial: Vec<String>,
+    pub incomplete: Vec<String>,
     /// Over all common episodes.
     pub all: PairedComparison,
     /// Per task, in order.
@@ -112,10 +112,10 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
         second: policies(second),
         headings: headings(first, second),
         deformable: pairs.iter().any(|pair| pair.first.header.soft),
-        unmatched: count(first) + count(second) - 2 * pairs.len(),
-        unlike: differing_fields(first, second),
+        unpaired: count(first) + count(second) - 2 * pairs.len(),
+        differing_settings: differing_fields(first, second),
         pairing,
-        partial: all()
+        incomplete: all()
             .filter(|run| run.is_partial())
             .flat_map(|run| run.warnings().into_iter().take(1))
             .collect(),
@@ -317,14 +317,15 @@ pub fn table(comparison: &Comparison) -> String {
             counted(comparison.all.invalid_pairs, "pair")
         ));
     }
-    if comparison.unmatched > 0 {
-        let verb = if comparison.unmatched == 1 { "was" } else { "were" };
-        let episodes = counted(comparison.unmatched, "episode");
+    if comparison.unpaired > 0 {
+        let verb = if comparison.unpaired == 1 { "was" } else { "were" };
+        let episodes = counted(comparison.unpaired, "episode");
         table.line(format!("{episodes} present in only one run {verb} skipped"));
     }
-    comparison.pairing.iter().chain(&comparison.partial).for_each(|sentence| table.line(sentence));
-    if !comparison.unlike.is_empty() {
-        table.line(format!("the runs also differ in {} (run.json)", comparison.unlike.join(", ")));
+    comparison.pairing.iter().chain(&comparison.incomplete).for_each(|sentence| table.line(sentence));
+    if !comparison.differing_settings.is_empty() {
+        table
+            .line(format!("the runs also differ in {} (run.json)", comparison.differing_settings.join(", ")));
     }
     table.text
 }
@@ -520,8 +521,9 @@ mod tests {
         part.manifest["sources"] = json!({ "x.lua": "1", "y.lua": "2" });
         whole.manifest["thresholds"] = json!({ "bun": 1.0, "pie": 2.0 });
         part.manifest["thresholds"] = json!({ "bun": 1.0 });
-        let unlike =
-            |part: &StoredRun| compare(&[whole.clone()], std::slice::from_ref(part)).expect("pairs").unlike;
+        let unlike = |part: &StoredRun| {
+            compare(&[whole.clone()], std::slice::from_ref(part)).expect("pairs").differing_settings
+        };
         assert_eq!(unlike(&part), [""; 0]);
         part.manifest["sources"]["y.lua"] = json!("9");
         assert_eq!(in_project("../a/scripts/experts/grasp.lua"), "scripts/experts/grasp.lua");

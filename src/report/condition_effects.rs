@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::{
     run_summary::RunSummary,
-    stored_run::RunChange,
+    stored_run::ConditionLabel,
     tables::{ResultTable, strings},
 };
 use softvt_evaluation::statistics::Rate;
@@ -31,7 +31,7 @@ pub struct ConditionEffects {
 /// A condition against the unchanged run.
 #[derive(Clone, Debug)]
 pub struct ConditionEffect {
-    pub change: RunChange,
+    pub change: ConditionLabel,
     /// Goal and Safety Success under the condition.
     pub goal: Rate,
     pub safety: Rate,

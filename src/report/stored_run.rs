@@ -70,7 +70,7 @@ pub fn remove_folder(manifest: &mut Value) {
 
 /// Changes that a run makes to its suite.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RunChange {
+pub struct ConditionLabel {
     /// Name of the changed factor, such as `mass`; `several` for more than one.
     pub factor: String,
     /// Its value, if one number is changed.
@@ -79,7 +79,7 @@ pub struct RunChange {
     pub label: String,
 }
 
-impl RunChange {
+impl ConditionLabel {
     /// Order by factor, then by value; changes without a number come last.
     pub fn compare(&self, other: &Self) -> Ordering {
         let value = |change: &Self| change.value.unwrap_or(f64::NAN);
@@ -146,7 +146,7 @@ impl StoredRun {
     }
 
     /// Changes to the suite; `None` for a suite as it is.
-    pub fn change(&self) -> Option<RunChange> {
+    pub fn change(&self) -> Option<ConditionLabel> {
         let twin = self.is_rigid_twin().then(|| "rigid twin".to_owned());
         let changes: Vec<String> = self.changes("shifts").chain(self.changes("set")).chain(twin).collect();
         let label = changes.join(", ");
@@ -158,7 +158,7 @@ impl StoredRun {
             },
             _ => ("several", None),
         };
-        Some(RunChange { factor: factor.to_owned(), value, label })
+        Some(ConditionLabel { factor: factor.to_owned(), value, label })
     }
 
     /// Settings that the run under a condition and its unchanged run share.

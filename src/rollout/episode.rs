@@ -14,7 +14,7 @@ use super::{
     observation_history::ObservationHistory,
     sensor_assets::{SensingError, SensorAssets},
     sensor_noise::SensorSeed,
-    sensors::{SensorSuite, StateRecording, check_sensors},
+    sensors::{Sensors, StateRecording, check_sensors},
     simulation::{SettleError, Simulation, placed_at, state_hash},
     trace::StepTrace,
 };
@@ -128,7 +128,7 @@ pub struct FinishedEpisode {
     /// One entry per control step, if requested.
     pub trace: Vec<StepTrace>,
     /// One entry per control step: the input of other scoring rules.
-    pub frames: Vec<ScoreFrame>,
+    pub frames: Vec<ControlStepScore>,
     /// Action of each control step.
     pub actions: Vec<Action>,
     /// Settled shape of a soft target.
@@ -139,7 +139,7 @@ pub struct FinishedEpisode {
 
 /// Success and deformation at a control step, as other scoring rules use them.
 #[derive(Clone, Debug)]
-pub struct ScoreFrame {
+pub struct ControlStepScore {
     /// True if the goal had been reached and held for long enough.
     pub success_now: bool,
     /// The target's worst deformation over the physics steps of the control step; `None` if it is unknown.
@@ -277,10 +277,10 @@ pub struct Episode {
     newton: NewtonCount,
     min_det_f: f64,
     trace: Vec<StepTrace>,
-    frames: Vec<ScoreFrame>,
+    frames: Vec<ControlStepScore>,
     actions: Vec<Action>,
     disturbance: Disturbance,
-    sensors: SensorSuite,
+    sensors: Sensors,
     history: ObservationHistory,
     recorded: Option<RecordedStates>,
     /// Streams that will be requested.
@@ -341,7 +341,7 @@ impl Episode {
         let seed = EpisodeSeed::new(&spec.header.id, &spec.task.layout).with_secret(spec.secret.as_ref());
         let disturbance = Disturbance::new(&spec.settings.robot.disturbance, &seed);
         let sensors =
-            SensorSuite::new(&sim, &spec.settings.tactile, sensor_assets).with_seed(SensorSeed::new(&seed));
+            Sensors::new(&sim, &spec.settings.tactile, sensor_assets).with_seed(SensorSeed::new(&seed));
         let recorded = spec.record_states.then(RecordedStates::default);
         Ok(Self {
             spec,
@@ -498,7 +498,7 @@ impl Episode {
         let own = self.sensors.camera(camera)?.clone();
         let camera =
             Camera { width: width.unwrap_or(own.width), height: height.unwrap_or(own.height), ..own.clone() };
-        let frame = SensorSuite::frame(&self.sim);
+        let frame = Sensors::frame(&self.sim);
         let image = if camera == own {
             self.sensors.render(&frame, &camera)?
         } else {
@@ -510,9 +510,9 @@ impl Episode {
     /// Renders the current tactile image of a finger. It does not change the record.
     ///
     /// # Errors
-    /// As [`SensorSuite::tactile_reading`].
+    /// As [`Sensors::tactile_reading`].
     pub fn render_tactile(&mut self, side: Side) -> Result<RgbImage, SensingError> {
-        Ok(self.sensors.tactile_reading(&SensorSuite::frame(&self.sim), side)?.image)
+        Ok(self.sensors.tactile_reading(&Sensors::frame(&self.sim), side)?.image)
     }
 
     /// Keeps the state for later observations and for the recording.
@@ -520,7 +520,7 @@ impl Episode {
         if self.streams == SensorStreams::default() && self.recorded.is_none() {
             return;
         }
-        let frame = SensorSuite::frame(&self.sim);
+        let frame = Sensors::frame(&self.sim);
         if let Some(recorded) = &mut self.recorded {
             recorded.frames.push(frame.clone());
             recorded.d_pct.push(d_pct);
@@ -555,7 +555,7 @@ impl Episode {
             self.judge.observe(&evidence);
             worst = worst.into_iter().chain(now).max_by(|a, b| a.rms_pct.total_cmp(&b.rms_pct));
         }
-        self.frames.push(ScoreFrame { success_now: self.judge.is_goal_reached(), deformation: worst });
+        self.frames.push(ControlStepScore { success_now: self.judge.is_goal_reached(), deformation: worst });
         if self.spec.record_trace {
             self.trace.push(self.trace());
         }

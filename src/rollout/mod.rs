@@ -78,7 +78,7 @@ mod evidence;
 mod goal_in_scene;
 mod observation_history;
 mod robot_instance;
-mod scene_doubts;
+mod scene_warnings;
 mod sensor_assets;
 mod sensor_noise;
 mod sensors;
@@ -90,16 +90,18 @@ mod trace;
 pub use asset_cache::AssetCache;
 pub use build_error::BuildError;
 pub use controller::{ChunkedPolicy, Controller};
-pub use episode::{Episode, EpisodeError, EpisodeSpec, FinishedEpisode, ScoreFrame, checksum, target_asset};
+pub use episode::{
+    ControlStepScore, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, checksum, target_asset,
+};
 pub use goal_in_scene::check_goal;
 pub use robot_instance::RobotInstance;
-pub use scene_doubts::scene_doubts;
+pub use scene_warnings::scene_warnings;
 pub use sensor_assets::{SensingError, SensorAssets};
 pub use sensor_noise::SensorSeed;
 pub use sensors::{
-    BodyConfiguration, CAMERA_IMAGE_SUFFIXES, Proprioception, ROBOT_SEGMENTATION_ID, SensorSuite,
-    StateRecording, TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES, check_sensors,
+    BodyConfiguration, CAMERA_IMAGE_SUFFIXES, Proprioception, ROBOT_SEGMENTATION_ID, Sensors, StateRecording,
+    TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES, check_sensors,
 };
 pub use simulation::{ArticulatedPart, ObjectInstance, SettleError, Simulation, state_hash};
-pub use soft_model::{cost_doubt, soft_model};
+pub use soft_model::{cost_warning, soft_model};
 pub use trace::{ObjectTrace, StepTrace};

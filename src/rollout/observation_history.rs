@@ -2,7 +2,7 @@
 
 use std::{collections::VecDeque, sync::Arc};
 
-use super::{sensor_assets::SensingError, sensors::SensorSuite};
+use super::{sensor_assets::SensingError, sensors::Sensors};
 use softvt_physics::world::WorldSnapshot;
 use softvt_policy::{
     CameraImage, Observation, PastStep, RobotState, SensorStreams, TactileFrame, TactileHistory,
@@ -50,7 +50,7 @@ impl ObservationHistory {
     /// Adds the requested streams to an observation that has none.
     pub(super) fn observe(
         &mut self,
-        sensors: &mut SensorSuite,
+        sensors: &mut Sensors,
         proprioceptive: Observation,
         streams: &SensorStreams,
     ) -> Result<Observation, SensingError> {
@@ -67,7 +67,7 @@ impl ObservationHistory {
         };
         self.camera_inside += u32::from(*camera_inside && !*is_counted);
         *is_counted |= *camera_inside;
-        let forces = streams.force.then(|| SensorSuite::pad_forces(frame));
+        let forces = streams.force.then(|| Sensors::pad_forces(frame));
         let force_history = if streams.force { self.forces() } else { Vec::new() };
         let tactile = if streams.tactile { Some(self.tactile(sensors)?) } else { None };
         Ok(Observation { cameras, past: steps, tactile, forces, force_history, ..proprioceptive })
@@ -76,14 +76,14 @@ impl ObservationHistory {
     /// Forces on the left and right pad in the last states, N.
     fn forces(&self) -> Vec<[f64; 6]> {
         let both = |entry: &HistoryEntry| {
-            let [left, right] = SensorSuite::pad_forces(&entry.frame).map(|pad| pad.wrench.force);
+            let [left, right] = Sensors::pad_forces(&entry.frame).map(|pad| pad.wrench.force);
             [left.x, left.y, left.z, right.x, right.y, right.z]
         };
         self.entries.iter().map(both).collect()
     }
 
     /// Tactile frames of the last states; each is computed once.
-    fn tactile(&mut self, sensors: &mut SensorSuite) -> Result<TactileHistory, SensingError> {
+    fn tactile(&mut self, sensors: &mut Sensors) -> Result<TactileHistory, SensingError> {
         let mut frames = Vec::with_capacity(self.entries.len());
         for HistoryEntry { frame, tactile, .. } in &mut self.entries {
             let both = match tactile.take() {
@@ -101,7 +101,7 @@ impl HistoryEntry {
     /// Images of the requested cameras. Those of a state are rendered once.
     fn images(
         &mut self,
-        sensors: &mut SensorSuite,
+        sensors: &mut Sensors,
         streams: &SensorStreams,
     ) -> Result<Vec<Arc<CameraImage>>, SensingError> {
         if let Some(images) = self.cameras.as_ref().filter(|images| images.len() == streams.cameras.len()) {

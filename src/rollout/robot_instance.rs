@@ -36,12 +36,12 @@ pub struct RobotInstance {
     ik: DiffIk,
     gripper: GripperSetpoint,
     /// Commands that the robot has not responded to yet, oldest first.
-    delayed: VecDeque<ToolCommand>,
+    delayed: VecDeque<DelayedCommand>,
 }
 
 /// Command of a control step.
 #[derive(Clone, Copy, Debug)]
-struct ToolCommand {
+struct DelayedCommand {
     pose_b: Pose,
     grip: GripTarget,
 }
@@ -100,11 +100,11 @@ impl RobotInstance {
     /// Sets the command of a control step: tool pose in the base frame, and closure or grip force. The robot responds to it
     /// in the next control step, or `spec.latency` steps later; until then it follows the earlier ones.
     pub fn command(&mut self, world: &mut World, pose_b: &Pose, grip: GripTarget) {
-        self.delayed.push_back(ToolCommand { pose_b: *pose_b, grip });
+        self.delayed.push_back(DelayedCommand { pose_b: *pose_b, grip });
         if self.delayed.len() <= self.spec.latency as usize {
             return;
         }
-        let Some(ToolCommand { pose_b, grip }) = self.delayed.pop_front() else { return };
+        let Some(DelayedCommand { pose_b, grip }) = self.delayed.pop_front() else { return };
         let target = self.ik.step(&self.q(world), &pose_b);
         let drives = world.articulation_mut(self.articulation).drives_mut();
         drives.iter_mut().flatten().zip(target).for_each(|(drive, q)| drive.target = q);

@@ -39,7 +39,7 @@ use softvt_sensing::{
 ///
 /// Nothing is computed until it is requested. Meshes and skins come from shared [`SensorAssets`].
 #[derive(Debug)]
-pub struct SensorSuite {
+pub struct Sensors {
     scene: Arc<Scene>,
     spec: TactileSpec,
     robot: RobotSpec,
@@ -53,7 +53,7 @@ pub struct SensorSuite {
 }
 
 /// A clone shares the meshes but has its own working memory.
-impl Clone for SensorSuite {
+impl Clone for Sensors {
     fn clone(&self) -> Self {
         Self {
             scene: self.scene.clone(),
@@ -85,7 +85,7 @@ const TAXELS: [usize; 2] = [25, 21];
 /// Segmentation id of the robot. Objects have ids from 1 in the order of the scene, each followed by its parts.
 pub const ROBOT_SEGMENTATION_ID: u16 = 1000;
 
-impl SensorSuite {
+impl Sensors {
     /// The sensors of a simulation.
     pub fn new(sim: &Simulation, spec: &TactileSpec, assets: &SensorAssets) -> Self {
         Self {
@@ -189,7 +189,7 @@ impl SensorSuite {
     /// Renders the image of a camera in an initial state, in which it must not be inside an object.
     ///
     /// # Errors
-    /// As [`SensorSuite::render`]; also if the camera is inside an object.
+    /// As [`Sensors::render`]; also if the camera is inside an object.
     pub fn render_unobstructed(
         &mut self,
         frame: &WorldSnapshot,
@@ -209,7 +209,7 @@ impl SensorSuite {
     /// its first control step.
     ///
     /// # Errors
-    /// As [`SensorSuite::render_unobstructed`] and [`SensorSuite::tactile_readings`].
+    /// As [`Sensors::render_unobstructed`] and [`Sensors::tactile_readings`].
     pub fn validate(&mut self, frame: &WorldSnapshot, streams: &SensorStreams) -> Result<(), SensingError> {
         for name in &streams.cameras {
             let camera = self.camera(name)?.clone().with_edge(TRIAL_EDGE);
@@ -266,7 +266,7 @@ impl SensorSuite {
     /// Readings of both tactile sensors in the form of observations.
     ///
     /// # Errors
-    /// As [`SensorSuite::tactile_readings`].
+    /// As [`Sensors::tactile_readings`].
     pub fn tactile_frames(&mut self, frame: &WorldSnapshot) -> Result<[TactileFrame; 2], SensingError> {
         let both = self.tactile_readings(frame)?;
         let untouched = self.assets.sensor(&self.spec)?.untouched_image.clone();
@@ -288,7 +288,7 @@ impl SensorSuite {
     /// Reading of one tactile sensor in a state.
     ///
     /// # Errors
-    /// As [`SensorSuite::tactile_readings`].
+    /// As [`Sensors::tactile_readings`].
     pub fn tactile_reading(
         &mut self,
         frame: &WorldSnapshot,
@@ -484,7 +484,7 @@ pub enum BodyConfiguration<'a> {
 #[derive(Debug)]
 pub struct StateRecording {
     /// Sensors of the simulation.
-    pub sensors: SensorSuite,
+    pub sensors: Sensors,
     /// The settled state and the state after each control step.
     pub frames: Vec<WorldSnapshot>,
     /// The target's largest D over the physics steps of each control step, % of the settled diagonal, after 0 for the settled state;

@@ -44,8 +44,8 @@ fn two_digits(number: f64) -> String {
     format_number(((number / unit).round() * unit * 1e6).round() / 1e6)
 }
 
-/// A doubt about a scene whose soft bodies are slow to simulate.
-pub fn cost_doubt(world: &World) -> Option<String> {
+/// A warning about a scene whose soft bodies are slow to simulate.
+pub fn cost_warning(world: &World) -> Option<String> {
     let nodes = world.soft_bodies().iter().map(|soft| soft.state.model.mesh.nodes.len()).sum();
     let cost =
         || format!("the soft bodies of the scene have {}; a lower resolution is faster", cost_of(nodes));

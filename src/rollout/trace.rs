@@ -25,7 +25,7 @@ pub struct StepTrace {
     pub closure: f64,
     /// Normal force of the left and right pad on the target, N.
     pub pad_force_n: [f64; 2],
-    /// Shear force over friction capacity of the two pads, 0..=1.
+    /// Shear force over friction friction_capacity of the two pads, 0..=1.
     pub friction_utilisation: [f64; 2],
     /// Slip of the two pads along the target, mm.
     pub slip_mm: [f64; 2],
@@ -85,8 +85,8 @@ impl StepTrace {
             closure: sim.robot.closure(),
             pad_force_n: contacts.map(|t| t.normal_force),
             friction_utilisation: contacts
-                .map(|t| if t.capacity > 0.0 { t.shear() / t.capacity } else { 0.0 }),
-            slip_mm: contacts.map(|t| 1e3 * t.travel),
+                .map(|t| if t.friction_capacity > 0.0 { t.shear() / t.friction_capacity } else { 0.0 }),
+            slip_mm: contacts.map(|t| 1e3 * t.slip_distance),
             dropped,
             energy_j: [energy.kinetic, energy.elastic, energy.potential],
             newton: sim.world.stats().newton_steps,

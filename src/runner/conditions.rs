@@ -144,8 +144,8 @@ fn not_applicable(condition: &Condition, object_type: ObjectType) -> Option<Stri
     }
     match condition.only? {
         only if only == object_type => None,
-        ObjectType::Deformable => Some("nothing that is judged deforms".to_owned()),
-        ObjectType::Rigid => Some("it is for rigid objects".to_owned()),
+        ObjectType::Deformable => Some("it applies to suites of deformable objects only".to_owned()),
+        ObjectType::Rigid => Some("it applies to suites of rigid objects only".to_owned()),
     }
 }
 

@@ -15,7 +15,7 @@ use softvt_report::{
     softvtbench_files::{self, DebugFrame, DebugShape},
     video::{self, Caption},
 };
-use softvt_rollout::{FinishedEpisode, ScoreFrame};
+use softvt_rollout::{ControlStepScore, FinishedEpisode};
 
 /// Episodes of a run that become videos.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -141,7 +141,7 @@ impl EpisodeArtifacts<'_> {
 /// The log of every control step that the scorer of SoftVTBench reads.
 fn debug_frames(finished: &FinishedEpisode) -> Vec<DebugFrame> {
     let header = &finished.record.header;
-    let frame = |(step, frame): (usize, &ScoreFrame)| {
+    let frame = |(step, frame): (usize, &ControlStepScore)| {
         let (d, reference) = (frame.deformation.as_ref(), finished.reference.as_ref());
         let (rms, max, bbox) = (d.map(|d| d.rms_pct), d.map(|d| d.max_pct), d.map(|d| d.bbox_m));
         let shape = DebugShape::new(&header.asset, reference, rms, max, bbox);

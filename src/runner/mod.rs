@@ -3,6 +3,7 @@
 //! A [`Runner`] runs the suites of a script, [`conditions`] runs them under changes, [`recording`] makes datasets of them, and
 //! [`replay`] simulates recorded episodes again. [`SuiteRun`] is below all of them: a suite with everything that its episodes
 //! need. Nothing here prints: progress and messages go to an [`Observer`].
+#![warn(missing_docs, unreachable_pub)]
 
 pub mod conditions;
 mod config;

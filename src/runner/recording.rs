@@ -34,7 +34,7 @@ use softvt_common::{
 };
 use softvt_dataset::{
     Demonstration,
-    card::{Card, TaskCount, rejection_counts},
+    card::{DatasetCard, TaskCount, rejection_counts},
     check,
     demonstration_writer::DemonstrationWriter,
     layout::{self, DATASET, MANIFEST, PARTS, RECORDING, TaskPaths, VIDEO_STREAMS},
@@ -516,7 +516,7 @@ fn write_summary(
     }
     manifest::write(root, &entries)?;
     let _ = fs::remove_dir(root.join(PARTS));
-    let card = Card {
+    let card = DatasetCard {
         softvt: env!("CARGO_PKG_VERSION").to_owned(),
         fps: CONTROL_HZ,
         has_images: options.has_images,

@@ -19,8 +19,8 @@ use softvt_dataset::card::Imported;
 use softvt_policy::{PolicyError, SensorStreams, TaskBrief, remote::PolicyConnections};
 use softvt_records::record::Origin;
 use softvt_rollout::{
-    AssetCache, BuildError, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SensorAssets, SensorSuite,
-    Simulation, check_goal, check_sensors, cost_doubt,
+    AssetCache, BuildError, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SensorAssets, Sensors,
+    Simulation, check_goal, check_sensors, cost_warning,
 };
 use softvt_scene::{Body, Scene};
 use softvt_script::{EpisodeSetup, LoadedScript, SceneBuilder, SceneChanges};
@@ -383,7 +383,7 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// Checks the first scene of a task as far as it can be checked before anything moves. It settles only if
-    /// the goal may hold at the start. Returns a doubt about its cost.
+    /// the goal may hold at the start. Returns a warning about its cost.
     ///
     /// # Errors
     /// A scene or sensor that is not valid.
@@ -402,9 +402,9 @@ impl<'a> SuiteRun<'a> {
                 let spec = EpisodeSpec::new(id, "noop", task, &scene, Scene::clone(&scene), settings);
                 Episode::start(spec, &AssetCache::default(), &self.sensor_assets)?;
             }
-            let mut sensors = SensorSuite::new(&sim, &settings.tactile, &self.sensor_assets);
-            sensors.check_camera_positions(&SensorSuite::frame(&sim)).map_err(sense)?;
-            Ok(cost_doubt(&sim.world))
+            let mut sensors = Sensors::new(&sim, &settings.tactile, &self.sensor_assets);
+            sensors.check_camera_positions(&Sensors::frame(&sim)).map_err(sense)?;
+            Ok(cost_warning(&sim.world))
         };
         check().map_err(|error| self.episode_error(&error))
     }
@@ -456,8 +456,8 @@ impl<'a> SuiteRun<'a> {
             return Ok(());
         }
         let sim = Simulation::new(scene, &settings.physics, &settings.robot, &self.assets)?;
-        let mut sensors = SensorSuite::new(&sim, &settings.tactile, &self.sensor_assets);
-        sensors.validate(&SensorSuite::frame(&sim), &streams).map_err(sense)
+        let mut sensors = Sensors::new(&sim, &settings.tactile, &self.sensor_assets);
+        sensors.validate(&Sensors::frame(&sim), &streams).map_err(sense)
     }
 }
 

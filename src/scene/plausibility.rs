@@ -18,20 +18,20 @@ const MAX_SAG: f64 = 0.15;
 
 impl Asset {
     /// Doubts about its material, one sentence each.
-    pub fn doubts(&self) -> Vec<String> {
+    pub fn warnings(&self) -> Vec<String> {
         match &self.body {
             Body::Soft(material @ SoftMaterial { youngs_pa, density, .. }) => {
-                let units = youngs_doubt(*youngs_pa).into_iter().chain(density_doubt(*density));
-                units.chain(self.sag_doubt(material)).collect()
+                let units = youngs_warning(*youngs_pa).into_iter().chain(density_warning(*density));
+                units.chain(self.sag_warning(material)).collect()
             }
-            Body::Rigid { density } => density_doubt(*density).into_iter().collect(),
-            Body::Articulated(parts) => parts.iter().filter_map(part_doubt).collect(),
+            Body::Rigid { density } => density_warning(*density).into_iter().collect(),
+            Body::Articulated(parts) => parts.iter().filter_map(part_warning).collect(),
             Body::Static | Body::Scenery => Vec::new(),
         }
     }
 
-    /// A doubt about a soft body that is compressed by its own weight: ρ g h / 2 E for an upright block of height h.
-    fn sag_doubt(&self, material: &SoftMaterial) -> Option<String> {
+    /// A warning about a soft body that is compressed by its own weight: ρ g h / 2 E for an upright block of height h.
+    fn sag_warning(&self, material: &SoftMaterial) -> Option<String> {
         let SoftMaterial { youngs_pa, density, .. } = material;
         let height = self.shape.bounds().size().z;
         let sag = density * GRAVITY * height / (2.0 * youngs_pa);
@@ -49,11 +49,11 @@ impl Asset {
     }
 }
 
-fn part_doubt(part: &Part) -> Option<String> {
-    density_doubt(part.density).map(|doubt| format!("part {}: {doubt}", part.name))
+fn part_warning(part: &Part) -> Option<String> {
+    density_warning(part.density).map(|warning| format!("part {}: {warning}", part.name))
 }
 
-fn youngs_doubt(pascals: f64) -> Option<String> {
+fn youngs_warning(pascals: f64) -> Option<String> {
     if pascals < MIN_YOUNGS_PA {
         let converted = 1e3 * pascals;
         return Some(format!(
@@ -65,7 +65,7 @@ fn youngs_doubt(pascals: f64) -> Option<String> {
     })
 }
 
-fn density_doubt(density: f64) -> Option<String> {
+fn density_warning(density: f64) -> Option<String> {
     if density < MIN_DENSITY {
         let converted = 1e3 * density;
         return Some(format!(
@@ -82,7 +82,7 @@ mod tests {
     use softvt_geometry::{Vec3, shape::Shape};
     use softvt_physics::contact::Friction;
 
-    fn doubts(youngs_pa: f64, density: f64) -> Vec<String> {
+    fn warnings(youngs_pa: f64, density: f64) -> Vec<String> {
         let material = SoftMaterial {
             youngs_pa,
             poisson: 0.3,
@@ -100,27 +100,27 @@ mod tests {
             visuals: Vec::new(),
             hints: Default::default(),
         };
-        asset.doubts()
+        asset.warnings()
     }
 
     #[test]
     fn values_in_other_units_are_doubted_with_the_likely_one() {
-        assert_eq!(doubts(4e4, 300.0), [""; 0]);
-        let both = doubts(40.0, 0.3);
+        assert_eq!(warnings(4e4, 300.0), [""; 0]);
+        let both = warnings(40.0, 0.3);
         assert!(both[0].contains("did you mean 40 kPa, youngs_pa = 40000?"), "{both:?}");
         assert!(both[1].contains("did you mean 0.3 g/cm³, density = 300?"), "{both:?}");
-        assert_eq!(doubts(1e3, 20.0), [""; 0], "a soft, light foam");
+        assert_eq!(warnings(1e3, 20.0), [""; 0], "a soft, light foam");
     }
 
     #[test]
     fn a_body_that_its_weight_compresses_is_doubted() {
-        assert_eq!(doubts(5e3, 1000.0), [""; 0]);
+        assert_eq!(warnings(5e3, 1000.0), [""; 0]);
         // ρ g h / 2 E = 0.39.
-        let sagging = doubts(500.0, 1000.0);
+        let sagging = warnings(500.0, 1000.0);
         assert!(
             sagging[0].starts_with("it sags to about 61 % of its height under its own weight"),
             "{sagging:?}"
         );
-        assert!(doubts(25.0, 300.0)[1].starts_with("it collapses under its own weight"));
+        assert!(warnings(25.0, 300.0)[1].starts_with("it collapses under its own weight"));
     }
 }

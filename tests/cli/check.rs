@@ -115,9 +115,9 @@ fn a_soft_body_of_few_voxels_across_is_doubted() {
 
 #[test]
 fn implausible_units_and_wide_objects_are_doubted() {
-    let doubts = |small: Small| small.project().succeeds("check x.lua").err;
+    let warnings = |small: Small| small.project().succeeds("check x.lua").err;
     let light =
-        doubts(Small { material: "youngs_pa = 40, poisson = 0.3, density = 0.3", ..Small::default() });
+        warnings(Small { material: "youngs_pa = 40, poisson = 0.3, density = 0.3", ..Small::default() });
     assert!(
         light.contains("asset cube: youngs_pa is 40 Pa, softer than a gel; did you mean 40 kPa"),
         "{light}"
@@ -126,14 +126,14 @@ fn implausible_units_and_wide_objects_are_doubted() {
         light.contains("asset cube: density is 0.3 kg/m³, lighter than foam; did you mean 0.3 g/cm³"),
         "{light}"
     );
-    let wide = doubts(Small {
+    let wide = warnings(Small {
         shape: "softvt.shape.box { size = { 0.12, 0.1, 0.04 } }:grounded()",
         ..Small::default()
     });
     assert!(wide.contains("asset cube: it is 100 mm wide, and the gripper opens 80 mm"), "{wide}");
-    assert!(!doubts(Small::default()).contains("warning"));
+    assert!(!warnings(Small::default()).contains("warning"));
     let soft =
-        doubts(Small { material: "youngs_pa = 600, poisson = 0.3, density = 900", ..Small::default() });
+        warnings(Small { material: "youngs_pa = 600, poisson = 0.3, density = 900", ..Small::default() });
     assert!(soft.contains("asset cube: it sags to about 71 % of its height under its own weight"), "{soft}");
     let ball = "softvt.shape.sphere { radius = 0.02 }";
     let text = Small::default()

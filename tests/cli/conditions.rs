@@ -82,7 +82,11 @@ fn conditions_without_effect_are_reported_and_not_run() {
     let output = project.succeeds("suites/trial.lua --policy noop --out run");
     let row = output.out.lines().find(|line| line.starts_with("hard  ")).expect("a row");
     assert!(row.split_whitespace().skip(1).all(|cell| cell == "N/A"), "{row}");
-    assert!(output.out.contains("hard: N/A, nothing that is judged deforms"), "{}", output.out);
+    assert!(
+        output.out.contains("hard: N/A, it applies to suites of deformable objects only"),
+        "{}",
+        output.out
+    );
     assert!(!project.path("run/hard").exists() && project.path("run/weak/summary.json").exists());
     let twin = self::project(THREE, "deformable");
     twin.succeeds("suites/trial.lua --policy noop --twin rigid --out run");

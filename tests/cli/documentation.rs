@@ -5,7 +5,7 @@ use std::{path::Path, time::Duration};
 
 use softvt::{
     evaluation::{
-        envelope_plot::{plot, three_lines},
+        envelope_plot::{plot, summary_text},
         thresholds::ThresholdFile,
     },
     script,
@@ -213,7 +213,7 @@ fn the_calibration_page_is_current() {
         let path = format!("assets/calibration/{asset}.json");
         let file = ThresholdFile::parse(&read(&path), &path).expect("a threshold file");
         let envelope = &file.envelopes[&asset];
-        let text = three_lines(&asset, envelope, file.limit(&asset));
+        let text = summary_text(&asset, envelope, file.limit(&asset));
         assert_eq!(fence.text, text, "{asset} is out of date: run softvt scripts/calibrate.lua");
         assert_eq!(read(&format!("assets/calibration/{asset}.txt")), text, "{asset}");
         assert!(page.contains(&format!("| [{asset}](#{asset}) | ")), "{asset}");

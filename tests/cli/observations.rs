@@ -9,7 +9,7 @@ use softvt::{
     policy::{Action, ActionChunk, Observation, Policy, PolicyError, RobotState, SensorStreams, TaskBrief},
     records::{record::EpisodeRecord, summary::SuiteSummary},
     report::terminal,
-    rollout::{AssetCache, ChunkedPolicy, Episode, EpisodeSpec, SensorAssets, SensorSuite, Simulation},
+    rollout::{AssetCache, ChunkedPolicy, Episode, EpisodeSpec, SensorAssets, Sensors, Simulation},
     script::{self, LoadedScript},
     sensing::tactile::MosaicLayout,
 };
@@ -269,9 +269,9 @@ fn left_and_right_are_those_of_the_image() {
         .scene;
         let sim =
             Simulation::new(Arc::new(scene), &settings.physics, &settings.robot, &rests).expect("it builds");
-        let mut senses = SensorSuite::new(&sim, &settings.tactile, &looks);
+        let mut senses = Sensors::new(&sim, &settings.tactile, &looks);
         let camera = senses.camera("third_person").expect("there").clone();
-        let picture = senses.render(&SensorSuite::frame(&sim), &camera).expect("drawn");
+        let picture = senses.render(&Sensors::frame(&sim), &camera).expect("drawn");
         let column = |name: &str| {
             let id = sim.objects.iter().position(|o| o.name == name).expect("placed") as u16 + 1;
             let of = picture.segmentation.iter().enumerate().filter(|(_, s)| **s == id);

@@ -15,7 +15,7 @@ use softvt_common::{
     parallel,
     text::{self, counted},
 };
-use softvt_rollout::{AssetCache, SensorAssets, scene_doubts};
+use softvt_rollout::{AssetCache, SensorAssets, scene_warnings};
 use softvt_runner::{
     EpisodeList, LoadedRun, SuiteRun, conditions,
     selection::{check_distinct_out_dirs, select_episodes},
@@ -67,8 +67,8 @@ pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
 fn check_suite(mut run: SuiteRun) -> Result<(), CliError> {
     let suite = run.suite;
     let tasks: Vec<_> = suite.tasks.iter().collect();
-    for doubt in check_first_scenes(&run, &tasks)? {
-        eprint_notice(format!("warning: {doubt}"));
+    for warning in check_first_scenes(&run, &tasks)? {
+        eprint_notice(format!("warning: {warning}"));
     }
     run.jobs = select_episodes(run.config, suite, &tasks);
     run.scan_limits(&tasks)?;
@@ -91,25 +91,25 @@ fn check_suite(mut run: SuiteRun) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Builds and checks the first scene of every task on all processors. Returns doubts about their objects.
+/// Builds and checks the first scene of every task on all processors. Returns warnings about their objects.
 fn check_first_scenes(run: &SuiteRun, tasks: &[&Task]) -> Result<BTreeSet<String>, CliError> {
     // Opening the scenes runs the whole script, so each thread takes idle ones before it opens others.
     let idle: Mutex<Vec<SceneBuilder>> = Mutex::default();
-    let mut doubts = BTreeSet::new();
+    let mut warnings = BTreeSet::new();
     let check = |job: usize| -> Result<BTreeSet<String>, CliError> {
         let task = tasks[job];
         let taken = parallel::lock(&idle).pop();
         let builder = taken.map_or_else(|| SceneBuilder::open(run.loaded), Ok)?;
         let setup = builder.build(&run.episode_id(task, 0), &run.changes())?;
         parallel::lock(&idle).push(builder);
-        let mut doubts = scene_doubts(task, &setup.scene, &run.assets);
-        let of_task = |doubt: String| format!("task {}: {doubt}", task.id);
-        doubts.extend(run.check_scene(task, setup.scene)?.map(of_task));
-        Ok(doubts)
+        let mut warnings = scene_warnings(task, &setup.scene, &run.assets);
+        let of_task = |warning: String| format!("task {}: {warning}", task.id);
+        warnings.extend(run.check_scene(task, setup.scene)?.map(of_task));
+        Ok(warnings)
     };
     parallel::run(tasks.len(), run.config.thread_count(), cancel::requested, check, |_, found| {
-        doubts.extend(found);
+        warnings.extend(found);
         Ok(())
     })?;
-    if cancel::requested() { Err(CliError::interrupted("interrupted")) } else { Ok(doubts) }
+    if cancel::requested() { Err(CliError::interrupted("interrupted")) } else { Ok(warnings) }
 }

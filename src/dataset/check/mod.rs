@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::{
     DatasetError, StreamValues, TaskFile,
-    card::Card,
+    card::DatasetCard,
     demonstration::actions_stream,
     layout::{IMAGE_STREAMS, MANIFEST},
     manifest::{self, ManifestEntry},
@@ -24,7 +24,7 @@ use softvt_sensing::tactile::MARKER_COUNT;
 
 /// Result of a check.
 #[derive(Debug, Default)]
-pub struct Findings {
+pub struct CheckReport {
     /// Demonstrations checked.
     pub demos: usize,
     /// Control steps in them.
@@ -55,7 +55,7 @@ const REQUIRED_STREAMS: [(&str, &[usize]); 14] = [
 /// Tolerance of rotations, quaternion lengths and timestamps.
 const TOLERANCE: f64 = 1e-6;
 
-impl Findings {
+impl CheckReport {
     fn add(&mut self, path: &Path, key: &str, what: impl Into<String>) {
         self.problems.push(DatasetError::content(path, key, what).to_string());
     }
@@ -70,9 +70,9 @@ impl Findings {
 ///
 /// # Errors
 /// `dataset.json` or the manifest is missing or unreadable.
-pub fn folder(root: &Path) -> Result<Findings, DatasetError> {
-    let (card, entries) = (Card::read(root)?, manifest::read(root)?);
-    let mut findings = Findings::default();
+pub fn folder(root: &Path) -> Result<CheckReport, DatasetError> {
+    let (card, entries) = (DatasetCard::read(root)?, manifest::read(root)?);
+    let mut findings = CheckReport::default();
     let mut files: BTreeMap<&str, Vec<&ManifestEntry>> = BTreeMap::new();
     for entry in &entries {
         files.entry(&entry.hdf5_path).or_default().push(entry);
@@ -113,9 +113,9 @@ pub fn folder(root: &Path) -> Result<Findings, DatasetError> {
 ///
 /// # Errors
 /// The file cannot be opened.
-pub fn file(path: &Path) -> Result<Findings, DatasetError> {
+pub fn file(path: &Path) -> Result<CheckReport, DatasetError> {
     let file = TaskFile::open(path)?;
-    let mut findings = Findings::default();
+    let mut findings = CheckReport::default();
     if file.environment().is_ok_and(|environment| environment["env_name"] != "softvt") {
         let error = DatasetError::not_recorded_by_softvt(path, "/data, attribute env_args");
         findings.problems.push(error.to_string());
@@ -126,7 +126,7 @@ pub fn file(path: &Path) -> Result<Findings, DatasetError> {
 }
 
 /// Checks that the videos of a demonstration have one frame per step, at the control rate.
-fn check_videos(findings: &mut Findings, root: &Path, entry: &ManifestEntry) {
+fn check_videos(findings: &mut CheckReport, root: &Path, entry: &ManifestEntry) {
     for (stream, file) in &entry.video_files {
         let path = root.join(file);
         let bytes = std::fs::read(&path).map_err(FileError::io("read", &path));
@@ -147,7 +147,7 @@ fn check_videos(findings: &mut Findings, root: &Path, entry: &ManifestEntry) {
     }
 }
 
-fn check_demonstrations(findings: &mut Findings, file: &TaskFile) {
+fn check_demonstrations(findings: &mut CheckReport, file: &TaskFile) {
     if let Some(environment) = findings.take(file.environment()) {
         check_script(findings, file, &environment);
     }
@@ -186,7 +186,7 @@ fn check_demonstrations(findings: &mut Findings, file: &TaskFile) {
 }
 
 /// Checks the path of the script that a replay of the file runs.
-fn check_script(findings: &mut Findings, file: &TaskFile, environment: &Value) {
+fn check_script(findings: &mut CheckReport, file: &TaskFile, environment: &Value) {
     let script = environment["env_kwargs"]["script"].as_str().unwrap_or_default();
     let key = "/data, attribute env_args, script";
     if !is_script_path(script) {
@@ -202,7 +202,7 @@ pub fn is_script_path(script: &str) -> bool {
 
 /// A demonstration that is being checked.
 struct DemoCheck<'a> {
-    findings: &'a mut Findings,
+    findings: &'a mut CheckReport,
     file: &'a TaskFile,
     demo: usize,
     steps: usize,

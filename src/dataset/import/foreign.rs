@@ -8,7 +8,7 @@ use softvt_scene::InitialState;
 
 /// Layouts that can be imported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ForeignLayout {
+pub enum ForeignFormat {
     /// Relative steps for robosuite's controller, as stored by robomimic and LIBERO.
     Libero,
     /// Absolute poses, as stored by SoftVTBench.
@@ -16,7 +16,7 @@ pub enum ForeignLayout {
     Softvt,
 }
 
-impl ForeignLayout {
+impl ForeignFormat {
     /// Name in messages and records.
     pub fn name(self) -> &'static str {
         match self {
@@ -33,7 +33,7 @@ pub struct ForeignFile {
     pub path: PathBuf,
     /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
-    pub layout: ForeignLayout,
+    pub layout: ForeignFormat,
     /// Its demonstrations, by index.
     pub demos: Vec<ForeignDemo>,
 }

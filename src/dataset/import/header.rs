@@ -4,13 +4,13 @@ use serde_json::Value;
 
 use super::{
     super::{DatasetError, TaskFile},
-    foreign::{ForeignLayout, ForeignTask},
+    foreign::{ForeignFormat, ForeignTask},
 };
 use softvt_benchmark::CONTROL_HZ;
 
 /// Metadata of a file.
 pub(super) struct Header {
-    pub layout: ForeignLayout,
+    pub layout: ForeignFormat,
     /// `env_args`; null if missing.
     pub environment: Value,
 }
@@ -146,16 +146,16 @@ impl StepScale {
     const ROBOSUITE: Self = Self { translation_m: 0.05, rotation_rad: 0.5 };
 }
 
-fn layout(file: &TaskFile, environment: &Value) -> Result<ForeignLayout, DatasetError> {
+fn layout(file: &TaskFile, environment: &Value) -> Result<ForeignFormat, DatasetError> {
     let first = file.demos[0];
     if environment["env_name"] == "softvt" {
-        return Ok(ForeignLayout::Softvt);
+        return Ok(ForeignFormat::Softvt);
     }
     let shape = file.shape(first, "actions")?;
     let is_robosuite = || environment["type"] == 1 || ROBOSUITE.iter().any(|name| file.has(first, name));
     match shape[..] {
-        [_, 7 | 13] if file.has(first, "obs/eef_pose") => Ok(ForeignLayout::SoftVtBench),
-        [_, 7] if is_robosuite() => Ok(ForeignLayout::Libero),
+        [_, 7 | 13] if file.has(first, "obs/eef_pose") => Ok(ForeignFormat::SoftVtBench),
+        [_, 7] if is_robosuite() => Ok(ForeignFormat::Libero),
         _ => {
             let what = format!(
                 "unknown layout: actions of shape {shape:?} and neither obs/eef_pose (SoftVTBench: 7 or 13 numbers per action) nor \

@@ -23,7 +23,7 @@ use softvt_common::files::FileError;
 use softvt_policy::ToolCommand;
 
 pub use foreign::{
-    ForeignDemo, ForeignFile, ForeignLayout, ForeignObjectPose, ForeignTask, InitialCondition,
+    ForeignDemo, ForeignFile, ForeignFormat, ForeignObjectPose, ForeignTask, InitialCondition,
 };
 pub use object_matching::match_objects;
 
@@ -37,9 +37,9 @@ pub fn read(path: &Path) -> Result<ForeignFile, DatasetError> {
     let demo = |&demo: &usize| {
         let reader = DemoReader { file: &file, demo };
         match header.layout {
-            ForeignLayout::Softvt => softvt_demo(reader),
-            ForeignLayout::SoftVtBench => softvtbench::demo(reader, &header),
-            ForeignLayout::Libero => libero::demo(reader, &header),
+            ForeignFormat::Softvt => softvt_demo(reader),
+            ForeignFormat::SoftVtBench => softvtbench::demo(reader, &header),
+            ForeignFormat::Libero => libero::demo(reader, &header),
         }
     };
     let demos = file.demos.iter().map(demo).collect::<Result<_, _>>()?;

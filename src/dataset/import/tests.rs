@@ -121,7 +121,7 @@ impl FileBuilder {
         path
     }
 
-    fn read(&self) -> (ForeignLayout, ForeignDemo) {
+    fn read(&self) -> (ForeignFormat, ForeignDemo) {
         let read = read(&self.write()).unwrap();
         (read.layout, read.demos.into_iter().next().unwrap())
     }
@@ -163,7 +163,7 @@ fn liberos_steps_become_the_goals_of_its_controller() {
     let (layout, demo) = file.read();
     assert_eq!(
         (layout, demo.task.prompts.clone()),
-        (ForeignLayout::Libero, vec!["pick up the cup".to_owned()])
+        (ForeignFormat::Libero, vec!["pick up the cup".to_owned()])
     );
     // The states are from before each action, the observations from after it.
     for (k, action) in poses(&demo).iter().enumerate() {
@@ -278,7 +278,7 @@ fn object_poses_are_read_from_a_mujoco_state_by_its_model() {
 fn softvtbenchs_poses_are_transformed_from_its_tool_to_ours() {
     let file = FileBuilder::softvtbench();
     let (layout, mut demo) = file.read();
-    assert_eq!(layout, ForeignLayout::SoftVtBench);
+    assert_eq!(layout, ForeignFormat::SoftVtBench);
     assert_eq!(demo.task.prompts[0], "Pick up the  CUP.");
     for (k, action) in poses(&demo).iter().enumerate() {
         let away = action.position_b - tool(k).translation.vector;

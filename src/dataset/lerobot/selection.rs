@@ -7,7 +7,7 @@ use std::{
 
 use crate::{
     DatasetError, TaskFile,
-    card::Card,
+    card::DatasetCard,
     layout::{DATASET, IMAGE_STREAMS, MANIFEST},
     manifest::{self, ManifestEntry},
 };
@@ -53,7 +53,7 @@ pub(super) fn select(root: &Path, words: &[String]) -> Result<Selection, Dataset
         let what = "it is missing; expected the folder of a finished softvt record";
         return Err(DatasetError::content(root, DATASET, what));
     }
-    if !Card::read(root)?.has_images {
+    if !DatasetCard::read(root)?.has_images {
         let what = "images are stored only as videos, whose compression is lossy; record with --images hdf5";
         return Err(DatasetError::content(&card_path, "pictures", what));
     }

@@ -17,7 +17,7 @@ pub struct ContactRecord {
     /// True while the pair of surfaces slides, so that dynamic friction acts.
     pub is_sliding: bool,
     /// Distance by which the anchor was dragged since first contact, m.
-    pub travel: f64,
+    pub slip_distance: f64,
 }
 
 impl ContactRecord {
@@ -27,7 +27,7 @@ impl ContactRecord {
         anchor: Vec3::new(0.0, 0.0, 0.0),
         normal_impulse: 0.0,
         is_sliding: false,
-        travel: 0.0,
+        slip_distance: 0.0,
     };
 
     /// The record of a first contact at `anchor`.

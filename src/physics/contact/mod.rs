@@ -16,5 +16,5 @@ pub use collider::{Collider, ContactSurface, Friction, SurfaceStiffness};
 pub use contact_history::{ContactHistory, ContactRecord};
 pub use detect::{BodyBounds, ColliderMotion, ContactCandidate, DetectionLimits, detect};
 pub use manifold::ManifoldPoint;
-pub use soft_field::{FieldCandidate, FieldContact, SoftField, detect_soft, may_touch};
+pub use soft_field::{DeformedSdf, SdfCandidate, SdfContact, detect_soft, may_touch};
 pub use solid::{CollisionGeometry, GelSample, PairId};

@@ -18,7 +18,7 @@ const MAX_VISITED_VOXELS: usize = 64;
 const MAX_NEWTON: usize = 8;
 
 /// Signed distance field of a soft body's surface in its current state.
-pub struct SoftField<'a> {
+pub struct DeformedSdf<'a> {
     body: &'a FemState,
     surface: &'a dyn ContactSurface,
     centre_w: Vec3,
@@ -27,7 +27,7 @@ pub struct SoftField<'a> {
 
 /// Contact of a sample with the field of a soft body.
 #[derive(Clone, Copy, Debug)]
-pub struct FieldContact {
+pub struct SdfContact {
     /// Gap, m; negative inside.
     pub gap: f64,
     /// Outward normal, world.
@@ -51,7 +51,7 @@ struct RestPoint {
     inverse_gradient: Mat3,
 }
 
-impl<'a> SoftField<'a> {
+impl<'a> DeformedSdf<'a> {
     /// The field of `body`, whose surface at rest is `surface`.
     pub fn new(body: &'a FemState, surface: &'a dyn ContactSurface) -> Self {
         let mesh = &body.model.mesh;
@@ -61,14 +61,14 @@ impl<'a> SoftField<'a> {
 
     /// Contact of a square sample of edge `spacing` (m) at `p` with outward normal `facing` (world). `None` if the
     /// surface faces the same way, or does not cover the sample.
-    pub fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> Option<FieldContact> {
+    pub fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> Option<SdfContact> {
         let point = self.map_to_rest(p)?;
         let facing_o = point.inverse_gradient.try_inverse()?.tr_mul(facing).try_normalize(0.0)?;
         let contact = self.surface.contact(&point.p_o, &facing_o, spacing);
         let pushed = point.inverse_gradient.tr_mul(&contact.normal);
         let stretch = pushed.norm();
         let normal = pushed / stretch;
-        (contact.coverage > 0.0 && facing.dot(&normal) <= 0.3).then(|| FieldContact {
+        (contact.coverage > 0.0 && facing.dot(&normal) <= 0.3).then(|| SdfContact {
             gap: contact.phi / stretch,
             normal,
             coverage: contact.coverage,
@@ -166,7 +166,7 @@ fn trilinear(corners: &[Vec3; 8], local: &Vec3) -> (Vec3, Mat3) {
 
 /// A sample of one soft body near the surface of another, at the start of the step.
 #[derive(Clone, Copy, Debug)]
-pub struct FieldCandidate {
+pub struct SdfCandidate {
     /// Sample group of the first body.
     pub group: usize,
     /// Sample of the first body.
@@ -174,7 +174,7 @@ pub struct FieldCandidate {
     /// Position of the sample, m, world.
     pub p: Vec3,
     /// Contact with the second body's field.
-    pub contact: FieldContact,
+    pub contact: SdfContact,
 }
 
 /// Distance within which a point of speed up to `speed` (m/s) is tested, m.
@@ -194,9 +194,9 @@ pub fn may_touch(a: &FemState, b: &FemState, limits: DetectionLimits) -> bool {
 /// retained before the contact begins.
 pub fn detect_soft(
     body: &FemState,
-    field: &SoftField,
+    field: &DeformedSdf,
     limits: DetectionLimits,
-    out: &mut Vec<FieldCandidate>,
+    out: &mut Vec<SdfCandidate>,
     near: &mut dyn FnMut(usize, u32),
 ) {
     let Some(around) = Aabb::from_points(&field.body.x) else { return };
@@ -227,11 +227,11 @@ pub fn detect_soft(
 /// The contact of one sample, and its speed against the field's body there, m/s.
 fn test_sample(
     body: &FemState,
-    field: &SoftField,
+    field: &DeformedSdf,
     search_box: &Aabb,
     group: usize,
     sample: usize,
-) -> Option<(FieldCandidate, f64)> {
+) -> Option<(SdfCandidate, f64)> {
     let nodes = &body.model.groups[group].nodes[..body.model.groups[group].count];
     let data = &body.model.samples[sample];
     let p = weighted(&body.x, nodes, &data.weights);
@@ -243,7 +243,7 @@ fn test_sample(
     let element = &field.body.model.mesh.elements[contact.element as usize];
     let approach =
         weighted(&body.v, nodes, &data.weights) - weighted(&field.body.v, element, &contact.weights);
-    Some((FieldCandidate { group, sample, p, contact }, approach.norm()))
+    Some((SdfCandidate { group, sample, p, contact }, approach.norm()))
 }
 
 fn weighted(values: &[Vec3], nodes: &[u32], weights: &[f64; 8]) -> Vec3 {

@@ -7,7 +7,7 @@
 use std::sync::OnceLock;
 
 use super::manifold::{
-    ManifoldPoint, SurfaceFeatures, field::SurfaceInField, manifold, primitives, surface_features,
+    ManifoldPoint, SurfaceFeatures, field::SurfaceInSdf, manifold, primitives, surface_features,
 };
 use softvt_geometry::{
     Aabb, Pose, Vec3,
@@ -159,8 +159,8 @@ impl RigidShape {
         out.extend(found.drain(..).enumerate().map(|(i, point)| (PairId::from(is_theirs(i)), point)));
     }
 
-    fn in_field_of<'a>(&'a self, pose: &Pose, other: &'a Self, other_pose: &'a Pose) -> SurfaceInField<'a> {
-        SurfaceInField::new(self.features(), &self.shape, pose, &other.shape, other.bounds(), other_pose)
+    fn in_field_of<'a>(&'a self, pose: &Pose, other: &'a Self, other_pose: &'a Pose) -> SurfaceInSdf<'a> {
+        SurfaceInSdf::new(self.features(), &self.shape, pose, &other.shape, other.bounds(), other_pose)
     }
 
     /// Contact points of a compliant skin at `gel_pose` with this shape whose gap is below `margin` (m).

@@ -103,7 +103,7 @@ impl NewtonProgress {
 
 /// Normal impulses of an island after a pass, N s.
 #[derive(Default)]
-struct PassResidual {
+struct PassImpulses {
     /// Sum of the absolute changes against the previous pass.
     change: f64,
     total: f64,
@@ -115,7 +115,7 @@ impl Solver {
     ///
     /// # Errors
     /// An island did not converge, which happens if a block is not positive definite or a value is not finite. The
-    /// results are void then.
+    /// results must not be used then.
     pub(crate) fn solve(&mut self, problem: &mut ContactProblem) -> Result<SolverStats, SolverFailure> {
         let mut stats = SolverStats::default();
         self.factorizations = 0;
@@ -134,7 +134,7 @@ impl Solver {
         let mut steps = 0;
         for pass in 0..MAX_PASSES {
             steps += self.newton(problem, island)?;
-            let PassResidual { change, total } = self.record(problem, island);
+            let PassImpulses { change, total } = self.record(problem, island);
             if change <= PASS_TOLERANCE * total {
                 break;
             }
@@ -301,8 +301,8 @@ impl Solver {
     }
 
     /// Writes impulses and velocities into the points.
-    fn record(&mut self, problem: &mut ContactProblem, island: &Island) -> PassResidual {
-        let mut residual = PassResidual::default();
+    fn record(&mut self, problem: &mut ContactProblem, island: &Island) -> PassImpulses {
+        let mut residual = PassImpulses::default();
         let law = ContactLaw::new(problem.dt, problem.dissipation_time);
         for &index in &island.clusters {
             let cluster = problem.clusters[index];

@@ -19,7 +19,7 @@ const WIDE: usize = 4;
 /// Factors the first `k` columns of the `n × n` matrix `a` (column-major, lower triangle) in place.
 ///
 /// Afterwards those columns hold `L` and the trailing block its Schur complement. Returns false if a pivot is not
-/// positive; `a` is void then. The upper triangle is neither read nor preserved.
+/// positive; `a` must not be used then. The upper triangle is neither read nor preserved.
 pub(crate) fn partial_cholesky(a: &mut [f64], n: usize, k: usize) -> bool {
     let mut packed = Vec::with_capacity(PANEL * n.next_multiple_of(ROWS));
     for start in (0..k).step_by(PANEL) {

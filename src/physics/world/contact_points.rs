@@ -8,7 +8,7 @@ use crate::{
 use softvt_geometry::Vec3;
 
 /// Geometry and history of one contact between two surfaces.
-pub(super) struct ContactPair {
+pub(super) struct SurfaceContact {
     /// Position, m, world.
     pub p: Vec3,
     /// Unit normal, world.
@@ -25,7 +25,7 @@ pub(super) struct ContactPair {
     pub is_sliding: bool,
 }
 
-impl ContactPair {
+impl SurfaceContact {
     /// The solver's point for this pair, without node weights and drift velocity.
     pub(super) fn contact_point(&self, friction: &Friction, stiffness: &SurfaceStiffness) -> ContactPoint {
         ContactPoint {
@@ -43,14 +43,14 @@ impl ContactPair {
 }
 
 /// Tangential spring of a solved point at the end of the step.
-pub(super) struct EndStretch {
+pub(super) struct SpringUpdate {
     /// Stretch if nothing had slipped, m, world.
     pub stretch: Vec3,
     /// Part of its length beyond what friction holds, which was slipped, m.
     pub slipped: f64,
 }
 
-impl EndStretch {
+impl SpringUpdate {
     pub(super) fn new(point: &ContactPoint, dt: f64) -> Self {
         let tangential = point.velocity - point.normal * point.normal.dot(&point.velocity);
         let stretch = point.offset + tangential * dt;

@@ -56,7 +56,7 @@ pub use builders::{
     FixedBuilder, Insert, KinematicBuilder, RigidBodyBuilder, SoftBodyBuilder, SoftBodyError,
 };
 pub use penetration::Penetration;
-pub use snapshot::{ContactPatch, Energy, PatchPoint, SampleFace, WorldSnapshot};
+pub use snapshot::{ContactPatch, Energy, PatchPoint, SampleSupport, WorldSnapshot};
 pub use state::{Articulation, BodyContact, ContactSummary, JointDrive, KinematicFrame, RigidBody, SoftBody};
 
 /// Why a step is invalid. The world must not be used afterwards; nothing is repaired silently.
@@ -106,7 +106,7 @@ pub enum StepFailure {
     },
     /// Contact forces on a soft body exceed what momentum change and material stress can balance.
     #[error(
-        "{body} is touched with {force:.1e} N at step {step}, beyond the {limit:.1e} N that its mass and stress explain"
+        "contact force on {body} is {force:.1e} N at step {step}; its mass and stress allow at most {limit:.1e} N"
     )]
     ForceLimitExceeded {
         /// Step, counted from 1.
@@ -200,7 +200,7 @@ impl World {
     /// Advances everything by one time step of [`PhysicsParams::dt`].
     ///
     /// # Errors
-    /// [`StepFailure`]: the state is void from then on.
+    /// [`StepFailure`]: the state must not be used afterwards.
     pub fn step(&mut self) -> Result<(), StepFailure> {
         self.step += 1;
         self.update_collider_motions();

@@ -7,7 +7,7 @@
 
 use super::{
     World,
-    contact_points::{ContactPair, EndStretch, SlidingPairs},
+    contact_points::{SlidingPairs, SpringUpdate, SurfaceContact},
 };
 use crate::{
     contact::{CollisionGeometry, DetectionLimits, ManifoldPoint, PairId},
@@ -42,12 +42,12 @@ struct PointState {
     normal_impulse: f64,
     is_sliding: bool,
     /// Distance slipped since first contact, m.
-    travel: f64,
+    slip_distance: f64,
 }
 
 impl PointState {
     fn first(key: PointKey) -> Self {
-        Self { key, stretch: Vec3::zeros(), normal_impulse: 0.0, is_sliding: false, travel: 0.0 }
+        Self { key, stretch: Vec3::zeros(), normal_impulse: 0.0, is_sliding: false, slip_distance: 0.0 }
     }
 }
 
@@ -56,7 +56,7 @@ impl PointState {
 struct RigidRow {
     key: PointKey,
     /// Distance slipped before this step, m.
-    travel: f64,
+    slip_distance: f64,
 }
 
 /// Two colliders close enough to touch within the step; normals point from `b` to `a`.
@@ -84,7 +84,7 @@ pub(super) struct PressingPoint<'a> {
     pub a: ColliderId,
     pub b: ColliderId,
     /// Distance slipped before this step, m.
-    pub travel: f64,
+    pub slip_distance: f64,
     pub point: &'a ContactPoint,
 }
 
@@ -112,7 +112,7 @@ impl World {
                 let at = contacts.states.binary_search_by_key(&key, |state| state.key);
                 let state = at.map_or(PointState::first(key), |at| contacts.states[at]);
                 self.push_rigid(point, &state, end_b == Endpoint::Known);
-                contacts.rows.push(RigidRow { key, travel: state.travel });
+                contacts.rows.push(RigidRow { key, slip_distance: state.slip_distance });
             }
             let last = self.problem.points.len();
             self.problem.clusters.push(ContactCluster { a: end_a, b: end_b, first, last });
@@ -172,7 +172,7 @@ impl World {
     fn push_rigid(&mut self, point: &ManifoldPoint, state: &PointState, is_b_known: bool) {
         let (a, b) = (self.collider(state.key.a), self.collider(state.key.b));
         let motion = &self.motions[state.key.b.index()];
-        let pair = ContactPair {
+        let pair = SurfaceContact {
             p: point.p_w,
             normal: point.n_w,
             gap: point.phi,
@@ -198,7 +198,7 @@ impl World {
             if point.normal_impulse <= 0.0 {
                 continue;
             }
-            let EndStretch { stretch, slipped } = EndStretch::new(point, dt);
+            let SpringUpdate { stretch, slipped } = SpringUpdate::new(point, dt);
             let kept = if slipped > 0.0 { stretch * (1.0 - slipped / stretch.norm()) } else { stretch };
             let rotation = &self.motions[row.key.b.index()].pose.rotation;
             contacts.states.push(PointState {
@@ -206,7 +206,7 @@ impl World {
                 stretch: rotation.inverse_transform_vector(&kept),
                 normal_impulse: point.normal_impulse,
                 is_sliding: sliding.contains(row.key.surfaces()),
-                travel: row.travel + slipped,
+                slip_distance: row.slip_distance + slipped,
             });
         }
         contacts.states.sort_unstable_by_key(|state| state.key);
@@ -234,10 +234,10 @@ impl RigidContacts {
         solved: &'a [ContactPoint],
     ) -> impl Iterator<Item = PressingPoint<'a>> {
         let pressing = self.rows.iter().zip(solved).filter(|(_, point)| point.normal_impulse > 0.0);
-        pressing.map(|(RigidRow { key, travel }, point)| PressingPoint {
+        pressing.map(|(RigidRow { key, slip_distance }, point)| PressingPoint {
             a: key.a,
             b: key.b,
-            travel: *travel,
+            slip_distance: *slip_distance,
             point,
         })
     }

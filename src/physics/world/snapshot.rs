@@ -1,6 +1,6 @@
 //! Observation of a world: copies of its state, contact forces and energies.
 
-use super::{BodyContact, World, contact_points::EndStretch, state::ContactSummary};
+use super::{BodyContact, World, contact_points::SpringUpdate, state::ContactSummary};
 use crate::{
     ids::{BodyId, ColliderId, ContactPartner, LinkId, RigidId, SoftId},
     joints::{kinetic_energy, potential_energy},
@@ -55,7 +55,7 @@ pub struct ContactPatch {
 
 /// The nodes of a soft body that carry one of its contact samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SampleFace {
+pub struct SampleSupport {
     /// Sample group of the body: a face or an element of its mesh.
     pub group: usize,
     /// Weights of the group's nodes.
@@ -68,7 +68,7 @@ pub struct PatchPoint {
     /// The surface that the collider touches.
     pub partner: ContactPartner,
     /// The sample of the other side, if that is a soft body.
-    pub face: Option<SampleFace>,
+    pub face: Option<SampleSupport>,
     /// Position in the collider's frame, m.
     pub p_p: Vec3,
     /// Area that the point represents, m², as far as the collider covers it.
@@ -110,7 +110,7 @@ impl Energy {
 struct SidePoint<'a> {
     point: &'a ContactPoint,
     /// Distance slipped before this step, m.
-    travel: f64,
+    slip_distance: f64,
     /// 1 for the side that the normal points to, −1 for the other.
     sign: f64,
     dt: f64,
@@ -139,7 +139,7 @@ impl World {
             if row.partner == own && point.normal_impulse > 0.0 {
                 let model = &self.soft(row.soft).state.model;
                 let area = model.samples[row.sample].surface.area * row.coverage;
-                let face = SampleFace { group: row.group, weights: point.weights_a };
+                let face = SampleSupport { group: row.group, weights: point.weights_a };
                 points.push(self.patch_point(collider, row.soft.into(), Some(face), point, 1.0, area));
             }
         }
@@ -161,7 +161,7 @@ impl World {
         &self,
         collider: ColliderId,
         partner: ContactPartner,
-        face: Option<SampleFace>,
+        face: Option<SampleSupport>,
         point: &ContactPoint,
         sign: f64,
         area: f64,
@@ -230,7 +230,7 @@ impl World {
             }
         };
         for (row, point) in rows.iter().zip(&problem.points).filter(|(_, point)| point.normal_impulse > 0.0) {
-            let on = |sign: f64| SidePoint { point, travel: row.travel, sign, dt };
+            let on = |sign: f64| SidePoint { point, slip_distance: row.slip_distance, sign, dt };
             record(row.soft.into(), row.partner, on(1.0));
             let other = match row.partner {
                 ContactPartner::Soft(other) => other.into(),
@@ -240,7 +240,7 @@ impl World {
         }
         for solved in rigid_contacts.pressing(&problem.points[rows.len()..]) {
             for (side, other, sign) in [(solved.a, solved.b, 1.0), (solved.b, solved.a, -1.0)] {
-                let point = SidePoint { point: solved.point, travel: solved.travel, sign, dt };
+                let point = SidePoint { point: solved.point, slip_distance: solved.slip_distance, sign, dt };
                 record(colliders[side.index()].parent, other.into(), point);
             }
         }
@@ -273,16 +273,18 @@ fn add_point(contacts: &mut Vec<BodyContact>, partner: ContactPartner, side: Sid
         contacts.push(BodyContact { partner, summary: ContactSummary::default() });
         contacts.len() - 1
     });
-    let SidePoint { point, travel, sign, dt } = side;
+    let SidePoint { point, slip_distance, sign, dt } = side;
     let sum = &mut contacts[at].summary;
     let force = point.normal_impulse / dt;
     sum.points += 1;
     sum.slipping_points += usize::from(point.is_slipping);
     let mean =
         |before: f64, value: f64| (before * sum.normal_force + value * force) / (sum.normal_force + force);
-    (sum.travel, sum.slip_speed) =
-        (mean(sum.travel, travel), mean(sum.slip_speed, EndStretch::new(point, dt).slipped / dt));
+    (sum.slip_distance, sum.slip_speed) = (
+        mean(sum.slip_distance, slip_distance),
+        mean(sum.slip_speed, SpringUpdate::new(point, dt).slipped / dt),
+    );
     sum.normal_force += force;
     sum.force_w += sign * (point.normal * point.normal_impulse + point.shear_impulse) / dt;
-    sum.capacity += point.mu * force;
+    sum.friction_capacity += point.mu * force;
 }

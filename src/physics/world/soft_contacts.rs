@@ -2,11 +2,11 @@
 
 use super::{
     World,
-    contact_points::{ContactPair, EndStretch, SlidingPairs},
+    contact_points::{SlidingPairs, SpringUpdate, SurfaceContact},
 };
 use crate::{
     contact::{
-        BodyBounds, ContactCandidate, ContactRecord, FieldCandidate, SoftField, detect, detect_soft,
+        BodyBounds, ContactCandidate, ContactRecord, DeformedSdf, SdfCandidate, detect, detect_soft,
         may_touch,
     },
     fem::FemState,
@@ -42,7 +42,7 @@ struct SoftColliderCandidate {
 struct SoftSoftCandidate {
     soft: SoftId,
     other: SoftId,
-    candidate: FieldCandidate,
+    candidate: SdfCandidate,
 }
 
 /// History of a contact point of a soft body during a step, parallel to the problem's points.
@@ -57,7 +57,7 @@ pub(super) struct SoftRow {
     pub coverage: f64,
     pub partner: ContactPartner,
     /// Distance slipped before this step, m.
-    pub travel: f64,
+    pub slip_distance: f64,
     anchor: Vec3,
     /// Maps small vectors of the world to the frame of the anchor.
     to_anchor: Mat3,
@@ -112,7 +112,7 @@ impl World {
                 if id == other || is_still || !may_touch(&soft.state, &target.state, limits) {
                     continue;
                 }
-                let field = field.get_or_insert_with(|| SoftField::new(&target.state, &**surface));
+                let field = field.get_or_insert_with(|| DeformedSdf::new(&target.state, &**surface));
                 found.clear();
                 let elements = &target.state.model.mesh.elements;
                 detect_soft(&soft.state, field, limits, &mut found, &mut |group, element| {
@@ -164,7 +164,7 @@ impl World {
             .copied()
             .unwrap_or(ContactRecord::first(partner, p_in_collider));
         let anchor_w = (motion.pose * nalgebra::Point3::from(record.anchor)).coords;
-        let pair = ContactPair {
+        let pair = SurfaceContact {
             p: candidate.p,
             normal: candidate.normal,
             gap: candidate.gap,
@@ -188,7 +188,7 @@ impl World {
             coverage: candidate.coverage,
             partner,
             anchor: record.anchor,
-            travel: record.travel,
+            slip_distance: record.slip_distance,
             to_anchor: motion.pose.rotation.inverse().to_rotation_matrix().into_inner(),
         };
         self.problem.points.push(point);
@@ -217,7 +217,7 @@ impl World {
 
     fn push_soft_soft(&mut self, found: &SoftSoftCandidate) {
         let (a, b) = (self.soft(found.soft), self.soft(found.other));
-        let FieldCandidate { group, sample, p, contact } = found.candidate;
+        let SdfCandidate { group, sample, p, contact } = found.candidate;
         let partner = ContactPartner::Soft(found.other);
         // The clock of a sleeping body does not advance.
         let now = a.steps_awake + u64::from(a.is_asleep());
@@ -228,7 +228,7 @@ impl World {
         // Both surfaces are sampled, so each carries half, unless only one of the two has a field.
         let share = if a.surface.is_some() { 0.5 } else { 1.0 };
         let data = &a.state.model.samples[sample];
-        let pair = ContactPair {
+        let pair = SurfaceContact {
             p,
             normal: contact.normal,
             gap: contact.gap,
@@ -249,7 +249,7 @@ impl World {
             coverage: contact.coverage,
             partner,
             anchor: record.anchor,
-            travel: record.travel,
+            slip_distance: record.slip_distance,
             to_anchor: contact.inverse_gradient,
         };
         self.problem.points.push(point);
@@ -272,12 +272,12 @@ impl World {
                 anchor: row.anchor,
                 normal_impulse: point.normal_impulse,
                 is_sliding: sliding.contains(row.pair()),
-                travel: row.travel,
+                slip_distance: row.slip_distance,
             };
-            let EndStretch { stretch, slipped } = EndStretch::new(point, dt);
+            let SpringUpdate { stretch, slipped } = SpringUpdate::new(point, dt);
             if slipped > 0.0 {
                 record.anchor += row.to_anchor * (stretch.try_normalize(0.0).unwrap_or_default() * slipped);
-                record.travel += slipped;
+                record.slip_distance += slipped;
             }
             soft.history.put(row.sample, record);
         }

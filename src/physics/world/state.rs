@@ -23,9 +23,9 @@ pub struct ContactSummary {
     /// Force on the body, N, world.
     pub force_w: Vec3,
     /// Sum of the friction bounds μ f_n, N: the largest shear force that the patch can hold.
-    pub capacity: f64,
+    pub friction_capacity: f64,
     /// Force-weighted mean distance slipped since first contact, m. It changes as well when points join or leave the patch.
-    pub travel: f64,
+    pub slip_distance: f64,
     /// Force-weighted mean speed at which the points slid in the last step, m/s.
     pub slip_speed: f64,
 }
@@ -43,8 +43,8 @@ impl ContactSummary {
             slipping_points: self.slipping_points + other.slipping_points,
             normal_force,
             force_w: self.force_w + other.force_w,
-            capacity: self.capacity + other.capacity,
-            travel: mean(self.travel, other.travel),
+            friction_capacity: self.friction_capacity + other.friction_capacity,
+            slip_distance: mean(self.slip_distance, other.slip_distance),
             slip_speed: mean(self.slip_speed, other.slip_speed),
         }
     }

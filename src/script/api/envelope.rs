@@ -27,7 +27,7 @@ use softvt_benchmark::variation::{DrawError, ModelOf, VariationRanges};
 use softvt_common::parallel::lock;
 use softvt_evaluation::{
     calibration::{Envelope, HoldRow, Protocol, SafeWindow, Scans, SweepRow, force_at},
-    envelope_plot::{plot, three_lines},
+    envelope_plot::{plot, summary_text},
     instance::{Grip, GripWindow, InstanceFactors, InstanceModel, VariantSweep},
     safety::DeformationLimit,
     thresholds::{ThresholdFile, sweep_jsonl},
@@ -230,7 +230,7 @@ output! {
         /// Why the sweep ended before the stable strain; nil if it did not.
         censored: "string?" = envelope.censored.as_deref();
         /// The envelope in three lines.
-        text: "string" = three_lines(asset, envelope, limit(envelope, file));
+        text: "string" = summary_text(asset, envelope, limit(envelope, file));
         /// A plot of deformation over width as SVG.
         plot: "string" = plot(asset, envelope, limit(envelope, file));
         /// The rows of the sweep as JSON lines.

@@ -144,7 +144,7 @@ record! {
 }
 
 record_of! {
-    /// Hysteresis of a binary gripper, in values of the seventh number.
+    /// Hysteresis of a binary gripper, in the unit of the gripper's number.
     GripLatch: "softvt.GripLatch" as "profile.actions.gripper.latch" {
         /// Value from which on, towards that of the closed gripper, an answer closes.
         close: f64;

@@ -39,7 +39,7 @@ use softvt_evaluation::deformation::ReferenceShape;
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::BodyId;
 use softvt_robot::{Side, gripper::GripTarget, rotation};
-use softvt_rollout::{AssetCache, SensingError, SensorAssets, SensorSeed, SensorSuite, Simulation};
+use softvt_rollout::{AssetCache, SensingError, SensorAssets, SensorSeed, Sensors, Simulation};
 use softvt_sensing::tactile::{MarkerStyle, PadWrench, TactileReading};
 
 const EPISODE: Type = Type::Integer(Range::closed(0.0, 1e9));
@@ -105,7 +105,7 @@ pub(crate) struct SimulationState {
     physics_steps: u64,
     failed: Option<String>,
     clock: Clock,
-    sensors: SensorSuite,
+    sensors: Sensors,
     _reserved: Reservation,
 }
 
@@ -155,7 +155,7 @@ impl LuaSimulation {
             physics_steps: 0,
             failed: None,
             clock: clock.clone(),
-            sensors: SensorSuite::new(&sim, &settings.tactile, &caches.sensors).with_seed(sensor_seed),
+            sensors: Sensors::new(&sim, &settings.tactile, &caches.sensors).with_seed(sensor_seed),
             sim,
             _reserved: reserved,
         }))))
@@ -227,7 +227,7 @@ impl SimulationState {
     }
 
     fn finger_readings(&mut self, lua: &Lua) -> mlua::Result<FingerReadings> {
-        let frame = SensorSuite::frame(&self.sim);
+        let frame = Sensors::frame(&self.sim);
         let readings = self.sensors.tactile_frames(&frame);
         readings.map(Arc::new).map_err(|e| fail(lua, format!("arm:tactile: {e}")))
     }
@@ -282,7 +282,7 @@ impl LuaSimulation {
         let mut camera = sensors.camera(camera).map_err(wrong)?.clone();
         camera.width = width.unwrap_or(camera.width);
         camera.height = height.unwrap_or(camera.height);
-        let frame = SensorSuite::frame(sim);
+        let frame = Sensors::frame(sim);
         // A camera inside of an object is a mistake of the layout, unless something has moved since.
         let image = match *physics_steps {
             0 => sensors.render_unobstructed(&frame, &camera),
@@ -295,7 +295,7 @@ impl LuaSimulation {
         let mut inner = lock(&self.0);
         let SimulationState { sim, sensors, clock, .. } = &mut *inner;
         let _pause = clock.pause();
-        let frame = SensorSuite::frame(sim);
+        let frame = Sensors::frame(sim);
         let reading = sensors
             .tactile_reading(&frame, side)
             .map_err(|e| fail(lua, format!("simulation:tactile: {e}")))?;
@@ -357,7 +357,7 @@ output! {
         /// Sum of the normal forces at the contact points of the left and the right gel pad on the object, N; see arm.force.
         pad_force: "number[]" = inner.sim.pad_normal_forces_on(inner.object(index)).to_vec();
         /// Distance that a movable object has slid on the left and the right pad, mm.
-        slip_mm: "number[]?" = inner.pad_contacts(index).map(|pads| pads.map(|pad| 1e3 * pad.travel).to_vec());
+        slip_mm: "number[]?" = inner.pad_contacts(index).map(|pads| pads.map(|pad| 1e3 * pad.slip_distance).to_vec());
         /// Deformation D of a soft body, %.
         d_pct: "number?" = inner.deformation_pct(index);
         /// Largest D since settling, %.

@@ -408,7 +408,7 @@ class! {
             /// Returns the tangential force of a solid on the body, N.
             fn shear(lua, this, solid: LuaSolid) -> ["number"] { this.contact(lua, "shear", &solid)?.shear() }
             /// Returns the distance that the contact patch has slid on a solid, mm.
-            fn travel(lua, this, solid: LuaSolid) -> ["number"] { 1e3 * this.contact(lua, "travel", &solid)?.travel }
+            fn slip_mm(lua, this, solid: LuaSolid) -> ["number"] { 1e3 * this.contact(lua, "slip_mm", &solid)?.slip_distance }
             /// Returns the share of the contact patch's samples that slip, 0..1.
             fn slipping(lua, this, solid: LuaSolid) -> ["number"] {
                 let contact = this.contact(lua, "slipping", &solid)?;

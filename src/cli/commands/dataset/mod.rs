@@ -16,7 +16,7 @@ use softvt_common::cancel;
 use softvt_common::{files, text::counted};
 use softvt_dataset::{
     DatasetError,
-    card::Card,
+    card::DatasetCard,
     check,
     layout::DATASET,
     lerobot::{self, ExportConfig, LeRobotVersion},
@@ -152,7 +152,7 @@ fn run_export(args: ExportArgs) -> Result<(), CliError> {
         Some(code) => code,
         // A folder without a card is refused by the export.
         None if !args.path.join(DATASET).is_file() => GripCode::default(),
-        None => Card::read(&args.path).map_err(CliError::input)?.gripper.unwrap_or_default(),
+        None => DatasetCard::read(&args.path).map_err(CliError::input)?.gripper.unwrap_or_default(),
     };
     let config = ExportConfig {
         data: args.path,

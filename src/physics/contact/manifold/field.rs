@@ -6,7 +6,7 @@ use super::{
     ManifoldPoint, NON_MATERIAL, POINT_AREA,
     feature::RIM_POINTS,
     feature_extraction::{Rim, SAMPLE_AREA, SurfaceFeatures},
-    field_probe::{FieldProbe, golden_minimum},
+    field_probe::{SdfProbe, golden_minimum},
 };
 use softvt_geometry::{Aabb, Pose, shape::Shape};
 
@@ -20,17 +20,17 @@ const RIM_FEATURES: u32 = 1 << 20;
 const FLAT_FEATURES: u32 = 1 << 23;
 
 /// Surface of body a in the distance field of body b.
-pub(in super::super) struct SurfaceInField<'a> {
+pub(in super::super) struct SurfaceInSdf<'a> {
     pub(super) features: &'a SurfaceFeatures,
     pub(super) shape: &'a Shape,
-    pub(super) probe: FieldProbe<'a>,
+    pub(super) probe: SdfProbe<'a>,
 }
 
-impl<'a> SurfaceInField<'a> {
+impl<'a> SurfaceInSdf<'a> {
     /// The surface of `shape` with its features in the field of shape b.
     ///
     /// Normals point from a to b. Two general bodies meet both ways, with the normals of one flipped: first
-    /// [`SurfaceInField::fixed`] of both, then [`SurfaceInField::lowest`].
+    /// [`SurfaceInSdf::fixed`] of both, then [`SurfaceInSdf::lowest`].
     pub(in super::super) fn new(
         features: &'a SurfaceFeatures,
         shape: &'a Shape,
@@ -39,7 +39,7 @@ impl<'a> SurfaceInField<'a> {
         bounds_b: &'a Aabb,
         pose_b: &'a Pose,
     ) -> Self {
-        let probe = FieldProbe { shape_b, bounds_b, a_in_b: pose_b.inv_mul(pose_a), pose_b };
+        let probe = SdfProbe { shape_b, bounds_b, a_in_b: pose_b.inv_mul(pose_a), pose_b };
         Self { features, shape, probe }
     }
 
@@ -64,7 +64,7 @@ impl<'a> SurfaceInField<'a> {
 }
 
 /// Appends the points of a nearly flat rim and its moving lowest point.
-fn rim_points(probe: &FieldProbe, rim: &Rim, feature: u32, margin: f64, out: &mut Vec<ManifoldPoint>) {
+fn rim_points(probe: &SdfProbe, rim: &Rim, feature: u32, margin: f64, out: &mut Vec<ManifoldPoint>) {
     let at = |angle: f64| {
         let (sin, cos) = angle.sin_cos();
         (rim.frame_o * nalgebra::Point3::new(rim.radius * cos, rim.radius * sin, 0.0)).coords
@@ -113,7 +113,7 @@ mod tests {
     fn touch(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64) -> Vec<ManifoldPoint> {
         let mut out = Vec::new();
         let (features, bounds) = (surface_features(a), b.bounds());
-        let surface = SurfaceInField::new(&features, a, pose_a, b, &bounds, pose_b);
+        let surface = SurfaceInSdf::new(&features, a, pose_a, b, &bounds, pose_b);
         surface.fixed(margin, &mut out);
         surface.lowest(margin, &mut out);
         out

@@ -4,7 +4,7 @@ use super::ManifoldPoint;
 use softvt_geometry::{Aabb, Pose, Vec3, shape::Shape};
 
 /// The distance field of the second body, evaluated at points of the first.
-pub(super) struct FieldProbe<'a> {
+pub(super) struct SdfProbe<'a> {
     pub shape_b: &'a Shape,
     pub bounds_b: &'a Aabb,
     /// The first body's frame in the second's.
@@ -12,7 +12,7 @@ pub(super) struct FieldProbe<'a> {
     pub pose_b: &'a Pose,
 }
 
-impl FieldProbe<'_> {
+impl SdfProbe<'_> {
     /// True if `p_a` is farther than `reach` (m) from the bounds of the second body.
     pub(super) fn is_beyond(&self, p_a: &Vec3, reach: f64) -> bool {
         let p_b = self.a_in_b * nalgebra::Point3::from(*p_a);

@@ -11,8 +11,8 @@ use std::f64::consts::{FRAC_PI_4, TAU};
 use super::{
     ManifoldPoint, NON_MATERIAL, POINT_AREA,
     feature_extraction::{Rim, SAMPLE_AREA},
-    field::SurfaceInField,
-    field_probe::{FieldProbe, golden_minimum},
+    field::SurfaceInSdf,
+    field_probe::{SdfProbe, golden_minimum},
     flat_region::{MAX_FLAT_CURVATURE, project_to_surface},
 };
 use softvt_geometry::{Vec3, orthonormal_basis, shape::Shape};
@@ -37,14 +37,14 @@ const LINE_RISE: f64 = 2e-5;
 
 /// The smooth surface of the first body in the field of the second.
 struct Smooth<'a> {
-    surface: &'a SurfaceInField<'a>,
+    surface: &'a SurfaceInSdf<'a>,
     /// Distance at which the rise of the gap is measured, m.
     distance: f64,
     /// Rise of the gap there from which a lowest point is well defined, m: that of [`MAX_FLAT_CURVATURE`].
     rise: f64,
 }
 
-impl SurfaceInField<'_> {
+impl SurfaceInSdf<'_> {
     /// Appends the lowest points and lines of smooth parts whose gap is below `margin` (m), as far as the points
     /// already in `out` do not carry there.
     pub(in super::super) fn lowest(&self, margin: f64, out: &mut Vec<ManifoldPoint>) {
@@ -205,7 +205,7 @@ fn distance_to_segment(p: &Vec3, [from, to]: &[Vec3; 2]) -> f64 {
 
 /// Minimises b's field over the surface of a: steepest descent with the steps of Barzilai & Borwein (IMA J. Numer.
 /// Anal. 8, 1988), halved where they do not descend.
-fn descend(probe: &FieldProbe, shape_a: &Shape, start: Vec3, spacing: f64) -> Vec3 {
+fn descend(probe: &SdfProbe, shape_a: &Shape, start: Vec3, spacing: f64) -> Vec3 {
     let downhill = |p: &Vec3| {
         let ((gap, gradient), normal) = (probe.gap_and_gradient(p), shape_a.distance_and_normal(p).1);
         (gap, normal * normal.dot(&gradient) - gradient)

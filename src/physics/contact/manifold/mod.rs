@@ -4,7 +4,7 @@
 //! features of both that face each other (a face, a side line) are projected along it; the corners of their
 //! overlap become the points. The gap of each point is exact at its position, so that corners and rims support
 //! a tipping body where its real edge is, and round bodies touch at a moving lowest point and roll. General
-//! shapes meet through `field::SurfaceInField`.
+//! shapes meet through `field::SurfaceInSdf`.
 //!
 //! # Why not parry's manifolds
 //! The contact forces here are pressures times areas, so every point needs the area that it represents, and a small

@@ -18,7 +18,7 @@ pub(super) struct ContactNormal {
     pub n_w: Vec3,
     /// Gap along it, m.
     pub gap: f64,
-    /// True if some pair of points is exactly this far apart; two boxes corner to corner are farther.
+    /// True if the gap is the distance, false if it is only a lower bound, as for two boxes corner to corner.
     pub is_attained: bool,
     /// The closest points, if an iteration computed them.
     pub closest: Option<ClosestPoints>,

@@ -113,7 +113,7 @@ mod tests {
     use super::*;
     use softvt_physics::{
         ColliderId, SoftId,
-        world::{PatchPoint, SampleFace},
+        world::{PatchPoint, SampleSupport},
     };
 
     /// Two samples on a flat pad: 20 kPa on 1 mm² at x = 2 mm, 40 kPa on 1 mm² at y = −3 mm; friction drags the body
@@ -121,7 +121,7 @@ mod tests {
     fn patch() -> (ContactPatch, PadSurface) {
         let point = |x: f64, y: f64, pressure: f64, shear: f64| PatchPoint {
             partner: SoftId::new(0).into(),
-            face: Some(SampleFace { group: 0, weights: [0.125; 8] }),
+            face: Some(SampleSupport { group: 0, weights: [0.125; 8] }),
             p_p: Vec3::new(x, y, 0.0),
             area: 1e-6,
             gap: 0.0,

@@ -10,19 +10,19 @@ use softvt_scene::{Asset, Body, Scene, SoftMaterial};
 
 /// Doubts about a scene of a task, one line each: materials, soft bodies of few voxels, rigid bodies of several pieces, and a target
 /// that the gripper cannot grasp.
-pub fn scene_doubts(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSet<String> {
-    let doubts = |asset: &Asset| {
+pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSet<String> {
+    let warnings = |asset: &Asset| {
         let name = asset.name.clone();
         asset
-            .doubts()
+            .warnings()
             .into_iter()
-            .chain(voxel_doubt(asset))
-            .chain(pieces_doubt(asset, cache))
-            .map(move |doubt| format!("asset {name}: {doubt}"))
+            .chain(voxel_warning(asset))
+            .chain(pieces_warning(asset, cache))
+            .map(move |warning| format!("asset {name}: {warning}"))
     };
-    let mut all: BTreeSet<String> = scene.objects.iter().flat_map(|object| doubts(&object.asset)).collect();
+    let mut all: BTreeSet<String> = scene.objects.iter().flat_map(|object| warnings(&object.asset)).collect();
     let target = scene.objects.iter().find(|object| object.name == task.goal.object);
-    all.extend(target.and_then(|target| width_doubt(&target.asset)));
+    all.extend(target.and_then(|target| width_warning(&target.asset)));
     all
 }
 
@@ -32,7 +32,7 @@ const MIN_VOXELS: f64 = 2.0;
 const PROBES: usize = 10;
 
 /// The thickness of a soft body of which more than half of the surface has less than [`MIN_VOXELS`] voxels behind it.
-fn voxel_doubt(asset: &Asset) -> Option<String> {
+fn voxel_warning(asset: &Asset) -> Option<String> {
     let Body::Soft(material) = &asset.body else { return None };
     let edge = asset.shape.bounds().size().max() / material.resolution.max(1) as f64;
     let thickness = thin_parts(&asset.shape, MIN_VOXELS * edge / PROBES as f64, PROBES, 0.5)?;
@@ -50,8 +50,8 @@ fn voxel_doubt(asset: &Asset) -> Option<String> {
     ))
 }
 
-/// A doubt about a rigid body of several pieces.
-fn pieces_doubt(asset: &Asset, cache: &AssetCache) -> Option<String> {
+/// A warning about a rigid body of several pieces.
+fn pieces_warning(asset: &Asset, cache: &AssetCache) -> Option<String> {
     if !matches!(asset.body, Body::Rigid { .. }) {
         return None;
     }
@@ -65,7 +65,7 @@ fn pieces_doubt(asset: &Asset, cache: &AssetCache) -> Option<String> {
 }
 
 /// The width where the stock experts grasp an object, if it exceeds the opening of the gripper.
-fn width_doubt(asset: &Asset) -> Option<String> {
+fn width_warning(asset: &Asset) -> Option<String> {
     let size = asset.shape.bounds().size();
     let width = asset.hints.get(GRASP_WIDTH).copied().unwrap_or(size.x.min(size.y));
     (width >= MAX_WIDTH).then(|| {
