@@ -22,6 +22,7 @@ use softvt_rollout::{ControlStepScore, FinishedEpisode};
 pub enum VideoSelection {
     /// All that are not safe.
     Failed,
+    /// All episodes.
     All,
     /// These episodes of each task.
     Episodes(Vec<u32>),

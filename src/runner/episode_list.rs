@@ -10,11 +10,14 @@ use crate::config::Shard;
 /// An episode to run.
 #[derive(Clone, Copy, Debug)]
 pub struct EpisodeJob<'a> {
+    /// Its task.
     pub task: &'a Task,
+    /// Its index in the task.
     pub episode: u32,
 }
 
 impl EpisodeJob<'_> {
+    /// Task and episode.
     pub fn index(&self) -> EpisodeIndex {
         EpisodeIndex { task: self.task.id, episode: self.episode }
     }
@@ -59,10 +62,12 @@ impl<'a> EpisodeList<'a> {
         Self { all: self.all.clone(), omitted }
     }
 
+    /// Number of episodes.
     pub fn len(&self) -> usize {
         self.all.len() - self.omitted.len()
     }
 
+    /// True if no episode is left.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -81,6 +86,7 @@ impl<'a> EpisodeList<'a> {
         self.all.job(position + before.0)
     }
 
+    /// The episodes in order.
     pub fn iter(&self) -> impl Iterator<Item = EpisodeJob<'a>> + '_ {
         (0..self.len()).map(|position| self.job(position))
     }

@@ -28,7 +28,9 @@ use softvt_rollout::FinishedEpisode;
 
 /// The episodes of a finished run, in order, with their summary.
 pub struct SuiteResult {
+    /// Rates and distributions.
     pub summary: SuiteSummary,
+    /// One record per episode, in order of task and episode.
     pub records: Vec<EpisodeRecord>,
 }
 

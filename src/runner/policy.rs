@@ -36,9 +36,11 @@ const DEFAULT_PROFILE: &str = "visuo_tactile";
 /// A policy that is not loaded yet, and how it is connected. By default, the expert of the task.
 #[derive(Clone, Debug, Default)]
 pub struct PolicyOptions {
+    /// The policy.
     pub source: PolicySource,
     /// Observations and action encoding of a policy server: a name or a Lua file.
     pub profile: Option<String>,
+    /// Protocol of a policy server.
     pub protocol: Option<Protocol>,
     /// Grip code in place of that of the profile or the Lua policy.
     pub gripper: Option<GripCode>,
@@ -60,6 +62,7 @@ impl PolicyOptions {
 /// Sources of policies.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PolicySource {
+    /// A policy that needs no file.
     Builtin(BuiltinPolicy),
     /// A policy in Lua.
     Lua(PathBuf),
@@ -87,12 +90,17 @@ impl From<Teacher> for PolicySource {
 /// Policies that need no file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BuiltinPolicy {
+    /// The expert of the task.
     Expert,
+    /// The expert with a hand that closes fully.
     ExpertBinary,
+    /// The expert with a hand that feels how firmly it must hold.
     TactileServo,
     /// The expert with the grip of a controller that does not feel.
     Controlled(GripController),
+    /// A robot that holds still.
     Noop,
+    /// Random actions.
     Random,
 }
 
@@ -118,6 +126,7 @@ impl BuiltinPolicy {
         Self::ALL.into_iter().find(|policy| policy.name() == name)
     }
 
+    /// The name that `--policy` takes.
     pub fn name(self) -> &'static str {
         match self {
             Self::Expert => "expert",
@@ -260,6 +269,7 @@ enum PolicyKind {
 pub struct DeclaredStreams {
     /// Source location of the declaration.
     pub place: String,
+    /// The declared sensors.
     pub streams: SensorStreams,
 }
 
@@ -277,6 +287,7 @@ pub struct PolicyConfig {
     pub file: Option<String>,
     /// SHA-256 of the files of the policy or of its profile, by name.
     pub sources: BTreeMap<String, String>,
+    /// Sensors that the file of the policy declares.
     pub declared: Option<DeclaredStreams>,
     /// True if the policy has access to ground-truth state, or to limits or materials of objects.
     pub privileged: bool,

@@ -20,7 +20,7 @@ const MAX_LISTED: usize = 3;
 
 /// The runs in a folder, at most one of each suite.
 #[derive(Debug)]
-pub struct RecordedRuns {
+pub(crate) struct RecordedRuns {
     dir: PathBuf,
     runs: Vec<StoredRun>,
 }
@@ -45,7 +45,7 @@ impl RecordedRuns {
     ///
     /// # Errors
     /// The folder contains no run, or one cannot be read.
-    pub fn load(dir: &Path) -> Result<Self, RunError> {
+    pub(crate) fn load(dir: &Path) -> Result<Self, RunError> {
         let runs = stored_run::load(dir).map_err(|error| RunError::input(error).prefixed("--policy"))?;
         Ok(Self { dir: dir.to_owned(), runs })
     }
@@ -58,7 +58,7 @@ impl RecordedRuns {
     ///
     /// # Errors
     /// The run is of another suite, seed, split or twin, or lacks some of `episodes`.
-    pub fn replay_source(
+    pub(crate) fn replay_source(
         &self,
         suite: &str,
         is_twin: bool,
@@ -114,7 +114,12 @@ impl RecordedRuns {
     ///
     /// # Errors
     /// The actions cannot be read.
-    pub fn actions(&self, suite: &str, is_twin: bool, brief: &TaskBrief) -> Result<Vec<Action>, RunError> {
+    pub(crate) fn actions(
+        &self,
+        suite: &str,
+        is_twin: bool,
+        brief: &TaskBrief,
+    ) -> Result<Vec<Action>, RunError> {
         let dir = self.run_of(suite, is_twin).map_or(&self.dir, |run| &run.dir);
         Ok(actions::read(&actions::path(dir, brief.index()))?)
     }

@@ -61,6 +61,7 @@ pub struct RecordingOptions {
     pub has_images: bool,
     /// True to add the true state: node positions, deformation, contacts, forces.
     pub has_privileged: bool,
+    /// True to continue an interrupted recording.
     pub resume: bool,
     /// Grip code of exports that name none.
     pub gripper: Option<GripCode>,
@@ -387,6 +388,7 @@ fn attempt_line(record: &EpisodeRecord) -> String {
 
 /// What a recording contains.
 pub struct RecordingSummary {
+    /// Counts by task.
     pub tasks: Vec<TaskCount>,
     /// File that lists all demonstrations.
     pub manifest: PathBuf,

@@ -71,16 +71,21 @@ pub fn difference(recorded: &EpisodeRecord, simulated: &EpisodeRecord) -> Result
 
 /// A run or dataset file, and the content of its `run.json`.
 pub struct StoredManifest<'a> {
+    /// The file, as messages name it.
     pub path: &'a Path,
+    /// Its content.
     pub manifest: &'a Value,
     /// Secret of a judged run, with the file that holds it.
     pub secret: Option<&'a SecretFile>,
+    /// Receiver of progress and messages.
     pub observer: Arc<dyn Observer>,
 }
 
 /// The secret in a seed file.
 pub struct SecretFile {
+    /// The file.
     pub path: PathBuf,
+    /// Its secret.
     pub secret: SecretSeed,
 }
 
@@ -192,7 +197,9 @@ impl StoredManifest<'_> {
 /// A demonstration: its file, and its number in the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DemoRef {
+    /// The HDF5 file.
     pub file: PathBuf,
+    /// Number of the demonstration in it.
     pub demo: usize,
 }
 
@@ -202,6 +209,7 @@ pub struct DemoReplay {
     pub state_hash: String,
     /// First difference from the recording. `None` if they are byte-identical.
     pub difference: Option<String>,
+    /// Goal Success of the re-simulation.
     pub goal_reached: bool,
 }
 

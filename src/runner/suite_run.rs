@@ -33,12 +33,17 @@ const MAX_SCANNED_EPISODES: usize = 100;
 /// [`SuiteRun::prepare`] checks the scenes and reads the limits; then [`SuiteRun::run_episode`] runs single episodes. A
 /// [`Runner`](super::Runner) does both for all episodes.
 pub struct SuiteRun<'a> {
+    /// Configuration of the run.
     pub config: &'a RunConfig,
+    /// The script of the suite.
     pub loaded: &'a LoadedScript,
+    /// The suite.
     pub suite: &'a Suite,
     /// Name in results.
     pub name: String,
+    /// Settings of the suite with the changes of the run.
     pub settings: Settings,
+    /// The episodes to run.
     pub jobs: EpisodeList<'a>,
     /// Files with the deformation limits of the objects.
     pub(crate) calibration_files: Arc<CalibrationFiles>,
@@ -50,7 +55,9 @@ pub struct SuiteRun<'a> {
     pub sources: BTreeMap<String, String>,
     /// The recorded run whose actions are repeated.
     pub replay_source: Option<ReplaySource>,
+    /// Meshes of the objects, shared by all episodes.
     pub assets: AssetCache,
+    /// Data of cameras and tactile sensors, shared by all episodes.
     pub sensor_assets: SensorAssets,
     /// Folder of the run.
     pub out: PathBuf,
@@ -58,12 +65,14 @@ pub struct SuiteRun<'a> {
     pub renders_episodes: bool,
     /// True if the policy observes the true forces on the pads.
     pub force_observed: bool,
+    /// Split of the episodes.
     pub split: Split,
     pub(crate) connections: Option<Arc<PolicyConnections>>,
     /// Demonstrations of other simulators that the episodes re-execute.
     pub origins: BTreeMap<EpisodeIndex, Origin>,
     /// Files of those demonstrations.
     pub imported: Vec<Imported>,
+    /// Makes the controller of an episode.
     pub controllers: ControllerFactory,
 }
 
