@@ -59,7 +59,7 @@ pub struct Comparison {
     /// Number of episodes present in only one run.
     pub unpaired: usize,
     /// Fields of `run.json`, other than the policy, in which the runs differ.
-    pub differing_settings: Vec<String>,
+    pub differing_fields: Vec<String>,
     /// Pairs of a suite and its rigid twin, one sentence per pair; empty for runs of the same suites.
     pub pairing: Vec<String>,
     /// One sentence per run with missing episodes.
@@ -113,7 +113,7 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
         headings: headings(first, second),
         deformable: pairs.iter().any(|pair| pair.first.header.soft),
         unpaired: count(first) + count(second) - 2 * pairs.len(),
-        differing_settings: differing_fields(first, second),
+        differing_fields: differing_fields(first, second),
         pairing,
         incomplete: all()
             .filter(|run| run.is_partial())
@@ -323,9 +323,8 @@ pub fn table(comparison: &Comparison) -> String {
         table.line(format!("{episodes} present in only one run {verb} skipped"));
     }
     comparison.pairing.iter().chain(&comparison.incomplete).for_each(|sentence| table.line(sentence));
-    if !comparison.differing_settings.is_empty() {
-        table
-            .line(format!("the runs also differ in {} (run.json)", comparison.differing_settings.join(", ")));
+    if !comparison.differing_fields.is_empty() {
+        table.line(format!("the runs also differ in {} (run.json)", comparison.differing_fields.join(", ")));
     }
     table.text
 }
@@ -521,17 +520,17 @@ mod tests {
         part.manifest["sources"] = json!({ "x.lua": "1", "y.lua": "2" });
         whole.manifest["thresholds"] = json!({ "bun": 1.0, "pie": 2.0 });
         part.manifest["thresholds"] = json!({ "bun": 1.0 });
-        let unlike = |part: &StoredRun| {
-            compare(&[whole.clone()], std::slice::from_ref(part)).expect("pairs").differing_settings
+        let differing = |part: &StoredRun| {
+            compare(&[whole.clone()], std::slice::from_ref(part)).expect("pairs").differing_fields
         };
-        assert_eq!(unlike(&part), [""; 0]);
+        assert_eq!(differing(&part), [""; 0]);
         part.manifest["sources"]["y.lua"] = json!("9");
         assert_eq!(in_project("../a/scripts/experts/grasp.lua"), "scripts/experts/grasp.lua");
         assert_eq!((in_project("x.lua"), in_project("my_suites/x.lua")), ("x.lua", "my_suites/x.lua"));
         part.manifest["thresholds"]["bun"] = json!(1.5);
-        assert_eq!(unlike(&part), ["sources (y.lua)", "thresholds (bun)"]);
+        assert_eq!(differing(&part), ["sources (y.lua)", "thresholds (bun)"]);
         part.manifest["settings"] = json!({ "robot": 1 });
-        assert_eq!(unlike(&part)[0], "settings");
+        assert_eq!(differing(&part)[0], "settings");
     }
 
     #[test]
