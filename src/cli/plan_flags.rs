@@ -55,7 +55,8 @@ const SUITES: &[PlanKind] = &[Suite, Suites];
 
 /// The command without a name: `softvt FILE.lua`.
 pub(crate) const RUN: &str = "softvt";
-/// The commands that take plans of all kinds. The others refuse plans of other kinds than theirs, and all of their flags act.
+/// The commands that take plans of all kinds. The others refuse plans of other kinds than theirs, and flags without effect in
+/// `args.rs` and `parse.rs`.
 const COMMANDS: [&str; 2] = [RUN, "check"];
 
 /// Flags, and the kinds of plan on which they act.
@@ -82,6 +83,14 @@ fn acts_on(flag: &str) -> Option<&'static [PlanKind]> {
     EFFECTS.iter().find(|effect| effect.flags.contains(&flag)).map(|effect| effect.acts_on)
 }
 
+/// True if a command takes plans of this kind.
+fn takes(command: &str, kind: PlanKind) -> bool {
+    match command {
+        "view" => kind == Suite,
+        _ => COMMANDS.contains(&command) || SUITES.contains(&kind),
+    }
+}
+
 /// A flag on the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct GivenFlag {
@@ -97,6 +106,10 @@ pub(crate) struct GivenFlag {
 /// The first such flag.
 pub(crate) fn check(command: &str, request: &Request, plan: &Plan) -> Result<(), CliError> {
     let (kind, config) = (PlanKind::of(plan), &request.config);
+    // A command that takes no plan of this kind says so itself.
+    if !takes(command, kind) {
+        return Ok(());
+    }
     let refused = |flag: &&GivenFlag| !acts_on(&flag.id).unwrap_or_default().contains(&kind);
     if let Some(flag) = request.given().iter().filter(|_| COMMANDS.contains(&command)).find(refused) {
         let kinds: Vec<&str> =
@@ -108,7 +121,7 @@ pub(crate) fn check(command: &str, request: &Request, plan: &Plan) -> Result<(),
     }
     let suites = plan.suites();
     let all_rigid = suites.iter().all(|suite| suite.object_type == ObjectType::Rigid);
-    if config.rigid_twin && !suites.is_empty() && all_rigid {
+    if config.rigid_twin && all_rigid {
         return Err(config.error("--twin: the objects of this suite are rigid already; leave it out").into());
     }
     Ok(())
@@ -170,6 +183,15 @@ mod tests {
 
     #[test]
     fn every_flag_is_in_the_table() {
+        let root = clap_command();
+        let takes_plan = |command: &&clap::Command| command.get_arguments().any(|arg| arg.get_id() == "file");
+        let names: Vec<&str> =
+            root.get_subcommands().filter(takes_plan).map(clap::Command::get_name).collect();
+        assert_eq!(
+            names,
+            ["check", "view", "record", "serve"],
+            "say in `takes` which plans a new command takes"
+        );
         for command in COMMANDS {
             for flag in flags(command) {
                 assert!(
@@ -192,9 +214,9 @@ mod tests {
             for command in COMMANDS {
                 let known = flags(command);
                 let acts = |flag: &str| acts_on(flag).is_some_and(|kinds| kinds.contains(&kind));
-                for (_, sample) in
-                    SAMPLES.iter().filter(|(flag, _)| known.iter().any(|id| id == flag) && !acts(flag))
-                {
+                for flag in known.iter().filter(|flag| !acts(flag)) {
+                    let sample = SAMPLES.iter().find(|(known, _)| known == flag);
+                    let (_, sample) = sample.unwrap_or_else(|| panic!("give a sample of the flag {flag}"));
                     let name = command.trim_start_matches(RUN);
                     let line = format!("softvt {name} {} {sample}", script.display());
                     let words: Vec<String> =

@@ -96,7 +96,7 @@ pub fn persist(temp: &Path, path: &Path) -> Result<(), FileError> {
 /// # Errors
 /// The system refuses.
 pub fn rename(from: &Path, to: &Path) -> Result<(), FileError> {
-    fs::rename(from, to).map_err(FileError::io("rename to", to))?;
+    fs::rename(from, to).map_err(FileError::io("replace", to))?;
     // The new name must survive a power failure as well. Systems that cannot sync folders have other means.
     let _ = to.parent().map(File::open).transpose().map(|folder| folder.map(|folder| folder.sync_all()));
     Ok(())

@@ -21,8 +21,10 @@
 //! | Does the target rest at its goal, released? | [`goal`] |
 //! | Was the object dropped, or released on purpose? | [`drop`](mod@drop) |
 //! | How far did it slide along the pads while they carried it? | [`slip`] |
+//! | How hard was the grip against the least that holds? | [`grip`] |
 //! | At which stage did the episode fail? | [`stage`] |
 //! | Goal, NoDrop and deformation limit together | [`safety`] |
+//! | What does the judge find, and how did the rollout end? | [`verdict`] |
 //! | Where does the limit τ of an asset come from? | [`calibration`], [`thresholds`], [`envelope_plot`] |
 //! | What limit and window has another instance of an asset? | [`instance`] |
 //! | Every threshold of the judge | [`criteria`] |

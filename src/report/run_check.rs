@@ -27,8 +27,8 @@ pub fn first_contradiction(manifest: &Value, records: &[EpisodeRecord]) -> Optio
     records.iter().enumerate().find_map(found)
 }
 
-/// How a record contradicts the run of this manifest; `None` if it does not. Manifests of earlier versions without the
-/// fields are not compared.
+/// How a record contradicts the run of this manifest; `None` if it does not. What the manifest does not state is
+/// not compared.
 fn contradiction(manifest: &Value, record: &EpisodeRecord) -> Option<String> {
     let (v, s) = (&record.verdict, &record.stats);
     let is_valid = record.outcome.is_valid();

@@ -1,5 +1,5 @@
 //! The Franka Emika Panda with GelSight Mini finger tips: kinematics, inertias, differential inverse kinematics,
-//! gripper and gel pads.
+//! gripper, gel pads, and the settings of the tactile sensors ([`tactile`]).
 //!
 //! Frames, all functions of the joint coordinates: `hand` as in Franka's own description (z towards the finger tips, y
 //! from the right finger to the left one); the `tool` frame (TCP), with the hand's axes, at the nominal midpoint of the

@@ -25,7 +25,7 @@ pub struct StepTrace {
     pub closure: f64,
     /// Normal force of the left and right pad on the target, N.
     pub pad_force_n: [f64; 2],
-    /// Shear force over friction friction_capacity of the two pads, 0..=1.
+    /// Shear force over friction capacity of the two pads, 0..=1.
     pub friction_utilisation: [f64; 2],
     /// Slip of the two pads along the target, mm.
     pub slip_mm: [f64; 2],

@@ -199,7 +199,7 @@ impl RunConfig {
     }
 
     /// Runs the jobs `0..count` on the threads of the configuration until one fails or a stop is requested. `finish` takes
-    /// each result and returns the line that tells the observer.
+    /// each result and returns the line of progress for the observer.
     ///
     /// # Errors
     /// A job or `finish` fails.

@@ -18,7 +18,7 @@ pub fn suites_of(plan: &Plan) -> &[Suite] {
 }
 
 /// An error about a plan without the suites that a command needs.
-pub fn needs_suites(command: &str, config: &RunConfig) -> RunError {
+pub(crate) fn needs_suites(command: &str, config: &RunConfig) -> RunError {
     config.error(format!(
         "softvt {command} needs a suite or a list of suites; name a file that returns softvt.suite"
     ))
@@ -101,7 +101,7 @@ pub fn check_distinct_out_dirs(config: &RunConfig, suites: &[Suite]) -> Result<(
 }
 
 /// Folder of a suite's run in `--out`: that folder itself, or one inside of it for a list of suites.
-pub fn run_dir(config: &RunConfig, suite: &Suite, is_list: bool) -> Option<PathBuf> {
+pub(crate) fn run_dir(config: &RunConfig, suite: &Suite, is_list: bool) -> Option<PathBuf> {
     let dir = config.out.as_ref()?;
     Some(if is_list { dir.join(path_component(&config.suite_name(suite))) } else { dir.clone() })
 }

@@ -30,6 +30,7 @@ pub enum Body {
 }
 
 /// Isotropic linear-elastic material of a soft body, and its discretisation.
+/// Its serialised names are part of fingerprints of assets.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SoftMaterial {
     /// Young's modulus, Pa; the shipped pastries have 2.5e4 to 2.2e5.
@@ -130,6 +131,7 @@ pub enum JointMotion {
 }
 
 /// A joint with one degree of freedom, between a part and its parent.
+/// Its serialised names are part of fingerprints of assets.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Joint {
     /// Translation or rotation.

@@ -71,8 +71,8 @@ fn write_canonical(value: &Value, text: &mut String) {
     match value {
         Value::Number(number) if number.is_f64() => {
             let x = number.as_f64().unwrap_or_default();
-            // Adding zero turns -0.0 into 0.0.
-            *text += &format!("{:.6e}", if x.abs() < 1e-12 { 0.0 } else { x + 0.0 });
+            // The bound also turns -0.0 into 0.0.
+            *text += &format!("{:.6e}", if x.abs() < 1e-12 { 0.0 } else { x });
         }
         Value::Array(values) => {
             text.push('[');

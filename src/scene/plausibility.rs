@@ -17,7 +17,7 @@ const GRAVITY: f64 = 9.81;
 const MAX_SAG: f64 = 0.15;
 
 impl Asset {
-    /// Doubts about its material, one sentence each.
+    /// Warnings about its material, one sentence each.
     pub fn warnings(&self) -> Vec<String> {
         match &self.body {
             Body::Soft(material @ SoftMaterial { youngs_pa, density, .. }) => {

@@ -72,6 +72,8 @@ fn lua_type(ty: &Type) -> String {
             Type::OneOf(_) | Type::Choice(_) | Type::Function(_) => format!("({})[]", lua_type(of)),
             of => format!("{}[]", lua_type(of)),
         },
+        // Settings are the only table of tables of any values.
+        Type::Map(Type::Map(Type::Any)) => SETTINGS_CLASS.into(),
         Type::Map(of) => format!("table<string, {}>", lua_type(of)),
         Type::Nested(record) => record.class.into(),
         Type::Constructed(records) => records.iter().map(|record| record.class).collect::<Vec<_>>().join("|"),
@@ -185,13 +187,19 @@ fn setting_groups(settings: &[Setting]) -> Vec<SettingGroup> {
             let (lua_type, details) = match (inner, &setting.default) {
                 (Some(_), _) => (own.clone(), String::new()),
                 (None, Value::Bool(_)) => ("boolean".to_owned(), setting_details(setting)),
-                (None, Value::String(_)) => ("string|table".to_owned(), setting_details(setting)),
+                // One of several models, by its name in the field `model`.
+                (None, Value::String(_)) => ("table".to_owned(), setting_details(setting)),
                 (None, _) => ("number".to_owned(), setting_details(setting)),
             };
             match fields.iter_mut().find(|field| field.name == name) {
                 None => fields.push(SettingField { name: name.to_owned(), lua_type, details }),
-                // A model is selected by its name, or by a table with its constants.
-                Some(model) if model.lua_type == "string|table" => model.lua_type = format!("string|{own}"),
+                Some(model) if model.lua_type == "table" => {
+                    model.lua_type.clone_from(&own);
+                    let (name, lua_type) = ("model".to_owned(), "string".to_owned());
+                    let details = " Name of the model; the constants are its own.".to_owned();
+                    let fields = vec![SettingField { name, lua_type, details }];
+                    groups.push(SettingGroup { class: own.clone(), fields });
+                }
                 Some(_) => {}
             }
             let Some(inner) = inner else { break };

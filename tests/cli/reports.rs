@@ -51,7 +51,7 @@ fn runs_are_paired_by_episode_and_task() {
 }
 
 #[test]
-fn harm_and_stages_are_compared_and_runs_without_them_too() {
+fn harm_and_stages_are_compared() {
     let project = project();
     let row = |text: &str, name: &str| -> Vec<String> {
         let line = text.lines().find(|line| line.starts_with(name)).unwrap_or_default();
@@ -73,39 +73,6 @@ fn harm_and_stages_are_compared_and_runs_without_them_too() {
     );
     assert_eq!(all["failed_stages"]["first"], json!({ "reach": 2 }));
     assert_eq!(all["invalid_pairs"], 0);
-    // Records of version 0.1 have none of these fields.
-    let lines = project.text("runs/b/episodes.jsonl");
-    let old: String = lines
-        .lines()
-        .map(|line| {
-            let mut record: Value = serde_json::from_str(line).expect("a record");
-            let fields = record.as_object_mut().expect("an object");
-            for field in [
-                "d_mean",
-                "d_final",
-                "d_p95",
-                "time_over_tau_s",
-                "others",
-                "others_ok",
-                "first_wrong_contact",
-                "failed_stage",
-                "collapsed_volume_pct",
-                "damaged_volume_pct",
-            ] {
-                fields.remove(field);
-            }
-            format!("{record}\n")
-        })
-        .collect();
-    project.write("runs/b/episodes.jsonl", old.as_bytes());
-    let text = project.succeeds("compare runs/a runs/b").out;
-    assert_eq!(row(&text, "DSR"), ["%", "N/A", "N/A"], "never judged: {text}");
-    for name in ["D mean", "D P95", "others within their τ", "touched other objects", "failed at any stage"]
-    {
-        assert_eq!(row(&text, name)[1..], ["N/A", "N/A"], "{name}: {text}");
-    }
-    let all = &json("runs/b")["all"];
-    assert_eq!((&all["d_mean"]["n"], &all["failed_stages"]["n"]), (&json!(0), &json!(0)));
     assert_eq!(all["goal"]["n"], 2);
 }
 

@@ -6,6 +6,7 @@ use super::warp::Axis;
 use crate::{Vec3, hex8};
 
 /// A height field over a surface; positive heights raise it outwards.
+/// Its serialised names are part of fingerprints of assets.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Displacement {
     /// Ridges at a regular pitch.

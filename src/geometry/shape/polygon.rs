@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::validate::ShapeError;
 
 /// A simple closed polygon with counter-clockwise corners, m: (x, z) for a prism, (r, z) with r ≥ 0 for a lathe.
+/// Its serialised names are part of fingerprints of assets.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Polygon {
     points: Vec<[f64; 2]>,

@@ -6,6 +6,7 @@ use serde::Serialize;
 use crate::{Mat3, Vec3};
 
 /// A coordinate axis of a shape's frame.
+/// Its serialised names are part of fingerprints of assets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Axis {
     /// The x axis.

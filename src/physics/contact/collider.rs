@@ -47,6 +47,7 @@ impl ContactSurface for Shape {
 }
 
 /// Coulomb friction coefficients of a surface. A pair of surfaces takes the larger of each, unless one is coated.
+/// Its serialised names are part of fingerprints of assets.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Friction {
     /// Coefficient of a surface that sticks.

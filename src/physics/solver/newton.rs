@@ -302,7 +302,7 @@ impl Solver {
 
     /// Writes impulses and velocities into the points.
     fn record(&mut self, problem: &mut ContactProblem, island: &Island) -> PassImpulses {
-        let mut residual = PassImpulses::default();
+        let mut impulses = PassImpulses::default();
         let law = ContactLaw::new(problem.dt, problem.dissipation_time);
         for &index in &island.clusters {
             let cluster = problem.clusters[index];
@@ -311,15 +311,15 @@ impl Solver {
             for (point, v) in problem.points[cluster.first..cluster.last].iter_mut().zip(&self.velocities) {
                 let response = law.contact(point, v);
                 let normal = response.map_or(0.0, |response| response.normal);
-                residual.change += (normal - point.previous_normal_impulse).abs();
-                residual.total += normal;
+                impulses.change += (normal - point.previous_normal_impulse).abs();
+                impulses.total += normal;
                 point.normal_impulse = normal;
                 point.shear_impulse = response.map_or(Vec3::zeros(), |a| a.impulse - point.normal * normal);
                 point.is_slipping = response.is_some_and(|response| response.is_slipping);
                 point.velocity = *v;
             }
         }
-        residual
+        impulses
     }
 
     /// Writes the step from the current velocities into `step`. It is always a descent direction.

@@ -303,7 +303,7 @@ impl World {
         }
     }
 
-    /// Mass of a soft or free rigid body, kg; `None` for bodies that gravity does not move.
+    /// Mass of a soft or free rigid body, kg; `None` for links, kinematic bodies and the world.
     pub fn mass(&self, body: impl Into<BodyId>) -> Option<f64> {
         match body.into() {
             BodyId::Soft(id) => Some(self.soft(id).state.model.total_mass()),

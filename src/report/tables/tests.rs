@@ -14,7 +14,7 @@ fn rigid_suites_have_no_safety_and_privileged_policies_are_marked_in_every_table
         stored("b", "expert", vec![rigid]),
     ]);
     let all = all_tables(&runs);
-    assert_eq!(all.len(), 6);
+    assert_eq!(all.len(), 8);
     for table in &all {
         let marked = |text: &String| text.contains("expert (privileged)");
         assert!(marked(&table.caption) || table.rows.iter().all(|row| row.iter().any(marked)), "{table:?}");

@@ -26,7 +26,7 @@ const FACTORS: Type = Type::Vector(2, "", Range::closed(0.1, 10.0));
 const COATINGS: Type = Type::Vector(2, "", Range::above(0.0, 10.0));
 const HOLD: Type = Type::Number("s", Range::closed(0.0, 10.0));
 /// Type of a table of settings.
-pub(crate) const SETTINGS: Type = Type::Table(SETTINGS_CLASS);
+pub(crate) const SETTINGS: Type = Type::Map(&Type::Map(&Type::Any));
 /// Class of the settings in the editor stubs, which list them group by group.
 pub(crate) const SETTINGS_CLASS: &str = "softvt.Settings";
 
