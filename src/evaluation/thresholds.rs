@@ -87,7 +87,7 @@ pub struct ThresholdFile {
     /// Envelope of each asset with its rows; absent in released files.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub envelopes: BTreeMap<String, Envelope>,
-    /// Fingerprint of each calibrated asset ([`softvt_scene::Asset::fingerprint`]); absent in released files.
+    /// Fingerprint of each calibrated asset, a hash of its mechanical properties; absent in released files.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub fingerprints: BTreeMap<String, String>,
 }
