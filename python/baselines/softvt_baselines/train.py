@@ -124,7 +124,9 @@ def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict)
             if step % REPORT == 0 or step == options.steps:
                 count = (step - 1) % REPORT + 1
                 loss, grip = (total / count).tolist()
-                line = f"{path.stem}: step {step} of {options.steps}, loss {loss:.4f}, gripper {grip:.4f}, {time.monotonic() - started:.0f} s"
+                line = (
+                    f"{path.stem}: step {step} of {options.steps}, loss {loss:.4f}, gripper {grip:.4f}, {time.monotonic() - started:.0f} s"
+                )
                 print(line, flush=True)
                 print(line, file=log, flush=True)
                 total.zero_()
