@@ -27,8 +27,7 @@ pub fn first_contradiction(manifest: &Value, records: &[EpisodeRecord]) -> Optio
     records.iter().enumerate().find_map(found)
 }
 
-/// How a record contradicts the run of this manifest; `None` if it does not. What the manifest does not state is
-/// not compared.
+/// Contradiction between a record and the manifest of its run; `None` if they agree. Skips what the manifest does not state.
 fn contradiction(manifest: &Value, record: &EpisodeRecord) -> Option<String> {
     let (v, s) = (&record.verdict, &record.stats);
     let is_valid = record.outcome.is_valid();

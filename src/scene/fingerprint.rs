@@ -10,7 +10,7 @@ use super::asset::{Asset, Body, Joint, Part, SoftMaterial};
 use softvt_geometry::shape::Shape;
 use softvt_physics::contact::Friction;
 
-/// What enters the fingerprint of an asset. Calibration files store the hashes: the names of these fields, and of those of
+/// Content of the fingerprint of an asset. Calibration files store the hashes: the names of these fields, and of those of
 /// the types below them, must not change.
 #[derive(Serialize)]
 struct Mechanics<'a> {
