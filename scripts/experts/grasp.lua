@@ -12,7 +12,8 @@ local UNDER, FINGER_CLEARANCE = 0.0015, 0.004
 local FINGER_STIFFNESS = 2000
 -- Step of the rotations tried for clearance.
 local STEP = math.rad(7.5)
--- Distance of each gel from the object at which closing becomes slow, m, and rate until there, 1/s.
+-- Distance of each gel from the object at which closing becomes slow, m, and rate until there, 1/s. A hand that feels begins up to
+-- twice as far away, so that its demonstrations do not tell by the time at which it touches.
 local CONTACT_CLEARANCE, FAST_RATE = 0.002, 0.6
 -- Width by which a command may exceed that of its grip, m.
 local COMMAND_MARGIN = 0.002
@@ -173,7 +174,8 @@ end
 
 -- Closes fast to a clearance at which nothing is touched. `width` is the distance of the gels at first contact, m.
 function grasp.approach(arm, object, width)
-  arm:close_to(math.max(arm.closure, grasp.clear_closure(object, CONTACT_CLEARANCE, width)), { rate = FAST_RATE })
+  local clearance = CONTACT_CLEARANCE * (arm.feels and 1 + math.random() or 1)
+  arm:close_to(math.max(arm.closure, grasp.clear_closure(object, clearance, width)), { rate = FAST_RATE })
 end
 
 -- Closes on an object as a person would: fast to a clearance at which nothing is touched, then slowly to the grip. `options`:

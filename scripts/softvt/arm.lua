@@ -12,7 +12,7 @@ local PEAK = 1.875
 local function smooth(u) return u * u * u * (10 + u * (6 * u - 15)) end
 
 -- Lets go of what the tactile servo holds.
-local function end_servo(self) self.grip = nil end
+local function end_servo(self) self.grip, self.wants_readings = nil, false end
 
 -- Sends one command and returns at the next control step, or raises the error that the host reports. The hand keeps the closure
 -- that the servo found.
@@ -163,8 +163,10 @@ function Arm:note(name, value) note(name, value) end
 function Arm:give_up(reason) yield(self.target, self.closure, self.gripping, reason) end
 
 -- An expert that reads the name of the controller is taken to follow it.
-local own = { target = true, closure = true, gripping = true }
-local state, methods, arm = { target = host.target, closure = host.closure, gripping = host.gripping, wants_readings = false }, {}, nil
+local own = { target = true, closure = true, gripping = true, feels = true }
+local state, methods, arm = {
+  target = host.target, closure = host.closure, gripping = host.gripping, feels = fingers.servo, wants_readings = false,
+}, {}, nil
 
 -- Methods work on the state of the arm; scripts get wrappers that check their arguments.
 for name, method in pairs(Arm) do

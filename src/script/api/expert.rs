@@ -310,6 +310,8 @@ class! {
             closure: "number" { get(_, this) { this.read(|view| view.closure) } }
             /// True from a call of grasp to the next call of release or open.
             gripping: "boolean" { get(_, _) { false } }
+            /// True under --policy tactile-servo, whose grasp closes by touch.
+            feels: "boolean" { get(_, _) { false } }
             /// Measured distance of the gels, m.
             width: "number" { get(_, this) { this.read(|view| view.width_m) } }
             /// Sum of the normal forces at all contact points of the left and the right gel pad, N, whatever touches it; forces
