@@ -38,7 +38,7 @@ pub struct Imported {
     pub file: String,
     /// SHA-256, hexadecimal.
     pub sha256: String,
-    pub layout: String,
+    pub format: String,
     pub demos: usize,
     /// Source of the executed commands.
     pub commands: String,

@@ -27,8 +27,8 @@ pub struct Demonstration {
     pub actions: Vec<Action>,
     /// True in steps in which the gripper is commanded to hold: its binary code.
     pub gripper_closed: Vec<bool>,
-    /// Seventh numbers of the actions in the code force, N. `None` in recordings of version 0.1.
-    pub grip_labels_n: Option<Vec<f64>>,
+    /// Seventh numbers of the actions in the code force, N.
+    pub grip_labels_n: Vec<f64>,
     /// Observations other than images, `obs/…`.
     pub observed: Vec<DataStream>,
     /// Ground truth that no real robot could measure, `privileged/…`; may be left out.
@@ -53,7 +53,7 @@ impl Demonstration {
         Self {
             record: finished.record.clone(),
             observed: observed(recording, &actions),
-            grip_labels_n: Some(grip_labels::forces(&grip_forces(recording, actions.len()), &gripper_closed)),
+            grip_labels_n: grip_labels::forces(&grip_forces(recording, actions.len()), &gripper_closed),
             gripper_closed,
             actions,
             privileged,
@@ -77,8 +77,7 @@ impl Demonstration {
     /// The streams outside `obs` and `privileged`: actions in every grip code, rewards, episode ends and timestamps.
     pub fn top_level_streams(&self) -> Vec<DataStream> {
         let steps = self.steps();
-        let mut all: Vec<DataStream> =
-            GripCode::ALL.into_iter().filter_map(|code| self.actions_in(code)).collect();
+        let mut all = GripCode::ALL.map(|code| self.actions_in(code)).to_vec();
         let last = |step: usize| step + 1 == steps;
         all.extend([
             DataStream::f64("rewards", &[], (0..steps).map(|step| f64::from(u8::from(last(step)))).collect()),
@@ -89,8 +88,8 @@ impl Demonstration {
         all
     }
 
-    /// The actions with their seventh number in a grip code. `None` if the recording does not have it.
-    fn actions_in(&self, code: GripCode) -> Option<DataStream> {
+    /// The actions with their seventh number in a grip code.
+    fn actions_in(&self, code: GripCode) -> DataStream {
         let closures: Vec<f64> = self.actions.iter().map(|action| action.closure()).collect();
         let (grip, meaning) = match code {
             GripCode::Continuous => (closures, "continuous closure: 1 - commanded width / 0.08 m"),
@@ -103,7 +102,7 @@ impl Demonstration {
                 "two-width: closure 0 while open, the median commanded closure of the closed steps while closed",
             ),
             GripCode::Force => (
-                self.grip_labels_n.clone()?,
+                self.grip_labels_n.clone(),
                 "force: mean pressing force of both pads after the step, N, while closed; -1 while open",
             ),
         };
@@ -112,12 +111,11 @@ impl Demonstration {
             .flat_map(|(action, closure)| Action { grip: GripTarget::Closure(closure), ..*action }.to_array())
             .collect();
         let unit = if code == GripCode::Force { "m, rad, N" } else { "m, rad, 1" };
-        let stream = DataStream::f64(actions_stream(code), &[7], rows)
+        DataStream::f64(actions_stream(code), &[7], rows)
             .unit(unit, BASE)
             .attribute("meaning", "absolute tool position (m) and axis-angle (rad), gripper")
             .attribute("gripper", meaning)
-            .attribute("grip_code", code.name());
-        Some(stream)
+            .attribute("grip_code", code.name())
     }
 }
 

@@ -277,7 +277,6 @@ impl GripCode {
 /// Meaning of the gripper's number: the grip code, and the values for open and closed. Values in between mean
 /// proportional closures, unless the code is binary.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(from = "GripperValuesFile", into = "GripperValuesFile")]
 pub struct GripperValues {
     /// Value of the open gripper. For [`GripCode::Force`] any value below 0 opens.
     pub open: f64,
@@ -286,6 +285,7 @@ pub struct GripperValues {
     /// Meaning of the value.
     pub code: GripCode,
     /// For [`GripCode::Binary`]: hysteresis, instead of the middle between both values.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub latch: Option<GripLatch>,
 }
 
@@ -298,34 +298,6 @@ pub struct GripLatch {
     pub open: f64,
     /// Control steps for which a change is kept whatever is answered.
     pub hold_steps: u32,
-}
-
-/// [`GripperValues`] as files contain them.
-#[derive(Serialize, Deserialize)]
-struct GripperValuesFile {
-    open: f64,
-    #[serde(rename = "shut", alias = "closed")]
-    closed: f64,
-    #[serde(default)]
-    binary: bool,
-    /// Missing in files of version 0.1.
-    #[serde(default)]
-    code: Option<GripCode>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    latch: Option<GripLatch>,
-}
-
-impl From<GripperValuesFile> for GripperValues {
-    fn from(GripperValuesFile { open, closed, binary, code, latch }: GripperValuesFile) -> Self {
-        let stated = if binary { GripCode::Binary } else { GripCode::Continuous };
-        Self { open, closed, code: code.unwrap_or(stated), latch }
-    }
-}
-
-impl From<GripperValues> for GripperValuesFile {
-    fn from(GripperValues { open, closed, code, latch }: GripperValues) -> Self {
-        Self { open, closed, binary: code == GripCode::Binary, code: Some(code), latch }
-    }
 }
 
 /// Share of its range by which a grip value may lie outside: answers of learned policies overshoot a little.
@@ -578,13 +550,10 @@ mod tests {
     fn files_name_the_grip_code_and_those_without_it_are_read() {
         let binary = Profile::named("vision").unwrap().actions.gripper;
         let text = serde_json::to_string(&binary).unwrap();
-        assert_eq!(text, r#"{"open":0.0,"shut":1.0,"binary":true,"code":"binary"}"#);
+        assert_eq!(text, r#"{"open":0.0,"closed":1.0,"code":"binary"}"#);
         assert_eq!(serde_json::from_str::<GripperValues>(&text).unwrap(), binary);
-        let old = r#"{"open":0.0,"shut":1.0,"binary":true}"#;
-        assert_eq!(serde_json::from_str::<GripperValues>(old).unwrap(), binary);
         let widths = binary.with_code(GripCode::TwoWidth).unwrap();
         let text = serde_json::to_string(&widths).unwrap();
-        assert!(text.contains(r#""binary":false,"code":"two-width""#), "{text}");
         assert_eq!(serde_json::from_str::<GripperValues>(&text).unwrap(), widths);
         assert_eq!(GripCode::named("two-width"), Some(GripCode::TwoWidth));
         assert_eq!(GripCode::named("twowidth"), None);

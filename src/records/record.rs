@@ -76,7 +76,7 @@ pub struct Origin {
     /// Name of the demonstration in the file.
     pub demo: String,
     /// Format of the file.
-    pub layout: String,
+    pub format: String,
     /// Initial state that replaces the one of the layout.
     pub start: InitialState,
 }

@@ -57,13 +57,13 @@ pub fn condition_effects(runs: &[RunSummary]) -> Vec<ConditionEffects> {
 }
 
 fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
-    let mut unchanged = group.iter().filter(|run| run.run.change().is_none());
+    let mut unchanged = group.iter().filter(|run| run.run.condition().is_none());
     let (reference, None) = (unchanged.next()?, unchanged.next()) else { return None };
     let reference_records = records_of_original(reference);
     let mut effects = Vec::new();
     let mut changed: BTreeMap<_, Vec<EpisodeRecord>> = BTreeMap::new();
     for run in group {
-        let Some(change) = run.run.change() else { continue };
+        let Some(change) = run.run.condition() else { continue };
         let records = records_of_original(run);
         let pairs = pair_episodes(&reference_records, &records);
         if pairs.is_empty() {

@@ -61,7 +61,6 @@ impl ConditionOutcome {
 pub struct ConditionRow {
     pub condition: String,
     /// True for the rigid twin of the suite, paired with the reference by task and episode.
-    #[serde(default)]
     pub rigid_twin: bool,
     pub shift: Vec<ShiftValue>,
     pub set: Vec<(String, String)>,

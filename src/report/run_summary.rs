@@ -35,7 +35,7 @@ pub fn summarize_runs(mut runs: Vec<StoredRun>) -> Vec<RunSummary> {
     let mut all: Vec<RunSummary> = runs.into_iter().map(summarize).collect();
     all.sort_by(|a, b| {
         let group = |run: &RunSummary| groups.get(&run.run.condition_group());
-        let by_change = || match (a.run.change(), b.run.change()) {
+        let by_change = || match (a.run.condition(), b.run.condition()) {
             (Some(a), Some(b)) => a.compare(&b),
             (a, b) => a.is_some().cmp(&b.is_some()),
         };

@@ -68,7 +68,7 @@ pub fn remove_folder(manifest: &mut Value) {
     }
 }
 
-/// Changes that a run makes to its suite.
+/// The changes that a run makes to its suite, as tables and plots name them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConditionLabel {
     /// Name of the changed factor, such as `mass`; `several` for more than one.
@@ -145,8 +145,8 @@ impl StoredRun {
         })
     }
 
-    /// Changes to the suite; `None` for a suite as it is.
-    pub fn change(&self) -> Option<ConditionLabel> {
+    /// The changes to the suite; `None` for a suite as it is.
+    pub fn condition(&self) -> Option<ConditionLabel> {
         let twin = self.is_rigid_twin().then(|| "rigid twin".to_owned());
         let changes: Vec<String> = self.changes("shifts").chain(self.changes("set")).chain(twin).collect();
         let label = changes.join(", ");

@@ -80,7 +80,7 @@ impl PadSurface {
             (0.5 - self.edge_distance(p_p.x, p_p.y) / spacing).clamp(0.0, 1.0)
         };
         Contact {
-            phi: (p_p.z - self.height(p_p.x, p_p.y)) / steepness,
+            gap: (p_p.z - self.height(p_p.x, p_p.y)) / steepness,
             normal: gradient / steepness,
             coverage,
         }
@@ -235,10 +235,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn phi_is_the_distance_to_the_dome(x in -12.6e-3..12.6e-3_f64, y in -10.3e-3..10.3e-3_f64, z in -3.0e-3..5.0e-3_f64) {
+        fn gap_is_the_distance_to_the_dome(x in -12.6e-3..12.6e-3_f64, y in -10.3e-3..10.3e-3_f64, z in -3.0e-3..5.0e-3_f64) {
             let pad = PadSurface::default();
             let p_p = Vec3::new(x, y, z + pad.height(x, y));
-            let found = pad.contact(&p_p, 0.75e-3).phi;
+            let found = pad.contact(&p_p, 0.75e-3).gap;
             let expected = distance(&pad, &p_p);
             prop_assert!((found - expected).abs() <= 5e-4 * expected.abs() + 1e-12, "{found} {expected}");
         }
@@ -285,7 +285,7 @@ mod tests {
         assert!(mean.xy().norm() < 1e-12, "{mean}");
         for GelSample { p, normal, .. } in samples {
             let contact = pad.contact(&p, 1e-3);
-            assert!(contact.phi.abs() < 1e-15 && (contact.normal - normal).norm() < 1e-15);
+            assert!(contact.gap.abs() < 1e-15 && (contact.normal - normal).norm() < 1e-15);
         }
     }
 

@@ -56,12 +56,11 @@ pub fn run<E: From<RunError>>(
         .collect::<Result<_, _>>()?;
     let mut prepared = Vec::new();
     for (suite, cases) in suites.iter().zip(&cases) {
-        let tasks = select_tasks(config, suite)?;
-        prepared.push((prepare_runs(loaded, suite, cases, &tasks, out)?, tasks));
+        prepared.push(prepare_runs(loaded, suite, cases, &select_tasks(config, suite)?, out)?);
     }
     let mut tables = Vec::new();
-    for ((suite, cases), (runs, tasks)) in suites.iter().zip(&cases).zip(prepared) {
-        let compared = compare_conditions(config, suite, cases, runs, &tasks)?;
+    for ((suite, cases), runs) in suites.iter().zip(&cases).zip(prepared) {
+        let compared = compare_conditions(config, suite, cases, runs)?;
         tables.push(compared);
         on_suite(&tables)?;
     }
@@ -177,7 +176,7 @@ fn prepare_runs<'a>(
         if let Some(Some(reference)) = runs.first() {
             run.copy_limits(reference);
         }
-        run.prepare(tasks).map_err(in_case)?;
+        run.prepare().map_err(in_case)?;
         runs.push(Some(run));
     }
     Ok(runs)
@@ -188,7 +187,6 @@ fn compare_conditions(
     suite: &Suite,
     cases: &[ConditionCase],
     runs: Vec<Option<SuiteRun>>,
-    tasks: &[&Task],
 ) -> Result<ConditionTable, RunError> {
     let (mut reference, mut force_observed) = (None, false);
     let mut rows = Vec::new();
@@ -197,7 +195,7 @@ fn compare_conditions(
         if let Some(run) = run {
             let (name, number) = (text::escape_control(&case.condition.name), rows.len() + 1);
             config.notice(format!("{}, {name} ({number} of {})", suite.name, cases.len()));
-            let result = run_suite(&run, tasks, &mut |_| ())?;
+            let result = run_suite(&run, &mut |_| ())?;
             outcome = Some(ConditionOutcome::new(case.folder.clone(), &result.records, reference.as_deref()));
             reference.get_or_insert(result.records);
             force_observed |= result.summary.force_observed;

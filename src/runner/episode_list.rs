@@ -53,6 +53,18 @@ impl<'a> EpisodeList<'a> {
         Self { all: Episodes::Listed(jobs), omitted: Vec::new() }
     }
 
+    /// The tasks of the episodes, those without one in a shard included, in order.
+    pub fn tasks(&self) -> Vec<&'a Task> {
+        match &self.all {
+            Episodes::Range { tasks, .. } => tasks.clone(),
+            Episodes::Listed(jobs) => {
+                let mut tasks: Vec<&Task> = jobs.iter().map(|job| job.task).collect();
+                tasks.dedup_by_key(|task| task.id);
+                tasks
+            }
+        }
+    }
+
     /// The list without these episodes.
     pub fn without(&self, done: impl Iterator<Item = EpisodeIndex>) -> Self {
         let mut omitted: Vec<usize> = done.filter_map(|index| self.all.position(index)).collect();

@@ -12,7 +12,6 @@ use crate::{
     run_manifest::{self, RunManifest},
     suite_run::SuiteRun,
 };
-use softvt_benchmark::Task;
 use softvt_common::cancel;
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{files, parallel, text::counted};
@@ -200,11 +199,10 @@ pub(crate) fn with_kept(outcome: Result<(), RunError>, kept: &str, hint: &str) -
 /// interrupted. Finished episodes are kept.
 pub(crate) fn run_suite(
     run: &SuiteRun,
-    tasks: &[&Task],
     on_episode: &mut dyn FnMut(&EpisodeRecord),
 ) -> Result<SuiteResult, RunError> {
     let config = run.config;
-    let manifest = RunManifest::new(run, tasks, config.episodes_of(run.suite));
+    let manifest = RunManifest::new(run, config.episodes_of(run.suite));
     // The same command again on a finished folder changes nothing, even without --resume.
     let finished = is_finished(&run.out) && run_manifest::is_in(&run.out, &manifest)?;
     let opened = match config.resume || finished {
@@ -397,6 +395,7 @@ mod tests {
     use super::*;
     use crate::config::LoadedRun;
     use softvt_benchmark::Plan;
+    use softvt_benchmark::Task;
     use softvt_policy::{Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief};
     use softvt_rollout::{ChunkedPolicy, Controller};
     use softvt_script::EpisodeSetup;
@@ -440,8 +439,8 @@ mod tests {
             if observed {
                 run.controllers = Box::new(force_observer);
             }
-            run.prepare(&tasks).expect("the scenes are valid");
-            run_suite(&run, &tasks, &mut |_| ()).expect("it runs");
+            run.prepare().expect("the scenes are valid");
+            run_suite(&run, &mut |_| ()).expect("it runs");
             for file in [RUN, EPISODES, SUMMARY] {
                 let text = std::fs::read_to_string(dir.join(file)).expect("written");
                 let value: serde_json::Value = serde_json::from_str(&text).expect("one document");

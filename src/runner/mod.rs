@@ -5,6 +5,7 @@
 //! need. Nothing here prints: progress and messages go to an [`Observer`].
 #![warn(missing_docs, unreachable_pub)]
 
+mod check;
 pub mod conditions;
 mod config;
 mod episode_artifacts;
@@ -17,6 +18,7 @@ pub mod import;
 mod limits;
 mod observer;
 mod policy;
+mod record;
 mod recorded_runs;
 pub mod recording;
 pub mod replay;
@@ -28,6 +30,7 @@ mod serving;
 pub mod stored_folder;
 mod suite_run;
 
+pub use check::SuiteChecker;
 pub use config::{LoadedRun, RunConfig, Shard, TraceDetail, read_secret, thread_count};
 pub use episode_artifacts::VideoSelection;
 pub use episode_list::{EpisodeJob, EpisodeList};
@@ -38,6 +41,7 @@ pub use policy::{
     BuiltinPolicy, ControllerFactory, DeclaredStreams, PolicyConfig, PolicyOptions, PolicySource,
     expert_controller, parse_profile,
 };
+pub use record::{DemoCount, record};
 pub use runner::Runner;
 pub use served_runs::ServedRuns;
 pub use serving::{check_served, first_observation, prepare_served, server_config};

@@ -87,7 +87,7 @@ pub struct SuiteRecording<'a> {
 }
 
 impl<'a> SuiteRecording<'a> {
-    /// Prepares a recording of at most the attempts `jobs` at `tasks`. `customize` selects the controllers, and where the intent to
+    /// Prepares a recording of at most the attempts `jobs`. `customize` selects the controllers, and where the intent to
     /// grip is recorded.
     ///
     /// # Errors
@@ -97,7 +97,6 @@ impl<'a> SuiteRecording<'a> {
         options: &'a RecordingOptions,
         loaded: &'a LoadedScript,
         suite: &'a Suite,
-        tasks: Vec<&'a Task>,
         jobs: EpisodeList<'a>,
         demos: Option<u32>,
         customize: impl FnOnce(&mut SuiteRun<'a>, &GripLog) -> Result<(), RunError>,
@@ -115,10 +114,11 @@ impl<'a> SuiteRecording<'a> {
         run.renders_episodes = true;
         let grip_log = GripLog::default();
         customize(&mut run, &grip_log)?;
-        run.prepare(&tasks)?;
+        run.prepare()?;
+        let tasks = run.jobs.tasks();
         let attempts = tasks.iter().map(|task| run.jobs.episodes_of(task.id).count());
         let episodes = demos.unwrap_or(attempts.max().unwrap_or_default() as u32);
-        let manifest = json!(RunManifest::new(&run, &tasks, episodes));
+        let manifest = json!(RunManifest::new(&run, episodes));
         let environment = json!({ "env_name": "softvt", "type": 2, "env_kwargs": manifest });
         Ok(Self { options, run, tasks, folder_name, demos, grip_log, manifest, environment })
     }

@@ -105,7 +105,7 @@ impl StoredManifest<'_> {
         run.split = self.split()?;
         run.controllers = replay_factory(actions, record);
         run.origins.extend(record.header.origin.iter().map(|origin| (index, (**origin).clone())));
-        run.prepare(&tasks)?;
+        run.prepare()?;
         self.check_sources(&run)?;
         Ok(with_policy_fields(run.run_episode(job, false, &run.controllers)?.record, record))
     }

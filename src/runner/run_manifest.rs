@@ -9,9 +9,7 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::{error::RunError, recorded_runs::ReplaySource, suite_run::SuiteRun};
-use softvt_benchmark::{
-    Needs, ShiftValue, Task, seed::SecretSeed, settings::Settings, variation::VariationRanges,
-};
+use softvt_benchmark::{Needs, ShiftValue, seed::SecretSeed, settings::Settings, variation::VariationRanges};
 use softvt_common::files;
 use softvt_dataset::card::Imported;
 use softvt_policy::profile::{GripCode, Profile};
@@ -93,7 +91,7 @@ pub(crate) struct RunManifest<'a> {
 
 impl<'a> RunManifest<'a> {
     /// The manifest of a prepared run of `episodes` per task.
-    pub(crate) fn new(run: &'a SuiteRun, tasks: &[&Task], episodes: u32) -> Self {
+    pub(crate) fn new(run: &'a SuiteRun, episodes: u32) -> Self {
         let config = run.config;
         let options = run.loaded.options.iter();
         Self {
@@ -118,7 +116,7 @@ impl<'a> RunManifest<'a> {
             seed: config.seed,
             seed_hash: config.secret.as_ref().map(SecretSeed::hash),
             split: run.split.name(),
-            tasks: tasks.iter().map(|task| task.id).collect(),
+            tasks: run.jobs.tasks().iter().map(|task| task.id).collect(),
             episodes,
             shard: config.shard.map(|shard| shard.to_string()),
             shifts: &config.shifts,

@@ -8,10 +8,7 @@ use crate::{
     evaluate::{SuiteResult, run_episodes, run_suite},
     observer::Observer,
     policy::PolicyConfig,
-    selection::{
-        check_episodes, check_parent_folder, next_run_dir, run_dir, select_episodes, select_suites,
-        select_tasks,
-    },
+    selection::{check_episodes, check_parent_folder, next_run_dir, run_dir, select_suites},
     suite_run::SuiteRun,
 };
 use softvt_benchmark::Plan;
@@ -114,13 +111,12 @@ impl<'a> Runner<'a> {
         for suite in suites {
             let numbered = || self.is_numbered.then(|| next_run_dir(config, &config.suite_name(suite)));
             let out = run_dir(config, suite, is_list).or_else(numbered);
-            let tasks = select_tasks(config, suite)?;
-            let jobs = select_episodes(config, suite, &tasks);
-            let mut run = SuiteRun::new(config, self.script, suite, jobs, out.clone().unwrap_or_default())?;
-            run.prepare(&tasks)?;
-            results.push(match out {
-                Some(_) => run_suite(&run, &tasks, &mut on_episode)?,
-                None => run_episodes(&run, &mut on_episode)?,
+            let has_folder = out.is_some();
+            let mut run = SuiteRun::selected(config, self.script, suite, out)?;
+            run.prepare()?;
+            results.push(match has_folder {
+                true => run_suite(&run, &mut on_episode)?,
+                false => run_episodes(&run, &mut on_episode)?,
             });
         }
         Ok(results)

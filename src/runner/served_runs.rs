@@ -7,7 +7,6 @@ use crate::{
     error::RunError,
     evaluate::{RunLog, episode_line, restore_artifacts, with_kept},
     run_manifest::RunManifest,
-    selection::select_tasks,
     suite_run::SuiteRun,
 };
 use softvt_common::cancel;
@@ -130,8 +129,7 @@ impl<'a> ServedRuns<'a> {
 impl<'a> ServedRun<'a> {
     fn open(run: &'a SuiteRun<'a>) -> Result<Self, RunError> {
         let config = run.config;
-        let tasks = select_tasks(config, run.suite)?;
-        let manifest = RunManifest::new(run, &tasks, config.episodes_of(run.suite));
+        let manifest = RunManifest::new(run, config.episodes_of(run.suite));
         let opened = match config.resume {
             true => RunFolder::resume(&run.out),
             false => RunFolder::create(&run.out).map(|folder| (folder, Vec::new())),

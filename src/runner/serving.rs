@@ -5,10 +5,7 @@ use serde_json::json;
 use crate::{
     config::RunConfig,
     error::RunError,
-    selection::{
-        check_distinct_out_dirs, check_parent_folder, needs_suites, run_dir, select_episodes, select_tasks,
-        suites_of,
-    },
+    selection::{check_distinct_out_dirs, check_parent_folder, needs_suites, run_dir, suites_of},
     suite_run::SuiteRun,
 };
 use softvt_benchmark::{Plan, Suite, seed::SecretSeed};
@@ -45,17 +42,16 @@ pub fn prepare_served<'a>(
     }
     let mut runs = Vec::new();
     for suite in suites {
-        let tasks = select_tasks(config, suite)?;
-        let jobs = select_episodes(config, suite, &tasks);
         let out = run_dir(config, suite, is_list);
-        let mut run = SuiteRun::new(config, loaded, suite, jobs, out.clone().unwrap_or_default())?;
+        let has_folder = out.is_some();
+        let mut run = SuiteRun::selected(config, loaded, suite, out)?;
         run.split = split;
         // Otherwise only privileged clients receive the limits.
-        run.reads_limits = config.policy.privileged || out.is_some();
-        if out.is_some() {
-            run.prepare(&tasks)?;
+        run.reads_limits = config.policy.privileged || has_folder;
+        if has_folder {
+            run.prepare()?;
         } else {
-            run.report_limits(&tasks)?;
+            run.report_limits()?;
         }
         runs.push(run);
     }
@@ -65,7 +61,7 @@ pub fn prepare_served<'a>(
 /// Configuration of a server of prepared runs, which records nothing.
 ///
 /// # Errors
-/// A task that does not exist, or a policy without a profile.
+/// A policy without a profile.
 pub fn server_config<'a>(
     config: &'a RunConfig,
     loaded: &LoadedScript,
@@ -81,9 +77,8 @@ pub fn server_config<'a>(
         run.start_episode(task, &id).map_err(|error| RequestError::Invalid(error.message))
     };
     let profile = config.policy.profile().ok_or_else(|| RunError::input("there is no profile to serve"))?;
-    let suites = runs.iter().map(|run| served_suite(config, run.suite)).collect::<Result<_, _>>()?;
     Ok(ServerConfig {
-        suites,
+        suites: runs.iter().map(served_suite).collect(),
         profile: profile.clone(),
         effort_n: runs.iter().map(|run| run.settings.robot.gripper.effort).fold(f64::INFINITY, f64::min),
         privileged: config.policy.privileged,
@@ -118,10 +113,9 @@ pub fn first_observation(config: &RunConfig, server: &ServerConfig) -> Result<Ob
 }
 
 /// A suite as clients see it: its name in results, the selected tasks, and the number of episodes of a run.
-fn served_suite(config: &RunConfig, suite: &Suite) -> Result<Suite, RunError> {
-    let tasks = select_tasks(config, suite)?.into_iter().cloned().collect();
-    let episodes = config.episodes_of(suite);
-    Ok(Suite { name: config.suite_name(suite), tasks, episodes, ..suite.clone() })
+fn served_suite(run: &SuiteRun) -> Suite {
+    let tasks = run.jobs.tasks().into_iter().cloned().collect();
+    Suite { name: run.name.clone(), tasks, episodes: run.config.episodes_of(run.suite), ..run.suite.clone() }
 }
 
 /// Hash of all that determines an episode, except its index and the actions of the client.

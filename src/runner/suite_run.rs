@@ -10,6 +10,7 @@ use crate::{
     limits::{CalibrationFiles, Calibrations, LimitScan, SceneLimits},
     policy::{ControllerFactory, DeclaredStreams},
     recorded_runs::{RecordedRuns, ReplaySource},
+    selection::{select_episodes, select_tasks},
 };
 use softvt_benchmark::{ObjectType, ShiftValue, Suite, Task, settings::Settings};
 use softvt_common::cancel;
@@ -128,6 +129,20 @@ impl<'a> SuiteRun<'a> {
         })
     }
 
+    /// A run of the tasks and episodes that the configuration selects, into the folder `out` if there is one.
+    ///
+    /// # Errors
+    /// As [`SuiteRun::new`]; a task that does not exist.
+    pub fn selected(
+        config: &'a RunConfig,
+        loaded: &'a LoadedScript,
+        suite: &'a Suite,
+        out: Option<PathBuf>,
+    ) -> Result<Self, RunError> {
+        let jobs = select_episodes(config, suite, &select_tasks(config, suite)?);
+        Self::new(config, loaded, suite, jobs, out.unwrap_or_default())
+    }
+
     /// Builds the scene of an episode with the changes of the run.
     ///
     /// # Errors
@@ -200,8 +215,8 @@ impl<'a> SuiteRun<'a> {
     ///
     /// # Errors
     /// A scene or calibration file that is not valid.
-    pub fn report_limits(&self, tasks: &[&Task]) -> Result<(), RunError> {
-        for task in tasks {
+    pub fn report_limits(&self) -> Result<(), RunError> {
+        for task in self.jobs.tasks() {
             let opened = self.open_episode(&self.episode_id(task, 0))?;
             let limits = self.limits_of(task, &opened.scene)?;
             self.calibration_files.report(EpisodeIndex { task: task.id, episode: 0 }, &limits);
@@ -214,10 +229,11 @@ impl<'a> SuiteRun<'a> {
     ///
     /// # Errors
     /// A calibration file that is not valid.
-    pub fn scan_limits(&mut self, tasks: &[&Task]) -> Result<(), RunError> {
+    pub fn scan_limits(&mut self) -> Result<(), RunError> {
         if self.calibrations.is_some() || !self.reads_limits {
             return Ok(());
         }
+        let tasks = self.jobs.tasks();
         let mut scan = LimitScan::default();
         parallel::run(
             tasks.len(),
@@ -350,9 +366,9 @@ impl<'a> SuiteRun<'a> {
     ///
     /// # Errors
     /// A layout, calibration file, camera, light or tactile sensor that is not valid; a server that cannot be reached.
-    pub fn prepare(&mut self, tasks: &[&Task]) -> Result<(), RunError> {
+    pub fn prepare(&mut self) -> Result<(), RunError> {
         let mut has_changed = false;
-        for task in tasks {
+        for task in self.jobs.tasks() {
             let first = self.jobs.episodes_of(task.id).next().unwrap_or(0);
             let opened = self.open_episode(&self.episode_id(task, first))?;
             has_changed |= opened.scene != opened.nominal || opened.prompt != task.prompt;
@@ -373,7 +389,7 @@ impl<'a> SuiteRun<'a> {
         if !has_changed {
             self.refuse_shifts_without_effect()?;
         }
-        self.scan_limits(tasks)
+        self.scan_limits()
     }
 
     /// Refuses shifts that change neither the scene nor the prompt of any task, unless their values are the nominal ones.

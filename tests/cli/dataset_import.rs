@@ -91,7 +91,7 @@ fn own_demonstrations_end_in_the_same_states() {
     };
     assert_eq!(states("data"), states("again"));
     let origin = &project.lines("again/manifest.jsonl")[1]["origin"];
-    assert_eq!((&origin["demo"], &origin["layout"]), (&"demo_1".into(), &"softvt".into()), "{origin}");
+    assert_eq!((&origin["demo"], &origin["format"]), (&"demo_1".into(), &"softvt".into()), "{origin}");
     assert!(project.text("again/README.md").contains(origin["sha256"].as_str().expect("a hash")));
     let checked = project.succeeds("dataset check again --replay all").out;
     assert!(checked.contains("2 of 2 byte-identical, 2 of 2 reach the goal"), "{checked}");

@@ -1,7 +1,5 @@
 //! `softvt check`: validation of a script without running its plan.
 
-use std::{collections::BTreeSet, path::PathBuf, sync::Mutex};
-
 use clap::Args;
 
 use crate::{
@@ -9,18 +7,10 @@ use crate::{
     error::CliError,
     output::{eprint_notice, print},
 };
-use softvt_benchmark::{Goal, GoalKind, Plan, REFERENCE, Task};
-use softvt_common::cancel;
-use softvt_common::{
-    parallel,
-    text::{self, counted},
-};
-use softvt_rollout::{AssetCache, SensorAssets, scene_warnings};
-use softvt_runner::{
-    EpisodeList, LoadedRun, SuiteRun, conditions,
-    selection::{check_distinct_out_dirs, select_episodes},
-};
-use softvt_script::{ExperimentInput, SceneBuilder};
+use softvt_benchmark::{Goal, GoalKind, Plan, REFERENCE, Suite};
+use softvt_common::text::{self, counted};
+use softvt_runner::{LoadedRun, SuiteChecker, conditions, selection::check_distinct_out_dirs};
+use softvt_script::ExperimentInput;
 
 /// Check a script without running it
 #[derive(Args, Clone, Debug)]
@@ -38,15 +28,16 @@ pub(crate) struct CheckArgs {
 /// # Errors
 /// The first thing that is not valid.
 pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
-    let LoadedRun { config, script: loaded } =
-        &Request::new(args.script)?.load_plan("check", &args.policy)?;
+    let run = Request::new(args.script)?.load_plan("check", &args.policy)?;
+    let LoadedRun { config, script: loaded } = &run;
     let plan = &loaded.plan;
     check_distinct_out_dirs(config, plan.suites())?;
-    let (assets, sensor_assets) = (AssetCache::approximate(), SensorAssets::default());
+    let checker = SuiteChecker::new(&run);
     for suite in plan.suites() {
-        let mut run = SuiteRun::new(config, loaded, suite, EpisodeList::listed(Vec::new()), PathBuf::new())?;
-        (run.assets, run.sensor_assets) = (assets.clone(), sensor_assets.clone());
-        check_suite(run)?;
+        for warning in checker.check(suite)? {
+            eprint_notice(format!("warning: {warning}"));
+        }
+        print_tasks(suite)?;
     }
     match plan {
         Plan::Suite(_) | Plan::Suites { .. } => {}
@@ -64,21 +55,14 @@ pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
     print(&format!("{}: OK\n", config.file.display()))
 }
 
-fn check_suite(mut run: SuiteRun) -> Result<(), CliError> {
-    let suite = run.suite;
-    let tasks: Vec<_> = suite.tasks.iter().collect();
-    for warning in check_first_scenes(&run, &tasks)? {
-        eprint_notice(format!("warning: {warning}"));
-    }
-    run.jobs = select_episodes(run.config, suite, &tasks);
-    run.scan_limits(&tasks)?;
+fn print_tasks(suite: &Suite) -> Result<(), CliError> {
     print(&format!(
         "suite {}: {}, {} each\n",
         suite.name,
-        counted(tasks.len(), "task"),
+        counted(suite.tasks.len(), "task"),
         counted(suite.episodes as usize, "episode")
     ))?;
-    for task in tasks {
+    for task in &suite.tasks {
         let expert = if task.expert { "" } else { ", no expert" };
         let Goal { kind, object, target, .. } = &task.goal;
         let relation = match kind {
@@ -89,27 +73,4 @@ fn check_suite(mut run: SuiteRun) -> Result<(), CliError> {
         print(&format!("{id:>4} {prompt}: {object} {relation} {target}{expert}\n"))?;
     }
     Ok(())
-}
-
-/// Builds and checks the first scene of every task on all processors. Returns warnings about their objects.
-fn check_first_scenes(run: &SuiteRun, tasks: &[&Task]) -> Result<BTreeSet<String>, CliError> {
-    // Opening the scenes runs the whole script, so each thread takes idle ones before it opens others.
-    let idle: Mutex<Vec<SceneBuilder>> = Mutex::default();
-    let mut warnings = BTreeSet::new();
-    let check = |job: usize| -> Result<BTreeSet<String>, CliError> {
-        let task = tasks[job];
-        let taken = parallel::lock(&idle).pop();
-        let builder = taken.map_or_else(|| SceneBuilder::open(run.loaded), Ok)?;
-        let setup = builder.build(&run.episode_id(task, 0), &run.changes())?;
-        parallel::lock(&idle).push(builder);
-        let mut warnings = scene_warnings(task, &setup.scene, &run.assets);
-        let of_task = |warning: String| format!("task {}: {warning}", task.id);
-        warnings.extend(run.check_scene(task, setup.scene)?.map(of_task));
-        Ok(warnings)
-    };
-    parallel::run(tasks.len(), run.config.thread_count(), cancel::requested, check, |_, found| {
-        warnings.extend(found);
-        Ok(())
-    })?;
-    if cancel::requested() { Err(CliError::interrupted("interrupted")) } else { Ok(warnings) }
 }

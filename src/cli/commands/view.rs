@@ -66,7 +66,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     let job = EpisodeJob { task, episode: args.episode };
     let mut run = SuiteRun::new(&config, &loaded, suite, EpisodeList::listed(vec![job]), dir.clone())?;
     run.renders_episodes = true;
-    run.prepare(&[task])?;
+    run.prepare()?;
     files::create_folder(dir)?;
     let finished = run.run_episode(job, true, &run.controllers)?;
     let caption = Caption::new(&finished.record);

@@ -72,11 +72,11 @@ impl CheckReport {
 /// `dataset.json` or the manifest is missing or unreadable.
 pub fn folder(root: &Path) -> Result<CheckReport, DatasetError> {
     let (card, entries) = (DatasetCard::read(root)?, manifest::read(root)?);
-    let mut findings = CheckReport::default();
+    let mut report = CheckReport::default();
     let mut files: BTreeMap<&str, Vec<&ManifestEntry>> = BTreeMap::new();
     for entry in &entries {
         files.entry(&entry.hdf5_path).or_default().push(entry);
-        check_videos(&mut findings, root, entry);
+        check_videos(&mut report, root, entry);
     }
     for task in &card.tasks {
         let of_task = |e: &&ManifestEntry| e.task_id == task.task && e.suite == task.suite;
@@ -86,27 +86,27 @@ pub fn folder(root: &Path) -> Result<CheckReport, DatasetError> {
                 "{listed} lines of {} task {}, dataset.json says {}",
                 task.suite, task.task, task.demos
             );
-            findings.add(&root.join(MANIFEST), "lines", what);
+            report.add(&root.join(MANIFEST), "lines", what);
         }
     }
     for (path, entries) in files {
         let path = root.join(path);
-        let Some(file) = findings.take(TaskFile::open(&path)) else { continue };
+        let Some(file) = report.take(TaskFile::open(&path)) else { continue };
         if file.demos.len() != entries.len() {
             let what = format!("{} demonstrations, the manifest has {}", file.demos.len(), entries.len());
-            findings.add(&path, "/data", what);
+            report.add(&path, "/data", what);
         }
         for entry in entries {
-            if let Some(steps) = findings.take(file.steps(entry.demo_id))
+            if let Some(steps) = report.take(file.steps(entry.demo_id))
                 && steps != entry.num_samples
             {
                 let what = format!("{steps} steps, the manifest says {}", entry.num_samples);
-                findings.add(&path, &format!("/data/demo_{}", entry.demo_id), what);
+                report.add(&path, &format!("/data/demo_{}", entry.demo_id), what);
             }
         }
-        check_demonstrations(&mut findings, &file);
+        check_demonstrations(&mut report, &file);
     }
-    Ok(findings)
+    Ok(report)
 }
 
 /// Checks one HDF5 file.
@@ -115,52 +115,52 @@ pub fn folder(root: &Path) -> Result<CheckReport, DatasetError> {
 /// The file cannot be opened.
 pub fn file(path: &Path) -> Result<CheckReport, DatasetError> {
     let file = TaskFile::open(path)?;
-    let mut findings = CheckReport::default();
+    let mut report = CheckReport::default();
     if file.environment().is_ok_and(|environment| environment["env_name"] != "softvt") {
         let error = DatasetError::not_recorded_by_softvt(path, "/data, attribute env_args");
-        findings.problems.push(error.to_string());
-        return Ok(findings);
+        report.problems.push(error.to_string());
+        return Ok(report);
     }
-    check_demonstrations(&mut findings, &file);
-    Ok(findings)
+    check_demonstrations(&mut report, &file);
+    Ok(report)
 }
 
 /// Checks that the videos of a demonstration have one frame per step, at the control rate.
-fn check_videos(findings: &mut CheckReport, root: &Path, entry: &ManifestEntry) {
+fn check_videos(report: &mut CheckReport, root: &Path, entry: &ManifestEntry) {
     for (stream, file) in &entry.video_files {
         let path = root.join(file);
         let bytes = std::fs::read(&path).map_err(FileError::io("read", &path));
-        let Some(bytes) = findings.take(bytes) else { continue };
-        findings.videos += 1;
+        let Some(bytes) = report.take(bytes) else { continue };
+        report.videos += 1;
         let Some(video) = video::VideoInfo::read(&bytes) else {
-            findings.add(&path, stream, "not an MP4 file, or truncated");
+            report.add(&path, stream, "not an MP4 file, or truncated");
             continue;
         };
         if video.frames != entry.num_samples {
             let what = format!("{} frames, the demonstration has {} steps", video.frames, entry.num_samples);
-            findings.add(&path, stream, what);
+            report.add(&path, stream, what);
         }
         if (video.frame_rate - f64::from(CONTROL_HZ)).abs() > 1e-9 {
             let what = format!("{} frames per second, expected {}", video.frame_rate, CONTROL_HZ);
-            findings.add(&path, stream, what);
+            report.add(&path, stream, what);
         }
     }
 }
 
-fn check_demonstrations(findings: &mut CheckReport, file: &TaskFile) {
-    if let Some(environment) = findings.take(file.environment()) {
-        check_script(findings, file, &environment);
+fn check_demonstrations(report: &mut CheckReport, file: &TaskFile) {
+    if let Some(environment) = report.take(file.environment()) {
+        check_script(report, file, &environment);
     }
-    let steps_before = findings.steps;
+    let steps_before = report.steps;
     for &demo in &file.demos {
-        findings.demos += 1;
+        report.demos += 1;
         let (names, steps) = (file.names(demo), file.steps(demo));
-        let (Some(names), Some(steps)) = (findings.take(names), findings.take(steps)) else { continue };
-        findings.steps += steps;
-        let mut check = DemoCheck { findings, file, demo, steps };
+        let (Some(names), Some(steps)) = (report.take(names), report.take(steps)) else { continue };
+        report.steps += steps;
+        let mut check = DemoCheck { report, file, demo, steps };
         let mut has_required_shapes = true;
         for (name, row_shape) in REQUIRED_STREAMS {
-            let shape = check.findings.take(file.shape(demo, name));
+            let shape = check.report.take(file.shape(demo, name));
             if shape.as_ref().is_some_and(|shape| shape.get(1..) == Some(row_shape)) {
                 continue;
             }
@@ -176,22 +176,22 @@ fn check_demonstrations(findings: &mut CheckReport, file: &TaskFile) {
             check.check_relations();
         }
     }
-    let (steps, demos) = (findings.steps - steps_before, file.demos.len());
+    let (steps, demos) = (report.steps - steps_before, file.demos.len());
     for (name, count, unit) in [("total", steps, "step"), ("num_demos", demos, "demonstration")] {
         if !file.has_count(name, count) {
             let what = format!("another number than the {} of the file", counted(count, unit));
-            findings.add(&file.path, &format!("/data, attribute {name}"), what);
+            report.add(&file.path, &format!("/data, attribute {name}"), what);
         }
     }
 }
 
 /// Checks the path of the script that a replay of the file runs.
-fn check_script(findings: &mut CheckReport, file: &TaskFile, environment: &Value) {
+fn check_script(report: &mut CheckReport, file: &TaskFile, environment: &Value) {
     let script = environment["env_kwargs"]["script"].as_str().unwrap_or_default();
     let key = "/data, attribute env_args, script";
     if !is_script_path(script) {
         let what = format!("{script:?} leads out of the folder; expected a path without \"..\"");
-        findings.add(&file.path, key, what);
+        report.add(&file.path, key, what);
     }
 }
 
@@ -202,7 +202,7 @@ pub fn is_script_path(script: &str) -> bool {
 
 /// A demonstration that is being checked.
 struct DemoCheck<'a> {
-    findings: &'a mut CheckReport,
+    report: &'a mut CheckReport,
     file: &'a TaskFile,
     demo: usize,
     steps: usize,
@@ -210,12 +210,12 @@ struct DemoCheck<'a> {
 
 impl DemoCheck<'_> {
     fn add(&mut self, name: &str, what: impl Into<String>) {
-        self.findings.problems.push(self.file.error(self.demo, name, what).to_string());
+        self.report.problems.push(self.file.error(self.demo, name, what).to_string());
     }
 
     /// Checks the length of a stream, and that its values are finite.
     fn check_stream(&mut self, name: &str) {
-        let Some(stream) = self.findings.take(self.file.stream(self.demo, name)) else { return };
+        let Some(stream) = self.report.take(self.file.stream(self.demo, name)) else { return };
         let width: usize = stream.row_shape.iter().product();
         let (count, steps) = (stream.values.len(), self.steps);
         if count != steps * width {
@@ -254,15 +254,11 @@ impl DemoCheck<'_> {
         }
     }
 
-    /// Checks the actions in a grip code that recordings of version 0.1 do not have.
+    /// Checks the actions in a grip code against the closures.
     fn check_grip_labels(&mut self, code: GripCode, actions: &[f64], binary: &[f64]) {
         let name = actions_stream(code);
-        let names = self.findings.take(self.file.names(self.demo)).unwrap_or_default();
-        if !names.iter().any(|own| own == name) {
-            return;
-        }
-        let labels =
-            self.findings.take(self.file.array(self.demo, name)).map_or(Vec::new(), |array| array.values);
+        let Some(labels) = self.report.take(self.file.array(self.demo, name)) else { return };
+        let labels = labels.values;
         if labels.len() != actions.len() {
             return self.add(name, format!("{} numbers, expected {}", labels.len(), actions.len()));
         }
@@ -282,7 +278,7 @@ impl DemoCheck<'_> {
     fn check_relations(&mut self) {
         let (file, demo) = (self.file, self.demo);
         let mut get =
-            |name: &str| self.findings.take(file.array(demo, name)).map_or(Vec::new(), |array| array.values);
+            |name: &str| self.report.take(file.array(demo, name)).map_or(Vec::new(), |array| array.values);
         let (poses, states, times) = (get("obs/eef_pose"), get("obs/state"), get("timestamps"));
         let (actions, binary) = (get("actions"), get("actions_binary"));
         self.check_quaternions("obs/eef_pose", &poses);

@@ -35,7 +35,7 @@ fn demonstration(salt: f64) -> Demonstration {
             .expect("a valid record"),
         actions: (0..STEPS).map(|step| Action::new(place(step), turn(step), 0.3)).collect(),
         gripper_closed: (0..STEPS).map(|step| step > 4).collect(),
-        grip_labels_n: Some((0..STEPS).map(|step| if step > 4 { 2.5 } else { -1.0 }).collect()),
+        grip_labels_n: (0..STEPS).map(|step| if step > 4 { 2.5 } else { -1.0 }).collect(),
         observed: vec![
             DataStream::f64("obs/eef_pose", &[7], each(&pose)),
             DataStream::f64("obs/state", &[7], each(&state)),
@@ -114,9 +114,9 @@ fn demonstrations_read_from_a_merged_file_are_identical() {
         assert_eq!(read.actions(demo).unwrap(), demonstration.actions);
     }
     assert!(read.actions(2).unwrap_err().to_string().contains("there is no demo_2; there are 2"));
-    let findings = file(&path).unwrap();
-    assert_eq!(findings.problems, [""; 0]);
-    assert_eq!((findings.demos, findings.steps), (2, 2 * STEPS));
+    let report = file(&path).unwrap();
+    assert_eq!(report.problems, [""; 0]);
+    assert_eq!((report.demos, report.steps), (2, 2 * STEPS));
 }
 
 #[test]
@@ -155,7 +155,7 @@ fn a_file_truncated_anywhere_is_reported_by_name() {
         let cut = folder.path().join("cut.hdf5");
         fs::write(&cut, &whole[..(share * whole.len() as f64) as usize]).unwrap();
         let message = match file(&cut) {
-            Ok(findings) => findings.problems.join("\n"),
+            Ok(report) => report.problems.join("\n"),
             Err(error) => error.to_string(),
         };
         assert!(message.contains("cut.hdf5"), "{share}: {message:?}");
@@ -165,14 +165,14 @@ fn a_file_truncated_anywhere_is_reported_by_name() {
     assert!(missing.starts_with("cannot read"), "it is missing");
 }
 
-/// The findings of a file whose group `/data/demo_0` `change` has modified.
+/// The report on a file whose group `/data/demo_0` `change` has modified.
 fn changed(change: impl Fn(&H5File)) -> String {
     let (_folder, path) = write(&demonstration(0.0), "task.hdf5");
     let hdf5 = H5File::open_rw(&path).unwrap();
     change(&hdf5);
     hdf5.close().unwrap();
     match file(&path) {
-        Ok(findings) => findings.problems.join("\n"),
+        Ok(report) => report.problems.join("\n"),
         Err(error) => error.to_string(),
     }
 }

@@ -355,14 +355,12 @@ impl TaskFile {
     /// The demonstration was not recorded by softvt, or the file is damaged.
     pub fn read(&self, demo: usize) -> Result<Demonstration, DatasetError> {
         let binary = self.array(demo, "actions_binary")?.values;
-        let forces = actions_stream(GripCode::Force);
-        let has_forces = self.names(demo)?.iter().any(|name| name == forces);
-        let forces = has_forces.then(|| self.array(demo, forces)).transpose()?;
+        let forces = self.array(demo, actions_stream(GripCode::Force))?.values;
         let mut read = Demonstration {
             record: self.record(demo)?,
             actions: self.actions(demo)?,
             gripper_closed: binary.chunks(7).map(|row| row[6] > 0.5).collect(),
-            grip_labels_n: forces.map(|rows| rows.values.chunks(7).map(|row| row[6]).collect()),
+            grip_labels_n: forces.chunks(7).map(|row| row[6]).collect(),
             observed: Vec::new(),
             privileged: Vec::new(),
         };

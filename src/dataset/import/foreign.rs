@@ -33,7 +33,7 @@ pub struct ForeignFile {
     pub path: PathBuf,
     /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
-    pub layout: ForeignFormat,
+    pub format: ForeignFormat,
     /// Its demonstrations, by index.
     pub demos: Vec<ForeignDemo>,
 }

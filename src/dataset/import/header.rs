@@ -1,4 +1,4 @@
-//! Metadata of a foreign file: layout, robot, control rate and task.
+//! Metadata of a foreign file: format, robot, control rate and task.
 
 use serde_json::Value;
 
@@ -10,7 +10,7 @@ use softvt_benchmark::CONTROL_HZ;
 
 /// Metadata of a file.
 pub(super) struct Header {
-    pub layout: ForeignFormat,
+    pub format: ForeignFormat,
     /// `env_args`; null if missing.
     pub environment: Value,
 }
@@ -28,16 +28,16 @@ const ROBOSUITE: [&str; 6] = [
 const PANDA: [&str; 2] = ["panda", "franka"];
 
 impl Header {
-    /// Recognises the layout of a file.
+    /// Recognises the format of a file.
     ///
     /// # Errors
-    /// Unknown layout, or an unsupported robot, controller or control rate.
+    /// Unknown format, or an unsupported robot, controller or control rate.
     pub(super) fn read(file: &TaskFile) -> Result<Self, DatasetError> {
         let environment = match file.file_attribute("env_args") {
             Some(_) => file.environment()?,
             None => Value::Null,
         };
-        let header = Self { layout: layout(file, &environment)?, environment };
+        let header = Self { format: format_of(file, &environment)?, environment };
         header.check_robot(file)?;
         header.check_rate(file)?;
         Ok(header)
@@ -146,7 +146,7 @@ impl StepScale {
     const ROBOSUITE: Self = Self { translation_m: 0.05, rotation_rad: 0.5 };
 }
 
-fn layout(file: &TaskFile, environment: &Value) -> Result<ForeignFormat, DatasetError> {
+fn format_of(file: &TaskFile, environment: &Value) -> Result<ForeignFormat, DatasetError> {
     let first = file.demos[0];
     if environment["env_name"] == "softvt" {
         return Ok(ForeignFormat::Softvt);
@@ -158,7 +158,7 @@ fn layout(file: &TaskFile, environment: &Value) -> Result<ForeignFormat, Dataset
         [_, 7] if is_robosuite() => Ok(ForeignFormat::Libero),
         _ => {
             let what = format!(
-                "unknown layout: actions of shape {shape:?} and neither obs/eef_pose (SoftVTBench: 7 or 13 numbers per action) nor \
+                "unknown format: actions of shape {shape:?} and neither obs/eef_pose (SoftVTBench: 7 or 13 numbers per action) nor \
                  env_args of type 1, obs/ee_states, ee_pos or joint_states (robomimic, LIBERO: 7 numbers per action)"
             );
             Err(DatasetError::content(&file.path, format!("/data/demo_{first}"), what))

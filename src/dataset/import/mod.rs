@@ -1,6 +1,6 @@
 //! Import of demonstrations recorded by other programs, as commands and an initial state for softvt's simulation.
 //!
-//! `docs/data.md`, "Importing", lists what is read of each layout. A file is read and checked completely before
+//! `docs/data.md`, "Importing", lists what is read of each format. A file is read and checked completely before
 //! anything is simulated; errors name the file, the key and the step.
 
 mod demo_reader;
@@ -30,20 +30,20 @@ pub use object_matching::match_objects;
 /// Reads all demonstrations of a file.
 ///
 /// # Errors
-/// Unknown layout, unsupported robot, controller or control rate, or missing or invalid streams.
+/// Unknown format, unsupported robot, controller or control rate, or missing or invalid streams.
 pub fn read(path: &Path) -> Result<ForeignFile, DatasetError> {
     let file = TaskFile::open(path)?;
     let header = header::Header::read(&file)?;
     let demo = |&demo: &usize| {
         let reader = DemoReader { file: &file, demo };
-        match header.layout {
+        match header.format {
             ForeignFormat::Softvt => softvt_demo(reader),
             ForeignFormat::SoftVtBench => softvtbench::demo(reader, &header),
             ForeignFormat::Libero => libero::demo(reader, &header),
         }
     };
     let demos = file.demos.iter().map(demo).collect::<Result<_, _>>()?;
-    Ok(ForeignFile { path: path.to_owned(), sha256: sha256(path)?, layout: header.layout, demos })
+    Ok(ForeignFile { path: path.to_owned(), sha256: sha256(path)?, format: header.format, demos })
 }
 
 /// A demonstration of softvt itself: the recorded commands, from the initial state of the same episode.

@@ -123,7 +123,7 @@ impl FileBuilder {
 
     fn read(&self) -> (ForeignFormat, ForeignDemo) {
         let read = read(&self.write()).unwrap();
-        (read.layout, read.demos.into_iter().next().unwrap())
+        (read.format, read.demos.into_iter().next().unwrap())
     }
 
     fn refusal(&self) -> String {
@@ -160,9 +160,9 @@ fn off(command: &Action, tool: &Pose, k: usize) -> f64 {
 #[test]
 fn liberos_steps_become_the_goals_of_its_controller() {
     let file = FileBuilder::libero();
-    let (layout, demo) = file.read();
+    let (format, demo) = file.read();
     assert_eq!(
-        (layout, demo.task.prompts.clone()),
+        (format, demo.task.prompts.clone()),
         (ForeignFormat::Libero, vec!["pick up the cup".to_owned()])
     );
     // The states are from before each action, the observations from after it.
@@ -277,8 +277,8 @@ fn object_poses_are_read_from_a_mujoco_state_by_its_model() {
 #[test]
 fn softvtbenchs_poses_are_transformed_from_its_tool_to_ours() {
     let file = FileBuilder::softvtbench();
-    let (layout, mut demo) = file.read();
-    assert_eq!(layout, ForeignFormat::SoftVtBench);
+    let (format, mut demo) = file.read();
+    assert_eq!(format, ForeignFormat::SoftVtBench);
     assert_eq!(demo.task.prompts[0], "Pick up the  CUP.");
     for (k, action) in poses(&demo).iter().enumerate() {
         let away = action.position_b - tool(k).translation.vector;
@@ -468,7 +468,7 @@ fn files_that_hold_no_demonstrations_are_reported() {
     assert!(read(file.folder.path()).unwrap_err().to_string().ends_with("is a folder, not an HDF5 file"));
     let mut other = FileBuilder::new(Value::Null);
     other.each("actions", |_| vec![0.0; 7]);
-    assert!(other.refusal().contains("unknown layout"));
+    assert!(other.refusal().contains("unknown format"));
 }
 
 #[test]

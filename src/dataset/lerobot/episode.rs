@@ -56,27 +56,13 @@ impl<'a> EpisodeData<'a> {
         let demo = &selection.demos[index];
         let steps = demo.entry.num_samples;
         let reader = DemoStreams { file: &TaskFile::open(&demo.path)?, demo: demo.entry.demo_id, steps };
-        let actions = actions_stream(config.gripper);
-        if !reader.has(actions)? {
-            let what = format!(
-                "missing: softvt 0.1 recorded no actions in the grip code {}; record the demonstrations again",
-                config.gripper.name()
-            );
-            return Err(reader.file.error(reader.demo, actions, what));
-        }
         let mut state = reader.floats("obs/state", &[VECTOR_LENGTH])?;
-        let sensed = "obs/gripper_width_sensed";
-        if !reader.has(sensed)? {
-            let what =
-                "missing: an earlier version recorded no sensed width; record the demonstrations again";
-            return Err(reader.file.error(reader.demo, sensed, what));
-        }
-        let widths = reader.floats(sensed, &[1])?;
+        let widths = reader.floats("obs/gripper_width_sensed", &[1])?;
         state
             .chunks_exact_mut(VECTOR_LENGTH)
             .zip(widths)
             .for_each(|(row, width)| row[VECTOR_LENGTH - 1] = 0.5 * width);
-        let actions = reader.floats(actions, &[VECTOR_LENGTH])?;
+        let actions = reader.floats(actions_stream(config.gripper), &[VECTOR_LENGTH])?;
         let markers = marker_rows(&reader.floats("obs/gripper_marker_motion", &[2, 2, MARKER_COUNT, 2])?);
         let images = reader.image_columns(config.version, selection.image_sizes, is_cancelled)?;
         let timestamps: Vec<f32> =
@@ -151,10 +137,6 @@ struct DemoStreams<'a> {
 }
 
 impl DemoStreams<'_> {
-    fn has(&self, name: &str) -> Result<bool, DatasetError> {
-        Ok(self.file.names(self.demo)?.iter().any(|own| own == name))
-    }
-
     /// Images of every image feature. `sizes` are those of the cameras.
     fn image_columns(
         &self,

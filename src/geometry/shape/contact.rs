@@ -11,7 +11,7 @@ use crate::Vec3;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
     /// Signed distance, m; negative inside.
-    pub phi: f64,
+    pub gap: f64,
     /// Outward unit normal of the shape.
     pub normal: Vec3,
     /// Share of the sample's patch that covers the face, 0..=1.
@@ -30,7 +30,7 @@ const MAX_DEPTH_RATIO: f64 = 3.0;
 
 /// One flat or round face of a sharp-edged shape, relative to a query point.
 struct SupportFace {
-    phi: f64,
+    gap: f64,
     normal: Vec3,
     /// Distance of the point inside of the edges of the face, in each direction, m.
     inside: [f64; 2],
@@ -67,8 +67,8 @@ impl Shape {
     }
 }
 
-fn full(SignedDistance { distance: phi, normal }: SignedDistance) -> Contact {
-    Contact { phi, normal, coverage: 1.0 }
+fn full(SignedDistance { distance: gap, normal }: SignedDistance) -> Contact {
+    Contact { gap, normal, coverage: 1.0 }
 }
 
 /// Contact with the face that the sample faces most directly, among those that it covers; `None` if it covers none.
@@ -77,27 +77,27 @@ fn full(SignedDistance { distance: phi, normal }: SignedDistance) -> Contact {
 /// of the contact turns continuously with the sample. With one face alone, it would jump by 90° as a sample that wraps
 /// around an edge passes 45°; light nodes of soft bodies were seen to alternate between the two.
 fn sharp<const N: usize>(faces: [SupportFace; N], facing: &Vec3, spacing: f64) -> Option<Contact> {
-    let nearest = -faces.iter().fold(f64::NEG_INFINITY, |least, face| least.max(face.phi));
+    let nearest = -faces.iter().fold(f64::NEG_INFINITY, |least, face| least.max(face.gap));
     let deepest = MAX_DEPTH.max(MAX_DEPTH_RATIO * nearest);
     let shares = faces.each_ref().map(|face| {
         let alignment = -facing.dot(&face.normal);
         let coverage = covered(face.inside[0], spacing) * covered(face.inside[1], spacing);
         let limit = face.depth.min(deepest);
-        let is_met = alignment > FACING && face.phi >= -limit && coverage > 0.0;
-        is_met.then(|| (alignment, coverage, (2.0 * (1.0 + face.phi / limit)).clamp(1e-6, 1.0)))
+        let is_met = alignment > FACING && face.gap >= -limit && coverage > 0.0;
+        is_met.then(|| (alignment, coverage, (2.0 * (1.0 + face.gap / limit)).clamp(1e-6, 1.0)))
     });
     let most = shares.iter().flatten().fold(FACING, |most, (alignment, ..)| most.max(*alignment));
-    let (mut total, mut phi, mut normal, mut coverage) = (0.0, 0.0, Vec3::zeros(), 0.0);
+    let (mut total, mut gap, mut normal, mut coverage) = (0.0, 0.0, Vec3::zeros(), 0.0);
     for (face, share) in faces.iter().zip(shares) {
         let Some((alignment, covered, depth)) = share else { continue };
         let weight = (1.0 - (most - alignment) / FACING_BAND).max(0.0) * depth;
         total += weight;
-        phi += weight * face.phi;
+        gap += weight * face.gap;
         normal += face.normal * weight;
         coverage += weight * covered;
     }
     let length = normal.norm();
-    (total > 0.0).then(|| Contact { phi: phi / length, normal: normal / length, coverage: coverage / total })
+    (total > 0.0).then(|| Contact { gap: gap / length, normal: normal / length, coverage: coverage / total })
 }
 
 /// Covered share, along one direction, of a patch with its centre `inside` m within the edge.
@@ -110,7 +110,7 @@ fn box_faces(p: &Vec3, half: &Vec3) -> [SupportFace; 3] {
     std::array::from_fn(|axis| {
         let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
         SupportFace {
-            phi: -inside[axis],
+            gap: -inside[axis],
             normal: Vec3::ith(axis, if p[axis] < 0.0 { -1.0 } else { 1.0 }),
             inside: [inside[i], inside[j]],
             depth: half[axis],
@@ -121,13 +121,13 @@ fn box_faces(p: &Vec3, half: &Vec3) -> [SupportFace; 3] {
 fn cylinder_faces(p: &Vec3, radius: f64, half_height: f64) -> [SupportFace; 2] {
     let r = primitive::length(p.x, p.y);
     let cap = SupportFace {
-        phi: p.z.abs() - half_height,
+        gap: p.z.abs() - half_height,
         normal: Vec3::z() * if p.z < 0.0 { -1.0 } else { 1.0 },
         inside: [radius - r, f64::INFINITY],
         depth: half_height,
     };
     let side = SupportFace {
-        phi: r - radius,
+        gap: r - radius,
         normal: if r > 1e-12 { Vec3::new(p.x / r, p.y / r, 0.0) } else { Vec3::x() },
         inside: [half_height - p.z.abs(), f64::INFINITY],
         depth: radius,
@@ -137,18 +137,18 @@ fn cylinder_faces(p: &Vec3, radius: f64, half_height: f64) -> [SupportFace; 2] {
 
 /// Contact with the deepest part. Flush parts add up their coverage, so that a patch on a seam is covered fully.
 fn union(parts: &[Shape], p: &Vec3, facing: &Vec3, spacing: f64) -> Contact {
-    let mut best = Contact { phi: f64::INFINITY, normal: Vec3::z(), coverage: 1.0 };
+    let mut best = Contact { gap: f64::INFINITY, normal: Vec3::z(), coverage: 1.0 };
     for part in parts {
         // A sample may contact a face from half a spacing beyond its edge.
-        if part.is_farther(p, best.phi + spacing) {
+        if part.is_farther(p, best.gap + spacing) {
             continue;
         }
         let contact = part.contact(p, facing, spacing);
         let flush =
-            (contact.phi - best.phi).abs() < 1e-3 * spacing && contact.normal.dot(&best.normal) > 0.999;
+            (contact.gap - best.gap).abs() < 1e-3 * spacing && contact.normal.dot(&best.normal) > 0.999;
         if flush {
             best.coverage = (best.coverage + contact.coverage).min(1.0);
-        } else if contact.phi < best.phi {
+        } else if contact.gap < best.gap {
             best = contact;
         }
     }
@@ -170,19 +170,19 @@ mod tests {
         };
         for degrees in [0.0, 20.0, 34.0] {
             let (x, y) = (at(degrees), at(90.0 - degrees));
-            assert!((x.normal - Vec3::x()).norm() < 1e-12 && (x.phi + 1e-3).abs() < 1e-12, "{x:?}");
-            assert!((y.normal - Vec3::y()).norm() < 1e-12 && (y.phi + 1.5e-3).abs() < 1e-12, "{y:?}");
+            assert!((x.normal - Vec3::x()).norm() < 1e-12 && (x.gap + 1e-3).abs() < 1e-12, "{x:?}");
+            assert!((y.normal - Vec3::y()).norm() < 1e-12 && (y.gap + 1.5e-3).abs() < 1e-12, "{y:?}");
         }
         for tenth in 0..900 {
             let (now, next) = (at(f64::from(tenth) / 10.0), at(f64::from(tenth + 1) / 10.0));
             let turn = now.normal.dot(&next.normal).clamp(-1.0, 1.0).acos().to_degrees();
             assert!(turn < 1.0, "{turn}° at {}°", f64::from(tenth) / 10.0);
-            assert!((now.phi - next.phi).abs() < 2e-5 && (now.coverage - next.coverage).abs() < 1e-12);
+            assert!((now.gap - next.gap).abs() < 2e-5 && (now.coverage - next.coverage).abs() < 1e-12);
         }
         // Halfway, the contact is the plane through the edge, half between the faces.
         let middle = at(45.0);
         assert!((middle.normal - Vec3::new(1.0, 1.0, 0.0).normalize()).norm() < 1e-12);
-        assert!((middle.phi + 2.5e-3 / 2f64.sqrt()).abs() < 1e-12);
+        assert!((middle.gap + 2.5e-3 / 2f64.sqrt()).abs() < 1e-12);
     }
 
     #[test]
@@ -193,7 +193,7 @@ mod tests {
             for facing in [Vec3::z(), -Vec3::z()] {
                 let contact = wall.contact(&Vec3::new(0.0045, 0.0, z), &facing, 7.5e-4);
                 assert!(
-                    (contact.phi + 5e-4).abs() < 1e-12 && contact.normal == Vec3::x(),
+                    (contact.gap + 5e-4).abs() < 1e-12 && contact.normal == Vec3::x(),
                     "{contact:?} at {z}"
                 );
             }

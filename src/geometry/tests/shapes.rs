@@ -168,7 +168,7 @@ fn coverage_is_continuous_as_a_sharp_edge_moves() {
                 let at = |k: i32| (f64::from(k) - 39.5) * spacing;
                 let p = Vec3::new(at(i % 80) - offset, at(i / 80), 0.011 - 0.3e-3);
                 let contact = pad.contact(&p, &facing, spacing);
-                (-contact.phi).max(0.0) * contact.coverage * contact.normal.z * spacing * spacing
+                (-contact.gap).max(0.0) * contact.coverage * contact.normal.z * spacing * spacing
             })
             .sum()
     };
@@ -185,7 +185,7 @@ fn a_deep_sample_near_an_edge_contacts_the_face_that_it_faces() {
     let p = Vec3::new(0.011 - 0.5e-3, 0.0, 0.011 - 2e-3);
     let contact = pad.contact(&p, &-Vec3::z(), 0.75e-3);
     assert_eq!((contact.normal, contact.coverage), (Vec3::z(), 1.0));
-    assert!((contact.phi + 2e-3).abs() < 1e-12);
+    assert!((contact.gap + 2e-3).abs() < 1e-12);
     let can = Shape::Cylinder { radius: 0.011, half_height: 0.011 };
     let on_rim = can.contact(&Vec3::new(0.011, 0.0, 0.010), &-Vec3::z(), 0.75e-3);
     assert_eq!((on_rim.normal, on_rim.coverage), (Vec3::z(), 0.5));
@@ -199,7 +199,7 @@ fn flush_parts_fully_cover_a_sample_on_their_seam() {
         .translated(Vec3::new(-0.01, 0.0, 0.0))
         .union(brick.translated(Vec3::new(0.01, 0.0, 0.0)));
     let contact = floor.contact(&Vec3::new(0.0, 0.0, 0.0099), &-Vec3::z(), 1e-3);
-    assert!((contact.coverage - 1.0).abs() < 1e-12 && (contact.phi + 1e-4).abs() < 1e-12, "{contact:?}");
+    assert!((contact.coverage - 1.0).abs() < 1e-12 && (contact.gap + 1e-4).abs() < 1e-12, "{contact:?}");
 }
 
 #[test]

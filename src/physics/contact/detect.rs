@@ -226,7 +226,7 @@ fn test_sample(
         group,
         sample,
         p: frame.to_world * local + frame.origin,
-        gap: contact.phi,
+        gap: contact.gap,
         normal: frame.to_world * contact.normal,
         coverage: contact.coverage,
     })

@@ -69,12 +69,12 @@ impl<'a> DeformedSdf<'a> {
         let stretch = pushed.norm();
         let normal = pushed / stretch;
         (contact.coverage > 0.0 && facing.dot(&normal) <= 0.3).then(|| SdfContact {
-            gap: contact.phi / stretch,
+            gap: contact.gap / stretch,
             normal,
             coverage: contact.coverage,
             element: point.at.element,
             weights: point.at.weights(),
-            surface_o: point.p_o - contact.normal * contact.phi,
+            surface_o: point.p_o - contact.normal * contact.gap,
             inverse_gradient: point.inverse_gradient,
         })
     }

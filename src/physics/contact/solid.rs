@@ -93,7 +93,7 @@ impl CollisionGeometry {
         let mut found = Vec::new();
         shape_a.find_contacts(&a.pose, shape_b, &b.pose, 0.0, &mut found);
         let seeds = shape_a.seed_depth(&a.pose, shape_b, &b.pose);
-        found.iter().map(|(_, point)| -point.phi).fold(seeds, f64::max)
+        found.iter().map(|(_, point)| -point.gap).fold(seeds, f64::max)
     }
 }
 
@@ -187,13 +187,13 @@ impl RigidShape {
             let facing = gel_in_shape.rotation * sample.normal;
             let contact = self.shape.contact(&p, &facing, sample.area.sqrt());
             let is_behind = facing.dot(&contact.normal) > MAX_FACING_COSINE;
-            if contact.phi >= margin || contact.coverage <= 0.0 || is_behind {
+            if contact.gap >= margin || contact.coverage <= 0.0 || is_behind {
                 return None;
             }
             Some(ManifoldPoint {
-                p_w: (pose * nalgebra::Point3::from(p - contact.normal * (0.5 * contact.phi))).coords,
+                p_w: (pose * nalgebra::Point3::from(p - contact.normal * (0.5 * contact.gap))).coords,
                 n_w: -(pose.rotation * contact.normal),
-                phi: contact.phi,
+                gap: contact.gap,
                 area: sample.area * contact.coverage,
                 feature,
             })

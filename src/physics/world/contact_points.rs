@@ -26,7 +26,7 @@ pub(super) struct SurfaceContact {
 }
 
 impl SurfaceContact {
-    /// The solver's point for this pair, without node weights and drift velocity.
+    /// The solver's point for this contact, without node weights and drift velocity.
     pub(super) fn contact_point(&self, friction: &Friction, stiffness: &SurfaceStiffness) -> ContactPoint {
         ContactPoint {
             p: self.p,

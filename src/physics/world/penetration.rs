@@ -57,13 +57,13 @@ impl World {
 
 /// Signed distance from a collider's surface, m.
 fn signed_distance(collider: &Collider, p: &Vec3) -> f64 {
-    collider.surface.contact(p, &Vec3::zeros(), 0.0).phi
+    collider.surface.contact(p, &Vec3::zeros(), 0.0).gap
 }
 
 /// Depth of the deepest sample of a soft body under another's surface, m.
 fn depth_in_soft(body: &FemState, other: &SoftBody) -> f64 {
     let Some(surface) = &other.surface else { return 0.0 };
-    let field = |p: &Vec3| surface.contact(p, &Vec3::zeros(), 0.0).phi;
+    let field = |p: &Vec3| surface.contact(p, &Vec3::zeros(), 0.0).gap;
     depth_in_field(body, &other.state.mean_pose(), &surface.bounds(), &field)
 }
 

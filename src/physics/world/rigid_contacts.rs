@@ -172,17 +172,18 @@ impl World {
     fn push_rigid(&mut self, point: &ManifoldPoint, state: &PointState, is_b_known: bool) {
         let (a, b) = (self.collider(state.key.a), self.collider(state.key.b));
         let motion = &self.motions[state.key.b.index()];
-        let pair = SurfaceContact {
+        let surface = SurfaceContact {
             p: point.p_w,
             normal: point.n_w,
-            gap: point.phi,
+            gap: point.gap,
             area: point.area,
             stretch: motion.pose.rotation * state.stretch,
             previous_normal_impulse: state.normal_impulse,
             is_sliding: state.is_sliding,
         };
         let drift = if is_b_known { motion.velocity(&point.p_w) } else { Vec3::zeros() };
-        let point = pair.contact_point(&a.friction.with(&b.friction), &a.stiffness.in_series(&b.stiffness));
+        let point =
+            surface.contact_point(&a.friction.with(&b.friction), &a.stiffness.in_series(&b.stiffness));
         self.problem.points.push(ContactPoint { drift, ..point });
     }
 

@@ -164,7 +164,7 @@ impl World {
             .copied()
             .unwrap_or(ContactRecord::first(partner, p_in_collider));
         let anchor_w = (motion.pose * nalgebra::Point3::from(record.anchor)).coords;
-        let pair = SurfaceContact {
+        let surface = SurfaceContact {
             p: candidate.p,
             normal: candidate.normal,
             gap: candidate.gap,
@@ -179,7 +179,7 @@ impl World {
         let point = ContactPoint {
             weights_a: sample.weights,
             drift: if is_known { motion.velocity(&candidate.p) } else { Vec3::zeros() },
-            ..pair.contact_point(&friction, &stiffness)
+            ..surface.contact_point(&friction, &stiffness)
         };
         let row = SoftRow {
             soft: id,
@@ -228,7 +228,7 @@ impl World {
         // Both surfaces are sampled, so each carries half, unless only one of the two has a field.
         let share = if a.surface.is_some() { 0.5 } else { 1.0 };
         let data = &a.state.model.samples[sample];
-        let pair = SurfaceContact {
+        let surface = SurfaceContact {
             p,
             normal: contact.normal,
             gap: contact.gap,
@@ -240,7 +240,7 @@ impl World {
         let point = ContactPoint {
             weights_a: data.weights,
             weights_b: contact.weights,
-            ..pair.contact_point(&a.friction.with(&b.friction), &a.stiffness.in_series(&b.stiffness))
+            ..surface.contact_point(&a.friction.with(&b.friction), &a.stiffness.in_series(&b.stiffness))
         };
         let row = SoftRow {
             soft: found.soft,

@@ -17,7 +17,6 @@ use crate::{
     selection::select_suites,
     suite_run::SuiteRun,
 };
-use softvt_benchmark::Task;
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{parallel, text::counted};
 use softvt_dataset::{
@@ -70,8 +69,8 @@ pub fn import(
         "suites": names,
     });
     record_all(recording, &request, || {
-        for Imported { file, layout, demos, commands, .. } in &sources {
-            config.notice(format!("{file}: {layout}, {}: {commands}", counted(*demos, "demonstration")));
+        for Imported { file, format, demos, commands, .. } in &sources {
+            config.notice(format!("{file}: {format}, {}: {commands}", counted(*demos, "demonstration")));
         }
         let mut recordings = Vec::new();
         for (index, suite) in suites.iter().enumerate() {
@@ -82,14 +81,11 @@ pub fn import(
             let mut jobs: Vec<EpisodeJob> =
                 demos.iter().map(|demo| EpisodeJob { task: demo.task.task, episode: demo.attempt }).collect();
             jobs.sort_by_key(|job| (suite.tasks.iter().position(|task| task.id == job.task.id), job.episode));
-            let mut tasks: Vec<&Task> = jobs.iter().map(|job| job.task).collect();
-            tasks.dedup_by_key(|task| task.id);
             recordings.push(SuiteRecording::new(
                 config,
                 recording,
                 loaded,
                 suite,
-                tasks,
                 EpisodeList::listed(jobs),
                 None,
                 |run, log| {
@@ -120,7 +116,7 @@ fn describe_files(files: &[ForeignFile]) -> Result<Vec<Imported>, RunError> {
     let describe = |file: &ForeignFile| Imported {
         file: file_name(file),
         sha256: file.sha256.clone(),
-        layout: file.layout.name().to_owned(),
+        format: file.format.name().to_owned(),
         demos: file.demos.len(),
         commands: file.demos.first().map_or(String::new(), |demo| demo.command_source.to_owned()),
     };
@@ -150,7 +146,7 @@ fn replay_demos(
             file: file_name(matched.file),
             sha256: matched.file.sha256.clone(),
             demo: demo.name.clone(),
-            layout: matched.file.layout.name().to_owned(),
+            format: matched.file.format.name().to_owned(),
             start,
         };
         run.origins.insert(index, origin);

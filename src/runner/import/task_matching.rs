@@ -53,7 +53,7 @@ pub(super) fn match_demos<'a>(
     for (file, demo) in files.iter().flat_map(|file| file.demos.iter().map(move |demo| (file, demo))) {
         let task = match forced {
             // A demonstration of softvt can only be of its own task.
-            Some(forced) if file.layout != ForeignFormat::Softvt => forced,
+            Some(forced) if file.format != ForeignFormat::Softvt => forced,
             Some(forced) if task_of(config, suites, file, demo)?.key() == forced.key() => forced,
             Some(_) => {
                 let id = demo.task.id.map_or(String::new(), |id| format!(" {id}"));
@@ -167,7 +167,7 @@ fn task_of<'a>(
     let name = named.as_ref().map(|name| normalized(&name.replace('-', "_")));
     let is_named = |suite: &Suite| name.as_ref() == Some(&normalized(&config.suite_name(suite)));
     let names_a_suite = suites.iter().any(is_named);
-    if file.layout == ForeignFormat::Softvt && !names_a_suite {
+    if file.format == ForeignFormat::Softvt && !names_a_suite {
         return Err(no_task(config, suites, file, demo));
     }
     let candidates: Vec<SuiteTask> = suites

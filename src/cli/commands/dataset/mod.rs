@@ -109,14 +109,13 @@ fn parse_replays(word: &str) -> Result<usize, String> {
 fn run_check(args: &DatasetCheckArgs) -> Result<(), CliError> {
     let path = &args.path;
     check_complete(path)?;
-    let findings = if path.is_dir() { check::folder(path) } else { check::file(path) };
-    let findings = findings?;
-    if !findings.problems.is_empty() {
+    let report = if path.is_dir() { check::folder(path) } else { check::file(path) }?;
+    if !report.problems.is_empty() {
         return Err(CliError::input(format!(
             "{}\n{}: {}",
-            findings.problems.join("\n"),
+            report.problems.join("\n"),
             path.display(),
-            counted(findings.problems.len(), "problem")
+            counted(report.problems.len(), "problem")
         )));
     }
     let observer: Arc<dyn Observer> = Arc::new(Console::default());
@@ -128,9 +127,9 @@ fn run_check(args: &DatasetCheckArgs) -> Result<(), CliError> {
     let is_ok = replays.iter().all(|replay| replay.difference.is_none());
     print(&format!(
         "{}, {}, {}{}\n",
-        counted(findings.demos, "demonstration"),
-        counted(findings.steps, "step"),
-        counted(findings.videos, "video"),
+        counted(report.demos, "demonstration"),
+        counted(report.steps, "step"),
+        counted(report.videos, "video"),
         if is_ok { ": OK" } else { "" }
     ))?;
     report_replays(&demos, &replays)

@@ -190,7 +190,7 @@ struct FeatureGrid<'a> {
     origin: Vec3,
     step: f64,
     count: [usize; 3],
-    phi: Vec<f64>,
+    gap: Vec<f64>,
 }
 
 /// Crossings of the surface with the edges of one grid cell.
@@ -210,8 +210,8 @@ impl<'a> FeatureGrid<'a> {
         let spare = cells.map(|n| n as f64) * step - bounds.size();
         let origin = bounds.min - spare * 0.43;
         let count = [cells.x + 1, cells.y + 1, cells.z + 1];
-        let mut grid = Self { shape, origin, step, count, phi: Vec::new() };
-        grid.phi = (0..count.iter().product()).map(|i| shape.distance_and_normal(&grid.node(i)).0).collect();
+        let mut grid = Self { shape, origin, step, count, gap: Vec::new() };
+        grid.gap = (0..count.iter().product()).map(|i| shape.distance_and_normal(&grid.node(i)).0).collect();
         grid
     }
 
@@ -224,8 +224,8 @@ impl<'a> FeatureGrid<'a> {
     /// The cells that the surface crosses, x fastest.
     fn crossed(&self) -> impl Iterator<Item = Cell> + '_ {
         let [nx, ny, _] = self.count;
-        let inner = move |i: usize| i % nx + 1 < nx && i / nx % ny + 1 < ny && i + nx * ny < self.phi.len();
-        (0..self.phi.len()).filter(move |&i| inner(i)).filter_map(move |i| {
+        let inner = move |i: usize| i % nx + 1 < nx && i / nx % ny + 1 < ny && i + nx * ny < self.gap.len();
+        (0..self.gap.len()).filter(move |&i| inner(i)).filter_map(move |i| {
             let corner = move |c: usize| i + (c & 1) + nx * (c >> 1 & 1) + nx * ny * (c >> 2 & 1);
             let mut crossings = Vec::new();
             for (low, axis) in (0..8).flat_map(|c| (0..3).map(move |axis| (c, axis))) {
@@ -238,14 +238,14 @@ impl<'a> FeatureGrid<'a> {
     }
 
     fn crossing(&self, i: usize, j: usize) -> Option<Crossing> {
-        let (mut p, mut q, mut phi_p) = (self.node(i), self.node(j), self.phi[i]);
-        if (phi_p < 0.0) == (self.phi[j] < 0.0) {
+        let (mut p, mut q, mut gap_p) = (self.node(i), self.node(j), self.gap[i]);
+        if (gap_p < 0.0) == (self.gap[j] < 0.0) {
             return None;
         }
         for _ in 0..20 {
             let middle = 0.5 * (p + q);
-            let phi = self.shape.distance_and_normal(&middle).0;
-            if (phi < 0.0) == (phi_p < 0.0) { (p, phi_p) = (middle, phi) } else { q = middle }
+            let gap = self.shape.distance_and_normal(&middle).0;
+            if (gap < 0.0) == (gap_p < 0.0) { (p, gap_p) = (middle, gap) } else { q = middle }
         }
         Some(Crossing { p, normal: self.shape.distance_and_normal(&p).1 })
     }

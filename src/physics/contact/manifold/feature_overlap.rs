@@ -97,13 +97,13 @@ pub(super) fn features(
     let (on_a, on_b) = (facing_features(a, &axis.n_w), facing_features(b, &-axis.n_w));
     let mut carried = 0.0;
     for FeatureOverlap { q, height_a, height_b, area, feature } in feature_overlaps(&plane, &on_a, &on_b) {
-        let phi = height_b - height_a;
+        let gap = height_b - height_a;
         carried +=
-            area * (1.0 - ((phi - axis.gap - DEEPEST_M[0]) / (DEEPEST_M[1] - DEEPEST_M[0])).clamp(0.0, 1.0));
-        if phi < margin && area > 0.0 {
+            area * (1.0 - ((gap - axis.gap - DEEPEST_M[0]) / (DEEPEST_M[1] - DEEPEST_M[0])).clamp(0.0, 1.0));
+        if gap < margin && area > 0.0 {
             let p_w =
                 plane.origin + plane.u * q[0] + plane.v * q[1] + plane.n * (0.5 * (height_a + height_b));
-            out.push(ManifoldPoint { p_w, n_w: axis.n_w, phi, area, feature });
+            out.push(ManifoldPoint { p_w, n_w: axis.n_w, gap, area, feature });
         }
     }
     let uncarried = POINT_AREA - carried;
@@ -118,7 +118,7 @@ fn witness(a: &Placed<Primitive>, b: &Placed<Primitive>, axis: &ContactNormal) -
         Some(touch) => 0.5 * (touch.a_w + touch.b_w),
         None => 0.5 * (support(a, &axis.n_w) + support(b, &-axis.n_w)),
     };
-    ManifoldPoint { p_w, n_w: axis.n_w, phi: axis.gap, area: POINT_AREA, feature: WITNESS }
+    ManifoldPoint { p_w, n_w: axis.n_w, gap: axis.gap, area: POINT_AREA, feature: WITNESS }
 }
 
 fn feature_overlaps(plane: &ProjectionPlane, a: &FacingFeatures, b: &FacingFeatures) -> Vec<FeatureOverlap> {
@@ -250,10 +250,10 @@ pub(super) fn plane_box(
     for corner in 0..8u32 {
         let sign = hex8::corner_sign(corner as usize);
         let p_w = box_w * nalgebra::Point3::from(half.component_mul(&sign));
-        let phi = n_w.dot(&(p_w.coords - plane_w.translation.vector));
+        let gap = n_w.dot(&(p_w.coords - plane_w.translation.vector));
         let area = (0..3).map(|axis| face[axis] * (sign[axis] * down[axis]).max(0.0)).sum::<f64>();
-        if phi < margin && area > 0.0 {
-            out.push(ManifoldPoint { p_w: p_w.coords - n_w * (0.5 * phi), n_w, phi, area, feature: corner });
+        if gap < margin && area > 0.0 {
+            out.push(ManifoldPoint { p_w: p_w.coords - n_w * (0.5 * gap), n_w, gap, area, feature: corner });
         }
     }
 }

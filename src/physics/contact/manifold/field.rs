@@ -53,7 +53,7 @@ impl<'a> SurfaceInSdf<'a> {
                 continue;
             }
             let point = self.probe.contact(p_a, area, feature);
-            if point.phi < margin {
+            if point.gap < margin {
                 out.push(point);
             }
         }
@@ -95,7 +95,7 @@ fn rim_points(probe: &SdfProbe, rim: &Rim, feature: u32, margin: f64, out: &mut 
         POINT_AREA * (tilt / MIN_RIM_TILT).min(1.0),
         NON_MATERIAL | (feature + RIM_POINTS),
     );
-    if point.phi < margin && point.area > 0.0 {
+    if point.gap < margin && point.area > 0.0 {
         out.push(point);
     }
 }
@@ -154,8 +154,8 @@ mod tests {
                 let height = -(turn * lowest).z - 5e-5;
                 let pose = Pose::from_parts(nalgebra::Translation3::new(0.1, 0.2, height), turn);
                 let points = touch(&shape, &pose, &ground, &ground_w, 0.001);
-                let point = points.iter().min_by(|p, q| p.phi.total_cmp(&q.phi)).expect("a lowest point");
-                assert!((point.phi + 5e-5).abs() < 1e-9, "{shape:?}, turn {k}: gap {}", point.phi);
+                let point = points.iter().min_by(|p, q| p.gap.total_cmp(&q.gap)).expect("a lowest point");
+                assert!((point.gap + 5e-5).abs() < 1e-9, "{shape:?}, turn {k}: gap {}", point.gap);
                 let aside = (point.p_w - (turn * lowest + pose.translation.vector)).xy().norm();
                 assert!(aside < 1e-6 && is_non_material(point), "{shape:?}, turn {k}: {aside} m aside");
                 assert!((point.n_w + Vec3::z()).norm() < 1e-12 && (point.area - POINT_AREA).abs() < 1e-12);
@@ -176,7 +176,7 @@ mod tests {
         );
         for p in &standing {
             assert!(
-                (p.phi + 1e-5).abs() < 1e-12 && rims.iter().any(|r| (p.p_w.xy().norm() - r).abs() < 1e-9)
+                (p.gap + 1e-5).abs() < 1e-12 && rims.iter().any(|r| (p.p_w.xy().norm() - r).abs() < 1e-9)
             );
         }
         for heading in [0.0f64, 0.13, 1.7] {
@@ -184,7 +184,7 @@ mod tests {
             let turn = Quat::from_scaled_axis(Vec3::new(-heading.sin(), heading.cos(), 0.0) * tilt);
             let points =
                 touch(&bowl, &Pose::from_parts(Vec3::zeros().into(), turn), &ground, &ground_w, 0.02);
-            let least = points.iter().map(|p| p.phi).fold(f64::INFINITY, f64::min);
+            let least = points.iter().map(|p| p.gap).fold(f64::INFINITY, f64::min);
             assert!((least + 0.025 * tilt.sin()).abs() < 1e-9, "{least}");
         }
     }
@@ -201,14 +201,14 @@ mod tests {
             let points = touch(&can, &pose, &ground, &ground_w, 5e-6);
             for end in [-0.05, 0.05] {
                 let at_end = points.iter().filter(|p| (p.p_w.x - end).abs() < 1e-6);
-                let carried: Vec<_> = at_end.filter(|p| (p.phi + 1e-5).abs() < 1e-9).collect();
+                let carried: Vec<_> = at_end.filter(|p| (p.gap + 1e-5).abs() < 1e-9).collect();
                 assert!(
                     carried.iter().any(|p| p.p_w.y.abs() < 1e-6 && is_non_material(p)),
                     "roll {roll}: {points:?}"
                 );
             }
             // Nothing but that line: what carries elsewhere on it is true contact too.
-            assert!(points.iter().all(|p| p.p_w.y.abs() < 1e-4 && p.phi >= -1e-5 - 1e-9), "{points:?}");
+            assert!(points.iter().all(|p| p.p_w.y.abs() < 1e-4 && p.gap >= -1e-5 - 1e-9), "{points:?}");
         }
     }
 
@@ -266,7 +266,7 @@ mod tests {
         assert_eq!(points.len(), 4, "{points:?}");
         let slope = 0.025 / f64::hypot(0.034, 0.025);
         for p in &points {
-            assert!((p.phi + 1e-5 * slope).abs() < 1e-9 && (p.p_w.xy().norm() - corner_r).abs() < 1e-5);
+            assert!((p.gap + 1e-5 * slope).abs() < 1e-9 && (p.p_w.xy().norm() - corner_r).abs() < 1e-5);
             assert!((p.n_w.z + slope).abs() < 1e-9, "from the cube into the wall: {}", p.n_w);
         }
     }

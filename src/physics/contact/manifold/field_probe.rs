@@ -26,19 +26,19 @@ impl SdfProbe<'_> {
 
     /// Gap at `p_a` (m) and its gradient, in the first body's frame.
     pub(super) fn gap_and_gradient(&self, p_a: &Vec3) -> (f64, Vec3) {
-        let (phi, n_b) =
+        let (gap, n_b) =
             self.shape_b.distance_and_normal(&(self.a_in_b * nalgebra::Point3::from(*p_a)).coords);
-        (phi, self.a_in_b.rotation.inverse_transform_vector(&n_b))
+        (gap, self.a_in_b.rotation.inverse_transform_vector(&n_b))
     }
 
     /// The contact point at `p_a` on the first body's surface.
     pub(super) fn contact(&self, p_a: &Vec3, area: f64, feature: u32) -> ManifoldPoint {
         let p_b = self.a_in_b * nalgebra::Point3::from(*p_a);
-        let (phi, n_b) = self.shape_b.distance_and_normal(&p_b.coords);
+        let (gap, n_b) = self.shape_b.distance_and_normal(&p_b.coords);
         let n_w = -(self.pose_b.rotation * n_b);
         // `p_a` is on the first surface; the second is one gap further along the normal.
-        let p_w = (self.pose_b * p_b).coords + n_w * (0.5 * phi);
-        ManifoldPoint { p_w, n_w, phi, area, feature }
+        let p_w = (self.pose_b * p_b).coords + n_w * (0.5 * gap);
+        ManifoldPoint { p_w, n_w, gap, area, feature }
     }
 }
 

@@ -195,8 +195,8 @@ impl PlaneFace<'_> {
 /// Projects `p` onto the surface by a few steps along the normal.
 pub(super) fn project_to_surface(shape: &Shape, mut p: Vec3) -> Vec3 {
     for _ in 0..3 {
-        let (phi, n) = shape.distance_and_normal(&p);
-        p -= n * phi;
+        let (gap, n) = shape.distance_and_normal(&p);
+        p -= n * gap;
     }
     p
 }

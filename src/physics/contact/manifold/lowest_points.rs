@@ -102,7 +102,7 @@ impl Smooth<'_> {
         let mut push = |p: &Vec3, share: f64, feature: u32| {
             let area = POINT_AREA * uncarried.min(self.distance_from_edges(p)) * share;
             let point = self.surface.probe.contact(p, area, feature);
-            if point.phi < margin && area > 0.0 {
+            if point.gap < margin && area > 0.0 {
                 out.push(point);
             }
         };
@@ -189,7 +189,7 @@ impl Smooth<'_> {
 fn uncarried_share(lowest: &ManifoldPoint, others: &[ManifoldPoint]) -> f64 {
     let same_side = others.iter().filter(|point| point.n_w.dot(&lowest.n_w) > SAME_SIDE);
     let carried = same_side.map(|point| {
-        let higher = (point.phi - lowest.phi - SAME_DEPTH_M[0]) / (SAME_DEPTH_M[1] - SAME_DEPTH_M[0]);
+        let higher = (point.gap - lowest.gap - SAME_DEPTH_M[0]) / (SAME_DEPTH_M[1] - SAME_DEPTH_M[0]);
         (1.0 - higher).clamp(0.0, 1.0) * (point.area / SAMPLE_AREA).min(1.0)
     });
     (1.0 - carried.sum::<f64>()).max(0.0)

@@ -42,7 +42,7 @@ pub struct ManifoldPoint {
     /// Unit normal from the first body to the second, world.
     pub n_w: Vec3,
     /// Gap along the normal, m; negative is overlap.
-    pub phi: f64,
+    pub gap: f64,
     /// Area that the point represents, m². The points of a flat patch share its area; a point or line contact has
     /// [`POINT_AREA`] per point. Areas fade in and out, so that a small change of pose changes forces little.
     pub area: f64,

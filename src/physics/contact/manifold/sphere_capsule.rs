@@ -18,10 +18,10 @@ pub(super) fn sphere(
     let centre_w = sphere_w.translation.vector;
     let centre_a = (a.pose.inverse() * nalgebra::Point3::from(centre_w)).coords;
     let SurfaceDistance { distance, normal } = SurfaceDistance::new(&a.shape, &centre_a);
-    let (phi, n_w) = (distance - radius, a.pose.rotation * normal);
-    if phi < margin {
-        let p_w = centre_w - n_w * (radius + 0.5 * phi);
-        out.push(ManifoldPoint { p_w, n_w, phi, area: POINT_AREA, feature: NON_MATERIAL });
+    let (gap, n_w) = (distance - radius, a.pose.rotation * normal);
+    if gap < margin {
+        let p_w = centre_w - n_w * (radius + 0.5 * gap);
+        out.push(ManifoldPoint { p_w, n_w, gap, area: POINT_AREA, feature: NON_MATERIAL });
     }
 }
 
@@ -87,21 +87,21 @@ pub(super) fn capsules(
     let (core_a, core_b) = (core(&a.pose, ha), core(&b.pose, hb));
     let mut push = |on_a: Vec3, on_b: Vec3, weight: f64, feature: u32| {
         let SurfaceDistance { distance, normal: n_w } = SurfaceDistance::to_ball(&(on_b - on_a), 0.0);
-        let phi = distance - ra - rb;
-        if phi < margin && weight > 0.0 {
-            let p_w = on_a + n_w * (ra + 0.5 * phi);
+        let gap = distance - ra - rb;
+        if gap < margin && weight > 0.0 {
+            let p_w = on_a + n_w * (ra + 0.5 * gap);
             let (area, feature) = (POINT_AREA * weight, NON_MATERIAL | feature);
-            out.push(ManifoldPoint { p_w, n_w, phi, area, feature });
+            out.push(ManifoldPoint { p_w, n_w, gap, area, feature });
         }
-        phi
+        gap
     };
     let ends_a = [0, 1].map(|i| push(core_a[i], on_segment(&core_b, &core_a[i]).0, 1.0, i as u32));
     let ends_b = [0, 1].map(|i| push(on_segment(&core_a, &core_b[i]).0, core_b[i], 1.0, 2 + i as u32));
     let (on_a, on_b) = between_segments(&core_a, &core_b);
-    let phi = (on_b - on_a).norm() - ra - rb;
+    let gap = (on_b - on_a).norm() - ra - rb;
     let straight = |ends: [f64; 2], t: f64| ends[0] + (ends[1] - ends[0]) * t;
     let (along_a, along_b) = (on_segment(&core_a, &on_a).1, on_segment(&core_b, &on_b).1);
-    let closer = straight(ends_a, along_a).min(straight(ends_b, along_b)) - phi;
+    let closer = straight(ends_a, along_a).min(straight(ends_b, along_b)) - gap;
     push(on_a, on_b, (closer / CLOSEST_FADE_M).clamp(0.0, 1.0), 4);
 }
 

@@ -57,8 +57,8 @@ impl Incline {
         let damping = DAMPING * 2.0 * (stiffness * self.body.mass).sqrt();
         let v = self.body.velocity_at(&point.p_w);
         let v_n = v.dot(&point.n_w);
-        let normal = (-stiffness * point.phi - damping * v_n).max(0.0);
-        if point.phi >= 0.0 || normal == 0.0 {
+        let normal = (-stiffness * point.gap - damping * v_n).max(0.0);
+        if point.gap >= 0.0 || normal == 0.0 {
             return Vec3::zeros();
         }
         let v_t = v - point.n_w * v_n;

@@ -1,0 +1,69 @@
+//! [`check_suite`]: the first scenes and the limits of a suite, without an episode.
+
+use std::{collections::BTreeSet, path::PathBuf, sync::Mutex};
+
+use crate::{
+    config::{LoadedRun, RunConfig},
+    episode_list::EpisodeList,
+    error::RunError,
+    selection::select_episodes,
+    suite_run::SuiteRun,
+};
+use softvt_benchmark::{Suite, Task};
+use softvt_common::{cancel, parallel};
+use softvt_rollout::{AssetCache, SensorAssets, scene_warnings};
+use softvt_script::{LoadedScript, SceneBuilder};
+
+/// Checks suites one after the other. Those that share assets load them once.
+pub struct SuiteChecker<'a> {
+    config: &'a RunConfig,
+    script: &'a LoadedScript,
+    assets: AssetCache,
+    sensor_assets: SensorAssets,
+}
+
+impl<'a> SuiteChecker<'a> {
+    /// A checker for the suites of a script.
+    pub fn new(LoadedRun { config, script }: &'a LoadedRun) -> Self {
+        Self { config, script, assets: AssetCache::approximate(), sensor_assets: SensorAssets::default() }
+    }
+
+    /// Builds and checks the first scene of every task on all processors, and reads the limits of its objects. Nothing is
+    /// rendered; a scene settles only if its goal may hold at the start. Returns warnings.
+    ///
+    /// # Errors
+    /// A setting, a scene, a sensor or a calibration file that is not valid; a request to stop.
+    pub fn check(&self, suite: &Suite) -> Result<BTreeSet<String>, RunError> {
+        let tasks: Vec<&Task> = suite.tasks.iter().collect();
+        // Without episodes, a run whose actions are repeated may have fewer of them than the suite.
+        let none = EpisodeList::listed(Vec::new());
+        let mut run = SuiteRun::new(self.config, self.script, suite, none, PathBuf::new())?;
+        (run.assets, run.sensor_assets) = (self.assets.clone(), self.sensor_assets.clone());
+        let warnings = check_first_scenes(&run, &tasks)?;
+        run.jobs = select_episodes(self.config, suite, &tasks);
+        run.scan_limits()?;
+        Ok(warnings)
+    }
+}
+
+fn check_first_scenes(run: &SuiteRun, tasks: &[&Task]) -> Result<BTreeSet<String>, RunError> {
+    // Opening the scenes runs the whole script, so each thread takes idle ones before it opens others.
+    let idle: Mutex<Vec<SceneBuilder>> = Mutex::default();
+    let mut warnings = BTreeSet::new();
+    let check = |job: usize| -> Result<BTreeSet<String>, RunError> {
+        let task = tasks[job];
+        let taken = parallel::lock(&idle).pop();
+        let builder = taken.map_or_else(|| SceneBuilder::open(run.loaded), Ok)?;
+        let setup = builder.build(&run.episode_id(task, 0), &run.changes())?;
+        parallel::lock(&idle).push(builder);
+        let mut warnings = scene_warnings(task, &setup.scene, &run.assets);
+        let of_task = |warning: String| format!("task {}: {warning}", task.id);
+        warnings.extend(run.check_scene(task, setup.scene)?.map(of_task));
+        Ok(warnings)
+    };
+    parallel::run(tasks.len(), run.config.thread_count(), cancel::requested, check, |_, found| {
+        warnings.extend(found);
+        Ok(())
+    })?;
+    if cancel::requested() { Err(RunError::interrupted("interrupted")) } else { Ok(warnings) }
+}

@@ -1,0 +1,129 @@
+//! [`record`]: demonstrations of the tasks of suites by their teachers.
+
+use std::collections::BTreeMap;
+
+use serde_json::json;
+
+use crate::{
+    config::{LoadedRun, RunConfig},
+    episode_list::EpisodeList,
+    error::RunError,
+    policy::{PolicyConfig, PolicyOptions, expert_controller},
+    recording::{GripLog, RecordingOptions, RecordingSummary, SuiteRecording, record_all},
+    selection::{select_suites, select_tasks},
+    suite_run::SuiteRun,
+};
+use softvt_benchmark::{Suite, Teacher};
+use softvt_common::{episode_id::EpisodeIndex, parallel};
+use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
+use softvt_rollout::{Controller, Simulation};
+use softvt_script::ExpertController;
+
+/// Attempts per demonstration, and the least number per task, unless [`DemoCount::attempts`] says otherwise.
+const ATTEMPTS_PER_DEMO: u32 = 4;
+const MIN_ATTEMPTS: u32 = 20;
+
+/// Demonstrations to record of each task.
+#[derive(Clone, Copy, Debug)]
+pub struct DemoCount {
+    /// Demonstrations that are safe and reach the goal.
+    pub demos: u32,
+    /// Maximum number of attempts, kept or not; by default 4 per demonstration and at least 20.
+    pub attempts: Option<u32>,
+}
+
+impl DemoCount {
+    fn max_attempts(self) -> u32 {
+        let default = self.demos.saturating_mul(ATTEMPTS_PER_DEMO).max(MIN_ATTEMPTS);
+        self.attempts.unwrap_or(default)
+    }
+}
+
+/// Records demonstrations of the selected tasks of every suite of a script, by the policy that `policy_of` returns for the teacher of
+/// the suite. Returns `None` if the folder contains the complete recording.
+///
+/// # Errors
+/// The script has no suite, the folder contains something else, an attempt or a file fails, or too few attempts are good.
+pub fn record(
+    LoadedRun { config, script }: &LoadedRun,
+    policy_of: impl Fn(Teacher) -> PolicyOptions,
+    count: DemoCount,
+    options: &RecordingOptions,
+) -> Result<Option<RecordingSummary>, RunError> {
+    let suites = select_suites("record", config, &script.plan)?;
+    let names: Vec<String> = suites.iter().map(|suite| config.suite_name(suite)).collect();
+    let mut request = json!({
+        "softvt": env!("CARGO_PKG_VERSION"),
+        "demos": count.demos,
+        "pictures": options.has_images,
+        "privileged": options.has_privileged,
+        "suites": names,
+    });
+    if let Some(code) = options.gripper {
+        request["gripper"] = json!(code);
+    }
+    let taught = |suite: &Suite| {
+        Ok::<_, RunError>(config.clone().with_policy(PolicyConfig::load(&policy_of(suite.teacher))?))
+    };
+    let configs: Vec<RunConfig> = suites.iter().map(taught).collect::<Result<_, _>>()?;
+    record_all(options, &request, || {
+        let prepare = |(suite, config)| {
+            let jobs = EpisodeList::of_tasks(&select_tasks(config, suite)?, count.max_attempts(), None);
+            SuiteRecording::new(config, options, script, suite, jobs, Some(count.demos), |run, log| {
+                record_grips(run, log);
+                Ok(())
+            })
+        };
+        suites.iter().zip(&configs).map(prepare).collect()
+    })
+}
+
+/// Makes the experts of a run record their intent into `log`. Other policies are left unchanged.
+fn record_grips(run: &mut SuiteRun, log: &GripLog) {
+    let Some(policy) = run.config.policy.expert() else { return };
+    let log = log.clone();
+    run.controllers = Box::new(move |opened, brief| {
+        Ok(Box::new(GripRecorder {
+            expert: expert_controller(opened, policy)?,
+            is_holding: Vec::new(),
+            index: brief.index(),
+            log: log.clone(),
+        }))
+    });
+}
+
+/// An expert whose intent to hold is recorded.
+///
+/// The binary gripper code of a dataset needs this intent. The commanded closure does not show it: a hand around a wide
+/// object is nearly open while it holds.
+struct GripRecorder {
+    expert: ExpertController,
+    is_holding: Vec<bool>,
+    index: EpisodeIndex,
+    log: GripLog,
+}
+
+impl Controller for GripRecorder {
+    fn streams(&self) -> SensorStreams {
+        self.expert.streams()
+    }
+
+    fn gave_up(&self) -> Option<&str> {
+        self.expert.gave_up()
+    }
+
+    fn notes(&self) -> BTreeMap<String, f64> {
+        self.expert.notes()
+    }
+
+    fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, PolicyError> {
+        let action = self.expert.act(sim, observation)?;
+        self.is_holding.push(self.expert.is_gripping);
+        Ok(action)
+    }
+
+    fn finish(&mut self) -> Result<(), PolicyError> {
+        parallel::lock(&self.log).insert(self.index, std::mem::take(&mut self.is_holding));
+        Ok(())
+    }
+}
