@@ -110,8 +110,8 @@ impl DatasetCard {
             )
         };
         let source = |source: &Imported| {
-            let Imported { file, sha256, layout, demos, commands } = source;
-            format!("| {file} | {sha256} | {layout} | {demos} | {commands} |\n")
+            let Imported { file, sha256, format, demos, commands } = source;
+            format!("| {file} | {sha256} | {format} | {demos} | {commands} |\n")
         };
         let mut page = format!(
             "---\nlicense: apache-2.0\ntask_categories:\n- robotics\n---\n\
