@@ -10,20 +10,26 @@
 //! in [`robot`], a rendered image in [`sensing::camera`], a tactile image in [`sensing::tactile`], the verdict on
 //! an episode in [`evaluation::judge`], a run of a suite in [`runner`]. `docs/library.md` has them together.
 //!
+//! The features `cli` and `runner` are on by default. Without `runner`, the crate has no Lua, datasets, reports and server, and
+//! [`rollout`] is the topmost layer.
+//!
 //! Units are SI throughout; a name carries its unit where it is not SI or not obvious. Frames are suffixes:
 //! `_w` world, `_b` robot base, `_h` hand, `_p` pad, `_o` object.
 #[doc(inline)]
 pub use softvt_benchmark as benchmark;
+#[cfg(feature = "cli")]
 #[doc(inline)]
 pub use softvt_cli as cli;
 #[doc(inline)]
 pub use softvt_common::{cancel, episode_id, files, npy, parallel, text};
+#[cfg(feature = "runner")]
 #[doc(inline)]
 pub use softvt_dataset as dataset;
 #[doc(inline)]
 pub use softvt_evaluation as evaluation;
 #[doc(inline)]
 pub use softvt_geometry as geometry;
+#[cfg(feature = "runner")]
 #[doc(inline)]
 pub use softvt_media as media;
 #[doc(inline)]
@@ -32,24 +38,28 @@ pub use softvt_physics as physics;
 pub use softvt_policy as policy;
 #[doc(inline)]
 pub use softvt_records as records;
+#[cfg(feature = "runner")]
 #[doc(inline)]
 pub use softvt_report as report;
 #[doc(inline)]
 pub use softvt_robot as robot;
 #[doc(inline)]
 pub use softvt_rollout as rollout;
+#[cfg(feature = "runner")]
 #[doc(inline)]
 pub use softvt_runner as runner;
 #[doc(inline)]
 pub use softvt_scene as scene;
+#[cfg(feature = "runner")]
 #[doc(inline)]
 pub use softvt_script as script;
 #[doc(inline)]
 pub use softvt_sensing as sensing;
+#[cfg(feature = "runner")]
 #[doc(inline)]
 pub use softvt_serve as serve;
 
 /// The examples of the page.
-#[cfg(doctest)]
+#[cfg(all(doctest, feature = "runner"))]
 #[doc = include_str!("../docs/library.md")]
 struct LibraryPage;

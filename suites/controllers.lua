@@ -1,4 +1,4 @@
--- Controllers that differ in their grip alone: the same expert knows the object (reference), closes by touch, or knows no more than
+-- Controllers that differ only in how the hand closes: the expert knows the object (reference), tactile-servo feels it, and the others know
 -- what shows of it and the statistics of the suite. The best of those without touch says what a suite needs. Prints one table.
 --
 --   softvt suites/controllers.lua --episodes 50

@@ -132,7 +132,7 @@ impl DatasetCard {
         page.extend(self.tasks.iter().map(task));
         if !self.imported.is_empty() {
             page += "\nImported: demonstrations from other simulators, re-executed with softvt's physics and sensors and judged again.\n\n";
-            page += "| file | SHA-256 | layout | demos | executed |\n|---|---|---|---|---|\n";
+            page += "| file | SHA-256 | format | demos | executed |\n|---|---|---|---|---|\n";
             page.extend(self.imported.iter().map(source));
         }
         page + PAGE
