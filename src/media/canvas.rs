@@ -1,7 +1,7 @@
 //! A canvas for images, lines and text: captions and charts drawn on what sensors show.
 
 use ab_glyph::{Font, FontRef, PxScale, ScaleFont, point};
-use image::{RgbImage, imageops};
+use image::RgbImage;
 use tiny_skia::{Color, Paint, PathBuilder, Pixmap, Rect, Stroke, StrokeDash, Transform};
 
 /// An opaque sRGB colour.
@@ -40,12 +40,6 @@ impl Canvas {
                 data[at..at + 4].copy_from_slice(&[r, g, b, 255]);
             }
         }
-    }
-
-    /// Copies an image to (x, y), resized to `width` × `height` pixels.
-    pub fn place_resized(&mut self, image: &RgbImage, x: u32, y: u32, width: u32, height: u32) {
-        let resized = imageops::resize(image, width, height, imageops::FilterType::CatmullRom);
-        self.place(&resized, x, y);
     }
 
     /// Fills a rectangle whose top left corner is (x, y).

@@ -10,8 +10,9 @@ use data_encoding::BASE64;
 use image::{
     ExtendedColorType, ImageEncoder, ImageFormat, ImageReader, Limits,
     codecs::png::{CompressionType, FilterType, PngEncoder},
-    imageops,
 };
+
+use softvt_sensing::camera::resize;
 
 /// Largest width of an embedded image, pixels.
 const MAX_WIDTH: u32 = 480;
@@ -40,12 +41,7 @@ pub(super) fn embed_image(path: &Path, budget: &mut ByteBudget) -> Option<DataIm
     let image = reader.decode().ok()?.into_rgb8();
     let (width, height) = image.dimensions();
     let small = match width > MAX_WIDTH {
-        true => imageops::resize(
-            &image,
-            MAX_WIDTH,
-            (height * MAX_WIDTH / width).max(1),
-            imageops::FilterType::CatmullRom,
-        ),
+        true => resize(&image, MAX_WIDTH, (height * MAX_WIDTH / width).max(1)),
         false => image,
     };
     let (width, height) = small.dimensions();

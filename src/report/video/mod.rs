@@ -22,7 +22,7 @@ use softvt_rollout::{
 };
 use softvt_scene::Camera;
 use softvt_sensing::{
-    camera::{RenderedImage, encode_png},
+    camera::{RenderedImage, encode_png, resize},
     tactile::{MarkerStyle, TactileReading},
 };
 
@@ -147,7 +147,7 @@ fn video_frame(
     for (side, reading) in recording.sensors.tactile_readings(frame)?.iter().enumerate() {
         let image = reading.with_markers(MarkerStyle::Dots);
         let x = CAMERA_PANEL * side as u32;
-        canvas.place_resized(&image, x, CAMERA_PANEL, CAMERA_PANEL, FINGER_PANEL);
+        canvas.place(&resize(&image, CAMERA_PANEL, FINGER_PANEL), x, CAMERA_PANEL);
         draw_label(&mut canvas, ["left finger", "right finger"][side], x, CAMERA_PANEL);
     }
     draw_caption(&mut canvas, recording, caption, index);
