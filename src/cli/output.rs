@@ -121,6 +121,11 @@ impl Progress {
             None => text::eprint_line(&format!("[{}/{}] {message}", self.done, self.total)),
         }
     }
+
+    /// Reports the end of a small job, which gets no line of its own.
+    pub(crate) fn step(&self) {
+        self.bar.iter().for_each(|bar| bar.inc(1));
+    }
 }
 
 /// Shows the progress and the messages of runs on standard error.

@@ -130,7 +130,7 @@ impl EpisodeArtifacts<'_> {
             let still = video::still_path(self.dir, index);
             video::write_video_frame(&mut states, &caption, worst, &still)?;
         }
-        Ok(video::write_video(&mut states, &caption, &path, cancel::requested)?)
+        Ok(video::write_video(&mut states, &caption, &path, 1, cancel::requested, || ())?)
     }
 
     fn trace_path(&self, index: EpisodeIndex) -> PathBuf {

@@ -7,7 +7,7 @@ use clap::Args;
 use crate::{
     args::{PolicyArgs, Request, ScriptArgs, parse_folder},
     error::CliError,
-    output::print,
+    output::{Progress, print},
 };
 use softvt_benchmark::Plan;
 use softvt_common::cancel;
@@ -79,7 +79,9 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     write_video_frame(&mut states, &caption, worst, &still)?;
     written.push(still);
     let video = dir.join("episode.mp4");
-    write_video(&mut states, &caption, &video, cancel::requested)?;
+    let progress = Progress::new(states.frames.len(), "drawing the film");
+    write_video(&mut states, &caption, &video, config.thread_count(), cancel::requested, || progress.step())?;
+    drop(progress);
     written.push(video);
     written.iter().try_for_each(|path| print(&format!("{}\n", path.display())))
 }

@@ -1,7 +1,10 @@
 //! Videos and still images of episodes: both cameras on top, both fingers below them, and the deformation against its
 //! limit at the bottom.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::Mutex,
+};
 
 use image::{ImageBuffer, ImageError, Luma, RgbImage};
 
@@ -9,6 +12,7 @@ use softvt_benchmark::{CONTROL_DT, CONTROL_HZ};
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{
     files::{FileError, replace},
+    parallel::{self, lock},
     text::format_number,
 };
 use softvt_media::{
@@ -18,7 +22,7 @@ use softvt_media::{
 use softvt_physics::world::WorldSnapshot;
 use softvt_records::record::EpisodeRecord;
 use softvt_rollout::{
-    CAMERA_IMAGE_SUFFIXES, SensingError, StateRecording, TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES,
+    CAMERA_IMAGE_SUFFIXES, SensingError, Sensors, StateRecording, TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES,
 };
 use softvt_scene::Camera;
 use softvt_sensing::{
@@ -95,7 +99,8 @@ impl Caption {
     }
 }
 
-/// Renders every state of a recording and writes the video, one frame per control step.
+/// Renders every state of a recording and writes the video, one frame per control step. The frames are drawn on up to `threads`
+/// threads; `on_frame` is called after each.
 ///
 /// If `is_cancelled` becomes true, no file is written.
 ///
@@ -105,16 +110,27 @@ pub fn write_video(
     recording: &mut StateRecording,
     caption: &Caption,
     path: &Path,
-    is_cancelled: impl Fn() -> bool,
+    threads: usize,
+    is_cancelled: impl Fn() -> bool + Sync,
+    mut on_frame: impl FnMut(),
 ) -> Result<(), EpisodeVideoError> {
+    // Its meshes are shared by the threads.
+    recording.sensors.render_scene()?;
+    let (recording, idle) = (&*recording, Mutex::new(Vec::new()));
+    let draw = |index: usize| {
+        let taken = lock(&idle).pop();
+        let mut sensors = taken.unwrap_or_else(|| recording.sensors.clone());
+        let frame = video_frame(&mut sensors, recording, caption, index);
+        lock(&idle).push(sensors);
+        frame
+    };
     let mut video = VideoWriter::new(WIDTH as usize, HEIGHT as usize, CONTROL_HZ)?;
-    for index in 0..recording.frames.len() {
-        if is_cancelled() {
-            return Err(EpisodeVideoError::Interrupted);
-        }
-        video.push(&video_frame(recording, caption, index)?)?;
-    }
-    Ok(video.save(path)?)
+    parallel::run_in_order(recording.frames.len(), threads, &is_cancelled, draw, |_, frame| {
+        video.push(&frame)?;
+        on_frame();
+        Ok::<_, EpisodeVideoError>(())
+    })?;
+    if is_cancelled() { Err(EpisodeVideoError::Interrupted) } else { Ok(video.save(path)?) }
 }
 
 /// Writes one frame of the video as a PNG file.
@@ -127,24 +143,27 @@ pub fn write_video_frame(
     index: usize,
     path: &Path,
 ) -> Result<(), EpisodeVideoError> {
-    Ok(replace(path, encode_png(&video_frame(recording, caption, index)?)?)?)
+    recording.sensors.render_scene()?;
+    let frame = video_frame(&mut recording.sensors.clone(), recording, caption, index)?;
+    Ok(replace(path, encode_png(&frame)?)?)
 }
 
 fn video_frame(
-    recording: &mut StateRecording,
+    sensors: &mut Sensors,
+    recording: &StateRecording,
     caption: &Caption,
     index: usize,
 ) -> Result<RgbImage, EpisodeVideoError> {
     let mut canvas = Canvas::new(WIDTH, HEIGHT, BACKGROUND);
     let frame = recording.frames.get(index).ok_or(EpisodeVideoError::Empty)?;
     for (side, name) in CAMERAS.into_iter().enumerate() {
-        let camera = recording.sensors.camera(name)?.clone().with_edge(CAMERA_PANEL as usize);
-        let image = recording.sensors.render(frame, &camera)?.into_rgb_image();
+        let camera = sensors.camera(name)?.clone().with_edge(CAMERA_PANEL as usize);
+        let image = sensors.render(frame, &camera)?.into_rgb_image();
         let x = CAMERA_PANEL * side as u32;
         canvas.place(&image, x, 0);
         draw_label(&mut canvas, ["third person", "wrist"][side], x, 0);
     }
-    for (side, reading) in recording.sensors.tactile_readings(frame)?.iter().enumerate() {
+    for (side, reading) in sensors.tactile_readings(frame)?.iter().enumerate() {
         let image = reading.with_markers(MarkerStyle::Dots);
         let x = CAMERA_PANEL * side as u32;
         canvas.place(&resize(&image, CAMERA_PANEL, FINGER_PANEL), x, CAMERA_PANEL);
