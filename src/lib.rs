@@ -4,7 +4,8 @@
 //! uses only those before it: [`geometry`] → [`physics`] → [`scene`], [`robot`] → [`sensing`], [`evaluation`] →
 //! [`records`], [`benchmark`] → [`policy`] → [`rollout`] → [`dataset`] → [`report`], [`script`], [`serve`] → [`runner`] → [`cli`].
 //! `docs/architecture.md` draws them and follows one episode. All of them may use [`text`] (numbers and text in
-//! messages), [`files`] (atomic files), [`npy`] (numpy files) and [`parallel`] (jobs on threads).
+//! messages), [`files`] (atomic files), [`npy`] (numpy files), [`parallel`] (jobs on threads), [`cancel`] (requests to stop),
+//! [`episode_id`] and [`settings`] (the declaration of settings).
 //!
 //! Examples: a dropped cube and a squeezed cube in [`physics::world`], distances in [`geometry::shape`], kinematics
 //! in [`robot`], a rendered image in [`sensing::camera`], a tactile image in [`sensing::tactile`], the verdict on
@@ -21,7 +22,7 @@ pub use softvt_benchmark as benchmark;
 #[doc(inline)]
 pub use softvt_cli as cli;
 #[doc(inline)]
-pub use softvt_common::{cancel, episode_id, files, npy, parallel, text};
+pub use softvt_common::{cancel, episode_id, files, npy, parallel, settings, text};
 #[cfg(feature = "runner")]
 #[doc(inline)]
 pub use softvt_dataset as dataset;

@@ -279,9 +279,8 @@ impl RecordingArgs {
             let what = "demonstrations are public, and so need no secret seed; use --seed";
             return Err(CliError::input(format!("--seed-file: {what}")));
         }
-        // The contact streams of a demonstration come from the trace.
-        let (threads, trace) = (self.threads, Some(TraceDetail::State));
-        Ok(Request::new(script)?.with(|config| RunConfig { tasks, threads, trace, ..config }))
+        let threads = self.threads;
+        Ok(Request::new(script)?.with(|config| RunConfig { tasks, threads, ..config }))
     }
 
     /// The recording, with the grip code of exports that name none.

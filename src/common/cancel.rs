@@ -14,3 +14,19 @@ pub fn request() -> bool {
 pub fn requested() -> bool {
     FLAG.load(Ordering::Relaxed)
 }
+
+/// Cancellation of a part of the process, such as one server. The part is also cancelled with the whole process.
+#[derive(Debug, Default)]
+pub struct CancelFlag(AtomicBool);
+
+impl CancelFlag {
+    /// Requests cancellation of the part.
+    pub fn request(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    /// True once cancellation of the part or of the process has been requested.
+    pub fn requested(&self) -> bool {
+        self.0.load(Ordering::Relaxed) || requested()
+    }
+}

@@ -91,7 +91,7 @@ pub struct RunConfig {
     pub file: PathBuf,
     /// Values of the options that the script declares, as `--name=value`.
     pub options: Vec<String>,
-    /// Base seed; that of a secret is its public seed.
+    /// Base seed. With a secret it is ignored, and that of the secret is used.
     pub seed: u64,
     /// Secret of a judged run.
     pub secret: Option<SecretSeed>,
@@ -165,7 +165,10 @@ impl RunConfig {
     ///
     /// # Errors
     /// The script fails or returns no plan.
-    pub fn load(self) -> Result<LoadedRun, RunError> {
+    pub fn load(mut self) -> Result<LoadedRun, RunError> {
+        if let Some(secret) = &self.secret {
+            self.seed = secret.public_seed();
+        }
         let script = softvt_script::load(&self.file, &self.options)?;
         Ok(LoadedRun { script: self.prepare_script(script)?, config: self })
     }
@@ -176,8 +179,9 @@ impl RunConfig {
     /// A variation that is not valid, or does not fit a suite.
     pub fn prepare_script(&self, mut loaded: LoadedScript) -> Result<LoadedScript, RunError> {
         if let Some(file) = &self.vary {
-            let (ranges, _) = softvt_script::load_variation(file)
+            let (ranges, files) = softvt_script::load_variation(file)
                 .map_err(|error| RunError::from(error).prefixed("--vary"))?;
+            loaded.variation_files = files;
             loaded.vary(&ranges).map_err(|error| self.error(format!("--vary: {error}")))?;
         }
         loaded.secret.clone_from(&self.secret);

@@ -112,6 +112,8 @@ impl<'a> SuiteRecording<'a> {
             SuiteRun::new(config, loaded, suite, jobs, layout::attempts(&options.out, &folder_name))?;
         run.split = Split::Demonstration;
         run.renders_episodes = true;
+        // The streams of contact, slip and drop come from the trace.
+        run.records_trace = true;
         let grip_log = GripLog::default();
         customize(&mut run, &grip_log)?;
         run.prepare()?;

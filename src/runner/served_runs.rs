@@ -9,7 +9,7 @@ use crate::{
     run_manifest::RunManifest,
     suite_run::SuiteRun,
 };
-use softvt_common::cancel;
+use softvt_common::cancel::{self, CancelFlag};
 use softvt_common::episode_id::{EpisodeId, EpisodeIndex};
 use softvt_common::{parallel::lock, text::counted};
 use softvt_records::summary::SuiteSummary;
@@ -23,6 +23,7 @@ pub struct ServedRuns<'a> {
     runs: Vec<ServedRun<'a>>,
     /// The first error of writing a file. The server ends then.
     failure: Mutex<Option<RunError>>,
+    cancel: CancelFlag,
 }
 
 /// The run folder of one suite.
@@ -39,7 +40,8 @@ impl<'a> ServedRuns<'a> {
     /// # Errors
     /// A folder holds another run or anything else, or cannot be written. No empty folder is left then.
     pub fn open(config: &'a RunConfig, runs: &'a [SuiteRun<'a>]) -> Result<Self, RunError> {
-        let mut opened = Self { config, runs: Vec::new(), failure: Mutex::default() };
+        let mut opened =
+            Self { config, runs: Vec::new(), failure: Mutex::default(), cancel: CancelFlag::default() };
         for run in runs {
             match ServedRun::open(run) {
                 Ok(run) => opened.runs.push(run),
@@ -50,6 +52,11 @@ impl<'a> ServedRuns<'a> {
             }
         }
         Ok(opened)
+    }
+
+    /// Ends the server: set by a file that cannot be written.
+    pub fn cancel(&self) -> &CancelFlag {
+        &self.cancel
     }
 
     /// Interface of the server to the recorded runs.
@@ -81,7 +88,7 @@ impl<'a> ServedRuns<'a> {
         served.add(finished).map_err(|error| {
             let message = error.message.clone();
             lock(&self.failure).get_or_insert(error);
-            cancel::request();
+            self.cancel.request();
             RequestError::Record(message)
         })
     }

@@ -122,7 +122,7 @@ fn served_suite(run: &SuiteRun) -> Suite {
 fn provenance_hash(config: &RunConfig, loaded: &LoadedScript) -> String {
     let all = json!([
         env!("CARGO_PKG_VERSION"),
-        loaded.sources.bundle.hashes(),
+        loaded.file_hashes(),
         config.options,
         config.shifts,
         config.settings,

@@ -64,6 +64,8 @@ pub struct SuiteRun<'a> {
     pub out: PathBuf,
     /// True if any episode may be rendered.
     pub renders_episodes: bool,
+    /// True if every control step is recorded.
+    pub(crate) records_trace: bool,
     /// True if the policy observes the true forces on the pads.
     pub force_observed: bool,
     /// Split of the episodes.
@@ -98,7 +100,7 @@ impl<'a> SuiteRun<'a> {
         let replay_source = find_replay_source(config, suite, &jobs)?;
         let connections =
             config.policy.server().map(|server| Arc::new(PolicyConnections::new(server.clone())));
-        let mut sources = loaded.sources.bundle.hashes();
+        let mut sources = loaded.file_hashes();
         sources.extend(config.policy.sources.clone());
         Ok(Self {
             config,
@@ -117,6 +119,7 @@ impl<'a> SuiteRun<'a> {
             sensor_assets: SensorAssets::default(),
             out,
             renders_episodes: config.video.is_some(),
+            records_trace: config.trace.is_some(),
             split: Split::Validation,
             controllers: config.policy.controller_factory(
                 connections.clone(),
@@ -339,7 +342,7 @@ impl<'a> SuiteRun<'a> {
         spec.header.privileged = self.is_privileged();
         spec.header.variation = opened.variation.clone().map(Box::new);
         spec.header.origin = origin.cloned().map(Box::new);
-        let record_trace = self.config.trace.is_some();
+        let record_trace = self.records_trace;
         let trace_nodes = self.config.trace == Some(TraceDetail::Nodes);
         Ok((EpisodeSpec { limits: limits.by_object, record_trace, trace_nodes, ..spec }, opened))
     }

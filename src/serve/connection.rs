@@ -3,7 +3,6 @@
 use std::{
     io::Read,
     net::TcpStream,
-    sync::atomic::{AtomicBool, Ordering},
     time::{Duration, Instant},
 };
 
@@ -15,6 +14,7 @@ use tungstenite::{
 };
 
 use super::access::Refusal;
+use softvt_common::cancel::CancelFlag;
 
 use softvt_policy::{
     msgpack::{MsgpackError, unpack},
@@ -56,7 +56,7 @@ pub(super) struct Aborted;
 #[derive(Debug)]
 pub(super) struct Connection<'a> {
     socket: WebSocket<PollingStream>,
-    cancel: &'a AtomicBool,
+    cancel: &'a CancelFlag,
 }
 
 impl<'a> Connection<'a> {
@@ -66,7 +66,7 @@ impl<'a> Connection<'a> {
     /// The client does not complete the handshake, or is refused.
     pub(super) fn accept(
         stream: TcpStream,
-        cancel: &'a AtomicBool,
+        cancel: &'a CancelFlag,
         check: impl FnOnce(&Request) -> Result<(), Refusal>,
     ) -> Result<Self, TransportError<Aborted>> {
         // The type of the error is tungstenite's.
@@ -95,7 +95,7 @@ impl<'a> Connection<'a> {
         let mut idle_since = Instant::now();
         loop {
             let message = transport::receive(&mut self.socket, |socket| {
-                if self.cancel.load(Ordering::Relaxed) {
+                if self.cancel.requested() {
                     return Err(Aborted);
                 }
                 if idle_since.elapsed() > PING_INTERVAL {
@@ -129,7 +129,7 @@ impl<'a> Connection<'a> {
         let mut deadline = Instant::now() + WRITE_TIMEOUT;
         let mut was_cancelled = false;
         transport::send(&mut self.socket, value, || {
-            if cancel.load(Ordering::Relaxed) && !was_cancelled {
+            if cancel.requested() && !was_cancelled {
                 was_cancelled = true;
                 deadline = deadline.min(Instant::now() + CANCELLED_TIMEOUT);
             }
@@ -139,7 +139,7 @@ impl<'a> Connection<'a> {
 
     /// Closes the connection after the client has received the last message.
     pub(super) fn close(mut self) {
-        let cancelled = || self.cancel.load(Ordering::Relaxed);
+        let cancelled = || self.cancel.requested();
         let code = if cancelled() { CloseCode::Away } else { CloseCode::Normal };
         let deadline = Instant::now() + CLOSE_DRAIN_TIMEOUT;
         let mut sent = self.socket.close(Some(CloseFrame { code, reason: "".into() }));
@@ -162,6 +162,6 @@ impl<'a> Connection<'a> {
     }
 }
 
-fn may_go_on(cancel: &AtomicBool, deadline: Instant) -> Result<(), Aborted> {
-    if cancel.load(Ordering::Relaxed) || Instant::now() > deadline { Err(Aborted) } else { Ok(()) }
+fn may_go_on(cancel: &CancelFlag, deadline: Instant) -> Result<(), Aborted> {
+    if cancel.requested() || Instant::now() > deadline { Err(Aborted) } else { Ok(()) }
 }

@@ -1,10 +1,8 @@
 //! A limit on the pixels that all clients together have in rendering.
 
+use softvt_common::cancel::CancelFlag;
 use std::{
-    sync::{
-        Condvar, Mutex, PoisonError,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::{Condvar, Mutex, PoisonError},
     time::Duration,
 };
 
@@ -23,11 +21,11 @@ pub(super) struct RenderBudget {
 impl RenderBudget {
     /// Waits until an image of so many pixels fits. A larger one than the limit is rendered alone. `None` if the server is
     /// cancelled.
-    pub(super) fn acquire(&self, pixels: usize, cancel: &AtomicBool) -> Option<RenderPermit<'_>> {
+    pub(super) fn acquire(&self, pixels: usize, cancel: &CancelFlag) -> Option<RenderPermit<'_>> {
         let pixels = pixels.min(MAX_RENDER_PIXELS);
         let mut in_use = self.in_use.lock().unwrap_or_else(PoisonError::into_inner);
         while *in_use + pixels > MAX_RENDER_PIXELS {
-            if cancel.load(Ordering::Relaxed) {
+            if cancel.requested() {
                 return None;
             }
             let waited = self.released.wait_timeout(in_use, POLL_INTERVAL);
@@ -58,7 +56,7 @@ mod tests {
 
     #[test]
     fn images_wait_until_they_fit() {
-        let (budget, cancel) = (RenderBudget::default(), AtomicBool::new(false));
+        let (budget, cancel) = (RenderBudget::default(), CancelFlag::default());
         let large = budget.acquire(usize::MAX, &cancel).unwrap();
         std::thread::scope(|scope| {
             let waiting = scope.spawn(|| budget.acquire(1, &cancel).is_some());
@@ -69,7 +67,7 @@ mod tests {
         });
         let half = MAX_RENDER_PIXELS / 2;
         let _both = [half, half].map(|pixels| budget.acquire(pixels, &cancel).unwrap());
-        cancel.store(true, Ordering::Relaxed);
+        cancel.request();
         assert!(budget.acquire(1, &cancel).is_none());
     }
 }

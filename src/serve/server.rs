@@ -4,7 +4,7 @@ use std::{
     io::{self, Read, Write},
     net::{Shutdown, TcpListener, TcpStream},
     panic::{AssertUnwindSafe, catch_unwind},
-    sync::atomic::{AtomicBool, AtomicUsize, Ordering},
+    sync::atomic::{AtomicUsize, Ordering},
     thread,
     time::{Duration, Instant},
 };
@@ -23,6 +23,7 @@ use super::{
     response,
     session::ClientSession,
 };
+use softvt_common::cancel::CancelFlag;
 use softvt_policy::transport::{POLL_INTERVAL, is_wait};
 
 /// Accept-loop polling interval.
@@ -57,7 +58,7 @@ struct ServerState<'a> {
     clients: AtomicUsize,
     render_budget: RenderBudget,
     attempts: Attempts<'a>,
-    cancel: &'a AtomicBool,
+    cancel: &'a CancelFlag,
 }
 
 /// Serves up to `max_clients` clients at a time until `cancel` is set. `hello` is the first message to each.
@@ -66,14 +67,14 @@ pub fn serve(
     config: &ServerConfig,
     hello: Value,
     max_clients: usize,
-    cancel: &AtomicBool,
+    cancel: &CancelFlag,
 ) {
     let (clients, render_budget) = (AtomicUsize::new(0), RenderBudget::default());
     let attempts = Attempts::new(config.recorder.as_ref());
     let state = ServerState { config, hello, max_clients, clients, render_budget, attempts, cancel };
     let connections = AtomicUsize::new(0);
     thread::scope(|scope| {
-        while !cancel.load(Ordering::Relaxed) {
+        while !cancel.requested() {
             // Errors are transient: the client has gone, or the process has too many open files.
             let Ok((stream, _)) = listener.accept() else {
                 thread::sleep(ACCEPT_POLL_INTERVAL);
@@ -149,10 +150,10 @@ fn handle_connection(stream: TcpStream, state: &ServerState) {
 }
 
 /// True if the connection starts with a health-check request. `None` if nothing arrives.
-fn is_health_check(stream: &TcpStream, cancel: &AtomicBool) -> Option<bool> {
+fn is_health_check(stream: &TcpStream, cancel: &CancelFlag) -> Option<bool> {
     let deadline = Instant::now() + HANDSHAKE_TIMEOUT;
     let mut start = [0; HEALTH_REQUEST.len() + 1];
-    while Instant::now() < deadline && !cancel.load(Ordering::Relaxed) {
+    while Instant::now() < deadline && !cancel.requested() {
         match stream.peek(&mut start) {
             Ok(0) => return None,
             Ok(count) if count == start.len() => {

@@ -1,9 +1,6 @@
 //! One client's episode, and copies of earlier states to return to.
 
-use std::{
-    collections::VecDeque,
-    sync::atomic::{AtomicBool, Ordering},
-};
+use std::collections::VecDeque;
 
 use rmpv::Value;
 
@@ -15,6 +12,7 @@ use super::{
     response::{self, Executed},
     state::{ActionRow, EpisodeState, LiveEpisode},
 };
+use softvt_common::cancel::CancelFlag;
 use softvt_policy::{encode::image_array, msgpack::pack_array};
 use softvt_robot::Side;
 
@@ -26,7 +24,7 @@ pub(super) struct ClientSession<'a> {
     config: &'a ServerConfig<'a>,
     render_budget: &'a RenderBudget,
     attempts: &'a Attempts<'a>,
-    cancel: &'a AtomicBool,
+    cancel: &'a CancelFlag,
     live: Option<LiveEpisode>,
     /// Copies of earlier states, the most recently used one last.
     snapshots: VecDeque<LiveEpisode>,
@@ -41,7 +39,7 @@ impl<'a> ClientSession<'a> {
         config: &'a ServerConfig<'a>,
         render_budget: &'a RenderBudget,
         attempts: &'a Attempts<'a>,
-        cancel: &'a AtomicBool,
+        cancel: &'a CancelFlag,
     ) -> Self {
         let snapshots = VecDeque::new();
         Self { config, render_budget, attempts, cancel, live: None, snapshots, attempt: None }
@@ -213,7 +211,7 @@ impl<'a> ClientSession<'a> {
     }
 
     fn check_cancel(&self) -> Result<(), RequestError> {
-        match self.cancel.load(Ordering::Relaxed) {
+        match self.cancel.requested() {
             true => Err("the server is shutting down".to_owned().into()),
             false => Ok(()),
         }

@@ -16,7 +16,10 @@ use crate::{
     error::{CliError, Exit},
     output::{eprint_notice, print},
 };
-use softvt_common::{cancel, episode_id::Split};
+use softvt_common::{
+    cancel::{self, CancelFlag},
+    episode_id::Split,
+};
 use softvt_report::terminal;
 use softvt_runner::{
     PolicyConfig, RunConfig, ServedRuns, Shard, check_served, first_observation, prepare_served,
@@ -141,7 +144,9 @@ fn serve(args: ServeArgs) -> Result<(), CliError> {
     print(&format!("ws://{address}\n"))?;
     // Without results to keep, the end of a server is no event.
     QUIET_INTERRUPT.store(served.is_none(), Ordering::Relaxed);
-    softvt_serve::serve(&listener, &server_config, hello, usize::from(args.threads), &cancel::FLAG);
+    let own = CancelFlag::default();
+    let cancel = served.as_ref().map_or(&own, ServedRuns::cancel);
+    softvt_serve::serve(&listener, &server_config, hello, usize::from(args.threads), cancel);
     drop(server_config);
     match served {
         Some(served) => {

@@ -97,6 +97,17 @@ pub struct LoadedScript {
     pub options: Vec<OptionSpec>,
     /// Secret of a judged run, from which the draws of its episodes derive.
     pub secret: Option<SecretSeed>,
+    /// SHA-256 of the files of a variation that replaced those of the suites, by name.
+    pub variation_files: BTreeMap<String, String>,
+}
+
+impl LoadedScript {
+    /// SHA-256 of every file that the episodes depend on, by name.
+    pub fn file_hashes(&self) -> BTreeMap<String, String> {
+        let mut hashes = self.sources.bundle.hashes();
+        hashes.extend(self.variation_files.clone());
+        hashes
+    }
 }
 
 /// Loads the script at `path` with its own arguments of the command line, and makes its plan. Standard scripts that are not
@@ -127,7 +138,7 @@ pub fn load_with(path: &Path, argv: &[String], limits: &Limits) -> Result<Loaded
         let options = lock(&instance.options).declared.clone();
         Ok((options, instance.plan().map_err(|e| instance.vm.explain(&e))?))
     })?;
-    Ok(LoadedScript { sources, plan, options, secret: None })
+    Ok(LoadedScript { sources, plan, options, secret: None, variation_files: BTreeMap::new() })
 }
 
 /// The options that the script at `path` declares, for `--help`. If the script fails, those declared before.
