@@ -55,7 +55,7 @@ pub enum Needs {
     Nothing,
     /// Its size, which shows.
     Size,
-    /// What does not show and has to be felt.
+    /// Stiffness, mass or friction, which only touch reveals.
     Touch,
 }
 

@@ -204,6 +204,11 @@ macro_rules! settings {
         pub struct $name {
             $(
                 $(#[doc = $doc])*
+                $(
+                    #[doc = concat!(
+                        "\n\nDefault `", stringify!($default), "`" $(, ", unit `", $unit, "`, range `", stringify!($range), "`")?, "."
+                    )]
+                )?
                 pub $field: $type,
             )*
         }

@@ -8,17 +8,17 @@ softvt_common::settings! {
     /// The default is the benchmark; a suite or `--set criteria.slip_m=…` may change each of them. The definitions that
     /// use them are in [`super::drop`], [`super::slip`], [`super::goal`] and [`super::judge`].
     pub struct SuccessCriteria {
-        /// Minimum force that counts as contact, of a pad, another part of the robot or a support, N.
+        /// Minimum force that counts as contact, of a pad, another part of the robot or a support.
         touch_force_n: f64 = 1e-3, "N", NotNegative;
-        /// Minimum rise of a body's lowest point above its settled height that counts as lifted, m.
+        /// Minimum rise of a body's lowest point above its settled height that counts as lifted.
         lift_height_m: f64 = 0.005, "m", NotNegative;
         /// Time without pad contact after which a grasp may count as lost, s (0.15 s: three control steps).
         lost_contact_s: f64 = 0.15, "s", NotNegative;
-        /// Fall relative to the hand beyond which a lost grasp is a drop, m.
+        /// Fall relative to the hand beyond which a lost grasp is a drop.
         lost_fall_m: f64 = 0.020, "m", NotNegative;
-        /// Length of a free fall beyond which it is a drop, before or after the release, m.
+        /// Length of a free fall beyond which it is a drop, before or after the release.
         free_fall_m: f64 = 0.050, "m", NotNegative;
-        /// Excess of the commanded over the measured gripper width that counts as a release command, m.
+        /// Excess of the commanded over the measured gripper width that counts as a release command.
         release_margin_m: f64 = 0.005, "m", NotNegative;
         /// Largest allowed distance that the object slides along a pad while the pads alone carry it, m: NoSlip, which is not part of NoDrop.
         slip_m: f64 = 0.002, "m", NotNegative;
@@ -28,11 +28,11 @@ softvt_common::settings! {
         gentle_ratio: f64 = 2.0, "", NotNegative;
         /// Minimum share of the target's weight that the goal must carry, 0 to 1.
         support_share: f64 = 0.5, "", Between(0.0, 1.0);
-        /// Distance of the centre beyond the goal's edge at which a placed object has left the goal, m.
+        /// Distance of the centre beyond the goal's edge at which a placed object has left the goal.
         leave_margin_m: f64 = 0.005, "m", NotNegative;
-        /// Horizontal and vertical distance within which SoftVTBench's released code counts an object as "on", m.
+        /// Horizontal and vertical distance within which SoftVTBench's released code counts an object as "on".
         goal_v1_on_m: f64 = 0.10, "m", NotNegative;
-        /// Horizontal and vertical distance within which SoftVTBench's released code counts an object as "in", m.
+        /// Horizontal and vertical distance within which SoftVTBench's released code counts an object as "in".
         goal_v1_in_m: f64 = 0.20, "m", NotNegative;
     }
 }

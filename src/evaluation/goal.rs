@@ -53,7 +53,7 @@ impl GoalRegion {
     }
 
     /// True if a centre at `centre_w` is over the region of an object at `object_w`, at any height.
-    pub fn is_over(&self, centre_w: &Vec3, object_w: &Pose) -> bool {
+    pub fn is_over(&self, object_w: &Pose, centre_w: &Vec3) -> bool {
         match self {
             Self::On { .. } => self.contains(object_w, centre_w, 0.0),
             Self::Inside { space } => {

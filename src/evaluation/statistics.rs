@@ -165,7 +165,7 @@ impl Distribution {
         }
     }
 
-    /// True if a percentile that is null falls on an invalid episode.
+    /// True if there are invalid episodes. Percentiles that are null fall on them.
     pub fn has_invalid(&self) -> bool {
         self.invalid > 0
     }

@@ -7,11 +7,11 @@ softvt_common::settings! {
     ///
     /// [`check`](softvt_common::settings::SettingField::check) rejects values outside of the valid ranges; a [`World`](super::World) assumes valid ones.
     pub struct PhysicsParams {
-        /// Time step, s. Control runs at 20 Hz independently of it, so it must divide 0.05 s in the benchmark.
+        /// Time step. Control runs at 20 Hz independently of it, so it must divide 0.05 s in the benchmark.
         dt: f64 = 1.0 / 60.0, "s", Between(1e-4, 0.05);
-        /// Mass-proportional Rayleigh damping of soft bodies (α, as air drag), 1/s. The paper's engine uses 2.5.
+        /// Mass-proportional Rayleigh damping of soft bodies (α, as air drag). The paper's engine uses 2.5.
         rayleigh_mass: f64 = 0.0, "1/s", NotNegative;
-        /// Stiffness-proportional Rayleigh damping of soft bodies (β), s. Implicit Euler adds its step: motion is damped by β + `dt`, by
+        /// Stiffness-proportional Rayleigh damping of soft bodies (β). Implicit Euler adds its step: motion is damped by β + `dt`, by
         /// default 21.7 ms, so that a smaller step damps less. Equilibria do not depend on it.
         rayleigh_stiffness: f64 = 5e-3, "s", NotNegative;
         /// Dissipation time scale τ_d of contact springs, s (Castro et al. 2022). A surface that recedes faster
@@ -23,15 +23,15 @@ softvt_common::settings! {
         /// Tangential over normal contact stiffness. Mindlin (1949) gives 0.5 to 0.8 for solids; creep does
         /// not depend on it.
         shear_ratio: f64 = 0.5, "", Positive;
-        /// Gap below which a sample becomes a contact point, m. A sample that will reach the surface within 1.5 steps becomes one as well.
+        /// Gap below which a sample becomes a contact point. A sample that will reach the surface within 1.5 steps becomes one as well.
         margin: f64 = 2e-4, "m", Positive;
-        /// Speed below which a body may fall asleep, m/s.
+        /// Speed below which a body may fall asleep.
         sleep_speed: f64 = 1e-4, "m/s", NotNegative;
-        /// Time for which a body must be that slow before it sleeps, s.
+        /// Time for which a body must be that slow before it sleeps.
         sleep_delay: f64 = 0.5, "s", Positive;
         /// True if bodies may fall asleep at all.
         sleeping: bool = true;
-        /// Longest time for which an element may be inverted before the run is invalid, s.
+        /// Longest time for which an element may be inverted before the run is invalid.
         max_inverted_time: f64 = 0.1, "s", NotNegative;
         /// Largest speed of a valid state, m/s: far above that of a gripper (0.2 m/s), an arm, or a fall onto a table.
         max_speed: f64 = 100.0, "m/s", Positive;

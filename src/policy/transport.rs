@@ -61,11 +61,6 @@ impl PollingStream {
         self.stream.set_nonblocking(nonblocking)
     }
 
-    /// The stream below the websocket.
-    pub fn tcp(&self) -> &TcpStream {
-        &self.stream
-    }
-
     fn interrupt(&mut self) -> io::Result<()> {
         match &mut self.interrupted {
             Some(last) if last.elapsed() >= POLL_INTERVAL => {

@@ -52,9 +52,9 @@ softvt_common::settings! {
     /// limits of [`panda::tree`](super::panda::tree)), in addition to exact gravity compensation. The same gains
     /// apply to all joints.
     pub struct ArmSpec {
-        /// Stiffness, N m/rad; positive.
+        /// Stiffness.
         kp: f64 = 8000.0, "N m/rad", Positive;
-        /// Damping, N m s/rad; positive.
+        /// Damping.
         kd: f64 = 800.0, "N m s/rad", Positive;
     }
 }
@@ -63,15 +63,15 @@ softvt_common::settings! {
     /// Drive of each finger: `f = kp (q_target − q) − kd q̇`, limited to `effort`. The opening range is fixed
     /// by the hardware ([`MAX_WIDTH`](super::gripper::MAX_WIDTH)).
     pub struct GripperSpec {
-        /// Stiffness, N/m; positive.
+        /// Stiffness.
         kp: f64 = 2000.0, "N/m", Positive;
-        /// Damping, N s/m; positive.
+        /// Damping.
         kd: f64 = 100.0, "N s/m", Positive;
-        /// Largest force per finger, N. The real hand holds 70 N continuously (Franka Emika, Hand data sheet); the paper's simulator has 200 N.
+        /// Largest force per finger. The real hand holds 70 N continuously (Franka Emika, Hand data sheet); the paper's simulator has 200 N.
         effort: f64 = 70.0, "N", Positive;
-        /// Speed at which the target of each finger moves, m/s.
+        /// Speed at which the target of each finger moves.
         speed: f64 = 0.2, "m/s", Positive;
-        /// Mass of each finger with its sensor, kg.
+        /// Mass of each finger with its sensor.
         finger_mass: f64 = 0.1, "kg", Positive;
     }
 }
@@ -85,11 +85,11 @@ softvt_common::settings! {
     /// firmware 11.3, `GetRtGripperPos`), as the standard deviation. Noise before rounding is off: averaging it would measure
     /// less than a step.
     pub struct WidthSensorSpec {
-        /// Step of the measured width, m; 0 for none.
+        /// Step of the measured width; 0 for none.
         resolution: f64 = 4e-4, "m", Between(0.0, 0.01);
-        /// Standard deviation of the error that is constant in an episode, m.
+        /// Standard deviation of the error that is constant in an episode.
         offset: f64 = 2.5e-4, "m", Between(0.0, 0.01);
-        /// Standard deviation of the noise, new in every control step, m.
+        /// Standard deviation of the noise, new in every control step.
         noise: f64 = 0.0, "m", Between(0.0, 0.01);
     }
 }
@@ -98,9 +98,9 @@ softvt_common::settings! {
     /// Contact of the gel pads: friction, and the compliance of gel and sensor per contact area (a model of the 4 mm gel
     /// for wide patches). It determines force and slip; tactile images are computed from a model of their own.
     pub struct PadSpec {
-        /// Normal stress per indentation, Pa/m.
+        /// Normal stress per indentation.
         normal_modulus: f64 = 3e8, "Pa/m", Positive;
-        /// Shear stress per tangential displacement, Pa/m.
+        /// Shear stress per tangential displacement.
         tangential_modulus: f64 = 4e7, "Pa/m", Positive;
         /// Friction coefficient while the pad sticks.
         static_mu: f64 = 1.5, "", NotNegative;
@@ -112,8 +112,8 @@ softvt_common::settings! {
 softvt_common::settings! {
     /// Differential inverse kinematics by damped least squares.
     pub struct IkSpec {
-        /// Damping λ of the least squares, in the mixed unit (m and rad per rad) of the Jacobian's singular values;
-        /// positive. Larger values are slower and more robust near singularities.
+        /// Damping λ of the least squares, in the mixed unit (m and rad per rad) of the Jacobian's singular values.
+        /// Larger values are slower and more robust near singularities.
         lambda: f64 = 0.01, "", Positive;
         /// Share of the way to the rest posture that the null space covers per control step, 0..=1.
         posture_gain: f64 = 0.0, "", Between(0.0, 1.0);
@@ -127,11 +127,11 @@ softvt_common::settings! {
     /// Demonstrations that are recorded with it hold the expert's commands, not the disturbed ones, and so show how to correct
     /// deviations (Laskey et al., *DART*, 2017).
     pub struct DisturbanceSpec {
-        /// Standard deviation of the position along each axis, m.
+        /// Standard deviation of the position along each axis.
         position: f64 = 0.0, "m", Between(0.0, 0.05);
-        /// Standard deviation of the rotation about each axis, rad.
+        /// Standard deviation of the rotation about each axis.
         rotation: f64 = 0.0, "rad", Between(0.0, 0.5);
-        /// Time after which the correlation of the offset has fallen to 1/e, s; positive.
+        /// Time after which the correlation of the offset has fallen to 1/e.
         duration: f64 = 0.5, "s", Positive;
     }
 }

@@ -36,15 +36,15 @@ softvt_common::settings! {
     /// Noise and wear of a tactile sensor: what a policy observes of it. The forces of the contact are unchanged.
     #[derive(Copy)]
     pub struct WearSpec {
-        /// Standard deviation of the noise of each marker coordinate in each image, px.
+        /// Standard deviation of the noise of each marker coordinate in each image.
         noise_px: f64 = 0.0, "px", Between(0.0, 20.0);
-        /// Standard deviation of the constant offset of each marker coordinate, px.
+        /// Standard deviation of the constant offset of each marker coordinate.
         offset_px: f64 = 0.0, "px", Between(0.0, 20.0);
         /// Factor on the displacements of the markers and on the changes of the image.
         gain: f64 = 1.0, "", Between(0.0, 10.0);
         /// Share of the markers that do not follow the gel.
         dead_share: f64 = 0.0, "", Between(0.0, 1.0);
-        /// Standard deviation of the noise of each colour value in each image, of 255.
+        /// Standard deviation of the noise of each colour value (0 to 255) in each image.
         image_noise: f64 = 0.0, "of 255", Between(0.0, 128.0);
     }
 }
@@ -53,11 +53,11 @@ softvt_common::settings! {
     /// Material and grid of the gel. Its shape is [`PadSurface`].
     #[derive(Copy)]
     pub struct GelSpec {
-        /// Shear modulus, Pa. 0.145 MPa: twice the C10 identified on a GelSight Mini (Helmut et al., arXiv 2411.03315).
+        /// Shear modulus. 0.145 MPa: twice the C10 identified on a GelSight Mini (Helmut et al., arXiv 2411.03315).
         shear_modulus: f64 = 1.45e5, "Pa", Between(1e2, 1e9);
         /// Poisson's ratio.
         poisson: f64 = 0.475, "", Between(0.0, 0.499);
-        /// Edge of a grid cell, m.
+        /// Edge of a grid cell.
         cell: f64 = 4e-4, "m", Between(1e-4, 5e-4);
     }
 }
@@ -67,9 +67,9 @@ softvt_common::settings! {
     /// the pad's x, image y (down) the pad's y; `docs/tactile.md` draws the frames.
     #[derive(Copy)]
     pub struct Pinhole {
-        /// Edge of a pixel on the plane of the apex, m. 0.0634 mm at 320×240 (GelSight's own figure).
+        /// Edge of a pixel on the plane of the apex. 0.0634 mm at 320×240 (GelSight's own figure).
         pitch: f64 = 6.34e-5, "m", Between(1e-5, 2e-4);
-        /// Distance of the pinhole from the apex, m.
+        /// Distance of the pinhole from the apex.
         lens: f64 = 2.6e-2, "m", Between(5e-3, 1.0);
     }
 }
@@ -133,11 +133,11 @@ softvt_common::settings! {
     /// Constants of the marker law of FOTS.
     #[derive(Copy)]
     pub struct FotsSpec {
-        /// Decay of the dilation, 1/px².
+        /// Decay of the dilation.
         dilate: f64 = 0.00125, "1/px²", Between(0.0, 1.0);
-        /// Decay of the shear, 1/px².
+        /// Decay of the shear.
         shear: f64 = 0.00021, "1/px²", Between(0.0, 1.0);
-        /// Decay of the twist, 1/px².
+        /// Decay of the twist.
         twist: f64 = 0.00038, "1/px²", Between(0.0, 1.0);
         /// Scale of the image, pixels per millimetre.
         scale: f64 = 19.58, "px/mm", Between(1.0, 1000.0);

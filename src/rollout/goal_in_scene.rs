@@ -55,7 +55,7 @@ impl GoalInScene {
     /// True if the object is over the region, at any height: the goal may hold once the scene has settled.
     pub(super) fn is_object_over(&self, sim: &Simulation) -> bool {
         let [object, target] = [self.object, self.target].map(|index| &sim.objects[index]);
-        self.region.is_over(&sim.centre(object), &foot_pose(sim, target))
+        self.region.is_over(&foot_pose(sim, target), &sim.centre(object))
     }
 }
 

@@ -119,7 +119,7 @@ fn condition_cases(
         changed.settings.extend(condition.set.iter().cloned());
         if let Some(name) = &condition.policy {
             changed.policy = PolicyConfig::named(name)
-                .map_err(|error| config.error(format!("condition {:?}: policy: {error}", condition.name)))?;
+                .map_err(|error| config.error(format!("condition {:?}: {error}", condition.name)))?;
         }
         if condition.rigid_twin {
             changed.rigid_twin = true;

@@ -1,4 +1,4 @@
-//! Evaluation of a policy on a suite: its episodes are run into a folder, which can be continued after an interrupt.
+//! Evaluation of a policy on a suite: its episodes are run, with or without a folder, which can be continued after an interrupt.
 
 use std::{collections::BTreeSet, path::Path};
 
@@ -26,6 +26,7 @@ use softvt_report::{
 use softvt_rollout::FinishedEpisode;
 
 /// The episodes of a finished run, in order, with their summary.
+#[derive(Clone, Debug)]
 pub struct SuiteResult {
     /// Rates and distributions.
     pub summary: SuiteSummary,

@@ -2,6 +2,7 @@
 
 use std::{
     collections::BTreeMap,
+    fmt,
     path::{Path, PathBuf},
     str::FromStr,
     sync::Arc,
@@ -249,7 +250,7 @@ fn suggestion<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> String {
 
 /// Makes the controller of an episode.
 pub type ControllerFactory =
-    Box<dyn Fn(EpisodeSetup, TaskBrief) -> Result<Box<dyn Controller>, RunError> + Sync>;
+    Box<dyn Fn(EpisodeSetup, TaskBrief) -> Result<Box<dyn Controller>, RunError> + Send + Sync>;
 
 #[derive(Clone, Debug)]
 enum PolicyKind {
@@ -258,10 +259,24 @@ enum PolicyKind {
     Server(Arc<PolicyServer>),
     /// Repeats the actions of recorded runs.
     Recorded(Arc<RecordedRuns>),
+    Rust(RustPolicy),
     /// A client of `softvt serve`, with the encoding of its observations and actions.
     Client(Arc<Profile>),
     /// The actions come from elsewhere: a dataset or a single recorded episode.
     External,
+}
+
+/// Makes a policy for an episode.
+type StartPolicy = dyn Fn(&TaskBrief) -> Box<dyn Policy> + Send + Sync;
+
+/// A policy in Rust.
+#[derive(Clone)]
+struct RustPolicy(Arc<StartPolicy>);
+
+impl fmt::Debug for RustPolicy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("RustPolicy")
+    }
 }
 
 /// The sensors that the file of a policy declares.
@@ -384,12 +399,19 @@ impl PolicyConfig {
     /// The built-in policy of a name.
     ///
     /// # Errors
-    /// No policy has the name; the message is a fragment.
-    pub fn named(name: &str) -> Result<Self, String> {
+    /// No policy has the name.
+    pub fn named(name: &str) -> Result<Self, RunError> {
         BuiltinPolicy::named(name).map(Self::builtin).ok_or_else(|| {
             let known = BuiltinPolicy::ALL.map(BuiltinPolicy::name);
-            format!("expected {}, got {name:?}{}", known.join(", "), suggestion(name, known.into_iter()))
+            let hint = suggestion(name, known.into_iter());
+            RunError::input(format!("policy: expected {}, got {name:?}{hint}", known.join(", ")))
         })
+    }
+
+    /// A policy in Rust, under this name in the results. `start` makes it for each episode; of each chunk of actions, all are
+    /// executed unless `replan` is set.
+    pub fn of(name: &str, start: impl Fn(&TaskBrief) -> Box<dyn Policy> + Send + Sync + 'static) -> Self {
+        Self::new(PolicyKind::Rust(RustPolicy(Arc::new(start))), name.to_owned())
     }
 
     /// The clients of `softvt serve`. `privileged` clients receive the true state.
@@ -479,6 +501,7 @@ impl PolicyConfig {
                     let actions = runs.actions(&suite, is_rigid_twin, &brief)?;
                     chunked(Box::new(RecordedPolicy::from_actions(&actions, None)), 1)
                 }
+                (PolicyKind::Rust(start), _) => chunked(start.0(&brief), replan),
                 (PolicyKind::Lua(file), _) => {
                     let policy = file.start(&opened.seed, gripper)?;
                     chunked(Box::new(policy), replan)

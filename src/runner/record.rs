@@ -40,7 +40,8 @@ impl DemoCount {
 }
 
 /// Records demonstrations of the selected tasks of every suite of a script, by the policy that `policy_of` returns for the teacher of
-/// the suite. Returns `None` if the folder contains the complete recording.
+/// the suite. Returns `None` if the folder contains the complete recording. Of the configuration, the policy, the output, the
+/// number of episodes, the shard, trace and videos do not matter here.
 ///
 /// # Errors
 /// The script has no suite, the folder contains something else, an attempt or a file fails, or too few attempts are good.

@@ -1,4 +1,4 @@
-//! `--policy RUN`: repetition of the actions of a recorded run.
+//! Repetition of the actions of a recorded run, as a policy.
 
 use std::path::{Path, PathBuf};
 

@@ -11,7 +11,7 @@ use crate::{
     selection::{check_episodes, check_parent_folder, next_run_dir, run_dir, select_suites},
     suite_run::SuiteRun,
 };
-use softvt_benchmark::Plan;
+use softvt_benchmark::{Plan, ShiftValue, seed::SecretSeed};
 use softvt_records::record::EpisodeRecord;
 use softvt_script::LoadedScript;
 
@@ -57,6 +57,21 @@ impl<'a> Runner<'a> {
     /// Episodes per task.
     pub fn episodes(self, count: u32) -> Self {
         self.change(|config| config.episodes = Some(count))
+    }
+
+    /// Base seed. That of a secret stays.
+    pub fn seed(self, seed: u64) -> Self {
+        self.change(|config| config.seed = config.secret.as_ref().map_or(seed, SecretSeed::public_seed))
+    }
+
+    /// A shift of the suite with its value, in addition to those of the configuration.
+    pub fn shift(self, name: &str, value: f64) -> Self {
+        self.change(|config| config.shifts.push(ShiftValue { name: name.to_owned(), value }))
+    }
+
+    /// A changed setting, by path and value, in addition to those of the configuration.
+    pub fn set(self, path: &str, value: impl ToString) -> Self {
+        self.change(|config| config.settings.push((path.to_owned(), value.to_string())))
     }
 
     /// Only one part of the episodes.

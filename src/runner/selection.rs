@@ -38,7 +38,7 @@ pub fn select_suites<'a>(command: &str, config: &RunConfig, plan: &'a Plan) -> R
     }
 }
 
-/// The tasks that `--task` selects, in the order of their indices.
+/// The tasks that [`RunConfig::tasks`] selects, in the order of their indices.
 ///
 /// # Errors
 /// A word that matches no task, or a task without an expert where the expert is the policy.
@@ -100,13 +100,13 @@ pub fn check_distinct_out_dirs(config: &RunConfig, suites: &[Suite]) -> Result<(
     })
 }
 
-/// Folder of a suite's run in `--out`: that folder itself, or one inside of it for a list of suites.
+/// Folder of a suite's run in [`RunConfig::out`]: that folder itself, or one inside of it for a list of suites.
 pub(crate) fn run_dir(config: &RunConfig, suite: &Suite, is_list: bool) -> Option<PathBuf> {
     let dir = config.out.as_ref()?;
     Some(if is_list { dir.join(path_component(&config.suite_name(suite))) } else { dir.clone() })
 }
 
-/// Checks `--out` of a plan that writes several run folders.
+/// Checks [`RunConfig::out`] of a plan that writes several run folders.
 ///
 /// # Errors
 /// The folder holds something other than runs.

@@ -1,4 +1,4 @@
-//! `softvt serve --out`: one run folder per suite, with the episodes that clients step to their end.
+//! Runs of a server: one folder per suite, with the episodes that clients step to their end.
 
 use std::{collections::BTreeSet, path::Path, sync::Mutex};
 
@@ -35,7 +35,7 @@ struct ServedRun<'a> {
 }
 
 impl<'a> ServedRuns<'a> {
-    /// Creates the folders of prepared runs, or opens them with `--resume`.
+    /// Creates the folders of prepared runs, or opens them where [`RunConfig::resume`] is set.
     ///
     /// # Errors
     /// A folder holds another run or anything else, or cannot be written. No empty folder is left then.

@@ -6,7 +6,7 @@ use softvt_geometry::Pose;
 use softvt_policy::{GripCommand, ToolCommand};
 use softvt_scene::InitialState;
 
-/// Layouts that can be imported.
+/// Formats that can be imported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ForeignFormat {
     /// Relative steps for robosuite's controller, as stored by robomimic and LIBERO.

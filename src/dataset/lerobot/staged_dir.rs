@@ -75,7 +75,7 @@ impl StagedDir {
 /// Checks that `out` is missing or an empty folder.
 ///
 /// # Errors
-/// It is not.
+/// The folder has content, or is a file.
 pub(super) fn check_empty(out: &Path) -> Result<(), DatasetError> {
     let refuse = |what: &str| {
         let what = format!("{what}; nothing was written; give a new folder");

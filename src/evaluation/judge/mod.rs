@@ -257,7 +257,7 @@ impl Judge {
         };
         self.drops.update(&self.config.criteria, self.config.dt_s, &sample);
         let is_placed = self.observe_goal(evidence, sample.is_touched || sample.is_touched_by_body);
-        let is_over_goal = self.config.goal.is_over(&evidence.target.centre_w, &evidence.goal.pose_w);
+        let is_over_goal = self.config.goal.is_over(&evidence.goal.pose_w, &evidence.target.centre_w);
         self.stage.update(&StageSample { touch, is_lifted, is_over_goal, is_placed });
     }
 

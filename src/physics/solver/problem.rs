@@ -40,7 +40,7 @@ pub(crate) struct FrameJacobian {
 pub(crate) enum Endpoint {
     /// A body whose velocity is known; it is part of the points' `drift`.
     Known,
-    /// A weighted mean of up to eight nodes of a block, with the weights in the points.
+    /// A weighted mean of up to eight nodes of a block; each point has the weights, `weights_a` or `weights_b`.
     Nodes {
         /// Index of the soft body's block.
         block: usize,
