@@ -110,9 +110,9 @@ impl Scene {
             let start = CpuClock::now();
             while self.world.time() + 0.5 * self.world.params.dt < end {
                 self.step();
-                out.newton += self.world.stats().newton_steps;
-                out.factored += self.world.stats().factorizations;
-                out.newton_max = out.newton_max.max(self.world.stats().max_newton_steps);
+                out.newton += self.world.solver_stats().newton_steps;
+                out.factored += self.world.solver_stats().factorizations;
+                out.newton_max = out.newton_max.max(self.world.solver_stats().max_newton_steps);
             }
             out.cpu[phase] = start.elapsed();
             out.simulated[phase] = self.world.time() - begun;

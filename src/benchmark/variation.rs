@@ -188,7 +188,7 @@ impl VariationRanges {
     ///
     /// # Errors
     /// No instance can be kept.
-    pub fn sample(
+    pub fn sample_instances(
         &self,
         suite: &str,
         asset: &Asset,

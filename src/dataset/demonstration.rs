@@ -52,7 +52,7 @@ impl Demonstration {
         let privileged = if with_privileged { privileged::streams(finished, recording) } else { Vec::new() };
         Self {
             record: finished.record.clone(),
-            observed: observed(recording, &actions),
+            observed: proprioception_streams(recording, &actions),
             grip_labels_n: grip_labels::forces(&grip_forces(recording, actions.len()), &gripper_closed),
             gripper_closed,
             actions,
@@ -111,7 +111,7 @@ impl Demonstration {
             .flat_map(|(action, closure)| Action { grip: GripTarget::Closure(closure), ..*action }.to_array())
             .collect();
         let unit = if code == GripCode::Force { "m, rad, N" } else { "m, rad, 1" };
-        DataStream::f64(actions_stream(code), &[7], rows)
+        DataStream::f64(actions_stream_name(code), &[7], rows)
             .unit(unit, BASE)
             .attribute("meaning", "absolute tool position (m) and axis-angle (rad), gripper")
             .attribute("gripper", meaning)
@@ -120,7 +120,7 @@ impl Demonstration {
 }
 
 /// Name of the stream of actions in a grip code.
-pub(crate) fn actions_stream(code: GripCode) -> &'static str {
+pub(crate) fn actions_stream_name(code: GripCode) -> &'static str {
     match code {
         GripCode::Continuous => "actions",
         GripCode::Binary => "actions_binary",
@@ -140,7 +140,7 @@ fn grip_forces(recording: &StateRecording, steps: usize) -> Vec<f64> {
 }
 
 /// Proprioception before each action.
-fn observed(recording: &StateRecording, actions: &[Action]) -> Vec<DataStream> {
+fn proprioception_streams(recording: &StateRecording, actions: &[Action]) -> Vec<DataStream> {
     let states: Vec<_> =
         recording.frames.iter().take(actions.len()).map(|f| recording.sensors.proprioception(f)).collect();
     let each =

@@ -125,7 +125,8 @@ pub struct RolloutStats {
     /// The first of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub first_far_command: Option<FarCommand>,
-    /// Number of control steps whose grip value was outside of its range by more than a tenth of it, and was clamped.
+    /// Number of control steps whose grip value was outside of its range, and was clamped: for decoded answers of policies by more than a
+    /// tenth of the range.
     pub clamped_grips: u32,
     /// Reason given by the controller for aborting the episode, if it did.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -36,7 +36,7 @@ pub struct Clearance {
 /// collision boxes; the arm is left out.
 pub fn clearance(tool_w: &Pose, width: f64, obstacles: &[Obstacle<'_>], range: f64) -> Clearance {
     let mut found = Clearance { distance: range, nearest: None };
-    for part in hand(width) {
+    for part in hand_collision_boxes(width) {
         let centre_w = tool_w * part.pose;
         for (index, obstacle) in obstacles.iter().enumerate() {
             let to_object = obstacle.pose_w.inverse() * centre_w;
@@ -57,7 +57,7 @@ pub fn clearance(tool_w: &Pose, width: f64, obstacles: &[Obstacle<'_>], range: f
 }
 
 /// Collision boxes of hand and fingers in the tool frame.
-fn hand(width: f64) -> impl Iterator<Item = CollisionBox> {
+fn hand_collision_boxes(width: f64) -> impl Iterator<Item = CollisionBox> {
     let hand_in_tool = panda::tool_in_hand().inverse();
     let link_in_tool = hand_in_tool * panda::hand_in_link().inverse();
     let fingers = Side::BOTH.into_iter().flat_map(move |side| {

@@ -543,7 +543,7 @@ impl Episode {
         for _ in 0..steps_per_control(self.spec.settings.physics.dt) {
             self.physics_steps += 1;
             self.sim.step()?;
-            let stats = self.sim.world.stats();
+            let stats = self.sim.world.solver_stats();
             self.newton.total += u64::from(stats.newton_steps);
             self.newton.max = self.newton.max.max(stats.max_newton_steps);
             if let BodyId::Soft(index) = self.sim.objects[self.target].body {

@@ -89,7 +89,7 @@ impl StepTrace {
             slip_mm: contacts.map(|t| 1e3 * t.slip_distance),
             dropped,
             energy_j: [energy.kinetic, energy.elastic, energy.potential],
-            newton: sim.world.stats().newton_steps,
+            newton: sim.world.solver_stats().newton_steps,
             objects: (0..sim.objects.len())
                 .filter(|&i| sim.objects[i].body != BodyId::World)
                 .map(|i| object(sim, evidence, i, with_nodes))

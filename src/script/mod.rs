@@ -27,7 +27,7 @@ pub use run::{
 };
 pub use schema::Range;
 pub use vm::{
-    Limits, PrintSink,
+    PrintSink, VmLimits,
     error::ScriptError,
     library::{Bundle, embedded, embedded_scripts, sha256},
     set_stuck_handler,

@@ -35,7 +35,7 @@ pub(super) fn observation(config: &ServerConfig, first: &Observation) -> Value {
             ObservationEntry::Query(_) => return None,
             ObservationEntry::Text(_) => text(config),
             ObservationEntry::Array(array) => {
-                let high = largest(input);
+                let high = magnitude_bounds(input);
                 let low = match array.dtype.as_str() {
                     "|u1" | "<u2" => vec![0.0],
                     _ => high.iter().map(|x| -x).collect(),
@@ -86,7 +86,7 @@ fn array_space(dtype: &str, shape: &[usize], low: Vec<f64>, high: Vec<f64>) -> V
 }
 
 /// Largest magnitude of all elements, or of each.
-fn largest(input: &ProfileInput) -> Vec<f64> {
+fn magnitude_bounds(input: &ProfileInput) -> Vec<f64> {
     match &input.source {
         InputSource::State { parts } => {
             let one = parts.iter().flat_map(|part| vec![max_magnitude(*part); part.count()]);

@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::{
     DatasetError, StreamValues, TaskFile,
     card::DatasetCard,
-    demonstration::actions_stream,
+    demonstration::actions_stream_name,
     layout::{IMAGE_STREAMS, MANIFEST},
     manifest::{self, ManifestEntry},
 };
@@ -256,7 +256,7 @@ impl DemoCheck<'_> {
 
     /// Checks the actions in a grip code against the closures.
     fn check_grip_labels(&mut self, code: GripCode, actions: &[f64], binary: &[f64]) {
-        let name = actions_stream(code);
+        let name = actions_stream_name(code);
         let Some(labels) = self.report.take(self.file.array(self.demo, name)) else { return };
         let labels = labels.values;
         if labels.len() != actions.len() {

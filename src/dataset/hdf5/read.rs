@@ -11,7 +11,7 @@ use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group, Hdf5Error};
 use serde_json::Value;
 
 use super::{
-    super::{DataStream, DatasetError, Demonstration, StreamValues, demonstration::actions_stream},
+    super::{DataStream, DatasetError, Demonstration, StreamValues, demonstration::actions_stream_name},
     limits::{self, ListError},
 };
 use softvt_common::files::FileError;
@@ -355,7 +355,7 @@ impl TaskFile {
     /// The demonstration was not recorded by softvt, or the file is damaged.
     pub fn read(&self, demo: usize) -> Result<Demonstration, DatasetError> {
         let binary = self.array(demo, "actions_binary")?.values;
-        let forces = self.array(demo, actions_stream(GripCode::Force))?.values;
+        let forces = self.array(demo, actions_stream_name(GripCode::Force))?.values;
         let mut read = Demonstration {
             record: self.record(demo)?,
             actions: self.actions(demo)?,

@@ -9,7 +9,7 @@ use super::{
     selection::{ImageSize, SelectedDemo, Selection},
     statistics::{FeatureStatistics, QuantileSource, ValueCounts, ValueMoments, ValueStatistics},
 };
-use crate::{DatasetError, ImageBlock, TaskFile, demonstration::actions_stream, layout::IMAGE_STREAMS};
+use crate::{DatasetError, ImageBlock, TaskFile, demonstration::actions_stream_name, layout::IMAGE_STREAMS};
 use softvt_benchmark::CONTROL_HZ;
 use softvt_robot::tactile::IMAGE_SIZE;
 use softvt_sensing::{
@@ -62,7 +62,7 @@ impl<'a> EpisodeData<'a> {
             .chunks_exact_mut(VECTOR_LENGTH)
             .zip(widths)
             .for_each(|(row, width)| row[VECTOR_LENGTH - 1] = 0.5 * width);
-        let actions = reader.floats(actions_stream(config.gripper), &[VECTOR_LENGTH])?;
+        let actions = reader.floats(actions_stream_name(config.gripper), &[VECTOR_LENGTH])?;
         let markers = marker_rows(&reader.floats("obs/gripper_marker_motion", &[2, 2, MARKER_COUNT, 2])?);
         let images = reader.image_columns(config.version, selection.image_sizes, is_cancelled)?;
         let timestamps: Vec<f32> =

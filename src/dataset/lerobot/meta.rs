@@ -11,7 +11,7 @@ use super::{
     parquet_table::{ColumnType, ColumnValues, ParquetColumn, ParquetTable},
     selection::{SelectedDemo, Selection},
 };
-use crate::{DatasetError, demonstration::actions_stream};
+use crate::{DatasetError, demonstration::actions_stream_name};
 use softvt_benchmark::CONTROL_HZ;
 use softvt_common::files;
 use softvt_policy::profile::GripCode;
@@ -32,7 +32,7 @@ pub(super) fn write(
     let encoding = json!({
         "softvt": env!("CARGO_PKG_VERSION"),
         "gripper": config.gripper.name(),
-        "source": actions_stream(config.gripper),
+        "source": actions_stream_name(config.gripper),
     });
     files::write_json(&dir.join("meta/softvt.json"), &encoding)?;
     files::replace(&dir.join("README.md"), readme(config, selection, summary))?;

@@ -230,7 +230,7 @@ impl World {
     }
 
     /// Iteration counts of the last solve.
-    pub fn stats(&self) -> SolverStats {
+    pub fn solver_stats(&self) -> SolverStats {
         self.stats
     }
 

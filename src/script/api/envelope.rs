@@ -112,7 +112,7 @@ pub(crate) fn sample(
     let size = asset.shape.bounds().size();
     let state = |drawn: Option<&ObjectVariation>| instance_state(lua, &Instance { asset, size, drawn });
     let Some(ranges) = ranges else { return (0..count).map(|_| state(None)).collect() };
-    let drawn = draw(lua, |model_of| ranges.sample(suite, asset, count, model_of))?;
+    let drawn = draw(lua, |model_of| ranges.sample_instances(suite, asset, count, model_of))?;
     let drawn = drawn.map_err(|error| fail(lua, error.to_string()))?;
     drawn.iter().map(|one| state(Some(one))).collect()
 }

@@ -266,7 +266,7 @@ impl LuaWorld {
             let Inner { world, timing, .. } = inner;
             let dt = world.params.dt;
             inner.failed = timing.measure(dt, || world.step()).err();
-            let stats = inner.world.stats();
+            let stats = inner.world.solver_stats();
             inner.newton_total += u64::from(stats.newton_steps);
             inner.newton_max = inner.newton_max.max(stats.max_newton_steps);
         }

@@ -22,7 +22,7 @@ use crate::{
     },
     schema::{Constructed, FromChecked, HasTable, Record, RecordType, is_constructed, strict_table},
     vm::{
-        Limits, Vm,
+        Vm, VmLimits,
         error::{ScriptError, fail, fail_at},
         json::to_json,
         library::{Bundle, Library},
@@ -55,7 +55,7 @@ pub struct ScriptSources {
     /// Every file that was read.
     pub bundle: Arc<Bundle>,
     argv: Vec<String>,
-    limits: Limits,
+    limits: VmLimits,
 }
 
 impl ScriptSources {
@@ -65,7 +65,7 @@ impl ScriptSources {
         kind: ScriptKind,
         path: &Path,
         argv: &[String],
-        limits: &Limits,
+        limits: &VmLimits,
         convert: impl FnOnce(&ScriptInstance) -> Result<T, ScriptError>,
     ) -> Result<(Self, T), ScriptError> {
         let (library, main) = Library::open(path)?;
@@ -126,14 +126,14 @@ impl LoadedScript {
 /// # Errors
 /// If a file cannot be read, the script fails, or its options or its plan are invalid; the message names file and line.
 pub fn load(path: &Path, argv: &[String]) -> Result<LoadedScript, ScriptError> {
-    load_with(path, argv, &Limits::default())
+    load_with(path, argv, &VmLimits::default())
 }
 
 /// [`load`] within other limits.
 ///
 /// # Errors
 /// As [`load`].
-pub fn load_with(path: &Path, argv: &[String], limits: &Limits) -> Result<LoadedScript, ScriptError> {
+pub fn load_with(path: &Path, argv: &[String], limits: &VmLimits) -> Result<LoadedScript, ScriptError> {
     let (sources, (options, plan)) = ScriptSources::read(ScriptKind::Plan, path, argv, limits, |instance| {
         let options = lock(&instance.options).declared.clone();
         Ok((options, instance.plan().map_err(|e| instance.vm.explain(&e))?))
@@ -147,7 +147,7 @@ pub fn load_with(path: &Path, argv: &[String], limits: &Limits) -> Result<Loaded
 /// If the file cannot be read or is not Lua.
 pub fn declared_options(path: &Path) -> Result<Vec<OptionSpec>, ScriptError> {
     let (library, main) = Library::open(path)?;
-    let instance = ScriptInstance::new(&main, library, &[], &Limits::default())?;
+    let instance = ScriptInstance::new(&main, library, &[], &VmLimits::default())?;
     let outcome = instance.vm.run_main();
     let declared = lock(&instance.options).declared.clone();
     if declared.is_empty() { outcome.map(|_| declared) } else { Ok(declared) }
@@ -163,7 +163,7 @@ pub(crate) struct ScriptInstance {
 
 impl ScriptInstance {
     /// A virtual machine in which nothing has run yet.
-    fn new(main: &str, library: Library, argv: &[String], limits: &Limits) -> Result<Self, ScriptError> {
+    fn new(main: &str, library: Library, argv: &[String], limits: &VmLimits) -> Result<Self, ScriptError> {
         let vm = Vm::new(main, library, limits)?;
         let options = OptionSession::new(argv);
         install(&vm, &options).map_err(|e| vm.explain(&e))?;
@@ -175,7 +175,7 @@ impl ScriptInstance {
         main: &str,
         library: Library,
         argv: &[String],
-        limits: &Limits,
+        limits: &VmLimits,
         prepare: impl FnOnce(&Lua),
     ) -> Result<Self, ScriptError> {
         let mut instance = Self::new(main, library, argv, limits)?;

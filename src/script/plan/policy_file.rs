@@ -13,7 +13,7 @@ use crate::{
     },
     schema::{Constructed, FromChecked, RecordType, ValidationError, check::check},
     vm::{
-        Limits,
+        VmLimits,
         error::ScriptError,
         list::plain,
         source_map::{fail_at_key, origin_of_key},
@@ -55,14 +55,14 @@ impl PolicyFile {
     /// # Errors
     /// If the file cannot be read or does not return a valid policy; the message names file and line.
     pub fn load(path: &Path) -> Result<Self, ScriptError> {
-        Self::load_with(path, &Limits::default())
+        Self::load_with(path, &VmLimits::default())
     }
 
     /// [`PolicyFile::load`] within other limits.
     ///
     /// # Errors
     /// As [`PolicyFile::load`].
-    pub fn load_with(path: &Path, limits: &Limits) -> Result<Self, ScriptError> {
+    pub fn load_with(path: &Path, limits: &VmLimits) -> Result<Self, ScriptError> {
         let (sources, (spec, observes_at)) =
             ScriptSources::read(ScriptKind::Policy, path, &[], limits, |instance| {
                 let policy = instance.policy()?;

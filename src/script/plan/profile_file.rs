@@ -11,7 +11,7 @@ use super::{ScriptKind, ScriptSources};
 use crate::{
     api::policy::{ActionEncodingSpec, GripperValuesSpec, InputKind, InputSpec, PoseKind, ProfileSpec},
     schema::Constructed,
-    vm::{Limits, error::ScriptError, source_map::fail_at_key},
+    vm::{VmLimits, error::ScriptError, source_map::fail_at_key},
 };
 use softvt_policy::profile::{
     ActionEncoding, ActionUnits, GripCode, GripLatch, GripperValues, InputSource, PoseEncoding, Profile,
@@ -24,7 +24,7 @@ use softvt_policy::profile::{
 /// If the file cannot be read or does not return a valid profile; the message names file and line.
 pub fn load_profile(path: &Path) -> Result<(Profile, BTreeMap<String, String>), ScriptError> {
     let (sources, profile) =
-        ScriptSources::read(ScriptKind::Plan, path, &[], &Limits::default(), |instance| {
+        ScriptSources::read(ScriptKind::Plan, path, &[], &VmLimits::default(), |instance| {
             let spec = instance.expected_result("a profile's file");
             let profile =
                 spec.and_then(|spec| ProfileReader { lua: &instance.vm.lua, spec: &spec }.profile());

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, path::Path};
 use super::{LoadedScript, ScriptKind, ScriptSources};
 use crate::{
     api::tasks::VariationSpec,
-    vm::{Limits, error::ScriptError},
+    vm::{VmLimits, error::ScriptError},
 };
 use softvt_benchmark::{ObjectType, Plan, Suite, variation::VariationRanges};
 
@@ -18,7 +18,7 @@ pub const STANDARD_VARIATION: &str = "scripts/variations/standard.lua";
 /// If the file cannot be read or does not return a valid variation; the message names file and line.
 pub fn load_variation(path: &Path) -> Result<(VariationRanges, BTreeMap<String, String>), ScriptError> {
     let (sources, ranges) =
-        ScriptSources::read(ScriptKind::Plan, path, &[], &Limits::default(), |instance| {
+        ScriptSources::read(ScriptKind::Plan, path, &[], &VmLimits::default(), |instance| {
             let spec = instance.expected_result::<VariationSpec>("a variation's file");
             spec.map(|spec| spec.ranges()).map_err(|e| instance.vm.explain(&e))
         })?;

@@ -139,7 +139,7 @@ fn printed_text_is_limited() {
             "for i = 1, 4e4 do print(('x'):rep(100)) end print(('x'):rep(4e6)) error('end', 0)",
         )]),
     );
-    let limits = Limits {
+    let limits = VmLimits {
         print: Arc::new(move |text| {
             seen.fetch_add(text.len(), Ordering::SeqCst);
         }),
@@ -254,7 +254,7 @@ fn a_scene_holds_no_more_than_can_be_computed() {
         "for i = 1, 1e6 do scene:add { name = 'b' .. i, asset = ball, position = { 0, 0, 0 } } end scene:add { name",
     );
     let project = Project::new(&[("x.lua", &(crowd + "return suite()"))]);
-    let limits = Limits { call: Duration::from_secs(20), ..limits() };
+    let limits = VmLimits { call: Duration::from_secs(20), ..limits() };
     let loaded = project.load_with("x.lua", &[], &limits).unwrap();
     let id = EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };
     let error =
@@ -309,7 +309,7 @@ fn texts_that_are_shared_are_counted_each_time() {
         format!("local function many(x) local t = {{}} for i = 1, 2000 do t[i] = x end return t end\n{many}");
     for result in ["return suite()", "return many(suite())"] {
         let project = Project::new(&[("x.lua", &format!("{many}{result}"))]);
-        let limits = Limits { load: Duration::from_secs(20), memory_bytes: 64 << 20, ..limits() };
+        let limits = VmLimits { load: Duration::from_secs(20), memory_bytes: 64 << 20, ..limits() };
         let message = project.load_with("x.lua", &[], &limits).unwrap_err().to_string();
         let expected = match result {
             "return suite()" => "task.prompt: tasks 0 and 1 of suite \"test\" are both",

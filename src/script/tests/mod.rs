@@ -14,7 +14,7 @@ mod visuals;
 
 use std::{fs, path::PathBuf, sync::Arc, time::Duration};
 
-use super::{Limits, LoadedScript, ScriptError, load_with};
+use super::{LoadedScript, ScriptError, VmLimits, load_with};
 
 /// A temporary project folder.
 pub(super) struct Project(tempfile::TempDir);
@@ -44,7 +44,7 @@ impl Project {
         &self,
         path: &str,
         argv: &[&str],
-        limits: &Limits,
+        limits: &VmLimits,
     ) -> Result<LoadedScript, ScriptError> {
         let argv: Vec<String> = argv.iter().map(|word| word.to_string()).collect();
         load_with(&self.path(path), &argv, limits)
@@ -58,8 +58,8 @@ impl Project {
 }
 
 /// Short limits, and a watchdog without effect.
-pub(super) fn limits() -> Limits {
-    Limits {
+pub(super) fn limits() -> VmLimits {
+    VmLimits {
         memory_bytes: 16 << 20,
         load: Duration::from_millis(300),
         call: Duration::from_millis(300),

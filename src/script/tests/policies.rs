@@ -387,7 +387,7 @@ fn limits_and_materials_are_refused_to_a_policy_that_does_not_declare_them() {
     let load = |text: &str| {
         let project =
             Project::new(&[("p.lua", text), ("assets/own.lua", "return { body = { youngs_pa = 1 } }")]);
-        PolicyFile::load_with(&project.path("p.lua"), &Limits { load: Duration::from_secs(10), ..limits() })
+        PolicyFile::load_with(&project.path("p.lua"), &VmLimits { load: Duration::from_secs(10), ..limits() })
             .map(|file| file.privileged)
             .map_err(|error| (error.line, error.message))
     };
@@ -439,7 +439,7 @@ fn a_copy_of_a_hidden_module_is_refused_under_any_name() {
         #[cfg(unix)]
         std::os::unix::fs::symlink(project.path("scripts/strain_sources.lua"), project.path("link.lua"))
             .unwrap();
-        PolicyFile::load_with(&project.path("p.lua"), &Limits { load: Duration::from_secs(10), ..limits() })
+        PolicyFile::load_with(&project.path("p.lua"), &VmLimits { load: Duration::from_secs(10), ..limits() })
             .map(|file| file.privileged)
             .map_err(|error| error.to_string())
     };

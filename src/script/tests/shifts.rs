@@ -2,7 +2,7 @@
 
 use std::{path::Path, time::Duration};
 
-use crate::{EpisodeSetup, Limits, LoadedScript, SceneChanges, load_with};
+use crate::{EpisodeSetup, LoadedScript, SceneChanges, VmLimits, load_with};
 use softvt_benchmark::{Plan, ShiftValue};
 use softvt_common::episode_id::{EpisodeId, Split};
 use softvt_scene::{Body, Scene};
@@ -10,7 +10,7 @@ use softvt_scene::{Body, Scene};
 fn loaded(suite: &str) -> LoadedScript {
     // Builds without optimisation on a busy machine need longer than users do.
     let long = Duration::from_secs(120);
-    let limits = Limits { load: long, call: long, ..Limits::default() };
+    let limits = VmLimits { load: long, call: long, ..VmLimits::default() };
     load_with(Path::new(&format!("suites/{suite}.lua")), &[], &limits).expect("it loads")
 }
 

@@ -83,7 +83,7 @@ fn wrong_calls_get_messages_in_terms_of_the_lua_interface() {
     let project = Project::new(&[("x.lua", &script())]);
     let minute = Duration::from_secs(60);
     let limits =
-        crate::Limits { load: minute, call: minute, point: minute, memory_bytes: 128 << 20, ..limits() };
+        crate::VmLimits { load: minute, call: minute, point: minute, memory_bytes: 128 << 20, ..limits() };
     let loaded = project.load_with("x.lua", &[], &limits).unwrap();
     let rows = Experiment::open(&loaded).unwrap().run(0).unwrap();
     let folder = format!("{}/", project.path("").display()).replace("//", "/");

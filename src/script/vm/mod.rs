@@ -52,7 +52,7 @@ pub type PrintSink = Arc<dyn Fn(&str) + Send + Sync>;
 
 /// Resources of one virtual machine.
 #[derive(Clone)]
-pub struct Limits {
+pub struct VmLimits {
     /// Memory of Lua values, bytes.
     pub memory_bytes: usize,
     /// Lua time to load a script and make its plan.
@@ -68,9 +68,9 @@ pub struct Limits {
     pub print: PrintSink,
 }
 
-impl std::fmt::Debug for Limits {
+impl std::fmt::Debug for VmLimits {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Limits").field("memory_bytes", &self.memory_bytes).finish_non_exhaustive()
+        f.debug_struct("VmLimits").field("memory_bytes", &self.memory_bytes).finish_non_exhaustive()
     }
 }
 
@@ -83,7 +83,7 @@ pub fn set_stuck_handler(handler: OnStuck) {
     let _ = STUCK_HANDLER.set(handler);
 }
 
-impl Default for Limits {
+impl Default for VmLimits {
     /// 256 MiB; 10 s to load, 5 s per call, 60 s per point; `print` to standard error.
     fn default() -> Self {
         Self {
@@ -108,7 +108,7 @@ struct VmState {
     raised: Mutex<Option<RaisedObject>>,
     /// Bytes that `print` may still write.
     printable: AtomicUsize,
-    limits: Limits,
+    limits: VmLimits,
 }
 
 impl VmState {
@@ -151,7 +151,7 @@ pub(crate) struct Vm {
 
 impl Vm {
     /// A virtual machine that reads from `library`; errors without a position name the file `main`.
-    pub(crate) fn new(main: &str, library: Library, limits: &Limits) -> Result<Self, ScriptError> {
+    pub(crate) fn new(main: &str, library: Library, limits: &VmLimits) -> Result<Self, ScriptError> {
         let state = Arc::new(VmState {
             main: main.into(),
             library: Arc::new(Mutex::new(library)),
