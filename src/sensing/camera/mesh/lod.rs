@@ -3,10 +3,13 @@
 use std::collections::BTreeMap;
 
 use crate::camera::{
-    math::V3,
+    math::{LANES, V3},
     shade::{
         occlusion::self_visibility,
-        pattern::{METALNESS, MaterialSample, SKY_VISIBILITY, VisualSample, sample_visual},
+        pattern::{
+            METALNESS, MaterialSample, PatternPoint, PatternPoints, SKY_VISIBILITY, VisualSample,
+            sample_visual,
+        },
     },
 };
 use softvt_geometry::{Aabb, basis_from_reference, mesh::Mesh, shape::Shape, union_find::UnionFind};
@@ -143,21 +146,25 @@ pub(crate) fn bake_vertices(
     }
     let reach = OCCLUSION_REACH * extent(mesh);
     // Copies of a vertex share its material, so that nothing changes along a crease.
-    let mut known: BTreeMap<u32, VisualSample> = BTreeMap::new();
-    let sample = |i: usize| {
-        let (p, n) = (&positions[i], &normals[i]);
-        *known.entry(sources[i]).or_insert_with(|| {
-            let is_border = adjacent_ids[i].iter().any(|&id| id != adjacent_ids[i][0]);
-            let ids = match shape {
-                Some(shape) if is_border => material_ids_near(shape, p, n, spacing),
-                _ => adjacent_ids[i].clone(),
-            };
-            let mut sample = blend_visuals(ids, visuals, p, n, spacing);
-            sample.material[SKY_VISIBILITY] = shape.map_or(1.0, |shape| self_visibility(shape, p, n, reach));
-            sample
-        })
-    };
-    let samples: Vec<VisualSample> = (0..positions.len()).map(sample).collect();
+    let mut first_copies: BTreeMap<u32, usize> = BTreeMap::new();
+    (0..positions.len()).rev().for_each(|i| _ = first_copies.insert(sources[i], i));
+    let point = |&i: &usize| PatternPoint { p: positions[i], n: normals[i] };
+    let points: Vec<PatternPoint> = first_copies.values().map(point).collect();
+    let ids = first_copies.values().map(|&i| {
+        let ids = &adjacent_ids[i];
+        match shape {
+            Some(shape) if ids.iter().any(|&id| id != ids[0]) => {
+                material_ids_near(shape, &positions[i], &normals[i], spacing)
+            }
+            _ => ids.clone(),
+        }
+    });
+    let mut blended = blend_visuals(ids.collect(), visuals, &points, spacing);
+    for (sample, PatternPoint { p, n }) in blended.iter_mut().zip(&points) {
+        sample.material[SKY_VISIBILITY] = shape.map_or(1.0, |shape| self_visibility(shape, p, n, reach));
+    }
+    let by_source: BTreeMap<u32, VisualSample> = first_copies.into_keys().zip(blended).collect();
+    let samples: Vec<VisualSample> = sources.iter().map(|source| by_source[source]).collect();
     if samples.iter().any(|sample| sample.relief != 0.0) {
         positions.iter_mut().zip(&normals).zip(&samples).for_each(|((p, n), s)| *p += n * s.relief);
         normals = vertex_normals(&positions, &triangles);
@@ -200,16 +207,32 @@ fn material_ids_near(shape: &Shape, p: &V3, n: &V3, spacing: f32) -> Vec<u16> {
         .collect()
 }
 
-/// Averages the visuals of `ids`, by how often each occurs.
-fn blend_visuals(mut ids: Vec<u16>, visuals: &[Visual], p: &V3, n: &V3, spacing: f32) -> VisualSample {
-    let mut blend = VisualSample { material: MaterialSample::zeros(), relief: 0.0 };
-    let share = 1.0 / ids.len() as f32;
-    ids.sort_unstable();
-    for run in ids.chunk_by(|a, b| a == b) {
-        let VisualSample { material, relief } = sample_visual(&visuals[run[0] as usize], p, n, spacing);
-        let weight = share * run.len() as f32;
-        blend.material += material * weight;
-        blend.relief += relief * weight;
+/// The visuals of points, each averaged over the material ids of the point by how often each occurs.
+fn blend_visuals(
+    ids: Vec<Vec<u16>>,
+    visuals: &[Visual],
+    points: &[PatternPoint],
+    spacing: f32,
+) -> Vec<VisualSample> {
+    // The points that show each material, and the share that it has there.
+    let mut shown: BTreeMap<u16, Vec<(usize, f32)>> = BTreeMap::new();
+    for (index, mut ids) in ids.into_iter().enumerate() {
+        let share = 1.0 / ids.len() as f32;
+        ids.sort_unstable();
+        for run in ids.chunk_by(|a, b| a == b) {
+            shown.entry(run[0]).or_default().push((index, share * run.len() as f32));
+        }
     }
-    blend
+    let mut blends = vec![VisualSample { material: MaterialSample::zeros(), relief: 0.0 }; points.len()];
+    for (id, shares) in shown {
+        for some in shares.chunks(LANES) {
+            let at: Vec<PatternPoint> = some.iter().map(|&(index, _)| points[index]).collect();
+            sample_visual(&visuals[id as usize], &PatternPoints::new(&at), spacing, |lane, sample| {
+                let (index, weight) = some[lane];
+                blends[index].material += sample.material * weight;
+                blends[index].relief += sample.relief * weight;
+            });
+        }
+    }
+    blends
 }

@@ -16,7 +16,7 @@ use wide::{bytemuck::cast, i32x8, u32x8};
 use super::lod::{CreasedMesh, Lod};
 use crate::camera::{
     math::{LANES, V3, Vec3x8, approx_log2, f32x8},
-    shade::pattern::{self, METALNESS, MaterialSample, sample_visual},
+    shade::pattern::{self, METALNESS, MaterialSample, PatternPoint, PatternPoints, sample_visual},
 };
 use softvt_geometry::{mesh::Mesh, shape::Shape, union_find::UnionFind};
 use softvt_scene::Visual;
@@ -236,13 +236,21 @@ impl TextureChart {
     fn paint(&self) -> Vec<MipLevel> {
         let [width, height] = self.size;
         let mut texels: Vec<Texel> = match &self.source {
-            ChartSource::Flat(visual) => (0..width * height)
-                .map(|i| {
+            ChartSource::Flat(visual) => {
+                let point = |i: usize| {
                     let [x, y] = [(i % width) as f32 + 0.5, (i / width) as f32 + 0.5];
-                    let p = self.origin + (self.u * x + self.v * y) * self.texel;
-                    texel_of(&sample_visual(visual, &p, &self.n, self.texel).material)
-                })
-                .collect(),
+                    PatternPoint { p: self.origin + (self.u * x + self.v * y) * self.texel, n: self.n }
+                };
+                let mut texels = vec![Texel::default(); width * height];
+                for (block, some) in texels.chunks_mut(LANES).enumerate() {
+                    let at: Vec<PatternPoint> =
+                        (0..some.len()).map(|lane| point(LANES * block + lane)).collect();
+                    sample_visual(visual, &PatternPoints::new(&at), self.texel, |lane, sample| {
+                        some[lane] = texel_of(&sample.material);
+                    });
+                }
+                texels
+            }
             ChartSource::Curved { material, triangles } => self.paint_curved(material, triangles),
         };
         let mut size = self.size;
@@ -260,15 +268,34 @@ impl TextureChart {
             project_triangle(corners, corners.map(|c| self.uv(&c.position)), self.size, &mut points);
         }
         let SurfaceMaterial { shape, visuals } = material;
-        let texel = |point: &SurfacePoint| {
-            let p = &point.position;
-            let id = if visuals.len() > 1 { shape.material(&p.cast()) as usize } else { 0 };
-            let n = point.normal.try_normalize(0.0).unwrap_or_else(V3::z);
-            let default = Visual::default();
-            texel_of(&sample_visual(visuals.get(id).unwrap_or(&default), p, &n, self.texel).material)
-        };
-        fill_gaps(points.iter().map(|point| point.as_ref().map(texel)).collect(), self.size)
+        // The painted texels of each material.
+        let mut shown: BTreeMap<usize, Vec<PaintedTexel>> = BTreeMap::new();
+        for (index, point) in points.iter().enumerate() {
+            let Some(SurfacePoint { position, normal, .. }) = point else { continue };
+            let id = if visuals.len() > 1 { shape.material(&position.cast()) as usize } else { 0 };
+            let n = normal.try_normalize(0.0).unwrap_or_else(V3::z);
+            let point = PatternPoint { p: *position, n };
+            shown.entry(id).or_default().push(PaintedTexel { index, point });
+        }
+        let mut texels = vec![None; points.len()];
+        let default = Visual::default();
+        for (id, painted) in shown {
+            for some in painted.chunks(LANES) {
+                let at: Vec<PatternPoint> = some.iter().map(|texel| texel.point).collect();
+                let visual = visuals.get(id).unwrap_or(&default);
+                sample_visual(visual, &PatternPoints::new(&at), self.texel, |lane, sample| {
+                    texels[some[lane].index] = Some(texel_of(&sample.material));
+                });
+            }
+        }
+        fill_gaps(texels, self.size)
     }
+}
+
+/// A texel that shows a surface, and the point that it shows.
+struct PaintedTexel {
+    index: usize,
+    point: PatternPoint,
 }
 
 /// The components of a material that textures store.
@@ -473,7 +500,9 @@ mod tests {
         let mut counts = [0; 2];
         for (uvs, (t, &chart)) in lod.uvs.iter().zip(lod.triangles.iter().zip(&lod.chart_ids)) {
             let middle = t.iter().map(|&v| lod.positions[v as usize]).sum::<V3>() / 3.0;
-            let expected = sample_visual(&printed(), &middle, &middle.normalize(), 1e-3).material[0];
+            let mut expected = 0.0;
+            let at = PatternPoints::new(&[PatternPoint { p: middle, n: middle.normalize() }]);
+            sample_visual(&printed(), &at, 1e-3, |_, sample| expected = sample.material[0]);
             if (0.02..=0.98).contains(&expected) {
                 continue;
             }

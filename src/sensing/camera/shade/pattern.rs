@@ -2,7 +2,9 @@
 //!
 //! Noise comes from integer hashes, so that its bytes are the same on every machine.
 
-use crate::camera::math::V3;
+use wide::{bytemuck::cast, i32x8, u32x8};
+
+use crate::camera::math::{LANES, V3, Vec3x8, f32x8};
 use softvt_geometry::Vec3;
 use softvt_scene::{Mask, TextDecal, Visual};
 
@@ -24,28 +26,80 @@ pub(crate) struct VisualSample {
     pub(crate) relief: f32,
 }
 
+/// A point of a surface at which a visual is evaluated.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PatternPoint {
+    /// Position, object frame, m.
+    pub(crate) p: V3,
+    /// Unit normal.
+    pub(crate) n: V3,
+}
+
+/// Points of surfaces at which a visual is evaluated together.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PatternPoints {
+    /// Positions, object frame, m.
+    pub(crate) p: Vec3x8,
+    /// Unit normals.
+    pub(crate) n: Vec3x8,
+    /// Number of lanes that are used.
+    pub(crate) count: usize,
+}
+
+impl PatternPoints {
+    /// One to eight points; further lanes repeat the last one.
+    pub(crate) fn new(points: &[PatternPoint]) -> Self {
+        let lanes = |of: fn(&PatternPoint) -> V3| {
+            let component =
+                |axis: usize| std::array::from_fn(|lane| of(&points[lane.min(points.len() - 1)])[axis]);
+            Vec3x8::from_arrays(&[component(0), component(1), component(2)])
+        };
+        Self { p: lanes(|point| point.p), n: lanes(|point| point.n), count: points.len() }
+    }
+
+    /// The value of a function of position and normal in each lane.
+    fn each(&self, value: impl Fn(&V3, &V3) -> f32) -> f32x8 {
+        let (p, n) = (self.p.to_arrays(), self.n.to_arrays());
+        let lane = |of: &[[f32; LANES]; 3], lane: usize| V3::new(of[0][lane], of[1][lane], of[2][lane]);
+        let mut values = [0.0; LANES];
+        for (index, known) in values.iter_mut().enumerate().take(self.count) {
+            *known = value(&lane(&p, index), &lane(&n, index));
+        }
+        f32x8::new(values)
+    }
+}
+
 /// Depth below the surface at which patterns are evaluated, m: a face on the border of a pattern shows the inner side.
 const SAMPLE_DEPTH: f32 = 2e-5;
 
-/// Evaluates `visual` at the point `p` (object frame, m) of a surface with unit normal `n`.
+/// Evaluates `visual` at points of surfaces, and passes the sample of each lane to `take`.
 ///
 /// Details finer than `spacing` (m) along the surface are averaged.
-pub(crate) fn sample_visual(visual: &Visual, p: &V3, n: &V3, spacing: f32) -> VisualSample {
-    let p = &(p - n * SAMPLE_DEPTH);
+pub(crate) fn sample_visual(
+    visual: &Visual,
+    at: &PatternPoints,
+    spacing: f32,
+    mut take: impl FnMut(usize, VisualSample),
+) {
+    let at = &PatternPoints { p: at.p - at.n * f32x8::splat(SAMPLE_DEPTH), ..*at };
     let [r, g, b] = visual.albedo;
-    let mut material =
-        MaterialSample::from([r, g, b, visual.roughness, visual.metalness, 1.0].map(|x| x as f32));
-    let mut relief = 0.0;
+    let mut material = [r, g, b, visual.roughness].map(|x| f32x8::splat(x as f32));
+    let mut relief = f32x8::ZERO;
     for layer in &visual.layers {
-        let mask = mask_value(&layer.mask, p, n, spacing);
-        let alpha = mask * layer.opacity as f32;
+        let mask = mask_value(&layer.mask, at, spacing);
+        let alpha = mask * f32x8::splat(layer.opacity as f32);
         let [r, g, b] = layer.albedo;
         for (value, target) in material.iter_mut().zip([r, g, b, layer.roughness]) {
-            *value += (target as f32 - *value) * alpha;
+            *value += (f32x8::splat(target as f32) - *value) * alpha;
         }
-        relief += mask * layer.relief_m as f32;
+        relief += mask * f32x8::splat(layer.relief_m as f32);
     }
-    VisualSample { material, relief }
+    let (material, relief) = (material.map(f32x8::to_array), relief.to_array());
+    for lane in 0..at.count {
+        let [r, g, b, roughness] = material.map(|values| values[lane]);
+        let material = MaterialSample::from([r, g, b, roughness, visual.metalness as f32, 1.0]);
+        take(lane, VisualSample { material, relief: relief[lane] });
+    }
 }
 
 /// Size of the smallest feature of a visual, m; infinite if it has none.
@@ -86,36 +140,42 @@ pub(crate) fn has_text(visual: &Visual) -> bool {
     visual.layers.iter().any(|layer| mask_has_text(&layer.mask))
 }
 
-/// Value of a mask at `p`, 0..=1, averaged over about `spacing` along the surface.
-fn mask_value(mask: &Mask, p: &V3, n: &V3, spacing: f32) -> f32 {
+/// Values of a mask, 0..=1, averaged over about `spacing` along the surface.
+fn mask_value(mask: &Mask, at: &PatternPoints, spacing: f32) -> f32x8 {
+    let PatternPoints { p, n, .. } = at;
     // Length by which a step of `spacing` along the surface can advance in a direction at this cosine to the normal.
-    let footprint = |cosine: f32| spacing * (1.0 - cosine * cosine).max(0.0).sqrt();
+    let footprint =
+        |cosine: f32x8| (f32x8::ONE - cosine * cosine).fast_max(f32x8::ZERO).sqrt() * f32x8::splat(spacing);
+    let splat = |x: f64| f32x8::splat(x as f32);
     match mask {
-        Mask::Whole => 1.0,
+        Mask::Whole => f32x8::ONE,
         Mask::Checker { size_m } => {
-            let size = *size_m as f32;
+            let period = f32x8::splat(2.0 * *size_m as f32);
             // The product of three square waves of values ±1, each averaged over the footprint.
-            let wave =
-                |i: usize| 2.0 * pulse_wave(p[i] / (2.0 * size), 0.5, footprint(n[i]) / (2.0 * size)) - 1.0;
-            0.5 + 0.5 * wave(0) * wave(1) * wave(2)
+            let wave = |p: f32x8, n: f32x8| {
+                f32x8::splat(2.0) * pulse_wave(p / period, 0.5, footprint(n) / period) - f32x8::ONE
+            };
+            let half = f32x8::HALF;
+            half + half * wave(p.x, n.x) * wave(p.y, n.y) * wave(p.z, n.z)
         }
         Mask::Stripes { axis, pitch_m, share } => {
-            let pitch = *pitch_m as f32;
+            let pitch = splat(*pitch_m);
             pulse_wave(along(axis, p) / pitch, *share as f32, footprint(along(axis, n)) / pitch)
         }
         Mask::Gradient { axis, from_m, to_m } => {
-            smoothstep((along(axis, p) - *from_m as f32) / (*to_m - *from_m) as f32)
+            smoothstep((along(axis, p) - splat(*from_m)) / f32x8::splat((*to_m - *from_m) as f32))
         }
         Mask::Noise { size_m, octaves, from, to, seed } => {
             let size = size_m.map(|s| s as f32);
             let filter_width = spacing / size.iter().copied().fold(f32::INFINITY, f32::min).max(1e-6);
-            let scaled = std::array::from_fn(|i| p[i] / size[i]);
+            let [x, y, z] = size.map(f32x8::splat);
+            let scaled = Vec3x8 { x: p.x / x, y: p.y / y, z: p.z / z };
             let value = fractal_noise(scaled, *octaves, filter_width, *seed);
-            smoothstep((value - *from as f32) / (*to - *from) as f32)
+            smoothstep((value - splat(*from)) / f32x8::splat((*to - *from) as f32))
         }
         Mask::Rings { centre_m, pitch_m, wobble_m, seed } => {
             let (pitch, wobble) = (*pitch_m as f32, *wobble_m as f32);
-            rings(&(p - V3::from(centre_m.map(|c| c as f32))), pitch, wobble, spacing, *seed)
+            rings(*p - Vec3x8::splat(&V3::from(centre_m.map(|c| c as f32))), pitch, wobble, spacing, *seed)
         }
         Mask::Boards { length_m, width_m, seed } => board(p, *length_m as f32, *width_m as f32, *seed),
         Mask::Seams { length_m, width_m, gap_m } => {
@@ -125,92 +185,124 @@ fn mask_value(mask: &Mask, p: &V3, n: &V3, spacing: f32) -> f32 {
             specks(p, *spacing_m as f32, *radius_m as f32, spacing, *seed)
         }
         Mask::Weave { pitch_m } => weave(p, *pitch_m as f32, spacing),
-        Mask::Facing { axis, from, to } => smoothstep((along(axis, n) - *from as f32) / (*to - *from) as f32),
+        Mask::Facing { axis, from, to } => {
+            smoothstep((along(axis, n) - splat(*from)) / f32x8::splat((*to - *from) as f32))
+        }
         Mask::Inside { shape, soft_m } => {
             let width = (*soft_m as f32).max(spacing).max(1e-6);
-            smoothstep(0.5 - shape.distance(&p.cast()) as f32 / width)
+            smoothstep(f32x8::HALF - at.each(|p, _| shape.distance(&p.cast()) as f32) / f32x8::splat(width))
         }
-        Mask::Text { decal } => text_coverage(decal, p, n, spacing),
-        Mask::Inverse { mask } => 1.0 - mask_value(mask, p, n, spacing),
-        Mask::Product { masks } => masks.iter().map(|m| mask_value(m, p, n, spacing)).product(),
+        Mask::Text { decal } => at.each(|p, n| text_coverage(decal, p, n, spacing)),
+        Mask::Inverse { mask } => f32x8::ONE - mask_value(mask, at, spacing),
+        Mask::Product { masks } => {
+            let mut product = f32x8::ONE;
+            for mask in masks {
+                // What follows may be costly.
+                if product == f32x8::ZERO {
+                    break;
+                }
+                product *= mask_value(mask, at, spacing);
+            }
+            product
+        }
     }
 }
 
 /// Component of `p` along `axis`, which may have any length.
-fn along(axis: &[f64; 3], p: &V3) -> f32 {
+fn along(axis: &[f64; 3], p: &Vec3x8) -> f32x8 {
     let axis = V3::from(axis.map(|x| x as f32));
-    p.dot(&axis) / axis.norm().max(1e-9)
+    p.dot(Vec3x8::splat(&axis)) / f32x8::splat(axis.norm().max(1e-9))
 }
 
-fn smoothstep(t: f32) -> f32 {
-    let t = t.clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
+fn unit(t: f32x8) -> f32x8 {
+    t.fast_max(f32x8::ZERO).fast_min(f32x8::ONE)
+}
+
+fn smoothstep(t: f32x8) -> f32x8 {
+    let t = unit(t);
+    t * t * (f32x8::splat(3.0) - f32x8::splat(2.0) * t)
+}
+
+fn fraction(x: f32x8) -> f32x8 {
+    x - x.floor()
 }
 
 /// Mean over an interval of `width` around `x` of the wave of period 1 that is 1 on the first `duty` of each period.
-fn pulse_wave(x: f32, duty: f32, width: f32) -> f32 {
-    if width < 1e-5 {
-        return if x - x.floor() < duty { 1.0 } else { 0.0 };
-    }
-    let integral = |x: f32| x.floor() * duty + (x - x.floor()).min(duty);
-    ((integral(x + 0.5 * width) - integral(x - 0.5 * width)) / width).clamp(0.0, 1.0)
+fn pulse_wave(x: f32x8, duty: f32, width: f32x8) -> f32x8 {
+    let duty = f32x8::splat(duty);
+    let integral = |x: f32x8| x.floor() * duty + fraction(x).fast_min(duty);
+    let half = f32x8::HALF * width;
+    let mean = unit((integral(x + half) - integral(x - half)) / width);
+    let point = fraction(x).simd_lt(duty).select(f32x8::ONE, f32x8::ZERO);
+    width.simd_lt(f32x8::splat(1e-5)).select(point, mean)
 }
 
 /// Wood rings about the z axis: brightness grows slowly across a ring and falls sharply at its edge.
-fn rings(p: &V3, pitch: f32, wobble: f32, spacing: f32, seed: u32) -> f32 {
-    let scaled = [p.x / (8.0 * wobble), p.y / (8.0 * wobble), p.z / (40.0 * wobble)];
+fn rings(p: Vec3x8, pitch: f32, wobble: f32, spacing: f32, seed: u32) -> f32x8 {
+    let (across, along) = (f32x8::splat(8.0 * wobble), f32x8::splat(40.0 * wobble));
+    let scaled = Vec3x8 { x: p.x / across, y: p.y / across, z: p.z / along };
     let bend = fractal_noise(scaled, 2, 0.0, seed);
-    let phase = ((p.x * p.x + p.y * p.y).sqrt() + 2.0 * wobble * (bend - 0.5)) / pitch;
-    let t = phase - phase.floor();
-    let ring = if t < 0.85 { (t / 0.85).powi(3) } else { 1.0 - (t - 0.85) / 0.15 };
+    let wobbling = f32x8::splat(2.0 * wobble) * (bend - f32x8::HALF);
+    let t = fraction(((p.x * p.x + p.y * p.y).sqrt() + wobbling) / f32x8::splat(pitch));
+    let (edge, rise) = (f32x8::splat(0.85), t / f32x8::splat(0.85));
+    let fall = f32x8::ONE - (t - edge) / f32x8::splat(0.15);
+    let ring = t.simd_lt(edge).select(rise * rise * rise, fall);
     let fade = (2.0 - 2.0 * spacing / pitch).clamp(0.0, 1.0);
-    0.3 + (ring - 0.3) * fade
+    let mean = f32x8::splat(0.3);
+    mean + (ring - mean) * f32x8::splat(fade)
 }
 
 /// Position on a floor in units of its boards' length and width. Each row is shifted along x by a random fraction of
 /// the board length.
-fn board_position(p: &V3, length: f32, width: f32) -> [f32; 2] {
-    let y = p.y / width;
-    [p.x / length + cell_random([y.floor() as i32, 17, 5], 1)[0], y]
+fn board_position(p: &Vec3x8, length: f32, width: f32) -> [f32x8; 2] {
+    let y = p.y / f32x8::splat(width);
+    let shift = cell_random([cell(y), i32x8::splat(17), i32x8::splat(5)], 1)[0];
+    [p.x / f32x8::splat(length) + shift, y]
 }
 
 /// A random value per board.
-fn board(p: &V3, length: f32, width: f32, seed: u32) -> f32 {
-    let [column, row] = board_position(p, length, width).map(|x| x.floor() as i32);
-    cell_random([column, row, 3], seed)[1]
+fn board(p: &Vec3x8, length: f32, width: f32, seed: u32) -> f32x8 {
+    let [column, row] = board_position(p, length, width).map(cell);
+    cell_random([column, row, i32x8::splat(3)], seed)[1]
 }
 
-fn seams(p: &V3, length: f32, width: f32, gap: f32, spacing: f32) -> f32 {
-    let [x, y] = board_position(p, length, width).map(|x| x - x.floor());
-    let seam = |t: f32, period: f32| {
-        let d = t.min(1.0 - t) * period;
-        ((0.5 * gap + 0.5 * spacing - d) / spacing.max(1e-6)).clamp(0.0, 1.0).min(gap / spacing.max(gap))
+fn seams(p: &Vec3x8, length: f32, width: f32, gap: f32, spacing: f32) -> f32x8 {
+    let [x, y] = board_position(p, length, width).map(fraction);
+    let (reach, most) = (f32x8::splat(0.5 * gap + 0.5 * spacing), f32x8::splat(gap / spacing.max(gap)));
+    let seam = |t: f32x8, period: f32| {
+        let d = t.fast_min(f32x8::ONE - t) * f32x8::splat(period);
+        unit((reach - d) / f32x8::splat(spacing.max(1e-6))).fast_min(most)
     };
-    seam(x, length).max(seam(y, width))
+    seam(x, length).fast_max(seam(y, width))
 }
 
-/// Balls at jittered positions, one per cube of edge `cell`.
-fn specks(p: &V3, cell: f32, radius: f32, spacing: f32, seed: u32) -> f32 {
-    let own = p.map(|x| (x / cell).floor() as i32);
-    let mut value: f32 = 0.0;
+/// Balls at jittered positions, one per cube of edge `edge`.
+fn specks(p: &Vec3x8, edge: f32, radius: f32, spacing: f32, seed: u32) -> f32x8 {
+    let (edge, radius_x8) = (f32x8::splat(edge), f32x8::splat(radius));
+    let own = [p.x, p.y, p.z].map(|x| cell(x / edge));
+    let softness = f32x8::splat(spacing.max(0.15 * radius));
+    let mut value = f32x8::ZERO;
     for neighbour in 0..27 {
-        let lattice = [own.x + neighbour % 3 - 1, own.y + neighbour / 3 % 3 - 1, own.z + neighbour / 9 - 1];
+        let offset = [neighbour % 3 - 1, neighbour / 3 % 3 - 1, neighbour / 9 - 1];
+        let lattice: [i32x8; 3] = std::array::from_fn(|axis| own[axis] + i32x8::splat(offset[axis]));
         let jitter = cell_random(lattice, seed);
-        let centre = V3::from_fn(|i, _| (lattice[i] as f32 + jitter[i]) * cell);
-        let gap = (p - centre).norm() - radius;
-        value = value.max((0.5 - gap / spacing.max(0.15 * radius)).clamp(0.0, 1.0));
+        let [x, y, z] = std::array::from_fn(|axis| (f32x8::from_i32x8(lattice[axis]) + jitter[axis]) * edge);
+        let away = *p - Vec3x8 { x, y, z };
+        let gap = away.dot(away).sqrt() - radius_x8;
+        value = value.fast_max(unit(f32x8::HALF - gap / softness));
     }
     value
 }
 
 /// Plain weave in x and y: each thread is highest along its middle.
-fn weave(p: &V3, pitch: f32, spacing: f32) -> f32 {
-    let (u, v) = (p.x / pitch, p.y / pitch);
-    let is_warp_on_top = (u.floor() + v.floor()) as i32 & 1 == 0;
-    let across = if is_warp_on_top { v - v.floor() } else { u - u.floor() };
-    let thread = 4.0 * across * (1.0 - across);
+fn weave(p: &Vec3x8, pitch: f32, spacing: f32) -> f32x8 {
+    let [u, v] = [p.x, p.y].map(|x| x / f32x8::splat(pitch));
+    let parity = fraction((u.floor() + v.floor()) * f32x8::HALF);
+    let across = parity.simd_lt(f32x8::splat(0.25)).select(fraction(v), fraction(u));
+    let thread = f32x8::splat(4.0) * across * (f32x8::ONE - across);
     let fade = (2.0 - 2.0 * spacing / pitch).clamp(0.0, 1.0);
-    2.0 / 3.0 + (thread - 2.0 / 3.0) * fade
+    let mean = f32x8::splat(2.0 / 3.0);
+    mean + (thread - mean) * f32x8::splat(fade)
 }
 
 /// Minimum cosine between the normal of a printed surface and the direction of the text.
@@ -253,57 +345,69 @@ fn text_position(decal: &TextDecal, p: &Vec3, n: &V3) -> Option<[f64; 2]> {
 }
 
 /// Hashes three words to three words (`pcg3d` of Jarzynski & Olano, Hash Functions for GPU Rendering, JCGT 9(3), 2020).
-fn pcg3d(mut v: [u32; 3]) -> [u32; 3] {
-    let mix = |v: &mut [u32; 3]| {
-        v[0] = v[0].wrapping_add(v[1].wrapping_mul(v[2]));
-        v[1] = v[1].wrapping_add(v[2].wrapping_mul(v[0]));
-        v[2] = v[2].wrapping_add(v[0].wrapping_mul(v[1]));
+fn pcg3d(mut v: [u32x8; 3]) -> [u32x8; 3] {
+    let mix = |v: &mut [u32x8; 3]| {
+        v[0] += v[1] * v[2];
+        v[1] += v[2] * v[0];
+        v[2] += v[0] * v[1];
     };
-    v = v.map(|x| x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223));
+    v = v.map(|x| x * u32x8::splat(1_664_525) + u32x8::splat(1_013_904_223));
     mix(&mut v);
     v = v.map(|x| x ^ (x >> 16));
     mix(&mut v);
     v
 }
 
-/// Returns three pseudo-random numbers in 0..1 for a cell of the integer lattice.
-fn cell_random(cell: [i32; 3], seed: u32) -> [f32; 3] {
-    let word = |i: usize, salt: u32| (cell[i] as u32).wrapping_add(seed.wrapping_mul(salt));
+/// The integer below each number.
+fn cell(x: f32x8) -> i32x8 {
+    x.floor().fast_trunc_int()
+}
+
+/// Returns three pseudo-random numbers in 0..1 for cells of the integer lattice.
+fn cell_random(cell: [i32x8; 3], seed: u32) -> [f32x8; 3] {
+    let word = |i: usize, salt: u32| {
+        let own: u32x8 = cast(cell[i]);
+        own + u32x8::splat(seed.wrapping_mul(salt))
+    };
     let words = pcg3d([word(0, 0x9E37_79B9), word(1, 0x85EB_CA6B), word(2, 0xC2B2_AE35)]);
-    words.map(|w| (w >> 8) as f32 * (1.0 / 16_777_216.0))
+    words.map(|w| f32x8::from_i32x8(cast(w >> 8)) * f32x8::splat(1.0 / 16_777_216.0))
 }
 
 /// Value noise with features of unit size, 0..=1, mean 0.5: lattice values blended by quintics
 /// (Perlin, Improving Noise, 2002).
-fn value_noise(p: [f32; 3], seed: u32) -> f32 {
-    let cell = p.map(|x| x.floor() as i32);
-    let f: [f32; 3] = std::array::from_fn(|i| p[i] - cell[i] as f32);
-    let s = f.map(|t| t * t * t * (t * (t * 6.0 - 15.0) + 10.0));
+fn value_noise(p: Vec3x8, seed: u32) -> f32x8 {
+    let p = [p.x, p.y, p.z];
+    let own = p.map(cell);
+    let s = p.map(|x| {
+        let t = fraction(x);
+        t * t * t * (t * (t * f32x8::splat(6.0) - f32x8::splat(15.0)) + f32x8::splat(10.0))
+    });
     let corner = |c: usize| {
-        let lattice = std::array::from_fn(|axis| cell[axis].wrapping_add((c >> axis & 1) as i32));
+        let lattice = std::array::from_fn(|axis| own[axis] + i32x8::splat((c >> axis & 1) as i32));
         cell_random(lattice, seed)[0]
     };
-    let lerp = |a: f32, b: f32, t: f32| a + (b - a) * t;
-    let along_x: [f32; 4] = std::array::from_fn(|i| lerp(corner(2 * i), corner(2 * i + 1), s[0]));
+    let lerp = |a: f32x8, b: f32x8, t: f32x8| a + (b - a) * t;
+    let along_x: [f32x8; 4] = std::array::from_fn(|i| lerp(corner(2 * i), corner(2 * i + 1), s[0]));
     lerp(lerp(along_x[0], along_x[1], s[1]), lerp(along_x[2], along_x[3], s[1]), s[2])
 }
 
 /// Sums octaves of value noise, each half the size and weight of the previous one, 0..=1.
 ///
 /// Octaves finer than `filter_width` (in units of the coarsest feature) fade to their mean, which prevents aliasing.
-fn fractal_noise(p: [f32; 3], octaves: u32, filter_width: f32, seed: u32) -> f32 {
-    let (mut sum, mut weights) = (0.0, 0.0);
+fn fractal_noise(p: Vec3x8, octaves: u32, filter_width: f32, seed: u32) -> f32x8 {
+    let (mut sum, mut weights) = (f32x8::ZERO, 0.0);
     for octave in 0..octaves {
         let scale = (1_u32 << octave) as f32;
         let weight = 1.0 / scale;
         let fade = (2.0 - 2.0 * filter_width * scale).clamp(0.0, 1.0);
-        let noise =
-            if fade > 0.0 { value_noise(p.map(|x| x * scale), seed.wrapping_add(octave)) - 0.5 } else { 0.0 };
-        sum += weight * fade * noise;
+        if fade > 0.0 {
+            let noise = value_noise(p * f32x8::splat(scale), seed.wrapping_add(octave)) - f32x8::HALF;
+            sum += f32x8::splat(weight * fade) * noise;
+        }
         weights += weight;
     }
     // A sum of independent octaves varies less than one of them; the factor restores about the same spread.
-    (0.5 + 1.5 * sum / weights).clamp(0.0, 1.0)
+    unit(f32x8::HALF + f32x8::splat(1.5) * sum / f32x8::splat(weights))
 }
 
 #[cfg(test)]
@@ -315,7 +419,8 @@ mod tests {
     use softvt_scene::LabelLine;
 
     fn value(of: &Mask, p: [f32; 3], n: [f32; 3], spacing: f32) -> f32 {
-        mask_value(of, &p.into(), &n.into(), spacing)
+        mask_value(of, &PatternPoints::new(&[PatternPoint { p: p.into(), n: n.into() }]), spacing).to_array()
+            [0]
     }
 
     #[test]
