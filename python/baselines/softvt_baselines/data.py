@@ -165,7 +165,11 @@ def pack(recording: Path, edge: int, processes: int, has_tactile: bool = False) 
     identity = f"{PACKED} {hashlib.sha256(card.read_bytes()).hexdigest()}"
     streams = CAMERAS | TACTILE if has_tactile else CAMERAS
     folder = recording / (f"packed_{edge}_tactile" if has_tactile else f"packed_{edge}")
-    if (folder / "identity").is_file() and (folder / "identity").read_text() == identity:
+
+    def is_packed() -> bool:
+        return (folder / "identity").is_file() and (folder / "identity").read_text() == identity
+
+    if is_packed():
         return folder
     demos = _demonstrations(recording)
     if not demos:
@@ -176,11 +180,13 @@ def pack(recording: Path, edge: int, processes: int, has_tactile: bool = False) 
         part.mkdir()
         _write_packed(part, demos, edge, streams, processes)
         (part / "identity").write_text(identity)
+        if is_packed():  # by another process, which reads it by now
+            return folder
         shutil.rmtree(folder, ignore_errors=True)
         try:
             part.rename(folder)
         except OSError:
-            if not folder.is_dir():  # else another process was first
+            if not folder.is_dir():
                 raise
     return folder
 
