@@ -1,33 +1,13 @@
-//! Project folders with small scripts, in which the binary runs.
+//! The binary, as it runs in a project folder.
 
-use std::{fs, path::PathBuf, time::Duration};
+use std::time::Duration;
 
 use assert_cmd::{Command, cargo::cargo_bin_cmd};
-use serde_json::Value;
 
-/// `solids.lua` for small scenes: a floor, a slab, a cube that rests stably on it, and a function for others. For goals that
-/// are reached within a second: a shelf, the place of a cube on it that is between the open fingers at the start, and the
-/// motion that pushes the cube to the middle of the shelf.
-pub const SOLIDS: (&str, &str) = (
-    "solids.lua",
-    r#"
-local function solid(name, size, body)
-  return softvt.asset { name = name, shape = softvt.shape.box { size = size }:grounded(), body = body }
-end
-return {
-  solid = solid,
-  floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 2, 2, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} },
-  slab = solid("slab", { 0.1, 0.1, 0.02 }, softvt.static {}),
-  cube = solid("cube", { 0.04, 0.04, 0.04 }, softvt.rigid { density = 300 }),
-  shelf = solid("shelf", { 0.06, 0.3, 0.265 }, softvt.static {}),
-  shelf_at = { -0.187, -0.022, 0 }, cube_at = { -0.187, 0.012, 0.265 },
-  push = function(arm)
-    arm:move_by({ 0, -0.02, 0 }, { speed = 0.2 })
-    arm:move_by({ 0, 0.015, 0 }, { speed = 0.2 })
-  end,
-}
-"#,
-);
+#[path = "../project/mod.rs"]
+mod project;
+
+pub use project::{Project, SOLIDS, SPATIAL_SOFT, Small};
 
 /// Exit code and output of a command.
 pub struct CliOutput {
@@ -36,48 +16,14 @@ pub struct CliOutput {
     pub err: String,
 }
 
-/// A folder that is removed at the end of the test.
-pub struct Project(tempfile::TempDir);
-
 impl Project {
-    pub fn new(files: &[(&str, &str)]) -> Self {
-        let project = Self(tempfile::tempdir().expect("a folder"));
-        files.iter().for_each(|(path, text)| project.write(path, text.as_bytes()));
-        project
-    }
-
-    pub fn write(&self, path: &str, bytes: &[u8]) {
-        let path = self.path(path);
-        fs::create_dir_all(path.parent().expect("a folder above")).expect("made");
-        fs::write(path, bytes).expect("written");
-    }
-
-    pub fn path(&self, path: &str) -> PathBuf {
-        self.0.path().join(path)
-    }
-
-    pub fn text(&self, path: &str) -> String {
-        fs::read_to_string(self.path(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
-    }
-
-    pub fn json(&self, path: &str) -> Value {
-        serde_json::from_str(&self.text(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
-    }
-
-    /// Parses JSON lines. Every line must be complete.
-    pub fn lines(&self, path: &str) -> Vec<Value> {
-        let text = self.text(path);
-        assert!(text.is_empty() || text.ends_with('\n'), "{path} ends in a torn line");
-        text.lines().map(|line| serde_json::from_str(line).expect("a line of JSON")).collect()
-    }
-
     pub fn softvt(&self, words: &str) -> CliOutput {
         run_command(self.command(words))
     }
 
     pub fn command(&self, words: &str) -> Command {
         let mut command: Command = cargo_bin_cmd!("softvt");
-        command.current_dir(self.0.path()).args(words.split_whitespace()).timeout(Duration::from_secs(110));
+        command.current_dir(self.path("")).args(words.split_whitespace()).timeout(Duration::from_secs(110));
         command
     }
 
@@ -115,54 +61,3 @@ pub fn refusal(output: CliOutput, words: &str) -> String {
     let (_, message) = err.rsplit_once("softvt: ").unwrap_or_else(|| panic!("no message: {err:?}"));
     message.trim_end().to_owned()
 }
-
-/// A suite of one soft cube on a floor, with replaceable parts.
-pub struct Small {
-    pub shape: &'static str,
-    pub material: &'static str,
-    pub at: &'static str,
-    pub task: &'static str,
-    pub expert: &'static str,
-}
-
-impl Default for Small {
-    fn default() -> Self {
-        Self {
-            shape: "softvt.shape.box { size = { 0.04, 0.04, 0.04 } }:grounded()",
-            material: "youngs_pa = 2e4, poisson = 0.3, density = 300",
-            at: "at = { 0, 0.1 }",
-            task: "budget_steps = 40",
-            expert: "arm:wait(1)",
-        }
-    }
-}
-
-impl Small {
-    /// Line 2 is the shape, 3 the material, 6 the place, 11 the task, 12 the expert.
-    pub fn text(&self) -> String {
-        let Self { shape, material, at, task, expert } = self;
-        format!(
-            r#"local floor = softvt.asset {{ name = "floor", shape = softvt.shape.box {{ size = {{ 1, 1, 0.05 }} }}:translate(0, 0, -0.025), body = softvt.static {{}} }}
-local shape = {shape}
-local cube = softvt.asset {{ name = "cube", shape = shape, body = softvt.soft {{ {material} }} }}
-local layout = softvt.layout("one", function(scene)
-  scene:add {{ name = "floor", asset = floor, position = {{ 0, 0, 0 }} }}
-  scene:add {{ name = "cube", asset = cube, {at} }}
-  scene:add {{ name = "post", asset = floor, position = {{ 0, 2, 0 }} }}
-end)
-return softvt.suite {{ name = "one", object_type = "deformable", variation = "spatial", episodes = 1, tasks = {{
-  softvt.task {{ prompt = "wait", layout = layout, goal = softvt.on {{ object = "cube", target = "post" }},
-    {task},
-    expert = function(arm, scene) {expert} end }},
-}} }}
-"#
-        )
-    }
-
-    pub fn project(&self) -> Project {
-        Project::new(&[("x.lua", &self.text())])
-    }
-}
-
-/// A suite that is embedded in the binary.
-pub const SPATIAL_SOFT: &str = "suites/spatial_soft.lua";
