@@ -3,7 +3,8 @@
 
 use std::{
     collections::BTreeSet,
-    process::{Command, Stdio},
+    io::{BufRead, BufReader, Read},
+    process::{ChildStderr, Command, Stdio},
     thread::sleep,
     time::{Duration, Instant},
 };
@@ -63,20 +64,21 @@ end }
 #[test]
 fn an_interrupted_experiment_prints_its_rows() {
     let project = Project::new(&[("x.lua", SLOW)]);
-    let child = Command::new(cargo_bin!("softvt"))
+    let mut child = Command::new(cargo_bin!("softvt"))
         .current_dir(project.path(""))
         .args(["x.lua", "--threads", "2", "--json"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .expect("started");
-    sleep(Duration::from_secs(2));
+    let mut messages = await_message(child.stderr.take().expect("messages"), "[1/100]", 1);
     let start = Instant::now();
     let killed = Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill runs");
     assert!(killed.success());
     let output = child.wait_with_output().expect("output");
     assert!(start.elapsed() < Duration::from_secs(10), "it took {:?}", start.elapsed());
-    let err = String::from_utf8(output.stderr).expect("text");
+    let mut err = String::new();
+    messages.read_to_string(&mut err).expect("text");
     assert_eq!(output.status.code(), Some(130), "{err}");
     assert_eq!(String::from_utf8(output.stdout).expect("text"), "{\"i\":1}\n");
     assert!(err.contains("interrupted; the rows of 1 of 100 points"), "{err}");
@@ -87,10 +89,13 @@ fn errors_before_an_interrupt_keep_their_exit_code() {
     // The second task fails at once, the first runs for long.
     let text = Small { task: "budget_steps = 100000", ..Small::default() }.text();
     let (suite, task) = text.trim_end().trim_end_matches("} }").split_once("  softvt.task").expect("a task");
-    let failing = task.replace("arm:wait(1)", "arm:wait_for_ever()").replace("\"wait\"", "\"fail\"");
+    let failing =
+        task.replace("arm:wait(1)", "print('begun') arm:wait_for_ever()").replace("\"wait\"", "\"fail\"");
     let both = format!("{suite}  softvt.task{task}  softvt.task{failing}}} }}");
     let project = Project::new(&[("x.lua", &both)]);
-    let (code, _, err) = interrupted(&project, &["x.lua", "--threads", "2", "--out", "run"], 6.0);
+    // The run tells nothing of the error before its end.
+    let line = ["x.lua", "--threads", "2", "--out", "run"];
+    let (code, _, err) = interrupted(&project, &line, 1, Duration::from_secs(1));
     assert_eq!(code, Some(2), "{err}");
     assert!(err.contains("unknown key \"wait_for_ever\""), "{err}");
 }
@@ -104,27 +109,45 @@ fn await_lines(project: &Project, count: usize) {
     }
 }
 
-/// Starts softvt, waits until it runs, sends a signal, and returns exit code, duration and messages.
-fn interrupted(project: &Project, words: &[&str], work_s: f64) -> (Option<i32>, Duration, String) {
-    let child = Command::new(cargo_bin!("softvt"))
+/// Reads messages until `count` of them contain `part`. Returns those that follow.
+fn await_message(err: ChildStderr, part: &str, count: usize) -> BufReader<ChildStderr> {
+    let (mut messages, mut before) = (BufReader::new(err), String::new());
+    while before.matches(part).count() < count {
+        assert_ne!(messages.read_line(&mut before).expect("text"), 0, "it ended: {before}");
+    }
+    messages
+}
+
+/// Starts softvt, waits until scripts have printed "begun" `count` times, and for `longer`, and sends a signal. Returns exit
+/// code, time from the signal to the end, and the messages of that time.
+fn interrupted(
+    project: &Project,
+    words: &[&str],
+    count: usize,
+    longer: Duration,
+) -> (Option<i32>, Duration, String) {
+    let mut child = Command::new(cargo_bin!("softvt"))
         .current_dir(project.path(""))
         .args(words)
-        .stdout(Stdio::piped())
+        .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()
         .expect("started");
-    sleep(Duration::from_secs_f64(work_s));
+    let mut messages = await_message(child.stderr.take().expect("messages"), "begun", count);
+    sleep(longer);
     let start = Instant::now();
     let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
     assert!(killed.success());
-    let output = child.wait_with_output().expect("output");
-    (output.status.code(), start.elapsed(), String::from_utf8(output.stderr).expect("text"))
+    let mut err = String::new();
+    messages.read_to_string(&mut err).expect("text");
+    (child.wait().expect("ended").code(), start.elapsed(), err)
 }
 
 /// Defines `step_for_ever()`, which spends nearly all its time in the physics.
 const STEPS: &str = r#"local function step_for_ever()
   local world = softvt.world { sleeping = false, gravity = { 0, 0, 0 } }
   world:soft { name = "cube", shape = softvt.shape.box { size = { 0.05, 0.05, 0.05 } }, body = softvt.soft { youngs_pa = 3e4, poisson = 0.4, density = 300 }, position = { 0, 0, 1 } }
+  print("begun")
   while true do pcall(world.step, world) end
 end
 "#;
@@ -132,24 +155,27 @@ end
 #[test]
 fn scripts_end_soon_after_an_interrupt() {
     // Endless loading, a calibration, and a library function that never returns.
-    let stuck = "return string.find(('a'):rep(40), ('.-'):rep(40) .. 'b')";
+    let stuck = "print('begun') return string.find(('a'):rep(40), ('.-'):rep(40) .. 'b')";
     let physics = format!("{STEPS}step_for_ever()");
     let laying_out =
         Small::default().text().replace("function(scene)\n", "function(scene)\nstep_for_ever()\n");
     let laying_out = format!("{STEPS}{laying_out}");
     let simulating = "return softvt.experiment { name = 'e', grid = { a = { 1 } }, run = function()\n\
          local sim = softvt.simulate { layout = softvt.layout('l', function() end) }\n\
+         print('begun')\n\
          while true do pcall(sim.wait, sim, 600) end\nend }";
-    for (name, text, words, work_s) in [
-        ("loading", "while true do end", vec!["x.lua"], 0.5),
-        ("calibrating", "return 1", vec!["scripts/calibrate.lua", "--asset", "sesame_bun"], 3.0),
-        ("stuck", stuck, vec!["x.lua"], 0.5),
-        ("loading physics", &physics, vec!["x.lua"], 1.0),
-        ("laying out with physics", &laying_out, vec!["x.lua", "--out", "run"], 1.0),
-        ("simulating", simulating, vec!["x.lua"], 2.0),
+    // It prints when it is loaded, and when a thread opens it.
+    let calibrating = format!("print('begun') {}", include_str!("../../scripts/calibrate.lua"));
+    for (name, text, words, count) in [
+        ("loading", "print('begun') while true do end", vec!["x.lua"], 1),
+        ("calibrating", &calibrating, vec!["x.lua", "--asset", "sesame_bun"], 2),
+        ("stuck", stuck, vec!["x.lua"], 1),
+        ("loading physics", &physics, vec!["x.lua"], 1),
+        ("laying out with physics", &laying_out, vec!["x.lua", "--out", "run"], 1),
+        ("simulating", simulating, vec!["x.lua"], 1),
     ] {
         let project = Project::new(&[("x.lua", text)]);
-        let (code, took, err) = interrupted(&project, &words, work_s);
+        let (code, took, err) = interrupted(&project, &words, count, Duration::ZERO);
         assert_eq!(code, Some(130), "{name}: {err}");
         // The library function ends only with the process, three seconds after the signal; a busy machine takes longer.
         assert!(took < Duration::from_secs(8), "{name}: {took:?}");
