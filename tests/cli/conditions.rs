@@ -1,27 +1,15 @@
-//! Conditions: each suite unchanged and under each condition, compared episode by episode.
-
-use std::{
-    fs,
-    path::{Path, PathBuf},
-    time::Duration,
-};
+//! Conditions: what is printed of them, checked and listed.
 
 use serde_json::Value;
 
-use crate::support::{Project, Small, run_command};
+use crate::support::{Project, Small};
 
 /// The small suite with shifts, under the given conditions.
-fn project(conditions: &str, object_type: &str) -> Project {
+fn project(conditions: &str) -> Project {
     let small = Small { expert: "arm:close_to(1, { rate = 2 })", ..Small::default() };
     let shifts = "local shifts = require \"shifts\"\n";
     let declared = "shifts = shifts.soft, episodes = 2,";
-    let mut text = small
-        .text()
-        .replacen("episodes = 1,", declared, 1)
-        .replace("\"deformable\"", &format!("\"{object_type}\""));
-    if object_type == "rigid" {
-        text = text.replace("softvt.soft { youngs_pa = 2e4, poisson = 0.3,", "softvt.rigid {");
-    }
+    let text = small.text().replacen("episodes = 1,", declared, 1);
     let plan = format!(
         "return softvt.conditions {{ name = \"trial\", suites = {{ require \"suites.one\" }}, conditions = {{\n{conditions}\n}} }}\n"
     );
@@ -34,102 +22,26 @@ const THREE: &str = "{ name = \"heavy x2\", shift = { mass = 2 } },
   { name = \"weak\", set = { [\"robot.gripper.effort\"] = 3 } },";
 
 #[test]
-fn each_condition_is_a_run_of_the_same_episodes() {
-    let project = project(THREE, "deformable");
+fn the_comparison_is_printed_as_a_table_and_as_json() {
+    let project = project(THREE);
     let output = project.succeeds("suites/trial.lua --policy noop --out run");
-    let rows: Vec<&str> = output.out.lines().filter(|line| !line.starts_with('─')).collect();
-    let starts: Vec<&str> = rows.iter().map(|row| row.split("  ").next().unwrap_or_default()).collect();
-    assert_eq!(
-        starts[1..7],
-        ["condition", "reference", "heavy x2", "same", "hard", "weak"],
-        "{}",
-        output.out
-    );
-    assert!(output.out.lines().all(|line| line.chars().count() <= 100), "{}", output.out);
     let (_, against) = output.out.split_once("change from the reference").expect("a second table");
     assert!(against.contains("95 % interval") && against.contains("\nheavy x2"), "{}", output.out);
-    let alone = project.succeeds("suites/one.lua --policy noop --shift mass=2 --out alone");
-    assert!(!alone.out.is_empty());
-    assert_eq!(project.text("run/heavy_x2/episodes.jsonl"), project.text("alone/episodes.jsonl"));
-    let settings = |path: &str| project.json(path)["settings"]["robot"]["gripper"]["effort"].clone();
-    assert_eq!(settings("run/weak/run.json"), 3.0);
-    assert_ne!(settings("run/reference/run.json"), 3.0);
+    assert!(output.err.ends_with("run/conditions.json\n"), "{}", output.err);
+    let printed = project.succeeds("suites/trial.lua --policy noop --out json --json").out;
+    assert_eq!(project.json("json/conditions.json"), serde_json::from_str::<Value>(&printed).expect("JSON"));
 }
 
 #[test]
-fn the_comparison_is_written_and_light_alone_changes_no_result() {
-    let project = project(THREE, "deformable");
-    let output = project.succeeds("suites/trial.lua --policy noop --out run --json");
-    let document = project.json("run/conditions.json");
-    assert_eq!(document, serde_json::from_str::<Value>(&output.out).expect("JSON"));
-    let suite = &document["suites"][0];
-    assert_eq!((&suite["suite"], &document["policy"]), (&Value::from("one"), &Value::from("noop")));
-    let rows = suite["rows"].as_array().expect("rows");
-    let names: Vec<&str> = rows.iter().filter_map(|row| row["condition"].as_str()).collect();
-    assert_eq!(names, ["reference", "heavy x2", "same", "hard", "weak"]);
-    assert!(rows[0]["outcome"]["paired"].is_null());
-    let same = &rows[2]["outcome"];
-    let goal = &same["paired"]["goal"];
-    assert_eq!((&goal["better"], &goal["worse"], &goal["same"]), (&0.into(), &0.into(), &2.into()));
-    assert_eq!((&goal["difference"], goal["interval95"].as_array().map(Vec::len)), (&0.0.into(), Some(2)));
-    assert_eq!(project.text("run/same/episodes.jsonl"), project.text("run/reference/episodes.jsonl"));
-    assert_ne!(project.text("run/heavy_x2/episodes.jsonl"), project.text("run/reference/episodes.jsonl"));
-}
-
-#[test]
-fn conditions_without_effect_are_reported_and_not_run() {
-    let project = project(THREE, "rigid");
-    let output = project.succeeds("suites/trial.lua --policy noop --out run");
-    let row = output.out.lines().find(|line| line.starts_with("hard  ")).expect("a row");
-    assert!(row.split_whitespace().skip(1).all(|cell| cell == "N/A"), "{row}");
-    assert!(
-        output.out.contains("hard: N/A, it applies to suites of deformable objects only"),
-        "{}",
-        output.out
-    );
-    assert!(!project.path("run/hard").exists() && project.path("run/weak/summary.json").exists());
-    let twin = self::project(THREE, "deformable");
-    twin.succeeds("suites/trial.lua --policy noop --twin rigid --out run");
-    assert!(!twin.path("run/hard").exists());
-}
-
-#[test]
-fn invalid_conditions_are_reported_before_anything_runs() {
-    let refused = |conditions: &str| {
-        let project = project(conditions, "deformable");
-        let message = project.refusal("suites/trial.lua --policy noop --out run");
-        assert!(!project.path("run").exists(), "{message}");
-        message
-    };
-    for (conditions, expected) in [
-        ("", "suites/trial.lua:1: conditions.conditions: expected at least one, got an empty list"),
-        (
-            "{ name = \"a\", shift = { mas = 2 } }",
-            "suites/trial.lua: --shift: unknown shift \"mas\"; did you mean \"mass\"? (suite one, condition \"a\")",
-        ),
-        (
-            "{ name = \"a\", set = { [\"robot.gripper.efort\"] = 2 } }",
-            "suites/trial.lua:1: condition \"a\": set: no setting \"robot.gripper.efort\"",
-        ),
-        ("{ name = \"a\", shift = { mass = -1 } }", "shift mass: expected a number in 0.01..100"),
-        ("{ name = \"a\" },\n{ name = \"a\" }", "is the name of another condition; give another"),
-        ("{ name = \"reference\" }", "\"reference\" is the name of the unchanged run; give another"),
-        ("{ name = \"a b\" },\n{ name = \"a_b\" }", "share the folder a_b; rename one"),
-        ("{ name = \"a\", mass = 2 }", "unknown key \"mass\""),
-    ] {
-        let message = refused(conditions);
-        assert!(message.contains(expected), "{message}");
-    }
-    let project = project(THREE, "deformable");
-    project.write("run/weak/summary.json", b"{}");
-    let message = project.refusal("suites/trial.lua --policy noop --out run");
-    assert!(message.contains("run/weak already holds a run"), "{message}");
-    assert!(!project.path("run/reference").exists());
+fn policies_are_printed_side_by_side() {
+    let project = project("{ name = \"other\", policy = \"noop\" },");
+    let printed = project.succeeds("suites/trial.lua --out run").out;
+    assert!(printed.contains("controller") && !printed.contains("change from the reference"), "{printed}");
 }
 
 #[test]
 fn conditions_are_checked_and_listed() {
-    let project = project(THREE, "deformable");
+    let project = project(THREE);
     let output = project.succeeds("check suites/trial.lua");
     assert!(output.out.contains("conditions: reference, heavy x2, same, hard, weak\n"), "{}", output.out);
     let output = project.succeeds("list suites --json");
@@ -154,86 +66,4 @@ fn conditions_are_checked_and_listed() {
         (&Value::from(10), &Value::from("suites/shifts.lua"))
     );
     assert!(project.succeeds("check suites/shifts.lua --suite one").out.contains("mass x1.75"));
-}
-
-/// The shipped files that return conditions, by their paths in the repository.
-fn shipped() -> Vec<String> {
-    fn collect(folder: &Path, found: &mut Vec<PathBuf>) {
-        for entry in fs::read_dir(folder).expect("a folder") {
-            let path = entry.expect("an entry").path();
-            match path.is_dir() {
-                true => collect(&path, found),
-                false => found.push(path),
-            }
-        }
-    }
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut files = Vec::new();
-    ["suites", "scripts"].iter().for_each(|folder| collect(&root.join(folder), &mut files));
-    let has_conditions = |path: &PathBuf| {
-        path.extension().is_some_and(|extension| extension == "lua")
-            && fs::read_to_string(path).is_ok_and(|text| text.contains("softvt.conditions {"))
-    };
-    let relative = |path: &PathBuf| path.strip_prefix(root).expect("below").display().to_string();
-    files.iter().filter(|path| has_conditions(path)).map(relative).collect()
-}
-
-#[test]
-fn every_shipped_list_of_conditions_can_be_checked() {
-    let files = shipped();
-    assert!(files.len() >= 2 && files.contains(&"suites/shifts.lua".to_owned()), "{files:?}");
-    let project = Project::new(&[]);
-    for file in files {
-        // The names of all lists that the file knows.
-        let help = project.succeeds(&format!("{file} --help")).out;
-        let lists = help.split_once("--conditions").map(|(_, text)| {
-            let (_, choices) = text.split_once("one of ").unwrap_or_else(|| panic!("{file}: {help}"));
-            choices.split(['\n', ')', ';']).next().unwrap_or_default().replace(", ", ",")
-        });
-        let flag = lists.map_or(String::new(), |lists| format!(" --conditions {lists}"));
-        assert!(file != "suites/shifts.lua" || flag.contains("perturbations"), "{flag}: {help}");
-        let mut command = project.command(&format!("check {file}{flag}"));
-        command.timeout(Duration::from_secs(600));
-        let output = run_command(command);
-        assert_eq!(output.code, 0, "{file}{flag}\n{}", output.err);
-    }
-    // The option of suites/shifts.lua names all lists of scripts/shifts.lua.
-    project.write(
-        "all.lua",
-        b"for key, list in pairs(require 'shifts') do
-  local is_list = #list > 0 and not rawget(list[1], 'apply')
-  assert(not is_list or key == 'conditions' or key == 'all_objects' or key == 'perturbations', key)
-end
-return softvt.experiment { name = 'all', grid = { a = { 1 } }, run = function() return {} end }",
-    );
-    project.succeeds("check all.lua");
-}
-
-#[test]
-fn whole_numbers_of_settings_are_named_by_their_field() {
-    let project = project("{ name = \"late\", set = { [\"robot.latency\"] = 4 / 2 } }", "deformable");
-    project.succeeds("check suites/trial.lua");
-    let trial = project.text("suites/trial.lua");
-    let refused = |value: &str| {
-        project.write("suites/trial.lua", trial.replace("4 / 2", value).as_bytes());
-        project.refusal("check suites/trial.lua")
-    };
-    assert_eq!(
-        refused("2.5"),
-        "suites/trial.lua:1: condition \"late\": set: robot.latency: expected a whole number of control steps, got \"2.5\""
-    );
-    let suite = project.text("suites/one.lua");
-    let settings = |value: &str| {
-        let declared = format!("settings = {{ robot = {{ latency = {value} }} }}, episodes = 2,");
-        project.write("suites/one.lua", suite.replacen("episodes = 2,", &declared, 1).as_bytes());
-    };
-    settings("6 / 3");
-    project.succeeds("check suites/one.lua");
-    settings("2.5");
-    let message = project.refusal("check suites/one.lua");
-    assert!(
-        message
-            .contains("suite.settings.robot.latency: expected a whole number of control steps, got \"2.5\""),
-        "{message}"
-    );
 }

@@ -60,6 +60,7 @@ fn settings_and_seed_reach_the_simulations_of_an_experiment() {
             "--shift mass=2",
             "--shift: applies to suites, lists of suites, conditions, and this file is an experiment",
         ),
+        ("--vary", "--vary: applies to suites, lists of suites, conditions, and this file is an experiment"),
     ] {
         let refused = project.refusal(&format!("x.lua {words}"));
         assert!(refused.contains(part), "{refused}");

@@ -234,45 +234,6 @@ fn run_files_record_sources_and_thresholds() {
     assert!(run["thresholds"]["sesame_bun"].as_f64().is_some_and(|tau| tau > 0.0));
 }
 
-/// A suite with a soft cube that has the name of a calibrated object, and the calibration of that object.
-fn impostor(fingerprint: &str) -> Project {
-    let project = Small::default().project();
-    let file = format!(
-        r#"{{"schema_version":1,"protocol_id":"softvtbench-v1","metric_id":"fem_rms_rigid_aligned_bbox_pct_v1",
-        "calibration":{{"method":"compression_sweep","definition":"d","kappa":0.5,"sources":[],"generated_at":"x"}},
-        "thresholds":{{"cube":{{"tau":1.0,"d_ref":2.0,"kappa":0.5,"n_stable_trials":3}}}},
-        "fingerprints":{{"cube":"{fingerprint}"}}}}"#
-    );
-    project.write("assets/calibration/cube.json", file.as_bytes());
-    project
-}
-
-#[test]
-fn limits_of_other_versions_are_ignored() {
-    let output = impostor("0123456789abcdef").succeeds("x.lua --policy noop --out run");
-    assert!(
-        output.err.contains("assets/calibration/cube.json was computed for a different version of \"cube\""),
-        "{}",
-        output.err
-    );
-    let script = r#"return softvt.experiment { name = "who", grid = { x = { 1 } }, run = function()
-  local cube = softvt.asset { name = "cube", shape = softvt.shape.box { size = { 0.04, 0.04, 0.04 } }:grounded(),
-    body = softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300 } }
-  local floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 1, 1, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} }
-  local sim = softvt.simulate { layout = softvt.layout("one", function(scene)
-    scene:add { name = "floor", asset = floor, position = { 0, 0, 0 } }
-    scene:add { name = "cube", asset = cube, at = { 0, 0.1 } } end) }
-  return { fingerprint = sim:measure "cube".fingerprint }
-end }
-"#;
-    let project = Project::new(&[("who.lua", script)]);
-    let row: Value = serde_json::from_str(&project.succeeds("who.lua --json").out).expect("a row");
-    let project = impostor(row["fingerprint"].as_str().expect("a text"));
-    let output = project.succeeds("x.lua --policy noop --out run");
-    assert!(!output.err.contains("another"), "{}", output.err);
-    assert_eq!(project.json("run/run.json")["thresholds"]["cube"], 1.0);
-}
-
 #[test]
 fn several_suites_are_one_json_document() {
     let one = Small { task: "budget_steps = 1", ..Small::default() }.text();

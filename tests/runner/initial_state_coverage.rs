@@ -1,5 +1,4 @@
-//! Initial states cover their ranges, and are equal for both tasks of a mirrored pair. Tested through the library, since
-//! the claim is about the settled scene.
+//! Initial states cover their ranges, and are equal for both tasks of a mirrored pair.
 
 use std::{path::Path, sync::Arc};
 

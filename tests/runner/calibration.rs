@@ -1,9 +1,25 @@
 //! The press test of `scripts/calibrate.lua` on objects of the user.
 
-use super::support::Project;
+use crate::support::{Project, Run};
 
-/// Arguments of a calibration that is as short as possible.
-const QUICK: &str = "scripts/calibrate.lua --asset brick --step-mm 1 --within-mm 0.5";
+/// Options of a press that is as short as possible.
+const SHORT: &str = "--step-mm=1 --within-mm=0.5";
+/// The scripts read the assets of the project in which they are.
+const CALIBRATE: (&str, &str) = ("scripts/calibrate.lua", include_str!("../../scripts/calibrate.lua"));
+const CHECK: (&str, &str) =
+    ("scripts/check_calibration.lua", include_str!("../../scripts/check_calibration.lua"));
+
+/// The short calibration of the brick, into a folder of the project.
+fn quick<'a>(project: &'a Project, out: &str) -> Run<'a> {
+    project.run(CALIBRATE.0).options(SHORT).options("--asset=brick").out(out)
+}
+
+/// The message with which an experiment is refused.
+fn refusal(run: &Run) -> String {
+    let (rows, outcome) = run.experiment();
+    assert!(rows.is_empty(), "{rows:?}");
+    outcome.expect_err("a refusal")
+}
 
 /// A project with a small brick of coarse voxels, whose material has the given fields besides.
 fn brick(material: &str) -> Project {
@@ -12,23 +28,20 @@ fn brick(material: &str) -> Project {
          shape = softvt.shape.box {{ size = {{ 0.04, 0.03, 0.024 }} }}:round(0.003):grounded(),\n  \
          body = softvt.soft {{ youngs_pa = 4e4, poisson = 0.3, density = 300, resolution = 4, grasp_spacing = 0.0015, {material} }},\n}}\n"
     );
-    Project::new(&[("assets/brick.lua", &text)])
+    Project::new(&[("assets/brick.lua", &text), CALIBRATE, CHECK])
 }
 
 #[test]
 fn the_limit_is_the_objects_own_and_its_calibration_repeats_bit_for_bit() {
     let project = brick("collapse_strain = 0.12, damage_strain = 0.3");
-    let calibrated = |words: &str| {
-        let output = project.succeeds(&format!("{QUICK} {words}"));
-        assert!(
-            output.out.contains("pressed until 5 % of the volume was beyond the stable strain 0.12"),
-            "{}",
-            output.out
-        );
+    let calibrated = |out: &str, threads| {
+        let (_, outcome) = quick(&project, out).threads(threads).experiment();
+        let text = outcome.expect("a limit");
+        assert!(text.contains("pressed until 5 % of the volume was beyond the stable strain 0.12"), "{text}");
         ["json", "sweep.jsonl", "svg", "txt"]
-            .map(|end| project.text(&format!("assets/calibration/brick.{end}")))
+            .map(|end| project.text(&format!("{out}/assets/calibration/brick.{end}")))
     };
-    let first = calibrated("");
+    let first = calibrated("first", 1);
     let file: serde_json::Value = serde_json::from_str(&first[0]).expect("JSON");
     assert_eq!((&file["schema_version"], &file["calibration"]["protocol"]), (&2.into(), &"press".into()));
     let envelope = &file["envelopes"]["brick"];
@@ -43,17 +56,18 @@ fn the_limit_is_the_objects_own_and_its_calibration_repeats_bit_for_bit() {
         variants.len() == 7
             && variants.iter().all(|variant| variant["rows"].as_array().is_some_and(|rows| rows.len() > 5))
     );
-    assert_eq!(calibrated("--threads 2"), first);
+    assert_eq!(calibrated("second", 2), first);
     // The robot's settings do not enter.
-    let message = project.refusal(&format!("{QUICK} --set robot.gripper.effort=20 --out again"));
+    let message = refusal(&quick(&project, "again").set("robot.gripper.effort", 20));
     assert!(message.contains("simulates no robot") && message.contains("changes nothing"), "{message}");
 }
 
 #[test]
 fn a_material_without_strains_is_calibrated_with_a_warning() {
-    let output = brick("").succeeds(QUICK);
-    assert!(output.out.contains("censored: the press ended early"), "{}", output.out);
-    assert!(output.out.contains("State collapse_strain in its softvt.soft"), "{}", output.out);
+    let (_, outcome) = quick(&brick(""), "run").experiment();
+    let text = outcome.expect("a limit");
+    assert!(text.contains("censored: the press ended early"), "{text}");
+    assert!(text.contains("State collapse_strain in its softvt.soft"), "{text}");
 }
 
 #[test]
@@ -61,7 +75,7 @@ fn a_strain_out_of_range_is_refused() {
     for (strain, got) in
         [("collapse_strain = 0", "0"), ("damage_strain = 1.5", "1.5"), ("damage_strain = -0.1", "-0.1")]
     {
-        let message = brick(strain).refusal(QUICK);
+        let message = refusal(&quick(&brick(strain), "run"));
         assert!(message.starts_with("assets/brick.lua:4: asset.body"), "{message}");
         assert!(message.contains("above 0") && message.ends_with(&format!("got {got}")), "{message}");
     }
@@ -76,7 +90,10 @@ fn assets_without_a_window_are_told_with_the_files_of_all_assets() {
     for (name, text) in [("sound", &sound), ("wide", &wide), ("sagging", &sagging)] {
         project.write(&format!("assets/{name}.lua"), text.as_bytes());
     }
-    let message = project.problem(&QUICK.replace("brick", "brick,sound,wide,sagging"));
+    let run = project.run(CALIBRATE.0).options(SHORT).options("--asset=brick,sound,wide,sagging").out("run");
+    let (rows, outcome) = run.experiment();
+    assert!(!rows.is_empty());
+    let message = outcome.expect_err("assets without a window");
     for part in [
         "brick: no safe window: ",
         ", and D passes τ at ",
@@ -88,10 +105,10 @@ fn assets_without_a_window_are_told_with_the_files_of_all_assets() {
     }
     assert!(!message.contains("sound:"), "{message}");
     for name in ["brick", "sound", "wide", "sagging"] {
-        assert!(project.path(&format!("assets/calibration/{name}.svg")).exists(), "{name}");
+        assert!(project.path(&format!("run/assets/calibration/{name}.svg")).exists(), "{name}");
     }
     let reason = |name: &str| {
-        let file = project.json(&format!("assets/calibration/{name}.json"));
+        let file = project.json(&format!("run/assets/calibration/{name}.json"));
         file["envelopes"][name]["censored"].as_str().unwrap_or_default().to_owned()
     };
     assert!(reason("wide").contains("91 mm wide where the fingers grasp it"), "{}", reason("wide"));
@@ -100,22 +117,23 @@ fn assets_without_a_window_are_told_with_the_files_of_all_assets() {
         "{}",
         reason("sagging")
     );
-    assert!(!project.text("assets/calibration/wide.txt").contains("lower bound"));
+    assert!(!project.text("run/assets/calibration/wide.txt").contains("lower bound"));
 }
 
 #[test]
 fn the_place_of_the_shape_and_the_step_of_the_physics_do_not_change_the_limit() {
-    let limit = |place: &str, words: &str| {
+    let limit = |place: &str, dt: Option<f64>| {
         let project = brick("collapse_strain = 0.12");
         let moved = project.text("assets/brick.lua").replace(":grounded()", place);
         project.write("assets/brick.lua", moved.as_bytes());
-        project.succeeds(&format!("{QUICK} --out run {words}"));
+        let run = quick(&project, "run");
+        dt.map_or(run.clone(), |dt| run.set("physics.dt", dt)).rows();
         let file = project.json("run/assets/calibration/brick.json");
         file["thresholds"]["brick"]["tau"].as_f64().expect("a limit")
     };
-    let nominal = limit(":grounded()", "");
-    assert!((limit(":grounded():translate(0.006, 0.004, 0)", "") / nominal - 1.0).abs() < 1e-3);
-    let fine = limit(":grounded()", "--set physics.dt=0.01");
+    let nominal = limit(":grounded()", None);
+    assert!((limit(":grounded():translate(0.006, 0.004, 0)", None) / nominal - 1.0).abs() < 1e-3);
+    let fine = limit(":grounded()", Some(0.01));
     assert!((fine / nominal - 1.0).abs() < 0.02, "{fine} and {nominal}");
 }
 
@@ -123,21 +141,24 @@ fn the_place_of_the_shape_and_the_step_of_the_physics_do_not_change_the_limit() 
 fn any_step_and_accuracy_end_a_calibration() {
     // Widths are multiples of 0.01 mm, which these are not.
     let project = brick("collapse_strain = 0.05");
-    for words in ["--step-mm 0.125 --within-mm 0.5", "--step-mm 0.333 --within-mm 0.01"] {
-        project.succeeds(&format!("scripts/calibrate.lua --asset brick {words} --out run{}", words.len()));
+    for (out, options) in
+        [("a", "--step-mm=0.125 --within-mm=0.5"), ("b", "--step-mm=0.333 --within-mm=0.01")]
+    {
+        project.run(CALIBRATE.0).options("--asset=brick").options(options).out(out).rows();
     }
 }
 
 #[test]
 fn a_calibration_is_checked_for_the_object_that_was_calibrated() {
     let project = brick("collapse_strain = 0.12");
-    project.succeeds(QUICK);
-    let check = "scripts/check_calibration.lua --asset brick --trials 1 --expert-trials 1 --step-mm 1";
-    let out = project.succeeds(&format!("{check} --out checked --json")).out;
-    let rows: Vec<serde_json::Value> =
-        out.lines().map(|line| serde_json::from_str(line).expect("a row")).collect();
+    quick(&project, "run").rows();
+    let file = "assets/calibration/brick.json";
+    project.write(file, project.text(&format!("run/{file}")).as_bytes());
+    let check = |options: &str| project.run(CHECK.0).options("--asset=brick").options(options);
+    let all = || check("--trials=1 --expert-trials=1 --step-mm=1");
+    let rows = all().out("checked").rows();
     let row = |check: &str| {
-        rows.iter().find(|row| row["check"] == check).unwrap_or_else(|| panic!("{check}: {out}"))
+        rows.iter().find(|row| row["check"] == check).unwrap_or_else(|| panic!("{check}: {rows:?}"))
     };
     // Both ends are tried with the displacements of the calibration and with those of the expert's grasps.
     for check in ["loose_inside", "loose_outside", "tight_inside", "tight_outside"] {
@@ -150,16 +171,16 @@ fn a_calibration_is_checked_for_the_object_that_was_calibrated() {
     assert_ne!(d_ref("resolution_6"), d_ref("resolution_12"));
     assert_eq!((&row("loose_outside")["held"], &row("tight_inside")["held"]), (&0.into(), &1.into()));
     for (words, part) in [
-        ("--part numerics --trials 3", "--trials does nothing with --part numerics"),
-        ("--part ends --step-mm 2", "--step-mm does nothing with --part ends"),
-        ("--trials 3", "--trials 3: give --out DIR"),
+        ("--part=numerics --trials=3", "--trials does nothing with --part numerics"),
+        ("--part=ends --step-mm=2", "--step-mm does nothing with --part ends"),
+        ("--trials=3", "--trials 3: give --out DIR"),
     ] {
-        let message = project.refusal(&format!("scripts/check_calibration.lua --asset brick {words}"));
+        let message = refusal(&check(words));
         assert!(message.contains(part), "{words}: {message}");
     }
     let softer = project.text("assets/brick.lua").replace("4e4", "1e4");
     project.write("assets/brick.lua", softer.as_bytes());
-    let message = project.refusal(&format!("{check} --out stale"));
+    let message = refusal(&all().out("stale"));
     assert!(
         message.contains("brick has no calibrated window, or one of another shape, material"),
         "{message}"
@@ -170,22 +191,22 @@ fn a_calibration_is_checked_for_the_object_that_was_calibrated() {
 fn a_calibration_refuses_what_does_nothing_and_what_would_replace_the_limits() {
     let project = brick("collapse_strain = 0.12");
     for (words, part) in [
-        ("--sweep-protocol hand --step-mm 1 --out run", "--step-mm does nothing with --sweep-protocol hand"),
-        ("--trials 3", "--trials does nothing with --sweep-protocol press"),
-        ("--sweep-protocol hand", "--sweep-protocol hand: give --out DIR"),
-        ("--kappa 0.3", "--kappa 0.3: give --out DIR"),
-        ("--asset brick,brick", "--asset names brick twice"),
-        ("--asset table", "table is not soft"),
+        ("--sweep-protocol=hand --step-mm=1", "--step-mm does nothing with --sweep-protocol hand"),
+        ("--trials=3", "--trials does nothing with --sweep-protocol press"),
+        ("--sweep-protocol=hand", "--sweep-protocol hand: give --out DIR"),
+        ("--kappa=0.3", "--kappa 0.3: give --out DIR"),
+        ("--asset=brick,brick", "--asset names brick twice"),
+        ("--asset=table", "table is not soft"),
     ] {
-        let asset = if words.contains("--asset") { "" } else { "--asset brick " };
-        let message = project.refusal(&format!("scripts/calibrate.lua {asset}{words}"));
+        let asset = if words.contains("--asset") { "" } else { "--asset=brick" };
+        let message = refusal(&project.run(CALIBRATE.0).options(asset).options(words));
         assert!(message.contains(part), "{words}: {message}");
     }
     let slow = project
         .text("assets/brick.lua")
         .replace("name = 'brick',", "name = 'brick', hints = { carry_pace = 0 },");
     project.write("assets/brick.lua", slow.as_bytes());
-    let message = project.refusal(QUICK);
+    let message = refusal(&quick(&project, "slow"));
     assert!(
         message.contains("the hint carry_pace of brick: expected a number in 0..1, above 0, got 0"),
         "{message}"

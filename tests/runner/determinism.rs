@@ -1,4 +1,6 @@
-//! Equal commands give byte-identical results.
+//! Equal runs give byte-identical results.
+
+use softvt::runner::TraceDetail;
 
 use crate::support::{Project, SPATIAL_SOFT};
 
@@ -6,9 +8,8 @@ use crate::support::{Project, SPATIAL_SOFT};
 fn episodes_are_byte_identical_for_any_threads() {
     let project = Project::new(&[]);
     for (out, threads) in [("one", 1), ("two", 2), ("again", 2)] {
-        project.succeeds(&format!(
-            "{SPATIAL_SOFT} --task 0,1 --episodes 2 --policy random --threads {threads} --out {out}"
-        ));
+        let run = project.run(SPATIAL_SOFT).tasks(&[0, 1]).episodes(2).policy("random");
+        run.threads(threads).out(out).finish();
     }
     let one = project.text("one/episodes.jsonl");
     assert_eq!(one.lines().count(), 4);
@@ -21,9 +22,8 @@ fn episodes_are_byte_identical_for_any_threads() {
 fn grasps_are_byte_identical_for_any_threads() {
     let project = Project::new(&[]);
     for threads in [1, 2] {
-        project.succeeds(&format!(
-            "{SPATIAL_SOFT} --task 2,5 --episodes 1 --threads {threads} --out {threads} --trace"
-        ));
+        let run = project.run(SPATIAL_SOFT).tasks(&[2, 5]).episodes(1).trace(TraceDetail::State);
+        run.threads(threads).out(&threads.to_string()).finish();
     }
     for file in ["episodes.jsonl", "trace/task_002/episode_00000.jsonl", "trace/task_005/episode_00000.jsonl"]
     {
@@ -34,11 +34,9 @@ fn grasps_are_byte_identical_for_any_threads() {
 #[test]
 fn another_seed_gives_other_episodes() {
     let project = Project::new(&[]);
-    for seed in [0, 1] {
-        project.succeeds(&format!(
-            "{SPATIAL_SOFT} --task 4 --episodes 1 --policy noop --seed {seed} --out {seed}"
-        ));
-    }
-    let hash = |out: &str| project.lines(&format!("{out}/episodes.jsonl"))[0]["state_hash"].clone();
-    assert_ne!(hash("0"), hash("1"));
+    let hash = |seed: u64| {
+        let run = project.run(SPATIAL_SOFT).tasks(&[4]).episodes(1).policy("noop");
+        run.seed(seed).record().stats.state_hash
+    };
+    assert_ne!(hash(0), hash(1));
 }

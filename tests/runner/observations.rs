@@ -1,5 +1,4 @@
-//! Observations of policies, and left and right of prompts in the image. Tested through the library, since the claims are
-//! about the observations.
+//! Observations of policies, and left and right of prompts in the image.
 
 use std::{path::Path, sync::Arc};
 
@@ -230,12 +229,11 @@ fn invalid_sensors_are_reported_with_their_line() {
         ),
     ] {
         let project = with(lines);
-        // The scene is not valid even if no policy uses the sensor. The library reports the same error as the program.
+        // The scene is not valid even if no policy uses the sensor. A run reports the same error.
         let message = played(&project, SensorStreams::default()).expect_err(words);
         assert!(message.contains(words), "{message}");
-        let message = project.refusal("x.lua --episodes 3 --out run");
-        let path = project.path("x.lua").display().to_string();
-        assert!(message.replace(&path, "x.lua").contains(words), "{message}");
+        let message = project.run("x.lua").episodes(3).out("run").error();
+        assert!(message.contains(words), "{message}");
         assert!(!project.path("run").exists());
     }
 }

@@ -1,6 +1,6 @@
 //! Tactile readings of a grasp: zero before it, gravity after lifting, and no drift in between.
 
-use serde_json::Value;
+use softvt::script::ExperimentRow;
 
 use crate::support::Project;
 
@@ -46,31 +46,30 @@ return softvt.experiment {
 }
 "#;
 
-fn rows(body: &str, closure: &str, settings: &str) -> Vec<Value> {
+fn rows(body: &str, closure: &str, settings: &str) -> Vec<ExperimentRow> {
     let text = HOLD.replace("BODY", body).replace("CLOSURE", closure).replace("SETTINGS", settings);
-    let output = Project::new(&[("hold.lua", &text)]).succeeds("hold.lua --json");
-    output.out.lines().map(|line| serde_json::from_str(line).expect("a row")).collect()
+    Project::new(&[("hold.lua", &text)]).run("hold.lua").rows()
 }
 
-fn number(row: &Value, key: &str) -> f64 {
-    row[key].as_f64().unwrap_or_else(|| panic!("{key} in {row}"))
+fn number(row: &ExperimentRow, key: &str) -> f64 {
+    row[key].as_f64().unwrap_or_else(|| panic!("{key} in {row:?}"))
 }
 
 /// Rows of a stage, left and right.
-fn stage<'a>(rows: &'a [Value], when: &str) -> [&'a Value; 2] {
-    let of: Vec<&Value> = rows.iter().filter(|row| row["when"] == when).collect();
+fn stage<'a>(rows: &'a [ExperimentRow], when: &str) -> [&'a ExperimentRow; 2] {
+    let of: Vec<&ExperimentRow> = rows.iter().filter(|row| row["when"] == when).collect();
     [of[0], of[1]]
 }
 
-fn check(rows: &[Value], weight_n: f64) {
+fn check(rows: &[ExperimentRow], weight_n: f64) {
     for row in stage(rows, "open") {
-        assert_eq!((number(row, "most"), number(row, "depth_mm")), (0.0, 0.0), "nothing touches: {row}");
+        assert_eq!((number(row, "most"), number(row, "depth_mm")), (0.0, 0.0), "nothing touches: {row:?}");
     }
     let (gripped, lifted, held) = (stage(rows, "gripped"), stage(rows, "lifted"), stage(rows, "held"));
     let mut carried = 0.0;
     for side in 0..2 {
         assert!(number(gripped[side], "depth_mm") > 0.01 && number(gripped[side], "most") > 0.1);
-        let pull = |row: &Value| row["force"][0].as_f64().expect("a number");
+        let pull = |row: &ExperimentRow| row["force"][0].as_f64().expect("a number");
         carried -= pull(held[side]);
         // Gravity acts along the fingers towards their tips: to the left in both images.
         let moved = number(lifted[side], "x") - number(gripped[side], "x");
@@ -106,7 +105,9 @@ fn the_sensors_model_pitch_and_gel_are_settings() {
     assert!(stiff["x"] != plain["x"] && stiff["mean"] != plain["mean"]);
     let refusal = |settings: &str| {
         let text = HOLD.replace("BODY", "softvt.rigid { density = 1700 }").replace("CLOSURE", "0.53");
-        Project::new(&[("hold.lua", &text.replace("SETTINGS", settings))]).refusal("hold.lua")
+        let (_, outcome) =
+            Project::new(&[("hold.lua", &text.replace("SETTINGS", settings))]).run("hold.lua").experiment();
+        outcome.expect_err(settings)
     };
     let unknown = refusal("{ tactile = { optics = { model = \"photon\" } } }");
     assert!(

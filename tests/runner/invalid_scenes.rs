@@ -2,22 +2,27 @@
 
 use insta::assert_snapshot;
 
-use crate::support::Small;
+use crate::support::{Project, Small};
+
+/// The message with which the check refuses a project.
+fn check(project: &Project) -> String {
+    project.message(project.run("x.lua").check().map(drop))
+}
 
 fn expert(expert: &'static str) -> String {
-    Small { expert, task: "budget_steps = 200", ..Small::default() }.project().refusal("x.lua --out run")
+    Small { expert, task: "budget_steps = 200", ..Small::default() }.project().run("x.lua").error()
 }
 
 #[test]
 fn empty_shapes_are_reported_with_their_asset() {
     let shape = "softvt.shape.sphere { radius = 0.02 }:subtract(softvt.shape.sphere { radius = 0.03 })";
     let project = Small { shape, ..Small::default() }.project();
-    assert_snapshot!(project.refusal("x.lua --out run"), @"x.lua:6: asset cube: the shape is empty; check its subtractions and intersections");
+    assert_snapshot!(project.run("x.lua").error(), @"x.lua:6: asset cube: the shape is empty; check its subtractions and intersections");
 }
 
 #[test]
 fn shapes_thinner_than_a_voxel_are_refused() {
-    let refusal = |shape| Small { shape, ..Small::default() }.project().refusal("x.lua --out run");
+    let refusal = |shape| Small { shape, ..Small::default() }.project().run("x.lua").error();
     assert_snapshot!(refusal("softvt.shape.box { size = { 0.04, 0.04, 0.0001 } }:grounded()"), @"x.lua:6: asset cube: it is 0.1 mm thick, thinner than a voxel: at resolution 6 they are 6.67 mm; no resolution up to 64 would serve; make it at least 0.63 mm thick");
     assert_snapshot!(refusal("softvt.shape.box { size = { 0.04, 0.04, 0.003 } }:grounded()"), @"x.lua:6: asset cube: it is 3 mm thick, thinner than a voxel: at resolution 6 they are 6.67 mm; resolution = 14 would serve");
     let project = Small {
@@ -28,7 +33,7 @@ fn shapes_thinner_than_a_voxel_are_refused() {
     .project();
     project
         .write("m.obj", b"v 0 0 0\nv .05 0 0\nv 0 .05 0\nv 0 0 .004\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
-    assert_snapshot!(project.refusal("x.lua --out run"), @"x.lua:6: asset cube: it is 4 mm thick, thinner than a voxel: at resolution 5 they are 10 mm; resolution = 13 would serve");
+    assert_snapshot!(project.run("x.lua").error(), @"x.lua:6: asset cube: it is 4 mm thick, thinner than a voxel: at resolution 5 they are 10 mm; resolution = 13 would serve");
 }
 
 /// A small scene of a floor and the objects that `add` places on it, from line 4 on.
@@ -40,7 +45,7 @@ fn placed(body: &str, add: &str) -> String {
          return softvt.suite {{ name = 'one', object_type = 'deformable', variation = 'spatial', episodes = 1, tasks = {{\n\
          softvt.task {{ prompt = 'wait', layout = layout, budget_steps = 1, goal = softvt.on {{ object = 'a', target = 'floor' }}, expert = function(arm) arm:wait(0.1) end }} }} }}"
     );
-    crate::support::Project::new(&[("x.lua", &text)]).refusal("x.lua --out run")
+    Project::new(&[("x.lua", &text)]).run("x.lua").error()
 }
 
 #[test]
@@ -72,7 +77,7 @@ fn overlaps_are_reported_with_depth_and_place() {
 #[test]
 fn sizes_in_millimetres_are_recognized() {
     let shape = "softvt.shape.box { size = { 40, 40, 40 } }:grounded()";
-    let message = Small { shape, ..Small::default() }.project().refusal("x.lua --out run");
+    let message = Small { shape, ..Small::default() }.project().run("x.lua").error();
     assert_snapshot!(message, @"x.lua:3: asset.shape: is 40 × 40 × 40 m, expected at most 10 m; lengths are in metres (softvt.mesh takes scale = 0.001 for mm)");
 }
 
@@ -84,7 +89,7 @@ fn mistakes_of_a_layout_are_reported_at_its_own_line() {
             .replace("scene:add { name = \"cube\", asset = cube, at = { 0, 0.1 } }", call);
         let text = text.replace("function(scene)", "function(scene, rng)");
         let text = text.replacen("local floor", "local arrange = require 'layouts.arrange' local floor", 1);
-        crate::support::Project::new(&[("x.lua", &text)]).refusal("check x.lua")
+        check(&Project::new(&[("x.lua", &text)]))
     };
     let refused = |arguments: &str| refused_call(&format!("arrange.add(scene, rng, {arguments})"));
     assert_snapshot!(refused("{ { name = 'cube', asset = cube, at = { 0, 0.1 } } }"), @"x.lua:6: arrange.add.clearance: expected a number, got nil");
@@ -97,10 +102,10 @@ fn mistakes_of_a_layout_are_reported_at_its_own_line() {
     let turned = refused_call("scene:add { name = 'cube', asset = cube, at = { 0, 0.1 }, yaw = 60 }");
     assert_snapshot!(turned, @"x.lua:6: scene:add.yaw: expected radians in -6.2832..6.2832, got 60; math.rad converts degrees");
     let sunk = Small { shape: "softvt.shape.box { size = { 0.04, 0.04, 0.04 } }", ..Small::default() };
-    assert_snapshot!(sunk.project().refusal("check x.lua"), @"x.lua:6: objects cube and floor (placed at x.lua:5) overlap by 20 mm at the start; the shape of cube reaches 20 mm below its origin: end it with :grounded(), or move the objects apart");
+    assert_snapshot!(check(&sunk.project()), @"x.lua:6: objects cube and floor (placed at x.lua:5) overlap by 20 mm at the start; the shape of cube reaches 20 mm below its origin: end it with :grounded(), or move the objects apart");
     let unknown = Small { at: "at = plac(0)", ..Small::default() };
     let text = format!("local function place(x) return {{ x, 0 }} end {}", unknown.text());
-    let message = crate::support::Project::new(&[("x.lua", &text)]).refusal("check x.lua");
+    let message = check(&Project::new(&[("x.lua", &text)]));
     assert_snapshot!(message, @r#"x.lua:6: attempt to call a nil value (global 'plac'); did you mean "place"?"#);
 }
 
@@ -109,12 +114,12 @@ fn a_layout_keeps_materials_near_those_of_the_assets() {
     let refused = |change: &str| {
         let at = "at = { 0, 0.1 } }";
         let text = Small::default().text().replace(at, &format!("{at} {change}"));
-        crate::support::Project::new(&[("x.lua", &text)])
+        Project::new(&[("x.lua", &text)])
     };
     let cube = "scene:object 'cube'";
-    assert_snapshot!(refused(&format!("{cube}.youngs_pa = 1e9")).refusal("check x.lua"), @r#"x.lua:6: object.youngs_pa: the layout gives "cube" 50000 times the youngs_pa of its asset "cube", expected in 0.1..10; declare an asset of that material, or a shift"#);
-    assert_snapshot!(refused(&format!("{cube}:scale_mass(0.01)")).refusal("x.lua --out run"), @r#"x.lua:6: object.density: the layout gives "cube" 0.01 times the density of its asset "cube", expected in 0.1..10; declare an asset of that material, or a shift"#);
-    refused(&format!("{cube}.youngs_pa = 2e5 {cube}.density = 30")).succeeds("check x.lua");
+    assert_snapshot!(check(&refused(&format!("{cube}.youngs_pa = 1e9"))), @r#"x.lua:6: object.youngs_pa: the layout gives "cube" 50000 times the youngs_pa of its asset "cube", expected in 0.1..10; declare an asset of that material, or a shift"#);
+    assert_snapshot!(refused(&format!("{cube}:scale_mass(0.01)")).run("x.lua").error(), @r#"x.lua:6: object.density: the layout gives "cube" 0.01 times the density of its asset "cube", expected in 0.1..10; declare an asset of that material, or a shift"#);
+    refused(&format!("{cube}.youngs_pa = 2e5 {cube}.density = 30")).run("x.lua").check().expect("valid");
 }
 
 #[test]
@@ -137,15 +142,14 @@ fn unsettled_objects_are_reported() {
 #[test]
 fn falling_objects_are_reported() {
     let project = Small { at: "position = { 0, 0.8, 0.1 }", ..Small::default() }.project();
-    let message = project.refusal("x.lua --out run");
+    let message = project.run("x.lua").error();
     assert_snapshot!(message, @"x.lua:6: layout one, episode 0: object cube fell out of the world: there was nothing below it, and after 3 s of settling it is 44.9 m lower; place it above a support");
 }
 
 #[test]
 fn objects_inside_of_the_hand_are_reported() {
-    let message = Small { at: "position = { -0.187, 0.03, 0.29 }", ..Small::default() }
-        .project()
-        .refusal("x.lua --out run");
+    let message =
+        Small { at: "position = { -0.187, 0.03, 0.29 }", ..Small::default() }.project().run("x.lua").error();
     assert!(message.starts_with("x.lua:6: object cube starts inside of the robot's hand ("), "{message}");
     assert!(message.ends_with(" mm deep; move it away, or the arm (scene.start_q)"), "{message}");
 }
@@ -153,22 +157,21 @@ fn objects_inside_of_the_hand_are_reported() {
 #[test]
 fn a_failed_first_episode_leaves_no_folder() {
     let project = Small { at: "position = { 0, 0.8, 0.1 }", ..Small::default() }.project();
-    project.refusal("x.lua --out run");
+    project.run("x.lua").out("run").error();
     assert!(!project.path("run").exists());
     project.write("x.lua", Small::default().text().as_bytes());
-    project.succeeds("x.lua --out run");
+    project.run("x.lua").out("run").record();
 }
 
 /// The reason with which the expert of a run of two episodes gave up in both.
 fn gave_up(text: &'static str) -> String {
     let project = Small { expert: text, ..Small::default() }.project();
-    project.succeeds("x.lua --episodes 2 --out run");
-    let records = project.lines("run/episodes.jsonl");
+    let records = project.run("x.lua").episodes(2).records();
     let reasons: Vec<&str> =
-        records.iter().map(|record| record["gave_up"].as_str().expect("a reason")).collect();
+        records.iter().map(|record| record.stats.gave_up.as_deref().expect("a reason")).collect();
     assert!(reasons.len() == 2 && reasons[0] == reasons[1], "{reasons:?}");
-    assert_eq!(records[0]["goal"], false);
-    reasons[0].to_owned()
+    assert!(!records[0].verdict.goal);
+    project.relative(reasons[0])
 }
 
 #[test]
@@ -188,10 +191,9 @@ fn an_expert_may_catch_an_unreachable_pose() {
     assert!(sent.starts_with("x.lua:12: unreachable pose: the tool gets no nearer to (2.000,"), "{sent}");
     let expert = "pcall(arm.move_to, arm, softvt.pose { position = { 2, 0, 0.3 } }) arm:wait(5)";
     let project = Small { expert, ..Small::default() }.project();
-    project.succeeds("x.lua --out run");
-    let record = &project.lines("run/episodes.jsonl")[0];
-    assert!(record["gave_up"].is_null() && record["goal"] == false, "{record}");
-    assert_eq!(record["far_commands"], 0, "nothing out of reach was sent");
+    let record = project.run("x.lua").record();
+    assert!(record.stats.gave_up.is_none() && !record.verdict.goal, "{record:#?}");
+    assert_eq!(record.stats.far_commands, 0, "nothing out of reach was sent");
 }
 
 #[test]
@@ -199,7 +201,7 @@ fn fast_motions_within_reach_are_accepted() {
     let way = "for _, y in ipairs { -0.3, 0.3, -0.3 } do\n\
                arm:move_to(softvt.pose { position = { 0.05, y, 0.2 }, yaw = y }, { speed = 3, angular_speed = 6 })\nend";
     let project = Small { expert: way, task: "budget_steps = 120", ..Small::default() }.project();
-    project.succeeds("x.lua --out run");
+    project.run("x.lua").record();
 }
 
 #[test]
@@ -210,29 +212,9 @@ fn errors_of_experts_have_their_line() {
 }
 
 #[test]
-fn control_characters_of_scripts_are_escaped() {
-    let text = Small::default().text().replace("prompt = \"wait\"", "prompt = \"wait\\27[2Jfor it\"");
-    let project = crate::support::Project::new(&[("x.lua", &format!("print('\\27]0;mine\\7')\n{text}"))]);
-    let output = project.succeeds("x.lua --policy noop --out run");
-    assert!(
-        !output.out.contains('\u{1b}') && !output.err.contains('\u{1b}'),
-        "{} {}",
-        output.out,
-        output.err
-    );
-    assert!(
-        output.out.contains("wait\\u{1b}[2Jfor it") && output.err.contains("\\u{1b}]0;mine\\u{7}"),
-        "{}",
-        output.err
-    );
-    project.write("x.lua", b"error('\\27[31mred')");
-    assert!(project.refusal("x.lua").contains("\\u{1b}[31mred"));
-}
-
-#[test]
 fn huge_numbers_are_printed_briefly() {
     let message = Small { material: "youngs_pa = -1e300, poisson = 0.3, density = 300", ..Small::default() };
-    assert!(message.project().refusal("x.lua --out run").ends_with("got -1e300"));
-    let setting = Small::default().project().refusal("x.lua --out run --set physics.dt=1e300");
+    assert!(message.project().run("x.lua").error().ends_with("got -1e300"));
+    let setting = Small::default().project().run("x.lua").set("physics.dt", "1e300").error();
     assert!(setting.ends_with("got 1e300"), "{setting}");
 }

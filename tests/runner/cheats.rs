@@ -19,10 +19,11 @@ return softvt.suite {{ name = "cheat", object_type = "rigid", variation = "spati
     Project::new(&[("x.lua", &text), SOLIDS])
 }
 
-/// The message with which both `softvt check` and a run refuse a suite.
+/// The message with which both the check and a run refuse a suite.
 fn refusal(add: &str, goal: &str) -> String {
     let project = project(add, goal);
-    let [check, run] = ["check x.lua", "x.lua --policy noop --out run"].map(|words| project.refusal(words));
+    let run = project.run("x.lua").policy("noop");
+    let (check, run) = (project.message(run.clone().check()), run.error());
     assert_eq!(check, run);
     run
 }
@@ -30,11 +31,9 @@ fn refusal(add: &str, goal: &str) -> String {
 /// Runs a suite that is accepted, and checks that its episode reaches no goal.
 fn fails(add: &str, goal: &str) {
     let project = project(add, goal);
-    project.succeeds("check x.lua");
-    project.succeeds("x.lua --policy noop --out run");
-    let episodes = project.lines("run/episodes.jsonl");
-    assert_eq!(episodes.len(), 1);
-    assert!(episodes[0]["goal"] == false && episodes[0]["safety"] == false, "{:#}", episodes[0]);
+    project.run("x.lua").check().expect("accepted");
+    let verdict = project.run("x.lua").policy("noop").record().verdict;
+    assert!(!verdict.goal && !verdict.safety, "{verdict:#?}");
 }
 
 const ON_SLAB: &str = r#"softvt.on { object = "cube", target = "slab" }"#;

@@ -1,8 +1,13 @@
 //! Judging of rigid and soft targets on rigid and soft supports.
 
-use serde_json::Value;
+use std::collections::BTreeSet;
 
-use crate::support::{Project, SOLIDS};
+use softvt::{
+    evaluation::{stage::Stage, verdict::Verdict},
+    runner::TraceDetail,
+};
+
+use crate::support::{Finished, Project, Run, SOLIDS, Small};
 
 /// A rigid block in the mirrored layout of the standard suite, written as a user would.
 const BLOCKS: &str = r#"
@@ -30,21 +35,20 @@ return softvt.asset {
 #[test]
 fn rigid_targets_need_no_deformation_limit() {
     let project = Project::new(&[("blocks.lua", BLOCKS), ("assets/block.lua", BLOCK)]);
-    let output = project.succeeds("blocks.lua --out run --json --trace");
-    for e in project.lines("run/episodes.jsonl") {
-        assert!(e["goal"] == true && e["no_drop"] == true && e["safety"] == true, "{e:#}");
-        assert!(e["deformation_ok"].is_null() && e["d_peak"].is_null() && e["tau"].is_null(), "{e:#}");
-        assert_eq!(e["no_slip"], true, "{e:#}");
-        assert!(e["mean_pad_force_n"].as_f64().is_some_and(|f| f > 0.5), "{e:#}");
+    let result = project.run("blocks.lua").out("run").trace(TraceDetail::State).finish().result();
+    assert_eq!(result.records.len(), 2);
+    for record in &result.records {
+        let verdict = &record.verdict;
+        assert!(verdict.goal && verdict.no_drop && verdict.safety && verdict.no_slip, "{verdict:#?}");
+        assert_eq!((verdict.deformation_ok, verdict.d_peak, verdict.tau), (None, None, None));
+        assert!(verdict.mean_pad_force_n > 0.5, "{verdict:#?}");
     }
-    let summary: Value = serde_json::from_str(&output.out).expect("JSON");
-    assert_eq!(summary["safety_success_rate"]["rate"], 100.0);
-    let binary = project.succeeds("blocks.lua --policy expert-binary --out binary --json");
-    let summary: Value = serde_json::from_str(&binary.out).expect("JSON");
-    assert_eq!(summary["safety_success_rate"]["rate"], 100.0, "a rigid block bears a binary gripper");
-    project.succeeds("blocks.lua --policy noop --out noop");
-    for e in project.lines("noop/episodes.jsonl") {
-        assert!(e["goal"] == false && e["no_drop"] == true, "{e:#}");
+    assert_eq!(result.summary.scores.safety_success_rate.rate, Some(100.0));
+    let binary = project.run("blocks.lua").policy("expert-binary").finish().result();
+    let rate = binary.summary.scores.safety_success_rate.rate;
+    assert_eq!(rate, Some(100.0), "a rigid block bears a binary gripper");
+    for record in project.run("blocks.lua").policy("noop").records() {
+        assert!(!record.verdict.goal && record.verdict.no_drop, "{:#?}", record.verdict);
     }
 }
 
@@ -82,21 +86,18 @@ fn objects_are_supported_by_what_they_rest_on() {
         ("rigid", "static"),
     ] {
         let project = Project::new(&[("x.lua", &stack(upper, lower)), SOLIDS]);
-        project.succeeds("x.lua --out run");
-        let episodes = project.lines("run/episodes.jsonl");
-        let goals: Vec<&Value> = episodes.iter().map(|e| &e["goal"]).collect();
-        assert_eq!(goals, [true, false], "{upper} on {lower}: {episodes:#?}");
-        assert!(episodes.iter().all(|e| e["no_drop"] == true), "{upper} on {lower}: {episodes:#?}");
+        let verdicts = project.run("x.lua").records().into_iter().map(|record| record.verdict);
+        let verdicts: Vec<_> = verdicts.collect();
+        let goals: Vec<bool> = verdicts.iter().map(|verdict| verdict.goal).collect();
+        assert_eq!(goals, [true, false], "{upper} on {lower}: {verdicts:#?}");
+        assert!(verdicts.iter().all(|verdict| verdict.no_drop), "{upper} on {lower}: {verdicts:#?}");
         // Harm of the target to a soft support is recorded, also if the support is not the goal.
-        for e in &episodes {
-            assert_eq!(e["d_peak_other"].is_number(), lower == "soft", "{upper} on {lower}: {e:#}");
-            assert_eq!(
-                e["others_ok"],
-                if lower == "soft" { Value::Null } else { true.into() },
-                "no limit: {e:#}"
-            );
+        for verdict in &verdicts {
+            assert_eq!(verdict.d_peak_other.is_some(), lower == "soft", "{upper} on {lower}: {verdict:#?}");
+            let expected = (lower != "soft").then_some(true);
+            assert_eq!(verdict.others_ok, expected, "no limit: {verdict:#?}");
         }
-        assert!(episodes[0]["failed_stage"].is_null() && episodes[1]["failed_stage"] == "grasp");
+        assert_eq!((verdicts[0].failed_stage, verdicts[1].failed_stage), (None, Some(Stage::Grasp)));
     }
 }
 
@@ -137,29 +138,26 @@ end } } }"#;
     [("who.lua", format!("{layout}{who}")), ("x.lua", format!("{layout}{suite}"))]
 }
 
-fn safe(project: &Project, words: &str) -> Vec<bool> {
-    project.succeeds(&format!("x.lua --out run {words}"));
-    let safe = project.lines("run/episodes.jsonl").iter().map(|e| e["safety"] == true).collect();
-    std::fs::remove_dir_all(project.path("run")).expect("removed");
-    safe
+fn safe(run: Run) -> Vec<bool> {
+    run.records().iter().map(|record| record.verdict.safety).collect()
 }
 
 #[test]
 fn limits_apply_only_to_the_calibrated_object() {
     let project = Project::new(&[SOLIDS]);
     cubes("2e4").iter().for_each(|(path, text)| project.write(path, text.as_bytes()));
-    let row: Value = serde_json::from_str(&project.succeeds("who.lua --json").out).expect("a row");
-    let fingerprint = row["fingerprint"].as_str().expect("a text");
+    let rows = project.run("who.lua").rows();
+    let fingerprint = rows[0]["fingerprint"].as_str().expect("a text");
     project.write("assets/calibration/cube.json", calibration(fingerprint).as_bytes());
-    assert_eq!(safe(&project, ""), [true, true]);
-    assert_eq!(safe(&project, "--shift soft=0.5"), [true, true], "limits stay nominal");
+    assert_eq!(safe(project.run("x.lua")), [true, true]);
+    assert_eq!(safe(project.run("x.lua").shift("soft", 0.5)), [true, true], "limits stay nominal");
     // One stiffness in the first episode and others later, under one name.
     let vary = cubes("rng:uniform(0, 1) < 2 and 2e4 * (1 + episode)");
     project.write("x.lua", vary[1].1.as_bytes());
-    assert_eq!(safe(&project, ""), [false, false]);
+    assert_eq!(safe(project.run("x.lua")), [false, false]);
     let other = cubes("3e4");
     project.write("x.lua", other[1].1.as_bytes());
-    assert_eq!(safe(&project, ""), [false, false]);
+    assert_eq!(safe(project.run("x.lua")), [false, false]);
 }
 
 /// A suite of soft cubes, with calibrations of the assets `cube` and `small`. Layout `drawn` places one of the two;
@@ -202,8 +200,7 @@ return softvt.experiment { name = "who", grid = { asset = { "cube", "small" } },
   return { asset = point.asset, fingerprint = softvt.simulate { layout = layout }:measure "cube".fingerprint }
 end }"#;
     let project = Project::new(&[("cubes.lua", library), ("x.lua", &suite), ("who.lua", who), SOLIDS]);
-    for line in project.succeeds("who.lua --json").out.lines() {
-        let row: Value = serde_json::from_str(line).expect("a row");
+    for row in project.run("who.lua").rows() {
         let [asset, fingerprint] = ["asset", "fingerprint"].map(|key| row[key].as_str().expect("a text"));
         let text = calibration(fingerprint).replace("\"cube\":", &format!("\"{asset}\":"));
         project.write(&format!("assets/calibration/{asset}.json"), text.as_bytes());
@@ -216,13 +213,14 @@ fn a_limit_holds_for_every_instance_of_its_asset() {
     let project = calibrated(
         "cube.youngs_pa = 2e4 * (1 + u) cube.density = 200 + 100 * u cube.static_mu = 0.9 cube.dynamic_mu = 0.7 + 0.1 * u",
     );
-    let output = project.succeeds("x.lua --out run");
-    let episodes = project.lines("run/episodes.jsonl");
-    assert!(episodes.iter().all(|e| e["tau"] == 1.0 && e["safety"] == true), "{episodes:#?}");
-    let assets: std::collections::BTreeSet<&str> =
-        episodes.iter().filter_map(|e| e["asset"].as_str()).collect();
+    let finished = project.run("x.lua").out("run").finish();
+    let messages = finished.messages.clone();
+    let records = finished.records();
+    let is_safe = |verdict: &Verdict| verdict.tau == Some(1.0) && verdict.safety;
+    assert!(records.iter().all(|record| is_safe(&record.verdict)), "{records:#?}");
+    let assets: BTreeSet<&str> = records.iter().map(|record| record.header.asset.as_str()).collect();
     assert_eq!(assets.len(), 2, "both assets are drawn: {assets:?}");
-    assert!(!output.err.contains("calibrat") && !output.err.contains("limit"), "{}", output.err);
+    assert!(!messages.contains("calibrat") && !messages.contains("limit"), "{messages}");
     assert_eq!(project.json("run/run.json")["thresholds"], serde_json::json!({ "cube": 1.0, "small": 1.0 }));
 }
 
@@ -230,13 +228,48 @@ fn a_limit_holds_for_every_instance_of_its_asset() {
 fn another_object_has_no_limit_and_check_and_run_say_so() {
     let project = calibrated("if u > 0.5 then cube.poisson = 0.4 end");
     let warning = "no limit for object \"cube\": it has Poisson's ratio 0.4 instead of 0.3 of asset \"cube\"";
-    let check = project.succeeds("check x.lua");
-    let line = check.err.lines().find(|line| line.contains(warning)).expect("a warning of the check");
-    assert!(line.starts_with("softvt: task 1 episode "), "{line}");
-    let run = project.succeeds("x.lua --out run");
-    assert!(run.err.contains(line), "{}", run.err);
-    let episodes = project.lines("run/episodes.jsonl");
-    let judged = |task: u64| episodes.iter().filter(|e| e["task"] == task && e["tau"] == 1.0).count();
+    let check = project.run("x.lua");
+    check.clone().check().expect("valid");
+    let told = check.told();
+    let line = told.lines().find(|line| line.contains(warning)).expect("a warning of the check");
+    assert!(line.starts_with("task 1 episode "), "{line}");
+    let Finished { results, messages } = project.run("x.lua").finish();
+    assert!(messages.contains(line), "{messages}");
+    let judged = |task: usize| {
+        let of_task = results[0].records.iter().filter(|record| record.header.id.task == task);
+        of_task.filter(|record| record.verdict.tau == Some(1.0)).count()
+    };
     assert_eq!(judged(0), 4);
-    assert!((1..4).contains(&judged(1)), "{episodes:#?}");
+    assert!((1..4).contains(&judged(1)), "{:#?}", results[0].records);
+}
+
+/// A suite with a soft cube that has the name of a calibrated object, and the calibration of that object.
+fn impostor(fingerprint: &str) -> Project {
+    let project = Small::default().project();
+    project.write("assets/calibration/cube.json", calibration(fingerprint).as_bytes());
+    project
+}
+
+#[test]
+fn limits_of_other_versions_are_ignored() {
+    let told = |project: &Project| project.run("x.lua").policy("noop").out("run").finish().messages;
+    let messages = told(&impostor("0123456789abcdef"));
+    let other = "assets/calibration/cube.json was computed for a different version of \"cube\"";
+    assert!(messages.contains(other), "{messages}");
+    let script = r#"return softvt.experiment { name = "who", grid = { x = { 1 } }, run = function()
+  local cube = softvt.asset { name = "cube", shape = softvt.shape.box { size = { 0.04, 0.04, 0.04 } }:grounded(),
+    body = softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300 } }
+  local floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 1, 1, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} }
+  local sim = softvt.simulate { layout = softvt.layout("one", function(scene)
+    scene:add { name = "floor", asset = floor, position = { 0, 0, 0 } }
+    scene:add { name = "cube", asset = cube, at = { 0, 0.1 } } end) }
+  return { fingerprint = sim:measure "cube".fingerprint }
+end }
+"#;
+    let project = Project::new(&[("who.lua", script)]);
+    let rows = project.run("who.lua").rows();
+    let project = impostor(rows[0]["fingerprint"].as_str().expect("a text"));
+    let messages = told(&project);
+    assert!(!messages.contains("different version"), "{messages}");
+    assert_eq!(project.json("run/run.json")["thresholds"]["cube"], 1.0);
 }

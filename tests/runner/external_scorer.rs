@@ -125,10 +125,10 @@ fn an_external_scorer_computes_the_same_rates() {
     let project = Project::new(&[]);
     for (policy, goal, safe) in [("expert", 100.0, 100.0), ("expert-binary", 100.0, 0.0), ("noop", 0.0, 0.0)]
     {
-        project.succeeds(&format!("{SPATIAL_SOFT} --policy {policy} --task 8,9 --episodes 1 --out {policy}"));
+        project.run(SPATIAL_SOFT).policy(policy).tasks(&[8, 9]).episodes(1).out(policy).finish();
         assert_eq!(agrees(&project, policy, false), [goal, safe], "{policy}");
     }
-    project.succeeds(&format!("{SPATIAL_SOFT} --twin rigid --task 8 --episodes 1 --out twin"));
+    project.run(SPATIAL_SOFT).twin().tasks(&[8]).episodes(1).out("twin").finish();
     let [goal, safe] = agrees(&project, "twin", true);
     assert_eq!(goal, safe);
 }

@@ -1,6 +1,7 @@
 //! Articulated objects in a suite: goals that name a part, experts that read joints, and refused definitions.
 
 use insta::assert_snapshot;
+use serde_json::Value;
 
 use crate::support::{Project, SOLIDS};
 
@@ -50,10 +51,7 @@ return softvt.suite {{ name = "one", object_type = "rigid", variation = "spatial
 "#
     );
     let project = Project::new(&[("x.lua", &text), SOLIDS]);
-    project.succeeds("x.lua --out run");
-    let lines = project.lines("run/episodes.jsonl");
-    assert_eq!(lines.len(), 1);
-    lines[0]["goal"].as_bool().expect("a verdict")
+    project.run("x.lua").record().verdict.goal
 }
 
 #[test]
@@ -73,15 +71,15 @@ fn an_expert_sees_parts_and_joints() {
       assert(#scene:objects() == 3, "parts are no objects of their own")
       error "all seen""#;
     let project = suite(TRAY, "chest", expert);
-    let output = project.refusal("x.lua --out run");
+    let output = project.run("x.lua").error();
     assert!(output.ends_with("x.lua:21: all seen"), "{output}");
     let project = suite(TRAY, "chest", "scene:part('chest', 'tra')");
-    assert_snapshot!(project.refusal("x.lua --out run"), @r#"x.lua: task 0, episode 0: x.lua:14: scene: unknown part "tra"; did you mean "tray"?"#);
+    assert_snapshot!(project.run("x.lua").error(), @r#"x.lua: task 0, episode 0: x.lua:14: scene: unknown part "tra"; did you mean "tray"?"#);
 }
 
 #[test]
 fn invalid_joints_and_parts_are_refused() {
-    let refusal = |joint, target| suite(joint, target, "arm:wait(1)").refusal("x.lua --out run");
+    let refusal = |joint, target| suite(joint, target, "arm:wait(1)").run("x.lua").error();
     assert_snapshot!(refusal("softvt.slider { axis = { 0, -1, 0 }, lower = 0 }", "chest"), @"x.lua:5: slider.upper: missing; expected metres");
     assert_snapshot!(refusal(TRAY, "chest.drawer"), @r#"x.lua:13: task.goal.target: unknown object "chest.drawer"; did you mean "chest.tray"?"#);
 }
@@ -135,36 +133,35 @@ return softvt.experiment {
 "#;
 
 /// Numbers of a list.
-fn numbers(list: &serde_json::Value) -> Vec<f64> {
-    list.as_array().into_iter().flatten().filter_map(serde_json::Value::as_f64).collect()
+fn numbers(list: &Value) -> Vec<f64> {
+    list.as_array().into_iter().flatten().filter_map(Value::as_f64).collect()
 }
 
 #[test]
 fn pad_forces_are_the_normal_forces_at_all_contacts_of_a_pad() {
-    let output = Project::new(&[("handle.lua", HANDLE)]).succeeds("handle.lua --json");
-    assert!(!output.out.contains("[-0.0,"), "{}", output.out);
-    let rows: Vec<serde_json::Value> =
-        output.out.lines().map(|line| serde_json::from_str(line).expect("a row")).collect();
+    let rows = Project::new(&[("handle.lua", HANDLE)]).run("handle.lua").rows();
+    let text = serde_json::to_string(&rows).expect("JSON");
+    assert!(!text.contains("[-0.0,"), "{text}");
     let case = |name: &str| rows.iter().find(|row| row["case"] == name).expect("both cases");
     for side in 0..2 {
         let row = case("grip");
         let force = numbers(&row["arm"])[side];
-        assert!(force > 1.0, "both pads hold the bar: {row}");
+        assert!(force > 1.0, "both pads hold the bar: {row:?}");
         // Each pad touches the handle alone.
-        assert_eq!(numbers(&row["handle"])[side], force, "{row}");
-        assert_eq!(numbers(&row["on"])[side], force, "{row}");
+        assert_eq!(numbers(&row["handle"])[side], force, "{row:?}");
+        assert_eq!(numbers(&row["on"])[side], force, "{row:?}");
         // The normals of a bar of 4.5 mm radius, 0.4 mm deep in the gel, are within 25° of the pressing direction.
         let pressing = -numbers(&row["gel"][side])[2];
-        assert!(force >= pressing && force < 1.03 * pressing, "{row}");
+        assert!(force >= pressing && force < 1.03 * pressing, "{row:?}");
     }
     let row = case("edge");
     let side =
         (0..2).max_by(|a, b| numbers(&row["arm"])[*a].total_cmp(&numbers(&row["arm"])[*b])).unwrap_or(0);
     let (force, gel) = (numbers(&row["arm"])[side], numbers(&row["gel"][side]));
-    assert!(force > 1.0 && numbers(&row["on"])[side] == force, "{row}");
+    assert!(force > 1.0 && numbers(&row["on"])[side] == force, "{row:?}");
     // Without friction the force on the gel is the vector sum of the normal forces, here of nearly one direction.
     let resultant = gel.iter().map(|component| component * component).sum::<f64>().sqrt();
-    assert!(resultant <= force && force < 1.02 * resultant, "{row}");
+    assert!(resultant <= force && force < 1.02 * resultant, "{row:?}");
     // The direction is oblique: the component along the pad's axis is much smaller.
-    assert!(force > 1.5 * -gel[2], "{row}");
+    assert!(force > 1.5 * -gel[2], "{row:?}");
 }

@@ -1,6 +1,11 @@
 //! Suites whose objects vary from episode to episode: records, names, reproducibility, and what is refused.
 
-use serde_json::Value;
+use softvt::{
+    records::record::EpisodeRecord,
+    report::condition_table::{compares_policies, controllers_table},
+    scene::ObjectVariation,
+    script::STANDARD_VARIATION,
+};
 
 use crate::support::{Project, Small};
 
@@ -8,33 +13,32 @@ fn project() -> Project {
     Small::default().project()
 }
 
-fn drawn<'a>(episode: &'a Value, factor: &str) -> &'a Value {
-    &episode["variation"]["objects"]["cube"][factor]
+/// What was drawn for the cube.
+fn drawn(episode: &EpisodeRecord) -> &ObjectVariation {
+    &episode.header.variation.as_ref().expect("it varies").objects["cube"]
 }
 
 #[test]
 fn records_have_the_drawn_numbers_and_the_suite_a_name_of_its_own() {
     let project = project();
-    for (out, threads) in [("one", 1), ("two", 2)] {
-        project.succeeds(&format!("x.lua --vary --episodes 3 --threads {threads} --out {out}"));
-    }
+    let [episodes, _] = [("one", 1), ("two", 2)].map(|(out, threads)| {
+        project.run("x.lua").vary(STANDARD_VARIATION).episodes(3).threads(threads).out(out).records()
+    });
     assert_eq!(project.text("one/episodes.jsonl"), project.text("two/episodes.jsonl"));
-    let episodes = project.lines("one/episodes.jsonl");
-    let scales: Vec<f64> = episodes.iter().map(|e| drawn(e, "scale").as_f64().expect("a number")).collect();
+    let scales: Vec<f64> = episodes.iter().map(|episode| drawn(episode).scale).collect();
     assert!(scales.iter().all(|scale| (0.88..=1.12).contains(scale)), "{scales:?}");
     assert!(scales[0] != scales[1] && scales[1] != scales[2], "{scales:?}");
-    assert!(episodes.iter().all(|episode| episode["suite"] == "one_varied"));
+    assert!(episodes.iter().all(|episode| episode.header.id.suite == "one_varied"));
     let manifest = project.json("one/run.json");
     assert_eq!(manifest["variation"]["size"]["max"], 1.12);
     assert_eq!(manifest["suite"], "one");
-    let replayed = project.succeeds("replay one 0/1");
-    assert!(!replayed.out.is_empty());
+    assert!(project.is_reproduced("one", "0/1"));
 }
 
 #[test]
 fn a_suite_without_variation_has_no_drawn_numbers() {
     let project = project();
-    project.succeeds("x.lua --out run");
+    assert_eq!(project.run("x.lua").out("run").record().header.variation, None);
     let text = project.text("run/episodes.jsonl");
     assert!(text.contains(r#""suite":"one""#) && !text.contains("variation"), "{text}");
     assert!(project.json("run/run.json")["variation"].is_null());
@@ -46,28 +50,23 @@ fn a_variation_in_a_file_replaces_the_standard_one() {
     let ranges = r#"return softvt.variation { name = "small", size = { 0.5, 0.5 }, stiffness = { 2, 2 }, density = { 1, 1 },
         friction = { 1, 1 }, colour = 0, light = { 1, 1 }, camera_offset = 0, camera_rotation = 0 }"#;
     project.write("small.lua", ranges.as_bytes());
-    project.succeeds("x.lua --vary=small.lua --out run");
-    let episode = &project.lines("run/episodes.jsonl")[0];
-    assert_eq!(
-        (drawn(episode, "scale"), drawn(episode, "youngs_factor")),
-        (&Value::from(0.5), &Value::from(2.0))
-    );
+    let episode = project.run("x.lua").vary("small.lua").record();
+    assert_eq!((drawn(&episode).scale, drawn(&episode).youngs_factor), (0.5, 2.0));
     project.write("small.lua", ranges.replace("{ 2, 2 }", "{ 2, 1 }").as_bytes());
-    let message = project.refusal("x.lua --vary=small.lua --out other");
+    let message = project.run("x.lua").vary("small.lua").error();
     assert!(message.contains("small.lua:1") && message.contains("variation.stiffness"), "{message}");
 }
 
 #[test]
 fn what_cannot_vary_is_refused_before_anything_runs() {
     let project = project();
-    for (words, reason) in [
-        ("suites/object_rigid.lua --vary", "suite object_rigid has object_type = \"rigid\""),
-        ("suites/object_varied.lua --vary", "suite object_varied varies already"),
-        ("scripts/imprints.lua --vary", "experiment"),
-        ("x.lua --vary=nowhere.lua", "nowhere.lua"),
+    for (script, variation, reason) in [
+        ("suites/object_rigid.lua", STANDARD_VARIATION, "suite object_rigid has object_type = \"rigid\""),
+        ("suites/object_varied.lua", STANDARD_VARIATION, "suite object_varied varies already"),
+        ("x.lua", "nowhere.lua", "nowhere.lua"),
     ] {
-        let message = project.refusal(&format!("{words} --out run"));
-        assert!(message.contains("--vary") && message.contains(reason), "{words}: {message}");
+        let message = project.run(script).vary(variation).out("run").error();
+        assert!(message.contains("--vary") && message.contains(reason), "{script}: {message}");
     }
     assert!(!project.path("run").exists());
 }
@@ -82,20 +81,23 @@ fn conditions_may_name_a_built_in_policy() {
         )
     };
     project.write("trial.lua", plan("noop").as_bytes());
-    project.succeeds("trial.lua --out run");
+    let tables = project.run("trial.lua").out("run").conditions().expect("valid");
     let policy = |folder: &str| project.lines(&format!("run/{folder}/episodes.jsonl"))[0]["policy"].clone();
-    assert_eq!((policy("reference"), policy("other")), (Value::from("expert"), Value::from("noop")));
+    assert_eq!((policy("reference"), policy("other")), ("expert".into(), "noop".into()));
+    assert_eq!(tables[0].rows[1].policy.as_deref(), Some("noop"));
     assert_eq!(project.json("run/conditions.json")["suites"][0]["rows"][1]["policy"], "noop");
-    let printed = project.succeeds("trial.lua --out other").out;
+    assert!(compares_policies(&tables));
+    let printed = controllers_table(&tables);
     assert!(printed.contains("controller") && !printed.contains("change from the reference"), "{printed}");
     project.write("trial.lua", plan("size-seen").as_bytes());
-    let printed = project.succeeds("trial.lua --out blind").out;
+    let tables = project.run("trial.lua").out("blind").conditions().expect("valid");
+    let printed = controllers_table(&tables);
     assert!(
         printed.contains("\nother *") && printed.contains("best without touch, one: other, Safety"),
         "{printed}"
     );
     project.write("trial.lua", plan("exprt").as_bytes());
-    let message = project.refusal("trial.lua --out again");
+    let message = project.run("trial.lua").out("again").conditions().expect_err("no such policy");
     assert!(
         message.contains("condition \"other\": policy:") && message.contains("did you mean expert?"),
         "{message}"
@@ -105,15 +107,15 @@ fn conditions_may_name_a_built_in_policy() {
 #[test]
 fn an_expert_that_ignores_the_controller_is_refused_at_its_grasp() {
     let project = Small { expert: "arm:grasp(0.5)", ..Small::default() }.project();
-    let message = project.refusal("x.lua --policy size-seen --out run");
+    let message = project.run("x.lua").policy("size-seen").error();
     assert!(
         message.contains("x.lua:12") && message.contains("has no grip for --policy size-seen"),
         "{message}"
     );
     let expert = "local name = arm.grip_controller arm:note(\"length\", #name) arm:grasp(0.5)";
     let project = Small { expert, ..Small::default() }.project();
-    project.succeeds("x.lua --policy contact-depth --out run");
-    assert_eq!(project.lines("run/episodes.jsonl")[0]["notes"]["length"], 13.0);
+    let record = project.run("x.lua").policy("contact-depth").out("run").record();
+    assert_eq!(record.stats.notes["length"], 13.0);
     let manifest = project.json("run/run.json");
     assert_eq!((&manifest["privileged"], &manifest["policy"]), (&true.into(), &"contact-depth".into()));
 }

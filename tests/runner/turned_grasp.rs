@@ -32,12 +32,10 @@ fn a_turned_grasp_is_as_gentle_as_a_straight_one() {
     let project = Project::new(&[]);
     let grasp = |name: &str, post_x: &str| {
         project.write(&format!("{name}.lua"), SUITE.replace("POST_X", post_x).as_bytes());
-        project.succeeds(&format!("{name}.lua --out {name}"));
-        let episode = &project.lines(&format!("{name}/episodes.jsonl"))[0];
-        assert_eq!(episode["safety"], true, "{episode}");
-        let share = episode["d_peak"].as_f64().expect("measured") / episode["tau"].as_f64().expect("a limit");
-        let width_mm = episode["notes"]["grip_width_mm"].as_f64().expect("a width");
-        (share, width_mm)
+        let record = project.run(&format!("{name}.lua")).record();
+        assert!(record.verdict.safety, "{record:?}");
+        let share = record.verdict.d_peak.expect("measured") / record.verdict.tau.expect("a limit");
+        (share, record.stats.notes["grip_width_mm"])
     };
     let (straight, turned) = (grasp("straight", "0.06"), grasp("turned", "0.022"));
     // The loaf is longer along the closing direction of the turned hand.

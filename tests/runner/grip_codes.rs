@@ -1,5 +1,7 @@
 //! The grip code force in an episode: the pads press on a soft cube with the force that the policy commands.
 
+use softvt::{policy::profile::GripCode, runner::TraceDetail};
+
 use crate::support::Small;
 
 /// Lowers the hand over the cube, closes with 3 N, lifts it, presses with 5 N, and opens.
@@ -23,7 +25,7 @@ return softvt.policy {
 fn the_pads_press_with_the_commanded_force() {
     let project = Small { task: "budget_steps = 230", ..Small::default() }.project();
     project.write("force.lua", POLICY.as_bytes());
-    project.succeeds("x.lua --policy force.lua --out run --trace");
+    project.run("x.lua").policy("force.lua").out("run").trace(TraceDetail::State).record();
     let trace = project.lines("run/trace/task_000/episode_00000.jsonl");
     let force = |step: usize| -> [f64; 2] {
         std::array::from_fn(|side| trace[step]["pad_force_n"][side].as_f64().expect("a force"))
@@ -42,11 +44,11 @@ fn the_pads_press_with_the_commanded_force() {
     // The bound of the gripper's own tests: a tenth of the force, and 0.1 N.
     assert!(most < 1.1 * 3.0 + 0.1, "overshoot: {most} N");
     assert_eq!(force(228), [0.0; 2], "opened");
-    assert!(project.succeeds("replay run 0/0").out.contains("byte-identical"));
+    assert!(project.is_reproduced("run", "0/0"));
 }
 
 #[test]
-fn the_grip_code_of_a_lua_policy_is_its_own_or_that_of_the_command_line() {
+fn the_grip_code_of_a_lua_policy_is_its_own_or_that_of_the_run() {
     // 0.6 is closed in the code binary.
     let policy = |declared: &str| {
         format!(
@@ -57,19 +59,19 @@ fn the_grip_code_of_a_lua_policy_is_its_own_or_that_of_the_command_line() {
     let project = Small { task: "budget_steps = 10", ..Small::default() }.project();
     project.write("plain.lua", policy("").as_bytes());
     project.write("binary.lua", policy("gripper = 'binary',").as_bytes());
-    for (name, words, code, closure) in [
-        ("a", "plain.lua", None, 0.6),
-        ("b", "binary.lua", Some("binary"), 1.0),
-        ("c", "plain.lua --gripper binary", Some("binary"), 1.0),
-        ("d", "binary.lua --gripper continuous", Some("continuous"), 0.6),
+    for (name, policy, given, code, closure) in [
+        ("a", "plain.lua", None, None, 0.6),
+        ("b", "binary.lua", None, Some("binary"), 1.0),
+        ("c", "plain.lua", Some(GripCode::Binary), Some("binary"), 1.0),
+        ("d", "binary.lua", Some(GripCode::Continuous), Some("continuous"), 0.6),
     ] {
-        let output = project.succeeds(&format!("x.lua --policy {words} --trace --out {name}"));
-        assert_eq!(project.json(&format!("{name}/run.json"))["gripper"].as_str(), code, "{words}");
-        assert_eq!(output.err.contains("gripper: "), code.is_some(), "{words}: {}", output.err);
+        let run = project.run("x.lua").policy(policy).with_policy(|policy| policy.gripper = given);
+        run.trace(TraceDetail::State).out(name).record();
+        assert_eq!(project.json(&format!("{name}/run.json"))["gripper"].as_str(), code, "{name}");
         let trace = project.lines(&format!("{name}/trace/task_000/episode_00000.jsonl"));
-        assert_eq!(trace[3]["closure"].as_f64(), Some(closure), "{words}: {}", trace[3]);
+        assert_eq!(trace[3]["closure"].as_f64(), Some(closure), "{name}: {}", trace[3]);
     }
-    let message = project.refusal("x.lua --policy plain.lua --gripper force --out e");
+    let message = project.run("x.lua").policy("plain.lua").gripper(GripCode::Force).error();
     assert!(
         message
             .contains("plain.lua:1: policy.act: the grip code of the policy is \"force\"; give force alone"),

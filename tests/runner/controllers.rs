@@ -1,7 +1,5 @@
 //! The order of the reference controllers: what a suite needs of a grip, by arithmetic and by episodes.
 
-use serde_json::Value;
-
 use crate::support::Project;
 
 /// Controllers without touch.
@@ -11,12 +9,12 @@ const BLIND: [&str; 6] =
 /// Mean over the kinds of a suite by column of `scripts/blind_bounds.lua`.
 fn bounds(suite: &str) -> impl Fn(&str) -> f64 {
     let project = Project::new(&[]);
-    let words = format!("scripts/blind_bounds.lua --suite {suite} --instances 400 --json");
-    let text = project.succeeds(&words).out;
-    let rows: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).expect("a row")).collect();
-    assert!(rows.len() >= 5, "{text}");
+    let options = format!("--suite={suite} --instances=400");
+    let rows = project.run("scripts/blind_bounds.lua").options(&options).rows();
+    assert!(rows.len() >= 5, "{rows:?}");
     move |column: &str| {
-        let values = rows.iter().map(|row| row[column].as_f64().unwrap_or_else(|| panic!("{column}: {row}")));
+        let values =
+            rows.iter().map(|row| row[column].as_f64().unwrap_or_else(|| panic!("{column}: {row:?}")));
         values.sum::<f64>() / rows.len() as f64
     }
 }
@@ -41,10 +39,9 @@ fn the_varied_suite_needs_the_size_and_the_hidden_ones_touch_by_arithmetic() {
 /// Number of safe episodes of a policy on the first episode of every task of Object-Hidden.
 fn safe_episodes(policy: &str) -> usize {
     let project = Project::new(&[]);
-    project.succeeds(&format!("suites/object_hidden.lua --episodes 1 --policy {policy} --out run"));
-    let episodes = project.lines("run/episodes.jsonl");
+    let episodes = project.run("suites/object_hidden.lua").episodes(1).policy(policy).records();
     assert_eq!(episodes.len(), 10);
-    episodes.iter().filter(|episode| episode["safety"] == true).count()
+    episodes.iter().filter(|episode| episode.verdict.safety).count()
 }
 
 #[test]
@@ -68,8 +65,12 @@ fn only_the_expert_and_a_hand_that_feels_are_safe_where_touch_is_needed() {
 #[test]
 fn bounds_of_suites_that_have_none_are_refused() {
     let project = Project::new(&[]);
-    let message = project.refusal("scripts/blind_bounds.lua --suite object_rigid");
+    let refusal = |options: &str| {
+        let (_, outcome) = project.run("scripts/blind_bounds.lua").options(options).experiment();
+        outcome.expect_err("no bounds")
+    };
+    let message = refusal("--suite=object_rigid");
     assert!(message.contains("no goal object of these suites has a calibrated window"), "{message}");
-    let message = project.refusal("scripts/blind_bounds.lua --suite all");
+    let message = refusal("--suite=all");
     assert!(message.contains("suites/all.lua returns a list of suites"), "{message}");
 }

@@ -44,12 +44,10 @@ return softvt.experiment {
 
 #[test]
 fn standard_objects_neither_chatter_nor_turn_inside_out_in_a_shut_hand() {
-    let output = Project::new(&[("shut.lua", SHUT)]).succeeds("shut.lua --json");
-    let rows: Vec<serde_json::Value> =
-        output.out.lines().map(|line| serde_json::from_str(line).expect("a row")).collect();
+    let rows = Project::new(&[("shut.lua", SHUT)]).run("shut.lua").rows();
     assert_eq!(rows.len(), 3);
     for row in rows {
-        let number = |key: &str| row[key].as_f64().unwrap_or_else(|| panic!("{key} in {row}"));
-        assert!(number("mm_s") < 5.0 && number("det_f") > 0.1 && number("force_n") > 10.0, "{row}");
+        let number = |key: &str| row[key].as_f64().unwrap_or_else(|| panic!("{key} in {row:?}"));
+        assert!(number("mm_s") < 5.0 && number("det_f") > 0.1 && number("force_n") > 10.0, "{row:?}");
     }
 }

@@ -1,0 +1,69 @@
+//! Validity of the benchmark on small suites: policies and objects that must fail do so, for the right reason.
+
+use softvt::{
+    evaluation::verdict::{Outcome, Verdict},
+    records::record::EpisodeRecord,
+};
+
+use crate::support::{Project, Run, SPATIAL_SOFT};
+
+/// Episodes of two tasks of different pairs.
+fn episodes(change: impl FnOnce(Run) -> Run) -> Vec<EpisodeRecord> {
+    let project = Project::new(&[]);
+    let records = change(project.run(SPATIAL_SOFT).tasks(&[0, 9]).episodes(1)).records();
+    assert_eq!(records.len(), 2);
+    records
+}
+
+fn all(episodes: &[EpisodeRecord], is_so: impl Fn(&Verdict) -> bool) -> bool {
+    episodes.iter().all(|episode| is_so(&episode.verdict))
+}
+
+fn d_peak(episode: &EpisodeRecord) -> f64 {
+    episode.verdict.d_peak.expect("a soft target")
+}
+
+#[test]
+fn noop_and_random_never_succeed() {
+    for policy in ["noop", "random"] {
+        let episodes = episodes(|run| run.policy(policy));
+        assert!(all(&episodes, |verdict| !verdict.goal && !verdict.safety), "{policy}: {episodes:?}");
+        assert!(episodes.iter().all(|e| e.outcome == Outcome::Budget), "{policy}: {episodes:?}");
+    }
+}
+
+#[test]
+fn stiffer_objects_deform_less() {
+    let soft = episodes(|run| run);
+    assert!(all(&soft, |verdict| verdict.safety), "{soft:?}");
+    let stiff = episodes(|run| run.shift("stiffness", 10.0));
+    assert!(all(&stiff, |verdict| verdict.goal), "{stiff:?}");
+    for (soft, stiff) in soft.iter().zip(&stiff) {
+        assert!(d_peak(stiff) < 0.5 * d_peak(soft), "{soft:?}\n{stiff:?}");
+        assert_eq!(soft.verdict.tau, stiff.verdict.tau, "the threshold stays nominal");
+        assert!(soft.verdict.tau.is_some());
+    }
+}
+
+#[test]
+fn a_binary_gripper_reaches_the_goal_unsafely() {
+    let (careful, binary) = (episodes(|run| run), episodes(|run| run.policy("expert-binary")));
+    for (careful, binary) in careful.iter().zip(&binary) {
+        assert!(d_peak(binary) > d_peak(careful), "{careful:?}\n{binary:?}");
+    }
+    assert!(all(&binary, |verdict| verdict.goal && !verdict.safety), "{binary:?}");
+}
+
+#[test]
+fn nothing_is_carried_without_friction() {
+    let episodes = episodes(|run| {
+        run.shift("friction", 0.0).set("robot.pads.static_mu", 0).set("robot.pads.dynamic_mu", 0)
+    });
+    assert!(all(&episodes, |verdict| !verdict.goal), "{episodes:?}");
+}
+
+#[test]
+fn weak_fingers_carry_nothing() {
+    let episodes = episodes(|run| run.set("robot.gripper.effort", 0.2));
+    assert!(all(&episodes, |verdict| !verdict.goal), "{episodes:?}");
+}

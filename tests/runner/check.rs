@@ -1,0 +1,169 @@
+//! The check of a script finds its errors without running it, with file and line.
+
+use insta::assert_snapshot;
+
+use crate::support::{Project, Small};
+
+/// The message with which the check refuses a project.
+fn refusal(project: &Project) -> String {
+    project.message(project.run("x.lua").check())
+}
+
+fn of(small: Small) -> String {
+    refusal(&small.project())
+}
+
+/// What the check warns of, in a project that is valid.
+fn warnings(project: &Project) -> String {
+    project.run("x.lua").check().expect("valid").join("\n")
+}
+
+#[test]
+fn errors_of_a_run_are_found_by_the_check() {
+    let text = Small::default().text();
+    let check = |from: &str, to: &str| {
+        assert!(text.contains(from), "{from}");
+        refusal(&Project::new(&[("x.lua", &text.replace(from, to))]))
+    };
+    assert_snapshot!(check("target = \"post\"", "target = \"cube\""), @r#"x.lua:10: task.goal.target: is "cube", which is the object itself; name what it must reach"#);
+    assert_snapshot!(check("object = \"cube\"", "object = \"floor\""), @r#"x.lua:10: task.goal.object: "floor" never moves; name an object whose body is softvt.soft or softvt.rigid"#);
+    assert_snapshot!(check("object = \"cube\"", "object = \"cub\""), @r#"x.lua:10: task.goal.object: unknown object "cub"; did you mean "cube"?"#);
+    assert_snapshot!(check("(scene)\n", "(scene) scene.start_q[4] = 0\n"), @"x.lua:4: scene.start_q[4]: expected radians in -3.0718..-0.0698, the limits of panda_link4, got 0");
+    assert_snapshot!(check("tasks = {", "tasks = {}, shifts = {"), @r#"x.lua:9: suite.shifts[1]: expected the result of softvt.shift{…}, got a table"#);
+}
+
+#[test]
+fn invalid_scenes_are_found_without_settling() {
+    assert_snapshot!(of(Small { at: "position = { 0, 0.1, -0.012 }", ..Small::default() }), @"x.lua:6: objects cube and floor (placed at x.lua:5) overlap by 12 mm at the start; move them apart");
+    let thin = of(Small {
+        shape: "softvt.shape.box { size = { 0.04, 0.04, 0.003 } }:grounded()",
+        ..Small::default()
+    });
+    assert!(thin.starts_with("x.lua:6: asset cube: it is 3 mm thick, thinner than a voxel"), "{thin}");
+    let inside = of(Small {
+        at: "at = { 0, 0.1 } } scene:add_camera { name = \"in\", position = { 0, 0.1, 0.02 }, look_at = { 1, 0, 0 }",
+        ..Small::default()
+    });
+    assert_snapshot!(inside, @"x.lua: task 0, episode 0: x.lua:6: camera in: position: it is inside cube; move it out");
+    let beside = of(Small { at: "position = { 0, -1, 0 }", ..Small::default() });
+    assert_snapshot!(beside, @"x.lua:6: object cube at (0, -1) m has nothing below it; place it above a support");
+    let below = of(Small { at: "position = { 0, 0.1, -0.3 }", ..Small::default() });
+    assert_snapshot!(below, @"x.lua:6: object cube at (0, 0.1) m has nothing below it; place it above a support");
+    let base = of(Small { at: "position = { -0.6, 0, 0.05 }", ..Small::default() });
+    assert_snapshot!(base, @"x.lua:6: object cube starts inside of the robot's base; move it away");
+    let dust = of(Small {
+        shape: "softvt.shape.box { size = { 4e-5, 4e-5, 4e-5 } }:grounded()",
+        ..Small::default()
+    });
+    assert_snapshot!(dust, @"x.lua:6: asset cube: it is 4.0e-5 m long, expected at least 0.001 m; sizes are in metres (a mesh has a scale)");
+    let hand = of(Small { at: "position = { -0.187, 0.03, 0.29 }", ..Small::default() });
+    assert!(hand.starts_with("x.lua:6: object cube starts inside of the robot's hand ("), "{hand}");
+}
+
+#[test]
+fn thin_rigid_walls_are_refused() {
+    let text = |size: &str| {
+        let text = Small::default().text().replace(
+            "body = softvt.soft { youngs_pa = 2e4, poisson = 0.3, density",
+            "body = softvt.rigid { density",
+        );
+        text.replace("{ 0.04, 0.04, 0.04 } }", size)
+    };
+    let refused = |size: &str| refusal(&Project::new(&[("x.lua", &text(size))]));
+    assert_snapshot!(refused("{ 0.04, 0.04, 0.0005 } }"), @"x.lua:6: asset cube: it is about 0.6 mm thick, or its walls are, expected at least 2 mm: other bodies may pass through thinner ones");
+    assert!(refused("{ 0.06, 0.06, 0.04 } }:shell(0.001)").contains("its walls are, expected at least 2 mm"));
+    warnings(&Project::new(&[("x.lua", &text("{ 0.04, 0.04, 0.003 } }"))]));
+}
+
+#[test]
+fn rigid_suites_refuse_soft_targets() {
+    let text = Small::default().text().replace("\"deformable\"", "\"rigid\"");
+    let project = Project::new(&[("x.lua", &text)]);
+    let expected = "x.lua:6: the target of task 0, cube, is soft, but suite one has object_type = \"rigid\"; set \"deformable\"";
+    assert_eq!(refusal(&project), expected);
+    assert_eq!(project.run("x.lua").error(), expected);
+}
+
+#[test]
+fn a_soft_body_of_two_pieces_is_refused() {
+    let ball = "softvt.shape.sphere { radius = 0.02 }";
+    let shape = format!("{ball}:union({ball}:translate(0.08, 0, 0)):grounded()");
+    let text = Small::default().text().replace(Small::default().shape, &shape);
+    let message = refusal(&Project::new(&[("x.lua", &text)]));
+    assert!(message.starts_with("x.lua:6: asset cube: its voxel mesh has 2 separate pieces, "), "{message}");
+}
+
+#[test]
+fn a_soft_body_of_few_voxels_across_is_doubted() {
+    let tube = |material: &'static str| {
+        let shape = "softvt.shape.cylinder { radius = 0.03, height = 0.04 }\
+                     :subtract(softvt.shape.cylinder { radius = 0.02, height = 0.1 }):grounded()";
+        warnings(&Small { shape, material, ..Small::default() }.project())
+    };
+    let coarse = tube("youngs_pa = 4e4, poisson = 0.3, density = 300, resolution = 8");
+    let expected = "asset cube: most of it is less than two voxels thick (10";
+    assert!(coarse.contains(expected) && coarse.contains("a voxel is 7.5 mm"), "{coarse}");
+    let fine = tube("youngs_pa = 4e4, poisson = 0.3, density = 300, resolution = 16");
+    assert!(!fine.contains("voxels"), "{fine}");
+}
+
+#[test]
+fn implausible_units_and_wide_objects_are_doubted() {
+    let of = |small: Small| warnings(&small.project());
+    let light = of(Small { material: "youngs_pa = 40, poisson = 0.3, density = 0.3", ..Small::default() });
+    assert!(
+        light.contains("asset cube: youngs_pa is 40 Pa, softer than a gel; did you mean 40 kPa"),
+        "{light}"
+    );
+    assert!(
+        light.contains("asset cube: density is 0.3 kg/m³, lighter than foam; did you mean 0.3 g/cm³"),
+        "{light}"
+    );
+    let wide =
+        of(Small { shape: "softvt.shape.box { size = { 0.12, 0.1, 0.04 } }:grounded()", ..Small::default() });
+    assert!(wide.contains("asset cube: it is 100 mm wide, and the gripper opens 80 mm"), "{wide}");
+    assert_eq!(of(Small::default()), "");
+    let soft = of(Small { material: "youngs_pa = 600, poisson = 0.3, density = 900", ..Small::default() });
+    assert!(soft.contains("asset cube: it sags to about 71 % of its height under its own weight"), "{soft}");
+    let ball = "softvt.shape.sphere { radius = 0.02 }";
+    let text = Small::default()
+        .text()
+        .replace(Small::default().shape, &format!("{ball}:union({ball}:translate(0.06, 0, 0)):grounded()"))
+        .replace("softvt.soft { youngs_pa = 2e4, poisson = 0.3,", "softvt.rigid {");
+    let pieces = warnings(&Project::new(&[("x.lua", &text)]));
+    assert!(pieces.contains("asset cube: its shape has 2 separate pieces, "), "{pieces}");
+}
+
+#[test]
+fn a_scene_of_too_many_nodes_is_refused_with_its_cost() {
+    let of_resolution = |resolution: u32| {
+        let material = format!(
+            "resolution = {resolution}, grasp_spacing = 0.01, youngs_pa = 2e4, poisson = 0.3, density"
+        );
+        let text = Small::default().text().replace("youngs_pa = 2e4, poisson = 0.3, density", &material);
+        Project::new(&[("x.lua", &text)])
+    };
+    let refused = refusal(&of_resolution(40));
+    assert!(
+        refused.starts_with("x.lua:6: asset cube: its voxel mesh has 68921 nodes, which need about ")
+            && refused.ends_with(
+                " s of processor time per simulated second, expected at most 40000; give a lower resolution"
+            ),
+        "{refused}"
+    );
+    let slow = warnings(&of_resolution(21));
+    assert!(
+        slow.contains("task 0: the soft bodies of the scene have 10648 nodes, which need about "),
+        "{slow}"
+    );
+    assert!(!warnings(&of_resolution(12)).contains("nodes"));
+    // Two bodies share the limit.
+    let project = of_resolution(28);
+    let pair = "scene:add { name = \"post\"";
+    let text = project
+        .text("x.lua")
+        .replace(pair, &format!("scene:add {{ name = \"twin\", asset = cube, at = {{ 0, -0.1 }} }} {pair}"));
+    project.write("x.lua", text.as_bytes());
+    let both = refusal(&project);
+    assert!(both.starts_with("x.lua:7: the soft bodies of the scene have 48778 nodes"), "{both}");
+}

@@ -1,0 +1,27 @@
+//! Tests of runs by the library: how episodes are judged, what policies and experts do, messages for invalid input, datasets,
+//! reports and servers, with typed results.
+
+mod articulated_objects;
+mod benchmark_validity;
+mod calibration;
+mod cheats;
+mod check;
+mod conditions;
+mod controllers;
+mod determinism;
+mod expert_failure;
+mod external_scorer;
+mod grip_codes;
+mod initial_state_coverage;
+mod invalid_scenes;
+mod invalid_scripts;
+mod judging;
+mod observations;
+mod policies;
+mod reports;
+mod script_timeouts;
+mod shut_hand;
+mod support;
+mod tactile_forces;
+mod turned_grasp;
+mod varied_suites;

@@ -1,0 +1,332 @@
+//! Policies in Lua, recorded actions and the tactile servo.
+
+use std::{net::TcpListener, time::Duration};
+
+use softvt::{
+    evaluation::{stage::Stage, verdict::Outcome},
+    policy::{profile::GripCode, remote::Protocol},
+    records::record::EpisodeRecord,
+    report::comparison,
+};
+
+use crate::support::{Project, Run, Small};
+
+/// Twelve control steps of a cube on a floor.
+fn project(policy: &str) -> Project {
+    let project = Small { task: "budget_steps = 12", ..Small::default() }.project();
+    project.write("p.lua", policy.as_bytes());
+    project
+}
+
+/// A policy that moves at random, depending on its observation, in chunks of three.
+const WANDERS: &str = "local n = 0
+return softvt.policy { name = 'wanders', observes = { tactile = true, cameras = { 'wrist' } }, replan = 2,
+  reset = function(task) n = task.episode end,
+  act = function(obs)
+    n = n + 1
+    local light, list = obs:camera('wrist'):mean()[1] / 255, {}
+    for i = 1, 3 do
+      list[i] = { position = { obs.position[1] + 0.01 * math.random(), obs.position[2], obs.position[3] - 0.001 * n * light },
+                  axis_angle = obs.axis_angle, closure = 0.1 * math.random() }
+    end
+    return list
+  end }
+";
+
+#[test]
+fn results_do_not_depend_on_threads_or_interruptions() {
+    let project = project(WANDERS);
+    let run = || project.run("x.lua").policy("p.lua").episodes(3);
+    run().threads(1).out("one").finish();
+    run().threads(2).out("two").finish();
+    // The state after a crash in the second episode.
+    run().threads(1).out("three").finish();
+    let first = project.text("three/episodes.jsonl").lines().next().expect("a line").to_owned() + "\n";
+    project.write("three/episodes.jsonl", first.as_bytes());
+    std::fs::remove_file(project.path("three/summary.json")).expect("removed");
+    assert_eq!(run().threads(2).resume().out("three").records().len(), 3);
+    for file in ["run.json", "episodes.jsonl", "summary.json"] {
+        let one = project.text(&format!("one/{file}"));
+        assert_eq!(one, project.text(&format!("two/{file}")), "{file} on two threads");
+        assert_eq!(one, project.text(&format!("three/{file}")), "{file} resumed");
+    }
+    let info = project.json("one/run.json");
+    assert_eq!((info["policy"].as_str(), info["privileged"].as_bool()), (Some("wanders"), Some(false)));
+    let file = info["policy_file"].as_str().expect("a path");
+    assert_eq!((project.relative(file).as_str(), info["replan"].as_u64()), ("p.lua", Some(2)));
+    assert!(info["sources"][file].as_str().is_some_and(|hash| hash.len() == 64));
+    assert!(project.is_reproduced("one", "0/2"));
+    project.write("p.lua", WANDERS.replace("0.01", "0.02").as_bytes());
+    let message = run().resume().out("three").error();
+    assert!(message.contains("belongs to another run: sources.p.lua"), "{message}");
+}
+
+#[test]
+fn policies_see_sensor_noise_that_does_not_depend_on_threads() {
+    // It moves by the noise of the markers.
+    let policy = project(
+        "return softvt.policy { name = 'feels', observes = { tactile = true }, act = function(obs)
+  local motion = obs.tactile.left.markers:mean()
+  local p = obs.position
+  return { position = { p[1] + 0.01 * motion[1], p[2], p[3] }, axis_angle = obs.axis_angle, closure = 0 }
+end }
+",
+    );
+    let run = || policy.run("x.lua").policy("p.lua").episodes(3).threads(1);
+    let noisy = || run().set("tactile.wear.noise_px", 0.1).set("tactile.wear.image_noise", 1);
+    run().out("exact").finish();
+    run().set("tactile.wear.noise_px", 0).out("off").finish();
+    noisy().out("one").finish();
+    noisy().threads(2).out("two").finish();
+    noisy().seed(1).out("seeded").finish();
+    let [exact, off, one, two, seeded] = ["exact", "off", "one", "two", "seeded"].map(|out| {
+        std::fs::read(policy.path(&format!("{out}/actions/task_000/episode_00000.npy"))).expect("actions")
+    });
+    assert_eq!((&exact, &one), (&off, &two));
+    assert!(one != exact && one != seeded);
+    assert!(policy.is_reproduced("one", "0/2"));
+}
+
+#[test]
+fn a_failing_policy_ends_the_run_and_keeps_finished_episodes() {
+    let good = "return { position = obs.position, axis_angle = obs.axis_angle, closure = 0 }";
+    for (bad, output) in [
+        ("error 'lost'", "p.lua:3: lost"),
+        ("return 7", "p.lua:2: policy.act: expected an action or a list of actions, got 7"),
+        ("while true do end", "p.lua:3: the script ran for more than 5 s"),
+    ] {
+        let project = project(&format!(
+            "local episode\nreturn softvt.policy {{ name = 'p', reset = function(t) episode = t.episode end, act = function(obs)\nif episode == 1 then {bad} end {good} end }}"
+        ));
+        let message = project.run("x.lua").policy("p.lua").episodes(2).threads(1).out("run").error();
+        assert!(
+            message.contains(output) && message.contains("1 of 2 episodes are in run"),
+            "{bad}: {message}"
+        );
+        assert_eq!(project.lines("run/episodes.jsonl").len(), 1);
+    }
+}
+
+#[test]
+fn nan_actions_fail_only_their_episode() {
+    let project = project(
+        "local episode\nreturn softvt.policy { name = 'p', reset = function(t) episode = t.episode end, act = function(obs)\n\
+         return { position = obs.position, axis_angle = obs.axis_angle, closure = episode == 0 and 0/0 or 0 } end }",
+    );
+    let records = project.run("x.lua").policy("p.lua").episodes(2).threads(1).out("run").records();
+    let Outcome::Error { message } = &records[0].outcome else { panic!("{:?}", records[0]) };
+    assert!(message.contains("not finite"), "{message}");
+    assert_eq!(records[1].outcome, Outcome::Budget);
+    assert!(!records[1].header.privileged, "it sees observations alone");
+    assert!(project.lines("run/episodes.jsonl")[1]["privileged"].is_null());
+    assert_eq!(project.json("run/summary.json")["privileged"], false);
+    assert!(project.json("run/softvtbench/summary.json")["privileged"].is_null());
+}
+
+#[test]
+fn a_policy_that_declares_access_to_limits_is_marked_in_its_results() {
+    let act = "act = function(obs) return { position = obs.position, axis_angle = obs.axis_angle, closure = 0 } end }";
+    let knows = "local tau = softvt.calibration('cube').tau\n";
+    let project = project(&format!("{knows}return softvt.policy {{ name = 'knows', {act}"));
+    let message = project.run("x.lua").policy("p.lua").out("run").error();
+    assert!(
+        message.starts_with("p.lua:1: softvt.calibration: a policy has no access to limits"),
+        "{message}"
+    );
+    assert!(!project.path("run").exists());
+    let text = format!("{knows}return softvt.policy {{ name = 'knows', privileged = true, {act}");
+    project.write("p.lua", text.as_bytes());
+    let record = project.run("x.lua").policy("p.lua").out("run").record();
+    assert!(record.header.privileged);
+    for file in ["run.json", "summary.json", "softvtbench/summary.json"] {
+        assert_eq!(project.json(&format!("run/{file}"))["privileged"], true, "{file}");
+    }
+    project.run("x.lua").policy("run").out("again").finish();
+    let compared = project.compare("run", "again").expect("comparable");
+    assert_eq!(compared.first, "knows (privileged)");
+    assert!(comparison::table(&compared).contains("knows (privileged)"));
+}
+
+#[test]
+fn missing_cameras_are_reported_before_anything_runs() {
+    let policy =
+        "return softvt.policy { name = 'p', observes = { cameras = { 'sied' } }, act = function() end }";
+    let project = project(policy);
+    let message = project.run("x.lua").policy("p.lua").out("run").error();
+    assert_eq!(
+        message,
+        "p.lua:1: policy.observes: unknown camera \"sied\"; there are third_person, wrist (scene of task 0)"
+    );
+    // Checked before any connection: there is no server at this address.
+    let profile = "return softvt.profile { name = 'v', \
+         inputs = { { keys = { 'a' }, source = 'camera', camera = 'wirst' } }, \
+         actions = { pose = 'absolute', gripper = { open = 0, closed = 1 } } }";
+    project.write("v.lua", profile.as_bytes());
+    let profile = project.path("v.lua").display().to_string();
+    let run = project.run("x.lua").policy("ws://127.0.0.1:1").out("run");
+    let message = run.with_policy(|policy| policy.profile = Some(profile)).error();
+    assert_eq!(
+        message,
+        "--profile v.lua: inputs: unknown camera \"wirst\"; did you mean \"wrist\"? (scene of task 0)"
+    );
+    assert!(!project.path("run").exists());
+}
+
+#[test]
+fn recorded_actions_must_fit_the_run() {
+    let project = project(WANDERS);
+    let first = project.run("x.lua").policy("p.lua").episodes(2).out("run").records();
+    let again = project.run("x.lua").policy("run").episodes(2).out("again").records();
+    let has_same_end = |(a, b): (&EpisodeRecord, &EpisodeRecord)| a.stats.state_hash == b.stats.state_hash;
+    assert!(first.iter().zip(&again).all(has_same_end), "the same motions");
+    let info = project.json("again/run.json");
+    let replayed = project.relative(info["replayed"]["run"].as_str().expect("a folder"));
+    assert_eq!((info["policy"].as_str(), replayed.as_str()), (Some("replay"), "run"));
+    assert!(info["replayed"]["sha256"].as_str().is_some_and(|hash| hash.len() == 64));
+    // Repeating the actions of a privileged policy is privileged too.
+    project.run("x.lua").out("seen").finish();
+    project.run("x.lua").policy("seen").out("echo").finish();
+    assert_eq!(project.json("echo/run.json")["replayed"]["policy"], "expert");
+    for of in [
+        &project.json("echo/run.json"),
+        &project.json("echo/summary.json"),
+        &project.lines("echo/episodes.jsonl")[0],
+    ] {
+        assert_eq!(of["privileged"], true);
+    }
+    assert_eq!(info["privileged"], false);
+    let run = |episodes: u32| project.run("x.lua").policy("run").episodes(episodes).out("no");
+    let refused = |run: Run, output: &str| {
+        let message = run.error();
+        assert!(message.contains(output), "{message}");
+        assert!(!project.path("no").exists());
+    };
+    refused(run(2).seed(1), "--policy run: its seed is 0, that of this run 1");
+    refused(run(2).twin(), "no run of suite one (rigid twin); available: one");
+    refused(run(4), "it lacks 2 of the 4 requested episodes: task 0 episode 2, task 0 episode 3");
+    std::fs::remove_file(project.path("run/actions/task_000/episode_00001.npy")).expect("removed");
+    refused(run(2), "it lacks 1 of the 2 requested episodes: task 0 episode 1");
+    let other = project.text("x.lua").replace("name = \"one\", object", "name = \"two\", object");
+    project.write("x.lua", other.as_bytes());
+    refused(run(1), "no run of suite two; available: one");
+}
+
+#[test]
+fn options_without_effect_are_refused() {
+    let project = project(WANDERS);
+    project.write(
+        "profile.lua",
+        b"return softvt.profile { name = 'x',\n inputs = {}, actions = {\n pose = 'absolut' } }",
+    );
+    let noop = || project.run("x.lua").policy("noop");
+    let server = |address: &str, profile: Option<&str>| {
+        let profile = profile.map(|file| project.path(file).display().to_string());
+        project.run("x.lua").policy(address).with_policy(|policy| policy.profile = profile)
+    };
+    let protocol = project.run("x.lua").with_policy(|policy| policy.protocol = Some(Protocol::VlaEval));
+    let vision =
+        project.run("x.lua").policy("random").with_policy(|policy| policy.profile = Some("vision".into()));
+    for (run, output) in [
+        (
+            noop().replan(3),
+            "--replan: applies to policy servers and Lua policies only; --policy noop ignores it",
+        ),
+        (protocol, "--protocol: applies to policy servers only; --policy expert ignores it"),
+        (vision, "--profile: applies to policy servers only"),
+        (
+            noop().gripper(GripCode::Binary),
+            "--gripper: applies to policy servers and Lua policies only; --policy noop",
+        ),
+        (project.run("x.lua").policy("q.lua"), "q.lua: no such file"),
+        (project.run("x.lua").policy("profile.lua"), "profile.lua:"),
+        (
+            server("ws://127.0.0.1:9", Some("profile.lua")),
+            "profile.lua:3: profile.actions.pose: expected one of",
+        ),
+        (server("ws://127.0.0.1:99999", None), "\"99999\" is not a port"),
+        (server("ws://127.0.0.1:0", None), "\"0\" is not a port"),
+        (server("ws://127.0.0.1:x", None), "--policy ws://127.0.0.1:x: "),
+    ] {
+        let message = run.out("run").error();
+        assert!(message.contains(output), "{output}: {message}");
+        assert!(!project.path("run").exists(), "{output}");
+    }
+    let message = project.run("p.lua").error();
+    assert!(message.contains("which is not a plan; run softvt SUITE.lua --policy"), "{message}");
+}
+
+#[test]
+fn profiles_in_lua_are_used_for_servers() {
+    // There is no server: the profile is read, and only the connection fails.
+    let free = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("an address");
+    let project = project(WANDERS);
+    let run = project.run("x.lua").policy(&format!("ws://{free}")).with_policy(|policy| {
+        policy.profile = Some("scripts/profiles/libero.lua".to_owned());
+        policy.timeout = Some(Duration::from_millis(200));
+    });
+    let message = run.policy_error();
+    assert!(message.contains("no policy server at"), "{message}");
+}
+
+/// An expert that grasps the cube from above, closing fully without tactile feedback, and lifts it.
+const GREEDY: &str = "local c = scene:object('cube').centre
+    local at = softvt.pose { position = { c[1], c[2], 0.022 } }
+    arm:move_to(at:translated { 0, 0, 0.05 }, { speed = 0.5 })
+    arm:move_to(at, { speed = 0.25 }) arm:grasp(0.9, { rate = 0.6 })
+    arm:move_by({ 0, 0, 0.06 }, { speed = 0.2 }) arm:wait(0.5)
+    if scene:object('cube').centre[3] < 0.06 then arm:give_up('it did not come along') end";
+
+#[test]
+fn the_tactile_servo_stops_at_contact() {
+    let project = Small { task: "budget_steps = 400", expert: GREEDY, ..Small::default() }.project();
+    let mut d = Vec::new();
+    for policy in ["expert", "tactile-servo"] {
+        let episode = project.run("x.lua").policy(policy).threads(1).out(policy).record();
+        assert!(episode.stats.gave_up.is_none(), "{policy} lifts it: {episode:?}");
+        for file in ["run.json", "summary.json", "softvtbench/summary.json"] {
+            assert_eq!(project.json(&format!("{policy}/{file}"))["privileged"], true, "{file}");
+        }
+        assert!(episode.header.privileged);
+        d.push(episode.verdict.d_peak.expect("a number"));
+    }
+    assert!(d[1] < 0.2 * d[0], "D is {} % with commanded closures, {} % with the tactile servo", d[0], d[1]);
+    assert!(project.is_reproduced("tactile-servo", "0/0"));
+}
+
+/// Peak force on a pad, N, as a policy lifts a cube of a material that starts below the hand.
+fn peak_force_of_lifting(policy: &str, material: &'static str) -> f64 {
+    let project = Small {
+        shape: "softvt.shape.box { size = { 0.05, 0.05, 0.05 } }:grounded()",
+        material,
+        at: "at = { -0.187, -0.005 }",
+        task: "budget_steps = 500",
+        ..Small::default()
+    }
+    .project();
+    let verdict = project.run("x.lua").policy(policy).threads(1).record().verdict;
+    assert_eq!((verdict.failed_stage, verdict.no_drop), (Some(Stage::Carry), true), "{verdict:?}");
+    verdict.peak_pad_force_n
+}
+
+#[test]
+fn a_policy_feels_how_firmly_it_must_hold() {
+    let policy = "scripts/policies/feel_and_lift.lua";
+    let light = peak_force_of_lifting(policy, "youngs_pa = 2e4, poisson = 0.3, density = 300");
+    let heavy = peak_force_of_lifting(policy, "youngs_pa = 2e4, poisson = 0.3, density = 1800");
+    // The force that holds the heavy cube at the friction of a sliding pad, 1.2. Contact alone takes about 0.4 N.
+    let least = 0.05_f64.powi(3) * 1800.0 * 9.81 / (2.0 * 1.2);
+    assert!(light < 0.6, "{light} N for a light cube");
+    assert!((1.05..2.0).contains(&(heavy / least)), "{heavy} N for a heavy cube, which {least} N hold");
+}
+
+#[test]
+fn arm_tactile_is_refused_where_it_is_not_available() {
+    let project = Small { expert: "arm:tactile()", ..Small::default() }.project();
+    let message = project.run("x.lua").error();
+    assert!(
+        message.contains(
+            "x.lua:12: arm:tactile: finger readings are available in simulation:drive and under --policy tactile-servo"
+        ),
+        "{message}"
+    );
+}

@@ -1,0 +1,313 @@
+//! Comparisons, pages and tables of finished runs, and runs that cannot be read.
+
+use std::fs;
+
+use serde_json::{Value, json};
+use softvt::{
+    evaluation::stage::Stage,
+    report::{comparison, terminal},
+    runner::TraceDetail,
+};
+
+use crate::support::{Project, Run, Small};
+
+/// Two short runs of the same two episodes, and one of another seed.
+fn project() -> Project {
+    let project = Small { task: "budget_steps = 8", ..Small::default() }.project();
+    for (policy, seed, out) in [("noop", 0, "runs/a"), ("random", 0, "runs/b"), ("noop", 7, "runs/other")] {
+        project.run("x.lua").episodes(2).policy(policy).seed(seed).out(out).finish();
+    }
+    project
+}
+
+/// One of two shards of two episodes of a project.
+fn part(project: &Project, number: u32) -> Run<'_> {
+    let run = project.run("x.lua").episodes(2).shard(&format!("{number}/2"));
+    run.out(&format!("part_{number}"))
+}
+
+/// Changes a JSON file of a project.
+fn edit(project: &Project, path: &str, change: impl Fn(&mut Value)) {
+    let mut document = project.json(path);
+    change(&mut document);
+    project.write(path, document.to_string().as_bytes());
+}
+
+#[test]
+fn runs_are_paired_by_episode_and_task() {
+    let project = project();
+    let compared = project.compare("runs/a", "runs/b").expect("comparable");
+    assert_eq!((compared.first.as_str(), compared.second.as_str()), ("noop", "random"));
+    let goal = &compared.all.goal;
+    assert_eq!((goal.n, goal.better, goal.worse, goal.same), (2, 0, 0, 2));
+    assert_eq!(goal.difference, Some(0.0));
+    assert!(goal.interval95.is_some());
+    assert_eq!(compared.by_task[0].differences.no_drop.n, 2);
+    // The cube has no limit, so that its safety was never judged.
+    assert_eq!((compared.all.safety.n, compared.all.dsr.n), (0, 0));
+    let text = comparison::table(&compared);
+    assert!(text.starts_with("noop → random · 2 paired episodes\n"), "{text}");
+    assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
+    assert!(text.contains("95 % interval") && text.contains("better"), "{text}");
+    // The expert is privileged, and every table marks it.
+    project.run("x.lua").episodes(2).out("runs/c").finish();
+    let text = comparison::table(&project.compare("runs/a", "runs/c").expect("comparable"));
+    assert!(text.contains("noop → expert (privileged) · "), "{text}");
+    // Of the finished run, whose episodes are not run again.
+    let summary = project.run("x.lua").episodes(2).out("runs/c").finish().result().summary;
+    let table = terminal::table(&summary);
+    assert!(table.contains("policy expert (privileged) · 2 episodes"), "{table}");
+    assert!(summary.privileged);
+    assert_eq!(project.json("runs/c/summary.json")["privileged"], true);
+}
+
+#[test]
+fn harm_and_stages_are_compared() {
+    let project = project();
+    let row = |text: &str, name: &str| -> Vec<String> {
+        let line = text.lines().find(|line| line.starts_with(name)).unwrap_or_default();
+        line[name.len().min(line.len())..].split_whitespace().map(str::to_owned).collect()
+    };
+    let compared = project.compare("runs/a", "runs/b").expect("comparable");
+    let text = comparison::table(&compared);
+    // Neither policy touches anything within its 8 steps.
+    assert_eq!(row(&text, "touched other objects")[..4], ["%", "0.0", "0.0", "+0.0"], "{text}");
+    assert_eq!(row(&text, "failed at any stage"), ["episodes", "2", "2", "+0", "0", "0"], "{text}");
+    assert_eq!(row(&text, "  reach"), ["episodes", "2", "2", "+0"], "{text}");
+    assert_eq!(row(&text, "D mean")[0], "%", "{text}");
+    let all = &compared.all;
+    assert_eq!((all.d_mean.n, all.d_final.n, all.d_p95.n), (2, 2, 2));
+    assert_eq!(all.failed_stages.first, [(Stage::Reach, 2)].into());
+    assert_eq!((all.invalid_pairs, all.goal.n), (0, 2));
+}
+
+#[test]
+fn two_runs_of_one_suite_are_not_compared() {
+    let project = project();
+    let message = project.message(project.compare("runs", "runs/a"));
+    assert_eq!(
+        message,
+        "runs/a and runs/b both hold suite one task 0 episode 0: compare one run per suite; give its folder"
+    );
+    assert!(project.message(project.compare("runs/a", "runs")).contains("runs/a and runs/b both hold"));
+}
+
+#[test]
+fn runs_of_different_seeds_share_no_episode() {
+    let project = project();
+    let message = project.message(project.compare("runs/a", "runs/other"));
+    assert_eq!(message, "runs/a and runs/other share no episode: seed 0 in the first, 7 in the second");
+}
+
+#[test]
+fn folders_without_a_run_are_named() {
+    let project = project();
+    fs::create_dir(project.path("empty")).expect("made");
+    let torn = project.text("runs/a/episodes.jsonl");
+    for (dir, path, text) in [
+        ("json", "run.json", "{\"softvt\": ".to_owned()),
+        ("fields", "run.json", json!({ "softvt": env!("CARGO_PKG_VERSION"), "script": "x.lua" }).to_string()),
+        ("line", "episodes.jsonl", format!("{}\n{torn}", &torn[..50])),
+        ("none", "episodes.jsonl", String::new()),
+    ] {
+        for name in ["run.json", "episodes.jsonl"] {
+            project.write(&format!("bad/{dir}/{name}"), project.text(&format!("runs/a/{name}")).as_bytes());
+        }
+        project.write(&format!("bad/{dir}/{path}"), text.as_bytes());
+    }
+    fs::remove_file(project.path("bad/none/episodes.jsonl")).expect("removed");
+    for (dir, words) in [
+        ("nowhere", "folder nowhere does not exist"),
+        ("x.lua", "x.lua is a file; give the folder of a run"),
+        (
+            "empty",
+            "empty holds no run: neither the folder nor any of its subfolders has run.json and episodes.jsonl",
+        ),
+        ("bad/json", "bad/json/run.json is not a valid run file: EOF while parsing"),
+        ("bad/fields", "bad/fields/run.json is not a valid run file: it has no suite"),
+        ("bad/line", "bad/line/episodes.jsonl:1: not an episode record"),
+        ("bad/none", "cannot read bad/none/episodes.jsonl"),
+    ] {
+        let message = project.message(project.stored(dir));
+        assert!(message.starts_with(words), "{dir}: {message}");
+        assert!(!message.contains("this is softvt"), "no other version: {message}");
+    }
+}
+
+#[test]
+fn runs_of_other_versions_are_reported() {
+    let project = project();
+    edit(&project, "runs/a/run.json", |run| run["softvt"] = json!("0.0.1"));
+    let report = project.report(&["runs/a"]);
+    let warning = "runs/a was written by softvt 0.0.1, and this is softvt";
+    assert!(report.warnings[0].starts_with(warning), "{:?}", report.warnings);
+    assert!(report.html.contains("runs/a was written by softvt 0.0.1"));
+    let text = comparison::table(&project.compare("runs/a", "runs/b").expect("comparable"));
+    assert!(text.contains("the runs also differ in softvt (run.json)"), "{text}");
+    let lines = project.text("runs/a/episodes.jsonl").replace("\"no_drop\"", "\"drops\"");
+    project.write("runs/a/episodes.jsonl", lines.as_bytes());
+    let message = project.message(project.stored("runs/a"));
+    assert!(
+        message.starts_with("runs/a/episodes.jsonl:1: not an episode record: missing field"),
+        "{message}"
+    );
+    let cause =
+        format!("; this run was written by softvt 0.0.1, and this is softvt {}: ", env!("CARGO_PKG_VERSION"));
+    assert!(message.contains(&cause), "{message}");
+}
+
+#[test]
+fn unfinished_runs_can_be_reported() {
+    let project = project();
+    let lines = project.text("runs/a/episodes.jsonl");
+    // The second line is incomplete, as after a crash; there is no summary yet.
+    let whole = lines.find('\n').expect("a line") + 1;
+    project.write("runs/a/episodes.jsonl", &lines.as_bytes()[..whole + 40]);
+    fs::remove_file(project.path("runs/a/summary.json")).expect("removed");
+    let warning = "runs/a is not finished: it has 1 of 2 episodes";
+    let report = project.report(&["runs/a", "runs/b"]);
+    let warnings = report.warnings.join("\n");
+    let torn = "the last line of runs/a/episodes.jsonl is truncated";
+    assert!(warnings.contains(warning) && warnings.contains(torn), "{warnings}");
+    assert!(report.html.contains(torn) && report.markdown.contains("| noop | 1 of 2 |"));
+    let compared = project.compare("runs/a", "runs/b").expect("comparable");
+    assert_eq!((compared.all.pairs, compared.unpaired), (1, 1));
+    let text = project.relative(comparison::table(&compared));
+    assert!(text.contains("1 paired episode") && text.contains(warning), "{text}");
+    assert!(text.contains("1 episode present in only one run was skipped"), "{text}");
+    project.write("runs/a/episodes.jsonl", b"");
+    assert_eq!(project.message(project.compare("runs/a", "runs/b")), "runs/a has no episode yet");
+    project.report(&["runs/a"]);
+}
+
+#[test]
+fn lost_files_are_restored_byte_identically() {
+    let project = Small { task: "budget_steps = 8", expert: "arm:close_to(1)", ..Small::default() }.project();
+    let run = || project.run("x.lua").episodes(3).trace(TraceDetail::State).out("run");
+    let told = |run: Run| run.finish().messages;
+    told(run());
+    let files = [
+        "actions/task_000/episode_00000.npy",
+        "softvtbench/task_000/episode_00001/policy_action_debug.jsonl",
+        "trace/task_000/episode_00002.jsonl",
+        "softvtbench/episodes.csv",
+        "softvtbench/thresholds.json",
+        "summary.json",
+        "episodes.jsonl",
+    ];
+    let bytes = |file: &str| fs::read(project.path(&format!("run/{file}"))).unwrap_or_default();
+    let before = files.map(bytes);
+    files[..5]
+        .iter()
+        .for_each(|file| fs::remove_file(project.path(&format!("run/{file}"))).expect("removed"));
+    let messages = told(run());
+    let expected = "restoring files of 3 finished episodes (first: run/actions/task_000/episode_00000.npy)";
+    assert!(messages.contains(expected), "{messages}");
+    assert!(files.map(bytes) == before);
+    assert!(told(run()).contains("already complete"));
+    // Without its summary the folder is unfinished and can be resumed.
+    fs::remove_file(project.path("run/summary.json")).expect("removed");
+    told(run().resume());
+    assert!(files.map(bytes) == before);
+    // Videos can be added later.
+    told(run().with(|config| config.video = Some("1".parse().expect("an episode"))));
+    let drawn =
+        |e: u32, kind: &str| project.path(&format!("run/video/task_000/episode_0000{e}.{kind}")).exists();
+    assert!(drawn(1, "mp4") && drawn(1, "png") && !drawn(0, "mp4"));
+    assert!(files.map(bytes) == before);
+    // A simulation that differs from its record is reported, and its files are not restored.
+    let lines = project.text("run/episodes.jsonl").replacen("\"state_hash\":\"", "\"state_hash\":\"f", 1);
+    project.write("run/episodes.jsonl", lines.as_bytes());
+    fs::remove_file(project.path("run/actions/task_000/episode_00000.npy")).expect("removed");
+    let messages = told(run());
+    assert!(messages.contains("the simulation differs from its record (state_hash:"), "{messages}");
+    assert!(!project.path("run/actions/task_000/episode_00000.npy").exists());
+    assert_eq!(project.text("run/episodes.jsonl"), lines);
+}
+
+#[test]
+fn records_that_contradict_themselves_are_refused_by_name() {
+    let project = Small { task: "budget_steps = 8", ..Small::default() }.project();
+    (1..=2).for_each(|number| drop(part(&project, number).finish()));
+    let (lines, manifest) = (project.text("part_1/episodes.jsonl"), project.text("part_1/run.json"));
+    let merged = || project.message(project.merge("all", &["part_1", "part_2"]));
+    for (from, to, problem) in [
+        (r#""goal":false"#, r#""goal":true"#, "goal is true, and the outcome is not completed"),
+        (r#""newton_mean":"#, r#""newton_mean":-"#, "newton_mean is -"),
+        (r#""d_peak_other":"#, r#""d_peak_gther":"#, "unknown key d_peak_gther"),
+    ] {
+        let changed = lines.replacen(from, to, 1);
+        assert_ne!(changed, lines);
+        project.write("part_1/episodes.jsonl", changed.as_bytes());
+        for refused in [
+            project.message(project.stored("part_1")),
+            project.message(project.compare("part_2", "part_1")),
+            merged(),
+            project.message(project.replay("part_1", "0/0", None)),
+            part(&project, 1).resume().error(),
+        ] {
+            assert!(refused.contains("part_1/episodes.jsonl:1: ") && refused.contains(problem), "{refused}");
+        }
+    }
+    project.write("part_1/episodes.jsonl", lines.as_bytes());
+    project.write("part_1/run.json", manifest.replace(r#""1/2""#, r#""99/2""#).as_bytes());
+    let refused = merged();
+    assert!(refused.contains("part_1/run.json") && refused.contains(r#"its shard is "99/2""#), "{refused}");
+    // A merge that fails while it writes leaves nothing.
+    project.write("part_1/run.json", manifest.as_bytes());
+    project.write("part_1/softvtbench/thresholds.json", b"{");
+    merged();
+    assert!(!project.path("all.part").exists() && !project.path("all").exists());
+}
+
+#[test]
+fn merged_shards_are_byte_identical_to_one_run() {
+    let project = Small { task: "budget_steps = 8", ..Small::default() }.project();
+    for (is_twin, name) in [(false, "soft"), (true, "rigid")] {
+        let run = || {
+            let run = project.run("x.lua").episodes(3);
+            if is_twin { run.twin() } else { run }
+        };
+        let parts = [1, 2].map(|number| format!("{name}_{number}"));
+        run().out(name).finish();
+        for (part, shard) in parts.iter().zip(["1/2", "2/2"]) {
+            run().shard(shard).out(part).finish();
+        }
+        let parts = parts.each_ref().map(String::as_str);
+        project.merge(&format!("{name}_all"), &parts).expect("merged");
+        for file in ["run.json", "episodes.jsonl", "summary.json", "softvtbench/summary.json"] {
+            let [merged, whole] = ["_all", ""].map(|end| project.text(&format!("{name}{end}/{file}")));
+            assert_eq!(merged, whole, "{name} {file}");
+        }
+        let summary = project.json(&format!("{name}_all/summary.json"));
+        assert_eq!((&summary["episodes"], &summary["privileged"]), (&3.into(), &true.into()));
+    }
+}
+
+#[test]
+fn damaged_actions_are_found_by_merge_and_restored_by_resume() {
+    let project = Small { task: "budget_steps = 8", expert: "arm:close_to(1)", ..Small::default() }.project();
+    (1..=2).for_each(|number| drop(part(&project, number).finish()));
+    let merged = || project.message(project.merge("all", &["part_1", "part_2"]));
+    let path = "part_1/actions/task_000/episode_00000.npy";
+    let whole = fs::read(project.path(path)).expect("written");
+    let mut changed = whole.clone();
+    let last = changed.len() - 1;
+    changed[last] ^= 1;
+    for (bytes, problem) in
+        [(&changed[..], "its SHA-256 differs"), (&whole[..whole.len() - 56], "do not fill the shape")]
+    {
+        project.write(path, bytes);
+        let refused = merged();
+        assert!(refused.starts_with(path) && refused.contains(problem), "{refused}");
+        let messages = part(&project, 1).resume().finish().messages;
+        assert!(messages.contains(path) && messages.contains(problem), "{messages}");
+        assert!(fs::read(project.path(path)).expect("restored") == whole);
+    }
+    fs::remove_file(project.path(path)).expect("removed");
+    assert!(merged().contains(path));
+    let lines = project.text("part_2/episodes.jsonl");
+    project.write("part_2/episodes.jsonl", lines.repeat(2).as_bytes());
+    let message = project.message(project.stored("part_2"));
+    assert!(message.starts_with("part_2/episodes.jsonl:2: task 0 episode 1 occurs twice"), "{message}");
+}
