@@ -4,7 +4,6 @@
 use std::{
     collections::BTreeMap,
     fs,
-    path::Path,
     process::{Command, Stdio},
     thread::sleep,
     time::Instant,
@@ -12,24 +11,9 @@ use std::{
 
 use assert_cmd::cargo::cargo_bin;
 
-use crate::support::{Project, Small};
+use crate::support::{Project, Small, files};
 
 const LINE: &str = "x.lua --policy random --threads 2 --resume";
-
-/// All files of a folder by relative path.
-fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    for entry in fs::read_dir(dir).expect("a folder") {
-        let path = entry.expect("an entry").path();
-        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
-        if path.is_dir() {
-            found.extend(files(&path).into_iter().map(|(inner, bytes)| (format!("{name}/{inner}"), bytes)));
-        } else {
-            found.insert(name, fs::read(&path).expect("a file"));
-        }
-    }
-    found
-}
 
 fn same(project: &Project, run: &str, whole: &BTreeMap<String, Vec<u8>>) {
     let found = files(&project.path(run));

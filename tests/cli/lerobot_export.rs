@@ -1,210 +1,35 @@
-//! `softvt dataset export`: rows are the inputs of a policy, results do not depend on threads, and invalid exports are
-//! reported.
+//! `softvt dataset export`: its flags, and what it prints.
 
-use std::{
-    fs::{self, File},
-    path::Path,
-};
+use crate::support::{Project, SOLIDS};
 
-use parquet::{
-    file::reader::{FileReader, SerializedFileReader},
-    record::{Field, Row},
-};
-use rmpv::Value;
-use softvt::dataset::TaskFile;
-
-use crate::{
-    dataset_recording::files,
-    serve::{Server, array, get, map},
-    support::{Project, SOLIDS},
-};
-
-/// The fingers close on a block on a pillar, and their fronts push a bar to the middle of its shelf.
+/// A rigid cube that a push moves to the middle of its shelf.
 const SUITE: &str = r#"
 local solids = require "solids"
-local pillar = solids.solid("pillar", { 0.03, 0.03, 0.28 }, softvt.static {})
-local block = solids.solid("block", { 0.03, 0.05, 0.04 }, softvt.rigid { density = 300 })
-local shelf = solids.solid("shelf", { 0.11, 0.08, 0.262 }, softvt.static {})
-local bar = solids.solid("bar", { 0.04, 0.12, 0.04 }, softvt.rigid { density = 300 })
 local layout = softvt.layout("one", function(scene)
-  scene.base = { -0.6, 0, 0 }
   scene:add { name = "floor", asset = solids.floor, position = { 0, 0, 0 } }
-  scene:add { name = "pillar", asset = pillar, position = { -0.137, -0.005, 0 } }
-  scene:add { name = "block", asset = block, position = { -0.127, -0.005, 0.28 } }
-  scene:add { name = "shelf", asset = shelf, position = { -0.044, -0.005, 0 } }
-  scene:add { name = "bar", asset = bar, position = { -0.088, -0.005, 0.262 } }
+  scene:add { name = "shelf", asset = solids.shelf, position = solids.shelf_at }
+  scene:add { name = "cube", asset = solids.cube, position = solids.cube_at }
 end)
-local function task(prompt)
-  return softvt.task { prompt = prompt, layout = layout, budget_steps = 40,
-    goal = softvt.on { object = "bar", target = "shelf" },
-    expert = function(arm, scene)
-      arm:grasp(0.6, { rate = 1 })
-      arm:move_by({ 0.02, 0, 0 }, { speed = 0.2 })
-      arm:move_by({ -0.015, 0, 0 }, { speed = 0.2 })
-      arm:wait(1)
-    end }
-end
-return softvt.suite { name = "one", object_type = "rigid", variation = "spatial", episodes = 1,
-  tasks = { task("wait a while"), task("wait for it") } }
+return softvt.suite { name = "one", object_type = "rigid", variation = "spatial", episodes = 1, tasks = {
+  softvt.task { prompt = "wait", layout = layout, goal = softvt.on { object = "cube", target = "shelf" }, budget_steps = 30,
+    expert = function(arm) solids.push(arm) arm:wait(1) end },
+} }
 "#;
 
-fn project() -> Project {
-    Project::new(&[("x.lua", SUITE), SOLIDS])
-}
-
-fn rows(path: &Path) -> Vec<Row> {
-    let reader = SerializedFileReader::new(File::open(path).expect("a table")).expect("Parquet");
-    reader.get_row_iter(None).expect("rows").map(|row| row.expect("a row")).collect()
-}
-
-fn field<'a>(row: &'a Row, name: &str) -> &'a Field {
-    let found = row.get_column_iter().find(|(column, _)| *column == name);
-    found.unwrap_or_else(|| panic!("no {name}")).1
-}
-
-/// Flattens nested lists of numbers.
-fn numbers(field: &Field) -> Vec<f32> {
-    match field {
-        Field::Float(x) => vec![*x],
-        Field::ListInternal(list) => list.elements().iter().flat_map(numbers).collect(),
-        other => panic!("no numbers: {other:?}"),
-    }
-}
-
-fn whole(field: &Field) -> i64 {
-    match field {
-        Field::Long(n) => *n,
-        other => panic!("no whole number: {other:?}"),
-    }
-}
-
-/// Decodes the pixels of a PNG file.
-fn pixels(field: &Field) -> Vec<u8> {
-    let Field::Group(group) = field else { panic!("no picture: {field:?}") };
-    let bytes = group.get_column_iter().find(|(name, _)| *name == "bytes").map(|(_, bytes)| bytes.clone());
-    let Some(Field::Bytes(bytes)) = bytes else { panic!("no bytes in {field:?}") };
-    image::load_from_memory(bytes.data()).expect("a PNG file").to_rgb8().into_raw()
-}
-
-/// The bytes of an array as clients receive it.
-fn sent(observation: &Value, name: &str) -> Vec<u8> {
-    let entries = get(observation, name).as_map().expect("an array");
-    let data =
-        entries.iter().find(|(key, _)| key.as_str() == Some("data") || key.as_slice() == Some(b"data"));
-    data.and_then(|(_, data)| data.as_slice()).expect("data").to_vec()
-}
-
-fn floats(bytes: &[u8]) -> Vec<f32> {
-    bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
-}
-
 #[test]
-fn rows_are_the_inputs_of_a_policy() {
-    let project = project();
-    project.succeeds("record x.lua --task 0 --demos 1 --out data");
-    project.succeeds("dataset export data --format lerobot-v2.1 --out out");
-    let rows = rows(&project.path("out/data/chunk-000/episode_000000.parquet"));
-    let actions = TaskFile::open(&project.path("data/hdf5/one_task0_demo.hdf5"))
-        .and_then(|file| file.actions(0))
-        .expect("actions");
-    assert!(
-        rows.len() >= 12 && rows.len() == actions.len(),
-        "longer than a policy's history: {}",
-        rows.len()
-    );
-    let server = Server::start(&project, "--profile visuo_tactile --split demonstration");
-    let (mut client, _) = server.client();
-    let episode = project.lines("data/manifest.jsonl")[0]["episode"].as_u64().expect("an attempt");
-    let reset = map(&[("type", "reset".into()), ("task", 0.into()), ("episode", episode.into())]);
-    let mut answer = client.ask(&reset);
-    let mut touched = false;
-    for (step, (row, action)) in rows.iter().zip(&actions).enumerate() {
-        let observation = get(&answer, "observation");
-        for name in ["image", "wrist_image", "tactile_image"] {
-            assert!(pixels(field(row, name)) == sent(observation, name), "{name} at step {step}");
-        }
-        assert_eq!(numbers(field(row, "state")), floats(&sent(observation, "state")), "step {step}");
-        // A row keeps the initial state and the last two of nine.
-        let markers = floats(&sent(observation, "tactile_marker_motion"));
-        let kept: Vec<f32> = [0, 7, 8].into_iter().flat_map(|i| markers[396 * i..][..396].to_vec()).collect();
-        assert_eq!(numbers(field(row, "tactile_marker_motion")), kept, "step {step}");
-        touched |= kept[396..792] != kept[792..];
-        let (p, r) = (action.position_b, action.axis_angle_b);
-        let command = [p.x, p.y, p.z, r.x, r.y, r.z, action.closure()];
-        assert_eq!(numbers(field(row, "actions")), command.map(|x| x as f32), "step {step}");
-        answer = client.ask(&map(&[("type", "step".into()), ("actions", array(&[1, 7], &command))]));
-    }
-    assert!(touched, "the block moves markers");
-    assert_eq!(get(&answer, "terminated").as_bool(), Some(true));
-}
-
-#[test]
-fn both_versions_have_the_same_rows() {
-    let project = project();
-    project.succeeds("record x.lua --demos 2 --out data --no-privileged");
+fn exports_are_printed_and_invalid_ones_refused() {
+    let project = Project::new(&[("x.lua", SUITE), SOLIDS]);
+    project.succeeds("record x.lua --demos 1 --out data --no-privileged --gripper two-width");
     let output = project.succeeds("dataset export data --format lerobot-v2.1 --out a --threads 1").out;
-    assert!(output.starts_with("4 episodes, ") && output.ends_with(" frames, 2 prompts: a\n"), "{output}");
-    project.succeeds("dataset export data --format lerobot-v2.1 --out b --threads 3");
-    assert!(files(&project.path("a")) == files(&project.path("b")), "not the same bytes");
-    project.succeeds("dataset export data/ --format lerobot-v3.0 --out c/");
-    let apart: Vec<Row> = (0..4)
-        .flat_map(|i| rows(&project.path(&format!("a/data/chunk-000/episode_{i:06}.parquet"))))
-        .collect();
-    let together = rows(&project.path("c/data/chunk-000/file-000.parquet"));
-    assert_eq!(apart.len(), together.len());
-    for (index, (one, other)) in apart.iter().zip(&together).enumerate() {
-        assert_eq!(whole(field(other, "index")), index as i64);
-        for (name, value) in one.get_column_iter() {
-            match name.ends_with("image") {
-                true => assert!(pixels(value) == pixels(field(other, name)), "{name}"),
-                false => assert_eq!(value, field(other, name), "{name}"),
-            }
-        }
-    }
-    let info = project.json("c/meta/info.json");
-    assert_eq!(info["total_frames"], together.len());
-    assert_eq!((&info["splits"]["train"], &info["total_tasks"]), (&"0:4".into(), &2.into()));
-    let episodes = rows(&project.path("c/meta/episodes/chunk-000/file-000.parquet"));
-    let ends: Vec<i64> = episodes.iter().map(|row| whole(field(row, "dataset_to_index"))).collect();
-    assert_eq!(ends.last(), Some(&(together.len() as i64)));
-    project.succeeds("dataset export data --format lerobot-v3.0 --gripper binary --task for --out d");
-    let binary = rows(&project.path("d/data/chunk-000/file-000.parquet"));
-    assert_eq!(binary.len() as i64, ends[3] - ends[1], "only the second task");
-    let gripper: Vec<f32> = binary.iter().map(|row| numbers(field(row, "actions"))[6]).collect();
-    assert!(gripper.iter().all(|x| [0.0, 1.0].contains(x)) && gripper.contains(&1.0), "{gripper:?}");
-    assert_eq!(project.lines("d/meta/softvt.jsonl")[0]["task_id"], 1);
-    assert_eq!(project.json("c/meta/softvt.json")["gripper"], "continuous");
-    for (code, stream) in [("two-width", "actions_two_width"), ("force", "actions_force")] {
-        project.succeeds(&format!(
-            "dataset export data --format lerobot-v3.0 --gripper {code} --task for --out {code}"
-        ));
-        let stated = project.json(&format!("{code}/meta/softvt.json"));
-        assert_eq!((&stated["gripper"], &stated["source"]), (&code.into(), &stream.into()));
-        let rows = rows(&project.path(&format!("{code}/data/chunk-000/file-000.parquet")));
-        let labels: Vec<f32> = rows.iter().map(|row| numbers(field(row, "actions"))[6]).collect();
-        let open = if code == "force" { -1.0 } else { 0.0 };
-        for (label, closed) in labels.iter().zip(&gripper) {
-            assert_eq!(*label == open, *closed == 0.0, "{code}: {labels:?}");
-        }
-        let held = labels.iter().copied().fold(0.0, f32::max);
-        // The hand closes by 0.05 per step to 0.6, in less than half of the demonstration: the median is 0.6.
-        assert!(if code == "force" { held > 1.0 } else { (held - 0.6).abs() < 1e-6 }, "{code}: {labels:?}");
-    }
-}
-
-#[test]
-fn invalid_exports_are_refused_and_leave_nothing() {
-    let project = project();
-    project.succeeds("record x.lua --task 0 --demos 1 --out data");
-    project.succeeds("record x.lua --task 0 --demos 1 --images video --out plain");
+    assert!(output.starts_with("1 episode, ") && output.ends_with(" frames, 1 prompt: a\n"), "{output}");
+    project.succeeds("dataset export data/ --format lerobot-v3.0 --gripper binary --task wait --out c/");
+    // The code of the recording, or the given one.
+    let code = |out: &str| project.json(&format!("{out}/meta/softvt.json"))["gripper"].clone();
+    assert_eq!((code("a"), code("c")), ("two-width".into(), "binary".into()));
     project.write("full/mine", b"mine");
     project.write("broken/recording.json", b"{}");
-    let hdf5 = project.path("data/hdf5/one_task0_demo.hdf5");
     for (words, output) in [
         ("data --format lerobot-v3.0 --out full", "--out full: it holds mine; nothing was written"),
-        ("data --format lerobot-v3.0 --out full/mine", "--out full/mine: it is not a folder"),
-        ("data --format lerobot-v3.0 --out x --task 7", "--task \"7\" matches no task"),
-        ("data --format lerobot-v3.0 --out x --task dance", "--task \"dance\" matches no task"),
         (
             "data --format lerobot-v3.0 --out x --gripper wide",
             "[possible values: continuous, binary, two-width, force]",
@@ -213,24 +38,10 @@ fn invalid_exports_are_refused_and_leave_nothing() {
         ("data --out x", "--format"),
         ("data --format lerobot-v2.1", "--out"),
         ("full --format lerobot-v2.1 --out x", "full: dataset.json: it is missing; expected the folder"),
-        ("nowhere --format lerobot-v2.1 --out x", "nowhere: dataset.json: it is missing"),
         ("broken --format lerobot-v2.1 --out x", "broken: the recording was interrupted"),
-        ("plain --format lerobot-v2.1 --out x", "record with --images hdf5"),
     ] {
         let message = project.refusal(&format!("dataset export {words}"));
         assert!(message.contains(output), "{words}: {message}");
     }
-    let whole = fs::read(&hdf5).expect("read");
-    fs::write(&hdf5, &whole[..whole.len() / 2]).expect("written");
-    let message = project.refusal("dataset export data --format lerobot-v2.1 --out x");
-    assert!(message.contains("one_task0_demo.hdf5") && message.contains("cut short"), "{message}");
-    // One step fewer than the manifest says.
-    fs::write(&hdf5, &whole).expect("written");
-    let manifest = project.text("data/manifest.jsonl");
-    let steps = format!("\"num_samples\":{}", project.lines("data/manifest.jsonl")[0]["num_samples"]);
-    project.write("data/manifest.jsonl", manifest.replace(&steps, "\"num_samples\":3").as_bytes());
-    let message = project.refusal("dataset export data --format lerobot-v2.1 --out x");
-    assert!(message.contains("/data/demo_0/obs/state: expected the shape [3, 7], got ["), "{message}");
     assert!(!project.path("x").exists() && !project.path("x.part").exists());
-    assert_eq!(files(&project.path("full")).len(), 1);
 }

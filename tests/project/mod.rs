@@ -1,8 +1,14 @@
 //! Project folders with small scripts: the input of the tests of the binary and of the library.
 
-use std::{fs, path::PathBuf};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
 
 use serde_json::Value;
+
+pub mod client;
 
 /// `solids.lua` for small scenes: a floor, a slab, a cube that rests stably on it, and a function for others. For goals that
 /// are reached within a second: a shelf, the place of a cube on it that is between the open fingers at the start, and the
@@ -62,6 +68,24 @@ impl Project {
         assert!(text.is_empty() || text.ends_with('\n'), "{path} ends in a torn line");
         text.lines().map(|line| serde_json::from_str(line).expect("a line of JSON")).collect()
     }
+}
+
+/// All files below a folder by path.
+pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(dir) = folders.pop() {
+        for entry in fs::read_dir(&dir).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let name = path.strip_prefix(folder).expect("below it").display().to_string();
+                found.insert(name, fs::read(&path).expect("read"));
+            }
+        }
+    }
+    found
 }
 
 /// A suite of one soft cube on a floor, with replaceable parts.

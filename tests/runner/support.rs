@@ -4,6 +4,7 @@
 use std::{
     path::{Path, PathBuf},
     sync::{Arc, Mutex},
+    time::Duration,
 };
 
 use softvt::{
@@ -35,7 +36,7 @@ use softvt::{
 #[path = "../project/mod.rs"]
 mod project;
 
-pub use project::{Project, SOLIDS, SPATIAL_SOFT, Small};
+pub use project::{Project, SOLIDS, SPATIAL_SOFT, Small, client, files};
 
 /// Messages and lines of progress.
 #[derive(Default)]
@@ -187,6 +188,17 @@ impl Run<'_> {
         self.with_policy(|policy| policy.source = word.parse().expect("a policy"))
     }
 
+    /// By a profile: a name, or a file of the project.
+    pub fn profile(self, word: &str) -> Self {
+        let file = self.project.path(word);
+        let word = if file.exists() { file.display().to_string() } else { word.to_owned() };
+        self.with_policy(|policy| policy.profile = Some(word))
+    }
+
+    pub fn timeout(self, timeout: Duration) -> Self {
+        self.with_policy(|policy| policy.timeout = Some(timeout))
+    }
+
     pub fn replan(self, count: u16) -> Self {
         self.with_policy(|policy| policy.replan = Some(count))
     }
@@ -213,6 +225,12 @@ impl Run<'_> {
 
     pub fn seed(self, seed: u64) -> Self {
         self.with(|config| config.seed = seed)
+    }
+
+    /// With the secret in a file of the project.
+    pub fn secret(self, file: &str) -> Self {
+        let secret = SecretSeed::new(self.project.text(file).as_bytes());
+        self.with(|config| config.secret = Some(secret))
     }
 
     pub fn shift(self, name: &str, value: f64) -> Self {

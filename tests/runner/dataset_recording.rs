@@ -1,0 +1,198 @@
+//! Recordings: kept demonstrations, refused folders, and independence of threads and interruptions.
+
+use std::{fs, path::Path, sync::Arc};
+
+use softvt::{
+    benchmark::Teacher,
+    dataset::{card::DatasetCard, check, manifest, stats},
+    episode_id::Split,
+    policy::profile::GripCode,
+    runner::{
+        DemoCount, PolicyOptions, Silent,
+        episode_selector::EpisodeSelector,
+        record,
+        recording::{RecordingOptions, RecordingSummary},
+        replay::{DemoRef, DemoReplay, check_complete, demos_of, simulate_demos},
+    },
+};
+
+use crate::support::{Project, Run, SOLIDS, files};
+
+/// A recording that is to be made.
+#[derive(Clone)]
+pub struct Recording<'a> {
+    pub run: Run<'a>,
+    /// The policy; by default the teacher of the suite.
+    pub policy: Option<Teacher>,
+    pub options: RecordingOptions,
+    pub demos: u32,
+    pub attempts: Option<u32>,
+}
+
+impl<'a> Recording<'a> {
+    /// A recording with images and the true state.
+    pub fn new(run: Run<'a>, demos: u32, out: &str) -> Self {
+        let options = RecordingOptions {
+            out: run.project.path(out),
+            has_images: true,
+            has_privileged: true,
+            resume: false,
+            gripper: None,
+        };
+        Self { run, policy: None, options, demos, attempts: None }
+    }
+
+    /// With other options.
+    pub fn with(mut self, change: impl FnOnce(&mut RecordingOptions)) -> Self {
+        change(&mut self.options);
+        self
+    }
+
+    /// Makes it. Returns `None` if it is complete already.
+    pub fn try_record(&self) -> Result<Option<RecordingSummary>, String> {
+        let count = DemoCount { demos: self.demos, attempts: self.attempts };
+        let policy_of = |teacher| PolicyOptions::new(self.policy.unwrap_or(teacher).into());
+        let loaded = self.run.load();
+        let recorded = loaded.and_then(|loaded| record(&loaded, policy_of, count, &self.options));
+        recorded.map_err(|error| self.run.project.relative(error))
+    }
+
+    /// Makes it. It must succeed.
+    pub fn record(&self) -> RecordingSummary {
+        self.try_record().unwrap_or_else(|message| panic!("{message}")).expect("a new recording")
+    }
+
+    fn refusal(&self) -> String {
+        self.try_record().err().expect("it is refused")
+    }
+}
+
+/// Simulates demonstrations again.
+fn replay(demos: &[DemoRef]) -> Vec<DemoReplay> {
+    simulate_demos(demos, &(Arc::new(Silent) as _)).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// True if the re-simulation of every demonstration of a dataset is byte-identical and reaches the goal.
+pub fn is_reproduced(dataset: &Path) -> bool {
+    let demos = demos_of(dataset).expect("a dataset");
+    replay(&demos).iter().all(|replay| replay.difference.is_none() && replay.goal_reached)
+}
+
+/// A rigid cube on a shelf, or on the floor in some attempts. A push reaches the goal in the former.
+const SUITE: &str = r#"
+local solids = require "solids"
+local layout = softvt.layout("one", function(scene)
+  local beside = math.random() < 0.4
+  scene:add { name = "floor", asset = solids.floor, position = { 0, 0, 0 } }
+  scene:add { name = "shelf", asset = solids.shelf, position = solids.shelf_at }
+  scene:add { name = "cube", asset = solids.cube, position = beside and { 0, 0.35, 0 } or solids.cube_at }
+end)
+return softvt.suite { name = "one", object_type = "rigid", variation = "spatial", episodes = 1, tasks = {
+  softvt.task { prompt = "wait", layout = layout, goal = softvt.on { object = "cube", target = "shelf" }, budget_steps = 30,
+    expert = function(arm, scene) solids.push(arm) arm:wait(1) end },
+} }
+"#;
+
+fn project() -> Project {
+    Project::new(&[("x.lua", SUITE), SOLIDS])
+}
+
+#[test]
+fn the_first_good_attempts_are_kept() {
+    let project = project();
+    let record = |out: &str, threads| Recording::new(project.run("x.lua").threads(threads), 3, out);
+    let summary = record("a", 1).record();
+    let task = &summary.tasks[0];
+    let rejected = *task.rejected.get("goal not reached").expect("some start on the floor");
+    assert_eq!((task.demos, task.attempts), (3, 3 + rejected), "{task:?}");
+    assert_eq!(DatasetCard::read(&project.path("a")).expect("a card").tasks, summary.tasks);
+    let attempts = project.stored("a/attempts").expect("a run").swap_remove(0).records;
+    assert_eq!(attempts.len(), task.attempts, "those not kept are there too");
+    assert!(attempts.iter().all(|attempt| attempt.header.id.split == Split::Demonstration));
+    let good = attempts.iter().filter(|attempt| attempt.verdict.safety);
+    let good: Vec<u32> = good.map(|attempt| attempt.header.id.episode).collect();
+    let entries = manifest::read(&project.path("a")).expect("a manifest");
+    assert_eq!(entries.iter().map(|entry| entry.episode).collect::<Vec<_>>(), good);
+    // With too few attempts the recording fails; with more it continues.
+    let few = Recording { attempts: Some(2), ..record("b", 3) }.refusal();
+    assert!(few.contains("task 0:") && few.contains("of 3 demonstrations after 2 attempts"), "{few}");
+    assert!(project.message(check_complete(&project.path("b"))).contains("was interrupted"));
+    assert!(record("b", 3).refusal().contains("--resume"));
+    record("b", 3).with(|options| options.resume = true).record();
+    assert!(files(&project.path("a")) == files(&project.path("b")), "not the same bytes");
+    assert!(record("b", 3).try_record().expect("a recording").is_none(), "already complete");
+}
+
+#[test]
+fn datasets_are_checked_and_reproduced() {
+    let project = project();
+    let recording = Recording::new(project.run("x.lua"), 2, "a");
+    let recording = recording.with(|options| {
+        (options.has_images, options.has_privileged) = (false, false);
+        options.gripper = Some(GripCode::TwoWidth);
+    });
+    recording.record();
+    let a = project.path("a");
+    assert_eq!(DatasetCard::read(&a).expect("a card").gripper, Some(GripCode::TwoWidth));
+    let checked = check::folder(&a).expect("a dataset");
+    assert_eq!((checked.demos, checked.videos, checked.problems), (2, 8, Vec::new()));
+    let demos = demos_of(&a).expect("demonstrations");
+    assert_eq!(demos.len(), 2);
+    assert!(is_reproduced(&a));
+    let find = |path: &Path, word: &str| word.parse::<EpisodeSelector>().expect("valid").find_demo(path);
+    let hdf5 = project.path("a/hdf5/one_task0_demo.hdf5");
+    assert_eq!(find(&a, "0/1").expect("there"), demos[1]);
+    assert_eq!(find(&hdf5, "0").expect("there"), demos[0]);
+    assert!(project.message(find(&a, "0/2").map(|_| ())).contains("no such demonstration"));
+    let columns = stats::column_statistics(&[&hdf5]).expect("numbers");
+    assert!(stats::table(&columns).contains("length (steps)") && stats::svg(&columns).starts_with("<svg"));
+    project.write("a/videos/one_task0/demo_0_eye_in_hand_rgb.mp4", b"not a video");
+    let whole = fs::read(&hdf5).expect("read");
+    fs::write(&hdf5, &whole[..whole.len() / 2]).expect("written");
+    let problems = check::folder(&a).expect("a dataset").problems;
+    assert_eq!(problems.len(), 2, "{problems:?}");
+    for words in ["demo_0_eye_in_hand_rgb.mp4: eye_in_hand_rgb: not an MP4 file", "one_task0_demo.hdf5"] {
+        assert!(problems.iter().any(|problem| problem.contains(words)), "{problems:?}");
+    }
+}
+
+#[test]
+fn folders_with_other_files_are_refused() {
+    let project = project();
+    project.write("mine/meta/info.json", b"{}");
+    let resumed = |script: &str, out: &str| {
+        Recording::new(project.run(script), 1, out).with(|options| options.resume = true).refusal()
+    };
+    let output = resumed("x.lua", "mine");
+    assert!(output.contains("--out mine: the folder contains meta but no softvt recording"), "{output}");
+    assert_eq!(files(&project.path("mine")).len(), 1);
+    project.write("other/recording.json", b"{\"softvt\":\"0.0.1\"}");
+    let output = resumed("x.lua", "other");
+    assert!(output.contains("the folder contains another recording (demos: null before, 1 now)"), "{output}");
+    project.write("wrong.lua", b"return nil + 1");
+    assert!(resumed("wrong.lua", "new").contains("wrong.lua:1"));
+    let stuck = SUITE.replace("arm:wait(1)", "arm:wait(0.1) error 'lost'");
+    project.write("stuck.lua", stuck.as_bytes());
+    assert!(resumed("stuck.lua", "new").contains("lost"));
+    assert!(!project.path("new").exists(), "nothing is left of a mistake");
+}
+
+#[test]
+fn the_teacher_of_a_suite_demonstrates_unless_a_policy_is_given() {
+    let taught = SUITE.replace("episodes = 1,", "episodes = 1, teacher = \"tactile-servo\",");
+    let project = Project::new(&[("x.lua", &taught), SOLIDS]);
+    let record = |out: &str| Recording::new(project.run("x.lua").threads(1), 1, out);
+    for (given, policy) in [(None, "tactile-servo"), (Some(Teacher::Expert), "expert")] {
+        Recording { policy: given, ..record(policy) }.record();
+        let attempts = project.stored(&format!("{policy}/attempts")).expect("a run");
+        assert_eq!(attempts[0].text("policy"), policy);
+    }
+    // An evaluation is not taught.
+    assert_eq!(project.run("x.lua").record().header.policy, "expert");
+    project.write("x.lua", taught.replace("tactile-servo", "noop").as_bytes());
+    let message = record("none").refusal();
+    assert!(
+        message.contains("suite.teacher: expected one of \"expert\", \"tactile-servo\", got \"noop\""),
+        "{message}"
+    );
+}

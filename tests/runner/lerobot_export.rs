@@ -1,0 +1,265 @@
+//! Exports for LeRobot: rows are the inputs of a policy, results do not depend on threads, and invalid exports are
+//! reported.
+
+use std::{
+    fs::{self, File},
+    path::Path,
+};
+
+use parquet::{
+    file::reader::{FileReader, SerializedFileReader},
+    record::{Field, Row},
+};
+use rmpv::Value;
+use softvt::{
+    dataset::{
+        TaskFile,
+        card::DatasetCard,
+        lerobot::{self, ExportConfig, ExportSummary, LeRobotVersion},
+        manifest,
+    },
+    episode_id::Split,
+    policy::profile::GripCode,
+};
+
+use crate::{
+    dataset_recording::Recording,
+    serve::{Access, Server},
+    support::{Project, SOLIDS, client::get, files},
+};
+
+/// The fingers close on a block on a pillar, and their fronts push a bar to the middle of its shelf.
+const SUITE: &str = r#"
+local solids = require "solids"
+local pillar = solids.solid("pillar", { 0.03, 0.03, 0.28 }, softvt.static {})
+local block = solids.solid("block", { 0.03, 0.05, 0.04 }, softvt.rigid { density = 300 })
+local shelf = solids.solid("shelf", { 0.11, 0.08, 0.262 }, softvt.static {})
+local bar = solids.solid("bar", { 0.04, 0.12, 0.04 }, softvt.rigid { density = 300 })
+local layout = softvt.layout("one", function(scene)
+  scene.base = { -0.6, 0, 0 }
+  scene:add { name = "floor", asset = solids.floor, position = { 0, 0, 0 } }
+  scene:add { name = "pillar", asset = pillar, position = { -0.137, -0.005, 0 } }
+  scene:add { name = "block", asset = block, position = { -0.127, -0.005, 0.28 } }
+  scene:add { name = "shelf", asset = shelf, position = { -0.044, -0.005, 0 } }
+  scene:add { name = "bar", asset = bar, position = { -0.088, -0.005, 0.262 } }
+end)
+local function task(prompt)
+  return softvt.task { prompt = prompt, layout = layout, budget_steps = 40,
+    goal = softvt.on { object = "bar", target = "shelf" },
+    expert = function(arm, scene)
+      arm:grasp(0.6, { rate = 1 })
+      arm:move_by({ 0.02, 0, 0 }, { speed = 0.2 })
+      arm:move_by({ -0.015, 0, 0 }, { speed = 0.2 })
+      arm:wait(1)
+    end }
+end
+return softvt.suite { name = "one", object_type = "rigid", variation = "spatial", episodes = 1,
+  tasks = { task("wait a while"), task("wait for it") } }
+"#;
+
+fn project() -> Project {
+    Project::new(&[("x.lua", SUITE), SOLIDS])
+}
+
+/// An export from the folder `data` of a project into `out`.
+fn config(project: &Project, version: LeRobotVersion, out: &str) -> ExportConfig {
+    ExportConfig {
+        data: project.path("data"),
+        out: project.path(out),
+        version,
+        gripper: GripCode::default(),
+        tasks: Vec::new(),
+        threads: 2,
+    }
+}
+
+fn export(config: &ExportConfig) -> ExportSummary {
+    lerobot::export(config, || false, |_, _| ()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn rows(path: &Path) -> Vec<Row> {
+    let reader = SerializedFileReader::new(File::open(path).expect("a table")).expect("Parquet");
+    reader.get_row_iter(None).expect("rows").map(|row| row.expect("a row")).collect()
+}
+
+fn field<'a>(row: &'a Row, name: &str) -> &'a Field {
+    let found = row.get_column_iter().find(|(column, _)| *column == name);
+    found.unwrap_or_else(|| panic!("no {name}")).1
+}
+
+/// Flattens nested lists of numbers.
+fn numbers(field: &Field) -> Vec<f32> {
+    match field {
+        Field::Float(x) => vec![*x],
+        Field::ListInternal(list) => list.elements().iter().flat_map(numbers).collect(),
+        other => panic!("no numbers: {other:?}"),
+    }
+}
+
+fn whole(field: &Field) -> i64 {
+    match field {
+        Field::Long(n) => *n,
+        other => panic!("no whole number: {other:?}"),
+    }
+}
+
+/// Decodes the pixels of a PNG file.
+fn pixels(field: &Field) -> Vec<u8> {
+    let Field::Group(group) = field else { panic!("no picture: {field:?}") };
+    let bytes = group.get_column_iter().find(|(name, _)| *name == "bytes").map(|(_, bytes)| bytes.clone());
+    let Some(Field::Bytes(bytes)) = bytes else { panic!("no bytes in {field:?}") };
+    image::load_from_memory(bytes.data()).expect("a PNG file").to_rgb8().into_raw()
+}
+
+/// The bytes of an array as clients receive it.
+fn sent(observation: &Value, name: &str) -> Vec<u8> {
+    let entries = get(observation, name).as_map().expect("an array");
+    let data =
+        entries.iter().find(|(key, _)| key.as_str() == Some("data") || key.as_slice() == Some(b"data"));
+    data.and_then(|(_, data)| data.as_slice()).expect("data").to_vec()
+}
+
+fn floats(bytes: &[u8]) -> Vec<f32> {
+    bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
+}
+
+#[test]
+fn rows_are_the_inputs_of_a_policy() {
+    let project = project();
+    Recording::new(project.run("x.lua").tasks(&[0]), 1, "data").record();
+    export(&config(&project, LeRobotVersion::V21, "out"));
+    let rows = rows(&project.path("out/data/chunk-000/episode_000000.parquet"));
+    let actions = TaskFile::open(&project.path("data/hdf5/one_task0_demo.hdf5"))
+        .and_then(|file| file.actions(0))
+        .expect("actions");
+    assert!(
+        rows.len() >= 12 && rows.len() == actions.len(),
+        "longer than a policy's history: {}",
+        rows.len()
+    );
+    let access = Access { split: Split::Demonstration, ..Access::default() };
+    let server = Server::with(&project.run("x.lua").profile("visuo_tactile"), access);
+    let (mut client, _) = server.client();
+    let episode = manifest::read(&project.path("data")).expect("a manifest")[0].episode;
+    let mut answer = client.reset(episode.into());
+    let mut touched = false;
+    for (step, (row, action)) in rows.iter().zip(&actions).enumerate() {
+        let observation = get(&answer, "observation");
+        for name in ["image", "wrist_image", "tactile_image"] {
+            assert!(pixels(field(row, name)) == sent(observation, name), "{name} at step {step}");
+        }
+        assert_eq!(numbers(field(row, "state")), floats(&sent(observation, "state")), "step {step}");
+        // A row keeps the initial state and the last two of nine.
+        let markers = floats(&sent(observation, "tactile_marker_motion"));
+        let kept: Vec<f32> = [0, 7, 8].into_iter().flat_map(|i| markers[396 * i..][..396].to_vec()).collect();
+        assert_eq!(numbers(field(row, "tactile_marker_motion")), kept, "step {step}");
+        touched |= kept[396..792] != kept[792..];
+        let (p, r) = (action.position_b, action.axis_angle_b);
+        let command = [p.x, p.y, p.z, r.x, r.y, r.z, action.closure()];
+        assert_eq!(numbers(field(row, "actions")), command.map(|x| x as f32), "step {step}");
+        answer = client.step(&[command]);
+    }
+    assert!(touched, "the block moves markers");
+    assert_eq!(get(&answer, "terminated").as_bool(), Some(true));
+}
+
+#[test]
+fn both_versions_have_the_same_rows() {
+    let project = project();
+    Recording::new(project.run("x.lua"), 2, "data").with(|options| options.has_privileged = false).record();
+    assert_eq!(DatasetCard::read(&project.path("data")).expect("a card").gripper, None);
+    let v21 = |out: &str, threads| ExportConfig { threads, ..config(&project, LeRobotVersion::V21, out) };
+    let exported = export(&v21("a", 1));
+    assert_eq!((exported.episodes, exported.tasks), (4, 2));
+    export(&v21("b", 3));
+    assert!(files(&project.path("a")) == files(&project.path("b")), "not the same bytes");
+    let v30 = |out: &str| config(&project, LeRobotVersion::V30, out);
+    assert_eq!(export(&ExportConfig { data: project.path("data/"), ..v30("c/") }), exported);
+    let apart: Vec<Row> = (0..4)
+        .flat_map(|i| rows(&project.path(&format!("a/data/chunk-000/episode_{i:06}.parquet"))))
+        .collect();
+    let together = rows(&project.path("c/data/chunk-000/file-000.parquet"));
+    assert_eq!((apart.len(), exported.frames), (together.len(), together.len()));
+    for (index, (one, other)) in apart.iter().zip(&together).enumerate() {
+        assert_eq!(whole(field(other, "index")), index as i64);
+        for (name, value) in one.get_column_iter() {
+            match name.ends_with("image") {
+                true => assert!(pixels(value) == pixels(field(other, name)), "{name}"),
+                false => assert_eq!(value, field(other, name), "{name}"),
+            }
+        }
+    }
+    let info = project.json("c/meta/info.json");
+    assert_eq!(info["total_frames"], together.len());
+    assert_eq!((&info["splits"]["train"], &info["total_tasks"]), (&"0:4".into(), &2.into()));
+    let episodes = rows(&project.path("c/meta/episodes/chunk-000/file-000.parquet"));
+    let ends: Vec<i64> = episodes.iter().map(|row| whole(field(row, "dataset_to_index"))).collect();
+    assert_eq!(ends.last(), Some(&(together.len() as i64)));
+    let second = |gripper: GripCode, out: &str| {
+        export(&ExportConfig { gripper, tasks: vec!["for".to_owned()], ..v30(out) });
+    };
+    second(GripCode::Binary, "d");
+    let binary = rows(&project.path("d/data/chunk-000/file-000.parquet"));
+    assert_eq!(binary.len() as i64, ends[3] - ends[1], "only the second task");
+    let gripper: Vec<f32> = binary.iter().map(|row| numbers(field(row, "actions"))[6]).collect();
+    assert!(gripper.iter().all(|x| [0.0, 1.0].contains(x)) && gripper.contains(&1.0), "{gripper:?}");
+    assert_eq!(project.lines("d/meta/softvt.jsonl")[0]["task_id"], 1);
+    assert_eq!(project.json("c/meta/softvt.json")["gripper"], "continuous");
+    for (grip_code, stream) in [(GripCode::TwoWidth, "actions_two_width"), (GripCode::Force, "actions_force")]
+    {
+        let code = grip_code.name();
+        second(grip_code, code);
+        let stated = project.json(&format!("{code}/meta/softvt.json"));
+        assert_eq!((&stated["gripper"], &stated["source"]), (&code.into(), &stream.into()));
+        let rows = rows(&project.path(&format!("{code}/data/chunk-000/file-000.parquet")));
+        let labels: Vec<f32> = rows.iter().map(|row| numbers(field(row, "actions"))[6]).collect();
+        let open = if code == "force" { -1.0 } else { 0.0 };
+        for (label, closed) in labels.iter().zip(&gripper) {
+            assert_eq!(*label == open, *closed == 0.0, "{code}: {labels:?}");
+        }
+        let held = labels.iter().copied().fold(0.0, f32::max);
+        // The hand closes by 0.05 per step to 0.6, in less than half of the demonstration: the median is 0.6.
+        assert!(if code == "force" { held > 1.0 } else { (held - 0.6).abs() < 1e-6 }, "{code}: {labels:?}");
+    }
+}
+
+#[test]
+fn invalid_exports_are_refused_and_leave_nothing() {
+    let project = project();
+    let record = |out: &str| Recording::new(project.run("x.lua").tasks(&[0]), 1, out);
+    record("data").record();
+    record("plain").with(|options| options.has_images = false).record();
+    project.write("full/mine", b"mine");
+    let hdf5 = project.path("data/hdf5/one_task0_demo.hdf5");
+    let refusal = |config: &ExportConfig| project.message(lerobot::export(config, || false, |_, _| ()));
+    let config = |data: &str, out: &str| ExportConfig {
+        data: project.path(data),
+        ..config(&project, LeRobotVersion::V21, out)
+    };
+    let task = |word: &str| ExportConfig { tasks: vec![word.to_owned()], ..config("data", "x") };
+    for (config, output) in [
+        (config("data", "full"), "--out full: it holds mine; nothing was written"),
+        (config("data", "full/mine"), "--out full/mine: it is not a folder"),
+        (task("7"), "--task \"7\" matches no task"),
+        (task("dance"), "--task \"dance\" matches no task"),
+        (config("full", "x"), "full: dataset.json: it is missing; expected the folder"),
+        (config("nowhere", "x"), "nowhere: dataset.json: it is missing"),
+        (config("plain", "x"), "record with --images hdf5"),
+    ] {
+        let message = refusal(&config);
+        assert!(message.contains(output), "{output}: {message}");
+    }
+    let whole = fs::read(&hdf5).expect("read");
+    fs::write(&hdf5, &whole[..whole.len() / 2]).expect("written");
+    let message = refusal(&config("data", "x"));
+    assert!(message.contains("one_task0_demo.hdf5") && message.contains("cut short"), "{message}");
+    // One step fewer than the manifest says.
+    fs::write(&hdf5, &whole).expect("written");
+    let manifest = project.text("data/manifest.jsonl");
+    let steps = format!("\"num_samples\":{}", project.lines("data/manifest.jsonl")[0]["num_samples"]);
+    project.write("data/manifest.jsonl", manifest.replace(&steps, "\"num_samples\":3").as_bytes());
+    let message = refusal(&config("data", "x"));
+    assert!(message.contains("/data/demo_0/obs/state: expected the shape [3, 7], got ["), "{message}");
+    assert!(!project.path("x").exists() && !project.path("x.part").exists());
+    assert_eq!(files(&project.path("full")).len(), 1);
+}

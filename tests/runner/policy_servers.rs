@@ -1,0 +1,703 @@
+//! Policy servers that answer, fail, hang or die: errors are reported and finished episodes are kept.
+
+use std::{
+    collections::BTreeSet,
+    fs,
+    io::{Read, Write},
+    net::{TcpListener, TcpStream},
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicUsize, Ordering},
+    },
+    thread,
+    time::Duration,
+};
+
+use rmpv::Value;
+use softvt::{
+    evaluation::verdict::Outcome,
+    policy::{profile::GripCode, remote::Protocol},
+    report::terminal,
+    runner::Cause,
+};
+use tungstenite::{Message, WebSocket, accept};
+
+use crate::support::{Project, Run, Small};
+
+type Socket = WebSocket<TcpStream>;
+
+/// Starts a server that handles `visits` connections with `serve`, which gets their number. Returns its address.
+fn server(visits: usize, serve: impl Fn(usize, Socket) + Send + 'static) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = format!("ws://{}", listener.local_addr().expect("an address"));
+    thread::spawn(move || {
+        for (number, stream) in listener.incoming().take(visits).enumerate() {
+            if let Ok(socket) = accept(stream.expect("a connection")) {
+                serve(number, socket);
+            }
+        }
+    });
+    address
+}
+
+fn packed(value: &Value) -> Message {
+    let mut bytes = Vec::new();
+    rmpv::encode::write_value(&mut bytes, value).expect("packed");
+    Message::binary(bytes)
+}
+
+fn text(name: &str) -> Value {
+    Value::from(name)
+}
+
+/// An array with keys of type bin, as openpi encodes it.
+fn array(dtype: &str, shape: &[usize], data: Vec<u8>) -> Value {
+    let key = |name: &str| Value::Binary(name.as_bytes().to_vec());
+    Value::Map(vec![
+        (key("__ndarray__"), Value::Boolean(true)),
+        (key("data"), Value::Binary(data)),
+        (key("dtype"), text(dtype)),
+        (key("shape"), Value::Array(shape.iter().map(|n| Value::from(*n)).collect())),
+    ])
+}
+
+fn actions(rows: usize, row: [f32; 7]) -> Value {
+    let numbers = (0..rows).flat_map(|_| row).flat_map(f32::to_le_bytes).collect();
+    Value::Map(vec![(text("actions"), array("<f4", &[rows, 7], numbers))])
+}
+
+/// The robot state of an observation.
+fn state(observation: &Value) -> Vec<f32> {
+    let of = |map: &Value, key: &[u8]| -> Value {
+        let found = map.as_map().expect("a map").iter().find(|(k, _)| match k {
+            Value::String(text) => text.as_bytes() == key,
+            Value::Binary(bytes) => bytes == key,
+            _ => false,
+        });
+        found.expect("an entry").1.clone()
+    };
+    let data = of(&of(observation, b"observation/state"), b"data");
+    data.as_slice().expect("bytes").as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
+}
+
+/// The next observation. The socket answers pings by itself.
+fn observation(socket: &mut Socket) -> Option<Value> {
+    loop {
+        match socket.read() {
+            Ok(Message::Binary(bytes)) => return rmpv::decode::read_value(&mut &bytes[..]).ok(),
+            Ok(Message::Ping(_) | Message::Pong(_)) => {}
+            _ => return None,
+        }
+    }
+}
+
+/// Sends the metadata of openpi and replies to each observation with `reply` of its number and content.
+fn answering(mut socket: Socket, reply: impl Fn(usize, &Value) -> Option<Message>) {
+    let _ = socket.send(packed(&Value::Map(Vec::new())));
+    let mut count = 0;
+    while let Some(seen) = observation(&mut socket) {
+        let Some(message) = reply(count, &seen) else { return };
+        if socket.send(message).is_err() {
+            return;
+        }
+        count += 1;
+    }
+}
+
+fn hold(seen: &Value, rows: usize) -> Message {
+    let state = state(seen);
+    let row = std::array::from_fn(|i| if i < 6 { state[i] } else { 0.0 });
+    packed(&actions(rows, row))
+}
+
+fn project() -> Project {
+    Small { task: "budget_steps = 12", ..Small::default() }.project()
+}
+
+/// A run of a server by the profile `vision` into the folder `run`.
+fn run<'a>(project: &'a Project, address: &str) -> Run<'a> {
+    let run = project.run("x.lua").policy(address).threads(1).out("run").profile("vision");
+    run.timeout(Duration::from_secs(5))
+}
+
+/// The message of a run that must fail because of its server.
+fn failure(address: &str, change: impl FnOnce(Run) -> Run) -> String {
+    let project = project();
+    let message = change(run(&project, address)).policy_error();
+    assert!(!project.path("run").exists(), "nothing was finished, so nothing is left");
+    message
+}
+
+fn fails(address: &str) -> String {
+    failure(address, |run| run)
+}
+
+/// The message of an episode that could not be run to its end.
+fn error_of(outcome: &Outcome) -> &str {
+    match outcome {
+        Outcome::Error { message } => message,
+        other => panic!("no error: {other:?}"),
+    }
+}
+
+#[test]
+fn one_request_is_sent_per_chunk() {
+    let asked = Arc::new(AtomicUsize::new(0));
+    let count = asked.clone();
+    let address = server(9, move |_, socket| {
+        answering(socket, |_, seen| {
+            count.fetch_add(1, Ordering::Relaxed);
+            Some(hold(seen, 50))
+        });
+    });
+    let project = project();
+    run(&project, &address).episodes(2).replan(5).finish();
+    // Twelve steps in chunks of five are three requests; two episodes use one connection.
+    assert_eq!(asked.load(Ordering::Relaxed), 6);
+    let info = project.json("run/run.json");
+    assert_eq!((info["policy"].as_str(), info["replan"].as_u64()), (Some("vision"), Some(5)));
+    assert_eq!(info["profile"]["actions"]["gripper"]["code"], "binary");
+    assert!(project.is_reproduced("run", "0/1"));
+}
+
+#[test]
+fn closed_idle_connections_are_reopened() {
+    let pongs = Arc::new(AtomicUsize::new(0));
+    let count = pongs.clone();
+    let address = server(9, move |_, mut socket| {
+        let _ = socket.send(packed(&Value::Map(Vec::new())));
+        let first = observation(&mut socket).expect("a question");
+        // Both frames are received before the next request.
+        let _ = socket.write(hold(&first, 50));
+        let _ = socket.write(Message::Ping("still there?".into()));
+        let _ = socket.flush();
+        let answers = std::iter::from_fn(|| socket.read().ok());
+        if answers.take(3).any(|message| matches!(&message, Message::Pong(_))) {
+            count.fetch_add(1, Ordering::Relaxed);
+        }
+        let Some(second) = observation(&mut socket) else { return };
+        let _ = socket.write(hold(&second, 50));
+        let _ = socket.write(Message::Close(None));
+        let _ = socket.flush();
+        let _ = socket.read();
+    });
+    let project = project();
+    run(&project, &address).episodes(2).replan(5).finish();
+    assert_eq!(pongs.load(Ordering::Relaxed), 3, "six questions over three connections");
+}
+
+/// Five actions that close the gripper: a reply that is wrong for an observation answered by `hold`.
+fn shut() -> Message {
+    packed(&actions(5, [0.4, 0.0, 0.3, 3.1, 0.0, 0.0, 1.0]))
+}
+
+#[test]
+fn surplus_replies_end_the_run() {
+    let address = server(9, |_, mut socket| {
+        let _ = socket.send(packed(&Value::Map(Vec::new())));
+        while let Some(seen) = observation(&mut socket) {
+            let _ = socket.send(hold(&seen, 5));
+            let _ = socket.send(shut());
+        }
+    });
+    let output = fails(&address);
+    assert!(output.contains("sent a message that was not requested"), "{output}");
+}
+
+#[test]
+fn the_timeout_holds_while_pings_arrive() {
+    let address = server(9, move |_, mut socket| {
+        let _ = socket.send(packed(&Value::Map(Vec::new())));
+        let _ = observation(&mut socket);
+        while socket.send(Message::Ping("still there?".into())).is_ok() {
+            thread::sleep(Duration::from_millis(10));
+        }
+    });
+    let output = failure(&address, |run| run.timeout(Duration::from_secs(2)));
+    assert!(output.contains("did not answer within 2 s"), "{output}");
+}
+
+#[test]
+fn the_grip_code_of_a_run_is_stated_and_compared_with_that_of_the_server() {
+    let stating = |code: &'static str| {
+        server(9, move |_, mut socket| {
+            let _ = socket.send(packed(&Value::Map(vec![(text("gripper"), text(code))])));
+            while let Some(seen) = observation(&mut socket) {
+                let state = state(&seen);
+                let row = std::array::from_fn(|i| if i < 6 { state[i] } else { 2.5 });
+                let _ = socket.send(packed(&actions(50, row)));
+            }
+        })
+    };
+    let output = fails(&stating("continuous"));
+    assert!(
+        output.contains("the grip code continuous") && output.contains("vision reads binary"),
+        "{output}"
+    );
+    let project = project();
+    run(&project, &stating("force")).gripper(GripCode::Force).finish();
+    let info = project.json("run/run.json");
+    assert_eq!(
+        (&info["gripper"], &info["profile"]["actions"]["gripper"]["code"]),
+        (&"force".into(), &"force".into())
+    );
+    assert!(project.is_reproduced("run", "0/0"), "the force is recorded");
+    let strong = run(&project, &stating("force")).gripper(GripCode::Force).set("robot.gripper.effort", 2);
+    let record = strong.out("strong").record();
+    let message = error_of(&record.outcome);
+    assert!(message.contains("2.5 N; expected 0 to 2 N"), "{message}");
+}
+
+#[test]
+fn missing_servers_are_reported() {
+    let free = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("an address");
+    let output = failure(&format!("ws://{free}"), |run| run.timeout(Duration::from_millis(300)));
+    assert!(
+        output.contains("no policy server at ws://127.0.0.1") && output.contains("--policy-timeout"),
+        "{output}"
+    );
+}
+
+#[test]
+fn invalid_addresses_are_input_errors() {
+    let project = project();
+    for (address, words) in [
+        ("wss://host:1", "use a tunnel"),
+        ("http://host:1", "expected ws://HOST:PORT"),
+        ("ws://", "not an address"),
+    ] {
+        let message = run(&project, address).error();
+        assert!(message.contains(words), "{message}");
+    }
+}
+
+#[test]
+fn hanging_servers_time_out() {
+    let address = server(9, |_, mut socket| {
+        let _ = socket.send(packed(&Value::Map(Vec::new())));
+        let _ = observation(&mut socket);
+        // Until the client leaves.
+        let _ = socket.read();
+    });
+    let output = failure(&address, |run| run.timeout(Duration::from_millis(500)));
+    assert!(output.contains("did not answer within 0.5 s"), "{output}");
+    // A server that accepts the connection and never responds.
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let silent = format!("ws://{}", listener.local_addr().expect("an address"));
+    let output = failure(&silent, |run| run.timeout(Duration::from_millis(500)));
+    assert!(output.contains("says nothing"), "{output}");
+}
+
+#[test]
+fn error_messages_of_servers_are_shown() {
+    let address = server(9, |_, socket| {
+        answering(socket, |_, _| {
+            Some(Message::text("Traceback (most recent call last):\nValueError: bad key"))
+        });
+    });
+    let output = fails(&address);
+    assert!(output.contains("reported an error:") && output.contains("ValueError: bad key"), "{output}");
+}
+
+#[test]
+fn malformed_replies_are_reported() {
+    let of = |value: Value| Value::Map(vec![(text("actions"), value)]);
+    let floats = |n: usize| vec![0; 4 * n];
+    for (reply, words) in [
+        (packed(&of(array("<f4", &[10, 6], floats(60)))), "[10, 6]: too few numbers"),
+        (packed(&of(array("<f4", &[0, 7], floats(0)))), "no action at all"),
+        (packed(&of(array("<f4", &[10, 7], floats(3)))), "with 12 bytes"),
+        (packed(&of(array("<U7", &[10, 7], floats(70)))), "dtype \"<U7\""),
+        (packed(&of(text("left"))), "has text as actions"),
+        (packed(&Value::Map(vec![(text("act"), Value::Nil)])), "no entry actions; it has act"),
+        (packed(&Value::Nil), "is nil"),
+        (Message::binary(vec![0xC1; 40]), "msgpack"),
+        (Message::binary(vec![0xDD, 0xFF, 0xFF, 0xFF, 0xFF]), "msgpack"),
+        (Message::binary(vec![0x91; 5000]), "msgpack"),
+        (Message::binary(Vec::new()), "msgpack"),
+        (
+            Message::binary([&[0xDD, 0, 0x20, 0, 0][..], &[0xC0; 2 << 20]].concat()),
+            "more than 1048576 values",
+        ),
+    ] {
+        let address = server(9, move |_, socket| answering(socket, |_, _| Some(reply.clone())));
+        let output = fails(&address);
+        assert!(output.contains(words), "{words}: {output}");
+    }
+}
+
+#[test]
+fn huge_replies_are_refused_unread() {
+    let address = server(9, |_, mut socket| {
+        let _ = socket.send(packed(&Value::Map(Vec::new())));
+        let _ = observation(&mut socket);
+        let mut frame = vec![0x82, 127];
+        frame.extend((1_u64 << 30).to_be_bytes());
+        let _ = socket.get_mut().write_all(&frame);
+        let megabyte = vec![0; 1 << 20];
+        while socket.get_mut().write_all(&megabyte).is_ok() {}
+    });
+    let output = fails(&address);
+    assert!(output.contains("more than 64 MiB"), "{output}");
+}
+
+#[test]
+fn other_protocols_are_reported() {
+    let address = server(9, |_, mut socket| {
+        let _ = socket.send(packed(&Value::from(7)));
+    });
+    assert!(fails(&address).contains("sent a number first"), "a greeting that is not a map");
+    let address = server(9, |_, socket| answering(socket, |_, seen| Some(packed(seen))));
+    let output = failure(&address, |run| {
+        let run = run.timeout(Duration::from_secs(1));
+        run.with_policy(|policy| policy.protocol = Some(Protocol::VlaEval))
+    });
+    assert!(output.contains("vla-eval"), "{output}");
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = format!("ws://{}", listener.local_addr().expect("an address"));
+    thread::spawn(move || {
+        for stream in listener.incoming().flatten().take(2) {
+            let mut stream = stream;
+            let _ = stream.write_all(b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n");
+            // Until the client leaves.
+            let _ = stream.read_to_end(&mut Vec::new());
+        }
+    });
+    assert!(fails(&address).contains("not a websocket server"), "a web server");
+}
+
+#[test]
+fn nan_replies_fail_only_their_episode() {
+    let address = server(9, |_, socket| {
+        answering(socket, |count, seen| match count {
+            1 => Some(packed(&actions(5, [f32::NAN; 7]))),
+            _ => Some(hold(seen, 5)),
+        });
+    });
+    let project = project();
+    let records = run(&project, &address).episodes(2).replan(5).records();
+    let message = error_of(&records[0].outcome);
+    assert!(message.contains("not finite"), "{message}");
+    assert_eq!((records[0].stats.steps, records[0].verdict.safety), (5, false));
+    assert_eq!(records[1].outcome, Outcome::Budget);
+    assert!(project.is_reproduced("run", "0/0"));
+}
+
+#[test]
+fn unreachable_poses_are_counted() {
+    let address = server(9, |_, socket| {
+        answering(socket, |_, _| Some(packed(&actions(9, [50.0, 0.0, -3.0, 0.0, 9.0, 0.0, 7.0]))))
+    });
+    let project = project();
+    let finished = run(&project, &address).finish();
+    let messages = finished.messages.clone();
+    let record = finished.records().swap_remove(0);
+    assert_eq!((record.stats.far_commands, record.stats.clamped_grips), (12, 12));
+    assert!(!record.verdict.safety);
+    let message = "all 12 commands were out of reach, first: (50, 0, -3) m";
+    assert!(error_of(&record.outcome).starts_with(message), "{record:?}");
+    assert!(messages.contains(message), "{messages}");
+    assert!(project.is_reproduced("run", "0/0"));
+}
+
+#[test]
+fn commands_that_are_not_executed_as_given_are_shown() {
+    let address = server(9, |_, socket| {
+        answering(socket, |count, seen| match count {
+            0 => Some(hold(seen, 6)),
+            _ => Some(packed(&actions(6, [50.0, 0.0, -3.0, 0.0, 0.0, 0.0, 255.0]))),
+        });
+    });
+    let project = project();
+    let finished = run(&project, &address).replan(6).finish();
+    let messages = &finished.messages;
+    let far = "; 6 of 12 commands were out of reach, first: (50, 0, -3) m, 49.";
+    assert!(messages.contains(far), "{messages}");
+    assert!(messages.contains("; 6 of 12 grip values were out of range"), "{messages}");
+    let summary = finished.result().summary;
+    assert_eq!((summary.commands.far, summary.commands.clamped_grips), (6, 6));
+    let table = terminal::table(&summary);
+    for line in [
+        "6 of 12 commands were out of reach in 1 episode",
+        "6 of 12 grip values were out of range in 1 episode",
+    ] {
+        assert!(table.contains(line), "{table}");
+    }
+    let report = project.report(&["run"]);
+    for text in [report.html, report.markdown] {
+        assert!(text.contains("Commands that were not executed as given") && text.contains("(50, 0, -3) m"));
+    }
+}
+
+#[test]
+fn actions_of_eight_numbers_need_a_profile_that_states_their_length() {
+    let eight = || Value::Map(vec![(text("actions"), array("<f4", &[5, 8], vec![0; 160]))]);
+    let address = server(9, move |_, socket| answering(socket, |_, _| Some(packed(&eight()))));
+    let refused = fails(&address);
+    assert!(
+        refused.contains("8 numbers per action are neither 7 nor the 32 of openpi's padding"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn a_dying_server_loses_no_finished_episode() {
+    let whole = project();
+    let address = server(9, |_, socket| answering(socket, |_, seen| Some(hold(seen, 50))));
+    run(&whole, &address).episodes(3).finish();
+    let broken = project();
+    let dying = server(1, |_, socket| answering(socket, |count, seen| (count < 3).then(|| hold(seen, 50))));
+    let message = run(&broken, &dying).episodes(3).timeout(Duration::from_secs(1)).policy_error();
+    assert!(message.contains("1 of 3 episodes are in run"), "{message}");
+    run(&broken, &address).episodes(3).resume().finish();
+    for file in ["episodes.jsonl", "summary.json", "softvtbench/episodes.csv"] {
+        assert_eq!(broken.text(&format!("run/{file}")), whole.text(&format!("run/{file}")), "{file}");
+    }
+    // The projects are in different folders.
+    let manifest = |project: &Project| project.relative(project.text("run/run.json"));
+    assert_eq!(manifest(&broken), manifest(&whole));
+    let again = || run(&broken, &address).episodes(3).finish().messages;
+    let messages = again();
+    assert!(messages.contains("already complete"), "{messages}");
+    // Files of finished episodes are restored from the actions, without the policy; without actions they are reported as lost.
+    let log = "run/softvtbench/task_000/episode_00001/policy_action_debug.jsonl";
+    let text = broken.text(log);
+    fs::remove_file(broken.path(log)).expect("removed");
+    let messages = again();
+    assert!(messages.contains("restoring files of 1 finished episode"), "{messages}");
+    assert_eq!(broken.text(log), text);
+    fs::remove_dir_all(broken.path("run/actions")).expect("removed");
+    let messages = again();
+    assert!(messages.contains("3 finished episodes lack their actions"), "{messages}");
+    assert_eq!(broken.text("run/episodes.jsonl"), whole.text("run/episodes.jsonl"));
+}
+
+#[test]
+fn profiles_determine_the_inputs() {
+    let entries = |profile: &str, gripper: Option<GripCode>| {
+        let names = Arc::new(Mutex::new(Vec::new()));
+        let kept = names.clone();
+        let address = server(9, move |_, socket| {
+            answering(socket, |_, seen| {
+                let map = seen.as_map().expect("a map");
+                *kept.lock().unwrap() =
+                    map.iter().map(|(k, _)| k.as_str().unwrap_or("").to_owned()).collect();
+                Some(hold(seen, 50))
+            });
+        });
+        let project = project();
+        let run = run(&project, &address).profile(profile);
+        let summary = run.with_policy(|policy| policy.gripper = gripper).finish().result().summary;
+        let names = names.lock().unwrap().clone();
+        (names, summary, project.json("run/run.json"))
+    };
+    let (vision, summary, _) = entries("vision", None);
+    assert!(vision.iter().any(|k| k == "image") && vision.iter().any(|k| k == "observation/wrist_image"));
+    assert!(!vision.iter().any(|k| k.contains("tactile")));
+    assert!(!summary.force_observed);
+    let (touch, _, info) = entries("visuo_tactile", Some(GripCode::Binary));
+    assert!(touch.iter().any(|k| k == "observation/tactile_marker_motion"));
+    assert_eq!(info["profile"]["actions"]["gripper"]["code"], "binary", "modality and gripper cross");
+    let (released, summary, _) = entries("softvtbench", None);
+    assert!(released.iter().any(|k| k == "tactile_gripper_force"));
+    assert!(summary.force_observed);
+}
+
+#[test]
+fn a_judged_run_names_its_episodes_to_the_server_by_hashes_alone() {
+    let identities = |is_judged: bool| {
+        let seen = Arc::new(Mutex::new(Vec::new()));
+        let kept = seen.clone();
+        let address = server(9, move |_, socket| {
+            answering(socket, |_, observation| {
+                let entries = observation.as_map().expect("a map").iter();
+                let identity =
+                    entries.clone().find(|(key, _)| key.as_str() == Some("softvt")).expect("it is sent");
+                let seed = entries
+                    .clone()
+                    .find(|(key, _)| key.as_str() == Some("__softvtbench_rng_seed"))
+                    .expect("sent");
+                kept.lock().unwrap().push((identity.1.clone(), seed.1.clone()));
+                Some(hold(observation, 4))
+            });
+        });
+        let project = project();
+        project.write("secret", b"correct horse battery staple");
+        let run = run(&project, &address).episodes(2).replan(4);
+        if is_judged { run.secret("secret") } else { run }.finish();
+        let seen = seen.lock().unwrap();
+        seen.clone()
+    };
+    let entry = |identity: &Value, name: &str| -> Option<Value> {
+        let entries = identity.as_map().expect("a map");
+        entries.iter().find(|(key, _)| key.as_str() == Some(name)).map(|(_, value)| value.clone())
+    };
+    let judged = identities(true);
+    assert_eq!(judged.len(), 6, "three requests in each of two episodes");
+    let ids: BTreeSet<String> =
+        judged.iter().map(|(identity, _)| entry(identity, "id").expect("a name").to_string()).collect();
+    assert_eq!(ids.len(), 2, "a name per episode");
+    let seeds: BTreeSet<String> = judged.iter().map(|(_, seed)| seed.to_string()).collect();
+    assert_eq!(seeds.len(), 6, "a seed per request");
+    for (identity, seed) in &judged {
+        let names: Vec<_> =
+            identity.as_map().expect("a map").iter().map(|(key, _)| key.as_str().unwrap()).collect();
+        assert_eq!(names, ["id", "step", "query", "seed", "wants_actions"]);
+        assert_eq!(entry(identity, "seed").as_ref(), Some(seed));
+    }
+    assert_eq!(judged, identities(true), "the same requests again");
+    let open = identities(false);
+    assert!(entry(&open[0].0, "suite").is_some() && entry(&open[0].0, "id").is_none());
+}
+
+#[test]
+fn lines_of_another_run_are_refused() {
+    let project = project();
+    let run = || project.run("x.lua").policy("noop").episodes(2).threads(1).out("run");
+    run().finish();
+    let (lines, info) = (project.text("run/episodes.jsonl"), project.text("run/run.json"));
+    let refused = |text: &str, words: &str| {
+        project.write("run/episodes.jsonl", text.as_bytes());
+        let message = run().resume().error();
+        assert!(message.contains(words), "{message}");
+    };
+    refused(&format!("{lines}{lines}"), "run/episodes.jsonl:3: task 0 episode 0 occurs twice");
+    refused(
+        &lines.replace("\"noop\"", "\"other\""),
+        "run/episodes.jsonl:1: task 0 episode 0 belongs to another run",
+    );
+    project.write("run/episodes.jsonl", lines.as_bytes());
+    fs::remove_file(project.path("run/run.json")).expect("removed");
+    assert!(run().resume().error().contains("there is no run.json next to it"));
+    project.write("run/run.json", info.as_bytes());
+    assert!(run().resume().finish().messages.contains("already complete"));
+}
+
+/// A profile with entries of several control steps, and of every kind of image.
+const HISTORY: &str = r#"return softvt.profile {
+  name = "history",
+  inputs = {
+    { keys = { "observation/state" }, source = "state", parts = { "position", "axis_angle", "closure" } },
+    { keys = { "two" }, source = "camera", camera = "wrist", frames = 2 },
+    { keys = { "one" }, source = "camera", camera = "wrist", frames = 1 },
+    { keys = { "depth" }, source = "depth", camera = "wrist" },
+    { keys = { "objects" }, source = "segmentation", camera = "wrist", frames = 3 },
+    { keys = { "arm" }, source = "state", parts = { "joints", "joint_velocities", "joint_torques" }, frames = 4 },
+    { keys = { "markers" }, source = "marker_motion", frames = 2 },
+    { keys = { "drawn" }, source = "tactile", finger = "left", markers = "black_arrows", frames = 2 },
+    { keys = { "mosaic" }, source = "tactile_image", markers = "dots" },
+    { keys = { "id" }, source = "query" },
+    { keys = { "seed" }, source = "query_seed" },
+  },
+  actions = { pose = "absolute", gripper = { open = 0, closed = 1 } },
+OBSERVE}"#;
+
+/// The entry of a map.
+fn entry<'a>(map: &'a Value, key: &str) -> &'a Value {
+    let is = |name: &Value| name.as_str() == Some(key) || name.as_slice() == Some(key.as_bytes());
+    &map.as_map().expect("a map").iter().find(|(name, _)| is(name)).unwrap_or_else(|| panic!("no {key}")).1
+}
+
+fn shape(observation: &Value, key: &str) -> Vec<u64> {
+    let shape = entry(entry(observation, key), "shape").as_array().expect("a list");
+    shape.iter().filter_map(Value::as_u64).collect()
+}
+
+fn bytes<'a>(observation: &'a Value, key: &str) -> &'a [u8] {
+    entry(entry(observation, key), "data").as_slice().expect("bytes")
+}
+
+/// The messages that a server gets in an episode of 12 steps in chunks of 5, with the metadata `greeting`.
+fn messages(
+    greeting: Value,
+    observe: &str,
+    change: impl Fn(Run) -> Run,
+) -> Result<Vec<Value>, (Cause, String)> {
+    let seen = Arc::new(Mutex::new(Vec::new()));
+    let kept = seen.clone();
+    let address = server(9, move |_, mut socket| {
+        let _ = socket.send(packed(&greeting));
+        while let Some(message) = observation(&mut socket) {
+            let wants = entry(entry(&message, "id"), "wants_actions").as_bool().expect("stated");
+            let reply = if wants { hold(&message, 50) } else { packed(&Value::Map(Vec::new())) };
+            kept.lock().expect("kept").push(message);
+            if socket.send(reply).is_err() {
+                return;
+            }
+        }
+    });
+    let project = project();
+    project.write("history.lua", HISTORY.replace("OBSERVE", observe).as_bytes());
+    let run = run(&project, &address).profile("history.lua").replan(5).timeout(Duration::from_secs(20));
+    change(run.episodes(1)).attempt()?;
+    let messages = seen.lock().expect("kept").clone();
+    Ok(messages)
+}
+
+#[test]
+fn entries_have_as_many_control_steps_as_the_profile_asks_for() {
+    let messages = messages(Value::Map(Vec::new()), "", |run| run.seed(11)).expect("it answers");
+    assert_eq!(messages.len(), 3);
+    let edge = 224;
+    for message in &messages {
+        for (key, expected) in [
+            ("two", vec![2, edge, edge, 3]),
+            ("one", vec![1, edge, edge, 3]),
+            ("depth", vec![edge, edge]),
+            ("objects", vec![3, edge, edge]),
+            ("arm", vec![4, 21]),
+            ("markers", vec![3, 198, 2]),
+            ("drawn", vec![2, 240, 320, 3]),
+            ("mosaic", vec![edge, edge, 3]),
+        ] {
+            assert_eq!(shape(message, key), expected, "{key}");
+        }
+        let (two, one) = (bytes(message, "two"), bytes(message, "one"));
+        assert_eq!(&two[one.len()..], one, "the present step is the last");
+    }
+    let two = bytes(&messages[0], "two");
+    assert_eq!(two[..two.len() / 2], two[two.len() / 2..], "the first step is repeated");
+    let ids: Vec<_> = messages.iter().map(|message| entry(message, "id")).collect();
+    let numbers =
+        |key: &str| ids.iter().map(|id| entry(id, key).as_u64().expect("a number")).collect::<Vec<_>>();
+    assert_eq!((numbers("query"), numbers("step")), (vec![0, 1, 2], vec![0, 5, 10]));
+    assert_eq!(
+        (numbers("task"), numbers("episode"), numbers("run_seed")),
+        (vec![0; 3], vec![0; 3], vec![11; 3])
+    );
+    let seeds: Vec<_> =
+        messages.iter().map(|message| entry(message, "seed").as_u64().expect("a seed")).collect();
+    assert_eq!(seeds, numbers("seed"));
+    assert!(seeds[0] != seeds[1] && seeds.iter().all(|seed| *seed < 1 << 32), "{seeds:?}");
+    assert_eq!(entry(ids[0], "suite"), &text("one"));
+}
+
+#[test]
+fn a_server_or_a_profile_may_ask_for_an_observation_in_every_control_step() {
+    let asks = Value::Map(vec![(text("observe_every_step"), Value::Boolean(true))]);
+    let by_server = messages(asks, "", |run| run).expect("it answers");
+    let every_step = "  observe_every_step = true,\n";
+    let by_profile = messages(Value::Map(Vec::new()), every_step, |run| run).expect("it answers");
+    for messages in [&by_server, &by_profile] {
+        assert_eq!(messages.len(), 12);
+        let wants = |message: &Value| entry(entry(message, "id"), "wants_actions").as_bool();
+        let asked: Vec<usize> = (0..12).filter(|step| wants(&messages[*step]) == Some(true)).collect();
+        assert_eq!(asked, [0, 5, 10]);
+        for step in 1..12 {
+            let (before, now) = (bytes(&messages[step - 1], "one"), bytes(&messages[step], "two"));
+            assert_eq!(&now[..before.len()], before, "step {step}");
+            assert_eq!(entry(entry(&messages[step], "id"), "step").as_u64(), Some(step as u64));
+        }
+    }
+    assert_eq!(by_server, by_profile);
+    let wrong = Value::Map(vec![(text("observe_every_step"), text("yes"))]);
+    let (cause, message) = messages(wrong, "", |run| run).expect_err("no truth value");
+    assert_eq!(cause, Cause::Policy);
+    assert!(message.contains("observe_every_step in its metadata; expected true or false"), "{message}");
+    let refused = messages(Value::Map(Vec::new()), every_step, |run| {
+        run.with_policy(|policy| policy.protocol = Some(Protocol::VlaEval))
+    });
+    let (cause, message) = refused.expect_err("another protocol");
+    assert_eq!(cause, Cause::Input);
+    assert!(message.contains("observe_every_step needs --protocol openpi"), "{message}");
+}
