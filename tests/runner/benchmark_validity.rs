@@ -1,5 +1,7 @@
 //! Validity of the benchmark on small suites: policies and objects that must fail do so, for the right reason.
 
+use std::sync::OnceLock;
+
 use softvt::{
     evaluation::verdict::{Outcome, Verdict},
     records::record::EpisodeRecord,
@@ -13,6 +15,12 @@ fn episodes(change: impl FnOnce(Run) -> Run) -> Vec<EpisodeRecord> {
     let records = change(project.run(SPATIAL_SOFT).tasks(&[0, 9]).episodes(1)).records();
     assert_eq!(records.len(), 2);
     records
+}
+
+/// The episodes of the expert.
+fn expert() -> &'static [EpisodeRecord] {
+    static EPISODES: OnceLock<Vec<EpisodeRecord>> = OnceLock::new();
+    EPISODES.get_or_init(|| episodes(|run| run))
 }
 
 fn all(episodes: &[EpisodeRecord], is_so: impl Fn(&Verdict) -> bool) -> bool {
@@ -34,8 +42,8 @@ fn noop_and_random_never_succeed() {
 
 #[test]
 fn stiffer_objects_deform_less() {
-    let soft = episodes(|run| run);
-    assert!(all(&soft, |verdict| verdict.safety), "{soft:?}");
+    let soft = expert();
+    assert!(all(soft, |verdict| verdict.safety), "{soft:?}");
     let stiff = episodes(|run| run.shift("stiffness", 10.0));
     assert!(all(&stiff, |verdict| verdict.goal), "{stiff:?}");
     for (soft, stiff) in soft.iter().zip(&stiff) {
@@ -47,7 +55,7 @@ fn stiffer_objects_deform_less() {
 
 #[test]
 fn a_binary_gripper_reaches_the_goal_unsafely() {
-    let (careful, binary) = (episodes(|run| run), episodes(|run| run.policy("expert-binary")));
+    let (careful, binary) = (expert(), episodes(|run| run.policy("expert-binary")));
     for (careful, binary) in careful.iter().zip(&binary) {
         assert!(d_peak(binary) > d_peak(careful), "{careful:?}\n{binary:?}");
     }
