@@ -18,7 +18,7 @@ use softvt_runner::{
     LoadedRun, PolicyConfig, PolicyOptions, PolicySource, RunConfig, Shard, TraceDetail, VideoSelection,
     parse_profile, read_secret, recording::RecordingOptions,
 };
-use softvt_script::{LoadedScript, STANDARD_VARIATION};
+use softvt_script::STANDARD_VARIATION;
 
 // The script, and changes of its scenes and their physics. A doc comment would replace the description of the commands
 // that this struct is flattened into.
@@ -173,11 +173,11 @@ impl Request {
     ///
     /// # Errors
     /// The script fails or returns no plan; a flag without effect.
-    pub(crate) fn load(&self, command: &str) -> Result<LoadedScript, CliError> {
-        let config = &self.config;
+    pub(crate) fn load(&self, command: &str) -> Result<LoadedRun, CliError> {
+        let config = self.config.clone();
         let loaded = softvt_script::load(&config.file, &config.options)?;
         plan_flags::check(command, self, &loaded.plan)?;
-        Ok(config.prepare_script(loaded)?)
+        Ok(LoadedRun { script: config.prepare_script(loaded)?, config })
     }
 
     /// Loads the script, refuses flags of `command` that would do nothing for its plan, and then loads the policy.
@@ -185,8 +185,8 @@ impl Request {
     /// # Errors
     /// The script fails or returns no plan; a flag without effect; a policy that cannot be loaded.
     pub(crate) fn load_plan(self, command: &str, policy: &PolicyArgs) -> Result<LoadedRun, CliError> {
-        let script = self.load(command)?;
-        Ok(LoadedRun { config: self.config.with_policy(PolicyConfig::load(&policy.options())?), script })
+        let LoadedRun { config, script } = self.load(command)?;
+        Ok(LoadedRun { config: config.with_policy(PolicyConfig::load(&policy.options())?), script })
     }
 }
 

@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use crate::{
-    config::RunConfig,
+    config::{LoadedRun, RunConfig},
     error::RunError,
     evaluate::{is_finished, run_suite},
     policy::PolicyConfig,
     selection::{check_episodes, path_component, select_episodes, select_tasks},
     suite_run::SuiteRun,
 };
-use softvt_benchmark::{Condition, ObjectType, REFERENCE, Suite, Task};
+use softvt_benchmark::{Condition, ObjectType, Plan, REFERENCE, Suite, Task};
 use softvt_common::{files::replace, text};
 use softvt_records::summary::method_label;
 use softvt_report::{
@@ -35,20 +35,20 @@ struct ConditionCase {
     not_applicable: Option<String>,
 }
 
-/// Runs every suite unchanged and under each condition. All scenes and folders are checked before the first episode runs.
-/// `on_suite` is called with the tables so far after each suite. Returns the content of `conditions.json`.
+/// Runs every suite of a script unchanged and under each of its conditions, into folders below `out`. All scenes and folders are
+/// checked before the first episode runs. `on_suite` is called with the tables so far after each suite. Returns the table of each
+/// suite.
 ///
 /// # Errors
-/// A condition that does not fit a suite, a folder that contains a run, or an episode that fails.
-/// Finished runs are kept.
+/// A script without conditions, a condition that does not fit a suite, a folder that contains a run, or an episode that
+/// fails. Finished runs are kept.
 pub fn run<E: From<RunError>>(
-    config: &RunConfig,
-    loaded: &LoadedScript,
-    suites: &[Suite],
-    conditions: &[Condition],
+    run: &LoadedRun,
     out: &Path,
     mut on_suite: impl FnMut(&[ConditionTable]) -> Result<(), E>,
-) -> Result<Value, E> {
+) -> Result<Vec<ConditionTable>, E> {
+    let LoadedRun { config, script: loaded } = run;
+    let (suites, conditions) = conditions_of(run)?;
     check_episodes(config, suites)?;
     let cases: Vec<Vec<ConditionCase>> = suites
         .iter()
@@ -64,19 +64,25 @@ pub fn run<E: From<RunError>>(
         tables.push(compared);
         on_suite(&tables)?;
     }
-    Ok(write(config, loaded, &tables, out)?)
+    replace(&out.join(FILE), format!("{:#}\n", document(run, &tables))).map_err(RunError::from)?;
+    Ok(tables)
+}
+
+/// The suites and the conditions of a script.
+fn conditions_of(LoadedRun { config, script }: &LoadedRun) -> Result<(&[Suite], &[Condition]), RunError> {
+    match &script.plan {
+        Plan::Conditions { suites, conditions, .. } => Ok((suites, conditions)),
+        _ => Err(config.error("the script returned no conditions")),
+    }
 }
 
 /// Checks that every condition can be applied to every suite, on the first task of each.
 ///
 /// # Errors
-/// The first condition or scene that is not valid.
-pub fn check(
-    config: &RunConfig,
-    loaded: &LoadedScript,
-    suites: &[Suite],
-    conditions: &[Condition],
-) -> Result<(), RunError> {
+/// A script without conditions; the first condition or scene that is not valid.
+pub fn check(run: &LoadedRun) -> Result<(), RunError> {
+    let LoadedRun { config, script: loaded } = run;
+    let (suites, conditions) = conditions_of(run)?;
     for suite in suites {
         let first: Vec<&Task> = suite.tasks.iter().take(1).collect();
         let cases = condition_cases(config, suite, conditions, false)?;
@@ -221,12 +227,8 @@ fn is_blind(policy: &PolicyConfig) -> bool {
     matches!(policy.expert(), Some(GripMode::Controller(controller)) if controller.is_blind())
 }
 
-fn write(
-    config: &RunConfig,
-    loaded: &LoadedScript,
-    tables: &[ConditionTable],
-    out: &Path,
-) -> Result<Value, RunError> {
+/// The content of `conditions.json`.
+pub fn document(LoadedRun { config, script: loaded }: &LoadedRun, tables: &[ConditionTable]) -> Value {
     let mut document = json!({
         "softvt": env!("CARGO_PKG_VERSION"),
         "script": loaded.sources.main,
@@ -237,6 +239,5 @@ fn write(
     if let Some(secret) = &config.secret {
         document["seed_hash"] = json!(secret.hash());
     }
-    replace(&out.join(FILE), format!("{document:#}\n"))?;
-    Ok(document)
+    document
 }

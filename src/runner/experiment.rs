@@ -8,7 +8,11 @@ use std::{
 
 use serde::Serialize;
 
-use crate::{config::RunConfig, error::RunError, run_manifest};
+use crate::{
+    config::{LoadedRun, RunConfig},
+    error::RunError,
+    run_manifest,
+};
 use softvt_benchmark::Plan;
 use softvt_common::cancel;
 use softvt_common::{
@@ -50,13 +54,12 @@ pub enum ExperimentOutput<'a> {
 }
 
 /// Runs all points of the experiment that a script returned. With an output folder, the rows and the files of the script are
-/// written into it.
+/// written into it; without one, the files of the script are written below the working folder.
 ///
 /// # Errors
 /// The script fails or tells a problem, a setting or the seed changes nothing, or a file cannot be written.
 pub fn run<E: From<RunError>>(
-    config: &RunConfig,
-    loaded: &LoadedScript,
+    LoadedRun { config, script: loaded }: &LoadedRun,
     mut on_output: impl FnMut(ExperimentOutput) -> Result<(), E>,
 ) -> Result<(), E> {
     let Plan::Experiment { name, points, has_finish, .. } = &loaded.plan else {

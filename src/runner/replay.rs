@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 use crate::{
     config::{LoadedRun, RunConfig, thread_count},
     episode_list::{EpisodeJob, EpisodeList},
+    episode_selector::EpisodeSelector,
     error::RunError,
     observer::Observer,
     policy::{ControllerFactory, PolicyConfig},
@@ -21,7 +22,7 @@ use crate::{
 };
 use softvt_benchmark::{Suite, seed::SecretSeed};
 use softvt_common::cancel;
-use softvt_common::episode_id::Split;
+use softvt_common::episode_id::{EpisodeIndex, Split};
 use softvt_common::parallel;
 use softvt_dataset::{
     TaskFile,
@@ -31,6 +32,7 @@ use softvt_dataset::{
 use softvt_evaluation::verdict::Outcome;
 use softvt_policy::{Action, builtin::RecordedPolicy};
 use softvt_records::record::EpisodeRecord;
+use softvt_report::{actions, stored_run::StoredRun};
 use softvt_rollout::ChunkedPolicy;
 use softvt_script::LoadedScript;
 
@@ -61,7 +63,10 @@ pub(crate) fn with_policy_fields(mut simulated: EpisodeRecord, record: &EpisodeR
 ///
 /// # Errors
 /// A record cannot be written as JSON.
-pub fn difference(recorded: &EpisodeRecord, simulated: &EpisodeRecord) -> Result<Option<String>, RunError> {
+pub(crate) fn difference(
+    recorded: &EpisodeRecord,
+    simulated: &EpisodeRecord,
+) -> Result<Option<String>, RunError> {
     if serde_json::to_string(recorded)? == serde_json::to_string(simulated)? {
         return Ok(None);
     }
@@ -70,7 +75,7 @@ pub fn difference(recorded: &EpisodeRecord, simulated: &EpisodeRecord) -> Result
 }
 
 /// A run or dataset file, and the content of its `run.json`.
-pub struct StoredManifest<'a> {
+pub(crate) struct StoredManifest<'a> {
     /// The file, as messages name it.
     pub path: &'a Path,
     /// Its content.
@@ -94,7 +99,7 @@ impl StoredManifest<'_> {
     ///
     /// # Errors
     /// The scripts have changed since, or the episode cannot be run.
-    pub fn simulate(&self, record: &EpisodeRecord, actions: Vec<Action>) -> Result<EpisodeRecord, RunError> {
+    fn simulate(&self, record: &EpisodeRecord, actions: Vec<Action>) -> Result<EpisodeRecord, RunError> {
         let index = record.header.id.index();
         let config = self.config(index.task)?;
         let LoadedRun { config, script: loaded } = config.load()?;
@@ -240,6 +245,34 @@ pub fn demos_of(path: &Path) -> Result<Vec<DemoRef>, RunError> {
     }
     let file = TaskFile::open(path)?;
     Ok(file.demos.iter().map(|demo| DemoRef { file: path.to_owned(), demo: *demo }).collect())
+}
+
+/// An episode of a run that was simulated again by its recorded actions.
+#[derive(Clone, Debug)]
+pub struct EpisodeReplay {
+    /// Task and episode.
+    pub index: EpisodeIndex,
+    /// Record of the simulation. The fields of the policy are those of the recorded one.
+    pub simulated: EpisodeRecord,
+    /// First difference from the recorded one. `None` if they are byte-identical.
+    pub difference: Option<String>,
+}
+
+/// Simulates an episode of a run again by its recorded actions. A judged run needs its `secret`.
+///
+/// # Errors
+/// The run has no such episode, its scripts have changed since, its actions are damaged, or the episode cannot be run.
+pub fn replay_episode(
+    run: &StoredRun,
+    episode: EpisodeSelector,
+    secret: Option<&SecretFile>,
+    observer: Arc<dyn Observer>,
+) -> Result<EpisodeReplay, RunError> {
+    let record = episode.find_record(run)?;
+    let index = record.header.id.index();
+    let manifest = StoredManifest { path: &run.dir, manifest: &run.manifest, secret, observer };
+    let simulated = manifest.simulate(record, actions::read(&actions::path(&run.dir, index))?)?;
+    Ok(EpisodeReplay { index, difference: difference(record, &simulated)?, simulated })
 }
 
 /// Simulates demonstrations again by their actions alone.

@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use crate::{
-    config::RunConfig,
+    config::{LoadedRun, RunConfig},
     error::RunError,
     selection::{check_distinct_out_dirs, check_parent_folder, needs_suites, run_dir, suites_of},
     suite_run::SuiteRun,
@@ -18,7 +18,7 @@ use softvt_serve::{AccessRules, RequestError, ServerConfig};
 ///
 /// # Errors
 /// It has none.
-pub fn check_served(config: &RunConfig, loaded: &LoadedScript) -> Result<(), RunError> {
+pub fn check_served(LoadedRun { config, script: loaded }: &LoadedRun) -> Result<(), RunError> {
     let is_empty = suites_of(&loaded.plan).iter().all(|suite| suite.tasks.is_empty());
     if is_empty { Err(needs_suites("serve", config)) } else { Ok(()) }
 }
@@ -28,8 +28,7 @@ pub fn check_served(config: &RunConfig, loaded: &LoadedScript) -> Result<(), Run
 /// # Errors
 /// A suite, shift, setting, scene or calibration file that is not valid.
 pub fn prepare_served<'a>(
-    config: &'a RunConfig,
-    loaded: &'a LoadedScript,
+    LoadedRun { config, script: loaded }: &'a LoadedRun,
     split: Split,
 ) -> Result<Vec<SuiteRun<'a>>, RunError> {
     let suites = suites_of(&loaded.plan);
@@ -63,8 +62,7 @@ pub fn prepare_served<'a>(
 /// # Errors
 /// A policy without a profile.
 pub fn server_config<'a>(
-    config: &'a RunConfig,
-    loaded: &LoadedScript,
+    LoadedRun { config, script: loaded }: &'a LoadedRun,
     runs: &'a [SuiteRun<'a>],
     access: AccessRules,
 ) -> Result<ServerConfig<'a>, RunError> {

@@ -6,7 +6,7 @@ use rust_hdf5::H5File;
 use softvt::{
     dataset::{StreamValues, TaskFile, check, manifest},
     runner::{
-        LoadedRun, PolicyConfig, PolicySource, RunError,
+        PolicySource, RunError,
         import::{self, ImportOptions},
         recording::{RecordingOptions, RecordingSummary},
     },
@@ -59,11 +59,7 @@ fn import(
         gripper: None,
     };
     let files: Vec<PathBuf> = files.iter().map(|file| project.path(file)).collect();
-    let imported = || -> Result<_, RunError> {
-        let LoadedRun { config, script } = run.load()?;
-        let config = config.with_policy(PolicyConfig::external("import"));
-        import::import(&config, &script, &files, options, &recording)
-    };
+    let imported = || -> Result<_, RunError> { import::import(&run.load()?, &files, options, &recording) };
     imported().map_err(|error| project.relative(error))
 }
 

@@ -17,8 +17,8 @@ use softvt::{
     episode_id::Split,
     records::summary::SuiteSummary,
     runner::{
-        LoadedRun, PolicyConfig, PolicyOptions, RunConfig, RunError, ServedRuns, check_served,
-        first_observation, prepare_served, server_config,
+        PolicyConfig, PolicyOptions, RunConfig, RunError, ServedRuns, check_served, first_observation,
+        prepare_served, server_config,
     },
     serve::{self, AccessRules},
 };
@@ -72,15 +72,16 @@ impl Server {
         stop: Receiver<()>,
     ) -> Result<Vec<SuiteSummary>, RunError> {
         let policy = PolicyConfig::client(policy, access.is_privileged)?;
-        let LoadedRun { config, script } = &config.with_policy(policy).load()?;
-        check_served(config, script)?;
+        let run = config.with_policy(policy).load()?;
+        let config = &run.config;
+        check_served(&run)?;
         let listener = serve::listen("127.0.0.1", 0).expect("a port");
         let address = listener.local_addr().expect("an address");
-        let runs = prepare_served(config, script, access.split)?;
+        let runs = prepare_served(&run, access.split)?;
         // Declared here, since the configuration of the server borrows it.
         let served;
         let rules = AccessRules::new("127.0.0.1", address, access.token);
-        let mut server = server_config(config, script, &runs, rules)?;
+        let mut server = server_config(&run, &runs, rules)?;
         let first = first_observation(config, &server)?;
         served = config.out.as_ref().map(|_| ServedRuns::open(config, &runs)).transpose()?;
         server.recorder = served.as_ref().map(ServedRuns::recorder);

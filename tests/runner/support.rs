@@ -13,7 +13,6 @@ use softvt::{
     policy::profile::GripCode,
     records::record::EpisodeRecord,
     report::{
-        actions,
         comparison::{self, Comparison},
         condition_table::ConditionTable,
         page,
@@ -27,7 +26,7 @@ use softvt::{
         SuiteChecker, SuiteResult, TraceDetail, conditions,
         episode_selector::EpisodeSelector,
         experiment::{self, ExperimentOutput},
-        replay::{self, SecretFile, StoredManifest},
+        replay::{self, SecretFile},
         selection::check_distinct_out_dirs,
     },
     script::{ExperimentInput, ExperimentRow},
@@ -124,15 +123,9 @@ impl Project {
             secret: SecretSeed::new(self.text(file).as_bytes()),
         });
         let simulate = || {
-            let record = episode.parse::<EpisodeSelector>().expect("an episode").find_record(stored)?;
-            let manifest = StoredManifest {
-                path: &stored.dir,
-                manifest: &stored.manifest,
-                secret: secret.as_ref(),
-                observer: Arc::new(Messages::default()),
-            };
-            let actions = actions::read(&actions::path(&stored.dir, record.header.id.index()))?;
-            replay::difference(record, &manifest.simulate(record, actions)?)
+            let episode = episode.parse::<EpisodeSelector>().expect("an episode");
+            let observer = Arc::new(Messages::default());
+            Ok(replay::replay_episode(stored, episode, secret.as_ref(), observer)?.difference)
         };
         simulate().map_err(|error: RunError| self.relative(error))
     }
@@ -341,8 +334,8 @@ impl Run<'_> {
                 warnings.extend(checker.check(suite)?);
             }
             match &script.plan {
-                Plan::Conditions { suites, conditions: list, .. } => {
-                    conditions::check(config, script, suites, list)?;
+                Plan::Conditions { .. } => {
+                    conditions::check(&run)?;
                 }
                 Plan::Experiment { .. } => {
                     let input = ExperimentInput::new(config.settings.clone(), config.seed);
@@ -358,16 +351,8 @@ impl Run<'_> {
     /// Runs the conditions of the script into the output folder.
     pub fn conditions(self) -> Result<Vec<ConditionTable>, String> {
         let compared = || -> Result<Vec<ConditionTable>, RunError> {
-            let LoadedRun { config, script } = &self.load()?;
-            let Plan::Conditions { suites, conditions: list, .. } = &script.plan else {
-                panic!("conditions")
-            };
-            let (out, mut tables) = (config.out.as_deref().expect("a folder"), Vec::new());
-            conditions::run(config, script, suites, list, out, |so_far| {
-                tables = so_far.to_vec();
-                Ok::<_, RunError>(())
-            })?;
-            Ok(tables)
+            let run = self.load()?;
+            conditions::run(&run, run.config.out.as_deref().expect("a folder"), |_| Ok(()))
         };
         compared().map_err(|error| self.project.relative(error))
     }
@@ -377,8 +362,7 @@ impl Run<'_> {
     pub fn experiment(&self) -> (Vec<ExperimentRow>, Result<String, String>) {
         let (mut rows, mut text) = (Vec::new(), String::new());
         let mut run = || {
-            let LoadedRun { config, script } = &self.load()?;
-            experiment::run(config, script, |output| -> Result<(), RunError> {
+            experiment::run(&self.load()?, |output| -> Result<(), RunError> {
                 match output {
                     ExperimentOutput::Rows(found) => rows = found.to_vec(),
                     ExperimentOutput::Text(found) => found.clone_into(&mut text),

@@ -41,8 +41,8 @@ pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
     }
     match plan {
         Plan::Suite(_) | Plan::Suites { .. } => {}
-        Plan::Conditions { suites, conditions, .. } => {
-            conditions::check(config, loaded, suites, conditions)?;
+        Plan::Conditions { conditions, .. } => {
+            conditions::check(&run)?;
             let names: Vec<&str> = conditions.iter().map(|condition| condition.name.as_str()).collect();
             print(&format!("conditions: {REFERENCE}, {}\n", text::escape_control(&names.join(", "))))?;
         }

@@ -10,12 +10,12 @@ use crate::{
     replays::report_replays,
 };
 use softvt_dataset::layout::is_dataset;
-use softvt_report::{actions, stored_run};
+use softvt_report::stored_run::{self, StoredRun};
 use softvt_runner::{
     Observer,
     episode_selector::EpisodeSelector,
     read_secret,
-    replay::{SecretFile, StoredManifest, check_complete, difference, simulate_demos},
+    replay::{EpisodeReplay, SecretFile, check_complete, replay_episode, simulate_demos},
     stored_folder::{enter_for_dataset, enter_for_run},
 };
 
@@ -59,14 +59,11 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
             names.join(", ")
         )));
     };
-    let record = args.episode.find_record(stored)?;
-    let index = record.header.id.index();
-    let dir = enter_for_run(stored, &*observer)?;
-    let path = actions::path(&dir, index);
-    let manifest =
-        StoredManifest { path: &dir, manifest: &stored.manifest, secret: secret.as_ref(), observer };
-    let simulated = manifest.simulate(record, actions::read(&path)?)?;
-    match difference(record, &simulated)? {
+    args.episode.find_record(stored)?;
+    let stored = StoredRun { dir: enter_for_run(stored, &*observer)?, ..stored.clone() };
+    let EpisodeReplay { index, simulated, difference } =
+        replay_episode(&stored, args.episode, secret.as_ref(), observer)?;
+    match difference {
         None => print(&format!("{index}: byte-identical, final state {}\n", simulated.stats.state_hash)),
         Some(difference) => Err(CliError::new(
             Exit::Internal,

@@ -11,7 +11,7 @@ use crate::{
     output::{eprint_notice, print, print_json, text_columns},
     plan_flags,
 };
-use softvt_benchmark::{Condition, Plan, Suite};
+use softvt_benchmark::Plan;
 use softvt_common::text::counted;
 use softvt_evaluation::verdict::Outcome;
 use softvt_policy::profile::Profile;
@@ -21,11 +21,11 @@ use softvt_report::{
     terminal,
 };
 use softvt_runner::{
-    LoadedRun, RunConfig, Runner, conditions,
+    LoadedRun, Runner, conditions,
     experiment::{self, ExperimentOutput},
     selection::{check_distinct_out_dirs, check_parent_folder, next_run_dir},
 };
-use softvt_script::{ExperimentRow, LoadedScript};
+use softvt_script::ExperimentRow;
 
 /// A safety-aware visuo-tactile manipulation benchmark for soft objects, on an ordinary CPU
 #[derive(Clone, Debug, Parser)]
@@ -77,45 +77,36 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
                 None => check_requirements(&requirements, &summaries),
             }
         }
-        Plan::Conditions { name, suites, conditions } => {
+        Plan::Conditions { name, suites, .. } => {
             check_distinct_out_dirs(config, suites)?;
             check_parent_folder(config)?;
             let out = config.out.clone().unwrap_or_else(|| next_run_dir(config, name));
-            run_conditions(config, loaded, suites, conditions, &out, json)
+            run_conditions(&run, suites.len(), &out, json)
         }
-        Plan::Experiment { columns, .. } => {
-            experiment::run(config, loaded, |output| -> Result<(), CliError> {
-                match output {
-                    ExperimentOutput::Rows(rows) => print_rows(rows, columns, json),
-                    ExperimentOutput::Text(_) if json => Ok(()),
-                    ExperimentOutput::Text(text) => print(&format!("{text}\n")),
-                }
-            })
-        }
+        Plan::Experiment { columns, .. } => experiment::run(&run, |output| -> Result<(), CliError> {
+            match output {
+                ExperimentOutput::Rows(rows) => print_rows(rows, columns, json),
+                ExperimentOutput::Text(_) if json => Ok(()),
+                ExperimentOutput::Text(text) => print(&format!("{text}\n")),
+            }
+        }),
     }
 }
 
 /// Runs suites under conditions and prints their tables: policies side by side once all have run, other conditions after
 /// each suite.
-fn run_conditions(
-    config: &RunConfig,
-    loaded: &LoadedScript,
-    suites: &[Suite],
-    conditions: &[Condition],
-    out: &Path,
-    json: bool,
-) -> Result<(), CliError> {
+fn run_conditions(run: &LoadedRun, suites: usize, out: &Path, json: bool) -> Result<(), CliError> {
     let print_last = |tables: &[ConditionTable]| -> Result<(), CliError> {
         match tables.last() {
             _ if json => Ok(()),
             Some(last) if !compares_policies(tables) => print(&table(last)),
-            Some(_) if tables.len() == suites.len() => print(&controllers_table(tables)),
+            Some(_) if tables.len() == suites => print(&controllers_table(tables)),
             _ => Ok(()),
         }
     };
-    let document = conditions::run(config, loaded, suites, conditions, out, print_last)?;
+    let tables = conditions::run(run, out, print_last)?;
     if json {
-        print_json(&document)?;
+        print_json(&conditions::document(run, &tables))?;
     }
     eprint_notice(out.join(conditions::FILE).display());
     Ok(())

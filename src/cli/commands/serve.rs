@@ -122,21 +122,21 @@ fn serve(args: ServeArgs) -> Result<(), CliError> {
         shard: args.shard,
         ..config
     });
-    let loaded = request.load("serve")?;
-    let config = &request.config;
-    check_served(config, &loaded)?;
+    let run = request.load("serve")?;
+    let config = &run.config;
+    check_served(&run)?;
     check_run_flags(&request)?;
     // After the checks, so that an error of the script is reported even if standard input is closed already.
     if args.until_stdin_closes {
         watch_stdin()?;
     }
     let listener = listen(&args)?;
-    let runs = prepare_served(config, &loaded, args.split)?;
+    let runs = prepare_served(&run, args.split)?;
     let address = listener.local_addr().map_err(|error| CliError::input(error).prefixed(&args.host))?;
     // Declared here, since the configuration of the server borrows it.
     let served;
     let access = AccessRules::new(&args.host, address, token(&args)?);
-    let mut server_config = server_config(config, &loaded, &runs, access)?;
+    let mut server_config = server_config(&run, &runs, access)?;
     let first = first_observation(config, &server_config)?;
     served = config.out.as_ref().map(|_| ServedRuns::open(config, &runs)).transpose()?;
     server_config.recorder = served.as_ref().map(ServedRuns::recorder);

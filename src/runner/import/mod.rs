@@ -10,9 +10,10 @@ use std::{
 use serde_json::json;
 
 use crate::{
-    config::RunConfig,
+    config::LoadedRun,
     episode_list::{EpisodeJob, EpisodeList},
     error::RunError,
+    policy::PolicyConfig,
     recording::{GripLog, RecordingOptions, RecordingSummary, SuiteRecording, record_all},
     selection::select_suites,
     suite_run::SuiteRun,
@@ -27,7 +28,6 @@ use softvt_policy::{ToolCommand, builtin::RecordedPolicy};
 use softvt_records::record::Origin;
 use softvt_rollout::{ChunkedPolicy, target_asset};
 use softvt_scene::{Body, InitialState};
-use softvt_script::LoadedScript;
 use task_matching::{MatchedDemo, match_demos};
 
 /// Options of an import of demonstrations.
@@ -46,12 +46,14 @@ pub struct ImportOptions {
 /// The script has no suite, a file is not valid or matches no task, the folder contains something else, an attempt or a
 /// file fails, or no demonstration is kept.
 pub fn import(
-    config: &RunConfig,
-    loaded: &LoadedScript,
+    run: &LoadedRun,
     files: &[PathBuf],
     options: ImportOptions,
     recording: &RecordingOptions,
 ) -> Result<Option<RecordingSummary>, RunError> {
+    // The name of the policy in the records; the actions are those of the files.
+    let config = &run.config.clone().with_policy(PolicyConfig::external("import"));
+    let loaded = &run.script;
     let suites = select_suites("dataset import", config, &loaded.plan)?;
     let files: Vec<ForeignFile> = files.iter().map(|path| import::read(path)).collect::<Result<_, _>>()?;
     let sources = describe_files(&files)?;

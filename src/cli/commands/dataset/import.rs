@@ -9,10 +9,7 @@ use crate::{
     error::CliError,
     output::print_recording,
 };
-use softvt_runner::{
-    PolicyConfig,
-    import::{self, ImportOptions},
-};
+use softvt_runner::import::{self, ImportOptions};
 
 /// Re-execute demonstrations of robomimic, LIBERO, SoftVTBench or softvt in a suite, and record the safe ones that reach the goal
 #[derive(Args, Clone, Debug)]
@@ -42,9 +39,7 @@ pub(crate) struct ImportArgs {
 /// As [`import::import`].
 pub(super) fn run(args: ImportArgs) -> Result<(), CliError> {
     let recording = &args.recording.options(None);
-    let request = args.recording.request(args.script, args.tasks)?;
-    let loaded = request.load("dataset import")?;
-    let config = request.config.with_policy(PolicyConfig::external("import"));
+    let run = args.recording.request(args.script, args.tasks)?.load("dataset import")?;
     let options = ImportOptions { attempts: args.attempts, layout: args.layout };
-    print_recording(&recording.out, import::import(&config, &loaded, &args.files, options, recording)?)
+    print_recording(&recording.out, import::import(&run, &args.files, options, recording)?)
 }
