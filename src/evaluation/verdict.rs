@@ -1,5 +1,7 @@
 //! [`Verdict`] on an episode, and [`Outcome`] of its rollout.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 use super::{drop::DropEvent, safety::KappaVerdict, stage::Stage};
@@ -14,8 +16,8 @@ pub enum Outcome {
     Budget,
     /// The physics state became invalid.
     Invalid {
-        /// One of "inverted", "not_finite", "not_converged", "too_fast", "too_hard" …
-        reason: String,
+        /// What was invalid.
+        reason: InvalidReason,
         /// Physics step since the policy took over.
         step: u64,
         /// Index of the node concerned, if there is one.
@@ -26,6 +28,37 @@ pub enum Outcome {
         /// Message of the error.
         message: String,
     },
+}
+
+/// Why a physics state is invalid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum InvalidReason {
+    /// An element was inverted for too long.
+    Inverted,
+    /// A position is not a finite number.
+    NotFinite,
+    /// The contact solve did not converge.
+    NotConverged,
+    /// The system of a soft body is not positive definite.
+    Indefinite,
+    /// A body is faster than `physics.max_speed`.
+    TooFast,
+    /// A contact force is larger than mass and stiffness allow.
+    TooHard,
+}
+
+impl fmt::Display for InvalidReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Inverted => "inverted",
+            Self::NotFinite => "not_finite",
+            Self::NotConverged => "not_converged",
+            Self::Indefinite => "indefinite",
+            Self::TooFast => "too_fast",
+            Self::TooHard => "too_hard",
+        })
+    }
 }
 
 impl Outcome {

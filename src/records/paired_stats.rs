@@ -336,7 +336,7 @@ fn mcnemar(better: usize, worse: usize) -> f64 {
 mod tests {
     use super::*;
     use crate::record::tests::sample;
-    use softvt_evaluation::verdict::{Outcome, WrongContact};
+    use softvt_evaluation::verdict::{InvalidReason, Outcome, WrongContact};
 
     /// Goal, safety and D of each episode; τ is 1.
     fn run(episodes: &[(bool, bool, f64)]) -> Vec<EpisodeRecord> {
@@ -378,7 +378,7 @@ mod tests {
     fn an_invalid_episode_is_worse_and_has_no_deformation_and_unpaired_episodes_are_left_out() {
         let before = run(&[(true, true, 0.5), (true, true, 0.5)]);
         let mut after = run(&[(true, true, 0.6), (true, true, 0.6), (true, true, 0.6)]);
-        after[1].outcome = Outcome::Invalid { reason: "inverted".into(), step: 3, node: None };
+        after[1].outcome = Outcome::Invalid { reason: InvalidReason::Inverted, step: 3, node: None };
         let paired = PairedComparison::from_pairs(&pair_episodes(&before, &after));
         assert_eq!((paired.pairs, counts(paired.goal), counts(paired.no_drop)), (2, [0, 1, 1], [0, 1, 1]));
         assert_eq!((paired.d_over_tau.n, paired.d_over_tau.worse), (1, 1));
@@ -419,7 +419,7 @@ mod tests {
         after[0].verdict.d_mean = Some(0.75);
         after[3].verdict.collapsed_volume_pct = Some(9.0);
         // An invalid episode touched something and has a stage; it has no D, no volume, and unknown harm.
-        after[3].outcome = Outcome::Invalid { reason: "inverted".into(), step: 3, node: None };
+        after[3].outcome = Outcome::Invalid { reason: InvalidReason::Inverted, step: 3, node: None };
         after[3].verdict.others_ok = None;
         let paired = PairedComparison::from_pairs(&pair_episodes(&before, &after));
         assert_eq!((paired.pairs, paired.invalid_pairs), (4, 1));

@@ -185,6 +185,8 @@ impl EpisodeRecord {
 
 #[cfg(test)]
 pub(crate) mod tests {
+    use softvt_evaluation::verdict::InvalidReason;
+
     use super::*;
 
     /// A successful, safe soft episode.
@@ -207,7 +209,7 @@ pub(crate) mod tests {
     fn a_record_is_one_line_and_comes_back_bit_for_bit() {
         let mut record = sample();
         record.verdict.d_peak_weighted = Some(0.1 + 0.2);
-        record.outcome = Outcome::Invalid { reason: "inverted".into(), step: 77, node: None };
+        record.outcome = Outcome::Invalid { reason: InvalidReason::Inverted, step: 77, node: None };
         let line = serde_json::to_string(&record).unwrap();
         assert!(!line.contains('\n'));
         assert!(line.starts_with(r#"{"suite":"suite","task":0,"prompt":"#), "{line}");

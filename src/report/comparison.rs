@@ -459,7 +459,7 @@ mod tests {
 
     use super::*;
     use crate::{run_summary::tests::stored, sample_record};
-    use softvt_evaluation::verdict::{Outcome, WrongContact};
+    use softvt_evaluation::verdict::{InvalidReason, Outcome, WrongContact};
 
     /// A run of three episodes with these stages of failure.
     fn run(dir: &str, d_mean: f64, stages: [Option<Stage>; 3]) -> StoredRun {
@@ -490,7 +490,7 @@ mod tests {
         let mut second = run("b", 0.5, [Some(Stage::Carry), None, None]);
         second.records[0].verdict.first_wrong_contact =
             Some(WrongContact { time_s: 1.0, object: "bun".to_owned() });
-        second.records[2].outcome = Outcome::Invalid { reason: "inverted".into(), step: 3, node: None };
+        second.records[2].outcome = Outcome::Invalid { reason: InvalidReason::Inverted, step: 3, node: None };
         let text = table(&compare(&[first], &[second]).expect("the same episodes"));
         assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
         assert_eq!(words(&text, "D mean"), ["%", "0.25", "0.50", "+0.25", "–", "0", "2"], "{text}");

@@ -33,7 +33,7 @@ use softvt_evaluation::{
     deformation::{Deformation, ReferenceShape},
     judge::{Judge, JudgeConfig},
     safety::DeformationLimit,
-    verdict::{Outcome, Verdict},
+    verdict::{InvalidReason, Outcome, Verdict},
 };
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::{
@@ -564,17 +564,19 @@ impl Episode {
 
     fn invalid(&self, failure: &StepFailure) -> Outcome {
         let (reason, node) = match failure {
-            StepFailure::Diverged { .. } => ("not_converged", None),
-            StepFailure::NotFinite { node, .. } => ("not_finite", Some(*node as u32)),
-            StepFailure::Indefinite { .. } => ("indefinite", None),
-            StepFailure::SpeedLimitExceeded { node, .. } => ("too_fast", node.map(|node| node as u32)),
-            StepFailure::ForceLimitExceeded { .. } => ("too_hard", None),
+            StepFailure::Diverged { .. } => (InvalidReason::NotConverged, None),
+            StepFailure::NotFinite { node, .. } => (InvalidReason::NotFinite, Some(*node as u32)),
+            StepFailure::Indefinite { .. } => (InvalidReason::Indefinite, None),
+            StepFailure::SpeedLimitExceeded { node, .. } => {
+                (InvalidReason::TooFast, node.map(|node| node as u32))
+            }
+            StepFailure::ForceLimitExceeded { .. } => (InvalidReason::TooHard, None),
             StepFailure::Inverted { body, element, .. } => {
                 let soft = self.sim.world.soft_bodies().iter().find(|s| s.name == *body);
-                ("inverted", soft.map(|s| s.state.model.mesh.elements[*element][0]))
+                (InvalidReason::Inverted, soft.map(|s| s.state.model.mesh.elements[*element][0]))
             }
         };
-        Outcome::Invalid { reason: reason.to_owned(), step: self.physics_steps, node }
+        Outcome::Invalid { reason, step: self.physics_steps, node }
     }
 
     /// The verdict so far. An episode that has not ended is judged as if its budget were spent.

@@ -3,6 +3,7 @@ use crate::{
     deformation::Deformation,
     evidence::{GoalEvidence, GripEvidence, GripperEvidence, PadEvidence},
     stage::Stage,
+    verdict::InvalidReason,
 };
 use softvt_geometry::{Aabb, Pose, Quat, Vec3};
 
@@ -276,7 +277,7 @@ fn evidence_that_is_not_finite_is_counted_and_not_safe() {
 fn an_invalid_rollout_fails_and_leaves_safety_unknown() {
     let mut replay = Replay::new(config());
     replay.rest(60, 0.0);
-    let v = replay.verdict(Outcome::Invalid { reason: "inverted".into(), step: 60, node: Some(1) });
+    let v = replay.verdict(Outcome::Invalid { reason: InvalidReason::Inverted, step: 60, node: Some(1) });
     assert!(!v.goal && !v.goal_v1 && !v.no_drop && !v.safety && !v.safety_known);
     assert_eq!(v.deformation_ok, None);
 }

@@ -1,6 +1,6 @@
 use super::*;
 use crate::record::tests::sample;
-use softvt_evaluation::verdict::{Outcome, WrongContact};
+use softvt_evaluation::verdict::{InvalidReason, Outcome, WrongContact};
 
 fn episode(task: usize, index: u32, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
     let mut record = sample();
@@ -24,7 +24,7 @@ fn records() -> Vec<EpisodeRecord> {
         }),
         episode(1, 1, |r| {
             r.header.asset = "roll".into();
-            r.outcome = Outcome::Invalid { reason: "inverted".into(), step: 9, node: Some(3) };
+            r.outcome = Outcome::Invalid { reason: InvalidReason::Inverted, step: 9, node: Some(3) };
             // Even if a record claimed success, an invalid episode has none.
             r.verdict.d_peak = Some(99.0);
         }),
