@@ -15,8 +15,8 @@ use softvt_benchmark::{ShiftValue, Teacher};
 use softvt_policy::{profile::GripCode, remote::Protocol};
 use softvt_records::requirement::Requirement;
 use softvt_runner::{
-    LoadedRun, PolicyConfig, PolicyOptions, PolicySource, RunConfig, Shard, TraceDetail, VideoSelection,
-    parse_profile, read_secret, recording::RecordingOptions,
+    ConfiguredScript, PolicyConfig, PolicyOptions, PolicySource, RunConfig, Shard, TraceDetail,
+    VideoSelection, parse_profile, read_secret, recording::RecordingOptions,
 };
 use softvt_script::STANDARD_VARIATION;
 
@@ -173,20 +173,20 @@ impl Request {
     ///
     /// # Errors
     /// The script fails or returns no plan; a flag without effect.
-    pub(crate) fn load(&self, command: &str) -> Result<LoadedRun, CliError> {
+    pub(crate) fn load(&self, command: &str) -> Result<ConfiguredScript, CliError> {
         let config = self.config.clone();
         let loaded = softvt_script::load(&config.file, &config.options)?;
         plan_flags::check(command, self, &loaded.plan)?;
-        Ok(LoadedRun { script: config.prepare_script(loaded)?, config })
+        Ok(ConfiguredScript { script: config.prepare_script(loaded)?, config })
     }
 
     /// Loads the script, refuses flags of `command` that would do nothing for its plan, and then loads the policy.
     ///
     /// # Errors
     /// The script fails or returns no plan; a flag without effect; a policy that cannot be loaded.
-    pub(crate) fn load_plan(self, command: &str, policy: &PolicyArgs) -> Result<LoadedRun, CliError> {
-        let LoadedRun { config, script } = self.load(command)?;
-        Ok(LoadedRun { config: config.with_policy(PolicyConfig::load(&policy.options())?), script })
+    pub(crate) fn load_plan(self, command: &str, policy: &PolicyArgs) -> Result<ConfiguredScript, CliError> {
+        let ConfiguredScript { config, script } = self.load(command)?;
+        Ok(ConfiguredScript { config: config.with_policy(PolicyConfig::load(&policy.options())?), script })
     }
 }
 

@@ -13,7 +13,7 @@ use super::{
     plan_flags::GivenFlag,
 };
 use softvt_common::text;
-use softvt_script::{OptionSpec, OptionValue};
+use softvt_script::{OptionSpec, ScriptOptionValue};
 
 /// Flags that select the policy. `softvt serve` refuses them: there the client is the policy.
 const POLICY_FLAGS: [&str; 4] = ["policy", "protocol", "replan", "policy_timeout"];
@@ -116,7 +116,7 @@ fn script_arg_id(option: &OptionSpec) -> String {
 
 fn script_arg(option: &OptionSpec, help: &str) -> Arg {
     let default = match &option.default {
-        OptionValue::Text(text) => format!("{text:?}"),
+        ScriptOptionValue::Text(text) => format!("{text:?}"),
         other => other.to_string(),
     };
     let arg = Arg::new(script_arg_id(option))
@@ -124,7 +124,7 @@ fn script_arg(option: &OptionSpec, help: &str) -> Arg {
         .help(format!("{help} [{}; default {default}]", option.expects()))
         .help_heading("Options of the script");
     match option.default {
-        OptionValue::Flag(_) => {
+        ScriptOptionValue::Flag(_) => {
             arg.num_args(0..=1).require_equals(true).default_missing_value("on").value_name("on|off")
         }
         _ if option.unit.is_empty() => arg.num_args(1).allow_hyphen_values(true).value_name("VALUE"),

@@ -7,7 +7,8 @@ use image::RgbImage;
 
 use softvt_geometry::Vec3;
 use softvt_sensing::tactile::{
-    HISTORY_LENGTH, MARKER_COUNT, MarkerStyle, Markers, MosaicLayout, PadWrench, Taxels, mosaic, mosaic_cell,
+    HISTORY_LENGTH, MARKER_COUNT, MarkerStyle, Markers, PadWrench, TactileMosaicLayout, Taxels, mosaic,
+    mosaic_cell,
 };
 
 /// Sensor streams of an observation. Streams that are not requested are never computed.
@@ -196,7 +197,7 @@ impl TactileHistory {
     }
 
     /// The 4 × 4 mosaic of both fingers' images, 224 × 224, with the markers drawn in a style if there is one.
-    pub fn mosaic(&self, layout: MosaicLayout, markers: Option<MarkerStyle>) -> RgbImage {
+    pub fn mosaic(&self, layout: TactileMosaicLayout, markers: Option<MarkerStyle>) -> RgbImage {
         let frames = self.last(HISTORY_LENGTH);
         let drawn = markers.map(|style| {
             [0, 1].map(|side| {

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{GripCommand, SensorStreams};
 use softvt_robot::Side;
-use softvt_sensing::tactile::{HISTORY_LENGTH, MarkerStyle, MosaicLayout};
+use softvt_sensing::tactile::{HISTORY_LENGTH, MarkerStyle, TactileMosaicLayout};
 
 /// Names of the cameras that every scene has.
 const CAMERAS: [&str; 2] = ["third_person", "wrist"];
@@ -99,7 +99,7 @@ pub enum InputSource {
     /// The 4 × 4 mosaic of the last 8 tactile images of both fingers, uint8 (224, 224, 3).
     TactileImage {
         /// Assignment of cells to fingers.
-        layout: MosaicLayout,
+        layout: TactileMosaicLayout,
         /// Style in which the markers are drawn into the images; `None` for images without markers.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         markers: Option<MarkerStyle>,
@@ -398,7 +398,7 @@ impl Profile {
             input(both("state"), state(&[finger])),
             input(vec!["prompt".to_owned()], InputSource::Prompt),
         ];
-        let mosaic = |markers| InputSource::TactileImage { layout: MosaicLayout::Rows, markers };
+        let mosaic = |markers| InputSource::TactileImage { layout: TactileMosaicLayout::Rows, markers };
         let tactile = [
             input(both("tactile_image"), mosaic(None)),
             input(both("tactile_marker_motion"), InputSource::MarkerMotion),

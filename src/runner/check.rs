@@ -3,7 +3,7 @@
 use std::{collections::BTreeSet, path::PathBuf, sync::Mutex};
 
 use crate::{
-    config::{LoadedRun, RunConfig},
+    config::{ConfiguredScript, RunConfig},
     episode_list::EpisodeList,
     error::RunError,
     selection::select_episodes,
@@ -24,7 +24,7 @@ pub struct SuiteChecker<'a> {
 
 impl<'a> SuiteChecker<'a> {
     /// A checker for the suites of a script.
-    pub fn new(LoadedRun { config, script }: &'a LoadedRun) -> Self {
+    pub fn new(ConfiguredScript { config, script }: &'a ConfiguredScript) -> Self {
         Self { config, script, assets: AssetCache::approximate(), sensor_assets: SensorAssets::default() }
     }
 

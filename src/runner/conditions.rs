@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use crate::{
-    config::{LoadedRun, RunConfig},
+    config::{ConfiguredScript, RunConfig},
     error::RunError,
     evaluate::{is_finished, run_suite},
     policy::PolicyConfig,
@@ -43,11 +43,11 @@ struct ConditionCase {
 /// A script without conditions, a condition that does not fit a suite, a folder that contains a run, or an episode that
 /// fails. Finished runs are kept.
 pub fn run<E: From<RunError>>(
-    run: &LoadedRun,
+    run: &ConfiguredScript,
     out: &Path,
     mut on_suite: impl FnMut(&[ConditionTable]) -> Result<(), E>,
 ) -> Result<Vec<ConditionTable>, E> {
-    let LoadedRun { config, script: loaded } = run;
+    let ConfiguredScript { config, script: loaded } = run;
     let (suites, conditions) = conditions_of(run)?;
     check_episodes(config, suites)?;
     let cases: Vec<Vec<ConditionCase>> = suites
@@ -69,7 +69,9 @@ pub fn run<E: From<RunError>>(
 }
 
 /// The suites and the conditions of a script.
-fn conditions_of(LoadedRun { config, script }: &LoadedRun) -> Result<(&[Suite], &[Condition]), RunError> {
+fn conditions_of(
+    ConfiguredScript { config, script }: &ConfiguredScript,
+) -> Result<(&[Suite], &[Condition]), RunError> {
     match &script.plan {
         Plan::Conditions { suites, conditions, .. } => Ok((suites, conditions)),
         _ => Err(config.error("the script returned no conditions")),
@@ -80,8 +82,8 @@ fn conditions_of(LoadedRun { config, script }: &LoadedRun) -> Result<(&[Suite], 
 ///
 /// # Errors
 /// A script without conditions; the first condition or scene that is not valid.
-pub fn check(run: &LoadedRun) -> Result<(), RunError> {
-    let LoadedRun { config, script: loaded } = run;
+pub fn check(run: &ConfiguredScript) -> Result<(), RunError> {
+    let ConfiguredScript { config, script: loaded } = run;
     let (suites, conditions) = conditions_of(run)?;
     for suite in suites {
         let first: Vec<&Task> = suite.tasks.iter().take(1).collect();
@@ -228,7 +230,10 @@ fn is_blind(policy: &PolicyConfig) -> bool {
 }
 
 /// The content of `conditions.json`.
-pub fn document(LoadedRun { config, script: loaded }: &LoadedRun, tables: &[ConditionTable]) -> Value {
+pub fn document(
+    ConfiguredScript { config, script: loaded }: &ConfiguredScript,
+    tables: &[ConditionTable],
+) -> Value {
     let mut document = json!({
         "softvt": env!("CARGO_PKG_VERSION"),
         "script": loaded.sources.main,

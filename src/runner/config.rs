@@ -77,7 +77,7 @@ impl fmt::Display for Shard {
 }
 
 /// A configuration and its script.
-pub struct LoadedRun {
+pub struct ConfiguredScript {
     /// The configuration from which the script was loaded.
     pub config: RunConfig,
     /// The script, loaded as the configuration says.
@@ -165,12 +165,12 @@ impl RunConfig {
     ///
     /// # Errors
     /// The script fails or returns no plan.
-    pub fn load(mut self) -> Result<LoadedRun, RunError> {
+    pub fn load(mut self) -> Result<ConfiguredScript, RunError> {
         if let Some(secret) = &self.secret {
             self.seed = secret.public_seed();
         }
         let script = softvt_script::load(&self.file, &self.options)?;
-        Ok(LoadedRun { script: self.prepare_script(script)?, config: self })
+        Ok(ConfiguredScript { script: self.prepare_script(script)?, config: self })
     }
 
     /// A loaded script whose suites vary as the configuration says.

@@ -394,7 +394,7 @@ fn simulate_again(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::LoadedRun;
+    use crate::config::ConfiguredScript;
     use softvt_benchmark::Plan;
     use softvt_benchmark::Task;
     use softvt_policy::{Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief};
@@ -426,7 +426,7 @@ mod tests {
     #[test]
     fn every_file_of_a_run_records_whether_the_policy_observed_true_forces() {
         let loaded = RunConfig::of("suites/spatial_soft.lua").load().expect("it loads");
-        let LoadedRun { config, script: loaded } = loaded;
+        let ConfiguredScript { config, script: loaded } = loaded;
         let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
         let mut suite = suite.clone();
         suite.tasks.truncate(1);

@@ -9,7 +9,7 @@ use std::{
 use serde::Serialize;
 
 use crate::{
-    config::{LoadedRun, RunConfig},
+    config::{ConfiguredScript, RunConfig},
     error::RunError,
     run_manifest,
 };
@@ -59,7 +59,7 @@ pub enum ExperimentOutput<'a> {
 /// # Errors
 /// The script fails or tells a problem, a setting or the seed changes nothing, or a file cannot be written.
 pub fn run<E: From<RunError>>(
-    LoadedRun { config, script: loaded }: &LoadedRun,
+    ConfiguredScript { config, script: loaded }: &ConfiguredScript,
     mut on_output: impl FnMut(ExperimentOutput) -> Result<(), E>,
 ) -> Result<(), E> {
     let Plan::Experiment { name, points, has_finish, .. } = &loaded.plan else {

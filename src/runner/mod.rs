@@ -31,7 +31,7 @@ pub mod stored_folder;
 mod suite_run;
 
 pub use check::SuiteChecker;
-pub use config::{LoadedRun, RunConfig, Shard, TraceDetail, read_secret, thread_count};
+pub use config::{ConfiguredScript, RunConfig, Shard, TraceDetail, read_secret, thread_count};
 pub use episode_artifacts::VideoSelection;
 pub use episode_list::{EpisodeJob, EpisodeList};
 pub use error::{Cause, RunError};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::json;
 
 use crate::{
-    config::{LoadedRun, RunConfig},
+    config::{ConfiguredScript, RunConfig},
     episode_list::EpisodeList,
     error::RunError,
     policy::{PolicyConfig, PolicyOptions, expert_controller},
@@ -46,7 +46,7 @@ impl DemoCount {
 /// # Errors
 /// The script has no suite, the folder contains something else, an attempt or a file fails, or too few attempts are good.
 pub fn record(
-    LoadedRun { config, script }: &LoadedRun,
+    ConfiguredScript { config, script }: &ConfiguredScript,
     policy_of: impl Fn(Teacher) -> PolicyOptions,
     count: DemoCount,
     options: &RecordingOptions,

@@ -10,7 +10,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
 use crate::{
-    config::{LoadedRun, RunConfig, thread_count},
+    config::{ConfiguredScript, RunConfig, thread_count},
     episode_list::{EpisodeJob, EpisodeList},
     episode_selector::EpisodeSelector,
     error::RunError,
@@ -102,7 +102,7 @@ impl StoredManifest<'_> {
     fn simulate(&self, record: &EpisodeRecord, actions: Vec<Action>) -> Result<EpisodeRecord, RunError> {
         let index = record.header.id.index();
         let config = self.config(index.task)?;
-        let LoadedRun { config, script: loaded } = config.load()?;
+        let ConfiguredScript { config, script: loaded } = config.load()?;
         let suite = self.suite(&loaded)?;
         let tasks = select_tasks(&config, suite)?;
         let job = EpisodeJob { task: tasks[0], episode: index.episode };

@@ -3,7 +3,7 @@
 use std::{path::PathBuf, sync::Arc};
 
 use crate::{
-    config::{LoadedRun, RunConfig, Shard},
+    config::{ConfiguredScript, RunConfig, Shard},
     error::RunError,
     evaluate::{SuiteResult, run_episodes, run_suite},
     observer::Observer,
@@ -35,7 +35,7 @@ pub struct Runner<'a> {
 
 impl<'a> Runner<'a> {
     /// The episodes of a configuration.
-    pub fn new(loaded: &'a LoadedRun) -> Self {
+    pub fn new(loaded: &'a ConfiguredScript) -> Self {
         Self { script: &loaded.script, config: loaded.config.clone(), is_numbered: false }
     }
 

@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use crate::{
-    config::{LoadedRun, RunConfig},
+    config::{ConfiguredScript, RunConfig},
     error::RunError,
     selection::{check_distinct_out_dirs, check_parent_folder, needs_suites, run_dir, suites_of},
     suite_run::SuiteRun,
@@ -18,7 +18,7 @@ use softvt_serve::{AccessRules, RequestError, ServerConfig};
 ///
 /// # Errors
 /// It has none.
-pub fn check_served(LoadedRun { config, script: loaded }: &LoadedRun) -> Result<(), RunError> {
+pub fn check_served(ConfiguredScript { config, script: loaded }: &ConfiguredScript) -> Result<(), RunError> {
     let is_empty = suites_of(&loaded.plan).iter().all(|suite| suite.tasks.is_empty());
     if is_empty { Err(needs_suites("serve", config)) } else { Ok(()) }
 }
@@ -28,7 +28,7 @@ pub fn check_served(LoadedRun { config, script: loaded }: &LoadedRun) -> Result<
 /// # Errors
 /// A suite, shift, setting, scene or calibration file that is not valid.
 pub fn prepare_served<'a>(
-    LoadedRun { config, script: loaded }: &'a LoadedRun,
+    ConfiguredScript { config, script: loaded }: &'a ConfiguredScript,
     split: Split,
 ) -> Result<Vec<SuiteRun<'a>>, RunError> {
     let suites = suites_of(&loaded.plan);
@@ -62,7 +62,7 @@ pub fn prepare_served<'a>(
 /// # Errors
 /// A policy without a profile.
 pub fn server_config<'a>(
-    LoadedRun { config, script: loaded }: &'a LoadedRun,
+    ConfiguredScript { config, script: loaded }: &'a ConfiguredScript,
     runs: &'a [SuiteRun<'a>],
     access: AccessRules,
 ) -> Result<ServerConfig<'a>, RunError> {

@@ -15,7 +15,7 @@ mod vm;
 pub use api::experiment_input::{ExperimentInput, InputError};
 pub use plan::{
     LoadedScript, ScriptSources, declared_options, load, load_with,
-    options::{OptionSpec, OptionValue},
+    options::{OptionSpec, ScriptOptionValue},
     policy_file::{LuaPolicy, PolicyFile},
     profile_file::load_profile,
     variation_file::{STANDARD_VARIATION, VaryError, load_variation},

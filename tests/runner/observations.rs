@@ -10,7 +10,7 @@ use softvt::{
     report::terminal,
     rollout::{AssetCache, ChunkedPolicy, Episode, EpisodeSpec, SensorAssets, Sensors, Simulation},
     script::{self, LoadedScript},
-    sensing::tactile::MosaicLayout,
+    sensing::tactile::TactileMosaicLayout,
 };
 
 use crate::support::{Project, SPATIAL_SOFT, Small};
@@ -87,7 +87,7 @@ fn policies_get_the_requested_streams_only() {
         let tactile = observation.tactile.as_ref().expect("asked for");
         assert_eq!(tactile.frames.len(), (step + 1).min(8));
         assert_eq!(tactile.now().expect("a frame")[0].image.dimensions(), (320, 240));
-        assert_eq!(tactile.mosaic(MosaicLayout::Rows, None).dimensions(), (224, 224));
+        assert_eq!(tactile.mosaic(TactileMosaicLayout::Rows, None).dimensions(), (224, 224));
         assert_eq!(tactile.marker_motion(8).len(), 9);
         assert_eq!(
             tactile.marker_motion(8)[0][99..],

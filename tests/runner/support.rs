@@ -22,8 +22,8 @@ use softvt::{
         tables::{ResultTable, all_tables},
     },
     runner::{
-        BuiltinPolicy, Cause, LoadedRun, Observer, PolicyConfig, PolicyOptions, RunConfig, RunError, Runner,
-        SuiteChecker, SuiteResult, TraceDetail, conditions,
+        BuiltinPolicy, Cause, ConfiguredScript, Observer, PolicyConfig, PolicyOptions, RunConfig, RunError,
+        Runner, SuiteChecker, SuiteResult, TraceDetail, conditions,
         episode_selector::EpisodeSelector,
         experiment::{self, ExperimentOutput},
         replay::{self, SecretFile},
@@ -265,9 +265,9 @@ impl Run<'_> {
     }
 
     /// The script and the policy.
-    pub fn load(&self) -> Result<LoadedRun, RunError> {
-        let LoadedRun { config, script } = self.config.clone().load()?;
-        Ok(LoadedRun { config: config.with_policy(PolicyConfig::load(&self.policy)?), script })
+    pub fn load(&self) -> Result<ConfiguredScript, RunError> {
+        let ConfiguredScript { config, script } = self.config.clone().load()?;
+        Ok(ConfiguredScript { config: config.with_policy(PolicyConfig::load(&self.policy)?), script })
     }
 
     /// The messages so far, without the folder of the project.
@@ -327,7 +327,7 @@ impl Run<'_> {
     pub fn check(self) -> Result<Vec<String>, String> {
         let checked = || -> Result<Vec<String>, RunError> {
             let run = self.load()?;
-            let LoadedRun { config, script } = &run;
+            let ConfiguredScript { config, script } = &run;
             check_distinct_out_dirs(config, script.plan.suites())?;
             let (checker, mut warnings) = (SuiteChecker::new(&run), Vec::new());
             for suite in script.plan.suites() {

@@ -9,7 +9,7 @@ use crate::{
 };
 use softvt_benchmark::{Goal, GoalKind, Plan, REFERENCE, Suite};
 use softvt_common::text::{self, counted};
-use softvt_runner::{LoadedRun, SuiteChecker, conditions, selection::check_distinct_out_dirs};
+use softvt_runner::{ConfiguredScript, SuiteChecker, conditions, selection::check_distinct_out_dirs};
 use softvt_script::ExperimentInput;
 
 /// Check a script without running it
@@ -29,7 +29,7 @@ pub(crate) struct CheckArgs {
 /// The first thing that is not valid.
 pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
     let run = Request::new(args.script)?.load_plan("check", &args.policy)?;
-    let LoadedRun { config, script: loaded } = &run;
+    let ConfiguredScript { config, script: loaded } = &run;
     let plan = &loaded.plan;
     check_distinct_out_dirs(config, plan.suites())?;
     let checker = SuiteChecker::new(&run);

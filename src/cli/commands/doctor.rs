@@ -13,7 +13,7 @@ use crate::{
 };
 use softvt_benchmark::Plan;
 use softvt_records::record::EpisodeRecord;
-use softvt_runner::{EpisodeJob, EpisodeList, LoadedRun, RunConfig, SuiteRun, thread_count};
+use softvt_runner::{ConfiguredScript, EpisodeJob, EpisodeList, RunConfig, SuiteRun, thread_count};
 
 /// `assets/golden.json`: an episode whose final state is published.
 #[derive(Deserialize)]
@@ -50,7 +50,7 @@ pub(super) fn run() -> Result<(), CliError> {
 /// Runs the golden episode and writes nothing.
 fn run_golden(golden: &GoldenEpisode) -> Result<EpisodeRecord, CliError> {
     let config = RunConfig { observer: Arc::new(Console::default()), ..RunConfig::of(&golden.script) };
-    let LoadedRun { config, script: loaded } = config.load()?;
+    let ConfiguredScript { config, script: loaded } = config.load()?;
     let Plan::Suite(suite) = &loaded.plan else {
         return Err(CliError::input(format!("{} is not a suite", golden.script)));
     };

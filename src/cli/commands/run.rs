@@ -21,7 +21,7 @@ use softvt_report::{
     terminal,
 };
 use softvt_runner::{
-    LoadedRun, Runner, conditions,
+    ConfiguredScript, Runner, conditions,
     experiment::{self, ExperimentOutput},
     selection::{check_distinct_out_dirs, check_parent_folder, next_run_dir},
 };
@@ -56,7 +56,7 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
     let (json, requirements) = (args.flags.json, args.flags.requirements.clone());
     let request = Request::new(args.script)?.with(|config| args.flags.apply(config));
     let run = request.load_plan(plan_flags::RUN, &args.policy)?;
-    let LoadedRun { config, script: loaded } = &run;
+    let ConfiguredScript { config, script: loaded } = &run;
     if let Some(code) = config.policy.gripper {
         let profile = config.policy.profile().map(|Profile { name, .. }| format!(" (profile {name})"));
         eprint_notice(format!("gripper: {}{}", code.name(), profile.unwrap_or_default()));
@@ -95,7 +95,7 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
 
 /// Runs suites under conditions and prints their tables: policies side by side once all have run, other conditions after
 /// each suite.
-fn run_conditions(run: &LoadedRun, suites: usize, out: &Path, json: bool) -> Result<(), CliError> {
+fn run_conditions(run: &ConfiguredScript, suites: usize, out: &Path, json: bool) -> Result<(), CliError> {
     let print_last = |tables: &[ConditionTable]| -> Result<(), CliError> {
         match tables.last() {
             _ if json => Ok(()),

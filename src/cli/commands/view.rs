@@ -13,7 +13,9 @@ use softvt_benchmark::Plan;
 use softvt_common::cancel;
 use softvt_common::files;
 use softvt_report::video::{Caption, worst_state, write_stills, write_video, write_video_frame};
-use softvt_runner::{EpisodeJob, EpisodeList, LoadedRun, RunConfig, SuiteRun, selection::select_tasks};
+use softvt_runner::{
+    ConfiguredScript, EpisodeJob, EpisodeList, RunConfig, SuiteRun, selection::select_tasks,
+};
 
 /// Render one episode: a video, and stills of every camera and tactile sensor
 #[derive(Args, Clone, Debug)]
@@ -45,7 +47,7 @@ pub(crate) struct ViewArgs {
 pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     let tasks = vec![args.task.clone()];
     let request = Request::new(args.script)?.with(|config| RunConfig { tasks, ..config });
-    let LoadedRun { config, script: loaded } = request.load_plan("view", &args.policy)?;
+    let ConfiguredScript { config, script: loaded } = request.load_plan("view", &args.policy)?;
     let Plan::Suite(suite) = &loaded.plan else {
         return Err(config
             .error("softvt view needs a single suite; name a file that returns softvt.suite")

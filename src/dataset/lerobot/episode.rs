@@ -14,7 +14,7 @@ use softvt_benchmark::CONTROL_HZ;
 use softvt_robot::tactile::IMAGE_SIZE;
 use softvt_sensing::{
     camera::encode_png,
-    tactile::{HISTORY_LENGTH, MARKER_COUNT, MosaicLayout, mosaic, mosaic_cell},
+    tactile::{HISTORY_LENGTH, MARKER_COUNT, TactileMosaicLayout, mosaic, mosaic_cell},
 };
 
 /// Images decompressed at once: whole chunks of the file.
@@ -163,7 +163,7 @@ impl DemoStreams<'_> {
                     }
                     cells.push(mosaic_cell(image));
                 }
-                let mosaic = mosaic([&history[0], &history[1]], MosaicLayout::Rows);
+                let mosaic = mosaic([&history[0], &history[1]], TactileMosaicLayout::Rows);
                 for (column, image) in columns.iter_mut().zip([third, wrist, mosaic]) {
                     column.push(&image, version.image_name(step)).map_err(|error| {
                         let key = format!("/data/demo_{}, step {step}", self.demo);

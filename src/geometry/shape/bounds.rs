@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use super::{
     combine::SignedDistance,
-    displacement::Displacement,
+    displacement::SurfaceRelief,
     tree::{Shape, to_local},
     warp::Axis,
 };
@@ -140,9 +140,9 @@ impl Shape {
             Self::Bend { shape, along, towards, curvature } => {
                 bent(&shape.loose_bounds(), *along, *towards, *curvature)
             }
-            Self::Displace { shape, reliefs } => {
-                shape.loose_bounds().loosened(1.5 * reliefs.iter().map(Displacement::max_height).sum::<f64>())
-            }
+            Self::Displace { shape, reliefs } => shape
+                .loose_bounds()
+                .loosened(1.5 * reliefs.iter().map(SurfaceRelief::max_height).sum::<f64>()),
             _ => self.bounds(),
         }
     }

@@ -8,7 +8,7 @@ use crate::{Vec3, hex8};
 /// A height field over a surface; positive heights raise it outwards.
 /// Its serialised names are part of fingerprints of assets.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub enum Displacement {
+pub enum SurfaceRelief {
     /// Ridges at a regular pitch.
     Ridges(Ridges),
     /// Bumps on a jittered lattice.
@@ -66,7 +66,7 @@ pub struct Ramp {
 /// Distance from the axis within which ridges fade out, per ridge (at least one), m: there they would merge.
 const FADE_RADIUS: f64 = 1e-3;
 
-impl Displacement {
+impl SurfaceRelief {
     /// Height (m) and its gradient at a point.
     pub(super) fn height(&self, p: &Vec3) -> (f64, Vec3) {
         let ((height, gradient), mask) = match self {

@@ -2,7 +2,7 @@
 
 use super::{
     combine::{SignedDistance, intersect_exactly},
-    displacement::Displacement,
+    displacement::SurfaceRelief,
     primitive,
     tree::{Shape, to_local},
     warp,
@@ -238,7 +238,7 @@ fn shell(outer: SignedDistance, thickness: f64) -> SignedDistance {
     )
 }
 
-fn displaced(smooth: SignedDistance, reliefs: &[Displacement], p: &Vec3) -> SignedDistance {
+fn displaced(smooth: SignedDistance, reliefs: &[SurfaceRelief], p: &Vec3) -> SignedDistance {
     let (mut value, mut gradient) = (smooth.distance, smooth.normal);
     for relief in reliefs {
         let (height, slope) = relief.height(p);

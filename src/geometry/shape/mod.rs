@@ -19,7 +19,7 @@ mod warp;
 
 pub(crate) use combine::SignedDistance;
 pub use contact::Contact;
-pub use displacement::{Bumps, Displacement, Ramp, Ridges};
+pub use displacement::{Bumps, Ramp, Ridges, SurfaceRelief};
 pub use mesh_solid::MeshSolid;
 pub use polygon::Polygon;
 pub use tree::{Shape, TreeSize};

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use super::{
-    displacement::Displacement, mesh_solid::MeshSolid, polygon::Polygon, validate::ShapeError, warp::Axis,
+    displacement::SurfaceRelief, mesh_solid::MeshSolid, polygon::Polygon, validate::ShapeError, warp::Axis,
 };
 use crate::{
     Pose, Quat, Vec3,
@@ -147,7 +147,7 @@ pub enum Shape {
         /// Shape without the height fields.
         shape: Arc<Shape>,
         /// Height fields; their heights add up.
-        reliefs: Vec<Displacement>,
+        reliefs: Vec<SurfaceRelief>,
     },
     /// A shape with another material, everywhere or in a region.
     Paint {
@@ -276,7 +276,7 @@ impl Shape {
     }
 
     /// The shape with an additional displacement.
-    pub fn displaced(self, relief: Displacement) -> Self {
+    pub fn displaced(self, relief: SurfaceRelief) -> Self {
         match self {
             Self::Displace { shape, mut reliefs } => {
                 reliefs.push(relief);

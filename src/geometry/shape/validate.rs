@@ -1,7 +1,7 @@
 //! Validation of the numbers of a shape, and its errors.
 
 use super::{
-    displacement::{Bumps, Displacement, Ramp, Ridges},
+    displacement::{Bumps, Ramp, Ridges, SurfaceRelief},
     tree::Shape,
 };
 use crate::Vec3;
@@ -77,14 +77,14 @@ impl Shape {
                 let (axis, hint) = (towards.index() as f64, "bend towards another axis than along");
                 ensure(along != towards, "bend", "towards axis", axis, hint)?;
             }
-            Self::Displace { reliefs, .. } => reliefs.iter().try_for_each(Displacement::validate)?,
+            Self::Displace { reliefs, .. } => reliefs.iter().try_for_each(SurfaceRelief::validate)?,
             Self::Subtract { .. } | Self::Paint { .. } | Self::Lathe(_) | Self::Mesh(_) => {}
         }
         self.children().into_iter().try_for_each(Self::validate)
     }
 }
 
-impl Displacement {
+impl SurfaceRelief {
     fn validate(&self) -> Result<(), ShapeError> {
         match self {
             Self::Ridges(Ridges { height, pitch, radial_pitch, phase, sharpness, mask, .. }) => {

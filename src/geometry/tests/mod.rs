@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use super::{
     Vec3,
     mesh::Mesh,
-    shape::{Axis, Bumps, Displacement, Ramp, Ridges, Shape},
+    shape::{Axis, Bumps, Ramp, Ridges, Shape, SurfaceRelief},
 };
 
 fn rng() -> ChaCha8Rng {
@@ -26,8 +26,8 @@ fn random_unit(rng: &mut ChaCha8Rng) -> Vec3 {
     }
 }
 
-fn ridges(axis: Axis, height: f64, count: i32, pitch: f64) -> Displacement {
-    Displacement::Ridges(Ridges {
+fn ridges(axis: Axis, height: f64, count: i32, pitch: f64) -> SurfaceRelief {
+    SurfaceRelief::Ridges(Ridges {
         axis,
         height,
         count,
@@ -39,8 +39,8 @@ fn ridges(axis: Axis, height: f64, count: i32, pitch: f64) -> Displacement {
     })
 }
 
-fn seeds() -> Displacement {
-    Displacement::Bumps(Bumps { height: 0.5e-3, radius: 3e-3, spacing: 8e-3, seed: 3, mask: None })
+fn seeds() -> SurfaceRelief {
+    SurfaceRelief::Bumps(Bumps { height: 0.5e-3, radius: 3e-3, spacing: 8e-3, seed: 3, mask: None })
 }
 
 /// Primitives, and placements and materials of them, which have exact distances.

@@ -10,7 +10,7 @@ use std::{
 use serde_json::json;
 
 use crate::{
-    config::LoadedRun,
+    config::ConfiguredScript,
     episode_list::{EpisodeJob, EpisodeList},
     error::RunError,
     policy::PolicyConfig,
@@ -46,7 +46,7 @@ pub struct ImportOptions {
 /// The script has no suite, a file is not valid or matches no task, the folder contains something else, an attempt or a
 /// file fails, or no demonstration is kept.
 pub fn import(
-    run: &LoadedRun,
+    run: &ConfiguredScript,
     files: &[PathBuf],
     options: ImportOptions,
     recording: &RecordingOptions,

@@ -9,7 +9,7 @@ use softvt_policy::{
     profile::{GripCode, GripLatch, MAX_FRAMES, StatePart},
 };
 use softvt_robot::Side;
-use softvt_sensing::tactile::{MarkerStyle, MosaicLayout};
+use softvt_sensing::tactile::{MarkerStyle, TactileMosaicLayout};
 
 const STEP: Type = Type::Number("", Range { max: 10.0, ..Range::POSITIVE });
 
@@ -75,7 +75,7 @@ record! {
         /// For tactile and tactile_image: style in which the markers are drawn into the images; not drawn by default.
         markers: Option<MarkerStyle>;
         /// For tactile_image: the left finger above the right one (rows, the default) or left of it.
-        layout: Option<MosaicLayout>;
+        layout: Option<TactileMosaicLayout>;
         /// For tactile: the finger.
         finger: Option<Side>;
     }
@@ -188,7 +188,7 @@ choice! {
     GripCode { "continuous" => Continuous, "binary" => Binary, "two-width" => TwoWidth, "force" => Force }
 }
 choice! { MarkerStyle { "dots" => Dots, "arrows" => Arrows, "black_arrows" => BlackArrows } }
-choice! { MosaicLayout { "rows" => Rows, "columns" => Columns } }
+choice! { TactileMosaicLayout { "rows" => Rows, "columns" => Columns } }
 choice! {
     StatePart {
         "position" => Position, "axis_angle" => AxisAngle,

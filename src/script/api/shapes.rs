@@ -17,7 +17,7 @@ use softvt_geometry::{
     Quat, Vec3,
     import::{ImportError, ImportOptions, MeshFormat, import},
     mass::mass_properties,
-    shape::{Axis, Bumps, Displacement, Ramp, Ridges, Shape, ShapeError, TreeSize},
+    shape::{Axis, Bumps, Ramp, Ridges, Shape, ShapeError, SurfaceRelief, TreeSize},
 };
 
 const LENGTH: Type = Type::Number("m", Range::POSITIVE);
@@ -315,7 +315,7 @@ class! {
                 mask: Option<Ramp>;
             } -> ["softvt.Shape"] {
                 let ridges = Ridges { axis, height, count, pitch, radial_pitch, phase, sharpness, mask };
-                this.derived(lua, this.copy().displaced(Displacement::Ridges(ridges)), &[])?
+                this.derived(lua, this.copy().displaced(SurfaceRelief::Ridges(ridges)), &[])?
             }
             /// Adds scattered bumps to a shape (seeds, raisins).
             fn bumps(lua, this) takes spec "softvt.BumpsSpec" {
@@ -331,7 +331,7 @@ class! {
                 mask: Option<Ramp>;
             } -> ["softvt.Shape"] {
                 let bumps = Bumps { height, radius, spacing, seed, mask };
-                this.derived(lua, this.copy().displaced(Displacement::Bumps(bumps)), &[])?
+                this.derived(lua, this.copy().displaced(SurfaceRelief::Bumps(bumps)), &[])?
             }
             /// Gives all or part of the surface another material.
             fn paint(lua, this) takes spec "softvt.PaintSpec" {

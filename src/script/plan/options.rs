@@ -49,7 +49,7 @@ record! {
 /// The value of an option.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-pub enum OptionValue {
+pub enum ScriptOptionValue {
     /// A number in the option's unit.
     Number(f64),
     /// A whole number.
@@ -73,8 +73,8 @@ pub struct OptionSpec {
     pub unit: String,
     /// Description for --help.
     pub help: String,
-    pub default: OptionValue,
-    pub value: OptionValue,
+    pub default: ScriptOptionValue,
+    pub value: ScriptOptionValue,
     /// Allowed numbers.
     pub range: Range,
     /// Allowed strings; any if empty.
@@ -95,15 +95,17 @@ impl OptionSpec {
     pub fn expects(&self) -> String {
         let unit = if self.unit.is_empty() { String::new() } else { format!(" ({})", self.unit) };
         match &self.default {
-            OptionValue::Number(_) => format!("a number{}{unit}", self.range.describe()),
-            OptionValue::Integer(_) => format!("a whole number{}{unit}", self.range.describe()),
-            OptionValue::Text(_) | OptionValue::Texts(_) if !self.choices.is_empty() => {
+            ScriptOptionValue::Number(_) => format!("a number{}{unit}", self.range.describe()),
+            ScriptOptionValue::Integer(_) => format!("a whole number{}{unit}", self.range.describe()),
+            ScriptOptionValue::Text(_) | ScriptOptionValue::Texts(_) if !self.choices.is_empty() => {
                 format!("one of {}", self.choices.join(", "))
             }
-            OptionValue::Text(_) => "a string".into(),
-            OptionValue::Flag(_) => "on or off".into(),
-            OptionValue::Numbers(_) => format!("numbers joined by commas{}{unit}", self.range.describe()),
-            OptionValue::Texts(_) => "strings joined by commas".into(),
+            ScriptOptionValue::Text(_) => "a string".into(),
+            ScriptOptionValue::Flag(_) => "on or off".into(),
+            ScriptOptionValue::Numbers(_) => {
+                format!("numbers joined by commas{}{unit}", self.range.describe())
+            }
+            ScriptOptionValue::Texts(_) => "strings joined by commas".into(),
         }
     }
 
@@ -117,27 +119,29 @@ impl OptionSpec {
     }
 
     /// Parses a value of the command line.
-    fn parse(&self, text: &str) -> Option<OptionValue> {
+    fn parse(&self, text: &str) -> Option<ScriptOptionValue> {
         let number = |text: &str| text.trim().parse::<f64>().ok().filter(|n| self.range.holds(*n));
         let allowed = |text: &str| self.choices.is_empty() || self.choices.iter().any(|c| c == text);
         let entries = || text.split(',').map(str::trim);
         match &self.default {
-            OptionValue::Number(_) => number(text).map(OptionValue::Number),
-            OptionValue::Integer(_) => {
+            ScriptOptionValue::Number(_) => number(text).map(ScriptOptionValue::Number),
+            ScriptOptionValue::Integer(_) => {
                 let integer = text.trim().parse::<i64>().ok().filter(|n| self.range.holds(*n as f64));
-                integer.map(OptionValue::Integer)
+                integer.map(ScriptOptionValue::Integer)
             }
-            OptionValue::Text(_) => allowed(text).then(|| OptionValue::Text(text.to_owned())),
-            OptionValue::Flag(_) => match text {
-                "on" | "true" | "yes" | "1" => Some(OptionValue::Flag(true)),
-                "off" | "false" | "no" | "0" => Some(OptionValue::Flag(false)),
+            ScriptOptionValue::Text(_) => allowed(text).then(|| ScriptOptionValue::Text(text.to_owned())),
+            ScriptOptionValue::Flag(_) => match text {
+                "on" | "true" | "yes" | "1" => Some(ScriptOptionValue::Flag(true)),
+                "off" | "false" | "no" | "0" => Some(ScriptOptionValue::Flag(false)),
                 _ => None,
             },
-            OptionValue::Numbers(_) => entries().map(number).collect::<Option<_>>().map(OptionValue::Numbers),
-            OptionValue::Texts(_) if entries().all(|entry| allowed(entry) && !entry.is_empty()) => {
-                Some(OptionValue::Texts(entries().map(str::to_owned).collect()))
+            ScriptOptionValue::Numbers(_) => {
+                entries().map(number).collect::<Option<_>>().map(ScriptOptionValue::Numbers)
             }
-            OptionValue::Texts(_) => None,
+            ScriptOptionValue::Texts(_) if entries().all(|entry| allowed(entry) && !entry.is_empty()) => {
+                Some(ScriptOptionValue::Texts(entries().map(str::to_owned).collect()))
+            }
+            ScriptOptionValue::Texts(_) => None,
         }
     }
 }
@@ -164,7 +168,7 @@ enum ArgumentError {
     #[error("option {0} is given twice; give it once")]
     Twice(String),
     #[error("option {flag} does nothing with {other} {value}; leave it out, or give {other} {needed}")]
-    NoEffect { flag: String, other: String, value: OptionValue, needed: String },
+    NoEffect { flag: String, other: String, value: ScriptOptionValue, needed: String },
     #[error("options.{option}.only_with: {other} is not an option of the script")]
     Undeclared { option: String, other: String },
     #[error("options.{option}.only_with.{other}: expected {expected}, got {needed:?}")]
@@ -222,10 +226,10 @@ impl OptionSession {
     }
 
     /// Consumes the arguments that set `spec` and returns its value, if any.
-    fn consume(&mut self, spec: &OptionSpec) -> Result<Option<OptionValue>, ArgumentError> {
+    fn consume(&mut self, spec: &OptionSpec) -> Result<Option<ScriptOptionValue>, ArgumentError> {
         let flag = spec.flag();
         let (underscored, negated) = (format!("--{}", spec.name), format!("--no-{}", &flag[2..]));
-        let is_flag = matches!(spec.default, OptionValue::Flag(_));
+        let is_flag = matches!(spec.default, ScriptOptionValue::Flag(_));
         let mut found = None;
         for at in 0..self.arguments.len() {
             let Some(word) = self.arguments[at].clone() else { continue };
@@ -304,7 +308,7 @@ fn declare(lua: &Lua, session: &mut OptionSession, key: &Value, value: &Value) -
     let checked = checked.map_err(|error| error_at_key(lua, "options", &error.inside(name.clone())))?;
     let record = OptionRecord::from_checked(checked, lua)?;
     let default = match record.default {
-        Value::Integer(n) if record.integer => Some(OptionValue::Integer(n)),
+        Value::Integer(n) if record.integer => Some(ScriptOptionValue::Integer(n)),
         Value::Integer(_) | Value::Number(_) if record.integer => None,
         default => lua.from_value(default).ok(),
     };
@@ -344,13 +348,13 @@ fn needed_values(
 ) -> mlua::Result<BTreeMap<String, String>> {
     let value = |(other, value): (String, Value)| {
         let message = format!("options.{name}.only_with.{other}: expected a number, string or boolean");
-        let value: OptionValue = lua.from_value(value).map_err(|_| fail(lua, message))?;
+        let value: ScriptOptionValue = lua.from_value(value).map_err(|_| fail(lua, message))?;
         Ok((other, value.to_string()))
     };
     values.into_iter().map(value).collect()
 }
 
-impl OptionValue {
+impl ScriptOptionValue {
     /// True if this is `other`, or a list with all of its entries.
     fn contains(&self, other: &Self) -> bool {
         match (self, other) {
@@ -361,7 +365,7 @@ impl OptionValue {
     }
 }
 
-impl std::fmt::Display for OptionValue {
+impl std::fmt::Display for ScriptOptionValue {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Number(n) => write!(f, "{n}"),

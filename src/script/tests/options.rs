@@ -1,5 +1,5 @@
 use super::*;
-use crate::OptionValue;
+use crate::ScriptOptionValue;
 
 const SCRIPT: &str = r#"
 local opt = softvt.options {
@@ -15,21 +15,21 @@ return softvt.experiment {
 }
 "#;
 
-fn value(argv: &[&str], name: &str) -> OptionValue {
+fn value(argv: &[&str], name: &str) -> ScriptOptionValue {
     let loaded = Project::new(&[("x.lua", SCRIPT)]).load("x.lua", argv).unwrap();
     loaded.options.into_iter().find(|option| option.name == name).unwrap().value
 }
 
 #[test]
 fn both_spellings_of_a_value_are_read() {
-    assert_eq!(value(&["--closure", "0.3"], "closure"), OptionValue::Number(0.3));
-    assert_eq!(value(&["--closure=0.3"], "closure"), OptionValue::Number(0.3));
-    assert_eq!(value(&[], "closure"), OptionValue::Number(0.5));
-    assert_eq!(value(&["--gap-mm", "42,40"], "gap_mm"), OptionValue::Numbers(vec![42.0, 40.0]));
-    assert_eq!(value(&["--gap_mm=42"], "gap_mm"), OptionValue::Numbers(vec![42.0]));
-    assert_eq!(value(&["--no-sleep"], "sleep"), OptionValue::Flag(false));
-    assert_eq!(value(&["--sleep=off"], "sleep"), OptionValue::Flag(false));
-    assert_eq!(value(&["--shape", "sphere"], "shape"), OptionValue::Text("sphere".into()));
+    assert_eq!(value(&["--closure", "0.3"], "closure"), ScriptOptionValue::Number(0.3));
+    assert_eq!(value(&["--closure=0.3"], "closure"), ScriptOptionValue::Number(0.3));
+    assert_eq!(value(&[], "closure"), ScriptOptionValue::Number(0.5));
+    assert_eq!(value(&["--gap-mm", "42,40"], "gap_mm"), ScriptOptionValue::Numbers(vec![42.0, 40.0]));
+    assert_eq!(value(&["--gap_mm=42"], "gap_mm"), ScriptOptionValue::Numbers(vec![42.0]));
+    assert_eq!(value(&["--no-sleep"], "sleep"), ScriptOptionValue::Flag(false));
+    assert_eq!(value(&["--sleep=off"], "sleep"), ScriptOptionValue::Flag(false));
+    assert_eq!(value(&["--shape", "sphere"], "shape"), ScriptOptionValue::Text("sphere".into()));
 }
 
 #[test]
@@ -80,7 +80,7 @@ proptest::proptest! {
     #[test]
     fn a_number_arrives_as_it_was_written(closure in 0.0f64..=1.0) {
         let arguments = [format!("--closure={closure}")];
-        proptest::prop_assert_eq!(value(&[&arguments[0]], "closure"), OptionValue::Number(closure));
+        proptest::prop_assert_eq!(value(&[&arguments[0]], "closure"), ScriptOptionValue::Number(closure));
     }
 
     #[test]

@@ -23,7 +23,9 @@ pub use self::{
         ContactError, Gel, GelField, GelScratch, PadWrench, SkinMesh, SubstrateCompliance, TactileContact,
         Taxels, patch_friction,
     },
-    image::{HISTORY_LENGTH, MosaicLayout, OpticsError, PolynomialOptics, TaximOptics, mosaic, mosaic_cell},
+    image::{
+        HISTORY_LENGTH, OpticsError, PolynomialOptics, TactileMosaicLayout, TaximOptics, mosaic, mosaic_cell,
+    },
     markers::{MARKER_COUNT, MarkerFlow, MarkerPositions, MarkerStyle, Markers},
     sensor::{TactileReading, TactileSensor, TactileSensorError},
     skin::TactileSkin,

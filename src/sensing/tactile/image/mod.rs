@@ -11,7 +11,7 @@ mod taxim;
 mod tests;
 mod visible_surface;
 
-pub use mosaic::{HISTORY_LENGTH, MosaicLayout, mosaic, mosaic_cell};
+pub use mosaic::{HISTORY_LENGTH, TactileMosaicLayout, mosaic, mosaic_cell};
 pub use polynomial_optics::{OpticsError, OpticsFile, PolynomialOptics, SLOPE_MONOMIALS, slope_monomials};
 pub use shadow::Led;
 pub use taxim::TaximOptics;

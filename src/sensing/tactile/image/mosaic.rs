@@ -17,7 +17,7 @@ const CELL_SIZE: u32 = 56;
 /// Arrangement of the cells; each finger's images run from left to right and top to bottom, oldest first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum MosaicLayout {
+pub enum TactileMosaicLayout {
     /// Left finger in the upper two rows, right finger in the lower two (the soft suites).
     #[default]
     Rows,
@@ -34,7 +34,7 @@ pub fn mosaic_cell(image: &RgbImage) -> RgbImage {
 ///
 /// `history` holds the cells of the left and the right finger, oldest first. A shorter history is extended at its
 /// start with its oldest cell; an empty one leaves its cells black.
-pub fn mosaic<T: Borrow<RgbImage>>(history: [&[T]; 2], layout: MosaicLayout) -> RgbImage {
+pub fn mosaic<T: Borrow<RgbImage>>(history: [&[T]; 2], layout: TactileMosaicLayout) -> RgbImage {
     let mut image = RgbImage::new(CELLS_PER_EDGE as u32 * CELL_SIZE, CELLS_PER_EDGE as u32 * CELL_SIZE);
     for (finger, cells) in history.into_iter().enumerate() {
         for place in 0..HISTORY_LENGTH {
@@ -42,8 +42,8 @@ pub fn mosaic<T: Borrow<RgbImage>>(history: [&[T]; 2], layout: MosaicLayout) -> 
                 continue;
             };
             let (column, row) = match layout {
-                MosaicLayout::Rows => (place % CELLS_PER_EDGE, 2 * finger + place / CELLS_PER_EDGE),
-                MosaicLayout::Columns => (2 * finger + place % 2, place / 2),
+                TactileMosaicLayout::Rows => (place % CELLS_PER_EDGE, 2 * finger + place / CELLS_PER_EDGE),
+                TactileMosaicLayout::Columns => (2 * finger + place % 2, place / 2),
             };
             let corner = [column, row].map(|at| i64::from(CELL_SIZE) * at as i64);
             imageops::replace(&mut image, cell.borrow(), corner[0], corner[1]);
@@ -69,18 +69,18 @@ mod tests {
     #[test]
     fn the_left_finger_is_above_and_time_runs_to_the_right() {
         let (left, right) = (cells(10, 8), cells(50, 8));
-        let image = mosaic([&left, &right], MosaicLayout::Rows);
+        let image = mosaic([&left, &right], TactileMosaicLayout::Rows);
         assert_eq!(image.dimensions(), (224, 224));
         assert_eq!([red(&image, 0, 0), red(&image, 3, 0), red(&image, 0, 1)], [10, 13, 14]);
         assert_eq!([red(&image, 0, 2), red(&image, 3, 3)], [50, 57]);
-        let image = mosaic([&left, &right], MosaicLayout::Columns);
+        let image = mosaic([&left, &right], TactileMosaicLayout::Columns);
         assert_eq!([red(&image, 1, 0), red(&image, 0, 1), red(&image, 2, 0)], [11, 12, 50]);
     }
 
     #[test]
     fn a_short_history_starts_with_its_oldest_frame_and_a_long_one_keeps_its_last() {
         let (short, long) = (cells(10, 3), cells(50, 20));
-        let image = mosaic([&short, &long], MosaicLayout::Rows);
+        let image = mosaic([&short, &long], TactileMosaicLayout::Rows);
         let upper: Vec<u8> = (0..8).map(|i| red(&image, i % 4, i / 4)).collect();
         assert_eq!(upper, [10, 10, 10, 10, 10, 10, 11, 12]);
         assert_eq!([red(&image, 0, 2), red(&image, 3, 3)], [62, 69]);
