@@ -5,7 +5,7 @@
 //! [`records`], [`benchmark`] → [`policy`] → [`rollout`] → [`dataset`] → [`report`], [`script`], [`serve`] → [`runner`] → [`cli`].
 //! `docs/architecture.md` draws them and follows one episode. All of them may use [`text`] (numbers and text in
 //! messages), [`files`] (atomic files), [`npy`] (numpy files), [`parallel`] (jobs on threads), [`cancel`] (requests to stop),
-//! [`episode_id`] and [`settings`] (the declaration of settings).
+//! [`episode_id`] and [`settings`](mod@settings) (the declaration of settings).
 //!
 //! Examples: a dropped cube and a squeezed cube in [`physics::world`], distances in [`geometry::shape`], kinematics
 //! in [`robot`], a rendered image in [`sensing::camera`], a tactile image in [`sensing::tactile`], the verdict on
