@@ -25,22 +25,26 @@ pub fn replaced(readme: &str, tables: &str) -> Result<String, String> {
     }
 }
 
-/// One table per script: controllers × suites.
+/// One table per script: controllers × suites. Suites that an earlier table shows are left out.
 pub fn overview(results: &[Results], labels: &Value) -> String {
-    let table = |one: &Results| {
-        let names: Vec<&str> = one.suites.iter().filter_map(|suite| suite["name"].as_str()).collect();
+    let table = |(index, one): (usize, &Results)| {
+        let is_known = |suite: &Value| {
+            results[..index]
+                .iter()
+                .any(|before| before.suites.iter().any(|known| known["name"] == suite["name"]))
+        };
+        let suites: Vec<&Value> = one.suites.iter().filter(|suite| !is_known(suite)).collect();
+        let names: Vec<&str> = suites.iter().filter_map(|suite| suite["name"].as_str()).collect();
         let mut text = format!("{}\n\n", caption(one));
         text += &header(std::iter::once(String::new()).chain(names.iter().map(|name| title(name))));
         for controller in controllers(one) {
-            let cells = one
-                .suites
-                .iter()
-                .map(|suite| found(suite, &controller).map_or_else(|| "–".to_owned(), verdicts));
+            let cells =
+                suites.iter().map(|suite| found(suite, &controller).map_or_else(|| "–".to_owned(), verdicts));
             text += &row(std::iter::once(label(labels, &controller)).chain(cells));
         }
         text
     };
-    results.iter().map(table).collect::<Vec<_>>().join("\n")
+    results.iter().enumerate().map(table).collect::<Vec<_>>().join("\n")
 }
 
 /// One table per script and suite, with all columns.
