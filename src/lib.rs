@@ -11,7 +11,7 @@
 //! in [`robot`], a rendered image in [`sensing::camera`], a tactile image in [`sensing::tactile`], the verdict on
 //! an episode in [`evaluation::judge`], a run of a suite in [`runner`]. `docs/library.md` has them together.
 //!
-//! The features `cli` and `runner` are on by default. Without `runner`, the crate has no Lua, datasets, reports and server, and
+//! The features `cli` and `runner` are on by default. Without `runner`, the crate has no Lua, datasets, reports or server, and
 //! [`rollout`] is the topmost layer.
 //!
 //! Units are SI throughout; a name carries its unit where it is not SI or not obvious. Frames are suffixes:

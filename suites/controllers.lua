@@ -1,5 +1,5 @@
 -- Controllers that differ only in how the hand closes: the expert knows the object (reference), tactile-servo feels it, and the others know
--- what shows of it and the statistics of the suite. The best of those without touch says what a suite needs. Prints one table.
+-- only what can be seen of it, and the statistics of the suite. The best of those without touch says what a suite needs. Prints one table.
 --
 --   softvt suites/controllers.lua --episodes 50
 return softvt.conditions {

@@ -13,7 +13,7 @@ local FINGER_STIFFNESS = 2000
 -- Step of the rotations tried for clearance.
 local STEP = math.rad(7.5)
 -- Distance of each gel from the object at which closing becomes slow, m, and rate until there, 1/s. A hand that feels begins up to
--- twice as far away, so that its demonstrations do not tell by the time at which it touches.
+-- twice as far away, so that the time of first contact does not reveal the size of the object.
 local CONTACT_CLEARANCE, FAST_RATE = 0.002, 0.6
 -- Width by which a command may exceed that of its grip, m.
 local COMMAND_MARGIN = 0.002

@@ -1,4 +1,4 @@
-//! [`check_suite`]: the first scenes and the limits of a suite, without an episode.
+//! [`SuiteChecker`]: the first scenes and the limits of a suite, without an episode.
 
 use std::{collections::BTreeSet, path::PathBuf, sync::Mutex};
 
@@ -42,7 +42,7 @@ impl<'a> SuiteChecker<'a> {
         let warnings = check_first_scenes(&run, &tasks)?;
         run.jobs = select_episodes(self.config, suite, &tasks);
         run.scan_limits()?;
-        Ok(warnings)
+        if cancel::requested() { Err(RunError::interrupted("interrupted")) } else { Ok(warnings) }
     }
 }
 
@@ -65,5 +65,5 @@ fn check_first_scenes(run: &SuiteRun, tasks: &[&Task]) -> Result<BTreeSet<String
         warnings.extend(found);
         Ok(())
     })?;
-    if cancel::requested() { Err(RunError::interrupted("interrupted")) } else { Ok(warnings) }
+    Ok(warnings)
 }

@@ -91,7 +91,7 @@ pub struct RunConfig {
     pub file: PathBuf,
     /// Values of the options that the script declares, as `--name=value`.
     pub options: Vec<String>,
-    /// Base seed. With a secret it is ignored, and that of the secret is used.
+    /// Base seed. [`RunConfig::load`] replaces it by the public seed of a secret.
     pub seed: u64,
     /// Secret of a judged run.
     pub secret: Option<SecretSeed>,

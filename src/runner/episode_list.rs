@@ -58,8 +58,12 @@ impl<'a> EpisodeList<'a> {
         match &self.all {
             Episodes::Range { tasks, .. } => tasks.clone(),
             Episodes::Listed(jobs) => {
-                let mut tasks: Vec<&Task> = jobs.iter().map(|job| job.task).collect();
-                tasks.dedup_by_key(|task| task.id);
+                let mut tasks: Vec<&Task> = Vec::new();
+                for job in jobs {
+                    if tasks.iter().all(|task| task.id != job.task.id) {
+                        tasks.push(job.task);
+                    }
+                }
                 tasks
             }
         }

@@ -1,4 +1,4 @@
-//! Evaluation of a policy on a suite: its episodes are run, with or without a folder, which can be continued after an interrupt.
+//! Evaluation of a policy on a suite. With a folder, an interrupted run can be continued.
 
 use std::{collections::BTreeSet, path::Path};
 

@@ -40,8 +40,8 @@ impl DemoCount {
 }
 
 /// Records demonstrations of the selected tasks of every suite of a script, by the policy that `policy_of` returns for the teacher of
-/// the suite. Returns `None` if the folder contains the complete recording. Of the configuration, the policy, the output, the
-/// number of episodes, the shard, trace and videos do not matter here.
+/// the suite. Returns `None` if the folder contains the complete recording. The policy, the output, the number of episodes, the shard,
+/// the trace and the videos of the configuration are ignored.
 ///
 /// # Errors
 /// The script has no suite, the folder contains something else, an attempt or a file fails, or too few attempts are good.
@@ -64,7 +64,10 @@ pub fn record(
         request["gripper"] = json!(code);
     }
     let taught = |suite: &Suite| {
-        Ok::<_, RunError>(config.clone().with_policy(PolicyConfig::load(&policy_of(suite.teacher))?))
+        let policy = PolicyConfig::load(&policy_of(suite.teacher))?;
+        let own =
+            RunConfig { out: None, episodes: None, shard: None, trace: None, video: None, ..config.clone() };
+        Ok::<_, RunError>(own.with_policy(policy))
     };
     let configs: Vec<RunConfig> = suites.iter().map(taught).collect::<Result<_, _>>()?;
     record_all(options, &request, || {

@@ -114,6 +114,9 @@ pub fn write_video(
     is_cancelled: impl Fn() -> bool + Sync,
     mut on_frame: impl FnMut(),
 ) -> Result<(), EpisodeVideoError> {
+    if is_cancelled() {
+        return Err(EpisodeVideoError::Interrupted);
+    }
     // Its meshes are shared by the threads.
     recording.sensors.render_scene()?;
     let (recording, idle) = (&*recording, Mutex::new(Vec::new()));
@@ -124,13 +127,15 @@ pub fn write_video(
         lock(&idle).push(sensors);
         frame
     };
-    let mut video = VideoWriter::new(WIDTH as usize, HEIGHT as usize, CONTROL_HZ)?;
+    let (mut video, mut drawn) = (VideoWriter::new(WIDTH as usize, HEIGHT as usize, CONTROL_HZ)?, 0);
     parallel::run_in_order(recording.frames.len(), threads, &is_cancelled, draw, |_, frame| {
         video.push(&frame)?;
+        drawn += 1;
         on_frame();
         Ok::<_, EpisodeVideoError>(())
     })?;
-    if is_cancelled() { Err(EpisodeVideoError::Interrupted) } else { Ok(video.save(path)?) }
+    // A request to stop ends the frames early.
+    if drawn < recording.frames.len() { Err(EpisodeVideoError::Interrupted) } else { Ok(video.save(path)?) }
 }
 
 /// Writes one frame of the video as a PNG file.
