@@ -16,7 +16,7 @@ pub enum Outcome {
     Budget,
     /// The physics state became invalid.
     Invalid {
-        /// What was invalid.
+        /// Property of the state that was invalid.
         reason: InvalidReason,
         /// Physics step since the policy took over.
         step: u64,

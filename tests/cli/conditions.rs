@@ -2,28 +2,11 @@
 
 use serde_json::Value;
 
-use crate::support::{Project, Small};
-
-/// The small suite with shifts, under the given conditions.
-fn project(conditions: &str) -> Project {
-    let small = Small { expert: "arm:close_to(1, { rate = 2 })", ..Small::default() };
-    let shifts = "local shifts = require \"shifts\"\n";
-    let declared = "shifts = shifts.soft, episodes = 2,";
-    let text = small.text().replacen("episodes = 1,", declared, 1);
-    let plan = format!(
-        "return softvt.conditions {{ name = \"trial\", suites = {{ require \"suites.one\" }}, conditions = {{\n{conditions}\n}} }}\n"
-    );
-    Project::new(&[("suites/one.lua", &format!("{shifts}{text}")), ("suites/trial.lua", &plan)])
-}
-
-const THREE: &str = "{ name = \"heavy x2\", shift = { mass = 2 } },
-  { name = \"same\", shift = { mass = 1, light = 0.5 } },
-  { name = \"hard\", shift = { stiffness = 2 }, only = \"deformable\" },
-  { name = \"weak\", set = { [\"robot.gripper.effort\"] = 3 } },";
+use crate::support::fixtures::{CONDITIONS, conditions_project};
 
 #[test]
 fn the_comparison_is_printed_as_a_table_and_as_json() {
-    let project = project(THREE);
+    let project = conditions_project(CONDITIONS, "deformable");
     let output = project.succeeds("suites/trial.lua --policy noop --out run");
     let (_, against) = output.out.split_once("change from the reference").expect("a second table");
     assert!(against.contains("95 % interval") && against.contains("\nheavy x2"), "{}", output.out);
@@ -34,14 +17,14 @@ fn the_comparison_is_printed_as_a_table_and_as_json() {
 
 #[test]
 fn policies_are_printed_side_by_side() {
-    let project = project("{ name = \"other\", policy = \"noop\" },");
+    let project = conditions_project("{ name = \"other\", policy = \"noop\" },", "deformable");
     let printed = project.succeeds("suites/trial.lua --out run").out;
     assert!(printed.contains("controller") && !printed.contains("change from the reference"), "{printed}");
 }
 
 #[test]
 fn conditions_are_checked_and_listed() {
-    let project = project(THREE);
+    let project = conditions_project(CONDITIONS, "deformable");
     let output = project.succeeds("check suites/trial.lua");
     assert!(output.out.contains("conditions: reference, heavy x2, same, hard, weak\n"), "{}", output.out);
     let output = project.succeeds("list suites --json");

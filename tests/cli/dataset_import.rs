@@ -1,28 +1,10 @@
 //! `softvt dataset import`: what it prints, and how its datasets are checked.
 
-use crate::support::{Project, SOLIDS};
-
-/// A rigid cube on a shelf. A push reaches the goal.
-const SUITE: &str = r#"
-local solids = require "solids"
-local layout = softvt.layout("one", function(scene)
-  local x, y, z = table.unpack(solids.cube_at)
-  scene:add { name = "floor", asset = solids.floor, position = { 0, 0, 0 } }
-  scene:add { name = "shelf", asset = solids.shelf, position = solids.shelf_at }
-  scene:add { name = "cube", asset = solids.cube, position = { x + 0.005 * math.random(), y, z } }
-  scene:add { name = "other", asset = solids.cube, position = { x, -0.15, z } }
-end)
-local function task(prompt)
-  return softvt.task { prompt = prompt, layout = layout, goal = softvt.on { object = "cube", target = "shelf" }, budget_steps = 30,
-    expert = function(arm, scene) solids.push(arm) arm:wait(1) end }
-end
-return softvt.suite { name = "one", object_type = "rigid", variation = "spatial", episodes = 1,
-  tasks = { task "wait", task "wait longer" } }
-"#;
+use crate::support::{Project, SOLIDS, fixtures::PUSHED_CUBE};
 
 /// A project with a dataset of two demonstrations of task 0.
 fn recorded() -> Project {
-    let project = Project::new(&[("x.lua", SUITE), SOLIDS]);
+    let project = Project::new(&[("x.lua", PUSHED_CUBE), SOLIDS]);
     project.succeeds("record x.lua --task 0 --demos 2 --out data --images video --no-privileged");
     project
 }

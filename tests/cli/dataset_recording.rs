@@ -2,25 +2,10 @@
 
 use std::fs;
 
-use crate::support::{Project, SOLIDS, run_command};
-
-/// A rigid cube on a shelf, or on the floor in some attempts. A push reaches the goal in the former.
-const SUITE: &str = r#"
-local solids = require "solids"
-local layout = softvt.layout("one", function(scene)
-  local beside = math.random() < 0.4
-  scene:add { name = "floor", asset = solids.floor, position = { 0, 0, 0 } }
-  scene:add { name = "shelf", asset = solids.shelf, position = solids.shelf_at }
-  scene:add { name = "cube", asset = solids.cube, position = beside and { 0, 0.35, 0 } or solids.cube_at }
-end)
-return softvt.suite { name = "one", object_type = "rigid", variation = "spatial", episodes = 1, tasks = {
-  softvt.task { prompt = "wait", layout = layout, goal = softvt.on { object = "cube", target = "shelf" }, budget_steps = 30,
-    expert = function(arm, scene) solids.push(arm) arm:wait(1) end },
-} }
-"#;
+use crate::support::{Project, SOLIDS, fixtures::MISPLACED_CUBE, run_command};
 
 fn project() -> Project {
-    Project::new(&[("x.lua", SUITE), SOLIDS])
+    Project::new(&[("x.lua", MISPLACED_CUBE), SOLIDS])
 }
 
 #[test]
@@ -70,7 +55,7 @@ fn the_grip_code_of_exports_is_recorded() {
     project.succeeds(&format!("record x.lua {words} --out a"));
     assert_eq!(project.json("a/dataset.json")["gripper"], "two-width");
     // The flag takes the place of the suite's teacher.
-    let taught = SUITE.replace("episodes = 1,", "episodes = 1, teacher = \"tactile-servo\",");
+    let taught = MISPLACED_CUBE.replace("episodes = 1,", "episodes = 1, teacher = \"tactile-servo\",");
     project.write("x.lua", taught.as_bytes());
     project.succeeds("record x.lua --demos 1 --images video --policy expert --out expert");
     assert_eq!(project.json("expert/attempts/one/run.json")["policy"], "expert");

@@ -1,32 +1,10 @@
 //! Flags of policies, what is printed of them, and exit codes of policies that fail.
 
-use crate::support::{Project, Small};
-
-/// Twelve control steps of a cube on a floor.
-fn project(policy: &str) -> Project {
-    let project = Small { task: "budget_steps = 12", ..Small::default() }.project();
-    project.write("p.lua", policy.as_bytes());
-    project
-}
-
-/// A policy that moves at random, depending on its observation, in chunks of three.
-const WANDERS: &str = "local n = 0
-return softvt.policy { name = 'wanders', observes = { tactile = true, cameras = { 'wrist' } }, replan = 2,
-  reset = function(task) n = task.episode end,
-  act = function(obs)
-    n = n + 1
-    local light, list = obs:camera('wrist'):mean()[1] / 255, {}
-    for i = 1, 3 do
-      list[i] = { position = { obs.position[1] + 0.01 * math.random(), obs.position[2], obs.position[3] - 0.001 * n * light },
-                  axis_angle = obs.axis_angle, closure = 0.1 * math.random() }
-    end
-    return list
-  end }
-";
+use crate::support::fixtures::{WANDERS, policy_project};
 
 #[test]
 fn a_policy_that_answers_nothing_valid_ends_with_its_exit_code() {
-    let project = project(
+    let project = policy_project(
         "return softvt.policy { name = 'p', act = function(obs)\n\
          return { position = obs.position, axis_angle = obs.axis_angle, closure = 0/0 } end }",
     );
@@ -45,7 +23,7 @@ fn a_policy_that_answers_nothing_valid_ends_with_its_exit_code() {
 
 #[test]
 fn a_failing_policy_is_reported_with_what_is_kept() {
-    let project = project(
+    let project = policy_project(
         "local episode\nreturn softvt.policy { name = 'p', reset = function(t) episode = t.episode end, act = function(obs)\n\
          if episode == 1 then error 'lost' end\n\
          return { position = obs.position, axis_angle = obs.axis_angle, closure = 0 } end }",
@@ -57,7 +35,7 @@ fn a_failing_policy_is_reported_with_what_is_kept() {
 #[test]
 fn the_grip_code_of_a_run_is_printed() {
     let act = "act = function(obs) return { position = obs.position, axis_angle = obs.axis_angle, closure = 0.6 } end }";
-    let project = project(&format!("return softvt.policy {{ name = 'p', {act}"));
+    let project = policy_project(&format!("return softvt.policy {{ name = 'p', {act}"));
     project.write(
         "binary.lua",
         format!("return softvt.policy {{ name = 'p', gripper = 'binary', {act}").as_bytes(),
@@ -78,7 +56,7 @@ fn the_grip_code_of_a_run_is_printed() {
 
 #[test]
 fn flags_without_effect_and_unknown_policies_are_refused() {
-    let project = project(WANDERS);
+    let project = policy_project(WANDERS);
     for (words, output) in [
         (
             "--policy noop --replan 3",
@@ -107,7 +85,7 @@ fn flags_without_effect_and_unknown_policies_are_refused() {
 
 #[test]
 fn policies_and_profiles_in_lua_are_listed() {
-    let project = project(WANDERS);
+    let project = policy_project(WANDERS);
     project.write("scripts/policies/mine.lua", b"-- Mine. It is good.\nreturn 1\n");
     let listed = |what: &str| project.succeeds(&format!("list {what}")).out;
     let policies = listed("policies");
@@ -126,7 +104,7 @@ fn a_policy_cannot_be_privileged_in_its_episodes_alone() {
     let body = "act = function(obs) print('granted: ' .. tostring((pcall(softvt.soft, { youngs_pa = 1e4, poisson = 0.3, density = 300 }))))
 return { position = obs.position, axis_angle = obs.axis_angle, closure = 0 } end";
     // The message about a missing module differed between loading and episodes.
-    let project = project(&format!(
+    let project = policy_project(&format!(
         "local _, why = pcall(require, 'no_such_module')
 local in_episode = tostring(why):find('was not loaded', 1, true) ~= nil
 return softvt.policy {{ name = 'flip', privileged = in_episode, {body} }}"

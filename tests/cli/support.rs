@@ -7,7 +7,7 @@ use assert_cmd::{Command, cargo::cargo_bin_cmd};
 #[path = "../project/mod.rs"]
 mod project;
 
-pub use project::{Project, SOLIDS, SPATIAL_SOFT, Small, client, files};
+pub use project::{Project, SOLIDS, SPATIAL_SOFT, Small, client, files, fixtures};
 
 /// Exit code and output of a command.
 pub struct CliOutput {

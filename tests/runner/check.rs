@@ -13,7 +13,7 @@ fn of(small: Small) -> String {
     refusal(&small.project())
 }
 
-/// What the check warns of, in a project that is valid.
+/// Warnings of the check in a valid project.
 fn warnings(project: &Project) -> String {
     project.run("x.lua").check().expect("valid").join("\n")
 }

@@ -8,30 +8,10 @@ use std::{
 use serde_json::json;
 use softvt::report::condition_table;
 
-use crate::support::{Project, Run, Small};
-
-/// The small suite with shifts, under the given conditions.
-fn project(conditions: &str, object_type: &str) -> Project {
-    let small = Small { expert: "arm:close_to(1, { rate = 2 })", ..Small::default() };
-    let shifts = "local shifts = require \"shifts\"\n";
-    let declared = "shifts = shifts.soft, episodes = 2,";
-    let mut text = small
-        .text()
-        .replacen("episodes = 1,", declared, 1)
-        .replace("\"deformable\"", &format!("\"{object_type}\""));
-    if object_type == "rigid" {
-        text = text.replace("softvt.soft { youngs_pa = 2e4, poisson = 0.3,", "softvt.rigid {");
-    }
-    let plan = format!(
-        "return softvt.conditions {{ name = \"trial\", suites = {{ require \"suites.one\" }}, conditions = {{\n{conditions}\n}} }}\n"
-    );
-    Project::new(&[("suites/one.lua", &format!("{shifts}{text}")), ("suites/trial.lua", &plan)])
-}
-
-const THREE: &str = "{ name = \"heavy x2\", shift = { mass = 2 } },
-  { name = \"same\", shift = { mass = 1, light = 0.5 } },
-  { name = \"hard\", shift = { stiffness = 2 }, only = \"deformable\" },
-  { name = \"weak\", set = { [\"robot.gripper.effort\"] = 3 } },";
+use crate::support::{
+    Project, Run,
+    fixtures::{CONDITIONS, conditions_project},
+};
 
 /// The run of the conditions of a project into the folder `run`.
 fn trial(project: &Project) -> Run<'_> {
@@ -40,7 +20,7 @@ fn trial(project: &Project) -> Run<'_> {
 
 #[test]
 fn each_condition_is_a_run_of_the_same_episodes() {
-    let project = project(THREE, "deformable");
+    let project = conditions_project(CONDITIONS, "deformable");
     let tables = trial(&project).conditions().expect("valid");
     let table = condition_table::table(&tables[0]);
     let rows: Vec<&str> = table.lines().filter(|line| !line.starts_with('─')).collect();
@@ -58,7 +38,7 @@ fn each_condition_is_a_run_of_the_same_episodes() {
 
 #[test]
 fn the_comparison_is_written_and_light_alone_changes_no_result() {
-    let project = project(THREE, "deformable");
+    let project = conditions_project(CONDITIONS, "deformable");
     let tables = trial(&project).conditions().expect("valid");
     let document = project.json("run/conditions.json");
     assert_eq!((&document["suites"], &document["policy"]), (&json!(tables), &"noop".into()));
@@ -78,7 +58,7 @@ fn the_comparison_is_written_and_light_alone_changes_no_result() {
 
 #[test]
 fn conditions_without_effect_are_reported_and_not_run() {
-    let project = project(THREE, "rigid");
+    let project = conditions_project(CONDITIONS, "rigid");
     let tables = trial(&project).conditions().expect("valid");
     let hard = &tables[0].rows[3];
     assert!(hard.outcome.is_none());
@@ -88,7 +68,7 @@ fn conditions_without_effect_are_reported_and_not_run() {
     assert!(row.split_whitespace().skip(1).all(|cell| cell == "N/A"), "{row}");
     assert!(table.contains("hard: N/A, it applies to suites of deformable objects only"), "{table}");
     assert!(!project.path("run/hard").exists() && project.path("run/weak/summary.json").exists());
-    let twin = self::project(THREE, "deformable");
+    let twin = conditions_project(CONDITIONS, "deformable");
     trial(&twin).twin().conditions().expect("valid");
     assert!(!twin.path("run/hard").exists());
 }
@@ -96,7 +76,7 @@ fn conditions_without_effect_are_reported_and_not_run() {
 #[test]
 fn invalid_conditions_are_reported_before_anything_runs() {
     let refused = |conditions: &str| {
-        let project = project(conditions, "deformable");
+        let project = conditions_project(conditions, "deformable");
         let message = project.message(trial(&project).conditions());
         assert!(!project.path("run").exists(), "{message}");
         message
@@ -120,7 +100,7 @@ fn invalid_conditions_are_reported_before_anything_runs() {
         let message = refused(conditions);
         assert!(message.contains(expected), "{message}");
     }
-    let project = project(THREE, "deformable");
+    let project = conditions_project(CONDITIONS, "deformable");
     project.write("run/weak/summary.json", b"{}");
     let message = project.message(trial(&project).conditions());
     assert!(message.contains("run/weak already holds a run"), "{message}");
@@ -177,7 +157,8 @@ return softvt.experiment { name = 'all', grid = { a = { 1 } }, run = function() 
 
 #[test]
 fn whole_numbers_of_settings_are_named_by_their_field() {
-    let project = project("{ name = \"late\", set = { [\"robot.latency\"] = 4 / 2 } }", "deformable");
+    let project =
+        conditions_project("{ name = \"late\", set = { [\"robot.latency\"] = 4 / 2 } }", "deformable");
     project.run("suites/trial.lua").check().expect("valid");
     let trial = project.text("suites/trial.lua");
     let refused = |value: &str| {

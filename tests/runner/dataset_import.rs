@@ -14,30 +14,12 @@ use softvt::{
 
 use crate::{
     dataset_recording::{Recording, is_reproduced},
-    support::{Project, Run, SOLIDS},
+    support::{Project, Run, SOLIDS, fixtures::PUSHED_CUBE},
 };
-
-/// A rigid cube on a shelf. A push reaches the goal.
-const SUITE: &str = r#"
-local solids = require "solids"
-local layout = softvt.layout("one", function(scene)
-  local x, y, z = table.unpack(solids.cube_at)
-  scene:add { name = "floor", asset = solids.floor, position = { 0, 0, 0 } }
-  scene:add { name = "shelf", asset = solids.shelf, position = solids.shelf_at }
-  scene:add { name = "cube", asset = solids.cube, position = { x + 0.005 * math.random(), y, z } }
-  scene:add { name = "other", asset = solids.cube, position = { x, -0.15, z } }
-end)
-local function task(prompt)
-  return softvt.task { prompt = prompt, layout = layout, goal = softvt.on { object = "cube", target = "shelf" }, budget_steps = 30,
-    expert = function(arm, scene) solids.push(arm) arm:wait(1) end }
-end
-return softvt.suite { name = "one", object_type = "rigid", variation = "spatial", episodes = 1,
-  tasks = { task "wait", task "wait longer" } }
-"#;
 
 /// A project with a dataset of two demonstrations of task 0.
 fn recorded() -> Project {
-    let project = Project::new(&[("x.lua", SUITE), SOLIDS]);
+    let project = Project::new(&[("x.lua", PUSHED_CUBE), SOLIDS]);
     let recording = Recording::new(project.run("x.lua").tasks(&[0]), 2, "data");
     recording.with(|options| (options.has_images, options.has_privileged) = (false, false)).record();
     project
@@ -176,7 +158,7 @@ fn invalid_imports_are_refused_and_write_nothing() {
     project.write("mine/notes.txt", b"mine");
     project.write(
         "two.lua",
-        SUITE.replace("name = \"one\", object_type", "name = \"two\", object_type").as_bytes(),
+        PUSHED_CUBE.replace("name = \"one\", object_type", "name = \"two\", object_type").as_bytes(),
     );
     project.write("world.lua", b"return softvt.experiment { name = 'e', grid = { a = { 1 } }, run = function() return { b = 1 } end }");
     let task = |word: &str| {

@@ -16,7 +16,7 @@ use softvt::{
     },
 };
 
-use crate::support::{Project, Run, SOLIDS, files};
+use crate::support::{Project, Run, SOLIDS, files, fixtures::MISPLACED_CUBE};
 
 /// A recording that is to be made.
 #[derive(Clone)]
@@ -78,23 +78,8 @@ pub fn is_reproduced(dataset: &Path) -> bool {
     replay(&demos).iter().all(|replay| replay.difference.is_none() && replay.goal_reached)
 }
 
-/// A rigid cube on a shelf, or on the floor in some attempts. A push reaches the goal in the former.
-const SUITE: &str = r#"
-local solids = require "solids"
-local layout = softvt.layout("one", function(scene)
-  local beside = math.random() < 0.4
-  scene:add { name = "floor", asset = solids.floor, position = { 0, 0, 0 } }
-  scene:add { name = "shelf", asset = solids.shelf, position = solids.shelf_at }
-  scene:add { name = "cube", asset = solids.cube, position = beside and { 0, 0.35, 0 } or solids.cube_at }
-end)
-return softvt.suite { name = "one", object_type = "rigid", variation = "spatial", episodes = 1, tasks = {
-  softvt.task { prompt = "wait", layout = layout, goal = softvt.on { object = "cube", target = "shelf" }, budget_steps = 30,
-    expert = function(arm, scene) solids.push(arm) arm:wait(1) end },
-} }
-"#;
-
 fn project() -> Project {
-    Project::new(&[("x.lua", SUITE), SOLIDS])
+    Project::new(&[("x.lua", MISPLACED_CUBE), SOLIDS])
 }
 
 #[test]
@@ -171,7 +156,7 @@ fn folders_with_other_files_are_refused() {
     assert!(output.contains("the folder contains another recording (demos: null before, 1 now)"), "{output}");
     project.write("wrong.lua", b"return nil + 1");
     assert!(resumed("wrong.lua", "new").contains("wrong.lua:1"));
-    let stuck = SUITE.replace("arm:wait(1)", "arm:wait(0.1) error 'lost'");
+    let stuck = MISPLACED_CUBE.replace("arm:wait(1)", "arm:wait(0.1) error 'lost'");
     project.write("stuck.lua", stuck.as_bytes());
     assert!(resumed("stuck.lua", "new").contains("lost"));
     assert!(!project.path("new").exists(), "nothing is left of a mistake");
@@ -179,7 +164,7 @@ fn folders_with_other_files_are_refused() {
 
 #[test]
 fn the_teacher_of_a_suite_demonstrates_unless_a_policy_is_given() {
-    let taught = SUITE.replace("episodes = 1,", "episodes = 1, teacher = \"tactile-servo\",");
+    let taught = MISPLACED_CUBE.replace("episodes = 1,", "episodes = 1, teacher = \"tactile-servo\",");
     let project = Project::new(&[("x.lua", &taught), SOLIDS]);
     let record = |out: &str| Recording::new(project.run("x.lua").threads(1), 1, out);
     for (given, policy) in [(None, "tactile-servo"), (Some(Teacher::Expert), "expert")] {

@@ -15,7 +15,7 @@ use crate::{
 
 const SECRET: &str = "correct horse battery staple";
 
-/// A suite whose cube lies elsewhere in every episode, with two seed files and a policy that tells what it is told.
+/// A suite whose cube lies elsewhere in every episode, with two seed files and a policy that prints what it receives.
 fn project() -> Project {
     let small =
         Small { task: "budget_steps = 3", at: "at = { rng:uniform(-0.05, 0.05), 0.1 }", ..Small::default() };

@@ -9,33 +9,14 @@ use softvt::{
     report::comparison,
 };
 
-use crate::support::{Project, Run, Small};
-
-/// Twelve control steps of a cube on a floor.
-fn project(policy: &str) -> Project {
-    let project = Small { task: "budget_steps = 12", ..Small::default() }.project();
-    project.write("p.lua", policy.as_bytes());
-    project
-}
-
-/// A policy that moves at random, depending on its observation, in chunks of three.
-const WANDERS: &str = "local n = 0
-return softvt.policy { name = 'wanders', observes = { tactile = true, cameras = { 'wrist' } }, replan = 2,
-  reset = function(task) n = task.episode end,
-  act = function(obs)
-    n = n + 1
-    local light, list = obs:camera('wrist'):mean()[1] / 255, {}
-    for i = 1, 3 do
-      list[i] = { position = { obs.position[1] + 0.01 * math.random(), obs.position[2], obs.position[3] - 0.001 * n * light },
-                  axis_angle = obs.axis_angle, closure = 0.1 * math.random() }
-    end
-    return list
-  end }
-";
+use crate::support::{
+    Run, Small,
+    fixtures::{WANDERS, policy_project},
+};
 
 #[test]
 fn results_do_not_depend_on_threads_or_interruptions() {
-    let project = project(WANDERS);
+    let project = policy_project(WANDERS);
     let run = || project.run("x.lua").policy("p.lua").episodes(3);
     run().threads(1).out("one").finish();
     run().threads(2).out("two").finish();
@@ -64,7 +45,7 @@ fn results_do_not_depend_on_threads_or_interruptions() {
 #[test]
 fn policies_see_sensor_noise_that_does_not_depend_on_threads() {
     // It moves by the noise of the markers.
-    let policy = project(
+    let policy = policy_project(
         "return softvt.policy { name = 'feels', observes = { tactile = true }, act = function(obs)
   local motion = obs.tactile.left.markers:mean()
   local p = obs.position
@@ -95,7 +76,7 @@ fn a_failing_policy_ends_the_run_and_keeps_finished_episodes() {
         ("return 7", "p.lua:2: policy.act: expected an action or a list of actions, got 7"),
         ("while true do end", "p.lua:3: the script ran for more than 5 s"),
     ] {
-        let project = project(&format!(
+        let project = policy_project(&format!(
             "local episode\nreturn softvt.policy {{ name = 'p', reset = function(t) episode = t.episode end, act = function(obs)\nif episode == 1 then {bad} end {good} end }}"
         ));
         let message = project.run("x.lua").policy("p.lua").episodes(2).threads(1).out("run").error();
@@ -109,7 +90,7 @@ fn a_failing_policy_ends_the_run_and_keeps_finished_episodes() {
 
 #[test]
 fn nan_actions_fail_only_their_episode() {
-    let project = project(
+    let project = policy_project(
         "local episode\nreturn softvt.policy { name = 'p', reset = function(t) episode = t.episode end, act = function(obs)\n\
          return { position = obs.position, axis_angle = obs.axis_angle, closure = episode == 0 and 0/0 or 0 } end }",
     );
@@ -127,7 +108,7 @@ fn nan_actions_fail_only_their_episode() {
 fn a_policy_that_declares_access_to_limits_is_marked_in_its_results() {
     let act = "act = function(obs) return { position = obs.position, axis_angle = obs.axis_angle, closure = 0 } end }";
     let knows = "local tau = softvt.calibration('cube').tau\n";
-    let project = project(&format!("{knows}return softvt.policy {{ name = 'knows', {act}"));
+    let project = policy_project(&format!("{knows}return softvt.policy {{ name = 'knows', {act}"));
     let message = project.run("x.lua").policy("p.lua").out("run").error();
     assert!(
         message.starts_with("p.lua:1: softvt.calibration: a policy has no access to limits"),
@@ -151,7 +132,7 @@ fn a_policy_that_declares_access_to_limits_is_marked_in_its_results() {
 fn missing_cameras_are_reported_before_anything_runs() {
     let policy =
         "return softvt.policy { name = 'p', observes = { cameras = { 'sied' } }, act = function() end }";
-    let project = project(policy);
+    let project = policy_project(policy);
     let message = project.run("x.lua").policy("p.lua").out("run").error();
     assert_eq!(
         message,
@@ -174,7 +155,7 @@ fn missing_cameras_are_reported_before_anything_runs() {
 
 #[test]
 fn recorded_actions_must_fit_the_run() {
-    let project = project(WANDERS);
+    let project = policy_project(WANDERS);
     let first = project.run("x.lua").policy("p.lua").episodes(2).out("run").records();
     let again = project.run("x.lua").policy("run").episodes(2).out("again").records();
     let has_same_end = |(a, b): (&EpisodeRecord, &EpisodeRecord)| a.stats.state_hash == b.stats.state_hash;
@@ -213,7 +194,7 @@ fn recorded_actions_must_fit_the_run() {
 
 #[test]
 fn options_without_effect_are_refused() {
-    let project = project(WANDERS);
+    let project = policy_project(WANDERS);
     project.write(
         "profile.lua",
         b"return softvt.profile { name = 'x',\n inputs = {}, actions = {\n pose = 'absolut' } }",
@@ -259,7 +240,7 @@ fn options_without_effect_are_refused() {
 fn profiles_in_lua_are_used_for_servers() {
     // There is no server: the profile is read, and only the connection fails.
     let free = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("an address");
-    let project = project(WANDERS);
+    let project = policy_project(WANDERS);
     let run = project.run("x.lua").policy(&format!("ws://{free}")).with_policy(|policy| {
         policy.profile = Some("scripts/profiles/libero.lua".to_owned());
         policy.timeout = Some(Duration::from_millis(200));

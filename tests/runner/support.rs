@@ -35,7 +35,7 @@ use softvt::{
 #[path = "../project/mod.rs"]
 mod project;
 
-pub use project::{Project, SOLIDS, SPATIAL_SOFT, Small, client, files};
+pub use project::{Project, SOLIDS, SPATIAL_SOFT, Small, client, files, fixtures};
 
 /// Messages and lines of progress.
 #[derive(Default)]

@@ -81,7 +81,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     write_video_frame(&mut states, &caption, worst, &still)?;
     written.push(still);
     let video = dir.join("episode.mp4");
-    let progress = Progress::new(states.frames.len(), "drawing the film");
+    let progress = Progress::new(states.frames.len(), "rendering the video");
     write_video(&mut states, &caption, &video, config.thread_count(), cancel::requested, || progress.step())?;
     drop(progress);
     written.push(video);

@@ -197,7 +197,7 @@ fn mask_value(mask: &Mask, at: &PatternPoints, spacing: f32) -> f32x8 {
         Mask::Product { masks } => {
             let mut product = f32x8::ONE;
             for mask in masks {
-                // What follows may be costly.
+                // The remaining masks may be costly.
                 if product == f32x8::ZERO {
                     break;
                 }
