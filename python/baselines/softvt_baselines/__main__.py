@@ -31,9 +31,14 @@ def _train(args: argparse.Namespace) -> None:
     if args.out.is_dir():
         raise UserError(f"--out {args.out}: expected a file, this is a folder")
     args.out.parent.mkdir(parents=True, exist_ok=True)
-    inputs = {"has_touch": args.touch or args.tactile_pictures, "has_tactile_pictures": args.tactile_pictures, "has_drives": args.drives}
-    shape = Shape(**inputs, code=args.gripper, head=args.head, frames=args.frames, edge=args.edge)
-    demos = load(args.recordings, args.gripper, args.edge, args.tactile_pictures, args.drives)
+    inputs = {
+        "has_touch": args.touch or args.tactile_pictures,
+        "has_tactile_pictures": args.tactile_pictures,
+        "has_drives": args.drives,
+        "has_memory": args.memory,
+    }
+    shape = Shape(**inputs, code=args.gripper, head=args.head, frames=args.frames, edge=args.edge, chunk=20 if args.memory else 50)
+    demos = load(args.recordings, args.gripper, args.edge, args.tactile_pictures, args.drives, args.memory)
     options = TrainOptions(shape, args.steps, args.batch, args.seed, device, args.compile)
     train(demos, options, args.out, {"recordings": [recording.name for recording in args.recordings]})
 
@@ -142,6 +147,11 @@ def _parser() -> argparse.ArgumentParser:
     train.add_argument("--tactile-pictures", action="store_true", help="give it the markers and the tactile pictures of both fingers")
     train.add_argument(
         "--drives", action="store_true", help="give it the exact finger position and the commanded closure, whose gap is the grip force"
+    )
+    train.add_argument(
+        "--memory",
+        action="store_true",
+        help="let it remember the last 20 s of slow motion, and close the hand by that memory alone, without pictures",
     )
     train.add_argument("--gripper", default="continuous", choices=CODES, help="grip code")
     train.add_argument("--head", default="regression", choices=["regression", "flow"], help="how actions are predicted")

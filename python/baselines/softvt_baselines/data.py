@@ -18,7 +18,7 @@ import numpy as np
 from PIL import Image
 
 from . import UserError
-from .numbers import Standard, fold, mean_axis, reference
+from .numbers import FINE, Standard, fine, fold, hand, mean_axis, reference
 
 # The grip codes and the streams that hold the actions in them.
 ACTIONS = {"continuous": "actions", "binary": "actions_binary", "two-width": "actions_two_width", "force": "actions_force"}
@@ -30,8 +30,10 @@ TACTILE = {"left_tactile_image": "gsmini_left_tactile_rgb", "right_tactile_image
 IDLE_MOTION, IDLE_TURN, IDLE_GRIP = 0.0005, 0.005, 0.002
 # Smallest deviations by which actions are divided: of the position (m), the rotation vector (rad), and the gripper.
 LEAST_SPREAD = np.array([0.001] * 3 + [0.01] * 3 + [0.002])
+# The same of actions on the fine scale.
+LEAST_FINE_SPREAD = 0.2
 # Version of the packed files.
-PACKED = 3
+PACKED = 4
 # Length of the marker displacements of a step: finger, marker, (x, y).
 MARKERS = 2 * 99 * 2
 
@@ -42,7 +44,9 @@ class Demonstrations:
 
     pictures: dict[str, np.ndarray]  # per key (M, edge, edge, 3) uint8
     state: np.ndarray  # (M, 7): tool position (m), rotation vector, finger position (m); folded; (M, 8) with the drives
+    commands: np.ndarray  # (M, 7): the action before each step; that of a first step is its state
     markers: np.ndarray  # (M, 396) px: displacements of the markers of both fingers
+    readings: np.ndarray  # (M, 6): of both fingers
     actions: np.ndarray  # (N, 7): tool position, rotation vector, gripper in the grip code; folded
     row: np.ndarray  # (N,) index among the recorded steps
     start: np.ndarray  # (N,) index of the first recorded step of the same demonstration
@@ -51,11 +55,31 @@ class Demonstrations:
     prompt: np.ndarray  # (N,) index of the prompt of each step
     axis: np.ndarray  # (3,) the side of the rotation vectors
     is_relative: bool  # True if the closure of an answer is relative to the commanded one
+    has_memory: bool = False  # True if answers are relative to the command before, on the fine scale
+
+    def changes(self, ahead: int) -> np.ndarray:
+        """What answers would be relative to the observation, (n, 7), for actions `ahead` steps after it, or as late as the longest
+        demonstration has them."""
+        steps = np.arange(len(self.actions))
+        ahead = min(ahead, int((self.last - steps).max()))
+        inside = steps + ahead <= self.last
+        rows = self.row[inside]
+        present = self.commands[rows] if self.has_memory else reference(self.state[rows], self.is_relative)
+        return self.actions[steps[inside] + ahead] - present
 
 
 def displacements(motion: np.ndarray) -> np.ndarray:
     """Displacements (T, 396) of the markers, px, of gripper_marker_motion (T, finger, initial and present, marker, xy)."""
     return (motion[:, :, 1] - motion[:, :, 0]).reshape(len(motion), -1)
+
+
+def readings(motion: np.ndarray) -> np.ndarray:
+    """Readings (T, 6) of both fingers: the mean motion of the markers along x and y, px, and their divergence, which grows with the load.
+    `motion` is gripper_marker_motion (T, finger, initial and present, marker, xy)."""
+    initial, moved = motion[:, :, 0], motion[:, :, 1] - motion[:, :, 0]
+    place = initial - initial.mean(axis=2, keepdims=True)
+    gradient = (place * moved).sum(axis=2) / np.maximum(np.square(place).sum(axis=2), 1e-6)
+    return np.concatenate([moved.mean(axis=2), gradient.sum(axis=2, keepdims=True)], 2).reshape(len(motion), -1).astype(np.float32)
 
 
 def is_relative(code: str, has_drives: bool) -> bool:
@@ -124,11 +148,13 @@ def _pack_one(job: _Job) -> dict[str, np.ndarray | str]:
                 raise UserError(f"{job.file}: pictures of {height} pixels; record with --edge {job.edge}, or train with --edge {height}")
             np.load(job.folder / f"{key}.npy", mmap_mode="r+")[rows] = shrink(obs[stream][:], job.edge)
         actions = {stream: demo[stream][:].astype(np.float32) for stream in ACTIONS.values() if stream in demo}
+        motion = obs["gripper_marker_motion"][:]
         return actions | {
             "state": obs["state"][:].astype(np.float32),
             "closure": obs["gripper_closure"][:].astype(np.float32),
             "sensed_width": obs["gripper_width_sensed"][:].astype(np.float32),
-            "markers": displacements(obs["gripper_marker_motion"][:]),
+            "markers": displacements(motion),
+            "readings": readings(motion),
             "prompt": str(demo.attrs["language"]),
         }
 
@@ -217,8 +243,18 @@ def _check_grip_code(recording: Path, code: str, packed) -> None:
         raise UserError(f"{recording} has no {ACTIONS[code]}, the actions in the grip code {code}: record it again")
 
 
-def load(recordings: list[Path], code: str, edge: int, has_tactile: bool = False, has_drives: bool = False) -> Demonstrations:
-    """Reads all demonstrations of recordings, with their tactile pictures and the drives of the fingers if they are asked for.
+def commands(state: np.ndarray, actions: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """The action before each step (M, 7) of demonstrations; that of a first step is its state."""
+    before, first = np.roll(actions, 1, axis=0), np.cumsum(lengths) - lengths
+    before[first] = hand(state[first])
+    return before
+
+
+def load(
+    recordings: list[Path], code: str, edge: int, has_tactile: bool = False, has_drives: bool = False, has_memory: bool = False
+) -> Demonstrations:
+    """Reads all demonstrations of recordings, with their tactile pictures and the drives of the fingers if they are asked for. For a
+    policy with memory, waiting is kept.
 
     Raises UserError if a recording is incomplete, or lacks the pictures or the grip code.
     """
@@ -235,17 +271,20 @@ def load(recordings: list[Path], code: str, edge: int, has_tactile: bool = False
         return mapped[0] if len(mapped) == 1 else np.concatenate(mapped)
 
     recorded, names, actions = joined("lengths"), joined("prompts"), joined(ACTIONS[code])
-    state = with_hand(joined("state"), joined("sensed_width"), joined("closure"), has_drives)
     axis = mean_axis(actions[:, 3:6])
-    actions = fold(actions, axis)
+    state, actions = fold(with_hand(joined("state"), joined("sensed_width"), joined("closure"), has_drives), axis), fold(actions, axis)
     grip_range = float(np.ptp(actions[:, 6]))
-    moving = [moving_steps(one, grip_range) for one in np.split(actions, np.cumsum(recorded)[:-1])]
+    moving = [
+        np.ones(len(one), bool) if has_memory else moving_steps(one, grip_range) for one in np.split(actions, np.cumsum(recorded)[:-1])
+    ]
     kept, lengths = np.concatenate(moving), np.array([mask.sum() for mask in moving])
     prompts = sorted(set(names.tolist()))
     return Demonstrations(
         pictures={key: pictures(key) for key in (CAMERAS | TACTILE if has_tactile else CAMERAS)},
-        state=fold(state, axis),
+        state=state,
+        commands=commands(state, actions, recorded),
         markers=joined("markers"),
+        readings=joined("readings"),
         actions=actions[kept],
         row=np.flatnonzero(kept),
         start=np.repeat(np.cumsum(recorded) - recorded, lengths),
@@ -254,6 +293,7 @@ def load(recordings: list[Path], code: str, edge: int, has_tactile: bool = False
         prompt=np.repeat([prompts.index(name) for name in names], lengths),
         axis=axis,
         is_relative=is_relative(code, has_drives),
+        has_memory=has_memory,
     )
 
 
@@ -274,12 +314,9 @@ class Statistics:
     @classmethod
     def of(cls, demos: Demonstrations, chunk: int) -> "Statistics":
         scale = float(np.sqrt(np.square(demos.markers, dtype=np.float64).mean()) + 1e-6)
-        steps, present = np.arange(len(demos.actions)), reference(demos.state[demos.row], demos.is_relative)
-        ahead: list[Standard] = []
-        for k in range(chunk):
-            inside = steps + k <= demos.last
-            changes = demos.actions[steps[inside] + k] - present[inside]
-            # Demonstrations may be shorter than a chunk.
-            ahead.append(Standard.of(changes, LEAST_SPREAD) if inside.any() else ahead[-1])
-        action = Standard(np.stack([one.mean for one in ahead]), np.stack([one.std for one in ahead]))
+        changes = [demos.changes(ahead) for ahead in range(chunk)]
+        if demos.has_memory:
+            action = Standard.of_each([fine(one, FINE) for one in changes], LEAST_FINE_SPREAD)
+        else:
+            action = Standard.of_each(changes, LEAST_SPREAD)
         return cls(Standard.of(demos.state), action, scale, demos.axis)

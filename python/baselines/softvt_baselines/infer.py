@@ -5,8 +5,9 @@ import torch
 
 from . import UserError, prompts
 from .checkpoint import Checkpoint
-from .inputs import read
+from .inputs import RECENT, read
 from .model import Policy
+from .numbers import FINE, coarse, turned
 from .serve import Plan, Request
 
 BATCH = 16  # observations that are answered together
@@ -45,7 +46,7 @@ class Answering:
         inputs: list[dict | UserError] = []
         for request in batch:
             try:
-                inputs.append(read(request.obs, self.checkpoint.policy.shape, self.checkpoint.statistics, self.vocabulary))
+                inputs.append(self._read(request))
             except UserError as error:
                 inputs.append(error)
         valid = [one for one in inputs if isinstance(one, dict)]
@@ -55,11 +56,28 @@ class Answering:
             for request, one in zip(batch, inputs)
         ]
 
+    def _read(self, request: Request) -> dict[str, np.ndarray]:
+        """The inputs of the network for a request, which gets the memory after it."""
+        shape, last, before = self.checkpoint.policy.shape, request.last, None
+        if shape.has_memory and last is not None:
+            executed, most = request.obs.get("softvt", {}).get("step", 0) - last.step, min(RECENT, len(last.actions))
+            if not 0 < executed <= most:
+                raise UserError(
+                    f"{executed} steps after an answer of {len(last.actions)} actions: a policy with memory needs --replan {most} or less"
+                )
+            before = last.memory, last.actions[:executed]
+        inputs, request.memory = read(request.obs, shape, self.checkpoint.statistics, self.vocabulary, before)
+        return inputs
+
     def _chunks(self, inputs: list[dict[str, np.ndarray]]) -> np.ndarray:
         padded = inputs + inputs[:1] * (BATCH - len(inputs))
         tensors = {key: torch.from_numpy(np.concatenate([one[key] for one in padded])).to(self.device) for key in padded[0]}
         answers = self._act(tensors).float().cpu().numpy()
         changes = self.checkpoint.statistics.action.invert(answers[: len(inputs)])
+        if self.checkpoint.policy.shape.has_memory:
+            # Those of a hand that feels are along its axes.
+            back = np.concatenate([np.eye(3)[None] if one["seen"] else one["axes"].transpose(0, 2, 1) for one in inputs])
+            changes = turned(coarse(changes, FINE), back)
         return changes + np.concatenate([one["reference"] for one in inputs])
 
     def _act(self, inputs: dict[str, torch.Tensor]) -> torch.Tensor:

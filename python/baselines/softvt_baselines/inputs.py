@@ -2,14 +2,27 @@
 
 import json
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from . import UserError, prompts
-from .data import CAMERAS, MARKERS, TACTILE, Statistics, is_relative, shrink
-from .numbers import fold, reference
+from .data import CAMERAS, MARKERS, TACTILE, Statistics, is_relative, readings, shrink
+from .numbers import GRIPPER, ROTATION, fold, hand, reference, turned, turns
 
 USE_PROFILE = "use the profile that train wrote next to the checkpoint"
+# A policy with memory sees means over intervals of steps before the present one. These are their limits. Feeling for a grip takes 100 to
+# 300 steps.
+LIMITS = (0, 1, 2, 4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 50, 64, 80, 100, 128, 160, 200, 250, 320, 400)
+INTERVALS, REMEMBERED = len(LIMITS) - 1, LIMITS[-1]
+# Share (INTERVALS, REMEMBERED) of each remembered step in the mean of each interval.
+SHARES = np.float32([[(first <= back < end) / (end - first) for back in range(REMEMBERED)] for first, end in pairwise(LIMITS)])
+# Control steps in an observation of such a policy, softvt's largest number: as many actions may be executed of an answer.
+RECENT = 32
+# Change of the command per step, m of the position or share of the closure (1.6 mm), from which on a motion is fast.
+FAST, FAST_GRIP = 1e-3, 0.02
+# Closing since the last fast motion (1 mm) from which on a hand is taken to feel.
+FEELS = 0.0125
 
 
 @dataclass
@@ -28,6 +41,7 @@ class Shape:
     marker_steps: tuple[int, ...] = (4, 0)  # steps before the present one whose markers are seen
     has_tactile_pictures: bool = False  # besides the markers
     has_drives: bool = False  # the exact finger position and the commanded closure, whose gap is the grip force
+    has_memory: bool = False  # states, commands and readings of earlier steps; answers are then relative to the command before
 
     def to_dict(self) -> dict:
         return asdict(self)
@@ -50,6 +64,7 @@ class Shape:
     def profile(self, name: str) -> str:
         """The profile of softvt with these inputs, in Lua."""
         history = f", frames = {self.frames}" if self.frames > 1 else ""
+        states = f", frames = {RECENT}" if self.has_memory else history
         hand = ["finger_position", "closure"] if self.has_drives else ["sensed_finger_position"]
         parts = ["position", "axis_angle", *hand]
         inputs = {
@@ -57,7 +72,7 @@ class Shape:
             "wrist_image": 'source = "camera", camera = "wrist"' + history,
             "left_tactile_image": 'source = "tactile", finger = "left"' + history,
             "right_tactile_image": 'source = "tactile", finger = "right"' + history,
-            "state": f'source = "state", parts = {{ {", ".join(map(json.dumps, parts))} }}' + history,
+            "state": f'source = "state", parts = {{ {", ".join(map(json.dumps, parts))} }}' + states,
             "prompt": 'source = "prompt"',
             "softvt": 'source = "query"',
             "tactile_marker_motion": f'source = "marker_motion", frames = {self.marker_rows - 1}',
@@ -70,7 +85,7 @@ class Shape:
     @property
     def marker_rows(self) -> int:
         """Length of tactile_marker_motion (rows, 198, 2): the initial positions of the markers, and those of the last steps."""
-        return max(self.marker_steps) + 2
+        return RECENT + 1 if self.has_memory else max(self.marker_steps) + 2
 
     @property
     def keys(self) -> list[str]:
@@ -78,9 +93,68 @@ class Shape:
         return [*self.pictures, "state", "prompt", "softvt"] + ["tactile_marker_motion"] * self.has_touch
 
 
-def read(obs: dict, shape: Shape, statistics: Statistics, vocabulary: prompts.Vocabulary) -> dict[str, np.ndarray]:
+def memory_begins(commands: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """The row from which on each row (M,) of commands is remembered, given those at which demonstrations begin: that of the last fast
+    motion.
+
+    Two steps of a fast motion tell where a demonstration ends it. A policy that remembered them would go on to where it had aimed
+    at first instead of looking.
+    """
+    change = np.abs(np.diff(commands, axis=0, prepend=commands[:1]))
+    begins = (np.linalg.norm(change[:, :3], axis=1) > FAST) | (change[:, GRIPPER] > FAST_GRIP)
+    begins[first] = True
+    return np.maximum.accumulate(np.where(begins, np.arange(len(commands)), 0))
+
+
+def is_seen(commands: np.ndarray, rows: np.ndarray, begins: np.ndarray) -> np.ndarray:
+    """False on the rows of commands on which the hand feels: it has closed slowly since the last fast motion."""
+    return commands[rows, GRIPPER] - commands[begins, GRIPPER] < FEELS
+
+
+@dataclass
+class Past:
+    """What a policy with memory has seen of an episode: one row per control step, the present one last."""
+
+    states: np.ndarray  # (T, 7): in the units of commands
+    commands: np.ndarray  # (T, 7): the action before each step
+    readings: np.ndarray  # (T, 6): of the fingers
+
+    def inputs(self) -> dict[str, np.ndarray]:
+        """The means of the remembered steps, each with a first axis of length 1: states and commands relative to the command before, along
+        the axes of the hand, and the least and the greatest of these commands. While nothing is remembered, the lag of the robot is not
+        shown either."""
+        last, begin = len(self.states) - 1, memory_begins(self.commands, np.array([0]))[-1]
+        rows, now, is_known = np.maximum(last - np.arange(REMEMBERED), begin), self.commands[-1], np.float32(begin < last)
+        axes = turns(now[ROTATION])
+        states, commands = (turned(is_known * (numbers[rows] - now), axes) for numbers in (self.states, self.commands))
+        return {
+            "states": (SHARES @ states)[None],
+            "commands": (SHARES @ commands)[None],
+            "extremes": np.stack([commands.min(0), commands.max(0)])[None],
+            "readings": (SHARES @ self.readings[rows])[None],
+            "seen": np.float32([is_seen(self.commands, last, begin)]),
+            "axes": axes[None],
+        }
+
+
+def remembered(states: np.ndarray, felt: np.ndarray, before: tuple[Past, np.ndarray] | None) -> Past:
+    """What was seen up to the present step, given the states (RECENT, 7) and readings of the last steps, and what had been seen at the
+    observation before with the actions (n, 7) executed since; None at the start."""
+    if before is None:
+        return Past(states[-1:], states[-1:], felt[-1:])
+    past, actions = before
+    steps, commands = len(actions), actions.astype(np.float32)
+    commands[:, GRIPPER] = commands[:, GRIPPER].clip(0, 1)
+    kept = slice(-REMEMBERED, None)
+    pairs = (past.states, states[-steps:]), (past.commands, commands), (past.readings, felt[-steps:])
+    return Past(*(np.concatenate(pair)[kept] for pair in pairs))
+
+
+def read(
+    obs: dict, shape: Shape, statistics: Statistics, vocabulary: prompts.Vocabulary, before: tuple[Past, np.ndarray] | None = None
+) -> tuple[dict[str, np.ndarray], Past | None]:
     """The inputs of a network for an observation, the noise for a flow, and what its answer is relative to, each with a first
-    axis of length 1.
+    axis of length 1; and for a policy with memory what it has seen, given `before` as in `remembered`.
 
     Raises UserError if an entry is missing or has another shape, or the prompt was not trained.
     """
@@ -91,12 +165,12 @@ def read(obs: dict, shape: Shape, statistics: Statistics, vocabulary: prompts.Vo
     if problem := vocabulary.problem(str(obs["prompt"])):
         raise UserError(problem)
 
-    def frames(key: str, axes: int) -> np.ndarray:
+    def frames(key: str, axes: int, count: int = shape.frames) -> np.ndarray:
         """An entry with its frames along the first axis."""
         array = np.array(obs[key])
         array = array[None] if array.ndim == axes else array
-        if array.ndim != axes + 1 or len(array) != shape.frames:
-            expected = f"{shape.frames} frames" if shape.frames > 1 else "one frame"
+        if array.ndim != axes + 1 or len(array) != count:
+            expected = f"{count} frames" if count > 1 else "one frame"
             raise UserError(f"{key} has the shape {np.shape(obs[key])}, expected {expected}; {USE_PROFILE}")
         return array
 
@@ -109,9 +183,10 @@ def read(obs: dict, shape: Shape, statistics: Statistics, vocabulary: prompts.Vo
             size = f"--set cameras.width={shape.edge} --set cameras.height={shape.edge}"
             raise UserError(f"{key} has {pictures.shape[2]} x {pictures.shape[1]} pixels; the policy needs softvt {size}")
         inputs[key] = shrink(pictures, shape.edge)[None]
-    states = fold(frames("state", 1)[None], statistics.axis)
-    if states.shape[-1] != shape.state:
-        raise UserError(f"state has {states.shape[-1]} numbers, expected {shape.state}; {USE_PROFILE}")
+    recent = fold(frames("state", 1, RECENT if shape.has_memory else shape.frames), statistics.axis)
+    if recent.shape[-1] != shape.state:
+        raise UserError(f"state has {recent.shape[-1]} numbers, expected {shape.state}; {USE_PROFILE}")
+    states = recent[None, -shape.frames :]
     inputs["state"], inputs["reference"] = statistics.state.apply(states), reference(states[:, -1:], shape.is_relative)
     inputs["prompt"] = np.array([prompts.encode(str(obs["prompt"]))])
     random = np.random.default_rng(obs["softvt"]["seed"])
@@ -122,4 +197,13 @@ def read(obs: dict, shape: Shape, statistics: Statistics, vocabulary: prompts.Vo
             raise UserError(f"tactile_marker_motion has the shape {motion.shape}, expected {expected}; {USE_PROFILE}")
         rows = [motion[-1 - back] - motion[0] for back in shape.marker_steps]
         inputs["markers"] = np.stack(rows).reshape(1, len(rows), -1) / np.float32(statistics.marker_scale)
-    return inputs
+    if not shape.has_memory:
+        return inputs, None
+    felt = np.zeros((RECENT, 6), np.float32)
+    if shape.has_touch:
+        fingers = motion.reshape(-1, 2, MARKERS // 4, 2)
+        felt = readings(np.stack([np.broadcast_to(fingers[:1], fingers[1:].shape), fingers[1:]], 2))
+    past = remembered(hand(recent), felt, before)
+    inputs |= past.inputs()
+    inputs["reference"] = past.commands[None, -1:]
+    return inputs, past

@@ -10,17 +10,90 @@ from torchvision.models import resnet18
 
 from . import prompts
 from .data import MARKERS
-from .inputs import Shape
-from .numbers import GRIPPER
+from .inputs import INTERVALS, Shape
+from .numbers import FINE, FINE_READINGS, GRIPPER, coarse, fine
 
 # Steps of the integration of a flow.
 FLOW_STEPS = 10
+# Width of the layers that read the memory, tokens that they give, and share of the numbers that are left out in training.
+MEMORY_WIDTH, MEMORY_TOKENS, DROPOUT = 1024, 4, 0.1
+# Readings relative to their mean over the last intervals (6 steps), which is taken to be at least 4 times FINE_READINGS.
+PRESENT, LEAST_PRESENT, MOST_RATIO = 4, 4, 5
+# Largest number on the fine scale whose change is looked at in training: 4 m.
+MOST = 12
 
 
 def _pictures_encoder() -> nn.Module:
     """ResNet-18 (He et al., 2016) with group normalisation, up to its last map of 512 channels."""
     net = resnet18(norm_layer=lambda channels: nn.GroupNorm(channels // 16, channels))
     return nn.Sequential(*list(net.children())[:-2])
+
+
+class Memory(nn.Module):
+    """Numbers of the remembered states and commands, and of the readings of the fingers with touch."""
+
+    def __init__(self, has_touch: bool):
+        super().__init__()
+        self.has_touch = has_touch
+        self.register_buffer("scale", torch.from_numpy(FINE), persistent=False)
+        self.register_buffer("readings_scale", torch.from_numpy(FINE_READINGS), persistent=False)
+        self.count = (2 * INTERVALS + 2) * 7 + (2 * INTERVALS * 6 if has_touch else 0)
+
+    def forward(self, obs: dict[str, Tensor]) -> Tensor:
+        """Numbers (B, count) of changes of states and commands (B, intervals, 7), their extremes (B, 2, 7) and readings (B, intervals, 6)."""
+        parts = [fine(obs[key].float(), self.scale) for key in ("states", "commands", "extremes")]
+        if self.has_touch:
+            felt = obs["readings"].float()
+            present = felt[:, :PRESENT].mean(1, keepdim=True).abs()
+            # A gel that slides and one that is held are told apart by a few per cent.
+            ratios = felt / torch.maximum(present, LEAST_PRESENT * self.readings_scale)
+            parts += [fine(felt, self.readings_scale), 3 * ratios.clamp(-MOST_RATIO, MOST_RATIO)]
+        return 0.3 * torch.cat([part.flatten(1) for part in parts], 1)
+
+
+class Remembering(nn.Module):
+    """Tokens of the memory."""
+
+    def __init__(self, width: int, has_touch: bool):
+        super().__init__()
+        self.memory, hidden = Memory(has_touch), MEMORY_WIDTH
+        self.net = nn.Sequential(
+            nn.Linear(self.memory.count, hidden), nn.GELU(), nn.Linear(hidden, hidden), nn.GELU(), nn.Linear(hidden, MEMORY_TOKENS * width)
+        )
+
+    def forward(self, obs: dict[str, Tensor]) -> Tensor:
+        # Half precision would lose the small changes beside the large ones.
+        with torch.autocast(obs["states"].device.type, enabled=False):
+            return self.net(self.memory(obs)).unflatten(1, (MEMORY_TOKENS, -1))
+
+
+class Feeling(nn.Module):
+    """Answers while the hand feels, along its axes, from the memory and the prompt alone: a grip that pictures do not tell could still be
+    learned by heart from them, since every demonstration looks different."""
+
+    def __init__(self, shape: Shape):
+        super().__init__()
+        self.shape, width = shape, MEMORY_WIDTH
+        self.ngrams = nn.EmbeddingBag(prompts.BUCKETS, 32, mode="sum", padding_idx=0)
+        nn.init.zeros_(self.ngrams.weight)
+        self.memory = Memory(shape.has_touch)
+        count, answers = self.memory.count + 32, shape.chunk * shape.action
+        self.first = nn.Linear(count, width)
+        self.layers = nn.ModuleList(
+            nn.Sequential(nn.LayerNorm(width), nn.Linear(width, width), nn.GELU(), nn.Dropout(DROPOUT), nn.Linear(width, width))
+            for _ in range(3)
+        )
+        self.last = nn.Sequential(nn.LayerNorm(width), nn.Linear(width, answers))
+        # To return to a remembered command is exact this way.
+        self.direct = nn.Linear(count, answers)
+
+    def forward(self, obs: dict[str, Tensor]) -> Tensor:
+        with torch.autocast(obs["states"].device.type, enabled=False):
+            numbers = torch.cat([self.memory(obs), self.ngrams(obs["prompt"])], 1)
+            found = self.first(numbers)
+            for layer in self.layers:
+                found = found + layer(found)
+            return (self.last(found) + self.direct(numbers)).unflatten(1, (self.shape.chunk, self.shape.action))
 
 
 class Tokens(nn.Module):
@@ -42,6 +115,8 @@ class Tokens(nn.Module):
         if shape.has_touch:
             self.touch = nn.Sequential(nn.Linear(MARKERS, 2 * width), nn.GELU(), nn.Linear(2 * width, width))
             self.touch_place = nn.Parameter(0.02 * torch.randn(len(shape.marker_steps), width))
+        if shape.has_memory:
+            self.memory = Remembering(width, shape.has_touch)
 
     def forward(self, obs: dict[str, Tensor]) -> Tensor:
         """Tokens (B, T, width) of pictures (B, frames, edge, edge, 3) uint8, standardised states (B, frames, 7 or 8), prompt
@@ -58,6 +133,8 @@ class Tokens(nn.Module):
         if self.shape.has_touch:
             # A firm grasp moves the markers ten times as far as a first contact, which is to be seen as well.
             tokens.append(self.touch(obs["markers"].asinh()) + self.touch_place)
+        if self.shape.has_memory:
+            tokens.append(self.memory(obs))
         return torch.cat(tokens, 1)
 
 
@@ -69,6 +146,7 @@ class Policy(nn.Module):
         self.shape = shape
         width = shape.width
         self.tokens = Tokens(shape)
+        self.register_buffer("fine", torch.from_numpy(FINE), persistent=False)
         options = dict(nhead=8, dim_feedforward=4 * width, dropout=0.1, activation="gelu", batch_first=True, norm_first=True)
         self.encoder = nn.TransformerEncoder(
             nn.TransformerEncoderLayer(width, **options), shape.layers, nn.LayerNorm(width), enable_nested_tensor=False
@@ -76,6 +154,8 @@ class Policy(nn.Module):
         self.decoder = nn.TransformerDecoder(nn.TransformerDecoderLayer(width, **options), shape.layers, nn.LayerNorm(width))
         self.queries = nn.Parameter(0.02 * torch.randn(shape.chunk, width))
         self.answer = nn.Linear(width, shape.action)
+        if shape.has_memory:
+            self.feeling = Feeling(shape)
         if shape.head == "flow":
             self.noisy = nn.Linear(shape.action, width)
             self.time = nn.Sequential(nn.Linear(64, width), nn.GELU(), nn.Linear(width, width))
@@ -87,22 +167,40 @@ class Policy(nn.Module):
             queries = queries + self.noisy(noisy) + self.time(torch.cat([waves.sin(), waves.cos()], 1))[:, None]
         return self.answer(self.decoder(queries, memory))
 
-    def loss(self, obs: dict[str, Tensor], actions: Tensor, is_step: Tensor) -> Tensor:
+    def loss(self, obs: dict[str, Tensor], actions: Tensor, is_step: Tensor, even: Tensor | None = None) -> Tensor:
         """Mean error (2,) of all numbers and of the gripper's alone, over the steps of a chunk that lie within the demonstration;
-        `is_step` is (B, chunk)."""
+        `is_step` is (B, chunk). On the fine scale the arm's long ways would count for little: `even` (3, chunk, 7), the mean and the
+        deviation of the numbers on the fine scale and the deviation of the changes themselves, adds the error of the changes."""
         memory = self.encoder(self.tokens(obs))
         if self.shape.head == "regression":
-            error = (self._decode(memory) - actions).abs()
+            error = self._error(self._decode(memory).float(), actions, even)
         else:
             noise, time = torch.randn_like(actions), torch.rand(len(actions), device=actions.device)
             noisy = torch.lerp(noise, actions, time[:, None, None])
             error = (self._decode(memory, noisy, time) - (actions - noise)).square()
-        both = torch.stack([error.mean(-1), error[..., GRIPPER]])
-        return (both * is_step).sum((1, 2)) / is_step.sum()
+        return _means(error, is_step)
+
+    def _error(self, answers: Tensor, actions: Tensor, even: Tensor | None) -> Tensor:
+        error = (answers - actions).abs()
+        if even is None:
+            return error
+        mean, std, spread = even
+        found, wanted = (coarse((part * std + mean).clamp(-MOST, MOST), self.fine) / spread for part in (answers, actions))
+        return error + (found - wanted).abs()
+
+    def feeling_loss(self, obs: dict[str, Tensor], actions: Tensor, is_step: Tensor, even: Tensor) -> Tensor:
+        """As `loss`, of the answers while the hand feels."""
+        return _means(self._error(self.feeling(obs), actions, even), is_step)
 
     @torch.no_grad()
     def act(self, obs: dict[str, Tensor], noise: Tensor) -> Tensor:
         """The chunk for an observation. Only a flow uses `noise` (B, chunk, 7)."""
+        answers = self._answers(obs, noise)
+        if not self.shape.has_memory:
+            return answers
+        return torch.where(obs["seen"][:, None, None] > 0, answers, self.feeling(obs))
+
+    def _answers(self, obs: dict[str, Tensor], noise: Tensor) -> Tensor:
         memory = self.encoder(self.tokens(obs))
         if self.shape.head == "regression":
             return self._decode(memory)
@@ -111,3 +209,9 @@ class Policy(nn.Module):
             time = torch.full((len(actions),), step / FLOW_STEPS, device=actions.device)
             actions = actions + self._decode(memory, actions, time) / FLOW_STEPS
         return actions
+
+
+def _means(error: Tensor, is_step: Tensor) -> Tensor:
+    """Mean (2,) of errors (B, chunk, 7) over the valid steps: of all numbers and of the gripper's alone."""
+    both = torch.stack([error.mean(-1), error[..., GRIPPER]])
+    return (both * is_step).sum((1, 2)) / is_step.sum()

@@ -25,14 +25,17 @@ class Plan:
 
     step: int  # control step of its first action
     actions: np.ndarray  # (chunk, 7)
+    memory: object = None  # what a policy remembers of the episode
 
 
 @dataclass
 class Request:
-    """An observation, and the answer to the one before it; None at the start of an episode."""
+    """An observation, and the answer to the one before it; None at the start of an episode. A policy may leave a memory for the
+    next request of the episode."""
 
     obs: dict
     last: Plan | None
+    memory: object = None
 
 
 # Answers a batch of requests: a chunk of actions each, or an error for its client.
@@ -77,14 +80,15 @@ async def serve(answers: Answers, batch_size: int, metadata: dict, host: str, po
                 query = obs.get("softvt", {})
                 step, episode = query.get("step", 0), tuple(query.get(key) for key in ("suite", "run_seed", "task", "episode"))
                 last = plans.pop(episode, None)
-                pending = _Pending(Request(obs, last if step > 0 else None), asyncio.get_running_loop().create_future())
+                request = Request(obs, last if step > 0 else None)
+                pending = _Pending(request, asyncio.get_running_loop().create_future())
                 await queue.put(pending)
                 answer = await pending.answer
                 if isinstance(answer, UserError):
                     await socket.send(str(answer))  # text is an error message
                     return
                 await socket.send(msgpack_numpy.packb({"actions": answer}))
-                plans[episode] = Plan(step, answer)
+                plans[episode] = Plan(step, answer, request.memory)
                 if len(plans) > EPISODES:
                     del plans[next(iter(plans))]
         except ConnectionClosed:

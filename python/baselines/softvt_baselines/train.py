@@ -10,12 +10,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from . import prompts
+from . import UserError, prompts
 from .checkpoint import Checkpoint, save
-from .data import Demonstrations, Statistics
-from .inputs import Shape
+from .data import LEAST_SPREAD, Demonstrations, Statistics
+from .inputs import REMEMBERED, SHARES, Shape, is_seen, memory_begins
 from .model import Policy
-from .numbers import reference
+from .numbers import FINE, FINE_READINGS, ROTATION, Standard, fine, hand, reference, turned, turns
 
 # Training, after ACT: learning rate and its last share, weight decay, warm-up (steps), decay of the averaged weights.
 RATE, LAST_RATE, WEIGHT_DECAY, WARM_UP, AVERAGE = 3e-4, 0.02, 1e-4, 300, 0.999
@@ -23,6 +23,16 @@ RATE, LAST_RATE, WEIGHT_DECAY, WARM_UP, AVERAGE = 3e-4, 0.02, 1e-4, 300, 0.999
 SHIFT, BRIGHTNESS = 0.045, 0.1
 # Noise of the state: position (m), rotation vector (rad), finger (m), commanded closure. Actions stay where they are, so it teaches to return.
 STATE_NOISE = [0.005] * 3 + [0.02] * 3 + [0.0001, 0]
+# The same of a policy with memory: noise of the pose in fast motions as a share of the motion in the next AHEAD steps, at most STATE_NOISE;
+# and relative noise of what it remembers. A hand that feels moves by less than any noise of the pose.
+SHARE, AHEAD, MEMORY_NOISE = 0.3, 10, 0.02
+# How much more often fast motions are shown to a policy with memory: a demonstration has few steps in which the hand finds the object.
+OFTEN = 3
+# Samples of a hand that feels for each other sample: they have no pictures.
+FEELING = 8
+# Noise of the remembered positions along the axes of such a hand, m. A teacher's small motions tell what it has decided: tactile-servo rises
+# by exactly 0.03 mm per step once it has found its grip. They are no reason to decide the same.
+HIDDEN_MOTION = [1e-4, 1e-4, 3e-4]
 REPORT = 200  # steps between two lines of the log
 
 
@@ -54,6 +64,22 @@ class Batches:
         self.prompt = on_device(demos.prompt)
         if self.shape.has_touch:
             self.markers = on_device((demos.markers / statistics.marker_scale).astype(np.float16))
+        self.steps = torch.arange(len(demos.actions), device=options.device)
+        if self.shape.has_memory:
+            self.hand, self.commands, self.readings = on_device(hand(demos.state)), on_device(demos.commands), on_device(demos.readings)
+            begin = memory_begins(demos.commands, demos.start)
+            self.begin, self.shares = on_device(begin), on_device(SHARES)
+            self.axes = on_device(turns(demos.commands[:, ROTATION]))
+            seen = is_seen(demos.commands, np.arange(len(begin)), begin)
+            if seen.all():
+                raise UserError(
+                    "no demonstration closes the hand slowly: --memory needs those of a teacher that feels, such as tactile-servo"
+                )
+            self.seen, self.feeling_steps = on_device(seen.astype(np.float32)), on_device(np.flatnonzero(~seen))
+            fast = np.flatnonzero(seen & (begin == np.arange(len(begin))))
+            self.steps = on_device(np.concatenate([np.flatnonzero(seen), np.tile(fast, OFTEN - 1)]))
+            self.hidden = on_device(np.float32(HIDDEN_MOTION))
+            self.fine, self.fine_readings = on_device(FINE), on_device(FINE_READINGS)
         self.random = torch.Generator(options.device).manual_seed(options.seed)
 
     def _past(self, steps: Tensor, back: tuple[int, ...]) -> Tensor:
@@ -70,22 +96,69 @@ class Batches:
         groups = torch.arange(batch, device=self.device)[:, None, None]
         return pictures.transpose(1, 2).transpose(2, 3)[groups, rows[:, :, None], columns[:, None, :]].permute(0, 3, 1, 2, 4)
 
+    def _blurred(self, numbers: Tensor, scale: Tensor) -> Tensor:
+        """Numbers with noise that is even on the fine scale."""
+        noise = torch.randn((2, *numbers.shape), generator=self.random, device=self.device)
+        return numbers + MEMORY_NOISE * (noise[0] * numbers + noise[1] * scale)
+
+    def _remembered(self, steps: Tensor) -> dict[str, Tensor]:
+        """The memory in some steps, as inputs.Past gives it."""
+        last = self.row[steps]
+        begin, now = self.begin[last], self.commands[last][:, None]
+        rows = torch.maximum(last[:, None] - torch.arange(REMEMBERED, device=self.device), begin[:, None])
+        is_known, axes = (begin < last)[:, None, None], self.axes[last]
+        states, commands = (turned(is_known * (numbers[rows] - now), axes) for numbers in (self.hand, self.commands))
+        extremes = torch.stack([commands.amin(1), commands.amax(1)], 1)
+        found = {"states": self.shares @ states, "commands": self.shares @ commands, "extremes": extremes}
+        found = {key: self._blurred(numbers, self.fine) for key, numbers in found.items()}
+        felt = self._blurred(self.shares @ self.readings[rows], self.fine_readings)
+        return found | {"readings": felt, "seen": self.seen[last]}
+
+    def _noise(self, steps: Tensor) -> Tensor:
+        """Noise of the state (B, 1, 7 or 8)."""
+        noise = self.noise * torch.randn((len(steps), 1, self.shape.state), generator=self.random, device=self.device)
+        if self.shape.has_memory:
+            last = self.row[steps]
+            later = self.actions[torch.minimum(steps + AHEAD, self.last[steps])]
+            motion = (later - self.commands[last])[:, :3].norm(dim=1)
+            noise[..., :6] *= ((self.begin[last] == last) * (SHARE * motion / STATE_NOISE[0]).clamp(max=1))[:, None, None]
+        return noise
+
     def draw(self, count: int) -> tuple[dict[str, Tensor], Tensor, Tensor]:
         """Observations, chunks of actions (count, chunk, 7), and which of these lie within the demonstration."""
-        steps = torch.randint(len(self.actions), (count,), generator=self.random, device=self.device)
+        steps = self.steps[torch.randint(len(self.steps), (count,), generator=self.random, device=self.device)]
         frames = self._past(steps, tuple(range(self.shape.frames - 1, -1, -1)))
         obs = {"prompt": self.prompts[self.prompt[steps]]}
         for key, pictures in self.pictures.items():
             shifted = self._shifted(pictures[frames])
             light = 1 + BRIGHTNESS * (2 * torch.rand((count, 1, 1, 1, 1), generator=self.random, device=self.device) - 1)
             obs[key] = (shifted * light).clamp(0, 255).byte()
-        noise = torch.randn((count, 1, self.shape.state), generator=self.random, device=self.device)
-        states = self.state[frames] + self.noise * noise
+        noise = self._noise(steps)
+        states = self.state[frames] + noise
         obs["state"] = (states - self.state_mean) / self.state_std
         if self.shape.has_touch:
             obs["markers"] = self.markers[self._past(steps, self.shape.marker_steps)].float()
         ahead = steps[:, None] + torch.arange(self.shape.chunk, device=self.device)
-        changes = self.actions[ahead.clamp(max=len(self.actions) - 1)] - reference(states[:, -1:], self.shape.is_relative)
+        future = self.actions[ahead.clamp(max=len(self.actions) - 1)]
+        if self.shape.has_memory:
+            obs |= self._remembered(steps)
+            # Noise of the hand's sensor is none of its command.
+            moved = torch.cat([noise[..., :6], torch.zeros_like(noise[..., :1])], 2)
+            changes = fine(future - self.commands[self.row[steps]][:, None] - moved, self.fine)
+        else:
+            changes = future - reference(states[:, -1:], self.shape.is_relative)
+        return obs, (changes - self.action_mean) / self.action_std, ahead <= self.last[steps][:, None]
+
+    def draw_feeling(self, count: int) -> tuple[dict[str, Tensor], Tensor, Tensor]:
+        """As `draw`, of a hand that feels: its memory, and actions along its axes."""
+        steps = self.feeling_steps[torch.randint(len(self.feeling_steps), (count,), generator=self.random, device=self.device)]
+        obs = {"prompt": self.prompts[self.prompt[steps]]} | self._remembered(steps)
+        noise = self.hidden * torch.randn((*obs["states"].shape[:2], 3), generator=self.random, device=self.device)
+        for key in ("states", "commands"):
+            obs[key][..., :3] += noise
+        ahead = steps[:, None] + torch.arange(self.shape.chunk, device=self.device)
+        future = self.actions[ahead.clamp(max=len(self.actions) - 1)]
+        changes = fine(turned(future - self.commands[steps][:, None], self.axes[steps]), self.fine)
         return obs, (changes - self.action_mean) / self.action_std, ahead <= self.last[steps][:, None]
 
 
@@ -97,6 +170,11 @@ def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict)
     batches = Batches(demos, statistics, options)
     policy = Policy(options.shape).to(options.device, memory_format=torch.channels_last)
     averaged = copy.deepcopy(policy).requires_grad_(False)
+    even = None
+    if options.shape.has_memory:
+        spread = Standard.of_each([demos.changes(ahead) for ahead in range(options.shape.chunk)], LEAST_SPREAD).std
+        action = statistics.action
+        even = torch.tensor(np.float32([action.mean, action.std, spread]), device=options.device)
     # The mode captures CUDA graphs: starting its kernels one by one takes longer than they run.
     loss_of = torch.compile(policy.loss, mode="reduce-overhead") if options.is_compiled else policy.loss
     optimizer = torch.optim.AdamW(policy.parameters(), RATE, weight_decay=WEIGHT_DECAY, fused=options.device.type == "cuda")
@@ -106,14 +184,20 @@ def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict)
         return min(1, (step + 1) / WARM_UP) * cosine
 
     schedule = torch.optim.lr_scheduler.LambdaLR(optimizer, rate)
-    started, total = time.monotonic(), torch.zeros(2, device=options.device)
+    seeing = [value for name, value in policy.named_parameters() if not name.startswith("feeling.")]
+    started, total, feeling_total = time.monotonic(), *torch.zeros((2, 2), device=options.device)
     with open(path.with_name(f"{path.name}.log"), "w") as log:
         for step in range(1, options.steps + 1):
             obs, actions, is_step = batches.draw(options.batch)
             with torch.autocast(options.device.type, torch.bfloat16, enabled=options.device.type == "cuda"):
-                loss = loss_of(obs, actions, is_step)
+                loss = loss_of(obs, actions, is_step, even)
             loss[0].backward()
-            torch.nn.utils.clip_grad_norm_(policy.parameters(), 1.0)
+            torch.nn.utils.clip_grad_norm_(seeing, 1.0)
+            if options.shape.has_memory:
+                feeling_loss = policy.feeling_loss(*batches.draw_feeling(FEELING * options.batch), even)
+                feeling_loss[0].backward()
+                torch.nn.utils.clip_grad_norm_(policy.feeling.parameters(), 1.0)
+                feeling_total += feeling_loss.detach()
             optimizer.step()
             optimizer.zero_grad(set_to_none=True)
             schedule.step()
@@ -124,12 +208,15 @@ def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict)
             if step % REPORT == 0 or step == options.steps:
                 count = (step - 1) % REPORT + 1
                 loss, grip = (total / count).tolist()
-                line = (
-                    f"{path.stem}: step {step} of {options.steps}, loss {loss:.4f}, gripper {grip:.4f}, {time.monotonic() - started:.0f} s"
-                )
+                line = f"{path.stem}: step {step} of {options.steps}, loss {loss:.4f}, gripper {grip:.4f}"
+                if options.shape.has_memory:
+                    loss, grip = (feeling_total / count).tolist()
+                    line += f"; while the hand feels {loss:.4f}, gripper {grip:.4f}"
+                line += f"; {time.monotonic() - started:.0f} s"
                 print(line, flush=True)
                 print(line, file=log, flush=True)
                 total.zero_()
+                feeling_total.zero_()
     about = about | {
         "steps": options.steps,
         "batch": options.batch,

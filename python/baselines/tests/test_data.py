@@ -8,11 +8,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 from softvt_baselines import UserError, prompts
-from softvt_baselines.data import ACTIONS, CAMERAS, TACTILE, Statistics, displacements, load, moving_steps, shrink
-from softvt_baselines.inputs import Shape, read
-from softvt_baselines.numbers import Standard, fold, mean_axis, reference
+from softvt_baselines.data import ACTIONS, CAMERAS, TACTILE, Statistics, displacements, load, moving_steps, readings, shrink
+from softvt_baselines.inputs import LIMITS, RECENT, Past, Shape, is_seen, memory_begins, read
+from softvt_baselines.numbers import FINE, Standard, coarse, fine, fold, hand, mean_axis, reference, turned, turns
 
 STEPS = 12
+# Initial positions of the markers of a finger, px.
+GRID = 20.0 * np.stack(np.meshgrid(np.arange(11), np.arange(9)), -1).reshape(99, 2)
 
 
 def rotation(vector: np.ndarray) -> np.ndarray:
@@ -37,7 +39,8 @@ def recording(folder: Path, demos: int = 2, without: tuple[str, ...] = (), gripp
             streams |= {stream: actions for stream in ACTIONS.values()}
             streams["obs/state"], streams["obs/gripper_closure"] = actions, np.full((STEPS, 1), 0.1 * index)
             streams["obs/gripper_width_sensed"] = np.full((STEPS, 1), 0.04 * index)
-            streams["obs/gripper_marker_motion"] = np.zeros((STEPS, 2, 2, 99, 2), np.float32)
+            streams["obs/gripper_marker_motion"] = np.random.default_rng(index).normal(0, 1, (STEPS, 2, 2, 99, 2)).astype(np.float32)
+            streams["obs/gripper_marker_motion"][:, :, 0] = GRID
             for name, values in streams.items():
                 if name not in without:
                     demo[name] = values
@@ -143,6 +146,39 @@ class Numbers(unittest.TestCase):
         felt[:, 6], felt[:, 2] = 0.4 + 0.00025 * np.arange(60), 2e-5 * np.arange(60)
         self.assertGreater(moving_steps(felt, 1.0).sum(), 6, "nor is tightening by 0.02 mm per step while the hand rises")
 
+    def test_memory_keeps_waiting_and_the_command_before_each_step(self):
+        with tempfile.TemporaryDirectory() as scratch:
+            demos = load([recording(Path(scratch) / "a")], "continuous", 4, has_drives=True, has_memory=True)
+        self.assertEqual(len(demos.actions), 2 * STEPS)
+        np.testing.assert_array_equal(demos.commands[1:STEPS], demos.actions[: STEPS - 1])
+        np.testing.assert_array_equal(demos.commands[STEPS], hand(demos.state[STEPS]))
+        action = Statistics.of(demos, 3).action
+        np.testing.assert_allclose(action.mean[2, 0], np.arcsinh(0.03 / FINE[0]), rtol=0.05, err_msg="relative to the command before")
+
+    def test_changes_along_the_axes_of_the_tool(self):
+        np.testing.assert_array_equal(turns(np.zeros(3)), np.eye(3))
+        vectors = np.array([[np.pi, 0, 0], [2.9, 0.7, 0.1]])
+        for vector, matrix in zip(vectors, turns(vectors)):
+            np.testing.assert_allclose(matrix, rotation(vector), atol=1e-6)
+            changes = np.arange(14.0).reshape(2, 7)
+            found = turned(changes, matrix)
+            np.testing.assert_allclose(found[:, :3], changes[:, :3] @ rotation(vector), atol=1e-5)
+            np.testing.assert_allclose(turned(found, matrix.T), changes, atol=1e-5)
+
+    def test_small_and_large_changes_are_told_apart_on_the_fine_scale(self):
+        changes = np.array([-0.3, -1e-4, 0, 2.5e-4, 0.9])
+        np.testing.assert_allclose(coarse(fine(changes, FINE[6]), FINE[6]), changes, rtol=1e-6)
+        self.assertGreater(fine(2 * changes, FINE[6])[3] - fine(changes, FINE[6])[3], 0.5)
+
+    def test_readings_are_the_mean_motion_and_the_divergence_of_each_finger(self):
+        motion = np.zeros((1, 2, 2, 99, 2))
+        motion[0, :, 0] = motion[0, :, 1] = GRID
+        motion[0, 0, 1] += [0.5, -1]
+        motion[0, 1, 1] *= [1.01, 1.02]
+        found = readings(motion)[0]
+        np.testing.assert_allclose(found[:3], [0.5, -1, 0], atol=1e-6)
+        np.testing.assert_allclose(found[5], 0.03, rtol=1e-4)
+
     def test_displacements_are_those_of_both_fingers(self):
         motion = np.zeros((1, 2, 2, 99, 2), np.float32)
         motion[0, 1, 1, 98, 1] = 3
@@ -175,7 +211,7 @@ class Inputs(unittest.TestCase):
         self.obs["tactile_marker_motion"] = motion
 
     def read(self, shape: Shape, **changes) -> dict:
-        return read(self.obs | changes, shape, self.statistics, self.vocabulary)
+        return read(self.obs | changes, shape, self.statistics, self.vocabulary)[0]
 
     def test_an_observation_becomes_the_inputs_of_the_network(self):
         shape = Shape(has_touch=True, edge=4, has_drives=True)
@@ -187,6 +223,31 @@ class Inputs(unittest.TestCase):
         self.assertEqual((found["markers"][0, 0].max(), found["markers"][0, 1].max()), (0, 3))
         np.testing.assert_array_equal(found["noise"], self.read(shape)["noise"])
         self.assertFalse((found["noise"] == self.read(shape, softvt={"seed": 8, "step": 0})["noise"]).all())
+
+    def test_fast_motions_of_the_arm_and_the_hand_are_not_remembered(self):
+        commands = np.zeros((10, 7), np.float32)
+        commands[2:, 0], commands[6:, 6] = 0.01, 0.1
+        commands[8:, 2], commands[9:, 6] = 1e-4, 0.1003
+        self.assertEqual(memory_begins(commands, np.array([0, 5])).tolist(), [0, 0, 2, 2, 2, 5, 6, 6, 6, 6])
+        states, felt = commands - np.float32(1e-3), np.zeros((10, 6), np.float32)
+        found = Past(states, commands, felt).inputs()
+        np.testing.assert_allclose(found["commands"][0, LIMITS.index(16)], [0, 0, -1e-4, 0, 0, 0, -3e-4], atol=1e-7, err_msg="since step 6")
+        self.assertTrue(found["states"].any())
+        while_fast = Past(states[:7], commands[:7], felt[:7]).inputs()
+        self.assertFalse(while_fast["states"].any() or while_fast["commands"].any())
+
+    def test_a_hand_feels_once_it_has_closed_slowly_since_the_last_fast_motion(self):
+        commands = np.zeros((30, 7), np.float32)
+        commands[5:, 6], commands[25:, 2] = 0.3, 0.01
+        commands[:25, 6] += 0.0013 * np.maximum(np.arange(25) - 5, 0)
+        commands[25:, 6] = commands[24, 6]
+        rows = np.arange(30)
+        seen = is_seen(commands, rows, memory_begins(commands, np.array([0])))
+        self.assertEqual(rows[~seen].tolist(), list(range(15, 25)))
+
+    def test_memory_needs_the_last_steps_of_states_and_markers_only(self):
+        profile = Shape(True, has_memory=True).profile("vt").splitlines()
+        self.assertEqual([line.split('"')[1] for line in profile if f"frames = {RECENT}" in line], ["state", "tactile_marker_motion"])
 
     def test_what_does_not_fit_is_named(self):
         for shape, changes, words in [

@@ -3,18 +3,21 @@
 import tempfile
 import unittest
 from pathlib import Path
+from unittest import mock
 
+import h5py
 import numpy as np
 import torch
-from softvt_baselines import UserError
+from softvt_baselines import UserError, prompts
 from softvt_baselines.checkpoint import device_of, load
-from softvt_baselines.data import CAMERAS, TACTILE
+from softvt_baselines.data import CAMERAS, TACTILE, Statistics, commands
 from softvt_baselines.data import load as load_demonstrations
 from softvt_baselines.infer import Answering, blended
-from softvt_baselines.inputs import Shape
+from softvt_baselines.inputs import RECENT, Past, Shape, read
+from softvt_baselines.numbers import FINE, fine, turns
 from softvt_baselines.serve import Plan, Request
-from softvt_baselines.train import TrainOptions, train
-from test_data import recording
+from softvt_baselines.train import Batches, TrainOptions, train
+from test_data import STEPS, recording
 
 CPU = torch.device("cpu")
 
@@ -27,8 +30,12 @@ class Policies(unittest.TestCase):
         self.demos = load_demonstrations([recording(self.folder / "data", edge=32)], "continuous", 32, has_tactile=True, has_drives=True)
 
     def trained(self, shape: Shape) -> Path:
-        path = self.folder / "policy.pt"
-        train(self.demos, TrainOptions(shape, 2, 4, 0, CPU), path, {})
+        path, demos = self.folder / "policy.pt", self.demos
+        if shape.has_memory:
+            demos = load_demonstrations([self.folder / "data"], "continuous", 32, has_drives=True, has_memory=True)
+            demos.commands[:] = 0
+            demos.commands[:, 6] = 0.005 * (np.arange(len(demos.actions)) % STEPS)
+        train(demos, TrainOptions(shape, 2, 4, 0, CPU), path, {})
         return path
 
     def observation(self, shape: Shape, seed: int) -> dict:
@@ -36,8 +43,9 @@ class Policies(unittest.TestCase):
         frames = () if shape.frames == 1 else (shape.frames,)
         obs = {camera: random.integers(0, 255, (*frames, 32, 32, 3), np.uint8) for camera in CAMERAS}
         obs |= {key: random.integers(0, 255, (*frames, 24, 32, 3), np.uint8) for key in TACTILE}
-        state = np.broadcast_to(np.array([0, 0, 0, 3.1, 0, 0, 0.04, 0], np.float32), (*frames, 8))
-        motion = random.normal(0, 1, (6, 198, 2)).astype(np.float32)
+        states = (RECENT,) if shape.has_memory else frames
+        state = np.broadcast_to(np.array([0, 0, 0, 3.1, 0, 0, 0.04, 0], np.float32), (*states, 8))
+        motion = random.normal(0, 1, (shape.marker_rows, 198, 2)).astype(np.float32)
         return obs | {
             "state": state,
             "prompt": "pick up the left bun",
@@ -46,10 +54,13 @@ class Policies(unittest.TestCase):
         }
 
     def test_every_kind_of_policy_trains_and_answers_whatever_else_is_in_the_batch(self):
-        for has_touch, head, frames, has_pictures in [
-            (False, "regression", 1, False),
-            (True, "regression", 1, True),
-            (True, "flow", 2, False),
+        for has_touch, head, frames, has_pictures, has_memory in [
+            (False, "regression", 1, False, False),
+            (True, "regression", 1, True, False),
+            (True, "flow", 2, False, False),
+            (False, "regression", 1, False, True),
+            (True, "regression", 1, False, True),
+            (True, "flow", 1, False, True),
         ]:
             shape = Shape(
                 has_touch,
@@ -61,6 +72,7 @@ class Policies(unittest.TestCase):
                 layers=1,
                 has_tactile_pictures=has_pictures,
                 has_drives=True,
+                has_memory=has_memory,
             )
             answering = Answering(load(self.trained(shape), CPU), CPU)
             observations = [self.observation(shape, seed) for seed in range(5)]
@@ -79,6 +91,59 @@ class Policies(unittest.TestCase):
         self.assertEqual(found[:, 0].tolist(), [1, 1.5, 2, 0, 0])
         for step, last in [(12, None), (10, Plan(10, planned)), (0, Plan(10, planned)), (15, Plan(10, planned))]:
             np.testing.assert_array_equal(blended(fresh, step, last, np.full(7, 0.5)), fresh)
+
+    def test_a_server_remembers_what_training_showed(self):
+        demos = load_demonstrations([self.folder / "data"], "continuous", 32, has_memory=True)
+        slow = np.minimum(np.arange(len(demos.actions)) % STEPS, 3) * 0.01 + 1e-4 * np.arange(len(demos.actions))
+        demos.actions[:, 0], demos.state[:, 0] = slow, slow - 0.001
+        demos.actions[:, 6] = 0.005 * (np.arange(len(demos.actions)) % STEPS)
+        demos.commands = commands(demos.state, demos.actions, np.array([STEPS, STEPS]))
+        shape, statistics = Shape(True, edge=32, chunk=5, has_memory=True), Statistics.of(demos, 5)
+        batches = Batches(demos, statistics, TrainOptions(shape, 1, 1, 0, CPU))
+        with h5py.File(self.folder / "data" / "hdf5" / "suite_task0_demo.hdf5") as file:
+            motion = file["data/demo_0/obs/gripper_marker_motion"][:]
+        before, last = None, 0
+        for step in (0, 2, 4, 8, 11):
+            shown = np.maximum(np.arange(step - RECENT + 1, step + 1), 0)
+            obs = self.observation(shape, 0) | {"state": demos.state[shown]}
+            obs["tactile_marker_motion"] = np.concatenate([motion[:1, :, 0], motion[shown, :, 1]]).reshape(-1, 198, 2)
+            before = before and (before, demos.actions[last:step])
+            inputs, before = read(obs, shape, statistics, prompts.Vocabulary(demos.prompts), before)
+            last = step
+            with mock.patch("softvt_baselines.train.MEMORY_NOISE", 0):
+                expected = batches._remembered(torch.tensor([step])) | {"axes": batches.axes[[step]]}
+            for key, value in expected.items():
+                self.assertEqual(inputs[key].shape, value.shape)
+                np.testing.assert_allclose(inputs[key], value.numpy(), rtol=1e-5, atol=1e-6, err_msg=f"{key} in step {step}")
+
+    def test_a_hand_that_feels_answers_from_its_memory_along_its_axes(self):
+        shape = Shape(True, edge=32, chunk=5, width=32, layers=1, has_drives=True, has_memory=True)
+        answering = Answering(load(self.trained(shape), CPU), CPU)
+        commands = np.zeros((20, 7), np.float32)
+        commands[:, 3:6], commands[:, 6] = [np.pi, 0, 0.4], 0.001 * np.arange(20)
+        past, action = Past(commands, commands, np.zeros((20, 6), np.float32)), commands[-1] + np.float32([0, 0, 0, 0, 0, 0, 0.001])
+        wanted = np.zeros((1, 5, 7), np.float32)
+        wanted[..., 1] = 0.0003  # towards the left finger
+        answer = torch.from_numpy(answering.checkpoint.statistics.action.apply(fine(wanted, FINE)))
+        with mock.patch.object(answering.checkpoint.policy.feeling, "forward", lambda obs: answer.expand(len(obs["seen"]), -1, -1)):
+            obs = self.observation(shape, 0) | {"softvt": {"seed": 0, "step": 1}}
+            found = answering([Request(obs, Plan(0, action[None].repeat(5, 0), past))])[0]
+        np.testing.assert_allclose(found[0, :3], 0.0003 * turns(action[3:6])[:, 1], atol=1e-7)
+        np.testing.assert_allclose(found[0, 3:], action[3:], atol=1e-5)
+
+    def test_a_teacher_that_closes_fast_is_refused(self):
+        demos = load_demonstrations([self.folder / "data"], "continuous", 32, has_memory=True)
+        with self.assertRaisesRegex(UserError, "needs those of a teacher that feels"):
+            train(demos, TrainOptions(Shape(False, edge=32, has_memory=True), 1, 1, 0, CPU), self.folder / "policy.pt", {})
+
+    def test_a_policy_with_memory_refuses_to_replan_too_late(self):
+        shape = Shape(False, edge=32, chunk=5, width=32, layers=1, has_drives=True, has_memory=True)
+        answering = Answering(load(self.trained(shape), CPU), CPU)
+        first = Request(self.observation(shape, 0), None)
+        plan = Plan(0, answering([first])[0], first.memory)
+        found = [answering([Request(self.observation(shape, 1) | {"softvt": {"seed": 1, "step": step}}, plan)])[0] for step in (5, 6)]
+        self.assertEqual(found[0].shape, (5, 7))
+        self.assertIn("needs --replan 5 or less", str(found[1]))
 
     def test_training_is_repeatable(self):
         shape = Shape(False, edge=32, chunk=5, width=32, layers=1, has_drives=True)
