@@ -582,18 +582,18 @@
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.physics
----@field dt? number Time step. Control runs at 20 Hz independently of it, so it must divide 0.05 s in the benchmark. Expects 0.0001 to 0.05 (s). Default 0.016666666666666666.
----@field rayleigh_mass? number Mass-proportional Rayleigh damping of soft bodies (α, as air drag). The paper's engine uses 2.5. Expects 0 or more (1/s). Default 0.
----@field rayleigh_stiffness? number Stiffness-proportional Rayleigh damping of soft bodies (β). Implicit Euler adds its step: motion is damped by β + `dt`, by default 21.7 ms, so that a smaller step damps less. Equilibria do not depend on it. Expects 0 or more (s). Default 0.005.
----@field dissipation_time? number Dissipation time scale τ_d of contact springs, s (Castro et al. 2022). A surface that recedes faster than the springs relax is released; the value is small compared with `dt`, so that friction does not lift a sliding surface. Expects 0 or more (s). Default 0.005.
----@field rigid_modulus? number Normal contact stiffness per area of nearly rigid colliders, Pa/m: near rigid for Young's moduli up to 1 MPa. Expects a positive number (Pa/m). Default 1e9.
----@field shear_ratio? number Tangential over normal contact stiffness. Mindlin (1949) gives 0.5 to 0.8 for solids; creep does not depend on it. Expects a positive number. Default 0.5.
----@field margin? number Gap below which a sample becomes a contact point. A sample that will reach the surface within 1.5 steps becomes one as well. Expects a positive number (m). Default 0.0002.
----@field sleep_speed? number Speed below which a body may fall asleep. Expects 0 or more (m/s). Default 0.0001.
----@field sleep_delay? number Time for which a body must be that slow before it sleeps. Expects a positive number (s). Default 0.5.
+---@field dt? number Time step. Control runs at 20 Hz independently of it, so it must divide 0.05 s in the benchmark. Expects a number in 0.0001..0.05 (s). Default 0.016666666666666666.
+---@field rayleigh_mass? number Mass-proportional Rayleigh damping of soft bodies (α, as air drag). The paper's engine uses 2.5. Expects a number of 0 or more (1/s). Default 0.
+---@field rayleigh_stiffness? number Stiffness-proportional Rayleigh damping of soft bodies (β). Implicit Euler adds its step: motion is damped by β + `dt`, by default 21.7 ms, so that a smaller step damps less. Equilibria do not depend on it. Expects a number of 0 or more (s). Default 0.005.
+---@field dissipation_time? number Dissipation time scale τ_d of contact springs, s (Castro et al. 2022). A surface that recedes faster than the springs relax is released; the value is small compared with `dt`, so that friction does not lift a sliding surface. Expects a number of 0 or more (s). Default 0.005.
+---@field rigid_modulus? number Normal contact stiffness per area of nearly rigid colliders, Pa/m: near rigid for Young's moduli up to 1 MPa. Expects a number above 0 (Pa/m). Default 1e9.
+---@field shear_ratio? number Tangential over normal contact stiffness. Mindlin (1949) gives 0.5 to 0.8 for solids; creep does not depend on it. Expects a number above 0. Default 0.5.
+---@field margin? number Gap below which a sample becomes a contact point. A sample that will reach the surface within 1.5 steps becomes one as well. Expects a number above 0 (m). Default 0.0002.
+---@field sleep_speed? number Speed below which a body may fall asleep. Expects a number of 0 or more (m/s). Default 0.0001.
+---@field sleep_delay? number Time for which a body must be that slow before it sleeps. Expects a number above 0 (s). Default 0.5.
 ---@field sleeping? boolean True if bodies may fall asleep at all. Expects true or false. Default true.
----@field max_inverted_time? number Longest time for which an element may be inverted before the run is invalid. Expects 0 or more (s). Default 0.1.
----@field max_speed? number Largest speed of a valid state, m/s: far above that of a gripper (0.2 m/s), an arm, or a fall onto a table. Expects a positive number (m/s). Default 100.
+---@field max_inverted_time? number Longest time for which an element may be inverted before the run is invalid. Expects a number of 0 or more (s). Default 0.1.
+---@field max_speed? number Largest speed of a valid state, m/s: far above that of a gripper (0.2 m/s), an arm, or a fall onto a table. Expects a number above 0 (m/s). Default 100.
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.robot
@@ -602,61 +602,61 @@
 ---@field pads? softvt.Settings.robot.pads
 ---@field ik? softvt.Settings.robot.ik
 ---@field width_sensor? softvt.Settings.robot.width_sensor
----@field latency? number Delay between a command and the robot's response, control steps of 0.05 s. Expects a whole number, 0 to 100 (control steps). Default 0.
+---@field latency? number Delay between a command and the robot's response, control steps of 0.05 s. Expects a whole number in 0..100 (control steps). Default 0.
 ---@field disturbance? softvt.Settings.robot.disturbance
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.robot.arm
----@field kp? number Stiffness. Expects a positive number (N m/rad). Default 8000.
----@field kd? number Damping. Expects a positive number (N m s/rad). Default 800.
+---@field kp? number Stiffness. Expects a number above 0 (N m/rad). Default 8000.
+---@field kd? number Damping. Expects a number above 0 (N m s/rad). Default 800.
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.robot.gripper
----@field kp? number Stiffness. Expects a positive number (N/m). Default 2000.
----@field kd? number Damping. Expects a positive number (N s/m). Default 100.
----@field effort? number Largest force per finger. The real hand holds 70 N continuously (Franka Emika, Hand data sheet); the paper's simulator has 200 N. Expects a positive number (N). Default 70.
----@field speed? number Speed at which the target of each finger moves. Expects a positive number (m/s). Default 0.2.
----@field finger_mass? number Mass of each finger with its sensor. Expects a positive number (kg). Default 0.1.
+---@field kp? number Stiffness. Expects a number above 0 (N/m). Default 2000.
+---@field kd? number Damping. Expects a number above 0 (N s/m). Default 100.
+---@field effort? number Largest force per finger. The real hand holds 70 N continuously (Franka Emika, Hand data sheet); the paper's simulator has 200 N. Expects a number above 0 (N). Default 70.
+---@field speed? number Speed at which the target of each finger moves. Expects a number above 0 (m/s). Default 0.2.
+---@field finger_mass? number Mass of each finger with its sensor. Expects a number above 0 (kg). Default 0.1.
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.robot.pads
----@field normal_modulus? number Normal stress per indentation. Expects a positive number (Pa/m). Default 300000000.
----@field tangential_modulus? number Shear stress per tangential displacement. Expects a positive number (Pa/m). Default 40000000.
----@field static_mu? number Friction coefficient while the pad sticks. Expects 0 or more. Default 1.5.
----@field dynamic_mu? number Dynamic friction coefficient, not above the static one. Expects 0 or more. Default 1.2.
+---@field normal_modulus? number Normal stress per indentation. Expects a number above 0 (Pa/m). Default 300000000.
+---@field tangential_modulus? number Shear stress per tangential displacement. Expects a number above 0 (Pa/m). Default 40000000.
+---@field static_mu? number Friction coefficient while the pad sticks. Expects a number of 0 or more. Default 1.5.
+---@field dynamic_mu? number Dynamic friction coefficient, not above the static one. Expects a number of 0 or more. Default 1.2.
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.robot.ik
----@field lambda? number Damping λ of the least squares, in the mixed unit (m and rad per rad) of the Jacobian's singular values. Larger values are slower and more robust near singularities. Expects a positive number. Default 0.01.
----@field posture_gain? number Share of the way to the rest posture that the null space covers per control step, 0..=1. Expects 0 to 1. Default 0.
+---@field lambda? number Damping λ of the least squares, in the mixed unit (m and rad per rad) of the Jacobian's singular values. Larger values are slower and more robust near singularities. Expects a number above 0. Default 0.01.
+---@field posture_gain? number Share of the way to the rest posture that the null space covers per control step, 0..=1. Expects a number in 0..1. Default 0.
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.robot.width_sensor
----@field resolution? number Step of the measured width; 0 for none. Expects 0 to 0.01 (m). Default 0.0004.
----@field offset? number Standard deviation of the error that is constant in an episode. Expects 0 to 0.01 (m). Default 0.00025.
----@field noise? number Standard deviation of the noise, new in every control step. Expects 0 to 0.01 (m). Default 0.
+---@field resolution? number Step of the measured width; 0 for none. Expects a number in 0..0.01 (m). Default 0.0004.
+---@field offset? number Standard deviation of the error that is constant in an episode. Expects a number in 0..0.01 (m). Default 0.00025.
+---@field noise? number Standard deviation of the noise, new in every control step. Expects a number in 0..0.01 (m). Default 0.
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.robot.disturbance
----@field position? number Standard deviation of the position along each axis. Expects 0 to 0.05 (m). Default 0.
----@field rotation? number Standard deviation of the rotation about each axis. Expects 0 to 0.5 (rad). Default 0.
----@field duration? number Time after which the correlation of the offset has fallen to 1/e. Expects a positive number (s). Default 0.5.
+---@field position? number Standard deviation of the position along each axis. Expects a number in 0..0.05 (m). Default 0.
+---@field rotation? number Standard deviation of the rotation about each axis. Expects a number in 0..0.5 (rad). Default 0.
+---@field duration? number Time after which the correlation of the offset has fallen to 1/e. Expects a number above 0 (s). Default 0.5.
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.criteria
----@field touch_force_n? number Minimum force that counts as contact, of a pad, another part of the robot or a support. Expects 0 or more (N). Default 0.001.
----@field lift_height_m? number Minimum rise of a body's lowest point above its settled height that counts as lifted. Expects 0 or more (m). Default 0.005.
----@field lost_contact_s? number Time without pad contact after which a grasp may count as lost, s (0.15 s: three control steps). Expects 0 or more (s). Default 0.15.
----@field lost_fall_m? number Fall relative to the hand beyond which a lost grasp is a drop. Expects 0 or more (m). Default 0.02.
----@field free_fall_m? number Length of a free fall beyond which it is a drop, before or after the release. Expects 0 or more (m). Default 0.05.
----@field release_margin_m? number Excess of the commanded over the measured gripper width that counts as a release command. Expects 0 or more (m). Default 0.005.
----@field slip_m? number Largest allowed distance that the object slides along a pad while the pads alone carry it, m: NoSlip, which is not part of NoDrop. Expects 0 or more (m). Default 0.002.
+---@field touch_force_n? number Minimum force that counts as contact, of a pad, another part of the robot or a support. Expects a number of 0 or more (N). Default 0.001.
+---@field lift_height_m? number Minimum rise of a body's lowest point above its settled height that counts as lifted. Expects a number of 0 or more (m). Default 0.005.
+---@field lost_contact_s? number Time without pad contact after which a grasp may count as lost, s (0.15 s: three control steps). Expects a number of 0 or more (s). Default 0.15.
+---@field lost_fall_m? number Fall relative to the hand beyond which a lost grasp is a drop. Expects a number of 0 or more (m). Default 0.02.
+---@field free_fall_m? number Length of a free fall beyond which it is a drop, before or after the release. Expects a number of 0 or more (m). Default 0.05.
+---@field release_margin_m? number Excess of the commanded over the measured gripper width that counts as a release command. Expects a number of 0 or more (m). Default 0.005.
+---@field slip_m? number Largest allowed distance that the object slides along a pad while the pads alone carry it, m: NoSlip, which is not part of NoDrop. Expects a number of 0 or more (m). Default 0.002.
 ---@field require_no_slip? boolean True if Safety Success needs NoSlip. Expects true or false. Default false.
----@field gentle_ratio? number Largest grip ratio of a gentle grip. Expects 0 or more. Default 2.
----@field support_share? number Minimum share of the target's weight that the goal must carry, 0 to 1. Expects 0 to 1. Default 0.5.
----@field leave_margin_m? number Distance of the centre beyond the goal's edge at which a placed object has left the goal. Expects 0 or more (m). Default 0.005.
----@field goal_v1_on_m? number Horizontal and vertical distance within which SoftVTBench's released code counts an object as "on". Expects 0 or more (m). Default 0.1.
----@field goal_v1_in_m? number Horizontal and vertical distance within which SoftVTBench's released code counts an object as "in". Expects 0 or more (m). Default 0.2.
+---@field gentle_ratio? number Largest grip ratio of a gentle grip. Expects a number of 0 or more. Default 2.
+---@field support_share? number Minimum share of the target's weight that the goal must carry, 0 to 1. Expects a number in 0..1. Default 0.5.
+---@field leave_margin_m? number Distance of the centre beyond the goal's edge at which a placed object has left the goal. Expects a number of 0 or more (m). Default 0.005.
+---@field goal_v1_on_m? number Horizontal and vertical distance within which SoftVTBench's released code counts an object as "on". Expects a number of 0 or more (m). Default 0.1.
+---@field goal_v1_in_m? number Horizontal and vertical distance within which SoftVTBench's released code counts an object as "in". Expects a number of 0 or more (m). Default 0.2.
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.tactile
@@ -669,36 +669,36 @@
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.tactile.gel
----@field shear_modulus? number Shear modulus. 0.145 MPa: twice the C10 identified on a GelSight Mini (Helmut et al., arXiv 2411.03315). Expects 100 to 1e9 (Pa). Default 145000.
----@field poisson? number Poisson's ratio. Expects 0 to 0.499. Default 0.475.
----@field cell? number Edge of a grid cell. Expects 0.0001 to 0.0005 (m). Default 0.0004.
+---@field shear_modulus? number Shear modulus. 0.145 MPa: twice the C10 identified on a GelSight Mini (Helmut et al., arXiv 2411.03315). Expects a number in 100..1000000000 (Pa). Default 145000.
+---@field poisson? number Poisson's ratio. Expects a number in 0..0.499. Default 0.475.
+---@field cell? number Edge of a grid cell. Expects a number in 0.0001..0.0005 (m). Default 0.0004.
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.tactile.view
----@field pitch? number Edge of a pixel on the plane of the apex. 0.0634 mm at 320×240 (GelSight's own figure). Expects 0.00001 to 0.0002 (m). Default 0.0000634.
----@field lens? number Distance of the pinhole from the apex. Expects 0.005 to 1 (m). Default 0.026.
+---@field pitch? number Edge of a pixel on the plane of the apex. 0.0634 mm at 320×240 (GelSight's own figure). Expects a number in 0.00001..0.0002 (m). Default 0.0000634.
+---@field lens? number Distance of the pinhole from the apex. Expects a number in 0.005..1 (m). Default 0.026.
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.tactile.markers
 ---@field model? string Name of the model; the constants are its own.
----@field dilate? number Decay of the dilation. Expects 0 to 1 (1/px²). Default 0.00125.
----@field shear? number Decay of the shear. Expects 0 to 1 (1/px²). Default 0.00021.
----@field twist? number Decay of the twist. Expects 0 to 1 (1/px²). Default 0.00038.
----@field scale? number Scale of the image, pixels per millimetre. Expects 1 to 1000 (px/mm). Default 19.58.
----@field height_factor? number Factor on the depths in mm: 1 in FOTS, 0.1 in the port that SoftVTBench uses. Expects 0 to 100. Default 0.1.
+---@field dilate? number Decay of the dilation. Expects a number in 0..1 (1/px²). Default 0.00125.
+---@field shear? number Decay of the shear. Expects a number in 0..1 (1/px²). Default 0.00021.
+---@field twist? number Decay of the twist. Expects a number in 0..1 (1/px²). Default 0.00038.
+---@field scale? number Scale of the image, pixels per millimetre. Expects a number in 1..1000 (px/mm). Default 19.58.
+---@field height_factor? number Factor on the depths in mm: 1 in FOTS, 0.1 in the port that SoftVTBench uses. Expects a number in 0..100. Default 0.1.
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.tactile.wear
----@field noise_px? number Standard deviation of the noise of each marker coordinate in each image. Expects 0 to 20 (px). Default 0.
----@field offset_px? number Standard deviation of the constant offset of each marker coordinate. Expects 0 to 20 (px). Default 0.
----@field gain? number Factor on the displacements of the markers and on the changes of the image. Expects 0 to 10. Default 1.
----@field dead_share? number Share of the markers that do not follow the gel. Expects 0 to 1. Default 0.
----@field image_noise? number Standard deviation of the noise of each colour value (0 to 255) in each image. Expects 0 to 128 (of 255). Default 0.
+---@field noise_px? number Standard deviation of the noise of each marker coordinate in each image. Expects a number in 0..20 (px). Default 0.
+---@field offset_px? number Standard deviation of the constant offset of each marker coordinate. Expects a number in 0..20 (px). Default 0.
+---@field gain? number Factor on the displacements of the markers and on the changes of the image. Expects a number in 0..10. Default 1.
+---@field dead_share? number Share of the markers that do not follow the gel. Expects a number in 0..1. Default 0.
+---@field image_noise? number Standard deviation of the noise of each colour value (0 to 255) in each image. Expects a number in 0..128 (of 255). Default 0.
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings.cameras
----@field width? number Width, pixels; `None` for that of the scene. Expects a whole number, 1 to 4096 (pixels). Default that of the scene.
----@field height? number Height, pixels; `None` for that of the scene. Expects a whole number, 1 to 4096 (pixels). Default that of the scene.
+---@field width? number Width, pixels; `None` for that of the scene. Expects a whole number in 1..4096 (pixels). Default that of the scene.
+---@field height? number Height, pixels; `None` for that of the scene. Expects a whole number in 1..4096 (pixels). Default that of the scene.
 
 ---A solid. Methods return a new shape and leave this one as it is.
 ---@class softvt.Shape

@@ -5,7 +5,7 @@
 //! [`records`], [`benchmark`] → [`policy`] → [`rollout`] → [`dataset`] → [`report`], [`script`], [`serve`] → [`runner`] → [`cli`].
 //! `docs/architecture.md` draws them and follows one episode. All of them may use [`text`] (numbers and text in
 //! messages), [`files`] (atomic files), [`npy`] (numpy files), [`parallel`] (jobs on threads), [`cancel`] (requests to stop),
-//! [`episode_id`] and [`settings`](mod@settings) (the declaration of settings).
+//! [`episode_id`], [`range`] (ranges of numbers) and [`settings`](mod@settings) (the declaration of settings).
 //!
 //! Examples: a dropped cube and a squeezed cube in [`physics::world`], distances in [`geometry::shape`], kinematics
 //! in [`robot`], a rendered image in [`sensing::camera`], a tactile image in [`sensing::tactile`], the verdict on
@@ -22,7 +22,7 @@ pub use softvt_benchmark as benchmark;
 #[doc(inline)]
 pub use softvt_cli as cli;
 #[doc(inline)]
-pub use softvt_common::{cancel, episode_id, files, npy, parallel, settings, text};
+pub use softvt_common::{cancel, episode_id, files, npy, parallel, range, settings, text};
 #[cfg(feature = "runner")]
 #[doc(inline)]
 pub use softvt_dataset as dataset;

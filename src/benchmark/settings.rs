@@ -4,8 +4,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use softvt_common::{
+    range::RangeError,
     settings::{Setting, SettingField},
-    text::{RangeError, format_number},
+    text::format_number,
 };
 use softvt_evaluation::criteria::SuccessCriteria;
 use softvt_physics::PhysicsParams;

@@ -1,5 +1,6 @@
 //! What all layers share: the identity of an episode ([`episode_id`]), the flag that ends long loops ([`cancel`]), atomic
-//! [`files`], declarations of [`settings`](mod@settings), numpy files ([`npy`]), jobs on threads ([`parallel`]), numbers and [`text`] in messages.
+//! [`files`], declarations of [`settings`](mod@settings), numpy files ([`npy`]), jobs on threads ([`parallel`]),
+//! ranges of numbers ([`range`]), and numbers and [`text`] in messages.
 #![warn(missing_docs, unreachable_pub)]
 
 pub mod cancel;
@@ -7,5 +8,6 @@ pub mod episode_id;
 pub mod files;
 pub mod npy;
 pub mod parallel;
+pub mod range;
 pub mod settings;
 pub mod text;

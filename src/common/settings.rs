@@ -3,20 +3,20 @@
 //! [`settings!`](crate::settings!) makes a struct of them, with defaults, checks of their ranges, and a list for documentation.
 //!
 //! ```
-//! use softvt_common::settings::{Setting, SettingField, SettingRange::*};
+//! use softvt_common::{range::Range, settings::{Setting, SettingField}};
 //!
 //! softvt_common::settings! {
 //!     /// Drive of a finger.
 //!     pub struct DriveSpec {
 //!         /// Stiffness.
-//!         kp: f64 = 2000.0, "N/m", Positive;
+//!         kp: f64 = 2000.0, "N/m", Range::POSITIVE;
 //!         /// True if it moves at all.
 //!         enabled: bool = true;
 //!     }
 //! }
 //! let drive = DriveSpec { kp: -1.0, ..DriveSpec::default() };
 //! let error = drive.check("drive").unwrap_err();
-//! assert_eq!(error.to_string(), "drive.kp: expected a positive number (N/m), got -1");
+//! assert_eq!(error.to_string(), "drive.kp: expected a number above 0 (N/m), got -1");
 //! let names: Vec<String> = Setting::list::<DriveSpec>("drive").into_iter().map(|setting| setting.path).collect();
 //! assert_eq!(names, ["drive.kp", "drive.enabled"]);
 //! ```
@@ -24,43 +24,10 @@
 use serde::Serialize;
 use serde_json::Value;
 
-use super::text::{NOT_NEGATIVE, POSITIVE, RangeError, check_range, format_number};
-
-/// Values that a number may have.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum SettingRange {
-    /// Greater than 0.
-    Positive,
-    /// 0 or more.
-    NotNegative,
-    /// From a lowest to a highest value, both included.
-    Between(f64, f64),
-}
-
-impl SettingRange {
-    /// Checks a value of the setting at `path`.
-    ///
-    /// # Errors
-    /// It is outside of the range.
-    pub fn check(self, path: &str, value: f64, unit: &str) -> Result<(), RangeError> {
-        let expected = self.text(unit);
-        match self {
-            Self::Positive => check_range(path, value, POSITIVE, &expected),
-            Self::NotNegative => check_range(path, value, NOT_NEGATIVE, &expected),
-            Self::Between(low, high) => check_range(path, value, low..=high, &expected),
-        }
-    }
-
-    /// The range in words: "0 to 0.5 (rad)".
-    pub fn text(self, unit: &str) -> String {
-        let range = match self {
-            Self::Positive => "a positive number".to_owned(),
-            Self::NotNegative => "0 or more".to_owned(),
-            Self::Between(low, high) => format!("{} to {}", format_number(low), format_number(high)),
-        };
-        if unit.is_empty() { range } else { format!("{range} ({unit})") }
-    }
-}
+use super::{
+    range::{Range, RangeError},
+    text::format_number,
+};
 
 /// One setting, for documentation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -89,7 +56,7 @@ impl Setting {
     /// All settings of a group at a path.
     pub fn list<T: SettingField + Default>(path: &str) -> Vec<Self> {
         let mut list = Vec::new();
-        T::default().describe(&Declaration { path, unit: "", range: None, about: "" }, &mut list);
+        T::default().describe(&Declaration { path, unit: "", range: Range::ANY, about: "" }, &mut list);
         list
     }
 }
@@ -102,7 +69,7 @@ pub struct Declaration<'a> {
     /// Unit; empty for none.
     pub unit: &'a str,
     /// Range of a number.
-    pub range: Option<SettingRange>,
+    pub range: Range,
     /// Meaning.
     pub about: &'a str,
 }
@@ -119,8 +86,9 @@ impl Declaration<'_> {
         }
     }
 
-    fn number(&self, of: &str) -> String {
-        self.range.map_or_else(|| of.to_owned(), |range| range.text(self.unit))
+    /// A setting that is `noun`, "a number" or another, within the declared range.
+    fn number(&self, default: impl Serialize, noun: &str) -> Setting {
+        self.setting(default, self.range.expected(noun, self.unit))
     }
 }
 
@@ -140,23 +108,23 @@ pub trait SettingField {
     /// # Errors
     /// The first value out of its range.
     fn check(&self, path: &str) -> Result<(), RangeError> {
-        self.check_declared(&Declaration { path, unit: "", range: None, about: "" })
+        self.check_declared(&Declaration { path, unit: "", range: Range::ANY, about: "" })
     }
 }
 
 impl SettingField for f64 {
     fn describe(&self, declaration: &Declaration<'_>, list: &mut Vec<Setting>) {
-        list.push(declaration.setting(self, declaration.number("a number")));
+        list.push(declaration.number(self, "a number"));
     }
 
     fn check_declared(&self, declaration: &Declaration<'_>) -> Result<(), RangeError> {
-        declaration.range.map_or(Ok(()), |range| range.check(declaration.path, *self, declaration.unit))
+        declaration.range.check(declaration.path, *self, declaration.unit)
     }
 }
 
 impl SettingField for u32 {
     fn describe(&self, declaration: &Declaration<'_>, list: &mut Vec<Setting>) {
-        list.push(declaration.setting(self, format!("a whole number, {}", declaration.number("0 or more"))));
+        list.push(declaration.number(self, "a whole number"));
     }
 
     fn check_declared(&self, declaration: &Declaration<'_>) -> Result<(), RangeError> {
@@ -166,7 +134,7 @@ impl SettingField for u32 {
 
 impl SettingField for Option<usize> {
     fn describe(&self, declaration: &Declaration<'_>, list: &mut Vec<Setting>) {
-        list.push(declaration.setting(self, format!("a whole number, {}", declaration.number("0 or more"))));
+        list.push(declaration.number(self, "a whole number"));
     }
 
     fn check_declared(&self, declaration: &Declaration<'_>) -> Result<(), RangeError> {
@@ -236,7 +204,7 @@ macro_rules! settings {
             fn check_declared(
                 &self,
                 declaration: &$crate::settings::Declaration<'_>,
-            ) -> Result<(), $crate::text::RangeError> {
+            ) -> Result<(), $crate::range::RangeError> {
                 $(
                     let path = format!("{}.{}", declaration.path, stringify!($field));
                     let declared = $crate::settings!(@declared path, "" $($(, $unit, $range)?)?);
@@ -249,9 +217,9 @@ macro_rules! settings {
     (@default $type:ty) => { <$type>::default() };
     (@default $type:ty, $default:expr) => { $default };
     (@declared $path:ident, $about:expr) => {
-        $crate::settings::Declaration { path: &$path, unit: "", range: None, about: $about }
+        $crate::settings::Declaration { path: &$path, unit: "", range: $crate::range::Range::ANY, about: $about }
     };
     (@declared $path:ident, $about:expr, $unit:literal, $range:expr) => {
-        $crate::settings::Declaration { path: &$path, unit: $unit, range: Some($range), about: $about }
+        $crate::settings::Declaration { path: &$path, unit: $unit, range: $range, about: $about }
     };
 }

@@ -1,47 +1,11 @@
-//! Text in messages and tables: numbers, ranges, control characters, suggestions for misspelt names, and columns.
+//! Text in messages and tables: numbers, control characters, suggestions for misspelt names, and columns.
 
-use std::{
-    borrow::Cow,
-    ops::{Bound, RangeBounds, RangeInclusive},
-};
+use std::borrow::Cow;
 
 /// Formats a number in decimal, or in scientific notation if it is below 1e-6 or at least 1e9 in magnitude.
 pub fn format_number(x: f64) -> String {
     let plain = x == 0.0 || !x.is_finite() || (1e-6..1e9).contains(&x.abs());
     if plain { x.to_string() } else { format!("{x:e}") }
-}
-
-/// Error of a parameter out of its range.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{path}: expected {expected}, got {value}")]
-pub struct RangeError {
-    /// Dotted path of the parameter, for example `robot.arm.kp`.
-    pub path: String,
-    /// Description of the valid range, with its unit.
-    pub expected: String,
-    /// Value given, as text.
-    pub value: String,
-}
-
-/// Range of finite numbers above 0.
-pub const POSITIVE: (Bound<f64>, Bound<f64>) = (Bound::Excluded(0.0), Bound::Included(f64::MAX));
-/// Range of finite numbers from 0.
-pub const NOT_NEGATIVE: RangeInclusive<f64> = 0.0..=f64::MAX;
-
-/// Checks that the parameter at `path` lies in `range`, which `expected` describes. NaN lies in no range.
-///
-/// # Errors
-/// The value is outside the range.
-pub fn check_range(
-    path: &str,
-    value: f64,
-    range: impl RangeBounds<f64>,
-    expected: &str,
-) -> Result<(), RangeError> {
-    if range.contains(&value) {
-        return Ok(());
-    }
-    Err(RangeError { path: path.to_owned(), expected: expected.to_owned(), value: format_number(value) })
 }
 
 /// Escapes control characters other than newlines and tabs, so that untrusted text cannot control a terminal.

@@ -1,6 +1,6 @@
 //! Parameters of the mechanics.
 
-use softvt_common::settings::SettingRange::{Between, NotNegative, Positive};
+use softvt_common::range::Range;
 
 softvt_common::settings! {
     /// Parameters of the mechanics. The defaults are those of the benchmark.
@@ -8,32 +8,32 @@ softvt_common::settings! {
     /// [`check`](softvt_common::settings::SettingField::check) rejects values outside of the valid ranges; a [`World`](super::World) assumes valid ones.
     pub struct PhysicsParams {
         /// Time step. Control runs at 20 Hz independently of it, so it must divide 0.05 s in the benchmark.
-        dt: f64 = 1.0 / 60.0, "s", Between(1e-4, 0.05);
+        dt: f64 = 1.0 / 60.0, "s", Range::closed(1e-4, 0.05);
         /// Mass-proportional Rayleigh damping of soft bodies (α, as air drag). The paper's engine uses 2.5.
-        rayleigh_mass: f64 = 0.0, "1/s", NotNegative;
+        rayleigh_mass: f64 = 0.0, "1/s", Range::NOT_NEGATIVE;
         /// Stiffness-proportional Rayleigh damping of soft bodies (β). Implicit Euler adds its step: motion is damped by β + `dt`, by
         /// default 21.7 ms, so that a smaller step damps less. Equilibria do not depend on it.
-        rayleigh_stiffness: f64 = 5e-3, "s", NotNegative;
+        rayleigh_stiffness: f64 = 5e-3, "s", Range::NOT_NEGATIVE;
         /// Dissipation time scale τ_d of contact springs, s (Castro et al. 2022). A surface that recedes faster
         /// than the springs relax is released; the value is small compared with `dt`, so that friction does not
         /// lift a sliding surface.
-        dissipation_time: f64 = 5e-3, "s", NotNegative;
+        dissipation_time: f64 = 5e-3, "s", Range::NOT_NEGATIVE;
         /// Normal contact stiffness per area of nearly rigid colliders, Pa/m: near rigid for Young's moduli up to 1 MPa.
-        rigid_modulus: f64 = 1e9, "Pa/m", Positive;
+        rigid_modulus: f64 = 1e9, "Pa/m", Range::POSITIVE;
         /// Tangential over normal contact stiffness. Mindlin (1949) gives 0.5 to 0.8 for solids; creep does
         /// not depend on it.
-        shear_ratio: f64 = 0.5, "", Positive;
+        shear_ratio: f64 = 0.5, "", Range::POSITIVE;
         /// Gap below which a sample becomes a contact point. A sample that will reach the surface within 1.5 steps becomes one as well.
-        margin: f64 = 2e-4, "m", Positive;
+        margin: f64 = 2e-4, "m", Range::POSITIVE;
         /// Speed below which a body may fall asleep.
-        sleep_speed: f64 = 1e-4, "m/s", NotNegative;
+        sleep_speed: f64 = 1e-4, "m/s", Range::NOT_NEGATIVE;
         /// Time for which a body must be that slow before it sleeps.
-        sleep_delay: f64 = 0.5, "s", Positive;
+        sleep_delay: f64 = 0.5, "s", Range::POSITIVE;
         /// True if bodies may fall asleep at all.
         sleeping: bool = true;
         /// Longest time for which an element may be inverted before the run is invalid.
-        max_inverted_time: f64 = 0.1, "s", NotNegative;
+        max_inverted_time: f64 = 0.1, "s", Range::NOT_NEGATIVE;
         /// Largest speed of a valid state, m/s: far above that of a gripper (0.2 m/s), an arm, or a fall onto a table.
-        max_speed: f64 = 100.0, "m/s", Positive;
+        max_speed: f64 = 100.0, "m/s", Range::POSITIVE;
     }
 }

@@ -3,11 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use softvt_common::{
-    settings::{
-        SettingField,
-        SettingRange::{Between, NotNegative, Positive},
-    },
-    text::RangeError,
+    range::{Range, RangeError},
+    settings::SettingField,
 };
 
 softvt_common::settings! {
@@ -26,7 +23,7 @@ softvt_common::settings! {
         /// Errors of the measured gripper width.
         width_sensor: WidthSensorSpec;
         /// Delay between a command and the robot's response, control steps of 0.05 s.
-        latency: u32 = 0, "control steps", Between(0.0, MAX_LATENCY);
+        latency: u32 = 0, "control steps", Range::closed(0.0, MAX_LATENCY);
         /// Random offset of the executed poses from the commanded ones.
         disturbance: DisturbanceSpec;
     }
@@ -43,7 +40,7 @@ impl RobotSpec {
     pub fn validate(&self) -> Result<(), RangeError> {
         self.check("robot")?;
         let PadSpec { static_mu, dynamic_mu, .. } = self.pads;
-        Between(0.0, static_mu).check("robot.pads.dynamic_mu", dynamic_mu, "")
+        Range::closed(0.0, static_mu).check("robot.pads.dynamic_mu", dynamic_mu, "")
     }
 }
 
@@ -53,9 +50,9 @@ softvt_common::settings! {
     /// apply to all joints.
     pub struct ArmSpec {
         /// Stiffness.
-        kp: f64 = 8000.0, "N m/rad", Positive;
+        kp: f64 = 8000.0, "N m/rad", Range::POSITIVE;
         /// Damping.
-        kd: f64 = 800.0, "N m s/rad", Positive;
+        kd: f64 = 800.0, "N m s/rad", Range::POSITIVE;
     }
 }
 
@@ -64,15 +61,15 @@ softvt_common::settings! {
     /// by the hardware ([`MAX_WIDTH`](super::gripper::MAX_WIDTH)).
     pub struct GripperSpec {
         /// Stiffness.
-        kp: f64 = 2000.0, "N/m", Positive;
+        kp: f64 = 2000.0, "N/m", Range::POSITIVE;
         /// Damping.
-        kd: f64 = 100.0, "N s/m", Positive;
+        kd: f64 = 100.0, "N s/m", Range::POSITIVE;
         /// Largest force per finger. The real hand holds 70 N continuously (Franka Emika, Hand data sheet); the paper's simulator has 200 N.
-        effort: f64 = 70.0, "N", Positive;
+        effort: f64 = 70.0, "N", Range::POSITIVE;
         /// Speed at which the target of each finger moves.
-        speed: f64 = 0.2, "m/s", Positive;
+        speed: f64 = 0.2, "m/s", Range::POSITIVE;
         /// Mass of each finger with its sensor.
-        finger_mass: f64 = 0.1, "kg", Positive;
+        finger_mass: f64 = 0.1, "kg", Range::POSITIVE;
     }
 }
 
@@ -86,11 +83,11 @@ softvt_common::settings! {
     /// less than a step.
     pub struct WidthSensorSpec {
         /// Step of the measured width; 0 for none.
-        resolution: f64 = 4e-4, "m", Between(0.0, 0.01);
+        resolution: f64 = 4e-4, "m", Range::closed(0.0, 0.01);
         /// Standard deviation of the error that is constant in an episode.
-        offset: f64 = 2.5e-4, "m", Between(0.0, 0.01);
+        offset: f64 = 2.5e-4, "m", Range::closed(0.0, 0.01);
         /// Standard deviation of the noise, new in every control step.
-        noise: f64 = 0.0, "m", Between(0.0, 0.01);
+        noise: f64 = 0.0, "m", Range::closed(0.0, 0.01);
     }
 }
 
@@ -99,13 +96,13 @@ softvt_common::settings! {
     /// for wide patches). It determines force and slip; tactile images are computed from a model of their own.
     pub struct PadSpec {
         /// Normal stress per indentation.
-        normal_modulus: f64 = 3e8, "Pa/m", Positive;
+        normal_modulus: f64 = 3e8, "Pa/m", Range::POSITIVE;
         /// Shear stress per tangential displacement.
-        tangential_modulus: f64 = 4e7, "Pa/m", Positive;
+        tangential_modulus: f64 = 4e7, "Pa/m", Range::POSITIVE;
         /// Friction coefficient while the pad sticks.
-        static_mu: f64 = 1.5, "", NotNegative;
+        static_mu: f64 = 1.5, "", Range::NOT_NEGATIVE;
         /// Dynamic friction coefficient, not above the static one.
-        dynamic_mu: f64 = 1.2, "", NotNegative;
+        dynamic_mu: f64 = 1.2, "", Range::NOT_NEGATIVE;
     }
 }
 
@@ -114,9 +111,9 @@ softvt_common::settings! {
     pub struct IkSpec {
         /// Damping λ of the least squares, in the mixed unit (m and rad per rad) of the Jacobian's singular values.
         /// Larger values are slower and more robust near singularities.
-        lambda: f64 = 0.01, "", Positive;
+        lambda: f64 = 0.01, "", Range::POSITIVE;
         /// Share of the way to the rest posture that the null space covers per control step, 0..=1.
-        posture_gain: f64 = 0.0, "", Between(0.0, 1.0);
+        posture_gain: f64 = 0.0, "", Range::closed(0.0, 1.0);
     }
 }
 
@@ -128,11 +125,11 @@ softvt_common::settings! {
     /// deviations (Laskey et al., *DART*, 2017).
     pub struct DisturbanceSpec {
         /// Standard deviation of the position along each axis.
-        position: f64 = 0.0, "m", Between(0.0, 0.05);
+        position: f64 = 0.0, "m", Range::closed(0.0, 0.05);
         /// Standard deviation of the rotation about each axis.
-        rotation: f64 = 0.0, "rad", Between(0.0, 0.5);
+        rotation: f64 = 0.0, "rad", Range::closed(0.0, 0.5);
         /// Time after which the correlation of the offset has fallen to 1/e.
-        duration: f64 = 0.5, "s", Positive;
+        duration: f64 = 0.5, "s", Range::POSITIVE;
     }
 }
 
@@ -167,16 +164,21 @@ mod tests {
         spec.gripper.kp = -1.0;
         assert_eq!(
             spec.validate().expect_err("negative").to_string(),
-            "robot.gripper.kp: expected a positive number (N/m), got -1"
+            "robot.gripper.kp: expected a number above 0 (N/m), got -1"
         );
         spec = RobotSpec::default();
         spec.ik.posture_gain = f64::NAN;
-        assert!(spec.validate().expect_err("NaN").to_string().contains("ik.posture_gain: expected 0 to 1"));
+        assert!(
+            spec.validate()
+                .expect_err("NaN")
+                .to_string()
+                .contains("ik.posture_gain: expected a number in 0..1")
+        );
         spec = RobotSpec::default();
         spec.pads.dynamic_mu = 1.6;
         assert_eq!(
             spec.validate().expect_err("above static").to_string(),
-            "robot.pads.dynamic_mu: expected 0 to 1.5, got 1.6"
+            "robot.pads.dynamic_mu: expected a number in 0..1.5, got 1.6"
         );
     }
 }

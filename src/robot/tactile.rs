@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::PadSurface;
 use softvt_common::{
-    settings::{Declaration, Setting, SettingField, SettingRange::Between},
-    text::RangeError,
+    range::{Range, RangeError},
+    settings::{Declaration, Setting, SettingField},
 };
 use softvt_geometry::Vec3;
 
@@ -37,15 +37,15 @@ softvt_common::settings! {
     #[derive(Copy)]
     pub struct WearSpec {
         /// Standard deviation of the noise of each marker coordinate in each image.
-        noise_px: f64 = 0.0, "px", Between(0.0, 20.0);
+        noise_px: f64 = 0.0, "px", Range::closed(0.0, 20.0);
         /// Standard deviation of the constant offset of each marker coordinate.
-        offset_px: f64 = 0.0, "px", Between(0.0, 20.0);
+        offset_px: f64 = 0.0, "px", Range::closed(0.0, 20.0);
         /// Factor on the displacements of the markers and on the changes of the image.
-        gain: f64 = 1.0, "", Between(0.0, 10.0);
+        gain: f64 = 1.0, "", Range::closed(0.0, 10.0);
         /// Share of the markers that do not follow the gel.
-        dead_share: f64 = 0.0, "", Between(0.0, 1.0);
+        dead_share: f64 = 0.0, "", Range::closed(0.0, 1.0);
         /// Standard deviation of the noise of each colour value (0 to 255) in each image.
-        image_noise: f64 = 0.0, "of 255", Between(0.0, 128.0);
+        image_noise: f64 = 0.0, "of 255", Range::closed(0.0, 128.0);
     }
 }
 
@@ -54,11 +54,11 @@ softvt_common::settings! {
     #[derive(Copy)]
     pub struct GelSpec {
         /// Shear modulus. 0.145 MPa: twice the C10 identified on a GelSight Mini (Helmut et al., arXiv 2411.03315).
-        shear_modulus: f64 = 1.45e5, "Pa", Between(1e2, 1e9);
+        shear_modulus: f64 = 1.45e5, "Pa", Range::closed(1e2, 1e9);
         /// Poisson's ratio.
-        poisson: f64 = 0.475, "", Between(0.0, 0.499);
+        poisson: f64 = 0.475, "", Range::closed(0.0, 0.499);
         /// Edge of a grid cell.
-        cell: f64 = 4e-4, "m", Between(1e-4, 5e-4);
+        cell: f64 = 4e-4, "m", Range::closed(1e-4, 5e-4);
     }
 }
 
@@ -68,9 +68,9 @@ softvt_common::settings! {
     #[derive(Copy)]
     pub struct Pinhole {
         /// Edge of a pixel on the plane of the apex. 0.0634 mm at 320×240 (GelSight's own figure).
-        pitch: f64 = 6.34e-5, "m", Between(1e-5, 2e-4);
+        pitch: f64 = 6.34e-5, "m", Range::closed(1e-5, 2e-4);
         /// Distance of the pinhole from the apex.
-        lens: f64 = 2.6e-2, "m", Between(5e-3, 1.0);
+        lens: f64 = 2.6e-2, "m", Range::closed(5e-3, 1.0);
     }
 }
 
@@ -134,15 +134,15 @@ softvt_common::settings! {
     #[derive(Copy)]
     pub struct FotsSpec {
         /// Decay of the dilation.
-        dilate: f64 = 0.00125, "1/px²", Between(0.0, 1.0);
+        dilate: f64 = 0.00125, "1/px²", Range::closed(0.0, 1.0);
         /// Decay of the shear.
-        shear: f64 = 0.00021, "1/px²", Between(0.0, 1.0);
+        shear: f64 = 0.00021, "1/px²", Range::closed(0.0, 1.0);
         /// Decay of the twist.
-        twist: f64 = 0.00038, "1/px²", Between(0.0, 1.0);
+        twist: f64 = 0.00038, "1/px²", Range::closed(0.0, 1.0);
         /// Scale of the image, pixels per millimetre.
-        scale: f64 = 19.58, "px/mm", Between(1.0, 1000.0);
+        scale: f64 = 19.58, "px/mm", Range::closed(1.0, 1000.0);
         /// Factor on the depths in mm: 1 in FOTS, 0.1 in the port that SoftVTBench uses.
-        height_factor: f64 = 0.1, "", Between(0.0, 100.0);
+        height_factor: f64 = 0.1, "", Range::closed(0.0, 100.0);
     }
 }
 
@@ -199,7 +199,7 @@ mod tests {
         let mut spec = TactileSpec::default();
         spec.view.pitch = f64::NAN;
         let message = spec.validate().expect_err("NaN").to_string();
-        assert_eq!(message, "tactile.view.pitch: expected 0.00001 to 0.0002 (m), got NaN");
+        assert_eq!(message, "tactile.view.pitch: expected a number in 0.00001..0.0002 (m), got NaN");
         let optics = OpticsModel::Taxim { tables: "x".into() };
         let spec = TactileSpec { shadows: true, optics, ..TactileSpec::default() };
         let message = spec.validate().expect_err("shadows of Taxim").to_string();

@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use nalgebra::Quaternion;
 use serde::{Deserialize, Serialize};
 
-use softvt_common::settings::SettingRange::Between;
+use softvt_common::range::Range;
 use softvt_geometry::{Pose, Quat, Vec3};
 
 /// Frame to which a camera is attached.
@@ -49,9 +49,9 @@ softvt_common::settings! {
     #[derive(Copy, Eq)]
     pub struct CameraSettings {
         /// Width, pixels; `None` for that of the scene.
-        width: Option<usize> = None, "pixels", Between(1.0, MAX_IMAGE_EDGE);
+        width: Option<usize> = None, "pixels", Range::closed(1.0, MAX_IMAGE_EDGE);
         /// Height, pixels; `None` for that of the scene.
-        height: Option<usize> = None, "pixels", Between(1.0, MAX_IMAGE_EDGE);
+        height: Option<usize> = None, "pixels", Range::closed(1.0, MAX_IMAGE_EDGE);
     }
 }
 

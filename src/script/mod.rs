@@ -25,7 +25,6 @@ pub use run::{
     experiment::{Experiment, ExperimentRow, ExperimentSummary},
     expert::{ExpertController, GripController, GripMode},
 };
-pub use schema::Range;
 pub use vm::{
     PrintSink, VmLimits,
     error::ScriptError,

@@ -319,7 +319,7 @@ fn latency_delays_the_response_by_control_steps() {
     assert!(
         project
             .refusal("x.lua --out bad --set robot.latency=101")
-            .contains("robot.latency: expected 0 to 100")
+            .contains("robot.latency: expected a number in 0..100")
     );
 }
 
@@ -351,7 +351,7 @@ fn a_disturbance_moves_the_robot_and_not_its_commands() {
     assert!(
         project
             .refusal("x.lua --out bad --set robot.disturbance.duration=0")
-            .contains("robot.disturbance.duration: expected a positive number (s), got 0")
+            .contains("robot.disturbance.duration: expected a number above 0 (s), got 0")
     );
 }
 

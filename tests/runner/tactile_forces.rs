@@ -115,7 +115,7 @@ fn the_sensors_model_pitch_and_gel_are_settings() {
         "{unknown}"
     );
     let pitch = refusal("{ tactile = { view = { pitch = 0 } } }");
-    assert!(pitch.contains("tactile.view.pitch: expected 0.00001 to 0.0002 (m)"), "{pitch}");
+    assert!(pitch.contains("tactile.view.pitch: expected a number in 0.00001..0.0002 (m)"), "{pitch}");
     let tables = refusal("{ tactile = { optics = { model = \"taxim\", tables = \"nowhere\" } } }");
     assert!(tables.contains("nowhere"), "{tables}");
     let shadows = "{ tactile = { shadows = true, optics = { model = \"taxim\", tables = \"nowhere\" } } }";

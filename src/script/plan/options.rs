@@ -120,13 +120,13 @@ impl OptionSpec {
 
     /// Parses a value of the command line.
     fn parse(&self, text: &str) -> Option<ScriptOptionValue> {
-        let number = |text: &str| text.trim().parse::<f64>().ok().filter(|n| self.range.holds(*n));
+        let number = |text: &str| text.trim().parse::<f64>().ok().filter(|n| self.range.contains(*n));
         let allowed = |text: &str| self.choices.is_empty() || self.choices.iter().any(|c| c == text);
         let entries = || text.split(',').map(str::trim);
         match &self.default {
             ScriptOptionValue::Number(_) => number(text).map(ScriptOptionValue::Number),
             ScriptOptionValue::Integer(_) => {
-                let integer = text.trim().parse::<i64>().ok().filter(|n| self.range.holds(*n as f64));
+                let integer = text.trim().parse::<i64>().ok().filter(|n| self.range.contains(*n as f64));
                 integer.map(ScriptOptionValue::Integer)
             }
             ScriptOptionValue::Text(_) => allowed(text).then(|| ScriptOptionValue::Text(text.to_owned())),

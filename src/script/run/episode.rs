@@ -225,7 +225,7 @@ fn check_materials(scene: &Scene) -> Result<(), ScriptError> {
     for object in &scene.objects {
         let factors = [("youngs_pa", object.youngs_factor()), ("density", object.density_factor())];
         for (key, factor) in factors {
-            let Some(factor) = factor.filter(|factor| !MATERIAL_FACTORS.holds(*factor)) else { continue };
+            let Some(factor) = factor.filter(|factor| !MATERIAL_FACTORS.contains(*factor)) else { continue };
             let message = format!(
                 "object.{key}: the layout gives {:?} {} times the {key} of its asset {:?}, expected{}; declare an asset of \
                  that material, or a shift",
@@ -326,7 +326,7 @@ pub fn check_shift(shifts: &[Shift], name: &str, value: f64) -> Result<(), Shift
         return Err(ShiftError::Unknown { name, known });
     };
     let range = Range::between(shift.min, shift.max);
-    if range.holds(value) {
+    if range.contains(value) {
         return Ok(());
     }
     let (range, unit, value) = (range.describe(), shift.unit.clone(), format_number(value));

@@ -39,10 +39,10 @@ impl Type {
         let kept = |accepted: bool| if accepted { Ok(value.clone()) } else { Err(wrong()) };
         match (self, value) {
             (Self::Number(_, range), _) => {
-                number(value).filter(|n| range.holds(*n)).map(Value::Number).ok_or_else(wrong)
+                number(value).filter(|n| range.contains(*n)).map(Value::Number).ok_or_else(wrong)
             }
             (Self::Integer(range), _) => {
-                whole(value).filter(|n| range.holds(*n as f64)).map(Value::Integer).ok_or_else(wrong)
+                whole(value).filter(|n| range.contains(*n as f64)).map(Value::Integer).ok_or_else(wrong)
             }
             (Self::Text, Value::String(text)) if text.as_bytes().len() > MAX_TEXT_BYTES => {
                 let message =
@@ -117,7 +117,7 @@ impl Type {
             return Err(self.expected(&got));
         }
         let checked = values.iter().enumerate().map(|(index, value)| {
-            let number = number(value).filter(|number| range.holds(*number));
+            let number = number(value).filter(|number| range.contains(*number));
             number.ok_or_else(|| {
                 let message = format!("expected a number{}, got {}", range.describe(), describe(value));
                 ValidationError::new(message).inside(format!("[{}]", index + 1))

@@ -11,6 +11,8 @@ pub(crate) mod object;
 
 use mlua::{Lua, Table};
 
+pub(crate) use softvt_common::range::Range;
+
 pub(crate) use check::{error_at_key, invalid, is_constructed, make, validate};
 pub(crate) use convert::{
     Constructed, FromChecked, HasTable, LuaType, RecordType, Unchecked, choice, one_of, record, record_of,
@@ -128,69 +130,6 @@ impl Record {
 
     fn names(&self) -> impl Iterator<Item = &'static str> + Clone + use<> {
         self.fields.iter().map(|field| field.name)
-    }
-}
-
-/// Bounds of a number; either end may be excluded.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Range {
-    pub min: f64,
-    pub max: f64,
-    /// True if `min` itself is refused.
-    pub above_min: bool,
-    /// True if `max` itself is refused.
-    pub below_max: bool,
-}
-
-impl Range {
-    /// Any finite number.
-    pub const ANY: Self =
-        Self { min: f64::NEG_INFINITY, max: f64::INFINITY, above_min: false, below_max: false };
-    /// Greater than zero.
-    pub const POSITIVE: Self = Self { min: 0.0, above_min: true, ..Self::ANY };
-    /// Zero or greater.
-    pub const NOT_NEGATIVE: Self = Self { min: 0.0, ..Self::ANY };
-
-    /// From `min` to `max`, both included.
-    pub const fn closed(min: f64, max: f64) -> Self {
-        Self { min, max, above_min: false, below_max: false }
-    }
-
-    /// From `min` (included) to `max` (excluded).
-    pub const fn below(min: f64, max: f64) -> Self {
-        Self { min, max, above_min: false, below_max: true }
-    }
-
-    /// From `min` (excluded) to `max` (included).
-    pub const fn above(min: f64, max: f64) -> Self {
-        Self { min, max, above_min: true, below_max: false }
-    }
-
-    /// From `min` to `max`, both included; an end that is `None` is open.
-    pub fn between(min: Option<f64>, max: Option<f64>) -> Self {
-        Self::closed(min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY))
-    }
-
-    /// True if `value` is finite and within the bounds.
-    pub fn holds(&self, value: f64) -> bool {
-        let low = if self.above_min { value > self.min } else { value >= self.min };
-        let high = if self.below_max { value < self.max } else { value <= self.max };
-        value.is_finite() && low && high
-    }
-
-    /// The bounds for a message: ` in 0..10`, ` above 0`, …; empty for any number.
-    pub fn describe(&self) -> String {
-        match (self.min.is_finite(), self.max.is_finite()) {
-            (false, false) => String::new(),
-            (true, false) if self.above_min => format!(" above {}", self.min),
-            (true, false) => format!(" of {} or more", self.min),
-            (false, true) => format!(" of {} or less", self.max),
-            (true, true) => {
-                let low = if self.above_min { "above " } else { "" };
-                let high = if self.below_max { "below " } else { "" };
-                format!(" in {low}{}..{high}{}", self.min, self.max)
-            }
-        }
     }
 }
 

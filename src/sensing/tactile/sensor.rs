@@ -9,7 +9,7 @@ use super::{
     image::{OpticsError, PolynomialOptics, TaximOptics},
     markers::{MarkerStyle, Markers},
 };
-use softvt_common::{npy::NpzError, text::RangeError};
+use softvt_common::{npy::NpzError, range::RangeError};
 use softvt_robot::PadSurface;
 use softvt_robot::tactile::{MarkerModel, OpticsModel, TactileSpec};
 

@@ -7,7 +7,7 @@ use super::{
     elastic_layer::LayerResponse,
     fourier::{FftBuffers, PaddedFft},
 };
-use softvt_common::text::RangeError;
+use softvt_common::range::RangeError;
 use softvt_robot::PadSurface;
 use softvt_robot::tactile::{GelSpec, Pinhole, TactileSpec};
 

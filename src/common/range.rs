@@ -1,0 +1,133 @@
+//! Ranges of numbers: what a parameter may be, in settings, materials and scripts.
+
+use super::text::format_number;
+
+/// Bounds of a finite number; either end may be excluded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// Lower bound.
+    pub min: f64,
+    /// Upper bound.
+    pub max: f64,
+    /// True if `min` itself is refused.
+    pub above_min: bool,
+    /// True if `max` itself is refused.
+    pub below_max: bool,
+}
+
+/// Error of a parameter out of its range.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{path}: expected {expected}, got {value}")]
+pub struct RangeError {
+    /// Dotted path of the parameter, for example `robot.arm.kp`.
+    pub path: String,
+    /// Description of the valid range, with its unit.
+    pub expected: String,
+    /// Value given, as text.
+    pub value: String,
+}
+
+impl Range {
+    /// Any finite number.
+    pub const ANY: Self =
+        Self { min: f64::NEG_INFINITY, max: f64::INFINITY, above_min: false, below_max: false };
+    /// Greater than zero.
+    pub const POSITIVE: Self = Self { min: 0.0, above_min: true, ..Self::ANY };
+    /// Zero or greater.
+    pub const NOT_NEGATIVE: Self = Self { min: 0.0, ..Self::ANY };
+
+    /// From `min` to `max`, both included.
+    pub const fn closed(min: f64, max: f64) -> Self {
+        Self { min, max, above_min: false, below_max: false }
+    }
+
+    /// From `min` (included) to `max` (excluded).
+    pub const fn below(min: f64, max: f64) -> Self {
+        Self { min, max, above_min: false, below_max: true }
+    }
+
+    /// From `min` (excluded) to `max` (included).
+    pub const fn above(min: f64, max: f64) -> Self {
+        Self { min, max, above_min: true, below_max: false }
+    }
+
+    /// From `min` to `max`, both included; an end that is `None` is open.
+    pub fn between(min: Option<f64>, max: Option<f64>) -> Self {
+        Self::closed(min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY))
+    }
+
+    /// True if `value` is finite and within the bounds.
+    pub fn contains(&self, value: f64) -> bool {
+        let low = if self.above_min { value > self.min } else { value >= self.min };
+        let high = if self.below_max { value < self.max } else { value <= self.max };
+        value.is_finite() && low && high
+    }
+
+    /// Checks a value of the parameter at `path`, which has this unit; "" for none.
+    ///
+    /// # Errors
+    /// The value is outside of the range.
+    pub fn check(&self, path: &str, value: f64, unit: &str) -> Result<(), RangeError> {
+        if self.contains(value) {
+            return Ok(());
+        }
+        let expected = self.expected("a number", unit);
+        Err(RangeError { path: path.to_owned(), expected, value: format_number(value) })
+    }
+
+    /// A value of this range in words, where `noun` says what it is: `a number in 0..0.5 (rad)`.
+    pub fn expected(&self, noun: &str, unit: &str) -> String {
+        let unit = if unit.is_empty() { String::new() } else { format!(" ({unit})") };
+        format!("{noun}{}{unit}", self.describe())
+    }
+
+    /// The bounds for a message: ` in 0..10`, ` above 0`, …; empty for any number.
+    pub fn describe(&self) -> String {
+        let [min, max] = [self.min, self.max]
+            .map(|end| if end.fract() == 0.0 { end.to_string() } else { format_number(end) });
+        match (self.min.is_finite(), self.max.is_finite()) {
+            (false, false) => String::new(),
+            (true, false) if self.above_min => format!(" above {min}"),
+            (true, false) => format!(" of {min} or more"),
+            (false, true) => format!(" of {max} or less"),
+            (true, true) => {
+                let low = if self.above_min { "above " } else { "" };
+                let high = if self.below_max { "below " } else { "" };
+                format!(" in {low}{min}..{high}{max}")
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ends_count_as_declared_and_numbers_that_are_not_finite_lie_in_no_range() {
+        let ends = |range: Range| [0.0, 0.25, 0.5].map(|value| range.contains(value));
+        assert_eq!(ends(Range::closed(0.0, 0.5)), [true, true, true]);
+        assert_eq!(ends(Range::below(0.0, 0.5)), [true, true, false]);
+        assert_eq!(ends(Range::above(0.0, 0.5)), [false, true, true]);
+        assert_eq!(ends(Range::between(Some(0.25), None)), [false, true, true]);
+        assert_eq!(ends(Range::POSITIVE), [false, true, true]);
+        let not_finite = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
+        assert!(not_finite.iter().all(|value| !Range::ANY.contains(*value)));
+    }
+
+    #[test]
+    fn an_error_names_parameter_range_unit_and_value() {
+        let message =
+            |range: Range, unit| range.check("arm.kp", f64::NAN, unit).expect_err("no number").to_string();
+        assert_eq!(message(Range::POSITIVE, "N/m"), "arm.kp: expected a number above 0 (N/m), got NaN");
+        assert_eq!(message(Range::NOT_NEGATIVE, ""), "arm.kp: expected a number of 0 or more, got NaN");
+        assert_eq!(
+            message(Range::below(1e-9, 0.5), ""),
+            "arm.kp: expected a number in 1e-9..below 0.5, got NaN"
+        );
+        assert_eq!(
+            message(Range::between(None, Some(2.0)), ""),
+            "arm.kp: expected a number of 2 or less, got NaN"
+        );
+    }
+}
