@@ -60,7 +60,7 @@ struct Outcome {
 impl Scene {
     fn new(case: &Case, sleeping: bool) -> Self {
         let shape = Shape::Box { half: Vec3::repeat(0.5 * EDGE) };
-        let material = ElasticMaterial { youngs_pa: 3e4, poisson: 0.4, density: 300.0 };
+        let material = ElasticMaterial::new(3e4, 0.4, 300.0).expect("valid");
         let volume = mass_properties(&shape, 1.0).mass;
         let model = FemModel::from_shape(&shape, volume, material, case.resolution, &SampleSpec::default());
         let model = model.expect("a cube has a mesh");

@@ -93,7 +93,7 @@ fn soft_assets_have_their_reference_size_and_material_and_rest_on_zero() {
         assert!(bounds.centre().xy().amax() < SIZE_TOLERANCE, "{name}: centre at {:?}", bounds.centre());
         let Body::Soft(soft) = &asset.body else { panic!("{name} is not soft") };
         assert_eq!(
-            (soft.youngs_pa, soft.poisson, soft.density),
+            (soft.elastic.youngs_pa(), soft.elastic.poisson(), soft.elastic.density()),
             (youngs_kpa * 1e3, poisson, density),
             "{name}"
         );

@@ -2,11 +2,7 @@
 
 use std::{convert::Infallible, sync::Arc};
 
-use super::{
-    build_error::BuildError,
-    shared_cache::SharedCache,
-    soft_model::{SoftGeometry, check_material},
-};
+use super::{build_error::BuildError, shared_cache::SharedCache, soft_model::SoftGeometry};
 use softvt_geometry::{
     Aabb, Pose, Vec3,
     cavity::cavity,
@@ -119,7 +115,6 @@ impl AssetCache {
             _ => material,
         };
         let build = || {
-            check_material(&asset.name, material)?;
             let geometry = self.geometries.get(
                 nominal,
                 |known| known.shape == nominal.shape && has_discretisation(known, declared),

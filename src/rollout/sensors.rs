@@ -7,7 +7,6 @@ use super::{
     sensor_assets::{SensingError, SensorAssets},
     sensor_noise::SensorSeed,
     simulation::{ObjectInstance, Simulation},
-    soft_model::elastic_material,
 };
 use softvt_benchmark::CONTROL_DT;
 use softvt_geometry::{Pose, Vec3};
@@ -23,7 +22,7 @@ use softvt_robot::{
     pads,
     panda::{self, ARM_DOFS},
 };
-use softvt_scene::{Body, Camera, CameraMount, Scene};
+use softvt_scene::{Camera, CameraMount, Scene};
 use softvt_sensing::{
     camera::{
         CameraError, FrameView, RenderObject, RenderScene, RenderedImage, Renderer, check_cameras,
@@ -453,8 +452,8 @@ fn is_in_contact(object: &ObjectInstance, patch: &ContactPatch) -> bool {
 
 /// Compliance of a soft body to a gel in ridges too fine for its elements.
 fn substrate_of(object: &ObjectInstance) -> Option<SubstrateCompliance> {
-    let (Body::Soft(material), Some(model)) = (&object.asset.body, &object.model) else { return None };
-    let modulus = elastic_material(material).plane_strain_modulus();
+    let model = object.model.as_ref()?;
+    let modulus = model.material.plane_strain_modulus();
     Some(SubstrateCompliance { modulus, resolved: 2.0 * model.mesh.edge })
 }
 

@@ -1,4 +1,4 @@
-//! Finite-element models of soft assets, and the checks of their shapes and materials.
+//! Finite-element models of soft assets, and the checks of their shapes.
 
 use std::sync::Arc;
 
@@ -11,10 +11,7 @@ use softvt_geometry::{
     shape::Shape,
     voxel::{SurfaceSample, VoxelMesh, VoxelSpec, voxel_mesh},
 };
-use softvt_physics::{
-    World,
-    fem::{ElasticMaterial, FemModel, MaterialError},
-};
+use softvt_physics::{World, fem::FemModel};
 use softvt_scene::SoftMaterial;
 
 /// Factor on the spacing of contact samples for approximate models.
@@ -55,9 +52,8 @@ pub fn cost_warning(world: &World) -> Option<String> {
 /// Builds the finite-element model of a soft body. `name` identifies the asset in error messages.
 ///
 /// # Errors
-/// The shape cannot be meshed, or a material parameter is out of range.
+/// The shape cannot be meshed.
 pub fn soft_model(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<Arc<FemModel>, BuildError> {
-    check_material(name, material)?;
     Ok(SoftGeometry::new(name, shape, material, false)?.model(material, 1.0))
 }
 
@@ -100,7 +96,7 @@ impl SoftGeometry {
     /// The model of a body of this shape at `scale` times the size. Its deformations under proportional loads are those
     /// of the unscaled body, up to rounding.
     pub(super) fn model(&self, material: &SoftMaterial, scale: f64) -> Arc<FemModel> {
-        let law = elastic_material(material);
+        let law = material.elastic;
         if scale == 1.0 {
             return FemModel::new(self.mesh.clone(), law, self.volume, self.samples.clone());
         }
@@ -118,18 +114,6 @@ fn check_connected(name: &str, mesh: &VoxelMesh) -> Result<(), BuildError> {
         1e3 * gap
     );
     Err(BuildError::Material { asset: name.to_owned(), what })
-}
-
-/// Checks the parameters of a material.
-pub(super) fn check_material(name: &str, m: &SoftMaterial) -> Result<(), BuildError> {
-    let wrong =
-        |error: MaterialError| BuildError::Material { asset: name.to_owned(), what: error.to_string() };
-    elastic_material(m).check().map_err(wrong)
-}
-
-/// The elasticity and density of a material.
-pub(super) fn elastic_material(m: &SoftMaterial) -> ElasticMaterial {
-    ElasticMaterial { youngs_pa: m.youngs_pa, poisson: m.poisson, density: m.density }
 }
 
 /// Maximum number of contact samples of one body. More take minutes to compute; nearly always the size
@@ -188,15 +172,13 @@ mod tests {
     use super::*;
     use softvt_evaluation::deformation::ReferenceShape;
     use softvt_geometry::{Pose, Vec3};
-    use softvt_physics::{BodyId, PhysicsParams, World, contact::Friction};
+    use softvt_physics::{BodyId, PhysicsParams, World, contact::Friction, fem::ElasticMaterial};
 
     const RADIUS: f64 = 0.03;
 
     fn ball() -> (Shape, SoftMaterial) {
         let material = SoftMaterial {
-            youngs_pa: 3e4,
-            poisson: 0.4,
-            density: 300.0,
+            elastic: ElasticMaterial::new(3e4, 0.4, 300.0).expect("valid"),
             resolution: 4,
             grasp_spacing: 4e-3,
             collapse_strain: None,

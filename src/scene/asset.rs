@@ -5,8 +5,9 @@ use std::{collections::BTreeMap, sync::Arc};
 use serde::{Deserialize, Serialize};
 
 use super::visual::Visual;
+use softvt_common::range::RangeError;
 use softvt_geometry::{Pose, Vec3, mass::mass_properties, shape::Shape};
-use softvt_physics::contact::Friction;
+use softvt_physics::{contact::Friction, fem::ElasticMaterial};
 
 /// Hint that gives the width of an asset where the fingers grasp it.
 const GRASP_WIDTH_HINT: &str = "grasp_width_m";
@@ -29,25 +30,19 @@ pub enum Body {
     Scenery,
 }
 
-/// Isotropic linear-elastic material of a soft body, and its discretisation.
-/// Its serialised names are part of fingerprints of assets.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Material of a soft body, and its discretisation. Its serialised names are part of fingerprints of assets.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SoftMaterial {
-    /// Young's modulus, Pa; the shipped pastries have 2.5e4 to 2.2e5.
-    pub youngs_pa: f64,
-    /// Poisson's ratio, 0 ≤ ν < 0.5.
-    pub poisson: f64,
-    /// Density, kg/m³.
-    pub density: f64,
+    /// Elasticity and density; the shipped pastries have Young's moduli of 2.5e4 to 2.2e5 Pa.
+    #[serde(flatten)]
+    pub elastic: ElasticMaterial,
     /// Voxels (finite elements) along the longest edge of the bounding box, 1..=[`Self::MAX_RESOLUTION`].
     pub resolution: usize,
     /// Spacing of the contact samples on surfaces that a gripper can reach (|n_z| ≤ 0.7 in the object frame), m.
     pub grasp_spacing: f64,
     /// Compressive strain, in (0, 1], at which cell walls buckle and a plateau of stress begins.
-    #[serde(default)]
     pub collapse_strain: Option<f64>,
     /// Compressive strain, in (0, 1], that leaves a visible crack or set.
-    #[serde(default)]
     pub damage_strain: Option<f64>,
 }
 
@@ -95,11 +90,25 @@ impl Asset {
     /// Mass (kg) of a soft or rigid body, or of the moving parts of an articulated one; `None` for fixed objects.
     pub fn mass(&self) -> Option<f64> {
         match &self.body {
-            Body::Soft(SoftMaterial { density, .. }) | Body::Rigid { density } => {
-                Some(mass_properties(&self.shape, *density).mass)
-            }
             Body::Articulated(parts) => Some(parts.iter().map(Part::mass).sum()),
-            Body::Static | Body::Scenery => None,
+            _ => self.density().map(|density| mass_properties(&self.shape, density).mass),
+        }
+    }
+
+    /// Elasticity and density of a soft body.
+    pub fn elastic(&self) -> Option<ElasticMaterial> {
+        match &self.body {
+            Body::Soft(material) => Some(material.elastic),
+            _ => None,
+        }
+    }
+
+    /// Density of a soft or rigid body, kg/m³.
+    pub fn density(&self) -> Option<f64> {
+        match &self.body {
+            Body::Soft(material) => Some(material.elastic.density()),
+            Body::Rigid { density } => Some(*density),
+            Body::Articulated(_) | Body::Static | Body::Scenery => None,
         }
     }
 
@@ -111,12 +120,19 @@ impl Asset {
     }
 
     /// Multiplies the density of everything that moves by `factor`.
-    pub fn scale_mass(&mut self, factor: f64) {
+    ///
+    /// # Errors
+    /// The product is not the density of a soft body.
+    pub fn scale_mass(&mut self, factor: f64) -> Result<(), RangeError> {
         match &mut self.body {
-            Body::Soft(SoftMaterial { density, .. }) | Body::Rigid { density } => *density *= factor,
-            Body::Articulated(parts) => parts.iter_mut().for_each(|part| part.scale_mass(factor)),
+            Body::Soft(SoftMaterial { elastic, .. }) => {
+                *elastic = elastic.with_density(elastic.density() * factor)?;
+            }
+            Body::Rigid { density } => *density *= factor,
+            Body::Articulated(parts) => parts.iter_mut().try_for_each(|part| part.scale_mass(factor))?,
             Body::Static | Body::Scenery => {}
         }
+        Ok(())
     }
 }
 
@@ -188,9 +204,9 @@ impl Part {
     }
 
     /// Multiplies the density by `factor`.
-    pub(super) fn scale_mass(&mut self, factor: f64) {
+    fn scale_mass(&mut self, factor: f64) -> Result<(), RangeError> {
         self.density *= factor;
-        Arc::make_mut(&mut self.asset).scale_mass(factor);
+        Arc::make_mut(&mut self.asset).scale_mass(factor)
     }
 }
 

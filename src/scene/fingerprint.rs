@@ -104,7 +104,7 @@ mod tests {
     use super::*;
     use crate::{SoftMaterial, Visual};
     use softvt_geometry::{Pose, Vec3, mesh::Mesh, shape::Shape};
-    use softvt_physics::contact::Friction;
+    use softvt_physics::{contact::Friction, fem::ElasticMaterial};
 
     fn bun() -> Asset {
         Asset {
@@ -114,9 +114,7 @@ mod tests {
                 pose: Pose::translation(0.0, 0.0, 0.03),
             },
             body: Body::Soft(SoftMaterial {
-                youngs_pa: 2e4,
-                poisson: 0.4,
-                density: 300.0,
+                elastic: ElasticMaterial::new(2e4, 0.4, 300.0).expect("valid"),
                 resolution: 6,
                 grasp_spacing: 7.5e-4,
                 collapse_strain: Some(0.1),
@@ -146,7 +144,10 @@ mod tests {
         assert!(changed(&|a| a.shape = Shape::Sphere { radius: 0.030_001 }));
         assert!(changed(&|a| a.shape = Shape::Box { half: Vec3::repeat(0.03) }));
         assert!(changed(&|a| a.friction.static_mu = 0.7));
-        assert!(soft(&|m| m.youngs_pa = 2.1e4) && soft(&|m| m.poisson = 0.3) && soft(&|m| m.density = 301.0));
+        let elastic = |youngs_pa, poisson, density| {
+            soft(&|m| m.elastic = ElasticMaterial::new(youngs_pa, poisson, density).expect("valid"))
+        };
+        assert!(elastic(2.1e4, 0.4, 300.0) && elastic(2e4, 0.3, 300.0) && elastic(2e4, 0.4, 301.0));
         assert!(soft(&|m| m.resolution = 7));
         assert!(soft(&|m| m.collapse_strain = None) && soft(&|m| m.damage_strain = Some(0.1)));
         assert!(!changed(&|a| a.name = "roll".into()));
@@ -160,7 +161,7 @@ mod tests {
             }),
             "paint between two placements"
         );
-        assert!(!soft(&|m| m.youngs_pa = 2e4 * (1.0 + f64::EPSILON)), "the last bit does not enter");
+        assert!(!elastic(2e4 * (1.0 + f64::EPSILON), 0.4, 300.0), "the last bit does not enter");
     }
 
     #[test]

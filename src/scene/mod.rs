@@ -9,13 +9,11 @@
 //!
 //! ```
 //! use softvt_geometry::{Vec3, shape::Shape};
-//! use softvt_physics::contact::Friction;
+//! use softvt_physics::{contact::Friction, fem::ElasticMaterial};
 //! use softvt_scene::{Asset, Body, SoftMaterial, Visual};
 //!
 //! let material = SoftMaterial {
-//!     youngs_pa: 5e4,
-//!     poisson: 0.4,
-//!     density: 300.0,
+//!     elastic: ElasticMaterial::new(5e4, 0.4, 300.0)?,
 //!     resolution: 10,
 //!     grasp_spacing: 7.5e-4,
 //!     collapse_strain: Some(0.1),
@@ -30,13 +28,14 @@
 //!     visuals: vec![Visual::plain([0.6, 0.4, 0.2], 0.8, 0.0)],
 //!     hints: Default::default(),
 //! };
-//! let rigid = Asset { body: Body::Rigid { density: material.density }, ..soft.clone() };
+//! let rigid = Asset { body: Body::Rigid { density: material.elastic.density() }, ..soft.clone() };
 //!
 //! let mass = soft.mass().expect("a soft body has a mass");
 //! assert!((mass / 0.0339 - 1.0).abs() < 0.02, "{mass} kg");
 //! assert_eq!(rigid.mass(), Some(mass));
 //! // Calibrations refer to assets by this hash, which appearance and name do not enter.
 //! assert_ne!(rigid.fingerprint(), soft.fingerprint());
+//! # Ok::<(), softvt_common::range::RangeError>(())
 //! ```
 #![warn(missing_docs, unreachable_pub)]
 
@@ -125,11 +124,7 @@ impl Object {
     /// D is a strain over a diagonal, so that a limit holds whatever the stiffness, density, friction, colour or uniform
     /// scale. Poisson's ratio changes how a shape deforms under the same strain.
     pub fn departure(&self) -> Option<String> {
-        let poisson = |asset: &Asset| match &asset.body {
-            Body::Soft(material) => Some(material.poisson),
-            _ => None,
-        };
-        let (own, nominal) = (poisson(&self.asset)?, poisson(&self.nominal)?);
+        let [own, nominal] = [self.asset.elastic()?.poisson(), self.nominal.elastic()?.poisson()];
         (own != nominal).then(|| format!("Poisson's ratio {own} instead of {nominal}"))
     }
 }
@@ -149,7 +144,7 @@ impl Scene {
     pub fn rigid_twin(mut self) -> Self {
         for object in &mut self.objects {
             if let Body::Soft(material) = &object.asset.body {
-                let density = material.density;
+                let density = material.elastic.density();
                 Arc::make_mut(&mut object.asset).body = Body::Rigid { density };
             }
         }

@@ -2,6 +2,7 @@
 
 use super::{Asset, Body, Part, SoftMaterial};
 use softvt_common::text::format_number;
+use softvt_physics::fem::ElasticMaterial;
 
 /// Smallest plausible Young's modulus, Pa: soft gels have some hundred.
 const MIN_YOUNGS_PA: f64 = 300.0;
@@ -20,9 +21,9 @@ impl Asset {
     /// Warnings about its material, one sentence each.
     pub fn warnings(&self) -> Vec<String> {
         match &self.body {
-            Body::Soft(material @ SoftMaterial { youngs_pa, density, .. }) => {
-                let units = youngs_warning(*youngs_pa).into_iter().chain(density_warning(*density));
-                units.chain(self.sag_warning(material)).collect()
+            Body::Soft(SoftMaterial { elastic, .. }) => {
+                let units = [youngs_warning(elastic.youngs_pa()), density_warning(elastic.density())];
+                units.into_iter().flatten().chain(self.sag_warning(elastic)).collect()
             }
             Body::Rigid { density } => density_warning(*density).into_iter().collect(),
             Body::Articulated(parts) => parts.iter().filter_map(part_warning).collect(),
@@ -31,8 +32,8 @@ impl Asset {
     }
 
     /// A warning about a soft body that is compressed by its own weight: ρ g h / 2 E for an upright block of height h.
-    fn sag_warning(&self, material: &SoftMaterial) -> Option<String> {
-        let SoftMaterial { youngs_pa, density, .. } = material;
+    fn sag_warning(&self, material: &ElasticMaterial) -> Option<String> {
+        let (youngs_pa, density) = (material.youngs_pa(), material.density());
         let height = self.shape.bounds().size().z;
         let sag = density * GRAVITY * height / (2.0 * youngs_pa);
         let left = match sag {
@@ -43,8 +44,8 @@ impl Asset {
         Some(format!(
             "it {left} under its own weight ({} mm high, {} kg/m³, {} Pa); youngs_pa is in pascals, density in kg/m³",
             format_number((1e3 * height).round()),
-            format_number(*density),
-            format_number(*youngs_pa)
+            format_number(density),
+            format_number(youngs_pa)
         ))
     }
 }
@@ -84,9 +85,7 @@ mod tests {
 
     fn warnings(youngs_pa: f64, density: f64) -> Vec<String> {
         let material = SoftMaterial {
-            youngs_pa,
-            poisson: 0.3,
-            density,
+            elastic: ElasticMaterial::new(youngs_pa, 0.3, density).expect("valid"),
             resolution: 6,
             grasp_spacing: 1e-3,
             collapse_strain: None,

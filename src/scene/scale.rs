@@ -5,8 +5,7 @@ use std::sync::Arc;
 use softvt_geometry::{Vec3, shape::Shape};
 
 use super::{
-    Object,
-    asset::{Asset, Body, SoftMaterial},
+    Body, Object, SoftMaterial,
     decal::{LabelLine, TextDecal},
     visual::{Mask, Visual, VisualLayer},
 };
@@ -51,10 +50,7 @@ impl Object {
 
     /// Young's modulus relative to that of the asset; `None` if it is not a soft body.
     pub fn youngs_factor(&self) -> Option<f64> {
-        match (&self.asset.body, &self.nominal.body) {
-            (Body::Soft(own), Body::Soft(nominal)) => Some(own.youngs_pa / nominal.youngs_pa),
-            _ => None,
-        }
+        Some(self.asset.elastic()?.youngs_pa() / self.nominal.elastic()?.youngs_pa())
     }
 
     /// Stable strain of the material relative to that of the asset; `None` if it is not a soft body that states one.
@@ -74,16 +70,6 @@ impl Object {
     /// Density relative to that of the asset; `None` if it is neither a soft nor a rigid body.
     pub fn density_factor(&self) -> Option<f64> {
         Some(self.asset.density()? / self.nominal.density()?)
-    }
-}
-
-impl Asset {
-    /// Density of a soft or rigid body, kg/m³.
-    fn density(&self) -> Option<f64> {
-        match &self.body {
-            Body::Soft(SoftMaterial { density, .. }) | Body::Rigid { density } => Some(*density),
-            Body::Articulated(_) | Body::Static | Body::Scenery => None,
-        }
     }
 }
 
@@ -161,14 +147,13 @@ impl Mask {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Asset;
     use softvt_geometry::Pose;
-    use softvt_physics::contact::Friction;
+    use softvt_physics::{contact::Friction, fem::ElasticMaterial};
 
     fn ball() -> Object {
         let material = SoftMaterial {
-            youngs_pa: 2e4,
-            poisson: 0.4,
-            density: 300.0,
+            elastic: ElasticMaterial::new(2e4, 0.4, 300.0).expect("valid"),
             resolution: 6,
             grasp_spacing: 1e-3,
             collapse_strain: None,
@@ -228,7 +213,7 @@ mod tests {
     fn changed_materials_survive_the_scale_and_count_as_factors() {
         let mut object = ball();
         let Body::Soft(material) = &mut Arc::make_mut(&mut object.asset).body else { panic!("soft") };
-        (material.youngs_pa, material.density) = (4e4, 150.0);
+        material.elastic = ElasticMaterial::new(4e4, 0.4, 150.0).expect("valid");
         Arc::make_mut(&mut object.asset).visuals[0].tint([0.5, 1.0, 3.0]);
         object.set_scale(0.9);
         assert_eq!((object.youngs_factor(), object.density_factor()), (Some(2.0), Some(0.5)));

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use softvt_common::range::RangeError;
 use softvt_geometry::{Pose, Quat, Vec3};
 use softvt_physics::contact::Friction;
 
@@ -30,14 +31,19 @@ pub struct ObjectVariation {
 
 impl ObjectVariation {
     /// Changes an object. Sizes and material numbers are multiplied.
-    pub fn apply(&self, object: &mut Object) {
+    ///
+    /// # Errors
+    /// A product is out of the range of the material.
+    pub fn apply(&self, object: &mut Object) -> Result<(), RangeError> {
         object.set_scale(object.scale * self.scale);
         let asset = Arc::make_mut(&mut object.asset);
         asset.friction.static_mu *= self.friction_factor;
         asset.friction.dynamic_mu *= self.friction_factor;
         if let Body::Soft(material) = &mut asset.body {
-            material.youngs_pa *= self.youngs_factor;
-            material.density *= self.density_factor;
+            let nominal = material.elastic;
+            material.elastic = nominal
+                .with_youngs_pa(nominal.youngs_pa() * self.youngs_factor)?
+                .with_density(nominal.density() * self.density_factor)?;
             if let Some(hidden) = self.hidden {
                 let strains = [&mut material.collapse_strain, &mut material.damage_strain];
                 strains.into_iter().flatten().for_each(|strain| *strain *= hidden.strain_factor);
@@ -45,6 +51,7 @@ impl ObjectVariation {
             }
         }
         asset.visuals.iter_mut().for_each(|visual| visual.tint(self.colour));
+        Ok(())
     }
 }
 
@@ -107,10 +114,13 @@ impl SceneVariation {
 
     /// Changes the scene. Sizes and material numbers are multiplied, so that those of the layout still count. Names that
     /// the scene does not contain are ignored.
-    pub fn apply(&self, scene: &mut Scene) {
+    ///
+    /// # Errors
+    /// As [`ObjectVariation::apply`].
+    pub fn apply(&self, scene: &mut Scene) -> Result<(), RangeError> {
         for object in &mut scene.objects {
             let Some(drawn) = self.objects.get(&object.name) else { continue };
-            drawn.apply(object);
+            drawn.apply(object)?;
         }
         scene.lighting.key.strength *= self.light.strength;
         scene.lighting.sky.strength *= self.light.strength;
@@ -119,5 +129,6 @@ impl SceneVariation {
             let turn = Quat::from_scaled_axis(Vec3::from(drawn.rotation_rad));
             camera.pose *= Pose::from_parts(Vec3::from(drawn.offset_m).into(), turn);
         }
+        Ok(())
     }
 }

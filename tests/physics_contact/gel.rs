@@ -177,7 +177,7 @@ fn contacts_of_soft_and_rigid_bodies_are_recorded_alike() {
     let shape = cuboid(0.05, 0.05, 0.05);
     let low = rigid(&mut world, &shape, 0.3, at(0.0, 0.0, 0.025), friction(0.6, 0.5));
     let high = rigid(&mut world, &shape, 0.2, at(0.0, 0.0, 0.075), friction(0.6, 0.5));
-    let bun = fem_model(&cuboid(0.04, 0.04, 0.04), SOFT, 4, 0.002);
+    let bun = fem_model(&cuboid(0.04, 0.04, 0.04), crumb(), 4, 0.002);
     let bun = soft(&mut world, &cuboid(0.04, 0.04, 0.04), &bun, at(0.0, 0.0, 0.12), friction(0.6, 0.5));
     run(&mut world, 1.5);
     let up = |on, partner| world.contact(on, partner).force_w.z;

@@ -38,7 +38,7 @@ fn two_soft_a_rigid_and_an_articulated_block_share_one_solve() {
     world.gravity = Vec3::zeros();
     let mu = friction(0.6, 0.5);
     let shape = cuboid(0.04, 0.04, 0.04);
-    let rest = fem_model(&shape, SOFT, 4, 2.5e-3);
+    let rest = fem_model(&shape, crumb(), 4, 2.5e-3);
     let wall_collider =
         world.add_shape("wall", BodyId::World, at(-0.05, 0.0, 0.0), &cuboid(0.1, 0.2, 0.2), mu);
     let first = soft(&mut world, &shape, &rest, at(0.02, 0.0, 0.0), mu);

@@ -14,8 +14,10 @@ use softvt::{
 use crate::bodies;
 pub use crate::solids::*;
 
-/// A soft material like bread.
-pub const SOFT: ElasticMaterial = ElasticMaterial { youngs_pa: 3e4, poisson: 0.4, density: 300.0 };
+/// A soft material like that of bread.
+pub fn crumb() -> ElasticMaterial {
+    ElasticMaterial::new(3e4, 0.4, 300.0).expect("valid")
+}
 
 /// The model of a soft block with samples every `spacing` m.
 pub fn fem_model(shape: &Shape, material: ElasticMaterial, resolution: usize, spacing: f64) -> Arc<FemModel> {

@@ -37,7 +37,7 @@ fn squeeze(world: &mut World, length: f64, squeeze: f64) -> f64 {
 #[test]
 fn two_cubes_face_to_face_are_as_stiff_as_one_of_double_length() {
     let (cube, bar) = (cuboid(0.05, 0.05, 0.05), cuboid(0.1, 0.05, 0.05));
-    let (rest, long) = (fem_model(&cube, SOFT, 6, 2e-3), fem_model(&bar, SOFT, 12, 2e-3));
+    let (rest, long) = (fem_model(&cube, crumb(), 6, 2e-3), fem_model(&bar, crumb(), 12, 2e-3));
     let free = || World::new(world().params, Vec3::zeros());
     let mut one = free();
     soft(&mut one, &bar, &long, Pose::identity(), bread());
@@ -58,7 +58,7 @@ fn two_cubes_face_to_face_are_as_stiff_as_one_of_double_length() {
 fn a_soft_collision_keeps_momentum() {
     let mut world = World::new(world().params, Vec3::zeros());
     let cube = cuboid(0.05, 0.05, 0.05);
-    let rest = fem_model(&cube, SOFT, 4, 3e-3);
+    let rest = fem_model(&cube, crumb(), 4, 3e-3);
     let a = soft(&mut world, &cube, &rest, at(-0.03, 0.0, 0.0), bread());
     let b =
         soft(&mut world, &cube, &rest, turned(at(0.035, 0.012, 0.006), Vec3::new(0.2, 0.4, 0.3)), bread());
@@ -85,7 +85,7 @@ fn a_soft_collision_keeps_momentum() {
 fn a_soft_block_sticks_below_the_static_angle_and_slides_above_it_with_dynamic_friction() {
     let (mu_s, mu_d) = (0.6f64, 0.4f64);
     let shape = cuboid(0.06, 0.06, 0.02);
-    let rest = fem_model(&shape, SOFT, 3, 3e-3);
+    let rest = fem_model(&shape, crumb(), 3, 3e-3);
     let scene = |angle: f64| {
         let mut world = world();
         floor(&mut world, friction(mu_s, mu_d));
@@ -113,7 +113,7 @@ fn two_stacked_soft_blocks_fall_asleep_and_a_third_wakes_them() {
     world.params.sleeping = true;
     floor(&mut world, bread());
     let shape = cuboid(0.05, 0.05, 0.025);
-    let rest = fem_model(&shape, SOFT, 4, 4e-3);
+    let rest = fem_model(&shape, crumb(), 4, 4e-3);
     let low = soft(&mut world, &shape, &rest, at(0.0, 0.0, 0.0125), bread());
     let high = soft(&mut world, &shape, &rest, at(0.004, 0.0, 0.0376), bread());
     run(&mut world, 3.0);
@@ -131,7 +131,7 @@ fn two_stacked_soft_blocks_fall_asleep_and_a_third_wakes_them() {
 fn soft_cubes_that_meet_at_two_metres_a_second_do_not_enter_each_other() {
     let mut world = World::new(world().params, Vec3::zeros());
     let cube = cuboid(0.05, 0.05, 0.05);
-    let rest = fem_model(&cube, SOFT, 4, 3e-3);
+    let rest = fem_model(&cube, crumb(), 4, 3e-3);
     soft(&mut world, &cube, &rest, at(-0.06, 0.0, 0.0), bread());
     soft(&mut world, &cube, &rest, turned(at(0.06, 0.0, 0.0), Vec3::x() * 0.3), bread());
     for (index, speed) in [(0, 1.0), (1, -1.0)] {
@@ -167,7 +167,7 @@ fn drop_into(shape: &Shape, from: Pose) -> (f64, f64, Vec3) {
     floor(&mut world, bread());
     world.add_shape("vessel", BodyId::World, Pose::identity(), shape, bread());
     let cube = cuboid(0.05, 0.05, 0.05);
-    let rest = fem_model(&cube, SOFT, 6, 1.5e-3);
+    let rest = fem_model(&cube, crumb(), 6, 1.5e-3);
     soft(&mut world, &cube, &rest, from, bread());
     world.set_soft_motion(SoftId::new(0), |_, v| *v = Vec3::z() * -2.0);
     let mut deepest = 0.0f64;
@@ -220,7 +220,7 @@ fn a_soft_cube_dropped_at_two_metres_a_second_crosses_no_wall() {
 fn no_step_of_a_free_fall_gains_energy() {
     let mut world = world();
     let cube = cuboid(0.05, 0.05, 0.05);
-    let rest = fem_model(&cube, SOFT, 4, 5e-3);
+    let rest = fem_model(&cube, crumb(), 4, 5e-3);
     soft(&mut world, &cube, &rest, at(0.0, 0.0, 1.0), bread());
     // Spinning, stretched and falling.
     world.set_soft_motion(SoftId::new(0), |x, v| {

@@ -18,7 +18,7 @@ const POISSON: f64 = 0.4;
 
 fn block(size: Vec3, resolution: usize, youngs_pa: f64, poisson: f64) -> FemState {
     let mesh = voxel_mesh(&Shape::cuboid(size), &VoxelSpec { resolution }).expect("a block");
-    let material = ElasticMaterial { youngs_pa, poisson, density: 300.0 };
+    let material = ElasticMaterial::new(youngs_pa, poisson, 300.0).expect("valid");
     FemState::new(FemModel::new(mesh, material, size.product(), Vec::new()), &Pose::identity())
 }
 
@@ -133,7 +133,7 @@ fn solve_linear(mut body: FemState, free: &[bool], load: &[Vec3]) -> Vec<Vec3> {
 pub fn rigid_motion(angle: f64) -> f64 {
     let mesh = voxel_mesh(&Shape::Sphere { radius: 0.025 }, &VoxelSpec { resolution: 6 }).expect("a sphere");
     let scale = YOUNGS * mesh.edge * mesh.edge;
-    let material = ElasticMaterial { youngs_pa: YOUNGS, poisson: POISSON, density: 300.0 };
+    let material = ElasticMaterial::new(YOUNGS, POISSON, 300.0).expect("valid");
     let mut body = FemState::new(FemModel::new(mesh, material, 6.5e-5, Vec::new()), &Pose::identity());
     let axis = nalgebra::Unit::new_normalize(Vec3::new(1.0, 2.0, -0.5));
     let turn = nalgebra::Rotation3::from_axis_angle(&axis, angle);

@@ -172,11 +172,8 @@ pub struct Scene {
 impl Scene {
     pub fn new(options: &Squeeze) -> Self {
         let shape = options.body.shape();
-        let material = ElasticMaterial {
-            youngs_pa: options.youngs_pa,
-            poisson: options.poisson,
-            density: options.density,
-        };
+        let material =
+            ElasticMaterial::new(options.youngs_pa, options.poisson, options.density).expect("valid");
         let rest = fem_model(&shape, material, options.resolution, &SampleSpec::default());
         let params = PhysicsParams {
             rayleigh_stiffness: options.beta,

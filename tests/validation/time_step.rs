@@ -65,7 +65,7 @@ pub fn lifted(rate: f64, beta: f64) -> f64 {
 
 /// Speed of a soft ball after 3 s on a slope of `slope` rad, m/s. It starts at rest.
 pub fn rolled(rate: f64, beta: f64, slope: f64) -> f64 {
-    let (radius, material) = (0.025, ElasticMaterial { youngs_pa: 3e4, poisson: 0.4, density: 300.0 });
+    let (radius, material) = (0.025, ElasticMaterial::new(3e4, 0.4, 300.0).expect("valid"));
     let body = Body::Sphere { radius };
     let params = PhysicsParams {
         dt: 1.0 / rate,

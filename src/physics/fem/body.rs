@@ -147,7 +147,7 @@ impl FemModel {
         let spacing = (samples.iter().map(|s| s.area).sum::<f64>() / samples.len().max(1) as f64).sqrt();
         let (samples, groups) = group_samples(&mesh, samples);
         Arc::new(Self {
-            mass: node_masses(&mesh, material.density, volume),
+            mass: node_masses(&mesh, material.density(), volume),
             is_checked: mesh.occupancy.iter().map(|f| f.fraction() >= MIN_CHECKED_FILL).collect(),
             material,
             samples,
@@ -171,7 +171,7 @@ impl FemModel {
     /// Normal contact stiffness of the surface per area, Pa/m: `min(1e9, 30 E/h)` with the voxel edge h, so stiff
     /// that the deformation is that of the voxels.
     pub fn contact_modulus(&self) -> f64 {
-        (30.0 * self.material.youngs_pa / self.mesh.edge).min(1e9)
+        (30.0 * self.material.youngs_pa() / self.mesh.edge).min(1e9)
     }
 }
 

@@ -129,7 +129,7 @@ mod tests {
     const SHARE: f64 = 0.7;
 
     fn law() -> Densification {
-        Densification::new(&ElasticMaterial { youngs_pa: 3e4, poisson: 0.3, density: 300.0 }, H)
+        Densification::new(&ElasticMaterial::new(3e4, 0.3, 300.0).expect("valid"), H)
     }
 
     fn evaluate(x: &Corners) -> Elastic {

@@ -124,11 +124,8 @@ mod tests {
 
     #[test]
     fn rigid_motion_needs_no_force_and_stiffness_is_symmetric() {
-        let k = stiffness(
-            0.01,
-            &OccupancyMask::full(),
-            &ElasticMaterial { youngs_pa: 3e4, poisson: 0.45, density: 1.0 },
-        );
+        let k =
+            stiffness(0.01, &OccupancyMask::full(), &ElasticMaterial::new(3e4, 0.45, 1.0).expect("valid"));
         let scale = k.iter().cloned().fold(0.0, f64::max);
         for u in [field(0.01, |_| Vec3::x()), field(0.01, |x| Vec3::new(0.3, -0.2, 0.5).cross(&x) * 100.0)] {
             assert!(apply(&k, &u).iter().all(|f| f.abs() < 1e-12 * scale));
@@ -143,7 +140,7 @@ mod tests {
     #[test]
     fn uniform_strain_stores_the_energy_of_hookes_law() {
         let h = 0.013_f64;
-        let material = ElasticMaterial { youngs_pa: 4e4, poisson: 0.3, density: 1.0 };
+        let material = ElasticMaterial::new(4e4, 0.3, 1.0).expect("valid");
         let (lambda, mu) = (material.lame_lambda(), material.shear_modulus());
         let grad = nalgebra::Matrix3::new(1e-3, 2e-3, -1e-3, 0.5e-3, -2e-3, 1e-3, 1e-3, 0.0, 1.5e-3);
         let strain = (grad + grad.transpose()) * 0.5;
@@ -182,7 +179,7 @@ mod tests {
             .for_each(|cell| half.insert(cell));
         let u = field(0.01, |x| Vec3::new(x.x, 0.0, 0.0));
         let energy = |fill: &OccupancyMask| {
-            let k = stiffness(0.01, fill, &ElasticMaterial { youngs_pa: 1e4, poisson: 0.2, density: 1.0 });
+            let k = stiffness(0.01, fill, &ElasticMaterial::new(1e4, 0.2, 1.0).expect("valid"));
             apply(&k, &u).iter().zip(u).map(|(f, u)| f * u).sum::<f64>()
         };
         assert!((energy(&half) / energy(&OccupancyMask::full()) - 0.5 - GHOST).abs() < 1e-12);

@@ -110,7 +110,9 @@ mod tests {
     };
 
     const H: f64 = 0.01;
-    const MATERIAL: ElasticMaterial = ElasticMaterial { youngs_pa: 3e4, poisson: 0.4, density: 1.0 };
+    fn material() -> ElasticMaterial {
+        ElasticMaterial::new(3e4, 0.4, 1.0).expect("valid")
+    }
 
     fn cube() -> Corners {
         std::array::from_fn(|a| hex8::corner(a) * H)
@@ -132,7 +134,7 @@ mod tests {
     }
 
     fn evaluate(x: &Corners, fill: &OccupancyMask, last: Mat3) -> Elastic {
-        elastic(x, &cube(), &mean_gradients(H, fill), &stiffness(H, fill, &MATERIAL), last)
+        elastic(x, &cube(), &mean_gradients(H, fill), &stiffness(H, fill, &material()), last)
     }
 
     fn bent(e: &[f64]) -> Corners {
@@ -156,7 +158,7 @@ mod tests {
 
     #[test]
     fn homogeneous_strain_stores_the_energy_of_the_filled_part_at_any_rotation() {
-        let (lambda, mu) = (MATERIAL.lame_lambda(), MATERIAL.shear_modulus());
+        let (lambda, mu) = (material().lame_lambda(), material().shear_modulus());
         let stretch = Mat3::new(0.7, 0.1, 0.0, 0.1, 1.2, -0.05, 0.0, -0.05, 0.9);
         let strain = stretch - Mat3::identity();
         let density = mu * strain.norm_squared() + 0.5 * lambda * strain.trace().powi(2);
@@ -186,7 +188,7 @@ mod tests {
             e in prop::collection::vec(-0.2f64..0.2, 24), kind in 0usize..4,
         ) {
             let (x, fill) = (bent(&e), fills()[kind]);
-            let (g, k0) = (mean_gradients(H, &fill), stiffness(H, &fill, &MATERIAL));
+            let (g, k0) = (mean_gradients(H, &fill), stiffness(H, &fill, &material()));
             let evaluate = |x: &Corners, last: Mat3| elastic(x, &cube(), &g, &k0, last);
             let at = evaluate(&x, Mat3::identity());
             let scale = at.force.iter().map(|f| f.norm()).fold(0.0, f64::max);

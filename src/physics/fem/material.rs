@@ -1,45 +1,73 @@
 //! Isotropic, linearly elastic material and its moduli.
 
-use softvt_common::text::format_number;
+use serde::Serialize;
 
-/// Isotropic, linearly elastic material.
-#[derive(Clone, Copy, Debug, PartialEq)]
+use softvt_common::range::{Range, RangeError};
+
+/// Isotropic, linearly elastic material. All its parameters are in their ranges: [`Self::new`] checks them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ElasticMaterial {
-    /// Young's modulus, Pa.
-    pub youngs_pa: f64,
-    /// Poisson's ratio, 0 ≤ ν < 0.5.
-    pub poisson: f64,
-    /// Density, kg/m³.
-    pub density: f64,
-}
-
-/// A parameter of a material that is out of range.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum MaterialError {
-    /// Young's modulus is not a positive number.
-    #[error("Young's modulus is {} Pa, expected a positive number", format_number(*.0))]
-    Youngs(f64),
-    /// Poisson's ratio is not that of a compressible material.
-    #[error("Poisson's ratio is {}, expected 0 <= poisson < 0.5", format_number(*.0))]
-    Poisson(f64),
-    /// The density is not a positive number.
-    #[error("density is {} kg/m³, expected a positive number", format_number(*.0))]
-    Density(f64),
+    youngs_pa: f64,
+    poisson: f64,
+    density: f64,
 }
 
 impl ElasticMaterial {
-    /// Checks the ranges of all parameters.
+    /// Range of Young's modulus, Pa.
+    pub const YOUNGS_PA: Range = Range::POSITIVE;
+    /// Range of Poisson's ratio; 0.5 would be incompressible.
+    pub const POISSON: Range = Range::below(0.0, 0.5);
+    /// Range of the density, kg/m³.
+    pub const DENSITY: Range = Range::POSITIVE;
+
+    /// A material with this Young's modulus (Pa), Poisson's ratio and density (kg/m³).
     ///
     /// # Errors
-    /// The first that is out of range.
-    pub fn check(&self) -> Result<(), MaterialError> {
-        let is_positive = |value: f64| value > 0.0 && value.is_finite();
-        match *self {
-            Self { youngs_pa, .. } if !is_positive(youngs_pa) => Err(MaterialError::Youngs(youngs_pa)),
-            Self { poisson, .. } if !(0.0..0.5).contains(&poisson) => Err(MaterialError::Poisson(poisson)),
-            Self { density, .. } if !is_positive(density) => Err(MaterialError::Density(density)),
-            _ => Ok(()),
-        }
+    /// The first parameter that is out of its range.
+    pub fn new(youngs_pa: f64, poisson: f64, density: f64) -> Result<Self, RangeError> {
+        Self::YOUNGS_PA.check("youngs_pa", youngs_pa, "Pa")?;
+        Self::POISSON.check("poisson", poisson, "")?;
+        Self::DENSITY.check("density", density, "kg/m³")?;
+        Ok(Self { youngs_pa, poisson, density })
+    }
+
+    /// Young's modulus, Pa.
+    pub fn youngs_pa(&self) -> f64 {
+        self.youngs_pa
+    }
+
+    /// Poisson's ratio.
+    pub fn poisson(&self) -> f64 {
+        self.poisson
+    }
+
+    /// Density, kg/m³.
+    pub fn density(&self) -> f64 {
+        self.density
+    }
+
+    /// The same material with another Young's modulus, Pa.
+    ///
+    /// # Errors
+    /// It is out of its range.
+    pub fn with_youngs_pa(self, youngs_pa: f64) -> Result<Self, RangeError> {
+        Self::new(youngs_pa, self.poisson, self.density)
+    }
+
+    /// The same material with another Poisson's ratio.
+    ///
+    /// # Errors
+    /// It is out of its range.
+    pub fn with_poisson(self, poisson: f64) -> Result<Self, RangeError> {
+        Self::new(self.youngs_pa, poisson, self.density)
+    }
+
+    /// The same material with another density, kg/m³.
+    ///
+    /// # Errors
+    /// It is out of its range.
+    pub fn with_density(self, density: f64) -> Result<Self, RangeError> {
+        Self::new(self.youngs_pa, self.poisson, density)
     }
 
     /// First Lamé parameter λ, Pa.
@@ -68,15 +96,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn moduli_agree_and_parameters_out_of_range_are_named() {
-        let material = ElasticMaterial { youngs_pa: 3e4, poisson: 0.3, density: 250.0 };
-        let (nu, m) = (material.poisson, material.constrained_modulus());
-        let exact = material.youngs_pa * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu));
-        assert!((m / exact - 1.0).abs() < 1e-14);
-        assert_eq!(material.check(), Ok(()));
-        let message = |material: ElasticMaterial| material.check().unwrap_err().to_string();
-        assert!(message(ElasticMaterial { poisson: 0.5, ..material }).starts_with("Poisson's ratio is 0.5"));
-        assert!(message(ElasticMaterial { youngs_pa: f64::NAN, ..material }).starts_with("Young's modulus"));
-        assert!(message(ElasticMaterial { density: 0.0, ..material }).starts_with("density is 0"));
+    fn moduli_agree() {
+        let material = ElasticMaterial::new(3e4, 0.3, 250.0).expect("valid");
+        let exact = 3e4 * (1.0 - 0.3) / ((1.0 + 0.3) * (1.0 - 2.0 * 0.3));
+        assert!((material.constrained_modulus() / exact - 1.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_parameter_out_of_range_is_named_also_when_a_valid_material_changes() {
+        let valid = ElasticMaterial::new(3e4, 0.3, 250.0).expect("valid");
+        let message = |made: Result<ElasticMaterial, RangeError>| made.expect_err("refused").to_string();
+        assert_eq!(
+            message(ElasticMaterial::new(0.0, 0.3, 250.0)),
+            "youngs_pa: expected a number above 0 (Pa), got 0"
+        );
+        assert!(message(valid.with_youngs_pa(f64::NAN)).starts_with("youngs_pa: expected a number above 0"));
+        assert_eq!(message(valid.with_poisson(0.5)), "poisson: expected a number in 0..below 0.5, got 0.5");
+        assert!(message(valid.with_density(-1.0)).starts_with("density: expected a number above 0 (kg/m³)"));
     }
 }

@@ -17,5 +17,5 @@ pub mod strain;
 pub(crate) mod system;
 
 pub use body::{FemModel, FemState, MinDetF};
-pub use material::{ElasticMaterial, MaterialError};
+pub use material::ElasticMaterial;
 pub use strain::{StrainLimits, StrainMeter};

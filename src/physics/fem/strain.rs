@@ -191,10 +191,12 @@ mod tests {
     use crate::fem::ElasticMaterial;
     use softvt_geometry::{Pose, Quat, Vec3, samples::SampleSpec, shape::Shape};
 
-    const MATERIAL: ElasticMaterial = ElasticMaterial { youngs_pa: 3e4, poisson: 0.3, density: 200.0 };
+    fn material() -> ElasticMaterial {
+        ElasticMaterial::new(3e4, 0.3, 200.0).expect("valid")
+    }
 
     fn state_of(shape: &Shape) -> FemState {
-        let model = FemModel::from_shape(shape, 1e-4, MATERIAL, 6, &SampleSpec::default()).unwrap();
+        let model = FemModel::from_shape(shape, 1e-4, material(), 6, &SampleSpec::default()).unwrap();
         FemState::new(model, &Pose::identity())
     }
 

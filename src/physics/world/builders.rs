@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::World;
 use crate::{
     contact::{ContactSurface, Friction},
-    fem::{ElasticMaterial, FemModel, MaterialError},
+    fem::{ElasticMaterial, FemModel},
     ids::{ColliderId, KinematicId, RigidId, SoftId},
     rigid::{RigidError, RigidState},
 };
@@ -53,17 +53,6 @@ pub struct SoftBodyBuilder {
     material: ElasticMaterial,
     resolution: usize,
     spacing: SampleSpec,
-}
-
-/// Why a soft body cannot be made.
-#[derive(Debug, thiserror::Error)]
-pub enum SoftBodyError {
-    /// A parameter of its material is out of range.
-    #[error(transparent)]
-    Material(#[from] MaterialError),
-    /// Its shape has no voxel mesh.
-    #[error(transparent)]
-    Mesh(#[from] VoxelMeshError),
 }
 
 /// Methods that all builders have.
@@ -187,11 +176,10 @@ impl Insert for RigidBodyBuilder {
 }
 
 impl Insert for SoftBodyBuilder {
-    type Output = Result<SoftId, SoftBodyError>;
+    type Output = Result<SoftId, VoxelMeshError>;
 
     fn insert(self, world: &mut World) -> Self::Output {
         let Placed { name, shape, pose, friction } = self.placed;
-        self.material.check()?;
         let volume = mass_properties(&shape, 1.0).mass;
         let model = FemModel::from_shape(&shape, volume, self.material, self.resolution, &self.spacing)?;
         let surface: Arc<dyn ContactSurface> = Arc::new(shape);

@@ -95,7 +95,7 @@ mod tests {
     /// A soft cube of 50 mm in free space.
     fn floating() -> World {
         let shape = Shape::cuboid(Vec3::repeat(0.05));
-        let material = ElasticMaterial { youngs_pa: 3e4, poisson: 0.4, density: 300.0 };
+        let material = ElasticMaterial::new(3e4, 0.4, 300.0).expect("valid");
         let model = FemModel::from_shape(&shape, 0.05_f64.powi(3), material, 2, &SampleSpec::default());
         let mut world = World::new(PhysicsParams::default(), Vec3::zeros());
         let mu = Friction::new(0.6, 0.5);

@@ -82,7 +82,7 @@ mod tests {
 
     /// A ball with partly filled voxels that is strained by `stretch` and thrown with a spin of 20 rad/s.
     fn thrown(stretch: f64, params: PhysicsParams) -> (World, crate::SoftId) {
-        let material = ElasticMaterial { youngs_pa: 3e4, poisson: 0.4, density: 300.0 };
+        let material = ElasticMaterial::new(3e4, 0.4, 300.0).expect("valid");
         let ball = Shape::Sphere { radius: 0.025 };
         let model = FemModel::from_shape(&ball, 6.5e-5, material, 4, &SampleSpec::default()).expect("a ball");
         let mut world = World::new(params, Vec3::new(0.0, 0.0, -9.81));

@@ -11,7 +11,7 @@
 //! use softvt_physics::{World, fem::ElasticMaterial};
 //! use softvt_physics::world::{FixedBuilder, KinematicBuilder, SoftBodyBuilder};
 //!
-//! let bread = ElasticMaterial { youngs_pa: 3e4, poisson: 0.0, density: 250.0 };
+//! let bread = ElasticMaterial::new(3e4, 0.0, 250.0)?;
 //! let jaw = Shape::cuboid(Vec3::new(0.01, 0.08, 0.04));
 //! let mut world = World::with_gravity();
 //! world.insert(FixedBuilder::ground());
@@ -52,9 +52,7 @@ use crate::{
 };
 use softvt_geometry::{Pose, Vec3};
 
-pub use builders::{
-    FixedBuilder, Insert, KinematicBuilder, RigidBodyBuilder, SoftBodyBuilder, SoftBodyError,
-};
+pub use builders::{FixedBuilder, Insert, KinematicBuilder, RigidBodyBuilder, SoftBodyBuilder};
 pub use penetration::Penetration;
 pub use snapshot::{ContactPatch, Energy, PatchPoint, SampleSupport, WorldSnapshot};
 pub use state::{Articulation, BodyContact, ContactSummary, JointDrive, KinematicFrame, RigidBody, SoftBody};

@@ -18,15 +18,15 @@ use crate::{
     vm::error::fail,
 };
 use softvt_common::text::format_number;
-use softvt_physics::contact::Friction;
+use softvt_physics::{contact::Friction, fem::ElasticMaterial};
 use softvt_scene::{Asset, Body, SoftMaterial, Visual};
 
 /// A coefficient of friction.
 pub(crate) const COEFFICIENT: Type = Type::Number("", Range::closed(0.0, 10.0));
-pub(crate) const PASCALS: Type = Type::Number("Pa", Range::POSITIVE);
-pub(crate) const POISSON: Type = Type::Number("", Range::below(0.0, 0.5));
+pub(crate) const PASCALS: Type = Type::Number("Pa", ElasticMaterial::YOUNGS_PA);
+pub(crate) const POISSON: Type = Type::Number("", ElasticMaterial::POISSON);
 pub(crate) const STRAIN: Type = Type::Number("", Range::above(0.0, 1.0));
-pub(crate) const DENSITY: Type = Type::Number("kg/m³", Range::POSITIVE);
+pub(crate) const DENSITY: Type = Type::Number("kg/m³", ElasticMaterial::DENSITY);
 
 record_of! {
     /// Coulomb friction of a surface. A pair of surfaces has the larger of each coefficient, unless one is coated.
@@ -55,7 +55,22 @@ record_of! {
         collapse_strain: Option<f64> = STRAIN;
         /// Compressive strain that leaves a visible crack or set.
         damage_strain: Option<f64> = STRAIN;
-    }
+    } by soft_material;
+}
+
+fn soft_material(
+    lua: &Lua,
+    youngs_pa: f64,
+    poisson: f64,
+    density: f64,
+    resolution: usize,
+    grasp_spacing: f64,
+    collapse_strain: Option<f64>,
+    damage_strain: Option<f64>,
+) -> mlua::Result<SoftMaterial> {
+    let elastic = ElasticMaterial::new(youngs_pa, poisson, density)
+        .map_err(|error| fail(lua, format!("{}.{error}", SoftMaterial::RECORD.label)))?;
+    Ok(SoftMaterial { elastic, resolution, grasp_spacing, collapse_strain, damage_strain })
 }
 
 record! {

@@ -17,11 +17,11 @@ use crate::{
     schema::{Constructed, Range, Type, class, object::fixed_list, record},
     vm::error::{author_line, fail},
 };
-use softvt_common::{parallel::lock, text::format_number};
+use softvt_common::{parallel::lock, range::RangeError, text::format_number};
 use softvt_geometry::{Aabb, Pose, Quat, Vec3};
-use softvt_physics::contact::Friction;
+use softvt_physics::{contact::Friction, fem::ElasticMaterial};
 use softvt_robot::panda::{self, ARM_DOFS};
-use softvt_scene::{Asset, Body, Camera, Lighting, Object, Scene, SoftMaterial};
+use softvt_scene::{Asset, Body, Camera, Lighting, Object, Scene};
 
 /// Start pose of the arm as in SoftVTBench (from the released code): the hand above the table, pointing down.
 const START_Q: [f64; ARM_DOFS] = [-0.01988, -0.18734, 0.00767, -2.40340, 0.00496, 2.24534, 0.79485];
@@ -354,23 +354,33 @@ impl LuaObject {
         change(&mut lock(&self.scene).objects[self.index]);
     }
 
-    fn material_number(&self, key: &str) -> Option<f64> {
-        self.read(|object| material_number(&mut object.asset.body.clone(), key).copied())
-    }
-
-    fn set_material_number(&self, lua: &Lua, key: &str, value: f64) -> mlua::Result<()> {
+    /// Changes the body. `change` returns `None` if the body has no `key`.
+    fn change_body(
+        &self,
+        lua: &Lua,
+        key: &str,
+        change: impl FnOnce(&mut Body) -> Option<Result<(), RangeError>>,
+    ) -> mlua::Result<()> {
         let mut scene = lock(&self.scene);
         let object = &mut scene.objects[self.index];
-        match material_number(&mut Arc::make_mut(&mut object.asset).body, key) {
-            Some(number) => {
-                *number = value;
-                Ok(())
-            }
-            None => {
-                let name = &object.name;
-                Err(fail(lua, format!("object.{key}: the body of object {name:?} has no {key}")))
-            }
-        }
+        let problem = match change(&mut Arc::make_mut(&mut object.asset).body) {
+            Some(Ok(())) => return Ok(()),
+            Some(Err(error)) => format!("object.{error}"),
+            None => format!("object.{key}: the body of object {:?} has no {key}", object.name),
+        };
+        Err(fail(lua, problem))
+    }
+
+    fn change_elastic(
+        &self,
+        lua: &Lua,
+        key: &str,
+        change: impl FnOnce(ElasticMaterial) -> Result<ElasticMaterial, RangeError>,
+    ) -> mlua::Result<()> {
+        self.change_body(lua, key, |body| match body {
+            Body::Soft(soft) => Some(change(soft.elastic).map(|elastic| soft.elastic = elastic)),
+            _ => None,
+        })
     }
 
     fn change_friction(&self, lua: &Lua, change: impl FnOnce(&mut Friction)) {
@@ -383,16 +393,6 @@ impl LuaObject {
                 parts.iter_mut().for_each(|part| Arc::make_mut(&mut part.asset).friction = friction);
             }
         });
-    }
-}
-
-/// The number `key` of the material of a body, if it has one.
-fn material_number<'a>(body: &'a mut Body, key: &str) -> Option<&'a mut f64> {
-    match (body, key) {
-        (Body::Soft(soft), "youngs_pa") => Some(&mut soft.youngs_pa),
-        (Body::Soft(soft), "poisson") => Some(&mut soft.poisson),
-        (Body::Soft(SoftMaterial { density, .. }) | Body::Rigid { density }, "density") => Some(density),
-        _ => None,
     }
 }
 
@@ -443,18 +443,33 @@ class! {
             }
             /// Density of a soft or rigid body.
             density: DENSITY => {
-                get(_, this) { this.material_number("density") }
-                set(lua, this, value: f64) { this.set_material_number(lua, "density", value)? }
+                get(_, this) { this.read(|object| object.asset.density()) }
+                set(lua, this, value: f64) {
+                    this.change_body(lua, "density", |body| match body {
+                        Body::Soft(soft) => {
+                            Some(soft.elastic.with_density(value).map(|elastic| soft.elastic = elastic))
+                        }
+                        Body::Rigid { density } => {
+                            *density = value;
+                            Some(Ok(()))
+                        }
+                        _ => None,
+                    })?
+                }
             }
             /// Young's modulus of a soft body.
             youngs_pa: PASCALS => {
-                get(_, this) { this.material_number("youngs_pa") }
-                set(lua, this, value: f64) { this.set_material_number(lua, "youngs_pa", value)? }
+                get(_, this) { this.read(|object| object.asset.elastic().map(|elastic| elastic.youngs_pa())) }
+                set(lua, this, value: f64) {
+                    this.change_elastic(lua, "youngs_pa", |elastic| elastic.with_youngs_pa(value))?
+                }
             }
             /// Poisson's ratio of a soft body.
             poisson: POISSON => {
-                get(_, this) { this.material_number("poisson") }
-                set(lua, this, value: f64) { this.set_material_number(lua, "poisson", value)? }
+                get(_, this) { this.read(|object| object.asset.elastic().map(|elastic| elastic.poisson())) }
+                set(lua, this, value: f64) {
+                    this.change_elastic(lua, "poisson", |elastic| elastic.with_poisson(value))?
+                }
             }
             /// Static coefficient of friction.
             static_mu: COEFFICIENT => {
@@ -493,7 +508,8 @@ class! {
             }
             /// Multiplies the density of a soft or rigid body, or of every moving part. Static objects are unchanged.
             fn scale_mass(lua, this, factor: f64 = Type::Number("", Range::closed(1e-6, 1e6))) -> [] {
-                this.change(lua, |object| Arc::make_mut(&mut object.asset).scale_mass(factor))
+                let scaled = Arc::make_mut(&mut lock(&this.scene).objects[this.index].asset).scale_mass(factor);
+                scaled.map_err(|error| fail(lua, format!("object:scale_mass: {error}")))?
             }
         }
     }

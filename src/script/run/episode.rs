@@ -202,8 +202,8 @@ fn vary(
     seed: &EpisodeSeed,
 ) -> mlua::Result<SceneVariation> {
     let drawn = draw(lua, |model_of| ranges.draw(seed, scene, model_of))?;
+    let subject = format!("layout {:?} of suite {:?}", seed.layout, seed.suite);
     let drawn = drawn.map_err(|error| {
-        let subject = format!("layout {:?} of suite {:?}", seed.layout, seed.suite);
         fail(lua, match error {
             DrawError::NoSoftObject => format!(
                 "{subject} {error}, and the variation {:?} changes soft objects; vary a suite of soft objects",
@@ -212,7 +212,7 @@ fn vary(
             _ => format!("{subject}: {error}"),
         })
     })?;
-    drawn.apply(scene);
+    drawn.apply(scene).map_err(|error| fail(lua, format!("{subject}: {error}")))?;
     Ok(drawn)
 }
 

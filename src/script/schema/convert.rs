@@ -177,6 +177,14 @@ macro_rules! first {
 }
 pub(crate) use first;
 
+/// The result of a conversion from its converted fields: the struct with fields of these names, or what a function makes
+/// of them.
+macro_rules! made {
+    ($lua:ident [$($field:ident)*]) => { Ok(Self { $($field),* }) };
+    ($lua:ident [$($field:ident)*] $make:expr) => { $make($lua, $($field),*) };
+}
+pub(crate) use made;
+
 /// The list of [`Field`](super::Field)s that a declaration describes.
 macro_rules! fields {
     ($(
@@ -238,15 +246,16 @@ macro_rules! record {
 }
 pub(crate) use record;
 
-/// Declares records whose struct is already defined, with fields of the same names: scripts then write such a struct as a
-/// table. The syntax is that of [`record!`].
+/// Declares records whose struct is already defined: scripts then write such a struct as a table. The syntax is that of
+/// [`record!`]. The struct has fields of the same names, or `by make;` at the end names the function that makes it from the
+/// interpreter and the fields.
 macro_rules! record_of {
     ($(
         $(#[doc = $doc:literal])+
         $name:ident : $class:literal as $label:literal $(, constructor $kind:literal)? $(, relations $check:path)? {$(
             $(#[doc = $field_doc:literal])+
             $field:ident : $rust:ty $(= $ty:expr)? $(=> $presence:ident $(($default:expr))?)? ;
-        )*}
+        )*} $(by $make:expr ;)?
     )+) => {$(
         impl $crate::schema::RecordType for $name {
             const RECORD: &'static $crate::schema::Record = &$crate::schema::Record {
@@ -265,11 +274,10 @@ macro_rules! record_of {
         impl $crate::schema::FromChecked for $name {
             fn from_checked(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
                 let _table: mlua::Table = lua.unpack(value)?;
-                Ok(Self {$(
-                    $field: $crate::schema::FromChecked::from_checked(
-                        _table.raw_get(stringify!($field))?, lua
-                    )?,
-                )*})
+                $(let $field: $rust = $crate::schema::FromChecked::from_checked(
+                    _table.raw_get(stringify!($field))?, lua
+                )?;)*
+                $crate::schema::convert::made!(lua [$($field)*] $($make)?)
             }
         }
 

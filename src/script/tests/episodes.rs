@@ -160,7 +160,7 @@ fn shifts_change_the_scene_and_are_strict() {
     let soften = "local o = scene:object 'ball' o.youngs_pa = o.youngs_pa * value return scene";
     let scene = open(soften, "stiffness").unwrap();
     let Body::Soft(soft) = &scene.objects[0].asset.body else { panic!("the ball is soft") };
-    assert_eq!(soft.youngs_pa, 20e3);
+    assert_eq!(soft.elastic.youngs_pa(), 20e3);
     assert_eq!(
         open(soften, "stifness").unwrap_err(),
         "unknown shift \"stifness\"; did you mean \"stiffness\"?"
@@ -194,7 +194,7 @@ fn the_library_scales_stiffness_and_mass() {
     .unwrap()
     .scene;
     let Body::Soft(soft) = &scene.objects[0].asset.body else { panic!("the ball is soft") };
-    assert_eq!((soft.youngs_pa, soft.density), (20e3, 400.0));
+    assert_eq!((soft.elastic.youngs_pa(), soft.elastic.density()), (20e3, 400.0));
     let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
     assert!(check_shift(&suite.shifts, "mass", 2.0).is_ok());
     assert_eq!(

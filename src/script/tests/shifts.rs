@@ -24,7 +24,7 @@ fn episode(loaded: &LoadedScript, suite: &str, task: usize, shifts: &[(&str, f64
 /// The objects whose density or Young's modulus a shift has multiplied by `factor`. All others must be unchanged.
 fn multiplied(setup: &EpisodeSetup, factor: f64) -> Vec<String> {
     let numbers = |body: &Body| match body {
-        Body::Soft(material) => vec![material.density, material.youngs_pa],
+        Body::Soft(material) => vec![material.elastic.density(), material.elastic.youngs_pa()],
         Body::Rigid { density } => vec![*density],
         _ => Vec::new(),
     };
