@@ -69,7 +69,7 @@ fn link(sim: &Simulation, name: &str) -> LinkId {
 fn push(sim: &mut Simulation, link: LinkId, target_velocity: f64, effort: f64) {
     let articulation = sim.world.articulation_mut(link.articulation);
     articulation.drives_mut()[link.index] =
-        Some(JointDrive { kp: 0.0, kd: 1e3, target: 0.0, target_velocity, effort, force: 0.0 });
+        Some(JointDrive { kp: 0.0, kd: 1e3, target: 0.0, target_velocity, effort });
 }
 
 /// Size of an asset with all joints at 0, m.

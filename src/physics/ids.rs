@@ -62,9 +62,10 @@ pub struct LinkId {
 
 /// Any body, or the world itself: the parent of a collider, of a camera or of a render mesh, and the body
 /// of a scene object.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum BodyId {
     /// The world: it never moves.
+    #[default]
     World,
     /// A frame that is moved from outside.
     Kinematic(KinematicId),

@@ -58,9 +58,8 @@ impl RobotInstance {
         let tree = panda::tree(*base_w, &spec.gripper);
         let open = gripper::MAX_WIDTH / 2.0;
         let all: Vec<f64> = q.iter().copied().chain([open, open]).collect();
-        let drive = |kp, kd, target, effort| {
-            Some(JointDrive { kp, kd, target, target_velocity: 0.0, effort, force: 0.0 })
-        };
+        let drive =
+            |kp, kd, target, effort| Some(JointDrive { kp, kd, target, target_velocity: 0.0, effort });
         let drives = all
             .iter()
             .zip(&tree.links)
@@ -114,13 +113,13 @@ impl RobotInstance {
     /// Advances the finger targets by one physics step; called before the step.
     pub fn advance(&mut self, world: &mut World) {
         let (dt, width) = (world.params.dt, self.width(world));
-        let drives = world.articulation_mut(self.articulation).drives_mut();
-        let fingers = drives[ARM_DOFS..].iter().flatten();
+        let articulation = world.articulation_mut(self.articulation);
+        let fingers = &articulation.drive_forces()[ARM_DOFS..];
         // The fingers close towards smaller joint coordinates.
-        let closing_force = -fingers.map(|drive| drive.force).sum::<f64>() / Side::BOTH.len() as f64;
+        let closing_force = -fingers.iter().sum::<f64>() / fingers.len() as f64;
         self.gripper.advance(dt, FingerState { width, closing_force });
         let target = self.gripper.finger_target();
-        drives[ARM_DOFS..].iter_mut().flatten().for_each(|drive| drive.target = target);
+        articulation.drives_mut()[ARM_DOFS..].iter_mut().flatten().for_each(|drive| drive.target = target);
     }
 
     /// Arm joint angles, rad.
@@ -156,14 +155,13 @@ impl RobotInstance {
     pub fn state(&self, world: &World, seed: SensorSeed) -> RobotState {
         let width = self.width(world);
         let articulation = world.articulation(self.articulation);
-        let torque = |i: usize| articulation.drives()[i].as_ref().map_or(0.0, |drive| drive.force);
         let tool_b = self.tool_b(world);
         RobotState {
             ee_position_b: tool_b.translation.vector,
             ee_axis_angle_b: rotation::axis_angle(&tool_b.rotation),
             joints: self.q(world),
             joint_velocities: std::array::from_fn(|i| articulation.state.v[i]),
-            joint_torques: std::array::from_fn(torque),
+            joint_torques: std::array::from_fn(|i| articulation.drive_forces()[i]),
             gripper_width_m: width,
             sensed_width_m: seed.sensed_width(&self.spec.width_sensor, width, world.step_count()),
             closure: self.closure(),

@@ -44,8 +44,7 @@ fn two_soft_a_rigid_and_an_articulated_block_share_one_solve() {
     let first = soft(&mut world, &shape, &rest, at(0.02, 0.0, 0.0), mu);
     let second = soft(&mut world, &shape, &rest, at(0.06, 0.0, 0.0), mu);
     let block = rigid(&mut world, &shape, 0.3, at(0.1, 0.0, 0.0), mu);
-    let drive =
-        JointDrive { kp: 2000.0, kd: 100.0, target: 0.1, target_velocity: 0.0, effort: 3.0, force: 0.0 };
+    let drive = JointDrive { kp: 2000.0, kd: 100.0, target: 0.1, target_velocity: 0.0, effort: 3.0 };
     let tree = world.add_articulation("slider", slider(), &[0.1405], vec![Some(drive)], false);
     let link = LinkId { articulation: tree, index: 0 };
     world.add_shape("slider", link, Pose::identity(), &shape, mu);
@@ -60,7 +59,7 @@ fn two_soft_a_rigid_and_an_articulated_block_share_one_solve() {
             .sum();
         let now = soft + world.rigid(block).state.momentum().x + 0.2 * world.articulation(tree).state.v[0];
         let wall = world.contact(first, wall_collider).force_w.x;
-        let drive = world.articulation(tree).drives()[0].map_or(0.0, |d| d.force);
+        let drive = world.articulation(tree).drive_forces()[0];
         let given = (wall + drive) * world.params.dt;
         assert!((now - momentum - given).abs() < 1e-6, "step {step}: {} is not {given} N s", now - momentum);
         momentum = now;

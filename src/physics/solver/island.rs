@@ -1,7 +1,7 @@
 //! Connected islands of a problem, and the factors kept for them between steps.
 
 use super::{
-    problem::{ContactProblem, ScalarConstraint},
+    problem::{BlockIdentity, ContactProblem, ScalarConstraint},
     secant::SecantPairs,
 };
 use crate::sparse::dense;
@@ -78,7 +78,7 @@ pub(super) fn islands(problem: &ContactProblem) -> Vec<Island> {
 #[derive(Clone, Debug, Default)]
 struct CachedFactor {
     /// Identity and size of each block.
-    key: Vec<(u64, usize)>,
+    key: Vec<(BlockIdentity, usize)>,
     /// Cholesky factor down to the constrained block, whose Schur complement it holds; column-major.
     factor: Vec<f64>,
     is_valid: bool,
@@ -174,8 +174,9 @@ impl FactorCache {
 impl CachedFactor {
     /// True if the factor belongs to these blocks.
     fn is_of(&self, problem: &ContactProblem, island: &Island) -> bool {
-        let is_same =
-            |(key, &b): (&(u64, usize), &usize)| *key == (problem.blocks[b].identity, problem.blocks[b].dim);
+        let is_same = |(key, &b): (&(BlockIdentity, usize), &usize)| {
+            *key == (problem.blocks[b].identity, problem.blocks[b].dim)
+        };
         self.key.len() == island.blocks.len() && self.key.iter().zip(&island.blocks).all(is_same)
     }
 }

@@ -145,7 +145,7 @@ impl ScalarConstraint {
     }
 
     /// Force at velocity `v`: `clamp(k (e − dt v) + d (v_t − v), min, max)`.
-    pub(super) fn force_at(&self, dt: f64, v: f64) -> f64 {
+    pub(crate) fn force_at(&self, dt: f64, v: f64) -> f64 {
         self.unlimited(dt, v).clamp(self.min_force, self.max_force)
     }
 
@@ -207,7 +207,7 @@ mod tests {
         #[test]
         fn a_scalar_force_is_the_gradient_of_its_cost(v in -2.0f64..2.0, error in -0.1f64..0.1) {
             let row = ScalarConstraint {
-                block: 0, index: 0, stiffness: 2000.0, damping: 100.0, error, target_velocity: 0.1, min_force: -70.0, max_force: 70.0, force: 0.0,
+                block: 0, index: 0, stiffness: 2000.0, damping: 100.0, error, target_velocity: 0.1, min_force: -70.0, max_force: 70.0,
             };
             let (dt, e) = (1.0 / 60.0, 1e-6);
             let slope = (row.cost(dt, v + e) - row.cost(dt, v - e)) / (2.0 * e);

@@ -20,5 +20,6 @@ mod secant;
 pub(crate) use newton::Solver;
 pub use newton::SolverStats;
 pub(crate) use problem::{
-    ContactCluster, ContactPoint, ContactProblem, Endpoint, FrameJacobian, ScalarConstraint, VelocityBlock,
+    BlockIdentity, ContactCluster, ContactPoint, ContactProblem, Endpoint, FrameJacobian, ScalarConstraint,
+    VelocityBlock,
 };

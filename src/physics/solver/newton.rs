@@ -151,11 +151,6 @@ impl Solver {
             let range = problem.range(block);
             problem.blocks[block].v.copy_from_slice(&self.v[range]);
         }
-        for &index in &island.constraints {
-            let constraint = &mut problem.constraints[index];
-            let v = self.v[problem.blocks[constraint.block].offset + constraint.index];
-            constraint.force = constraint.force_at(problem.dt, v);
-        }
         Ok(steps)
     }
 

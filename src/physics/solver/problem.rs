@@ -1,5 +1,6 @@
 //! Data of one solve.
 
+use crate::ids::BodyId;
 use softvt_geometry::Vec3;
 
 /// A block of generalised velocities with its own momentum equation `A v = r` (a *clique* of Drake's SAP).
@@ -17,11 +18,20 @@ pub(crate) struct VelocityBlock {
     pub rhs: Vec<f64>,
     /// Initial guess, and the solution afterwards; `dim` velocities.
     pub v: Vec<f64>,
-    /// Meaning of the velocities: blocks of equal identity and size in two problems describe the same coordinates,
-    /// and a factored Hessian is kept from one to the other.
-    pub identity: u64,
+    /// Meaning of the velocities.
+    pub identity: BlockIdentity,
     /// Index of its first velocity in the vectors of its island; set by the solver.
     pub offset: usize,
+}
+
+/// What the velocities of a block describe. Blocks of equal identity and size in two problems describe the same
+/// coordinates, and a factored Hessian is kept from one to the other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct BlockIdentity {
+    /// The body that moves; an articulation is named by its first link.
+    pub body: BodyId,
+    /// Number of times that the body has changed its coordinates.
+    pub version: u64,
 }
 
 /// Jacobian of a rigid frame: its motion as a linear function of the velocities of one block.
@@ -121,8 +131,22 @@ pub(crate) struct ScalarConstraint {
     pub min_force: f64,
     /// Largest force (N or N m); 0 for an upper stop.
     pub max_force: f64,
-    /// Result: the force (N or N m).
-    pub force: f64,
+}
+
+impl ScalarConstraint {
+    /// A constraint without force limits that exerts no force yet.
+    pub(crate) fn free(block: usize, index: usize) -> Self {
+        Self {
+            block,
+            index,
+            stiffness: 0.0,
+            damping: 0.0,
+            error: 0.0,
+            target_velocity: 0.0,
+            min_force: f64::NEG_INFINITY,
+            max_force: f64::INFINITY,
+        }
+    }
 }
 
 /// A whole problem; its buffers are reused between steps.

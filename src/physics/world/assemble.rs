@@ -1,14 +1,16 @@
 //! Assembly of the convex problem of a step from the state of the world: velocity blocks, frame Jacobians,
 //! contacts and joint constraints.
 
+use std::collections::HashMap;
+
 use super::{Articulation, StepFailure, World};
 use crate::{
     contact::ColliderMotion,
     fem::{rigid_motion::RigidVelocity, system::StepCoefficients},
-    ids::{ArticulationId, BodyId, RigidId, SoftId},
+    ids::{ArticulationId, BodyId, LinkId, RigidId, SoftId},
     joints,
     rigid::{FreeSpin, free_spin},
-    solver::{Endpoint, FrameJacobian, ScalarConstraint, VelocityBlock},
+    solver::{BlockIdentity, Endpoint, FrameJacobian, ScalarConstraint, VelocityBlock},
 };
 use softvt_geometry::{Pose, Vec3};
 
@@ -32,7 +34,8 @@ pub(super) struct BlockMap {
     /// Torque-free rotation of each rigid body in this step.
     pub free_spins: Vec<FreeSpin>,
     momentum: Vec<Vec3>,
-    frames: Vec<(BodyId, usize)>,
+    /// Index of the Jacobian of each rigid body and link that is in contact.
+    frames: HashMap<BodyId, usize>,
 }
 
 impl BlockMap {
@@ -144,7 +147,8 @@ impl World {
                 rigid
             });
             let dim = 3 * soft.system.retained().len();
-            let identity = (index as u64) << 40 | soft.system.retained_version();
+            let id = BodyId::Soft(SoftId::new(index));
+            let identity = BlockIdentity { body: id, version: soft.system.retained_version() };
             let matrix = soft.system.take_matrix();
             let (rhs, v) = (vec![0.0; dim], vec![0.0; dim]);
             let mut block = VelocityBlock { dim, matrix, rhs, v, identity, ..VelocityBlock::default() };
@@ -165,7 +169,7 @@ impl World {
         self.blocks.rigid.clear();
         self.blocks.free_spins.clear();
         let dt = self.params.dt;
-        for rigid in &self.rigid {
+        for (index, rigid) in self.rigid.iter().enumerate() {
             let body = &rigid.state;
             let spin = free_spin(body, dt);
             self.blocks.free_spins.push(spin);
@@ -188,7 +192,7 @@ impl World {
                 matrix,
                 rhs: stack(&linear, &angular),
                 v: stack(&body.v, &body.w),
-                identity: 1 << 60 | self.blocks.rigid.len() as u64,
+                identity: BlockIdentity { body: BodyId::Rigid(RigidId::new(index)), version: 0 },
                 ..VelocityBlock::default()
             });
         }
@@ -197,7 +201,8 @@ impl World {
     fn add_articulation_blocks(&mut self) {
         self.blocks.articulations.clear();
         let dt = self.params.dt;
-        for articulation in &mut self.articulations {
+        for (index, articulation) in self.articulations.iter_mut().enumerate() {
+            let root = LinkId { articulation: ArticulationId::new(index), index: 0 };
             if articulation.sleep.is_asleep {
                 self.blocks.articulations.push(None);
                 continue;
@@ -221,7 +226,7 @@ impl World {
                 matrix: mass.as_slice().to_vec(),
                 rhs: rhs.as_slice().to_vec(),
                 v: articulation.state.v.as_slice().to_vec(),
-                identity: 1 << 61 | self.blocks.articulations.len() as u64,
+                identity: BlockIdentity { body: BodyId::Link(root), version: 0 },
                 ..VelocityBlock::default()
             });
         }
@@ -249,12 +254,11 @@ impl World {
     /// The endpoint of a rigid body or link; its Jacobian is added to the problem on first use. `Known` for what
     /// sleeps or has a prescribed motion.
     pub(super) fn body_endpoint(&mut self, body: BodyId) -> Endpoint {
+        if let Some(&frame) = self.blocks.frames.get(&body) {
+            return Endpoint::Frame(frame);
+        }
         let (block, jacobian, origin) = match body {
             BodyId::World | BodyId::Kinematic(_) | BodyId::Soft(_) => return Endpoint::Known,
-            _ if self.blocks.frames.iter().any(|(known, _)| *known == body) => {
-                let found = self.blocks.frames.iter().find(|(known, _)| *known == body);
-                return found.map_or(Endpoint::Known, |(_, frame)| Endpoint::Frame(*frame));
-            }
             BodyId::Rigid(id) => {
                 let Some(block) = self.blocks.rigid[id.index()] else { return Endpoint::Known };
                 let identity = (0..36).map(|e| if e % 7 == 0 { 1.0 } else { 0.0 }).collect();
@@ -268,9 +272,10 @@ impl World {
                 (block, jacobian, poses[id.index].translation.vector)
             }
         };
-        self.blocks.frames.push((body, self.problem.frames.len()));
+        let frame = self.problem.frames.len();
         self.problem.frames.push(FrameJacobian { block, jacobian, origin });
-        Endpoint::Frame(self.problem.frames.len() - 1)
+        self.blocks.frames.insert(body, frame);
+        Endpoint::Frame(frame)
     }
 
     /// True if the motion of a body is known before the solve, because it is prescribed or the body sleeps.
@@ -300,8 +305,6 @@ impl World {
 }
 
 /// Drive, stops, speed limit and dry friction of one joint; `inertia` is its diagonal entry of the mass matrix.
-///
-/// A drive comes first: its force is read from the first constraint of its joint.
 fn joint_constraints(
     articulation: &Articulation,
     joint: usize,
@@ -311,28 +314,10 @@ fn joint_constraints(
 ) -> impl Iterator<Item = ScalarConstraint> + use<> {
     let link = &articulation.tree.links[joint];
     let (q, v) = (articulation.state.q[joint], articulation.state.v[joint]);
-    let free = ScalarConstraint {
-        block,
-        index: joint,
-        stiffness: 0.0,
-        damping: 0.0,
-        error: 0.0,
-        target_velocity: 0.0,
-        min_force: f64::NEG_INFINITY,
-        max_force: f64::INFINITY,
-        force: 0.0,
-    };
+    let free = ScalarConstraint::free(block, joint);
     let pushes_up = ScalarConstraint { min_force: 0.0, ..free };
     let pushes_down = ScalarConstraint { max_force: 0.0, ..free };
-    let drive = articulation.drives[joint].map(|d| ScalarConstraint {
-        stiffness: d.kp,
-        damping: d.kd,
-        error: d.target - q,
-        target_velocity: d.target_velocity,
-        min_force: -d.effort,
-        max_force: d.effort,
-        ..free
-    });
+    let drive = articulation.drives[joint].map(|drive| drive.constraint(block, joint, q));
     // Stops bring a joint to rest within about two steps whatever its inertia: k dt² and c dt are of the order of it.
     let rate = if drive.is_some() { STOP_RATE } else { FIRM_RATE };
     let (k, c) = (rate * inertia / (dt * dt), STOP_RATE * inertia / dt);

@@ -80,6 +80,7 @@ impl World {
             state: JointState::at_rest(q),
             tree,
             drives,
+            drive_forces: vec![0.0; joints],
             has_gravity,
             sleep: SleepState::default(),
             friction: q.iter().map(|&anchor| JointFriction { anchor, stiffness: 0.0 }).collect(),

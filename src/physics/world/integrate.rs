@@ -37,31 +37,20 @@ impl World {
             let Some(block) = block else { continue };
             let state = &mut articulation.state;
             state.v.copy_from_slice(&self.problem.blocks[*block].v);
+            let drives = articulation.drives.iter().zip(&mut articulation.drive_forces).enumerate();
+            for (joint, (drive, force)) in drives {
+                let law = drive.map(|drive| drive.constraint(*block, joint, state.q[joint]));
+                *force = law.map_or(0.0, |law| law.force_at(dt, state.v[joint]));
+            }
             state.q.axpy(dt, &state.v, 1.0);
-            articulation.poses = joints::forward(&articulation.tree, state.q.as_slice());
-        }
-        self.record_joint_forces();
-        self.kinematic.iter_mut().for_each(|k| k.pose = k.next);
-    }
-
-    /// Updates the anchors of dry friction and the forces of drives.
-    fn record_joint_forces(&mut self) {
-        for (articulation, block) in self.articulations.iter_mut().zip(&self.blocks.articulations) {
-            let Some(block) = block else { continue };
             let joints = articulation.friction.iter_mut().zip(&articulation.tree.links);
-            for ((friction, link), q) in joints.zip(articulation.state.q.iter()) {
+            for ((friction, link), q) in joints.zip(state.q.iter()) {
                 let stretch = link.friction / friction.stiffness;
                 friction.anchor = friction.anchor.clamp(q - stretch, q + stretch);
             }
-            for (joint, drive) in articulation.drives.iter_mut().enumerate() {
-                // The first constraint of a driven joint is its drive.
-                let constraint =
-                    self.problem.constraints.iter().find(|c| c.block == *block && c.index == joint);
-                if let (Some(drive), Some(constraint)) = (drive, constraint) {
-                    drive.force = constraint.force;
-                }
-            }
+            articulation.poses = joints::forward(&articulation.tree, state.q.as_slice());
         }
+        self.kinematic.iter_mut().for_each(|k| k.pose = k.next);
     }
 }
 

@@ -8,6 +8,7 @@ use crate::{
     ids::ContactPartner,
     joints::{JointState, JointTree},
     rigid::RigidState,
+    solver::ScalarConstraint,
 };
 use softvt_geometry::{Pose, Vec3};
 
@@ -147,8 +148,21 @@ pub struct JointDrive {
     pub target_velocity: f64,
     /// Effort limit, N m or N.
     pub effort: f64,
-    /// Force of the last step, N m or N.
-    pub force: f64,
+}
+
+impl JointDrive {
+    /// Its force law for the solver: on velocity `index` of a block, with the joint at `q` at the start of the step.
+    pub(super) fn constraint(&self, block: usize, index: usize, q: f64) -> ScalarConstraint {
+        ScalarConstraint {
+            stiffness: self.kp,
+            damping: self.kd,
+            error: self.target - q,
+            target_velocity: self.target_velocity,
+            min_force: -self.effort,
+            max_force: self.effort,
+            ..ScalarConstraint::free(block, index)
+        }
+    }
 }
 
 /// Dry friction of a joint as a stiff spring whose force is limited to the friction: a joint that
@@ -170,6 +184,7 @@ pub struct Articulation {
     pub state: JointState,
     pub(super) tree: JointTree,
     pub(super) drives: Vec<Option<JointDrive>>,
+    pub(super) drive_forces: Vec<f64>,
     pub(super) has_gravity: bool,
     pub(super) sleep: SleepState,
     pub(super) friction: Vec<JointFriction>,
@@ -195,6 +210,11 @@ impl Articulation {
     /// The drive of each joint, to change targets and gains or to add and remove drives.
     pub fn drives_mut(&mut self) -> &mut [Option<JointDrive>] {
         &mut self.drives
+    }
+
+    /// Force of the drive of each joint in the last step, N m or N; 0 for a joint without one.
+    pub fn drive_forces(&self) -> &[f64] {
+        &self.drive_forces
     }
 
     /// True if any joint has a drive.
