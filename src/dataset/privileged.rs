@@ -1,11 +1,9 @@
 //! Ground-truth streams: shapes, forces, contact and deformation, which no real robot could measure.
 
-use softvt_evaluation::deformation::METRIC_ID;
+use softvt_evaluation::{deformation::METRIC_ID, judge::ControlStepScore};
 use softvt_geometry::Vec3;
 use softvt_policy::PadForce;
-use softvt_rollout::{
-    BodyConfiguration, ControlStepScore, FinishedEpisode, Sensors, StateRecording, StepTrace,
-};
+use softvt_rollout::{BodyConfiguration, FinishedEpisode, Sensors, StateRecording, StepTrace};
 
 use super::stream::{DataStream, StreamValues, pose_row};
 
@@ -74,9 +72,9 @@ fn contact(finished: &FinishedEpisode) -> Vec<DataStream> {
 fn deformation(finished: &FinishedEpisode) -> Vec<DataStream> {
     let Some(reference) = &finished.reference else { return Vec::new() };
     let at_rest: [f64; 3] = reference.bbox_m().into();
-    let frames = &finished.frames;
+    let scores = &finished.scores;
     let of = |pick: &dyn Fn(&ControlStepScore) -> Option<f64>| {
-        shifted(frames, vec![0.0], |frame| vec![pick(frame).unwrap_or(f64::NAN)])
+        shifted(scores, vec![0.0], |score| vec![pick(score).unwrap_or(f64::NAN)])
     };
     let size = |f: &ControlStepScore| {
         f.deformation.map_or(vec![f64::NAN; 3], |d| d.bbox_m.iter().copied().collect())
@@ -93,7 +91,7 @@ fn deformation(finished: &FinishedEpisode) -> Vec<DataStream> {
         DataStream::f64(
             "privileged/soft_extras/fem_bbox_dims",
             &[3],
-            shifted(frames, at_rest.to_vec(), size),
+            shifted(scores, at_rest.to_vec(), size),
         )
         .unit("m", "world"),
     ]

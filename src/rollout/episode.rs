@@ -30,8 +30,8 @@ use softvt_benchmark::{
 use softvt_common::episode_id::EpisodeId;
 use softvt_common::text::format_number;
 use softvt_evaluation::{
-    deformation::{Deformation, ReferenceShape},
-    judge::{Judge, JudgeConfig},
+    deformation::ReferenceShape,
+    judge::{ControlStepScore, Judge, JudgeConfig},
     safety::DeformationLimit,
     verdict::{InvalidReason, Outcome, Verdict},
 };
@@ -128,22 +128,13 @@ pub struct FinishedEpisode {
     /// One entry per control step, if requested.
     pub trace: Vec<StepTrace>,
     /// One entry per control step: the input of other scoring rules.
-    pub frames: Vec<ControlStepScore>,
+    pub scores: Vec<ControlStepScore>,
     /// Action of each control step.
     pub actions: Vec<Action>,
     /// Settled shape of a soft target.
     pub reference: Option<ReferenceShape>,
     /// States of the episode, if requested.
     pub recording: Option<StateRecording>,
-}
-
-/// Success and deformation at a control step, as other scoring rules use them.
-#[derive(Clone, Debug)]
-pub struct ControlStepScore {
-    /// True if the goal had been reached and held for long enough.
-    pub success_now: bool,
-    /// The target's worst deformation over the physics steps of the control step; `None` if it is unknown.
-    pub deformation: Option<Deformation>,
 }
 
 /// An episode cannot be run: an error in the user's input, or a failure of the controller.
@@ -277,12 +268,11 @@ pub struct Episode {
     newton: NewtonCount,
     min_det_f: f64,
     trace: Vec<StepTrace>,
-    frames: Vec<ControlStepScore>,
     actions: Vec<Action>,
     disturbance: Disturbance,
     sensors: Sensors,
     history: ObservationHistory,
-    recorded: Option<RecordedStates>,
+    recorded: Option<Vec<WorldSnapshot>>,
     /// Streams that will be requested.
     streams: SensorStreams,
     far_commands: u32,
@@ -296,13 +286,6 @@ struct NewtonCount {
     total: u64,
     /// Maximum in one physics step.
     max: u32,
-}
-
-/// States recorded so far.
-#[derive(Clone, Default)]
-struct RecordedStates {
-    frames: Vec<WorldSnapshot>,
-    d_pct: Vec<Option<f64>>,
 }
 
 impl Episode {
@@ -342,7 +325,7 @@ impl Episode {
         let disturbance = Disturbance::new(&spec.settings.robot.disturbance, &seed);
         let sensors =
             Sensors::new(&sim, &spec.settings.tactile, sensor_assets).with_seed(SensorSeed::new(&seed));
-        let recorded = spec.record_states.then(RecordedStates::default);
+        let recorded = spec.record_states.then(Vec::new);
         Ok(Self {
             spec,
             sim,
@@ -355,7 +338,6 @@ impl Episode {
             newton: NewtonCount::default(),
             min_det_f: f64::INFINITY,
             trace: Vec::new(),
-            frames: Vec::new(),
             actions: Vec::new(),
             disturbance,
             sensors,
@@ -410,7 +392,7 @@ impl Episode {
     /// Starts the episode. `streams` are those that any later observation may request; their history is kept.
     pub fn begin(&mut self, streams: SensorStreams) {
         self.streams = streams;
-        self.record_state(self.evidence.reference(self.target).map(|_| 0.0));
+        self.record_state();
         self.outcome = self.regular_outcome();
     }
 
@@ -440,7 +422,7 @@ impl Episode {
         if let Err(failure) = self.control_step(action) {
             return Some(self.invalid(&failure));
         }
-        self.record_state(self.frames.last().and_then(|frame| frame.deformation.as_ref()).map(|d| d.rms_pct));
+        self.record_state();
         self.regular_outcome()
     }
 
@@ -516,14 +498,13 @@ impl Episode {
     }
 
     /// Keeps the state for later observations and for the recording.
-    fn record_state(&mut self, d_pct: Option<f64>) {
+    fn record_state(&mut self) {
         if self.streams == SensorStreams::default() && self.recorded.is_none() {
             return;
         }
         let frame = Sensors::frame(&self.sim);
         if let Some(recorded) = &mut self.recorded {
-            recorded.frames.push(frame.clone());
-            recorded.d_pct.push(d_pct);
+            recorded.push(frame.clone());
         }
         let robot = self.sim.robot.state(&self.sim.world, self.sensors.seed());
         self.history.push(frame, robot, self.streams.past_steps);
@@ -539,7 +520,6 @@ impl Episode {
         let executed_b = self.disturbance.apply(&pose_b);
         self.sim.robot.command(&mut self.sim.world, &executed_b, action.grip);
         self.steps += 1;
-        let mut worst: Option<Deformation> = None;
         for _ in 0..steps_per_control(self.spec.settings.physics.dt) {
             self.physics_steps += 1;
             self.sim.step()?;
@@ -550,12 +530,8 @@ impl Episode {
                 self.min_det_f = self.min_det_f.min(self.sim.world.soft(index).min_det_f.det_f);
             }
             let time = self.time();
-            let evidence = self.evidence.collect(&self.sim, time);
-            let now = evidence.target.deformation;
-            self.judge.observe(&evidence);
-            worst = worst.into_iter().chain(now).max_by(|a, b| a.rms_pct.total_cmp(&b.rms_pct));
+            self.judge.observe(&self.evidence.collect(&self.sim, time));
         }
-        self.frames.push(ControlStepScore { success_now: self.judge.is_goal_reached(), deformation: worst });
         if self.spec.record_trace {
             self.trace.push(self.trace());
         }
@@ -634,20 +610,15 @@ impl Episode {
     /// Ends the episode: its record with what belongs to it. `gave_up` is as for [`record`](Self::record).
     pub fn finish(self, gave_up: Option<String>) -> FinishedEpisode {
         let record = self.record(gave_up);
-        let recording = self.recorded.map(|RecordedStates { frames, d_pct }| StateRecording {
-            sensors: self.sensors,
-            frames,
-            d_pct,
-        });
         let reference = self.evidence.reference(self.target).cloned();
-        FinishedEpisode {
-            record,
-            trace: self.trace,
-            frames: self.frames,
-            actions: self.actions,
-            reference,
-            recording,
-        }
+        let scores = self.judge.scores().to_vec();
+        let recording = self.recorded.map(|frames| {
+            let settled = reference.as_ref().map(|_| 0.0);
+            let worst = scores.iter().map(|score| score.deformation.map(|d| d.rms_pct));
+            let d_pct = std::iter::once(settled).chain(worst).collect();
+            StateRecording { sensors: self.sensors, frames, d_pct }
+        });
+        FinishedEpisode { record, trace: self.trace, scores, actions: self.actions, reference, recording }
     }
 }
 

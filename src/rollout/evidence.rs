@@ -35,6 +35,8 @@ pub(super) struct EvidenceCollector {
     /// Movable objects that are not the target.
     others: Vec<usize>,
     references: Vec<Option<ReferenceShape>>,
+    /// Deformation of each object in the last evidence; `None` if it is rigid or cannot be measured.
+    deformations: Vec<Option<Deformation>>,
     bodies: Vec<BodyEvidence>,
     crushed: Option<StrainMeter>,
 }
@@ -44,7 +46,7 @@ impl EvidenceCollector {
     pub(super) fn new(sim: &Simulation, goal: &GoalInScene, support_share: f64) -> Self {
         let &GoalInScene { object: target, target: goal, region } = goal;
         let is_other = |i: &usize| *i != target && sim.objects[*i].body.is_free();
-        let references = sim
+        let references: Vec<_> = sim
             .objects
             .iter()
             .map(|object| match object.body {
@@ -64,7 +66,8 @@ impl EvidenceCollector {
             }
             _ => None,
         };
-        Self { target, goal, region, support_share, others, references, bodies, crushed }
+        let deformations = deformations(&references, sim).collect();
+        Self { target, goal, region, support_share, others, references, deformations, bodies, crushed }
     }
 
     /// The other movable objects as they settled, with their deformation limits by name.
@@ -86,10 +89,9 @@ impl EvidenceCollector {
         self.others.iter().map(other).collect()
     }
 
-    /// Current deformation of an object; `None` if it is rigid or cannot be measured.
-    pub(super) fn deformation(&self, sim: &Simulation, object: usize) -> Option<Deformation> {
-        let BodyId::Soft(index) = sim.objects[object].body else { return None };
-        self.references[object].as_ref()?.measure(&sim.world.soft(index).state.x).ok()
+    /// Deformation of an object in the last evidence, 0 before the first; `None` if it is rigid or cannot be measured.
+    pub(super) fn deformation(&self, object: usize) -> Option<Deformation> {
+        self.deformations[object]
     }
 
     /// Settled shape of an object.
@@ -99,6 +101,8 @@ impl EvidenceCollector {
 
     /// The evidence of the last physics step.
     pub(super) fn collect<'a>(&'a mut self, sim: &Simulation, time_s: f64) -> Evidence<'a> {
+        self.deformations.clear();
+        self.deformations.extend(deformations(&self.references, sim));
         let mut bodies = std::mem::take(&mut self.bodies);
         bodies.clear();
         bodies.extend(self.others.iter().map(|&i| self.body(sim, i)));
@@ -183,9 +187,20 @@ impl EvidenceCollector {
             lowest_z_w: lowest(sim, object),
             support_force_n: support,
             robot_force_n: from_robot,
-            deformation: self.deformation(sim, index),
+            deformation: self.deformations[index],
         }
     }
+}
+
+/// Deformation of each object from its reference.
+fn deformations<'a>(
+    references: &'a [Option<ReferenceShape>],
+    sim: &'a Simulation,
+) -> impl Iterator<Item = Option<Deformation>> + 'a {
+    sim.objects.iter().zip(references).map(|(object, reference)| {
+        let BodyId::Soft(index) = object.body else { return None };
+        reference.as_ref()?.measure(&sim.world.soft(index).state.x).ok()
+    })
 }
 
 /// Contact partners that an object consists of: its colliders, or its soft body.

@@ -90,9 +90,7 @@ mod trace;
 pub use asset_cache::AssetCache;
 pub use build_error::BuildError;
 pub use controller::{ChunkedPolicy, Controller};
-pub use episode::{
-    ControlStepScore, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, checksum, target_asset,
-};
+pub use episode::{Episode, EpisodeError, EpisodeSpec, FinishedEpisode, checksum, target_asset};
 pub use goal_in_scene::check_goal;
 pub use robot_instance::RobotInstance;
 pub use scene_warnings::scene_warnings;

@@ -9,13 +9,14 @@ use crate::error::RunError;
 use softvt_common::cancel;
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::files;
+use softvt_evaluation::judge::ControlStepScore;
 use softvt_records::record::EpisodeRecord;
 use softvt_report::{
     actions,
     softvtbench_files::{self, DebugFrame, DebugShape},
     video::{self, Caption},
 };
-use softvt_rollout::{ControlStepScore, FinishedEpisode};
+use softvt_rollout::FinishedEpisode;
 
 /// Episodes of a run that become videos.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -142,13 +143,13 @@ impl EpisodeArtifacts<'_> {
 /// The log of every control step that the scorer of SoftVTBench reads.
 fn debug_frames(finished: &FinishedEpisode) -> Vec<DebugFrame> {
     let header = &finished.record.header;
-    let frame = |(step, frame): (usize, &ControlStepScore)| {
-        let (d, reference) = (frame.deformation.as_ref(), finished.reference.as_ref());
+    let frame = |(step, score): (usize, &ControlStepScore)| {
+        let (d, reference) = (score.deformation.as_ref(), finished.reference.as_ref());
         let (rms, max, bbox) = (d.map(|d| d.rms_pct), d.map(|d| d.max_pct), d.map(|d| d.bbox_m));
         let shape = DebugShape::new(&header.asset, reference, rms, max, bbox);
-        DebugFrame::new(&header.id, step as u32, frame.success_now, shape)
+        DebugFrame::new(&header.id, step as u32, score.success_now, shape)
     };
-    let mut frames: Vec<DebugFrame> = finished.frames.iter().enumerate().map(frame).collect();
+    let mut frames: Vec<DebugFrame> = finished.scores.iter().enumerate().map(frame).collect();
     if frames.len() < finished.record.stats.steps as usize {
         frames.push(aborted_frame(finished, frames.len()));
     }
@@ -159,7 +160,7 @@ fn debug_frames(finished: &FinishedEpisode) -> Vec<DebugFrame> {
 /// belongs to this step.
 fn aborted_frame(finished: &FinishedEpisode, step: usize) -> DebugFrame {
     let (header, verdict) = (&finished.record.header, &finished.record.verdict);
-    let before = finished.frames.iter().filter_map(|frame| Some(frame.deformation.as_ref()?.rms_pct));
+    let before = finished.scores.iter().filter_map(|score| Some(score.deformation.as_ref()?.rms_pct));
     let before = before.fold(0.0, f64::max);
     let peak = verdict.d_peak.filter(|peak| *peak > before);
     let reference = finished.reference.as_ref();

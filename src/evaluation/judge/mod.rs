@@ -84,7 +84,7 @@ use softvt_geometry::Aabb;
 
 use super::{
     criteria::SuccessCriteria,
-    deformation::series::DeformationSeries,
+    deformation::{Deformation, series::DeformationSeries},
     drop::{DropEvent, DropMonitor, DropReason, DropSample, ReleaseMonitor},
     evidence::{BodyEvidence, CrushedShares, Evidence},
     goal::{GoalMonitor, GoalRegion, GoalSample},
@@ -147,6 +147,15 @@ struct FirstContact {
     other: usize,
 }
 
+/// Success and deformation of the target at a control step, as other scoring rules use them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ControlStepScore {
+    /// True if the goal had been reached and held for long enough.
+    pub success_now: bool,
+    /// The worst deformation over the physics steps of the control step; `None` if it is unknown.
+    pub deformation: Option<Deformation>,
+}
+
 /// Sums over the physics steps of one control step.
 #[derive(Clone, Copy, Debug, Default)]
 struct ControlStepSums {
@@ -182,6 +191,11 @@ pub struct Judge {
     peak_weighted: PeakDeformation,
     peak_max: PeakDeformation,
     series: DeformationSeries,
+    scores: Vec<ControlStepScore>,
+    /// Worst deformation of the target since the last control step.
+    worst: Option<Deformation>,
+    /// Physics steps so far.
+    steps: u64,
     /// Peaks of the other bodies, in the order of the evidence.
     peaks_other: Vec<PeakDeformation>,
     first_wrong_contact: Option<FirstContact>,
@@ -197,6 +211,9 @@ impl Judge {
         let goal = GoalMonitor::new(config.hold_s, config.dt_s * f64::from(config.steps_per_control));
         Self {
             series: DeformationSeries::new(if config.is_target_soft { config.max_steps } else { 0 }),
+            scores: Vec::with_capacity(config.max_steps / config.steps_per_control as usize),
+            worst: None,
+            steps: 0,
             peaks_other: vec![PeakDeformation::default(); config.others.len()],
             first_wrong_contact: None,
             stage: StageMonitor::default(),
@@ -223,11 +240,22 @@ impl Judge {
     /// judged as if the target had been dropped.
     pub fn observe(&mut self, evidence: &Evidence<'_>) {
         self.observe_deformation(evidence);
-        if !evidence.is_finite() {
+        if evidence.is_finite() {
+            self.observe_handling(evidence);
+        } else {
             self.missing_evidence += 1;
             self.drops.record(DropReason::NoEvidence, self.time_s);
-            return;
         }
+        self.steps += 1;
+        if self.steps.is_multiple_of(u64::from(self.config.steps_per_control)) {
+            let score =
+                ControlStepScore { success_now: self.is_goal_reached(), deformation: self.worst.take() };
+            self.scores.push(score);
+        }
+    }
+
+    /// Contacts, lift, release, slip, grip, drop and goal.
+    fn observe_handling(&mut self, evidence: &Evidence<'_>) {
         self.time_s = evidence.time_s;
         self.observe_wrong_contact(evidence);
         let touch = self.observe_pads(evidence);
@@ -264,6 +292,11 @@ impl Judge {
     /// True if the goal has held for long enough: the episode may end.
     pub fn is_goal_reached(&self) -> bool {
         self.goal.reached_s.is_some()
+    }
+
+    /// The scores of all complete control steps so far.
+    pub fn scores(&self) -> &[ControlStepScore] {
+        &self.scores
     }
 
     /// True if the target rests at the goal: in its region, and carried. For a state that has settled before the episode.
@@ -365,8 +398,9 @@ impl Judge {
                 peak.update(body.deformation.map(|d| d.rms_pct));
             }
         }
+        let d = evidence.target.deformation;
+        self.worst = self.worst.into_iter().chain(d).max_by(|a, b| a.rms_pct.total_cmp(&b.rms_pct));
         if self.config.is_target_soft {
-            let d = evidence.target.deformation;
             self.series.push(d.map(|d| d.rms_pct), self.config.limit.map(|limit| limit.tau_pct()));
             self.peak.update(d.map(|d| d.rms_pct));
             self.peak_weighted.update(d.map(|d| d.weighted_pct));
