@@ -367,12 +367,12 @@
 
 ---Cubes, every other one 1; one corner is at the origin.
 ---@class softvt.CheckerMask
----@field size_m number Edge of a cube. Expects metres above 0.
+---@field size_m number Edge of a cube. Expects metres of 0.000001 or more.
 
 ---Slabs across an axis.
 ---@class softvt.StripesMask
 ---@field axis "x"|"y"|"z"|number[] Direction in which they follow each other. Expects one of "x", "y", "z" or a list of 3 numbers (any length).
----@field pitch_m number Distance from one to the next. Expects metres above 0.
+---@field pitch_m number Distance from one to the next. Expects metres of 0.000001 or more.
 ---@field share? number Share of the pitch that is 1. Expects a number in 0..1. Default 0.5.
 
 ---Rises smoothly from 0 to 1 along an axis.
@@ -392,31 +392,31 @@
 ---Annual rings of a trunk: cylinders about a line along z, distorted by noise.
 ---@class softvt.RingsMask
 ---@field centre_m number[] A point of the line. Expects a list of 3 numbers (m).
----@field pitch_m number Distance from one ring to the next. Expects metres above 0.
----@field wobble_m? number Amplitude of the distortion. Expects metres above 0. Default 0.01.
+---@field pitch_m number Distance from one ring to the next. Expects metres of 0.000001 or more.
+---@field wobble_m? number Amplitude of the distortion. Expects metres of 0.000001 or more. Default 0.01.
 ---@field seed? integer Selects the pattern. Expects a whole number in 0..4294967295. Default 0.
 
 ---Boards along x, side by side in y, with one value per board.
 ---@class softvt.BoardsMask
----@field length_m number Length of a board. Expects metres above 0.
----@field width_m number Width of a board. Expects metres above 0.
+---@field length_m number Length of a board. Expects metres of 0.000001 or more.
+---@field width_m number Width of a board. Expects metres of 0.000001 or more.
 ---@field seed? integer Selects the pattern. Expects a whole number in 0..4294967295. Default 0.
 
 ---The gaps between boards of these sizes.
 ---@class softvt.SeamsMask
----@field length_m number Length of a board. Expects metres above 0.
----@field width_m number Width of a board. Expects metres above 0.
----@field gap_m number Width of a gap. Expects metres above 0.
+---@field length_m number Length of a board. Expects metres of 0.000001 or more.
+---@field width_m number Width of a board. Expects metres of 0.000001 or more.
+---@field gap_m number Width of a gap. Expects metres of 0.000001 or more.
 
 ---Scattered round specks.
 ---@class softvt.SpecksMask
----@field spacing_m number Mean distance. Expects metres above 0.
----@field radius_m number Radius, at most half the spacing. Expects metres above 0.
+---@field spacing_m number Mean distance. Expects metres of 0.000001 or more.
+---@field radius_m number Radius, at most half the spacing. Expects metres of 0.000001 or more.
 ---@field seed? integer Selects the pattern. Expects a whole number in 0..4294967295. Default 0.
 
 ---A plain weave in x and y: high in the middle of a thread.
 ---@class softvt.WeaveMask
----@field pitch_m number Width of a thread. Expects metres above 0.
+---@field pitch_m number Width of a thread. Expects metres of 0.000001 or more.
 
 ---Surfaces that face a direction, by the cosine between their normal and that direction.
 ---@class softvt.FacingMask
@@ -436,7 +436,7 @@
 ---@field at number[] Middle of the line; of a wrapped line, only the height counts. Expects a list of 3 numbers (m).
 ---@field facing "+x"|"-x"|"+y"|"-y"|"+z"|"-z"|number[] Direction that the printed surface faces. The top of the letters points to +y on top faces, else to +z. Expects one of "+x", "-x", "+y", "-y", "+z", "-z" or a list of 3 numbers (any length).
 ---@field angle? number Rotation of the line on its surface, counter-clockwise for the reader. Expects radians. Default 0.
----@field wrap_m? number Radius of the upright cylinder about the z axis that the line is wrapped around; flat by default. Expects metres above 0.
+---@field wrap_m? number Radius of the upright cylinder about the z axis that the line is wrapped around; flat by default. Expects metres of 0.000001 or more.
 ---@field weight? number Thickening of the strokes, in heights of a capital letter. Expects a number in 0..0.25. Default 0.08.
 ---@field font? "sans"|"mono" Typeface. Default "sans".
 

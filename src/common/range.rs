@@ -34,7 +34,12 @@ impl Range {
     /// Greater than zero.
     pub const POSITIVE: Self = Self { min: 0.0, above_min: true, ..Self::ANY };
     /// Zero or greater.
-    pub const NOT_NEGATIVE: Self = Self { min: 0.0, ..Self::ANY };
+    pub const NOT_NEGATIVE: Self = Self::at_least(0.0);
+
+    /// From `min`, included.
+    pub const fn at_least(min: f64) -> Self {
+        Self { min, ..Self::ANY }
+    }
 
     /// From `min` to `max`, both included.
     pub const fn closed(min: f64, max: f64) -> Self {

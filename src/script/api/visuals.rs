@@ -17,7 +17,9 @@ use softvt_common::parallel::lock;
 use softvt_geometry::shape::Shape;
 use softvt_scene::{LabelLine, MAX_LETTERS, Mask, Scene, TextDecal, Typeface, Visual, VisualLayer};
 
-const LENGTH: Type = Type::Number("m", Range::POSITIVE);
+/// Lengths of patterns. Finer ones cannot be seen, and their waves exceed the numbers of the renderer.
+const LENGTHS: Range = Range::at_least(1e-6);
+const LENGTH: Type = Type::Number("m", LENGTHS);
 const SHARE: Type = Type::Number("", Range::closed(0.0, 1.0));
 const COSINE: Type = Type::Number("", Range::closed(-1.0, 1.0));
 const NOISE_VALUE: Type = Type::Number("", Range::closed(-1.0, 2.0));
@@ -92,7 +94,7 @@ impl FromChecked for Sizes {
 }
 
 impl LuaType for Sizes {
-    const TYPE: Type = Type::OneOf(&[LENGTH, Type::Vector(3, "m", Range::POSITIVE)]);
+    const TYPE: Type = Type::OneOf(&[LENGTH, Type::Vector(3, "m", LENGTHS)]);
 }
 
 /// `softvt.Mask`.

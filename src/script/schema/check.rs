@@ -211,7 +211,7 @@ pub(crate) fn check(lua: &Lua, record: &Record, table: &Table) -> Result<Table, 
     let out = lua.create_table()?;
     for field in record.fields {
         let value = match table.raw_get(field.name)? {
-            Value::Nil => absent(lua, field),
+            Value::Nil => absent(lua, record, table, field),
             value => field.ty.check(lua, &value),
         };
         out.raw_set(field.name, value.map_err(|error| error.inside(field.name))?)?;
@@ -219,11 +219,23 @@ pub(crate) fn check(lua: &Lua, record: &Record, table: &Table) -> Result<Table, 
     Ok(out)
 }
 
-/// The value of a field that is not given.
-fn absent(lua: &Lua, field: &Field) -> Result<Value, ValidationError> {
+/// The value of a field that is not given. The error about a required one names all that `table` lacks.
+fn absent(lua: &Lua, record: &Record, table: &Table, field: &Field) -> Result<Value, ValidationError> {
     Ok(match field.presence {
         FieldDefault::Required => {
-            return Err(ValidationError::new(format!("missing; expected {}", field.ty.describe())));
+            let is_missing = |other: &&Field| {
+                other.presence == FieldDefault::Required
+                    && other.name != field.name
+                    && matches!(table.raw_get(other.name), Ok(Value::Nil))
+            };
+            let others: Vec<_> = record.fields.iter().filter(is_missing).map(|other| other.name).collect();
+            let also = match others.is_empty() {
+                true => String::new(),
+                false => {
+                    format!(", as {} {}", if others.len() == 1 { "is" } else { "are" }, others.join(", "))
+                }
+            };
+            return Err(ValidationError::new(format!("missing{also}; expected {}", field.ty.describe())));
         }
         FieldDefault::Optional => Value::Nil,
         FieldDefault::Number(n) => Value::Number(n),

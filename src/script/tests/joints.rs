@@ -42,14 +42,13 @@ fn open(text: &str) -> Result<Scene, String> {
 #[test]
 fn a_joint_without_limits_or_with_wrong_ones_is_refused_at_its_line() {
     let joint = |text: &str| error_of(&chest(text, ""));
-    let missing = |unit: &str| format!("missing; expected {unit}");
     assert_eq!(
         joint("softvt.slider { axis = { 0, -1, 0 } }"),
-        format!("suites/x.lua:4: slider.lower: {}", missing("metres"))
+        "suites/x.lua:4: slider.lower: missing, as is upper; expected metres"
     );
     assert_eq!(
         joint("softvt.hinge { axis = { 0, 0, 1 }, origin = { 0, 0, 0 },\nlower = -1 }"),
-        format!("suites/x.lua:4: hinge.upper: {}", missing("radians"))
+        "suites/x.lua:4: hinge.upper: missing; expected radians"
     );
     assert_eq!(
         joint("softvt.slider { axis = { 0, -1, 0 }, lower = 0,\nupper = -0.1 }"),

@@ -108,11 +108,14 @@ fn wrong_visuals_are_reported_with_line_and_hint() {
         ),
         (
             "mask = mask.noise { size_m = 0 },",
-            at(8, "mask.noise.size_m: expected metres above 0 or a list of 3 numbers above 0 (m), got 0"),
+            at(
+                8,
+                "mask.noise.size_m: expected metres of 0.000001 or more or a list of 3 numbers of 0.000001 or more (m), got 0",
+            ),
         ),
         (
             "mask = mask.noise { size_m = { 1, 0, 1 } },",
-            at(8, "mask.noise.size_m[2]: expected a number above 0, got 0"),
+            at(8, "mask.noise.size_m[2]: expected a number of 0.000001 or more, got 0"),
         ),
         (
             "mask = mask.noise { size_m = 1, from = 0.5, to = 0.5 },",
