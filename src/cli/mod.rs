@@ -1,7 +1,7 @@
 //! The `softvt` command.
 //!
 //! `commands` has one file per command; `args` are the arguments that several of them take; `parse` fills them in from the
-//! command line. Runs are in the crate `softvt-runner`.
+//! command line. Runs are in the crate `softvt-runner`; this one is internal to the binary.
 #![warn(unreachable_pub)]
 
 mod args;
@@ -10,7 +10,6 @@ mod error;
 mod output;
 mod parse;
 mod plan_flags;
-mod replays;
 #[cfg(test)]
 mod tests;
 

@@ -8,13 +8,17 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::error::CliError;
+use crate::error::{CliError, Exit};
 use softvt_common::{
     parallel::lock,
     text::{self, counted},
 };
 use softvt_dataset::card::rejection_counts;
-use softvt_runner::{Observer, recording::RecordingSummary};
+use softvt_runner::{
+    Observer,
+    recording::RecordingSummary,
+    replay::{DemoRef, DemoReplay},
+};
 
 /// Prints to standard output with control characters escaped. A closed pipe (`| head -1`) is accepted: the reader has
 /// what it wants.
@@ -37,6 +41,38 @@ pub(crate) fn print(text: &str) -> Result<(), CliError> {
 /// As [`print`].
 pub(crate) fn print_json(value: &impl serde::Serialize) -> Result<(), CliError> {
     print(&format!("{:#}\n", serde_json::json!(value)))
+}
+
+/// Prints for each demonstration whether its re-simulation is byte-identical, and how many reach the goal.
+///
+/// # Errors
+/// A result differs (exit code 1).
+pub(crate) fn report_replays(demos: &[DemoRef], replays: &[DemoReplay]) -> Result<(), CliError> {
+    for (DemoRef { file, demo }, replay) in demos.iter().zip(replays) {
+        let result = match &replay.difference {
+            None => format!("byte-identical, final state {}", replay.state_hash),
+            Some(difference) => format!("differs: {difference}"),
+        };
+        print(&format!("{} demo_{demo}: {result}\n", file.display()))?;
+    }
+    let all = demos.len();
+    let identical = replays.iter().filter(|replay| replay.difference.is_none()).count();
+    let reached = replays.iter().filter(|replay| replay.goal_reached).count();
+    if all > 1 {
+        print(&format!(
+            "replayed by their actions alone: {identical} of {all} byte-identical, {reached} of {all} reach the goal\n"
+        ))?;
+    }
+    if identical == all {
+        return Ok(());
+    }
+    Err(CliError::new(
+        Exit::Internal,
+        format!(
+            "replaying {} gave another result; softvt doctor checks whether this machine computes the published results",
+            counted(all - identical, "demonstration")
+        ),
+    ))
 }
 
 /// Characters of a cell that are shown. The widths of format strings end at 65,535.

@@ -4,7 +4,7 @@
 pub mod builtin;
 pub mod decode;
 pub mod encode;
-mod grip_switch;
+mod grip_hysteresis;
 mod interface;
 pub mod msgpack;
 mod observation;
@@ -12,9 +12,8 @@ pub mod osc;
 pub mod profile;
 pub mod remote;
 pub mod transport;
-mod width_latch;
 
-pub use grip_switch::GripSwitch;
+pub use grip_hysteresis::{GripSwitch, WidthLatch};
 pub use interface::{
     Action, ActionChunk, GripCommand, Policy, PolicyError, QueryId, TaskBrief, ToolCommand, ToolMotion,
 };
@@ -23,4 +22,3 @@ pub use observation::{
 };
 pub use osc::CommandResolver;
 pub use softvt_robot::GripTarget;
-pub use width_latch::WidthLatch;

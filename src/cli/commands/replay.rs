@@ -6,8 +6,7 @@ use clap::Args;
 
 use crate::{
     error::{CliError, Exit},
-    output::{Console, print},
-    replays::report_replays,
+    output::{Console, print, report_replays},
 };
 use softvt_dataset::layout::is_dataset;
 use softvt_report::stored_run::{self, StoredRun};

@@ -9,8 +9,7 @@ use clap::{Args, Subcommand, value_parser};
 use crate::{
     args::parse_folder,
     error::CliError,
-    output::{Console, Progress, eprint_notice, print, print_json},
-    replays::report_replays,
+    output::{Console, Progress, eprint_notice, print, print_json, report_replays},
 };
 use softvt_common::cancel;
 use softvt_common::{files, text::counted};

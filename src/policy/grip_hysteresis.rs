@@ -1,4 +1,5 @@
-//! The grip code two-width: a hand that is either open, or at the width that the policy gave when it closed.
+//! Grip codes whose closure depends on earlier answers: a gripper that is open or closed with hysteresis, and one that holds a
+//! width.
 
 /// Closure above which an answer closes an open gripper: a target width below 72 mm.
 const CLOSE_ABOVE: f64 = 0.1;
@@ -8,8 +9,32 @@ const OPEN_BELOW: f64 = 0.05;
 /// through those in between.
 const FOLLOW_STEPS: u32 = 10;
 
-/// Holds the width of the code two-width. The width follows the answers of the first 0.5 s after closing; the last of
-/// them is held until an answer opens the gripper.
+/// State of a gripper that is open or closed, with hysteresis: the decoder of SoftVTBench's release v0.2 for continuous
+/// answers. A change is kept for some control steps, whatever is answered.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GripSwitch {
+    is_closed: bool,
+    /// Control steps for which the state is still kept.
+    held_steps: u32,
+}
+
+impl GripSwitch {
+    /// Commanded closure, 0 or 1, after the answer of the next control step: true closes, false opens, `None` changes
+    /// nothing.
+    pub fn closure(&mut self, closes: Option<bool>, hold_steps: u32) -> f64 {
+        if self.held_steps > 0 {
+            self.held_steps -= 1;
+        } else if let Some(is_closed) = closes.filter(|closes| *closes != self.is_closed) {
+            *self = Self { is_closed, held_steps: hold_steps.saturating_sub(1) };
+        }
+        f64::from(u8::from(self.is_closed))
+    }
+}
+
+/// Memory of the grip code two-width: a hand that is either open, or at the width that the policy gave when it closed.
+///
+/// The width follows the answers of the first 0.5 s after closing; the last of them is held until an answer opens the
+/// gripper.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WidthLatch {
     held: Option<HeldClosure>,
@@ -41,6 +66,18 @@ impl WidthLatch {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_change_is_kept_for_some_steps_and_then_until_an_answer_on_the_other_side() {
+        let mut switch = GripSwitch::default();
+        let mut run = |answers: &[Option<bool>]| -> Vec<f64> {
+            answers.iter().map(|closes| switch.closure(*closes, 3)).collect()
+        };
+        assert_eq!(run(&[None, Some(false)]), [0.0, 0.0]);
+        assert_eq!(run(&[Some(true), Some(false), Some(false)]), [1.0; 3], "three steps at least");
+        assert_eq!(run(&[None, None]), [1.0; 2], "between both limits nothing changes");
+        assert_eq!(run(&[Some(false), Some(true), None, None]), [0.0; 4]);
+    }
 
     #[test]
     fn the_width_is_held_from_half_a_second_after_closing_until_an_answer_opens() {
