@@ -14,9 +14,11 @@ use softvt_policy::profile::GripCode;
 /// Demonstrations of a task.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TaskCount {
+    /// Name of the suite.
     pub suite: String,
     /// Task index in the suite.
     pub task: usize,
+    /// Instruction.
     pub prompt: String,
     /// Asset of the target.
     pub asset: String,
@@ -24,10 +26,13 @@ pub struct TaskCount {
     pub demos: usize,
     /// Control steps in them.
     pub samples: usize,
+    /// Attempts, kept or not.
     pub attempts: usize,
     /// Rejected attempts, by reason.
     pub rejected: BTreeMap<String, usize>,
+    /// Size of the HDF5 file.
     pub hdf5_bytes: u64,
+    /// Size of its videos.
     pub video_bytes: u64,
 }
 
@@ -38,7 +43,9 @@ pub struct Imported {
     pub file: String,
     /// SHA-256, hexadecimal.
     pub sha256: String,
+    /// Name of its format, such as SoftVTBench.
     pub format: String,
+    /// Demonstrations in it.
     pub demos: usize,
     /// Source of the executed commands.
     pub commands: String,
@@ -63,6 +70,7 @@ pub struct DatasetCard {
     /// Source files, if the demonstrations were imported.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub imported: Vec<Imported>,
+    /// The demonstrations of each task.
     pub tasks: Vec<TaskCount>,
 }
 

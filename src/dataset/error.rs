@@ -9,21 +9,28 @@ use softvt_media::video::VideoError;
 use softvt_rollout::SensingError;
 
 /// Error of reading, writing or rendering demonstrations. Messages name the file and the key in it.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
+    /// A file cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
+    /// The file is no HDF5 file.
     #[error("{path} {what}")]
     NotHdf5 { path: String, what: String },
     /// `key` is a group, dataset, attribute or line of the file.
     #[error("{path}: {key}: {what}")]
     Content { path: String, key: String, what: String },
+    /// The output folder contains something else.
     #[error("--out {out}: {what}")]
     OutputNotEmpty { out: String, what: String },
+    /// An image or a tactile reading cannot be computed.
     #[error(transparent)]
     Sensing(#[from] SensingError),
+    /// A video cannot be written.
     #[error(transparent)]
     Video(#[from] VideoError),
+    /// A stop was requested.
     #[error("interrupted")]
     Interrupted,
 }

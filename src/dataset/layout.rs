@@ -25,7 +25,9 @@ pub const VIDEO_STREAMS: [&str; 4] =
 /// A file of an attempt and its place in the finished dataset.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PartMove {
+    /// Path of the file among the attempts.
     pub part: PathBuf,
+    /// Path in the finished dataset.
     pub target: PathBuf,
 }
 
@@ -51,6 +53,7 @@ impl TaskPaths {
         format!("hdf5/{}_demo.hdf5", self.name())
     }
 
+    /// HDF5 file.
     pub fn hdf5(&self) -> PathBuf {
         self.root.join(self.hdf5_relative())
     }

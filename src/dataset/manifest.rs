@@ -19,9 +19,11 @@ pub const SCHEMA_VERSION: u32 = 1;
 pub struct ManifestEntry {
     /// [`SCHEMA_VERSION`].
     pub schema_version: u32,
+    /// Name of the suite.
     pub suite: String,
     /// The suite again, under SoftVTBench's name.
     pub task_suite: String,
+    /// Index of the task in the suite.
     pub task_id: usize,
     /// Index of the attempt in the split of demonstrations.
     pub episode: u32,
@@ -31,6 +33,7 @@ pub struct ManifestEntry {
     pub hdf5_path: String,
     /// Number of control steps.
     pub num_samples: usize,
+    /// Instruction.
     pub language: String,
     /// Asset of the target.
     pub asset_name: String,

@@ -16,13 +16,19 @@ const BINS: usize = 24;
 /// Distribution of one quantity over all demonstrations.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ColumnStatistics {
+    /// Name with its unit.
     pub name: String,
+    /// Number of values.
     pub count: usize,
+    /// Smallest value.
     pub min: f64,
+    /// Mean.
     pub mean: f64,
     /// Standard deviation.
     pub sd: f64,
+    /// Median.
     pub median: f64,
+    /// Largest value.
     pub max: f64,
     /// Counts in bins of equal width from `min` to `max`.
     pub bins: Vec<usize>,

@@ -6,7 +6,9 @@ use softvt_robot::rotation;
 /// Values of a [`DataStream`], step by step.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StreamValues {
+    /// Physical quantities.
     F64(Vec<f64>),
+    /// The same with half the size.
     F32(Vec<f32>),
     /// Images and truth values.
     U8(Vec<u8>),
@@ -36,14 +38,17 @@ impl StreamValues {
 }
 
 impl DataStream {
+    /// A stream of 64-bit numbers, of this shape per step.
     pub fn f64(name: impl Into<String>, row_shape: &[usize], values: Vec<f64>) -> Self {
         Self::new(name.into(), row_shape, StreamValues::F64(values))
     }
 
+    /// A stream of 32-bit numbers, of this shape per step.
     pub fn f32(name: impl Into<String>, row_shape: &[usize], values: Vec<f32>) -> Self {
         Self::new(name.into(), row_shape, StreamValues::F32(values))
     }
 
+    /// A stream of bytes, of this shape per step.
     pub fn u8(name: impl Into<String>, row_shape: &[usize], values: Vec<u8>) -> Self {
         Self::new(name.into(), row_shape, StreamValues::U8(values))
     }

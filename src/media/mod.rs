@@ -1,5 +1,5 @@
 //! Drawing on images ([`canvas`]), and video files ([`video`]).
-#![warn(unreachable_pub)]
+#![warn(missing_docs, unreachable_pub)]
 
 pub mod canvas;
 pub mod video;

@@ -1,4 +1,6 @@
 //! Run folders and everything derived from them: result tables, HTML report, videos, and files in SoftVTBench's format.
+//!
+//! An internal crate: the runner and the command line use it, and other programs read the files.
 #![warn(unreachable_pub)]
 
 pub mod actions;

@@ -3,7 +3,7 @@
 //! Layers, each of which uses those before it: `vm` (the sandboxed virtual machine), `schema` (declarations of records,
 //! classes and functions, and checks by them), `api` (everything a script can reach as `softvt.…`), `plan` (loading a file),
 //! `run` (episodes, experts, experiments). [`stubs`] writes the declarations for language servers and readers.
-#![warn(unreachable_pub)]
+#![warn(missing_docs, unreachable_pub)]
 
 mod api;
 mod plan;

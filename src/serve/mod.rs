@@ -1,6 +1,6 @@
 //! A server through which clients control episodes: reset, step, render, get and set the state. The protocol
 //! is described in `docs/serve.md`.
-#![warn(unreachable_pub)]
+#![warn(missing_docs, unreachable_pub)]
 
 mod access;
 mod attempts;

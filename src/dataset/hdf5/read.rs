@@ -20,6 +20,7 @@ use softvt_records::record::EpisodeRecord;
 
 /// The HDF5 file of a task, with the demonstrations `/data/demo_0`, `/data/demo_1`, …
 pub struct TaskFile {
+    /// Path of the file.
     pub path: PathBuf,
     /// Indices of the demonstrations, ascending.
     pub demos: Vec<usize>,
@@ -39,7 +40,9 @@ pub(crate) enum NumberType {
 /// Values of a stream as `f64`, in row-major order. The first axis is the step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FloatArray {
+    /// The values.
     pub values: Vec<f64>,
+    /// Length of each axis.
     pub shape: Vec<usize>,
 }
 
@@ -53,8 +56,11 @@ impl FloatArray {
 /// RGB images of equal size, 8 bits per channel, one after the other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImageBlock {
+    /// Rows from the top, pixels from the left, channels last.
     pub bytes: Vec<u8>,
+    /// Height of an image, px.
     pub height: usize,
+    /// Width of an image, px.
     pub width: usize,
 }
 

@@ -13,6 +13,7 @@ pub enum ForeignFormat {
     Libero,
     /// Absolute poses, as stored by SoftVTBench.
     SoftVtBench,
+    /// A recording of softvt.
     Softvt,
 }
 
@@ -30,9 +31,11 @@ impl ForeignFormat {
 /// A file of demonstrations.
 #[derive(Clone, Debug)]
 pub struct ForeignFile {
+    /// Path of the file.
     pub path: PathBuf,
     /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
+    /// Its format.
     pub format: ForeignFormat,
     /// Its demonstrations, by index.
     pub demos: Vec<ForeignDemo>,
@@ -45,12 +48,15 @@ pub struct ForeignFile {
 pub struct ForeignDemo {
     /// Name of its group, such as `demo_3`.
     pub name: String,
+    /// The task that it names.
     pub task: ForeignTask,
+    /// Commands of the tool and the gripper.
     pub commands: Vec<ToolCommand>,
     /// True while the gripper is commanded to hold.
     pub gripper_closed: Vec<bool>,
     /// True while the gripper holds an object and the recorded closure is the measured one, limited by that object.
     pub is_stopped_by_object: Vec<bool>,
+    /// Where it starts.
     pub initial_condition: InitialCondition,
     /// Data the commands were computed from, for the dataset card.
     pub command_source: &'static str,
@@ -59,6 +65,7 @@ pub struct ForeignDemo {
 /// Task named by a foreign demonstration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ForeignTask {
+    /// Name of the suite.
     pub suite: Option<String>,
     /// Task index in the suite.
     pub id: Option<usize>,
@@ -92,6 +99,7 @@ pub enum InitialCondition {
 pub struct ForeignObjectPose {
     /// Its name there.
     pub name: String,
+    /// Its pose, in the frame that `in_base` tells.
     pub pose: Pose,
     /// True if `pose` is in the robot's base frame, else in that simulator's world frame, whose x and y are assumed
     /// to coincide with softvt's.

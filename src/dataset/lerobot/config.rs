@@ -24,6 +24,7 @@ pub struct ExportConfig {
     pub data: PathBuf,
     /// Output folder; must not exist or be empty.
     pub out: PathBuf,
+    /// Version of the format.
     pub version: LeRobotVersion,
     /// Code of the seventh number of an action.
     pub gripper: GripCode,
@@ -36,6 +37,7 @@ pub struct ExportConfig {
 /// Size of an exported dataset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ExportSummary {
+    /// Demonstrations.
     pub episodes: usize,
     /// Rows of all episodes.
     pub frames: usize,

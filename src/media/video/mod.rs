@@ -19,17 +19,22 @@ const QUANTISER: u8 = 22;
 const KEY_INTERVAL: u32 = 40;
 
 /// Error of encoding or writing a video.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, Error)]
 pub enum VideoError {
-    // Odd sizes are excluded since chroma is stored at half the resolution.
+    /// The size cannot be encoded: chroma is stored at half the resolution.
     #[error("a video of {0} × {1} pixels cannot be encoded: both must be even, from 16 to 4096")]
     Size(usize, usize),
+    /// An image does not have the size of the video.
     #[error("an image of {got} bytes in a video of {width} × {height}: expected {expected}")]
     ImageSize { got: usize, expected: usize, width: usize, height: usize },
+    /// H.264 encoding failed.
     #[error("the encoder failed: {0:?}")]
     Encoder(EncodeError),
+    /// No frame was added.
     #[error("the video has no frames")]
     Empty,
+    /// The file cannot be written.
     #[error(transparent)]
     File(#[from] FileError),
 }

@@ -174,6 +174,7 @@ fn nal_units(stream: &[u8]) -> impl Iterator<Item = &[u8]> {
 /// Length and frame rate of a video.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VideoInfo {
+    /// Number of frames.
     pub frames: usize,
     /// Frames per second.
     pub frame_rate: f64,

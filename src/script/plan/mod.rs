@@ -92,6 +92,7 @@ impl ScriptSources {
 pub struct LoadedScript {
     /// The files; episodes run on these.
     pub sources: ScriptSources,
+    /// What the script returns: suites, conditions or an experiment.
     pub plan: Plan,
     /// The declared options, with their values.
     pub options: Vec<OptionSpec>,

@@ -73,7 +73,9 @@ pub struct OptionSpec {
     pub unit: String,
     /// Description for --help.
     pub help: String,
+    /// Value where none is given.
     pub default: ScriptOptionValue,
+    /// Value in this run.
     pub value: ScriptOptionValue,
     /// Allowed numbers.
     pub range: Range,

@@ -32,6 +32,7 @@ use softvt_robot::rotation;
 /// A loaded policy file.
 #[derive(Clone, Debug)]
 pub struct PolicyFile {
+    /// Name in results.
     pub name: String,
     /// Number of actions of a list that are executed, if the file sets it.
     pub replan: Option<usize>,

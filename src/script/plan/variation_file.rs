@@ -26,12 +26,16 @@ pub fn load_variation(path: &Path) -> Result<(VariationRanges, BTreeMap<String, 
 }
 
 /// A plan cannot be varied.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum VaryError {
+    /// It has no suite.
     #[error("applies to suites, and this file is an experiment")]
     Experiment,
+    /// A suite varies already.
     #[error("suite {suite} varies already, by its own variation {variation:?}; leave the flag out")]
     Varied { suite: String, variation: String },
+    /// A suite has no soft objects.
     #[error("{}", no_soft_objects(suite, variation))]
     Rigid { suite: String, variation: String },
 }

@@ -306,16 +306,19 @@ fn unknown_shift<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -
     }
 }
 
-/// The value of `--shift name=value` is invalid.
+/// The value of a shift is invalid.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ShiftError {
+    /// The suite declares no shift of this name.
     #[error("{}", unknown_shift(name, known.iter().map(String::as_str)))]
     Unknown { name: String, known: Vec<String> },
+    /// The value is out of the declared range.
     #[error("shift {name}: expected a number{range} ({unit}), got {value}")]
     Value { name: String, range: String, unit: String, value: String },
 }
 
-/// Checks the value of `--shift name=value` against the declared shifts of a suite.
+/// Checks the value of a shift against those that a suite declares.
 ///
 /// # Errors
 /// If the shift is unknown or the value is out of its range; the message is a fragment.

@@ -65,6 +65,7 @@ pub struct VmLimits {
     pub grace: Duration,
     /// Called if a library function does not return.
     pub on_stuck: OnStuck,
+    /// Receives what scripts print.
     pub print: PrintSink,
 }
 
