@@ -16,6 +16,9 @@
 //!
 //! Units are SI throughout; a name carries its unit where it is not SI or not obvious. Frames are suffixes:
 //! `_w` world, `_b` robot base, `_h` hand, `_p` pad, `_o` object.
+// The modules of switched-off features are named above all the same.
+#![cfg_attr(not(feature = "cli"), allow(rustdoc::broken_intra_doc_links))]
+
 #[doc(inline)]
 pub use softvt_benchmark as benchmark;
 #[cfg(feature = "cli")]
