@@ -22,7 +22,8 @@ fn imports_are_printed_and_checked() {
     assert!(project.succeeds("replay again/attempts/one 0/1").out.contains("byte-identical"));
     let once_more = project.succeeds(&line);
     assert!(once_more.err.contains("is already complete"), "{}", once_more.err);
-    project.succeeds(&format!("dataset import x.lua {OWN} --out layout --images video --layout"));
+    project
+        .succeeds(&format!("dataset import x.lua {OWN} --out layout --images video --ignore-recorded-poses"));
     let message = project.refusal(&format!("dataset import x.lua {OWN} --task 7 --out new"));
     assert!(message.contains("--task 7: suite one has no such task"), "{message}");
     for data in ["data", OWN] {

@@ -141,8 +141,8 @@ fn objects_start_where_the_file_has_them() {
     }
     assert!(check::folder(&project.path("made")).expect("a dataset").problems.is_empty());
     assert!(is_reproduced(&project.path("made")));
-    let layout = ImportOptions { layout: true, ..ImportOptions::default() };
-    import(&run, &["inside.hdf5"], "kept", layout).expect("the layout has it elsewhere");
+    let laid_out = ImportOptions { ignore_recorded_poses: true, ..ImportOptions::default() };
+    import(&run, &["inside.hdf5"], "kept", laid_out).expect("the layout has it elsewhere");
 }
 
 #[test]

@@ -36,7 +36,7 @@ pub struct ImportOptions {
     /// Maximum number of demonstrations per task, in order; by default all.
     pub attempts: Option<u32>,
     /// True to start objects where the layouts of the suite put them, not where the files do.
-    pub layout: bool,
+    pub ignore_recorded_poses: bool,
 }
 
 /// Re-executes the demonstrations of `files` in the suites of a script, and records those that are safe and reach the goal.
@@ -64,7 +64,7 @@ pub fn import(
         "softvt": env!("CARGO_PKG_VERSION"),
         "imported": sources,
         "attempts": options.attempts,
-        "layout": options.layout,
+        "ignore_recorded_poses": options.ignore_recorded_poses,
         "task": config.tasks,
         "pictures": recording.has_images,
         "privileged": recording.has_privileged,
@@ -92,7 +92,7 @@ pub fn import(
                 None,
                 |run, log| {
                     run.imported = sources.clone();
-                    replay_demos(run, log, &demos, options.layout)
+                    replay_demos(run, log, &demos, options.ignore_recorded_poses)
                 },
             )?);
         }
@@ -129,19 +129,19 @@ fn file_name(file: &ForeignFile) -> String {
     file.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Makes the episodes of a run re-execute the demonstrations, each from its own initial state. With `use_layout`
+/// Makes the episodes of a run re-execute the demonstrations, each from its own initial state. With `ignore_recorded_poses`
 /// objects start where the layout puts them.
 fn replay_demos(
     run: &mut SuiteRun,
     grip_log: &GripLog,
     demos: &[&MatchedDemo],
-    use_layout: bool,
+    ignore_recorded_poses: bool,
 ) -> Result<(), RunError> {
     let mut commands: BTreeMap<EpisodeIndex, Vec<ToolCommand>> = BTreeMap::new();
     let (mut placed, mut foreign) = (0, 0);
     for matched in demos {
         let index = EpisodeIndex { task: matched.task.task.id, episode: matched.attempt };
-        let (start, demo) = initial_state(run, matched, use_layout)?;
+        let (start, demo) = initial_state(run, matched, ignore_recorded_poses)?;
         foreign += usize::from(matches!(demo.initial_condition, InitialCondition::OtherSimulator { .. }));
         placed += usize::from(!start.places.is_empty());
         let origin = Origin {
@@ -174,16 +174,16 @@ fn replay_demos(
 fn initial_state(
     run: &SuiteRun,
     matched: &MatchedDemo,
-    use_layout: bool,
+    ignore_recorded_poses: bool,
 ) -> Result<(InitialState, ForeignDemo), RunError> {
     let mut demo = matched.demo.clone();
     let (joints, poses) = match &matched.demo.initial_condition {
         InitialCondition::SoftvtEpisode { start, .. } => {
-            let places = if use_layout { Vec::new() } else { start.places.clone() };
+            let places = if ignore_recorded_poses { Vec::new() } else { start.places.clone() };
             return Ok((InitialState { places, ..*start }, demo));
         }
         InitialCondition::OtherSimulator { joints, objects } => {
-            (*joints, if use_layout { &[][..] } else { objects })
+            (*joints, if ignore_recorded_poses { &[][..] } else { objects })
         }
     };
     let mut start = InitialState { joints, places: Vec::new() };

@@ -30,7 +30,7 @@ pub(crate) struct ImportArgs {
     attempts: Option<u32>,
     /// Start objects where the layouts of the suite put them, not where the files do
     #[arg(long)]
-    layout: bool,
+    ignore_recorded_poses: bool,
 }
 
 /// Imports the demonstrations that the arguments name.
@@ -40,6 +40,7 @@ pub(crate) struct ImportArgs {
 pub(super) fn run(args: ImportArgs) -> Result<(), CliError> {
     let recording = &args.recording.options(None);
     let run = args.recording.request(args.script, args.tasks)?.load("dataset import")?;
-    let options = ImportOptions { attempts: args.attempts, layout: args.layout };
+    let options =
+        ImportOptions { attempts: args.attempts, ignore_recorded_poses: args.ignore_recorded_poses };
     print_recording(&recording.out, import::import(&run, &args.files, options, recording)?)
 }
