@@ -35,13 +35,29 @@ pub(crate) struct CliError {
 impl<E: Error + 'static> From<E> for CliError {
     fn from(error: E) -> Self {
         let of_run = (&error as &dyn Error).downcast_ref::<RunError>();
-        match of_run.map(|error| error.cause) {
-            None => Self::input(error),
-            // Of a run that failed before an interrupt.
-            Some(Cause::Input) => Self::new(Exit::Input, error),
-            Some(Cause::Policy) => Self::new(Exit::Policy, error),
-            Some(Cause::Interrupt) => Self::interrupted(error),
+        let Some(of_run) = of_run else { return Self::input(error) };
+        let mut message = of_run.text(&flag_of);
+        if let Some(out) = &of_run.resumable {
+            message += &format!("; continue with --resume --out {}", out.display());
         }
+        match of_run.cause {
+            // Of a run that failed before an interrupt.
+            Cause::Input => Self::new(Exit::Input, message),
+            Cause::Policy => Self::new(Exit::Policy, message),
+            Cause::Interrupt => Self::interrupted(message),
+        }
+    }
+}
+
+/// The flag that sets a field of the configuration of a run or its policy.
+fn flag_of(field: &str) -> String {
+    match field {
+        "tasks" => "--task".to_owned(),
+        "settings" => "--set".to_owned(),
+        "shifts" => "--shift".to_owned(),
+        "secret" => "--seed-file".to_owned(),
+        "timeout" => "--policy-timeout".to_owned(),
+        _ => format!("--{field}"),
     }
 }
 

@@ -28,21 +28,23 @@ impl<'a> SuiteChecker<'a> {
         Self { config, script, assets: AssetCache::approximate(), sensor_assets: SensorAssets::default() }
     }
 
-    /// Builds and checks the first scene of every task on all processors, and reads the limits of its objects. Nothing is
-    /// rendered; a scene settles only if its goal may hold at the start. Returns warnings.
+    /// Builds and checks the first scene of every task on all processors, gives their warnings to `warn`, and reads the limits
+    /// of their objects. Nothing is rendered; a scene settles only if its goal may hold at the start.
     ///
     /// # Errors
     /// A setting, a scene, a sensor or a calibration file that is not valid; a request to stop.
-    pub fn check(&self, suite: &Suite) -> Result<BTreeSet<String>, RunError> {
+    pub fn check(&self, suite: &Suite, warn: impl FnMut(String)) -> Result<(), RunError> {
         let tasks: Vec<&Task> = suite.tasks.iter().collect();
         // Without episodes, a run whose actions are repeated may have fewer of them than the suite.
         let none = EpisodeList::listed(Vec::new());
-        let mut run = SuiteRun::new(self.config, self.script, suite, none, PathBuf::new())?;
-        (run.assets, run.sensor_assets) = (self.assets.clone(), self.sensor_assets.clone());
-        let warnings = check_first_scenes(&run, &tasks)?;
-        run.jobs = select_episodes(self.config, suite, &tasks);
-        run.scan_limits()?;
-        if cancel::requested() { Err(RunError::interrupted("interrupted")) } else { Ok(warnings) }
+        let run = SuiteRun {
+            assets: self.assets.clone(),
+            sensor_assets: self.sensor_assets.clone(),
+            ..SuiteRun::new(self.config, self.script, suite, none, PathBuf::new())?
+        };
+        check_first_scenes(&run, &tasks)?.into_iter().for_each(warn);
+        SuiteRun { jobs: select_episodes(self.config, suite, &tasks), ..run }.scan_limits()?;
+        if cancel::requested() { Err(RunError::interrupted("interrupted")) } else { Ok(()) }
     }
 }
 

@@ -10,7 +10,7 @@ use crate::{
     evaluate::{is_finished, run_suite},
     policy::PolicyConfig,
     selection::{check_episodes, path_component, select_episodes, select_tasks},
-    suite_run::SuiteRun,
+    suite_run::{PreparedRun, SuiteRun},
 };
 use softvt_benchmark::{Condition, ObjectType, Plan, REFERENCE, Suite, Task};
 use softvt_common::{files::replace, text};
@@ -163,8 +163,8 @@ fn prepare_runs<'a>(
     cases: &'a [ConditionCase],
     tasks: &[&'a Task],
     out: &Path,
-) -> Result<Vec<Option<SuiteRun<'a>>>, RunError> {
-    let mut runs: Vec<Option<SuiteRun>> = Vec::new();
+) -> Result<Vec<Option<PreparedRun<'a>>>, RunError> {
+    let mut runs: Vec<Option<PreparedRun>> = Vec::new();
     for case in cases {
         if case.not_applicable.is_some() {
             runs.push(None);
@@ -180,12 +180,12 @@ fn prepare_runs<'a>(
             RunFolder::check_vacant(&dir).map_err(|error| case.config.error(error))?;
         }
         let jobs = select_episodes(&case.config, suite, tasks);
-        let mut run = SuiteRun::new(&case.config, loaded, suite, jobs, dir).map_err(in_case)?;
-        if let Some(Some(reference)) = runs.first() {
-            run.copy_limits(reference);
-        }
-        run.prepare().map_err(in_case)?;
-        runs.push(Some(run));
+        let run = SuiteRun::new(&case.config, loaded, suite, jobs, dir).map_err(in_case)?;
+        let prepared = match runs.first() {
+            Some(Some(reference)) => run.prepare_like(reference),
+            _ => run.prepare(),
+        };
+        runs.push(Some(prepared.map_err(in_case)?));
     }
     Ok(runs)
 }
@@ -194,7 +194,7 @@ fn compare_conditions(
     config: &RunConfig,
     suite: &Suite,
     cases: &[ConditionCase],
-    runs: Vec<Option<SuiteRun>>,
+    runs: Vec<Option<PreparedRun>>,
 ) -> Result<ConditionTable, RunError> {
     let (mut reference, mut force_observed) = (None, false);
     let mut rows = Vec::new();

@@ -180,9 +180,9 @@ impl RunConfig {
     pub fn prepare_script(&self, mut loaded: LoadedScript) -> Result<LoadedScript, RunError> {
         if let Some(file) = &self.vary {
             let (ranges, files) = softvt_script::load_variation(file)
-                .map_err(|error| RunError::from(error).prefixed("--vary"))?;
+                .map_err(|error| RunError::from(error).in_setting("vary", ""))?;
             loaded.variation_files = files;
-            loaded.vary(&ranges).map_err(|error| self.error(format!("--vary: {error}")))?;
+            loaded.vary(&ranges).map_err(|error| self.error_of("vary", "", error))?;
         }
         loaded.secret.clone_from(&self.secret);
         Ok(loaded)
@@ -190,7 +190,17 @@ impl RunConfig {
 
     /// An error about the script.
     pub fn error(&self, message: impl fmt::Display) -> RunError {
-        RunError::input(message).prefixed(self.file.display())
+        RunError::input(message).at(self.file.display())
+    }
+
+    /// An error about a setting with this value, as [`RunError::of_setting`].
+    pub(crate) fn error_of(
+        &self,
+        field: &'static str,
+        value: impl ToString,
+        message: impl ToString,
+    ) -> RunError {
+        RunError::of_setting(field, value, message).at(self.file.display())
     }
 
     pub(crate) fn notice(&self, message: impl fmt::Display) {
@@ -247,7 +257,7 @@ const MAX_SECRET_BYTES: u64 = 1 << 20;
 /// # Errors
 /// The file cannot be read, or is empty.
 pub fn read_secret(path: &Path, observer: &dyn Observer) -> Result<SecretSeed, RunError> {
-    let refuse = |what: String| RunError::input(format!("--seed-file {}: {what}", path.display()));
+    let refuse = |what: String| RunError::of_setting("secret", path.display(), what);
     let make = "write one, for example: head -c 32 /dev/urandom > FILE";
     let mut content = Vec::new();
     // Devices such as /dev/urandom have no end.
@@ -265,7 +275,7 @@ pub fn read_secret(path: &Path, observer: &dyn Observer) -> Result<SecretSeed, R
     }
     if content.len() < MIN_SECRET_BYTES {
         observer.notice(&format!(
-            "warning: --seed-file {}: {} bytes may be guessed from their hash in the results; {make}",
+            "warning: the seed file {}: {} bytes may be guessed from their hash in the results; {make}",
             path.display(),
             content.len()
         ));

@@ -1,5 +1,7 @@
 //! [`RunError`]: why a run did not come to its end.
 
+use std::path::PathBuf;
+
 use softvt_common::{cancel, files::FileError};
 
 /// Causes of a [`RunError`].
@@ -13,20 +15,56 @@ pub enum Cause {
     Interrupt,
 }
 
-/// An error that ends a run. Its message is for a user: it names the file and the remedy.
+/// A setting of a run, by its field of [`RunConfig`](crate::RunConfig) or [`PolicyOptions`](crate::PolicyOptions).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FaultySetting {
+    /// Name of the field.
+    pub field: &'static str,
+    /// The value that is not valid; empty if the message says it.
+    pub value: String,
+}
+
+/// An error that ends a run. Its text is for a user: it names the file and the remedy.
 #[derive(Debug, thiserror::Error)]
-#[error("{message}")]
+#[error("{}{}", self.text(&|field| field.to_owned()), if self.resumable.is_some() { "; resume it to continue" } else { "" })]
 pub struct RunError {
     /// Its cause, which decides the exit code of a command.
     pub cause: Cause,
-    /// Text for a user.
+    /// Where it is, such as a file; empty if the message says it.
+    pub place: String,
+    /// The setting at fault, if it is one.
+    pub setting: Option<FaultySetting>,
+    /// The problem and the remedy.
     pub message: String,
+    /// Folder of the run, if it was interrupted and can be resumed.
+    pub resumable: Option<PathBuf>,
 }
 
 impl RunError {
     /// An error with this cause.
     pub fn new(cause: Cause, message: impl ToString) -> Self {
-        Self { cause, message: message.to_string() }
+        Self { cause, place: String::new(), setting: None, message: message.to_string(), resumable: None }
+    }
+
+    /// Invalid input in a setting with this value; empty if the message says it.
+    pub(crate) fn of_setting(field: &'static str, value: impl ToString, message: impl ToString) -> Self {
+        Self::input(message).in_setting(field, value)
+    }
+
+    /// The same error, with the setting at fault.
+    pub(crate) fn in_setting(self, field: &'static str, value: impl ToString) -> Self {
+        Self { setting: Some(FaultySetting { field, value: value.to_string() }), ..self }
+    }
+
+    /// The text without how to resume, with settings as the caller names them: a command line has a flag for each.
+    pub fn text(&self, name_of: &dyn Fn(&str) -> String) -> String {
+        let setting = self.setting.iter().map(|FaultySetting { field, value }| match value.as_str() {
+            "" => name_of(field),
+            value => format!("{} {value}", name_of(field)),
+        });
+        let place = std::iter::once(self.place.clone()).filter(|place| !place.is_empty());
+        let parts: Vec<String> = place.chain(setting).chain([self.message.clone()]).collect();
+        parts.join(": ")
     }
 
     /// Invalid input. Once a stop is requested, that is the cause, since the error may be its consequence.
@@ -40,9 +78,10 @@ impl RunError {
         Self::new(Cause::Interrupt, message)
     }
 
-    /// Puts `prefix` and a colon before the message.
-    pub fn prefixed(self, prefix: impl std::fmt::Display) -> Self {
-        Self { message: format!("{prefix}: {}", self.message), ..self }
+    /// Puts a place before the text.
+    pub fn at(self, place: impl std::fmt::Display) -> Self {
+        let separator = if self.place.is_empty() { "" } else { ": " };
+        Self { place: format!("{place}{separator}{}", self.place), ..self }
     }
 
     /// Names the part of the request that failed, in parentheses after the message.

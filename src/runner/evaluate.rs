@@ -10,7 +10,7 @@ use crate::{
     error::{Cause, RunError},
     replay::{difference, replay_factory, with_policy_fields},
     run_manifest::{self, RunManifest},
-    suite_run::SuiteRun,
+    suite_run::PreparedRun,
 };
 use softvt_common::cancel;
 use softvt_common::episode_id::EpisodeIndex;
@@ -42,7 +42,7 @@ pub(crate) struct SimulatedEpisode {
 
 /// The folder of a run in progress, and the records of its finished episodes.
 pub(crate) struct RunLog<'a> {
-    run: &'a SuiteRun<'a>,
+    run: &'a PreparedRun<'a>,
     folder: RunFolder,
     pub records: Vec<EpisodeRecord>,
 }
@@ -53,7 +53,7 @@ impl<'a> RunLog<'a> {
     /// # Errors
     /// The folder is of another run, or the manifest cannot be written.
     pub(crate) fn new(
-        run: &'a SuiteRun,
+        run: &'a PreparedRun,
         folder: RunFolder,
         records: Vec<EpisodeRecord>,
         manifest: &impl Serialize,
@@ -160,7 +160,7 @@ impl<'a> RunLog<'a> {
     /// A file cannot be written.
     pub(crate) fn write_results(&mut self) -> Result<(), RunError> {
         self.sort()?;
-        let calibrations = self.run.calibrations.clone().unwrap_or_default();
+        let calibrations = self.run.calibrations.clone();
         softvtbench_files::write_scores(&self.run.out, &self.records, &calibrations.merged)?;
         self.write_summary()
     }
@@ -183,12 +183,19 @@ impl<'a> RunLog<'a> {
 ///
 /// # Errors
 /// The outcome is an error, or the run was interrupted.
-pub(crate) fn with_kept(outcome: Result<(), RunError>, kept: &str, hint: &str) -> Result<(), RunError> {
+pub(crate) fn with_kept(
+    outcome: Result<(), RunError>,
+    kept: &str,
+    resumable: Option<&Path>,
+) -> Result<(), RunError> {
     match outcome {
         // An error from before the interrupt has its own exit code and is reported as it is.
         Err(error) if error.cause != Cause::Interrupt => Err(error.with_line(kept)),
         Ok(()) if !cancel::requested() => Ok(()),
-        _ => Err(RunError::interrupted(format!("interrupted; {kept}{hint}"))),
+        _ => {
+            let resumable = resumable.map(Path::to_owned);
+            Err(RunError { resumable, ..RunError::interrupted(format!("interrupted; {kept}")) })
+        }
     }
 }
 
@@ -199,7 +206,7 @@ pub(crate) fn with_kept(outcome: Result<(), RunError>, kept: &str, hint: &str) -
 /// The folder contains another run, or one that may not be resumed; a script, policy or file fails; or the run is
 /// interrupted. Finished episodes are kept.
 pub(crate) fn run_suite(
-    run: &SuiteRun,
+    run: &PreparedRun,
     on_episode: &mut dyn FnMut(&EpisodeRecord),
 ) -> Result<SuiteResult, RunError> {
     let config = run.config;
@@ -243,7 +250,7 @@ pub(crate) fn run_suite(
         outcome => {
             let kept =
                 format!("{} of {} are in {out}", log.records.len(), counted(run.jobs.len(), "episode"));
-            with_kept(outcome, &kept, &format!("; continue with --resume --out {out}"))?;
+            with_kept(outcome, &kept, Some(&run.out))?;
         }
     }
     log.write_results()?;
@@ -256,7 +263,7 @@ pub(crate) fn run_suite(
 /// # Errors
 /// A script or policy fails, or a request to stop.
 pub(crate) fn run_episodes(
-    run: &SuiteRun,
+    run: &PreparedRun,
     on_episode: &mut dyn FnMut(&EpisodeRecord),
 ) -> Result<SuiteResult, RunError> {
     let (config, mut records) = (run.config, Vec::new());
@@ -283,7 +290,7 @@ pub(crate) fn is_finished(dir: &Path) -> bool {
 /// Reports an episode whose video could not be written. The episode counts nevertheless.
 fn report_unrendered(config: &RunConfig, index: EpisodeIndex, rendered: Result<(), RunError>) {
     if let Err(error) = rendered {
-        config.notice(format!("no video of {index}: {}", error.message));
+        config.notice(format!("no video of {index}: {error}"));
     }
 }
 
@@ -321,7 +328,7 @@ pub(crate) fn episode_line(record: &EpisodeRecord) -> String {
 ///
 /// # Errors
 /// An episode cannot be run, or a file cannot be written.
-pub(crate) fn restore_artifacts(run: &SuiteRun, records: &[EpisodeRecord]) -> Result<(), RunError> {
+pub(crate) fn restore_artifacts(run: &PreparedRun, records: &[EpisodeRecord]) -> Result<(), RunError> {
     let artifacts = run.artifacts();
     let incomplete = records.iter().filter(|record| !artifacts.missing(record).is_empty());
     let has_actions = |record: &EpisodeRecord| artifacts.has_actions(record);
@@ -366,7 +373,7 @@ pub(crate) fn restore_artifacts(run: &SuiteRun, records: &[EpisodeRecord]) -> Re
 
 /// Simulates a finished episode again. Returns `None`, after a notice, if the result differs from its record.
 fn simulate_again(
-    run: &SuiteRun,
+    run: &PreparedRun,
     record: &EpisodeRecord,
     has_actions: bool,
 ) -> Result<Option<SimulatedEpisode>, RunError> {
@@ -394,7 +401,7 @@ fn simulate_again(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::ConfiguredScript;
+    use crate::{config::ConfiguredScript, suite_run::SuiteRun};
     use softvt_benchmark::Plan;
     use softvt_benchmark::Task;
     use softvt_policy::{Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief};
@@ -436,11 +443,12 @@ mod tests {
         for (out, observed) in [("without", false), ("with", true)] {
             let dir = root.path().join(out);
             let jobs = EpisodeList::of_tasks(&tasks, 1, None);
-            let mut run = SuiteRun::new(&config, &loaded, &suite, jobs, dir.clone()).expect("valid");
-            if observed {
-                run.controllers = Box::new(force_observer);
-            }
-            run.prepare().expect("the scenes are valid");
+            let run = SuiteRun::new(&config, &loaded, &suite, jobs, dir.clone()).expect("valid");
+            let run = match observed {
+                true => SuiteRun { controllers: Box::new(force_observer), ..run },
+                false => run,
+            };
+            let run = run.prepare().expect("the scenes are valid");
             run_suite(&run, &mut |_| ()).expect("it runs");
             for file in [RUN, EPISODES, SUMMARY] {
                 let text = std::fs::read_to_string(dir.join(file)).expect("written");

@@ -145,15 +145,19 @@ pub fn run<E: From<RunError>>(
 /// Refuses to write files into the project that were made with changed settings, another seed or an option that says so:
 /// they would be taken for the nominal ones, such as the calibration of an asset.
 fn refuse_changed_project_files(config: &RunConfig, loaded: &LoadedScript) -> Result<(), RunError> {
-    let setting = config.settings.first().map(|(path, _)| format!("--set {path}"));
-    let seed = || (config.seed != 0).then(|| "--seed".to_owned());
+    let message = "give an output folder: this experiment can write files, and those made with it must not replace the files \
+                   of the project";
+    if let Some((path, _)) = config.settings.first() {
+        return Err(config.error_of("settings", path, message));
+    }
+    if config.seed != 0 {
+        return Err(config.error_of("seed", config.seed, message));
+    }
     let changed = |option: &&OptionSpec| option.needs_out && option.value != option.default;
-    let option = || loaded.options.iter().find(changed).map(|o| format!("{} {}", o.flag(), o.value));
-    let Some(flag) = setting.or_else(seed).or_else(option) else { return Ok(()) };
-    Err(config.error(format!(
-        "{flag}: give --out DIR: this experiment can write files, and those made with it must not replace the files of \
-         the project"
-    )))
+    match loaded.options.iter().find(changed) {
+        None => Ok(()),
+        Some(option) => Err(config.error(format!("{} {}: {message}", option.flag(), option.value))),
+    }
 }
 
 /// Writes a file of the script under `base`. Refuses to follow symbolic links, which could lead out of the folder.

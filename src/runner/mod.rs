@@ -2,7 +2,7 @@
 //!
 //! A [`Runner`] runs the suites of a script, [`conditions`] runs them under changes, [`recording`] makes datasets of them, and
 //! [`replay`] simulates recorded episodes again. [`SuiteRun`] is below all of them: a suite with everything that its episodes
-//! need. Nothing here prints: progress and messages go to an [`Observer`].
+//! need; [`PreparedRun`] is one whose scenes are valid, with the limits of their objects. Nothing here prints: progress and messages go to an [`Observer`].
 #![warn(missing_docs, unreachable_pub)]
 
 mod check;
@@ -34,7 +34,7 @@ pub use check::SuiteChecker;
 pub use config::{ConfiguredScript, RunConfig, Shard, TraceDetail, read_secret, thread_count};
 pub use episode_artifacts::VideoSelection;
 pub use episode_list::{EpisodeJob, EpisodeList};
-pub use error::{Cause, RunError};
+pub use error::{Cause, FaultySetting, RunError};
 pub use evaluate::SuiteResult;
 pub use observer::{Observer, Silent};
 pub use policy::{
@@ -45,4 +45,4 @@ pub use record::{DemoCount, record};
 pub use runner::Runner;
 pub use served_runs::ServedRuns;
 pub use serving::{check_served, first_observation, prepare_served, server_config};
-pub use suite_run::SuiteRun;
+pub use suite_run::{PreparedRun, SuiteRun};

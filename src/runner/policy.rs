@@ -362,10 +362,9 @@ impl PolicyConfig {
                 let (profile, sources) = load_profile_of(args)?;
                 let profile_name = args.profile.as_deref().unwrap_or(DEFAULT_PROFILE);
                 if profile.observe_every_step && args.protocol == Some(Protocol::VlaEval) {
-                    return Err(RunError::input(format!(
-                        "--profile {profile_name}: observe_every_step needs --protocol openpi; in vla-eval's protocol every \
-                         observation is a request for actions"
-                    )));
+                    let message = "observe_every_step needs the protocol openpi; in that of vla-eval every observation is a \
+                                   request for actions";
+                    return Err(RunError::of_setting("profile", profile_name, message));
                 }
                 let declared = declared_streams(args, &profile);
                 Self {
@@ -410,8 +409,19 @@ impl PolicyConfig {
 
     /// A policy in Rust, under this name in the results. `start` makes it for each episode; of each chunk of actions, all are
     /// executed unless `replan` is set.
-    pub fn of(name: &str, start: impl Fn(&TaskBrief) -> Box<dyn Policy> + Send + Sync + 'static) -> Self {
-        Self::new(PolicyKind::Rust(RustPolicy(Arc::new(start))), name.to_owned())
+    ///
+    /// # Errors
+    /// A built-in policy has the name.
+    pub fn of(
+        name: &str,
+        start: impl Fn(&TaskBrief) -> Box<dyn Policy> + Send + Sync + 'static,
+    ) -> Result<Self, RunError> {
+        if BuiltinPolicy::named(name).is_some() {
+            return Err(RunError::input(format!(
+                "policy: {name:?} is a built-in policy; give yours another name"
+            )));
+        }
+        Ok(Self::new(PolicyKind::Rust(RustPolicy(Arc::new(start))), name.to_owned()))
     }
 
     /// The clients of `softvt serve`. `privileged` clients receive the true state.
@@ -529,7 +539,7 @@ impl PolicyConfig {
 /// The sensors that a profile observes.
 fn declared_streams(args: &PolicyOptions, profile: &Profile) -> DeclaredStreams {
     let name = args.profile.as_deref().unwrap_or(DEFAULT_PROFILE);
-    DeclaredStreams { place: format!("--profile {name}: inputs"), streams: profile.streams() }
+    DeclaredStreams { place: format!("profile {name}: inputs"), streams: profile.streams() }
 }
 
 /// Starts the expert of a task.
@@ -552,32 +562,31 @@ fn load_profile_of(args: &PolicyOptions) -> Result<(Profile, BTreeMap<String, St
     };
     if let Some(code) = args.gripper {
         let values = profile.actions.gripper.with_code(code).ok_or_else(|| {
-            RunError::input(format!(
-                "--gripper {}: --profile {name} has grip forces, and no values for open and closed",
-                code.name()
-            ))
+            let message = format!("the profile {name} has grip forces, and no values for open and closed");
+            RunError::of_setting("gripper", code.name(), message)
         })?;
         profile.actions.gripper = values;
     }
     Ok((profile, sources))
 }
 
-/// Refuses options that the policy would ignore. The message names their flags.
+/// Refuses options that the policy would ignore.
 fn refuse_options_without_effect(args: &PolicyOptions) -> Result<(), RunError> {
     let is_server = matches!(args.source, PolicySource::Server(_));
     let is_lua = matches!(args.source, PolicySource::Lua(_));
-    let flags = [
-        ("--profile", args.profile.is_some() && !is_server),
-        ("--protocol", args.protocol.is_some() && !is_server),
-        ("--gripper", args.gripper.is_some() && !is_server && !is_lua),
-        ("--policy-timeout", args.timeout.is_some() && !is_server),
-        ("--replan", args.replan.is_some() && !is_server && !is_lua),
+    let options = [
+        ("profile", args.profile.is_some() && !is_server),
+        ("protocol", args.protocol.is_some() && !is_server),
+        ("gripper", args.gripper.is_some() && !is_server && !is_lua),
+        ("timeout", args.timeout.is_some() && !is_server),
+        ("replan", args.replan.is_some() && !is_server && !is_lua),
     ];
-    let Some((flag, _)) = flags.into_iter().find(|(_, is_ignored)| *is_ignored) else { return Ok(()) };
-    let of_both = ["--replan", "--gripper"].contains(&flag);
+    let Some((option, _)) = options.into_iter().find(|(_, is_ignored)| *is_ignored) else { return Ok(()) };
+    let of_both = ["replan", "gripper"].contains(&option);
     let kinds = if of_both { "policy servers and Lua policies" } else { "policy servers" };
     let policy = args.source.word();
-    Err(RunError::input(format!("{flag}: applies to {kinds} only; --policy {policy} ignores it")))
+    let message = format!("applies to {kinds} only; the policy {policy} ignores it");
+    Err(RunError::of_setting(option, "", message))
 }
 
 #[cfg(test)]
@@ -608,21 +617,21 @@ mod tests {
 
     #[test]
     fn options_without_effect_are_refused() {
-        let message = |options: PolicyOptions| PolicyConfig::load(&options).unwrap_err().message;
+        let message = |options: PolicyOptions| PolicyConfig::load(&options).unwrap_err().to_string();
         let noop = || PolicyOptions::new(PolicySource::Builtin(BuiltinPolicy::Noop));
         let servo = || PolicyOptions::new(PolicySource::Builtin(BuiltinPolicy::TactileServo));
         assert_eq!(
             message(PolicyOptions { replan: Some(3), ..noop() }),
-            "--replan: applies to policy servers and Lua policies only; --policy noop ignores it"
+            "replan: applies to policy servers and Lua policies only; the policy noop ignores it"
         );
         assert_eq!(
             message(PolicyOptions { gripper: Some(GripCode::Binary), ..noop() }),
-            "--gripper: applies to policy servers and Lua policies only; --policy noop ignores it"
+            "gripper: applies to policy servers and Lua policies only; the policy noop ignores it"
         );
         for (flag, options) in [
-            ("--profile", PolicyOptions { profile: Some("vision".into()), ..noop() }),
-            ("--protocol", PolicyOptions { protocol: Some(Protocol::VlaEval), ..noop() }),
-            ("--policy-timeout", PolicyOptions { timeout: Some(DEFAULT_TIMEOUT), ..servo() }),
+            ("profile", PolicyOptions { profile: Some("vision".into()), ..noop() }),
+            ("protocol", PolicyOptions { protocol: Some(Protocol::VlaEval), ..noop() }),
+            ("timeout", PolicyOptions { timeout: Some(DEFAULT_TIMEOUT), ..servo() }),
         ] {
             assert!(message(options).starts_with(&format!("{flag}: applies to policy servers only")));
         }

@@ -8,7 +8,7 @@ use crate::{
     config::{ConfiguredScript, RunConfig},
     episode_list::EpisodeList,
     error::RunError,
-    policy::{PolicyConfig, PolicyOptions, expert_controller},
+    policy::{ControllerFactory, PolicyConfig, PolicyOptions, expert_controller},
     recording::{GripLog, RecordingOptions, RecordingSummary, SuiteRecording, record_all},
     selection::{select_suites, select_tasks},
     suite_run::SuiteRun,
@@ -74,8 +74,7 @@ pub fn record(
         let prepare = |(suite, config)| {
             let jobs = EpisodeList::of_tasks(&select_tasks(config, suite)?, count.max_attempts(), None);
             SuiteRecording::new(config, options, script, suite, jobs, Some(count.demos), |run, log| {
-                record_grips(run, log);
-                Ok(())
+                Ok(record_grips(run, log))
             })
         };
         suites.iter().zip(&configs).map(prepare).collect()
@@ -83,10 +82,10 @@ pub fn record(
 }
 
 /// Makes the experts of a run record their intent into `log`. Other policies are left unchanged.
-fn record_grips(run: &mut SuiteRun, log: &GripLog) {
-    let Some(policy) = run.config.policy.expert() else { return };
+fn record_grips<'a>(run: SuiteRun<'a>, log: &GripLog) -> SuiteRun<'a> {
+    let Some(policy) = run.config.policy.expert() else { return run };
     let log = log.clone();
-    run.controllers = Box::new(move |opened, brief| {
+    let controllers: ControllerFactory = Box::new(move |opened, brief| {
         Ok(Box::new(GripRecorder {
             expert: expert_controller(opened, policy)?,
             is_holding: Vec::new(),
@@ -94,6 +93,7 @@ fn record_grips(run: &mut SuiteRun, log: &GripLog) {
             log: log.clone(),
         }))
     });
+    SuiteRun { controllers, ..run }
 }
 
 /// An expert whose intent to hold is recorded.

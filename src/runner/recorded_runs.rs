@@ -46,7 +46,7 @@ impl RecordedRuns {
     /// # Errors
     /// The folder contains no run, or one cannot be read.
     pub(crate) fn load(dir: &Path) -> Result<Self, RunError> {
-        let runs = stored_run::load(dir).map_err(|error| RunError::input(error).prefixed("--policy"))?;
+        let runs = stored_run::load(dir).map_err(|error| RunError::of_setting("policy", "", error))?;
         Ok(Self { dir: dir.to_owned(), runs })
     }
 
@@ -68,15 +68,11 @@ impl RecordedRuns {
         let run = self.run_of(suite, is_twin).ok_or_else(|| {
             let available: Vec<String> =
                 self.runs.iter().map(|run| suite_label(run.text("suite"), is_rigid_twin(run))).collect();
-            RunError::input(format!(
-                "--policy {}: no run of suite {}; available: {}",
-                self.dir.display(),
-                suite_label(suite, is_twin),
-                available.join(", ")
-            ))
+            let (suite, available) = (suite_label(suite, is_twin), available.join(", "));
+            let message = format!("no run of suite {suite}; available: {available}");
+            RunError::of_setting("policy", self.dir.display(), message)
         })?;
-        let refuse =
-            |message: String| Err(RunError::input(format!("--policy {}: {message}", run.dir.display())));
+        let refuse = |message: String| Err(RunError::of_setting("policy", run.dir.display(), message));
         let seed = run.manifest["seed"].as_u64();
         if seed != Some(base_seed) {
             let seed = seed.map_or("unknown".to_owned(), |seed| seed.to_string());
@@ -96,7 +92,7 @@ impl RecordedRuns {
                 more => format!(" and {more} more"),
             };
             return refuse(format!(
-                "it lacks {} of the {} requested episodes: {listed}{more}; select available ones with --task and --episodes",
+                "it lacks {} of the {} requested episodes: {listed}{more}; select available tasks and episodes",
                 missing.len(),
                 requested.len()
             ));

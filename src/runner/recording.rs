@@ -22,7 +22,7 @@ use crate::{
     policy::ControllerFactory,
     run_manifest::{self, RunManifest},
     selection::path_component,
-    suite_run::SuiteRun,
+    suite_run::{PreparedRun, SuiteRun},
 };
 use softvt_benchmark::{CONTROL_HZ, Suite, Task};
 use softvt_common::cancel;
@@ -74,7 +74,7 @@ pub type GripLog = Arc<Mutex<BTreeMap<EpisodeIndex, Vec<bool>>>>;
 pub struct SuiteRecording<'a> {
     options: &'a RecordingOptions,
     /// The attempts.
-    run: SuiteRun<'a>,
+    run: PreparedRun<'a>,
     tasks: Vec<&'a Task>,
     /// Name of the suite as a path component.
     folder_name: String,
@@ -87,11 +87,11 @@ pub struct SuiteRecording<'a> {
 }
 
 impl<'a> SuiteRecording<'a> {
-    /// Prepares a recording of at most the attempts `jobs`. `customize` selects the controllers, and where the intent to
-    /// grip is recorded.
+    /// Prepares a recording of at most the attempts `jobs`. `customize` gives the run its controllers, which record the intent
+    /// to grip.
     ///
     /// # Errors
-    /// A setting or scene that is not valid.
+    /// A setting or scene that is not valid, or a secret seed.
     pub fn new(
         config: &'a RunConfig,
         options: &'a RecordingOptions,
@@ -99,7 +99,7 @@ impl<'a> SuiteRecording<'a> {
         suite: &'a Suite,
         jobs: EpisodeList<'a>,
         demos: Option<u32>,
-        customize: impl FnOnce(&mut SuiteRun<'a>, &GripLog) -> Result<(), RunError>,
+        customize: impl FnOnce(SuiteRun<'a>, &GripLog) -> Result<SuiteRun<'a>, RunError>,
     ) -> Result<Self, RunError> {
         let script = &loaded.sources.main;
         if !check::is_script_path(script) {
@@ -107,16 +107,21 @@ impl<'a> SuiteRecording<'a> {
                 "{script}: a recording names its script, and its path must not contain \"..\"; start softvt in a folder above it"
             )));
         }
+        if config.secret.is_some() {
+            let message =
+                "a recording has no secret seed: demonstrations would show the episodes of a judged run";
+            return Err(config.error(message));
+        }
         let folder_name = path_component(&config.suite_name(suite));
-        let mut run =
-            SuiteRun::new(config, loaded, suite, jobs, layout::attempts(&options.out, &folder_name))?;
-        run.split = Split::Demonstration;
-        run.renders_episodes = true;
-        // The streams of contact, slip and drop come from the trace.
-        run.records_trace = true;
+        let run = SuiteRun {
+            split: Split::Demonstration,
+            renders_episodes: true,
+            // The streams of contact, slip and drop come from the trace.
+            records_trace: true,
+            ..SuiteRun::new(config, loaded, suite, jobs, layout::attempts(&options.out, &folder_name))?
+        };
         let grip_log = GripLog::default();
-        customize(&mut run, &grip_log)?;
-        run.prepare()?;
+        let run = customize(run, &grip_log)?.prepare()?;
         let tasks = run.jobs.tasks();
         let attempts = tasks.iter().map(|task| run.jobs.episodes_of(task.id).count());
         let episodes = demos.unwrap_or(attempts.max().unwrap_or_default() as u32);
@@ -142,9 +147,9 @@ impl<'a> SuiteRecording<'a> {
         };
         log.sort()?;
         let kept = log.records.iter().filter(|record| rejection(record).is_none()).count();
-        let out = self.options.out.display();
-        let kept = format!("{} in {out}; continue with --resume", counted(kept, "demonstration"));
-        with_kept(outcome, &kept, "")?;
+        let out = &self.options.out;
+        let kept = format!("{} in {}", counted(kept, "demonstration"), out.display());
+        with_kept(outcome, &kept, Some(out))?;
         self.check_demo_counts(&log.records)?;
         log.write_summary()?;
         Ok(log.records)
@@ -288,7 +293,7 @@ impl<'a> SuiteRecording<'a> {
             return Ok(());
         }
         Err(self.run.config.error(format!(
-            "{}\nthe good ones are in {}; continue with --resume and more --attempts, or fix the expert",
+            "{}\nthe good ones are in {}; resume it with more attempts, or fix the expert",
             short.join("\n"),
             self.options.out.display()
         )))
@@ -428,7 +433,7 @@ pub fn record_all<'a>(
 /// The folder contains another recording, something else, or this recording incomplete without `resume`.
 fn check_folder(root: &Path, resume: bool, request: &Value) -> Result<bool, RunError> {
     let path = root.join(RECORDING);
-    let refuse = |message: String| Err(RunError::input(format!("--out {}: {message}", root.display())));
+    let refuse = |message: String| Err(RunError::of_setting("out", root.display(), message));
     if root.exists() && !root.is_dir() {
         return refuse("not a folder; select a new folder".to_owned());
     }
@@ -458,10 +463,12 @@ fn check_folder(root: &Path, resume: bool, request: &Value) -> Result<bool, RunE
     }
     let is_complete = root.join(DATASET).is_file();
     if !resume && !is_complete {
-        return refuse(
-            "the folder contains an interrupted recording; continue it with --resume, or select a new folder"
-                .to_owned(),
+        let interrupted = RunError::of_setting(
+            "out",
+            root.display(),
+            "the folder contains an interrupted recording; select a new folder for another",
         );
+        return Err(RunError { resumable: Some(root.to_owned()), ..interrupted });
     }
     Ok(is_complete)
 }

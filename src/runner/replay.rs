@@ -18,7 +18,7 @@ use crate::{
     policy::{ControllerFactory, PolicyConfig},
     run_manifest,
     selection::{select_tasks, suites_of},
-    suite_run::SuiteRun,
+    suite_run::{PreparedRun, SuiteRun},
 };
 use softvt_benchmark::{Suite, seed::SecretSeed};
 use softvt_common::cancel;
@@ -106,11 +106,13 @@ impl StoredManifest<'_> {
         let suite = self.suite(&loaded)?;
         let tasks = select_tasks(&config, suite)?;
         let job = EpisodeJob { task: tasks[0], episode: index.episode };
-        let mut run = SuiteRun::new(&config, &loaded, suite, EpisodeList::listed(vec![job]), PathBuf::new())?;
-        run.split = self.split()?;
-        run.controllers = replay_factory(actions, record);
-        run.origins.extend(record.header.origin.iter().map(|origin| (index, (**origin).clone())));
-        run.prepare()?;
+        let run = SuiteRun {
+            split: self.split()?,
+            controllers: replay_factory(actions, record),
+            origins: record.header.origin.iter().map(|origin| (index, (**origin).clone())).collect(),
+            ..SuiteRun::new(&config, &loaded, suite, EpisodeList::listed(vec![job]), PathBuf::new())?
+        };
+        let run = run.prepare()?;
         self.check_sources(&run)?;
         Ok(with_policy_fields(run.run_episode(job, false, &run.controllers)?.record, record))
     }
@@ -153,18 +155,19 @@ impl StoredManifest<'_> {
         match (self.manifest["seed_hash"].as_str(), self.secret) {
             (None, None) => Ok(None),
             (Some(hash), Some(given)) if given.secret.hash() == hash => Ok(Some(&given.secret)),
-            (Some(hash), Some(given)) => Err(RunError::input(format!(
-                "--seed-file {}: its hash is {}, that of {path} is {hash}",
+            (Some(hash), Some(given)) => Err(RunError::of_setting(
+                "secret",
                 given.path.display(),
-                given.secret.hash()
-            ))),
+                format!("its hash is {}, that of {path} is {hash}", given.secret.hash()),
+            )),
             (Some(_), None) => Err(RunError::input(format!(
-                "{path}: the run was judged with a secret seed; add --seed-file FILE, the file with that seed"
+                "{path}: the run was judged with a secret seed; give the file with that seed"
             ))),
-            (None, Some(given)) => Err(RunError::input(format!(
-                "--seed-file {}: {path} has no secret seed; leave it out",
-                given.path.display()
-            ))),
+            (None, Some(given)) => Err(RunError::of_setting(
+                "secret",
+                given.path.display(),
+                format!("{path} has no secret seed; leave it out"),
+            )),
         }
     }
 
@@ -181,7 +184,7 @@ impl StoredManifest<'_> {
     }
 
     /// Checks that scripts and thresholds are those of the stored run.
-    fn check_sources(&self, run: &SuiteRun) -> Result<(), RunError> {
+    fn check_sources(&self, run: &PreparedRun) -> Result<(), RunError> {
         let now = json!(run.sources);
         let before = self.manifest["sources"].as_object().into_iter().flatten();
         let changed: Vec<&str> = before
@@ -225,7 +228,7 @@ pub struct DemoReplay {
 pub fn check_complete(path: &Path) -> Result<(), RunError> {
     if path.is_dir() && path.join(RECORDING).is_file() && !path.join(DATASET).is_file() {
         return Err(RunError::input(format!(
-            "{}: the recording was interrupted; complete it with softvt record … --resume --out {0}",
+            "{}: the recording was interrupted; resume it to complete it",
             path.display()
         )));
     }

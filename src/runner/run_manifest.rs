@@ -8,7 +8,7 @@ use std::{
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::{error::RunError, recorded_runs::ReplaySource, suite_run::SuiteRun};
+use crate::{error::RunError, recorded_runs::ReplaySource, suite_run::PreparedRun};
 use softvt_benchmark::{Needs, ShiftValue, seed::SecretSeed, settings::Settings, variation::VariationRanges};
 use softvt_common::files;
 use softvt_dataset::card::Imported;
@@ -91,7 +91,7 @@ pub(crate) struct RunManifest<'a> {
 
 impl<'a> RunManifest<'a> {
     /// The manifest of a prepared run of `episodes` per task.
-    pub(crate) fn new(run: &'a SuiteRun, episodes: u32) -> Self {
+    pub(crate) fn new(run: &'a PreparedRun, episodes: u32) -> Self {
         let config = run.config;
         let options = run.loaded.options.iter();
         Self {
@@ -125,7 +125,7 @@ impl<'a> RunManifest<'a> {
             set: &config.settings,
             settings: &run.settings,
             sources: run.sources.clone(),
-            thresholds: run.calibrations.clone().unwrap_or_default().tau_pct,
+            thresholds: run.calibrations.tau_pct.clone(),
             force_observed: run.force_observed,
         }
     }
@@ -165,7 +165,7 @@ pub(crate) fn write(folder: &RunFolder, manifest: &impl Serialize) -> Result<(),
     match difference(&stored, &json!(manifest)) {
         None => Ok(()),
         Some(what) => Err(RunError::input(format!(
-            "{path} belongs to another run: {what}; resume it with its original arguments, or select another --out"
+            "{path} belongs to another run: {what}; resume it with its original arguments, or select another output folder"
         ))),
     }
 }

@@ -1,9 +1,14 @@
 //! [`Runner`]: the suites of a script under a policy.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{
+    borrow::Cow,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use crate::{
-    config::{ConfiguredScript, RunConfig, Shard},
+    config::{ConfiguredScript, RunConfig, Shard, TraceDetail},
+    episode_artifacts::VideoSelection,
     error::RunError,
     evaluate::{SuiteResult, run_episodes, run_suite},
     observer::Observer,
@@ -28,7 +33,7 @@ use softvt_script::LoadedScript;
 /// ```
 #[derive(Clone)]
 pub struct Runner<'a> {
-    script: &'a LoadedScript,
+    script: Cow<'a, LoadedScript>,
     config: RunConfig,
     is_numbered: bool,
 }
@@ -36,7 +41,7 @@ pub struct Runner<'a> {
 impl<'a> Runner<'a> {
     /// The episodes of a configuration.
     pub fn new(loaded: &'a ConfiguredScript) -> Self {
-        Self { script: &loaded.script, config: loaded.config.clone(), is_numbered: false }
+        Self { script: Cow::Borrowed(&loaded.script), config: loaded.config.clone(), is_numbered: false }
     }
 
     fn change(mut self, change: impl FnOnce(&mut RunConfig)) -> Self {
@@ -72,6 +77,31 @@ impl<'a> Runner<'a> {
     /// A changed setting, by path and value, in addition to those of the configuration.
     pub fn set(self, path: &str, value: impl ToString) -> Self {
         self.change(|config| config.settings.push((path.to_owned(), value.to_string())))
+    }
+
+    /// The rigid twin of the suites: soft objects are made rigid.
+    pub fn rigid_twin(self) -> Self {
+        self.change(|config| config.rigid_twin = true)
+    }
+
+    /// The suites varied within the ranges of a file, in place of their own.
+    ///
+    /// # Errors
+    /// A variation that is not valid, or does not fit a suite.
+    pub fn vary(self, file: impl AsRef<Path>) -> Result<Self, RunError> {
+        let varied = self.change(|config| config.vary = Some(file.as_ref().to_owned()));
+        let script = varied.config.prepare_script(varied.script.into_owned())?;
+        Ok(Self { script: Cow::Owned(script), ..varied })
+    }
+
+    /// Writes the true state after every control step into the output folder.
+    pub fn trace(self, detail: TraceDetail) -> Self {
+        self.change(|config| config.trace = Some(detail))
+    }
+
+    /// Renders videos of these episodes into the output folder.
+    pub fn video(self, episodes: VideoSelection) -> Self {
+        self.change(|config| config.video = Some(episodes))
     }
 
     /// Only one part of the episodes.
@@ -127,8 +157,7 @@ impl<'a> Runner<'a> {
             let numbered = || self.is_numbered.then(|| next_run_dir(config, &config.suite_name(suite)));
             let out = run_dir(config, suite, is_list).or_else(numbered);
             let has_folder = out.is_some();
-            let mut run = SuiteRun::selected(config, self.script, suite, out)?;
-            run.prepare()?;
+            let run = SuiteRun::selected(config, &self.script, suite, out)?.prepare()?;
             results.push(match has_folder {
                 true => run_suite(&run, &mut on_episode)?,
                 false => run_episodes(&run, &mut on_episode)?,

@@ -43,11 +43,11 @@ pub fn select_suites<'a>(command: &str, config: &RunConfig, plan: &'a Plan) -> R
 /// # Errors
 /// A word that matches no task, or a task without an expert where the expert is the policy.
 pub fn select_tasks<'a>(config: &RunConfig, suite: &'a Suite) -> Result<Vec<&'a Task>, RunError> {
-    let refuse = |message: String| Err(config.error(message));
     let mut selected: Vec<&Task> = Vec::new();
     for word in &config.tasks {
         if word.trim().is_empty() {
-            return refuse(format!("--task: expected an index or part of a prompt, got {word:?}"));
+            let message = format!("expected an index or part of a prompt, got {word:?}");
+            return Err(config.error_of("tasks", "", message));
         }
         let index = word.parse::<usize>().ok();
         let matches = |task: &&Task| match index {
@@ -62,9 +62,8 @@ pub fn select_tasks<'a>(config: &RunConfig, suite: &'a Suite) -> Result<Vec<&'a 
                 count => format!("it has tasks 0 to {}", count.saturating_sub(1)),
             };
             let name = &suite.name;
-            return refuse(format!(
-                "--task {word}: suite {name} has no such task; {available} (softvt list tasks)"
-            ));
+            let message = format!("suite {name} has no such task; {available} (softvt list tasks)");
+            return Err(config.error_of("tasks", word, message));
         }
     }
     if config.tasks.is_empty() {
@@ -73,7 +72,8 @@ pub fn select_tasks<'a>(config: &RunConfig, suite: &'a Suite) -> Result<Vec<&'a 
     selected.sort_by_key(|task| task.id);
     selected.dedup_by_key(|task| task.id);
     if let Some(task) = selected.iter().find(|task| !task.expert && config.policy.expert().is_some()) {
-        return refuse(format!("task {} has no expert; add one, or select another --policy", task.id));
+        let message = format!("task {} has no expert; add one, or select another policy", task.id);
+        return Err(config.error(message));
     }
     Ok(selected)
 }
@@ -152,8 +152,9 @@ fn check_video_episodes(config: &RunConfig, suite: &Suite) -> Result<(), RunErro
         1 => "only episode 0".to_owned(),
         count => format!("episodes 0 to {}", count.saturating_sub(1)),
     };
-    Err(config.error(format!(
-        "--video={beyond}: suite {} runs {available} of each task; select one of them, or raise --episodes",
+    let message = format!(
+        "suite {} runs {available} of each task; select one of them, or raise the number of episodes",
         suite.name
-    )))
+    );
+    Err(config.error_of("video", beyond, message))
 }

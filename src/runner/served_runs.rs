@@ -7,7 +7,7 @@ use crate::{
     error::RunError,
     evaluate::{RunLog, episode_line, restore_artifacts, with_kept},
     run_manifest::RunManifest,
-    suite_run::SuiteRun,
+    suite_run::PreparedRun,
 };
 use softvt_common::cancel::{self, CancelFlag};
 use softvt_common::episode_id::{EpisodeId, EpisodeIndex};
@@ -28,7 +28,7 @@ pub struct ServedRuns<'a> {
 
 /// The run folder of one suite.
 struct ServedRun<'a> {
-    run: &'a SuiteRun<'a>,
+    run: &'a PreparedRun<'a>,
     /// Episodes that were in the folder when the server started.
     resumed: BTreeSet<EpisodeIndex>,
     log: Mutex<RunLog<'a>>,
@@ -39,7 +39,7 @@ impl<'a> ServedRuns<'a> {
     ///
     /// # Errors
     /// A folder holds another run or anything else, or cannot be written. No empty folder is left then.
-    pub fn open(config: &'a RunConfig, runs: &'a [SuiteRun<'a>]) -> Result<Self, RunError> {
+    pub fn open(config: &'a RunConfig, runs: &'a [PreparedRun<'a>]) -> Result<Self, RunError> {
         let mut opened =
             Self { config, runs: Vec::new(), failure: Mutex::default(), cancel: CancelFlag::default() };
         for run in runs {
@@ -69,7 +69,7 @@ impl<'a> ServedRuns<'a> {
                 if !cancel::requested() {
                     let (suite, index) = (&id.suite, id.index());
                     self.config.notice(format!(
-                        "{suite}: {index} will not be recorded: {reason}; a server with --resume takes it again"
+                        "{suite}: {index} will not be recorded: {reason}; a resumed server takes it again"
                     ));
                 }
             }),
@@ -86,7 +86,7 @@ impl<'a> ServedRuns<'a> {
         let served =
             self.find(suite).ok_or_else(|| RequestError::Record(format!("unknown suite {suite}")))?;
         served.add(finished).map_err(|error| {
-            let message = error.message.clone();
+            let message = error.to_string();
             lock(&self.failure).get_or_insert(error);
             self.cancel.request();
             RequestError::Record(message)
@@ -112,13 +112,11 @@ impl<'a> ServedRuns<'a> {
             });
         }
         if recorded == 0 {
-            return (summaries, with_kept(outcome, "no episode was recorded", ""));
+            return (summaries, with_kept(outcome, "no episode was recorded", None));
         }
-        let out = config.out.as_deref().unwrap_or(Path::new("")).display();
-        let kept = format!("{recorded} of {} are in {out}", counted(requested, "episode"));
-        let is_partial = recorded < requested;
-        let hint = if is_partial { format!("; continue with --resume --out {out}") } else { String::new() };
-        (summaries, with_kept(outcome, &kept, &hint))
+        let out = config.out.as_deref().unwrap_or(Path::new(""));
+        let kept = format!("{recorded} of {} are in {}", counted(requested, "episode"), out.display());
+        (summaries, with_kept(outcome, &kept, (recorded < requested).then_some(out)))
     }
 
     /// Removes the folders without episodes.
@@ -134,7 +132,7 @@ impl<'a> ServedRuns<'a> {
 }
 
 impl<'a> ServedRun<'a> {
-    fn open(run: &'a SuiteRun<'a>) -> Result<Self, RunError> {
+    fn open(run: &'a PreparedRun<'a>) -> Result<Self, RunError> {
         let config = run.config;
         let manifest = RunManifest::new(run, config.episodes_of(run.suite));
         let opened = match config.resume {
@@ -168,7 +166,7 @@ impl<'a> ServedRun<'a> {
 }
 
 /// Writes the results of a run that has all of its episodes.
-fn write_if_complete(run: &SuiteRun, log: &mut RunLog) -> Result<(), RunError> {
+fn write_if_complete(run: &PreparedRun, log: &mut RunLog) -> Result<(), RunError> {
     let is_complete = !log.records.is_empty() && log.records.len() == run.jobs.len();
     if is_complete { log.write_results() } else { Ok(()) }
 }

@@ -6,7 +6,7 @@ use crate::{
     config::{ConfiguredScript, RunConfig},
     error::RunError,
     selection::{check_distinct_out_dirs, check_parent_folder, needs_suites, run_dir, suites_of},
-    suite_run::SuiteRun,
+    suite_run::{PreparedRun, SuiteRun},
 };
 use softvt_benchmark::{Plan, Suite, seed::SecretSeed};
 use softvt_common::episode_id::{EpisodeId, Split};
@@ -30,7 +30,7 @@ pub fn check_served(ConfiguredScript { config, script: loaded }: &ConfiguredScri
 pub fn prepare_served<'a>(
     ConfiguredScript { config, script: loaded }: &'a ConfiguredScript,
     split: Split,
-) -> Result<Vec<SuiteRun<'a>>, RunError> {
+) -> Result<Vec<PreparedRun<'a>>, RunError> {
     let suites = suites_of(&loaded.plan);
     let is_list = matches!(loaded.plan, Plan::Suites { .. });
     if config.out.is_some() {
@@ -43,16 +43,10 @@ pub fn prepare_served<'a>(
     for suite in suites {
         let out = run_dir(config, suite, is_list);
         let has_folder = out.is_some();
-        let mut run = SuiteRun::selected(config, loaded, suite, out)?;
-        run.split = split;
-        // Otherwise only privileged clients receive the limits.
-        run.reads_limits = config.policy.privileged || has_folder;
-        if has_folder {
-            run.prepare()?;
-        } else {
-            run.report_limits()?;
-        }
-        runs.push(run);
+        // Without a folder, only privileged clients receive the limits.
+        let reads_limits = config.policy.privileged || has_folder;
+        let run = SuiteRun { split, reads_limits, ..SuiteRun::selected(config, loaded, suite, out)? };
+        runs.push(if has_folder { run.prepare()? } else { run.prepare_unrecorded()? });
     }
     Ok(runs)
 }
@@ -63,7 +57,7 @@ pub fn prepare_served<'a>(
 /// A policy without a profile.
 pub fn server_config<'a>(
     ConfiguredScript { config, script: loaded }: &'a ConfiguredScript,
-    runs: &'a [SuiteRun<'a>],
+    runs: &'a [PreparedRun<'a>],
     access: AccessRules,
 ) -> Result<ServerConfig<'a>, RunError> {
     let start_episode = |id: &EpisodeId| {
@@ -72,7 +66,7 @@ pub fn server_config<'a>(
         let task = run.suite.tasks.iter().find(|task| task.id == id.task);
         let task = task.ok_or_else(|| format!("unknown task {}", id.task))?;
         let id = EpisodeId { suite: run.suite.name.clone(), ..id.clone() };
-        run.start_episode(task, &id).map_err(|error| RequestError::Invalid(error.message))
+        run.start_episode(task, &id).map_err(|error| RequestError::Invalid(error.to_string()))
     };
     let profile = config.policy.profile().ok_or_else(|| RunError::input("there is no profile to serve"))?;
     Ok(ServerConfig {
@@ -111,7 +105,7 @@ pub fn first_observation(config: &RunConfig, server: &ServerConfig) -> Result<Ob
 }
 
 /// A suite as clients see it: its name in results, the selected tasks, and the number of episodes of a run.
-fn served_suite(run: &SuiteRun) -> Suite {
+fn served_suite(run: &PreparedRun) -> Suite {
     let tasks = run.jobs.tasks().into_iter().cloned().collect();
     Suite { name: run.name.clone(), tasks, episodes: run.config.episodes_of(run.suite), ..run.suite.clone() }
 }

@@ -1,6 +1,6 @@
 //! A suite with everything that its episodes need: settings, deformation limits, assets and controllers.
 
-use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
+use std::{collections::BTreeMap, ops::Deref, path::PathBuf, sync::Arc};
 
 use crate::{
     config::{RunConfig, TraceDetail},
@@ -29,10 +29,9 @@ use softvt_script::{EpisodeSetup, LoadedScript, SceneBuilder, SceneChanges};
 /// Episodes per task whose scenes are built before a run, to find all assets and the limits that are missing.
 const MAX_SCANNED_EPISODES: usize = 100;
 
-/// A suite with everything that its episodes need.
+/// A suite with everything that its episodes need: [`SuiteRun::run_episode`] runs single episodes.
 ///
-/// [`SuiteRun::prepare`] checks the scenes and reads the limits; then [`SuiteRun::run_episode`] runs single episodes. A
-/// [`Runner`](super::Runner) does both for all episodes.
+/// [`SuiteRun::prepare`] checks the scenes and reads the limits. A [`Runner`](super::Runner) does that and runs all episodes.
 pub struct SuiteRun<'a> {
     /// Configuration of the run.
     pub config: &'a RunConfig,
@@ -48,12 +47,8 @@ pub struct SuiteRun<'a> {
     pub jobs: EpisodeList<'a>,
     /// Files with the deformation limits of the objects.
     pub(crate) calibration_files: Arc<CalibrationFiles>,
-    /// The calibrations of the assets in the scenes of the run; `None` before they are known.
-    pub(crate) calibrations: Option<Calibrations>,
     /// False if objects have no limits, since no verdict is shown.
     pub reads_limits: bool,
-    /// SHA-256 of every file that the results depend on, by name.
-    pub sources: BTreeMap<String, String>,
     /// The recorded run whose actions are repeated.
     pub replay_source: Option<ReplaySource>,
     /// Meshes of the objects, shared by all episodes.
@@ -66,8 +61,6 @@ pub struct SuiteRun<'a> {
     pub renders_episodes: bool,
     /// True if every control step is recorded.
     pub(crate) records_trace: bool,
-    /// True if the policy observes the true forces on the pads.
-    pub force_observed: bool,
     /// Split of the episodes.
     pub split: Split,
     pub(crate) connections: Option<Arc<PolicyConnections>>,
@@ -77,6 +70,25 @@ pub struct SuiteRun<'a> {
     pub imported: Vec<Imported>,
     /// Makes the controller of an episode.
     pub controllers: ControllerFactory,
+}
+
+/// A run whose scenes are valid, with the limits of their objects.
+pub struct PreparedRun<'a> {
+    run: SuiteRun<'a>,
+    /// The calibrations of the assets in the scenes of the run.
+    pub(crate) calibrations: Calibrations,
+    /// SHA-256 of every file that the results depend on, by name.
+    pub sources: BTreeMap<String, String>,
+    /// True if the policy observes the true forces on the pads.
+    pub force_observed: bool,
+}
+
+impl<'a> Deref for PreparedRun<'a> {
+    type Target = SuiteRun<'a>;
+
+    fn deref(&self) -> &SuiteRun<'a> {
+        &self.run
+    }
 }
 
 impl<'a> SuiteRun<'a> {
@@ -92,16 +104,14 @@ impl<'a> SuiteRun<'a> {
         out: PathBuf,
     ) -> Result<Self, RunError> {
         let settings = suite.settings.with_all(&config.settings);
-        let settings = settings.map_err(|error| config.error(format!("--set: {error}")))?;
+        let settings = settings.map_err(|error| config.error_of("settings", "", error))?;
         for ShiftValue { name, value } in &config.shifts {
             softvt_script::check_shift(&suite.shifts, name, *value)
-                .map_err(|error| config.error(format!("--shift: {error}")))?;
+                .map_err(|error| config.error_of("shifts", "", error))?;
         }
         let replay_source = find_replay_source(config, suite, &jobs)?;
         let connections =
             config.policy.server().map(|server| Arc::new(PolicyConnections::new(server.clone())));
-        let mut sources = loaded.file_hashes();
-        sources.extend(config.policy.sources.clone());
         Ok(Self {
             config,
             loaded,
@@ -110,10 +120,7 @@ impl<'a> SuiteRun<'a> {
             settings,
             jobs,
             calibration_files: Arc::new(CalibrationFiles::new(&config.file, config.observer.clone())),
-            calibrations: None,
             reads_limits: true,
-            sources,
-            force_observed: replay_source.as_ref().is_some_and(|source| source.force_observed),
             replay_source,
             assets: AssetCache::default(),
             sensor_assets: SensorAssets::default(),
@@ -144,6 +151,11 @@ impl<'a> SuiteRun<'a> {
     ) -> Result<Self, RunError> {
         let jobs = select_episodes(config, suite, &select_tasks(config, suite)?);
         Self::new(config, loaded, suite, jobs, out.unwrap_or_default())
+    }
+
+    /// The same run, of which every episode can be rendered.
+    pub fn rendered(self) -> Self {
+        Self { renders_episodes: true, ..self }
     }
 
     /// Builds the scene of an episode with the changes of the run.
@@ -196,13 +208,6 @@ impl<'a> SuiteRun<'a> {
         }
     }
 
-    /// Takes over the limits of another run of the same suite, whose layouts are the same.
-    pub(crate) fn copy_limits(&mut self, other: &Self) {
-        self.calibration_files.clone_from(&other.calibration_files);
-        self.calibrations.clone_from(&other.calibrations);
-        self.sources.clone_from(&other.sources);
-    }
-
     /// Limits of the objects in the scene of an episode.
     ///
     /// # Errors
@@ -218,7 +223,7 @@ impl<'a> SuiteRun<'a> {
     ///
     /// # Errors
     /// A scene or calibration file that is not valid.
-    pub fn report_limits(&self) -> Result<(), RunError> {
+    fn report_limits(&self) -> Result<(), RunError> {
         for task in self.jobs.tasks() {
             let opened = self.open_episode(&self.episode_id(task, 0))?;
             let limits = self.limits_of(task, &opened.scene)?;
@@ -227,14 +232,14 @@ impl<'a> SuiteRun<'a> {
         Ok(())
     }
 
-    /// Builds the scenes of the first episodes of each task, keeps the calibrations of their assets, and reports objects
+    /// Builds the scenes of the first episodes of each task, returns the calibrations of their assets, and reports objects
     /// without a limit. A layout that fails ends the scan of its task; the episode itself reports the error.
     ///
     /// # Errors
     /// A calibration file that is not valid.
-    pub fn scan_limits(&mut self) -> Result<(), RunError> {
-        if self.calibrations.is_some() || !self.reads_limits {
-            return Ok(());
+    pub(crate) fn scan_limits(&self) -> Result<Calibrations, RunError> {
+        if !self.reads_limits {
+            return Ok(Calibrations::default());
         }
         let tasks = self.jobs.tasks();
         let mut scan = LimitScan::default();
@@ -249,10 +254,7 @@ impl<'a> SuiteRun<'a> {
             },
         )?;
         scan.report(&self.calibration_files);
-        let calibrations = scan.calibrations(&self.calibration_files);
-        self.sources.extend(calibrations.sources.clone());
-        self.calibrations = Some(calibrations);
-        Ok(())
+        Ok(scan.calibrations(&self.calibration_files))
     }
 
     /// Limits in the first episodes of a task. All shards of a run look at the same episodes.
@@ -355,13 +357,12 @@ impl<'a> SuiteRun<'a> {
             EpisodeError::Control { source, .. } if source.is_of_server() => Cause::Policy,
             _ => Cause::Input,
         };
-        let message = match (error, error.place()) {
+        match (RunError::new(cause, error), error, error.place()) {
             // The message of this one begins with file and line.
-            (EpisodeError::Build(BuildError::At { .. }), _) => error.to_string(),
-            (_, Some(place)) => format!("{place}: {error}"),
-            (_, None) => format!("{}: {error}", self.config.file.display()),
-        };
-        RunError { cause, message }
+            (of_episode, EpisodeError::Build(BuildError::At { .. }), _) => of_episode,
+            (of_episode, _, Some(place)) => of_episode.at(place),
+            (of_episode, _, None) => of_episode.at(self.config.file.display()),
+        }
     }
 
     /// Connects to the policy server, renders once what the policy observes at the start of the first episode of each task,
@@ -369,8 +370,51 @@ impl<'a> SuiteRun<'a> {
     ///
     /// # Errors
     /// A layout, calibration file, camera, light or tactile sensor that is not valid; a server that cannot be reached.
-    pub fn prepare(&mut self) -> Result<(), RunError> {
+    pub fn prepare(self) -> Result<PreparedRun<'a>, RunError> {
+        let force_observed = self.check_first_episodes()?;
+        let calibrations = self.scan_limits()?;
+        let mut sources = self.sources();
+        sources.extend(calibrations.sources.clone());
+        Ok(PreparedRun { run: self, calibrations, sources, force_observed })
+    }
+
+    /// As [`Self::prepare`], with the limits of another run of the same suite, whose layouts are the same.
+    ///
+    /// # Errors
+    /// A layout, camera, light or tactile sensor that is not valid; a server that cannot be reached.
+    pub(crate) fn prepare_like(self, other: &PreparedRun) -> Result<PreparedRun<'a>, RunError> {
+        let run = Self { calibration_files: other.calibration_files.clone(), ..self };
+        let force_observed = run.check_first_episodes()?;
+        let (calibrations, sources) = (other.calibrations.clone(), other.sources.clone());
+        Ok(PreparedRun { run, calibrations, sources, force_observed })
+    }
+
+    /// Tells which objects have no limit, for episodes that are not recorded. Scenes are checked when they are opened.
+    ///
+    /// # Errors
+    /// A scene or calibration file that is not valid.
+    pub(crate) fn prepare_unrecorded(self) -> Result<PreparedRun<'a>, RunError> {
+        self.report_limits()?;
+        let (sources, force_observed) = (self.sources(), self.observes_recorded_force());
+        Ok(PreparedRun { run: self, calibrations: Calibrations::default(), sources, force_observed })
+    }
+
+    /// SHA-256 of every file of the script and the policy, by name.
+    fn sources(&self) -> BTreeMap<String, String> {
+        let mut sources = self.loaded.file_hashes();
+        sources.extend(self.config.policy.sources.clone());
+        sources
+    }
+
+    /// True if the policy whose actions are repeated observed the true forces on the pads.
+    fn observes_recorded_force(&self) -> bool {
+        self.replay_source.as_ref().is_some_and(|source| source.force_observed)
+    }
+
+    /// Checks the first episode of each task. Returns true if the policy observes the true forces on the pads.
+    fn check_first_episodes(&self) -> Result<bool, RunError> {
         let mut has_changed = false;
+        let mut force_observed = self.observes_recorded_force();
         for task in self.jobs.tasks() {
             let first = self.jobs.episodes_of(task.id).next().unwrap_or(0);
             let opened = self.open_episode(&self.episode_id(task, first))?;
@@ -386,13 +430,13 @@ impl<'a> SuiteRun<'a> {
             // A client of `softvt serve` has no controller here.
             let declared = self.config.policy.declared.as_ref();
             let streams = declared.map_or_else(|| controller.streams(), |declared| declared.streams.clone());
-            self.force_observed |= streams.force;
+            force_observed |= streams.force;
             self.check_streams(scene, streams, task, first).map_err(|error| self.episode_error(&error))?;
         }
         if !has_changed {
             self.refuse_shifts_without_effect()?;
         }
-        self.scan_limits()
+        Ok(force_observed)
     }
 
     /// Refuses shifts that change neither the scene nor the prompt of any task, unless their values are the nominal ones.
@@ -403,10 +447,11 @@ impl<'a> SuiteRun<'a> {
         };
         match self.config.shifts.iter().find(|shift| !is_nominal(shift)) {
             None => Ok(()),
-            Some(ShiftValue { name, value }) => Err(self.config.error(format!(
-                "--shift {name}={value}: changes nothing in suite {}; leave it out",
-                self.suite.name
-            ))),
+            Some(ShiftValue { name, value }) => Err(self.config.error_of(
+                "shifts",
+                format!("{name}={value}"),
+                format!("changes nothing in suite {}; leave it out", self.suite.name),
+            )),
         }
     }
 

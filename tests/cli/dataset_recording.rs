@@ -15,7 +15,7 @@ fn recordings_are_printed_checked_and_reproduced() {
     assert!(few.contains("of 2 demonstrations after 1 attempt"), "{few}");
     assert!(project.refusal("dataset check a").contains("was interrupted"));
     let line = "record x.lua --demos 2 --out a --images video --no-privileged";
-    assert!(project.refusal(line).contains("--resume"));
+    assert!(project.refusal(line).contains("continue with --resume --out a"));
     let output = project.succeeds(&format!("{line} --resume")).out;
     let attempts = project.json("a/dataset.json")["tasks"][0]["attempts"].as_u64().expect("a count");
     assert!(output.contains(&format!("2 demonstrations from {attempts} attempts")), "{output}");

@@ -89,8 +89,8 @@ fn an_experiment_writes_its_rows_and_its_command_line() {
     let project =
         Project::new(&[("x.lua", &(text.trim_end().trim_end_matches('}').to_owned() + ", " + finish))]);
     let refused = project.refusal("x.lua --set robot.gripper.speed=0.01");
-    assert!(refused.contains("--set robot.gripper.speed: give --out DIR"), "{refused}");
-    assert!(project.refusal("x.lua --seed 1").contains("--seed: give --out DIR"));
+    assert!(refused.contains("--set robot.gripper.speed: give an output folder"), "{refused}");
+    assert!(project.refusal("x.lua --seed 1").contains("--seed 1: give an output folder"));
     assert!(
         !project.path("assets").exists(),
         "a file of the project is not replaced by one of changed settings"
@@ -144,7 +144,7 @@ fn an_option_of_a_script_acts_or_is_refused() {
     let misspelt = Project::new(&[("x.lua", &declared("mode = 'slwo'"))]).refusal("x.lua");
     assert!(misspelt.contains("options.wait_s.only_with.mode: expected one of fast, slow"), "{misspelt}");
     let changed = project.refusal("x.lua --kappa 0.3");
-    assert!(changed.contains("--kappa 0.3: give --out DIR"), "{changed}");
+    assert!(changed.contains("--kappa 0.3: give an output folder"), "{changed}");
     project.succeeds("x.lua --kappa 0.3 --out run");
     // A problem is reported after the files are written.
     let problem = project.problem("x.lua --kappa 1 --out worse");

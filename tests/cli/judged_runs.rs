@@ -9,7 +9,7 @@ fn a_run_with_a_seed_file_is_repeated_with_it_alone() {
     project.succeeds("x.lua --policy noop --seed-file secret --out run");
     let hash = project.json("run/run.json")["seed_hash"].as_str().expect("a hash").to_owned();
     assert!(project.succeeds("replay run 0/0 --seed-file secret").out.contains("byte-identical"));
-    assert!(project.refusal("replay run 0/0").contains("add --seed-file FILE"));
+    assert!(project.refusal("replay run 0/0").contains("give the file with that seed"));
     project.succeeds("report run --out page");
     assert!(project.text("page/report.html").contains(&format!("secret, SHA-256 {hash}")));
 }

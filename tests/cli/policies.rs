@@ -60,13 +60,13 @@ fn flags_without_effect_and_unknown_policies_are_refused() {
     for (words, output) in [
         (
             "--policy noop --replan 3",
-            "--replan: applies to policy servers and Lua policies only; --policy noop ignores it",
+            "--replan: applies to policy servers and Lua policies only; the policy noop ignores it",
         ),
-        ("--protocol vla-eval", "--protocol: applies to policy servers only; --policy expert ignores it"),
+        ("--protocol vla-eval", "--protocol: applies to policy servers only; the policy expert ignores it"),
         ("--policy random --profile vision", "--profile: applies to policy servers only"),
         (
             "--policy noop --gripper binary",
-            "--gripper: applies to policy servers and Lua policies only; --policy noop",
+            "--gripper: applies to policy servers and Lua policies only; the policy noop",
         ),
         ("--policy q.lua", "q.lua: no such file"),
         ("--policy ws://127.0.0.1:99999", "\"99999\" is not a port"),

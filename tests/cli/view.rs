@@ -228,7 +228,7 @@ fn missing_tactile_tables_are_reported() {
 fn videos_of_episodes_that_are_not_run_are_refused() {
     let project = short();
     let message = project.refusal("x.lua --episodes 2 --video=1,7 --out run");
-    assert!(message.contains("x.lua: --video=7: suite one runs episodes 0 to 1 of each task"), "{message}");
+    assert!(message.contains("x.lua: --video 7: suite one runs episodes 0 to 1 of each task"), "{message}");
     assert!(!project.path("run").exists());
 }
 

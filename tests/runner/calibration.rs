@@ -173,7 +173,7 @@ fn a_calibration_is_checked_for_the_object_that_was_calibrated() {
     for (words, part) in [
         ("--part=numerics --trials=3", "--trials does nothing with --part numerics"),
         ("--part=ends --step-mm=2", "--step-mm does nothing with --part ends"),
-        ("--trials=3", "--trials 3: give --out DIR"),
+        ("--trials=3", "--trials 3: give an output folder"),
     ] {
         let message = refusal(&check(words));
         assert!(message.contains(part), "{words}: {message}");
@@ -193,8 +193,8 @@ fn a_calibration_refuses_what_does_nothing_and_what_would_replace_the_limits() {
     for (words, part) in [
         ("--sweep-protocol=hand --step-mm=1", "--step-mm does nothing with --sweep-protocol hand"),
         ("--trials=3", "--trials does nothing with --sweep-protocol press"),
-        ("--sweep-protocol=hand", "--sweep-protocol hand: give --out DIR"),
-        ("--kappa=0.3", "--kappa 0.3: give --out DIR"),
+        ("--sweep-protocol=hand", "--sweep-protocol hand: give an output folder"),
+        ("--kappa=0.3", "--kappa 0.3: give an output folder"),
         ("--asset=brick,brick", "--asset names brick twice"),
         ("--asset=table", "table is not soft"),
     ] {

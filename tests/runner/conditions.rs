@@ -85,7 +85,7 @@ fn invalid_conditions_are_reported_before_anything_runs() {
         ("", "suites/trial.lua:1: conditions.conditions: expected at least one, got an empty list"),
         (
             "{ name = \"a\", shift = { mas = 2 } }",
-            "suites/trial.lua: --shift: unknown shift \"mas\"; did you mean \"mass\"? (suite one, condition \"a\")",
+            "suites/trial.lua: shifts: unknown shift \"mas\"; did you mean \"mass\"? (suite one, condition \"a\")",
         ),
         (
             "{ name = \"a\", set = { [\"robot.gripper.efort\"] = 2 } }",

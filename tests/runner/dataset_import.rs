@@ -172,12 +172,12 @@ fn invalid_imports_are_refused_and_write_nothing() {
         (x(), &["x.lua"], "x.lua is not an HDF5 file"),
         (x(), &["odd.hdf5"], "odd.hdf5: demo_0: it is of \"sing\", and x.lua has no such task"),
         (x(), &["torn.hdf5"], "torn.hdf5: /data/demo_0/obs/eef_pose: step 9: not a unit quaternion w x y z"),
-        (task("7"), &["odd.hdf5"], "--task 7: suite one has no such task"),
-        (task("wait"), &["odd.hdf5"], "--task wait: matches 2 tasks; select the one of the demonstrations"),
+        (task("7"), &["odd.hdf5"], "tasks 7: suite one has no such task"),
+        (task("wait"), &["odd.hdf5"], "tasks wait: matches 2 tasks; select the one of the demonstrations"),
         (
             x().seed(3),
             &[OWN],
-            "it was recorded with the seed 0, and this import uses the seed 3; add --seed 0",
+            "it was recorded with the seed 0, and this import uses the seed 3; import it with the seed 0",
         ),
         (project.run("two.lua"), &[OWN], "it is of \"wait\" of the suite one, and two.lua has no such task"),
         (project.run("world.lua"), &[OWN], "softvt dataset import needs a suite"),
@@ -189,8 +189,8 @@ fn invalid_imports_are_refused_and_write_nothing() {
     }
     for (out, expected) in [
         ("mine", "the folder contains notes.txt but no softvt recording"),
-        ("data", "--out data: the folder contains a dataset of softvt record"),
-        ("x.lua", "--out x.lua: not a folder"),
+        ("data", "out data: the folder contains a dataset of softvt record"),
+        ("x.lua", "out x.lua: not a folder"),
     ] {
         let message = import(&x(), &[OWN], out, ImportOptions::default()).err().expect(expected);
         assert!(message.contains(expected), "{message}");

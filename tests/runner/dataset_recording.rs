@@ -83,6 +83,17 @@ fn project() -> Project {
 }
 
 #[test]
+fn demonstrations_do_not_show_the_episodes_of_a_judged_run() {
+    let project = project();
+    project.write("secret", b"correct horse battery staple");
+    let recording = Recording::new(project.run("x.lua").secret("secret"), 1, "judged");
+    assert_eq!(
+        recording.refusal(),
+        "x.lua: a recording has no secret seed: demonstrations would show the episodes of a judged run"
+    );
+}
+
+#[test]
 fn the_first_good_attempts_are_kept() {
     let project = project();
     let record = |out: &str, threads| Recording::new(project.run("x.lua").threads(threads), 3, out);
@@ -102,7 +113,7 @@ fn the_first_good_attempts_are_kept() {
     let few = Recording { attempts: Some(2), ..record("b", 3) }.refusal();
     assert!(few.contains("task 0:") && few.contains("of 3 demonstrations after 2 attempts"), "{few}");
     assert!(project.message(check_complete(&project.path("b"))).contains("was interrupted"));
-    assert!(record("b", 3).refusal().contains("--resume"));
+    assert!(record("b", 3).refusal().contains("resume it"));
     record("b", 3).with(|options| options.resume = true).record();
     assert!(files(&project.path("a")) == files(&project.path("b")), "not the same bytes");
     assert!(record("b", 3).try_record().expect("a recording").is_none(), "already complete");
@@ -149,7 +160,7 @@ fn folders_with_other_files_are_refused() {
         Recording::new(project.run(script), 1, out).with(|options| options.resume = true).refusal()
     };
     let output = resumed("x.lua", "mine");
-    assert!(output.contains("--out mine: the folder contains meta but no softvt recording"), "{output}");
+    assert!(output.contains("out mine: the folder contains meta but no softvt recording"), "{output}");
     assert_eq!(files(&project.path("mine")).len(), 1);
     project.write("other/recording.json", b"{\"softvt\":\"0.0.1\"}");
     let output = resumed("x.lua", "other");

@@ -70,9 +70,9 @@ fn results_hold_the_hash_of_the_seed_and_only_who_has_the_file_can_repeat_them()
 
     assert_eq!(project.replay("one", "0/3", Some("secret")), Ok(None));
     let message = project.replay("one", "0/3", None).expect_err("a secret run");
-    assert!(message.contains("was judged with a secret seed; add --seed-file FILE"), "{message}");
+    assert!(message.contains("was judged with a secret seed; give the file with that seed"), "{message}");
     let message = project.replay("one", "0/3", Some("other")).expect_err("another secret");
-    assert!(message.starts_with("--seed-file other: its hash is ") && message.contains(hash), "{message}");
+    assert!(message.starts_with("secret other: its hash is ") && message.contains(hash), "{message}");
     let message = project.replay("public", "0/3", Some("secret")).expect_err("a public run");
     assert!(message.contains("has no secret seed; leave it out"), "{message}");
     assert!(project.report(&["one"]).html.contains(&format!("secret, SHA-256 {hash}")));

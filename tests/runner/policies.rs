@@ -4,15 +4,27 @@ use std::{net::TcpListener, time::Duration};
 
 use softvt::{
     evaluation::{stage::Stage, verdict::Outcome},
-    policy::{profile::GripCode, remote::Protocol},
+    policy::{builtin::NoopPolicy, profile::GripCode, remote::Protocol},
     records::record::EpisodeRecord,
     report::comparison,
+    runner::PolicyConfig,
 };
 
 use crate::support::{
     Run, Small,
     fixtures::{WANDERS, policy_project},
 };
+
+#[test]
+fn a_policy_in_rust_has_no_name_of_a_built_in_one() {
+    let of =
+        |name| PolicyConfig::of(name, |_| Box::<NoopPolicy>::default()).map(drop).map_err(|e| e.to_string());
+    assert_eq!(of("mine"), Ok(()));
+    assert_eq!(
+        of("expert"),
+        Err("policy: \"expert\" is a built-in policy; give yours another name".to_owned())
+    );
+}
 
 #[test]
 fn results_do_not_depend_on_threads_or_interruptions() {
@@ -148,7 +160,7 @@ fn missing_cameras_are_reported_before_anything_runs() {
     let message = run.with_policy(|policy| policy.profile = Some(profile)).error();
     assert_eq!(
         message,
-        "--profile v.lua: inputs: unknown camera \"wirst\"; did you mean \"wrist\"? (scene of task 0)"
+        "profile v.lua: inputs: unknown camera \"wirst\"; did you mean \"wrist\"? (scene of task 0)"
     );
     assert!(!project.path("run").exists());
 }
@@ -182,7 +194,7 @@ fn recorded_actions_must_fit_the_run() {
         assert!(message.contains(output), "{message}");
         assert!(!project.path("no").exists());
     };
-    refused(run(2).seed(1), "--policy run: its seed is 0, that of this run 1");
+    refused(run(2).seed(1), "policy run: its seed is 0, that of this run 1");
     refused(run(2).twin(), "no run of suite one (rigid twin); available: one");
     refused(run(4), "it lacks 2 of the 4 requested episodes: task 0 episode 2, task 0 episode 3");
     std::fs::remove_file(project.path("run/actions/task_000/episode_00001.npy")).expect("removed");
@@ -210,13 +222,13 @@ fn options_without_effect_are_refused() {
     for (run, output) in [
         (
             noop().replan(3),
-            "--replan: applies to policy servers and Lua policies only; --policy noop ignores it",
+            "replan: applies to policy servers and Lua policies only; the policy noop ignores it",
         ),
-        (protocol, "--protocol: applies to policy servers only; --policy expert ignores it"),
-        (vision, "--profile: applies to policy servers only"),
+        (protocol, "protocol: applies to policy servers only; the policy expert ignores it"),
+        (vision, "profile: applies to policy servers only"),
         (
             noop().gripper(GripCode::Binary),
-            "--gripper: applies to policy servers and Lua policies only; --policy noop",
+            "gripper: applies to policy servers and Lua policies only; the policy noop",
         ),
         (project.run("x.lua").policy("q.lua"), "q.lua: no such file"),
         (project.run("x.lua").policy("profile.lua"), "profile.lua:"),

@@ -699,5 +699,5 @@ fn a_server_or_a_profile_may_ask_for_an_observation_in_every_control_step() {
     });
     let (cause, message) = refused.expect_err("another protocol");
     assert_eq!(cause, Cause::Input);
-    assert!(message.contains("observe_every_step needs --protocol openpi"), "{message}");
+    assert!(message.contains("observe_every_step needs the protocol openpi"), "{message}");
 }

@@ -337,7 +337,7 @@ fn folders_that_do_not_fit_are_refused() {
         (
             project.run("x.lua").profile("vision").tasks(&[7]),
             validation,
-            "--task 7: suite one has no such task",
+            "tasks 7: suite one has no such task",
         ),
     ] {
         let message = Server::try_start(&run, access).err().expect(expected);

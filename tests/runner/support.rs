@@ -331,7 +331,7 @@ impl Run<'_> {
             check_distinct_out_dirs(config, script.plan.suites())?;
             let (checker, mut warnings) = (SuiteChecker::new(&run), Vec::new());
             for suite in script.plan.suites() {
-                warnings.extend(checker.check(suite)?);
+                checker.check(suite, |warning| warnings.push(warning))?;
             }
             match &script.plan {
                 Plan::Conditions { .. } => {

@@ -3,6 +3,7 @@
 use softvt::{
     records::record::EpisodeRecord,
     report::condition_table::{compares_policies, controllers_table},
+    runner::{Runner, TraceDetail},
     scene::ObjectVariation,
     script::STANDARD_VARIATION,
 };
@@ -36,6 +37,20 @@ fn records_have_the_drawn_numbers_and_the_suite_a_name_of_its_own() {
 }
 
 #[test]
+fn a_runner_varies_its_suites_makes_their_twins_and_traces_its_episodes() {
+    let project = Small { task: "budget_steps = 3", ..Small::default() }.project();
+    let loaded = project.run("x.lua").policy("noop").load().expect("a suite");
+    let runner = Runner::new(&loaded).episodes(1).trace(TraceDetail::State);
+    let varied = runner.clone().vary(STANDARD_VARIATION).expect("it varies").out(project.path("varied"));
+    let results = varied.run(|_| ()).expect("it runs");
+    assert!(results[0].records[0].header.variation.is_some());
+    assert_eq!(project.lines("varied/trace/task_000/episode_00000.jsonl").len(), 3);
+    let twin = runner.rigid_twin().out(project.path("twin")).run(|_| ()).expect("it runs");
+    let header = &twin[0].records[0].header;
+    assert_eq!((header.id.suite.as_str(), header.soft), ("one_rigid_twin", false));
+}
+
+#[test]
 fn a_suite_without_variation_has_no_drawn_numbers() {
     let project = project();
     assert_eq!(project.run("x.lua").out("run").record().header.variation, None);
@@ -52,6 +67,11 @@ fn a_variation_in_a_file_replaces_the_standard_one() {
     project.write("small.lua", ranges.as_bytes());
     let episode = project.run("x.lua").vary("small.lua").record();
     assert_eq!((drawn(&episode).scale, drawn(&episode).youngs_factor), (0.5, 2.0));
+    project
+        .write("bare.lua", b"return softvt.variation { name = 'bare', size = { 1, 1 }, light = { 1, 1 } }");
+    let message = project.run("x.lua").vary("bare.lua").error();
+    let missing = "variation.stiffness: missing, as are density, friction, colour, camera_offset, camera_rotation; expected";
+    assert!(message.contains(missing), "{message}");
     project.write("small.lua", ranges.replace("{ 2, 2 }", "{ 2, 1 }").as_bytes());
     let message = project.run("x.lua").vary("small.lua").error();
     assert!(message.contains("small.lua:1") && message.contains("variation.stiffness"), "{message}");
@@ -66,7 +86,7 @@ fn what_cannot_vary_is_refused_before_anything_runs() {
         ("x.lua", "nowhere.lua", "nowhere.lua"),
     ] {
         let message = project.run(script).vary(variation).out("run").error();
-        assert!(message.contains("--vary") && message.contains(reason), "{script}: {message}");
+        assert!(message.contains("vary: ") && message.contains(reason), "{script}: {message}");
     }
     assert!(!project.path("run").exists());
 }

@@ -34,9 +34,7 @@ pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
     check_distinct_out_dirs(config, plan.suites())?;
     let checker = SuiteChecker::new(&run);
     for suite in plan.suites() {
-        for warning in checker.check(suite)? {
-            eprint_notice(format!("warning: {warning}"));
-        }
+        checker.check(suite, |warning| eprint_notice(format!("warning: {warning}")))?;
         print_tasks(suite)?;
     }
     match plan {

@@ -66,9 +66,8 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     };
     let dir = &args.out;
     let job = EpisodeJob { task, episode: args.episode };
-    let mut run = SuiteRun::new(&config, &loaded, suite, EpisodeList::listed(vec![job]), dir.clone())?;
-    run.renders_episodes = true;
-    run.prepare()?;
+    let run = SuiteRun::new(&config, &loaded, suite, EpisodeList::listed(vec![job]), dir.clone())?;
+    let run = run.rendered().prepare()?;
     files::create_folder(dir)?;
     let finished = run.run_episode(job, true, &run.controllers)?;
     let caption = Caption::new(&finished.record);

@@ -13,7 +13,7 @@ use crate::{
     config::ConfiguredScript,
     episode_list::{EpisodeJob, EpisodeList},
     error::RunError,
-    policy::PolicyConfig,
+    policy::{ControllerFactory, PolicyConfig},
     recording::{GripLog, RecordingOptions, RecordingSummary, SuiteRecording, record_all},
     selection::select_suites,
     suite_run::SuiteRun,
@@ -91,8 +91,8 @@ pub fn import(
                 EpisodeList::listed(jobs),
                 None,
                 |run, log| {
-                    run.imported = sources.clone();
-                    replay_demos(run, log, &demos, options.ignore_recorded_poses)
+                    let run = replay_demos(run, log, &demos, options.ignore_recorded_poses)?;
+                    Ok(SuiteRun { imported: sources.clone(), ..run })
                 },
             )?);
         }
@@ -131,17 +131,18 @@ fn file_name(file: &ForeignFile) -> String {
 
 /// Makes the episodes of a run re-execute the demonstrations, each from its own initial state. With `ignore_recorded_poses`
 /// objects start where the layout puts them.
-fn replay_demos(
-    run: &mut SuiteRun,
+fn replay_demos<'a>(
+    run: SuiteRun<'a>,
     grip_log: &GripLog,
     demos: &[&MatchedDemo],
     ignore_recorded_poses: bool,
-) -> Result<(), RunError> {
+) -> Result<SuiteRun<'a>, RunError> {
+    let mut origins = BTreeMap::new();
     let mut commands: BTreeMap<EpisodeIndex, Vec<ToolCommand>> = BTreeMap::new();
     let (mut placed, mut foreign) = (0, 0);
     for matched in demos {
         let index = EpisodeIndex { task: matched.task.task.id, episode: matched.attempt };
-        let (start, demo) = initial_state(run, matched, ignore_recorded_poses)?;
+        let (start, demo) = initial_state(&run, matched, ignore_recorded_poses)?;
         foreign += usize::from(matches!(demo.initial_condition, InitialCondition::OtherSimulator { .. }));
         placed += usize::from(!start.places.is_empty());
         let origin = Origin {
@@ -151,11 +152,11 @@ fn replay_demos(
             format: matched.file.format.name().to_owned(),
             start,
         };
-        run.origins.insert(index, origin);
+        origins.insert(index, origin);
         commands.insert(index, demo.commands);
         parallel::lock(grip_log).insert(index, demo.gripper_closed);
     }
-    run.controllers = Box::new(move |_, brief| {
+    let controllers: ControllerFactory = Box::new(move |_, brief| {
         let index = brief.index();
         let commands = commands.get(&index).cloned().unwrap_or_default();
         Ok(Box::new(ChunkedPolicy::new(Box::new(RecordedPolicy::new(commands, None)), brief, 1)))
@@ -167,7 +168,7 @@ fn replay_demos(
             run.suite.name
         ));
     }
-    Ok(())
+    Ok(SuiteRun { origins, controllers, ..run })
 }
 
 /// The initial state of a demonstration in the suite, and the demonstration adapted to the suite.

@@ -61,7 +61,7 @@ pub(super) fn match_demos<'a>(
                     file,
                     demo,
                     format!(
-                        "--task {}: it was recorded by softvt and is of task{id}; leave --task out",
+                        "it was recorded by softvt and is of task{id}, not of the selected {}; select none",
                         config.tasks.join(",")
                     ),
                 ));
@@ -125,12 +125,13 @@ fn forced_task<'a>(config: &RunConfig, suites: &'a [Suite]) -> Result<Option<Sui
     match (&found[..], error) {
         ([task], _) => Ok(Some(*task)),
         ([], Some(error)) => Err(error),
-        _ => Err(config.error(format!(
-            "--task {}: matches {} tasks; select the one of the demonstrations, or leave --task out to match their \
-             instructions",
-            config.tasks.join(","),
-            found.len()
-        ))),
+        _ => {
+            let message = format!(
+                "matches {} tasks; select the one of the demonstrations, or none to match their instructions",
+                found.len()
+            );
+            Err(config.error_of("tasks", config.tasks.join(","), message))
+        }
     }
 }
 
@@ -144,7 +145,7 @@ fn own_attempt(config: &RunConfig, file: &ForeignFile, demo: &ForeignDemo) -> Re
             file,
             demo,
             format!(
-                "it was recorded with the seed {seed}, and this import uses the seed {own}; add --seed {seed}"
+                "it was recorded with the seed {seed}, and this import uses the seed {own}; import it with the seed {seed}"
             ),
         )),
     }
@@ -192,7 +193,7 @@ fn task_of<'a>(
                     file,
                     demo,
                     format!(
-                        "its instruction, {prompt:?}, is that of {}; select one with --task",
+                        "its instruction, {prompt:?}, is that of {}; select one of them",
                         tasks.join(", ")
                     ),
                 ));
@@ -228,7 +229,7 @@ fn no_task(config: &RunConfig, suites: &[Suite], file: &ForeignFile, demo: &Fore
         tasks.collect::<String>()
     };
     let tasks: String = suites.iter().map(list).collect();
-    refuse(file, demo, format!("{problem}; if one fits, select it with --task:{tasks}"))
+    refuse(file, demo, format!("{problem}; if one fits, select it:{tasks}"))
 }
 
 #[cfg(test)]
