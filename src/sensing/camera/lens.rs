@@ -37,7 +37,7 @@ pub(crate) struct Lens {
     /// Change of the ray per pixel to the right.
     pub(crate) right: V3,
     /// Change of the ray per pixel downwards.
-    down: V3,
+    pub(crate) down: V3,
 }
 
 /// A vertex projected into the image.

@@ -3,10 +3,10 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use super::{
-    lod::{Lod, MAX_ERROR_PIXELS, NodeWeights, bake_vertices, extent},
+    lod::{Lod, NodeWeights, bake_vertices, extent},
     primitive::{append_visible, flat_faces, primitive_mesh, transform},
     simplify::simplify,
-    texture::{SurfaceMaterial, TEXT_TEXEL, TextureChart, flat_charts, parameterize, suits_flat_charts},
+    texture::{SurfaceMaterial, TextureChart, flat_charts, parameterize, suits_flat_charts},
 };
 use crate::camera::{error::CameraError, math::V3, raster::TRIANGLE_BITS, shade::pattern};
 use softvt_geometry::{
@@ -16,7 +16,7 @@ use softvt_geometry::{
     surface_mesh::SurfaceMesh,
     voxel::{Embedding, VoxelMesh},
 };
-use softvt_scene::Visual;
+use softvt_scene::{Visual, VisualLayer};
 
 /// Cells along the longest edge of a shape, per level of detail. The coarsest level also casts shadows.
 const CELLS: [f64; 4] = [64.0, 40.0, 26.0, 16.0];
@@ -58,14 +58,7 @@ impl RenderMesh {
         if let Some(mesh) = flat_faces(shape) {
             return Self::from_mesh(name, &mesh, visuals);
         }
-        let mut mesh = Self::with_lods(name, shape, visuals, true)?;
-        // Texture coordinates belong to the triangles as they are.
-        if mesh.charts.is_empty() {
-            for lod in &mut mesh.lods {
-                *lod = simplify(lod, SIMPLIFY_TOLERANCE * lod.vertex_spacing);
-            }
-        }
-        Ok(mesh)
+        Self::with_lods(name, shape, visuals, true)
     }
 
     /// Builds the mesh of a shape that will bend, with small triangles on flat faces too.
@@ -79,28 +72,40 @@ impl RenderMesh {
     fn with_lods(name: &str, shape: &Shape, visuals: &[Visual], is_rigid: bool) -> Result<Self, CameraError> {
         let longest = shape.bounds().size().max();
         let (mut lods, mut charts) = (Vec::new(), Vec::new());
-        let text_material = visuals
-            .iter()
-            .any(pattern::has_text)
+        let is_textured = visuals.len() > 1 || visuals.iter().any(|visual| !visual.layers.is_empty());
+        let surface = is_textured
             .then(|| Arc::new(SurfaceMaterial { shape: shape.clone(), visuals: visuals.to_vec() }));
+        // What the vertices hold: of a textured surface, what textures do not.
+        let baked: Vec<Visual> =
+            visuals.iter().map(|v| if is_textured { without_colours(v) } else { v.clone() }).collect();
+        let is_baked_alike = baked.iter().all(|visual| *visual == baked[0]);
+        let relief = baked
+            .iter()
+            .flat_map(|visual| &visual.layers)
+            .map(|layer| layer.relief_m.abs())
+            .fold(0.0, f64::max);
         // Textured faces of rigid shapes need no small triangles.
-        let prefers_primitives = is_revolved(shape) || is_rigid && text_material.is_some();
+        let prefers_primitives = is_revolved(shape) || is_rigid && is_textured;
         for cells in CELLS {
             let cell = longest / cells;
             let primitives = prefers_primitives.then(|| primitive_mesh(shape, cell)).flatten();
             let mesh = primitives.unwrap_or_else(|| SurfaceMesh::from_shape(shape, cell).mesh);
-            let material_ids: Vec<u16> =
+            let mut material_ids: Vec<u16> =
                 mesh.triangles.iter().map(|t| shape.material(&centroid(&mesh, t))).collect();
             check_mesh(name, &mesh, &material_ids, visuals)?;
-            let mut lod = bake_vertices(&mesh, &material_ids, visuals, cell as f32, Some(shape));
-            let texel = TEXT_TEXEL * (CELLS[0] / cells) as f32;
-            if let Some(material) = &text_material {
-                parameterize(&mut lod, &mut charts, material, texel);
+            if is_baked_alike {
+                material_ids.fill(0);
             }
-            if !lods.is_empty() && lod.is_uniform {
-                // With text, a coarse level also requires that its texels are no larger than a pixel.
-                let min_error = if text_material.is_some() { MAX_ERROR_PIXELS * texel } else { 0.0 };
-                lod.geometric_error = rms_error(&mesh, shape, cell).max(min_error);
+            let mut lod = bake_vertices(&mesh, &material_ids, &baked, cell as f32, Some(shape));
+            if !lods.is_empty() && (lod.is_uniform || is_textured) {
+                // Coarse levels lack the relief.
+                lod.geometric_error = rms_error(&mesh, shape, cell).max(relief as f32);
+            }
+            if is_rigid {
+                lod = simplify(&lod, SIMPLIFY_TOLERANCE * lod.vertex_spacing);
+            }
+            if let Some(surface) = &surface {
+                parameterize(&mut lod, &mut charts, surface);
             }
             lods.push(lod);
             if matches!(shape, Shape::Mesh(_)) {
@@ -219,6 +224,14 @@ impl RenderSolid {
         transform(&mut self.mesh, pose);
         self
     }
+}
+
+/// A visual whose colours a texture holds: its metalness and relief.
+fn without_colours(visual: &Visual) -> Visual {
+    let (albedo, roughness) = ([0.0; 3], 1.0);
+    let raised = visual.layers.iter().filter(|layer| layer.relief_m != 0.0);
+    let layers = raised.map(|layer| VisualLayer { albedo, roughness, ..layer.clone() }).collect();
+    Visual { albedo, roughness, layers, ..visual.clone() }
 }
 
 fn check_mesh(name: &str, mesh: &Mesh, material_ids: &[u16], visuals: &[Visual]) -> Result<(), CameraError> {

@@ -31,11 +31,17 @@ const MAX_TEXELS: f32 = 1536.0;
 /// Minimum edge of a texel, m.
 const MIN_TEXEL: f32 = 0.8e-3;
 /// Edge of a texel on surfaces with text, m.
-pub(crate) const TEXT_TEXEL: f32 = 0.3e-3;
+const TEXT_TEXEL: f32 = 0.3e-3;
 /// Texels across the finest feature of a pattern.
 const TEXELS_PER_FEATURE: f32 = 8.0;
 /// Margin in texels painted around triangles: bilinear sampling reads neighbours.
 const PAINT_MARGIN: f32 = 1.5;
+
+/// Edge of a texel that shows the details of a visual on a chart of this size, both m.
+fn finest_texel(visual: &Visual, size: f32) -> f32 {
+    let min_texel = if pattern::has_text(visual) { TEXT_TEXEL } else { MIN_TEXEL };
+    min_texel.max(pattern::finest_feature(visual).min(size) / TEXELS_PER_FEATURE)
+}
 
 /// Albedo (linear RGB) and roughness.
 type Texel = [f32; 4];
@@ -54,9 +60,21 @@ pub(crate) struct TextureChart {
     /// Width and height, texels.
     size: [usize; 2],
     source: ChartSource,
-    /// Painted on first use, since many charts are never visible, e.g. undersides.
-    mips: OnceLock<Vec<MipLevel>>,
+    bands: [OnceLock<Vec<MipLevel>>; BANDS.len()],
 }
+
+/// Levels of a mip map that are painted together, on first use: distant objects need no fine levels, and many charts are never
+/// visible, e.g. undersides.
+struct MipBand {
+    /// Finest level of the band; the last band has all coarser ones.
+    first: usize,
+    /// Level at which the band is painted. The levels above it are means of this one, which smooths edges that patterns do
+    /// not filter.
+    painted: usize,
+}
+
+const BANDS: [MipBand; 3] =
+    [MipBand { first: 0, painted: 0 }, MipBand { first: 2, painted: 1 }, MipBand { first: 4, painted: 3 }];
 
 /// Source of a texture.
 #[derive(Clone, Debug)]
@@ -111,8 +129,7 @@ pub(crate) fn flat_charts(mesh: &Mesh, visual: &Visual, charts: &mut Vec<Texture
         planes[index].corners.extend(corners);
         chart_ids.push(index as u32);
     }
-    let min_texel = if pattern::has_text(visual) { TEXT_TEXEL } else { MIN_TEXEL };
-    let texel = |size: f32| min_texel.max(pattern::finest_feature(visual).min(size) / TEXELS_PER_FEATURE);
+    let texel = |size: f32| finest_texel(visual, size);
     charts.extend(planes.iter().map(|plane| {
         TextureChart::new(&plane.normal, &plane.corners, texel, ChartSource::Flat(visual.clone()))
     }));
@@ -132,15 +149,12 @@ pub(crate) fn flat_charts(mesh: &Mesh, visual: &Visual, charts: &mut Vec<Texture
     }
 }
 
-/// Textures every triangle of a curved level; its charts are appended to `charts`. `texel` is the edge of a texel, m.
+/// Textures every triangle of a curved level; its charts are appended to `charts`.
 ///
 /// The level then counts as uniform: its materials no longer require small triangles.
-pub(crate) fn parameterize(
-    lod: &mut Lod,
-    charts: &mut Vec<TextureChart>,
-    material: &Arc<SurfaceMaterial>,
-    texel: f32,
-) {
+pub(crate) fn parameterize(lod: &mut Lod, charts: &mut Vec<TextureChart>, material: &Arc<SurfaceMaterial>) {
+    let texel =
+        material.visuals.iter().map(|visual| finest_texel(visual, f32::MAX)).fold(MIN_TEXEL, f32::min);
     // The axis along which each triangle mostly faces, twice, plus 1 if it faces backwards.
     let face_direction = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|v| lod.positions[v as usize]);
@@ -203,7 +217,7 @@ impl TextureChart {
         let texel = texel(longest).max(longest / MAX_TEXELS);
         let origin = u * u0 + v * v0 + n * corners[0].dot(n);
         let size = [u1 - u0, v1 - v0].map(|x| (x / texel).ceil().max(1.0) as usize);
-        Self { origin, u, v, n: *n, texel, size, source, mips: OnceLock::new() }
+        Self { origin, u, v, n: *n, texel, size, source, bands: Default::default() }
     }
 
     /// Texture coordinates of a point of the object frame, texels.
@@ -214,18 +228,17 @@ impl TextureChart {
 
     /// Albedo and roughness at texture coordinates `[u, v]`, averaged over about `footprint`, m (trilinear filtering).
     pub(crate) fn sample(&self, [u, v]: [f32x8; 2], footprint: f32x8) -> (Vec3x8, f32x8) {
-        let mips = self.mips.get_or_init(|| self.paint());
-        let coarsest = f32x8::splat((mips.len() - 1) as f32);
+        let coarsest = f32x8::splat(self.coarsest_level() as f32);
         let texels = footprint * f32x8::splat(1.0 / self.texel);
         let level = approx_log2(texels.fast_max(f32x8::ONE)).fast_max(f32x8::ZERO).fast_min(coarsest);
         let lanes = level.to_array();
         let low = lanes.into_iter().fold(f32::MAX, f32::min) as usize;
         let high = lanes.into_iter().fold(0.0, f32::max).ceil() as usize;
         let mut sum = [f32x8::ZERO; 4];
-        for (k, mip) in mips.iter().enumerate().take(high + 1).skip(low) {
+        for k in low..=high {
             let weight = (f32x8::ONE - (level - f32x8::splat(k as f32)).abs()).fast_max(f32x8::ZERO);
             let scale = f32x8::splat(1.0 / (1_u32 << k) as f32);
-            let values = mip.sample(u * scale, v * scale);
+            let values = self.mip(k).sample(u * scale, v * scale);
             (0..4).for_each(|c| sum[c] += weight * values[c]);
         }
         // Textures hold square roots of the albedo.
@@ -233,39 +246,71 @@ impl TextureChart {
         (Vec3x8 { x: x * x, y: y * y, z: z * z }, roughness)
     }
 
-    fn paint(&self) -> Vec<MipLevel> {
-        let [width, height] = self.size;
-        let mut texels: Vec<Texel> = match &self.source {
-            ChartSource::Flat(visual) => {
-                let point = |i: usize| {
-                    let [x, y] = [(i % width) as f32 + 0.5, (i / width) as f32 + 0.5];
-                    PatternPoint { p: self.origin + (self.u * x + self.v * y) * self.texel, n: self.n }
-                };
-                let mut texels = vec![Texel::default(); width * height];
-                for (block, some) in texels.chunks_mut(LANES).enumerate() {
-                    let at: Vec<PatternPoint> =
-                        (0..some.len()).map(|lane| point(LANES * block + lane)).collect();
-                    sample_visual(visual, &PatternPoints::new(&at), self.texel, |lane, sample| {
-                        some[lane] = texel_of(&sample.material);
-                    });
-                }
-                texels
-            }
-            ChartSource::Curved { material, triangles } => self.paint_curved(material, triangles),
+    /// The level of one texel.
+    fn coarsest_level(&self) -> usize {
+        self.size[0].max(self.size[1]).next_power_of_two().ilog2() as usize
+    }
+
+    fn mip(&self, level: usize) -> &MipLevel {
+        let band = BANDS.iter().rposition(|band| band.first <= level).unwrap_or(0);
+        let mips = self.bands[band].get_or_init(|| self.paint(band));
+        &mips[level - BANDS[band].first]
+    }
+
+    /// Paints the levels of a band.
+    fn paint(&self, band: usize) -> Vec<MipLevel> {
+        let MipBand { first, painted } = BANDS[band];
+        let grid = TexelGrid {
+            texel: self.texel * (1_u32 << painted) as f32,
+            size: self.size.map(|n| n.div_ceil(1 << painted)),
         };
-        let mut size = self.size;
-        let mut mips = vec![MipLevel::new(&texels, size)];
-        while size[0].max(size[1]) > 1 {
-            (texels, size) = halve(&texels, size);
-            mips.push(MipLevel::new(&texels, size));
+        let mut texels = match &self.source {
+            ChartSource::Flat(visual) => self.paint_flat(visual, &grid),
+            ChartSource::Curved { material, triangles } => self.paint_curved(material, triangles, &grid),
+        };
+        let last = BANDS.get(band + 1).map_or(self.coarsest_level(), |next| next.first - 1);
+        let (mut size, mut mips) = (grid.size, Vec::new());
+        for level in painted..=last.min(self.coarsest_level()) {
+            if level > painted {
+                (texels, size) = halve(&texels, size);
+            }
+            if level >= first {
+                mips.push(MipLevel::new(&texels, size));
+            }
         }
         mips
     }
 
-    fn paint_curved(&self, material: &SurfaceMaterial, triangles: &[[ChartVertex; 3]]) -> Vec<Texel> {
-        let mut points: Vec<Option<SurfacePoint>> = vec![None; self.size[0] * self.size[1]];
+    fn paint_flat(
+        &self,
+        visual: &Visual,
+        &TexelGrid { texel, size: [width, height] }: &TexelGrid,
+    ) -> Vec<Texel> {
+        let point = |i: usize| {
+            let [x, y] = [(i % width) as f32 + 0.5, (i / width) as f32 + 0.5];
+            PatternPoint { p: self.origin + (self.u * x + self.v * y) * texel, n: self.n }
+        };
+        let mut texels = vec![Texel::default(); width * height];
+        for (block, some) in texels.chunks_mut(LANES).enumerate() {
+            let at: Vec<PatternPoint> = (0..some.len()).map(|lane| point(LANES * block + lane)).collect();
+            sample_visual(visual, &PatternPoints::new(&at), texel, |lane, sample| {
+                some[lane] = texel_of(&sample.material);
+            });
+        }
+        texels
+    }
+
+    fn paint_curved(
+        &self,
+        material: &SurfaceMaterial,
+        triangles: &[[ChartVertex; 3]],
+        &TexelGrid { texel, size }: &TexelGrid,
+    ) -> Vec<Texel> {
+        let mut points: Vec<Option<SurfacePoint>> = vec![None; size[0] * size[1]];
+        let scale = self.texel / texel;
         for corners in triangles {
-            project_triangle(corners, corners.map(|c| self.uv(&c.position)), self.size, &mut points);
+            let uvs = corners.map(|c| self.uv(&c.position).map(|x| x * scale));
+            project_triangle(corners, uvs, size, &mut points);
         }
         let SurfaceMaterial { shape, visuals } = material;
         // The painted texels of each material.
@@ -283,13 +328,21 @@ impl TextureChart {
             for some in painted.chunks(LANES) {
                 let at: Vec<PatternPoint> = some.iter().map(|texel| texel.point).collect();
                 let visual = visuals.get(id).unwrap_or(&default);
-                sample_visual(visual, &PatternPoints::new(&at), self.texel, |lane, sample| {
+                sample_visual(visual, &PatternPoints::new(&at), texel, |lane, sample| {
                     texels[some[lane].index] = Some(texel_of(&sample.material));
                 });
             }
         }
-        fill_gaps(texels, self.size)
+        fill_gaps(texels, size)
     }
+}
+
+/// The texels of a level of a chart.
+struct TexelGrid {
+    /// Edge of a texel, m.
+    texel: f32,
+    /// Width and height, texels.
+    size: [usize; 2],
 }
 
 /// A texel that shows a surface, and the point that it shows.
@@ -312,6 +365,44 @@ struct SurfacePoint {
     inset: f32,
 }
 
+/// Twice the signed area of a triangle.
+fn twice_area([a, b, c]: [[f32; 2]; 3]) -> f32 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+}
+
+/// The point of a triangle nearest to another point, as barycentric coordinates.
+struct NearestPoint {
+    weights: [f32; 3],
+    /// Distance of the other point from the border of the triangle, positive inside.
+    inset: f32,
+}
+
+impl NearestPoint {
+    fn of_triangle(corners: [[f32; 2]; 3], p: [f32; 2]) -> Self {
+        let area = twice_area(corners);
+        let edge = |i: usize| [corners[(i + 1) % 3], corners[(i + 2) % 3]];
+        let weights = [0, 1, 2].map(|i| twice_area([edge(i)[0], edge(i)[1], p]) / area);
+        if weights.iter().all(|w| *w >= 0.0) {
+            let height = |i: usize| {
+                let [a, b] = edge(i);
+                weights[i] * area / (b[0] - a[0]).hypot(b[1] - a[1])
+            };
+            return Self { weights, inset: height(0).min(height(1)).min(height(2)) };
+        }
+        let on_edge = |i: usize| {
+            let [a, b] = edge(i);
+            let (along, away) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
+            let length2 = along[0] * along[0] + along[1] * along[1];
+            let t = ((away[0] * along[0] + away[1] * along[1]) / length2).clamp(0.0, 1.0);
+            let mut weights = [0.0; 3];
+            (weights[(i + 1) % 3], weights[(i + 2) % 3]) = (1.0 - t, t);
+            Self { weights, inset: -(away[0] - t * along[0]).hypot(away[1] - t * along[1]) }
+        };
+        let nearer = |a: Self, b: Self| if b.inset > a.inset { b } else { a };
+        nearer(nearer(on_edge(0), on_edge(1)), on_edge(2))
+    }
+}
+
 /// Enters the points of a triangle at the texels that it covers or nearly covers. Of several points, a texel keeps
 /// the one with the greatest inset.
 fn project_triangle(
@@ -320,10 +411,7 @@ fn project_triangle(
     size: [usize; 2],
     points: &mut [Option<SurfacePoint>],
 ) {
-    let cross =
-        |a: [f32; 2], b: [f32; 2], p: [f32; 2]| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
-    let area = cross(uvs[0], uvs[1], uvs[2]);
-    if area <= 0.0 {
+    if twice_area(uvs) <= 0.0 {
         return;
     }
     let range = |axis: usize| {
@@ -334,21 +422,17 @@ fn project_triangle(
     for y in range(1) {
         for x in range(0) {
             let p = [x as f32 + 0.5, y as f32 + 0.5];
-            let mut inset = f32::MAX;
-            let barycentric: [f32; 3] = std::array::from_fn(|i| {
-                let (a, b) = (uvs[(i + 1) % 3], uvs[(i + 2) % 3]);
-                let area = cross(a, b, p);
-                inset = inset.min(area / (b[0] - a[0]).hypot(b[1] - a[1]));
-                area
-            });
+            let NearestPoint { weights: [a, b, c], inset } = NearestPoint::of_triangle(uvs, p);
             let known = &mut points[y * size[0] + x];
             if inset > -PAINT_MARGIN && known.as_ref().is_none_or(|known| known.inset < inset) {
-                let weights = barycentric.map(|w| w.max(0.0));
-                let sum: f32 = weights.iter().sum();
-                let interpolate =
-                    |of: [V3; 3]| (of[0] * weights[0] + of[1] * weights[1] + of[2] * weights[2]) / sum;
+                let interpolate = |of: [V3; 3]| of[0] * a + of[1] * b + of[2] * c;
+                let chord = interpolate(corners.map(|c| c.position));
+                // The mean of a triangle and of the tangent planes at its corners follows a curved surface to second order
+                // (compare Boubekeur & Alexa, Phong Tessellation, SIGGRAPH Asia 2008).
+                let tangent =
+                    interpolate(corners.map(|c| chord + c.normal * c.normal.dot(&(c.position - chord))));
                 *known = Some(SurfacePoint {
-                    position: interpolate(corners.map(|c| c.position)),
+                    position: (chord + tangent) * 0.5,
                     normal: interpolate(corners.map(|c| c.normal)),
                     inset,
                 });

@@ -84,14 +84,33 @@ impl<'a> TriangleInterpolator<'a> {
         samples
     }
 
-    /// Appends the point where the ray through (x, y) meets the triangle, or the nearest point of the triangle.
-    pub(crate) fn push(&self, batch: &mut ShadingBatch<'a>, lens: &Lens, x: f32, y: f32) {
+    /// Barycentric coordinates of the point of the triangle that appears nearest to (x, y).
+    fn nearest_weights(&self, lens: &Lens, x: f32, y: f32) -> [f32; 3] {
         let ray = lens.ray(x, y);
-        let weights = self.barycentric.map(|b| b.dot(&ray));
+        let mut weights = self.barycentric.map(|b| b.dot(&ray));
+        let sign = (weights[0] + weights[1] + weights[2]).signum();
+        if weights.iter().any(|w| w * sign < 0.0) {
+            // In the image, a weight is linear: it vanishes on an edge, and its gradient is normal to that edge.
+            let axes: [Vec3; 2] = [lens.right.cast(), lens.down.cast()];
+            let gradients = self.barycentric.map(|b| axes.map(|axis| b.dot(&axis)));
+            let distance =
+                |i: usize| -weights[i] * sign / gradients[i][0].hypot(gradients[i][1]).max(f64::MIN_POSITIVE);
+            let edge = (1..3).fold(0, |most, i| if distance(i) > distance(most) { i } else { most });
+            let [gx, gy] = gradients[edge];
+            let step = weights[edge] / (gx * gx + gy * gy).max(f64::MIN_POSITIVE);
+            let on_edge = ray - (axes[0] * gx + axes[1] * gy) * step;
+            weights = self.barycentric.map(|b| b.dot(&on_edge));
+            weights[edge] = 0.0;
+        }
         let sum = weights[0] + weights[1] + weights[2];
         let w = if sum == 0.0 { [1.0 / 3.0; 3] } else { weights.map(|w| (w / sum).max(0.0) as f32) };
         let scale = 1.0 / (w[0] + w[1] + w[2]);
-        let w = w.map(|w| w * scale);
+        w.map(|w| w * scale)
+    }
+
+    /// Appends the point where the ray through (x, y) meets the triangle, or the point of the triangle that appears nearest.
+    pub(crate) fn push(&self, batch: &mut ShadingBatch<'a>, lens: &Lens, x: f32, y: f32) {
+        let w = self.nearest_weights(lens, x, y);
         let ([a, b, c], lane) = (&self.corners, batch.count);
         for (i, values) in batch.attributes.iter_mut().enumerate() {
             values[lane] = a[i] * w[0] + b[i] * w[1] + c[i] * w[2];

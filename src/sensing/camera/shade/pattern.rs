@@ -4,7 +4,7 @@
 
 use wide::{bytemuck::cast, i32x8, u32x8};
 
-use crate::camera::math::{LANES, V3, Vec3x8, f32x8};
+use crate::camera::math::{LANES, V3, Vec3x8, f32x8, sum_lanes};
 use softvt_geometry::Vec3;
 use softvt_scene::{Mask, TextDecal, Visual};
 
@@ -57,6 +57,15 @@ impl PatternPoints {
         Self { p: lanes(|point| point.p), n: lanes(|point| point.n), count: points.len() }
     }
 
+    /// A ball around the points, about their mean; lanes that are not used count as well.
+    fn bounding_ball(&self) -> BoundingBall {
+        let share = f32x8::splat(1.0 / LANES as f32);
+        let centre = V3::from([self.p.x, self.p.y, self.p.z].map(|x| sum_lanes(x * share)));
+        let away = self.p - Vec3x8::splat(&centre);
+        let radius2 = away.dot(away).to_array().into_iter().fold(0.0, f32::max);
+        BoundingBall { centre, radius: radius2.sqrt() }
+    }
+
     /// The value of a function of position and normal in each lane.
     fn each(&self, value: impl Fn(&V3, &V3) -> f32) -> f32x8 {
         let (p, n) = (self.p.to_arrays(), self.n.to_arrays());
@@ -68,6 +77,15 @@ impl PatternPoints {
         f32x8::new(values)
     }
 }
+
+/// A ball around points.
+struct BoundingBall {
+    centre: V3,
+    radius: f32,
+}
+
+/// Margin for the errors of first-order distances, which can exceed true ones.
+const DISTANCE_MARGIN: f32 = 2.0;
 
 /// Depth below the surface at which patterns are evaluated, m: a face on the border of a pattern shows the inner side.
 const SAMPLE_DEPTH: f32 = 2e-5;
@@ -190,7 +208,14 @@ fn mask_value(mask: &Mask, at: &PatternPoints, spacing: f32) -> f32x8 {
         }
         Mask::Inside { shape, soft_m } => {
             let width = (*soft_m as f32).max(spacing).max(1e-6);
-            smoothstep(f32x8::HALF - at.each(|p, _| shape.distance(&p.cast()) as f32) / f32x8::splat(width))
+            let distance = |p: &V3| shape.distance(&p.cast()) as f32;
+            let ball = at.bounding_ball();
+            let from_centre = distance(&ball.centre);
+            // Far from the border all points are inside or all outside.
+            if from_centre.abs() > DISTANCE_MARGIN * (ball.radius + 0.5 * width) {
+                return f32x8::splat(if from_centre < 0.0 { 1.0 } else { 0.0 });
+            }
+            smoothstep(f32x8::HALF - at.each(|p, _| distance(p)) / f32x8::splat(width))
         }
         Mask::Text { decal } => at.each(|p, n| text_coverage(decal, p, n, spacing)),
         Mask::Inverse { mask } => f32x8::ONE - mask_value(mask, at, spacing),
