@@ -18,6 +18,7 @@ pub mod import;
 mod limits;
 mod observer;
 mod policy;
+pub mod rates;
 mod record;
 mod recorded_runs;
 pub mod recording;

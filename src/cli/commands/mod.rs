@@ -2,6 +2,7 @@
 //!
 //! The doc comments of the structs and fields of arguments are the help text that `--help` prints.
 
+mod bench;
 mod check;
 mod dataset;
 mod doctor;
@@ -37,6 +38,7 @@ pub(crate) enum Command {
     Dataset(dataset::DatasetCommand),
     List(list::ListArgs),
     Init(init::InitArgs),
+    Bench(bench::BenchArgs),
     /// Check the installation and run a golden episode
     Doctor,
 }
@@ -56,6 +58,7 @@ impl Command {
             Self::Dataset(command) => dataset::run(command),
             Self::List(args) => list::run(&args),
             Self::Init(args) => init::run(&args),
+            Self::Bench(args) => bench::run(&args),
             Self::Doctor => doctor::run(),
         }
     }

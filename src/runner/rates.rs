@@ -1,0 +1,185 @@
+//! Rates: how many observations this machine makes per second.
+//!
+//! The expert of a suite solves its first task again and again, without sensor streams and with them. Rates count control steps
+//! from the first action to the last; the scene settles and its appearance is made before.
+
+use std::time::Instant;
+
+use cpu_time::ThreadTime;
+use serde::{Deserialize, Serialize};
+
+use super::{config::RunConfig, error::RunError};
+use softvt_benchmark::{CONTROL_HZ, Plan};
+use softvt_common::episode_id::{EpisodeId, Split};
+use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
+use softvt_rollout::{AssetCache, Controller, Episode, EpisodeSpec, SensorAssets, Simulation};
+use softvt_script::{EpisodeSetup, ExpertController, GripMode, LoadedScript, SceneChanges};
+
+/// The suite whose first task is run.
+pub const RATED_SUITE: &str = "suites/spatial_soft.lua";
+
+/// What an observation holds, in the order of [`MachineRates::streams`].
+const STREAMS: [&str; 4] = ["state", "state, cameras", "state, touch", "all streams"];
+
+/// Rates of one machine.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct MachineRates {
+    /// Version of softvt.
+    pub softvt: String,
+    /// Processor, as the system names it.
+    pub machine: String,
+    /// CPU time from nothing to the first observation with all streams, s.
+    pub first_observation_s: f64,
+    /// Rates on one thread.
+    pub streams: Vec<StreamRate>,
+    /// Number of threads that run episodes at the same time.
+    pub threads: usize,
+    /// Observations per second (wall time) with all streams, of all threads together.
+    pub observations_per_s: f64,
+}
+
+/// Rate of observations with some of the streams, on one thread.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct StreamRate {
+    /// What an observation holds.
+    pub streams: String,
+    /// Observations per second of CPU time.
+    pub observations_per_s: f64,
+}
+
+impl StreamRate {
+    /// Simulated time per CPU time.
+    pub fn times_real_time(&self) -> f64 {
+        self.observations_per_s / f64::from(CONTROL_HZ)
+    }
+}
+
+/// Measures the rates of this machine with up to `threads` episodes at a time. `on_stage` is told what is measured next.
+///
+/// # Errors
+/// The suite cannot be loaded or run, e.g. because a file of the working folder replaces one of it.
+pub fn measure(threads: usize, mut on_stage: impl FnMut(&str)) -> Result<MachineRates, RunError> {
+    let loaded = RunConfig::of(RATED_SUITE).load()?.script;
+    let caches = Caches::default();
+    on_stage("the first observation");
+    let first = time_episode(&loaded, &streams_of(STREAMS.len() - 1), &caches)?;
+    let mut streams = Vec::new();
+    for (index, name) in STREAMS.into_iter().enumerate() {
+        on_stage(name);
+        let timing = time_episode(&loaded, &streams_of(index), &caches)?;
+        streams
+            .push(StreamRate { streams: name.to_owned(), observations_per_s: timing.steps / timing.cpu_s });
+    }
+    on_stage("all threads");
+    let together: Vec<Result<EpisodeTiming, RunError>> = std::thread::scope(|scope| {
+        let run = || time_episode(&loaded, &streams_of(STREAMS.len() - 1), &caches);
+        let running: Vec<_> = (0..threads).map(|_| scope.spawn(run)).collect();
+        running
+            .into_iter()
+            .map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+            .collect()
+    });
+    let mut observations_per_s = 0.0;
+    for timing in together {
+        let timing = timing?;
+        observations_per_s += timing.steps / timing.wall_s;
+    }
+    Ok(MachineRates {
+        softvt: env!("CARGO_PKG_VERSION").to_owned(),
+        machine: processor(),
+        first_observation_s: first.until_action_s,
+        streams,
+        threads,
+        observations_per_s,
+    })
+}
+
+/// The streams of a row of [`STREAMS`].
+fn streams_of(row: usize) -> SensorStreams {
+    let cameras = ["third_person", "wrist"].map(str::to_owned).into();
+    match row {
+        0 => SensorStreams::default(),
+        1 => SensorStreams { cameras, ..SensorStreams::default() },
+        2 => SensorStreams { tactile: true, ..SensorStreams::default() },
+        _ => SensorStreams { cameras, tactile: true, force: true, ..SensorStreams::default() },
+    }
+}
+
+/// Caches shared by all episodes.
+#[derive(Default)]
+struct Caches {
+    assets: AssetCache,
+    sensors: SensorAssets,
+}
+
+/// Duration of an episode.
+struct EpisodeTiming {
+    /// Control steps.
+    steps: f64,
+    /// CPU time before the first action, s.
+    until_action_s: f64,
+    /// CPU time of this thread from the first action on, s.
+    cpu_s: f64,
+    /// Wall time from the first action on, s.
+    wall_s: f64,
+}
+
+/// An expert with sensor streams that it ignores, and the times of its first action.
+struct ObservedExpert {
+    expert: ExpertController,
+    streams: SensorStreams,
+    first_action: Option<FirstAction>,
+}
+
+struct FirstAction {
+    cpu: ThreadTime,
+    wall: Instant,
+}
+
+impl Controller for ObservedExpert {
+    fn streams(&self) -> SensorStreams {
+        self.streams.clone()
+    }
+
+    fn act(&mut self, sim: &Simulation, seen: &Observation) -> Result<Option<Action>, PolicyError> {
+        self.first_action.get_or_insert_with(|| FirstAction { cpu: ThreadTime::now(), wall: Instant::now() });
+        self.expert.act(sim, seen)
+    }
+}
+
+fn time_episode(
+    loaded: &LoadedScript,
+    streams: &SensorStreams,
+    caches: &Caches,
+) -> Result<EpisodeTiming, RunError> {
+    let begin = ThreadTime::now();
+    let Plan::Suite(suite) = &loaded.plan else {
+        return Err(RunError::input(format!("{RATED_SUITE} is not a suite")));
+    };
+    let id =
+        EpisodeId { suite: suite.name.clone(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };
+    let opened = EpisodeSetup::open(loaded, &id, &SceneChanges::default()).map_err(RunError::input)?;
+    let (task, settings) = (&suite.tasks[0], &suite.settings);
+    let spec = EpisodeSpec::new(id, "expert", task, &opened.nominal, opened.scene.clone(), settings);
+    let expert =
+        opened.expert(GripMode::Commanded).ok_or_else(|| RunError::input("the suite has no expert"))?;
+    let mut controller = ObservedExpert { expert, streams: streams.clone(), first_action: None };
+    let episode = Episode::start(spec, &caches.assets, &caches.sensors).map_err(RunError::input)?;
+    let record = episode.run(&mut controller).map_err(RunError::input)?.record;
+    let first = controller.first_action.ok_or_else(|| RunError::input("the expert never acted"))?;
+    let cpu_s = first.cpu.elapsed().as_secs_f64();
+    Ok(EpisodeTiming {
+        steps: record.stats.time_s * f64::from(CONTROL_HZ),
+        until_action_s: begin.elapsed().as_secs_f64() - cpu_s,
+        cpu_s,
+        wall_s: first.wall.elapsed().as_secs_f64(),
+    })
+}
+
+/// Name of the processor; without one, the architecture and the system.
+fn processor() -> String {
+    let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let name = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
+    let unknown = || format!("{} {}", std::env::consts::ARCH, std::env::consts::OS);
+    name.map_or_else(unknown, |(_, name)| name.trim().to_owned())
+}
