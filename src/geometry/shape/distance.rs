@@ -51,6 +51,12 @@ impl Shape {
         (distance, normal)
     }
 
+    /// A point near the surface, moved onto it by one Newton step along the gradient.
+    pub fn nearest_to_first_order(&self, p_o: &Vec3) -> Vec3 {
+        let SignedDistance { distance, normal } = self.first_order(p_o);
+        p_o - normal * distance
+    }
+
     /// Distance (m) along the unit vector `direction_o` from `origin_o` to the first surface point, if it is at most
     /// `max` m. A ray that starts inside hits at 0.
     ///

@@ -19,8 +19,8 @@ use softvt_scene::Visual;
 const CREASE_COSINE: f32 = 0.8;
 /// Maximum length of the edges of a coarse level with a pattern, pixels.
 const MAX_EDGE_PIXELS: f32 = 1.7;
-/// Maximum geometric error of a coarse level of uniform material, pixels.
-const MAX_ERROR_PIXELS: f32 = 0.2;
+/// Maximum geometric error of a coarse level that is uniform or textured, pixels.
+const MAX_ERROR_PIXELS: f32 = 0.25;
 /// Reach of ambient occlusion by the object itself, in longest extents of the object.
 const OCCLUSION_REACH: f64 = 0.12;
 
@@ -52,7 +52,7 @@ pub(crate) struct Lod {
     pub(crate) vertex_spacing: f32,
     /// True if the material is the same everywhere, or textured.
     pub(crate) is_uniform: bool,
-    /// Root mean square distance from the exact shape, m.
+    /// Distance from the exact shape that few triangles exceed, m.
     pub(crate) geometric_error: f32,
 }
 

@@ -34,6 +34,9 @@ const LOD_ERRORS: [f32; 3] = [1e-4, 2.5e-4, 5e-4];
 const UNIFORM_SPACING: f64 = 0.16;
 /// Minimum cell that counts for it, m: meshes given explicitly are fine enough for any view.
 const MIN_CELL: f64 = 2e-3;
+/// Share of triangles that may be farther from the surface than the geometric error of their level: a groove, which takes
+/// little of the surface, counts.
+const ERROR_SHARE: f64 = 0.02;
 /// Vertices deeper than this inside another solid are invisible, m.
 const HIDDEN_DEPTH: f64 = 1.5e-3;
 
@@ -99,7 +102,7 @@ impl RenderMesh {
             let mut lod = bake_vertices(&mesh, &material_ids, &baked, cell as f32, Some(shape));
             if !lods.is_empty() && (lod.is_uniform || is_textured) {
                 // Coarse levels lack the relief.
-                lod.geometric_error = rms_error(&mesh, shape, cell).max(relief as f32);
+                lod.geometric_error = geometric_error(&mesh, shape, cell).max(relief as f32);
             }
             if is_rigid {
                 lod = simplify(&lod, SIMPLIFY_TOLERANCE * lod.vertex_spacing);
@@ -291,10 +294,12 @@ fn subdivide(mesh: &mut Mesh, max_edge: f64) -> f64 {
     }
 }
 
-/// Root mean square distance of the centroids of triangles from the surface of `shape`, m. Centroids deeper than
-/// `cell` are ignored: they are hidden by another part of the shape.
-fn rms_error(mesh: &Mesh, shape: &Shape, cell: f64) -> f32 {
-    let distances = mesh.triangles.iter().map(|t| shape.distance(&centroid(mesh, t)));
-    let squares: f64 = distances.filter(|d| d.abs() < cell).map(|d| d * d).sum();
-    (squares / mesh.triangles.len().max(1) as f64).sqrt() as f32
+/// Distance from the surface of `shape` that a few of the centroids of triangles exceed ([`ERROR_SHARE`]), m. Centroids deeper
+/// than `cell` are ignored: they are hidden by another part of the shape.
+fn geometric_error(mesh: &Mesh, shape: &Shape, cell: f64) -> f32 {
+    let distances = mesh.triangles.iter().map(|t| shape.distance(&centroid(mesh, t)).abs());
+    let mut seen: Vec<f64> = distances.filter(|d| *d < cell).collect();
+    seen.sort_unstable_by(f64::total_cmp);
+    let rank = ((1.0 - ERROR_SHARE) * seen.len() as f64) as usize;
+    seen.get(rank).copied().unwrap_or(0.0) as f32
 }

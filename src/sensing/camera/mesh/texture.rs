@@ -317,7 +317,9 @@ impl TextureChart {
         let mut shown: BTreeMap<usize, Vec<PaintedTexel>> = BTreeMap::new();
         for (index, point) in points.iter().enumerate() {
             let Some(SurfacePoint { position, normal, .. }) = point else { continue };
-            let id = if visuals.len() > 1 { shape.material(&position.cast()) as usize } else { 0 };
+            // Paint follows the surface, which triangles cut short.
+            let on_surface = || shape.nearest_to_first_order(&position.cast());
+            let id = if visuals.len() > 1 { shape.material(&on_surface()) as usize } else { 0 };
             let n = normal.try_normalize(0.0).unwrap_or_else(V3::z);
             let point = PatternPoint { p: *position, n };
             shown.entry(id).or_default().push(PaintedTexel { index, point });
