@@ -74,7 +74,7 @@ struct MipBand {
 }
 
 const BANDS: [MipBand; 3] =
-    [MipBand { first: 0, painted: 0 }, MipBand { first: 2, painted: 1 }, MipBand { first: 4, painted: 3 }];
+    [MipBand { first: 0, painted: 0 }, MipBand { first: 3, painted: 1 }, MipBand { first: 5, painted: 3 }];
 
 /// Source of a texture.
 #[derive(Clone, Debug)]
