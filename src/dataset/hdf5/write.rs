@@ -13,7 +13,7 @@ use softvt_records::record::EpisodeRecord;
 /// Largest chunk of numbers, bytes. Readers of one step decompress a whole chunk.
 const MAX_CHUNK_BYTES: usize = 1 << 18;
 /// Compression level (zlib): higher levels double the time for images and save a few percent.
-const COMPRESSION_LEVEL: u32 = 1;
+const COMPRESSION_LEVEL: u32 = 4;
 
 /// Length of a dataset and of its chunks, in steps.
 #[derive(Clone, Copy)]
