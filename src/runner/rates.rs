@@ -15,9 +15,6 @@ use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
 use softvt_rollout::{AssetCache, Controller, Episode, EpisodeSpec, SensorAssets, Simulation};
 use softvt_script::{EpisodeSetup, ExpertController, GripMode, LoadedScript, SceneChanges};
 
-/// The suite whose first task is run.
-pub const RATED_SUITE: &str = "suites/spatial_soft.lua";
-
 /// What an observation holds, in the order of [`MachineRates::streams`].
 const STREAMS: [&str; 4] = ["state", "state, cameras", "state, touch", "all streams"];
 
@@ -26,6 +23,8 @@ const STREAMS: [&str; 4] = ["state", "state, cameras", "state, touch", "all stre
 pub struct MachineRates {
     /// Version of softvt.
     pub softvt: String,
+    /// Suite whose first task is run.
+    pub script: String,
     /// Processor, as the system names it.
     pub machine: String,
     /// CPU time from nothing to the first observation with all streams, s.
@@ -54,12 +53,16 @@ impl StreamRate {
     }
 }
 
-/// Measures the rates of this machine with up to `threads` episodes at a time. `on_stage` is told what is measured next.
+/// Measures the rates of this machine in the suite `script`, with up to `threads` episodes at a time. `on_stage` is told what is measured next.
 ///
 /// # Errors
 /// The suite cannot be loaded or run, e.g. because a file of the working folder replaces one of it.
-pub fn measure(threads: usize, mut on_stage: impl FnMut(&str)) -> Result<MachineRates, RunError> {
-    let loaded = RunConfig::of(RATED_SUITE).load()?.script;
+pub fn measure(
+    script: &str,
+    threads: usize,
+    mut on_stage: impl FnMut(&str),
+) -> Result<MachineRates, RunError> {
+    let loaded = RunConfig::of(script).load()?.script;
     let caches = Caches::default();
     on_stage("the first observation");
     let first = time_episode(&loaded, &streams_of(STREAMS.len() - 1), &caches)?;
@@ -86,6 +89,7 @@ pub fn measure(threads: usize, mut on_stage: impl FnMut(&str)) -> Result<Machine
     }
     Ok(MachineRates {
         softvt: env!("CARGO_PKG_VERSION").to_owned(),
+        script: script.to_owned(),
         machine: processor(),
         first_observation_s: first.until_action_s,
         streams,
@@ -154,7 +158,7 @@ fn time_episode(
 ) -> Result<EpisodeTiming, RunError> {
     let begin = ThreadTime::now();
     let Plan::Suite(suite) = &loaded.plan else {
-        return Err(RunError::input(format!("{RATED_SUITE} is not a suite")));
+        return Err(RunError::input("the script is not a suite"));
     };
     let id =
         EpisodeId { suite: suite.name.clone(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };

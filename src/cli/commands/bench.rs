@@ -28,30 +28,26 @@ pub(crate) struct BenchArgs {
 /// Measures and prints the rates.
 ///
 /// # Errors
-/// The suite cannot be run, or the file not written.
+/// The suite cannot be run, or the file cannot be written.
 pub(super) fn run(args: &BenchArgs) -> Result<(), CliError> {
-    let published: Option<MachineRates> =
-        softvt_script::embedded("assets/rates.json").map(serde_json::from_slice).transpose()?;
-    let rates =
-        rates::measure(thread_count(args.threads), |stage| eprint_notice(format!("measuring: {stage}")))?;
+    let published = softvt_script::embedded("assets/rates.json")
+        .ok_or_else(|| CliError::input("this build has no assets/rates.json, which names the suite"))?;
+    let published: MachineRates = serde_json::from_slice(published)?;
+    let on_stage = |stage: &str| eprint_notice(format!("measuring: {stage}"));
+    let rates = rates::measure(&published.script, thread_count(args.threads), on_stage)?;
     if let Some(path) = &args.out {
         replace(path, [serde_json::to_string_pretty(&rates)?.as_bytes(), b"\n"].concat())?;
     }
-    print(&table(&rates, published.as_ref()))
+    print(&table(&rates, &published))
 }
 
 /// The rates, one column for each machine.
-fn table(here: &MachineRates, published: Option<&MachineRates>) -> String {
-    let machines: Vec<&MachineRates> = std::iter::once(here).chain(published).collect();
+fn table(here: &MachineRates, published: &MachineRates) -> String {
     let row = |name: &str, value: &dyn Fn(&MachineRates) -> String| {
-        std::iter::once(name.to_owned()).chain(machines.iter().map(|rates| value(rates))).collect::<Vec<_>>()
+        vec![name.to_owned(), value(here), value(published)]
     };
     let mut rows = vec![
-        std::iter::once("")
-            .chain(["here", "published"])
-            .take(machines.len() + 1)
-            .map(str::to_owned)
-            .collect(),
+        ["", "here", "published"].map(str::to_owned).to_vec(),
         row("CPU s to the first observation", &|rates| format!("{:.2}", rates.first_observation_s)),
     ];
     for (index, of_streams) in here.streams.iter().enumerate() {
@@ -65,14 +61,37 @@ fn table(here: &MachineRates, published: Option<&MachineRates>) -> String {
     let machine =
         |rates: &MachineRates| format!("{:.0} ({} threads)", rates.observations_per_s, rates.threads);
     rows.push(row("all streams, machine", &machine));
-    let names = machines
-        .iter()
-        .zip(["here", "published"])
-        .map(|(rates, which)| format!("{which}: softvt {}, {}\n", rates.softvt, rates.machine));
+    let names = [("here", here), ("published", published)]
+        .map(|(which, rates)| format!("{which}: softvt {}, {}\n", rates.softvt, rates.machine));
     format!(
         "Observations per second, and the multiple of real time, in {} task 0\n\n{}\n{}",
-        rates::RATED_SUITE,
+        here.script,
         text_columns(&rows, |column| column > 0),
-        names.collect::<String>()
+        names.concat()
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use softvt_runner::rates::StreamRate;
+
+    #[test]
+    fn a_table_has_the_rates_of_both_machines_and_the_multiples_of_real_time() {
+        let rates = |machine: &str, observations_per_s: f64| MachineRates {
+            softvt: "0.1.0".to_owned(),
+            script: "suites/some.lua".to_owned(),
+            machine: machine.to_owned(),
+            first_observation_s: 1.5,
+            streams: vec![StreamRate { streams: "state".to_owned(), observations_per_s }],
+            threads: 4,
+            observations_per_s: 4.0 * observations_per_s,
+        };
+        let text = table(&rates("mine", 30.0), &rates("theirs", 60.0));
+        for expected in
+            ["suites/some.lua", "30 (1.5 ×)", "60 (3.0 ×)", "120 (4 threads)", "here: softvt 0.1.0, mine"]
+        {
+            assert!(text.contains(expected), "{expected} in\n{text}");
+        }
+    }
 }
