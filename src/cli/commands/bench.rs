@@ -58,8 +58,11 @@ fn table(here: &MachineRates, published: &MachineRates) -> String {
         };
         rows.push(row(&format!("{}, one core", of_streams.streams), &value));
     }
-    let machine =
-        |rates: &MachineRates| format!("{:.0} ({} threads)", rates.observations_per_s, rates.threads);
+    let machine = |rates: &MachineRates| {
+        let threads =
+            if rates.threads == 1 { "1 thread".to_owned() } else { format!("{} threads", rates.threads) };
+        format!("{:.0} ({threads})", rates.observations_per_s)
+    };
     rows.push(row("all streams, machine", &machine));
     let names = [("here", here), ("published", published)]
         .map(|(which, rates)| format!("{which}: softvt {}, {}\n", rates.softvt, rates.machine));
