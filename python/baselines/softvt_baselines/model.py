@@ -45,7 +45,7 @@ class Memory(nn.Module):
         if self.has_touch:
             felt = obs["readings"].float()
             present = felt[:, :PRESENT].mean(1, keepdim=True).abs()
-            # A gel that slides and one that is held are told apart by a few per cent.
+            # Readings of a gel that slides and of one that is held differ by a few per cent.
             ratios = felt / torch.maximum(present, LEAST_PRESENT * self.readings_scale)
             parts += [fine(felt, self.readings_scale), 3 * ratios.clamp(-MOST_RATIO, MOST_RATIO)]
         return 0.3 * torch.cat([part.flatten(1) for part in parts], 1)
@@ -62,7 +62,7 @@ class Remembering(nn.Module):
         )
 
     def forward(self, obs: dict[str, Tensor]) -> Tensor:
-        # Half precision would lose the small changes beside the large ones.
+        # Half precision would lose small changes of large values.
         with torch.autocast(obs["states"].device.type, enabled=False):
             return self.net(self.memory(obs)).unflatten(1, (MEMORY_TOKENS, -1))
 

@@ -42,8 +42,8 @@ const HIDDEN_DEPTH: f64 = 1.5e-3;
 
 /// Triangles and materials of one kind of object, shared by all its instances.
 ///
-/// Materials are functions of the object frame. They are evaluated once, into vertices, or into textures for large
-/// flat faces and for surfaces with text, and filtered to the spacing of the samples; small images therefore do not
+/// Materials are functions of the object frame. They are evaluated once, into vertices, or into textures for
+/// surfaces with patterns or several materials, and filtered to the spacing of the samples; small images therefore do not
 /// alias. Coarser levels of detail are drawn where they look the same.
 #[derive(Clone, Debug)]
 pub struct RenderMesh {

@@ -1,9 +1,9 @@
 //! Textures of flat faces and of parts of curved surfaces.
 //!
-//! A chart maps surface points to texels by projection along one direction. Its texture is painted on first use from
-//! the materials of the surface and filtered by a mip map (Williams, Pyramidal Parametrics, 1983).
+//! A chart maps surface points to texels by projection along one direction. The levels of its mip map (Williams, Pyramidal
+//! Parametrics, 1983) are painted on first use from the materials of the surface.
 //!
-//! Flat meshes get one chart per plane. A curved surface with text is divided into connected parts that face mostly
+//! Flat meshes get one chart per plane. A curved surface with patterns is divided into connected parts that face mostly
 //! along one axis; projection along that axis stretches them by less than √3.
 
 use std::{
@@ -62,6 +62,7 @@ pub(crate) struct TextureChart {
     /// Width and height, texels.
     size: [usize; 2],
     source: ChartSource,
+    /// The levels of each of [`BANDS`].
     bands: [OnceLock<Vec<MipLevel>>; BANDS.len()],
 }
 
@@ -75,6 +76,7 @@ struct MipBand {
     painted: usize,
 }
 
+/// Bands from fine to coarse.
 const BANDS: [MipBand; 3] =
     [MipBand { first: 0, painted: 0 }, MipBand { first: 3, painted: 1 }, MipBand { first: 5, painted: 3 }];
 
