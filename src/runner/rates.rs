@@ -10,7 +10,11 @@ use serde::{Deserialize, Serialize};
 
 use super::{config::RunConfig, error::RunError};
 use softvt_benchmark::{CONTROL_HZ, Plan};
-use softvt_common::episode_id::{EpisodeId, Split};
+use softvt_common::{
+    cancel,
+    episode_id::{EpisodeId, Split},
+    parallel,
+};
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
 use softvt_rollout::{AssetCache, Controller, Episode, EpisodeSpec, SensorAssets, Simulation};
 use softvt_script::{EpisodeSetup, ExpertController, GripMode, LoadedScript, SceneChanges};
@@ -74,19 +78,12 @@ pub fn measure(
             .push(StreamRate { streams: name.to_owned(), observations_per_s: timing.steps / timing.cpu_s });
     }
     on_stage("all threads");
-    let together: Vec<Result<EpisodeTiming, RunError>> = std::thread::scope(|scope| {
-        let run = || time_episode(&loaded, &streams_of(STREAMS.len() - 1), &caches);
-        let running: Vec<_> = (0..threads).map(|_| scope.spawn(run)).collect();
-        running
-            .into_iter()
-            .map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-            .collect()
-    });
     let mut observations_per_s = 0.0;
-    for timing in together {
-        let timing = timing?;
+    let run = |_| time_episode(&loaded, &streams_of(STREAMS.len() - 1), &caches);
+    parallel::run(threads, threads, cancel::requested, run, |_, timing| {
         observations_per_s += timing.steps / timing.wall_s;
-    }
+        Ok(())
+    })?;
     Ok(MachineRates {
         softvt: env!("CARGO_PKG_VERSION").to_owned(),
         script: script.to_owned(),

@@ -34,7 +34,7 @@ const MIN_TEXEL: f32 = 0.8e-3;
 const TEXT_TEXEL: f32 = 0.3e-3;
 /// Texels across the finest feature of a pattern.
 const TEXELS_PER_FEATURE: f32 = 8.0;
-/// Minimum number of texels across a chart at the levels that are sampled.
+/// Minimum number of texels across a chart at its coarsest level, if it has as many at the finest.
 const MIN_TEXELS_ACROSS: usize = 4;
 /// Margin in texels painted around triangles: bilinear sampling reads neighbours.
 const PAINT_MARGIN: f32 = 1.5;
@@ -232,7 +232,7 @@ impl TextureChart {
 
     /// Albedo and roughness at texture coordinates `[u, v]`, averaged over about `footprint`, m (trilinear filtering).
     pub(crate) fn sample(&self, [u, v]: [f32x8; 2], footprint: f32x8) -> (Vec3x8, f32x8) {
-        let coarsest = f32x8::splat(self.coarsest_sampled() as f32);
+        let coarsest = f32x8::splat(self.coarsest_level() as f32);
         let texels = footprint * f32x8::splat(1.0 / self.texel);
         let level = approx_log2(texels.fast_max(f32x8::ONE)).fast_max(f32x8::ZERO).fast_min(coarsest);
         let lanes = level.to_array();
@@ -250,14 +250,9 @@ impl TextureChart {
         (Vec3x8 { x: x * x, y: y * y, z: z * z }, roughness)
     }
 
-    /// The coarsest level that is sampled: narrow charts are not blended across until their border tells.
-    fn coarsest_sampled(&self) -> usize {
-        (self.size[0].min(self.size[1]) / MIN_TEXELS_ACROSS).max(1).ilog2() as usize
-    }
-
-    /// The level of one texel.
+    /// The coarsest level: narrow charts are not blended across until their border shows.
     fn coarsest_level(&self) -> usize {
-        self.size[0].max(self.size[1]).next_power_of_two().ilog2() as usize
+        (self.size[0].min(self.size[1]) / MIN_TEXELS_ACROSS).max(1).ilog2() as usize
     }
 
     fn mip(&self, level: usize) -> &MipLevel {
