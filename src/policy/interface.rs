@@ -88,8 +88,8 @@ pub enum ToolMotion {
 /// Command of the gripper in a [`ToolCommand`], as the grip code of a profile reads it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum GripCommand {
-    /// A closure, 0 (open) ..= 1 (closed); clamped by the hand.
-    Closure(f64),
+    /// A target of the hand.
+    Target(GripTarget),
     /// The closure of an answer in the code two-width, see [`WidthLatch`](super::WidthLatch).
     TwoWidth(f64),
     /// Open or closed with the whole effort, with hysteresis, see [`GripSwitch`](super::GripSwitch).
@@ -99,20 +99,12 @@ pub enum GripCommand {
         /// Control steps for which a change is kept whatever is answered.
         hold_steps: u32,
     },
-    /// A grip force, N, at which closing stops; opens below 0.
-    Force(f64),
 }
 
 impl From<Action> for ToolCommand {
     fn from(action: Action) -> Self {
         let Action { position_b, axis_angle_b, grip } = action;
-        Self {
-            motion: ToolMotion::Pose { position_b, axis_angle_b },
-            grip: match grip {
-                GripTarget::Closure(closure) => GripCommand::Closure(closure),
-                GripTarget::Force(force_n) => GripCommand::Force(force_n),
-            },
-        }
+        Self { motion: ToolMotion::Pose { position_b, axis_angle_b }, grip: GripCommand::Target(grip) }
     }
 }
 

@@ -29,13 +29,11 @@ impl CommandResolver {
     /// The action that `command` means in the control step of `observation`.
     pub fn resolve(&mut self, observation: &Observation, command: ToolCommand) -> Action {
         let grip = match command.grip {
-            GripCommand::Closure(closure) => GripTarget::Closure(closure),
+            GripCommand::Target(target) => target,
             GripCommand::TwoWidth(answer) => GripTarget::Closure(self.latch.closure(answer)),
             GripCommand::Latched { closes, hold_steps } => {
                 GripTarget::Closure(self.switch.closure(closes, hold_steps))
             }
-            GripCommand::Force(force) if force < 0.0 => GripTarget::Closure(0.0),
-            GripCommand::Force(force) => GripTarget::Force(force),
         };
         match command.motion {
             ToolMotion::Pose { position_b, axis_angle_b } => {

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{GripCommand, SensorStreams};
-use softvt_robot::Side;
+use softvt_robot::{GripTarget, Side};
 use softvt_sensing::tactile::{HISTORY_LENGTH, MarkerStyle, TactileMosaicLayout};
 
 /// Names of the cameras that every scene has.
@@ -327,9 +327,9 @@ impl GripperValues {
             return GripCommand::Latched { closes, hold_steps };
         }
         match self.code {
-            GripCode::Continuous | GripCode::Binary => GripCommand::Closure(self.closure(value)),
             GripCode::TwoWidth => GripCommand::TwoWidth(self.closure(value)),
-            GripCode::Force => GripCommand::Force(value),
+            GripCode::Force if value >= 0.0 => GripCommand::Target(GripTarget::Force(value)),
+            _ => GripCommand::Target(GripTarget::Closure(self.closure(value))),
         }
     }
 
@@ -543,7 +543,7 @@ mod tests {
         let binary = Profile::named("vision").unwrap().actions.gripper;
         assert_eq!([255.0, -3.0, 0.7].map(|x| binary.closure(x)), [255.0, -3.0, 1.0]);
         assert_eq!(closure.closure(1e300), 1e3);
-        assert_eq!(GripperValues::FORCE.command(9.0), GripCommand::Force(9.0));
+        assert_eq!(GripperValues::FORCE.command(9.0), GripCommand::Target(GripTarget::Force(9.0)));
     }
 
     #[test]
@@ -580,10 +580,10 @@ mod tests {
     fn every_code_reads_its_own_values() {
         let fingers = Profile::named("softvtbench").unwrap().actions.gripper;
         let of = |code, value| fingers.with_code(code).unwrap().command(value);
-        assert_eq!(of(GripCode::Continuous, 0.01), GripCommand::Closure(0.75));
-        assert_eq!(of(GripCode::Binary, 0.01), GripCommand::Closure(1.0));
+        assert_eq!(of(GripCode::Continuous, 0.01), GripCommand::Target(GripTarget::Closure(0.75)));
+        assert_eq!(of(GripCode::Binary, 0.01), GripCommand::Target(GripTarget::Closure(1.0)));
         assert_eq!(of(GripCode::TwoWidth, 0.01), GripCommand::TwoWidth(0.75));
-        assert_eq!(of(GripCode::Force, 4.5), GripCommand::Force(4.5));
+        assert_eq!(of(GripCode::Force, 4.5), GripCommand::Target(GripTarget::Force(4.5)));
         assert_eq!(GripperValues::FORCE.with_code(GripCode::Continuous), None);
     }
 }

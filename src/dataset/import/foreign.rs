@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use softvt_geometry::Pose;
-use softvt_policy::{GripCommand, ToolCommand};
+use softvt_policy::{GripCommand, GripTarget, ToolCommand};
 use softvt_scene::InitialState;
 
 /// Formats that can be imported.
@@ -117,7 +117,7 @@ impl ForeignDemo {
         let stopped =
             self.commands.iter_mut().zip(&self.is_stopped_by_object).filter(|(_, stopped)| **stopped);
         for (command, _) in stopped {
-            command.grip = GripCommand::Closure(1.0);
+            command.grip = GripCommand::Target(GripTarget::Closure(1.0));
         }
     }
 }

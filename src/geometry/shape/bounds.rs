@@ -143,7 +143,15 @@ impl Shape {
             Self::Displace { shape, reliefs } => shape
                 .loose_bounds()
                 .loosened(1.5 * reliefs.iter().map(SurfaceRelief::max_height).sum::<f64>()),
-            _ => self.bounds(),
+            Self::Box { .. }
+            | Self::Sphere { .. }
+            | Self::Ellipsoid { .. }
+            | Self::Capsule { .. }
+            | Self::Cylinder { .. }
+            | Self::Torus { .. }
+            | Self::Prism { .. }
+            | Self::Lathe(_)
+            | Self::Mesh(_) => self.bounds(),
         }
     }
 

@@ -32,7 +32,15 @@ impl Shape {
                     shape.material(p_o)
                 }
             }
-            _ => 0,
+            Self::Box { .. }
+            | Self::Sphere { .. }
+            | Self::Ellipsoid { .. }
+            | Self::Capsule { .. }
+            | Self::Cylinder { .. }
+            | Self::Torus { .. }
+            | Self::Prism { .. }
+            | Self::Lathe(_)
+            | Self::Mesh(_) => 0,
         }
     }
 
@@ -61,7 +69,15 @@ impl Shape {
             Self::Displace { shape, reliefs } => {
                 Self::Displace { shape: arc(shape), reliefs: reliefs.clone() }
             }
-            _ => self.clone(),
+            Self::Box { .. }
+            | Self::Sphere { .. }
+            | Self::Ellipsoid { .. }
+            | Self::Capsule { .. }
+            | Self::Cylinder { .. }
+            | Self::Torus { .. }
+            | Self::Prism { .. }
+            | Self::Lathe(_)
+            | Self::Mesh(_) => self.clone(),
         }
     }
 

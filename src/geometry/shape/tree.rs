@@ -329,7 +329,15 @@ impl Shape {
             Self::Union(parts) | Self::Intersect(parts) | Self::SmoothUnion { parts, .. } => {
                 parts.iter().collect()
             }
-            _ => Vec::new(),
+            Self::Box { .. }
+            | Self::Sphere { .. }
+            | Self::Ellipsoid { .. }
+            | Self::Capsule { .. }
+            | Self::Cylinder { .. }
+            | Self::Torus { .. }
+            | Self::Prism { .. }
+            | Self::Lathe(_)
+            | Self::Mesh(_) => Vec::new(),
         }
     }
 

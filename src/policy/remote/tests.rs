@@ -13,7 +13,7 @@ use tungstenite::{Message, WebSocket, accept};
 
 use super::*;
 use crate::{
-    GripCommand, RobotState,
+    GripCommand, GripTarget, RobotState,
     msgpack::{map, pack},
     profile::{ActionEncoding, GripperValues, InputSource, PoseEncoding, ProfileInput, StatePart},
 };
@@ -114,7 +114,7 @@ fn episode(
         let mut closures = Vec::new();
         for _ in 0..questions {
             match policy.act(&observation())?.commands[0].grip {
-                GripCommand::Closure(closure) => closures.push(closure),
+                GripCommand::Target(GripTarget::Closure(closure)) => closures.push(closure),
                 other => panic!("{other:?}"),
             }
             thread::sleep(pause);
