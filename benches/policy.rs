@@ -18,7 +18,7 @@ use std::{
 use rmpv::Value;
 use softvt::{
     policy::{
-        ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief,
+        ActionChunk, Observation, Policy, PolicyError, SensorStreams, EpisodeBrief,
         profile::Profile,
         remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},
     },
@@ -119,7 +119,7 @@ impl Policy for Timed<'_> {
         self.inner.streams()
     }
 
-    fn reset(&mut self, brief: &TaskBrief) -> Result<(), PolicyError> {
+    fn reset(&mut self, brief: &EpisodeBrief) -> Result<(), PolicyError> {
         self.inner.reset(brief)
     }
 
@@ -149,7 +149,7 @@ fn overheads(profile: &str) -> Vec<f64> {
     let policy = Timed { inner: remote, took: &mut took };
     let mut driver = ChunkedPolicy::new(
         Box::new(policy),
-        TaskBrief { suite, task: 0, prompt, episode: 0, seed: 0, alias: None },
+        EpisodeBrief { suite, task: 0, prompt, episode: 0, seed: 0, alias: None },
         10,
     );
     let started = Episode::start(spec, &AssetCache::default(), &SensorAssets::default()).expect("it starts");

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use softvt::{
-    episode_id::{EpisodeId, Split},
+    episode_id::{EpisodeId, EpisodeSplit},
     geometry::Vec3,
     physics::{BodyId, ContactPartner, LinkId, world::JointDrive},
     robot::tactile::TactileSpec,
@@ -38,7 +38,7 @@ fn scene() -> Scene {
     std::fs::write(&path, SUITE).expect("written");
     let loaded = script::load(&path, &[]).unwrap_or_else(|e| panic!("{e}"));
     let id =
-        EpisodeId { suite: "kitchen".into(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };
+        EpisodeId { suite: "kitchen".into(), task: 0, episode: 0, base_seed: 0, split: EpisodeSplit::Validation };
     EpisodeSetup::open(&loaded, &id, &SceneChanges::default()).unwrap_or_else(|e| panic!("{e}")).scene
 }
 

@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, path::Path, sync::Arc};
 
 use softvt::{
     benchmark::{Goal, GoalKind, Plan},
-    episode_id::{EpisodeId, Split},
+    episode_id::{EpisodeId, EpisodeSplit},
     geometry::{
         Pose, Vec3,
         mass::mass_properties,
@@ -66,7 +66,7 @@ fn suite() -> LoadedScript {
 
 fn scene(loaded: &LoadedScript, task: usize, episode: u32) -> Scene {
     let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
-    let id = EpisodeId { suite: suite.name.clone(), task, episode, base_seed: 0, split: Split::Validation };
+    let id = EpisodeId { suite: suite.name.clone(), task, episode, base_seed: 0, split: EpisodeSplit::Validation };
     EpisodeSetup::open(loaded, &id, &SceneChanges::default()).unwrap_or_else(|e| panic!("{e}")).scene
 }
 

@@ -6,7 +6,7 @@ use std::{path::PathBuf, sync::Arc};
 
 use softvt::{
     benchmark::Plan,
-    episode_id::{EpisodeId, Split},
+    episode_id::{EpisodeId, EpisodeSplit},
     geometry::{Pose, Quat, Vec3, shape::Shape},
     physics::{BodyId, PhysicsParams},
     robot::{RobotSpec, tactile::TactileSpec},
@@ -42,7 +42,7 @@ fn the_first_task_of_spatial_soft_matches_its_reference() {
     let loaded = script::load(&suite, &[]).expect("the suite loads");
     let Plan::Suite(suite) = &loaded.plan else { panic!("it is a suite") };
     let id =
-        EpisodeId { suite: suite.name.clone(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };
+        EpisodeId { suite: suite.name.clone(), task: 0, episode: 0, base_seed: 0, split: EpisodeSplit::Validation };
     let scene = script::EpisodeSetup::open(&loaded, &id, &script::SceneChanges::default())
         .expect("the suite opens")
         .scene;

@@ -5,7 +5,7 @@ use std::{collections::BTreeSet, path::Path};
 
 use softvt::{
     benchmark::{Goal, GoalKind, Plan, ShiftValue, Suite, Task},
-    episode_id::{EpisodeId, Split},
+    episode_id::{EpisodeId, EpisodeSplit},
     geometry::{Pose, Vec3, shape::Shape},
     scene::{Body, Object, Scene, part_poses},
     script::{self, EpisodeSetup, LoadedScript, SceneChanges},
@@ -79,7 +79,7 @@ fn suite(loaded: &LoadedScript) -> &Suite {
     suite
 }
 
-fn open(loaded: &LoadedScript, task: usize, episode: u32, split: Split) -> Scene {
+fn open(loaded: &LoadedScript, task: usize, episode: u32, split: EpisodeSplit) -> Scene {
     let suite = suite(loaded).name.clone();
     let id = EpisodeId { suite, task, episode, base_seed: 0, split };
     EpisodeSetup::open(loaded, &id, &SceneChanges::default()).unwrap_or_else(|e| panic!("{e}")).scene
@@ -110,7 +110,7 @@ fn prompts_are_those_of_the_paper_and_match_the_goals() {
                 format!("on the {target}")
             };
             assert!(task.prompt.ends_with(&place), "{name} {k}: {target}");
-            let scene = open(&loaded, k, 0, Split::Validation);
+            let scene = open(&loaded, k, 0, EpisodeSplit::Validation);
             let soft = matches!(object(&scene, what).asset.body, Body::Soft(_));
             assert_eq!(soft, name.ends_with("soft"), "{name} {k}");
             assert_ne!(object(&scene, target).asset.body, Body::Static, "{name} {k}: the target can move");
@@ -144,7 +144,7 @@ fn object_suites_have_the_distractors_of_libero() {
     let (rigid, soft) = (load("object_rigid"), load("object_soft"));
     for (k, [target, distractors @ ..]) in GROCERIES.iter().enumerate() {
         for (loaded, target) in [(&rigid, *target), (&soft, &suite(&soft).tasks[k].goal.object)] {
-            let scene = open(loaded, k, 0, Split::Validation);
+            let scene = open(loaded, k, 0, EpisodeSplit::Validation);
             let found: BTreeSet<&str> = colliding_objects(&scene).map(|o| o.asset.name.as_str()).collect();
             let expected: BTreeSet<&str> = distractors.iter().copied().chain([target, "basket"]).collect();
             assert_eq!(found, expected, "{} {k}", suite(loaded).name);
@@ -216,7 +216,7 @@ fn soft_targets_on_the_floor_start_within_20_mm_and_30_degrees() {
     let (mut all, mut middles, mut arms) = (Vec::new(), Vec::new(), Vec::new());
     for (k, task) in suite(&loaded).tasks.iter().enumerate() {
         let scenes: Vec<Scene> =
-            (0..STANDARD as u32).map(|episode| open(&loaded, k, episode, Split::Validation)).collect();
+            (0..STANDARD as u32).map(|episode| open(&loaded, k, episode, EpisodeSplit::Validation)).collect();
         all.push(poses(&scenes, &task.goal.object));
         middles.push(if FAR.contains(&k) { [-0.12, -0.24] } else { [0.05, -0.10] });
         arms.extend(scenes);
@@ -235,7 +235,7 @@ const STANDARD: usize = 5;
 #[test]
 fn rigid_objects_start_in_the_regions_of_libero() {
     let standard = |loaded: &LoadedScript, task: usize| -> Vec<Scene> {
-        (0..STANDARD as u32).map(|episode| open(loaded, task, episode, Split::Validation)).collect()
+        (0..STANDARD as u32).map(|episode| open(loaded, task, episode, EpisodeSplit::Validation)).collect()
     };
     let loaded = load("object_rigid");
     let others = [[-0.15, 0.06], [0.10, -0.20], [0.15, 0.03], [-0.20, -0.08]];
@@ -276,7 +276,7 @@ fn the_target_bowl_is_where_the_prompt_says() {
     let loaded = load("spatial_rigid");
     for (k, place) in RELATIONS.iter().enumerate() {
         for episode in 0..10 {
-            let scene = open(&loaded, k, episode, Split::Validation);
+            let scene = open(&loaded, k, episode, EpisodeSplit::Validation);
             let at = |name: &str| object(&scene, name).pose_w.translation.vector;
             let (bowl, other) = (at("bowl"), at("other_bowl"));
             let across = |a: Vec3, b: Vec3| (a - b).xy().norm();
@@ -327,7 +327,7 @@ fn splits_have_disjoint_start_states() {
                 })
                 .collect()
         };
-        let (validation, demonstration) = (states(Split::Validation), states(Split::Demonstration));
+        let (validation, demonstration) = (states(EpisodeSplit::Validation), states(EpisodeSplit::Demonstration));
         assert_eq!(
             (validation.len() as u32, demonstration.len() as u32),
             (EPISODES / 2, EPISODES / 2),
@@ -381,7 +381,7 @@ fn objects_do_not_overlap_at_the_start() {
     for name in ["object_soft", "spatial_soft", "object_rigid", "spatial_rigid"] {
         let loaded = load(name);
         for task in 0..10 {
-            let scene = open(&loaded, task, 0, Split::Validation);
+            let scene = open(&loaded, task, 0, EpisodeSplit::Validation);
             let all: Vec<(&str, Vec<PlacedShape>)> =
                 colliding_objects(&scene).map(|o| (o.name.as_str(), placed_shapes(o))).collect();
             for (i, (first, a)) in all.iter().enumerate() {
@@ -404,7 +404,7 @@ fn a_mass_shift_scales_the_mass_of_all_moving_bodies_and_nothing_else() {
             let shifts: Vec<ShiftValue> =
                 shifts.iter().map(|(name, value)| ((*name).to_owned(), *value).into()).collect();
             let suite = suite(&loaded).name.clone();
-            let split = Split::Validation;
+            let split = EpisodeSplit::Validation;
             let id = EpisodeId { suite, task, episode: 0, base_seed: 0, split };
             EpisodeSetup::open(&loaded, &id, &SceneChanges { shifts, ..SceneChanges::default() })
                 .unwrap_or_else(|e| panic!("{e}"))

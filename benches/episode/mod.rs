@@ -2,7 +2,7 @@
 
 use softvt::{
     benchmark::Plan,
-    episode_id::{EpisodeId, Split},
+    episode_id::{EpisodeId, EpisodeSplit},
     rollout::EpisodeSpec,
     script::{self, EpisodeSetup, ExpertController, GripMode, LoadedScript, SceneChanges},
 };
@@ -20,7 +20,7 @@ pub fn load() -> LoadedScript {
 pub fn open(loaded: &LoadedScript, task: usize, film: bool) -> (EpisodeSpec, ExpertController) {
     let Plan::Suite(suite) = &loaded.plan else { panic!("{SUITE} is a suite") };
     let id =
-        EpisodeId { suite: suite.name.clone(), task, episode: 0, base_seed: 0, split: Split::Validation };
+        EpisodeId { suite: suite.name.clone(), task, episode: 0, base_seed: 0, split: EpisodeSplit::Validation };
     let opened = EpisodeSetup::open(loaded, &id, &SceneChanges::default()).expect("it opens");
     let mut spec = EpisodeSpec {
         record_states: film,

@@ -9,8 +9,7 @@ local blind_grips = {}
 
 -- Instances of a kind that a number is optimised over.
 local INSTANCES = 600
--- Width of the open gripper, m, and stiffness of the drive of a finger, N/m (robot.gripper.kp).
-local STROKE, FINGER_STIFFNESS = 0.08, 2000
+local STROKE = grasp.STROKE
 -- Largest speed of closing in contact, m/s, share of an error that is corrected per control step, largest duration, s, and tolerance, m.
 -- The measured width lags by two steps behind its command; a larger share would overshoot.
 local SPEED, SHARE, DURATION, TOLERANCE = 0.004, 0.15, 4, 1e-5
@@ -43,14 +42,11 @@ local function most_common(lows, highs)
   return best, most
 end
 
--- Width of the command that holds a grip, m.
-local function command_width(grip) return grip.width - 2 * grip.force / FINGER_STIFFNESS end
-
 -- Indentation of a grip after first contact, of both pads together, m.
 local function depth(grip, window) return window.contact - grip.width end
 
 -- Depth of its command below first contact, m: what the spring of the drives adds to the indentation is that of the force.
-local function command_depth(grip, window) return window.contact - command_width(grip) end
+local function command_depth(grip, window) return window.contact - grasp.command_width(grip) end
 
 local function force_of(grip) return grip.force end
 
@@ -88,7 +84,7 @@ local function close_to_command(arm, width) arm:grasp(clamp(1 - width / STROKE),
 -- Closes until both pads press with a force.
 local function close_to_force(arm, force)
   close_to_contact(arm)
-  settle(arm, function() return 2 * (force - 0.5 * (arm.force[1] + arm.force[2])) / FINGER_STIFFNESS end)
+  settle(arm, function() return 2 * (force - 0.5 * (arm.force[1] + arm.force[2])) / arm.finger_stiffness end)
 end
 
 -- Products of the force and a power of the indentation, which the drives measure: 0 is the force alone, a large one the indentation alone.
@@ -98,7 +94,7 @@ local function drive_numbers()
     list[#list + 1] = {
       power = power,
       of = function(grip, window)
-        local beyond = depth(grip, window) - depth_at(window, CONTACT_GAP * FINGER_STIFFNESS / 2)
+        local beyond = depth(grip, window) - depth_at(window, CONTACT_GAP * grasp.STIFFNESS / 2)
         return grip.force * math.max(0, 1e3 * beyond) ^ power
       end,
     }
@@ -116,7 +112,7 @@ local function close_by_drives(arm, number, power)
   while arm.closure < 1 do
     close_to_command(arm, STROKE * (1 - arm.closure) - (contact and DRIVE_STEP or DRIVE_FAST))
     arm:wait(DRIVE_WAIT)
-    local force, width = FINGER_STIFFNESS * read(gap() - rest) / 2, read(arm.width)
+    local force, width = arm.finger_stiffness * read(gap() - rest) / 2, read(arm.width)
     if not contact and force > 0 then contact = width end
     if contact and force * math.max(0, 1e3 * (contact - width)) ^ power >= number then return end
   end
@@ -126,7 +122,7 @@ end
 -- which rise as the hand closes; the powers of the size; and the motion of the hand, given the number and the width of first contact, m.
 local LAWS = {
   ["fixed-closure"] = {
-    numbers = { { of = grasp.command } }, size_powers = { 0 },
+    numbers = { { of = function(grip) return grasp.command(grip) end } }, size_powers = { 0 },
     close = function(arm, number) arm:grasp(clamp(number), { rate = RATE }) end,
   },
   ["size-seen"] = {

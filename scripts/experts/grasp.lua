@@ -1,15 +1,12 @@
 -- Grasps from above with a known closure: across the object's narrow side or by its rim, where the hand has clearance.
--- SPREAD: largest displacement of an expert's grasp in each horizontal direction, m, so that demonstrations differ.
-local grasp = { SPREAD = 0.0015 }
+-- SPREAD: largest displacement of an expert's grasp in each horizontal direction, m, so that demonstrations differ. Of the standard
+-- hand: STROKE, the width of the open gripper, m; CASE, the extent of the sensor cases below the tool centre point, m; STIFFNESS, that of
+-- the drive of a finger, N/m, which arm.finger_stiffness gives for the hand of a run.
+local grasp = { SPREAD = 0.0015, STROKE = 0.08, CASE = 0.016, STIFFNESS = 2000 }
 
--- Full stroke of the gripper, m.
-local STROKE = 0.08
--- Extent of the sensor cases below the tool centre point, m.
-local CASE = 0.016
+local STROKE, CASE = grasp.STROKE, grasp.CASE
 -- Clearance to leave below the cases and around the fingers, m.
 local UNDER, FINGER_CLEARANCE = 0.0015, 0.004
--- Stiffness of the drive of a finger, N/m (robot.gripper.kp).
-local FINGER_STIFFNESS = 2000
 -- Step of the rotations tried for clearance.
 local STEP = math.rad(7.5)
 -- Distance of each gel from the object at which closing becomes slow, m, and rate until there, 1/s. A hand that feels begins up to
@@ -105,9 +102,13 @@ function grasp.target(object, share)
   return { width = between "width", force = between "force" }
 end
 
--- The closure whose command holds a grip: each finger is a spring, which the force on its pad displaces from its target.
-function grasp.command(grip)
-  return math.max(0, math.min(1, 1 - (grip.width - 2 * grip.force / FINGER_STIFFNESS) / STROKE))
+-- Width of the command that holds a grip, m: each finger is a spring, which the force on its pad displaces from its target. Without a
+-- stiffness of the drives (N/m), that of the standard hand.
+function grasp.command_width(grip, stiffness) return grip.width - 2 * grip.force / (stiffness or grasp.STIFFNESS) end
+
+-- The closure of that command.
+function grasp.command(grip, stiffness)
+  return math.max(0, math.min(1, 1 - grasp.command_width(grip, stiffness) / STROKE))
 end
 
 -- The command for the middle of the safe window.
@@ -185,7 +186,7 @@ function grasp.close(arm, object, grip, options)
   local rate = options.closing_speed / STROKE
   grasp.approach(arm, object, options.width)
   if options.closure then return arm:grasp(options.closure, { rate = rate }) end
-  local most = grasp.command(grip)
+  local most = grasp.command(grip, arm.finger_stiffness)
   if grip.force == 0 then return arm:grasp(most, { rate = rate }) end
   -- The command is bounded, in case the object yields or a pad misses it.
   most = math.min(1, most + COMMAND_MARGIN / STROKE)

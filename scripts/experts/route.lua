@@ -1,8 +1,10 @@
 -- Heights at which the hand passes above obstacles.
+local grasp = require "experts.grasp"
+
 local route = {}
 
--- Extent of the hand beyond the tool centre point, along the closing direction and downwards, m.
-local HAND, CASE = 0.07, 0.016
+-- Extent of the hand beyond the tool centre point along the closing direction, m.
+local HAND = 0.07
 
 -- Horizontal distance of a point from the segment between two others.
 local function segment_distance(p, a, b)
@@ -31,7 +33,7 @@ function route.carry_height(scene, from, to, carried, margin)
       top = math.max(top, object.centre[3] + object.size[3] / 2)
     end
   end
-  return top + math.max(CASE, carried.below) + margin
+  return top + math.max(grasp.CASE, carried.below) + margin
 end
 
 -- Returns the lowest height of the tool centre point, at least `rise` (m) above `pose`, at which the empty hand moves from

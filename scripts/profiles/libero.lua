@@ -13,6 +13,6 @@ return softvt.profile {
   },
   actions = {
     pose = "delta_osc", translation_m = 0.05, rotation_rad = 0.5,
-    gripper = { open = -1, closed = 1, binary = true },
+    gripper = { open = -1, closed = 1, code = "binary" },
   },
 }

@@ -70,8 +70,6 @@ function Arm:close_to(closure, options)
   for step = 1, steps do self:command(self.target, start * (1 - step / steps) + closure * (step / steps)) end
 end
 
--- Width of the open gripper, m.
-local STROKE = 0.08
 -- Lag of the measured width behind its command, s, and the trim to the width of a grip: share of the error that a command corrects,
 -- largest duration, s, and tolerance, m.
 local LAG, TRIM_SHARE, TRIM_TIME, TRIM_TOLERANCE = 0.1, 0.5, 0.5, 5e-5
@@ -82,7 +80,7 @@ local function close_until(self, closure, options)
   local rate, width, force = options.rate, options.width, options.force
   local function is_reached()
     if force and min(host.force[1], host.force[2]) >= force then return true end
-    return width and host.width - LAG * rate * STROKE <= width
+    return width and host.width - LAG * rate * host.stroke <= width
   end
   while self.closure < closure and not is_reached() do
     self:command(self.target, min(closure, self.closure + rate * host.dt))
@@ -91,7 +89,7 @@ local function close_until(self, closure, options)
   for _ = 1, ceil(TRIM_TIME / host.dt) do
     local error = host.width - width
     if error < TRIM_TOLERANCE then return end
-    self:command(self.target, min(closure, self.closure + TRIM_SHARE * error / STROKE))
+    self:command(self.target, min(closure, self.closure + TRIM_SHARE * error / host.stroke))
   end
 end
 

@@ -83,6 +83,16 @@ pub enum GoalKind {
     Inside,
 }
 
+impl GoalKind {
+    /// Its word between the object and the target of a goal.
+    pub fn preposition(self) -> &'static str {
+        match self {
+            Self::On => "on",
+            Self::Inside => "in",
+        }
+    }
+}
+
 /// One task of a suite.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Task {

@@ -9,7 +9,7 @@ use rand_chacha::{
 };
 use sha2::{Digest, Sha256};
 
-use softvt_common::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 
 /// Purpose of a stream of random numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -137,7 +137,7 @@ pub struct EpisodeSeed {
     /// Seed of the run.
     pub base_seed: u64,
     /// List of episodes that `episode` counts in.
-    pub split: Split,
+    pub split: EpisodeSplit,
     /// Secret of a judged run.
     pub secret: Option<SecretSeed>,
 }
@@ -235,7 +235,7 @@ mod tests {
             task: 1,
             episode: 3,
             base_seed: 7,
-            split: Split::Validation,
+            split: EpisodeSplit::Validation,
             secret: None,
         }
     }
@@ -248,7 +248,7 @@ mod tests {
             EpisodeSeed { suite: "sl".into(), layout: "".into(), ..seed() },
             EpisodeSeed { episode: 4, ..seed() },
             EpisodeSeed { base_seed: 8, ..seed() },
-            EpisodeSeed { split: Split::Demonstration, ..seed() },
+            EpisodeSeed { split: EpisodeSplit::Demonstration, ..seed() },
         ];
         assert!(others.iter().all(|other| first(other, RandomStream::Layout) != base));
         assert_ne!(first(&seed(), RandomStream::Arm), base);

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use super::seed::{EpisodeSeed, RandomStream, uniform};
-use softvt_common::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_common::text::format_number;
 use softvt_evaluation::instance::{InstanceFactors, InstanceModel};
 use softvt_robot::spec::PadSpec;
@@ -196,7 +196,7 @@ impl VariationRanges {
         model_of: &ModelOf<'_>,
     ) -> Result<Vec<ObjectVariation>, DrawError> {
         let id =
-            EpisodeId { suite: suite.into(), task: 0, episode: 0, base_seed: 0, split: Split::Experiment };
+            EpisodeId { suite: suite.into(), task: 0, episode: 0, base_seed: 0, split: EpisodeSplit::Experiment };
         let mut streams = InstanceStreams::of(&EpisodeSeed::new(&id, &asset.name));
         (0..count)
             .map(|_| self.draw_instance(&mut streams, asset, &InstanceFactors::NOMINAL, model_of))

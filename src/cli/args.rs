@@ -43,20 +43,14 @@ pub(crate) struct ScriptArgs {
     #[arg(long = "shift", value_name = "NAME=VALUE", value_delimiter = ',')]
     pub shifts: Vec<String>,
     /// Make every soft object rigid, with the same shape, mass and appearance
-    #[arg(long, value_name = "KIND")]
-    pub twin: Option<Twin>,
+    #[arg(long)]
+    pub rigid_twin: bool,
     /// Vary the soft objects, the light and the cameras from episode to episode: by a Lua file, or by the standard ranges (scripts/variations/standard.lua)
     #[arg(long, value_name = "FILE.lua", num_args = 0..=1, require_equals = true, default_missing_value = STANDARD_VARIATION)]
     pub vary: Option<PathBuf>,
     /// Change a setting, such as robot.gripper.effort=20
     #[arg(long = "set", value_name = "PATH=VALUE")]
     pub settings: Vec<String>,
-}
-
-/// Variants of a suite.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Twin {
-    Rigid,
 }
 
 // The episodes of a run, and its output.
@@ -149,7 +143,7 @@ impl Request {
             settings: settings.map_err(in_file)?,
             seed: secret.as_ref().map_or(script.seed, |secret| secret.public_seed()),
             secret,
-            rigid_twin: script.twin.is_some(),
+            rigid_twin: script.rigid_twin,
             file: script.file,
             options: script.options,
             vary: script.vary,

@@ -69,7 +69,7 @@ struct Effect {
 /// Every flag of the [`COMMANDS`].
 static EFFECTS: [Effect; 5] = [
     Effect { flags: &["seed", "settings", "threads", "out", "json"], acts_on: ALL },
-    Effect { flags: &["shifts", "twin", "vary", "seed_file"], acts_on: EPISODES },
+    Effect { flags: &["shifts", "rigid_twin", "vary", "seed_file"], acts_on: EPISODES },
     Effect {
         flags: &["policy", "profile", "protocol", "gripper", "replan", "policy_timeout", "name"],
         acts_on: EPISODES,
@@ -122,7 +122,7 @@ pub(crate) fn check(command: &str, request: &Request, plan: &Plan) -> Result<(),
     let suites = plan.suites();
     let all_rigid = suites.iter().all(|suite| suite.object_type == ObjectType::Rigid);
     if config.rigid_twin && all_rigid {
-        return Err(config.error("--twin: the objects of this suite are rigid already; leave it out").into());
+        return Err(config.error("--rigid-twin: the objects of this suite are rigid already; leave it out").into());
     }
     Ok(())
 }
@@ -141,7 +141,7 @@ mod tests {
     const SAMPLES: &[(&str, &str)] = &[
         ("seed_file", "--seed-file Cargo.toml"),
         ("shifts", "--shift mass=2"),
-        ("twin", "--twin rigid"),
+        ("rigid_twin", "--rigid-twin"),
         ("vary", "--vary"),
         ("policy", "--policy noop"),
         ("protocol", "--protocol openpi"),

@@ -2,12 +2,17 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Set once; never cleared.
+/// Set by [`request`], cleared by [`withdraw`].
 pub static FLAG: AtomicBool = AtomicBool::new(false);
 
 /// Requests cancellation. Returns true if it had been requested before.
 pub fn request() -> bool {
     FLAG.swap(true, Ordering::Relaxed)
+}
+
+/// Withdraws the request, once all that it stopped has ended: the process can run again.
+pub fn withdraw() {
+    FLAG.store(false, Ordering::Relaxed);
 }
 
 /// True once cancellation has been requested.

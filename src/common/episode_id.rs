@@ -18,7 +18,7 @@ pub struct EpisodeId {
     #[serde(rename = "seed")]
     pub base_seed: u64,
     /// List of episodes that `episode` counts in.
-    pub split: Split,
+    pub split: EpisodeSplit,
 }
 
 impl EpisodeId {
@@ -47,7 +47,7 @@ impl fmt::Display for EpisodeIndex {
 /// Which seeds an episode draws from. Two splits have no episode in common.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Split {
+pub enum EpisodeSplit {
     /// Episodes for recording demonstrations.
     Demonstration,
     /// Trials of calibrations and other experiments.
@@ -59,10 +59,10 @@ pub enum Split {
 
 /// A name is not that of a split.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("expected {}", Split::ALL.map(Split::name).join(", "))]
+#[error("expected {}", EpisodeSplit::ALL.map(EpisodeSplit::name).join(", "))]
 pub struct UnknownSplit;
 
-impl FromStr for Split {
+impl FromStr for EpisodeSplit {
     type Err = UnknownSplit;
 
     fn from_str(name: &str) -> Result<Self, UnknownSplit> {
@@ -70,7 +70,7 @@ impl FromStr for Split {
     }
 }
 
-impl Split {
+impl EpisodeSplit {
     /// Every split.
     pub const ALL: [Self; 3] = [Self::Validation, Self::Demonstration, Self::Experiment];
 

@@ -21,9 +21,9 @@ pub enum DatasetError {
     /// `key` is a group, dataset, attribute or line of the file.
     #[error("{path}: {key}: {what}")]
     Content { path: String, key: String, what: String },
-    /// The output folder contains something else.
-    #[error("--out {out}: {what}")]
-    OutputNotEmpty { out: String, what: String },
+    /// The output folder cannot be used.
+    #[error("{out}: {what}")]
+    Output { out: String, what: String },
     /// An image or a tactile reading cannot be computed.
     #[error(transparent)]
     Sensing(#[from] SensingError),

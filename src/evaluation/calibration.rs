@@ -141,7 +141,7 @@ impl SafeWindow {
 
 /// Measurements of a calibration, from which an [`Envelope`] follows.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Scans {
+pub struct CalibrationMeasurements {
     /// Protocol by which the rows were measured.
     pub protocol: Protocol,
     /// Stable strain of the material; `None` if it states no limit, and for the robot's hand.
@@ -193,8 +193,8 @@ struct Reference {
 
 impl Envelope {
     /// Sorts the rows by width and computes the bounds.
-    pub fn new(scans: Scans, kappa: f64) -> Self {
-        let Scans { protocol, stable_strain, ended, mut holds, mut sweep, variants } = scans;
+    pub fn new(scans: CalibrationMeasurements, kappa: f64) -> Self {
+        let CalibrationMeasurements { protocol, stable_strain, ended, mut holds, mut sweep, variants } = scans;
         holds.sort_by(|a, b| b.width_mm.total_cmp(&a.width_mm));
         sweep.sort_by(|a, b| b.width_mm.total_cmp(&a.width_mm));
         let at_strain = stable_strain.and_then(|strain| reference_at_strain(&sweep, strain));
@@ -369,7 +369,7 @@ pub(crate) mod tests {
     }
 
     /// A press test of an object 50 mm wide that reaches its stable strain of 0.3 at 44.5 mm, and holds from `lower` on.
-    pub(crate) fn scans(lower: f64) -> Scans {
+    pub(crate) fn scans(lower: f64) -> CalibrationMeasurements {
         let holds = [49.0, 48.0, 47.0, 46.0].map(|width| hold(width, if width <= lower { 5 } else { 2 }));
         let sweep = vec![
             squeeze(50.0, 0.0, true),
@@ -377,7 +377,7 @@ pub(crate) mod tests {
             squeeze(46.0, 2.0, true),
             squeeze(44.0, 10.0 / 3.0, true),
         ];
-        Scans { stable_strain: Some(0.3), holds: holds.into(), sweep, ..Scans::default() }
+        CalibrationMeasurements { stable_strain: Some(0.3), holds: holds.into(), sweep, ..CalibrationMeasurements::default() }
     }
 
     #[test]
@@ -394,7 +394,7 @@ pub(crate) mod tests {
 
     #[test]
     fn a_sweep_that_ends_before_the_stable_strain_is_censored_with_its_reason() {
-        let reason = |change: &dyn Fn(&mut Scans)| {
+        let reason = |change: &dyn Fn(&mut CalibrationMeasurements)| {
             let mut scans = scans(48.0);
             change(&mut scans);
             let envelope = Envelope::new(scans, 0.5);
@@ -422,7 +422,7 @@ pub(crate) mod tests {
     #[test]
     fn the_loose_end_is_above_no_width_at_which_a_trial_failed() {
         let lower =
-            |holds: Vec<HoldRow>| Envelope::new(Scans { holds, ..scans(48.0) }, 0.5).window.width_lower_mm;
+            |holds: Vec<HoldRow>| Envelope::new(CalibrationMeasurements { holds, ..scans(48.0) }, 0.5).window.width_lower_mm;
         assert_eq!(lower(vec![hold(47.0, 5), hold(49.0, 5), hold(48.0, 4)]), Some(47.0));
         assert_eq!(lower(vec![hold(47.0, 4), hold(48.0, 5)]), None);
         assert_eq!(lower(vec![]), None);
@@ -433,13 +433,13 @@ pub(crate) mod tests {
         let tight = |d_at_47: f64| {
             let carried = |width, d| HoldRow { d_peak_pct: Some(d), ..hold(width, 5) };
             let holds = vec![carried(47.0, d_at_47), carried(48.0, 1.1), carried(49.0, 0.7)];
-            Envelope::new(Scans { holds, ..scans(48.0) }, 0.5).window.width_at_tau_mm.unwrap()
+            Envelope::new(CalibrationMeasurements { holds, ..scans(48.0) }, 0.5).window.width_at_tau_mm.unwrap()
         };
         // τ is 1.5 %, which the sweep reaches at 47 mm.
         assert!((tight(1.9) - 47.5).abs() < 1e-12);
         assert!((tight(1.4) - 47.0).abs() < 1e-12);
         let above = HoldRow { d_peak_pct: Some(1.6), ..hold(48.0, 5) };
-        let heavy = Envelope::new(Scans { holds: vec![above], ..scans(48.0) }, 0.5);
+        let heavy = Envelope::new(CalibrationMeasurements { holds: vec![above], ..scans(48.0) }, 0.5);
         assert_eq!(heavy.window.width_at_tau_mm, Some(47.0), "the tight end of the sweep");
         assert_eq!(heavy.carried_d_pct, Some(1.6));
         assert!(heavy.exceeds_when_carried(heavy.limit(0.5).unwrap()));
@@ -455,7 +455,7 @@ pub(crate) mod tests {
                 .extent_mm()
         };
         assert_eq!((extent(46.99), extent(46.5)), (None, Some(0.5)), "an extent below the accuracy");
-        let none = Envelope::new(Scans { sweep: vec![squeeze(49.0, 1.0, false)], ..scans(48.0) }, 0.5);
+        let none = Envelope::new(CalibrationMeasurements { sweep: vec![squeeze(49.0, 1.0, false)], ..scans(48.0) }, 0.5);
         assert_eq!((none.d_ref_pct, none.window.width_at_tau_mm, none.limit(0.5)), (None, None, None));
     }
 

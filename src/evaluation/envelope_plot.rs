@@ -235,12 +235,12 @@ fn window_ends(axes: &Axes, envelope: &Envelope) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::calibration::{
-        Scans,
+        CalibrationMeasurements,
         tests::{hold, scans},
     };
     use super::*;
 
-    fn shown(scans: Scans) -> (String, String) {
+    fn shown(scans: CalibrationMeasurements) -> (String, String) {
         let envelope = Envelope::new(scans, 0.5);
         let limit = envelope.limit(0.5);
         (summary_text("bun", &envelope, limit), plot("bun", &envelope, limit))
@@ -268,17 +268,17 @@ mod tests {
         let held = bending.holds.iter().filter(|row| row.all_held()).count();
         let (_, svg) = shown(bending);
         assert_eq!(svg.matches("<polygon").count(), held, "the axes reach to all that held");
-        let (narrow, _) = shown(Scans { holds: vec![hold(47.01, 5), hold(48.0, 2)], ..scans(48.0) });
+        let (narrow, _) = shown(CalibrationMeasurements { holds: vec![hold(47.01, 5), hold(48.0, 2)], ..scans(48.0) });
         assert!(narrow.contains("47.00 mm; 0.010 mm are less than the accuracy of its ends"), "{narrow}");
-        let (untried, _) = shown(Scans { holds: vec![], ..scans(48.0) });
+        let (untried, _) = shown(CalibrationMeasurements { holds: vec![], ..scans(48.0) });
         assert!(untried.contains("no safe window: no hold trial was run, and D passes τ"), "{untried}");
         let (empty, _) = shown(scans(46.0));
         assert!(empty.contains("it holds from 46.00 mm inward, and D passes τ at 47.00 mm"), "{empty}");
-        let (censored, _) = shown(Scans { stable_strain: None, ..scans(48.0) });
+        let (censored, _) = shown(CalibrationMeasurements { stable_strain: None, ..scans(48.0) });
         assert!(
             censored.contains("censored: the press ended early (the material states no collapse_strain)")
         );
-        let (hand, _) = shown(Scans { protocol: Protocol::Hand, ..scans(48.0) });
+        let (hand, _) = shown(CalibrationMeasurements { protocol: Protocol::Hand, ..scans(48.0) });
         assert!(hand.contains("by the robot's hand"), "{hand}");
     }
 
@@ -297,9 +297,9 @@ mod tests {
 
     #[test]
     fn an_empty_or_single_row_envelope_is_plotted() {
-        let (text, svg) = shown(Scans::default());
+        let (text, svg) = shown(CalibrationMeasurements::default());
         assert!(text.contains("no τ: no squeeze was stable") && svg.contains("no rows"), "{text}");
-        let one = Scans { sweep: vec![scans(48.0).sweep[1].clone()], ..Scans::default() };
+        let one = CalibrationMeasurements { sweep: vec![scans(48.0).sweep[1].clone()], ..CalibrationMeasurements::default() };
         let (_, svg) = shown(one);
         assert!(svg.contains("<circle") && !svg.contains("NaN") && !svg.contains("inf"), "{svg}");
     }

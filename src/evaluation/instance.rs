@@ -268,7 +268,7 @@ fn piecewise_linear(points: &[(f64, f64)], x: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::calibration::{
-        HoldRow, Scans,
+        HoldRow, CalibrationMeasurements,
         tests::{hold, squeeze},
     };
 
@@ -293,7 +293,7 @@ mod tests {
         });
         let holds = vec![hold(49.0, 5), HoldRow { d_peak_pct: Some(1.0), ..hold(48.0, 5) }];
         let scans =
-            Scans { stable_strain: Some(0.1), holds, sweep: sweep.collect(), variants, ..Scans::default() };
+            CalibrationMeasurements { stable_strain: Some(0.1), holds, sweep: sweep.collect(), variants, ..CalibrationMeasurements::default() };
         Envelope::new(scans, 0.5)
     }
 

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// A stage, with the event that completes it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Stage {
+pub enum TaskStage {
     /// Until a pad touches the target.
     #[default]
     Reach,
@@ -24,7 +24,7 @@ pub enum Stage {
     Release,
 }
 
-impl Stage {
+impl TaskStage {
     /// All stages, in order.
     pub const ALL: [Self; 6] =
         [Self::Reach, Self::Grasp, Self::Lift, Self::Carry, Self::Place, Self::Release];
@@ -44,7 +44,7 @@ impl Stage {
 
 /// One physics step as [`StageMonitor`] reads it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct StageSample {
+pub struct StageEvidence {
     /// True for each pad that touches the target.
     pub touch: [bool; 2],
     /// True if the target is lifted.
@@ -59,20 +59,20 @@ pub struct StageSample {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StageMonitor {
     /// The present stage.
-    pub stage: Stage,
+    pub stage: TaskStage,
 }
 
 impl StageMonitor {
     /// Takes in one physics step, which may complete several stages.
-    pub fn update(&mut self, sample: &StageSample) {
+    pub fn update(&mut self, sample: &StageEvidence) {
         let [left, right] = sample.touch;
         loop {
             self.stage = match self.stage {
-                Stage::Reach if left || right => Stage::Grasp,
-                Stage::Grasp if left && right => Stage::Lift,
-                Stage::Lift if sample.is_lifted && (left || right) => Stage::Carry,
-                Stage::Carry if sample.is_over_goal => Stage::Place,
-                Stage::Place if sample.is_placed => Stage::Release,
+                TaskStage::Reach if left || right => TaskStage::Grasp,
+                TaskStage::Grasp if left && right => TaskStage::Lift,
+                TaskStage::Lift if sample.is_lifted && (left || right) => TaskStage::Carry,
+                TaskStage::Carry if sample.is_over_goal => TaskStage::Place,
+                TaskStage::Place if sample.is_placed => TaskStage::Release,
                 _ => return,
             };
         }
@@ -86,24 +86,24 @@ mod tests {
     #[test]
     fn stages_are_completed_in_order() {
         let mut monitor = StageMonitor::default();
-        let mut after = |sample: StageSample| {
+        let mut after = |sample: StageEvidence| {
             monitor.update(&sample);
             monitor.stage
         };
-        let none = StageSample::default();
+        let none = StageEvidence::default();
         assert_eq!(
-            after(StageSample { is_over_goal: true, is_placed: true, ..none }),
-            Stage::Reach,
+            after(StageEvidence { is_over_goal: true, is_placed: true, ..none }),
+            TaskStage::Reach,
             "not touched"
         );
-        assert_eq!(after(StageSample { touch: [false, true], is_lifted: true, ..none }), Stage::Grasp);
-        assert_eq!(after(StageSample { touch: [true, true], ..none }), Stage::Lift);
-        assert_eq!(after(none), Stage::Lift, "stages stay completed");
-        assert_eq!(after(StageSample { is_lifted: true, ..none }), Stage::Lift, "thrown, not held");
-        let carried = StageSample { touch: [true, true], is_lifted: true, ..none };
-        assert_eq!(after(carried), Stage::Carry);
-        assert_eq!(after(StageSample { is_over_goal: true, ..carried }), Stage::Place);
-        assert_eq!(after(StageSample { is_over_goal: true, is_placed: true, ..none }), Stage::Release);
-        assert!(Stage::ALL.is_sorted());
+        assert_eq!(after(StageEvidence { touch: [false, true], is_lifted: true, ..none }), TaskStage::Grasp);
+        assert_eq!(after(StageEvidence { touch: [true, true], ..none }), TaskStage::Lift);
+        assert_eq!(after(none), TaskStage::Lift, "stages stay completed");
+        assert_eq!(after(StageEvidence { is_lifted: true, ..none }), TaskStage::Lift, "thrown, not held");
+        let carried = StageEvidence { touch: [true, true], is_lifted: true, ..none };
+        assert_eq!(after(carried), TaskStage::Carry);
+        assert_eq!(after(StageEvidence { is_over_goal: true, ..carried }), TaskStage::Place);
+        assert_eq!(after(StageEvidence { is_over_goal: true, is_placed: true, ..none }), TaskStage::Release);
+        assert!(TaskStage::ALL.is_sorted());
     }
 }

@@ -4,7 +4,11 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::{drop::DropEvent, safety::KappaVerdict, stage::Stage};
+use super::{
+    drop::DropEvent,
+    safety::{KappaVerdict, PeakDeformation},
+    stage::TaskStage,
+};
 
 /// End of a rollout.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -70,7 +74,7 @@ impl Outcome {
 
 /// First contact of the robot with an object that is not the target.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct WrongContact {
+pub struct WrongObjectContact {
     /// Time of the contact, s.
     pub time_s: f64,
     /// Name of the object.
@@ -79,7 +83,7 @@ pub struct WrongContact {
 
 /// Deformation of a soft body that is not the target.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct OtherDeformation {
+pub struct OtherObjectDeformation {
     /// Name of the object in the scene.
     pub object: String,
     /// Peak D, %; null if it was never measured.
@@ -127,13 +131,13 @@ pub struct Verdict {
     pub d_peak_other: Option<f64>,
     /// The other soft bodies, one by one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub others: Vec<OtherDeformation>,
+    pub others: Vec<OtherObjectDeformation>,
     /// No other soft body exceeded its own τ; null where that is unknown.
     pub others_ok: Option<bool>,
     /// First contact of the robot with a movable object that is not the target; null without one.
-    pub first_wrong_contact: Option<WrongContact>,
+    pub first_wrong_contact: Option<WrongObjectContact>,
     /// Stage at which an episode without Goal Success ended; null with it.
-    pub failed_stage: Option<Stage>,
+    pub failed_stage: Option<TaskStage>,
     /// Largest share of the target's volume that was beyond the collapse strain of its material at one time, %; null
     /// for a rigid target and for a material without that strain.
     pub collapsed_volume_pct: Option<f64>,
@@ -175,4 +179,11 @@ pub struct Verdict {
     pub grip_ratio: Option<f64>,
     /// Goal Success with a grip ratio of at most `criteria.gentle_ratio`.
     pub gentle: bool,
+}
+
+impl Verdict {
+    /// The peak deformation of the target, to compare with a limit.
+    pub fn peak(&self) -> PeakDeformation {
+        PeakDeformation { d_pct: self.d_peak, missing: self.missing_deformation }
+    }
 }

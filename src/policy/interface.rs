@@ -124,7 +124,7 @@ impl From<Action> for ActionChunk {
 /// Description of an episode, passed to a policy when the episode begins: its id without base seed and split, which
 /// must not influence a policy, and its instruction.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct TaskBrief {
+pub struct EpisodeBrief {
     /// Name of the suite.
     pub suite: String,
     /// Index of the task in the suite.
@@ -164,8 +164,8 @@ pub struct QueryId {
 
 impl QueryId {
     /// The first request of an episode.
-    pub fn first(brief: &TaskBrief) -> Self {
-        let TaskBrief { suite, task, episode, seed, alias, .. } = brief;
+    pub fn first(brief: &EpisodeBrief) -> Self {
+        let EpisodeBrief { suite, task, episode, seed, alias, .. } = brief;
         Self {
             alias: alias.clone(),
             suite: suite.clone(),
@@ -200,7 +200,7 @@ fn seed_of(kind: &str, parts: &[String]) -> u32 {
     u32::from_be_bytes([hash[0], hash[1], hash[2], hash[3]])
 }
 
-impl TaskBrief {
+impl EpisodeBrief {
     /// Position of the episode in its run.
     pub fn index(&self) -> EpisodeIndex {
         EpisodeIndex { task: self.task, episode: self.episode }
@@ -220,7 +220,7 @@ pub enum PolicyError {
     },
     /// No server accepted a connection in time.
     #[error(
-        "no policy server at {url}: {reason}; tried for {seconds} s: start it, or raise --policy-timeout"
+        "no policy server at {url}: {reason}; tried for {seconds} s: start it, or allow it more time"
     )]
     Unreachable {
         /// Address of the server.
@@ -239,7 +239,7 @@ pub enum PolicyError {
         reason: String,
     },
     /// The address of the server is invalid: an error in the user's input.
-    #[error("--policy {url}: {problem}; expected ws://HOST:PORT")]
+    #[error("the policy server {url:?}: {problem}; expected ws://HOST:PORT")]
     Address {
         /// Address as it was given.
         url: String,
@@ -305,7 +305,7 @@ pub trait Policy: Send {
     ///
     /// # Errors
     /// See [`PolicyError`].
-    fn reset(&mut self, _brief: &TaskBrief) -> Result<(), PolicyError> {
+    fn reset(&mut self, _brief: &EpisodeBrief) -> Result<(), PolicyError> {
         Ok(())
     }
     /// True if [`observe`](Self::observe) is to be called in every control step without a call of [`act`](Self::act).
@@ -340,7 +340,7 @@ mod tests {
     #[test]
     fn seeds_are_those_of_the_released_key() {
         // Computed with Python's hashlib from the description of the release.
-        let brief = TaskBrief {
+        let brief = EpisodeBrief {
             suite: "object_soft".into(),
             task: 3,
             prompt: String::new(),

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::record::EpisodeRecord;
 use softvt_common::episode_id::EpisodeId;
 use softvt_evaluation::{
-    stage::Stage,
+    stage::TaskStage,
     statistics::{Z95, mean, stratified_bootstrap},
 };
 
@@ -192,9 +192,9 @@ pub struct PairedStages {
     /// Number of episodes in which both runs recorded stages.
     pub n: usize,
     /// Number of failed episodes of the first run, by stage.
-    pub first: BTreeMap<Stage, usize>,
+    pub first: BTreeMap<TaskStage, usize>,
     /// Number of failed episodes of the second run, by stage.
-    pub second: BTreeMap<Stage, usize>,
+    pub second: BTreeMap<TaskStage, usize>,
     /// Number of episodes in which the second run completed more stages.
     pub better: usize,
     /// Number of episodes in which the first run completed more stages.
@@ -203,10 +203,10 @@ pub struct PairedStages {
 
 impl PairedStages {
     /// Compares the stage of failure of each episode in the first and in the second run, `None` after Goal Success.
-    pub fn new(pairs: impl IntoIterator<Item = [Option<Stage>; 2]>) -> Self {
+    pub fn new(pairs: impl IntoIterator<Item = [Option<TaskStage>; 2]>) -> Self {
         let mut stages = Self::default();
         // Stages are in order, and Goal Success comes after all of them.
-        let completed = |failed: Option<Stage>| failed.map_or(Stage::ALL.len(), |stage| stage as usize);
+        let completed = |failed: Option<TaskStage>| failed.map_or(TaskStage::ALL.len(), |stage| stage as usize);
         for [first, second] in pairs {
             stages.n += 1;
             for (counts, failed) in [(&mut stages.first, first), (&mut stages.second, second)] {
@@ -336,7 +336,7 @@ fn mcnemar(better: usize, worse: usize) -> f64 {
 mod tests {
     use super::*;
     use crate::record::tests::sample;
-    use softvt_evaluation::verdict::{InvalidReason, Outcome, WrongContact};
+    use softvt_evaluation::verdict::{InvalidReason, Outcome, WrongObjectContact};
 
     /// Goal, safety and D of each episode; τ is 1.
     fn run(episodes: &[(bool, bool, f64)]) -> Vec<EpisodeRecord> {
@@ -390,10 +390,10 @@ mod tests {
     }
 
     /// Fields of records of this version in addition to those of [`run`].
-    fn with_harm(mut record: EpisodeRecord, contact: bool, failed_stage: Option<Stage>) -> EpisodeRecord {
+    fn with_harm(mut record: EpisodeRecord, contact: bool, failed_stage: Option<TaskStage>) -> EpisodeRecord {
         let v = &mut record.verdict;
         (v.d_mean, v.d_final, v.d_p95, v.time_over_tau_s) = (Some(0.25), Some(0.0), Some(0.5), Some(1.5));
-        v.first_wrong_contact = contact.then(|| WrongContact { time_s: 2.0, object: "bun".to_owned() });
+        v.first_wrong_contact = contact.then(|| WrongObjectContact { time_s: 2.0, object: "bun".to_owned() });
         v.others_ok = Some(!contact);
         v.failed_stage = failed_stage;
         record
@@ -402,19 +402,19 @@ mod tests {
     #[test]
     fn harm_and_stages_are_paired_and_invalid_episodes_have_no_values() {
         let base = run(&[(true, true, 0.5), (false, false, 0.5), (false, false, 0.5), (true, true, 0.5)]);
-        let side = |rows: [(bool, Option<Stage>); 4]| -> Vec<EpisodeRecord> {
+        let side = |rows: [(bool, Option<TaskStage>); 4]| -> Vec<EpisodeRecord> {
             base.iter()
                 .zip(rows)
                 .map(|(record, (contact, stage))| with_harm(record.clone(), contact, stage))
                 .collect()
         };
         let before =
-            side([(true, None), (true, Some(Stage::Grasp)), (false, Some(Stage::Reach)), (false, None)]);
+            side([(true, None), (true, Some(TaskStage::Grasp)), (false, Some(TaskStage::Reach)), (false, None)]);
         let mut after = side([
             (false, None),
-            (true, Some(Stage::Carry)),
-            (false, Some(Stage::Reach)),
-            (true, Some(Stage::Place)),
+            (true, Some(TaskStage::Carry)),
+            (false, Some(TaskStage::Reach)),
+            (true, Some(TaskStage::Place)),
         ]);
         after[0].verdict.d_mean = Some(0.75);
         after[3].verdict.collapsed_volume_pct = Some(9.0);
@@ -437,8 +437,8 @@ mod tests {
         );
         assert_eq!((paired.others_ok.n, counts(paired.others_ok)), (3, [1, 0, 2]));
         let stages = paired.failed_stages;
-        assert_eq!(stages.first, BTreeMap::from([(Stage::Reach, 1), (Stage::Grasp, 1)]));
-        assert_eq!(stages.second, BTreeMap::from([(Stage::Reach, 1), (Stage::Carry, 1), (Stage::Place, 1)]));
+        assert_eq!(stages.first, BTreeMap::from([(TaskStage::Reach, 1), (TaskStage::Grasp, 1)]));
+        assert_eq!(stages.second, BTreeMap::from([(TaskStage::Reach, 1), (TaskStage::Carry, 1), (TaskStage::Place, 1)]));
         assert_eq!((stages.n, stages.better, stages.worse), (4, 1, 1));
     }
 

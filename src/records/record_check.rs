@@ -4,8 +4,8 @@ use serde_json::Value;
 
 use super::record::EpisodeRecord;
 use softvt_evaluation::{
-    safety::{DeformationLimit, PeakDeformation, SafetyParts},
-    verdict::{OtherDeformation, Outcome},
+    safety::{DeformationLimit, SafetyParts},
+    verdict::{OtherObjectDeformation, Outcome},
 };
 
 /// A text is not the record of an episode.
@@ -136,7 +136,7 @@ impl EpisodeRecord {
     /// Checks the limits, and that Safety Success at each κ follows from Goal, NoDrop and D.
     fn check_deformation(&self) -> Result<(), String> {
         let (v, soft) = (&self.verdict, self.header.soft);
-        let peak = PeakDeformation { d_pct: v.d_peak, missing: v.missing_deformation };
+        let peak = v.peak();
         let ok = |tau: Option<f64>| peak.is_within(tau).filter(|_| soft && self.outcome.is_valid());
         if !soft && (v.d_peak.is_some() || v.tau.is_some()) {
             return Err("the target is rigid, and d_peak or tau is a number".to_owned());
@@ -220,7 +220,7 @@ impl EpisodeRecord {
     fn check_others(&self) -> Result<(), String> {
         let v = &self.verdict;
         for other in &v.others {
-            let OtherDeformation { object, d_peak, tau, deformation_ok } = other;
+            let OtherObjectDeformation { object, d_peak, tau, deformation_ok } = other;
             let is_above = d_peak.zip(*tau).map(|(d, tau)| d > tau);
             let is_contradiction = match deformation_ok {
                 Some(ok) => is_above != Some(!ok),

@@ -13,7 +13,7 @@ use super::{
     terminal::{TaskName, task_names},
 };
 use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
-use softvt_evaluation::stage::Stage;
+use softvt_evaluation::stage::TaskStage;
 use softvt_records::{
     paired_stats::{
         EpisodeKey, EpisodePair, PairedComparison, PairedDifference, PairedStages, group_by_task,
@@ -392,7 +392,7 @@ fn push_stages(table: &mut TextTable, stages: &PairedStages) {
     let [first, second] = [&stages.first, &stages.second];
     let total = counts("failed at any stage".to_owned(), first.values().sum(), second.values().sum());
     table.row(total.into_iter().chain([String::new(), stages.better.to_string(), stages.worse.to_string()]));
-    for stage in Stage::ALL {
+    for stage in TaskStage::ALL {
         let [first, second] = [first, second].map(|of| of.get(&stage).copied().unwrap_or(0));
         if first + second > 0 {
             table.row(counts(format!("  {}", stage.name()), first, second));
@@ -459,11 +459,11 @@ mod tests {
 
     use super::*;
     use crate::{run_summary::tests::stored, sample_record};
-    use softvt_evaluation::verdict::{InvalidReason, Outcome, WrongContact};
+    use softvt_evaluation::verdict::{InvalidReason, Outcome, WrongObjectContact};
 
     /// A run of three episodes with these stages of failure.
-    fn run(dir: &str, d_mean: f64, stages: [Option<Stage>; 3]) -> StoredRun {
-        let record = |(episode, failed_stage): (usize, Option<Stage>)| {
+    fn run(dir: &str, d_mean: f64, stages: [Option<TaskStage>; 3]) -> StoredRun {
+        let record = |(episode, failed_stage): (usize, Option<TaskStage>)| {
             let mut record = sample_record();
             record.header.id.episode = episode as u32;
             let v = &mut record.verdict;
@@ -486,10 +486,10 @@ mod tests {
 
     #[test]
     fn the_table_has_the_rows_of_the_summary() {
-        let first = run("a", 0.25, [Some(Stage::Reach), Some(Stage::Grasp), None]);
-        let mut second = run("b", 0.5, [Some(Stage::Carry), None, None]);
+        let first = run("a", 0.25, [Some(TaskStage::Reach), Some(TaskStage::Grasp), None]);
+        let mut second = run("b", 0.5, [Some(TaskStage::Carry), None, None]);
         second.records[0].verdict.first_wrong_contact =
-            Some(WrongContact { time_s: 1.0, object: "bun".to_owned() });
+            Some(WrongObjectContact { time_s: 1.0, object: "bun".to_owned() });
         second.records[2].outcome = Outcome::Invalid { reason: InvalidReason::Inverted, step: 3, node: None };
         let text = table(&compare(&[first], &[second]).expect("the same episodes"));
         assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");

@@ -29,11 +29,11 @@ pub(super) const EPISODE_FOLDERS: [&str; 4] = ["actions", "trace", "video", soft
 pub enum RunFolderError {
     /// `found` is a file of that run.
     #[error(
-        "{dir} already holds a run ({found}): resume it with --resume, or give another folder with --out"
+        "{dir} already holds a run ({found}): resume it, or give another output folder"
     )]
     Occupied { dir: String, found: &'static str },
     /// `found` is a file that no run has written.
-    #[error("{dir} is not empty and holds no run (it contains {found}); give a new folder with --out")]
+    #[error("{dir} is not empty and holds no run (it contains {found}); give a new output folder")]
     Foreign { dir: String, found: String },
     #[error("another softvt process is using {dir}; wait for it to finish, or stop it")]
     Busy { dir: String },
@@ -292,7 +292,7 @@ mod tests {
         let mut folder = RunFolder::create(root.path()).unwrap();
         folder.append(&episode(0)).unwrap();
         let error = RunFolder::create(root.path()).unwrap_err().to_string();
-        assert!(error.contains("already holds a run (episodes.jsonl)") && error.contains("--out"), "{error}");
+        assert!(error.contains("already holds a run (episodes.jsonl)") && error.contains("another output folder"), "{error}");
         assert_eq!(indices(root.path()), [0]);
         fs::remove_file(root.path().join(EPISODES)).unwrap();
         files::write_json(&root.path().join(RUN), &1).unwrap();

@@ -139,7 +139,7 @@ pub(super) mod tests {
 
     use super::*;
     use crate::sample_record;
-    use softvt_evaluation::{drop::DropEvent, stage::Stage};
+    use softvt_evaluation::{drop::DropEvent, stage::TaskStage};
 
     /// A finished run of `records` in the folder `dir`.
     pub(crate) fn stored(dir: &str, policy: &str, mut records: Vec<EpisodeRecord>) -> StoredRun {
@@ -222,7 +222,7 @@ pub(super) mod tests {
         record.verdict.drop = Some(DropEvent { reason: DropReason::NoEvidence, time_s: 0.0 });
         let reason = unsafe_reason(&record).unwrap();
         assert!(reason.starts_with("the action holds NaN") && !reason.contains("dropped"), "{reason}");
-        record.verdict.failed_stage = Some(Stage::Reach);
+        record.verdict.failed_stage = Some(TaskStage::Reach);
         assert!(unsafe_reason(&record).unwrap().contains("; failed while: reach;"));
     }
 }

@@ -28,20 +28,20 @@ pub enum MergeError {
     File(#[from] FileError),
     #[error(transparent)]
     Thresholds(#[from] ThresholdError),
-    #[error("{0}; --resume of that shard restores it")]
+    #[error("{0}; resume that shard to restore it")]
     Actions(#[from] ActionsError),
     #[error("{out} already exists; give a new folder")]
     OutputExists { out: String },
     #[error("these are shards of several suites ({suites}): merge each suite separately")]
     SeveralSuites { suites: String },
-    #[error("{dir}: it is not a shard: it was run without --shard")]
+    #[error("{dir}: it is the run of a whole suite, not a shard")]
     NotShard { dir: String },
     #[error("{dir}: it is a shard of another run than {first}")]
     OtherRun { dir: String, first: String },
     #[error("{dir}: {episode} is also in {other}")]
     DuplicateEpisode { dir: String, episode: EpisodeIndex, other: String },
     #[error(
-        "suite {suite}: {missing} of {expected} episodes are missing, the first of which is {first}: a shard is not given or not finished (--resume)"
+        "suite {suite}: {missing} of {expected} episodes are missing, the first of which is {first}: a shard is not given, or not finished and can be resumed"
     )]
     Missing { suite: String, missing: usize, expected: usize, first: EpisodeIndex },
 }

@@ -173,14 +173,14 @@ impl StoredRun {
         let dir = self.dir.display();
         if self.is_partial() {
             warnings.push(format!(
-                "{dir} is not finished: it has {} of {} episodes; it is still running, or can be resumed with --resume",
+                "{dir} is not finished: it has {} of {} episodes; it is still running, or can be resumed",
                 self.records.len(),
                 self.requested_episodes()
             ));
         }
         if self.is_truncated {
             warnings.push(format!(
-                "the last line of {dir}/{EPISODES} is truncated and was skipped; --resume runs that episode again"
+                "the last line of {dir}/{EPISODES} is truncated and was skipped; a resumed run executes that episode again"
             ));
         }
         if self.text("softvt") != VERSION {

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use super::simulation::Simulation;
 use softvt_policy::{
-    Action, ActionChunk, CommandResolver, Observation, Policy, PolicyError, SensorStreams, TaskBrief,
+    Action, ActionChunk, CommandResolver, Observation, Policy, PolicyError, SensorStreams, EpisodeBrief,
     ToolCommand,
 };
 
@@ -50,14 +50,14 @@ pub trait Controller {
 pub struct ChunkedPolicy<'a> {
     policy: Box<dyn Policy + 'a>,
     replan: usize,
-    brief: Option<TaskBrief>,
+    brief: Option<EpisodeBrief>,
     remaining: VecDeque<ToolCommand>,
     resolver: CommandResolver,
 }
 
 impl<'a> ChunkedPolicy<'a> {
     /// Runs `policy` in the episode `brief`. At most the first `replan` commands of each chunk are executed.
-    pub fn new(policy: Box<dyn Policy + 'a>, brief: TaskBrief, replan: usize) -> Self {
+    pub fn new(policy: Box<dyn Policy + 'a>, brief: EpisodeBrief, replan: usize) -> Self {
         Self {
             policy,
             replan: replan.max(1),

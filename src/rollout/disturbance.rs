@@ -47,12 +47,12 @@ impl Disturbance {
 
 #[cfg(test)]
 mod tests {
-    use softvt_common::episode_id::{EpisodeId, Split};
+    use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 
     use super::*;
 
     fn disturbance(spec: &DisturbanceSpec, episode: u32) -> Disturbance {
-        let id = EpisodeId { suite: "s".into(), task: 0, episode, base_seed: 0, split: Split::Validation };
+        let id = EpisodeId { suite: "s".into(), task: 0, episode, base_seed: 0, split: EpisodeSplit::Validation };
         Disturbance::new(spec, &EpisodeSeed::new(&id, "l"))
     }
 

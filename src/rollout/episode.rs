@@ -22,7 +22,7 @@ use sha2::{Digest, Sha256};
 use softvt_common::cancel;
 
 use softvt_benchmark::{
-    Goal, GoalKind, Task,
+    Goal, Task,
     seed::{EpisodeSeed, SecretSeed},
     settings::Settings,
     steps_per_control,
@@ -200,7 +200,7 @@ pub enum EpisodeError {
     #[error(
         "task {task}, episode {episode}: the goal already holds at the start: {} rests {} {} before the robot moves; \
          place it elsewhere",
-        .goal.object, match .goal.kind { GoalKind::On => "on", GoalKind::Inside => "in" }, .goal.target
+        .goal.object, .goal.kind.preposition(), .goal.target
     )]
     GoalHolds {
         /// Task index.

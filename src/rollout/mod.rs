@@ -12,11 +12,11 @@
 //! use std::sync::Arc;
 //!
 //! use softvt_benchmark::{Goal, GoalKind, Task, settings::Settings};
-//! use softvt_common::episode_id::{EpisodeId, Split};
+//! use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 //! use softvt_evaluation::verdict::Outcome;
 //! use softvt_geometry::{Aabb, Pose, Vec3, shape::Shape};
 //! use softvt_physics::contact::Friction;
-//! use softvt_policy::{TaskBrief, builtin::NoopPolicy};
+//! use softvt_policy::{EpisodeBrief, builtin::NoopPolicy};
 //! use softvt_rollout::{AssetCache, ChunkedPolicy, Episode, EpisodeSpec, SensorAssets};
 //! use softvt_scene::{Asset, Body, Lighting, Object, Scene};
 //!
@@ -56,11 +56,11 @@
 //!     expert: false,
 //! };
 //! let suite = "example".to_owned();
-//! let id = EpisodeId { suite: suite.clone(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };
+//! let id = EpisodeId { suite: suite.clone(), task: 0, episode: 0, base_seed: 0, split: EpisodeSplit::Validation };
 //! let spec = EpisodeSpec::new(id, "noop", &task, &scene.clone(), scene, &Settings::default());
 //! let episode = Episode::start(spec, &AssetCache::default(), &SensorAssets::default())?;
 //!
-//! let brief = TaskBrief { suite, task: 0, prompt: task.prompt.clone(), episode: 0, seed: 0, alias: None };
+//! let brief = EpisodeBrief { suite, task: 0, prompt: task.prompt.clone(), episode: 0, seed: 0, alias: None };
 //! let finished = episode.run(&mut ChunkedPolicy::new(Box::<NoopPolicy>::default(), brief, 1))?;
 //! assert_eq!(finished.record.outcome, Outcome::Budget);
 //! assert_eq!(finished.record.stats.steps, 3);

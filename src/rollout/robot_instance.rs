@@ -122,6 +122,11 @@ impl RobotInstance {
         articulation.drives_mut()[ARM_DOFS..].iter_mut().flatten().for_each(|drive| drive.target = target);
     }
 
+    /// Stiffness of the drive of a finger, N/m.
+    pub fn finger_stiffness(&self) -> f64 {
+        self.spec.gripper.kp
+    }
+
     /// Arm joint angles, rad.
     pub fn q(&self, world: &World) -> [f64; ARM_DOFS] {
         std::array::from_fn(|i| world.articulation(self.articulation).state.q[i])

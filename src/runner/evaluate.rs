@@ -404,7 +404,7 @@ mod tests {
     use crate::{config::ConfiguredScript, suite_run::SuiteRun};
     use softvt_benchmark::Plan;
     use softvt_benchmark::Task;
-    use softvt_policy::{Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief};
+    use softvt_policy::{Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, EpisodeBrief};
     use softvt_rollout::{ChunkedPolicy, Controller};
     use softvt_script::EpisodeSetup;
 
@@ -426,7 +426,7 @@ mod tests {
         }
     }
 
-    fn force_observer(_: EpisodeSetup, brief: TaskBrief) -> Result<Box<dyn Controller>, RunError> {
+    fn force_observer(_: EpisodeSetup, brief: EpisodeBrief) -> Result<Box<dyn Controller>, RunError> {
         Ok(Box::new(ChunkedPolicy::new(Box::new(ForceObserver), brief, 1)))
     }
 

@@ -15,7 +15,7 @@ use softvt_common::cancel;
 use softvt_common::text;
 use softvt_dataset::layout::is_dataset;
 use softvt_policy::{
-    Policy, SensorStreams, TaskBrief, builtin,
+    Policy, SensorStreams, EpisodeBrief, builtin,
     builtin::RecordedPolicy,
     profile::{GripCode, PROFILES, Profile},
     remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},
@@ -250,7 +250,7 @@ fn suggestion<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> String {
 
 /// Makes the controller of an episode.
 pub type ControllerFactory =
-    Box<dyn Fn(EpisodeSetup, TaskBrief) -> Result<Box<dyn Controller>, RunError> + Send + Sync>;
+    Box<dyn Fn(EpisodeSetup, EpisodeBrief) -> Result<Box<dyn Controller>, RunError> + Send + Sync>;
 
 #[derive(Clone, Debug)]
 enum PolicyKind {
@@ -267,7 +267,7 @@ enum PolicyKind {
 }
 
 /// Makes a policy for an episode.
-type StartPolicy = dyn Fn(&TaskBrief) -> Box<dyn Policy> + Send + Sync;
+type StartPolicy = dyn Fn(&EpisodeBrief) -> Box<dyn Policy> + Send + Sync;
 
 /// A policy in Rust.
 #[derive(Clone)]
@@ -414,7 +414,7 @@ impl PolicyConfig {
     /// A built-in policy has the name.
     pub fn of(
         name: &str,
-        start: impl Fn(&TaskBrief) -> Box<dyn Policy> + Send + Sync + 'static,
+        start: impl Fn(&EpisodeBrief) -> Box<dyn Policy> + Send + Sync + 'static,
     ) -> Result<Self, RunError> {
         if BuiltinPolicy::named(name).is_some() {
             return Err(RunError::input(format!(

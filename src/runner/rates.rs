@@ -12,7 +12,7 @@ use super::{config::RunConfig, error::RunError};
 use softvt_benchmark::{CONTROL_HZ, Plan};
 use softvt_common::{
     cancel,
-    episode_id::{EpisodeId, Split},
+    episode_id::{EpisodeId, EpisodeSplit},
     parallel,
 };
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
@@ -158,7 +158,7 @@ fn time_episode(
         return Err(RunError::input("the script is not a suite"));
     };
     let id =
-        EpisodeId { suite: suite.name.clone(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };
+        EpisodeId { suite: suite.name.clone(), task: 0, episode: 0, base_seed: 0, split: EpisodeSplit::Validation };
     let opened = EpisodeSetup::open(loaded, &id, &SceneChanges::default()).map_err(RunError::input)?;
     let (task, settings) = (&suite.tasks[0], &suite.settings);
     let spec = EpisodeSpec::new(id, "expert", task, &opened.nominal, opened.scene.clone(), settings);

@@ -6,9 +6,9 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::{episode_list::EpisodeList, error::RunError};
-use softvt_common::episode_id::{EpisodeIndex, Split};
+use softvt_common::episode_id::{EpisodeIndex, EpisodeSplit};
 use softvt_common::files::FileError;
-use softvt_policy::{Action, TaskBrief};
+use softvt_policy::{Action, EpisodeBrief};
 use softvt_report::{
     actions,
     run_folder::EPISODES,
@@ -27,7 +27,7 @@ pub(crate) struct RecordedRuns {
 
 /// The run whose actions are repeated, as `run.json` names it.
 #[derive(Clone, Debug, Serialize)]
-pub struct ReplaySource {
+pub(crate) struct ReplaySource {
     /// The folder, as it was typed.
     pub run: String,
     /// Name of the recorded policy.
@@ -78,7 +78,7 @@ impl RecordedRuns {
             let seed = seed.map_or("unknown".to_owned(), |seed| seed.to_string());
             return refuse(format!("its seed is {seed}, that of this run {base_seed}"));
         }
-        let (split, own) = (run.text("split"), Split::Validation.name());
+        let (split, own) = (run.text("split"), EpisodeSplit::Validation.name());
         if split != own {
             return refuse(format!("its split is {split}, that of this run {own}"));
         }
@@ -114,7 +114,7 @@ impl RecordedRuns {
         &self,
         suite: &str,
         is_twin: bool,
-        brief: &TaskBrief,
+        brief: &EpisodeBrief,
     ) -> Result<Vec<Action>, RunError> {
         let dir = self.run_of(suite, is_twin).map_or(&self.dir, |run| &run.dir);
         Ok(actions::read(&actions::path(dir, brief.index()))?)

@@ -26,7 +26,7 @@ use crate::{
 };
 use softvt_benchmark::{CONTROL_HZ, Suite, Task};
 use softvt_common::cancel;
-use softvt_common::episode_id::{EpisodeIndex, Split};
+use softvt_common::episode_id::{EpisodeIndex, EpisodeSplit};
 use softvt_common::{
     files::{self, FileError},
     parallel,
@@ -114,7 +114,7 @@ impl<'a> SuiteRecording<'a> {
         }
         let folder_name = path_component(&config.suite_name(suite));
         let run = SuiteRun {
-            split: Split::Demonstration,
+            split: EpisodeSplit::Demonstration,
             renders_episodes: true,
             // The streams of contact, slip and drop come from the trace.
             records_trace: true,

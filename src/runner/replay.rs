@@ -22,7 +22,7 @@ use crate::{
 };
 use softvt_benchmark::{Suite, seed::SecretSeed};
 use softvt_common::cancel;
-use softvt_common::episode_id::{EpisodeIndex, Split};
+use softvt_common::episode_id::{EpisodeIndex, EpisodeSplit};
 use softvt_common::parallel;
 use softvt_dataset::{
     TaskFile,
@@ -171,7 +171,7 @@ impl StoredManifest<'_> {
         }
     }
 
-    fn split(&self) -> Result<Split, RunError> {
+    fn split(&self) -> Result<EpisodeSplit, RunError> {
         let name = self.text("split");
         name.parse().map_err(|_| RunError::input(format!("{}: unknown split {name:?}", self.path.display())))
     }

@@ -9,7 +9,7 @@ use crate::{
     suite_run::{PreparedRun, SuiteRun},
 };
 use softvt_benchmark::{Plan, Suite, seed::SecretSeed};
-use softvt_common::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_policy::Observation;
 use softvt_script::LoadedScript;
 use softvt_serve::{AccessRules, RequestError, ServerConfig};
@@ -29,7 +29,7 @@ pub fn check_served(ConfiguredScript { config, script: loaded }: &ConfiguredScri
 /// A suite, shift, setting, scene or calibration file that is not valid.
 pub fn prepare_served<'a>(
     ConfiguredScript { config, script: loaded }: &'a ConfiguredScript,
-    split: Split,
+    split: EpisodeSplit,
 ) -> Result<Vec<PreparedRun<'a>>, RunError> {
     let suites = suites_of(&loaded.plan);
     let is_list = matches!(loaded.plan, Plan::Suites { .. });
@@ -76,7 +76,7 @@ pub fn server_config<'a>(
         privileged: config.policy.privileged,
         seed: config.seed,
         has_secret_seed: config.secret.is_some(),
-        split: runs.first().map_or(Split::Validation, |run| run.split),
+        split: runs.first().map_or(EpisodeSplit::Validation, |run| run.split),
         fingerprint: provenance_hash(config, loaded),
         access,
         start_episode: Box::new(start_episode),

@@ -14,10 +14,10 @@ use crate::{
 };
 use softvt_benchmark::{ObjectType, ShiftValue, Suite, Task, settings::Settings};
 use softvt_common::cancel;
-use softvt_common::episode_id::{EpisodeId, EpisodeIndex, Split};
+use softvt_common::episode_id::{EpisodeId, EpisodeIndex, EpisodeSplit};
 use softvt_common::{parallel, text::unknown_name};
 use softvt_dataset::card::Imported;
-use softvt_policy::{PolicyError, SensorStreams, TaskBrief, remote::PolicyConnections};
+use softvt_policy::{PolicyError, SensorStreams, EpisodeBrief, remote::PolicyConnections};
 use softvt_records::record::Origin;
 use softvt_rollout::{
     AssetCache, BuildError, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SensorAssets, Sensors,
@@ -48,26 +48,26 @@ pub struct SuiteRun<'a> {
     /// Files with the deformation limits of the objects.
     pub(crate) calibration_files: Arc<CalibrationFiles>,
     /// False if objects have no limits, since no verdict is shown.
-    pub reads_limits: bool,
+    pub(crate) reads_limits: bool,
     /// The recorded run whose actions are repeated.
-    pub replay_source: Option<ReplaySource>,
+    pub(crate) replay_source: Option<ReplaySource>,
     /// Meshes of the objects, shared by all episodes.
-    pub assets: AssetCache,
+    pub(crate) assets: AssetCache,
     /// Data of cameras and tactile sensors, shared by all episodes.
-    pub sensor_assets: SensorAssets,
+    pub(crate) sensor_assets: SensorAssets,
     /// Folder of the run.
     pub out: PathBuf,
     /// True if any episode may be rendered.
-    pub renders_episodes: bool,
+    pub(crate) renders_episodes: bool,
     /// True if every control step is recorded.
     pub(crate) records_trace: bool,
     /// Split of the episodes.
-    pub split: Split,
+    pub(crate) split: EpisodeSplit,
     pub(crate) connections: Option<Arc<PolicyConnections>>,
     /// Demonstrations of other simulators that the episodes re-execute.
-    pub origins: BTreeMap<EpisodeIndex, Origin>,
+    pub(crate) origins: BTreeMap<EpisodeIndex, Origin>,
     /// Files of those demonstrations.
-    pub imported: Vec<Imported>,
+    pub(crate) imported: Vec<Imported>,
     /// Makes the controller of an episode.
     pub controllers: ControllerFactory,
 }
@@ -127,7 +127,7 @@ impl<'a> SuiteRun<'a> {
             out,
             renders_episodes: config.video.is_some(),
             records_trace: config.trace.is_some(),
-            split: Split::Validation,
+            split: EpisodeSplit::Validation,
             controllers: config.policy.controller_factory(
                 connections.clone(),
                 &suite.name,
@@ -181,8 +181,8 @@ impl<'a> SuiteRun<'a> {
         Some(secret.episode_name(&self.name, task.id, episode))
     }
 
-    pub(crate) fn brief(&self, task: &Task, episode: u32) -> TaskBrief {
-        TaskBrief {
+    pub(crate) fn brief(&self, task: &Task, episode: u32) -> EpisodeBrief {
+        EpisodeBrief {
             suite: self.name.clone(),
             task: task.id,
             prompt: task.prompt.clone(),
@@ -307,7 +307,7 @@ impl<'a> SuiteRun<'a> {
         controllers: &ControllerFactory,
     ) -> Result<Result<FinishedEpisode, EpisodeError>, RunError> {
         let (spec, opened) = self.spec(job.task, &self.episode_id(job.task, job.episode), origin)?;
-        let brief = TaskBrief { prompt: opened.prompt.clone(), ..self.brief(job.task, job.episode) };
+        let brief = EpisodeBrief { prompt: opened.prompt.clone(), ..self.brief(job.task, job.episode) };
         let mut controller = controllers(opened, brief)?;
         let spec = EpisodeSpec { record_states: keep_states, ..spec };
         let started = Episode::start(spec, &self.assets, &self.sensor_assets);
@@ -425,7 +425,7 @@ impl<'a> SuiteRun<'a> {
             if let Some(connections) = &self.connections {
                 connections.check().map_err(policy_failure)?;
             }
-            let brief = TaskBrief { prompt: opened.prompt.clone(), ..self.brief(task, first) };
+            let brief = EpisodeBrief { prompt: opened.prompt.clone(), ..self.brief(task, first) };
             let controller = (self.controllers)(opened, brief)?;
             // A client of `softvt serve` has no controller here.
             let declared = self.config.policy.declared.as_ref();

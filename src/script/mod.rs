@@ -12,7 +12,7 @@ mod schema;
 pub mod stubs;
 mod vm;
 
-pub use api::experiment_input::{ExperimentInput, InputError};
+pub use api::experiment_input::{ExperimentInput, ExperimentInputError};
 pub use plan::{
     LoadedScript, ScriptSources, declared_options, load, load_with,
     options::{OptionSpec, ScriptOptionValue},

@@ -113,10 +113,10 @@ impl fmt::Debug for Attempt<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use softvt_common::episode_id::Split;
+    use softvt_common::episode_id::EpisodeSplit;
 
     fn id(episode: u32) -> EpisodeId {
-        EpisodeId { suite: "one".to_owned(), task: 0, episode, base_seed: 0, split: Split::Validation }
+        EpisodeId { suite: "one".to_owned(), task: 0, episode, base_seed: 0, split: EpisodeSplit::Validation }
     }
 
     /// Runs `test` on the attempts of a server that records the episodes below 10; returns the reports of lost ones.

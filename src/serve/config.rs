@@ -2,7 +2,7 @@
 
 use super::access::AccessRules;
 use softvt_benchmark::Suite;
-use softvt_common::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_policy::{PolicyError, profile::Profile};
 use softvt_rollout::{Episode, EpisodeError, FinishedEpisode};
 
@@ -60,7 +60,7 @@ pub struct ServerConfig<'a> {
     /// True if draws derive from a secret seed; requests then cannot name another.
     pub has_secret_seed: bool,
     /// Split of requests without one.
-    pub split: Split,
+    pub split: EpisodeSplit,
     /// Hash of the scripts, shifts, settings and version. States of servers with another hash are refused.
     pub fingerprint: String,
     /// Connections that are accepted.

@@ -7,7 +7,7 @@ use super::{
     state::{ActionRow, EpisodeState},
 };
 use softvt_benchmark::Suite;
-use softvt_common::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_policy::{
     msgpack::{NumberArray, entry, kind, names, numbers},
     profile::ACTION_LEN,
@@ -104,7 +104,7 @@ fn episode_id(fields: &RequestFields, config: &ServerConfig) -> Result<EpisodeId
     let split = match fields.text("split")? {
         None => config.split,
         Some(name) => name
-            .parse::<Split>()
+            .parse::<EpisodeSplit>()
             .map_err(|error| fields.error(&format!("split is {:?}; {error}", shortened(&name))))?,
     };
     if !suite.tasks.iter().any(|known| known.id == task) {

@@ -110,10 +110,10 @@ impl LiveEpisode {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use softvt_common::episode_id::Split;
+    use softvt_common::episode_id::EpisodeSplit;
 
     fn state(episode: u32, actions: &[f64]) -> EpisodeState {
-        let (suite, split) = ("one".to_owned(), Split::Validation);
+        let (suite, split) = ("one".to_owned(), EpisodeSplit::Validation);
         let id = EpisodeId { suite, task: 0, episode, base_seed: 0, split };
         EpisodeState { id, actions: actions.iter().map(|x| [*x; ACTION_LEN]).collect() }
     }

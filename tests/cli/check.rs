@@ -31,7 +31,7 @@ fn warnings_are_printed_and_errors_refused() {
 fn a_twin_of_a_rigid_suite_is_refused() {
     let text = Small::default().text().replace("\"deformable\"", "\"rigid\"");
     assert_eq!(
-        Project::new(&[("x.lua", &text)]).refusal("check x.lua --twin rigid"),
-        "x.lua: --twin: the objects of this suite are rigid already; leave it out"
+        Project::new(&[("x.lua", &text)]).refusal("check x.lua --rigid-twin"),
+        "x.lua: --rigid-twin: the objects of this suite are rigid already; leave it out"
     );
 }

@@ -295,9 +295,9 @@ fn the_rigid_twin_of_rigid_objects_is_refused() {
         .replace("softvt.soft { youngs_pa = 2e4, poisson = 0.3,", "softvt.rigid {")
         .replace("\"deformable\"", "\"rigid\"");
     let project = Project::new(&[("soft.lua", &soft), ("rigid.lua", &rigid)]);
-    let refused = project.refusal("check rigid.lua --twin rigid");
-    assert!(refused.contains("--twin: the objects of this suite are rigid already"), "{refused}");
-    project.succeeds("check soft.lua --twin rigid");
+    let refused = project.refusal("check rigid.lua --rigid-twin");
+    assert!(refused.contains("--rigid-twin: the objects of this suite are rigid already"), "{refused}");
+    project.succeeds("check soft.lua --rigid-twin");
 }
 
 #[test]

@@ -29,7 +29,7 @@ fn exports_are_printed_and_invalid_ones_refused() {
     project.write("full/mine", b"mine");
     project.write("broken/recording.json", b"{}");
     for (words, output) in [
-        ("data --format lerobot-v3.0 --out full", "--out full: it holds mine; nothing was written"),
+        ("data --format lerobot-v3.0 --out full", "full: it holds mine; nothing was written"),
         (
             "data --format lerobot-v3.0 --out x --gripper wide",
             "[possible values: continuous, binary, two-width, force]",

@@ -58,7 +58,7 @@ fn view_writes_identical_stills_and_video_each_time() {
 #[test]
 fn native_stills_have_the_native_size() {
     let project = short();
-    project.succeeds("view x.lua --native --policy noop --out seen");
+    project.succeeds("view x.lua --full-size --policy noop --out seen");
     let size = |name: &str| png_size(&fs::read(project.path(name)).expect("written"));
     assert_eq!((size("seen/end_third_person.png"), size("seen/end_wrist.png")), ([1024, 1024], [512, 512]));
 }

@@ -5,7 +5,7 @@ use std::{fs, path::Path, sync::Arc};
 use softvt::{
     benchmark::Teacher,
     dataset::{card::DatasetCard, check, manifest, stats},
-    episode_id::Split,
+    episode_id::EpisodeSplit,
     policy::profile::GripCode,
     runner::{
         DemoCount, PolicyOptions, Silent,
@@ -104,7 +104,7 @@ fn the_first_good_attempts_are_kept() {
     assert_eq!(DatasetCard::read(&project.path("a")).expect("a card").tasks, summary.tasks);
     let attempts = project.stored("a/attempts").expect("a run").swap_remove(0).records;
     assert_eq!(attempts.len(), task.attempts, "those not kept are there too");
-    assert!(attempts.iter().all(|attempt| attempt.header.id.split == Split::Demonstration));
+    assert!(attempts.iter().all(|attempt| attempt.header.id.split == EpisodeSplit::Demonstration));
     let good = attempts.iter().filter(|attempt| attempt.verdict.safety);
     let good: Vec<u32> = good.map(|attempt| attempt.header.id.episode).collect();
     let entries = manifest::read(&project.path("a")).expect("a manifest");

@@ -4,7 +4,7 @@ use std::{path::Path, sync::Arc};
 
 use softvt::{
     benchmark::{Plan, settings::Settings},
-    episode_id::{EpisodeId, Split},
+    episode_id::{EpisodeId, EpisodeSplit},
     rollout::{AssetCache, Simulation, state_hash},
     scene::Scene,
     script::{self, EpisodeSetup, LoadedScript, SceneChanges},
@@ -22,7 +22,7 @@ fn loaded() -> LoadedScript {
 
 fn scene(loaded: &LoadedScript, task: usize, episode: u32, base_seed: u64) -> Scene {
     let id =
-        EpisodeId { suite: "spatial_soft".to_owned(), task, episode, base_seed, split: Split::Validation };
+        EpisodeId { suite: "spatial_soft".to_owned(), task, episode, base_seed, split: EpisodeSplit::Validation };
     EpisodeSetup::open(loaded, &id, &SceneChanges::default()).expect("the episode opens").scene
 }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use softvt::{
-    evaluation::{stage::Stage, verdict::Verdict},
+    evaluation::{stage::TaskStage, verdict::Verdict},
     runner::TraceDetail,
 };
 
@@ -97,7 +97,7 @@ fn objects_are_supported_by_what_they_rest_on() {
             let expected = (lower != "soft").then_some(true);
             assert_eq!(verdict.others_ok, expected, "no limit: {verdict:#?}");
         }
-        assert_eq!((verdicts[0].failed_stage, verdicts[1].failed_stage), (None, Some(Stage::Grasp)));
+        assert_eq!((verdicts[0].failed_stage, verdicts[1].failed_stage), (None, Some(TaskStage::Grasp)));
     }
 }
 

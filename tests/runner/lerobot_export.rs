@@ -18,7 +18,7 @@ use softvt::{
         lerobot::{self, ExportConfig, ExportSummary, LeRobotVersion},
         manifest,
     },
-    episode_id::Split,
+    episode_id::EpisodeSplit,
     policy::profile::GripCode,
 };
 
@@ -137,7 +137,7 @@ fn rows_are_the_inputs_of_a_policy() {
         "longer than a policy's history: {}",
         rows.len()
     );
-    let access = Access { split: Split::Demonstration, ..Access::default() };
+    let access = Access { split: EpisodeSplit::Demonstration, ..Access::default() };
     let server = Server::with(&project.run("x.lua").profile("visuo_tactile"), access);
     let (mut client, _) = server.client();
     let episode = manifest::read(&project.path("data")).expect("a manifest")[0].episode;
@@ -238,13 +238,13 @@ fn invalid_exports_are_refused_and_leave_nothing() {
     };
     let task = |word: &str| ExportConfig { tasks: vec![word.to_owned()], ..config("data", "x") };
     for (config, output) in [
-        (config("data", "full"), "--out full: it holds mine; nothing was written"),
-        (config("data", "full/mine"), "--out full/mine: it is not a folder"),
-        (task("7"), "--task \"7\" matches no task"),
-        (task("dance"), "--task \"dance\" matches no task"),
+        (config("data", "full"), "full: it holds mine; nothing was written"),
+        (config("data", "full/mine"), "full/mine: it is not a folder"),
+        (task("7"), "no task matches \"7\""),
+        (task("dance"), "no task matches \"dance\""),
         (config("full", "x"), "full: dataset.json: it is missing; expected the folder"),
         (config("nowhere", "x"), "nowhere: dataset.json: it is missing"),
-        (config("plain", "x"), "record with --images hdf5"),
+        (config("plain", "x"), "record them in the HDF5 files"),
     ] {
         let message = refusal(&config);
         assert!(message.contains(output), "{output}: {message}");

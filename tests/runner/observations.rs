@@ -4,8 +4,8 @@ use std::{path::Path, sync::Arc};
 
 use softvt::{
     benchmark::{Plan, settings::Settings},
-    episode_id::{EpisodeId, Split},
-    policy::{Action, ActionChunk, Observation, Policy, PolicyError, RobotState, SensorStreams, TaskBrief},
+    episode_id::{EpisodeId, EpisodeSplit},
+    policy::{Action, ActionChunk, Observation, Policy, PolicyError, RobotState, SensorStreams, EpisodeBrief},
     records::{record::EpisodeRecord, summary::SuiteSummary},
     report::terminal,
     rollout::{AssetCache, ChunkedPolicy, Episode, EpisodeSpec, SensorAssets, Sensors, Simulation},
@@ -16,7 +16,7 @@ use softvt::{
 use crate::support::{Project, SPATIAL_SOFT, Small};
 
 fn episode_id(suite: &str, task: usize) -> EpisodeId {
-    EpisodeId { suite: suite.to_owned(), task, episode: 0, base_seed: 0, split: Split::Validation }
+    EpisodeId { suite: suite.to_owned(), task, episode: 0, base_seed: 0, split: EpisodeSplit::Validation }
 }
 
 /// Stores its observations.
@@ -54,7 +54,7 @@ fn played(project: &Project, streams: SensorStreams) -> Result<(Vec<Observation>
         Episode::start(spec, &AssetCache::default(), &SensorAssets::default()).map_err(|e| e.to_string())?;
     let mut witness = RecordingPolicy { streams, seen: Vec::new() };
     let brief =
-        TaskBrief { suite: "one".into(), task: 0, prompt: "wait".into(), episode: 0, seed: 0, alias: None };
+        EpisodeBrief { suite: "one".into(), task: 0, prompt: "wait".into(), episode: 0, seed: 0, alias: None };
     let mut driver = ChunkedPolicy::new(Box::new(&mut witness), brief, 1);
     let outcome = episode.run(&mut driver).map_err(|e| e.to_string());
     drop(driver);

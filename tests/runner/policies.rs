@@ -3,7 +3,7 @@
 use std::{net::TcpListener, time::Duration};
 
 use softvt::{
-    evaluation::{stage::Stage, verdict::Outcome},
+    evaluation::{stage::TaskStage, verdict::Outcome},
     policy::{builtin::NoopPolicy, profile::GripCode, remote::Protocol},
     records::record::EpisodeRecord,
     report::comparison,
@@ -297,7 +297,7 @@ fn peak_force_of_lifting(policy: &str, material: &'static str) -> f64 {
     }
     .project();
     let verdict = project.run("x.lua").policy(policy).threads(1).record().verdict;
-    assert_eq!((verdict.failed_stage, verdict.no_drop), (Some(Stage::Carry), true), "{verdict:?}");
+    assert_eq!((verdict.failed_stage, verdict.no_drop), (Some(TaskStage::Carry), true), "{verdict:?}");
     verdict.peak_pad_force_n
 }
 

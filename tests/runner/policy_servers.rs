@@ -253,7 +253,7 @@ fn missing_servers_are_reported() {
     let free = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("an address");
     let output = failure(&format!("ws://{free}"), |run| run.timeout(Duration::from_millis(300)));
     assert!(
-        output.contains("no policy server at ws://127.0.0.1") && output.contains("--policy-timeout"),
+        output.contains("no policy server at ws://127.0.0.1") && output.contains("allow it more time"),
         "{output}"
     );
 }

@@ -4,7 +4,7 @@ use std::fs;
 
 use serde_json::{Value, json};
 use softvt::{
-    evaluation::stage::Stage,
+    evaluation::stage::TaskStage,
     report::{comparison, terminal},
     runner::TraceDetail,
 };
@@ -77,7 +77,7 @@ fn harm_and_stages_are_compared() {
     assert_eq!(row(&text, "D mean")[0], "%", "{text}");
     let all = &compared.all;
     assert_eq!((all.d_mean.n, all.d_final.n, all.d_p95.n), (2, 2, 2));
-    assert_eq!(all.failed_stages.first, [(Stage::Reach, 2)].into());
+    assert_eq!(all.failed_stages.first, [(TaskStage::Reach, 2)].into());
     assert_eq!((all.invalid_pairs, all.goal.n), (0, 2));
 }
 

@@ -14,7 +14,7 @@ use std::{
 use rmpv::Value;
 use softvt::{
     cancel::CancelFlag,
-    episode_id::Split,
+    episode_id::EpisodeSplit,
     records::summary::SuiteSummary,
     runner::{
         PolicyConfig, PolicyOptions, RunConfig, RunError, ServedRuns, check_served, first_observation,
@@ -32,7 +32,7 @@ use crate::support::{
 /// How clients are served.
 #[derive(Clone)]
 pub struct Access {
-    pub split: Split,
+    pub split: EpisodeSplit,
     pub is_privileged: bool,
     pub max_clients: usize,
     pub token: Option<String>,
@@ -40,7 +40,7 @@ pub struct Access {
 
 impl Default for Access {
     fn default() -> Self {
-        Self { split: Split::Validation, is_privileged: false, max_clients: 8, token: None }
+        Self { split: EpisodeSplit::Validation, is_privileged: false, max_clients: 8, token: None }
     }
 }
 
@@ -237,7 +237,7 @@ fn info_counts_commands_out_of_reach_and_grip_values_out_of_range() {
 #[test]
 fn privileged_clients_receive_the_true_state() {
     let project = project();
-    let access = Access { split: Split::Demonstration, is_privileged: true, ..Access::default() };
+    let access = Access { split: EpisodeSplit::Demonstration, is_privileged: true, ..Access::default() };
     let server = Server::with(&vision(&project).seed(3), access);
     let (mut client, hello) = server.client();
     assert_eq!((get(&hello, "seed").as_u64(), text(&hello, "split")), (Some(3), "demonstration"));

@@ -4,7 +4,7 @@ use std::fs;
 
 use rmpv::Value;
 use softvt::{
-    episode_id::{EpisodeIndex, Split},
+    episode_id::{EpisodeIndex, EpisodeSplit},
     policy::{Action, profile::GripCode},
     report::{actions, comparison, terminal},
 };
@@ -127,7 +127,7 @@ fn a_served_run_is_replayed_compared_and_reported() {
     assert_eq!(episodes, [0, 2], "sorted");
     assert!(project.is_reproduced("served", "0/0") && project.is_reproduced("served", "0/2"));
     let report = project.report(&["served"]);
-    let warning = "served is not finished: it has 2 of 3 episodes; it is still running, or can be resumed with --resume";
+    let warning = "served is not finished: it has 2 of 3 episodes; it is still running, or can be resumed";
     assert_eq!(report.warnings, [warning]);
     let viewed = "softvt view x.lua --task 0 --policy served --out seen";
     assert!(report.html.contains(viewed), "a command that repeats the actions");
@@ -313,7 +313,7 @@ fn folders_that_do_not_fit_are_refused() {
         (
             served(&project, 2, "served"),
             validation.clone(),
-            "served already holds a run (run.json): resume it with --resume",
+            "served already holds a run (run.json): resume it, or give another output folder",
         ),
         (
             served(&project, 2, "foreign"),
@@ -325,7 +325,7 @@ fn folders_that_do_not_fit_are_refused() {
         (resumed().seed(1), validation.clone(), "belongs to another run"),
         (
             resumed(),
-            Access { split: Split::Demonstration, ..validation.clone() },
+            Access { split: EpisodeSplit::Demonstration, ..validation.clone() },
             "split: \"validation\" before, \"demonstration\" now",
         ),
         (resumed(), Access { is_privileged: true, ..validation.clone() }, "belongs to another run"),

@@ -7,7 +7,7 @@ use crate::{
     error::CliError,
     output::{eprint_notice, print},
 };
-use softvt_benchmark::{Goal, GoalKind, Plan, REFERENCE, Suite};
+use softvt_benchmark::{Goal, Plan, REFERENCE, Suite};
 use softvt_common::text::{self, counted};
 use softvt_runner::{ConfiguredScript, SuiteChecker, conditions, selection::check_distinct_out_dirs};
 use softvt_script::ExperimentInput;
@@ -63,10 +63,7 @@ fn print_tasks(suite: &Suite) -> Result<(), CliError> {
     for task in &suite.tasks {
         let expert = if task.expert { "" } else { ", no expert" };
         let Goal { kind, object, target, .. } = &task.goal;
-        let relation = match kind {
-            GoalKind::On => "on",
-            GoalKind::Inside => "in",
-        };
+        let relation = kind.preposition();
         let (id, prompt) = (task.id, text::escape_control(&task.prompt));
         print(&format!("{id:>4} {prompt}: {object} {relation} {target}{expert}\n"))?;
     }

@@ -18,7 +18,7 @@ use crate::{
 };
 use softvt_common::{
     cancel::{self, CancelFlag},
-    episode_id::Split,
+    episode_id::EpisodeSplit,
 };
 use softvt_report::terminal;
 use softvt_runner::{
@@ -47,7 +47,7 @@ pub(crate) struct ServeArgs {
     threads: u16,
     /// List of episodes for clients that do not name one
     #[arg(long, value_name = "SPLIT", default_value = "validation")]
-    split: Split,
+    split: EpisodeSplit,
     /// Token that clients have to send as Authorization: Bearer TOKEN [default: the environment variable SOFTVT_TOKEN, if set]
     #[arg(long, value_name = "TOKEN", value_parser = parse_token)]
     token: Option<String>,

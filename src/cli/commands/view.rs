@@ -31,9 +31,9 @@ pub(crate) struct ViewArgs {
     /// Episode of the task
     #[arg(long, value_name = "N", default_value = "0")]
     episode: u32,
-    /// Stills at the native size of the cameras: 1024 and 512 pixels instead of 224
+    /// Stills at the full size of the cameras: 1024 and 512 pixels instead of 224
     #[arg(long)]
-    native: bool,
+    full_size: bool,
     /// Output folder
     #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     out: PathBuf,
@@ -75,7 +75,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     let last = states.frames.len().saturating_sub(1);
     let worst = worst_state(&states);
     let moments = [("start", 0), ("worst", worst), ("end", last)];
-    let mut written = write_stills(&mut states, &moments, args.native, dir, cancel::requested)?;
+    let mut written = write_stills(&mut states, &moments, args.full_size, dir, cancel::requested)?;
     let still = dir.join("episode.png");
     write_video_frame(&mut states, &caption, worst, &still)?;
     written.push(still);

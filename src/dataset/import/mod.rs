@@ -18,7 +18,7 @@ use sha2::{Digest, Sha256};
 
 use self::demo_reader::DemoReader;
 use super::{DatasetError, TaskFile};
-use softvt_common::episode_id::Split;
+use softvt_common::episode_id::EpisodeSplit;
 use softvt_common::files::FileError;
 use softvt_policy::ToolCommand;
 
@@ -54,7 +54,7 @@ fn softvt_demo(reader: DemoReader) -> Result<ForeignDemo, DatasetError> {
     let record = reader.file.record(reader.demo)?;
     let header = &record.header;
     let id = &header.id;
-    if id.split != Split::Demonstration {
+    if id.split != EpisodeSplit::Demonstration {
         let what = format!("its split is {}; expected demonstration", id.split.name());
         return Err(reader.error("metadata_json", what));
     }

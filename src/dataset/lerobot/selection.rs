@@ -54,7 +54,7 @@ pub(super) fn select(root: &Path, words: &[String]) -> Result<Selection, Dataset
         return Err(DatasetError::content(root, DATASET, what));
     }
     if !DatasetCard::read(root)?.has_images {
-        let what = "images are stored only as videos, whose compression is lossy; record with --images hdf5";
+        let what = "images are stored only as videos, whose compression is lossy; record them in the HDF5 files";
         return Err(DatasetError::content(&card_path, "pictures", what));
     }
     let entries = matching_entries(root, manifest::read(root)?, words)?;
@@ -96,7 +96,7 @@ fn matching_entries(
             let known: BTreeSet<usize> = entries.iter().map(|entry| entry.task_id).collect();
             let known: Vec<String> = known.iter().map(usize::to_string).collect();
             let what = format!(
-                "--task {word:?} matches no task: expected an index or part of a prompt; there are {}",
+                "no task matches {word:?}: expected an index or part of a prompt; there are {}",
                 known.join(", ")
             );
             return Err(DatasetError::content(root, MANIFEST, what));

@@ -31,7 +31,8 @@ impl StagedDir {
         // A link to an empty folder cannot be replaced by a folder, but its target can.
         let out = fs::canonicalize(out).unwrap_or_else(|_| out.to_path_buf());
         if out.file_name().is_none() {
-            return Err(DatasetError::content(&out, "--out", "it has no name; give a new folder"));
+            let what = "it has no name; give a new folder".to_owned();
+            return Err(DatasetError::Output { out: out.display().to_string(), what });
         }
         let temp = files::temp_path(&out);
         if fs::symlink_metadata(&temp).is_ok() {
@@ -79,7 +80,7 @@ impl StagedDir {
 pub(super) fn check_empty(out: &Path) -> Result<(), DatasetError> {
     let refuse = |what: &str| {
         let what = format!("{what}; nothing was written; give a new folder");
-        Err(DatasetError::OutputNotEmpty { out: out.display().to_string(), what })
+        Err(DatasetError::Output { out: out.display().to_string(), what })
     };
     match fs::read_dir(out) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
@@ -96,8 +97,8 @@ pub(super) fn check_empty(out: &Path) -> Result<(), DatasetError> {
 /// Removes the remains of an interrupted export.
 fn remove_remains(temp: &Path) -> Result<(), DatasetError> {
     let in_the_way = |what: &str| {
-        let what = format!("{what}; nothing was written; give another --out");
-        Err(DatasetError::OutputNotEmpty { out: temp.display().to_string(), what })
+        let what = format!("{what}; nothing was written; give another output folder");
+        Err(DatasetError::Output { out: temp.display().to_string(), what })
     };
     let Ok(marker) = File::open(temp.join(MARKER_FILE)) else {
         return in_the_way("it is in the way and not left by an interrupted export");

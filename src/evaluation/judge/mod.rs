@@ -91,8 +91,8 @@ use super::{
     grip::{GripMonitor, GripSample},
     safety::{DeformationLimit, KAPPAS, KappaVerdict, PeakDeformation, SafetyParts},
     slip::{OpeningMonitor, SlipMonitor, SlipSample},
-    stage::{StageMonitor, StageSample},
-    verdict::{OtherDeformation, Outcome, Verdict, WrongContact},
+    stage::{StageMonitor, StageEvidence},
+    verdict::{OtherObjectDeformation, Outcome, Verdict, WrongObjectContact},
 };
 
 /// Parameters of a [`Judge`], known once the scene has settled.
@@ -286,7 +286,7 @@ impl Judge {
         self.drops.update(&self.config.criteria, self.config.dt_s, &sample);
         let is_placed = self.observe_goal(evidence, sample.is_touched || sample.is_touched_by_body);
         let is_over_goal = self.config.goal.is_over(&evidence.goal.pose_w, &evidence.target.centre_w);
-        self.stage.update(&StageSample { touch, is_lifted, is_over_goal, is_placed });
+        self.stage.update(&StageEvidence { touch, is_lifted, is_over_goal, is_placed });
     }
 
     /// True if the goal has held for long enough: the episode may end.
@@ -343,7 +343,7 @@ impl Judge {
             true if others.iter().all(|other| other.deformation_ok == Some(true)) => Some(true),
             _ => None,
         };
-        let first_wrong_contact = self.first_wrong_contact.map(|contact| WrongContact {
+        let first_wrong_contact = self.first_wrong_contact.map(|contact| WrongObjectContact {
             time_s: contact.time_s,
             object: self.config.others[contact.other].name.clone(),
         });
@@ -414,11 +414,11 @@ impl Judge {
     }
 
     /// Deformation of the other soft bodies, judged if the episode ended validly.
-    fn others(&self, valid: bool) -> Vec<OtherDeformation> {
+    fn others(&self, valid: bool) -> Vec<OtherObjectDeformation> {
         let soft = self.config.others.iter().zip(&self.peaks_other).filter(|(other, _)| other.is_soft);
         soft.map(|(other, peak)| {
             let tau = other.limit.map(|limit| limit.tau_pct());
-            OtherDeformation {
+            OtherObjectDeformation {
                 object: other.name.clone(),
                 d_peak: peak.d_pct,
                 tau,

@@ -2,7 +2,7 @@ use super::*;
 use crate::{
     deformation::Deformation,
     evidence::{GoalEvidence, GripEvidence, GripperEvidence, PadEvidence},
-    stage::Stage,
+    stage::TaskStage,
     verdict::InvalidReason,
 };
 use softvt_geometry::{Aabb, Pose, Quat, Vec3};
@@ -383,13 +383,13 @@ fn a_failed_episode_names_its_stage() {
     let stage = |replay: &Replay| replay.judge.clone().finish(&Outcome::Budget).failed_stage;
     let mut replay = Replay::new(config());
     replay.rest(2, -0.2);
-    assert_eq!(stage(&replay), Some(Stage::Reach));
+    assert_eq!(stage(&replay), Some(TaskStage::Reach));
     replay.carry(2, -0.2, 0.5);
-    assert_eq!(stage(&replay), Some(Stage::Carry));
+    assert_eq!(stage(&replay), Some(TaskStage::Carry));
     replay.carry(2, 0.0, 0.5);
-    assert_eq!(stage(&replay), Some(Stage::Place));
+    assert_eq!(stage(&replay), Some(TaskStage::Place));
     replay.rest(3, 0.0);
-    assert_eq!(stage(&replay), Some(Stage::Release));
+    assert_eq!(stage(&replay), Some(TaskStage::Release));
     replay.rest(30, 0.0);
     assert_eq!(replay.verdict(Outcome::Completed).failed_stage, None);
 }

@@ -13,7 +13,7 @@ use rmpv::Value;
 use self::connection::PolicyConnection;
 pub use self::connection::{PolicyServer, Protocol};
 use super::{
-    ActionChunk, Observation, Policy, PolicyError, QueryId, SensorStreams, TaskBrief, decode, encode,
+    ActionChunk, Observation, Policy, PolicyError, QueryId, SensorStreams, EpisodeBrief, decode, encode,
     msgpack::{entry, kind},
     profile::{GripCode, Profile},
 };
@@ -92,7 +92,7 @@ impl Policy for RemotePolicy {
         self.connections.server.profile.streams()
     }
 
-    fn reset(&mut self, brief: &TaskBrief) -> Result<(), PolicyError> {
+    fn reset(&mut self, brief: &EpisodeBrief) -> Result<(), PolicyError> {
         let mut connection = self.connections.take()?;
         if self.connections.server.protocol == Protocol::VlaEval {
             let deadline = connection.server.deadline();
@@ -204,7 +204,7 @@ fn check_grip_code(server: &PolicyServer, metadata: &Value) -> Result<(), Policy
     match GripCode::named(&stated) {
         Some(code) if code == own => Ok(()),
         Some(code) => Err(server.error(&format!(
-            "states the grip code {} in its metadata, and the profile {name} reads {}: pass --gripper {}",
+            "states the grip code {} in its metadata, and the profile {name} reads {}: choose the grip code {}",
             code.name(),
             own.name(),
             code.name()

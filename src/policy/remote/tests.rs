@@ -101,7 +101,7 @@ fn episode(
     pause: Duration,
 ) -> Result<Vec<f64>, String> {
     let mut policy = RemotePolicy::new(connections.clone());
-    let brief = TaskBrief {
+    let brief = EpisodeBrief {
         suite: "one".to_owned(),
         task: 0,
         prompt: String::new(),

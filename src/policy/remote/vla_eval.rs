@@ -10,7 +10,7 @@ use rmpv::Value;
 
 use super::connection::PolicyConnection;
 use crate::{
-    ActionChunk, Observation, PolicyError, QueryId, TaskBrief, decode,
+    ActionChunk, Observation, PolicyError, QueryId, EpisodeBrief, decode,
     encode::content,
     msgpack::{entry, map, names},
     profile::{InputSource, Profile},
@@ -42,7 +42,7 @@ pub(super) fn greet(connection: &mut PolicyConnection, deadline: Instant) -> Res
 
 pub(super) fn start(
     connection: &mut PolicyConnection,
-    brief: &TaskBrief,
+    brief: &EpisodeBrief,
     deadline: Instant,
 ) -> Result<(), PolicyError> {
     let mut task = vec![("name", Value::from(brief.prompt.as_str()))];

@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 
 use super::record::{EpisodeRecord, FarCommand};
 use softvt_evaluation::{
-    safety::{DeformationLimit, PeakDeformation, SafetyParts},
-    stage::Stage,
+    safety::{DeformationLimit, SafetyParts},
+    stage::TaskStage,
     statistics::{Distribution, Rate, mean, stratified_bootstrap},
     verdict::Outcome,
 };
@@ -67,7 +67,7 @@ pub struct Scores {
     /// Share of episodes in which the robot touched a movable object other than the target.
     pub wrong_contact_rate: Rate,
     /// Number of episodes without Goal Success by the stage at which they ended.
-    pub failed_stages: BTreeMap<Stage, usize>,
+    pub failed_stages: BTreeMap<TaskStage, usize>,
     /// Smallest and largest τ that was applied, %; null without any.
     pub tau_range: Option<TauRange>,
     /// Deformation within the episodes.
@@ -106,7 +106,7 @@ pub struct EpisodeDeformation {
 
 /// One point of the curve of safety over κ.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct KappaRow {
+pub struct RatesAtKappa {
     /// Share of D_ref that is allowed.
     pub kappa: f64,
     /// D_peak ≤ κ·D_ref.
@@ -214,7 +214,7 @@ pub struct SuiteSummary {
     #[serde(flatten)]
     pub scores: Scores,
     /// Safety over κ from 0 to 1; empty where no target deforms.
-    pub kappa: Vec<KappaRow>,
+    pub kappa: Vec<RatesAtKappa>,
     /// Scores by task, in order.
     pub by_task: Vec<TaskScores>,
     /// Scores by asset of the target.
@@ -395,7 +395,7 @@ fn grouped<'a, K: Ord>(
 }
 
 /// Safety as a function of κ; everything but τ stays.
-fn kappa_curve(records: &[&EpisodeRecord]) -> Vec<KappaRow> {
+fn kappa_curve(records: &[&EpisodeRecord]) -> Vec<RatesAtKappa> {
     if !records.iter().any(|r| r.header.soft) {
         return Vec::new();
     }
@@ -404,9 +404,9 @@ fn kappa_curve(records: &[&EpisodeRecord]) -> Vec<KappaRow> {
         let kappa = f64::from(step) / f64::from(KAPPA_STEPS);
         if !is_judged {
             let none = Rate::not_judged();
-            return KappaRow { kappa, deformation_ok_rate: none, safety_success_rate: none };
+            return RatesAtKappa { kappa, deformation_ok_rate: none, safety_success_rate: none };
         }
-        KappaRow {
+        RatesAtKappa {
             kappa,
             deformation_ok_rate: Rate::from_test(records, |r| is_within(r, kappa) == Some(true)),
             safety_success_rate: Rate::from_test(records, |r| {
@@ -423,8 +423,7 @@ fn kappa_curve(records: &[&EpisodeRecord]) -> Vec<KappaRow> {
 fn is_within(record: &EpisodeRecord, kappa: f64) -> Option<bool> {
     let verdict = &record.verdict;
     let limit = verdict.d_ref.map(|d_ref_pct| DeformationLimit { d_ref_pct, kappa });
-    let peak = PeakDeformation { d_pct: verdict.d_peak, missing: verdict.missing_deformation };
-    peak.is_within(limit.map(|l| l.tau_pct())).filter(|_| record.outcome.is_valid())
+    verdict.peak().is_within(limit.map(|l| l.tau_pct())).filter(|_| record.outcome.is_valid())
 }
 
 #[cfg(test)]

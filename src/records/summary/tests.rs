@@ -1,6 +1,6 @@
 use super::*;
 use crate::record::tests::sample;
-use softvt_evaluation::verdict::{InvalidReason, Outcome, WrongContact};
+use softvt_evaluation::verdict::{InvalidReason, Outcome, WrongObjectContact};
 
 fn episode(task: usize, index: u32, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
     let mut record = sample();
@@ -116,14 +116,14 @@ fn harm_and_stages_are_counted() {
             episode(0, 0, |r| r.verdict.others_ok = Some(true)),
             episode(0, 1, |r| {
                 r.verdict.others_ok = Some(false);
-                r.verdict.first_wrong_contact = Some(WrongContact { time_s: 1.0, object: "cube".into() });
+                r.verdict.first_wrong_contact = Some(WrongObjectContact { time_s: 1.0, object: "cube".into() });
             }),
-            episode(0, 2, |r| (r.verdict.goal, r.verdict.failed_stage) = (false, Some(Stage::Lift))),
+            episode(0, 2, |r| (r.verdict.goal, r.verdict.failed_stage) = (false, Some(TaskStage::Lift))),
         ],
     );
     assert_eq!((s.scores.others_ok_rate.unwrap().rate, s.scores.others_unknown), (Some(50.0), 1));
     assert!((s.scores.wrong_contact_rate.rate.unwrap() - 100.0 / 3.0).abs() < 1e-9);
-    assert_eq!(s.scores.failed_stages, [(Stage::Lift, 1)].into());
+    assert_eq!(s.scores.failed_stages, [(TaskStage::Lift, 1)].into());
     let alone = SuiteSummary::from_records("suite", "expert", &[episode(0, 0, |_| ())]);
     assert_eq!((alone.scores.others_ok_rate, alone.scores.wrong_contact_rate.rate), (None, Some(0.0)));
     let many: Vec<_> =

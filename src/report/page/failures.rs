@@ -125,6 +125,7 @@ fn view_commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
     // The value of this flag follows an equals sign.
     view.extend(manifest["vary"].as_str().map(|file| format!("--vary={file}")));
     let is_judged = manifest["seed_hash"].is_string();
+    view.extend(manifest["twin"].is_string().then(|| "--rigid-twin".to_owned()));
     let mut add = |flag: &str, value: String| view.extend([flag.to_owned(), value]);
     add("--task", id.task.to_string());
     // Defaults are omitted.
@@ -144,9 +145,6 @@ fn view_commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
         add("--seed-file", "FILE".to_owned());
     } else if id.base_seed > 0 {
         add("--seed", id.base_seed.to_string());
-    }
-    if let Some(twin) = manifest["twin"].as_str() {
-        add("--twin", twin.to_owned());
     }
     for (flag, field) in [("--shift", "shifts"), ("--set", "set")] {
         run.changes(field).for_each(|change| add(flag, change));

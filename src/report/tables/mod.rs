@@ -10,7 +10,7 @@ use super::{
 use softvt_common::text::decimal;
 use softvt_evaluation::{
     safety::KAPPAS,
-    stage::Stage,
+    stage::TaskStage,
     statistics::{Distribution, Rate},
 };
 use softvt_records::summary::{EpisodeDeformation, Scores, TaskScores};
@@ -270,11 +270,11 @@ pub fn stage_table(runs: &[RunSummary]) -> Option<ResultTable> {
         let optional = |of: &Option<Rate>| of.as_ref().map_or_else(|| "N/A".to_owned(), rate);
         let head = [run.summary.suite.clone(), run.method.clone()];
         let harm = [optional(&s.others_ok_rate), s.others_unknown.to_string(), rate(&s.wrong_contact_rate)];
-        let stages = Stage::ALL.map(|stage| s.failed_stages.get(&stage).copied().unwrap_or(0).to_string());
+        let stages = TaskStage::ALL.map(|stage| s.failed_stages.get(&stage).copied().unwrap_or(0).to_string());
         head.into_iter().chain(harm).chain(stages).collect()
     };
     let rows: Vec<Vec<String>> = runs.iter().map(row).collect();
-    let stages = Stage::ALL.map(Stage::name);
+    let stages = TaskStage::ALL.map(TaskStage::name);
     let head = ["Suite", "Method", "Others within their τ", "Unknown", "Touched others"];
     (!rows.is_empty()).then(|| ResultTable {
         caption: "Harm to other objects, % of episodes, and the number of episodes without Goal Success by the stage at which they ended.".to_owned(),

@@ -1,7 +1,7 @@
 use super::*;
 use crate::run_summary::{summarize_runs, tests::stored};
 use crate::sample_record;
-use softvt_evaluation::stage::Stage;
+use softvt_evaluation::stage::TaskStage;
 
 #[test]
 fn rigid_suites_have_no_safety_and_privileged_policies_are_marked_in_every_table() {
@@ -143,7 +143,7 @@ fn hostile_names_are_escaped_in_markdown() {
 #[test]
 fn harm_and_stages_have_a_table() {
     let mut record = sample_record();
-    (record.verdict.others_ok, record.verdict.failed_stage) = (Some(false), Some(Stage::Carry));
+    (record.verdict.others_ok, record.verdict.failed_stage) = (Some(false), Some(TaskStage::Carry));
     (record.verdict.d_mean, record.verdict.time_over_tau_s) = (Some(0.2), Some(0.25));
     let runs = summarize_runs(vec![stored("a", "pi", vec![record])]);
     let table = stage_table(&runs).expect("recorded");

@@ -26,7 +26,7 @@ use crate::{
 use softvt_benchmark::variation::{DrawError, ModelOf, VariationRanges};
 use softvt_common::parallel::lock;
 use softvt_evaluation::{
-    calibration::{Envelope, HoldRow, Protocol, SafeWindow, Scans, SweepRow, force_at},
+    calibration::{Envelope, HoldRow, Protocol, SafeWindow, CalibrationMeasurements, SweepRow, force_at},
     envelope_plot::{plot, summary_text},
     instance::{Grip, GripWindow, InstanceFactors, InstanceModel, VariantSweep},
     safety::DeformationLimit,
@@ -311,7 +311,7 @@ functions! {
             let holds: Vec<HoldRow> = rows(lua, "softvt.envelope: holds", &holds)?;
             let sweep: Vec<SweepRow> = rows(lua, "softvt.envelope: sweep", &sweep)?;
             let variants: Vec<VariantSweep> = rows(lua, "softvt.envelope: variants", &variants)?;
-            let scans = Scans { protocol, stable_strain, ended, holds, sweep, variants };
+            let scans = CalibrationMeasurements { protocol, stable_strain, ended, holds, sweep, variants };
             let envelope = Envelope::new(scans, kappa);
             let made_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
             let mut file = ThresholdFile::new(kappa, vec![format!("{asset}.sweep.jsonl")], made_by)

@@ -26,7 +26,7 @@ pub struct ExperimentInput {
 /// A part of the command line that would change nothing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
-pub enum InputError {
+pub enum ExperimentInputError {
     #[error("--set: {0}")]
     Settings(#[from] SettingsError),
     #[error("--set {path}: an experiment judges no episodes; leave it out")]
@@ -51,10 +51,10 @@ impl ExperimentInput {
     ///
     /// # Errors
     /// A setting does not exist, has a value out of its range, or concerns the judge.
-    pub fn new(set: Vec<(String, String)>, seed: u64) -> Result<Self, InputError> {
+    pub fn new(set: Vec<(String, String)>, seed: u64) -> Result<Self, ExperimentInputError> {
         Settings::default().with_all(&set)?;
-        match set.iter().find(|(path, _)| ["criteria", "rules"].contains(&group(path))) {
-            Some((path, _)) => Err(InputError::Criteria { path: path.clone() }),
+        match set.iter().find(|(path, _)| group(path) == "criteria") {
+            Some((path, _)) => Err(ExperimentInputError::Criteria { path: path.clone() }),
             None => Ok(Self { set, seed, ..Self::default() }),
         }
     }
@@ -63,7 +63,7 @@ impl ExperimentInput {
     ///
     /// # Errors
     /// A setting or seed that changed nothing.
-    pub fn check_used(&self) -> Result<(), InputError> {
+    pub fn check_used(&self) -> Result<(), ExperimentInputError> {
         let has = |flag: &AtomicBool| flag.load(Ordering::Relaxed);
         for (path, _) in &self.set {
             let path = path.clone();
@@ -71,14 +71,14 @@ impl ExperimentInput {
                 break;
             }
             if group(&path) != "physics" {
-                return Err(InputError::NoRobot { path });
+                return Err(ExperimentInputError::NoRobot { path });
             }
             if !has(&self.has_world) {
-                return Err(InputError::NoPhysics { path });
+                return Err(ExperimentInputError::NoPhysics { path });
             }
         }
         if self.seed != 0 && !has(&self.has_random) {
-            return Err(InputError::NoRandomNumbers);
+            return Err(ExperimentInputError::NoRandomNumbers);
         }
         Ok(())
     }

@@ -314,6 +314,10 @@ class! {
             feels: "boolean" { get(_, _) { false } }
             /// Measured distance of the gels, m.
             width: "number" { get(_, this) { this.read(|view| view.width_m) } }
+            /// Largest distance of the gels, m.
+            stroke: "number" { get(_, _) { MAX_WIDTH } }
+            /// Stiffness of the drive of a finger, N/m (robot.gripper.kp).
+            finger_stiffness: "number" { get(_, this) { this.read(|view| view.finger_stiffness) } }
             /// Sum of the normal forces at all contact points of the left and the right gel pad, N, whatever touches it; forces
             /// on the cases of the fingers do not count. On the edge of a pad the normals are oblique, and the sum is larger
             /// than the pressing force, which is -sim:tactile(side).force[3].

@@ -13,7 +13,7 @@ use softvt_benchmark::{
     seed::{EpisodeSeed, RandomStream},
     variation::VariationRanges,
 };
-use softvt_common::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_common::parallel::lock;
 use softvt_geometry::{Aabb, Pose, Vec3};
 use softvt_robot::ik::{PoseDifference, PoseTolerance, UnreachablePose};
@@ -65,6 +65,8 @@ pub(crate) struct ExpertView {
     pub tcp_b: Pose,
     /// Distance of the gels, m.
     pub width_m: f64,
+    /// Stiffness of the drive of a finger, N/m.
+    pub finger_stiffness: f64,
     /// Last commanded closure: 0 is open, 1 is closed.
     pub closure: f64,
     /// Normal force on the left and the right pad, N.
@@ -119,7 +121,7 @@ impl SuiteInstances {
             task: 0,
             episode: 0,
             base_seed: 0,
-            split: Split::Experiment,
+            split: EpisodeSplit::Experiment,
         };
         let mut kinds: Vec<Arc<Asset>> = Vec::new();
         for goal in &self.goals {
@@ -169,6 +171,7 @@ fn expert_view(sim: &Simulation, time_s: f64) -> ExpertView {
         base_w: sim.robot.base_w,
         tcp_b: sim.robot.tool_b(&sim.world),
         width_m: sim.robot.width(&sim.world),
+        finger_stiffness: sim.robot.finger_stiffness(),
         closure: sim.robot.closure(),
         pad_force_n: sim.pad_normal_forces(),
         grip_controller: None,

@@ -14,7 +14,7 @@ use crate::{
     vm::error::fail,
 };
 use softvt_common::text::unknown_name;
-use softvt_policy::{Observation, PadForce, TactileFrame, TactileHistory, TaskBrief};
+use softvt_policy::{Observation, PadForce, TactileFrame, TactileHistory, EpisodeBrief};
 use softvt_robot::rotation;
 use softvt_sensing::tactile::{MarkerFlow, MarkerPositions, Markers};
 
@@ -55,7 +55,7 @@ output! {
 
 output! {
     /// The episode that begins.
-    fn task_brief(lua, brief: &TaskBrief) -> "softvt.TaskBrief" as "task" {
+    fn task_brief(lua, brief: &EpisodeBrief) -> "softvt.EpisodeBrief" as "task" {
         /// Name of the suite; nil in a judged run.
         suite: "string?" = brief.alias.is_none().then_some(brief.suite.as_str());
         /// Index of the task, from 0; nil in a judged run.

@@ -22,7 +22,7 @@ record! {
         /// Observations of the policy.
         observes: ObservesSpec;
         /// Called when the episode begins.
-        reset: Option<Function> = Type::Function("fun(task: softvt.TaskBrief)");
+        reset: Option<Function> = Type::Function("fun(task: softvt.EpisodeBrief)");
         /// Returns the action of this control step, or a list of actions for the next ones.
         act: Function = Type::Function("fun(obs: softvt.Observation): softvt.Action|softvt.Action[]");
         /// Number of actions of a list that are executed before act is called again, unless --replan gives another; all
@@ -108,8 +108,6 @@ record! {
         /// beyond the middle, else open. two-width: open, or the width that the answers give just after closing, held until
         /// one opens. force: a grip force in N at which closing stops; below 0 opens.
         code: Option<GripCode>;
-        /// True for code = "binary".
-        binary: Option<bool>;
         /// For code = "binary": limits at which the gripper closes and opens, instead of the middle.
         latch: Option<GripLatch>;
     }

@@ -33,7 +33,7 @@ use softvt_benchmark::{
     steps_per_control,
 };
 use softvt_common::cancel;
-use softvt_common::episode_id::Split;
+use softvt_common::episode_id::EpisodeSplit;
 use softvt_common::parallel::lock;
 use softvt_evaluation::deformation::ReferenceShape;
 use softvt_geometry::{Pose, Vec3};
@@ -82,10 +82,8 @@ fn leaves(path: String, data: &Json) -> Vec<(String, String)> {
 /// The settings of a simulation: those of the script, then those of the command line.
 fn simulation_settings(lua: &Lua, table: Option<&Table>) -> mlua::Result<Settings> {
     const LABEL: &str = "softvt.simulate: settings";
-    for key in ["criteria", "rules"] {
-        if table.is_some_and(|table| table.contains_key(key).unwrap_or(false)) {
-            return Err(fail(lua, format!("{LABEL}.{key}: a simulation judges no episodes; leave it out")));
-        }
+    if table.is_some_and(|table| table.contains_key("criteria").unwrap_or(false)) {
+        return Err(fail(lua, format!("{LABEL}.criteria: a simulation judges no episodes; leave it out")));
     }
     let own = settings(lua, LABEL, table)?;
     experiment_input::simulation_settings(lua, &own).map_err(|e| fail(lua, format!("{LABEL}: --set: {e}")))
@@ -180,7 +178,7 @@ functions! {
         } -> ["softvt.Simulation"] {
             let settings = simulation_settings(lua, settings.as_ref())?;
             let seed = seed.unwrap_or_else(|| experiment_input::base_seed(lua));
-            let (layout_name, split) = (layout.name.clone(), Split::Experiment);
+            let (layout_name, split) = (layout.name.clone(), EpisodeSplit::Experiment);
             let seed = EpisodeSeed { suite, layout: layout_name, task: 0, episode, base_seed: seed, split, secret: None };
             LuaSimulation::new(lua, &layout, seed, &settings)?
         }

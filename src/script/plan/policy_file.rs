@@ -23,7 +23,7 @@ use crate::{
 use softvt_benchmark::seed::{EpisodeSeed, RandomStream};
 use softvt_geometry::Vec3;
 use softvt_policy::{
-    ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief, ToolCommand, ToolMotion,
+    ActionChunk, Observation, Policy, PolicyError, SensorStreams, EpisodeBrief, ToolCommand, ToolMotion,
     decode::MAX_CHUNK_LEN,
     profile::{GripCode, GripperValues},
 };
@@ -143,7 +143,7 @@ impl Policy for LuaPolicy {
         self.file.streams.clone()
     }
 
-    fn reset(&mut self, brief: &TaskBrief) -> Result<(), PolicyError> {
+    fn reset(&mut self, brief: &EpisodeBrief) -> Result<(), PolicyError> {
         let Some(reset) = &self.reset else { return Ok(()) };
         let vm = &self.instance.vm;
         let brief = task_brief(&vm.lua, brief).map_err(|e| script_error(vm.explain(&e)))?;

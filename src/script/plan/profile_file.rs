@@ -188,12 +188,7 @@ impl ProfileReader<'_> {
 
     fn gripper(&self, spec: &GripperValuesSpec) -> mlua::Result<GripperValues> {
         let wrong = |key: &str, what: &str| self.wrong(key, format!("actions.gripper.{key}: {what}"));
-        let code = match (spec.code, spec.binary) {
-            (Some(_), Some(_)) => return Err(wrong("binary", "code says it already; leave it out")),
-            (Some(code), None) => code,
-            (None, Some(true)) => GripCode::Binary,
-            (None, _) => GripCode::Continuous,
-        };
+        let code = spec.code.unwrap_or_default();
         if code == GripCode::Force {
             let given = [("open", spec.open), ("closed", spec.closed)];
             let what = "code = \"force\" has none: a force in N closes, less than 0 opens; leave it out";

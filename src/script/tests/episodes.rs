@@ -7,13 +7,13 @@ use crate::{
     check_shift,
 };
 use softvt_benchmark::{Plan, ShiftValue};
-use softvt_common::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_geometry::{Pose, Vec3, shape::Shape};
 use softvt_rollout::Controller;
 use softvt_scene::{Asset, Body};
 
 fn episode_id(episode: u32, base_seed: u64) -> EpisodeId {
-    EpisodeId { suite: "test".into(), task: 0, episode, base_seed, split: Split::Validation }
+    EpisodeId { suite: "test".into(), task: 0, episode, base_seed, split: EpisodeSplit::Validation }
 }
 
 fn project(rest: &str) -> Project {
@@ -54,6 +54,7 @@ fn view() -> ExpertView {
         base_w: Pose::translation(-0.66, 0.0, 0.012),
         tcp_b: Pose::translation(0.66, 0.0, 0.288),
         width_m: 0.08,
+        finger_stiffness: 2000.0,
         closure: 0.0,
         pad_force_n: [0.0; 2],
         grip_controller: None,
@@ -417,7 +418,7 @@ fn an_episode_of_another_suite_than_that_of_the_plan_is_refused() {
     let text = format!("{SUITE}return suite()");
     let project = Project::new(&[("x.lua", &text)]);
     let mut loaded = project.load("x.lua", &[]).expect("a suite");
-    let id = EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };
+    let id = EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 0, split: EpisodeSplit::Validation };
     assert!(EpisodeSetup::open(&loaded, &id, &SceneChanges::default()).is_ok());
     let Plan::Suite(suite) = &mut loaded.plan else { panic!("a suite") };
     suite.tasks[0].goal.target = "ball".into();

@@ -7,7 +7,7 @@ use std::sync::{
 
 use super::*;
 use crate::Experiment;
-use softvt_common::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 
 /// Runs `text` in an experiment; returns its rows as JSON, or the message.
 fn run(text: &str) -> Result<String, String> {
@@ -256,7 +256,7 @@ fn a_scene_holds_no_more_than_can_be_computed() {
     let project = Project::new(&[("x.lua", &(crowd + "return suite()"))]);
     let limits = VmLimits { call: Duration::from_secs(20), ..limits() };
     let loaded = project.load_with("x.lua", &[], &limits).unwrap();
-    let id = EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };
+    let id = EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 0, split: EpisodeSplit::Validation };
     let error =
         crate::EpisodeSetup::open(&loaded, &id, &crate::SceneChanges::default()).map(|_| ()).unwrap_err();
     assert_eq!(error.message, "scene:add: a scene holds at most 1000 objects");

@@ -7,18 +7,18 @@ use image::{Rgb, RgbImage};
 use super::*;
 use crate::{LuaPolicy, PolicyFile, load_profile};
 use softvt_benchmark::seed::EpisodeSeed;
-use softvt_common::episode_id::Split;
+use softvt_common::episode_id::EpisodeSplit;
 use softvt_geometry::Vec3;
 use softvt_policy::{
     Action, ActionChunk, CameraImage, GripCommand, GripTarget, Observation, Policy, PolicyError, RobotState,
-    SensorStreams, TactileFrame, TactileHistory, TaskBrief, ToolCommand, ToolMotion,
+    SensorStreams, TactileFrame, TactileHistory, EpisodeBrief, ToolCommand, ToolMotion,
     profile::{GripCode, Profile},
 };
 use softvt_sensing::tactile::Markers;
 
 fn seed(episode: u32) -> EpisodeSeed {
     let (suite, layout) = ("one".to_owned(), "one".to_owned());
-    EpisodeSeed { suite, layout, task: 0, episode, base_seed: 0, split: Split::Validation, secret: None }
+    EpisodeSeed { suite, layout, task: 0, episode, base_seed: 0, split: EpisodeSplit::Validation, secret: None }
 }
 
 /// A finger whose markers have all moved by `by` px, with an image that is `lit` brighter than the untouched one.
@@ -55,8 +55,8 @@ fn observation() -> Observation {
     }
 }
 
-fn brief() -> TaskBrief {
-    TaskBrief { suite: "one".into(), task: 3, prompt: "take it".into(), episode: 7, seed: 0, alias: None }
+fn brief() -> EpisodeBrief {
+    EpisodeBrief { suite: "one".into(), task: 3, prompt: "take it".into(), episode: 7, seed: 0, alias: None }
 }
 
 const OBSERVES: &str = "observes = { cameras = { 'wrist' }, tactile = true, drives = true }";
@@ -288,7 +288,7 @@ fn the_built_in_profiles_can_be_written_in_lua() {
     let vision = [
         ("name = \"visuo_tactile\"", "name = \"vision\""),
         (tactile, ""),
-        ("closed = 1 }", "closed = 1, binary = true }"),
+        ("closed = 1 }", "closed = 1, code = 'binary' }"),
     ];
     let drives = [
         ("name = \"visuo_tactile\"", "name = \"vision_drives\""),
@@ -324,7 +324,7 @@ fn a_profile_may_name_other_cameras_units_and_paddings() {
         (GripCode::TwoWidth, "{ open = -1, closed = 1, code = \"two-width\" }"),
         (GripCode::Force, "{ code = \"force\" }"),
     ] {
-        let own = ("{ open = -1, closed = 1, binary = true }", gripper);
+        let own = ("{ open = -1, closed = 1, code = \"binary\" }", gripper);
         assert_eq!(profile(&changed("libero", &[own])).unwrap().actions.gripper.code, code);
     }
     let profile = profile(&changed("libero", &changes)).unwrap();
@@ -366,9 +366,8 @@ fn errors_in_profiles_are_reported_with_their_line() {
         ),
         ("\"delta_osc\"", "\"absolute\"", "profile.actions.translation_m: pose = \"absolute\" has no steps"),
         ("open = -1", "open = 1", "profile.actions.gripper.closed: is 1 like open"),
-        ("binary = true", "code = \"two-widths\"", "did you mean \"two-width\"?"),
-        ("binary = true", "binary = true, code = \"binary\"", "profile.actions.gripper.binary: code says it"),
-        ("binary = true", "code = \"force\"", "profile.actions.gripper.open: code = \"force\" has none"),
+        ("code = \"binary\"", "code = \"two-widths\"", "did you mean \"two-width\"?"),
+        ("code = \"binary\"", "code = \"force\"", "profile.actions.gripper.open: code = \"force\" has none"),
         ("open = -1,", "", "profile.actions.gripper.open: missing; code = \"binary\" needs it"),
         ("rotation_rad = 0.5", "rotation_rad = 0/0", "profile.actions.rotation_rad: expected a number"),
         (

@@ -4,7 +4,7 @@ use std::{path::Path, time::Duration};
 
 use crate::{EpisodeSetup, LoadedScript, SceneChanges, VmLimits, load_with};
 use softvt_benchmark::{Plan, ShiftValue};
-use softvt_common::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_scene::{Body, Scene};
 
 fn loaded(suite: &str) -> LoadedScript {
@@ -15,7 +15,7 @@ fn loaded(suite: &str) -> LoadedScript {
 }
 
 fn episode(loaded: &LoadedScript, suite: &str, task: usize, shifts: &[(&str, f64)]) -> EpisodeSetup {
-    let id = EpisodeId { suite: suite.to_owned(), task, episode: 3, base_seed: 1, split: Split::Validation };
+    let id = EpisodeId { suite: suite.to_owned(), task, episode: 3, base_seed: 1, split: EpisodeSplit::Validation };
     let shift = |(name, value): &(&str, f64)| ShiftValue { name: (*name).to_owned(), value: *value };
     let shifts: Vec<ShiftValue> = shifts.iter().map(shift).collect();
     EpisodeSetup::open(loaded, &id, &SceneChanges { shifts, ..SceneChanges::default() }).expect("a scene")

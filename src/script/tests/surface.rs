@@ -9,7 +9,7 @@ use crate::{
     plan::options,
     schema::{Function, Record},
 };
-use softvt_common::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 
 /// Makes an object of each class, calls everything with everything, and returns the messages.
 const SCRIPT: &str = include_str!("surface.lua");
@@ -118,7 +118,7 @@ fn wrong_calls_get_messages_in_terms_of_the_lua_interface() {
             "softvt.InstanceState",
             "softvt.Instances",
             "softvt.List",
-            "softvt.TaskBrief",
+            "softvt.EpisodeBrief",
             "softvt.Observation",
             "softvt.Fingers",
             "softvt.Forces"
@@ -132,7 +132,7 @@ fn in_layout(text: &str) -> String {
     let whole = super::SUITE.replace("scene:add { name", &format!("{text} scene:add {{ name"));
     let project = Project::new(&[("x.lua", &(whole + "return suite()"))]);
     let loaded = project.load("x.lua", &[]).unwrap();
-    let id = EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };
+    let id = EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 0, split: EpisodeSplit::Validation };
     let folder = format!("{}/", project.path("").display()).replace("//", "/");
     match crate::EpisodeSetup::open(&loaded, &id, &crate::SceneChanges::default()) {
         Ok(_) => String::new(),

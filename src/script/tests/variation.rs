@@ -3,7 +3,7 @@
 use super::*;
 use crate::{EpisodeSetup, SceneChanges, load_variation};
 use softvt_benchmark::Plan;
-use softvt_common::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_scene::Object;
 
 const ASSETS: &str = r#"
@@ -35,7 +35,7 @@ fn project(rest: &str) -> Project {
 }
 
 fn open(loaded: &LoadedScript, task: usize, episode: u32) -> Result<EpisodeSetup, ScriptError> {
-    let id = EpisodeId { suite: "test".into(), task, episode, base_seed: 3, split: Split::Validation };
+    let id = EpisodeId { suite: "test".into(), task, episode, base_seed: 3, split: EpisodeSplit::Validation };
     EpisodeSetup::open(loaded, &id, &SceneChanges::default())
 }
 

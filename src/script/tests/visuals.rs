@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{Project, SUITE, error_of};
 use crate::{EpisodeSetup, SceneChanges};
-use softvt_common::episode_id::{EpisodeId, Split};
+use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_scene::{Body, Mask, Visual};
 
 fn with_visuals(visuals: &str) -> String {
@@ -15,7 +15,7 @@ fn with_visuals(visuals: &str) -> String {
 }
 
 fn first() -> EpisodeId {
-    EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 0, split: Split::Validation }
+    EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 0, split: EpisodeSplit::Validation }
 }
 
 fn read(visuals: &str) -> Vec<Visual> {
