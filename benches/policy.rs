@@ -18,7 +18,7 @@ use std::{
 use rmpv::Value;
 use softvt::{
     policy::{
-        ActionChunk, Observation, Policy, PolicyError, SensorStreams, EpisodeBrief,
+        ActionChunk, EpisodeBrief, Observation, Policy, PolicyError, SensorStreams,
         profile::Profile,
         remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},
     },

@@ -37,8 +37,13 @@ fn scene() -> Scene {
     let path = folder.path().join("kitchen.lua");
     std::fs::write(&path, SUITE).expect("written");
     let loaded = script::load(&path, &[]).unwrap_or_else(|e| panic!("{e}"));
-    let id =
-        EpisodeId { suite: "kitchen".into(), task: 0, episode: 0, base_seed: 0, split: EpisodeSplit::Validation };
+    let id = EpisodeId {
+        suite: "kitchen".into(),
+        task: 0,
+        episode: 0,
+        base_seed: 0,
+        split: EpisodeSplit::Validation,
+    };
     EpisodeSetup::open(&loaded, &id, &SceneChanges::default()).unwrap_or_else(|e| panic!("{e}")).scene
 }
 

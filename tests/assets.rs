@@ -66,7 +66,8 @@ fn suite() -> LoadedScript {
 
 fn scene(loaded: &LoadedScript, task: usize, episode: u32) -> Scene {
     let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
-    let id = EpisodeId { suite: suite.name.clone(), task, episode, base_seed: 0, split: EpisodeSplit::Validation };
+    let id =
+        EpisodeId { suite: suite.name.clone(), task, episode, base_seed: 0, split: EpisodeSplit::Validation };
     EpisodeSetup::open(loaded, &id, &SceneChanges::default()).unwrap_or_else(|e| panic!("{e}")).scene
 }
 

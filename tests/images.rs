@@ -41,8 +41,13 @@ fn the_first_task_of_spatial_soft_matches_its_reference() {
     let suite = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("suites/spatial_soft.lua");
     let loaded = script::load(&suite, &[]).expect("the suite loads");
     let Plan::Suite(suite) = &loaded.plan else { panic!("it is a suite") };
-    let id =
-        EpisodeId { suite: suite.name.clone(), task: 0, episode: 0, base_seed: 0, split: EpisodeSplit::Validation };
+    let id = EpisodeId {
+        suite: suite.name.clone(),
+        task: 0,
+        episode: 0,
+        base_seed: 0,
+        split: EpisodeSplit::Validation,
+    };
     let scene = script::EpisodeSetup::open(&loaded, &id, &script::SceneChanges::default())
         .expect("the suite opens")
         .scene;

@@ -327,7 +327,8 @@ fn splits_have_disjoint_start_states() {
                 })
                 .collect()
         };
-        let (validation, demonstration) = (states(EpisodeSplit::Validation), states(EpisodeSplit::Demonstration));
+        let (validation, demonstration) =
+            (states(EpisodeSplit::Validation), states(EpisodeSplit::Demonstration));
         assert_eq!(
             (validation.len() as u32, demonstration.len() as u32),
             (EPISODES / 2, EPISODES / 2),

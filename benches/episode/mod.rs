@@ -19,8 +19,13 @@ pub fn load() -> LoadedScript {
 /// The first episode of a task and its controller.
 pub fn open(loaded: &LoadedScript, task: usize, film: bool) -> (EpisodeSpec, ExpertController) {
     let Plan::Suite(suite) = &loaded.plan else { panic!("{SUITE} is a suite") };
-    let id =
-        EpisodeId { suite: suite.name.clone(), task, episode: 0, base_seed: 0, split: EpisodeSplit::Validation };
+    let id = EpisodeId {
+        suite: suite.name.clone(),
+        task,
+        episode: 0,
+        base_seed: 0,
+        split: EpisodeSplit::Validation,
+    };
     let opened = EpisodeSetup::open(loaded, &id, &SceneChanges::default()).expect("it opens");
     let mut spec = EpisodeSpec {
         record_states: film,

@@ -195,8 +195,13 @@ impl VariationRanges {
         count: u32,
         model_of: &ModelOf<'_>,
     ) -> Result<Vec<ObjectVariation>, DrawError> {
-        let id =
-            EpisodeId { suite: suite.into(), task: 0, episode: 0, base_seed: 0, split: EpisodeSplit::Experiment };
+        let id = EpisodeId {
+            suite: suite.into(),
+            task: 0,
+            episode: 0,
+            base_seed: 0,
+            split: EpisodeSplit::Experiment,
+        };
         let mut streams = InstanceStreams::of(&EpisodeSeed::new(&id, &asset.name));
         (0..count)
             .map(|_| self.draw_instance(&mut streams, asset, &InstanceFactors::NOMINAL, model_of))

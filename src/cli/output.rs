@@ -3,7 +3,12 @@
 use std::{
     io::{self, IsTerminal, Write},
     path::Path,
-    sync::Mutex,
+    sync::{
+        Mutex,
+        mpsc::{self, RecvTimeoutError, Sender},
+    },
+    thread,
+    time::Duration,
 };
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -123,10 +128,54 @@ pub(crate) fn eprint_notice(message: impl std::fmt::Display) {
     text::eprint_line(&text::escape_control(&format!("softvt: {message}")));
 }
 
+/// Time after which a user is told what takes so long, if there is no terminal that shows it at once.
+const PATIENCE: Duration = Duration::from_secs(1);
+/// Period with which a terminal shows the elapsed time anew.
+const TICK: Duration = Duration::from_millis(200);
+
+/// Says on standard error what is being done: at once on a terminal, where the line disappears when this is dropped, and after
+/// [`PATIENCE`] elsewhere.
+pub(crate) enum Activity {
+    Spinner(ProgressBar),
+    /// Its thread ends when this is dropped.
+    Delayed(#[allow(dead_code, reason = "dropped to end the thread")] Sender<()>),
+}
+
+impl Activity {
+    pub(crate) fn new(what: &str) -> Self {
+        if io::stderr().is_terminal() {
+            let spinner = ProgressBar::new_spinner().with_message(text::escape_control(what).into_owned());
+            if let Ok(style) = ProgressStyle::with_template("{msg}  {elapsed} elapsed") {
+                spinner.set_style(style);
+            }
+            spinner.enable_steady_tick(TICK);
+            return Self::Spinner(spinner);
+        }
+        let (end, ended) = mpsc::channel();
+        let what = what.to_owned();
+        thread::spawn(move || {
+            if ended.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
+                eprint_notice(what);
+            }
+        });
+        Self::Delayed(end)
+    }
+}
+
+impl Drop for Activity {
+    fn drop(&mut self) {
+        if let Self::Spinner(spinner) = self {
+            spinner.finish_and_clear();
+        }
+    }
+}
+
 /// Progress of a list of jobs on standard error: a bar on a terminal, which disappears
 /// when this is dropped, and one line per job elsewhere.
 pub(crate) struct Progress {
     bar: Option<ProgressBar>,
+    /// Until the first job ends, where there is no bar.
+    first: Option<Activity>,
     total: usize,
     done: usize,
 }
@@ -140,14 +189,23 @@ impl Progress {
             if let Ok(style) = ProgressStyle::with_template(&template) {
                 bar.set_style(style);
             }
+            bar.enable_steady_tick(TICK);
             bar
         });
-        Self { bar, total, done: 0 }
+        let first = bar.is_none().then(|| Activity::new(what));
+        Self { bar, first, total, done: 0 }
+    }
+
+    /// There are `count` more jobs.
+    pub(crate) fn expect(&mut self, count: usize) {
+        self.total += count;
+        self.bar.iter().for_each(|bar| bar.inc_length(count as u64));
     }
 
     /// Reports the end of one job.
     pub(crate) fn tick(&mut self, message: &str) {
         self.done += 1;
+        self.first = None;
         let message = text::escape_control(message);
         match &self.bar {
             Some(bar) => {
@@ -167,16 +225,38 @@ impl Progress {
 /// Shows the progress and the messages of runs on standard error.
 #[derive(Default)]
 pub(crate) struct Console {
+    activity: Mutex<Option<Activity>>,
     progress: Mutex<Option<Progress>>,
 }
 
 impl Observer for Console {
     fn notice(&self, message: &str) {
-        eprint_notice(message);
+        let (activity, progress) = (lock(&self.activity), lock(&self.progress));
+        let bar = match &*activity {
+            Some(Activity::Spinner(spinner)) => Some(spinner),
+            _ => progress.as_ref().and_then(|progress| progress.bar.as_ref()),
+        };
+        match bar {
+            Some(bar) => bar.suspend(|| eprint_notice(message)),
+            None => eprint_notice(message),
+        }
     }
 
-    fn begin(&self, total: usize, what: &str) {
-        *lock(&self.progress) = Some(Progress::new(total, what));
+    fn work(&self, what: &str) {
+        // The former one leaves the terminal first.
+        *lock(&self.activity) = None;
+        *lock(&self.activity) = Some(Activity::new(what));
+    }
+
+    fn begin(&self, what: &str) {
+        *lock(&self.activity) = None;
+        *lock(&self.progress) = Some(Progress::new(0, what));
+    }
+
+    fn expect(&self, count: usize) {
+        if let Some(progress) = &mut *lock(&self.progress) {
+            progress.expect(count);
+        }
     }
 
     fn advance(&self, line: &str) {
@@ -186,6 +266,7 @@ impl Observer for Console {
     }
 
     fn end(&self) {
+        *lock(&self.activity) = None;
         *lock(&self.progress) = None;
     }
 }

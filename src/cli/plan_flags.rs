@@ -122,7 +122,9 @@ pub(crate) fn check(command: &str, request: &Request, plan: &Plan) -> Result<(),
     let suites = plan.suites();
     let all_rigid = suites.iter().all(|suite| suite.object_type == ObjectType::Rigid);
     if config.rigid_twin && all_rigid {
-        return Err(config.error("--rigid-twin: the objects of this suite are rigid already; leave it out").into());
+        return Err(config
+            .error("--rigid-twin: the objects of this suite are rigid already; leave it out")
+            .into());
     }
     Ok(())
 }

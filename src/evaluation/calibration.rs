@@ -194,7 +194,8 @@ struct Reference {
 impl Envelope {
     /// Sorts the rows by width and computes the bounds.
     pub fn new(scans: CalibrationMeasurements, kappa: f64) -> Self {
-        let CalibrationMeasurements { protocol, stable_strain, ended, mut holds, mut sweep, variants } = scans;
+        let CalibrationMeasurements { protocol, stable_strain, ended, mut holds, mut sweep, variants } =
+            scans;
         holds.sort_by(|a, b| b.width_mm.total_cmp(&a.width_mm));
         sweep.sort_by(|a, b| b.width_mm.total_cmp(&a.width_mm));
         let at_strain = stable_strain.and_then(|strain| reference_at_strain(&sweep, strain));
@@ -377,7 +378,12 @@ pub(crate) mod tests {
             squeeze(46.0, 2.0, true),
             squeeze(44.0, 10.0 / 3.0, true),
         ];
-        CalibrationMeasurements { stable_strain: Some(0.3), holds: holds.into(), sweep, ..CalibrationMeasurements::default() }
+        CalibrationMeasurements {
+            stable_strain: Some(0.3),
+            holds: holds.into(),
+            sweep,
+            ..CalibrationMeasurements::default()
+        }
     }
 
     #[test]
@@ -421,8 +427,9 @@ pub(crate) mod tests {
 
     #[test]
     fn the_loose_end_is_above_no_width_at_which_a_trial_failed() {
-        let lower =
-            |holds: Vec<HoldRow>| Envelope::new(CalibrationMeasurements { holds, ..scans(48.0) }, 0.5).window.width_lower_mm;
+        let lower = |holds: Vec<HoldRow>| {
+            Envelope::new(CalibrationMeasurements { holds, ..scans(48.0) }, 0.5).window.width_lower_mm
+        };
         assert_eq!(lower(vec![hold(47.0, 5), hold(49.0, 5), hold(48.0, 4)]), Some(47.0));
         assert_eq!(lower(vec![hold(47.0, 4), hold(48.0, 5)]), None);
         assert_eq!(lower(vec![]), None);
@@ -433,7 +440,10 @@ pub(crate) mod tests {
         let tight = |d_at_47: f64| {
             let carried = |width, d| HoldRow { d_peak_pct: Some(d), ..hold(width, 5) };
             let holds = vec![carried(47.0, d_at_47), carried(48.0, 1.1), carried(49.0, 0.7)];
-            Envelope::new(CalibrationMeasurements { holds, ..scans(48.0) }, 0.5).window.width_at_tau_mm.unwrap()
+            Envelope::new(CalibrationMeasurements { holds, ..scans(48.0) }, 0.5)
+                .window
+                .width_at_tau_mm
+                .unwrap()
         };
         // τ is 1.5 %, which the sweep reaches at 47 mm.
         assert!((tight(1.9) - 47.5).abs() < 1e-12);
@@ -455,7 +465,10 @@ pub(crate) mod tests {
                 .extent_mm()
         };
         assert_eq!((extent(46.99), extent(46.5)), (None, Some(0.5)), "an extent below the accuracy");
-        let none = Envelope::new(CalibrationMeasurements { sweep: vec![squeeze(49.0, 1.0, false)], ..scans(48.0) }, 0.5);
+        let none = Envelope::new(
+            CalibrationMeasurements { sweep: vec![squeeze(49.0, 1.0, false)], ..scans(48.0) },
+            0.5,
+        );
         assert_eq!((none.d_ref_pct, none.window.width_at_tau_mm, none.limit(0.5)), (None, None, None));
     }
 

@@ -268,7 +268,8 @@ mod tests {
         let held = bending.holds.iter().filter(|row| row.all_held()).count();
         let (_, svg) = shown(bending);
         assert_eq!(svg.matches("<polygon").count(), held, "the axes reach to all that held");
-        let (narrow, _) = shown(CalibrationMeasurements { holds: vec![hold(47.01, 5), hold(48.0, 2)], ..scans(48.0) });
+        let (narrow, _) =
+            shown(CalibrationMeasurements { holds: vec![hold(47.01, 5), hold(48.0, 2)], ..scans(48.0) });
         assert!(narrow.contains("47.00 mm; 0.010 mm are less than the accuracy of its ends"), "{narrow}");
         let (untried, _) = shown(CalibrationMeasurements { holds: vec![], ..scans(48.0) });
         assert!(untried.contains("no safe window: no hold trial was run, and D passes τ"), "{untried}");
@@ -299,7 +300,10 @@ mod tests {
     fn an_empty_or_single_row_envelope_is_plotted() {
         let (text, svg) = shown(CalibrationMeasurements::default());
         assert!(text.contains("no τ: no squeeze was stable") && svg.contains("no rows"), "{text}");
-        let one = CalibrationMeasurements { sweep: vec![scans(48.0).sweep[1].clone()], ..CalibrationMeasurements::default() };
+        let one = CalibrationMeasurements {
+            sweep: vec![scans(48.0).sweep[1].clone()],
+            ..CalibrationMeasurements::default()
+        };
         let (_, svg) = shown(one);
         assert!(svg.contains("<circle") && !svg.contains("NaN") && !svg.contains("inf"), "{svg}");
     }

@@ -268,7 +268,7 @@ fn piecewise_linear(points: &[(f64, f64)], x: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::calibration::{
-        HoldRow, CalibrationMeasurements,
+        CalibrationMeasurements, HoldRow,
         tests::{hold, squeeze},
     };
 
@@ -292,8 +292,13 @@ mod tests {
             SweepRow { force_n, strain_p95: Some(strain_p95), ..squeeze(width_mm, d_pct, true) }
         });
         let holds = vec![hold(49.0, 5), HoldRow { d_peak_pct: Some(1.0), ..hold(48.0, 5) }];
-        let scans =
-            CalibrationMeasurements { stable_strain: Some(0.1), holds, sweep: sweep.collect(), variants, ..CalibrationMeasurements::default() };
+        let scans = CalibrationMeasurements {
+            stable_strain: Some(0.1),
+            holds,
+            sweep: sweep.collect(),
+            variants,
+            ..CalibrationMeasurements::default()
+        };
         Envelope::new(scans, 0.5)
     }
 

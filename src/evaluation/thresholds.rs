@@ -292,7 +292,12 @@ mod tests {
         let mut file =
             ThresholdFile::new(0.5, vec!["sweep.jsonl".into()], "softvt".into()).measured_by(Protocol::Hand);
         let sweep = vec![squeeze(48.0, 0.1, true), squeeze(47.0, 1.0 / 3.0, true), squeeze(46.0, 4.0, false)];
-        let scans = CalibrationMeasurements { protocol: Protocol::Hand, holds: vec![hold(48.0, 5)], sweep, ..CalibrationMeasurements::default() };
+        let scans = CalibrationMeasurements {
+            protocol: Protocol::Hand,
+            holds: vec![hold(48.0, 5)],
+            sweep,
+            ..CalibrationMeasurements::default()
+        };
         assert!(file.insert("bun", Envelope::new(scans, 0.5)));
         file
     }
@@ -359,7 +364,10 @@ mod tests {
     fn merging_collects_assets_and_an_unstable_sweep_gives_no_threshold() {
         let mut all = file();
         let mut other = ThresholdFile::new(0.5, vec![], "softvt".into());
-        let scans = CalibrationMeasurements { sweep: vec![squeeze(48.0, 1.0, false)], ..CalibrationMeasurements::default() };
+        let scans = CalibrationMeasurements {
+            sweep: vec![squeeze(48.0, 1.0, false)],
+            ..CalibrationMeasurements::default()
+        };
         assert!(!other.insert("mush", Envelope::new(scans, 0.5)));
         all.merge(other);
         assert_eq!(all.thresholds.len(), 1);

@@ -15,7 +15,7 @@ pub mod transport;
 
 pub use grip_hysteresis::{GripSwitch, WidthLatch};
 pub use interface::{
-    Action, ActionChunk, GripCommand, Policy, PolicyError, QueryId, EpisodeBrief, ToolCommand, ToolMotion,
+    Action, ActionChunk, EpisodeBrief, GripCommand, Policy, PolicyError, QueryId, ToolCommand, ToolMotion,
 };
 pub use observation::{
     CameraImage, Observation, PadForce, PastStep, RobotState, SensorStreams, TactileFrame, TactileHistory,

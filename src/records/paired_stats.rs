@@ -206,7 +206,8 @@ impl PairedStages {
     pub fn new(pairs: impl IntoIterator<Item = [Option<TaskStage>; 2]>) -> Self {
         let mut stages = Self::default();
         // Stages are in order, and Goal Success comes after all of them.
-        let completed = |failed: Option<TaskStage>| failed.map_or(TaskStage::ALL.len(), |stage| stage as usize);
+        let completed =
+            |failed: Option<TaskStage>| failed.map_or(TaskStage::ALL.len(), |stage| stage as usize);
         for [first, second] in pairs {
             stages.n += 1;
             for (counts, failed) in [(&mut stages.first, first), (&mut stages.second, second)] {
@@ -408,8 +409,12 @@ mod tests {
                 .map(|(record, (contact, stage))| with_harm(record.clone(), contact, stage))
                 .collect()
         };
-        let before =
-            side([(true, None), (true, Some(TaskStage::Grasp)), (false, Some(TaskStage::Reach)), (false, None)]);
+        let before = side([
+            (true, None),
+            (true, Some(TaskStage::Grasp)),
+            (false, Some(TaskStage::Reach)),
+            (false, None),
+        ]);
         let mut after = side([
             (false, None),
             (true, Some(TaskStage::Carry)),
@@ -438,7 +443,10 @@ mod tests {
         assert_eq!((paired.others_ok.n, counts(paired.others_ok)), (3, [1, 0, 2]));
         let stages = paired.failed_stages;
         assert_eq!(stages.first, BTreeMap::from([(TaskStage::Reach, 1), (TaskStage::Grasp, 1)]));
-        assert_eq!(stages.second, BTreeMap::from([(TaskStage::Reach, 1), (TaskStage::Carry, 1), (TaskStage::Place, 1)]));
+        assert_eq!(
+            stages.second,
+            BTreeMap::from([(TaskStage::Reach, 1), (TaskStage::Carry, 1), (TaskStage::Place, 1)])
+        );
         assert_eq!((stages.n, stages.better, stages.worse), (4, 1, 1));
     }
 

@@ -28,9 +28,7 @@ pub(super) const EPISODE_FOLDERS: [&str; 4] = ["actions", "trace", "video", soft
 #[derive(Debug, thiserror::Error)]
 pub enum RunFolderError {
     /// `found` is a file of that run.
-    #[error(
-        "{dir} already holds a run ({found}): resume it, or give another output folder"
-    )]
+    #[error("{dir} already holds a run ({found}): resume it, or give another output folder")]
     Occupied { dir: String, found: &'static str },
     /// `found` is a file that no run has written.
     #[error("{dir} is not empty and holds no run (it contains {found}); give a new output folder")]
@@ -292,7 +290,10 @@ mod tests {
         let mut folder = RunFolder::create(root.path()).unwrap();
         folder.append(&episode(0)).unwrap();
         let error = RunFolder::create(root.path()).unwrap_err().to_string();
-        assert!(error.contains("already holds a run (episodes.jsonl)") && error.contains("another output folder"), "{error}");
+        assert!(
+            error.contains("already holds a run (episodes.jsonl)") && error.contains("another output folder"),
+            "{error}"
+        );
         assert_eq!(indices(root.path()), [0]);
         fs::remove_file(root.path().join(EPISODES)).unwrap();
         files::write_json(&root.path().join(RUN), &1).unwrap();

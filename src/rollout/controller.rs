@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use super::simulation::Simulation;
 use softvt_policy::{
-    Action, ActionChunk, CommandResolver, Observation, Policy, PolicyError, SensorStreams, EpisodeBrief,
+    Action, ActionChunk, CommandResolver, EpisodeBrief, Observation, Policy, PolicyError, SensorStreams,
     ToolCommand,
 };
 

@@ -52,7 +52,8 @@ mod tests {
     use super::*;
 
     fn disturbance(spec: &DisturbanceSpec, episode: u32) -> Disturbance {
-        let id = EpisodeId { suite: "s".into(), task: 0, episode, base_seed: 0, split: EpisodeSplit::Validation };
+        let id =
+            EpisodeId { suite: "s".into(), task: 0, episode, base_seed: 0, split: EpisodeSplit::Validation };
         Disturbance::new(spec, &EpisodeSeed::new(&id, "l"))
     }
 

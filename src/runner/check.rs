@@ -34,6 +34,7 @@ impl<'a> SuiteChecker<'a> {
     /// # Errors
     /// A setting, a scene, a sensor or a calibration file that is not valid; a request to stop.
     pub fn check(&self, suite: &Suite, warn: impl FnMut(String)) -> Result<(), RunError> {
+        self.config.observer.work(&format!("checking {}", suite.name));
         let tasks: Vec<&Task> = suite.tasks.iter().collect();
         // Without episodes, a run whose actions are repeated may have fewer of them than the suite.
         let none = EpisodeList::listed(Vec::new());
@@ -42,7 +43,9 @@ impl<'a> SuiteChecker<'a> {
             sensor_assets: self.sensor_assets.clone(),
             ..SuiteRun::new(self.config, self.script, suite, none, PathBuf::new())?
         };
-        check_first_scenes(&run, &tasks)?.into_iter().for_each(warn);
+        let warnings = check_first_scenes(&run, &tasks)?;
+        self.config.observer.end();
+        warnings.into_iter().for_each(warn);
         SuiteRun { jobs: select_episodes(self.config, suite, &tasks), ..run }.scan_limits()?;
         if cancel::requested() { Err(RunError::interrupted("interrupted")) } else { Ok(()) }
     }

@@ -11,7 +11,7 @@ use std::{
 use crate::{
     episode_artifacts::VideoSelection,
     error::RunError,
-    observer::{Observer, Silent},
+    observer::{JobList, Observer, Silent},
     policy::PolicyConfig,
 };
 use softvt_benchmark::{ShiftValue, Suite, seed::SecretSeed};
@@ -212,25 +212,28 @@ impl RunConfig {
         thread_count(self.threads)
     }
 
-    /// Runs the jobs `0..count` on the threads of the configuration until one fails or a stop is requested. `finish` takes
-    /// each result and returns the line of progress for the observer.
+    /// Runs the jobs `0..count` of a list on the threads of the configuration until one fails or a stop is requested. `finish`
+    /// takes each result and returns the line of progress for the observer.
     ///
     /// # Errors
     /// A job or `finish` fails.
     pub(crate) fn run_jobs<T: Send>(
         &self,
-        name: &str,
+        list: &JobList,
         count: usize,
         job: impl Fn(usize) -> Result<T, RunError> + Sync,
         mut finish: impl FnMut(usize, T) -> Result<String, RunError>,
     ) -> Result<(), RunError> {
-        self.observer.begin(count, name);
-        let outcome = parallel::run(count, self.thread_count(), cancel::requested, job, |number, result| {
-            self.observer.advance(&finish(number, result)?);
+        list.expect(count);
+        parallel::run(count, self.thread_count(), cancel::requested, job, |number, result| {
+            list.advance(&finish(number, result)?);
             Ok(())
-        });
-        self.observer.end();
-        outcome
+        })
+    }
+
+    /// Begins a list of jobs for [`Self::run_jobs`].
+    pub(crate) fn job_list(&self, what: &str) -> JobList<'_> {
+        JobList::begin(&*self.observer, what)
     }
 
     /// Episodes per task of a suite.

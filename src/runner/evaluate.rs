@@ -8,6 +8,7 @@ use crate::{
     config::RunConfig,
     episode_list::{EpisodeJob, EpisodeList},
     error::{Cause, RunError},
+    observer::JobList,
     replay::{difference, replay_factory, with_policy_fields},
     run_manifest::{self, RunManifest},
     suite_run::PreparedRun,
@@ -102,20 +103,20 @@ impl<'a> RunLog<'a> {
         })
     }
 
-    /// Runs jobs. Writes the files of each finished episode, and then its line.
+    /// Runs jobs of a list. Writes the files of each finished episode, and then its line.
     ///
     /// # Errors
     /// A script, policy or file that fails. Finished episodes are kept.
     pub(crate) fn run_jobs<'j>(
         &mut self,
-        name: &str,
+        list: &JobList,
         jobs: &EpisodeList<'j>,
         simulate: impl Fn(EpisodeJob<'j>) -> Result<SimulatedEpisode, RunError> + Sync,
         write: impl Fn(&FinishedEpisode) -> Result<(), RunError>,
         mut line: impl FnMut(&EpisodeRecord) -> String,
     ) -> Result<(), RunError> {
         let (config, simulate) = (self.run.config, |position| simulate(jobs.job(position)));
-        config.run_jobs(name, jobs.len(), simulate, |_, SimulatedEpisode { finished, rendered }| {
+        config.run_jobs(list, jobs.len(), simulate, |_, SimulatedEpisode { finished, rendered }| {
             let record = self.add(finished, &write)?;
             report_unrendered(config, record.header.id.index(), rendered);
             Ok(line(record))
@@ -240,7 +241,13 @@ pub(crate) fn run_suite(
             on_episode(record);
             episode_line(record)
         };
-        log.run_jobs(&run.name, &remaining, simulate, |finished| artifacts.write(finished), line)
+        log.run_jobs(
+            &config.job_list(&run.name),
+            &remaining,
+            simulate,
+            |finished| artifacts.write(finished),
+            line,
+        )
     });
     match outcome {
         Err(error) if error.cause != Cause::Interrupt && log.records.is_empty() => {
@@ -268,12 +275,17 @@ pub(crate) fn run_episodes(
 ) -> Result<SuiteResult, RunError> {
     let (config, mut records) = (run.config, Vec::new());
     let simulate = |position| run.run_episode(run.jobs.job(position), false, &run.controllers);
-    config.run_jobs(&run.name, run.jobs.len(), simulate, |_, finished: FinishedEpisode| {
-        on_episode(&finished.record);
-        let line = episode_line(&finished.record);
-        records.push(finished.record);
-        Ok(line)
-    })?;
+    config.run_jobs(
+        &config.job_list(&run.name),
+        run.jobs.len(),
+        simulate,
+        |_, finished: FinishedEpisode| {
+            on_episode(&finished.record);
+            let line = episode_line(&finished.record);
+            records.push(finished.record);
+            Ok(line)
+        },
+    )?;
     if cancel::requested() {
         return Err(RunError::interrupted("interrupted"));
     }
@@ -312,7 +324,7 @@ pub(crate) fn episode_line(record: &EpisodeRecord) -> String {
         _ => format!("failed{d}"),
     };
     let stats = &record.stats;
-    let mut line = format!("{}: {outcome}, {:.1} s", record.header.id.index(), stats.time_s);
+    let mut line = format!("{}: {outcome}, {:.1} s simulated", record.header.id.index(), stats.time_s);
     if let Some(reason) = &stats.gave_up {
         line += &format!("; gave up: {reason}");
     }
@@ -404,7 +416,7 @@ mod tests {
     use crate::{config::ConfiguredScript, suite_run::SuiteRun};
     use softvt_benchmark::Plan;
     use softvt_benchmark::Task;
-    use softvt_policy::{Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, EpisodeBrief};
+    use softvt_policy::{Action, ActionChunk, EpisodeBrief, Observation, Policy, PolicyError, SensorStreams};
     use softvt_rollout::{ChunkedPolicy, Controller};
     use softvt_script::EpisodeSetup;
 

@@ -91,11 +91,13 @@ pub fn run<E: From<RunError>>(
         parallel::lock(&idle).push(experiment);
         Ok(rows)
     };
-    let outcome = config.run_jobs(name, points, run_point, |point, found: Vec<ExperimentRow>| {
+    let list = config.job_list(name);
+    let outcome = config.run_jobs(&list, points, run_point, |point, found: Vec<ExperimentRow>| {
         let line = format!("point {point}: {}", counted(found.len(), "row"));
         rows[point] = found;
         Ok(line)
     });
+    drop(list);
     let done = rows.iter().filter(|rows| !rows.is_empty()).count();
     let rows: Vec<ExperimentRow> = rows.into_iter().flatten().collect();
     if cancel::requested() {

@@ -1,5 +1,7 @@
 //! [`Observer`]: what a run tells while it is in progress.
 
+use std::ops::Deref;
+
 /// Receives the progress and the messages of runs. Its methods are called from any thread; by default they do nothing.
 pub trait Observer: Send + Sync {
     /// A message that needs no answer, such as a warning.
@@ -7,9 +9,20 @@ pub trait Observer: Send + Sync {
         let _ = message;
     }
 
-    /// A list of `total` jobs begins; `what` names it.
-    fn begin(&self, total: usize, what: &str) {
-        let _ = (total, what);
+    /// Work begins that can take seconds and has no results of its own, such as `checking the scenes`. It ends with the next
+    /// call of `begin`, `end` or this function.
+    fn work(&self, what: &str) {
+        let _ = what;
+    }
+
+    /// A list of jobs begins; `what` names it.
+    fn begin(&self, what: &str) {
+        let _ = what;
+    }
+
+    /// The list has `count` more jobs.
+    fn expect(&self, count: usize) {
+        let _ = count;
     }
 
     /// A job of the list has ended, with one line about its result.
@@ -17,7 +30,7 @@ pub trait Observer: Send + Sync {
         let _ = line;
     }
 
-    /// The list has ended.
+    /// The list, or the work, has ended.
     fn end(&self) {}
 }
 
@@ -26,3 +39,27 @@ pub trait Observer: Send + Sync {
 pub struct Silent;
 
 impl Observer for Silent {}
+
+/// An open list of jobs, which ends when this is dropped.
+pub(crate) struct JobList<'a>(&'a dyn Observer);
+
+impl<'a> JobList<'a> {
+    pub(crate) fn begin(observer: &'a dyn Observer, what: &str) -> Self {
+        observer.begin(what);
+        Self(observer)
+    }
+}
+
+impl<'a> Deref for JobList<'a> {
+    type Target = dyn Observer + 'a;
+
+    fn deref(&self) -> &Self::Target {
+        self.0
+    }
+}
+
+impl Drop for JobList<'_> {
+    fn drop(&mut self) {
+        self.0.end();
+    }
+}

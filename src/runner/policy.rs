@@ -15,7 +15,7 @@ use softvt_common::cancel;
 use softvt_common::text;
 use softvt_dataset::layout::is_dataset;
 use softvt_policy::{
-    Policy, SensorStreams, EpisodeBrief, builtin,
+    EpisodeBrief, Policy, SensorStreams, builtin,
     builtin::RecordedPolicy,
     profile::{GripCode, PROFILES, Profile},
     remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},

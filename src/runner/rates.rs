@@ -157,8 +157,13 @@ fn time_episode(
     let Plan::Suite(suite) = &loaded.plan else {
         return Err(RunError::input("the script is not a suite"));
     };
-    let id =
-        EpisodeId { suite: suite.name.clone(), task: 0, episode: 0, base_seed: 0, split: EpisodeSplit::Validation };
+    let id = EpisodeId {
+        suite: suite.name.clone(),
+        task: 0,
+        episode: 0,
+        base_seed: 0,
+        split: EpisodeSplit::Validation,
+    };
     let opened = EpisodeSetup::open(loaded, &id, &SceneChanges::default()).map_err(RunError::input)?;
     let (task, settings) = (&suite.tasks[0], &suite.settings);
     let spec = EpisodeSpec::new(id, "expert", task, &opened.nominal, opened.scene.clone(), settings);

@@ -161,6 +161,7 @@ impl<'a> SuiteRecording<'a> {
             let path = actions::path(&self.run.out, finished.record.header.id.index());
             Ok(actions::write(&path, &finished.actions)?)
         };
+        let list = self.run.config.job_list(&self.folder_name);
         loop {
             let due = |task: &'a Task| {
                 self.due(&log.records, task.id).into_iter().map(move |episode| EpisodeJob { task, episode })
@@ -169,7 +170,7 @@ impl<'a> SuiteRecording<'a> {
             if !jobs.is_empty() {
                 let record =
                     |job| Ok(SimulatedEpisode { finished: self.record_attempt(job)?, rendered: Ok(()) });
-                log.run_jobs(&self.folder_name, &jobs, record, write_actions, attempt_line)?;
+                log.run_jobs(&list, &jobs, record, write_actions, attempt_line)?;
             }
             for task in &self.tasks {
                 let kept = kept(&log.records, task.id);
@@ -390,7 +391,7 @@ fn attempt_line(record: &EpisodeRecord) -> String {
         (Some(reason), Outcome::Error { message }) => format!("not kept: {reason} ({message})"),
         (Some(reason), _) => format!("not kept: {reason}"),
     };
-    format!("task {} attempt {}: {result}, {:.1} s", id.task, id.episode, record.stats.time_s)
+    format!("task {} attempt {}: {result}, {:.1} s simulated", id.task, id.episode, record.stats.time_s)
 }
 
 /// What a recording contains.

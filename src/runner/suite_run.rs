@@ -17,7 +17,7 @@ use softvt_common::cancel;
 use softvt_common::episode_id::{EpisodeId, EpisodeIndex, EpisodeSplit};
 use softvt_common::{parallel, text::unknown_name};
 use softvt_dataset::card::Imported;
-use softvt_policy::{PolicyError, SensorStreams, EpisodeBrief, remote::PolicyConnections};
+use softvt_policy::{EpisodeBrief, PolicyError, SensorStreams, remote::PolicyConnections};
 use softvt_records::record::Origin;
 use softvt_rollout::{
     AssetCache, BuildError, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SensorAssets, Sensors,
@@ -371,10 +371,12 @@ impl<'a> SuiteRun<'a> {
     /// # Errors
     /// A layout, calibration file, camera, light or tactile sensor that is not valid; a server that cannot be reached.
     pub fn prepare(self) -> Result<PreparedRun<'a>, RunError> {
+        self.config.observer.work(&format!("checking the scenes of {}", self.name));
         let force_observed = self.check_first_episodes()?;
         let calibrations = self.scan_limits()?;
         let mut sources = self.sources();
         sources.extend(calibrations.sources.clone());
+        self.config.observer.end();
         Ok(PreparedRun { run: self, calibrations, sources, force_observed })
     }
 

@@ -21,8 +21,13 @@ fn loaded() -> LoadedScript {
 }
 
 fn scene(loaded: &LoadedScript, task: usize, episode: u32, base_seed: u64) -> Scene {
-    let id =
-        EpisodeId { suite: "spatial_soft".to_owned(), task, episode, base_seed, split: EpisodeSplit::Validation };
+    let id = EpisodeId {
+        suite: "spatial_soft".to_owned(),
+        task,
+        episode,
+        base_seed,
+        split: EpisodeSplit::Validation,
+    };
     EpisodeSetup::open(loaded, &id, &SceneChanges::default()).expect("the episode opens").scene
 }
 

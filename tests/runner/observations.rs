@@ -5,7 +5,9 @@ use std::{path::Path, sync::Arc};
 use softvt::{
     benchmark::{Plan, settings::Settings},
     episode_id::{EpisodeId, EpisodeSplit},
-    policy::{Action, ActionChunk, Observation, Policy, PolicyError, RobotState, SensorStreams, EpisodeBrief},
+    policy::{
+        Action, ActionChunk, EpisodeBrief, Observation, Policy, PolicyError, RobotState, SensorStreams,
+    },
     records::{record::EpisodeRecord, summary::SuiteSummary},
     report::terminal,
     rollout::{AssetCache, ChunkedPolicy, Episode, EpisodeSpec, SensorAssets, Sensors, Simulation},
@@ -53,8 +55,14 @@ fn played(project: &Project, streams: SensorStreams) -> Result<(Vec<Observation>
     let episode =
         Episode::start(spec, &AssetCache::default(), &SensorAssets::default()).map_err(|e| e.to_string())?;
     let mut witness = RecordingPolicy { streams, seen: Vec::new() };
-    let brief =
-        EpisodeBrief { suite: "one".into(), task: 0, prompt: "wait".into(), episode: 0, seed: 0, alias: None };
+    let brief = EpisodeBrief {
+        suite: "one".into(),
+        task: 0,
+        prompt: "wait".into(),
+        episode: 0,
+        seed: 0,
+        alias: None,
+    };
     let mut driver = ChunkedPolicy::new(Box::new(&mut witness), brief, 1);
     let outcome = episode.run(&mut driver).map_err(|e| e.to_string());
     drop(driver);

@@ -135,9 +135,10 @@ impl FileBuilder {
 
 fn poses(demo: &ForeignDemo) -> Vec<Action> {
     let pose = |command: &ToolCommand| match (command.motion, command.grip) {
-        (ToolMotion::Pose { position_b, axis_angle_b }, GripCommand::Target(GripTarget::Closure(closure))) => {
-            Action::new(position_b, axis_angle_b, closure)
-        }
+        (
+            ToolMotion::Pose { position_b, axis_angle_b },
+            GripCommand::Target(GripTarget::Closure(closure)),
+        ) => Action::new(position_b, axis_angle_b, closure),
         _ => panic!("a pose and a closure"),
     };
     demo.commands.iter().map(pose).collect()

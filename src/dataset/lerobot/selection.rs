@@ -54,7 +54,8 @@ pub(super) fn select(root: &Path, words: &[String]) -> Result<Selection, Dataset
         return Err(DatasetError::content(root, DATASET, what));
     }
     if !DatasetCard::read(root)?.has_images {
-        let what = "images are stored only as videos, whose compression is lossy; record them in the HDF5 files";
+        let what =
+            "images are stored only as videos, whose compression is lossy; record them in the HDF5 files";
         return Err(DatasetError::content(&card_path, "pictures", what));
     }
     let entries = matching_entries(root, manifest::read(root)?, words)?;

@@ -91,7 +91,7 @@ use super::{
     grip::{GripMonitor, GripSample},
     safety::{DeformationLimit, KAPPAS, KappaVerdict, PeakDeformation, SafetyParts},
     slip::{OpeningMonitor, SlipMonitor, SlipSample},
-    stage::{StageMonitor, StageEvidence},
+    stage::{StageEvidence, StageMonitor},
     verdict::{OtherObjectDeformation, Outcome, Verdict, WrongObjectContact},
 };
 

@@ -99,7 +99,8 @@ impl PolicyServer {
             return Ok(());
         }
         let seconds = self.timeout.as_secs_f64();
-        Err(self.error(&format!("{what} within {seconds} s; raise the timeout of the policy if it needs longer")))
+        Err(self
+            .error(&format!("{what} within {seconds} s; raise the timeout of the policy if it needs longer")))
     }
 
     fn socket_error(&self, error: &Error) -> PolicyError {

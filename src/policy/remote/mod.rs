@@ -13,7 +13,7 @@ use rmpv::Value;
 use self::connection::PolicyConnection;
 pub use self::connection::{PolicyServer, Protocol};
 use super::{
-    ActionChunk, Observation, Policy, PolicyError, QueryId, SensorStreams, EpisodeBrief, decode, encode,
+    ActionChunk, EpisodeBrief, Observation, Policy, PolicyError, QueryId, SensorStreams, decode, encode,
     msgpack::{entry, kind},
     profile::{GripCode, Profile},
 };

@@ -10,7 +10,7 @@ use rmpv::Value;
 
 use super::connection::PolicyConnection;
 use crate::{
-    ActionChunk, Observation, PolicyError, QueryId, EpisodeBrief, decode,
+    ActionChunk, EpisodeBrief, Observation, PolicyError, QueryId, decode,
     encode::content,
     msgpack::{entry, map, names},
     profile::{InputSource, Profile},

@@ -116,7 +116,8 @@ fn harm_and_stages_are_counted() {
             episode(0, 0, |r| r.verdict.others_ok = Some(true)),
             episode(0, 1, |r| {
                 r.verdict.others_ok = Some(false);
-                r.verdict.first_wrong_contact = Some(WrongObjectContact { time_s: 1.0, object: "cube".into() });
+                r.verdict.first_wrong_contact =
+                    Some(WrongObjectContact { time_s: 1.0, object: "cube".into() });
             }),
             episode(0, 2, |r| (r.verdict.goal, r.verdict.failed_stage) = (false, Some(TaskStage::Lift))),
         ],

@@ -2,7 +2,7 @@ use crate::sample_record;
 use std::fs;
 
 use super::*;
-use softvt_evaluation::calibration::{Envelope, Protocol, CalibrationMeasurements, SweepRow};
+use softvt_evaluation::calibration::{CalibrationMeasurements, Envelope, Protocol, SweepRow};
 use softvt_geometry::Vec3;
 
 fn episode(task: usize, asset: &str, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
@@ -102,7 +102,11 @@ fn files_land_where_the_scorer_finds_them() {
         slip_mm: 0.0,
         stable: true,
     };
-    let scans = CalibrationMeasurements { protocol: Protocol::Hand, sweep: vec![row], ..CalibrationMeasurements::default() };
+    let scans = CalibrationMeasurements {
+        protocol: Protocol::Hand,
+        sweep: vec![row],
+        ..CalibrationMeasurements::default()
+    };
     thresholds.insert("bun", Envelope::new(scans, 0.5));
     write_scores(root.path(), &records(), &thresholds).unwrap();
     let header = sample_record().header;

@@ -270,7 +270,8 @@ pub fn stage_table(runs: &[RunSummary]) -> Option<ResultTable> {
         let optional = |of: &Option<Rate>| of.as_ref().map_or_else(|| "N/A".to_owned(), rate);
         let head = [run.summary.suite.clone(), run.method.clone()];
         let harm = [optional(&s.others_ok_rate), s.others_unknown.to_string(), rate(&s.wrong_contact_rate)];
-        let stages = TaskStage::ALL.map(|stage| s.failed_stages.get(&stage).copied().unwrap_or(0).to_string());
+        let stages =
+            TaskStage::ALL.map(|stage| s.failed_stages.get(&stage).copied().unwrap_or(0).to_string());
         head.into_iter().chain(harm).chain(stages).collect()
     };
     let rows: Vec<Vec<String>> = runs.iter().map(row).collect();

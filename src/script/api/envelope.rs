@@ -26,7 +26,7 @@ use crate::{
 use softvt_benchmark::variation::{DrawError, ModelOf, VariationRanges};
 use softvt_common::parallel::lock;
 use softvt_evaluation::{
-    calibration::{Envelope, HoldRow, Protocol, SafeWindow, CalibrationMeasurements, SweepRow, force_at},
+    calibration::{CalibrationMeasurements, Envelope, HoldRow, Protocol, SafeWindow, SweepRow, force_at},
     envelope_plot::{plot, summary_text},
     instance::{Grip, GripWindow, InstanceFactors, InstanceModel, VariantSweep},
     safety::DeformationLimit,

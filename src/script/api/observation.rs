@@ -14,7 +14,7 @@ use crate::{
     vm::error::fail,
 };
 use softvt_common::text::unknown_name;
-use softvt_policy::{Observation, PadForce, TactileFrame, TactileHistory, EpisodeBrief};
+use softvt_policy::{EpisodeBrief, Observation, PadForce, TactileFrame, TactileHistory};
 use softvt_robot::rotation;
 use softvt_sensing::tactile::{MarkerFlow, MarkerPositions, Markers};
 

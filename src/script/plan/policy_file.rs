@@ -23,7 +23,7 @@ use crate::{
 use softvt_benchmark::seed::{EpisodeSeed, RandomStream};
 use softvt_geometry::Vec3;
 use softvt_policy::{
-    ActionChunk, Observation, Policy, PolicyError, SensorStreams, EpisodeBrief, ToolCommand, ToolMotion,
+    ActionChunk, EpisodeBrief, Observation, Policy, PolicyError, SensorStreams, ToolCommand, ToolMotion,
     decode::MAX_CHUNK_LEN,
     profile::{GripCode, GripperValues},
 };

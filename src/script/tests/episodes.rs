@@ -418,7 +418,13 @@ fn an_episode_of_another_suite_than_that_of_the_plan_is_refused() {
     let text = format!("{SUITE}return suite()");
     let project = Project::new(&[("x.lua", &text)]);
     let mut loaded = project.load("x.lua", &[]).expect("a suite");
-    let id = EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 0, split: EpisodeSplit::Validation };
+    let id = EpisodeId {
+        suite: "test".into(),
+        task: 0,
+        episode: 0,
+        base_seed: 0,
+        split: EpisodeSplit::Validation,
+    };
     assert!(EpisodeSetup::open(&loaded, &id, &SceneChanges::default()).is_ok());
     let Plan::Suite(suite) = &mut loaded.plan else { panic!("a suite") };
     suite.tasks[0].goal.target = "ball".into();

@@ -256,7 +256,13 @@ fn a_scene_holds_no_more_than_can_be_computed() {
     let project = Project::new(&[("x.lua", &(crowd + "return suite()"))]);
     let limits = VmLimits { call: Duration::from_secs(20), ..limits() };
     let loaded = project.load_with("x.lua", &[], &limits).unwrap();
-    let id = EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 0, split: EpisodeSplit::Validation };
+    let id = EpisodeId {
+        suite: "test".into(),
+        task: 0,
+        episode: 0,
+        base_seed: 0,
+        split: EpisodeSplit::Validation,
+    };
     let error =
         crate::EpisodeSetup::open(&loaded, &id, &crate::SceneChanges::default()).map(|_| ()).unwrap_err();
     assert_eq!(error.message, "scene:add: a scene holds at most 1000 objects");

@@ -32,7 +32,13 @@ fn suite(chest: &str, place: &str) -> String {
 fn open(text: &str) -> Result<Scene, String> {
     let project = Project::new(&[("x.lua", text)]);
     let loaded = project.load("x.lua", &[]).map_err(|e| e.message)?;
-    let id = EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 1, split: EpisodeSplit::Validation };
+    let id = EpisodeId {
+        suite: "test".into(),
+        task: 0,
+        episode: 0,
+        base_seed: 1,
+        split: EpisodeSplit::Validation,
+    };
     let folder = format!("{}/", project.path("").display()).replace("//", "/");
     EpisodeSetup::open(&loaded, &id, &SceneChanges::default())
         .map(|e| e.scene)

@@ -10,15 +10,23 @@ use softvt_benchmark::seed::EpisodeSeed;
 use softvt_common::episode_id::EpisodeSplit;
 use softvt_geometry::Vec3;
 use softvt_policy::{
-    Action, ActionChunk, CameraImage, GripCommand, GripTarget, Observation, Policy, PolicyError, RobotState,
-    SensorStreams, TactileFrame, TactileHistory, EpisodeBrief, ToolCommand, ToolMotion,
+    Action, ActionChunk, CameraImage, EpisodeBrief, GripCommand, GripTarget, Observation, Policy,
+    PolicyError, RobotState, SensorStreams, TactileFrame, TactileHistory, ToolCommand, ToolMotion,
     profile::{GripCode, Profile},
 };
 use softvt_sensing::tactile::Markers;
 
 fn seed(episode: u32) -> EpisodeSeed {
     let (suite, layout) = ("one".to_owned(), "one".to_owned());
-    EpisodeSeed { suite, layout, task: 0, episode, base_seed: 0, split: EpisodeSplit::Validation, secret: None }
+    EpisodeSeed {
+        suite,
+        layout,
+        task: 0,
+        episode,
+        base_seed: 0,
+        split: EpisodeSplit::Validation,
+        secret: None,
+    }
 }
 
 /// A finger whose markers have all moved by `by` px, with an image that is `lit` brighter than the untouched one.
@@ -262,7 +270,10 @@ fn the_shipped_policies_act() {
         policy.reset(&brief()).unwrap();
         let chunk = policy.act(&observation()).unwrap();
         let ToolMotion::Pose { position_b, .. } = chunk.commands[0].motion else { panic!("a pose") };
-        assert_eq!((position_b.x, chunk.commands[0].grip), (0.5, GripCommand::Target(GripTarget::Closure(0.0))));
+        assert_eq!(
+            (position_b.x, chunk.commands[0].grip),
+            (0.5, GripCommand::Target(GripTarget::Closure(0.0)))
+        );
     }
 }
 

@@ -15,7 +15,13 @@ fn loaded(suite: &str) -> LoadedScript {
 }
 
 fn episode(loaded: &LoadedScript, suite: &str, task: usize, shifts: &[(&str, f64)]) -> EpisodeSetup {
-    let id = EpisodeId { suite: suite.to_owned(), task, episode: 3, base_seed: 1, split: EpisodeSplit::Validation };
+    let id = EpisodeId {
+        suite: suite.to_owned(),
+        task,
+        episode: 3,
+        base_seed: 1,
+        split: EpisodeSplit::Validation,
+    };
     let shift = |(name, value): &(&str, f64)| ShiftValue { name: (*name).to_owned(), value: *value };
     let shifts: Vec<ShiftValue> = shifts.iter().map(shift).collect();
     EpisodeSetup::open(loaded, &id, &SceneChanges { shifts, ..SceneChanges::default() }).expect("a scene")

@@ -132,7 +132,13 @@ fn in_layout(text: &str) -> String {
     let whole = super::SUITE.replace("scene:add { name", &format!("{text} scene:add {{ name"));
     let project = Project::new(&[("x.lua", &(whole + "return suite()"))]);
     let loaded = project.load("x.lua", &[]).unwrap();
-    let id = EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 0, split: EpisodeSplit::Validation };
+    let id = EpisodeId {
+        suite: "test".into(),
+        task: 0,
+        episode: 0,
+        base_seed: 0,
+        split: EpisodeSplit::Validation,
+    };
     let folder = format!("{}/", project.path("").display()).replace("//", "/");
     match crate::EpisodeSetup::open(&loaded, &id, &crate::SceneChanges::default()) {
         Ok(_) => String::new(),
