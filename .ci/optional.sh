@@ -37,6 +37,11 @@ python_environment() {
     fi
 }
 
+# short_suite SUITE STEPS FILE: writes a copy of a suite whose tasks have that many control steps, for what does not depend on the goal.
+short_suite() {
+    printf 'local suite = require "suites.%s"\nfor _, task in ipairs(suite.tasks) do task.budget_steps = %d end\nreturn suite\n' "$1" "$2" > "$3"
+}
+
 skipped=()
 
 # optional_stage NAME SCRIPT: runs a test of the above kind, and adds it to `skipped` if it was skipped.
