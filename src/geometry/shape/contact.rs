@@ -79,13 +79,22 @@ fn full(SignedDistance { distance: gap, normal }: SignedDistance) -> Contact {
 fn sharp<const N: usize>(faces: [SupportFace; N], facing: &Vec3, spacing: f64) -> Option<Contact> {
     let nearest = -faces.iter().fold(f64::NEG_INFINITY, |least, face| least.max(face.gap));
     let deepest = MAX_DEPTH.max(MAX_DEPTH_RATIO * nearest);
+    // Most samples face one face only, so the shares of the others are not computed.
     let shares = faces.each_ref().map(|face| {
         let alignment = -facing.dot(&face.normal);
-        let coverage = covered(face.inside[0], spacing) * covered(face.inside[1], spacing);
         let limit = face.depth.min(deepest);
-        let is_met = alignment > FACING && face.gap >= -limit && coverage > 0.0;
-        is_met.then(|| (alignment, coverage, (2.0 * (1.0 + face.gap / limit)).clamp(1e-6, 1.0)))
+        let is_faced = alignment > FACING && face.gap >= -limit;
+        if !is_faced {
+            return None;
+        }
+        let coverage = covered(face.inside[0], spacing) * covered(face.inside[1], spacing);
+        let depth = (2.0 * (1.0 + face.gap / limit)).clamp(1e-6, 1.0);
+        (coverage > 0.0).then_some((alignment, coverage, depth))
     });
+    let mut met = faces.iter().zip(&shares).filter_map(|(face, share)| Some((face, share.as_ref()?)));
+    if let (Some((face, &(_, coverage, _))), None) = (met.next(), met.next()) {
+        return Some(Contact { gap: face.gap, normal: face.normal, coverage });
+    }
     let most = shares.iter().flatten().fold(FACING, |most, (alignment, ..)| most.max(*alignment));
     let (mut total, mut gap, mut normal, mut coverage) = (0.0, 0.0, Vec3::zeros(), 0.0);
     for (face, share) in faces.iter().zip(shares) {

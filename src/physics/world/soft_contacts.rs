@@ -145,13 +145,16 @@ impl World {
             let a = self.group_endpoint(soft, group, block);
             let b = self.body_endpoint(self.collider(collider).parent);
             let first = self.problem.points.len();
-            same.iter().for_each(|candidate| self.push_soft_collider(candidate, &b));
+            let pose = self.motions[collider.index()].pose;
+            let to_anchor = pose.rotation.inverse().to_rotation_matrix().into_inner();
+            same.iter().for_each(|candidate| self.push_soft_collider(candidate, &b, &to_anchor));
             self.problem.clusters.push(ContactCluster { a, b, first, last: self.problem.points.len() });
         }
         self.candidates.collider = candidates;
     }
 
-    fn push_soft_collider(&mut self, found: &SoftColliderCandidate, b: &Endpoint) {
+    /// Adds one contact; `to_anchor` turns the world into the collider's frame.
+    fn push_soft_collider(&mut self, found: &SoftColliderCandidate, b: &Endpoint, to_anchor: &Mat3) {
         let SoftColliderCandidate { soft: id, collider, candidate } = *found;
         let partner = ContactPartner::Collider(collider);
         let (soft, motion) = (self.soft(id), &self.motions[collider.index()]);
@@ -189,7 +192,7 @@ impl World {
             partner,
             anchor: record.anchor,
             slip_distance: record.slip_distance,
-            to_anchor: motion.pose.rotation.inverse().to_rotation_matrix().into_inner(),
+            to_anchor: *to_anchor,
         };
         self.problem.points.push(point);
         self.rows.push(row);
