@@ -53,7 +53,7 @@ fn multiply(k: &[f64; 576], u: &[f64; 24]) -> [f64; 24] {
     let mut p = [0.0; 24];
     for (column, &value) in k.chunks_exact(24).zip(u) {
         for (p, k) in p.iter_mut().zip(column) {
-            *p += k * value;
+            *p = k.mul_add(value, *p);
         }
     }
     p
