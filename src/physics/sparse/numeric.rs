@@ -1,6 +1,6 @@
 //! Numeric factorization: assembly of the fronts, elimination, and the triangular solves.
 
-use super::{SymbolicFactor, dense};
+use super::{SymbolicFactor, dense, symbolic::Run};
 
 /// Cholesky factor of a block matrix, for one [`SymbolicFactor`] at a time. Its buffers are reused.
 #[derive(Clone, Debug, Default)]
@@ -10,6 +10,8 @@ pub(crate) struct CholeskyFactor {
     front: Vec<f64>,
     schur: Vec<f64>,
     gather: Vec<f64>,
+    /// Row of each position in the current front, for those in it.
+    row_of: Vec<u32>,
 }
 
 /// A symmetric matrix of 3×3 blocks over a graph of nodes.
@@ -27,55 +29,35 @@ impl CholeskyFactor {
         self.stack.resize(plan.stack_len, 0.0);
         self.front.resize(plan.largest * plan.largest, 0.0);
         self.gather.resize(plan.largest, 0.0);
+        self.row_of.resize(plan.order.len(), 0);
         let mut top = 0;
         for (index, front) in plan.fronts.iter().enumerate() {
             let n = 3 * front.rows.len();
             let k = 3 * front.pivots;
-            self.front[..n * n].fill(0.0);
-            self.assemble(plan, index, matrix);
+            let is_root = index + 1 == plan.fronts.len();
+            if is_root {
+                self.schur.resize(n * n, 0.0);
+            }
+            let values = if is_root { &mut self.schur } else { &mut self.front };
+            (0..n).for_each(|c| values[c * n + c / 3 * 3..(c + 1) * n].fill(0.0));
+            front.rows.iter().zip(0..).for_each(|(&at, row)| self.row_of[at as usize] = row);
+            assemble(plan, index, matrix, &self.row_of, values);
             for &child in front.children.iter().rev() {
                 let rest = 3 * (plan.fronts[child].rows.len() - plan.fronts[child].pivots);
                 top -= rest * rest;
-                extend_add(&mut self.front, n, &self.stack[top..], rest, &plan.fronts[child].into_parent);
+                extend_add(values, n, &self.stack[top..], rest, &plan.fronts[child].into_parent);
+            }
+            if is_root {
+                break;
             }
             if !dense::partial_cholesky(&mut self.front[..n * n], n, k) {
                 return false;
             }
             self.panels[front.offset..front.offset + n * k].copy_from_slice(&self.front[..n * k]);
-            if index + 1 == plan.fronts.len() {
-                self.schur.clear();
-                self.schur.extend_from_slice(&self.front[..n * n]);
-            } else {
-                push_update(&self.front, n, k, &mut self.stack[top..]);
-                top += (n - k) * (n - k);
-            }
+            push_update(&self.front, n, k, &mut self.stack[top..]);
+            top += (n - k) * (n - k);
         }
         true
-    }
-
-    /// Adds the matrix entries whose earlier position is eliminated in this front (or retained, in the root).
-    fn assemble(&mut self, plan: &SymbolicFactor, index: usize, matrix: &dyn BlockMatrix) {
-        let front = &plan.fronts[index];
-        let n = 3 * front.rows.len();
-        let root = index + 1 == plan.fronts.len();
-        let columns = if root { front.rows.len() } else { front.pivots };
-        let values = &mut self.front;
-        for column in 0..columns {
-            let at = front.first + column;
-            matrix.column(plan.order[at], &mut |other, block, transposed| {
-                let row = plan.position[other as usize];
-                if (row as usize) < at {
-                    return;
-                }
-                let row = front.rows.binary_search(&row).expect("the pattern covers the matrix");
-                for c in 0..3 {
-                    for r in 0..3 {
-                        let value = if transposed { block[3 * r + c] } else { block[3 * c + r] };
-                        values[(3 * column + c) * n + 3 * row + r] += value;
-                    }
-                }
-            });
-        }
     }
 
     /// Schur complement of the retained nodes: side `3 · retained`, column-major, lower triangle.
@@ -108,6 +90,36 @@ impl CholeskyFactor {
     }
 }
 
+/// Adds the matrix entries whose earlier position is eliminated in this front (or retained, in the root).
+fn assemble(
+    plan: &SymbolicFactor,
+    index: usize,
+    matrix: &dyn BlockMatrix,
+    row_of: &[u32],
+    values: &mut [f64],
+) {
+    let front = &plan.fronts[index];
+    let n = 3 * front.rows.len();
+    let root = index + 1 == plan.fronts.len();
+    let columns = if root { front.rows.len() } else { front.pivots };
+    for column in 0..columns {
+        let at = front.first + column;
+        matrix.column(plan.order[at], &mut |other, block, transposed| {
+            let row = plan.position[other as usize];
+            if (row as usize) < at {
+                return;
+            }
+            let row = row_of[row as usize] as usize;
+            for c in 0..3 {
+                for r in 0..3 {
+                    let value = if transposed { block[3 * r + c] } else { block[3 * c + r] };
+                    values[(3 * column + c) * n + 3 * row + r] += value;
+                }
+            }
+        });
+    }
+}
+
 fn load(work: &mut [f64], b: &[f64], rows: &[u32]) {
     for (w, &row) in work.chunks_exact_mut(3).zip(rows) {
         w.copy_from_slice(&b[3 * row as usize..3 * row as usize + 3]);
@@ -128,20 +140,22 @@ fn push_update(front: &[f64], n: usize, k: usize, stack: &mut [f64]) {
     }
 }
 
-/// Adds a child's update matrix to its parent's front.
-fn extend_add(front: &mut [f64], n: usize, update: &[f64], rest: usize, into: &[u32]) {
-    for (cb, &column) in into.iter().enumerate() {
-        for c in 0..3 {
-            let source = &update[(3 * cb + c) * rest..(3 * cb + c + 1) * rest];
-            let target = &mut front[(3 * column as usize + c) * n..(3 * column as usize + c + 1) * n];
-            for (rb, &row) in into.iter().enumerate().skip(cb) {
-                for r in 0..3 {
-                    // Entries above the diagonal of a diagonal block are neither written nor read.
-                    target[3 * row as usize + r] += source[3 * rb + r];
-                }
+/// Adds a child's update matrix (side `rest`) to its parent's front, lower triangles.
+fn extend_add(front: &mut [f64], n: usize, update: &[f64], rest: usize, into: &[Run]) {
+    for (index, run) in into.iter().enumerate() {
+        for c in 0..run.len {
+            let source = &update[(run.from + c) * rest..(run.from + c + 1) * rest];
+            let target = &mut front[(run.to + c) * n..(run.to + c + 1) * n];
+            add(&mut target[run.to + c..run.to + run.len], &source[run.from + c..run.from + run.len]);
+            for below in &into[index + 1..] {
+                add(&mut target[below.to..below.to + below.len], &source[below.from..below.from + below.len]);
             }
         }
     }
+}
+
+fn add(target: &mut [f64], source: &[f64]) {
+    target.iter_mut().zip(source).for_each(|(t, s)| *t += s);
 }
 
 #[cfg(test)]

@@ -32,14 +32,25 @@ pub(super) struct Front {
     pub rows: Vec<u32>,
     /// Children in the order in which they were eliminated.
     pub children: Vec<usize>,
-    /// Index in the parent's rows of each row beyond the pivots.
-    pub into_parent: Vec<u32>,
+    /// Where the rows beyond the pivots are among the rows of the parent.
+    pub into_parent: Vec<Run>,
     /// Offset of the panel `L` (3·rows × 3·pivots, column-major) in the factor.
     pub offset: usize,
 }
 
+/// Adjacent rows of an update matrix that are adjacent in the parent's front too, counted in scalars.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Run {
+    /// First row in the update matrix.
+    pub from: usize,
+    /// First row in the parent.
+    pub to: usize,
+    /// Number of rows.
+    pub len: usize,
+}
+
 /// Largest share of explicit zeros accepted when two fronts are merged.
-const MERGE_ZEROS: f64 = 0.1;
+const MERGE_ZEROS: f64 = 0.05;
 /// Fronts with at most this many pivots are merged regardless of zeros.
 const MERGE_SMALL: usize = 3;
 
@@ -191,13 +202,14 @@ fn link(fronts: &mut [Front], front_of: &[usize]) {
     for index in 0..fronts.len() - 1 {
         let Some(&next) = fronts[index].rows.get(fronts[index].pivots) else { continue };
         let parent = front_of[next as usize];
-        let below = &fronts[index].rows[fronts[index].pivots..];
-        let into: Vec<u32> = below
-            .iter()
-            .map(|row| {
-                fronts[parent].rows.binary_search(row).expect("a child's rows lie in its parent") as u32
-            })
-            .collect();
+        let mut into: Vec<Run> = Vec::new();
+        for (from, row) in fronts[index].rows[fronts[index].pivots..].iter().enumerate() {
+            let to = fronts[parent].rows.binary_search(row).expect("a child's rows lie in its parent");
+            match into.last_mut() {
+                Some(run) if run.to + run.len == 3 * to => run.len += 3,
+                _ => into.push(Run { from: 3 * from, to: 3 * to, len: 3 }),
+            }
+        }
         fronts[index].into_parent = into;
         fronts[parent].children.push(index);
     }
