@@ -31,6 +31,9 @@ const MAX_PASSES: usize = 3;
 const PASS_TOLERANCE: f64 = 0.01;
 /// Steps after which the convergence with a stale factor, corrected by those steps, is judged.
 const STALE_FACTOR_TRIAL: u32 = 2;
+/// Slope at the end of a line search, relative to that at its start. Points on the line are cheap: they need no product
+/// with the matrices of the blocks.
+const LINE_TOLERANCE: f64 = 0.1;
 /// Guesses of the active segments of the scalar constraints before the segments at the current velocities are taken.
 const MAX_SEGMENT_GUESSES: usize = 8;
 
@@ -66,8 +69,10 @@ pub(crate) struct Solver {
     step: Vec<f64>,
     gradient: Vec<f64>,
     trial_gradient: Vec<f64>,
-    /// `A v`.
+    /// `A v`, `A` times the step, and `A` times the trial point.
     product: Vec<f64>,
+    step_product: Vec<f64>,
+    trial_product: Vec<f64>,
     /// `diag(A)^-1/2`.
     scale: Vec<f64>,
     cache: FactorCache,
@@ -131,6 +136,7 @@ impl Solver {
     /// Solves one island; returns the number of Newton steps.
     fn solve_island(&mut self, problem: &mut ContactProblem, island: &Island) -> Result<u32, SolverFailure> {
         self.prepare(problem, island);
+        multiply(problem, island, &self.v, &mut self.product);
         let mut steps = 0;
         for pass in 0..MAX_PASSES {
             steps += self.newton(problem, island)?;
@@ -163,11 +169,9 @@ impl Solver {
             self.v.extend_from_slice(&b.v);
             self.scale.extend((0..b.dim).map(|i| 1.0 / b.matrix[i * b.dim + i].sqrt()));
         }
-        for buffer in
-            [&mut self.trial, &mut self.step, &mut self.gradient, &mut self.trial_gradient, &mut self.product]
-        {
-            buffer.resize(island.size, 0.0);
-        }
+        let vectors = [&mut self.trial, &mut self.step, &mut self.gradient, &mut self.trial_gradient];
+        let products = [&mut self.product, &mut self.step_product, &mut self.trial_product];
+        vectors.into_iter().chain(products).for_each(|buffer| buffer.resize(island.size, 0.0));
     }
 
     /// Newton's method for one pass; returns the number of steps.
@@ -175,10 +179,7 @@ impl Solver {
     /// The cost is piecewise quadratic and changes little from step to step, so an existing factor of its Hessian is
     /// used for as long as that is cheaper than a new one. The gradient is always exact.
     fn newton(&mut self, problem: &ContactProblem, island: &Island) -> Result<u32, SolverFailure> {
-        let v = std::mem::take(&mut self.v);
-        let mut gradient = std::mem::take(&mut self.gradient);
-        let mut cost = self.evaluate(problem, island, &v, &mut gradient);
-        (self.v, self.gradient) = (v, gradient);
+        let mut cost = evaluate(problem, island, &self.v, &self.product, &mut self.gradient);
         let mut ratio = self.residual_ratio(problem, island);
         let mut has_factor = self.cache.select(problem, island);
         let mut progress = NewtonProgress { steps: 0, initial_ratio: ratio };
@@ -216,49 +217,6 @@ impl Solver {
                     || progress.remaining_steps(ratio) < FACTOR_COST_IN_STEPS);
         }
         Err(SolverFailure { block: island.blocks[0], residual_ratio: ratio })
-    }
-
-    /// Cost and gradient at `v`.
-    fn evaluate(
-        &mut self,
-        problem: &ContactProblem,
-        island: &Island,
-        v: &[f64],
-        gradient: &mut [f64],
-    ) -> f64 {
-        let mut cost = 0.0;
-        for &block in &island.blocks {
-            let (b, range) = (&problem.blocks[block], problem.range(block));
-            let product = &mut self.product[range.clone()];
-            dense::symmetric_multiply(&b.matrix, b.dim, &v[range.clone()], product);
-            let rows = gradient[range.clone()].iter_mut().zip(product.iter());
-            for ((g, p), (r, v)) in rows.zip(b.rhs.iter().zip(&v[range])) {
-                *g = p - r;
-                cost += v * (0.5 * p - r);
-            }
-        }
-        let law = ContactLaw::new(problem.dt, problem.dissipation_time);
-        for cluster in island.clusters.iter().map(|&index| &problem.clusters[index]) {
-            let (mut on_a, mut on_b, mut is_touched) = ([Vec3::zeros(); 8], [Vec3::zeros(); 8], false);
-            for (point, velocity) in problem.point_velocities(cluster, v) {
-                let Some(ContactResponse { impulse, cost: own, .. }) = law.contact(point, &velocity) else {
-                    continue;
-                };
-                is_touched = true;
-                cost += own;
-                problem.add_point_impulse(&cluster.a, &mut on_a, &point.weights_a, &point.p, &impulse);
-                problem.add_point_impulse(&cluster.b, &mut on_b, &point.weights_b, &point.p, &impulse);
-            }
-            if is_touched {
-                problem.scatter_impulses(&cluster.a, -1.0, &on_a, gradient);
-                problem.scatter_impulses(&cluster.b, 1.0, &on_b, gradient);
-            }
-        }
-        for (at, constraint) in island.scalars(problem) {
-            cost += constraint.cost(problem.dt, v[at]);
-            gradient[at] -= problem.dt * constraint.force_at(problem.dt, v[at]);
-        }
-        cost
     }
 
     /// Factors the Hessian at the current velocities, without the scalar constraints, down to the constrained block.
@@ -364,14 +322,14 @@ impl Solver {
     /// Corrects the kept factor by the last step, without the contribution of the scalar constraints.
     fn correct_factor(&mut self, problem: &ContactProblem, island: &Island) {
         let (old, new) = (&self.trial, &self.v);
-        let step = new.iter().zip(old).map(|(v, v0)| v - v0).collect();
-        let gradients = self.gradient.iter().zip(&self.trial_gradient);
-        let mut change: Vec<f64> = gradients.map(|(g, g0)| g - g0).collect();
+        // The former gradient becomes the change.
+        self.trial_gradient.iter_mut().zip(&self.gradient).for_each(|(g0, g)| *g0 = g - *g0);
         for (at, constraint) in island.scalars(problem) {
             let force = |v: &[f64]| constraint.force_at(problem.dt, v[at]);
-            change[at] -= problem.dt * (force(old) - force(new));
+            self.trial_gradient[at] -= problem.dt * (force(old) - force(new));
         }
-        self.cache.corrections().push(step, change);
+        let steps = new.iter().zip(old).map(|(v, v0)| v - v0);
+        self.cache.corrections().push(steps.zip(self.trial_gradient.iter().copied()));
     }
 
     /// Norm of the scaled gradient over the tolerance.
@@ -395,35 +353,100 @@ impl Solver {
         if slope.is_nan() || slope >= 0.0 {
             return None;
         }
-        let (mut low, mut high, mut at) = (0.0, f64::INFINITY, 1.0);
+        multiply(problem, island, &self.step, &mut self.step_product);
+        // Ends of the bracket of the minimum, and the slopes there.
+        let (mut low, mut high, mut at) = ((0.0, slope), (f64::INFINITY, f64::INFINITY), 1.0);
         let mut value = f64::INFINITY;
         for _ in 0..40 {
             self.trial.iter_mut().zip(&self.v).zip(&self.step).for_each(|((t, v), s)| *t = v + at * s);
-            let trial = std::mem::take(&mut self.trial);
-            let mut gradient = std::mem::take(&mut self.trial_gradient);
-            value = self.evaluate(problem, island, &trial, &mut gradient);
-            let along: f64 = gradient.iter().zip(&self.step).map(|(g, s)| g * s).sum();
-            (self.trial, self.trial_gradient) = (trial, gradient);
+            let products = self.product.iter().zip(&self.step_product);
+            self.trial_product.iter_mut().zip(products).for_each(|(t, (p, s))| *t = p + at * s);
+            value = evaluate(problem, island, &self.trial, &self.trial_product, &mut self.trial_gradient);
+            let along: f64 = self.trial_gradient.iter().zip(&self.step).map(|(g, s)| g * s).sum();
             let descends = value <= cost + 1e-4 * at * slope;
-            // At a slope this small, or still downhill, the model is accurate enough to take the step.
-            if descends && (along.abs() <= 0.3 * slope.abs() || along <= 0.0) {
+            // If the full step still leads downhill, the model is accurate enough to take it.
+            let is_downhill = along <= 0.0 && high.0.is_infinite();
+            if descends && (is_downhill || along.abs() <= LINE_TOLERANCE * slope.abs()) {
                 break;
             }
             if along > 0.0 || !value.is_finite() {
-                high = at;
+                high = (at, along);
             } else {
-                low = at;
+                low = (at, along);
             }
-            if high - low < 1e-9 {
+            if high.0 - low.0 < 1e-9 {
                 break;
             }
-            at = if high.is_finite() { 0.5 * (low + high) } else { 1.5 * at };
+            at = next_trial(low, high);
         }
         if value.is_nan() || value > cost {
             return None;
         }
         std::mem::swap(&mut self.v, &mut self.trial);
         std::mem::swap(&mut self.gradient, &mut self.trial_gradient);
+        std::mem::swap(&mut self.product, &mut self.trial_product);
         Some(value)
     }
+}
+
+/// `A v` for the velocities `v` of an island.
+fn multiply(problem: &ContactProblem, island: &Island, v: &[f64], product: &mut [f64]) {
+    for &block in &island.blocks {
+        let (b, range) = (&problem.blocks[block], problem.range(block));
+        dense::symmetric_multiply(&b.matrix, b.dim, &v[range.clone()], &mut product[range]);
+    }
+}
+
+/// Cost and gradient at `v`, where `product` is `A v`.
+fn evaluate(
+    problem: &ContactProblem,
+    island: &Island,
+    v: &[f64],
+    product: &[f64],
+    gradient: &mut [f64],
+) -> f64 {
+    let mut cost = 0.0;
+    for &block in &island.blocks {
+        let (b, range) = (&problem.blocks[block], problem.range(block));
+        let rows = gradient[range.clone()].iter_mut().zip(&product[range.clone()]);
+        for ((g, p), (r, v)) in rows.zip(b.rhs.iter().zip(&v[range])) {
+            *g = p - r;
+            cost += v * (0.5 * p - r);
+        }
+    }
+    let law = ContactLaw::new(problem.dt, problem.dissipation_time);
+    for cluster in island.clusters.iter().map(|&index| &problem.clusters[index]) {
+        let (mut on_a, mut on_b, mut is_touched) = ([Vec3::zeros(); 8], [Vec3::zeros(); 8], false);
+        for (point, velocity) in problem.point_velocities(cluster, v) {
+            let Some(ContactResponse { impulse, cost: own, .. }) = law.contact(point, &velocity) else {
+                continue;
+            };
+            is_touched = true;
+            cost += own;
+            problem.add_point_impulse(&cluster.a, &mut on_a, &point.weights_a, &point.p, &impulse);
+            problem.add_point_impulse(&cluster.b, &mut on_b, &point.weights_b, &point.p, &impulse);
+        }
+        if is_touched {
+            problem.scatter_impulses(&cluster.a, -1.0, &on_a, gradient);
+            problem.scatter_impulses(&cluster.b, 1.0, &on_b, gradient);
+        }
+    }
+    for (at, constraint) in island.scalars(problem) {
+        cost += constraint.cost(problem.dt, v[at]);
+        gradient[at] -= problem.dt * constraint.force_at(problem.dt, v[at]);
+    }
+    cost
+}
+
+/// Where the slope of the cost vanishes between two points of a line, each with its slope, if it is linear there.
+///
+/// The slope of a convex cost grows monotonically, so this is nearer to the minimum than the middle; it keeps a tenth of
+/// the bracket from either end.
+fn next_trial(low: (f64, f64), high: (f64, f64)) -> f64 {
+    if !high.0.is_finite() {
+        return 1.5 * low.0;
+    }
+    let share = low.1 / (low.1 - high.1);
+    let share = if share.is_finite() { share.clamp(0.1, 0.9) } else { 0.5 };
+    low.0 + share * (high.0 - low.0)
 }

@@ -6,7 +6,7 @@
 use crate::sparse::dense::dot;
 
 /// A step and the change of the gradient along it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct SecantPair {
     step: Vec<f64>,
     change: Vec<f64>,
@@ -16,26 +16,40 @@ struct SecantPair {
 /// Number of pairs kept per factor.
 const MAX_PAIRS: usize = 8;
 
-/// The last pairs, oldest first.
+/// The last pairs.
 #[derive(Clone, Debug, Default)]
-pub(super) struct SecantPairs(Vec<SecantPair>);
+pub(super) struct SecantPairs {
+    /// Oldest first; beyond `used`, buffers of discarded pairs.
+    pairs: Vec<SecantPair>,
+    used: usize,
+}
 
 impl SecantPairs {
     /// Discards all pairs, after a new factorization.
     pub(super) fn clear(&mut self) {
-        self.0.clear();
+        self.used = 0;
     }
 
-    /// Adds a step and the change of the gradient along it.
-    pub(super) fn push(&mut self, step: Vec<f64>, change: Vec<f64>) {
-        if self.0.len() == MAX_PAIRS {
-            self.0.remove(0);
+    /// Adds a step and the change of the gradient along it, entry by entry.
+    pub(super) fn push(&mut self, entries: impl Iterator<Item = (f64, f64)>) {
+        if self.used == MAX_PAIRS {
+            self.pairs.rotate_left(1);
+            self.used -= 1;
+        } else if self.used == self.pairs.len() {
+            self.pairs.push(SecantPair::default());
         }
-        let curvature = dot(&step, &change);
+        let SecantPair { step, change, curvature } = &mut self.pairs[self.used];
+        step.clear();
+        change.clear();
+        for (s, y) in entries {
+            step.push(s);
+            change.push(y);
+        }
+        *curvature = dot(step, change);
         // The cost is convex, so a curvature below this is rounding.
-        let floor = 1e-12 * (dot(&step, &step) * dot(&change, &change)).sqrt();
-        if curvature > floor {
-            self.0.push(SecantPair { step, change, curvature });
+        let floor = 1e-12 * (dot(step, step) * dot(change, change)).sqrt();
+        if *curvature > floor {
+            self.used += 1;
         }
     }
 
@@ -44,7 +58,7 @@ impl SecantPairs {
     pub(super) fn solve(&self, stiffness: &[f64], b: &mut [f64], solve: impl FnOnce(&mut [f64])) {
         let head = b.len() - stiffness.len();
         let (mut weights, mut curvatures) = ([0.0; MAX_PAIRS], [0.0; MAX_PAIRS]);
-        let pairs = self.0.iter();
+        let pairs = self.pairs[..self.used].iter();
         for ((pair, weight), curvature) in pairs.clone().zip(&mut weights).zip(&mut curvatures).rev() {
             let tail = || pair.step[head..].iter().zip(stiffness);
             *curvature = pair.curvature + tail().map(|(s, k)| k * s * s).sum::<f64>();
@@ -74,7 +88,7 @@ mod tests {
         for i in [1, 2, 4] {
             let v: [f64; 5] = std::array::from_fn(|j| if i == j { 0.7 } else { 0.0 });
             let g: [f64; 5] = std::array::from_fn(|j| hessian[j] * v[j]);
-            pairs.push(v.to_vec(), g.to_vec());
+            pairs.push(v.into_iter().zip(g));
         }
         let mut b = [1.0, 2.0, 3.0, 4.0, 5.0];
         let full = [1.0, 5.0, 0.25, 1.0, 3.0 + 2.0];
