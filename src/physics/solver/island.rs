@@ -1,14 +1,16 @@
 //! Connected islands of a problem, and the factors kept for them between steps.
 
 use super::{
+    factor::{Factor, Precision},
     problem::{BlockIdentity, ContactProblem, ScalarConstraint},
     secant::SecantPairs,
 };
-use crate::sparse::dense;
 use softvt_geometry::union_find::UnionFind;
 
-/// Cost of a factorization in Newton steps with an existing factor.
-pub(super) const FACTOR_COST_IN_STEPS: f64 = 8.0;
+/// Cost of a factorization in Newton steps with an existing factor: constant part, and part per velocity.
+///
+/// A factorization needs `n³/3` operations, a step reads `n²/2` numbers a few times; measured with 150 to 2000 velocities.
+const FACTOR_COST_IN_STEPS: [f64; 2] = [5.0, 1.0 / 200.0];
 /// Steps of a pass that refactoring would not avoid.
 const UNAVOIDABLE_STEPS: u32 = 4;
 /// Number of islands whose factors are kept.
@@ -35,6 +37,12 @@ impl Island {
     ) -> impl Iterator<Item = (usize, &'a ScalarConstraint)> {
         let constraints = self.constraints.iter().map(|&index| &problem.constraints[index]);
         constraints.map(|constraint| (problem.blocks[constraint.block].offset + constraint.index, constraint))
+    }
+
+    /// Cost of a factorization, in Newton steps with an existing factor.
+    pub(super) fn factor_cost(&self) -> f64 {
+        let [constant, per_velocity] = FACTOR_COST_IN_STEPS;
+        constant + per_velocity * self.size as f64
     }
 
     /// Size of the constrained block: the number of velocities from the first one with a scalar constraint to the end.
@@ -80,7 +88,7 @@ struct CachedFactor {
     /// Identity and size of each block.
     key: Vec<(BlockIdentity, usize)>,
     /// Cholesky factor down to the constrained block, whose Schur complement it holds; column-major.
-    factor: Vec<f64>,
+    factor: Factor,
     is_valid: bool,
     secant: SecantPairs,
     /// Steps of the first pass that ended with this factor.
@@ -107,7 +115,7 @@ impl FactorCache {
         if let Some(found) = found {
             self.entries[..=found].rotate_right(1);
             let entry = &self.entries[0];
-            return entry.is_valid && f64::from(entry.excess_steps) < FACTOR_COST_IN_STEPS;
+            return entry.is_valid && f64::from(entry.excess_steps) < island.factor_cost();
         }
         if self.entries.len() < MAX_CACHED_FACTORS {
             self.entries.push(CachedFactor::default());
@@ -121,19 +129,21 @@ impl FactorCache {
         false
     }
 
-    /// Takes the buffer of the current factor, to be filled with a new Hessian.
-    pub(super) fn take(&mut self, island: &Island) -> Vec<f64> {
-        let mut factor = std::mem::take(&mut self.entries[0].factor);
-        factor.resize(island.size * island.size, 0.0);
-        factor
-    }
-
-    /// Sets the current factor; `is_valid` if the factorization succeeded.
-    pub(super) fn set(&mut self, factor: Vec<f64>, is_valid: bool) {
+    /// Factors a Hessian down to the constrained block and makes the result the current factor. False if it is not
+    /// positive definite in this precision.
+    pub(super) fn factor(
+        &mut self,
+        problem: &ContactProblem,
+        island: &Island,
+        hessian: &[f64],
+        precision: Precision,
+    ) -> bool {
         let entry = &mut self.entries[0];
-        (entry.factor, entry.is_valid) = (factor, is_valid);
+        let head = island.size - island.constrained_size(problem);
+        entry.is_valid = entry.factor.set(hessian, island.size, head, precision);
         (entry.first_steps, entry.excess_steps) = (None, 0);
         entry.secant.clear();
+        entry.is_valid
     }
 
     /// Records that a pass converged after `steps` with the current factor.
@@ -146,23 +156,14 @@ impl FactorCache {
     /// Solves in place with the current factor, its corrections, and `stiffness` added to the diagonal
     /// of the constrained block.
     pub(super) fn solve(&mut self, island: &Island, stiffness: &[f64], b: &mut [f64]) {
-        let (n, t) = (island.size, stiffness.len());
-        let (head, constrained) = (n - t, &mut self.constrained);
-        let entry = &self.entries[0];
-        constrained.clear();
-        for (c, stiffness) in stiffness.iter().enumerate() {
-            let start = (head + c) * n + head;
-            constrained.extend_from_slice(&entry.factor[start..start + t]);
-            constrained[c * t + c] += stiffness;
-        }
-        // The Schur complement of a positive definite matrix plus stiffness is positive definite: this cannot fail.
-        dense::partial_cholesky(constrained, t, t);
-        entry.secant.solve(stiffness, b, |b| {
-            dense::forward(&entry.factor, n, head, b);
-            dense::forward(constrained, t, t, &mut b[head..]);
-            dense::backward(constrained, t, t, &mut b[head..]);
-            dense::backward(&entry.factor, n, head, b);
-        });
+        let CachedFactor { factor, secant, .. } = &mut self.entries[0];
+        let constrained = &mut self.constrained;
+        secant.solve(stiffness, b, |b| factor.solve(island.size, stiffness, b, constrained));
+    }
+
+    /// Precision of the current factor.
+    pub(super) fn precision(&self) -> Precision {
+        self.entries[0].factor.precision
     }
 
     /// Corrections of the current factor.

@@ -10,6 +10,7 @@
 //! The solver does not depend on the kinds of bodies: a [`VelocityBlock`] is a symmetric positive definite matrix
 //! with a right-hand side, a [`ContactCluster`] a set of contact points between two endpoints.
 
+mod factor;
 mod island;
 mod kinematics;
 mod law;

@@ -8,7 +8,8 @@
 //! Newton method (Lee, Sun & Saunders 2014) in which the scalar constraints are the part that is not linearised.
 
 use super::{
-    island::{FACTOR_COST_IN_STEPS, FactorCache, Island, islands},
+    factor::Precision,
+    island::{FactorCache, Island, islands},
     kinematics::{ClusterHessian, DofMap},
     law::{ContactLaw, ContactResponse, LinearSegment},
     problem::ContactProblem,
@@ -30,7 +31,9 @@ const MAX_PASSES: usize = 3;
 /// Relative change of the normal impulses below which the passes end.
 const PASS_TOLERANCE: f64 = 0.01;
 /// Steps after which the convergence with a stale factor, corrected by those steps, is judged.
-const STALE_FACTOR_TRIAL: u32 = 2;
+const STALE_FACTOR_TRIAL: u32 = 3;
+/// Velocities from which an island's Hessian is factored in single precision, which is worth it for large matrices only.
+const SINGLE_FROM: usize = 96;
 /// Slope at the end of a line search, relative to that at its start. Points on the line are cheap: they need no product
 /// with the matrices of the blocks.
 const LINE_TOLERANCE: f64 = 0.1;
@@ -75,6 +78,8 @@ pub(crate) struct Solver {
     trial_product: Vec<f64>,
     /// `diag(A)^-1/2`.
     scale: Vec<f64>,
+    /// Hessian without the scalar constraints, `n × n`, column-major, lower triangle.
+    hessian: Vec<f64>,
     cache: FactorCache,
     /// Segment on which each scalar constraint of the island is assumed to end.
     segments: Vec<LinearSegment>,
@@ -182,14 +187,18 @@ impl Solver {
         let mut cost = evaluate(problem, island, &self.v, &self.product, &mut self.gradient);
         let mut ratio = self.residual_ratio(problem, island);
         let mut has_factor = self.cache.select(problem, island);
+        let mut precision = if island.size < SINGLE_FROM { Precision::Double } else { Precision::Single };
         let mut progress = NewtonProgress { steps: 0, initial_ratio: ratio };
         for step in 0..MAX_NEWTON {
             if ratio <= 1.0 {
                 self.cache.record_pass(progress.steps);
                 return Ok(step);
             }
+            if step == REFACTOR_EVERY_STEP_AFTER {
+                precision = Precision::Double;
+            }
             let is_new = !has_factor;
-            if is_new && !(ratio.is_finite() && self.refactor(problem, island)) {
+            if is_new && !(ratio.is_finite() && self.refactor(problem, island, precision)) {
                 break;
             }
             if is_new {
@@ -197,7 +206,9 @@ impl Solver {
             }
             self.find_step(problem, island);
             let Some(lower) = self.line_search(problem, island, cost) else {
-                if !is_new {
+                if !is_new || self.cache.precision() == Precision::Single {
+                    // A new factor that gives no descent is too coarse.
+                    precision = if is_new { Precision::Double } else { precision };
                     has_factor = false;
                     continue;
                 }
@@ -214,22 +225,33 @@ impl Solver {
             progress.steps += 1;
             has_factor = step + 1 < REFACTOR_EVERY_STEP_AFTER
                 && (progress.steps < STALE_FACTOR_TRIAL
-                    || progress.remaining_steps(ratio) < FACTOR_COST_IN_STEPS);
+                    || progress.remaining_steps(ratio) < island.factor_cost());
         }
         Err(SolverFailure { block: island.blocks[0], residual_ratio: ratio })
     }
 
-    /// Factors the Hessian at the current velocities, without the scalar constraints, down to the constrained block.
-    /// False if it is not positive definite.
-    fn refactor(&mut self, problem: &ContactProblem, island: &Island) -> bool {
+    /// Factors the Hessian at the current velocities, without the scalar constraints, down to the constrained block; in
+    /// double precision if single precision fails. False if it is not positive definite.
+    fn refactor(&mut self, problem: &ContactProblem, island: &Island, precision: Precision) -> bool {
+        self.assemble_hessian(problem, island);
+        self.factorizations += 1;
+        self.cache.factor(problem, island, &self.hessian, precision)
+            || precision == Precision::Single
+                && self.cache.factor(problem, island, &self.hessian, Precision::Double)
+    }
+
+    /// Writes the lower triangle of the Hessian at the current velocities, without the scalar constraints.
+    fn assemble_hessian(&mut self, problem: &ContactProblem, island: &Island) {
         let n = island.size;
-        let mut hessian = self.cache.take(island);
-        hessian[..n * n].fill(0.0);
+        self.hessian.resize(n * n, 0.0);
         for b in island.blocks.iter().map(|&block| &problem.blocks[block]) {
             for column in 0..b.dim {
                 let source = &b.matrix[column * b.dim + column..(column + 1) * b.dim];
-                let target = (b.offset + column) * n + b.offset + column;
-                hessian[target..target + source.len()].copy_from_slice(source);
+                let start = (b.offset + column) * n;
+                let target = &mut self.hessian[start + b.offset + column..start + n];
+                let (diagonal, below) = target.split_at_mut(source.len());
+                diagonal.copy_from_slice(source);
+                below.fill(0.0);
             }
         }
         let law = ContactLaw::new(problem.dt, problem.dissipation_time);
@@ -243,14 +265,9 @@ impl Solver {
             }
             if is_touched {
                 self.map.set(problem, cluster);
-                self.map.scatter(&self.local, &mut hessian, n);
+                self.map.scatter(&self.local, &mut self.hessian, n);
             }
         }
-        let is_definite =
-            dense::partial_cholesky(&mut hessian[..n * n], n, n - island.constrained_size(problem));
-        self.cache.set(hessian, is_definite);
-        self.factorizations += 1;
-        is_definite
     }
 
     /// Writes impulses and velocities into the points.

@@ -13,8 +13,8 @@ struct SecantPair {
     curvature: f64,
 }
 
-/// Number of pairs kept per factor.
-const MAX_PAIRS: usize = 8;
+/// Number of pairs kept per factor. Their cost is small beside the triangular solves of islands that take many steps.
+const MAX_PAIRS: usize = 20;
 
 /// The last pairs.
 #[derive(Clone, Debug, Default)]

@@ -1,7 +1,8 @@
 //! Dense Cholesky kernels on column-major storage, for the fronts of the sparse factor and for the contact solve.
 //!
 //! Products are added by `mul_add`, which is exactly rounded on every machine, and sums have a fixed order, so the
-//! results are the same bits everywhere.
+//! results are the same bits everywhere. The factorization and the triangular solves exist in double and in single
+//! precision.
 
 use std::ops::Range;
 
@@ -14,6 +15,8 @@ const WIDTHS: [usize; 3] = [8, 32, 128];
 const COLUMNS: usize = 4;
 /// Rows of that tile in double precision: with these, it fills the registers of AVX2.
 const ROWS: usize = 12;
+/// Rows of that tile in single precision.
+const SINGLE_ROWS: usize = 16;
 /// Columns processed at once by triangular solves and products, so that the vector is loaded and stored less often.
 const WIDE: usize = 4;
 /// Partial sums of a dot product.
@@ -23,6 +26,7 @@ const LANES: usize = 8;
 pub(crate) trait Real: RealField + Copy {}
 
 impl Real for f64 {}
+impl Real for f32 {}
 
 /// Factors the first `k` columns of the `n × n` matrix `a` (column-major, lower triangle) in place.
 ///
@@ -30,6 +34,11 @@ impl Real for f64 {}
 /// positive; `a` must not be used then. The upper triangle is neither read nor preserved.
 pub(crate) fn partial_cholesky(a: &mut [f64], n: usize, k: usize) -> bool {
     factor_blocks::<f64, ROWS>(a, n, 0..k, n, &WIDTHS, &mut packing_buffer::<ROWS, _>(n, k))
+}
+
+/// As [`partial_cholesky`], in single precision.
+pub(crate) fn partial_cholesky_single(a: &mut [f32], n: usize, k: usize) -> bool {
+    factor_blocks::<f32, SINGLE_ROWS>(a, n, 0..k, n, &WIDTHS, &mut packing_buffer::<SINGLE_ROWS, _>(n, k))
 }
 
 fn packing_buffer<const R: usize, T>(n: usize, k: usize) -> Vec<T> {
@@ -344,5 +353,19 @@ mod tests {
     fn an_indefinite_matrix_is_rejected() {
         assert!(!partial_cholesky(&mut [1.0, 2.0, 2.0, 1.0], 2, 2));
         assert!(!partial_cholesky(&mut [f64::NAN], 1, 1));
+    }
+
+    #[test]
+    fn a_single_precision_factor_is_the_rounded_one() {
+        for (n, k) in [(1, 1), (7, 3), (61, 29), (300, 280)] {
+            let mut a = spd(n);
+            let mut single: Vec<f32> = a.iter().map(|x| *x as f32).collect();
+            assert!(partial_cholesky(&mut a, n, k) && partial_cholesky_single(&mut single, n, k));
+            let lower = (0..n * n).filter(|at| at % n >= at / n);
+            let largest = a.iter().fold(0.0, |max: f64, x| max.max(x.abs()));
+            lower.for_each(|at| {
+                assert!((a[at] - f64::from(single[at])).abs() < 1e-5 * largest, "{n} {k} {at}")
+            });
+        }
     }
 }
