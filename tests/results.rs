@@ -22,7 +22,8 @@ fn the_published_tables_are_those_of_the_summaries() {
         tables::replaced(&readme, &tables::overview(&results, &labels)).expect("a place for the tables");
     assert_eq!(readme, expected, "run .ci/regenerate results");
     let page = fs::read_to_string(root.join(tables::PAGE)).expect("a page");
-    assert_eq!(page, tables::page(&results, &labels), "run .ci/regenerate results");
+    let physics = collected::physics(root).expect("a golden state");
+    assert_eq!(page, tables::page(&results, &labels, &physics), "run .ci/regenerate results");
 }
 
 /// Writes a run of `suite` with two episodes, of which one is safe.
@@ -57,6 +58,8 @@ fn run(folder: &Path, script: &str, suite: &str, policy: &str) {
 fn rows_and_columns_follow_the_runs() {
     let home = tempfile::tempdir().expect("a folder");
     let root = home.path();
+    fs::create_dir_all(root.join("assets")).expect("a folder");
+    fs::write(root.join("assets/golden.json"), json!({ "state_hash": "abc" }).to_string()).expect("a file");
     let out = root.join("controllers");
     let suites = ["one_varied", "two"].map(|suite| {
         let rows = [("reference", None), ("size-seen", Some("size-seen"))].map(|(condition, policy)| {
@@ -90,7 +93,8 @@ fn rows_and_columns_follow_the_runs() {
          | `expert` | 100.0 / 50.0 [25.0, 50.0] |\n| `binary` | 100.0 / 50.0 [25.0, 50.0] |\n"
     );
     // Medians of D/τ 0.5 and 2, of grip ratios 1.5 and 2.5, and of times 4 and 6 s.
-    assert!(tables::page(&results, &labels).contains("| 50.0 [25.0, 50.0] | 1.25 | 2.00 | 5.0 |"));
+    let page = tables::page(&results, &labels, "abcd");
+    assert!(page.contains("| 50.0 [25.0, 50.0] | 1.25 | 2.00 | 5.0 | `abc` |"), "{page}");
     let error = collected::add(root, &root.join("docs")).expect_err("no run");
     assert!(error.contains("no finished run"), "{error}");
 }

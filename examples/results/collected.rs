@@ -47,12 +47,18 @@ pub fn labels(root: &Path) -> Result<Value, String> {
     json_of(&root.join(FOLDER).join(LABELS))
 }
 
-/// Adds the runs of a folder to the summaries of its script.
+/// The final state of the golden episode, which stands for the physics of this version: `softvt doctor` computes it.
+pub fn physics(root: &Path) -> Result<String, String> {
+    let path = root.join("assets/golden.json");
+    text(&json_of(&path)?, "state_hash", &path)
+}
+
+/// Adds the runs of a folder, made with the physics of this version, to the summaries of its script.
 ///
 /// # Errors
 /// If the folder has no finished run, or a file cannot be read or written.
 pub fn add(root: &Path, folder: &Path) -> Result<(), String> {
-    let runs = runs(folder)?;
+    let (runs, physics) = (runs(folder)?, physics(root)?);
     if runs.is_empty() {
         return Err(format!(
             "{}: no finished run: neither conditions.json nor summary.json",
@@ -80,7 +86,7 @@ pub fn add(root: &Path, folder: &Path) -> Result<(), String> {
         }
         let controllers =
             at["controllers"].as_array_mut().ok_or_else(|| format!("{}: no controllers", path.display()))?;
-        *named(controllers, &name) = cell(&name, &summary, &manifest, &run.folder)?;
+        *named(controllers, &name) = cell(&name, &summary, &manifest, &run.folder, &physics)?;
         let text = serde_json::to_string_pretty(&file).map_err(|error| error.to_string())?;
         fs::create_dir_all(root.join(FOLDER)).map_err(|error| error.to_string())?;
         fs::write(&path, text + "\n").map_err(|error| format!("{}: {error}", path.display()))?;
@@ -132,7 +138,13 @@ fn named<'a>(list: &'a mut Vec<Value>, name: &str) -> &'a mut Value {
 }
 
 /// The numbers of a run that are kept.
-fn cell(name: &str, summary: &Value, manifest: &Value, folder: &Path) -> Result<Value, String> {
+fn cell(
+    name: &str,
+    summary: &Value,
+    manifest: &Value,
+    folder: &Path,
+    physics: &str,
+) -> Result<Value, String> {
     let path = folder.join("episodes.jsonl");
     let lines = fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
     let records: Vec<Value> = lines
@@ -158,6 +170,7 @@ fn cell(name: &str, summary: &Value, manifest: &Value, folder: &Path) -> Result<
     for key in ["softvt", "seed"] {
         cell.insert(key.into(), manifest[key].clone());
     }
+    cell.insert("physics".into(), physics.into());
     Ok(cell.into())
 }
 

@@ -19,7 +19,7 @@ fn main() -> Result<(), String> {
     let (results, labels) = (collected::read(root)?, collected::labels(root)?);
     let readme = fs::read_to_string("README.md").map_err(|error| format!("README.md: {error}"))?;
     write("README.md", &tables::replaced(&readme, &tables::overview(&results, &labels))?)?;
-    write(tables::PAGE, &tables::page(&results, &labels))
+    write(tables::PAGE, &tables::page(&results, &labels, &collected::physics(root)?))
 }
 
 fn write(path: &str, text: &str) -> Result<(), String> {
