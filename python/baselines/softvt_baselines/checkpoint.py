@@ -12,7 +12,7 @@ from .inputs import Shape
 from .model import Policy
 from .numbers import Standard
 
-VERSION = 4
+VERSION = 5
 
 
 @dataclass

@@ -19,13 +19,18 @@ FLOW_STEPS = 10
 MEMORY_WIDTH, MEMORY_TOKENS, DROPOUT = 1024, 4, 0.1
 # Readings relative to their mean over the last intervals (6 steps), which is taken to be at least 4 times FINE_READINGS.
 PRESENT, LEAST_PRESENT, MOST_RATIO = 4, 4, 5
+# Pixels of a picture along an edge of a cell of its last map.
+CELL = 16
 # Largest number on the fine scale whose change is looked at in training: 4 m.
 MOST = 12
 
 
 def _pictures_encoder() -> nn.Module:
-    """ResNet-18 (He et al., 2016) with group normalisation, up to its last map of 512 channels."""
+    """ResNet-18 (He et al., 2016) with group normalisation, up to its last map of 512 channels. Its last stage keeps the resolution, since
+    a hand has to reach an object to a few millimetres, of which a cell of 32 pixels covers many."""
     net = resnet18(norm_layer=lambda channels: nn.GroupNorm(channels // 16, channels))
+    for layer in (net.layer4[0].conv1, net.layer4[0].downsample[0]):
+        layer.stride = (1, 1)
     return nn.Sequential(*list(net.children())[:-2])
 
 
@@ -102,7 +107,7 @@ class Tokens(nn.Module):
     def __init__(self, shape: Shape):
         super().__init__()
         self.shape = shape
-        width, cells = shape.width, (shape.edge // 32) ** 2
+        width, cells = shape.width, (shape.edge // CELL) ** 2
         self.pictures = nn.ModuleDict({key: _pictures_encoder() for key in shape.pictures})
         self.project = nn.ModuleDict({key: nn.Linear(512, width) for key in shape.pictures})
         self.place = nn.ParameterDict({key: nn.Parameter(0.02 * torch.randn(shape.frames, cells, width)) for key in shape.pictures})
@@ -128,7 +133,9 @@ class Tokens(nn.Module):
             cells = net(planes.contiguous(memory_format=torch.channels_last)).flatten(2).transpose(1, 2)
             cells = self.project[key](cells).unflatten(0, (batch, frames)) + self.place[key]
             tokens.append(cells.flatten(1, 2))
-        tokens.append(self.state(obs["state"]) + self.state_place)
+        # Half precision would round positions to a millimetre.
+        with torch.autocast(obs["state"].device.type, enabled=False):
+            tokens.append(self.state(obs["state"].float()) + self.state_place)
         tokens.append(self.prompt(self.ngrams(obs["prompt"])).unsqueeze(1))
         if self.shape.has_touch:
             # A firm grasp moves the markers ten times as far as a first contact, which is to be seen as well.

@@ -14,6 +14,7 @@ from softvt_baselines.data import CAMERAS, TACTILE, Statistics, commands
 from softvt_baselines.data import load as load_demonstrations
 from softvt_baselines.infer import Answering, blended
 from softvt_baselines.inputs import RECENT, Past, Shape, read
+from softvt_baselines.model import Policy
 from softvt_baselines.numbers import FINE, fine, turns
 from softvt_baselines.serve import Plan, Request
 from softvt_baselines.train import Batches, TrainOptions, train
@@ -52,6 +53,17 @@ class Policies(unittest.TestCase):
             "softvt": {"seed": seed, "step": 0},
             "tactile_marker_motion": motion,
         }
+
+    def test_states_are_not_rounded_to_half_precision(self):
+        seen = []
+        net = Policy(Shape(False, edge=32, chunk=5, width=32, layers=1))
+        net.tokens.state[0].register_forward_hook(lambda _, inputs, answer: seen.append(answer))
+        obs = {key: torch.zeros((2, 1, 32, 32, 3), dtype=torch.uint8) for key in CAMERAS}
+        obs |= {"state": torch.ones((2, 1, 7)), "prompt": torch.zeros((2, 4), dtype=torch.long)}
+        obs["state"][1] += 1 / 512
+        with torch.autocast("cpu", torch.bfloat16):
+            net.tokens(obs)
+        self.assertFalse(torch.equal(seen[0][0], seen[0][1]))
 
     def test_every_kind_of_policy_trains_and_answers_whatever_else_is_in_the_batch(self):
         for has_touch, head, frames, has_pictures, has_memory in [
