@@ -113,7 +113,8 @@ def is_seen(commands: np.ndarray, rows: np.ndarray, begins: np.ndarray) -> np.nd
 
 @dataclass
 class Past:
-    """What a policy with memory has seen of an episode: one row per control step, the present one last."""
+    """What a policy with memory has seen of an episode: one row per control step, the present one last. All steps are kept, since a hand may
+    feel for longer than REMEMBERED steps, and since when it feels decides which network answers."""
 
     states: np.ndarray  # (T, 7): in the units of commands
     commands: np.ndarray  # (T, 7): the action before each step
@@ -145,9 +146,8 @@ def remembered(states: np.ndarray, felt: np.ndarray, before: tuple[Past, np.ndar
     past, actions = before
     steps, commands = len(actions), actions.astype(np.float32)
     commands[:, GRIPPER] = commands[:, GRIPPER].clip(0, 1)
-    kept = slice(-REMEMBERED, None)
     pairs = (past.states, states[-steps:]), (past.commands, commands), (past.readings, felt[-steps:])
-    return Past(*(np.concatenate(pair)[kept] for pair in pairs))
+    return Past(*(np.concatenate(pair) for pair in pairs))
 
 
 def read(

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 from softvt_baselines import UserError, prompts
 from softvt_baselines.data import ACTIONS, CAMERAS, TACTILE, Statistics, displacements, load, moving_steps, readings, shrink
-from softvt_baselines.inputs import LIMITS, RECENT, Past, Shape, is_seen, memory_begins, read
+from softvt_baselines.inputs import LIMITS, RECENT, REMEMBERED, Past, Shape, is_seen, memory_begins, read, remembered
 from softvt_baselines.numbers import FINE, Standard, coarse, fine, fold, hand, mean_axis, reference, turned, turns
 
 STEPS = 12
@@ -244,6 +244,16 @@ class Inputs(unittest.TestCase):
         rows = np.arange(30)
         seen = is_seen(commands, rows, memory_begins(commands, np.array([0])))
         self.assertEqual(rows[~seen].tolist(), list(range(15, 25)))
+
+    def test_a_hand_feels_however_long_ago_it_began(self):
+        commands = np.zeros((2 * REMEMBERED, 7), np.float32)
+        commands[:, 6] = 0.0013 * np.minimum(np.arange(len(commands)), 20)
+        felt = np.zeros((RECENT, 6), np.float32)
+        past = remembered(commands[:1], felt, None)
+        for step in range(1, len(commands) - RECENT, RECENT):
+            recent = commands[step : step + RECENT]
+            past = remembered(recent, felt, (past, recent))
+        self.assertFalse(past.inputs()["seen"].any())
 
     def test_memory_needs_the_last_steps_of_states_and_markers_only(self):
         profile = Shape(True, has_memory=True).profile("vt").splitlines()
