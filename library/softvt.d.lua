@@ -180,7 +180,7 @@
 ---@class softvt.Policy
 ---@field name string Name in results, unless --name gives another.
 ---@field observes? softvt.Observes Observations of the policy.
----@field reset? fun(task: softvt.TaskBrief) Called when the episode begins.
+---@field reset? fun(task: softvt.EpisodeBrief) Called when the episode begins.
 ---@field act fun(obs: softvt.Observation): softvt.Action|softvt.Action[] Returns the action of this control step, or a list of actions for the next ones.
 ---@field replan? integer Number of actions of a list that are executed before act is called again, unless --replan gives another; all by default. Expects a whole number in 1..10000.
 ---@field gripper? "continuous"|"binary"|"two-width"|"force" Grip code, which says what the closure of an action commands, unless --gripper gives another: a closure (continuous); open, or above 0.5 closed with the whole effort (binary); open, or the width given just after closing (two-width). For force, actions have force. By default an action has closure, which is continuous, or force.
@@ -227,7 +227,6 @@
 ---@field open? number Value that opens the gripper; not for code = "force". Expects a number.
 ---@field closed? number Value that closes it; not for code = "force". Expects a number.
 ---@field code? "continuous"|"binary"|"two-width"|"force" What the value commands. continuous: a closure in proportion between open and closed, the default. binary: closed beyond the middle, else open. two-width: open, or the width that the answers give just after closing, held until one opens. force: a grip force in N at which closing stops; below 0 opens.
----@field binary? boolean True for code = "binary".
 ---@field latch? softvt.GripLatch For code = "binary": limits at which the gripper closes and opens, instead of the middle.
 
 ---Hysteresis of a binary gripper, in the unit of the gripper's number.
@@ -1353,6 +1352,8 @@ function Instances:sample(object, count) end
 ---@field gripping boolean True from a call of grasp to the next call of release or open.
 ---@field feels boolean True under --policy tactile-servo, whose grasp closes by touch.
 ---@field width number Measured distance of the gels, m.
+---@field stroke number Largest distance of the gels, m.
+---@field finger_stiffness number Stiffness of the drive of a finger, N/m (robot.gripper.kp).
 ---@field force number[] Sum of the normal forces at all contact points of the left and the right gel pad, N, whatever touches it; forces on the cases of the fingers do not count. On the edge of a pad the normals are oblique, and the sum is larger than the pressing force, which is -sim:tactile(side).force[3].
 ---@field grip_controller string? Name of the controller that takes the place of the expert's own grip, such as "size-seen" under --policy size-seen (experts.blind_grips). nil under policies that have none.
 ---@field instances softvt.Instances? With a grip_controller, which must not know the instance: the instances that the suite can draw. nil without.
@@ -1415,13 +1416,13 @@ function Arm:give_up(reason) end
 local List = {}
 
 ---The episode that begins.
----@class softvt.TaskBrief
+---@class softvt.EpisodeBrief
 ---@field suite string? Name of the suite; nil in a judged run.
 ---@field task integer? Index of the task, from 0; nil in a judged run.
 ---@field prompt string The instruction.
 ---@field episode integer? Index of the episode, from 0; nil in a judged run.
 ---@field id string? Name of the episode in a judged run (--seed-file), from which its draws cannot be computed.
-local TaskBrief = {}
+local EpisodeBrief = {}
 
 ---The observation of a policy at a control step. Poses are of the tool centre point in the robot's base frame. The true state of the scene is not part of it.
 ---@class softvt.Observation

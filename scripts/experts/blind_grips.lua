@@ -4,12 +4,13 @@
 --
 -- look-retry is no such bound: it lifts, looks whether the object follows, and closes further.
 local grasp = require "experts.grasp"
+local hand = require "experts.hand"
 
 local blind_grips = {}
 
 -- Instances of a kind that a number is optimised over.
 local INSTANCES = 600
-local STROKE = grasp.STROKE
+local STROKE = hand.STROKE
 -- Largest speed of closing in contact, m/s, share of an error that is corrected per control step, largest duration, s, and tolerance, m.
 -- The measured width lags by two steps behind its command; a larger share would overshoot.
 local SPEED, SHARE, DURATION, TOLERANCE = 0.004, 0.15, 4, 1e-5
@@ -94,7 +95,7 @@ local function drive_numbers()
     list[#list + 1] = {
       power = power,
       of = function(grip, window)
-        local beyond = depth(grip, window) - depth_at(window, CONTACT_GAP * grasp.STIFFNESS / 2)
+        local beyond = depth(grip, window) - depth_at(window, CONTACT_GAP * hand.STIFFNESS / 2)
         return grip.force * math.max(0, 1e3 * beyond) ^ power
       end,
     }

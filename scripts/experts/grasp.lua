@@ -1,10 +1,10 @@
 -- Grasps from above with a known closure: across the object's narrow side or by its rim, where the hand has clearance.
--- SPREAD: largest displacement of an expert's grasp in each horizontal direction, m, so that demonstrations differ. Of the standard
--- hand: STROKE, the width of the open gripper, m; CASE, the extent of the sensor cases below the tool centre point, m; STIFFNESS, that of
--- the drive of a finger, N/m, which arm.finger_stiffness gives for the hand of a run.
-local grasp = { SPREAD = 0.0015, STROKE = 0.08, CASE = 0.016, STIFFNESS = 2000 }
+-- SPREAD: largest displacement of an expert's grasp in each horizontal direction, m, so that demonstrations differ.
+local hand = require "experts.hand"
 
-local STROKE, CASE = grasp.STROKE, grasp.CASE
+local grasp = { SPREAD = 0.0015 }
+
+local STROKE, CASE = hand.STROKE, hand.CASE
 -- Clearance to leave below the cases and around the fingers, m.
 local UNDER, FINGER_CLEARANCE = 0.0015, 0.004
 -- Step of the rotations tried for clearance.
@@ -104,7 +104,7 @@ end
 
 -- Width of the command that holds a grip, m: each finger is a spring, which the force on its pad displaces from its target. Without a
 -- stiffness of the drives (N/m), that of the standard hand.
-function grasp.command_width(grip, stiffness) return grip.width - 2 * grip.force / (stiffness or grasp.STIFFNESS) end
+function grasp.command_width(grip, stiffness) return grip.width - 2 * grip.force / (stiffness or hand.STIFFNESS) end
 
 -- The closure of that command.
 function grasp.command(grip, stiffness)

@@ -1,23 +1,25 @@
 //! [`SuiteChecker`]: the first scenes and the limits of a suite, without an episode.
 
-use std::{collections::BTreeSet, path::PathBuf, sync::Mutex};
+use std::{collections::BTreeSet, path::PathBuf};
 
 use crate::{
     config::{ConfiguredScript, RunConfig},
     episode_list::EpisodeList,
     error::RunError,
+    scene_pool::ScenePool,
     selection::select_episodes,
     suite_run::SuiteRun,
 };
 use softvt_benchmark::{Suite, Task};
 use softvt_common::{cancel, parallel};
 use softvt_rollout::{AssetCache, SensorAssets, scene_warnings};
-use softvt_script::{LoadedScript, SceneBuilder};
+use softvt_script::LoadedScript;
 
 /// Checks suites one after the other. Those that share assets load them once.
 pub struct SuiteChecker<'a> {
     config: &'a RunConfig,
     script: &'a LoadedScript,
+    scenes: ScenePool<'a>,
     assets: AssetCache,
     sensor_assets: SensorAssets,
 }
@@ -25,7 +27,8 @@ pub struct SuiteChecker<'a> {
 impl<'a> SuiteChecker<'a> {
     /// A checker for the suites of a script.
     pub fn new(ConfiguredScript { config, script }: &'a ConfiguredScript) -> Self {
-        Self { config, script, assets: AssetCache::approximate(), sensor_assets: SensorAssets::default() }
+        let (assets, sensor_assets) = (AssetCache::approximate(), SensorAssets::default());
+        Self { config, script, scenes: ScenePool::new(script), assets, sensor_assets }
     }
 
     /// Builds and checks the first scene of every task on all processors, gives their warnings to `warn`, and reads the limits
@@ -43,24 +46,23 @@ impl<'a> SuiteChecker<'a> {
             sensor_assets: self.sensor_assets.clone(),
             ..SuiteRun::new(self.config, self.script, suite, none, PathBuf::new())?
         };
-        let warnings = check_first_scenes(&run, &tasks)?;
+        let warnings = check_first_scenes(&run, &self.scenes, &tasks)?;
         self.config.observer.end();
         warnings.into_iter().for_each(warn);
-        SuiteRun { jobs: select_episodes(self.config, suite, &tasks), ..run }.scan_limits()?;
+        SuiteRun { jobs: select_episodes(self.config, suite, &tasks), ..run }.scan_limits(&self.scenes)?;
         if cancel::requested() { Err(RunError::interrupted("interrupted")) } else { Ok(()) }
     }
 }
 
-fn check_first_scenes(run: &SuiteRun, tasks: &[&Task]) -> Result<BTreeSet<String>, RunError> {
-    // Opening the scenes runs the whole script, so each thread takes idle ones before it opens others.
-    let idle: Mutex<Vec<SceneBuilder>> = Mutex::default();
+fn check_first_scenes(
+    run: &SuiteRun,
+    scenes: &ScenePool,
+    tasks: &[&Task],
+) -> Result<BTreeSet<String>, RunError> {
     let mut warnings = BTreeSet::new();
     let check = |job: usize| -> Result<BTreeSet<String>, RunError> {
         let task = tasks[job];
-        let taken = parallel::lock(&idle).pop();
-        let builder = taken.map_or_else(|| SceneBuilder::open(run.loaded), Ok)?;
-        let setup = builder.build(&run.episode_id(task, 0), &run.changes())?;
-        parallel::lock(&idle).push(builder);
+        let setup = scenes.with(|builder| builder.build(&run.episode_id(task, 0), &run.changes()))??;
         let mut warnings = scene_warnings(task, &setup.scene, &run.assets);
         let of_task = |warning: String| format!("task {}: {warning}", task.id);
         warnings.extend(run.check_scene(task, setup.scene)?.map(of_task));

@@ -10,6 +10,7 @@ use crate::{
     limits::{CalibrationFiles, Calibrations, LimitScan, SceneLimits},
     policy::{ControllerFactory, DeclaredStreams},
     recorded_runs::{RecordedRuns, ReplaySource},
+    scene_pool::ScenePool,
     selection::{select_episodes, select_tasks},
 };
 use softvt_benchmark::{ObjectType, ShiftValue, Suite, Task, settings::Settings};
@@ -24,7 +25,7 @@ use softvt_rollout::{
     Simulation, check_goal, check_sensors, cost_warning,
 };
 use softvt_scene::{Body, Scene};
-use softvt_script::{EpisodeSetup, LoadedScript, SceneBuilder, SceneChanges};
+use softvt_script::{EpisodeSetup, LoadedScript, SceneChanges};
 
 /// Episodes per task whose scenes are built before a run, to find all assets and the limits that are missing.
 const MAX_SCANNED_EPISODES: usize = 100;
@@ -237,7 +238,7 @@ impl<'a> SuiteRun<'a> {
     ///
     /// # Errors
     /// A calibration file that is not valid.
-    pub(crate) fn scan_limits(&self) -> Result<Calibrations, RunError> {
+    pub(crate) fn scan_limits(&self, scenes: &ScenePool) -> Result<Calibrations, RunError> {
         if !self.reads_limits {
             return Ok(Calibrations::default());
         }
@@ -247,7 +248,7 @@ impl<'a> SuiteRun<'a> {
             tasks.len(),
             self.config.thread_count(),
             cancel::requested,
-            |job| self.scan_task(tasks[job]),
+            |job| self.scan_task(scenes, tasks[job]),
             |_, found| {
                 found.into_iter().for_each(|(index, limits)| scan.add(index, limits));
                 Ok(())
@@ -258,17 +259,22 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// Limits in the first episodes of a task. All shards of a run look at the same episodes.
-    fn scan_task(&self, task: &Task) -> Result<BTreeMap<EpisodeIndex, SceneLimits>, RunError> {
+    fn scan_task(
+        &self,
+        scenes: &ScenePool,
+        task: &Task,
+    ) -> Result<BTreeMap<EpisodeIndex, SceneLimits>, RunError> {
         let of_task = self.jobs.episodes_of(task.id);
         let episodes: Vec<u32> = match self.config.shard {
             Some(_) => (0..self.config.episodes_of(self.suite)).take(MAX_SCANNED_EPISODES).collect(),
             None => of_task.take(MAX_SCANNED_EPISODES).collect(),
         };
         let mut found = BTreeMap::new();
-        let Ok(builder) = SceneBuilder::open(self.loaded) else { return Ok(found) };
         let changes = self.changes();
         for episode in episodes {
-            let Ok(opened) = builder.build(&self.episode_id(task, episode), &changes) else { break };
+            let opened = scenes.with(|builder| builder.build(&self.episode_id(task, episode), &changes));
+            // Errors are told when the episode is opened.
+            let Ok(Ok(opened)) = opened else { break };
             found.insert(EpisodeIndex { task: task.id, episode }, self.limits_of(task, &opened.scene)?);
         }
         Ok(found)
@@ -373,7 +379,7 @@ impl<'a> SuiteRun<'a> {
     pub fn prepare(self) -> Result<PreparedRun<'a>, RunError> {
         self.config.observer.work(&format!("checking the scenes of {}", self.name));
         let force_observed = self.check_first_episodes()?;
-        let calibrations = self.scan_limits()?;
+        let calibrations = self.scan_limits(&ScenePool::new(self.loaded))?;
         let mut sources = self.sources();
         sources.extend(calibrations.sources.clone());
         self.config.observer.end();
@@ -553,7 +559,10 @@ pub(crate) fn find_replay_source(
 /// Converts the error of a policy server.
 fn policy_failure(error: PolicyError) -> RunError {
     match error {
-        PolicyError::Interrupted | PolicyError::Address { .. } => RunError::input(error),
+        PolicyError::Interrupted => RunError::input(error),
+        PolicyError::Address { url, problem } => {
+            RunError::of_setting("policy", url, format!("{problem}; expected ws://HOST:PORT"))
+        }
         other => RunError::new(Cause::Policy, other),
     }
 }

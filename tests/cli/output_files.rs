@@ -203,7 +203,7 @@ fn unsuitable_output_folders_are_refused() {
     let before = (project.text("run/run.json"), project.text("run/episodes.jsonl"));
     assert_eq!(
         project.refusal("x.lua --out run --policy noop"),
-        "x.lua: run already holds a run (run.json): resume it with --resume, or give another folder with --out"
+        "x.lua: run already holds a run (run.json): resume it, or give another output folder"
     );
     assert_eq!((project.text("run/run.json"), project.text("run/episodes.jsonl")), before);
 }

@@ -94,7 +94,7 @@ fn folders_and_flags_that_do_not_fit_are_refused() {
     assert!(busy.contains("another softvt process is using served"), "{busy}");
     server.interrupt();
     for (words, expected) in [
-        ("--out served", "served already holds a run (run.json): resume it with --resume"),
+        ("--out served", "served already holds a run (run.json): resume it, or"),
         ("--resume", "--out <DIR>"),
         ("--episodes 2", "--episodes: applies to the run in --out; add --out DIR, or leave it out"),
         ("--shard 1/2", "--shard: applies to the run in --out"),

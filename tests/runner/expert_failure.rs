@@ -8,7 +8,7 @@ use crate::support::{Project, Small};
 fn the_reason_of_give_up_is_recorded() {
     let project = Small { expert: "arm:wait(0.1) arm:give_up('too slippery')", ..Small::default() }.project();
     let finished = project.run("x.lua").episodes(2).finish();
-    let line = "task 0 episode 0: failed, D 0.00 %, 2.0 s; gave up: too slippery";
+    let line = "task 0 episode 0: failed, D 0.00 %, 2.0 s simulated; gave up: too slippery";
     assert!(finished.messages.contains(line), "{}", finished.messages);
     let SuiteResult { summary, records } = finished.result();
     let list =

@@ -238,7 +238,7 @@ fn options_without_effect_are_refused() {
         ),
         (server("ws://127.0.0.1:99999", None), "\"99999\" is not a port"),
         (server("ws://127.0.0.1:0", None), "\"0\" is not a port"),
-        (server("ws://127.0.0.1:x", None), "--policy ws://127.0.0.1:x: "),
+        (server("ws://127.0.0.1:x", None), "policy ws://127.0.0.1:x: "),
     ] {
         let message = run.out("run").error();
         assert!(message.contains(output), "{output}: {message}");

@@ -106,8 +106,9 @@ impl RigidShape {
         }
         let deepest = |surface: &Self, from: &Pose, into: &Self, frame: &Pose| {
             let to = frame.inv_mul(from);
-            let depth = |p: &Vec3| -into.shape.distance(&(to * nalgebra::Point3::from(*p)).coords);
-            surface.features().seeds.iter().map(depth).fold(0.0, f64::max)
+            let seeds = surface.features().seeds.iter().map(|p| (to * nalgebra::Point3::from(*p)).coords);
+            let inside = seeds.filter(|p| into.bounds().contains(p));
+            inside.map(|p| -into.shape.distance(&p)).fold(0.0, f64::max)
         };
         deepest(self, pose, other, other_pose).max(deepest(other, other_pose, self, pose))
     }
