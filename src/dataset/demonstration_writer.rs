@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use image::{RgbImage, imageops};
+use image::RgbImage;
 use rust_hdf5::H5Dataset;
 use serde_json::Value;
 
@@ -15,7 +15,10 @@ use softvt_benchmark::CONTROL_HZ;
 use softvt_media::video::VideoWriter;
 use softvt_rollout::StateRecording;
 use softvt_scene::Camera;
-use softvt_sensing::tactile::{MarkerStyle, Markers};
+use softvt_sensing::{
+    camera::resize,
+    tactile::{MarkerStyle, Markers},
+};
 
 /// Output files of a demonstration. Each appears complete or not at all.
 pub struct DemonstrationWriter<'a> {
@@ -227,13 +230,15 @@ impl StepImages {
                 let scale =
                     f64::min(f64::from(CELL_WIDTH) / f64::from(w), f64::from(CELL_HEIGHT) / f64::from(h));
                 let edge = |pixels: u32| ((scale * f64::from(pixels)) as u32).max(1);
-                resized = imageops::resize(image, edge(w), edge(h), imageops::FilterType::Triangle);
+                resized = resize(image, edge(w), edge(h));
                 &resized
             };
             let (w, h) = cell.dimensions();
             let x = at % 2 * CELL_WIDTH + (CELL_WIDTH - w) / 2;
             let y = at / 2 * CELL_HEIGHT + (CELL_HEIGHT - h) / 2;
-            imageops::replace(&mut preview, cell, i64::from(x), i64::from(y));
+            let (stride, width, first) = (6 * CELL_WIDTH as usize, 3 * w as usize, 3 * x as usize);
+            let rows = preview.chunks_exact_mut(stride).skip(y as usize).zip(cell.chunks_exact(width.max(1)));
+            rows.for_each(|(to, from)| to[first..first + width].copy_from_slice(from));
         }
         preview
     }

@@ -3,6 +3,8 @@
 //! Connectivity comes from naive surface nets (Gibson 1998). Vertices are placed by the quadric error of dual
 //! contouring (Ju et al. 2002), which preserves sharp edges and corners, and projected on the surface.
 
+use std::collections::HashMap;
+
 use fast_surface_nets::{SurfaceNetsBuffer, ndshape::RuntimeShape, surface_nets};
 
 use super::{
@@ -25,7 +27,7 @@ pub struct SurfaceMesh {
 
 /// Largest number of grid points, which bounds the memory; smaller cells are enlarged to fit.
 const MAX_POINTS: f64 = 2e7;
-/// Edge, in cells, of the blocks that are skipped as a whole where they are far from the surface.
+/// Edge, in cells, of the largest blocks that are skipped as a whole where they are far from the surface; a power of two.
 const BLOCK: usize = 4;
 /// Largest number of passes that make the lattice well composed; a repair may invalidate neighbouring cells.
 const MAX_PASSES: usize = 16;
@@ -53,8 +55,9 @@ pub(super) fn surface_triangles(shape: &Shape, cell: f64) -> (Mesh, Vec<Vec3>) {
     let top = grid.count.map(|n| n as u32 - 1);
     let array = RuntimeShape::<u32, 3>::new(grid.count.map(|n| n as u32));
     surface_nets(&values, &array, [0; 3], top, &mut buffer);
-    let vertices: Vec<Vec3> =
-        buffer.surface_points.iter().map(|at| grid.vertex(shape, &values, at.map(|i| i as usize))).collect();
+    let mut crossings = EdgeCrossings { shape, found: HashMap::new() };
+    let mut vertex = |at: &[u32; 3]| grid.vertex(&mut crossings, &values, at.map(|i| i as usize));
+    let vertices: Vec<Vec3> = buffer.surface_points.iter().map(&mut vertex).collect();
     let normals: Vec<Vec3> = vertices.iter().map(|v| shape.first_order(v).normal).collect();
     let triangles =
         buffer.indices.chunks_exact(6).flat_map(|quad| split(shape, &vertices, &normals, quad)).collect();
@@ -147,10 +150,7 @@ impl SamplingGrid {
 
     /// Signed distance in cells at every point, x fastest; only its sign is valid far from the surface.
     fn sample(&self, shape: &Shape) -> Vec<f32> {
-        let [nx, ny, nz] = self.count;
-        let mut values = vec![1.0_f32; nx * ny * nz];
-        let half = 0.5 * (BLOCK - 1) as f64;
-        let far = 2.0 * 3.0_f64.sqrt() * (half + 1.0) * self.cell;
+        let mut values = vec![1.0_f32; self.count.iter().product()];
         let blocks = self.count.map(|n| n.div_ceil(BLOCK));
         for block in 0..blocks.iter().product() {
             let start = [
@@ -158,18 +158,33 @@ impl SamplingGrid {
                 block / blocks[0] % blocks[1] * BLOCK,
                 block / blocks[0] / blocks[1] * BLOCK,
             ];
-            let middle = shape.distance(&(self.point(start) + Vec3::repeat(half * self.cell)));
-            for z in start[2]..(start[2] + BLOCK).min(nz) {
-                for y in start[1]..(start[1] + BLOCK).min(ny) {
-                    for x in start[0]..(start[0] + BLOCK).min(nx) {
-                        let value =
-                            if middle.abs() > far { middle } else { shape.distance(&self.point([x, y, z])) };
-                        values[x + nx * (y + ny * z)] = (value / self.cell) as f32;
-                    }
-                }
-            }
+            self.sample_block(shape, start, BLOCK, &mut values);
         }
         values
+    }
+
+    /// Samples a cube of `edge` points from `start` on: as a whole where the surface is far, else by its eighths.
+    fn sample_block(&self, shape: &Shape, start: [usize; 3], edge: usize, values: &mut [f32]) {
+        let half = 0.5 * (edge - 1) as f64;
+        let far = 2.0 * 3.0_f64.sqrt() * (half + 1.0) * self.cell;
+        let middle = shape.distance(&(self.point(start) + Vec3::repeat(half * self.cell)));
+        if edge > 1 && middle.abs() <= far {
+            for eighth in 0..8 {
+                let step = hex8::corner_index(eighth).map(|k| k * edge / 2);
+                let first: [usize; 3] = std::array::from_fn(|axis| start[axis] + step[axis]);
+                if (0..3).all(|axis| first[axis] < self.count[axis]) {
+                    self.sample_block(shape, first, edge / 2, values);
+                }
+            }
+            return;
+        }
+        let [nx, ny, _] = self.count;
+        let range = |axis: usize| start[axis]..(start[axis] + edge).min(self.count[axis]);
+        for z in range(2) {
+            for y in range(1) {
+                range(0).for_each(|x| values[x + nx * (y + ny * z)] = (middle / self.cell) as f32);
+            }
+        }
     }
 
     /// Removes features finer than the lattice that would make the surface touch itself. A set of lattice points
@@ -202,32 +217,28 @@ impl SamplingGrid {
     /// The vertex of the cell with lowest corner `at`. On a smooth surface it is the mean of the crossings
     /// with the cell's edges, projected on the surface; at a sharp edge, the point that best fits the tangent
     /// planes of the crossings.
-    fn vertex(&self, shape: &Shape, values: &[f32], at: [usize; 3]) -> Vec3 {
+    fn vertex(&self, crossings: &mut EdgeCrossings, values: &[f32], at: [usize; 3]) -> Vec3 {
         let [nx, ny, _] = self.count;
+        let shape = crossings.shape;
         let corners: [GridPoint; 8] = std::array::from_fn(|c| {
             let [x, y, z] = std::array::from_fn(|axis| at[axis] + hex8::corner_index(c)[axis]);
-            GridPoint { p: self.point([x, y, z]), value: f64::from(values[x + nx * (y + ny * z)]) }
+            let index = x + nx * (y + ny * z);
+            GridPoint { index, p: self.point([x, y, z]), value: f64::from(values[index]) }
         });
         let crossed: Vec<[GridPoint; 2]> = (0..8)
             .flat_map(|a: usize| [1, 2, 4].map(|bit| (a, a | bit)))
             .filter(|&(a, b)| a != b && (corners[a].value < 0.0) != (corners[b].value < 0.0))
             .map(|(a, b)| [a, b].map(|c| corners[c]))
             .collect();
-        let linear = |[a, b]: &[GridPoint; 2]| a.p + (b.p - a.p) * (a.value / (a.value - b.value));
-        let mean = crossed.iter().map(linear).sum::<Vec3>() / crossed.len() as f64;
+        let mean = crossed.iter().map(linear_crossing).sum::<Vec3>() / crossed.len() as f64;
         let smooth = || shape.project(&mean, self.cell).unwrap_or(mean);
-        let at_crossings: Vec<SignedDistance> =
-            crossed.iter().map(|edge| shape.first_order(&linear(edge))).collect();
+        let at_crossings: Vec<SignedDistance> = crossed.iter().map(|edge| crossings.linear(edge)).collect();
         let is_linear = at_crossings.iter().all(|at| at.distance.abs() <= LINEARITY_TOLERANCE * self.cell);
         if is_linear && are_parallel(at_crossings.iter().map(|at| at.normal), SMOOTH_COSINE) {
             return smooth();
         }
         // The field is not linear in this cell, so the crossings are found by bisection.
-        let planes: Vec<TangentPlane> = crossed
-            .iter()
-            .map(|[a, b]| crossing(shape, a.p, b.p))
-            .map(|p| TangentPlane { p, normal: shape.first_order(&p).normal })
-            .collect();
+        let planes: Vec<TangentPlane> = crossed.iter().map(|edge| crossings.exact(edge)).collect();
         if are_parallel(planes.iter().map(|plane| plane.normal), SHARP_COSINE) {
             return smooth();
         }
@@ -240,14 +251,61 @@ impl SamplingGrid {
 /// A corner of a cell with its signed distance, in cells.
 #[derive(Clone, Copy)]
 struct GridPoint {
+    /// Index in the lattice.
+    index: usize,
     p: Vec3,
     value: f64,
 }
 
+/// The crossing of the surface with an edge, if the field is linear along it.
+fn linear_crossing([a, b]: &[GridPoint; 2]) -> Vec3 {
+    a.p + (b.p - a.p) * (a.value / (a.value - b.value))
+}
+
 /// Tangent plane of the surface at a point.
+#[derive(Clone, Copy)]
 struct TangentPlane {
     p: Vec3,
     normal: Vec3,
+}
+
+/// The surface along the edges of the lattice. Up to four cells share an edge; it is examined once.
+struct EdgeCrossings<'a> {
+    shape: &'a Shape,
+    /// By the lattice indices of the ends.
+    found: HashMap<[usize; 2], EdgeCrossing>,
+}
+
+/// What is known of the crossing of the surface with an edge.
+struct EdgeCrossing {
+    /// The field at the linear crossing.
+    linear: SignedDistance,
+    /// The tangent plane at the crossing itself, once a cell has asked for it.
+    exact: Option<TangentPlane>,
+}
+
+impl EdgeCrossings<'_> {
+    fn at(&mut self, edge: &[GridPoint; 2]) -> &mut EdgeCrossing {
+        let shape = self.shape;
+        self.found.entry(edge.map(|end| end.index)).or_insert_with(|| EdgeCrossing {
+            linear: shape.first_order(&linear_crossing(edge)),
+            exact: None,
+        })
+    }
+
+    /// The field at the linear crossing of an edge.
+    fn linear(&mut self, edge: &[GridPoint; 2]) -> SignedDistance {
+        self.at(edge).linear
+    }
+
+    /// The tangent plane where the surface crosses an edge.
+    fn exact(&mut self, edge: &[GridPoint; 2]) -> TangentPlane {
+        let shape = self.shape;
+        *self.at(edge).exact.get_or_insert_with(|| {
+            let p = crossing(shape, edge[0].p, edge[1].p);
+            TangentPlane { p, normal: shape.first_order(&p).normal }
+        })
+    }
 }
 
 /// True if the cosine between the first normal and every other is at least `cosine`.

@@ -86,8 +86,7 @@ impl SensorAssets {
         self.meshes.get(asset, same, || {
             let model = match mesh {
                 None => RenderMesh::from_shape(name, &asset.shape, &asset.visuals)?,
-                Some(mesh) => RenderMesh::from_deformable_shape(name, &asset.shape, &asset.visuals)?
-                    .embedded_in(name, mesh)?,
+                Some(mesh) => RenderMesh::from_soft_shape(name, &asset.shape, &asset.visuals, mesh)?,
             };
             Ok(Arc::new(model))
         })

@@ -1,7 +1,7 @@
 //! The scene to be drawn: objects, their poses in a state, and the light.
 
 use std::sync::{
-    Arc,
+    Arc, OnceLock,
     atomic::{AtomicU64, Ordering},
 };
 
@@ -35,7 +35,7 @@ pub struct RenderObject {
     /// Triangles and materials, shared by all instances.
     pub mesh: Arc<RenderMesh>,
     /// The body that the object moves with. If it is a soft body, the mesh must be
-    /// [embedded](RenderMesh::embedded_in) in it. Kinematic bodies are not supported.
+    /// [attached](RenderMesh::from_soft_shape) to it. Kinematic bodies are not supported.
     pub body: BodyId,
     /// Pose of the object in the frame of the body, or in the world; ignored for soft bodies.
     pub pose_in_body: Pose,
@@ -57,8 +57,8 @@ impl RenderObject {
 pub struct RenderScene {
     pub(crate) objects: Vec<RenderObject>,
     pub(crate) lighting: Lighting,
-    /// World-space levels of detail of each fixed object; empty for moving ones.
-    pub(crate) fixed_meshes: Vec<Vec<Arc<PosedMesh>>>,
+    /// Levels of detail in the world of each fixed object, posed on first use; unused for moving ones.
+    fixed_meshes: FixedMeshes,
     pub(crate) fixed_shadow: ShadowMap,
     /// Coarser shadows of fixed objects beyond the fine map, if there are any.
     pub(crate) wide_shadow: Option<ShadowMap>,
@@ -96,21 +96,25 @@ impl RenderScene {
                 reason: format!("{} objects; at most {MAX_OBJECTS} can be drawn, join some", objects.len()),
             });
         }
-        let mut fixed_meshes = Vec::new();
-        for object in &objects {
-            let posed = |lod| PosedMesh::new(object, lod, &FrameView::default()).map(Arc::new);
-            let lods = if object.is_moving() { &[] } else { object.mesh.lods.as_slice() };
-            fixed_meshes.push(lods.iter().map(posed).collect::<Result<Vec<_>, _>>()?);
+        let fixed_meshes = FixedMeshes::new(&objects);
+        let mut bounds = Vec::new();
+        let mut casters = Vec::new();
+        for (index, object) in objects.iter().enumerate().filter(|(_, object)| !object.is_moving()) {
+            let level = object.mesh.caster()?;
+            let posed = fixed_meshes.get(&objects, index, level)?;
+            bounds.push(posed.clone());
+            if object.casts_shadow {
+                casters.push((posed, object.mesh.level(level)?));
+            }
         }
         let draw_shadows = |mut map: ShadowMap| {
-            let casters = objects.iter().zip(&fixed_meshes).filter(|(object, _)| object.casts_shadow);
-            map.draw(casters.filter_map(|(object, posed)| {
-                Some((posed.first()?.positions.as_slice(), object.mesh.lods[0].triangles.as_slice()))
-            }));
+            map.draw(
+                casters.iter().map(|(posed, lod)| (posed.positions.as_slice(), lod.triangles.as_slice())),
+            );
             map
         };
         let fixed_shadow = draw_shadows(ShadowMap::new(&lighting));
-        let wide_shadow = wide_shadow_radius(&fixed_meshes, &lighting)
+        let wide_shadow = wide_shadow_radius(&bounds, &lighting)
             .map(|radius| draw_shadows(ShadowMap::with_radius(&lighting, radius)));
         // Relaxed: only uniqueness matters.
         static NEXT_ID: AtomicU64 = AtomicU64::new(0);
@@ -125,12 +129,42 @@ impl RenderScene {
             id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
         })
     }
+
+    /// A level of detail of a fixed object in the world.
+    pub(crate) fn fixed_mesh(&self, object: usize, level: usize) -> Result<Arc<PosedMesh>, CameraError> {
+        self.fixed_meshes.get(&self.objects, object, level)
+    }
+}
+
+/// Levels of detail of fixed objects in the world, by object and level, posed on first use.
+#[derive(Debug)]
+struct FixedMeshes(Vec<Vec<OnceLock<Arc<PosedMesh>>>>);
+
+impl FixedMeshes {
+    fn new(objects: &[RenderObject]) -> Self {
+        let levels = |object: &RenderObject| vec![OnceLock::new(); object.mesh.level_count()];
+        Self(objects.iter().map(levels).collect())
+    }
+
+    fn get(
+        &self,
+        objects: &[RenderObject],
+        index: usize,
+        level: usize,
+    ) -> Result<Arc<PosedMesh>, CameraError> {
+        let (slot, object) = (&self.0[index][level], &objects[index]);
+        if let Some(posed) = slot.get() {
+            return Ok(posed.clone());
+        }
+        let posed = PosedMesh::new(object, object.mesh.level(level)?, &FrameView::default())?;
+        Ok(slot.get_or_init(|| Arc::new(posed)).clone())
+    }
 }
 
 /// Radius that contains all fixed objects, m, if the fine shadow map does not.
-fn wide_shadow_radius(fixed_meshes: &[Vec<Arc<PosedMesh>>], lighting: &Lighting) -> Option<f32> {
+fn wide_shadow_radius(fixed_meshes: &[Arc<PosedMesh>], lighting: &Lighting) -> Option<f32> {
     let (centre, fine_radius) = (lighting.shadow_centre_w.cast::<f32>(), lighting.shadow_radius_m as f32);
-    let positions = fixed_meshes.iter().filter_map(|lods| lods.last()).flat_map(|posed| &posed.positions);
+    let positions = fixed_meshes.iter().flat_map(|posed| &posed.positions);
     let farthest = positions.map(|p| (p - centre).norm()).fold(0.0, f32::max);
     (farthest > fine_radius).then(|| farthest.min(MAX_WIDE_RADIUS * fine_radius))
 }

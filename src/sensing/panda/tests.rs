@@ -19,7 +19,8 @@ const POSE: [f64; panda::DOFS] = [0.3, -0.5, 0.2, -2.0, 0.4, 1.9, 0.7, 0.02, 0.0
 
 #[test]
 fn the_robot_has_a_moderate_number_of_triangles() {
-    let triangles: usize = meshes().parts.iter().map(|part| part.mesh.lods[0].triangles.len()).sum();
+    let triangles: usize =
+        meshes().parts.iter().map(|part| part.mesh.level(0).expect("a level").triangles.len()).sum();
     assert!((5_000..=30_000).contains(&triangles), "{triangles}");
 }
 

@@ -1,6 +1,8 @@
 //! Extraction of the surface features of a shape that can touch another: sharp corners and edges, rims, flat regions,
 //! and seeds on its smooth parts.
 
+use std::collections::HashMap;
+
 use nalgebra::SymmetricEigen;
 
 use super::{
@@ -197,6 +199,7 @@ struct FeatureGrid<'a> {
 struct Cell(Vec<Crossing>);
 
 /// A point of the surface and its normal.
+#[derive(Clone, Copy)]
 struct Crossing {
     p: Vec3,
     normal: Vec3,
@@ -224,30 +227,31 @@ impl<'a> FeatureGrid<'a> {
     /// The cells that the surface crosses, x fastest.
     fn crossed(&self) -> impl Iterator<Item = Cell> + '_ {
         let [nx, ny, _] = self.count;
+        // Up to four cells share an edge.
+        let mut known: HashMap<[usize; 2], Crossing> = HashMap::new();
         let inner = move |i: usize| i % nx + 1 < nx && i / nx % ny + 1 < ny && i + nx * ny < self.gap.len();
         (0..self.gap.len()).filter(move |&i| inner(i)).filter_map(move |i| {
             let corner = move |c: usize| i + (c & 1) + nx * (c >> 1 & 1) + nx * ny * (c >> 2 & 1);
             let mut crossings = Vec::new();
             for (low, axis) in (0..8).flat_map(|c| (0..3).map(move |axis| (c, axis))) {
-                if low >> axis & 1 == 0 {
-                    crossings.extend(self.crossing(corner(low), corner(low | 1 << axis)));
+                let ends = [corner(low), corner(low | 1 << axis)];
+                if low >> axis & 1 == 0 && (self.gap[ends[0]] < 0.0) != (self.gap[ends[1]] < 0.0) {
+                    crossings.push(*known.entry(ends).or_insert_with(|| self.crossing(ends)));
                 }
             }
             (!crossings.is_empty()).then_some(Cell(crossings))
         })
     }
 
-    fn crossing(&self, i: usize, j: usize) -> Option<Crossing> {
+    /// The crossing of the surface between two nodes on different sides of it.
+    fn crossing(&self, [i, j]: [usize; 2]) -> Crossing {
         let (mut p, mut q, mut gap_p) = (self.node(i), self.node(j), self.gap[i]);
-        if (gap_p < 0.0) == (self.gap[j] < 0.0) {
-            return None;
-        }
         for _ in 0..20 {
             let middle = 0.5 * (p + q);
             let gap = self.shape.distance_and_normal(&middle).0;
             if (gap < 0.0) == (gap_p < 0.0) { (p, gap_p) = (middle, gap) } else { q = middle }
         }
-        Some(Crossing { p, normal: self.shape.distance_and_normal(&p).1 })
+        Crossing { p, normal: self.shape.distance_and_normal(&p).1 }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::texture::TextureChart;
 use crate::camera::{
     math::{LANES, V3},
     shade::{
@@ -40,7 +41,8 @@ pub(crate) struct Lod {
     /// Material of each vertex.
     pub(crate) materials: Vec<MaterialSample>,
     pub(crate) triangles: Vec<[u32; 3]>,
-    /// Texture chart of each triangle; empty if the level is not textured.
+    pub(crate) charts: Vec<TextureChart>,
+    /// Index in `charts` of each triangle's chart; empty if the level is not textured.
     pub(crate) chart_ids: Vec<u32>,
     /// Texture coordinates of each triangle's corners in its chart, texels.
     pub(crate) uvs: Vec<[[f32; 2]; 3]>,
@@ -54,13 +56,15 @@ pub(crate) struct Lod {
     pub(crate) is_uniform: bool,
     /// Distance from the exact shape that few triangles exceed, m.
     pub(crate) geometric_error: f32,
+    /// Height of the relief of the materials that a coarse level lacks, m.
+    pub(crate) missing_relief: f32,
 }
 
 impl Lod {
     /// True if the level looks like finer ones where a pixel covers `pixel` metres.
     pub(crate) fn is_fine_enough(&self, pixel: f32) -> bool {
         self.vertex_spacing <= MAX_EDGE_PIXELS * pixel
-            || self.is_uniform && self.geometric_error <= MAX_ERROR_PIXELS * pixel
+            || self.is_uniform && self.geometric_error.max(self.missing_relief) <= MAX_ERROR_PIXELS * pixel
     }
 }
 

@@ -1,12 +1,15 @@
 //! The drawn form of an object: levels of detail with baked materials.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, LazyLock},
+};
 
 use super::{
     lod::{Lod, NodeWeights, bake_vertices, extent},
     primitive::{append_visible, flat_faces, primitive_mesh, transform},
     simplify::simplify,
-    texture::{SurfaceMaterial, TextureChart, flat_charts, parameterize, suits_flat_charts},
+    texture::{SurfaceMaterial, flat_charts, parameterize, suits_flat_charts},
 };
 use crate::camera::{error::CameraError, math::V3, raster::TRIANGLE_BITS, shade::pattern};
 use softvt_geometry::{
@@ -18,17 +21,19 @@ use softvt_geometry::{
 };
 use softvt_scene::{Visual, VisualLayer};
 
-/// Cells along the longest edge of a shape, per level of detail. The coarsest level also casts shadows.
-const CELLS: [f64; 4] = [64.0, 40.0, 26.0, 16.0];
+/// Cells along the longest edge of a shape, per level of detail.
+const CELLS: [f64; 5] = [64.0, 40.0, 26.0, 16.0, 10.0];
 /// Tolerance of the simplification of rigid shapes, in vertex spacings.
 const SIMPLIFY_TOLERANCE: f32 = 0.025;
 /// Maximum edge of triangles with patterns, in longest extents of the mesh.
 const MAX_PATTERN_EDGE: f64 = 1.0 / 48.0;
 /// Maximum number of triangles that subdivision creates.
 const MAX_SUBDIVIDED_TRIANGLES: usize = 120_000;
-/// Geometric errors of the levels of detail, m: for large images, for small ones, and for distant views and shadows.
-/// The last is below the depth bias of shadow maps, so that casters do not shade their own surface.
-const LOD_ERRORS: [f32; 3] = [1e-4, 2.5e-4, 5e-4];
+/// Geometric errors of the levels of detail of solids, m: for large images, for small ones, and for distant views and shadows.
+const LOD_ERRORS: [f32; 4] = [1e-4, 2.5e-4, 5e-4, MAX_CASTER_ERROR];
+/// Maximum geometric error of the levels of detail that cast shadows, m: half the depth bias of shadow maps, so that casters do
+/// not shade their own surface.
+const MAX_CASTER_ERROR: f32 = 1e-3;
 /// Vertex spacing in cells that counts for the choice of a level: surfaces of one colour need
 /// fewer vertices than patterns.
 const UNIFORM_SPACING: f64 = 0.16;
@@ -37,6 +42,8 @@ const MIN_CELL: f64 = 2e-3;
 /// Share of triangles that may be farther from the surface than the geometric error of their level: a groove, which takes
 /// little of the surface, counts.
 const ERROR_SHARE: f64 = 0.02;
+/// Depth inside a shape from which a vertex belongs to a hidden part of it, m: corners of visible parts are rounded by less.
+const HIDDEN_CORNER_DEPTH: f64 = 3e-4;
 /// Vertices deeper than this inside another solid are invisible, m.
 const HIDDEN_DEPTH: f64 = 1.5e-3;
 
@@ -44,12 +51,19 @@ const HIDDEN_DEPTH: f64 = 1.5e-3;
 ///
 /// Materials are functions of the object frame. They are evaluated once, into vertices, or into textures for
 /// surfaces with patterns or several materials, and filtered to the spacing of the samples; small images therefore do not
-/// alias. Coarser levels of detail are drawn where they look the same.
+/// alias. Coarser levels of detail are drawn where they look the same; those of shapes are built on first use.
 #[derive(Clone, Debug)]
 pub struct RenderMesh {
     /// From fine to coarse; at least one.
-    pub(crate) lods: Vec<Lod>,
-    pub(crate) charts: Vec<TextureChart>,
+    levels: Vec<Arc<LazyLevel>>,
+}
+
+/// A level of detail that is built on first use: finer ones take longer and are seen from nearby only.
+type LazyLevel =
+    LazyLock<Result<Lod, CameraError>, Box<dyn FnOnce() -> Result<Lod, CameraError> + Send + Sync>>;
+
+fn lazy_level(build: impl FnOnce() -> Result<Lod, CameraError> + Send + Sync + 'static) -> Arc<LazyLevel> {
+    Arc::new(LazyLock::new(Box::new(build)))
 }
 
 impl RenderMesh {
@@ -61,61 +75,69 @@ impl RenderMesh {
         if let Some(mesh) = flat_faces(shape) {
             return Self::from_mesh(name, &mesh, visuals);
         }
-        Self::with_lods(name, shape, visuals, true)
+        Self::with_lazy_levels(ShapeSurface::new(name, shape, visuals, None))
     }
 
-    /// Builds the mesh of a shape that will bend, with small triangles on flat faces too.
+    /// Builds the mesh of the shape of a soft body, attached to the nodes of `voxels`, with small triangles on flat faces
+    /// too.
     ///
     /// # Errors
-    /// As [`RenderMesh::from_shape`].
-    pub fn from_deformable_shape(name: &str, shape: &Shape, visuals: &[Visual]) -> Result<Self, CameraError> {
-        Self::with_lods(name, shape, visuals, false)
+    /// As [`RenderMesh::from_shape`]; or part of the surface lies more than two voxels outside `voxels`.
+    pub fn from_soft_shape(
+        name: &str,
+        shape: &Shape,
+        visuals: &[Visual],
+        voxels: &VoxelMesh,
+    ) -> Result<Self, CameraError> {
+        Self::with_lazy_levels(ShapeSurface::new(name, shape, visuals, Some(voxels.clone())))
     }
 
-    fn with_lods(name: &str, shape: &Shape, visuals: &[Visual], is_rigid: bool) -> Result<Self, CameraError> {
-        let longest = shape.bounds().size().max();
-        let (mut lods, mut charts) = (Vec::new(), Vec::new());
-        let is_textured = visuals.len() > 1 || visuals.iter().any(|visual| !visual.layers.is_empty());
-        let surface = is_textured
-            .then(|| Arc::new(SurfaceMaterial { shape: shape.clone(), visuals: visuals.to_vec() }));
-        // What the vertices hold: of a textured surface, what textures do not.
-        let baked: Vec<Visual> =
-            visuals.iter().map(|v| if is_textured { without_colours(v) } else { v.clone() }).collect();
-        let is_baked_alike = baked.iter().all(|visual| *visual == baked[0]);
-        let relief = baked
-            .iter()
-            .flat_map(|visual| &visual.layers)
-            .map(|layer| layer.relief_m.abs())
-            .fold(0.0, f64::max);
-        // Textured faces of rigid shapes need no small triangles.
-        let prefers_primitives = is_revolved(shape) || is_rigid && is_textured;
-        for cells in CELLS {
-            let cell = longest / cells;
-            let primitives = prefers_primitives.then(|| primitive_mesh(shape, cell)).flatten();
-            let mesh = primitives.unwrap_or_else(|| SurfaceMesh::from_shape(shape, cell).mesh);
-            let mut material_ids: Vec<u16> =
-                mesh.triangles.iter().map(|t| shape.material(&centroid(&mesh, t))).collect();
-            check_mesh(name, &mesh, &material_ids, visuals)?;
-            if is_baked_alike {
-                material_ids.fill(0);
-            }
-            let mut lod = bake_vertices(&mesh, &material_ids, &baked, cell as f32, Some(shape));
-            if !lods.is_empty() && (lod.is_uniform || is_textured) {
-                // Coarse levels lack the relief.
-                lod.geometric_error = geometric_error(&mesh, shape, cell).max(relief as f32);
-            }
-            if is_rigid {
-                lod = simplify(&lod, SIMPLIFY_TOLERANCE * lod.vertex_spacing);
-            }
-            if let Some(surface) = &surface {
-                parameterize(&mut lod, &mut charts, surface);
-            }
-            lods.push(lod);
-            if matches!(shape, Shape::Mesh(_)) {
-                break;
+    /// Builds the level that casts shadows, which every image needs, and leaves finer ones for later.
+    fn with_lazy_levels(surface: ShapeSurface) -> Result<Self, CameraError> {
+        // A mesh has its own triangles at every level.
+        let cells = if matches!(surface.material.shape, Shape::Mesh(_)) { &CELLS[..1] } else { &CELLS };
+        let surface = Arc::new(surface);
+        let level = |(index, &cells): (usize, &f64)| {
+            let surface = surface.clone();
+            lazy_level(move || surface.level(cells, index == 0))
+        };
+        let mesh = Self { levels: cells.iter().enumerate().map(level).collect() };
+        mesh.caster()?;
+        Ok(mesh)
+    }
+
+    fn from_levels(levels: impl IntoIterator<Item = Lod>) -> Self {
+        let levels = levels.into_iter().map(|lod| {
+            let level = lazy_level(move || Ok(lod));
+            LazyLock::force(&level);
+            level
+        });
+        Self { levels: levels.collect() }
+    }
+
+    /// Number of levels.
+    pub(crate) fn level_count(&self) -> usize {
+        self.levels.len()
+    }
+
+    /// A level of detail; 0 is the finest.
+    pub(crate) fn level(&self, index: usize) -> Result<&Lod, CameraError> {
+        self.levels[index].as_ref().as_ref().map_err(Clone::clone)
+    }
+
+    /// Index of the level that casts shadows and stands for the object where its extent matters only.
+    pub(crate) fn caster(&self) -> Result<usize, CameraError> {
+        self.coarsest_where(|lod| lod.geometric_error <= MAX_CASTER_ERROR)
+    }
+
+    /// Index of the coarsest level that is good enough, or of the finest one.
+    pub(crate) fn coarsest_where(&self, is_good: impl Fn(&Lod) -> bool) -> Result<usize, CameraError> {
+        for index in (1..self.levels.len()).rev() {
+            if is_good(self.level(index)?) {
+                return Ok(index);
             }
         }
-        Ok(Self { lods, charts })
+        Ok(0)
     }
 
     /// Builds the mesh of triangles, closed or not, which are visible from their counter-clockwise side.
@@ -126,18 +148,18 @@ impl RenderMesh {
     /// The mesh is empty, not finite, or refers to a vertex that does not exist; or there are no visuals.
     pub fn from_mesh(name: &str, mesh: &Mesh, visuals: &[Visual]) -> Result<Self, CameraError> {
         check_mesh(name, mesh, &[0], visuals)?;
-        let (mut mesh, mut charts) = (mesh.clone(), Vec::new());
+        let mut mesh = mesh.clone();
         let mut edge = extent(&mesh);
         let has_pattern = !visuals[0].layers.is_empty();
         let lod = if has_pattern && suits_flat_charts(&mesh, visuals.iter().any(pattern::has_text)) {
-            flat_charts(&mesh, &visuals[0], &mut charts)
+            flat_charts(&mesh, &visuals[0])
         } else {
             if has_pattern {
                 edge = edge.min(subdivide(&mut mesh, edge * MAX_PATTERN_EDGE));
             }
             bake_vertices(&mesh, &vec![0; mesh.triangles.len()], visuals, edge as f32, None)
         };
-        Ok(Self { lods: vec![lod], charts })
+        Ok(Self::from_levels([lod]))
     }
 
     /// Builds the mesh of solids that may overlap; `visuals` are those that the solids index. They are meshed
@@ -166,33 +188,94 @@ impl RenderMesh {
         let mut finer = bake_vertices(&combined, &material_ids, visuals, spacing, Some(&union));
         // Solids share no vertices and are uniform each, so their materials do not limit simplification.
         finer.is_uniform = true;
-        let lods = LOD_ERRORS.map(|geometric_error| {
+        Ok(Self::from_levels(LOD_ERRORS.map(|geometric_error| {
             finer = Lod { geometric_error, ..simplify(&finer, geometric_error) };
             finer.clone()
-        });
-        Ok(Self { lods: lods.into(), charts: Vec::new() })
+        })))
+    }
+}
+
+/// The surface of a shape, from which levels of detail are built.
+#[derive(Debug)]
+struct ShapeSurface {
+    /// For error messages.
+    name: String,
+    material: Arc<SurfaceMaterial>,
+    /// What the vertices hold of each visual: of a textured surface, what textures do not.
+    baked: Vec<Visual>,
+    is_textured: bool,
+    /// Nodes of the soft body that the surface belongs to, if any.
+    voxels: Option<VoxelMesh>,
+}
+
+impl ShapeSurface {
+    fn new(name: &str, shape: &Shape, visuals: &[Visual], voxels: Option<VoxelMesh>) -> Self {
+        let is_textured = visuals.len() > 1 || visuals.iter().any(|visual| !visual.layers.is_empty());
+        let baked = |v: &Visual| if is_textured { without_colours(v) } else { v.clone() };
+        Self {
+            name: name.to_owned(),
+            material: Arc::new(SurfaceMaterial { shape: shape.clone(), visuals: visuals.to_vec() }),
+            baked: visuals.iter().map(baked).collect(),
+            is_textured,
+            voxels,
+        }
     }
 
-    /// Attaches the mesh to the nodes of a soft body.
-    ///
-    /// # Errors
-    /// Part of the surface lies more than two voxels outside `voxels`.
-    pub fn embedded_in(mut self, name: &str, voxels: &VoxelMesh) -> Result<Self, CameraError> {
-        for lod in &mut self.lods {
-            let attach = |p: &V3| {
-                let at: Embedding = voxels.locate(&p.cast())?;
-                Some(NodeWeights {
-                    nodes: voxels.elements[at.element as usize],
-                    weights: at.weights().map(|w| w as f32),
-                })
-            };
-            let embedding: Option<Vec<_>> = lod.positions.iter().map(attach).collect();
-            lod.embedding = embedding.ok_or_else(|| CameraError::Mesh {
-                name: name.to_owned(),
-                reason: "its surface lies outside of its voxel mesh; build both from one shape".to_owned(),
-            })?;
+    /// Builds the level of detail with `cells` along the longest edge.
+    fn level(&self, cells: f64, is_finest: bool) -> Result<Lod, CameraError> {
+        let SurfaceMaterial { shape, visuals } = &*self.material;
+        let cell = shape.bounds().size().max() / cells;
+        let mesh = self.triangulate(cell);
+        let mut material_ids: Vec<u16> =
+            mesh.triangles.iter().map(|t| shape.material(&centroid(&mesh, t))).collect();
+        check_mesh(&self.name, &mesh, &material_ids, visuals)?;
+        if self.baked.iter().all(|visual| *visual == self.baked[0]) {
+            material_ids.fill(0);
         }
-        Ok(self)
+        let mut lod = bake_vertices(&mesh, &material_ids, &self.baked, cell as f32, Some(shape));
+        if !is_finest && (lod.is_uniform || self.is_textured) {
+            lod.geometric_error = geometric_error(&mesh, shape);
+            lod.missing_relief = self.relief();
+        }
+        if self.voxels.is_none() {
+            lod = simplify(&lod, SIMPLIFY_TOLERANCE * lod.vertex_spacing);
+        }
+        if self.is_textured {
+            parameterize(&mut lod, &self.material);
+        }
+        self.embed(lod)
+    }
+
+    fn triangulate(&self, cell: f64) -> Mesh {
+        let shape = &self.material.shape;
+        // Textured faces of rigid shapes need no small triangles.
+        let prefers_primitives = is_revolved(shape) || self.voxels.is_none() && self.is_textured;
+        let primitives = prefers_primitives.then(|| primitive_mesh(shape, cell)).flatten();
+        primitives.unwrap_or_else(|| SurfaceMesh::from_shape(shape, cell).mesh)
+    }
+
+    /// Height of the highest relief, m.
+    fn relief(&self) -> f32 {
+        let layers = self.baked.iter().flat_map(|visual| &visual.layers);
+        layers.map(|layer| layer.relief_m.abs()).fold(0.0, f64::max) as f32
+    }
+
+    /// Attaches a level to the nodes of the soft body.
+    fn embed(&self, lod: Lod) -> Result<Lod, CameraError> {
+        let Some(voxels) = &self.voxels else { return Ok(lod) };
+        let attach = |p: &V3| {
+            let at: Embedding = voxels.locate(&p.cast())?;
+            Some(NodeWeights {
+                nodes: voxels.elements[at.element as usize],
+                weights: at.weights().map(|w| w as f32),
+            })
+        };
+        let embedding: Option<Vec<_>> = lod.positions.iter().map(attach).collect();
+        let outside = || CameraError::Mesh {
+            name: self.name.clone(),
+            reason: "its surface lies outside of its voxel mesh; build both from one shape".to_owned(),
+        };
+        Ok(Lod { embedding: embedding.ok_or_else(outside)?, ..lod })
     }
 }
 
@@ -294,12 +377,14 @@ fn subdivide(mesh: &mut Mesh, max_edge: f64) -> f64 {
     }
 }
 
-/// Distance from the surface of `shape` that a few of the centroids of triangles exceed ([`ERROR_SHARE`]), m. Centroids deeper
-/// than `cell` are ignored: they are hidden by another part of the shape.
-fn geometric_error(mesh: &Mesh, shape: &Shape, cell: f64) -> f32 {
-    let distances = mesh.triangles.iter().map(|t| shape.distance(&centroid(mesh, t)).abs());
-    let mut seen: Vec<f64> = distances.filter(|d| *d < cell).collect();
-    seen.sort_unstable_by(f64::total_cmp);
-    let rank = ((1.0 - ERROR_SHARE) * seen.len() as f64) as usize;
-    seen.get(rank).copied().unwrap_or(0.0) as f32
+/// Distance from the surface of `shape` that a few of the centroids of triangles exceed ([`ERROR_SHARE`]), m. Triangles with
+/// a corner inside the shape do not count: they are hidden by another part of it.
+fn geometric_error(mesh: &Mesh, shape: &Shape) -> f32 {
+    let is_hidden: Vec<bool> =
+        mesh.vertices.iter().map(|v| shape.distance(v) < -HIDDEN_CORNER_DEPTH).collect();
+    let seen = mesh.triangles.iter().filter(|t| t.iter().all(|&v| !is_hidden[v as usize]));
+    let mut distances: Vec<f64> = seen.map(|t| shape.distance(&centroid(mesh, t)).abs()).collect();
+    distances.sort_unstable_by(f64::total_cmp);
+    let rank = ((1.0 - ERROR_SHARE) * distances.len() as f64) as usize;
+    distances.get(rank).copied().unwrap_or(0.0) as f32
 }

@@ -12,10 +12,12 @@
 use std::{cmp::Reverse, collections::BinaryHeap};
 
 use super::lod::Lod;
-use crate::camera::math::V3;
+use crate::camera::{math::V3, shade::pattern::SKY_VISIBILITY};
 
-/// Position, normal and material.
-const DIMENSIONS: usize = 12;
+/// Number of components of position, normal and material.
+const ALL_DIMENSIONS: usize = 12;
+/// Number of those that change over a surface of one material: position, normal and visibility of the sky.
+const UNIFORM_DIMENSIONS: usize = 7;
 /// Deviation of a normal that costs as much as a displacement by the tolerance, rad.
 const NORMAL_TOLERANCE: f64 = 0.15;
 /// Deviation of a material component that costs as much.
@@ -28,31 +30,31 @@ const MIN_TURN_COSINE: f32 = 0.5;
 /// Minimum ratio of twice the area of a triangle to the square of its longest edge after a collapse.
 const MIN_ASPECT: f32 = 0.02;
 
-type Point = [f64; DIMENSIONS];
+type Point<const D: usize> = [f64; D];
 
 /// xᵀ A x + 2 b · x + c: a weighted sum of squared distances from planes.
 #[derive(Clone)]
-struct Quadric {
-    a: [Point; DIMENSIONS],
-    b: Point,
+struct Quadric<const D: usize> {
+    a: [Point<D>; D],
+    b: Point<D>,
     c: f64,
 }
 
-fn dot(a: &Point, b: &Point) -> f64 {
+fn dot<const D: usize>(a: &Point<D>, b: &Point<D>) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Returns `a − scale · b`.
-fn subtract_scaled(a: &Point, b: &Point, scale: f64) -> Point {
+fn subtract_scaled<const D: usize>(a: &Point<D>, b: &Point<D>, scale: f64) -> Point<D> {
     std::array::from_fn(|i| a[i] - b[i] * scale)
 }
 
-impl Quadric {
-    const ZERO: Self = Self { a: [[0.0; DIMENSIONS]; DIMENSIONS], b: [0.0; DIMENSIONS], c: 0.0 };
+impl<const D: usize> Quadric<D> {
+    const ZERO: Self = Self { a: [[0.0; D]; D], b: [0.0; D], c: 0.0 };
 
     /// The squared distance from the plane through three points; `None` if they are collinear.
-    fn from_triangle([p, q, r]: [&Point; 3], weight: f64) -> Option<Self> {
-        let normalized = |v: Point| {
+    fn from_triangle([p, q, r]: [&Point<D>; 3], weight: f64) -> Option<Self> {
+        let normalized = |v: Point<D>| {
             let length = dot(&v, &v).sqrt();
             (length > 1e-12).then(|| v.map(|x| x / length))
         };
@@ -76,7 +78,7 @@ impl Quadric {
         self.c += other.c;
     }
 
-    fn cost(&self, x: &Point) -> f64 {
+    fn cost(&self, x: &Point<D>) -> f64 {
         let square: f64 = self.a.iter().zip(x).map(|(row, xi)| xi * dot(row, x)).sum();
         (square + 2.0 * dot(&self.b, x) + self.c).max(0.0)
     }
@@ -94,10 +96,10 @@ struct Collapse {
 }
 
 /// A mesh while it loses vertices.
-struct Simplifier<'a> {
+struct Simplifier<'a, const D: usize> {
     lod: &'a Lod,
-    points: Vec<Point>,
-    quadrics: Vec<Quadric>,
+    points: Vec<Point<D>>,
+    quadrics: Vec<Quadric<D>>,
     triangles: Vec<[u32; 3]>,
     is_alive: Vec<bool>,
     /// Triangles adjacent to each vertex.
@@ -107,37 +109,30 @@ struct Simplifier<'a> {
     /// Number of changes of each vertex's quadric.
     revisions: Vec<u32>,
     queue: BinaryHeap<Reverse<Collapse>>,
+    /// Collapses that cost more are not queued.
+    max_cost: f64,
 }
 
 /// Returns a level of detail with as few triangles as look the same within `tolerance`, m.
 pub(crate) fn simplify(lod: &Lod, tolerance: f32) -> Lod {
-    let mut simplifier = Simplifier::new(lod, f64::from(tolerance));
-    let max_cost = MAX_COST * f64::from(tolerance).powi(2);
-    for v in 0..lod.positions.len() as u32 {
-        simplifier.queue_collapses(v);
+    if lod.is_uniform {
+        Simplifier::<UNIFORM_DIMENSIONS>::new(lod, f64::from(tolerance)).run(tolerance)
+    } else {
+        Simplifier::<ALL_DIMENSIONS>::new(lod, f64::from(tolerance)).run(tolerance)
     }
-    while let Some(Reverse(Collapse { cost_bits, from, to, revision })) = simplifier.queue.pop() {
-        if f64::from_bits(cost_bits) > max_cost {
-            break;
-        }
-        let current = simplifier.revisions[from as usize] + simplifier.revisions[to as usize];
-        if current == revision && simplifier.is_valid(from, to) {
-            simplifier.collapse(from, to);
-        }
-    }
-    simplifier.finish(tolerance)
 }
 
-impl<'a> Simplifier<'a> {
+impl<'a, const D: usize> Simplifier<'a, D> {
     fn new(lod: &'a Lod, tolerance: f64) -> Self {
         let point = |v: usize| {
             let (p, n, material) = (lod.positions[v], lod.normals[v], &lod.materials[v]);
-            let mut x = [0.0; DIMENSIONS];
+            let mut x = [0.0; D];
             for axis in 0..3 {
                 x[axis] = f64::from(p[axis]);
                 x[3 + axis] = f64::from(n[axis]) * tolerance / NORMAL_TOLERANCE;
             }
-            for (x, &value) in x[6..].iter_mut().zip(material) {
+            let first = if D == UNIFORM_DIMENSIONS { SKY_VISIBILITY } else { 0 };
+            for (x, &value) in x[6..].iter_mut().zip(material.iter().skip(first)) {
                 *x = f64::from(value) * tolerance / MATERIAL_TOLERANCE;
             }
             x
@@ -153,6 +148,7 @@ impl<'a> Simplifier<'a> {
             is_pinned: vec![false; count],
             revisions: vec![0; count],
             queue: BinaryHeap::new(),
+            max_cost: MAX_COST * tolerance * tolerance,
         };
         let area = |t: &[u32; 3]| f64::from(simplifier.area_normal(t).norm());
         let mean = lod.triangles.iter().map(area).sum::<f64>() / lod.triangles.len().max(1) as f64;
@@ -168,6 +164,20 @@ impl<'a> Simplifier<'a> {
             simplifier.is_pinned[v] = simplifier.is_at_border(v as u32);
         }
         simplifier
+    }
+
+    /// Collapses edges, the cheapest first.
+    fn run(mut self, tolerance: f32) -> Lod {
+        for v in 0..self.points.len() as u32 {
+            self.queue_collapses(v, |other| other > v);
+        }
+        while let Some(Reverse(Collapse { from, to, revision, .. })) = self.queue.pop() {
+            let current = self.revisions[from as usize] + self.revisions[to as usize];
+            if current == revision && self.is_valid(from, to) {
+                self.collapse(from, to);
+            }
+        }
+        self.finish(tolerance)
     }
 
     /// Normal of a triangle, twice as long as its area.
@@ -189,17 +199,20 @@ impl<'a> Simplifier<'a> {
         self.neighbours(v).chunk_by(|a, b| a == b).any(|same| same.len() != 2)
     }
 
-    /// Queues all collapses along the edges of a vertex.
-    fn queue_collapses(&mut self, v: u32) {
+    /// Queues the collapses along the edges from a vertex to neighbours that are `selected`, in both directions.
+    fn queue_collapses(&mut self, v: u32, selected: impl Fn(u32) -> bool) {
         let mut neighbours = self.neighbours(v);
         neighbours.dedup();
-        for other in neighbours {
+        for other in neighbours.into_iter().filter(|&other| selected(other)) {
             for (from, to) in [(v, other), (other, v)] {
                 if self.is_pinned[from as usize] {
                     continue;
                 }
                 let x = &self.points[to as usize];
                 let cost = self.quadrics[from as usize].cost(x) + self.quadrics[to as usize].cost(x);
+                if cost > self.max_cost {
+                    continue;
+                }
                 let revision = self.revisions[from as usize] + self.revisions[to as usize];
                 self.queue.push(Reverse(Collapse { cost_bits: cost.to_bits(), from, to, revision }));
             }
@@ -244,7 +257,7 @@ impl<'a> Simplifier<'a> {
         self.quadrics[to as usize].add(&quadric);
         self.revisions[from as usize] += 1;
         self.revisions[to as usize] += 1;
-        self.queue_collapses(to);
+        self.queue_collapses(to, |_| true);
     }
 
     fn finish(self, tolerance: f32) -> Lod {
@@ -262,6 +275,7 @@ impl<'a> Simplifier<'a> {
             vertex_spacing: lod.vertex_spacing,
             is_uniform: lod.is_uniform,
             geometric_error: lod.geometric_error + tolerance,
+            missing_relief: lod.missing_relief,
             ..Lod::default()
         }
     }

@@ -19,7 +19,6 @@ use softvt_geometry::Vec3;
 #[derive(Clone, Debug)]
 pub(crate) struct MeshInstance<'a> {
     pub(crate) lod: &'a Lod,
-    pub(crate) charts: &'a [TextureChart],
     pub(crate) posed: Arc<PosedMesh>,
 }
 
@@ -60,7 +59,7 @@ impl<'a> TriangleInterpolator<'a> {
             id,
             barycentric: [b.cross(&c), c.cross(&a), a.cross(&b)],
             corners,
-            chart: lod.chart_ids.get(triangle).map(|&chart| &instance.charts[chart as usize]),
+            chart: lod.chart_ids.get(triangle).map(|&chart| &lod.charts[chart as usize]),
         }
     }
 
@@ -93,8 +92,9 @@ impl<'a> TriangleInterpolator<'a> {
             // In the image, a weight is linear: it vanishes on an edge, and its gradient is normal to that edge.
             let axes: [Vec3; 2] = [lens.right.cast(), lens.down.cast()];
             let gradients = self.barycentric.map(|b| axes.map(|axis| b.dot(&axis)));
-            let distance =
-                |i: usize| -weights[i] * sign / gradients[i][0].hypot(gradients[i][1]).max(f64::MIN_POSITIVE);
+            // A square root rounds alike on every machine; `hypot` does not.
+            let length = |[x, y]: [f64; 2]| (x * x + y * y).sqrt();
+            let distance = |i: usize| -weights[i] * sign / length(gradients[i]).max(f64::MIN_POSITIVE);
             let edge = (1..3).fold(0, |most, i| if distance(i) > distance(most) { i } else { most });
             let [gx, gy] = gradients[edge];
             let step = weights[edge] / (gx * gx + gy * gy).max(f64::MIN_POSITIVE);
@@ -184,5 +184,52 @@ impl ShadingBatch<'_> {
             samples.roughness = mask.select(roughness, samples.roughness);
         }
         samples
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use softvt_scene::Camera;
+
+    fn lens() -> Lens {
+        Lens::new(&Camera { pose: softvt_geometry::Pose::identity(), ..Camera::third_person_table() }, None)
+            .expect("a good camera")
+    }
+
+    /// A triangle whose corners appear at these pixels, 1 m in front of the camera.
+    fn triangle(corners: [[f32; 2]; 3]) -> TriangleInterpolator<'static> {
+        let lens = lens();
+        let corners = corners.map(|[x, y]| {
+            let ray: V3 = lens.ray(x, y).cast();
+            let mut corner = [0.0; ATTRIBUTES];
+            corner[..3].copy_from_slice(ray.as_slice());
+            corner
+        });
+        let [a, b, c] = corners.map(|corner| V3::new(corner[0], corner[1], corner[2]).cast::<f64>());
+        let barycentric = [b.cross(&c), c.cross(&a), a.cross(&b)];
+        TriangleInterpolator { id: 0, barycentric, corners, chart: None }
+    }
+
+    #[test]
+    fn a_pixel_next_to_a_sliver_shows_its_nearest_point_and_not_a_far_corner() {
+        // Clamped barycentric coordinates of a point beside the middle are those of a point far along the sliver.
+        let corners = [[60.0, 100.0], [160.0, 100.0], [150.0, 100.2]];
+        let sliver = triangle(corners);
+        for (x, y) in [(100.0, 99.0), (100.0, 101.0), (130.0, 98.0), (80.0, 103.0)] {
+            let weights = sliver.nearest_weights(&lens(), x, y);
+            let at = |axis: usize| (0..3).map(|i| weights[i] * corners[i][axis]).sum::<f32>();
+            assert!((at(0) - x).abs() < 0.1, "({x}, {y}): the point shown is at {}", at(0));
+            assert!((99.9..=100.3).contains(&at(1)), "({x}, {y}): the point shown is at {}", at(1));
+            assert!(weights.iter().all(|w| *w >= 0.0), "{weights:?}");
+        }
+    }
+
+    #[test]
+    fn a_pixel_inside_a_triangle_shows_the_point_that_its_ray_meets() {
+        let corners = [[40.0, 40.0], [160.0, 60.0], [90.0, 180.0]];
+        let weights = triangle(corners).nearest_weights(&lens(), 97.0, 93.0);
+        let at = [0, 1].map(|axis| (0..3).map(|i| weights[i] * corners[i][axis]).sum::<f32>());
+        assert!((at[0] - 97.0).abs() < 1e-3 && (at[1] - 93.0).abs() < 1e-3, "{at:?}");
     }
 }

@@ -55,9 +55,8 @@ impl MovingShadow {
         view.rigid.clone_into(&mut self.rigid);
         view.links.clone_into(&mut self.links);
         let casters = objects.iter().filter(|o| o.object.casts_shadow && o.object.is_moving());
-        self.map.draw(
-            casters.map(|o| (o.coarsest.posed.positions.as_slice(), o.coarsest.lod.triangles.as_slice())),
-        );
+        self.map
+            .draw(casters.map(|o| (o.caster.posed.positions.as_slice(), o.caster.lod.triangles.as_slice())));
     }
 }
 

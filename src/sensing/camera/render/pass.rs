@@ -19,7 +19,7 @@ use softvt_physics::BodyId;
 
 /// Maximum extent of objects that occlude the sky for others, m; larger ones are floors and walls.
 const MAX_OCCLUDER_EXTENT: f32 = 0.35;
-/// Factor on the bounding radius in the frustum test: finer levels may exceed the coarsest one a little.
+/// Factor on the bounding radius in the frustum test: finer levels may exceed the one that casts shadows a little.
 const BOUNDS_MARGIN: f32 = 1.1;
 
 /// Lowest and highest corner of a bounding box.
@@ -33,15 +33,16 @@ pub(crate) fn bounds_of(points: impl IntoIterator<Item = V3>) -> Bounds {
 /// An object of a scene in the state of an image.
 pub(crate) struct PosedObject<'a> {
     pub(crate) object: &'a RenderObject,
-    pub(crate) coarsest: MeshInstance<'a>,
-    /// Bounds of the coarsest level, world, m.
+    /// The level of detail that casts shadows.
+    pub(crate) caster: MeshInstance<'a>,
+    /// Bounds of this level, world, m.
     pub(crate) bounds: Bounds,
     /// The level of detail that the image shows; `None` if the object is out of view.
     pub(crate) drawn: Option<MeshInstance<'a>>,
 }
 
 impl<'a> PosedObject<'a> {
-    /// Poses the coarsest level of detail, and the one for the distance from the camera.
+    /// Poses the level of detail that casts shadows, and the one for the distance from the camera.
     pub(crate) fn new(
         scene: &'a RenderScene,
         index: usize,
@@ -49,25 +50,28 @@ impl<'a> PosedObject<'a> {
         lens: &Lens,
     ) -> Result<Self, CameraError> {
         let object = &scene.objects[index];
-        let lods = &object.mesh.lods;
+        let mesh = &object.mesh;
         let pose = |level: usize| {
-            let posed = match scene.fixed_meshes[index].get(level) {
-                Some(posed) => posed.clone(),
-                None => Arc::new(PosedMesh::new(object, &lods[level], view)?),
+            let lod = mesh.level(level)?;
+            let posed = if object.is_moving() {
+                Arc::new(PosedMesh::new(object, lod, view)?)
+            } else {
+                scene.fixed_mesh(index, level)?
             };
-            Ok(MeshInstance { lod: &lods[level], charts: &object.mesh.charts, posed })
+            Ok(MeshInstance { lod, posed })
         };
-        let coarsest = pose(lods.len() - 1)?;
-        let bounds @ [low, high] = bounds_of(coarsest.posed.positions.iter().copied());
+        let caster_level = mesh.caster()?;
+        let caster = pose(caster_level)?;
+        let bounds @ [low, high] = bounds_of(caster.posed.positions.iter().copied());
         let (centre, radius) = ((low + high) * 0.5, 0.5 * (high - low).norm());
         let drawn = if lens.may_see(&centre, BOUNDS_MARGIN * radius) {
             let pixel = (lens.depth(&centre) - radius).max(lens.near) / lens.focal;
-            let level = lods.iter().rposition(|lod| lod.is_fine_enough(pixel)).unwrap_or(0);
-            Some(if level + 1 == lods.len() { coarsest.clone() } else { pose(level)? })
+            let level = mesh.coarsest_where(|lod| lod.is_fine_enough(pixel))?;
+            Some(if level == caster_level { caster.clone() } else { pose(level)? })
         } else {
             None
         };
-        Ok(Self { object, coarsest, bounds, drawn })
+        Ok(Self { object, caster, bounds, drawn })
     }
 
     /// True for small objects that cast shadows, except links of articulations.
@@ -84,8 +88,8 @@ impl<'a> PosedObject<'a> {
             return false;
         }
         let mut angle = 0.0_f64;
-        for t in &self.coarsest.lod.triangles {
-            let [a, b, c] = t.map(|v| (self.coarsest.posed.positions[v as usize] - point).cast::<f64>());
+        for t in &self.caster.lod.triangles {
+            let [a, b, c] = t.map(|v| (self.caster.posed.positions[v as usize] - point).cast::<f64>());
             let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
             let denominator = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
             angle += 2.0 * a.dot(&b.cross(&c)).atan2(denominator);

@@ -174,8 +174,7 @@ pub(crate) struct TileResolver<'a, 'p, S> {
     sink: &'p mut S,
     /// Receives depth and segmentation.
     image: &'p mut RenderedImage,
-    /// The triangle that was interpolated last.
-    last: Option<TriangleInterpolator<'a>>,
+    recent: RecentTriangles<'a>,
     batch: ShadingBatch<'a>,
 }
 
@@ -187,7 +186,7 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
         sink: &'p mut S,
         image: &'p mut RenderedImage,
     ) -> Self {
-        Self { pass, rect, samples, sink, image, last: None, batch: ShadingBatch::default() }
+        Self { pass, rect, samples, sink, image, recent: [None; RECENT], batch: ShadingBatch::default() }
     }
 
     /// Resolves all pixels, or only those that show a moving object. Depth and segmentation go to `image` directly.
@@ -248,7 +247,7 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
         let (px, py) = ((self.rect.x + x) as f32 + 0.5, (self.rect.y + y) as f32 + 0.5);
         if id == NO_TRIANGLE {
             self.shade_background(f32x8::splat(px) + LANE_INDEX, f32x8::splat(py), &targets);
-        } else if let Some(triangle) = interpolator(&mut self.last, self.pass, id) {
+        } else if let Some(triangle) = interpolator(&mut self.recent, self.pass, id) {
             let points = triangle.row(self.pass.lens, px, py);
             self.sink.add(self.pass, self.pass.shade(&points), Some(&points), &targets);
         }
@@ -296,7 +295,7 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
             self.shade_background(f32x8::splat(x), f32x8::splat(y), &targets);
             return;
         }
-        if let Some(triangle) = interpolator(&mut self.last, self.pass, id) {
+        if let Some(triangle) = interpolator(&mut self.recent, self.pass, id) {
             let batch = &mut self.batch;
             triangle.push(batch, self.pass.lens, x, y);
             (batch.pixel[batch.count], batch.share[batch.count]) = (pixel as u32, share);
@@ -334,15 +333,22 @@ pub(crate) fn is_all_moving(samples: &TileSamples, first: usize) -> bool {
     (all & u32x8::splat(MOVING_FLAG)).to_bitmask() == 0xFF
 }
 
-/// Prepares triangle `id`, unless it is the last one. `None` if its object is out of view.
+/// Number of prepared triangles that a tile keeps: neighbouring pixels alternate between a few.
+const RECENT: usize = 32;
+
+/// Prepared triangles, by the last bits of their ids.
+type RecentTriangles<'a> = [Option<TriangleInterpolator<'a>>; RECENT];
+
+/// Prepares triangle `id`, unless it is known. `None` if its object is out of view.
 fn interpolator<'m, 'a>(
-    last: &'m mut Option<TriangleInterpolator<'a>>,
+    recent: &'m mut RecentTriangles<'a>,
     pass: &RenderPass<'a>,
     id: u32,
 ) -> Option<&'m TriangleInterpolator<'a>> {
-    if last.as_ref().is_none_or(|triangle| triangle.id != id) {
+    let known = &mut recent[id as usize % RECENT];
+    if known.as_ref().is_none_or(|triangle| triangle.id != id) {
         let instance = pass.objects.get(object_index(id))?.drawn.as_ref()?;
-        *last = Some(TriangleInterpolator::new(instance, pass.lens, id));
+        *known = Some(TriangleInterpolator::new(instance, pass.lens, id));
     }
-    last.as_ref()
+    known.as_ref()
 }

@@ -5,6 +5,8 @@
 //! in the fitted colours already, so only a horizon above that slope counts: a ball shades the ground next to it, not
 //! its own far side.
 
+use std::ops::Range;
+
 use super::visible_surface::VisibleSurface;
 
 /// Share of the light in a full shadow: FOTS's factor (Zhao et al., arXiv 2404.19217, and its code).
@@ -40,7 +42,9 @@ impl Led {
 /// Casts shadows over the window of a surface.
 pub(super) struct ShadowCaster<'a> {
     surface: &'a VisibleSurface,
-    /// Greatest height towards the camera, px.
+    /// Greatest height towards the camera in each row, px.
+    row_heights: Vec<f32>,
+    /// Greatest height of all, px.
     highest: f32,
     /// Pixels per metre of height.
     scale: f32,
@@ -50,50 +54,101 @@ impl<'a> ShadowCaster<'a> {
     /// Shadows of a surface with pixels of edge `pitch`, m.
     pub(super) fn new(surface: &'a VisibleSurface, pitch: f32) -> Self {
         let scale = 1.0 / pitch;
-        let highest = surface.u.iter().fold(0.0_f32, |most, u| most.max(-u)) * scale;
-        Self { surface, highest, scale }
+        let highest = |u: &[f32]| u.iter().fold(0.0_f32, |most, u| most.max(-u)) * scale;
+        let rows = surface.u.chunks(surface.size[0].max(1));
+        Self { surface, row_heights: rows.map(highest).collect(), highest: highest(&surface.u), scale }
     }
 
     /// Dims `light`, the pixels of `row` from column `first` of the window on, by the shadows from `led`.
+    ///
+    /// All rays of the row advance together: their points lie at the same place between the pixels.
     pub(super) fn cast(&self, led: &Led, row: usize, first: usize, light: &mut [f32]) {
-        let width = self.surface.size[0];
-        for (i, light) in light.iter_mut().enumerate() {
-            let here = -self.surface.u[row * width + first + i] * self.scale;
+        let from = row * self.surface.size[0] + first;
+        let here: Vec<f32> =
+            self.surface.u[from..from + light.len()].iter().map(|u| -u * self.scale).collect();
+        let lowest = here.iter().copied().fold(f32::MAX, f32::min);
+        if light.is_empty() || self.highest - lowest <= MIN_RISE {
+            return;
+        }
+        let least = self.own_slopes(led, [first, row], &here);
+        let mut horizon = least.clone();
+        let mut heights = vec![0.0; here.len()];
+        let mut far = 2.0 * STEP;
+        while far * led.elevation_tangent <= self.highest - lowest {
+            let Some(line) = self.line(led, [first, row], far, here.len()) else { break };
+            if line.highest(&self.row_heights) - lowest > far * led.elevation_tangent {
+                let range = line.range.clone();
+                self.sample(&line, &mut heights[range.clone()]);
+                let pixels = horizon[range.clone()].iter_mut().zip(&heights[range.clone()]).zip(&here[range]);
+                pixels.for_each(|((most, height), here)| *most = most.max((height - here) / far));
+            }
+            far += STEP;
+        }
+        for (light, ((horizon, least), here)) in light.iter_mut().zip(horizon.iter().zip(&least).zip(&here)) {
             if self.highest - here > MIN_RISE {
-                *light *= 1.0 - (1.0 - FULL_SHADOW) * self.depth(led, [(first + i) as f32, row as f32], here);
+                *light *= 1.0 - (1.0 - FULL_SHADOW) * ((horizon - least) / PENUMBRA).min(1.0);
             }
         }
     }
 
-    /// Depth of the shadow on a pixel of height `here` (px): 0 in the light to 1 in full shadow.
-    fn depth(&self, led: &Led, from: [f32; 2], here: f32) -> f32 {
-        let reach = (self.highest - here) / led.elevation_tangent;
-        // Slope of the pixel itself, over the first step.
-        let own = (self.height(from, led, STEP).unwrap_or(here) - here) / STEP;
-        let least = led.elevation_tangent.max(own);
-        let mut horizon = least;
-        let mut far = 2.0 * STEP;
-        while far <= reach {
-            let Some(height) = self.height(from, led, far) else { break };
-            horizon = horizon.max((height - here) / far);
-            far += STEP;
+    /// Slope above which the horizon of each pixel counts: that of the light, or the slope of the pixel itself over the
+    /// first step.
+    fn own_slopes(&self, led: &Led, from: [usize; 2], here: &[f32]) -> Vec<f32> {
+        let mut least = vec![led.elevation_tangent; here.len()];
+        if let Some(line) = self.line(led, from, STEP, here.len()) {
+            let range = line.range.clone();
+            let mut heights = vec![0.0; range.len()];
+            self.sample(&line, &mut heights);
+            let pixels = least[range.clone()].iter_mut().zip(&heights).zip(&here[range]);
+            pixels.for_each(|((least, height), here)| *least = least.max((height - here) / STEP));
         }
-        ((horizon - least) / PENUMBRA).min(1.0)
+        least
     }
 
-    /// Height (px) at a distance (px) towards the LED; `None` outside the window.
-    fn height(&self, from: [f32; 2], led: &Led, far: f32) -> Option<f32> {
-        let [x, y] = [0, 1].map(|axis| from[axis] + far * led.direction[axis]);
-        let [width, height] = self.surface.size;
-        if x < 0.0 || y < 0.0 || x >= (width - 1) as f32 || y >= (height - 1) as f32 {
-            return None;
+    /// The points at a distance (px) towards the LED from `count` pixels of a row; `None` if none lies in the window.
+    fn line(&self, led: &Led, [first, row]: [usize; 2], far: f32, count: usize) -> Option<SampleLine> {
+        let [width, height] = self.surface.size.map(|n| n as isize);
+        let offset = led.direction.map(|along| far * along);
+        let whole = offset.map(f32::floor);
+        let [column, row] = [first as isize + whole[0] as isize, row as isize + whole[1] as isize];
+        let (start, end) = ((-column).max(0), (width - 1 - column).min(count as isize));
+        (start < end && (0..height - 1).contains(&row)).then(|| SampleLine {
+            range: start as usize..end as usize,
+            row: row as usize,
+            column: (column + start) as usize,
+            share: [offset[0] - whole[0], offset[1] - whole[1]],
+        })
+    }
+
+    /// Heights (px) at the points of a line.
+    fn sample(&self, line: &SampleLine, heights: &mut [f32]) {
+        let ([tx, ty], width, count) = (line.share, self.surface.size[0], heights.len());
+        let from = line.row * width + line.column;
+        let part = |offset: usize| self.surface.u[from + offset..from + offset + count].iter();
+        let corners = part(0).zip(part(1)).zip(part(width)).zip(part(width + 1));
+        for (height, (((a, b), c), d)) in heights.iter_mut().zip(corners) {
+            let (upper, lower) = (a + tx * (b - a), c + tx * (d - c));
+            *height = -(upper + ty * (lower - upper)) * self.scale;
         }
-        let (i, j) = (x as usize, y as usize);
-        let (tx, ty) = (x - i as f32, y - j as f32);
-        let u = &self.surface.u[j * width + i..];
-        let upper = u[0] + tx * (u[1] - u[0]);
-        let lower = u[width] + tx * (u[width + 1] - u[width]);
-        Some(-(upper + ty * (lower - upper)) * self.scale)
+    }
+}
+
+/// Points between the pixels of two rows, one for each pixel in a range.
+struct SampleLine {
+    /// Pixels whose points lie in the window.
+    range: Range<usize>,
+    /// The upper row.
+    row: usize,
+    /// Column to the left of the first point.
+    column: usize,
+    /// Distance of the points from that column and row, px.
+    share: [f32; 2],
+}
+
+impl SampleLine {
+    /// Greatest height in both rows, px.
+    fn highest(&self, row_heights: &[f32]) -> f32 {
+        row_heights[self.row].max(row_heights[self.row + 1])
     }
 }
 
