@@ -1,7 +1,7 @@
 -- Grasps from above with a known closure: across the object's narrow side or by its rim, where the hand has clearance.
--- SPREAD: largest displacement of an expert's grasp in each horizontal direction, m, so that demonstrations differ.
 local hand = require "experts.hand"
 
+-- SPREAD: largest displacement of an expert's grasp in each horizontal direction, m, so that demonstrations differ.
 local grasp = { SPREAD = 0.0015 }
 
 local STROKE, CASE = hand.STROKE, hand.CASE
