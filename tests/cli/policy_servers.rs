@@ -46,7 +46,8 @@ fn failures_of_servers_have_their_exit_code() {
     let output = project.softvt(&format!("x.lua --policy ws://{free} --policy-timeout 0.3 --out run"));
     assert_eq!((output.code, output.out.as_str()), (3, ""), "{}", output.err);
     assert!(
-        output.err.contains("no policy server at ws://127.0.0.1") && output.err.contains("allow it more time"),
+        output.err.contains("no policy server at ws://127.0.0.1")
+            && output.err.contains("allow it more time"),
         "{}",
         output.err
     );

@@ -233,7 +233,7 @@ fn records_that_contradict_themselves_are_refused_by_name() {
     let merged = || project.message(project.merge("all", &["part_1", "part_2"]));
     for (from, to, problem) in [
         (r#""goal":false"#, r#""goal":true"#, "goal is true, and the outcome is not completed"),
-        (r#""newton_mean":"#, r#""newton_mean":-"#, "newton_mean is -"),
+        (r#","time_s":"#, r#","time_s":-"#, "time_s is -"),
         (r#""d_peak_other":"#, r#""d_peak_gther":"#, "unknown key d_peak_gther"),
     ] {
         let changed = lines.replacen(from, to, 1);
