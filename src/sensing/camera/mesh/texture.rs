@@ -242,9 +242,8 @@ impl TextureChart {
             let values = self.levels[k].sample(u * scale, v * scale, |corner| self.paint(k, corner));
             (0..4).for_each(|c| sum[c] += weight * values[c]);
         }
-        // Textures hold square roots of the albedo.
         let [x, y, z, roughness] = sum;
-        (Vec3x8 { x: x * x, y: y * y, z: z * z }, roughness)
+        (Vec3x8 { x, y, z }, roughness)
     }
 
     /// Paints the tile of a level whose first texel is `corner`.
@@ -253,7 +252,8 @@ impl TextureChart {
         let edge = |level: usize| self.texel * (1_u32 << level) as f32;
         let region = TexelRegion {
             texel: edge(level - finer),
-            filter: edge(level.saturating_sub(2).min(MAX_FILTER_LEVEL)),
+            // A narrower filter would leave gaps between the painted points, and displace borders.
+            filter: edge((level - finer).min(MAX_FILTER_LEVEL)),
             corner: corner.map(|at| at << finer),
             size: self.levels[level].tile_size(corner).map(|n| n << finer),
         };
@@ -502,8 +502,8 @@ impl MipLevel {
         [0, 1].map(|axis| (self.size[axis] - corner[axis]).min(TILE) + 1)
     }
 
-    /// Bilinear interpolation, clamped at the edges; (u, v) in texels. Returns the four bytes scaled to 0..=1. `paint` makes
-    /// the tile whose first texel it is given.
+    /// Bilinear interpolation, clamped at the edges; (u, v) in texels. Returns albedo and roughness. `paint` makes the tile
+    /// whose first texel it is given.
     #[inline(always)]
     fn sample(&self, u: f32x8, v: f32x8, paint: impl Fn([usize; 2]) -> Box<[u32]>) -> [f32x8; 4] {
         let clamped = |x: f32x8, count: usize| {
@@ -528,27 +528,27 @@ impl MipLevel {
                 (corners[2][lane], corners[3][lane]) = (bottom[0], bottom[1]);
             }
         }
-        let fraction = |x: f32x8, i: i32x8| -> u32x8 {
-            cast(((x - f32x8::from_i32x8(i)) * f32x8::splat(256.0)).fast_trunc_int())
-        };
-        blend_bytes(corners.map(u32x8::new), fraction(x, i), fraction(y, j))
+        let fraction = |x: f32x8, i: i32x8| x - f32x8::from_i32x8(i);
+        blend(corners.map(u32x8::new), fraction(x, i), fraction(y, j))
     }
 }
 
-/// Blends four packed texels by fractions in 1/256, two bytes at a time.
+/// Blends four packed texels, bilinearly at `x` and `y` in 0..=1. Albedos are blended themselves, not their stored square roots: that
+/// would shift borders towards the lighter side.
 #[inline(always)]
-fn blend_bytes(corners: [u32x8; 4], x: u32x8, y: u32x8) -> [f32x8; 4] {
-    let both = (x * y) >> 8;
-    let weights = [u32x8::splat(256) - x - y + both, x - both, y - both, both];
-    let mask = u32x8::splat(0x00FF_00FF);
-    let (mut even, mut odd) = (u32x8::ZERO, u32x8::ZERO);
+fn blend(corners: [u32x8; 4], x: f32x8, y: f32x8) -> [f32x8; 4] {
+    let both = x * y;
+    let weights = [f32x8::ONE - x - y + both, x - both, y - both, both];
+    let mask = u32x8::splat(0xFF);
+    let mut sum = [f32x8::ZERO; 4];
     for (texel, weight) in corners.into_iter().zip(weights) {
-        even += (texel & mask) * weight;
-        odd += ((texel >> 8) & mask) * weight;
+        let byte = |texel: u32x8| f32x8::from_i32x8(cast(texel & mask)) * f32x8::splat(1.0 / 255.0);
+        let [r, g, b, roughness] = [byte(texel), byte(texel >> 8), byte(texel >> 16), byte(texel >> 24)];
+        for (sum, value) in sum.iter_mut().zip([r * r, g * g, b * b, roughness]) {
+            *sum += weight * value;
+        }
     }
-    let value = |x: u32x8| f32x8::from_i32x8(cast(x)) * f32x8::splat(1.0 / 65_280.0);
-    let low = u32x8::splat(0xFFFF);
-    [value(even & low), value(odd & low), value(even >> 16), value(odd >> 16)]
+    sum
 }
 
 #[cfg(test)]
