@@ -128,21 +128,23 @@ pub(crate) fn eprint_notice(message: impl std::fmt::Display) {
     text::eprint_line(&text::escape_control(&format!("softvt: {message}")));
 }
 
-/// Time after which a user is told what takes so long, if there is no terminal that shows it at once.
+/// Delay before a notice says what is being done, where there is no terminal.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// Period with which a terminal shows the elapsed time anew.
+/// Interval at which a terminal redraws the elapsed time.
 const TICK: Duration = Duration::from_millis(200);
 
 /// Says on standard error what is being done: at once on a terminal, where the line disappears when this is dropped, and after
 /// [`PATIENCE`] elsewhere.
-pub(crate) enum Activity {
+enum Activity {
     Spinner(ProgressBar),
     /// Its thread ends when this is dropped.
-    Delayed(#[allow(dead_code, reason = "dropped to end the thread")] Sender<()>),
+    Delayed {
+        _end: Sender<()>,
+    },
 }
 
 impl Activity {
-    pub(crate) fn new(what: &str) -> Self {
+    fn new(what: &str) -> Self {
         if io::stderr().is_terminal() {
             let spinner = ProgressBar::new_spinner().with_message(text::escape_control(what).into_owned());
             if let Ok(style) = ProgressStyle::with_template("{msg}  {elapsed} elapsed") {
@@ -158,7 +160,7 @@ impl Activity {
                 eprint_notice(what);
             }
         });
-        Self::Delayed(end)
+        Self::Delayed { _end: end }
     }
 }
 

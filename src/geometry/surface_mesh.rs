@@ -276,7 +276,7 @@ struct EdgeCrossings<'a> {
     found: HashMap<[usize; 2], EdgeCrossing>,
 }
 
-/// What is known of the crossing of the surface with an edge.
+/// The crossing of the surface with an edge, as far as it was computed.
 struct EdgeCrossing {
     /// The field at the linear crossing.
     linear: SignedDistance,

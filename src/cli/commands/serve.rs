@@ -14,7 +14,7 @@ use crate::{
     QUIET_INTERRUPT,
     args::{PolicyArgs, Request, ScriptArgs, parse_count, parse_folder},
     error::{CliError, Exit},
-    output::{Activity, eprint_notice, print},
+    output::{eprint_notice, print},
 };
 use softvt_common::{
     cancel::{self, CancelFlag},
@@ -137,9 +137,9 @@ fn serve(args: ServeArgs) -> Result<(), CliError> {
     let served;
     let access = AccessRules::new(&args.host, address, token(&args)?);
     let mut server_config = server_config(&run, &runs, access)?;
-    let activity = Activity::new("rendering the first observation");
+    config.observer.work("rendering the first observation");
     let first = first_observation(config, &server_config)?;
-    drop(activity);
+    config.observer.end();
     served = config.out.as_ref().map(|_| ServedRuns::open(config, &runs)).transpose()?;
     server_config.recorder = served.as_ref().map(ServedRuns::recorder);
     let hello = softvt_serve::hello(&server_config, &first);

@@ -7,7 +7,7 @@ use clap::Args;
 use crate::{
     args::{PolicyArgs, Request, ScriptArgs, parse_folder},
     error::CliError,
-    output::{Activity, Progress, print},
+    output::{Progress, print},
 };
 use softvt_benchmark::Plan;
 use softvt_common::cancel;
@@ -69,20 +69,20 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     let run = SuiteRun::new(&config, &loaded, suite, EpisodeList::listed(vec![job]), dir.clone())?;
     let run = run.rendered().prepare()?;
     files::create_folder(dir)?;
-    let activity = Activity::new("simulating the episode");
+    config.observer.work("simulating the episode");
     let finished = run.run_episode(job, true, &run.controllers)?;
-    drop(activity);
+    config.observer.end();
     let caption = Caption::new(&finished.record);
     let Some(mut states) = finished.recording else { return Ok(()) };
     let last = states.frames.len().saturating_sub(1);
     let worst = worst_state(&states);
     let moments = [("start", 0), ("worst", worst), ("end", last)];
-    let activity = Activity::new("drawing the stills");
+    config.observer.work("drawing the stills");
     let mut written = write_stills(&mut states, &moments, args.full_size, dir, cancel::requested)?;
     let still = dir.join("episode.png");
     write_video_frame(&mut states, &caption, worst, &still)?;
     written.push(still);
-    drop(activity);
+    config.observer.end();
     let video = dir.join("episode.mp4");
     let progress = Progress::new(states.frames.len(), "rendering the video");
     write_video(&mut states, &caption, &video, config.thread_count(), cancel::requested, || progress.step())?;

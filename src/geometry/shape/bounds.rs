@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use super::{
     combine::SignedDistance,
     displacement::SurfaceRelief,
-    tree::{Shape, to_local},
+    tree::{Shape, to_local, without_parts},
     warp::Axis,
 };
 use crate::{Aabb, Vec3};
@@ -143,15 +143,7 @@ impl Shape {
             Self::Displace { shape, reliefs } => shape
                 .loose_bounds()
                 .loosened(1.5 * reliefs.iter().map(SurfaceRelief::max_height).sum::<f64>()),
-            Self::Box { .. }
-            | Self::Sphere { .. }
-            | Self::Ellipsoid { .. }
-            | Self::Capsule { .. }
-            | Self::Cylinder { .. }
-            | Self::Torus { .. }
-            | Self::Prism { .. }
-            | Self::Lathe(_)
-            | Self::Mesh(_) => self.bounds(),
+            without_parts!() => self.bounds(),
         }
     }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{
-    tree::{Shape, to_local},
+    tree::{Shape, to_local, without_parts},
     warp,
 };
 use crate::Vec3;
@@ -32,15 +32,7 @@ impl Shape {
                     shape.material(p_o)
                 }
             }
-            Self::Box { .. }
-            | Self::Sphere { .. }
-            | Self::Ellipsoid { .. }
-            | Self::Capsule { .. }
-            | Self::Cylinder { .. }
-            | Self::Torus { .. }
-            | Self::Prism { .. }
-            | Self::Lathe(_)
-            | Self::Mesh(_) => 0,
+            without_parts!() => 0,
         }
     }
 
@@ -69,15 +61,7 @@ impl Shape {
             Self::Displace { shape, reliefs } => {
                 Self::Displace { shape: arc(shape), reliefs: reliefs.clone() }
             }
-            Self::Box { .. }
-            | Self::Sphere { .. }
-            | Self::Ellipsoid { .. }
-            | Self::Capsule { .. }
-            | Self::Cylinder { .. }
-            | Self::Torus { .. }
-            | Self::Prism { .. }
-            | Self::Lathe(_)
-            | Self::Mesh(_) => self.clone(),
+            without_parts!() => self.clone(),
         }
     }
 

@@ -160,6 +160,23 @@ pub enum Shape {
     },
 }
 
+/// The pattern of the shapes that have no parts. A match that lists it in place of `_` does not compile once a shape with parts
+/// is added.
+macro_rules! without_parts {
+    () => {
+        Self::Box { .. }
+            | Self::Sphere { .. }
+            | Self::Ellipsoid { .. }
+            | Self::Capsule { .. }
+            | Self::Cylinder { .. }
+            | Self::Torus { .. }
+            | Self::Prism { .. }
+            | Self::Lathe(_)
+            | Self::Mesh(_)
+    };
+}
+pub(super) use without_parts;
+
 impl Shape {
     /// A box with edge lengths `size`, m.
     pub fn cuboid(size: Vec3) -> Self {
@@ -329,15 +346,7 @@ impl Shape {
             Self::Union(parts) | Self::Intersect(parts) | Self::SmoothUnion { parts, .. } => {
                 parts.iter().collect()
             }
-            Self::Box { .. }
-            | Self::Sphere { .. }
-            | Self::Ellipsoid { .. }
-            | Self::Capsule { .. }
-            | Self::Cylinder { .. }
-            | Self::Torus { .. }
-            | Self::Prism { .. }
-            | Self::Lathe(_)
-            | Self::Mesh(_) => Vec::new(),
+            without_parts!() => Vec::new(),
         }
     }
 

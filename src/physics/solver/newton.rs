@@ -458,7 +458,7 @@ fn evaluate(
     cost
 }
 
-/// Where the slope of the cost vanishes between two points of a line, each with its slope, if it is linear there.
+/// Root of the linear interpolation of the slope of the cost between two points `(position, slope)` of a line.
 ///
 /// The slope of a convex cost grows monotonically, so this is nearer to the minimum than the middle; it keeps a tenth of
 /// the bracket from either end.

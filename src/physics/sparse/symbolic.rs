@@ -32,7 +32,7 @@ pub(super) struct Front {
     pub rows: Vec<u32>,
     /// Children in the order in which they were eliminated.
     pub children: Vec<usize>,
-    /// Where the rows beyond the pivots are among the rows of the parent.
+    /// Indices of the rows beyond the pivots in the rows of the parent.
     pub into_parent: Vec<Run>,
     /// Offset of the panel `L` (3·rows × 3·pivots, column-major) in the factor.
     pub offset: usize,
