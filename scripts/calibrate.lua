@@ -187,7 +187,7 @@ return softvt.experiment {
   run = run,
   finish = finish,
   columns = {
-    "asset", "kind", "width_mm", "closure", "held", "trials", "d_peak_pct", "stable", "d_pct", "force_n", "strain_p95", "min_det_f", "node_speed_m_s",
+    "asset", "kind", "width_mm", "closure", "held", "trials", "d_peak_pct", "stable", "d_pct", "d_v1_pct", "force_n", "strain_p95", "min_det_f", "node_speed_m_s",
     "both_pads", "slip_mm", "scale", "youngs_factor", "ended",
   },
 }

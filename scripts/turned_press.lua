@@ -108,7 +108,7 @@ local function measure(bench)
   local mm = bench.diagonal_mm / 100
   return {
     width_mm = 1e3 * bench.width, depth_mm = 1e3 * (bench.nominal - bench.width), force_n = 0.5 * (bench.body:force(a) + bench.body:force(b)),
-    d_pct = d.rms_pct, d_mm = d.rms_pct * mm, weighted_mm = d.weighted_pct * mm, max_mm = d.max_pct * mm,
+    d_pct = d.rms_pct, d_mm = d.rms_pct * mm, v1_mm = d.v1_rms_pct * mm, max_mm = d.max_pct * mm,
     strain_p95 = bench.body:strain_percentile(95), strain_p99 = bench.body:strain_percentile(99),
     slip_mm = math.max(bench.body:slip_mm(a), bench.body:slip_mm(b)),
     shear_n = math.max(bench.body:shear(a), bench.body:shear(b)),
@@ -173,7 +173,7 @@ return softvt.experiment {
   end,
   run = run,
   columns = {
-    "asset", "pads", "resolution", "equal", "share", "turn", "force_n", "depth_mm", "d_pct", "d_mm", "weighted_mm", "max_mm", "strain_p95",
+    "asset", "pads", "resolution", "equal", "share", "turn", "force_n", "depth_mm", "d_pct", "d_mm", "v1_mm", "max_mm", "strain_p95",
     "strain_p99", "slip_mm", "shear_n", "diagonal_mm",
   },
 }

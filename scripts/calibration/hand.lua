@@ -120,7 +120,7 @@ local function squeeze(sim, closure)
   end
   if not ok then return nil end
   local seen = sim:measure "object"
-  row.width_mm, row.d_pct = 1e3 * seen.width_m, seen.d_peak_pct
+  row.width_mm, row.d_pct, row.d_v1_pct = 1e3 * seen.width_m, seen.d_peak_pct, seen.d_peak_v1_pct
   row.force_n = 0.5 * (seen.pad_force[1] + seen.pad_force[2])
   row.slip_mm = math.max(table.unpack(seen.slip_mm))
   row.stable = softvt.stable(row)

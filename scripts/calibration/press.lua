@@ -148,8 +148,9 @@ end
 local function squeeze(bench, width)
   local fastest = bench:close_to(width, CLOSING) and bench:rest(REST_SPEED, REST_S)
   if not fastest then return nil end
+  local d = bench.body:deformation()
   local row = {
-    width_mm = in_mm(width), d_pct = bench.body:deformation().rms_pct, force_n = 0.5 * (bench:force(1) + bench:force(2)),
+    width_mm = in_mm(width), d_pct = d.rms_pct, d_v1_pct = d.v1_rms_pct, force_n = 0.5 * (bench:force(1) + bench:force(2)),
     strain_p95 = bench.body:strain_percentile(PERCENTILE), min_det_f = bench.min_det_f, node_speed_m_s = fastest,
     both_pads = bench:both_touch(), slip_mm = bench:slip_mm(), stable = false,
   }

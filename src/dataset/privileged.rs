@@ -1,6 +1,9 @@
 //! Ground-truth streams: shapes, forces, contact and deformation, which no real robot could measure.
 
-use softvt_evaluation::{deformation::METRIC_ID, judge::ControlStepScore};
+use softvt_evaluation::{
+    deformation::{METRIC_ID, V1_METRIC_ID},
+    judge::ControlStepScore,
+};
 use softvt_geometry::Vec3;
 use softvt_policy::PadForce;
 use softvt_rollout::{BodyConfiguration, FinishedEpisode, Sensors, StateRecording, StepTrace};
@@ -77,17 +80,18 @@ fn deformation(finished: &FinishedEpisode) -> Vec<DataStream> {
         shifted(scores, vec![0.0], |score| vec![pick(score).unwrap_or(f64::NAN)])
     };
     let size = |f: &ControlStepScore| {
-        f.deformation.map_or(vec![f64::NAN; 3], |d| d.bbox_m.iter().copied().collect())
+        f.deformation_v1.map_or(vec![f64::NAN; 3], |d| d.bbox_m.iter().copied().collect())
     };
-    let percent = |name: &str, numbers| {
-        DataStream::f64(format!("privileged/soft_extras/{name}"), &[], numbers)
+    let percent = |name: &str, metric: &str, numbers| {
+        DataStream::f64(format!("privileged/{name}"), &[], numbers)
             .unit("% of the settled bounding box's diagonal", "")
-            .attribute("metric_id", METRIC_ID)
+            .attribute("metric_id", metric)
             .attribute("meaning", "worst over the physics steps of the control step before")
     };
     vec![
-        percent("fem_deformation_rms", of(&|f| Some(f.deformation?.rms_pct))),
-        percent("fem_deformation_max", of(&|f| Some(f.deformation?.max_pct))),
+        percent("d", METRIC_ID, of(&|f| Some(f.deformation?.rms_pct))),
+        percent("d_max", METRIC_ID, of(&|f| Some(f.deformation?.max_pct))),
+        percent("soft_extras/fem_deformation_rms", V1_METRIC_ID, of(&|f| Some(f.deformation_v1?.v1_rms_pct))),
         DataStream::f64(
             "privileged/soft_extras/fem_bbox_dims",
             &[3],

@@ -69,7 +69,7 @@ pub fn column_statistics(paths: &[impl AsRef<Path>]) -> Result<Vec<ColumnStatist
             }
             peaks.extend(file.record(demo).ok().and_then(|record| record.verdict.d_peak));
             // Missing for rigid targets and without privileged streams.
-            if let Ok(d) = file.array(demo, "privileged/soft_extras/fem_deformation_rms") {
+            if let Ok(d) = file.array(demo, "privileged/d") {
                 soft.extend(d.values);
             }
         }

@@ -76,6 +76,9 @@ pub struct SweepRow {
     pub closure: Option<f64>,
     /// D at rest in the press, peak D with the robot's hand, %.
     pub d_pct: f64,
+    /// The same by SoftVTBench's definition of D, %; for its files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub d_v1_pct: Option<f64>,
     /// Mean normal force per pad at rest, N.
     pub force_n: f64,
     /// Compressive strain that 95 % of the volume stays below; only in the press.
@@ -167,6 +170,9 @@ pub struct Envelope {
     pub censored: Option<String>,
     /// D_ref, %; null without a stable squeeze.
     pub d_ref_pct: Option<f64>,
+    /// D_ref by SoftVTBench's definition of D, at the same width, %.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub d_ref_v1_pct: Option<f64>,
     /// Width at D_ref, mm.
     pub width_at_d_ref_mm: Option<f64>,
     /// Widest width at which both pads touched, mm.
@@ -188,6 +194,7 @@ pub struct Envelope {
 /// D_ref of a sweep, with its width.
 struct Reference {
     d_pct: f64,
+    d_v1_pct: Option<f64>,
     width_mm: f64,
 }
 
@@ -216,6 +223,7 @@ impl Envelope {
             stable_strain,
             censored,
             d_ref_pct: limit.map(|limit| limit.d_ref_pct),
+            d_ref_v1_pct: reference.as_ref().and_then(|found| found.d_v1_pct).map(round_to_six_decimals),
             width_at_d_ref_mm: reference.map(|found| round_to_six_decimals(found.width_mm)),
             width_contact_mm: sweep.iter().find(|row| row.both_pads).map(|row| row.width_mm),
             carried_d_pct: carried(&holds)
@@ -263,6 +271,7 @@ fn reference_at_strain(sweep: &[SweepRow], strain: f64) -> Option<Reference> {
     let between = |from: f64, to: f64| from + share * (to - from);
     Some(Reference {
         d_pct: between(before.d_pct, after.d_pct),
+        d_v1_pct: before.d_v1_pct.zip(after.d_v1_pct).map(|(from, to)| between(from, to)),
         width_mm: between(before.width_mm, after.width_mm),
     })
 }
@@ -271,7 +280,7 @@ fn reference_at_strain(sweep: &[SweepRow], strain: f64) -> Option<Reference> {
 fn largest_stable(sweep: &[SweepRow]) -> Option<Reference> {
     let stable = sweep.iter().filter(|row| row.stable && row.d_pct.is_finite());
     let largest = stable.max_by(|a, b| a.d_pct.total_cmp(&b.d_pct))?;
-    Some(Reference { d_pct: largest.d_pct, width_mm: largest.width_mm })
+    Some(Reference { d_pct: largest.d_pct, d_v1_pct: largest.d_v1_pct, width_mm: largest.width_mm })
 }
 
 /// True if 5 % of the volume is beyond the stable strain in a row.
@@ -359,6 +368,7 @@ pub(crate) mod tests {
             width_mm,
             closure: None,
             d_pct,
+            d_v1_pct: Some(1.2 * d_pct),
             force_n: 0.5 * (50.0 - width_mm),
             strain_p95: Some(0.1 * d_pct),
             min_det_f: 0.6,
@@ -389,7 +399,7 @@ pub(crate) mod tests {
     #[test]
     fn the_reference_is_interpolated_where_the_strain_reaches_the_stable_strain() {
         let envelope = Envelope::new(scans(48.0), 0.5);
-        assert_eq!(envelope.d_ref_pct, Some(3.0));
+        assert_eq!((envelope.d_ref_pct, envelope.d_ref_v1_pct), (Some(3.0), Some(3.6)));
         assert!((envelope.width_at_d_ref_mm.unwrap() - 44.5).abs() < 1e-12);
         assert_eq!(envelope.censored, None);
         let window = envelope.window;

@@ -1,7 +1,7 @@
 //! Threshold files: τ and D_ref per asset, as JSON with the fields of SoftVTBench and some of our own.
 //!
-//! A file holds one asset (`assets/calibration/*.json`) or many (`softvtbench/` of a run). Released SoftVTBench files have
-//! version 1 of the layout, without `envelopes`, `fingerprints` and `calibration.protocol`; they are read as well.
+//! A file holds one asset (`assets/calibration/*.json`) or many. [`ThresholdFile::released`] is the file of SoftVTBench's
+//! scorer, of version 1 of the layout and of SoftVTBench's definition of D; its limits hold for no other, so it is not read.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     calibration::{Envelope, Protocol},
-    deformation::METRIC_ID,
+    deformation::{METRIC_ID, V1_METRIC_ID},
     safety::{DeformationLimit, round_to_six_decimals},
 };
 
@@ -78,7 +78,7 @@ pub struct ThresholdFile {
     pub schema_version: u32,
     /// Must be [`PROTOCOL_ID`].
     pub protocol_id: String,
-    /// Must be [`METRIC_ID`].
+    /// [`METRIC_ID`], or [`V1_METRIC_ID`] in released files.
     pub metric_id: String,
     /// Provenance of the thresholds.
     pub calibration: CalibrationInfo,
@@ -158,16 +158,32 @@ impl ThresholdFile {
         self.calibration.sources.extend(other.calibration.sources);
     }
 
-    /// The same in the layout of SoftVTBench.
+    /// The same in the layout of SoftVTBench, with limits on its D. Assets without one are left out.
     pub fn released(&self) -> Self {
-        let calibration = CalibrationInfo { protocol: None, ..self.calibration.clone() };
-        let schema_version = RELEASED_SCHEMA_VERSION;
-        Self { schema_version, calibration, envelopes: BTreeMap::new(), ..self.clone() }
+        let threshold = |(asset, ours): (&String, &AssetThreshold)| {
+            let limit = self.v1_limit(asset)?;
+            let (tau, d_ref) = (limit.tau_pct(), limit.d_ref_pct);
+            Some((asset.clone(), AssetThreshold { tau, d_ref, ..ours.clone() }))
+        };
+        Self {
+            schema_version: RELEASED_SCHEMA_VERSION,
+            metric_id: V1_METRIC_ID.into(),
+            calibration: CalibrationInfo { protocol: None, ..self.calibration.clone() },
+            thresholds: self.thresholds.iter().filter_map(threshold).collect(),
+            envelopes: BTreeMap::new(),
+            ..self.clone()
+        }
     }
 
     /// Deformation limit of `asset`, if it is calibrated.
     pub fn limit(&self, asset: &str) -> Option<DeformationLimit> {
         self.thresholds.get(asset).map(|t| DeformationLimit { d_ref_pct: t.d_ref, kappa: t.kappa })
+    }
+
+    /// Limit of `asset` on D of SoftVTBench's definition, if it is calibrated: it ends at the same width.
+    pub fn v1_limit(&self, asset: &str) -> Option<DeformationLimit> {
+        let d_ref_pct = self.envelopes.get(asset)?.d_ref_v1_pct?;
+        self.thresholds.get(asset).map(|t| DeformationLimit { d_ref_pct, kappa: t.kappa })
     }
 
     /// Parses the text of a threshold file; `path` names it in errors.
@@ -177,14 +193,12 @@ impl ThresholdFile {
     pub fn parse(text: &str, path: &str) -> Result<Self, ThresholdError> {
         let json = |source| ThresholdError::Json { path: path.into(), source };
         let value: serde_json::Value = serde_json::from_str(text).map_err(json)?;
-        let version = value.get("schema_version").and_then(serde_json::Value::as_u64);
-        let is_released = version == Some(RELEASED_SCHEMA_VERSION.into()) && value.get("envelopes").is_none();
-        if let Some(version) = version.filter(|_| !is_released) {
-            check_equal(path, "schema_version", &version.to_string(), &SCHEMA_VERSION.to_string())?;
-        }
         // First of all: for a file of another metric the error should say that, not that some field is missing.
         if let Some(metric) = value.get("metric_id").and_then(|m| m.as_str()) {
             check_equal(path, "metric_id", metric, METRIC_ID)?;
+        }
+        if let Some(version) = value.get("schema_version").and_then(serde_json::Value::as_u64) {
+            check_equal(path, "schema_version", &version.to_string(), &SCHEMA_VERSION.to_string())?;
         }
         let file: Self = serde_json::from_value(value).map_err(json)?;
         file.validate(path)?;
@@ -262,7 +276,7 @@ fn check_equal(path: &str, field: &'static str, got: &str, expected: &str) -> Re
     })
 }
 
-/// `<asset>.sweep.jsonl`: the sweep rows of an asset in the fields of SoftVTBench's sweeps, and more. `closure` is the
+/// `<asset>.sweep.jsonl`: the sweep rows of an asset in the fields of SoftVTBench's sweeps, and more: `d_peak` is D of its definition, `d_pct` the scored one. `closure` is the
 /// commanded one of the robot's hand, 0 open and 1 closed; in SoftVTBench's files it is the opening, 1 open and 0 closed.
 pub fn sweep_jsonl(asset: &str, envelope: &Envelope) -> String {
     let rows = envelope.sweep.iter().enumerate().map(|(level, row)| {
@@ -271,7 +285,8 @@ pub fn sweep_jsonl(asset: &str, envelope: &Envelope) -> String {
             "level": level,
             "gripper_width_mm": row.width_mm,
             "closure": row.closure,
-            "d_peak": row.d_pct,
+            "d_peak": row.d_v1_pct,
+            "d_pct": row.d_pct,
             "force_n": row.force_n,
             "strain_p95": row.strain_p95,
             "stable": row.stable,
@@ -311,17 +326,6 @@ mod tests {
         assert_eq!(file.limit("bun").unwrap().tau_pct(), 0.166667);
         assert_eq!(file.limit("bread"), None);
         assert_eq!(file.thresholds["bun"].n_stable_trials, 2);
-    }
-
-    #[test]
-    fn a_released_file_without_envelopes_is_read() {
-        let text = r#"{"schema_version":1,"protocol_id":"softvtbench-v1",
-            "metric_id":"fem_rms_rigid_aligned_bbox_pct_v1","metric":"in words",
-            "calibration":{"method":"compression_sweep","definition":"d","kappa":0.5,"sources":[],
-            "generated_at":"2026-07-19T14:47:17Z"},
-            "thresholds":{"soft_a":{"tau":1.179545,"d_ref":2.359091,"kappa":0.5,"n_stable_trials":16}}}"#;
-        let file = ThresholdFile::parse(text, "released.json").unwrap();
-        assert_eq!(file.limit("soft_a"), Some(DeformationLimit { d_ref_pct: 2.359091, kappa: 0.5 }));
     }
 
     #[test]
@@ -379,11 +383,14 @@ mod tests {
     }
 
     #[test]
-    fn the_released_layout_has_neither_envelopes_nor_a_protocol() {
+    fn the_released_file_has_its_limits_on_the_d_of_softvtbench_and_is_not_read() {
         let released = file().released();
         let text = released.to_text();
         assert!(!text.contains("envelopes") && !text.contains("protocol\":"), "{text}");
-        assert_eq!(ThresholdFile::parse(&text, "thresholds.json").unwrap(), released);
+        let (bun, limit) = (&released.thresholds["bun"], file().v1_limit("bun").unwrap());
+        assert_eq!((bun.d_ref, bun.tau, limit.tau_pct()), (0.4, 0.2, 0.2));
+        let refused = ThresholdFile::parse(&text, "thresholds.json").unwrap_err().to_string();
+        assert!(refused.starts_with(&format!("thresholds.json: metric_id is {V1_METRIC_ID:?}")), "{refused}");
     }
 
     #[test]

@@ -115,8 +115,8 @@ pub struct Verdict {
     pub slip_mm: f64,
     /// Peak D of the target, %; null for a rigid one.
     pub d_peak: Option<f64>,
-    /// Peak mass-weighted D of the target, %.
-    pub d_peak_weighted: Option<f64>,
+    /// Peak of the target's D as SoftVTBench's released code defines it, %: all nodes alike, along the world's axes.
+    pub d_peak_v1: Option<f64>,
     /// Peak of the largest node displacement of the target, %.
     pub d_peak_max: Option<f64>,
     /// Mean D of the target over all physics steps, %.

@@ -208,7 +208,7 @@ pub(crate) mod tests {
     #[test]
     fn a_record_is_one_line_and_comes_back_bit_for_bit() {
         let mut record = sample();
-        record.verdict.d_peak_weighted = Some(0.1 + 0.2);
+        record.verdict.d_peak_v1 = Some(0.1 + 0.2);
         record.outcome = Outcome::Invalid { reason: InvalidReason::Inverted, step: 77, node: None };
         let line = serde_json::to_string(&record).unwrap();
         assert!(!line.contains('\n'));

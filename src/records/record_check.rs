@@ -67,7 +67,7 @@ impl EpisodeRecord {
             ("least_pad_force_n", v.least_pad_force_n),
             ("goal_time_s", v.goal_time_s),
             ("d_peak", v.d_peak),
-            ("d_peak_weighted", v.d_peak_weighted),
+            ("d_peak_v1", v.d_peak_v1),
             ("d_peak_max", v.d_peak_max),
             ("d_mean", v.d_mean),
             ("d_final", v.d_final),

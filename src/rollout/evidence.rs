@@ -52,7 +52,7 @@ impl EvidenceCollector {
             .map(|object| match object.body {
                 BodyId::Soft(index) => {
                     let body = &sim.world.soft(index).state;
-                    ReferenceShape::new(&body.x, &body.model.mass).ok()
+                    ReferenceShape::new(&body.x, &body.model.mass).ok().map(|shape| shape.along(&body.frame))
                 }
                 _ => None,
             })

@@ -103,7 +103,7 @@ impl CalibrationFiles {
             return Ok(Err(MissingLimit::NotCalibrated { path: relative_path(&asset.name) }));
         };
         let path = file.path.clone();
-        // The published files of SoftVTBench have no fingerprint; they are assumed to fit.
+        // A file without a fingerprint is assumed to fit.
         let calibrated = file.thresholds.fingerprints.get(&asset.name);
         if calibrated.is_some_and(|calibrated| *calibrated != asset.fingerprint()) {
             return Ok(Err(MissingLimit::OtherVersion { path }));

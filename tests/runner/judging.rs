@@ -104,7 +104,7 @@ fn objects_are_supported_by_what_they_rest_on() {
 /// The calibration of a cube with a fingerprint.
 fn calibration(fingerprint: &str) -> String {
     format!(
-        r#"{{"schema_version":1,"protocol_id":"softvtbench-v1","metric_id":"fem_rms_rigid_aligned_bbox_pct_v1",
+        r#"{{"schema_version":2,"protocol_id":"softvtbench-v1","metric_id":"fem_volume_rms_rigid_aligned_object_bbox_pct_v1",
         "calibration":{{"method":"compression_sweep","definition":"d","kappa":0.5,"sources":[],"generated_at":"x"}},
         "thresholds":{{"cube":{{"tau":1.0,"d_ref":2.0,"kappa":0.5,"n_stable_trials":3}}}},
         "fingerprints":{{"cube":"{fingerprint}"}}}}"#

@@ -1,7 +1,7 @@
 //! FEM-RMS deformation D: distance of a soft body from its reference shape after removal of the rigid motion.
 //!
 //! With nodes `xᵢ` now and `Xᵢ` in the reference shape, weights `wᵢ`, weighted means `c` and `C`, and the diagonal
-//! `d` of the reference's axis-aligned bounding box in the frame in which its nodes were given:
+//! `d` of the reference's bounding box along the axes of the object's frame ([`ReferenceShape::along`]):
 //!
 //! `D = 100 % · sqrt( Σ wᵢ |xᵢ − c − R (Xᵢ − C)|² / Σ wᵢ ) / d`
 //!
@@ -10,8 +10,10 @@
 //! optimum as the SVD with a flipped last singular vector, but it is a proper rotation by construction, also for
 //! flat and collapsed bodies.
 //!
-//! The score uses uniform weights ([`METRIC_ID`], as SoftVTBench); the mass-weighted value and the largest node
-//! displacement are reported next to it. The reference is the settled shape, so sagging under gravity does not count.
+//! The weights of the score ([`METRIC_ID`]) are the volumes that the nodes stand for, so that D approximates an integral
+//! over the body, whatever its mesh and however it is turned against the voxels. SoftVTBench's released code weights all
+//! nodes alike and takes the box along the axes of the world ([`V1_METRIC_ID`]); that value is reported beside it. The
+//! reference is the settled shape, so sagging under gravity does not count.
 
 pub mod series;
 
@@ -19,8 +21,11 @@ use nalgebra::{Matrix4, Quaternion, SymmetricEigen};
 
 use softvt_geometry::{Aabb, Mat3, Quat, Vec3};
 
-/// Name of D with uniform weights, shared with SoftVTBench.
-pub const METRIC_ID: &str = "fem_rms_rigid_aligned_bbox_pct_v1";
+/// Name of D as it is scored: weighted by volume, of the diagonal along the axes of the object.
+pub const METRIC_ID: &str = "fem_volume_rms_rigid_aligned_object_bbox_pct_v1";
+
+/// Name of D as SoftVTBench's released code defines it: all nodes alike, of the diagonal along the axes of the world.
+pub const V1_METRIC_ID: &str = "fem_rms_rigid_aligned_bbox_pct_v1";
 
 /// Diagonal of a bounding box below which a body counts as a point, m.
 const SMALLEST_DIAGONAL_M: f64 = 1e-12;
@@ -45,16 +50,16 @@ pub enum DeformationError {
     NoSize(f64),
 }
 
-/// Deformation of a body at one moment; percentages are of the diagonal of the reference's bounding box.
+/// Deformation of a body at one moment; percentages are of [`ReferenceShape::diagonal_m`] unless said otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deformation {
-    /// D with uniform weights, % ([`METRIC_ID`]).
+    /// D, % ([`METRIC_ID`]).
     pub rms_pct: f64,
-    /// D with the node weights of the reference in the fit and in the mean, %.
-    pub weighted_pct: f64,
-    /// Largest node displacement of the uniform fit, %.
+    /// Largest node displacement of the same fit, %.
     pub max_pct: f64,
-    /// Rotation of the uniform fit, from the reference to the current shape.
+    /// D as SoftVTBench's released code defines it ([`V1_METRIC_ID`]), % of [`ReferenceShape::v1_diagonal_m`].
+    pub v1_rms_pct: f64,
+    /// Rotation of the fit, from the reference to the current shape.
     pub rotation: Quat,
     /// Extents of the current world-aligned bounding box, m.
     pub bbox_m: Vec3,
@@ -72,8 +77,10 @@ pub struct ReferenceShape {
     weights: Vec<f64>,
     /// Weighted mean of `nodes`, m.
     weighted_centre: Vec3,
-    /// Bounding-box extents, m.
+    /// Extents of the bounding box in the frame of the nodes, m.
     bbox_m: Vec3,
+    /// Diagonal of the bounding box along the axes of the object, m.
+    diagonal_m: f64,
 }
 
 /// Means of a set of nodes and their covariance sums with the reference, from one pass.
@@ -86,8 +93,8 @@ struct AlignmentSums {
 }
 
 impl ReferenceShape {
-    /// Prepares a reference from its `nodes` (m, any frame) and one weight per node (volume or
-    /// mass; only ratios matter).
+    /// Prepares a reference from its `nodes` (m, any frame) and one weight per node: the volume or mass that it stands for;
+    /// only ratios matter.
     ///
     /// # Errors
     /// Fewer than three nodes, a node that is not finite, a body without size, or weights that are not one per node,
@@ -115,15 +122,32 @@ impl ReferenceShape {
         let mean = nodes[0] + nodes.iter().map(|x| x - nodes[0]).sum::<Vec3>() / nodes.len() as f64;
         let nodes: Vec<Vec3> = nodes.iter().map(|x| x - mean).collect();
         let weighted_centre = nodes.iter().zip(&weights).map(|(x, w)| x * *w).sum();
-        Ok(Self { nodes, weights, weighted_centre, bbox_m })
+        Ok(Self { nodes, weights, weighted_centre, bbox_m, diagonal_m })
     }
 
-    /// Diagonal of the reference's bounding box, m.
+    /// The same reference, of an object whose axes are the columns of `frame`: the diagonal is that of its bounding box along
+    /// these, so that D does not depend on how the object lies. Without this, the axes are those of the nodes.
+    #[must_use]
+    pub fn along(mut self, frame: &Mat3) -> Self {
+        let turned: Vec<Vec3> = self.nodes.iter().map(|x| frame.tr_mul(x)).collect();
+        let diagonal_m = Aabb::from_points(&turned).map_or(0.0, |bounds| bounds.size().norm());
+        if diagonal_m > SMALLEST_DIAGONAL_M && diagonal_m.is_finite() {
+            self.diagonal_m = diagonal_m;
+        }
+        self
+    }
+
+    /// Diagonal of the reference's bounding box along the axes of the object, m.
     pub fn diagonal_m(&self) -> f64 {
+        self.diagonal_m
+    }
+
+    /// Diagonal of the reference's bounding box in the frame of the nodes, m.
+    pub fn v1_diagonal_m(&self) -> f64 {
         self.bbox_m.norm()
     }
 
-    /// Extents of the reference's bounding box, m.
+    /// Extents of the reference's bounding box in the frame of the nodes, m.
     pub fn bbox_m(&self) -> Vec3 {
         self.bbox_m
     }
@@ -142,29 +166,28 @@ impl ReferenceShape {
             return Err(DeformationError::NodeCount { expected: self.nodes.len(), got: nodes.len() });
         }
         let sums = self.sums(nodes)?;
-        let rotation = best_rotation(&sums.product);
-        let (fit, weighted_fit) = (
+        let rotation = best_rotation(&sums.weighted_product);
+        let (fit, v1_fit) = (
             rotation.to_rotation_matrix().into_inner(),
-            best_rotation(&sums.weighted_product).to_rotation_matrix().into_inner(),
+            best_rotation(&sums.product).to_rotation_matrix().into_inner(),
         );
-        let (mut sum, mut weighted_sum, mut largest) = (0.0_f64, 0.0_f64, 0.0_f64);
+        let (mut sum, mut largest, mut v1_sum) = (0.0_f64, 0.0_f64, 0.0_f64);
         for ((x, rest), weight) in nodes.iter().zip(&self.nodes).zip(&self.weights) {
             let x = x - nodes[0];
-            let square = (x - sums.mean - fit * rest).norm_squared();
-            sum += square;
+            let square = (x - sums.weighted_mean - fit * (rest - self.weighted_centre)).norm_squared();
+            sum += weight * square;
             largest = largest.max(square);
-            let weighted = x - sums.weighted_mean - weighted_fit * (rest - self.weighted_centre);
-            weighted_sum += weight * weighted.norm_squared();
+            v1_sum += (x - sums.mean - v1_fit * rest).norm_squared();
         }
         // Finite nodes may still be so far away that their squares overflow.
-        if !(sum.is_finite() && weighted_sum.is_finite()) {
+        if !(v1_sum.is_finite() && sum.is_finite()) {
             return Err(far_node(nodes));
         }
         let percent = 100.0 / self.diagonal_m();
         Ok(Deformation {
-            rms_pct: percent * (sum / nodes.len() as f64).sqrt(),
-            weighted_pct: percent * weighted_sum.sqrt(),
+            rms_pct: percent * sum.sqrt(),
             max_pct: percent * largest.sqrt(),
+            v1_rms_pct: 100.0 / self.v1_diagonal_m() * (v1_sum / nodes.len() as f64).sqrt(),
             rotation,
             bbox_m: sums.bbox_m,
         })

@@ -152,8 +152,10 @@ struct FirstContact {
 pub struct ControlStepScore {
     /// True if the goal had been reached and held for long enough.
     pub success_now: bool,
-    /// The worst deformation over the physics steps of the control step; `None` if it is unknown.
+    /// Deformation at the physics step of the control step with the largest D; `None` if it is unknown.
     pub deformation: Option<Deformation>,
+    /// Deformation at the physics step with the largest D of SoftVTBench's definition.
+    pub deformation_v1: Option<Deformation>,
 }
 
 /// Sums over the physics steps of one control step.
@@ -188,12 +190,13 @@ pub struct Judge {
     /// True if another object than the target was lifted first; `None` before.
     is_other_first: Option<bool>,
     peak: PeakDeformation,
-    peak_weighted: PeakDeformation,
+    peak_v1: PeakDeformation,
     peak_max: PeakDeformation,
     series: DeformationSeries,
     scores: Vec<ControlStepScore>,
-    /// Worst deformation of the target since the last control step.
+    /// Worst deformation of the target since the last control step, by D and by that of SoftVTBench.
     worst: Option<Deformation>,
+    worst_v1: Option<Deformation>,
     /// Physics steps so far.
     steps: u64,
     /// Peaks of the other bodies, in the order of the evidence.
@@ -213,6 +216,7 @@ impl Judge {
             series: DeformationSeries::new(if config.is_target_soft { config.max_steps } else { 0 }),
             scores: Vec::with_capacity(config.max_steps / config.steps_per_control as usize),
             worst: None,
+            worst_v1: None,
             steps: 0,
             peaks_other: vec![PeakDeformation::default(); config.others.len()],
             first_wrong_contact: None,
@@ -228,7 +232,7 @@ impl Judge {
             pad_forces: PadForceStats::default(),
             is_other_first: None,
             peak: PeakDeformation::default(),
-            peak_weighted: PeakDeformation::default(),
+            peak_v1: PeakDeformation::default(),
             peak_max: PeakDeformation::default(),
             crushed: CrushedShares::default(),
             missing_evidence: 0,
@@ -248,8 +252,11 @@ impl Judge {
         }
         self.steps += 1;
         if self.steps.is_multiple_of(u64::from(self.config.steps_per_control)) {
-            let score =
-                ControlStepScore { success_now: self.is_goal_reached(), deformation: self.worst.take() };
+            let score = ControlStepScore {
+                success_now: self.is_goal_reached(),
+                deformation: self.worst.take(),
+                deformation_v1: self.worst_v1.take(),
+            };
             self.scores.push(score);
         }
     }
@@ -357,7 +364,7 @@ impl Judge {
             no_slip,
             slip_mm: 1e3 * self.slip.slip_m(),
             d_peak: self.peak.d_pct,
-            d_peak_weighted: self.peak_weighted.d_pct,
+            d_peak_v1: self.peak_v1.d_pct,
             d_peak_max: self.peak_max.d_pct,
             d_mean: series.mean,
             d_final: series.last,
@@ -400,10 +407,12 @@ impl Judge {
         }
         let d = evidence.target.deformation;
         self.worst = self.worst.into_iter().chain(d).max_by(|a, b| a.rms_pct.total_cmp(&b.rms_pct));
+        self.worst_v1 =
+            self.worst_v1.into_iter().chain(d).max_by(|a, b| a.v1_rms_pct.total_cmp(&b.v1_rms_pct));
         if self.config.is_target_soft {
             self.series.push(d.map(|d| d.rms_pct), self.config.limit.map(|limit| limit.tau_pct()));
             self.peak.update(d.map(|d| d.rms_pct));
-            self.peak_weighted.update(d.map(|d| d.weighted_pct));
+            self.peak_v1.update(d.map(|d| d.v1_rms_pct));
             self.peak_max.update(d.map(|d| d.max_pct));
             let larger = |peak: Option<f64>, now: Option<f64>| peak.into_iter().chain(now).reduce(f64::max);
             self.crushed = CrushedShares {

@@ -36,7 +36,7 @@ fn config() -> JudgeConfig {
 fn deformed(rms_pct: f64) -> Deformation {
     Deformation {
         rms_pct,
-        weighted_pct: 0.9 * rms_pct,
+        v1_rms_pct: 1.1 * rms_pct,
         max_pct: 3.0 * rms_pct,
         rotation: Quat::identity(),
         bbox_m: Vec3::repeat(0.06),

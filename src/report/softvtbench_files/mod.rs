@@ -1,6 +1,7 @@
 //! Files with SoftVTBench's names and units, for its released scorer.
 //!
-//! Its `safe_success` ignores NoDrop; softvt's is in `summary.json` of the run folder. The scorer treats every
+//! D and τ are those of SoftVTBench's definition ([`V1_METRIC_ID`]). Its `safe_success` ignores NoDrop; softvt's is in
+//! `summary.json` of the run folder. The scorer treats every
 //! `policy_action_debug.jsonl` as one episode, hence one folder per episode.
 
 use std::{
@@ -14,7 +15,7 @@ use serde_json::{Value, json};
 use softvt_common::episode_id::{EpisodeId, EpisodeIndex};
 use softvt_common::files::{self, FileError, replace};
 use softvt_evaluation::{
-    deformation::{METRIC_ID, ReferenceShape},
+    deformation::{ReferenceShape, V1_METRIC_ID},
     statistics::{Rate, quantile},
     thresholds::ThresholdFile,
 };
@@ -49,7 +50,7 @@ pub struct DebugFrame {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DebugShape {
     pub fem_deformation_known: bool,
-    /// [`METRIC_ID`]; null when not known.
+    /// [`V1_METRIC_ID`]; null when not known.
     pub fem_deformation_metric_id: Option<String>,
     /// Asset of the target.
     pub fem_deformation_asset: String,
@@ -67,24 +68,27 @@ pub struct DebugShape {
 }
 
 impl DebugShape {
-    /// From the reference, the largest D and node displacement of the control step, and the bounding box at that
-    /// time. D is unknown without a reference or a measurement, as for a rigid target.
+    /// From the reference, the largest D of SoftVTBench's definition in the control step, and the largest displacement of a
+    /// node ([`Deformation::max_pct`](softvt_evaluation::deformation::Deformation)) and the bounding box at that time. D is
+    /// unknown without a reference or a measurement, as for a rigid target.
     pub fn new(
         asset: &str,
         reference: Option<&ReferenceShape>,
-        rms_pct: Option<f64>,
+        v1_rms_pct: Option<f64>,
         max_pct: Option<f64>,
         bbox_m: Option<Vec3>,
     ) -> Self {
-        let known = reference.filter(|_| rms_pct.is_some());
+        let known = reference.filter(|_| v1_rms_pct.is_some());
         Self {
             fem_deformation_known: known.is_some(),
-            fem_deformation_metric_id: known.map(|_| METRIC_ID.into()),
+            fem_deformation_metric_id: known.map(|_| V1_METRIC_ID.into()),
             fem_deformation_asset: asset.into(),
             fem_deformation_nodes: known.map(ReferenceShape::node_count),
-            fem_deformation_rms: known.and(rms_pct),
-            fem_deformation_max: known.and(max_pct),
-            fem_bbox_diag: known.map(ReferenceShape::diagonal_m),
+            fem_deformation_rms: known.and(v1_rms_pct),
+            fem_deformation_max: known
+                .zip(max_pct)
+                .map(|(reference, max)| max * reference.diagonal_m() / reference.v1_diagonal_m()),
+            fem_bbox_diag: known.map(ReferenceShape::v1_diagonal_m),
             fem_bbox_delta: known.zip(bbox_m).map(|(reference, bbox)| (bbox - reference.bbox_m()).norm()),
             fem_bbox_dims: known.and(bbox_m).map(Into::into),
         }
@@ -137,39 +141,61 @@ pub fn write_scores(
     thresholds: &ThresholdFile,
 ) -> Result<(), FileError> {
     let folder = dir.join(FOLDER);
-    replace(&folder.join(EPISODES_CSV), episodes_csv(records))?;
-    replace(&folder.join(SUMMARY_JSON), format!("{:#}\n", summary(records)))?;
+    let scored: Vec<ScoredEpisode> =
+        in_order(records).into_iter().map(|r| ScoredEpisode::new(r, thresholds)).collect();
+    replace(&folder.join(EPISODES_CSV), episodes_csv(&scored))?;
+    replace(&folder.join(SUMMARY_JSON), format!("{:#}\n", summary(&scored)))?;
     replace(&folder.join(THRESHOLDS_JSON), thresholds.released().to_text())
 }
 
-/// SoftVTBench's Safe Success: Goal ∧ D_peak ≤ τ, without NoDrop; `None` if evidence is missing.
-fn safe_success(record: &EpisodeRecord) -> Option<bool> {
-    let verdict = &record.verdict;
-    match (verdict.goal, record.header.soft) {
-        (false, _) => Some(false),
-        (true, false) => Some(true),
-        (true, true) => deform_ok(record),
+/// An episode with the limit of SoftVTBench's D: one per asset, and none where softvt knows none.
+struct ScoredEpisode<'a> {
+    record: &'a EpisodeRecord,
+    tau: Option<f64>,
+}
+
+impl<'a> ScoredEpisode<'a> {
+    fn new(record: &'a EpisodeRecord, thresholds: &ThresholdFile) -> Self {
+        let limit = thresholds.v1_limit(&record.header.asset).filter(|_| record.verdict.tau.is_some());
+        Self { record, tau: limit.map(|limit| limit.tau_pct()) }
+    }
+
+    fn d_peak(&self) -> Option<f64> {
+        self.record.verdict.d_peak_v1
+    }
+
+    /// SoftVTBench's Safe Success: Goal ∧ D_peak ≤ τ, without NoDrop; `None` if evidence is missing.
+    fn safe_success(&self) -> Option<bool> {
+        match (self.record.verdict.goal, self.record.header.soft) {
+            (false, _) => Some(false),
+            (true, false) => Some(true),
+            (true, true) => self.deform_ok(),
+        }
+    }
+
+    fn is_safe(&self) -> bool {
+        self.safe_success() == Some(true)
+    }
+
+    fn deform_ok(&self) -> Option<bool> {
+        self.d_peak().zip(self.tau).map(|(d, tau)| d <= tau)
+    }
+
+    /// Reasons for which the scorer cannot judge the episode, in its terms.
+    fn missing_evidence(&self) -> String {
+        let mut reasons = Vec::new();
+        if self.d_peak().is_none() {
+            reasons.push("missing_fem_deformation_rms".to_owned());
+            reasons.push("missing_fem_deformation_metric_id".to_owned());
+        }
+        if self.tau.is_none() {
+            reasons.push(format!("missing_tau:{}", self.record.header.asset));
+        }
+        reasons.join(";")
     }
 }
 
-fn deform_ok(record: &EpisodeRecord) -> Option<bool> {
-    record.verdict.d_peak.zip(record.verdict.tau).map(|(d, tau)| d <= tau)
-}
-
-/// Reasons for which the scorer cannot judge an episode, in its terms.
-fn missing_evidence(record: &EpisodeRecord) -> String {
-    let mut reasons = Vec::new();
-    if record.verdict.d_peak.is_none() {
-        reasons.push("missing_fem_deformation_rms".to_owned());
-        reasons.push("missing_fem_deformation_metric_id".to_owned());
-    }
-    if record.verdict.tau.is_none() {
-        reasons.push(format!("missing_tau:{}", record.header.asset));
-    }
-    reasons.join(";")
-}
-
-fn episodes_csv(records: &[EpisodeRecord]) -> String {
+fn episodes_csv(episodes: &[ScoredEpisode<'_>]) -> String {
     let mut out = String::from(
         "source,task,episode,asset,goal_success,d_peak,tau,deform_ok,safe_success,frames,reason\r\n",
     );
@@ -179,8 +205,8 @@ fn episodes_csv(records: &[EpisodeRecord]) -> String {
         None => "",
     };
     let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.6}"));
-    for record in in_order(records) {
-        let (header, verdict) = (&record.header, &record.verdict);
+    for episode in episodes {
+        let header = &episode.record.header;
         // Writing to a String cannot fail.
         let _ = write!(
             out,
@@ -188,58 +214,57 @@ fn episodes_csv(records: &[EpisodeRecord]) -> String {
             header.id.task,
             header.id.episode,
             quote_csv(&header.asset),
-            truth(Some(verdict.goal)),
-            number(verdict.d_peak),
-            number(verdict.tau),
-            truth(deform_ok(record)),
-            truth(safe_success(record)),
-            record.stats.steps.max(1),
-            quote_csv(&missing_evidence(record)),
+            truth(Some(episode.record.verdict.goal)),
+            number(episode.d_peak()),
+            number(episode.tau),
+            truth(episode.deform_ok()),
+            truth(episode.safe_success()),
+            episode.record.stats.steps.max(1),
+            quote_csv(&episode.missing_evidence()),
         );
     }
     out
 }
 
-fn summary(records: &[EpisodeRecord]) -> Value {
-    let is_safe = |r: &&EpisodeRecord| safe_success(r) == Some(true);
-    let (all, n) = (in_order(records), records.len());
-    let goal_rate = Rate::from_test(&all, |r| r.verdict.goal).rate;
-    let safe_rate = Rate::from_test(&all, is_safe).rate;
+fn summary(episodes: &[ScoredEpisode<'_>]) -> Value {
+    let n = episodes.len();
+    let goal_rate = Rate::from_test(episodes, |e| e.record.verdict.goal).rate;
+    let safe_rate = Rate::from_test(episodes, ScoredEpisode::is_safe).rate;
     let mut by_asset = serde_json::Map::new();
-    for asset in all.iter().map(|r| &r.header.asset) {
+    for asset in episodes.iter().map(|e| &e.record.header.asset) {
         if !by_asset.contains_key(asset) {
-            let group: Vec<_> = all.iter().copied().filter(|r| r.header.asset == *asset).collect();
+            let group: Vec<_> = episodes.iter().filter(|e| e.record.header.asset == *asset).collect();
             by_asset.insert(asset.clone(), asset_summary(&group));
         }
     }
     let mut scores = json!({
         "n_episodes": n,
         "n_goal_known": n,
-        "n_safe_unknown": all.iter().filter(|r| safe_success(r).is_none()).count(),
+        "n_safe_unknown": episodes.iter().filter(|e| e.safe_success().is_none()).count(),
         "goal_success_rate": goal_rate,
         "safe_success_rate": safe_rate,
         "goal_safe_gap": goal_rate.zip(safe_rate).map(|(goal, safe)| round_to(goal - safe, 2)),
-        "rigid_mode": n > 0 && all.iter().all(|r| !r.header.soft),
-        "deformation_metric_id": METRIC_ID,
+        "rigid_mode": n > 0 && episodes.iter().all(|e| !e.record.header.soft),
+        "deformation_metric_id": V1_METRIC_ID,
         "by_asset": by_asset,
     });
     // Not a field of SoftVTBench, hence only written for privileged policies.
-    if all.iter().any(|r| r.header.privileged) {
+    if episodes.iter().any(|e| e.record.header.privileged) {
         scores["privileged"] = json!(true);
     }
     scores
 }
 
-fn asset_summary(group: &[&EpisodeRecord]) -> Value {
-    let goal = group.iter().filter(|r| r.verdict.goal).count();
-    let safe = group.iter().filter(|r| safe_success(r) == Some(true)).count();
-    let mut peaks: Vec<f64> = group.iter().filter_map(|r| r.verdict.d_peak).collect();
+fn asset_summary(group: &[&ScoredEpisode<'_>]) -> Value {
+    let goal = group.iter().filter(|e| e.record.verdict.goal).count();
+    let safe = group.iter().filter(|e| e.is_safe()).count();
+    let mut peaks: Vec<f64> = group.iter().filter_map(|e| e.d_peak()).collect();
     peaks.sort_by(f64::total_cmp);
     json!({
         "n": group.len(),
         "goal": goal,
         "safe": safe,
-        "tau": group.first().and_then(|r| r.verdict.tau),
+        "tau": group.first().and_then(|e| e.tau),
         "d_peak_p50": quantile(&peaks, 0.5).map(|d| round_to(d, 4)),
         "d_peak_max": peaks.last().map(|d| round_to(*d, 4)),
         "goal_success_rate": Rate::new(goal, group.len()).rate,

@@ -14,13 +14,19 @@ fn episode(task: usize, asset: &str, edit: impl Fn(&mut EpisodeRecord)) -> Episo
 
 fn records() -> Vec<EpisodeRecord> {
     vec![
-        episode(1, "roll", |r| r.verdict.d_peak = Some(1.25)),
+        episode(1, "roll", |r| r.verdict.d_peak_v1 = Some(1.25)),
         episode(0, "bun", |r| {
             // Dropped: unsafe for softvt, safe for SoftVTBench.
-            (r.verdict.no_drop, r.verdict.safety, r.verdict.d_peak) = (false, false, Some(1.0));
+            (r.verdict.no_drop, r.verdict.safety, r.verdict.d_peak_v1) = (false, false, Some(1.0));
         }),
         episode(2, "cake", |r| r.verdict.tau = None),
     ]
+}
+
+/// The episodes with a limit of 1 % where they have one.
+fn scored(records: &[EpisodeRecord]) -> Vec<ScoredEpisode<'_>> {
+    let tau = |record: &EpisodeRecord| record.verdict.tau.map(|_| 1.0);
+    in_order(records).into_iter().map(|record| ScoredEpisode { record, tau: tau(record) }).collect()
 }
 
 #[test]
@@ -28,14 +34,15 @@ fn episodes_csv_has_softvtbenchs_columns_and_line_ends() {
     let expected = "source,task,episode,asset,goal_success,d_peak,tau,deform_ok,safe_success,frames,reason\r\n\
         jsonl,0,0,bun,True,1.000000,1.000000,True,True,168,\r\n\
         jsonl,1,0,roll,True,1.250000,1.000000,False,False,168,\r\n\
-        jsonl,2,0,cake,True,0.333333,,,,168,missing_tau:cake\r\n";
-    assert_eq!(episodes_csv(&records()), expected);
+        jsonl,2,0,cake,True,0.300000,,,,168,missing_tau:cake\r\n";
+    assert_eq!(episodes_csv(&scored(&records())), expected);
     assert_eq!(quote_csv("a,\"b\""), "\"a,\"\"b\"\"\"");
 }
 
 #[test]
 fn the_summary_has_softvtbenchs_fields_and_ignores_nodrop() {
-    let s = summary(&records());
+    let records = records();
+    let s = summary(&scored(&records));
     assert_eq!(s["n_episodes"], 3);
     assert_eq!(s["n_safe_unknown"], 1);
     assert_eq!(s["goal_success_rate"], 100.0);
@@ -44,7 +51,7 @@ fn the_summary_has_softvtbenchs_fields_and_ignores_nodrop() {
     assert_eq!(s["rigid_mode"], false);
     let keys: Vec<_> = s["by_asset"].as_object().unwrap().keys().collect();
     assert_eq!(keys, ["bun", "roll", "cake"]);
-    assert_eq!(s["by_asset"]["cake"]["d_peak_p50"], 0.3333);
+    assert_eq!(s["by_asset"]["cake"]["d_peak_p50"], 0.3);
     assert!(s["by_asset"]["cake"]["tau"].is_null());
 }
 
@@ -52,9 +59,9 @@ fn the_summary_has_softvtbenchs_fields_and_ignores_nodrop() {
 fn a_rigid_episode_is_safe_if_it_reaches_the_goal() {
     let rigid = episode(0, "box", |r| {
         r.header.soft = false;
-        (r.verdict.d_peak, r.verdict.tau) = (None, None);
+        (r.verdict.d_peak_v1, r.verdict.tau) = (None, None);
     });
-    let s = summary(&[rigid]);
+    let s = summary(&scored(&[rigid]));
     assert_eq!((s["rigid_mode"].clone(), s["safe_success_rate"].clone()), (json!(true), json!(100.0)));
 }
 
@@ -64,12 +71,12 @@ fn a_debug_frame_describes_the_shape_of_the_target() {
     let reference = ReferenceShape::new(&nodes, &[1.0; 4]).unwrap();
     let now = nodes.map(|x| Vec3::new(0.5 * x.x, x.y, x.z));
     let d = reference.measure(&now).unwrap();
-    let shape = DebugShape::new("bun", Some(&reference), Some(d.rms_pct), Some(d.max_pct), Some(d.bbox_m));
+    let shape = DebugShape::new("bun", Some(&reference), Some(d.v1_rms_pct), Some(d.max_pct), Some(d.bbox_m));
     let frame = serde_json::to_value(DebugFrame::new(&sample_record().header.id, 7, false, shape)).unwrap();
     assert_eq!((&frame["frame"], &frame["exp_idx"], &frame["task_id"]), (&json!(7), &json!(0), &json!(0)));
-    assert_eq!(frame["fem_deformation_metric_id"], METRIC_ID);
+    assert_eq!(frame["fem_deformation_metric_id"], V1_METRIC_ID);
     assert_eq!(frame["fem_deformation_nodes"], 4);
-    assert_eq!(frame["fem_deformation_rms"], d.rms_pct);
+    assert_eq!(frame["fem_deformation_rms"], d.v1_rms_pct);
     assert!((frame["fem_bbox_diag"].as_f64().unwrap() - 0.07).abs() < 1e-12);
     assert!((frame["fem_bbox_delta"].as_f64().unwrap() - 0.03).abs() < 1e-12);
     let broken = serde_json::to_value(DebugShape::new("bun", Some(&reference), Some(9.5), Some(20.0), None));
@@ -94,6 +101,7 @@ fn files_land_where_the_scorer_finds_them() {
         width_mm: 56.0,
         closure: Some(0.3),
         d_pct: 2.0,
+        d_v1_pct: Some(2.4),
         force_n: 2.0,
         strain_p95: None,
         min_det_f: 0.6,
@@ -120,7 +128,8 @@ fn files_land_where_the_scorer_finds_them() {
     assert!(has_scores(root.path()));
     fs::remove_file(root.path().join("softvtbench/episodes.csv")).unwrap();
     assert!(!has_scores(root.path()));
-    let written = ThresholdFile::read(&root.path().join("softvtbench/thresholds.json")).unwrap();
-    assert!(written.envelopes.is_empty() && written.limit("bun").is_some());
-    assert_eq!(written.schema_version, 1, "the version of SoftVTBench");
+    let written = fs::read_to_string(root.path().join("softvtbench/thresholds.json")).unwrap();
+    let written: Value = serde_json::from_str(&written).unwrap();
+    assert_eq!(written["schema_version"], 1, "the version of SoftVTBench");
+    assert_eq!(written["thresholds"]["bun"]["d_ref"], 2.4);
 }

@@ -301,8 +301,8 @@ functions! {
             fingerprint: Option<String>;
             /// Rows width_mm, closure, trials, held, slip_mm, d_peak_pct of the scan for the loose end.
             holds: Value = ROWS;
-            /// Rows width_mm, closure, d_pct, force_n, strain_p95, min_det_f, node_speed_m_s, both_pads, slip_mm, stable
-            /// of the compression sweep.
+            /// Rows width_mm, closure, d_pct, d_v1_pct, force_n, strain_p95, min_det_f, node_speed_m_s, both_pads, slip_mm,
+            /// stable of the compression sweep.
             sweep: Value = ROWS;
             /// Presses at other sizes and stiffnesses: { scale, youngs_factor, rows }, with the rows width_mm, d_pct, force_n,
             /// strain_p95.

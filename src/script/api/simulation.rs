@@ -35,7 +35,7 @@ use softvt_benchmark::{
 use softvt_common::cancel;
 use softvt_common::episode_id::EpisodeSplit;
 use softvt_common::parallel::lock;
-use softvt_evaluation::deformation::ReferenceShape;
+use softvt_evaluation::deformation::{Deformation, ReferenceShape};
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::BodyId;
 use softvt_robot::{Side, gripper::GripTarget, rotation};
@@ -93,6 +93,7 @@ fn simulation_settings(lua: &Lua, table: Option<&Table>) -> mlua::Result<Setting
 struct ObjectMeasurements {
     settled: Option<ReferenceShape>,
     d_peak_pct: f64,
+    d_peak_v1_pct: f64,
     start_z: f64,
 }
 
@@ -141,11 +142,12 @@ impl LuaSimulation {
             settled: match object.body {
                 BodyId::Soft(id) => {
                     let body = &sim.world.soft(id).state;
-                    ReferenceShape::new(&body.x, &body.model.mass).ok()
+                    ReferenceShape::new(&body.x, &body.model.mass).ok().map(|shape| shape.along(&body.frame))
                 }
                 _ => None,
             },
             d_peak_pct: 0.0,
+            d_peak_v1_pct: 0.0,
             start_z: sim.centre(object).z,
         });
         Ok(Self(Arc::new(Mutex::new(SimulationState {
@@ -209,19 +211,20 @@ impl SimulationState {
                 return false;
             }
             for index in 0..self.records.len() {
-                if let Some(d) = self.deformation_pct(index) {
+                if let Some(d) = self.deformation(index) {
                     let record = &mut self.records[index];
-                    record.d_peak_pct = record.d_peak_pct.max(d);
+                    record.d_peak_pct = record.d_peak_pct.max(d.rms_pct);
+                    record.d_peak_v1_pct = record.d_peak_v1_pct.max(d.v1_rms_pct);
                 }
             }
         }
         true
     }
 
-    fn deformation_pct(&self, object: usize) -> Option<f64> {
+    fn deformation(&self, object: usize) -> Option<Deformation> {
         let BodyId::Soft(id) = self.sim.objects[object].body else { return None };
         let settled = self.records[object].settled.as_ref()?;
-        settled.measure(&self.sim.world.soft(id).state.x).ok().map(|d| d.rms_pct)
+        settled.measure(&self.sim.world.soft(id).state.x).ok()
     }
 
     fn finger_readings(&mut self, lua: &Lua) -> mlua::Result<FingerReadings> {
@@ -357,9 +360,11 @@ output! {
         /// Distance that a movable object has slid on the left and the right pad, mm.
         slip_mm: "number[]?" = inner.pad_contacts(index).map(|pads| pads.map(|pad| 1e3 * pad.slip_distance).to_vec());
         /// Deformation D of a soft body, %.
-        d_pct: "number?" = inner.deformation_pct(index);
+        d_pct: "number?" = inner.deformation(index).map(|d| d.rms_pct);
         /// Largest D since settling, %.
         d_peak_pct: "number?" = inner.soft_body(index).map(|_| inner.records[index].d_peak_pct);
+        /// The same by SoftVTBench's definition of D, %.
+        d_peak_v1_pct: "number?" = inner.soft_body(index).map(|_| inner.records[index].d_peak_v1_pct);
         /// Minimum det F of a filled element of a soft body.
         min_det_f: "number?" = inner.soft_body(index).and_then(|body| finite(body.min_det_f.det_f));
         /// True if a soft body sleeps.

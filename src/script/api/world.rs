@@ -70,14 +70,14 @@ record! {
 }
 
 output! {
-    /// Deformation of a body against its reference shape, in percent of the diagonal of its bounding box.
+    /// Deformation of a body against its reference shape, in percent of the diagonal of its bounding box along its own axes.
     fn deformation_table(lua, deformation: &Deformation) -> "softvt.Deformation" as "deformation" {
-        /// Root mean square over the nodes.
+        /// D: root mean square of the displacement over the volume.
         rms_pct: "number" = deformation.rms_pct;
-        /// The same, weighted by mass.
-        weighted_pct: "number" = deformation.weighted_pct;
-        /// Largest displacement.
+        /// Largest displacement of a node.
         max_pct: "number" = deformation.max_pct;
+        /// D as SoftVTBench's released code defines it: all nodes alike, the box along the axes of the world.
+        v1_rms_pct: "number" = deformation.v1_rms_pct;
     }
 }
 
@@ -399,8 +399,12 @@ class! {
             fn set_reference(lua, this, which: String = Type::Choice(&["rest", "now"])) -> [] {
                 let mut inner = lock(&this.world);
                 let body = &inner.world.soft(this.id).state;
-                let nodes = if which == "rest" { &body.model.mesh.nodes } else { &body.x };
-                let reference = ReferenceShape::new(nodes, &body.model.mass);
+                let mass = &body.model.mass;
+                let reference = if which == "rest" {
+                    ReferenceShape::new(&body.model.mesh.nodes, mass)
+                } else {
+                    ReferenceShape::new(&body.x, mass).map(|shape| shape.along(&body.frame))
+                };
                 inner.references[this.id.index()] = reference.map_err(|e| fail(lua, e.to_string()))?;
             }
             /// Returns the normal force of a solid on the body, N.
