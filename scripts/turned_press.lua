@@ -105,10 +105,9 @@ end
 local function measure(bench)
   local d = bench.body:deformation()
   local a, b = bench.pads[1].solid, bench.pads[2].solid
-  local mm = bench.diagonal_mm / 100
   return {
     width_mm = 1e3 * bench.width, depth_mm = 1e3 * (bench.nominal - bench.width), force_n = 0.5 * (bench.body:force(a) + bench.body:force(b)),
-    d_pct = d.rms_pct, d_mm = d.rms_pct * mm, v1_mm = d.v1_rms_pct * mm, max_mm = d.max_pct * mm,
+    d_pct = d.rms_pct, d_v1_pct = d.v1_rms_pct, max_pct = d.max_pct,
     strain_p95 = bench.body:strain_percentile(95), strain_p99 = bench.body:strain_percentile(99),
     slip_mm = math.max(bench.body:slip_mm(a), bench.body:slip_mm(b)),
     shear_n = math.max(bench.body:shear(a), bench.body:shear(b)),
@@ -131,8 +130,6 @@ local function run(point)
   local bench = build(point)
   rest(bench, 1e-3, 0.5)
   bench.body:set_reference "now"
-  local extent = bench.body:extent()
-  bench.diagonal_mm = 1e3 * math.sqrt(extent[1] ^ 2 + extent[2] ^ 2 + extent[3] ^ 2)
   local most = 0
   for _, share in ipairs(opt.share) do most = math.max(most, share) end
   local force, depth = bench.window.tight.force, 1e3 * (bench.nominal - bench.window.tight.width)
@@ -147,7 +144,7 @@ local function run(point)
       local row = at(rows, what[1], share * what[2])
       if row then
         row.asset, row.turn, row.resolution, row.pads = point.asset, point.turn, point.resolution, point.pads
-        row.equal, row.share, row.diagonal_mm = what[1], share, bench.diagonal_mm
+        row.equal, row.share = what[1], share
         found[#found + 1] = row
       end
     end
@@ -173,7 +170,7 @@ return softvt.experiment {
   end,
   run = run,
   columns = {
-    "asset", "pads", "resolution", "equal", "share", "turn", "force_n", "depth_mm", "d_pct", "d_mm", "v1_mm", "max_mm", "strain_p95",
-    "strain_p99", "slip_mm", "shear_n", "diagonal_mm",
+    "asset", "pads", "resolution", "equal", "share", "turn", "force_n", "depth_mm", "d_pct", "d_v1_pct", "max_pct",
+    "strain_p95", "strain_p99", "slip_mm", "shear_n",
   },
 }

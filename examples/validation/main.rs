@@ -63,8 +63,8 @@ const MISSES: &str = "
   of a strained body: its null space has the rotations of the rest shape. Bodies in flight conserve angular momentum.
 - The way of a stopping drawer is short by up to half a step of its speed: positions are first-order in the step.
 - Soft bodies at resolution 6 are too stiff between pads of 24 mm, and where the edges of the pads are between nodes.
-- D at equal force depends on the angle between the grasp and the voxels, by 5 % for a ball of resolution 6
-  (`softvt scripts/turned_press.lua`). Limits are measured at 0°.
+- D depends on the angle between the grasp and the voxels, of resolution 6. When round bodies are turned, D at the force of the tight end
+  falls by up to 8 %, and at its width grows by up to 18 % (`softvt scripts/turned_press.lua`). Limits are measured at 0°.
 - *Converged truth* has cubes alone, and resolutions 18 and 24 by their small-strain stiffness only; their squeezes take minutes.
 - Surfaces at grazing incidence of the key light receive no shadow from objects nearer than a few millimetres, and moving
   objects cast none outside of the sphere with a fine shadow map (0.85 m).
