@@ -1,7 +1,8 @@
 //! Threshold files: τ and D_ref per asset, as JSON with the fields of SoftVTBench and some of our own.
 //!
 //! A file holds one asset (`assets/calibration/*.json`) or many. [`ThresholdFile::released`] is the file of SoftVTBench's
-//! scorer, of version 1 of the layout and of SoftVTBench's definition of D; its limits hold for no other, so it is not read.
+//! scorer (`softvtbench/` of a run), of version 1 of the layout and of SoftVTBench's definition of D. Its limits hold for no
+//! other D.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -191,29 +192,41 @@ impl ThresholdFile {
     /// # Errors
     /// Invalid JSON, another metric, protocol, schema or method, or numbers out of range.
     pub fn parse(text: &str, path: &str) -> Result<Self, ThresholdError> {
+        Self::parse_as(text, path, METRIC_ID, SCHEMA_VERSION)
+    }
+
+    /// Parses a file of [`ThresholdFile::released`], as [`ThresholdFile::parse`] does.
+    ///
+    /// # Errors
+    /// As [`ThresholdFile::parse`].
+    pub fn parse_released(text: &str, path: &str) -> Result<Self, ThresholdError> {
+        Self::parse_as(text, path, V1_METRIC_ID, RELEASED_SCHEMA_VERSION)
+    }
+
+    fn parse_as(text: &str, path: &str, metric_id: &str, schema_version: u32) -> Result<Self, ThresholdError> {
         let json = |source| ThresholdError::Json { path: path.into(), source };
         let value: serde_json::Value = serde_json::from_str(text).map_err(json)?;
         // First of all: for a file of another metric the error should say that, not that some field is missing.
         if let Some(metric) = value.get("metric_id").and_then(|m| m.as_str()) {
-            check_equal(path, "metric_id", metric, METRIC_ID)?;
+            check_equal(path, "metric_id", metric, metric_id)?;
         }
         if let Some(version) = value.get("schema_version").and_then(serde_json::Value::as_u64) {
-            check_equal(path, "schema_version", &version.to_string(), &SCHEMA_VERSION.to_string())?;
+            check_equal(path, "schema_version", &version.to_string(), &schema_version.to_string())?;
         }
         let file: Self = serde_json::from_value(value).map_err(json)?;
         file.validate(path)?;
         Ok(file)
     }
 
-    /// Reads a threshold file.
+    /// Reads a file of [`ThresholdFile::released`].
     ///
     /// # Errors
     /// As [`ThresholdFile::parse`], or the file cannot be read.
-    pub fn read(path: &Path) -> Result<Self, ThresholdError> {
+    pub fn read_released(path: &Path) -> Result<Self, ThresholdError> {
         let name = path.display().to_string();
         let text = std::fs::read_to_string(path)
             .map_err(|source| ThresholdError::Io { path: name.clone(), source })?;
-        Self::parse(&text, &name)
+        Self::parse_released(&text, &name)
     }
 
     /// Text of the file: indented JSON with a final newline, thresholds with at most six decimals.
@@ -360,7 +373,7 @@ mod tests {
         assert!(refused("\"d_ref\": 0.333333", "\"d_ref\": -1").contains("thresholds.bun.d_ref is -1"));
         assert!(refused("\"n_stable_trials\": 2", "\"n_stable_trials\": 0").contains("n_stable_trials is 0"));
         assert!(refused("{", "").contains("not a threshold file"));
-        let missing = ThresholdFile::read(Path::new("/nowhere/bun.json")).unwrap_err().to_string();
+        let missing = ThresholdFile::read_released(Path::new("/nowhere/bun.json")).unwrap_err().to_string();
         assert!(missing.starts_with("/nowhere/bun.json: "), "{missing}");
     }
 
@@ -383,7 +396,7 @@ mod tests {
     }
 
     #[test]
-    fn the_released_file_has_its_limits_on_the_d_of_softvtbench_and_is_not_read() {
+    fn the_released_file_has_its_limits_on_the_d_of_softvtbench() {
         let released = file().released();
         let text = released.to_text();
         assert!(!text.contains("envelopes") && !text.contains("protocol\":"), "{text}");
@@ -391,6 +404,7 @@ mod tests {
         assert_eq!((bun.d_ref, bun.tau, limit.tau_pct()), (0.4, 0.2, 0.2));
         let refused = ThresholdFile::parse(&text, "thresholds.json").unwrap_err().to_string();
         assert!(refused.starts_with(&format!("thresholds.json: metric_id is {V1_METRIC_ID:?}")), "{refused}");
+        assert_eq!(ThresholdFile::parse_released(&text, "thresholds.json").unwrap(), released);
     }
 
     #[test]

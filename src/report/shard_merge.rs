@@ -165,7 +165,7 @@ impl<'a> MergedRun<'a> {
         files::write_json_lines(&folder.join(EPISODES), records)?;
         files::write_json(&folder.join(RUN), manifest)?;
         let path = shards[0].dir.join(softvtbench_files::FOLDER).join(softvtbench_files::THRESHOLDS_JSON);
-        softvtbench_files::write_scores(folder, records, &ThresholdFile::read(&path)?)?;
+        softvtbench_files::write_scores(folder, records, &ThresholdFile::read_released(&path)?)?;
         // The records of a rigid twin carry its own suite name.
         let suite = records.first().map_or(shards[0].suite(), |record| &record.header.id.suite);
         let summary = SuiteSummary::from_records(suite, shards[0].text("policy"), records);

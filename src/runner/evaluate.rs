@@ -162,7 +162,7 @@ impl<'a> RunLog<'a> {
     pub(crate) fn write_results(&mut self) -> Result<(), RunError> {
         self.sort()?;
         let calibrations = self.run.calibrations.clone();
-        softvtbench_files::write_scores(&self.run.out, &self.records, &calibrations.merged)?;
+        softvtbench_files::write_scores(&self.run.out, &self.records, &calibrations.merged.released())?;
         self.write_summary()
     }
 

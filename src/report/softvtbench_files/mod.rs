@@ -131,7 +131,8 @@ pub fn has_scores(dir: &Path) -> bool {
     [EPISODES_CSV, SUMMARY_JSON, THRESHOLDS_JSON].iter().all(|name| dir.join(FOLDER).join(name).is_file())
 }
 
-/// Writes `episodes.csv`, `summary.json` and `thresholds.json` of one suite's `records` below the run folder `dir`.
+/// Writes `episodes.csv`, `summary.json` and `thresholds.json` of one suite's `records` below the run folder `dir`. The
+/// thresholds are those on SoftVTBench's D ([`ThresholdFile::released`]).
 ///
 /// # Errors
 /// A file cannot be written.
@@ -145,7 +146,7 @@ pub fn write_scores(
         in_order(records).into_iter().map(|r| ScoredEpisode::new(r, thresholds)).collect();
     replace(&folder.join(EPISODES_CSV), episodes_csv(&scored))?;
     replace(&folder.join(SUMMARY_JSON), format!("{:#}\n", summary(&scored)))?;
-    replace(&folder.join(THRESHOLDS_JSON), thresholds.released().to_text())
+    replace(&folder.join(THRESHOLDS_JSON), thresholds.to_text())
 }
 
 /// An episode with the limit of SoftVTBench's D: one per asset, and none where softvt knows none.
@@ -156,7 +157,7 @@ struct ScoredEpisode<'a> {
 
 impl<'a> ScoredEpisode<'a> {
     fn new(record: &'a EpisodeRecord, thresholds: &ThresholdFile) -> Self {
-        let limit = thresholds.v1_limit(&record.header.asset).filter(|_| record.verdict.tau.is_some());
+        let limit = thresholds.limit(&record.header.asset).filter(|_| record.verdict.tau.is_some());
         Self { record, tau: limit.map(|limit| limit.tau_pct()) }
     }
 

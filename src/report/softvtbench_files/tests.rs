@@ -116,7 +116,7 @@ fn files_land_where_the_scorer_finds_them() {
         ..CalibrationMeasurements::default()
     };
     thresholds.insert("bun", Envelope::new(scans, 0.5));
-    write_scores(root.path(), &records(), &thresholds).unwrap();
+    write_scores(root.path(), &records(), &thresholds.released()).unwrap();
     let header = sample_record().header;
     let frame = DebugFrame::new(&header.id, 0, true, DebugShape::new("bun", None, None, None, None));
     let path = debug_log_path(root.path(), header.id.index());
