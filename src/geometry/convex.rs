@@ -55,11 +55,11 @@ pub struct Placed<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClosestPoints {
     /// Point on the surface of the first shape, world, m.
-    pub a_w: Vec3,
+    pub on_a_w: Vec3,
     /// Point on the surface of the second shape, world, m.
-    pub b_w: Vec3,
+    pub on_b_w: Vec3,
     /// Unit normal from the first to the second shape, world.
-    pub n_w: Vec3,
+    pub normal_w: Vec3,
 }
 
 /// A primitive as a convex core with a layer around it.
@@ -109,6 +109,10 @@ pub fn closest_points(
     );
     let GJKResult::ClosestPoints(on_a, on_b, normal) = found else { return None };
     let point = |p: parry::Vector| (a.frame * nalgebra::Point3::from(from_parry(p))).coords;
-    let n_w = (a.frame.rotation * from_parry(normal)).try_normalize(0.0)?;
-    Some(ClosestPoints { a_w: point(on_a) + n_w * a.radius, b_w: point(on_b) - n_w * b.radius, n_w })
+    let normal_w = (a.frame.rotation * from_parry(normal)).try_normalize(0.0)?;
+    Some(ClosestPoints {
+        on_a_w: point(on_a) + normal_w * a.radius,
+        on_b_w: point(on_b) - normal_w * b.radius,
+        normal_w,
+    })
 }

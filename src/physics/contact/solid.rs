@@ -80,7 +80,7 @@ impl CollisionGeometry {
             }
             (Self::Rigid(rigid), Self::Gel(gel)) => {
                 let points = rigid.gel_contacts(&a.pose, gel, &b.pose, margin);
-                out.extend(points.map(|point| (0, ManifoldPoint { n_w: -point.n_w, ..point })));
+                out.extend(points.map(|point| (0, ManifoldPoint { normal_w: -point.normal_w, ..point })));
             }
             (Self::Gel(_), Self::Gel(_)) => {}
         }
@@ -192,8 +192,8 @@ impl RigidShape {
                 return None;
             }
             Some(ManifoldPoint {
-                p_w: (pose * nalgebra::Point3::from(p - contact.normal * (0.5 * contact.gap))).coords,
-                n_w: -(pose.rotation * contact.normal),
+                position_w: (pose * nalgebra::Point3::from(p - contact.normal * (0.5 * contact.gap))).coords,
+                normal_w: -(pose.rotation * contact.normal),
                 gap: contact.gap,
                 area: sample.area * contact.coverage,
                 feature,
@@ -203,5 +203,5 @@ impl RigidShape {
 }
 
 fn flip_normals(points: &mut [ManifoldPoint]) {
-    points.iter_mut().for_each(|point| point.n_w = -point.n_w);
+    points.iter_mut().for_each(|point| point.normal_w = -point.normal_w);
 }

@@ -25,7 +25,7 @@ const MIN_CHECKED_FILL: f64 = 0.2;
 
 /// Contact samples carried by the same nodes: those of an element, or of one of its faces.
 #[derive(Clone, Debug)]
-pub struct SampleGroup {
+pub struct ContactSampleGroup {
     /// The nodes, of which the first `count` are used.
     pub nodes: [u32; 8],
     /// How many entries of `nodes` are used.
@@ -61,7 +61,7 @@ pub struct FemModel {
     /// Contact samples, ordered by group.
     pub samples: Vec<ContactSample>,
     /// Consecutive samples on the same nodes.
-    pub groups: Vec<SampleGroup>,
+    pub groups: Vec<ContactSampleGroup>,
     /// Square root of the mean sample area, m: the typical spacing.
     pub spacing: f64,
     pub(super) stiffness: Vec<Stiffness>,
@@ -196,7 +196,10 @@ fn node_masses(mesh: &VoxelMesh, density: f64, volume: f64) -> Vec<f64> {
 }
 
 /// Groups samples that are carried by the same nodes and sorts them by group.
-fn group_samples(mesh: &VoxelMesh, samples: Vec<SurfaceSample>) -> (Vec<ContactSample>, Vec<SampleGroup>) {
+fn group_samples(
+    mesh: &VoxelMesh,
+    samples: Vec<SurfaceSample>,
+) -> (Vec<ContactSample>, Vec<ContactSampleGroup>) {
     let key = |s: &SurfaceSample| {
         let weights = s.at.weights();
         let mask = weights.iter().enumerate().fold(0u8, |m, (c, w)| if *w > 1e-12 { m | 1 << c } else { m });
@@ -204,7 +207,7 @@ fn group_samples(mesh: &VoxelMesh, samples: Vec<SurfaceSample>) -> (Vec<ContactS
     };
     let mut keyed: Vec<((u32, u8), SurfaceSample)> = samples.into_iter().map(|s| (key(&s), s)).collect();
     keyed.sort_by_key(|(key, _)| *key);
-    let (mut out, mut groups): (Vec<ContactSample>, Vec<SampleGroup>) =
+    let (mut out, mut groups): (Vec<ContactSample>, Vec<ContactSampleGroup>) =
         (Vec::with_capacity(keyed.len()), Vec::new());
     let mut last_key = None;
     for (key, surface) in keyed {
@@ -215,7 +218,7 @@ fn group_samples(mesh: &VoxelMesh, samples: Vec<SurfaceSample>) -> (Vec<ContactS
             let element = mesh.elements[key.0 as usize];
             corners.iter().enumerate().for_each(|(i, &c)| nodes[i] = element[c]);
             let (first, last) = (out.len(), out.len());
-            groups.push(SampleGroup { nodes, count: corners.len(), first, last, spacing: 0.0 });
+            groups.push(ContactSampleGroup { nodes, count: corners.len(), first, last, spacing: 0.0 });
         }
         let all = surface.at.weights();
         let mut weights = [0.0; 8];

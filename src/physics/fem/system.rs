@@ -7,7 +7,7 @@
 //! tangent changes no equilibrium: the elastic force is always evaluated exactly, and `A` only affects the transient.
 
 use super::body::{FemModel, FemState};
-use crate::sparse::{BlockMatrix, CholeskyFactor, SymbolicFactor};
+use crate::sparse::{BlockMatrix, CholeskyFactor, NotPositiveDefinite, SymbolicFactor};
 use softvt_geometry::{Mat3, Vec3};
 
 /// Change of an element's rotation (Frobenius norm, about √2 × radians) beyond which the matrix is factored again.
@@ -218,13 +218,24 @@ impl VelocitySystem {
         self.retained_index[node as usize] as usize
     }
 
-    /// Updates retained nodes and factor for the body and the marks of `step`. False if `A` is not positive definite.
-    pub(crate) fn prepare(&mut self, body: &FemState, c: &StepCoefficients, step: u64) -> bool {
+    /// Updates retained nodes and factor for the body and the marks of `step`.
+    ///
+    /// # Errors
+    /// `A` is not positive definite.
+    pub(crate) fn update(
+        &mut self,
+        body: &FemState,
+        c: &StepCoefficients,
+        step: u64,
+    ) -> Result<(), NotPositiveDefinite> {
         let new_plan = self.update_retained(step);
-        if new_plan || self.plan.is_none() {
-            self.plan =
-                Some(SymbolicFactor::new(&self.blocks.neighbours, &self.blocks.places, &self.retained));
+        if new_plan {
+            self.plan = None;
         }
+        let (blocks, retained) = (&mut self.blocks, &self.retained);
+        let plan = self
+            .plan
+            .get_or_insert_with(|| SymbolicFactor::new(&blocks.neighbours, &blocks.places, retained));
         if new_plan || (body.frame - self.frame).norm_squared() > STALE_FRAME * STALE_FRAME {
             self.frame = body.frame;
             self.schur_w.clear();
@@ -241,17 +252,16 @@ impl VelocitySystem {
             && !body.rotation.iter().zip(&self.factored).any(stale)
             && !body.densification.iter().zip(&self.factored_densification).any(has_changed);
         if fresh {
-            return true;
+            return Ok(());
         }
         self.schur_w.clear();
         self.factored.clear();
         self.factored.extend(body.rotation.iter().map(|r| to_frame * r));
         self.factored_densification.clone_from(&body.densification);
-        self.blocks.assemble(body, &self.factored, c);
+        blocks.assemble(body, &self.factored, c);
         self.coefficients = Some(*c);
         self.factorizations += 1;
-        let Some(plan) = &self.plan else { return false };
-        self.factor.refill(plan, &self.blocks)
+        self.factor.refill(plan, blocks)
     }
 
     /// Updates the retained nodes; true if they changed.

@@ -5,7 +5,7 @@
 //! Numerical Algorithms*, 2002, ch. 12). In single precision it takes half of the time and memory. The Hessian is scaled
 //! to a unit diagonal first, which removes the differences of units and masses.
 
-use crate::sparse::dense;
+use crate::sparse::{NotPositiveDefinite, dense};
 
 /// Precision of a factor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,8 +31,17 @@ pub(super) struct Factor {
 }
 
 impl Factor {
-    /// Factors the first `head` columns of a Hessian of side `n`. False if it is not positive definite.
-    pub(super) fn set(&mut self, hessian: &[f64], n: usize, head: usize, precision: Precision) -> bool {
+    /// Factors the first `head` columns of a Hessian of side `n`.
+    ///
+    /// # Errors
+    /// It is not positive definite in this precision.
+    pub(super) fn set(
+        &mut self,
+        hessian: &[f64],
+        n: usize,
+        head: usize,
+        precision: Precision,
+    ) -> Result<(), NotPositiveDefinite> {
         self.precision = precision;
         if precision == Precision::Double {
             self.double.clear();
@@ -95,7 +104,7 @@ fn factor_constrained(
     }
     // The Schur complement of a positive definite matrix plus stiffness is positive definite: this cannot fail in
     // double precision, and a single-precision one that fails gives no descent, so that it is replaced.
-    dense::partial_cholesky(constrained, t, t);
+    let _ = dense::partial_cholesky(constrained, t, t);
 }
 
 fn solve_constrained(constrained: &[f64], b: &mut [f64]) {
@@ -128,7 +137,7 @@ mod tests {
         dense::symmetric_multiply(&full, n, &x, &mut b);
         for (precision, tolerance) in [(Precision::Double, 1e-12), (Precision::Single, 1e-5)] {
             let (mut factor, mut solved) = (Factor::default(), b.clone());
-            assert!(factor.set(&hessian(n), n, head, precision));
+            factor.set(&hessian(n), n, head, precision).expect("positive definite");
             factor.solve(n, &stiffness, &mut solved, &mut Vec::new());
             let scaled = |i: usize| 10f64.powi((i % 5) as i32);
             let error = (0..n).map(|i| ((solved[i] - x[i]) / scaled(i)).abs()).fold(0.0, f64::max);

@@ -5,6 +5,7 @@ use super::{
     problem::{BlockIdentity, ContactProblem, ScalarConstraint},
     secant::SecantPairs,
 };
+use crate::sparse::NotPositiveDefinite;
 use softvt_geometry::union_find::UnionFind;
 
 /// Cost of a factorization in Newton steps with an existing factor: constant part, and part per velocity.
@@ -129,21 +130,24 @@ impl FactorCache {
         false
     }
 
-    /// Factors a Hessian down to the constrained block and makes the result the current factor. False if it is not
-    /// positive definite in this precision.
+    /// Factors a Hessian down to the constrained block and makes the result the current factor.
+    ///
+    /// # Errors
+    /// It is not positive definite in this precision.
     pub(super) fn factor(
         &mut self,
         problem: &ContactProblem,
         island: &Island,
         hessian: &[f64],
         precision: Precision,
-    ) -> bool {
+    ) -> Result<(), NotPositiveDefinite> {
         let entry = &mut self.entries[0];
         let head = island.size - island.constrained_size(problem);
-        entry.is_valid = entry.factor.set(hessian, island.size, head, precision);
+        let factored = entry.factor.set(hessian, island.size, head, precision);
+        entry.is_valid = factored.is_ok();
         (entry.first_steps, entry.excess_steps) = (None, 0);
         entry.secant.clear();
-        entry.is_valid
+        factored
     }
 
     /// Records that a pass converged after `steps` with the current factor.

@@ -14,7 +14,7 @@ use super::{
     law::{ContactLaw, ContactResponse, LinearSegment},
     problem::ContactProblem,
 };
-use crate::sparse::dense;
+use crate::sparse::{NotPositiveDefinite, dense};
 use softvt_geometry::Vec3;
 
 /// Convergence of the gradient relative to the momenta of the island (both scaled by `diag(A)^-1/2`).
@@ -143,12 +143,12 @@ impl Solver {
 
     /// Solves one island; returns the number of Newton steps.
     fn solve_island(&mut self, problem: &mut ContactProblem, island: &Island) -> Result<u32, SolverFailure> {
-        self.prepare(problem, island);
+        self.start(problem, island);
         multiply(problem, island, &self.v, &mut self.product);
         let mut steps = 0;
         for pass in 0..MAX_PASSES {
             steps += self.newton(problem, island)?;
-            let PassImpulses { change, total } = self.record(problem, island);
+            let PassImpulses { change, total } = self.write_back(problem, island);
             if change <= PASS_TOLERANCE * total {
                 break;
             }
@@ -168,7 +168,8 @@ impl Solver {
         Ok(steps)
     }
 
-    fn prepare(&mut self, problem: &mut ContactProblem, island: &Island) {
+    /// Reads the initial velocities of an island and gives the buffers its size.
+    fn start(&mut self, problem: &mut ContactProblem, island: &Island) {
         self.v.clear();
         self.scale.clear();
         for &block in &island.blocks {
@@ -201,7 +202,7 @@ impl Solver {
                 precision = Precision::Double;
             }
             let is_new = !has_factor;
-            if is_new && !(ratio.is_finite() && self.refactor(problem, island, precision)) {
+            if is_new && !(ratio.is_finite() && self.refactor(problem, island, precision).is_ok()) {
                 break;
             }
             if is_new {
@@ -234,13 +235,23 @@ impl Solver {
     }
 
     /// Factors the Hessian at the current velocities, without the scalar constraints, down to the constrained block; in
-    /// double precision if single precision fails. False if it is not positive definite.
-    fn refactor(&mut self, problem: &ContactProblem, island: &Island, precision: Precision) -> bool {
+    /// double precision if single precision fails.
+    ///
+    /// # Errors
+    /// It is not positive definite.
+    fn refactor(
+        &mut self,
+        problem: &ContactProblem,
+        island: &Island,
+        precision: Precision,
+    ) -> Result<(), NotPositiveDefinite> {
         self.assemble_hessian(problem, island);
         self.factorizations += 1;
-        self.cache.factor(problem, island, &self.hessian, precision)
-            || precision == Precision::Single
-                && self.cache.factor(problem, island, &self.hessian, Precision::Double)
+        let factored = self.cache.factor(problem, island, &self.hessian, precision);
+        if factored.is_err() && precision == Precision::Single {
+            return self.cache.factor(problem, island, &self.hessian, Precision::Double);
+        }
+        factored
     }
 
     /// Writes the lower triangle of the Hessian at the current velocities, without the scalar constraints.
@@ -274,7 +285,7 @@ impl Solver {
     }
 
     /// Writes impulses and velocities into the points.
-    fn record(&mut self, problem: &mut ContactProblem, island: &Island) -> PassImpulses {
+    fn write_back(&mut self, problem: &mut ContactProblem, island: &Island) -> PassImpulses {
         let mut impulses = PassImpulses::default();
         let law = ContactLaw::new(problem.dt, problem.dissipation_time);
         for &index in &island.clusters {
@@ -374,8 +385,10 @@ impl Solver {
             return None;
         }
         multiply(problem, island, &self.step, &mut self.step_product);
-        // Ends of the bracket of the minimum, and the slopes there.
-        let (mut low, mut high, mut at) = ((0.0, slope), (f64::INFINITY, f64::INFINITY), 1.0);
+        // Ends of the bracket of the minimum.
+        let mut low = LinePoint { position: 0.0, slope };
+        let mut high = LinePoint { position: f64::INFINITY, slope: f64::INFINITY };
+        let mut at = 1.0;
         let mut value = f64::INFINITY;
         for _ in 0..40 {
             self.trial.iter_mut().zip(&self.v).zip(&self.step).for_each(|((t, v), s)| *t = v + at * s);
@@ -385,16 +398,17 @@ impl Solver {
             let along: f64 = self.trial_gradient.iter().zip(&self.step).map(|(g, s)| g * s).sum();
             let descends = value <= cost + 1e-4 * at * slope;
             // If the full step still leads downhill, the model is accurate enough to take it.
-            let is_downhill = along <= 0.0 && high.0.is_infinite();
+            let is_downhill = along <= 0.0 && high.position.is_infinite();
             if descends && (is_downhill || along.abs() <= LINE_TOLERANCE * slope.abs()) {
                 break;
             }
+            let reached = LinePoint { position: at, slope: along };
             if along > 0.0 || !value.is_finite() {
-                high = (at, along);
+                high = reached;
             } else {
-                low = (at, along);
+                low = reached;
             }
-            if high.0 - low.0 < 1e-9 {
+            if high.position - low.position < 1e-9 {
                 break;
             }
             at = next_trial(low, high);
@@ -458,15 +472,24 @@ fn evaluate(
     cost
 }
 
-/// Root of the linear interpolation of the slope of the cost between two points `(position, slope)` of a line.
+/// A point of a line search.
+#[derive(Clone, Copy)]
+struct LinePoint {
+    /// Multiple of the step.
+    position: f64,
+    /// Derivative of the cost by the position.
+    slope: f64,
+}
+
+/// Root of the linear interpolation of the slope of the cost between two points of a line.
 ///
 /// The slope of a convex cost grows monotonically, so this is nearer to the minimum than the middle; it keeps a tenth of
 /// the bracket from either end.
-fn next_trial(low: (f64, f64), high: (f64, f64)) -> f64 {
-    if !high.0.is_finite() {
-        return 1.5 * low.0;
+fn next_trial(low: LinePoint, high: LinePoint) -> f64 {
+    if !high.position.is_finite() {
+        return 1.5 * low.position;
     }
-    let share = low.1 / (low.1 - high.1);
+    let share = low.slope / (low.slope - high.slope);
     let share = if share.is_finite() { share.clamp(0.1, 0.9) } else { 0.5 };
-    low.0 + share * (high.0 - low.0)
+    low.position + share * (high.position - low.position)
 }

@@ -8,6 +8,8 @@ use std::ops::Range;
 
 use nalgebra::RealField;
 
+use super::NotPositiveDefinite;
+
 /// Columns per block at each level: a block is factored in blocks of the level below, each followed by the update of the
 /// rest of its block. Narrow blocks waste few operations, wide ones pass over a large matrix less often.
 const WIDTHS: [usize; 3] = [8, 32, 128];
@@ -30,14 +32,17 @@ impl Real for f32 {}
 
 /// Factors the first `k` columns of the `n × n` matrix `a` (column-major, lower triangle) in place.
 ///
-/// Afterwards those columns hold `L` and the trailing block its Schur complement. Returns false if a pivot is not
-/// positive; `a` must not be used then. The upper triangle is neither read nor preserved.
-pub(crate) fn partial_cholesky(a: &mut [f64], n: usize, k: usize) -> bool {
+/// Afterwards those columns hold `L` and the trailing block its Schur complement. The upper triangle is neither read nor
+/// preserved.
+///
+/// # Errors
+/// A pivot is not positive.
+pub(crate) fn partial_cholesky(a: &mut [f64], n: usize, k: usize) -> Result<(), NotPositiveDefinite> {
     factor_blocks::<f64, ROWS>(a, n, 0..k, n, &WIDTHS, &mut packing_buffer::<ROWS, _>(n, k))
 }
 
 /// As [`partial_cholesky`], in single precision.
-pub(crate) fn partial_cholesky_single(a: &mut [f32], n: usize, k: usize) -> bool {
+pub(crate) fn partial_cholesky_single(a: &mut [f32], n: usize, k: usize) -> Result<(), NotPositiveDefinite> {
     factor_blocks::<f32, SINGLE_ROWS>(a, n, 0..k, n, &WIDTHS, &mut packing_buffer::<SINGLE_ROWS, _>(n, k))
 }
 
@@ -53,22 +58,20 @@ fn factor_blocks<T: Real, const R: usize>(
     last: usize,
     widths: &[usize],
     packed: &mut Vec<T>,
-) -> bool {
+) -> Result<(), NotPositiveDefinite> {
     let Some((&width, narrower)) = widths.split_last() else {
         return factor_strip(a, n, columns.start, columns.end);
     };
     for start in columns.clone().step_by(width) {
         let end = (start + width).min(columns.end);
-        if !factor_blocks::<T, R>(a, n, start..end, end, narrower, packed) {
-            return false;
-        }
+        factor_blocks::<T, R>(a, n, start..end, end, narrower, packed)?;
         update::<T, R>(a, n, start..end, last, packed);
     }
-    true
+    Ok(())
 }
 
 /// Factors columns `start..end` over all rows below, left-looking.
-fn factor_strip<T: Real>(a: &mut [T], n: usize, start: usize, end: usize) -> bool {
+fn factor_strip<T: Real>(a: &mut [T], n: usize, start: usize, end: usize) -> Result<(), NotPositiveDefinite> {
     for j in start..end {
         for p in start..j {
             let (left, right) = a.split_at_mut(j * n);
@@ -80,12 +83,12 @@ fn factor_strip<T: Real>(a: &mut [T], n: usize, start: usize, end: usize) -> boo
         // The comparison fails for NaN.
         let is_positive = pivot > T::zero();
         if !is_positive {
-            return false;
+            return Err(NotPositiveDefinite);
         }
         let inverse = T::one() / pivot.sqrt();
         a[j * n + j..j * n + n].iter_mut().for_each(|x| *x *= inverse);
     }
-    true
+    Ok(())
 }
 
 /// Subtracts `L Lᵀ` of `columns` from the lower triangle of the columns up to `last`. It may write above the
@@ -311,13 +314,13 @@ mod tests {
         for (n, k) in [(1, 1), (7, 3), (40, 40), (61, 29), (100, 52), (310, 290)] {
             let a = spd(n);
             let mut l = a.clone();
-            assert!(partial_cholesky(&mut l, n, k));
+            partial_cholesky(&mut l, n, k).expect("positive definite");
             let x: Vec<f64> = (0..n).map(|i| (i as f64 * 0.7).sin()).collect();
             let mut b = vec![0.0; n];
             symmetric_multiply(&a, n, &x, &mut b);
             forward(&l, n, k, &mut b);
             if k < n {
-                assert!(partial_cholesky(&mut schur(&l, n, k), n - k, n - k));
+                partial_cholesky(&mut schur(&l, n, k), n - k, n - k).expect("positive definite");
                 let s = schur(&l, n, k);
                 let mut right = vec![0.0; n - k];
                 symmetric_multiply(&s, n - k, &x[k..], &mut right);
@@ -351,8 +354,8 @@ mod tests {
 
     #[test]
     fn an_indefinite_matrix_is_rejected() {
-        assert!(!partial_cholesky(&mut [1.0, 2.0, 2.0, 1.0], 2, 2));
-        assert!(!partial_cholesky(&mut [f64::NAN], 1, 1));
+        assert_eq!(partial_cholesky(&mut [1.0, 2.0, 2.0, 1.0], 2, 2), Err(NotPositiveDefinite));
+        assert_eq!(partial_cholesky(&mut [f64::NAN], 1, 1), Err(NotPositiveDefinite));
     }
 
     #[test]
@@ -360,7 +363,8 @@ mod tests {
         for (n, k) in [(1, 1), (7, 3), (61, 29), (300, 280)] {
             let mut a = spd(n);
             let mut single: Vec<f32> = a.iter().map(|x| *x as f32).collect();
-            assert!(partial_cholesky(&mut a, n, k) && partial_cholesky_single(&mut single, n, k));
+            partial_cholesky(&mut a, n, k).expect("positive definite");
+            partial_cholesky_single(&mut single, n, k).expect("positive definite");
             let lower = (0..n * n).filter(|at| at % n >= at / n);
             let largest = a.iter().fold(0.0, |max: f64, x| max.max(x.abs()));
             lower.for_each(|at| {

@@ -1,6 +1,6 @@
 //! Numeric factorization: assembly of the fronts, elimination, and the triangular solves.
 
-use super::{SymbolicFactor, dense, symbolic::Run};
+use super::{NotPositiveDefinite, SymbolicFactor, dense, symbolic::Run};
 
 /// Cholesky factor of a block matrix, for one [`SymbolicFactor`] at a time. Its buffers are reused.
 #[derive(Clone, Debug, Default)]
@@ -22,9 +22,15 @@ pub(crate) trait BlockMatrix {
 }
 
 impl CholeskyFactor {
-    /// Factors `matrix`. Afterwards [`CholeskyFactor::schur`] is the Schur complement of the retained nodes. Returns
-    /// false if the matrix is not positive definite.
-    pub(crate) fn refill(&mut self, plan: &SymbolicFactor, matrix: &dyn BlockMatrix) -> bool {
+    /// Factors `matrix`. Afterwards [`CholeskyFactor::schur`] is the Schur complement of the retained nodes.
+    ///
+    /// # Errors
+    /// The matrix is not positive definite.
+    pub(crate) fn refill(
+        &mut self,
+        plan: &SymbolicFactor,
+        matrix: &dyn BlockMatrix,
+    ) -> Result<(), NotPositiveDefinite> {
         self.panels.resize(plan.factor_len, 0.0);
         self.stack.resize(plan.stack_len, 0.0);
         self.front.resize(plan.largest * plan.largest, 0.0);
@@ -50,14 +56,12 @@ impl CholeskyFactor {
             if is_root {
                 break;
             }
-            if !dense::partial_cholesky(&mut self.front[..n * n], n, k) {
-                return false;
-            }
+            dense::partial_cholesky(&mut self.front[..n * n], n, k)?;
             self.panels[front.offset..front.offset + n * k].copy_from_slice(&self.front[..n * k]);
             push_update(&self.front, n, k, &mut self.stack[top..]);
             top += (n - k) * (n - k);
         }
-        true
+        Ok(())
     }
 
     /// Schur complement of the retained nodes: side `3 · retained`, column-major, lower triangle.
@@ -222,7 +226,7 @@ mod tests {
             let places: Vec<[i32; 3]> = (0..125).map(|c| [c % 5, c / 5 % 5, c / 25]).collect();
             let plan = SymbolicFactor::new(&grid.neighbours, &places, &keep);
             let mut factor = CholeskyFactor::default();
-            assert!(factor.refill(&plan, &grid));
+            factor.refill(&plan, &grid).expect("positive definite");
             let mut y = vec![0.0; 3 * nodes];
             for (at, &node) in plan.order.iter().enumerate() {
                 y[3 * at..3 * at + 3].copy_from_slice(&b[3 * node as usize..3 * node as usize + 3]);
@@ -231,7 +235,7 @@ mod tests {
             let inner = 3 * (nodes - keep.len());
             let side = 3 * keep.len();
             let mut reduced = factor.schur().to_vec();
-            assert!(dense::partial_cholesky(&mut reduced, side, side));
+            dense::partial_cholesky(&mut reduced, side, side).expect("positive definite");
             dense::forward(&reduced, side, side, &mut y[inner..]);
             dense::backward(&reduced, side, side, &mut y[inner..]);
             factor.backward(&plan, &mut y);

@@ -11,6 +11,7 @@ use crate::{
     joints,
     rigid::{FreeSpin, free_spin},
     solver::{BlockIdentity, Endpoint, FrameJacobian, ScalarConstraint, VelocityBlock},
+    sparse::NotPositiveDefinite,
 };
 use softvt_geometry::{Pose, Vec3};
 
@@ -128,9 +129,9 @@ impl World {
                 continue;
             }
             let body = &soft.state;
-            if !soft.system.prepare(body, &c, soft.steps_awake) {
-                return Err(StepFailure::Indefinite { step: self.step, body: soft.name.clone() });
-            }
+            soft.system.update(body, &c, soft.steps_awake).map_err(|NotPositiveDefinite| {
+                StepFailure::Indefinite { step: self.step, body: soft.name.clone() }
+            })?;
             let momentum = &mut self.blocks.momentum;
             momentum.clear();
             momentum.extend(

@@ -173,15 +173,15 @@ impl World {
         let (a, b) = (self.collider(state.key.a), self.collider(state.key.b));
         let motion = &self.motions[state.key.b.index()];
         let surface = SurfaceContact {
-            p: point.p_w,
-            normal: point.n_w,
+            p: point.position_w,
+            normal: point.normal_w,
             gap: point.gap,
             area: point.area,
             stretch: motion.pose.rotation * state.stretch,
             previous_normal_impulse: state.normal_impulse,
             is_sliding: state.is_sliding,
         };
-        let drift = if is_b_known { motion.velocity(&point.p_w) } else { Vec3::zeros() };
+        let drift = if is_b_known { motion.velocity(&point.position_w) } else { Vec3::zeros() };
         let point =
             surface.contact_point(&a.friction.with(&b.friction), &a.stiffness.in_series(&b.stiffness));
         self.problem.points.push(ContactPoint { drift, ..point });

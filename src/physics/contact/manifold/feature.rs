@@ -20,7 +20,7 @@ const LINE: u32 = 128;
 /// A corner of a face.
 pub(super) struct FaceCorner {
     /// Position, m, world.
-    pub p_w: Vec3,
+    pub position_w: Vec3,
     /// Identifier of the corner.
     pub feature: u32,
     /// Identifier of the edge to the next corner.
@@ -101,7 +101,7 @@ fn box_face(half: &Vec3, pose: &Pose, direction: &Vec3) -> Face {
             let (from, to) = (corner(k), corner(k + 1));
             let along = if from[u] == to[u] { v } else { u };
             FaceCorner {
-                p_w: (pose * nalgebra::Point3::from(half.component_mul(&from))).coords,
+                position_w: (pose * nalgebra::Point3::from(half.component_mul(&from))).coords,
                 feature: id(&from),
                 edge: 8 + id(&from.inf(&to)) * 3 + along as u32,
             }
@@ -133,8 +133,8 @@ fn cap(radius: f64, z: f64, pose: &Pose, weight: f64) -> Face {
             // Counter-clockwise about the outward normal, which is −z below.
             let k = if z > 0.0 { k } else { RIM_POINTS - 1 - k };
             let (sin, cos) = (TAU * f64::from(k) / f64::from(RIM_POINTS)).sin_cos();
-            let p_w = pose * nalgebra::Point3::new(radius * cos, radius * sin, z);
-            FaceCorner { p_w: p_w.coords, feature: base + k, edge: 64 + base + k }
+            let position_w = pose * nalgebra::Point3::new(radius * cos, radius * sin, z);
+            FaceCorner { position_w: position_w.coords, feature: base + k, edge: 64 + base + k }
         })
         .collect();
     let normal = pose.rotation * Vec3::z() * z.signum();

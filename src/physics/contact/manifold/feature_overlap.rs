@@ -58,8 +58,11 @@ impl ProjectionPlane {
 
     /// Corners of a projected face, counter-clockwise, with `owner` added to their identifiers.
     fn polygon(&self, face: &Face, owner: u32) -> Vec<Corner> {
-        let corner =
-            |c: &FaceCorner| Corner { p: self.project(&c.p_w), feature: c.feature | owner, edge: c.edge };
+        let corner = |c: &FaceCorner| Corner {
+            p: self.project(&c.position_w),
+            feature: c.feature | owner,
+            edge: c.edge,
+        };
         let mut corners: Vec<Corner> = face.corners.iter().map(corner).collect();
         if clip::area2(&corners) < 0.0 {
             corners.reverse();
@@ -93,17 +96,17 @@ pub(super) fn features(
     out: &mut Vec<ManifoldPoint>,
 ) {
     let Some(axis) = contact_normal(a, b, margin) else { return };
-    let plane = ProjectionPlane::new(b.pose.translation.vector, axis.n_w);
-    let (on_a, on_b) = (facing_features(a, &axis.n_w), facing_features(b, &-axis.n_w));
+    let plane = ProjectionPlane::new(b.pose.translation.vector, axis.normal_w);
+    let (on_a, on_b) = (facing_features(a, &axis.normal_w), facing_features(b, &-axis.normal_w));
     let mut carried = 0.0;
     for FeatureOverlap { q, height_a, height_b, area, feature } in feature_overlaps(&plane, &on_a, &on_b) {
         let gap = height_b - height_a;
         carried +=
             area * (1.0 - ((gap - axis.gap - DEEPEST_M[0]) / (DEEPEST_M[1] - DEEPEST_M[0])).clamp(0.0, 1.0));
         if gap < margin && area > 0.0 {
-            let p_w =
+            let position_w =
                 plane.origin + plane.u * q[0] + plane.v * q[1] + plane.n * (0.5 * (height_a + height_b));
-            out.push(ManifoldPoint { p_w, n_w: axis.n_w, gap, area, feature });
+            out.push(ManifoldPoint { position_w, normal_w: axis.normal_w, gap, area, feature });
         }
     }
     let uncarried = POINT_AREA - carried;
@@ -114,11 +117,11 @@ pub(super) fn features(
 
 /// The closest points, for contacts that no overlap of features represents (a rim against an edge, end against end).
 fn witness(a: &Placed<Primitive>, b: &Placed<Primitive>, axis: &ContactNormal) -> ManifoldPoint {
-    let p_w = match axis.closest {
-        Some(touch) => 0.5 * (touch.a_w + touch.b_w),
-        None => 0.5 * (support(a, &axis.n_w) + support(b, &-axis.n_w)),
+    let position_w = match axis.closest {
+        Some(touch) => 0.5 * (touch.on_a_w + touch.on_b_w),
+        None => 0.5 * (support(a, &axis.normal_w) + support(b, &-axis.normal_w)),
     };
-    ManifoldPoint { p_w, n_w: axis.n_w, gap: axis.gap, area: POINT_AREA, feature: WITNESS }
+    ManifoldPoint { position_w, normal_w: axis.normal_w, gap: axis.gap, area: POINT_AREA, feature: WITNESS }
 }
 
 fn feature_overlaps(plane: &ProjectionPlane, a: &FacingFeatures, b: &FacingFeatures) -> Vec<FeatureOverlap> {
@@ -244,16 +247,22 @@ pub(super) fn plane_box(
     margin: f64,
     out: &mut Vec<ManifoldPoint>,
 ) {
-    let n_w = plane_w.rotation * Vec3::z();
-    let down = -(box_w.rotation.inverse() * n_w);
+    let normal_w = plane_w.rotation * Vec3::z();
+    let down = -(box_w.rotation.inverse() * normal_w);
     let face = Vec3::new(half.y * half.z, half.x * half.z, half.x * half.y);
     for corner in 0..8u32 {
         let sign = hex8::corner_sign(corner as usize);
-        let p_w = box_w * nalgebra::Point3::from(half.component_mul(&sign));
-        let gap = n_w.dot(&(p_w.coords - plane_w.translation.vector));
+        let position_w = box_w * nalgebra::Point3::from(half.component_mul(&sign));
+        let gap = normal_w.dot(&(position_w.coords - plane_w.translation.vector));
         let area = (0..3).map(|axis| face[axis] * (sign[axis] * down[axis]).max(0.0)).sum::<f64>();
         if gap < margin && area > 0.0 {
-            out.push(ManifoldPoint { p_w: p_w.coords - n_w * (0.5 * gap), n_w, gap, area, feature: corner });
+            out.push(ManifoldPoint {
+                position_w: position_w.coords - normal_w * (0.5 * gap),
+                normal_w,
+                gap,
+                area,
+                feature: corner,
+            });
         }
     }
 }

@@ -156,9 +156,11 @@ mod tests {
                 let points = touch(&shape, &pose, &ground, &ground_w, 0.001);
                 let point = points.iter().min_by(|p, q| p.gap.total_cmp(&q.gap)).expect("a lowest point");
                 assert!((point.gap + 5e-5).abs() < 1e-9, "{shape:?}, turn {k}: gap {}", point.gap);
-                let aside = (point.p_w - (turn * lowest + pose.translation.vector)).xy().norm();
+                let aside = (point.position_w - (turn * lowest + pose.translation.vector)).xy().norm();
                 assert!(aside < 1e-6 && is_non_material(point), "{shape:?}, turn {k}: {aside} m aside");
-                assert!((point.n_w + Vec3::z()).norm() < 1e-12 && (point.area - POINT_AREA).abs() < 1e-12);
+                assert!(
+                    (point.normal_w + Vec3::z()).norm() < 1e-12 && (point.area - POINT_AREA).abs() < 1e-12
+                );
                 assert_eq!(points.len(), 1, "{points:?}");
             }
         }
@@ -176,7 +178,8 @@ mod tests {
         );
         for p in &standing {
             assert!(
-                (p.gap + 1e-5).abs() < 1e-12 && rims.iter().any(|r| (p.p_w.xy().norm() - r).abs() < 1e-9)
+                (p.gap + 1e-5).abs() < 1e-12
+                    && rims.iter().any(|r| (p.position_w.xy().norm() - r).abs() < 1e-9)
             );
         }
         for heading in [0.0f64, 0.13, 1.7] {
@@ -200,15 +203,18 @@ mod tests {
             let pose = Pose::from_parts(nalgebra::Translation3::new(0.0, 0.0, 0.033 - 1e-5), turn);
             let points = touch(&can, &pose, &ground, &ground_w, 5e-6);
             for end in [-0.05, 0.05] {
-                let at_end = points.iter().filter(|p| (p.p_w.x - end).abs() < 1e-6);
+                let at_end = points.iter().filter(|p| (p.position_w.x - end).abs() < 1e-6);
                 let carried: Vec<_> = at_end.filter(|p| (p.gap + 1e-5).abs() < 1e-9).collect();
                 assert!(
-                    carried.iter().any(|p| p.p_w.y.abs() < 1e-6 && is_non_material(p)),
+                    carried.iter().any(|p| p.position_w.y.abs() < 1e-6 && is_non_material(p)),
                     "roll {roll}: {points:?}"
                 );
             }
             // Nothing but that line: what carries elsewhere on it is true contact too.
-            assert!(points.iter().all(|p| p.p_w.y.abs() < 1e-4 && p.gap >= -1e-5 - 1e-9), "{points:?}");
+            assert!(
+                points.iter().all(|p| p.position_w.y.abs() < 1e-4 && p.gap >= -1e-5 - 1e-9),
+                "{points:?}"
+            );
         }
     }
 
@@ -266,8 +272,10 @@ mod tests {
         assert_eq!(points.len(), 4, "{points:?}");
         let slope = 0.025 / f64::hypot(0.034, 0.025);
         for p in &points {
-            assert!((p.gap + 1e-5 * slope).abs() < 1e-9 && (p.p_w.xy().norm() - corner_r).abs() < 1e-5);
-            assert!((p.n_w.z + slope).abs() < 1e-9, "from the cube into the wall: {}", p.n_w);
+            assert!(
+                (p.gap + 1e-5 * slope).abs() < 1e-9 && (p.position_w.xy().norm() - corner_r).abs() < 1e-5
+            );
+            assert!((p.normal_w.z + slope).abs() < 1e-9, "from the cube into the wall: {}", p.normal_w);
         }
     }
 

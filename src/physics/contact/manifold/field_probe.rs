@@ -35,10 +35,10 @@ impl SdfProbe<'_> {
     pub(super) fn contact(&self, p_a: &Vec3, area: f64, feature: u32) -> ManifoldPoint {
         let p_b = self.a_in_b * nalgebra::Point3::from(*p_a);
         let (gap, n_b) = self.shape_b.distance_and_normal(&p_b.coords);
-        let n_w = -(self.pose_b.rotation * n_b);
+        let normal_w = -(self.pose_b.rotation * n_b);
         // `p_a` is on the first surface; the second is one gap further along the normal.
-        let p_w = (self.pose_b * p_b).coords + n_w * (0.5 * gap);
-        ManifoldPoint { p_w, n_w, gap, area, feature }
+        let position_w = (self.pose_b * p_b).coords + normal_w * (0.5 * gap);
+        ManifoldPoint { position_w, normal_w, gap, area, feature }
     }
 }
 

@@ -187,7 +187,7 @@ impl Smooth<'_> {
 
 /// Share of a point contact that is not carried by other points as deep as `lowest` on its side.
 fn uncarried_share(lowest: &ManifoldPoint, others: &[ManifoldPoint]) -> f64 {
-    let same_side = others.iter().filter(|point| point.n_w.dot(&lowest.n_w) > SAME_SIDE);
+    let same_side = others.iter().filter(|point| point.normal_w.dot(&lowest.normal_w) > SAME_SIDE);
     let carried = same_side.map(|point| {
         let higher = (point.gap - lowest.gap - SAME_DEPTH_M[0]) / (SAME_DEPTH_M[1] - SAME_DEPTH_M[0]);
         (1.0 - higher).clamp(0.0, 1.0) * (point.area / SAMPLE_AREA).min(1.0)

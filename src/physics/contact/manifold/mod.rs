@@ -38,9 +38,9 @@ pub(super) use feature_extraction::{SurfaceFeatures, primitives, surface_feature
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ManifoldPoint {
     /// Position, half-way between the two surfaces, m, world.
-    pub p_w: Vec3,
+    pub position_w: Vec3,
     /// Unit normal from the first body to the second, world.
-    pub n_w: Vec3,
+    pub normal_w: Vec3,
     /// Gap along the normal, m; negative is overlap.
     pub gap: f64,
     /// Area that the point represents, m². The points of a flat patch share its area; a point or line contact has
@@ -82,7 +82,7 @@ pub fn manifold(a: &Placed<Primitive>, b: &Placed<Primitive>, margin: f64, out: 
     if rank(&a.shape) > rank(&b.shape) {
         let start = out.len();
         manifold(b, a, margin, out);
-        return out[start..].iter_mut().for_each(|point| point.n_w = -point.n_w);
+        return out[start..].iter_mut().for_each(|point| point.normal_w = -point.normal_w);
     }
     match (a.shape, b.shape) {
         (Primitive::Plane, Primitive::Plane) => {}

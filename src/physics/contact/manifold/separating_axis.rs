@@ -15,7 +15,7 @@ const PREFER_FACES_SHARE: f64 = 0.01;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ContactNormal {
     /// Unit, from the first primitive to the second, world.
-    pub n_w: Vec3,
+    pub normal_w: Vec3,
     /// Gap along it, m.
     pub gap: f64,
     /// True if the gap is the distance, false if it is only a lower bound, as for two boxes corner to corner.
@@ -30,14 +30,14 @@ pub(super) fn contact_normal(
     b: &Placed<Primitive>,
     margin: f64,
 ) -> Option<ContactNormal> {
-    let gap_along = |n_w: &Vec3| n_w.dot(&(support(b, &-n_w) - support(a, n_w)));
+    let gap_along = |normal_w: &Vec3| normal_w.dot(&(support(b, &-normal_w) - support(a, normal_w)));
     let signed = |axis: &Vec3| {
         let (ahead, behind) = (gap_along(axis), gap_along(&-axis));
         if ahead >= behind { (ahead, *axis) } else { (behind, -axis) }
     };
-    let (mut gap, mut n_w) = if a.shape == Primitive::Plane {
-        let n_w = faces(a)[0];
-        (gap_along(&n_w), n_w)
+    let (mut gap, mut normal_w) = if a.shape == Primitive::Plane {
+        let normal_w = faces(a)[0];
+        (gap_along(&normal_w), normal_w)
     } else {
         faces(a)
             .iter()
@@ -49,7 +49,7 @@ pub(super) fn contact_normal(
         return None;
     }
     if a.shape == Primitive::Plane {
-        return Some(ContactNormal { n_w, gap, closest: None, is_attained: true });
+        return Some(ContactNormal { normal_w, gap, closest: None, is_attained: true });
     }
     let mut to_beat = gap + PREFER_FACES_M + PREFER_FACES_SHARE * gap.abs();
     for edge_a in edges(a) {
@@ -57,7 +57,7 @@ pub(super) fn contact_normal(
             let Some(cross) = edge_a.cross(&edge_b).try_normalize(1e-6) else { continue };
             let found = signed(&cross);
             if found.0 > to_beat {
-                (gap, n_w) = found;
+                (gap, normal_w) = found;
                 to_beat = gap;
             }
         }
@@ -66,16 +66,16 @@ pub(super) fn contact_normal(
         return None;
     }
     if matches!((a.shape, b.shape), (Primitive::Box { .. }, Primitive::Box { .. })) {
-        return Some(ContactNormal { n_w, gap, closest: None, is_attained: gap <= 0.0 });
+        return Some(ContactNormal { normal_w, gap, closest: None, is_attained: gap <= 0.0 });
     }
     let closest = convex::closest_points(a, b, margin);
     if let Some(found) = closest {
-        let refined = gap_along(&found.n_w);
+        let refined = gap_along(&found.normal_w);
         if refined > gap + PREFER_FACES_M {
-            (gap, n_w) = (refined, found.n_w);
+            (gap, normal_w) = (refined, found.normal_w);
         }
     }
-    (gap < margin).then_some(ContactNormal { n_w, gap, closest, is_attained: true })
+    (gap < margin).then_some(ContactNormal { normal_w, gap, closest, is_attained: true })
 }
 
 /// The point of a primitive farthest along `direction` (unit, world).

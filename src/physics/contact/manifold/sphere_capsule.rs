@@ -18,10 +18,10 @@ pub(super) fn sphere(
     let centre_w = sphere_w.translation.vector;
     let centre_a = (a.pose.inverse() * nalgebra::Point3::from(centre_w)).coords;
     let SurfaceDistance { distance, normal } = SurfaceDistance::new(&a.shape, &centre_a);
-    let (gap, n_w) = (distance - radius, a.pose.rotation * normal);
+    let (gap, normal_w) = (distance - radius, a.pose.rotation * normal);
     if gap < margin {
-        let p_w = centre_w - n_w * (radius + 0.5 * gap);
-        out.push(ManifoldPoint { p_w, n_w, gap, area: POINT_AREA, feature: NON_MATERIAL });
+        let position_w = centre_w - normal_w * (radius + 0.5 * gap);
+        out.push(ManifoldPoint { position_w, normal_w, gap, area: POINT_AREA, feature: NON_MATERIAL });
     }
 }
 
@@ -86,12 +86,12 @@ pub(super) fn capsules(
     let Primitive::Capsule { radius: rb, half_height: hb } = b.shape else { return };
     let (core_a, core_b) = (core(&a.pose, ha), core(&b.pose, hb));
     let mut push = |on_a: Vec3, on_b: Vec3, weight: f64, feature: u32| {
-        let SurfaceDistance { distance, normal: n_w } = SurfaceDistance::to_ball(&(on_b - on_a), 0.0);
+        let SurfaceDistance { distance, normal: normal_w } = SurfaceDistance::to_ball(&(on_b - on_a), 0.0);
         let gap = distance - ra - rb;
         if gap < margin && weight > 0.0 {
-            let p_w = on_a + n_w * (ra + 0.5 * gap);
+            let position_w = on_a + normal_w * (ra + 0.5 * gap);
             let (area, feature) = (POINT_AREA * weight, NON_MATERIAL | feature);
-            out.push(ManifoldPoint { p_w, n_w, gap, area, feature });
+            out.push(ManifoldPoint { position_w, normal_w, gap, area, feature });
         }
         gap
     };

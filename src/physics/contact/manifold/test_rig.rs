@@ -55,13 +55,13 @@ impl Incline {
     fn force(&mut self, point: &ManifoldPoint, springs: &mut BTreeMap<u32, Vec3>) -> Vec3 {
         let stiffness = MODULUS * point.area;
         let damping = DAMPING * 2.0 * (stiffness * self.body.mass).sqrt();
-        let v = self.body.velocity_at(&point.p_w);
-        let v_n = v.dot(&point.n_w);
+        let v = self.body.velocity_at(&point.position_w);
+        let v_n = v.dot(&point.normal_w);
         let normal = (-stiffness * point.gap - damping * v_n).max(0.0);
         if point.gap >= 0.0 || normal == 0.0 {
             return Vec3::zeros();
         }
-        let v_t = v - point.n_w * v_n;
+        let v_t = v - point.normal_w * v_n;
         let stretch = self.springs.get(&point.feature).copied().unwrap_or_default() + v_t * DT;
         let wanted = -stretch * (0.5 * stiffness) - v_t * (0.3 * damping);
         let bound = self.friction * normal;
@@ -72,7 +72,7 @@ impl Incline {
             (wanted, stretch)
         };
         springs.insert(point.feature, stretch);
-        point.n_w * normal + tangential
+        point.normal_w * normal + tangential
     }
 
     fn step(&mut self) {
@@ -82,7 +82,7 @@ impl Incline {
         for point in &points {
             let f = self.force(point, &mut springs);
             force += f;
-            torque += (point.p_w - self.body.pose_w.translation.vector).cross(&f);
+            torque += (point.position_w - self.body.pose_w.translation.vector).cross(&f);
         }
         self.springs = springs;
         let spin = free_spin(&self.body, DT);

@@ -71,9 +71,9 @@ fn a_box_flat_on_a_plane_stands_on_its_four_corners() {
     let points = meet(&Primitive::Plane, &at(0.0, 0.0, 0.1), &BOX, &at(0.2, 0.1, 0.149), 0.005);
     assert_eq!(points.len(), 4);
     for point in &points {
-        assert!((point.gap + 0.001).abs() < 1e-15 && point.n_w == Vec3::z());
+        assert!((point.gap + 0.001).abs() < 1e-15 && point.normal_w == Vec3::z());
         assert!((point.area - 0.03 * 0.02).abs() < 1e-18);
-        let corner = point.p_w - Vec3::new(0.2, 0.1, 0.0995);
+        let corner = point.position_w - Vec3::new(0.2, 0.1, 0.0995);
         assert!((corner.abs() - Vec3::new(0.03, 0.02, 0.0)).norm() < 1e-15);
     }
 }
@@ -89,7 +89,7 @@ fn turned_square_on_square_meets_in_the_octagon() {
     assert!(
         points
             .iter()
-            .all(|point| (point.gap - 0.0005).abs() < 1e-12 && (point.n_w - Vec3::z()).norm() < 1e-12)
+            .all(|point| (point.gap - 0.0005).abs() < 1e-12 && (point.normal_w - Vec3::z()).norm() < 1e-12)
     );
     let mut names: Vec<u32> = points.iter().map(|point| point.feature).collect();
     names.sort_unstable();
@@ -122,8 +122,8 @@ fn crossed_edges_touch_in_one_point() {
     let points = meet(&cube, &lower, &cube, &upper, 0.0002);
     assert_eq!(points.len(), 1);
     assert!((points[0].gap + 0.0003).abs() < 1e-12);
-    assert!((points[0].p_w - Vec3::new(0.001, 0.0, 0.5 * height + 0.0)).xy().norm() < 2.1e-3);
-    assert!((points[0].n_w - Vec3::z()).norm() < 1e-12);
+    assert!((points[0].position_w - Vec3::new(0.001, 0.0, 0.5 * height + 0.0)).xy().norm() < 2.1e-3);
+    assert!((points[0].normal_w - Vec3::z()).norm() < 1e-12);
 }
 
 #[test]
@@ -136,7 +136,9 @@ fn a_can_stands_on_its_whole_rim_and_leans_on_its_lowest_point() {
         * (std::f64::consts::TAU / f64::from(feature::RIM_POINTS)).sin();
     assert!((area(&standing) - polygon).abs() < 1e-15);
     assert!(
-        standing.iter().all(|p| (p.p_w.xy().norm() - 0.033).abs() < 1e-15 && (p.gap + 1e-4).abs() < 1e-15)
+        standing
+            .iter()
+            .all(|p| (p.position_w.xy().norm() - 0.033).abs() < 1e-15 && (p.gap + 1e-4).abs() < 1e-15)
     );
     for heading in [0.0f64, 0.13, 2.0] {
         let tilt = Vec3::new(-heading.sin(), heading.cos(), 0.0) * 0.3;
@@ -161,7 +163,11 @@ fn a_lying_can_and_a_lying_capsule_rest_on_the_ends_of_their_lowest_line() {
                 let reach: f64 = if long { half } else { 0.03 };
                 assert_eq!(points.len(), 2, "{primitive:?} on {floor:?}");
                 for p in &points {
-                    assert!((p.p_w.x.abs() - reach).abs() < 1e-9 && p.p_w.y.abs() < 1e-9, "{:?}", p.p_w);
+                    assert!(
+                        (p.position_w.x.abs() - reach).abs() < 1e-9 && p.position_w.y.abs() < 1e-9,
+                        "{:?}",
+                        p.position_w
+                    );
                     assert!((p.gap + 1e-4).abs() < 1e-9 && is_non_material(p));
                 }
             }
@@ -188,9 +194,9 @@ fn the_gap_is_the_largest_that_any_direction_shows() {
                     n.dot(&(support(&b, &pose_b, &-n) - support(&a, &pose_a, n)))
                 };
                 let least = points.iter().min_by(|p, q| p.gap.total_cmp(&q.gap)).expect("a point");
-                assert!((gap_along(&least.n_w) - gap).abs() < 1.2e-5, "{a:?} {b:?}: {gap} not attained");
+                assert!((gap_along(&least.normal_w) - gap).abs() < 1.2e-5, "{a:?} {b:?}: {gap} not attained");
                 for _ in 0..400 {
-                    let n = (least.n_w + Vec3::from_fn(|_, _| rng.random_range(-1.5..1.5))).normalize();
+                    let n = (least.normal_w + Vec3::from_fn(|_, _| rng.random_range(-1.5..1.5))).normalize();
                     assert!(
                         gap_along(&n) < gap + 0.011 * gap.abs() + 1.2e-5,
                         "{a:?} {b:?}: {} beats {gap}",
@@ -216,7 +222,7 @@ fn swapping_the_bodies_flips_the_normals_only() {
             assert!((area(&there) / area(&back) - 1.0).abs() < share, "{a:?} {b:?} {there:?} {back:?}");
             for p in &there {
                 let twin = back.iter().any(|q| {
-                    let apart = (p.p_w - q.p_w).norm().max((p.n_w + q.n_w).norm());
+                    let apart = (p.position_w - q.position_w).norm().max((p.normal_w + q.normal_w).norm());
                     apart < near && (p.gap - q.gap).abs() < level
                 });
                 assert!(twin, "{a:?} {b:?}: {p:?} has no twin in {back:?}");
@@ -228,8 +234,8 @@ fn swapping_the_bodies_flips_the_normals_only() {
 /// Force and torque (about the world's origin) of a layer of unit modulus.
 fn push(points: &[ManifoldPoint]) -> (Vec3, Vec3) {
     points.iter().fold((Vec3::zeros(), Vec3::zeros()), |(force, torque), p| {
-        let f = p.n_w * (p.area * (-p.gap).max(0.0));
-        (force + f, torque + p.p_w.cross(&f))
+        let f = p.normal_w * (p.area * (-p.gap).max(0.0));
+        (force + f, torque + p.position_w.cross(&f))
     })
 }
 
@@ -275,9 +281,9 @@ fn a_can_on_a_box_is_carried_by_the_part_of_its_cap_over_the_box() {
     let table = Primitive::Box { half: Vec3::new(0.1, 0.1, 0.02) };
     let can_w = at(0.09, 0.01, 0.07 - 1e-5);
     let points = meet(&table, &Pose::identity(), &CAN, &can_w, 0.001);
-    let far = points.iter().map(|p| p.p_w.x).fold(0.0, f64::max);
+    let far = points.iter().map(|p| p.position_w.x).fold(0.0, f64::max);
     assert!((far - 0.1).abs() < 1e-12, "reaches to {far}");
-    assert!(points.iter().all(|p| (p.gap + 1e-5).abs() < 1e-12 && p.n_w == Vec3::z()));
+    assert!(points.iter().all(|p| (p.gap + 1e-5).abs() < 1e-12 && p.normal_w == Vec3::z()));
     // The segment of the disc cut off at 10 mm from the centre.
     let (r, d): (f64, f64) = (0.033, 0.01);
     let cut = r * r * (d / r).acos() - d * (r * r - d * d).sqrt();
@@ -290,7 +296,7 @@ fn stacked_cans_share_the_whole_disc() {
     let points = meet(&CAN, &Pose::identity(), &CAN, &turned(at(0.0, 0.0, 0.0999), Vec3::z() * 0.05), 0.001);
     let disc = std::f64::consts::PI * 0.033f64.powi(2);
     assert!((area(&points) / disc - 1.0).abs() < 0.03);
-    let centre = points.iter().fold(Vec3::zeros(), |sum, p| sum + p.p_w * p.area) / area(&points);
+    let centre = points.iter().fold(Vec3::zeros(), |sum, p| sum + p.position_w * p.area) / area(&points);
     assert!(centre.xy().norm() < 1e-9 && points.iter().all(|p| (p.gap + 1e-4).abs() < 1e-12));
 }
 
@@ -305,8 +311,8 @@ fn a_can_leaning_on_a_wall_touches_its_edge_with_its_side() {
     let can_w = turned(Pose::from_parts(centre.into(), Quat::identity()), Vec3::y() * lean);
     let points = meet(&CAN, &can_w, &wall, &Pose::identity(), 0.0005);
     assert_eq!(points.len(), 1, "{points:?}");
-    assert!((points[0].gap + 2e-5).abs() < 1e-7 && (points[0].n_w - side).norm() < 1e-4, "{points:?}");
-    assert!((points[0].p_w - Vec3::new(-0.005, 0.0, 0.03)).norm() < 5e-5, "{points:?}");
+    assert!((points[0].gap + 2e-5).abs() < 1e-7 && (points[0].normal_w - side).norm() < 1e-4, "{points:?}");
+    assert!((points[0].position_w - Vec3::new(-0.005, 0.0, 0.03)).norm() < 5e-5, "{points:?}");
 }
 
 #[test]
