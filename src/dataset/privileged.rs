@@ -80,7 +80,7 @@ fn deformation(finished: &FinishedEpisode) -> Vec<DataStream> {
         shifted(scores, vec![0.0], |score| vec![pick(score).unwrap_or(f64::NAN)])
     };
     let size = |f: &ControlStepScore| {
-        f.deformation_v1.map_or(vec![f64::NAN; 3], |d| d.bbox_m.iter().copied().collect())
+        f.worst.deformation_v1.map_or(vec![f64::NAN; 3], |d| d.bbox_m.iter().copied().collect())
     };
     let percent = |name: &str, metric: &str, numbers| {
         DataStream::f64(format!("privileged/{name}"), &[], numbers)
@@ -89,9 +89,13 @@ fn deformation(finished: &FinishedEpisode) -> Vec<DataStream> {
             .attribute("meaning", "worst over the physics steps of the control step before")
     };
     vec![
-        percent("d", METRIC_ID, of(&|f| Some(f.deformation?.rms_pct))),
-        percent("d_max", METRIC_ID, of(&|f| Some(f.deformation?.max_pct))),
-        percent("soft_extras/fem_deformation_rms", V1_METRIC_ID, of(&|f| Some(f.deformation_v1?.v1_rms_pct))),
+        percent("d", METRIC_ID, of(&|f| Some(f.worst.deformation?.rms_pct))),
+        percent("d_max", METRIC_ID, of(&|f| Some(f.worst.deformation?.max_pct))),
+        percent(
+            "soft_extras/fem_deformation_rms",
+            V1_METRIC_ID,
+            of(&|f| Some(f.worst.deformation_v1?.v1_rms_pct)),
+        ),
         DataStream::f64(
             "privileged/soft_extras/fem_bbox_dims",
             &[3],

@@ -37,7 +37,7 @@ impl DeformationLimit {
     }
 }
 
-/// Largest deformation over the physics steps of an episode.
+/// Largest deformation over the physics steps of an episode ([`super::deformation::series`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PeakDeformation {
     /// The largest D, %; `None` if it was never measured.
@@ -47,14 +47,6 @@ pub struct PeakDeformation {
 }
 
 impl PeakDeformation {
-    /// Takes in the D of one step; `None` and values that are not finite count as missing.
-    pub fn update(&mut self, d_pct: Option<f64>) {
-        match d_pct.filter(|d| d.is_finite()) {
-            Some(d) => self.d_pct = Some(self.d_pct.map_or(d, |peak| peak.max(d))),
-            None => self.missing += 1,
-        }
-    }
-
     /// True if the deformation never exceeded `tau_pct`; equality is allowed.
     ///
     /// `Some(false)` if it was exceeded, even when other steps are missing. `None` if it was not exceeded but the
@@ -103,10 +95,8 @@ pub struct KappaVerdict {
 mod tests {
     use super::*;
 
-    fn peak(ds: &[Option<f64>]) -> PeakDeformation {
-        let mut peak = PeakDeformation::default();
-        ds.iter().for_each(|d| peak.update(*d));
-        peak
+    fn peak(d_pct: Option<f64>, missing: u64) -> PeakDeformation {
+        PeakDeformation { d_pct, missing }
     }
 
     #[test]
@@ -114,17 +104,16 @@ mod tests {
         let limit = DeformationLimit { d_ref_pct: 2.359091, kappa: 0.5 };
         assert_eq!(limit.tau_pct(), 1.179546);
         assert_eq!(limit.tau_at(0.3), 0.707727);
-        assert_eq!(peak(&[Some(1.179546)]).is_within(Some(limit.tau_pct())), Some(true));
-        assert_eq!(peak(&[Some(1.1795461)]).is_within(Some(limit.tau_pct())), Some(false));
+        assert_eq!(peak(Some(1.179546), 0).is_within(Some(limit.tau_pct())), Some(true));
+        assert_eq!(peak(Some(1.1795461), 0).is_within(Some(limit.tau_pct())), Some(false));
     }
 
     #[test]
     fn missing_evidence_is_never_safe() {
-        assert_eq!(peak(&[]).is_within(Some(1.0)), None);
-        assert_eq!(peak(&[Some(0.5), None]).is_within(Some(1.0)), None);
-        assert_eq!(peak(&[Some(0.5), Some(f64::NAN)]).is_within(Some(1.0)), None);
-        assert_eq!(peak(&[Some(0.5)]).is_within(None), None, "no threshold");
-        assert_eq!(peak(&[Some(1.5), None]).is_within(Some(1.0)), Some(false), "known to be too much");
+        assert_eq!(peak(None, 0).is_within(Some(1.0)), None);
+        assert_eq!(peak(Some(0.5), 1).is_within(Some(1.0)), None);
+        assert_eq!(peak(Some(0.5), 0).is_within(None), None, "no threshold");
+        assert_eq!(peak(Some(1.5), 1).is_within(Some(1.0)), Some(false), "known to be too much");
         let parts = SafetyParts { goal: true, no_drop: true, slip_ok: None };
         assert!(!parts.is_safe(true, None));
     }

@@ -614,7 +614,7 @@ impl Episode {
         let scores = self.judge.scores().to_vec();
         let recording = self.recorded.map(|frames| {
             let settled = reference.as_ref().map(|_| 0.0);
-            let worst = scores.iter().map(|score| score.deformation.map(|d| d.rms_pct));
+            let worst = scores.iter().map(|score| score.worst.deformation.map(|d| d.rms_pct));
             let d_pct = std::iter::once(settled).chain(worst).collect();
             StateRecording { sensors: self.sensors, frames, d_pct }
         });

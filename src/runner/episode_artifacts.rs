@@ -144,7 +144,7 @@ impl EpisodeArtifacts<'_> {
 fn debug_frames(finished: &FinishedEpisode) -> Vec<DebugFrame> {
     let header = &finished.record.header;
     let frame = |(step, score): (usize, &ControlStepScore)| {
-        let (d, reference) = (score.deformation_v1.as_ref(), finished.reference.as_ref());
+        let (d, reference) = (score.worst.deformation_v1.as_ref(), finished.reference.as_ref());
         let (rms, max, bbox) = (d.map(|d| d.v1_rms_pct), d.map(|d| d.max_pct), d.map(|d| d.bbox_m));
         let shape = DebugShape::new(&header.asset, reference, rms, max, bbox);
         DebugFrame::new(&header.id, step as u32, score.success_now, shape)
@@ -160,7 +160,8 @@ fn debug_frames(finished: &FinishedEpisode) -> Vec<DebugFrame> {
 /// belongs to this step.
 fn aborted_frame(finished: &FinishedEpisode, step: usize) -> DebugFrame {
     let (header, verdict) = (&finished.record.header, &finished.record.verdict);
-    let before = finished.scores.iter().filter_map(|score| Some(score.deformation_v1.as_ref()?.v1_rms_pct));
+    let before =
+        finished.scores.iter().filter_map(|score| Some(score.worst.deformation_v1.as_ref()?.v1_rms_pct));
     let before = before.fold(0.0, f64::max);
     let peak = verdict.d_peak_v1.filter(|peak| *peak > before);
     let reference = finished.reference.as_ref();

@@ -84,12 +84,12 @@ use softvt_geometry::Aabb;
 
 use super::{
     criteria::SuccessCriteria,
-    deformation::{Deformation, series::DeformationSeries},
+    deformation::series::{DeformationSeries, WorstSteps},
     drop::{DropEvent, DropMonitor, DropReason, DropSample, ReleaseMonitor},
     evidence::{BodyEvidence, CrushedShares, Evidence},
     goal::{GoalMonitor, GoalRegion, GoalSample},
     grip::{GripMonitor, GripSample},
-    safety::{DeformationLimit, KAPPAS, KappaVerdict, PeakDeformation, SafetyParts},
+    safety::{DeformationLimit, KAPPAS, KappaVerdict, SafetyParts},
     slip::{OpeningMonitor, SlipMonitor, SlipSample},
     stage::{StageEvidence, StageMonitor},
     verdict::{OtherObjectDeformation, Outcome, Verdict, WrongObjectContact},
@@ -152,10 +152,8 @@ struct FirstContact {
 pub struct ControlStepScore {
     /// True if the goal had been reached and held for long enough.
     pub success_now: bool,
-    /// Deformation at the physics step of the control step with the largest D; `None` if it is unknown.
-    pub deformation: Option<Deformation>,
-    /// Deformation at the physics step with the largest D of SoftVTBench's definition.
-    pub deformation_v1: Option<Deformation>,
+    /// Deformation at the worst physics steps of the control step.
+    pub worst: WorstSteps,
 }
 
 /// Sums over the physics steps of one control step.
@@ -189,18 +187,13 @@ pub struct Judge {
     pad_forces: PadForceStats,
     /// True if another object than the target was lifted first; `None` before.
     is_other_first: Option<bool>,
-    peak: PeakDeformation,
-    peak_v1: PeakDeformation,
-    peak_max: PeakDeformation,
+    /// Deformation of the target.
     series: DeformationSeries,
     scores: Vec<ControlStepScore>,
-    /// Worst deformation of the target since the last control step, by D and by that of SoftVTBench.
-    worst: Option<Deformation>,
-    worst_v1: Option<Deformation>,
     /// Physics steps so far.
     steps: u64,
-    /// Peaks of the other bodies, in the order of the evidence.
-    peaks_other: Vec<PeakDeformation>,
+    /// Deformations of the other bodies, in the order of the evidence.
+    series_other: Vec<DeformationSeries>,
     first_wrong_contact: Option<FirstContact>,
     stage: StageMonitor,
     crushed: CrushedShares,
@@ -215,10 +208,8 @@ impl Judge {
         Self {
             series: DeformationSeries::new(if config.is_target_soft { config.max_steps } else { 0 }),
             scores: Vec::with_capacity(config.max_steps / config.steps_per_control as usize),
-            worst: None,
-            worst_v1: None,
             steps: 0,
-            peaks_other: vec![PeakDeformation::default(); config.others.len()],
+            series_other: vec![DeformationSeries::new(0); config.others.len()],
             first_wrong_contact: None,
             stage: StageMonitor::default(),
             config,
@@ -231,9 +222,6 @@ impl Judge {
             control_step: ControlStepSums::default(),
             pad_forces: PadForceStats::default(),
             is_other_first: None,
-            peak: PeakDeformation::default(),
-            peak_v1: PeakDeformation::default(),
-            peak_max: PeakDeformation::default(),
             crushed: CrushedShares::default(),
             missing_evidence: 0,
             time_s: 0.0,
@@ -252,12 +240,8 @@ impl Judge {
         }
         self.steps += 1;
         if self.steps.is_multiple_of(u64::from(self.config.steps_per_control)) {
-            let score = ControlStepScore {
-                success_now: self.is_goal_reached(),
-                deformation: self.worst.take(),
-                deformation_v1: self.worst_v1.take(),
-            };
-            self.scores.push(score);
+            let worst = self.series.take_worst();
+            self.scores.push(ControlStepScore { success_now: self.is_goal_reached(), worst });
         }
     }
 
@@ -329,8 +313,10 @@ impl Judge {
         let soft = self.config.is_target_soft;
         let goal = valid && self.is_goal_reached();
         let no_drop = self.drops.first.is_none();
-        let within = |tau| if soft && valid { self.peak.is_within(tau) } else { None };
+        let others = self.others(valid);
         let limit = self.config.limit.filter(|_| soft);
+        let series = self.series.finish(limit.map(|limit| limit.tau_pct()));
+        let within = |tau| if soft && valid { series.peak.is_within(tau) } else { None };
         let deformation_ok = within(limit.map(|l| l.tau_pct()));
         let no_slip = self.slip.slip_m() <= self.config.criteria.slip_m;
         let slip_ok = (self.config.criteria.require_no_slip && valid).then_some(no_slip);
@@ -344,7 +330,6 @@ impl Judge {
             let safety = parts.is_safe(soft, deformation_ok);
             KappaVerdict { kappa, tau_pct, deformation_ok, safety }
         };
-        let others = self.others(valid);
         let others_ok = match valid {
             true if others.iter().any(|other| other.deformation_ok == Some(false)) => Some(false),
             true if others.iter().all(|other| other.deformation_ok == Some(true)) => Some(true),
@@ -354,7 +339,6 @@ impl Judge {
             time_s: contact.time_s,
             object: self.config.others[contact.other].name.clone(),
         });
-        let series = self.series.finish();
         Verdict {
             goal,
             goal_time_s: self.goal.reached_s.filter(|_| goal),
@@ -363,9 +347,9 @@ impl Judge {
             drop: self.drops.first,
             no_slip,
             slip_mm: 1e3 * self.slip.slip_m(),
-            d_peak: self.peak.d_pct,
-            d_peak_v1: self.peak_v1.d_pct,
-            d_peak_max: self.peak_max.d_pct,
+            d_peak: series.peak.d_pct,
+            d_peak_v1: series.peak_v1,
+            d_peak_max: series.peak_max,
             d_mean: series.mean,
             d_final: series.last,
             d_p95: series.p95,
@@ -387,7 +371,7 @@ impl Judge {
             safety_known: valid && self.missing_evidence == 0 && (!soft || deformation_ok.is_some()),
             kappas: limit.iter().flat_map(|limit| KAPPAS.map(|kappa| kappa_verdict(limit, kappa))).collect(),
             missing_evidence: self.missing_evidence,
-            missing_deformation: self.peak.missing,
+            missing_deformation: series.peak.missing,
             contact_success,
             contact_safety: contact_success && safety && no_slip,
             peak_pad_force_n: self.pad_forces.peak_n,
@@ -399,21 +383,12 @@ impl Judge {
     }
 
     fn observe_deformation(&mut self, evidence: &Evidence<'_>) {
-        for ((other, body), peak) in self.config.others.iter().zip(evidence.others).zip(&mut self.peaks_other)
-        {
-            if other.is_soft {
-                peak.update(body.deformation.map(|d| d.rms_pct));
-            }
+        let others = self.config.others.iter().zip(evidence.others).zip(&mut self.series_other);
+        for ((_, body), series) in others.filter(|((other, _), _)| other.is_soft) {
+            series.push(body.deformation);
         }
-        let d = evidence.target.deformation;
-        self.worst = self.worst.into_iter().chain(d).max_by(|a, b| a.rms_pct.total_cmp(&b.rms_pct));
-        self.worst_v1 =
-            self.worst_v1.into_iter().chain(d).max_by(|a, b| a.v1_rms_pct.total_cmp(&b.v1_rms_pct));
         if self.config.is_target_soft {
-            self.series.push(d.map(|d| d.rms_pct), self.config.limit.map(|limit| limit.tau_pct()));
-            self.peak.update(d.map(|d| d.rms_pct));
-            self.peak_v1.update(d.map(|d| d.v1_rms_pct));
-            self.peak_max.update(d.map(|d| d.max_pct));
+            self.series.push(evidence.target.deformation);
             let larger = |peak: Option<f64>, now: Option<f64>| peak.into_iter().chain(now).reduce(f64::max);
             self.crushed = CrushedShares {
                 collapsed: larger(self.crushed.collapsed, evidence.crushed.collapsed),
@@ -424,9 +399,9 @@ impl Judge {
 
     /// Deformation of the other soft bodies, judged if the episode ended validly.
     fn others(&self, valid: bool) -> Vec<OtherObjectDeformation> {
-        let soft = self.config.others.iter().zip(&self.peaks_other).filter(|(other, _)| other.is_soft);
-        soft.map(|(other, peak)| {
-            let tau = other.limit.map(|limit| limit.tau_pct());
+        let soft = self.config.others.iter().zip(&self.series_other).filter(|(other, _)| other.is_soft);
+        soft.map(|(other, series)| {
+            let (peak, tau) = (series.peak(), other.limit.map(|limit| limit.tau_pct()));
             OtherObjectDeformation {
                 object: other.name.clone(),
                 d_peak: peak.d_pct,
