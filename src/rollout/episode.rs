@@ -12,6 +12,7 @@ use super::{
     evidence::{EvidenceCollector, lowest},
     goal_in_scene::GoalInScene,
     observation_history::ObservationHistory,
+    robot_instance::HandCommand,
     sensor_assets::{SensingError, SensorAssets},
     sensor_noise::SensorSeed,
     sensors::{Sensors, StateRecording, check_sensors},
@@ -517,8 +518,8 @@ impl Episode {
     fn control_step(&mut self, action: &Action) -> Result<(), StepFailure> {
         let rotation = rotation::from_axis_angle(&action.axis_angle_b);
         let pose_b = Pose::from_parts(action.position_b.into(), rotation);
-        let executed_b = self.disturbance.apply(&pose_b);
-        self.sim.robot.command(&mut self.sim.world, &executed_b, action.grip);
+        let command = HandCommand { pose_b: self.disturbance.apply(&pose_b), grip: action.grip };
+        self.sim.robot.command(&mut self.sim.world, command);
         self.steps += 1;
         for _ in 0..steps_per_control(self.spec.settings.physics.dt) {
             self.physics_steps += 1;

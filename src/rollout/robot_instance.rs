@@ -36,14 +36,16 @@ pub struct RobotInstance {
     ik: DiffIk,
     gripper: GripperSetpoint,
     /// Commands that the robot has not responded to yet, oldest first.
-    delayed: VecDeque<DelayedCommand>,
+    delayed: VecDeque<HandCommand>,
 }
 
-/// Command of a control step.
+/// Command of a control step: where the tool and the gripper should be at its end.
 #[derive(Clone, Copy, Debug)]
-struct DelayedCommand {
-    pose_b: Pose,
-    grip: GripTarget,
+pub struct HandCommand {
+    /// Tool pose, base frame.
+    pub pose_b: Pose,
+    /// Closure or grip force.
+    pub grip: GripTarget,
 }
 
 impl RobotInstance {
@@ -96,14 +98,14 @@ impl RobotInstance {
         }
     }
 
-    /// Sets the command of a control step: tool pose in the base frame, and closure or grip force. The robot responds to it
-    /// in the next control step, or `spec.latency` steps later; until then it follows the earlier ones.
-    pub fn command(&mut self, world: &mut World, pose_b: &Pose, grip: GripTarget) {
-        self.delayed.push_back(DelayedCommand { pose_b: *pose_b, grip });
+    /// Sets the command of a control step. The robot responds to it in the next control step, or `spec.latency` steps later;
+    /// until then it follows the earlier ones.
+    pub fn command(&mut self, world: &mut World, command: HandCommand) {
+        self.delayed.push_back(command);
         if self.delayed.len() <= self.spec.latency as usize {
             return;
         }
-        let Some(DelayedCommand { pose_b, grip }) = self.delayed.pop_front() else { return };
+        let Some(HandCommand { pose_b, grip }) = self.delayed.pop_front() else { return };
         let target = self.ik.step(&self.q(world), &pose_b);
         let drives = world.articulation_mut(self.articulation).drives_mut();
         drives.iter_mut().flatten().zip(target).for_each(|(drive, q)| drive.target = q);
