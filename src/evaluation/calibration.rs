@@ -61,7 +61,8 @@ pub struct HoldRow {
 }
 
 impl HoldRow {
-    pub(crate) fn all_held(&self) -> bool {
+    /// True if the object was held in every trial; false without a trial.
+    pub fn all_held(&self) -> bool {
         self.trials > 0 && self.held == self.trials
     }
 }

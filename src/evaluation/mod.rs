@@ -25,7 +25,7 @@
 //! | At which stage did the episode fail? | [`stage`] |
 //! | Goal, NoDrop and deformation limit together | [`safety`] |
 //! | What does the judge find, and how did the rollout end? | [`verdict`] |
-//! | Where does the limit τ of an asset come from? | [`calibration`], [`thresholds`], [`envelope_plot`] |
+//! | Where does the limit τ of an asset come from? | [`calibration`], [`thresholds`], [`envelope_text`] |
 //! | What limit and window has another instance of an asset? | [`instance`] |
 //! | Every threshold of the judge | [`criteria`] |
 //! | Rates and intervals | [`statistics`] |
@@ -37,7 +37,7 @@ pub mod calibration;
 pub mod criteria;
 pub mod deformation;
 pub mod drop;
-pub mod envelope_plot;
+pub mod envelope_text;
 pub mod evidence;
 pub mod goal;
 pub mod grip;

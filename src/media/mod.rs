@@ -1,5 +1,6 @@
-//! Drawing on images ([`canvas`]), and video files ([`video`]).
+//! Drawing on images ([`canvas`]), plots ([`plot`]) and video files ([`video`]).
 #![warn(missing_docs, unreachable_pub)]
 
 pub mod canvas;
+pub mod plot;
 pub mod video;

@@ -12,6 +12,7 @@ mod schema;
 pub mod stubs;
 mod vm;
 
+pub use api::envelope_plot::envelope_plot;
 pub use api::experiment_input::{ExperimentInput, ExperimentInputError};
 pub use plan::{
     LoadedScript, ScriptSources, declared_options, load, load_with,

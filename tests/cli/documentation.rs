@@ -4,11 +4,8 @@
 use std::{path::Path, time::Duration};
 
 use softvt::{
-    evaluation::{
-        envelope_plot::{plot, summary_text},
-        thresholds::ThresholdFile,
-    },
-    script,
+    evaluation::{envelope_text::summary_text, thresholds::ThresholdFile},
+    script::{self, envelope_plot},
 };
 
 use crate::support::{CliOutput, Project, run_command};
@@ -218,7 +215,7 @@ fn the_calibration_page_is_current() {
         assert_eq!(read(&format!("assets/calibration/{asset}.txt")), text, "{asset}");
         assert!(page.contains(&format!("| [{asset}](#{asset}) | ")), "{asset}");
         let shown = read(&format!("assets/calibration/{asset}.svg"));
-        assert_eq!(shown, plot(&asset, envelope, file.limit(&asset)), "{asset}");
+        assert_eq!(shown, envelope_plot(&asset, envelope, file.limit(&asset)), "{asset}");
         assert_eq!(envelope.censored, None, "{asset}");
         assert!(
             envelope.window.extent_mm().is_some_and(|extent| extent >= 1.0),

@@ -11,6 +11,7 @@ use serde::de::DeserializeOwned;
 
 use super::{
     assets::{AssetSpec, STRAIN},
+    envelope_plot::envelope_plot,
     scene::COATING,
     tasks::VariationSpec,
 };
@@ -27,7 +28,7 @@ use softvt_benchmark::variation::{DrawError, ModelOf, VariationRanges};
 use softvt_common::parallel::lock;
 use softvt_evaluation::{
     calibration::{CalibrationMeasurements, Envelope, HoldRow, Protocol, SafeWindow, SweepRow, force_at},
-    envelope_plot::{plot, summary_text},
+    envelope_text::summary_text,
     instance::{Grip, GripWindow, InstanceFactors, InstanceModel, VariantSweep},
     safety::DeformationLimit,
     thresholds::{ThresholdFile, sweep_jsonl},
@@ -232,7 +233,7 @@ output! {
         /// The envelope in three lines.
         text: "string" = summary_text(asset, envelope, limit(envelope, file));
         /// A plot of deformation over width as SVG.
-        plot: "string" = plot(asset, envelope, limit(envelope, file));
+        plot: "string" = envelope_plot(asset, envelope, limit(envelope, file));
         /// The rows of the sweep as JSON lines.
         sweep: "string" = sweep_jsonl(asset, envelope);
         /// The calibration file as JSON text.

@@ -4,6 +4,7 @@
 pub(crate) mod assets;
 pub(crate) mod cameras;
 pub(crate) mod envelope;
+pub(crate) mod envelope_plot;
 pub(crate) mod experiment_input;
 pub(crate) mod expert;
 pub(crate) mod expert_input;
