@@ -76,8 +76,8 @@ pub enum DrawError {
     NoSoftObject,
     /// The asset has no calibrated window for the condition on it.
     #[error(
-        "asset {asset} has no calibrated window, by which the variation {variation:?} selects instances; run softvt \
-         scripts/calibrate.lua --asset {asset}"
+        "asset {asset} has no calibrated window, by which the variation {variation:?} selects instances; \
+         scripts/calibrate.lua calibrates it (asset={asset})"
     )]
     NoWindow {
         /// Name of the asset.

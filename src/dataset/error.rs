@@ -67,10 +67,6 @@ impl DatasetError {
     }
 
     pub(super) fn not_recorded_by_softvt(path: &Path, key: impl Display) -> Self {
-        Self::content(
-            path,
-            key,
-            "it was not recorded by softvt; softvt dataset import re-executes such demonstrations",
-        )
+        Self::content(path, key, "it was not recorded by softvt; an import re-executes such demonstrations")
     }
 }

@@ -21,7 +21,9 @@ use softvt_common::{
     text::counted,
 };
 use softvt_report::run_folder::{RUN, RunFolder};
-use softvt_script::{Experiment, ExperimentInput, ExperimentRow, LoadedScript, OptionSpec};
+use softvt_script::{
+    Experiment, ExperimentInput, ExperimentInputError, ExperimentRow, LoadedScript, OptionSpec,
+};
 
 /// The rows of an experiment, one JSON object per line.
 const ROWS: &str = "rows.jsonl";
@@ -39,7 +41,7 @@ struct ExperimentManifest<'a> {
     options: BTreeMap<String, String>,
     /// Options of the script as they were typed.
     arguments: &'a [String],
-    /// Arguments of `--set`: the settings that are not those of the script.
+    /// The settings that are not those of the script.
     set: &'a [(String, String)],
     /// SHA-256 of files by name.
     sources: BTreeMap<String, String>,
@@ -69,8 +71,7 @@ pub fn run<E: From<RunError>>(
     if let Some(dir) = out {
         RunFolder::check_new(dir).map_err(|error| config.error(error))?;
     }
-    let input = ExperimentInput::new(config.settings.clone(), config.seed);
-    let input = Arc::new(input.map_err(|error| config.error(error))?);
+    let input = Arc::new(input(config)?);
     if *has_finish && out.is_none() {
         refuse_changed_project_files(config, loaded)?;
     }
@@ -108,7 +109,7 @@ pub fn run<E: From<RunError>>(
         .into());
     }
     outcome?;
-    input.check_used().map_err(|error| config.error(error))?;
+    input.check_used().map_err(|error| input_error(config, &error))?;
     // The rows are kept if finish fails.
     on_output(ExperimentOutput::Rows(&rows))?;
     if let Some(dir) = out {
@@ -142,6 +143,23 @@ pub fn run<E: From<RunError>>(
     };
     run_manifest::write_new(dir, &manifest)?;
     Ok(outcome?)
+}
+
+/// Checks the settings of a run for an experiment without running it.
+///
+/// # Errors
+/// A setting does not exist, has a value out of its range, or concerns the judge.
+pub fn check(config: &RunConfig) -> Result<(), RunError> {
+    input(config).map(|_| ())
+}
+
+fn input(config: &RunConfig) -> Result<ExperimentInput, RunError> {
+    ExperimentInput::new(config.settings.clone(), config.seed).map_err(|error| input_error(config, &error))
+}
+
+fn input_error(config: &RunConfig, error: &ExperimentInputError) -> RunError {
+    let field = if *error == ExperimentInputError::NoRandomNumbers { "seed" } else { "settings" };
+    config.error_of(field, error.path().unwrap_or_default(), error)
 }
 
 /// Refuses to write files into the project that were made with changed settings, another seed or an option that says so:

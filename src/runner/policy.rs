@@ -212,9 +212,8 @@ impl FromStr for PolicySource {
             file if file.ends_with(".lua") => Self::Lua(file.into()),
             data if is_dataset(Path::new(data)) => {
                 return Err(format!(
-                    "{data} is a dataset, not a policy; to simulate its demonstrations again: softvt replay {data} 0/0 for \
-                     one, softvt dataset check {data} --replay all for all; for demonstrations of another simulator: softvt \
-                     dataset import SUITE.lua FILE.hdf5 --out DIR"
+                    "{data} is a dataset, not a policy; a replay simulates its demonstrations again, and an import executes \
+                     those of another simulator"
                 ));
             }
             folder if Path::new(folder).is_dir() => Self::Run(folder.into()),

@@ -51,7 +51,7 @@ pub fn record(
     count: DemoCount,
     options: &RecordingOptions,
 ) -> Result<Option<RecordingSummary>, RunError> {
-    let suites = select_suites("record", config, &script.plan)?;
+    let suites = select_suites(config, &script.plan)?;
     let names: Vec<String> = suites.iter().map(|suite| config.suite_name(suite)).collect();
     let mut request = json!({
         "softvt": env!("CARGO_PKG_VERSION"),

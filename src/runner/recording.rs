@@ -104,7 +104,7 @@ impl<'a> SuiteRecording<'a> {
         let script = &loaded.sources.main;
         if !check::is_script_path(script) {
             return Err(RunError::input(format!(
-                "{script}: a recording names its script, and its path must not contain \"..\"; start softvt in a folder above it"
+                "{script}: a recording names its script, and its path must not contain \"..\"; make a folder above it the working folder"
             )));
         }
         if config.secret.is_some() {
@@ -450,12 +450,12 @@ fn check_folder(root: &Path, resume: bool, request: &Value) -> Result<bool, RunE
     }
     let stored: Value = serde_json::from_str(&files::read_text(&path)?)
         .map_err(|e| RunError::input(format!("{} is not a softvt recording: {e}", path.display())))?;
-    let command = |request: &Value| match request.get("imported") {
-        Some(_) => "softvt dataset import",
-        None => "softvt record",
+    let kind = |request: &Value| match request.get("imported") {
+        Some(_) => "imported demonstrations",
+        None => "recorded demonstrations",
     };
-    if command(&stored) != command(request) {
-        return refuse(format!("the folder contains a dataset of {}; select a new folder", command(&stored)));
+    if kind(&stored) != kind(request) {
+        return refuse(format!("the folder contains {}; select a new folder", kind(&stored)));
     }
     if let Some(difference) = run_manifest::difference(&stored, request) {
         return refuse(format!(

@@ -143,7 +143,7 @@ impl<'a> Runner<'a> {
     pub fn run(&self, mut on_episode: impl FnMut(&EpisodeRecord)) -> Result<Vec<SuiteResult>, RunError> {
         let (config, plan) = (&self.config, &self.script.plan);
         let is_list = matches!(plan, Plan::Suites { .. });
-        let suites = select_suites("run", config, plan)?;
+        let suites = select_suites(config, plan)?;
         let needs_folder = config.trace.is_some() || config.video.is_some() || config.resume;
         if needs_folder && config.out.is_none() && !self.is_numbered {
             return Err(config.error("a trace, a video and a resumed run need an output folder"));

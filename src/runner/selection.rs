@@ -17,25 +17,19 @@ pub fn suites_of(plan: &Plan) -> &[Suite] {
     }
 }
 
-/// An error about a plan without the suites that a command needs.
-pub(crate) fn needs_suites(command: &str, config: &RunConfig) -> RunError {
-    config.error(format!(
-        "softvt {command} needs a suite or a list of suites; name a file that returns softvt.suite"
-    ))
+/// An error about a plan that is neither a suite nor a list of suites.
+pub(crate) fn no_suites(config: &RunConfig) -> RunError {
+    config.error("expected a suite or a list of suites; name a file that returns softvt.suite")
 }
 
-/// The suites of a plan, for commands that write a folder for each.
+/// The suites of a plan, each with a folder of its own.
 ///
 /// # Errors
 /// The plan is neither a suite nor a list of suites with distinct folders.
-pub fn select_suites<'a>(command: &str, config: &RunConfig, plan: &'a Plan) -> Result<&'a [Suite], RunError> {
+pub fn select_suites<'a>(config: &RunConfig, plan: &'a Plan) -> Result<&'a [Suite], RunError> {
     let suites = suites_of(plan);
     check_distinct_out_dirs(config, suites)?;
-    if matches!(plan, Plan::Suite(_) | Plan::Suites { .. }) {
-        Ok(suites)
-    } else {
-        Err(needs_suites(command, config))
-    }
+    if matches!(plan, Plan::Suite(_) | Plan::Suites { .. }) { Ok(suites) } else { Err(no_suites(config)) }
 }
 
 /// The tasks that [`RunConfig::tasks`] selects, in the order of their indices.
@@ -62,7 +56,7 @@ pub fn select_tasks<'a>(config: &RunConfig, suite: &'a Suite) -> Result<Vec<&'a 
                 count => format!("it has tasks 0 to {}", count.saturating_sub(1)),
             };
             let name = &suite.name;
-            let message = format!("suite {name} has no such task; {available} (softvt list tasks)");
+            let message = format!("suite {name} has no such task; {available}");
             return Err(config.error_of("tasks", word, message));
         }
     }

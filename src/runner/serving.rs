@@ -5,7 +5,7 @@ use serde_json::json;
 use crate::{
     config::{ConfiguredScript, RunConfig},
     error::RunError,
-    selection::{check_distinct_out_dirs, check_parent_folder, needs_suites, run_dir, suites_of},
+    selection::{check_distinct_out_dirs, check_parent_folder, no_suites, run_dir, suites_of},
     suite_run::{PreparedRun, SuiteRun},
 };
 use softvt_benchmark::{Plan, Suite, seed::SecretSeed};
@@ -20,7 +20,7 @@ use softvt_serve::{AccessRules, RequestError, ServerConfig};
 /// It has none.
 pub fn check_served(ConfiguredScript { config, script: loaded }: &ConfiguredScript) -> Result<(), RunError> {
     let is_empty = suites_of(&loaded.plan).iter().all(|suite| suite.tasks.is_empty());
-    if is_empty { Err(needs_suites("serve", config)) } else { Ok(()) }
+    if is_empty { Err(no_suites(config)) } else { Ok(()) }
 }
 
 /// The suites with all that their episodes need. Their scenes are checked, completely so if episodes are recorded.

@@ -61,7 +61,7 @@ impl AccessRules {
         match &self.token {
             Some(token) if !is_authorized(headers, token) => Err(Refusal::new(
                 StatusCode::UNAUTHORIZED,
-                "the server requires its token (--token) in the header Authorization: Bearer TOKEN\n",
+                "the server requires its token in the header Authorization: Bearer TOKEN\n",
             )),
             // No web page knows the token.
             Some(_) => Ok(()),
@@ -70,7 +70,7 @@ impl AccessRules {
                 StatusCode::FORBIDDEN,
                 format!(
                     "Host: {host} is not an address of this server; connect to its IP address, or start it with that \
-                     name as --host or with --token\n"
+                     name as its host, or with a token\n"
                 ),
             )),
         }

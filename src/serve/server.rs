@@ -138,7 +138,7 @@ fn handle_connection(stream: TcpStream, state: &ServerState) {
     let check = |request: &_| {
         state.config.access.check(request)?;
         slot = SlotGuard::acquire(&state.clients, state.max_clients);
-        let reason = || format!("the server has {} clients, its limit (--threads)\n", state.max_clients);
+        let reason = || format!("the server has {} clients, its limit\n", state.max_clients);
         match slot {
             Some(_) => Ok(()),
             None => Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, reason())),

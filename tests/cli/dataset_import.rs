@@ -28,9 +28,6 @@ fn imports_are_printed_and_checked() {
     assert!(message.contains("--task 7: suite one has no such task"), "{message}");
     for data in ["data", OWN] {
         let output = project.refusal(&format!("x.lua --policy {data} --out run"));
-        assert!(
-            output.contains("is a dataset, not a policy") && output.contains("softvt dataset check"),
-            "{output}"
-        );
+        assert!(output.contains("is a dataset, not a policy"), "{output}");
     }
 }

@@ -7,7 +7,7 @@ use crate::support::{Project, Small};
 #[test]
 fn missing_files_are_named() {
     let project = Project::new(&[("suites/spatial_soft.lua", "")]);
-    assert_snapshot!(project.refusal("none.lua"), @"none.lua: no such file; give the path of a Lua file; `softvt list suites` lists the standard suites");
+    assert_snapshot!(project.refusal("none.lua"), @"none.lua: no such file; give the path of a Lua file; the standard suites are in suites/");
     assert_snapshot!(project.refusal("object_soft"), @"object_soft: no such file; did you mean suites/object_soft.lua?");
     assert_snapshot!(project.refusal("suites/spatial_sof.lua"), @"suites/spatial_sof.lua: no such file; did you mean suites/spatial_soft.lua?");
 }

@@ -80,7 +80,10 @@ fn flags_without_effect_and_unknown_policies_are_refused() {
         assert!(!project.path("run").exists(), "{words}");
     }
     let message = project.refusal("p.lua");
-    assert!(message.contains("which is not a plan; run softvt SUITE.lua --policy"), "{message}");
+    assert!(
+        message.contains("which is not a plan; run a suite, and give this file as its policy"),
+        "{message}"
+    );
 }
 
 #[test]

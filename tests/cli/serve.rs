@@ -138,7 +138,7 @@ fn invalid_servers_are_refused() {
     let port = taken.local_addr().expect("an address").port();
     for (words, expected) in [
         (format!("serve x.lua --port {port}"), "already in use at 127.0.0.1"),
-        ("serve e.lua".to_owned(), "softvt serve needs a suite"),
+        ("serve e.lua".to_owned(), "expected a suite or a list of suites"),
         ("serve x.lua --policy noop".to_owned(), "--policy: the client of softvt serve is the policy"),
         ("serve x.lua --port 70000".to_owned(), "70000"),
         ("serve x.lua --host 192.0.2.7 --port 0".to_owned(), "cannot listen on this address"),

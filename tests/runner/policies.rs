@@ -245,7 +245,10 @@ fn options_without_effect_are_refused() {
         assert!(!project.path("run").exists(), "{output}");
     }
     let message = project.run("p.lua").error();
-    assert!(message.contains("which is not a plan; run softvt SUITE.lua --policy"), "{message}");
+    assert!(
+        message.contains("which is not a plan; run a suite, and give this file as its policy"),
+        "{message}"
+    );
 }
 
 #[test]

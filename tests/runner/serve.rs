@@ -490,7 +490,7 @@ fn invalid_servers_are_refused() {
         b"return softvt.experiment { name = \"e\", points = function() return {} end, run = function() end }",
     );
     for (run, expected) in [
-        (project.run("e.lua"), "softvt serve needs a suite"),
+        (project.run("e.lua"), "expected a suite or a list of suites"),
         (vision(&project).shift("warp", 1.0), "unknown shift \"warp\""),
     ] {
         let message = Server::try_start(&run, Access::default()).err().expect(expected);

@@ -9,8 +9,9 @@ use crate::{
 };
 use softvt_benchmark::{Goal, Plan, REFERENCE, Suite};
 use softvt_common::text::{self, counted};
-use softvt_runner::{ConfiguredScript, SuiteChecker, conditions, selection::check_distinct_out_dirs};
-use softvt_script::ExperimentInput;
+use softvt_runner::{
+    ConfiguredScript, SuiteChecker, conditions, experiment, selection::check_distinct_out_dirs,
+};
 
 /// Check a script without running it
 #[derive(Args, Clone, Debug)]
@@ -45,8 +46,7 @@ pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
             print(&format!("conditions: {REFERENCE}, {}\n", text::escape_control(&names.join(", "))))?;
         }
         Plan::Experiment { name, points, .. } => {
-            ExperimentInput::new(config.settings.clone(), config.seed)
-                .map_err(|error| config.error(error))?;
+            experiment::check(config)?;
             print(&format!("experiment {name}: {}, not run by this check\n", counted(*points, "point")))?;
         }
     }

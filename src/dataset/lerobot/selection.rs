@@ -50,7 +50,7 @@ pub(super) struct Selection {
 pub(super) fn select(root: &Path, words: &[String]) -> Result<Selection, DatasetError> {
     let card_path = root.join(DATASET);
     if !card_path.is_file() {
-        let what = "it is missing; expected the folder of a finished softvt record";
+        let what = "it is missing; expected the folder of a finished recording";
         return Err(DatasetError::content(root, DATASET, what));
     }
     if !DatasetCard::read(root)?.has_images {

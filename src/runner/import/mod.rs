@@ -54,7 +54,7 @@ pub fn import(
     // The name of the policy in the records; the actions are those of the files.
     let config = &run.config.clone().with_policy(PolicyConfig::external("import"));
     let loaded = &run.script;
-    let suites = select_suites("dataset import", config, &loaded.plan)?;
+    let suites = select_suites(config, &loaded.plan)?;
     let files: Vec<ForeignFile> = files.iter().map(|path| import::read(path)).collect::<Result<_, _>>()?;
     let sources = describe_files(&files)?;
     let matched = match_demos(config, suites, &files, options.attempts.unwrap_or(u32::MAX))?;

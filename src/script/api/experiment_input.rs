@@ -1,4 +1,4 @@
-//! The part of the command line that reaches the simulations of an experiment: `--set` and `--seed`.
+//! What a run gives to the simulations of an experiment: settings and a seed.
 
 use std::sync::{
     Arc,
@@ -10,7 +10,7 @@ use mlua::Lua;
 use softvt_benchmark::settings::{Settings, SettingsError};
 use softvt_physics::PhysicsParams;
 
-/// Settings and seed of the command line for an experiment, shared by all its virtual machines. It also records what
+/// Settings and seed of a run for an experiment, shared by all its virtual machines. It also records what
 /// the points have used, since a setting of a part that no point simulates would change nothing.
 #[derive(Debug, Default)]
 pub struct ExperimentInput {
@@ -23,22 +23,31 @@ pub struct ExperimentInput {
     row_text: AtomicUsize,
 }
 
-/// A part of the command line that would change nothing.
+/// An input that is not valid, or that would change nothing. Its text does not name the input, see
+/// [`ExperimentInputError::path`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum ExperimentInputError {
-    #[error("--set: {0}")]
+    #[error("{0}")]
     Settings(#[from] SettingsError),
-    #[error("--set {path}: an experiment judges no episodes; leave it out")]
+    #[error("an experiment judges no episodes; leave it out")]
     Criteria { path: String },
-    #[error(
-        "--set {path}: the experiment simulates no robot (softvt.simulate), so this changes nothing; leave it out"
-    )]
+    #[error("the experiment simulates no robot (softvt.simulate), so this changes nothing; leave it out")]
     NoRobot { path: String },
-    #[error("--set {path}: the experiment simulates nothing, so this changes nothing; leave it out")]
+    #[error("the experiment simulates nothing, so this changes nothing; leave it out")]
     NoPhysics { path: String },
-    #[error("--seed: the experiment draws no random numbers, so this changes nothing; leave it out")]
+    #[error("the experiment draws no random numbers, so this changes nothing; leave it out")]
     NoRandomNumbers,
+}
+
+impl ExperimentInputError {
+    /// Path of the setting that would change nothing. `None` for the seed, and for a setting that the text names.
+    pub fn path(&self) -> Option<&str> {
+        match self {
+            Self::Criteria { path } | Self::NoRobot { path } | Self::NoPhysics { path } => Some(path),
+            Self::Settings(_) | Self::NoRandomNumbers => None,
+        }
+    }
 }
 
 /// The group of settings that a path begins with.
@@ -47,7 +56,7 @@ fn group(path: &str) -> &str {
 }
 
 impl ExperimentInput {
-    /// Checks settings by path and value, as `--set` gives them, against the defaults.
+    /// Checks settings by path and value against the defaults.
     ///
     /// # Errors
     /// A setting does not exist, has a value out of its range, or concerns the judge.
@@ -103,14 +112,14 @@ fn input(lua: &Lua) -> Arc<ExperimentInput> {
     lua.app_data_ref::<Arc<ExperimentInput>>().map_or_else(Arc::default, |input| Arc::clone(&input))
 }
 
-/// The settings of a simulation with those of the command line.
+/// The settings of a simulation with those of the run.
 pub(crate) fn simulation_settings(lua: &Lua, settings: &Settings) -> Result<Settings, SettingsError> {
     let input = input(lua);
     input.has_simulation.store(true, Ordering::Relaxed);
     settings.with_all(&input.set)
 }
 
-/// The parameters of a world of bare bodies with those of the command line.
+/// The parameters of a world of bare bodies with those of the run.
 pub(crate) fn world_params(lua: &Lua, params: PhysicsParams) -> Result<PhysicsParams, SettingsError> {
     let input = input(lua);
     input.has_world.store(true, Ordering::Relaxed);

@@ -79,14 +79,15 @@ fn leaves(path: String, data: &Json) -> Vec<(String, String)> {
     }
 }
 
-/// The settings of a simulation: those of the script, then those of the command line.
+/// The settings of a simulation: those of the script, then those of the run.
 fn simulation_settings(lua: &Lua, table: Option<&Table>) -> mlua::Result<Settings> {
     const LABEL: &str = "softvt.simulate: settings";
     if table.is_some_and(|table| table.contains_key("criteria").unwrap_or(false)) {
         return Err(fail(lua, format!("{LABEL}.criteria: a simulation judges no episodes; leave it out")));
     }
     let own = settings(lua, LABEL, table)?;
-    experiment_input::simulation_settings(lua, &own).map_err(|e| fail(lua, format!("{LABEL}: --set: {e}")))
+    experiment_input::simulation_settings(lua, &own)
+        .map_err(|e| fail(lua, format!("{LABEL}, with those of the run: {e}")))
 }
 
 /// Measurements of an object since the simulation has settled.

@@ -175,7 +175,7 @@ functions! {
             let params =
                 PhysicsParams { dt, rayleigh_mass, rayleigh_stiffness, sleeping, ..PhysicsParams::default() };
             let params = experiment_input::world_params(lua, params)
-                .map_err(|e| fail(lua, format!("softvt.world: --set: {e}")))?;
+                .map_err(|e| fail(lua, format!("softvt.world, with the settings of the run: {e}")))?;
             let gravity = gravity.map_or(Vec3::new(0.0, 0.0, -9.81), Vec3::from);
             LuaWorld(Arc::new(Mutex::new(Inner {
                 world: World::new(params, gravity),

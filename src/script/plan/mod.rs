@@ -235,11 +235,12 @@ impl ScriptInstance {
 
     fn plan(&self) -> mlua::Result<Plan> {
         let lua = &self.vm.lua;
-        for (record, flag) in [(PolicySpec::RECORD, "--policy"), (ProfileSpec::RECORD, "--profile")] {
+        for (record, role) in [(PolicySpec::RECORD, "policy"), (ProfileSpec::RECORD, "profile")] {
             if self.returned(record) {
-                let (kind, main) = (record.kind, self.vm.main());
-                let message =
-                    format!("returns {kind}{{…}}, which is not a plan; run softvt SUITE.lua {flag} {main}");
+                let kind = record.kind;
+                let message = format!(
+                    "returns {kind}{{…}}, which is not a plan; run a suite, and give this file as its {role}"
+                );
                 return Err(fail(lua, message));
             }
         }

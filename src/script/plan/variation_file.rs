@@ -33,7 +33,7 @@ pub enum VaryError {
     #[error("applies to suites, and this file is an experiment")]
     Experiment,
     /// A suite varies already.
-    #[error("suite {suite} varies already, by its own variation {variation:?}; leave the flag out")]
+    #[error("suite {suite} varies already, by its own variation {variation:?}; vary another suite")]
     Varied { suite: String, variation: String },
     /// A suite has no soft objects.
     #[error("{}", no_soft_objects(suite, variation))]

@@ -7,7 +7,7 @@ fn a_missing_file_is_named() {
     let error = load_with(&PathBuf::from("nowhere/x.lua"), &[], &limits()).unwrap_err().to_string();
     assert_eq!(
         error,
-        "nowhere/x.lua: no such file; give the path of a Lua file; `softvt list suites` lists the standard suites"
+        "nowhere/x.lua: no such file; give the path of a Lua file; the standard suites are in suites/"
     );
     assert!(error_of_folder().starts_with("suites: is a folder"));
 }

@@ -399,7 +399,7 @@ fn missing(main: &Path, name: &str) -> ScriptError {
     let same_stem = known.iter().filter(|path| stem(path) == stem(name)).max().map(String::as_str);
     match same_stem.or_else(|| suggest(name, known.iter().map(String::as_str))) {
         Some(close) => error.hint(format!("did you mean {close}?")),
-        None => error.hint("give the path of a Lua file; `softvt list suites` lists the standard suites"),
+        None => error.hint("give the path of a Lua file; the standard suites are in suites/"),
     }
 }
 
