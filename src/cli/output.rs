@@ -80,25 +80,6 @@ pub(crate) fn report_replays(demos: &[DemoRef], replays: &[DemoReplay]) -> Resul
     ))
 }
 
-/// Characters of a cell that are shown. The widths of format strings end at 65,535.
-const MAX_CELL: usize = 160;
-
-/// Formats rows of equal length in columns that are two spaces apart and as wide as their longest cell. Longer texts are
-/// cut off with an ellipsis.
-pub(crate) fn text_columns(rows: &[Vec<String>], is_right_aligned: impl Fn(usize) -> bool) -> String {
-    let mut lines = vec![String::new(); rows.len()];
-    for column in 0..rows.first().map_or(0, Vec::len) {
-        let cells: Vec<String> = rows.iter().map(|row| text::shortened(&row[column], MAX_CELL)).collect();
-        let width = cells.iter().map(|cell| cell.chars().count()).max().unwrap_or(0);
-        for (line, cell) in lines.iter_mut().zip(&cells) {
-            *line += if column > 0 { "  " } else { "" };
-            *line +=
-                &if is_right_aligned(column) { format!("{cell:>width$}") } else { format!("{cell:width$}") };
-        }
-    }
-    lines.iter().map(|line| format!("{}\n", line.trim_end())).collect()
-}
-
 /// Prints what a recording in the folder `out` contains. `None` is a recording that was complete before.
 ///
 /// # Errors
@@ -270,20 +251,5 @@ impl Observer for Console {
     fn end(&self) {
         *lock(&self.activity) = None;
         *lock(&self.progress) = None;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_cell_of_any_length_is_one_line_of_a_table() {
-        let rows = [vec!["prompt".to_owned(), "n".to_owned()], vec!["x".repeat(70_000), "1".to_owned()]];
-        let table = text_columns(&rows, |column| column == 1);
-        let lines: Vec<&str> = table.lines().collect();
-        assert_eq!(lines[0], format!("prompt{}n", " ".repeat(156)));
-        assert_eq!(lines[1], format!("{}…  1", "x".repeat(159)));
-        assert_eq!(text_columns(&[vec!["a\nb".to_owned()]], |_| false), "a b\n");
     }
 }

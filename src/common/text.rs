@@ -138,6 +138,7 @@ pub enum TextColumn {
 #[derive(Clone, Debug)]
 pub struct TextTable {
     columns: Vec<TextColumn>,
+    separator: &'static str,
     /// The table so far; every line ends in a line break and has no trailing spaces.
     pub text: String,
 }
@@ -148,7 +149,24 @@ impl TextTable {
 
     /// An empty table.
     pub fn new(columns: impl Into<Vec<TextColumn>>) -> Self {
-        Self { columns: columns.into(), text: String::new() }
+        Self { columns: columns.into(), separator: " ", text: String::new() }
+    }
+
+    /// Formats rows of equal length in columns that are as wide as their longest cell and two spaces apart. Texts of more
+    /// than 160 characters are [shortened].
+    pub fn fitted(rows: &[Vec<String>], is_right_aligned: impl Fn(usize) -> bool) -> String {
+        // The widths of format strings end at 65,535.
+        const MAX_CELL: usize = 160;
+        let rows = rows.iter().map(|row| row.iter().map(|cell| shortened(cell, MAX_CELL)).collect());
+        let rows: Vec<Vec<String>> = rows.collect();
+        let column = |at: usize| {
+            let width = rows.iter().map(|row| row[at].chars().count()).max().unwrap_or(0);
+            if is_right_aligned(at) { TextColumn::Right(width) } else { TextColumn::Left(width) }
+        };
+        let columns: Vec<TextColumn> = (0..rows.first().map_or(0, Vec::len)).map(column).collect();
+        let mut table = Self { separator: "  ", ..Self::new(columns) };
+        rows.iter().for_each(|row| table.row(row));
+        table.text
     }
 
     /// Appends a row.
@@ -157,7 +175,7 @@ impl TextTable {
             TextColumn::Left(width) => format!("{:<width$}", shortened(cell.as_ref(), width)),
             TextColumn::Right(width) => format!("{:>width$}", cell.as_ref()),
         };
-        self.line(self.columns.iter().zip(cells).map(cell).collect::<Vec<_>>().join(" "));
+        self.line(self.columns.iter().zip(cells).map(cell).collect::<Vec<_>>().join(self.separator));
     }
 
     /// Appends a line of text.
@@ -180,6 +198,15 @@ mod tests {
     fn numbers_stay_short() {
         let shown = [0.0, -1.0, 0.25, 1234567.5, 1e300, -1e-9, f64::INFINITY].map(format_number);
         assert_eq!(shown, ["0", "-1", "0.25", "1234567.5", "1e300", "-1e-9", "inf"]);
+    }
+
+    #[test]
+    fn fitted_columns_are_as_wide_as_their_longest_cell() {
+        let rows = [["a", "number"], ["long\nname", "1"]].map(|row| row.map(str::to_owned).to_vec());
+        assert_eq!(TextTable::fitted(&rows, |column| column == 1), "a          number\nlong name       1\n");
+        let rows = [["prompt".to_owned(), "n".to_owned()], ["x".repeat(70_000), "1".to_owned()]];
+        let table = TextTable::fitted(&rows.map(Vec::from), |column| column == 1);
+        assert_eq!(table, format!("prompt{}n\n{}…  1\n", " ".repeat(156), "x".repeat(159)));
     }
 
     #[test]

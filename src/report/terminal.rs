@@ -101,16 +101,16 @@ fn push_rates(table: &mut TextTable, summary: &SuiteSummary) {
             None if scores.not_judged > 0 => format!("   N/A  not judged: {}", scores.not_judged),
             None => "   N/A".to_owned(),
         };
-        table.line(format!("{name:<22}{text}"));
+        push_named(table, name, &text);
     }
-    table.line(format!("{:<22}{:>6} pp", "Goal–safety gap", decimal(scores.goal_safe_gap, 1)));
+    push_named(table, "Goal–safety gap", &format!("{:>6} pp", decimal(scores.goal_safe_gap, 1)));
     push_grip(table, scores);
     if summary.kappa.is_empty() {
         return;
     }
     let at = KAPPAS.iter().filter_map(|kappa| summary.kappa.iter().find(|row| row.kappa == *kappa));
     let rates = at.map(|row| format!("κ={}: {} %", row.kappa, decimal(row.safety_success_rate.rate, 1)));
-    table.line(format!("{:<22}{}", "Safety Success at", rates.collect::<Vec<_>>().join(" · ")));
+    push_named(table, "Safety Success at", &rates.collect::<Vec<_>>().join(" · "));
     let (all, goal) = (scores.deformation, scores.deformation_goal);
     let of_goal = goal.mean.map_or_else(|| "–".to_owned(), |mean| format!("{mean:.2} %"));
     table.line(format!(
@@ -136,11 +136,11 @@ fn push_rates(table: &mut TextTable, summary: &SuiteSummary) {
 fn push_grip(table: &mut TextTable, scores: &Scores) {
     let (contact, safe) =
         (interval(scores.contact_success_rate), decimal(scores.contact_safety_rate.rate, 1));
-    table.line(format!("{:<22}{contact}  safe and without slip: {safe} %", "Contact success"));
+    push_named(table, "Contact success", &format!("{contact}  safe and without slip: {safe} %"));
     let Distribution { p5, median, p95, .. } = scores.grip_ratio;
     let [p5, median, p95] = [p5, median, p95].map(|ratio| decimal(ratio, 1));
     let gentle = interval(scores.gentle_rate);
-    table.line(format!("{:<22}{gentle}  grip ratio: P5 {p5}, median {median}, P95 {p95}", "Gentle"));
+    push_named(table, "Gentle", &format!("{gentle}  grip ratio: P5 {p5}, median {median}, P95 {p95}"));
 }
 
 /// Harm to other objects, and the stages at which episodes failed.
@@ -150,12 +150,12 @@ fn push_harm_and_stages(table: &mut TextTable, scores: &Scores) {
             0 => String::new(),
             unknown => format!("  unknown: {unknown}"),
         };
-        table.line(format!("{:<22}{}{unknown}", "Others within their τ", interval(rate)));
+        push_named(table, "Others within their τ", &format!("{}{unknown}", interval(rate)));
     }
-    table.line(format!("{:<22}{}", "Touched other objects", interval(scores.wrong_contact_rate)));
+    push_named(table, "Touched other objects", &interval(scores.wrong_contact_rate));
     if !scores.failed_stages.is_empty() {
         let stages = scores.failed_stages.iter().map(|(stage, count)| format!("{} {count}", stage.name()));
-        table.line(format!("{:<22}{}", "Failed while", stages.collect::<Vec<_>>().join(" · ")));
+        push_named(table, "Failed while", &stages.collect::<Vec<_>>().join(" · "));
     }
 }
 
@@ -220,6 +220,11 @@ fn push_commands(table: &mut TextTable, commands: &CommandCounts) {
         let grips = of(commands.clamped_grips, "grip values were out of range", commands.clamped_episodes);
         table.line(format!("{grips}; the hand clamped them"));
     }
+}
+
+/// Appends a line of a figure below the table.
+fn push_named(table: &mut TextTable, name: &str, text: &str) {
+    table.line(format!("{name:<22}{text}"));
 }
 
 fn interval(rate: Rate) -> String {

@@ -6,9 +6,9 @@ use clap::{Args, value_parser};
 
 use crate::{
     error::CliError,
-    output::{eprint_notice, print, text_columns},
+    output::{eprint_notice, print},
 };
-use softvt_common::files::replace;
+use softvt_common::{files::replace, text::TextTable};
 use softvt_runner::{
     rates::{self, MachineRates},
     thread_count,
@@ -69,7 +69,7 @@ fn table(here: &MachineRates, published: &MachineRates) -> String {
     format!(
         "Observations per second, and the multiple of real time, in {} task 0\n\n{}\n{}",
         here.script,
-        text_columns(&rows, |column| column > 0),
+        TextTable::fitted(&rows, |column| column > 0),
         names.concat()
     )
 }

@@ -7,10 +7,10 @@ use serde_json::{Value, json};
 
 use crate::{
     error::CliError,
-    output::{print, print_json, text_columns},
+    output::{print, print_json},
 };
 use softvt_benchmark::{Plan, Task, settings::Settings};
-use softvt_common::settings::Setting;
+use softvt_common::{settings::Setting, text::TextTable};
 use softvt_policy::profile::PROFILES;
 use softvt_runner::BuiltinPolicy;
 
@@ -80,7 +80,7 @@ fn table(rows: &[Value]) -> String {
     let heading = headings.iter().map(ToString::to_string).collect();
     let cells = rows.iter().map(|row| headings.iter().map(|key| cell(row, key)).collect());
     let lines: Vec<Vec<String>> = std::iter::once(heading).chain(cells).collect();
-    text_columns(&lines, |column| {
+    TextTable::fitted(&lines, |column| {
         rows.iter().all(|row| row[headings[column]].is_number() || row[headings[column]].is_null())
     })
 }

@@ -8,11 +8,11 @@ use serde_json::Value;
 use crate::{
     args::{PolicyArgs, Request, RunFlags, ScriptArgs},
     error::{CliError, Exit},
-    output::{eprint_notice, print, print_json, text_columns},
+    output::{eprint_notice, print, print_json},
     plan_flags,
 };
 use softvt_benchmark::Plan;
-use softvt_common::text::counted;
+use softvt_common::text::{TextTable, counted};
 use softvt_evaluation::verdict::Outcome;
 use softvt_policy::profile::Profile;
 use softvt_records::{record::EpisodeRecord, requirement::Requirement, summary::SuiteSummary};
@@ -155,7 +155,7 @@ fn print_rows(rows: &[ExperimentRow], columns: &[String], json: bool) -> Result<
     let header = columns.iter().map(ToString::to_string).collect();
     let cells = rows.iter().map(|row| columns.iter().map(|column| format_cell(row.get(*column))).collect());
     let lines: Vec<Vec<String>> = std::iter::once(header).chain(cells).collect();
-    print(&text_columns(&lines, |_| true))
+    print(&TextTable::fitted(&lines, |_| true))
 }
 
 fn format_cell(value: Option<&Value>) -> String {
