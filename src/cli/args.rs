@@ -6,11 +6,7 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use clap::{Args, ValueEnum, value_parser};
 
-use crate::{
-    error::CliError,
-    output::Console,
-    plan_flags::{self, GivenFlag},
-};
+use crate::{error::CliError, output::Console, plan_flags};
 use softvt_benchmark::{ShiftValue, Teacher};
 use softvt_policy::{profile::GripCode, remote::Protocol};
 use softvt_records::requirement::Requirement;
@@ -30,9 +26,9 @@ pub(crate) struct ScriptArgs {
     /// Values of the options that the script declares, as `--name=value`. Filled in after parsing.
     #[arg(skip)]
     pub options: Vec<String>,
-    /// Flags of the command that are given. Filled in after parsing.
+    /// Identifiers of the arguments of the command that are given. Filled in after parsing.
     #[arg(skip)]
-    pub given: Vec<GivenFlag>,
+    pub given: Vec<String>,
     /// Base seed
     #[arg(long, value_name = "S", default_value = "0", allow_hyphen_values = true, value_parser = parse_seed)]
     pub seed: u64,
@@ -60,14 +56,14 @@ pub(crate) struct RunFlags {
     #[arg(long = "task", value_name = "TASK", value_delimiter = ',')]
     pub tasks: Vec<String>,
     /// Episodes per task [default: set by the suite]
-    #[arg(long, value_name = "N", value_parser = parse_count)]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..))]
     pub episodes: Option<u32>,
     /// Number of threads; results do not depend on it [default: number of processors]
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Record every control step; =nodes adds node positions
     #[arg(long, value_name = "DETAIL", num_args = 0..=1, require_equals = true, default_missing_value = "state")]
-    pub trace: Option<TraceArg>,
+    pub trace: Option<TraceDetail>,
     /// Render videos of unsafe episodes; =all for all, =0,3 for these episodes of each task
     #[arg(long, value_name = "WHICH", num_args = 0..=1, require_equals = true, default_missing_value = "failed")]
     pub video: Option<VideoSelection>,
@@ -88,22 +84,6 @@ pub(crate) struct RunFlags {
     pub json: bool,
 }
 
-/// Detail of `--trace`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum TraceArg {
-    State,
-    Nodes,
-}
-
-impl From<TraceArg> for TraceDetail {
-    fn from(detail: TraceArg) -> Self {
-        match detail {
-            TraceArg::State => Self::State,
-            TraceArg::Nodes => Self::Nodes,
-        }
-    }
-}
-
 impl RunFlags {
     /// Adds the episodes and the output to a configuration.
     pub(crate) fn apply(self, config: RunConfig) -> RunConfig {
@@ -112,7 +92,7 @@ impl RunFlags {
             episodes: self.episodes,
             shard: self.shard,
             threads: self.threads,
-            trace: self.trace.map(TraceDetail::from),
+            trace: self.trace,
             video: self.video,
             out: self.out,
             resume: self.resume,
@@ -121,10 +101,10 @@ impl RunFlags {
     }
 }
 
-/// A configuration, and the flags that were given for it.
+/// A configuration, and the identifiers of the arguments that were given for it.
 pub(crate) struct Request {
     pub config: RunConfig,
-    given: Vec<GivenFlag>,
+    pub given: Vec<String>,
 }
 
 impl Request {
@@ -158,11 +138,6 @@ impl Request {
         Self { config: change(self.config), ..self }
     }
 
-    /// The flags that were given.
-    pub(crate) fn given(&self) -> &[GivenFlag] {
-        &self.given
-    }
-
     /// Loads the script and refuses flags of `command` that would do nothing for its plan.
     ///
     /// # Errors
@@ -190,24 +165,39 @@ pub(crate) struct PolicyArgs {
     /// Policy that controls the robot: a name (softvt list policies), a Lua file, a server such as ws://host:8000, or a run folder whose actions are repeated [default: expert; softvt record: the suite's teacher]
     #[arg(long, value_name = "POLICY")]
     policy: Option<PolicySource>,
-    /// Observations and action encoding of a policy server: a name (softvt list profiles) or a Lua file [default: visuo_tactile]
-    #[arg(long, value_name = "PROFILE", value_parser = parse_profile)]
-    profile: Option<String>,
+    #[command(flatten)]
+    pub profile: ProfileArgs,
     /// Protocol of a policy server [default: openpi]
     #[arg(long, value_name = "PROTOCOL")]
     protocol: Option<Protocol>,
-    /// Grip code, the meaning of an action's gripper value, in place of that of the profile or the Lua policy: docs/policies.md
-    #[arg(long, value_name = "CODE")]
-    gripper: Option<GripCode>,
     /// Actions executed from each predicted chunk [default: 10 for servers]
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..))]
     replan: Option<u16>,
     /// Timeout in seconds, for connecting and for each reply [default: 60]
     #[arg(long, value_name = "SECONDS", value_parser = parse_timeout)]
     policy_timeout: Option<Duration>,
+}
+
+// What a policy sees and how it answers, wherever it runs. A doc comment would replace the description of the commands.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct ProfileArgs {
+    /// Observations and action encoding of a policy server: a name (softvt list profiles) or a Lua file [default: visuo_tactile]
+    #[arg(long, value_name = "PROFILE", value_parser = parse_profile)]
+    profile: Option<String>,
+    /// Grip code, the meaning of an action's gripper value, in place of that of the profile or the Lua policy: docs/policies.md
+    #[arg(long, value_name = "CODE")]
+    gripper: Option<GripCode>,
     /// Policy name shown in the results
     #[arg(long, value_name = "NAME", value_parser = parse_name)]
     name: Option<String>,
+}
+
+impl ProfileArgs {
+    /// Options of a policy.
+    pub(crate) fn options(&self) -> PolicyOptions {
+        let Self { profile, gripper, name } = self.clone();
+        PolicyOptions { profile, gripper, name, ..PolicyOptions::default() }
+    }
 }
 
 impl PolicyArgs {
@@ -215,12 +205,10 @@ impl PolicyArgs {
     pub(crate) fn options(&self) -> PolicyOptions {
         PolicyOptions {
             source: self.policy.clone().unwrap_or_default(),
-            profile: self.profile.clone(),
             protocol: self.protocol,
-            gripper: self.gripper,
             replan: self.replan,
             timeout: self.policy_timeout,
-            name: self.name.clone(),
+            ..self.profile.options()
         }
     }
 
@@ -233,7 +221,7 @@ impl PolicyArgs {
     /// The grip code that exports of a recording use. Policies that are neither servers nor in Lua have none of their own.
     pub(crate) fn take_export_code(&mut self) -> Option<GripCode> {
         let has_code = matches!(self.policy, Some(PolicySource::Server(_) | PolicySource::Lua(_)));
-        if has_code { self.gripper } else { self.gripper.take() }
+        if has_code { self.profile.gripper } else { self.profile.gripper.take() }
     }
 }
 
@@ -295,12 +283,6 @@ pub(crate) fn parse_folder(word: &str) -> Result<PathBuf, String> {
         return Err("expected a folder; \".\" is the working folder".to_owned());
     }
     Ok(word.into())
-}
-
-/// Parses a count of at least one.
-pub(crate) fn parse_count(word: &str) -> Result<u32, String> {
-    let count = word.parse().ok().filter(|count| *count > 0);
-    count.ok_or_else(|| format!("expected a whole number of at least 1 and at most {}", u32::MAX))
 }
 
 fn parse_seed(word: &str) -> Result<u64, String> {

@@ -49,16 +49,18 @@ impl<E: Error + 'static> From<E> for CliError {
     }
 }
 
-/// The flag that sets a field of the configuration of a run or its policy.
-fn flag_of(field: &str) -> String {
-    match field {
-        "tasks" => "--task".to_owned(),
-        "settings" => "--set".to_owned(),
-        "shifts" => "--shift".to_owned(),
-        "secret" => "--seed-file".to_owned(),
-        "timeout" => "--policy-timeout".to_owned(),
-        _ => format!("--{field}"),
-    }
+/// The flag that sets a field of the arguments, of the configuration of a run or of its policy.
+pub(crate) fn flag_of(field: &str) -> String {
+    let name = match field {
+        "tasks" => "task",
+        "settings" => "set",
+        "shifts" => "shift",
+        "requirements" => "require",
+        "secret" => "seed-file",
+        "timeout" => "policy-timeout",
+        other => other,
+    };
+    format!("--{}", name.replace('_', "-"))
 }
 
 impl CliError {
@@ -70,6 +72,12 @@ impl CliError {
     pub(crate) fn input(message: impl ToString) -> Self {
         let exit = if cancel::requested() { Exit::Interrupted } else { Exit::Input };
         Self::new(exit, message)
+    }
+
+    /// A result that is not the recorded one.
+    pub(crate) fn other_result(message: impl std::fmt::Display) -> Self {
+        let remedy = "softvt doctor checks whether this machine computes the published results";
+        Self::new(Exit::Internal, format!("{message}; {remedy}"))
     }
 
     pub(crate) fn interrupted(message: impl ToString) -> Self {

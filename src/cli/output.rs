@@ -13,7 +13,7 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::error::{CliError, Exit};
+use crate::error::CliError;
 use softvt_common::{
     parallel::lock,
     text::{self, counted},
@@ -71,13 +71,8 @@ pub(crate) fn report_replays(demos: &[DemoRef], replays: &[DemoReplay]) -> Resul
     if identical == all {
         return Ok(());
     }
-    Err(CliError::new(
-        Exit::Internal,
-        format!(
-            "replaying {} gave another result; softvt doctor checks whether this machine computes the published results",
-            counted(all - identical, "demonstration")
-        ),
-    ))
+    let differing = counted(all - identical, "demonstration");
+    Err(CliError::other_result(format!("replaying {differing} gave another result")))
 }
 
 /// Prints what a recording in the folder `out` contains. `None` is a recording that was complete before.

@@ -10,13 +10,9 @@ use super::{
     commands::{Command, run::RunArgs},
     error::CliError,
     output::print,
-    plan_flags::GivenFlag,
 };
 use softvt_common::text;
 use softvt_script::{OptionSpec, ScriptOptionValue};
-
-/// Flags that select the policy. `softvt serve` refuses them: there the client is the policy.
-const POLICY_FLAGS: [&str; 4] = ["policy", "protocol", "replan", "policy_timeout"];
 
 /// Parses the command line. Returns `None` if it asked for help or the version, which is then printed.
 ///
@@ -37,7 +33,6 @@ pub(super) fn parse(words: &[String]) -> Result<Option<Command>, CliError> {
         text::eprint_line(short_help(command).trim_end());
         return Err(CliError::input(""));
     }
-    let flags = flags_of(&command);
     let matches = match command.try_get_matches_from(words) {
         Ok(matches) => matches,
         Err(error) if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
@@ -47,14 +42,6 @@ pub(super) fn parse(words: &[String]) -> Result<Option<Command>, CliError> {
         Err(error) => return Err(in_file(usage_error(&error.to_string()))),
     };
     let innermost = innermost(&matches);
-    if let Some(("serve", matches)) = matches.subcommand()
-        && let Some(flag) = POLICY_FLAGS.iter().find(|flag| is_given(matches, flag))
-    {
-        let flag = flag.replace('_', "-");
-        return Err(CliError::input(format!(
-            "--{flag}: the client of softvt serve is the policy; leave it out"
-        )));
-    }
     let parsed = match matches.subcommand_name() {
         Some(_) => Command::from_arg_matches(&matches),
         None => RunArgs::from_arg_matches(&matches).map(|args| Command::Run(Box::new(args))),
@@ -62,16 +49,15 @@ pub(super) fn parse(words: &[String]) -> Result<Option<Command>, CliError> {
     let mut command = parsed.map_err(|error| in_file(usage_error(&error.to_string())))?;
     if let Some(script) = command.script_mut() {
         script.options = given_options(innermost, &options);
-        script.given = given_flags(innermost, &flags);
+        script.given = given_ids(innermost);
     }
     Ok(Some(command))
 }
 
 /// The whole command, without options of a script.
 pub(super) fn clap_command() -> clap::Command {
-    Command::augment_subcommands(RunArgs::command()).mut_subcommand("serve", |serve| {
-        POLICY_FLAGS.iter().fold(serve, |serve, flag| serve.mut_arg(*flag, |arg| arg.hide(true)))
-    })
+    Command::augment_subcommands(RunArgs::command())
+        .mut_subcommand("serve", |serve| serve.mut_arg("name", |name| name.requires("out")))
 }
 
 /// The help of `softvt` without arguments: the commands, and where to read on.
@@ -142,26 +128,10 @@ fn given_options(matches: &ArgMatches, options: &[OptionSpec]) -> Vec<String> {
     given.collect()
 }
 
-/// The flags of all commands without the options of a script.
-fn flags_of(command: &clap::Command) -> Vec<GivenFlag> {
-    let own = command.get_arguments().filter_map(|arg| {
-        let id = arg.get_id().to_string();
-        let long = arg.get_long().filter(|_| !id.starts_with(SCRIPT_ARG))?.to_owned();
-        Some(GivenFlag { id, long })
-    });
-    let mut flags: Vec<GivenFlag> = own.collect();
-    for inner in command.get_subcommands().flat_map(flags_of) {
-        if !flags.contains(&inner) {
-            flags.push(inner);
-        }
-    }
-    flags
-}
-
-/// The given ones of `flags`.
-fn given_flags(matches: &ArgMatches, flags: &[GivenFlag]) -> Vec<GivenFlag> {
-    let is_known = |flag: &GivenFlag| matches.try_contains_id(&flag.id).is_ok();
-    flags.iter().filter(|flag| is_known(flag) && is_given(matches, &flag.id)).cloned().collect()
+/// Identifiers of the arguments that are given, without options of the script.
+fn given_ids(matches: &ArgMatches) -> Vec<String> {
+    let ids = matches.ids().map(|id| id.as_str());
+    ids.filter(|id| !id.starts_with(SCRIPT_ARG) && is_given(matches, id)).map(str::to_owned).collect()
 }
 
 fn is_given(matches: &ArgMatches, id: &str) -> bool {

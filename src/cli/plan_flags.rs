@@ -2,7 +2,10 @@
 
 use std::fmt;
 
-use crate::{args::Request, error::CliError};
+use crate::{
+    args::Request,
+    error::{CliError, flag_of},
+};
 use softvt_benchmark::{ObjectType, Plan};
 
 /// Kind of a plan.
@@ -67,14 +70,30 @@ struct Effect {
 }
 
 /// Every flag of the [`COMMANDS`].
-static EFFECTS: [Effect; 5] = [
+static EFFECTS: [Effect; 3] = [
     Effect { flags: &["seed", "settings", "threads", "out", "json"], acts_on: ALL },
-    Effect { flags: &["shifts", "rigid_twin", "vary", "seed_file"], acts_on: EPISODES },
     Effect {
-        flags: &["policy", "profile", "protocol", "gripper", "replan", "policy_timeout", "name"],
+        flags: &[
+            "shifts",
+            "rigid_twin",
+            "vary",
+            "seed_file",
+            "policy",
+            "profile",
+            "protocol",
+            "gripper",
+            "replan",
+            "policy_timeout",
+            "name",
+            "tasks",
+            "episodes",
+            "shard",
+            "trace",
+            "video",
+            "resume",
+        ],
         acts_on: EPISODES,
     },
-    Effect { flags: &["tasks", "episodes", "shard", "trace", "video", "resume"], acts_on: EPISODES },
     Effect { flags: &["requirements"], acts_on: SUITES },
 ];
 
@@ -91,15 +110,6 @@ fn takes(command: &str, kind: PlanKind) -> bool {
     }
 }
 
-/// A flag on the command line.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct GivenFlag {
-    /// Identifier in clap.
-    pub id: String,
-    /// As it is typed, without the two dashes.
-    pub long: String,
-}
-
 /// Refuses flags that would do nothing for the plan of the script.
 ///
 /// # Errors
@@ -110,21 +120,17 @@ pub(crate) fn check(command: &str, request: &Request, plan: &Plan) -> Result<(),
     if !takes(command, kind) {
         return Ok(());
     }
-    let refused = |flag: &&GivenFlag| !acts_on(&flag.id).unwrap_or_default().contains(&kind);
-    if let Some(flag) = request.given().iter().filter(|_| COMMANDS.contains(&command)).find(refused) {
-        let kinds: Vec<&str> =
-            acts_on(&flag.id).unwrap_or_default().iter().map(|kind| kind.plural()).collect();
-        let (long, kinds) = (&flag.long, kinds.join(", "));
-        return Err(config
-            .error(format!("--{long}: applies to {kinds}, and this file is {kind}; leave it out"))
-            .into());
+    let refused = |id: &&String| acts_on(id).is_some_and(|kinds| !kinds.contains(&kind));
+    if let Some(id) = request.given.iter().filter(|_| COMMANDS.contains(&command)).find(refused) {
+        let kinds: Vec<&str> = acts_on(id).unwrap_or_default().iter().map(|kind| kind.plural()).collect();
+        let (flag, kinds) = (flag_of(id), kinds.join(", "));
+        let message = format!("{flag}: applies to {kinds}, and this file is {kind}; leave it out");
+        return Err(config.error(message).into());
     }
-    let suites = plan.suites();
-    let all_rigid = suites.iter().all(|suite| suite.object_type == ObjectType::Rigid);
+    let all_rigid = plan.suites().iter().all(|suite| suite.object_type == ObjectType::Rigid);
     if config.rigid_twin && all_rigid {
-        return Err(config
-            .error("--rigid-twin: the objects of this suite are rigid already; leave it out")
-            .into());
+        let message = "--rigid-twin: the objects of this suite are rigid already; leave it out";
+        return Err(config.error(message).into());
     }
     Ok(())
 }

@@ -27,6 +27,18 @@ pub enum TraceDetail {
     Nodes,
 }
 
+impl FromStr for TraceDetail {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        match word {
+            "state" => Ok(Self::State),
+            "nodes" => Ok(Self::Nodes),
+            _ => Err("expected state or nodes".to_owned()),
+        }
+    }
+}
+
 /// One of `count` parts of a run, numbered from 1: every `count`-th episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {

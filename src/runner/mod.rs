@@ -14,6 +14,7 @@ pub mod episode_selector;
 mod error;
 mod evaluate;
 pub mod experiment;
+mod golden;
 pub mod import;
 mod limits;
 mod observer;
@@ -38,6 +39,7 @@ pub use episode_artifacts::VideoSelection;
 pub use episode_list::{EpisodeJob, EpisodeList};
 pub use error::{Cause, FaultySetting, RunError};
 pub use evaluate::SuiteResult;
+pub use golden::GoldenEpisode;
 pub use observer::{Observer, Silent};
 pub use policy::{
     BuiltinPolicy, ControllerFactory, DeclaredStreams, PolicyConfig, PolicyOptions, PolicySource,

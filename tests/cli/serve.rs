@@ -139,7 +139,7 @@ fn invalid_servers_are_refused() {
     for (words, expected) in [
         (format!("serve x.lua --port {port}"), "already in use at 127.0.0.1"),
         ("serve e.lua".to_owned(), "expected a suite or a list of suites"),
-        ("serve x.lua --policy noop".to_owned(), "--policy: the client of softvt serve is the policy"),
+        ("serve x.lua --policy noop".to_owned(), "unexpected argument '--policy'"),
         ("serve x.lua --port 70000".to_owned(), "70000"),
         ("serve x.lua --host 192.0.2.7 --port 0".to_owned(), "cannot listen on this address"),
         ("serve x.lua --split test".to_owned(), "expected validation"),

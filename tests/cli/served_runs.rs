@@ -96,9 +96,9 @@ fn folders_and_flags_that_do_not_fit_are_refused() {
     for (words, expected) in [
         ("--out served", "served already holds a run (run.json): resume it, or"),
         ("--resume", "--out <DIR>"),
-        ("--episodes 2", "--episodes: applies to the run in --out; add --out DIR, or leave it out"),
-        ("--shard 1/2", "--shard: applies to the run in --out"),
-        ("--name mine", "--name: applies to the run in --out"),
+        ("--episodes 2", "required arguments were not provided:\n  --out <DIR>"),
+        ("--shard 1/2", "--out <DIR>"),
+        ("--name mine", "--out <DIR>"),
         ("--task 7", "--task 7: suite one has no such task"),
     ] {
         let message = project.refusal(&format!("serve x.lua --port 0 {FLAGS} {words}"));

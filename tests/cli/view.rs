@@ -93,7 +93,7 @@ fn invalid_views_are_refused() {
     let project = short();
     project.write("e.lua", b"return softvt.experiment { name = \"e\", grid = { a = { 1 } }, run = function() return { b = 1 } end }");
     let message = project.refusal("view e.lua --out seen");
-    assert!(message.contains("e.lua: softvt view needs a single suite"), "{message}");
+    assert!(message.contains("e.lua: expected a single suite"), "{message}");
     let message = project.refusal("view x.lua --task 3 --out seen");
     assert!(message.contains("--task 3: suite one has no such task"), "{message}");
     let message = project.refusal("view x.lua");

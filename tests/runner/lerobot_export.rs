@@ -67,7 +67,7 @@ fn config(project: &Project, version: LeRobotVersion, out: &str) -> ExportConfig
         data: project.path("data"),
         out: project.path(out),
         version,
-        gripper: GripCode::default(),
+        gripper: None,
         tasks: Vec::new(),
         threads: 2,
     }
@@ -196,7 +196,7 @@ fn both_versions_have_the_same_rows() {
     let ends: Vec<i64> = episodes.iter().map(|row| whole(field(row, "dataset_to_index"))).collect();
     assert_eq!(ends.last(), Some(&(together.len() as i64)));
     let second = |gripper: GripCode, out: &str| {
-        export(&ExportConfig { gripper, tasks: vec!["for".to_owned()], ..v30(out) });
+        export(&ExportConfig { gripper: Some(gripper), tasks: vec!["for".to_owned()], ..v30(out) });
     };
     second(GripCode::Binary, "d");
     let binary = rows(&project.path("d/data/chunk-000/file-000.parquet"));

@@ -1,27 +1,12 @@
 //! `softvt doctor`: versions, the machine, and a comparison of the physics with the published bits.
 
-use std::{
-    path::{Path, PathBuf},
-    sync::Arc,
-};
-
-use serde::Deserialize;
+use std::{path::Path, sync::Arc};
 
 use crate::{
     error::{CliError, Exit},
     output::{Console, print},
 };
-use softvt_benchmark::Plan;
-use softvt_records::record::EpisodeRecord;
-use softvt_runner::{ConfiguredScript, EpisodeJob, EpisodeList, RunConfig, SuiteRun, thread_count};
-
-/// `assets/golden.json`: an episode whose final state is published.
-#[derive(Deserialize)]
-struct GoldenEpisode {
-    script: String,
-    task: usize,
-    state_hash: String,
-}
+use softvt_runner::{GoldenEpisode, thread_count};
 
 /// Prints versions and runs the golden episode.
 ///
@@ -36,30 +21,14 @@ pub(super) fn run() -> Result<(), CliError> {
         thread_count(None),
         if cfg!(target_feature = "avx2") { "avx2" } else { "portable (slower; the same results)" },
     ))?;
-    let Some(golden) = softvt_script::embedded("assets/golden.json") else {
+    let Some(golden) = GoldenEpisode::published()? else {
         return print("golden     none in this build\n");
     };
-    let golden: GoldenEpisode = serde_json::from_slice(golden)?;
-    let hash = run_golden(&golden)?.stats.state_hash;
+    let hash = golden.simulate(Arc::new(Console::default()))?;
     let is_same = hash == golden.state_hash;
     let verdict = if is_same { "matches the published one" } else { "DIFFERS from the published one" };
     print(&format!("golden     {} task {}: {hash}, {verdict}\n", golden.script, golden.task))?;
     if is_same { Ok(()) } else { Err(mismatch(&golden)) }
-}
-
-/// Runs the golden episode and writes nothing.
-fn run_golden(golden: &GoldenEpisode) -> Result<EpisodeRecord, CliError> {
-    let config = RunConfig { observer: Arc::new(Console::default()), ..RunConfig::of(&golden.script) };
-    let ConfiguredScript { config, script: loaded } = config.load()?;
-    let Plan::Suite(suite) = &loaded.plan else {
-        return Err(CliError::input(format!("{} is not a suite", golden.script)));
-    };
-    let task = suite.tasks.iter().find(|task| task.id == golden.task);
-    let task =
-        task.ok_or_else(|| CliError::input(format!("{} has no task {}", golden.script, golden.task)))?;
-    let job = EpisodeJob { task, episode: 0 };
-    let run = SuiteRun::new(&config, &loaded, suite, EpisodeList::listed(vec![job]), PathBuf::new())?;
-    Ok(run.run_episode(job, false, &run.controllers)?.record)
 }
 
 fn mismatch(golden: &GoldenEpisode) -> CliError {

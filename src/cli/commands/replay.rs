@@ -5,7 +5,7 @@ use std::{path::PathBuf, sync::Arc};
 use clap::Args;
 
 use crate::{
-    error::{CliError, Exit},
+    error::CliError,
     output::{Console, print, report_replays},
 };
 use softvt_dataset::layout::is_dataset;
@@ -51,12 +51,9 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
     }
     let stored = stored_run::load(dir)?;
     let [stored] = &stored[..] else {
-        let names: Vec<String> = stored.iter().map(|run| run.dir.display().to_string()).collect();
-        return Err(CliError::input(format!(
-            "{} contains several runs; select one of {}",
-            dir.display(),
-            names.join(", ")
-        )));
+        let names = stored.iter().map(|run| run.dir.display().to_string()).collect::<Vec<_>>().join(", ");
+        let message = format!("{} contains several runs; select one of {names}", dir.display());
+        return Err(CliError::input(message));
     };
     args.episode.find_record(stored)?;
     let stored = StoredRun { dir: enter_for_run(stored, &*observer)?, ..stored.clone() };
@@ -64,11 +61,6 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
         replay_episode(&stored, args.episode, secret.as_ref(), observer)?;
     match difference {
         None => print(&format!("{index}: byte-identical, final state {}\n", simulated.stats.state_hash)),
-        Some(difference) => Err(CliError::new(
-            Exit::Internal,
-            format!(
-                "{index} differs: {difference}; softvt doctor checks whether this machine computes the published results"
-            ),
-        )),
+        Some(difference) => Err(CliError::other_result(format!("{index} differs: {difference}"))),
     }
 }

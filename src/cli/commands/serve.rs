@@ -12,7 +12,7 @@ use clap::{Args, value_parser};
 
 use crate::{
     QUIET_INTERRUPT,
-    args::{PolicyArgs, Request, ScriptArgs, parse_count, parse_folder},
+    args::{ProfileArgs, Request, ScriptArgs, parse_folder},
     error::{CliError, Exit},
     output::{eprint_notice, print},
 };
@@ -67,18 +67,15 @@ pub(crate) struct ServeArgs {
     #[arg(long, requires = "out")]
     resume: bool,
     /// Episodes per task of the run in --out [default: set by the suite]
-    #[arg(long, value_name = "N", value_parser = parse_count)]
+    #[arg(long, value_name = "N", requires = "out", value_parser = value_parser!(u32).range(1..))]
     episodes: Option<u32>,
     /// Record only the I-th of N parts of the run; softvt merge combines them
-    #[arg(long, value_name = "I/N")]
+    #[arg(long, value_name = "I/N", requires = "out")]
     shard: Option<Shard>,
-    // Only the profile, the grip code and the name apply: the client is the policy. The other flags are hidden and refused.
+    // The client is the policy.
     #[command(flatten)]
-    policy: PolicyArgs,
+    profile: ProfileArgs,
 }
-
-/// Flags about the run in `--out`, by their identifiers in clap.
-const RUN_FLAGS: [&str; 3] = ["episodes", "shard", "name"];
 
 /// True once standard input has closed under `--until-stdin-closes`.
 static STDIN_CLOSED: AtomicBool = AtomicBool::new(false);
@@ -112,7 +109,7 @@ fn watch_stdin() -> Result<(), CliError> {
 
 fn serve(args: ServeArgs) -> Result<(), CliError> {
     let request = Request::new(args.script.clone())?;
-    let policy = PolicyConfig::client(&args.policy.options(), args.privileged)?;
+    let policy = PolicyConfig::client(&args.profile.options(), args.privileged)?;
     let request = request.with(|config| RunConfig {
         policy,
         tasks: args.tasks.clone(),
@@ -125,7 +122,6 @@ fn serve(args: ServeArgs) -> Result<(), CliError> {
     let run = request.load("serve")?;
     let config = &run.config;
     check_served(&run)?;
-    check_run_flags(&request)?;
     // After the checks, so that an error of the script is reported even if standard input is closed already.
     if args.until_stdin_closes {
         watch_stdin()?;
@@ -157,17 +153,6 @@ fn serve(args: ServeArgs) -> Result<(), CliError> {
             Ok(outcome?)
         }
         None => Err(CliError::interrupted("")),
-    }
-}
-
-/// Refuses flags about the run in `--out` without `--out`.
-fn check_run_flags(request: &Request) -> Result<(), CliError> {
-    match request.given().iter().find(|flag| RUN_FLAGS.contains(&flag.id.as_str())) {
-        Some(flag) if request.config.out.is_none() => Err(CliError::input(format!(
-            "--{}: applies to the run in --out; add --out DIR, or leave it out",
-            flag.long
-        ))),
-        _ => Ok(()),
     }
 }
 

@@ -49,20 +49,14 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     let request = Request::new(args.script)?.with(|config| RunConfig { tasks, ..config });
     let ConfiguredScript { config, script: loaded } = request.load_plan("view", &args.policy)?;
     let Plan::Suite(suite) = &loaded.plan else {
-        return Err(config
-            .error("softvt view needs a single suite; name a file that returns softvt.suite")
-            .into());
+        let message = "expected a single suite; name a file that returns softvt.suite";
+        return Err(config.error(message).into());
     };
     let tasks = select_tasks(&config, suite)?;
     let [task] = tasks[..] else {
-        let matches: Vec<String> = tasks.iter().map(|task| task.id.to_string()).collect();
-        return Err(config
-            .error(format!(
-                "--task {:?} matches the tasks {}; select one by its index",
-                args.task,
-                matches.join(", ")
-            ))
-            .into());
+        let ids = tasks.iter().map(|task| task.id.to_string()).collect::<Vec<_>>().join(", ");
+        let message = format!("--task {:?} matches the tasks {ids}; select one by its index", args.task);
+        return Err(config.error(message).into());
     };
     let dir = &args.out;
     let job = EpisodeJob { task, episode: args.episode };

@@ -26,8 +26,8 @@ pub struct ExportConfig {
     pub out: PathBuf,
     /// Version of the format.
     pub version: LeRobotVersion,
-    /// Code of the seventh number of an action.
-    pub gripper: GripCode,
+    /// Code of the seventh number of an action; `None` for that of the recording, or continuous.
+    pub gripper: Option<GripCode>,
     /// Tasks to export, each an index or part of a prompt; empty for all.
     pub tasks: Vec<String>,
     /// Number of threads. The files do not depend on it.

@@ -62,7 +62,7 @@ impl<'a> EpisodeData<'a> {
             .chunks_exact_mut(VECTOR_LENGTH)
             .zip(widths)
             .for_each(|(row, width)| row[VECTOR_LENGTH - 1] = 0.5 * width);
-        let actions = reader.floats(actions_stream_name(config.gripper), &[VECTOR_LENGTH])?;
+        let actions = reader.floats(actions_stream_name(selection.gripper), &[VECTOR_LENGTH])?;
         let markers = marker_rows(&reader.floats("obs/gripper_marker_motion", &[2, 2, MARKER_COUNT, 2])?);
         let images = reader.image_columns(config.version, selection.image_sizes, is_cancelled)?;
         let timestamps: Vec<f32> =

@@ -28,11 +28,11 @@ pub(super) fn write(
         LeRobotVersion::V21 => write_task_lines(dir, &selection.prompts)?,
         LeRobotVersion::V30 => write_task_table(dir, &selection.prompts)?,
     }
-    write_origins(dir, config, selection)?;
+    write_origins(dir, selection)?;
     let encoding = json!({
         "softvt": env!("CARGO_PKG_VERSION"),
-        "gripper": config.gripper.name(),
-        "source": actions_stream_name(config.gripper),
+        "gripper": selection.gripper.name(),
+        "source": actions_stream_name(selection.gripper),
     });
     files::write_json(&dir.join("meta/softvt.json"), &encoding)?;
     files::replace(&dir.join("README.md"), readme(config, selection, summary))?;
@@ -97,7 +97,7 @@ fn write_task_table(dir: &Path, prompts: &[String]) -> Result<(), DatasetError> 
 }
 
 /// `softvt.jsonl`: the demonstration that each episode comes from.
-fn write_origins(dir: &Path, config: &ExportConfig, selection: &Selection) -> Result<(), DatasetError> {
+fn write_origins(dir: &Path, selection: &Selection) -> Result<(), DatasetError> {
     let line = |(index, SelectedDemo { entry, .. }): (usize, &SelectedDemo)| {
         json!({
             "episode_index": index,
@@ -109,7 +109,7 @@ fn write_origins(dir: &Path, config: &ExportConfig, selection: &Selection) -> Re
             "seed": entry.seed,
             "episode": entry.episode,
             "state_hash": entry.state_hash,
-            "gripper": config.gripper.name(),
+            "gripper": selection.gripper.name(),
         })
     };
     let lines = selection.demos.iter().enumerate().map(line);
@@ -119,7 +119,7 @@ fn write_origins(dir: &Path, config: &ExportConfig, selection: &Selection) -> Re
 /// The human-readable description, with the metadata that Hugging Face's hub reads.
 fn readme(config: &ExportConfig, selection: &Selection, summary: ExportSummary) -> String {
     let ExportSummary { episodes, frames, tasks } = summary;
-    let gripper = match config.gripper {
+    let gripper = match selection.gripper {
         GripCode::Continuous => "the commanded closure, 0 open to 1 closed",
         GripCode::Binary => "1 while the gripper is commanded to hold, else 0",
         GripCode::TwoWidth => {
@@ -146,6 +146,6 @@ fn readme(config: &ExportConfig, selection: &Selection, summary: ExportSummary) 
         config.version.code(),
         CONTROL_HZ,
         env!("CARGO_PKG_VERSION"),
-        config.gripper.name(),
+        selection.gripper.name(),
     )
 }

@@ -43,7 +43,7 @@ pub fn export(
     on_episode: impl FnMut(usize, &str),
 ) -> Result<ExportSummary, DatasetError> {
     staged_dir::check_empty(&config.out)?;
-    let selection = selection::select(&config.data, &config.tasks)?;
+    let selection = selection::select(config)?;
     let features = features::all(selection.image_sizes);
     let staged = StagedDir::create(&config.out)?;
     match write(config, &selection, &features, &staged, is_cancelled, on_episode) {

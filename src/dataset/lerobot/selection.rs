@@ -5,12 +5,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use super::ExportConfig;
 use crate::{
     DatasetError, TaskFile,
     card::DatasetCard,
     layout::{DATASET, IMAGE_STREAMS, MANIFEST},
     manifest::{self, ManifestEntry},
 };
+use softvt_policy::profile::GripCode;
 
 /// Size of an image, pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,25 +42,28 @@ pub(super) struct Selection {
     pub prompts: Vec<String>,
     /// Image sizes of both cameras in the first demonstration.
     pub image_sizes: [ImageSize; 2],
+    /// Code of the seventh number of an action.
+    pub gripper: GripCode,
 }
 
-/// Selects the demonstrations whose task matches one of `words`, each an index or part of a prompt; all
-/// if `words` is empty.
+/// Selects the demonstrations of the tasks that the configuration names.
 ///
 /// # Errors
 /// The folder is not a finished recording, has no images, or a word matches no task.
-pub(super) fn select(root: &Path, words: &[String]) -> Result<Selection, DatasetError> {
+pub(super) fn select(config: &ExportConfig) -> Result<Selection, DatasetError> {
+    let root = &config.data;
     let card_path = root.join(DATASET);
     if !card_path.is_file() {
         let what = "it is missing; expected the folder of a finished recording";
         return Err(DatasetError::content(root, DATASET, what));
     }
-    if !DatasetCard::read(root)?.has_images {
+    let card = DatasetCard::read(root)?;
+    if !card.has_images {
         let what =
             "images are stored only as videos, whose compression is lossy; record them in the HDF5 files";
         return Err(DatasetError::content(&card_path, "pictures", what));
     }
-    let entries = matching_entries(root, manifest::read(root)?, words)?;
+    let entries = matching_entries(root, manifest::read(root)?, &config.tasks)?;
     let mut seen = BTreeSet::new();
     if let Some(twice) = entries.iter().find(|entry| !seen.insert((&entry.hdf5_path, entry.demo_id))) {
         let what = format!("{} demo_{} is listed twice", twice.hdf5_path, twice.demo_id);
@@ -80,7 +85,8 @@ pub(super) fn select(root: &Path, words: &[String]) -> Result<Selection, Dataset
         return Err(DatasetError::content(&root.join(MANIFEST), "lines", "it is empty"));
     };
     let image_sizes = image_sizes(first)?;
-    Ok(Selection { demos, prompts, image_sizes })
+    let gripper = config.gripper.or(card.gripper).unwrap_or_default();
+    Ok(Selection { demos, prompts, image_sizes, gripper })
 }
 
 fn matching_entries(

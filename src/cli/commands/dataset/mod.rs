@@ -14,10 +14,7 @@ use crate::{
 use softvt_common::cancel;
 use softvt_common::{files, text::counted};
 use softvt_dataset::{
-    DatasetError,
-    card::DatasetCard,
-    check,
-    layout::DATASET,
+    DatasetError, check,
     lerobot::{self, ExportConfig, LeRobotVersion},
     stats,
 };
@@ -146,17 +143,11 @@ fn sample(demos: &[DemoRef], count: usize) -> Vec<DemoRef> {
 /// As [`lerobot::export`]. No output remains then.
 fn run_export(args: ExportArgs) -> Result<(), CliError> {
     check_complete(&args.path)?;
-    let gripper = match args.gripper {
-        Some(code) => code,
-        // A folder without a card is refused by the export.
-        None if !args.path.join(DATASET).is_file() => GripCode::default(),
-        None => DatasetCard::read(&args.path).map_err(CliError::input)?.gripper.unwrap_or_default(),
-    };
     let config = ExportConfig {
         data: args.path,
         out: args.out,
         version: args.format,
-        gripper,
+        gripper: args.gripper,
         tasks: args.tasks,
         threads: thread_count(args.threads),
     };
