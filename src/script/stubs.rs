@@ -9,7 +9,8 @@ use super::{
     plan::options,
     schema::{
         Class, Field, FieldDefault, Function, Record, Signature, Type,
-        object::{Access, LuaField, Param},
+        function::Param,
+        object::{Access, LuaField},
     },
 };
 

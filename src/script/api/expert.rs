@@ -18,7 +18,7 @@ use super::{
     tasks::SuiteSpec,
 };
 use crate::{
-    schema::{ApiObject, Constructed, Range, Type, class, functions, object::arguments, output},
+    schema::{ApiObject, Constructed, Range, Type, class, function::arguments, functions, output},
     vm::{base_library, error::fail, library::embedded, privilege::check_privilege, value::number},
 };
 use softvt_common::parallel::lock;

@@ -28,7 +28,7 @@ use mlua::{Lua, Table, Value};
 use super::{
     schema::{
         ApiObject, Class, Function, Record, RecordType, Signature, Type, Unchecked, ValidationError,
-        check::error_of_caller, functions, make, object::signature,
+        check::error_of_caller, function::signature, functions, make,
     },
     vm::{
         error::fail,

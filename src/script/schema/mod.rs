@@ -1,13 +1,15 @@
 //! Declarations of the Lua interface: records (tables that scripts write), classes (objects that scripts hold) and
 //! functions.
 //!
-//! Each is declared once, by [`record!`](convert), [`class!`](object), [`output!`](object) or [`functions!`](object). The
+//! Each is declared once, by [`record!`](convert), [`class!`](object), [`output!`] or [`functions!`](function). The
 //! declaration gives the Rust struct or the accessors, the check of every value with its messages, the stubs for language
 //! servers and the reference page. A key is therefore known everywhere or nowhere.
 
 pub(crate) mod check;
 pub(crate) mod convert;
+pub(crate) mod function;
 pub(crate) mod object;
+mod output;
 
 use mlua::{Lua, Table};
 
@@ -17,9 +19,9 @@ pub(crate) use check::{error_at_key, invalid, is_constructed, make, validate};
 pub(crate) use convert::{
     Constructed, FromChecked, HasTable, LuaType, RecordType, Unchecked, choice, one_of, record, record_of,
 };
-pub(crate) use object::{
-    ApiObject, Class, FieldValue, Function, Signature, class, functions, output, strict_table,
-};
+pub(crate) use function::{Function, Signature, functions};
+pub(crate) use object::{ApiObject, Class, FieldValue, class};
+pub(crate) use output::{output, strict_table};
 
 /// The values that a field or parameter accepts.
 #[derive(Clone, Copy, Debug)]

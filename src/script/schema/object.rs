@@ -1,11 +1,13 @@
-//! Objects of the host in Lua, tables that it returns, and functions: their declarations, and the one place where arguments
-//! are taken and fields are read and written.
+//! Objects of the host in Lua: their declarations, and the one place where fields are read and written.
 
 use mlua::{
     FromLua, IntoLua, Lua, MetaMethod, MultiValue, Table, UserData, UserDataFields, UserDataMethods, Value,
 };
 
-use super::{FieldDefault, Type, error_at_key};
+use super::{
+    Type,
+    function::{Signature, arguments},
+};
 use crate::vm::{error::fail, list::LuaList, value::describe};
 use softvt_common::text::unknown_name;
 use softvt_geometry::Vec3;
@@ -34,31 +36,6 @@ pub(crate) enum Access {
     /// Read-only, with its LuaCATS type, and how to change it instead.
     Read(&'static str, Option<&'static str>),
     Write(Type),
-}
-
-/// A function or method.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Signature {
-    pub name: &'static str,
-    pub params: &'static [Param],
-    /// LuaCATS types of the results.
-    pub returns: &'static [&'static str],
-    pub doc: &'static str,
-}
-
-/// A parameter; its argument is checked by its type.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Param {
-    pub name: &'static str,
-    pub ty: Type,
-    pub presence: FieldDefault,
-    pub checked: bool,
-}
-
-impl Param {
-    pub(crate) fn is_optional(&self) -> bool {
-        self.presence != FieldDefault::Required
-    }
 }
 
 impl Class {
@@ -282,7 +259,7 @@ macro_rules! class {
                     },)*)?
                 ],
                 methods: &[
-                    $($($crate::schema::object::signature!(
+                    $($($crate::schema::function::signature!(
                         [$($method_doc)*] $method($($arg : $arg_type $(= $arg_lua)?),*)
                         $(takes $table $table_class {$(
                             $(#[doc = $field_doc])+
@@ -290,7 +267,7 @@ macro_rules! class {
                         )*})?
                         -> [$($return),*]
                     ),)*)?
-                    $($($crate::schema::object::signature!(
+                    $($($crate::schema::function::signature!(
                         [$($lua_method_doc)+] $lua_method($($lua_arg : $lua_arg_type $(= $lua_arg_lua)?),*)
                         -> [$($lua_return),*]
                     ),)*)?
@@ -329,7 +306,7 @@ macro_rules! class {
             ];
             const METHODS: &'static [$crate::schema::object::Method<Self>] = &[
                 $($(|state, object, values| {
-                    $crate::schema::object::bind_arguments! {
+                    $crate::schema::function::bind_arguments! {
                         (values, state)
                         $($arg : $arg_type),*
                         $(; takes $table $($field : $field_type),*)?
@@ -369,205 +346,6 @@ macro_rules! class {
 }
 pub(crate) use class;
 
-/// Declares variables for the checked arguments of a call: the parameters, and the fields of the table that comes last.
-macro_rules! bind_arguments {
-    (($values:ident, $lua:ident) $($arg:ident : $arg_type:ty),*) => {
-        $crate::schema::object::bind_arguments! { @each ($values, $lua) $($arg : $arg_type,)* }
-    };
-    (@each ($values:ident, $lua:ident) $($arg:ident : $arg_type:ty,)*) => {
-        let mut _values = $values.into_iter();
-        $(
-            let $arg: $arg_type = $crate::schema::FromChecked::from_checked(
-                _values.next().unwrap_or(mlua::Value::Nil), $lua
-            )?;
-        )*
-    };
-    (($values:ident, $lua:ident) $($arg:ident : $arg_type:ty),* ; takes $table:ident $($field:ident : $type:ty),*) => {
-        $crate::schema::object::bind_arguments! {
-            @each ($values, $lua) $($arg : $arg_type,)* $table : mlua::Table,
-        }
-        $(
-            let $field: $type = $crate::schema::FromChecked::from_checked(
-                $table.raw_get(stringify!($field))?, $lua
-            )?;
-        )*
-    };
-}
-pub(crate) use bind_arguments;
-
-/// The [`Signature`] of a function or method.
-macro_rules! signature {
-    (
-        [$($doc:literal)*] $name:ident($($arg:ident : $arg_type:ty $(= $arg_lua:expr)?),*)
-        $(takes $table:ident $class:literal { $($fields:tt)* })?
-        -> [$($return:literal),*]
-    ) => {{
-        const DOC: &str = concat!($($doc),*);
-        $crate::schema::Signature {
-            name: stringify!($name),
-            params: &[
-                $($crate::schema::object::Param {
-                    name: stringify!($arg),
-                    ty: $crate::schema::convert::first!(
-                        $($arg_lua,)? <$arg_type as $crate::schema::LuaType>::TYPE
-                    ),
-                    presence: <$arg_type as $crate::schema::LuaType>::PRESENCE,
-                    checked: <$arg_type as $crate::schema::LuaType>::CHECKED,
-                },)*
-                $({
-                    const RECORD: &$crate::schema::Record = &$crate::schema::Record {
-                        label: stringify!($name),
-                        class: $class,
-                        kind: $class,
-                        doc: DOC,
-                        fields: $crate::schema::convert::fields! { $($fields)* },
-                        relations: None,
-                    };
-                    $crate::schema::object::Param {
-                        name: stringify!($table),
-                        ty: $crate::schema::Type::Nested(RECORD),
-                        presence: RECORD.presence(),
-                        checked: true,
-                    }
-                },)?
-            ],
-            returns: &[$($return),*],
-            doc: DOC,
-        }
-    }};
-}
-pub(crate) use signature;
-
-/// A function of the `softvt` table.
-#[derive(Clone, Copy)]
-pub(crate) struct Function {
-    pub signature: Signature,
-    pub call: fn(&Lua, MultiValue) -> mlua::Result<MultiValue>,
-}
-
-impl Function {
-    /// Stores the function in `table`; messages name it with `prefix`.
-    pub(crate) fn install(&'static self, lua: &Lua, table: &Table, prefix: &'static str) -> mlua::Result<()> {
-        let function = lua.create_function(move |lua, values: MultiValue| {
-            let label = format!("{prefix}{}", self.signature.name);
-            (self.call)(lua, arguments(lua, &label, &self.signature, values)?)
-        })?;
-        table.set(self.signature.name, function)
-    }
-}
-
-impl Signature {
-    /// The record of a function that takes one table and nothing else.
-    pub(crate) fn record(&self) -> Option<&'static super::Record> {
-        match self.params {
-            [Param { ty: Type::Nested(record), checked: true, .. }] => Some(record),
-            _ => None,
-        }
-    }
-}
-
-/// Declares a list of functions of the `softvt` table: `functions! { LIST { /// Documentation. fn name(lua, argument: RustType =
-/// Type::…) -> ["LuaCATS type"] { … } } }`. As the methods of [`class!`], a function can take a table.
-macro_rules! functions {
-    ($list:ident {$(
-        $(#[doc = $doc:literal])+
-        fn $name:ident($lua:pat_param $(, $arg:ident : $arg_type:ty $(= $arg_lua:expr)?)*)
-            $(takes $table:ident $class:literal {$(
-                $(#[doc = $field_doc:literal])+
-                $field:ident : $field_type:ty $(= $field_lua:expr)? $(=> $presence:ident $(($default:expr))?)? ;
-            )*})?
-            -> [$($return:literal),*] $body:block
-    )*}) => {
-        pub(crate) static $list: &[$crate::schema::Function] = &[$($crate::schema::Function {
-            signature: $crate::schema::object::signature!(
-                [$($doc)*] $name($($arg : $arg_type $(= $arg_lua)?),*)
-                $(takes $table $class {$(
-                    $(#[doc = $field_doc])+
-                    $field : $field_type $(= $field_lua)? $(=> $presence $(($default))?)? ;
-                )*})?
-                -> [$($return),*]
-            ),
-            call: |state, values| {
-                $crate::schema::object::bind_arguments! {
-                    (values, state)
-                    $($arg : $arg_type),*
-                    $(; takes $table $($field : $field_type),*)?
-                }
-                let $lua = state;
-                mlua::IntoLuaMulti::into_lua_multi($body, state)
-            },
-        }),*];
-    };
-}
-pub(crate) use functions;
-
-/// Declares tables that scripts receive: the class for stubs and reference, and the function that fills such a table.
-///
-/// ```text
-/// output! {
-///     /// Documentation of the class.
-///     fn name(lua, source: &Source) -> "softvt.Class" as "name in messages" {
-///         /// Documentation of the field; a value of nil is absent.
-///         field: "LuaCATS type" = value;
-///     }
-/// }
-/// ```
-///
-/// The name of the function is also that of the module with the [`Class`]. Reading or writing another key is an error.
-macro_rules! output {
-    (
-        $(#[doc = $doc:literal])+
-        fn $name:ident($lua:ident $(, $arg:ident : $arg_type:ty)*) -> $class:literal as $label:literal {$(
-            $(#[doc = $field_doc:literal])+
-            $field:ident : $field_type:literal = $value:expr;
-        )*}
-    ) => {
-        $(#[doc = $doc])+
-        pub(crate) fn $name($lua: &mlua::Lua $(, $arg: $arg_type)*) -> mlua::Result<mlua::Table> {
-            let table = $lua.create_table()?;
-            $(table.raw_set(stringify!($field), $value)?;)*
-            $crate::schema::strict_table($lua, $label, table, vec![$(stringify!($field).to_owned()),*])
-        }
-
-        pub(crate) mod $name {
-            pub(crate) static CLASS: $crate::schema::Class = $crate::schema::Class {
-                name: $class,
-                doc: concat!($($doc),+),
-                fields: &[$($crate::schema::object::LuaField {
-                    name: stringify!($field),
-                    access: $crate::schema::object::Access::Read($field_type, None),
-                    doc: concat!($($field_doc),+),
-                }),*],
-                methods: &[],
-            };
-        }
-    };
-}
-pub(crate) use output;
-
-/// Makes `table` refuse to be read and written by keys other than `names`.
-pub(crate) fn strict_table(lua: &Lua, label: &str, table: Table, names: Vec<String>) -> mlua::Result<Table> {
-    let meta = lua.create_table()?;
-    let name = label.to_owned();
-    let refuse = lua.create_function(move |lua, (table, key, value): (Table, Value, Value)| match &key {
-        Value::String(key) if names.iter().any(|name| *name == key.to_string_lossy()) => {
-            table.raw_set(key, value)?;
-            Ok(Value::Nil)
-        }
-        Value::String(key) => {
-            let known = names.iter().map(String::as_str);
-            Err(fail(lua, format!("{name}: {}", unknown_name("key", &key.to_string_lossy(), known))))
-        }
-        key => Err(fail(lua, format!("{name}: expected a name as key, got {}", describe(key)))),
-    })?;
-    // Lua asks the metatable only for keys without a value; reading a known one stores and returns nil.
-    meta.set("__index", &refuse)?;
-    meta.set("__newindex", refuse)?;
-    meta.set("__metatable", label)?;
-    table.set_metatable(Some(meta))?;
-    Ok(table)
-}
-
 /// Sets the name of the class.
 pub(crate) fn add_fields<T: ApiObject, F: UserDataFields<T>>(fields: &mut F) {
     fields.add_meta_field(MetaMethod::Type, T::NAME);
@@ -591,30 +369,6 @@ pub(crate) fn add_methods<T: ApiObject, M: UserDataMethods<T>>(methods: &mut M) 
             body(lua, &this, arguments(lua, &label, signature, values)?)
         });
     }
-}
-
-/// Checks the arguments of a call, and fills in the defaults of tables; more arguments are ignored, as in Lua.
-pub(crate) fn arguments(
-    lua: &Lua,
-    label: &str,
-    signature: &Signature,
-    values: impl IntoIterator<Item = Value>,
-) -> mlua::Result<MultiValue> {
-    let mut values = values.into_iter();
-    let checked = signature.params.iter().map(|param| {
-        let value = match (values.next().unwrap_or(Value::Nil), param.presence) {
-            (value, _) if !param.checked => return Ok(value),
-            (Value::Nil, FieldDefault::Optional) => return Ok(Value::Nil),
-            (Value::Nil, FieldDefault::Empty) => Value::Table(lua.create_table()?),
-            (value, _) => value,
-        };
-        param.ty.check(lua, &value).map_err(|error| match param.ty {
-            // The keys of a table say enough.
-            Type::Nested(_) => error_at_key(lua, label, &error),
-            _ => fail(lua, error.describe(&format!("{label}: {}", param.name))),
-        })
-    });
-    checked.collect()
 }
 
 /// The field or method name that a key is.
