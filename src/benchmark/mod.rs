@@ -50,7 +50,7 @@ pub enum Variation {
 /// What a controller has to know of an instance to grip it safely.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Needs {
+pub enum NeededKnowledge {
     /// Nothing but its kind: one closure per kind suffices.
     Nothing,
     /// Its size, which shows.
@@ -136,7 +136,7 @@ pub struct Suite {
     pub variation: Variation,
     /// What a safe grip needs, if the suite states it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub needs: Option<Needs>,
+    pub needs: Option<NeededKnowledge>,
     /// Default number of episodes per task.
     pub episodes: u32,
     /// The tasks, in order.

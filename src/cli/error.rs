@@ -3,7 +3,7 @@
 use std::error::Error;
 
 use softvt_common::cancel;
-use softvt_runner::{Cause, RunError};
+use softvt_runner::{RunError, RunErrorCause};
 
 /// Exit codes, the same for every command. `docs/cli.md` lists them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,9 +42,9 @@ impl<E: Error + 'static> From<E> for CliError {
         }
         match of_run.cause {
             // Of a run that failed before an interrupt.
-            Cause::Input => Self::new(Exit::Input, message),
-            Cause::Policy => Self::new(Exit::Policy, message),
-            Cause::Interrupt => Self::interrupted(message),
+            RunErrorCause::Input => Self::new(Exit::Input, message),
+            RunErrorCause::Policy => Self::new(Exit::Policy, message),
+            RunErrorCause::Interrupt => Self::interrupted(message),
         }
     }
 }

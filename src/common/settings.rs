@@ -56,14 +56,15 @@ impl Setting {
     /// All settings of a group at a path.
     pub fn list<T: SettingField + Default>(path: &str) -> Vec<Self> {
         let mut list = Vec::new();
-        T::default().describe(&Declaration { path, unit: "", range: Range::ANY, about: "" }, &mut list);
+        T::default()
+            .describe(&SettingDeclaration { path, unit: "", range: Range::ANY, about: "" }, &mut list);
         list
     }
 }
 
 /// What the declaration of a setting says beside its type and default.
 #[derive(Clone, Copy, Debug)]
-pub struct Declaration<'a> {
+pub struct SettingDeclaration<'a> {
     /// Dotted path.
     pub path: &'a str,
     /// Unit; empty for none.
@@ -74,7 +75,7 @@ pub struct Declaration<'a> {
     pub about: &'a str,
 }
 
-impl Declaration<'_> {
+impl SettingDeclaration<'_> {
     /// The setting with this default and these values.
     pub fn setting(&self, default: impl Serialize, values: String) -> Setting {
         let default = serde_json::to_value(default).unwrap_or_default();
@@ -95,59 +96,59 @@ impl Declaration<'_> {
 /// A setting or a group of settings.
 pub trait SettingField {
     /// Appends the settings that this default value stands for.
-    fn describe(&self, declaration: &Declaration<'_>, list: &mut Vec<Setting>);
+    fn describe(&self, declaration: &SettingDeclaration<'_>, list: &mut Vec<Setting>);
 
     /// Checks the range of the value at a path, or of all values of a group.
     ///
     /// # Errors
     /// The first value out of its range.
-    fn check_declared(&self, declaration: &Declaration<'_>) -> Result<(), RangeError>;
+    fn check_declared(&self, declaration: &SettingDeclaration<'_>) -> Result<(), RangeError>;
 
     /// As [`Self::check_declared`], for a group at `path`.
     ///
     /// # Errors
     /// The first value out of its range.
     fn check(&self, path: &str) -> Result<(), RangeError> {
-        self.check_declared(&Declaration { path, unit: "", range: Range::ANY, about: "" })
+        self.check_declared(&SettingDeclaration { path, unit: "", range: Range::ANY, about: "" })
     }
 }
 
 impl SettingField for f64 {
-    fn describe(&self, declaration: &Declaration<'_>, list: &mut Vec<Setting>) {
+    fn describe(&self, declaration: &SettingDeclaration<'_>, list: &mut Vec<Setting>) {
         list.push(declaration.number(self, "a number"));
     }
 
-    fn check_declared(&self, declaration: &Declaration<'_>) -> Result<(), RangeError> {
+    fn check_declared(&self, declaration: &SettingDeclaration<'_>) -> Result<(), RangeError> {
         declaration.range.check(declaration.path, *self, declaration.unit)
     }
 }
 
 impl SettingField for u32 {
-    fn describe(&self, declaration: &Declaration<'_>, list: &mut Vec<Setting>) {
+    fn describe(&self, declaration: &SettingDeclaration<'_>, list: &mut Vec<Setting>) {
         list.push(declaration.number(self, "a whole number"));
     }
 
-    fn check_declared(&self, declaration: &Declaration<'_>) -> Result<(), RangeError> {
+    fn check_declared(&self, declaration: &SettingDeclaration<'_>) -> Result<(), RangeError> {
         f64::from(*self).check_declared(declaration)
     }
 }
 
 impl SettingField for Option<usize> {
-    fn describe(&self, declaration: &Declaration<'_>, list: &mut Vec<Setting>) {
+    fn describe(&self, declaration: &SettingDeclaration<'_>, list: &mut Vec<Setting>) {
         list.push(declaration.number(self, "a whole number"));
     }
 
-    fn check_declared(&self, declaration: &Declaration<'_>) -> Result<(), RangeError> {
+    fn check_declared(&self, declaration: &SettingDeclaration<'_>) -> Result<(), RangeError> {
         self.map_or(Ok(()), |number| (number as f64).check_declared(declaration))
     }
 }
 
 impl SettingField for bool {
-    fn describe(&self, declaration: &Declaration<'_>, list: &mut Vec<Setting>) {
+    fn describe(&self, declaration: &SettingDeclaration<'_>, list: &mut Vec<Setting>) {
         list.push(declaration.setting(self, "true or false".to_owned()));
     }
 
-    fn check_declared(&self, _: &Declaration<'_>) -> Result<(), RangeError> {
+    fn check_declared(&self, _: &SettingDeclaration<'_>) -> Result<(), RangeError> {
         Ok(())
     }
 }
@@ -190,7 +191,7 @@ macro_rules! settings {
         impl $crate::settings::SettingField for $name {
             fn describe(
                 &self,
-                declaration: &$crate::settings::Declaration<'_>,
+                declaration: &$crate::settings::SettingDeclaration<'_>,
                 list: &mut Vec<$crate::settings::Setting>,
             ) {
                 $(
@@ -203,7 +204,7 @@ macro_rules! settings {
 
             fn check_declared(
                 &self,
-                declaration: &$crate::settings::Declaration<'_>,
+                declaration: &$crate::settings::SettingDeclaration<'_>,
             ) -> Result<(), $crate::range::RangeError> {
                 $(
                     let path = format!("{}.{}", declaration.path, stringify!($field));
@@ -217,9 +218,9 @@ macro_rules! settings {
     (@default $type:ty) => { <$type>::default() };
     (@default $type:ty, $default:expr) => { $default };
     (@declared $path:ident, $about:expr) => {
-        $crate::settings::Declaration { path: &$path, unit: "", range: $crate::range::Range::ANY, about: $about }
+        $crate::settings::SettingDeclaration { path: &$path, unit: "", range: $crate::range::Range::ANY, about: $about }
     };
     (@declared $path:ident, $about:expr, $unit:literal, $range:expr) => {
-        $crate::settings::Declaration { path: &$path, unit: $unit, range: $range, about: $about }
+        $crate::settings::SettingDeclaration { path: &$path, unit: $unit, range: $range, about: $about }
     };
 }

@@ -38,7 +38,7 @@ pub struct TaskCount {
 
 /// A file of imported demonstrations.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Imported {
+pub struct ImportedFile {
     /// File name without folders.
     pub file: String,
     /// SHA-256, hexadecimal.
@@ -69,7 +69,7 @@ pub struct DatasetCard {
     pub gripper: Option<GripCode>,
     /// Source files, if the demonstrations were imported.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub imported: Vec<Imported>,
+    pub imported: Vec<ImportedFile>,
     /// The demonstrations of each task.
     pub tasks: Vec<TaskCount>,
 }
@@ -117,8 +117,8 @@ impl DatasetCard {
                 "| {suite} | {id} | {prompt} | {asset} | {demos} | {samples} | {attempts} | {reasons} |\n"
             )
         };
-        let source = |source: &Imported| {
-            let Imported { file, sha256, format, demos, commands } = source;
+        let source = |source: &ImportedFile| {
+            let ImportedFile { file, sha256, format, demos, commands } = source;
             format!("| {file} | {sha256} | {format} | {demos} | {commands} |\n")
         };
         let mut page = format!(

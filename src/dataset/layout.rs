@@ -24,7 +24,7 @@ pub const VIDEO_STREAMS: [&str; 4] =
 
 /// A file of an attempt and its place in the finished dataset.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PartMove {
+pub struct AttemptFile {
     /// Path of the file among the attempts.
     pub part: PathBuf,
     /// Path in the finished dataset.
@@ -80,12 +80,12 @@ impl TaskPaths {
     }
 
     /// Videos and preview of an attempt that becomes demonstration `demo`.
-    pub fn video_moves(&self, attempt: u32, demo: usize) -> Vec<PartMove> {
-        let video = |stream: usize| PartMove {
+    pub fn video_moves(&self, attempt: u32, demo: usize) -> Vec<AttemptFile> {
+        let video = |stream: usize| AttemptFile {
             part: self.part(attempt, &format!("{}.mp4", VIDEO_STREAMS[stream])),
             target: self.root.join(self.video_relative(demo, stream)),
         };
-        let preview = PartMove { part: self.part(attempt, "preview.mp4"), target: self.preview(demo) };
+        let preview = AttemptFile { part: self.part(attempt, "preview.mp4"), target: self.preview(demo) };
         (0..VIDEO_STREAMS.len()).map(video).chain([preview]).collect()
     }
 }

@@ -9,7 +9,7 @@ use super::{
     layout::{MANIFEST, TaskPaths, VIDEO_STREAMS},
 };
 use softvt_common::files;
-use softvt_records::record::{EpisodeRecord, Origin};
+use softvt_records::record::{DemonstrationOrigin, EpisodeRecord};
 
 /// Version of the format.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -50,7 +50,7 @@ pub struct ManifestEntry {
     pub notes: BTreeMap<String, f64>,
     /// Imported demonstration of which it is a re-execution.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub origin: Option<Box<Origin>>,
+    pub origin: Option<Box<DemonstrationOrigin>>,
     /// Videos by stream, relative to the dataset.
     pub video_files: BTreeMap<String, String>,
 }

@@ -23,5 +23,5 @@ mod stream;
 
 pub use demonstration::Demonstration;
 pub use error::DatasetError;
-pub use hdf5::{FloatArray, ImageBlock, TaskFile, merge_parts};
+pub use hdf5::{FloatArray, ImageStack, TaskFile, merge_parts};
 pub use stream::{DataStream, StreamValues};

@@ -43,12 +43,12 @@ pub struct VariantSweep {
     /// Factor on Young's modulus.
     pub youngs_factor: f64,
     /// Rows by decreasing width.
-    pub rows: Vec<VariantRow>,
+    pub rows: Vec<VariantSweepRow>,
 }
 
 /// One row of a [`VariantSweep`], as in [`SweepRow`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct VariantRow {
+pub struct VariantSweepRow {
     /// Width, mm.
     pub width_mm: f64,
     /// D at rest, %.
@@ -61,7 +61,7 @@ pub struct VariantRow {
 
 /// A grip at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Grip {
+pub struct GripAtRest {
     /// Distance of the gels, m.
     pub width_m: f64,
     /// Force per pad, N.
@@ -72,9 +72,9 @@ pub struct Grip {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GripWindow {
     /// The loosest grip that holds.
-    pub loose: Grip,
+    pub loose: GripAtRest,
     /// The tightest grip whose carried object stays within τ; equal to `loose` if none does.
-    pub tight: Grip,
+    pub tight: GripAtRest,
     /// Distance of the gels at first contact, m.
     pub contact_m: f64,
     /// D that the weight of the carried object causes, over τ.
@@ -103,12 +103,12 @@ enum Quantity {
 
 /// One press in such quantities, by decreasing width.
 struct Curve {
-    rows: Vec<VariantRow>,
+    rows: Vec<VariantSweepRow>,
 }
 
 impl Curve {
-    fn new(rows: impl Iterator<Item = VariantRow>, scale: f64, youngs: f64) -> Self {
-        let reduced = |row: VariantRow| VariantRow {
+    fn new(rows: impl Iterator<Item = VariantSweepRow>, scale: f64, youngs: f64) -> Self {
+        let reduced = |row: VariantSweepRow| VariantSweepRow {
             width_mm: row.width_mm / scale,
             force_n: row.force_n / (youngs * scale * scale),
             ..row
@@ -118,7 +118,7 @@ impl Curve {
 
     /// The value of `wanted` where `given` first reaches `at`, linear between rows and along the first or last two beyond them.
     fn read(&self, wanted: Quantity, given: Quantity, at: f64) -> Option<f64> {
-        let of = |row: &VariantRow, quantity| match quantity {
+        let of = |row: &VariantSweepRow, quantity| match quantity {
             Quantity::Strain => row.strain_p95,
             Quantity::D => row.d_pct,
             Quantity::Force => row.force_n,
@@ -155,7 +155,12 @@ impl InstanceModel {
     pub fn new(envelope: &Envelope, kappa: f64) -> Self {
         let row = |row: &SweepRow| {
             let strain_p95 = row.strain_p95?;
-            Some(VariantRow { width_mm: row.width_mm, d_pct: row.d_pct, force_n: row.force_n, strain_p95 })
+            Some(VariantSweepRow {
+                width_mm: row.width_mm,
+                d_pct: row.d_pct,
+                force_n: row.force_n,
+                strain_p95,
+            })
         };
         let stable = envelope.sweep.iter().filter(|row| row.stable);
         let variant =
@@ -219,7 +224,7 @@ impl InstanceModel {
             self.reading(factors, |curve| curve.read(Quantity::Width, Quantity::Force, reduced))
         };
         let force_at = |d: f64| self.reading(factors, |curve| curve.read(Quantity::Force, Quantity::D, d));
-        let grip = |force_n: f64| Some(Grip { width_m: 1e-3 * scale * width_at(force_n)?, force_n });
+        let grip = |force_n: f64| Some(GripAtRest { width_m: 1e-3 * scale * width_at(force_n)?, force_n });
         let loose = grip(loose_n)?;
         let tight_n = if left > 0.0 { force_unit * force_at(d_tight)? } else { 0.0 };
         let tight = if tight_n > loose_n { grip(tight_n)? } else { loose };
@@ -273,10 +278,10 @@ mod tests {
     };
 
     /// A press in which D, strain and force grow linearly with the indentation of a body of 50 mm.
-    fn rows(scale: f64, youngs: f64, stiffening: f64) -> Vec<VariantRow> {
+    fn rows(scale: f64, youngs: f64, stiffening: f64) -> Vec<VariantSweepRow> {
         let row = |step: u32| {
             let indentation = f64::from(step);
-            VariantRow {
+            VariantSweepRow {
                 width_mm: scale * (50.0 - indentation),
                 d_pct: stiffening * indentation,
                 force_n: youngs * scale * scale * indentation,
@@ -288,7 +293,7 @@ mod tests {
 
     fn envelope(variants: Vec<VariantSweep>) -> Envelope {
         let sweep = rows(1.0, 1.0, 1.0).into_iter().map(|row| {
-            let VariantRow { width_mm, d_pct, force_n, strain_p95 } = row;
+            let VariantSweepRow { width_mm, d_pct, force_n, strain_p95 } = row;
             SweepRow { force_n, strain_p95: Some(strain_p95), ..squeeze(width_mm, d_pct, true) }
         });
         let holds = vec![hold(49.0, 5), HoldRow { d_peak_pct: Some(1.0), ..hold(48.0, 5) }];

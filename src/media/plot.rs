@@ -28,15 +28,15 @@ pub struct Plot {
     /// Label of the lower end of the vertical axis.
     pub zero: String,
     /// Range of the horizontal axis with a green background.
-    pub band: Option<Band>,
+    pub band: Option<AxisBand>,
     /// Dashed horizontal lines.
-    pub levels: Vec<Level>,
+    pub levels: Vec<LevelLine>,
     /// Dots on a line, rings where they are not filled.
-    pub curve: Vec<Point>,
+    pub curve: Vec<PlotPoint>,
     /// Diamonds without a line.
-    pub diamonds: Vec<Point>,
+    pub diamonds: Vec<PlotPoint>,
     /// Vertical lines.
-    pub marks: Vec<Mark>,
+    pub marks: Vec<VerticalMark>,
 }
 
 /// A horizontal axis, in either direction. Values beyond its ends are drawn at them.
@@ -52,7 +52,7 @@ pub struct HorizontalAxis {
 
 /// A range of the horizontal axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Band {
+pub struct AxisBand {
     /// Left end.
     pub left: f64,
     /// Right end.
@@ -61,7 +61,7 @@ pub struct Band {
 
 /// A value on the vertical axis.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Level {
+pub struct LevelLine {
     /// The value.
     pub y: f64,
     /// Text beside the axis.
@@ -70,7 +70,7 @@ pub struct Level {
 
 /// A point of the plot.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Point {
+pub struct PlotPoint {
     /// Place on the horizontal axis.
     pub x: f64,
     /// Place on the vertical axis.
@@ -81,18 +81,18 @@ pub struct Point {
 
 /// A value on the horizontal axis.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Mark {
+pub struct VerticalMark {
     /// The value.
     pub x: f64,
     /// Text above the line.
     pub label: String,
     /// Side of the line on which the text is.
-    pub side: MarkSide,
+    pub side: LabelSide,
 }
 
 /// Side of a vertical line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MarkSide {
+pub enum LabelSide {
     /// The text ends at the line.
     Left,
     /// The text begins at the line.
@@ -129,7 +129,7 @@ impl Plot {
     }
 
     fn background(&self) -> String {
-        let Some(Band { left, right }) = self.band else { return String::new() };
+        let Some(AxisBand { left, right }) = self.band else { return String::new() };
         let (from, to) = (self.x_px(left), self.x_px(right));
         format!(
             "<rect x=\"{from:.1}\" y=\"{TOP}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"#d9efd9\"/>\n",
@@ -158,7 +158,7 @@ impl Plot {
 
     fn level_lines(&self) -> String {
         let dashed = "stroke=\"#b03030\" stroke-dasharray=\"5 4\"";
-        let drawn = self.levels.iter().map(|Level { y, label }| {
+        let drawn = self.levels.iter().map(|LevelLine { y, label }| {
             let y = self.y_px(*y);
             line(LEFT, y, WIDTH - RIGHT, y, dashed) + &text(LEFT - 6.0, y + 4.0, "end", label)
         });
@@ -201,11 +201,11 @@ impl Plot {
     }
 
     fn mark_lines(&self) -> String {
-        let drawn = self.marks.iter().map(|Mark { x, label, side }| {
+        let drawn = self.marks.iter().map(|VerticalMark { x, label, side }| {
             let x = self.x_px(*x);
             let anchor = match side {
-                MarkSide::Left => "end",
-                MarkSide::Right => "start",
+                LabelSide::Left => "end",
+                LabelSide::Right => "start",
             };
             line(x, TOP, x, HEIGHT - BOTTOM, "stroke=\"#308030\"") + &text(x, TOP - 2.0, anchor, label)
         });
@@ -240,14 +240,14 @@ mod tests {
             x: HorizontalAxis { label: "width".to_owned(), left: 10.0, right: 0.0 },
             top: 2.0,
             zero: "0".to_owned(),
-            band: Some(Band { left: 10.0, right: 5.0 }),
-            levels: vec![Level { y: 1.0, label: "half".to_owned() }],
+            band: Some(AxisBand { left: 10.0, right: 5.0 }),
+            levels: vec![LevelLine { y: 1.0, label: "half".to_owned() }],
             curve: vec![
-                Point { x: 10.0, y: 0.0, is_filled: true },
-                Point { x: -7.0, y: 9.0, is_filled: false },
+                PlotPoint { x: 10.0, y: 0.0, is_filled: true },
+                PlotPoint { x: -7.0, y: 9.0, is_filled: false },
             ],
-            diamonds: vec![Point { x: 5.0, y: 1.0, is_filled: true }],
-            marks: vec![Mark { x: 5.0, label: "end".to_owned(), side: MarkSide::Left }],
+            diamonds: vec![PlotPoint { x: 5.0, y: 1.0, is_filled: true }],
+            marks: vec![VerticalMark { x: 5.0, label: "end".to_owned(), side: LabelSide::Left }],
         };
         let svg = plot.svg();
         for part in [

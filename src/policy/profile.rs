@@ -286,12 +286,12 @@ pub struct GripperValues {
     pub code: GripCode,
     /// For [`GripCode::Binary`]: hysteresis, instead of the middle between both values.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub latch: Option<GripLatch>,
+    pub latch: Option<GripHysteresis>,
 }
 
 /// Hysteresis of a binary gripper, as SoftVTBench's release v0.2 decodes continuous answers.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct GripLatch {
+pub struct GripHysteresis {
     /// Value from which on, towards that of the closed gripper, an answer closes.
     pub close: f64,
     /// Value from which on, towards that of the open gripper, an answer opens.
@@ -316,7 +316,8 @@ impl GripperValues {
 
     /// The command of a value.
     pub fn command(&self, value: f64) -> GripCommand {
-        if let (GripCode::Binary, Some(GripLatch { close, open, hold_steps })) = (self.code, self.latch) {
+        if let (GripCode::Binary, Some(GripHysteresis { close, open, hold_steps })) = (self.code, self.latch)
+        {
             let towards_closed = |limit: f64| (value - limit) * (self.closed - self.open) >= 0.0;
             let towards_open = |limit: f64| (value - limit) * (self.closed - self.open) <= 0.0;
             let closes = match (towards_closed(close), towards_open(open)) {
@@ -429,7 +430,7 @@ impl Profile {
                 let motion = input(both("tactile_marker_motion"), InputSource::MarkerMotion);
                 inputs.push(ProfileInput { frames: Some(2), ..motion });
                 inputs.push(force());
-                let latch = GripLatch { close: 0.0398, open: 0.03995, hold_steps: 10 };
+                let latch = GripHysteresis { close: 0.0398, open: 0.03995, hold_steps: 10 };
                 absolute(match name {
                     "softvtbench_v02" => fingers(GripCode::Continuous),
                     _ => GripperValues { latch: Some(latch), ..fingers(GripCode::Binary) },

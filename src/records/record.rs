@@ -35,7 +35,7 @@ pub struct EpisodeHeader {
     /// Changes of the scene by the variation of the suite, if it varies. The policy does not see them.
     pub variation: Option<Box<SceneVariation>>,
     /// Foreign demonstration that the episode re-executes, if any.
-    pub origin: Option<Box<Origin>>,
+    pub origin: Option<Box<DemonstrationOrigin>>,
 }
 
 impl Serialize for EpisodeHeader {
@@ -68,7 +68,7 @@ impl Serialize for EpisodeHeader {
 
 /// Demonstration of another simulator or robot, of which an episode takes the initial state and the actions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Origin {
+pub struct DemonstrationOrigin {
     /// Name of its file, without folders.
     pub file: String,
     /// SHA-256 of the file, hexadecimal.
@@ -83,7 +83,7 @@ pub struct Origin {
 
 /// A command that is out of reach of one step of the inverse kinematics.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct FarCommand {
+pub struct UnreachableCommand {
     /// Commanded position of the tool in the base frame, m.
     pub position_m: [f64; 3],
     /// Distance from the tool, m.
@@ -92,7 +92,7 @@ pub struct FarCommand {
     pub angle_rad: f64,
 }
 
-impl fmt::Display for FarCommand {
+impl fmt::Display for UnreachableCommand {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let short = |x: f64| decimal(Some(x), 3).trim_end_matches('0').trim_end_matches('.').to_owned();
         let position = self.position_m.map(short).join(", ");
@@ -124,7 +124,7 @@ pub struct RolloutStats {
     pub far_commands: u32,
     /// The first of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub first_far_command: Option<FarCommand>,
+    pub first_far_command: Option<UnreachableCommand>,
     /// Number of control steps whose grip value was outside of its range, and was clamped: for decoded answers of policies by more than a
     /// tenth of the range.
     pub clamped_grips: u32,
@@ -199,8 +199,11 @@ pub(crate) mod tests {
         let mut stats = sample().stats;
         assert!(stats.command_notes().is_empty());
         (stats.far_commands, stats.clamped_grips) = (168, 3);
-        stats.first_far_command =
-            Some(FarCommand { position_m: [467.0, 4.25, -260.0], distance_m: 534.5104, angle_rad: 0.0 });
+        stats.first_far_command = Some(UnreachableCommand {
+            position_m: [467.0, 4.25, -260.0],
+            distance_m: 534.5104,
+            angle_rad: 0.0,
+        });
         let far = "168 of 168 commands were out of reach, first: (467, 4.25, -260) m, 534.51 m and 0 rad from the tool";
         assert_eq!(stats.command_notes(), [far, "3 of 168 grip values were out of range"]);
     }

@@ -278,7 +278,7 @@ mod tests {
     use super::*;
     use crate::sample_record;
     use softvt_evaluation::verdict::Outcome;
-    use softvt_records::record::{EpisodeRecord, FarCommand};
+    use softvt_records::record::{EpisodeRecord, UnreachableCommand};
 
     fn episode(task: usize, prompt: &str, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
         let mut record = sample_record();
@@ -392,7 +392,8 @@ mod tests {
         let far = episode(0, "lift it", |r| {
             (r.stats.far_commands, r.stats.clamped_grips) = (100, 7);
             let position_m = [467.0, 4.0, 260.0];
-            r.stats.first_far_command = Some(FarCommand { position_m, distance_m: 534.5, angle_rad: 0.0 });
+            r.stats.first_far_command =
+                Some(UnreachableCommand { position_m, distance_m: 534.5, angle_rad: 0.0 });
         });
         let text = table(&SuiteSummary::from_records("suite", "pi", &[far, episode(0, "lift it", |_| ())]));
         let lines = "100 of 336 commands were out of reach in 1 episode\n  first: (467, 4, 260) m, 534.5 m and 0 rad from the tool\n";

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::PadSurface;
 use softvt_common::{
     range::{Range, RangeError},
-    settings::{Declaration, Setting, SettingField},
+    settings::{Setting, SettingDeclaration, SettingField},
 };
 use softvt_geometry::Vec3;
 
@@ -163,24 +163,24 @@ impl TactileSpec {
 }
 
 impl SettingField for OpticsModel {
-    fn describe(&self, declaration: &Declaration<'_>, list: &mut Vec<Setting>) {
+    fn describe(&self, declaration: &SettingDeclaration<'_>, list: &mut Vec<Setting>) {
         let values = "polynomial, or { model = \"taxim\", tables = folder }".to_owned();
         list.push(declaration.setting("polynomial", values));
     }
 
-    fn check_declared(&self, _: &Declaration<'_>) -> Result<(), RangeError> {
+    fn check_declared(&self, _: &SettingDeclaration<'_>) -> Result<(), RangeError> {
         Ok(())
     }
 }
 
 impl SettingField for MarkerModel {
-    fn describe(&self, declaration: &Declaration<'_>, list: &mut Vec<Setting>) {
+    fn describe(&self, declaration: &SettingDeclaration<'_>, list: &mut Vec<Setting>) {
         let values = "elastic, or fots with the constants below".to_owned();
         list.push(declaration.setting("elastic", values));
         FotsSpec::default().describe(declaration, list);
     }
 
-    fn check_declared(&self, declaration: &Declaration<'_>) -> Result<(), RangeError> {
+    fn check_declared(&self, declaration: &SettingDeclaration<'_>) -> Result<(), RangeError> {
         match self {
             Self::Elastic => Ok(()),
             Self::Fots(fots) => fots.check_declared(declaration),

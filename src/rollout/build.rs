@@ -16,7 +16,7 @@ use softvt_physics::{
     joints::{JointKind, JointTree, Link},
     rigid::RigidState,
 };
-use softvt_scene::{Body, JointMotion, Object, Part, Scene};
+use softvt_scene::{Body, JointMotion, MovingPart, Object, Scene};
 
 /// Minimum thickness of rigid walls, m. Other bodies can pass through thinner ones between two steps.
 const MIN_WALL: f64 = 2e-3;
@@ -193,7 +193,7 @@ fn add(
 fn add_articulated(
     world: &mut World,
     object: &Object,
-    parts: &[Part],
+    parts: &[MovingPart],
     base: usize,
     cache: &AssetCache,
 ) -> Result<(ArticulationId, Vec<ObjectInstance>), BuildError> {
@@ -230,7 +230,7 @@ fn add_articulated(
 }
 
 /// Link of a part. Its frame is that of the object, translated to the origin of the joint.
-fn link(part: &Part, parts: &[Part], cache: &AssetCache) -> Link {
+fn link(part: &MovingPart, parts: &[MovingPart], cache: &AssetCache) -> Link {
     let m = cache.mass(&part.asset.shape, part.density);
     let joint = &part.joint;
     let axis = nalgebra::Unit::new_normalize(joint.axis_o);

@@ -42,7 +42,7 @@ use softvt_physics::{
     world::{StepFailure, WorldSnapshot},
 };
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
-use softvt_records::record::{EpisodeHeader, EpisodeRecord, FarCommand, RolloutStats};
+use softvt_records::record::{EpisodeHeader, EpisodeRecord, RolloutStats, UnreachableCommand};
 use softvt_robot::{
     Side,
     ik::{LINEARISATION_RANGE, PoseDifference},
@@ -277,7 +277,7 @@ pub struct Episode {
     /// Streams that will be requested.
     streams: SensorStreams,
     far_commands: u32,
-    first_far_command: Option<FarCommand>,
+    first_far_command: Option<UnreachableCommand>,
     clamped_grips: u32,
 }
 
@@ -633,13 +633,13 @@ pub fn checksum(actions: &[Action]) -> String {
 }
 
 /// The command, if it is farther from the tool than one step of the inverse kinematics reaches; both in the base frame.
-fn far_command(tool_b: &Pose, action: &Action) -> Option<FarCommand> {
+fn far_command(tool_b: &Pose, action: &Action) -> Option<UnreachableCommand> {
     let turn = rotation::error(
         &rotation::from_axis_angle(&rotation::axis_angle(&tool_b.rotation)),
         &rotation::from_axis_angle(&action.axis_angle_b),
     );
     let error = PoseDifference { translation: action.position_b - tool_b.translation.vector, rotation: turn };
-    (!LINEARISATION_RANGE.contains(&error)).then(|| FarCommand {
+    (!LINEARISATION_RANGE.contains(&error)).then(|| UnreachableCommand {
         position_m: action.position_b.into(),
         distance_m: error.translation.norm(),
         angle_rad: error.rotation.norm(),
@@ -668,7 +668,7 @@ enum ActionError {
         "all {steps} commands were out of reach, first: {first}; expected positions in m and axis-angles in rad, in the \
          robot's base frame"
     )]
-    OutOfReach { steps: u32, first: FarCommand },
+    OutOfReach { steps: u32, first: UnreachableCommand },
 }
 
 /// Checks that the numbers of an action are finite and plausible, and a grip force within the effort of the gripper.

@@ -11,7 +11,7 @@ use std::{
 use crate::{
     episode_artifacts::VideoSelection,
     error::RunError,
-    observer::{JobList, Observer, Silent},
+    observer::{JobList, Observer, SilentObserver},
     policy::PolicyConfig,
 };
 use softvt_benchmark::{ShiftValue, Suite, seed::SecretSeed};
@@ -157,7 +157,7 @@ impl Default for RunConfig {
             video: None,
             out: None,
             resume: false,
-            observer: Arc::new(Silent),
+            observer: Arc::new(SilentObserver),
         }
     }
 }

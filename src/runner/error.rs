@@ -6,7 +6,7 @@ use softvt_common::{cancel, files::FileError};
 
 /// Causes of a [`RunError`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cause {
+pub enum RunErrorCause {
     /// A script, an argument or a file that is not valid.
     Input,
     /// The policy, or the connection to it.
@@ -29,7 +29,7 @@ pub struct FaultySetting {
 #[error("{}{}", self.text(&|field| field.to_owned()), if self.resumable.is_some() { "; resume it to continue" } else { "" })]
 pub struct RunError {
     /// Its cause, which decides the exit code of a command.
-    pub cause: Cause,
+    pub cause: RunErrorCause,
     /// Where it is, such as a file; empty if the message says it.
     pub place: String,
     /// The setting at fault, if it is one.
@@ -42,7 +42,7 @@ pub struct RunError {
 
 impl RunError {
     /// An error with this cause.
-    pub fn new(cause: Cause, message: impl ToString) -> Self {
+    pub fn new(cause: RunErrorCause, message: impl ToString) -> Self {
         Self { cause, place: String::new(), setting: None, message: message.to_string(), resumable: None }
     }
 
@@ -69,13 +69,13 @@ impl RunError {
 
     /// Invalid input. Once a stop is requested, that is the cause, since the error may be its consequence.
     pub fn input(message: impl ToString) -> Self {
-        let cause = if cancel::requested() { Cause::Interrupt } else { Cause::Input };
+        let cause = if cancel::requested() { RunErrorCause::Interrupt } else { RunErrorCause::Input };
         Self::new(cause, message)
     }
 
     /// A run that ended by a request to stop.
     pub fn interrupted(message: impl ToString) -> Self {
-        Self::new(Cause::Interrupt, message)
+        Self::new(RunErrorCause::Interrupt, message)
     }
 
     /// Puts a place before the text.

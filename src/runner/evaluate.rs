@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::{
     config::RunConfig,
     episode_list::{EpisodeJob, EpisodeList},
-    error::{Cause, RunError},
+    error::{RunError, RunErrorCause},
     observer::JobList,
     replay::{difference, replay_factory, with_policy_fields},
     run_manifest::{self, RunManifest},
@@ -191,7 +191,7 @@ pub(crate) fn with_kept(
 ) -> Result<(), RunError> {
     match outcome {
         // An error from before the interrupt has its own exit code and is reported as it is.
-        Err(error) if error.cause != Cause::Interrupt => Err(error.with_line(kept)),
+        Err(error) if error.cause != RunErrorCause::Interrupt => Err(error.with_line(kept)),
         Ok(()) if !cancel::requested() => Ok(()),
         _ => {
             let resumable = resumable.map(Path::to_owned);
@@ -250,7 +250,7 @@ pub(crate) fn run_suite(
         )
     });
     match outcome {
-        Err(error) if error.cause != Cause::Interrupt && log.records.is_empty() => {
+        Err(error) if error.cause != RunErrorCause::Interrupt && log.records.is_empty() => {
             log.discard()?;
             return Err(error);
         }

@@ -37,10 +37,10 @@ pub use check::SuiteChecker;
 pub use config::{ConfiguredScript, RunConfig, Shard, TraceDetail, read_secret, thread_count};
 pub use episode_artifacts::VideoSelection;
 pub use episode_list::{EpisodeJob, EpisodeList};
-pub use error::{Cause, FaultySetting, RunError};
+pub use error::{FaultySetting, RunError, RunErrorCause};
 pub use evaluate::SuiteResult;
 pub use golden::GoldenEpisode;
-pub use observer::{Observer, Silent};
+pub use observer::{Observer, SilentObserver};
 pub use policy::{
     BuiltinPolicy, ControllerFactory, DeclaredStreams, PolicyConfig, PolicyOptions, PolicySource,
     expert_controller, parse_profile,

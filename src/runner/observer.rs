@@ -36,9 +36,9 @@ pub trait Observer: Send + Sync {
 
 /// Tells nothing.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Silent;
+pub struct SilentObserver;
 
-impl Observer for Silent {}
+impl Observer for SilentObserver {}
 
 /// An open list of jobs, which ends when this is dropped.
 pub(crate) struct JobList<'a>(&'a dyn Observer);

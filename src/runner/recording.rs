@@ -43,7 +43,7 @@ use softvt_dataset::{
 };
 use softvt_evaluation::verdict::Outcome;
 use softvt_policy::{builtin::RecordedPolicy, profile::GripCode};
-use softvt_records::record::{EpisodeRecord, Origin};
+use softvt_records::record::{DemonstrationOrigin, EpisodeRecord};
 use softvt_report::{actions, run_folder::RunFolder};
 use softvt_rollout::{ChunkedPolicy, EpisodeError, FinishedEpisode, SettleError};
 use softvt_scene::InitialState;
@@ -240,7 +240,8 @@ impl<'a> SuiteRecording<'a> {
             let policy = RecordedPolicy::new(Vec::new(), Some(ending.clone()));
             Ok(Box::new(ChunkedPolicy::new(Box::new(policy), brief, 1)))
         });
-        let layout_start = origin.map(|origin| Origin { start: InitialState::default(), ..origin.clone() });
+        let layout_start =
+            origin.map(|origin| DemonstrationOrigin { start: InitialState::default(), ..origin.clone() });
         run.run_episode_from(job, layout_start.as_ref(), true, &failing)?
             .map_err(|error| run.episode_error(&error))
     }

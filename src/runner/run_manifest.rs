@@ -9,9 +9,11 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::{error::RunError, recorded_runs::ReplaySource, suite_run::PreparedRun};
-use softvt_benchmark::{Needs, ShiftValue, seed::SecretSeed, settings::Settings, variation::VariationRanges};
+use softvt_benchmark::{
+    NeededKnowledge, ShiftValue, seed::SecretSeed, settings::Settings, variation::VariationRanges,
+};
 use softvt_common::files;
-use softvt_dataset::card::Imported;
+use softvt_dataset::card::ImportedFile;
 use softvt_policy::profile::{GripCode, Profile};
 use softvt_report::{
     run_folder::{RUN, RunFolder},
@@ -35,7 +37,7 @@ pub(crate) struct RunManifest<'a> {
     vary: Option<String>,
     /// What a safe grip needs, if the suite states it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    needs: Option<Needs>,
+    needs: Option<NeededKnowledge>,
     /// The suite whose rigid twin this one is.
     #[serde(skip_serializing_if = "Option::is_none")]
     twin_of: Option<&'a str>,
@@ -57,7 +59,7 @@ pub(crate) struct RunManifest<'a> {
     replayed: Option<&'a ReplaySource>,
     /// Files of the demonstrations that were re-executed.
     #[serde(skip_serializing_if = "Option::is_none")]
-    imported: Option<&'a [Imported]>,
+    imported: Option<&'a [ImportedFile]>,
     /// Actions executed from each chunk.
     #[serde(skip_serializing_if = "Option::is_none")]
     replan: Option<usize>,

@@ -6,7 +6,7 @@ use crate::{
     config::{RunConfig, TraceDetail},
     episode_artifacts::EpisodeArtifacts,
     episode_list::{EpisodeJob, EpisodeList},
-    error::{Cause, RunError},
+    error::{RunError, RunErrorCause},
     limits::{CalibrationFiles, Calibrations, LimitScan, SceneLimits},
     policy::{ControllerFactory, DeclaredStreams},
     recorded_runs::{RecordedRuns, ReplaySource},
@@ -17,9 +17,9 @@ use softvt_benchmark::{ObjectType, ShiftValue, Suite, Task, settings::Settings};
 use softvt_common::cancel;
 use softvt_common::episode_id::{EpisodeId, EpisodeIndex, EpisodeSplit};
 use softvt_common::{parallel, text::unknown_name};
-use softvt_dataset::card::Imported;
+use softvt_dataset::card::ImportedFile;
 use softvt_policy::{EpisodeBrief, PolicyError, SensorStreams, remote::PolicyConnections};
-use softvt_records::record::Origin;
+use softvt_records::record::DemonstrationOrigin;
 use softvt_rollout::{
     AssetCache, BuildError, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SensorAssets, Sensors,
     Simulation, check_goal, check_sensors, cost_warning,
@@ -66,9 +66,9 @@ pub struct SuiteRun<'a> {
     pub(crate) split: EpisodeSplit,
     pub(crate) connections: Option<Arc<PolicyConnections>>,
     /// Demonstrations of other simulators that the episodes re-execute.
-    pub(crate) origins: BTreeMap<EpisodeIndex, Origin>,
+    pub(crate) origins: BTreeMap<EpisodeIndex, DemonstrationOrigin>,
     /// Files of those demonstrations.
-    pub(crate) imported: Vec<Imported>,
+    pub(crate) imported: Vec<ImportedFile>,
     /// Makes the controller of an episode.
     pub controllers: ControllerFactory,
 }
@@ -308,7 +308,7 @@ impl<'a> SuiteRun<'a> {
     pub fn run_episode_from(
         &self,
         job: EpisodeJob<'_>,
-        origin: Option<&Origin>,
+        origin: Option<&DemonstrationOrigin>,
         keep_states: bool,
         controllers: &ControllerFactory,
     ) -> Result<Result<FinishedEpisode, EpisodeError>, RunError> {
@@ -334,7 +334,7 @@ impl<'a> SuiteRun<'a> {
         &self,
         task: &Task,
         id: &EpisodeId,
-        origin: Option<&Origin>,
+        origin: Option<&DemonstrationOrigin>,
     ) -> Result<(EpisodeSpec, EpisodeSetup), RunError> {
         let mut opened = self.open_episode(id)?;
         if let Some(origin) = origin {
@@ -359,9 +359,9 @@ impl<'a> SuiteRun<'a> {
     pub fn episode_error(&self, error: &EpisodeError) -> RunError {
         let cause = match error {
             // An error after the interrupt may be its consequence.
-            _ if cancel::requested() => Cause::Interrupt,
-            EpisodeError::Control { source, .. } if source.is_of_server() => Cause::Policy,
-            _ => Cause::Input,
+            _ if cancel::requested() => RunErrorCause::Interrupt,
+            EpisodeError::Control { source, .. } if source.is_of_server() => RunErrorCause::Policy,
+            _ => RunErrorCause::Input,
         };
         match (RunError::new(cause, error), error, error.place()) {
             // The message of this one begins with file and line.
@@ -563,6 +563,6 @@ fn policy_failure(error: PolicyError) -> RunError {
         PolicyError::Address { url, problem } => {
             RunError::of_setting("policy", url, format!("{problem}; expected ws://HOST:PORT"))
         }
-        other => RunError::new(Cause::Policy, other),
+        other => RunError::new(RunErrorCause::Policy, other),
     }
 }

@@ -23,7 +23,7 @@ pub enum Body {
         density: f64,
     },
     /// Parts on joints. The asset's own shape is their base, which is fixed to the world.
-    Articulated(Vec<Part>),
+    Articulated(Vec<MovingPart>),
     /// Fixed to the world; collides.
     Static,
     /// Rendered only: fixed and without collisions.
@@ -80,7 +80,7 @@ pub struct Asset {
 
 impl Asset {
     /// Parts of an articulated object, parents before children; empty for other bodies.
-    pub fn parts(&self) -> &[Part] {
+    pub fn parts(&self) -> &[MovingPart] {
         match &self.body {
             Body::Articulated(parts) => parts,
             _ => &[],
@@ -90,7 +90,7 @@ impl Asset {
     /// Mass (kg) of a soft or rigid body, or of the moving parts of an articulated one; `None` for fixed objects.
     pub fn mass(&self) -> Option<f64> {
         match &self.body {
-            Body::Articulated(parts) => Some(parts.iter().map(Part::mass).sum()),
+            Body::Articulated(parts) => Some(parts.iter().map(MovingPart::mass).sum()),
             _ => self.density().map(|density| mass_properties(&self.shape, density).mass),
         }
     }
@@ -183,7 +183,7 @@ impl Joint {
 
 /// A moving part of an articulated object.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Part {
+pub struct MovingPart {
     /// Name, unique in the object, for example "top_drawer".
     pub name: String,
     /// Shape and appearance in the frame of the whole object with all joints at 0. The asset has the name of the part
@@ -197,7 +197,7 @@ pub struct Part {
     pub joint: Joint,
 }
 
-impl Part {
+impl MovingPart {
     /// Mass, kg.
     pub fn mass(&self) -> f64 {
         mass_properties(&self.asset.shape, self.density).mass
@@ -213,7 +213,7 @@ impl Part {
 /// Poses of the parts relative to the object frame at joint values `joints` (m or rad, one per part).
 ///
 /// A pose maps the shape of its part, which is given with all joints at 0, to its place in the object frame.
-pub fn part_poses(parts: &[Part], joints: &[f64]) -> Vec<Pose> {
+pub fn part_poses(parts: &[MovingPart], joints: &[f64]) -> Vec<Pose> {
     let mut poses: Vec<Pose> = Vec::with_capacity(parts.len());
     for (part, &value) in parts.iter().zip(joints) {
         let own = match part.joint.motion {

@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-use super::asset::{Asset, Body, Joint, Part, SoftMaterial};
+use super::asset::{Asset, Body, Joint, MovingPart, SoftMaterial};
 use softvt_geometry::shape::Shape;
 use softvt_physics::contact::Friction;
 
@@ -37,8 +37,8 @@ struct PartMechanics<'a> {
 }
 
 impl<'a> PartMechanics<'a> {
-    fn new(part: &'a Part) -> Self {
-        let Part { asset, density, parent, joint, .. } = part;
+    fn new(part: &'a MovingPart) -> Self {
+        let MovingPart { asset, density, parent, joint, .. } = part;
         Self { shape: asset.shape.unpainted(), density: *density, parent: *parent, joint }
     }
 }

@@ -55,7 +55,7 @@ use serde::{Deserialize, Serialize};
 
 use softvt_geometry::{Aabb, Pose, Quat, Vec3};
 
-pub use asset::{Asset, Body, Joint, JointMotion, Part, SoftMaterial, part_poses};
+pub use asset::{Asset, Body, Joint, JointMotion, MovingPart, SoftMaterial, part_poses};
 pub use camera::{Camera, CameraMount, CameraSettings};
 pub use decal::{GlyphCoverage, LabelLine, MAX_LETTERS, TextDecal, Typeface};
 pub use light::{KeyLight, Lighting, Sky};

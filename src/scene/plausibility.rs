@@ -1,6 +1,6 @@
 //! Materials that are valid and most likely a mistake.
 
-use super::{Asset, Body, Part, SoftMaterial};
+use super::{Asset, Body, MovingPart, SoftMaterial};
 use softvt_common::text::format_number;
 use softvt_physics::fem::ElasticMaterial;
 
@@ -50,7 +50,7 @@ impl Asset {
     }
 }
 
-fn part_warning(part: &Part) -> Option<String> {
+fn part_warning(part: &MovingPart) -> Option<String> {
     density_warning(part.density).map(|warning| format!("part {}: {warning}", part.name))
 }
 

@@ -29,9 +29,9 @@ pub use run::{
 pub use vm::{
     PrintSink, VmLimits,
     error::ScriptError,
-    library::{Bundle, embedded, embedded_scripts, sha256},
+    library::{ScriptFiles, embedded, embedded_scripts, sha256},
     set_stuck_handler,
-    watchdog::OnStuck,
+    watchdog::StuckHandler,
 };
 
 #[cfg(test)]

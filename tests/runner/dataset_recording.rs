@@ -8,7 +8,7 @@ use softvt::{
     episode_id::EpisodeSplit,
     policy::profile::GripCode,
     runner::{
-        DemoCount, PolicyOptions, Silent,
+        DemoCount, PolicyOptions, SilentObserver,
         episode_selector::EpisodeSelector,
         record,
         recording::{RecordingOptions, RecordingSummary},
@@ -69,7 +69,7 @@ impl<'a> Recording<'a> {
 
 /// Simulates demonstrations again.
 fn replay(demos: &[DemoRef]) -> Vec<DemoReplay> {
-    simulate_demos(demos, &(Arc::new(Silent) as _)).unwrap_or_else(|error| panic!("{error}"))
+    simulate_demos(demos, &(Arc::new(SilentObserver) as _)).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// True if the re-simulation of every demonstration of a dataset is byte-identical and reaches the goal.

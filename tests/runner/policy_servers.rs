@@ -18,7 +18,7 @@ use softvt::{
     evaluation::verdict::Outcome,
     policy::{profile::GripCode, remote::Protocol},
     report::terminal,
-    runner::Cause,
+    runner::RunErrorCause,
 };
 use tungstenite::{Message, WebSocket, accept};
 
@@ -612,7 +612,7 @@ fn messages(
     greeting: Value,
     observe: &str,
     change: impl Fn(Run) -> Run,
-) -> Result<Vec<Value>, (Cause, String)> {
+) -> Result<Vec<Value>, (RunErrorCause, String)> {
     let seen = Arc::new(Mutex::new(Vec::new()));
     let kept = seen.clone();
     let address = server(9, move |_, mut socket| {
@@ -692,12 +692,12 @@ fn a_server_or_a_profile_may_ask_for_an_observation_in_every_control_step() {
     assert_eq!(by_server, by_profile);
     let wrong = Value::Map(vec![(text("observe_every_step"), text("yes"))]);
     let (cause, message) = messages(wrong, "", |run| run).expect_err("no truth value");
-    assert_eq!(cause, Cause::Policy);
+    assert_eq!(cause, RunErrorCause::Policy);
     assert!(message.contains("observe_every_step in its metadata; expected true or false"), "{message}");
     let refused = messages(Value::Map(Vec::new()), every_step, |run| {
         run.with_policy(|policy| policy.protocol = Some(Protocol::VlaEval))
     });
     let (cause, message) = refused.expect_err("another protocol");
-    assert_eq!(cause, Cause::Input);
+    assert_eq!(cause, RunErrorCause::Input);
     assert!(message.contains("observe_every_step needs the protocol openpi"), "{message}");
 }

@@ -22,8 +22,8 @@ use softvt::{
         tables::{ResultTable, all_tables},
     },
     runner::{
-        BuiltinPolicy, Cause, ConfiguredScript, Observer, PolicyConfig, PolicyOptions, RunConfig, RunError,
-        Runner, SuiteChecker, SuiteResult, TraceDetail, conditions,
+        BuiltinPolicy, ConfiguredScript, Observer, PolicyConfig, PolicyOptions, RunConfig, RunError,
+        RunErrorCause, Runner, SuiteChecker, SuiteResult, TraceDetail, conditions,
         episode_selector::EpisodeSelector,
         experiment::{self, ExperimentOutput},
         replay::{self, SecretFile},
@@ -298,7 +298,7 @@ impl Run<'_> {
     }
 
     /// Runs it. Returns the cause and the message of the error that ends it.
-    pub fn attempt(self) -> Result<Finished, (Cause, String)> {
+    pub fn attempt(self) -> Result<Finished, (RunErrorCause, String)> {
         match self.results() {
             Ok(results) => Ok(Finished { results, messages: self.told() }),
             Err(error) => Err((error.cause, self.project.relative(error))),
@@ -308,7 +308,7 @@ impl Run<'_> {
     /// The message for invalid input.
     pub fn error(self) -> String {
         match self.attempt() {
-            Err((Cause::Input, message)) => message,
+            Err((RunErrorCause::Input, message)) => message,
             Err(other) => panic!("{other:?}"),
             Ok(finished) => panic!("it succeeds\n{}", finished.messages),
         }
@@ -317,7 +317,7 @@ impl Run<'_> {
     /// The message of a policy that fails.
     pub fn policy_error(self) -> String {
         match self.attempt() {
-            Err((Cause::Policy, message)) => message,
+            Err((RunErrorCause::Policy, message)) => message,
             Err(other) => panic!("{other:?}"),
             Ok(finished) => panic!("it succeeds\n{}", finished.messages),
         }

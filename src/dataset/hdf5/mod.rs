@@ -7,5 +7,5 @@ mod write;
 
 pub use merge::merge_parts;
 pub(super) use read::NumberType;
-pub use read::{FloatArray, ImageBlock, TaskFile};
+pub use read::{FloatArray, ImageStack, TaskFile};
 pub(super) use write::{ChunkedSteps, Hdf5Writer, write_file};

@@ -55,7 +55,7 @@ impl FloatArray {
 
 /// RGB images of equal size, 8 bits per channel, one after the other.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ImageBlock {
+pub struct ImageStack {
     /// Rows from the top, pixels from the left, channels last.
     pub bytes: Vec<u8>,
     /// Height of an image, px.
@@ -330,14 +330,14 @@ impl TaskFile {
     ///
     /// # Errors
     /// A step is missing, or the stream does not hold 8-bit RGB images.
-    pub fn images(&self, demo: usize, name: &str, steps: Range<usize>) -> Result<ImageBlock, DatasetError> {
+    pub fn images(&self, demo: usize, name: &str, steps: Range<usize>) -> Result<ImageStack, DatasetError> {
         let data = self.dataset(demo, name)?;
         let &[_, height, width, 3] = &data.shape()[..] else {
             let what = format!("expected the shape (steps, height, width, 3), got {:?}", data.shape());
             return Err(self.error(demo, name, what));
         };
         let bytes = data.read_slice(&[steps.start, 0, 0, 0], &[steps.len(), height, width, 3]);
-        Ok(ImageBlock { bytes: bytes.map_err(self.failed(demo, name))?, height, width })
+        Ok(ImageStack { bytes: bytes.map_err(self.failed(demo, name))?, height, width })
     }
 
     /// Reads the actions of a demonstration: absolute tool poses in the base frame, continuous gripper closure.

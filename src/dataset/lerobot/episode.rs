@@ -9,7 +9,7 @@ use super::{
     selection::{ImageSize, SelectedDemo, Selection},
     statistics::{FeatureStatistics, QuantileSource, ValueCounts, ValueMoments, ValueStatistics},
 };
-use crate::{DatasetError, ImageBlock, TaskFile, demonstration::actions_stream_name, layout::IMAGE_STREAMS};
+use crate::{DatasetError, ImageStack, TaskFile, demonstration::actions_stream_name, layout::IMAGE_STREAMS};
 use softvt_benchmark::CONTROL_HZ;
 use softvt_robot::tactile::IMAGE_SIZE;
 use softvt_sensing::{
@@ -202,7 +202,7 @@ impl DemoStreams<'_> {
         {
             let name = format!("obs/{name}");
             self.check_shape(&name, &[size.height, size.width, 3])?;
-            let ImageBlock { bytes, height, width } = self.file.images(self.demo, &name, steps.clone())?;
+            let ImageStack { bytes, height, width } = self.file.images(self.demo, &name, steps.clone())?;
             let each = bytes.chunks_exact((3 * height * width).max(1));
             *images =
                 each.filter_map(|b| RgbImage::from_raw(width as u32, height as u32, b.to_vec())).collect();

@@ -22,6 +22,6 @@ pub use contact::Contact;
 pub use displacement::{Bumps, Ramp, Ridges, SurfaceRelief};
 pub use mesh_solid::MeshSolid;
 pub use polygon::Polygon;
-pub use tree::{Shape, TreeSize};
+pub use tree::{Shape, ShapeTreeSize};
 pub use validate::ShapeError;
 pub use warp::Axis;

@@ -317,7 +317,7 @@ pub(super) fn to_local(pose: &Pose, p_o: &Vec3) -> Vec3 {
 /// Size of the tree of a shape, which bounds the cost of traversals and queries. Shared parts count
 /// every time they occur.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TreeSize {
+pub struct ShapeTreeSize {
     /// Number of nodes, including the root.
     pub nodes: usize,
     /// Depth, including the root.
@@ -351,13 +351,13 @@ impl Shape {
     }
 
     /// Returns the size of the tree.
-    pub fn tree_size(&self) -> TreeSize {
+    pub fn tree_size(&self) -> ShapeTreeSize {
         let own = match self {
             Self::Displace { reliefs, .. } => reliefs.len().max(1),
             _ => 1,
         };
         let exact = matches!(self, Self::Union(_) | Self::Intersect(_) | Self::Subtract { .. });
-        let mut size = TreeSize { nodes: own, depth: 0, work: 0.0 };
+        let mut size = ShapeTreeSize { nodes: own, depth: 0, work: 0.0 };
         for part in self.children().into_iter().map(Self::tree_size) {
             size.nodes += part.nodes;
             size.depth = size.depth.max(part.depth);
@@ -381,7 +381,7 @@ mod tests {
     #[test]
     fn shared_parts_count_every_time_they_occur() {
         let size = |shape: &Shape| {
-            let TreeSize { nodes, depth, .. } = shape.tree_size();
+            let ShapeTreeSize { nodes, depth, .. } = shape.tree_size();
             (nodes, depth)
         };
         let ball = Shape::Sphere { radius: 0.01 };

@@ -17,4 +17,4 @@ pub use contact_history::{ContactHistory, ContactRecord};
 pub use detect::{BodyBounds, ColliderMotion, ContactCandidate, DetectionLimits, detect};
 pub use manifold::ManifoldPoint;
 pub use soft_field::{DeformedSdf, SdfCandidate, SdfContact, detect_soft, may_touch};
-pub use solid::{CollisionGeometry, GelSample, PairId};
+pub use solid::{CollisionGeometry, ContactPairId, GelSample};

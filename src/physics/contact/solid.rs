@@ -48,7 +48,7 @@ pub struct GelSample {
 
 /// The pair of primitives that a contact point belongs to, or, for general shapes, the body whose
 /// surface feature it is.
-pub type PairId = u32;
+pub type ContactPairId = u32;
 
 /// A skin sample with a larger cosine between its normal and the shape's has the shape behind it.
 const MAX_FACING_COSINE: f64 = 0.3;
@@ -69,7 +69,7 @@ impl CollisionGeometry {
         a: Placed<&Self>,
         b: Placed<&Self>,
         margin: f64,
-        out: &mut Vec<(PairId, ManifoldPoint)>,
+        out: &mut Vec<(ContactPairId, ManifoldPoint)>,
     ) {
         match (a.shape, b.shape) {
             (Self::Rigid(shape_a), Self::Rigid(shape_b)) => {
@@ -127,7 +127,7 @@ impl RigidShape {
         other: &Self,
         other_pose: &Pose,
         margin: f64,
-        out: &mut Vec<(PairId, ManifoldPoint)>,
+        out: &mut Vec<(ContactPairId, ManifoldPoint)>,
     ) {
         let mut found = Vec::new();
         if let (Some(own), Some(others)) = (&self.primitives, &other.primitives) {
@@ -135,7 +135,7 @@ impl RigidShape {
             for (i, a) in own.iter().enumerate() {
                 for (j, b) in others.iter().enumerate() {
                     manifold(&moved(a, pose), &moved(b, other_pose), margin, &mut found);
-                    let pair = (i * others.len() + j) as PairId;
+                    let pair = (i * others.len() + j) as ContactPairId;
                     out.extend(found.drain(..).map(|point| (pair, point)));
                 }
             }
@@ -157,7 +157,7 @@ impl RigidShape {
         theirs.lowest(margin, &mut found);
         flip_normals(&mut found);
         let is_theirs = |i: usize| (first..second).contains(&i) || i >= third;
-        out.extend(found.drain(..).enumerate().map(|(i, point)| (PairId::from(is_theirs(i)), point)));
+        out.extend(found.drain(..).enumerate().map(|(i, point)| (ContactPairId::from(is_theirs(i)), point)));
     }
 
     fn in_field_of<'a>(&'a self, pose: &Pose, other: &'a Self, other_pose: &'a Pose) -> SurfaceInSdf<'a> {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{
     densification::{self, Densification},
     element::{self, Stiffness},
-    force::{self, Corners, elastic},
+    force::{self, ElementCorners, elastic},
     material::ElasticMaterial,
     rotation::polar,
 };
@@ -66,7 +66,7 @@ pub struct FemModel {
     pub spacing: f64,
     pub(super) stiffness: Vec<Stiffness>,
     pub(super) stiffness_of: Vec<u32>,
-    pub(super) corners: Corners,
+    pub(super) corners: ElementCorners,
     /// Mean shape gradients, parallel to `stiffness`.
     pub(super) mean: Vec<[Vec3; 8]>,
     /// Share of material, parallel to `stiffness`.
@@ -294,7 +294,7 @@ impl FemState {
         self.min_det_f = MinDetF { det_f: f64::INFINITY, element: 0 };
         let mut mean = Mat3::zeros();
         for (e, nodes) in rest.mesh.elements.iter().enumerate() {
-            let x: Corners = std::array::from_fn(|c| self.x[nodes[c] as usize]);
+            let x: ElementCorners = std::array::from_fn(|c| self.x[nodes[c] as usize]);
             let kind = rest.stiffness_of[e] as usize;
             let (k0, mean_gradients) = (&rest.stiffness[kind], &rest.mean[kind]);
             let mut result = elastic(&x, &rest.corners, mean_gradients, k0, self.rotation[e]);

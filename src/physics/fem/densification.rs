@@ -19,7 +19,7 @@
 
 use super::{
     element::gauss_points,
-    force::{Corners, Elastic, deformation_gradient},
+    force::{ElasticResponse, ElementCorners, deformation_gradient},
     material::ElasticMaterial,
 };
 use softvt_geometry::{Mat3, Vec3, hex8};
@@ -86,7 +86,7 @@ impl Densification {
 
     /// Adds force and energy of a voxel at corner positions `x` of which `share` is material. Returns the largest
     /// curvature ψ'' of its Gauss points.
-    pub fn add(&self, x: &Corners, share: f64, elastic: &mut Elastic) -> f64 {
+    pub fn add(&self, x: &ElementCorners, share: f64, elastic: &mut ElasticResponse) -> f64 {
         let scale = self.scale * share;
         let mut largest: f64 = 0.0;
         for g in &self.gradients {
@@ -101,7 +101,7 @@ impl Densification {
     }
 
     /// Adds the 3×3 blocks of the tangent, in the frame `rotation`, for the corner pairs `(a, b ≤ a)` in row order.
-    pub fn add_tangent(&self, x: &Corners, rotation: &Mat3, share: f64, blocks: &mut [Mat3; 36]) {
+    pub fn add_tangent(&self, x: &ElementCorners, rotation: &Mat3, share: f64, blocks: &mut [Mat3; 36]) {
         for g in &self.gradients {
             let f = rotation.tr_mul(&deformation_gradient(x, g));
             let Potential { slope, curvature, .. } = Potential::at(f.determinant());
@@ -132,14 +132,14 @@ mod tests {
         Densification::new(&ElasticMaterial::new(3e4, 0.3, 300.0).expect("valid"), H)
     }
 
-    fn evaluate(x: &Corners) -> Elastic {
-        let mut out = Elastic { rotation: Mat3::identity(), force: [Vec3::zeros(); 8], energy: 0.0 };
+    fn evaluate(x: &ElementCorners) -> ElasticResponse {
+        let mut out = ElasticResponse { rotation: Mat3::identity(), force: [Vec3::zeros(); 8], energy: 0.0 };
         law().add(x, SHARE, &mut out);
         out
     }
 
     /// A cube pressed to `height` of its own, turned, with corners moved by `e` edges.
-    fn pressed(height: f64, e: &[f64]) -> Corners {
+    fn pressed(height: f64, e: &[f64]) -> ElementCorners {
         let turn = Quat::from_scaled_axis(Vec3::new(0.4, -1.1, 0.3));
         std::array::from_fn(|a| {
             let moved = hex8::corner(a) + Vec3::from_column_slice(&e[3 * a..3 * a + 3]);
@@ -148,15 +148,15 @@ mod tests {
     }
 
     /// Second derivative of the energy along `d`, by central differences of the force.
-    fn exact_curvature(x: &Corners, d: &Corners, step: f64) -> f64 {
+    fn exact_curvature(x: &ElementCorners, d: &ElementCorners, step: f64) -> f64 {
         let along = |s: f64| {
-            let moved: Corners = std::array::from_fn(|a| x[a] + d[a] * s);
+            let moved: ElementCorners = std::array::from_fn(|a| x[a] + d[a] * s);
             -evaluate(&moved).force.iter().zip(d).map(|(f, d)| f.dot(d)).sum::<f64>()
         };
         (along(step) - along(-step)) / (2.0 * step)
     }
 
-    fn quadratic_form(blocks: &[Mat3; 36], rotation: &Mat3, d: &Corners) -> f64 {
+    fn quadratic_form(blocks: &[Mat3; 36], rotation: &Mat3, d: &ElementCorners) -> f64 {
         let d = d.map(|d| rotation.tr_mul(&d));
         let pairs = (0..8).flat_map(|a| (0..=a).map(move |b| (a, b)));
         pairs.zip(blocks).map(|((a, b), k)| d[a].dot(&(k * d[b])) * if a == b { 1.0 } else { 2.0 }).sum()
@@ -223,7 +223,7 @@ mod tests {
         ) {
             let x = pressed(height, &e);
             prop_assume!(crate::fem::force::min_det(&x, H) > 0.0);
-            let d: Corners = std::array::from_fn(|a| Vec3::from_column_slice(&d[3 * a..3 * a + 3]));
+            let d: ElementCorners = std::array::from_fn(|a| Vec3::from_column_slice(&d[3 * a..3 * a + 3]));
             let centre = gauss_points().iter().map(|xi| deformation_gradient(&x, &hex8::gradients(xi, H))).sum::<Mat3>() / 8.0;
             let rotation = polar_svd(&centre);
             let mut blocks = [Mat3::zeros(); 36];

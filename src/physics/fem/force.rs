@@ -4,14 +4,14 @@ use super::rotation::{polar, positive_inverse, stretch_hessian};
 use softvt_geometry::{Mat3, Vec3};
 
 /// Corner positions or forces of an element.
-pub type Corners = [Vec3; 8];
+pub type ElementCorners = [Vec3; 8];
 
 /// Elastic response of an element.
-pub struct Elastic {
+pub struct ElasticResponse {
     /// Rotation of the element.
     pub rotation: Mat3,
     /// Force on each corner, N, world frame: exactly `−∂U/∂x`.
-    pub force: Corners,
+    pub force: ElementCorners,
     /// Stored energy, J.
     pub energy: f64,
 }
@@ -22,7 +22,13 @@ pub struct Elastic {
 /// column-major 24×24), and `last` is an estimate of the rotation. The force is `f_a = −R (p_a − q × g_a)` with `p =
 /// K₀ (y − X)`, `m = Σ y_a × p_a`, `S = Rᵀ F`, `q = (tr S I − S)⁻¹ m`: the second term is due to the change of the
 /// rotation itself. Without it the force is not the derivative of the energy and has a spurious moment.
-pub fn elastic(x: &Corners, rest: &Corners, g: &[Vec3; 8], k0: &[f64; 576], last: Mat3) -> Elastic {
+pub fn elastic(
+    x: &ElementCorners,
+    rest: &ElementCorners,
+    g: &[Vec3; 8],
+    k0: &[f64; 576],
+    last: Mat3,
+) -> ElasticResponse {
     let f = deformation_gradient(x, g);
     let r = polar(&f, last);
     let mut u = [0.0; 24];
@@ -40,11 +46,11 @@ pub fn elastic(x: &Corners, rest: &Corners, g: &[Vec3; 8], k0: &[f64; 576], last
     // An inverted or flattened element has no unique rotation; its projection term is left out there.
     let q = positive_inverse(&stretch_hessian(&r.tr_mul(&f))).map_or(Vec3::zeros(), |inv| inv * moment);
     let force = std::array::from_fn(|a| -(r * (corner(a) - q.cross(&g[a]))));
-    Elastic { rotation: r, force, energy }
+    ElasticResponse { rotation: r, force, energy }
 }
 
 /// Mean deformation gradient `F = Σ x_a ⊗ g_a`.
-pub fn deformation_gradient(x: &Corners, g: &[Vec3; 8]) -> Mat3 {
+pub fn deformation_gradient(x: &ElementCorners, g: &[Vec3; 8]) -> Mat3 {
     (1..8).fold(Mat3::zeros(), |f, a| f + (x[a] - x[0]) * g[a].transpose())
 }
 
@@ -64,7 +70,7 @@ fn multiply(k: &[f64; 576], u: &[f64; 24]) -> [f64; 24] {
 ///
 /// A column of F is the slope along one axis: the mean of the four edges in that direction, weighted by the position
 /// of the point across them. So it has only four values per element.
-fn gauss_slopes(x: &Corners, h: f64) -> [[Vec3; 4]; 3] {
+fn gauss_slopes(x: &ElementCorners, h: f64) -> [[Vec3; 4]; 3] {
     let near = 0.5 + 0.5 / 3f64.sqrt();
     std::array::from_fn(|axis| {
         let (i, j) = (1 << ((axis == 0) as usize), 4 >> ((axis == 2) as usize));
@@ -78,7 +84,7 @@ fn gauss_slopes(x: &Corners, h: f64) -> [[Vec3; 4]; 3] {
 }
 
 /// Deformation gradients at the 2×2×2 Gauss points of a voxel of edge `h` (m).
-pub fn gauss_gradients(x: &Corners, h: f64) -> [Mat3; 8] {
+pub fn gauss_gradients(x: &ElementCorners, h: f64) -> [Mat3; 8] {
     let slopes = gauss_slopes(x, h);
     std::array::from_fn(|g| {
         let (x, y, z) = (g & 1, g >> 1 & 1, g >> 2);
@@ -87,7 +93,7 @@ pub fn gauss_gradients(x: &Corners, h: f64) -> [Mat3; 8] {
 }
 
 /// Smallest det F over the 2×2×2 Gauss points of a voxel of edge `h` (m); ≤ 0 means inverted.
-pub fn min_det(x: &Corners, h: f64) -> f64 {
+pub fn min_det(x: &ElementCorners, h: f64) -> f64 {
     let slopes = gauss_slopes(x, h);
     let det = |g: usize| {
         let (x, y, z) = (g & 1, g >> 1 & 1, g >> 2);
@@ -114,7 +120,7 @@ mod tests {
         ElasticMaterial::new(3e4, 0.4, 1.0).expect("valid")
     }
 
-    fn cube() -> Corners {
+    fn cube() -> ElementCorners {
         std::array::from_fn(|a| hex8::corner(a) * H)
     }
 
@@ -133,11 +139,11 @@ mod tests {
         ]
     }
 
-    fn evaluate(x: &Corners, fill: &OccupancyMask, last: Mat3) -> Elastic {
+    fn evaluate(x: &ElementCorners, fill: &OccupancyMask, last: Mat3) -> ElasticResponse {
         elastic(x, &cube(), &mean_gradients(H, fill), &stiffness(H, fill, &material()), last)
     }
 
-    fn bent(e: &[f64]) -> Corners {
+    fn bent(e: &[f64]) -> ElementCorners {
         let mut x = cube();
         x.iter_mut().enumerate().for_each(|(a, x)| *x += Vec3::from_column_slice(&e[3 * a..3 * a + 3]) * H);
         x
@@ -189,7 +195,7 @@ mod tests {
         ) {
             let (x, fill) = (bent(&e), fills()[kind]);
             let (g, k0) = (mean_gradients(H, &fill), stiffness(H, &fill, &material()));
-            let evaluate = |x: &Corners, last: Mat3| elastic(x, &cube(), &g, &k0, last);
+            let evaluate = |x: &ElementCorners, last: Mat3| elastic(x, &cube(), &g, &k0, last);
             let at = evaluate(&x, Mat3::identity());
             let scale = at.force.iter().map(|f| f.norm()).fold(0.0, f64::max);
             let step = 1e-6 * H;

@@ -8,7 +8,7 @@
 //! 3 rad/s and 10 kPa).
 
 use super::FemState;
-use crate::rigid::{RigidState, free_spin};
+use crate::rigid::{RigidState, torque_free_rotation};
 use softvt_geometry::{Mat3, Pose, Vec3};
 
 /// Rotation per step below which nodes move straight, rad: the stretch is then below the rounding of positions.
@@ -27,7 +27,7 @@ pub fn advance(body: &mut FemState, dt: f64) {
     let mass = body.model.total_mass();
     let free =
         RigidState { pose_w: Pose::identity(), com_o: Vec3::zeros(), v: drift, w, mass, inertia_o: inertia };
-    let turn = free_spin(&free, dt).turn.to_rotation_matrix();
+    let turn = torque_free_rotation(&free, dt).turn.to_rotation_matrix();
     let end = centre + drift * dt;
     for (x, v) in body.x.iter_mut().zip(&mut body.v) {
         let r = *x - centre;

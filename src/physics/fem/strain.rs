@@ -6,7 +6,7 @@
 
 use super::{
     body::{FemModel, FemState},
-    force::{Corners, gauss_gradients},
+    force::{ElementCorners, gauss_gradients},
 };
 use softvt_geometry::Mat3;
 
@@ -179,7 +179,7 @@ struct WeightedStrain {
 fn gradients_of(state: &FemState, element: usize) -> [Mat3; POINTS] {
     let mesh = &state.model.mesh;
     let nodes = &mesh.elements[element];
-    let x: Corners = std::array::from_fn(|c| state.x[nodes[c] as usize]);
+    let x: ElementCorners = std::array::from_fn(|c| state.x[nodes[c] as usize]);
     gauss_gradients(&x, mesh.edge)
 }
 

@@ -1,7 +1,7 @@
 //! Free rigid bodies: state, world inertia, torque-free motion, energy and momentum.
 //!
-//! A step of the world computes the torque-free rotation by [`free_spin`], solves for the velocities at the end of
-//! the step (without torques, the angular velocity is [`FreeSpin::end_w`]), and then calls [`advance`]. In free
+//! A step of the world computes the torque-free rotation by [`torque_free_rotation`], solves for the velocities at the end of
+//! the step (without torques, the angular velocity is [`TorqueFreeRotation::end_w`]), and then calls [`advance`]. In free
 //! flight this conserves the vector of angular momentum and the kinetic energy to rounding, at any step size.
 
 use softvt_geometry::{Mat3, Pose, Quat, Vec3};
@@ -111,7 +111,7 @@ fn check_inertia(inertia: &Mat3) -> Result<(), RigidError> {
 
 /// Torque-free rotation of a body over one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FreeSpin {
+pub struct TorqueFreeRotation {
     /// Angular velocity at the end of the step, rad/s, world.
     pub end_w: Vec3,
     /// Rotation over the step, applied from the left: rotation after = turn · rotation before.
@@ -124,7 +124,7 @@ pub struct FreeSpin {
 /// by the Cayley map of dt ω̄. The first conserves every quadratic invariant, hence energy. With the second, the
 /// *vector* of angular momentum is conserved too, because L₁ = cay(−dt ω̄) L₀ (Austin, Krishnaprasad & Wang, "Almost
 /// Poisson integration of rigid body systems", J. Comput. Phys. 107, 1993).
-pub fn free_spin(body: &RigidState, dt: f64) -> FreeSpin {
+pub fn torque_free_rotation(body: &RigidState, dt: f64) -> TorqueFreeRotation {
     let start = body.pose_w.rotation;
     let mut omega = start.inverse() * body.w;
     let substeps = (dt * omega.norm() / MAX_SUBSTEP_ROTATION).ceil().max(1.0);
@@ -135,7 +135,7 @@ pub fn free_spin(body: &RigidState, dt: f64) -> FreeSpin {
         rotation *= cayley(&(0.5 * h * (omega + next)));
         omega = next;
     }
-    FreeSpin { end_w: rotation * omega, turn: rotation * start.inverse() }
+    TorqueFreeRotation { end_w: rotation * omega, turn: rotation * start.inverse() }
 }
 
 /// Solves I(ω₁−ω₀) + h ω̄×Iω̄ = 0 for ω₁ by Newton's method (body frame).
@@ -164,7 +164,7 @@ fn cayley(x: &Vec3) -> Quat {
 ///
 /// The change of the angular velocity by torques and contacts (`w` minus the torque-free one) rotates the body by the
 /// exponential map, in addition to the torque-free rotation. The quaternion is renormalised.
-pub fn advance(body: &mut RigidState, v: Vec3, w: Vec3, spin: &FreeSpin, dt: f64) {
+pub fn advance(body: &mut RigidState, v: Vec3, w: Vec3, spin: &TorqueFreeRotation, dt: f64) {
     let extra = Quat::from_scaled_axis((w - spin.end_w) * dt);
     body.pose_w.rotation = Quat::new_normalize((extra * spin.turn * body.pose_w.rotation).into_inner());
     body.pose_w.translation.vector += v * dt;

@@ -17,7 +17,7 @@ fn brick() -> RigidState {
 
 fn drift(body: &mut RigidState, dt: f64, steps: usize) {
     for _ in 0..steps {
-        let spin = free_spin(body, dt);
+        let spin = torque_free_rotation(body, dt);
         let v = body.v;
         advance(body, v, spin.end_w, &spin, dt);
     }
@@ -80,7 +80,7 @@ fn free_fall_matches_the_closed_form_of_the_scheme_and_turns_about_the_centre_of
     body.w = Vec3::new(0.0, 0.0, 3.0);
     let (start, dt, steps) = (body.pose_w.translation.vector, 1.0 / 60.0, 60);
     for _ in 0..steps {
-        let spin = free_spin(&body, dt);
+        let spin = torque_free_rotation(&body, dt);
         let v = body.v + GRAVITY * dt;
         advance(&mut body, v, spin.end_w, &spin, dt);
     }
@@ -93,7 +93,7 @@ fn free_fall_matches_the_closed_form_of_the_scheme_and_turns_about_the_centre_of
 #[test]
 fn a_turn_by_contact_torque_is_the_exponential_of_the_new_velocity() {
     let mut body = brick();
-    let spin = free_spin(&body, 0.01);
+    let spin = torque_free_rotation(&body, 0.01);
     let before = body.pose_w.rotation;
     advance(&mut body, Vec3::zeros(), Vec3::new(0.0, 2.0, 0.0), &spin, 0.01);
     let turn = (body.pose_w.rotation * before.inverse()).scaled_axis();

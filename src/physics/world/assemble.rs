@@ -9,7 +9,7 @@ use crate::{
     fem::{rigid_motion::RigidVelocity, system::StepCoefficients},
     ids::{ArticulationId, BodyId, LinkId, RigidId, SoftId},
     joints,
-    rigid::{FreeSpin, free_spin},
+    rigid::{TorqueFreeRotation, torque_free_rotation},
     solver::{BlockIdentity, Endpoint, FrameJacobian, ScalarConstraint, VelocityBlock},
     sparse::NotPositiveDefinite,
 };
@@ -34,7 +34,7 @@ pub(super) struct BlockMap {
     pub rigid: Vec<Option<usize>>,
     pub articulations: Vec<Option<usize>>,
     /// Torque-free rotation of each rigid body in this step.
-    pub free_spins: Vec<FreeSpin>,
+    pub torque_free_rotations: Vec<TorqueFreeRotation>,
     momentum: Vec<Vec3>,
     /// Index of the Jacobian of each rigid body and link that is in contact.
     frames: HashMap<BodyId, usize>,
@@ -169,12 +169,12 @@ impl World {
 
     fn add_rigid_blocks(&mut self) {
         self.blocks.rigid.clear();
-        self.blocks.free_spins.clear();
+        self.blocks.torque_free_rotations.clear();
         let dt = self.params.dt;
         for (index, rigid) in self.rigid.iter().enumerate() {
             let body = &rigid.state;
-            let spin = free_spin(body, dt);
-            self.blocks.free_spins.push(spin);
+            let spin = torque_free_rotation(body, dt);
+            self.blocks.torque_free_rotations.push(spin);
             if rigid.sleep.is_asleep {
                 self.blocks.rigid.push(None);
                 continue;

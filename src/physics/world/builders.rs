@@ -14,7 +14,7 @@ use softvt_geometry::{
 };
 
 /// A description of a body that [`World::insert`] takes.
-pub trait Insert {
+pub trait BodyBuilder {
     /// Identifier of the inserted body, or why it cannot be made.
     type Output;
 
@@ -143,7 +143,7 @@ impl SoftBodyBuilder {
     }
 }
 
-impl Insert for FixedBuilder {
+impl BodyBuilder for FixedBuilder {
     type Output = ColliderId;
 
     fn insert(self, world: &mut World) -> ColliderId {
@@ -152,7 +152,7 @@ impl Insert for FixedBuilder {
     }
 }
 
-impl Insert for KinematicBuilder {
+impl BodyBuilder for KinematicBuilder {
     type Output = KinematicId;
 
     fn insert(self, world: &mut World) -> KinematicId {
@@ -163,7 +163,7 @@ impl Insert for KinematicBuilder {
     }
 }
 
-impl Insert for RigidBodyBuilder {
+impl BodyBuilder for RigidBodyBuilder {
     type Output = Result<RigidId, RigidError>;
 
     fn insert(self, world: &mut World) -> Self::Output {
@@ -175,7 +175,7 @@ impl Insert for RigidBodyBuilder {
     }
 }
 
-impl Insert for SoftBodyBuilder {
+impl BodyBuilder for SoftBodyBuilder {
     type Output = Result<SoftId, VoxelMeshError>;
 
     fn insert(self, world: &mut World) -> Self::Output {

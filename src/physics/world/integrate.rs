@@ -31,7 +31,7 @@ impl World {
             let Some(block) = self.blocks.rigid[i] else { continue };
             let v = &self.problem.blocks[block].v;
             let (linear, angular) = (Vec3::new(v[0], v[1], v[2]), Vec3::new(v[3], v[4], v[5]));
-            rigid::advance(&mut rigid.state, linear, angular, &self.blocks.free_spins[i], dt);
+            rigid::advance(&mut rigid.state, linear, angular, &self.blocks.torque_free_rotations[i], dt);
         }
         for (articulation, block) in self.articulations.iter_mut().zip(&self.blocks.articulations) {
             let Some(block) = block else { continue };

@@ -52,7 +52,7 @@ use crate::{
 };
 use softvt_geometry::{Pose, Vec3};
 
-pub use builders::{FixedBuilder, Insert, KinematicBuilder, RigidBodyBuilder, SoftBodyBuilder};
+pub use builders::{BodyBuilder, FixedBuilder, KinematicBuilder, RigidBodyBuilder, SoftBodyBuilder};
 pub use penetration::Penetration;
 pub use snapshot::{ContactPatch, Energy, PatchPoint, SampleSupport, WorldSnapshot};
 pub use state::{Articulation, BodyContact, ContactSummary, JointDrive, KinematicFrame, RigidBody, SoftBody};
@@ -183,7 +183,7 @@ impl World {
     }
 
     /// Adds a body that a builder describes, and returns its identifier.
-    pub fn insert<B: Insert>(&mut self, body: B) -> B::Output {
+    pub fn insert<B: BodyBuilder>(&mut self, body: B) -> B::Output {
         body.insert(self)
     }
 

@@ -10,7 +10,7 @@ use super::{
     contact_points::{SlidingPairs, SpringUpdate, SurfaceContact},
 };
 use crate::{
-    contact::{CollisionGeometry, DetectionLimits, ManifoldPoint, PairId},
+    contact::{CollisionGeometry, ContactPairId, DetectionLimits, ManifoldPoint},
     ids::{BodyId, ColliderId},
     solver::{ContactCluster, ContactPoint, Endpoint},
 };
@@ -21,7 +21,7 @@ use softvt_geometry::{Aabb, GroupedAabb, Vec3, convex::Placed, overlapping_pairs
 struct PointKey {
     a: ColliderId,
     b: ColliderId,
-    pair: PairId,
+    pair: ContactPairId,
     feature: u32,
 }
 
@@ -76,7 +76,7 @@ pub(super) struct RigidContacts {
     /// In the order of their points, which follow those of soft bodies.
     rows: Vec<RigidRow>,
     pairs: Vec<ColliderPair>,
-    found: Vec<(PairId, ManifoldPoint)>,
+    found: Vec<(ContactPairId, ManifoldPoint)>,
 }
 
 /// A solved point of two colliders that presses.

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::record::{EpisodeRecord, FarCommand};
+use super::record::{EpisodeRecord, UnreachableCommand};
 use softvt_evaluation::{
     safety::{DeformationLimit, SafetyParts},
     stage::TaskStage,
@@ -173,7 +173,7 @@ pub struct CommandCounts {
     /// Number of episodes with such a command.
     pub far_episodes: usize,
     /// The first such command of the first of these episodes.
-    pub first_far: Option<FarCommand>,
+    pub first_far: Option<UnreachableCommand>,
     /// Number of grip values that were out of range, and clamped.
     pub clamped_grips: u64,
     /// Number of episodes with such a value.

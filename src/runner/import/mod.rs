@@ -21,11 +21,11 @@ use crate::{
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{parallel, text::counted};
 use softvt_dataset::{
-    card::Imported,
+    card::ImportedFile,
     import::{self, ForeignDemo, ForeignFile, InitialCondition},
 };
 use softvt_policy::{ToolCommand, builtin::RecordedPolicy};
-use softvt_records::record::Origin;
+use softvt_records::record::DemonstrationOrigin;
 use softvt_rollout::{ChunkedPolicy, target_asset};
 use softvt_scene::{Body, InitialState};
 use task_matching::{MatchedDemo, match_demos};
@@ -71,7 +71,7 @@ pub fn import(
         "suites": names,
     });
     record_all(recording, &request, || {
-        for Imported { file, format, demos, commands, .. } in &sources {
+        for ImportedFile { file, format, demos, commands, .. } in &sources {
             config.notice(format!("{file}: {format}, {}: {commands}", counted(*demos, "demonstration")));
         }
         let mut recordings = Vec::new();
@@ -104,7 +104,7 @@ pub fn import(
 ///
 /// # Errors
 /// Two files have the same content.
-fn describe_files(files: &[ForeignFile]) -> Result<Vec<Imported>, RunError> {
+fn describe_files(files: &[ForeignFile]) -> Result<Vec<ImportedFile>, RunError> {
     let mut seen: BTreeMap<&str, &ForeignFile> = BTreeMap::new();
     for file in files {
         if let Some(twin) = seen.insert(&file.sha256, file) {
@@ -115,7 +115,7 @@ fn describe_files(files: &[ForeignFile]) -> Result<Vec<Imported>, RunError> {
             )));
         }
     }
-    let describe = |file: &ForeignFile| Imported {
+    let describe = |file: &ForeignFile| ImportedFile {
         file: file_name(file),
         sha256: file.sha256.clone(),
         format: file.format.name().to_owned(),
@@ -145,7 +145,7 @@ fn replay_demos<'a>(
         let (start, demo) = initial_state(&run, matched, ignore_recorded_poses)?;
         foreign += usize::from(matches!(demo.initial_condition, InitialCondition::OtherSimulator { .. }));
         placed += usize::from(!start.places.is_empty());
-        let origin = Origin {
+        let origin = DemonstrationOrigin {
             file: file_name(matched.file),
             sha256: matched.file.sha256.clone(),
             demo: demo.name.clone(),

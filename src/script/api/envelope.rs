@@ -24,12 +24,12 @@ use crate::{
         privilege::check_privilege,
     },
 };
-use softvt_benchmark::variation::{DrawError, ModelOf, VariationRanges};
+use softvt_benchmark::variation::{DrawError, InstanceModelLookup, VariationRanges};
 use softvt_common::parallel::lock;
 use softvt_evaluation::{
     calibration::{CalibrationMeasurements, Envelope, HoldRow, Protocol, SafeWindow, SweepRow, force_at},
     envelope_text::summary_text,
-    instance::{Grip, GripWindow, InstanceFactors, InstanceModel, VariantSweep},
+    instance::{GripAtRest, GripWindow, InstanceFactors, InstanceModel, VariantSweep},
     safety::DeformationLimit,
     thresholds::{ThresholdFile, sweep_jsonl},
 };
@@ -78,7 +78,7 @@ pub(crate) fn calibrated_asset(lua: &Lua, asset: &str) -> mlua::Result<Option<Ca
 /// A calibration cannot be read. The inner error is that of `draw`.
 pub(crate) fn draw<T>(
     lua: &Lua,
-    draw: impl FnOnce(&ModelOf<'_>) -> Result<T, DrawError>,
+    draw: impl FnOnce(&InstanceModelLookup<'_>) -> Result<T, DrawError>,
 ) -> mlua::Result<Result<T, DrawError>> {
     let broken = RefCell::new(None);
     // A fingerprint takes milliseconds, and a sample asks for one asset many times.
@@ -245,7 +245,7 @@ output! {
 
 output! {
     /// A grip at rest.
-    fn grip_table(lua, grip: &Grip) -> "softvt.Grip" as "grip" {
+    fn grip_table(lua, grip: &GripAtRest) -> "softvt.Grip" as "grip" {
         /// Distance of the gels, m.
         width: "number" = grip.width_m;
         /// Normal force per pad, N.

@@ -4,7 +4,9 @@ use softvt_evaluation::{
     calibration::{Envelope, HoldRow, SafeWindow, SweepRow},
     safety::DeformationLimit,
 };
-use softvt_media::plot::{Band, HorizontalAxis, Level, Mark, MarkSide, Plot, Point, message};
+use softvt_media::plot::{
+    AxisBand, HorizontalAxis, LabelSide, LevelLine, Plot, PlotPoint, VerticalMark, message,
+};
 
 /// Plots D over the width as SVG: stable squeezes as dots, unstable ones as rings, peak D of hold trials as diamonds
 /// (filled if every trial held), τ and D_ref as dashed lines, and the safe window as a band. Widths decrease to the right,
@@ -28,9 +30,9 @@ pub fn envelope_plot(asset: &str, envelope: &Envelope, limit: Option<Deformation
     // Failed trials beyond the axes are left out.
     let carried = |row: &HoldRow| {
         let d_pct = row.d_peak_pct.filter(|d| *d <= top && row.width_mm <= widest)?;
-        Some(Point { x: row.width_mm, y: d_pct, is_filled: row.all_held() })
+        Some(PlotPoint { x: row.width_mm, y: d_pct, is_filled: row.all_held() })
     };
-    let squeezed = |row: &&SweepRow| Point { x: row.width_mm, y: row.d_pct, is_filled: row.stable };
+    let squeezed = |row: &&SweepRow| PlotPoint { x: row.width_mm, y: row.d_pct, is_filled: row.stable };
     Plot {
         title: format!("{asset}: D over the width between the gels{trials}"),
         x: HorizontalAxis {
@@ -49,25 +51,25 @@ pub fn envelope_plot(asset: &str, envelope: &Envelope, limit: Option<Deformation
     .svg()
 }
 
-fn band(window: &SafeWindow) -> Option<Band> {
+fn band(window: &SafeWindow) -> Option<AxisBand> {
     window.extent_mm()?;
-    Some(Band { left: window.width_lower_mm?, right: window.width_at_tau_mm? })
+    Some(AxisBand { left: window.width_lower_mm?, right: window.width_at_tau_mm? })
 }
 
-fn limit_levels(limit: DeformationLimit) -> Vec<Level> {
-    let level = |d: f64, name: &str| Level { y: d, label: format!("{name} {d:.2} %") };
+fn limit_levels(limit: DeformationLimit) -> Vec<LevelLine> {
+    let level = |d: f64, name: &str| LevelLine { y: d, label: format!("{name} {d:.2} %") };
     vec![level(limit.tau_pct(), "τ"), level(limit.d_ref_pct, "")]
 }
 
 /// The two ends of the window with their widths and forces.
-fn window_ends(window: &SafeWindow) -> Vec<Mark> {
-    let end = |width: Option<f64>, force: Option<f64>, side: MarkSide| {
+fn window_ends(window: &SafeWindow) -> Vec<VerticalMark> {
+    let end = |width: Option<f64>, force: Option<f64>, side: LabelSide| {
         let (width, force) = width.zip(force)?;
-        Some(Mark { x: width, label: format!("{width:.1} mm, {force:.2} N"), side })
+        Some(VerticalMark { x: width, label: format!("{width:.1} mm, {force:.2} N"), side })
     };
     let ends = [
-        end(window.width_lower_mm, window.force_lower_n, MarkSide::Left),
-        end(window.width_at_tau_mm, window.force_at_tau_n, MarkSide::Right),
+        end(window.width_lower_mm, window.force_lower_n, LabelSide::Left),
+        end(window.width_at_tau_mm, window.force_at_tau_n, LabelSide::Right),
     ];
     ends.into_iter().flatten().collect()
 }

@@ -14,7 +14,7 @@ use crate::{
 use softvt_common::text::{format_number, unknown_name};
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::contact::Friction;
-use softvt_scene::{Asset, Body, Joint, JointMotion, Part, Visual, part_poses};
+use softvt_scene::{Asset, Body, Joint, JointMotion, MovingPart, Visual, part_poses};
 
 record! {
     /// A joint along which a part slides, such as that of a drawer. Values are in m.
@@ -132,8 +132,8 @@ pub(crate) fn parts(
     body: &ArticulatedSpec,
     asset_visuals: &[Visual],
     friction: Friction,
-) -> mlua::Result<Vec<Part>> {
-    let mut parts: Vec<Part> = Vec::new();
+) -> mlua::Result<Vec<MovingPart>> {
+    let mut parts: Vec<MovingPart> = Vec::new();
     for index in order(&body.parts).map_err(|error| fail(lua, error.describe("articulated")))? {
         let PartSpec { name, shape, density, joint, parent, visuals, hints } = &body.parts[index];
         let shape = shape.copy();
@@ -146,7 +146,7 @@ pub(crate) fn parts(
             friction,
             hints: hints.clone(),
         };
-        parts.push(Part {
+        parts.push(MovingPart {
             name: name.clone(),
             asset: Arc::new(asset),
             density: *density,

@@ -6,7 +6,7 @@ use crate::schema::{Range, Record, RecordType, Type, choice, record, record_of};
 use softvt_policy::{
     SensorStreams,
     decode::MAX_CHUNK_LEN,
-    profile::{GripCode, GripLatch, MAX_FRAMES, StatePart},
+    profile::{GripCode, GripHysteresis, MAX_FRAMES, StatePart},
 };
 use softvt_robot::Side;
 use softvt_sensing::tactile::{MarkerStyle, TactileMosaicLayout};
@@ -109,7 +109,7 @@ record! {
         /// one opens. force: a grip force in N at which closing stops; below 0 opens.
         code: Option<GripCode>;
         /// For code = "binary": limits at which the gripper closes and opens, instead of the middle.
-        latch: Option<GripLatch>;
+        latch: Option<GripHysteresis>;
     }
     /// The messages of a policy server: the observations it gets and the meaning of its actions. The file given to --profile
     /// returns one.
@@ -143,7 +143,7 @@ record! {
 
 record_of! {
     /// Hysteresis of a binary gripper, in the unit of the gripper's number.
-    GripLatch: "softvt.GripLatch" as "profile.actions.gripper.latch" {
+    GripHysteresis: "softvt.GripHysteresis" as "profile.actions.gripper.latch" {
         /// Value from which on, towards that of the closed gripper, an answer closes.
         close: f64;
         /// Value from which on, towards that of the open gripper, an answer opens.

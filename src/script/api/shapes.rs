@@ -17,7 +17,7 @@ use softvt_geometry::{
     Quat, Vec3,
     import::{ImportError, ImportOptions, MeshFormat, import},
     mass::mass_properties,
-    shape::{Axis, Bumps, Ramp, Ridges, Shape, ShapeError, SurfaceRelief, TreeSize},
+    shape::{Axis, Bumps, Ramp, Ridges, Shape, ShapeError, ShapeTreeSize, SurfaceRelief},
 };
 
 const LENGTH: Type = Type::Number("m", Range::POSITIVE);
@@ -40,7 +40,7 @@ record_of! {
 }
 
 /// Largest tree of a shape: every evaluation of its distance visits all of it.
-const MAX_TREE: TreeSize = TreeSize { nodes: 2000, depth: 100, work: 1e5 };
+const MAX_TREE: ShapeTreeSize = ShapeTreeSize { nodes: 2000, depth: 100, work: 1e5 };
 
 /// `softvt.Shape`.
 #[derive(Clone, Debug)]
@@ -66,7 +66,7 @@ impl LuaShape {
 
     /// Checks a shape that keeps `extra_bytes` in addition to its tree.
     fn new(lua: &Lua, shape: Shape, extra_bytes: usize) -> mlua::Result<Self> {
-        let TreeSize { nodes, depth, work } = shape.tree_size();
+        let ShapeTreeSize { nodes, depth, work } = shape.tree_size();
         if work > MAX_TREE.work {
             let message = "shape: cuts or unions are nested too deeply to be evaluated; join the parts by union first \
                            (a:union(b):union(c)), then cut or join them at once";

@@ -12,7 +12,7 @@ use crate::{
     vm::{error::fail, value::describe},
 };
 use softvt_benchmark::{
-    Needs, ObjectType, REFERENCE, Teacher, Variation,
+    NeededKnowledge, ObjectType, REFERENCE, Teacher, Variation,
     variation::{FactorRange, HiddenRanges, VariationRanges},
 };
 
@@ -31,7 +31,7 @@ pub(crate) const SETTINGS: Type = Type::Map(&Type::Map(&Type::Any));
 pub(crate) const SETTINGS_CLASS: &str = "softvt.Settings";
 
 choice! { ObjectType { "deformable" => Deformable, "rigid" => Rigid } }
-choice! { Needs { "nothing" => Nothing, "size" => Size, "touch" => Touch } }
+choice! { NeededKnowledge { "nothing" => Nothing, "size" => Size, "touch" => Touch } }
 choice! { Teacher { "expert" => Expert, "tactile-servo" => TactileServo } }
 choice! { Variation { "object" => Object, "spatial" => Spatial } }
 
@@ -142,7 +142,7 @@ record! {
         variation: Variation;
         /// What a controller has to know of an instance to grip it safely, as softvt list suites prints it: "nothing" but its
         /// kind, its "size", or what only "touch" tells. softvt scripts/blind_bounds.lua estimates it.
-        needs: Option<Needs>;
+        needs: Option<NeededKnowledge>;
         /// Default number of episodes per task.
         episodes: u32 = Type::Integer(Range::closed(1.0, 1e6)) => Integer(5);
         /// The tasks, in order.

@@ -25,7 +25,7 @@ use crate::{
         Vm, VmLimits,
         error::{ScriptError, fail, fail_at},
         json::to_json,
-        library::{Bundle, Library},
+        library::{Library, ScriptFiles},
         source_map::{fail_at_key, origin_of_key},
         value::{describe, describe_constructed, sorted_pairs},
     },
@@ -53,7 +53,7 @@ pub struct ScriptSources {
     /// The main file, as messages name it.
     pub main: String,
     /// Every file that was read.
-    pub bundle: Arc<Bundle>,
+    pub bundle: Arc<ScriptFiles>,
     argv: Vec<String>,
     limits: VmLimits,
 }

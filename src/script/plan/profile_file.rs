@@ -14,7 +14,7 @@ use crate::{
     vm::{VmLimits, error::ScriptError, source_map::fail_at_key},
 };
 use softvt_policy::profile::{
-    ActionEncoding, ActionUnits, GripCode, GripLatch, GripperValues, InputSource, PoseEncoding, Profile,
+    ActionEncoding, ActionUnits, GripCode, GripHysteresis, GripperValues, InputSource, PoseEncoding, Profile,
     ProfileInput,
 };
 
@@ -167,7 +167,7 @@ impl ProfileReader<'_> {
         open: f64,
         closed: f64,
         code: GripCode,
-    ) -> mlua::Result<Option<GripLatch>> {
+    ) -> mlua::Result<Option<GripHysteresis>> {
         let Some(latch) = spec.latch else { return Ok(None) };
         let wrong = |what: String| self.wrong("latch", format!("actions.gripper.latch: {what}"));
         if code != GripCode::Binary {

@@ -32,7 +32,7 @@ const MAX_BYTES: u64 = 64 << 20;
 
 /// Every file that a script has read. Episodes run on a bundle and never read the disk again.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Bundle {
+pub struct ScriptFiles {
     /// Contents of the files by their name in messages.
     pub files: BTreeMap<String, Arc<[u8]>>,
     /// The file found for each module or data file that was requested.
@@ -51,7 +51,7 @@ pub fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
 }
 
-impl Bundle {
+impl ScriptFiles {
     /// SHA-256 of every file by its name.
     pub fn hashes(&self) -> BTreeMap<String, String> {
         self.files.iter().map(|(name, bytes)| (name.clone(), sha256(bytes))).collect()
@@ -107,7 +107,7 @@ pub(crate) struct Library {
     roots: Vec<PathBuf>,
     /// The main file, which cannot be required as a module.
     main: PathBuf,
-    pub bundle: Bundle,
+    pub bundle: ScriptFiles,
     is_frozen: bool,
 }
 
@@ -120,13 +120,13 @@ impl Library {
         let mut roots = vec![folder, above, PathBuf::from(".")];
         let mut seen = BTreeSet::new();
         roots.retain(|root| root.canonicalize().is_ok_and(|real| seen.insert(real)));
-        let mut bundle = Bundle::default();
+        let mut bundle = ScriptFiles::default();
         bundle.files.insert(name.clone(), read_main(main, &name)?.into());
         Ok((Self { roots, main: main.into(), bundle, is_frozen: false }, name))
     }
 
     /// A library of the files in `bundle` alone.
-    pub(crate) fn frozen(bundle: Bundle) -> Self {
+    pub(crate) fn frozen(bundle: ScriptFiles) -> Self {
         Self { roots: Vec::new(), main: PathBuf::new(), bundle, is_frozen: true }
     }
 

@@ -30,7 +30,7 @@ use library::{Library, SharedLibrary, lua_text};
 use memory_budget::MemoryUse;
 use privilege::{PrivilegedAccess, check_module};
 use value::{describe, literal};
-use watchdog::{Clock, Deadline, OnStuck};
+use watchdog::{Clock, Deadline, StuckHandler};
 
 use softvt_benchmark::seed;
 use softvt_common::{
@@ -64,7 +64,7 @@ pub struct VmLimits {
     /// Time after a limit during which the script may still stop by itself before it counts as stuck.
     pub grace: Duration,
     /// Called if a library function does not return.
-    pub on_stuck: OnStuck,
+    pub on_stuck: StuckHandler,
     /// Receives what scripts print.
     pub print: PrintSink,
 }
@@ -75,11 +75,11 @@ impl std::fmt::Debug for VmLimits {
     }
 }
 
-static STUCK_HANDLER: OnceLock<OnStuck> = OnceLock::new();
+static STUCK_HANDLER: OnceLock<StuckHandler> = OnceLock::new();
 
 /// Sets what happens if a library function of Lua (such as `string.find` with a hostile pattern) never returns. Nothing can
 /// interrupt it, so a program should end. Without a handler a message is printed and the thread stays busy.
-pub fn set_stuck_handler(handler: OnStuck) {
+pub fn set_stuck_handler(handler: StuckHandler) {
     // The first handler stays: there is one program per process.
     let _ = STUCK_HANDLER.set(handler);
 }

@@ -5,7 +5,7 @@
 //! each time, so that a `pcall` that catches the error gains only one instruction.
 //!
 //! A C function (`string.find` with a hostile pattern) never reaches the hook, and nothing can interrupt it. The watchdog is
-//! a thread that polls every running limit and then calls [`OnStuck`], which ends the process. It does so only if the hook
+//! a thread that polls every running limit and then calls [`StuckHandler`], which ends the process. It does so only if the hook
 //! has not run since the last check, and if the process has had at least as much processor time as the script may take.
 
 use std::{
@@ -27,7 +27,7 @@ const HOOK_INTERVAL: u32 = 20_000;
 const WATCHDOG_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Called with a message when a library function does not return.
-pub type OnStuck = Arc<dyn Fn(&str) + Send + Sync>;
+pub type StuckHandler = Arc<dyn Fn(&str) + Send + Sync>;
 
 /// The clocks that the watchdog checks.
 static CLOCKS: Mutex<Vec<Weak<Mutex<ClockState>>>> = Mutex::new(Vec::new());
@@ -75,7 +75,7 @@ struct ClockState {
     file: String,
     /// Time beyond a limit before the watchdog acts.
     grace: Duration,
-    on_stuck: OnStuck,
+    on_stuck: StuckHandler,
     hook_calls: u64,
     call: Option<LimitedCall>,
 }
@@ -128,7 +128,7 @@ pub(crate) struct Clock(Arc<Mutex<ClockState>>);
 impl Clock {
     /// A clock without a running call. The watchdog calls `on_stuck` if a script exceeds a limit by `grace` without a call of
     /// the hook. Messages name `file`.
-    pub(crate) fn new(file: &str, grace: Duration, on_stuck: OnStuck) -> Self {
+    pub(crate) fn new(file: &str, grace: Duration, on_stuck: StuckHandler) -> Self {
         let state = ClockState { file: file.into(), grace, on_stuck, hook_calls: 0, call: None };
         let clock = Self(Arc::new(Mutex::new(state)));
         watch(&clock.0);

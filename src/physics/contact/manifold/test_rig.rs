@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use super::tests::{BALL, BOX, CAN, meet, support};
 use super::*;
-use crate::rigid::{RigidState, advance, free_spin};
+use crate::rigid::{RigidState, advance, torque_free_rotation};
 use softvt_geometry::{Mat3, Pose, Quat};
 
 const GRAVITY: f64 = 9.81;
@@ -85,7 +85,7 @@ impl Incline {
             torque += (point.position_w - self.body.pose_w.translation.vector).cross(&f);
         }
         self.springs = springs;
-        let spin = free_spin(&self.body, DT);
+        let spin = torque_free_rotation(&self.body, DT);
         let inverse = self.body.inertia_w().try_inverse().expect("a real inertia");
         let (v, w) = (self.body.v + force * (DT / self.body.mass), spin.end_w + inverse * torque * DT);
         advance(&mut self.body, v, w, &spin, DT);
