@@ -100,7 +100,7 @@ pub enum LabelSide {
 }
 
 /// An image with a text in place of a plot, as SVG.
-pub fn message(what: &str) -> String {
+pub fn text_image(what: &str) -> String {
     image(&text(LEFT, TOP, "start", what))
 }
 
@@ -261,6 +261,6 @@ mod tests {
         ] {
             assert!(svg.contains(part), "{part} in\n{svg}");
         }
-        assert!(message("nothing").contains(">nothing</text>\n</svg>\n"));
+        assert!(text_image("nothing").contains(">nothing</text>\n</svg>\n"));
     }
 }

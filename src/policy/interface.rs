@@ -261,7 +261,7 @@ pub enum PolicyError {
 
 impl PolicyError {
     /// True if a policy server is at fault, not the user's input.
-    pub fn is_of_server(&self) -> bool {
+    pub fn is_server_fault(&self) -> bool {
         matches!(
             self,
             Self::Server { .. } | Self::Unreachable { .. } | Self::NotWebsocket { .. } | Self::Response(_)

@@ -98,7 +98,7 @@ pub fn websocket_config(max_message_bytes: usize) -> WebSocketConfig {
 }
 
 /// True if an operation ended because of a timeout, and can be repeated.
-pub fn is_wait(error: &io::Error) -> bool {
+pub fn would_block(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
 }
 
@@ -145,7 +145,7 @@ pub fn send_frame<E>(
 ) -> Result<(), TransportError<E>> {
     let mut sent = socket.send(message);
     while let Err(Error::Io(error)) = &sent
-        && is_wait(error)
+        && would_block(error)
     {
         on_wait().map_err(TransportError::Aborted)?;
         sent = socket.flush();
@@ -163,7 +163,9 @@ pub fn receive<E>(
 ) -> Result<Message, TransportError<E>> {
     loop {
         match socket.read() {
-            Err(Error::Io(error)) if is_wait(&error) => on_wait(socket).map_err(TransportError::Aborted)?,
+            Err(Error::Io(error)) if would_block(&error) => {
+                on_wait(socket).map_err(TransportError::Aborted)?
+            }
             read => return read.map_err(TransportError::Socket),
         }
     }

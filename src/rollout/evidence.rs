@@ -111,7 +111,7 @@ impl EvidenceCollector {
         let crushed = match (&mut self.crushed, target.body) {
             (Some(meter), BodyId::Soft(index)) => {
                 meter.update(&sim.world.soft(index).state);
-                CrushedShares { collapsed: meter.collapsed(), damaged: meter.damaged() }
+                CrushedShares { collapsed: meter.collapsed_share(), damaged: meter.damaged_share() }
             }
             _ => CrushedShares::default(),
         };

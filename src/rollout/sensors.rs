@@ -157,7 +157,7 @@ impl Sensors {
         frame: &WorldSnapshot,
         camera: &Camera,
     ) -> Result<RenderedImage, SensingError> {
-        let kept = std::mem::replace(&mut self.renderer, Renderer::transient());
+        let kept = std::mem::replace(&mut self.renderer, Renderer::without_backgrounds());
         let image = self.render(frame, camera);
         self.renderer = kept;
         image

@@ -360,7 +360,7 @@ impl<'a> SuiteRun<'a> {
         let cause = match error {
             // An error after the interrupt may be its consequence.
             _ if cancel::requested() => RunErrorCause::Interrupt,
-            EpisodeError::Control { source, .. } if source.is_of_server() => RunErrorCause::Policy,
+            EpisodeError::Control { source, .. } if source.is_server_fault() => RunErrorCause::Policy,
             _ => RunErrorCause::Input,
         };
         match (RunError::new(cause, error), error, error.place()) {

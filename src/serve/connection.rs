@@ -18,7 +18,7 @@ use softvt_common::cancel::CancelFlag;
 
 use softvt_policy::{
     msgpack::{MsgpackError, unpack},
-    transport::{self, PollingStream, TransportError, complete_handshake, is_wait, websocket_config},
+    transport::{self, PollingStream, TransportError, complete_handshake, websocket_config, would_block},
 };
 
 /// Longest message that is accepted; a state of 50,000 actions has 2.7 MiB.
@@ -144,7 +144,7 @@ impl<'a> Connection<'a> {
         let deadline = Instant::now() + CLOSE_DRAIN_TIMEOUT;
         let mut sent = self.socket.close(Some(CloseFrame { code, reason: "".into() }));
         // The stream interrupts a write once per poll interval.
-        while matches!(&sent, Err(tungstenite::Error::Io(error)) if is_wait(error))
+        while matches!(&sent, Err(tungstenite::Error::Io(error)) if would_block(error))
             && Instant::now() < deadline
         {
             sent = self.socket.flush();
@@ -155,7 +155,7 @@ impl<'a> Connection<'a> {
         while Instant::now() < deadline && !cancelled() {
             match stream.read(&mut discarded) {
                 Ok(0) => return,
-                Err(error) if !is_wait(&error) => return,
+                Err(error) if !would_block(&error) => return,
                 _ => {}
             }
         }

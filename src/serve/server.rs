@@ -24,7 +24,7 @@ use super::{
     session::ClientSession,
 };
 use softvt_common::cancel::CancelFlag;
-use softvt_policy::transport::{POLL_INTERVAL, is_wait};
+use softvt_policy::transport::{POLL_INTERVAL, would_block};
 
 /// Accept-loop polling interval.
 const ACCEPT_POLL_INTERVAL: Duration = Duration::from_millis(10);
@@ -165,7 +165,7 @@ fn is_health_check(stream: &TcpStream, cancel: &CancelFlag) -> Option<bool> {
                 return Some(false);
             }
             Ok(_) => thread::sleep(ACCEPT_POLL_INTERVAL),
-            Err(error) if is_wait(&error) => {}
+            Err(error) if would_block(&error) => {}
             Err(_) => return None,
         }
     }

@@ -224,3 +224,19 @@ fn the_calibration_page_is_current() {
         );
     }
 }
+
+#[test]
+fn the_architecture_page_names_files_that_exist() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let page = read("docs/architecture.md");
+    let is_path = |word: &&str| {
+        let is_plain = word.chars().all(|c| c.is_ascii_alphanumeric() || "_./".contains(c));
+        is_plain && (word.contains('/') || word.ends_with(".rs"))
+    };
+    let paths: Vec<&str> = page.split('`').skip(1).step_by(2).filter(is_path).collect();
+    assert!(paths.len() > 100, "{paths:?}");
+    for path in paths {
+        let exists = ["", "src", "src/physics"].iter().any(|folder| root.join(folder).join(path).exists());
+        assert!(exists, "docs/architecture.md names {path}, which does not exist");
+    }
+}

@@ -98,12 +98,12 @@ impl StrainMeter {
 
     /// Share of the volume (0..=1) that was beyond the collapse strain in the state of the last update; `None` without that
     /// limit.
-    pub fn collapsed(&self) -> Option<f64> {
+    pub fn collapsed_share(&self) -> Option<f64> {
         self.limits.collapse.map(|_| self.collapsed_share)
     }
 
     /// Share of the volume (0..=1) that has ever been beyond the damage strain; `None` without that limit.
-    pub fn damaged(&self) -> Option<f64> {
+    pub fn damaged_share(&self) -> Option<f64> {
         self.limits.damage.map(|_| self.damaged_share)
     }
 
@@ -249,16 +249,16 @@ mod tests {
         let limits = StrainLimits { collapse: Some(0.1), damage: Some(0.25) };
         let mut meter = StrainMeter::new(&rest.model, limits);
         meter.update(&rest);
-        assert_eq!((meter.collapsed(), meter.damaged()), (Some(0.0), Some(0.0)));
+        assert_eq!((meter.collapsed_share(), meter.damaged_share()), (Some(0.0), Some(0.0)));
         meter.update(&pressed);
         let whole = |share: Option<f64>| (share.unwrap() - 1.0).abs() < 1e-12;
-        assert!(whole(meter.collapsed()) && whole(meter.damaged()));
+        assert!(whole(meter.collapsed_share()) && whole(meter.damaged_share()));
         meter.update(&rest);
-        assert_eq!(meter.collapsed(), Some(0.0));
-        assert!(whole(meter.damaged()));
+        assert_eq!(meter.collapsed_share(), Some(0.0));
+        assert!(whole(meter.damaged_share()));
         let mut none = StrainMeter::new(&rest.model, StrainLimits::default());
         none.update(&pressed);
-        assert_eq!((none.collapsed(), none.damaged()), (None, None));
+        assert_eq!((none.collapsed_share(), none.damaged_share()), (None, None));
     }
 
     #[test]

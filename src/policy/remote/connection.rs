@@ -23,7 +23,7 @@ use crate::{
     msgpack::unpack,
     profile::Profile,
     transport::{
-        self, POLL_INTERVAL, PollingStream, TransportError, complete_handshake, is_wait, websocket_config,
+        self, POLL_INTERVAL, PollingStream, TransportError, complete_handshake, websocket_config, would_block,
     },
 };
 
@@ -240,7 +240,7 @@ impl PolicyConnection {
                 Ok(Message::Ping(_) | Message::Pong(_)) => {}
                 Ok(Message::Binary(_)) => return Err(self.server.unrequested()),
                 Ok(Message::Text(text)) => return Err(self.reported_error(&text)),
-                Err(Error::Io(error)) if is_wait(&error) => {
+                Err(Error::Io(error)) if would_block(&error) => {
                     return Ok(self.socket.get_mut().set_nonblocking(false).is_ok());
                 }
                 // The end: a new connection is needed.
@@ -275,7 +275,7 @@ impl Drop for PolicyConnection {
         let frame = CloseFrame { code: CloseCode::Normal, reason: "".into() };
         let mut sent = self.socket.close(Some(frame));
         while let Err(Error::Io(error)) = &sent
-            && is_wait(error)
+            && would_block(error)
             && may_wait().is_ok()
         {
             sent = self.socket.flush();

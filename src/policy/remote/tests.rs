@@ -123,7 +123,7 @@ fn episode(
         Ok(closures)
     };
     run().map_err(|error: PolicyError| {
-        assert!(error.is_of_server(), "{error}");
+        assert!(error.is_server_fault(), "{error}");
         error.to_string()
     })
 }

@@ -5,7 +5,7 @@ use softvt_evaluation::{
     safety::DeformationLimit,
 };
 use softvt_media::plot::{
-    AxisBand, HorizontalAxis, LabelSide, LevelLine, Plot, PlotPoint, VerticalMark, message,
+    AxisBand, HorizontalAxis, LabelSide, LevelLine, Plot, PlotPoint, VerticalMark, text_image,
 };
 
 /// Plots D over the width as SVG: stable squeezes as dots, unstable ones as rings, peak D of hold trials as diamonds
@@ -18,7 +18,7 @@ pub fn envelope_plot(asset: &str, envelope: &Envelope, limit: Option<Deformation
     let (widest, narrowest) =
         (widths().fold(f64::NEG_INFINITY, f64::max), widths().fold(f64::INFINITY, f64::min));
     if widest < narrowest {
-        return message(&format!("{asset}: no rows"));
+        return text_image(&format!("{asset}: no rows"));
     }
     let held = envelope.holds.iter().filter(|row| row.all_held()).filter_map(|row| row.d_peak_pct);
     let d_max = rows.iter().map(|row| row.d_pct).chain(held).fold(0.0, f64::max);

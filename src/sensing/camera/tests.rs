@@ -130,7 +130,8 @@ fn a_cached_background_does_not_change_the_image() {
         let rigid = [Pose::translation(-0.1, -0.1, height)];
         let a = cached.render(&scene, &cube_view(&rigid), &camera).expect("an image");
         let b = draw_uncached(&scene, &rigid, &camera);
-        let once = Renderer::transient().render(&scene, &cube_view(&rigid), &camera).expect("an image");
+        let once =
+            Renderer::without_backgrounds().render(&scene, &cube_view(&rigid), &camera).expect("an image");
         assert!(once == a, "an image whose background is not kept has the same bytes");
         assert_eq!(a.segmentation, b.segmentation);
         assert_eq!(a.depth, b.depth);

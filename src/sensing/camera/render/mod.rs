@@ -63,7 +63,7 @@ impl MovingShadow {
 impl Renderer {
     /// A renderer for single images: it keeps no backgrounds, which take some 130 bytes per pixel. Its images are
     /// byte-identical to those of a renderer that keeps them.
-    pub fn transient() -> Self {
+    pub fn without_backgrounds() -> Self {
         Self { is_transient: true, ..Self::default() }
     }
 
