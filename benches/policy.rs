@@ -20,7 +20,7 @@ use softvt::{
     policy::{
         ActionChunk, EpisodeBrief, Observation, Policy, PolicyError, SensorStreams,
         profile::Profile,
-        remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},
+        remote::{PolicyConnections, PolicyServer, RemotePolicy, ServerProtocol},
     },
     rollout::{AssetCache, ChunkedPolicy, Episode, SensorAssets},
 };
@@ -137,7 +137,7 @@ fn overheads(profile: &str) -> Vec<f64> {
     let (url, answers) = serve(Duration::ZERO);
     let remote = RemotePolicy::new(Arc::new(PolicyConnections::new(PolicyServer {
         url,
-        protocol: Protocol::Openpi,
+        protocol: ServerProtocol::Openpi,
         profile: Profile::named(profile).expect("a profile"),
         timeout: Duration::from_secs(60),
         api_key: None,

@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum, value_parser};
 
 use crate::{error::CliError, output::Console, plan_flags};
 use softvt_benchmark::{ShiftValue, Teacher};
-use softvt_policy::{profile::GripCode, remote::Protocol};
+use softvt_policy::{profile::GripCode, remote::ServerProtocol};
 use softvt_records::requirement::Requirement;
 use softvt_runner::{
     ConfiguredScript, PolicyConfig, PolicyOptions, PolicySource, RunConfig, Shard, TraceDetail,
@@ -169,7 +169,7 @@ pub(crate) struct PolicyArgs {
     pub profile: ProfileArgs,
     /// Protocol of a policy server [default: openpi]
     #[arg(long, value_name = "PROTOCOL")]
-    protocol: Option<Protocol>,
+    protocol: Option<ServerProtocol>,
     /// Actions executed from each predicted chunk [default: 10 for servers]
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..))]
     replan: Option<u16>,

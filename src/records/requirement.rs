@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use super::summary::{Scores, SuiteSummary};
+use super::summary::{GroupScores, SuiteSummary};
 use softvt_evaluation::statistics::Rate;
 
 /// Slack of comparisons, so that a rate of 90 % meets 0.9 whatever its last bit.
@@ -26,7 +26,7 @@ struct Metric {
     /// True for shares of 1; false for deformations in percent and for counts.
     is_rate: bool,
     /// The value, if it is defined for the suite.
-    value: fn(&Scores) -> Option<f64>,
+    value: fn(&GroupScores) -> Option<f64>,
 }
 
 static METRICS: [Metric; 8] = [

@@ -12,7 +12,7 @@ use softvt_evaluation::statistics::Rate;
 use softvt_records::{
     paired_stats::{EpisodePair, PairedComparison, PairedDifference, pair_episodes},
     record::EpisodeRecord,
-    summary::Scores,
+    summary::GroupScores,
 };
 
 /// The conditions of a suite and a policy.
@@ -69,7 +69,7 @@ fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
         if pairs.is_empty() {
             continue;
         }
-        let scores = Scores::from_records(&pairs.iter().map(|pair| pair.second).collect::<Vec<_>>());
+        let scores = GroupScores::from_records(&pairs.iter().map(|pair| pair.second).collect::<Vec<_>>());
         effects.push(ConditionEffect {
             change,
             goal: scores.goal_success_rate,
@@ -152,7 +152,7 @@ pub fn effects_table(effects: &[ConditionEffects]) -> Option<ResultTable> {
 
 /// Values of a factor with at least two, for its trend.
 #[derive(Clone, Debug)]
-pub struct Trend {
+pub struct FactorTrend {
     pub factor: String,
     pub points: Vec<TrendPoint>,
 }
@@ -166,13 +166,13 @@ pub struct TrendPoint {
 
 impl ConditionEffects {
     /// Factors with at least two values, in order.
-    pub fn trends(&self) -> Vec<Trend> {
+    pub fn trends(&self) -> Vec<FactorTrend> {
         let of_factor = |effects: &[ConditionEffect]| {
             let point = |effect: &ConditionEffect| {
                 Some(TrendPoint { value: effect.change.value?, goal: effect.goal, safety: effect.safety })
             };
             let points: Vec<TrendPoint> = effects.iter().filter_map(point).collect();
-            (points.len() > 1).then(|| Trend { factor: effects[0].change.factor.clone(), points })
+            (points.len() > 1).then(|| FactorTrend { factor: effects[0].change.factor.clone(), points })
         };
         self.effects.chunk_by(|a, b| a.change.factor == b.change.factor).filter_map(of_factor).collect()
     }

@@ -9,7 +9,7 @@ use softvt_evaluation::statistics::{Distribution, Rate};
 use softvt_records::{
     paired_stats::{PairedComparison, d_over_tau, pair_episodes},
     record::EpisodeRecord,
-    summary::Scores,
+    summary::GroupScores,
 };
 
 /// Results under one condition.
@@ -42,7 +42,7 @@ impl ConditionOutcome {
             let own: Vec<EpisodeRecord> = records.iter().map(|record| renamed(record, name)).collect();
             PairedComparison::from_pairs(&pair_episodes(reference, &own))
         });
-        let scores = Scores::from_records(&records.iter().collect::<Vec<_>>());
+        let scores = GroupScores::from_records(&records.iter().collect::<Vec<_>>());
         Self {
             folder,
             episodes: scores.episodes,

@@ -13,7 +13,7 @@ const ROUNDING: f64 = 1e-6;
 
 /// A record that contradicts the manifest of its run.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Contradiction {
+pub struct RecordContradiction {
     /// Line of the record, from 1.
     pub line: usize,
     /// The fields that disagree, and their values.
@@ -21,9 +21,10 @@ pub struct Contradiction {
 }
 
 /// The first of the records, in the order of their lines, that contradicts the manifest of their run.
-pub fn first_contradiction(manifest: &Value, records: &[EpisodeRecord]) -> Option<Contradiction> {
-    let found =
-        |(number, record)| Some(Contradiction { line: number + 1, what: contradiction(manifest, record)? });
+pub fn first_contradiction(manifest: &Value, records: &[EpisodeRecord]) -> Option<RecordContradiction> {
+    let found = |(number, record)| {
+        Some(RecordContradiction { line: number + 1, what: contradiction(manifest, record)? })
+    };
     records.iter().enumerate().find_map(found)
 }
 

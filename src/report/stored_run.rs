@@ -10,7 +10,7 @@ use std::{
 use serde_json::Value;
 
 use super::{
-    run_check::{Contradiction, first_contradiction},
+    run_check::{RecordContradiction, first_contradiction},
     run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, is_truncated, read_episodes},
 };
 use softvt_common::episode_id::EpisodeIndex;
@@ -263,7 +263,7 @@ fn is_shard(shard: &Value) -> bool {
 
 /// Checks that the records, in the order of their lines, are of the run of this manifest.
 fn check_records(dir: &Path, manifest: &Value, records: &[EpisodeRecord]) -> Result<(), StoredRunError> {
-    first_contradiction(manifest, records).map_or(Ok(()), |Contradiction { line, what }| {
+    first_contradiction(manifest, records).map_or(Ok(()), |RecordContradiction { line, what }| {
         Err(StoredRunError::Contradiction { path: dir.join(EPISODES).display().to_string(), line, what })
     })
 }

@@ -6,7 +6,7 @@ use softvt_evaluation::{
     statistics::{Distribution, Rate},
 };
 use softvt_records::summary::{
-    AbortedEpisode, CommandCounts, EpisodeDeformation, InvalidEpisode, Scores, SuiteSummary, TauRange,
+    AbortedEpisode, CommandCounts, EpisodeDeformation, GroupScores, InvalidEpisode, SuiteSummary, TauRange,
 };
 
 /// Columns: index and prompt of the task, three rates, four figures of D, τ and the number of invalid episodes.
@@ -56,7 +56,7 @@ pub fn table(summary: &SuiteSummary) -> String {
     table.text
 }
 
-fn cells(number: &str, name: &str, scores: &Scores, is_soft: bool) -> [String; 11] {
+fn cells(number: &str, name: &str, scores: &GroupScores, is_soft: bool) -> [String; 11] {
     let Distribution { mean, p5, median, p95, .. } = scores.deformation;
     let not_applicable = || "N/A".to_owned();
     let percentile = |value| if is_soft { percentile(&scores.deformation, value) } else { not_applicable() };
@@ -133,7 +133,7 @@ fn push_rates(table: &mut TextTable, summary: &SuiteSummary) {
 }
 
 /// Contact success and the grip ratio.
-fn push_grip(table: &mut TextTable, scores: &Scores) {
+fn push_grip(table: &mut TextTable, scores: &GroupScores) {
     let (contact, safe) =
         (interval(scores.contact_success_rate), decimal(scores.contact_safety_rate.rate, 1));
     push_named(table, "Contact success", &format!("{contact}  safe and without slip: {safe} %"));
@@ -144,7 +144,7 @@ fn push_grip(table: &mut TextTable, scores: &Scores) {
 }
 
 /// Harm to other objects, and the stages at which episodes failed.
-fn push_harm_and_stages(table: &mut TextTable, scores: &Scores) {
+fn push_harm_and_stages(table: &mut TextTable, scores: &GroupScores) {
     if let Some(rate) = scores.others_ok_rate {
         let unknown = match scores.others_unknown {
             0 => String::new(),

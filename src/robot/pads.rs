@@ -12,7 +12,7 @@
 use nalgebra::Quaternion;
 
 use super::spec::Side;
-use softvt_geometry::{Aabb, Mat3, Pose, Quat, Vec3, shape::Contact};
+use softvt_geometry::{Aabb, Mat3, Pose, Quat, Vec3, shape::SampleContact};
 use softvt_physics::contact::{CollisionGeometry, ContactSurface, GelSample};
 
 /// Height of the gel's apex above the finger frame, m; equal to that of Franka's own finger tips.
@@ -71,7 +71,7 @@ impl PadSurface {
     ///
     /// The coverage falls from 1 to 0 over one spacing across the edge of the footprint, so that forces stay continuous
     /// as a pad moves. It is 0 below the gel's base, where a point belongs to the sensor's case.
-    pub fn contact(&self, p_p: &Vec3, spacing: f64) -> Contact {
+    pub fn contact(&self, p_p: &Vec3, spacing: f64) -> SampleContact {
         let gradient = Vec3::new(p_p.x / self.radius_x, p_p.y / self.radius_y, 1.0);
         let steepness = gradient.norm();
         let coverage = if p_p.z < -self.thickness {
@@ -79,7 +79,7 @@ impl PadSurface {
         } else {
             (0.5 - self.edge_distance(p_p.x, p_p.y) / spacing).clamp(0.0, 1.0)
         };
-        Contact {
+        SampleContact {
             gap: (p_p.z - self.height(p_p.x, p_p.y)) / steepness,
             normal: gradient / steepness,
             coverage,
@@ -109,7 +109,7 @@ impl PadSurface {
 const GEL_SPACING: f64 = 0.75e-3;
 
 impl ContactSurface for PadSurface {
-    fn contact(&self, p: &Vec3, _facing: &Vec3, spacing: f64) -> Contact {
+    fn contact(&self, p: &Vec3, _facing: &Vec3, spacing: f64) -> SampleContact {
         Self::contact(self, p, spacing)
     }
 

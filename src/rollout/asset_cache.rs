@@ -2,7 +2,7 @@
 
 use std::{convert::Infallible, sync::Arc};
 
-use super::{build_error::BuildError, shared_cache::SharedCache, soft_model::SoftGeometry};
+use super::{build_error::SceneBuildError, shared_cache::SharedCache, soft_model::SoftGeometry};
 use softvt_geometry::{
     Aabb, Pose, Vec3,
     cavity::cavity,
@@ -108,7 +108,7 @@ impl AssetCache {
         &self,
         object: &Object,
         material: &SoftMaterial,
-    ) -> Result<Arc<FemModel>, BuildError> {
+    ) -> Result<Arc<FemModel>, SceneBuildError> {
         let Object { asset, nominal, .. } = object;
         let declared = match &nominal.body {
             Body::Soft(declared) => declared,

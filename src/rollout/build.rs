@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{
     asset_cache::{AssetCache, MIN_PART_WALL},
-    build_error::{BuildError, tenths_of_mm},
+    build_error::{SceneBuildError, tenths_of_mm},
     simulation::{ArticulatedPart, ObjectInstance},
     soft_model::MAX_NODES,
 };
@@ -23,7 +23,7 @@ const MIN_WALL: f64 = 2e-3;
 /// Minimum length of the longest side of an object, m. Less is nearly always a wrong scale.
 const MIN_SIZE: f64 = 1e-3;
 
-fn check_scale(object: &Object, cache: &AssetCache) -> Result<(), BuildError> {
+fn check_scale(object: &Object, cache: &AssetCache) -> Result<(), SceneBuildError> {
     let longest = cache.bounds(&object.asset.shape).size().max();
     // Meshing reports an empty shape.
     if longest >= MIN_SIZE || longest == 0.0 {
@@ -33,15 +33,15 @@ fn check_scale(object: &Object, cache: &AssetCache) -> Result<(), BuildError> {
         "it is {longest:.1e} m long, expected at least {} m; sizes are in metres (a mesh has a scale)",
         format_number(MIN_SIZE)
     );
-    Err(BuildError::Material { asset: object.asset.name.clone(), what })
+    Err(SceneBuildError::Material { asset: object.asset.name.clone(), what })
 }
 
 /// The error about walls that are too thin for a minimum (m); `description` states how thick they are.
-fn thin_walls(object: &Object, description: &str, min: f64) -> BuildError {
+fn thin_walls(object: &Object, description: &str, min: f64) -> SceneBuildError {
     let min = format_number(1e3 * min);
     let what =
         format!("{description}, expected at least {min} mm: other bodies may pass through thinner ones");
-    BuildError::Material { asset: object.asset.name.clone(), what }
+    SceneBuildError::Material { asset: object.asset.name.clone(), what }
 }
 
 /// Tolerated initial overlap, m. Contact forces resolve it while the objects settle.
@@ -52,11 +52,11 @@ pub(super) fn add_all(
     world: &mut World,
     scene: &Scene,
     cache: &AssetCache,
-) -> Result<Vec<ObjectInstance>, BuildError> {
+) -> Result<Vec<ObjectInstance>, SceneBuildError> {
     let mut instances: Vec<ObjectInstance> = Vec::new();
     for object in &scene.objects {
         if instances.iter().any(|known| known.name == object.name) {
-            return Err(BuildError::DuplicateName(object.name.clone()).of(object));
+            return Err(SceneBuildError::DuplicateName(object.name.clone()).of(object));
         }
         add(world, object, cache, &mut instances).map_err(|error| error.of(object))?;
     }
@@ -64,7 +64,7 @@ pub(super) fn add_all(
 }
 
 /// Checks that no objects overlap each other or the robot, which must be in `world` already.
-pub(super) fn check_overlap(world: &mut World, scene: &Scene) -> Result<(), BuildError> {
+pub(super) fn check_overlap(world: &mut World, scene: &Scene) -> Result<(), SceneBuildError> {
     let found = world.penetrations(MAX_OVERLAP);
     let Some(deepest) = found.iter().max_by(|a, b| a.depth.total_cmp(&b.depth)) else { return Ok(()) };
     // The name of a part is that of its object, a dot and its own name.
@@ -80,14 +80,14 @@ pub(super) fn check_overlap(world: &mut World, scene: &Scene) -> Result<(), Buil
     if let (Some(index), None) = (first.0, second.0) {
         // Only the colliders of the robot belong to no object.
         let (object, part) = (first.1, second.1);
-        return Err(BuildError::InRobot { object, part, depth: deepest.depth }.of(&scene.objects[index]));
+        return Err(SceneBuildError::InRobot { object, part, depth: deepest.depth }.of(&scene.objects[index]));
     }
     let place = |index: Option<usize>| index.map_or(String::new(), |i| scene.objects[i].placed_at.clone());
     // Most objects are placed by the lowest point of their shape, on something.
     let free = first.0.map(|index| &scene.objects[index].asset);
     let free = free.filter(|asset| matches!(asset.body, Body::Soft(_) | Body::Rigid { .. }));
     let lowest = free.map_or(0.0, |asset| -asset.shape.bounds().min.z);
-    let error = BuildError::Overlap {
+    let error = SceneBuildError::Overlap {
         below_origin: Some(lowest).filter(|lowest| *lowest >= 0.5 * deepest.depth && *lowest > MAX_OVERLAP),
         first: first.1,
         second: second.1,
@@ -107,7 +107,7 @@ const BASE_LOW: f64 = 0.03;
 const BASE_HIGH: f64 = 0.33;
 
 /// Checks that no movable object overlaps the base of the robot.
-pub(super) fn check_base(scene: &Scene) -> Result<(), BuildError> {
+pub(super) fn check_base(scene: &Scene) -> Result<(), SceneBuildError> {
     let movable = |object: &&Object| matches!(object.asset.body, Body::Soft(_) | Body::Rigid { .. });
     for object in scene.objects.iter().filter(movable) {
         let column_o = object.pose_w.inverse() * scene.base_w;
@@ -117,7 +117,7 @@ pub(super) fn check_base(scene: &Scene) -> Result<(), BuildError> {
             object.asset.shape.distance(&(column_o * nalgebra::Point3::new(0.0, 0.0, z)).coords) < BASE_RADIUS
         });
         if inside {
-            return Err(BuildError::InBase(object.name.clone()).of(object));
+            return Err(SceneBuildError::InBase(object.name.clone()).of(object));
         }
     }
     Ok(())
@@ -129,7 +129,7 @@ fn add(
     object: &Object,
     cache: &AssetCache,
     instances: &mut Vec<ObjectInstance>,
-) -> Result<(), BuildError> {
+) -> Result<(), SceneBuildError> {
     let asset = &object.asset;
     check_scale(object, cache)?;
     if matches!(asset.body, Body::Rigid { .. })
@@ -148,7 +148,7 @@ fn add(
             let others = instances.iter().filter_map(|instance| instance.model.as_ref());
             let nodes = model.mesh.nodes.len() + others.map(|model| model.mesh.nodes.len()).sum::<usize>();
             if nodes > MAX_NODES {
-                return Err(BuildError::Nodes(nodes));
+                return Err(SceneBuildError::Nodes(nodes));
             }
             fem_model = Some(model.clone());
             let surface: Arc<dyn ContactSurface> = Arc::new(asset.shape.clone());
@@ -158,7 +158,7 @@ fn add(
         Body::Rigid { density } => {
             let m = cache.mass(&asset.shape, *density);
             let body = RigidState::new(&object.pose_w, m.com, m.mass, m.inertia)
-                .map_err(|source| BuildError::Rigid { asset: asset.name.clone(), source })?;
+                .map_err(|source| SceneBuildError::Rigid { asset: asset.name.clone(), source })?;
             let body = BodyId::Rigid(world.add_rigid(&object.name, body));
             let collider = collider(world, body, Pose::identity());
             (body, vec![world.add_collider(collider)])
@@ -196,7 +196,7 @@ fn add_articulated(
     parts: &[MovingPart],
     base: usize,
     cache: &AssetCache,
-) -> Result<(ArticulationId, Vec<ObjectInstance>), BuildError> {
+) -> Result<(ArticulationId, Vec<ObjectInstance>), SceneBuildError> {
     for part in parts {
         if let Some(wall) = cache.wall(&part.asset.shape) {
             let mm = tenths_of_mm(wall);
@@ -206,7 +206,7 @@ fn add_articulated(
     }
     let links = parts.iter().map(|part| link(part, parts, cache)).collect();
     let tree = JointTree { links, base_w: object.pose_w };
-    tree.validate().map_err(|source| BuildError::Joints { object: object.name.clone(), source })?;
+    tree.validate().map_err(|source| SceneBuildError::Joints { object: object.name.clone(), source })?;
     let drives = vec![None; parts.len()];
     let articulation = world.add_articulation(&object.name, tree, &object.joints, drives, true);
     let instances = parts.iter().enumerate().map(|(index, part)| {

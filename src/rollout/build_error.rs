@@ -8,7 +8,7 @@ use softvt_scene::Object;
 
 /// An object cannot be built.
 #[derive(Debug, thiserror::Error)]
-pub enum BuildError {
+pub enum SceneBuildError {
     /// The shape cannot be meshed.
     #[error("asset {asset}: {source}")]
     Geometry {
@@ -100,7 +100,7 @@ pub enum BuildError {
         /// `file:line`.
         place: String,
         /// The cause.
-        source: Box<BuildError>,
+        source: Box<SceneBuildError>,
     },
     /// Two objects have the same name.
     #[error("the scene has two objects named {0}; names must be unique")]
@@ -129,7 +129,7 @@ fn placed(at: &str) -> String {
     if at.is_empty() { String::new() } else { format!(" (placed at {at})") }
 }
 
-impl BuildError {
+impl SceneBuildError {
     /// Adds the place in the script that placed `object`.
     pub(super) fn of(self, object: &Object) -> Self {
         match object.placed_at.as_str() {

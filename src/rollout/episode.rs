@@ -6,7 +6,7 @@ use image::RgbImage;
 
 use super::{
     asset_cache::AssetCache,
-    build_error::BuildError,
+    build_error::SceneBuildError,
     controller::Controller,
     disturbance::Disturbance,
     evidence::{EvidenceCollector, lowest},
@@ -143,7 +143,7 @@ pub struct FinishedEpisode {
 pub enum EpisodeError {
     /// The scene cannot be built.
     #[error(transparent)]
-    Build(#[from] BuildError),
+    Build(#[from] SceneBuildError),
     /// The scene does not come to rest.
     #[error("layout {layout}, episode {episode}: {source}")]
     Settle {

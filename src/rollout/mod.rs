@@ -88,7 +88,7 @@ mod soft_model;
 mod trace;
 
 pub use asset_cache::AssetCache;
-pub use build_error::BuildError;
+pub use build_error::SceneBuildError;
 pub use controller::{ChunkedPolicy, Controller};
 pub use episode::{Episode, EpisodeError, EpisodeSpec, FinishedEpisode, checksum, target_asset};
 pub use goal_in_scene::check_goal;

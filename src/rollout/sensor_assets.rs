@@ -9,7 +9,7 @@ use softvt_scene::{Asset, Camera};
 use softvt_sensing::{
     camera::{CameraError, RenderMesh},
     panda::RobotMeshes,
-    tactile::{ContactError, TactileSensor, TactileSensorError, TactileSkin},
+    tactile::{TactileContactError, TactileSensor, TactileSensorError, TactileSkin},
 };
 
 /// Data of a sensor cannot be computed.
@@ -23,7 +23,7 @@ pub enum SensingError {
     Sensor(#[from] TactileSensorError),
     /// A tactile contact cannot be computed.
     #[error(transparent)]
-    Field(#[from] ContactError),
+    Field(#[from] TactileContactError),
     /// An error about a camera that a script has set.
     #[error("{at}: {source}")]
     Set {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use sha2::{Digest, Sha256};
 
-use super::{asset_cache::AssetCache, build, build_error::BuildError, robot_instance::RobotInstance};
+use super::{asset_cache::AssetCache, build, build_error::SceneBuildError, robot_instance::RobotInstance};
 use softvt_benchmark::CONTROL_DT;
 use softvt_common::cancel;
 use softvt_geometry::{Aabb, Pose, Vec3};
@@ -156,7 +156,7 @@ impl Simulation {
         params: &PhysicsParams,
         robot_spec: &RobotSpec,
         cache: &AssetCache,
-    ) -> Result<Self, BuildError> {
+    ) -> Result<Self, SceneBuildError> {
         let mut world = World::new(params.clone(), scene.gravity);
         let objects = build::add_all(&mut world, &scene, cache)?;
         let robot = RobotInstance::new(&mut world, robot_spec, &scene.base_w, &scene.start_q, CONTROL_DT);
@@ -335,7 +335,7 @@ impl Simulation {
     ///
     /// # Errors
     /// The first body with nothing below it.
-    pub fn check_support(&self) -> Result<(), BuildError> {
+    pub fn check_support(&self) -> Result<(), SceneBuildError> {
         let boxes: Vec<Aabb> = self.objects.iter().map(|o| o.bounds.transformed(&o.start_w)).collect();
         for (object, own) in self.objects.iter().zip(&boxes) {
             let supports = |(other, below): (&ObjectInstance, &Aabb)| {
@@ -347,7 +347,7 @@ impl Simulation {
             };
             if object.body.is_free() && !self.objects.iter().zip(&boxes).any(supports) {
                 let at = object.start_w.translation.vector;
-                let error = BuildError::NothingBelow { object: object.name.clone(), x: at.x, y: at.y };
+                let error = SceneBuildError::NothingBelow { object: object.name.clone(), x: at.x, y: at.y };
                 let placed = self.scene.objects.iter().find(|placed| placed.name == object.name);
                 return Err(match placed {
                     Some(placed) => error.of(placed),

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::build_error::BuildError;
+use super::build_error::SceneBuildError;
 use softvt_common::text::format_number;
 use softvt_geometry::{
     mass::{approximate_mass_properties, mass_properties},
@@ -53,7 +53,11 @@ pub fn cost_warning(world: &World) -> Option<String> {
 ///
 /// # Errors
 /// The shape cannot be meshed.
-pub fn soft_model(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<Arc<FemModel>, BuildError> {
+pub fn soft_model(
+    name: &str,
+    shape: &Shape,
+    material: &SoftMaterial,
+) -> Result<Arc<FemModel>, SceneBuildError> {
     Ok(SoftGeometry::new(name, shape, material, false)?.model(material, 1.0))
 }
 
@@ -73,7 +77,7 @@ impl SoftGeometry {
         shape: &Shape,
         material: &SoftMaterial,
         approximate: bool,
-    ) -> Result<Self, BuildError> {
+    ) -> Result<Self, SceneBuildError> {
         check_size(name, shape, material)?;
         check_thickness(name, shape, material)?;
         let (grasp_spacing, volume) = match approximate {
@@ -83,10 +87,10 @@ impl SoftGeometry {
             false => (material.grasp_spacing, mass_properties(shape, 1.0).mass),
         };
         let mesh = voxel_mesh(shape, &VoxelSpec { resolution: material.resolution })
-            .map_err(|source| BuildError::Geometry { asset: name.to_owned(), source })?;
+            .map_err(|source| SceneBuildError::Geometry { asset: name.to_owned(), source })?;
         if mesh.nodes.len() > MAX_NODES {
             let what = format!("its voxel mesh has {}", too_many(mesh.nodes.len()));
-            return Err(BuildError::Material { asset: name.to_owned(), what });
+            return Err(SceneBuildError::Material { asset: name.to_owned(), what });
         }
         check_connected(name, &mesh)?;
         let samples = surface_samples(shape, &mesh, &SampleSpec { grasp_spacing, ..SampleSpec::default() });
@@ -106,21 +110,21 @@ impl SoftGeometry {
 }
 
 /// Checks that a body is one piece: D of several would measure how they move apart.
-fn check_connected(name: &str, mesh: &VoxelMesh) -> Result<(), BuildError> {
+fn check_connected(name: &str, mesh: &VoxelMesh) -> Result<(), SceneBuildError> {
     let Some(SeparatePieces { count, gap }) = SeparatePieces::find(mesh) else { return Ok(()) };
     let what = format!(
         "its voxel mesh has {count} separate pieces, {:.1} mm apart; join them, give a higher resolution if the shape is \
          connected, or make each an asset of its own",
         1e3 * gap
     );
-    Err(BuildError::Material { asset: name.to_owned(), what })
+    Err(SceneBuildError::Material { asset: name.to_owned(), what })
 }
 
 /// Maximum number of contact samples of one body. More take minutes to compute; nearly always the size
 /// was given in millimetres.
 const MAX_SAMPLES: f64 = 1e6;
 
-fn check_size(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<(), BuildError> {
+fn check_size(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<(), SceneBuildError> {
     let size = shape.bounds().size();
     let samples =
         2.0 * (size.x * size.y + size.y * size.z + size.z * size.x) / material.grasp_spacing.powi(2);
@@ -135,11 +139,11 @@ fn check_size(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<(), 
         format_number(size.z),
         1e3 * material.grasp_spacing
     );
-    Err(BuildError::Material { asset: name.to_owned(), what })
+    Err(SceneBuildError::Material { asset: name.to_owned(), what })
 }
 
 /// Checks that a body is at least a voxel thick. A thinner one may have no elements at all.
-fn check_thickness(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<(), BuildError> {
+fn check_thickness(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<(), SceneBuildError> {
     let size = shape.bounds().size();
     let (thin, long) = (size.min(), size.max());
     let edge = long / material.resolution.max(1) as f64;
@@ -164,7 +168,7 @@ fn check_thickness(name: &str, shape: &Shape, material: &SoftMaterial) -> Result
         material.resolution,
         mm(edge)
     );
-    Err(BuildError::Material { asset: name.to_owned(), what })
+    Err(SceneBuildError::Material { asset: name.to_owned(), what })
 }
 
 #[cfg(test)]

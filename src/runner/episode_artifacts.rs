@@ -14,7 +14,7 @@ use softvt_records::record::EpisodeRecord;
 use softvt_report::{
     actions,
     softvtbench_files::{self, DebugFrame, DebugShape},
-    video::{self, Caption},
+    video::{self, VideoCaption},
 };
 use softvt_rollout::FinishedEpisode;
 
@@ -123,7 +123,7 @@ impl EpisodeArtifacts<'_> {
         if !self.is_rendered(record) {
             return Ok(());
         }
-        let (index, caption) = (record.header.id.index(), Caption::new(record));
+        let (index, caption) = (record.header.id.index(), VideoCaption::new(record));
         let path = video::video_path(self.dir, index);
         files::create_folder(path.parent().unwrap_or(self.dir))?;
         if !record.verdict.safety {

@@ -20,7 +20,7 @@ use softvt_evaluation::verdict::Outcome;
 use softvt_records::{record::EpisodeRecord, summary::SuiteSummary};
 use softvt_report::{
     actions,
-    run_check::{Contradiction, first_contradiction},
+    run_check::{RecordContradiction, first_contradiction},
     run_folder::{EPISODES, RUN, RunFolder, SUMMARY},
     softvtbench_files,
 };
@@ -95,7 +95,7 @@ impl<'a> RunLog<'a> {
     /// Checks that no record contradicts the manifest of the run.
     fn check_contradictions(&self, manifest: &impl Serialize) -> Result<(), RunError> {
         let manifest = serde_json::to_value(manifest).unwrap_or_default();
-        first_contradiction(&manifest, &self.records).map_or(Ok(()), |Contradiction { line, what }| {
+        first_contradiction(&manifest, &self.records).map_or(Ok(()), |RecordContradiction { line, what }| {
             Err(RunError::input(format!(
                 "{}:{line}: the record contradicts {RUN}: {what}; it was changed after the episode",
                 self.run.out.join(EPISODES).display()

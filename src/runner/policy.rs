@@ -18,7 +18,7 @@ use softvt_policy::{
     EpisodeBrief, Policy, SensorStreams, builtin,
     builtin::RecordedPolicy,
     profile::{GripCode, PROFILES, Profile},
-    remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},
+    remote::{PolicyConnections, PolicyServer, RemotePolicy, ServerProtocol},
 };
 use softvt_rollout::{ChunkedPolicy, Controller};
 use softvt_script::{EpisodeSetup, ExpertController, GripController, GripMode, PolicyFile, load_profile};
@@ -42,7 +42,7 @@ pub struct PolicyOptions {
     /// Observations and action encoding of a policy server: a name or a Lua file.
     pub profile: Option<String>,
     /// Protocol of a policy server.
-    pub protocol: Option<Protocol>,
+    pub protocol: Option<ServerProtocol>,
     /// Grip code in place of that of the profile or the Lua policy.
     pub gripper: Option<GripCode>,
     /// Actions executed from each predicted chunk.
@@ -360,7 +360,7 @@ impl PolicyConfig {
             PolicySource::Server(url) => {
                 let (profile, sources) = load_profile_of(args)?;
                 let profile_name = args.profile.as_deref().unwrap_or(DEFAULT_PROFILE);
-                if profile.observe_every_step && args.protocol == Some(Protocol::VlaEval) {
+                if profile.observe_every_step && args.protocol == Some(ServerProtocol::VlaEval) {
                     let message = "observe_every_step needs the protocol openpi; in that of vla-eval every observation is a \
                                    request for actions";
                     return Err(RunError::of_setting("profile", profile_name, message));
@@ -629,7 +629,7 @@ mod tests {
         );
         for (flag, options) in [
             ("profile", PolicyOptions { profile: Some("vision".into()), ..noop() }),
-            ("protocol", PolicyOptions { protocol: Some(Protocol::VlaEval), ..noop() }),
+            ("protocol", PolicyOptions { protocol: Some(ServerProtocol::VlaEval), ..noop() }),
             ("timeout", PolicyOptions { timeout: Some(DEFAULT_TIMEOUT), ..servo() }),
         ] {
             assert!(message(options).starts_with(&format!("{flag}: applies to policy servers only")));

@@ -21,7 +21,7 @@ use softvt_dataset::card::ImportedFile;
 use softvt_policy::{EpisodeBrief, PolicyError, SensorStreams, remote::PolicyConnections};
 use softvt_records::record::DemonstrationOrigin;
 use softvt_rollout::{
-    AssetCache, BuildError, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SensorAssets, Sensors,
+    AssetCache, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SceneBuildError, SensorAssets, Sensors,
     Simulation, check_goal, check_sensors, cost_warning,
 };
 use softvt_scene::{Body, Scene};
@@ -365,7 +365,7 @@ impl<'a> SuiteRun<'a> {
         };
         match (RunError::new(cause, error), error, error.place()) {
             // The message of this one begins with file and line.
-            (of_episode, EpisodeError::Build(BuildError::At { .. }), _) => of_episode,
+            (of_episode, EpisodeError::Build(SceneBuildError::At { .. }), _) => of_episode,
             (of_episode, _, Some(place)) => of_episode.at(place),
             (of_episode, _, None) => of_episode.at(self.config.file.display()),
         }

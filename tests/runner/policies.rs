@@ -4,7 +4,7 @@ use std::{net::TcpListener, time::Duration};
 
 use softvt::{
     evaluation::{stage::TaskStage, verdict::Outcome},
-    policy::{builtin::NoopPolicy, profile::GripCode, remote::Protocol},
+    policy::{builtin::NoopPolicy, profile::GripCode, remote::ServerProtocol},
     records::record::EpisodeRecord,
     report::comparison,
     runner::PolicyConfig,
@@ -216,7 +216,7 @@ fn options_without_effect_are_refused() {
         let profile = profile.map(|file| project.path(file).display().to_string());
         project.run("x.lua").policy(address).with_policy(|policy| policy.profile = profile)
     };
-    let protocol = project.run("x.lua").with_policy(|policy| policy.protocol = Some(Protocol::VlaEval));
+    let protocol = project.run("x.lua").with_policy(|policy| policy.protocol = Some(ServerProtocol::VlaEval));
     let vision =
         project.run("x.lua").policy("random").with_policy(|policy| policy.profile = Some("vision".into()));
     for (run, output) in [

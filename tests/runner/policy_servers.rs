@@ -16,7 +16,7 @@ use std::{
 use rmpv::Value;
 use softvt::{
     evaluation::verdict::Outcome,
-    policy::{profile::GripCode, remote::Protocol},
+    policy::{profile::GripCode, remote::ServerProtocol},
     report::terminal,
     runner::RunErrorCause,
 };
@@ -350,7 +350,7 @@ fn other_protocols_are_reported() {
     let address = server(9, |_, socket| answering(socket, |_, seen| Some(packed(seen))));
     let output = failure(&address, |run| {
         let run = run.timeout(Duration::from_secs(1));
-        run.with_policy(|policy| policy.protocol = Some(Protocol::VlaEval))
+        run.with_policy(|policy| policy.protocol = Some(ServerProtocol::VlaEval))
     });
     assert!(output.contains("vla-eval"), "{output}");
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
@@ -695,7 +695,7 @@ fn a_server_or_a_profile_may_ask_for_an_observation_in_every_control_step() {
     assert_eq!(cause, RunErrorCause::Policy);
     assert!(message.contains("observe_every_step in its metadata; expected true or false"), "{message}");
     let refused = messages(Value::Map(Vec::new()), every_step, |run| {
-        run.with_policy(|policy| policy.protocol = Some(Protocol::VlaEval))
+        run.with_policy(|policy| policy.protocol = Some(ServerProtocol::VlaEval))
     });
     let (cause, message) = refused.expect_err("another protocol");
     assert_eq!(cause, RunErrorCause::Input);

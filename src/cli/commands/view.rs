@@ -12,7 +12,7 @@ use crate::{
 use softvt_benchmark::Plan;
 use softvt_common::cancel;
 use softvt_common::files;
-use softvt_report::video::{Caption, worst_state, write_stills, write_video, write_video_frame};
+use softvt_report::video::{VideoCaption, worst_state, write_stills, write_video, write_video_frame};
 use softvt_runner::{
     ConfiguredScript, EpisodeJob, EpisodeList, RunConfig, SuiteRun, selection::select_tasks,
 };
@@ -66,7 +66,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     config.observer.work("simulating the episode");
     let finished = run.run_episode(job, true, &run.controllers)?;
     config.observer.end();
-    let caption = Caption::new(&finished.record);
+    let caption = VideoCaption::new(&finished.record);
     let Some(mut states) = finished.recording else { return Ok(()) };
     let last = states.frames.len().saturating_sub(1);
     let worst = worst_state(&states);

@@ -8,7 +8,7 @@ use gltf::{
     mesh::Mode,
 };
 
-use super::{ImportError, check_size};
+use super::{MeshImportError, check_size};
 use crate::mesh::Mesh;
 
 type Transform = nalgebra::Matrix4<f64>;
@@ -21,11 +21,11 @@ const MAX_NODES: usize = 10_000;
 const HEADER_BYTES: usize = 12;
 const LENGTH_OFFSET: usize = 8;
 
-pub(super) fn read(bytes: &[u8]) -> Result<Mesh, ImportError> {
+pub(super) fn read(bytes: &[u8]) -> Result<Mesh, MeshImportError> {
     check_length(bytes)?;
     let file = gltf::Gltf::from_slice(bytes)
-        .map_err(|error| ImportError::Unreadable { format: "GLB", reason: error.to_string() })?;
-    let outside = ImportError::Unsupported("buffers outside of the file");
+        .map_err(|error| MeshImportError::Unreadable { format: "GLB", reason: error.to_string() })?;
+    let outside = MeshImportError::Unsupported("buffers outside of the file");
     let blob = file.blob.as_deref().ok_or_else(|| outside.clone())?;
     let is_inside =
         |buffer: gltf::Buffer| matches!(buffer.source(), Source::Bin) && buffer.length() <= blob.len();
@@ -45,14 +45,14 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mesh, ImportError> {
 }
 
 /// Compares the length in the header with that of the file. Without a header of glTF the crate says what is wrong.
-fn check_length(bytes: &[u8]) -> Result<(), ImportError> {
+fn check_length(bytes: &[u8]) -> Result<(), MeshImportError> {
     let Some(header) = bytes.get(..HEADER_BYTES).filter(|header| header.starts_with(b"glTF")) else {
-        return Err(ImportError::Unreadable { format: "GLB", reason: "it has no glTF header".into() });
+        return Err(MeshImportError::Unreadable { format: "GLB", reason: "it has no glTF header".into() });
     };
     let declared =
         header[LENGTH_OFFSET..].iter().rev().fold(0, |length, &byte| length << 8 | usize::from(byte));
     let actual = bytes.len();
-    if declared == actual { Ok(()) } else { Err(ImportError::Length { declared, actual }) }
+    if declared == actual { Ok(()) } else { Err(MeshImportError::Length { declared, actual }) }
 }
 
 /// The mesh of the nodes so far.
@@ -63,13 +63,18 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn add_node(&mut self, node: &gltf::Node, parent: &Transform, depth: usize) -> Result<(), ImportError> {
+    fn add_node(
+        &mut self,
+        node: &gltf::Node,
+        parent: &Transform,
+        depth: usize,
+    ) -> Result<(), MeshImportError> {
         if depth > MAX_DEPTH {
-            return Err(ImportError::Unsupported("a scene tree more than 64 deep"));
+            return Err(MeshImportError::Unsupported("a scene tree more than 64 deep"));
         }
         self.nodes += 1;
         if self.nodes > MAX_NODES {
-            return Err(ImportError::TooLarge { what: "nodes", limit: MAX_NODES });
+            return Err(MeshImportError::TooLarge { what: "nodes", limit: MAX_NODES });
         }
         let columns = node.transform().matrix();
         let pose = parent * Transform::from_fn(|row, column| f64::from(columns[column][row]));
@@ -85,9 +90,9 @@ impl Reader<'_> {
         primitive: &gltf::Primitive,
         mesh: usize,
         pose: &Transform,
-    ) -> Result<(), ImportError> {
+    ) -> Result<(), MeshImportError> {
         if primitive.mode() != Mode::Triangles {
-            return Err(ImportError::Unsupported("points, lines or triangle strips"));
+            return Err(MeshImportError::Unsupported("points, lines or triangle strips"));
         }
         let attributes = Attributes::check(primitive, mesh)?;
         let corners = attributes.indices.unwrap_or(attributes.positions);
@@ -141,7 +146,7 @@ struct Attributes {
 }
 
 impl Attributes {
-    fn check(primitive: &gltf::Primitive, mesh: usize) -> Result<Self, ImportError> {
+    fn check(primitive: &gltf::Primitive, mesh: usize) -> Result<Self, MeshImportError> {
         let positions = primitive.get(&Semantic::Positions).ok_or_else(|| {
             accessor_error(mesh, POSITION, "is missing", "positions of type VEC3 of 32-bit floats")
         })?;
@@ -191,9 +196,9 @@ fn is_texture_coordinate(accessor: &Accessor) -> bool {
 
 /// Refuses what the reader of the crate computes with unchecked arithmetic: no elements, elements that overlap, and
 /// offsets beyond the file.
-fn check_layout(mesh: usize, attribute: &'static str, accessor: &Accessor) -> Result<(), ImportError> {
+fn check_layout(mesh: usize, attribute: &'static str, accessor: &Accessor) -> Result<(), MeshImportError> {
     if accessor.sparse().is_some() {
-        return Err(ImportError::Unsupported("sparse accessors"));
+        return Err(MeshImportError::Unsupported("sparse accessors"));
     }
     let error = |found: &str, required| Err(accessor_error(mesh, attribute, found, required));
     let (Some(view), 1..) = (accessor.view(), accessor.count()) else {
@@ -235,6 +240,11 @@ fn type_name(accessor: &Accessor) -> String {
     format!("{dimensions} of {component}")
 }
 
-fn accessor_error(mesh: usize, attribute: &'static str, found: &str, required: &'static str) -> ImportError {
-    ImportError::Accessor { mesh, attribute, found: found.to_owned(), required }
+fn accessor_error(
+    mesh: usize,
+    attribute: &'static str,
+    found: &str,
+    required: &'static str,
+) -> MeshImportError {
+    MeshImportError::Accessor { mesh, attribute, found: found.to_owned(), required }
 }

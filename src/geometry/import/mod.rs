@@ -11,7 +11,7 @@ use super::{
 
 /// Unit and orientation of a mesh file.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ImportOptions {
+pub struct MeshImportOptions {
     /// Length of the unit of the file, m (1e-3 for a file in millimetres); positive.
     pub scale: f64,
     /// True if z is up in the file. Otherwise y is up, and the mesh is rotated.
@@ -32,7 +32,7 @@ pub enum MeshFormat {
 /// Failure to import a mesh. The caller adds the name of the file.
 #[allow(missing_docs, reason = "the messages describe the variants")]
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ImportError {
+pub enum MeshImportError {
     #[error("\"{0}\" is not a supported mesh format; give an .obj, .stl or .glb file")]
     Extension(String),
     #[error("cannot be read as {format}: {reason}")]
@@ -56,12 +56,12 @@ impl MeshFormat {
     ///
     /// # Errors
     /// If the extension is not `obj`, `stl` or `glb`.
-    pub fn from_extension(extension: &str) -> Result<Self, ImportError> {
+    pub fn from_extension(extension: &str) -> Result<Self, MeshImportError> {
         match extension.to_ascii_lowercase().as_str() {
             "obj" => Ok(Self::Obj),
             "stl" => Ok(Self::Stl),
             "glb" => Ok(Self::Gltf),
-            other => Err(ImportError::Extension(other.to_owned())),
+            other => Err(MeshImportError::Extension(other.to_owned())),
         }
     }
 }
@@ -77,9 +77,13 @@ pub const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
 ///
 /// # Errors
 /// If the bytes do not parse, the mesh is empty or larger than the limits, or a coordinate or an index is invalid.
-pub fn import(bytes: &[u8], format: MeshFormat, options: &ImportOptions) -> Result<Mesh, ImportError> {
+pub fn import(
+    bytes: &[u8],
+    format: MeshFormat,
+    options: &MeshImportOptions,
+) -> Result<Mesh, MeshImportError> {
     if !(options.scale > 0.0 && options.scale.is_finite()) {
-        return Err(ImportError::Scale(options.scale));
+        return Err(MeshImportError::Scale(options.scale));
     }
     let mut mesh = match format {
         MeshFormat::Obj => read_obj(bytes)?,
@@ -95,16 +99,16 @@ pub fn import(bytes: &[u8], format: MeshFormat, options: &ImportOptions) -> Resu
     Ok(mesh)
 }
 
-fn check_size(vertices: usize, triangles: usize) -> Result<(), ImportError> {
+fn check_size(vertices: usize, triangles: usize) -> Result<(), MeshImportError> {
     let check = |what, count, limit| {
-        if count > limit { Err(ImportError::TooLarge { what, limit }) } else { Ok(()) }
+        if count > limit { Err(MeshImportError::TooLarge { what, limit }) } else { Ok(()) }
     };
     check("triangles", triangles, MAX_TRIANGLES)?;
     check("vertices", vertices, MAX_VERTICES)
 }
 
-fn read_obj(bytes: &[u8]) -> Result<Mesh, ImportError> {
-    let unreadable = |reason: String| ImportError::Unreadable { format: "OBJ", reason };
+fn read_obj(bytes: &[u8]) -> Result<Mesh, MeshImportError> {
+    let unreadable = |reason: String| MeshImportError::Unreadable { format: "OBJ", reason };
     let options = tobj::LoadOptions { triangulate: true, single_index: true, ..Default::default() };
     // Appearance is defined in asset scripts, so material files are not opened.
     let no_materials = |_: &std::path::Path| Err(tobj::LoadError::OpenFileFailed);
@@ -130,9 +134,9 @@ fn read_obj(bytes: &[u8]) -> Result<Mesh, ImportError> {
     Ok(out)
 }
 
-fn read_stl(bytes: &[u8]) -> Result<Mesh, ImportError> {
+fn read_stl(bytes: &[u8]) -> Result<Mesh, MeshImportError> {
     let read = stl_io::read_stl(&mut Cursor::new(bytes))
-        .map_err(|error| ImportError::Unreadable { format: "STL", reason: error.to_string() })?;
+        .map_err(|error| MeshImportError::Unreadable { format: "STL", reason: error.to_string() })?;
     let place = |v: &stl_io::Vertex| Vec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]));
     Ok(Mesh {
         vertices: read.vertices.iter().map(place).collect(),

@@ -9,7 +9,7 @@ use crate::Vec3;
 
 /// Contact of a surface sample with a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Contact {
+pub struct SampleContact {
     /// Signed distance, m; negative inside.
     pub gap: f64,
     /// Outward unit normal of the shape.
@@ -47,7 +47,7 @@ impl Shape {
     /// total over a field of samples is therefore continuous as an edge
     /// moves, and a deep sample near an edge does not switch to the adjacent face. All other shapes return
     /// [`Shape::distance_and_normal`] with full coverage.
-    pub fn contact(&self, p_o: &Vec3, facing_o: &Vec3, spacing: f64) -> Contact {
+    pub fn contact(&self, p_o: &Vec3, facing_o: &Vec3, spacing: f64) -> SampleContact {
         match self {
             Self::Box { half } => sharp(box_faces(p_o, half), facing_o, spacing)
                 .unwrap_or_else(|| full(primitive::cuboid(p_o, half))),
@@ -58,7 +58,7 @@ impl Shape {
             Self::Placed { shape, pose } => {
                 let facing = pose.rotation.inverse_transform_vector(facing_o);
                 let contact = shape.contact(&to_local(pose, p_o), &facing, spacing);
-                Contact { normal: pose.rotation * contact.normal, ..contact }
+                SampleContact { normal: pose.rotation * contact.normal, ..contact }
             }
             Self::Paint { shape, .. } => shape.contact(p_o, facing_o, spacing),
             Self::Union(parts) => union(parts, p_o, facing_o, spacing),
@@ -67,8 +67,8 @@ impl Shape {
     }
 }
 
-fn full(SignedDistance { distance: gap, normal }: SignedDistance) -> Contact {
-    Contact { gap, normal, coverage: 1.0 }
+fn full(SignedDistance { distance: gap, normal }: SignedDistance) -> SampleContact {
+    SampleContact { gap, normal, coverage: 1.0 }
 }
 
 /// Contact with the face that the sample faces most directly, among those that it covers; `None` if it covers none.
@@ -76,7 +76,7 @@ fn full(SignedDistance { distance: gap, normal }: SignedDistance) -> Contact {
 /// Faces that it faces nearly as directly take part (a plane through their common edge, between them). So the direction
 /// of the contact turns continuously with the sample. With one face alone, it would jump by 90° as a sample that wraps
 /// around an edge passes 45°; light nodes of soft bodies were seen to alternate between the two.
-fn sharp<const N: usize>(faces: [SupportFace; N], facing: &Vec3, spacing: f64) -> Option<Contact> {
+fn sharp<const N: usize>(faces: [SupportFace; N], facing: &Vec3, spacing: f64) -> Option<SampleContact> {
     let nearest = -faces.iter().fold(f64::NEG_INFINITY, |least, face| least.max(face.gap));
     let deepest = MAX_DEPTH.max(MAX_DEPTH_RATIO * nearest);
     // Most samples face one face only, so the shares of the others are not computed.
@@ -93,7 +93,7 @@ fn sharp<const N: usize>(faces: [SupportFace; N], facing: &Vec3, spacing: f64) -
     });
     let mut met = faces.iter().zip(&shares).filter_map(|(face, share)| Some((face, share.as_ref()?)));
     if let (Some((face, &(_, coverage, _))), None) = (met.next(), met.next()) {
-        return Some(Contact { gap: face.gap, normal: face.normal, coverage });
+        return Some(SampleContact { gap: face.gap, normal: face.normal, coverage });
     }
     let most = shares.iter().flatten().fold(FACING, |most, (alignment, ..)| most.max(*alignment));
     let (mut total, mut gap, mut normal, mut coverage) = (0.0, 0.0, Vec3::zeros(), 0.0);
@@ -106,7 +106,11 @@ fn sharp<const N: usize>(faces: [SupportFace; N], facing: &Vec3, spacing: f64) -
         coverage += weight * covered;
     }
     let length = normal.norm();
-    (total > 0.0).then(|| Contact { gap: gap / length, normal: normal / length, coverage: coverage / total })
+    (total > 0.0).then(|| SampleContact {
+        gap: gap / length,
+        normal: normal / length,
+        coverage: coverage / total,
+    })
 }
 
 /// Covered share, along one direction, of a patch with its centre `inside` m within the edge.
@@ -145,8 +149,8 @@ fn cylinder_faces(p: &Vec3, radius: f64, half_height: f64) -> [SupportFace; 2] {
 }
 
 /// Contact with the deepest part. Flush parts add up their coverage, so that a patch on a seam is covered fully.
-fn union(parts: &[Shape], p: &Vec3, facing: &Vec3, spacing: f64) -> Contact {
-    let mut best = Contact { gap: f64::INFINITY, normal: Vec3::z(), coverage: 1.0 };
+fn union(parts: &[Shape], p: &Vec3, facing: &Vec3, spacing: f64) -> SampleContact {
+    let mut best = SampleContact { gap: f64::INFINITY, normal: Vec3::z(), coverage: 1.0 };
     for part in parts {
         // A sample may contact a face from half a spacing beyond its edge.
         if part.is_farther(p, best.gap + spacing) {

@@ -18,7 +18,7 @@ mod validate;
 mod warp;
 
 pub(crate) use combine::SignedDistance;
-pub use contact::Contact;
+pub use contact::SampleContact;
 pub use displacement::{Bumps, Ramp, Ridges, SurfaceRelief};
 pub use mesh_solid::MeshSolid;
 pub use polygon::Polygon;

@@ -3,19 +3,19 @@ use rand::Rng;
 
 use crate::{
     Aabb, Vec3,
-    import::{ImportError, ImportOptions, MeshFormat, import},
+    import::{MeshFormat, MeshImportError, MeshImportOptions, import},
     mesh::{Mesh, MeshError},
     shape::Shape,
     surface_mesh::SurfaceMesh,
 };
 
-const METRES: ImportOptions = ImportOptions { scale: 1.0, z_up: true };
+const METRES: MeshImportOptions = MeshImportOptions { scale: 1.0, z_up: true };
 
 /// A unit cube from the origin, with outward-oriented quads.
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
     f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
-fn read_obj(text: &str) -> Result<Mesh, ImportError> {
+fn read_obj(text: &str) -> Result<Mesh, MeshImportError> {
     import(text.as_bytes(), MeshFormat::Obj, &METRES)
 }
 
@@ -113,7 +113,7 @@ fn scale_and_up_axis_are_applied() {
     let tall = CUBE.replace(" 1 ", " 3 ").replace("v 0 3 3 ", "v 0 3 1");
     let tall = tall.lines().filter(|l| l.starts_with('f')).collect::<Vec<_>>().join("\n");
     let corners = "v 0 0 0\nv 1 0 0\nv 1 3 0\nv 0 3 0\nv 0 0 1\nv 1 0 1\nv 1 3 1\nv 0 3 1\n";
-    let options = ImportOptions { scale: 1e-3, z_up: false };
+    let options = MeshImportOptions { scale: 1e-3, z_up: false };
     let mesh = import(format!("{corners}{tall}").as_bytes(), MeshFormat::Obj, &options).expect("a brick");
     let size = Aabb::from_points(&mesh.vertices).expect("corners").size();
     assert!((size - Vec3::new(1e-3, 1e-3, 3e-3)).norm() < 1e-15 && mesh.volume() > 0.0, "{size:?}");
@@ -124,29 +124,29 @@ fn open_empty_flat_and_malformed_files_are_refused_with_a_reason() {
     let open = CUBE.rsplit_once("f 4").expect("a last face").0;
     let refusal =
         |text: &str| read_obj(text).and_then(|mesh| Ok(Shape::from_mesh(mesh)?)).expect_err("refused");
-    assert_eq!(refusal(open), ImportError::Mesh(MeshError::Open { edges: 4 }));
+    assert_eq!(refusal(open), MeshImportError::Mesh(MeshError::Open { edges: 4 }));
     assert_eq!(
         refusal(open).to_string(),
         "the mesh is open: 4 edges have a triangle on one side only; close its holes"
     );
-    assert_eq!(refusal("v 0 0 0\n"), ImportError::Mesh(MeshError::Empty));
+    assert_eq!(refusal("v 0 0 0\n"), MeshImportError::Mesh(MeshError::Empty));
     assert_eq!(
         refusal(&CUBE.replace("v 1 1 1", "v 1 nan 1")),
-        ImportError::Mesh(MeshError::NotFinite { vertex: 6 })
+        MeshImportError::Mesh(MeshError::NotFinite { vertex: 6 })
     );
     let sheet = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1\n";
-    assert_eq!(refusal(sheet), ImportError::Mesh(MeshError::Flat));
+    assert_eq!(refusal(sheet), MeshImportError::Mesh(MeshError::Flat));
     let twice = format!("{CUBE}f 4 3 2 1\n");
-    assert!(matches!(refusal(&twice), ImportError::Mesh(MeshError::NonManifold { .. })));
-    assert!(matches!(refusal("v a b c\n"), ImportError::Unreadable { format: "OBJ", .. }));
+    assert!(matches!(refusal(&twice), MeshImportError::Mesh(MeshError::NonManifold { .. })));
+    assert!(matches!(refusal("v a b c\n"), MeshImportError::Unreadable { format: "OBJ", .. }));
     for format in [MeshFormat::Stl, MeshFormat::Gltf] {
-        assert!(matches!(import(b"not a mesh", format, &METRES), Err(ImportError::Unreadable { .. })));
+        assert!(matches!(import(b"not a mesh", format, &METRES), Err(MeshImportError::Unreadable { .. })));
     }
     let cut_short = &glb(&read_obj(CUBE).expect("a cube"))[..200];
     assert!(import(cut_short, MeshFormat::Gltf, &METRES).is_err());
-    assert_eq!(MeshFormat::from_extension("FBX"), Err(ImportError::Extension("fbx".into())));
-    let millimetres = ImportOptions { scale: -1.0, z_up: true };
-    assert_eq!(import(CUBE.as_bytes(), MeshFormat::Obj, &millimetres), Err(ImportError::Scale(-1.0)));
+    assert_eq!(MeshFormat::from_extension("FBX"), Err(MeshImportError::Extension("fbx".into())));
+    let millimetres = MeshImportOptions { scale: -1.0, z_up: true };
+    assert_eq!(import(CUBE.as_bytes(), MeshFormat::Obj, &millimetres), Err(MeshImportError::Scale(-1.0)));
 }
 
 #[test]
@@ -211,7 +211,7 @@ fn glb_accessors_of_other_types_and_outside_data_are_refused() {
     let actual = longer.len() + 4;
     longer.extend([0; 4]);
     let declared = actual - 4;
-    assert_eq!(import(&longer, MeshFormat::Gltf, &METRES), Err(ImportError::Length { declared, actual }));
+    assert_eq!(import(&longer, MeshFormat::Gltf, &METRES), Err(MeshImportError::Length { declared, actual }));
 }
 
 #[test]

@@ -8,14 +8,14 @@ use super::solid::CollisionGeometry;
 use crate::ids::{ArticulationId, BodyId};
 use softvt_geometry::{
     Aabb, Pose, Vec3,
-    shape::{Contact, Shape},
+    shape::{SampleContact, Shape},
 };
 
 /// The surface of a solid in its own frame, m. [`Shape`] implements it.
 pub trait ContactSurface: Debug + Send + Sync {
     /// Signed distance, outward normal and coverage for a square sample of edge `spacing` (m) at `p`
     /// with outward normal `facing`.
-    fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> Contact;
+    fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> SampleContact;
     /// True if a cheap test proves that the solid is more than `reach` (m) away from `p`; false leaves it open.
     fn is_farther(&self, _p: &Vec3, _reach: f64) -> bool {
         false
@@ -29,7 +29,7 @@ pub trait ContactSurface: Debug + Send + Sync {
 }
 
 impl ContactSurface for Shape {
-    fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> Contact {
+    fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> SampleContact {
         Self::contact(self, p, facing, spacing)
     }
 

@@ -44,7 +44,7 @@ const DEFAULT_PORT: u16 = 8000;
 
 /// Protocol of a policy server.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum Protocol {
+pub enum ServerProtocol {
     /// openpi: the server sends metadata first, then a chunk of actions per observation.
     #[default]
     #[value(help = None::<&str>)]
@@ -60,7 +60,7 @@ pub struct PolicyServer {
     /// `ws://host:port`, optionally with a path.
     pub url: String,
     /// Protocol.
-    pub protocol: Protocol,
+    pub protocol: ServerProtocol,
     /// Keys and units of observations and actions.
     pub profile: Profile,
     /// Time limit for connecting, greeting included, and for each response.

@@ -11,7 +11,7 @@ use std::{
 use rmpv::Value;
 
 use self::connection::PolicyConnection;
-pub use self::connection::{PolicyServer, Protocol};
+pub use self::connection::{PolicyServer, ServerProtocol};
 use super::{
     ActionChunk, EpisodeBrief, Observation, Policy, PolicyError, QueryId, SensorStreams, decode, encode,
     msgpack::{entry, kind},
@@ -55,8 +55,8 @@ impl PolicyConnections {
         let deadline = self.server.deadline();
         let mut connection = PolicyConnection::open(&self.server, deadline)?;
         match self.server.protocol {
-            Protocol::Openpi => greet_openpi(&mut connection, deadline)?,
-            Protocol::VlaEval => vla_eval::greet(&mut connection, deadline)?,
+            ServerProtocol::Openpi => greet_openpi(&mut connection, deadline)?,
+            ServerProtocol::VlaEval => vla_eval::greet(&mut connection, deadline)?,
         }
         Ok(connection)
     }
@@ -94,7 +94,7 @@ impl Policy for RemotePolicy {
 
     fn reset(&mut self, brief: &EpisodeBrief) -> Result<(), PolicyError> {
         let mut connection = self.connections.take()?;
-        if self.connections.server.protocol == Protocol::VlaEval {
+        if self.connections.server.protocol == ServerProtocol::VlaEval {
             let deadline = connection.server.deadline();
             vla_eval::start(&mut connection, brief, deadline)?;
         }
@@ -124,7 +124,7 @@ impl Policy for RemotePolicy {
         let mut current = self.connection.take();
         // openpi's servers keep no state of an episode: the connection can be replaced between two requests. Those that
         // observe every step do.
-        if protocol == Protocol::Openpi
+        if protocol == ServerProtocol::Openpi
             && !self.observes_every_step()
             && let Some(connection) = &mut current
             && !connection.is_open()?
@@ -134,8 +134,8 @@ impl Policy for RemotePolicy {
         let mut connection = current.map_or_else(|| self.connections.take(), Ok)?;
         self.query.step = step_of(observation);
         let chunk = match protocol {
-            Protocol::Openpi => infer_openpi(&mut connection, observation, &self.query),
-            Protocol::VlaEval => vla_eval::infer(&mut connection, observation, &self.query),
+            ServerProtocol::Openpi => infer_openpi(&mut connection, observation, &self.query),
+            ServerProtocol::VlaEval => vla_eval::infer(&mut connection, observation, &self.query),
         };
         self.query.query += 1;
         // After a failure a response may still be on its way: the connection is not used again.
@@ -150,9 +150,9 @@ impl Policy for RemotePolicy {
         let deadline = connection.server.deadline();
         match self.connections.server.protocol {
             // The reply that the last actions came from may have been that to an earlier observation.
-            Protocol::Openpi => connection.check_silence(deadline)?,
-            Protocol::VlaEval if vla_eval::end(&mut connection, deadline).is_err() => return Ok(()),
-            Protocol::VlaEval => {}
+            ServerProtocol::Openpi => connection.check_silence(deadline)?,
+            ServerProtocol::VlaEval if vla_eval::end(&mut connection, deadline).is_err() => return Ok(()),
+            ServerProtocol::VlaEval => {}
         }
         self.connections.put(connection);
         Ok(())

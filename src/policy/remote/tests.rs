@@ -78,7 +78,7 @@ fn policy_server(url: String, code: GripCode, timeout: Duration) -> PolicyServer
         actions: ActionEncoding::new(PoseEncoding::Absolute, gripper),
         observe_every_step: false,
     };
-    PolicyServer { url, protocol: Protocol::Openpi, profile, timeout, api_key: None, cancel: &CANCEL }
+    PolicyServer { url, protocol: ServerProtocol::Openpi, profile, timeout, api_key: None, cancel: &CANCEL }
 }
 
 fn observation() -> Observation {

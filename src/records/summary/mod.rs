@@ -21,7 +21,7 @@ const KAPPA_STEPS: u32 = 20;
 
 /// Success rates and deformation of a group of episodes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Scores {
+pub struct GroupScores {
     /// Number of episodes, valid or not.
     pub episodes: usize,
     /// Number of episodes that were invalid or could not be run.
@@ -126,7 +126,7 @@ pub struct TaskScores {
     pub asset: String,
     /// Scores of its episodes.
     #[serde(flatten)]
-    pub scores: Scores,
+    pub scores: GroupScores,
 }
 
 /// Scores of the episodes with one target asset.
@@ -138,7 +138,7 @@ pub struct AssetScores {
     pub d_ref: Option<f64>,
     /// Scores of its episodes.
     #[serde(flatten)]
-    pub scores: Scores,
+    pub scores: GroupScores,
 }
 
 /// Episode that its controller aborted.
@@ -212,7 +212,7 @@ pub struct SuiteSummary {
     pub commands: CommandCounts,
     /// Scores of all episodes together.
     #[serde(flatten)]
-    pub scores: Scores,
+    pub scores: GroupScores,
     /// Safety over κ from 0 to 1; empty where no target deforms.
     pub kappa: Vec<RatesAtKappa>,
     /// Scores by task, in order.
@@ -227,7 +227,7 @@ pub struct SuiteSummary {
     pub invalid_episodes: Vec<InvalidEpisode>,
 }
 
-impl Scores {
+impl GroupScores {
     /// Scores of `records`.
     pub fn from_records(records: &[&EpisodeRecord]) -> Self {
         let valid: Vec<_> = records.iter().copied().filter(|r| r.outcome.is_valid()).collect();
@@ -303,7 +303,7 @@ impl Scores {
     }
 }
 
-impl Scores {
+impl GroupScores {
     /// Adds the bootstrap intervals of the rates and of the mean D, stratified by task.
     fn add_bootstrap(&mut self, tasks: &BTreeMap<usize, Vec<&EpisodeRecord>>) {
         let outcomes = |test: fn(&EpisodeRecord) -> bool| -> Vec<Vec<bool>> {
@@ -333,12 +333,12 @@ impl SuiteSummary {
         records.sort_by_key(|r| r.header.id.index());
         let task_scores = |(task, group): (usize, Vec<&EpisodeRecord>)| {
             let (prompt, asset) = (group[0].header.prompt.clone(), group[0].header.asset.clone());
-            TaskScores { task, prompt, asset, scores: Scores::from_records(&group) }
+            TaskScores { task, prompt, asset, scores: GroupScores::from_records(&group) }
         };
         let asset_scores = |(asset, group): (String, Vec<&EpisodeRecord>)| {
             let tau = group.iter().find_map(|r| r.verdict.tau);
             let d_ref = group.iter().find_map(|r| r.verdict.d_ref);
-            (asset, AssetScores { tau, d_ref, scores: Scores::from_records(&group) })
+            (asset, AssetScores { tau, d_ref, scores: GroupScores::from_records(&group) })
         };
         let aborted = |r: &&EpisodeRecord| {
             let (task, episode) = (r.header.id.task, r.header.id.episode);
@@ -354,7 +354,7 @@ impl SuiteSummary {
             Some(InvalidEpisode { task, episode, reason })
         };
         let by_task = grouped(&records, |r| r.header.id.task);
-        let mut scores = Scores::from_records(&records);
+        let mut scores = GroupScores::from_records(&records);
         scores.add_bootstrap(&by_task);
         Self {
             suite: suite.into(),

@@ -5,7 +5,7 @@
 use maud::{Markup, Render, html};
 
 use crate::{
-    condition_effects::{ConditionEffects, Trend, TrendPoint},
+    condition_effects::{ConditionEffects, FactorTrend, TrendPoint},
     run_summary::RunSummary,
 };
 use softvt_common::text::{format_number, shortened};
@@ -285,7 +285,7 @@ fn mark(series: &Series, at: &str, height: f64) -> Markup {
     html! { rect x=(at) y=(y(height)) width=(MARK) height=(MARK) rx=(series.mark_radius) transform=(offset) {} }
 }
 
-fn trend_plot(trend: &Trend, unchanged: [Option<f64>; 2]) -> Markup {
+fn trend_plot(trend: &FactorTrend, unchanged: [Option<f64>; 2]) -> Markup {
     let points = &trend.points;
     let (low, high) = (points[0].value, points[points.len() - 1].value);
     let is_log = low > 0.0 && high / low >= LOG_RATIO;

@@ -13,7 +13,7 @@ use softvt_evaluation::{
     stage::TaskStage,
     statistics::{Distribution, Rate},
 };
-use softvt_records::summary::{EpisodeDeformation, Scores, TaskScores};
+use softvt_records::summary::{EpisodeDeformation, GroupScores, TaskScores};
 
 /// Number of columns, from the left, that hold text; the others hold numbers.
 pub(super) const TEXT_COLUMNS: usize = 2;
@@ -39,7 +39,7 @@ pub fn rate(rate: &Rate) -> String {
 }
 
 /// As [`rate`]; "N/A" for rigid suites and for what was never judged.
-fn soft_rate(run: &RunSummary, scores: &Scores, of: &Rate) -> String {
+fn soft_rate(run: &RunSummary, scores: &GroupScores, of: &Rate) -> String {
     let is_judged = of.rate.is_some() || scores.not_judged == 0;
     if run.is_soft() && is_judged { rate(of) } else { "N/A".to_owned() }
 }

@@ -70,7 +70,7 @@ pub enum EpisodeVideoError {
 
 /// Text below the panels of a video.
 #[derive(Clone, Debug)]
-pub struct Caption {
+pub struct VideoCaption {
     prompt: String,
     episode: String,
     verdict: String,
@@ -79,7 +79,7 @@ pub struct Caption {
     is_safe: bool,
 }
 
-impl Caption {
+impl VideoCaption {
     /// Describes a finished episode.
     pub fn new(record: &EpisodeRecord) -> Self {
         let (header, verdict) = (&record.header, &record.verdict);
@@ -108,7 +108,7 @@ impl Caption {
 /// A state cannot be rendered, the file cannot be written, or the call was cancelled.
 pub fn write_video(
     recording: &mut StateRecording,
-    caption: &Caption,
+    caption: &VideoCaption,
     path: &Path,
     threads: usize,
     is_cancelled: impl Fn() -> bool + Sync,
@@ -144,7 +144,7 @@ pub fn write_video(
 /// The state cannot be rendered, or the file cannot be written.
 pub fn write_video_frame(
     recording: &mut StateRecording,
-    caption: &Caption,
+    caption: &VideoCaption,
     index: usize,
     path: &Path,
 ) -> Result<(), EpisodeVideoError> {
@@ -156,7 +156,7 @@ pub fn write_video_frame(
 fn video_frame(
     sensors: &mut Sensors,
     recording: &StateRecording,
-    caption: &Caption,
+    caption: &VideoCaption,
     index: usize,
 ) -> Result<RgbImage, EpisodeVideoError> {
     let mut canvas = Canvas::new(WIDTH, HEIGHT, BACKGROUND);
@@ -186,7 +186,7 @@ fn draw_label(canvas: &mut Canvas, name: &str, x: u32, y: u32) {
     canvas.write(name, x + 16.0, y + 27.0, 19.0, [255, 255, 255]);
 }
 
-fn draw_caption(canvas: &mut Canvas, recording: &StateRecording, caption: &Caption, index: usize) {
+fn draw_caption(canvas: &mut Canvas, recording: &StateRecording, caption: &VideoCaption, index: usize) {
     let top = (CAMERA_PANEL + FINGER_PANEL) as f32;
     canvas.write(&caption.prompt, MARGIN, top + 28.0, 20.0, TEXT);
     let time = index as f64 * CONTROL_DT;
@@ -204,7 +204,7 @@ fn draw_caption(canvas: &mut Canvas, recording: &StateRecording, caption: &Capti
 fn draw_deformation_chart(
     canvas: &mut Canvas,
     recording: &StateRecording,
-    caption: &Caption,
+    caption: &VideoCaption,
     index: usize,
     y: f32,
 ) {

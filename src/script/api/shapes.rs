@@ -15,7 +15,7 @@ use crate::{
 use softvt_common::parallel::lock;
 use softvt_geometry::{
     Quat, Vec3,
-    import::{ImportError, ImportOptions, MeshFormat, import},
+    import::{MeshFormat, MeshImportError, MeshImportOptions, import},
     mass::mass_properties,
     shape::{Axis, Bumps, Ramp, Ridges, Shape, ShapeError, ShapeTreeSize, SurfaceRelief},
 };
@@ -199,9 +199,9 @@ functions! {
             // Fails before the mesh is built if it would not fit.
             drop(reserve(lua, MESH_BYTES_PER_FILE_BYTE * bytes.len())?);
             let extension = file.rsplit_once('.').map_or("", |(_, extension)| extension);
-            let refused = |error: ImportError| fail(lua, format!("softvt.mesh: {file}: {error}"));
+            let refused = |error: MeshImportError| fail(lua, format!("softvt.mesh: {file}: {error}"));
             let mesh = MeshFormat::from_extension(extension)
-                .and_then(|format| import(&bytes, format, &ImportOptions { scale, z_up }))
+                .and_then(|format| import(&bytes, format, &MeshImportOptions { scale, z_up }))
                 .map_err(refused)?;
             // A glTF mesh may occur in many nodes, so its size does not follow from that of the file.
             let needed = (MESH_BYTES_PER_FILE_BYTE * bytes.len()).max(BYTES_PER_TRIANGLE * mesh.triangles.len());

@@ -20,8 +20,8 @@ mod tests;
 
 pub use self::{
     elastic::{
-        ContactError, Gel, GelField, GelScratch, PadWrench, SkinMesh, SubstrateCompliance, TactileContact,
-        Taxels, patch_friction,
+        Gel, GelField, GelScratch, PadWrench, SkinMesh, SubstrateCompliance, TactileContact,
+        TactileContactError, Taxels, patch_friction,
     },
     image::{
         HISTORY_LENGTH, OpticsError, PolynomialOptics, TactileMosaicLayout, TaximOptics, mosaic, mosaic_cell,

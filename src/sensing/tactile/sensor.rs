@@ -5,7 +5,7 @@ use std::sync::Arc;
 use image::RgbImage;
 
 use super::{
-    elastic::{ContactError, Gel, GelField, GelScratch, TactileContact},
+    elastic::{Gel, GelField, GelScratch, TactileContact, TactileContactError},
     image::{OpticsError, PolynomialOptics, TaximOptics},
     markers::{MarkerStyle, Markers},
 };
@@ -126,7 +126,7 @@ impl TactileSensor {
         &self,
         contact: &TactileContact,
         scratch: &mut GelScratch,
-    ) -> Result<TactileReading, ContactError> {
+    ) -> Result<TactileReading, TactileContactError> {
         let field = GelField::solve(&self.gel, contact, scratch)?;
         let image = self.optics.render(&self.gel, field.as_ref());
         let markers = Markers::new(&self.gel, &self.markers, field.as_ref());

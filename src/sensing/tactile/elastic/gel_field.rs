@@ -61,7 +61,7 @@ pub struct GelField {
 /// Reasons why a contact has no field.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
-pub enum ContactError {
+pub enum TactileContactError {
     #[error("the pad is pressed with {force} N, but no skin is given")]
     NoSkin { force: f64 },
     #[error("the pad's {field} is {value}; expected a finite number{condition}")]
@@ -81,7 +81,7 @@ impl GelField {
         gel: &Gel,
         contact: &TactileContact,
         scratch: &mut GelScratch,
-    ) -> Result<Option<Self>, ContactError> {
+    ) -> Result<Option<Self>, TactileContactError> {
         validate(contact)?;
         let TactileContact { wrench, skins, friction, substrate } = contact;
         if wrench.normal() <= 0.0 {
@@ -94,7 +94,7 @@ impl GelField {
         }
         let mut height_map = HeightMap::new(gel, skins);
         if skins.is_empty() {
-            return Err(ContactError::NoSkin { force: wrench.normal() });
+            return Err(TactileContactError::NoSkin { force: wrench.normal() });
         }
         // A skin that passes outside the grid, such as a rim at the edge of the pad, leaves no imprint.
         let Some(normal) = solve_normal_contact(gel, &height_map.gaps(gel), wrench.normal(), scratch) else {
@@ -201,7 +201,7 @@ pub(in super::super) fn cubic_taps(position: f64) -> CubicTaps {
     CubicTaps { first: base as isize - 1, weights }
 }
 
-fn validate(contact: &TactileContact) -> Result<(), ContactError> {
+fn validate(contact: &TactileContact) -> Result<(), TactileContactError> {
     let TactileContact { wrench, friction, substrate, .. } = contact;
     let substrate = substrate.unwrap_or(SubstrateCompliance { modulus: 1.0, resolved: 1.0 });
     for (field, value, is_valid, condition) in [
@@ -214,7 +214,7 @@ fn validate(contact: &TactileContact) -> Result<(), ContactError> {
         ("substrate.resolved", substrate.resolved, substrate.resolved > 0.0, " above 0"),
     ] {
         if !(value.is_finite() && is_valid) {
-            return Err(ContactError::BadNumber { field, value, condition });
+            return Err(TactileContactError::BadNumber { field, value, condition });
         }
     }
     Ok(())

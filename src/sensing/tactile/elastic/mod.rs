@@ -17,7 +17,7 @@ pub(super) mod tests;
 
 pub use gel::{Gel, GelScratch};
 pub(super) use gel_field::cubic_taps;
-pub use gel_field::{ContactError, GelField, SubstrateCompliance, TactileContact};
+pub use gel_field::{GelField, SubstrateCompliance, TactileContact, TactileContactError};
 pub use height_map::SkinMesh;
 pub use pad_wrench::{PadWrench, Taxels, patch_friction};
 pub use tangential_contact::PlanarMotion;

@@ -4,7 +4,7 @@
 //! disc of 1.5 mm. Depth and outward displacement of the sphere are checked in `tests/validation/gel.rs`.
 
 use super::{
-    ContactError, Gel, GelField, GelScratch, PadWrench, SkinMesh, TactileContact, cubic_taps,
+    Gel, GelField, GelScratch, PadWrench, SkinMesh, TactileContact, TactileContactError, cubic_taps,
     gel::LayerKernels,
     gel_field::surface_displacement,
     tangential_contact::{TangentialSolution, solve_tangential_contact},
@@ -230,7 +230,7 @@ fn bad_contacts_are_named_and_no_force_is_no_contact() {
     assert!(run(PadWrench::default(), 1.5).expect("no force").is_none());
     let pressed = PadWrench::new(1.0, [0.0; 2], 0.0, [0.0; 2]);
     let error = run(pressed, 1.5).expect_err("no skin");
-    assert_eq!(error, ContactError::NoSkin { force: 1.0 });
+    assert_eq!(error, TactileContactError::NoSkin { force: 1.0 });
     assert!(run(PadWrench::new(f64::NAN, [0.0; 2], 0.0, [0.0; 2]), 1.5).is_err());
     let message = run(pressed, -0.1).expect_err("no friction").to_string();
     assert_eq!(message, "the pad's friction is -0.1; expected a finite number of at least 0");
