@@ -227,10 +227,10 @@
 ---@field open? number Value that opens the gripper; not for code = "force". Expects a number.
 ---@field closed? number Value that closes it; not for code = "force". Expects a number.
 ---@field code? "continuous"|"binary"|"two-width"|"force" What the value commands. continuous: a closure in proportion between open and closed, the default. binary: closed beyond the middle, else open. two-width: open, or the width that the answers give just after closing, held until one opens. force: a grip force in N at which closing stops; below 0 opens.
----@field latch? softvt.GripLatch For code = "binary": limits at which the gripper closes and opens, instead of the middle.
+---@field latch? softvt.GripHysteresis For code = "binary": limits at which the gripper closes and opens, instead of the middle.
 
 ---Hysteresis of a binary gripper, in the unit of the gripper's number.
----@class softvt.GripLatch
+---@class softvt.GripHysteresis
 ---@field close number Value from which on, towards that of the closed gripper, an answer closes. Expects a number.
 ---@field open number Value from which on, towards that of the open gripper, an answer opens. Expects a number.
 ---@field hold_steps? integer Control steps for which a change is kept, whatever is answered. Expects a whole number in 0..10000. Default 0.
@@ -274,7 +274,7 @@
 ---@field ended? string Why the sweep ended, if its last row does not tell.
 ---@field fingerprint? string Fingerprint of the calibrated asset, as softvt.fingerprint returns it. Results for another object of that name then do not use the calibration.
 ---@field holds table<string, any>[] Rows width_mm, closure, trials, held, slip_mm, d_peak_pct of the scan for the loose end.
----@field sweep table<string, any>[] Rows width_mm, closure, d_pct, force_n, strain_p95, min_det_f, node_speed_m_s, both_pads, slip_mm, stable of the compression sweep.
+---@field sweep table<string, any>[] Rows width_mm, closure, d_pct, d_v1_pct, force_n, strain_p95, min_det_f, node_speed_m_s, both_pads, slip_mm, stable of the compression sweep.
 ---@field variants? table<string, any>[] Presses at other sizes and stiffnesses: { scale, youngs_factor, rows }, with the rows width_mm, d_pct, force_n, strain_p95.
 
 ---Returns the safe window of an instance of a calibrated asset; nil without a window. Experts see the factors as fields of their objects.
@@ -941,11 +941,11 @@ local Solid = {}
 ---@param axis_angle? number[]
 function Solid:move_to(position, axis_angle) end
 
----Deformation of a body against its reference shape, in percent of the diagonal of its bounding box.
+---Deformation of a body against its reference shape, in percent of the diagonal of its bounding box along its own axes.
 ---@class softvt.Deformation
----@field rms_pct number Root mean square over the nodes.
----@field weighted_pct number The same, weighted by mass.
----@field max_pct number Largest displacement.
+---@field rms_pct number D: root mean square of the displacement over the volume.
+---@field max_pct number Largest displacement of a node.
+---@field v1_rms_pct number D as SoftVTBench's released code defines it: all nodes alike, the box along the axes of the world.
 local Deformation = {}
 
 ---A settled scene with the robot.
@@ -1001,6 +1001,7 @@ function Simulation:tool() end
 ---@field slip_mm number[]? Distance that a movable object has slid on the left and the right pad, mm.
 ---@field d_pct number? Deformation D of a soft body, %.
 ---@field d_peak_pct number? Largest D since settling, %.
+---@field d_peak_v1_pct number? The same by SoftVTBench's definition of D, %.
 ---@field min_det_f number? Minimum det F of a filled element of a soft body.
 ---@field asleep boolean? True if a soft body sleeps.
 local Measurements = {}
