@@ -201,6 +201,11 @@ impl ProfileArgs {
 }
 
 impl PolicyArgs {
+    /// True if a policy was named.
+    pub(crate) fn is_given(&self) -> bool {
+        self.policy.is_some()
+    }
+
     /// The policy and its options.
     pub(crate) fn options(&self) -> PolicyOptions {
         PolicyOptions {

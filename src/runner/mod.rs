@@ -19,6 +19,7 @@ pub mod import;
 mod limits;
 mod observer;
 mod policy;
+pub mod policy_check;
 pub mod rates;
 mod record;
 mod recorded_runs;

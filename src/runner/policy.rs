@@ -489,6 +489,29 @@ impl PolicyConfig {
         }
     }
 
+    /// Connections to the server of the policy, if it has one. They are opened on demand.
+    pub(crate) fn connections(&self) -> Option<Arc<PolicyConnections>> {
+        self.server().map(|server| Arc::new(PolicyConnections::new(server.clone())))
+    }
+
+    /// Starts the policy for an episode, if it answers observations with chunks of actions.
+    ///
+    /// # Errors
+    /// The script of a policy in Lua fails.
+    pub(crate) fn start(
+        &self,
+        connections: Option<&Arc<PolicyConnections>>,
+        opened: &EpisodeSetup,
+        brief: &EpisodeBrief,
+    ) -> Result<Option<Box<dyn Policy>>, RunError> {
+        Ok(match (&self.kind, connections) {
+            (PolicyKind::Server(_), Some(connections)) => Some(Box::new(RemotePolicy::new(connections.clone()))),
+            (PolicyKind::Rust(start), _) => Some(start.0(brief)),
+            (PolicyKind::Lua(file), _) => Some(Box::new(file.start(&opened.seed, self.gripper)?)),
+            _ => None,
+        })
+    }
+
     /// A factory of controllers for the episodes of a suite; `connections` lead to its server.
     pub(crate) fn controller_factory(
         &self,
@@ -496,40 +519,35 @@ impl PolicyConfig {
         suite: &str,
         is_rigid_twin: bool,
     ) -> ControllerFactory {
-        let (kind, suite) = (self.kind.clone(), suite.to_owned());
-        let (replan, gripper) = (self.replan.unwrap_or(usize::MAX), self.gripper);
+        let (policy, suite) = (self.clone(), suite.to_owned());
+        let replan = self.replan.unwrap_or(usize::MAX);
         Box::new(move |opened, brief| {
             let chunked = |policy: Box<dyn Policy>, replan| -> Box<dyn Controller> {
                 Box::new(ChunkedPolicy::new(policy, brief.clone(), replan))
             };
-            Ok(match (&kind, &connections) {
-                (PolicyKind::Server(_), Some(connections)) => {
-                    chunked(Box::new(RemotePolicy::new(connections.clone())), replan)
-                }
-                (PolicyKind::Recorded(runs), _) => {
+            if let Some(started) = policy.start(connections.as_ref(), &opened, &brief)? {
+                return Ok(chunked(started, replan));
+            }
+            Ok(match &policy.kind {
+                PolicyKind::Recorded(runs) => {
                     let actions = runs.actions(&suite, is_rigid_twin, &brief)?;
                     chunked(Box::new(RecordedPolicy::from_actions(&actions, None)), 1)
                 }
-                (PolicyKind::Rust(start), _) => chunked(start.0(&brief), replan),
-                (PolicyKind::Lua(file), _) => {
-                    let policy = file.start(&opened.seed, gripper)?;
-                    chunked(Box::new(policy), replan)
-                }
-                (PolicyKind::Builtin(BuiltinPolicy::Noop), _) => {
-                    chunked(Box::<builtin::NoopPolicy>::default(), 1)
-                }
-                (PolicyKind::Builtin(BuiltinPolicy::Random), _) => {
+                PolicyKind::Builtin(BuiltinPolicy::Noop) => chunked(Box::<builtin::NoopPolicy>::default(), 1),
+                PolicyKind::Builtin(BuiltinPolicy::Random) => {
                     let seed = rand::RngCore::next_u64(&mut opened.seed.stream(RandomStream::Script));
                     chunked(Box::new(builtin::RandomPolicy::new(seed)), 1)
                 }
-                (PolicyKind::Builtin(expert), _) => {
+                PolicyKind::Builtin(expert) => {
                     let mode = expert.grip_mode().unwrap_or(GripMode::Commanded);
                     Box::new(expert_controller(opened, mode)?)
                 }
                 // The provider of the actions replaces this factory.
-                (PolicyKind::External | PolicyKind::Client(_) | PolicyKind::Server(_), _) => {
-                    chunked(Box::new(RecordedPolicy::new(Vec::new(), None)), 1)
-                }
+                PolicyKind::External
+                | PolicyKind::Client(_)
+                | PolicyKind::Server(_)
+                | PolicyKind::Lua(_)
+                | PolicyKind::Rust(_) => chunked(Box::new(RecordedPolicy::new(Vec::new(), None)), 1),
             })
         })
     }

@@ -95,11 +95,23 @@ pub struct SecretFile {
 }
 
 impl StoredManifest<'_> {
-    /// Simulates an episode again. The policy fields of the result are copied from `record`.
+    /// Simulates an episode again by its `actions`. The policy fields of the result are copied from `record`.
     ///
     /// # Errors
     /// The scripts have changed since, or the episode cannot be run.
     fn simulate(&self, record: &EpisodeRecord, actions: Vec<Action>) -> Result<EpisodeRecord, RunError> {
+        Ok(with_policy_fields(self.simulate_with(record, replay_factory(actions, record))?, record))
+    }
+
+    /// Simulates an episode again with other controllers.
+    ///
+    /// # Errors
+    /// The scripts have changed since, or the episode cannot be run.
+    fn simulate_with(
+        &self,
+        record: &EpisodeRecord,
+        controllers: ControllerFactory,
+    ) -> Result<EpisodeRecord, RunError> {
         let index = record.header.id.index();
         let config = self.config(index.task)?;
         let ConfiguredScript { config, script: loaded } = config.load()?;
@@ -108,13 +120,13 @@ impl StoredManifest<'_> {
         let job = EpisodeJob { task: tasks[0], episode: index.episode };
         let run = SuiteRun {
             split: self.split()?,
-            controllers: replay_factory(actions, record),
+            controllers,
             origins: record.header.origin.iter().map(|origin| (index, (**origin).clone())).collect(),
             ..SuiteRun::new(&config, &loaded, suite, EpisodeList::listed(vec![job]), PathBuf::new())?
         };
         let run = run.prepare()?;
         self.check_sources(&run)?;
-        Ok(with_policy_fields(run.run_episode(job, false, &run.controllers)?.record, record))
+        Ok(run.run_episode(job, false, &run.controllers)?.record)
     }
 
     fn text(&self, field: &str) -> &str {
@@ -300,18 +312,30 @@ pub fn simulate_demos(demos: &[DemoRef], observer: &Arc<dyn Observer>) -> Result
     Ok(replays.into_values().collect())
 }
 
-fn replay_demo(demo: &DemoRef, observer: &Arc<dyn Observer>) -> Result<DemoReplay, RunError> {
+/// Simulates the episode of a demonstration with the controllers that `controllers` makes from its actions.
+///
+/// # Errors
+/// The demonstration cannot be read or simulated.
+pub(crate) fn simulate_demo_with(
+    demo: &DemoRef,
+    observer: &Arc<dyn Observer>,
+    controllers: impl FnOnce(Vec<Action>) -> ControllerFactory,
+) -> Result<EpisodeRecord, RunError> {
     let file = TaskFile::open(&demo.file)?;
-    let record = file.record(demo.demo)?;
-    let environment = file.environment()?;
-    let actions = file.actions(demo.demo)?;
+    let (record, environment) = (file.record(demo.demo)?, file.environment()?);
     let stored = StoredManifest {
         path: &demo.file,
         manifest: &environment["env_kwargs"],
         secret: None,
         observer: observer.clone(),
     };
-    let simulated = stored.simulate(&record, actions)?;
+    stored.simulate_with(&record, controllers(file.actions(demo.demo)?))
+}
+
+fn replay_demo(demo: &DemoRef, observer: &Arc<dyn Observer>) -> Result<DemoReplay, RunError> {
+    let record = TaskFile::open(&demo.file)?.record(demo.demo)?;
+    let simulated = simulate_demo_with(demo, observer, |actions| replay_factory(actions, &record))?;
+    let simulated = with_policy_fields(simulated, &record);
     Ok(DemoReplay {
         difference: difference(&record, &simulated)?,
         goal_reached: simulated.verdict.goal,

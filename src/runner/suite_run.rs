@@ -111,8 +111,7 @@ impl<'a> SuiteRun<'a> {
                 .map_err(|error| config.error_of("shifts", "", error))?;
         }
         let replay_source = find_replay_source(config, suite, &jobs)?;
-        let connections =
-            config.policy.server().map(|server| Arc::new(PolicyConnections::new(server.clone())));
+        let connections = config.policy.connections();
         Ok(Self {
             config,
             loaded,
@@ -557,7 +556,7 @@ pub(crate) fn find_replay_source(
 }
 
 /// Converts the error of a policy server.
-fn policy_failure(error: PolicyError) -> RunError {
+pub(crate) fn policy_failure(error: PolicyError) -> RunError {
     match error {
         PolicyError::Interrupted => RunError::input(error),
         PolicyError::Address { url, problem } => {

@@ -22,6 +22,7 @@ mod judging;
 mod lerobot_export;
 mod observations;
 mod policies;
+mod policy_check;
 mod policy_servers;
 mod reports;
 mod script_timeouts;

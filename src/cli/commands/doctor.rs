@@ -1,18 +1,67 @@
-//! `softvt doctor`: versions, the machine, and a comparison of the physics with the published bits.
+//! `softvt doctor`: versions, the machine, and a comparison of the physics with the published bits; or a comparison of a
+//! policy with demonstrations.
 
-use std::{path::Path, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use clap::Args;
 
 use crate::{
+    args::PolicyArgs,
     error::{CliError, Exit},
-    output::{Console, print},
+    output::{Console, print, print_json},
 };
-use softvt_runner::{GoldenEpisode, thread_count};
+use softvt_runner::{
+    GoldenEpisode, Observer, PolicyConfig, policy_check::check_policy, stored_folder::enter_for_dataset,
+    thread_count,
+};
 
-/// Prints versions and runs the golden episode.
+/// Check the installation with a golden episode, or a policy against demonstrations
+#[derive(Args, Clone, Debug)]
+pub(crate) struct DoctorArgs {
+    #[command(flatten)]
+    policy: PolicyArgs,
+    /// Recorded demonstrations: their observations are sent to the policy, and its answers compared with their actions
+    #[arg(long, value_name = "DIR", requires = "policy")]
+    dataset: Option<PathBuf>,
+    /// Number of demonstrations, spread over the dataset
+    #[arg(long, value_name = "N", default_value_t = 3, requires = "dataset")]
+    demos: usize,
+    /// Print the comparison as JSON
+    #[arg(long, requires = "dataset")]
+    json: bool,
+}
+
+/// Checks the installation, or a policy.
 ///
 /// # Errors
-/// The golden episode cannot be run, or ends in another state than the published one.
-pub(super) fn run() -> Result<(), CliError> {
+/// The golden episode cannot be run, or ends in another state than the published one. The policy cannot be run, or (exit code
+/// 3) its answers do not agree with the demonstrations.
+pub(super) fn run(args: &DoctorArgs) -> Result<(), CliError> {
+    match (&args.dataset, args.policy.is_given()) {
+        (Some(dataset), _) => check_answers(args, dataset),
+        (None, true) => Err(CliError::input(
+            "--policy needs --dataset DIR: a folder of softvt record, with whose demonstrations its answers are compared",
+        )),
+        (None, false) => check_installation(),
+    }
+}
+
+fn check_answers(args: &DoctorArgs, dataset: &Path) -> Result<(), CliError> {
+    let observer: Arc<dyn Observer> = Arc::new(Console::default());
+    let policy = PolicyConfig::load(&args.policy.options())?;
+    let check = check_policy(&policy, &enter_for_dataset(dataset, &*observer)?, args.demos, &observer)?;
+    if args.json { print_json(&check)? } else { print(&check.text())? }
+    match check.findings.is_empty() {
+        true => Ok(()),
+        false => Err(CliError::new(Exit::Policy, "the answers of the policy do not agree with the demonstrations")),
+    }
+}
+
+/// Prints versions and runs the golden episode.
+fn check_installation() -> Result<(), CliError> {
     print(&format!(
         "softvt     {}\nplatform   {} {}, {} threads\nfeatures   {}\nlua        5.4, embedded\n",
         env!("CARGO_PKG_VERSION"),

@@ -39,8 +39,7 @@ pub(crate) enum Command {
     List(list::ListArgs),
     Init(init::InitArgs),
     Bench(bench::BenchArgs),
-    /// Check the installation and run a golden episode
-    Doctor,
+    Doctor(Box<doctor::DoctorArgs>),
 }
 
 impl Command {
@@ -59,7 +58,7 @@ impl Command {
             Self::List(args) => list::run(&args),
             Self::Init(args) => init::run(&args),
             Self::Bench(args) => bench::run(&args),
-            Self::Doctor => doctor::run(),
+            Self::Doctor(args) => doctor::run(&args),
         }
     }
 
