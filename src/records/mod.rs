@@ -6,6 +6,7 @@
 #![warn(missing_docs, unreachable_pub)]
 
 pub mod paired_stats;
+pub mod paired_tests;
 pub mod record;
 pub mod record_check;
 pub mod requirement;

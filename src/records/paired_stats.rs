@@ -8,7 +8,10 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::record::EpisodeRecord;
+use super::{
+    paired_tests::{e_value, mcnemar, signed_rank},
+    record::EpisodeRecord,
+};
 use softvt_common::episode_id::EpisodeId;
 use softvt_evaluation::{
     stage::TaskStage,
@@ -258,9 +261,13 @@ pub struct PairedDifference {
     /// episodes (Efron, 1979), from a fixed seed, null for fewer than
     /// [`MIN_BOOTSTRAP_VALUES`](softvt_evaluation::statistics::MIN_BOOTSTRAP_VALUES) episodes.
     pub interval95: Option<[f64; 2]>,
-    /// Exact two-sided p-value of McNemar's test of a rate (binomial on the episodes that differ); absent for a mean.
+    /// Two-sided p-value: of McNemar's exact test for a rate, of Wilcoxon's signed-rank test for a mean (null if no episode
+    /// differs). It is valid for a number of episodes that was chosen before the run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub p: Option<f64>,
+    /// E-value of a rate ([`e_value`]), valid at any time of the run; absent for a mean.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub e: Option<f64>,
 }
 
 impl PairedDifference {
@@ -285,6 +292,7 @@ impl PairedDifference {
             difference: (n > 0).then(|| points((better as f64 - worse as f64) / n as f64)),
             interval95: (n > 0).then(|| agresti_min(n, better, worse).map(points)),
             p: Some(mcnemar(better, worse)),
+            e: Some(e_value(better, worse)),
         }
     }
 
@@ -309,7 +317,8 @@ impl PairedDifference {
             same: differences.len() - better - worse,
             difference: mean(&differences),
             interval95: stratified_bootstrap(std::slice::from_ref(&differences)),
-            p: None,
+            p: signed_rank(&differences),
+            e: None,
         }
     }
 }
@@ -321,16 +330,6 @@ fn agresti_min(n: usize, better: usize, worse: usize) -> [f64; 2] {
     let centre = (b - c) / n;
     let half = Z95 * ((b + c) - (b - c) * (b - c) / n).sqrt() / n;
     [centre - half, centre + half]
-}
-
-/// Exact two-sided p-value of McNemar's test: `better` against `worse` under equal probabilities.
-fn mcnemar(better: usize, worse: usize) -> f64 {
-    let n = better + worse;
-    let fewer = better.min(worse);
-    // Binomial terms by their logarithms: n may be thousands.
-    let ln_choose = |k: usize| (1..=k).map(|i| ((n - k + i) as f64 / i as f64).ln()).sum::<f64>();
-    let tail: f64 = (0..=fewer).map(|k| (ln_choose(k) - n as f64 * std::f64::consts::LN_2).exp()).sum();
-    (2.0 * tail).min(1.0)
 }
 
 #[cfg(test)]

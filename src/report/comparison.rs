@@ -53,7 +53,7 @@ pub struct Comparison {
     /// Policy of the second run.
     pub second: String,
     /// Headings of both runs: their policies, or their folders if the policies have one name.
-    pub headings: [String; 2],
+    pub headings: Vec<String>,
     /// True if any target deforms.
     pub deformable: bool,
     /// Number of episodes present in only one run.
@@ -110,7 +110,7 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
     Ok(Comparison {
         first: policies(first),
         second: policies(second),
-        headings: headings(first, second),
+        headings: names(&[first, second]),
         deformable: pairs.iter().any(|pair| pair.first.header.soft),
         unpaired: count(first) + count(second) - 2 * pairs.len(),
         differing_fields: differing_fields(first, second),
@@ -152,12 +152,12 @@ fn with_twins_paired(first: &[StoredRun], second: &[StoredRun]) -> ([Vec<StoredR
     (sides, pairing)
 }
 
-fn records(runs: &[StoredRun]) -> impl Iterator<Item = &EpisodeRecord> {
+pub(super) fn records(runs: &[StoredRun]) -> impl Iterator<Item = &EpisodeRecord> {
     runs.iter().flat_map(|run| &run.records)
 }
 
 /// Checks that no episode occurs twice, since one of the two would be ignored.
-fn check_unique(runs: &[StoredRun]) -> Result<(), CompareError> {
+pub(super) fn check_unique(runs: &[StoredRun]) -> Result<(), CompareError> {
     let mut known = BTreeMap::new();
     for run in runs {
         let dir = || run.dir.display().to_string();
@@ -186,7 +186,7 @@ fn seed_hash(run: &StoredRun) -> String {
 }
 
 /// The error about two runs without common episodes, with the property in which they differ.
-fn no_common_episode(first: &[StoredRun], second: &[StoredRun]) -> CompareError {
+pub(super) fn no_common_episode(first: &[StoredRun], second: &[StoredRun]) -> CompareError {
     type Property = fn(&StoredRun) -> String;
     let properties: [(&str, Property); 5] = [
         ("suite", |run| run.suite().to_owned()),
@@ -219,26 +219,27 @@ fn policies(runs: &[StoredRun]) -> String {
     joined(&runs.iter().map(label).collect())
 }
 
-/// Names of both runs that differ, for the headings of their columns.
-fn headings(first: &[StoredRun], second: &[StoredRun]) -> [String; 2] {
-    let sides = [first, second];
-    let policies = sides.map(|runs| joined(&runs.iter().map(|run| run.text("policy").to_owned()).collect()));
+/// Names of folders with runs that differ: their policies, or their own names.
+pub(super) fn names(folders: &[impl AsRef<[StoredRun]>]) -> Vec<String> {
+    let policy = |runs: &[StoredRun]| joined(&runs.iter().map(|run| run.text("policy").to_owned()).collect());
+    let policies: Vec<String> = folders.iter().map(|runs| policy(runs.as_ref())).collect();
     let folder = |runs: &[StoredRun]| match runs {
         [run] => run.dir.clone(),
         // The runs of several suites are in one folder.
         _ => runs.first().and_then(|run| run.dir.parent()).map_or_else(PathBuf::new, Path::to_owned),
     };
     let name = |path: PathBuf| path.file_name().map(|name| name.to_string_lossy().into_owned());
-    let folders = sides.map(|runs| name(folder(runs)).unwrap_or_default());
-    let both = ["first", "second"].map(str::to_owned);
-    [policies, folders].into_iter().find(|[a, b]| a != b).unwrap_or(both)
+    let own: Vec<String> = folders.iter().map(|runs| name(folder(runs.as_ref())).unwrap_or_default()).collect();
+    let differ = |names: &&Vec<String>| names.iter().collect::<BTreeSet<_>>().len() == names.len();
+    let numbered = || (1..=folders.len()).map(|number| format!("run {number}")).collect();
+    [&policies, &own].into_iter().find(differ).cloned().unwrap_or_else(numbered)
 }
 
 /// Fields of `run.json` about the conditions of a run in which two runs of one suite differ. Of files and limits, those
 /// that both runs read are compared, since a run of fewer tasks reads fewer; the differing ones follow in brackets.
 fn differing_fields(first: &[StoredRun], second: &[StoredRun]) -> Vec<String> {
-    const CONDITION_FIELDS: [&str; 8] =
-        ["softvt", "twin", "variation", "shifts", "options", "settings", "sources", "thresholds"];
+    const CONDITION_FIELDS: [&str; 9] =
+        ["softvt", "metric_id", "twin", "variation", "shifts", "options", "settings", "sources", "thresholds"];
     /// Fields with an entry per file or asset.
     const KEYED_FIELDS: [&str; 2] = ["sources", "thresholds"];
     let mut found = BTreeSet::new();
@@ -286,7 +287,7 @@ pub fn table(comparison: &Comparison) -> String {
         counted(comparison.all.pairs, "paired episode")
     ));
     table.rule();
-    let [first, second] = comparison.headings.each_ref().map(|name| shortened(name, HEADING_WIDTH));
+    let [first, second] = [0, 1].map(|side| shortened(&comparison.headings[side], HEADING_WIDTH));
     push_headings(&mut table, "", &first, &second);
     let push = |table: &mut TextTable, name: &str, differences: &PairedComparison| {
         push_rates(table, name, differences);
@@ -311,6 +312,7 @@ pub fn table(comparison: &Comparison) -> String {
     table.line(LEGEND);
     table.line("Goal is TSR · DSR: goal with D within τ · failed: better where more stages were completed");
     table.line("N/A: no pair of episodes has it in both runs");
+    table.line(e_values(&comparison.all));
     if comparison.all.invalid_pairs > 0 {
         table.line(format!(
             "{} with an invalid episode: failed in success rates; without D, time over τ and volumes",
@@ -401,7 +403,7 @@ fn push_stages(table: &mut TextTable, stages: &PairedStages) {
 }
 
 /// Legend of the rows.
-pub(super) const LEGEND: &str = "diff.: right minus left · 95 % intervals: Agresti and Min for rates, bootstrap for D (n ≥ 10)\nbetter, worse: number of episodes; a lower D is better · p: McNemar's exact test";
+pub(super) const LEGEND: &str = "diff.: right minus left · 95 % intervals: Agresti and Min for rates, bootstrap for D (n ≥ 10)\nbetter, worse: number of episodes; a lower D is better · p: McNemar's exact test of rates,\nWilcoxon's signed-rank test of other measures";
 
 /// Appends the column headings, with `name` above the names of the rows.
 pub(super) fn push_headings(table: &mut TextTable, name: &str, first: &str, second: &str) {
@@ -438,6 +440,18 @@ pub(super) fn push_difference(
         paired.worse.to_string(),
     ];
     table.row(cells.into_iter().chain(paired.p.map(probability)));
+}
+
+/// The e-values of the rates, which a reader who watches a run may use.
+fn e_values(paired: &PairedComparison) -> String {
+    let rates = [("Goal", paired.goal), ("NoDrop", paired.no_drop), ("Safety", paired.safety)];
+    let known = rates.iter().filter_map(|(name, rate)| Some(format!("{name} {}", e_value_text(rate.e?))));
+    let known: Vec<String> = known.collect();
+    format!("e-values: {} · 20 is 5 %, also if runs are continued until then", known.join(", "))
+}
+
+fn e_value_text(e: f64) -> String {
+    if e >= 1e4 { format!("{e:.1e}") } else { format!("{e:.2}") }
 }
 
 /// A p-value with three decimals.

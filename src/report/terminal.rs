@@ -5,6 +5,7 @@ use softvt_evaluation::{
     safety::KAPPAS,
     statistics::{Distribution, Rate},
 };
+use softvt_records::paired_tests::{MIN_DISCORDANT, Resolution};
 use softvt_records::summary::{
     AbortedEpisode, CommandCounts, EpisodeDeformation, GroupScores, InvalidEpisode, SuiteSummary, TauRange,
 };
@@ -53,6 +54,7 @@ pub fn table(summary: &SuiteSummary) -> String {
     push_rates(&mut table, summary);
     push_harm_and_stages(&mut table, scores);
     push_notes(&mut table, summary);
+    table.line(resolution(scores));
     table.text
 }
 
@@ -156,6 +158,19 @@ fn push_harm_and_stages(table: &mut TextTable, scores: &GroupScores) {
     if !scores.failed_stages.is_empty() {
         let stages = scores.failed_stages.iter().map(|(stage, count)| format!("{} {count}", stage.name()));
         push_named(table, "Failed while", &stages.collect::<Vec<_>>().join(" · "));
+    }
+}
+
+/// What the number of episodes can separate.
+fn resolution(scores: &Scores) -> String {
+    let rate = scores.safety_success_rate.rate.or(scores.goal_success_rate.rate).unwrap_or(0.0);
+    let n = scores.episodes;
+    let episodes = counted(n, "episode");
+    match Resolution::new((0.01 * rate * n as f64).round() as usize, n) {
+        Some(Resolution { smallest, found }) => format!(
+            "{episodes} separate policies whose rates differ by {smallest:.1} points at least, and in 4 of 5 cases by {found:.0}"
+        ),
+        None => format!("{episodes} cannot separate two policies: {MIN_DISCORDANT} are needed at least"),
     }
 }
 

@@ -14,6 +14,7 @@ use softvt_benchmark::{
 };
 use softvt_common::files;
 use softvt_dataset::card::ImportedFile;
+use softvt_evaluation::deformation::METRIC_ID;
 use softvt_policy::profile::{GripCode, Profile};
 use softvt_report::{
     run_folder::{RUN, RunFolder},
@@ -85,6 +86,8 @@ pub(crate) struct RunManifest<'a> {
     settings: &'a Settings,
     /// SHA-256 of files by name.
     sources: BTreeMap<String, String>,
+    /// Definition of D and of its limits.
+    metric_id: &'static str,
     /// τ by asset, %.
     thresholds: BTreeMap<String, Option<f64>>,
     /// True if the policy observes the true forces on the pads.
@@ -127,6 +130,7 @@ impl<'a> RunManifest<'a> {
             set: &config.settings,
             settings: &run.settings,
             sources: run.sources.clone(),
+            metric_id: METRIC_ID,
             thresholds: run.calibrations.tau_pct.clone(),
             force_observed: run.force_observed,
         }

@@ -11,7 +11,8 @@ use crate::{
 };
 use softvt_common::files;
 use softvt_report::{
-    comparison, page,
+    comparison, leaderboard, page,
+    policy_ranking::PolicyRanking,
     run_summary::summarize_runs,
     shard_merge, stored_run,
     tables::{ResultTable, all_tables},
@@ -22,7 +23,7 @@ use softvt_report::{
 const LATEX_HEADER: &str =
     "% Needs \\usepackage{booktabs}; of names in other alphabets, LuaLaTeX or XeLaTeX.\n";
 
-/// Write an HTML page about runs, and its tables as Markdown and LaTeX
+/// Write an HTML page about runs, its tables as Markdown and LaTeX, and a JSON row per run
 #[derive(Args, Debug)]
 pub(crate) struct ReportArgs {
     /// Run folders, or folders that contain run folders
@@ -33,15 +34,12 @@ pub(crate) struct ReportArgs {
     out: PathBuf,
 }
 
-/// Compare two runs of the same episodes, episode by episode
+/// Compare runs of the same episodes, episode by episode
 #[derive(Args, Debug)]
 pub(crate) struct CompareArgs {
-    /// Run folder, or a folder that contains run folders
-    #[arg(value_name = "A")]
-    first: PathBuf,
-    /// The other run folder
-    #[arg(value_name = "B")]
-    second: PathBuf,
+    /// Run folders, or folders that contain run folders: two in detail, more in one table
+    #[arg(value_name = "RUN", required = true, num_args = 2..)]
+    runs: Vec<PathBuf>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -58,7 +56,7 @@ pub(crate) struct MergeArgs {
     shards: Vec<PathBuf>,
 }
 
-/// Writes `report.html`, `report.md` and `report.tex`.
+/// Writes `report.html`, `report.md`, `report.tex` and `report.jsonl`.
 ///
 /// # Errors
 /// A folder without a run, or a file that cannot be written.
@@ -78,6 +76,7 @@ pub(super) fn report(args: &ReportArgs) -> Result<(), CliError> {
         ("report.html", page::page(&summaries, &args.out)),
         ("report.md", joined(ResultTable::markdown)),
         ("report.tex", LATEX_HEADER.to_owned() + &joined(ResultTable::latex)),
+        ("report.jsonl", leaderboard::rows(&summaries)),
     ] {
         files::replace(&args.out.join(name), text)?;
     }
@@ -85,18 +84,18 @@ pub(super) fn report(args: &ReportArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Prints the paired differences of the runs in the second folder from those in the first.
+/// Prints the paired differences of the runs in the second folder from those in the first, or the ranking of more folders.
 ///
 /// # Errors
 /// A folder without a run or with two of one suite, or no common episode.
 pub(super) fn compare(args: &CompareArgs) -> Result<(), CliError> {
-    let first = stored_run::load(&args.first)?;
-    let second = stored_run::load(&args.second)?;
-    let compared = comparison::compare(&first, &second)?;
-    match args.json {
-        true => print_json(&compared),
-        false => print(&comparison::table(&compared)),
+    let folders = args.runs.iter().map(|dir| stored_run::load(dir)).collect::<Result<Vec<_>, _>>()?;
+    if let [first, second] = &folders[..] {
+        let compared = comparison::compare(first, second)?;
+        return if args.json { print_json(&compared) } else { print(&comparison::table(&compared)) };
     }
+    let ranking = PolicyRanking::new(&folders)?;
+    if args.json { print_json(&ranking) } else { print(&ranking.table()) }
 }
 
 /// Merges shards into a new folder and prints the tables of the merged runs.

@@ -1,0 +1,107 @@
+//! One JSON row per run, for leaderboards.
+
+use serde::Serialize;
+use serde_json::Value;
+
+use super::run_summary::RunSummary;
+use softvt_evaluation::statistics::Rate;
+use softvt_records::summary::SuiteSummary;
+
+/// The results of one run, and all that they depend on.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+struct LeaderboardRow<'a> {
+    benchmark: &'static str,
+    /// Version of softvt that made the run.
+    version: &'a Value,
+    suite: &'a str,
+    /// What a safe grip needs besides the kind of the object.
+    needs: &'a Value,
+    policy: &'a str,
+    /// Policy, its privileged inputs and changes of the suite.
+    method: &'a str,
+    /// True if the policy had the true state.
+    privileged: bool,
+    /// True if it had the true forces on the pads.
+    force_observed: bool,
+    /// Base seed; null in a judged run, whose `seed_hash` is given.
+    seed: &'a Value,
+    seed_hash: &'a Value,
+    split: &'a Value,
+    shifts: &'a Value,
+    settings_changed: &'a Value,
+    /// True if the run is not finished.
+    partial: bool,
+    tasks: usize,
+    episodes: usize,
+    invalid: usize,
+    /// Rates in %, with 95 % Wilson intervals.
+    goal: Rate,
+    no_drop: Rate,
+    safety: Rate,
+    dsr: Option<Rate>,
+    contact_safety: Rate,
+    /// Definition of D.
+    metric_id: &'a Value,
+    /// Median of the peak of D, %.
+    d_peak_median: Option<f64>,
+    /// Median of the largest force on a pad over the least that holds the object.
+    grip_ratio_median: Option<f64>,
+}
+
+impl<'a> LeaderboardRow<'a> {
+    fn new(run: &'a RunSummary) -> Self {
+        let RunSummary { run, summary, method } = run;
+        let SuiteSummary { scores, .. } = summary;
+        let field = |name: &str| &run.manifest[name];
+        Self {
+            benchmark: "softvt",
+            version: field("softvt"),
+            suite: &summary.suite,
+            needs: field("needs"),
+            policy: &summary.policy,
+            method,
+            privileged: summary.privileged,
+            force_observed: summary.force_observed,
+            seed: field("seed"),
+            seed_hash: field("seed_hash"),
+            split: field("split"),
+            shifts: field("shifts"),
+            settings_changed: field("set"),
+            partial: run.is_partial(),
+            tasks: summary.by_task.len(),
+            episodes: scores.episodes,
+            invalid: scores.invalid,
+            goal: scores.goal_success_rate,
+            no_drop: scores.no_drop_rate,
+            safety: scores.safety_success_rate,
+            dsr: scores.dsr,
+            contact_safety: scores.contact_safety_rate,
+            metric_id: field("metric_id"),
+            d_peak_median: scores.deformation.median,
+            grip_ratio_median: scores.grip_ratio.median,
+        }
+    }
+}
+
+/// The rows of runs as JSON lines, in their order.
+pub fn rows(runs: &[RunSummary]) -> String {
+    let row = |run| serde_json::json!(LeaderboardRow::new(run)).to_string() + "\n";
+    runs.iter().map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{run_summary::{summarize_runs, tests::stored}, sample_record};
+
+    #[test]
+    fn a_row_says_what_a_result_depends_on() {
+        let runs = summarize_runs(vec![stored("a", "pi", vec![sample_record()])]);
+        let text = rows(&runs);
+        let row: Value = serde_json::from_str(text.trim_end()).unwrap();
+        assert_eq!((&row["benchmark"], &row["policy"], &row["episodes"]), (&"softvt".into(), &"pi".into(), &1.into()));
+        assert_eq!((&row["seed"], &row["seed_hash"], &row["partial"]), (&11.into(), &Value::Null, &false.into()));
+        assert_eq!(row["goal"]["rate"], 100.0);
+        assert_eq!(text.lines().count(), 1);
+    }
+}

@@ -1,0 +1,142 @@
+//! Comparison of three or more runs on the episodes that all of them have.
+
+use std::cmp::Reverse;
+
+use serde::Serialize;
+
+use super::{
+    comparison::{CompareError, check_unique, names, no_common_episode, records},
+    stored_run::StoredRun,
+};
+use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
+use softvt_evaluation::statistics::{Rate, quantile};
+use softvt_records::{
+    paired_stats::{EpisodePair, PairedComparison, d_over_tau, pair_episodes},
+    paired_tests::{holm, letters},
+    record::EpisodeRecord,
+};
+
+/// Level at which two runs count as different, after Holm's adjustment for the number of pairs.
+const LEVEL: f64 = 0.05;
+
+/// One of several runs of the same episodes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RankedRun {
+    /// Policy, or the folder if the policies have one name.
+    pub name: String,
+    /// Goal Success over the common episodes.
+    pub goal: Rate,
+    /// Safety Success over the common episodes.
+    pub safety: Rate,
+    /// Median of peak D over τ.
+    pub d_over_tau: Option<f64>,
+    /// Runs that share a letter do not differ in Safety Success (McNemar's test).
+    pub safety_letters: String,
+    /// Runs that share a letter do not differ in D/τ (Wilcoxon's signed-rank test).
+    pub d_over_tau_letters: String,
+}
+
+/// Several runs by decreasing Safety Success.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PolicyRanking {
+    /// Number of episodes that all runs have.
+    pub episodes: usize,
+    /// Level of the tests, adjusted for their number by Holm's method.
+    pub level: f64,
+    /// The runs.
+    pub runs: Vec<RankedRun>,
+}
+
+impl PolicyRanking {
+    /// Compares the runs of several folders, each with one run per suite.
+    ///
+    /// # Errors
+    /// An episode occurs twice in a folder, or there is no episode that all folders have.
+    pub fn new(folders: &[Vec<StoredRun>]) -> Result<Self, CompareError> {
+        folders.iter().try_for_each(|runs| check_unique(runs))?;
+        let Some((first, rest)) = folders.split_first() else {
+            return Ok(Self { episodes: 0, level: LEVEL, runs: Vec::new() });
+        };
+        let mut common: Vec<&EpisodeRecord> = records(first).collect();
+        for other in rest {
+            let pairs = pair_episodes(common, records(other));
+            common = pairs.iter().map(|pair| pair.first).collect();
+            if common.is_empty() {
+                return Err(no_common_episode(first, other));
+            }
+        }
+        let in_common = |runs: &'_ [StoredRun]| {
+            let pairs = pair_episodes(common.iter().copied(), records(runs));
+            pairs.into_iter().map(|pair| pair.second.clone()).collect()
+        };
+        let mut runs: Vec<(String, Vec<EpisodeRecord>)> =
+            names(folders).into_iter().zip(folders.iter().map(|runs| in_common(runs))).collect();
+        let is_safe = |record: &EpisodeRecord| record.outcome.is_valid() && record.verdict.safety;
+        runs.sort_by_key(|(_, records)| Reverse(records.iter().filter(|r| is_safe(r)).count()));
+        let compared = |a: usize, b: usize| {
+            let pairs = runs[a].1.iter().zip(&runs[b].1).map(|(first, second)| EpisodePair { first, second });
+            PairedComparison::from_pairs(&pairs.collect::<Vec<_>>())
+        };
+        let safety_letters = letters_of(runs.len(), |a, b| compared(a, b).safety.p);
+        let d_letters = letters_of(runs.len(), |a, b| compared(a, b).d_over_tau.p);
+        let ranked = runs.iter().zip(safety_letters.into_iter().zip(d_letters));
+        let runs = ranked.map(|((name, records), (safety_letters, d_over_tau_letters))| RankedRun {
+            name: name.clone(),
+            goal: Rate::from_test(records, |r| r.outcome.is_valid() && r.verdict.goal),
+            safety: Rate::from_test(records, is_safe),
+            d_over_tau: median(records.iter().filter_map(d_over_tau).collect()),
+            safety_letters,
+            d_over_tau_letters,
+        });
+        Ok(Self { episodes: common.len(), level: LEVEL, runs: runs.collect() })
+    }
+
+    /// The ranking as a plain-text table.
+    pub fn table(&self) -> String {
+        const COLUMNS: [TextColumn; 6] = {
+            use TextColumn::{Left, Right};
+            [Left(30), Right(20), Right(20), Left(6), Right(6), Left(6)]
+        };
+        let mut table = TextTable::new(COLUMNS);
+        table.line(format!("{} that all runs have", counted(self.episodes, "episode")));
+        table.row(["policy", "Goal, %", "Safety, %", "", "D/τ", ""]);
+        table.rule();
+        for run in &self.runs {
+            table.row([
+                shortened(&run.name, 30),
+                interval(&run.goal),
+                interval(&run.safety),
+                run.safety_letters.clone(),
+                decimal(run.d_over_tau, 2),
+                run.d_over_tau_letters.clone(),
+            ]);
+        }
+        table.rule();
+        table.line("95 % Wilson intervals · D/τ: median of the episodes that have it");
+        table.line("policies that share a letter do not differ at 5 % (paired tests: McNemar's of Safety, Wilcoxon's");
+        table.line("signed-rank of D/τ; adjusted for the number of pairs by Holm's method)");
+        table.text
+    }
+}
+
+/// Letters of runs whose pairs have these p-values; without one, two runs do not differ.
+fn letters_of(count: usize, p_value: impl Fn(usize, usize) -> Option<f64>) -> Vec<String> {
+    let pairs: Vec<[usize; 2]> = (0..count).flat_map(|a| (a + 1..count).map(move |b| [a, b])).collect();
+    let p_values: Vec<f64> = pairs.iter().map(|&[a, b]| p_value(a, b).unwrap_or(1.0)).collect();
+    let adjusted = holm(&p_values);
+    letters(count, |a, b| {
+        pairs.iter().position(|pair| *pair == [a.min(b), a.max(b)]).is_some_and(|at| adjusted[at] < LEVEL)
+    })
+}
+
+fn interval(rate: &Rate) -> String {
+    match rate.wilson95 {
+        Some([low, high]) => format!("{} [{low:.1}, {high:.1}]", decimal(rate.rate, 1)),
+        None => decimal(rate.rate, 1),
+    }
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    quantile(&values, 0.5)
+}
