@@ -229,7 +229,8 @@ pub(super) fn names(folders: &[impl AsRef<[StoredRun]>]) -> Vec<String> {
         _ => runs.first().and_then(|run| run.dir.parent()).map_or_else(PathBuf::new, Path::to_owned),
     };
     let name = |path: PathBuf| path.file_name().map(|name| name.to_string_lossy().into_owned());
-    let own: Vec<String> = folders.iter().map(|runs| name(folder(runs.as_ref())).unwrap_or_default()).collect();
+    let own: Vec<String> =
+        folders.iter().map(|runs| name(folder(runs.as_ref())).unwrap_or_default()).collect();
     let differ = |names: &&Vec<String>| names.iter().collect::<BTreeSet<_>>().len() == names.len();
     let numbered = || (1..=folders.len()).map(|number| format!("run {number}")).collect();
     [&policies, &own].into_iter().find(differ).cloned().unwrap_or_else(numbered)
@@ -238,8 +239,17 @@ pub(super) fn names(folders: &[impl AsRef<[StoredRun]>]) -> Vec<String> {
 /// Fields of `run.json` about the conditions of a run in which two runs of one suite differ. Of files and limits, those
 /// that both runs read are compared, since a run of fewer tasks reads fewer; the differing ones follow in brackets.
 fn differing_fields(first: &[StoredRun], second: &[StoredRun]) -> Vec<String> {
-    const CONDITION_FIELDS: [&str; 9] =
-        ["softvt", "metric_id", "twin", "variation", "shifts", "options", "settings", "sources", "thresholds"];
+    const CONDITION_FIELDS: [&str; 9] = [
+        "softvt",
+        "metric_id",
+        "twin",
+        "variation",
+        "shifts",
+        "options",
+        "settings",
+        "sources",
+        "thresholds",
+    ];
     /// Fields with an entry per file or asset.
     const KEYED_FIELDS: [&str; 2] = ["sources", "thresholds"];
     let mut found = BTreeSet::new();

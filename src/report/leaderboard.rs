@@ -92,15 +92,24 @@ pub fn rows(runs: &[RunSummary]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{run_summary::{summarize_runs, tests::stored}, sample_record};
+    use crate::{
+        run_summary::{summarize_runs, tests::stored},
+        sample_record,
+    };
 
     #[test]
     fn a_row_says_what_a_result_depends_on() {
         let runs = summarize_runs(vec![stored("a", "pi", vec![sample_record()])]);
         let text = rows(&runs);
         let row: Value = serde_json::from_str(text.trim_end()).unwrap();
-        assert_eq!((&row["benchmark"], &row["policy"], &row["episodes"]), (&"softvt".into(), &"pi".into(), &1.into()));
-        assert_eq!((&row["seed"], &row["seed_hash"], &row["partial"]), (&11.into(), &Value::Null, &false.into()));
+        assert_eq!(
+            (&row["benchmark"], &row["policy"], &row["episodes"]),
+            (&"softvt".into(), &"pi".into(), &1.into())
+        );
+        assert_eq!(
+            (&row["seed"], &row["seed_hash"], &row["partial"]),
+            (&11.into(), &Value::Null, &false.into())
+        );
         assert_eq!(row["goal"]["rate"], 100.0);
         assert_eq!(text.lines().count(), 1);
     }

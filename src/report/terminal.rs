@@ -162,7 +162,7 @@ fn push_harm_and_stages(table: &mut TextTable, scores: &GroupScores) {
 }
 
 /// What the number of episodes can separate.
-fn resolution(scores: &Scores) -> String {
+fn resolution(scores: &GroupScores) -> String {
     let rate = scores.safety_success_rate.rate.or(scores.goal_success_rate.rate).unwrap_or(0.0);
     let n = scores.episodes;
     let episodes = counted(n, "episode");

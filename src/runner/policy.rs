@@ -505,7 +505,9 @@ impl PolicyConfig {
         brief: &EpisodeBrief,
     ) -> Result<Option<Box<dyn Policy>>, RunError> {
         Ok(match (&self.kind, connections) {
-            (PolicyKind::Server(_), Some(connections)) => Some(Box::new(RemotePolicy::new(connections.clone()))),
+            (PolicyKind::Server(_), Some(connections)) => {
+                Some(Box::new(RemotePolicy::new(connections.clone())))
+            }
             (PolicyKind::Rust(start), _) => Some(start.0(brief)),
             (PolicyKind::Lua(file), _) => Some(Box::new(file.start(&opened.seed, self.gripper)?)),
             _ => None,

@@ -26,8 +26,8 @@ use softvt_policy::{
     Action, ActionChunk, CommandResolver, EpisodeBrief, Observation, Policy, PolicyError, SensorStreams,
     ToolCommand, ToolMotion,
 };
-use softvt_rollout::{Controller, Simulation};
 use softvt_robot::rotation;
+use softvt_rollout::{Controller, Simulation};
 
 const NOT_COMPARABLE: &str = "only policy servers and policies in Lua can be compared with demonstrations";
 
@@ -222,15 +222,19 @@ impl PolicyCheck {
         let Samples { steps, answers } = samples;
         let mut seconds: Vec<f64> = answers.iter().map(|answer| answer.seconds).collect();
         seconds.sort_by(f64::total_cmp);
-        let translations = pairs(steps, LEAST_TRANSLATION_M, |s, action| action.position_b - s.tool_position_b);
+        let translations =
+            pairs(steps, LEAST_TRANSLATION_M, |s, action| action.position_b - s.tool_position_b);
         let rotations = pairs(steps, LEAST_ROTATION_RAD, |s, action| {
             let turned = rotation::from_axis_angle(&action.axis_angle_b) * s.tool_orientation_b.inverse();
             turned.scaled_axis()
         });
         let grips: Vec<[f64; 2]> =
             steps.iter().map(|s| [s.recorded.closure(), s.answered.closure()]).collect();
-        let (translation, rotation, grip) =
-            (Agreement::of_vectors(&translations), Agreement::of_vectors(&rotations), Agreement::of_numbers(&grips));
+        let (translation, rotation, grip) = (
+            Agreement::of_vectors(&translations),
+            Agreement::of_vectors(&rotations),
+            Agreement::of_numbers(&grips),
+        );
         let mut findings = Vec::new();
         findings.extend(explain_translation(&translations, &translation, steps));
         findings.extend(explain_rotation(&rotations, &rotation, steps));
@@ -318,7 +322,8 @@ impl Agreement {
     }
 
     fn agrees(&self) -> bool {
-        self.correlation.is_none_or(|r| r >= AGREES) && self.scale.is_none_or(|s| AGREEING_SCALES.contains(&s))
+        self.correlation.is_none_or(|r| r >= AGREES)
+            && self.scale.is_none_or(|s| AGREEING_SCALES.contains(&s))
     }
 }
 
@@ -416,7 +421,9 @@ fn explain_rotation(pairs: &[VectorPair], of: &Agreement, steps: &[StepSample]) 
         })
         .filter(|pair| pair.recorded.norm() >= LEAST_ROTATION_RAD)
         .collect();
-    if fit(&tool_pairs, &Mat3::identity()).0.is_some_and(|r| r >= EXPLAINS) && of.correlation.is_some_and(|r| r < AGREES) {
+    if fit(&tool_pairs, &Mat3::identity()).0.is_some_and(|r| r >= EXPLAINS)
+        && of.correlation.is_some_and(|r| r < AGREES)
+    {
         return Some(
             "rotation: the answers are turned about the axes of the tool; rotations are expected about those of the base"
                 .to_owned(),
@@ -427,7 +434,11 @@ fn explain_rotation(pairs: &[VectorPair], of: &Agreement, steps: &[StepSample]) 
     }
     let (r, scale) = (of.correlation?, of.scale?);
     Some(if r >= AGREES {
-        let unit = if (30.0..=100.0).contains(&scale) { ": radians are expected, these look like degrees" } else { "" };
+        let unit = if (30.0..=100.0).contains(&scale) {
+            ": radians are expected, these look like degrees"
+        } else {
+            ""
+        };
         format!("rotation: the answers are {scale:.3} times as large as the recorded ones{unit}")
     } else {
         "rotation: the answers do not follow the demonstrations: check its encoding (axis-angle, quaternion order, side)"
@@ -461,7 +472,11 @@ fn explain_rate(answers: &[AnswerSample]) -> Option<String> {
     let error = |factor: f64| -> f64 {
         let of_answer = |answer: &AnswerSample| -> f64 {
             let at = |j: usize| ((j + 1) as f64 * factor).round() as usize - 1;
-            let compared = answer.path_b.iter().enumerate().filter_map(|(j, p)| Some((p - answer.recorded_b.get(at(j))?).norm()));
+            let compared = answer
+                .path_b
+                .iter()
+                .enumerate()
+                .filter_map(|(j, p)| Some((p - answer.recorded_b.get(at(j))?).norm()));
             compared.sum()
         };
         answers.iter().filter(|answer| answer.path_b.len() >= 4).map(of_answer).sum()

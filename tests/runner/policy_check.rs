@@ -5,9 +5,7 @@ use std::{path::Path, sync::Arc};
 use softvt::{
     dataset::TaskFile,
     geometry::Vec3,
-    policy::{
-        Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, ToolCommand,
-    },
+    policy::{Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, ToolCommand},
     robot::rotation,
     runner::{
         PolicyConfig, Silent,

@@ -53,10 +53,16 @@ fn check_answers(args: &DoctorArgs, dataset: &Path) -> Result<(), CliError> {
     let observer: Arc<dyn Observer> = Arc::new(Console::default());
     let policy = PolicyConfig::load(&args.policy.options())?;
     let check = check_policy(&policy, &enter_for_dataset(dataset, &*observer)?, args.demos, &observer)?;
-    if args.json { print_json(&check)? } else { print(&check.text())? }
+    if args.json {
+        print_json(&check)?
+    } else {
+        print(&check.text())?
+    }
     match check.findings.is_empty() {
         true => Ok(()),
-        false => Err(CliError::new(Exit::Policy, "the answers of the policy do not agree with the demonstrations")),
+        false => {
+            Err(CliError::new(Exit::Policy, "the answers of the policy do not agree with the demonstrations"))
+        }
     }
 }
 

@@ -161,7 +161,7 @@ impl<'a> ScoredEpisode<'a> {
         Self { record, tau: limit.map(|limit| limit.tau_pct()) }
     }
 
-    fn d_peak(&self) -> Option<f64> {
+    fn peak_pct(&self) -> Option<f64> {
         self.record.verdict.d_peak_v1
     }
 
@@ -179,13 +179,13 @@ impl<'a> ScoredEpisode<'a> {
     }
 
     fn deform_ok(&self) -> Option<bool> {
-        self.d_peak().zip(self.tau).map(|(d, tau)| d <= tau)
+        self.peak_pct().zip(self.tau).map(|(d, tau)| d <= tau)
     }
 
     /// Reasons for which the scorer cannot judge the episode, in its terms.
     fn missing_evidence(&self) -> String {
         let mut reasons = Vec::new();
-        if self.d_peak().is_none() {
+        if self.peak_pct().is_none() {
             reasons.push("missing_fem_deformation_rms".to_owned());
             reasons.push("missing_fem_deformation_metric_id".to_owned());
         }
@@ -216,7 +216,7 @@ fn episodes_csv(episodes: &[ScoredEpisode<'_>]) -> String {
             header.id.episode,
             quote_csv(&header.asset),
             truth(Some(episode.record.verdict.goal)),
-            number(episode.d_peak()),
+            number(episode.peak_pct()),
             number(episode.tau),
             truth(episode.deform_ok()),
             truth(episode.safe_success()),
@@ -259,7 +259,7 @@ fn summary(episodes: &[ScoredEpisode<'_>]) -> Value {
 fn asset_summary(group: &[&ScoredEpisode<'_>]) -> Value {
     let goal = group.iter().filter(|e| e.record.verdict.goal).count();
     let safe = group.iter().filter(|e| e.is_safe()).count();
-    let mut peaks: Vec<f64> = group.iter().filter_map(|e| e.d_peak()).collect();
+    let mut peaks: Vec<f64> = group.iter().filter_map(|e| e.peak_pct()).collect();
     peaks.sort_by(f64::total_cmp);
     json!({
         "n": group.len(),
