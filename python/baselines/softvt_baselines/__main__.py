@@ -21,6 +21,13 @@ def _record(args: argparse.Namespace) -> None:
     )
 
 
+def _demonstrate(args: argparse.Namespace) -> None:
+    from .demonstrate import demonstrate, processes_of
+
+    processes = processes_of(args.processes)
+    demonstrate(args.suite, args.out, args.attempts, args.ways, args.edge, args.seed, args.disturbance, args.teacher, args.task, processes)
+
+
 def _train(args: argparse.Namespace) -> None:
     from .checkpoint import device_of
     from .data import load
@@ -139,6 +146,22 @@ def _parser() -> argparse.ArgumentParser:
     record.add_argument("suite", help="suite of softvt")
     record.add_argument("--out", type=Path, required=True, help="folder of the recording")
     with_recording(record)
+
+    demonstrate = command(
+        "demonstrate", _demonstrate, "record grips of a teacher that feels, with ways to and from them by feedback laws: for train --memory"
+    )
+    demonstrate.add_argument("suite", help="suite of softvt")
+    demonstrate.add_argument("--out", type=Path, required=True, help="folder of the recording")
+    demonstrate.add_argument("--attempts", type=_positive, default=150, help="attempts of the teacher per task")
+    demonstrate.add_argument("--ways", type=_positive, default=4, help="ways to the object per attempt")
+    demonstrate.add_argument("--task", default="", help="only these tasks: indices, separated by commas")
+    demonstrate.add_argument("--seed", type=_positive, default=1, help="seed of the episodes; evaluations use 0")
+    demonstrate.add_argument("--teacher", default="tactile-servo", help="built-in policy that demonstrates")
+    demonstrate.add_argument("--processes", type=int, default=0, help="processes; 0: one per processor")
+    demonstrate.add_argument(
+        "--disturbance", type=_length, default=0.00003, help="standard deviation of the robot from its commands, m; of its rotation 4 rad per m"
+    )
+    with_edge(demonstrate)
 
     train = command("train", _train, "train a policy")
     train.add_argument("recordings", type=Path, nargs="+", help="folders of softvt record")

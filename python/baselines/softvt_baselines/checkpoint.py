@@ -12,7 +12,7 @@ from .inputs import Shape
 from .model import Policy
 from .numbers import Standard
 
-VERSION = 5
+VERSION = 6
 
 
 @dataclass

@@ -33,7 +33,7 @@ LEAST_SPREAD = np.array([0.001] * 3 + [0.01] * 3 + [0.002])
 # The same of actions on the fine scale.
 LEAST_FINE_SPREAD = 0.2
 # Version of the packed files.
-PACKED = 4
+PACKED = 5
 # Length of the marker displacements of a step: finger, marker, (x, y).
 MARKERS = 2 * 99 * 2
 
@@ -42,7 +42,8 @@ MARKERS = 2 * 99 * 2
 class Demonstrations:
     """All demonstrations, one after the other: M recorded steps, of which N are trained on."""
 
-    pictures: dict[str, np.ndarray]  # per key (M, edge, edge, 3) uint8
+    pictures: dict[str, np.ndarray]  # per key (P, edge, edge, 3) uint8
+    picture: np.ndarray  # (M,) index of the pictures of each recorded step, -1 without
     state: np.ndarray  # (M, 7): tool position (m), rotation vector, finger position (m); folded; (M, 8) with the drives
     commands: np.ndarray  # (M, 7): the action before each step; that of a first step is its state
     markers: np.ndarray  # (M, 396) px: displacements of the markers of both fingers
@@ -266,8 +267,11 @@ def load(
     def joined(stream: str) -> np.ndarray:
         return np.concatenate([numbers[stream] for numbers in packed])
 
+    picture = [numbers["picture"] if "picture" in numbers else np.arange(numbers["lengths"].sum()) for numbers in packed]
+    counts = [int(one.max()) + 1 for one in picture]
+
     def pictures(key: str) -> np.ndarray:
-        mapped = [np.load(folder / f"{key}.npy", mmap_mode="r") for folder in folders]
+        mapped = [np.load(folder / f"{key}.npy", mmap_mode="r")[:count] for folder, count in zip(folders, counts)]
         return mapped[0] if len(mapped) == 1 else np.concatenate(mapped)
 
     recorded, names, actions = joined("lengths"), joined("prompts"), joined(ACTIONS[code])
@@ -281,6 +285,7 @@ def load(
     prompts = sorted(set(names.tolist()))
     return Demonstrations(
         pictures={key: pictures(key) for key in (CAMERAS | TACTILE if has_tactile else CAMERAS)},
+        picture=np.concatenate([np.where(one < 0, -1, one + first) for one, first in zip(picture, np.cumsum(counts) - counts)]),
         state=state,
         commands=commands(state, actions, recorded),
         markers=joined("markers"),

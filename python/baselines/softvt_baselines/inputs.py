@@ -23,6 +23,8 @@ RECENT = 32
 FAST, FAST_GRIP = 1e-3, 0.02
 # Closing since the last fast motion (1 mm) from which on a hand is taken to feel.
 FEELS = 0.0125
+# Opening per step of the command by which a hand lets go: more than a hand that feels ever loosens its grip.
+LETS_GO = 0.018
 
 
 @dataclass
@@ -111,6 +113,16 @@ def is_seen(commands: np.ndarray, rows: np.ndarray, begins: np.ndarray) -> np.nd
     return commands[rows, GRIPPER] - commands[begins, GRIPPER] < FEELS
 
 
+def holds(commands: np.ndarray, first: np.ndarray, begins: np.ndarray) -> np.ndarray:
+    """True on the rows (M,) on which the hand has felt an object and has not let go of it since, given the rows at which demonstrations
+    begin."""
+    index = np.arange(len(commands))
+    lets_go = np.diff(commands[:, GRIPPER], prepend=commands[0, GRIPPER]) < -LETS_GO
+    lets_go[first] = True
+    felt, let_go = (np.maximum.accumulate(np.where(rows, index, -1)) for rows in (~is_seen(commands, index, begins), lets_go))
+    return felt >= let_go
+
+
 @dataclass
 class Past:
     """What a policy with memory has seen of an episode: one row per control step, the present one last. All steps are kept, since a hand may
@@ -124,7 +136,8 @@ class Past:
         """The means of the remembered steps, each with a first axis of length 1: states and commands relative to the command before, along
         the axes of the hand, and the least and the greatest of these commands. While nothing is remembered, the lag of the robot is not
         shown either."""
-        last, begin = len(self.states) - 1, memory_begins(self.commands, np.array([0]))[-1]
+        begins = memory_begins(self.commands, np.array([0]))
+        last, begin = len(self.states) - 1, begins[-1]
         rows, now, is_known = np.maximum(last - np.arange(REMEMBERED), begin), self.commands[-1], np.float32(begin < last)
         axes = turns(now[ROTATION])
         states, commands = (turned(is_known * (numbers[rows] - now), axes) for numbers in (self.states, self.commands))
@@ -134,6 +147,7 @@ class Past:
             "extremes": np.stack([commands.min(0), commands.max(0)])[None],
             "readings": (SHARES @ self.readings[rows])[None],
             "seen": np.float32([is_seen(self.commands, last, begin)]),
+            "held": np.float32([[holds(self.commands, np.array([0]), begins)[-1]]]),
             "axes": axes[None],
         }
 

@@ -42,10 +42,11 @@ class Memory(nn.Module):
         self.has_touch = has_touch
         self.register_buffer("scale", torch.from_numpy(FINE), persistent=False)
         self.register_buffer("readings_scale", torch.from_numpy(FINE_READINGS), persistent=False)
-        self.count = (2 * INTERVALS + 2) * 7 + (2 * INTERVALS * 6 if has_touch else 0)
+        self.count = 1 + (2 * INTERVALS + 2) * 7 + (2 * INTERVALS * 6 if has_touch else 0)
 
     def forward(self, obs: dict[str, Tensor]) -> Tensor:
-        """Numbers (B, count) of changes of states and commands (B, intervals, 7), their extremes (B, 2, 7) and readings (B, intervals, 6)."""
+        """Numbers (B, count) of changes of states and commands (B, intervals, 7), their extremes (B, 2, 7) and readings (B, intervals, 6),
+        and whether the hand holds what it has felt (B, 1)."""
         parts = [fine(obs[key].float(), self.scale) for key in ("states", "commands", "extremes")]
         if self.has_touch:
             felt = obs["readings"].float()
@@ -53,7 +54,7 @@ class Memory(nn.Module):
             # Readings of a gel that slides and of one that is held differ by a few per cent.
             ratios = felt / torch.maximum(present, LEAST_PRESENT * self.readings_scale)
             parts += [fine(felt, self.readings_scale), 3 * ratios.clamp(-MOST_RATIO, MOST_RATIO)]
-        return 0.3 * torch.cat([part.flatten(1) for part in parts], 1)
+        return torch.cat([obs["held"].float(), *(0.3 * part.flatten(1) for part in parts)], 1)
 
 
 class Remembering(nn.Module):

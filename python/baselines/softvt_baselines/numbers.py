@@ -62,7 +62,36 @@ def turns(rotations: np.ndarray) -> np.ndarray:
     x, y, z = np.moveaxis(rotations, -1, 0) / angle[..., 0, 0]
     zero = np.zeros_like(x)
     cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(*x.shape, 3, 3)
-    return (np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)).astype(np.float32)
+    return (np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)).astype(rotations.dtype)
+
+
+def _vector(matrix: np.ndarray) -> np.ndarray:
+    """The rotation vector (3,) of a rotation matrix, by its quaternion, which is exact near half a turn as well."""
+    trace = np.array([matrix.trace(), *matrix.diagonal()])
+    largest = int(trace.argmax())
+    if largest == 0:
+        x, y, z = matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]
+        quaternion = np.array([1 + trace[0], x, y, z])
+    else:
+        i = largest - 1
+        j, k = (i + 1) % 3, (i + 2) % 3
+        quaternion = np.empty(4)
+        quaternion[0] = matrix[k, j] - matrix[j, k]
+        quaternion[1 + i] = 1 + matrix[i, i] - matrix[j, j] - matrix[k, k]
+        quaternion[1 + j], quaternion[1 + k] = matrix[j, i] + matrix[i, j], matrix[k, i] + matrix[i, k]
+    length = float(np.linalg.norm(quaternion[1:]))
+    angle = 2 * np.arctan2(length, quaternion[0])
+    return (angle if angle <= np.pi else angle - 2 * np.pi) * quaternion[1:] / max(length, 1e-300)
+
+
+def between(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """The rotation vector (3,), in the base frame, that turns the rotation of one vector into that of another."""
+    return _vector(turns(np.float64(second)) @ turns(np.float64(first)).T)
+
+
+def rotated(rotation: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """The rotation vector (3,) after a turn in the base frame."""
+    return _vector(turns(np.float64(turn)) @ turns(np.float64(rotation)))
 
 
 def turned(changes, matrices):

@@ -13,7 +13,7 @@ from torch import Tensor
 from . import UserError, prompts
 from .checkpoint import Checkpoint, save
 from .data import LEAST_SPREAD, Demonstrations, Statistics
-from .inputs import REMEMBERED, SHARES, Shape, is_seen, memory_begins
+from .inputs import REMEMBERED, SHARES, Shape, holds, is_seen, memory_begins
 from .model import Policy
 from .numbers import FINE, FINE_READINGS, ROTATION, Standard, fine, hand, reference, turned, turns
 
@@ -26,8 +26,6 @@ STATE_NOISE = [0.005] * 3 + [0.02] * 3 + [0.0001, 0]
 # The same of a policy with memory: noise of the pose in fast motions as a share of the motion in the next AHEAD steps, at most STATE_NOISE;
 # and relative noise of what it remembers. A hand that feels moves by less than any noise of the pose.
 SHARE, AHEAD, MEMORY_NOISE = 0.3, 10, 0.02
-# How much more often fast motions are shown to a policy with memory: a demonstration has few steps in which the hand finds the object.
-OFTEN = 3
 # Samples of a hand that feels for each other sample: they have no pictures.
 FEELING = 8
 # Noise of the remembered positions along the axes of such a hand, m. A teacher's small motions tell what it has decided: tactile-servo rises
@@ -54,7 +52,7 @@ class Batches:
             return torch.tensor(array, device=options.device)
 
         self.shape, self.device = options.shape, options.device
-        self.pictures = {key: on_device(demos.pictures[key]) for key in options.shape.pictures}
+        self.pictures, self.picture = {key: on_device(demos.pictures[key]) for key in options.shape.pictures}, on_device(demos.picture)
         self.state, self.actions = on_device(demos.state), on_device(demos.actions)
         self.state_mean, self.state_std = on_device(statistics.state.mean), on_device(statistics.state.std)
         self.action_mean, self.action_std = on_device(statistics.action.mean), on_device(statistics.action.std)
@@ -76,8 +74,8 @@ class Batches:
                     "no demonstration closes the hand slowly: --memory needs those of a teacher that feels, such as tactile-servo"
                 )
             self.seen, self.feeling_steps = on_device(seen.astype(np.float32)), on_device(np.flatnonzero(~seen))
-            fast = np.flatnonzero(seen & (begin == np.arange(len(begin))))
-            self.steps = on_device(np.concatenate([np.flatnonzero(seen), np.tile(fast, OFTEN - 1)]))
+            self.held = on_device(np.float32(holds(demos.commands, demos.start, begin))[:, None])
+            self.steps = on_device(np.flatnonzero(seen & (demos.picture >= 0)))
             self.hidden = on_device(np.float32(HIDDEN_MOTION))
             self.fine, self.fine_readings = on_device(FINE), on_device(FINE_READINGS)
         self.random = torch.Generator(options.device).manual_seed(options.seed)
@@ -112,7 +110,7 @@ class Batches:
         found = {"states": self.shares @ states, "commands": self.shares @ commands, "extremes": extremes}
         found = {key: self._blurred(numbers, self.fine) for key, numbers in found.items()}
         felt = self._blurred(self.shares @ self.readings[rows], self.fine_readings)
-        return found | {"readings": felt, "seen": self.seen[last]}
+        return found | {"readings": felt, "seen": self.seen[last], "held": self.held[last]}
 
     def _noise(self, steps: Tensor) -> Tensor:
         """Noise of the state (B, 1, 7 or 8)."""
@@ -130,7 +128,7 @@ class Batches:
         frames = self._past(steps, tuple(range(self.shape.frames - 1, -1, -1)))
         obs = {"prompt": self.prompts[self.prompt[steps]]}
         for key, pictures in self.pictures.items():
-            shifted = self._shifted(pictures[frames])
+            shifted = self._shifted(pictures[self.picture[frames]])
             light = 1 + BRIGHTNESS * (2 * torch.rand((count, 1, 1, 1, 1), generator=self.random, device=self.device) - 1)
             obs[key] = (shifted * light).clamp(0, 255).byte()
         noise = self._noise(steps)

@@ -1,0 +1,345 @@
+"""Demonstrations for policies that feel: grips of a teacher, and ways to and from them by feedback laws.
+
+A teacher such as tactile-servo first runs without cameras. What it did is repeated through `softvt serve`, with pictures only where a policy
+looks: its grip as it was, the way to the basket by a law, and ways to the object from random places by another law. The recording is
+written as `data.pack` writes it.
+"""
+
+import hashlib
+import json
+import multiprocessing
+import os
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from . import UserError, laws
+from .client import Client, serving
+from .data import ACTIONS, CAMERAS, PACKED, displacements, readings
+from .evaluate import camera_flags, run_softvt
+from .inputs import RECENT, is_seen, memory_begins
+from .laws import Grasp, Release
+from .numbers import GRIPPER, ROTATION, between, rotated
+
+# Steps that are shown before the hand closes slowly.
+BEFORE = 5
+# Steps between two pictures: on the way to an object, within NEAR (m) of it, and while carrying.
+FAR_STRIDE, NEAR_STRIDE, CARRY_STRIDE, NEAR = 3, 2, 3, 0.06
+# Share of the ways that begin near the object, and of those that begin between the fingers' heights; the radii of both, m.
+NEAR_SHARE, LOW_SHARE, NEAR_RADIUS, LOW_RADIUS = 0.65, 0.3, 0.08, 0.0035
+# Heights above the grasp at which low ways begin, m, and turns off that of the grasp, rad (standard deviation).
+LOW_HEIGHTS, LOW_TURN, HOME_TURN = (0.015, 0.045), 0.08, 0.05
+# Largest motion of any object on the way of a hand, m: it has touched none then.
+UNTOUCHED = 0.001
+# Steps of the budget that are used at most.
+MOST_STEPS = 690
+# Objects that are round from above: their turn does not show, and the hand keeps its own.
+ROUND = {"steamed_bun", "golden_bun", "sesame_bun", "cylinder", "sphere"}
+# Objects that look alike after a quarter of a turn.
+SQUARE = {"cube"}
+# Largest number of pictures of a scene.
+MOST_PICTURES = 1500
+PROFILE = """return softvt.profile {
+  name = "demonstrations",
+  inputs = {
+    { keys = { "image" }, source = "camera", camera = "third_person" },
+    { keys = { "wrist_image" }, source = "camera", camera = "wrist" },
+    { keys = { "state" }, source = "state", parts = { "position", "axis_angle", "finger_position", "sensed_finger_position", "closure" }, frames = RECENT },
+    { keys = { "tactile_marker_motion" }, source = "marker_motion", frames = RECENT },
+    { keys = { "prompt" }, source = "prompt" },
+  },
+  actions = { pose = "absolute", gripper = { open = 0, closed = 1, code = "continuous" } },
+}
+"""
+
+
+@dataclass
+class Plan:
+    """What an attempt of the teacher shows."""
+
+    actions: np.ndarray  # (T, 7) from its start until it lifts the object
+    begin: int  # step in which it begins to close slowly
+    grasp: Grasp
+    release: Release
+
+
+def plan_of(actions: np.ndarray) -> Plan | None:
+    """The plan in the actions (T, 7) of an attempt; None if it grasped more than once."""
+    before = np.concatenate([actions[:1], actions[:-1]])  # the command before each step
+    begins = memory_begins(np.float32(before), np.array([0]))
+    feels = np.flatnonzero(~is_seen(np.float32(before), np.arange(len(before)), begins))
+    if len(feels) == 0 or (np.diff(feels) > 1).any():
+        return None
+    first, last = feels[0], feels[-1]
+    begin = begins[first]
+    pose = before[begin]
+    is_above = np.hypot(*(before[:, :2] - pose[:2]).T) < 1e-3
+    over = before[int(is_above.argmax()), 2]
+    waits = np.flatnonzero(np.abs(np.diff(before[: begin + 1, GRIPPER])) < 1e-9)
+    opening = before[waits[-1], GRIPPER] if len(waits) else 0.0
+    lifts = np.flatnonzero(np.diff(actions[:last, 2]) <= 2e-5)
+    if len(lifts) == 0:
+        return None
+    lift = int(lifts[-1]) + 1  # the first action that lifts
+    opens = np.flatnonzero(np.diff(actions[lift:, GRIPPER]) < -0.005)
+    if len(opens) == 0:
+        return None
+    end = lift + int(opens[0])
+    grasp = Grasp(pose[:6], float(max(over, pose[2] + 0.05)), float(opening), float(pose[GRIPPER]))
+    release = Release(actions[end, :6], float(actions[lift:end, 2].max()), float(actions[end:, GRIPPER].min()))
+    return Plan(actions[:lift], int(begin), grasp, release)
+
+
+def turned_home(grasp: Grasp, home: np.ndarray, asset: str) -> Grasp:
+    """A grasp whose turn is the one nearest to that of the hand at home, of those that are alike for an asset."""
+    pose = grasp.pose.copy()
+    if asset in ROUND:
+        pose[3:] = [np.pi, 0, 0]
+    elif asset in SQUARE:
+        turns = [rotated(pose[3:], np.array([0, 0, k * np.pi / 2])) for k in range(4)]
+        pose[3:] = min(turns, key=lambda turn: np.linalg.norm(between(home[ROTATION], turn)))
+    return Grasp(pose, grasp.over, grasp.opening, grasp.closure)
+
+
+def start_of(grasp: Grasp, home: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """A random command from which the hand reaches the object: near it, low above it, or on the way from home."""
+    start, pose = home.copy(), grasp.pose
+    turn = between(home[ROTATION], pose[3:])
+    if random.random() < NEAR_SHARE:
+        is_low = random.random() < LOW_SHARE
+        angle, radius = 2 * np.pi * random.random(), (LOW_RADIUS if is_low else NEAR_RADIUS) * random.random() ** 0.5
+        start[:2] = pose[:2] + radius * np.array([np.cos(angle), np.sin(angle)])
+        start[2] = pose[2] + random.uniform(*LOW_HEIGHTS) if is_low else grasp.over + 0.08 * random.random()
+        share = 1 if is_low else random.random() * (radius < laws.TURNS_WITHIN)
+        start[ROTATION] = rotated(home[ROTATION], share * turn + np.array([0, 0, LOW_TURN * random.standard_normal()]))
+        start[GRIPPER] = grasp.opening
+    else:
+        share = random.random()
+        start[:2] += share * (pose[:2] - home[:2]) + random.uniform(-0.05, 0.05, 2)
+        start[2] = max(grasp.over, home[2] + share * (grasp.over - home[2])) + 0.04 * random.random()
+        start[ROTATION] = rotated(home[ROTATION], np.array([0, 0, HOME_TURN * random.standard_normal()]))
+        start[GRIPPER] = grasp.opening * share
+    return start
+
+
+@dataclass
+class Shown:
+    """Steps of an episode, one row each."""
+
+    rows: list[dict] = field(default_factory=list)  # what was observed before each action
+    actions: list[np.ndarray] = field(default_factory=list)
+
+
+class Episode:
+    """An episode that is stepped with pictures where they are wanted."""
+
+    def __init__(self, client: Client, task: int, episode: int):
+        self.client, self.shown = client, Shown()
+        obs = client.reset(task, episode)
+        self.prompt, self.is_over, self.info = str(obs["prompt"]), False, {}
+        self.next = self._rows(obs, 1)[0]  # the row of the next step
+
+    def _rows(self, obs: dict, count: int) -> list[dict]:
+        motion = np.asarray(obs["tactile_marker_motion"]).reshape(-1, 2, 99, 2)
+        moved = motion[-count:]
+        pairs = np.stack([np.broadcast_to(motion[:1], moved.shape), moved], 2)
+        felt, markers, states = readings(pairs), displacements(pairs).astype(np.float32), np.asarray(obs["state"])[-count:]
+        rows = [{"state": states[k], "markers": markers[k], "readings": felt[k]} for k in range(count)]
+        rows[-1] |= {key: np.asarray(obs[key]) for key in CAMERAS}
+        return rows
+
+    def play(self, actions: np.ndarray, pictured: np.ndarray) -> None:
+        """Executes actions, so that the steps of `pictured` have pictures; until the episode is over."""
+        stops = sorted({*(int(step) for step in pictured if 0 < step < len(actions)), len(actions)})
+        done = 0
+        for stop in stops:
+            while done < stop and not self.is_over:
+                part = actions[done : min(stop, done + RECENT)]
+                response = self.client.step(part)
+                count = int(response["info"]["carried_out"])
+                self.info, self.is_over = response["info"], response["terminated"] or response["truncated"]
+                rows = [self.next, *self._rows(response["observation"], count)]
+                self.shown.rows += rows[:-1]
+                self.shown.actions += [*part[:count]]
+                self.next, done = rows[-1], done + len(part)
+
+    def positions(self) -> np.ndarray:
+        return np.array([thing["position_w"] for thing in self.info["state"]["objects"]])
+
+
+@dataclass
+class Job:
+    task: int
+    episode: int
+    asset: str
+    file: Path  # of the teacher's actions
+    ways: int
+
+
+@dataclass
+class Settings:
+    address: str
+    folder: Path
+    edge: int
+    seed: int
+
+
+class _Worker:
+    """A process with a connection, and files of pictures that all processes share."""
+
+    def __init__(self, settings: Settings, used):
+        self.client, self.settings, self.used = Client(settings.address), settings, used
+        self.files = {key: np.load(settings.folder / f"{key}.npy", mmap_mode="r+") for key in CAMERAS}
+
+    def demonstration(self, shown: Shown, prompt: str, pictured: np.ndarray, first: int) -> dict:
+        """The rows from the first one, whose pictures go to the files."""
+        rows = shown.rows[first:]
+        wanted = [k for k in range(len(rows)) if k + first in set(pictured.tolist()) and "image" in rows[k]]
+        with self.used.get_lock():
+            at = self.used.value
+            self.used.value += len(wanted)
+        for key, file in self.files.items():
+            for k, row in enumerate(wanted):
+                file[at + k] = rows[row][key]
+        picture = np.full(len(rows), -1)
+        picture[wanted] = at + np.arange(len(wanted))
+        states = np.array([row["state"] for row in rows], np.float32)
+        return {
+            "prompt": prompt,
+            "picture": picture,
+            ACTIONS["continuous"]: np.array(shown.actions[first:], np.float32),
+            "state": states[:, :7],
+            "sensed_width": 2 * states[:, 7:8],
+            "closure": states[:, 8:9],
+            "markers": np.array([row["markers"] for row in rows], np.float16),
+            "readings": np.array([row["readings"] for row in rows], np.float32),
+        }
+
+    def grip(self, job: Job, plan: Plan) -> dict | str:
+        """The teacher's grip, and the way to where it lets go; or the reason why it is not shown."""
+        episode = Episode(self.client, job.task, job.episode)
+        episode.play(plan.actions, np.zeros(0, int))
+        if episode.is_over:
+            return "ended early"
+        carried = laws.carry(plan.actions[-1], plan.release)
+        lift, pictured = len(plan.actions), np.arange(0, len(carried), CARRY_STRIDE)
+        episode.play(carried, np.concatenate([pictured, np.arange(len(carried) - 24, len(carried))]))
+        count = len(episode.shown.rows)
+        while not episode.is_over and len(episode.shown.rows) < count + 40:
+            episode.play(episode.shown.actions[-1][None].repeat(8, 0), np.zeros(0, int))
+        record = episode.info.get("record") or {}
+        if not record.get("safety"):
+            return f"not safe: {record.get('failed_stage') or ('slip' if record.get('goal') and record.get('deformation_ok') else 'deformed')}"
+        shown = Shown(episode.shown.rows[:count], episode.shown.actions[:count])
+        kept = lift + np.concatenate([pictured, np.arange(max(0, len(carried) - 24), len(carried))])
+        return self.demonstration(shown, episode.prompt, kept, plan.begin - BEFORE)
+
+    def ways(self, job: Job, plan: Plan) -> list[dict]:
+        """Ways from random places to where the teacher grasped."""
+        random = np.random.default_rng([self.settings.seed, job.task, job.episode])
+        episode = Episode(self.client, job.task, job.episode)
+        home = plan.actions[0].copy()
+        grasp = turned_home(plan.grasp, home, job.asset)
+        command, places, found = home, None, []
+        for number in range(job.ways):
+            start = start_of(grasp, home, random) if number else home
+            going, way = laws.travel(command, start, grasp.over), laws.reach(start, grasp)
+            if len(episode.shown.rows) + len(going) + len(way) > MOST_STEPS or len(way) >= laws.MOST_STEPS:
+                continue
+            # The hand comes to rest where it starts.
+            episode.play(np.concatenate([going, start[None].repeat(4, 0)]), np.array([len(going) + 3]))
+            places = episode.positions() if places is None else places
+            before = np.concatenate([start[None], way[:-1]])
+            near = np.linalg.norm(before[:, :3] - grasp.pose[:3], axis=1) < NEAR
+            steps = np.arange(len(way))
+            pictured = steps[np.where(near, steps % NEAR_STRIDE, steps % FAR_STRIDE) == 0]
+            first = len(episode.shown.rows)
+            episode.play(way, pictured)
+            if episode.is_over or np.abs(episode.positions() - places).max() > UNTOUCHED:
+                break
+            found.append(self.demonstration(episode.shown, episode.prompt, first + pictured, first))
+            command = way[-1]
+        return found
+
+
+_worker: _Worker
+
+
+def _begin(settings: Settings, used) -> None:
+    global _worker
+    _worker = _Worker(settings, used)
+
+
+def _show(job: Job) -> tuple[list[dict], str]:
+    """The demonstrations of an attempt, and what became of its grip."""
+    plan = plan_of(np.load(job.file))
+    if plan is None:
+        return [], "grasped again"
+    grip = _worker.grip(job, plan)
+    ways = _worker.ways(job, plan)
+    return ([grip] if isinstance(grip, dict) else []) + ways, "kept" if isinstance(grip, dict) else grip
+
+
+def demonstrate(
+    suite: str, out: Path, attempts: int, ways: int, edge: int, seed: int, disturbance: float, teacher: str, tasks: str, processes: int
+) -> None:
+    """Records demonstrations into a folder that `data.load` reads. An attempt shows one grip and `ways` ways to the object.
+
+    Raises UserError if softvt fails.
+    """
+    if (out / "dataset.json").is_file():
+        return
+    only = ["--task", tasks] if tasks else []
+    moves = ["--set", f"robot.disturbance.position={disturbance}", "--set", f"robot.disturbance.rotation={4 * disturbance}"]
+    common = ["--seed", str(seed), *only, *moves]
+    run, folder = out / "attempts", out / f"packed_{edge}"
+    run_softvt([suite, "--policy", teacher, *common, "--episodes", str(attempts), "--threads", str(processes), "--out", str(run), "--resume"])
+    jobs = []
+    for line in (run / "episodes.jsonl").read_text().splitlines():
+        row = json.loads(line)
+        if row["safety"]:
+            file = run / "actions" / f"task_{row['task']:03}" / f"episode_{row['episode']:05}.npy"
+            jobs.append(Job(row["task"], row["episode"], row["asset"], file, ways))
+    if not jobs:
+        raise UserError(f"{run}: no attempt is safe")
+    folder.mkdir(parents=True, exist_ok=True)
+    profile = out / "profile.lua"
+    profile.write_text(PROFILE.replace("RECENT", str(RECENT)))
+    for key in CAMERAS:  # sparse: only what is written takes space
+        np.lib.format.open_memmap(folder / f"{key}.npy", "w+", np.uint8, (len(jobs) * MOST_PICTURES, edge, edge, 3))
+    flags = ["--threads", str(processes), "--privileged", "--profile", str(profile), *common, *camera_flags(edge)]
+    context = multiprocessing.get_context("spawn")
+    used, found, fates = context.Value("q", 0), [], Counter()
+    with serving(suite, flags) as address:
+        settings = Settings(address, folder, edge, seed)
+        with ProcessPoolExecutor(processes, context, _begin, (settings, used)) as pool:
+            for number, (shown, fate) in enumerate(pool.map(_show, jobs), 1):
+                found += shown
+                fates[fate] += 1
+                if number % 50 == 0 or number == len(jobs):
+                    print(f"{out.name}: {number} of {len(jobs)} attempts repeated, {used.value} pictures", flush=True)
+    lengths = np.array([len(one["state"]) for one in found])
+    arrays = {key: np.concatenate([one[key] for one in found]) for key in found[0] if key != "prompt"}
+    np.savez(folder / "numbers.npz", lengths=lengths, prompts=np.array([one["prompt"] for one in found]), **arrays)
+    (out / "recording.json").write_text(json.dumps({"gripper": None}) + "\n")
+    card = {
+        "suite": suite,
+        "seed": seed,
+        "teacher": teacher,
+        "attempts": attempts,
+        "safe_attempts": len(jobs),
+        "grips": dict(sorted(fates.items())),
+        "demonstrations": len(found),
+        "steps": int(lengths.sum()),
+        "pictures": used.value,
+    }
+    (out / "dataset.json").write_text(json.dumps(card, indent=1) + "\n")
+    (folder / "identity").write_text(f"{PACKED} {hashlib.sha256((out / 'dataset.json').read_bytes()).hexdigest()}")
+    print(f"{out.name}: {json.dumps(card)}", flush=True)
+
+
+def processes_of(count: int) -> int:
+    return count or os.cpu_count() or 1
