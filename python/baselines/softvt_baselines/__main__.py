@@ -10,7 +10,7 @@ from . import UserError
 
 CODES = ["continuous", "binary", "two-width", "force"]
 INPUTS = {"vo": "vision only", "vp": "vision and drives", "vt": "vision and touch", "vpt": "all three"}
-REFERENCES = ["expert", "tactile-servo", "fixed-closure"]
+REFERENCES = ["expert", "tactile-servo", "fixed-closure", "size-seen"]
 
 
 def _record(args: argparse.Namespace) -> None:
@@ -72,10 +72,28 @@ def _evaluate(args: argparse.Namespace) -> None:
 
 
 def _study(args: argparse.Namespace) -> None:
-    from .study import Study, run
+    import time
 
-    options = {key: value for key, value in vars(args).items() if key not in ("command", "run", "flags")}
-    run(Study(**options, flags=tuple(args.flags)))
+    from .study import Study, read_queue, run
+
+    until = time.monotonic() + 60 * args.minutes
+
+    def one(given: argparse.Namespace, out: Path) -> None:
+        own = ("command", "run", "flags", "queue", "minutes", "out")
+        options = {key: value for key, value in vars(given).items() if key not in own}
+        run(Study(**options, out=out, flags=tuple(args.flags), until=until))
+
+    if args.queue is None:
+        if not args.suites:
+            raise UserError("study: name a suite, or a --queue")
+        return one(args, args.out)
+    if args.suites:
+        raise UserError("study: a --queue names the suites")
+    # All lines are read before the first study runs.
+    studies = [(name, _parser().parse_args(["study", *words, "--out", "."])) for name, *words in read_queue(args.queue)]
+    for name, given in studies:
+        if time.monotonic() < until:
+            one(given, args.out / name)
 
 
 def _page(args: argparse.Namespace) -> None:
@@ -102,6 +120,7 @@ def _number(kind: type, is_valid: Callable[[float], bool], expected: str) -> Cal
 _positive = _number(int, lambda value: value >= 1, "a whole number, 1 or more")
 _edge = _number(int, lambda value: value >= 32 and value % 32 == 0, "a multiple of 32 pixels")
 _share = _number(float, lambda value: 0 <= value < 1, "a number from 0 to below 1")
+_minutes = _number(float, lambda value: value > 0, "a number above 0")
 _length = _number(float, lambda value: 0 <= value <= 0.05, "0 to 0.05 m")
 
 
@@ -202,7 +221,11 @@ def _parser() -> argparse.ArgumentParser:
     with_blend(evaluate)
 
     study = command("study", _study, "record, train and evaluate every combination of suites, inputs, grip codes and seeds")
-    study.add_argument("suites", nargs="+", help="names of standard suites")
+    study.add_argument("suites", nargs="*", help="names of standard suites")
+    study.add_argument(
+        "--queue", type=Path, help="file with a study per line, in place of the other options: the name of its folder below --out, and its options"
+    )
+    study.add_argument("--minutes", type=_minutes, default=float("inf"), help="time after which no further part is begun")
     study.add_argument("--out", type=Path, required=True, help="folder of the study")
     study.add_argument(
         "--inputs",
@@ -220,6 +243,10 @@ def _parser() -> argparse.ArgumentParser:
     study.add_argument("--episodes", type=_positive, default=50, help="episodes per task")
     with_recording(study)
     with_blend(study)
+    study.add_argument("--task", default="", help="only these tasks: indices, separated by commas")
+    study.add_argument("--memory", action="store_true", help="policies that remember, from recordings of demonstrate")
+    study.add_argument("--attempts", type=_positive, default=150, help="attempts of the teacher per task, with --memory")
+    study.add_argument("--ways", type=_positive, default=4, help="ways to the object per attempt, with --memory")
     study.add_argument("--compile", action="store_true", help="compile the networks")
     study.add_argument("--per-gpu", type=_positive, default=1, help="policies that are trained on one GPU at a time")
 

@@ -197,7 +197,8 @@ class _Worker:
     def demonstration(self, shown: Shown, prompt: str, pictured: np.ndarray, first: int) -> dict:
         """The rows from the first one, whose pictures go to the files."""
         rows = shown.rows[first:]
-        wanted = [k for k in range(len(rows)) if k + first in set(pictured.tolist()) and "image" in rows[k]]
+        chosen = {*(pictured - first).tolist()}
+        wanted = [k for k, row in enumerate(rows) if k in chosen and "image" in row]
         with self.used.get_lock():
             at = self.used.value
             self.used.value += len(wanted)

@@ -19,8 +19,9 @@ INTERVALS, REMEMBERED = len(LIMITS) - 1, LIMITS[-1]
 SHARES = np.float32([[(first <= back < end) / (end - first) for back in range(REMEMBERED)] for first, end in pairwise(LIMITS)])
 # Control steps in an observation of such a policy, softvt's largest number: as many actions may be executed of an answer.
 RECENT = 32
-# Change of the command per step, m of the position or share of the closure (1.6 mm), from which on a motion is fast.
-FAST, FAST_GRIP = 1e-3, 0.02
+# Change of the command per step, m of the position or share of the closure (0.6 mm), from which on a motion is fast. A hand that feels closes
+# by at most 0.4 mm.
+FAST, FAST_GRIP = 1e-3, 0.008
 # Closing since the last fast motion (1 mm) from which on a hand is taken to feel.
 FEELS = 0.0125
 # Opening per step of the command by which a hand lets go: more than a hand that feels ever loosens its grip.

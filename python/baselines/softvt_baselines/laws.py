@@ -14,12 +14,12 @@ from .numbers import GRIPPER, ROTATION, between, rotated
 STEP = 0.05
 # Reaching: largest speed, m/s, and the acceleration by which it falls towards the end, m/s²; least speed, m/s; turn per step, rad, and the
 # horizontal distance within which the hand turns, m: from farther away, a picture does not show well how an object is turned.
-REACH_SPEED, REACH_SLOWING, REACH_LEAST, TURN, TURNS_WITHIN = 0.4, 0.6, 0.02, 0.06, 0.04
+REACH_SPEED, REACH_SLOWING, REACH_LEAST, TURN, TURNS_WITHIN = 0.4, 0.2, 0.02, 0.06, 0.04
 # The hand comes down in a funnel: height over distance from its axis beyond a radius, m, and the distance that a turn counts, m/rad.
 FUNNEL, RADIUS, PER_TURN = 8, 0.002, 0.1
 # Distance, m, and turn, rad, at which the hand has arrived.
 ARRIVED, TURNED = 0.0005, 0.02
-# Change of the closure per step of the open hand, and while it closes slowly: 0.1 mm of width, as tactile-servo does.
+# Change of the closure per step, about, and while the hand closes slowly: 0.1 mm of width, as tactile-servo does.
 FAST_CLOSING, SLOW_CLOSING = 0.03, 0.00125
 # Slow steps that are shown: more than those after which a hand is taken to feel.
 SLOW_STEPS = 14
@@ -79,7 +79,8 @@ def reach_step(command: np.ndarray, grasp: Grasp) -> np.ndarray:
     if not has_arrived:
         found[GRIPPER] = _towards(closure, grasp.opening, FAST_CLOSING)
     elif closure < grasp.closure - 1e-6:
-        found[GRIPPER] = _towards(closure, grasp.closure, FAST_CLOSING)
+        # In equal steps: a short last one would pass for slow closing.
+        found[GRIPPER] = closure + (grasp.closure - closure) / max(1, round((grasp.closure - closure) / FAST_CLOSING))
     else:
         found[GRIPPER] = closure + SLOW_CLOSING
     return found

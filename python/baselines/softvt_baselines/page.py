@@ -10,11 +10,12 @@ import numpy as np
 
 from . import UserError, results
 from .results import Estimate, Run
+from .study import ORIGIN
 
 # The tables stand between these lines of the page.
 BEGIN, END = "<!-- tables: softvt-baselines page -->", "<!-- end of tables -->"
 LEARNED = re.compile(r"(?P<suite>\w+)-(?P<inputs>vo|vp|vt|vpt)-(?P<code>[a-z-]+)-s(?P<seed>\d+)-r(?P<replan>\d+)(?P<condition>\+.*)?")
-REFERENCES = {"expert": "expert (privileged)", "tactile-servo": "tactile servo (privileged)", "fixed-closure": "fixed closure (privileged)"}
+REFERENCES = {"expert": "expert (privileged)", "tactile-servo": "tactile servo (privileged)", "fixed-closure": "fixed closure (privileged)", "size-seen": "size seen (privileged)"}
 # The inputs with which others are compared: what they add is the difference.
 WITHOUT = {"vp": "vo", "vt": "vo", "vpt": "vp"}
 MEASURES = ["goal", "no_drop", "safety"]
@@ -48,7 +49,9 @@ def collect(study: Path, into: Path) -> None:
         folder, run = into / "+".join([name, *inner[1:]]), results.load(summary.parent)
         _identify(folder, run.suite)
         folder.mkdir(parents=True, exist_ok=True)
-        shutil.copy(summary, folder)
+        for file in (summary, summary.with_name(ORIGIN)):
+            if file.is_file():
+                shutil.copy(file, folder)
         results.save(run, folder)
 
 

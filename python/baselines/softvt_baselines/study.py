@@ -1,14 +1,19 @@
 """A study: records suites, trains the policies of a list on all GPUs, and evaluates them.
 
-Everything that is complete in the folder of the study is kept, so a study that was interrupted continues.
+Everything that is complete in the folder of the study is kept, so a study that was interrupted continues. A queue is a list of studies, which
+stops in time.
 """
 
+import hashlib
 import itertools
 import json
 import os
+import platform
 import queue
+import shlex
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -22,7 +27,9 @@ from .evaluate import recording_flags, run_softvt
 # Script that runs a suite under conditions.
 SHIFTS = "shifts"
 # Options that all results in the folder of a study have in common.
-SAME = ["demos", "steps", "edge", "teacher", "disturbance", "blend", "episodes"]
+SAME = ["demos", "steps", "edge", "teacher", "disturbance", "blend", "episodes", "task", "memory", "attempts", "ways"]
+# File beside the results of a run that says where they come from.
+ORIGIN = "origin.json"
 
 
 @dataclass
@@ -46,7 +53,12 @@ class Study:
     shifts: bool = False  # evaluate also under the standard conditions of suites/shifts.lua, with the first of `replans`
     references: tuple[str, ...] = ()  # built-in policies that are evaluated as well
     compile: bool = False  # compile the networks
+    task: str = ""  # only these tasks: indices, separated by commas
+    memory: bool = False  # policies that remember, from demonstrations of `demonstrate`
+    attempts: int = 150  # of the teacher per task, for these
+    ways: int = 4  # to the object per attempt
     flags: tuple[str, ...] = ()  # further flags of the evaluations of learned policies
+    until: float = float("inf")  # time (time.monotonic()) after which no further part is begun
 
 
 @dataclass(frozen=True)
@@ -59,6 +71,19 @@ class Job:
     @property
     def name(self) -> str:
         return f"{self.suite}-{self.inputs}-{self.code}-s{self.seed}"
+
+
+class OutOfTime(UserError):
+    """A part was not begun, since the time was up."""
+
+
+def _note(study: Study, text: str, began: float) -> None:
+    print(f"{study.out.name}: {text}; {time.monotonic() - began:.0f} s", flush=True)
+
+
+def _check_time(study: Study) -> None:
+    if time.monotonic() > study.until:
+        raise OutOfTime("the time was up")
 
 
 def _call(words: list[str], log: Path, gpu: int | None = None) -> None:
@@ -77,27 +102,62 @@ def _train(job: Job, study: Study, gpu: int | None) -> None:
     checkpoint = study.out / "checkpoints" / f"{job.name}.pt"
     if checkpoint.is_file():
         return
+    _check_time(study)
+    began = time.monotonic()
     switches = ["--touch"] * ("t" in job.inputs) + ["--drives"] * ("p" in job.inputs) + ["--compile"] * study.compile
+    switches += ["--memory"] * study.memory
     shape = ["--gripper", job.code, "--edge", str(study.edge), "--steps", str(study.steps), "--seed", str(job.seed), *switches]
     words = ["train", str(study.out / "data" / job.suite), "--out", str(checkpoint), "--device", _device(gpu), *shape]
     _call(words, study.out / "logs" / f"{job.name}.log", gpu)
+    _note(study, f"trained {job.name}", began)
+
+
+def _machine() -> str:
+    """The processor and the GPUs of this machine, in words."""
+    try:
+        words = ["nvidia-smi", "--query-gpu=name", "--format=csv,noheader"]
+        gpus = subprocess.run(words, capture_output=True, text=True).stdout.split("\n")
+    except FileNotFoundError:
+        gpus = []
+    return f"{os.cpu_count()} processors ({platform.machine()}), {', '.join(filter(None, gpus)) or 'no GPU'}"
+
+
+def _write_origin(run: Path, checkpoint: Path | None) -> None:
+    """Writes where the results of a run come from. SOFTVT_COMMIT names the commit of softvt."""
+    origin = {"machine": _machine(), "commit": os.environ.get("SOFTVT_COMMIT")}
+    if checkpoint is not None:
+        origin["checkpoint_sha256"] = hashlib.sha256(checkpoint.read_bytes()).hexdigest()
+    (run / ORIGIN).write_text(json.dumps(origin, indent=1) + "\n")
 
 
 def _evaluate(job: Job, replan: int, script: str, study: Study, threads: int, gpu: int | None) -> None:
     name = f"{job.name}-r{replan}"
+    run, checkpoint = study.out / "runs" / name / script, study.out / "checkpoints" / f"{job.name}.pt"
+    if (run / ORIGIN).is_file():
+        return
+    _check_time(study)
+    began = time.monotonic()
     words = ["evaluate", str(study.out / "checkpoints" / f"{job.name}.pt"), f"suites/{script}.lua"]
     words += ["--out", str(study.out / "runs" / name), "--name", name, "--device", _device(gpu), "--blend", str(study.blend)]
     flags = ["--replan", str(replan), "--episodes", str(study.episodes), "--threads", str(threads), "--resume", *study.flags]
     flags += ["--suite", job.suite] * (script == SHIFTS)
+    flags += ["--task", study.task] if study.task else []
     _call([*words, "--", *flags], study.out / "logs" / f"{name}-{script}.log", gpu)
-    print(f"evaluated {name} on {script}", flush=True)
+    _write_origin(run, checkpoint)
+    _note(study, f"evaluated {name} on {script}", began)
 
 
 def _evaluate_reference(suite: str, policy: str, study: Study, threads: int, gpu: int | None) -> None:
     name = f"{suite}-{policy}"
-    words = [f"suites/{suite}.lua", "--policy", policy, "--out", str(study.out / "runs" / name), "--name", name]
+    run = study.out / "runs" / name
+    if (run / ORIGIN).is_file():
+        return
+    _check_time(study)
+    began = time.monotonic()
+    words = [f"suites/{suite}.lua", "--policy", policy, "--out", str(run), "--name", name, *(["--task", study.task] if study.task else [])]
     run_softvt([*words, "--episodes", str(study.episodes), "--threads", str(threads), "--resume"])
-    print(f"evaluated {name}", flush=True)
+    _write_origin(run, None)
+    _note(study, f"evaluated {name}", began)
 
 
 def _device(gpu: int | None) -> str:
@@ -119,6 +179,8 @@ class _Workers:
             gpu = self.free.get()
             try:
                 work(gpu)
+            except OutOfTime:
+                raise
             except UserError as error:
                 print(error, file=sys.stderr, flush=True)
                 raise
@@ -149,11 +211,22 @@ def _check_options(study: Study) -> None:
 
 def _record(suite: str, study: Study) -> None:
     recording = study.out / "data" / suite
-    if not (recording / "dataset.json").is_file():
+    if (recording / "dataset.json").is_file():
+        pack(recording, study.edge, os.cpu_count() or 1)
+        return
+    _check_time(study)
+    began = time.monotonic()
+    if study.memory:
+        words = ["demonstrate", f"suites/{suite}.lua", "--out", str(recording), "--attempts", str(study.attempts), "--ways", str(study.ways)]
+        words += ["--edge", str(study.edge), "--disturbance", str(study.disturbance), *(["--task", study.task] if study.task else [])]
+        words += ["--teacher", study.teacher] if study.teacher != "suite" else []
+        _call(words, study.out / "logs" / f"{suite}.log")
+    else:
         flags = ["--out", str(recording), "--resume", *recording_flags(study.demos, study.edge, study.teacher, study.disturbance)]
+        flags += ["--task", study.task] if study.task else []
         run_softvt(["record", f"suites/{suite}.lua", *flags])
     pack(recording, study.edge, os.cpu_count() or 1)
-    print(f"recorded {suite}", flush=True)
+    _note(study, f"recorded {suite}", began)
 
 
 def run(study: Study) -> None:
@@ -200,4 +273,18 @@ def run(study: Study) -> None:
         evaluation.cancel()
         raise
     if problems:
+        if study.until < time.monotonic():
+            print(f"{study.out.name}: stopped in time, {len(problems)} parts are left", flush=True)
+            return
         raise UserError(f"{len(problems)} recordings, policies or runs are not complete: {'; '.join(problems)}")
+
+
+def read_queue(path: Path) -> list[list[str]]:
+    """The words of each study in a queue: one study per line, its name and its options. A line that begins with # says nothing.
+
+    Raises UserError if the file is missing.
+    """
+    if not path.is_file():
+        raise UserError(f"{path}: no such queue")
+    lines = [shlex.split(line, comments=True) for line in path.read_text().splitlines()]
+    return [words for words in lines if words]

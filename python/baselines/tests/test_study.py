@@ -1,5 +1,6 @@
 """The order of a study and what happens when a part fails. Needs no learning library: commands are replaced."""
 
+import json
 import sys
 import tempfile
 import types
@@ -33,14 +34,18 @@ class Studies(unittest.TestCase):
             raise UserError("it failed")
         if words[0] == "train":
             self.switches[Path(words[words.index("--out") + 1]).stem.split("-")[1]] = {
-                word for word in words if word in ("--touch", "--drives")
+                word for word in words if word in ("--touch", "--drives", "--memory")
             }
             Path(words[words.index("--out") + 1]).touch()
+        if words[0] == "evaluate":
+            (Path(words[words.index("--out") + 1]) / Path(words[2]).stem).mkdir(parents=True)
 
     def run_softvt(self, words):
         self.calls.append(" ".join(words[:2]))
         if self.failing and self.failing in self.calls[-1]:
             raise UserError("it failed")
+        if words[0] != "record":
+            Path(words[words.index("--out") + 1]).mkdir(parents=True)
 
     def study(self, **changes) -> study.Study:
         options = dict(suites=["one"], inputs=["vo", "vt"], seeds=[0], codes=["continuous"], replans=[4, 10], out=self.out, demos=1)
@@ -52,8 +57,9 @@ class Studies(unittest.TestCase):
         runs = sorted(call for call in self.calls if call.startswith("evaluate"))
         expected = [f"evaluate runs/one-{inputs}-continuous-s0-r{replan}" for inputs in ("vo", "vt") for replan in (10, 4, 4)]
         self.assertEqual(runs, expected)
+        self.calls.clear()
         study.run(self.study(references=("expert",), shifts=True))
-        self.assertEqual(len([call for call in self.calls if call.startswith("train")]), 2)
+        self.assertEqual(self.calls, ["record suites/one.lua"], "what is there is not made again")
 
     def test_inputs_are_switches_of_training(self):
         study.run(self.study(inputs=["vo", "vp", "vt", "vpt"]))
@@ -77,6 +83,29 @@ class Studies(unittest.TestCase):
         with self.assertRaises(UserError) as caught:
             study.run(self.study(steps=3))
         self.assertIn("steps 2, now 3", str(caught.exception))
+
+
+    def test_results_say_where_they_come_from(self):
+        with mock.patch.dict("os.environ", {"SOFTVT_COMMIT": "abc"}):
+            study.run(self.study(inputs=["vt"], replans=[4]))
+        origin = json.loads((self.out / "runs/one-vt-continuous-s0-r4/one" / study.ORIGIN).read_text())
+        self.assertEqual((origin["commit"], len(origin["checkpoint_sha256"])), ("abc", 64))
+
+    def test_no_part_is_begun_after_the_time(self):
+        study.run(self.study(until=0))
+        self.assertEqual(self.calls, [])
+
+    def test_policies_that_remember_have_recordings_of_their_own(self):
+        study.run(self.study(memory=True, attempts=7, task="0,3", inputs=["vt"]))
+        self.assertEqual(self.calls[0], "demonstrate data/one")
+        self.assertIn("--memory", self.switches["vt"])
+
+    def test_a_queue_has_a_study_per_line(self):
+        path = self.out / "queue"
+        path.write_text("# First.\nsmall one two --seeds 0  # with one seed\n\nmore one\n")
+        self.assertEqual(study.read_queue(path), [["small", "one", "two", "--seeds", "0"], ["more", "one"]])
+        with self.assertRaises(UserError):
+            study.read_queue(self.out / "none")
 
 
 if __name__ == "__main__":
