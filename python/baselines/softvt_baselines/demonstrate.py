@@ -83,7 +83,7 @@ def plan_of(actions: np.ndarray) -> Plan | None:
     lifts = np.flatnonzero(np.diff(actions[:last, 2]) <= 2e-5)
     if len(lifts) == 0:
         return None
-    lift = int(lifts[-1]) + 1  # the first action that lifts
+    lift = int(lifts[-1]) + 2  # the first action that lifts
     opens = np.flatnonzero(np.diff(actions[lift:, GRIPPER]) < -0.005)
     if len(opens) == 0:
         return None
