@@ -2,6 +2,7 @@
 
 import argparse
 import asyncio
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -22,10 +23,10 @@ def _record(args: argparse.Namespace) -> None:
 
 
 def _demonstrate(args: argparse.Namespace) -> None:
-    from .demonstrate import demonstrate, processes_of
+    from .demonstrate import Demonstrate, demonstrate
 
-    processes = processes_of(args.processes)
-    demonstrate(args.suite, args.out, args.attempts, args.ways, args.edge, args.seed, args.disturbance, args.teacher, args.task, processes)
+    options = {key: value for key, value in vars(args).items() if key not in ("command", "run", "flags")}
+    demonstrate(Demonstrate(**options | {"processes": args.processes or os.cpu_count() or 1}))
 
 
 def _train(args: argparse.Namespace) -> None:
@@ -46,7 +47,7 @@ def _train(args: argparse.Namespace) -> None:
     }
     shape = Shape(**inputs, code=args.gripper, head=args.head, frames=args.frames, edge=args.edge, chunk=20 if args.memory else 50)
     demos = load(args.recordings, args.gripper, args.edge, args.tactile_pictures, args.drives, args.memory)
-    options = TrainOptions(shape, args.steps, args.batch, args.seed, device, args.compile)
+    options = TrainOptions(shape, args.steps, args.batch, args.seed, device, args.compile, args.seconds)
     train(demos, options, args.out, {"recordings": [recording.name for recording in args.recordings]})
 
 
@@ -144,6 +145,9 @@ def _parser() -> argparse.ArgumentParser:
 
     def with_steps(sub: argparse.ArgumentParser) -> None:
         sub.add_argument("--steps", type=_positive, default=6000, help="training steps")
+        sub.add_argument(
+            "--seconds", type=_minutes, default=float("inf"), help="time that training may take: there are fewer steps if need be"
+        )
 
     def with_recording(sub: argparse.ArgumentParser) -> None:
         sub.add_argument("--demos", type=_positive, default=75, help="demonstrations per task")
@@ -161,6 +165,11 @@ def _parser() -> argparse.ArgumentParser:
             help="standard deviation of the robot from its commands while recording, m; of its rotation 4 rad per m",
         )
 
+    def with_demonstrations(sub: argparse.ArgumentParser) -> None:
+        sub.add_argument("--attempts", type=_positive, default=100, help="attempts of the teacher per task")
+        sub.add_argument("--scenes", type=_positive, default=200, help="scenes with ways to the object, per task")
+        sub.add_argument("--ways", type=_positive, default=4, help="ways to the object per scene")
+
     record = command("record", _record, "record demonstrations of a suite with pictures of the size that policies see")
     record.add_argument("suite", help="suite of softvt")
     record.add_argument("--out", type=Path, required=True, help="folder of the recording")
@@ -171,14 +180,16 @@ def _parser() -> argparse.ArgumentParser:
     )
     demonstrate.add_argument("suite", help="suite of softvt")
     demonstrate.add_argument("--out", type=Path, required=True, help="folder of the recording")
-    demonstrate.add_argument("--attempts", type=_positive, default=150, help="attempts of the teacher per task")
-    demonstrate.add_argument("--ways", type=_positive, default=4, help="ways to the object per attempt")
+    with_demonstrations(demonstrate)
     demonstrate.add_argument("--task", default="", help="only these tasks: indices, separated by commas")
     demonstrate.add_argument("--seed", type=_positive, default=1, help="seed of the episodes; evaluations use 0")
     demonstrate.add_argument("--teacher", default="tactile-servo", help="built-in policy that demonstrates")
     demonstrate.add_argument("--processes", type=int, default=0, help="processes; 0: one per processor")
     demonstrate.add_argument(
-        "--disturbance", type=_length, default=0.00003, help="standard deviation of the robot from its commands, m; of its rotation 4 rad per m"
+        "--disturbance",
+        type=_length,
+        default=0.00003,
+        help="standard deviation of the robot from its commands, m; of its rotation 4 rad per m",
     )
     with_edge(demonstrate)
 
@@ -223,7 +234,9 @@ def _parser() -> argparse.ArgumentParser:
     study = command("study", _study, "record, train and evaluate every combination of suites, inputs, grip codes and seeds")
     study.add_argument("suites", nargs="*", help="names of standard suites")
     study.add_argument(
-        "--queue", type=Path, help="file with a study per line, in place of the other options: the name of its folder below --out, and its options"
+        "--queue",
+        type=Path,
+        help="file with a study per line, in place of the other options: the name of its folder below --out, and its options",
     )
     study.add_argument("--minutes", type=_minutes, default=float("inf"), help="time after which no further part is begun")
     study.add_argument("--out", type=Path, required=True, help="folder of the study")
@@ -245,8 +258,7 @@ def _parser() -> argparse.ArgumentParser:
     with_blend(study)
     study.add_argument("--task", default="", help="only these tasks: indices, separated by commas")
     study.add_argument("--memory", action="store_true", help="policies that remember, from recordings of demonstrate")
-    study.add_argument("--attempts", type=_positive, default=150, help="attempts of the teacher per task, with --memory")
-    study.add_argument("--ways", type=_positive, default=4, help="ways to the object per attempt, with --memory")
+    with_demonstrations(study)
     study.add_argument("--compile", action="store_true", help="compile the networks")
     study.add_argument("--per-gpu", type=_positive, default=1, help="policies that are trained on one GPU at a time")
 

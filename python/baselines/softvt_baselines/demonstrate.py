@@ -1,14 +1,13 @@
 """Demonstrations for policies that feel: grips of a teacher, and ways to and from them by feedback laws.
 
 A teacher such as tactile-servo first runs without cameras. What it did is repeated through `softvt serve`, with pictures only where a policy
-looks: its grip as it was, the way to the basket by a law, and ways to the object from random places by another law. The recording is
-written as `data.pack` writes it.
+looks: its grip as it was, and the way from there by a law. In further scenes, where the teacher runs until it begins to close, another law
+reaches the object from random places. The recording is written as `data.pack` writes it.
 """
 
 import hashlib
 import json
 import multiprocessing
-import os
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
@@ -40,8 +39,13 @@ MOST_STEPS = 690
 ROUND = {"steamed_bun", "golden_bun", "sesame_bun", "cylinder", "sphere"}
 # Objects that look alike after a quarter of a turn.
 SQUARE = {"cube"}
-# Largest number of pictures of a scene.
-MOST_PICTURES = 1500
+# Displacement of the teacher's grasps in each horizontal direction, m, and control steps of a teacher that only reaches.
+SPREAD, REACHES = 0.003, 90
+# Seeds of the scenes follow that of the grips by this much.
+NEXT_SEED = 1000
+# Largest number of pictures of a grip and of a way.
+GRIP_PICTURES, WAY_PICTURES = 250, laws.MOST_STEPS
+CONTEXT = multiprocessing.get_context("spawn")
 PROFILE = """return softvt.profile {
   name = "demonstrations",
   inputs = {
@@ -62,24 +66,41 @@ class Plan:
 
     actions: np.ndarray  # (T, 7) from its start until it lifts the object
     begin: int  # step in which it begins to close slowly
-    grasp: Grasp
     release: Release
 
 
-def plan_of(actions: np.ndarray) -> Plan | None:
-    """The plan in the actions (T, 7) of an attempt; None if it grasped more than once."""
-    before = np.concatenate([actions[:1], actions[:-1]])  # the command before each step
-    begins = memory_begins(np.float32(before), np.array([0]))
-    feels = np.flatnonzero(~is_seen(np.float32(before), np.arange(len(before)), begins))
-    if len(feels) == 0 or (np.diff(feels) > 1).any():
+def _before(actions: np.ndarray) -> np.ndarray:
+    """The command before each step (T, 7)."""
+    return np.concatenate([actions[:1], actions[:-1]])
+
+
+def _feels(actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Steps in which the hand feels, and since which step each step is remembered."""
+    before = np.float32(_before(actions))
+    begins = memory_begins(before, np.array([0]))
+    return np.flatnonzero(~is_seen(before, np.arange(len(before)), begins)), begins
+
+
+def grasp_of(actions: np.ndarray) -> Grasp | None:
+    """Where the hand begins to close slowly for the first time; None if it does not."""
+    feels, begins = _feels(actions)
+    if len(feels) == 0:
         return None
-    first, last = feels[0], feels[-1]
-    begin = begins[first]
+    before, begin = _before(actions), begins[feels[0]]
     pose = before[begin]
     is_above = np.hypot(*(before[:, :2] - pose[:2]).T) < 1e-3
     over = before[int(is_above.argmax()), 2]
     waits = np.flatnonzero(np.abs(np.diff(before[: begin + 1, GRIPPER])) < 1e-9)
     opening = before[waits[-1], GRIPPER] if len(waits) else 0.0
+    return Grasp(pose[:6], float(max(over, pose[2] + 0.05)), float(opening), float(pose[GRIPPER]))
+
+
+def plan_of(actions: np.ndarray) -> Plan | None:
+    """The plan in the actions (T, 7) of an attempt; None if it grasped more than once."""
+    feels, begins = _feels(actions)
+    if len(feels) == 0 or (np.diff(feels) > 1).any():
+        return None
+    last = feels[-1]
     lifts = np.flatnonzero(np.diff(actions[:last, 2]) <= 2e-5)
     if len(lifts) == 0:
         return None
@@ -88,9 +109,8 @@ def plan_of(actions: np.ndarray) -> Plan | None:
     if len(opens) == 0:
         return None
     end = lift + int(opens[0])
-    grasp = Grasp(pose[:6], float(max(over, pose[2] + 0.05)), float(opening), float(pose[GRIPPER]))
     release = Release(actions[end, :6], float(actions[lift:end, 2].max()), float(actions[end:, GRIPPER].min()))
-    return Plan(actions[:lift], int(begin), grasp, release)
+    return Plan(actions[:lift], int(begins[feels[0]]), release)
 
 
 def turned_home(grasp: Grasp, home: np.ndarray, asset: str) -> Grasp:
@@ -176,7 +196,7 @@ class Job:
     episode: int
     asset: str
     file: Path  # of the teacher's actions
-    ways: int
+    ways: int  # to the object; 0: the grip is repeated
 
 
 @dataclass
@@ -233,17 +253,19 @@ class _Worker:
             episode.play(episode.shown.actions[-1][None].repeat(8, 0), np.zeros(0, int))
         record = episode.info.get("record") or {}
         if not record.get("safety"):
-            return f"not safe: {record.get('failed_stage') or ('slip' if record.get('goal') and record.get('deformation_ok') else 'deformed')}"
+            return (
+                f"not safe: {record.get('failed_stage') or ('slip' if record.get('goal') and record.get('deformation_ok') else 'deformed')}"
+            )
         shown = Shown(episode.shown.rows[:count], episode.shown.actions[:count])
         kept = lift + np.concatenate([pictured, np.arange(max(0, len(carried) - 24), len(carried))])
         return self.demonstration(shown, episode.prompt, kept, plan.begin - BEFORE)
 
-    def ways(self, job: Job, plan: Plan) -> list[dict]:
+    def ways(self, job: Job, actions: np.ndarray, grasp: Grasp) -> list[dict]:
         """Ways from random places to where the teacher grasped."""
         random = np.random.default_rng([self.settings.seed, job.task, job.episode])
         episode = Episode(self.client, job.task, job.episode)
-        home = plan.actions[0].copy()
-        grasp = turned_home(plan.grasp, home, job.asset)
+        home = actions[0].copy()
+        grasp = turned_home(grasp, home, job.asset)
         command, places, found = home, None, []
         for number in range(job.ways):
             start = start_of(grasp, home, random) if number else home
@@ -275,64 +297,104 @@ def _begin(settings: Settings, used) -> None:
 
 
 def _show(job: Job) -> tuple[list[dict], str]:
-    """The demonstrations of an attempt, and what became of its grip."""
-    plan = plan_of(np.load(job.file))
+    """The demonstrations of an attempt or a scene, and what became of it."""
+    actions = np.load(job.file)
+    if job.ways:
+        grasp = grasp_of(actions)
+        return (_worker.ways(job, actions, grasp), "ways") if grasp else ([], "not reached")
+    plan = plan_of(actions)
     if plan is None:
         return [], "grasped again"
     grip = _worker.grip(job, plan)
-    ways = _worker.ways(job, plan)
-    return ([grip] if isinstance(grip, dict) else []) + ways, "kept" if isinstance(grip, dict) else grip
+    return ([grip], "kept") if isinstance(grip, dict) else ([], grip)
 
 
-def demonstrate(
-    suite: str, out: Path, attempts: int, ways: int, edge: int, seed: int, disturbance: float, teacher: str, tasks: str, processes: int
-) -> None:
-    """Records demonstrations into a folder that `data.load` reads. An attempt shows one grip and `ways` ways to the object.
+@dataclass
+class Demonstrate:
+    """What is recorded."""
+
+    suite: str  # a file below suites/
+    out: Path
+    attempts: int  # of the teacher per task
+    scenes: int  # with ways to the object, per task
+    ways: int  # per scene
+    edge: int
+    seed: int
+    disturbance: float  # m
+    teacher: str
+    task: str  # only these tasks: indices, separated by commas; "": all
+    processes: int
+
+    @property
+    def common(self) -> list[str]:
+        """Flags of the teacher and of the servers."""
+        moves = ["--set", f"robot.disturbance.position={self.disturbance}", "--set", f"robot.disturbance.rotation={4 * self.disturbance}"]
+        return [*(["--task", self.task] if self.task else []), *moves]
+
+    def run_teacher(self, seed: int, episodes: int, steps: int | None) -> Path:
+        """The folder of a run of the teacher, with `steps` control steps per episode if they are given."""
+        name = "attempts" if steps is None else "scenes"
+        lines = [f'require("experts.grasp").SPREAD = {SPREAD}', f"local suite = require {json.dumps('suites.' + Path(self.suite).stem)}"]
+        lines += [] if steps is None else [f"for _, task in ipairs(suite.tasks) do task.budget_steps = {steps} end"]
+        script, run = self.out / f"{name}.lua", self.out / name
+        script.write_text("\n".join([*lines, "return suite\n"]))
+        words = [str(script), "--policy", self.teacher, "--seed", str(seed), *self.common, "--episodes", str(episodes)]
+        run_softvt([*words, "--threads", str(self.processes), "--out", str(run), "--resume"])
+        return run
+
+    def jobs(self, run: Path, ways: int) -> list[Job]:
+        found = []
+        for line in (run / "episodes.jsonl").read_text().splitlines():
+            row = json.loads(line)
+            if ways or row["safety"]:
+                file = run / "actions" / f"task_{row['task']:03}" / f"episode_{row['episode']:05}.npy"
+                found.append(Job(row["task"], row["episode"], row["asset"], file, ways))
+        # Long ones of a task do not come last.
+        return sorted(found, key=lambda job: (job.episode, job.task))
+
+    def repeat(self, jobs: list[Job], seed: int, used) -> tuple[list[dict], Counter]:
+        """The demonstrations of jobs, and what became of them."""
+        profile, found, fates = self.out / "profile.lua", [], Counter()
+        profile.write_text(PROFILE.replace("RECENT", str(RECENT)))
+        flags = ["--threads", str(self.processes), "--privileged", "--profile", str(profile), "--seed", str(seed), *self.common]
+        with serving(self.suite, [*flags, *camera_flags(self.edge)]) as address:
+            settings = Settings(address, self.out / f"packed_{self.edge}", self.edge, seed)
+            with ProcessPoolExecutor(self.processes, CONTEXT, _begin, (settings, used)) as pool:
+                for number, (shown, fate) in enumerate(pool.map(_show, jobs), 1):
+                    found += shown
+                    fates[fate] += 1
+                    if number % 100 == 0 or number == len(jobs):
+                        print(f"{self.out.name}: {number} of {len(jobs)} repeated, {used.value} pictures", flush=True)
+        return found, fates
+
+
+def demonstrate(one: Demonstrate) -> None:
+    """Records demonstrations into a folder that `data.load` reads.
 
     Raises UserError if softvt fails.
     """
+    out, folder = one.out, one.out / f"packed_{one.edge}"
     if (out / "dataset.json").is_file():
         return
-    only = ["--task", tasks] if tasks else []
-    moves = ["--set", f"robot.disturbance.position={disturbance}", "--set", f"robot.disturbance.rotation={4 * disturbance}"]
-    common = ["--seed", str(seed), *only, *moves]
-    run, folder = out / "attempts", out / f"packed_{edge}"
-    run_softvt([suite, "--policy", teacher, *common, "--episodes", str(attempts), "--threads", str(processes), "--out", str(run), "--resume"])
-    jobs = []
-    for line in (run / "episodes.jsonl").read_text().splitlines():
-        row = json.loads(line)
-        if row["safety"]:
-            file = run / "actions" / f"task_{row['task']:03}" / f"episode_{row['episode']:05}.npy"
-            jobs.append(Job(row["task"], row["episode"], row["asset"], file, ways))
-    if not jobs:
-        raise UserError(f"{run}: no attempt is safe")
     folder.mkdir(parents=True, exist_ok=True)
-    profile = out / "profile.lua"
-    profile.write_text(PROFILE.replace("RECENT", str(RECENT)))
+    grips = one.jobs(one.run_teacher(one.seed, one.attempts, None), 0)
+    ways = one.jobs(one.run_teacher(one.seed + NEXT_SEED, one.scenes, REACHES), one.ways)
+    if not grips:
+        raise UserError(f"{out}: no attempt of the teacher is safe")
+    most = len(grips) * GRIP_PICTURES + len(ways) * one.ways * WAY_PICTURES
     for key in CAMERAS:  # sparse: only what is written takes space
-        np.lib.format.open_memmap(folder / f"{key}.npy", "w+", np.uint8, (len(jobs) * MOST_PICTURES, edge, edge, 3))
-    flags = ["--threads", str(processes), "--privileged", "--profile", str(profile), *common, *camera_flags(edge)]
-    context = multiprocessing.get_context("spawn")
-    used, found, fates = context.Value("q", 0), [], Counter()
-    with serving(suite, flags) as address:
-        settings = Settings(address, folder, edge, seed)
-        with ProcessPoolExecutor(processes, context, _begin, (settings, used)) as pool:
-            for number, (shown, fate) in enumerate(pool.map(_show, jobs), 1):
-                found += shown
-                fates[fate] += 1
-                if number % 50 == 0 or number == len(jobs):
-                    print(f"{out.name}: {number} of {len(jobs)} attempts repeated, {used.value} pictures", flush=True)
+        np.lib.format.open_memmap(folder / f"{key}.npy", "w+", np.uint8, (most, one.edge, one.edge, 3))
+    used = CONTEXT.Value("q", 0)
+    (found, fates), (more, others) = one.repeat(grips, one.seed, used), one.repeat(ways, one.seed + NEXT_SEED, used)
+    found += more
     lengths = np.array([len(one["state"]) for one in found])
     arrays = {key: np.concatenate([one[key] for one in found]) for key in found[0] if key != "prompt"}
     np.savez(folder / "numbers.npz", lengths=lengths, prompts=np.array([one["prompt"] for one in found]), **arrays)
     (out / "recording.json").write_text(json.dumps({"gripper": None}) + "\n")
-    card = {
-        "suite": suite,
-        "seed": seed,
-        "teacher": teacher,
-        "attempts": attempts,
-        "safe_attempts": len(jobs),
+    card = {key: value for key, value in vars(one).items() if key not in ("out", "processes")} | {
+        "safe_attempts": len(grips),
         "grips": dict(sorted(fates.items())),
+        "scenes_shown": dict(sorted(others.items())),
         "demonstrations": len(found),
         "steps": int(lengths.sum()),
         "pictures": used.value,
@@ -340,7 +402,3 @@ def demonstrate(
     (out / "dataset.json").write_text(json.dumps(card, indent=1) + "\n")
     (folder / "identity").write_text(f"{PACKED} {hashlib.sha256((out / 'dataset.json').read_bytes()).hexdigest()}")
     print(f"{out.name}: {json.dumps(card)}", flush=True)
-
-
-def processes_of(count: int) -> int:
-    return count or os.cpu_count() or 1

@@ -214,10 +214,12 @@ def read(
         inputs["markers"] = np.stack(rows).reshape(1, len(rows), -1) / np.float32(statistics.marker_scale)
     if not shape.has_memory:
         return inputs, None
-    felt = np.zeros((RECENT, 6), np.float32)
+    count = 1 if before is None else len(before[1])
+    felt = np.zeros((count, 6), np.float32)
     if shape.has_touch:
         fingers = motion.reshape(-1, 2, MARKERS // 4, 2)
-        felt = readings(np.stack([np.broadcast_to(fingers[:1], fingers[1:].shape), fingers[1:]], 2))
+        moved = fingers[-count:]
+        felt = readings(np.stack([np.broadcast_to(fingers[:1], moved.shape), moved], 2))
     past = remembered(hand(recent), felt, before)
     inputs |= past.inputs()
     inputs["reference"] = past.commands[None, -1:]

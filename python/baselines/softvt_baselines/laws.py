@@ -105,7 +105,10 @@ def carry_step(command: np.ndarray, held: np.ndarray, release: Release) -> np.nd
     most = max(release.over, held[2] + BELOW) if distance > CARRY_RADIUS else release.over
     down = min(most, release.pose[2] + CARRY_FUNNEL * max(distance - CARRY_RADIUS, 0))
     if height < down:
-        fast = min(_slowed(max(height - held[2], 0), UP, CARRY_ACCELERATION, CARRY_LEAST), _slowed(down - height, UP, CARRY_ACCELERATION, CARRY_LEAST))
+        fast = min(
+            _slowed(max(height - held[2], 0), UP, CARRY_ACCELERATION, CARRY_LEAST),
+            _slowed(down - height, UP, CARRY_ACCELERATION, CARRY_LEAST),
+        )
     else:
         fast = _slowed(height - down, DOWN, CARRY_ACCELERATION, CARRY_LEAST)
     found[2] = _towards(height, down, fast)

@@ -15,7 +15,12 @@ from .study import ORIGIN
 # The tables stand between these lines of the page.
 BEGIN, END = "<!-- tables: softvt-baselines page -->", "<!-- end of tables -->"
 LEARNED = re.compile(r"(?P<suite>\w+)-(?P<inputs>vo|vp|vt|vpt)-(?P<code>[a-z-]+)-s(?P<seed>\d+)-r(?P<replan>\d+)(?P<condition>\+.*)?")
-REFERENCES = {"expert": "expert (privileged)", "tactile-servo": "tactile servo (privileged)", "fixed-closure": "fixed closure (privileged)", "size-seen": "size seen (privileged)"}
+REFERENCES = {
+    "expert": "expert (privileged)",
+    "tactile-servo": "tactile servo (privileged)",
+    "fixed-closure": "fixed closure (privileged)",
+    "size-seen": "size seen (privileged)",
+}
 # The inputs with which others are compared: what they add is the difference.
 WITHOUT = {"vp": "vo", "vt": "vo", "vpt": "vp"}
 MEASURES = ["goal", "no_drop", "safety"]

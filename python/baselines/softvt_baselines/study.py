@@ -27,7 +27,7 @@ from .evaluate import recording_flags, run_softvt
 # Script that runs a suite under conditions.
 SHIFTS = "shifts"
 # Options that all results in the folder of a study have in common.
-SAME = ["demos", "steps", "edge", "teacher", "disturbance", "blend", "episodes", "task", "memory", "attempts", "ways"]
+SAME = ["demos", "steps", "edge", "teacher", "disturbance", "blend", "episodes", "task", "memory", "attempts", "scenes", "ways"]
 # File beside the results of a run that says where they come from.
 ORIGIN = "origin.json"
 
@@ -53,10 +53,12 @@ class Study:
     shifts: bool = False  # evaluate also under the standard conditions of suites/shifts.lua, with the first of `replans`
     references: tuple[str, ...] = ()  # built-in policies that are evaluated as well
     compile: bool = False  # compile the networks
+    seconds: float = float("inf")  # time that training a policy may take
     task: str = ""  # only these tasks: indices, separated by commas
     memory: bool = False  # policies that remember, from demonstrations of `demonstrate`
-    attempts: int = 150  # of the teacher per task, for these
-    ways: int = 4  # to the object per attempt
+    attempts: int = 100  # of the teacher per task, for these
+    scenes: int = 200  # with ways to the object, per task
+    ways: int = 4  # per scene
     flags: tuple[str, ...] = ()  # further flags of the evaluations of learned policies
     until: float = float("inf")  # time (time.monotonic()) after which no further part is begun
 
@@ -105,7 +107,7 @@ def _train(job: Job, study: Study, gpu: int | None) -> None:
     _check_time(study)
     began = time.monotonic()
     switches = ["--touch"] * ("t" in job.inputs) + ["--drives"] * ("p" in job.inputs) + ["--compile"] * study.compile
-    switches += ["--memory"] * study.memory
+    switches += ["--memory"] * study.memory + (["--seconds", str(study.seconds)] if study.seconds < float("inf") else [])
     shape = ["--gripper", job.code, "--edge", str(study.edge), "--steps", str(study.steps), "--seed", str(job.seed), *switches]
     words = ["train", str(study.out / "data" / job.suite), "--out", str(checkpoint), "--device", _device(gpu), *shape]
     _call(words, study.out / "logs" / f"{job.name}.log", gpu)
@@ -217,7 +219,8 @@ def _record(suite: str, study: Study) -> None:
     _check_time(study)
     began = time.monotonic()
     if study.memory:
-        words = ["demonstrate", f"suites/{suite}.lua", "--out", str(recording), "--attempts", str(study.attempts), "--ways", str(study.ways)]
+        words = ["demonstrate", f"suites/{suite}.lua", "--out", str(recording), "--attempts", str(study.attempts)]
+        words += ["--scenes", str(study.scenes), "--ways", str(study.ways)]
         words += ["--edge", str(study.edge), "--disturbance", str(study.disturbance), *(["--task", study.task] if study.task else [])]
         words += ["--teacher", study.teacher] if study.teacher != "suite" else []
         _call(words, study.out / "logs" / f"{suite}.log")

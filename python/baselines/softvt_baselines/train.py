@@ -32,6 +32,8 @@ FEELING = 8
 # by exactly 0.03 mm per step once it has found its grip. They are no reason to decide the same.
 HIDDEN_MOTION = [1e-4, 1e-4, 3e-4]
 REPORT = 200  # steps between two lines of the log
+# Steps between which the rate of training is measured, once compiling is over and before the learning rate falls.
+TIMED = (50, 150)
 
 
 @dataclass
@@ -42,6 +44,7 @@ class TrainOptions:
     seed: int
     device: torch.device
     is_compiled: bool = False  # compile the network, which takes a minute and needs a C compiler
+    seconds: float = math.inf  # time that training should take: there are fewer steps if they are too slow
 
 
 class Batches:
@@ -162,6 +165,7 @@ class Batches:
 
 def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict) -> None:
     """Trains a policy and writes its checkpoint to `path`, with the log and the profile next to it."""
+    began, times = time.monotonic(), ()
     torch.manual_seed(options.seed)
     torch.set_float32_matmul_precision("high")
     statistics = Statistics.of(demos, options.shape.chunk)
@@ -177,15 +181,25 @@ def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict)
     loss_of = torch.compile(policy.loss, mode="reduce-overhead") if options.is_compiled else policy.loss
     optimizer = torch.optim.AdamW(policy.parameters(), RATE, weight_decay=WEIGHT_DECAY, fused=options.device.type == "cuda")
 
+    most = options.steps
+
     def rate(step: int) -> float:
-        cosine = LAST_RATE + (1 - LAST_RATE) * 0.5 * (1 + math.cos(math.pi * step / options.steps))
+        cosine = LAST_RATE + (1 - LAST_RATE) * 0.5 * (1 + math.cos(math.pi * step / most))
         return min(1, (step + 1) / WARM_UP) * cosine
 
     schedule = torch.optim.lr_scheduler.LambdaLR(optimizer, rate)
     seeing = [value for name, value in policy.named_parameters() if not name.startswith("feeling.")]
     started, total, feeling_total = time.monotonic(), *torch.zeros((2, 2), device=options.device)
     with open(path.with_name(f"{path.name}.log"), "w") as log:
-        for step in range(1, options.steps + 1):
+        step = 0
+        while step < most:
+            step += 1
+            if step in TIMED and options.seconds < math.inf:
+                torch.cuda.synchronize() if options.device.type == "cuda" else None
+                times = (*times, time.monotonic()) if step > TIMED[0] else (time.monotonic(),)
+                if step == TIMED[1]:
+                    left = options.seconds - (times[1] - began)
+                    most = max(step, min(most, int(step + left * (TIMED[1] - TIMED[0]) / (times[1] - times[0]))))
             obs, actions, is_step = batches.draw(options.batch)
             with torch.autocast(options.device.type, torch.bfloat16, enabled=options.device.type == "cuda"):
                 loss = loss_of(obs, actions, is_step, even)
@@ -203,10 +217,10 @@ def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict)
             with torch.no_grad():
                 torch._foreach_lerp_(list(averaged.parameters()), list(policy.parameters()), 1 - decay)
             total += loss.detach()
-            if step % REPORT == 0 or step == options.steps:
+            if step % REPORT == 0 or step == most:
                 count = (step - 1) % REPORT + 1
                 loss, grip = (total / count).tolist()
-                line = f"{path.stem}: step {step} of {options.steps}, loss {loss:.4f}, gripper {grip:.4f}"
+                line = f"{path.stem}: step {step} of {most}, loss {loss:.4f}, gripper {grip:.4f}"
                 if options.shape.has_memory:
                     loss, grip = (feeling_total / count).tolist()
                     line += f"; while the hand feels {loss:.4f}, gripper {grip:.4f}"
@@ -216,7 +230,7 @@ def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict)
                 total.zero_()
                 feeling_total.zero_()
     about = about | {
-        "steps": options.steps,
+        "steps": most,
         "batch": options.batch,
         "seed": options.seed,
         "recorded_steps": len(demos.state),

@@ -4,7 +4,7 @@ import unittest
 
 import numpy as np
 from softvt_baselines import laws
-from softvt_baselines.demonstrate import plan_of, start_of, turned_home
+from softvt_baselines.demonstrate import grasp_of, plan_of, start_of, turned_home
 from softvt_baselines.inputs import FAST_GRIP, FEELS, holds, is_seen, memory_begins
 from softvt_baselines.laws import Grasp, Release
 from softvt_baselines.numbers import GRIPPER, ROTATION, between, rotated
@@ -93,10 +93,10 @@ class Plans(unittest.TestCase):
         carried = laws.carry(wait[-1], Carrying.release)
         reached = laws.reach(HOME, GRASP)[: -laws.SLOW_STEPS]
         actions = np.concatenate([reached, closing, wait, carried])
-        plan = plan_of(actions)
+        plan, grasp = plan_of(actions), grasp_of(actions)
         self.assertEqual(len(plan.actions), len(reached) + 107)
-        np.testing.assert_allclose(plan.grasp.pose[:3], GRASP.pose[:3], atol=laws.ARRIVED)
-        self.assertAlmostEqual(plan.grasp.closure, 0.15, places=6)
+        np.testing.assert_allclose(grasp.pose[:3], GRASP.pose[:3], atol=laws.ARRIVED)
+        self.assertAlmostEqual(grasp.closure, 0.15, places=6)
         np.testing.assert_allclose(plan.release.pose[:3], Carrying.release.pose[:3], atol=laws.CARRY_RADIUS)
         self.assertAlmostEqual(plan.release.closure, Carrying.release.closure)
         self.assertIsNone(plan_of(np.concatenate([actions, actions])), "it grasped twice")

@@ -84,7 +84,6 @@ class Studies(unittest.TestCase):
             study.run(self.study(steps=3))
         self.assertIn("steps 2, now 3", str(caught.exception))
 
-
     def test_results_say_where_they_come_from(self):
         with mock.patch.dict("os.environ", {"SOFTVT_COMMIT": "abc"}):
             study.run(self.study(inputs=["vt"], replans=[4]))
