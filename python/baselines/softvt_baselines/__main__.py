@@ -97,6 +97,12 @@ def _study(args: argparse.Namespace) -> None:
             one(given, args.out / name)
 
 
+def _diagnose(args: argparse.Namespace) -> None:
+    from .diagnose import diagnose
+
+    print(diagnose(args.run_folder))
+
+
 def _page(args: argparse.Namespace) -> None:
     from .page import write
 
@@ -261,6 +267,9 @@ def _parser() -> argparse.ArgumentParser:
     with_demonstrations(study)
     study.add_argument("--compile", action="store_true", help="compile the networks")
     study.add_argument("--per-gpu", type=_positive, default=1, help="policies that are trained on one GPU at a time")
+
+    diagnose = command("diagnose", _diagnose, "say where the episodes of a run fail; the run was made with --trace, on an Object suite")
+    diagnose.add_argument("run_folder", metavar="run", type=Path, help="run folder of softvt")
 
     page = command("page", _page, "write the tables and the figure of studies into docs/baselines.md")
     page.add_argument("studies", type=Path, nargs="*", help="folders of studies to collect; none: those that were collected")
