@@ -11,14 +11,17 @@ from . import UserError
 
 CODES = ["continuous", "binary", "two-width", "force"]
 INPUTS = {"vo": "vision only", "vp": "vision and drives", "vt": "vision and touch", "vpt": "all three"}
+# Disturbances of recordings, m: of ordinary ones, and of those of a teacher that feels.
+DISTURBANCE, FELT_DISTURBANCE = 0.002, 0.00003
 REFERENCES = ["expert", "tactile-servo", "fixed-closure", "size-seen"]
 
 
 def _record(args: argparse.Namespace) -> None:
     from .evaluate import recording_flags, run_softvt
 
+    disturbance = DISTURBANCE if args.disturbance is None else args.disturbance
     run_softvt(
-        ["record", args.suite, "--out", str(args.out), *recording_flags(args.demos, args.edge, args.teacher, args.disturbance), *args.flags]
+        ["record", args.suite, "--out", str(args.out), *recording_flags(args.demos, args.edge, args.teacher, disturbance), *args.flags]
     )
 
 
@@ -82,6 +85,8 @@ def _study(args: argparse.Namespace) -> None:
     def one(given: argparse.Namespace, out: Path) -> None:
         own = ("command", "run", "flags", "queue", "minutes", "out")
         options = {key: value for key, value in vars(given).items() if key not in own}
+        if given.disturbance is None:
+            options["disturbance"] = FELT_DISTURBANCE if given.memory else DISTURBANCE
         run(Study(**options, out=out, flags=tuple(args.flags), until=until))
 
     if args.queue is None:
@@ -155,6 +160,10 @@ def _parser() -> argparse.ArgumentParser:
             "--seconds", type=_minutes, default=float("inf"), help="time that training may take: there are fewer steps if need be"
         )
 
+    def with_disturbance(sub: argparse.ArgumentParser, default: float | None, more: str = "") -> None:
+        words = f"standard deviation of the robot from its commands while recording, m; of its rotation 4 rad per m{more}"
+        sub.add_argument("--disturbance", type=_length, default=default, help=words)
+
     def with_recording(sub: argparse.ArgumentParser) -> None:
         sub.add_argument("--demos", type=_positive, default=75, help="demonstrations per task")
         with_edge(sub)
@@ -164,12 +173,7 @@ def _parser() -> argparse.ArgumentParser:
             choices=["suite", "expert", "tactile-servo"],
             help="policy that demonstrates; suite: that of the suite",
         )
-        sub.add_argument(
-            "--disturbance",
-            type=_length,
-            default=0.002,
-            help="standard deviation of the robot from its commands while recording, m; of its rotation 4 rad per m",
-        )
+        with_disturbance(sub, None, f"; by default {DISTURBANCE}, and {FELT_DISTURBANCE} with --memory")
 
     def with_demonstrations(sub: argparse.ArgumentParser) -> None:
         sub.add_argument("--attempts", type=_positive, default=100, help="attempts of the teacher per task")
@@ -191,12 +195,7 @@ def _parser() -> argparse.ArgumentParser:
     demonstrate.add_argument("--seed", type=_positive, default=1, help="seed of the episodes; evaluations use 0")
     demonstrate.add_argument("--teacher", default="tactile-servo", help="built-in policy that demonstrates")
     demonstrate.add_argument("--processes", type=int, default=0, help="processes; 0: one per processor")
-    demonstrate.add_argument(
-        "--disturbance",
-        type=_length,
-        default=0.00003,
-        help="standard deviation of the robot from its commands, m; of its rotation 4 rad per m",
-    )
+    with_disturbance(demonstrate, FELT_DISTURBANCE)
     with_edge(demonstrate)
 
     train = command("train", _train, "train a policy")
