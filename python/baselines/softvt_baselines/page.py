@@ -117,7 +117,7 @@ def _pairs(learned: dict[Policy, list[Run]]) -> list[tuple[Policy, list[Run], li
 def tables(folder: Path) -> str:
     """All tables, in Markdown."""
     learned, references = _grouped(folder)
-    text = "Rates are means over the training seeds; intervals (95 %, bootstrap) are over the episodes, for these seeds.\n\n"
+    text = "Rates are means over the training seeds; intervals (95 %, bootstrap) are over the episodes and, of several, the seeds.\n\n"
     for suite in sorted({policy.suite for policy in learned} | {suite for suite, _ in references}):
         text += f"### `{suite}`\n\n"
         rows = [

@@ -101,15 +101,28 @@ class Estimate:
         return f"{self.mean:{sign}.1f} [{self.low:{sign}.1f}, {self.high:{sign}.1f}]"
 
 
-def _bootstrap(values: np.ndarray, task: np.ndarray) -> Estimate:
-    """The mean of one number per episode, with the percentile interval of a bootstrap that redraws the episodes of each task."""
-    random = np.random.default_rng(SEED)
-    sums = np.zeros(RESAMPLES)
-    for one in np.unique(task):
-        own = values[task == one]
-        sums += own[random.integers(len(own), size=(RESAMPLES, len(own)))].sum(axis=1)
-    low, high = np.percentile(sums / len(values), [2.5, 97.5])
-    return Estimate(100 * values.mean(), 100 * low, 100 * high)
+def _bootstrap(sets: list[list[Run]], measure: str) -> tuple[float, np.ndarray]:
+    """The mean of a measure over the episodes and the training seeds of the last of one or two sets of runs, less that of the first of two; and
+    the same of resamples (RESAMPLES,) that redraw the episodes of each task and, of several, the seeds of each set."""
+    random, task = np.random.default_rng(SEED), sets[0][0].task
+    values = [np.array([getattr(run, measure) for run in runs]) for runs in sets]  # (seeds, episodes) each
+    sums = [np.zeros((RESAMPLES, len(one))) for one in values]
+    for kind in np.unique(task):
+        own = np.flatnonzero(task == kind)
+        drawn = own[random.integers(len(own), size=(RESAMPLES, len(own)))]
+        for one, total in zip(values, sums):
+            for seed, outcomes in enumerate(one):
+                total[:, seed] += outcomes[drawn].sum(axis=1)
+    counts = [random.multinomial(n, [1 / n] * n, RESAMPLES) if (n := len(one)) > 1 else np.ones((RESAMPLES, 1)) for one in values]
+    means = [(total * count).sum(axis=1) / (len(task) * len(one)) for one, total, count in zip(values, sums, counts)]
+    mean = values[-1].mean() - (values[0].mean() if len(sets) > 1 else 0)
+    return float(mean), means[-1] - (means[0] if len(sets) > 1 else 0)
+
+
+def _estimate(sets: list[list[Run]], measure: str) -> Estimate:
+    mean, resampled = _bootstrap(sets, measure)
+    low, high = np.percentile(resampled, [2.5, 97.5])
+    return Estimate(100 * mean, 100 * low, 100 * high)
 
 
 def _same_episodes(runs: list[Run]) -> None:
@@ -129,11 +142,10 @@ def in_common(runs: list[Run]) -> list[Run]:
 def rate(runs: list[Run], measure: str) -> Estimate:
     """The rate of `goal`, `no_drop` or `safety` over the runs of a policy with several training seeds."""
     _same_episodes(runs)
-    return _bootstrap(np.mean([getattr(run, measure) for run in runs], axis=0), runs[0].task)
+    return _estimate([runs], measure)
 
 
 def difference(first: list[Run], second: list[Run], measure: str) -> Estimate:
     """The rate of the second policy minus that of the first on the same episodes, each averaged over its training seeds."""
     _same_episodes(first + second)
-    means = [np.mean([getattr(run, measure) for run in runs], axis=0) for runs in (first, second)]
-    return _bootstrap(means[1] - means[0], first[0].task)
+    return _estimate([first, second], measure)
