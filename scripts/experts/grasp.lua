@@ -1,17 +1,17 @@
 -- Grasps from above with a known closure: across the object's narrow side or by its rim, where the hand has clearance.
 local hand = require "experts.hand"
 
--- SPREAD: largest displacement of an expert's grasp in each horizontal direction, m, so that demonstrations differ.
-local grasp = { SPREAD = 0.0015 }
+-- SPREAD: largest displacement of an expert's grasp in each horizontal direction, m, so that demonstrations differ. CONTACT_CLEARANCE:
+-- distance of each gel from the object at which closing becomes slow, m.
+local grasp = { SPREAD = 0.0015, CONTACT_CLEARANCE = 0.002 }
 
 local STROKE, CASE = hand.STROKE, hand.CASE
 -- Clearance to leave below the cases and around the fingers, m.
 local UNDER, FINGER_CLEARANCE = 0.0015, 0.004
 -- Step of the rotations tried for clearance.
 local STEP = math.rad(7.5)
--- Distance of each gel from the object at which closing becomes slow, m, and rate until there, 1/s. A hand that feels begins up to
--- twice as far away, so that the time of first contact does not reveal the size of the object.
-local CONTACT_CLEARANCE, FAST_RATE = 0.002, 0.6
+-- Rate until closing becomes slow, 1/s.
+local FAST_RATE = 0.6
 -- Width by which a command may exceed that of its grip, m.
 local COMMAND_MARGIN = 0.002
 -- Squeeze of a rigid object: the target width is below its width by this much, m.
@@ -173,9 +173,10 @@ local function candidates(object, height, offset)
   return list
 end
 
--- Closes fast to a clearance at which nothing is touched. `width` is the distance of the gels at first contact, m.
+-- Closes fast to a clearance at which nothing is touched. `width` is the distance of the gels at first contact, m. A hand that feels stops
+-- up to twice as far away, so that the time of first contact does not reveal the size of the object.
 function grasp.approach(arm, object, width)
-  local clearance = CONTACT_CLEARANCE * (arm.feels and 1 + math.random() or 1)
+  local clearance = grasp.CONTACT_CLEARANCE * (arm.feels and 1 + math.random() or 1)
   arm:close_to(math.max(arm.closure, grasp.clear_closure(object, clearance, width)), { rate = FAST_RATE })
 end
 

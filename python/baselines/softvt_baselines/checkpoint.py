@@ -35,6 +35,7 @@ def save(path: Path, checkpoint: Checkpoint) -> None:
         "statistics": {
             "state": [torch.from_numpy(statistics.state.mean), torch.from_numpy(statistics.state.std)],
             "action": [torch.from_numpy(statistics.action.mean), torch.from_numpy(statistics.action.std)],
+            "felt": [torch.from_numpy(statistics.felt.mean), torch.from_numpy(statistics.felt.std)],
             "marker_scale": statistics.marker_scale,
             "axis": torch.from_numpy(statistics.axis),
         },
@@ -65,8 +66,8 @@ def load(path: Path, device: torch.device) -> Checkpoint:
             raise UserError(f"{path}: a checkpoint of version {content['version']}, expected {VERSION}; train it again")
         shape = Shape(**{key: tuple(value) if isinstance(value, list) else value for key, value in content["shape"].items()})
         stated = content["statistics"]
-        numbers = {name: Standard(*(part.numpy() for part in stated[name])) for name in ("state", "action")}
-        statistics = Statistics(numbers["state"], numbers["action"], float(stated["marker_scale"]), stated["axis"].numpy())
+        numbers = {name: Standard(*(part.numpy() for part in stated[name])) for name in ("state", "action", "felt")}
+        statistics = Statistics(numbers["state"], numbers["action"], numbers["felt"], float(stated["marker_scale"]), stated["axis"].numpy())
         prompts, about = content["prompts"], content["about"]
         policy = Policy(shape)
         policy.load_state_dict({name: value.float() for name, value in content["weights"].items()})
@@ -77,7 +78,7 @@ def load(path: Path, device: torch.device) -> Checkpoint:
     except Exception as error:  # torch reports broken and foreign files in many ways
         reason = " ".join(str(error).split())[:200]
         raise UserError(f"{path}: not a checkpoint of this package: {reason}") from None
-    if not (np.isfinite(statistics.action.std).all() and (statistics.action.std > 0).all()):
+    if not all(np.isfinite(one.std).all() and (one.std > 0).all() for one in (statistics.action, statistics.felt)):
         raise UserError(f"{path}: the normalisation of its actions is not valid; train it again")
     return Checkpoint(policy.to(device).eval(), statistics, list(prompts), dict(about))
 

@@ -18,7 +18,8 @@ import numpy as np
 from PIL import Image
 
 from . import UserError
-from .numbers import FINE, Standard, fine, fold, hand, mean_axis, reference
+from .numbers import FINE, GRIPPER, Standard, fine, fold, hand, mean_axis, reference
+from .phases import is_seen, memory_begins
 
 # The grip codes and the streams that hold the actions in them.
 ACTIONS = {"continuous": "actions", "binary": "actions_binary", "two-width": "actions_two_width", "force": "actions_force"}
@@ -56,17 +57,41 @@ class Demonstrations:
     prompt: np.ndarray  # (N,) index of the prompt of each step
     axis: np.ndarray  # (3,) the side of the rotation vectors
     is_relative: bool  # True if the closure of an answer is relative to the commanded one
-    has_memory: bool = False  # True if answers are relative to the command before, on the fine scale
+    has_memory: bool = False  # True if answers are on the fine scale, and relative to the command before while the hand feels
 
-    def changes(self, ahead: int) -> np.ndarray:
+    @property
+    def begin(self) -> np.ndarray:
+        """(M,) the row from which on each row is remembered."""
+        return memory_begins(self.commands, np.unique(self.start))
+
+    @property
+    def seen(self) -> np.ndarray:
+        """(M,) False in the steps in which the hand feels."""
+        return is_seen(self.commands, np.arange(len(self.commands)), self.begin)
+
+    def changes(self, ahead: int, feels: bool = False) -> np.ndarray:
         """What answers would be relative to the observation, (n, 7), for actions `ahead` steps after it, or as late as the longest
-        demonstration has them."""
+        demonstration has them; of a policy with memory, in the steps in which the hand feels or in the others."""
         steps = np.arange(len(self.actions))
-        ahead = min(ahead, int((self.last - steps).max()))
-        inside = steps + ahead <= self.last
-        rows = self.row[inside]
-        present = self.commands[rows] if self.has_memory else reference(self.state[rows], self.is_relative)
-        return self.actions[steps[inside] + ahead] - present
+        if self.has_memory:
+            chosen = steps[self.seen != feels]
+            # A short demonstration of a test may have no such steps.
+            steps = chosen if len(chosen) else steps
+        ahead = min(ahead, int((self.last[steps] - steps).max()))
+        steps = steps[steps + ahead <= self.last[steps]]
+        rows = self.row[steps]
+        present = reference(self.state[rows], self.is_relative)
+        if self.has_memory:
+            present = self.commands[rows] if feels else seen_reference(self.state[rows], self.commands[rows])
+        return self.actions[steps + ahead] - present
+
+
+def seen_reference(state, command):
+    """What is subtracted from the actions (…, 7) of a policy with memory that sees, arrays or tensors: the pose of the tool, since what is
+    seen is seen from there, and the closure commanded last."""
+    found = state[..., :7] + 0
+    found[..., GRIPPER] = command[..., GRIPPER]
+    return found
 
 
 def displacements(motion: np.ndarray) -> np.ndarray:
@@ -306,22 +331,25 @@ def load(
 class Statistics:
     """Normalisation of the inputs and answers of a policy.
 
-    Answers are relative to the observation (numbers.reference): a policy that is to hold still then answers 0, instead of a pose
-    which it knows to a few millimetres only. The first actions of a chunk differ less from the present pose than the last
+    Answers are relative to the observation (numbers.reference, seen_reference), those of a hand that feels to the command before: a policy that
+    is to hold still then answers 0, instead of a pose which it knows to a few millimetres only. The first actions of a chunk differ less from the present pose than the last
     ones, and are standardised each on their own.
     """
 
     state: Standard
     action: Standard  # of shape (chunk, 7)
+    felt: Standard  # the same while the hand feels
     marker_scale: float  # px
     axis: np.ndarray  # (3,) the side of the rotation vectors
 
     @classmethod
     def of(cls, demos: Demonstrations, chunk: int) -> "Statistics":
         scale = float(np.sqrt(np.square(demos.markers, dtype=np.float64).mean()) + 1e-6)
-        changes = [demos.changes(ahead) for ahead in range(chunk)]
-        if demos.has_memory:
-            action = Standard.of_each([fine(one, FINE) for one in changes], LEAST_FINE_SPREAD)
-        else:
-            action = Standard.of_each(changes, LEAST_SPREAD)
-        return cls(Standard.of(demos.state), action, scale, demos.axis)
+        if not demos.has_memory:
+            action = Standard.of_each([demos.changes(ahead) for ahead in range(chunk)], LEAST_SPREAD)
+            return cls(Standard.of(demos.state), action, action, scale, demos.axis)
+        action, felt = (
+            Standard.of_each([fine(demos.changes(ahead, feels), FINE) for ahead in range(chunk)], LEAST_FINE_SPREAD)
+            for feels in (False, True)
+        )
+        return cls(Standard.of(demos.state), action, felt, scale, demos.axis)

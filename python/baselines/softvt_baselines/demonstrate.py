@@ -19,9 +19,10 @@ from . import UserError, laws
 from .client import Client, serving
 from .data import ACTIONS, CAMERAS, PACKED, displacements, readings
 from .evaluate import camera_flags, run_softvt
-from .inputs import RECENT, is_seen, memory_begins
+from .inputs import RECENT
 from .laws import Grasp, Release
 from .numbers import GRIPPER, ROTATION, between, rotated
+from .phases import is_seen, memory_begins
 
 # Steps that are shown before the hand closes slowly.
 BEFORE = 5
@@ -41,6 +42,8 @@ ROUND = {"steamed_bun", "golden_bun", "sesame_bun", "cylinder", "sphere"}
 SQUARE = {"cube"}
 # Displacement of the teacher's grasps in each horizontal direction, m, and control steps of a teacher that only reaches.
 SPREAD, REACHES = 0.003, 90
+# Distance of each gel from an object from which on the teacher closes slowly, m. A policy does not know the size as well as the teacher.
+CLEARANCE = 0.003
 # Seeds of the scenes follow that of the grips by this much.
 NEXT_SEED = 1000
 # Largest number of pictures of a grip and of a way.
@@ -334,7 +337,8 @@ class Demonstrate:
     def run_teacher(self, seed: int, episodes: int, steps: int | None) -> Path:
         """The folder of a run of the teacher, with `steps` control steps per episode if they are given."""
         name = "attempts" if steps is None else "scenes"
-        lines = [f'require("experts.grasp").SPREAD = {SPREAD}', f"local suite = require {json.dumps('suites.' + Path(self.suite).stem)}"]
+        lines = ['local grasp = require "experts.grasp"', f"grasp.SPREAD, grasp.CONTACT_CLEARANCE = {SPREAD}, {CLEARANCE}"]
+        lines += [f"local suite = require {json.dumps('suites.' + Path(self.suite).stem)}"]
         lines += [] if steps is None else [f"for _, task in ipairs(suite.tasks) do task.budget_steps = {steps} end"]
         script, run = self.out / f"{name}.lua", self.out / name
         script.write_text("\n".join([*lines, "return suite\n"]))

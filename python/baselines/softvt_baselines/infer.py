@@ -73,8 +73,11 @@ class Answering:
         padded = inputs + inputs[:1] * (BATCH - len(inputs))
         tensors = {key: torch.from_numpy(np.concatenate([one[key] for one in padded])).to(self.device) for key in padded[0]}
         answers = self._act(tensors).float().cpu().numpy()
-        changes = self.checkpoint.statistics.action.invert(answers[: len(inputs)])
+        statistics, answers = self.checkpoint.statistics, answers[: len(inputs)]
+        changes = statistics.action.invert(answers)
         if self.checkpoint.policy.shape.has_memory:
+            seen = np.concatenate([one["seen"] for one in inputs])[:, None, None] > 0
+            changes = np.where(seen, changes, statistics.felt.invert(answers))
             # Those of a hand that feels are along its axes.
             back = np.concatenate([np.eye(3)[None] if one["seen"] else one["axes"].transpose(0, 2, 1) for one in inputs])
             changes = turned(coarse(changes, FINE), back)

@@ -7,8 +7,9 @@ from itertools import pairwise
 import numpy as np
 
 from . import UserError, prompts
-from .data import CAMERAS, MARKERS, TACTILE, Statistics, is_relative, readings, shrink
+from .data import CAMERAS, MARKERS, TACTILE, Statistics, is_relative, readings, seen_reference, shrink
 from .numbers import GRIPPER, ROTATION, fold, hand, reference, turned, turns
+from .phases import holds, is_seen, memory_begins
 
 USE_PROFILE = "use the profile that train wrote next to the checkpoint"
 # A policy with memory sees means over intervals of steps before the present one. These are their limits. Feeling for a grip takes 100 to
@@ -19,13 +20,6 @@ INTERVALS, REMEMBERED = len(LIMITS) - 1, LIMITS[-1]
 SHARES = np.float32([[(first <= back < end) / (end - first) for back in range(REMEMBERED)] for first, end in pairwise(LIMITS)])
 # Control steps in an observation of such a policy, softvt's largest number: as many actions may be executed of an answer.
 RECENT = 32
-# Change of the command per step, m of the position or share of the closure (0.6 mm), from which on a motion is fast. A hand that feels closes
-# by at most 0.4 mm.
-FAST, FAST_GRIP = 1e-3, 0.008
-# Closing since the last fast motion (1 mm) from which on a hand is taken to feel.
-FEELS = 0.0125
-# Opening per step of the command by which a hand lets go: more than a hand that feels ever loosens its grip.
-LETS_GO = 0.018
 
 
 @dataclass
@@ -94,34 +88,6 @@ class Shape:
     def keys(self) -> list[str]:
         """Keys of an observation."""
         return [*self.pictures, "state", "prompt", "softvt"] + ["tactile_marker_motion"] * self.has_touch
-
-
-def memory_begins(commands: np.ndarray, first: np.ndarray) -> np.ndarray:
-    """The row from which on each row (M,) of commands is remembered, given those at which demonstrations begin: that of the last fast
-    motion.
-
-    Two steps of a fast motion tell where a demonstration ends it. A policy that remembered them would go on to where it had aimed
-    at first instead of looking.
-    """
-    change = np.abs(np.diff(commands, axis=0, prepend=commands[:1]))
-    begins = (np.linalg.norm(change[:, :3], axis=1) > FAST) | (change[:, GRIPPER] > FAST_GRIP)
-    begins[first] = True
-    return np.maximum.accumulate(np.where(begins, np.arange(len(commands)), 0))
-
-
-def is_seen(commands: np.ndarray, rows: np.ndarray, begins: np.ndarray) -> np.ndarray:
-    """False on the rows of commands on which the hand feels: it has closed slowly since the last fast motion."""
-    return commands[rows, GRIPPER] - commands[begins, GRIPPER] < FEELS
-
-
-def holds(commands: np.ndarray, first: np.ndarray, begins: np.ndarray) -> np.ndarray:
-    """True on the rows (M,) on which the hand has felt an object and has not let go of it since, given the rows at which demonstrations
-    begin."""
-    index = np.arange(len(commands))
-    lets_go = np.diff(commands[:, GRIPPER], prepend=commands[0, GRIPPER]) < -LETS_GO
-    lets_go[first] = True
-    felt, let_go = (np.maximum.accumulate(np.where(rows, index, -1)) for rows in (~is_seen(commands, index, begins), lets_go))
-    return felt >= let_go
 
 
 @dataclass
@@ -222,5 +188,6 @@ def read(
         felt = readings(np.stack([np.broadcast_to(fingers[:1], moved.shape), moved], 2))
     past = remembered(hand(recent), felt, before)
     inputs |= past.inputs()
-    inputs["reference"] = past.commands[None, -1:]
+    command = past.commands[None, -1:]
+    inputs["reference"] = seen_reference(states[:, -1:], command) if inputs["seen"] else command
     return inputs, past

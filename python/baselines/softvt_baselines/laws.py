@@ -1,5 +1,6 @@
-"""Motions by feedback laws: each command follows from the one before alone, and none of them waits. A policy without memory can therefore
-learn them, which it cannot learn of a teacher that stops on its way: what it sees there does not tell how long the hand has waited.
+"""Motions by feedback laws: each command follows from the one before and from where the tool is, and none of them waits for a time. A policy
+without memory can therefore learn them, which it cannot learn of a teacher that stops on its way: what it sees there does not tell how long the
+hand has waited.
 
 A command is (7,): position of the tool (m), rotation vector, closure.
 """
@@ -12,13 +13,16 @@ from .numbers import GRIPPER, ROTATION, between, rotated
 
 # Control step, s.
 STEP = 0.05
+# Share of the way to its command by which the arm moves in a step.
+FOLLOWS = 0.39
 # Reaching: largest speed, m/s, and the acceleration by which it falls towards the end, m/s²; least speed, m/s; turn per step, rad, and the
 # horizontal distance within which the hand turns, m: from farther away, a picture does not show well how an object is turned.
 REACH_SPEED, REACH_SLOWING, REACH_LEAST, TURN, TURNS_WITHIN = 0.4, 0.2, 0.02, 0.06, 0.04
 # The hand comes down in a funnel: height over distance from its axis beyond a radius, m, and the distance that a turn counts, m/rad.
 FUNNEL, RADIUS, PER_TURN = 8, 0.002, 0.1
-# Distance, m, and turn, rad, at which the hand has arrived.
-ARRIVED, TURNED = 0.0005, 0.02
+# Distance, m, and turn, rad, at which the command has arrived, and distance at which the arm has, m. A hand that closed as soon as its command
+# has arrived would learn to close while it cannot yet see whether it is where it should be.
+ARRIVED, TURNED, FOLLOWED = 0.0005, 0.02, 0.001
 # Change of the closure per step, about, and while the hand closes slowly: 0.1 mm of width, as tactile-servo does.
 FAST_CLOSING, SLOW_CLOSING = 0.03, 0.00125
 # Slow steps that are shown: more than those after which a hand is taken to feel.
@@ -61,8 +65,8 @@ def _slowed(distance: float, most: float, slowing: float, least: float) -> float
     return STEP * min(most, least + (2 * slowing * distance) ** 0.5)
 
 
-def reach_step(command: np.ndarray, grasp: Grasp) -> np.ndarray:
-    """The next command of a hand that reaches an object and closes around it."""
+def reach_step(command: np.ndarray, tool: np.ndarray, grasp: Grasp) -> np.ndarray:
+    """The next command of a hand whose tool is at a position (3,), and which reaches an object and closes around it."""
     found, away = command.copy(), grasp.pose[:2] - command[:2]
     distance, turn = float(np.hypot(*away)), between(command[ROTATION], grasp.pose[3:])
     angle = float(np.linalg.norm(turn))
@@ -75,6 +79,7 @@ def reach_step(command: np.ndarray, grasp: Grasp) -> np.ndarray:
     if distance < TURNS_WITHIN and angle > 0:
         found[ROTATION] = rotated(command[ROTATION], turn * min(1, TURN / angle))
     has_arrived = distance < ARRIVED and abs(command[2] - grasp.pose[2]) < ARRIVED and angle < TURNED
+    has_arrived = has_arrived and float(np.linalg.norm(tool - grasp.pose[:3])) < FOLLOWED
     closure = command[GRIPPER]
     if not has_arrived:
         found[GRIPPER] = _towards(closure, grasp.opening, FAST_CLOSING)
@@ -87,10 +92,11 @@ def reach_step(command: np.ndarray, grasp: Grasp) -> np.ndarray:
 
 
 def reach(command: np.ndarray, grasp: Grasp) -> np.ndarray:
-    """Commands (n, 7) from one to the first slow steps of closing."""
-    commands = [command]
+    """Commands (n, 7) from one at which the hand rests to the first slow steps of closing."""
+    commands, tool = [command], command[:3]
     while len(commands) <= MOST_STEPS and commands[-1][GRIPPER] < grasp.closure + SLOW_STEPS * SLOW_CLOSING - 1e-6:
-        commands.append(reach_step(commands[-1], grasp))
+        commands.append(reach_step(commands[-1], tool, grasp))
+        tool = tool + FOLLOWS * (commands[-1][:3] - tool)
     return np.array(commands[1:])
 
 

@@ -12,10 +12,11 @@ from torch import Tensor
 
 from . import UserError, prompts
 from .checkpoint import Checkpoint, save
-from .data import LEAST_SPREAD, Demonstrations, Statistics
-from .inputs import REMEMBERED, SHARES, Shape, holds, is_seen, memory_begins
+from .data import LEAST_SPREAD, Demonstrations, Statistics, seen_reference
+from .inputs import REMEMBERED, SHARES, Shape
 from .model import Policy
 from .numbers import FINE, FINE_READINGS, ROTATION, Standard, fine, hand, reference, turned, turns
+from .phases import holds
 
 # Training, after ACT: learning rate and its last share, weight decay, warm-up (steps), decay of the averaged weights.
 RATE, LAST_RATE, WEIGHT_DECAY, WARM_UP, AVERAGE = 3e-4, 0.02, 1e-4, 300, 0.999
@@ -59,6 +60,7 @@ class Batches:
         self.state, self.actions = on_device(demos.state), on_device(demos.actions)
         self.state_mean, self.state_std = on_device(statistics.state.mean), on_device(statistics.state.std)
         self.action_mean, self.action_std = on_device(statistics.action.mean), on_device(statistics.action.std)
+        self.felt_mean, self.felt_std = on_device(statistics.felt.mean), on_device(statistics.felt.std)
         self.noise = on_device(np.float32(STATE_NOISE[: self.shape.state]))
         self.row, self.start, self.last = on_device(demos.row), on_device(demos.start), on_device(demos.last)
         self.prompts = on_device(np.array([prompts.encode(prompt) for prompt in demos.prompts]))
@@ -68,10 +70,9 @@ class Batches:
         self.steps = torch.arange(len(demos.actions), device=options.device)
         if self.shape.has_memory:
             self.hand, self.commands, self.readings = on_device(hand(demos.state)), on_device(demos.commands), on_device(demos.readings)
-            begin = memory_begins(demos.commands, demos.start)
+            begin, seen = demos.begin, demos.seen
             self.begin, self.shares = on_device(begin), on_device(SHARES)
             self.axes = on_device(turns(demos.commands[:, ROTATION]))
-            seen = is_seen(demos.commands, np.arange(len(begin)), begin)
             if seen.all():
                 raise UserError(
                     "no demonstration closes the hand slowly: --memory needs those of a teacher that feels, such as tactile-servo"
@@ -143,9 +144,7 @@ class Batches:
         future = self.actions[ahead.clamp(max=len(self.actions) - 1)]
         if self.shape.has_memory:
             obs |= self._remembered(steps)
-            # Noise of the hand's sensor is none of its command.
-            moved = torch.cat([noise[..., :6], torch.zeros_like(noise[..., :1])], 2)
-            changes = fine(future - self.commands[self.row[steps]][:, None] - moved, self.fine)
+            changes = fine(future - seen_reference(states[:, -1:], self.commands[self.row[steps]][:, None]), self.fine)
         else:
             changes = future - reference(states[:, -1:], self.shape.is_relative)
         return obs, (changes - self.action_mean) / self.action_std, ahead <= self.last[steps][:, None]
@@ -160,7 +159,7 @@ class Batches:
         ahead = steps[:, None] + torch.arange(self.shape.chunk, device=self.device)
         future = self.actions[ahead.clamp(max=len(self.actions) - 1)]
         changes = fine(turned(future - self.commands[steps][:, None], self.axes[steps]), self.fine)
-        return obs, (changes - self.action_mean) / self.action_std, ahead <= self.last[steps][:, None]
+        return obs, (changes - self.felt_mean) / self.felt_std, ahead <= self.last[steps][:, None]
 
 
 def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict) -> None:
@@ -172,11 +171,11 @@ def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict)
     batches = Batches(demos, statistics, options)
     policy = Policy(options.shape).to(options.device, memory_format=torch.channels_last)
     averaged = copy.deepcopy(policy).requires_grad_(False)
-    even = None
+    even = {False: None}
     if options.shape.has_memory:
-        spread = Standard.of_each([demos.changes(ahead) for ahead in range(options.shape.chunk)], LEAST_SPREAD).std
-        action = statistics.action
-        even = torch.tensor(np.float32([action.mean, action.std, spread]), device=options.device)
+        for feels, own in ((False, statistics.action), (True, statistics.felt)):
+            spread = Standard.of_each([demos.changes(ahead, feels) for ahead in range(options.shape.chunk)], LEAST_SPREAD).std
+            even[feels] = torch.tensor(np.float32([own.mean, own.std, spread]), device=options.device)
     # The mode captures CUDA graphs: starting its kernels one by one takes longer than they run.
     loss_of = torch.compile(policy.loss, mode="reduce-overhead") if options.is_compiled else policy.loss
     optimizer = torch.optim.AdamW(policy.parameters(), RATE, weight_decay=WEIGHT_DECAY, fused=options.device.type == "cuda")
@@ -202,11 +201,11 @@ def train(demos: Demonstrations, options: TrainOptions, path: Path, about: dict)
                     most = max(step, min(most, int(step + left * (TIMED[1] - TIMED[0]) / (times[1] - times[0]))))
             obs, actions, is_step = batches.draw(options.batch)
             with torch.autocast(options.device.type, torch.bfloat16, enabled=options.device.type == "cuda"):
-                loss = loss_of(obs, actions, is_step, even)
+                loss = loss_of(obs, actions, is_step, even[False])
             loss[0].backward()
             torch.nn.utils.clip_grad_norm_(seeing, 1.0)
             if options.shape.has_memory:
-                feeling_loss = policy.feeling_loss(*batches.draw_feeling(FEELING * options.batch), even)
+                feeling_loss = policy.feeling_loss(*batches.draw_feeling(FEELING * options.batch), even[True])
                 feeling_loss[0].backward()
                 torch.nn.utils.clip_grad_norm_(policy.feeling.parameters(), 1.0)
                 feeling_total += feeling_loss.detach()

@@ -9,8 +9,9 @@ import h5py
 import numpy as np
 from softvt_baselines import UserError, prompts
 from softvt_baselines.data import ACTIONS, CAMERAS, TACTILE, Statistics, displacements, load, moving_steps, readings, shrink
-from softvt_baselines.inputs import LIMITS, RECENT, REMEMBERED, Past, Shape, is_seen, memory_begins, read, remembered
+from softvt_baselines.inputs import LIMITS, RECENT, REMEMBERED, Past, Shape, read, remembered
 from softvt_baselines.numbers import FINE, Standard, coarse, fine, fold, hand, mean_axis, reference, turned, turns
+from softvt_baselines.phases import is_seen, memory_begins
 
 STEPS = 12
 # Initial positions of the markers of a finger, px.
@@ -152,8 +153,11 @@ class Numbers(unittest.TestCase):
         self.assertEqual(len(demos.actions), 2 * STEPS)
         np.testing.assert_array_equal(demos.commands[1:STEPS], demos.actions[: STEPS - 1])
         np.testing.assert_array_equal(demos.commands[STEPS], hand(demos.state[STEPS]))
-        action = Statistics.of(demos, 3).action
-        np.testing.assert_allclose(action.mean[2, 0], np.arcsinh(0.03 / FINE[0]), rtol=0.05, err_msg="relative to the command before")
+        found = Statistics.of(demos, 3)
+        np.testing.assert_allclose(found.felt.mean[2, 0], np.arcsinh(0.03 / FINE[0]), rtol=0.05, err_msg="relative to the command before")
+        np.testing.assert_allclose(
+            found.action.mean[2, 0], np.arcsinh(0.02 / FINE[0]), rtol=0.05, err_msg="relative to the pose of the tool"
+        )
 
     def test_changes_along_the_axes_of_the_tool(self):
         np.testing.assert_array_equal(turns(np.zeros(3)), np.eye(3))
@@ -202,7 +206,7 @@ class Prompts(unittest.TestCase):
 class Inputs(unittest.TestCase):
     def setUp(self):
         standard = Standard(np.zeros(8, np.float32), np.ones(8, np.float32))
-        self.statistics = Statistics(standard, standard, 2.0, np.array([1, 0, 0], np.float32))
+        self.statistics = Statistics(standard, standard, standard, 2.0, np.array([1, 0, 0], np.float32))
         self.vocabulary = prompts.Vocabulary(["take it"])
         motion = np.zeros((6, 198, 2), np.float32)
         motion[5] = 6

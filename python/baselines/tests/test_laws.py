@@ -5,9 +5,9 @@ import unittest
 import numpy as np
 from softvt_baselines import laws
 from softvt_baselines.demonstrate import grasp_of, plan_of, start_of, turned_home
-from softvt_baselines.inputs import FAST_GRIP, FEELS, holds, is_seen, memory_begins
 from softvt_baselines.laws import Grasp, Release
 from softvt_baselines.numbers import GRIPPER, ROTATION, between, rotated
+from softvt_baselines.phases import FAST_GRIP, FEELS, holds, is_seen, memory_begins
 
 DOWN = np.array([np.pi, 0, 0])
 GRASP = Grasp(np.array([0.46, -0.25, 0.023, *rotated(DOWN, np.array([0, 0, 0.4]))]), 0.08, 0.0, 0.15)

@@ -136,7 +136,7 @@ class Policies(unittest.TestCase):
         past, action = Past(commands, commands, np.zeros((20, 6), np.float32)), commands[-1] + np.float32([0, 0, 0, 0, 0, 0, 0.001])
         wanted = np.zeros((1, 5, 7), np.float32)
         wanted[..., 1] = 0.0003  # towards the left finger
-        answer = torch.from_numpy(answering.checkpoint.statistics.action.apply(fine(wanted, FINE)))
+        answer = torch.from_numpy(answering.checkpoint.statistics.felt.apply(fine(wanted, FINE)))
         with mock.patch.object(answering.checkpoint.policy.feeling, "forward", lambda obs: answer.expand(len(obs["seen"]), -1, -1)):
             obs = self.observation(shape, 0) | {"softvt": {"seed": 0, "step": 1}}
             found = answering([Request(obs, Plan(0, action[None].repeat(5, 0), past))])[0]
