@@ -40,7 +40,8 @@ MOST_STEPS = 690
 ROUND = {"steamed_bun", "golden_bun", "sesame_bun", "cylinder", "sphere"}
 # Objects that look alike after a quarter of a turn.
 SQUARE = {"cube"}
-# Displacement of the teacher's grasps in each horizontal direction, m, and control steps of a teacher that only reaches.
+# Displacement of the teacher's grasps in each horizontal direction, m: a hand that feels learns what to do if it is beside the object. The ways of
+# the other scenes end in the middle. Control steps of a teacher that only reaches.
 SPREAD, REACHES = 0.003, 90
 # Distance of each gel from an object from which on the teacher closes slowly, m. A policy does not know the size as well as the teacher.
 CLEARANCE = 0.003
@@ -337,7 +338,10 @@ class Demonstrate:
     def run_teacher(self, seed: int, episodes: int, steps: int | None) -> Path:
         """The folder of a run of the teacher, with `steps` control steps per episode if they are given."""
         name = "attempts" if steps is None else "scenes"
-        lines = ['local grasp = require "experts.grasp"', f"grasp.SPREAD, grasp.CONTACT_CLEARANCE = {SPREAD}, {CLEARANCE}"]
+        lines = [
+            'local grasp = require "experts.grasp"',
+            f"grasp.SPREAD, grasp.CONTACT_CLEARANCE = {SPREAD if steps is None else 0}, {CLEARANCE}",
+        ]
         lines += [f"local suite = require {json.dumps('suites.' + Path(self.suite).stem)}"]
         lines += [] if steps is None else [f"for _, task in ipairs(suite.tasks) do task.budget_steps = {steps} end"]
         script, run = self.out / f"{name}.lua", self.out / name

@@ -1,5 +1,6 @@
 """The page of a study: collects its runs, and writes tables and figures of those that were collected."""
 
+import json
 import re
 import shutil
 from collections import Counter, defaultdict
@@ -88,15 +89,20 @@ def _table(heading: list[str], rows: list[list[str]]) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in lines) + "\n"
 
 
+def _spread(values: np.ndarray) -> str:
+    """Median, and the 5th and 95th percentile."""
+    if not len(values) or np.isnan(values).all():
+        return "–"
+    low, median, high = np.nanpercentile(np.minimum(values, 99), [5, 50, 95])
+    return f"{median:.2f} [{low:.2f}, {high:.2f}]"
+
+
 def _row(name: str, runs: list[Run], replan: str) -> list[str]:
-    ratio = np.concatenate([run.ratio for run in runs])
-    shown = "–"
-    if not np.isnan(ratio).all():
-        low, median, high = np.nanpercentile(np.minimum(ratio, 99), [5, 50, 95])
-        shown = f"{median:.2f} [{low:.2f}, {high:.2f}]"
+    ratio, grip = (np.concatenate([getattr(run, key) for run in runs]) for key in ("ratio", "grip"))
+    grip = grip[np.concatenate([run.goal for run in runs]) == 1]
     rates = [results.rate(runs, measure).text() for measure in MEASURES]
     episodes = str(len(runs[0].task)) + ("" if all(run.is_finished for run in runs) else " (interrupted)")
-    return [name, replan, str(len(runs)), episodes, *rates, shown]
+    return [name, replan, str(len(runs)), episodes, *rates, _spread(ratio), _spread(grip)]
 
 
 def _name(policy: Policy) -> str:
@@ -126,7 +132,8 @@ def tables(folder: Path) -> str:
             if (policy.suite, policy.condition) == (suite, "")
         ]
         rows += [_row(shown, [references[suite, name]], "") for name, shown in REFERENCES.items() if (suite, name) in references]
-        text += _table(["policy", "replan", "seeds", "episodes", "Goal, %", "NoDrop, %", "Safety, %", "D/τ"], rows)
+        text += _table(["policy", "replan", "seeds", "episodes", "Goal, %", "NoDrop, %", "Safety, %", "D/τ", "grip ratio"], rows)
+        text += _origin(folder, suite)
     pairs = [pair for pair in _pairs(learned) if pair[0].condition != UNCHANGED]
     if pairs:
         text += (
@@ -146,6 +153,9 @@ def tables(folder: Path) -> str:
             "Safety there, points",
         ]
         text += _table(heading, [_difference(*pair) for pair in pairs])
+    if compared := _against_references(learned, references):
+        text += "### Differences from reference controllers, on the episodes that both have\n\n"
+        text += _table(["suite", "difference", "replan", "seeds", "episodes", "Goal, points", "Safety, points"], compared)
     for policy, fewer, more in pairs:
         if not policy.condition:
             text += f"### `{policy.suite}`, {_compared(policy)}, {policy.code}, replan {policy.replan}: by task and by stage\n\n"
@@ -155,6 +165,19 @@ def tables(folder: Path) -> str:
         text += "### Shifts\n\nThe change is that against the same policy without a shift, on the same episodes.\n\n"
         text += _table(["suite", "policy", "replan", "seeds", "shift", "Goal, %", "Safety, %", "change of Safety, points"], shifted)
     return text
+
+
+def _origin(folder: Path, suite: str) -> str:
+    """Where the runs of a suite come from, as far as they say it."""
+    places, weights = set(), []
+    for path in sorted(folder.glob(f"{suite}-*/{ORIGIN}")):
+        origin = json.loads(path.read_text())
+        places.add(f"softvt at {origin['commit'] or 'an unknown commit'} on {origin['machine']}")
+        if digest := origin.get("checkpoint_sha256"):
+            weights.append(f"`{path.parent.name}` {digest[:16]}")
+    if not places:
+        return ""
+    return f"Made by {'; '.join(sorted(places))}. Checkpoints (SHA-256): {', '.join(weights)}.\n\n"
 
 
 def _compared(policy: Policy) -> str:
@@ -174,6 +197,20 @@ def _difference(policy: Policy, fewer: list[Run], more: list[Run]) -> list[str]:
         there = results.difference([fewer[0].where(both)], [more[0].where(both)], "safety").text(signed=True) if both.any() else "–"
     names = [f"`{policy.suite}`", _compared(policy), policy.code, str(policy.replan), str(len(more)), policy.condition or "none"]
     return [*names, str(len(more[0].task)), *shown, succeed, there]
+
+
+def _against_references(learned: dict[Policy, list[Run]], references: dict[tuple[str, str], Run]) -> list[list[str]]:
+    """Rows of the policies less each reference of their suite."""
+    rows = []
+    for policy, runs in sorted(learned.items()):
+        for name, shown in REFERENCES.items():
+            if policy.condition or (policy.suite, name) not in references:
+                continue
+            reference, *common = results.in_common([references[policy.suite, name], *runs])
+            found = [results.difference([reference], common, measure).text(signed=True) for measure in ("goal", "safety")]
+            difference = f"{_name(policy)} − {shown}"
+            rows.append([f"`{policy.suite}`", difference, str(policy.replan), str(len(runs)), str(len(reference.task)), *found])
+    return rows
 
 
 def _by_task(policy: Policy, fewer: list[Run], more: list[Run]) -> str:

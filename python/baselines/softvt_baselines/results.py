@@ -11,7 +11,7 @@ from . import UserError
 
 # File with the outcomes of the episodes of a run that was collected, and its columns.
 OUTCOMES = "outcomes.csv"
-COLUMNS = ["task", "episode", "goal", "no_drop", "safety", "ratio", "stage"]
+COLUMNS = ["task", "episode", "goal", "no_drop", "safety", "ratio", "stage", "grip"]
 # Resamples of a bootstrap, and its seed.
 RESAMPLES, SEED = 10_000, 0
 
@@ -28,13 +28,14 @@ class Run:
     no_drop: np.ndarray  # (N,) 1 if nothing was dropped
     safety: np.ndarray  # (N,) 1 if also safely
     ratio: np.ndarray  # (N,) peak D over the limit; infinite if the episode is invalid, NaN if there is no limit
+    grip: np.ndarray  # (N,) peak force over the least one that holds; NaN if it is unknown
     stage: list[str]  # stage in which the episode failed, or ""
     assets: dict[int, str]  # asset of the target by task, as far as the summary has it
     is_finished: bool = True
 
     def where(self, chosen: np.ndarray) -> "Run":
         """The chosen episodes."""
-        columns = {key: getattr(self, key)[chosen] for key in ("task", "episode", "goal", "no_drop", "safety", "ratio")}
+        columns = {key: getattr(self, key)[chosen] for key in ("task", "episode", "goal", "no_drop", "safety", "ratio", "grip")}
         return replace(self, **columns, stage=[stage for stage, is_chosen in zip(self.stage, chosen) if is_chosen])
 
 
@@ -58,7 +59,7 @@ def load(folder: Path) -> Run:
             rows = list(csv.DictReader(file))
     else:
         rows = [json.loads(line) for line in (folder / "episodes.jsonl").read_text().splitlines()]
-        rows = [row | {"ratio": _ratio(row), "stage": row.get("failed_stage") or ""} for row in rows]
+        rows = [row | {"ratio": _ratio(row), "stage": row.get("failed_stage") or "", "grip": row.get("grip_ratio")} for row in rows]
         rows.sort(key=lambda row: (row["task"], row["episode"]))
 
     def column(key: str, kind: type) -> np.ndarray:
@@ -74,6 +75,7 @@ def load(folder: Path) -> Run:
         task=column("task", int),
         episode=column("episode", int),
         ratio=column("ratio", float),
+        grip=np.array([float(row.get("grip") or "nan") for row in rows]),
         stage=[row["stage"] for row in rows],
         **rates,
     )
@@ -84,8 +86,8 @@ def save(run: Run, folder: Path) -> None:
     with open(folder / OUTCOMES, "w", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(COLUMNS)
-        for row in zip(run.task, run.episode, run.goal, run.no_drop, run.safety, run.ratio, run.stage):
-            table.writerow([*map(int, row[:5]), f"{row[5]:.4g}", row[6]])
+        for row in zip(run.task, run.episode, run.goal, run.no_drop, run.safety, run.ratio, run.stage, run.grip):
+            table.writerow([*map(int, row[:5]), f"{row[5]:.4g}", row[6], f"{row[7]:.4g}"])
 
 
 @dataclass

@@ -1,5 +1,6 @@
 """The page of a study."""
 
+import json
 import shutil
 import tempfile
 import unittest
@@ -34,10 +35,12 @@ class Pages(unittest.TestCase):
         self.assertTrue(text.startswith("before\n") and text.endswith("after\n") and "old" not in text)
         self.assertIn("| VT, continuous | 4 | 2 | 50 | 100.0 [100.0, 100.0] |", text)
         self.assertIn("| expert (privileged) |  | 1 | 50 | 100.0", text)
-        difference = text.split("### Differences")[1]
+        difference = text.split("### Differences", 1)[1]
         for pair in ("VP − VO", "VT − VO", "VPT − VP"):
             self.assertIn(f"| `one` | {pair} | continuous | 4 | 2 | none | 50 | +0.0 [+0.0, +0.0] |", difference)
-        self.assertEqual(difference.count("| `one` |"), 3)
+        between, against = difference.split("### Differences from reference controllers")
+        self.assertEqual((between.count("| `one` |"), against.count("| `one` |")), (3, 4))
+        self.assertIn("| `one` | VT, continuous − expert (privileged) | 4 | 2 | 50 | +0.0 [+0.0, +0.0] | -", against)
         figure = (self.docs / "images" / "baselines.svg").read_bytes()
         page.write([], self.docs)
         self.assertEqual((self.docs / "baselines.md").read_text(), text)
@@ -50,7 +53,7 @@ class Pages(unittest.TestCase):
         page.collect(self.study, self.docs)
         text = page.tables(self.docs)
         self.assertIn("| `one` | VT − VO | continuous | 4 | 1 | light x2 |", text)
-        self.assertNotIn("reference", text)
+        self.assertNotIn("| reference |", text)
         self.assertIn("| `one` | VT, continuous | 4 | 1 | light x2 | 100.0 [100.0, 100.0] | 100.0 [100.0, 100.0] | +100.0", text)
 
     def test_an_interrupted_run_that_was_collected_is_compared_on_the_episodes_that_both_have(self):
@@ -74,6 +77,14 @@ class Pages(unittest.TestCase):
         docs = Path(__file__).parents[3] / "docs"
         published = (docs / "baselines.md").read_text().split(page.BEGIN)[1].split(page.END)[0]
         self.assertEqual(published.strip(), page.tables(docs / "baselines").strip())
+
+    def test_runs_say_where_they_come_from(self):
+        origin = {"machine": "a machine", "commit": "abc", "checkpoint_sha256": "0123456789abcdef" * 4}
+        run = self.study / "runs" / "one-vo-continuous-s0-r4" / "one"
+        (run / "origin.json").write_text(json.dumps(origin))
+        page.collect(self.study, self.docs)
+        expected = "Made by softvt at abc on a machine. Checkpoints (SHA-256): `one-vo-continuous-s0-r4` 0123456789abcdef."
+        self.assertIn(expected, page.tables(self.docs))
 
     def test_foreign_runs_are_refused_and_not_collected(self):
         self.run_of("something", np.ones((10, 5), bool))

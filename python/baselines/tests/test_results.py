@@ -24,6 +24,7 @@ def run(folder: Path, safe: np.ndarray, suite: str = "one") -> Path:
             "safety": bool(is_safe),
             "tau": 0.5,
             "d_peak": 0.25,
+            "grip_ratio": 1.5 if is_safe else None,
             "outcome": {"kind": "invalid" if not is_safe else "completed"},
         }
         for (task, episode), is_safe in np.ndenumerate(safe)
@@ -68,7 +69,7 @@ class Results(unittest.TestCase):
         (self.folder / "a" / "episodes.jsonl").unlink()
         save(before, self.folder / "a")
         after = load(self.folder / "a")
-        for key in ("task", "episode", "goal", "no_drop", "safety", "ratio", "stage"):
+        for key in ("task", "episode", "goal", "no_drop", "safety", "ratio", "stage", "grip"):
             np.testing.assert_array_equal(getattr(before, key), getattr(after, key))
 
     def test_runs_that_cannot_be_compared_are_refused(self):
