@@ -284,9 +284,9 @@ def figure(folder: Path, path: Path) -> None:
             at = np.arange(len(rates)) + 0.4 * place - 0.2
             top.bar(at, [rate.mean for rate in rates], 0.38, color=colours[measure], label=measure.capitalize())
             top.errorbar(at, [rate.mean for rate in rates], _bars(rates), fmt="none", ecolor="black", elinewidth=0.8)
-        top.set(title=suite, ylim=(0, 105), ylabel="% of episodes")
+        top.set(title=suite, ylim=(0, 122), yticks=range(0, 101, 20), ylabel="% of episodes")
         top.set_xticks(range(len(groups)), groups, rotation=60, ha="right")
-        top.legend(loc="lower right")
+        top.legend(loc="upper center", ncol=2, frameon=False)
         for name, runs in groups.items():
             ratio = np.sort(np.concatenate([run.ratio for run in runs]))
             bottom.step(ratio, 100 * np.arange(1, len(ratio) + 1) / len(ratio), where="post", label=name, linewidth=1)
