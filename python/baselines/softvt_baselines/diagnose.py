@@ -14,6 +14,8 @@ from . import UserError
 from .demonstrate import ROUND, SQUARE
 from .numbers import turns
 
+# Distance across the motion of the fingers within which a grasp counts as one in the middle, m.
+MIDDLE = 0.003
 # Force on a pad from which on it touches, N.
 TOUCHES = 0.01
 # Position of the robot's base on the floor of the Object suites, m: traces have poses of the tool in its frame, those of objects in the world.
@@ -25,9 +27,15 @@ class Meeting:
     """The first control step in which a pad touches the object."""
 
     step: int
-    beside: float  # horizontal distance of the tool from the middle of the object, m
+    along: float  # distance of the tool from the middle of the object along the motion of the fingers, m
+    across: float  # and across it, horizontally
     turned: float  # of the fingers against the sides of the object, rad; 0 for a round one
     closing: float  # change of the closure in that step
+
+    @property
+    def beside(self) -> float:
+        """Horizontal distance from the middle, m."""
+        return float(np.hypot(self.along, self.across))
 
 
 def _yaw(quaternion: list[float]) -> float:
@@ -43,12 +51,13 @@ def meeting(trace: list[dict], asset: str) -> Meeting | None:
     k = touching[0]
     before = trace[max(k - 1, 0)]  # the object is still where it was
     thing = next(other for other in before["objects"] if other["name"] == asset)
-    beside = np.hypot(*(np.array(before["ee_position_b"][:2]) + BASE - thing["position_w"][:2]))
-    fingers = turns(np.array(before["ee_axis_angle_b"]))[:, 1]
+    beside = np.array(before["ee_position_b"][:2]) + BASE - thing["position_w"][:2]
+    fingers = turns(np.array(before["ee_axis_angle_b"]))[:2, 1]
     turned = np.arctan2(fingers[1], fingers[0]) - np.pi / 2 - _yaw(thing["quaternion_w"])
     period = np.pi / 2 if asset in SQUARE else np.pi
     turned = 0.0 if asset in ROUND else (turned + period / 2) % period - period / 2
-    return Meeting(k, float(beside), float(turned), trace[k]["closure"] - before["closure"])
+    along, across = float(beside @ fingers), float(beside @ [-fingers[1], fingers[0]])
+    return Meeting(k, along, across, float(turned), trace[k]["closure"] - before["closure"])
 
 
 def _quantiles(values: list[float], scale: float = 1) -> str:
@@ -66,6 +75,12 @@ def _fate(row: dict) -> str:
     return "dropped" if not row["no_drop"] else "slipped"
 
 
+def _safe(rows: list[dict], meetings: list[Meeting | None], is_middle: bool) -> str:
+    """How many are safe of the episodes whose grasp is in the middle, or of the others."""
+    chosen = [row for row, one in zip(rows, meetings) if one and (abs(one.across) <= MIDDLE) == is_middle]
+    return f"{sum(row['safety'] for row in chosen)} of {len(chosen)}"
+
+
 def diagnose(run: Path) -> str:
     """A summary in words. Raises UserError without a trace."""
     rows = [json.loads(line) for line in (run / "episodes.jsonl").read_text().splitlines()]
@@ -78,13 +93,15 @@ def diagnose(run: Path) -> str:
         meetings.append(meeting(trace, row["asset"]))
     for task in [None, *sorted({row["task"] for row in rows})]:
         chosen = [k for k, row in enumerate(rows) if task is None or row["task"] == task]
-        own, met = [rows[k] for k in chosen], [meetings[k] for k in chosen if meetings[k]]
+        own, all_met = [rows[k] for k in chosen], [meetings[k] for k in chosen]
+        met = [one for one in all_met if one]
         fates = Counter(_fate(row) for row in own)
         held = [row for row in own if row["goal"]]
         parts = [
             f"{'all' if task is None else own[0]['asset']}: n {len(own)}",
             ", ".join(f"{name} {count}" for name, count in fates.most_common()),
             f"beside {_quantiles([one.beside for one in met], 1e3)} mm",
+            f"safe of those within {1e3 * MIDDLE:g} mm across the fingers {_safe(own, all_met, True)}, of the others {_safe(own, all_met, False)}",
             f"turned {_quantiles([abs(one.turned) for one in met], 57.3)}°",
             f"closing {_quantiles([one.closing for one in met], 80)} mm per step, in step {_quantiles([one.step for one in met])}",
             f"grip ratio {_quantiles([row['grip_ratio'] for row in held])}",

@@ -26,6 +26,7 @@ class Diagnoses(unittest.TestCase):
         found = meeting(trace(0.2), "cube")
         self.assertEqual(found.step, 2)
         self.assertAlmostEqual(found.beside, 0.003)
+        self.assertAlmostEqual(abs(found.along), 0.003 * np.sin(0.2), places=5)
         self.assertAlmostEqual(abs(found.turned), 0.2, places=5)
         self.assertAlmostEqual(abs(meeting(trace(np.pi / 2 - 0.2), "cube").turned), 0.2, places=5, msg="its sides are alike")
         self.assertEqual(meeting(trace(0.2), "cube").closing, found.closing)
@@ -46,7 +47,7 @@ class Diagnoses(unittest.TestCase):
                 path.write_text("".join(json.dumps(step) + "\n" for step in trace(0)))
             found = diagnose(run).splitlines()
         self.assertEqual(len(found), 2)
-        self.assertIn("cube: n 2; safe 1, too firm 1; beside 3 / 3 / 3 mm", found[1])
+        self.assertIn("cube: n 2; safe 1, too firm 1; beside 3 / 3 / 3 mm; safe of those within 3 mm across the fingers", found[1])
 
 
 if __name__ == "__main__":
