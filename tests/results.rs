@@ -17,12 +17,12 @@ fn the_published_tables_are_those_of_the_summaries() {
     let root = Path::new(ROOT);
     let (results, labels) =
         (collected::read(root).expect("summaries"), collected::labels(root).expect("labels"));
+    let physics = collected::physics(root).expect("a golden state");
     let readme = fs::read_to_string(root.join("README.md")).expect("a README");
-    let expected =
-        tables::replaced(&readme, &tables::overview(&results, &labels)).expect("a place for the tables");
+    let expected = tables::replaced(&readme, &tables::overview(&results, &labels, &physics));
+    let expected = expected.expect("a place for the tables");
     assert_eq!(readme, expected, "run .ci/regenerate results");
     let page = fs::read_to_string(root.join(tables::PAGE)).expect("a page");
-    let physics = collected::physics(root).expect("a golden state");
     assert_eq!(page, tables::page(&results, &labels, &physics), "run .ci/regenerate results");
 }
 
@@ -79,7 +79,7 @@ fn rows_and_columns_follow_the_runs() {
     collected::add(root, &out).expect("runs of conditions");
     let results = collected::read(root).expect("summaries");
     let labels = json!({ "size-seen": "sees the size" });
-    let overview = tables::overview(&results, &labels);
+    let overview = tables::overview(&results, &labels, "abc");
     assert_eq!(
         overview,
         "`softvt suites/controllers.lua --episodes 2`: 2 episodes per cell. Goal / Safety in %, with the 95 % interval of Safety. No episode was invalid. \
@@ -91,6 +91,10 @@ fn rows_and_columns_follow_the_runs() {
          plan from ground-truth state (*privileged*).\n\n\
          |  | One |\n|---|---|\n\
          | `expert` | 100.0 / 50.0 [25.0, 50.0] |\n| `binary` | 100.0 / 50.0 [25.0, 50.0] |\n"
+    );
+    assert!(
+        tables::overview(&results, &labels, "abcd")
+            .starts_with("Rows that this version has not computed anew")
     );
     // Medians of D/τ 0.5 and 2, of grip ratios 1.5 and 2.5, and of times 4 and 6 s.
     let page = tables::page(&results, &labels, "abcd");

@@ -16,10 +16,11 @@ fn main() -> Result<(), String> {
     for folder in &folders {
         collected::add(root, Path::new(folder))?;
     }
-    let (results, labels) = (collected::read(root)?, collected::labels(root)?);
+    let (results, labels, physics) =
+        (collected::read(root)?, collected::labels(root)?, collected::physics(root)?);
     let readme = fs::read_to_string("README.md").map_err(|error| format!("README.md: {error}"))?;
-    write("README.md", &tables::replaced(&readme, &tables::overview(&results, &labels))?)?;
-    write(tables::PAGE, &tables::page(&results, &labels, &collected::physics(root)?))
+    write("README.md", &tables::replaced(&readme, &tables::overview(&results, &labels, &physics))?)?;
+    write(tables::PAGE, &tables::page(&results, &labels, &physics))
 }
 
 fn write(path: &str, text: &str) -> Result<(), String> {

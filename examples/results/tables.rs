@@ -25,8 +25,9 @@ pub fn replaced(readme: &str, tables: &str) -> Result<String, String> {
     }
 }
 
-/// One table per script: controllers × suites. Suites that an earlier table shows are left out.
-pub fn overview(results: &[Results], labels: &Value) -> String {
+/// One table per script: controllers × suites. Suites that an earlier table shows are left out. Results of another final state
+/// than `physics` are announced as those of an earlier version.
+pub fn overview(results: &[Results], labels: &Value, physics: &str) -> String {
     let table = |(index, one): (usize, &Results)| {
         let is_known = |suite: &Value| {
             results[..index]
@@ -44,7 +45,15 @@ pub fn overview(results: &[Results], labels: &Value) -> String {
         }
         text
     };
-    results.iter().enumerate().map(table).collect::<Vec<_>>().join("\n")
+    let cells = results.iter().flat_map(|one| &one.suites).flat_map(|suite| suite["controllers"].as_array());
+    let earlier = match cells.flatten().any(|cell| cell["physics"] != physics) {
+        true => {
+            "Rows that this version has not computed anew yet are of an earlier one, with other limits of D; \
+                 [docs/results](docs/results/README.md) marks them.\n\n"
+        }
+        false => "",
+    };
+    earlier.to_owned() + &results.iter().enumerate().map(table).collect::<Vec<_>>().join("\n")
 }
 
 /// One table per script and suite, with all columns.
@@ -56,7 +65,8 @@ pub fn page(results: &[Results], labels: &Value, physics: &str) -> String {
         .to_owned();
     text += &format!(
         "\nThe last column is the state in which the episode of `softvt doctor` ended in the version that made the run, now `{physics}`. \
-         Versions that differ there can differ in single episodes.\n"
+         Rows of another state are of an earlier version: single episodes can differ, and if the definition or the limits of D \
+         have changed since ([changelog](../../CHANGELOG.md)), rates too.\n"
     );
     for one in results {
         text += &format!("\n## `{}`\n", command(one));

@@ -168,7 +168,7 @@ fn resolution(scores: &GroupScores) -> String {
     let episodes = counted(n, "episode");
     match Resolution::new((0.01 * rate * n as f64).round() as usize, n) {
         Some(Resolution { smallest, found }) => format!(
-            "{episodes} separate policies whose rates differ by {smallest:.1} points at least, and in 4 of 5 cases by {found:.0}"
+            "{episodes} separate two policies from a difference of {smallest:.0} points on, in 4 of 5 cases from {found:.0} on"
         ),
         None => format!("{episodes} cannot separate two policies: {MIN_DISCORDANT} are needed at least"),
     }

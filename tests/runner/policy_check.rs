@@ -8,7 +8,7 @@ use softvt::{
     policy::{Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, ToolCommand},
     robot::rotation,
     runner::{
-        PolicyConfig, Silent,
+        PolicyConfig, SilentObserver,
         policy_check::{PolicyCheck, check_policy},
         replay::demos_of,
     },
@@ -32,6 +32,10 @@ struct Memory {
 const CHUNK: usize = 8;
 
 impl Policy for Memory {
+    fn name(&self) -> &str {
+        "memory"
+    }
+
     fn streams(&self) -> SensorStreams {
         SensorStreams::default()
     }
@@ -57,7 +61,8 @@ fn check(dataset: &Path, stride: usize, change: Change) -> PolicyCheck {
         Box::new(Memory { actions: actions.clone(), step: 0, stride, change })
     };
     let policy = PolicyConfig::of("memory", start).expect("a name");
-    check_policy(&policy, dataset, 1, &(Arc::new(Silent) as _)).unwrap_or_else(|error| panic!("{error}"))
+    check_policy(&policy, dataset, 1, &(Arc::new(SilentObserver) as _))
+        .unwrap_or_else(|error| panic!("{error}"))
 }
 
 #[test]
@@ -65,12 +70,12 @@ fn what_is_wrong_with_answers_is_named() {
     let project = Project::new(&[]);
     Recording::new(project.run(SPATIAL_SOFT).tasks(&[3]), 1, "data").with(|o| o.has_images = false).record();
     let dataset = project.path("data");
-    let same = check(&dataset, 1, |action, ..| action);
+    let same = check(&dataset, 1, |action, _, _| action);
     assert_eq!(same.findings, [""; 0], "{same:?}");
     assert!(same.translation.error.is_some_and(|error| error < 1e-9), "{same:?}");
     assert!(same.grip.correlation.is_some_and(|r| r > 0.999) && same.answers > 5, "{same:?}");
     let cases: [(&str, usize, Change); 6] = [
-        ("gripper: the answers are inverted", 1, |a, ..| {
+        ("gripper: the answers are inverted", 1, |a, _, _| {
             Action::new(a.position_b, a.axis_angle_b, 1.0 - a.closure())
         }),
         ("these look like millimetres", 1, |a, tool, _| Action {
@@ -81,11 +86,11 @@ fn what_is_wrong_with_answers_is_named() {
             let d = a.position_b - tool;
             Action { position_b: tool + Vec3::new(d.y, -d.x, d.z), ..a }
         }),
-        ("in the frame of the robot's base", 1, |a, ..| Action {
+        ("in the frame of the robot's base", 1, |a, _, _| Action {
             position_b: a.position_b + Vec3::new(0.5, 0.0, 0.2),
             ..a
         }),
-        ("these look like 10 Hz", 2, |a, ..| a),
+        ("these look like 10 Hz", 2, |a, _, _| a),
         ("do not follow the demonstrations", 1, |a, tool, _| Action {
             position_b: tool + 0.02 * (1e5 * a.position_b).map(f64::sin),
             ..a
@@ -103,7 +108,7 @@ fn a_policy_without_answers_cannot_be_compared() {
     let project = Project::new(&[]);
     Recording::new(project.run(SPATIAL_SOFT).tasks(&[3]), 1, "data").with(|o| o.has_images = false).record();
     let noop = PolicyConfig::named("noop").expect("built in");
-    let refused = check_policy(&noop, &project.path("data"), 1, &(Arc::new(Silent) as _));
+    let refused = check_policy(&noop, &project.path("data"), 1, &(Arc::new(SilentObserver) as _));
     let message = refused.err().map(|error| error.to_string());
     assert!(message.is_some_and(|text| text.contains("only policy servers")), "of a built-in policy");
 }
