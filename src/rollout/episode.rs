@@ -490,6 +490,13 @@ impl Episode {
         Ok(image.into_rgb_image())
     }
 
+    /// Current poses of the scene's cameras, base frame, in their order.
+    pub fn cameras_b(&self) -> Vec<Pose> {
+        let b_from_w = self.sim.robot.base_w.inverse();
+        let cameras_w = self.sensors.cameras_w(&Sensors::frame(&self.sim));
+        cameras_w.into_iter().map(|camera_w| b_from_w * camera_w).collect()
+    }
+
     /// Renders the current tactile image of a finger. It does not change the record.
     ///
     /// # Errors

@@ -185,6 +185,12 @@ impl Sensors {
         FrameView { nodes: &frame.nodes, rigid: &frame.rigid, links: &frame.links, hand_w: Some(hand_w) }
     }
 
+    /// Poses of the scene's cameras in a state, world, in their order.
+    pub fn cameras_w(&self, frame: &WorldSnapshot) -> Vec<Pose> {
+        let view = self.view(frame);
+        self.scene.cameras.iter().map(|camera| camera_w(camera, &view)).collect()
+    }
+
     /// Renders the image of a camera in an initial state, in which it must not be inside an object.
     ///
     /// # Errors
@@ -229,11 +235,7 @@ impl Sensors {
         let robot = RenderScene::new(self.render_robot()?, self.scene.lighting.clone())?;
         let view = self.view(frame);
         for camera in &self.scene.cameras {
-            let mount_w = match (camera.mount, view.hand_w) {
-                (CameraMount::Hand, Some(hand_w)) => hand_w,
-                _ => Pose::identity(),
-            };
-            let eye_w = mount_w * nalgebra::Point3::from(camera.pose.translation.vector);
+            let eye_w = nalgebra::Point3::from(camera_w(camera, &view).translation.vector);
             let is_around = |object: &&ObjectInstance| {
                 object.asset.shape.distance(&object.start_w.inverse_transform_point(&eye_w).coords) < 0.0
             };
@@ -398,6 +400,14 @@ impl Sensors {
             .objects(self.articulation, base_w, ROBOT_SEGMENTATION_ID)
             .into_iter()
             .collect())
+    }
+}
+
+/// Pose of a camera, world.
+fn camera_w(camera: &Camera, view: &FrameView) -> Pose {
+    match (camera.mount, view.hand_w) {
+        (CameraMount::Hand, Some(hand_w)) => hand_w * camera.pose,
+        _ => camera.pose,
     }
 }
 

@@ -38,6 +38,8 @@ pub(super) enum Request {
         /// Height, pixels; `None` for the camera's own.
         height: Option<usize>,
     },
+    /// Return the matrices of the cameras.
+    Cameras,
     /// Return the state of the episode.
     GetState,
     /// Restore a state.
@@ -47,7 +49,7 @@ pub(super) enum Request {
 }
 
 /// Types of requests, for messages.
-const TYPES: &str = "reset, step, render, get_state, set_state, close";
+const TYPES: &str = "reset, step, render, cameras, get_state, set_state, close";
 
 impl Request {
     /// Validates a message.
@@ -81,6 +83,7 @@ impl Request {
                     height: edge("height")?,
                 })
             }
+            "cameras" => fields(&[]).map(|_| Self::Cameras),
             "get_state" => fields(&[]).map(|_| Self::GetState),
             "set_state" => state(&fields(&["state"])?, config),
             "close" => fields(&[]).map(|_| Self::Close),

@@ -11,13 +11,15 @@ use super::{
     state::LiveEpisode,
 };
 use softvt_benchmark::{CONTROL_DT, Task};
+use softvt_common::npy::NpyArray;
 use softvt_evaluation::verdict::Outcome;
 use softvt_policy::{
     Observation,
     encode::content,
-    msgpack::map,
+    msgpack::{map, pack_array},
     profile::{Profile, ProfileInput},
 };
+use softvt_robot::rotation;
 
 /// Version of the protocol.
 const PROTOCOL: u32 = 1;
@@ -105,6 +107,41 @@ fn encoded(observation: &Observation, profile: &Profile) -> Value {
     Value::Map(profile.inputs.iter().filter_map(entry).collect())
 }
 
+/// The cameras of the scene by name: size in pixels, intrinsic matrix, and pose in the base frame as a matrix (4, 4), its axes as
+/// in OpenGL.
+pub(super) fn cameras(live: &LiveEpisode) -> Value {
+    let cameras = &live.episode.sim.scene.cameras;
+    let entries = cameras.iter().zip(live.episode.cameras_b()).map(|(camera, camera_b)| {
+        let matrix = |edge, rows: Vec<f64>| pack_array(NpyArray::from_f64(vec![edge, edge], rows), true);
+        let entry = map([
+            ("width", camera.width.into()),
+            ("height", camera.height.into()),
+            ("intrinsic", matrix(3, camera.intrinsic().as_flattened().to_vec())),
+            // nalgebra iterates over columns.
+            ("pose_b", matrix(4, camera_b.to_homogeneous().transpose().iter().copied().collect())),
+        ]);
+        (camera.name.as_str(), entry)
+    });
+    typed("cameras", [("cameras", map(entries))])
+}
+
+/// What clients with access to the true state need to read it: the goal, the pose of the robot's base in the world, and the names of all
+/// objects by their number in segmentations, from 1.
+fn scene(live: &LiveEpisode, config: &ServerConfig) -> serde_json::Value {
+    let id = &live.state.id;
+    let mut tasks =
+        config.suites.iter().filter(|suite| suite.name == id.suite).flat_map(|suite| &suite.tasks);
+    let sim = &live.episode.sim;
+    let position: [f64; 3] = sim.robot.base_w.translation.vector.into();
+    let q = rotation::canonical(&sim.robot.base_w.rotation);
+    json!({
+        "goal": tasks.find(|task| task.id == id.task).map(|task| &task.goal),
+        "base_position_w": position,
+        "base_quaternion_w": [q.w, q.i, q.j, q.k],
+        "objects": sim.objects.iter().map(|object| &object.name).collect::<Vec<_>>(),
+    })
+}
+
 /// Unless clients are privileged: what any policy can know, and whether the goal was reached.
 fn info(
     live: &LiveEpisode,
@@ -128,6 +165,9 @@ fn info(
         }
     }
     if config.privileged {
+        if executed.is_none() {
+            put("scene", scene(live, config));
+        }
         put("state", json!(live.episode.trace()));
         put("verdict", json!(live.episode.verdict()));
     }

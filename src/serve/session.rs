@@ -69,6 +69,7 @@ impl<'a> ClientSession<'a> {
             }
             Request::Step(rows) => self.step(&rows),
             Request::Render { camera, width, height } => self.render(camera, width, height),
+            Request::Cameras => Ok(response::cameras(self.live("cameras")?)),
             Request::GetState => self.get_state(),
             Request::Close => Ok(response::typed("close", [])),
         }

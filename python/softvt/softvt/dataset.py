@@ -1,0 +1,164 @@
+"""Recordings of `softvt record` as a data set of control steps, for the loaders of PyTorch and others."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import h5py
+
+ACTIONS = {"continuous": "actions", "binary": "actions_binary", "two-width": "actions_two_width", "force": "actions_force"}
+"""Streams of the actions in each grip code (docs/data.md)."""
+
+OBSERVATIONS = ("agentview_rgb", "eye_in_hand_rgb", "state")
+"""Streams that an item has by default."""
+
+
+@dataclass(frozen=True)
+class Demonstration:
+    """One demonstration of a recording."""
+
+    file: Path
+    """HDF5 file."""
+    name: str
+    """Group in the file, such as "demo_0"."""
+    steps: int
+    """Number of control steps."""
+    suite: str
+    task: int
+    prompt: str
+    attempt: int
+    """Episode of the demonstration split in which it was recorded."""
+
+
+class Dataset:
+    """The control steps of a recording, as a map-style data set: `len(dataset)` and `dataset[i]`.
+
+    An item is a dict of the requested observation streams and of
+
+    - `actions` (horizon, 7): the actions from this step on; after the last step they repeat the last one, and `actions_is_pad` (horizon) is
+      true there. Position (m), axis-angle (rad), and the gripper in the grip code.
+    - `prompt`, `episode` (number of the demonstration in `demonstrations`) and `step`.
+
+    Files are opened by each process that reads, so that loaders with workers are safe.
+    """
+
+    demonstrations: list[Demonstration]
+    """All demonstrations, in the order of files and of their numbers."""
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        keys: Sequence[str] = OBSERVATIONS,
+        *,
+        horizon: int = 1,
+        gripper: str = "continuous",
+        task: int | Sequence[int] | None = None,
+    ):
+        """Opens a recording.
+
+        path: folder that `softvt record` wrote, or one of its HDF5 files.
+        keys: streams of `obs`, such as "state" or "gsmini_left_tactile_rgb", and others by their path, such as "privileged/d".
+        horizon: number of actions of an item.
+        gripper: grip code of the actions.
+        task: only these tasks.
+
+        Raises ValueError if there is no such stream or no demonstration, and ImportError without h5py.
+        """
+        if gripper not in ACTIONS:
+            raise ValueError(f"gripper={gripper!r}: expected one of {', '.join(ACTIONS)}")
+        if horizon < 1:
+            raise ValueError(f"horizon={horizon}: expected at least 1")
+        self._streams = {key: key if "/" in key else f"obs/{key}" for key in keys}
+        self._actions, self._horizon = ACTIONS[gripper], horizon
+        self._files: dict[Path, h5py.File] = {}
+        self._process = os.getpid()
+        tasks = None if task is None else {task} if isinstance(task, int) else {*task}
+        self.demonstrations = [demo for file in _hdf5_files(Path(path)) for demo in self._read(file) if tasks is None or demo.task in tasks]
+        if not self.demonstrations:
+            raise ValueError(f"{path}: no demonstration" + ("" if tasks is None else f" of task {', '.join(map(str, sorted(tasks)))}"))
+        self._starts = np.cumsum([0, *(demo.steps for demo in self.demonstrations)])
+
+    def __len__(self) -> int:
+        """Number of control steps."""
+        return int(self._starts[-1])
+
+    def __getitem__(self, index: int) -> dict[str, Any]:
+        """The control step of a number, from 0; negative ones count from the end."""
+        number = index + len(self) if index < 0 else index
+        if not 0 <= number < len(self):
+            raise IndexError(f"step {index} of {len(self)}")
+        episode = int(np.searchsorted(self._starts, number, side="right")) - 1
+        demo, step = self.demonstrations[episode], number - int(self._starts[episode])
+        group = self._group(demo)
+        item: dict[str, Any] = {key: np.asarray(group[stream][step]) for key, stream in self._streams.items()}
+        actions = np.asarray(group[self._actions][step : step + self._horizon], dtype=np.float32)
+        missing = self._horizon - len(actions)
+        item["actions"] = np.concatenate([actions, np.repeat(actions[-1:], missing, axis=0)])
+        item["actions_is_pad"] = np.arange(self._horizon) >= len(actions)
+        return {**item, "prompt": demo.prompt, "episode": episode, "step": step}
+
+    def episode(self, number: int) -> dict[str, np.ndarray]:
+        """All steps of a demonstration: the requested streams and `actions`, each with the steps along its first axis."""
+        group = self._group(self.demonstrations[number])
+        streams = {key: np.asarray(group[stream]) for key, stream in self._streams.items()}
+        return {**streams, "actions": np.asarray(group[self._actions])}
+
+    def close(self) -> None:
+        """Closes the files. They are opened again when they are needed."""
+        for file in self._files.values():
+            file.close()
+        self._files.clear()
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Open files cannot be sent to the workers of a loader.
+        return {**self.__dict__, "_files": {}}
+
+    def _read(self, file: Path) -> list[Demonstration]:
+        data = self._open(file)["data"]
+        found = []
+        for name in sorted(data, key=lambda name: int(name.removeprefix("demo_"))):
+            group, attrs = data[name], data[name].attrs
+            for stream in [*self._streams.values(), self._actions]:
+                if stream not in group:
+                    have = ", ".join(sorted(group["obs"]))
+                    raise ValueError(f"{file}: data/{name} has no stream {stream}; obs has {have}")
+            text = {key: _text(attrs[key]) for key in ("task_suite", "language")}
+            numbers = {key: int(attrs[key]) for key in ("num_samples", "task_id", "attempt")}
+            found.append(
+                Demonstration(
+                    file, name, numbers["num_samples"], text["task_suite"], numbers["task_id"], text["language"], numbers["attempt"]
+                )
+            )
+        return found
+
+    def _group(self, demo: Demonstration) -> Any:
+        return self._open(demo.file)["data"][demo.name]
+
+    def _open(self, path: Path) -> "h5py.File":
+        import h5py
+
+        if self._process != os.getpid():
+            # The files of the process that this one was forked from.
+            self._files, self._process = {}, os.getpid()
+        if path not in self._files:
+            self._files[path] = h5py.File(path, "r")
+        return self._files[path]
+
+
+def _hdf5_files(path: Path) -> list[Path]:
+    """The HDF5 files of a recording, in order of their names. Raises ValueError if there is none."""
+    if path.is_file():
+        return [path]
+    found = sorted((path / "hdf5").glob("*.hdf5")) or sorted(path.glob("*.hdf5"))
+    if not found:
+        raise ValueError(f"{path}: no recording; give a folder that softvt record wrote, or one of its HDF5 files")
+    return found
+
+
+def _text(value: Any) -> str:
+    return value.decode() if isinstance(value, bytes) else str(value)

@@ -1,0 +1,483 @@
+"""softvt as a Gymnasium environment: a client of `softvt serve` that starts its own server, or connects to one."""
+
+import weakref
+from collections import deque
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+from .profile import CONTROLS, PARTS, ProfileSpec, parse_parts, require_one_of
+from .readings import Readings
+from .serve import Client, Lease, lease
+from .true_state import STATE_SIZE, Scene, TrueState, progress
+
+REWARDS = ("sparse", "staged", "safety")
+"""Values of the argument `reward`."""
+
+LAYOUTS = ("flat", "lerobot")
+"""Values of the argument `layout`."""
+
+FIRST_SEED = 1000
+"""Seed of episode 0: the first seed of lerobot-eval, so that it judges the episodes of `softvt FILE.lua`."""
+
+NEW_ROLLOUT = "lerobot_new_rollout"
+"""Option of `reset` by which lerobot-eval begins an episode."""
+
+_EPISODES = 2**32
+_RENDER_MODES = ("rgb_array", "sensors")
+_SENSOR_EDGE = 240  # pixels of each image of the render mode "sensors"
+
+Observation = np.ndarray | dict[str, Any]
+Step = tuple[Observation, float, bool, bool, dict[str, Any]]
+
+
+class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
+    """Tasks of a suite. docs/python.md describes observations, actions, rewards and `info`."""
+
+    metadata = {"render_modes": [*_RENDER_MODES], "render_fps": 20}
+
+    task_description: str
+    """The prompt of the present episode."""
+
+    def __init__(
+        self,
+        script: str | None = None,
+        *,
+        url: str | None = None,
+        token: str | None = None,
+        suite: str | None = None,
+        task: int | str | Sequence[int] | None = 0,
+        obs: str | Sequence[str] | None = None,
+        control: str = "delta",
+        gripper: str = "continuous",
+        reward: str = "sparse",
+        layout: str = "flat",
+        history: int = 1,
+        cameras: Sequence[str] = ("third_person", "wrist"),
+        image_size: int | tuple[int, int] | None = None,
+        profile: str | None = None,
+        cost: bool = True,
+        privileged: bool = False,
+        split: str | None = None,
+        first_seed: int = FIRST_SEED,
+        freeze: bool = False,
+        flags: Sequence[str] = (),
+        binary: str | None = None,
+        render_mode: str | None = None,
+        camera: str | None = None,
+    ):
+        """Starts a server, or shares one that was started with equal arguments.
+
+        script: a Lua file that returns a suite or a list of suites, or the name of a standard suite, such as "object_soft".
+        url, token: a running server in place of the script. `control`, `gripper`, `history`, `cameras`, `image_size`, `profile` and `flags`
+            are then those of the server.
+        suite: name of one of several suites of the script; by default the first.
+        task: number of a task, part of its prompt, or several numbers, of which each reset draws one; None for all tasks.
+        obs: parts of the observation (`softvt.profile.PARTS`), such as "state", or joined by +, such as "pixels+proprio". By default "state";
+            with `url` or `profile`, all that the server sends.
+        control: "delta" (fractions −1..1 of 20 mm and 0.2 rad), "delta_osc" (of 50 mm and 0.5 rad, as LIBERO has them) or "pose" (absolute).
+        gripper: grip code of the last number of an action: "continuous", "binary", "two-width" or "force".
+        reward: 1 at the goal ("sparse"), 1 at a goal reached safely ("safety"), or the increase of progress ("staged").
+        layout: keys of the observation: "flat", or those that LeRobot reads.
+        history: control steps of each entry, the present one last, along a first axis if there are several.
+        cameras: names of the cameras of pixels, depth and segmentation.
+        image_size: pixels of the camera images, (height, width) or one number for both; by default those of the scene.
+        profile: a profile of softvt by name or file, in place of `obs`, `control`, `gripper`, `history` and `cameras`.
+        cost: True for `info["cost"]`, which needs a server with access to the true state (`--privileged`).
+        privileged: True for `info["verdict"]` and `info["state"]`.
+        split: list of episodes, "validation", "demonstration" or "experiment"; by default that of the server, "validation".
+        first_seed: seed of episode 0.
+        freeze: True to repeat the last transition after the end of an episode, until a reset with a seed or with the option of lerobot-eval.
+        flags: further flags of `softvt serve`, such as ("--shift", "stiffness=0.5").
+        binary: the program; by default `softvt.find_binary()`.
+        render_mode: "rgb_array" for the image of `camera`, or "sensors" for both cameras above both fingers.
+        camera: a camera's name (default: the scene's first), or "left" or "right" for a finger.
+
+        Raises ValueError for an argument that is not possible, and ServerError with the message of the program if it does not start.
+        """
+        require_one_of("reward", reward, REWARDS)
+        require_one_of("layout", layout, LAYOUTS)
+        require_one_of("control", control, CONTROLS)
+        if render_mode is not None:
+            require_one_of("render_mode", render_mode, _RENDER_MODES)
+        if (script is None) == (url is None):
+            raise ValueError("give either the script of a suite or the url of a server")
+        parts = parse_parts(obs) if obs is not None else None if url or profile else ("state",)
+        needs_truth = cost or privileged or reward != "sparse" or (parts is not None and "state" in parts)
+        self.render_mode = render_mode
+        self._camera, self._reward, self._layout, self._freezes = camera, reward, layout, freeze
+        self._has_cost, self._has_readings = cost, privileged
+        self._parts, self._split, self._first_seed = parts, split, first_seed
+        self._lease: Lease | None = None
+        if script is not None:
+            spec = None if profile or parts is None else ProfileSpec(parts, control, gripper, tuple(cameras), history)
+            own_flags = _flags(profile, image_size, needs_truth) + tuple(flags)
+            self._lease = lease(_script(script), own_flags, binary, None if spec is None else spec.to_lua())
+            connect = self._lease.connect
+        else:
+            assert url is not None
+
+            def connect() -> Client:
+                return Client(url, token)
+
+        try:
+            self._client = connect()
+        except BaseException:
+            if self._lease is not None:
+                self._lease.release()
+            raise
+        self._closer = weakref.finalize(self, _close, self._client, self._lease)
+        try:
+            self._begin(suite, task, needs_truth, history if script is not None else 1)
+        except BaseException:
+            self.close()
+            raise
+
+    def _begin(self, suite: str | None, task: int | str | Sequence[int] | None, needs_truth: bool, history: int) -> None:
+        hello = self._client.hello
+        if needs_truth and not hello["privileged"]:
+            raise ValueError(
+                "obs='state', reward='staged', reward='safety', cost=True and privileged=True need the true state, which this server does not "
+                "send; start it with --privileged, or use obs='proprio', reward='sparse' and cost=False"
+            )
+        suites = {entry["name"]: entry for entry in hello["suites"]}
+        name = suite if suite is not None else next(iter(suites))
+        if name not in suites:
+            raise ValueError(f"suite={name!r}: the server has {', '.join(suites)}")
+        self._suite = name
+        self._prompts = {entry["task"]: entry["prompt"] for entry in suites[name]["tasks"]}
+        self._tasks = _tasks(name, task, self._prompts)
+        self.task = self._tasks[0]
+        self.task_description = self._prompts[self.task]
+        budgets = {entry["task"]: entry["budget_steps"] for entry in suites[name]["tasks"]}
+        # The name under which Gymnasium's TimeLimit has it, and under which LeRobot asks for it.
+        self._max_episode_steps = max(budgets[task] for task in self._tasks)
+        self._entries = self._select(hello["observation_space"])
+        self._history = history
+        self._past: deque[np.ndarray] = deque(maxlen=history)
+        self.observation_space = self._space(hello["observation_space"])
+        low, high = (_numbers(hello["action_space"], end, np.float32) for end in ("low", "high"))
+        self.action_space = spaces.Box(low, high, dtype=np.float32)
+        self._scene: Scene | None = None
+        self._verdict: Mapping[str, Any] = {}
+        self._progress = 0.0
+        self._last: Step | None = None
+        self._pending = ""
+
+    # Gymnasium's interface.
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, dict[str, Any]]:
+        """Starts episode `seed - first_seed` of the task, or a random one.
+
+        `options` may name another `task` or `split`, the `episode`, and the `seed` of the whole list of episodes.
+        """
+        self.begin_reset(seed, options)
+        return self.end_reset()
+
+    def step(self, action: np.ndarray) -> Step:
+        """Executes an action (7), or several (n, 7), and returns the result of the last one."""
+        self.begin_step(action)
+        return self.end_step()
+
+    def render(self) -> Any:
+        """Image of the present state, uint8 (height, width, 3); None without a render mode."""
+        if self.render_mode is None:
+            return None
+        if self.render_mode == "rgb_array":
+            return self._client.request("render", camera=self._camera)["image"]
+        return self._render_sensors()
+
+    def close(self) -> None:
+        """Closes the connection, and ends the server after its last environment. A second call has no effect."""
+        self._closer()
+
+    # What softvt offers besides.
+
+    def begin_reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
+        """As `reset`, without waiting; `end_reset` has to follow. Several environments thus work at the same time."""
+        super().reset(seed=seed)
+        options = dict(options or {})
+        is_new = options.pop(NEW_ROLLOUT, False) or seed is not None or bool(options)
+        if self._freezes and self._last is not None and not is_new:
+            self._pending = "frozen"
+            return
+        unknown = options.keys() - {"task", "episode", "split", "seed"}
+        if unknown:
+            raise ValueError(f"reset: options has no {', '.join(map(repr, sorted(unknown)))}; expected task, episode, split or seed")
+        drawn = int(self.np_random.integers(_EPISODES))
+        task = self._tasks[int(self.np_random.integers(len(self._tasks)))]
+        episode = drawn if seed is None else (seed - self._first_seed) % _EPISODES
+        requested = {"suite": self._suite, "task": task, "episode": episode, "split": self._split, **options}
+        self._client.send("reset", **{key: value for key, value in requested.items() if value is not None})
+        self._pending = "reset"
+
+    def end_reset(self) -> tuple[Observation, dict[str, Any]]:
+        """Waits for `begin_reset`."""
+        if self._take_pending() == "frozen":
+            assert self._last is not None
+            observation, _, _, _, info = self._last
+            return observation, info
+        return self._restart(self._client.receive())
+
+    def begin_step(self, action: np.ndarray) -> None:
+        """As `step`, without waiting; `end_step` has to follow."""
+        if self._freezes and self._last is not None:
+            self._pending = "frozen"
+            return
+        self._client.send("step", action=np.asarray(action))
+        self._pending = "step"
+
+    def end_step(self) -> Step:
+        """Waits for `begin_step`."""
+        if self._take_pending() == "frozen":
+            assert self._last is not None
+            return self._last
+        response = self._client.receive()
+        before = self._verdict
+        self._verdict = response["info"].get("verdict", {})
+        observation, state = self._observe(response, is_first=False)
+        info = self._info(response["info"], before)
+        reward = self._reward_of(response, state)
+        terminated, truncated = bool(response["terminated"]), bool(response["truncated"])
+        if self._freezes and (terminated or truncated):
+            self._last = (observation, 0.0, terminated, truncated, info)
+        return observation, reward, terminated, truncated, info
+
+    def get_state(self) -> dict[str, Any]:
+        """State of the episode as plain data, for `set_state` of this or an equal environment."""
+        state: dict[str, Any] = self._client.request("get_state")["state"]
+        return state
+
+    def set_state(self, state: dict[str, Any]) -> tuple[Observation, dict[str, Any]]:
+        """Restores a state bit for bit; returns what `reset` does."""
+        return self._restart(self._client.request("set_state", state=state))
+
+    def camera_matrices(self) -> dict[str, dict[str, Any]]:
+        """Of each camera by name, in the present state: `width` and `height` of its image, pixels, its matrix `intrinsic` (3, 3), and its pose in
+        the robot's base frame `pose_b` (4, 4), with the axes of OpenGL: x right, y up, view along −z."""
+        cameras: dict[str, dict[str, Any]] = self._client.request("cameras")["cameras"]
+        return cameras
+
+    @property
+    def hello(self) -> dict[str, Any]:
+        """The server's description of its suites, tasks and profile (docs/serve.md)."""
+        return self._client.hello
+
+    def _take_pending(self) -> str:
+        pending, self._pending = self._pending, ""
+        return pending
+
+    def _restart(self, response: dict[str, Any]) -> tuple[Observation, dict[str, Any]]:
+        """Takes in the first answer of an episode or of a restored state."""
+        raw = response["info"]
+        self._last = None
+        self.task = raw["task"]
+        self.task_description = self._prompts[self.task]
+        self._verdict = raw.get("verdict", {})
+        self._scene = None
+        if self._needs_state():
+            self._scene = Scene.read(raw["scene"])
+        observation, state = self._observe(response, is_first=True)
+        self._progress = progress(state, self._verdict) if state is not None else 0.0
+        return observation, self._info(raw, self._verdict)
+
+    def _needs_state(self) -> bool:
+        return self._reward == "staged" or (self._parts is not None and "state" in self._parts)
+
+    # Observations.
+
+    def _select(self, entries: Mapping[str, Any]) -> list[str]:
+        """Keys of the server's entries that the observation has."""
+        if self._parts is None:
+            # Text is no Box, which many libraries need.
+            return [key for key, entry in entries.items() if "charset" not in entry]
+        selected = []
+        for part in self._parts:
+            if part == "state":
+                continue
+            found = [key for key, entry in entries.items() if _part(key, entry) == part]
+            if not found:
+                raise ValueError(
+                    f"obs={part!r}: the profile {self._client.hello['profile']!r} of this server does not send it; it sends {', '.join(entries)}"
+                )
+            selected += found
+        return selected
+
+    def _space(self, entries: Mapping[str, Any]) -> spaces.Space[Any]:
+        all_spaces: dict[str, spaces.Space[Any]] = {key: _space(entries[key]) for key in self._entries}
+        if self._parts is not None and "state" in self._parts:
+            shape = (STATE_SIZE,) if self._history == 1 else (self._history, STATE_SIZE)
+            all_spaces["state"] = spaces.Box(-np.inf, np.inf, shape, np.float32)
+        if self._layout == "flat":
+            return next(iter(all_spaces.values())) if self._is_bare else spaces.Dict(all_spaces)
+        if "tactile_marker_motion" in all_spaces:
+            motion = all_spaces["tactile_marker_motion"]
+            assert isinstance(motion, spaces.Box)
+            all_spaces["tactile_marker_motion"] = spaces.Box(_last_motion(motion.low), _last_motion(motion.high), dtype=np.float32)
+        nested = self._nest(all_spaces)
+        return spaces.Dict({key: spaces.Dict(value) if isinstance(value, dict) else value for key, value in nested.items()})
+
+    @property
+    def _is_bare(self) -> bool:
+        """True if the observation is an array instead of a dict with one entry."""
+        return self._parts in (("state",), ("proprio",))
+
+    def _nest(self, flat: Mapping[str, Any]) -> dict[str, Any]:
+        """The keys that LeRobot reads: pictures in `pixels`, the robot's state as `agent_pos`, the true one as `environment_state`."""
+        nested: dict[str, Any] = {}
+        for key, value in flat.items():
+            match _part(key, self._client.hello["observation_space"].get(key, {})):
+                case "pixels" | "tactile" | "tactile_image":
+                    nested.setdefault("pixels", {})[key] = value
+                case "proprio":
+                    nested["agent_pos"] = value
+                case _:
+                    nested["environment_state" if self._is_true_state(key) else key] = value
+        return nested
+
+    def _is_true_state(self, key: str) -> bool:
+        return key == "state" and key not in self._entries
+
+    def _observe(self, response: dict[str, Any], is_first: bool) -> tuple[Observation, TrueState | None]:
+        sent, raw = response["observation"], response["info"]
+        flat = {key: sent[key] for key in self._entries}
+        state = None if self._scene is None else TrueState.read(self._scene, raw["state"], raw["verdict"])
+        if state is not None and self._parts is not None and "state" in self._parts:
+            self._past.extend([state.vector] * (self._history if is_first else 1))
+            flat["state"] = state.vector if self._history == 1 else np.stack(self._past)
+        if self._layout == "flat":
+            return (next(iter(flat.values())) if self._is_bare else flat), state
+        if "tactile_marker_motion" in flat:
+            flat["tactile_marker_motion"] = _last_motion(flat["tactile_marker_motion"])
+        return self._nest(flat), state
+
+    # Rewards and info.
+
+    def _reward_of(self, response: dict[str, Any], state: TrueState | None) -> float:
+        if self._reward == "staged":
+            assert state is not None
+            before, self._progress = self._progress, progress(state, self._verdict)
+            return self._progress - before
+        if self._reward == "safety":
+            return 1.0 if response["terminated"] and self._verdict["safety"] else 0.0
+        return float(response["reward"])
+
+    def _info(self, raw: dict[str, Any], before: Mapping[str, Any]) -> dict[str, Any]:
+        """`before` is the verdict of the previous step."""
+        info: dict[str, Any] = {key: raw[key] for key in ("task", "episode", "step", "time_s", "far_commands", "clamped_grips")}
+        info["prompt"] = self.task_description
+        # Vector environments make an array of Python's bool only.
+        info["is_success"] = bool(raw["success"])
+        if self._has_cost:
+            info.update(_costs(before, self._verdict))
+            info["is_safe"] = bool(self._verdict["safety"])
+        if self._has_readings:
+            info["verdict"], info["state"] = Readings(raw["verdict"]), Readings(raw["state"])
+        if "record" in raw:
+            info["record"] = Readings(raw["record"])
+        if "recorded" in raw:
+            info["recorded"] = bool(raw["recorded"])
+        return info
+
+    def _render_sensors(self) -> np.ndarray:
+        """Both cameras above both fingers."""
+        names = [*self.camera_matrices()][:2]
+        cameras = [self._client.request("render", camera=name, width=320, height=_SENSOR_EDGE)["image"] for name in names]
+        fingers = [self._client.request("render", camera=side)["image"] for side in ("left", "right")]
+        return np.vstack([np.hstack(cameras), np.hstack(fingers)])
+
+
+def _close(client: Client, lease: Lease | None) -> None:
+    client.close()
+    if lease is not None:
+        lease.release()
+
+
+def _script(name: str) -> str:
+    """Path of a Lua file, or of a standard suite."""
+    return str(name) if str(name).endswith(".lua") else f"suites/{name}.lua"
+
+
+def _flags(profile: str | None, image_size: int | tuple[int, int] | None, needs_truth: bool) -> tuple[str, ...]:
+    flags: list[str] = []
+    if profile is not None:
+        flags += ["--profile", profile]
+    if image_size is not None:
+        height, width = (image_size, image_size) if isinstance(image_size, int) else image_size
+        flags += ["--set", f"cameras.height={height}", "--set", f"cameras.width={width}"]
+    if needs_truth:
+        flags.append("--privileged")
+    return tuple(flags)
+
+
+def _tasks(suite: str, task: int | str | Sequence[int] | None, prompts: Mapping[int, str]) -> list[int]:
+    """Numbers of the tasks that an argument names. Raises ValueError if there is no such task."""
+    if task is None:
+        return [*prompts]
+    if isinstance(task, str):
+        found = [number for number, prompt in prompts.items() if task.lower() in prompt.lower()]
+        if len(found) != 1:
+            raise ValueError(
+                f"task={task!r}: {len(found)} prompts of suite {suite} contain it; expected one of: {'; '.join(prompts.values())}"
+            )
+        return found
+    numbers = [int(task)] if isinstance(task, int | np.integer) else [int(number) for number in task]
+    for number in numbers:
+        if number not in prompts:
+            known = [*prompts]
+            have = f"0 to {known[-1]}" if known == [*range(len(known))] else ", ".join(map(str, known))
+            raise ValueError(f"task {number}: suite {suite} has the tasks {have}")
+    if not numbers:
+        raise ValueError("task: no number in the list")
+    return numbers
+
+
+def _part(key: str, entry: Mapping[str, Any]) -> str:
+    """Part of an observation (`PARTS`) that an entry of a server belongs to; its key for other entries."""
+    if "charset" in entry:
+        return "prompt"
+    if key in PARTS and key not in ("state", "prompt"):
+        return key
+    if key == "tactile_marker_motion":
+        return "marker_motion"
+    if key.startswith("tactile_"):
+        return "tactile"
+    shape, dtype = entry.get("shape", ()), entry.get("dtype", "")
+    if dtype == "|u1" and len(shape) >= 3:
+        return "pixels"
+    for part in ("depth", "segmentation"):
+        if key.endswith(f"_{part}"):
+            return part
+    # The robot's own state in softvt's profiles.
+    return "proprio" if key == "state" and entry else key
+
+
+def _space(entry: Mapping[str, Any]) -> spaces.Space[Any]:
+    """Space of an entry as the server describes it: text, or an array with common or individual bounds."""
+    if "charset" in entry:
+        return spaces.Text(entry["max_length"], charset=entry["charset"])
+    dtype = np.dtype(entry["dtype"]).type
+    return spaces.Box(_numbers(entry, "low", dtype), _numbers(entry, "high", dtype), dtype=dtype)
+
+
+def _numbers(entry: Mapping[str, Any], end: str, dtype: Any) -> np.ndarray:
+    """Lower or upper bounds of an array."""
+    return np.broadcast_to(np.array(entry[end], dtype), tuple(entry["shape"])).copy()
+
+
+def _last_motion(motion: np.ndarray) -> np.ndarray:
+    """Initial, previous and present positions of the markers (3, 198, 2), as the data sets for LeRobot have them."""
+    return motion[[0, -2, -1]]
+
+
+def _costs(before: Mapping[str, Any], now: Mapping[str, Any]) -> dict[str, float]:
+    """Costs of a step, 1 each: D beyond τ, a drop, and slip beyond the limit where the suite forbids it; `cost` is their sum."""
+    costs = {
+        "cost_deformation": float((now["time_over_tau_s"] or 0.0) > (before["time_over_tau_s"] or 0.0)),
+        "cost_drop": float(before["no_drop"] and not now["no_drop"]),
+        "cost_slip": float(before["slip_ok"] is not False and now["slip_ok"] is False),
+    }
+    return {"cost": sum(costs.values()), **costs}

@@ -1,0 +1,111 @@
+"""Profiles of `softvt serve` for the arguments of an environment: which observations it sends, and what its actions mean."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+PARTS = ("state", "proprio", "pixels", "depth", "segmentation", "tactile", "tactile_image", "marker_motion", "prompt")
+"""Parts of an observation, by their names in the argument `obs`."""
+
+CONTROLS = ("delta", "delta_osc", "pose", "joints")
+"""Values of the argument `control`."""
+
+PROPRIO = ("position", "axis_angle", "sensed_finger_position")
+"""Parts of the entry `proprio`: tool position (m) and axis-angle (rad) in the base frame, and half of the width that the sensor of a real hand
+measures (m); the `state` of the profiles `vision` and `visuo_tactile`."""
+
+GRIPPERS = ("continuous", "binary", "two-width", "force")
+"""Grip codes (docs/policies.md)."""
+
+MAX_HISTORY = 32
+"""Most control steps of an observation."""
+
+
+@dataclass(frozen=True)
+class ProfileSpec:
+    """Arguments of an environment that its server's profile depends on."""
+
+    parts: tuple[str, ...]
+    control: str
+    gripper: str = "continuous"
+    cameras: tuple[str, ...] = ("third_person", "wrist")
+    history: int = 1
+
+    def __post_init__(self) -> None:
+        """Checks the values. Raises ValueError."""
+        if not self.parts:
+            raise ValueError(f"obs: no part of an observation; give some of {', '.join(PARTS)}")
+        for part in self.parts:
+            require_one_of("obs", part, PARTS)
+        require_one_of("control", self.control, CONTROLS)
+        if self.control == "joints":
+            raise ValueError("control='joints': softvt commands tool poses, not joint angles; use 'pose' or 'delta'")
+        require_one_of("gripper", self.gripper, GRIPPERS)
+        if not 1 <= self.history <= MAX_HISTORY:
+            raise ValueError(f"history={self.history}: expected 1 to {MAX_HISTORY} control steps")
+
+    def to_lua(self) -> str:
+        """The profile as a Lua file. Its entries have the keys of observations with `layout="flat"`."""
+        frames = "" if self.history == 1 else f", frames = {self.history}"
+        inputs = []
+        for part in self.parts:
+            for key, source in self._sources(part):
+                inputs.append(f"    {{ keys = {{ {_quoted(key)} }}, {source}{'' if part in ('prompt', 'tactile_image') else frames} }},")
+        if not inputs:
+            # A profile has at least one entry. The true state is not one of them: it comes with each answer.
+            inputs.append(f"    {{ keys = {{ 'proprio' }}, {_proprio()} }},")
+        return "\n".join(
+            ["return softvt.profile {", '  name = "python",', "  inputs = {", *inputs, "  },", f"  {self._actions()},", "}", ""]
+        )
+
+    def _sources(self, part: str) -> list[tuple[str, str]]:
+        """Keys and sources of the entries of a part."""
+        match part:
+            case "pixels":
+                return [(camera, f'source = "camera", camera = {_quoted(camera)}') for camera in self.cameras]
+            case "depth" | "segmentation":
+                return [(f"{camera}_{part}", f'source = "{part}", camera = {_quoted(camera)}') for camera in self.cameras]
+            case "tactile":
+                return [(f"tactile_{finger}", f'source = "tactile", finger = "{finger}"') for finger in ("left", "right")]
+            case "tactile_image" | "prompt":
+                return [(part, f'source = "{part}"')]
+            case "marker_motion":
+                return [("tactile_marker_motion", 'source = "marker_motion"')]
+            case "proprio":
+                return [(part, _proprio())]
+        return []
+
+    def _actions(self) -> str:
+        match self.control:
+            case "pose":
+                pose, ends = 'pose = "absolute"', "open = 0, closed = 1"
+            case "delta":
+                pose, ends = 'pose = "delta", translation_m = 0.02, rotation_rad = 0.2', "open = -1, closed = 1"
+            case _:
+                pose, ends = 'pose = "delta_osc", translation_m = 0.05, rotation_rad = 0.5', "open = -1, closed = 1"
+        ends = "" if self.gripper == "force" else f"{ends}, "
+        return f'actions = {{ {pose}, gripper = {{ {ends}code = "{self.gripper}" }} }}'
+
+
+def parse_parts(obs: str | Sequence[str]) -> tuple[str, ...]:
+    """Parts of an observation from a list, or from text such as "pixels+proprio". Raises ValueError for an unknown one."""
+    parts = tuple(obs.split("+")) if isinstance(obs, str) else tuple(obs)
+    for part in parts:
+        require_one_of("obs", part, PARTS)
+    return tuple(dict.fromkeys(parts))
+
+
+def require_one_of(argument: str, value: str, known: Sequence[str]) -> None:
+    """Raises ValueError unless the value of an argument is one of those."""
+    if value not in known:
+        raise ValueError(f"{argument}={value!r}: expected {', '.join(map(repr, known[:-1]))} or {known[-1]!r}")
+
+
+def _proprio() -> str:
+    parts = ", ".join(_quoted(part) for part in PROPRIO)
+    return f'source = "state", parts = {{ {parts} }}'
+
+
+def _quoted(text: str) -> str:
+    """A string of Lua."""
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return f'"{escaped}"'

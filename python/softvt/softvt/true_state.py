@@ -1,0 +1,126 @@
+"""The true state of an episode as a vector of numbers, and the staged reward, which is a function of it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+STAGES = ("reach", "grasp", "lift", "carry", "place", "release")
+"""Stages of an episode, in order (docs/results.md)."""
+
+STATE_FIELDS: dict[str, int] = {
+    "tool_position": 3,  # m
+    "tool_rotation": 6,  # the first two columns of the rotation matrix
+    "gripper_width": 1,  # m, exact
+    "closure": 1,  # as commanded, 0 open to 1 closed
+    "pad_force": 2,  # of the left and right pad on the object, N
+    "object_position": 3,  # m
+    "object_rotation": 6,
+    "object_from_tool": 3,  # m
+    "target_position": 3,  # m
+    "target_from_object": 3,  # m
+    "deformation": 1,  # D / τ; 0 for rigid objects and for those without a limit
+}
+"""Fields of the vector with their numbers of elements, in order. Positions and rotations are in the robot's base frame."""
+
+STATE_SIZE = sum(STATE_FIELDS.values())
+"""Length of the vector."""
+
+_NEAR_M = 0.2
+"""Distance that the staged reward counts as half-way, as tanh does, m."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is constant in an episode: the goal, and the pose of the robot's base in the world."""
+
+    object: str
+    target: str
+    base_position: np.ndarray  # (3), m
+    base_rotation: np.ndarray  # (3, 3)
+
+    @classmethod
+    def read(cls, scene: Mapping[str, Any]) -> "Scene":
+        """The `info["scene"]` of a server. Raises ValueError if its goal is not that of one object at one target."""
+        goal = scene["goal"]
+        if not (isinstance(goal, Mapping) and "object" in goal and "target" in goal):
+            raise ValueError("obs='state' and reward='staged' need a goal of one object at one target, which this task has not")
+        position = np.array(scene["base_position_w"], dtype=np.float64)
+        return cls(goal["object"], goal["target"], position, _matrix_of_quaternion(scene["base_quaternion_w"]))
+
+
+@dataclass(frozen=True)
+class TrueState:
+    """The true state after a control step, in the robot's base frame."""
+
+    vector: np.ndarray
+    """Float32, of length STATE_SIZE."""
+    reach_m: float
+    """Distance from the tool to the origin of the object's frame, m."""
+    carry_m: float
+    """Horizontal distance from the object to the target, m."""
+
+    @classmethod
+    def read(cls, scene: Scene, state: Mapping[str, Any], verdict: Mapping[str, Any]) -> "TrueState":
+        """From the `state` and the `verdict` of a server. Raises ValueError if the object or the target cannot move, or is not there."""
+        tool, tool_rotation = np.array(state["ee_position_b"]), _matrix_of_axis_angle(state["ee_axis_angle_b"])
+        position, rotation, deformation = _object(scene, state, scene.object)
+        target, _, _ = _object(scene, state, scene.target)
+        tau = verdict["tau"]
+        fields = {
+            "tool_position": tool,
+            "tool_rotation": _two_columns(tool_rotation),
+            "gripper_width": [state["gripper_width_m"]],
+            "closure": [state["closure"]],
+            "pad_force": state["pad_force_n"],
+            "object_position": position,
+            "object_rotation": _two_columns(rotation),
+            "object_from_tool": position - tool,
+            "target_position": target,
+            "target_from_object": target - position,
+            "deformation": [deformation / tau if deformation is not None and tau else 0.0],
+        }
+        vector = np.concatenate([np.asarray(fields[name], dtype=np.float32) for name in STATE_FIELDS])
+        return cls(vector, float(np.linalg.norm(position - tool)), float(np.linalg.norm((target - position)[:2])))
+
+
+def progress(state: TrueState, verdict: Mapping[str, Any]) -> float:
+    """Progress of an episode, 0 to 1: the share of completed stages, and the way within reaching and carrying."""
+    if verdict["goal"]:
+        return 1.0
+    stage = verdict["failed_stage"]
+    remaining = {"reach": state.reach_m, "carry": state.carry_m}.get(stage, math.inf)
+    return (STAGES.index(stage) + 1.0 - math.tanh(remaining / _NEAR_M)) / len(STAGES)
+
+
+def _object(scene: Scene, state: Mapping[str, Any], name: str) -> tuple[np.ndarray, np.ndarray, float | None]:
+    """Position (m) and rotation in the base frame, and D (%)."""
+    for entry in state["objects"]:
+        if entry["name"] == name:
+            position = scene.base_rotation.T @ (np.array(entry["position_w"]) - scene.base_position)
+            return position, scene.base_rotation.T @ _matrix_of_quaternion(entry["quaternion_w"]), entry["d_pct"]
+    raise ValueError(f"obs='state' and reward='staged' need the position of {name!r}, which the server does not send")
+
+
+def _two_columns(rotation: np.ndarray) -> np.ndarray:
+    return rotation[:, :2].T.reshape(6)
+
+
+def _matrix_of_quaternion(wxyz: Any) -> np.ndarray:
+    w, x, y, z = wxyz
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _matrix_of_axis_angle(axis_angle: Any) -> np.ndarray:
+    vector = np.array(axis_angle, dtype=np.float64)
+    angle = float(np.linalg.norm(vector))
+    axis = vector / angle if angle > 0 else vector
+    return _matrix_of_quaternion([math.cos(angle / 2), *(math.sin(angle / 2) * axis)])

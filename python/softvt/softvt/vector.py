@@ -1,0 +1,129 @@
+"""Several environments that one server steps at the same time, without worker processes."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space, concatenate, create_empty_array, iterate
+
+from .env import SoftVTEnv
+
+
+class SoftVTVectorEnv(VectorEnv):
+    """`num_envs` environments with the same arguments. Each has a connection; the server steps them in parallel, one thread each."""
+
+    def __init__(
+        self,
+        num_envs: int,
+        *,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | None = None,
+        **arguments: Any,
+    ):
+        """`arguments` are those of SoftVTEnv. `max_episode_steps` truncates episodes before the budget of their task."""
+        self.envs: list[SoftVTEnv] = []
+        try:
+            for _ in range(num_envs):
+                self.envs.append(SoftVTEnv(**arguments))
+        except BaseException:
+            self.close_extras()
+            raise
+        first = self.envs[0]
+        self.num_envs = num_envs
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {**first.metadata, "autoreset_mode": self.autoreset_mode}
+        self.render_mode = first.render_mode
+        self.single_observation_space, self.single_action_space = first.observation_space, first.action_space
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._max_steps = max_episode_steps
+        self._steps = np.zeros(num_envs, dtype=np.int64)
+        self._ended = np.zeros(num_envs, dtype=np.bool_)
+        self._observations: list[Any] = [None] * num_envs
+
+    def reset(self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Starts an episode in each environment, or in those of the mask `options["reset_mask"]`. A single seed is that of the first one, and
+        the others have the following ones."""
+        seeds = (
+            [None if seed is None else seed + index for index in range(self.num_envs)] if seed is None or isinstance(seed, int) else seed
+        )
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"reset: {len(seeds)} seeds for {self.num_envs} environments")
+        options = dict(options or {})
+        mask = np.asarray(options.pop("reset_mask", np.ones(self.num_envs, dtype=np.bool_)))
+        chosen = [int(index) for index in np.flatnonzero(mask)]
+        for index in chosen:
+            self.envs[index].begin_reset(seeds[index], options)
+        infos: dict[str, Any] = {}
+        for index in chosen:
+            infos = self._add_info(infos, self._end_reset(index), index)
+        return self._batch(), infos
+
+    def step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Executes an action in each environment. An environment whose episode has ended is reset as the autoreset mode says."""
+        if self.autoreset_mode == AutoresetMode.DISABLED and self._ended.any():
+            raise RuntimeError("step: an episode has ended; reset it first, by options={'reset_mask': …}")
+        restarting = self._ended.copy()
+        for index, action in enumerate(iterate(self.action_space, actions)):
+            if restarting[index]:
+                self.envs[index].begin_reset()
+            else:
+                self.envs[index].begin_step(action)
+        rewards = np.zeros(self.num_envs)
+        terminated, truncated = np.zeros((2, self.num_envs), dtype=np.bool_)
+        found: list[dict[str, Any]] = [{}] * self.num_envs
+        for index, env in enumerate(self.envs):
+            if restarting[index]:
+                found[index] = self._end_reset(index)
+                continue
+            self._observations[index], rewards[index], terminated[index], truncated[index], found[index] = env.end_step()
+            self._steps[index] += 1
+            if self._max_steps is not None and self._steps[index] >= self._max_steps and not terminated[index]:
+                truncated[index] = True
+        infos: dict[str, Any] = {}
+        self._ended = terminated | truncated
+        if self.autoreset_mode == AutoresetMode.SAME_STEP:
+            ended = [int(index) for index in np.flatnonzero(self._ended)]
+            for index in ended:
+                infos = self._add_info(infos, {"final_obs": self._observations[index], "final_info": found[index]}, index)
+                self.envs[index].begin_reset()
+            for index in ended:
+                found[index] = self._end_reset(index)
+        for index, info in enumerate(found):
+            infos = self._add_info(infos, info, index)
+        return self._batch(), rewards, terminated, truncated, infos
+
+    def render(self) -> tuple[Any, ...] | None:
+        """Images of all environments."""
+        return None if self.render_mode is None else self.call("render")
+
+    def call(self, name: str, *arguments: Any, **named: Any) -> tuple[Any, ...]:
+        """Calls a method of each environment, or reads an attribute."""
+        found = [getattr(env, name) for env in self.envs]
+        return tuple(value(*arguments, **named) if callable(value) else value for value in found)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """An attribute of each environment."""
+        return tuple(getattr(env, name) for env in self.envs)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Sets an attribute of each environment, to one value or to a list of values."""
+        each = values if isinstance(values, list | tuple) else [values] * self.num_envs
+        for env, value in zip(self.envs, each, strict=True):
+            setattr(env, name, value)
+
+    def close_extras(self, **_: Any) -> None:
+        """Closes all environments."""
+        for env in self.envs:
+            env.close()
+
+    def _end_reset(self, index: int) -> dict[str, Any]:
+        self._observations[index], info = self.envs[index].end_reset()
+        self._steps[index] = 0
+        self._ended[index] = False
+        return info
+
+    def _batch(self) -> Any:
+        batch: Any = create_empty_array(self.single_observation_space, self.num_envs)
+        return concatenate(self.single_observation_space, self._observations, batch)
