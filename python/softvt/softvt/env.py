@@ -12,7 +12,7 @@ from gymnasium import spaces
 from .profile import CONTROLS, PARTS, ProfileSpec, parse_parts, require_one_of
 from .readings import Readings
 from .serve import Client, Lease, lease
-from .true_state import STATE_SIZE, Scene, TrueState, progress
+from .true_state import STATE_BOUNDS, Scene, TrueState, progress
 
 REWARDS = ("sparse", "staged", "safety")
 """Values of the argument `reward`."""
@@ -309,8 +309,8 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
     def _space(self, entries: Mapping[str, Any]) -> spaces.Space[Any]:
         all_spaces: dict[str, spaces.Space[Any]] = {key: _space(entries[key]) for key in self._entries}
         if self._parts is not None and "state" in self._parts:
-            shape = (STATE_SIZE,) if self._history == 1 else (self._history, STATE_SIZE)
-            all_spaces["state"] = spaces.Box(-np.inf, np.inf, shape, np.float32)
+            bounds = STATE_BOUNDS if self._history == 1 else np.tile(STATE_BOUNDS, (self._history, 1))
+            all_spaces["state"] = spaces.Box(-bounds, bounds, dtype=np.float32)
         if self._layout == "flat":
             return next(iter(all_spaces.values())) if self._is_bare else spaces.Dict(all_spaces)
         if "tactile_marker_motion" in all_spaces:
@@ -452,7 +452,7 @@ def _part(key: str, entry: Mapping[str, Any]) -> str:
         if key.endswith(f"_{part}"):
             return part
     # The robot's own state in softvt's profiles.
-    return "proprio" if key == "state" and entry else key
+    return "proprio" if entry and key.rsplit("/", 1)[-1] == "state" else key
 
 
 def _space(entry: Mapping[str, Any]) -> spaces.Space[Any]:
@@ -464,8 +464,9 @@ def _space(entry: Mapping[str, Any]) -> spaces.Space[Any]:
 
 
 def _numbers(entry: Mapping[str, Any], end: str, dtype: Any) -> np.ndarray:
-    """Lower or upper bounds of an array."""
-    return np.broadcast_to(np.array(entry[end], dtype), tuple(entry["shape"])).copy()
+    """Lower or upper bounds of an array, which the server states once or for each element."""
+    shape, bounds = tuple(entry["shape"]), np.array(entry[end], dtype)
+    return np.full(shape, bounds) if bounds.size == 1 else bounds.reshape(shape)
 
 
 def _last_motion(motion: np.ndarray) -> np.ndarray:

@@ -13,6 +13,9 @@ PROPRIO = ("position", "axis_angle", "sensed_finger_position")
 """Parts of the entry `proprio`: tool position (m) and axis-angle (rad) in the base frame, and half of the width that the sensor of a real hand
 measures (m); the `state` of the profiles `vision` and `visuo_tactile`."""
 
+PROPRIO_SIZE = 7
+"""Numbers of the entry `proprio`."""
+
 GRIPPERS = ("continuous", "binary", "two-width", "force")
 """Grip codes (docs/policies.md)."""
 

@@ -20,7 +20,7 @@ from urllib.parse import urlsplit
 
 import msgpack
 import numpy as np
-from websocket import WebSocketException, create_connection
+from websocket import WebSocketBadStatusException, WebSocketException, create_connection
 
 from .binary import find_binary
 
@@ -61,6 +61,9 @@ class Client:
         header = {"Authorization": f"Bearer {token}"} if token else {}
         try:
             self._socket = create_connection(url, header=header)
+        except WebSocketBadStatusException as error:
+            reason = {401: "its token is missing or wrong", 503: "it has as many clients as it accepts"}.get(error.status_code, str(error))
+            raise ServerError(f"the server at {url} refuses the connection: {reason}") from error
         except (OSError, WebSocketException, ValueError) as error:
             raise self._lost(error) from error
         self.hello = self.receive()

@@ -10,23 +10,26 @@ import numpy as np
 STAGES = ("reach", "grasp", "lift", "carry", "place", "release")
 """Stages of an episode, in order (docs/results.md)."""
 
-STATE_FIELDS: dict[str, int] = {
-    "tool_position": 3,  # m
-    "tool_rotation": 6,  # the first two columns of the rotation matrix
-    "gripper_width": 1,  # m, exact
-    "closure": 1,  # as commanded, 0 open to 1 closed
-    "pad_force": 2,  # of the left and right pad on the object, N
-    "object_position": 3,  # m
-    "object_rotation": 6,
-    "object_from_tool": 3,  # m
-    "target_position": 3,  # m
-    "target_from_object": 3,  # m
-    "deformation": 1,  # D / τ; 0 for rigid objects and for those without a limit
-}
-"""Fields of the vector with their numbers of elements, in order. Positions and rotations are in the robot's base frame."""
+# Bounds of possible values, not of likely ones: an object may fall, and forces may be those of an impact.
+_FAR_M, _MAX_FORCE_N, _MAX_DEFORMATION = 1e3, 1e6, 1e6
 
-STATE_SIZE = sum(STATE_FIELDS.values())
-"""Length of the vector."""
+STATE_FIELDS: dict[str, tuple[int, float]] = {
+    "tool_position": (3, _FAR_M),  # m
+    "tool_rotation": (6, 1.001),  # the first two columns of the rotation matrix
+    "gripper_width": (1, 1.0),  # m, exact
+    "closure": (1, 1.001),  # as commanded, 0 open to 1 closed
+    "pad_force": (2, _MAX_FORCE_N),  # of the left and right pad on the object, N
+    "object_position": (3, _FAR_M),  # m
+    "object_rotation": (6, 1.001),
+    "object_from_tool": (3, _FAR_M),  # m
+    "target_position": (3, _FAR_M),  # m
+    "target_from_object": (3, _FAR_M),  # m
+    "deformation": (1, _MAX_DEFORMATION),  # D / τ; 0 for rigid objects and for those without a limit
+}
+"""Fields of the vector in order: number of elements, and largest magnitude. Positions and rotations are in the robot's base frame."""
+
+STATE_BOUNDS = np.concatenate([np.full(size, bound, dtype=np.float32) for size, bound in STATE_FIELDS.values()])
+"""Largest magnitude of each element of the vector."""
 
 _NEAR_M = 0.2
 """Distance that the staged reward counts as half-way, as tanh does, m."""
@@ -56,7 +59,7 @@ class TrueState:
     """The true state after a control step, in the robot's base frame."""
 
     vector: np.ndarray
-    """Float32, of length STATE_SIZE."""
+    """Float32, the elements of STATE_FIELDS."""
     reach_m: float
     """Distance from the tool to the origin of the object's frame, m."""
     carry_m: float

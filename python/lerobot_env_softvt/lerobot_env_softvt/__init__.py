@@ -1,0 +1,125 @@
+"""softvt as an environment of LeRobot, which imports this module by its name: `lerobot-eval --env.type=softvt --env.task=object_hidden`.
+
+docs/lerobot.md is the guide.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from gymnasium.vector import VectorEnv
+from lerobot.configs import FeatureType, PolicyFeature
+from lerobot.envs import EnvConfig
+from lerobot.utils.constants import ACTION, OBS_ENV_STATE, OBS_IMAGES, OBS_STATE
+from softvt.env import FIRST_SEED
+from softvt.profile import PROPRIO_SIZE, parse_parts
+from softvt.true_state import STATE_BOUNDS
+
+from softvt import SoftVTVectorEnv
+
+_CAMERAS = ("third_person", "wrist")
+
+
+@EnvConfig.register_subclass("softvt")
+@dataclass
+class SoftVTEnvConfig(EnvConfig):
+    """Environment of the type `softvt`: one vector environment for each task of each suite.
+
+    `pc_success` of lerobot-eval is Goal Success, and with `reward` "safety" `avg_max_reward` is the rate of Safety Success, from 0 to 1. Finished
+    sub-environments repeat their last transition.
+    """
+
+    task: str | None = "object_soft"
+    """Standard suite or Lua file, or several with commas between."""
+    task_ids: list[int] | None = None
+    """Numbers of the tasks; None for all."""
+    fps: int = 20
+    obs: str = "pixels+proprio"
+    """Parts of the observation, joined by +: pixels, proprio, tactile_image, tactile, marker_motion, state."""
+    control: str = "pose"
+    """Meaning of an action: "pose", "delta" or "delta_osc"."""
+    gripper: str = "continuous"
+    """Grip code of the last number of an action."""
+    reward: str = "safety"
+    """ "safety", "sparse" or "staged"."""
+    observation_height: int = 224
+    observation_width: int = 224
+    split: str = "validation"
+    """List of episodes."""
+    first_seed: int = FIRST_SEED
+    """Value of `--seed` for which the first episode is episode 0 of the suite."""
+    flags: list[str] = field(default_factory=list)
+    """Further flags of `softvt serve`, such as ["--shift", "stiffness=0.5"]."""
+    render_mode: str = "rgb_array"
+    camera: str | None = None
+    """Camera of the videos; by default the scene's first."""
+    features: dict[str, PolicyFeature] = field(default_factory=dict)
+    features_map: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Fills in the features of the observation and of the action."""
+        image = (self.observation_height, self.observation_width, 3)
+        finger = (240, 320, 3)
+        visual: dict[str, dict[str, tuple[int, ...]]] = {
+            "pixels": dict.fromkeys(_CAMERAS, image),
+            "tactile_image": {"tactile_image": (224, 224, 3)},
+            "tactile": {"tactile_left": finger, "tactile_right": finger},
+        }
+        other = {
+            "proprio": ("agent_pos", OBS_STATE, PolicyFeature(FeatureType.STATE, (PROPRIO_SIZE,))),
+            "state": ("environment_state", OBS_ENV_STATE, PolicyFeature(FeatureType.ENV, STATE_BOUNDS.shape)),
+            "marker_motion": (
+                "tactile_marker_motion",
+                "observation.tactile_marker_motion",
+                PolicyFeature(FeatureType.STATE, (3, 198, 2)),
+            ),
+        }
+        self._add(ACTION, ACTION, PolicyFeature(FeatureType.ACTION, (7,)))
+        for part in parse_parts(self.obs):
+            for name, shape in visual.get(part, {}).items():
+                # The key by which `--eval.recording` finds the pictures too.
+                self._add(f"{OBS_IMAGES}.{name}", f"{OBS_IMAGES}.{name}", PolicyFeature(FeatureType.VISUAL, shape))
+            if part in other:
+                self._add(*other[part])
+            elif part not in visual:
+                raise ValueError(f"env.obs: LeRobot's policies have no input for {part!r}; expected {', '.join([*visual, *other])}")
+
+    def _add(self, key: str, policy_key: str, feature: PolicyFeature) -> None:
+        self.features[key] = feature
+        self.features_map[key] = policy_key
+
+    @property
+    def gym_kwargs(self) -> dict[str, Any]:
+        """Arguments of the environments, without the task."""
+        return {
+            "obs": self.obs,
+            "control": self.control,
+            "gripper": self.gripper,
+            "reward": self.reward,
+            "layout": "lerobot",
+            "image_size": (self.observation_height, self.observation_width),
+            "split": self.split,
+            "first_seed": self.first_seed,
+            "flags": tuple(self.flags),
+            "cost": False,
+            "freeze": True,
+            "render_mode": self.render_mode,
+            "camera": self.camera,
+        }
+
+    def create_envs(self, n_envs: int, use_async_envs: bool = False) -> dict[str, dict[int, VectorEnv]]:
+        """Vector environments by suite and task. They step in parallel in either mode: the server has a thread for each environment, so that
+        no worker processes are needed."""
+        if not self.task:
+            raise ValueError("env.task: give a standard suite or a Lua file")
+        found: dict[str, dict[int, VectorEnv]] = {}
+        for script in self.task.split(","):
+            arguments = {**self.gym_kwargs, "script": script.strip()}
+            first = SoftVTVectorEnv(1, **arguments, task=None)
+            try:
+                for suite in first.envs[0].hello["suites"]:
+                    known = [entry["task"] for entry in suite["tasks"]]
+                    tasks = known if self.task_ids is None else self.task_ids
+                    found[suite["name"]] = {task: SoftVTVectorEnv(n_envs, **arguments, suite=suite["name"], task=task) for task in tasks}
+            finally:
+                first.close()
+        return found
