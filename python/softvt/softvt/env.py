@@ -130,6 +130,8 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
                 self._lease.release()
             raise
         self._closer = weakref.finalize(self, _close, self._client, self._lease)
+        # Servers end with their process anyway.
+        self._closer.atexit = False
         try:
             self._begin(suite, task, needs_truth, history if script is not None else 1)
         except BaseException:
@@ -367,7 +369,9 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
 
     def _info(self, raw: dict[str, Any], before: Mapping[str, Any]) -> dict[str, Any]:
         """`before` is the verdict of the previous step."""
-        info: dict[str, Any] = {key: raw[key] for key in ("task", "episode", "step", "time_s", "far_commands", "clamped_grips")}
+        info: dict[str, Any] = {key: raw[key] for key in ("task", "step", "time_s", "far_commands", "clamped_grips")}
+        # Not "episode", under which wrappers of Gymnasium and Stable-Baselines3 put their statistics.
+        info["episode_index"] = raw["episode"]
         info["prompt"] = self.task_description
         # Vector environments make an array of Python's bool only.
         info["is_success"] = bool(raw["success"])

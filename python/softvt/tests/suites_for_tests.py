@@ -1,0 +1,50 @@
+"""Suites and runs that the tests share. They need the program: SOFTVT_BINARY or the PATH."""
+
+import atexit
+import json
+import subprocess
+import tempfile
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+import softvt
+
+FOLDER = Path(tempfile.mkdtemp(prefix="softvt-tests-"))
+STEPS = 12
+"""Budget of the tasks of the short suite, control steps."""
+
+
+@atexit.register
+def _remove() -> None:
+    for path in sorted(FOLDER.rglob("*"), reverse=True):
+        path.rmdir() if path.is_dir() else path.unlink()
+    FOLDER.rmdir()
+
+
+@cache
+def short_suite() -> str:
+    """Path of Spatial-Soft with budgets of `STEPS`."""
+    path = FOLDER / "short.lua"
+    path.write_text(
+        f'local suite = require "suites.spatial_soft"\nfor _, task in ipairs(suite.tasks) do task.budget_steps = {STEPS} end\nreturn suite\n'
+    )
+    return str(path)
+
+
+@cache
+def expert_run(policy: str = "expert") -> tuple[np.ndarray, dict]:
+    """Actions (steps, 7) and record of an expert in task 0, episode 0 of Object-Soft."""
+    out = FOLDER / policy
+    command = [softvt.find_binary(), "suites/object_soft.lua", "--task", "0", "--episodes", "1", "--policy", policy, "--out", str(out)]
+    subprocess.run(command, check=True, capture_output=True)
+    record = json.loads((out / "episodes.jsonl").read_text())
+    return np.load(out / "actions/task_000/episode_00000.npy"), record
+
+
+def same(a, b) -> bool:
+    """True if two observations are equal bit for bit."""
+    if isinstance(a, dict):
+        return a.keys() == b.keys() and all(same(a[key], b[key]) for key in a)
+    return np.array_equal(a, b)

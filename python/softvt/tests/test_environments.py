@@ -1,0 +1,337 @@
+"""Environments: Gymnasium's checker, observations, rewards, info, episodes and states."""
+
+import pickle
+import unittest
+import warnings
+
+import gymnasium
+import numpy as np
+import softvt
+from gymnasium.utils.env_checker import check_env
+from softvt.true_state import STATE_BOUNDS, STATE_FIELDS
+from suites_for_tests import STEPS, expert_run, same, short_suite
+
+# Policies of this field return poses in metres and radians, and depth is infinite in the background.
+EXPECTED_WARNINGS = ("we recommend using a symmetric and normalized space", "is infinity", "is -infinity")
+HOLD = np.zeros(7)
+
+
+def field(state: np.ndarray, name: str) -> np.ndarray:
+    """A field of the vector of the true state."""
+    first = sum(size for size, _ in list(STATE_FIELDS.values())[: list(STATE_FIELDS).index(name)])
+    return state[first : first + STATE_FIELDS[name][0]]
+
+
+class Environments(unittest.TestCase):
+    def make(self, script: str | None = None, **arguments) -> softvt.SoftVTEnv:
+        env = softvt.SoftVTEnv(script or short_suite(), **arguments)
+        self.addCleanup(env.close)
+        return env
+
+    def test_gymnasiums_checker_reports_nothing(self):
+        for arguments in [
+            {"obs": "state", "reward": "staged"},
+            {"obs": "proprio+pixels+tactile+marker_motion", "image_size": 48, "cost": False},
+            {"obs": "pixels+depth+segmentation+state", "image_size": (40, 48), "history": 3, "privileged": True},
+            {"obs": "proprio+pixels+tactile_image+marker_motion+state", "layout": "lerobot", "control": "pose", "reward": "safety"},
+            {"obs": "pixels+prompt", "control": "delta_osc", "gripper": "binary"},
+            {"profile": "libero"},
+            {"profile": "visuo_tactile", "layout": "lerobot"},
+        ]:
+            with self.subTest(arguments), warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                check_env(self.make(task=2, render_mode="rgb_array", **arguments))
+                reported = [str(one.message) for one in caught if not any(words in str(one.message) for words in EXPECTED_WARNINGS)]
+                self.assertEqual(reported, [])
+
+    def test_registered_environments_are_made_with_arguments(self):
+        env = gymnasium.make("softvt/SpatialSoft-v0", task="left small dark brown", max_episode_steps=2, obs="proprio")
+        self.addCleanup(env.close)
+        _, info = env.reset(seed=1000)
+        self.assertEqual((info["task"], info["episode_index"]), (4, 0))
+        self.assertEqual(env.get_wrapper_attr("task_description"), info["prompt"])
+        env.step(env.action_space.sample())
+        *_, truncated, info = env.step(env.action_space.sample())
+        self.assertTrue(truncated)
+        self.assertIs(info["is_success"], False)
+        own = gymnasium.make("softvt/File-v0", script=short_suite())
+        self.addCleanup(own.close)
+        self.assertEqual(own.get_wrapper_attr("_max_episode_steps"), STEPS)
+
+    def test_impossible_tasks_suites_and_parts_are_refused(self):
+        for arguments, words in [
+            ({"task": 99}, "task 99: suite spatial_soft has the tasks 0 to 9"),
+            ({"task": [0, -1]}, "task -1"),
+            ({"task": "pastry"}, "10 prompts of suite spatial_soft contain it"),
+            ({"suite": "object_soft"}, "suite='object_soft': the server has spatial_soft"),
+        ]:
+            with self.subTest(arguments), self.assertRaisesRegex(ValueError, words):
+                self.make(obs="proprio", **arguments)
+        with softvt.Server(short_suite(), "--profile", "vision") as server:
+            for arguments, words in [
+                ({"obs": "tactile", "cost": False}, "obs='tactile': the profile 'vision' .* sends image, wrist_image, state, prompt"),
+                ({"obs": "state"}, "start it with --privileged"),
+                ({"cost": True}, "start it with --privileged"),
+                ({"reward": "safety", "cost": False}, "start it with --privileged"),
+            ]:
+                with self.subTest(arguments), self.assertRaisesRegex(ValueError, words):
+                    softvt.SoftVTEnv(url=server.url, token=server.token, **arguments)
+            env = softvt.SoftVTEnv(url=server.url, token=server.token, obs="pixels+proprio", cost=False)
+            self.assertEqual(set(env.observation_space.spaces), {"image", "wrist_image", "state"})
+            env.close()
+
+    def test_a_seed_names_an_episode_and_its_start_depends_on_it_alone(self):
+        env = self.make(obs="state", task=2)
+        first, info = env.reset(seed=1003)
+        self.assertEqual(info["episode_index"], 3)
+        other, _ = env.reset(seed=1004)
+        self.assertFalse(same(first, other))
+        again, info = env.reset(options={"episode": 3})
+        self.assertTrue(same(first, again))
+        _, info = env.reset(seed=0)
+        self.assertEqual(info["episode_index"], 2**32 - 1000)
+        episodes = [[env.reset(seed=7)[1]["episode_index"], env.reset()[1]["episode_index"]] for _ in range(2)]
+        self.assertEqual(episodes[0], episodes[1], "the episode after a seed is drawn from it")
+        self.assertFalse(same(env.reset(options={"episode": 3, "split": "demonstration"})[0], first))
+        with self.assertRaisesRegex(ValueError, "'episodes'; expected task, episode, split or seed"):
+            env.reset(options={"episodes": 3})
+
+    def test_without_a_task_every_reset_draws_one(self):
+        env = self.make(obs="proprio", task=None)
+        tasks = [env.reset(seed=seed)[1]["task"] for seed in range(12)]
+        self.assertGreater(len(set(tasks)), 3)
+        self.assertEqual(tasks, [env.reset(seed=seed)[1]["task"] for seed in range(12)])
+
+    def test_the_same_actions_give_the_same_observations_and_a_state_is_restored(self):
+        env = self.make(obs="state+pixels+tactile", image_size=48)
+        actions = np.random.default_rng(0).uniform(-1, 1, (8, 7))
+
+        def drive():
+            start, _ = env.reset(seed=1001)
+            return [start] + [env.step(action)[0] for action in actions]
+
+        once, again = drive(), drive()
+        self.assertTrue(all(same(a, b) for a, b in zip(once, again)))
+        self.assertFalse(same(once[0], once[-1]))
+        env.reset(seed=1001)
+        env.step(actions[:4])
+        state = pickle.loads(pickle.dumps(env.get_state()))
+        self.assertTrue(same(env.step(actions[4])[0], once[5]))
+        other = self.make(obs="state+pixels+tactile", image_size=48)
+        for restored in (env, other):
+            observation, info = restored.set_state(state)
+            self.assertTrue(same(observation, once[4]))
+            self.assertEqual(info["step"], 4)
+            self.assertTrue(same(restored.step(actions[4])[0], once[5]))
+
+    def test_an_experts_actions_earn_each_reward_and_end_with_the_record_of_its_run(self):
+        actions, record = expert_run()
+        binary, unsafe = expert_run("expert-binary")
+        self.assertTrue(record["safety"] and unsafe["goal"] and not unsafe["safety"])
+        for reward, total, unsafe_total in [("sparse", 1.0, 1.0), ("safety", 1.0, 0.0), ("staged", None, None)]:
+            env = self.make("object_soft", obs="proprio", control="pose", reward=reward, privileged=True)
+            for rows, expected, kept in [(actions, total, record), (binary, unsafe_total, unsafe)]:
+                with self.subTest(reward, safe=kept["safety"]):
+                    env.reset(options={"episode": 0})
+                    steps = [env.step(row) for row in rows]
+                    rewards = [one[1] for one in steps]
+                    _, _, terminated, truncated, info = steps[-1]
+                    self.assertTrue(terminated and not truncated)
+                    self.assertIs(info["is_success"], True)
+                    self.assertEqual((info["is_safe"], info["record"]["goal"]), (kept["safety"], True))
+                    self.assertEqual(info["record"]["state_hash"], kept["state_hash"])
+                    if expected is None:
+                        self.assertAlmostEqual(sum(rewards), 1.0, delta=0.17)
+                        self.assertGreater(sum(one > 0 for one in rewards), 50, "dense")
+                    else:
+                        self.assertEqual(rewards, [0.0] * (len(rows) - 1) + [expected])
+                    costs = [one[4]["cost"] for one in steps]
+                    self.assertEqual(sum(costs) > 0, not kept["safety"])
+                    self.assertEqual([type(one) for one in (costs[0], rewards[0], terminated)], [float, float, bool])
+
+    def test_the_true_state_agrees_with_the_privileged_info_of_the_server(self):
+        env = self.make(obs="state", privileged=True, task=3)
+        state, info = env.reset(seed=1000)
+        self.assertEqual(state.shape, STATE_BOUNDS.shape)
+        np.testing.assert_allclose(field(state, "tool_position"), info["state"]["ee_position_b"], atol=1e-6)
+        # The robot of this scene stands on a plate of 12 mm, 0.66 m behind the origin.
+        left = next(entry for entry in info["state"]["objects"] if entry["name"] == "left")
+        expected = np.array(left["position_w"]) - [-0.66, 0.0, 0.012]
+        scene = env._client.request("reset", task=3, episode=0)["info"]["scene"]
+        np.testing.assert_allclose(scene["base_position_w"], [-0.66, 0.0, 0.012], atol=1e-9)
+        self.assertEqual((scene["goal"]["object"], scene["goal"]["target"]), ("left", "plate"))
+        np.testing.assert_allclose(field(state, "object_position"), expected, atol=1e-6)
+        np.testing.assert_allclose(field(state, "object_from_tool"), expected - np.array(info["state"]["ee_position_b"]), atol=1e-6)
+        column = field(state, "object_rotation")[:3]
+        w, x, y, z = left["quaternion_w"]
+        np.testing.assert_allclose(column, [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], atol=1e-6)
+
+    def test_a_camera_matrix_projects_the_object_to_its_pixels(self):
+        env = self.make(obs="state+segmentation", task=3)
+        observation, _ = env.reset(seed=1000)
+        names = env._client.request("reset", task=3, episode=0)["info"]["scene"]["objects"]
+        seen = observation["third_person_segmentation"] == names.index("left") + 1
+        camera = env.camera_matrices()["third_person"]
+        self.assertEqual((camera["height"], camera["width"]), seen.shape)
+        point_b = np.append(field(observation["state"], "object_position") + [0, 0, 0.01], 1.0)
+        x, y, z, _ = np.linalg.inv(camera["pose_b"]) @ point_b
+        # OpenCV's axes: y down, z forward.
+        column, row, _ = camera["intrinsic"] @ [x / -z, -y / -z, 1.0]
+        rows, columns = np.nonzero(seen)
+        self.assertLess(abs(rows.mean() - row), 3.0)
+        self.assertLess(abs(columns.mean() - column), 3.0)
+        before = env.camera_matrices()["wrist"]["pose_b"]
+        for _ in range(3):
+            env.step(np.array([0, 0, 1, 0, 0, 0, -1.0]))
+        moved = env.camera_matrices()["wrist"]["pose_b"][:3, 3] - before[:3, 3]
+        self.assertGreater(moved[2], 0.01)
+
+    def test_entries_have_the_stated_shapes(self):
+        env = self.make(obs="proprio+pixels+depth+tactile+tactile_image+marker_motion+prompt", image_size=(40, 48), history=2)
+        observation, info = env.reset(seed=1000)
+        shapes = {key: value.shape for key, value in observation.items() if key != "prompt"}
+        images = {name: (2, 40, 48, 3) for name in ("third_person", "wrist")}
+        depth = {f"{name}_depth": (2, 40, 48) for name in ("third_person", "wrist")}
+        fingers = {f"tactile_{side}": (2, 240, 320, 3) for side in ("left", "right")}
+        other = {"proprio": (2, 7), "tactile_image": (224, 224, 3), "tactile_marker_motion": (3, 198, 2)}
+        self.assertEqual(shapes, images | depth | fingers | other)
+        self.assertEqual(observation["prompt"], info["prompt"])
+        self.assertIn(observation, env.observation_space)
+
+    def test_the_layout_of_lerobot_has_its_keys(self):
+        env = self.make(obs="proprio+pixels+tactile_image+marker_motion+state", layout="lerobot", image_size=48)
+        observation, _ = env.reset(seed=1000)
+        self.assertEqual({*observation}, {"pixels", "agent_pos", "environment_state", "tactile_marker_motion"})
+        self.assertEqual({*observation["pixels"]}, {"third_person", "wrist", "tactile_image"})
+        self.assertEqual(observation["tactile_marker_motion"].shape, (3, 198, 2))
+
+    def test_history_of_the_state_repeats_the_first_step(self):
+        env = self.make(obs="state", history=3)
+        start, _ = env.reset(seed=1000)
+        self.assertTrue((start == start[0]).all())
+        after, *_ = env.step(HOLD + 0.5)
+        self.assertTrue(same(after[:2], start[1:]) and not same(after[2], start[2]))
+
+    def test_render_modes_and_their_images(self):
+        for mode, camera, shape in [
+            ("rgb_array", None, (224, 224, 3)),
+            ("rgb_array", "wrist", (224, 224, 3)),
+            ("rgb_array", "left", (240, 320, 3)),
+            ("sensors", None, (480, 640, 3)),
+        ]:
+            env = self.make(obs="proprio", render_mode=mode, camera=camera)
+            env.reset(seed=1000)
+            image = env.render()
+            self.assertEqual((image.shape, image.dtype), (shape, np.uint8))
+        self.assertIsNone(self.make(obs="proprio").render())
+
+    def test_an_environment_that_freezes_repeats_its_end_until_a_rollout_begins(self):
+        env = self.make(obs="proprio", freeze=True)
+        env.reset(seed=1000)
+        for _ in range(STEPS):
+            end = env.step(HOLD)
+        self.assertTrue(end[3])
+        again = env.step(HOLD)
+        self.assertTrue(same(again[0], end[0]) and again[1:4] == (0.0, False, True) and again[4] is end[4])
+        self.assertTrue(same(env.reset()[0], end[0]), "as an autoreset calls it")
+        self.assertEqual(env.reset(options={"lerobot_new_rollout": True})[1]["step"], 0)
+        self.assertFalse(env.step(HOLD)[3])
+
+    def test_after_the_end_a_step_is_refused(self):
+        env = self.make(obs="proprio")
+        env.reset(seed=1000)
+        for _ in range(STEPS):
+            env.step(HOLD)
+        with self.assertRaisesRegex(softvt.ServerError, "the episode is over"):
+            env.step(HOLD)
+
+    def test_actions_that_are_no_numbers_or_too_few_are_refused_and_the_episode_goes_on(self):
+        env = self.make(obs="proprio")
+        env.reset(seed=1000)
+        for action, words in [(HOLD[:6], "shape"), (HOLD * np.nan, "not finite")]:
+            with self.assertRaisesRegex(softvt.ServerError, words):
+                env.step(action)
+        self.assertEqual(env.step(HOLD)[4]["step"], 1)
+
+    def test_info_has_true_state_and_verdict_on_request_only(self):
+        env = self.make(obs="proprio", cost=False)
+        self.assertFalse(env.hello["privileged"])
+        _, info = env.reset(seed=1000)
+        _, _, _, _, later = env.step(HOLD)
+        expected = {"task", "episode_index", "step", "time_s", "far_commands", "clamped_grips", "prompt", "is_success"}
+        self.assertEqual((set(info), set(later)), (expected, expected))
+
+    def test_readings_are_a_mapping_that_can_be_pickled(self):
+        readings = softvt.Readings({"d_peak": 0.5})
+        self.assertEqual((pickle.loads(pickle.dumps(readings))["d_peak"], dict(readings)), (0.5, {"d_peak": 0.5}))
+
+
+class Vectors(unittest.TestCase):
+    def test_every_mode_gives_what_single_environments_give(self):
+        arguments = {"script": short_suite(), "obs": "proprio+pixels", "image_size": 48, "privileged": True}
+        single = softvt.SoftVTEnv(**arguments)
+        self.addCleanup(single.close)
+        actions = np.random.default_rng(0).uniform(-1, 1, (STEPS, 2, 7)).astype(np.float32)
+        starts, ends = [], []
+        for index in range(2):
+            starts.append(single.reset(seed=1000 + index)[0])
+            for step in range(STEPS):
+                observation, *_, truncated, _ = single.step(actions[step, index])
+            self.assertTrue(truncated)
+            ends.append(observation)
+        for mode in (None, "sync", "async", "vector_entry_point"):
+            with self.subTest(mode):
+                envs = gymnasium.make_vec("softvt/File-v0", num_envs=2, vectorization_mode=mode, **arguments)
+                self.addCleanup(envs.close)
+                self.assertEqual(envs.metadata["render_fps"], 20)
+                observation, info = envs.reset(seed=1000)
+                self.assertEqual(info["is_success"].dtype, np.bool_)
+                for index in range(2):
+                    self.assertTrue(same({key: value[index] for key, value in observation.items()}, starts[index]))
+                for step in range(STEPS):
+                    observation, _, _, truncated, info = envs.step(actions[step])
+                self.assertTrue(truncated.all())
+                self.assertEqual(info["is_success"].tolist(), [False, False])
+                self.assertIsInstance(info["verdict"][0], softvt.Readings)
+                for index in range(2):
+                    self.assertTrue(same({key: value[index] for key, value in observation.items()}, ends[index]))
+                _, rewards, _, truncated, info = envs.step(actions[0])
+                self.assertFalse(truncated.any(), "reset in the next step")
+                self.assertEqual(info["step"].tolist(), [0, 0])
+                envs.close()
+
+    def test_the_vector_of_one_server_has_the_autoreset_modes(self):
+        def make(**arguments):
+            envs = softvt.SoftVTVectorEnv(2, script=short_suite(), obs="proprio", **arguments)
+            self.addCleanup(envs.close)
+            envs.reset(seed=1000)
+            return envs
+
+        hold = np.zeros((2, 7), dtype=np.float32)
+        envs = make(autoreset_mode="SameStep", max_episode_steps=2)
+        envs.step(hold)
+        observation, _, _, truncated, info = envs.step(hold)
+        self.assertTrue(truncated.all())
+        self.assertEqual(info["step"].tolist(), [0, 0])
+        self.assertEqual(info["final_info"]["step"].tolist(), [2, 2])
+        self.assertFalse(same(observation[0], info["final_obs"][0]))
+        envs = make(autoreset_mode="Disabled", max_episode_steps=1)
+        envs.step(hold)
+        with self.assertRaisesRegex(RuntimeError, "reset_mask"):
+            envs.step(hold)
+        envs.reset(seed=[5, 6], options={"reset_mask": np.array([True, False])})
+        self.assertEqual(envs._ended.tolist(), [False, True])
+
+    def test_a_vector_calls_its_environments(self):
+        envs = softvt.SoftVTVectorEnv(2, script=short_suite(), obs="proprio", render_mode="rgb_array", camera="left")
+        self.addCleanup(envs.close)
+        envs.reset(seed=1000)
+        self.assertEqual(envs.call("_max_episode_steps"), (STEPS, STEPS))
+        self.assertEqual(envs.get_attr("task"), (0, 0))
+        self.assertEqual([image.shape for image in envs.render()], [(240, 320, 3)] * 2)
+        with self.assertRaisesRegex(ValueError, "3 seeds for 2"):
+            envs.reset(seed=[1, 2, 3])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,165 @@
+"""Servers: their start and their end, and what clients learn of both."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+import unittest
+from pathlib import Path
+from unittest import mock
+
+import numpy as np
+import softvt
+from softvt import serve
+from suites_for_tests import FOLDER, short_suite
+
+
+def is_running(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    # A zombie has ended; its new parent need not have noticed yet.
+    stat = Path(f"/proc/{process}/stat").read_text(encoding="utf-8")
+    return stat.rsplit(")", 1)[1].split()[0] != "Z"
+
+
+class Servers(unittest.TestCase):
+    def test_a_server_ends_with_its_environment_which_may_be_closed_twice(self):
+        with mock.patch.object(serve, "LINGER_S", 0.0):
+            env = softvt.SoftVTEnv(short_suite(), obs="proprio")
+            pid = next(iter(serve._running)).pid
+            env.close()
+            env.close()
+            self.assert_ends(pid)
+            with self.assertRaisesRegex(softvt.ServerError, "closed"):
+                env.step(np.zeros(7))
+
+    def test_an_environment_that_nobody_holds_lets_go_of_its_server(self):
+        with mock.patch.object(serve, "LINGER_S", 0.0):
+            env = softvt.SoftVTEnv(short_suite(), obs="proprio")
+            pid = next(iter(serve._running)).pid
+            del env
+            self.assert_ends(pid)
+
+    def test_environments_with_equal_arguments_share_a_server(self):
+        first, second = (softvt.SoftVTEnv(short_suite(), obs="proprio", task=task) for task in (0, 3))
+        other = softvt.SoftVTEnv(short_suite(), obs="proprio", control="pose")
+        try:
+            self.assertEqual(first._client.url, second._client.url)
+            self.assertNotEqual(first._client.url, other._client.url)
+        finally:
+            for env in (first, second, other):
+                env.close()
+
+    def test_a_forked_and_a_spawned_process_use_the_server_of_their_parent(self):
+        env = softvt.SoftVTEnv(short_suite(), obs="proprio")
+        try:
+            url = env._client.url
+            reading, writing = os.pipe()
+            child = os.fork()
+            if child == 0:
+                # The process must not run the tests on, whatever happens.
+                try:
+                    own = softvt.SoftVTEnv(short_suite(), obs="proprio")
+                    os.write(writing, own._client.url.encode())
+                    own.close()
+                finally:
+                    os._exit(0)
+            os.close(writing)
+            with os.fdopen(reading) as pipe:
+                self.assertEqual(pipe.read(), url)
+            os.waitpid(child, 0)
+            program = f"import softvt; print(softvt.SoftVTEnv({short_suite()!r}, obs='proprio')._client.url)"
+            spawned = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+            self.assertEqual(spawned.stdout.strip(), url)
+            env.reset(seed=0)
+        finally:
+            env.close()
+
+    def test_a_server_ends_with_its_python_process(self):
+        launch = f"""
+import os, signal, softvt
+from softvt import serve
+os.environ.pop(serve.SERVERS, None)
+env = softvt.SoftVTEnv({short_suite()!r}, obs="proprio", control="pose")
+print(next(iter(serve._running)).pid, flush=True)
+"""
+        endings = {
+            "at its last line": ("", 0),
+            "by an exception": ("raise ValueError", 1),
+            "by SIGTERM": ("os.kill(os.getpid(), signal.SIGTERM)", -signal.SIGTERM),
+            "by SIGKILL": ("os.kill(os.getpid(), signal.SIGKILL)", -signal.SIGKILL),
+            "after a fork that lives on": ("import time\nif os.fork() == 0: os.close(1); os.close(2); time.sleep(3); os._exit(0)", 0),
+        }
+        for how, (last, code) in endings.items():
+            with self.subTest(how):
+                ended = subprocess.run([sys.executable, "-c", launch + last], capture_output=True, text=True)
+                self.assertEqual(ended.returncode, code, ended)
+                self.assertNotIn("Exception ignored", ended.stderr)
+                self.assert_ends(int(ended.stdout))
+
+    def test_a_server_that_was_killed_is_named_with_the_signal(self):
+        env = softvt.SoftVTEnv(short_suite(), obs="proprio", flags=("--seed", "5"))
+        try:
+            env.reset(seed=0)
+            server = next(iter(server for server in serve._running if server.url == env._client.url))
+            os.kill(server.pid, signal.SIGKILL)
+            with self.assertRaisesRegex(softvt.ServerLostError, "ended by SIGKILL"):
+                env.step(np.zeros(7))
+            again = softvt.SoftVTEnv(short_suite(), obs="proprio", flags=("--seed", "5"))
+            again.reset(seed=0)
+            again.close()
+        finally:
+            env.close()
+
+    def test_ctrl_c_does_not_reach_the_server(self):
+        with softvt.Server(short_suite()) as server:
+            self.assertNotEqual(os.getsid(server.pid), os.getsid(0))
+
+    def test_a_port_in_use_is_refused_with_the_message_of_the_program(self):
+        with softvt.Server(short_suite(), "--profile", "vision") as server:
+            port = int(server.url.rsplit(":", 1)[1])
+            with self.assertRaisesRegex(softvt.ServerError, f"exit code 2.*--port {port}: already in use"):
+                softvt.Server(short_suite(), port=port)
+
+    def test_an_error_of_a_script_is_that_of_the_program(self):
+        broken = FOLDER / "broken.lua"
+        broken.write_text("return softvt.suiet {}\n")
+        with self.assertRaisesRegex(softvt.ServerError, 'broken.lua:1: .*did you mean "suite"'):
+            softvt.SoftVTEnv(str(broken))
+        with self.assertRaisesRegex(softvt.ServerError, "suites/object_sfot.lua"):
+            softvt.SoftVTEnv("object_sfot")
+
+    def test_a_server_accepts_clients_with_its_token_only(self):
+        with softvt.Server(short_suite()) as server:
+            with self.assertRaisesRegex(softvt.ServerError, "token is missing or wrong"):
+                softvt.Client(server.url)
+            softvt.Client(server.url, server.token).close()
+
+    def test_a_missing_server_is_named_with_a_command(self):
+        with self.assertRaisesRegex(softvt.ServerLostError, "ws://127.0.0.1:9 .*softvt serve FILE.lua --port 9"):
+            softvt.SoftVTEnv(url="ws://127.0.0.1:9")
+
+    def test_requests_of_several_clients_run_at_the_same_time(self):
+        with softvt.Server(short_suite()) as server:
+            clients = [server.connect() for _ in range(3)]
+            for episode, client in enumerate(clients):
+                client.send("reset", task=0, episode=episode)
+            self.assertEqual([client.receive()["info"]["episode"] for client in clients], [0, 1, 2])
+            for client in clients:
+                client.close()
+
+    def assert_ends(self, process: int):
+        deadline = time.monotonic() + 60
+        while is_running(process):
+            self.assertLess(time.monotonic(), deadline, "the server runs on")
+            time.sleep(0.02)
+
+
+if __name__ == "__main__":
+    # Threads of earlier tests would hide a fork that hangs.
+    assert threading.active_count() == 1
+    unittest.main()
