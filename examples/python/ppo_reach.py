@@ -13,12 +13,11 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+import softvt
 from stable_baselines3 import PPO
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import VecNormalize
-
-import softvt
 
 gymnasium.register_envs(softvt)
 
@@ -59,7 +58,9 @@ def main() -> None:
 
     # Numbers of the state differ in size by orders of magnitude.
     training = VecNormalize(make("demonstration", options.envs, options.seed), gamma=0.97)
-    policy = PPO("MlpPolicy", training, n_steps=256, batch_size=512, gamma=0.97, learning_rate=1e-3, seed=options.seed, device="cpu", verbose=1)
+    policy = PPO(
+        "MlpPolicy", training, n_steps=256, batch_size=512, gamma=0.97, learning_rate=1e-3, seed=options.seed, device="cpu", verbose=1
+    )
     began = time.monotonic()
     policy.learn(options.steps)
     took = time.monotonic() - began

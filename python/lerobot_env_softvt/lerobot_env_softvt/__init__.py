@@ -10,11 +10,10 @@ from gymnasium.vector import VectorEnv
 from lerobot.configs import FeatureType, PolicyFeature
 from lerobot.envs import EnvConfig
 from lerobot.utils.constants import ACTION, OBS_ENV_STATE, OBS_IMAGES, OBS_STATE
+from softvt import SoftVTVectorEnv
 from softvt.env import FIRST_SEED
 from softvt.profile import PROPRIO_SIZE, parse_parts
 from softvt.true_state import STATE_BOUNDS
-
-from softvt import SoftVTVectorEnv
 
 _CAMERAS = ("third_person", "wrist")
 

@@ -127,7 +127,9 @@ class SoftVTBenchmark(StepBenchmark):
     def get_step_result(self, step_result: StepResult) -> EpisodeResult:
         """The verdict on the episode."""
         verdict = step_result.info["verdict"]
-        result: EpisodeResult = {key: bool(verdict[name]) for key, name in (("success", "goal"), ("safety", "safety"), ("no_drop", "no_drop"))}
+        result: EpisodeResult = {
+            key: bool(verdict[name]) for key, name in (("success", "goal"), ("safety", "safety"), ("no_drop", "no_drop"))
+        }
         if verdict["d_peak"] is not None and verdict["tau"]:
             result["d_over_tau"] = verdict["d_peak"] / verdict["tau"]
         return result

@@ -8,7 +8,6 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-
 import softvt
 
 FOLDER = Path(tempfile.mkdtemp(prefix="softvt-tests-"))

@@ -19,7 +19,10 @@ class Arguments(unittest.TestCase):
             self.assertIn(softvt.environment_id(suite), gymnasium.registry)
 
     def test_a_program_that_is_missing_is_named_with_the_ways_to_install_it(self):
-        with mock.patch.dict(os.environ, {"SOFTVT_BINARY": "/nowhere/softvt"}), self.assertRaisesRegex(FileNotFoundError, "/nowhere/softvt"):
+        with (
+            mock.patch.dict(os.environ, {"SOFTVT_BINARY": "/nowhere/softvt"}),
+            self.assertRaisesRegex(FileNotFoundError, "/nowhere/softvt"),
+        ):
             softvt.find_binary()
         with (
             mock.patch.dict(os.environ, {"PATH": ""}),

@@ -40,7 +40,9 @@ class Environments(unittest.TestCase):
         ]:
             with self.subTest(arguments), warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")
-                check_env(self.make(task=2, render_mode="rgb_array", **arguments))
+                env = gymnasium.make("softvt/File-v0", script=short_suite(), task=2, render_mode="rgb_array", **arguments)
+                self.addCleanup(env.close)
+                check_env(env.unwrapped)
                 reported = [str(one.message) for one in caught if not any(words in str(one.message) for words in EXPECTED_WARNINGS)]
                 self.assertEqual(reported, [])
 

@@ -1,0 +1,91 @@
+"""Runs that a server records, and recordings of demonstrations as data sets."""
+
+import json
+import pickle
+import subprocess
+import unittest
+
+import numpy as np
+import softvt
+from suites_for_tests import FOLDER, expert_run
+
+
+class Runs(unittest.TestCase):
+    def test_a_recorded_run_has_the_record_of_the_expert_whose_actions_were_stepped(self):
+        actions, record = expert_run()
+        out = FOLDER / "recorded"
+        flags = ("--episodes", "1", "--task", "0", "--out", str(out), "--name", "mine")
+        env = softvt.SoftVTEnv("object_soft", obs="proprio", control="pose", cost=False, flags=flags)
+        try:
+            self.assertTrue(env.hello["records"])
+            env.reset(seed=1000)
+            infos = [env.step(row)[4] for row in actions]
+        finally:
+            env.close()
+        self.assertTrue(infos[-1]["recorded"])
+        self.assertFalse(any("recorded" in info for info in infos[:-1]))
+        recorded = json.loads((out / "episodes.jsonl").read_text())
+        self.assertEqual(recorded["policy"], "mine")
+        for entry in (recorded, record):
+            for key in ("policy", "camera_inside", "gave_up", "notes", "privileged"):
+                entry.pop(key, None)
+        self.assertEqual(recorded, record)
+        for command in (["replay", str(out), "0/0"], ["report", str(out), "--out", str(FOLDER / "report")]):
+            subprocess.run([softvt.find_binary(), *command], check=True, stdout=subprocess.DEVNULL)
+
+
+class Datasets(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = FOLDER / "demonstrations"
+        command = ["record", "suites/object_rigid.lua", "--task", "0,1", "--demos", "1", "--out", str(cls.folder)]
+        small = ["--set", "cameras.width=32", "--set", "cameras.height=24"]
+        subprocess.run([softvt.find_binary(), *command, *small], check=True, capture_output=True)
+
+    def test_items_are_the_steps_of_all_demonstrations(self):
+        data = softvt.Dataset(self.folder, horizon=4)
+        first, second = data.demonstrations
+        self.assertEqual((first.task, second.task, first.suite), (0, 1, "object_rigid"))
+        self.assertEqual(len(data), first.steps + second.steps)
+        item = data[first.steps]
+        self.assertEqual((item["episode"], item["step"], item["prompt"]), (1, 0, second.prompt))
+        self.assertEqual(item["agentview_rgb"].shape, (24, 32, 3))
+        self.assertEqual((item["actions"].shape, item["actions"].dtype), ((4, 7), np.float32))
+        self.assertEqual([len(data), data[-1]["step"]], [len([*data]), second.steps - 1])
+        with self.assertRaises(IndexError):
+            data[len(data)]
+
+    def test_actions_after_the_last_step_are_marked(self):
+        data = softvt.Dataset(self.folder, keys=("state",), horizon=3, task=0)
+        last = data[len(data) - 1]
+        self.assertEqual(last["actions_is_pad"].tolist(), [False, True, True])
+        self.assertTrue((last["actions"] == last["actions"][0]).all())
+        whole = data.episode(0)
+        np.testing.assert_array_equal(whole["actions"][-1].astype(np.float32), last["actions"][0])
+        np.testing.assert_array_equal(whole["state"][-1], last["state"])
+
+    def test_grip_codes_and_other_streams(self):
+        data = softvt.Dataset(next((self.folder / "hdf5").iterdir()), keys=("gripper_width", "privileged/pad_force"), gripper="binary")
+        self.assertEqual(set(np.unique([item["actions"][0, 6] for item in data])), {0.0, 1.0})
+        self.assertIn("privileged/pad_force", data[0])
+
+    def test_a_data_set_can_be_sent_to_a_worker(self):
+        data = softvt.Dataset(self.folder)
+        self.assertEqual(pickle.loads(pickle.dumps(data))[3]["step"], data[3]["step"])
+        data.close()
+        self.assertEqual(data[3]["step"], 3)
+
+    def test_what_is_missing_is_named(self):
+        for arguments, words in [
+            ({"path": FOLDER / "nothing"}, "no recording"),
+            ({"path": self.folder, "keys": ("agentview",)}, "no stream obs/agentview; obs has agentview_rgb"),
+            ({"path": self.folder, "task": 7}, "no demonstration of task 7"),
+            ({"path": self.folder, "gripper": "soft"}, "expected one of continuous"),
+            ({"path": self.folder, "horizon": 0}, "at least 1"),
+        ]:
+            with self.subTest(arguments), self.assertRaisesRegex(ValueError, words):
+                softvt.Dataset(**arguments)
+
+
+if __name__ == "__main__":
+    unittest.main()

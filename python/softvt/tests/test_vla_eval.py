@@ -1,0 +1,101 @@
+"""The benchmark class under the stock tool of vla-eval, with a model server that repeats the actions of an expert."""
+
+import json
+import subprocess
+import sys
+import time
+import unittest
+
+import numpy as np
+from softvt.vla_eval import SoftVTBenchmark
+from suites_for_tests import FOLDER, expert_run, short_suite
+from vla_eval.specs import GRIPPER_CLOSE_POS, POSITION_ABSOLUTE
+
+SERVER = """
+import sys
+import numpy as np
+from vla_eval.model_servers.base import ModelServer
+from vla_eval.model_servers.serve import serve
+from vla_eval.specs import GRIPPER_01, IMAGE_RGB, POSITION_ABSOLUTE, ROTATION_AA
+
+rows = np.load(sys.argv[2])
+
+class Repeat(ModelServer):
+    async def on_episode_start(self, config, ctx):
+        self.step = 0
+
+    async def on_observation(self, obs, ctx):
+        assert obs["images"]["tactile_image"].shape == (224, 224, 3)
+        assert obs["tactile_marker_motion"].shape == (9, 198, 2) and obs["states"].shape == (7,)
+        self.step += 1
+        await ctx.send_action({"actions": rows[min(self.step, len(rows)) - 1]})
+
+    async def on_episode_end(self, result, ctx):
+        pass
+
+    def get_action_spec(self):
+        return {"position": POSITION_ABSOLUTE, "rotation": ROTATION_AA, "gripper": GRIPPER_01}
+
+    def get_observation_spec(self):
+        return {"agentview": IMAGE_RGB}
+
+serve(Repeat(), host="127.0.0.1", port=int(sys.argv[1]))
+"""
+PORT = 18795
+
+
+class Benchmarks(unittest.TestCase):
+    def test_the_stock_tool_aggregates_success_safety_drops_and_deformation(self):
+        actions, record = expert_run("expert-binary")
+        np.save(FOLDER / "rows.npy", actions)
+        out = FOLDER / "vla"
+        config = {
+            "server": {"url": f"ws://127.0.0.1:{PORT}"},
+            "output_dir": str(out),
+            "benchmarks": [
+                {
+                    "benchmark": "softvt.vla_eval:SoftVTBenchmark",
+                    "name": "softvt",
+                    "episodes_per_task": 1,
+                    "max_tasks": 1,
+                    "params": {"suite": "object_soft", "seed": 0, "send_tactile": True, "image_size": 48},
+                }
+            ],
+        }
+        (FOLDER / "config.json").write_text(json.dumps(config))
+        server = subprocess.Popen([sys.executable, "-c", SERVER, str(PORT), str(FOLDER / "rows.npy")], stderr=subprocess.DEVNULL)
+        try:
+            # The tool tries again while the server starts.
+            time.sleep(2)
+            tool = [sys.executable, "-m", "vla_eval.cli.main", "run", "--config", str(FOLDER / "config.json"), "--no-docker", "--yes"]
+            done = subprocess.run(tool, capture_output=True, text=True)
+        finally:
+            server.kill()
+            server.wait()
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("Spec validation passed", done.stdout + done.stderr)
+        result = json.loads(next(out.glob("*_aggregate.json")).read_text())
+        self.assertEqual((result["mean_success"], result["mean_safety"], result["mean_no_drop"]), (1.0, 0.0, 1.0))
+        self.assertAlmostEqual(result["max_d_over_tau"], record["d_peak"] / record["tau"], places=3)
+
+    def test_formats_and_held_actions_follow_the_control(self):
+        pose = SoftVTBenchmark(short_suite(), image_size=48)
+        delta = SoftVTBenchmark(
+            short_suite(), control="delta_osc", gripper="binary", send_wrist_image=False, send_state=False, image_size=48
+        )
+        self.addCleanup(pose.cleanup)
+        self.addCleanup(delta.cleanup)
+        self.assertEqual(pose.get_action_spec()["position"], POSITION_ABSOLUTE)
+        self.assertEqual(delta.get_action_spec()["gripper"], GRIPPER_CLOSE_POS)
+        self.assertEqual(set(delta.get_observation_spec()), {"agentview", "language"})
+        last = {"actions": np.arange(7.0)}
+        self.assertIs(pose.get_hold_action(last), last)
+        np.testing.assert_array_equal(delta.get_hold_action(last)["actions"], [0, 0, 0, 0, 0, 0, 6])
+        self.assertEqual(delta.get_hold_action(None)["actions"][-1], -1)
+        self.assertEqual(pose.get_metadata()["max_steps"], 12)
+        with self.assertRaisesRegex(ValueError, "8 numbers"):
+            pose.step({"actions": np.zeros(8)})
+
+
+if __name__ == "__main__":
+    unittest.main()
