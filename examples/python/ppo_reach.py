@@ -1,7 +1,7 @@
 """PPO from the true state learns to reach the object: Stable-Baselines3, two cores, some minutes.
 
     pip install . stable-baselines3
-    python examples/python/ppo_reach.py --steps 150000
+    python examples/python/ppo_reach.py --verbose 1
 
 Reaching is the first stage of an episode: it is completed when a pad touches the object. The policy sees the true state, so that results are
 privileged (docs/policies.md).
@@ -17,7 +17,7 @@ import softvt
 from stable_baselines3 import PPO
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.evaluation import evaluate_policy
-from stable_baselines3.common.vec_env import VecNormalize
+from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 gymnasium.register_envs(softvt)
 
@@ -35,25 +35,23 @@ class Reach(gymnasium.Wrapper):
         return observation, float(reward), terminated or reached, truncated, info
 
 
-def make(split: str, envs: int, seed: int) -> Any:
-    arguments = {
-        "task": 0,
-        "obs": "state",
-        "control": "delta",
-        "reward": "staged",
-        "privileged": True,
-        "split": split,
-        "max_episode_steps": EPISODE_STEPS,
-    }
-    return make_vec_env("softvt/SpatialRigid-v0", n_envs=envs, seed=seed, env_kwargs=arguments, wrapper_class=Reach)
+def make(split: str, envs: int, seed: int) -> VecEnv:
+    """Environments that share one server."""
+
+    def make_one() -> gymnasium.Env:
+        arguments = {"task": 0, "obs": "state", "control": "delta", "reward": "staged", "privileged": True, "split": split}
+        return Reach(gymnasium.make("softvt/SpatialRigid-v0", max_episode_steps=EPISODE_STEPS, **arguments))
+
+    return make_vec_env(make_one, n_envs=envs, seed=seed)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--steps", type=int, default=150_000, help="control steps of training")
+    parser.add_argument("--steps", type=int, default=100_000, help="control steps of training")
     parser.add_argument("--envs", type=int, default=8)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--episodes", type=int, default=20, help="episodes of the evaluation")
+    parser.add_argument("--verbose", type=int, default=0, help="1 for the progress of training")
     options = parser.parse_args()
 
     # Numbers of the state differ in size by orders of magnitude.
@@ -74,7 +72,7 @@ def main() -> None:
             reached.append(local["info"]["is_success"])
 
     evaluate_policy(policy, testing, options.episodes, callback=note)
-    print(f"{options.steps} steps in {took:.0f} s; reached the object in {sum(reached)} of {len(reached)} episodes")
+    print(f"{policy.num_timesteps} steps in {took:.0f} s; reached the object in {sum(reached)} of {len(reached)} episodes")
     training.close()
     testing.close()
 

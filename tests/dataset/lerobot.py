@@ -16,21 +16,41 @@ from PIL import Image
 PICTURES = {"image": "agentview_rgb", "wrist_image": "eye_in_hand_rgb", "tactile_image": None}
 ORDER = [*PICTURES, "state", "actions", "tactile_marker_motion", "timestamp", "frame_index", "episode_index", "index", "task_index"]
 STREAMS = {"continuous": "actions", "binary": "actions_binary", "two-width": "actions_two_width", "force": "actions_force"}
+# The keys of v3.0 are those that LeRobot's own policies look for.
+KEYS = {
+    "image": "observation.images.third_person",
+    "wrist_image": "observation.images.wrist",
+    "tactile_image": "observation.images.tactile_image",
+    "state": "observation.state",
+    "actions": "action",
+    "tactile_marker_motion": "observation.tactile_marker_motion",
+}
 QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
 PLAIN = {"timestamp": "float32", "frame_index": "int64", "episode_index": "int64", "index": "int64", "task_index": "int64"}
 
 
-def schema(found):
+def key(name, version):
+    """The key of a feature in a version."""
+    return KEYS.get(name, name) if version == "v3.0" else name
+
+
+def order(version):
+    return [key(name, version) for name in ORDER]
+
+
+def schema(found, version):
     picture = pa.struct([("bytes", pa.binary()), ("path", pa.string())])
     numbers = pa.list_(pa.field("element", pa.float32()))
     nested = pa.list_(pa.field("element", pa.list_(pa.field("element", numbers))))
     types = {name: picture for name in PICTURES} | {"state": numbers, "actions": numbers, "tactile_marker_motion": nested}
     types |= {name: getattr(pa, kind)() for name, kind in PLAIN.items()}
-    assert found.names == ORDER, found.names
+    assert found.names == order(version), found.names
     for name, kind in types.items():
-        assert found.field(name).type == kind and found.field(name).nullable, (name, found.field(name))
+        field = found.field(key(name, version))
+        assert field.type == kind and field.nullable, (name, field)
     known = json.loads(found.metadata[b"huggingface"])["info"]["features"]
-    assert list(known) == ORDER
+    assert list(known) == order(version)
+    known = dict(zip(ORDER, known.values()))
     assert known["image"] == {"_type": "Image"}
     assert known["state"] == {"feature": {"dtype": "float32", "_type": "Value"}, "length": 7, "_type": "Sequence"}
     assert known["tactile_marker_motion"] == {"shape": [3, 198, 2], "dtype": "float32", "_type": "Array3D"}
@@ -60,7 +80,8 @@ def info(root, version, episodes, frames, tasks):
         },
     }[version]
     assert found == expected, found
-    assert list(features) == ORDER
+    assert list(features) == order(version)
+    features = dict(zip(ORDER, features.values()))
     for name in PICTURES:
         assert features[name] == {"dtype": "image", "shape": [224, 224, 3], "names": ["height", "width", "channel"]}
     for name, shape in {"state": [7], "actions": [7], "tactile_marker_motion": [3, 198, 2]}.items():
@@ -193,7 +214,7 @@ def version_21(data, root, gripper):
         if entry["language"] not in prompts:
             prompts.append(entry["language"])
         path = root / f"data/chunk-000/episode_{number:06d}.parquet"
-        schema(pq.read_schema(path))
+        schema(pq.read_schema(path), "v2.1")
         table = pq.read_table(path)
         held = compare(table, demo, (number, first, prompts.index(entry["language"])), "frame_{:06d}.png", gripper)
         assert episodes[number] == {"episode_index": number, "tasks": [entry["language"]], "length": table.num_rows}
@@ -219,8 +240,8 @@ def version_30(data, root, gripper):
         if entry["language"] not in prompts:
             prompts.append(entry["language"])
         at, group = groups[number]
-        schema(files[at].schema_arrow)
-        table = files[at].read_row_group(group)
+        schema(files[at].schema_arrow, "v3.0")
+        table = files[at].read_row_group(group).rename_columns(ORDER)
         bounds = files[at].metadata.row_group(group).column(ORDER.index("episode_index") + 3).statistics
         assert (bounds.min, bounds.max) == (number, number), "one episode a group, and it says which"
         held = compare(table, demo, (number, first, prompts.index(entry["language"])), "frame-{:06d}.png", gripper)
@@ -238,16 +259,16 @@ def version_30(data, root, gripper):
         }
         assert expected == {key: value for key, value in stored.items() if not key.startswith("stats/")}, stored
         for name in ORDER:
-            prefix = f"stats/{name}/"
+            prefix = f"stats/{key(name, 'v3.0')}/"
             figures = {key.removeprefix(prefix): value for key, value in stored.items() if key.startswith(prefix)}
             same(name, figures, held[name], "v3.0")
             whole[name].append(held[name])
         first += steps
     assert len(groups) == len(episodes) == number + 1
     stats = json.loads((root / "meta/stats.json").read_text())
-    assert set(stats) == set(ORDER)
-    for name, stored in stats.items():
-        same(name, stored, np.concatenate(whole[name]), "v3.0")
+    assert set(stats) == set(order("v3.0"))
+    for name in ORDER:
+        same(name, stats[key(name, "v3.0")], np.concatenate(whole[name]), "v3.0")
     tasks = pd.read_parquet(root / "meta/tasks.parquet")
     assert tasks.index.tolist() == prompts and tasks["task_index"].tolist() == list(range(len(prompts))), tasks
     assert tasks.columns.tolist() == ["task_index"] and tasks.index.name is None

@@ -12,7 +12,7 @@ pub enum LeRobotVersion {
     /// One table per episode; used by openpi and SoftVTBench.
     #[value(name = "lerobot-v2.1", help = None::<&str>)]
     V21,
-    /// Many episodes per table; LeRobot's own since 0.4.
+    /// Many episodes per table; LeRobot's own since 0.4, with the keys of its own policies.
     #[value(name = "lerobot-v3.0", help = None::<&str>)]
     V30,
 }
@@ -56,6 +56,21 @@ impl LeRobotVersion {
         match self {
             Self::V21 => "v2.1",
             Self::V30 => "v3.0",
+        }
+    }
+
+    /// Key of a feature whose name in openpi's and SoftVTBench's data is `name`: v3.0 has those that LeRobot's own policies look for.
+    pub(super) fn key(self, name: &'static str) -> &'static str {
+        match (self, name) {
+            (Self::V21, _) => name,
+            (Self::V30, "image") => "observation.images.third_person",
+            (Self::V30, "wrist_image") => "observation.images.wrist",
+            (Self::V30, "tactile_image") => "observation.images.tactile_image",
+            (Self::V30, "state") => "observation.state",
+            (Self::V30, "tactile_marker_motion") => "observation.tactile_marker_motion",
+            (Self::V30, "actions") => "action",
+            // Those that LeRobot adds to every dataset.
+            (Self::V30, _) => name,
         }
     }
 

@@ -73,20 +73,21 @@ impl<'a> EpisodeData<'a> {
             [counted(0), constant(index), counted(demo.first_frame), constant(demo.prompt)];
 
         let mut episode = Self { index, demo, columns: Vec::new(), statistics: Vec::new() };
+        let key = |name| config.version.key(name);
         for (name, ImageColumn { images, counts }) in IMAGE_FEATURES.into_iter().zip(images) {
             let parts = counts.into_iter().map(ValueStatistics::counted).collect();
-            episode.push(name, &[3, 1, 1], parts, ColumnValues::Images(images));
+            episode.push(key(name), &[3, 1, 1], parts, ColumnValues::Images(images));
         }
         for (name, rows) in [("state", state), ("actions", actions)] {
             let column = |i: usize| rows.iter().skip(i).step_by(VECTOR_LENGTH).map(|x| f64::from(*x));
             let parts = (0..VECTOR_LENGTH).map(|i| ValueStatistics::of(column(i).collect())).collect();
-            episode.push(name, &[VECTOR_LENGTH], parts, ColumnValues::F32(rows));
+            episode.push(key(name), &[VECTOR_LENGTH], parts, ColumnValues::F32(rows));
         }
         let (shape, parts) = match config.version {
             LeRobotVersion::V21 => (&MARKER_SHAPE[..], statistics_per_marker(&markers)),
             LeRobotVersion::V30 => (&[2][..], statistics_of_all_markers(&markers)),
         };
-        episode.push("tactile_marker_motion", shape, parts, ColumnValues::F32(markers));
+        episode.push(key("tactile_marker_motion"), shape, parts, ColumnValues::F32(markers));
         let part = |numbers: Vec<f64>| vec![ValueStatistics::of(numbers)];
         let seconds = timestamps.iter().map(|time| f64::from(*time)).collect();
         episode.push("timestamp", &[1], part(seconds), ColumnValues::F32(timestamps));

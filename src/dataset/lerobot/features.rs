@@ -4,12 +4,13 @@ use parquet::file::metadata::KeyValue;
 use serde_json::{Map, Value, json};
 
 use super::{
+    config::LeRobotVersion,
     parquet_table::{ColumnType, ParquetColumn, TableSchema},
     selection::ImageSize,
 };
 use softvt_sensing::tactile::MARKER_COUNT;
 
-/// Image features of a row, in order.
+/// Names of the image features of a row, in order.
 pub(super) const IMAGE_FEATURES: [&str; 3] = ["image", "wrist_image", "tactile_image"];
 /// Index features of a row, in order: the last ones.
 pub(super) const INDEX_FEATURES: [&str; 4] = ["frame_index", "episode_index", "index", "task_index"];
@@ -24,6 +25,7 @@ const POSE: [&str; 6] = ["x", "y", "z", "axis_angle_x", "axis_angle_y", "axis_an
 /// A feature.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Feature {
+    /// Its key in this version.
     pub name: &'static str,
     /// Type in LeRobot's terms.
     pub dtype: &'static str,
@@ -34,8 +36,13 @@ pub(super) struct Feature {
 }
 
 /// All features in order; those that LeRobot adds to every dataset come last. `sizes` are those of the cameras.
-pub(super) fn all([third_person, wrist]: [ImageSize; 2]) -> Vec<Feature> {
-    let feature = |name, dtype, shape: &[usize], names| Feature { name, dtype, shape: shape.to_vec(), names };
+pub(super) fn all(version: LeRobotVersion, [third_person, wrist]: [ImageSize; 2]) -> Vec<Feature> {
+    let feature = |name, dtype, shape: &[usize], names| Feature {
+        name: version.key(name),
+        dtype,
+        shape: shape.to_vec(),
+        names,
+    };
     let mosaic = ImageSize { height: 224, width: 224 };
     let images = IMAGE_FEATURES.into_iter().zip([third_person, wrist, mosaic]);
     let images = images.map(|(name, ImageSize { height, width })| {

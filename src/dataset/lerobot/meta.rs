@@ -127,6 +127,9 @@ fn readme(config: &ExportConfig, selection: &Selection, summary: ExportSummary) 
         }
         GripCode::Force => "grip force in N while closed, -1 while open",
     };
+    let key = |name| config.version.key(name);
+    let [image, wrist, tactile] = features::IMAGE_FEATURES.map(key);
+    let (markers, state, actions) = (key("tactile_marker_motion"), key("state"), key("actions"));
     let prompts: String = selection.prompts.iter().map(|prompt| format!("- {prompt}\n")).collect();
     format!(
         "---\nlicense: apache-2.0\ntask_categories:\n- robotics\ntags:\n- LeRobot\nconfigs:\n- config_name: default\n  \
@@ -136,11 +139,11 @@ fn readme(config: &ExportConfig, selection: &Selection, summary: ExportSummary) 
          simulation. Every episode reaches its goal and is safe by softvt's evaluator.\n\n\
          Frame t holds the observation of a policy at step t and the action commanded then.\n\n\
          | key | |\n|---|---|\n\
-         | `image`, `wrist_image` | third person and wrist |\n\
-         | `tactile_image` | 4 × 4 cells: the last 8 images of the left finger above, of the right finger below |\n\
-         | `tactile_marker_motion` | (3, 198, 2) px: initial marker positions, those of the previous step and of this one; left finger first |\n\
-         | `state` | tool position (m), axis-angle (rad) in the robot's base frame; position of one finger, 0 closed to 0.04 m |\n\
-         | `actions` | absolute tool position and axis-angle; {gripper} |\n\n\
+         | `{image}`, `{wrist}` | third person and wrist |\n\
+         | `{tactile}` | 4 × 4 cells: the last 8 images of the left finger above, of the right finger below |\n\
+         | `{markers}` | (3, 198, 2) px: initial marker positions, those of the previous step and of this one; left finger first |\n\
+         | `{state}` | tool position (m), axis-angle (rad) in the robot's base frame; position of one finger, 0 closed to 0.04 m |\n\
+         | `{actions}` | absolute tool position and axis-angle; {gripper} |\n\n\
          `meta/softvt.json` states the grip code ({}), and `meta/softvt.jsonl` the demonstration of each episode.\n\n\
          {prompts}",
         config.version.code(),

@@ -44,7 +44,7 @@ pub fn export(
 ) -> Result<ExportSummary, DatasetError> {
     staged_dir::check_empty(&config.out)?;
     let selection = selection::select(config)?;
-    let features = features::all(selection.image_sizes);
+    let features = features::all(config.version, selection.image_sizes);
     let staged = StagedDir::create(&config.out)?;
     match write(config, &selection, &features, &staged, is_cancelled, on_episode) {
         Ok(summary) => staged.commit().map(|()| summary),
