@@ -27,11 +27,11 @@ install_debian() {
 }
 
 # python_environment FOLDER REASON ARGUMENT...: makes an environment with the packages that pip gets as arguments, or skips. With
-# VENV_FLAGS=--system-site-packages it also has those of python3.
+# VENV_FLAGS=--system-site-packages it also has those of python3. VENV_PYTHON names another interpreter than python3.
 python_environment() {
     local folder=$1 reason=$2 why
     shift 2
-    if ! why=$({ python3 -m venv ${VENV_FLAGS:-} "$folder" && "$folder/bin/pip" install --quiet --disable-pip-version-check "$@"; } 2>&1); then
+    if ! why=$({ "${VENV_PYTHON:-python3}" -m venv ${VENV_FLAGS:-} "$folder" && "$folder/bin/pip" install --quiet --disable-pip-version-check "$@"; } 2>&1); then
         tail -n 3 <<< "$why" >&2
         skip "$reason"
     fi
