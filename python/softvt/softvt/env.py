@@ -1,5 +1,6 @@
 """softvt as a Gymnasium environment: a client of `softvt serve` that starts its own server, or connects to one."""
 
+import inspect
 import weakref
 from collections import deque
 from collections.abc import Mapping, Sequence
@@ -105,6 +106,10 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
             require_one_of("render_mode", render_mode, _RENDER_MODES)
         if (script is None) == (url is None):
             raise ValueError("give either the script of a suite or the url of a server")
+        own = {"control": control, "gripper": gripper, "history": history, "cameras": tuple(cameras)}
+        _refuse_changed("profile", profile, own)
+        _refuse_changed("url", url, {**own, "profile": profile, "image_size": image_size, "flags": tuple(flags), "binary": binary})
+        _refuse_changed("script", script, {"token": token})
         parts = parse_parts(obs) if obs is not None else None if url or profile else ("state",)
         needs_truth = cost or privileged or reward != "sparse" or (parts is not None and "state" in parts)
         self.render_mode = render_mode
@@ -133,7 +138,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         # Servers end with their process anyway.
         self._closer.atexit = False
         try:
-            self._begin(suite, task, needs_truth, history if script is not None else 1)
+            self._begin(suite, task, needs_truth, history)
         except BaseException:
             self.close()
             raise
@@ -398,6 +403,16 @@ def _close(client: Client, lease: Lease | None) -> None:
     client.close()
     if lease is not None:
         lease.release()
+
+
+def _refuse_changed(cause: str, given: object, arguments: Mapping[str, object]) -> None:
+    """Raises ValueError for arguments that have no effect where another one is given."""
+    if given is None:
+        return
+    defaults = {name: parameter.default for name, parameter in inspect.signature(SoftVTEnv.__init__).parameters.items()}
+    for name, value in arguments.items():
+        if value != defaults[name]:
+            raise ValueError(f"{name}={value!r} has no effect with {cause}={given!r}; leave it out")
 
 
 def _script(name: str) -> str:

@@ -8,6 +8,7 @@ with Server("suites/object_soft.lua", "--profile", "vision") as server, server.c
 import atexit
 import hashlib
 import json
+import multiprocessing
 import os
 import secrets
 import signal
@@ -266,7 +267,9 @@ def lease(script: str, flags: Sequence[str] = (), binary: str | None = None, pro
     key = hashlib.sha256(words.encode()).hexdigest()
     with _lock:
         shared = _servers.get(key)
-        if shared is None and (address := _announced().get(key)) is not None:
+        # Other programs than workers would lose a server that ends with its last environment in this process.
+        is_worker = multiprocessing.parent_process() is not None
+        if is_worker and shared is None and (address := _announced().get(key)) is not None:
             url, token = address
             try:
                 Client(url, token).close()

@@ -22,6 +22,8 @@ class SoftVTVectorEnv(VectorEnv):
         **arguments: Any,
     ):
         """`arguments` are those of SoftVTEnv. `max_episode_steps` truncates episodes before the budget of their task."""
+        if num_envs < 1:
+            raise ValueError(f"num_envs={num_envs}: expected at least 1")
         self.envs: list[SoftVTEnv] = []
         try:
             for _ in range(num_envs):

@@ -62,6 +62,9 @@ class Arguments(unittest.TestCase):
                 ({"script": "object_soft", "layout": "nested"}, "layout='nested'"),
                 ({"script": "object_soft", "obs": "image"}, "obs='image'"),
                 ({"script": "object_soft", "render_mode": "window"}, "render_mode='window'"),
+                ({"script": "object_soft", "profile": "vision", "control": "pose"}, "control='pose' has no effect with profile='vision'"),
+                ({"url": "ws://127.0.0.1:9", "image_size": 64}, "image_size=64 has no effect with url="),
+                ({"script": "object_soft", "token": "t"}, "token='t' has no effect"),
             ]:
                 with self.subTest(arguments), self.assertRaisesRegex(ValueError, words):
                     softvt.SoftVTEnv(**arguments)

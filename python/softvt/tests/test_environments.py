@@ -22,6 +22,11 @@ def field(state: np.ndarray, name: str) -> np.ndarray:
     return state[first : first + STATE_FIELDS[name][0]]
 
 
+def judged(record) -> dict:
+    """A record without the fields that depend on what observed and controlled the episode."""
+    return {key: value for key, value in record.items() if key not in ("policy", "camera_inside", "gave_up", "notes", "privileged")}
+
+
 class Environments(unittest.TestCase):
     def make(self, script: str | None = None, **arguments) -> softvt.SoftVTEnv:
         env = softvt.SoftVTEnv(script or short_suite(), **arguments)
@@ -141,7 +146,7 @@ class Environments(unittest.TestCase):
                     self.assertTrue(terminated and not truncated)
                     self.assertIs(info["is_success"], True)
                     self.assertEqual((info["is_safe"], info["record"]["goal"]), (kept["safety"], True))
-                    self.assertEqual(info["record"]["state_hash"], kept["state_hash"])
+                    self.assertEqual(judged(info["record"]), judged(kept))
                     if expected is None:
                         self.assertAlmostEqual(sum(rewards), 1.0, delta=0.17)
                         self.assertGreater(sum(one > 0 for one in rewards), 50, "dense")

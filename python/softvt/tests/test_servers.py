@@ -1,10 +1,10 @@
 """Servers: their start and their end, and what clients learn of both."""
 
+import multiprocessing
 import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 import unittest
 from pathlib import Path
@@ -24,6 +24,13 @@ def is_running(process: int) -> bool:
     # A zombie has ended; its new parent need not have noticed yet.
     stat = Path(f"/proc/{process}/stat").read_text(encoding="utf-8")
     return stat.rsplit(")", 1)[1].split()[0] != "Z"
+
+
+def send_url(pipe, suite: str) -> None:
+    """Sends the address of a new environment's server."""
+    env = softvt.SoftVTEnv(suite, obs="proprio")
+    pipe.send(env._client.url)
+    env.close()
 
 
 class Servers(unittest.TestCase):
@@ -54,27 +61,20 @@ class Servers(unittest.TestCase):
             for env in (first, second, other):
                 env.close()
 
-    def test_a_forked_and_a_spawned_process_use_the_server_of_their_parent(self):
+    def test_worker_processes_use_the_server_of_their_parent_and_other_programs_do_not(self):
         env = softvt.SoftVTEnv(short_suite(), obs="proprio")
         try:
-            url = env._client.url
-            reading, writing = os.pipe()
-            child = os.fork()
-            if child == 0:
-                # The process must not run the tests on, whatever happens.
-                try:
-                    own = softvt.SoftVTEnv(short_suite(), obs="proprio")
-                    os.write(writing, own._client.url.encode())
-                    own.close()
-                finally:
-                    os._exit(0)
-            os.close(writing)
-            with os.fdopen(reading) as pipe:
-                self.assertEqual(pipe.read(), url)
-            os.waitpid(child, 0)
+            for method in ("fork", "spawn"):
+                context = multiprocessing.get_context(method)
+                reading, writing = context.Pipe(duplex=False)
+                worker = context.Process(target=send_url, args=(writing, short_suite()))
+                worker.start()
+                self.assertEqual(reading.recv(), env._client.url, method)
+                worker.join()
+                self.assertEqual(worker.exitcode, 0)
             program = f"import softvt; print(softvt.SoftVTEnv({short_suite()!r}, obs='proprio')._client.url)"
-            spawned = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-            self.assertEqual(spawned.stdout.strip(), url)
+            other = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+            self.assertNotEqual(other.stdout.strip(), env._client.url)
             env.reset(seed=0)
         finally:
             env.close()
@@ -83,7 +83,6 @@ class Servers(unittest.TestCase):
         launch = f"""
 import os, signal, softvt
 from softvt import serve
-os.environ.pop(serve.SERVERS, None)
 env = softvt.SoftVTEnv({short_suite()!r}, obs="proprio", control="pose")
 print(next(iter(serve._running)).pid, flush=True)
 """
@@ -160,6 +159,4 @@ print(next(iter(serve._running)).pid, flush=True)
 
 
 if __name__ == "__main__":
-    # Threads of earlier tests would hide a fork that hangs.
-    assert threading.active_count() == 1
     unittest.main()
