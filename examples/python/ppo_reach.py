@@ -47,7 +47,7 @@ def make(split: str, envs: int, seed: int) -> VecEnv:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--steps", type=int, default=100_000, help="control steps of training")
+    parser.add_argument("--steps", type=int, default=60_000, help="control steps of training")
     parser.add_argument("--envs", type=int, default=8)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--episodes", type=int, default=20, help="episodes of the evaluation")
