@@ -57,7 +57,15 @@ def main() -> None:
     # Numbers of the state differ in size by orders of magnitude.
     training = VecNormalize(make("demonstration", options.envs, options.seed), gamma=0.97)
     policy = PPO(
-        "MlpPolicy", training, n_steps=256, batch_size=512, gamma=0.97, learning_rate=1e-3, seed=options.seed, device="cpu", verbose=1
+        "MlpPolicy",
+        training,
+        n_steps=256,
+        batch_size=512,
+        gamma=0.97,
+        learning_rate=1e-3,
+        seed=options.seed,
+        device="cpu",
+        verbose=options.verbose,
     )
     began = time.monotonic()
     policy.learn(options.steps)

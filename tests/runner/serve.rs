@@ -241,8 +241,15 @@ fn privileged_clients_receive_the_true_state() {
     let server = Server::with(&vision(&project).seed(3), access);
     let (mut client, hello) = server.client();
     assert_eq!((get(&hello, "seed").as_u64(), text(&hello, "split")), (Some(3), "demonstration"));
-    client.reset(0);
+    let start = client.reset(0);
+    let scene = get(get(&start, "info"), "scene");
+    assert_eq!(text(get(scene, "goal"), "object"), "cube");
+    let names: Vec<_> =
+        get(scene, "objects").as_array().expect("a list").iter().filter_map(Value::as_str).collect();
+    assert!(names.contains(&"cube"), "{names:?}");
+    assert_eq!(get(scene, "base_quaternion_w").as_array().map(Vec::len), Some(4));
     let info = get(&client.ask(&step(12)), "info").clone();
+    assert!(!keys(&info).contains(&"scene"), "only at the start");
     let objects = get(get(&info, "state"), "objects").as_array().expect("a list").clone();
     assert_eq!(text(&objects[0], "name"), "cube");
     assert!(get(get(&info, "state"), "pad_force_n").is_array());
@@ -459,6 +466,44 @@ fn restored_states_are_byte_identical() {
     let changed = Server::start(&project.run("x.lua").profile("libero"));
     let output = changed.client().0.refused(&back);
     assert!(output.contains("another profile or gripper"), "{output}");
+}
+
+/// The numbers of an array as clients receive it.
+fn doubles(value: &Value) -> Vec<f64> {
+    let entries = value.as_map().expect("an array");
+    let data =
+        entries.iter().find(|(key, _)| key.as_slice() == Some(b"data")).and_then(|(_, data)| data.as_slice());
+    data.expect("data").as_chunks::<8>().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect()
+}
+
+#[test]
+fn cameras_have_their_matrices() {
+    let project = project();
+    let server = Server::start(&vision(&project));
+    let (mut client, _) = server.client();
+    assert!(client.refused(&of("cameras")).contains("reset first"));
+    client.reset(0);
+    let found = client.ask(&of("cameras"));
+    let cameras = get(&found, "cameras");
+    assert_eq!(keys(cameras), ["third_person", "wrist"]);
+    let camera = get(cameras, "third_person");
+    // A lens of 18 before a picture of 15, both in the same unit.
+    let focal = 224.0 * 18.0 / 15.0;
+    let expected = [focal, 0.0, 112.0, 0.0, focal, 112.0, 0.0, 0.0, 1.0];
+    for (number, expected) in doubles(get(camera, "intrinsic")).into_iter().zip(expected) {
+        assert!((number - expected).abs() < 1e-9, "{number} instead of {expected}");
+    }
+    let before = doubles(get(get(cameras, "wrist"), "pose_b"));
+    assert_eq!((before.len(), &before[12..]), (16, &[0.0, 0.0, 0.0, 1.0][..]));
+    assert!(before[10] > 0.9, "the view is down, along -z: {before:?}");
+    client.ask(&step(5));
+    let after = client.ask(&of("cameras"));
+    assert_eq!(get(get(&after, "cameras"), "third_person"), camera, "it stands still");
+    assert_ne!(
+        doubles(get(get(get(&after, "cameras"), "wrist"), "pose_b")),
+        before,
+        "it moves with the hand"
+    );
 }
 
 #[test]
