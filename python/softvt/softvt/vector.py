@@ -1,6 +1,6 @@
 """Several environments that one server steps at the same time, without worker processes."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -58,8 +58,8 @@ class SoftVTVectorEnv(VectorEnv):
         for index in chosen:
             self.envs[index].begin_reset(seeds[index], options)
         infos: dict[str, Any] = {}
-        for index in chosen:
-            infos = self._add_info(infos, self._end_reset(index), index)
+        for index, info in self._wait(chosen, self._end_reset).items():
+            infos = self._add_info(infos, info, index)
         return self._batch(), infos
 
     def step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
@@ -74,15 +74,17 @@ class SoftVTVectorEnv(VectorEnv):
                 self.envs[index].begin_step(action)
         rewards = np.zeros(self.num_envs)
         terminated, truncated = np.zeros((2, self.num_envs), dtype=np.bool_)
-        found: list[dict[str, Any]] = [{}] * self.num_envs
-        for index, env in enumerate(self.envs):
+
+        def end(index: int) -> dict[str, Any]:
             if restarting[index]:
-                found[index] = self._end_reset(index)
-                continue
-            self._observations[index], rewards[index], terminated[index], truncated[index], found[index] = env.end_step()
+                return self._end_reset(index)
+            self._observations[index], rewards[index], terminated[index], truncated[index], info = self.envs[index].end_step()
             self._steps[index] += 1
             if self._max_steps is not None and self._steps[index] >= self._max_steps and not terminated[index]:
                 truncated[index] = True
+            return info
+
+        found = self._wait(range(self.num_envs), end)
         infos: dict[str, Any] = {}
         self._ended = terminated | truncated
         if self.autoreset_mode == AutoresetMode.SAME_STEP:
@@ -90,9 +92,8 @@ class SoftVTVectorEnv(VectorEnv):
             for index in ended:
                 infos = self._add_info(infos, {"final_obs": self._observations[index], "final_info": found[index]}, index)
                 self.envs[index].begin_reset()
-            for index in ended:
-                found[index] = self._end_reset(index)
-        for index, info in enumerate(found):
+            found |= self._wait(ended, self._end_reset)
+        for index, info in found.items():
             infos = self._add_info(infos, info, index)
         return self._batch(), rewards, terminated, truncated, infos
 
@@ -119,6 +120,19 @@ class SoftVTVectorEnv(VectorEnv):
         """Closes all environments."""
         for env in self.envs:
             env.close()
+
+    def _wait(self, indices: Iterable[int], end: Callable[[int], dict[str, Any]]) -> dict[int, dict[str, Any]]:
+        """Reads the answers of all these environments. The first error is raised after that, so that no answer is left for a later request."""
+        found: dict[int, dict[str, Any]] = {}
+        first: Exception | None = None
+        for index in indices:
+            try:
+                found[index] = end(index)
+            except Exception as error:
+                first = first or error
+        if first is not None:
+            raise first
+        return found
 
     def _end_reset(self, index: int) -> dict[str, Any]:
         self._observations[index], info = self.envs[index].end_reset()

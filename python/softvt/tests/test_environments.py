@@ -329,6 +329,15 @@ class Vectors(unittest.TestCase):
         envs.reset(seed=[5, 6], options={"reset_mask": np.array([True, False])})
         self.assertEqual(envs._ended.tolist(), [False, True])
 
+    def test_an_action_that_is_refused_leaves_the_other_environments_as_they_are(self):
+        envs = softvt.SoftVTVectorEnv(2, script=short_suite(), obs="proprio")
+        self.addCleanup(envs.close)
+        envs.reset(seed=1000)
+        with self.assertRaisesRegex(softvt.ServerError, "not finite"):
+            envs.step(np.array([HOLD * np.nan, HOLD], dtype=np.float32))
+        *_, info = envs.step(np.zeros((2, 7), dtype=np.float32))
+        self.assertEqual(info["step"].tolist(), [1, 2])
+
     def test_a_vector_calls_its_environments(self):
         envs = softvt.SoftVTVectorEnv(2, script=short_suite(), obs="proprio", render_mode="rgb_array", camera="left")
         self.addCleanup(envs.close)
