@@ -16,6 +16,8 @@ from softvt.profile import PROPRIO_SIZE, parse_parts
 from softvt.true_state import STATE_BOUNDS
 
 _CAMERAS = ("third_person", "wrist")
+_SCENE_IMAGE = (224, 224, 3)
+"""Shape of the images of all standard scenes."""
 
 
 @EnvConfig.register_subclass("softvt")
@@ -56,10 +58,9 @@ class SoftVTEnvConfig(EnvConfig):
 
     def __post_init__(self) -> None:
         """Fills in the features of the observation and of the action."""
-        image = (self.observation_height, self.observation_width, 3)
         finger = (240, 320, 3)
         visual: dict[str, dict[str, tuple[int, ...]]] = {
-            "pixels": dict.fromkeys(_CAMERAS, image),
+            "pixels": dict.fromkeys(_CAMERAS, self._image),
             "tactile_image": {"tactile_image": (224, 224, 3)},
             "tactile": {"tactile_left": finger, "tactile_right": finger},
         }
@@ -87,6 +88,10 @@ class SoftVTEnvConfig(EnvConfig):
         self.features_map[key] = policy_key
 
     @property
+    def _image(self) -> tuple[int, int, int]:
+        return (self.observation_height, self.observation_width, 3)
+
+    @property
     def gym_kwargs(self) -> dict[str, Any]:
         """Arguments of the environments, without the task."""
         return {
@@ -95,7 +100,8 @@ class SoftVTEnvConfig(EnvConfig):
             "gripper": self.gripper,
             "reward": self.reward,
             "layout": "lerobot",
-            "image_size": (self.observation_height, self.observation_width),
+            # A size that scenes have anyway is no setting, which would tell runs apart.
+            "image_size": None if self._image == _SCENE_IMAGE else self._image[:2],
             "split": self.split,
             "first_seed": self.first_seed,
             "flags": tuple(self.flags),
@@ -115,6 +121,7 @@ class SoftVTEnvConfig(EnvConfig):
             arguments = {**self.gym_kwargs, "script": script.strip()}
             first = SoftVTVectorEnv(1, **arguments, task=None)
             try:
+                self._check_images(first)
                 for suite in first.envs[0].hello["suites"]:
                     known = [entry["task"] for entry in suite["tasks"]]
                     tasks = known if self.task_ids is None else self.task_ids
@@ -122,3 +129,14 @@ class SoftVTEnvConfig(EnvConfig):
             finally:
                 first.close()
         return found
+
+    def _check_images(self, vector: SoftVTVectorEnv) -> None:
+        """Raises ValueError if the cameras of the scene have another size than the features."""
+        space: Any = vector.single_observation_space
+        for name in _CAMERAS:
+            if "pixels" in space.spaces and name in space["pixels"].spaces and space["pixels"][name].shape != self._image:
+                height, width, _ = space["pixels"][name].shape
+                raise ValueError(
+                    f"env.task: camera {name} has {height} x {width} pixels; state --env.observation_height={height} and "
+                    f"--env.observation_width={width}"
+                )
