@@ -192,6 +192,8 @@ class Evaluations(unittest.TestCase):
             EnvConfig.get_choice_class("softvt")(obs="pixels+depth")
         with self.assertRaisesRegex(ValueError, "task 99: suite object_soft has the tasks 0 to 9"):
             make_env(EnvConfig.get_choice_class("softvt")(task=short_suite(), task_ids=[99]))
+        with self.assertRaisesRegex(ValueError, "224 x 64 pixels; state --env.observation_height=224"):
+            make_env(EnvConfig.get_choice_class("softvt")(task=short_suite(), flags=["--set", "cameras.width=64"]))
 
 
 class Bridges(unittest.TestCase):
