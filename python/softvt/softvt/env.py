@@ -110,7 +110,10 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         _refuse_changed("profile", profile, own)
         _refuse_changed("url", url, {**own, "profile": profile, "image_size": image_size, "flags": tuple(flags), "binary": binary})
         _refuse_changed("script", script, {"token": token})
-        parts = parse_parts(obs) if obs is not None else None if url or profile else ("state",)
+        # None for all that the server sends.
+        parts = None if url or profile else ("state",)
+        if obs is not None:
+            parts = parse_parts(obs)
         needs_truth = cost or privileged or reward != "sparse" or (parts is not None and "state" in parts)
         self.render_mode = render_mode
         self._camera, self._reward, self._layout, self._freezes = camera, reward, layout, freeze
@@ -311,6 +314,10 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
                     f"obs={part!r}: the profile {self._client.hello['profile']!r} of this server does not send it; it sends {', '.join(entries)}"
                 )
             selected += found
+        if "state" in self._parts and "state" in selected:
+            raise ValueError(
+                "obs: the profile of this server has an entry 'state' of its own, so that the true state cannot be added to it"
+            )
         return selected
 
     def _space(self, entries: Mapping[str, Any]) -> spaces.Space[Any]:

@@ -83,6 +83,8 @@ class Environments(unittest.TestCase):
             ]:
                 with self.subTest(arguments), self.assertRaisesRegex(ValueError, words):
                     softvt.SoftVTEnv(url=server.url, token=server.token, **arguments)
+            with self.assertRaisesRegex(ValueError, "entry 'state' of its own"):
+                self.make(profile="vision", obs="proprio+state")
             env = softvt.SoftVTEnv(url=server.url, token=server.token, obs="pixels+proprio", cost=False)
             self.assertEqual(set(env.observation_space.spaces), {"image", "wrist_image", "state"})
             env.close()
