@@ -111,7 +111,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         _refuse_changed("url", url, {**own, "profile": profile, "image_size": image_size, "flags": tuple(flags), "binary": binary})
         _refuse_changed("script", script, {"token": token})
         # None for all that the server sends.
-        parts = None if url or profile else ("state",)
+        parts: tuple[str, ...] | None = None if url or profile else ("state",)
         if obs is not None:
             parts = parse_parts(obs)
         needs_truth = cost or privileged or reward != "sparse" or (parts is not None and "state" in parts)
