@@ -25,7 +25,7 @@ pub use softvt_benchmark as benchmark;
 #[doc(inline)]
 pub use softvt_cli as cli;
 #[doc(inline)]
-pub use softvt_common::{cancel, episode_id, files, npy, parallel, range, settings, text};
+pub use softvt_common::{cancel, disk_cache, episode_id, files, npy, parallel, range, settings, text};
 #[cfg(feature = "runner")]
 #[doc(inline)]
 pub use softvt_dataset as dataset;

@@ -6,6 +6,7 @@ use std::{path::PathBuf, sync::Arc};
 
 use softvt::{
     benchmark::Plan,
+    disk_cache::DiskCache,
     episode_id::{EpisodeId, EpisodeSplit},
     geometry::{Pose, Quat, Vec3, shape::Shape},
     physics::{BodyId, PhysicsParams},
@@ -107,7 +108,9 @@ fn materials_match_their_reference() {
     let board =
         Visual::plain([0.42, 0.43, 0.45], 0.7, 0.0).with(layer(noise(3, 0.3, 0.8), [0.36, 0.37, 0.39], 0.0));
     let fixed = |name: String, segmentation_id, shape: &Shape, visual: Visual, at: [f64; 3]| RenderObject {
-        mesh: Arc::new(RenderMesh::from_shape(&name, shape, &[visual]).expect("a surface")),
+        mesh: Arc::new(
+            RenderMesh::from_shape(&name, shape, &[visual], &DiskCache::DISABLED).expect("a surface"),
+        ),
         name,
         segmentation_id,
         body: BodyId::World,

@@ -5,6 +5,7 @@
 #![warn(unreachable_pub)]
 
 mod args;
+mod cache;
 mod commands;
 mod error;
 mod output;
@@ -59,6 +60,7 @@ fn run_process() -> Result<(), CliError> {
         std::process::exit(2);
     }));
     handle_interrupts();
+    cache::share();
     let words: Vec<String> = std::env::args_os()
         .map(|word| {
             word.into_string().map_err(|w| CliError::input(format!("argument {w:?} is not valid UTF-8")))

@@ -1,5 +1,7 @@
 //! Mass, centre of mass and inertia of uniform solids.
 
+use serde::{Deserialize, Serialize};
+
 use super::{
     Mat3, Pose, Vec3,
     mesh::Mesh,
@@ -8,7 +10,7 @@ use super::{
 };
 
 /// Mass, centre of mass and inertia of a uniform solid.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MassProperties {
     /// Mass, kg.
     pub mass: f64,

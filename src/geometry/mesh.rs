@@ -2,10 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+
 use super::Vec3;
 
 /// A triangle mesh with vertices and triangles by index.
-#[derive(Clone, Debug, PartialEq, Default)]
+#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
 pub struct Mesh {
     /// Vertex positions, object frame, m.
     pub vertices: Vec<Vec3>,

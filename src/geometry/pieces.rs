@@ -1,9 +1,11 @@
 //! Connected pieces of a voxel mesh.
 
+use serde::{Deserialize, Serialize};
+
 use super::{union_find::UnionFind, voxel::VoxelMesh};
 
 /// The pieces of a mesh whose elements are not all connected by common nodes.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SeparatePieces {
     /// Number of pieces, at least 2.
     pub count: usize,

@@ -2,6 +2,8 @@
 //!
 //! Corners and shape functions of an element are those of [`hex8`].
 
+use serde::{Deserialize, Serialize};
+
 use super::{
     Vec3, hex8,
     shape::{Shape, ShapeError},
@@ -12,7 +14,7 @@ pub const SUBCELLS: usize = 6;
 
 /// Filled sub-cells of a voxel: bit `i + SUBCELLS (j + SUBCELLS k)` is set if the centre of the sub-cell
 /// is inside the body.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct OccupancyMask(pub [u64; 4]);
 
 impl OccupancyMask {
@@ -46,7 +48,7 @@ impl OccupancyMask {
 }
 
 /// A mesh of equal cubes that covers a shape; nodes and elements in x-fastest order.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct VoxelMesh {
     /// Edge of the voxels, m.
     pub edge: f64,
@@ -65,7 +67,7 @@ pub struct VoxelMesh {
 }
 
 /// A material point, by its element and local coordinates.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Embedding {
     /// Index of the element in the mesh.
     pub element: u32,
@@ -81,7 +83,7 @@ impl Embedding {
 }
 
 /// A quadrature point of the surface of a body.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct SurfaceSample {
     /// Material point in the voxel mesh.
     pub at: Embedding,

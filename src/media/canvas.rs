@@ -32,13 +32,14 @@ impl Canvas {
 
     /// Copies an image to (x, y), clipped at the edges.
     pub fn place(&mut self, image: &RgbImage, x: u32, y: u32) {
-        let (width, height) = (self.pixels.width(), self.pixels.height());
-        let data = self.pixels.data_mut();
-        for (column, row, &image::Rgb([r, g, b])) in image.enumerate_pixels() {
-            if x + column < width && y + row < height {
-                let at = 4 * ((y + row) * width + x + column) as usize;
-                data[at..at + 4].copy_from_slice(&[r, g, b, 255]);
-            }
+        let (width, skipped) = (4 * self.pixels.width() as usize, 4 * x as usize);
+        let lines = self.pixels.data_mut().chunks_exact_mut(width).skip(y as usize);
+        for (line, row) in lines.zip(image.chunks_exact(3 * image.width().max(1) as usize)) {
+            let pixels = line.get_mut(skipped..).unwrap_or_default().as_chunks_mut::<4>().0;
+            pixels
+                .iter_mut()
+                .zip(row.as_chunks::<3>().0)
+                .for_each(|(pixel, &[r, g, b])| *pixel = [r, g, b, 255]);
         }
     }
 

@@ -2,7 +2,10 @@
 
 use std::{convert::Infallible, sync::Arc};
 
+use serde::{Serialize, de::DeserializeOwned};
+
 use super::{build_error::SceneBuildError, shared_cache::SharedCache, soft_model::SoftGeometry};
+use softvt_common::disk_cache::DiskCache;
 use softvt_geometry::{
     Aabb, Pose, Vec3,
     cavity::cavity,
@@ -13,7 +16,7 @@ use softvt_geometry::{
 };
 use softvt_physics::{
     BodyId, World,
-    contact::{Collider, CollisionGeometry, Friction},
+    contact::{Collider, CollisionGeometry, Friction, SurfaceFeatures},
     fem::FemModel,
 };
 use softvt_scene::{Asset, Body, Object, SoftMaterial};
@@ -31,6 +34,7 @@ pub struct AssetCache {
     walls: SharedCache<Shape, Option<f64>>,
     cavities: SharedCache<Shape, Option<Aabb>>,
     pieces: SharedCache<Shape, Option<SeparatePieces>>,
+    disk: DiskCache,
     /// True to compute masses and contact samples approximately.
     approximate: bool,
 }
@@ -44,7 +48,23 @@ fn of_shape<V: Clone>(cache: &SharedCache<Shape, V>, shape: &Shape, compute: imp
     value
 }
 
+/// The stored value of this kind for a shape.
+fn stored<V: Serialize + DeserializeOwned>(
+    disk: &DiskCache,
+    kind: &'static str,
+    shape: &Shape,
+    compute: impl FnOnce() -> V,
+) -> V {
+    let Ok(value) = disk.get(kind, shape, || Ok::<_, Infallible>(compute()));
+    value
+}
+
 impl AssetCache {
+    /// An empty cache that keeps what takes long in `disk`; by default in the cache of the process.
+    pub fn stored_in(disk: DiskCache) -> Self {
+        Self { disk, ..Self::default() }
+    }
+
     /// A cache for scenes that are checked but never simulated: expensive values are approximate.
     pub fn approximate() -> Self {
         Self { approximate: true, ..Self::default() }
@@ -52,32 +72,35 @@ impl AssetCache {
 
     /// Bounds of a shape.
     pub(super) fn bounds(&self, shape: &Shape) -> Aabb {
-        of_shape(&self.bounds, shape, || shape.bounds())
+        of_shape(&self.bounds, shape, || stored(&self.disk, "bounds", shape, || shape.bounds()))
     }
 
     /// Mass properties of a shape at a uniform density, kg/m³.
     pub(super) fn mass(&self, shape: &Shape, density: f64) -> MassProperties {
-        let compute = if self.approximate { approximate_mass_properties } else { mass_properties };
-        let unit = of_shape(&self.masses, shape, || compute(shape, 1.0));
+        let unit = of_shape(&self.masses, shape, || match self.approximate {
+            true => stored(&self.disk, "rough-mass", shape, || approximate_mass_properties(shape, 1.0)),
+            false => stored(&self.disk, "mass", shape, || mass_properties(shape, 1.0)),
+        });
         MassProperties { mass: unit.mass * density, com: unit.com, inertia: unit.inertia * density }
     }
 
     /// Typical thickness of the thin walls of a shape, m; see [`thin_wall`].
     pub(super) fn wall(&self, shape: &Shape) -> Option<f64> {
-        of_shape(&self.walls, shape, || thin_wall(shape))
+        of_shape(&self.walls, shape, || stored(&self.disk, "wall", shape, || thin_wall(shape)))
     }
 
     /// Box around the cavity of a shape, object frame; see [`cavity`].
     pub(super) fn cavity(&self, shape: &Shape) -> Option<Aabb> {
-        of_shape(&self.cavities, shape, || cavity(shape))
+        of_shape(&self.cavities, shape, || stored(&self.disk, "cavity", shape, || cavity(shape)))
     }
 
     /// Separate pieces of a shape; gaps below a voxel are not seen.
     pub(super) fn pieces(&self, shape: &Shape) -> Option<SeparatePieces> {
-        of_shape(&self.pieces, shape, || {
+        let find = || {
             let mesh = voxel_mesh(shape, &VoxelSpec { resolution: PIECES_RESOLUTION }).ok()?;
             SeparatePieces::find(&mesh)
-        })
+        };
+        of_shape(&self.pieces, shape, || stored(&self.disk, "pieces", shape, find))
     }
 
     /// A collider of a hard shape at `pose_in_parent` on `parent`.
@@ -99,8 +122,15 @@ impl AssetCache {
             stiffness: world.rigid_surface_stiffness(),
             bounds: self.bounds(shape),
             base_of: None,
-            solid: Some(of_shape(&self.solids, shape, || Arc::new(CollisionGeometry::new(shape)))),
+            solid: Some(of_shape(&self.solids, shape, || Arc::new(self.collision_geometry(shape)))),
         }
+    }
+
+    fn collision_geometry(&self, shape: &Shape) -> CollisionGeometry {
+        let (disk, own) = (self.disk.clone(), shape.clone());
+        CollisionGeometry::with_features(shape, move || {
+            stored(&disk, "features", &own, || SurfaceFeatures::of(&own))
+        })
     }
 
     /// Finite-element model of a soft object with this material. Instances of one asset share its discretisation.
@@ -118,7 +148,10 @@ impl AssetCache {
             let geometry = self.geometries.get(
                 nominal,
                 |known| known.shape == nominal.shape && has_discretisation(known, declared),
-                || SoftGeometry::new(&asset.name, &nominal.shape, declared, self.approximate).map(Arc::new),
+                || {
+                    SoftGeometry::stored(&asset.name, &nominal.shape, declared, self.approximate, &self.disk)
+                        .map(Arc::new)
+                },
             )?;
             Ok(geometry.model(material, object.scale))
         };

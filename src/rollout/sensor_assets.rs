@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::shared_cache::SharedCache;
+use softvt_common::disk_cache::DiskCache;
 use softvt_geometry::voxel::VoxelMesh;
 use softvt_robot::tactile::TactileSpec;
 use softvt_scene::{Asset, Camera};
@@ -72,9 +73,15 @@ pub struct SensorAssets {
     skins: SharedCache<Arc<Asset>, Arc<TactileSkin>>,
     sensors: SharedCache<TactileSpec, Arc<TactileSensor>>,
     robot: SharedCache<(), Arc<RobotMeshes>>,
+    disk: DiskCache,
 }
 
 impl SensorAssets {
+    /// Empty caches that keep what takes long in `disk`; by default in the cache of the process.
+    pub fn stored_in(disk: DiskCache) -> Self {
+        Self { disk, ..Self::default() }
+    }
+
     /// Render mesh of an asset; `mesh` is the voxel mesh of a soft body.
     pub(super) fn mesh(
         &self,
@@ -85,8 +92,10 @@ impl SensorAssets {
         let same = |known: &Arc<Asset>| have_same_surface(known, asset) && known.visuals == asset.visuals;
         self.meshes.get(asset, same, || {
             let model = match mesh {
-                None => RenderMesh::from_shape(name, &asset.shape, &asset.visuals)?,
-                Some(mesh) => RenderMesh::from_soft_shape(name, &asset.shape, &asset.visuals, mesh)?,
+                None => RenderMesh::from_shape(name, &asset.shape, &asset.visuals, &self.disk)?,
+                Some(mesh) => {
+                    RenderMesh::from_soft_shape(name, &asset.shape, &asset.visuals, mesh, &self.disk)?
+                }
             };
             Ok(Arc::new(model))
         })
@@ -104,8 +113,8 @@ impl SensorAssets {
             |known| have_same_surface(known, asset),
             || {
                 let skin = match mesh {
-                    None => TactileSkin::from_shape(&asset.shape),
-                    Some(mesh) => TactileSkin::from_soft(&asset.shape, mesh)
+                    None => TactileSkin::from_shape(&asset.shape, &self.disk),
+                    Some(mesh) => TactileSkin::from_soft(&asset.shape, mesh, &self.disk)
                         .ok_or_else(|| SensingError::Skin(name.to_owned()))?,
                 };
                 Ok(Arc::new(skin))
@@ -115,7 +124,7 @@ impl SensorAssets {
 
     /// Render meshes of the robot.
     pub(super) fn robot(&self) -> Result<Arc<RobotMeshes>, CameraError> {
-        self.robot.get(&(), |()| true, || Ok(Arc::new(RobotMeshes::new()?)))
+        self.robot.get(&(), |()| true, || Ok(Arc::new(RobotMeshes::new(&self.disk)?)))
     }
 
     /// Tactile sensor of a specification.

@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use super::build_error::SceneBuildError;
+use softvt_common::disk_cache::DiskCache;
 use softvt_common::text::format_number;
 use softvt_geometry::{
     mass::{approximate_mass_properties, mass_properties},
@@ -62,7 +65,7 @@ pub fn soft_model(
 }
 
 /// Discretised shape of a soft body: the part of its model that depends on neither elasticity nor density.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct SoftGeometry {
     mesh: VoxelMesh,
     samples: Vec<SurfaceSample>,
@@ -71,6 +74,18 @@ pub(super) struct SoftGeometry {
 }
 
 impl SoftGeometry {
+    /// As [`SoftGeometry::new`], kept in `disk`.
+    pub(super) fn stored(
+        name: &str,
+        shape: &Shape,
+        material: &SoftMaterial,
+        approximate: bool,
+        disk: &DiskCache,
+    ) -> Result<Self, SceneBuildError> {
+        let inputs = (shape, material.resolution, material.grasp_spacing, approximate);
+        disk.get("voxels", &inputs, || Self::new(name, shape, material, approximate))
+    }
+
     /// Meshes a shape. An `approximate` geometry has fewer contact samples and an approximate volume.
     pub(super) fn new(
         name: &str,

@@ -3,9 +3,10 @@
 use std::sync::OnceLock;
 
 use ab_glyph::{Font, FontRef, PxScale, ScaleFont, point};
+use serde::Serialize;
 
 /// Typeface of a text decal.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub enum Typeface {
     /// Ubuntu Light, without serifs.
     #[default]
@@ -15,7 +16,7 @@ pub enum Typeface {
 }
 
 /// A line of text with its place and style, in the object frame at rest.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct LabelLine {
     /// Text, at most [`MAX_LETTERS`] characters.
     pub text: String,
@@ -44,10 +45,11 @@ const CAPITAL: f32 = 44.0;
 const MARGIN: usize = 2;
 
 /// A line of text with its raster, which is computed at the first use.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize)]
 pub struct TextDecal {
     /// Text, place and style.
     pub line: LabelLine,
+    #[serde(skip)]
     coverage: OnceLock<GlyphCoverage>,
 }
 

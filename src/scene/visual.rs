@@ -2,13 +2,15 @@
 
 use std::sync::Arc;
 
+use serde::Serialize;
+
 use super::decal::TextDecal;
 use softvt_geometry::shape::Shape;
 
 /// Visual material of a surface (metalness–roughness model). Colours are linear RGB.
 ///
 /// The layers are blended over the base in order, like coats of paint.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Visual {
     /// Base colour, 0..=1.
     pub albedo: [f64; 3],
@@ -41,7 +43,7 @@ impl Visual {
 }
 
 /// A colour blended over the layers below, weighted by a mask.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct VisualLayer {
     /// Spatial weight of the layer.
     pub mask: Mask,
@@ -56,7 +58,7 @@ pub struct VisualLayer {
 }
 
 /// A weight in 0..=1 at every surface point of an object. Lengths are in metres, points in the object frame at rest.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Mask {
     /// 1 everywhere.
     Whole,

@@ -1,5 +1,6 @@
 //! Black-box tests of the binary: flags, exit codes, printed output, files, signals and processes.
 
+mod cache;
 mod check;
 mod conditions;
 mod crash_recovery;

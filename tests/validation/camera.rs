@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use softvt::{
+    disk_cache::DiskCache,
     geometry::{Pose, Quat, Vec3, shape::Shape},
     physics::BodyId,
     scene::{Camera, Lighting, Mask, Visual, VisualLayer},
@@ -13,7 +14,7 @@ use softvt::{
 const EDGE: usize = 224;
 
 fn object(id: u16, shape: &Shape, visual: Visual, pose: Pose) -> RenderObject {
-    let mesh = RenderMesh::from_shape("object", shape, &[visual]).expect("a surface");
+    let mesh = RenderMesh::from_shape("object", shape, &[visual], &DiskCache::DISABLED).expect("a surface");
     RenderObject {
         name: format!("object {id}"),
         segmentation_id: id,

@@ -3,6 +3,7 @@
 //! The doc comments of the structs and fields of arguments are the help text that `--help` prints.
 
 mod bench;
+mod cache;
 mod check;
 mod dataset;
 mod doctor;
@@ -39,6 +40,7 @@ pub(crate) enum Command {
     List(list::ListArgs),
     Init(init::InitArgs),
     Bench(bench::BenchArgs),
+    Cache(cache::CacheArgs),
     Doctor(Box<doctor::DoctorArgs>),
 }
 
@@ -58,6 +60,7 @@ impl Command {
             Self::List(args) => list::run(&args),
             Self::Init(args) => init::run(&args),
             Self::Bench(args) => bench::run(&args),
+            Self::Cache(args) => cache::run(&args),
             Self::Doctor(args) => doctor::run(&args),
         }
     }

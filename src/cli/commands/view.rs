@@ -72,14 +72,15 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     let worst = worst_state(&states);
     let moments = [("start", 0), ("worst", worst), ("end", last)];
     config.observer.work("drawing the stills");
-    let mut written = write_stills(&mut states, &moments, args.full_size, dir, cancel::requested)?;
+    let threads = config.thread_count();
+    let mut written = write_stills(&mut states, &moments, args.full_size, dir, threads, cancel::requested)?;
     let still = dir.join("episode.png");
     write_video_frame(&mut states, &caption, worst, &still)?;
     written.push(still);
     config.observer.end();
     let video = dir.join("episode.mp4");
     let progress = Progress::new(states.frames.len(), "rendering the video");
-    write_video(&mut states, &caption, &video, config.thread_count(), cancel::requested, || progress.step())?;
+    write_video(&mut states, &caption, &video, threads, cancel::requested, || progress.step())?;
     drop(progress);
     written.push(video);
     written.iter().try_for_each(|path| print(&format!("{}\n", path.display())))

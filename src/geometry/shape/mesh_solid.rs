@@ -33,10 +33,13 @@ impl std::fmt::Debug for MeshSolid {
     }
 }
 
-// A mesh is serialised as the hash of its surface: fingerprints of assets need no more.
+// Text holds the hash of the surface: fingerprints of assets need no more. A binary format holds all of it.
 impl Serialize for MeshSolid {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(&digest(&self.mesh))
+        if serializer.is_human_readable() {
+            return serializer.serialize_str(&digest(&self.mesh));
+        }
+        self.mesh.serialize(serializer)
     }
 }
 

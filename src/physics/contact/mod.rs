@@ -15,6 +15,6 @@ mod solid;
 pub use collider::{Collider, ContactSurface, Friction, SurfaceStiffness};
 pub use contact_history::{ContactHistory, ContactRecord};
 pub use detect::{BodyBounds, ColliderMotion, ContactCandidate, DetectionLimits, detect};
-pub use manifold::ManifoldPoint;
+pub use manifold::{ManifoldPoint, SurfaceFeatures};
 pub use soft_field::{DeformedSdf, SdfCandidate, SdfContact, detect_soft, may_touch};
 pub use solid::{CollisionGeometry, ContactPairId, GelSample};

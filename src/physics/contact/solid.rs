@@ -4,11 +4,9 @@
 //! features are tested in the other's distance field. A compliant skin (the gel of a tactile sensor) meets rigid
 //! shapes at its samples.
 
-use std::sync::OnceLock;
+use std::sync::{LazyLock, OnceLock};
 
-use super::manifold::{
-    ManifoldPoint, SurfaceFeatures, field::SurfaceInSdf, manifold, primitives, surface_features,
-};
+use super::manifold::{ManifoldPoint, SurfaceFeatures, field::SurfaceInSdf, manifold, primitives};
 use softvt_geometry::{
     Aabb, Pose, Vec3,
     convex::{Placed, Primitive},
@@ -30,7 +28,7 @@ pub struct RigidShape {
     shape: Shape,
     primitives: Option<Vec<Placed<Primitive>>>,
     /// Computed on first use: it takes milliseconds, and most colliders never meet a general shape.
-    features: OnceLock<SurfaceFeatures>,
+    features: LazyLock<SurfaceFeatures, Box<dyn FnOnce() -> SurfaceFeatures + Send>>,
     /// Computed on first use, since the bounds of a displaced shape take a search.
     bounds: OnceLock<Aabb>,
 }
@@ -56,10 +54,16 @@ const MAX_FACING_COSINE: f64 = 0.3;
 impl CollisionGeometry {
     /// The geometry of a rigid shape.
     pub fn new(shape: &Shape) -> Self {
+        let own = shape.clone();
+        Self::with_features(shape, move || SurfaceFeatures::of(&own))
+    }
+
+    /// The geometry of a rigid shape whose `features`, those of [`SurfaceFeatures::of`], are computed on first use.
+    pub fn with_features(shape: &Shape, features: impl FnOnce() -> SurfaceFeatures + Send + 'static) -> Self {
         Self::Rigid(Box::new(RigidShape {
             shape: shape.clone(),
             primitives: primitives(shape),
-            features: OnceLock::new(),
+            features: LazyLock::new(Box::new(features)),
             bounds: OnceLock::new(),
         }))
     }
@@ -118,7 +122,7 @@ impl RigidShape {
     }
 
     fn features(&self) -> &SurfaceFeatures {
-        self.features.get_or_init(|| surface_features(&self.shape))
+        &self.features
     }
 
     fn find_contacts(

@@ -117,16 +117,9 @@ pub fn write_video(
     if is_cancelled() {
         return Err(EpisodeVideoError::Interrupted);
     }
-    // Its meshes are shared by the threads.
-    recording.sensors.render_scene()?;
-    let (recording, idle) = (&*recording, Mutex::new(Vec::new()));
-    let draw = |index: usize| {
-        let taken = lock(&idle).pop();
-        let mut sensors = taken.unwrap_or_else(|| recording.sensors.clone());
-        let frame = video_frame(&mut sensors, recording, caption, index);
-        lock(&idle).push(sensors);
-        frame
-    };
+    let shared = SharedSensors::new(&mut recording.sensors)?;
+    let recording = &*recording;
+    let draw = |index: usize| shared.lend(|sensors| video_frame(sensors, recording, caption, index));
     let (mut video, mut drawn) = (VideoWriter::new(WIDTH as usize, HEIGHT as usize, CONTROL_HZ)?, 0);
     parallel::run_in_order(recording.frames.len(), threads, &is_cancelled, draw, |_, frame| {
         video.push(&frame)?;
@@ -136,6 +129,29 @@ pub fn write_video(
     })?;
     // A request to stop ends the frames early.
     if drawn < recording.frames.len() { Err(EpisodeVideoError::Interrupted) } else { Ok(video.save(path)?) }
+}
+
+/// Sensors of several threads, which share their meshes and have their own working memory.
+struct SharedSensors {
+    original: Sensors,
+    idle: Mutex<Vec<Sensors>>,
+}
+
+impl SharedSensors {
+    fn new(sensors: &mut Sensors) -> Result<Self, SensingError> {
+        // The copies share the meshes from here on.
+        sensors.render_scene()?;
+        Ok(Self { original: sensors.clone(), idle: Mutex::default() })
+    }
+
+    /// Lends sensors that no other thread uses to `work`.
+    fn lend<T>(&self, work: impl FnOnce(&mut Sensors) -> T) -> T {
+        let taken = lock(&self.idle).pop();
+        let mut sensors = taken.unwrap_or_else(|| self.original.clone());
+        let result = work(&mut sensors);
+        lock(&self.idle).push(sensors);
+        result
+    }
 }
 
 /// Writes one frame of the video as a PNG file.
@@ -266,8 +282,8 @@ fn full_size(camera: &Camera) -> usize {
 ///
 /// Cameras also get depth (16 bits, units of 0.1 mm along the optical axis, 65535 beyond the
 /// range and in the background) and segmentation (16 bits: objects from 1 in the order of the
-/// scene, [`softvt_rollout::ROBOT_SEGMENTATION_ID`], 0 in the background). Files are written
-/// atomically. Returns their paths.
+/// scene, [`softvt_rollout::ROBOT_SEGMENTATION_ID`], 0 in the background). They are drawn on up to `threads` threads. Files are
+/// written atomically. Returns their paths.
 ///
 /// # Errors
 /// A state cannot be rendered, a file cannot be written, or `is_cancelled` became true between two files.
@@ -276,34 +292,58 @@ pub fn write_stills(
     states: &[(&str, usize)],
     is_full_size: bool,
     dir: &Path,
-    is_cancelled: impl Fn() -> bool,
+    threads: usize,
+    is_cancelled: impl Fn() -> bool + Sync,
 ) -> Result<Vec<PathBuf>, EpisodeVideoError> {
-    let mut written = Vec::new();
-    for &(state, index) in states {
+    let shared = SharedSensors::new(&mut recording.sensors)?;
+    let (recording, cameras) = (&*recording, shared.original.cameras().to_vec());
+    // In each state the images of every camera, then those of the fingers.
+    let per_state = cameras.len() + 1;
+    let draw = |job: usize| {
+        let (state, index) = states[job / per_state];
         let frame = recording.frames.get(index).ok_or(EpisodeVideoError::Empty)?;
-        let mut write = |source: &str, suffix: &str, bytes: Vec<u8>| {
+        let named = |source: &str, suffix: &str| dir.join(format!("{state}_{source}{suffix}.png"));
+        let mut drawn = Vec::new();
+        match cameras.get(job % per_state) {
+            Some(camera) => {
+                let edge = full_size(camera);
+                let seen = if is_full_size { camera.clone().with_edge(edge) } else { camera.clone() };
+                let image = shared.lend(|sensors| sensors.render(frame, &seen))?;
+                for (suffix, png) in CAMERA_IMAGE_SUFFIXES.into_iter().zip(encode_camera_image(image)?) {
+                    drawn.push(Still { path: named(&camera.name, suffix), png });
+                }
+            }
+            None => {
+                let readings = shared.lend(|sensors| sensors.tactile_readings(frame))?;
+                for (name, reading) in TACTILE_IMAGES.into_iter().zip(&readings) {
+                    for (suffix, image) in TACTILE_IMAGE_SUFFIXES.into_iter().zip(tactile_images(reading)) {
+                        drawn.push(Still { path: named(name, suffix), png: encode_png(&image)? });
+                    }
+                }
+            }
+        }
+        Ok(drawn)
+    };
+    let (mut written, mut done, jobs) = (Vec::new(), 0, states.len() * per_state);
+    parallel::run_in_order(jobs, threads, &is_cancelled, draw, |_, stills: Vec<Still>| {
+        for Still { path, png } in stills {
             if is_cancelled() {
                 return Err(EpisodeVideoError::Interrupted);
             }
-            let path = dir.join(format!("{state}_{source}{suffix}.png"));
-            replace(&path, bytes)?;
+            replace(&path, png)?;
             written.push(path);
-            Ok(())
-        };
-        for camera in recording.sensors.cameras().to_vec() {
-            let camera = if is_full_size { camera.clone().with_edge(full_size(&camera)) } else { camera };
-            let image = recording.sensors.render(frame, &camera)?;
-            for (suffix, bytes) in CAMERA_IMAGE_SUFFIXES.into_iter().zip(encode_camera_image(image)?) {
-                write(&camera.name, suffix, bytes)?;
-            }
         }
-        for (name, reading) in TACTILE_IMAGES.into_iter().zip(&recording.sensors.tactile_readings(frame)?) {
-            for (suffix, image) in TACTILE_IMAGE_SUFFIXES.into_iter().zip(tactile_images(reading)) {
-                write(name, suffix, encode_png(&image)?)?;
-            }
-        }
-    }
-    Ok(written)
+        done += 1;
+        Ok(())
+    })?;
+    // A request to stop ends the jobs early.
+    if done < jobs { Err(EpisodeVideoError::Interrupted) } else { Ok(written) }
+}
+
+/// An encoded image and its place.
+struct Still {
+    path: PathBuf,
+    png: Vec<u8>,
 }
 
 /// Encodes colour, depth and segmentation, in the order of [`CAMERA_IMAGE_SUFFIXES`].

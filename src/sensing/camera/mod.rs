@@ -23,13 +23,15 @@
 //!
 //! ```
 //! use std::sync::Arc;
+//! use softvt_common::disk_cache::DiskCache;
 //! use softvt_geometry::{Pose, Vec3, shape::Shape};
 //! use softvt_physics::BodyId;
 //! use softvt_scene::{Camera, Lighting, Visual};
 //! use softvt_sensing::camera::{FrameView, RenderMesh, RenderObject, RenderScene, Renderer};
 //!
 //! let object = |name: &str, id: u16, half: Vec3, colour: [f64; 3], z: f64| {
-//!     let mesh = RenderMesh::from_shape(name, &Shape::Box { half }, &[Visual::plain(colour, 0.6, 0.0)])?;
+//!     let (shape, visual) = (Shape::Box { half }, Visual::plain(colour, 0.6, 0.0));
+//!     let mesh = RenderMesh::from_shape(name, &shape, &[visual], &DiskCache::DISABLED)?;
 //!     Ok::<_, softvt_sensing::camera::CameraError>(RenderObject {
 //!         name: name.to_owned(),
 //!         segmentation_id: id,
@@ -69,7 +71,7 @@ mod tests;
 pub use self::image::{RenderedImage, encode_png, resize};
 pub use error::CameraError;
 pub use lens::check_cameras;
-pub(crate) use mesh::render_mesh::RenderSolid;
+pub(crate) use mesh::{lod::Lod, render_mesh::RenderSolid};
 pub use mesh::{
     primitive::{box_mesh, flat_faces},
     render_mesh::RenderMesh,

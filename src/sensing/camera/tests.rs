@@ -7,6 +7,7 @@ use super::{
     shade::shadow::ShadowMap,
     *,
 };
+use softvt_common::disk_cache::DiskCache;
 use softvt_geometry::{Pose, Quat, Vec3, mesh::Mesh, shape::Shape};
 use softvt_physics::{BodyId, RigidId};
 use softvt_scene::{Camera, CameraMount, Lighting, Mask, Visual, VisualLayer};
@@ -28,7 +29,8 @@ fn object(id: u16, mesh: RenderMesh, body: BodyId, pose_in_body: Pose) -> Render
 
 fn ball(id: u16, radius: f64, pose_w: Pose) -> RenderObject {
     let mesh =
-        RenderMesh::from_shape("ball", &Shape::Sphere { radius }, &[Visual::default()]).expect("a ball");
+        RenderMesh::from_shape("ball", &Shape::Sphere { radius }, &[Visual::default()], &DiskCache::DISABLED)
+            .expect("a ball");
     object(id, mesh, BodyId::World, pose_w)
 }
 
@@ -46,7 +48,8 @@ fn checker(size_m: f64) -> Visual {
 /// A floor whose top is at z = 0.
 fn ground(visual: Visual) -> RenderObject {
     let half = Vec3::new(1.0, 1.0, 0.1);
-    let mesh = RenderMesh::from_shape("ground", &Shape::Box { half }, &[visual]).expect("a box");
+    let mesh = RenderMesh::from_shape("ground", &Shape::Box { half }, &[visual], &DiskCache::DISABLED)
+        .expect("a box");
     let mut ground = object(1, mesh, BodyId::World, Pose::translation(0.0, 0.0, -0.1));
     ground.casts_shadow = false;
     ground
@@ -80,7 +83,9 @@ fn a_straight_outline_is_straight_in_the_segmentation() {
     for shift in [0.0, 0.3, 0.5, 0.8] {
         let camera = above(1.0);
         let half = Vec3::new(0.1, 0.1, 0.01);
-        let mesh = RenderMesh::from_shape("box", &Shape::Box { half }, &[Visual::default()]).expect("a box");
+        let mesh =
+            RenderMesh::from_shape("box", &Shape::Box { half }, &[Visual::default()], &DiskCache::DISABLED)
+                .expect("a box");
         let x = shift / focal(&camera);
         let scene = scene(vec![
             ground(Visual::default()),
@@ -96,7 +101,8 @@ fn a_straight_outline_is_straight_in_the_segmentation() {
 /// A scene with a floor, a ball and a cube, and its camera.
 fn still_life() -> (Vec<RenderObject>, Camera) {
     let cube =
-        RenderMesh::from_mesh("cube", &box_mesh(&Vec3::repeat(0.05)), &[checker(0.02)]).expect("a cube");
+        RenderMesh::from_mesh("cube", &box_mesh(&Vec3::repeat(0.05)), &[checker(0.02)], &DiskCache::DISABLED)
+            .expect("a cube");
     let objects = vec![
         ground(checker(0.13)),
         ball(2, 0.06, Pose::translation(0.15, 0.05, 0.06)),
@@ -228,7 +234,9 @@ fn smooth_surfaces_do_not_shade_themselves_where_they_face_the_light() {
     let solid = |shape: Shape| {
         RenderMesh::from_solids("solid", &[RenderSolid::new(shape, 3e-3, 0)], &visuals).expect("a solid")
     };
-    let shape = |shape: &Shape| RenderMesh::from_shape("shape", shape, &visuals).expect("a shape");
+    let shape = |shape: &Shape| {
+        RenderMesh::from_shape("shape", shape, &visuals, &DiskCache::DISABLED).expect("a shape")
+    };
     let tube = Shape::Cylinder { radius: 0.06, half_height: 0.15 };
     let ball = Shape::Sphere { radius: 0.1 };
     let slab = Shape::Box { half: Vec3::new(0.2, 0.2, 0.02) };
@@ -302,7 +310,9 @@ fn fixed_objects_cast_shadows_outside_the_fine_shadow_map() {
     let mut lighting = Lighting { shadow_centre_w: Vec3::zeros(), ..Lighting::default() };
     (lighting.key.direction_w, lighting.key.softness_rad) = (Vec3::new(1.0, 0.0, 1.0), 0.01);
     let slab = |half: Vec3, at: Vec3| {
-        let mesh = RenderMesh::from_shape("slab", &Shape::Box { half }, &[Visual::default()]).expect("a box");
+        let mesh =
+            RenderMesh::from_shape("slab", &Shape::Box { half }, &[Visual::default()], &DiskCache::DISABLED)
+                .expect("a box");
         object(1, mesh, BodyId::World, Pose::from_parts(at.into(), Quat::identity()))
     };
     let floor = slab(Vec3::new(6.0, 3.0, 0.05), Vec3::new(0.0, 0.0, -0.05));
@@ -394,10 +404,12 @@ fn cameras_are_validated_one_by_one_and_together() {
 #[test]
 fn invalid_meshes_states_and_lights_are_rejected() {
     let visuals = [Visual::default()];
-    let empty = RenderMesh::from_mesh("egg", &Mesh::default(), &visuals).expect_err("empty");
+    let empty =
+        RenderMesh::from_mesh("egg", &Mesh::default(), &visuals, &DiskCache::DISABLED).expect_err("empty");
     assert!(empty.to_string().starts_with("egg cannot be drawn: the mesh is empty"), "{empty}");
     let painted = Shape::Sphere { radius: 0.1 }.painted(3, None);
-    let unknown = RenderMesh::from_shape("egg", &painted, &visuals).expect_err("no such visual");
+    let unknown =
+        RenderMesh::from_shape("egg", &painted, &visuals, &DiskCache::DISABLED).expect_err("no such visual");
     assert!(unknown.to_string().contains("material 3 has no visual; there are 1"), "{unknown}");
     let lost = scene(vec![RenderObject { body: rigid(4), ..ball(1, 0.1, Pose::identity()) }]);
     let error = Renderer::default().render(&lost, &FrameView::default(), &above(1.0)).expect_err("lost");

@@ -12,7 +12,10 @@ mod tests;
 
 use std::sync::Arc;
 
-use super::camera::{CameraError, RenderMesh, RenderObject, RenderSolid};
+use serde::{Deserialize, Serialize};
+
+use super::camera::{CameraError, Lod, RenderMesh, RenderObject, RenderSolid};
+use softvt_common::disk_cache::DiskCache;
 use softvt_geometry::Pose;
 use softvt_physics::{ArticulationId, BodyId, LinkId};
 use softvt_robot::{Side, panda};
@@ -64,16 +67,44 @@ pub struct RobotMeshes {
 struct PartMesh {
     /// Index of the link in the articulation; `None` for the base.
     link: Option<usize>,
-    name: &'static str,
+    name: String,
     mesh: Arc<RenderMesh>,
 }
 
+/// A part as it is stored: its surface has no textures.
+#[derive(Serialize, Deserialize)]
+struct PartLevels {
+    link: Option<usize>,
+    name: String,
+    levels: Vec<Lod>,
+}
+
 impl RobotMeshes {
-    /// Builds the meshes of all parts.
+    /// Builds the meshes of all parts, or takes them from `cache`.
     ///
     /// # Errors
     /// A part has no surface. This is a bug in this module.
-    pub fn new() -> Result<Self, CameraError> {
+    pub fn new(cache: &DiskCache) -> Result<Self, CameraError> {
+        // They follow from the code alone.
+        let levels = cache.get("robot", &(), || Self::build()?.levels())?;
+        let part = |part: PartLevels| PartMesh {
+            link: part.link,
+            name: part.name,
+            mesh: Arc::new(RenderMesh::from_levels(part.levels)),
+        };
+        Ok(Self { parts: levels.into_iter().map(part).collect() })
+    }
+
+    /// The levels of detail of all parts.
+    fn levels(self) -> Result<Vec<PartLevels>, CameraError> {
+        let levels = |PartMesh { link, name, mesh }| {
+            let levels = (0..mesh.level_count()).map(|index| mesh.level(index).cloned());
+            Ok(PartLevels { link, name, levels: levels.collect::<Result<_, _>>()? })
+        };
+        self.parts.into_iter().map(levels).collect()
+    }
+
+    fn build() -> Result<Self, CameraError> {
         let visuals = visuals();
         let mut parts = vec![arm::base()];
         parts.extend(arm::links());
@@ -82,11 +113,12 @@ impl RobotMeshes {
         let mut meshes = Vec::new();
         for RobotPart { link, name, solids } in parts {
             let mesh = RenderMesh::from_solids(name, &solids, &visuals)?;
-            meshes.push(PartMesh { link, name, mesh: Arc::new(mesh) });
+            meshes.push(PartMesh { link, name: name.to_owned(), mesh: Arc::new(mesh) });
         }
         for (side, name) in Side::BOTH.into_iter().zip(["left gel", "right gel"]) {
-            let mesh = RenderMesh::from_mesh(name, &hand::gel(side), &visuals[SENSOR_GEL..])?;
-            meshes.push(PartMesh { link: Some(panda::finger_link(side)), name, mesh: Arc::new(mesh) });
+            let (link, visual) = (Some(panda::finger_link(side)), &visuals[SENSOR_GEL..]);
+            let mesh = RenderMesh::from_mesh(name, &hand::gel(side), visual, &DiskCache::DISABLED)?;
+            meshes.push(PartMesh { link, name: name.to_owned(), mesh: Arc::new(mesh) });
         }
         Ok(Self { parts: meshes })
     }

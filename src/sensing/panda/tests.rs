@@ -4,6 +4,7 @@ use std::sync::OnceLock;
 
 use super::*;
 use crate::camera::{FrameView, RenderScene, Renderer};
+use softvt_common::disk_cache::DiskCache;
 use softvt_geometry::Vec3;
 use softvt_physics::joints::forward;
 use softvt_robot::{GripperSpec, pads, panda};
@@ -11,7 +12,7 @@ use softvt_scene::{Camera, Lighting};
 
 fn meshes() -> &'static RobotMeshes {
     static MESHES: OnceLock<RobotMeshes> = OnceLock::new();
-    MESHES.get_or_init(|| RobotMeshes::new().expect("every part has a surface"))
+    MESHES.get_or_init(|| RobotMeshes::new(&DiskCache::DISABLED).expect("every part has a surface"))
 }
 
 /// Joint positions, none of them zero: joints 1 to 7, then the fingers half open.

@@ -1,9 +1,10 @@
 //! Surfaces of bodies as they press on a gel: finer than the collision geometry, created once per asset and placed
 //! over the pad at every frame.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, convert::Infallible};
 
 use crate::camera;
+use softvt_common::disk_cache::DiskCache;
 use softvt_geometry::{Mat3, Pose, Vec3, shape::Shape, surface_mesh::SurfaceMesh, voxel::VoxelMesh};
 
 /// Edge of the cells from which a skin is extracted, m: fine enough for seeds and ridges of a millimetre, with the
@@ -63,24 +64,26 @@ struct EmbeddedVertex {
 }
 
 impl TactileSkin {
-    /// Skin of a rigid shape. Flat faces keep their few triangles.
-    pub fn from_shape(shape: &Shape) -> Self {
+    /// Skin of a rigid shape. Flat faces keep their few triangles. Other surfaces are kept in `cache`.
+    pub fn from_shape(shape: &Shape, cache: &DiskCache) -> Self {
         match camera::flat_faces(shape) {
             Some(mesh) => Self { vertices: mesh.vertices, triangles: mesh.triangles, embedding: None },
-            None => Self::sampled(shape),
+            None => Self::sampled(shape, cache),
         }
     }
 
     /// Skin of a soft body with the voxel mesh `mesh`, with small triangles on flat faces too. `None` if part of the
     /// shape lies more than two voxels outside the mesh.
-    pub fn from_soft(shape: &Shape, mesh: &VoxelMesh) -> Option<Self> {
-        let mut skin = Self::sampled(shape);
+    pub fn from_soft(shape: &Shape, mesh: &VoxelMesh, cache: &DiskCache) -> Option<Self> {
+        let mut skin = Self::sampled(shape, cache);
         skin.embedding = Some(SplineEmbedding::new(&skin.vertices, mesh)?);
         Some(skin)
     }
 
-    fn sampled(shape: &Shape) -> Self {
-        let mesh = SurfaceMesh::from_shape(shape, CELL.max(shape.bounds().size().max() / MAX_CELLS)).mesh;
+    fn sampled(shape: &Shape, cache: &DiskCache) -> Self {
+        let cell = || CELL.max(shape.bounds().size().max() / MAX_CELLS);
+        let sample = || Ok::<_, Infallible>(SurfaceMesh::from_shape(shape, cell()).mesh);
+        let Ok(mesh) = cache.get("skin", shape, sample);
         Self { vertices: mesh.vertices, triangles: mesh.triangles, embedding: None }
     }
 
@@ -210,7 +213,7 @@ mod tests {
     fn ball() -> (TactileSkin, VoxelMesh) {
         let shape = Shape::Sphere { radius: 0.02 };
         let mesh = voxel_mesh(&shape, &VoxelSpec { resolution: 6 }).expect("a ball");
-        (TactileSkin::from_soft(&shape, &mesh).expect("inside"), mesh)
+        (TactileSkin::from_soft(&shape, &mesh, &DiskCache::DISABLED).expect("inside"), mesh)
     }
 
     #[test]

@@ -4,6 +4,7 @@
 use std::collections::HashMap;
 
 use nalgebra::SymmetricEigen;
+use serde::{Deserialize, Serialize};
 
 use super::{
     POINT_AREA, Placed, Primitive,
@@ -33,7 +34,7 @@ const SHARP_TURN: f64 = 0.35;
 pub(super) const SAMPLE_AREA: f64 = 0.25 * POINT_AREA;
 
 /// A convex circle of the surface, about the z axis of `frame_o` in its plane z = 0.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(in super::super) struct Rim {
     /// Frame of the circle in the object frame.
     pub frame_o: Pose,
@@ -44,32 +45,34 @@ pub(in super::super) struct Rim {
 }
 
 /// Features of a surface that are tested for contact, object frame, m.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(in super::super) struct SurfaceFeatures {
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SurfaceFeatures {
     /// Points on sharp convex corners and edges.
-    pub corners: Vec<Vec3>,
+    pub(in super::super) corners: Vec<Vec3>,
     /// Circular edges of convex solids.
-    pub rims: Vec<Rim>,
+    pub(in super::super) rims: Vec<Rim>,
     /// Samples of flat and nearly flat regions, and of finely rounded edges.
-    pub flat_samples: Vec<FlatSample>,
+    pub(in super::super) flat_samples: Vec<FlatSample>,
     /// Points spread over the whole surface, at which the search for the lowest point of a smooth part starts.
-    pub seeds: Vec<Vec3>,
+    pub(in super::super) seeds: Vec<Vec3>,
     /// Distance between neighbouring seeds, m.
-    pub spacing: f64,
+    pub(in super::super) spacing: f64,
 }
 
-/// Extracts the features of a shape. Those of boxes, cylinders and lathes are known exactly; the sharp edges and flat
-/// regions of other shapes are found on a grid of 1/24 of the longest side.
-pub(in super::super) fn surface_features(shape: &Shape) -> SurfaceFeatures {
-    let mut features = SurfaceFeatures::default();
-    add_features(shape, &Pose::identity(), &mut features);
-    let size = shape.bounds().size().max();
-    features.spacing = size / SEED_CELLS;
-    features.seeds = FeatureGrid::over(shape, features.spacing)
-        .crossed()
-        .map(|cell| project_to_surface(shape, cell.mean()))
-        .collect();
-    features
+impl SurfaceFeatures {
+    /// Extracts the features of a shape. Those of boxes, cylinders and lathes are known exactly; the sharp edges and flat
+    /// regions of other shapes are found on a grid of 1/24 of the longest side.
+    pub fn of(shape: &Shape) -> Self {
+        let mut features = Self::default();
+        add_features(shape, &Pose::identity(), &mut features);
+        let size = shape.bounds().size().max();
+        features.spacing = size / SEED_CELLS;
+        features.seeds = FeatureGrid::over(shape, features.spacing)
+            .crossed()
+            .map(|cell| project_to_surface(shape, cell.mean()))
+            .collect();
+        features
+    }
 }
 
 /// The convex primitives that a shape is composed of, with their frames in the object frame. `None` if

@@ -105,14 +105,14 @@ mod tests {
     use std::f64::consts::FRAC_PI_2;
 
     use super::{
-        super::{Primitive, primitives, surface_features, tests::is_non_material},
+        super::{Primitive, primitives, tests::is_non_material},
         *,
     };
     use softvt_geometry::{Quat, Vec3};
 
     fn touch(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64) -> Vec<ManifoldPoint> {
         let mut out = Vec::new();
-        let (features, bounds) = (surface_features(a), b.bounds());
+        let (features, bounds) = (SurfaceFeatures::of(a), b.bounds());
         let surface = SurfaceInSdf::new(&features, a, pose_a, b, &bounds, pose_b);
         surface.fixed(margin, &mut out);
         surface.lowest(margin, &mut out);
@@ -225,7 +225,7 @@ mod tests {
         let block = Shape::cuboid(Vec3::new(0.06, 0.04, 0.03)).subtract(notch);
         let turned = block.rotated(Quat::from_scaled_axis(Vec3::new(0.2, 0.3, 0.1)));
         let Shape::Placed { shape, pose } = &turned else { panic!("a placed shape") };
-        let samples = surface_features(&turned).corners;
+        let samples = SurfaceFeatures::of(&turned).corners;
         let own: Vec<Vec3> =
             samples.iter().map(|p| pose.inverse_transform_point(&(*p).into()).coords).collect();
         let (distance_to_faces, step) = (

@@ -4,6 +4,8 @@
 //! carries at its outline, where it passes into a rounding. A nearly flat region has a moving lowest point, which
 //! counts less the flatter the region is (see [`super::field`]); samples spread over it count for the rest.
 
+use serde::{Deserialize, Serialize};
+
 use super::POINT_AREA;
 use softvt_geometry::{Vec3, orthonormal_basis, shape::Shape};
 
@@ -29,7 +31,7 @@ const CURVATURE_DISTANCE: f64 = 0.1;
 const SAMPLE_DISTANCE: f64 = 3.0;
 
 /// A contact sample of a flat or nearly flat region.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(in super::super) struct FlatSample {
     /// Position on the surface, m.
     pub p: Vec3,

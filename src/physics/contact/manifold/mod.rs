@@ -32,7 +32,8 @@ mod test_rig;
 #[cfg(test)]
 mod tests;
 
-pub(super) use feature_extraction::{SurfaceFeatures, primitives, surface_features};
+pub use feature_extraction::SurfaceFeatures;
+pub(super) use feature_extraction::primitives;
 
 /// One point where two bodies touch or nearly touch.
 #[derive(Clone, Copy, Debug, PartialEq)]

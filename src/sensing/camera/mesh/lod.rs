@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+
 use super::texture::TextureChart;
 use crate::camera::{
     math::{LANES, V3},
@@ -26,14 +28,14 @@ const MAX_ERROR_PIXELS: f32 = 0.25;
 const OCCLUSION_REACH: f64 = 0.12;
 
 /// A vertex as a weighted sum of the nodes of a soft body.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(crate) struct NodeWeights {
     pub(crate) nodes: [u32; 8],
     pub(crate) weights: [f32; 8],
 }
 
 /// One level of detail of a [`RenderMesh`](super::render_mesh::RenderMesh), in the object frame at rest.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Lod {
     /// Vertex positions, m. Vertices are duplicated at creases, so that each has one normal.
     pub(crate) positions: Vec<V3>,
@@ -41,10 +43,14 @@ pub(crate) struct Lod {
     /// Material of each vertex.
     pub(crate) materials: Vec<MaterialSample>,
     pub(crate) triangles: Vec<[u32; 3]>,
+    /// Not stored, like the two fields below: [`parameterize`](super::texture::parameterize) makes them fast.
+    #[serde(skip)]
     pub(crate) charts: Vec<TextureChart>,
     /// Index in `charts` of each triangle's chart; empty if the level is not textured.
+    #[serde(skip)]
     pub(crate) chart_ids: Vec<u32>,
     /// Texture coordinates of each triangle's corners in its chart, texels.
+    #[serde(skip)]
     pub(crate) uvs: Vec<[[f32; 2]; 3]>,
     /// Smoothing group of each triangle: triangles of one group share vertices, groups meet at creases.
     pub(crate) smoothing_groups: Vec<u32>,

@@ -9,9 +9,13 @@ use super::{
     lod::{Lod, NodeWeights, bake_vertices, extent},
     primitive::{append_visible, flat_faces, primitive_mesh, transform},
     simplify::simplify,
-    texture::{SurfaceMaterial, flat_charts, parameterize, suits_flat_charts},
+    texture::{
+        SurfaceMaterial, flat_charts, painted_count, painted_tiles, parameterize, restore_tiles,
+        suits_flat_charts,
+    },
 };
 use crate::camera::{error::CameraError, math::V3, raster::TRIANGLE_BITS, shade::pattern};
+use softvt_common::disk_cache::{CacheKey, DiskCache};
 use softvt_geometry::{
     Pose, Vec3,
     mesh::Mesh,
@@ -59,23 +63,72 @@ pub struct RenderMesh {
 }
 
 /// A level of detail that is built on first use: finer ones take longer and are seen from nearby only.
-type LazyLevel =
-    LazyLock<Result<Lod, CameraError>, Box<dyn FnOnce() -> Result<Lod, CameraError> + Send + Sync>>;
+type LazyLevel = LazyLock<
+    Result<KeptLevel, CameraError>,
+    Box<dyn FnOnce() -> Result<KeptLevel, CameraError> + Send + Sync>,
+>;
 
-fn lazy_level(build: impl FnOnce() -> Result<Lod, CameraError> + Send + Sync + 'static) -> Arc<LazyLevel> {
+fn lazy_level(
+    build: impl FnOnce() -> Result<KeptLevel, CameraError> + Send + Sync + 'static,
+) -> Arc<LazyLevel> {
     Arc::new(LazyLock::new(Box::new(build)))
 }
 
+/// A level of detail whose painted tiles are stored when it is dropped: only then it is known which of them are seen.
+#[derive(Debug)]
+struct KeptLevel {
+    lod: Lod,
+    store: Option<TileStore>,
+}
+
+/// Where the painted tiles of a level are stored.
+#[derive(Debug)]
+struct TileStore {
+    cache: DiskCache,
+    key: CacheKey,
+    /// Number of tiles that are stored.
+    count: usize,
+}
+
+impl KeptLevel {
+    /// A level with the tiles that are stored under `key`, if it is textured.
+    fn new(lod: Lod, cache: &DiskCache, key: Option<&CacheKey>) -> Self {
+        let key = key.filter(|_| !lod.charts.is_empty()).and_then(|key| cache.key("tiles", key));
+        let store = key.map(|key| {
+            let tiles = cache.read(&key).unwrap_or_default();
+            restore_tiles(&lod.charts, tiles);
+            TileStore { cache: cache.clone(), key, count: painted_count(&lod.charts) }
+        });
+        Self { lod, store }
+    }
+}
+
+impl Drop for KeptLevel {
+    fn drop(&mut self) {
+        if let Some(TileStore { cache, key, count }) = &self.store
+            && painted_count(&self.lod.charts) > *count
+        {
+            cache.write(key, &painted_tiles(&self.lod.charts));
+        }
+    }
+}
+
 impl RenderMesh {
-    /// Builds the mesh of a rigid shape. `visuals` are indexed by its material ids; `name` appears in errors.
+    /// Builds the mesh of a rigid shape. `visuals` are indexed by its material ids; `name` appears in errors. What takes long
+    /// is kept in `cache`.
     ///
     /// # Errors
     /// The shape has no surface, or a material id has no visual.
-    pub fn from_shape(name: &str, shape: &Shape, visuals: &[Visual]) -> Result<Self, CameraError> {
+    pub fn from_shape(
+        name: &str,
+        shape: &Shape,
+        visuals: &[Visual],
+        cache: &DiskCache,
+    ) -> Result<Self, CameraError> {
         if let Some(mesh) = flat_faces(shape) {
-            return Self::from_mesh(name, &mesh, visuals);
+            return Self::from_mesh(name, &mesh, visuals, cache);
         }
-        Self::with_lazy_levels(ShapeSurface::new(name, shape, visuals, None))
+        Self::with_lazy_levels(ShapeSurface::new(name, shape, visuals, None, cache))
     }
 
     /// Builds the mesh of the shape of a soft body, attached to the nodes of `voxels`, with small triangles on flat faces
@@ -88,8 +141,9 @@ impl RenderMesh {
         shape: &Shape,
         visuals: &[Visual],
         voxels: &VoxelMesh,
+        cache: &DiskCache,
     ) -> Result<Self, CameraError> {
-        Self::with_lazy_levels(ShapeSurface::new(name, shape, visuals, Some(voxels.clone())))
+        Self::with_lazy_levels(ShapeSurface::new(name, shape, visuals, Some(voxels.clone()), cache))
     }
 
     /// Builds the level that casts shadows, which every image needs, and leaves finer ones for later.
@@ -106,9 +160,14 @@ impl RenderMesh {
         Ok(mesh)
     }
 
-    fn from_levels(levels: impl IntoIterator<Item = Lod>) -> Self {
-        let levels = levels.into_iter().map(|lod| {
-            let level = lazy_level(move || Ok(lod));
+    /// The mesh with these levels, from fine to coarse.
+    pub(crate) fn from_levels(levels: impl IntoIterator<Item = Lod>) -> Self {
+        Self::from_kept(levels.into_iter().map(|lod| KeptLevel { lod, store: None }))
+    }
+
+    fn from_kept(levels: impl IntoIterator<Item = KeptLevel>) -> Self {
+        let levels = levels.into_iter().map(|kept| {
+            let level = lazy_level(move || Ok(kept));
             LazyLock::force(&level);
             level
         });
@@ -122,7 +181,7 @@ impl RenderMesh {
 
     /// A level of detail; 0 is the finest.
     pub(crate) fn level(&self, index: usize) -> Result<&Lod, CameraError> {
-        self.levels[index].as_ref().as_ref().map_err(Clone::clone)
+        self.levels[index].as_ref().as_ref().map(|level| &level.lod).map_err(Clone::clone)
     }
 
     /// Index of the level that casts shadows and stands for the object where its extent matters only.
@@ -146,8 +205,14 @@ impl RenderMesh {
     ///
     /// # Errors
     /// The mesh is empty, not finite, or refers to a vertex that does not exist; or there are no visuals.
-    pub fn from_mesh(name: &str, mesh: &Mesh, visuals: &[Visual]) -> Result<Self, CameraError> {
+    pub fn from_mesh(
+        name: &str,
+        mesh: &Mesh,
+        visuals: &[Visual],
+        cache: &DiskCache,
+    ) -> Result<Self, CameraError> {
         check_mesh(name, mesh, &[0], visuals)?;
+        let key = cache.key("mesh", &(mesh, visuals));
         let mut mesh = mesh.clone();
         let mut edge = extent(&mesh);
         let has_pattern = !visuals[0].layers.is_empty();
@@ -159,7 +224,7 @@ impl RenderMesh {
             }
             bake_vertices(&mesh, &vec![0; mesh.triangles.len()], visuals, edge as f32, None)
         };
-        Ok(Self::from_levels([lod]))
+        Ok(Self::from_kept([KeptLevel::new(lod, cache, key.as_ref())]))
     }
 
     /// Builds the mesh of solids that may overlap; `visuals` are those that the solids index. They are meshed
@@ -206,10 +271,19 @@ struct ShapeSurface {
     is_textured: bool,
     /// Nodes of the soft body that the surface belongs to, if any.
     voxels: Option<VoxelMesh>,
+    cache: DiskCache,
+    /// Key of shape, visuals and voxels.
+    key: Option<CacheKey>,
 }
 
 impl ShapeSurface {
-    fn new(name: &str, shape: &Shape, visuals: &[Visual], voxels: Option<VoxelMesh>) -> Self {
+    fn new(
+        name: &str,
+        shape: &Shape,
+        visuals: &[Visual],
+        voxels: Option<VoxelMesh>,
+        cache: &DiskCache,
+    ) -> Self {
         let is_textured = visuals.len() > 1 || visuals.iter().any(|visual| !visual.layers.is_empty());
         let baked = |v: &Visual| if is_textured { without_colours(v) } else { v.clone() };
         Self {
@@ -217,12 +291,24 @@ impl ShapeSurface {
             material: Arc::new(SurfaceMaterial { shape: shape.clone(), visuals: visuals.to_vec() }),
             baked: visuals.iter().map(baked).collect(),
             is_textured,
+            key: cache.key("surface", &(shape, visuals, &voxels)),
             voxels,
+            cache: cache.clone(),
         }
     }
 
-    /// Builds the level of detail with `cells` along the longest edge.
-    fn level(&self, cells: f64, is_finest: bool) -> Result<Lod, CameraError> {
+    /// The level of detail with `cells` along the longest edge.
+    fn level(&self, cells: f64, is_finest: bool) -> Result<KeptLevel, CameraError> {
+        let inputs = (&self.key, cells, is_finest);
+        let mut lod = self.cache.get("level", &inputs, || self.build_level(cells, is_finest))?;
+        if self.is_textured {
+            parameterize(&mut lod, &self.material);
+        }
+        Ok(KeptLevel::new(lod, &self.cache, self.cache.key("level", &inputs).as_ref()))
+    }
+
+    /// Builds a level of detail without its textures.
+    fn build_level(&self, cells: f64, is_finest: bool) -> Result<Lod, CameraError> {
         let SurfaceMaterial { shape, visuals } = &*self.material;
         let cell = shape.bounds().size().max() / cells;
         let mesh = self.triangulate(cell);
@@ -239,9 +325,6 @@ impl ShapeSurface {
         }
         if self.voxels.is_none() {
             lod = simplify(&lod, SIMPLIFY_TOLERANCE * lod.vertex_spacing);
-        }
-        if self.is_textured {
-            parameterize(&mut lod, &self.material);
         }
         self.embed(lod)
     }

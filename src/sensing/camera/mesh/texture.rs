@@ -12,6 +12,7 @@ use std::{
     sync::{Arc, OnceLock},
 };
 
+use serde::{Deserialize, Serialize};
 use wide::{bytemuck::cast, i32x8, u32x8};
 
 use super::lod::{CreasedMesh, Lod};
@@ -160,11 +161,13 @@ pub(crate) fn parameterize(lod: &mut Lod, material: &Arc<SurfaceMaterial>) {
     };
     let directions: Vec<usize> = lod.triangles.iter().map(face_direction).collect();
     let mut connected = UnionFind::new(lod.triangles.len());
-    let mut first_at: BTreeMap<(u32, usize), usize> = BTreeMap::new();
+    // The first triangle of each direction at each vertex.
+    let mut first_at = vec![[usize::MAX; 6]; lod.positions.len()];
     for (t, (corners, &direction)) in lod.triangles.iter().zip(&directions).enumerate() {
         for &v in corners {
-            let other = *first_at.entry((v, direction)).or_insert(t);
-            connected.union(other, t);
+            let first = &mut first_at[v as usize][direction];
+            *first = t.min(*first);
+            connected.union(*first, t);
         }
     }
     let mut parts: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
@@ -244,6 +247,14 @@ impl TextureChart {
         }
         let [x, y, z, roughness] = sum;
         (Vec3x8 { x, y, z }, roughness)
+    }
+
+    /// The tiles that have been painted.
+    fn painted(&self) -> impl Iterator<Item = (TilePlace, &[u32])> {
+        self.levels.iter().enumerate().flat_map(|(level, mip)| {
+            let tiles = mip.tiles.iter().enumerate();
+            tiles.filter_map(move |(index, tile)| Some((TilePlace { level, index }, &**tile.get()?)))
+        })
     }
 
     /// Paints the tile of a level whose first texel is `corner`.
@@ -479,6 +490,46 @@ fn pack(&[r, g, b, roughness]: &Texel) -> u32 {
     byte(r.sqrt()) | byte(g.sqrt()) << 8 | byte(b.sqrt()) << 16 | byte(roughness) << 24
 }
 
+/// Place of a tile in a chart.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+struct TilePlace {
+    level: usize,
+    /// Position in the tiles of its level.
+    index: usize,
+}
+
+/// A painted tile of a textured surface.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct PaintedTile {
+    chart: usize,
+    place: TilePlace,
+    texels: Box<[u32]>,
+}
+
+/// The tiles of a surface that have been painted.
+pub(crate) fn painted_tiles(charts: &[TextureChart]) -> Vec<PaintedTile> {
+    let mut tiles = Vec::new();
+    for (chart, painted) in charts.iter().map(TextureChart::painted).enumerate() {
+        tiles.extend(painted.map(|(place, texels)| PaintedTile { chart, place, texels: texels.into() }));
+    }
+    tiles
+}
+
+/// Number of tiles of a surface that have been painted.
+pub(crate) fn painted_count(charts: &[TextureChart]) -> usize {
+    charts.iter().map(|chart| chart.painted().count()).sum()
+}
+
+/// Puts painted tiles where they belong, as if they had been seen.
+pub(crate) fn restore_tiles(charts: &[TextureChart], tiles: Vec<PaintedTile>) {
+    for PaintedTile { chart, place: TilePlace { level, index }, texels } in tiles {
+        let level = charts.get(chart).and_then(|chart| chart.levels.get(level));
+        if let Some(tile) = level.and_then(|level| level.tiles.get(index)) {
+            let _ = tile.set(texels);
+        }
+    }
+}
+
 /// Edge of a tile, texels.
 const TILE: usize = 32;
 
@@ -573,7 +624,8 @@ mod tests {
     }
 
     fn ball() -> RenderMesh {
-        RenderMesh::from_shape("ball", &Shape::Sphere { radius: 0.03 }, &[printed()]).expect("a mesh")
+        RenderMesh::from_shape("ball", &Shape::Sphere { radius: 0.03 }, &[printed()], &DiskCache::DISABLED)
+            .expect("a mesh")
     }
 
     #[test]
