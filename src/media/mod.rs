@@ -2,5 +2,6 @@
 #![warn(missing_docs, unreachable_pub)]
 
 pub mod canvas;
+pub mod log_plot;
 pub mod plot;
 pub mod video;

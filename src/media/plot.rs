@@ -13,7 +13,7 @@ const BOTTOM: f64 = 46.0;
 /// Intervals between the labels of the horizontal axis.
 const TICKS: u32 = 5;
 
-const CURVE: &str = "#2050a0";
+pub(super) const CURVE: &str = "#2050a0";
 const DIAMOND: &str = "#c07020";
 
 /// Contents of a plot. The vertical axis begins at 0.
@@ -220,12 +220,12 @@ fn image(contents: &str) -> String {
     )
 }
 
-fn text(x: f64, y: f64, anchor: &str, what: &str) -> String {
+pub(super) fn text(x: f64, y: f64, anchor: &str, what: &str) -> String {
     let escaped = what.replace('&', "&amp;").replace('<', "&lt;");
     format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{escaped}</text>\n")
 }
 
-fn line(x1: f64, y1: f64, x2: f64, y2: f64, style: &str) -> String {
+pub(super) fn line(x1: f64, y1: f64, x2: f64, y2: f64, style: &str) -> String {
     format!("<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" {style}/>\n")
 }
 

@@ -32,6 +32,7 @@ pub struct AssetCache {
     masses: SharedCache<Shape, MassProperties>,
     solids: SharedCache<Shape, Arc<CollisionGeometry>>,
     walls: SharedCache<Shape, Option<f64>>,
+    thicknesses: SharedCache<(Shape, ThicknessProbe), Option<f64>>,
     cavities: SharedCache<Shape, Option<Aabb>>,
     pieces: SharedCache<Shape, Option<SeparatePieces>>,
     disk: DiskCache,
@@ -87,6 +88,17 @@ impl AssetCache {
     /// Typical thickness of the thin walls of a shape, m; see [`thin_wall`].
     pub(super) fn wall(&self, shape: &Shape) -> Option<f64> {
         of_shape(&self.walls, shape, || stored(&self.disk, "wall", shape, || thin_wall(shape)))
+    }
+
+    /// Typical thickness of the thin parts of a shape that a probe finds, m; `None` if it has few.
+    pub(super) fn thickness(&self, shape: &Shape, probe: ThicknessProbe) -> Option<f64> {
+        let compute = || Ok::<_, Infallible>(thin_parts(shape, probe));
+        let Ok(thickness) = self.thicknesses.get(
+            &(shape.clone(), probe),
+            |(known, of)| *of == probe && known == shape,
+            || self.disk.get("thickness", &(shape, probe), compute),
+        );
+        thickness
     }
 
     /// Box around the cavity of a shape, object frame; see [`cavity`].
@@ -178,12 +190,20 @@ const RAYS: usize = 12;
 /// the surface has such walls.
 fn thin_wall(shape: &Shape) -> Option<f64> {
     let steps = (MIN_PART_WALL / WALL_STEP).round() as usize;
-    thin_parts(shape, WALL_STEP, steps, THIN_SHARE)
+    thin_parts(shape, ThicknessProbe { step: WALL_STEP, steps, share: THIN_SHARE })
 }
 
-/// Typical thickness of what is thinner than `steps` steps of `step` (m) below the surface of a shape, m. `None` if at most this
-/// share of the surface has so little behind it.
-pub(super) fn thin_parts(shape: &Shape, step: f64, steps: usize, share: f64) -> Option<f64> {
+/// A search for thin parts of a shape: those thinner than `steps` steps of `step` (m) below its surface.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub(super) struct ThicknessProbe {
+    pub(super) step: f64,
+    pub(super) steps: usize,
+    /// Share of the surface up to which thin parts do not count.
+    pub(super) share: f64,
+}
+
+/// Typical thickness of the thin parts of a shape, m. `None` if it has few.
+fn thin_parts(shape: &Shape, ThicknessProbe { step, steps, share }: ThicknessProbe) -> Option<f64> {
     let hits = outer_points(shape);
     let under = |p: &Vec3| {
         let normal = shape.distance_and_normal(p).1;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::asset_cache::{AssetCache, thin_parts};
+use super::asset_cache::{AssetCache, ThicknessProbe};
 use softvt_benchmark::Task;
 use softvt_geometry::pieces::SeparatePieces;
 use softvt_robot::gripper::MAX_WIDTH;
@@ -16,7 +16,7 @@ pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSe
         asset
             .warnings()
             .into_iter()
-            .chain(voxel_warning(asset))
+            .chain(voxel_warning(asset, cache))
             .chain(pieces_warning(asset, cache))
             .map(move |warning| format!("asset {name}: {warning}"))
     };
@@ -32,10 +32,11 @@ const MIN_VOXELS: f64 = 2.0;
 const PROBES: usize = 10;
 
 /// The thickness of a soft body of which more than half of the surface has less than [`MIN_VOXELS`] voxels behind it.
-fn voxel_warning(asset: &Asset) -> Option<String> {
+fn voxel_warning(asset: &Asset, cache: &AssetCache) -> Option<String> {
     let Body::Soft(material) = &asset.body else { return None };
-    let edge = asset.shape.bounds().size().max() / material.resolution.max(1) as f64;
-    let thickness = thin_parts(&asset.shape, MIN_VOXELS * edge / PROBES as f64, PROBES, 0.5)?;
+    let edge = cache.bounds(&asset.shape).size().max() / material.resolution.max(1) as f64;
+    let probe = ThicknessProbe { step: MIN_VOXELS * edge / PROBES as f64, steps: PROBES, share: 0.5 };
+    let thickness = cache.thickness(&asset.shape, probe)?;
     let needed = (material.resolution as f64 * MIN_VOXELS * edge / thickness).ceil();
     let fix = if needed <= SoftMaterial::MAX_RESOLUTION as f64 {
         format!("resolution = {needed} gives it two")

@@ -15,6 +15,7 @@ mod error;
 mod evaluate;
 pub mod experiment;
 mod golden;
+pub mod growth;
 pub mod import;
 mod limits;
 mod observer;

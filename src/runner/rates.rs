@@ -9,9 +9,10 @@ use cpu_time::ThreadTime;
 use serde::{Deserialize, Serialize};
 
 use super::{config::RunConfig, error::RunError};
-use softvt_benchmark::{CONTROL_HZ, Plan};
+use softvt_benchmark::{CONTROL_HZ, Plan, Suite};
 use softvt_common::{
     cancel,
+    disk_cache::DiskCache,
     episode_id::{EpisodeId, EpisodeSplit},
     parallel,
 };
@@ -31,8 +32,11 @@ pub struct MachineRates {
     pub script: String,
     /// Processor, as the system names it.
     pub machine: String,
-    /// CPU time from nothing to the first observation with all streams, s.
+    /// CPU time from nothing to the first observation with all streams, without a cache on disk, s.
     pub first_observation_s: f64,
+    /// The same with what an earlier process left in the cache of the process, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cached_first_observation_s: Option<f64>,
     /// Rates on one thread.
     pub streams: Vec<StreamRate>,
     /// Number of threads that run episodes at the same time.
@@ -67,9 +71,12 @@ pub fn measure(
     mut on_stage: impl FnMut(&str),
 ) -> Result<MachineRates, RunError> {
     let loaded = RunConfig::of(script).load()?.script;
-    let caches = Caches::default();
     on_stage("the first observation");
-    let first = time_episode(&loaded, &streams_of(STREAMS.len() - 1), &caches)?;
+    let first = time_episode(&loaded, &all_streams(), &Caches::without_disk())?;
+    // The first time fills the cache on disk.
+    time_episode(&loaded, &all_streams(), &Caches::default())?;
+    let caches = Caches::default();
+    let cached = time_episode(&loaded, &all_streams(), &caches)?;
     let mut streams = Vec::new();
     for (index, name) in STREAMS.into_iter().enumerate() {
         on_stage(name);
@@ -78,21 +85,37 @@ pub fn measure(
             .push(StreamRate { streams: name.to_owned(), observations_per_s: timing.steps / timing.cpu_s });
     }
     on_stage("all threads");
-    let mut observations_per_s = 0.0;
-    let run = |_| time_episode(&loaded, &streams_of(STREAMS.len() - 1), &caches);
-    parallel::run(threads, threads, cancel::requested, run, |_, timing| {
-        observations_per_s += timing.steps / timing.wall_s;
-        Ok(())
-    })?;
+    let observations_per_s = observations_per_s(&loaded, threads, &caches)?;
     Ok(MachineRates {
         softvt: env!("CARGO_PKG_VERSION").to_owned(),
         script: script.to_owned(),
         machine: processor(),
         first_observation_s: first.until_action_s,
+        cached_first_observation_s: Some(cached.until_action_s),
         streams,
         threads,
         observations_per_s,
     })
+}
+
+/// Observations per second of wall time with all streams, with `threads` episodes at the same time.
+pub(crate) fn observations_per_s(
+    loaded: &LoadedScript,
+    threads: usize,
+    caches: &Caches,
+) -> Result<f64, RunError> {
+    let mut rate = 0.0;
+    let run = |_| time_episode(loaded, &all_streams(), caches);
+    parallel::run(threads, threads, cancel::requested, run, |_, timing| {
+        rate += timing.steps / timing.wall_s;
+        Ok(())
+    })?;
+    Ok(rate)
+}
+
+/// All streams: those of the last row of [`STREAMS`].
+pub(crate) fn all_streams() -> SensorStreams {
+    streams_of(STREAMS.len() - 1)
 }
 
 /// The streams of a row of [`STREAMS`].
@@ -108,13 +131,23 @@ fn streams_of(row: usize) -> SensorStreams {
 
 /// Caches shared by all episodes.
 #[derive(Default)]
-struct Caches {
-    assets: AssetCache,
+pub(crate) struct Caches {
+    pub(crate) assets: AssetCache,
     sensors: SensorAssets,
 }
 
+impl Caches {
+    /// Caches that keep nothing on disk.
+    fn without_disk() -> Self {
+        Self {
+            assets: AssetCache::stored_in(DiskCache::DISABLED),
+            sensors: SensorAssets::stored_in(DiskCache::DISABLED),
+        }
+    }
+}
+
 /// Duration of an episode.
-struct EpisodeTiming {
+pub(crate) struct EpisodeTiming {
     /// Control steps.
     steps: f64,
     /// CPU time before the first action, s.
@@ -148,22 +181,15 @@ impl Controller for ObservedExpert {
     }
 }
 
-fn time_episode(
+/// Runs the first episode of a suite with sensor streams.
+pub(crate) fn time_episode(
     loaded: &LoadedScript,
     streams: &SensorStreams,
     caches: &Caches,
 ) -> Result<EpisodeTiming, RunError> {
     let begin = ThreadTime::now();
-    let Plan::Suite(suite) = &loaded.plan else {
-        return Err(RunError::input("the script is not a suite"));
-    };
-    let id = EpisodeId {
-        suite: suite.name.clone(),
-        task: 0,
-        episode: 0,
-        base_seed: 0,
-        split: EpisodeSplit::Validation,
-    };
+    let suite = suite_of(loaded)?;
+    let id = first_episode(suite);
     let opened = EpisodeSetup::open(loaded, &id, &SceneChanges::default()).map_err(RunError::input)?;
     let (task, settings) = (&suite.tasks[0], &suite.settings);
     let spec = EpisodeSpec::new(id, "expert", task, &opened.nominal, opened.scene.clone(), settings);
@@ -180,6 +206,25 @@ fn time_episode(
         cpu_s,
         wall_s: first.wall.elapsed().as_secs_f64(),
     })
+}
+
+/// The suite of a script.
+pub(crate) fn suite_of(loaded: &LoadedScript) -> Result<&Suite, RunError> {
+    match &loaded.plan {
+        Plan::Suite(suite) => Ok(suite),
+        _ => Err(RunError::input("the script is not a suite")),
+    }
+}
+
+/// The first episode of the first task of a suite.
+pub(crate) fn first_episode(suite: &Suite) -> EpisodeId {
+    EpisodeId {
+        suite: suite.name.clone(),
+        task: 0,
+        episode: 0,
+        base_seed: 0,
+        split: EpisodeSplit::Validation,
+    }
 }
 
 /// Name of the processor; without one, the architecture and the system.

@@ -34,8 +34,12 @@ impl Asset {
     /// A warning about a soft body that is compressed by its own weight: ρ g h / 2 E for an upright block of height h.
     fn sag_warning(&self, material: &ElasticMaterial) -> Option<String> {
         let (youngs_pa, density) = (material.youngs_pa(), material.density());
+        let sag_of = |height: f64| density * GRAVITY * height / (2.0 * youngs_pa);
+        if sag_of(self.shape.loose_bounds().size().z) < MAX_SAG {
+            return None;
+        }
         let height = self.shape.bounds().size().z;
-        let sag = density * GRAVITY * height / (2.0 * youngs_pa);
+        let sag = sag_of(height);
         let left = match sag {
             ..MAX_SAG => return None,
             ..0.8 => format!("sags to about {:.0} % of its height", 100.0 * (1.0 - sag)),

@@ -8,8 +8,12 @@ use crate::{
     error::CliError,
     output::{eprint_notice, print},
 };
-use softvt_common::{files::replace, text::TextTable};
+use softvt_common::{
+    files::replace,
+    text::{TextTable, decimal},
+};
 use softvt_runner::{
+    growth::{self, GrowthCurve, GrowthPoint},
     rates::{self, MachineRates},
     thread_count,
 };
@@ -23,6 +27,9 @@ pub(crate) struct BenchArgs {
     /// Also write the rates to a JSON file
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Measure how the cost grows with nodes, bodies, threads and pixels instead, and plot it as an SVG file
+    #[arg(long, value_name = "FILE", conflicts_with = "out")]
+    growth: Option<PathBuf>,
 }
 
 /// Measures and prints the rates.
@@ -34,6 +41,11 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), CliError> {
         .ok_or_else(|| CliError::input("this build has no assets/rates.json, which names the suite"))?;
     let published: MachineRates = serde_json::from_slice(published)?;
     let on_stage = |stage: &str| eprint_notice(format!("measuring: {stage}"));
+    if let Some(path) = &args.growth {
+        let curves = growth::measure(&published.script, thread_count(args.threads), on_stage)?;
+        replace(path, growth::plot(&curves))?;
+        return print(&growth_table(&curves));
+    }
     let rates = rates::measure(&published.script, thread_count(args.threads), on_stage)?;
     if let Some(path) = &args.out {
         replace(path, [serde_json::to_string_pretty(&rates)?.as_bytes(), b"\n"].concat())?;
@@ -49,6 +61,7 @@ fn table(here: &MachineRates, published: &MachineRates) -> String {
     let mut rows = vec![
         ["", "here", "published"].map(str::to_owned).to_vec(),
         row("CPU s to the first observation", &|rates| format!("{:.2}", rates.first_observation_s)),
+        row("the same with the cache", &|rates| decimal(rates.cached_first_observation_s, 2)),
     ];
     for (index, of_streams) in here.streams.iter().enumerate() {
         let value = |rates: &MachineRates| {
@@ -74,6 +87,18 @@ fn table(here: &MachineRates, published: &MachineRates) -> String {
     )
 }
 
+/// The curves, one row per measurement.
+fn growth_table(curves: &[GrowthCurve]) -> String {
+    let of_curve = |curve: &GrowthCurve| {
+        let power = curve.exponent().map_or_else(String::new, |power| format!(", power {power:.2}"));
+        let mut rows = vec![vec![curve.size.to_owned(), format!("{}{power}", curve.cost)]];
+        let point = |point: &GrowthPoint| vec![format!("{}", point.size), format!("{:.3}", point.cost)];
+        rows.extend(curve.points.iter().map(point));
+        TextTable::fitted(&rows, |_| true)
+    };
+    curves.iter().map(of_curve).collect::<Vec<_>>().join("\n")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -86,6 +111,7 @@ mod tests {
             script: "suites/some.lua".to_owned(),
             machine: machine.to_owned(),
             first_observation_s: 1.5,
+            cached_first_observation_s: None,
             streams: vec![StreamRate { streams: "state".to_owned(), observations_per_s }],
             threads: 4,
             observations_per_s: 4.0 * observations_per_s,

@@ -114,8 +114,8 @@ impl Shape {
         }
     }
 
-    /// A box that contains the shape; not tight.
-    pub(crate) fn loose_bounds(&self) -> Aabb {
+    /// A box that contains the shape and its [bounds](Self::bounds); not tight, but fast.
+    pub fn loose_bounds(&self) -> Aabb {
         match self {
             Self::Placed { shape, pose } => shape.loose_bounds().transformed(pose),
             Self::Scaled { shape, scale } => {

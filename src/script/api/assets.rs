@@ -117,8 +117,10 @@ const MAX_SIZE: f64 = 10.0;
 fn check_asset(lua: &Lua, record: &Record, asset: &Table) -> mlua::Result<()> {
     let shape: LuaShape = FromChecked::from_checked(asset.raw_get("shape")?, lua)?;
     let body: BodySpec = FromChecked::from_checked(asset.raw_get("body")?, lua)?;
-    let size = shape.copy().bounds().size();
-    if matches!(body, BodySpec::Soft(_) | BodySpec::Rigid(_)) && size.max() > MAX_SIZE {
+    let (is_handled, shape) = (matches!(body, BodySpec::Soft(_) | BodySpec::Rigid(_)), shape.copy());
+    let size = || shape.bounds().size();
+    if is_handled && shape.loose_bounds().size().max() > MAX_SIZE && size().max() > MAX_SIZE {
+        let size = size();
         let [x, y, z] = [size.x, size.y, size.z].map(|side| format_number((1e3 * side).round() / 1e3));
         let message = format!(
             "is {x} × {y} × {z} m, expected at most {MAX_SIZE} m; lengths are in metres (softvt.mesh takes scale = 0.001 for mm)"

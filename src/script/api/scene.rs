@@ -241,18 +241,23 @@ fn position(lua: &Lua, scene: &Scene, spec: &PlacementSpec) -> mlua::Result<Vec3
 fn distance_to_objects(scene: &Scene, x: f64, y: f64) -> f64 {
     /// Height below which an object is a support, m.
     const SUPPORT: f64 = 1e-3;
-    let solid = scene.objects.iter().filter(|object| !matches!(object.asset.body, Body::Scenery));
-    let distances = solid.filter_map(|object| {
-        let bounds = object.asset.shape.bounds();
+    let distance = |object: &Object, bounds: &Aabb| {
         let centre = object.pose_w.translation.vector;
         if centre.z + bounds.max.z <= SUPPORT {
-            return None;
+            return f64::INFINITY;
         }
         let reach = |low: f64, high: f64| low.abs().max(high.abs());
         let radius = reach(bounds.min.x, bounds.max.x).hypot(reach(bounds.min.y, bounds.max.y));
-        Some((centre.x - x).hypot(centre.y - y) - radius)
-    });
-    distances.fold(f64::INFINITY, f64::min)
+        (centre.x - x).hypot(centre.y - y) - radius
+    };
+    let mut nearest = f64::INFINITY;
+    for object in scene.objects.iter().filter(|object| !matches!(object.asset.body, Body::Scenery)) {
+        // Tight bounds take a hundred times as long and are farther away.
+        if distance(object, &object.asset.shape.loose_bounds()) < nearest {
+            nearest = nearest.min(distance(object, &object.asset.shape.bounds()));
+        }
+    }
+    nearest
 }
 
 /// Height of the surface of an object, or of one of its parts, at (x, y) of the world, m.

@@ -1,0 +1,111 @@
+//! Panels of curves with logarithmic axes, as SVG.
+
+use super::plot::{CURVE, PlotPoint, line, text};
+
+/// Width and height of a panel, px.
+const PANEL: [f64; 2] = [320.0, 240.0];
+/// Margins of a panel around its plotting area, px.
+const LEFT: f64 = 52.0;
+const RIGHT: f64 = 14.0;
+const TOP: f64 = 26.0;
+const BOTTOM: f64 = 40.0;
+const GRID: &str = "stroke=\"#dddddd\"";
+
+/// A curve of positive values in a panel of its own.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LogPanel {
+    /// Text above the panel.
+    pub title: String,
+    /// Label below the horizontal axis.
+    pub x_label: String,
+    /// Points of the curve.
+    pub points: Vec<PlotPoint>,
+}
+
+/// An image of panels, two side by side.
+pub fn svg(panels: &[LogPanel]) -> String {
+    let [width, height] = [2.0 * PANEL[0], PANEL[1] * panels.len().div_ceil(2) as f64];
+    let drawn: String = panels.iter().enumerate().map(|(index, panel)| draw(index, panel)).collect();
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" \
+         font-size=\"11\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n{drawn}</svg>\n"
+    )
+}
+
+/// The range of whole powers of ten around values.
+struct Decades {
+    low: f64,
+    high: f64,
+}
+
+impl Decades {
+    fn around(values: impl Iterator<Item = f64>) -> Self {
+        let (low, high) = values
+            .map(|value| value.max(f64::MIN_POSITIVE).log10())
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        let (low, high) = ((low + 1e-9).floor(), (high - 1e-9).ceil());
+        Self { low, high: high.max(low + 1.0) }
+    }
+
+    /// Position of a value between the ends, 0..=1.
+    fn share(&self, value: f64) -> f64 {
+        (value.max(f64::MIN_POSITIVE).log10() - self.low) / (self.high - self.low)
+    }
+
+    fn ticks(&self) -> impl Iterator<Item = f64> {
+        (self.low as i32..=self.high as i32).map(|power| 10f64.powi(power))
+    }
+}
+
+fn draw(index: usize, panel: &LogPanel) -> String {
+    let (x0, y0) = (PANEL[0] * (index % 2) as f64, PANEL[1] * (index / 2) as f64);
+    let (left, right) = (x0 + LEFT, x0 + PANEL[0] - RIGHT);
+    let (top, base) = (y0 + TOP, y0 + PANEL[1] - BOTTOM);
+    let across = Decades::around(panel.points.iter().map(|point| point.x));
+    let up = Decades::around(panel.points.iter().map(|point| point.y));
+    let x = |value: f64| left + across.share(value) * (right - left);
+    let y = |value: f64| base - up.share(value) * (base - top);
+    let columns = across.ticks().map(|tick| {
+        line(x(tick), top, x(tick), base, GRID) + &text(x(tick), base + 14.0, "middle", &short(tick))
+    });
+    let rows = up.ticks().map(|tick| {
+        line(left, y(tick), right, y(tick), GRID) + &text(left - 5.0, y(tick) + 4.0, "end", &short(tick))
+    });
+    let at = |point: &PlotPoint| format!("{:.1},{:.1}", x(point.x), y(point.y));
+    let path: Vec<String> = panel.points.iter().map(at).collect();
+    let mark = |point: &PlotPoint| {
+        let fill = if point.is_filled { CURVE } else { "white" };
+        format!(
+            "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"3\" fill=\"{fill}\" stroke=\"{CURVE}\"/>\n",
+            x(point.x),
+            y(point.y)
+        )
+    };
+    let grid: String = columns.chain(rows).collect();
+    grid + &format!("<polyline points=\"{}\" fill=\"none\" stroke=\"{CURVE}\"/>\n", path.join(" "))
+        + &panel.points.iter().map(mark).collect::<String>()
+        + &text(left, y0 + 16.0, "start", &panel.title)
+        + &text(0.5 * (left + right), base + 30.0, "middle", &panel.x_label)
+}
+
+/// A power of ten.
+fn short(tick: f64) -> String {
+    if tick >= 1e4 { format!("1e{:.0}", tick.log10()) } else { format!("{tick}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_power_law_is_a_straight_line_and_one_point_has_axes() {
+        let point = |x: f64, y: f64| PlotPoint { x, y, is_filled: true };
+        let points = vec![point(1.0, 1.0), point(10.0, 10.0), point(100.0, 100.0)];
+        let panel = LogPanel { title: "cost".to_owned(), x_label: "size".to_owned(), points };
+        let text = svg(&[panel]);
+        assert!(text.contains("<polyline points=\"52.0,200.0 179.0,113.0 306.0,26.0\""), "{text}");
+        let alone = LogPanel { title: String::new(), x_label: String::new(), points: vec![point(1.0, 7.0)] };
+        let text = svg(&[alone]);
+        assert!(text.contains("<circle") && !text.contains("NaN") && !text.contains("inf"), "{text}");
+    }
+}
