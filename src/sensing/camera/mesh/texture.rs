@@ -606,6 +606,7 @@ fn blend(corners: [u32x8; 4], x: f32x8, y: f32x8) -> [f32x8; 4] {
 mod tests {
     use super::*;
     use crate::camera::RenderMesh;
+    use softvt_common::disk_cache::DiskCache;
     use softvt_scene::{LabelLine, Mask, TextDecal, VisualLayer};
 
     /// A word facing +x, white on black.
@@ -664,6 +665,38 @@ mod tests {
             counts[usize::from(expected > 0.5)] += 1;
         }
         assert!(counts[0] > 1000 && counts[1] > 20, "triangles off and on letters: {counts:?}");
+    }
+
+    #[test]
+    fn seen_tiles_are_kept_and_equal_painted_ones() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let cache = || DiskCache::new(folder.path(), 1 << 24, |problem| panic!("{problem}"));
+        let shape = Shape::Sphere { radius: 0.03 };
+        let mesh =
+            |cache: &DiskCache| RenderMesh::from_shape("ball", &shape, &[printed()], cache).expect("a mesh");
+        // Albedos along a line on the first chart of a level, and the number of tiles painted before they are sampled.
+        let sample = |mesh: &RenderMesh, level: usize| {
+            let charts = &mesh.level(level).expect("a level").charts;
+            let known = painted_count(charts);
+            let at = |k: u16| [f32x8::splat(0.7 * f32::from(k)), f32x8::splat(11.3)];
+            let albedos: Vec<[f32; 8]> =
+                (0..40).map(|k| charts[0].sample(at(k), f32x8::splat(1e-3)).0.x.to_array()).collect();
+            (known, albedos)
+        };
+        let (uncached, first) = (mesh(&DiskCache::DISABLED), mesh(&cache()));
+        for level in 0..first.level_count() {
+            let (known, painted) = sample(&first, level);
+            assert_eq!((known, &painted), (0, &sample(&uncached, level).1), "level {level}");
+        }
+        drop(first);
+        let second = mesh(&cache());
+        for level in 0..second.level_count() {
+            let (known, painted) = sample(&second, level);
+            assert!(known > 0, "level {level}");
+            assert_eq!(painted, sample(&uncached, level).1, "level {level}");
+        }
+        let corners = |mesh: &RenderMesh| mesh.level(0).expect("a level").positions.clone();
+        assert_eq!(corners(&second), corners(&uncached));
     }
 
     #[test]
