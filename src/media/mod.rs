@@ -1,4 +1,4 @@
-//! Drawing on images ([`canvas`]), plots ([`plot`]) and video files ([`video`]).
+//! Drawing on images ([`canvas`]), plots ([`plot`], [`log_plot`]) and video files ([`video`]).
 #![warn(missing_docs, unreachable_pub)]
 
 pub mod canvas;
