@@ -517,7 +517,7 @@ mod tests {
         second.records[2].outcome = Outcome::Invalid { reason: InvalidReason::Inverted, step: 3, node: None };
         let text = table(&compare(&[first], &[second]).expect("the same episodes"));
         assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
-        assert_eq!(words(&text, "D mean"), ["%", "0.25", "0.50", "+0.25", "–", "0", "2"], "{text}");
+        assert_eq!(words(&text, "D mean"), ["%", "0.25", "0.50", "+0.25", "–", "0", "2", "0.500"], "{text}");
         assert_eq!(words(&text, "D final")[..4], ["%", "0.10", "0.10", "+0.00"]);
         assert_eq!(words(&text, "D P95")[..4], ["%", "0.30", "0.30", "+0.00"]);
         assert_eq!(words(&text, "time over τ")[..4], ["s", "0.50", "0.50", "+0.00"]);

@@ -220,7 +220,7 @@ impl Scene {
         let touches = self.pads.map(|(_, collider, _)| self.world.contact(SoftId::new(0), collider));
         Seen {
             t: self.world.time(),
-            d_pct: self.reference.measure(&soft.state.x).map_or(f64::NAN, |d| d.rms_pct),
+            d_pct: self.reference.measure(&soft.state.x).map_or(f64::NAN, |d| d.v1_rms_pct),
             moved_h: local(&centre) - (self.start - pivot),
             rise: (centre - self.start).z,
             force: 0.5 * (touches[0].normal_force + touches[1].normal_force),

@@ -37,7 +37,7 @@ pub fn small_strain(resolution: usize, pad_mm: f64, offset_mm: [f64; 2]) -> (f64
     let rest: Vec<_> = on_lattice.iter().map(|&n| body.model.mesh.nodes[n]).collect();
     let now: Vec<_> = on_lattice.iter().map(|&n| body.x[n]).collect();
     let reference = ReferenceShape::new(&rest, &vec![1.0; rest.len()]).expect("a cube");
-    let d = reference.measure(&now).expect("a cube").rms_pct;
+    let d = reference.measure(&now).expect("a cube").v1_rms_pct;
     (force / CLOSE, d / (1e3 * CLOSE))
 }
 
