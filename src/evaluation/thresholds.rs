@@ -203,7 +203,12 @@ impl ThresholdFile {
         Self::parse_as(text, path, V1_METRIC_ID, RELEASED_SCHEMA_VERSION)
     }
 
-    fn parse_as(text: &str, path: &str, metric_id: &str, schema_version: u32) -> Result<Self, ThresholdError> {
+    fn parse_as(
+        text: &str,
+        path: &str,
+        metric_id: &str,
+        schema_version: u32,
+    ) -> Result<Self, ThresholdError> {
         let json = |source| ThresholdError::Json { path: path.into(), source };
         let value: serde_json::Value = serde_json::from_str(text).map_err(json)?;
         // First of all: for a file of another metric the error should say that, not that some field is missing.

@@ -115,7 +115,7 @@ fn squeeze(count: usize, resolution: usize) -> Result<f64, RunError> {
         damage_strain: None,
     };
     let cube = Shape::Box { half: Vec3::repeat(0.5 * EDGE) };
-    let model = soft_model("cube", &cube, &material).map_err(RunError::input)?;
+    let model = soft_model("specimen", &cube, &material).map_err(RunError::input)?;
     let plate = Shape::Box { half: Vec3::new(0.5 * THICKNESS, 0.011, 0.011) };
     let mut world = World::new(PhysicsParams::default(), Vec3::zeros());
     let pose = |side: f64, depth: f64, row: usize| {
@@ -124,10 +124,10 @@ fn squeeze(count: usize, resolution: usize) -> Result<f64, RunError> {
     let mut plates: Vec<(KinematicId, f64, usize)> = Vec::new();
     for row in 0..count {
         let at = Pose::translation(0.0, PITCH * row as f64, 0.0);
-        world.add_soft("cube", model.clone(), None, &at, Friction::default());
+        world.add_soft("specimen", model.clone(), None, &at, Friction::default());
         for side in [-1.0, 1.0] {
             let frame = world.add_kinematic(pose(side, 0.0, row));
-            world.add_shape("plate", frame, Pose::identity(), &plate, Friction::default());
+            world.add_shape("jaw", frame, Pose::identity(), &plate, Friction::default());
             plates.push((frame, side, row));
         }
     }

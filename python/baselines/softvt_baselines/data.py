@@ -226,7 +226,9 @@ def pack(recording: Path, edge: int, processes: int, has_tactile: bool = False) 
     demos = _demonstrations(recording)
     if not demos:
         others = [other.name.removeprefix("packed_") for other in recording.glob("packed_*") if other.name != folder.name]
-        raise UserError(f"{recording}: no demonstrations" + (f" with pictures of {edge} pixels, but of {', '.join(others)}" if others else ""))
+        raise UserError(
+            f"{recording}: no demonstrations" + (f" with pictures of {edge} pixels, but of {', '.join(others)}" if others else "")
+        )
     # Other processes may pack the same recording.
     with TemporaryDirectory(dir=recording, prefix="packing_") as scratch:
         part = Path(scratch) / folder.name
