@@ -4,7 +4,6 @@
 //! compared with the recorded action, which is executed. Actions are compared as displacements from the measured tool pose.
 
 use std::{
-    collections::VecDeque,
     path::Path,
     sync::{Arc, Mutex},
     time::Instant,
@@ -23,11 +22,11 @@ use softvt_common::{parallel::lock, text::counted};
 use softvt_evaluation::statistics::quantile;
 use softvt_geometry::{Mat3, Quat, Vec3};
 use softvt_policy::{
-    Action, ActionChunk, CommandResolver, EpisodeBrief, Observation, Policy, PolicyError, SensorStreams,
-    ToolCommand, ToolMotion,
+    Action, ActionChunk, EpisodeBrief, Observation, Policy, PolicyError, SensorStreams, ToolCommand,
+    ToolMotion,
 };
 use softvt_robot::rotation;
-use softvt_rollout::{Controller, Simulation};
+use softvt_rollout::{ChunkedPolicy, Controller, Simulation};
 
 const NOT_COMPARABLE: &str = "only policy servers and policies in Lua can be compared with demonstrations";
 
@@ -53,73 +52,93 @@ struct StepSample {
 /// One answer of the policy.
 #[derive(Clone, Debug)]
 struct AnswerSample {
+    /// Number of control steps before the request.
+    step: usize,
     /// Positions to which the commands lead from the measured one, m.
     path_b: Vec<Vec3>,
-    /// Recorded positions of the control steps from the request on, m.
-    recorded_b: Vec<Vec3>,
     seconds: f64,
 }
 
+/// What was seen in one demonstration.
 #[derive(Clone, Debug, Default)]
-struct Samples {
+struct DemoSamples {
     steps: Vec<StepSample>,
     answers: Vec<AnswerSample>,
 }
 
-/// Executes recorded actions and compares the answers of a policy with them.
-struct ComparingController {
+/// A policy whose answers are kept.
+struct SampledPolicy {
     policy: Box<dyn Policy>,
-    brief: Option<EpisodeBrief>,
-    replan: usize,
-    recorded: Vec<Action>,
-    step: usize,
-    remaining: VecDeque<ToolCommand>,
-    resolver: CommandResolver,
-    samples: Arc<Mutex<Samples>>,
+    samples: Arc<Mutex<DemoSamples>>,
 }
 
-impl Controller for ComparingController {
+impl Policy for SampledPolicy {
+    fn name(&self) -> &str {
+        self.policy.name()
+    }
+
     fn streams(&self) -> SensorStreams {
         self.policy.streams()
     }
 
-    fn wants_observation(&self) -> bool {
-        self.remaining.is_empty() || self.policy.observes_every_step()
+    fn reset(&mut self, brief: &EpisodeBrief) -> Result<(), PolicyError> {
+        self.policy.reset(brief)
     }
 
-    fn act(&mut self, _sim: &Simulation, observation: &Observation) -> Result<Option<Action>, PolicyError> {
-        let Some(&recorded) = self.recorded.get(self.step) else { return Ok(None) };
-        if let Some(brief) = self.brief.take() {
-            self.policy.reset(&brief)?;
-        }
-        if self.remaining.is_empty() {
-            let asked = Instant::now();
-            let ActionChunk { mut commands } = self.policy.act(observation)?;
-            let seconds = asked.elapsed().as_secs_f64();
-            let path_b = path_of(observation.robot.ee_position_b, &commands);
-            let rest = self.recorded[self.step..].iter().map(|action| action.position_b);
-            lock(&self.samples).answers.push(AnswerSample { path_b, recorded_b: rest.collect(), seconds });
-            commands.truncate(self.replan);
-            self.remaining = commands.into();
-        } else if self.policy.observes_every_step() {
-            self.policy.observe(observation)?;
-        }
-        let Some(command) = self.remaining.pop_front() else {
-            return Err(PolicyError::Response("has no action at all".to_owned()));
-        };
-        let sample = StepSample {
-            tool_position_b: observation.robot.ee_position_b,
-            tool_orientation_b: rotation::from_axis_angle(&observation.robot.ee_axis_angle_b),
-            answered: self.resolver.resolve(observation, command),
-            recorded,
-        };
-        lock(&self.samples).steps.push(sample);
-        self.step += 1;
-        Ok(Some(recorded))
+    fn observes_every_step(&self) -> bool {
+        self.policy.observes_every_step()
+    }
+
+    fn observe(&mut self, observation: &Observation) -> Result<(), PolicyError> {
+        self.policy.observe(observation)
+    }
+
+    fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError> {
+        let asked = Instant::now();
+        let chunk = self.policy.act(observation)?;
+        let seconds = asked.elapsed().as_secs_f64();
+        let path_b = path_of(observation.robot.ee_position_b, &chunk.commands);
+        let mut samples = lock(&self.samples);
+        let step = samples.steps.len();
+        samples.answers.push(AnswerSample { step, path_b, seconds });
+        Ok(chunk)
     }
 
     fn finish(&mut self) -> Result<(), PolicyError> {
         self.policy.finish()
+    }
+}
+
+/// Executes recorded actions in place of those that a policy answers.
+struct ComparingController {
+    answers: ChunkedPolicy<'static>,
+    recorded: std::vec::IntoIter<Action>,
+    samples: Arc<Mutex<DemoSamples>>,
+}
+
+impl Controller for ComparingController {
+    fn streams(&self) -> SensorStreams {
+        self.answers.streams()
+    }
+
+    fn wants_observation(&self) -> bool {
+        self.answers.wants_observation()
+    }
+
+    fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, PolicyError> {
+        let Some(recorded) = self.recorded.next() else { return Ok(None) };
+        let Some(answered) = self.answers.act(sim, observation)? else { return Ok(Some(recorded)) };
+        lock(&self.samples).steps.push(StepSample {
+            tool_position_b: observation.robot.ee_position_b,
+            tool_orientation_b: rotation::from_axis_angle(&observation.robot.ee_axis_angle_b),
+            answered,
+            recorded,
+        });
+        Ok(Some(recorded))
+    }
+
+    fn finish(&mut self) -> Result<(), PolicyError> {
+        self.answers.finish()
     }
 }
 
@@ -187,47 +206,45 @@ pub fn check_policy(
     }
     let count = count.clamp(1, all.len());
     let chosen: Vec<&DemoRef> = (0..count).map(|k| &all[k * all.len() / count]).collect();
-    let samples = Arc::new(Mutex::new(Samples::default()));
     let connections = policy.connections();
     if let Some(connections) = &connections {
         connections.check().map_err(policy_failure)?;
     }
+    let mut demos = Vec::with_capacity(count);
     for (k, demo) in chosen.iter().enumerate() {
         observer.work(&format!("comparing demonstration {} of {count}", k + 1));
-        let (policy, connections, samples) = (policy.clone(), connections.clone(), samples.clone());
+        let samples = Arc::new(Mutex::new(DemoSamples::default()));
+        let (policy, connections, shared) = (policy.clone(), connections.clone(), samples.clone());
         let controllers = |recorded: Vec<Action>| -> ControllerFactory {
             Box::new(move |opened, brief| {
                 let started = policy.start(connections.as_ref(), &opened, &brief)?;
+                let started = started.ok_or_else(|| RunError::input(NOT_COMPARABLE))?;
+                let sampled = Box::new(SampledPolicy { policy: started, samples: shared.clone() });
+                let replan = policy.replan.unwrap_or(usize::MAX);
                 Ok(Box::new(ComparingController {
-                    policy: started.ok_or_else(|| RunError::input(NOT_COMPARABLE))?,
-                    brief: Some(brief),
-                    replan: policy.replan.unwrap_or(usize::MAX),
-                    recorded: recorded.clone(),
-                    step: 0,
-                    remaining: VecDeque::new(),
-                    resolver: CommandResolver::default(),
-                    samples: samples.clone(),
+                    answers: ChunkedPolicy::new(sampled, brief, replan),
+                    recorded: recorded.clone().into_iter(),
+                    samples: shared.clone(),
                 }))
             })
         };
         simulate_demo_with(demo, observer, controllers)?;
         observer.end();
+        demos.push(std::mem::take(&mut *lock(&samples)));
     }
-    let samples = lock(&samples).clone();
-    Ok(PolicyCheck::new(count, &samples))
+    Ok(PolicyCheck::new(&demos))
 }
 
 impl PolicyCheck {
-    fn new(demonstrations: usize, samples: &Samples) -> Self {
-        let Samples { steps, answers } = samples;
-        let mut seconds: Vec<f64> = answers.iter().map(|answer| answer.seconds).collect();
+    fn new(demos: &[DemoSamples]) -> Self {
+        let steps: Vec<StepSample> = demos.iter().flat_map(|demo| &demo.steps).copied().collect();
+        let steps = &steps[..];
+        let mut seconds: Vec<f64> =
+            demos.iter().flat_map(|demo| &demo.answers).map(|answer| answer.seconds).collect();
         seconds.sort_by(f64::total_cmp);
         let translations =
             pairs(steps, LEAST_TRANSLATION_M, |s, action| action.position_b - s.tool_position_b);
-        let rotations = pairs(steps, LEAST_ROTATION_RAD, |s, action| {
-            let turned = rotation::from_axis_angle(&action.axis_angle_b) * s.tool_orientation_b.inverse();
-            turned.scaled_axis()
-        });
+        let rotations = pairs(steps, LEAST_ROTATION_RAD, turn);
         let grips: Vec<[f64; 2]> =
             steps.iter().map(|s| [s.recorded.closure(), s.answered.closure()]).collect();
         let (translation, rotation, grip) = (
@@ -239,10 +256,10 @@ impl PolicyCheck {
         findings.extend(explain_translation(&translations, &translation, steps));
         findings.extend(explain_rotation(&rotations, &rotation, steps));
         findings.extend(explain_grip(&grips, &grip));
-        findings.extend(explain_rate(answers));
+        findings.extend(explain_rate(demos));
         Self {
-            demonstrations,
-            answers: answers.len(),
+            demonstrations: demos.len(),
+            answers: seconds.len(),
             answer_median_s: quantile(&seconds, 0.5),
             answer_max_s: seconds.last().copied(),
             translation,
@@ -294,6 +311,11 @@ struct VectorPair {
 fn pairs(steps: &[StepSample], least: f64, of: impl Fn(&StepSample, &Action) -> Vec3) -> Vec<VectorPair> {
     let pair = |s: &StepSample| VectorPair { recorded: of(s, &s.recorded), answered: of(s, &s.answered) };
     steps.iter().map(pair).filter(|pair| pair.recorded.norm() >= least).collect()
+}
+
+/// Rotation vector from the measured orientation of the tool to that of an action, about the axes of the base.
+fn turn(s: &StepSample, action: &Action) -> Vec3 {
+    (rotation::from_axis_angle(&action.axis_angle_b) * s.tool_orientation_b.inverse()).scaled_axis()
 }
 
 impl Agreement {
@@ -409,15 +431,11 @@ fn explain_rotation(pairs: &[VectorPair], of: &Agreement, steps: &[StepSample]) 
     if of.agrees() || pairs.len() < 10 {
         return None;
     }
-    let in_tool = |s: &StepSample, action: &Action| {
-        let turned = rotation::from_axis_angle(&action.axis_angle_b) * s.tool_orientation_b.inverse();
-        turned.scaled_axis()
-    };
     let tool_pairs: Vec<VectorPair> = steps
         .iter()
         .map(|s| VectorPair {
-            recorded: s.tool_orientation_b.inverse() * in_tool(s, &s.recorded),
-            answered: in_tool(s, &s.answered),
+            recorded: s.tool_orientation_b.inverse() * turn(s, &s.recorded),
+            answered: turn(s, &s.answered),
         })
         .filter(|pair| pair.recorded.norm() >= LEAST_ROTATION_RAD)
         .collect();
@@ -468,18 +486,22 @@ fn explain_grip(pairs: &[[f64; 2]], of: &Agreement) -> Option<String> {
 }
 
 /// Compares the paths of answers with the demonstrations at half, the same and twice the speed.
-fn explain_rate(answers: &[AnswerSample]) -> Option<String> {
+fn explain_rate(demos: &[DemoSamples]) -> Option<String> {
     let error = |factor: f64| -> f64 {
-        let of_answer = |answer: &AnswerSample| -> f64 {
-            let at = |j: usize| ((j + 1) as f64 * factor).round() as usize - 1;
+        let of_answer = |demo: &DemoSamples, answer: &AnswerSample| -> f64 {
+            let at = |j: usize| answer.step + ((j + 1) as f64 * factor).round() as usize - 1;
             let compared = answer
                 .path_b
                 .iter()
                 .enumerate()
-                .filter_map(|(j, p)| Some((p - answer.recorded_b.get(at(j))?).norm()));
+                .filter_map(|(j, p)| Some((p - demo.steps.get(at(j))?.recorded.position_b).norm()));
             compared.sum()
         };
-        answers.iter().filter(|answer| answer.path_b.len() >= 4).map(of_answer).sum()
+        let of_demo = |demo: &DemoSamples| -> f64 {
+            let long = demo.answers.iter().filter(|answer| answer.path_b.len() >= 4);
+            long.map(|answer| of_answer(demo, answer)).sum()
+        };
+        demos.iter().map(of_demo).sum()
     };
     let [slow, same, fast] = [0.5, 1.0, 2.0].map(error);
     let (factor, least) = if slow < fast { ("half", slow) } else { ("twice", fast) };
