@@ -564,7 +564,7 @@
 ---@class softvt.GraspOptions
 ---@field rate? number Rate of the gripper; 1 is the whole stroke in a second. Expects a number (1/s) above 0. Default 0.5.
 ---@field width? number Measured distance of the gels at which closing stops. A tactile servo ignores it. Expects metres in 0..0.08.
----@field force? number Normal force on each pad at which closing stops. A tactile servo ignores it. Expects a number (N) above 0.
+---@field force? number Mean normal force per pad at which closing stops. A tactile servo ignores it. Expects a number (N) above 0.
 
 ---Options of releasing an object.
 ---@class softvt.ReleaseOptions

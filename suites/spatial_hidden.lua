@@ -20,8 +20,7 @@ for k, object in ipairs(objects) do
       prompt = ("pick up the %s %s and place it on the plate"):format(side, object.description),
       layout = layout,
       goal = softvt.on { object = side, target = "plate", hold_s = 0.4 },
-      -- Below the middle of the window: of heavy objects, D is above what the window expects (docs/validation.md, Misses).
-      expert = pick_place { object = side, target = "plate", stop = "touch", share = 0.35, window = 0.1, closing_speed = 0.003 },
+      expert = pick_place { object = side, target = "plate", stop = "touch", window = 0.1, closing_speed = 0.003 },
     }
   end
 end

@@ -65,8 +65,6 @@ const MISSES: &str = "
 - Soft bodies at resolution 6 are too stiff between pads of 24 mm, and where the edges of the pads are between nodes.
 - D depends on the angle between the grasp and the voxels, of resolution 6. When round bodies are turned, D at the force of the tight end
   falls by up to 8 %, and at its width grows by up to 18 % (`softvt scripts/turned_press.lua`). Limits are measured at 0°.
-- Windows of instances add what the weight does to D as a perpendicular vector. D of heavy objects with flat sides exceeds that: of cubes and
-  cylinders of the hidden suites by up to 17 % in the middle of the window. Their experts therefore grip at 0.35 of it.
 - *Converged truth* has cubes alone, and resolutions 18 and 24 by their small-strain stiffness only; their squeezes take minutes.
 - Surfaces at grazing incidence of the key light receive no shadow from objects nearer than a few millimetres, and moving
   objects cast none outside of the sphere with a fine shadow map (0.85 m).

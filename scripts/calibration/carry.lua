@@ -26,7 +26,7 @@ local function single_object(asset, one, displacement)
   end)
 end
 
--- Trial `k`, which closes until both pads press with `force` (N). Returns whether the object was carried without slip, its peak D (%)
+-- Trial `k`, which closes until the pads press with `force` (N) on average. Returns whether the object was carried without slip, its peak D (%)
 -- and the mean force on the pads before the lift (N).
 local function carried(asset, one, force, k)
   local displacement = {}

@@ -181,7 +181,7 @@ function grasp.approach(arm, object, width)
 end
 
 -- Closes on an object as a person would: fast to a clearance at which nothing is touched, then slowly to the grip. `options`:
--- closing_speed (m/s, of the width), stop ("width": at the measured width of the grip; "touch": when both pads press with its
+-- closing_speed (m/s, of the width), stop ("width": at the measured width of the grip; "touch": when the pads press with its
 -- force), closure (a command instead of a grip) and width (distance of the gels at first contact, m).
 function grasp.close(arm, object, grip, options)
   local rate = options.closing_speed / STROKE

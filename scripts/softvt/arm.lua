@@ -70,26 +70,40 @@ function Arm:close_to(closure, options)
   for step = 1, steps do self:command(self.target, start * (1 - step / steps) + closure * (step / steps)) end
 end
 
--- Lag of the measured width behind its command, s, and the trim to the width of a grip: share of the error that a command corrects,
--- largest duration, s, and tolerance, m.
-local LAG, TRIM_SHARE, TRIM_TIME, TRIM_TOLERANCE = 0.1, 0.5, 0.5, 5e-5
+-- Lag of the measurements behind the command, s; the trim to the width or the force of a grip: share of the error that a command
+-- corrects, largest duration, s, and tolerance, m and as a share of the force.
+local LAG = 0.1
+local WIDTH_TRIM, FORCE_TRIM = { share = 0.5, seconds = 0.5, tolerance = 5e-5 }, { share = 0.15, seconds = 1, tolerance = 0.01 }
 
--- Closes until the gels are at options.width or both pads press with options.force, at the latest at the closure. The measured
--- width, which the compliance of the fingers displaces from the command, is then trimmed.
+-- Force per pad, N: the mean of both, which the support of the object makes unequal until it is lifted.
+local function grip_force() return 0.5 * (host.force[1] + host.force[2]) end
+
+-- Closes until the gels are at options.width or the pads press with options.force, at the latest at the closure. The measurements
+-- lag behind the command, so closing ends before: width and force are expected to change on at the present rate. They are then trimmed,
+-- which also corrects what the compliance of the fingers adds to the width.
 local function close_until(self, closure, options)
   local rate, width, force = options.rate, options.width, options.force
-  local function is_reached()
-    if force and min(host.force[1], host.force[2]) >= force then return true end
-    return width and host.width - LAG * rate * host.stroke <= width
+  local step, pressed, rise = rate * host.dt, 0, 0
+  while self.closure < closure do
+    local now = grip_force()
+    pressed, rise = now, max(0, now - pressed)
+    local both_touch = min(host.force[1], host.force[2]) > 0
+    if force and both_touch and pressed + LAG / host.dt * rise >= force then break end
+    if width and host.width - LAG * rate * host.stroke <= width then break end
+    self:command(self.target, min(closure, self.closure + step))
   end
-  while self.closure < closure and not is_reached() do
-    self:command(self.target, min(closure, self.closure + rate * host.dt))
-  end
-  if not width then return end
-  for _ = 1, ceil(TRIM_TIME / host.dt) do
-    local error = host.width - width
-    if error < TRIM_TOLERANCE then return end
-    self:command(self.target, min(closure, self.closure + TRIM_SHARE * error / host.stroke))
+  local trim = width and WIDTH_TRIM or FORCE_TRIM
+  for _ = 1, ceil(trim.seconds / host.dt) do
+    -- What is missing, as a change of closure. The force is taken to grow on by `rise` per step of closing.
+    local missing, tolerance
+    if width then
+      missing, tolerance = (host.width - width) / host.stroke, trim.tolerance / host.stroke
+    else
+      missing = rise > 0 and step * (force - grip_force()) / rise or 0
+      tolerance = rise > 0 and step * trim.tolerance * force / rise or 0
+    end
+    if missing <= tolerance then return end
+    self:command(self.target, min(closure, self.closure + trim.share * missing))
   end
 end
 

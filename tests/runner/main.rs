@@ -14,6 +14,7 @@ mod determinism;
 mod expert_failure;
 mod external_scorer;
 mod grip_codes;
+mod grip_force;
 mod initial_state_coverage;
 mod invalid_scenes;
 mod invalid_scripts;

@@ -269,7 +269,7 @@ mod options {
             rate: f64 = RATE => Number(0.5);
             /// Measured distance of the gels at which closing stops. A tactile servo ignores it.
             width: Option<f64> = Type::Number("m", Range::closed(0.0, MAX_WIDTH));
-            /// Normal force on each pad at which closing stops. A tactile servo ignores it.
+            /// Mean normal force per pad at which closing stops. A tactile servo ignores it.
             force: Option<f64> = Type::Number("N", Range::POSITIVE);
         }
         /// Options of releasing an object.
