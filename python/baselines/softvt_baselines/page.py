@@ -55,9 +55,10 @@ def collect(study: Path, into: Path) -> None:
         folder, run = into / "+".join([name, *inner[1:]]), results.load(summary.parent)
         _identify(folder, run.suite)
         folder.mkdir(parents=True, exist_ok=True)
-        for file in (summary, summary.with_name(ORIGIN)):
-            if file.is_file():
-                shutil.copy(file, folder)
+        shutil.copy(summary, folder)
+        if (origin := summary.with_name(ORIGIN)).is_file():
+            version = json.loads(summary.with_name("run.json").read_text())["softvt"]
+            (folder / ORIGIN).write_text(json.dumps({"softvt": version} | json.loads(origin.read_text()), indent=1) + "\n")
         results.save(run, folder)
 
 
@@ -172,11 +173,11 @@ def _origin(folder: Path, suite: str) -> str:
     places, weights = set(), []
     for path in sorted(folder.glob(f"{suite}-*/{ORIGIN}")):
         origin = json.loads(path.read_text())
-        places.add(f"softvt at {origin['commit'] or 'an unknown commit'} on {origin['machine']}")
+        places.add(f"softvt {origin['softvt']} at {origin['commit'] or 'an unknown commit'} on {origin['machine']}")
         if digest := origin.get("checkpoint_sha256"):
             weights.append(f"`{path.parent.name}` {digest[:16]}")
     if not places:
-        return ""
+        return "The runs do not say which version of softvt made them; it was one before 0.2.0.\n\n"
     return f"Made by {'; '.join(sorted(places))}. Checkpoints (SHA-256): {', '.join(weights)}.\n\n"
 
 

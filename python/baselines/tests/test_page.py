@@ -82,8 +82,9 @@ class Pages(unittest.TestCase):
         origin = {"machine": "a machine", "commit": "abc", "checkpoint_sha256": "0123456789abcdef" * 4}
         run = self.study / "runs" / "one-vo-continuous-s0-r4" / "one"
         (run / "origin.json").write_text(json.dumps(origin))
+        (run / "run.json").write_text(json.dumps({"softvt": "0.2.0"}))
         page.collect(self.study, self.docs)
-        expected = "Made by softvt at abc on a machine. Checkpoints (SHA-256): `one-vo-continuous-s0-r4` 0123456789abcdef."
+        expected = "Made by softvt 0.2.0 at abc on a machine. Checkpoints (SHA-256): `one-vo-continuous-s0-r4` 0123456789abcdef."
         self.assertIn(expected, page.tables(self.docs))
 
     def test_foreign_runs_are_refused_and_not_collected(self):
