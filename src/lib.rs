@@ -5,7 +5,8 @@
 //! [`records`], [`benchmark`] → [`policy`] → [`rollout`] → [`dataset`] → [`report`], [`script`], [`serve`] → [`runner`] → [`cli`].
 //! `docs/architecture.md` draws them and follows one episode. All of them may use [`text`] (numbers and text in
 //! messages), [`files`] (atomic files), [`npy`] (numpy files), [`parallel`] (jobs on threads), [`cancel`] (requests to stop),
-//! [`episode_id`], [`range`] (ranges of numbers) and [`settings`](mod@settings) (the declaration of settings).
+//! [`episode_id`], [`range`] (ranges of numbers) and [`settings`](mod@settings) (the declaration of settings). [`sensing`] also
+//! uses [`signal`] (Fourier transforms, resizing of images).
 //!
 //! Examples: a dropped cube and a squeezed cube in [`physics::world`], distances in [`geometry::shape`], kinematics
 //! in [`robot`], a rendered image in [`sensing::camera`], a tactile image in [`sensing::tactile`], the verdict on
@@ -62,6 +63,8 @@ pub use softvt_sensing as sensing;
 #[cfg(feature = "runner")]
 #[doc(inline)]
 pub use softvt_serve as serve;
+#[doc(inline)]
+pub use softvt_signal as signal;
 
 /// The examples of the page.
 #[cfg(all(doctest, feature = "runner"))]

@@ -68,7 +68,7 @@ mod shade;
 #[cfg(test)]
 mod tests;
 
-pub use self::image::{RenderedImage, encode_png, resize};
+pub use self::image::{RenderedImage, encode_png};
 pub use error::CameraError;
 pub use lens::check_cameras;
 pub(crate) use mesh::{lod::Lod, render_mesh::RenderSolid};
@@ -78,3 +78,4 @@ pub use mesh::{
 };
 pub use render::Renderer;
 pub use scene::{FrameView, RenderObject, RenderScene, check_light};
+pub use softvt_signal::resize::resize;

@@ -1,15 +1,12 @@
 //! The gel: grid over the pad and response of its surface to tractions, computed once for all fingers and frames.
 
 use nalgebra::Vector2;
-use rustfft::num_complex::Complex32;
 
-use super::{
-    elastic_layer::LayerResponse,
-    fourier::{FftBuffers, PaddedFft},
-};
+use super::elastic_layer::LayerResponse;
 use softvt_common::range::RangeError;
 use softvt_robot::PadSurface;
 use softvt_robot::tactile::{GelSpec, Pinhole, TactileSpec};
+use softvt_signal::fourier::{Complex32, FftBuffers, PaddedFft};
 
 /// Grid over the pad, kernels of the bonded layer and view of the camera: everything that is computed once per sensor.
 ///

@@ -1,7 +1,6 @@
 //! Gel field: pressure, shear and displacement of the gel's surface under a contact.
 
 use nalgebra::Vector2;
-use rustfft::num_complex::Complex32;
 
 use super::{
     gel::{Gel, GelScratch},
@@ -11,6 +10,7 @@ use super::{
     tangential_contact::{PlanarMotion, apply_shear_kernel, solve_tangential_contact, spring_stiffness},
 };
 use softvt_geometry::{Mat3, Vec3};
+use softvt_signal::fourier::Complex32;
 
 /// Contact of bodies with a pad: the input of [`GelField::solve`].
 #[derive(Clone, Copy, Debug)]

@@ -7,10 +7,10 @@
 //! reaches the bound first.
 
 use nalgebra::Vector2;
-use rustfft::num_complex::Complex32;
 
 use super::gel::{Gel, GelScratch};
 use softvt_geometry::{Mat3, Vec3};
+use softvt_signal::fourier::Complex32;
 
 /// Iterations end when the sticking cells differ from a rigid motion by less than this share of it (energy norm).
 const TOLERANCE: f64 = 3e-2;
