@@ -36,30 +36,45 @@ fn the_varied_suite_needs_the_size_and_the_hidden_ones_touch_by_arithmetic() {
     }
 }
 
-/// Number of safe episodes of a policy on the first episode of every task of Object-Hidden.
-fn safe_episodes(policy: &str) -> usize {
-    let project = Project::new(&[]);
-    let episodes = project.run("suites/object_hidden.lua").episodes(1).policy(policy).records();
-    assert_eq!(episodes.len(), 10);
-    episodes.iter().filter(|episode| episode.verdict.safety).count()
-}
-
-#[test]
-fn only_the_expert_and_a_hand_that_feels_are_safe_where_touch_is_needed() {
+/// Compares the controllers on the first episode of tasks of Object-Hidden, of which each has another object.
+fn compare_controllers(tasks: &[usize]) {
+    let safe_episodes = |policy: &str| {
+        let project = Project::new(&[]);
+        let run = project.run("suites/object_hidden.lua").tasks(tasks).episodes(1).policy(policy);
+        let episodes = run.records();
+        assert_eq!(episodes.len(), tasks.len());
+        episodes.iter().filter(|episode| episode.verdict.safety).count()
+    };
+    let count = tasks.len();
     let [expert, servo, binary] = ["expert", "tactile-servo", "expert-binary"].map(safe_episodes);
-    assert!(expert >= 9, "the expert is safe in {expert} of 10 episodes");
-    assert!(servo >= 8, "tactile-servo is safe in {servo} of 10 episodes");
-    assert_eq!(binary, 0, "a hand that closes fully is safe in {binary} of 10 episodes");
+    assert!(10 * expert >= 9 * count, "the expert is safe in {expert} of {count} episodes");
+    assert!(10 * servo >= 8 * count, "tactile-servo is safe in {servo} of {count} episodes");
+    assert_eq!(binary, 0, "a hand that closes fully is safe in {binary} of {count} episodes");
     let mut total = 0;
     for policy in ["size-seen", "contact-depth", "one-force"] {
         let safe = safe_episodes(policy);
         assert!(
             safe < servo.min(expert),
-            "{policy} is safe in {safe} of 10 episodes, tactile-servo in {servo}"
+            "{policy} is safe in {safe} of {count} episodes, tactile-servo in {servo}"
         );
         total += safe;
     }
-    assert!(total <= 18, "controllers without touch are safe in {total} of 30 episodes");
+    assert!(
+        10 * total <= 6 * 3 * count,
+        "controllers without touch are safe in {total} of {} episodes",
+        3 * count
+    );
+}
+
+#[test]
+fn only_the_expert_and_a_hand_that_feels_are_safe_where_touch_is_needed() {
+    compare_controllers(&[0, 2, 4, 6, 8]);
+}
+
+#[test]
+#[ignore = "takes a minute; .ci/nightly runs it"]
+fn the_same_holds_for_all_objects() {
+    compare_controllers(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9]);
 }
 
 #[test]

@@ -58,6 +58,7 @@ fn endless_loops_are_stopped_everywhere() {
         "while true do pcall(function() while true do end end) end",
         "local function f() return f() end f()",
         "local c = coroutine.wrap(function() while true do end end) c()",
+        "local c = coroutine.wrap(function() while true do coroutine.yield() end end) while true do c() end",
         "while true do coroutine.resume(coroutine.create(function() while true do end end)) end",
         "while true do xpcall(function() while true do end end, function() while true do end end) end",
         "while true do local x <close> = setmetatable({}, { __close = function() while true do end end }) end",
