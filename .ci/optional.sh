@@ -26,15 +26,26 @@ install_debian() {
         && "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
 }
 
-# python_environment FOLDER REASON ARGUMENT...: makes an environment with the packages that pip gets as arguments, or skips. With
-# VENV_FLAGS=--system-site-packages it also has those of python3. VENV_PYTHON names another interpreter than python3.
+# python_environment FOLDER REASON ARGUMENT...: makes an environment with the packages that pip gets as arguments, or skips; nothing
+# is left to do if it has been made with the same arguments. With VENV_FLAGS=--system-site-packages it also has those of python3.
+# VENV_PYTHON names another interpreter than python3. Most modules of large packages are never imported, hence not compiled.
 python_environment() {
-    local folder=$1 reason=$2 why
+    local folder=$1 reason=$2 why made
     shift 2
-    if ! why=$({ "${VENV_PYTHON:-python3}" -m venv ${VENV_FLAGS:-} "$folder" && "$folder/bin/pip" install --quiet --disable-pip-version-check "$@"; } 2>&1); then
+    made=$folder/made-$(cksum <<< "$*" | tr ' ' '-')
+    [[ ! -e $made ]] || return 0
+    if ! why=$({ "${VENV_PYTHON:-python3}" -m venv ${VENV_FLAGS:-} "$folder" \
+        && "$folder/bin/pip" install --quiet --disable-pip-version-check --no-compile "$@"; } 2>&1); then
         tail -n 3 <<< "$why" >&2
         skip "$reason"
     fi
+    touch "$made"
+}
+
+# environments_only: ends a test whose environments are made in advance. .ci/run names their folder, ENVIRONMENTS, and runs the
+# tests so while the code compiles; without it they are in the folder of the argument.
+environments_only() {
+    [[ ${ENVIRONMENTS_ONLY:-} != true ]] || exit 0
 }
 
 # short_suite SUITE STEPS FILE: writes a copy of a suite whose tasks have that many control steps, for what does not depend on the goal.
@@ -44,13 +55,15 @@ short_suite() {
 
 skipped=()
 
-# optional_stage NAME SCRIPT: runs a test of the above kind, and adds it to `skipped` if it was skipped.
+# optional_stage NAME SCRIPT: runs a test of the above kind, and adds it to `skipped` if it was skipped. In a subshell, SKIPPED names a
+# file that gets it too.
 optional_stage() {
     local status=0 reason
     reason=$(mktemp)
     SKIP_REASON=$reason "$2" || status=$?
     if [[ $status == 77 ]]; then
         skipped+=("$1: $(<"$reason")")
+        [[ -z ${SKIPPED:-} ]] || echo "${skipped[-1]}" >> "$SKIPPED"
         status=0
     fi
     rm -f "$reason"
