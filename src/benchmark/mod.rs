@@ -1,6 +1,7 @@
 //! The benchmark as plain data, as scripts return it: suites, tasks, experiments and plans.
 #![warn(missing_docs, unreachable_pub)]
 
+pub mod run_changes;
 pub mod seed;
 pub mod settings;
 pub mod variation;

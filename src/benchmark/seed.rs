@@ -9,7 +9,10 @@ use rand_chacha::{
 };
 use sha2::{Digest, Sha256};
 
-use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
+use softvt_common::{
+    episode_id::{EpisodeId, EpisodeSplit},
+    text::hex,
+};
 
 /// Purpose of a stream of random numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,10 +118,6 @@ fn sha256(parts: &[&[u8]]) -> [u8; 32] {
         hash.update(part);
     }
     hash.finalize().into()
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Source of the random streams of an episode: all values on which its initial state depends. Tasks that share a layout share

@@ -121,7 +121,7 @@ impl Request {
         let config = RunConfig {
             shifts: shifts.map_err(in_file)?,
             settings: settings.map_err(in_file)?,
-            seed: secret.as_ref().map_or(script.seed, |secret| secret.public_seed()),
+            seed: script.seed,
             secret,
             rigid_twin: script.rigid_twin,
             file: script.file,
@@ -144,7 +144,7 @@ impl Request {
     /// The script fails or returns no plan; a flag without effect.
     pub(crate) fn load(&self, command: &str) -> Result<ConfiguredScript, CliError> {
         let config = self.config.clone();
-        let loaded = softvt_script::load(&config.file, &config.options)?;
+        let loaded = config.load_script()?;
         plan_flags::check(command, self, &loaded.plan)?;
         Ok(ConfiguredScript { script: config.prepare_script(loaded)?, config })
     }

@@ -21,7 +21,7 @@ use std::{
 use serde::{Serialize, de::DeserializeOwned};
 use sha2::{Digest, Sha256};
 
-use crate::parallel::lock;
+use crate::{parallel::lock, text::hex};
 
 /// Version of the format of the files.
 const FORMAT: u32 = 1;
@@ -113,8 +113,7 @@ impl DiskCache {
             hash.update((part.len() as u64).to_le_bytes());
             hash.update(part);
         }
-        let hash = hash.finalize().iter().take(16).map(|byte| format!("{byte:02x}")).collect();
-        Some(CacheKey { kind, hash })
+        Some(CacheKey { kind, hash: hex(&hash.finalize()[..16]) })
     }
 
     /// The value of these inputs: a stored one, otherwise that of `compute`, which is stored if that took long.

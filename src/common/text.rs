@@ -97,6 +97,11 @@ fn rank_of_word(word: &str, candidate: &str) -> Option<Rank> {
     Some(Rank { difference, edits, length: candidate.len() })
 }
 
+/// Bytes in lower-case hexadecimal, two digits each.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 /// Formats a count with its noun: "1 task", "3 tasks".
 pub fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })

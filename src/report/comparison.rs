@@ -12,6 +12,7 @@ use super::{
     stored_run::StoredRun,
     terminal::{TaskName, task_names},
 };
+use softvt_benchmark::run_changes::RunChanges;
 use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
 use softvt_evaluation::stage::TaskStage;
 use softvt_records::{
@@ -182,7 +183,7 @@ pub(super) fn check_unique(runs: &[StoredRun]) -> Result<(), CompareError> {
 
 /// Hash of the secret seed of a judged run.
 fn seed_hash(run: &StoredRun) -> String {
-    run.manifest["seed_hash"].as_str().unwrap_or("none").to_owned()
+    run.changes().seed_hash.unwrap_or_else(|| "none".to_owned())
 }
 
 /// The error about two runs without common episodes, with the property in which they differ.
@@ -191,7 +192,7 @@ pub(super) fn no_common_episode(first: &[StoredRun], second: &[StoredRun]) -> Co
     let properties: [(&str, Property); 5] = [
         ("suite", |run| run.suite().to_owned()),
         ("seed hash", seed_hash),
-        ("seed", |run| run.manifest["seed"].to_string()),
+        ("seed", |run| run.changes().seed.to_string()),
         ("split", |run| run.text("split").to_owned()),
         ("tasks", |run| run.manifest["tasks"].to_string()),
     ];
@@ -239,23 +240,13 @@ pub(super) fn names(folders: &[impl AsRef<[StoredRun]>]) -> Vec<String> {
 /// Fields of `run.json` about the conditions of a run in which two runs of one suite differ. Of files and limits, those
 /// that both runs read are compared, since a run of fewer tasks reads fewer; the differing ones follow in brackets.
 fn differing_fields(first: &[StoredRun], second: &[StoredRun]) -> Vec<String> {
-    const CONDITION_FIELDS: [&str; 9] = [
-        "softvt",
-        "metric_id",
-        "twin",
-        "variation",
-        "shifts",
-        "options",
-        "settings",
-        "sources",
-        "thresholds",
-    ];
+    let condition_fields = || [&["softvt", "metric_id"], &RunChanges::EFFECTS[..], &KEYED_FIELDS].concat();
     /// Fields with an entry per file or asset.
     const KEYED_FIELDS: [&str; 2] = ["sources", "thresholds"];
     let mut found = BTreeSet::new();
     for a in first {
         let Some(b) = second.iter().find(|b| b.suite() == a.suite()) else { continue };
-        for field in CONDITION_FIELDS {
+        for field in condition_fields() {
             let (a, b) = (&a.manifest[field], &b.manifest[field]);
             if a == b {
                 continue;

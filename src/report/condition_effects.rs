@@ -205,7 +205,7 @@ mod tests {
             dir: Path::new(dir).to_owned(),
             manifest: json!({
                 "softvt": "x", "script": "x.lua", "suite": suite, "policy": "p", "seed": 0, "split": "validation",
-                "tasks": [0], "episodes": safe.len(), "shifts": shifts, "set": [], "twin_of": twin_of,
+                "tasks": [0], "episodes": safe.len(), "shifts": shifts, "set": [], "arguments": [], "twin_of": twin_of,
             }),
             records: records.collect(),
             is_finished: true,

@@ -55,7 +55,7 @@ fn summarize(run: StoredRun) -> RunSummary {
     summary.force_observed |= run.observes_forces();
     let mut method = summary.method_label();
     // Changes to the suite, such as `mass=2`.
-    let changes: Vec<String> = run.changes("shifts").chain(run.changes("set")).collect();
+    let changes = run.changes().assignments();
     if !changes.is_empty() {
         method += &format!(" · {}", changes.join(", "));
     }

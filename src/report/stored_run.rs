@@ -13,6 +13,7 @@ use super::{
     run_check::{RecordContradiction, first_contradiction},
     run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, is_truncated, read_episodes},
 };
+use softvt_benchmark::run_changes::RunChanges;
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::files::{self, FileError};
 use softvt_records::record::EpisodeRecord;
@@ -108,7 +109,7 @@ impl StoredRun {
 
     /// True if soft objects were made rigid.
     pub fn is_rigid_twin(&self) -> bool {
-        self.manifest["twin_of"].is_string() || self.manifest["twin"].is_string()
+        self.manifest["twin_of"].is_string() || self.changes().is_rigid_twin()
     }
 
     /// True if the policy has access to ground-truth state.
@@ -137,18 +138,15 @@ impl StoredRun {
         !self.is_finished || self.records.len() < self.requested_episodes()
     }
 
-    /// Entries of a list of changes in `run.json` (`shifts` or `set`), as `name=value`.
-    pub(super) fn changes(&self, field: &str) -> impl Iterator<Item = String> {
-        self.manifest[field].as_array().into_iter().flatten().map(|pair| {
-            let value = pair[1].as_str().map_or_else(|| pair[1].to_string(), str::to_owned);
-            format!("{}={value}", pair[0].as_str().unwrap_or_default())
-        })
+    /// The changes of the suite that `run.json` states; it was checked on reading.
+    pub fn changes(&self) -> RunChanges {
+        RunChanges::of_manifest(&self.manifest).unwrap_or_default()
     }
 
     /// The changes to the suite; `None` for a suite as it is.
     pub fn condition(&self) -> Option<ConditionLabel> {
         let twin = self.is_rigid_twin().then(|| "rigid twin".to_owned());
-        let changes: Vec<String> = self.changes("shifts").chain(self.changes("set")).chain(twin).collect();
+        let changes: Vec<String> = self.changes().assignments().into_iter().chain(twin).collect();
         let label = changes.join(", ");
         let (factor, value) = match &changes[..] {
             [] => return None,
@@ -163,8 +161,15 @@ impl StoredRun {
 
     /// Settings that the run under a condition and its unchanged run share.
     pub fn condition_group(&self) -> [String; 5] {
-        let text = |field: &str| self.manifest[field].to_string();
-        [self.original_suite().to_owned(), text("policy"), text("seed"), text("split"), text("vary")]
+        let text = |field: &str| self.text(field).to_owned();
+        let RunChanges { seed, vary, .. } = self.changes();
+        [
+            self.original_suite().to_owned(),
+            text("policy"),
+            seed.to_string(),
+            text("split"),
+            vary.unwrap_or_default(),
+        ]
     }
 
     /// Warnings for a reader of the results, one sentence each.
@@ -236,6 +241,7 @@ fn load_one(dir: &Path) -> Result<StoredRun, StoredRunError> {
         ["softvt", "script", "suite", "policy"].iter().try_for_each(|field| has(field, Value::is_string))?;
         has("tasks", Value::is_array)?;
         has("episodes", Value::is_u64)?;
+        RunChanges::of_manifest(&manifest).map_err(|error| invalid(error.to_string()))?;
         if !is_shard(&manifest["shard"]) {
             let what = format!("its shard is {}; expected I/N with 1 <= I <= N", manifest["shard"]);
             return Err(invalid(what));
@@ -292,7 +298,7 @@ mod tests {
         let load_shard = |shard: Value| {
             let manifest = serde_json::json!({
                 "softvt": VERSION, "script": "x.lua", "suite": "suite", "policy": "expert", "tasks": [0], "episodes": 1,
-                "shard": shard,
+                "arguments": [], "shifts": [], "set": [], "seed": 0, "shard": shard,
             });
             files::write_json(&root.path().join(RUN), &manifest).unwrap();
             files::write_json_lines(&root.path().join(EPISODES), &[sample_record()]).unwrap();
@@ -312,6 +318,7 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let manifest = serde_json::json!({
             "softvt": VERSION, "script": "x.lua", "suite": "suite", "policy": "expert", "tasks": [0], "episodes": 1,
+            "arguments": [], "shifts": [], "set": [], "seed": 0,
         });
         files::write_json(&root.path().join(RUN), &manifest).unwrap();
         let lines = root.path().join(EPISODES);

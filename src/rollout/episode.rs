@@ -29,7 +29,7 @@ use softvt_benchmark::{
     steps_per_control,
 };
 use softvt_common::episode_id::EpisodeId;
-use softvt_common::text::format_number;
+use softvt_common::text::{format_number, hex};
 use softvt_evaluation::{
     deformation::ReferenceShape,
     judge::{ControlStepScore, Judge, JudgeConfig},
@@ -636,7 +636,7 @@ pub fn checksum(actions: &[Action]) -> String {
     for number in actions.iter().flat_map(|action| action.to_array().into_iter().chain(action.force_n())) {
         hash.update(number.to_le_bytes());
     }
-    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+    hex(&hash.finalize())
 }
 
 /// The command, if it is farther from the tool than one step of the inverse kinematics reaches; both in the base frame.

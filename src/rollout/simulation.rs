@@ -7,6 +7,7 @@ use sha2::{Digest, Sha256};
 use super::{asset_cache::AssetCache, build, build_error::SceneBuildError, robot_instance::RobotInstance};
 use softvt_benchmark::CONTROL_DT;
 use softvt_common::cancel;
+use softvt_common::text::hex;
 use softvt_geometry::{Aabb, Pose, Vec3};
 use softvt_physics::{
     BodyId, ColliderId, ContactPartner, PhysicsParams, World,
@@ -386,5 +387,5 @@ pub fn state_hash(sim: &Simulation) -> String {
     for articulation in sim.world.articulations() {
         articulation.state.q.iter().for_each(|x| put(*x));
     }
-    hash.finalize().iter().take(8).map(|b| format!("{b:02x}")).collect()
+    hex(&hash.finalize()[..8])
 }

@@ -234,15 +234,16 @@ pub fn document(
     ConfiguredScript { config, script: loaded }: &ConfiguredScript,
     tables: &[ConditionTable],
 ) -> Value {
+    let changes = config.changes();
     let mut document = json!({
         "softvt": env!("CARGO_PKG_VERSION"),
         "script": loaded.sources.main,
         "policy": config.policy.name,
-        "seed": config.seed,
+        "seed": changes.seed,
         "suites": tables,
     });
-    if let Some(secret) = &config.secret {
-        document["seed_hash"] = json!(secret.hash());
+    if let Some(hash) = changes.seed_hash {
+        document["seed_hash"] = json!(hash);
     }
     document
 }

@@ -14,7 +14,11 @@ use crate::{
     observer::{JobList, Observer, SilentObserver},
     policy::PolicyConfig,
 };
-use softvt_benchmark::{ShiftValue, Suite, seed::SecretSeed};
+use softvt_benchmark::{
+    ShiftValue, Suite,
+    run_changes::{RunChanges, Twin},
+    seed::SecretSeed,
+};
 use softvt_common::{cancel, parallel};
 use softvt_script::LoadedScript;
 
@@ -103,7 +107,7 @@ pub struct RunConfig {
     pub file: PathBuf,
     /// Values of the options that the script declares, as `--name=value`.
     pub options: Vec<String>,
-    /// Base seed. [`RunConfig::load`] replaces it by the public seed of a secret.
+    /// Base seed of a run without a secret; [`RunConfig::base_seed`] is that of every run.
     pub seed: u64,
     /// Secret of a judged run.
     pub secret: Option<SecretSeed>,
@@ -177,15 +181,20 @@ impl RunConfig {
     ///
     /// # Errors
     /// The script fails or returns no plan.
-    pub fn load(mut self) -> Result<ConfiguredScript, RunError> {
-        if let Some(secret) = &self.secret {
-            self.seed = secret.public_seed();
-        }
-        let script = softvt_script::load(&self.file, &self.options)?;
-        Ok(ConfiguredScript { script: self.prepare_script(script)?, config: self })
+    pub fn load(self) -> Result<ConfiguredScript, RunError> {
+        let script = self.prepare_script(self.load_script()?)?;
+        Ok(ConfiguredScript { script, config: self })
     }
 
-    /// A loaded script whose suites vary as the configuration says.
+    /// Loads the script with its options. [`Self::prepare_script`] makes it ready for the run.
+    ///
+    /// # Errors
+    /// The script fails or returns no plan.
+    pub fn load_script(&self) -> Result<LoadedScript, RunError> {
+        Ok(softvt_script::load(&self.file, &self.options)?)
+    }
+
+    /// A loaded script with the secret, whose suites vary as the configuration says.
     ///
     /// # Errors
     /// A variation that is not valid, or does not fit a suite.
@@ -198,6 +207,32 @@ impl RunConfig {
         }
         loaded.secret.clone_from(&self.secret);
         Ok(loaded)
+    }
+
+    /// Base seed of the run: the public seed of its secret, if it has one.
+    pub fn base_seed(&self) -> u64 {
+        self.secret.as_ref().map_or(self.seed, SecretSeed::public_seed)
+    }
+
+    /// The changes of the suite, as `run.json` states them.
+    pub fn changes(&self) -> RunChanges {
+        RunChanges {
+            arguments: self.options.clone(),
+            shifts: self.shifts.clone(),
+            set: self.settings.clone(),
+            twin: self.rigid_twin.then_some(Twin::Rigid),
+            vary: self.vary.as_ref().map(|file| file.display().to_string()),
+            seed: self.base_seed(),
+            seed_hash: self.secret.as_ref().map(SecretSeed::hash),
+        }
+    }
+
+    /// This configuration with the changes of another run. A judged run also needs its secret.
+    pub(crate) fn with_changes(self, changes: RunChanges, secret: Option<SecretSeed>) -> Self {
+        let rigid_twin = changes.is_rigid_twin();
+        let RunChanges { arguments, shifts, set, twin: _, vary, seed, seed_hash: _ } = changes;
+        let (options, settings, vary) = (arguments, set, vary.map(PathBuf::from));
+        Self { options, shifts, settings, rigid_twin, vary, seed, secret, ..self }
     }
 
     /// An error about the script.

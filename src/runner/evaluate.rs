@@ -78,8 +78,9 @@ impl<'a> RunLog<'a> {
         let mut seen = BTreeSet::new();
         for (number, record) in self.records.iter().enumerate() {
             let (header, id, index) = (&record.header, &record.header.id, record.header.id.index());
-            let is_own =
-                id.suite == run.name && id.base_seed == config.seed && header.policy == config.policy.name;
+            let is_own = id.suite == run.name
+                && id.base_seed == config.base_seed()
+                && header.policy == config.policy.name;
             let problem = if !is_own || run.jobs.find(index).is_none() {
                 "belongs to another run"
             } else if !seen.insert(index) {

@@ -135,7 +135,7 @@ pub fn run<E: From<RunError>>(
         script: &loaded.sources.main,
         experiment: name,
         points,
-        seed: config.seed,
+        seed: config.base_seed(),
         options: options.map(|option| (option.name.clone(), format!("{:?}", option.value))).collect(),
         arguments: &config.options,
         set: &config.settings,
@@ -154,7 +154,8 @@ pub fn check(config: &RunConfig) -> Result<(), RunError> {
 }
 
 fn input(config: &RunConfig) -> Result<ExperimentInput, RunError> {
-    ExperimentInput::new(config.settings.clone(), config.seed).map_err(|error| input_error(config, &error))
+    ExperimentInput::new(config.settings.clone(), config.base_seed())
+        .map_err(|error| input_error(config, &error))
 }
 
 fn input_error(config: &RunConfig, error: &ExperimentInputError) -> RunError {
@@ -170,8 +171,8 @@ fn refuse_changed_project_files(config: &RunConfig, loaded: &LoadedScript) -> Re
     if let Some((path, _)) = config.settings.first() {
         return Err(config.error_of("settings", path, message));
     }
-    if config.seed != 0 {
-        return Err(config.error_of("seed", config.seed, message));
+    if config.base_seed() != 0 {
+        return Err(config.error_of("seed", config.base_seed(), message));
     }
     let changed = |option: &&OptionSpec| option.needs_out && option.value != option.default;
     match loaded.options.iter().find(changed) {

@@ -8,6 +8,7 @@ use sha2::{Digest, Sha256};
 use crate::{episode_list::EpisodeList, error::RunError};
 use softvt_common::episode_id::{EpisodeIndex, EpisodeSplit};
 use softvt_common::files::FileError;
+use softvt_common::text::hex;
 use softvt_policy::{Action, EpisodeBrief};
 use softvt_report::{
     actions,
@@ -73,9 +74,8 @@ impl RecordedRuns {
             RunError::of_setting("policy", self.dir.display(), message)
         })?;
         let refuse = |message: String| Err(RunError::of_setting("policy", run.dir.display(), message));
-        let seed = run.manifest["seed"].as_u64();
-        if seed != Some(base_seed) {
-            let seed = seed.map_or("unknown".to_owned(), |seed| seed.to_string());
+        let seed = run.changes().seed;
+        if seed != base_seed {
             return refuse(format!("its seed is {seed}, that of this run {base_seed}"));
         }
         let (split, own) = (run.text("split"), EpisodeSplit::Validation.name());
@@ -126,7 +126,7 @@ fn suite_label(suite: &str, is_twin: bool) -> String {
 }
 
 fn is_rigid_twin(run: &StoredRun) -> bool {
-    run.manifest["twin"].is_string()
+    run.changes().is_rigid_twin()
 }
 
 fn episodes_with_actions(run: &StoredRun) -> impl Iterator<Item = EpisodeIndex> {
@@ -145,5 +145,5 @@ fn digest(run: &StoredRun) -> Result<String, FileError> {
         hash.update((bytes.len() as u64).to_le_bytes());
         hash.update(&bytes);
     }
-    Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
+    Ok(hex(&hash.finalize()))
 }

@@ -6,7 +6,6 @@ use std::{
     sync::Arc,
 };
 
-use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
 use crate::{
@@ -20,7 +19,7 @@ use crate::{
     selection::{select_tasks, suites_of},
     suite_run::{PreparedRun, SuiteRun},
 };
-use softvt_benchmark::{Suite, seed::SecretSeed};
+use softvt_benchmark::{Suite, run_changes::RunChanges, seed::SecretSeed};
 use softvt_common::cancel;
 use softvt_common::episode_id::{EpisodeIndex, EpisodeSplit};
 use softvt_common::parallel;
@@ -133,28 +132,24 @@ impl StoredManifest<'_> {
         self.manifest[field].as_str().unwrap_or_default()
     }
 
-    fn field<T: DeserializeOwned>(&self, field: &str) -> Result<T, RunError> {
-        serde_json::from_value(self.manifest[field].clone()).map_err(|_| {
+    fn changes(&self) -> Result<RunChanges, RunError> {
+        RunChanges::of_manifest(self.manifest).map_err(|error| {
             let path = self.path.display();
-            RunError::input(format!("{path}/run.json has no valid field {field:?}; it is of another version"))
+            RunError::input(format!(
+                "{path}: its changes of the suite cannot be read: {error}; it is of another version"
+            ))
         })
     }
 
     /// The configuration of the run, for one task and with a policy whose actions come from elsewhere.
     fn config(&self, task: usize) -> Result<RunConfig, RunError> {
+        let changes = self.changes()?;
+        let secret = self.secret(changes.seed_hash.as_deref())?.cloned();
         Ok(RunConfig {
-            file: self.text("script").into(),
-            options: self.field("arguments")?,
-            seed: self.field("seed")?,
-            secret: self.secret()?.cloned(),
-            settings: self.field("set")?,
-            shifts: self.field("shifts")?,
-            rigid_twin: self.manifest["twin"].is_string(),
-            vary: self.manifest["vary"].as_str().map(PathBuf::from),
             policy: PolicyConfig::external("replay"),
             tasks: vec![task.to_string()],
             observer: self.observer.clone(),
-            ..RunConfig::default()
+            ..RunConfig::of(self.text("script")).with_changes(changes, secret)
         })
     }
 
@@ -162,9 +157,9 @@ impl StoredManifest<'_> {
     ///
     /// # Errors
     /// The secret is missing, is that of another run, or was given for a run without one.
-    fn secret(&self) -> Result<Option<&SecretSeed>, RunError> {
+    fn secret(&self, seed_hash: Option<&str>) -> Result<Option<&SecretSeed>, RunError> {
         let path = self.path.display();
-        match (self.manifest["seed_hash"].as_str(), self.secret) {
+        match (seed_hash, self.secret) {
             (None, None) => Ok(None),
             (Some(hash), Some(given)) if given.secret.hash() == hash => Ok(Some(&given.secret)),
             (Some(hash), Some(given)) => Err(RunError::of_setting(

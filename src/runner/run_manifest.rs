@@ -10,7 +10,10 @@ use serde_json::{Map, Value, json};
 
 use crate::{error::RunError, recorded_runs::ReplaySource, suite_run::PreparedRun};
 use softvt_benchmark::{
-    NeededKnowledge, ShiftValue, seed::SecretSeed, settings::Settings, variation::VariationRanges,
+    NeededKnowledge, ShiftValue,
+    run_changes::{RunChanges, Twin},
+    settings::Settings,
+    variation::VariationRanges,
 };
 use softvt_common::files;
 use softvt_dataset::card::ImportedFile;
@@ -29,7 +32,7 @@ pub(crate) struct RunManifest<'a> {
     script: String,
     suite: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
-    twin: Option<&'a str>,
+    twin: Option<Twin>,
     /// Ranges within which the episodes vary, if they do.
     #[serde(skip_serializing_if = "Option::is_none")]
     variation: Option<&'a VariationRanges>,
@@ -76,13 +79,13 @@ pub(crate) struct RunManifest<'a> {
     /// The part of the run, such as 2/8.
     #[serde(skip_serializing_if = "Option::is_none")]
     shard: Option<String>,
-    shifts: &'a [ShiftValue],
+    shifts: Vec<ShiftValue>,
     /// Values of all options of the script.
     options: BTreeMap<String, String>,
     /// Options of the script as they were typed.
-    arguments: &'a [String],
+    arguments: Vec<String>,
     /// Arguments of `--set`.
-    set: &'a [(String, String)],
+    set: Vec<(String, String)>,
     settings: &'a Settings,
     /// SHA-256 of files by name.
     sources: BTreeMap<String, String>,
@@ -98,14 +101,15 @@ impl<'a> RunManifest<'a> {
     /// The manifest of a prepared run of `episodes` per task.
     pub(crate) fn new(run: &'a PreparedRun, episodes: u32) -> Self {
         let config = run.config;
+        let RunChanges { arguments, shifts, set, twin, vary, seed, seed_hash } = config.changes();
         let options = run.loaded.options.iter();
         Self {
             softvt: env!("CARGO_PKG_VERSION"),
             script: run.loaded.sources.main.clone(),
             suite: &run.suite.name,
-            twin: config.rigid_twin.then_some("rigid"),
+            twin,
             variation: run.suite.vary.as_ref(),
-            vary: config.vary.as_ref().map(|file| file.display().to_string()),
+            vary,
             // Of the suite as it is: neither of its twin, nor with another variation.
             needs: run.suite.needs.filter(|_| config.vary.is_none() && !config.rigid_twin),
             twin_of: run.suite.twin_of.as_deref(),
@@ -118,16 +122,16 @@ impl<'a> RunManifest<'a> {
             imported: Some(&run.imported[..]).filter(|files| !files.is_empty()),
             replan: config.policy.replan,
             privileged: run.is_privileged(),
-            seed: config.seed,
-            seed_hash: config.secret.as_ref().map(SecretSeed::hash),
+            seed,
+            seed_hash,
             split: run.split.name(),
             tasks: run.jobs.tasks().iter().map(|task| task.id).collect(),
             episodes,
             shard: config.shard.map(|shard| shard.to_string()),
-            shifts: &config.shifts,
+            shifts,
             options: options.map(|option| (option.name.clone(), format!("{:?}", option.value))).collect(),
-            arguments: &config.options,
-            set: &config.settings,
+            arguments,
+            set,
             settings: &run.settings,
             sources: run.sources.clone(),
             metric_id: METRIC_ID,

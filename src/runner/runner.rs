@@ -16,7 +16,7 @@ use crate::{
     selection::{check_episodes, check_parent_folder, next_run_dir, run_dir, select_suites},
     suite_run::SuiteRun,
 };
-use softvt_benchmark::{Plan, ShiftValue, seed::SecretSeed};
+use softvt_benchmark::{Plan, ShiftValue};
 use softvt_records::record::EpisodeRecord;
 use softvt_script::LoadedScript;
 
@@ -66,7 +66,7 @@ impl<'a> Runner<'a> {
 
     /// Base seed. That of a secret stays.
     pub fn seed(self, seed: u64) -> Self {
-        self.change(|config| config.seed = config.secret.as_ref().map_or(seed, SecretSeed::public_seed))
+        self.change(|config| config.seed = seed)
     }
 
     /// A shift of the suite with its value, in addition to those of the configuration.

@@ -150,7 +150,7 @@ impl<'a> ServedRun<'a> {
     /// True if an episode is one of the run that the folder did not have when the server started.
     fn selects(&self, id: &EpisodeId) -> bool {
         let (run, index) = (self.run, id.index());
-        let is_own = id.base_seed == run.config.seed && id.split == run.split;
+        let is_own = id.base_seed == run.config.base_seed() && id.split == run.split;
         is_own && run.jobs.find(index).is_some() && !self.resumed.contains(&index)
     }
 

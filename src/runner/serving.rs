@@ -8,7 +8,7 @@ use crate::{
     selection::{check_distinct_out_dirs, check_parent_folder, no_suites, run_dir, suites_of},
     suite_run::{PreparedRun, SuiteRun},
 };
-use softvt_benchmark::{Plan, Suite, seed::SecretSeed};
+use softvt_benchmark::{Plan, Suite};
 use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_policy::Observation;
 use softvt_script::LoadedScript;
@@ -74,7 +74,7 @@ pub fn server_config<'a>(
         profile: profile.clone(),
         effort_n: runs.iter().map(|run| run.settings.robot.gripper.effort).fold(f64::INFINITY, f64::min),
         privileged: config.policy.privileged,
-        seed: config.seed,
+        seed: config.base_seed(),
         has_secret_seed: config.secret.is_some(),
         split: runs.first().map_or(EpisodeSplit::Validation, |run| run.split),
         fingerprint: provenance_hash(config, loaded),
@@ -112,14 +112,6 @@ fn served_suite(run: &PreparedRun) -> Suite {
 
 /// Hash of all that determines an episode, except its index and the actions of the client.
 fn provenance_hash(config: &RunConfig, loaded: &LoadedScript) -> String {
-    let all = json!([
-        env!("CARGO_PKG_VERSION"),
-        loaded.file_hashes(),
-        config.options,
-        config.shifts,
-        config.settings,
-        config.rigid_twin,
-        config.secret.as_ref().map(SecretSeed::hash)
-    ]);
+    let all = json!([env!("CARGO_PKG_VERSION"), loaded.file_hashes(), config.changes().hash()]);
     softvt_script::sha256(all.to_string().as_bytes())
 }

@@ -187,7 +187,7 @@ impl<'a> SuiteRun<'a> {
             task: task.id,
             prompt: task.prompt.clone(),
             episode,
-            seed: self.config.seed,
+            seed: self.config.base_seed(),
             alias: self.alias(task, episode),
         }
     }
@@ -203,7 +203,7 @@ impl<'a> SuiteRun<'a> {
             suite: self.suite.name.clone(),
             task: task.id,
             episode,
-            base_seed: self.config.seed,
+            base_seed: self.config.base_seed(),
             split: self.split,
         }
     }
@@ -550,8 +550,9 @@ pub(crate) fn find_replay_source(
     suite: &Suite,
     jobs: &EpisodeList,
 ) -> Result<Option<ReplaySource>, RunError> {
-    let source =
-        |recorded: &RecordedRuns| recorded.replay_source(&suite.name, config.rigid_twin, config.seed, jobs);
+    let source = |recorded: &RecordedRuns| {
+        recorded.replay_source(&suite.name, config.rigid_twin, config.base_seed(), jobs)
+    };
     config.policy.recorded().map(source).transpose()
 }
 

@@ -7,6 +7,7 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 use super::asset::{Asset, Body, Joint, MovingPart, SoftMaterial};
+use softvt_common::text::hex;
 use softvt_geometry::shape::Shape;
 use softvt_physics::contact::Friction;
 
@@ -61,7 +62,7 @@ impl Asset {
         let mechanics = Mechanics { shape: self.shape.unpainted(), body, friction: self.friction };
         let mut text = String::new();
         write_canonical(&serde_json::to_value(mechanics).unwrap_or_default(), &mut text);
-        Sha256::digest(text).iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+        hex(&Sha256::digest(text)[..8])
     }
 }
 

@@ -20,6 +20,7 @@ use self::demo_reader::DemoReader;
 use super::{DatasetError, TaskFile};
 use softvt_common::episode_id::EpisodeSplit;
 use softvt_common::files::FileError;
+use softvt_common::text::hex;
 use softvt_policy::ToolCommand;
 
 pub use foreign::{
@@ -85,7 +86,7 @@ fn sha256(path: &Path) -> Result<String, DatasetError> {
     let mut file = std::fs::File::open(path).map_err(FileError::io("read", path))?;
     let mut hash = Sha256::new();
     std::io::copy(&mut file, &mut hash).map_err(FileError::io("read", path))?;
-    Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
+    Ok(hex(&hash.finalize()))
 }
 
 #[cfg(test)]

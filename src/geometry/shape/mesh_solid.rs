@@ -49,7 +49,7 @@ fn digest(mesh: &Mesh) -> String {
     let coordinates = mesh.vertices.iter().flat_map(|v| v.iter());
     coordinates.for_each(|x| hash.update(((x * 1e9).round() as i64).to_le_bytes()));
     mesh.triangles.iter().flatten().for_each(|corner| hash.update(corner.to_le_bytes()));
-    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+    format!("{:x}", hash.finalize())
 }
 
 impl MeshSolid {

@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use maud::{Markup, html};
-use serde_json::Value;
 
 use super::images::{ByteBudget, DataImage, embed_image, relative_link};
 use crate::{
@@ -112,6 +111,7 @@ fn with_unbreakable_units(text: &str) -> String {
 /// Commands that render an episode without a video, and that replay it.
 fn view_commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
     let (run, manifest) = (&run.run, &run.run.manifest);
+    let changes = run.changes();
     // The script that returns the suite itself: `view` does not accept a list of suites, which may be what was run.
     let main = run.text("script");
     let located = |path: &str| located(path, manifest["folder"].as_str());
@@ -119,13 +119,8 @@ fn view_commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
     let is_main = sibling == main || manifest["sources"].get(&sibling).is_none();
     let mut view = vec![located(if is_main { main } else { &sibling })];
     if is_main {
-        let arguments = manifest["arguments"].as_array().into_iter().flatten().filter_map(Value::as_str);
-        view.extend(arguments.map(str::to_owned));
+        view.extend(changes.arguments.clone());
     }
-    // The value of this flag follows an equals sign.
-    view.extend(manifest["vary"].as_str().map(|file| format!("--vary={file}")));
-    let is_judged = manifest["seed_hash"].is_string();
-    view.extend(manifest["twin"].is_string().then(|| "--rigid-twin".to_owned()));
     let mut add = |flag: &str, value: String| view.extend([flag.to_owned(), value]);
     add("--task", id.task.to_string());
     // Defaults are omitted.
@@ -141,15 +136,8 @@ fn view_commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
         (None, None) => run.text("policy").to_owned(),
     };
     add("--policy", policy);
-    if is_judged {
-        add("--seed-file", "FILE".to_owned());
-    } else if id.base_seed > 0 {
-        add("--seed", id.base_seed.to_string());
-    }
-    for (flag, field) in [("--shift", "shifts"), ("--set", "set")] {
-        run.changes(field).for_each(|change| add(flag, change));
-    }
-    add("--out", "seen".to_owned());
+    view.extend(changes.flags());
+    view.extend(["--out", "seen"].map(str::to_owned));
     let view: Vec<String> = view.iter().map(|word| quoted(word)).collect();
     let replayed = quoted(&run.dir.display().to_string());
     [
@@ -158,7 +146,7 @@ fn view_commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
             "softvt replay {replayed} {}/{}{}",
             id.task,
             id.episode,
-            if is_judged { " --seed-file FILE" } else { "" }
+            if changes.seed_hash.is_some() { " --seed-file FILE" } else { "" }
         ),
     ]
 }

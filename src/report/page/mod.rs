@@ -10,6 +10,7 @@ use std::path::Path;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde_json::Value;
 
+use softvt_benchmark::run_changes::RunChanges;
 use softvt_common::text::{counted, escape_control};
 
 use super::{
@@ -200,7 +201,7 @@ fn settings(summary: &RunSummary) -> Markup {
         ("Script", command_line(&manifest["script"], &manifest["arguments"])),
         ("Policy", summary.summary.method_label()),
         ("softvt", value_text(&manifest["softvt"])),
-        ("Seed, split", format!("{}, {}", seed_text(manifest), value_text(&manifest["split"]))),
+        ("Seed, split", format!("{}, {}", seed_text(&summary.run.changes()), value_text(&manifest["split"]))),
         ("Episodes", format!("{} of {}", summary.run.records.len(), summary.run.requested_episodes())),
         ("Shifts", pairs(&manifest["shifts"])),
         ("Settings changed", pairs(&manifest["set"])),
@@ -217,9 +218,8 @@ fn settings(summary: &RunSummary) -> Markup {
 }
 
 /// The seed of a run. That of a judged run is secret; its hash identifies it.
-fn seed_text(manifest: &Value) -> String {
-    let hash = manifest["seed_hash"].as_str();
-    hash.map_or_else(|| value_text(&manifest["seed"]), |hash| format!("secret, SHA-256 {hash}"))
+fn seed_text(RunChanges { seed, seed_hash, .. }: &RunChanges) -> String {
+    seed_hash.as_ref().map_or_else(|| seed.to_string(), |hash| format!("secret, SHA-256 {hash}"))
 }
 
 fn value_text(value: &Value) -> String {

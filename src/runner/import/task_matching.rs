@@ -137,7 +137,7 @@ fn forced_task<'a>(config: &RunConfig, suites: &'a [Suite]) -> Result<Option<Sui
 
 /// The attempt number of a demonstration of softvt.
 fn own_attempt(config: &RunConfig, file: &ForeignFile, demo: &ForeignDemo) -> Result<Option<u32>, RunError> {
-    let own = config.seed;
+    let own = config.base_seed();
     match &demo.initial_condition {
         InitialCondition::OtherSimulator { .. } => Ok(None),
         InitialCondition::SoftvtEpisode { seed, attempt, .. } if *seed == own => Ok(Some(*attempt)),

@@ -15,7 +15,7 @@ use super::{
     error::{ScriptError, SourceLine},
     privilege::is_hidden_path,
 };
-use softvt_common::text::suggest;
+use softvt_common::text::{hex, suggest};
 
 /// The embedded folders, by their names in the repository.
 static EMBEDDED: [(&str, Dir<'_>); 3] = [
@@ -48,7 +48,7 @@ pub struct ScriptFiles {
 
 /// SHA-256 in lower-case hexadecimal.
 pub fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
+    hex(&Sha256::digest(bytes))
 }
 
 impl ScriptFiles {
