@@ -251,11 +251,11 @@
 
 ---Returns an empty world: soft bodies among fixed or prescribed solids, without a robot. Settings of the command line, --set physics.…, take precedence in experiments.
 ---@class softvt.WorldSpec
----@field dt? number Time step. Expects seconds in 0.00001..0.05. Default 0.016666666666666666.
----@field rayleigh_mass? number Mass-proportional Rayleigh damping. Expects a number (1/s) in 0..1000. Default 0.
----@field rayleigh_stiffness? number Stiffness-proportional Rayleigh damping. Expects seconds in 0..1. Default 0.005.
+---@field dt? number Time step: the setting physics.dt, with its default and range. Expects seconds.
+---@field rayleigh_mass? number Mass-proportional Rayleigh damping: the setting physics.rayleigh_mass. Expects a number (1/s).
+---@field rayleigh_stiffness? number Stiffness-proportional Rayleigh damping: the setting physics.rayleigh_stiffness. Expects seconds.
 ---@field gravity? number[] Gravity; {0, 0, -9.81} by default. Expects a list of 3 numbers (m/s²).
----@field sleeping? boolean True if bodies at rest fall asleep. Default true.
+---@field sleeping? boolean True if bodies at rest fall asleep: the setting physics.sleeping.
 
 ---Builds a scene with the robot and lets it settle. Deformation refers to the settled shapes.
 ---@class softvt.SimulateSpec

@@ -73,7 +73,7 @@ end
 local function release_pose(arm, scene, spec, held)
   local object, target = scene:object(spec.object), scene:object(spec.target)
   local surface = grasp.bottom(target) + (target.hints.surface_m or target.size[3]) + held.height + RELEASE_HEIGHT
-  local width = 0.08 * (1 - grasp.clear_closure(object, nil, held.width))
+  local width = arm.stroke * (1 - grasp.clear_closure(object, nil, held.width))
   -- The object's offset from the tool rotates with the hand.
   local dx, dy = object.centre[1] - arm.pose.x, object.centre[2] - arm.pose.y
   local best, rotations = nil, place_rotations(object, target)

@@ -14,7 +14,7 @@ use super::{
 use softvt_benchmark::CONTROL_HZ;
 use softvt_media::video::VideoWriter;
 use softvt_rollout::StateRecording;
-use softvt_scene::Camera;
+use softvt_scene::{Camera, STANDARD_CAMERAS};
 use softvt_sensing::{
     camera::resize,
     tactile::{MarkerStyle, Markers},
@@ -164,8 +164,6 @@ impl ImageOutputs {
     }
 }
 
-/// Cameras that every scene has.
-const CAMERAS: [&str; 2] = ["third_person", "wrist"];
 /// Cell of a preview, pixels: the size of a tactile image.
 const CELL_WIDTH: u32 = 320;
 const CELL_HEIGHT: u32 = 240;
@@ -192,7 +190,7 @@ impl<'a> StepRenderer<'a> {
     /// The scene lacks the camera `third_person` or `wrist`.
     fn new(recording: &'a mut StateRecording) -> Result<Self, DatasetError> {
         let camera = |name: &str| Ok(recording.sensors.camera(name)?.clone());
-        let cameras = CAMERAS.into_iter().map(camera).collect::<Result<_, DatasetError>>()?;
+        let cameras = STANDARD_CAMERAS.into_iter().map(camera).collect::<Result<_, DatasetError>>()?;
         Ok(Self { recording, cameras })
     }
 

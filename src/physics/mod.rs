@@ -16,6 +16,6 @@ mod sparse;
 pub mod world;
 
 pub use ids::{ArticulationId, BodyId, ColliderId, ContactPartner, KinematicId, LinkId, RigidId, SoftId};
-pub use params::PhysicsParams;
+pub use params::{PhysicsParams, STANDARD_GRAVITY};
 pub use solver::SolverStats;
 pub use world::World;

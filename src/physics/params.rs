@@ -1,6 +1,10 @@
 //! Parameters of the mechanics.
 
 use softvt_common::range::Range;
+use softvt_geometry::Vec3;
+
+/// Gravity of every scene that states no other, m/s².
+pub const STANDARD_GRAVITY: Vec3 = Vec3::new(0.0, 0.0, -9.81);
 
 softvt_common::settings! {
     /// Parameters of the mechanics. The defaults are those of the benchmark.

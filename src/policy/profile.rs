@@ -4,10 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{GripCommand, SensorStreams};
 use softvt_robot::{GripTarget, Side};
+use softvt_scene::STANDARD_CAMERAS;
 use softvt_sensing::tactile::{HISTORY_LENGTH, MarkerStyle, TactileMosaicLayout};
-
-/// Names of the cameras that every scene has.
-const CAMERAS: [&str; 2] = ["third_person", "wrist"];
 
 /// Interface of a policy: the entries of its observations and the encoding of its actions.
 ///
@@ -82,7 +80,7 @@ pub enum InputSource {
         half_turn: bool,
     },
     /// Object at each pixel of a camera image, uint16 (height, width): its number in the scene, from 1; 0 in the
-    /// background, 1000 for the robot.
+    /// background, [`ROBOT_SEGMENTATION_ID`](softvt_scene::ROBOT_SEGMENTATION_ID) for the robot.
     Segmentation {
         /// Name of the camera.
         camera: String,
@@ -394,8 +392,8 @@ impl Profile {
         };
         let input = ProfileInput::new;
         let mut inputs = vec![
-            input(both("image"), plain(CAMERAS[0])),
-            input(both("wrist_image"), plain(CAMERAS[1])),
+            input(both("image"), plain(STANDARD_CAMERAS[0])),
+            input(both("wrist_image"), plain(STANDARD_CAMERAS[1])),
             input(both("state"), state(&[finger])),
             input(vec!["prompt".to_owned()], InputSource::Prompt),
         ];
@@ -439,8 +437,8 @@ impl Profile {
             "libero" => {
                 let turned =
                     |camera: &str| InputSource::Camera { camera: camera.to_owned(), half_turn: true };
-                inputs[0].source = turned(CAMERAS[0]);
-                inputs[1].source = turned(CAMERAS[1]);
+                inputs[0].source = turned(STANDARD_CAMERAS[0]);
+                inputs[1].source = turned(STANDARD_CAMERAS[1]);
                 inputs[2].source = state(&[StatePart::FingerPair]);
                 inputs[..3].iter_mut().for_each(|input| input.keys.truncate(1));
                 ActionEncoding::new(
@@ -503,7 +501,7 @@ mod tests {
     #[test]
     fn streams_are_those_of_the_inputs() {
         let streams = |name| Profile::named(name).unwrap().streams();
-        assert_eq!(streams("vision").cameras, CAMERAS);
+        assert_eq!(streams("vision").cameras, STANDARD_CAMERAS);
         assert!(!streams("vision").tactile && !streams("visuo_tactile").force);
         assert!(streams("visuo_tactile").tactile && streams("softvtbench").force);
         let visuo_tactile = streams("visuo_tactile");

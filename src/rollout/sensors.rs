@@ -22,7 +22,7 @@ use softvt_robot::{
     pads,
     panda::{self, ARM_DOFS},
 };
-use softvt_scene::{Camera, CameraMount, Scene};
+use softvt_scene::{Camera, CameraMount, ROBOT_SEGMENTATION_ID, Scene};
 use softvt_sensing::{
     camera::{
         CameraError, FrameView, RenderObject, RenderScene, RenderedImage, Renderer, check_cameras,
@@ -81,8 +81,6 @@ const TRIAL_EDGE: usize = 16;
 
 /// Taxels of the force maps along x and y, 1 mm each.
 const TAXELS: [usize; 2] = [25, 21];
-/// Segmentation id of the robot. Objects have ids from 1 in the order of the scene, each followed by its parts.
-pub const ROBOT_SEGMENTATION_ID: u16 = 1000;
 
 impl Sensors {
     /// The sensors of a simulation.

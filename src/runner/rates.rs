@@ -18,6 +18,7 @@ use softvt_common::{
 };
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
 use softvt_rollout::{AssetCache, Controller, Episode, EpisodeSpec, SensorAssets, Simulation};
+use softvt_scene::STANDARD_CAMERAS;
 use softvt_script::{EpisodeSetup, ExpertController, GripMode, LoadedScript, SceneChanges};
 
 /// What an observation holds, in the order of [`MachineRates::streams`].
@@ -120,7 +121,7 @@ pub(crate) fn all_streams() -> SensorStreams {
 
 /// The streams of a row of [`STREAMS`].
 fn streams_of(row: usize) -> SensorStreams {
-    let cameras = ["third_person", "wrist"].map(str::to_owned).into();
+    let cameras = STANDARD_CAMERAS.map(str::to_owned).into();
     match row {
         0 => SensorStreams::default(),
         1 => SensorStreams { cameras, ..SensorStreams::default() },

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use serde::{Deserialize, Serialize};
 
 use super::visual::Visual;
-use softvt_common::range::RangeError;
+use softvt_common::range::{Range, RangeError};
 use softvt_geometry::{Pose, Vec3, mass::mass_properties, shape::Shape};
 use softvt_physics::{contact::Friction, fem::ElasticMaterial};
 
@@ -36,19 +36,26 @@ pub struct SoftMaterial {
     /// Elasticity and density; the shipped pastries have Young's moduli of 2.5e4 to 2.2e5 Pa.
     #[serde(flatten)]
     pub elastic: ElasticMaterial,
-    /// Voxels (finite elements) along the longest edge of the bounding box, 1..=[`Self::MAX_RESOLUTION`].
+    /// Voxels (finite elements) along the longest edge of the bounding box, within [`Self::RESOLUTION`].
     pub resolution: usize,
-    /// Spacing of the contact samples on surfaces that a gripper can reach (|n_z| ≤ 0.7 in the object frame), m.
+    /// Spacing of the contact samples on surfaces that a gripper can reach (|n_z| ≤ 0.7 in the object frame), m,
+    /// within [`Self::GRASP_SPACING_M`].
     pub grasp_spacing: f64,
-    /// Compressive strain, in (0, 1], at which cell walls buckle and a plateau of stress begins.
+    /// Compressive strain, within [`Self::STRAIN`], at which cell walls buckle and a plateau of stress begins.
     pub collapse_strain: Option<f64>,
-    /// Compressive strain, in (0, 1], that leaves a visible crack or set.
+    /// Compressive strain, within [`Self::STRAIN`], that leaves a visible crack or set.
     pub damage_strain: Option<f64>,
 }
 
 impl SoftMaterial {
     /// Largest allowed resolution.
     pub const MAX_RESOLUTION: usize = 64;
+    /// Range of the resolution.
+    pub const RESOLUTION: Range = Range::closed(1.0, Self::MAX_RESOLUTION as f64);
+    /// Range of the spacing of contact samples, m.
+    pub const GRASP_SPACING_M: Range = Range::closed(1e-4, 0.02);
+    /// Range of the strains at which the material changes.
+    pub const STRAIN: Range = Range::above(0.0, 1.0);
 
     /// Strain up to which the material is stable and undamaged: the smaller of its two limits.
     pub fn stable_strain(&self) -> Option<f64> {

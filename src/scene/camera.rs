@@ -76,13 +76,18 @@ fn fovy_from_lens(focal: f64, aperture: f64) -> f64 {
 /// Width and height of the default policy images, pixels.
 const POLICY_IMAGE_EDGE: usize = 224;
 
+/// Names of the cameras that every scene has: [`Camera::third_person_table`] and [`Camera::wrist`].
+pub const STANDARD_CAMERAS: [&str; 2] = ["third_person", "wrist"];
+/// Largest number of cameras of a scene; each renders its own images.
+pub const MAX_CAMERAS: usize = 64;
+
 impl Camera {
     /// The third-person camera of table scenes (SoftVTBench's environment: focal length 18, aperture 15, table at
     /// z = 0.90 m). Image right is +y of the world.
     pub fn third_person_table() -> Self {
         let at = Vec3::new(0.6586, 0.0, 0.7104);
         Self {
-            name: "third_person".to_owned(),
+            name: STANDARD_CAMERAS[0].to_owned(),
             mount: CameraMount::World,
             pose: placed(at, Quaternion::new(0.6380, 0.3048, 0.3048, 0.6380)),
             fovy_rad: fovy_from_lens(18.0, 15.0),
@@ -98,7 +103,7 @@ impl Camera {
     /// is the hand's +y.
     pub fn wrist() -> Self {
         Self {
-            name: "wrist".to_owned(),
+            name: STANDARD_CAMERAS[1].to_owned(),
             mount: CameraMount::Hand,
             pose: placed(Vec3::new(0.05, 0.0, 0.0), Quaternion::new(0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0)),
             fovy_rad: fovy_from_lens(9.77, 15.0),

@@ -56,12 +56,20 @@ use serde::{Deserialize, Serialize};
 use softvt_geometry::{Aabb, Pose, Quat, Vec3};
 
 pub use asset::{Asset, Body, Joint, JointMotion, MovingPart, SoftMaterial, part_poses};
-pub use camera::{Camera, CameraMount, CameraSettings};
+pub use camera::{Camera, CameraMount, CameraSettings, MAX_CAMERAS, STANDARD_CAMERAS};
 pub use decal::{GlyphCoverage, LabelLine, MAX_LETTERS, TextDecal, Typeface};
 pub use light::{KeyLight, Lighting, Sky};
 pub use scale::LENGTH_HINT;
 pub use variation::{CameraVariation, HiddenProperties, LightVariation, ObjectVariation, SceneVariation};
 pub use visual::{Mask, Visual, VisualLayer};
+
+/// Largest number of objects of a scene, and of bodies that are drawn, among them the parts of articulated objects and of
+/// the robot.
+pub const MAX_OBJECTS: usize = 1000;
+/// Segmentation id of the robot. Objects have ids from 1 in the order of the scene, each followed by its parts.
+pub const ROBOT_SEGMENTATION_ID: u16 = 1000;
+// With the robot at most MAX_OBJECTS bodies are drawn, so the last object has a smaller id.
+const _: () = assert!(ROBOT_SEGMENTATION_ID as usize >= MAX_OBJECTS);
 
 /// An asset placed in a scene.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 use super::{Asset, Body, MovingPart, SoftMaterial};
 use softvt_common::text::format_number;
-use softvt_physics::fem::ElasticMaterial;
+use softvt_physics::{STANDARD_GRAVITY, fem::ElasticMaterial};
 
 /// Smallest plausible Young's modulus, Pa: soft gels have some hundred.
 const MIN_YOUNGS_PA: f64 = 300.0;
@@ -12,8 +12,6 @@ const MAX_YOUNGS_PA: f64 = 1e9;
 const MIN_DENSITY: f64 = 5.0;
 const MAX_DENSITY: f64 = 23_000.0;
 
-/// Acceleration of gravity, m/s².
-const GRAVITY: f64 = 9.81;
 /// Compression by its own weight from which on a body hardly stands.
 const MAX_SAG: f64 = 0.15;
 
@@ -34,7 +32,7 @@ impl Asset {
     /// A warning about a soft body that is compressed by its own weight: ρ g h / 2 E for an upright block of height h.
     fn sag_warning(&self, material: &ElasticMaterial) -> Option<String> {
         let (youngs_pa, density) = (material.youngs_pa(), material.density());
-        let sag_of = |height: f64| density * GRAVITY * height / (2.0 * youngs_pa);
+        let sag_of = |height: f64| density * STANDARD_GRAVITY.norm() * height / (2.0 * youngs_pa);
         if sag_of(self.shape.loose_bounds().size().z) < MAX_SAG {
             return None;
         }

@@ -1,15 +1,12 @@
 //! A limit on the pixels that all clients together have in rendering.
 
+use std::sync::{Condvar, Mutex, PoisonError};
+
 use softvt_common::cancel::CancelFlag;
-use std::{
-    sync::{Condvar, Mutex, PoisonError},
-    time::Duration,
-};
+use softvt_policy::transport::POLL_INTERVAL;
 
 /// Maximum number of pixels of an image of a requested size, and of all images that are rendered at the same time.
 pub(super) const MAX_RENDER_PIXELS: usize = 1920 * 1080;
-/// Interval at which a waiting request checks for cancellation.
-const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Pixels of the images that are being rendered.
 #[derive(Debug, Default)]
@@ -60,7 +57,7 @@ mod tests {
         let large = budget.acquire(usize::MAX, &cancel).unwrap();
         std::thread::scope(|scope| {
             let waiting = scope.spawn(|| budget.acquire(1, &cancel).is_some());
-            std::thread::sleep(Duration::from_millis(20));
+            std::thread::sleep(std::time::Duration::from_millis(20));
             assert!(!waiting.is_finished());
             drop(large);
             assert!(waiting.join().unwrap());

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::solid::CollisionGeometry;
 use crate::ids::{ArticulationId, BodyId};
+use softvt_common::range::Range;
 use softvt_geometry::{
     Aabb, Pose, Vec3,
     shape::{SampleContact, Shape},
@@ -61,13 +62,17 @@ pub struct Friction {
 }
 
 impl Default for Friction {
-    /// 0.6 / 0.5, that of every object and surface but the pads.
+    /// [`Friction::STANDARD`].
     fn default() -> Self {
-        Self::new(0.6, 0.5)
+        Self::STANDARD
     }
 }
 
 impl Friction {
+    /// Friction of every object and surface that states no other.
+    pub const STANDARD: Self = Self::new(0.6, 0.5);
+    /// Range of a coefficient.
+    pub const COEFFICIENT: Range = Range::closed(0.0, 10.0);
     /// No friction at all.
     pub const NONE: Self = Self::new(0.0, 0.0);
 

@@ -8,10 +8,11 @@
 
 use super::{collider::ContactSurface, detect::DetectionLimits};
 use crate::fem::FemState;
-use softvt_geometry::{Aabb, Mat3, Vec3, hex8, voxel::Embedding};
+use softvt_geometry::{
+    Aabb, Mat3, Vec3, hex8,
+    voxel::{Embedding, MAX_EXTRAPOLATION},
+};
 
-/// Distance from a voxel, in voxel edges, up to which its trilinear map is used; beyond, the map is continued linearly.
-const MAX_EXTRAPOLATION: f64 = 0.3;
 /// Largest number of voxels that a search visits.
 const MAX_VISITED_VOXELS: usize = 64;
 /// Newton iterations in one voxel; an undeformed one takes a single iteration.

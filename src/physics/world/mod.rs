@@ -177,9 +177,9 @@ impl World {
         Self { params, gravity, ..Self::default() }
     }
 
-    /// An empty world with default parameters and gravity of 9.81 m/s² along −z.
+    /// An empty world with default parameters and [`STANDARD_GRAVITY`](crate::STANDARD_GRAVITY).
     pub fn with_gravity() -> Self {
-        Self::new(PhysicsParams::default(), Vec3::new(0.0, 0.0, -9.81))
+        Self::new(PhysicsParams::default(), crate::STANDARD_GRAVITY)
     }
 
     /// Adds a body that a builder describes, and returns its identifier.

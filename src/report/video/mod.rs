@@ -24,7 +24,7 @@ use softvt_records::record::EpisodeRecord;
 use softvt_rollout::{
     CAMERA_IMAGE_SUFFIXES, SensingError, Sensors, StateRecording, TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES,
 };
-use softvt_scene::Camera;
+use softvt_scene::{Camera, STANDARD_CAMERAS};
 use softvt_sensing::{
     camera::{RenderedImage, encode_png, resize},
     tactile::{MarkerStyle, TactileReading},
@@ -39,8 +39,6 @@ const CAPTION_HEIGHT: u32 = 160;
 const WIDTH: u32 = 2 * CAMERA_PANEL;
 const HEIGHT: u32 = CAMERA_PANEL + FINGER_PANEL + CAPTION_HEIGHT;
 const MARGIN: f32 = 16.0;
-/// Names of the cameras of the two panels.
-const CAMERAS: [&str; 2] = ["third_person", "wrist"];
 /// Edges of images in full size, pixels.
 const THIRD_PERSON_FULL_SIZE: usize = 1024;
 const OTHER_FULL_SIZE: usize = 512;
@@ -177,7 +175,7 @@ fn video_frame(
 ) -> Result<RgbImage, EpisodeVideoError> {
     let mut canvas = Canvas::new(WIDTH, HEIGHT, BACKGROUND);
     let frame = recording.frames.get(index).ok_or(EpisodeVideoError::Empty)?;
-    for (side, name) in CAMERAS.into_iter().enumerate() {
+    for (side, name) in STANDARD_CAMERAS.into_iter().enumerate() {
         let camera = sensors.camera(name)?.clone().with_edge(CAMERA_PANEL as usize);
         let image = sensors.render(frame, &camera)?.into_rgb_image();
         let x = CAMERA_PANEL * side as u32;
@@ -275,14 +273,14 @@ pub fn worst_state(recording: &StateRecording) -> usize {
 }
 
 fn full_size(camera: &Camera) -> usize {
-    if camera.name == CAMERAS[0] { THIRD_PERSON_FULL_SIZE } else { OTHER_FULL_SIZE }
+    if camera.name == STANDARD_CAMERAS[0] { THIRD_PERSON_FULL_SIZE } else { OTHER_FULL_SIZE }
 }
 
 /// Writes every image of selected states as PNG files in `dir`; `states` are names and indices of states.
 ///
 /// Cameras also get depth (16 bits, units of 0.1 mm along the optical axis, 65535 beyond the
 /// range and in the background) and segmentation (16 bits: objects from 1 in the order of the
-/// scene, [`softvt_rollout::ROBOT_SEGMENTATION_ID`], 0 in the background). They are drawn on up to `threads` threads. Files are
+/// scene, [`softvt_scene::ROBOT_SEGMENTATION_ID`], 0 in the background). They are drawn on up to `threads` threads. Files are
 /// written atomically. Returns their paths.
 ///
 /// # Errors

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     schema::{
-        Constructed, FromChecked, Range, Record, RecordType, Type, check::invalid, functions, one_of, record,
+        Constructed, FromChecked, Record, RecordType, Type, check::invalid, functions, one_of, record,
         record_of,
     },
     vm::error::fail,
@@ -22,19 +22,19 @@ use softvt_physics::{contact::Friction, fem::ElasticMaterial};
 use softvt_scene::{Asset, Body, SoftMaterial, Visual};
 
 /// A coefficient of friction.
-pub(crate) const COEFFICIENT: Type = Type::Number("", Range::closed(0.0, 10.0));
+pub(crate) const COEFFICIENT: Type = Type::Number("", Friction::COEFFICIENT);
 pub(crate) const PASCALS: Type = Type::Number("Pa", ElasticMaterial::YOUNGS_PA);
 pub(crate) const POISSON: Type = Type::Number("", ElasticMaterial::POISSON);
-pub(crate) const STRAIN: Type = Type::Number("", Range::above(0.0, 1.0));
+pub(crate) const STRAIN: Type = Type::Number("", SoftMaterial::STRAIN);
 pub(crate) const DENSITY: Type = Type::Number("kg/m³", ElasticMaterial::DENSITY);
 
 record_of! {
     /// Coulomb friction of a surface. A pair of surfaces has the larger of each coefficient, unless one is coated.
     Friction: "softvt.Friction" as "friction" {
         /// Static coefficient.
-        static_mu: f64 = COEFFICIENT => Number(0.6);
+        static_mu: f64 = COEFFICIENT => Number(Friction::STANDARD.static_mu);
         /// Dynamic coefficient, at most the static one.
-        dynamic_mu: f64 = COEFFICIENT => Number(0.5);
+        dynamic_mu: f64 = COEFFICIENT => Number(Friction::STANDARD.dynamic_mu);
         /// True for a layer on the surface (flour, oil, glaze), whose coefficients are those of any pair.
         coated: bool => Boolean(false);
     }
@@ -47,9 +47,9 @@ record_of! {
         /// Density.
         density: f64 = DENSITY;
         /// Voxels along the longest edge of the bounding box.
-        resolution: usize = Type::Integer(Range::closed(1.0, SoftMaterial::MAX_RESOLUTION as f64)) => Integer(6);
+        resolution: usize = Type::Integer(SoftMaterial::RESOLUTION) => Integer(6);
         /// Spacing of contact samples where a gripper can reach.
-        grasp_spacing: f64 = Type::Number("m", Range::closed(0.0001, 0.02)) => Number(0.00075);
+        grasp_spacing: f64 = Type::Number("m", SoftMaterial::GRASP_SPACING_M) => Number(0.00075);
         /// Compressive strain at which cell walls buckle and a plateau of stress begins; a calibration presses no
         /// further.
         collapse_strain: Option<f64> = STRAIN;

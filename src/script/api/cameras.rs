@@ -14,10 +14,8 @@ use crate::{
 };
 use softvt_common::parallel::lock;
 use softvt_geometry::{Pose, Quat, Vec3};
-use softvt_scene::{Camera, CameraMount, Lighting, Scene};
+use softvt_scene::{Camera, CameraMount, Lighting, MAX_CAMERAS, Scene};
 
-/// Cameras of a scene; each renders its own images.
-const MAX_CAMERAS: usize = 64;
 /// Strengths and colours of lights, which may be brighter than white.
 const BRIGHTNESS: Range = Range::closed(0.0, 1000.0);
 const FIELD_OF_VIEW: Type = Type::Number("rad", Range::closed(0.01, 2.8));

@@ -19,15 +19,12 @@ use crate::{
 };
 use softvt_common::{parallel::lock, range::RangeError, text::format_number};
 use softvt_geometry::{Aabb, Pose, Quat, Vec3};
-use softvt_physics::{contact::Friction, fem::ElasticMaterial};
+use softvt_physics::{STANDARD_GRAVITY, contact::Friction, fem::ElasticMaterial};
 use softvt_robot::panda::{self, ARM_DOFS};
-use softvt_scene::{Asset, Body, Camera, Lighting, Object, Scene};
+use softvt_scene::{Asset, Body, Camera, Lighting, MAX_OBJECTS, Object, Scene};
 
 /// Start pose of the arm as in SoftVTBench (from the released code): the hand above the table, pointing down.
 const START_Q: [f64; ARM_DOFS] = [-0.01988, -0.18734, 0.00767, -2.40340, 0.00496, 2.24534, 0.79485];
-
-/// Objects of a scene; a layout that adds more contains an endless loop.
-const MAX_OBJECTS: usize = 1000;
 
 /// Largest coordinate, m: beyond it floating-point positions are too coarse for a grasp.
 const MAX_COORDINATE: f64 = 1e3;
@@ -50,7 +47,7 @@ pub(crate) fn empty_scene() -> Scene {
         objects: Vec::new(),
         base_w: Pose::translation(-0.66, 0.0, 0.012),
         start_q: START_Q,
-        gravity: Vec3::new(0.0, 0.0, -9.81),
+        gravity: STANDARD_GRAVITY,
         workspace: Aabb { min: Vec3::new(-0.5, -0.6, -0.05), max: Vec3::new(0.5, 0.6, 1.0) },
         lighting: Lighting::default(),
         cameras: vec![Camera::third_person_table(), Camera::wrist()],
@@ -183,6 +180,7 @@ impl LuaScene {
             let message = format!("scene:add: there is an object {name:?} already; give another name");
             return Err(fail(lua, message));
         }
+        // A layout that adds more contains an endless loop.
         if scene.objects.len() >= MAX_OBJECTS {
             return Err(fail(lua, format!("scene:add: a scene holds at most {MAX_OBJECTS} objects")));
         }

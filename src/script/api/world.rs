@@ -161,22 +161,28 @@ functions! {
         /// Returns an empty world: soft bodies among fixed or prescribed solids, without a robot. Settings of the command
         /// line, --set physics.…, take precedence in experiments.
         fn world(lua) takes spec "softvt.WorldSpec" {
-            /// Time step.
-            dt: f64 = Type::Number("s", Range::closed(1e-5, 0.05)) => Number(1.0 / 60.0);
-            /// Mass-proportional Rayleigh damping.
-            rayleigh_mass: f64 = Type::Number("1/s", Range::closed(0.0, 1e3)) => Number(0.0);
-            /// Stiffness-proportional Rayleigh damping.
-            rayleigh_stiffness: f64 = Type::Number("s", Range::closed(0.0, 1.0)) => Number(5e-3);
+            /// Time step: the setting physics.dt, with its default and range.
+            dt: Option<f64> = Type::Number("s", Range::ANY);
+            /// Mass-proportional Rayleigh damping: the setting physics.rayleigh_mass.
+            rayleigh_mass: Option<f64> = Type::Number("1/s", Range::ANY);
+            /// Stiffness-proportional Rayleigh damping: the setting physics.rayleigh_stiffness.
+            rayleigh_stiffness: Option<f64> = Type::Number("s", Range::ANY);
             /// Gravity; {0, 0, -9.81} by default.
             gravity: Option<[f64; 3]> = Type::vector(3, "m/s²");
-            /// True if bodies at rest fall asleep.
-            sleeping: bool => Boolean(true);
+            /// True if bodies at rest fall asleep: the setting physics.sleeping.
+            sleeping: Option<bool>;
         } -> ["softvt.World"] {
-            let params =
-                PhysicsParams { dt, rayleigh_mass, rayleigh_stiffness, sleeping, ..PhysicsParams::default() };
+            let default = PhysicsParams::default();
+            let params = PhysicsParams {
+                dt: dt.unwrap_or(default.dt),
+                rayleigh_mass: rayleigh_mass.unwrap_or(default.rayleigh_mass),
+                rayleigh_stiffness: rayleigh_stiffness.unwrap_or(default.rayleigh_stiffness),
+                sleeping: sleeping.unwrap_or(default.sleeping),
+                ..default
+            };
             let params = experiment_input::world_params(lua, params)
                 .map_err(|e| fail(lua, format!("softvt.world, with the settings of the run: {e}")))?;
-            let gravity = gravity.map_or(Vec3::new(0.0, 0.0, -9.81), Vec3::from);
+            let gravity = gravity.map_or(softvt_physics::STANDARD_GRAVITY, Vec3::from);
             LuaWorld(Arc::new(Mutex::new(Inner {
                 world: World::new(params, gravity),
                 references: Vec::new(),

@@ -7,14 +7,12 @@ use super::{
     math::{V3, Vec3x8, f32x8, is_finite},
 };
 use softvt_geometry::{Pose, Vec3};
-use softvt_scene::{Camera, CameraMount};
+use softvt_scene::{Camera, CameraMount, MAX_CAMERAS};
 
 /// Maximum width and height of an image, pixels.
 const MAX_EDGE: usize = 4096;
 /// Maximum number of pixels of all cameras of a scene together: a cached background takes about 100 bytes per pixel.
 const MAX_TOTAL_PIXELS: usize = MAX_EDGE * MAX_EDGE;
-/// Maximum number of cameras of a scene.
-const MAX_CAMERAS: usize = 64;
 /// Maximum distance of a camera from the origin along each axis, m. Farther out, single precision does
 /// not resolve a pixel.
 const MAX_COORDINATE: f64 = 1e6;

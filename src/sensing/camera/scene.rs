@@ -18,10 +18,8 @@ use super::{
 };
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::BodyId;
-use softvt_scene::Lighting;
+use softvt_scene::{Lighting, MAX_OBJECTS};
 
-/// Maximum number of objects of a scene; triangle ids have bits for about as many.
-const MAX_OBJECTS: usize = 1000;
 /// Maximum radius of the wide shadow map, in radii of the fine one: beyond, it would be too coarse.
 const MAX_WIDE_RADIUS: f32 = 8.0;
 
@@ -90,6 +88,7 @@ impl RenderScene {
     /// more than 1000 objects.
     pub fn new(objects: Vec<RenderObject>, lighting: Lighting) -> Result<Self, CameraError> {
         check_light(&lighting)?;
+        // Triangle ids have bits for about as many.
         if objects.len() > MAX_OBJECTS {
             return Err(CameraError::Mesh {
                 name: "the scene".to_owned(),
