@@ -268,7 +268,7 @@
 ---Returns the results of a calibration: the safe window, the deformation limit τ, and the files to write.
 ---@class softvt.EnvelopeSpec
 ---@field asset string Name of the asset.
----@field protocol? "press"|"hand" Protocol by which the rows were measured. Default "press".
+---@field protocol? "press"|"hand" How the sweep was made. Default "press".
 ---@field kappa? number Safety factor κ of the deformation limit τ = κ D_ref. Expects a number in 0..1. Default 0.5.
 ---@field stable_strain? number Stable strain of the material, at which 5 % of the volume ends the press. Expects a number in above 0..1.
 ---@field ended? string Why the sweep ended, if its last row does not tell.
@@ -1018,18 +1018,22 @@ local Measurements = {}
 ---@field depth_mm number Largest depth of the indentation, mm.
 local TactileReading = {}
 
----The safe window of an object. An end is nil if the scans do not reach it.
+---One end of the safe window of an asset.
+---@class softvt.WindowEnd
+---@field width_mm number? Width between the gels, mm; nil if the scans do not reach it.
+---@field force_n number? Force per pad, N; nil if the sweep does not reach the width.
+local WindowEnd = {}
+
+---The safe window of an asset.
 ---@class softvt.SafeWindow
----@field width_lower_mm number? Loose end: the widest width between the gels at which every hold trial held, mm.
----@field width_at_tau_mm number? Tight end: the widest width at which the deformation reaches τ, pressed or carried, mm.
----@field force_lower_n number? Force per pad at the loose end, N.
----@field force_at_tau_n number? Force per pad at the tight end, N.
+---@field loose softvt.WindowEnd Loose end: the widest width at which every hold trial held.
+---@field tight softvt.WindowEnd Tight end: the widest width at which the deformation reaches τ, pressed or carried.
 ---@field extent_mm number? Extent of the window, mm; nil if it is empty.
 local SafeWindow = {}
 
 ---Results of a calibration.
 ---@class softvt.Envelope
----@field protocol string Protocol: "press" or "hand".
+---@field protocol string How the sweep was made: "press" or "hand".
 ---@field window softvt.SafeWindow The safe window.
 ---@field width_contact_mm number? Widest width at which both pads touched, mm.
 ---@field width_at_d_ref_mm number? Width at D_ref, mm.
@@ -1052,13 +1056,13 @@ local Envelope = {}
 local Grip = {}
 
 ---The safe window of an instance.
----@class softvt.GripWindow
+---@class softvt.InstanceWindow
 ---@field loose softvt.Grip The loosest grip that holds.
 ---@field tight softvt.Grip The tightest grip whose carried object stays within τ; that of the loose end if none does.
 ---@field contact number Distance of the gels at first contact, m.
 ---@field carried number D that the weight of the carried object causes, as a share of τ.
 ---@field tau number Deformation limit τ of the instance, %.
-local GripWindow = {}
+local InstanceWindow = {}
 
 ---An instance of an asset, with the fields that a grasp needs of an object.
 ---@class softvt.InstanceState
@@ -1646,7 +1650,7 @@ function softvt.calibration(asset) end
 
 ---Returns the safe window of an instance of a calibrated asset; nil without a window. Experts see the factors as fields of their objects.
 ---@param spec softvt.Instance
----@return softvt.GripWindow?
+---@return softvt.InstanceWindow?
 function softvt.grip_window(spec) end
 
 ---Returns instances of an asset as the episodes of a suite draw them, from a random stream that no episode uses. Without a variation each is the asset itself.

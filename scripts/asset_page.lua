@@ -118,7 +118,7 @@ local function row(name)
       local function number(format, value) return value and format:format(value) or "–" end
       local window = limit and limit.window
       add(number("%.2f", body.collapse_strain), number("%.2f", body.damage_strain), number("%.3f", limit and limit.tau))
-      add(number("%.2f", window and window.width_lower_mm), number("%.2f", window and window.width_at_tau_mm))
+      add(number("%.2f", window and window.loose.width_mm), number("%.2f", window and window.tight.width_mm))
     end
   end
   return "| " .. table.concat(cells, " | ") .. " |\n"

@@ -101,7 +101,7 @@ local function press_asset(name, o)
   append(rows, "sweep", name, sweep.rows)
   append(rows, "end", name, { { ended = sweep.ended, stable_strain = sweep.stable_strain } })
   local found = envelope(name, rows, o)
-  local at_tau, contact = found.window.width_at_tau_mm, found.width_contact_mm
+  local at_tau, contact = found.window.tight.width_mm, found.width_contact_mm
   if at_tau and contact then
     local holds = press.loose_end(asset, 1e-3 * at_tau, 1e-3 * contact, 1e-3 * found.width_at_d_ref_mm, 1e-3 * o.within_mm)
     press.carried_end(asset, holds, found.tau)

@@ -31,11 +31,11 @@ return function(names, found, o)
   for _, name in ipairs(names) do
     local known = found[name]
     local window, d_ref = known.window, known.d_ref
-    local force = number("%.2f", window.force_lower_n) .. " to " .. number("%.2f", window.force_at_tau_n)
+    local force = number("%.2f", window.loose.force_n) .. " to " .. number("%.2f", window.tight.force_n)
     local cells = {
       ("[%s](#%s)"):format(name, name), number("%.2f", known.stable_strain), number("%.3f", d_ref), number("%.3f", known.tau),
-      number("%.3f", d_ref and 0.3 * d_ref), number("%.3f", d_ref and 0.7 * d_ref), number("%.2f", window.width_lower_mm),
-      number("%.2f", window.width_at_tau_mm), number("%.2f", window.extent_mm), force, number("%.3f", known.carried_d),
+      number("%.3f", d_ref and 0.3 * d_ref), number("%.3f", d_ref and 0.7 * d_ref), number("%.2f", window.loose.width_mm),
+      number("%.2f", window.tight.width_mm), number("%.2f", window.extent_mm), force, number("%.3f", known.carried_d),
       known.censored or "no",
     }
     rows[#rows + 1] = "| " .. table.concat(cells, " | ") .. " |\n"

@@ -74,7 +74,7 @@ local function ends(point)
   local name, window = point.asset, calibrations[point.asset].window
   local inward = (point.at == "loose" and 1 or -1) * (point.side == "inside" and END_SHARE or -END_SHARE)
   local along = (point.at == "loose" and 0 or 1) + inward
-  local width = 1e-3 * (window.width_lower_mm + along * (window.width_at_tau_mm - window.width_lower_mm))
+  local width = 1e-3 * (window.loose.width_mm + along * (window.tight.width_mm - window.loose.width_mm))
   -- Before contact there is no force.
   local grip = { width = width, force = softvt.force_at(calibrations[name].table.envelopes[name].sweep, 1e3 * width) or 0 }
   local held, d_peak_pct, width_mm = hand.trials(assets[name], grip, point.first, point.last, point.spread, HOLD_S)

@@ -85,7 +85,7 @@ function grasp.problem(object)
   end
 end
 
--- The safe window of an object (softvt.GripWindow), that of its asset scaled to the instance. Nil without a calibration.
+-- The safe window of an object (softvt.InstanceWindow), that of its asset scaled to the instance. Nil without a calibration.
 function grasp.window(object)
   return softvt.grip_window {
     asset = object.asset, scale = object.scale, youngs_factor = object.youngs_factor, density_factor = object.density_factor,

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::seed::{EpisodeSeed, RandomStream, uniform};
 use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_common::text::format_number;
-use softvt_evaluation::instance::{InstanceFactors, InstanceModel};
+use softvt_evaluation::instance::{InstanceFactors, InstancePresses};
 use softvt_robot::spec::PadSpec;
 use softvt_scene::{
     Asset, Body, CameraVariation, HiddenProperties, LightVariation, Object, ObjectVariation, Scene,
@@ -113,7 +113,7 @@ pub enum DrawError {
 }
 
 /// The calibrated instances of an asset, if it is calibrated. Only variations with hidden properties ask.
-pub type InstanceModelLookup<'a> = dyn Fn(&Asset) -> Option<Arc<InstanceModel>> + 'a;
+pub type InstancePressLookup<'a> = dyn Fn(&Asset) -> Option<Arc<InstancePresses>> + 'a;
 
 /// Ranges from which the objects, the light and the cameras of an episode are drawn.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -154,7 +154,7 @@ impl VariationRanges {
         &self,
         seed: &EpisodeSeed,
         scene: &Scene,
-        model_of: &InstanceModelLookup<'_>,
+        model_of: &InstancePressLookup<'_>,
     ) -> Result<SceneVariation, DrawError> {
         let mut streams = InstanceStreams::of(seed);
         let [mut colour, mut light, mut camera] =
@@ -193,7 +193,7 @@ impl VariationRanges {
         suite: &str,
         asset: &Asset,
         count: u32,
-        model_of: &InstanceModelLookup<'_>,
+        model_of: &InstancePressLookup<'_>,
     ) -> Result<Vec<ObjectVariation>, DrawError> {
         let id = EpisodeId {
             suite: suite.into(),
@@ -213,7 +213,7 @@ impl VariationRanges {
         streams: &mut InstanceStreams,
         asset: &Asset,
         layout: &InstanceFactors,
-        model_of: &InstanceModelLookup<'_>,
+        model_of: &InstancePressLookup<'_>,
     ) -> Result<ObjectVariation, DrawError> {
         let scale = self.size.uniform(&mut streams.size);
         let mut draw_material = || ObjectVariation {

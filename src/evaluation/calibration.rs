@@ -3,10 +3,10 @@
 //! Widths are measured between the apexes of the gels, forces per pad at rest. `softvt scripts/calibrate.lua` runs both
 //! scans, by one of two protocols:
 //!
-//! - [`Protocol::Press`], a press test of the object alone. D_ref is D at the widest press at which 5 % of the body's
+//! - [`SweepProtocol::Press`], a press test of the object alone. D_ref is D at the widest press at which 5 % of the body's
 //!   volume has a compressive strain beyond the material's *stable strain*, interpolated between two rows of the sweep.
 //!   A sweep that ends earlier is *censored*: D_ref is then the largest stable D, a lower bound.
-//! - [`Protocol::Hand`], the sweep of SoftVTBench (appendix C.3) with the robot's hand: D_ref is the largest D of a
+//! - [`SweepProtocol::Hand`], the sweep of SoftVTBench (appendix C.3) with the robot's hand: D_ref is the largest D of a
 //!   stable squeeze.
 //!
 //! The loose end of the envelope is the widest width at which every hold trial held, down to the narrowest one tried. The
@@ -30,10 +30,10 @@ const MAX_SLIP_MM: f64 = 2.0;
 /// Smallest extent of a safe window, mm: the accuracy of its loose end.
 const MIN_EXTENT_MM: f64 = 0.02;
 
-/// Protocol of a calibration.
+/// How the sweep of a calibration is made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Protocol {
+pub enum SweepProtocol {
     /// A press test of the object alone, up to the stable strain of its material.
     #[default]
     Press,
@@ -122,32 +122,69 @@ impl SweepRow {
     }
 }
 
-/// The two ends of the safe window. An end is null if the scans do not reach it.
+/// One end of the safe window of an asset. Its width is unknown if the scans do not reach it, its force also if the sweep does
+/// not reach its width.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct WindowEnd {
+    /// Width between the gels, mm.
+    pub width_mm: Option<f64>,
+    /// Force per pad, N.
+    pub force_n: Option<f64>,
+}
+
+/// Safe window of an asset: from the loose end, up to which friction holds it, to the tight end, at which D reaches τ. That of
+/// an instance is an [`InstanceWindow`](super::instance::InstanceWindow).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(from = "StoredWindow", into = "StoredWindow")]
 pub struct SafeWindow {
-    /// Loose end: the widest width at which every trial held, mm.
-    pub width_lower_mm: Option<f64>,
-    /// Tight end: the widest width at which D reaches τ, pressed or carried, mm.
-    pub width_at_tau_mm: Option<f64>,
-    /// Force per pad at the loose end, N.
-    pub force_lower_n: Option<f64>,
-    /// Force per pad at the tight end, N.
-    pub force_at_tau_n: Option<f64>,
+    /// The widest width at which every trial held.
+    pub loose: WindowEnd,
+    /// The widest width at which D reaches τ, pressed or carried.
+    pub tight: WindowEnd,
 }
 
 impl SafeWindow {
     /// Extent of the window, mm; `None` if it is below 0.02 mm or an end is unknown.
     pub fn extent_mm(&self) -> Option<f64> {
-        let extent = self.width_lower_mm? - self.width_at_tau_mm?;
+        let extent = self.loose.width_mm? - self.tight.width_mm?;
         (extent >= MIN_EXTENT_MM).then_some(extent)
+    }
+}
+
+/// The window in calibration files.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+struct StoredWindow {
+    width_lower_mm: Option<f64>,
+    width_at_tau_mm: Option<f64>,
+    force_lower_n: Option<f64>,
+    force_at_tau_n: Option<f64>,
+}
+
+impl From<StoredWindow> for SafeWindow {
+    fn from(stored: StoredWindow) -> Self {
+        Self {
+            loose: WindowEnd { width_mm: stored.width_lower_mm, force_n: stored.force_lower_n },
+            tight: WindowEnd { width_mm: stored.width_at_tau_mm, force_n: stored.force_at_tau_n },
+        }
+    }
+}
+
+impl From<SafeWindow> for StoredWindow {
+    fn from(SafeWindow { loose, tight }: SafeWindow) -> Self {
+        Self {
+            width_lower_mm: loose.width_mm,
+            width_at_tau_mm: tight.width_mm,
+            force_lower_n: loose.force_n,
+            force_at_tau_n: tight.force_n,
+        }
     }
 }
 
 /// Measurements of a calibration, from which an [`Envelope`] follows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CalibrationMeasurements {
-    /// Protocol by which the rows were measured.
-    pub protocol: Protocol,
+    /// How the sweep was made.
+    pub protocol: SweepProtocol,
     /// Stable strain of the material; `None` if it states no limit, and for the robot's hand.
     pub stable_strain: Option<f64>,
     /// Why the sweep ended, if its last row does not tell.
@@ -163,8 +200,8 @@ pub struct CalibrationMeasurements {
 /// Envelope of an asset, with the rows it was computed from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Envelope {
-    /// Protocol by which the rows were measured.
-    pub protocol: Protocol,
+    /// How the sweep was made.
+    pub protocol: SweepProtocol,
     /// Stable strain of the material: the smaller of its collapse and damage strain.
     pub stable_strain: Option<f64>,
     /// Why the sweep ended before the stable strain; null if it did not. D_ref is then a lower bound.
@@ -208,14 +245,19 @@ impl Envelope {
         sweep.sort_by(|a, b| b.width_mm.total_cmp(&a.width_mm));
         let at_strain = stable_strain.and_then(|strain| reference_at_strain(&sweep, strain));
         let censored = match (protocol, &at_strain) {
-            (Protocol::Press, None) => Some(ended.unwrap_or_else(|| reason_of_end(&sweep, stable_strain))),
-            (Protocol::Press, Some(_)) | (Protocol::Hand, _) => None,
+            (SweepProtocol::Press, None) => {
+                Some(ended.unwrap_or_else(|| reason_of_end(&sweep, stable_strain)))
+            }
+            (SweepProtocol::Press, Some(_)) | (SweepProtocol::Hand, _) => None,
         };
-        let starts_beyond = protocol == Protocol::Press && is_beyond(sweep.first(), stable_strain);
+        let starts_beyond = protocol == SweepProtocol::Press && is_beyond(sweep.first(), stable_strain);
         let reference = at_strain.or_else(|| largest_stable(&sweep).filter(|_| !starts_beyond));
         let limit = reference.as_ref().and_then(|found| limit_of(found.d_pct, kappa));
-        let width_lower_mm = loose_end(&holds);
-        let width_at_tau_mm = limit.and_then(|limit| {
+        let end = |width_mm: Option<f64>| {
+            let force_n = width_mm.and_then(|width| force_at(&sweep, width));
+            WindowEnd { width_mm, force_n }
+        };
+        let tight_mm = limit.and_then(|limit| {
             let ends = [pressed_end(&sweep, limit.tau_pct()), carried_end(&holds, limit.tau_pct())];
             ends.into_iter().flatten().reduce(f64::max).map(round_to_six_decimals)
         });
@@ -231,12 +273,7 @@ impl Envelope {
                 .map(|point| point.d_pct)
                 .reduce(f64::min)
                 .map(round_to_six_decimals),
-            window: SafeWindow {
-                width_lower_mm,
-                width_at_tau_mm,
-                force_lower_n: width_lower_mm.and_then(|width| force_at(&sweep, width)),
-                force_at_tau_n: width_at_tau_mm.and_then(|width| force_at(&sweep, width)),
-            },
+            window: SafeWindow { loose: end(loose_end(&holds)), tight: end(tight_mm) },
             holds,
             sweep,
             variants,
@@ -404,8 +441,8 @@ pub(crate) mod tests {
         assert!((envelope.width_at_d_ref_mm.unwrap() - 44.5).abs() < 1e-12);
         assert_eq!(envelope.censored, None);
         let window = envelope.window;
-        assert_eq!((window.width_lower_mm, window.width_at_tau_mm), (Some(48.0), Some(47.0)));
-        assert_eq!((window.force_lower_n, window.force_at_tau_n), (Some(1.0), Some(1.5)));
+        assert_eq!((window.loose.width_mm, window.tight.width_mm), (Some(48.0), Some(47.0)));
+        assert_eq!((window.loose.force_n, window.tight.force_n), (Some(1.0), Some(1.5)));
         assert_eq!((window.extent_mm(), envelope.width_contact_mm), (Some(1.0), Some(50.0)));
     }
 
@@ -432,14 +469,14 @@ pub(crate) mod tests {
         );
         let nameless = reason(&|scans| scans.stable_strain = None);
         assert_eq!(nameless.0, "the material states no collapse_strain");
-        let hand = reason(&|scans| (scans.protocol, scans.stable_strain) = (Protocol::Hand, None));
+        let hand = reason(&|scans| (scans.protocol, scans.stable_strain) = (SweepProtocol::Hand, None));
         assert_eq!(hand, (String::new(), Some(3.333333)), "the hand's D_ref is its largest stable D");
     }
 
     #[test]
     fn the_loose_end_is_above_no_width_at_which_a_trial_failed() {
         let lower = |holds: Vec<HoldRow>| {
-            Envelope::new(CalibrationMeasurements { holds, ..scans(48.0) }, 0.5).window.width_lower_mm
+            Envelope::new(CalibrationMeasurements { holds, ..scans(48.0) }, 0.5).window.loose.width_mm
         };
         assert_eq!(lower(vec![hold(47.0, 5), hold(49.0, 5), hold(48.0, 4)]), Some(47.0));
         assert_eq!(lower(vec![hold(47.0, 4), hold(48.0, 5)]), None);
@@ -453,7 +490,8 @@ pub(crate) mod tests {
             let holds = vec![carried(47.0, d_at_47), carried(48.0, 1.1), carried(49.0, 0.7)];
             Envelope::new(CalibrationMeasurements { holds, ..scans(48.0) }, 0.5)
                 .window
-                .width_at_tau_mm
+                .tight
+                .width_mm
                 .unwrap()
         };
         // τ is 1.5 %, which the sweep reaches at 47 mm.
@@ -461,7 +499,7 @@ pub(crate) mod tests {
         assert!((tight(1.4) - 47.0).abs() < 1e-12);
         let above = HoldRow { d_peak_pct: Some(1.6), ..hold(48.0, 5) };
         let heavy = Envelope::new(CalibrationMeasurements { holds: vec![above], ..scans(48.0) }, 0.5);
-        assert_eq!(heavy.window.width_at_tau_mm, Some(47.0), "the tight end of the sweep");
+        assert_eq!(heavy.window.tight.width_mm, Some(47.0), "the tight end of the sweep");
         assert_eq!(heavy.carried_d_pct, Some(1.6));
         assert!(heavy.exceeds_when_carried(heavy.limit(0.5).unwrap()));
     }
@@ -469,18 +507,17 @@ pub(crate) mod tests {
     #[test]
     fn an_envelope_whose_ends_have_crossed_has_no_extent() {
         let envelope = Envelope::new(scans(46.0), 0.5);
-        assert_eq!((envelope.window.width_lower_mm, envelope.window.extent_mm()), (Some(46.0), None));
+        assert_eq!((envelope.window.loose.width_mm, envelope.window.extent_mm()), (Some(46.0), None));
         let extent = |tight| {
-            let ends = (Some(47.0), Some(tight));
-            SafeWindow { width_lower_mm: ends.0, width_at_tau_mm: ends.1, ..SafeWindow::default() }
-                .extent_mm()
+            let end = |width| WindowEnd { width_mm: Some(width), force_n: None };
+            SafeWindow { loose: end(47.0), tight: end(tight) }.extent_mm()
         };
         assert_eq!((extent(46.99), extent(46.5)), (None, Some(0.5)), "an extent below the accuracy");
         let none = Envelope::new(
             CalibrationMeasurements { sweep: vec![squeeze(49.0, 1.0, false)], ..scans(48.0) },
             0.5,
         );
-        assert_eq!((none.d_ref_pct, none.window.width_at_tau_mm, none.limit(0.5)), (None, None, None));
+        assert_eq!((none.d_ref_pct, none.window.tight.width_mm, none.limit(0.5)), (None, None, None));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The safe interaction envelope of an asset in three lines of text.
 
 use super::{
-    calibration::{Envelope, Protocol},
+    calibration::{Envelope, SweepProtocol},
     safety::DeformationLimit,
 };
 
@@ -19,17 +19,17 @@ fn window_line(envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
     let window = &envelope.window;
     let newton = |force: Option<f64>| force.map_or_else(|| "–".to_owned(), |force| format!("{force:.2}"));
     let exceeds = limit.is_some_and(|limit| envelope.exceeds_when_carried(limit));
-    let loose = match window.width_lower_mm {
+    let loose = match window.loose.width_mm {
         Some(lower) => format!("it holds from {lower:.2} mm inward"),
         None if envelope.holds.is_empty() => "no hold trial was run".to_owned(),
         None => "no width held in every trial".to_owned(),
     };
-    let tight = match window.width_at_tau_mm {
+    let tight = match window.tight.width_mm {
         Some(tight) => format!("D passes τ at {tight:.2} mm"),
         None if limit.is_none() => "there is no τ".to_owned(),
         None => "the sweep does not reach τ".to_owned(),
     };
-    match (window.width_lower_mm, window.width_at_tau_mm, window.extent_mm()) {
+    match (window.loose.width_mm, window.tight.width_mm, window.extent_mm()) {
         (Some(lower), Some(tight), Some(extent)) if exceeds => format!(
             "held from {lower:.2} mm and pressed to τ at {tight:.2} mm of width ({extent:.2} mm), but D of the carried \
              object exceeds τ at every width ({:.3} % at least)",
@@ -37,8 +37,8 @@ fn window_line(envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
         ),
         (Some(lower), Some(tight), Some(extent)) => format!(
             "safe between {lower:.2} and {tight:.2} mm of width ({extent:.2} mm), at {} to {} N per pad",
-            newton(window.force_lower_n),
-            newton(window.force_at_tau_n)
+            newton(window.loose.force_n),
+            newton(window.tight.force_n)
         ),
         (Some(lower), Some(tight_mm), None) if lower > tight_mm => format!(
             "no safe window: {loose}, and {tight}; {:.3} mm are less than the accuracy of its ends",
@@ -60,12 +60,12 @@ fn limit_line(envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
 
 fn end_line(envelope: &Envelope) -> String {
     match (envelope.protocol, &envelope.censored, envelope.stable_strain) {
-        (Protocol::Hand, ..) => "squeezed by the robot's hand: D_ref is the largest stable D".to_owned(),
-        (Protocol::Press, None, Some(strain)) => {
+        (SweepProtocol::Hand, ..) => "squeezed by the robot's hand: D_ref is the largest stable D".to_owned(),
+        (SweepProtocol::Press, None, Some(strain)) => {
             format!("pressed until 5 % of the volume was beyond the stable strain {strain}")
         }
-        (Protocol::Press, None, None) => "pressed to the end of the sweep".to_owned(),
-        (Protocol::Press, Some(reason), _) => {
+        (SweepProtocol::Press, None, None) => "pressed to the end of the sweep".to_owned(),
+        (SweepProtocol::Press, Some(reason), _) => {
             let bound = if envelope.d_ref_pct.is_some() { ", so D_ref is a lower bound" } else { "" };
             format!("censored: the press ended early ({reason}){bound}")
         }
@@ -108,7 +108,7 @@ mod tests {
         assert!(
             censored.contains("censored: the press ended early (the material states no collapse_strain)")
         );
-        let hand = text(CalibrationMeasurements { protocol: Protocol::Hand, ..scans(48.0) });
+        let hand = text(CalibrationMeasurements { protocol: SweepProtocol::Hand, ..scans(48.0) });
         assert!(hand.contains("by the robot's hand"), "{hand}");
         assert!(text(CalibrationMeasurements::default()).contains("no τ: no squeeze was stable"));
     }

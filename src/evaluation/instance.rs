@@ -68,9 +68,9 @@ pub struct GripAtRest {
     pub force_n: f64,
 }
 
-/// Safe window of an instance.
+/// Safe window of an instance, from its loose to its tight end.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GripWindow {
+pub struct InstanceWindow {
     /// The loosest grip that holds.
     pub loose: GripAtRest,
     /// The tightest grip whose carried object stays within τ; equal to `loose` if none does.
@@ -83,7 +83,7 @@ pub struct GripWindow {
     pub tau_pct: f64,
 }
 
-impl GripWindow {
+impl InstanceWindow {
     /// Force of the tight end over that of the loose end.
     pub fn ratio(&self) -> f64 {
         self.tight.force_n / self.loose.force_n
@@ -134,7 +134,7 @@ impl Curve {
 }
 
 /// The presses of an asset, for the readings of its instances.
-pub struct InstanceModel {
+pub struct InstancePresses {
     /// Limit of the asset.
     limit: Option<DeformationLimit>,
     /// Stable strain of the asset; `None` if its press ended earlier.
@@ -150,7 +150,7 @@ pub struct InstanceModel {
     stiffnesses: Vec<(f64, Curve)>,
 }
 
-impl InstanceModel {
+impl InstancePresses {
     /// The instances of an asset with this envelope, for limits of `kappa` times D_ref.
     pub fn new(envelope: &Envelope, kappa: f64) -> Self {
         let row = |row: &SweepRow| {
@@ -203,10 +203,10 @@ impl InstanceModel {
     }
 
     /// Safe window of an instance; `None` if the asset has none.
-    pub fn window(&self, factors: &InstanceFactors) -> Option<GripWindow> {
+    pub fn window(&self, factors: &InstanceFactors) -> Option<InstanceWindow> {
         self.window.extent_mm()?;
         let InstanceFactors { scale, youngs, density, friction, .. } = *factors;
-        let (force_lower, width_at_tau) = (self.window.force_lower_n?, self.window.width_at_tau_mm?);
+        let (force_lower, width_at_tau) = (self.window.loose.force_n?, self.window.tight.width_mm?);
         let force_unit = youngs * scale * scale;
         let loose_n = force_lower * density * scale.powi(3) / friction;
         let tau = self.limit(factors)?.tau_pct();
@@ -229,7 +229,7 @@ impl InstanceModel {
         let tight_n = if left > 0.0 { force_unit * force_at(d_tight)? } else { 0.0 };
         let tight = if tight_n > loose_n { grip(tight_n)? } else { loose };
         let contact_m = 1e-3 * scale * self.width_contact_mm?;
-        Some(GripWindow { loose, tight, contact_m, carried, tau_pct: tau })
+        Some(InstanceWindow { loose, tight, contact_m, carried, tau_pct: tau })
     }
 
     /// D of the asset at a width between the gels, mm.
@@ -307,8 +307,8 @@ mod tests {
         Envelope::new(scans, 0.5)
     }
 
-    fn model(variants: Vec<VariantSweep>) -> InstanceModel {
-        InstanceModel::new(&envelope(variants), 0.5)
+    fn model(variants: Vec<VariantSweep>) -> InstancePresses {
+        InstancePresses::new(&envelope(variants), 0.5)
     }
 
     fn near(value: f64, expected: f64) -> bool {
@@ -321,10 +321,10 @@ mod tests {
         assert_eq!(model.limit(&InstanceFactors::NOMINAL), envelope.limit(0.5));
         let window = model.window(&InstanceFactors::NOMINAL).expect("calibrated");
         let stored = envelope.window;
-        assert!(near(1e3 * window.loose.width_m, stored.width_lower_mm.unwrap()), "{window:?}");
-        assert!(near(1e3 * window.tight.width_m, stored.width_at_tau_mm.unwrap()), "{window:?}");
-        assert!(near(window.loose.force_n, stored.force_lower_n.unwrap()), "{window:?}");
-        assert!(near(window.tight.force_n, stored.force_at_tau_n.unwrap()), "{window:?}");
+        assert!(near(1e3 * window.loose.width_m, stored.loose.width_mm.unwrap()), "{window:?}");
+        assert!(near(1e3 * window.tight.width_m, stored.tight.width_mm.unwrap()), "{window:?}");
+        assert!(near(window.loose.force_n, stored.loose.force_n.unwrap()), "{window:?}");
+        assert!(near(window.tight.force_n, stored.tight.force_n.unwrap()), "{window:?}");
         assert!(near(window.carried, 0.2), "1 % of 5 %");
     }
 

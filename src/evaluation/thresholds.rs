@@ -9,7 +9,7 @@ use std::{collections::BTreeMap, path::Path};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    calibration::{Envelope, Protocol},
+    calibration::{Envelope, SweepProtocol},
     deformation::{METRIC_ID, V1_METRIC_ID},
     safety::{DeformationLimit, round_to_six_decimals},
 };
@@ -42,9 +42,9 @@ pub enum ThresholdError {
 pub struct CalibrationInfo {
     /// Always [`METHOD`].
     pub method: String,
-    /// Protocol of the calibration; absent in released files.
+    /// How the sweep was made; absent in released files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub protocol: Option<Protocol>,
+    pub protocol: Option<SweepProtocol>,
     /// Definition of τ in words.
     pub definition: String,
     /// κ of the benchmark, the share of D_ref that is allowed.
@@ -115,10 +115,10 @@ impl ThresholdFile {
     }
 
     /// The same file, of assets that were calibrated by `protocol`.
-    pub fn measured_by(mut self, protocol: Protocol) -> Self {
+    pub fn measured_by(mut self, protocol: SweepProtocol) -> Self {
         let definition = match protocol {
-            Protocol::Press => "tau_o = kappa * d at which 5 % of the volume passes the stable strain",
-            Protocol::Hand => "tau_o = kappa * max_stable_d_peak",
+            SweepProtocol::Press => "tau_o = kappa * d at which 5 % of the volume passes the stable strain",
+            SweepProtocol::Hand => "tau_o = kappa * max_stable_d_peak",
         };
         (self.calibration.protocol, self.calibration.definition) = (Some(protocol), definition.into());
         self
@@ -322,11 +322,11 @@ mod tests {
     use super::*;
 
     fn file() -> ThresholdFile {
-        let mut file =
-            ThresholdFile::new(0.5, vec!["sweep.jsonl".into()], "softvt".into()).measured_by(Protocol::Hand);
+        let mut file = ThresholdFile::new(0.5, vec!["sweep.jsonl".into()], "softvt".into())
+            .measured_by(SweepProtocol::Hand);
         let sweep = vec![squeeze(48.0, 0.1, true), squeeze(47.0, 1.0 / 3.0, true), squeeze(46.0, 4.0, false)];
         let scans = CalibrationMeasurements {
-            protocol: Protocol::Hand,
+            protocol: SweepProtocol::Hand,
             holds: vec![hold(48.0, 5)],
             sweep,
             ..CalibrationMeasurements::default()

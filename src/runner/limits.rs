@@ -15,7 +15,7 @@ use crate::{error::RunError, observer::Observer};
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{files, parallel::lock, text::counted};
 use softvt_evaluation::{
-    instance::{InstanceFactors, InstanceModel},
+    instance::{InstanceFactors, InstancePresses},
     safety::{DeformationLimit, NOMINAL_KAPPA},
     thresholds::ThresholdFile,
 };
@@ -59,7 +59,7 @@ impl CalibrationFile {
             strain,
             ..InstanceFactors::NOMINAL
         };
-        InstanceModel::new(self.thresholds.envelopes.get(name)?, of_asset.kappa).limit(&factors)
+        InstancePresses::new(self.thresholds.envelopes.get(name)?, of_asset.kappa).limit(&factors)
     }
 }
 

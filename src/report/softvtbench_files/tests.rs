@@ -2,7 +2,7 @@ use crate::sample_record;
 use std::fs;
 
 use super::*;
-use softvt_evaluation::calibration::{CalibrationMeasurements, Envelope, Protocol, SweepRow};
+use softvt_evaluation::calibration::{CalibrationMeasurements, Envelope, SweepProtocol, SweepRow};
 use softvt_geometry::Vec3;
 
 fn episode(task: usize, asset: &str, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
@@ -111,7 +111,7 @@ fn files_land_where_the_scorer_finds_them() {
         stable: true,
     };
     let scans = CalibrationMeasurements {
-        protocol: Protocol::Hand,
+        protocol: SweepProtocol::Hand,
         sweep: vec![row],
         ..CalibrationMeasurements::default()
     };

@@ -24,12 +24,14 @@ use crate::{
         privilege::check_privilege,
     },
 };
-use softvt_benchmark::variation::{DrawError, InstanceModelLookup, VariationRanges};
+use softvt_benchmark::variation::{DrawError, InstancePressLookup, VariationRanges};
 use softvt_common::parallel::lock;
 use softvt_evaluation::{
-    calibration::{CalibrationMeasurements, Envelope, HoldRow, Protocol, SafeWindow, SweepRow, force_at},
+    calibration::{
+        CalibrationMeasurements, Envelope, HoldRow, SafeWindow, SweepProtocol, SweepRow, WindowEnd, force_at,
+    },
     envelope_text::summary_text,
-    instance::{GripAtRest, GripWindow, InstanceFactors, InstanceModel, VariantSweep},
+    instance::{GripAtRest, InstanceFactors, InstancePresses, InstanceWindow, VariantSweep},
     safety::DeformationLimit,
     thresholds::{ThresholdFile, sweep_jsonl},
 };
@@ -50,7 +52,7 @@ struct CalibratedAssets(Arc<Mutex<BTreeMap<String, Option<CalibratedAsset>>>>);
 #[derive(Clone)]
 pub(crate) struct CalibratedAsset {
     /// Limits and windows of its instances.
-    pub model: Arc<InstanceModel>,
+    pub model: Arc<InstancePresses>,
     /// Fingerprint of the asset that was calibrated.
     fingerprint: Option<String>,
 }
@@ -65,7 +67,7 @@ pub(crate) fn calibrated_asset(lua: &Lua, asset: &str) -> mlua::Result<Option<Ca
         return Ok(known.clone());
     }
     let found = calibration_file(lua, "softvt.grip_window", asset)?.and_then(|(_, file)| {
-        let model = Arc::new(InstanceModel::new(file.envelopes.get(asset)?, file.calibration.kappa));
+        let model = Arc::new(InstancePresses::new(file.envelopes.get(asset)?, file.calibration.kappa));
         Some(CalibratedAsset { model, fingerprint: file.fingerprints.get(asset).cloned() })
     });
     lock(&assets.0).insert(asset.to_owned(), found.clone());
@@ -78,11 +80,11 @@ pub(crate) fn calibrated_asset(lua: &Lua, asset: &str) -> mlua::Result<Option<Ca
 /// A calibration cannot be read. The inner error is that of `draw`.
 pub(crate) fn draw<T>(
     lua: &Lua,
-    draw: impl FnOnce(&InstanceModelLookup<'_>) -> Result<T, DrawError>,
+    draw: impl FnOnce(&InstancePressLookup<'_>) -> Result<T, DrawError>,
 ) -> mlua::Result<Result<T, DrawError>> {
     let broken = RefCell::new(None);
     // A fingerprint takes milliseconds, and a sample asks for one asset many times.
-    let known = RefCell::new(BTreeMap::<*const Asset, Option<Arc<InstanceModel>>>::new());
+    let known = RefCell::new(BTreeMap::<*const Asset, Option<Arc<InstancePresses>>>::new());
     let find = |asset: &Asset| match calibrated_asset(lua, &asset.name) {
         // A calibration of another version of the asset does not count, as for its limit.
         Ok(found) => found
@@ -194,16 +196,22 @@ fn calibration_file(lua: &Lua, label: &str, asset: &str) -> mlua::Result<Option<
 const ROWS: Type = Type::List(&Type::Map(&Type::Any));
 
 output! {
-    /// The safe window of an object. An end is nil if the scans do not reach it.
+    /// One end of the safe window of an asset.
+    fn window_end_table(lua, end: &WindowEnd) -> "softvt.WindowEnd" as "window end" {
+        /// Width between the gels, mm; nil if the scans do not reach it.
+        width_mm: "number?" = end.width_mm;
+        /// Force per pad, N; nil if the sweep does not reach the width.
+        force_n: "number?" = end.force_n;
+    }
+}
+
+output! {
+    /// The safe window of an asset.
     fn window_table(lua, window: &SafeWindow) -> "softvt.SafeWindow" as "window" {
-        /// Loose end: the widest width between the gels at which every hold trial held, mm.
-        width_lower_mm: "number?" = window.width_lower_mm;
-        /// Tight end: the widest width at which the deformation reaches τ, pressed or carried, mm.
-        width_at_tau_mm: "number?" = window.width_at_tau_mm;
-        /// Force per pad at the loose end, N.
-        force_lower_n: "number?" = window.force_lower_n;
-        /// Force per pad at the tight end, N.
-        force_at_tau_n: "number?" = window.force_at_tau_n;
+        /// Loose end: the widest width at which every hold trial held.
+        loose: "softvt.WindowEnd" = window_end_table(lua, &window.loose)?;
+        /// Tight end: the widest width at which the deformation reaches τ, pressed or carried.
+        tight: "softvt.WindowEnd" = window_end_table(lua, &window.tight)?;
         /// Extent of the window, mm; nil if it is empty.
         extent_mm: "number?" = window.extent_mm();
     }
@@ -212,7 +220,7 @@ output! {
 output! {
     /// Results of a calibration.
     fn envelope_table(lua, asset: &str, envelope: &Envelope, file: &ThresholdFile) -> "softvt.Envelope" as "envelope" {
-        /// Protocol: "press" or "hand".
+        /// How the sweep was made: "press" or "hand".
         protocol: "string" = lua.to_value(&envelope.protocol)?;
         /// The safe window.
         window: "softvt.SafeWindow" = window_table(lua, &envelope.window)?;
@@ -255,7 +263,7 @@ output! {
 
 output! {
     /// The safe window of an instance.
-    fn grip_window_table(lua, window: &GripWindow) -> "softvt.GripWindow" as "window" {
+    fn instance_window_table(lua, window: &InstanceWindow) -> "softvt.InstanceWindow" as "window" {
         /// The loosest grip that holds.
         loose: "softvt.Grip" = grip_table(lua, &window.loose)?;
         /// The tightest grip whose carried object stays within τ; that of the loose end if none does.
@@ -281,7 +289,7 @@ fn rows<T: DeserializeOwned>(lua: &Lua, label: &str, value: &Value) -> mlua::Res
     }
 }
 
-choice! { Protocol { "press" => Press, "hand" => Hand } }
+choice! { SweepProtocol { "press" => Press, "hand" => Hand } }
 
 functions! {
     FUNCTIONS {
@@ -289,8 +297,8 @@ functions! {
         fn envelope(lua) takes spec "softvt.EnvelopeSpec" {
             /// Name of the asset.
             asset: String = Type::Name;
-            /// Protocol by which the rows were measured.
-            protocol: Protocol => Text("press");
+            /// How the sweep was made.
+            protocol: SweepProtocol => Text("press");
             /// Safety factor κ of the deformation limit τ = κ D_ref.
             kappa: f64 = Type::Number("", Range::closed(0.0, 1.0)) => Number(0.5);
             /// Stable strain of the material, at which 5 % of the volume ends the press.
@@ -353,12 +361,12 @@ functions! {
             strain_factor: f64 = FACTOR => Number(1.0);
             /// Static friction of its coating.
             coating: Option<f64> = COATING;
-        } -> ["softvt.GripWindow?"] {
+        } -> ["softvt.InstanceWindow?"] {
             check_privilege(lua, "softvt.grip_window")?;
             let friction = coating.map_or(1.0, |mu| mu / PadSpec::default().static_mu);
             let factors = InstanceFactors { scale, youngs: youngs_factor, density: density_factor, strain: strain_factor, friction };
             let found = calibrated_asset(lua, &asset)?.and_then(|asset| asset.model.window(&factors));
-            found.map(|window| grip_window_table(lua, &window)).transpose()?
+            found.map(|window| instance_window_table(lua, &window)).transpose()?
         }
         /// Returns instances of an asset as the episodes of a suite draw them, from a random stream that no episode uses. Without a
         /// variation each is the asset itself.

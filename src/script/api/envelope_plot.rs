@@ -14,7 +14,7 @@ use softvt_media::plot::{
 pub fn envelope_plot(asset: &str, envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
     let finite = |row: &&SweepRow| row.d_pct.is_finite() && row.width_mm.is_finite();
     let rows: Vec<&SweepRow> = envelope.sweep.iter().filter(finite).collect();
-    let widths = || rows.iter().map(|row| row.width_mm).chain(envelope.window.width_lower_mm);
+    let widths = || rows.iter().map(|row| row.width_mm).chain(envelope.window.loose.width_mm);
     let (widest, narrowest) =
         (widths().fold(f64::NEG_INFINITY, f64::max), widths().fold(f64::INFINITY, f64::min));
     if widest < narrowest {
@@ -53,7 +53,7 @@ pub fn envelope_plot(asset: &str, envelope: &Envelope, limit: Option<Deformation
 
 fn band(window: &SafeWindow) -> Option<AxisBand> {
     window.extent_mm()?;
-    Some(AxisBand { left: window.width_lower_mm?, right: window.width_at_tau_mm? })
+    Some(AxisBand { left: window.loose.width_mm?, right: window.tight.width_mm? })
 }
 
 fn limit_levels(limit: DeformationLimit) -> Vec<LevelLine> {
@@ -68,8 +68,8 @@ fn window_ends(window: &SafeWindow) -> Vec<VerticalMark> {
         Some(VerticalMark { x: width, label: format!("{width:.1} mm, {force:.2} N"), side })
     };
     let ends = [
-        end(window.width_lower_mm, window.force_lower_n, LabelSide::Left),
-        end(window.width_at_tau_mm, window.force_at_tau_n, LabelSide::Right),
+        end(window.loose.width_mm, window.loose.force_n, LabelSide::Left),
+        end(window.tight.width_mm, window.tight.force_n, LabelSide::Right),
     ];
     ends.into_iter().flatten().collect()
 }
