@@ -4,7 +4,7 @@ use softvt::{
     benchmark::Plan,
     episode_id::{EpisodeId, EpisodeSplit},
     rollout::EpisodeSpec,
-    script::{self, EpisodeSetup, ExpertController, GripMode, LoadedScript, SceneChanges},
+    script::{self, EpisodeSetup, ExpertController, ExpertGrip, LoadedScript, SceneChanges},
 };
 
 /// The suite.
@@ -39,5 +39,5 @@ pub fn open(loaded: &LoadedScript, task: usize, film: bool) -> (EpisodeSpec, Exp
         )
     };
     spec.header.privileged = true;
-    (spec, opened.expert(GripMode::Commanded).expect("an expert"))
+    (spec, opened.expert(ExpertGrip::Commanded).expect("an expert"))
 }

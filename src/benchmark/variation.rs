@@ -70,7 +70,7 @@ pub struct HiddenRanges {
 
 /// No instance within the ranges of a variation can be kept, or its window is unknown.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum DrawError {
+pub enum VariationError {
     /// The scene has no object that the variation changes.
     #[error("has no soft object")]
     NoSoftObject,
@@ -154,8 +154,8 @@ impl VariationRanges {
         &self,
         seed: &EpisodeSeed,
         scene: &Scene,
-        model_of: &InstancePressLookup<'_>,
-    ) -> Result<SceneVariation, DrawError> {
+        presses_of: &InstancePressLookup<'_>,
+    ) -> Result<SceneVariation, VariationError> {
         let mut streams = InstanceStreams::of(seed);
         let [mut colour, mut light, mut camera] =
             [RandomStream::Colour, RandomStream::Light, RandomStream::Camera]
@@ -164,12 +164,12 @@ impl VariationRanges {
         for object in scene.objects.iter().filter(|object| SceneVariation::applies_to(&object.asset.body)) {
             let drawn = ObjectVariation {
                 colour: std::array::from_fn(|_| 1.0 + around_zero(&mut colour, self.colour)),
-                ..self.draw_instance(&mut streams, &object.nominal, &factors_in_layout(object), model_of)?
+                ..self.draw_instance(&mut streams, &object.nominal, &factors_in_layout(object), presses_of)?
             };
             objects.insert(object.name.clone(), drawn);
         }
         if objects.is_empty() {
-            return Err(DrawError::NoSoftObject);
+            return Err(VariationError::NoSoftObject);
         }
         let mut cameras = BTreeMap::new();
         for moved in scene.cameras.iter().filter(|camera| SceneVariation::moves(camera.mount)) {
@@ -193,8 +193,8 @@ impl VariationRanges {
         suite: &str,
         asset: &Asset,
         count: u32,
-        model_of: &InstancePressLookup<'_>,
-    ) -> Result<Vec<ObjectVariation>, DrawError> {
+        presses_of: &InstancePressLookup<'_>,
+    ) -> Result<Vec<ObjectVariation>, VariationError> {
         let id = EpisodeId {
             suite: suite.into(),
             task: 0,
@@ -204,7 +204,7 @@ impl VariationRanges {
         };
         let mut streams = InstanceStreams::of(&EpisodeSeed::new(&id, &asset.name));
         (0..count)
-            .map(|_| self.draw_instance(&mut streams, asset, &InstanceFactors::NOMINAL, model_of))
+            .map(|_| self.draw_instance(&mut streams, asset, &InstanceFactors::NOMINAL, presses_of))
             .collect()
     }
 
@@ -213,8 +213,8 @@ impl VariationRanges {
         streams: &mut InstanceStreams,
         asset: &Asset,
         layout: &InstanceFactors,
-        model_of: &InstancePressLookup<'_>,
-    ) -> Result<ObjectVariation, DrawError> {
+        presses_of: &InstancePressLookup<'_>,
+    ) -> Result<ObjectVariation, VariationError> {
         let scale = self.size.uniform(&mut streams.size);
         let mut draw_material = || ObjectVariation {
             scale,
@@ -228,15 +228,15 @@ impl VariationRanges {
         let names = || (asset.name.clone(), self.name.clone());
         let no_window = || {
             let (asset, variation) = names();
-            DrawError::NoWindow { asset, variation }
+            VariationError::NoWindow { asset, variation }
         };
-        let model = model_of(asset).ok_or_else(no_window)?;
+        let presses = presses_of(asset).ok_or_else(no_window)?;
         for draws in 1..=MAX_DRAWS {
             let material = draw_material();
             let (drawn, mut hidden) = ranges.draw(&mut streams.hidden, material);
             if let Some(strain) = too_large(asset, hidden.strain_factor) {
                 let (asset, variation) = names();
-                return Err(DrawError::Strain { asset, variation, strain: format_number(strain) });
+                return Err(VariationError::Strain { asset, variation, strain: format_number(strain) });
             }
             let factors = InstanceFactors {
                 scale: layout.scale * scale,
@@ -245,7 +245,7 @@ impl VariationRanges {
                 strain: hidden.strain_factor,
                 friction: hidden.coating / PadSpec::default().static_mu,
             };
-            let window = model.window(&factors).ok_or_else(no_window)?;
+            let window = presses.window(&factors).ok_or_else(no_window)?;
             if window.carried <= MAX_CARRIED && ranges.window_ratio.contains(window.ratio()) {
                 (hidden.window_ratio, hidden.draws) = (window.ratio(), draws);
                 return Ok(ObjectVariation { hidden: Some(hidden), ..drawn });
@@ -253,7 +253,7 @@ impl VariationRanges {
         }
         let (asset, variation) = names();
         let FactorRange { min, max } = ranges.window_ratio;
-        Err(DrawError::NoInstance {
+        Err(VariationError::NoInstance {
             asset,
             variation,
             range: format!("{}..{}", format_number(min), format_number(max)),

@@ -20,7 +20,7 @@ pub const PADDED_ACTION_LEN: usize = 32;
 ///
 /// ```
 /// use rmpv::Value;
-/// use softvt_policy::{GripCommand, GripTarget, ToolMotion, decode, msgpack::map, profile::Profile};
+/// use softvt_policy::{EncodedGrip, GripTarget, ToolMotion, decode, msgpack::map, profile::Profile};
 ///
 /// let libero = Profile::named("libero").expect("a built-in profile");
 /// // A step of +5 cm along x at most; the gripper's value 1 means closed.
@@ -28,7 +28,7 @@ pub const PADDED_ACTION_LEN: usize = 32;
 /// let chunk = decode::chunk(&map([("actions", Value::Array(row))]), &libero.actions)?;
 /// let ToolMotion::Delta { translation_b, .. } = chunk.commands[0].motion else { unreachable!() };
 /// assert_eq!(translation_b.x, 0.05);
-/// assert_eq!(chunk.commands[0].grip, GripCommand::Target(GripTarget::Closure(1.0)));
+/// assert_eq!(chunk.commands[0].grip, EncodedGrip::Target(GripTarget::Closure(1.0)));
 /// # Ok::<(), softvt_policy::PolicyError>(())
 /// ```
 ///
@@ -105,7 +105,7 @@ pub fn command(row: &[f64; ACTION_LEN], encoding: &ActionEncoding) -> Result<Too
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Action, GripCommand, GripTarget, msgpack::pack_array, profile::Profile};
+    use crate::{Action, EncodedGrip, GripTarget, msgpack::pack_array, profile::Profile};
     use softvt_common::npy::NpyArray;
 
     fn read(value: Value) -> Result<ActionChunk, PolicyError> {
@@ -159,7 +159,7 @@ mod tests {
             translation_b: Vec3::new(0.05, -0.05, 0.025),
             rotation_b: Vec3::new(0.0, 0.0, 0.5),
         };
-        assert_eq!(delta, ToolCommand { motion, grip: GripCommand::Target(GripTarget::Closure(1.0)) });
+        assert_eq!(delta, ToolCommand { motion, grip: EncodedGrip::Target(GripTarget::Closure(1.0)) });
     }
 
     #[test]

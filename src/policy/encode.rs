@@ -7,7 +7,7 @@ use super::{
     CameraImage, Observation, QueryId, RobotState,
     msgpack::{map, pack_array},
     observation::last,
-    profile::{InputSource, Profile, ProfileInput, StatePart},
+    profile::{ObservationSource, Profile, ProfileInput, RobotStatePart},
 };
 use softvt_common::npy::NpyArray;
 use softvt_robot::rotation;
@@ -35,7 +35,7 @@ impl ObservationEntry {
     }
 }
 
-/// Content of an entry, in the type and shape given at [`InputSource`]; [`ProfileInput::frames`] adds an axis. `None` if
+/// Content of an entry, in the type and shape given at [`ObservationSource`]; [`ProfileInput::frames`] adds an axis. `None` if
 /// the observation lacks its stream, or `query` is needed and missing.
 pub fn content(
     observation: &Observation,
@@ -44,10 +44,10 @@ pub fn content(
 ) -> Option<ObservationEntry> {
     let steps = input.steps();
     let array = match &input.source {
-        InputSource::Prompt => return Some(ObservationEntry::Text(observation.prompt.clone())),
-        InputSource::Query => return Some(ObservationEntry::Query(query_map(query?))),
-        InputSource::QuerySeed => return Some(ObservationEntry::Query(query?.seed().into())),
-        InputSource::Camera { camera, half_turn } => {
+        ObservationSource::Prompt => return Some(ObservationEntry::Text(observation.prompt.clone())),
+        ObservationSource::Query => return Some(ObservationEntry::Query(query_map(query?))),
+        ObservationSource::QuerySeed => return Some(ObservationEntry::Query(query?.seed().into())),
+        ObservationSource::Camera { camera, half_turn } => {
             let turned = |one: &CameraImage| match half_turn {
                 true => imageops::rotate180(&one.image),
                 false => one.image.clone(),
@@ -55,7 +55,7 @@ pub fn content(
             let images = observation.camera_images(camera, steps);
             stacked(input, images.into_iter().map(|one| image_array(turned(one))))?
         }
-        InputSource::Depth { camera, half_turn } => {
+        ObservationSource::Depth { camera, half_turn } => {
             let depth = |one: &CameraImage| {
                 let numbers = turned(one.depth.as_ref()?, *half_turn);
                 Some(NpyArray::from_f32(shape_of(one), numbers))
@@ -63,7 +63,7 @@ pub fn content(
             let images = observation.camera_images(camera, steps);
             stacked(input, images.into_iter().filter_map(depth))?
         }
-        InputSource::Segmentation { camera, half_turn } => {
+        ObservationSource::Segmentation { camera, half_turn } => {
             let objects = |one: &CameraImage| {
                 let numbers = turned(one.segmentation.as_ref()?, *half_turn);
                 Some(NpyArray::from_u16(shape_of(one), numbers))
@@ -71,17 +71,17 @@ pub fn content(
             let images = observation.camera_images(camera, steps);
             stacked(input, images.into_iter().filter_map(objects))?
         }
-        InputSource::State { parts } => {
+        ObservationSource::State { parts } => {
             let row = |robot: &RobotState| {
                 let numbers: Vec<f32> = parts.iter().flat_map(|part| state(robot, *part)).collect();
                 NpyArray::from_f32(vec![numbers.len()], numbers)
             };
             stacked(input, observation.robot_states(steps).into_iter().map(row))?
         }
-        InputSource::TactileImage { layout, markers } => {
+        ObservationSource::TactileImage { layout, markers } => {
             image_array(observation.tactile.as_ref()?.mosaic(*layout, *markers))
         }
-        InputSource::Tactile { finger, markers } => {
+        ObservationSource::Tactile { finger, markers } => {
             let frames = observation.tactile.as_ref()?.last(steps);
             let images = frames.into_iter().map(|frame| {
                 let frame = &frame[finger.index()];
@@ -89,11 +89,11 @@ pub fn content(
             });
             stacked(input, images.map(image_array))?
         }
-        InputSource::MarkerMotion => {
+        ObservationSource::MarkerMotion => {
             let rows = observation.tactile.as_ref()?.marker_motion(steps);
             NpyArray::from_f32(vec![rows.len(), 2 * MARKER_COUNT, 2], rows.into_iter().flatten().flatten())
         }
-        InputSource::Force => {
+        ObservationSource::Force => {
             let past: Vec<&[f64; 6]> = observation.force_history.iter().collect();
             let rows = last(&past, steps);
             NpyArray::from_f32(vec![rows.len(), 6], rows.into_iter().flatten().map(|x| *x as f32))
@@ -162,28 +162,28 @@ pub fn image_array(image: RgbImage) -> NpyArray {
     NpyArray::from_bytes(shape, image.into_raw())
 }
 
-fn state(o: &RobotState, part: StatePart) -> Vec<f32> {
+fn state(o: &RobotState, part: RobotStatePart) -> Vec<f32> {
     let quaternion = || rotation::from_axis_angle(&o.ee_axis_angle_b).into_inner();
     let numbers: Vec<f64> = match part {
-        StatePart::Position => o.ee_position_b.iter().copied().collect(),
-        StatePart::AxisAngle => o.ee_axis_angle_b.iter().copied().collect(),
-        StatePart::QuaternionWxyz => {
+        RobotStatePart::Position => o.ee_position_b.iter().copied().collect(),
+        RobotStatePart::AxisAngle => o.ee_axis_angle_b.iter().copied().collect(),
+        RobotStatePart::QuaternionWxyz => {
             let q = quaternion();
             vec![q.w, q.i, q.j, q.k]
         }
-        StatePart::QuaternionXyzw => {
+        RobotStatePart::QuaternionXyzw => {
             let q = quaternion();
             vec![q.i, q.j, q.k, q.w]
         }
-        StatePart::Joints => o.joints.to_vec(),
-        StatePart::JointVelocities => o.joint_velocities.to_vec(),
-        StatePart::JointTorques => o.joint_torques.to_vec(),
-        StatePart::GripperWidth => vec![o.gripper_width_m],
-        StatePart::FingerPosition => vec![0.5 * o.gripper_width_m],
-        StatePart::SensedWidth => vec![o.sensed_width_m],
-        StatePart::SensedFingerPosition => vec![0.5 * o.sensed_width_m],
-        StatePart::FingerPair => vec![0.5 * o.gripper_width_m, -0.5 * o.gripper_width_m],
-        StatePart::Closure => vec![o.closure],
+        RobotStatePart::Joints => o.joints.to_vec(),
+        RobotStatePart::JointVelocities => o.joint_velocities.to_vec(),
+        RobotStatePart::JointTorques => o.joint_torques.to_vec(),
+        RobotStatePart::GripperWidth => vec![o.gripper_width_m],
+        RobotStatePart::FingerPosition => vec![0.5 * o.gripper_width_m],
+        RobotStatePart::SensedWidth => vec![o.sensed_width_m],
+        RobotStatePart::SensedFingerPosition => vec![0.5 * o.sensed_width_m],
+        RobotStatePart::FingerPair => vec![0.5 * o.gripper_width_m, -0.5 * o.gripper_width_m],
+        RobotStatePart::Closure => vec![o.closure],
     };
     debug_assert_eq!(numbers.len(), part.count());
     numbers.into_iter().map(|x| x as f32).collect()

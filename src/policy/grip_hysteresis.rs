@@ -1,6 +1,8 @@
 //! Grip codes whose closure depends on earlier answers: a gripper that is open or closed with hysteresis, and one that holds a
 //! width.
 
+use serde::{Deserialize, Serialize};
+
 /// Closure above which an answer closes an open gripper: a target width below 72 mm.
 const CLOSE_ABOVE: f64 = 0.1;
 /// Closure below which an answer opens a closed gripper: a target width above 76 mm.
@@ -8,6 +10,17 @@ const OPEN_BELOW: f64 = 0.05;
 /// Control steps after closing in which the width follows the answers: 0.5 s. A policy that learned two widths passes
 /// through those in between.
 const FOLLOW_STEPS: u32 = 10;
+
+/// Hysteresis of a binary gripper, as SoftVTBench's release v0.2 decodes continuous answers.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GripHysteresis {
+    /// Value from which on, towards that of the closed gripper, an answer closes.
+    pub close: f64,
+    /// Value from which on, towards that of the open gripper, an answer opens.
+    pub open: f64,
+    /// Control steps for which a change is kept whatever is answered.
+    pub hold_steps: u32,
+}
 
 /// State of a gripper that is open or closed, with hysteresis: the decoder of SoftVTBench's release v0.2 for continuous
 /// answers. A change is kept for some control steps, whatever is answered.

@@ -60,7 +60,7 @@ pub struct ToolCommand {
     /// Motion of the tool.
     pub motion: ToolMotion,
     /// Command of the gripper.
-    pub grip: GripCommand,
+    pub grip: EncodedGrip,
 }
 
 /// Motion of the tool in a [`ToolCommand`].
@@ -87,7 +87,7 @@ pub enum ToolMotion {
 
 /// Command of the gripper in a [`ToolCommand`], as the grip code of a profile reads it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum GripCommand {
+pub enum EncodedGrip {
     /// A target of the hand.
     Target(GripTarget),
     /// The closure of an answer in the code two-width, see [`WidthLatch`](super::WidthLatch).
@@ -104,7 +104,7 @@ pub enum GripCommand {
 impl From<Action> for ToolCommand {
     fn from(action: Action) -> Self {
         let Action { position_b, axis_angle_b, grip } = action;
-        Self { motion: ToolMotion::Pose { position_b, axis_angle_b }, grip: GripCommand::Target(grip) }
+        Self { motion: ToolMotion::Pose { position_b, axis_angle_b }, grip: EncodedGrip::Target(grip) }
     }
 }
 

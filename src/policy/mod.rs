@@ -13,9 +13,9 @@ pub mod profile;
 pub mod remote;
 pub mod transport;
 
-pub use grip_hysteresis::{GripSwitch, WidthLatch};
+pub use grip_hysteresis::{GripHysteresis, GripSwitch, WidthLatch};
 pub use interface::{
-    Action, ActionChunk, EpisodeBrief, GripCommand, Policy, PolicyError, QueryId, ToolCommand, ToolMotion,
+    Action, ActionChunk, EncodedGrip, EpisodeBrief, Policy, PolicyError, QueryId, ToolCommand, ToolMotion,
 };
 pub use observation::{
     CameraImage, Observation, PadForce, PastStep, RobotState, SensorStreams, TactileFrame, TactileHistory,

@@ -6,7 +6,7 @@
 //! distance that it does cover. The equation x'' = kp (g − x) − kd x' has the solution x(t) = g + e^{−ωt} ((x₀ − g) +
 //! (v₀ + ω (x₀ − g)) t) with ω = √kp. Position and rotation vector both follow it.
 
-use super::{Action, GripCommand, GripSwitch, Observation, ToolCommand, ToolMotion, WidthLatch};
+use super::{Action, EncodedGrip, GripSwitch, Observation, ToolCommand, ToolMotion, WidthLatch};
 use softvt_benchmark::CONTROL_DT;
 use softvt_geometry::{Quat, Vec3};
 use softvt_robot::{GripTarget, rotation};
@@ -29,9 +29,9 @@ impl CommandResolver {
     /// The action that `command` means in the control step of `observation`.
     pub fn resolve(&mut self, observation: &Observation, command: ToolCommand) -> Action {
         let grip = match command.grip {
-            GripCommand::Target(target) => target,
-            GripCommand::TwoWidth(answer) => GripTarget::Closure(self.latch.closure(answer)),
-            GripCommand::Latched { closes, hold_steps } => {
+            EncodedGrip::Target(target) => target,
+            EncodedGrip::TwoWidth(answer) => GripTarget::Closure(self.latch.closure(answer)),
+            EncodedGrip::Latched { closes, hold_steps } => {
                 GripTarget::Closure(self.switch.closure(closes, hold_steps))
             }
         };

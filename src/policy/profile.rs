@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{GripCommand, SensorStreams};
+use super::{EncodedGrip, GripHysteresis, SensorStreams};
 use softvt_robot::{GripTarget, Side};
 use softvt_scene::STANDARD_CAMERAS;
 use softvt_sensing::tactile::{HISTORY_LENGTH, MarkerStyle, TactileMosaicLayout};
@@ -33,7 +33,7 @@ pub struct ProfileInput {
     /// Keys under which it is sent.
     pub keys: Vec<String>,
     /// Content of the entry.
-    pub source: InputSource,
+    pub source: ObservationSource,
     /// Number of control steps in the entry, the present one last, along its first axis. `None`: the present step
     /// alone without that axis, or all 8 steps of markers and forces.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -42,14 +42,14 @@ pub struct ProfileInput {
 
 impl ProfileInput {
     /// An input of the present step.
-    pub fn new(keys: Vec<String>, source: InputSource) -> Self {
+    pub fn new(keys: Vec<String>, source: ObservationSource) -> Self {
         Self { keys, source, frames: None }
     }
 
     /// Number of control steps that it needs.
     pub fn steps(&self) -> usize {
         let default = match self.source {
-            InputSource::MarkerMotion | InputSource::Force => HISTORY_LENGTH,
+            ObservationSource::MarkerMotion | ObservationSource::Force => HISTORY_LENGTH,
             _ => 1,
         };
         self.frames.unwrap_or(default)
@@ -64,7 +64,7 @@ impl ProfileInput {
 /// Content of an entry: its source, numpy type and shape.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
-pub enum InputSource {
+pub enum ObservationSource {
     /// A camera image, uint8 (height, width, 3).
     Camera {
         /// Name of the camera.
@@ -90,7 +90,7 @@ pub enum InputSource {
     /// State of the robot, float32 (n).
     State {
         /// Parts of the vector, in order.
-        parts: Vec<StatePart>,
+        parts: Vec<RobotStatePart>,
     },
     /// The instruction, text.
     Prompt,
@@ -125,7 +125,7 @@ pub enum InputSource {
 /// A part of a state vector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum StatePart {
+pub enum RobotStatePart {
     /// Tool position in the base frame, m (3).
     Position,
     /// Tool orientation in the base frame as axis-angle, rad (3).
@@ -154,7 +154,7 @@ pub enum StatePart {
     Closure,
 }
 
-impl StatePart {
+impl RobotStatePart {
     /// Number of components.
     pub fn count(self) -> usize {
         match self {
@@ -287,17 +287,6 @@ pub struct GripperValues {
     pub latch: Option<GripHysteresis>,
 }
 
-/// Hysteresis of a binary gripper, as SoftVTBench's release v0.2 decodes continuous answers.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct GripHysteresis {
-    /// Value from which on, towards that of the closed gripper, an answer closes.
-    pub close: f64,
-    /// Value from which on, towards that of the open gripper, an answer opens.
-    pub open: f64,
-    /// Control steps for which a change is kept whatever is answered.
-    pub hold_steps: u32,
-}
-
 /// Share of its range by which a grip value may lie outside: answers of learned policies overshoot a little.
 const GRIP_OVERSHOOT: f64 = 0.1;
 /// Largest magnitude of a closure outside of 0..=1.
@@ -313,7 +302,7 @@ impl GripperValues {
     }
 
     /// The command of a value.
-    pub fn command(&self, value: f64) -> GripCommand {
+    pub fn command(&self, value: f64) -> EncodedGrip {
         if let (GripCode::Binary, Some(GripHysteresis { close, open, hold_steps })) = (self.code, self.latch)
         {
             let towards_closed = |limit: f64| (value - limit) * (self.closed - self.open) >= 0.0;
@@ -323,12 +312,12 @@ impl GripperValues {
                 (false, true) => Some(false),
                 (false, false) => None,
             };
-            return GripCommand::Latched { closes, hold_steps };
+            return EncodedGrip::Latched { closes, hold_steps };
         }
         match self.code {
-            GripCode::TwoWidth => GripCommand::TwoWidth(self.closure(value)),
-            GripCode::Force if value >= 0.0 => GripCommand::Target(GripTarget::Force(value)),
-            _ => GripCommand::Target(GripTarget::Closure(self.closure(value))),
+            GripCode::TwoWidth => EncodedGrip::TwoWidth(self.closure(value)),
+            GripCode::Force if value >= 0.0 => EncodedGrip::Target(GripTarget::Force(value)),
+            _ => EncodedGrip::Target(GripTarget::Closure(self.closure(value))),
         }
     }
 
@@ -381,28 +370,28 @@ impl Profile {
     /// The built-in profile of a name.
     pub fn named(name: &str) -> Option<Self> {
         let both = |name: &str| vec![format!("observation/{name}"), name.to_owned()];
-        let plain = |camera: &str| InputSource::Camera { camera: camera.to_owned(), half_turn: false };
-        let state = |hand: &[StatePart]| InputSource::State {
-            parts: [&[StatePart::Position, StatePart::AxisAngle], hand].concat(),
+        let plain = |camera: &str| ObservationSource::Camera { camera: camera.to_owned(), half_turn: false };
+        let state = |hand: &[RobotStatePart]| ObservationSource::State {
+            parts: [&[RobotStatePart::Position, RobotStatePart::AxisAngle], hand].concat(),
         };
         // SoftVTBench's interfaces and LIBERO's have the exact position of the fingers.
         let finger = match name {
-            "vision" | "visuo_tactile" => StatePart::SensedFingerPosition,
-            _ => StatePart::FingerPosition,
+            "vision" | "visuo_tactile" => RobotStatePart::SensedFingerPosition,
+            _ => RobotStatePart::FingerPosition,
         };
         let input = ProfileInput::new;
         let mut inputs = vec![
             input(both("image"), plain(STANDARD_CAMERAS[0])),
             input(both("wrist_image"), plain(STANDARD_CAMERAS[1])),
             input(both("state"), state(&[finger])),
-            input(vec!["prompt".to_owned()], InputSource::Prompt),
+            input(vec!["prompt".to_owned()], ObservationSource::Prompt),
         ];
-        let mosaic = |markers| InputSource::TactileImage { layout: TactileMosaicLayout::Rows, markers };
+        let mosaic = |markers| ObservationSource::TactileImage { layout: TactileMosaicLayout::Rows, markers };
         let tactile = [
             input(both("tactile_image"), mosaic(None)),
-            input(both("tactile_marker_motion"), InputSource::MarkerMotion),
+            input(both("tactile_marker_motion"), ObservationSource::MarkerMotion),
         ];
-        let force = || input(both("tactile_gripper_force"), InputSource::Force);
+        let force = || input(both("tactile_gripper_force"), ObservationSource::Force);
         // Finger positions, m.
         let fingers = |code| GripperValues { code, ..GripperValues::new(0.04, 0.0) };
         let closure = GripperValues::new(0.0, 1.0);
@@ -410,7 +399,7 @@ impl Profile {
         let actions = match name {
             "vision" => absolute(GripperValues { code: GripCode::Binary, ..closure }),
             "vision_drives" => {
-                inputs[2].source = state(&[StatePart::FingerPosition, StatePart::Closure]);
+                inputs[2].source = state(&[RobotStatePart::FingerPosition, RobotStatePart::Closure]);
                 absolute(closure)
             }
             "visuo_tactile" => {
@@ -425,7 +414,7 @@ impl Profile {
             }
             "softvtbench_v02" | "softvtbench_v02_latched" => {
                 inputs.push(input(both("tactile_image"), mosaic(Some(MarkerStyle::BlackArrows))));
-                let motion = input(both("tactile_marker_motion"), InputSource::MarkerMotion);
+                let motion = input(both("tactile_marker_motion"), ObservationSource::MarkerMotion);
                 inputs.push(ProfileInput { frames: Some(2), ..motion });
                 inputs.push(force());
                 let latch = GripHysteresis { close: 0.0398, open: 0.03995, hold_steps: 10 };
@@ -436,10 +425,10 @@ impl Profile {
             }
             "libero" => {
                 let turned =
-                    |camera: &str| InputSource::Camera { camera: camera.to_owned(), half_turn: true };
+                    |camera: &str| ObservationSource::Camera { camera: camera.to_owned(), half_turn: true };
                 inputs[0].source = turned(STANDARD_CAMERAS[0]);
                 inputs[1].source = turned(STANDARD_CAMERAS[1]);
-                inputs[2].source = state(&[StatePart::FingerPair]);
+                inputs[2].source = state(&[RobotStatePart::FingerPair]);
                 inputs[..3].iter_mut().for_each(|input| input.keys.truncate(1));
                 ActionEncoding::new(
                     PoseEncoding::DeltaOsc { translation_m: 0.05, rotation_rad: 0.5 },
@@ -448,8 +437,8 @@ impl Profile {
             }
             _ => return None,
         };
-        inputs.push(input(vec!["softvt".to_owned()], InputSource::Query));
-        inputs.push(input(vec!["__softvtbench_rng_seed".to_owned()], InputSource::QuerySeed));
+        inputs.push(input(vec!["softvt".to_owned()], ObservationSource::Query));
+        inputs.push(input(vec!["__softvtbench_rng_seed".to_owned()], ObservationSource::QuerySeed));
         Some(Self { name: name.to_owned(), inputs, actions, observe_every_step: false })
     }
 
@@ -460,26 +449,26 @@ impl Profile {
             let past_steps = input.steps() - 1;
             streams.past_steps = streams.past_steps.max(past_steps);
             match &input.source {
-                InputSource::Camera { camera, .. }
-                | InputSource::Depth { camera, .. }
-                | InputSource::Segmentation { camera, .. } => {
+                ObservationSource::Camera { camera, .. }
+                | ObservationSource::Depth { camera, .. }
+                | ObservationSource::Segmentation { camera, .. } => {
                     streams.past_images = streams.past_images.max(past_steps);
                     if !streams.cameras.contains(camera) {
                         streams.cameras.push(camera.clone());
                     }
-                    streams.depth |= matches!(input.source, InputSource::Depth { .. });
-                    streams.segmentation |= matches!(input.source, InputSource::Segmentation { .. });
+                    streams.depth |= matches!(input.source, ObservationSource::Depth { .. });
+                    streams.segmentation |= matches!(input.source, ObservationSource::Segmentation { .. });
                 }
-                InputSource::TactileImage { .. }
-                | InputSource::Tactile { .. }
-                | InputSource::MarkerMotion => {
+                ObservationSource::TactileImage { .. }
+                | ObservationSource::Tactile { .. }
+                | ObservationSource::MarkerMotion => {
                     streams.tactile = true;
                 }
-                InputSource::Force => streams.force = true,
-                InputSource::State { .. }
-                | InputSource::Prompt
-                | InputSource::Query
-                | InputSource::QuerySeed => {}
+                ObservationSource::Force => streams.force = true,
+                ObservationSource::State { .. }
+                | ObservationSource::Prompt
+                | ObservationSource::Query
+                | ObservationSource::QuerySeed => {}
             }
         }
         streams
@@ -511,15 +500,15 @@ mod tests {
     #[test]
     fn only_vision_drives_has_the_command_and_the_exact_width() {
         let hand = |name| match &Profile::named(name).unwrap().inputs[2].source {
-            InputSource::State { parts } => parts[2..].to_vec(),
+            ObservationSource::State { parts } => parts[2..].to_vec(),
             other => panic!("{other:?}"),
         };
         for name in ["vision", "visuo_tactile"] {
-            assert_eq!(hand(name), [StatePart::SensedFingerPosition], "{name}");
+            assert_eq!(hand(name), [RobotStatePart::SensedFingerPosition], "{name}");
         }
-        assert_eq!(hand("vision_drives"), [StatePart::FingerPosition, StatePart::Closure]);
+        assert_eq!(hand("vision_drives"), [RobotStatePart::FingerPosition, RobotStatePart::Closure]);
         for name in ["softvtbench", "softvtbench_v02"] {
-            assert_eq!(hand(name), [StatePart::FingerPosition], "{name}");
+            assert_eq!(hand(name), [RobotStatePart::FingerPosition], "{name}");
         }
     }
 
@@ -542,7 +531,7 @@ mod tests {
         let binary = Profile::named("vision").unwrap().actions.gripper;
         assert_eq!([255.0, -3.0, 0.7].map(|x| binary.closure(x)), [255.0, -3.0, 1.0]);
         assert_eq!(closure.closure(1e300), 1e3);
-        assert_eq!(GripperValues::FORCE.command(9.0), GripCommand::Target(GripTarget::Force(9.0)));
+        assert_eq!(GripperValues::FORCE.command(9.0), EncodedGrip::Target(GripTarget::Force(9.0)));
     }
 
     #[test]
@@ -562,7 +551,7 @@ mod tests {
     fn a_latched_gripper_has_two_limits() {
         let gripper = Profile::named("softvtbench_v02_latched").unwrap().actions.gripper;
         let closes = |value| match gripper.command(value) {
-            GripCommand::Latched { closes, hold_steps: 10 } => closes,
+            EncodedGrip::Latched { closes, hold_steps: 10 } => closes,
             other => panic!("{other:?}"),
         };
         assert_eq!(
@@ -579,10 +568,10 @@ mod tests {
     fn every_code_reads_its_own_values() {
         let fingers = Profile::named("softvtbench").unwrap().actions.gripper;
         let of = |code, value| fingers.with_code(code).unwrap().command(value);
-        assert_eq!(of(GripCode::Continuous, 0.01), GripCommand::Target(GripTarget::Closure(0.75)));
-        assert_eq!(of(GripCode::Binary, 0.01), GripCommand::Target(GripTarget::Closure(1.0)));
-        assert_eq!(of(GripCode::TwoWidth, 0.01), GripCommand::TwoWidth(0.75));
-        assert_eq!(of(GripCode::Force, 4.5), GripCommand::Target(GripTarget::Force(4.5)));
+        assert_eq!(of(GripCode::Continuous, 0.01), EncodedGrip::Target(GripTarget::Closure(0.75)));
+        assert_eq!(of(GripCode::Binary, 0.01), EncodedGrip::Target(GripTarget::Closure(1.0)));
+        assert_eq!(of(GripCode::TwoWidth, 0.01), EncodedGrip::TwoWidth(0.75));
+        assert_eq!(of(GripCode::Force, 4.5), EncodedGrip::Target(GripTarget::Force(4.5)));
         assert_eq!(GripperValues::FORCE.with_code(GripCode::Continuous), None);
     }
 }

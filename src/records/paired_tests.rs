@@ -69,7 +69,7 @@ fn normal_tails(ranks: &[usize], smaller: usize) -> f64 {
 
 /// What a number of episodes can separate of two policies that run the same ones, in percentage points of a rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Resolution {
+pub struct DetectableDifference {
     /// Smallest difference that can be significant at 5 %: that of [`MIN_DISCORDANT`] episodes, which one policy alone wins.
     pub smallest: f64,
     /// Difference that McNemar's test finds with a probability of 80 % (Connor, Biometrics 43, 1987), for outcomes that are
@@ -82,8 +82,8 @@ pub const MIN_DISCORDANT: usize = 6;
 /// Sum of the quantiles of the normal distribution for a level of 5 % (two-sided) and a power of 80 %.
 const QUANTILES: f64 = 1.959_964 + 0.841_621;
 
-impl Resolution {
-    /// Resolution of a run with `successes` of `episodes`; `None` if it cannot separate any policies.
+impl DetectableDifference {
+    /// That of a run with `successes` of `episodes`; `None` if it cannot separate any policies.
     pub fn new(successes: usize, episodes: usize) -> Option<Self> {
         if episodes < MIN_DISCORDANT {
             return None;
@@ -198,12 +198,12 @@ mod tests {
 
     #[test]
     fn fifty_episodes_separate_policies_that_differ_by_12_points_at_least() {
-        let resolution = Resolution::new(25, 50).unwrap();
+        let resolution = DetectableDifference::new(25, 50).unwrap();
         assert_eq!(resolution.smallest, 12.0);
         assert!((resolution.found - 28.0).abs() < 0.1, "{}", resolution.found);
         assert!(mcnemar(MIN_DISCORDANT, 0) < 0.05 && mcnemar(MIN_DISCORDANT - 1, 0) > 0.05);
-        assert_eq!(Resolution::new(5, 5), None);
-        assert_eq!(Resolution::new(6, 6).unwrap().found, 100.0);
+        assert_eq!(DetectableDifference::new(5, 5), None);
+        assert_eq!(DetectableDifference::new(6, 6).unwrap().found, 100.0);
     }
 
     #[test]

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize, Serializer, ser::SerializeMap};
 use softvt_common::episode_id::EpisodeId;
 use softvt_common::text::decimal;
 use softvt_evaluation::verdict::{Outcome, Verdict};
-use softvt_scene::{InitialState, SceneVariation};
+use softvt_scene::{InitialStateOverride, SceneVariation};
 
 /// Id, task, target and policy of an episode: the first columns of its record.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -78,7 +78,7 @@ pub struct DemonstrationOrigin {
     /// Format of the file.
     pub format: String,
     /// Initial state that replaces the one of the layout.
-    pub start: InitialState,
+    pub start: InitialStateOverride,
 }
 
 /// A command that is out of reach of one step of the inverse kinematics.

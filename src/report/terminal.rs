@@ -5,7 +5,7 @@ use softvt_evaluation::{
     safety::KAPPAS,
     statistics::{Distribution, Rate},
 };
-use softvt_records::paired_tests::{MIN_DISCORDANT, Resolution};
+use softvt_records::paired_tests::{DetectableDifference, MIN_DISCORDANT};
 use softvt_records::summary::{
     AbortedEpisode, CommandCounts, EpisodeDeformation, GroupScores, InvalidEpisode, SuiteSummary, TauRange,
 };
@@ -166,8 +166,8 @@ fn resolution(scores: &GroupScores) -> String {
     let rate = scores.safety_success_rate.rate.or(scores.goal_success_rate.rate).unwrap_or(0.0);
     let n = scores.episodes;
     let episodes = counted(n, "episode");
-    match Resolution::new((0.01 * rate * n as f64).round() as usize, n) {
-        Some(Resolution { smallest, found }) => format!(
+    match DetectableDifference::new((0.01 * rate * n as f64).round() as usize, n) {
+        Some(DetectableDifference { smallest, found }) => format!(
             "{episodes} separate two policies from a difference of {smallest:.0} points on, in 4 of 5 cases from {found:.0} on"
         ),
         None => format!("{episodes} cannot separate two policies: {MIN_DISCORDANT} are needed at least"),

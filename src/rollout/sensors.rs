@@ -496,7 +496,7 @@ pub struct StateRecording {
     pub frames: Vec<WorldSnapshot>,
     /// The target's largest D over the physics steps of each control step, % of the settled diagonal, after 0 for the settled state;
     /// `None` for a rigid target.
-    pub d_pct: Vec<Option<f64>>,
+    pub worst_d_pct: Vec<Option<f64>>,
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ use softvt_report::{
     condition_table::{ConditionOutcome, ConditionRow, ConditionTable},
     run_folder::RunFolder,
 };
-use softvt_script::{GripMode, LoadedScript};
+use softvt_script::{ExpertGrip, LoadedScript};
 
 /// Name of the file with the comparison of all suites, in the folder above all runs.
 pub const FILE: &str = "conditions.json";
@@ -226,7 +226,7 @@ fn compare_conditions(
 
 /// True for a bound of what can be done without touch.
 fn is_blind(policy: &PolicyConfig) -> bool {
-    matches!(policy.expert(), Some(GripMode::Controller(controller)) if controller.is_blind())
+    matches!(policy.expert(), Some(ExpertGrip::Blind(grip)) if grip.is_bound())
 }
 
 /// The content of `conditions.json`.

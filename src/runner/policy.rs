@@ -21,7 +21,7 @@ use softvt_policy::{
     remote::{PolicyConnections, PolicyServer, RemotePolicy, ServerProtocol},
 };
 use softvt_rollout::{ChunkedPolicy, Controller};
-use softvt_script::{EpisodeSetup, ExpertController, GripController, GripMode, PolicyFile, load_profile};
+use softvt_script::{BlindGrip, EpisodeSetup, ExpertController, ExpertGrip, PolicyFile, load_profile};
 
 /// Environment variable with the key of a policy server. A flag would show it to other users of the machine.
 const API_KEY: &str = "SOFTVT_API_KEY";
@@ -98,7 +98,7 @@ pub enum BuiltinPolicy {
     /// The expert with a hand that feels how firmly it must hold.
     TactileServo,
     /// The expert with the grip of a controller that does not feel.
-    Controlled(GripController),
+    Controlled(BlindGrip),
     /// A robot that holds still.
     Noop,
     /// Random actions.
@@ -111,13 +111,13 @@ impl BuiltinPolicy {
         Self::Expert,
         Self::ExpertBinary,
         Self::TactileServo,
-        Self::Controlled(GripController::FixedClosure),
-        Self::Controlled(GripController::SizeSeen),
-        Self::Controlled(GripController::ContactDepth),
-        Self::Controlled(GripController::OneForce),
-        Self::Controlled(GripController::OneForceForAll),
-        Self::Controlled(GripController::Drives),
-        Self::Controlled(GripController::LookRetry),
+        Self::Controlled(BlindGrip::FixedClosure),
+        Self::Controlled(BlindGrip::SizeSeen),
+        Self::Controlled(BlindGrip::ContactDepth),
+        Self::Controlled(BlindGrip::OneForce),
+        Self::Controlled(BlindGrip::OneForceForAll),
+        Self::Controlled(BlindGrip::Drives),
+        Self::Controlled(BlindGrip::LookRetry),
         Self::Noop,
         Self::Random,
     ];
@@ -150,25 +150,25 @@ impl BuiltinPolicy {
                 "the same expert, feeling in the tactile markers how firmly it must hold (privileged)"
             }
             Self::Controlled(controller) => match controller {
-                GripController::FixedClosure => {
+                BlindGrip::FixedClosure => {
                     "the same expert without touch: one closure per kind of object (privileged)"
                 }
-                GripController::SizeSeen => {
+                BlindGrip::SizeSeen => {
                     "the same expert without touch: the best closure for the size of the object (privileged)"
                 }
-                GripController::ContactDepth => {
+                BlindGrip::ContactDepth => {
                     "the same expert without touch: the best indentation after first contact (privileged)"
                 }
-                GripController::OneForce => {
+                BlindGrip::OneForce => {
                     "the same expert without touch: the best force per kind of object (privileged)"
                 }
-                GripController::OneForceForAll => {
+                BlindGrip::OneForceForAll => {
                     "the same expert without touch: the best force for all objects of the suite (privileged)"
                 }
-                GripController::Drives => {
+                BlindGrip::Drives => {
                     "the same expert without touch: reads the width and the force of the finger drives (privileged)"
                 }
-                GripController::LookRetry => {
+                BlindGrip::LookRetry => {
                     "the same expert without touch: lifts, looks whether the object follows, and closes further (privileged)"
                 }
             },
@@ -178,12 +178,12 @@ impl BuiltinPolicy {
     }
 
     /// How the gripper is controlled, for scripted experts, which have access to ground-truth state.
-    fn grip_mode(self) -> Option<GripMode> {
+    fn grip_mode(self) -> Option<ExpertGrip> {
         Some(match self {
-            Self::Expert => GripMode::Commanded,
-            Self::ExpertBinary => GripMode::Binary,
-            Self::TactileServo => GripMode::TactileServo,
-            Self::Controlled(controller) => GripMode::Controller(controller),
+            Self::Expert => ExpertGrip::Commanded,
+            Self::ExpertBinary => ExpertGrip::Binary,
+            Self::TactileServo => ExpertGrip::TactileServo,
+            Self::Controlled(controller) => ExpertGrip::Blind(controller),
             Self::Noop | Self::Random => return None,
         })
     }
@@ -447,7 +447,7 @@ impl PolicyConfig {
     }
 
     /// How a scripted expert controls the gripper. `None` for other policies.
-    pub fn expert(&self) -> Option<GripMode> {
+    pub fn expert(&self) -> Option<ExpertGrip> {
         match self.kind {
             PolicyKind::Builtin(policy) => policy.grip_mode(),
             _ => None,
@@ -541,7 +541,7 @@ impl PolicyConfig {
                     chunked(Box::new(builtin::RandomPolicy::new(seed)), 1)
                 }
                 PolicyKind::Builtin(expert) => {
-                    let mode = expert.grip_mode().unwrap_or(GripMode::Commanded);
+                    let mode = expert.grip_mode().unwrap_or(ExpertGrip::Commanded);
                     Box::new(expert_controller(opened, mode)?)
                 }
                 // The provider of the actions replaces this factory.
@@ -565,7 +565,7 @@ fn declared_streams(args: &PolicyOptions, profile: &Profile) -> DeclaredStreams 
 ///
 /// # Errors
 /// The task has none, or its script fails.
-pub fn expert_controller(opened: EpisodeSetup, mode: GripMode) -> Result<ExpertController, RunError> {
+pub fn expert_controller(opened: EpisodeSetup, mode: ExpertGrip) -> Result<ExpertController, RunError> {
     opened.expert(mode).ok_or_else(|| RunError::input("the task has no expert"))
 }
 

@@ -157,7 +157,7 @@ fn path_of(start_b: Vec3, commands: &[ToolCommand]) -> Vec<Vec3> {
 
 /// How far answers agree with recorded actions in one respect.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Agreement {
+pub struct AnswerAgreement {
     /// Number of control steps that were compared.
     pub n: usize,
     /// Correlation of the displacements, from −1 to 1; null without motion.
@@ -180,11 +180,11 @@ pub struct PolicyCheck {
     /// Largest time of an answer, s.
     pub answer_max_s: Option<f64>,
     /// Translation of the tool.
-    pub translation: Agreement,
+    pub translation: AnswerAgreement,
     /// Rotation of the tool about the axes of the base.
-    pub rotation: Agreement,
+    pub rotation: AnswerAgreement,
     /// Closure of the gripper.
-    pub grip: Agreement,
+    pub grip: AnswerAgreement,
     /// What is probably wrong, one sentence each; empty if the answers agree.
     pub findings: Vec<String>,
 }
@@ -248,9 +248,9 @@ impl PolicyCheck {
         let grips: Vec<[f64; 2]> =
             steps.iter().map(|s| [s.recorded.closure(), s.answered.closure()]).collect();
         let (translation, rotation, grip) = (
-            Agreement::of_vectors(&translations),
-            Agreement::of_vectors(&rotations),
-            Agreement::of_numbers(&grips),
+            AnswerAgreement::of_vectors(&translations),
+            AnswerAgreement::of_vectors(&rotations),
+            AnswerAgreement::of_numbers(&grips),
         );
         let mut findings = Vec::new();
         findings.extend(explain_translation(&translations, &translation, steps));
@@ -274,7 +274,7 @@ impl PolicyCheck {
         let number = |value: Option<f64>, scale: f64, digits: usize| {
             value.map_or_else(|| "–".to_owned(), |value| format!("{:.digits$}", scale * value))
         };
-        let row = |name: &str, of: &Agreement, scale: f64, unit: &str| {
+        let row = |name: &str, of: &AnswerAgreement, scale: f64, unit: &str| {
             format!(
                 "{name:<12}correlation {:>5}, factor {:>6}, median error {} {unit}\n",
                 number(of.correlation, 1.0, 2),
@@ -318,7 +318,7 @@ fn turn(s: &StepSample, action: &Action) -> Vec3 {
     (rotation::from_axis_angle(&action.axis_angle_b) * s.tool_orientation_b.inverse()).scaled_axis()
 }
 
-impl Agreement {
+impl AnswerAgreement {
     fn of_vectors(pairs: &[VectorPair]) -> Self {
         let (correlation, scale) = fit(pairs, &Mat3::identity());
         let mut errors: Vec<f64> = pairs.iter().map(|p| (p.answered - p.recorded).norm()).collect();
@@ -373,7 +373,7 @@ fn signed_permutations() -> impl Iterator<Item = Mat3> {
 }
 
 /// The axes of which the answers would agree, if they explain the answers and those of the base do not.
-fn other_axes(pairs: &[VectorPair], agreement: &Agreement) -> Option<String> {
+fn other_axes(pairs: &[VectorPair], agreement: &AnswerAgreement) -> Option<String> {
     let own = agreement.correlation?;
     let of = |axes: &Mat3| fit(pairs, axes).0.unwrap_or(-1.0);
     let best = signed_permutations().max_by(|a, b| of(a).total_cmp(&of(b)))?;
@@ -387,7 +387,7 @@ fn other_axes(pairs: &[VectorPair], agreement: &Agreement) -> Option<String> {
     Some(format!("({}, {}, {})", name(0), name(1), name(2)))
 }
 
-fn explain_translation(pairs: &[VectorPair], of: &Agreement, steps: &[StepSample]) -> Option<String> {
+fn explain_translation(pairs: &[VectorPair], of: &AnswerAgreement, steps: &[StepSample]) -> Option<String> {
     if of.agrees() {
         return None;
     }
@@ -426,7 +426,7 @@ fn constant_offset(steps: &[StepSample]) -> Option<Vec3> {
     (mean.norm() > 0.02 && spread < 0.25 * mean.norm()).then_some(mean)
 }
 
-fn explain_rotation(pairs: &[VectorPair], of: &Agreement, steps: &[StepSample]) -> Option<String> {
+fn explain_rotation(pairs: &[VectorPair], of: &AnswerAgreement, steps: &[StepSample]) -> Option<String> {
     // A few turned steps say little.
     if of.agrees() || pairs.len() < 10 {
         return None;
@@ -464,7 +464,7 @@ fn explain_rotation(pairs: &[VectorPair], of: &Agreement, steps: &[StepSample]) 
     })
 }
 
-fn explain_grip(pairs: &[[f64; 2]], of: &Agreement) -> Option<String> {
+fn explain_grip(pairs: &[[f64; 2]], of: &AnswerAgreement) -> Option<String> {
     let varies = |side: usize| {
         let values = pairs.iter().map(|pair| pair[side]);
         let [low, high] = values.fold([f64::MAX, f64::MIN], |[low, high], x| [low.min(x), high.max(x)]);

@@ -19,7 +19,7 @@ use softvt_common::{
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
 use softvt_rollout::{AssetCache, Controller, Episode, EpisodeSpec, SensorAssets, Simulation};
 use softvt_scene::STANDARD_CAMERAS;
-use softvt_script::{EpisodeSetup, ExpertController, GripMode, LoadedScript, SceneChanges};
+use softvt_script::{EpisodeSetup, ExpertController, ExpertGrip, LoadedScript, SceneChanges};
 
 /// What an observation holds, in the order of [`MachineRates::streams`].
 const STREAMS: [&str; 4] = ["state", "state, cameras", "state, touch", "all streams"];
@@ -195,7 +195,7 @@ pub(crate) fn time_episode(
     let (task, settings) = (&suite.tasks[0], &suite.settings);
     let spec = EpisodeSpec::new(id, "expert", task, &opened.nominal, opened.scene.clone(), settings);
     let expert =
-        opened.expert(GripMode::Commanded).ok_or_else(|| RunError::input("the suite has no expert"))?;
+        opened.expert(ExpertGrip::Commanded).ok_or_else(|| RunError::input("the suite has no expert"))?;
     let mut controller = ObservedExpert { expert, streams: streams.clone(), first_action: None };
     let episode = Episode::start(spec, &caches.assets, &caches.sensors).map_err(RunError::input)?;
     let record = episode.run(&mut controller).map_err(RunError::input)?.record;

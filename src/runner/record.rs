@@ -9,7 +9,7 @@ use crate::{
     episode_list::EpisodeList,
     error::RunError,
     policy::{ControllerFactory, PolicyConfig, PolicyOptions, expert_controller},
-    recording::{GripLog, RecordingOptions, RecordingSummary, SuiteRecording, record_all},
+    recording::{HoldingLog, RecordingOptions, RecordingSummary, SuiteRecording, record_all},
     selection::{select_suites, select_tasks},
     suite_run::SuiteRun,
 };
@@ -82,7 +82,7 @@ pub fn record(
 }
 
 /// Makes the experts of a run record their intent into `log`. Other policies are left unchanged.
-fn record_grips<'a>(run: SuiteRun<'a>, log: &GripLog) -> SuiteRun<'a> {
+fn record_grips<'a>(run: SuiteRun<'a>, log: &HoldingLog) -> SuiteRun<'a> {
     let Some(policy) = run.config.policy.expert() else { return run };
     let log = log.clone();
     let controllers: ControllerFactory = Box::new(move |opened, brief| {
@@ -104,7 +104,7 @@ struct GripRecorder {
     expert: ExpertController,
     is_holding: Vec<bool>,
     index: EpisodeIndex,
-    log: GripLog,
+    log: HoldingLog,
 }
 
 impl Controller for GripRecorder {

@@ -46,7 +46,7 @@ use softvt_policy::{builtin::RecordedPolicy, profile::GripCode};
 use softvt_records::record::{DemonstrationOrigin, EpisodeRecord};
 use softvt_report::{actions, run_folder::RunFolder};
 use softvt_rollout::{ChunkedPolicy, EpisodeError, FinishedEpisode, SettleError};
-use softvt_scene::InitialState;
+use softvt_scene::InitialStateOverride;
 use softvt_script::LoadedScript;
 
 /// Prefix of the error of an attempt that could not start from the state of its demonstration.
@@ -68,7 +68,7 @@ pub struct RecordingOptions {
 }
 
 /// Per attempt and control step: true if the gripper is intended to hold.
-pub type GripLog = Arc<Mutex<BTreeMap<EpisodeIndex, Vec<bool>>>>;
+pub type HoldingLog = Arc<Mutex<BTreeMap<EpisodeIndex, Vec<bool>>>>;
 
 /// A suite that is being recorded: rounds of attempts, the files of the good ones, and one merged file per task.
 pub struct SuiteRecording<'a> {
@@ -80,7 +80,7 @@ pub struct SuiteRecording<'a> {
     folder_name: String,
     /// Demonstrations that each task must have: its first good attempts. `None` to keep all good attempts.
     demos: Option<u32>,
-    grip_log: GripLog,
+    grip_log: HoldingLog,
     manifest: Value,
     /// Environment arguments of the HDF5 files, in robomimic's form.
     environment: Value,
@@ -99,7 +99,7 @@ impl<'a> SuiteRecording<'a> {
         suite: &'a Suite,
         jobs: EpisodeList<'a>,
         demos: Option<u32>,
-        customize: impl FnOnce(SuiteRun<'a>, &GripLog) -> Result<SuiteRun<'a>, RunError>,
+        customize: impl FnOnce(SuiteRun<'a>, &HoldingLog) -> Result<SuiteRun<'a>, RunError>,
     ) -> Result<Self, RunError> {
         let script = &loaded.sources.main;
         if !check::is_script_path(script) {
@@ -120,7 +120,7 @@ impl<'a> SuiteRecording<'a> {
             records_trace: true,
             ..SuiteRun::new(config, loaded, suite, jobs, layout::attempts(&options.out, &folder_name))?
         };
-        let grip_log = GripLog::default();
+        let grip_log = HoldingLog::default();
         let run = customize(run, &grip_log)?.prepare()?;
         let tasks = run.jobs.tasks();
         let attempts = tasks.iter().map(|task| run.jobs.episodes_of(task.id).count());
@@ -229,7 +229,7 @@ impl<'a> SuiteRecording<'a> {
         let error = match (run.run_episode_from(job, origin, true, &run.controllers)?, origin) {
             (Ok(finished), _) => return Ok(finished),
             (Err(error), Some(origin))
-                if is_start_error(&error) && origin.start != InitialState::default() =>
+                if is_start_error(&error) && origin.start != InitialStateOverride::default() =>
             {
                 error
             }
@@ -240,8 +240,8 @@ impl<'a> SuiteRecording<'a> {
             let policy = RecordedPolicy::new(Vec::new(), Some(ending.clone()));
             Ok(Box::new(ChunkedPolicy::new(Box::new(policy), brief, 1)))
         });
-        let layout_start =
-            origin.map(|origin| DemonstrationOrigin { start: InitialState::default(), ..origin.clone() });
+        let layout_start = origin
+            .map(|origin| DemonstrationOrigin { start: InitialStateOverride::default(), ..origin.clone() });
         run.run_episode_from(job, layout_start.as_ref(), true, &failing)?
             .map_err(|error| run.episode_error(&error))
     }

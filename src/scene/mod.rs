@@ -169,7 +169,7 @@ impl Scene {
 ///
 /// Nothing is validated here: overlapping objects are refused when the simulation is built from the scene.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct InitialState {
+pub struct InitialStateOverride {
     /// Joint angles of the arm, rad; `None` keeps those of the layout.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joints: Option<[f64; 7]>,
@@ -190,7 +190,7 @@ pub struct ObjectPlacement {
     pub yaw: Option<f64>,
 }
 
-impl InitialState {
+impl InitialStateOverride {
     /// Applies the overrides to `scene`. Names that the scene does not contain are ignored.
     pub fn apply(&self, scene: &mut Scene) {
         scene.start_q = self.joints.unwrap_or(scene.start_q);

@@ -19,12 +19,12 @@ pub use plan::{
     options::{OptionSpec, ScriptOptionValue},
     policy_file::{LuaPolicy, PolicyFile},
     profile_file::load_profile,
-    variation_file::{STANDARD_VARIATION, VaryError, load_variation},
+    variation_file::{PlanVariationError, STANDARD_VARIATION, load_variation},
 };
 pub use run::{
     episode::{EpisodeSetup, SceneBuilder, SceneChanges, ShiftError, check_shift},
     experiment::{Experiment, ExperimentRow, ExperimentSummary},
-    expert::{ExpertController, GripController, GripMode},
+    expert::{BlindGrip, ExpertController, ExpertGrip},
 };
 pub use vm::{
     PrintSink, VmLimits,

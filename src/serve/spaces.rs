@@ -11,8 +11,8 @@ use softvt_policy::{
     encode::{ObservationEntry, content},
     msgpack::map,
     profile::{
-        ACTION_LEN, ActionEncoding, ActionUnits, GripCode, GripperValues, InputSource, PoseEncoding,
-        ProfileInput, StatePart,
+        ACTION_LEN, ActionEncoding, ActionUnits, GripCode, GripperValues, ObservationSource, PoseEncoding,
+        ProfileInput, RobotStatePart,
     },
 };
 
@@ -88,29 +88,33 @@ fn array_space(dtype: &str, shape: &[usize], low: Vec<f64>, high: Vec<f64>) -> V
 /// Largest magnitude of all elements, or of each.
 fn magnitude_bounds(input: &ProfileInput) -> Vec<f64> {
     match &input.source {
-        InputSource::State { parts } => {
+        ObservationSource::State { parts } => {
             let one = parts.iter().flat_map(|part| vec![max_magnitude(*part); part.count()]);
             one.collect::<Vec<_>>().repeat(input.steps())
         }
-        InputSource::Depth { .. } => vec![f64::INFINITY],
-        InputSource::Segmentation { .. } => vec![f64::from(u16::MAX)],
-        InputSource::MarkerMotion => vec![MAX_MARKER_PX],
-        InputSource::Force => vec![MAX_FORCE_N],
-        InputSource::Prompt | InputSource::Query | InputSource::QuerySeed => vec![f64::INFINITY],
-        InputSource::Camera { .. } | InputSource::TactileImage { .. } | InputSource::Tactile { .. } => {
+        ObservationSource::Depth { .. } => vec![f64::INFINITY],
+        ObservationSource::Segmentation { .. } => vec![f64::from(u16::MAX)],
+        ObservationSource::MarkerMotion => vec![MAX_MARKER_PX],
+        ObservationSource::Force => vec![MAX_FORCE_N],
+        ObservationSource::Prompt | ObservationSource::Query | ObservationSource::QuerySeed => {
+            vec![f64::INFINITY]
+        }
+        ObservationSource::Camera { .. }
+        | ObservationSource::TactileImage { .. }
+        | ObservationSource::Tactile { .. } => {
             vec![255.0]
         }
     }
 }
 
 /// Largest magnitude of a number of the state.
-fn max_magnitude(part: StatePart) -> f64 {
+fn max_magnitude(part: RobotStatePart) -> f64 {
     match part {
-        StatePart::Position => MAX_POSITION_M,
-        StatePart::AxisAngle => MAX_ANGLE,
-        StatePart::Joints => 2.0 * PI,
-        StatePart::JointVelocities => MAX_JOINT_SPEED,
-        StatePart::JointTorques => MAX_TORQUE,
+        RobotStatePart::Position => MAX_POSITION_M,
+        RobotStatePart::AxisAngle => MAX_ANGLE,
+        RobotStatePart::Joints => 2.0 * PI,
+        RobotStatePart::JointVelocities => MAX_JOINT_SPEED,
+        RobotStatePart::JointTorques => MAX_TORQUE,
         // Quaternions, the closure, and widths in metres.
         _ => 1.0 + 1e-3,
     }

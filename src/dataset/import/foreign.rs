@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use softvt_geometry::Pose;
-use softvt_policy::{GripCommand, GripTarget, ToolCommand};
-use softvt_scene::InitialState;
+use softvt_policy::{EncodedGrip, GripTarget, ToolCommand};
+use softvt_scene::InitialStateOverride;
 
 /// Formats that can be imported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,7 +90,7 @@ pub enum InitialCondition {
         /// Index in the split of demonstrations.
         attempt: u32,
         /// Overrides of the layout.
-        start: InitialState,
+        start: InitialStateOverride,
     },
 }
 
@@ -117,7 +117,7 @@ impl ForeignDemo {
         let stopped =
             self.commands.iter_mut().zip(&self.is_stopped_by_object).filter(|(_, stopped)| **stopped);
         for (command, _) in stopped {
-            command.grip = GripCommand::Target(GripTarget::Closure(1.0));
+            command.grip = EncodedGrip::Target(GripTarget::Closure(1.0));
         }
     }
 }

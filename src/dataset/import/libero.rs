@@ -16,7 +16,7 @@ use super::{
 };
 use softvt_geometry::{Pose, Quat, Vec3};
 use softvt_policy::{
-    Action, GripCommand, ToolCommand, ToolMotion, decode, osc,
+    Action, EncodedGrip, ToolCommand, ToolMotion, decode, osc,
     profile::{ActionEncoding, PoseEncoding, Profile},
 };
 use softvt_robot::{GripTarget, ik::ArmAngles, rotation};
@@ -67,7 +67,7 @@ pub(super) fn demo(reader: DemoReader, header: &Header) -> Result<ForeignDemo, D
         task: header.task(reader.file, reader.demo),
         gripper_closed: steps
             .iter()
-            .map(|step| matches!(step.grip, GripCommand::Target(GripTarget::Closure(closure)) if closure > 0.5))
+            .map(|step| matches!(step.grip, EncodedGrip::Target(GripTarget::Closure(closure)) if closure > 0.5))
             .collect(),
         is_stopped_by_object: vec![false; commands.len()],
         commands,

@@ -135,7 +135,7 @@ mod tests {
         assert_eq!(named(&found), [("left", 10.0), ("right", 30.0)]);
         assert!((found[0].yaw.unwrap() - 0.3).abs() < 1e-12);
         let mut moved = scene();
-        softvt_scene::InitialState { joints: Some([0.5; 7]), places: found }.apply(&mut moved);
+        softvt_scene::InitialStateOverride { joints: Some([0.5; 7]), places: found }.apply(&mut moved);
         let at = moved.objects[2].pose_w.translation.vector;
         assert!((at - Vec3::new(0.3, 0.1, 0.25)).norm() < 1e-12, "the height is that of the layout: {at}");
         assert_eq!((moved.start_q, &moved.objects[0]), ([0.5; 7], &scene().objects[0]));

@@ -8,7 +8,7 @@ use super::{libero::goals, mujoco::MujocoModel, *};
 use crate::hdf5::{ChunkedSteps, write_file};
 use softvt_benchmark::CONTROL_DT;
 use softvt_geometry::{Pose, Quat, Vec3};
-use softvt_policy::{Action, GripCommand, GripTarget, ToolCommand, ToolMotion};
+use softvt_policy::{Action, EncodedGrip, GripTarget, ToolCommand, ToolMotion};
 use softvt_robot::{IkSpec, ik::DiffIk, rotation};
 
 const STEPS: usize = 6;
@@ -137,7 +137,7 @@ fn poses(demo: &ForeignDemo) -> Vec<Action> {
     let pose = |command: &ToolCommand| match (command.motion, command.grip) {
         (
             ToolMotion::Pose { position_b, axis_angle_b },
-            GripCommand::Target(GripTarget::Closure(closure)),
+            EncodedGrip::Target(GripTarget::Closure(closure)),
         ) => Action::new(position_b, axis_angle_b, closure),
         _ => panic!("a pose and a closure"),
     };
@@ -239,7 +239,7 @@ fn a_goal_without_rotation_keeps_the_last_goals_orientation() {
     let tool = [tool(0), tool(1), tool(2)];
     let step = |turn: Vec3| ToolCommand {
         motion: ToolMotion::Delta { full: false, translation_b: Vec3::x(), rotation_b: turn },
-        grip: GripCommand::Target(GripTarget::Closure(0.0)),
+        grip: EncodedGrip::Target(GripTarget::Closure(0.0)),
     };
     let found = goals(&tool, &[step(Vec3::zeros()), step(Vec3::z() * 0.1), step(Vec3::zeros())]);
     let turned = |k: usize| match found[k].motion {

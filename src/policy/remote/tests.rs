@@ -13,9 +13,9 @@ use tungstenite::{Message, WebSocket, accept};
 
 use super::*;
 use crate::{
-    GripCommand, GripTarget, RobotState,
+    EncodedGrip, GripTarget, RobotState,
     msgpack::{map, pack},
-    profile::{ActionEncoding, GripperValues, InputSource, PoseEncoding, ProfileInput, StatePart},
+    profile::{ActionEncoding, GripperValues, ObservationSource, PoseEncoding, ProfileInput, RobotStatePart},
 };
 
 type Socket = WebSocket<TcpStream>;
@@ -70,7 +70,7 @@ fn chunk(closure: f64) -> Value {
 }
 
 fn policy_server(url: String, code: GripCode, timeout: Duration) -> PolicyServer {
-    let state = InputSource::State { parts: vec![StatePart::Position] };
+    let state = ObservationSource::State { parts: vec![RobotStatePart::Position] };
     let gripper = GripperValues { code, ..GripperValues::new(0.0, 1.0) };
     let profile = Profile {
         name: "state".to_owned(),
@@ -114,7 +114,7 @@ fn episode(
         let mut closures = Vec::new();
         for _ in 0..questions {
             match policy.act(&observation())?.commands[0].grip {
-                GripCommand::Target(GripTarget::Closure(closure)) => closures.push(closure),
+                EncodedGrip::Target(GripTarget::Closure(closure)) => closures.push(closure),
                 other => panic!("{other:?}"),
             }
             thread::sleep(pause);

@@ -13,7 +13,7 @@ use crate::{
     ActionChunk, EpisodeBrief, Observation, PolicyError, QueryId, decode,
     encode::content,
     msgpack::{entry, map, names},
-    profile::{InputSource, Profile},
+    profile::{ObservationSource, Profile},
 };
 
 const VERSION: u64 = 1;
@@ -99,19 +99,21 @@ fn encoded(observation: &Observation, profile: &Profile, query: &QueryId) -> Val
         let key = |name: &str| name.rsplit('/').next().unwrap_or(name).to_owned();
         let own = input.keys.first().map_or(String::new(), |name| key(name));
         match &input.source {
-            InputSource::Camera { camera, .. } if camera == "third_person" => {
+            ObservationSource::Camera { camera, .. } if camera == "third_person" => {
                 images.push(("agentview".to_owned(), value))
             }
-            InputSource::Camera { camera, .. } => images.push((camera.clone(), value)),
-            InputSource::TactileImage { .. } | InputSource::Tactile { .. } => images.push((own, value)),
-            InputSource::State { .. } => rest.push(("states".to_owned(), value)),
-            InputSource::Prompt => rest.push(("task_description".to_owned(), value)),
-            InputSource::Depth { .. }
-            | InputSource::Segmentation { .. }
-            | InputSource::MarkerMotion
-            | InputSource::Force
-            | InputSource::Query
-            | InputSource::QuerySeed => rest.push((own, value)),
+            ObservationSource::Camera { camera, .. } => images.push((camera.clone(), value)),
+            ObservationSource::TactileImage { .. } | ObservationSource::Tactile { .. } => {
+                images.push((own, value))
+            }
+            ObservationSource::State { .. } => rest.push(("states".to_owned(), value)),
+            ObservationSource::Prompt => rest.push(("task_description".to_owned(), value)),
+            ObservationSource::Depth { .. }
+            | ObservationSource::Segmentation { .. }
+            | ObservationSource::MarkerMotion
+            | ObservationSource::Force
+            | ObservationSource::Query
+            | ObservationSource::QuerySeed => rest.push((own, value)),
         }
     }
     rest.insert(0, ("images".to_owned(), map(images)));

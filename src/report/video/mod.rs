@@ -223,7 +223,7 @@ fn draw_deformation_chart(
     y: f32,
 ) {
     let (x, width, height) = (150.0, 800.0, 76.0);
-    let max = recording.d_pct.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
+    let max = recording.worst_d_pct.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
     let scale = 1.15 * max.max(caption.tau_pct.unwrap_or(0.0)).max(0.1);
     let steps = recording.frames.len().saturating_sub(1).max(1) as f32;
     let point = |at: usize, d: f64| [x + width * at as f32 / steps, y + height * (1.0 - (d / scale) as f32)];
@@ -236,9 +236,9 @@ fn draw_deformation_chart(
         let label = format!("τ {} %", format_number(rounded));
         canvas.write(&label, x + width + 8.0, level + 5.0, 16.0, HARM);
     }
-    let so_far = recording.d_pct.iter().enumerate().take(index + 1);
+    let so_far = recording.worst_d_pct.iter().enumerate().take(index + 1);
     let curve: Vec<[f32; 2]> = so_far.filter_map(|(at, d)| Some(point(at, (*d)?))).collect();
-    let Some(now) = recording.d_pct.get(index).copied().flatten() else {
+    let Some(now) = recording.worst_d_pct.get(index).copied().flatten() else {
         let text = if max > 0.0 { "" } else { "none: a rigid body" };
         canvas.write(text, MARGIN, y + 46.0, 16.0, FAINT);
         return;
@@ -266,8 +266,8 @@ pub fn worst_state(recording: &StateRecording) -> usize {
     let pad_force = |frame: &WorldSnapshot| -> f64 {
         frame.patches.iter().flat_map(|patch| &patch.points).map(|point| point.pressure * point.area).sum()
     };
-    let severity = |at: usize| recording.d_pct[at].unwrap_or_else(|| pad_force(&recording.frames[at]));
-    let states = 0..recording.frames.len().min(recording.d_pct.len());
+    let severity = |at: usize| recording.worst_d_pct[at].unwrap_or_else(|| pad_force(&recording.frames[at]));
+    let states = 0..recording.frames.len().min(recording.worst_d_pct.len());
     // The first one of equals.
     states.max_by(|&a, &b| severity(a).total_cmp(&severity(b)).then(b.cmp(&a))).unwrap_or(0)
 }

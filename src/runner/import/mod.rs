@@ -14,7 +14,7 @@ use crate::{
     episode_list::{EpisodeJob, EpisodeList},
     error::RunError,
     policy::{ControllerFactory, PolicyConfig},
-    recording::{GripLog, RecordingOptions, RecordingSummary, SuiteRecording, record_all},
+    recording::{HoldingLog, RecordingOptions, RecordingSummary, SuiteRecording, record_all},
     selection::select_suites,
     suite_run::SuiteRun,
 };
@@ -27,7 +27,7 @@ use softvt_dataset::{
 use softvt_policy::{ToolCommand, builtin::RecordedPolicy};
 use softvt_records::record::DemonstrationOrigin;
 use softvt_rollout::{ChunkedPolicy, target_asset};
-use softvt_scene::{Body, InitialState};
+use softvt_scene::{Body, InitialStateOverride};
 use task_matching::{MatchedDemo, match_demos};
 
 /// Options of an import of demonstrations.
@@ -133,7 +133,7 @@ fn file_name(file: &ForeignFile) -> String {
 /// objects start where the layout puts them.
 fn replay_demos<'a>(
     run: SuiteRun<'a>,
-    grip_log: &GripLog,
+    grip_log: &HoldingLog,
     demos: &[&MatchedDemo],
     ignore_recorded_poses: bool,
 ) -> Result<SuiteRun<'a>, RunError> {
@@ -176,18 +176,18 @@ fn initial_state(
     run: &SuiteRun,
     matched: &MatchedDemo,
     ignore_recorded_poses: bool,
-) -> Result<(InitialState, ForeignDemo), RunError> {
+) -> Result<(InitialStateOverride, ForeignDemo), RunError> {
     let mut demo = matched.demo.clone();
     let (joints, poses) = match &matched.demo.initial_condition {
         InitialCondition::SoftvtEpisode { start, .. } => {
             let places = if ignore_recorded_poses { Vec::new() } else { start.places.clone() };
-            return Ok((InitialState { places, ..*start }, demo));
+            return Ok((InitialStateOverride { places, ..*start }, demo));
         }
         InitialCondition::OtherSimulator { joints, objects } => {
             (*joints, if ignore_recorded_poses { &[][..] } else { objects })
         }
     };
-    let mut start = InitialState { joints, places: Vec::new() };
+    let mut start = InitialStateOverride { joints, places: Vec::new() };
     if poses.is_empty() && !demo.is_stopped_by_object.contains(&true) {
         return Ok((start, demo));
     }

@@ -24,7 +24,7 @@ use crate::{
         privilege::check_privilege,
     },
 };
-use softvt_benchmark::variation::{DrawError, InstancePressLookup, VariationRanges};
+use softvt_benchmark::variation::{InstancePressLookup, VariationError, VariationRanges};
 use softvt_common::parallel::lock;
 use softvt_evaluation::{
     calibration::{
@@ -52,7 +52,7 @@ struct CalibratedAssets(Arc<Mutex<BTreeMap<String, Option<CalibratedAsset>>>>);
 #[derive(Clone)]
 pub(crate) struct CalibratedAsset {
     /// Limits and windows of its instances.
-    pub model: Arc<InstancePresses>,
+    pub presses: Arc<InstancePresses>,
     /// Fingerprint of the asset that was calibrated.
     fingerprint: Option<String>,
 }
@@ -67,8 +67,8 @@ pub(crate) fn calibrated_asset(lua: &Lua, asset: &str) -> mlua::Result<Option<Ca
         return Ok(known.clone());
     }
     let found = calibration_file(lua, "softvt.grip_window", asset)?.and_then(|(_, file)| {
-        let model = Arc::new(InstancePresses::new(file.envelopes.get(asset)?, file.calibration.kappa));
-        Some(CalibratedAsset { model, fingerprint: file.fingerprints.get(asset).cloned() })
+        let presses = Arc::new(InstancePresses::new(file.envelopes.get(asset)?, file.calibration.kappa));
+        Some(CalibratedAsset { presses, fingerprint: file.fingerprints.get(asset).cloned() })
     });
     lock(&assets.0).insert(asset.to_owned(), found.clone());
     Ok(found)
@@ -80,8 +80,8 @@ pub(crate) fn calibrated_asset(lua: &Lua, asset: &str) -> mlua::Result<Option<Ca
 /// A calibration cannot be read. The inner error is that of `draw`.
 pub(crate) fn draw<T>(
     lua: &Lua,
-    draw: impl FnOnce(&InstancePressLookup<'_>) -> Result<T, DrawError>,
-) -> mlua::Result<Result<T, DrawError>> {
+    draw: impl FnOnce(&InstancePressLookup<'_>) -> Result<T, VariationError>,
+) -> mlua::Result<Result<T, VariationError>> {
     let broken = RefCell::new(None);
     // A fingerprint takes milliseconds, and a sample asks for one asset many times.
     let known = RefCell::new(BTreeMap::<*const Asset, Option<Arc<InstancePresses>>>::new());
@@ -89,7 +89,7 @@ pub(crate) fn draw<T>(
         // A calibration of another version of the asset does not count, as for its limit.
         Ok(found) => found
             .filter(|found| found.fingerprint.as_ref().is_none_or(|known| *known == asset.fingerprint()))
-            .map(|found| found.model),
+            .map(|found| found.presses),
         Err(error) => {
             broken.replace(Some(error));
             None
@@ -115,7 +115,7 @@ pub(crate) fn sample(
     let size = asset.shape.bounds().size();
     let state = |drawn: Option<&ObjectVariation>| instance_state(lua, &Instance { asset, size, drawn });
     let Some(ranges) = ranges else { return (0..count).map(|_| state(None)).collect() };
-    let drawn = draw(lua, |model_of| ranges.sample_instances(suite, asset, count, model_of))?;
+    let drawn = draw(lua, |presses_of| ranges.sample_instances(suite, asset, count, presses_of))?;
     let drawn = drawn.map_err(|error| fail(lua, error.to_string()))?;
     drawn.iter().map(|one| state(Some(one))).collect()
 }
@@ -365,7 +365,7 @@ functions! {
             check_privilege(lua, "softvt.grip_window")?;
             let friction = coating.map_or(1.0, |mu| mu / PadSpec::default().static_mu);
             let factors = InstanceFactors { scale, youngs: youngs_factor, density: density_factor, strain: strain_factor, friction };
-            let found = calibrated_asset(lua, &asset)?.and_then(|asset| asset.model.window(&factors));
+            let found = calibrated_asset(lua, &asset)?.and_then(|asset| asset.presses.window(&factors));
             found.map(|window| instance_window_table(lua, &window)).transpose()?
         }
         /// Returns instances of an asset as the episodes of a suite draw them, from a random stream that no episode uses. Without a

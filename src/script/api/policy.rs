@@ -4,9 +4,9 @@ use mlua::Function;
 
 use crate::schema::{Range, Record, RecordType, Type, choice, record, record_of};
 use softvt_policy::{
-    SensorStreams,
+    GripHysteresis, SensorStreams,
     decode::MAX_CHUNK_LEN,
-    profile::{GripCode, GripHysteresis, MAX_FRAMES, StatePart},
+    profile::{GripCode, MAX_FRAMES, RobotStatePart},
 };
 use softvt_robot::Side;
 use softvt_sensing::tactile::{MarkerStyle, TactileMosaicLayout};
@@ -67,7 +67,7 @@ record! {
         /// For state: its parts in order, in m, rad, rad/s and N m, of 3 numbers (position, axis_angle), 4 (quaternions), 7
         /// (joints, joint_velocities, joint_torques), 2 (finger_pair) and 1. The sensed width has the steps and the offset of
         /// a real hand; the gap between the exact one and the commanded closure is the grip force.
-        parts: Option<Vec<StatePart>>;
+        parts: Option<Vec<RobotStatePart>>;
         /// Number of control steps in the entry, the present one last, along a first axis; not for prompt and tactile_image.
         /// By default the present step without that axis, and 8 steps of marker_motion and force. The start of an episode
         /// repeats its first step.
@@ -188,7 +188,7 @@ choice! {
 choice! { MarkerStyle { "dots" => Dots, "arrows" => Arrows, "black_arrows" => BlackArrows } }
 choice! { TactileMosaicLayout { "rows" => Rows, "columns" => Columns } }
 choice! {
-    StatePart {
+    RobotStatePart {
         "position" => Position, "axis_angle" => AxisAngle,
         "quaternion_wxyz" => QuaternionWxyz, "quaternion_xyzw" => QuaternionXyzw,
         "joints" => Joints, "joint_velocities" => JointVelocities, "joint_torques" => JointTorques,

@@ -13,9 +13,12 @@ use crate::{
     schema::Constructed,
     vm::{VmLimits, error::ScriptError, source_map::fail_at_key},
 };
-use softvt_policy::profile::{
-    ActionEncoding, ActionUnits, GripCode, GripHysteresis, GripperValues, InputSource, PoseEncoding, Profile,
-    ProfileInput,
+use softvt_policy::{
+    GripHysteresis,
+    profile::{
+        ActionEncoding, ActionUnits, GripCode, GripperValues, ObservationSource, PoseEncoding, Profile,
+        ProfileInput,
+    },
 };
 
 /// Reads the profile at `path`. Also returns the SHA-256 of every file that was read, by name.
@@ -101,25 +104,25 @@ impl ProfileReader<'_> {
         let (camera, half_turn) =
             (|| camera.clone().ok_or_else(|| missing("camera")), half_turn.unwrap_or(false));
         let source = match source {
-            InputKind::Camera => InputSource::Camera { camera: camera()?, half_turn },
-            InputKind::Depth => InputSource::Depth { camera: camera()?, half_turn },
-            InputKind::Segmentation => InputSource::Segmentation { camera: camera()?, half_turn },
+            InputKind::Camera => ObservationSource::Camera { camera: camera()?, half_turn },
+            InputKind::Depth => ObservationSource::Depth { camera: camera()?, half_turn },
+            InputKind::Segmentation => ObservationSource::Segmentation { camera: camera()?, half_turn },
             InputKind::State => {
                 let parts = parts.clone().filter(|parts| !parts.is_empty());
-                InputSource::State { parts: parts.ok_or_else(|| missing("parts"))? }
+                ObservationSource::State { parts: parts.ok_or_else(|| missing("parts"))? }
             }
-            InputKind::Prompt => InputSource::Prompt,
+            InputKind::Prompt => ObservationSource::Prompt,
             InputKind::TactileImage => {
-                InputSource::TactileImage { layout: layout.unwrap_or_default(), markers: *markers }
+                ObservationSource::TactileImage { layout: layout.unwrap_or_default(), markers: *markers }
             }
             InputKind::Tactile => {
                 let finger = finger.ok_or_else(|| missing("finger"))?;
-                InputSource::Tactile { finger, markers: *markers }
+                ObservationSource::Tactile { finger, markers: *markers }
             }
-            InputKind::MarkerMotion => InputSource::MarkerMotion,
-            InputKind::Force => InputSource::Force,
-            InputKind::Query => InputSource::Query,
-            InputKind::QuerySeed => InputSource::QuerySeed,
+            InputKind::MarkerMotion => ObservationSource::MarkerMotion,
+            InputKind::Force => ObservationSource::Force,
+            InputKind::Query => ObservationSource::Query,
+            InputKind::QuerySeed => ObservationSource::QuerySeed,
         };
         Ok(ProfileInput { keys: keys.clone(), source, frames: *frames })
     }

@@ -28,7 +28,7 @@ pub fn load_variation(path: &Path) -> Result<(VariationRanges, BTreeMap<String, 
 /// A plan cannot be varied.
 #[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum VaryError {
+pub enum PlanVariationError {
     /// It has no suite.
     #[error("applies to suites, and this file is an experiment")]
     Experiment,
@@ -53,14 +53,14 @@ impl LoadedScript {
     ///
     /// # Errors
     /// A suite varies already or has no soft objects, or the plan has no suites.
-    pub fn vary(&mut self, ranges: &VariationRanges) -> Result<(), VaryError> {
+    pub fn vary(&mut self, ranges: &VariationRanges) -> Result<(), PlanVariationError> {
         let vary = |suite: &mut Suite| {
             let (name, variation) = (suite.name.clone(), ranges.name.clone());
             if let Some(own) = &suite.vary {
-                return Err(VaryError::Varied { suite: name, variation: own.name.clone() });
+                return Err(PlanVariationError::Varied { suite: name, variation: own.name.clone() });
             }
             if suite.object_type == ObjectType::Rigid {
-                return Err(VaryError::Rigid { suite: name, variation });
+                return Err(PlanVariationError::Rigid { suite: name, variation });
             }
             suite.vary = Some(ranges.clone());
             Ok(())
@@ -68,7 +68,7 @@ impl LoadedScript {
         match &mut self.plan {
             Plan::Suite(suite) => vary(suite),
             Plan::Suites { suites } | Plan::Conditions { suites, .. } => suites.iter_mut().try_for_each(vary),
-            Plan::Experiment { .. } => Err(VaryError::Experiment),
+            Plan::Experiment { .. } => Err(PlanVariationError::Experiment),
         }
     }
 }

@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use mlua::{Function, Lua, Value};
 
-use super::expert::{ExpertController, GripMode};
+use super::expert::{ExpertController, ExpertGrip};
 use crate::{
     api::{
         envelope::draw,
@@ -23,7 +23,7 @@ use crate::{
 use softvt_benchmark::{
     Shift, ShiftValue, Suite,
     seed::{EpisodeSeed, RandomStream, SecretSeed},
-    variation::{DrawError, VariationRanges},
+    variation::{VariationError, VariationRanges},
 };
 use softvt_common::episode_id::EpisodeId;
 use softvt_common::{
@@ -73,7 +73,7 @@ impl EpisodeSetup {
     }
 
     /// The controller that runs the expert of the task; `None` if the task has no expert.
-    pub fn expert(self, mode: GripMode) -> Option<ExpertController> {
+    pub fn expert(self, mode: ExpertGrip) -> Option<ExpertController> {
         let function = self.expert?;
         self.instance.vm.random.reseed(self.seed.stream(RandomStream::Expert));
         Some(ExpertController::new(self.instance, function, mode, self.instances))
@@ -201,11 +201,11 @@ fn vary(
     ranges: &VariationRanges,
     seed: &EpisodeSeed,
 ) -> mlua::Result<SceneVariation> {
-    let drawn = draw(lua, |model_of| ranges.draw(seed, scene, model_of))?;
+    let drawn = draw(lua, |presses_of| ranges.draw(seed, scene, presses_of))?;
     let subject = format!("layout {:?} of suite {:?}", seed.layout, seed.suite);
     let drawn = drawn.map_err(|error| {
         fail(lua, match error {
-            DrawError::NoSoftObject => format!(
+            VariationError::NoSoftObject => format!(
                 "{subject} {error}, and the variation {:?} changes soft objects; vary a suite of soft objects",
                 ranges.name
             ),

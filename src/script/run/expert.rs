@@ -15,13 +15,13 @@ use softvt_rollout::{Controller, Simulation};
 
 /// Gripper control of the scripted experts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum GripMode {
+pub enum ExpertGrip {
     /// The closure that the expert commands.
     Commanded,
     /// Either open or closed.
     Binary,
     /// That of a controller that does not know the instance, if the expert has one of its name.
-    Controller(GripController),
+    Blind(BlindGrip),
     /// Feels with the tactile sensors how firmly the object must be held, wherever the expert grasps.
     TactileServo,
 }
@@ -29,7 +29,7 @@ pub enum GripMode {
 /// Controllers of the gripper that know what shows of an object and the instances that the suite draws, in place of the instance
 /// itself. Experts implement them in Lua.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum GripController {
+pub enum BlindGrip {
     /// One closure per asset.
     FixedClosure,
     /// A closure per asset and size.
@@ -46,7 +46,7 @@ pub enum GripController {
     LookRetry,
 }
 
-impl GripController {
+impl BlindGrip {
     /// Name, as experts read it.
     pub fn name(self) -> &'static str {
         match self {
@@ -61,7 +61,7 @@ impl GripController {
     }
 
     /// True for a bound of what a policy without touch can do.
-    pub fn is_blind(self) -> bool {
+    pub fn is_bound(self) -> bool {
         self != Self::LookRetry
     }
 }
@@ -72,7 +72,7 @@ impl GripController {
 pub struct ExpertController {
     pub(crate) instance: Arc<ScriptInstance>,
     pub(crate) coroutine: Coroutine,
-    mode: GripMode,
+    mode: ExpertGrip,
     /// True while the gripper should hold an object, as last commanded.
     pub is_gripping: bool,
     monitor: TrackingErrorMonitor,
@@ -83,10 +83,10 @@ impl ExpertController {
     pub(crate) fn new(
         instance: Arc<ScriptInstance>,
         function: mlua::Function,
-        mode: GripMode,
+        mode: ExpertGrip,
         instances: Arc<SuiteInstances>,
     ) -> Self {
-        let access = if mode == GripMode::TactileServo { FingerAccess::Servo } else { FingerAccess::None };
+        let access = if mode == ExpertGrip::TactileServo { FingerAccess::Servo } else { FingerAccess::None };
         let (coroutine, monitor) = (Coroutine::new(function, access), TrackingErrorMonitor::default());
         Self { instance, coroutine, mode, is_gripping: false, monitor, instances }
     }
@@ -94,7 +94,7 @@ impl ExpertController {
 
 impl Controller for ExpertController {
     fn streams(&self) -> SensorStreams {
-        SensorStreams { tactile: self.mode == GripMode::TactileServo, ..SensorStreams::default() }
+        SensorStreams { tactile: self.mode == ExpertGrip::TactileServo, ..SensorStreams::default() }
     }
 
     fn wants_observation(&self) -> bool {
@@ -113,7 +113,7 @@ impl Controller for ExpertController {
         let tactile = observation.tactile.as_ref().and_then(|tactile| tactile.frames.last());
         self.coroutine.set_readings(tactile.cloned());
         let mut input = ExpertInput::new(sim, observation.time_s, &mut self.monitor);
-        if let GripMode::Controller(controller) = self.mode {
+        if let ExpertGrip::Blind(controller) = self.mode {
             input.view.grip_controller = Some(controller.name());
             input.view.instances = Some(self.instances.clone());
         }
@@ -128,8 +128,8 @@ impl Controller for ExpertController {
         Ok(command.map(|command| {
             self.is_gripping = command.gripping;
             let closure = match self.mode {
-                GripMode::Binary => f64::from(u8::from(command.gripping)),
-                GripMode::Commanded | GripMode::Controller(_) | GripMode::TactileServo => command.closure,
+                ExpertGrip::Binary => f64::from(u8::from(command.gripping)),
+                ExpertGrip::Commanded | ExpertGrip::Blind(_) | ExpertGrip::TactileServo => command.closure,
             };
             let orientation = rotation::axis_angle(&command.pose_b.rotation);
             Action::new(command.pose_b.translation.vector, orientation, closure)

@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use super::*;
 use crate::{
-    EpisodeSetup, ExpertController, GripMode, SceneChanges,
+    EpisodeSetup, ExpertController, ExpertGrip, SceneChanges,
     api::expert_input::{ExpertCommand, ExpertView, ObjectView},
     check_shift,
 };
@@ -67,7 +67,7 @@ fn expert(body: &str) -> (Project, ExpertController) {
     let project = project(&format!("return suite(function(arm, scene) {body} end)"));
     let loaded = project.load("x.lua", &[]).unwrap();
     let setup = EpisodeSetup::open(&loaded, &episode_id(0, 1), &SceneChanges::default()).unwrap();
-    (project, setup.expert(GripMode::Commanded).unwrap())
+    (project, setup.expert(ExpertGrip::Commanded).unwrap())
 }
 
 /// The next command of an expert that sees [`view`].

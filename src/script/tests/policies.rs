@@ -10,7 +10,7 @@ use softvt_benchmark::seed::EpisodeSeed;
 use softvt_common::episode_id::EpisodeSplit;
 use softvt_geometry::Vec3;
 use softvt_policy::{
-    Action, ActionChunk, CameraImage, EpisodeBrief, GripCommand, GripTarget, Observation, Policy,
+    Action, ActionChunk, CameraImage, EncodedGrip, EpisodeBrief, GripTarget, Observation, Policy,
     PolicyError, RobotState, SensorStreams, TactileFrame, TactileHistory, ToolCommand, ToolMotion,
     profile::{GripCode, Profile},
 };
@@ -141,7 +141,7 @@ fn actions_are_accepted_alone_or_as_lists_with_either_form_of_rotation() {
     let one = act(&format!("return {{ {POSE}, closure = 0.5 }}")).unwrap();
     assert_eq!(one.commands, [ToolCommand::from(expected)]);
     let force = act(&format!("return {{ {POSE}, force = 2.5 }}")).unwrap();
-    assert_eq!(force.commands[0].grip, GripCommand::Target(GripTarget::Force(2.5)));
+    assert_eq!(force.commands[0].grip, EncodedGrip::Target(GripTarget::Force(2.5)));
     let two = act(&format!("local a = {{ {POSE}, closure = 0.5 }} return {{ a, a }}")).unwrap();
     assert_eq!(two.commands.len(), 2);
     let turned =
@@ -150,7 +150,7 @@ fn actions_are_accepted_alone_or_as_lists_with_either_form_of_rotation() {
     let ToolMotion::Pose { position_b, axis_angle_b } = turned.commands[0].motion else { panic!("a pose") };
     assert!((axis_angle_b - Vec3::new(std::f64::consts::PI, 0.0, 0.0)).norm() < 1e-9);
     assert_eq!(position_b, Vec3::new(0.5, -0.125, 0.25));
-    assert_eq!(turned.commands[0].grip, GripCommand::Target(GripTarget::Closure(0.25)));
+    assert_eq!(turned.commands[0].grip, EncodedGrip::Target(GripTarget::Closure(0.25)));
 }
 
 #[test]
@@ -272,7 +272,7 @@ fn the_shipped_policies_act() {
         let ToolMotion::Pose { position_b, .. } = chunk.commands[0].motion else { panic!("a pose") };
         assert_eq!(
             (position_b.x, chunk.commands[0].grip),
-            (0.5, GripCommand::Target(GripTarget::Closure(0.0)))
+            (0.5, EncodedGrip::Target(GripTarget::Closure(0.0)))
         );
     }
 }
@@ -518,15 +518,15 @@ fn a_policy_commands_in_each_of_the_four_grip_codes() {
     };
     let (half, force) = ("closure = 0.6", "force = 2.5");
     for (declared, flag, action, expected) in [
-        ("", None, half, GripCommand::Target(GripTarget::Closure(0.6))),
-        ("", None, force, GripCommand::Target(GripTarget::Force(2.5))),
-        ("gripper = 'continuous',", None, half, GripCommand::Target(GripTarget::Closure(0.6))),
-        ("gripper = 'binary',", None, half, GripCommand::Target(GripTarget::Closure(1.0))),
-        ("gripper = 'binary',", None, "closure = 0.5", GripCommand::Target(GripTarget::Closure(0.0))),
-        ("gripper = 'two-width',", None, half, GripCommand::TwoWidth(0.6)),
-        ("gripper = 'force',", None, force, GripCommand::Target(GripTarget::Force(2.5))),
-        ("gripper = 'binary',", Some(GripCode::TwoWidth), half, GripCommand::TwoWidth(0.6)),
-        ("", Some(GripCode::Binary), half, GripCommand::Target(GripTarget::Closure(1.0))),
+        ("", None, half, EncodedGrip::Target(GripTarget::Closure(0.6))),
+        ("", None, force, EncodedGrip::Target(GripTarget::Force(2.5))),
+        ("gripper = 'continuous',", None, half, EncodedGrip::Target(GripTarget::Closure(0.6))),
+        ("gripper = 'binary',", None, half, EncodedGrip::Target(GripTarget::Closure(1.0))),
+        ("gripper = 'binary',", None, "closure = 0.5", EncodedGrip::Target(GripTarget::Closure(0.0))),
+        ("gripper = 'two-width',", None, half, EncodedGrip::TwoWidth(0.6)),
+        ("gripper = 'force',", None, force, EncodedGrip::Target(GripTarget::Force(2.5))),
+        ("gripper = 'binary',", Some(GripCode::TwoWidth), half, EncodedGrip::TwoWidth(0.6)),
+        ("", Some(GripCode::Binary), half, EncodedGrip::Target(GripTarget::Closure(1.0))),
     ] {
         assert_eq!(grip(declared, flag, action), Ok(expected), "{declared} {flag:?} {action}");
     }
