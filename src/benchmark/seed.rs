@@ -9,10 +9,7 @@ use rand_chacha::{
 };
 use sha2::{Digest, Sha256};
 
-use softvt_common::{
-    episode_id::{EpisodeId, EpisodeSplit},
-    text::hex,
-};
+use softvt_common::{episode_id::EpisodeId, text::hex};
 
 /// Purpose of a stream of random numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,19 +121,11 @@ fn sha256(parts: &[&[u8]]) -> [u8; 32] {
 /// their initial states, except for the hidden properties of objects.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EpisodeSeed {
-    /// Name of the suite.
-    pub suite: String,
+    /// The episode. Hidden properties alone depend on its task, so that an attempt at one task of a mirrored pair does not reveal
+    /// those of the other.
+    pub id: EpisodeId,
     /// Name of the layout; the tasks of a mirrored pair share it.
     pub layout: String,
-    /// Index of the task. Hidden properties depend on it, so that an attempt at one task of a mirrored pair does not reveal those of
-    /// the other.
-    pub task: usize,
-    /// Index of the episode in its split.
-    pub episode: u32,
-    /// Seed of the run.
-    pub base_seed: u64,
-    /// List of episodes that `episode` counts in.
-    pub split: EpisodeSplit,
     /// Secret of a judged run.
     pub secret: Option<SecretSeed>,
 }
@@ -144,15 +133,7 @@ pub struct EpisodeSeed {
 impl EpisodeSeed {
     /// Seed of an episode whose task has this layout.
     pub fn new(id: &EpisodeId, layout: &str) -> Self {
-        Self {
-            suite: id.suite.clone(),
-            layout: layout.to_owned(),
-            task: id.task,
-            episode: id.episode,
-            base_seed: id.base_seed,
-            split: id.split,
-            secret: None,
-        }
+        Self { id: id.clone(), layout: layout.to_owned(), secret: None }
     }
 
     /// The same seed in a judged run.
@@ -162,12 +143,10 @@ impl EpisodeSeed {
 
     /// Random generator of a stream, at its start.
     pub fn stream(&self, stream: RandomStream) -> ChaCha8Rng {
-        let split = self.split.name();
-        let episode = self.episode.to_string();
-        let base_seed = self.base_seed.to_string();
+        let EpisodeId { suite, task, episode, base_seed, split } = &self.id;
+        let [task, episode, base_seed] = [task.to_string(), episode.to_string(), base_seed.to_string()];
         let mut parts =
-            vec!["softvt episode", &self.suite, &self.layout, &episode, &base_seed, split, stream.name()];
-        let task = self.task.to_string();
+            vec!["softvt episode", suite, &self.layout, &episode, &base_seed, split.name(), stream.name()];
         if stream == RandomStream::Hidden {
             parts.push(&task);
         }
@@ -226,17 +205,17 @@ pub fn uniform_integer(rng: &mut ChaCha8Rng, low: i64, high: i64) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use softvt_common::episode_id::EpisodeSplit;
 
     fn seed() -> EpisodeSeed {
-        EpisodeSeed {
-            suite: "s".into(),
-            layout: "l".into(),
-            task: 1,
-            episode: 3,
-            base_seed: 7,
-            split: EpisodeSplit::Validation,
-            secret: None,
-        }
+        let (suite, split) = ("s".to_owned(), EpisodeSplit::Validation);
+        EpisodeSeed::new(&EpisodeId { suite, task: 1, episode: 3, base_seed: 7, split }, "l")
+    }
+
+    fn with(change: impl Fn(&mut EpisodeId)) -> EpisodeSeed {
+        let mut seed = seed();
+        change(&mut seed.id);
+        seed
     }
 
     #[test]
@@ -244,14 +223,14 @@ mod tests {
         let first = |s: &EpisodeSeed, stream| s.stream(stream).next_u64();
         let base = first(&seed(), RandomStream::Layout);
         let others = [
-            EpisodeSeed { suite: "sl".into(), layout: "".into(), ..seed() },
-            EpisodeSeed { episode: 4, ..seed() },
-            EpisodeSeed { base_seed: 8, ..seed() },
-            EpisodeSeed { split: EpisodeSplit::Demonstration, ..seed() },
+            EpisodeSeed { layout: "".into(), ..with(|id| id.suite = "sl".into()) },
+            with(|id| id.episode = 4),
+            with(|id| id.base_seed = 8),
+            with(|id| id.split = EpisodeSplit::Demonstration),
         ];
         assert!(others.iter().all(|other| first(other, RandomStream::Layout) != base));
         assert_ne!(first(&seed(), RandomStream::Arm), base);
-        let other_task = EpisodeSeed { task: 2, ..seed() };
+        let other_task = with(|id| id.task = 2);
         assert_eq!(first(&other_task, RandomStream::Material), first(&seed(), RandomStream::Material));
         assert_ne!(first(&other_task, RandomStream::Hidden), first(&seed(), RandomStream::Hidden));
         assert_eq!(first(&seed(), RandomStream::Layout), base);
@@ -266,7 +245,7 @@ mod tests {
         assert_eq!(first(Some(&a)), first(Some(&SecretSeed::new(b"one"))));
         assert!(a.hash() != b.hash() && a.public_seed() != b.public_seed() && a.public_seed() < 1 << 48);
         // The public seed does not give these draws.
-        let public = EpisodeSeed { base_seed: a.public_seed(), ..seed() };
+        let public = with(|id| id.base_seed = a.public_seed());
         assert_ne!(public.stream(RandomStream::Size).next_u64(), first(Some(&a)));
         let names = [a.episode_name("s", 1, 2), a.episode_name("s", 12, 0), b.episode_name("s", 1, 2)];
         assert!(names[0] != names[1] && names[0] != names[2] && names[0].len() == 32);

@@ -4,7 +4,7 @@ use image::{RgbImage, imageops};
 use rmpv::Value;
 
 use super::{
-    CameraImage, Observation, QueryId, RobotState,
+    CameraImage, EpisodeBrief, Observation, QueryId, RobotState,
     msgpack::{map, pack_array},
     observation::last,
     profile::{ObservationSource, Profile, ProfileInput, RobotStatePart},
@@ -126,13 +126,14 @@ fn shape_of(image: &CameraImage) -> Vec<usize> {
 }
 
 fn query_map(query: &QueryId) -> Value {
-    let identity = match &query.alias {
+    let EpisodeBrief { suite, task, episode, seed, alias, .. } = &query.brief;
+    let identity = match alias {
         Some(alias) => vec![("id", Value::from(alias.as_str()))],
         None => vec![
-            ("suite", Value::from(query.suite.as_str())),
-            ("task", Value::from(query.task as u64)),
-            ("episode", Value::from(query.episode)),
-            ("run_seed", Value::from(query.run_seed)),
+            ("suite", Value::from(suite.as_str())),
+            ("task", Value::from(*task as u64)),
+            ("episode", Value::from(*episode)),
+            ("run_seed", Value::from(*seed)),
         ],
     };
     map(identity.into_iter().chain([

@@ -4,8 +4,8 @@ use sha2::{Digest, Sha256};
 
 use super::{Observation, SensorStreams};
 use softvt_common::episode_id::EpisodeIndex;
-use softvt_geometry::Vec3;
-use softvt_robot::GripTarget;
+use softvt_geometry::{Pose, Vec3};
+use softvt_robot::{GripTarget, rotation};
 
 /// Command of one control step: where the tool and the gripper should be at its end.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +39,16 @@ impl Action {
             GripTarget::Closure(_) => None,
             GripTarget::Force(force_n) => Some(force_n),
         }
+    }
+
+    /// Tool pose in the base frame.
+    pub fn pose_b(&self) -> Pose {
+        Pose::from_parts(self.position_b.into(), rotation::from_axis_angle(&self.axis_angle_b))
+    }
+
+    /// All numbers of the action: those of [`Self::to_array`], and the grip force if it commands one.
+    pub fn numbers(self) -> impl Iterator<Item = f64> {
+        self.to_array().into_iter().chain(self.force_n())
     }
 
     /// Position, axis-angle and closure: the row of an action in recorded files.
@@ -123,7 +133,7 @@ impl From<Action> for ActionChunk {
 
 /// Description of an episode, passed to a policy when the episode begins: its id without base seed and split, which
 /// must not influence a policy, and its instruction.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct EpisodeBrief {
     /// Name of the suite.
     pub suite: String,
@@ -144,16 +154,8 @@ pub struct EpisodeBrief {
 /// has the same identity, whatever the number of threads.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct QueryId {
-    /// Name of the episode in a judged run, which is sent in place of suite, task, episode and run seed.
-    pub alias: Option<String>,
-    /// Name of the suite.
-    pub suite: String,
-    /// Index of the task in the suite.
-    pub task: usize,
-    /// Index of the episode in its split.
-    pub episode: u32,
-    /// Seed of the run.
-    pub run_seed: u64,
+    /// The episode. Its alias, if it has one, is sent in place of suite, task, episode and seed.
+    pub brief: EpisodeBrief,
     /// Control step of the episode.
     pub step: u32,
     /// Number of earlier requests for actions in the episode.
@@ -165,29 +167,18 @@ pub struct QueryId {
 impl QueryId {
     /// The first request of an episode.
     pub fn first(brief: &EpisodeBrief) -> Self {
-        let EpisodeBrief { suite, task, episode, seed, alias, .. } = brief;
-        Self {
-            alias: alias.clone(),
-            suite: suite.clone(),
-            task: *task,
-            episode: *episode,
-            run_seed: *seed,
-            wants_actions: true,
-            ..Self::default()
-        }
+        Self { brief: brief.clone(), wants_actions: true, ..Self::default() }
     }
 
     /// Seed of the request, by the key of SoftVTBench's release v0.2: the first four bytes, big-endian, of the SHA-256 of
     /// the parts joined by the byte 0x1f. A demonstration is named demo_K there, K being the episode here. In a judged run
     /// the only part of an episode is its alias.
     pub fn seed(&self) -> u32 {
-        let demo = format!("demo_{}", self.episode);
-        let episode = match &self.alias {
+        let EpisodeBrief { suite, task, episode, seed, alias, .. } = &self.brief;
+        let demo = format!("demo_{episode}");
+        let episode = match alias {
             Some(alias) => seed_of("episode", std::slice::from_ref(alias)),
-            None => seed_of(
-                "episode",
-                &[self.run_seed.to_string(), self.suite.clone(), self.task.to_string(), demo],
-            ),
+            None => seed_of("episode", &[seed.to_string(), suite.clone(), task.to_string(), demo]),
         };
         seed_of("inference", &[episode.to_string(), self.query.to_string()])
     }

@@ -2,6 +2,7 @@
 #![warn(missing_docs, unreachable_pub)]
 
 pub mod builtin;
+mod command_resolver;
 pub mod decode;
 pub mod encode;
 mod grip_hysteresis;
@@ -13,6 +14,7 @@ pub mod profile;
 pub mod remote;
 pub mod transport;
 
+pub use command_resolver::CommandResolver;
 pub use grip_hysteresis::{GripHysteresis, GripSwitch, WidthLatch};
 pub use interface::{
     Action, ActionChunk, EncodedGrip, EpisodeBrief, Policy, PolicyError, QueryId, ToolCommand, ToolMotion,
@@ -20,5 +22,4 @@ pub use interface::{
 pub use observation::{
     CameraImage, Observation, PadForce, PastStep, RobotState, SensorStreams, TactileFrame, TactileHistory,
 };
-pub use osc::CommandResolver;
 pub use softvt_robot::GripTarget;

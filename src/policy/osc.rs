@@ -6,58 +6,13 @@
 //! distance that it does cover. The equation x'' = kp (g − x) − kd x' has the solution x(t) = g + e^{−ωt} ((x₀ − g) +
 //! (v₀ + ω (x₀ − g)) t) with ω = √kp. Position and rotation vector both follow it.
 
-use super::{Action, EncodedGrip, GripSwitch, Observation, ToolCommand, ToolMotion, WidthLatch};
+use super::Action;
 use softvt_benchmark::CONTROL_DT;
 use softvt_geometry::{Quat, Vec3};
 use softvt_robot::{GripTarget, rotation};
 
 /// Stiffness of the spring, 1/s².
 const KP: f64 = 150.0;
-
-/// Turns a sequence of commands into actions. Stateful, because a displacement executed by robosuite's controller
-/// depends on the velocity after the previous one, and a width in the code two-width is held.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct CommandResolver {
-    /// Velocities of the tool between two control steps, as the spring leaves them; zero after other commands.
-    velocity: Vec3,
-    angular_velocity: Vec3,
-    latch: WidthLatch,
-    switch: GripSwitch,
-}
-
-impl CommandResolver {
-    /// The action that `command` means in the control step of `observation`.
-    pub fn resolve(&mut self, observation: &Observation, command: ToolCommand) -> Action {
-        let grip = match command.grip {
-            EncodedGrip::Target(target) => target,
-            EncodedGrip::TwoWidth(answer) => GripTarget::Closure(self.latch.closure(answer)),
-            EncodedGrip::Latched { closes, hold_steps } => {
-                GripTarget::Closure(self.switch.closure(closes, hold_steps))
-            }
-        };
-        match command.motion {
-            ToolMotion::Pose { position_b, axis_angle_b } => {
-                self.stop();
-                Action { position_b, axis_angle_b, grip }
-            }
-            ToolMotion::Delta { full, translation_b, rotation_b } => {
-                let (translation_b, rotation_b) = if full {
-                    self.stop();
-                    (translation_b, rotation_b)
-                } else {
-                    let moved = spring(&translation_b, &mut self.velocity);
-                    (moved, spring(&rotation_b, &mut self.angular_velocity))
-                };
-                let orientation_b = rotation::from_axis_angle(&observation.robot.ee_axis_angle_b);
-                goal(observation.robot.ee_position_b, orientation_b, translation_b, rotation_b, grip)
-            }
-        }
-    }
-
-    fn stop(&mut self) {
-        (self.velocity, self.angular_velocity) = (Vec3::zeros(), Vec3::zeros());
-    }
-}
 
 /// A tool pose displaced by a translation (m) and a rotation vector (rad) in the base frame: the
 /// goal of robosuite's controller.
@@ -73,7 +28,7 @@ pub fn goal(
 }
 
 /// Distance that the spring covers in a control step towards a goal at `step`. Updates its velocity.
-fn spring(step: &Vec3, velocity: &mut Vec3) -> Vec3 {
+pub(crate) fn spring(step: &Vec3, velocity: &mut Vec3) -> Vec3 {
     let (omega, t) = (KP.sqrt(), CONTROL_DT);
     let decay = (-omega * t).exp();
     let slope = *velocity - step * omega;

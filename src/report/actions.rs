@@ -53,8 +53,8 @@ pub fn path(dir: &Path, index: EpisodeIndex) -> PathBuf {
 /// The file cannot be written.
 pub fn write(path: &Path, actions: &[Action]) -> Result<(), FileError> {
     let has_force = actions.iter().any(|action| action.force_n().is_some());
-    let force = |action: &Action| has_force.then_some(action.force_n().unwrap_or(NO_FORCE));
-    let numbers = actions.iter().flat_map(|action| action.to_array().into_iter().chain(force(action)));
+    let filler = |action: &Action| (has_force && action.force_n().is_none()).then_some(NO_FORCE);
+    let numbers = actions.iter().flat_map(|action| action.numbers().chain(filler(action)));
     let width = if has_force { WIDTH_WITH_FORCE } else { WIDTH };
     replace(path, NpyArray::from_f64(vec![actions.len(), width], numbers).to_npy())
 }

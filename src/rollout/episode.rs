@@ -12,7 +12,6 @@ use super::{
     evidence::{EvidenceCollector, lowest},
     goal_in_scene::GoalInScene,
     observation_history::ObservationHistory,
-    robot_instance::HandCommand,
     sensor_assets::{SensingError, SensorAssets},
     sensor_noise::SensorSeed,
     sensors::{Sensors, StateRecording, check_sensors},
@@ -523,10 +522,8 @@ impl Episode {
     }
 
     fn control_step(&mut self, action: &Action) -> Result<(), StepFailure> {
-        let rotation = rotation::from_axis_angle(&action.axis_angle_b);
-        let pose_b = Pose::from_parts(action.position_b.into(), rotation);
-        let command = HandCommand { pose_b: self.disturbance.apply(&pose_b), grip: action.grip };
-        self.sim.robot.command(&mut self.sim.world, command);
+        let pose_b = self.disturbance.apply(&action.pose_b());
+        self.sim.robot.command(&mut self.sim.world, pose_b, action.grip);
         self.steps += 1;
         for _ in 0..steps_per_control(self.spec.settings.physics.dt) {
             self.physics_steps += 1;
@@ -633,7 +630,7 @@ impl Episode {
 /// SHA-256 of actions, as little-endian float64 numbers; hexadecimal.
 pub fn checksum(actions: &[Action]) -> String {
     let mut hash = Sha256::new();
-    for number in actions.iter().flat_map(|action| action.to_array().into_iter().chain(action.force_n())) {
+    for number in actions.iter().flat_map(|action| action.numbers()) {
         hash.update(number.to_le_bytes());
     }
     hex(&hash.finalize())

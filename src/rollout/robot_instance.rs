@@ -36,16 +36,14 @@ pub struct RobotInstance {
     ik: DiffIk,
     gripper: GripperSetpoint,
     /// Commands that the robot has not responded to yet, oldest first.
-    delayed: VecDeque<HandCommand>,
+    delayed: VecDeque<DelayedCommand>,
 }
 
-/// Command of a control step: where the tool and the gripper should be at its end.
+/// An earlier command of [`RobotInstance::command`].
 #[derive(Clone, Copy, Debug)]
-pub struct HandCommand {
-    /// Tool pose, base frame.
-    pub pose_b: Pose,
-    /// Closure or grip force.
-    pub grip: GripTarget,
+struct DelayedCommand {
+    pose_b: Pose,
+    grip: GripTarget,
 }
 
 impl RobotInstance {
@@ -98,14 +96,14 @@ impl RobotInstance {
         }
     }
 
-    /// Sets the command of a control step. The robot responds to it in the next control step, or `spec.latency` steps later;
-    /// until then it follows the earlier ones.
-    pub fn command(&mut self, world: &mut World, command: HandCommand) {
-        self.delayed.push_back(command);
+    /// Commands where the tool (base frame) and the gripper should be at the end of a control step. The robot responds in the
+    /// next control step, or `spec.latency` steps later; until then it follows the earlier commands.
+    pub fn command(&mut self, world: &mut World, pose_b: Pose, grip: GripTarget) {
+        self.delayed.push_back(DelayedCommand { pose_b, grip });
         if self.delayed.len() <= self.spec.latency as usize {
             return;
         }
-        let Some(HandCommand { pose_b, grip }) = self.delayed.pop_front() else { return };
+        let Some(DelayedCommand { pose_b, grip }) = self.delayed.pop_front() else { return };
         let target = self.ik.step(&self.q(world), &pose_b);
         let drives = world.articulation_mut(self.articulation).drives_mut();
         drives.iter_mut().flatten().zip(target).for_each(|(drive, q)| drive.target = q);

@@ -33,13 +33,13 @@ use softvt_benchmark::{
     steps_per_control,
 };
 use softvt_common::cancel;
-use softvt_common::episode_id::EpisodeSplit;
+use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_common::parallel::lock;
 use softvt_evaluation::deformation::{Deformation, ReferenceShape};
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::BodyId;
 use softvt_robot::{Side, gripper::GripTarget, rotation};
-use softvt_rollout::{AssetCache, HandCommand, SensingError, SensorAssets, SensorSeed, Sensors, Simulation};
+use softvt_rollout::{AssetCache, SensingError, SensorAssets, SensorSeed, Sensors, Simulation};
 use softvt_sensing::tactile::{MarkerStyle, PadWrench, TactileReading};
 
 const EPISODE: Type = Type::Integer(Range::closed(0.0, 1e9));
@@ -181,9 +181,8 @@ functions! {
         } -> ["softvt.Simulation"] {
             let settings = simulation_settings(lua, settings.as_ref())?;
             let seed = seed.unwrap_or_else(|| experiment_input::base_seed(lua));
-            let (layout_name, split) = (layout.name.clone(), EpisodeSplit::Experiment);
-            let seed = EpisodeSeed { suite, layout: layout_name, task: 0, episode, base_seed: seed, split, secret: None };
-            LuaSimulation::new(lua, &layout, seed, &settings)?
+            let id = EpisodeId { suite, task: 0, episode, base_seed: seed, split: EpisodeSplit::Experiment };
+            LuaSimulation::new(lua, &layout, EpisodeSeed::new(&id, &layout.name), &settings)?
         }
     }
 }
@@ -199,8 +198,7 @@ impl SimulationState {
             self.failed = Some("interrupted".into());
         }
         if let Some(ExpertCommand { pose_b, closure, .. }) = command {
-            let command = HandCommand { pose_b: *pose_b, grip: GripTarget::Closure(*closure) };
-            self.sim.robot.command(&mut self.sim.world, command);
+            self.sim.robot.command(&mut self.sim.world, *pose_b, GripTarget::Closure(*closure));
         }
         let _pause = self.clock.pause();
         for _ in 0..steps_per_control(self.sim.world.params.dt) {

@@ -110,9 +110,8 @@ impl SceneBuilder {
         self.check_suite(&suite).map_err(|e| vm.explain(&e))?;
         let ranges = self.suites.get(&id.suite).and_then(|suite| suite.vary.as_ref());
         // A twin has the initial states of the suite whose twin it is.
-        let seed_suite = suite.twin_of.clone().unwrap_or_else(|| id.suite.clone());
-        let seed = EpisodeSeed::new(id, &task.layout.name).with_secret(self.secret.as_ref());
-        let seed = EpisodeSeed { suite: seed_suite, ..seed };
+        let seed_id = EpisodeId { suite: suite.twin_of.as_ref().unwrap_or(&id.suite).clone(), ..id.clone() };
+        let seed = EpisodeSeed::new(&seed_id, &task.layout.name).with_secret(self.secret.as_ref());
         vm.random.reseed(seed.stream(RandomStream::Script));
         let mut current = LuaScene::new(empty_scene());
         let rng = LuaRng::new(seed.clone(), RandomStream::Layout);
@@ -202,7 +201,7 @@ fn vary(
     seed: &EpisodeSeed,
 ) -> mlua::Result<SceneVariation> {
     let drawn = draw(lua, |presses_of| ranges.draw(seed, scene, presses_of))?;
-    let subject = format!("layout {:?} of suite {:?}", seed.layout, seed.suite);
+    let subject = format!("layout {:?} of suite {:?}", seed.layout, seed.id.suite);
     let drawn = drawn.map_err(|error| {
         fail(lua, match error {
             VariationError::NoSoftObject => format!(

@@ -7,7 +7,7 @@ use image::{Rgb, RgbImage};
 use super::*;
 use crate::{LuaPolicy, PolicyFile, load_profile};
 use softvt_benchmark::seed::EpisodeSeed;
-use softvt_common::episode_id::EpisodeSplit;
+use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_geometry::Vec3;
 use softvt_policy::{
     Action, ActionChunk, CameraImage, EncodedGrip, EpisodeBrief, GripTarget, Observation, Policy,
@@ -17,16 +17,8 @@ use softvt_policy::{
 use softvt_sensing::tactile::Markers;
 
 fn seed(episode: u32) -> EpisodeSeed {
-    let (suite, layout) = ("one".to_owned(), "one".to_owned());
-    EpisodeSeed {
-        suite,
-        layout,
-        task: 0,
-        episode,
-        base_seed: 0,
-        split: EpisodeSplit::Validation,
-        secret: None,
-    }
+    let (suite, split) = ("one".to_owned(), EpisodeSplit::Validation);
+    EpisodeSeed::new(&EpisodeId { suite, task: 0, episode, base_seed: 0, split }, "one")
 }
 
 /// A finger whose markers have all moved by `by` px, with an image that is `lit` brighter than the untouched one.
