@@ -10,13 +10,14 @@ mod episode;
 use std::{
     net::{TcpListener, TcpStream},
     process::{Command, Stdio},
-    sync::{Arc, Mutex, atomic::AtomicBool},
+    sync::{Arc, Mutex},
     thread,
     time::{Duration, Instant},
 };
 
 use rmpv::Value;
 use softvt::{
+    cancel::CancelFlag,
     policy::{
         ActionChunk, EpisodeBrief, Observation, Policy, PolicyError, SensorStreams,
         profile::Profile,
@@ -133,7 +134,7 @@ impl Policy for Timed<'_> {
 
 /// Latencies of an episode's responses beyond the server's own time, sorted, ms.
 fn overheads(profile: &str) -> Vec<f64> {
-    static STOP: AtomicBool = AtomicBool::new(false);
+    static STOP: CancelFlag = CancelFlag::new();
     let (url, answers) = serve(Duration::ZERO);
     let remote = RemotePolicy::new(Arc::new(PolicyConnections::new(PolicyServer {
         url,

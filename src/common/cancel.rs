@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Set by [`request`], cleared by [`withdraw`].
-pub static FLAG: AtomicBool = AtomicBool::new(false);
+static FLAG: AtomicBool = AtomicBool::new(false);
 
 /// Requests cancellation. Returns true if it had been requested before.
 pub fn request() -> bool {
@@ -24,7 +24,15 @@ pub fn requested() -> bool {
 #[derive(Debug, Default)]
 pub struct CancelFlag(AtomicBool);
 
+/// The flag of what is cancelled with the process alone.
+pub static WITH_PROCESS: CancelFlag = CancelFlag::new();
+
 impl CancelFlag {
+    /// A flag without a request.
+    pub const fn new() -> Self {
+        Self(AtomicBool::new(false))
+    }
+
     /// Requests cancellation of the part.
     pub fn request(&self) {
         self.0.store(true, Ordering::Relaxed);

@@ -532,7 +532,7 @@ impl Episode {
             self.newton.total += u64::from(stats.newton_steps);
             self.newton.max = self.newton.max.max(stats.max_newton_steps);
             if let BodyId::Soft(index) = self.sim.objects[self.target].body {
-                self.min_det_f = self.min_det_f.min(self.sim.world.soft(index).min_det_f.det_f);
+                self.min_det_f = self.min_det_f.min(self.sim.world.soft(index).state.min_det_f().det_f);
             }
             let time = self.time();
             self.judge.observe(&self.evidence.collect(&self.sim, time));

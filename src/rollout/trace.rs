@@ -112,7 +112,7 @@ fn object(sim: &Simulation, evidence: &EvidenceCollector, index: usize, with_nod
         position_w: pose.translation.vector.into(),
         quaternion_w: [q.w, q.i, q.j, q.k],
         d_pct: evidence.deformation(index).map(|d| d.rms_pct),
-        min_det_f: soft.map(|s| s.min_det_f.det_f),
+        min_det_f: soft.map(|s| s.state.min_det_f().det_f),
         asleep: sim.is_asleep(instance),
         touches: contacts.map(|contact| sim.world.partner_name(contact.partner).to_owned()).collect(),
         nodes: soft.filter(|_| with_nodes).map(|s| s.state.x.iter().map(|x| (*x).into()).collect()),

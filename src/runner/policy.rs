@@ -380,7 +380,7 @@ impl PolicyConfig {
                         profile,
                         timeout: args.timeout.unwrap_or(DEFAULT_TIMEOUT),
                         api_key: std::env::var(API_KEY).ok(),
-                        cancel: &cancel::FLAG,
+                        cancel: &cancel::WITH_PROCESS,
                     })),
                 }
             }

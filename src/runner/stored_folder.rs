@@ -68,9 +68,9 @@ fn enter(
     if softvt_script::embedded(script).is_some() {
         return Ok(path.to_owned());
     }
-    let made_in = stored.map_or(String::new(), |folder| format!(" nor in {folder}, where it was made"));
+    let made_in = stored.map_or(String::new(), |folder| format!(" or in {folder}, where it was made"));
     Err(RunError::input(format!(
-        "{}: its script {script} is neither in the working folder{made_in}; change to the folder that contains it",
+        "{}: its script {script} is not in the working folder{made_in}; change to the folder that contains it",
         path.display()
     )))
 }

@@ -41,7 +41,7 @@ fn recordings_are_printed_checked_and_reproduced() {
     let script = project.text("x.lua");
     fs::rename(project.path("x.lua"), project.path("y.lua")).expect("renamed");
     let lost = project.refusal("dataset check a");
-    assert!(lost.contains("a: its script x.lua is neither in the working folder nor in"), "{lost}");
+    assert!(lost.contains("a: its script x.lua is not in the working folder or in"), "{lost}");
     project.write("x.lua", script.as_bytes());
     project.write("a/videos/one_task0/demo_0_eye_in_hand_rgb.mp4", b"not a video");
     let wrong = project.refusal("dataset check a");

@@ -225,7 +225,7 @@ impl Scene {
             rise: (centre - self.start).z,
             force: 0.5 * (touches[0].normal_force + touches[1].normal_force),
             capacity: touches[0].friction_capacity + touches[1].friction_capacity,
-            min_det_f: soft.min_det_f.det_f,
+            min_det_f: soft.state.min_det_f().det_f,
             sliding: touches.iter().any(|t| t.slipping_points == t.points),
         }
     }

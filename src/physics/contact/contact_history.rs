@@ -5,19 +5,19 @@ use softvt_geometry::Vec3;
 
 /// State of one sample against one partner.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ContactRecord {
+pub(crate) struct ContactRecord {
     /// The partner; `None` in an unused record.
-    pub partner: Option<ContactPartner>,
+    pub(crate) partner: Option<ContactPartner>,
     /// Step of the last contact. A record that is older than the previous step is stale.
-    pub step: u64,
+    pub(crate) step: u64,
     /// Stick anchor in the partner's frame (for a soft partner its rest configuration), m.
-    pub anchor: Vec3,
+    pub(crate) anchor: Vec3,
     /// Normal impulse of the last step, N s.
-    pub normal_impulse: f64,
+    pub(crate) normal_impulse: f64,
     /// True while the pair of surfaces slides, so that dynamic friction acts.
-    pub is_sliding: bool,
+    pub(crate) is_sliding: bool,
     /// Distance by which the anchor was dragged since first contact, m.
-    pub slip_distance: f64,
+    pub(crate) slip_distance: f64,
 }
 
 impl ContactRecord {
@@ -31,30 +31,30 @@ impl ContactRecord {
     };
 
     /// The record of a first contact at `anchor`.
-    pub fn first(partner: ContactPartner, anchor: Vec3) -> Self {
+    pub(crate) fn first(partner: ContactPartner, anchor: Vec3) -> Self {
         Self { partner: Some(partner), anchor, ..Self::UNUSED }
     }
 }
 
 /// Records of all samples of one soft body, for two partners per sample. A contact is kept for one step after it ended.
 #[derive(Clone, Debug)]
-pub struct ContactHistory {
+pub(crate) struct ContactHistory {
     records: Vec<[ContactRecord; 2]>,
 }
 
 impl ContactHistory {
     /// An empty history of a body with this many samples.
-    pub fn new(samples: usize) -> Self {
+    pub(crate) fn new(samples: usize) -> Self {
         Self { records: vec![[ContactRecord::UNUSED; 2]; samples] }
     }
 
     /// The record of `sample` against `partner` at the beginning of `step`, unless it is stale.
-    pub fn get(&self, sample: usize, partner: ContactPartner, step: u64) -> Option<&ContactRecord> {
+    pub(crate) fn get(&self, sample: usize, partner: ContactPartner, step: u64) -> Option<&ContactRecord> {
         self.records[sample].iter().find(|record| record.partner == Some(partner) && record.step + 1 == step)
     }
 
     /// Stores `record`, replacing the partner's old one, a stale one, or the one of smaller impulse.
-    pub fn put(&mut self, sample: usize, record: ContactRecord) {
+    pub(crate) fn put(&mut self, sample: usize, record: ContactRecord) {
         let records = &mut self.records[sample];
         let same = records.iter().position(|r| r.partner == record.partner);
         let stale = records.iter().position(|r| r.step + 1 < record.step);

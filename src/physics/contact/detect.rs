@@ -6,55 +6,55 @@ use softvt_geometry::{Aabb, Mat3, Pose, Vec3};
 
 /// A sample near a surface, at the start of the step.
 #[derive(Clone, Copy, Debug)]
-pub struct ContactCandidate {
+pub(crate) struct ContactCandidate {
     /// Sample group of the body.
-    pub group: usize,
+    pub(crate) group: usize,
     /// Sample of the body.
-    pub sample: usize,
+    pub(crate) sample: usize,
     /// Position of the sample, m, world.
-    pub p: Vec3,
+    pub(crate) p: Vec3,
     /// Gap, m; negative is overlap.
-    pub gap: f64,
+    pub(crate) gap: f64,
     /// Outward unit normal of the surface, world.
-    pub normal: Vec3,
+    pub(crate) normal: Vec3,
     /// Covered share of the sample's area, 0..=1.
-    pub coverage: f64,
+    pub(crate) coverage: f64,
 }
 
 /// Pose and velocity of a collider at the start of the step.
 #[derive(Clone, Copy, Debug)]
-pub struct ColliderMotion {
+pub(crate) struct ColliderMotion {
     /// Collider frame in the world.
-    pub pose: Pose,
+    pub(crate) pose: Pose,
     /// Velocity of the parent's origin, m/s, world.
-    pub linear: Vec3,
+    pub(crate) linear: Vec3,
     /// Angular velocity, rad/s, world.
-    pub angular: Vec3,
+    pub(crate) angular: Vec3,
     /// The parent's origin, m, world; of a rigid body its centre of mass.
-    pub origin: Vec3,
+    pub(crate) origin: Vec3,
 }
 
 impl ColliderMotion {
     /// Velocity of the parent's material point at `p` (m, world), m/s.
-    pub fn velocity(&self, p: &Vec3) -> Vec3 {
+    pub(crate) fn velocity(&self, p: &Vec3) -> Vec3 {
         self.linear + self.angular.cross(&(p - self.origin))
     }
 }
 
 /// Distances and times that limit a search for contacts.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DetectionLimits {
+pub(crate) struct DetectionLimits {
     /// Time step, s.
-    pub dt: f64,
+    pub(crate) dt: f64,
     /// Samples closer than this become contact points, m.
-    pub margin: f64,
+    pub(crate) margin: f64,
     /// Nodes of samples closer than this are retained in the reduced system, m.
-    pub reach: f64,
+    pub(crate) reach: f64,
 }
 
 impl DetectionLimits {
     /// Steps of approach within which a contact point is created (speculative contact).
-    pub const STEPS_AHEAD: f64 = 1.5;
+    pub(crate) const STEPS_AHEAD: f64 = 1.5;
 
     /// Approach within [`Self::STEPS_AHEAD`] steps at a speed (m/s), m.
     pub(super) fn approach_distance(&self, speed: f64) -> f64 {
@@ -64,7 +64,7 @@ impl DetectionLimits {
 
 /// Bounds of a body and its sample groups at the start of a step, shared by the searches against all colliders.
 #[derive(Clone, Debug, Default)]
-pub struct BodyBounds {
+pub(crate) struct BodyBounds {
     body: Option<Aabb>,
     groups: Vec<Aabb>,
     max_speed: f64,
@@ -72,7 +72,7 @@ pub struct BodyBounds {
 
 impl BodyBounds {
     /// Computes the bounds of `body`.
-    pub fn update(&mut self, body: &FemState) {
+    pub(crate) fn update(&mut self, body: &FemState) {
         self.body = Aabb::from_points(&body.x);
         self.max_speed = body.max_speed();
         self.groups.clear();
@@ -91,7 +91,7 @@ impl BodyBounds {
 ///
 /// Calls `near` with every sample group within [`DetectionLimits::reach`], so that its nodes are retained
 /// before the contact begins.
-pub fn detect(
+pub(crate) fn detect(
     body: &FemState,
     body_bounds: &BodyBounds,
     collider: &Collider,

@@ -19,7 +19,7 @@ const MAX_VISITED_VOXELS: usize = 64;
 const MAX_NEWTON: usize = 8;
 
 /// Signed distance field of a soft body's surface in its current state.
-pub struct DeformedSdf<'a> {
+pub(crate) struct DeformedSdf<'a> {
     body: &'a FemState,
     surface: &'a dyn ContactSurface,
     centre_w: Vec3,
@@ -28,21 +28,21 @@ pub struct DeformedSdf<'a> {
 
 /// Contact of a sample with the field of a soft body.
 #[derive(Clone, Copy, Debug)]
-pub struct SdfContact {
+pub(crate) struct SdfContact {
     /// Gap, m; negative inside.
-    pub gap: f64,
+    pub(crate) gap: f64,
     /// Outward normal, world.
-    pub normal: Vec3,
+    pub(crate) normal: Vec3,
     /// Covered share of the sample's area, 0..=1.
-    pub coverage: f64,
+    pub(crate) coverage: f64,
     /// The element in which the sample lies.
-    pub element: u32,
+    pub(crate) element: u32,
     /// Weights of its eight nodes.
-    pub weights: [f64; 8],
+    pub(crate) weights: [f64; 8],
     /// The surface point under the sample, in the rest configuration, object frame, m.
-    pub surface_o: Vec3,
+    pub(crate) surface_o: Vec3,
     /// F⁻¹: maps small vectors of the world to the rest configuration.
-    pub inverse_gradient: Mat3,
+    pub(crate) inverse_gradient: Mat3,
 }
 
 /// A point of the world mapped to the rest configuration of the body.
@@ -54,7 +54,7 @@ struct RestPoint {
 
 impl<'a> DeformedSdf<'a> {
     /// The field of `body`, whose surface at rest is `surface`.
-    pub fn new(body: &'a FemState, surface: &'a dyn ContactSurface) -> Self {
+    pub(crate) fn new(body: &'a FemState, surface: &'a dyn ContactSurface) -> Self {
         let mesh = &body.model.mesh;
         let mean = |points: &[Vec3]| points.iter().sum::<Vec3>() / points.len().max(1) as f64;
         Self { body, surface, centre_w: mean(&body.x), centre_o: mean(&mesh.nodes) }
@@ -62,7 +62,7 @@ impl<'a> DeformedSdf<'a> {
 
     /// Contact of a square sample of edge `spacing` (m) at `p` with outward normal `facing` (world). `None` if the
     /// surface faces the same way, or does not cover the sample.
-    pub fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> Option<SdfContact> {
+    pub(crate) fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> Option<SdfContact> {
         let point = self.map_to_rest(p)?;
         let facing_o = point.inverse_gradient.try_inverse()?.tr_mul(facing).try_normalize(0.0)?;
         let contact = self.surface.contact(&point.p_o, &facing_o, spacing);
@@ -167,15 +167,15 @@ fn trilinear(corners: &[Vec3; 8], local: &Vec3) -> (Vec3, Mat3) {
 
 /// A sample of one soft body near the surface of another, at the start of the step.
 #[derive(Clone, Copy, Debug)]
-pub struct SdfCandidate {
+pub(crate) struct SdfCandidate {
     /// Sample group of the first body.
-    pub group: usize,
+    pub(crate) group: usize,
     /// Sample of the first body.
-    pub sample: usize,
+    pub(crate) sample: usize,
     /// Position of the sample, m, world.
-    pub p: Vec3,
+    pub(crate) p: Vec3,
     /// Contact with the second body's field.
-    pub contact: SdfContact,
+    pub(crate) contact: SdfContact,
 }
 
 /// Distance within which a point of speed up to `speed` (m/s) is tested, m.
@@ -184,7 +184,7 @@ fn search_distance(speed: f64, limits: DetectionLimits) -> f64 {
 }
 
 /// True if two bodies are close or fast enough for [`detect_soft`] to find anything.
-pub fn may_touch(a: &FemState, b: &FemState, limits: DetectionLimits) -> bool {
+pub(crate) fn may_touch(a: &FemState, b: &FemState, limits: DetectionLimits) -> bool {
     let (Some(box_a), Some(box_b)) = (Aabb::from_points(&a.x), Aabb::from_points(&b.x)) else { return false };
     box_a.loosened(search_distance(a.max_speed() + b.max_speed(), limits)).intersects(&box_b)
 }
@@ -193,7 +193,7 @@ pub fn may_touch(a: &FemState, b: &FemState, limits: DetectionLimits) -> bool {
 ///
 /// Calls `near` with the group and element of every sample within reach of the field, so that their nodes are
 /// retained before the contact begins.
-pub fn detect_soft(
+pub(crate) fn detect_soft(
     body: &FemState,
     field: &DeformedSdf,
     limits: DetectionLimits,

@@ -46,7 +46,7 @@ pub struct GelSample {
 
 /// The pair of primitives that a contact point belongs to, or, for general shapes, the body whose
 /// surface feature it is.
-pub type ContactPairId = u32;
+pub(crate) type ContactPairId = u32;
 
 /// A skin sample with a larger cosine between its normal and the shape's has the shape behind it.
 const MAX_FACING_COSINE: f64 = 0.3;
@@ -69,7 +69,7 @@ impl CollisionGeometry {
     }
 
     /// Appends the contact points of `a` and `b` whose gap is below `margin` (m). Normals point from `a` to `b`.
-    pub fn find_contacts(
+    pub(crate) fn find_contacts(
         a: Placed<&Self>,
         b: Placed<&Self>,
         margin: f64,

@@ -25,13 +25,13 @@ use super::{
 use softvt_geometry::{Mat3, Vec3, hex8};
 
 /// Volume ratio `det F` below which an element stiffens.
-pub const ONSET: f64 = 0.3;
+pub(crate) const ONSET: f64 = 0.3;
 /// Volume ratio below which the stress grows linearly.
-pub const FLOOR: f64 = 0.05;
+pub(crate) const FLOOR: f64 = 0.05;
 
 /// The law for voxels of one size and material.
 #[derive(Clone, Debug)]
-pub struct Densification {
+pub(crate) struct Densification {
     /// Modulus times the volume of a Gauss point, J.
     scale: f64,
     /// Shape gradients at the Gauss points, 1/m.
@@ -79,14 +79,14 @@ fn cofactor(f: &Mat3) -> Mat3 {
 
 impl Densification {
     /// The law for voxels of edge `h` (m).
-    pub fn new(material: &ElasticMaterial, h: f64) -> Self {
+    pub(crate) fn new(material: &ElasticMaterial, h: f64) -> Self {
         let modulus = material.constrained_modulus();
         Self { scale: modulus * h.powi(3) / 8.0, gradients: gauss_points().map(|xi| hex8::gradients(&xi, h)) }
     }
 
     /// Adds force and energy of a voxel at corner positions `x` of which `share` is material. Returns the largest
     /// curvature ψ'' of its Gauss points.
-    pub fn add(&self, x: &ElementCorners, share: f64, elastic: &mut ElasticResponse) -> f64 {
+    pub(crate) fn add(&self, x: &ElementCorners, share: f64, elastic: &mut ElasticResponse) -> f64 {
         let scale = self.scale * share;
         let mut largest: f64 = 0.0;
         for g in &self.gradients {
@@ -101,7 +101,13 @@ impl Densification {
     }
 
     /// Adds the 3×3 blocks of the tangent, in the frame `rotation`, for the corner pairs `(a, b ≤ a)` in row order.
-    pub fn add_tangent(&self, x: &ElementCorners, rotation: &Mat3, share: f64, blocks: &mut [Mat3; 36]) {
+    pub(crate) fn add_tangent(
+        &self,
+        x: &ElementCorners,
+        rotation: &Mat3,
+        share: f64,
+        blocks: &mut [Mat3; 36],
+    ) {
         for g in &self.gradients {
             let f = rotation.tr_mul(&deformation_gradient(x, g));
             let Potential { slope, curvature, .. } = Potential::at(f.determinant());

@@ -4,10 +4,10 @@
 //! & Haugen 2005). With `R = polar(F)`, `F` the element-mean deformation gradient, `y_a = Rᵀ x_a`, the energy of an
 //! element is `U = ½ (y − X)ᵀ K₀ (y − X)` and its force the exact `−∂U/∂x` ([`force`]). `K₀` is a trilinear B-bar
 //! hexahedron ([`element`]), so that ν near 0.5 does not lock. An element that is compressed below 0.3 of its volume stiffens
-//! ([`densification`]). Time stepping uses the SPD tangent `R K₀ Rᵀ`.
+//! (`densification`). Time stepping uses the SPD tangent `R K₀ Rᵀ`.
 
 pub mod body;
-pub mod densification;
+pub(crate) mod densification;
 pub mod element;
 pub mod force;
 pub mod material;

@@ -33,7 +33,6 @@ impl World {
         state.update_elastic();
         self.soft.push(SoftBody {
             name: name.to_owned(),
-            min_det_f: state.min_det_f(),
             state,
             friction,
             stiffness: SurfaceStiffness { normal: modulus, shear: self.params.shear_ratio * modulus },

@@ -14,9 +14,10 @@ impl World {
             if let Some(node) = soft.state.x.iter().position(|x| !x.iter().all(|c| c.is_finite())) {
                 return Err(StepFailure::NotFinite { step, body: soft.name.clone(), node });
             }
-            soft.inverted_time = if soft.min_det_f.det_f <= 0.0 { soft.inverted_time + dt } else { 0.0 };
+            let least = soft.state.min_det_f();
+            soft.inverted_time = if least.det_f <= 0.0 { soft.inverted_time + dt } else { 0.0 };
             if soft.inverted_time > max_inverted_time {
-                let (body, element) = (soft.name.clone(), soft.min_det_f.element);
+                let (body, element) = (soft.name.clone(), least.element);
                 return Err(StepFailure::Inverted { step, body, element, seconds: max_inverted_time });
             }
         }

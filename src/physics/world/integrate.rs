@@ -25,7 +25,6 @@ impl World {
             }
             rigid_motion::advance(body, dt);
             body.update_elastic();
-            soft.min_det_f = body.min_det_f();
         }
         for (i, rigid) in self.rigid.iter_mut().enumerate() {
             let Some(block) = self.blocks.rigid[i] else { continue };

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::{
     contact::{ContactHistory, ContactSurface, Friction, SurfaceStiffness},
-    fem::{FemState, MinDetF, system::VelocitySystem},
+    fem::{FemState, system::VelocitySystem},
     ids::ContactPartner,
     joints::{JointState, JointTree},
     rigid::RigidState,
@@ -78,8 +78,6 @@ pub struct SoftBody {
     pub stiffness: SurfaceStiffness,
     pub(super) surface: Option<Arc<dyn ContactSurface>>,
     pub(super) sleep: SleepState,
-    /// Smallest det F of its filled elements after the last step.
-    pub min_det_f: MinDetF,
     pub(super) contacts: Vec<BodyContact>,
     /// Factored velocity system, reduced to the nodes in contact.
     pub(crate) system: VelocitySystem,

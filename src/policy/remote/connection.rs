@@ -3,10 +3,7 @@
 use std::{
     io::{self, ErrorKind},
     net::{TcpStream, ToSocketAddrs},
-    sync::{
-        atomic::{AtomicBool, Ordering},
-        mpsc::{self, RecvTimeoutError},
-    },
+    sync::mpsc::{self, RecvTimeoutError},
     thread,
     time::{Duration, Instant},
 };
@@ -17,6 +14,8 @@ use tungstenite::{
     http::Uri,
     protocol::{CloseFrame, frame::coding::CloseCode},
 };
+
+use softvt_common::cancel::CancelFlag;
 
 use crate::{
     PolicyError,
@@ -68,7 +67,7 @@ pub struct PolicyServer {
     /// Sent as `Authorization: Api-Key …`, if present.
     pub api_key: Option<String>,
     /// Flag that cancels the run.
-    pub cancel: &'static AtomicBool,
+    pub cancel: &'static CancelFlag,
 }
 
 impl PolicyServer {
@@ -78,7 +77,7 @@ impl PolicyServer {
     }
 
     fn check_cancel(&self) -> Result<(), PolicyError> {
-        if self.cancel.load(Ordering::Relaxed) { Err(PolicyError::Interrupted) } else { Ok(()) }
+        if self.cancel.requested() { Err(PolicyError::Interrupted) } else { Ok(()) }
     }
 
     /// End of an operation that begins now.
@@ -269,7 +268,7 @@ impl Drop for PolicyConnection {
         let _ = self.socket.get_mut().set_nonblocking(false);
         let deadline = Instant::now() + CLOSE_TIMEOUT;
         let may_wait = || {
-            let is_over = Instant::now() > deadline || self.server.cancel.load(Ordering::Relaxed);
+            let is_over = Instant::now() > deadline || self.server.cancel.requested();
             if is_over { Err(()) } else { Ok(()) }
         };
         let frame = CloseFrame { code: CloseCode::Normal, reason: "".into() };

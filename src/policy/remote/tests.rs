@@ -3,7 +3,7 @@
 use std::{
     io::{Read, Write},
     net::{TcpListener, TcpStream},
-    sync::{atomic::AtomicBool, mpsc},
+    sync::mpsc,
     thread,
     time::{Duration, Instant},
 };
@@ -12,6 +12,8 @@ use rmpv::Value;
 use tungstenite::{Message, WebSocket, accept};
 
 use super::*;
+use softvt_common::cancel::CancelFlag;
+
 use crate::{
     EncodedGrip, GripTarget, RobotState,
     msgpack::{map, pack},
@@ -20,7 +22,7 @@ use crate::{
 
 type Socket = WebSocket<TcpStream>;
 
-static CANCEL: AtomicBool = AtomicBool::new(false);
+static CANCEL: CancelFlag = CancelFlag::new();
 
 /// Starts a server that handles each connection in a thread of its own. Returns its address.
 fn server(serve: impl Fn(Socket) + Send + Sync + 'static) -> String {

@@ -366,7 +366,7 @@ output! {
         /// The same by SoftVTBench's definition of D, %.
         d_peak_v1_pct: "number?" = inner.soft_body(index).map(|_| inner.records[index].d_peak_v1_pct);
         /// Minimum det F of a filled element of a soft body.
-        min_det_f: "number?" = inner.soft_body(index).and_then(|body| finite(body.min_det_f.det_f));
+        min_det_f: "number?" = inner.soft_body(index).and_then(|body| finite(body.state.min_det_f().det_f));
         /// True if a soft body sleeps.
         asleep: "boolean?" = inner.soft_body(index).map(|body| body.is_asleep());
     }

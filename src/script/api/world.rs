@@ -381,7 +381,7 @@ class! {
             /// Returns the mass, kg.
             fn mass(_, this) -> ["number"] { this.read(|body| body.state.model.total_mass()) }
             /// Returns the least det F of a filled element: 0 or less is inverted, nil if no element is filled.
-            fn min_det_f(_, this) -> ["number?"] { finite(this.read(|body| body.min_det_f.det_f)) }
+            fn min_det_f(_, this) -> ["number?"] { finite(this.read(|body| body.state.min_det_f().det_f)) }
             /// Returns true if the body sleeps.
             fn asleep(_, this) -> ["boolean"] { this.read(SoftBody::is_asleep) }
             /// Returns the deformation against the reference shape.

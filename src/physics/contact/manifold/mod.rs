@@ -37,19 +37,19 @@ pub(super) use feature_extraction::primitives;
 
 /// One point where two bodies touch or nearly touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ManifoldPoint {
+pub(crate) struct ManifoldPoint {
     /// Position, half-way between the two surfaces, m, world.
-    pub position_w: Vec3,
+    pub(crate) position_w: Vec3,
     /// Unit normal from the first body to the second, world.
-    pub normal_w: Vec3,
+    pub(crate) normal_w: Vec3,
     /// Gap along the normal, m; negative is overlap.
-    pub gap: f64,
+    pub(crate) gap: f64,
     /// Area that the point represents, m². The points of a flat patch share its area; a point or line contact has
     /// [`POINT_AREA`] per point. Areas fade in and out, so that a small change of pose changes forces little.
-    pub area: f64,
+    pub(crate) area: f64,
     /// Identifies the two features that meet; constant from step to step while they stay
     /// the same. See [`NON_MATERIAL`].
-    pub feature: u32,
+    pub(crate) feature: u32,
 }
 
 /// Flag in `feature` for a point that is not a material point of either body, such as the lowest point of
@@ -57,12 +57,12 @@ pub struct ManifoldPoint {
 ///
 /// Its tangential spring must be stretched by the *velocity* of the touching material, since the motion of the point
 /// itself is not slip: a rolling ball does not slip.
-pub const NON_MATERIAL: u32 = 1 << 31;
+pub(crate) const NON_MATERIAL: u32 = 1 << 31;
 
 /// Area of a point contact and of either end of a line contact, m². With the contact modulus of stiff solids (1e9
 /// Pa/m) this is 1e6 N/m, hence 10 µm under 10 N. A tenth of it makes a can of 0.3 kg tip 0.4° too early, because the
 /// rim that carries it sinks in.
-pub const POINT_AREA: f64 = 1e-3;
+pub(crate) const POINT_AREA: f64 = 1e-3;
 
 /// Position in the order of types; the manifold of each pair of types is implemented for one order only.
 fn rank(primitive: &Primitive) -> u8 {
@@ -79,7 +79,12 @@ fn rank(primitive: &Primitive) -> u8 {
 ///
 /// Swapping the two flips the normals and changes nothing else, except the feature identifiers of two
 /// primitives of one type.
-pub fn manifold(a: &Placed<Primitive>, b: &Placed<Primitive>, margin: f64, out: &mut Vec<ManifoldPoint>) {
+pub(crate) fn manifold(
+    a: &Placed<Primitive>,
+    b: &Placed<Primitive>,
+    margin: f64,
+    out: &mut Vec<ManifoldPoint>,
+) {
     if rank(&a.shape) > rank(&b.shape) {
         let start = out.len();
         manifold(b, a, margin, out);
