@@ -32,7 +32,7 @@ pub(crate) struct ScriptArgs {
     /// Base seed
     #[arg(long, value_name = "S", default_value = "0", allow_hyphen_values = true, value_parser = parse_seed)]
     pub seed: u64,
-    /// Secret base seed of a judged run: any file, such as 32 random bytes. Results hold its hash: docs/policies.md#judged-runs
+    /// File with the secret base seed of a judged run: docs/policies.md#judged-runs
     #[arg(long, value_name = "FILE", conflicts_with = "seed")]
     pub seed_file: Option<PathBuf>,
     /// Scene changes that the suite declares, such as stiffness=0.5
@@ -41,7 +41,7 @@ pub(crate) struct ScriptArgs {
     /// Make every soft object rigid, with the same shape, mass and appearance
     #[arg(long)]
     pub rigid_twin: bool,
-    /// Vary the soft objects, the light and the cameras from episode to episode: by a Lua file, or by the standard ranges (scripts/variations/standard.lua)
+    /// Vary objects, light and cameras from episode to episode, within the ranges of a Lua file or the standard ones
     #[arg(long, value_name = "FILE.lua", num_args = 0..=1, require_equals = true, default_missing_value = STANDARD_VARIATION)]
     pub vary: Option<PathBuf>,
     /// Change a setting, such as robot.gripper.effort=20
@@ -76,10 +76,10 @@ pub(crate) struct RunFlags {
     /// Run the I-th of N parts; softvt merge combines them
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
-    /// Condition on the results of each suite, such as "safety>=0.9"; exit code 99 if it does not hold
+    /// Condition on each suite, such as "safety>=0.9"; exit code 99 if it does not hold
     #[arg(long = "require", value_name = "CONDITION")]
     pub requirements: Vec<Requirement>,
-    /// Print JSON: an object for a suite or for conditions, an array for a list of suites, one line per row of an experiment
+    /// Print JSON; an array for a list of suites, a line per row for an experiment
     #[arg(long)]
     pub json: bool,
 }
@@ -162,7 +162,7 @@ impl Request {
 // The policy, and how it is connected. A doc comment would replace the description of the commands.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct PolicyArgs {
-    /// Policy that controls the robot: a name (softvt list policies), a Lua file, a server such as ws://host:8000, or a run folder whose actions are repeated [default: expert; softvt record: the suite's teacher]
+    /// Policy: a name (softvt list policies), Lua file, server such as ws://host:8000 or run [default: expert or teacher]
     #[arg(long, value_name = "POLICY")]
     policy: Option<PolicySource>,
     #[command(flatten)]
@@ -181,10 +181,10 @@ pub(crate) struct PolicyArgs {
 // What a policy sees and how it answers, wherever it runs. A doc comment would replace the description of the commands.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ProfileArgs {
-    /// Observations and action encoding of a policy server: a name (softvt list profiles) or a Lua file [default: visuo_tactile]
+    /// What a server observes and answers: a name (softvt list profiles) or a Lua file [default: visuo_tactile]
     #[arg(long, value_name = "PROFILE", value_parser = parse_profile)]
     profile: Option<String>,
-    /// Grip code, the meaning of an action's gripper value, in place of that of the profile or the Lua policy: docs/policies.md
+    /// Grip code in place of that of the profile or the Lua policy: docs/policies.md
     #[arg(long, value_name = "CODE")]
     gripper: Option<GripCode>,
     /// Policy name shown in the results

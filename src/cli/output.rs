@@ -18,7 +18,6 @@ use softvt_common::{
     parallel::lock,
     text::{self, counted},
 };
-use softvt_dataset::card::rejection_counts;
 use softvt_runner::{
     Observer,
     recording::RecordingSummary,
@@ -84,19 +83,7 @@ pub(crate) fn print_recording(out: &Path, summary: Option<RecordingSummary>) -> 
         eprint_notice(format!("{} is already complete", out.display()));
         return Ok(());
     };
-    for task in &summary.tasks {
-        print(&format!(
-            "{} task {}: {} from {}, {}, {:.1} MB; not kept: {}\n",
-            task.suite,
-            task.task,
-            counted(task.demos, "demonstration"),
-            counted(task.attempts, "attempt"),
-            counted(task.samples, "step"),
-            (task.hdf5_bytes + task.video_bytes) as f64 / 1e6,
-            rejection_counts(&task.rejected)
-        ))?;
-    }
-    print(&format!("{}\n", summary.manifest.display()))
+    print(&format!("{}{}\n", summary.text(), summary.manifest.display()))
 }
 
 /// Prints a message of the program to standard error, after `softvt: `, with control characters escaped.

@@ -35,6 +35,21 @@ pub struct SuiteResult {
     pub records: Vec<EpisodeRecord>,
 }
 
+impl SuiteResult {
+    /// Says so if the actions of the policy could be executed in no episode, as those of one that answers NaN.
+    pub fn refusal_of_all_actions(&self) -> Option<String> {
+        let message = |record: &EpisodeRecord| match &record.outcome {
+            Outcome::Error { message } => Some(message.clone()),
+            _ => None,
+        };
+        let first = message(self.records.first()?)?;
+        self.records.iter().all(|record| message(record).is_some()).then(|| {
+            let count = counted(self.records.len(), "episode");
+            format!("no episode is valid: the policy's actions were refused in {count}, first: {first}")
+        })
+    }
+}
+
 /// A simulated episode, and the result of rendering it.
 pub(crate) struct SimulatedEpisode {
     pub finished: FinishedEpisode,

@@ -1,12 +1,13 @@
 //! Run of an experiment: its points on threads, its rows in the order of the points, its files at the end.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
     sync::{Arc, Mutex},
 };
 
 use serde::Serialize;
+use serde_json::Value;
 
 use crate::{
     config::{ConfiguredScript, RunConfig},
@@ -18,7 +19,7 @@ use softvt_common::cancel;
 use softvt_common::{
     files::{self, replace},
     parallel,
-    text::counted,
+    text::{TextTable, counted},
 };
 use softvt_report::run_folder::{RUN, RunFolder};
 use softvt_script::{
@@ -53,6 +54,31 @@ pub enum ExperimentOutput<'a> {
     Rows(&'a [ExperimentRow]),
     /// The text of its `finish` function.
     Text(&'a str),
+}
+
+/// Rows as text, in these columns or in those of all rows; empty without rows.
+pub fn table(rows: &[ExperimentRow], columns: &[String]) -> String {
+    if rows.is_empty() {
+        return String::new();
+    }
+    let all: BTreeSet<&String> = rows.iter().flat_map(|row| row.keys()).collect();
+    let columns: Vec<&String> =
+        if columns.is_empty() { all.into_iter().collect() } else { columns.iter().collect() };
+    let header = columns.iter().map(ToString::to_string).collect();
+    let cells = rows.iter().map(|row| columns.iter().map(|column| cell(row.get(*column))).collect());
+    let lines: Vec<Vec<String>> = std::iter::once(header).chain(cells).collect();
+    TextTable::fitted(&lines, |_| true)
+}
+
+fn cell(value: Option<&Value>) -> String {
+    match value {
+        None | Some(Value::Null) => "-".to_owned(),
+        Some(Value::String(text)) => text.clone(),
+        Some(Value::Number(number)) => number.as_f64().map_or(number.to_string(), |x| {
+            format!("{x:.5}").trim_end_matches('0').trim_end_matches('.').to_owned()
+        }),
+        Some(other) => other.to_string(),
+    }
 }
 
 /// Runs all points of the experiment that a script returned. With an output folder, the rows and the files of the script are

@@ -9,7 +9,7 @@ use super::{
     error::RunError,
     rates::{Caches, all_streams, first_episode, observations_per_s, suite_of, time_episode},
 };
-use softvt_common::cancel;
+use softvt_common::{cancel, text::TextTable};
 use softvt_geometry::{Pose, Vec3, shape::Shape};
 use softvt_media::{
     log_plot::{self, LogPanel},
@@ -57,6 +57,18 @@ impl GrowthCurve {
         let (first, last) = (self.points.first()?, self.points.last()?);
         (last.size > first.size).then(|| (last.cost / first.cost).ln() / (last.size / first.size).ln())
     }
+}
+
+/// The curves as text, one row per measurement.
+pub fn table(curves: &[GrowthCurve]) -> String {
+    let of_curve = |curve: &GrowthCurve| {
+        let power = curve.exponent().map_or_else(String::new, |power| format!(", power {power:.2}"));
+        let mut rows = vec![vec![curve.size.to_owned(), format!("{}{power}", curve.cost)]];
+        let point = |point: &GrowthPoint| vec![format!("{}", point.size), format!("{:.3}", point.cost)];
+        rows.extend(curve.points.iter().map(point));
+        TextTable::fitted(&rows, |_| true)
+    };
+    curves.iter().map(of_curve).collect::<Vec<_>>().join("\n")
 }
 
 /// Measures all curves on this machine; images and threads in the first task of the suite `script`, with up to `threads`

@@ -5,6 +5,7 @@
 //! need; [`PreparedRun`] is one whose scenes are valid, with the limits of their objects. Nothing here prints: progress and messages go to an [`Observer`].
 #![warn(missing_docs, unreachable_pub)]
 
+pub mod catalog;
 mod check;
 pub mod conditions;
 mod config;

@@ -15,6 +15,7 @@ use softvt_common::{
     disk_cache::DiskCache,
     episode_id::{EpisodeId, EpisodeSplit},
     parallel,
+    text::{TextTable, decimal},
 };
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
 use softvt_rollout::{AssetCache, Controller, Episode, EpisodeSpec, SensorAssets, Simulation};
@@ -44,6 +45,43 @@ pub struct MachineRates {
     pub threads: usize,
     /// Observations per second (wall time) with all streams, of all threads together.
     pub observations_per_s: f64,
+}
+
+impl MachineRates {
+    /// These rates beside published ones as text, one column for each machine.
+    pub fn table_beside(&self, published: &Self) -> String {
+        let here = self;
+        let row = |name: &str, value: &dyn Fn(&MachineRates) -> String| {
+            vec![name.to_owned(), value(here), value(published)]
+        };
+        let mut rows = vec![
+            ["", "here", "published"].map(str::to_owned).to_vec(),
+            row("CPU s to the first observation", &|rates| format!("{:.2}", rates.first_observation_s)),
+            row("the same with the cache", &|rates| decimal(rates.cached_first_observation_s, 2)),
+        ];
+        for (index, of_streams) in here.streams.iter().enumerate() {
+            let value = |rates: &MachineRates| {
+                rates.streams.get(index).map_or_else(String::new, |rate| {
+                    format!("{:.0} ({:.1} ×)", rate.observations_per_s, rate.times_real_time())
+                })
+            };
+            rows.push(row(&format!("{}, one core", of_streams.streams), &value));
+        }
+        let machine = |rates: &MachineRates| {
+            let threads =
+                if rates.threads == 1 { "1 thread".to_owned() } else { format!("{} threads", rates.threads) };
+            format!("{:.0} ({threads})", rates.observations_per_s)
+        };
+        rows.push(row("all streams, machine", &machine));
+        let names = [("here", here), ("published", published)]
+            .map(|(which, rates)| format!("{which}: softvt {}, {}\n", rates.softvt, rates.machine));
+        format!(
+            "Observations per second, and the multiple of real time, in {} task 0\n\n{}\n{}",
+            here.script,
+            TextTable::fitted(&rows, |column| column > 0),
+            names.concat()
+        )
+    }
 }
 
 /// Rate of observations with some of the streams, on one thread.
@@ -234,4 +272,29 @@ fn processor() -> String {
     let name = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
     let unknown = || format!("{} {}", std::env::consts::ARCH, std::env::consts::OS);
     name.map_or_else(unknown, |(_, name)| name.trim().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_has_the_rates_of_both_machines_and_the_multiples_of_real_time() {
+        let rates = |machine: &str, observations_per_s: f64| MachineRates {
+            softvt: "0.1.0".to_owned(),
+            script: "suites/some.lua".to_owned(),
+            machine: machine.to_owned(),
+            first_observation_s: 1.5,
+            cached_first_observation_s: None,
+            streams: vec![StreamRate { streams: "state".to_owned(), observations_per_s }],
+            threads: 4,
+            observations_per_s: 4.0 * observations_per_s,
+        };
+        let text = rates("mine", 30.0).table_beside(&rates("theirs", 60.0));
+        for expected in
+            ["suites/some.lua", "30 (1.5 ×)", "60 (3.0 ×)", "120 (4 threads)", "here: softvt 0.1.0, mine"]
+        {
+            assert!(text.contains(expected), "{expected} in\n{text}");
+        }
+    }
 }

@@ -403,6 +403,25 @@ pub struct RecordingSummary {
     pub manifest: PathBuf,
 }
 
+impl RecordingSummary {
+    /// A line of text for each task.
+    pub fn text(&self) -> String {
+        let line = |task: &TaskCount| {
+            format!(
+                "{} task {}: {} from {}, {}, {:.1} MB; not kept: {}\n",
+                task.suite,
+                task.task,
+                counted(task.demos, "demonstration"),
+                counted(task.attempts, "attempt"),
+                counted(task.samples, "step"),
+                (task.hdf5_bytes + task.video_bytes) as f64 / 1e6,
+                rejection_counts(&task.rejected)
+            )
+        };
+        self.tasks.iter().map(line).collect()
+    }
+}
+
 /// Records a dataset. `request` describes it in `recording.json`; `prepare` returns its prepared suites. Returns `None` if the
 /// folder contains this very dataset already.
 ///

@@ -1,9 +1,8 @@
 //! `softvt FILE.lua`: the plan of a script.
 
-use std::{collections::BTreeSet, path::Path};
+use std::path::Path;
 
 use clap::Parser;
-use serde_json::Value;
 
 use crate::{
     args::{PolicyArgs, Request, RunFlags, ScriptArgs},
@@ -12,16 +11,14 @@ use crate::{
     plan_flags,
 };
 use softvt_benchmark::Plan;
-use softvt_common::text::{TextTable, counted};
-use softvt_evaluation::verdict::Outcome;
 use softvt_policy::profile::Profile;
-use softvt_records::{record::EpisodeRecord, requirement::Requirement, summary::SuiteSummary};
+use softvt_records::{requirement::Requirement, summary::SuiteSummary};
 use softvt_report::{
     condition_table::{ConditionTable, compares_policies, controllers_table, table},
     terminal,
 };
 use softvt_runner::{
-    ConfiguredScript, Runner, conditions,
+    ConfiguredScript, Runner, SuiteResult, conditions,
     experiment::{self, ExperimentOutput},
     selection::{check_distinct_out_dirs, check_parent_folder, next_run_dir},
 };
@@ -65,7 +62,7 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
         plan @ (Plan::Suite(_) | Plan::Suites { .. }) => {
             let is_list = matches!(plan, Plan::Suites { .. });
             let results = Runner::new(&run).numbered().run(|_| ())?;
-            let failed = results.iter().find_map(|result| all_actions_refused(&result.records));
+            let failed = results.iter().find_map(SuiteResult::refusal_of_all_actions);
             let summaries: Vec<SuiteSummary> = results.into_iter().map(|result| result.summary).collect();
             match &summaries[..] {
                 [summary] if json && !is_list => print_json(summary),
@@ -73,7 +70,7 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
                 summaries => summaries.iter().try_for_each(|summary| print(&terminal::table(summary))),
             }?;
             match failed {
-                Some(error) => Err(error),
+                Some(message) => Err(CliError::new(Exit::Policy, message)),
                 None => check_requirements(&requirements, &summaries),
             }
         }
@@ -122,49 +119,13 @@ fn check_requirements(requirements: &[Requirement], summaries: &[SuiteSummary]) 
     if unmet.is_empty() { Ok(()) } else { Err(CliError::new(Exit::RequirementNotMet, unmet.join("\n"))) }
 }
 
-/// The error of a policy whose actions could be executed in no episode, such as one that answers NaN.
-fn all_actions_refused(records: &[EpisodeRecord]) -> Option<CliError> {
-    let message = |record: &EpisodeRecord| match &record.outcome {
-        Outcome::Error { message } => Some(message.clone()),
-        _ => None,
-    };
-    let first = message(records.first()?)?;
-    records.iter().all(|record| message(record).is_some()).then(|| {
-        let count = counted(records.len(), "episode");
-        CliError::new(
-            Exit::Policy,
-            format!("no episode is valid: the policy's actions were refused in {count}, first: {first}"),
-        )
-    })
-}
-
 /// Prints rows as JSON lines or as a table.
 ///
 /// # Errors
 /// As [`print`].
 fn print_rows(rows: &[ExperimentRow], columns: &[String], json: bool) -> Result<(), CliError> {
-    if json {
-        return rows.iter().try_for_each(|row| print(&format!("{}\n", serde_json::json!(row))));
-    }
-    if rows.is_empty() {
-        return Ok(());
-    }
-    let all: BTreeSet<&String> = rows.iter().flat_map(|row| row.keys()).collect();
-    let columns: Vec<&String> =
-        if columns.is_empty() { all.into_iter().collect() } else { columns.iter().collect() };
-    let header = columns.iter().map(ToString::to_string).collect();
-    let cells = rows.iter().map(|row| columns.iter().map(|column| format_cell(row.get(*column))).collect());
-    let lines: Vec<Vec<String>> = std::iter::once(header).chain(cells).collect();
-    print(&TextTable::fitted(&lines, |_| true))
-}
-
-fn format_cell(value: Option<&Value>) -> String {
-    match value {
-        None | Some(Value::Null) => "-".to_owned(),
-        Some(Value::String(text)) => text.clone(),
-        Some(Value::Number(number)) => number.as_f64().map_or(number.to_string(), |x| {
-            format!("{x:.5}").trim_end_matches('0').trim_end_matches('.').to_owned()
-        }),
-        Some(other) => other.to_string(),
+    match json {
+        true => rows.iter().try_for_each(|row| print(&format!("{}\n", serde_json::json!(row)))),
+        false => print(&experiment::table(rows, columns)),
     }
 }
