@@ -5,7 +5,7 @@
 ---@class softvt.Suite
 ---@field name string Name in results; part of the seed.
 ---@field object_type "deformable"|"rigid" Mechanics of the objects.
----@field variation "object"|"spatial" Difference between the tasks.
+---@field tasks_differ_in "object"|"spatial" Difference between the tasks.
 ---@field needs? "nothing"|"size"|"touch" What a controller has to know of an instance to grip it safely, as softvt list suites prints it: "nothing" but its kind, its "size", or what only "touch" tells. softvt scripts/blind_bounds.lua estimates it.
 ---@field episodes? integer Default number of episodes per task. Expects a whole number in 1..1000000. Default 5.
 ---@field tasks softvt.Task[] The tasks, in order.

@@ -33,7 +33,7 @@ end
 return softvt.suite {
   name = "object_hidden",
   object_type = "deformable",
-  variation = "object",
+  tasks_differ_in = "object",
   needs = "touch",
   episodes = 5,
   tasks = tasks,

@@ -17,7 +17,7 @@ end
 return softvt.suite {
   name = "object_rigid",
   object_type = "rigid",
-  variation = "object",
+  tasks_differ_in = "object",
   needs = "nothing",
   episodes = 5,
   tasks = tasks,

@@ -30,7 +30,7 @@ end
 return softvt.suite {
   name = "object_soft",
   object_type = "deformable",
-  variation = "object",
+  tasks_differ_in = "object",
   needs = "nothing",
   episodes = 5,
   tasks = tasks,

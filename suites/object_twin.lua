@@ -7,7 +7,7 @@ return softvt.suite {
   name = "object_twin",
   object_type = "rigid",
   twin_of = soft.name,
-  variation = soft.variation,
+  tasks_differ_in = soft.tasks_differ_in,
   needs = "nothing",
   episodes = soft.episodes,
   tasks = soft.tasks,

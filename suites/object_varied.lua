@@ -6,7 +6,7 @@ local standard = require "variations.standard"
 return softvt.suite {
   name = "object_varied",
   object_type = "deformable",
-  variation = "object",
+  tasks_differ_in = "object",
   needs = "size",
   episodes = 5,
   tasks = object_soft.tasks,

@@ -1,4 +1,4 @@
--- Suites under conditions of one changed factor each, compared with the unmodified reference at the same tasks, initial states and
+-- Suites under conditions of one changed factor each, compared with the reference at the same tasks, initial states and
 -- seeds. Writes one table per suite, conditions.json, and an ordinary run folder per condition.
 --
 --   softvt suites/shifts.lua

@@ -28,7 +28,7 @@ end
 return softvt.suite {
   name = "spatial_hidden",
   object_type = "deformable",
-  variation = "spatial",
+  tasks_differ_in = "spatial",
   needs = "touch",
   episodes = 5,
   tasks = tasks,

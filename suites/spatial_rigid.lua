@@ -22,7 +22,7 @@ end
 return softvt.suite {
   name = "spatial_rigid",
   object_type = "rigid",
-  variation = "spatial",
+  tasks_differ_in = "spatial",
   needs = "nothing",
   episodes = 5,
   tasks = tasks,

@@ -27,7 +27,7 @@ end
 return softvt.suite {
   name = "spatial_soft",
   object_type = "deformable",
-  variation = "spatial",
+  tasks_differ_in = "spatial",
   needs = "nothing",
   episodes = 5,
   tasks = tasks,

@@ -6,7 +6,7 @@ local standard = require "variations.standard"
 return softvt.suite {
   name = "spatial_varied",
   object_type = "deformable",
-  variation = "spatial",
+  tasks_differ_in = "spatial",
   needs = "size",
   episodes = 5,
   tasks = spatial_soft.tasks,

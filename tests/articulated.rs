@@ -27,7 +27,7 @@ local layout = softvt.layout("kitchen", function(scene)
   scene:add { name = "stove", asset = stove, at = { 0, -0.3 }, joints = { knob = 1 } }
   scene:add { name = "bowl", asset = bowl, at = { 0, 0.2 - 0.0805 - 0.06 }, on = "cabinet.top_drawer" }
 end)
-return softvt.suite { name = "kitchen", object_type = "rigid", variation = "spatial", tasks = { softvt.task {
+return softvt.suite { name = "kitchen", object_type = "rigid", tasks_differ_in = "spatial", tasks = { softvt.task {
   prompt = "wait", layout = layout, goal = softvt.on { object = "bowl", target = "stove" },
 } } }
 "#;

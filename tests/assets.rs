@@ -279,7 +279,7 @@ fn stacks(stacks: &[&[&str]]) -> Vec<Scene> {
           local goal = softvt.on {{ object = \"mark\", target = \"table\" }}
           tasks[#tasks + 1] = softvt.task {{ prompt = table.concat(names, \" under \"), layout = layout, goal = goal }}
         end
-        return softvt.suite {{ name = \"stacks\", object_type = \"rigid\", variation = \"object\", tasks = tasks }}",
+        return softvt.suite {{ name = \"stacks\", object_type = \"rigid\", tasks_differ_in = \"object\", tasks = tasks }}",
         list.join(", ")
     );
     let path = folder.path().join("stacks.lua");

@@ -26,7 +26,7 @@ end)
 return softvt.suite {
   name = "my_suite",
   object_type = "deformable", -- or "rigid"
-  variation = "object",       -- or "spatial": what varies between the tasks
+  tasks_differ_in = "object",       -- or "spatial": what varies between the tasks
   episodes = 5,
   tasks = {
     softvt.task {

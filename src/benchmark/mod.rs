@@ -41,7 +41,7 @@ impl Teacher {
 /// The factor that varies between the tasks of a suite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Variation {
+pub enum TaskDifference {
     /// Tasks differ in the object.
     Object,
     /// Tasks differ in the layout.
@@ -134,7 +134,7 @@ pub struct Suite {
     /// Kind of its objects.
     pub object_type: ObjectType,
     /// Factor that varies between its tasks.
-    pub variation: Variation,
+    pub tasks_differ_in: TaskDifference,
     /// What a safe grip needs, if the suite states it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub needs: Option<NeededKnowledge>,
@@ -179,10 +179,10 @@ impl From<ShiftValue> for (String, f64) {
     }
 }
 
-/// Name of the run without changes, next to those under conditions.
+/// Name of the reference: the run of a suite as it is, next to those under conditions.
 pub const REFERENCE: &str = "reference";
 
-/// A named set of changes under which suites are run in addition to the unchanged reference.
+/// A named set of changes under which suites are run in addition to the reference.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Condition {
     /// Name, as in results.

@@ -9,7 +9,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::{
-    stored_run::StoredRun,
+    stored_run::{StoredRun, records_as},
     terminal::{TaskName, task_names},
 };
 use softvt_benchmark::run_changes::RunChanges;
@@ -145,9 +145,7 @@ fn with_twins_paired(first: &[StoredRun], second: &[StoredRun]) -> ([Vec<StoredR
                 "{} is the rigid twin of {original}; their episodes are paired by task and episode",
                 run.suite()
             ));
-            for record in &mut run.records {
-                record.header.id.suite.clone_from(&original);
-            }
+            run.records = records_as(&run.records, &original);
         }
     }
     (sides, pairing)
@@ -460,11 +458,11 @@ fn probability(p: f64) -> String {
     if p < 0.001 { "<0.001".to_owned() } else { format!("{p:.3}") }
 }
 
-fn signed(value: Option<f64>, digits: usize) -> String {
+pub(super) fn signed(value: Option<f64>, digits: usize) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{value:+.digits$}"))
 }
 
-fn interval(bounds: Option<[f64; 2]>, digits: usize) -> String {
+pub(super) fn interval(bounds: Option<[f64; 2]>, digits: usize) -> String {
     bounds.map_or_else(|| "–".to_owned(), |[low, high]| format!("[{low:+.digits$}, {high:+.digits$}]"))
 }
 

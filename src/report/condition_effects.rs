@@ -1,11 +1,12 @@
-//! Effects of conditions: runs with one changed factor against the unchanged run of the same suite, policy and seed, on
+//! Effects of conditions: runs with one changed factor against the reference of the same suite, policy and seed, on
 //! the same episodes. A rigid twin is a condition of its soft original.
 
 use std::collections::BTreeMap;
 
 use super::{
+    comparison::{interval, signed},
     run_summary::RunSummary,
-    stored_run::ConditionLabel,
+    stored_run::{ConditionLabel, records_as},
     tables::{ResultTable, strings},
 };
 use softvt_evaluation::statistics::Rate;
@@ -19,7 +20,7 @@ use softvt_records::{
 #[derive(Clone, Debug)]
 pub struct ConditionEffects {
     pub suite: String,
-    /// Name of the unchanged run.
+    /// Name of the reference.
     pub method: String,
     /// In the order of factors and values.
     pub effects: Vec<ConditionEffect>,
@@ -28,7 +29,7 @@ pub struct ConditionEffects {
     pub mean_safety: PairedDifference,
 }
 
-/// A condition against the unchanged run.
+/// A condition against the reference.
 #[derive(Clone, Debug)]
 pub struct ConditionEffect {
     pub change: ConditionLabel,
@@ -39,15 +40,11 @@ pub struct ConditionEffect {
 }
 
 /// The records of a run under the name of the soft original.
-fn records_of_original(run: &RunSummary) -> Vec<EpisodeRecord> {
-    let mut records = run.run.records.clone();
-    for record in &mut records {
-        run.run.original_suite().clone_into(&mut record.header.id.suite);
-    }
-    records
+fn records_of_original(RunSummary { run, .. }: &RunSummary) -> Vec<EpisodeRecord> {
+    records_as(&run.records, run.original_suite())
 }
 
-/// The effects of all conditions among `runs` whose unchanged run is there too, exactly once.
+/// The effects of all conditions among `runs` whose reference is there too, exactly once.
 pub fn condition_effects(runs: &[RunSummary]) -> Vec<ConditionEffects> {
     let mut groups: BTreeMap<_, Vec<&RunSummary>> = BTreeMap::new();
     for run in runs {
@@ -57,8 +54,8 @@ pub fn condition_effects(runs: &[RunSummary]) -> Vec<ConditionEffects> {
 }
 
 fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
-    let mut unchanged = group.iter().filter(|run| run.run.condition().is_none());
-    let (reference, None) = (unchanged.next()?, unchanged.next()) else { return None };
+    let mut references = group.iter().filter(|run| run.run.condition().is_none());
+    let (reference, None) = (references.next()?, references.next()) else { return None };
     let reference_records = records_of_original(reference);
     let mut effects = Vec::new();
     let mut changed: BTreeMap<_, Vec<EpisodeRecord>> = BTreeMap::new();
@@ -109,11 +106,12 @@ fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
 }
 
 /// A difference with its interval and sign.
-fn signed(difference: &PairedDifference, digits: usize) -> String {
-    let interval = difference
-        .interval95
-        .map_or(String::new(), |[low, high]| format!(" [{low:+.digits$}, {high:+.digits$}]"));
-    difference.difference.map_or_else(|| "–".to_owned(), |value| format!("{value:+.digits$}{interval}"))
+fn signed_with_interval(difference: &PairedDifference, digits: usize) -> String {
+    let value = signed(difference.difference, digits);
+    match (difference.difference, difference.interval95) {
+        (Some(_), bounds @ Some(_)) => format!("{value} {}", interval(bounds, digits)),
+        _ => value,
+    }
 }
 
 /// The table of all effects; `None` without any.
@@ -127,9 +125,9 @@ pub fn effects_table(effects: &[ConditionEffects]) -> Option<ResultTable> {
                 name.clone(),
                 effect.change.label.clone(),
                 pairs.to_string(),
-                signed(goal, 1),
-                signed(safety, 1),
-                signed(d_over_tau, 2),
+                signed_with_interval(goal, 1),
+                signed_with_interval(safety, 1),
+                signed_with_interval(d_over_tau, 2),
             ]);
         }
         if suite.effects.len() > 1 {
@@ -137,14 +135,14 @@ pub fn effects_table(effects: &[ConditionEffects]) -> Option<ResultTable> {
                 name,
                 format!("mean of {} conditions", suite.effects.len()),
                 suite.mean_goal.n.to_string(),
-                signed(&suite.mean_goal, 1),
-                signed(&suite.mean_safety, 1),
+                signed_with_interval(&suite.mean_goal, 1),
+                signed_with_interval(&suite.mean_safety, 1),
                 "–".to_owned(),
             ]);
         }
     }
     (!rows.is_empty()).then(|| ResultTable {
-        caption: "Change from the unchanged run on the same episodes, percentage points, with 95 % intervals: of single conditions by Agresti and Min, of means by the bootstrap over episodes.".to_owned(),
+        caption: "Change from the reference on the same episodes, percentage points, with 95 % intervals: of single conditions by Agresti and Min, of means by the bootstrap over episodes.".to_owned(),
         head: strings(["Suite", "Condition", "Episodes", "Δ Goal", "Δ Safety", "Δ D/τ"]),
         rows,
     })
@@ -177,8 +175,8 @@ impl ConditionEffects {
         self.effects.chunk_by(|a, b| a.change.factor == b.change.factor).filter_map(of_factor).collect()
     }
 
-    /// Goal and Safety Success of the unchanged run, percent.
-    pub fn unchanged(&self) -> [Option<f64>; 2] {
+    /// Goal and Safety Success of the reference, percent.
+    pub fn reference(&self) -> [Option<f64>; 2] {
         let first = self.effects.first().map(|effect| &effect.differences);
         [first.and_then(|first| first.goal.first), first.and_then(|first| first.safety.first)]
     }
@@ -214,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn conditions_are_paired_with_the_unchanged_run() {
+    fn conditions_are_paired_with_the_reference() {
         let runs = summarize_runs(vec![
             run("a", &[], None, &[true, true, true, false]),
             run("b", &[("mass", 2.5)], None, &[false, false, true, false]),
@@ -238,6 +236,6 @@ mod tests {
         assert_eq!(table.rows.len(), 4);
         assert!(table.rows[1][4].starts_with("-50.0 ["), "{:?}", table.rows);
         assert_eq!(table.rows[3][1], "mean of 3 conditions");
-        assert!(condition_effects(&runs[1..3]).is_empty(), "there is no unchanged run");
+        assert!(condition_effects(&runs[1..3]).is_empty(), "there is no reference");
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::comparison;
+use super::{comparison, stored_run::records_as};
 use softvt_benchmark::ShiftValue;
 use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
 use softvt_evaluation::statistics::{Distribution, Rate};
@@ -31,16 +31,9 @@ pub struct ConditionOutcome {
 impl ConditionOutcome {
     /// Results of `records`, compared with those of the reference.
     pub fn new(folder: String, records: &[EpisodeRecord], reference: Option<&[EpisodeRecord]>) -> Self {
-        // The twin of a suite has a name of its own in results. Within a table, task and episode identify the pair.
-        let renamed = |record: &EpisodeRecord, name: &str| {
-            let mut record = record.clone();
-            record.header.id.suite = name.to_owned();
-            record
-        };
         let paired = reference.map(|reference| {
             let name = reference.first().map_or("", |record| &record.header.id.suite);
-            let own: Vec<EpisodeRecord> = records.iter().map(|record| renamed(record, name)).collect();
-            PairedComparison::from_pairs(&pair_episodes(reference, &own))
+            PairedComparison::from_pairs(&pair_episodes(reference, &records_as(records, name)))
         });
         let scores = GroupScores::from_records(&records.iter().collect::<Vec<_>>());
         Self {

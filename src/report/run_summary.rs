@@ -23,7 +23,7 @@ pub struct UnsafeEpisode<'a> {
     pub reason: String,
 }
 
-/// Summarises runs, sorted by suite. A run under conditions follows its unchanged run, in the order of factors and
+/// Summarises runs, sorted by suite. A run under conditions follows its reference, in the order of factors and
 /// values. A folder given twice counts once.
 pub fn summarize_runs(mut runs: Vec<StoredRun>) -> Vec<RunSummary> {
     let mut seen = BTreeSet::new();
@@ -156,7 +156,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn conditions_follow_their_unchanged_run_in_the_order_of_values() {
+    fn conditions_follow_their_reference_in_the_order_of_values() {
         let run = |dir: &str, policy: &str, shift: Option<(&str, f64)>| {
             let mut run = stored(dir, policy, vec![sample_record()]);
             run.manifest["shifts"] = json!(shift.into_iter().collect::<Vec<_>>());

@@ -69,6 +69,13 @@ pub fn remove_folder(manifest: &mut Value) {
     }
 }
 
+/// Records under the name of another suite. A rigid twin is paired with its soft original by task and episode.
+pub(super) fn records_as(records: &[EpisodeRecord], suite: &str) -> Vec<EpisodeRecord> {
+    let mut records = records.to_vec();
+    records.iter_mut().for_each(|record| suite.clone_into(&mut record.header.id.suite));
+    records
+}
+
 /// The changes that a run makes to its suite, as tables and plots name them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConditionLabel {
@@ -159,7 +166,7 @@ impl StoredRun {
         Some(ConditionLabel { factor: factor.to_owned(), value, label })
     }
 
-    /// Settings that the run under a condition and its unchanged run share.
+    /// Settings that the run under a condition and its reference share.
     pub fn condition_group(&self) -> [String; 5] {
         let text = |field: &str| self.text(field).to_owned();
         let RunChanges { seed, vary, .. } = self.changes();

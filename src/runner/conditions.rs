@@ -1,4 +1,4 @@
-//! `softvt.conditions`: every suite unchanged and under each condition, one run folder each, and their comparison.
+//! `softvt.conditions`: every suite as it is (the reference) and under each condition, one run folder each, and their comparison.
 
 use std::path::{Path, PathBuf};
 
@@ -24,7 +24,7 @@ use softvt_script::{ExpertGrip, LoadedScript};
 /// Name of the file with the comparison of all suites, in the folder above all runs.
 pub const FILE: &str = "conditions.json";
 
-/// A suite under one condition, or the unchanged reference.
+/// A suite under one condition, or the reference.
 struct ConditionCase {
     condition: Condition,
     /// Folder of the run, relative to that of all runs.
@@ -35,7 +35,7 @@ struct ConditionCase {
     not_applicable: Option<String>,
 }
 
-/// Runs every suite of a script unchanged and under each of its conditions, into folders below `out`. All scenes and folders are
+/// Runs every suite of a script as it is and under each of its conditions, into folders below `out`. All scenes and folders are
 /// checked before the first episode runs. `on_suite` is called with the tables so far after each suite. Returns the table of each
 /// suite.
 ///

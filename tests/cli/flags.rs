@@ -358,7 +358,7 @@ fn a_disturbance_moves_the_robot_and_not_its_commands() {
 #[test]
 fn a_rigid_twin_is_paired_with_its_soft_original() {
     let text = Small { task: "budget_steps = 1", ..Small::default() }.text();
-    let twin = "local soft = require \"x\"\nreturn softvt.suite { name = \"one_twin\", object_type = \"rigid\", twin_of = soft.name, variation = soft.variation, episodes = soft.episodes, tasks = soft.tasks }\n";
+    let twin = "local soft = require \"x\"\nreturn softvt.suite { name = \"one_twin\", object_type = \"rigid\", twin_of = soft.name, tasks_differ_in = soft.tasks_differ_in, episodes = soft.episodes, tasks = soft.tasks }\n";
     let conditions = "return softvt.conditions { name = \"c\", suites = { (require \"x\") }, conditions = { { name = \"twin\", rigid_twin = true } } }\n";
     let project = Project::new(&[("x.lua", &text), ("twin.lua", twin), ("c.lua", conditions)]);
     project.succeeds("x.lua --policy noop --out soft");

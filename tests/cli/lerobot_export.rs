@@ -10,7 +10,7 @@ local layout = softvt.layout("one", function(scene)
   scene:add { name = "shelf", asset = solids.shelf, position = solids.shelf_at }
   scene:add { name = "cube", asset = solids.cube, position = solids.cube_at }
 end)
-return softvt.suite { name = "one", object_type = "rigid", variation = "spatial", episodes = 1, tasks = {
+return softvt.suite { name = "one", object_type = "rigid", tasks_differ_in = "spatial", episodes = 1, tasks = {
   softvt.task { prompt = "wait", layout = layout, goal = softvt.on { object = "cube", target = "shelf" }, budget_steps = 30,
     expert = function(arm) solids.push(arm) arm:wait(1) end },
 } }

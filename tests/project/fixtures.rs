@@ -16,7 +16,7 @@ local function task(prompt)
   return softvt.task { prompt = prompt, layout = layout, goal = softvt.on { object = "cube", target = "shelf" }, budget_steps = 30,
     expert = function(arm, scene) solids.push(arm) arm:wait(1) end }
 end
-return softvt.suite { name = "one", object_type = "rigid", variation = "spatial", episodes = 1,
+return softvt.suite { name = "one", object_type = "rigid", tasks_differ_in = "spatial", episodes = 1,
   tasks = { task "wait", task "wait longer" } }
 "#;
 
@@ -29,7 +29,7 @@ local layout = softvt.layout("one", function(scene)
   scene:add { name = "shelf", asset = solids.shelf, position = solids.shelf_at }
   scene:add { name = "cube", asset = solids.cube, position = beside and { 0, 0.35, 0 } or solids.cube_at }
 end)
-return softvt.suite { name = "one", object_type = "rigid", variation = "spatial", episodes = 1, tasks = {
+return softvt.suite { name = "one", object_type = "rigid", tasks_differ_in = "spatial", episodes = 1, tasks = {
   softvt.task { prompt = "wait", layout = layout, goal = softvt.on { object = "cube", target = "shelf" }, budget_steps = 30,
     expert = function(arm, scene) solids.push(arm) arm:wait(1) end },
 } }

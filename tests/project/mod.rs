@@ -123,7 +123,7 @@ local layout = softvt.layout("one", function(scene)
   scene:add {{ name = "cube", asset = cube, {at} }}
   scene:add {{ name = "post", asset = floor, position = {{ 0, 2, 0 }} }}
 end)
-return softvt.suite {{ name = "one", object_type = "deformable", variation = "spatial", episodes = 1, tasks = {{
+return softvt.suite {{ name = "one", object_type = "deformable", tasks_differ_in = "spatial", episodes = 1, tasks = {{
   softvt.task {{ prompt = "wait", layout = layout, goal = softvt.on {{ object = "cube", target = "post" }},
     {task},
     expert = function(arm, scene) {expert} end }},

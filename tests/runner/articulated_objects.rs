@@ -19,7 +19,7 @@ local layout = softvt.layout("one", function(scene)
   scene:add {{ name = "block", asset = block, at = {{ 0, 0.03 }}, on = "chest.tray" }}
   assert(scene:object("chest").joints.tray == 0.05)
 end)
-return softvt.suite {{ name = "one", object_type = "rigid", variation = "spatial", episodes = 1, tasks = {{
+return softvt.suite {{ name = "one", object_type = "rigid", tasks_differ_in = "spatial", episodes = 1, tasks = {{
   softvt.task {{ prompt = "wait", layout = layout, budget_steps = 40, goal = softvt.on {{ object = "block", target = "{target}" }},
     expert = function(arm, scene) {expert} end }},
 }} }}
@@ -44,7 +44,7 @@ local layout = softvt.layout("one", function(scene)
   scene:add {{ name = "chest", asset = chest, position = {{ x, y, 0.24 }} }}
   scene:add {{ name = "block", asset = solids.cube, position = solids.cube_at }}
 end)
-return softvt.suite {{ name = "one", object_type = "rigid", variation = "spatial", episodes = 1, tasks = {{
+return softvt.suite {{ name = "one", object_type = "rigid", tasks_differ_in = "spatial", episodes = 1, tasks = {{
   softvt.task {{ prompt = "push", layout = layout, budget_steps = 40, goal = softvt.on {{ object = "block", target = "{target}" }},
     expert = function(arm) solids.push(arm) arm:wait(1) end }},
 }} }}

@@ -11,7 +11,7 @@ local layout = softvt.layout("cheat", function(scene)
   scene:add {{ name = "floor", asset = solids.floor, position = {{ 0, 0, 0 }} }}
   {add}
 end)
-return softvt.suite {{ name = "cheat", object_type = "rigid", variation = "spatial", episodes = 1, tasks = {{
+return softvt.suite {{ name = "cheat", object_type = "rigid", tasks_differ_in = "spatial", episodes = 1, tasks = {{
   softvt.task {{ prompt = "cheat", layout = layout, budget_steps = 20, goal = {goal} }},
 }} }}
 "#

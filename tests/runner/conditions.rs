@@ -1,4 +1,4 @@
-//! Conditions: each suite unchanged and under each condition, compared episode by episode.
+//! Conditions: each suite as it is and under each condition, compared episode by episode.
 
 use std::{
     fs,
@@ -93,7 +93,7 @@ fn invalid_conditions_are_reported_before_anything_runs() {
         ),
         ("{ name = \"a\", shift = { mass = -1 } }", "shift mass: expected a number in 0.01..100"),
         ("{ name = \"a\" },\n{ name = \"a\" }", "is the name of another condition; give another"),
-        ("{ name = \"reference\" }", "\"reference\" is the name of the unchanged run; give another"),
+        ("{ name = \"reference\" }", "\"reference\" is the name of the run without changes; give another"),
         ("{ name = \"a b\" },\n{ name = \"a_b\" }", "share the folder a_b; rename one"),
         ("{ name = \"a\", mass = 2 }", "unknown key \"mass\""),
     ] {

@@ -42,7 +42,7 @@ fn placed(body: &str, add: &str) -> String {
         "local floor = softvt.asset {{ name = 'floor', shape = softvt.shape.box {{ size = {{ 1, 1, 0.05 }} }}:translate(0, 0, -0.025), body = softvt.static {{}} }}\n\
          local block = softvt.asset {{ name = 'block', shape = softvt.shape.box {{ size = {{ 0.04, 0.04, 0.04 }} }}:grounded(), body = {body} }}\n\
          local layout = softvt.layout('one', function(scene)\n{add}\nend)\n\
-         return softvt.suite {{ name = 'one', object_type = 'deformable', variation = 'spatial', episodes = 1, tasks = {{\n\
+         return softvt.suite {{ name = 'one', object_type = 'deformable', tasks_differ_in = 'spatial', episodes = 1, tasks = {{\n\
          softvt.task {{ prompt = 'wait', layout = layout, budget_steps = 1, goal = softvt.on {{ object = 'a', target = 'floor' }}, expert = function(arm) arm:wait(0.1) end }} }} }}"
     );
     Project::new(&[("x.lua", &text)]).run("x.lua").error()

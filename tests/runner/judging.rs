@@ -13,7 +13,7 @@ use crate::support::{Finished, Project, Run, SOLIDS, Small};
 const BLOCKS: &str = r#"
 local pick_place, layouts = require "experts.pick_place", require "layouts.spatial_soft"
 return softvt.suite {
-  name = "blocks", object_type = "rigid", variation = "spatial", episodes = 2,
+  name = "blocks", object_type = "rigid", tasks_differ_in = "spatial", episodes = 2,
   tasks = { softvt.task {
     prompt = "put the left block on the plate",
     layout = layouts.pair("block", 2),
@@ -70,7 +70,7 @@ local function task(on)
   return softvt.task {{ prompt = on, layout = layout, goal = softvt.on {{ object = "upper", target = on }}, budget_steps = 24,
     expert = function(arm) solids.push(arm) arm:wait(1) end }}
 end
-return softvt.suite {{ name = "stack", object_type = "deformable", variation = "spatial", episodes = 1, tasks = {{ task "lower", task "far" }} }}
+return softvt.suite {{ name = "stack", object_type = "deformable", tasks_differ_in = "spatial", episodes = 1, tasks = {{ task "lower", task "far" }} }}
 "#
     )
 }
@@ -129,7 +129,7 @@ end)
     let who = r#"return softvt.experiment { name = "who", grid = { x = { 1 } }, run = function()
   return { fingerprint = softvt.simulate { layout = layout }:measure "cube".fingerprint }
 end }"#;
-    let suite = r#"return softvt.suite { name = "one", object_type = "deformable", variation = "spatial", episodes = 2, tasks = {
+    let suite = r#"return softvt.suite { name = "one", object_type = "deformable", tasks_differ_in = "spatial", episodes = 2, tasks = {
   softvt.task { prompt = "push", layout = layout, goal = softvt.on { object = "cube", target = "shelf" }, budget_steps = 24,
     expert = function(arm) solids.push(arm) arm:wait(1) end },
 }, shifts = { softvt.shift { name = "soft", default = 1, apply = function(scene, x)
@@ -187,7 +187,7 @@ local function task(layout)
   return softvt.task {{ prompt = layout.name, layout = layout, goal = softvt.on {{ object = "cube", target = "shelf" }}, budget_steps = 24,
     expert = function(arm) solids.push(arm) arm:wait(1) end }}
 end
-return softvt.suite {{ name = "one", object_type = "deformable", variation = "spatial", episodes = 4, tasks = {{ task(drawn), task(changed) }} }}
+return softvt.suite {{ name = "one", object_type = "deformable", tasks_differ_in = "spatial", episodes = 4, tasks = {{ task(drawn), task(changed) }} }}
 "#
     );
     let who = r#"

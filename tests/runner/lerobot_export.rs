@@ -53,7 +53,7 @@ local function task(prompt)
       arm:wait(1)
     end }
 end
-return softvt.suite { name = "one", object_type = "rigid", variation = "spatial", episodes = 1,
+return softvt.suite { name = "one", object_type = "rigid", tasks_differ_in = "spatial", episodes = 1,
   tasks = { task("wait a while"), task("wait for it") } }
 "#;
 

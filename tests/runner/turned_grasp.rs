@@ -18,7 +18,7 @@ local layout = softvt.layout("between_posts", function(scene)
   end
 end)
 return softvt.suite {
-  name = "turned", object_type = "deformable", variation = "object", episodes = 1,
+  name = "turned", object_type = "deformable", tasks_differ_in = "object", episodes = 1,
   tasks = { softvt.task {
     prompt = "put the loaf on the plate", layout = layout,
     goal = softvt.on { object = "loaf", target = "plate", hold_s = 0.4 },

@@ -225,7 +225,7 @@ pub(super) fn trends(suite: &ConditionEffects) -> Markup {
             @for trend in suite.trends() {
                 div {
                     p.suite { (trend.factor) }
-                    (trend_plot(&trend, suite.unchanged()))
+                    (trend_plot(&trend, suite.reference()))
                 }
             }
         }
@@ -285,7 +285,7 @@ fn mark(series: &Series, at: &str, height: f64) -> Markup {
     html! { rect x=(at) y=(y(height)) width=(MARK) height=(MARK) rx=(series.mark_radius) transform=(offset) {} }
 }
 
-fn trend_plot(trend: &FactorTrend, unchanged: [Option<f64>; 2]) -> Markup {
+fn trend_plot(trend: &FactorTrend, reference: [Option<f64>; 2]) -> Markup {
     let points = &trend.points;
     let (low, high) = (points[0].value, points[points.len() - 1].value);
     let is_log = low > 0.0 && high / low >= LOG_RATIO;
@@ -306,7 +306,7 @@ fn trend_plot(trend: &FactorTrend, unchanged: [Option<f64>; 2]) -> Markup {
             (rate_axis(40.0))
             svg.plot width="100%" height=(PLOT_HEIGHT + 40.0) role="img" aria-label=(label) {
                 (rate_grid())
-                @for (series, unchanged) in SERIES.iter().zip(unchanged) { (trend_series(series, points, at, unchanged)) }
+                @for (series, reference) in SERIES.iter().zip(reference) { (trend_series(series, points, at, reference)) }
                 @for value in labelled {
                     text.tick x=(x(at(value))) y=(y(PLOT_HEIGHT + 16.0)) text-anchor="middle" { (format_number(value)) }
                 }
@@ -318,12 +318,12 @@ fn trend_plot(trend: &FactorTrend, unchanged: [Option<f64>; 2]) -> Markup {
     }
 }
 
-/// The line of the unchanged run, and the rate at each value with its interval.
+/// The line of the reference, and the rate at each value with its interval.
 fn trend_series(
     series: &Series,
     points: &[TrendPoint],
     at: impl Fn(f64) -> f64,
-    unchanged: Option<f64>,
+    reference: Option<f64>,
 ) -> Markup {
     let [right, down] = series.shift;
     let rates: Vec<(String, f64, [f64; 2])> = points
@@ -334,8 +334,8 @@ fn trend_series(
         })
         .collect();
     html! {
-        @if let Some(height) = unchanged.map(|rate| y(level(rate) + down)) {
-            g class=(series.class) { line.unchanged x1="0" x2="100%" y1=(height) y2=(height) {} }
+        @if let Some(height) = reference.map(|rate| y(level(rate) + down)) {
+            g class=(series.class) { line.reference x1="0" x2="100%" y1=(height) y2=(height) {} }
         }
         g class=(series.class) transform=(format!("translate({right} {down})")) {
             @for pair in rates.windows(2) { line x1=(pair[0].0) x2=(pair[1].0) y1=(y(pair[0].1)) y2=(y(pair[1].1)) {} }

@@ -112,7 +112,7 @@ fn results(runs: &[RunSummary]) -> Markup {
     }
 }
 
-/// Effects of changed factors; `None` without a run under a condition and its unchanged run.
+/// Effects of changed factors; `None` without a run under a condition and its reference.
 fn conditions(runs: &[RunSummary]) -> Option<Markup> {
     let effects = condition_effects(runs);
     let effects_table = effects_table(&effects)?;
@@ -123,7 +123,7 @@ fn conditions(runs: &[RunSummary]) -> Option<Markup> {
                 (figures::trends(suite))
                 figcaption {
                     "Goal and Safety Success, % of the episodes, over the value of each factor: " (suite.suite) ", " (suite.method)
-                    ". Values are in the unit of the shift or setting. Whiskers are 95 % Wilson intervals; dashed lines are the unchanged run. Marks are shifted so that both rates are visible."
+                    ". Values are in the unit of the shift or setting. Whiskers are 95 % Wilson intervals; dashed lines are the reference. Marks are shifted so that both rates are visible."
                 }
             }
         }

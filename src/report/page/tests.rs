@@ -148,9 +148,9 @@ fn trends_have_intervals_and_named_axes() {
     let panels: Vec<&str> = figure.split("class=\"axes\"").skip(1).collect();
     let [mass, stiffness] = panels[..] else { panic!("two factors: {figure}") };
     for panel in panels {
-        // Two rates at two values, each with an interval, and the unchanged run.
+        // Two rates at two values, each with an interval, and the reference.
         assert_eq!(
-            (panel.matches("whisker").count(), panel.matches("class=\"unchanged\"").count()),
+            (panel.matches("whisker").count(), panel.matches("class=\"reference\"").count()),
             (4, 2),
             "{panel}"
         );
@@ -158,7 +158,7 @@ fn trends_have_intervals_and_named_axes() {
     }
     assert!(mass.contains("value of mass<") && mass.find(">1.25<") < mass.find(">2.5<"), "{mass}");
     assert!(stiffness.contains("value of stiffness, log scale<"), "{stiffness}");
-    // The unchanged run comes first in the tables and figures.
+    // The reference comes first in the tables and figures.
     assert!(page.find("pi · mass=1.25") < page.find("pi · mass=2.5"), "{page}");
     assert!(page.find("<td class=\"text\">pi</td>") < page.find("pi · mass=1.25"), "{page}");
 }

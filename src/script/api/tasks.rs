@@ -12,7 +12,7 @@ use crate::{
     vm::{error::fail, value::describe},
 };
 use softvt_benchmark::{
-    NeededKnowledge, ObjectType, REFERENCE, Teacher, Variation,
+    NeededKnowledge, ObjectType, REFERENCE, TaskDifference, Teacher,
     variation::{FactorRange, HiddenRanges, VariationRanges},
 };
 
@@ -33,7 +33,7 @@ pub(crate) const SETTINGS_CLASS: &str = "softvt.Settings";
 choice! { ObjectType { "deformable" => Deformable, "rigid" => Rigid } }
 choice! { NeededKnowledge { "nothing" => Nothing, "size" => Size, "touch" => Touch } }
 choice! { Teacher { "expert" => Expert, "tactile-servo" => TactileServo } }
-choice! { Variation { "object" => Object, "spatial" => Spatial } }
+choice! { TaskDifference { "object" => Object, "spatial" => Spatial } }
 
 record! {
     /// The layout of a scene. Tasks with the same layout name share their initial states.
@@ -139,7 +139,7 @@ record! {
         /// Mechanics of the objects.
         object_type: ObjectType;
         /// Difference between the tasks.
-        variation: Variation;
+        tasks_differ_in: TaskDifference;
         /// What a controller has to know of an instance to grip it safely, as softvt list suites prints it: "nothing" but its
         /// kind, its "size", or what only "touch" tells. softvt scripts/blind_bounds.lua estimates it.
         needs: Option<NeededKnowledge>;
@@ -342,7 +342,7 @@ fn check_conditions(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<(
     let mut names = vec![REFERENCE.to_owned()];
     for (index, ConditionSpec { name, .. }) in conditions.into_iter().enumerate() {
         if names.contains(&name) {
-            let of = if name == REFERENCE { "the unchanged run" } else { "another condition" };
+            let of = if name == REFERENCE { "the run without changes" } else { "another condition" };
             let message = format!("{name:?} is the name of {of}; give another");
             let path = vec!["conditions".into(), format!("[{}]", index + 1), "name".into()];
             return Err(error_at_key(lua, record.label, &ValidationError { path, message }));

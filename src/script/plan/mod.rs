@@ -32,8 +32,8 @@ use crate::{
 };
 use options::{OptionSession, OptionSpec, SharedOptions};
 use softvt_benchmark::{
-    Condition, Goal, GoalKind, ObjectType, Plan, Shift, ShiftValue, Suite, Task, Variation, seed::SecretSeed,
-    settings::Settings,
+    Condition, Goal, GoalKind, ObjectType, Plan, Shift, ShiftValue, Suite, Task, TaskDifference,
+    seed::SecretSeed, settings::Settings,
 };
 use softvt_common::{parallel::lock, text::unknown_name};
 
@@ -378,9 +378,9 @@ pub(crate) fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Su
         let message = format!("suite.tasks: suite {name:?} has no tasks; give at least one");
         return Err(fail_at_key(lua, &spec.table, "tasks", message));
     }
-    let budget = match spec.variation {
-        Variation::Object => 700,
-        Variation::Spatial => 500,
+    let budget = match spec.tasks_differ_in {
+        TaskDifference::Object => 700,
+        TaskDifference::Spatial => 500,
     };
     let mut tasks: Vec<Task> = Vec::new();
     let mut known = BTreeMap::new();
@@ -412,7 +412,7 @@ pub(crate) fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Su
     Ok(Suite {
         name,
         object_type: spec.object_type,
-        variation: spec.variation,
+        tasks_differ_in: spec.tasks_differ_in,
         needs: spec.needs,
         episodes: spec.episodes,
         tasks,

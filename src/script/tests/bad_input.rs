@@ -300,7 +300,7 @@ fn an_invalid_plan_is_reported_at_the_line_that_made_it() {
             &format!(
                 "local layout = softvt.layout('l', function() end)\nlocal function task(prompt, goal)\n\
                  return softvt.task {{ prompt = prompt, layout = layout,\n  goal = goal }}\nend\n\
-                 return softvt.suite {{ name = 's', object_type = 'rigid', variation = 'spatial',\n  tasks = {tasks} }}"
+                 return softvt.suite {{ name = 's', object_type = 'rigid', tasks_differ_in = 'spatial',\n  tasks = {tasks} }}"
             ),
         )]);
         project.error("x.lua", &[])

@@ -213,7 +213,7 @@ fn unreachable_goals_are_reported_at_their_line() {
              local sky = softvt.asset {{ name = 'sky', shape = mat.shape, body = softvt.scenery {{}} }}\n\
              local all = softvt.layout('all', function(scene) for i, asset in ipairs {{ ball, mat, chest, sky }} do\n\
              scene:add {{ name = asset.name, asset = asset, at = {{ i, 0 }} }} end end)\n\
-             return softvt.suite {{ name = 'test', object_type = 'rigid', variation = 'object', tasks = {{ softvt.task {{\n\
+             return softvt.suite {{ name = 'test', object_type = 'rigid', tasks_differ_in = 'object', tasks = {{ softvt.task {{\n\
              prompt = 'p', layout = all, goal = softvt.on {{ -- a comment\n object = '{object}',\n target = '{target}' }} }} }} }}"
         );
         let project = project(&text);
@@ -302,7 +302,7 @@ fn an_expert_that_gives_up_is_done_and_its_reason_is_kept() {
 
 #[test]
 fn an_object_can_stand_on_another() {
-    let text = "return softvt.suite { name = 'test', object_type = 'rigid', variation = 'object', tasks = { softvt.task {\n\
+    let text = "return softvt.suite { name = 'test', object_type = 'rigid', tasks_differ_in = 'object', tasks = { softvt.task {\n\
         prompt = 'p', goal = softvt.on { object = 'a', target = 'b' }, layout = softvt.layout('two', function(scene)\n\
         scene:add { name = 'b', asset = ball, at = { 0.1, 0 } }\n\
         scene:add { name = 'a', asset = ball, at = { 0.1, 0 }, on = 'b' }\nend) } } }";

@@ -24,7 +24,7 @@ fn suite(chest: &str, place: &str) -> String {
         "{chest}local ball = softvt.asset {{ name = 'ball', shape = softvt.shape.sphere {{ radius = 0.02 }}:grounded(), body = softvt.rigid {{ density = 300 }} }}\n\
          local layout = softvt.layout('one', function(scene)\n\
          {place} scene:add {{ name = 'marble', asset = ball, at = {{ 0.5, 0 }} }}\nend)\n\
-         return softvt.suite {{ name = 'test', object_type = 'rigid', variation = 'spatial', tasks = {{ softvt.task {{\n\
+         return softvt.suite {{ name = 'test', object_type = 'rigid', tasks_differ_in = 'spatial', tasks = {{ softvt.task {{\n\
          prompt = 'p', layout = layout, goal = softvt.on {{ object = 'marble', target = 'chest.drawer' }} }} }} }}"
     )
 }

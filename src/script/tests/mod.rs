@@ -86,7 +86,7 @@ local layout = softvt.layout("one", function(scene, rng)
 end)
 local function suite(expert, shifts)
   return softvt.suite {
-    name = "test", object_type = "deformable", variation = "spatial", shifts = shifts,
+    name = "test", object_type = "deformable", tasks_differ_in = "spatial", shifts = shifts,
     tasks = { softvt.task {
       prompt = "lift the ball", layout = layout, expert = expert,
       goal = softvt.on { object = "ball", target = "mat" },

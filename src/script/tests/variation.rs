@@ -23,7 +23,7 @@ local function suite(build, vary, type)
   local function task(name)
     return softvt.task { prompt = "lift " .. name, layout = layout, goal = softvt.on { object = name, target = "mat" } }
   end
-  return softvt.suite { name = "test", object_type = type or "deformable", variation = "spatial", vary = vary, tasks = { task "left", task "right" } }
+  return softvt.suite { name = "test", object_type = type or "deformable", tasks_differ_in = "spatial", vary = vary, tasks = { task "left", task "right" } }
 end
 local function pair(scene, rng)
   for k, name in ipairs { "left", "right" } do scene:add { name = name, asset = soft, at = { 0.1 * k + rng:uniform(0, 0.01), 0 } } end
