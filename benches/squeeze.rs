@@ -4,8 +4,7 @@
 //! [`ROUNDS`] runs: other load on the machine lengthens the wall clock, not this.
 //! `cargo bench --bench squeeze -- "gap 42"` runs the cases whose names contain the words.
 
-use std::time::Instant;
-
+use cpu_time::ThreadTime;
 use softvt::{
     geometry::{Pose, Vec3, mass::mass_properties, samples::SampleSpec, shape::Shape},
     physics::{
@@ -107,14 +106,14 @@ impl Scene {
         let mut out = Outcome::default();
         let mut begun = 0.0;
         for (phase, end) in self.ends().into_iter().enumerate() {
-            let start = CpuClock::now();
+            let start = ThreadTime::now();
             while self.world.time() + 0.5 * self.world.params.dt < end {
                 self.step();
                 out.newton += self.world.solver_stats().newton_steps;
                 out.factored += self.world.solver_stats().factorizations;
                 out.newton_max = out.newton_max.max(self.world.solver_stats().max_newton_steps);
             }
-            out.cpu[phase] = start.elapsed();
+            out.cpu[phase] = start.elapsed().as_secs_f64();
             out.simulated[phase] = self.world.time() - begun;
             begun = self.world.time();
             if phase == 0 {
@@ -129,27 +128,6 @@ impl Scene {
 
 fn pad_pose(side: f64, x: f64, z: f64) -> Pose {
     Pose::translation(side * (x + PAD_HALF.x), 0.0, 0.5 * EDGE + z)
-}
-
-/// CPU time of this thread where the system tells it (Linux), else the wall clock.
-struct CpuClock(Instant, Option<f64>);
-
-impl CpuClock {
-    fn now() -> Self {
-        Self(Instant::now(), Self::thread())
-    }
-
-    fn thread() -> Option<f64> {
-        let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-        Some(text.split_whitespace().next()?.parse::<f64>().ok()? * 1e-9)
-    }
-
-    fn elapsed(&self) -> f64 {
-        match (self.1, Self::thread()) {
-            (Some(start), Some(end)) => end - start,
-            _ => self.0.elapsed().as_secs_f64(),
-        }
-    }
 }
 
 fn report(case: &Case) {
@@ -181,9 +159,9 @@ fn report_asleep(case: &Case) {
         scene.world.step().expect("a resting cube is well behaved");
     }
     assert!(scene.world.soft(scene.body).is_asleep(), "the cube should sleep after 3 s at rest");
-    let start = CpuClock::now();
+    let start = ThreadTime::now();
     (0..seconds(200.0)).for_each(|_| scene.world.step().expect("a sleeping cube is well behaved"));
-    println!("{:<28} {:.6}", "asleep", start.elapsed() / 200.0);
+    println!("{:<28} {:.6}", "asleep", start.elapsed().as_secs_f64() / 200.0);
 }
 
 fn main() {

@@ -1,8 +1,7 @@
 -- Spatial-Hidden: two objects of one kind, one of which is to be put on the plate, as in Spatial-Soft. How stiff, brittle, heavy and
 -- slippery each is does not show, and differs between the two and from episode to episode.
-local pick_place = require "experts.pick_place"
+local hidden = require "hidden"
 local layouts = require "layouts.spatial_soft"
-local shifts = require "shifts"
 
 local objects = {
   { asset = "spiral_roll", description = "white spiral pastry with ridged frosting", sides = { "right", "left" } },
@@ -20,25 +19,9 @@ for k, object in ipairs(objects) do
       prompt = ("pick up the %s %s and place it on the plate"):format(side, object.description),
       layout = layout,
       goal = softvt.on { object = side, target = "plate", hold_s = 0.4 },
-      expert = pick_place { object = side, target = "plate", stop = "touch", window = 0.1, closing_speed = 0.003 },
+      expert = hidden.pick_place(side, "plate"),
     }
   end
 end
 
-return softvt.suite {
-  name = "spatial_hidden",
-  object_type = "deformable",
-  tasks_differ_in = "spatial",
-  needs = "touch",
-  episodes = 5,
-  tasks = tasks,
-  shifts = shifts.soft,
-  teacher = "tactile-servo",
-  vary = require "variations.hidden",
-  settings = {
-    -- Noise of a real GelSight Mini (docs/tactile.md).
-    tactile = { wear = { noise_px = 0.1, image_noise = 0.7 } },
-    -- An object must not slip in the hand by more than 2 mm while it is carried.
-    criteria = { require_no_slip = true },
-  },
-}
+return hidden.suite { name = "spatial_hidden", tasks_differ_in = "spatial", tasks = tasks }

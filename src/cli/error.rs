@@ -24,7 +24,8 @@ pub(crate) enum Exit {
 
 /// An error that ends a command: an exit code and a message for standard error.
 ///
-/// It is no [`std::error::Error`], so that every such error can become one by `?`: an error of the input, unless it is a [`RunError`] with another cause.
+/// It does not implement [`std::error::Error`]. So `?` turns every error that does into a [`CliError`]: an error of the input,
+/// or of the policy or an interrupt if a [`RunError`] says so.
 #[derive(Debug)]
 pub(crate) struct CliError {
     pub exit: Exit,

@@ -7,7 +7,7 @@ pub(crate) const OPEN_FORCE: f64 = -1.0;
 /// hand that is commanded to the measured width would exert no force.
 pub(crate) fn two_widths(closures: &[f64], is_closed: &[bool]) -> Vec<f64> {
     let closed = closures.iter().zip(is_closed).filter(|(_, is_closed)| **is_closed);
-    let held = median(closed.map(|(closure, _)| *closure).collect());
+    let held = lower_median(closed.map(|(closure, _)| *closure).collect());
     is_closed.iter().map(|is_closed| if *is_closed { held } else { 0.0 }).collect()
 }
 
@@ -15,7 +15,7 @@ pub(crate) fn two_widths(closures: &[f64], is_closed: &[bool]) -> Vec<f64> {
 /// reaches the median of all closed steps, the label is that median, since it is what the hand closes to.
 pub(crate) fn forces(force_after_n: &[f64], is_closed: &[bool]) -> Vec<f64> {
     let closed = force_after_n.iter().zip(is_closed).filter(|(_, is_closed)| **is_closed);
-    let held = median(closed.map(|(force, _)| *force).filter(|force| *force > 0.0).collect());
+    let held = lower_median(closed.map(|(force, _)| *force).filter(|force| *force > 0.0).collect());
     let mut is_held = false;
     let label = |(force, is_closed): (&f64, &bool)| {
         is_held = *is_closed && (is_held || *force >= held);
@@ -29,7 +29,7 @@ pub(crate) fn forces(force_after_n: &[f64], is_closed: &[bool]) -> Vec<f64> {
 }
 
 /// The median, the lower one of an even number of values; 0 without values.
-fn median(mut values: Vec<f64>) -> f64 {
+fn lower_median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len().saturating_sub(1) / 2).copied().unwrap_or(0.0)
 }

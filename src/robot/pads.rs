@@ -118,7 +118,7 @@ impl ContactSurface for PadSurface {
         Aabb { min: Vec3::new(-half.x, -half.y, -self.thickness), max: half }
     }
 
-    fn solid(&self) -> Option<CollisionGeometry> {
+    fn collision_geometry(&self) -> Option<CollisionGeometry> {
         Some(CollisionGeometry::Gel(self.samples(GEL_SPACING)))
     }
 }

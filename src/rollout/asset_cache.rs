@@ -134,7 +134,9 @@ impl AssetCache {
             stiffness: world.rigid_surface_stiffness(),
             bounds: self.bounds(shape),
             base_of: None,
-            solid: Some(of_shape(&self.solids, shape, || Arc::new(self.collision_geometry(shape)))),
+            collision_geometry: Some(of_shape(&self.solids, shape, || {
+                Arc::new(self.collision_geometry(shape))
+            })),
         }
     }
 

@@ -169,11 +169,11 @@ fn check_thickness(name: &str, shape: &Shape, material: &SoftMaterial) -> Result
     let mm = |metres: f64| format_number((1e5 * metres).round() / 100.0);
     let needed = (long / thin * (1.0 - 1e-6)).ceil();
     let fix = if needed <= SoftMaterial::MAX_RESOLUTION as f64 {
-        format!("resolution = {needed} would serve")
+        format!("give resolution = {needed}")
     } else {
         let least = mm(long / SoftMaterial::MAX_RESOLUTION as f64);
         format!(
-            "no resolution up to {} would serve; make it at least {least} mm thick",
+            "no resolution up to {} is fine enough; make it at least {least} mm thick",
             SoftMaterial::MAX_RESOLUTION
         )
     };

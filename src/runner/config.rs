@@ -288,8 +288,7 @@ impl RunConfig {
         self.episodes.unwrap_or(suite.episodes)
     }
 
-    /// Name of a suite in results. A suite that `vary` varies and a rigid twin have names of their own, though the
-    /// places of their objects are those of the suite.
+    /// Name of a suite in results. It has a suffix if `vary` or the rigid twin changes the objects, whose places stay.
     pub fn suite_name(&self, suite: &Suite) -> String {
         let varied = if self.vary.is_some() { "_varied" } else { "" };
         let twin = if self.rigid_twin { "_rigid_twin" } else { "" };

@@ -232,7 +232,7 @@ impl FromStr for PolicySource {
 /// Checks the name of a profile, or the end of the path of its file.
 ///
 /// # Errors
-/// Neither; the message is a fragment.
+/// The word is neither a known name nor the path of a Lua file. The message continues "invalid value".
 pub fn parse_profile(word: &str) -> Result<String, String> {
     let known = PROFILES.map(|(name, _)| name);
     if word.ends_with(".lua") || known.contains(&word) {

@@ -23,8 +23,8 @@ fn empty_shapes_are_reported_with_their_asset() {
 #[test]
 fn shapes_thinner_than_a_voxel_are_refused() {
     let refusal = |shape| Small { shape, ..Small::default() }.project().run("x.lua").error();
-    assert_snapshot!(refusal("softvt.shape.box { size = { 0.04, 0.04, 0.0001 } }:grounded()"), @"x.lua:6: asset cube: it is 0.1 mm thick, thinner than a voxel: at resolution 6 they are 6.67 mm; no resolution up to 64 would serve; make it at least 0.63 mm thick");
-    assert_snapshot!(refusal("softvt.shape.box { size = { 0.04, 0.04, 0.003 } }:grounded()"), @"x.lua:6: asset cube: it is 3 mm thick, thinner than a voxel: at resolution 6 they are 6.67 mm; resolution = 14 would serve");
+    assert_snapshot!(refusal("softvt.shape.box { size = { 0.04, 0.04, 0.0001 } }:grounded()"), @"x.lua:6: asset cube: it is 0.1 mm thick, thinner than a voxel: at resolution 6 they are 6.67 mm; no resolution up to 64 is fine enough; make it at least 0.63 mm thick");
+    assert_snapshot!(refusal("softvt.shape.box { size = { 0.04, 0.04, 0.003 } }:grounded()"), @"x.lua:6: asset cube: it is 3 mm thick, thinner than a voxel: at resolution 6 they are 6.67 mm; give resolution = 14");
     let project = Small {
         shape: "softvt.mesh { file = 'm.obj' }:grounded()",
         material: "youngs_pa = 2e4, poisson = 0.3, density = 300, resolution = 5",
@@ -33,7 +33,7 @@ fn shapes_thinner_than_a_voxel_are_refused() {
     .project();
     project
         .write("m.obj", b"v 0 0 0\nv .05 0 0\nv 0 .05 0\nv 0 0 .004\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
-    assert_snapshot!(project.run("x.lua").error(), @"x.lua:6: asset cube: it is 4 mm thick, thinner than a voxel: at resolution 5 they are 10 mm; resolution = 13 would serve");
+    assert_snapshot!(project.run("x.lua").error(), @"x.lua:6: asset cube: it is 4 mm thick, thinner than a voxel: at resolution 5 they are 10 mm; give resolution = 13");
 }
 
 /// A small scene of a floor and the objects that `add` places on it, from line 4 on.

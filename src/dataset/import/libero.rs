@@ -57,9 +57,10 @@ pub(super) fn demo(reader: DemoReader, header: &Header) -> Result<ForeignDemo, D
             tool_pose::check_first_pose(reader, recorded)?;
             (goals(&delayed(&recorded.poses), &steps), "steps away from the recorded poses of the tool")
         }
-        (None, None) => {
-            (steps.clone(), "steps away from where our own tool is: the file has neither joints nor poses")
-        }
+        (None, None) => (
+            steps.clone(),
+            "steps away from where the tool is in softvt: the file has neither joints nor poses",
+        ),
     };
     let objects = states.first().zip(model.as_ref()).and_then(|(state, model)| model.object_poses(state));
     Ok(ForeignDemo {

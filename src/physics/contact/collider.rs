@@ -24,7 +24,7 @@ pub trait ContactSurface: Debug + Send + Sync {
     /// A box around the solid.
     fn bounds(&self) -> Aabb;
     /// Geometry for contact with other colliders. Without it, the surface touches soft bodies only.
-    fn solid(&self) -> Option<CollisionGeometry> {
+    fn collision_geometry(&self) -> Option<CollisionGeometry> {
         None
     }
 }
@@ -42,7 +42,7 @@ impl ContactSurface for Shape {
         Self::bounds(self)
     }
 
-    fn solid(&self) -> Option<CollisionGeometry> {
+    fn collision_geometry(&self) -> Option<CollisionGeometry> {
         Some(CollisionGeometry::new(self))
     }
 }
@@ -144,7 +144,7 @@ pub struct Collider {
     /// touches that articulation's links.
     pub base_of: Option<ArticulationId>,
     /// Geometry for contact with other colliders; without it, only soft bodies touch the collider.
-    pub solid: Option<Arc<CollisionGeometry>>,
+    pub collision_geometry: Option<Arc<CollisionGeometry>>,
 }
 
 impl Collider {
@@ -158,7 +158,7 @@ impl Collider {
         stiffness: SurfaceStiffness,
     ) -> Self {
         let bounds = surface.bounds();
-        let solid = surface.solid().map(Arc::new);
+        let collision_geometry = surface.collision_geometry().map(Arc::new);
         Self {
             name: name.to_owned(),
             parent: parent.into(),
@@ -168,7 +168,7 @@ impl Collider {
             stiffness,
             bounds,
             base_of: None,
-            solid,
+            collision_geometry,
         }
     }
 

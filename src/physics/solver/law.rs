@@ -38,7 +38,7 @@ impl ContactLaw {
     /// Response of a point at relative velocity `v`; `None` if the point is separated and carried no normal impulse
     /// in the previous pass.
     ///
-    /// Normal: the spring at the end of the step with dissipation, `γ = dt k (−φ − (dt + τ) v_n)₊`. Tangent: with
+    /// Normal: the spring at the end of the step with dissipation, `γ = dt k (−gap − (dt + τ) v_n)₊`. Tangent: with
     /// `z = s + (dt + τ) v_t` the spring `−dt k_t z`, cut off at the lagged bound `μ γ_n` (a Huber cost in `z`).
     #[inline]
     pub(super) fn contact(&self, point: &ContactPoint, v: &Vec3) -> Option<ContactResponse> {

@@ -45,7 +45,7 @@ impl World {
             let (a, b) = (a.min(b), a.max(b));
             let [first, second] = [self.collider(a), self.collider(b)];
             let placed = |id: ColliderId| {
-                let shape = self.collider(id).solid.as_deref()?;
+                let shape = self.collider(id).collision_geometry.as_deref()?;
                 Some(Placed { shape, pose: self.motions[id.index()].pose })
             };
             let depth = CollisionGeometry::depth(placed(a)?, placed(b)?);

@@ -96,7 +96,10 @@ impl World {
         self.near_pairs(&mut contacts.pairs);
         for &ColliderPair { a, b, margin } in &contacts.pairs {
             let (first, second) = (self.collider(a), self.collider(b));
-            let (Some(solid_a), Some(solid_b)) = (&first.solid, &second.solid) else { continue };
+            let (Some(solid_a), Some(solid_b)) = (&first.collision_geometry, &second.collision_geometry)
+            else {
+                continue;
+            };
             contacts.found.clear();
             let placed = |shape, id: ColliderId| Placed { shape, pose: self.motions[id.index()].pose };
             let (placed_a, placed_b) = (placed(&**solid_a, a), placed(&**solid_b, b));
@@ -125,7 +128,7 @@ impl World {
     pub(super) fn near_pairs(&self, pairs: &mut Vec<ColliderPair>) {
         pairs.clear();
         let ids: Vec<ColliderId> = (0..self.colliders.len())
-            .filter(|&i| self.colliders[i].solid.is_some())
+            .filter(|&i| self.colliders[i].collision_geometry.is_some())
             .map(ColliderId::new)
             .collect();
         let boxes: Vec<GroupedAabb> = ids.iter().map(|&id| self.swept_box(id)).collect();

@@ -42,7 +42,7 @@ impl PrivilegedAccess {
     /// Grants or refuses further access, as the policy has declared.
     ///
     /// # Errors
-    /// At the first use so far, if the policy is not privileged.
+    /// The policy declares itself not privileged, and its script has used privileged functions: the error of the first use.
     pub(crate) fn declare(&self, is_privileged: bool) -> mlua::Result<()> {
         let decided = if is_privileged { Access::Granted } else { Access::Refused };
         match std::mem::replace(&mut *lock(&self.0), decided) {
