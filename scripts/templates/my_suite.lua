@@ -26,7 +26,7 @@ end)
 return softvt.suite {
   name = "my_suite",
   object_type = "deformable", -- or "rigid"
-  tasks_differ_in = "object",       -- or "spatial": what varies between the tasks
+  tasks_differ_in = "object", -- or "spatial": what differs between the tasks
   episodes = 5,
   tasks = {
     softvt.task {

@@ -23,6 +23,7 @@ const WIDTH_WITH_FORCE: usize = 8;
 const NO_FORCE: f64 = -1.0;
 
 /// Error of reading recorded actions.
+#[allow(missing_docs, reason = "the messages describe the variants")]
 #[derive(Debug, thiserror::Error)]
 pub enum ActionsError {
     #[error(transparent)]

@@ -30,8 +30,11 @@ const POLICY_WIDTH: usize = 40;
 /// Differences of one task.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TaskDifferences {
+    /// Name of the suite.
     pub suite: String,
+    /// Index of the task in the suite.
     pub task: usize,
+    /// Instruction of the task.
     pub prompt: String,
     /// Asset of the object.
     pub asset: String,
@@ -72,6 +75,7 @@ pub struct Comparison {
 }
 
 /// Error of comparing two runs.
+#[allow(missing_docs, reason = "the messages describe the variants")]
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
     #[error(

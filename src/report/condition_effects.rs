@@ -19,23 +19,28 @@ use softvt_records::{
 /// The conditions of a suite and a policy.
 #[derive(Clone, Debug)]
 pub struct ConditionEffects {
+    /// Name of the suite in results.
     pub suite: String,
     /// Name of the reference.
     pub method: String,
     /// In the order of factors and values.
     pub effects: Vec<ConditionEffect>,
-    /// Mean over all conditions, Goal and Safety Success, percentage points; intervals over episodes.
+    /// Mean change of Goal Success over all conditions, percentage points; its interval is over episodes.
     pub mean_goal: PairedDifference,
+    /// Mean change of Safety Success, as `mean_goal`.
     pub mean_safety: PairedDifference,
 }
 
 /// A condition against the reference.
 #[derive(Clone, Debug)]
 pub struct ConditionEffect {
+    /// The changed factor.
     pub change: ConditionLabel,
-    /// Goal and Safety Success under the condition.
+    /// Goal Success under the condition.
     pub goal: Rate,
+    /// Safety Success under the condition.
     pub safety: Rate,
+    /// The condition minus the reference, on the same episodes.
     pub differences: PairedComparison,
 }
 
@@ -151,14 +156,20 @@ pub fn effects_table(effects: &[ConditionEffects]) -> Option<ResultTable> {
 /// Values of a factor with at least two, for its trend.
 #[derive(Clone, Debug)]
 pub struct FactorTrend {
+    /// Name of the factor.
     pub factor: String,
+    /// One point per value, in their order.
     pub points: Vec<TrendPoint>,
 }
 
+/// The rates at one value of a factor.
 #[derive(Clone, Copy, Debug)]
 pub struct TrendPoint {
+    /// Value of the factor.
     pub value: f64,
+    /// Goal Success.
     pub goal: Rate,
+    /// Safety Success.
     pub safety: Rate,
 }
 

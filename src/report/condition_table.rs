@@ -17,10 +17,15 @@ use softvt_records::{
 pub struct ConditionOutcome {
     /// Its run folder, relative to that of all conditions.
     pub folder: String,
+    /// Number of episodes.
     pub episodes: usize,
+    /// Number of invalid episodes, which count as failed.
     pub invalid: usize,
+    /// Goal Success.
     pub goal_success_rate: Rate,
+    /// NoDrop.
     pub no_drop_rate: Rate,
+    /// Safety Success.
     pub safety_success_rate: Rate,
     /// Peak D divided by τ, of valid episodes that have both.
     pub d_over_tau: Distribution,
@@ -52,10 +57,13 @@ impl ConditionOutcome {
 /// One condition of a suite.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ConditionRow {
+    /// Name of the condition.
     pub condition: String,
     /// True for the rigid twin of the suite, paired with the reference by task and episode.
     pub rigid_twin: bool,
+    /// Shifts by name and value.
     pub shift: Vec<ShiftValue>,
+    /// Changed settings by path and value.
     pub set: Vec<(String, String)>,
     /// Policy in place of that of the reference; absent for the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -72,11 +80,13 @@ pub struct ConditionRow {
 /// A suite under all conditions, the reference first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ConditionTable {
+    /// Name of the suite in results.
     pub suite: String,
     /// Policy name with its privileged inputs.
     pub policy: String,
     /// True if targets deform, so that D/τ is defined.
     pub deformable: bool,
+    /// One row per condition.
     pub rows: Vec<ConditionRow>,
 }
 

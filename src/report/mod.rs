@@ -1,7 +1,7 @@
 //! Run folders and everything derived from them: result tables, HTML report, videos, and files in SoftVTBench's format.
 //!
-//! An internal crate: the runner and the command line use it, and other programs read the files.
-#![warn(unreachable_pub)]
+//! [`stored_run`] reads run folders, [`run_summary`] summarises them, and the other modules write what is made of them.
+#![warn(missing_docs, unreachable_pub)]
 
 pub mod actions;
 pub mod comparison;

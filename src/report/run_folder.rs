@@ -25,6 +25,7 @@ pub const SUMMARY: &str = "summary.json";
 pub(super) const EPISODE_FOLDERS: [&str; 4] = ["actions", "trace", "video", softvtbench_files::FOLDER];
 
 /// Error of using a run folder.
+#[allow(missing_docs, reason = "the messages describe the variants")]
 #[derive(Debug, thiserror::Error)]
 pub enum RunFolderError {
     /// `found` is a file of that run.
@@ -127,6 +128,7 @@ impl RunFolder {
         Ok((Self { dir: dir.into(), episodes }, records))
     }
 
+    /// The folder.
     pub fn path(&self) -> &Path {
         &self.dir
     }

@@ -10,7 +10,9 @@ use softvt_records::{record::EpisodeRecord, summary::SuiteSummary};
 /// A run with its results.
 #[derive(Clone, Debug)]
 pub struct RunSummary {
+    /// The run.
     pub run: StoredRun,
+    /// Its rates and distributions.
     pub summary: SuiteSummary,
     /// Policy, its privileged inputs, and what distinguishes this run from others of its suite.
     pub method: String,
@@ -19,7 +21,9 @@ pub struct RunSummary {
 /// An episode that is not safe.
 #[derive(Clone, Debug)]
 pub struct UnsafeEpisode<'a> {
+    /// Its record.
     pub record: &'a EpisodeRecord,
+    /// Why it is not safe.
     pub reason: String,
 }
 

@@ -20,6 +20,7 @@ use softvt_evaluation::thresholds::{ThresholdError, ThresholdFile};
 use softvt_records::{record::EpisodeRecord, summary::SuiteSummary};
 
 /// Error of merging shards.
+#[allow(missing_docs, reason = "the messages describe the variants")]
 #[derive(Debug, thiserror::Error)]
 pub enum MergeError {
     #[error(transparent)]

@@ -23,6 +23,7 @@ const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// Contents of a run folder.
 #[derive(Clone, Debug)]
 pub struct StoredRun {
+    /// The folder.
     pub dir: PathBuf,
     /// Contents of `run.json`.
     pub manifest: Value,
@@ -35,6 +36,7 @@ pub struct StoredRun {
 }
 
 /// Error of reading runs.
+#[allow(missing_docs, reason = "the messages describe the variants")]
 #[derive(Debug, thiserror::Error)]
 pub enum StoredRunError {
     #[error(transparent)]

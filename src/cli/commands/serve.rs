@@ -48,7 +48,7 @@ pub(crate) struct ServeArgs {
     /// List of episodes for clients that do not name one
     #[arg(long, value_name = "SPLIT", default_value = "validation")]
     split: EpisodeSplit,
-    /// Token that clients have to send as Authorization: Bearer TOKEN [default: the environment variable SOFTVT_TOKEN, if set]
+    /// Token that clients send as Authorization: Bearer TOKEN [default: the variable SOFTVT_TOKEN, if set]
     #[arg(long, value_name = "TOKEN", value_parser = parse_token)]
     token: Option<String>,
     /// Send clients the true state: poses, deformation, contact forces, limits, verdict
@@ -60,7 +60,7 @@ pub(crate) struct ServeArgs {
     /// Serve only these tasks: indices or parts of prompts, separated by commas
     #[arg(long = "task", value_name = "TASK", value_delimiter = ',')]
     tasks: Vec<String>,
-    /// Record the episodes that clients step to their end in a run folder; a list of suites has one folder per suite inside
+    /// Run folder of the episodes that clients step to their end; one inside per suite of a list
     #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     out: Option<PathBuf>,
     /// Continue the run in --out, if there is one

@@ -38,10 +38,13 @@ pub struct DebugFrame {
     pub frame: u32,
     /// Episode index in the task.
     pub exp_idx: u32,
+    /// Name of the suite.
     pub task_suite: String,
+    /// Index of the task in the suite.
     pub task_id: usize,
     /// True once the goal has held for the required time.
     pub success_now: bool,
+    /// Deformation of the target.
     #[serde(flatten)]
     pub shape: DebugShape,
 }
@@ -49,11 +52,13 @@ pub struct DebugFrame {
 /// Deformation of the target, with SoftVTBench's field names; % of the bounding-box diagonal, lengths in m.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DebugShape {
+    /// True if D was measured.
     pub fem_deformation_known: bool,
     /// [`V1_METRIC_ID`]; null when not known.
     pub fem_deformation_metric_id: Option<String>,
     /// Asset of the target.
     pub fem_deformation_asset: String,
+    /// Number of nodes of the target.
     pub fem_deformation_nodes: Option<usize>,
     /// Largest D over the physics steps of the control step, so that the peak of the frames is the peak of the rollout.
     pub fem_deformation_rms: Option<f64>,
@@ -96,6 +101,7 @@ impl DebugShape {
 }
 
 impl DebugFrame {
+    /// The entry of a control step of an episode.
     pub fn new(id: &EpisodeId, frame: u32, success_now: bool, shape: DebugShape) -> Self {
         Self {
             frame,

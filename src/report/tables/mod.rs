@@ -21,6 +21,7 @@ pub(super) const TEXT_COLUMNS: usize = 2;
 /// A table of results, as text cells.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ResultTable {
+    /// What the numbers are, above or below the table.
     pub caption: String,
     /// Column headings.
     pub head: Vec<String>,

@@ -50,6 +50,7 @@ const SAFE: Rgb8 = [94, 201, 140];
 const HARM: Rgb8 = [240, 96, 84];
 
 /// Why a video or still image cannot be written.
+#[allow(missing_docs, reason = "the messages describe the variants")]
 #[derive(Debug, thiserror::Error)]
 pub enum EpisodeVideoError {
     #[error(transparent)]

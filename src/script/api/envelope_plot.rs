@@ -77,73 +77,58 @@ fn window_ends(window: &SafeWindow) -> Vec<VerticalMark> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use softvt_evaluation::calibration::CalibrationMeasurements;
+    use softvt_evaluation::{calibration::CalibrationMeasurements, thresholds::ThresholdFile};
 
-    /// A sweep from 50 mm whose third squeeze is not stable, and hold trials that hold from 48 mm inward or wider.
-    fn measurements(widest_held_mm: f64) -> CalibrationMeasurements {
-        let row = |width_mm: f64, d_pct: f64, stable: bool| SweepRow {
-            width_mm,
-            closure: None,
-            d_pct,
-            d_v1_pct: Some(1.2 * d_pct),
-            force_n: 0.5 * (50.0 - width_mm),
-            strain_p95: Some(0.1 * d_pct),
-            min_det_f: 0.6,
-            node_speed_m_s: 1e-4,
-            both_pads: true,
-            slip_mm: 0.0,
-            stable,
-        };
-        let hold = |width_mm: f64| {
-            let held = if width_mm <= widest_held_mm { 5 } else { 2 };
-            HoldRow { width_mm, closure: None, trials: 5, held, slip_mm: 0.1, d_peak_pct: None }
-        };
-        CalibrationMeasurements {
-            stable_strain: Some(0.3),
-            holds: [49.0, 48.0, 47.0, 46.0].map(hold).into(),
-            sweep: vec![
-                row(50.0, 0.0, true),
-                row(48.0, 1.0, true),
-                row(46.0, 2.0, true),
-                row(44.0, 10.0 / 3.0, true),
-            ],
-            ..CalibrationMeasurements::default()
-        }
+    /// The envelope of a standard asset.
+    fn calibrated() -> Envelope {
+        let text = include_str!("../../../assets/calibration/braided_roll.json");
+        let mut file = ThresholdFile::parse(text, "braided_roll.json").expect("a calibration");
+        file.envelopes.remove("braided_roll").expect("its envelope")
     }
 
-    fn plotted(measurements: CalibrationMeasurements) -> String {
-        let envelope = Envelope::new(measurements, 0.5);
-        envelope_plot("bun", &envelope, envelope.limit(0.5))
+    fn plotted(envelope: &Envelope) -> String {
+        envelope_plot("bun", envelope, envelope.limit(0.5))
     }
 
     #[test]
     fn the_plot_shows_band_limits_and_every_row() {
-        let svg = plotted(measurements(48.0));
+        let mut envelope = calibrated();
+        let svg = plotted(&envelope);
         let count = |what: &str| svg.matches(what).count();
-        assert_eq!((count("<circle"), count("stroke-dasharray"), count("#d9efd9")), (4, 2, 1), "{svg}");
-        assert!(
-            svg.contains("48.0 mm, 1.00 N") && svg.contains("47.0 mm, 1.50 N") && svg.contains("τ 1.50 %")
-        );
+        assert_eq!(count("<circle"), envelope.sweep.len(), "{svg}");
+        assert_eq!((count("stroke-dasharray"), count("#d9efd9")), (2, 1), "{svg}");
+        for end in [envelope.window.loose, envelope.window.tight] {
+            let (width, force) = (end.width_mm.unwrap(), end.force_n.unwrap());
+            assert!(svg.contains(&format!("{width:.1} mm, {force:.2} N")), "{svg}");
+        }
+        let tau = envelope.limit(0.5).unwrap().tau_pct();
+        assert!(svg.contains(&format!("τ {tau:.2} %")), "{svg}");
         assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n") && !svg.contains("NaN"));
-        let empty = plotted(measurements(46.0));
-        assert_eq!(empty.matches("#d9efd9").count(), 0, "an empty window has no band");
+        envelope.window.tight = envelope.window.loose;
+        assert_eq!(plotted(&envelope).matches("#d9efd9").count(), 0, "an empty window has no band");
     }
 
     #[test]
     fn hold_trials_are_diamonds_and_the_axes_reach_to_all_that_held() {
-        let mut bending = measurements(48.0);
-        bending.holds.iter_mut().for_each(|row| row.d_peak_pct = Some(1.6));
-        assert_eq!(plotted(bending.clone()).matches("<polygon").count(), 4, "every hold trial is plotted");
-        let peak = |row: &HoldRow| Some(if row.held == row.trials { 9.0 } else { 99.0 });
-        bending.holds.iter_mut().for_each(|row| row.d_peak_pct = peak(row));
-        assert_eq!(plotted(bending).matches("<polygon").count(), 3);
+        let mut envelope = calibrated();
+        let diamonds = |envelope: &Envelope| plotted(envelope).matches("<polygon").count();
+        let held = envelope.holds.iter().filter(|row| row.all_held()).count();
+        assert!(held > 1 && held < envelope.holds.len());
+        envelope.holds.iter_mut().for_each(|row| row.d_peak_pct = Some(0.1));
+        assert_eq!(diamonds(&envelope), envelope.holds.len(), "every hold trial is plotted");
+        let peak = |row: &HoldRow| Some(if row.all_held() { 9.0 } else { 99.0 });
+        envelope.holds.iter_mut().for_each(|row| row.d_peak_pct = peak(row));
+        assert_eq!(diamonds(&envelope), held);
     }
 
     #[test]
     fn an_empty_or_single_row_envelope_is_plotted() {
-        assert!(plotted(CalibrationMeasurements::default()).contains("bun: no rows"));
-        let sweep = vec![measurements(48.0).sweep[1].clone()];
-        let svg = plotted(CalibrationMeasurements { sweep, ..CalibrationMeasurements::default() });
+        let empty = Envelope::new(CalibrationMeasurements::default(), 0.5);
+        assert!(plotted(&empty).contains("bun: no rows"));
+        let sweep = vec![calibrated().sweep[1].clone()];
+        let single =
+            Envelope::new(CalibrationMeasurements { sweep, ..CalibrationMeasurements::default() }, 0.5);
+        let svg = plotted(&single);
         assert!(svg.contains("<circle") && !svg.contains("NaN") && !svg.contains("inf"), "{svg}");
     }
 }

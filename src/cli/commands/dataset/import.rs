@@ -11,7 +11,7 @@ use crate::{
 };
 use softvt_runner::import::{self, ImportOptions};
 
-/// Re-execute demonstrations of robomimic, LIBERO, SoftVTBench or softvt in a suite, and record the safe ones that reach the goal
+/// Re-execute demonstrations of robomimic, LIBERO, SoftVTBench or softvt in a suite, and record the good ones
 #[derive(Args, Clone, Debug)]
 #[command(override_usage = "softvt dataset import [OPTIONS] --out <DIR> <FILE.lua> <FILE.hdf5>...")]
 pub(crate) struct ImportArgs {

@@ -57,7 +57,7 @@ pub(crate) struct ExportArgs {
     /// Output folder; must be new
     #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     out: PathBuf,
-    /// Grip code, the meaning of an action's seventh number: docs/policies.md [default: that of the recording, or continuous]
+    /// Grip code of the actions: docs/policies.md [default: that of the recording, or continuous]
     #[arg(long, value_name = "CODE")]
     gripper: Option<GripCode>,
     /// Export only these tasks: indices or parts of prompts, separated by commas
