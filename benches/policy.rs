@@ -1,9 +1,9 @@
 //! Round trips to a policy server on the loopback interface.
 //!
-//! `cargo bench --bench policy` prints, for each profile, the latency of a response beyond the server's own time: encoding,
-//! sending, receiving and decoding, over the replans of an episode in which the server holds the robot still. It also
-//! evaluates a slow server (200 ms per response, one at a time) with two workers, and prints the share of time in which that
-//! server was busy.
+//! `cargo bench --bench policy` prints, for each profile, the latency of a response beyond the server's own time:
+//! encoding, sending, receiving and decoding, over the replans of an episode in which the server holds the robot still.
+//! It also evaluates a slow server (200 ms per response, one at a time) with two workers, and prints the share of time
+//! in which that server was busy.
 
 mod episode;
 

@@ -1,9 +1,10 @@
-//! CPU time per image, in the first task of a suite as the expert solves it, with the complete robot, scene and soft bodies.
+//! CPU time per image, in the first task of a suite as the expert solves it, with the complete robot, scene and soft
+//! bodies.
 //!
-//! `cargo bench --bench render` prints milliseconds of CPU time per image next to the goals. Each of [`IMAGES`] states, spread
-//! evenly over the episode, is drawn [`ROUNDS`] times; the result is the mean over the states of the fastest time. The last
-//! column is the time of the first image, which fills the caches. Words after `--` select the lines that contain one of them.
-//! `cargo bench --bench render -- --png DIR` also writes images to a folder, one scene per layout.
+//! `cargo bench --bench render` prints milliseconds of CPU time per image next to the goals. Each of [`IMAGES`] states,
+//! spread evenly over the episode, is drawn [`ROUNDS`] times; the result is the mean over the states of the fastest
+//! time. The last column is the time of the first image, which fills the caches. Words after `--` select the lines that
+//! contain one of them. `cargo bench --bench render -- --png DIR` also writes images to a folder, one scene per layout.
 
 mod episode;
 

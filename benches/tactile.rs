@@ -1,5 +1,5 @@
-//! Time of the tactile sensor per finger: `cargo bench --bench tactile`. Reports the minimum of many rounds, which is hardly
-//! affected by other load on the machine.
+//! Time of the tactile sensor per finger: `cargo bench --bench tactile`. Reports the minimum of many rounds, which is
+//! hardly affected by other load on the machine.
 
 use std::{hint::black_box, time::Instant};
 

@@ -5,16 +5,17 @@
 //! cargo run --release --example fit_gelsight -- taxim/calib/gelsight_mini/dataPack.npz > assets/gelsight/mini.json
 //! ```
 //!
-//! The package (T. Schneider, MIT) holds 24 images, 640 × 480, of a ball pressed into a GelSight Mini, the contact circle of
-//! each, drawn by hand, and the untouched image. The circles are up to 26 px away from the visible dents. So each circle is
-//! first moved to the point where the colour of its image changes fastest, which is the ball's lowest point; its radius is
-//! kept. Within a circle the shape of the ball gives the slope at every pixel. Ridge regression then finds, for each channel,
-//! the coefficients of 20 monomials of the slope whose sum multiplies the untouched image.
+//! The package (T. Schneider, MIT) holds 24 images, 640 × 480, of a ball pressed into a GelSight Mini, the contact
+//! circle of each, drawn by hand, and the untouched image. The circles are up to 26 px away from the visible dents. So
+//! each circle is first moved to the point where the colour of its image changes fastest, which is the ball's lowest
+//! point; its radius is kept. Within a circle the shape of the ball gives the slope at every pixel. Ridge regression
+//! then finds, for each channel, the coefficients of 20 monomials of the slope whose sum multiplies the untouched
+//! image.
 //!
-//! The errors printed to stderr are of images left out of the fit, in four folds: every fourth image, a quarter of the images
-//! in the order they were taken (other places on the gel), and every fourth image with the circles not moved. The radius of
-//! the ball is not documented: 2 mm is the number in the package's own parameters; another may be given as the second
-//! argument (mm).
+//! The errors printed to stderr are of images left out of the fit, in four folds: every fourth image, a quarter of the
+//! images in the order they were taken (other places on the gel), and every fourth image with the circles not moved.
+//! The radius of the ball is not documented: 2 mm is the number in the package's own parameters; another may be given
+//! as the second argument (mm).
 
 use std::{error::Error, f64::consts::PI, ops::Range, path::Path};
 
@@ -242,7 +243,8 @@ fn fit(samples: &[&Sample]) -> Option<[DVector<f64>; 3]> {
     Some([channel(0)?, channel(1)?, channel(2)?])
 }
 
-/// Mean absolute error, of 255, of each fold of images under the fit to the other folds; `fold` maps an index to its fold.
+/// Mean absolute error, of 255, of each fold of images under the fit to the other folds; `fold` maps an index to its
+/// fold.
 fn held_out_error(presses: &[Vec<Sample>], fold: impl Fn(usize) -> usize) -> f64 {
     let error = |out: usize| {
         let of = |left_out: bool| {

@@ -2,18 +2,18 @@
 //!
 //! Each module is a crate, `softvt-geometry` to `softvt-cli`; this crate re-exports them. They form layers, and each
 //! uses only those before it: [`geometry`] → [`physics`] → [`scene`], [`robot`] → [`sensing`], [`evaluation`] →
-//! [`records`], [`benchmark`] → [`policy`] → [`rollout`] → [`dataset`] → [`report`], [`script`], [`serve`] → [`runner`] → [`cli`].
-//! `docs/architecture.md` draws them and follows one episode. All of them may use [`text`] (numbers and text in
-//! messages), [`files`] (atomic files), [`npy`] (numpy files), [`parallel`] (jobs on threads), [`cancel`] (requests to stop),
-//! [`episode_id`], [`range`] (ranges of numbers) and [`settings`](mod@settings) (the declaration of settings). [`sensing`] also
-//! uses [`signal`] (Fourier transforms, resizing of images).
+//! [`records`], [`benchmark`] → [`policy`] → [`rollout`] → [`dataset`] → [`report`], [`script`], [`serve`] → [`runner`]
+//! → [`cli`]. `docs/architecture.md` draws them and follows one episode. All of them may use [`text`] (numbers and text
+//! in messages), [`files`] (atomic files), [`npy`] (numpy files), [`parallel`] (jobs on threads), [`cancel`] (requests
+//! to stop), [`episode_id`], [`range`] (ranges of numbers) and [`settings`](mod@settings) (the declaration of
+//! settings). [`sensing`] also uses [`signal`] (Fourier transforms, resizing of images).
 //!
 //! Examples: a dropped cube and a squeezed cube in [`physics::world`], distances in [`geometry::shape`], kinematics
 //! in [`robot`], a rendered image in [`sensing::camera`], a tactile image in [`sensing::tactile`], the verdict on
 //! an episode in [`evaluation::judge`], a run of a suite in [`runner`]. `docs/library.md` has them together.
 //!
-//! The features `cli` and `runner` are on by default. Without `runner`, the crate has no Lua, datasets, reports or server, and
-//! [`rollout`] is the topmost layer.
+//! The features `cli` and `runner` are on by default. Without `runner`, the crate has no Lua, datasets, reports or
+//! server, and [`rollout`] is the topmost layer.
 //!
 //! Units are SI throughout; a name carries its unit where it is not SI or not obvious. Frames are suffixes:
 //! `_w` world, `_b` robot base, `_h` hand, `_p` pad, `_o` object.

@@ -1,4 +1,5 @@
-//! The shipped assets: size, material, mass, meshes, samples and stability; and the start states of the Spatial-Soft suite.
+//! The shipped assets: size, material, mass, meshes, samples and stability; and the start states of the Spatial-Soft
+//! suite.
 
 use std::{collections::BTreeMap, path::Path, sync::Arc};
 

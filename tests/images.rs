@@ -1,6 +1,7 @@
 //! Compares rendered images byte by byte with reviewed references in `tests/golden/camera`.
 //!
-//! After an intended change, regenerate the references with `.ci/regenerate golden-images` and look at them before committing.
+//! After an intended change, regenerate the references with `.ci/regenerate golden-images` and look at them before
+//! committing.
 
 use std::{path::PathBuf, sync::Arc};
 

@@ -1,5 +1,5 @@
-//! The forty tasks of the benchmark: prompts, object placement and its variation, disjoint splits, no overlaps. Scenes are
-//! opened but not simulated.
+//! The forty tasks of the benchmark: prompts, object placement and its variation, disjoint splits, no overlaps. Scenes
+//! are opened but not simulated.
 
 use std::{collections::BTreeSet, path::Path};
 

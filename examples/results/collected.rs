@@ -17,7 +17,8 @@ pub struct Results {
     pub script: String,
     /// True if the script runs all controllers, as conditions; otherwise each has a run of its own.
     pub has_conditions: bool,
-    /// Suites in the order of the script, as objects with `name` and `controllers`: objects with `name` and the fields of [`cell`].
+    /// Suites in the order of the script, as objects with `name` and `controllers`: objects with `name` and the fields
+    /// of [`cell`].
     pub suites: Vec<Value>,
 }
 

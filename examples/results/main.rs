@@ -1,9 +1,9 @@
 //! Writes the tables of results: `cargo run --release --example results -- FOLDER...`
 //!
-//! Each folder is the output of `softvt SCRIPT --out FOLDER`: of conditions (`suites/controllers.lua`), of a list of suites
-//! (`suites/all.lua`), or of one suite. The results of its runs replace those of the same suites and controllers in
-//! `docs/results/SCRIPT.json`, which are committed; to drop others, delete that file first. Then the tables in README.md and
-//! `docs/results/README.md` are written anew from these files, also without any folder.
+//! Each folder is the output of `softvt SCRIPT --out FOLDER`: of conditions (`suites/controllers.lua`), of a list of
+//! suites (`suites/all.lua`), or of one suite. The results of its runs replace those of the same suites and controllers
+//! in `docs/results/SCRIPT.json`, which are committed; to drop others, delete that file first. Then the tables in
+//! README.md and `docs/results/README.md` are written anew from these files, also without any folder.
 
 mod collected;
 mod tables;

@@ -25,8 +25,8 @@ pub fn replaced(readme: &str, tables: &str) -> Result<String, String> {
     }
 }
 
-/// One table per script: controllers × suites. Suites that an earlier table shows are left out. Results of another final state
-/// than `physics` are announced as those of an earlier version.
+/// One table per script: controllers × suites. Suites that an earlier table shows are left out. Results of another
+/// final state than `physics` are announced as those of an earlier version.
 pub fn overview(results: &[Results], labels: &Value, physics: &str) -> String {
     let table = |(index, one): (usize, &Results)| {
         let is_known = |suite: &Value| {

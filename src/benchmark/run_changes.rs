@@ -7,8 +7,8 @@ use sha2::{Digest, Sha256};
 use crate::ShiftValue;
 use softvt_common::text::hex;
 
-/// What a run changes of its suite, and the seed of its draws. Each field is the value of one flag and, under its name, a
-/// key of `run.json`.
+/// What a run changes of its suite, and the seed of its draws. Each field is the value of one flag and, under its name,
+/// a key of `run.json`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RunChanges {
     /// Options of the script as they were typed.
@@ -36,8 +36,8 @@ pub enum Twin {
 }
 
 impl RunChanges {
-    /// Keys of `run.json` that hold what the changes amount to, whatever files and options state them. Runs that agree in
-    /// them, in the version and in their files have the same conditions.
+    /// Keys of `run.json` that hold what the changes amount to, whatever files and options state them. Runs that agree
+    /// in them, in the version and in their files have the same conditions.
     pub const EFFECTS: [&'static str; 5] = ["twin", "variation", "shifts", "options", "settings"];
 
     /// The changes of the run with this `run.json`.
@@ -67,7 +67,8 @@ impl RunChanges {
         self.set.iter().map(|(path, value)| format!("{path}={value}"))
     }
 
-    /// The flags that state the changes, word by word, without the options of the script. The file of a secret is `FILE`.
+    /// The flags that state the changes, word by word, without the options of the script. The file of a secret is
+    /// `FILE`.
     pub fn flags(&self) -> Vec<String> {
         // The value of this flag follows an equals sign.
         let mut words: Vec<String> = self.vary.iter().map(|file| format!("--vary={file}")).collect();

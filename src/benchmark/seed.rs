@@ -117,12 +117,12 @@ fn sha256(parts: &[&[u8]]) -> [u8; 32] {
     hash.finalize().into()
 }
 
-/// Source of the random streams of an episode: all values on which its initial state depends. Tasks that share a layout share
-/// their initial states, except for the hidden properties of objects.
+/// Source of the random streams of an episode: all values on which its initial state depends. Tasks that share a layout
+/// share their initial states, except for the hidden properties of objects.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EpisodeSeed {
-    /// The episode. Hidden properties alone depend on its task, so that an attempt at one task of a mirrored pair does not reveal
-    /// those of the other.
+    /// The episode. Hidden properties alone depend on its task, so that an attempt at one task of a mirrored pair does
+    /// not reveal those of the other.
     pub id: EpisodeId,
     /// Name of the layout; the tasks of a mirrored pair share it.
     pub layout: String,
@@ -176,8 +176,8 @@ pub fn standard_normal(rng: &mut ChaCha8Rng) -> f64 {
     radius * (std::f64::consts::TAU * uniform(rng)).cos()
 }
 
-/// Roughly standard normal, from one number of the generator, for noise of many values: a binomial number of 48 trials and a
-/// uniform one in between. Mean 0, variance 1, never beyond 7.1.
+/// Roughly standard normal, from one number of the generator, for noise of many values: a binomial number of 48 trials
+/// and a uniform one in between. Mean 0, variance 1, never beyond 7.1.
 pub fn rough_normal(rng: &mut ChaCha8Rng) -> f64 {
     let bits = rng.next_u64();
     let count = (bits >> 16).count_ones();

@@ -162,8 +162,8 @@ impl Settings {
         serde_json::from_value(tree).map_err(refused)
     }
 
-    /// Checks the ranges of all parameters, and that the physics step divides [`CONTROL_DT`]. A step that was rounded to
-    /// a few decimals, such as 0.016667, becomes the exact one.
+    /// Checks the ranges of all parameters, and that the physics step divides [`CONTROL_DT`]. A step that was rounded
+    /// to a few decimals, such as 0.016667, becomes the exact one.
     ///
     /// # Errors
     /// The first parameter out of range.

@@ -43,11 +43,12 @@ impl FactorRange {
     }
 }
 
-/// Exponent of the stable strain over age: stale crumb is stiffer and cracks at a smaller strain. About 0.7 by the measurements
-/// of Cornford, Axford and Elton (1964) and Scanlon, Sapirstein and Fahloul (2000).
+/// Exponent of the stable strain over age: stale crumb is stiffer and cracks at a smaller strain. About 0.7 by the
+/// measurements of Cornford, Axford and Elton (1964) and Scanlon, Sapirstein and Fahloul (2000).
 const STALING_EXPONENT: f64 = 0.7;
 
-/// Largest share of its limit that an instance may deform by its own weight when it is carried. Beyond it no grip is reliably safe.
+/// Largest share of its limit that an instance may deform by its own weight when it is carried. Beyond it no grip is
+/// reliably safe.
 const MAX_CARRIED: f64 = 0.5;
 
 /// Draws of an object before its ranges count as empty.
@@ -145,8 +146,8 @@ impl VariationRanges {
     /// Draws the variation of an episode. Each factor has a stream of its own, except stiffness, density and friction,
     /// which are drawn from that of the material. Soft objects are drawn in the order of the scene.
     ///
-    /// With hidden properties, everything but size, colour and looks is drawn again until the window of the instance is within
-    /// `window_ratio`, so that neither size nor colour depends on what is hidden.
+    /// With hidden properties, everything but size, colour and looks is drawn again until the window of the instance is
+    /// within `window_ratio`, so that neither size nor colour depends on what is hidden.
     ///
     /// # Errors
     /// The scene has no soft object, or no instance can be kept.
@@ -183,8 +184,8 @@ impl VariationRanges {
         Ok(SceneVariation { objects, light, cameras })
     }
 
-    /// Draws `count` instances of an asset as episodes do, from streams of their own that no episode uses: the statistics of
-    /// the suite, for controllers that know these but not the instance.
+    /// Draws `count` instances of an asset as episodes do, from streams of their own that no episode uses: the
+    /// statistics of the suite, for controllers that know these but not the instance.
     ///
     /// # Errors
     /// No instance can be kept.

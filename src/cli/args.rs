@@ -162,7 +162,8 @@ impl Request {
 // The policy, and how it is connected. A doc comment would replace the description of the commands.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct PolicyArgs {
-    /// Policy: a name (softvt list policies), Lua file, server such as ws://host:8000 or run [default: expert or teacher]
+    /// Policy: a name (softvt list policies), Lua file, server such as ws://host:8000 or run [default: expert or
+    /// teacher]
     #[arg(long, value_name = "POLICY")]
     policy: Option<PolicySource>,
     #[command(flatten)]
@@ -223,7 +224,8 @@ impl PolicyArgs {
         PolicyOptions { source, ..self.options() }
     }
 
-    /// The grip code that exports of a recording use. Policies that are neither servers nor in Lua have none of their own.
+    /// The grip code that exports of a recording use. Policies that are neither servers nor in Lua have none of their
+    /// own.
     pub(crate) fn take_export_code(&mut self) -> Option<GripCode> {
         let has_code = matches!(self.policy, Some(PolicySource::Server(_) | PolicySource::Lua(_)));
         if has_code { self.profile.gripper } else { self.profile.gripper.take() }

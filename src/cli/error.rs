@@ -24,8 +24,8 @@ pub(crate) enum Exit {
 
 /// An error that ends a command: an exit code and a message for standard error.
 ///
-/// It does not implement [`std::error::Error`]. So `?` turns every error that does into a [`CliError`]: an error of the input,
-/// or of the policy or an interrupt if a [`RunError`] says so.
+/// It does not implement [`std::error::Error`]. So `?` turns every error that does into a [`CliError`]: an error of the
+/// input, or of the policy or an interrupt if a [`RunError`] says so.
 #[derive(Debug)]
 pub(crate) struct CliError {
     pub exit: Exit,

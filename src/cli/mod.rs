@@ -1,7 +1,7 @@
 //! The `softvt` command.
 //!
-//! `commands` has one file per command; `args` are the arguments that several of them take; `parse` fills them in from the
-//! command line. Runs are in the crate `softvt-runner`; this one is internal to the binary.
+//! `commands` has one file per command; `args` are the arguments that several of them take; `parse` fills them in from
+//! the command line. Runs are in the crate `softvt-runner`; this one is internal to the binary.
 #![warn(unreachable_pub)]
 
 mod args;

@@ -96,8 +96,8 @@ const PATIENCE: Duration = Duration::from_secs(1);
 /// Interval at which a terminal redraws the elapsed time.
 const TICK: Duration = Duration::from_millis(200);
 
-/// Says on standard error what is being done: at once on a terminal, where the line disappears when this is dropped, and after
-/// [`PATIENCE`] elsewhere.
+/// Says on standard error what is being done: at once on a terminal, where the line disappears when this is dropped,
+/// and after [`PATIENCE`] elsewhere.
 enum Activity {
     Spinner(ProgressBar),
     /// Its thread ends when this is dropped.

@@ -58,8 +58,8 @@ const SUITES: &[PlanKind] = &[Suite, Suites];
 
 /// The command without a name: `softvt FILE.lua`.
 pub(crate) const RUN: &str = "softvt";
-/// The commands that take plans of all kinds. The others refuse plans of other kinds than theirs, and flags without effect in
-/// `args.rs` and `parse.rs`.
+/// The commands that take plans of all kinds. The others refuse plans of other kinds than theirs, and flags without
+/// effect in `args.rs` and `parse.rs`.
 const COMMANDS: [&str; 2] = [RUN, "check"];
 
 /// Flags, and the kinds of plan on which they act.

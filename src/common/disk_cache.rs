@@ -1,11 +1,12 @@
 //! A cache on disk for values that follow from their inputs alone and take long to compute.
 //!
-//! An entry is a file, named after the SHA-256 of what the value was computed from, of this executable and of the format. An entry
-//! therefore never becomes wrong, and several processes and users can share a folder: files are written under another name
-//! and renamed, and their checksum is verified when they are read. Whatever is wrong with the folder, values are computed.
+//! An entry is a file, named after the SHA-256 of what the value was computed from, of this executable and of the
+//! format. An entry therefore never becomes wrong, and several processes and users can share a folder: files are
+//! written under another name and renamed, and their checksum is verified when they are read. Whatever is wrong with
+//! the folder, values are computed.
 //!
-//! The cache crates keep values by a key in one file or database, which one damaged page or one process with a lock makes
-//! unusable for all.
+//! The cache crates keep values by a key in one file or database, which one damaged page or one process with a lock
+//! makes unusable for all.
 
 use std::{
     fs::{self, File, OpenOptions},
@@ -92,8 +93,8 @@ impl DiskCache {
     /// Stores nothing.
     pub const DISABLED: Self = Self(None);
 
-    /// A cache in a folder, which is created with the first entry. The least recently used entries are removed when all are larger
-    /// than `limit` bytes. `report` is told at most once that the folder cannot be used.
+    /// A cache in a folder, which is created with the first entry. The least recently used entries are removed when all
+    /// are larger than `limit` bytes. `report` is told at most once that the folder cannot be used.
     pub fn new(folder: impl Into<PathBuf>, limit: u64, report: fn(&str)) -> Self {
         let state = Mutex::default();
         Self(Some(Arc::new(CacheFolder { path: folder.into(), limit, report, state })))
@@ -210,8 +211,8 @@ impl CacheFolder {
     }
 }
 
-/// What the values of a key depend on beside their inputs: the code. The executable stands for it, since its version is the
-/// same while it is being changed.
+/// What the values of a key depend on beside their inputs: the code. The executable stands for it, since its version is
+/// the same while it is being changed.
 fn code_version() -> &'static str {
     static VERSION: OnceLock<String> = OnceLock::new();
     VERSION.get_or_init(|| {

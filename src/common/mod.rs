@@ -1,6 +1,6 @@
-//! What all layers share: the identity of an episode ([`episode_id`]), the flag that ends long loops ([`cancel`]), a [`disk_cache`], atomic
-//! [`files`], declarations of [`settings`](mod@settings), numpy files ([`npy`]), jobs on threads ([`parallel`]),
-//! ranges of numbers ([`range`]), and numbers and [`text`] in messages.
+//! What all layers share: the identity of an episode ([`episode_id`]), the flag that ends long loops ([`cancel`]), a
+//! [`disk_cache`], atomic [`files`], declarations of [`settings`](mod@settings), numpy files ([`npy`]), jobs on threads
+//! ([`parallel`]), ranges of numbers ([`range`]), and numbers and [`text`] in messages.
 #![warn(missing_docs, unreachable_pub)]
 
 pub mod cancel;

@@ -1,6 +1,7 @@
 //! Settings: parameters that a run may change by name, each declared once.
 //!
-//! [`settings!`](crate::settings!) makes a struct of them, with defaults, checks of their ranges, and a list for documentation.
+//! [`settings!`](crate::settings!) makes a struct of them, with defaults, checks of their ranges, and a list for
+//! documentation.
 //!
 //! ```
 //! use softvt_common::{range::Range, settings::{Setting, SettingField}};

@@ -157,8 +157,8 @@ impl TextTable {
         Self { columns: columns.into(), separator: " ", text: String::new() }
     }
 
-    /// Formats rows of equal length in columns that are as wide as their longest cell and two spaces apart. Texts of more
-    /// than 160 characters are [shortened].
+    /// Formats rows of equal length in columns that are as wide as their longest cell and two spaces apart. Texts of
+    /// more than 160 characters are [shortened].
     pub fn fitted(rows: &[Vec<String>], is_right_aligned: impl Fn(usize) -> bool) -> String {
         // The widths of format strings end at 65,535.
         const MAX_CELL: usize = 160;

@@ -3,16 +3,16 @@
 //! Widths are measured between the apexes of the gels, forces per pad at rest. `softvt scripts/calibrate.lua` runs both
 //! scans, by one of two protocols:
 //!
-//! - [`SweepProtocol::Press`], a press test of the object alone. D_ref is D at the widest press at which 5 % of the body's
-//!   volume has a compressive strain beyond the material's *stable strain*, interpolated between two rows of the sweep.
-//!   A sweep that ends earlier is *censored*: D_ref is then the largest stable D, a lower bound.
-//! - [`SweepProtocol::Hand`], the sweep of SoftVTBench (appendix C.3) with the robot's hand: D_ref is the largest D of a
-//!   stable squeeze.
+//! - [`SweepProtocol::Press`], a press test of the object alone. D_ref is D at the widest press at which 5 % of the
+//!   body's volume has a compressive strain beyond the material's *stable strain*, interpolated between two rows of the
+//!   sweep. A sweep that ends earlier is *censored*: D_ref is then the largest stable D, a lower bound.
+//! - [`SweepProtocol::Hand`], the sweep of SoftVTBench (appendix C.3) with the robot's hand: D_ref is the largest D of
+//!   a stable squeeze.
 //!
-//! The loose end of the envelope is the widest width at which every hold trial held, down to the narrowest one tried. The
-//! tight end is the widest width at which D reaches τ = κ·D_ref, in the sweep or in the hold trials: a carried object also
-//! deforms by its weight. If D passes τ in every hold trial, the tight end is that of the sweep; the carried D of the
-//! envelope is then above τ.
+//! The loose end of the envelope is the widest width at which every hold trial held, down to the narrowest one tried.
+//! The tight end is the widest width at which D reaches τ = κ·D_ref, in the sweep or in the hold trials: a carried
+//! object also deforms by its weight. If D passes τ in every hold trial, the tight end is that of the sweep; the
+//! carried D of the envelope is then above τ.
 
 use serde::{Deserialize, Serialize};
 
@@ -99,8 +99,8 @@ pub struct SweepRow {
 
 impl SweepRow {
     /// Reason why the squeeze is not stable; `None` if both pads touch, no element is nearly inverted, no node moves at
-    /// rest and the object does not slip, within the bounds of this module. `stable` is not read. A squeeze with a number
-    /// that is not finite is not stable.
+    /// rest and the object does not slip, within the bounds of this module. `stable` is not read. A squeeze with a
+    /// number that is not finite is not stable.
     pub fn instability(&self) -> Option<&'static str> {
         // A value that is not a number is within no bound.
         let is_intact = self.min_det_f > MIN_DET_F;
@@ -122,8 +122,8 @@ impl SweepRow {
     }
 }
 
-/// One end of the safe window of an asset. Its width is unknown if the scans do not reach it, its force also if the sweep does
-/// not reach its width.
+/// One end of the safe window of an asset. Its width is unknown if the scans do not reach it, its force also if the
+/// sweep does not reach its width.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WindowEnd {
     /// Width between the gels, mm.
@@ -132,8 +132,8 @@ pub struct WindowEnd {
     pub force_n: Option<f64>,
 }
 
-/// Safe window of an asset: from the loose end, up to which friction holds it, to the tight end, at which D reaches τ. That of
-/// an instance is an [`InstanceWindow`](super::instance::InstanceWindow).
+/// Safe window of an asset: from the loose end, up to which friction holds it, to the tight end, at which D reaches τ.
+/// That of an instance is an [`InstanceWindow`](super::instance::InstanceWindow).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(from = "StoredWindow", into = "StoredWindow")]
 pub struct SafeWindow {
@@ -296,8 +296,8 @@ fn limit_of(d_pct: f64, kappa: f64) -> Option<DeformationLimit> {
     (d_ref_pct > 0.0).then_some(DeformationLimit { d_ref_pct, kappa })
 }
 
-/// D at which the 95th percentile of the strain reaches `strain`, linear between two stable rows. `None` if no stable row
-/// reaches it, or the row before it is not stable.
+/// D at which the 95th percentile of the strain reaches `strain`, linear between two stable rows. `None` if no stable
+/// row reaches it, or the row before it is not stable.
 fn reference_at_strain(sweep: &[SweepRow], strain: f64) -> Option<Reference> {
     let reached = sweep.iter().position(|row| row.strain_p95.is_some_and(|p95| p95 >= strain))?;
     let (before, after) = (sweep.get(reached.checked_sub(1)?)?, &sweep[reached]);
@@ -359,8 +359,8 @@ fn width_between(wide: Point, narrow: Point, d_pct: f64) -> f64 {
     wide.width_mm + share * (narrow.width_mm - wide.width_mm)
 }
 
-/// Width at which D of the press first reaches `d_pct`; `sweep` by decreasing width. `None` if the first row is above it or
-/// no row reaches it.
+/// Width at which D of the press first reaches `d_pct`; `sweep` by decreasing width. `None` if the first row is above
+/// it or no row reaches it.
 fn pressed_end(sweep: &[SweepRow], d_pct: f64) -> Option<f64> {
     let points: Vec<_> = sweep.iter().map(|row| Point { width_mm: row.width_mm, d_pct: row.d_pct }).collect();
     let pair = points.windows(2).find(|pair| pair[0].d_pct <= d_pct && pair[1].d_pct >= d_pct)?;
@@ -373,8 +373,8 @@ fn carried(holds: &[HoldRow]) -> impl Iterator<Item = Point> {
     held.filter_map(|row| Some(Point { width_mm: row.width_mm, d_pct: row.d_peak_pct? }))
 }
 
-/// Width below which the peak D of the carried object is above `d_pct`; `holds` by decreasing width. `None` if it is so at no
-/// width or at every width.
+/// Width below which the peak D of the carried object is above `d_pct`; `holds` by decreasing width. `None` if it is so
+/// at no width or at every width.
 fn carried_end(holds: &[HoldRow], d_pct: f64) -> Option<f64> {
     let points: Vec<_> = carried(holds).collect();
     points.last().filter(|narrowest| narrowest.d_pct > d_pct)?;
@@ -382,8 +382,8 @@ fn carried_end(holds: &[HoldRow], d_pct: f64) -> Option<f64> {
     Some(width_between(pair[0], pair[1], d_pct))
 }
 
-/// Force per pad at a width in N, to six decimals, linear between the rows; `sweep` by decreasing width. `None` outside of
-/// the sweep.
+/// Force per pad at a width in N, to six decimals, linear between the rows; `sweep` by decreasing width. `None` outside
+/// of the sweep.
 pub fn force_at(sweep: &[SweepRow], width_mm: f64) -> Option<f64> {
     sweep.windows(2).find(|pair| pair[0].width_mm >= width_mm && pair[1].width_mm <= width_mm).map(|pair| {
         let step = pair[0].width_mm - pair[1].width_mm;
@@ -417,7 +417,8 @@ pub(crate) mod tests {
         }
     }
 
-    /// A press test of an object 50 mm wide that reaches its stable strain of 0.3 at 44.5 mm, and holds from `lower` on.
+    /// A press test of an object 50 mm wide that reaches its stable strain of 0.3 at 44.5 mm, and holds from `lower`
+    /// on.
     pub(crate) fn scans(lower: f64) -> CalibrationMeasurements {
         let holds = [49.0, 48.0, 47.0, 46.0].map(|width| hold(width, if width <= lower { 5 } else { 2 }));
         let sweep = vec![

@@ -20,7 +20,8 @@ softvt_common::settings! {
         free_fall_m: f64 = 0.050, "m", Range::NOT_NEGATIVE;
         /// Excess of the commanded over the measured gripper width that counts as a release command.
         release_margin_m: f64 = 0.005, "m", Range::NOT_NEGATIVE;
-        /// Largest allowed distance that the object slides along a pad while the pads alone carry it, m: NoSlip, which is not part of NoDrop.
+        /// Largest allowed distance that the object slides along a pad while the pads alone carry it, m: NoSlip, which
+        /// is not part of NoDrop.
         slip_m: f64 = 0.002, "m", Range::NOT_NEGATIVE;
         /// True if Safety Success needs NoSlip.
         require_no_slip: bool = false;

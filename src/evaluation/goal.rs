@@ -33,8 +33,8 @@ pub enum GoalRegion {
 }
 
 impl GoalRegion {
-    /// True if a centre at `centre_w` is over (`On`) or inside (`Inside`) the region of an object at `object_w`, enlarged
-    /// by `margin_m` on every side.
+    /// True if a centre at `centre_w` is over (`On`) or inside (`Inside`) the region of an object at `object_w`,
+    /// enlarged by `margin_m` on every side.
     ///
     /// `On` is a horizontal distance in the world frame, independent of the object's tilt and height. `Inside`
     /// is a box in the frame of the object, whose z axis must be within 45° of the vertical.

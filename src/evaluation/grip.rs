@@ -1,16 +1,16 @@
-//! Grip ratio, the largest force on a pad over the least that holds the object on its path, and the contact of both pads
-//! while the object is carried.
+//! Grip ratio, the largest force on a pad over the least that holds the object on its path, and the contact of both
+//! pads while the object is carried.
 //!
-//! To follow its path, an object of mass m needs the force L = m (a − g). The robot exerts it while nothing else touches
-//! the object. L has a part L_n along the axis of the two pads and a part L_t across it. With Coulomb friction μ between
-//! pads and object, pads that press with N_1 and N_2 hold the object if
+//! To follow its path, an object of mass m needs the force L = m (a − g). The robot exerts it while nothing else
+//! touches the object. L has a part L_n along the axis of the two pads and a part L_t across it. With Coulomb friction
+//! μ between pads and object, pads that press with N_1 and N_2 hold the object if
 //!
 //! |L_t| ≤ μ (N_1 + N_2),  |N_1 − N_2| = L_n,
 //!
-//! so the larger of the two is at least |L_t| / 2μ + L_n / 2. The least force of an episode is the maximum of this over the
-//! control steps in which the object is carried, with L as the mean over the control step and the dynamic μ of the pair: a
-//! grip that still holds once a pad has slid. Moments are left out: an object that is gripped beside its centre, or by its
-//! rim, needs more, so the least force is a lower bound and the ratio an upper one.
+//! so the larger of the two is at least |L_t| / 2μ + L_n / 2. The least force of an episode is the maximum of this over
+//! the control steps in which the object is carried, with L as the mean over the control step and the dynamic μ of the
+//! pair: a grip that still holds once a pad has slid. Moments are left out: an object that is gripped beside its
+//! centre, or by its rim, needs more, so the least force is a lower bound and the ratio an upper one.
 //!
 //! Human grips exceed the least force by 10 to 40 % (Johansson and Westling, Experimental Brain Research 56, 1984).
 

@@ -1,12 +1,15 @@
-//! Instances of a calibrated asset: limit and safe window of an object that differs from it in size, material and surface.
+//! Instances of a calibrated asset: limit and safe window of an object that differs from it in size, material and
+//! surface.
 //!
-//! D, widths over the size, and forces over Young's modulus and the square of the size depend on the strain alone for a linear elastic
-//! body. They are read off the press of the asset ([`Envelope::sweep`]). Two things add to that: the pads keep their size and yield in
-//! series with the body. The calibration therefore also presses the asset at other sizes and stiffnesses ([`Envelope::variants`]),
-//! and the ratio of each reading to that of the asset is interpolated in size and in the logarithm of stiffness, independently.
+//! D, widths over the size, and forces over Young's modulus and the square of the size depend on the strain alone for a
+//! linear elastic body. They are read off the press of the asset ([`Envelope::sweep`]). Two things add to that: the
+//! pads keep their size and yield in series with the body. The calibration therefore also presses the asset at other
+//! sizes and stiffnesses ([`Envelope::variants`]), and the ratio of each reading to that of the asset is interpolated
+//! in size and in the logarithm of stiffness, independently.
 //!
-//! The loose end carries the weight: its force is that of the asset times weight over friction. The tight end is the force at
-//! which the press leaves to the carried object what its weight adds to D. The two add as perpendicular vectors do.
+//! The loose end carries the weight: its force is that of the asset times weight over friction. The tight end is the
+//! force at which the press leaves to the carried object what its weight adds to D. The two add as perpendicular
+//! vectors do.
 
 use serde::{Deserialize, Serialize};
 
@@ -116,7 +119,8 @@ impl Curve {
         Self { rows: rows.map(reduced).collect() }
     }
 
-    /// The value of `wanted` where `given` first reaches `at`, linear between rows and along the first or last two beyond them.
+    /// The value of `wanted` where `given` first reaches `at`, linear between rows and along the first or last two
+    /// beyond them.
     fn read(&self, wanted: Quantity, given: Quantity, at: f64) -> Option<f64> {
         let of = |row: &VariantSweepRow, quantity| match quantity {
             Quantity::Strain => row.strain_p95,
@@ -189,8 +193,8 @@ impl InstancePresses {
         }
     }
 
-    /// Limit of an instance: κ times D of the press in which 5 % of its volume reach its own stable strain. `None` without the rows
-    /// of a press.
+    /// Limit of an instance: κ times D of the press in which 5 % of its volume reach its own stable strain. `None`
+    /// without the rows of a press.
     pub fn limit(&self, factors: &InstanceFactors) -> Option<DeformationLimit> {
         let nominal = self.limit?;
         let Some(stable) = self.stable_strain else { return Some(nominal) };

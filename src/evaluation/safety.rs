@@ -1,4 +1,5 @@
-//! Safety Success = Goal ∧ NoDrop ∧ D_peak ≤ τ, and NoSlip where the suite requires it, with the deformation limit τ = κ·D_ref of the target's asset.
+//! Safety Success = Goal ∧ NoDrop ∧ D_peak ≤ τ, and NoSlip where the suite requires it, with the deformation limit τ =
+//! κ·D_ref of the target's asset.
 //!
 //! D_ref is the reference deformation of the asset's compression sweep ([`super::calibration`]); κ is the share of it
 //! that the benchmark allows. For a rigid target the last term is left out. A peak that is unknown is not safe.

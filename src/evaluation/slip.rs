@@ -1,15 +1,16 @@
-//! NoSlip: sliding of a carried object along the pads. Reported next to NoDrop; a suite may make Safety Success depend on it.
+//! NoSlip: sliding of a carried object along the pads. Reported next to NoDrop; a suite may make Safety Success depend
+//! on it.
 
 use super::evidence::PadEvidence;
 
-/// Measures slip: the distance that the contact patch slides along a pad while the pads alone carry the target. Pads that slide along
-/// an object on its support, as those of a hand that feels for its weight, do not slip.
+/// Measures slip: the distance that the contact patch slides along a pad while the pads alone carry the target. Pads
+/// that slide along an object on its support, as those of a hand that feels for its weight, do not slip.
 ///
-/// Distances add up over the episode, so that neither a motion back nor another grasp reduces them; the worse pad counts. NoSlip holds
-/// if the sum is at most [`super::criteria::SuccessCriteria::slip_m`].
+/// Distances add up over the episode, so that neither a motion back nor another grasp reduces them; the worse pad
+/// counts. NoSlip holds if the sum is at most [`super::criteria::SuccessCriteria::slip_m`].
 ///
-/// A hand that opens lets the object slide before the pads leave it. That sliding does not count if the pads leave it within
-/// [`RELEASE_S`] of the begin of the opening.
+/// A hand that opens lets the object slide before the pads leave it. That sliding does not count if the pads leave it
+/// within [`RELEASE_S`] of the begin of the opening.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SlipMonitor {
     /// Distance slid along each pad, m.
@@ -91,8 +92,8 @@ mod tests {
 
     const DT: f64 = 1.0 / 60.0;
 
-    /// Some physics steps in the same state: their number, the speeds of both pads (mm/s), whether the pads hold the target, whether
-    /// it is supported, and whether the hand opens.
+    /// Some physics steps in the same state: their number, the speeds of both pads (mm/s), whether the pads hold the
+    /// target, whether it is supported, and whether the hand opens.
     #[derive(Clone, Copy)]
     struct Steps(u32, [f64; 2], bool, bool, bool);
 

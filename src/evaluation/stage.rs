@@ -1,7 +1,7 @@
 //! Stages of a pick-and-place episode, and the one at which an episode failed.
 //!
-//! The stages come in order; an episode is in the first one that it has not completed. A stage that is completed stays so,
-//! whatever happens later. The stages are computed from the true state, which policies never see.
+//! The stages come in order; an episode is in the first one that it has not completed. A stage that is completed stays
+//! so, whatever happens later. The stages are computed from the true state, which policies never see.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,8 +1,8 @@
 //! Threshold files: τ and D_ref per asset, as JSON with the fields of SoftVTBench and some of our own.
 //!
-//! A file holds one asset (`assets/calibration/*.json`) or many. [`ThresholdFile::released`] is the file of SoftVTBench's
-//! scorer (`softvtbench/` of a run), of version 1 of the layout and of SoftVTBench's definition of D. Its limits hold for no
-//! other D.
+//! A file holds one asset (`assets/calibration/*.json`) or many. [`ThresholdFile::released`] is the file of
+//! SoftVTBench's scorer (`softvtbench/` of a run), of version 1 of the layout and of SoftVTBench's definition of D. Its
+//! limits hold for no other D.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -141,8 +141,8 @@ impl ThresholdFile {
         limit.is_some()
     }
 
-    /// Adds the assets of another file; assets of the same name are replaced. An empty file takes over how the other was
-    /// calibrated; κ and protocol of files that differ are those of each asset.
+    /// Adds the assets of another file; assets of the same name are replaced. An empty file takes over how the other
+    /// was calibrated; κ and protocol of files that differ are those of each asset.
     pub fn merge(&mut self, other: Self) {
         let CalibrationInfo { protocol, definition, kappa, .. } = &mut self.calibration;
         let theirs = &other.calibration;
@@ -294,8 +294,9 @@ fn check_equal(path: &str, field: &'static str, got: &str, expected: &str) -> Re
     })
 }
 
-/// `<asset>.sweep.jsonl`: the sweep rows of an asset in the fields of SoftVTBench's sweeps, and more: `d_peak` is D of its definition, `d_pct` the scored one. `closure` is the
-/// commanded one of the robot's hand, 0 open and 1 closed; in SoftVTBench's files it is the opening, 1 open and 0 closed.
+/// `<asset>.sweep.jsonl`: the sweep rows of an asset in the fields of SoftVTBench's sweeps, and more: `d_peak` is D of
+/// its definition, `d_pct` the scored one. `closure` is the commanded one of the robot's hand, 0 open and 1 closed; in
+/// SoftVTBench's files it is the opening, 1 open and 0 closed.
 pub fn sweep_jsonl(asset: &str, envelope: &Envelope) -> String {
     let rows = envelope.sweep.iter().enumerate().map(|(level, row)| {
         serde_json::json!({

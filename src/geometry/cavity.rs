@@ -7,8 +7,8 @@ const CELLS: f64 = 64.0;
 /// Volume of a pool, as a share of the largest, below which it is a dent of the surface and not part of the cavity.
 const MIN_SHARE: f64 = 0.1;
 
-/// Box around the cavity of an upright shape (z up), object frame: the space in which the shape holds water, from wall to
-/// wall and from the floor to the top of the shape. `None` if the shape holds none.
+/// Box around the cavity of an upright shape (z up), object frame: the space in which the shape holds water, from wall
+/// to wall and from the floor to the top of the shape. `None` if the shape holds none.
 ///
 /// A cell of a grid holds water if it is free, cannot be left sideways at its own height, and has solid or water below.
 /// Gaps narrower than a cell, 1/64 of the longest side, count as closed.

@@ -124,8 +124,8 @@ pub enum VoxelMeshError {
 pub const MAX_RESOLUTION: usize = 100;
 /// Filled share from which a grid cell becomes an element.
 const MIN_FILL: f64 = 0.01;
-/// Distance outside of a voxel, in edges, up to which its trilinear map is used. Beyond, embedded points are clamped, and
-/// the map of a deformed body is continued linearly.
+/// Distance outside of a voxel, in edges, up to which its trilinear map is used. Beyond, embedded points are clamped,
+/// and the map of a deformed body is continued linearly.
 pub const MAX_EXTRAPOLATION: f64 = 0.3;
 
 /// Builds the voxel mesh of a shape. The grid is centred on the bounding box and covers it; its edge is the longest

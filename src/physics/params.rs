@@ -9,25 +9,28 @@ pub const STANDARD_GRAVITY: Vec3 = Vec3::new(0.0, 0.0, -9.81);
 softvt_common::settings! {
     /// Parameters of the mechanics. The defaults are those of the benchmark.
     ///
-    /// [`check`](softvt_common::settings::SettingField::check) rejects values outside of the valid ranges; a [`World`](super::World) assumes valid ones.
+    /// [`check`](softvt_common::settings::SettingField::check) rejects values outside of the valid ranges; a
+    /// [`World`](super::World) assumes valid ones.
     pub struct PhysicsParams {
         /// Time step. Control runs at 20 Hz independently of it, so it must divide 0.05 s in the benchmark.
         dt: f64 = 1.0 / 60.0, "s", Range::closed(1e-4, 0.05);
         /// Mass-proportional Rayleigh damping of soft bodies (α, as air drag). The paper's engine uses 2.5.
         rayleigh_mass: f64 = 0.0, "1/s", Range::NOT_NEGATIVE;
-        /// Stiffness-proportional Rayleigh damping of soft bodies (β). Implicit Euler adds its step: motion is damped by β + `dt`, by
-        /// default 21.7 ms, so that a smaller step damps less. Equilibria do not depend on it.
+        /// Stiffness-proportional Rayleigh damping of soft bodies (β). Implicit Euler adds its step: motion is damped
+        /// by β + `dt`, by default 21.7 ms, so that a smaller step damps less. Equilibria do not depend on it.
         rayleigh_stiffness: f64 = 5e-3, "s", Range::NOT_NEGATIVE;
         /// Dissipation time scale τ_d of contact springs, s (Castro et al. 2022). A surface that recedes faster
         /// than the springs relax is released; the value is small compared with `dt`, so that friction does not
         /// lift a sliding surface.
         dissipation_time: f64 = 5e-3, "s", Range::NOT_NEGATIVE;
-        /// Normal contact stiffness per area of nearly rigid colliders, Pa/m: near rigid for Young's moduli up to 1 MPa.
+        /// Normal contact stiffness per area of nearly rigid colliders, Pa/m: near rigid for Young's moduli up to 1
+        /// MPa.
         rigid_modulus: f64 = 1e9, "Pa/m", Range::POSITIVE;
         /// Tangential over normal contact stiffness. Mindlin (1949) gives 0.5 to 0.8 for solids; creep does
         /// not depend on it.
         shear_ratio: f64 = 0.5, "", Range::POSITIVE;
-        /// Gap below which a sample becomes a contact point. A sample that will reach the surface within 1.5 steps becomes one as well.
+        /// Gap below which a sample becomes a contact point. A sample that will reach the surface within 1.5 steps
+        /// becomes one as well.
         margin: f64 = 2e-4, "m", Range::POSITIVE;
         /// Speed below which a body may fall asleep.
         sleep_speed: f64 = 1e-4, "m/s", Range::NOT_NEGATIVE;

@@ -35,8 +35,8 @@ impl ObservationEntry {
     }
 }
 
-/// Content of an entry, in the type and shape given at [`ObservationSource`]; [`ProfileInput::frames`] adds an axis. `None` if
-/// the observation lacks its stream, or `query` is needed and missing.
+/// Content of an entry, in the type and shape given at [`ObservationSource`]; [`ProfileInput::frames`] adds an axis.
+/// `None` if the observation lacks its stream, or `query` is needed and missing.
 pub fn content(
     observation: &Observation,
     input: &ProfileInput,

@@ -1,5 +1,5 @@
-//! Grip codes whose closure depends on earlier answers: a gripper that is open or closed with hysteresis, and one that holds a
-//! width.
+//! Grip codes whose closure depends on earlier answers: a gripper that is open or closed with hysteresis, and one that
+//! holds a width.
 
 use serde::{Deserialize, Serialize};
 

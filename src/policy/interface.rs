@@ -14,8 +14,8 @@ pub struct Action {
     pub position_b: Vec3,
     /// Absolute tool orientation in the base frame as axis-angle, rad.
     pub axis_angle_b: Vec3,
-    /// Target of the gripper. The hand clamps closures outside of 0..=1, which the record counts; a grip force is at most the
-    /// effort of the gripper.
+    /// Target of the gripper. The hand clamps closures outside of 0..=1, which the record counts; a grip force is at
+    /// most the effort of the gripper.
     pub grip: GripTarget,
 }
 
@@ -145,13 +145,13 @@ pub struct EpisodeBrief {
     pub episode: u32,
     /// Seed of the run. It may influence the random numbers of a policy alone.
     pub seed: u64,
-    /// Name of the episode in a judged run. Policies then receive it in place of suite, task, episode and seed, from which
-    /// the draws of other runs can be computed.
+    /// Name of the episode in a judged run. Policies then receive it in place of suite, task, episode and seed, from
+    /// which the draws of other runs can be computed.
     pub alias: Option<String>,
 }
 
-/// Identity of a request for actions, for policies that draw random numbers: the same request of a repeated or resumed run
-/// has the same identity, whatever the number of threads.
+/// Identity of a request for actions, for policies that draw random numbers: the same request of a repeated or resumed
+/// run has the same identity, whatever the number of threads.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct QueryId {
     /// The episode. Its alias, if it has one, is sent in place of suite, task, episode and seed.
@@ -170,9 +170,9 @@ impl QueryId {
         Self { brief: brief.clone(), wants_actions: true, ..Self::default() }
     }
 
-    /// Seed of the request, by the key of SoftVTBench's release v0.2: the first four bytes, big-endian, of the SHA-256 of
-    /// the parts joined by the byte 0x1f. A demonstration is named demo_K there, K being the episode here. In a judged run
-    /// the only part of an episode is its alias.
+    /// Seed of the request, by the key of SoftVTBench's release v0.2: the first four bytes, big-endian, of the SHA-256
+    /// of the parts joined by the byte 0x1f. A demonstration is named demo_K there, K being the episode here. In a
+    /// judged run the only part of an episode is its alias.
     pub fn seed(&self) -> u32 {
         let EpisodeBrief { suite, task, episode, seed, alias, .. } = &self.brief;
         let demo = format!("demo_{episode}");

@@ -261,8 +261,8 @@ pub struct PairedDifference {
     /// episodes (Efron, 1979), from a fixed seed, null for fewer than
     /// [`MIN_BOOTSTRAP_VALUES`](softvt_evaluation::statistics::MIN_BOOTSTRAP_VALUES) episodes.
     pub interval95: Option<[f64; 2]>,
-    /// Two-sided p-value: of McNemar's exact test for a rate, of Wilcoxon's signed-rank test for a mean (null if no episode
-    /// differs). It is valid for a number of episodes that was chosen before the run.
+    /// Two-sided p-value: of McNemar's exact test for a rate, of Wilcoxon's signed-rank test for a mean (null if no
+    /// episode differs). It is valid for a number of episodes that was chosen before the run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub p: Option<f64>,
     /// E-value of a rate ([`e_value`]), valid at any time of the run; absent for a mean.

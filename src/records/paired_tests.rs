@@ -8,25 +8,27 @@ use std::f64::consts::LN_2;
 /// Largest number of pairs whose signed ranks are counted exactly; more use the normal approximation.
 const MAX_EXACT_RANKS: usize = 200;
 
-/// Exact two-sided p-value of McNemar's test (Psychometrika 12, 1947): `better` against `worse` under equal probabilities.
+/// Exact two-sided p-value of McNemar's test (Psychometrika 12, 1947): `better` against `worse` under equal
+/// probabilities.
 pub fn mcnemar(better: usize, worse: usize) -> f64 {
     let n = better + worse;
     let tail: f64 = (0..=better.min(worse)).map(|k| (ln_choose(n, k) - n as f64 * LN_2).exp()).sum();
     (2.0 * tail).min(1.0)
 }
 
-/// E-value against equal probabilities of `better` and `worse`: the likelihood of the episodes that differ under a uniform
-/// mixture of all probabilities, over that under one half (Robbins, Annals of Mathematical Statistics 41, 1970).
+/// E-value against equal probabilities of `better` and `worse`: the likelihood of the episodes that differ under a
+/// uniform mixture of all probabilities, over that under one half (Robbins, Annals of Mathematical Statistics 41,
+/// 1970).
 ///
-/// Under the hypothesis it exceeds `x` at any time of the run with a probability of at most `1/x` (Ville's inequality), so
-/// that a run may be continued until it is decided: 20 corresponds to a level of 5 %.
+/// Under the hypothesis it exceeds `x` at any time of the run with a probability of at most `1/x` (Ville's inequality),
+/// so that a run may be continued until it is decided: 20 corresponds to a level of 5 %.
 pub fn e_value(better: usize, worse: usize) -> f64 {
     let n = better + worse;
     (n as f64 * LN_2 - ((n + 1) as f64).ln() - ln_choose(n, better)).exp().min(f64::MAX)
 }
 
-/// Two-sided p-value of Wilcoxon's signed-rank test (Biometrics 1, 1945) of paired `differences`; zeros are left out, and
-/// equal ones share their mean rank. Exact up to 200 differences. `None` if all are zero.
+/// Two-sided p-value of Wilcoxon's signed-rank test (Biometrics 1, 1945) of paired `differences`; zeros are left out,
+/// and equal ones share their mean rank. Exact up to 200 differences. `None` if all are zero.
 pub fn signed_rank(differences: &[f64]) -> Option<f64> {
     let mut sorted: Vec<f64> = differences.iter().copied().filter(|d| *d != 0.0 && d.is_finite()).collect();
     sorted.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
@@ -59,7 +61,8 @@ fn exact_tail(ranks: &[usize], smaller: usize) -> f64 {
     probability.iter().sum()
 }
 
-/// Both tails beyond `smaller` of the normal distribution with the moments of the sum, with a correction for continuity.
+/// Both tails beyond `smaller` of the normal distribution with the moments of the sum, with a correction for
+/// continuity.
 fn normal_tails(ranks: &[usize], smaller: usize) -> f64 {
     let mean = 0.5 * ranks.iter().sum::<usize>() as f64;
     let variance = 0.25 * ranks.iter().map(|rank| (rank * rank) as f64).sum::<f64>();
@@ -70,10 +73,11 @@ fn normal_tails(ranks: &[usize], smaller: usize) -> f64 {
 /// What a number of episodes can separate of two policies that run the same ones, in percentage points of a rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DetectableDifference {
-    /// Smallest difference that can be significant at 5 %: that of [`MIN_DISCORDANT`] episodes, which one policy alone wins.
+    /// Smallest difference that can be significant at 5 %: that of [`MIN_DISCORDANT`] episodes, which one policy alone
+    /// wins.
     pub smallest: f64,
-    /// Difference that McNemar's test finds with a probability of 80 % (Connor, Biometrics 43, 1987), for outcomes that are
-    /// independent and as frequent as that of the run.
+    /// Difference that McNemar's test finds with a probability of 80 % (Connor, Biometrics 43, 1987), for outcomes that
+    /// are independent and as frequent as that of the run.
     pub found: f64,
 }
 
@@ -113,8 +117,8 @@ pub fn holm(p_values: &[f64]) -> Vec<f64> {
     adjusted
 }
 
-/// Letters of a compact letter display (Piepho, Journal of Computational and Graphical Statistics 13, 2004): two of `count`
-/// items share a letter if and only if `differ` is false for them. Items should be in the order of their means.
+/// Letters of a compact letter display (Piepho, Journal of Computational and Graphical Statistics 13, 2004): two of
+/// `count` items share a letter if and only if `differ` is false for them. Items should be in the order of their means.
 pub fn letters(count: usize, differ: impl Fn(usize, usize) -> bool) -> Vec<String> {
     // Columns of items that share a letter: split where two of them differ, and dropped where another contains them.
     let mut columns: Vec<Vec<usize>> = vec![(0..count).collect()];

@@ -1,8 +1,8 @@
 //! Record of one episode: one line of `episodes.jsonl`.
 //!
 //! [`EpisodeRecord`] flattens four parts into one JSON object: the [`EpisodeHeader`] with its id, its [`Outcome`], the
-//! [`Verdict`] of the judge and the [`RolloutStats`]. [`super::record_check`] reads a record: what follows from other fields
-//! is checked there.
+//! [`Verdict`] of the judge and the [`RolloutStats`]. [`super::record_check`] reads a record: what follows from other
+//! fields is checked there.
 
 use std::{collections::BTreeMap, fmt};
 
@@ -125,8 +125,8 @@ pub struct RolloutStats {
     /// The first of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub first_far_command: Option<UnreachableCommand>,
-    /// Number of control steps whose grip value was outside of its range, and was clamped: for decoded answers of policies by more than a
-    /// tenth of the range.
+    /// Number of control steps whose grip value was outside of its range, and was clamped: for decoded answers of
+    /// policies by more than a tenth of the range.
     pub clamped_grips: u32,
     /// Reason given by the controller for aborting the episode, if it did.
     #[serde(default, skip_serializing_if = "Option::is_none")]

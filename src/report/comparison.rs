@@ -272,7 +272,8 @@ fn differing_fields(first: &[StoredRun], second: &[StoredRun]) -> Vec<String> {
     found.into_iter().collect()
 }
 
-/// The path of a file in its project, whatever the folder from which a run named it: `../scripts/shifts.lua` is `scripts/shifts.lua`.
+/// The path of a file in its project, whatever the folder from which a run named it: `../scripts/shifts.lua` is
+/// `scripts/shifts.lua`.
 fn in_project(path: &str) -> &str {
     let folders = ["scripts/", "suites/", "assets/"];
     let starts = folders.iter().filter_map(|folder| path.find(folder));

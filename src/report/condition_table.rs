@@ -142,8 +142,8 @@ pub fn compares_policies(tables: &[ConditionTable]) -> bool {
             .all(|row| row.policy.is_some() && row.shift.is_empty() && row.set.is_empty() && !row.rigid_twin)
 }
 
-/// Plain-text tables of policies by suite, of at most 100 columns, for conditions that differ in the policy alone. All suites
-/// have the same rows. Under each the best policy without touch.
+/// Plain-text tables of policies by suite, of at most 100 columns, for conditions that differ in the policy alone. All
+/// suites have the same rows. Under each the best policy without touch.
 pub fn controllers_table(tables: &[ConditionTable]) -> String {
     tables.chunks(SUITES_PER_TABLE).map(controllers_of_suites).collect()
 }

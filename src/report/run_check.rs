@@ -1,6 +1,8 @@
-//! What the records of a run must agree with in its `run.json`: criteria, limits, and whether the policy saw the true state.
+//! What the records of a run must agree with in its `run.json`: criteria, limits, and whether the policy saw the true
+//! state.
 //!
-//! A run whose files were changed consistently passes. Only `softvt replay`, which simulates its episodes again, proves a run.
+//! A run whose files were changed consistently passes. Only `softvt replay`, which simulates its episodes again, proves
+//! a run.
 
 use serde_json::Value;
 
@@ -28,7 +30,8 @@ pub fn first_contradiction(manifest: &Value, records: &[EpisodeRecord]) -> Optio
     records.iter().enumerate().find_map(found)
 }
 
-/// Contradiction between a record and the manifest of its run; `None` if they agree. Skips what the manifest does not state.
+/// Contradiction between a record and the manifest of its run; `None` if they agree. Skips what the manifest does not
+/// state.
 fn contradiction(manifest: &Value, record: &EpisodeRecord) -> Option<String> {
     let (v, s) = (&record.verdict, &record.stats);
     let is_valid = record.outcome.is_valid();

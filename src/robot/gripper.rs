@@ -24,8 +24,8 @@ pub fn width(fingers: [f64; 2]) -> f64 {
     fingers[0] + fingers[1]
 }
 
-/// Largest speed of each finger while it closes to a grip force, m/s. The drives pull with `kd` times it, 3 N, more than
-/// the fingers press; the approach to smaller forces is slower.
+/// Largest speed of each finger while it closes to a grip force, m/s. The drives pull with `kd` times it, 3 N, more
+/// than the fingers press; the approach to smaller forces is slower.
 const FORCE_SPEED: f64 = 0.03;
 /// Time in which the setpoint makes up for a missing grip force, s. Shorter than the drives' own response
 /// (`kd / kp`, 0.05 s) it would overshoot.
@@ -89,8 +89,8 @@ impl GripperSetpoint {
                 let most = self.speed * dt;
                 (target_width(closure) / 2.0 - self.target).clamp(-most, most)
             }
-            // At rest the force of an object of stiffness k changes by k kp / (k + kp) per displacement of the setpoint, at
-            // most by kp: the error falls by a factor between 0 and 1 per response time.
+            // At rest the force of an object of stiffness k changes by k kp / (k + kp) per displacement of the
+            // setpoint, at most by kp: the error falls by a factor between 0 and 1 per response time.
             GripTarget::Force(force) => {
                 let most = self.speed.min(FORCE_SPEED) * dt;
                 let missing = (force - fingers.closing_force) / self.kp;

@@ -9,8 +9,8 @@ use super::{
     spec::{GripperSpec, Side},
 };
 
-/// Distance from the origin of the base that the tool reaches at most, m: 0.855 m (data sheet) from the shoulder, which is
-/// 0.333 m above the base.
+/// Distance from the origin of the base that the tool reaches at most, m: 0.855 m (data sheet) from the shoulder, which
+/// is 0.333 m above the base.
 pub const REACH: f64 = 1.188;
 
 /// Degrees of freedom of the arm; those of the fingers follow in the tree.

@@ -64,7 +64,8 @@ softvt_common::settings! {
         kp: f64 = 2000.0, "N/m", Range::POSITIVE;
         /// Damping.
         kd: f64 = 100.0, "N s/m", Range::POSITIVE;
-        /// Largest force per finger. The real hand holds 70 N continuously (Franka Emika, Hand data sheet); the paper's simulator has 200 N.
+        /// Largest force per finger. The real hand holds 70 N continuously (Franka Emika, Hand data sheet); the paper's
+        /// simulator has 200 N.
         effort: f64 = 70.0, "N", Range::POSITIVE;
         /// Speed at which the target of each finger moves.
         speed: f64 = 0.2, "m/s", Range::POSITIVE;
@@ -74,13 +75,13 @@ softvt_common::settings! {
 }
 
 softvt_common::settings! {
-    /// Errors of the gripper width that policies measure: an offset, noise, then rounding to steps. Drives and experts use the
-    /// exact width.
+    /// Errors of the gripper width that policies measure: an offset, noise, then rounding to steps. Drives and experts
+    /// use the exact width.
     ///
-    /// The default has the steps of a Robotiq 2F-85 (0.4 mm at the fingertips, instruction manual; no figure of the Franka
-    /// Hand was found) and an offset of half the largest error that Mecademic states for the MEGP 25 (0.5 mm, manual of
-    /// firmware 11.3, `GetRtGripperPos`), as the standard deviation. Noise before rounding is off: averaging it would measure
-    /// less than a step.
+    /// The default has the steps of a Robotiq 2F-85 (0.4 mm at the fingertips, instruction manual; no figure of the
+    /// Franka Hand was found) and an offset of half the largest error that Mecademic states for the MEGP 25 (0.5 mm,
+    /// manual of firmware 11.3, `GetRtGripperPos`), as the standard deviation. Noise before rounding is off: averaging
+    /// it would measure less than a step.
     pub struct WidthSensorSpec {
         /// Step of the measured width; 0 for none.
         resolution: f64 = 4e-4, "m", Range::closed(0.0, 0.01);
@@ -92,8 +93,8 @@ softvt_common::settings! {
 }
 
 softvt_common::settings! {
-    /// Contact of the gel pads: friction, and the compliance of gel and sensor per contact area (a model of the 4 mm gel
-    /// for wide patches). It determines force and slip; tactile images are computed from a model of their own.
+    /// Contact of the gel pads: friction, and the compliance of gel and sensor per contact area (a model of the 4 mm
+    /// gel for wide patches). It determines force and slip; tactile images are computed from a model of their own.
     pub struct PadSpec {
         /// Normal stress per indentation.
         normal_modulus: f64 = 3e8, "Pa/m", Range::POSITIVE;
@@ -118,11 +119,11 @@ softvt_common::settings! {
 }
 
 softvt_common::settings! {
-    /// Random offset between the commanded and the executed tool pose: a stationary Gauss–Markov process per axis (Gardiner,
-    /// *Stochastic Methods*, 2009, 4.5.4), different in every episode. Off by default.
+    /// Random offset between the commanded and the executed tool pose: a stationary Gauss–Markov process per axis
+    /// (Gardiner, *Stochastic Methods*, 2009, 4.5.4), different in every episode. Off by default.
     ///
-    /// Demonstrations that are recorded with it hold the expert's commands, not the disturbed ones, and so show how to correct
-    /// deviations (Laskey et al., *DART*, 2017).
+    /// Demonstrations that are recorded with it hold the expert's commands, not the disturbed ones, and so show how to
+    /// correct deviations (Laskey et al., *DART*, 2017).
     pub struct DisturbanceSpec {
         /// Standard deviation of the position along each axis.
         position: f64 = 0.0, "m", Range::closed(0.0, 0.05);

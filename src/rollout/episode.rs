@@ -355,8 +355,8 @@ impl Episode {
     /// the state is invalid.
     ///
     /// # Errors
-    /// The controller fails with an error that is not confined to the episode, a sensor stream cannot be computed, or the
-    /// process is [cancelled](softvt_common::cancel).
+    /// The controller fails with an error that is not confined to the episode, a sensor stream cannot be computed, or
+    /// the process is [cancelled](softvt_common::cancel).
     pub fn run(mut self, controller: &mut dyn Controller) -> Result<FinishedEpisode, EpisodeError> {
         let mut action = self.start_hold;
         let streams = controller.streams();

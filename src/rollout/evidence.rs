@@ -152,8 +152,8 @@ impl EvidenceCollector {
         }
     }
 
-    /// Indices of the objects whose support of the target counts: the one at the goal and, for a container, the objects in
-    /// it that it carries, directly or by one another.
+    /// Indices of the objects whose support of the target counts: the one at the goal and, for a container, the objects
+    /// in it that it carries, directly or by one another.
     fn carriers(&self, sim: &Simulation, goal_w: &Pose) -> Vec<usize> {
         let mut carriers = vec![self.goal];
         if !matches!(self.region, GoalRegion::Inside { .. }) {

@@ -67,8 +67,8 @@ pub fn check_goal(task: &Task, sim: &Simulation, cache: &AssetCache) -> Result<b
     Ok(GoalInScene::find(task, sim, cache)?.is_object_over(sim))
 }
 
-/// Region in which the object must rest, in the frame of the target at its foot. `None` for `Inside` an object without a
-/// cavity.
+/// Region in which the object must rest, in the frame of the target at its foot. `None` for `Inside` an object without
+/// a cavity.
 fn goal_region(kind: GoalKind, target: &ObjectInstance, cache: &AssetCache) -> Option<GoalRegion> {
     match kind {
         GoalKind::On => Some(GoalRegion::On { radius_m: 0.5 * target.bounds.size().xy().min() }),

@@ -96,8 +96,8 @@ impl RobotInstance {
         }
     }
 
-    /// Commands where the tool (base frame) and the gripper should be at the end of a control step. The robot responds in the
-    /// next control step, or `spec.latency` steps later; until then it follows the earlier commands.
+    /// Commands where the tool (base frame) and the gripper should be at the end of a control step. The robot responds
+    /// in the next control step, or `spec.latency` steps later; until then it follows the earlier commands.
     pub fn command(&mut self, world: &mut World, pose_b: Pose, grip: GripTarget) {
         self.delayed.push_back(DelayedCommand { pose_b, grip });
         if self.delayed.len() <= self.spec.latency as usize {

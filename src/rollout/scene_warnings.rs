@@ -8,8 +8,8 @@ use softvt_geometry::pieces::SeparatePieces;
 use softvt_robot::gripper::MAX_WIDTH;
 use softvt_scene::{Asset, Body, Scene, SoftMaterial};
 
-/// Warnings about a scene of a task, one line each: materials, soft bodies of few voxels, rigid bodies of several pieces, and a target
-/// that the gripper cannot grasp.
+/// Warnings about a scene of a task, one line each: materials, soft bodies of few voxels, rigid bodies of several
+/// pieces, and a target that the gripper cannot grasp.
 pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSet<String> {
     let warnings = |asset: &Asset| {
         let name = asset.name.clone();

@@ -1,8 +1,8 @@
 //! Errors of the sensors: noise and wear of the tactile sensors (settings `tactile.wear.*`), and those of the measured
 //! gripper width (`robot.width_sensor.*`), applied to exact readings.
 //!
-//! Constant errors belong to a finger and an episode; noise also to the physics step. All come from the sensor stream of the
-//! episode, so a reading does not depend on when or how often it is computed.
+//! Constant errors belong to a finger and an episode; noise also to the physics step. All come from the sensor stream
+//! of the episode, so a reading does not depend on when or how often it is computed.
 
 use softvt_benchmark::seed::{
     EpisodeSeed, RandomStream, keyed_rng, rough_normal, standard_normal, uniform, uniform_integer,

@@ -1,5 +1,6 @@
-//! Sensors of a simulation and their checks before an episode: images, tactile readings, forces and proprioception. Each is a pure function of a
-//! [`WorldSnapshot`] (a state of the world), so that it can be computed on demand, also after the episode.
+//! Sensors of a simulation and their checks before an episode: images, tactile readings, forces and proprioception.
+//! Each is a pure function of a [`WorldSnapshot`] (a state of the world), so that it can be computed on demand, also
+//! after the episode.
 
 use std::sync::Arc;
 
@@ -494,8 +495,8 @@ pub struct StateRecording {
     pub sensors: Sensors,
     /// The settled state and the state after each control step.
     pub frames: Vec<WorldSnapshot>,
-    /// The target's largest D over the physics steps of each control step, % of the settled diagonal, after 0 for the settled state;
-    /// `None` for a rigid target.
+    /// The target's largest D over the physics steps of each control step, % of the settled diagonal, after 0 for the
+    /// settled state; `None` for a rigid target.
     pub worst_d_pct: Vec<Option<f64>>,
 }
 

@@ -1,5 +1,5 @@
-//! What there is to run, in the working folder and in the library of the binary: suites, tasks, assets, policies, profiles and
-//! settings, one JSON object each.
+//! What there is to run, in the working folder and in the library of the binary: suites, tasks, assets, policies,
+//! profiles and settings, one JSON object each.
 
 use std::{collections::BTreeSet, path::Path};
 

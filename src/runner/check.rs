@@ -31,8 +31,8 @@ impl<'a> SuiteChecker<'a> {
         Self { config, script, scenes: ScenePool::new(script), assets, sensor_assets }
     }
 
-    /// Builds and checks the first scene of every task on all processors, gives their warnings to `warn`, and reads the limits
-    /// of their objects. Nothing is rendered; a scene settles only if its goal may hold at the start.
+    /// Builds and checks the first scene of every task on all processors, gives their warnings to `warn`, and reads the
+    /// limits of their objects. Nothing is rendered; a scene settles only if its goal may hold at the start.
     ///
     /// # Errors
     /// A setting, a scene, a sensor or a calibration file that is not valid; a request to stop.

@@ -1,4 +1,5 @@
-//! `softvt.conditions`: every suite as it is (the reference) and under each condition, one run folder each, and their comparison.
+//! `softvt.conditions`: every suite as it is (the reference) and under each condition, one run folder each, and their
+//! comparison.
 
 use std::path::{Path, PathBuf};
 
@@ -35,9 +36,9 @@ struct ConditionCase {
     not_applicable: Option<String>,
 }
 
-/// Runs every suite of a script as it is and under each of its conditions, into folders below `out`. All scenes and folders are
-/// checked before the first episode runs. `on_suite` is called with the tables so far after each suite. Returns the table of each
-/// suite.
+/// Runs every suite of a script as it is and under each of its conditions, into folders below `out`. All scenes and
+/// folders are checked before the first episode runs. `on_suite` is called with the tables so far after each suite.
+/// Returns the table of each suite.
 ///
 /// # Errors
 /// A script without conditions, a condition that does not fit a suite, a folder that contains a run, or an episode that

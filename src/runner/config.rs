@@ -259,8 +259,8 @@ impl RunConfig {
         thread_count(self.threads)
     }
 
-    /// Runs the jobs `0..count` of a list on the threads of the configuration until one fails or a stop is requested. `finish`
-    /// takes each result and returns the line of progress for the observer.
+    /// Runs the jobs `0..count` of a list on the threads of the configuration until one fails or a stop is requested.
+    /// `finish` takes each result and returns the line of progress for the observer.
     ///
     /// # Errors
     /// A job or `finish` fails.

@@ -90,7 +90,8 @@ impl<'a> EpisodeList<'a> {
 
     /// The episode at a position below [`EpisodeList::len`].
     pub fn job(&self, position: usize) -> EpisodeJob<'a> {
-        // The k-th omitted position has k before it, so the number of remaining ones before it does not decrease with k.
+        // The k-th omitted position has k before it, so the number of remaining ones before it does not decrease with
+        // k.
         let mut before = (0, self.omitted.len());
         while before.0 < before.1 {
             let middle = before.0.midpoint(before.1);

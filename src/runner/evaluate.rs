@@ -216,8 +216,8 @@ pub(crate) fn with_kept(
     }
 }
 
-/// Runs the episodes of a prepared suite into its folder, and calls `on_episode` for each one that it has run and written, in
-/// the order in which they end. Episodes that are there already are kept.
+/// Runs the episodes of a prepared suite into its folder, and calls `on_episode` for each one that it has run and
+/// written, in the order in which they end. Episodes that are there already are kept.
 ///
 /// # Errors
 /// The folder contains another run, or one that may not be resumed; a script, policy or file fails; or the run is
@@ -281,7 +281,8 @@ pub(crate) fn run_suite(
     Ok(SuiteResult { summary: log.summary(), records: log.records })
 }
 
-/// Runs the episodes of a prepared suite and writes nothing. Calls `on_episode` for each, in the order in which they end.
+/// Runs the episodes of a prepared suite and writes nothing. Calls `on_episode` for each, in the order in which they
+/// end.
 ///
 /// # Errors
 /// A script or policy fails, or a request to stop.
@@ -352,7 +353,8 @@ pub(crate) fn episode_line(record: &EpisodeRecord) -> String {
 }
 
 /// Restores requested files of finished episodes that are missing: by the recorded actions, or without these by the
-/// policy unless it is in another program. Files that cannot be restored are reported; the results of their episodes stay.
+/// policy unless it is in another program. Files that cannot be restored are reported; the results of their episodes
+/// stay.
 ///
 /// # Errors
 /// An episode cannot be run, or a file cannot be written.

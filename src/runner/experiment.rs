@@ -81,8 +81,8 @@ fn cell(value: Option<&Value>) -> String {
     }
 }
 
-/// Runs all points of the experiment that a script returned. With an output folder, the rows and the files of the script are
-/// written into it; without one, the files of the script are written below the working folder.
+/// Runs all points of the experiment that a script returned. With an output folder, the rows and the files of the
+/// script are written into it; without one, the files of the script are written below the working folder.
 ///
 /// # Errors
 /// The script fails or tells a problem, a setting or the seed changes nothing, or a file cannot be written.
@@ -189,8 +189,8 @@ fn input_error(config: &RunConfig, error: &ExperimentInputError) -> RunError {
     config.error_of(field, error.path().unwrap_or_default(), error)
 }
 
-/// Refuses to write files into the project that were made with changed settings, another seed or an option that says so:
-/// they would be taken for the nominal ones, such as the calibration of an asset.
+/// Refuses to write files into the project that were made with changed settings, another seed or an option that says
+/// so: they would be taken for the nominal ones, such as the calibration of an asset.
 fn refuse_changed_project_files(config: &RunConfig, loaded: &LoadedScript) -> Result<(), RunError> {
     let message = "give an output folder: this experiment can write files, and those made with it must not replace the files \
                    of the project";

@@ -1,4 +1,5 @@
-//! Growth of the cost with the nodes of a soft body, with the number of bodies, with threads, and with the pixels of an image.
+//! Growth of the cost with the nodes of a soft body, with the number of bodies, with threads, and with the pixels of an
+//! image.
 
 use std::sync::Arc;
 
@@ -71,8 +72,8 @@ pub fn table(curves: &[GrowthCurve]) -> String {
     curves.iter().map(of_curve).collect::<Vec<_>>().join("\n")
 }
 
-/// Measures all curves on this machine; images and threads in the first task of the suite `script`, with up to `threads`
-/// episodes at a time. `on_stage` is told what is measured next.
+/// Measures all curves on this machine; images and threads in the first task of the suite `script`, with up to
+/// `threads` episodes at a time. `on_stage` is told what is measured next.
 ///
 /// # Errors
 /// The suite cannot be loaded or run, a squeeze does not converge, or a request to stop.

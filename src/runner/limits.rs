@@ -1,9 +1,9 @@
 //! Deformation limits of the objects of an episode.
 //!
 //! A limit is looked up for every soft object that the scene of an episode has, by the name of its asset and the
-//! fingerprint of the asset as its file defines it. A layout or shift that changes stiffness, density, friction, colour or
-//! scale leaves the limit valid ([`Object::departure`]). An instance with another stable strain has a limit of its own, read
-//! off the press of the asset.
+//! fingerprint of the asset as its file defines it. A layout or shift that changes stiffness, density, friction, colour
+//! or scale leaves the limit valid ([`Object::departure`]). An instance with another stable strain has a limit of its
+//! own, read off the press of the asset.
 
 use std::{
     collections::{BTreeMap, BTreeSet},

@@ -1,8 +1,9 @@
 //! Runs: the episodes of suites under a policy, into folders that can be continued, merged, replayed and reported.
 //!
-//! A [`Runner`] runs the suites of a script, [`conditions`] runs them under changes, [`recording`] makes datasets of them, and
-//! [`replay`] simulates recorded episodes again. [`SuiteRun`] is below all of them: a suite with everything that its episodes
-//! need; [`PreparedRun`] is one whose scenes are valid, with the limits of their objects. Nothing here prints: progress and messages go to an [`Observer`].
+//! A [`Runner`] runs the suites of a script, [`conditions`] runs them under changes, [`recording`] makes datasets of
+//! them, and [`replay`] simulates recorded episodes again. [`SuiteRun`] is below all of them: a suite with everything
+//! that its episodes need; [`PreparedRun`] is one whose scenes are valid, with the limits of their objects. Nothing
+//! here prints: progress and messages go to an [`Observer`].
 #![warn(missing_docs, unreachable_pub)]
 
 pub mod catalog;

@@ -9,8 +9,8 @@ pub trait Observer: Send + Sync {
         let _ = message;
     }
 
-    /// Work begins that can take seconds and has no results of its own, such as `checking the scenes`. It ends with the next
-    /// call of `begin`, `end` or this function.
+    /// Work begins that can take seconds and has no results of its own, such as `checking the scenes`. It ends with the
+    /// next call of `begin`, `end` or this function.
     fn work(&self, what: &str) {
         let _ = what;
     }

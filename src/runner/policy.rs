@@ -406,8 +406,8 @@ impl PolicyConfig {
         })
     }
 
-    /// A policy in Rust, under this name in the results. `start` makes it for each episode; of each chunk of actions, all are
-    /// executed unless `replan` is set.
+    /// A policy in Rust, under this name in the results. `start` makes it for each episode; of each chunk of actions,
+    /// all are executed unless `replan` is set.
     ///
     /// # Errors
     /// A built-in policy has the name.

@@ -1,7 +1,8 @@
 //! Comparison of a policy's answers with the actions of demonstrations that it should know.
 //!
 //! The demonstrations are simulated again. At every request the policy sees the observation of a run, and its answer is
-//! compared with the recorded action, which is executed. Actions are compared as displacements from the measured tool pose.
+//! compared with the recorded action, which is executed. Actions are compared as displacements from the measured tool
+//! pose.
 
 use std::{
     path::Path,

@@ -1,7 +1,7 @@
 //! Rates: how many observations this machine makes per second.
 //!
-//! The expert of a suite solves its first task again and again, without sensor streams and with them. Rates count control steps
-//! from the first action to the last; the scene settles and its appearance is made before.
+//! The expert of a suite solves its first task again and again, without sensor streams and with them. Rates count
+//! control steps from the first action to the last; the scene settles and its appearance is made before.
 
 use std::time::Instant;
 
@@ -100,7 +100,8 @@ impl StreamRate {
     }
 }
 
-/// Measures the rates of this machine in the suite `script`, with up to `threads` episodes at a time. `on_stage` is told what is measured next.
+/// Measures the rates of this machine in the suite `script`, with up to `threads` episodes at a time. `on_stage` is
+/// told what is measured next.
 ///
 /// # Errors
 /// The suite cannot be loaded or run, e.g. because a file of the working folder replaces one of it.

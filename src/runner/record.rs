@@ -39,12 +39,13 @@ impl DemoCount {
     }
 }
 
-/// Records demonstrations of the selected tasks of every suite of a script, by the policy that `policy_of` returns for the teacher of
-/// the suite. Returns `None` if the folder contains the complete recording. The policy, the output, the number of episodes, the shard,
-/// the trace and the videos of the configuration are ignored.
+/// Records demonstrations of the selected tasks of every suite of a script, by the policy that `policy_of` returns for
+/// the teacher of the suite. Returns `None` if the folder contains the complete recording. The policy, the output, the
+/// number of episodes, the shard, the trace and the videos of the configuration are ignored.
 ///
 /// # Errors
-/// The script has no suite, the folder contains something else, an attempt or a file fails, or too few attempts are good.
+/// The script has no suite, the folder contains something else, an attempt or a file fails, or too few attempts are
+/// good.
 pub fn record(
     ConfiguredScript { config, script }: &ConfiguredScript,
     policy_of: impl Fn(Teacher) -> PolicyOptions,

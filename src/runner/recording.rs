@@ -87,8 +87,8 @@ pub struct SuiteRecording<'a> {
 }
 
 impl<'a> SuiteRecording<'a> {
-    /// Prepares a recording of at most the attempts `jobs`. `customize` gives the run its controllers, which record the intent
-    /// to grip.
+    /// Prepares a recording of at most the attempts `jobs`. `customize` gives the run its controllers, which record the
+    /// intent to grip.
     ///
     /// # Errors
     /// A setting or scene that is not valid, or a secret seed.
@@ -422,8 +422,8 @@ impl RecordingSummary {
     }
 }
 
-/// Records a dataset. `request` describes it in `recording.json`; `prepare` returns its prepared suites. Returns `None` if the
-/// folder contains this very dataset already.
+/// Records a dataset. `request` describes it in `recording.json`; `prepare` returns its prepared suites. Returns `None`
+/// if the folder contains this very dataset already.
 ///
 /// # Errors
 /// The folder contains something else, an attempt or a file fails, or too few attempts are good.

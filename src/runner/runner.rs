@@ -134,12 +134,13 @@ impl<'a> Runner<'a> {
         Self { is_numbered: true, ..self }
     }
 
-    /// Runs the episodes, and calls `on_episode` for each one that it has run, in the order in which they end. Returns the
-    /// results of each suite, with the episodes that the output folder had before.
+    /// Runs the episodes, and calls `on_episode` for each one that it has run, in the order in which they end. Returns
+    /// the results of each suite, with the episodes that the output folder had before.
     ///
     /// # Errors
-    /// The script has no suite; a scene, a setting or the policy is not valid; a folder contains something else; a trace, a video
-    /// or a resumed run without an output folder; or a request to stop. Finished episodes are kept in the output folder.
+    /// The script has no suite; a scene, a setting or the policy is not valid; a folder contains something else; a
+    /// trace, a video or a resumed run without an output folder; or a request to stop. Finished episodes are kept in
+    /// the output folder.
     pub fn run(&self, mut on_episode: impl FnMut(&EpisodeRecord)) -> Result<Vec<SuiteResult>, RunError> {
         let (config, plan) = (&self.config, &self.script.plan);
         let is_list = matches!(plan, Plan::Suites { .. });

@@ -47,8 +47,8 @@ fn recording_folder(file: &Path) -> Result<Option<String>, RunError> {
     Ok(manifest["folder"].as_str().map(str::to_owned))
 }
 
-/// Makes the folder that has `script` the working folder: the present one, `stored`, or one above `path`. Returns `path`
-/// from there.
+/// Makes the folder that has `script` the working folder: the present one, `stored`, or one above `path`. Returns
+/// `path` from there.
 fn enter(
     path: &Path,
     script: &str,

@@ -32,7 +32,8 @@ const MAX_SCANNED_EPISODES: usize = 100;
 
 /// A suite with everything that its episodes need: [`SuiteRun::run_episode`] runs single episodes.
 ///
-/// [`SuiteRun::prepare`] checks the scenes and reads the limits. A [`Runner`](super::Runner) does that and runs all episodes.
+/// [`SuiteRun::prepare`] checks the scenes and reads the limits. A [`Runner`](super::Runner) does that and runs all
+/// episodes.
 pub struct SuiteRun<'a> {
     /// Configuration of the run.
     pub config: &'a RunConfig,
@@ -232,8 +233,8 @@ impl<'a> SuiteRun<'a> {
         Ok(())
     }
 
-    /// Builds the scenes of the first episodes of each task, returns the calibrations of their assets, and reports objects
-    /// without a limit. A layout that fails ends the scan of its task; the episode itself reports the error.
+    /// Builds the scenes of the first episodes of each task, returns the calibrations of their assets, and reports
+    /// objects without a limit. A layout that fails ends the scan of its task; the episode itself reports the error.
     ///
     /// # Errors
     /// A calibration file that is not valid.
@@ -370,8 +371,8 @@ impl<'a> SuiteRun<'a> {
         }
     }
 
-    /// Connects to the policy server, renders once what the policy observes at the start of the first episode of each task,
-    /// and reads the deformation limits of all objects.
+    /// Connects to the policy server, renders once what the policy observes at the start of the first episode of each
+    /// task, and reads the deformation limits of all objects.
     ///
     /// # Errors
     /// A layout, calibration file, camera, light or tactile sensor that is not valid; a server that cannot be reached.
@@ -446,7 +447,8 @@ impl<'a> SuiteRun<'a> {
         Ok(force_observed)
     }
 
-    /// Refuses shifts that change neither the scene nor the prompt of any task, unless their values are the nominal ones.
+    /// Refuses shifts that change neither the scene nor the prompt of any task, unless their values are the nominal
+    /// ones.
     fn refuse_shifts_without_effect(&self) -> Result<(), RunError> {
         let is_nominal = |shift: &ShiftValue| {
             let declared = self.suite.shifts.iter().find(|declared| declared.name == shift.name);
@@ -477,7 +479,8 @@ impl<'a> SuiteRun<'a> {
             let sim = Simulation::new(scene.clone(), &settings.physics, &settings.robot, &self.assets)?;
             sim.check_support()?;
             if check_goal(task, &sim, &self.assets)? {
-                // Whether it holds is known once the scene has settled, with masses and contacts that are not approximate.
+                // Whether it holds is known once the scene has settled, with masses and contacts that are not
+                // approximate.
                 let id = self.episode_id(task, 0);
                 let spec = EpisodeSpec::new(id, "noop", task, &scene, Scene::clone(&scene), settings);
                 Episode::start(spec, &AssetCache::default(), &self.sensor_assets)?;

@@ -112,8 +112,8 @@ impl Camera {
         }
     }
 
-    /// Intrinsic matrix, pixels, for the axes of OpenCV: x to the right, y down, z forward. The image begins at (0, 0), so that the
-    /// centre of its first pixel is at (0.5, 0.5).
+    /// Intrinsic matrix, pixels, for the axes of OpenCV: x to the right, y down, z forward. The image begins at (0, 0),
+    /// so that the centre of its first pixel is at (0.5, 0.5).
     pub fn intrinsic(&self) -> [[f64; 3]; 3] {
         let focal = 0.5 * self.height as f64 / (0.5 * self.fovy_rad).tan();
         [[focal, 0.0, 0.5 * self.width as f64], [0.0, focal, 0.5 * self.height as f64], [0.0, 0.0, 1.0]]

@@ -11,8 +11,8 @@ use softvt_common::text::hex;
 use softvt_geometry::shape::Shape;
 use softvt_physics::contact::Friction;
 
-/// Content of the fingerprint of an asset. Calibration files store the hashes: the names of these fields, and of those of
-/// the types below them, must not change.
+/// Content of the fingerprint of an asset. Calibration files store the hashes: the names of these fields, and of those
+/// of the types below them, must not change.
 #[derive(Serialize)]
 struct Mechanics<'a> {
     shape: Shape,
@@ -47,8 +47,8 @@ impl<'a> PartMechanics<'a> {
 impl Asset {
     /// Hash of everything that a calibration depends on: shape, body with its material and resolution, and friction.
     ///
-    /// 16 hexadecimal digits of the SHA-256 of a canonical JSON text. Appearance, hints and name do not enter. Numbers have seven
-    /// significant digits, since trigonometric functions differ between platforms in the last bits.
+    /// 16 hexadecimal digits of the SHA-256 of a canonical JSON text. Appearance, hints and name do not enter. Numbers
+    /// have seven significant digits, since trigonometric functions differ between platforms in the last bits.
     pub fn fingerprint(&self) -> String {
         let body = match &self.body {
             Body::Soft(material) => BodyMechanics::Soft(material),

@@ -63,8 +63,8 @@ pub use scale::LENGTH_HINT;
 pub use variation::{CameraVariation, HiddenProperties, LightVariation, ObjectVariation, SceneVariation};
 pub use visual::{Mask, Visual, VisualLayer};
 
-/// Largest number of objects of a scene, and of bodies that are drawn, among them the parts of articulated objects and of
-/// the robot.
+/// Largest number of objects of a scene, and of bodies that are drawn, among them the parts of articulated objects and
+/// of the robot.
 pub const MAX_OBJECTS: usize = 1000;
 /// Segmentation id of the robot. Objects have ids from 1 in the order of the scene, each followed by its parts.
 pub const ROBOT_SEGMENTATION_ID: u16 = 1000;
@@ -129,8 +129,8 @@ pub struct Scene {
 impl Object {
     /// Reason why the deformation limit of the nominal asset does not hold for this object; `None` if it does.
     ///
-    /// D is a strain over a diagonal, so that a limit holds whatever the stiffness, density, friction, colour or uniform
-    /// scale. Poisson's ratio changes how a shape deforms under the same strain.
+    /// D is a strain over a diagonal, so that a limit holds whatever the stiffness, density, friction, colour or
+    /// uniform scale. Poisson's ratio changes how a shape deforms under the same strain.
     pub fn departure(&self) -> Option<String> {
         let [own, nominal] = [self.asset.elastic()?.poisson(), self.nominal.elastic()?.poisson()];
         (own != nominal).then(|| format!("Poisson's ratio {own} instead of {nominal}"))

@@ -112,8 +112,8 @@ impl SceneVariation {
         mount == CameraMount::World
     }
 
-    /// Changes the scene. Sizes and material numbers are multiplied, so that those of the layout still count. Names that
-    /// the scene does not contain are ignored.
+    /// Changes the scene. Sizes and material numbers are multiplied, so that those of the layout still count. Names
+    /// that the scene does not contain are ignored.
     ///
     /// # Errors
     /// As [`ObjectVariation::apply`].

@@ -1,8 +1,8 @@
 //! Lua: the only module that knows it.
 //!
 //! Layers, each of which uses those before it: `vm` (the sandboxed virtual machine), `schema` (declarations of records,
-//! classes and functions, and checks by them), `api` (everything a script can reach as `softvt.…`), `plan` (loading a file),
-//! `run` (episodes, experts, experiments). [`stubs`] writes the declarations for language servers and readers.
+//! classes and functions, and checks by them), `api` (everything a script can reach as `softvt.…`), `plan` (loading a
+//! file), `run` (episodes, experts, experiments). [`stubs`] writes the declarations for language servers and readers.
 #![warn(missing_docs, unreachable_pub)]
 
 mod api;

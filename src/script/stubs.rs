@@ -29,8 +29,8 @@ fn functions() -> impl Iterator<Item = &'static Signature> {
     declared.chain([&api::SORTED])
 }
 
-/// Every table that a script may write: those of constructors, those that its functions return, and those that functions and
-/// methods take, each followed by the tables nested in it.
+/// Every table that a script may write: those of constructors, those that its functions return, and those that
+/// functions and methods take, each followed by the tables nested in it.
 fn records() -> Vec<&'static Record> {
     fn add(records: &mut Vec<&'static Record>, record: &'static Record) {
         if !records.iter().any(|known| known.class == record.class) {

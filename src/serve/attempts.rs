@@ -1,8 +1,8 @@
 //! Attempts of clients at the episodes that the server records.
 //!
-//! An episode is recorded at most once, and a client cannot choose among several results: only the attempt that executes
-//! the first action of the episode on this server counts, and only if it steps the episode from its reset to its end.
-//! Until then no other client can step the episode, so that none tries out actions for it.
+//! An episode is recorded at most once, and a client cannot choose among several results: only the attempt that
+//! executes the first action of the episode on this server counts, and only if it steps the episode from its reset to
+//! its end. Until then no other client can step the episode, so that none tries out actions for it.
 
 use std::{collections::BTreeMap, fmt, sync::Mutex};
 

@@ -60,7 +60,8 @@ pub(super) struct Connection<'a> {
 }
 
 impl<'a> Connection<'a> {
-    /// Accepts a websocket, unless `check` refuses the request: then the client receives the HTTP status and the reason.
+    /// Accepts a websocket, unless `check` refuses the request: then the client receives the HTTP status and the
+    /// reason.
     ///
     /// # Errors
     /// The client does not complete the handshake, or is refused.

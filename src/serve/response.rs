@@ -107,8 +107,8 @@ fn encoded(observation: &Observation, profile: &Profile) -> Value {
     Value::Map(profile.inputs.iter().filter_map(entry).collect())
 }
 
-/// The cameras of the scene by name: size in pixels, intrinsic matrix, and pose in the base frame as a matrix (4, 4), its axes as
-/// in OpenGL.
+/// The cameras of the scene by name: size in pixels, intrinsic matrix, and pose in the base frame as a matrix (4, 4),
+/// its axes as in OpenGL.
 pub(super) fn cameras(live: &LiveEpisode) -> Value {
     let cameras = &live.episode.sim.scene.cameras;
     let entries = cameras.iter().zip(live.episode.cameras_b()).map(|(camera, camera_b)| {
@@ -125,8 +125,8 @@ pub(super) fn cameras(live: &LiveEpisode) -> Value {
     typed("cameras", [("cameras", map(entries))])
 }
 
-/// What clients with access to the true state need to read it: the goal, the pose of the robot's base in the world, and the names of all
-/// objects by their number in segmentations, from 1.
+/// What clients with access to the true state need to read it: the goal, the pose of the robot's base in the world, and
+/// the names of all objects by their number in segmentations, from 1.
 fn scene(live: &LiveEpisode, config: &ServerConfig) -> serde_json::Value {
     let id = &live.state.id;
     let mut tasks =

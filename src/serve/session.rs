@@ -149,8 +149,8 @@ impl<'a> ClientSession<'a> {
         response::transition("step", self.live("step")?, config, Some(Executed { count: executed, recorded }))
     }
 
-    /// Records the episode if it is over and this attempt at it counts. Returns whether it was recorded; `None` before the
-    /// end, and if the server records nothing.
+    /// Records the episode if it is over and this attempt at it counts. Returns whether it was recorded; `None` before
+    /// the end, and if the server records nothing.
     fn record_if_over(&mut self) -> Result<Option<bool>, RequestError> {
         let Some(live) = self.live.as_ref().filter(|live| live.episode.outcome().is_some()) else {
             return Ok(None);

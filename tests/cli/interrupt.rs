@@ -118,8 +118,8 @@ fn await_message(err: ChildStderr, part: &str, count: usize) -> BufReader<ChildS
     messages
 }
 
-/// Starts softvt, waits until scripts have printed "begun" `count` times, and for `longer`, and sends a signal. Returns exit
-/// code, time from the signal to the end, and the messages of that time.
+/// Starts softvt, waits until scripts have printed "begun" `count` times, and for `longer`, and sends a signal. Returns
+/// exit code, time from the signal to the end, and the messages of that time.
 fn interrupted(
     project: &Project,
     words: &[&str],

@@ -10,8 +10,8 @@ use tungstenite::{Message, WebSocket, accept};
 
 use crate::support::{Project, Small, client::array};
 
-/// Starts a server that answers every observation with twelve actions of these numbers, and states its grip code. Returns its
-/// address.
+/// Starts a server that answers every observation with twelve actions of these numbers, and states its grip code.
+/// Returns its address.
 fn server(code: &'static str, action: [f64; 7]) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = format!("ws://{}", listener.local_addr().expect("an address"));

@@ -148,7 +148,8 @@ fn soft_cubes_that_meet_at_two_metres_a_second_do_not_enter_each_other() {
     assert!(nearest < 1e-3 && nearest > -2e-3, "{nearest} m apart at the nearest");
 }
 
-/// The deepest that any material of a soft body is behind the surface of `shape`, m; sampled four times along an element's edge.
+/// The deepest that any material of a soft body is behind the surface of `shape`, m; sampled four times along an
+/// element's edge.
 fn depth(body: &FemState, shape: &Shape) -> f64 {
     let mesh = &body.model.mesh;
     let inside = (0..64).map(|i| Vec3::new((i % 4) as f64, (i / 4 % 4) as f64, (i / 16) as f64) / 3.0);

@@ -11,9 +11,9 @@ use serde_json::Value;
 pub mod client;
 pub mod fixtures;
 
-/// `solids.lua` for small scenes: a floor, a slab, a cube that rests stably on it, and a function for others. For goals that
-/// are reached within a second: a shelf, the place of a cube on it that is between the open fingers at the start, and the
-/// motion that pushes the cube to the middle of the shelf.
+/// `solids.lua` for small scenes: a floor, a slab, a cube that rests stably on it, and a function for others. For goals
+/// that are reached within a second: a shelf, the place of a cube on it that is between the open fingers at the start,
+/// and the motion that pushes the cube to the middle of the shelf.
 pub const SOLIDS: (&str, &str) = (
     "solids.lua",
     r#"

@@ -84,9 +84,9 @@ fn invalid_joints_and_parts_are_refused() {
     assert_snapshot!(refusal(TRAY, "chest.drawer"), @r#"x.lua:13: task.goal.target: unknown object "chest.drawer"; did you mean "chest.tray"?"#);
 }
 
-/// Forces of the pads on the handle of a drawer of the standard cabinet. Point `grip`: both pads hold the bar. Point `edge`:
-/// the hand comes wide open, so that the lower finger stops at the handle below and the edge of a pad meets the bar
-/// obliquely; nothing has friction.
+/// Forces of the pads on the handle of a drawer of the standard cabinet. Point `grip`: both pads hold the bar. Point
+/// `edge`: the hand comes wide open, so that the lower finger stops at the handle below and the edge of a pad meets the
+/// bar obliquely; nothing has friction.
 const HANDLE: &str = r#"local floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 2, 2, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} }
 local wooden_cabinet = require "assets.wooden_cabinet"
 local function layout(name, has_friction)

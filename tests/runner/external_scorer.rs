@@ -1,5 +1,5 @@
-//! An independent scorer, written from the rules of the released one. It reads `softvtbench/` of a run and must compute the
-//! same rates.
+//! An independent scorer, written from the rules of the released one. It reads `softvtbench/` of a run and must compute
+//! the same rates.
 
 use std::{collections::BTreeMap, fs, path::Path};
 

@@ -1,10 +1,11 @@
-//! A grasp that ends by its force: the pads press with it on average, however heavy the object, however soft, and wherever it stands
-//! between them.
+//! A grasp that ends by its force: the pads press with it on average, however heavy the object, however soft, and
+//! wherever it stands between them.
 
 use crate::support::Project;
 
-/// Closes on a cube whose centre is `offset` from the middle of the hand, m, until the pads press with `force`, N. The cube is
-/// `density` times as heavy and `youngs` times as stiff as its asset; the friction of its support makes the pads press unequally.
+/// Closes on a cube whose centre is `offset` from the middle of the hand, m, until the pads press with `force`, N. The
+/// cube is `density` times as heavy and `youngs` times as stiff as its asset; the friction of its support makes the
+/// pads press unequally.
 const GRASP: &str = r#"local grasp = require "experts.grasp"
 local table_top, cube = require "assets.table", require "assets.cube"
 local layouts = {}

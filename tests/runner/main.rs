@@ -1,5 +1,5 @@
-//! Tests of runs by the library: how episodes are judged, what policies and experts do, messages for invalid input, datasets,
-//! reports and servers, with typed results.
+//! Tests of runs by the library: how episodes are judged, what policies and experts do, messages for invalid input,
+//! datasets, reports and servers, with typed results.
 
 mod articulated_objects;
 mod benchmark_validity;

@@ -459,7 +459,8 @@ fn a_dying_server_loses_no_finished_episode() {
     let again = || run(&broken, &address).episodes(3).finish().messages;
     let messages = again();
     assert!(messages.contains("already complete"), "{messages}");
-    // Files of finished episodes are restored from the actions, without the policy; without actions they are reported as lost.
+    // Files of finished episodes are restored from the actions, without the policy; without actions they are reported
+    // as lost.
     let log = "run/softvtbench/task_000/episode_00001/policy_action_debug.jsonl";
     let text = broken.text(log);
     fs::remove_file(broken.path(log)).expect("removed");

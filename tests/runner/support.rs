@@ -1,5 +1,6 @@
-//! Runs of small projects in this process, by the library. Scripts are named by absolute paths, since tests run on threads of
-//! one process and share its working folder, the repository; messages are returned without the folder of the project.
+//! Runs of small projects in this process, by the library. Scripts are named by absolute paths, since tests run on
+//! threads of one process and share its working folder, the repository; messages are returned without the folder of the
+//! project.
 
 use std::{
     path::{Path, PathBuf},
@@ -357,8 +358,8 @@ impl Run<'_> {
         compared().map_err(|error| self.project.relative(error))
     }
 
-    /// Runs the experiment of the script. Returns its rows and its text, or the error. Without an output folder its files
-    /// would be written into the repository.
+    /// Runs the experiment of the script. Returns its rows and its text, or the error. Without an output folder its
+    /// files would be written into the repository.
     pub fn experiment(&self) -> (Vec<ExperimentRow>, Result<String, String>) {
         let (mut rows, mut text) = (Vec::new(), String::new());
         let mut run = || {

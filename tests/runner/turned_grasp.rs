@@ -1,4 +1,5 @@
-//! A grasp that is turned for want of clearance stops by force: the width of the safe window is that of a straight grasp.
+//! A grasp that is turned for want of clearance stops by force: the width of the safe window is that of a straight
+//! grasp.
 
 use crate::support::Project;
 

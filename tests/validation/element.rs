@@ -54,8 +54,8 @@ pub fn patch() -> (f64, f64) {
     (largest(true) / largest(false), body.elastic_energy / exact - 1.0)
 }
 
-/// A bar of `n` voxels across, stretched by 1 % and thinned by ν: recovered Young's modulus, Pa, from the end force, and
-/// the largest side force over the largest end force, which is zero exactly if the bar's own ν is the given one.
+/// A bar of `n` voxels across, stretched by 1 % and thinned by ν: recovered Young's modulus, Pa, from the end force,
+/// and the largest side force over the largest end force, which is zero exactly if the bar's own ν is the given one.
 pub fn bar(n: usize) -> (f64, f64) {
     let (length, side, strain) = (0.1, 0.02, 0.01);
     let mut body = block(Vec3::new(length, side, side), 5 * n, YOUNGS, POISSON);
@@ -93,8 +93,8 @@ pub fn cantilever(n: usize, poisson: f64) -> f64 {
     sum / f64::from(count) / exact
 }
 
-/// Small displacements under `load` with the nodes that are not `free` held: conjugate gradients, the stiffness taken as
-/// the central difference of the body's forces at rest.
+/// Small displacements under `load` with the nodes that are not `free` held: conjugate gradients, the stiffness taken
+/// as the central difference of the body's forces at rest.
 fn solve_linear(mut body: FemState, free: &[bool], load: &[Vec3]) -> Vec<Vec3> {
     let masked = |v: Vec<Vec3>| -> Vec<Vec3> {
         v.into_iter().zip(free).map(|(v, free)| if *free { v } else { Vec3::zeros() }).collect()

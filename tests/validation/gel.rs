@@ -1,5 +1,5 @@
-//! The gel under a ball, against an independent axisymmetric finite-element solution of the same layer (flat, 4 mm thick,
-//! ν 0.475, μ 0.145 MPa, bonded below; a rigid ball of 4 mm).
+//! The gel under a ball, against an independent axisymmetric finite-element solution of the same layer (flat, 4 mm
+//! thick, ν 0.475, μ 0.145 MPa, bonded below; a rigid ball of 4 mm).
 
 use softvt::{
     geometry::Vec3,

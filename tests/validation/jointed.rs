@@ -78,8 +78,9 @@ pub fn period(angle: f64) -> f64 {
     found / (2.0 * std::f64::consts::PI * (2.0 * ROD / (3.0 * GRAVITY)).sqrt() / a)
 }
 
-/// Largest gain of energy in a step, and change of a swing's largest energy within 20 s, of a rod on a hinge, of its energy over hanging. Positions are
-/// those at the ends of steps and velocities those within them, so the energy is that of the middle of a step.
+/// Largest gain of energy in a step, and change of a swing's largest energy within 20 s, of a rod on a hinge, of its
+/// energy over hanging. Positions are those at the ends of steps and velocities those within them, so the energy is
+/// that of the middle of a step.
 pub fn swing(angle: f64) -> [f64; 2] {
     let mut world = pendulum(angle);
     let energy = |before: f64, world: &World| {
@@ -242,7 +243,8 @@ mod tests {
     #[test]
     fn a_drawer_stops_and_slides_as_damping_and_friction_say() {
         for speed in [0.3, 0.5] {
-            // The way is first-order in the step: at 60 Hz it misses 5 % of the closed form, which docs/validation.md says.
+            // The way is first-order in the step: at 60 Hz it misses 5 % of the closed form, which docs/validation.md
+            // says.
             let [coarse, fine] = STEPS.map(|dt| {
                 let [way, exact] = stopping(speed, dt);
                 way / exact - 1.0

@@ -1,7 +1,7 @@
 //! Validation of the mechanics against closed forms and the independent static reference of `tests/reference`.
 //!
-//! Every module holds experiments and the tests that assert their results; `examples/validation/` prints the same experiments
-//! as tables.
+//! Every module holds experiments and the tests that assert their results; `examples/validation/` prints the same
+//! experiments as tables.
 
 #[path = "../bodies/mod.rs"]
 mod bodies;

@@ -102,8 +102,8 @@ pub struct Standing {
 /// Edge of the rounded boxes, m.
 const EDGE: f64 = 0.048;
 
-/// A box and a can, which is turned so that different samples of its rim carry it, and both with rounded edges, which tip over
-/// the outline of the flat that they rest on.
+/// A box and a can, which is turned so that different samples of its rim carry it, and both with rounded edges, which
+/// tip over the outline of the flat that they rest on.
 pub fn standing() -> Vec<Standing> {
     let headed = |angle: f64| turned(at(0.0, 0.0, 0.05), Vec3::z() * angle);
     let tall = cuboid(0.06, 0.08, 0.1);

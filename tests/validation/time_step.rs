@@ -1,4 +1,5 @@
-//! What depends on the time step: not the equilibria, but motion, which the step of implicit Euler damps like a larger β.
+//! What depends on the time step: not the equilibria, but motion, which the step of implicit Euler damps like a larger
+//! β.
 
 use softvt::{
     geometry::{Pose, Vec3, samples::SampleSpec},

@@ -23,8 +23,8 @@ pub(crate) struct CheckArgs {
     policy: PolicyArgs,
 }
 
-/// Loads a script and builds the first scene of every task. Nothing is run or rendered; a scene settles only if its goal may
-/// hold at the start.
+/// Loads a script and builds the first scene of every task. Nothing is run or rendered; a scene settles only if its
+/// goal may hold at the start.
 ///
 /// # Errors
 /// The first thing that is not valid.

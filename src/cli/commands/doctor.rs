@@ -1,5 +1,5 @@
-//! `softvt doctor`: versions, the machine, and a comparison of the physics with the published bits; or a comparison of a
-//! policy with demonstrations.
+//! `softvt doctor`: versions, the machine, and a comparison of the physics with the published bits; or a comparison of
+//! a policy with demonstrations.
 
 use std::{
     path::{Path, PathBuf},
@@ -37,8 +37,8 @@ pub(crate) struct DoctorArgs {
 /// Checks the installation, or a policy.
 ///
 /// # Errors
-/// The golden episode cannot be run, or ends in another state than the published one. The policy cannot be run, or (exit code
-/// 3) its answers do not agree with the demonstrations.
+/// The golden episode cannot be run, or ends in another state than the published one. The policy cannot be run, or
+/// (exit code 3) its answers do not agree with the demonstrations.
 pub(super) fn run(args: &DoctorArgs) -> Result<(), CliError> {
     match (&args.dataset, args.policy.is_given()) {
         (Some(dataset), _) => check_answers(args, dataset),

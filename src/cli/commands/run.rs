@@ -90,8 +90,8 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
     }
 }
 
-/// Runs suites under conditions and prints their tables: policies side by side once all have run, other conditions after
-/// each suite.
+/// Runs suites under conditions and prints their tables: policies side by side once all have run, other conditions
+/// after each suite.
 fn run_conditions(run: &ConfiguredScript, suites: usize, out: &Path, json: bool) -> Result<(), CliError> {
     let print_last = |tables: &[ConditionTable]| -> Result<(), CliError> {
         match tables.last() {

@@ -83,8 +83,8 @@ static STDIN_CLOSED: AtomicBool = AtomicBool::new(false);
 /// Serves the suites of a script until the process is interrupted, or its standard input closes.
 ///
 /// # Errors
-/// The script has no suite, its first episode cannot be rendered, the address is not available, or `--out` holds something
-/// else; in the end, the interrupt.
+/// The script has no suite, its first episode cannot be rendered, the address is not available, or `--out` holds
+/// something else; in the end, the interrupt.
 pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
     match serve(args) {
         Err(end) if end.exit == Exit::Interrupted && STDIN_CLOSED.load(Ordering::Relaxed) => {

@@ -1,5 +1,5 @@
-//! Limits on the structure of a file. A crafted file of a few kilobytes can state arrays and groups without end; they are
-//! refused before memory is allocated for them.
+//! Limits on the structure of a file. A crafted file of a few kilobytes can state arrays and groups without end; they
+//! are refused before memory is allocated for them.
 
 use rust_hdf5::{H5Dataset, H5Group, Hdf5Error, LinkClass, StorageLayout};
 

@@ -178,8 +178,8 @@ impl TaskFile {
         self.data.attr_string(name).ok()
     }
 
-    /// True if the attribute of `/data` of this name is the integer `expected`. rust-hdf5 returns the number of a group as
-    /// text: its bytes up to the first that is 0.
+    /// True if the attribute of `/data` of this name is the integer `expected`. rust-hdf5 returns the number of a group
+    /// as text: its bytes up to the first that is 0.
     pub(crate) fn has_count(&self, name: &str, expected: usize) -> bool {
         let bytes = (expected as u64).to_le_bytes();
         let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());

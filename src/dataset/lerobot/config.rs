@@ -59,7 +59,8 @@ impl LeRobotVersion {
         }
     }
 
-    /// Key of a feature whose name in openpi's and SoftVTBench's data is `name`: v3.0 has those that LeRobot's own policies look for.
+    /// Key of a feature whose name in openpi's and SoftVTBench's data is `name`: v3.0 has those that LeRobot's own
+    /// policies look for.
     pub(super) fn key(self, name: &'static str) -> &'static str {
         match (self, name) {
             (Self::V21, _) => name,

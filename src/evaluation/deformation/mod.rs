@@ -10,10 +10,10 @@
 //! optimum as the SVD with a flipped last singular vector, but it is a proper rotation by construction, also for
 //! flat and collapsed bodies.
 //!
-//! The weights of the score ([`METRIC_ID`]) are the volumes that the nodes stand for, so that D approximates an integral
-//! over the body, whatever its mesh and however it is turned against the voxels. SoftVTBench's released code weights all
-//! nodes alike and takes the box along the axes of the world ([`V1_METRIC_ID`]); that value is reported beside it. The
-//! reference is the settled shape, so sagging under gravity does not count.
+//! The weights of the score ([`METRIC_ID`]) are the volumes that the nodes stand for, so that D approximates an
+//! integral over the body, whatever its mesh and however it is turned against the voxels. SoftVTBench's released code
+//! weights all nodes alike and takes the box along the axes of the world ([`V1_METRIC_ID`]); that value is reported
+//! beside it. The reference is the settled shape, so sagging under gravity does not count.
 
 pub mod series;
 
@@ -93,8 +93,8 @@ struct AlignmentSums {
 }
 
 impl ReferenceShape {
-    /// Prepares a reference from its `nodes` (m, any frame) and one weight per node: the volume or mass that it stands for;
-    /// only ratios matter.
+    /// Prepares a reference from its `nodes` (m, any frame) and one weight per node: the volume or mass that it stands
+    /// for; only ratios matter.
     ///
     /// # Errors
     /// Fewer than three nodes, a node that is not finite, a body without size, or weights that are not one per node,
@@ -125,8 +125,8 @@ impl ReferenceShape {
         Ok(Self { nodes, weights, weighted_centre, bbox_m, diagonal_m })
     }
 
-    /// The same reference, of an object whose axes are the columns of `frame`: the diagonal is that of its bounding box along
-    /// these, so that D does not depend on how the object lies. Without this, the axes are those of the nodes.
+    /// The same reference, of an object whose axes are the columns of `frame`: the diagonal is that of its bounding box
+    /// along these, so that D does not depend on how the object lies. Without this, the axes are those of the nodes.
     #[must_use]
     pub fn along(mut self, frame: &Mat3) -> Self {
         let turned: Vec<Vec3> = self.nodes.iter().map(|x| frame.tr_mul(x)).collect();

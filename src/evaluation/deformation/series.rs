@@ -45,8 +45,8 @@ pub struct SeriesStatistics {
 }
 
 impl DeformationSeries {
-    /// Empty series whose mean, last value, percentile and steps above τ are those of the first `max_steps` measured steps;
-    /// peaks are of all.
+    /// Empty series whose mean, last value, percentile and steps above τ are those of the first `max_steps` measured
+    /// steps; peaks are of all.
     pub fn new(max_steps: usize) -> Self {
         Self { values: vec![0.0; max_steps].into(), ..Self::default() }
     }

@@ -2,8 +2,8 @@
 //!
 //! NoDrop is false from the first of these events on, also when the object is caught again:
 //! - **lost grasp**: the object was lifted at its last pad contact. Since then at least `lost_contact_s` have passed
-//!   without pad contact and without a release command, and its centre has fallen by more than `lost_fall_m` relative to
-//!   the hand. It does not matter whether it has landed meanwhile.
+//!   without pad contact and without a release command, and its centre has fallen by more than `lost_fall_m` relative
+//!   to the hand. It does not matter whether it has landed meanwhile.
 //! - **free fall**: neither the robot nor a support touches the object, and its centre is more than `free_fall_m` below
 //!   its highest point since the last contact, released or not.
 //! - **left goal**: the object has rested at the goal for a control step, and at the end of a later one its centre is

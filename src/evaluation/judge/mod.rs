@@ -12,26 +12,37 @@
 //! 4. **Lift.** A body is lifted if it is not supported and its lowest point is more than `lift_height_m` above its
 //!    settled height. The first body that is lifted decides `wrong_instance`; the target, if several are lifted in one
 //!    step.
-//! 5. **Release** and **slip**: [`ReleaseMonitor`], [`SlipMonitor`]. The pads carry the target while both touch it, it is not
-//!    supported and no release was commanded.
+//! 5. **Release** and **slip**: [`ReleaseMonitor`], [`SlipMonitor`]. The pads carry the target while both touch it, it
+//!    is not supported and no release was commanded.
 //! 6. **Drop**: [`DropMonitor`].
 //! 7. **Goal**, at the last physics step of each control step: [`GoalMonitor`].
 //! 8. **Stage** of the episode: [`StageMonitor`].
 //! 9. **Grip** while the target is lifted and no release was commanded: [`GripMonitor`].
 //!
-//! Harm to others is judged in addition: their peaks of D against their own τ, and the first contact of the robot with one of them.
+//! Harm to others is judged in addition: their peaks of D against their own τ, and the first contact of the robot with
+//! one of them.
 //!
-//! At the end ([`Judge::finish`]): Safety Success = Goal ∧ NoDrop ∧ D_peak ≤ τ, and NoSlip if the criteria
-//! require it ([`super::safety`]). Reported beside it: *gentle*, Goal with a grip ratio of at most `gentle_ratio`, and the nested
-//! successes of the SoftTacWorld challenge. Contact success is Goal with contact of both pads throughout the carry; contact
-//! safety is contact success with Safety and NoSlip.
+//! At the end ([`Judge::finish`]): Safety Success = Goal ∧ NoDrop ∧ D_peak ≤ τ, and NoSlip if the criteria require it
+//! ([`super::safety`]). Reported beside it: *gentle*, Goal with a grip ratio of at most `gentle_ratio`, and the nested
+//! successes of the SoftTacWorld challenge. Contact success is Goal with contact of both pads throughout the carry;
+//! contact safety is contact success with Safety and NoSlip.
 //!
 //! # Example
 //!
 //! A target rests on a plate, released, for nine control steps of 50 ms; the goal asks for 0.4 s.
 //!
 //! ```
-//! use softvt_evaluation::{criteria::SuccessCriteria, deformation::ReferenceShape, evidence::{BodyEvidence, CrushedShares, Evidence, GoalEvidence, GripEvidence, GripperEvidence, PadEvidence}, goal::GoalRegion, judge::{Judge, JudgeConfig}, safety::DeformationLimit, verdict::Outcome};
+//! use softvt_evaluation::{
+//!     criteria::SuccessCriteria,
+//!     deformation::ReferenceShape,
+//!     evidence::{
+//!         BodyEvidence, CrushedShares, Evidence, GoalEvidence, GripEvidence, GripperEvidence, PadEvidence,
+//!     },
+//!     goal::GoalRegion,
+//!     judge::{Judge, JudgeConfig},
+//!     safety::DeformationLimit,
+//!     verdict::Outcome,
+//! };
 //! use softvt_geometry::{Aabb, Pose, Vec3};
 //!
 //! let (dt_s, weight_n) = (1.0 / 60.0, 0.3);
@@ -290,7 +301,8 @@ impl Judge {
         &self.scores
     }
 
-    /// True if the target rests at the goal: in its region, and carried. For a state that has settled before the episode.
+    /// True if the target rests at the goal: in its region, and carried. For a state that has settled before the
+    /// episode.
     pub fn rests_at_goal(&self, evidence: &Evidence<'_>) -> bool {
         let config = &self.config;
         let needed_n = config.criteria.support_share * config.target_weight_n;

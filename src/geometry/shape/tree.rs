@@ -160,8 +160,8 @@ pub enum Shape {
     },
 }
 
-/// The pattern of the shapes that have no parts. A match that lists it in place of `_` does not compile once a shape with parts
-/// is added.
+/// The pattern of the shapes that have no parts. A match that lists it in place of `_` does not compile once a shape
+/// with parts is added.
 macro_rules! without_parts {
     () => {
         Self::Box { .. }

@@ -55,8 +55,8 @@ pub struct Friction {
     pub static_mu: f64,
     /// Coefficient of a surface that slides, not above the static one.
     pub dynamic_mu: f64,
-    /// True for a layer on the surface, such as flour, oil or glaze: it separates the surfaces, so that its coefficients are
-    /// those of any pair.
+    /// True for a layer on the surface, such as flour, oil or glaze: it separates the surfaces, so that its
+    /// coefficients are those of any pair.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub coated: bool,
 }
@@ -89,8 +89,8 @@ impl Friction {
         Self { static_mu, dynamic_mu: Self::COATING_RATIO * static_mu, coated: true }
     }
 
-    /// The coefficients of a pair: those of the coating, the more slippery one if both are coated, and without a coating the
-    /// larger ones.
+    /// The coefficients of a pair: those of the coating, the more slippery one if both are coated, and without a
+    /// coating the larger ones.
     pub fn with(&self, other: &Self) -> Self {
         let pick: fn(f64, f64) -> f64 = match (self.coated, other.coated) {
             (true, false) => return *self,

@@ -1,8 +1,8 @@
 //! Surfaces in contact: colliders with their friction and stiffness. Their detection is internal.
 //!
-//! Soft bodies touch with the samples of their surface: colliders by `detect`, other soft bodies by `detect_soft`. Colliders
-//! touch each other by `CollisionGeometry::find_contacts`: manifolds of rigid bodies. The contacts become contact points of the
-//! solver in [`World`](super::World), and `ContactHistory` keeps their state between steps.
+//! Soft bodies touch with the samples of their surface: colliders by `detect`, other soft bodies by `detect_soft`.
+//! Colliders touch each other by `CollisionGeometry::find_contacts`: manifolds of rigid bodies. The contacts become
+//! contact points of the solver in [`World`](super::World), and `ContactHistory` keeps their state between steps.
 
 mod collider;
 mod contact_history;

@@ -79,8 +79,8 @@ pub struct FemModel {
 /// exponent is that of the fill of nested dissection.
 const FACTOR_BYTES: f64 = 2048.0;
 
-/// Processor time of a simulated second (60 steps) of a body of n nodes at rest on a support over n^(3/2), s: of the order
-/// of that of cubes of 6 to 24 voxels per edge.
+/// Processor time of a simulated second (60 steps) of a body of n nodes at rest on a support over n^(3/2), s: of the
+/// order of that of cubes of 6 to 24 voxels per edge.
 const SECONDS: f64 = 8e-6;
 
 impl FemModel {

@@ -11,11 +11,12 @@
 //! point's share of the voxel's material. Below [`FLOOR`], ψ continues as its Taylor polynomial of degree two, so that
 //! the force of an element that one step has turned inside out is finite and opposes the inversion.
 //!
-//! With `∂J/∂F = cof F` the force on corner `a` is `−w c ψ' cof(F) g_a`: no net force, since `Σ g_a = 0`, and no moment,
-//! since `cof(F) Fᵀ = J I`. The second derivative is `ψ'' cof F ⊗ cof F + ψ' ∂²J/∂F²`. The second term is indefinite.
-//! In the frame of the polar rotation of `F`, its only positive part (`ψ' < 0`) acts on symmetric `δF`, with eigenvalues
-//! of at most `−ψ' |F|`. [`Densification::add_tangent`] takes this bound for all symmetric `δF`: the tangent is
-//! positive semidefinite, and not below the exact one while `J ≥ 0`, so that a linearised step does not overshoot.
+//! With `∂J/∂F = cof F` the force on corner `a` is `−w c ψ' cof(F) g_a`: no net force, since `Σ g_a = 0`, and no
+//! moment, since `cof(F) Fᵀ = J I`. The second derivative is `ψ'' cof F ⊗ cof F + ψ' ∂²J/∂F²`. The second term is
+//! indefinite. In the frame of the polar rotation of `F`, its only positive part (`ψ' < 0`) acts on symmetric `δF`,
+//! with eigenvalues of at most `−ψ' |F|`. [`Densification::add_tangent`] takes this bound for all symmetric `δF`: the
+//! tangent is positive semidefinite, and not below the exact one while `J ≥ 0`, so that a linearised step does not
+//! overshoot.
 
 use super::{
     element::gauss_points,

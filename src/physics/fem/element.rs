@@ -28,10 +28,10 @@ pub fn gauss_points() -> [Vec3; 8] {
 
 /// Averages of the shape gradients over the material of a voxel of edge `h`, 1/m.
 ///
-/// The weights are those of [`stiffness`]: 1 in filled sub-cells, and [`GHOST`] everywhere in a voxel that is not full. So
-/// the rotation, which follows from these gradients, is that of the part that stores the energy. With gradients of the
-/// whole voxel, a corner with hardly any material turns all of it, and the tangent `R K₀ Rᵀ` has no term for that: it was
-/// found 3 to 5 times too soft there. In a full voxel the averages are `±1/(4h)` on each axis.
+/// The weights are those of [`stiffness`]: 1 in filled sub-cells, and [`GHOST`] everywhere in a voxel that is not full.
+/// So the rotation, which follows from these gradients, is that of the part that stores the energy. With gradients of
+/// the whole voxel, a corner with hardly any material turns all of it, and the tangent `R K₀ Rᵀ` has no term for that:
+/// it was found 3 to 5 times too soft there. In a full voxel the averages are `±1/(4h)` on each axis.
 pub fn mean_gradients(h: f64, fill: &OccupancyMask) -> [Vec3; 8] {
     let whole: [Vec3; 8] = std::array::from_fn(|corner| hex8::corner_sign(corner) * (0.25 / h));
     if *fill == OccupancyMask::full() {

@@ -18,9 +18,9 @@ pub struct ElasticResponse {
 
 /// Force and energy of an element at world corner positions `x`.
 ///
-/// `rest` are the undeformed corners (m), `g` mean shape gradients (1/m, with any weights), `k0` the rest stiffness (N/m,
-/// column-major 24×24), and `last` is an estimate of the rotation. The force is `f_a = −R (p_a − q × g_a)` with `p =
-/// K₀ (y − X)`, `m = Σ y_a × p_a`, `S = Rᵀ F`, `q = (tr S I − S)⁻¹ m`: the second term is due to the change of the
+/// `rest` are the undeformed corners (m), `g` mean shape gradients (1/m, with any weights), `k0` the rest stiffness
+/// (N/m, column-major 24×24), and `last` is an estimate of the rotation. The force is `f_a = −R (p_a − q × g_a)` with
+/// `p = K₀ (y − X)`, `m = Σ y_a × p_a`, `S = Rᵀ F`, `q = (tr S I − S)⁻¹ m`: the second term is due to the change of the
 /// rotation itself. Without it the force is not the derivative of the energy and has a spurious moment.
 pub fn elastic(
     x: &ElementCorners,

@@ -2,9 +2,10 @@
 //!
 //! `K = Σ R K₀ Rᵀ` is assembled and factored in the body's co-rotating frame, so a body that is carried or rotates
 //! without changing shape keeps its factor. It is factored again when an element's rotation has changed by
-//! `STALE_ROTATION` relative to the body, when the densification of an element has changed, or when a new node comes into contact. The frame itself follows the body in
-//! steps of `STALE_FRAME`, so that the matrix of a body that is merely held is not even rotated. A slightly old
-//! tangent changes no equilibrium: the elastic force is always evaluated exactly, and `A` only affects the transient.
+//! `STALE_ROTATION` relative to the body, when the densification of an element has changed, or when a new node comes
+//! into contact. The frame itself follows the body in steps of `STALE_FRAME`, so that the matrix of a body that is
+//! merely held is not even rotated. A slightly old tangent changes no equilibrium: the elastic force is always
+//! evaluated exactly, and `A` only affects the transient.
 
 use super::body::{FemModel, FemState};
 use crate::sparse::{BlockMatrix, CholeskyFactor, NotPositiveDefinite, SymbolicFactor};
@@ -14,7 +15,8 @@ use softvt_geometry::{Mat3, Vec3};
 const STALE_ROTATION: f64 = 0.04;
 /// Change of the body's rotation (same norm) beyond which the reduced matrix is rotated again.
 const STALE_FRAME: f64 = 2e-3;
-/// Ratio by which the densification of an element may grow, and by which it may fall, before the matrix is factored again.
+/// Ratio by which the densification of an element may grow, and by which it may fall, before the matrix is factored
+/// again.
 const STALE_DENSIFICATION: [f64; 2] = [1.2, 0.6];
 /// Curvature of the densification that counts as none in this comparison.
 const SMALL_DENSIFICATION: f64 = 0.05;

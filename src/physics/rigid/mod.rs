@@ -1,8 +1,9 @@
 //! Free rigid bodies: state, world inertia, torque-free motion, energy and momentum.
 //!
-//! A step of the world computes the torque-free rotation by [`torque_free_rotation`], solves for the velocities at the end of
-//! the step (without torques, the angular velocity is [`TorqueFreeRotation::end_w`]), and then calls [`advance`]. In free
-//! flight this conserves the vector of angular momentum and the kinetic energy to rounding, at any step size.
+//! A step of the world computes the torque-free rotation by [`torque_free_rotation`], solves for the velocities at the
+//! end of the step (without torques, the angular velocity is [`TorqueFreeRotation::end_w`]), and then calls
+//! [`advance`]. In free flight this conserves the vector of angular momentum and the kinetic energy to rounding, at any
+//! step size.
 
 use softvt_geometry::{Mat3, Pose, Quat, Vec3};
 

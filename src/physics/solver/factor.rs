@@ -2,8 +2,8 @@
 //!
 //! A factor only gives the direction of a step, whose length and end are found with the exact gradient. So its rounding
 //! costs at most a few steps and changes no solution, as in iterative refinement (Higham, *Accuracy and Stability of
-//! Numerical Algorithms*, 2002, ch. 12). In single precision it takes half of the time and memory. The Hessian is scaled
-//! to a unit diagonal first, which removes the differences of units and masses.
+//! Numerical Algorithms*, 2002, ch. 12). In single precision it takes half of the time and memory. The Hessian is
+//! scaled to a unit diagonal first, which removes the differences of units and masses.
 
 use crate::sparse::{NotPositiveDefinite, dense};
 

@@ -35,7 +35,8 @@ const MAX_PASSES: usize = 3;
 const PASS_TOLERANCE: f64 = 0.01;
 /// Steps after which the convergence with a stale factor, corrected by those steps, is judged.
 const STALE_FACTOR_TRIAL: u32 = 3;
-/// Velocities from which an island's Hessian is factored in single precision, which is worth it for large matrices only.
+/// Velocities from which an island's Hessian is factored in single precision, which is worth it for large matrices
+/// only.
 const SINGLE_FROM: usize = 96;
 /// Slope at the end of a line search, relative to that at its start. Points on the line are cheap: they need no product
 /// with the matrices of the blocks.
@@ -378,7 +379,8 @@ impl Solver {
 
     /// Moves along `step` to a lower cost: by the full step if that descends enough, else to the minimum on the line.
     ///
-    /// Returns the new cost; the gradient there is in `gradient`, the former point and its gradient in `trial`. `None` if no descent was found.
+    /// Returns the new cost; the gradient there is in `gradient`, the former point and its gradient in `trial`. `None`
+    /// if no descent was found.
     fn line_search(&mut self, problem: &ContactProblem, island: &Island, cost: f64) -> Option<f64> {
         let slope: f64 = self.gradient.iter().zip(&self.step).map(|(g, s)| g * s).sum();
         if slope.is_nan() || slope >= 0.0 {
@@ -483,8 +485,8 @@ struct LinePoint {
 
 /// Root of the linear interpolation of the slope of the cost between two points of a line.
 ///
-/// The slope of a convex cost grows monotonically, so this is nearer to the minimum than the middle; it keeps a tenth of
-/// the bracket from either end.
+/// The slope of a convex cost grows monotonically, so this is nearer to the minimum than the middle; it keeps a tenth
+/// of the bracket from either end.
 fn next_trial(low: LinePoint, high: LinePoint) -> f64 {
     if !high.position.is_finite() {
         return 1.5 * low.position;

@@ -10,8 +10,8 @@ use nalgebra::RealField;
 
 use super::NotPositiveDefinite;
 
-/// Columns per block at each level: a block is factored in blocks of the level below, each followed by the update of the
-/// rest of its block. Narrow blocks waste few operations, wide ones pass over a large matrix less often.
+/// Columns per block at each level: a block is factored in blocks of the level below, each followed by the update of
+/// the rest of its block. Narrow blocks waste few operations, wide ones pass over a large matrix less often.
 const WIDTHS: [usize; 3] = [8, 32, 128];
 /// Columns of the register tile of the update.
 const COLUMNS: usize = 4;
@@ -32,8 +32,8 @@ impl Real for f32 {}
 
 /// Factors the first `k` columns of the `n × n` matrix `a` (column-major, lower triangle) in place.
 ///
-/// Afterwards those columns hold `L` and the trailing block its Schur complement. The upper triangle is neither read nor
-/// preserved.
+/// Afterwards those columns hold `L` and the trailing block its Schur complement. The upper triangle is neither read
+/// nor preserved.
 ///
 /// # Errors
 /// A pivot is not positive.

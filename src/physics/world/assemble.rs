@@ -16,8 +16,8 @@ use crate::{
 use softvt_geometry::{Pose, Vec3};
 
 /// Distance to a surface within which a group's nodes are retained in the reduced system, m. The factor then does not
-/// change when a contact begins. Each retained node adds to every step of the solver, so this is little more than the gaps
-/// that open and close while bodies rest.
+/// change when a contact begins. Each retained node adds to every step of the solver, so this is little more than the
+/// gaps that open and close while bodies rest.
 pub(super) const RETAIN_DISTANCE: f64 = 1e-3;
 /// Stiffness and damping of joint stops, relative to the joint's inertia over a step.
 const STOP_RATE: f64 = 0.5;
@@ -109,8 +109,8 @@ impl World {
 
     /// Adds the velocity system `A v = b` of each soft body.
     ///
-    /// The tangent `K = Σ R K₀ Rᵀ` in `A` has the rotations of the *rest* shape as null directions. On the rotation of a
-    /// strained body it acts as a brake. So a body without contact is solved for its deviation `w = v − v_r` from the
+    /// The tangent `K = Σ R K₀ Rᵀ` in `A` has the rotations of the *rest* shape as null directions. On the rotation of
+    /// a strained body it acts as a brake. So a body without contact is solved for its deviation `w = v − v_r` from the
     /// rigid motion `v_r` with the momenta of `b`: `A w = b − (1 + α dt) M v_r`. What momenta `w` still has through `K`
     /// are removed ([`World::integrate`]), so linear and angular momentum are exact for any strain and any age of the
     /// factor. In contact, the brake is a force that the contacts balance, and that is zero at rest.

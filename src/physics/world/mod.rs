@@ -1,10 +1,11 @@
 //! The world: all bodies and colliders, and the step that moves them.
 //!
 //! A [`World`] owns soft bodies, free rigid bodies, articulations, kinematic frames and colliders. `add_*` puts an
-//! object in and returns its [identifier](super::ids). [`World::step`] advances everything by [`PhysicsParams::dt`]. Units are SI; positions, velocities and
-//! forces are in the world frame unless a name says otherwise.
+//! object in and returns its [identifier](super::ids). [`World::step`] advances everything by [`PhysicsParams::dt`].
+//! Units are SI; positions, velocities and forces are in the world frame unless a name says otherwise.
 //!
-//! A soft cube falls on the ground and comes to rest. Two jaws then squeeze it by a fifth, and the force on one is read:
+//! A soft cube falls on the ground and comes to rest. Two jaws then squeeze it by a fifth, and the force on one is
+//! read:
 //!
 //! ```
 //! use softvt_geometry::{Pose, Vec3, shape::Shape};
@@ -16,7 +17,8 @@
 //! let mut world = World::with_gravity();
 //! world.insert(FixedBuilder::ground());
 //! let cube = world.insert(SoftBodyBuilder::new(Shape::cuboid(Vec3::repeat(0.05)), bread).at(0.0, 0.0, 0.03))?;
-//! let jaws = [-1.0, 1.0].map(|side| (side, world.insert(KinematicBuilder::new(jaw.clone()).at(0.031 * side, 0.0, 0.025))));
+//! let jaw_at = |side| KinematicBuilder::new(jaw.clone()).at(0.031 * side, 0.0, 0.025);
+//! let jaws = [-1.0, 1.0].map(|side| (side, world.insert(jaw_at(side))));
 //! world.run(1.0)?;
 //! assert!((world.soft(cube).state.centre().z - 0.025).abs() < 1e-3);
 //!
@@ -25,7 +27,7 @@
 //!     jaws.iter().for_each(|(side, jaw)| world.move_kinematic(*jaw, Pose::translation(reach * side, 0.0, 0.025)));
 //!     world.step()?;
 //! }
-//! // Without lateral strain the stress is uniform: E A ε = 3e4 × 0.05 × 0.04 × 0.2 = 12 N, and a little more at the edges.
+//! // Without lateral strain the stress is uniform: E A ε = 3e4 × 0.05 × 0.04 × 0.2 = 12 N, and more at the edges.
 //! let force = world.contact_with(cube, jaws[0].1).normal_force;
 //! assert!((12.0..15.0).contains(&force), "{force} N");
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -289,8 +291,8 @@ impl World {
         &self.articulation(id.articulation).poses[id.index]
     }
 
-    /// Pose of a body in the world: the mean pose of a soft body, the object frame of a rigid one, the frame of a link or of a
-    /// kinematic body, the identity for the world itself.
+    /// Pose of a body in the world: the mean pose of a soft body, the object frame of a rigid one, the frame of a link
+    /// or of a kinematic body, the identity for the world itself.
     pub fn pose(&self, body: impl Into<BodyId>) -> Pose {
         match body.into() {
             BodyId::Soft(id) => self.soft(id).state.mean_pose(),

@@ -192,8 +192,8 @@ impl World {
         found.map_or(ContactSummary::default(), |contact| contact.summary)
     }
 
-    /// Contact of a soft or free rigid `body` with another body: with all of its colliders, or with the surface of a soft one. The
-    /// other body may be [`BodyId::World`], for all fixed solids. Zero for a `body` of another kind.
+    /// Contact of a soft or free rigid `body` with another body: with all of its colliders, or with the surface of a
+    /// soft one. The other body may be [`BodyId::World`], for all fixed solids. Zero for a `body` of another kind.
     pub fn contact_with(&self, body: impl Into<BodyId>, other: impl Into<BodyId>) -> ContactSummary {
         let other = other.into();
         let belongs = |partner: ContactPartner| match partner {

@@ -195,7 +195,8 @@ impl PolicyConnection {
     }
 
     /// Checks that the server sent nothing after its last reply: sends a ping and waits for its pong. Frames keep their
-    /// order, so a message sent before the pong arrives before it. A connection that the server closed meanwhile passes.
+    /// order, so a message sent before the pong arrives before it. A connection that the server closed meanwhile
+    /// passes.
     ///
     /// # Errors
     /// The server sent a message, or no pong until `deadline`.

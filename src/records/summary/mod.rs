@@ -1,8 +1,8 @@
 //! Summary of a run (`summary.json`): rates and distributions over its episodes.
 //!
-//! Rates are in percent over *all* episodes: an invalid episode, or one with missing evidence, counts as a failure. What was
-//! judged in no episode has no rate. Distributions of D are over all episodes with a soft target: means over the valid
-//! ones, percentiles with invalid ones ranked as worst.
+//! Rates are in percent over *all* episodes: an invalid episode, or one with missing evidence, counts as a failure.
+//! What was judged in no episode has no rate. Distributions of D are over all episodes with a soft target: means over
+//! the valid ones, percentiles with invalid ones ranked as worst.
 
 use std::collections::BTreeMap;
 

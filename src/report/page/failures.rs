@@ -151,7 +151,8 @@ fn view_commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
     ]
 }
 
-/// The path of a file of a run from the working folder: the path itself, or that in the folder in which the run was made.
+/// The path of a file of a run from the working folder: the path itself, or that in the folder in which the run was
+/// made.
 fn located(path: &str, folder: Option<&str>) -> String {
     let stored = folder.map(|folder| Path::new(folder).join(path));
     match stored.filter(|stored| !Path::new(path).exists() && stored.exists()) {

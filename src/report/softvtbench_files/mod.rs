@@ -73,9 +73,9 @@ pub struct DebugShape {
 }
 
 impl DebugShape {
-    /// From the reference, the largest D of SoftVTBench's definition in the control step, and the largest displacement of a
-    /// node ([`Deformation::max_pct`](softvt_evaluation::deformation::Deformation)) and the bounding box at that time. D is
-    /// unknown without a reference or a measurement, as for a rigid target.
+    /// From the reference, the largest D of SoftVTBench's definition in the control step, and the largest displacement
+    /// of a node ([`Deformation::max_pct`](softvt_evaluation::deformation::Deformation)) and the bounding box at that
+    /// time. D is unknown without a reference or a measurement, as for a rigid target.
     pub fn new(
         asset: &str,
         reference: Option<&ReferenceShape>,

@@ -98,8 +98,8 @@ impl VideoCaption {
     }
 }
 
-/// Renders every state of a recording and writes the video, one frame per control step. The frames are drawn on up to `threads`
-/// threads; `on_frame` is called after each.
+/// Renders every state of a recording and writes the video, one frame per control step. The frames are drawn on up to
+/// `threads` threads; `on_frame` is called after each.
 ///
 /// If `is_cancelled` becomes true, no file is written.
 ///
@@ -279,9 +279,9 @@ fn full_size(camera: &Camera) -> usize {
 
 /// Writes every image of selected states as PNG files in `dir`; `states` are names and indices of states.
 ///
-/// Cameras also get depth (16 bits, units of 0.1 mm along the optical axis, 65535 beyond the
-/// range and in the background) and segmentation (16 bits: objects from 1 in the order of the
-/// scene, [`softvt_scene::ROBOT_SEGMENTATION_ID`], 0 in the background). They are drawn on up to `threads` threads. Files are
+/// Cameras also get depth (16 bits, units of 0.1 mm along the optical axis, 65535 beyond the range and in the
+/// background) and segmentation (16 bits: objects from 1 in the order of the scene,
+/// [`softvt_scene::ROBOT_SEGMENTATION_ID`], 0 in the background). They are drawn on up to `threads` threads. Files are
 /// written atomically. Returns their paths.
 ///
 /// # Errors

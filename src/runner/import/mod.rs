@@ -39,8 +39,8 @@ pub struct ImportOptions {
     pub ignore_recorded_poses: bool,
 }
 
-/// Re-executes the demonstrations of `files` in the suites of a script, and records those that are safe and reach the goal.
-/// Returns `None` if the output folder contains this very dataset already.
+/// Re-executes the demonstrations of `files` in the suites of a script, and records those that are safe and reach the
+/// goal. Returns `None` if the output folder contains this very dataset already.
 ///
 /// # Errors
 /// The script has no suite, a file is not valid or matches no task, the folder contains something else, an attempt or a
@@ -129,8 +129,8 @@ fn file_name(file: &ForeignFile) -> String {
     file.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Makes the episodes of a run re-execute the demonstrations, each from its own initial state. With `ignore_recorded_poses`
-/// objects start where the layout puts them.
+/// Makes the episodes of a run re-execute the demonstrations, each from its own initial state. With
+/// `ignore_recorded_poses` objects start where the layout puts them.
 fn replay_demos<'a>(
     run: SuiteRun<'a>,
     grip_log: &HoldingLog,

@@ -96,7 +96,8 @@ record! {
         friction: Friction;
         /// Visuals by material id of the shape, from 0; plain grey by default.
         visuals: Vec<Visual> => Empty;
-        /// Numbers for experts (grasp height …). Those whose names end in _m are lengths, which follow an object's scale.
+        /// Numbers for experts (grasp height …). Those whose names end in _m are lengths, which follow an object's
+        /// scale.
         hints: BTreeMap<String, f64> => Empty;
     }
 }

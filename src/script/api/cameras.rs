@@ -218,8 +218,8 @@ class! {
             height: IMAGE_EDGE => height;
         }
         methods {
-            /// Turns the camera to a point; up (z by default) is the upward direction in the image. Both are in the frame
-            /// of the mount.
+            /// Turns the camera to a point; up (z by default) is the upward direction in the image. Both are in the
+            /// frame of the mount.
             fn look_at(lua, this, point: [f64; 3] = POINT, up: Option<[f64; 3]>) -> [] {
                 let from = this.read(|camera| camera.pose.translation.vector);
                 let rotation = look_at(lua, &format!("{}:look_at", this.name()), &from, point, up)?;

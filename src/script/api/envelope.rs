@@ -170,8 +170,8 @@ fn calibration_path(asset: &str) -> String {
     format!("assets/calibration/{asset}.json")
 }
 
-/// Finds the calibration of an asset, so that the episodes of the script have it. An asset that is made during an episode has
-/// none unless it was found before.
+/// Finds the calibration of an asset, so that the episodes of the script have it. An asset that is made during an
+/// episode has none unless it was found before.
 pub(crate) fn find_calibration(lua: &Lua, asset: &str) -> mlua::Result<()> {
     let library = app_data::<SharedLibrary>(lua)?;
     match lock(&library).optional_data(&calibration_path(asset)) {
@@ -305,16 +305,16 @@ functions! {
             stable_strain: Option<f64> = STRAIN;
             /// Why the sweep ended, if its last row does not tell.
             ended: Option<String>;
-            /// Fingerprint of the calibrated asset, as softvt.fingerprint returns it. Results for another object of that
-            /// name then do not use the calibration.
+            /// Fingerprint of the calibrated asset, as softvt.fingerprint returns it. Results for another object of
+            /// that name then do not use the calibration.
             fingerprint: Option<String>;
             /// Rows width_mm, closure, trials, held, slip_mm, d_peak_pct of the scan for the loose end.
             holds: Value = ROWS;
-            /// Rows width_mm, closure, d_pct, d_v1_pct, force_n, strain_p95, min_det_f, node_speed_m_s, both_pads, slip_mm,
-            /// stable of the compression sweep.
+            /// Rows width_mm, closure, d_pct, d_v1_pct, force_n, strain_p95, min_det_f, node_speed_m_s, both_pads,
+            /// slip_mm, stable of the compression sweep.
             sweep: Value = ROWS;
-            /// Presses at other sizes and stiffnesses: { scale, youngs_factor, rows }, with the rows width_mm, d_pct, force_n,
-            /// strain_p95.
+            /// Presses at other sizes and stiffnesses: { scale, youngs_factor, rows }, with the rows width_mm, d_pct,
+            /// force_n, strain_p95.
             variants: Value = ROWS => Empty;
         } -> ["softvt.Envelope"] {
             let holds: Vec<HoldRow> = rows(lua, "softvt.envelope: holds", &holds)?;
@@ -331,7 +331,8 @@ functions! {
             }
             envelope_table(lua, &asset, &envelope, &file)?
         }
-        /// Returns the content of assets/calibration/<asset>.json as softvt.envelope does; nil if there is no such file.
+        /// Returns the content of assets/calibration/<asset>.json as softvt.envelope does; nil if there is no such
+        /// file.
         fn calibration(lua, asset: String = Type::Name) -> ["softvt.Envelope?"] {
             let label = "softvt.calibration";
             check_privilege(lua, label)?;
@@ -346,8 +347,8 @@ functions! {
                 }
             }
         }
-        /// Returns the safe window of an instance of a calibrated asset; nil without a window. Experts see the factors as fields of their
-        /// objects.
+        /// Returns the safe window of an instance of a calibrated asset; nil without a window. Experts see the factors
+        /// as fields of their objects.
         fn grip_window(lua) takes spec "softvt.Instance" {
             /// Name of the asset.
             asset: String = Type::Name;
@@ -368,8 +369,8 @@ functions! {
             let found = calibrated_asset(lua, &asset)?.and_then(|asset| asset.presses.window(&factors));
             found.map(|window| instance_window_table(lua, &window)).transpose()?
         }
-        /// Returns instances of an asset as the episodes of a suite draw them, from a random stream that no episode uses. Without a
-        /// variation each is the asset itself.
+        /// Returns instances of an asset as the episodes of a suite draw them, from a random stream that no episode
+        /// uses. Without a variation each is the asset itself.
         fn sample_instances(lua) takes spec "softvt.Sample" {
             /// The asset.
             asset: Constructed<AssetSpec>;

@@ -9,8 +9,8 @@ use softvt_media::plot::{
 };
 
 /// Plots D over the width as SVG: stable squeezes as dots, unstable ones as rings, peak D of hold trials as diamonds
-/// (filled if every trial held), τ and D_ref as dashed lines, and the safe window as a band. Widths decrease to the right,
-/// as the pads close.
+/// (filled if every trial held), τ and D_ref as dashed lines, and the safe window as a band. Widths decrease to the
+/// right, as the pads close.
 pub fn envelope_plot(asset: &str, envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
     let finite = |row: &&SweepRow| row.d_pct.is_finite() && row.width_mm.is_finite();
     let rows: Vec<&SweepRow> = envelope.sweep.iter().filter(finite).collect();

@@ -143,8 +143,8 @@ impl Coroutine {
         self.running.as_ref().map(|(thread, _)| thread).filter(|thread| thread.is_resumable())
     }
 
-    /// Ends the expert as `arm:give_up` does, with `complaint` and the line of the script as the reason, unless the script
-    /// catches the error.
+    /// Ends the expert as `arm:give_up` does, with `complaint` and the line of the script as the reason, unless the
+    /// script catches the error.
     pub(crate) fn abort(&mut self, lua: &Lua, complaint: &str, explain: impl Fn(&mlua::Error) -> String) {
         if self.gave_up.is_some() {
             return;
@@ -318,14 +318,15 @@ class! {
             stroke: "number" { get(_, _) { MAX_WIDTH } }
             /// Stiffness of the drive of a finger, N/m (robot.gripper.kp).
             finger_stiffness: "number" { get(_, this) { this.read(|view| view.finger_stiffness) } }
-            /// Sum of the normal forces at all contact points of the left and the right gel pad, N, whatever touches it; forces
-            /// on the cases of the fingers do not count. On the edge of a pad the normals are oblique, and the sum is larger
-            /// than the pressing force, which is -sim:tactile(side).force[3].
+            /// Sum of the normal forces at all contact points of the left and the right gel pad, N, whatever touches
+            /// it; forces on the cases of the fingers do not count. On the edge of a pad the normals are oblique, and
+            /// the sum is larger than the pressing force, which is -sim:tactile(side).force[3].
             force: "number[]" { get(_, this) { this.read(|view| view.pad_force_n) } }
-            /// Name of the controller that takes the place of the expert's own grip, such as "size-seen" under --policy size-seen
-            /// (experts.blind_grips). nil under policies that have none.
+            /// Name of the controller that takes the place of the expert's own grip, such as "size-seen" under --policy
+            /// size-seen (experts.blind_grips). nil under policies that have none.
             grip_controller: "string?" { get(_, this) { this.read(|view| view.grip_controller.map(str::to_owned)) } }
-            /// With a grip_controller, which must not know the instance: the instances that the suite can draw. nil without.
+            /// With a grip_controller, which must not know the instance: the instances that the suite can draw. nil
+            /// without.
             instances: "softvt.Instances?" {
                 get(lua, this) {
                     let instances = this.read(|view| view.instances.clone());
@@ -347,16 +348,16 @@ class! {
             /// Closes or opens to a closure.
             fn close_to(closure: f64 = CLOSURE, options: RateOptions) -> [];
             /// Closes on an object, to a closure or until the width or the force of the options is reached. A binary
-            /// gripper, which is either open or closed, closes here and not in close_to. A tactile servo lifts the
-            /// hand by a few millimetres, finds the least grip that holds, goes back down and closes to that grip and a margin,
-            /// whatever closure is given.
+            /// gripper, which is either open or closed, closes here and not in close_to. A tactile servo lifts the hand
+            /// by a few millimetres, finds the least grip that holds, goes back down and closes to that grip and a
+            /// margin, whatever closure is given.
             fn grasp(closure: f64 = CLOSURE, options: GraspOptions) -> [];
             /// Releases an object by opening, by default wide.
             fn release(options: ReleaseOptions) -> [];
             /// Opens the gripper.
             fn open(options: RateOptions) -> [];
-            /// Returns the present readings of the tactile sensors; the first call waits for a control step. Available in
-            /// simulation:drive and under --policy tactile-servo.
+            /// Returns the present readings of the tactile sensors; the first call waits for a control step. Available
+            /// in simulation:drive and under --policy tactile-servo.
             fn tactile() -> ["softvt.Fingers"];
             /// Holds the last command for a time.
             fn wait(seconds: f64 = Type::Number("s", Range::closed(0.0, 600.0))) -> [];
@@ -416,8 +417,9 @@ class! {
             fn kinds(_, this) -> ["string[]"] {
                 this.kinds()?.iter().map(|kind| kind.name.clone()).collect::<Vec<_>>()
             }
-            /// Returns instances of the asset of an object in the scene, or of a kind, drawn as the suite draws them, from a random stream
-            /// that no episode uses: the same in every episode. Without a variation each is the asset itself.
+            /// Returns instances of the asset of an object in the scene, or of a kind, drawn as the suite draws them,
+            /// from a random stream that no episode uses: the same in every episode. Without a variation each is the
+            /// asset itself.
             fn sample(
                 lua,
                 this,
@@ -473,8 +475,8 @@ class! {
                 let states = view.objects.iter().map(|object| object_state(lua, object));
                 lua.create_sequence_from(states.collect::<mlua::Result<Vec<_>>>()?)?
             }
-            /// Returns the distance between a hand at a pose and the nearest object, m, and the name of that object. The
-            /// distance is at most 0.2 and negative inside.
+            /// Returns the distance between a hand at a pose and the nearest object, m, and the name of that object.
+            /// The distance is at most 0.2 and negative inside.
             fn clearance(lua, this, pose: LuaPose) takes options "softvt.Clearance" {
                 /// Distance of the gels.
                 width: f64 = Type::Number("m", Range::closed(0.0, MAX_WIDTH)) => Number(MAX_WIDTH);

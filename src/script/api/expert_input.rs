@@ -213,8 +213,8 @@ fn object_view(sim: &Simulation, object: &ObjectInstance, name: &str) -> ObjectV
 /// Tracking error beyond which the tool counts as away from its command.
 const TRACKING_LIMIT: PoseTolerance = PoseTolerance { distance: 0.02, angle: 0.2 };
 
-/// Control steps beyond [`TRACKING_LIMIT`] before the command's reachability is searched, which takes tens of milliseconds.
-/// A fast motion lags for fewer steps, and its command is found to be reachable otherwise.
+/// Control steps beyond [`TRACKING_LIMIT`] before the command's reachability is searched, which takes tens of
+/// milliseconds. A fast motion lags for fewer steps, and its command is found to be reachable otherwise.
 const MAX_LAG_STEPS: u32 = 20;
 
 /// Distance from the robot's base that the tool never reaches, m.

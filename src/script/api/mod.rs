@@ -1,5 +1,5 @@
-//! Everything a script can reach as `softvt.…`, one file per domain. A further function or class is declared in its file
-//! and listed here.
+//! Everything a script can reach as `softvt.…`, one file per domain. A further function or class is declared in its
+//! file and listed here.
 
 pub(crate) mod assets;
 pub(crate) mod cameras;
@@ -59,9 +59,9 @@ pub(crate) static SORTED: Signature = signature!(
 
 functions! {
     FUNCTIONS {
-        /// Checks a table that a function of a script takes, and returns it: `softvt.check_fields("pick_place", spec, { object =
-        /// "string", speed = "number?" })`. Each key has the name of a Lua type, with ? if it may be absent. The error is at the
-        /// line of the file that called the function.
+        /// Checks a table that a function of a script takes, and returns it: `softvt.check_fields("pick_place", spec, {
+        /// object = "string", speed = "number?" })`. Each key has the name of a Lua type, with ? if it may be absent.
+        /// The error is at the line of the file that called the function.
         fn check_fields(
             lua,
             label: String,

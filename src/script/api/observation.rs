@@ -70,8 +70,8 @@ output! {
 }
 
 class! {
-    /// The observation of a policy at a control step. Poses are of the tool centre point in the robot's base frame. The true
-    /// state of the scene is not part of it.
+    /// The observation of a policy at a control step. Poses are of the tool centre point in the robot's base frame. The
+    /// true state of the scene is not part of it.
     LuaObservation: "softvt.Observation" {
         label(_) { "obs".to_owned() }
         fields {
@@ -225,10 +225,11 @@ class! {
             /// Returns the root mean square of the displacements without their mean and twist. It grows with the normal
             /// force: about 0.3 px per newton on round dough and rigid objects, less on flat and soft ones.
             fn rms_residual(_, this) -> ["number"] { this.flow.press() }
-            /// Returns the mean displacement towards the fingertip or across, as of an object that slips out of the grasp;
-            /// 0 if it is pushed in.
+            /// Returns the mean displacement towards the fingertip or across, as of an object that slips out of the
+            /// grasp; 0 if it is pushed in.
             fn outward_shear(_, this) -> ["number"] { this.flow.drag() }
-            /// Returns the trace of the displacement gradient; positive where an indentation pushes the markers outwards.
+            /// Returns the trace of the displacement gradient; positive where an indentation pushes the markers
+            /// outwards.
             fn divergence(_, this) -> ["number"] { this.flow.divergence() }
             /// Returns the rotation of the markers, rad; positive is clockwise in the image.
             fn twist(_, this) -> ["number"] { this.flow.twist() }

@@ -30,15 +30,15 @@ record! {
         replan: Option<usize> = Type::Integer(Range::closed(1.0, MAX_CHUNK_LEN as f64));
         /// Grip code, which says what the closure of an action commands, unless --gripper gives another: a closure
         /// (continuous); open, or above 0.5 closed with the whole effort (binary); open, or the width given just after
-        /// closing (two-width). For force, actions have force. By default an action has closure, which is continuous, or
-        /// force.
+        /// closing (two-width). For force, actions have force. By default an action has closure, which is continuous,
+        /// or force.
         gripper: Option<GripCode>;
         /// True to let the policy use limits and materials of objects: softvt.calibration, assets, and the modules
         /// strain_sources and experts. Its results say that it is privileged.
         privileged: bool => Boolean(false);
     }
-    /// A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame, and a closure or
-    /// a grip force. Give either axis_angle or quaternion, and either closure or force.
+    /// A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame, and a
+    /// closure or a grip force. Give either axis_angle or quaternion, and either closure or force.
     ActionSpec: "softvt.Action" as "action" {
         /// Position.
         position: [f64; 3] = Type::vector(3, "m, base frame");
@@ -55,22 +55,23 @@ record! {
     InputSpec: "softvt.Input" as "profile.inputs" {
         /// Keys under which it is sent.
         keys: Vec<String>;
-        /// Content: the image of a camera, its depth (m), or the object at each pixel; numbers of the robot's state; the
-        /// prompt; the mosaic of 8 tactile images of both fingers; the image of one finger; the initial and the last
-        /// marker positions; the last true forces on the gels; the identity of the request, a map; a seed for policies
-        /// that draw random numbers, equal whenever a run is repeated.
+        /// Content: the image of a camera, its depth (m), or the object at each pixel; numbers of the robot's state;
+        /// the prompt; the mosaic of 8 tactile images of both fingers; the image of one finger; the initial and the
+        /// last marker positions; the last true forces on the gels; the identity of the request, a map; a seed for
+        /// policies that draw random numbers, equal whenever a run is repeated.
         source: InputKind;
         /// For camera, depth and segmentation: the camera's name in the scene.
         camera: Option<String> = Type::Name;
         /// For camera, depth and segmentation: true to rotate the image by 180°.
         half_turn: Option<bool>;
-        /// For state: its parts in order, in m, rad, rad/s and N m, of 3 numbers (position, axis_angle), 4 (quaternions), 7
-        /// (joints, joint_velocities, joint_torques), 2 (finger_pair) and 1. The sensed width has the steps and the offset of
-        /// a real hand; the gap between the exact one and the commanded closure is the grip force.
+        /// For state: its parts in order, in m, rad, rad/s and N m, of 3 numbers (position, axis_angle), 4
+        /// (quaternions), 7 (joints, joint_velocities, joint_torques), 2 (finger_pair) and 1. The sensed width has the
+        /// steps and the offset of a real hand; the gap between the exact one and the commanded closure is the grip
+        /// force.
         parts: Option<Vec<RobotStatePart>>;
-        /// Number of control steps in the entry, the present one last, along a first axis; not for prompt and tactile_image.
-        /// By default the present step without that axis, and 8 steps of marker_motion and force. The start of an episode
-        /// repeats its first step.
+        /// Number of control steps in the entry, the present one last, along a first axis; not for prompt and
+        /// tactile_image. By default the present step without that axis, and 8 steps of marker_motion and force. The
+        /// start of an episode repeats its first step.
         frames: Option<usize> = Type::Integer(Range::closed(1.0, MAX_FRAMES as f64));
         /// For tactile and tactile_image: style in which the markers are drawn into the images; not drawn by default.
         markers: Option<MarkerStyle>;
@@ -79,11 +80,11 @@ record! {
         /// For tactile: the finger.
         finger: Option<Side>;
     }
-    /// The meaning of the numbers of an action: three of position, three of orientation (axis-angle), one of the gripper;
-    /// further ones are padding.
+    /// The meaning of the numbers of an action: three of position, three of orientation (axis-angle), one of the
+    /// gripper; further ones are padding.
     ActionEncodingSpec: "softvt.ActionEncoding" as "profile.actions" {
-        /// absolute: a pose in the base frame. delta: shares -1 to 1 of a step away from the tool's pose. delta_osc: the
-        /// same, reduced to what robosuite's controller reaches within a control step.
+        /// absolute: a pose in the base frame. delta: shares -1 to 1 of a step away from the tool's pose. delta_osc:
+        /// the same, reduced to what robosuite's controller reaches within a control step.
         pose: PoseKind;
         /// For delta and delta_osc: the step of a share of 1, m.
         translation_m: Option<f64> = STEP;
@@ -104,15 +105,15 @@ record! {
         open: Option<f64>;
         /// Value that closes it; not for code = "force".
         closed: Option<f64>;
-        /// What the value commands. continuous: a closure in proportion between open and closed, the default. binary: closed
-        /// beyond the middle, else open. two-width: open, or the width that the answers give just after closing, held until
-        /// one opens. force: a grip force in N at which closing stops; below 0 opens.
+        /// What the value commands. continuous: a closure in proportion between open and closed, the default. binary:
+        /// closed beyond the middle, else open. two-width: open, or the width that the answers give just after closing,
+        /// held until one opens. force: a grip force in N at which closing stops; below 0 opens.
         code: Option<GripCode>;
         /// For code = "binary": limits at which the gripper closes and opens, instead of the middle.
         latch: Option<GripHysteresis>;
     }
-    /// The messages of a policy server: the observations it gets and the meaning of its actions. The file given to --profile
-    /// returns one.
+    /// The messages of a policy server: the observations it gets and the meaning of its actions. The file given to
+    /// --profile returns one.
     ProfileSpec: "softvt.Profile" as "profile", constructor "softvt.profile" {
         /// Name in results, unless --name gives another.
         name: String = Type::Name;
@@ -133,8 +134,8 @@ record! {
         cameras: Vec<String> = Type::List(&Type::Name) => Empty;
         /// True to get the tactile images and markers of the fingers.
         tactile: bool => Boolean(false);
-        /// True to get the commanded closure and the exact width, whose gap is the grip force: 1 mm per N. Without it, the width
-        /// has the steps and the offset of a real hand.
+        /// True to get the commanded closure and the exact width, whose gap is the grip force: 1 mm per N. Without it,
+        /// the width has the steps and the offset of a real hand.
         drives: bool => Boolean(false);
         /// True to get the true forces on the gels, which no real sensor gives; results then say force_observed.
         force: bool => Boolean(false);

@@ -6,8 +6,8 @@ use crate::schema::{Range, Type, check::MIN_LENGTH, class, functions};
 use softvt_geometry::{Pose, Quat, Vec3};
 use softvt_robot::rotation;
 
-/// Divides the numbers by the largest magnitude, so that no square over- or underflows. `None` if that is too small or not
-/// finite.
+/// Divides the numbers by the largest magnitude, so that no square over- or underflows. `None` if that is too small or
+/// not finite.
 fn normalized_to_max<const N: usize>(numbers: [f64; N]) -> Option<[f64; N]> {
     let largest =
         numbers.iter().fold(0.0, |max: f64, x| if x.is_nan() { f64::NAN } else { max.max(x.abs()) });
@@ -19,8 +19,8 @@ pub(crate) fn unit_direction(numbers: [f64; 3]) -> Option<Vec3> {
     normalized_to_max(numbers).map(|numbers| Vec3::from(numbers).normalize())
 }
 
-/// A direction of any length. The length is kept where it can be computed with, so that scripts can write the components
-/// one by one; else it is 1.
+/// A direction of any length. The length is kept where it can be computed with, so that scripts can write the
+/// components one by one; else it is 1.
 pub(crate) fn direction(numbers: [f64; 3]) -> Option<Vec3> {
     let unit = unit_direction(numbers)?;
     let largest = numbers.iter().fold(0.0, |max: f64, x| max.max(x.abs()));
@@ -48,8 +48,8 @@ const POSITION: Type = Type::vector(3, "m, world");
 
 functions! {
     FUNCTIONS {
-        /// Returns a pose in the world frame: `softvt.pose { position = { 0.4, 0, 0.2 }, yaw = math.pi / 2 }`. Without a
-        /// quaternion the hand points straight down.
+        /// Returns a pose in the world frame: `softvt.pose { position = { 0.4, 0, 0.2 }, yaw = math.pi / 2 }`. Without
+        /// a quaternion the hand points straight down.
         fn pose(_) takes spec "softvt.PoseSpec" {
             /// Position.
             position: [f64; 3] = POSITION;

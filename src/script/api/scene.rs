@@ -326,8 +326,8 @@ class! {
                 let index = find(lua, &lock(&this.scene), &name)?;
                 LuaObject { scene: this.scene.clone(), index }
             }
-            /// Returns the horizontal distance from a point to the nearest object, taken as an upright cylinder about its
-            /// origin, m; negative inside of one. Surfaces at or below z = 0 and scenery do not count.
+            /// Returns the horizontal distance from a point to the nearest object, taken as an upright cylinder about
+            /// its origin, m; negative inside of one. Surfaces at or below z = 0 and scenery do not count.
             fn distance_to_objects(_, this, x: f64, y: f64) -> ["number"] {
                 this.read(|scene| distance_to_objects(scene, x, y))
             }
@@ -484,16 +484,16 @@ class! {
                 get(_, this) { this.read(|object| object.asset.friction.dynamic_mu) }
                 set(lua, this, value: f64) { this.change_friction(lua, |friction| friction.dynamic_mu = value); }
             }
-            /// Static coefficient of a coating (flour, oil, glaze), which is that of every pair with this object; the dynamic one is
-            /// 0.8 of it. Nil without a coating.
+            /// Static coefficient of a coating (flour, oil, glaze), which is that of every pair with this object; the
+            /// dynamic one is 0.8 of it. Nil without a coating.
             coating: COATING => {
                 get(_, this) { this.read(|object| object.coating()) }
                 set(lua, this, value: f64) { this.change_friction(lua, |friction| *friction = Friction::coated(value)); }
             }
         }
         methods {
-            /// Returns the mass of a soft or rigid body, of one moving part of an articulated object, or of all its moving
-            /// parts, kg; nil for what never moves.
+            /// Returns the mass of a soft or rigid body, of one moving part of an articulated object, or of all its
+            /// moving parts, kg; nil for what never moves.
             fn mass(lua, this, part: Option<String>) -> ["number?"] {
                 let scene = lock(&this.scene);
                 let object = &scene.objects[this.index];

@@ -182,8 +182,8 @@ functions! {
 
 functions! {
     FUNCTIONS {
-        /// Reads a shape from an OBJ, STL or GLB file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface must be
-        /// closed.
+        /// Reads a shape from an OBJ, STL or GLB file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface
+        /// must be closed.
         fn mesh(lua) takes spec "softvt.MeshSpec" {
             /// Path inside of the project, next to the Lua file or from a root folder.
             file: String;

@@ -175,8 +175,8 @@ functions! {
             episode: u32 = EPISODE => Integer(0);
             /// Part of the seed; by default that of the run, --seed.
             seed: Option<u64> = EPISODE;
-            /// Changed settings of physics, robot, tactile sensors and cameras (docs/settings.md): { physics = {…}, robot = {…} }.
-            /// Those of the command line, --set, take precedence in experiments.
+            /// Changed settings of physics, robot, tactile sensors and cameras (docs/settings.md): { physics = {…},
+            /// robot = {…} }. Those of the command line, --set, take precedence in experiments.
             settings: Option<Table> = SETTINGS;
         } -> ["softvt.Simulation"] {
             let settings = simulation_settings(lua, settings.as_ref())?;
@@ -328,8 +328,8 @@ output! {
         present: "number[][]" = positions(lua, &reading.markers.current)?;
         /// The markers with the measures of their displacements.
         markers: "softvt.Markers" = LuaMarkers::new(reading.markers);
-        /// True force on the gel, N, pad frame: the vector sum over its contact points, friction included. A pressing body makes
-        /// z negative.
+        /// True force on the gel, N, pad frame: the vector sum over its contact points, friction included. A pressing
+        /// body makes z negative.
         force: "number[]" = lua.create_sequence_from(force.iter().copied())?;
         /// Largest depth of the indentation, mm.
         depth_mm: "number" = reading.field.as_ref().map_or(0.0, |field| 1e3 * field.depth());
@@ -355,7 +355,8 @@ output! {
         joints: "table<string, number>" = lua.create_table_from(
             inner.sim.parts(index).map(|(instance, part)| (part.name.as_str(), inner.sim.joint(instance)))
         )?;
-        /// Sum of the normal forces at the contact points of the left and the right gel pad on the object, N; see arm.force.
+        /// Sum of the normal forces at the contact points of the left and the right gel pad on the object, N; see
+        /// arm.force.
         pad_force: "number[]" = inner.sim.pad_normal_forces_on(inner.object(index)).to_vec();
         /// Distance that a movable object has slid on the left and the right pad, mm.
         slip_mm: "number[]?" = inner.pad_contacts(index).map(|pads| pads.map(|pad| 1e3 * pad.slip_distance).to_vec());
@@ -424,8 +425,8 @@ class! {
             fn tactile(lua, this, side: Side) -> ["softvt.TactileReading"] { this.tactile(lua, side)? }
             /// Returns the time since settling, s.
             fn time(_, this) -> ["number"] { lock(&this.0).time() }
-            /// Returns the pose of the tool centre point in the world frame: position, m, and orientation as axis-angle,
-            /// rad.
+            /// Returns the pose of the tool centre point in the world frame: position, m, and orientation as
+            /// axis-angle, rad.
             fn tool(lua, this) -> ["number[]", "number[]"] {
                 let tool = lock(&this.0).tool_pose();
                 let list = |vector: Vec3| lua.create_sequence_from(vector.iter().copied());

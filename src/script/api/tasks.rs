@@ -52,8 +52,8 @@ record! {
         /// Time that it must stay there.
         hold_s: f64 = HOLD => Number(0.4);
     }
-    /// The object rests in the target's cavity, carried by it or by objects in it, released, for a time. The cavity is the
-    /// space in which its shape holds water.
+    /// The object rests in the target's cavity, carried by it or by objects in it, released, for a time. The cavity is
+    /// the space in which its shape holds water.
     InsideSpec: "softvt.Inside" as "task.goal", constructor "softvt.inside" {
         /// Scene name of the object.
         object: String;
@@ -72,8 +72,8 @@ record! {
         goal: GoalSpec;
         /// A coroutine that solves the task with privileged state.
         expert: Option<Function> = EXPERT;
-        /// Control steps (20 Hz) that the policy has; by default 500 in suites that vary layouts, 700 in those that vary
-        /// objects.
+        /// Control steps (20 Hz) that the policy has; by default 500 in suites that vary layouts, 700 in those that
+        /// vary objects.
         budget_steps: Option<u32> = Type::Integer(Range::closed(1.0, 100_000.0));
     }
     /// A change of the scene that a run can request with --shift name=value. Limits of D stay those of the assets.
@@ -88,12 +88,14 @@ record! {
         min: Option<f64>;
         /// Highest value.
         max: Option<f64>;
-        /// Changes the scene; may return another one. scene.goal_object is the object of the task's goal and scene.prompt the
-        /// instruction. Draw from rng:stream "camera", "light", "material" or "sensor", whichever the shift changes.
+        /// Changes the scene; may return another one. scene.goal_object is the object of the task's goal and
+        /// scene.prompt the instruction. Draw from rng:stream "camera", "light", "material" or "sensor", whichever the
+        /// shift changes.
         apply: Function = Type::Function("fun(scene: softvt.Scene, value: number, rng: softvt.Rng): softvt.Scene?");
     }
     /// Ranges from which every episode of a suite draws: factors on size, stiffness, density and friction of each soft
-    /// object, its colour, the light and the poses of the cameras. The policy sees none of the drawn numbers; records do.
+    /// object, its colour, the light and the poses of the cameras. The policy sees none of the drawn numbers; records
+    /// do.
     VariationSpec: "softvt.Variation" as "variation", constructor "softvt.variation", relations check_variation {
         /// Name in results.
         name: String = Type::Name;
@@ -116,18 +118,19 @@ record! {
         /// Properties of the soft objects that do not show.
         hidden: Option<HiddenSpec>;
     }
-    /// Ranges of properties that do not show, drawn log-uniform for each soft object. Size, colour and looks do not depend on them.
-    /// An instance is drawn again until the ratio of its largest to its smallest safe grip force is within window_ratio; objects need
-    /// a calibration for that. Policies never see these numbers; records have them.
+    /// Ranges of properties that do not show, drawn log-uniform for each soft object. Size, colour and looks do not
+    /// depend on them. An instance is drawn again until the ratio of its largest to its smallest safe grip force is
+    /// within window_ratio; objects need a calibration for that. Policies never see these numbers; records have them.
     HiddenSpec: "softvt.Hidden" as "variation.hidden" {
         /// Relative density of the foam: a factor on the density, and by its square on Young's modulus.
         aeration: [f64; 2] = FACTORS;
-        /// Age: a factor on Young's modulus; the collapse and damage strains shrink by its power 0.7, and τ of the instance
-        /// with them.
+        /// Age: a factor on Young's modulus; the collapse and damage strains shrink by its power 0.7, and τ of the
+        /// instance with them.
         staling: [f64; 2] = FACTORS;
         /// Factor on the mass.
         filling: [f64; 2] = FACTORS;
-        /// Static friction of a coating (flour, oil, glaze), which acts between the object and everything that it touches.
+        /// Static friction of a coating (flour, oil, glaze), which acts between the object and everything that it
+        /// touches.
         coating: [f64; 2] = COATINGS;
         /// Largest over smallest safe grip force of the instances that are kept, at least 1.
         window_ratio: [f64; 2] = Type::Vector(2, "", Range::closed(1.0, 1000.0));
@@ -140,8 +143,8 @@ record! {
         object_type: ObjectType;
         /// Difference between the tasks.
         tasks_differ_in: TaskDifference;
-        /// What a controller has to know of an instance to grip it safely, as softvt list suites prints it: "nothing" but its
-        /// kind, its "size", or what only "touch" tells. softvt scripts/blind_bounds.lua estimates it.
+        /// What a controller has to know of an instance to grip it safely, as softvt list suites prints it: "nothing"
+        /// but its kind, its "size", or what only "touch" tells. softvt scripts/blind_bounds.lua estimates it.
         needs: Option<NeededKnowledge>;
         /// Default number of episodes per task.
         episodes: u32 = Type::Integer(Range::closed(1.0, 1e6)) => Integer(5);
@@ -151,17 +154,18 @@ record! {
         shifts: Vec<Constructed<ShiftSpec>> => Empty;
         /// Ranges from which the soft objects, the light and the cameras of every episode are drawn.
         vary: Option<Constructed<VariationSpec>>;
-        /// Changed settings (docs/settings.md): { physics = {…}, robot = {…}, criteria = {…}, tactile = {…}, cameras = {…} }.
+        /// Changed settings (docs/settings.md): { physics = {…}, robot = {…}, criteria = {…}, tactile = {…}, cameras =
+        /// {…} }.
         settings: Option<Table> = SETTINGS;
-        /// Name of the suite of soft objects whose rigid twin this is. All soft bodies become rigid, with the same shape,
-        /// mass and looks; initial states are those of that suite, so tasks and layouts must be its own.
+        /// Name of the suite of soft objects whose rigid twin this is. All soft bodies become rigid, with the same
+        /// shape, mass and looks; initial states are those of that suite, so tasks and layouts must be its own.
         twin_of: Option<String> = Type::Name;
         /// Policy whose demonstrations softvt record keeps unless --policy names another: that of the hidden suites is
         /// "tactile-servo", which shows how a grip is found. By default the expert.
         teacher: Option<Teacher>;
     }
-    /// A difference between a run and its reference: other shifts, settings or another policy, with the same tasks, initial
-    /// states and seeds.
+    /// A difference between a run and its reference: other shifts, settings or another policy, with the same tasks,
+    /// initial states and seeds.
     ConditionSpec: "softvt.Condition" as "conditions.conditions" {
         /// Name in the table of results and of the run folder.
         name: String;

@@ -1,5 +1,5 @@
-//! Appearances: visuals, the layers over them, and masks, which are immutable values with chained methods. Lengths are in
-//! metres; points and directions in the object frame at rest.
+//! Appearances: visuals, the layers over them, and masks, which are immutable values with chained methods. Lengths are
+//! in metres; points and directions in the object frame at rest.
 
 use std::sync::{Arc, Mutex};
 
@@ -287,8 +287,8 @@ functions! {
             let bytes = size_of::<Mask>() + shape.bytes();
             LuaMask::new(lua, Mask::Inside { shape: Arc::new(shape.copy()), soft_m }, 1, bytes)?
         }
-        /// The letters of a line of text, printed on surfaces that face the reader. Surfaces with text are drawn in finer
-        /// detail.
+        /// The letters of a line of text, printed on surfaces that face the reader. Surfaces with text are drawn in
+        /// finer detail.
         fn text(lua) takes spec "softvt.TextMask" {
             /// At most 64 letters.
             text: String;

@@ -70,7 +70,8 @@ record! {
 }
 
 output! {
-    /// Deformation of a body against its reference shape, in percent of the diagonal of its bounding box along its own axes.
+    /// Deformation of a body against its reference shape, in percent of the diagonal of its bounding box along its own
+    /// axes.
     fn deformation_table(lua, deformation: &Deformation) -> "softvt.Deformation" as "deformation" {
         /// D: root mean square of the displacement over the volume.
         rms_pct: "number" = deformation.rms_pct;
@@ -158,8 +159,8 @@ fn gel_pose_on_carrier() -> Pose {
 
 functions! {
     FUNCTIONS {
-        /// Returns an empty world: soft bodies among fixed or prescribed solids, without a robot. Settings of the command
-        /// line, --set physics.…, take precedence in experiments.
+        /// Returns an empty world: soft bodies among fixed or prescribed solids, without a robot. Settings of the
+        /// command line, --set physics.…, take precedence in experiments.
         fn world(lua) takes spec "softvt.WorldSpec" {
             /// Time step: the setting physics.dt, with its default and range.
             dt: Option<f64> = Type::Number("s", Range::ANY);
@@ -306,8 +307,8 @@ class! {
             fn kinematic(lua, this, spec: WorldSolidSpec) -> ["softvt.Solid"] { this.add_solid(lua, &spec, true)? }
             /// Adds a solid that never moves.
             fn static(lua, this, spec: WorldSolidSpec) -> ["softvt.Solid"] { this.add_solid(lua, &spec, false)? }
-            /// Adds a gel pad of the robot, with the shape and the default contact law of its fingers, on a carrier that
-            /// solid:move_to moves. Its frame is at the apex of the gel, which faces along x.
+            /// Adds a gel pad of the robot, with the shape and the default contact law of its fingers, on a carrier
+            /// that solid:move_to moves. Its frame is at the apex of the gel, which faces along x.
             fn gel_pad(lua, this, spec: WorldGelPadSpec) -> ["softvt.Solid"] { this.add_gel_pad(lua, &spec)? }
             /// Makes one time step. Returns false and the reason once the state is invalid.
             fn step(lua, this) -> ["boolean", "string?"] { this.step(lua)? }
@@ -389,8 +390,8 @@ class! {
             /// Returns the strain up to which its material is stable and undamaged: the smaller of collapse_strain and
             /// damage_strain; nil if it states none.
             fn stable_strain(_, this) -> ["number?"] { lock(&this.world).stable_strains[this.id.index()] }
-            /// Returns the compressive strain that `percent` of the volume stays below: 1 − σ_min(F) at the Gauss points,
-            /// weighted by volume.
+            /// Returns the compressive strain that `percent` of the volume stays below: 1 − σ_min(F) at the Gauss
+            /// points, weighted by volume.
             fn strain_percentile(lua, this, percent: f64 = PERCENT) -> ["number"] {
                 let strain = this.strain(|meter, state| meter.percentile(state, 1.0 - percent / 100.0));
                 finite(strain).ok_or_else(|| fail(lua, "body:strain_percentile: the body has no finite strain"))?
@@ -441,7 +442,8 @@ class! {
     LuaSolid: "softvt.Solid" {
         label(_) { "solid".to_owned() }
         methods {
-            /// Prescribes the pose after the next step: position, m, and orientation as axis-angle, rad (none by default).
+            /// Prescribes the pose after the next step: position, m, and orientation as axis-angle, rad (none by
+            /// default).
             fn move_to(lua, this, position: [f64; 3] = POSITION, axis_angle: Option<[f64; 3]> = AXIS_ANGLE) -> [] {
                 let Some(id) = this.kinematic else {
                     let message = "solid:move_to: a static solid cannot move; make it with world:kinematic";

@@ -111,8 +111,8 @@ impl LoadedScript {
     }
 }
 
-/// Loads the script at `path` with its own arguments of the command line, and makes its plan. Standard scripts that are not
-/// on the disk are read from the library inside the binary.
+/// Loads the script at `path` with its own arguments of the command line, and makes its plan. Standard scripts that are
+/// not on the disk are read from the library inside the binary.
 ///
 /// ```
 /// use std::path::Path;
@@ -215,7 +215,8 @@ impl ScriptInstance {
         table.is_some_and(|table| is_constructed(&self.vm.lua, record, table))
     }
 
-    /// The result of the main file if the constructor of `T` made it, checked again, since a script may have written to it.
+    /// The result of the main file if the constructor of `T` made it, checked again, since a script may have written to
+    /// it.
     pub(crate) fn result<T: RecordType>(&self) -> mlua::Result<Option<Constructed<T>>> {
         match &self.result {
             Some(table) if self.returned(T::RECORD) => {
@@ -277,7 +278,8 @@ impl ScriptInstance {
         })
     }
 
-    /// The suites that the main file returned: one suite, conditions, or a list of suites. `None` if it is something else.
+    /// The suites that the main file returned: one suite, conditions, or a list of suites. `None` if it is something
+    /// else.
     fn suites(&self) -> mlua::Result<Option<Vec<Constructed<SuiteSpec>>>> {
         if let Some(suite) = self.result()? {
             return Ok(Some(vec![suite]));

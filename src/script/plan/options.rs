@@ -37,11 +37,11 @@ record! {
         choices: Option<Vec<String>>;
         /// Description for --help.
         help: String => Text("");
-        /// Values of other options without which this one does nothing, and is refused: { sweep_protocol = "hand" }. A list
-        /// must contain the value.
+        /// Values of other options without which this one does nothing, and is refused: { sweep_protocol = "hand" }. A
+        /// list must contain the value.
         only_with: Option<BTreeMap<String, Value>>;
-        /// True if files that are made with another value than the default must not replace those of the project: such a
-        /// value then needs --out.
+        /// True if files that are made with another value than the default must not replace those of the project: such
+        /// a value then needs --out.
         needs_out: bool => Boolean(false);
     }
 }

@@ -76,8 +76,8 @@ impl PolicyFile {
         Ok(Self { name, replan, gripper, streams, drives, privileged, observes_at, sources })
     }
 
-    /// Starts the policy of an episode in a virtual machine of its own. Its actions are read in the grip code `gripper`,
-    /// or in that of the file.
+    /// Starts the policy of an episode in a virtual machine of its own. Its actions are read in the grip code
+    /// `gripper`, or in that of the file.
     ///
     /// # Errors
     /// If the file fails, or declares something else than when it was loaded.
@@ -161,8 +161,8 @@ fn script_error(error: ScriptError) -> PolicyError {
 }
 
 impl LuaPolicy {
-    /// An error in the result of `act`, at the line where that function begins, since its call is over. `label` names the
-    /// value in the message.
+    /// An error in the result of `act`, at the line where that function begins, since its call is over. `label` names
+    /// the value in the message.
     fn malformed(&self, label: &str, error: impl Into<ValidationError>) -> PolicyError {
         let info = self.act.info();
         let file = info.source.as_deref().and_then(|source| source.strip_prefix('@'));

@@ -34,8 +34,8 @@ use softvt_geometry::{Aabb, Vec3};
 use softvt_robot::{gripper::MAX_WIDTH, panda};
 use softvt_scene::{Body, CameraSettings, Scene, SceneVariation};
 
-/// Changes of a scene between its layout and the start of an episode, applied in the order of the fields. The variation comes
-/// before them: limits and initial states are those of the varied scene.
+/// Changes of a scene between its layout and the start of an episode, applied in the order of the fields. The variation
+/// comes before them: limits and initial states are those of the varied scene.
 #[derive(Clone, Debug, Default)]
 pub struct SceneChanges {
     /// Shifts by name and value, in the order in which they apply.
@@ -80,8 +80,8 @@ impl EpisodeSetup {
     }
 }
 
-/// Builds the scenes of many episodes in one virtual machine, for checks without a simulation. Global state that one layout
-/// changes is seen by the next.
+/// Builds the scenes of many episodes in one virtual machine, for checks without a simulation. Global state that one
+/// layout changes is seen by the next.
 pub struct SceneBuilder {
     instance: Arc<ScriptInstance>,
     /// The suites of the plan, by name.
@@ -218,8 +218,8 @@ fn vary(
 /// Factors by which a layout may change the material of an object: those that a variation may draw.
 const MATERIAL_FACTORS: Range = Range::closed(0.1, 10.0);
 
-/// Checks the materials that the layout has changed. Limits of D stay those of the asset, and records have the factors of
-/// shifts and variations alone.
+/// Checks the materials that the layout has changed. Limits of D stay those of the asset, and records have the factors
+/// of shifts and variations alone.
 fn check_materials(scene: &Scene) -> Result<(), ScriptError> {
     for object in &scene.objects {
         let factors = [("youngs_pa", object.youngs_factor()), ("density", object.density_factor())];
@@ -239,8 +239,8 @@ fn check_materials(scene: &Scene) -> Result<(), ScriptError> {
     Ok(())
 }
 
-/// Checks that an object that was scaled fits between the fingers. `largest` is the largest factor that the variation can
-/// draw: a suite of which one episode in ten cannot be solved is not valid.
+/// Checks that an object that was scaled fits between the fingers. `largest` is the largest factor that the variation
+/// can draw: a suite of which one episode in ten cannot be solved is not valid.
 fn check_width(
     scene: &Scene,
     name: &str,

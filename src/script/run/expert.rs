@@ -26,8 +26,8 @@ pub enum ExpertGrip {
     TactileServo,
 }
 
-/// Controllers of the gripper that know what shows of an object and the instances that the suite draws, in place of the instance
-/// itself. Experts implement them in Lua.
+/// Controllers of the gripper that know what shows of an object and the instances that the suite draws, in place of the
+/// instance itself. Experts implement them in Lua.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BlindGrip {
     /// One closure per asset.

@@ -18,8 +18,8 @@ pub(crate) const MIN_LENGTH: f64 = 1e-9;
 const MAX_TEXT_BYTES: usize = 4096;
 
 impl Type {
-    /// Checks `value` and returns it as it is stored: numbers converted, lists of the host as plain tables, nested tables
-    /// as copies with their defaults.
+    /// Checks `value` and returns it as it is stored: numbers converted, lists of the host as plain tables, nested
+    /// tables as copies with their defaults.
     pub(crate) fn check(&self, lua: &Lua, value: &Value) -> Result<Value, ValidationError> {
         let value = &plain(lua, value)?;
         if let Value::String(text) = value
@@ -98,8 +98,8 @@ impl Type {
         ValidationError::new(format!("expected {}, got {got}", self.describe()))
     }
 
-    /// Checks a list of exactly `count` finite numbers in `range`. The error is at the wrong entry, or at the list itself if
-    /// its length is wrong.
+    /// Checks a list of exactly `count` finite numbers in `range`. The error is at the wrong entry, or at the list
+    /// itself if its length is wrong.
     fn check_numbers(
         &self,
         lua: &Lua,
@@ -302,7 +302,8 @@ pub(crate) fn error_at_key(lua: &Lua, label: &str, error: &ValidationError) -> m
     error_at(lua, current_line(lua), label, error)
 }
 
-/// The error of a function of a script about a table that it was given, at the line of the file that called the function.
+/// The error of a function of a script about a table that it was given, at the line of the file that called the
+/// function.
 pub(crate) fn error_of_caller(lua: &Lua, label: &str, error: &ValidationError) -> mlua::Error {
     let line = |level| lua.inspect_stack(level, SourceLine::running);
     let mut lines = (0..).map_while(line).flatten();

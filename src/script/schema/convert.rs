@@ -177,8 +177,8 @@ macro_rules! first {
 }
 pub(crate) use first;
 
-/// The result of a conversion from its converted fields: the struct with fields of these names, or what a function makes
-/// of them.
+/// The result of a conversion from its converted fields: the struct with fields of these names, or what a function
+/// makes of them.
 macro_rules! made {
     ($lua:ident [$($field:ident)*]) => { Ok(Self { $($field),* }) };
     ($lua:ident [$($field:ident)*] $make:expr) => { $make($lua, $($field),*) };
@@ -218,9 +218,10 @@ pub(crate) use fields;
 /// }
 /// ```
 ///
-/// The Lua type may be left out where [`LuaType`] of the Rust type says enough, and so may the default: an `Option` may then
-/// be absent, and a nested record of which every field has a default. Constructor and relations are optional. Gives the
-/// struct with its conversion from a checked table ([`FromChecked`]) and the [`Record`] by which tables are checked.
+/// The Lua type may be left out where [`LuaType`] of the Rust type says enough, and so may the default: an `Option` may
+/// then be absent, and a nested record of which every field has a default. Constructor and relations are optional.
+/// Gives the struct with its conversion from a checked table ([`FromChecked`]) and the [`Record`] by which tables are
+/// checked.
 macro_rules! record {
     ($(
         $(#[doc = $doc:literal])+
@@ -247,8 +248,8 @@ macro_rules! record {
 pub(crate) use record;
 
 /// Declares records whose struct is already defined: scripts then write such a struct as a table. The syntax is that of
-/// [`record!`]. The struct has fields of the same names, or `by make;` at the end names the function that makes it from the
-/// interpreter and the fields.
+/// [`record!`]. The struct has fields of the same names, or `by make;` at the end names the function that makes it from
+/// the interpreter and the fields.
 macro_rules! record_of {
     ($(
         $(#[doc = $doc:literal])+
@@ -292,8 +293,8 @@ macro_rules! record_of {
 }
 pub(crate) use record_of;
 
-/// Declares the strings that stand for the values of an enum: `choice! { Axis { "x" => X, … } }`. `enum Axis` instead of `Axis`
-/// defines the enum too.
+/// Declares the strings that stand for the values of an enum: `choice! { Axis { "x" => X, … } }`. `enum Axis` instead
+/// of `Axis` defines the enum too.
 macro_rules! choice {
     ($(#[doc = $doc:literal])+ enum $name:ident { $($text:literal => $variant:ident),+ $(,)? }) => {
         $(#[doc = $doc])+

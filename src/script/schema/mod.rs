@@ -2,8 +2,8 @@
 //! functions.
 //!
 //! Each is declared once, by [`record!`](convert), [`class!`](object), [`output!`] or [`functions!`](function). The
-//! declaration gives the Rust struct or the accessors, the check of every value with its messages, the stubs for language
-//! servers and the reference page. A key is therefore known everywhere or nowhere.
+//! declaration gives the Rust struct or the accessors, the check of every value with its messages, the stubs for
+//! language servers and the reference page. A key is therefore known everywhere or nowhere.
 
 pub(crate) mod check;
 pub(crate) mod convert;

@@ -139,7 +139,8 @@ pub(crate) fn fixed_list<T: IntoLua>(
 /// Hint for lists of measured values.
 pub(crate) const MEASURED: &str = "it is measured";
 
-/// The object that a value holds. Arguments are checked before, so that another value is an error of the interface itself.
+/// The object that a value holds. Arguments are checked before, so that another value is an error of the interface
+/// itself.
 pub(crate) fn object_of<T: ApiObject>(lua: &Lua, value: &Value) -> mlua::Result<T> {
     let object = value.as_userdata().and_then(|data| data.borrow::<T>().ok().map(|object| object.clone()));
     object.ok_or_else(|| fail(lua, format!("expected a {}, got {}", T::NAME, describe(value))))
@@ -191,10 +192,10 @@ pub(crate) trait ApiObject: Clone + Send + Sync + UserData + FromLua + 'static {
 ///         methods {
 ///             /// Documentation.
 ///             fn name(lua, this, argument: RustType = Type::…) -> ["LuaCATS type"] { … }
-///             /// Documentation of the method and of the table, which comes last and whose fields the body uses by name.
+///             /// Documentation of the method and of the table, whose fields the body uses by name.
 ///             fn name(lua, this) takes spec "softvt.Table" { … as in record! … } -> ["LuaCATS type"] { … }
 ///         }
-///         lua_methods {                                        // implemented in Lua, with arguments checked by `arguments`
+///         lua_methods {                              // implemented in Lua, with arguments checked by `arguments`
 ///             /// Documentation.
 ///             fn name(argument: RustType) -> ["LuaCATS type"];
 ///         }

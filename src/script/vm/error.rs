@@ -216,8 +216,8 @@ pub(crate) fn current_line(lua: &Lua) -> Option<SourceLine> {
     }
 }
 
-/// Line of the innermost function on the stack that is the author's own, and not of the embedded library below `scripts/`.
-/// Without one, the outermost.
+/// Line of the innermost function on the stack that is the author's own, and not of the embedded library below
+/// `scripts/`. Without one, the outermost.
 pub(crate) fn author_line(lua: &Lua) -> Option<SourceLine> {
     let main = app_data::<MainFile>(lua).map(|main| main.0).unwrap_or_default();
     let is_library = |file: &str| {

@@ -39,8 +39,8 @@ pub struct ScriptFiles {
     pub served: BTreeMap<String, String>,
     /// Data files that were requested and not found.
     pub absent: BTreeSet<String>,
-    /// Messages about the modules and data files that could not be used. An episode repeats them, so that a script cannot
-    /// tell an episode from the run that made its plan.
+    /// Messages about the modules and data files that could not be used. An episode repeats them, so that a script
+    /// cannot tell an episode from the run that made its plan.
     pub refused: BTreeMap<String, String>,
     /// Names of the modules with limits or materials of objects, of those that a policy requested.
     pub hidden: BTreeSet<String>,
@@ -269,8 +269,8 @@ impl Library {
         Ok(found)
     }
 
-    /// Finds the file of `key`: at the path `first`, else at the first of `candidates` below the roots, on disk or embedded.
-    /// `late` is the error of a frozen library for a file that was not read before.
+    /// Finds the file of `key`: at the path `first`, else at the first of `candidates` below the roots, on disk or
+    /// embedded. `late` is the error of a frozen library for a file that was not read before.
     fn find(
         &mut self,
         key: &str,

@@ -1,5 +1,5 @@
-//! Lists that belong to an object of the host. Reading `scene.base` gives such a list and no copy, whose changes would be
-//! lost without an error.
+//! Lists that belong to an object of the host. Reading `scene.base` gives such a list and no copy, whose changes would
+//! be lost without an error.
 
 use mlua::{Lua, MetaMethod, MultiValue, Table, UserData, UserDataFields, UserDataMethods, Value};
 

@@ -1,12 +1,13 @@
 //! Time limits: a hook that `pcall` cannot swallow, and a watchdog for C functions that never return.
 //!
-//! Limits count the processor time of the script's own thread, so that a busy machine does not time out a harmless script.
-//! The hook runs every few thousand Lua instructions. Once the time is up it runs at *every* instruction and raises an error
-//! each time, so that a `pcall` that catches the error gains only one instruction.
+//! Limits count the processor time of the script's own thread, so that a busy machine does not time out a harmless
+//! script. The hook runs every few thousand Lua instructions. Once the time is up it runs at *every* instruction and
+//! raises an error each time, so that a `pcall` that catches the error gains only one instruction.
 //!
-//! A C function (`string.find` with a hostile pattern) never reaches the hook, and nothing can interrupt it. The watchdog is
-//! a thread that polls every running limit and then calls [`StuckHandler`], which ends the process. It does so only if the hook
-//! has not run since the last check, and if the process has had at least as much processor time as the script may take.
+//! A C function (`string.find` with a hostile pattern) never reaches the hook, and nothing can interrupt it. The
+//! watchdog is a thread that polls every running limit and then calls [`StuckHandler`], which ends the process. It does
+//! so only if the hook has not run since the last check, and if the process has had at least as much processor time as
+//! the script may take.
 
 use std::{
     sync::{Arc, Mutex, Once, Weak},
@@ -126,8 +127,8 @@ fn process_time() -> Duration {
 pub(crate) struct Clock(Arc<Mutex<ClockState>>);
 
 impl Clock {
-    /// A clock without a running call. The watchdog calls `on_stuck` if a script exceeds a limit by `grace` without a call of
-    /// the hook. Messages name `file`.
+    /// A clock without a running call. The watchdog calls `on_stuck` if a script exceeds a limit by `grace` without a
+    /// call of the hook. Messages name `file`.
     pub(crate) fn new(file: &str, grace: Duration, on_stuck: StuckHandler) -> Self {
         let state = ClockState { file: file.into(), grace, on_stuck, hook_calls: 0, call: None };
         let clock = Self(Arc::new(Mutex::new(state)));
@@ -166,8 +167,8 @@ impl Clock {
         }
     }
 
-    /// Limits the virtual machine to `limit` of this thread's processor time until the guard is dropped. A nested call keeps
-    /// the outer limit.
+    /// Limits the virtual machine to `limit` of this thread's processor time until the guard is dropped. A nested call
+    /// keeps the outer limit.
     pub(crate) fn start(&self, limit: Duration) -> Deadline {
         let mut state = lock(&self.0);
         if state.call.is_some() {

@@ -60,8 +60,8 @@ pub struct SurfaceFeatures {
 }
 
 impl SurfaceFeatures {
-    /// Extracts the features of a shape. Those of boxes, cylinders and lathes are known exactly; the sharp edges and flat
-    /// regions of other shapes are found on a grid of 1/24 of the longest side.
+    /// Extracts the features of a shape. Those of boxes, cylinders and lathes are known exactly; the sharp edges and
+    /// flat regions of other shapes are found on a grid of 1/24 of the longest side.
     pub fn of(shape: &Shape) -> Self {
         let mut features = Self::default();
         add_features(shape, &Pose::identity(), &mut features);

@@ -33,29 +33,31 @@ const SIMPLIFY_TOLERANCE: f32 = 0.025;
 const MAX_PATTERN_EDGE: f64 = 1.0 / 48.0;
 /// Maximum number of triangles that subdivision creates.
 const MAX_SUBDIVIDED_TRIANGLES: usize = 120_000;
-/// Geometric errors of the levels of detail of solids, m: for large images, for small ones, and for distant views and shadows.
+/// Geometric errors of the levels of detail of solids, m: for large images, for small ones, and for distant views and
+/// shadows.
 const LOD_ERRORS: [f32; 4] = [1e-4, 2.5e-4, 5e-4, MAX_CASTER_ERROR];
-/// Maximum geometric error of the levels of detail that cast shadows, m: half the depth bias of shadow maps, so that casters do
-/// not shade their own surface.
+/// Maximum geometric error of the levels of detail that cast shadows, m: half the depth bias of shadow maps, so that
+/// casters do not shade their own surface.
 const MAX_CASTER_ERROR: f32 = 1e-3;
 /// Vertex spacing in cells that counts for the choice of a level: surfaces of one colour need
 /// fewer vertices than patterns.
 const UNIFORM_SPACING: f64 = 0.16;
 /// Minimum cell that counts for it, m: meshes given explicitly are fine enough for any view.
 const MIN_CELL: f64 = 2e-3;
-/// Share of triangles that may be farther from the surface than the geometric error of their level: a groove, which takes
-/// little of the surface, counts.
+/// Share of triangles that may be farther from the surface than the geometric error of their level: a groove, which
+/// takes little of the surface, counts.
 const ERROR_SHARE: f64 = 0.02;
-/// Depth inside a shape from which a vertex belongs to a hidden part of it, m: corners of visible parts are rounded by less.
+/// Depth inside a shape from which a vertex belongs to a hidden part of it, m: corners of visible parts are rounded by
+/// less.
 const HIDDEN_CORNER_DEPTH: f64 = 3e-4;
 /// Vertices deeper than this inside another solid are invisible, m.
 const HIDDEN_DEPTH: f64 = 1.5e-3;
 
 /// Triangles and materials of one kind of object, shared by all its instances.
 ///
-/// Materials are functions of the object frame. They are evaluated once, into vertices, or into textures for
-/// surfaces with patterns or several materials, and filtered to the spacing of the samples; small images therefore do not
-/// alias. Coarser levels of detail are drawn where they look the same; those of shapes are built on first use.
+/// Materials are functions of the object frame. They are evaluated once, into vertices, or into textures for surfaces
+/// with patterns or several materials, and filtered to the spacing of the samples; small images therefore do not alias.
+/// Coarser levels of detail are drawn where they look the same; those of shapes are built on first use.
 #[derive(Clone, Debug)]
 pub struct RenderMesh {
     /// From fine to coarse; at least one.
@@ -114,8 +116,8 @@ impl Drop for KeptLevel {
 }
 
 impl RenderMesh {
-    /// Builds the mesh of a rigid shape. `visuals` are indexed by its material ids; `name` appears in errors. What takes long
-    /// is kept in `cache`.
+    /// Builds the mesh of a rigid shape. `visuals` are indexed by its material ids; `name` appears in errors. What
+    /// takes long is kept in `cache`.
     ///
     /// # Errors
     /// The shape has no surface, or a material id has no visual.
@@ -131,8 +133,8 @@ impl RenderMesh {
         Self::with_lazy_levels(ShapeSurface::new(name, shape, visuals, None, cache))
     }
 
-    /// Builds the mesh of the shape of a soft body, attached to the nodes of `voxels`, with small triangles on flat faces
-    /// too.
+    /// Builds the mesh of the shape of a soft body, attached to the nodes of `voxels`, with small triangles on flat
+    /// faces too.
     ///
     /// # Errors
     /// As [`RenderMesh::from_shape`]; or part of the surface lies more than two voxels outside `voxels`.
@@ -460,8 +462,8 @@ fn subdivide(mesh: &mut Mesh, max_edge: f64) -> f64 {
     }
 }
 
-/// Distance from the surface of `shape` that a few of the centroids of triangles exceed ([`ERROR_SHARE`]), m. Triangles with
-/// a corner inside the shape do not count: they are hidden by another part of it.
+/// Distance from the surface of `shape` that a few of the centroids of triangles exceed ([`ERROR_SHARE`]), m. Triangles
+/// with a corner inside the shape do not count: they are hidden by another part of it.
 fn geometric_error(mesh: &Mesh, shape: &Shape) -> f32 {
     let is_hidden: Vec<bool> =
         mesh.vertices.iter().map(|v| shape.distance(v) < -HIDDEN_CORNER_DEPTH).collect();

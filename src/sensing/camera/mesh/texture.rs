@@ -1,8 +1,8 @@
 //! Textures of flat faces and of parts of curved surfaces.
 //!
-//! A chart maps surface points to texels by projection along one direction. The levels of its mip map (Williams, Pyramidal
-//! Parametrics, 1983) consist of tiles, which are painted from the materials of the surface when they are first seen: most
-//! of a floor or of an underside never is.
+//! A chart maps surface points to texels by projection along one direction. The levels of its mip map (Williams,
+//! Pyramidal Parametrics, 1983) consist of tiles, which are painted from the materials of the surface when they are
+//! first seen: most of a floor or of an underside never is.
 //!
 //! Flat meshes get one chart per plane. A curved surface with patterns is divided into connected parts that face mostly
 //! along one axis; projection along that axis stretches them by less than √3.
@@ -38,11 +38,11 @@ const TEXT_TEXEL: f32 = 0.3e-3;
 const TEXELS_PER_FEATURE: f32 = 8.0;
 /// Minimum number of texels across a chart at its coarsest level, if it has as many at the finest.
 const MIN_TEXELS_ACROSS: usize = 4;
-/// Finest level whose tiles are the means of 4 × 4 painted points per texel. Those of finer levels, which have more texels,
-/// are the means of 2 × 2.
+/// Finest level whose tiles are the means of 4 × 4 painted points per texel. Those of finer levels, which have more
+/// texels, are the means of 2 × 2.
 const FIRST_DENSE_LEVEL: usize = 4;
-/// Level to whose texels patterns are filtered at most: layers of labels are thin, and a wider filter would let the material
-/// below shine through.
+/// Level to whose texels patterns are filtered at most: layers of labels are thin, and a wider filter would let the
+/// material below shine through.
 const MAX_FILTER_LEVEL: usize = 1;
 /// Margin in texels painted around triangles: bilinear sampling reads neighbours.
 const PAINT_MARGIN: f32 = 1.5;
@@ -435,8 +435,8 @@ fn project_triangle(
             if inset > -PAINT_MARGIN && known.as_ref().is_none_or(|known| known.inset < inset) {
                 let interpolate = |of: [V3; 3]| of[0] * a + of[1] * b + of[2] * c;
                 let chord = interpolate(corners.map(|c| c.position));
-                // The mean of a triangle and of the tangent planes at its corners follows a curved surface to second order
-                // (compare Boubekeur & Alexa, Phong Tessellation, SIGGRAPH Asia 2008).
+                // The mean of a triangle and of the tangent planes at its corners follows a curved surface to second
+                // order (compare Boubekeur & Alexa, Phong Tessellation, SIGGRAPH Asia 2008).
                 let tangent =
                     interpolate(corners.map(|c| chord + c.normal * c.normal.dot(&(c.position - chord))));
                 *known = Some(SurfacePoint {
@@ -553,8 +553,8 @@ impl MipLevel {
         [0, 1].map(|axis| (self.size[axis] - corner[axis]).min(TILE) + 1)
     }
 
-    /// Bilinear interpolation, clamped at the edges; (u, v) in texels. Returns albedo and roughness. `paint` makes the tile
-    /// whose first texel it is given.
+    /// Bilinear interpolation, clamped at the edges; (u, v) in texels. Returns albedo and roughness. `paint` makes the
+    /// tile whose first texel it is given.
     #[inline(always)]
     fn sample(&self, u: f32x8, v: f32x8, paint: impl Fn([usize; 2]) -> Box<[u32]>) -> [f32x8; 4] {
         let clamped = |x: f32x8, count: usize| {
@@ -584,8 +584,8 @@ impl MipLevel {
     }
 }
 
-/// Blends four packed texels, bilinearly at `x` and `y` in 0..=1. Albedos are blended themselves, not their stored square roots: that
-/// would shift borders towards the lighter side.
+/// Blends four packed texels, bilinearly at `x` and `y` in 0..=1. Albedos are blended themselves, not their stored
+/// square roots: that would shift borders towards the lighter side.
 #[inline(always)]
 fn blend(corners: [u32x8; 4], x: f32x8, y: f32x8) -> [f32x8; 4] {
     let both = x * y;
@@ -701,8 +701,8 @@ mod tests {
 
     #[test]
     fn paint_lies_on_the_surface_and_not_on_the_chords_of_coarse_triangles() {
-        // A quarter of a cylinder about y in one piece: its chord is 8.8 mm deep. A stripe of 6 mm runs where the surface
-        // is 21.2 mm above the axis.
+        // A quarter of a cylinder about y in one piece: its chord is 8.8 mm deep. A stripe of 6 mm runs where the
+        // surface is 21.2 mm above the axis.
         let (radius, half) = (0.03_f32, 0.02_f32);
         let edge = radius * std::f32::consts::FRAC_1_SQRT_2;
         let corner = |x: f32, y: f32| ChartVertex {

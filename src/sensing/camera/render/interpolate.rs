@@ -63,7 +63,8 @@ impl<'a> TriangleInterpolator<'a> {
         }
     }
 
-    /// Surface points at eight neighbouring pixels, all of which this triangle covers; (x, y) is the centre of the first.
+    /// Surface points at eight neighbouring pixels, all of which this triangle covers; (x, y) is the centre of the
+    /// first.
     pub(crate) fn row(&self, lens: &Lens, x: f32, y: f32) -> SurfaceSamples {
         let (first, right) = (lens.ray(x, y), lens.right.cast());
         let weights = self
@@ -108,7 +109,8 @@ impl<'a> TriangleInterpolator<'a> {
         w.map(|w| w * scale)
     }
 
-    /// Appends the point where the ray through (x, y) meets the triangle, or the point of the triangle that appears nearest.
+    /// Appends the point where the ray through (x, y) meets the triangle, or the point of the triangle that appears
+    /// nearest.
     pub(crate) fn push(&self, batch: &mut ShadingBatch<'a>, lens: &Lens, x: f32, y: f32) {
         let w = self.nearest_weights(lens, x, y);
         let ([a, b, c], lane) = (&self.corners, batch.count);

@@ -206,8 +206,8 @@ impl ShadowMap {
         }
     }
 
-    /// True if a shadow may fall within a box in the frame of the map: lowest and highest u, v (texels) and height above
-    /// level ground (m).
+    /// True if a shadow may fall within a box in the frame of the map: lowest and highest u, v (texels) and height
+    /// above level ground (m).
     pub(crate) fn may_shade(&self, [low, high]: &[V3; 2]) -> bool {
         let tile = |x: f32| (x.max(0.0) as usize / TILE).min(TILES - 1);
         let columns = tile(low.x)..tile(high.x) + 1;

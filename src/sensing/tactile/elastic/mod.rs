@@ -1,8 +1,8 @@
 //! Elasticity of the gel: from force and shape of a contact to pressure, shear and displacement of the gel's surface.
 //!
 //! The gel is an elastic layer bonded to a rigid base. Its response is known in closed form for each wave number
-//! (`elastic_layer`) and applied by Fourier transforms ([`softvt_signal::fourier`]). `normal_contact` finds the pressure under a
-//! pressed shape, `tangential_contact` the shear with stick and slip; [`GelField::solve`] joins them.
+//! (`elastic_layer`) and applied by Fourier transforms ([`softvt_signal::fourier`]). `normal_contact` finds the
+//! pressure under a pressed shape, `tangential_contact` the shear with stick and slip; [`GelField::solve`] joins them.
 
 mod elastic_layer;
 mod gel;
