@@ -4,7 +4,8 @@
 local material = require "materials"
 local packaging = require "packaging"
 
-local YELLOW, TEAL, RED, WHITE = { 0.88, 0.56, 0.045 }, { 0.010, 0.155, 0.175 }, { 0.60, 0.03, 0.02 }, { 0.90, 0.88, 0.80 }
+local YELLOW, TEAL, RED, WHITE =
+  { 0.88, 0.56, 0.045 }, { 0.010, 0.155, 0.175 }, { 0.60, 0.03, 0.02 }, { 0.90, 0.88, 0.80 }
 
 local label = packaging.label { on = { "+x", "-x" }, out = 30.2, wrap = 30.2, round = 8 }
 label.belt(44, 66, TEAL)
@@ -21,7 +22,14 @@ local WORDS = "SAFETOUCHBGKLMNPRW"
 for i = 1, #WORDS do
   local high = i % 2 == 0 and 33 or 18
   local lean = 0.55 * math.sin(2.4 * i)
-  row.text(WORDS:sub(i, i), (i - 1) * step, high + 3 * math.sin(1.7 * i), 11, INKS[i % 4 + 1], { weight = 0.22, lean = lean })
+  row.text(
+    WORDS:sub(i, i),
+    (i - 1) * step,
+    high + 3 * math.sin(1.7 * i),
+    11,
+    INKS[i % 4 + 1],
+    { weight = 0.22, lean = lean }
+  )
 end
 table.move(row.layers, 1, #row.layers, #label.layers + 1, label.layers)
 

@@ -7,9 +7,18 @@ local mm = 1e-3
 local SAUCE, BLACK, CREAM = { 0.085, 0.017, 0.006 }, { 0.014, 0.012, 0.011 }, { 0.90, 0.80, 0.60 }
 local EMBER, FLAME, SPARK = { 0.56, 0.045, 0.008 }, { 0.82, 0.22, 0.012 }, { 0.92, 0.60, 0.06 }
 
-local glass = packaging.revolve {
-  { 0, 0 }, { 23.5, 0 }, { 23.5, 73 }, { 22.5, 77 }, { 19, 83 }, { 14.5, 87 }, { 13, 91 }, { 0, 91 },
-}:scale(1, 29 / 47, 1)
+local glass = packaging
+  .revolve {
+    { 0, 0 },
+    { 23.5, 0 },
+    { 23.5, 73 },
+    { 22.5, 77 },
+    { 19, 83 },
+    { 14.5, 87 },
+    { 13, 91 },
+    { 0, 91 },
+  }
+  :scale(1, 29 / 47, 1)
 local cap = packaging.revolve { { 0, 88 }, { 10, 88 }, { 10, 106 }, { 9, 107 }, { 0, 107 } }:paint { material = 1 }
 
 -- Flames on a black label. A tongue leans and tapers to its tip.
@@ -18,8 +27,13 @@ label.belt(7, 64, CREAM)
 label.belt(8, 63, BLACK)
 local function tongue(x, wide, high, colour)
   label.polygon(x, 8, {
-    { -0.5 * wide, 0 }, { 0.5 * wide, 0 }, { 0.46 * wide, 0.34 * high }, { 0.22 * wide, 0.62 * high }, { 0.16 * wide, high },
-    { -0.16 * wide, 0.72 * high }, { -0.44 * wide, 0.36 * high },
+    { -0.5 * wide, 0 },
+    { 0.5 * wide, 0 },
+    { 0.46 * wide, 0.34 * high },
+    { 0.22 * wide, 0.62 * high },
+    { 0.16 * wide, high },
+    { -0.16 * wide, 0.72 * high },
+    { -0.44 * wide, 0.36 * high },
   }, colour)
 end
 for i, colour in ipairs { EMBER, FLAME, SPARK } do

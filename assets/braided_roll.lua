@@ -17,7 +17,14 @@ end
 
 -- Lobes get smaller towards the ends, as the dough of a plait does.
 local braid = lobe(-40, 1, 0.78)
-for _, next in ipairs { { -26, -1, 0.92 }, { -12, 1, 1 }, { 3, -1, 1 }, { 17, 1, 0.98 }, { 31, -1, 0.88 }, { 41, 1, 0.74 } } do
+for _, next in ipairs {
+  { -26, -1, 0.92 },
+  { -12, 1, 1 },
+  { 3, -1, 1 },
+  { 17, 1, 0.98 },
+  { 31, -1, 0.88 },
+  { 41, 1, 0.74 },
+} do
   braid = braid:smooth_union(lobe(table.unpack(next)), 3 * mm)
 end
 
@@ -25,10 +32,30 @@ return softvt.asset {
   name = "braided_roll",
   shape = braid:subtract(TABLE_TOP, 4 * mm),
   -- At six voxels a length, three across, the braid is half again too stiff between pads; at twelve it is 5 % so.
-  body = softvt.soft { youngs_pa = 90e3, poisson = 0.37, density = 300, resolution = 12, collapse_strain = 0.10, damage_strain = 0.30 },
+  body = softvt.soft {
+    youngs_pa = 90e3,
+    poisson = 0.37,
+    density = 300,
+    resolution = 12,
+    collapse_strain = 0.10,
+    damage_strain = 0.30,
+  },
   hints = { grasp_height_m = 19 * mm },
   visuals = {
-    material.crust { base = { 0.74, 0.405, 0.115 }, top = { 0.50, 0.21, 0.035 }, browning = 0.8, foot = { 0.80, 0.555, 0.27 }, sheen = 0.30, seed = 41 },
-    material.crust { base = { 0.76, 0.24, 0.03 }, top = { 0.62, 0.16, 0.02 }, foot = { 0.78, 0.34, 0.08 }, sheen = 0.20, seed = 42 },
+    material.crust {
+      base = { 0.74, 0.405, 0.115 },
+      top = { 0.50, 0.21, 0.035 },
+      browning = 0.8,
+      foot = { 0.80, 0.555, 0.27 },
+      sheen = 0.30,
+      seed = 41,
+    },
+    material.crust {
+      base = { 0.76, 0.24, 0.03 },
+      top = { 0.62, 0.16, 0.02 },
+      foot = { 0.78, 0.34, 0.08 },
+      sheen = 0.20,
+      seed = 42,
+    },
   },
 }

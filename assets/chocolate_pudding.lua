@@ -3,10 +3,21 @@
 -- 10 g, as in LIBERO (100 kg/m³ of the box around it).
 local packaging = require "packaging"
 
-local BROWN, DARK, CREAM, MILKY = { 0.115, 0.036, 0.014 }, { 0.045, 0.014, 0.006 }, { 0.90, 0.83, 0.68 }, { 0.36, 0.16, 0.06 }
-local tub = packaging.revolve {
-  { 0, 0 }, { 32, 0 }, { 33.5, 1.5 }, { 37, 22.6 }, { 39.6, 23.4 }, { 40, 24.2 }, { 40, 26.2 }, { 39.2, 27 }, { 0, 27 },
-}:scale(1, 46 / 80, 1)
+local BROWN, DARK, CREAM, MILKY =
+  { 0.115, 0.036, 0.014 }, { 0.045, 0.014, 0.006 }, { 0.90, 0.83, 0.68 }, { 0.36, 0.16, 0.06 }
+local tub = packaging
+  .revolve {
+    { 0, 0 },
+    { 32, 0 },
+    { 33.5, 1.5 },
+    { 37, 22.6 },
+    { 39.6, 23.4 },
+    { 40, 24.2 },
+    { 40, 26.2 },
+    { 39.2, 27 },
+    { 0, 27 },
+  }
+  :scale(1, 46 / 80, 1)
 
 -- A dollop of pudding swims on the lid's cream field.
 local lid = packaging.label { on = { "+z" }, out = 27 }

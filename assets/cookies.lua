@@ -3,7 +3,8 @@
 -- 10 g, as in LIBERO (100 kg/m³ of the box around it).
 local packaging = require "packaging"
 
-local RED, CREAM, DOUGH, CHIP = { 0.42, 0.018, 0.022 }, { 0.90, 0.81, 0.60 }, { 0.56, 0.27, 0.075 }, { 0.055, 0.018, 0.007 }
+local RED, CREAM, DOUGH, CHIP =
+  { 0.42, 0.018, 0.022 }, { 0.90, 0.81, 0.60 }, { 0.56, 0.27, 0.075 }, { 0.055, 0.018, 0.007 }
 
 -- On top, read from +x: the name, and three cookies with chips.
 local top = packaging.label { on = { "+z" }, out = 19, turn = math.pi / 2 }
@@ -13,7 +14,9 @@ for _, at in ipairs { { -24, -11 }, { 24, -11 }, { 0, -13 } } do
   top.oval(x, y, 25.5, 25.5, { 0.30, 0.12, 0.03 })
   top.oval(x, y, 24, 24, DOUGH)
   top.oval(x - 0.8, y + 0.8, 17, 17, { 0.66, 0.36, 0.115 }, { opacity = 0.7, soft = 5 })
-  for i, chip in ipairs(CHIPS) do top.oval(x + chip[1], y + chip[2], 3.6 - 0.3 * (i % 3), 3.1, CHIP) end
+  for i, chip in ipairs(CHIPS) do
+    top.oval(x + chip[1], y + chip[2], 3.6 - 0.3 * (i % 3), 3.1, CHIP)
+  end
 end
 top.bar(0, 15, 83, 19, CREAM)
 top.bar(0, 6.4, 83, 0.8, DOUGH)

@@ -1,5 +1,5 @@
--- A croissant, 95 × 46 × 36 mm: a crescent of rolled segments that get smaller towards the horns, striped with chocolate
--- dough.
+-- A croissant, 95 × 46 × 36 mm: a crescent of rolled segments that get smaller towards the horns, striped with
+-- chocolate dough.
 local material = require "materials"
 
 local mm = 1e-3
@@ -16,7 +16,11 @@ end
 
 -- Segments: place along the arc, length, width, height over the table (mm). Each overlaps the next, which is smaller.
 local SEGMENTS = {
-  { 0, 34, 39.6, 36 }, { 14.5, 28, 35, 32.5 }, { 27, 24, 28, 26.5 }, { 37.8, 20, 20, 20 }, { 46.7, 15.2, 12, 13.5 },
+  { 0, 34, 39.6, 36 },
+  { 14.5, 28, 35, 32.5 },
+  { 27, 24, 28, 26.5 },
+  { 37.8, 20, 20, 20 },
+  { 46.7, 15.2, 12, 13.5 },
 }
 local BELOW = 4
 
@@ -35,18 +39,33 @@ for _, segment in ipairs(SEGMENTS) do
 end
 
 local crust = material.crust {
-  base = { 0.78, 0.47, 0.14 }, top = { 0.66, 0.32, 0.06 }, browning = 0.6, foot = { 0.80, 0.53, 0.22 }, sheen = 0.28,
-  rise_m = 9 * mm, seed = 21,
+  base = { 0.78, 0.47, 0.14 },
+  top = { 0.66, 0.32, 0.06 },
+  browning = 0.6,
+  foot = { 0.80, 0.53, 0.22 },
+  sheen = 0.28,
+  rise_m = 9 * mm,
+  seed = 21,
 }
 table.insert(crust.layers, {
-  mask = softvt.mask.inside { shape = stripes, soft_m = 4 * mm }, albedo = { 0.27, 0.085, 0.014 }, roughness = 0.26, opacity = 0.9,
+  mask = softvt.mask.inside { shape = stripes, soft_m = 4 * mm },
+  albedo = { 0.27, 0.085, 0.014 },
+  roughness = 0.26,
+  opacity = 0.9,
 })
 
 return softvt.asset {
   name = "croissant",
   shape = pastry:subtract(TABLE_TOP, 2.5 * mm),
   -- Squeezed by a fifth it is 2 % stiffer than at 18 voxels a length; at six voxels it would be 22 %.
-  body = softvt.soft { youngs_pa = 160e3, poisson = 0.36, density = 260, resolution = 12, collapse_strain = 0.08, damage_strain = 0.10 },
+  body = softvt.soft {
+    youngs_pa = 160e3,
+    poisson = 0.36,
+    density = 260,
+    resolution = 12,
+    collapse_strain = 0.08,
+    damage_strain = 0.10,
+  },
   hints = { grasp_height_m = 20.5 * mm },
   visuals = { crust },
 }

@@ -1,5 +1,5 @@
--- A floor of boards that supports objects: its top is the plane z = 0 of the world. At x = 0.75, y = 0 it covers the floor of
--- scenery.floor_room board by board.
+-- A floor of boards that supports objects: its top is the plane z = 0 of the world. At x = 0.75, y = 0 it covers the
+-- floor of scenery.floor_room board by board.
 local material = require "materials"
 
 return softvt.asset {

@@ -3,12 +3,20 @@
 -- 37 g, as in LIBERO (100 kg/m³ of the box around it).
 local packaging = require "packaging"
 
-local BLUE, DEEP, WHITE, BLACK = { 0.03, 0.16, 0.55 }, { 0.012, 0.045, 0.24 }, { 0.86, 0.87, 0.86 }, { 0.02, 0.02, 0.025 }
+local BLUE, DEEP, WHITE, BLACK =
+  { 0.03, 0.16, 0.55 }, { 0.012, 0.045, 0.24 }, { 0.86, 0.87, 0.86 }, { 0.02, 0.02, 0.025 }
 local mm = 1e-3
 
 -- The gable seen along y: the roof rises to a fin.
 local shape = packaging.extrude({
-  { -26.5, 0 }, { 26.5, 0 }, { 26.5, 99 }, { 2.2, 121 }, { 2.2, 131 }, { -2.2, 131 }, { -2.2, 121 }, { -26.5, 99 },
+  { -26.5, 0 },
+  { 26.5, 0 },
+  { 26.5, 99 },
+  { 2.2, 121 },
+  { 2.2, 131 },
+  { -2.2, 131 },
+  { -2.2, 121 },
+  { -26.5, 99 },
 }, 53)
 
 -- A cow's patches below, the sky above.

@@ -9,15 +9,22 @@ local mm = 1e-3
 local function flutes(depth, from, to)
   return { axis = "z", count = 40, height = depth, mask = { axis = "z", from = from * mm, to = to * mm } }
 end
-local solid = packaging.revolve { { 0, 0 }, { 42, 0 }, { 43.4, 32 }, { 44.5, 34.4 }, { 44.5, 41 }, { 43.5, 42 }, { 0, 42 } }
-  :ridges(flutes(-1 * mm, 33.5, 30)):ridges(flutes(1 * mm, 8, 4))
-local hollow = packaging.revolve { { 0, 6 }, { 34, 6 }, { 36.4, 9 }, { 38.5, 39 }, { 39.8, 42.1 }, { 39.8, 50 }, { 0, 50 } }
+local solid = packaging
+  .revolve { { 0, 0 }, { 42, 0 }, { 43.4, 32 }, { 44.5, 34.4 }, { 44.5, 41 }, { 43.5, 42 }, { 0, 42 } }
+  :ridges(flutes(-1 * mm, 33.5, 30))
+  :ridges(flutes(1 * mm, 8, 4))
+local hollow =
+  packaging.revolve { { 0, 6 }, { 34, 6 }, { 36.4, 9 }, { 38.5, 39 }, { 39.8, 42.1 }, { 39.8, 50 }, { 0, 50 } }
 
 -- White glaze that pools blue-green where it is thick, inside at the bottom.
-local glaze = material.ceramic { base = { 0.84, 0.85, 0.81 }, shade = { 0.76, 0.79, 0.74 }, roughness = 0.16, seed = 31 }
+local glaze =
+  material.ceramic { base = { 0.84, 0.85, 0.81 }, shade = { 0.76, 0.79, 0.74 }, roughness = 0.16, seed = 31 }
 local pool = softvt.shape.torus { major = 35.5 * mm, minor = 3 * mm }:translate(0, 0, 7.5 * mm)
 table.insert(glaze.layers, {
-  mask = softvt.mask.inside { shape = pool, soft_m = 8 * mm }, albedo = { 0.48, 0.63, 0.60 }, roughness = 0.14, opacity = 0.8,
+  mask = softvt.mask.inside { shape = pool, soft_m = 8 * mm },
+  albedo = { 0.48, 0.63, 0.60 },
+  roughness = 0.14,
+  opacity = 0.8,
 })
 
 return softvt.asset {

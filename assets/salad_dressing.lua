@@ -3,15 +3,27 @@
 -- 28 g, as in LIBERO (100 kg/m³ of the box around it).
 local packaging = require "packaging"
 
-local CREAM, GREEN, LEAF, DARK = { 0.90, 0.86, 0.70 }, { 0.03, 0.20, 0.04 }, { 0.13, 0.40, 0.05 }, { 0.012, 0.07, 0.018 }
+local CREAM, GREEN, LEAF, DARK =
+  { 0.90, 0.86, 0.70 }, { 0.03, 0.20, 0.04 }, { 0.13, 0.40, 0.05 }, { 0.012, 0.07, 0.018 }
 local mm = 1e-3
 
-local glass = packaging.revolve {
-  { 0, 0 }, { 26.5, 0 }, { 26.5, 110 }, { 25.5, 112.5 }, { 21, 117 }, { 16, 120 }, { 14, 122.5 }, { 14, 127 }, { 0, 127 },
-}:scale(1, 36 / 53, 1)
+local glass = packaging
+  .revolve {
+    { 0, 0 },
+    { 26.5, 0 },
+    { 26.5, 110 },
+    { 25.5, 112.5 },
+    { 21, 117 },
+    { 16, 120 },
+    { 14, 122.5 },
+    { 14, 127 },
+    { 0, 127 },
+  }
+  :scale(1, 36 / 53, 1)
 local cap = packaging.revolve { { 0, 125 }, { 12, 125 }, { 12, 144.8 }, { 11, 146 }, { 0, 146 } }:paint { material = 1 }
 
--- Through the glass: vinegar with herbs below, oil above it, air in the neck; deeper in colour where one looks through more.
+-- Through the glass: vinegar with herbs below, oil above it, air in the neck; deeper in colour where one looks through
+-- more.
 local label = packaging.label { on = { "+y", "-y" }, out = 17.5, round = 3 }
 local facing = softvt.mask.facing
 local herbs = softvt.mask.specks { spacing_m = 4.5 * mm, radius_m = 0.9 * mm, seed = 5 }

@@ -1,5 +1,5 @@
--- A soft toy ball, 57 mm: yellow silicone. It is drawn 3 % higher and cut off below by as much: on a foot 18 mm across it
--- does not roll.
+-- A soft toy ball, 57 mm: yellow silicone. It is drawn 3 % higher and cut off below by as much: on a foot 18 mm across
+-- it does not roll.
 local material = require "materials"
 
 local mm = 1e-3

@@ -4,7 +4,8 @@
 local material = require "materials"
 local packaging = require "packaging"
 
-local RED, CREAM, GREEN, DARK = { 0.56, 0.022, 0.014 }, { 0.89, 0.80, 0.58 }, { 0.025, 0.19, 0.03 }, { 0.30, 0.010, 0.008 }
+local RED, CREAM, GREEN, DARK =
+  { 0.56, 0.022, 0.014 }, { 0.89, 0.80, 0.58 }, { 0.025, 0.19, 0.03 }, { 0.30, 0.010, 0.008 }
 
 local label = packaging.label { on = { "+x", "-x" }, out = 30.2, wrap = 30.2, round = 8 }
 label.belt(40, 72.4, DARK)
@@ -18,7 +19,9 @@ for _, x in ipairs { -17, 17, 0 } do
   label.oval(x, y, 23, 21, DARK)
   label.oval(x, y, 21.6, 19.6, RED)
   label.oval(x - 4, y + 4, 5, 3.4, { 0.80, 0.25, 0.18 }, { lean = 0.6 })
-  for i = -2, 2 do label.leaf(x + 2.6 * i, y + 8.8 - 0.7 * math.abs(i), 7, math.pi / 2 - 0.55 * i, GREEN) end
+  for i = -2, 2 do
+    label.leaf(x + 2.6 * i, y + 8.8 - 0.7 * math.abs(i), 7, math.pi / 2 - 0.55 * i, GREEN)
+  end
 end
 
 return softvt.asset {

@@ -1,5 +1,5 @@
--- A soft toy wedge, 64 × 50 × 40 mm: a ramp of green foam with rounded edges. Its toe and its ridge are blunt, so that no
--- edge is thinner than the voxels can carry.
+-- A soft toy wedge, 64 × 50 × 40 mm: a ramp of green foam with rounded edges. Its toe and its ridge are blunt, so that
+-- no edge is thinner than the voxels can carry.
 local material = require "materials"
 
 local mm = 1e-3

@@ -8,7 +8,9 @@ local sources = require "strain_sources"
 local views = require "asset_views"
 
 local STANDARD = {}
-for _, group in ipairs { names.soft, names.rigid, names.articulated } do table.move(group, 1, #group, #STANDARD + 1, STANDARD) end
+for _, group in ipairs { names.soft, names.rigid, names.articulated } do
+  table.move(group, 1, #group, #STANDARD + 1, STANDARD)
+end
 
 local opt = softvt.options {
   asset = { default = STANDARD, help = "assets to show" },
@@ -98,14 +100,23 @@ local function parts(asset)
     local slides = tostring(part.joint) == "softvt.slider"
     local unit, scale = slides and "mm" or "°", slides and 1e3 or math.deg(1)
     list[#list + 1] = ("%s: %s g, %.0f to %.0f %s"):format(
-      part.name, grams(part.shape, part.density), scale * part.joint.lower, scale * part.joint.upper, unit)
+      part.name,
+      grams(part.shape, part.density),
+      scale * part.joint.lower,
+      scale * part.joint.upper,
+      unit
+    )
   end
   return table.concat(list, "; ")
 end
 
 local function row(name)
   local asset, cells = assets[name], { ("<a id=%q></a>%s"):format(name, name), image(name, "") }
-  local function add(...) for _, cell in ipairs { ... } do cells[#cells + 1] = cell end end
+  local function add(...)
+    for _, cell in ipairs { ... } do
+      cells[#cells + 1] = cell
+    end
+  end
   if kind(asset) == "softvt.articulated" then
     add(millimetres(asset), friction(asset), parts(asset))
   else
@@ -129,18 +140,29 @@ local function strain_row(name)
   local known, body = sources.assets[name], assets[name].body
   if not known or kind(assets[name]) ~= "softvt.soft" then return nil end
   return ("| %s | %.2f | %.2f–%.2f | %s | %.2f | %.2f–%.2f | %s |\n"):format(
-    name, body.collapse_strain, known.collapse[1], known.collapse[2], known.class, body.damage_strain, known.damage[1], known.damage[2],
-    known.why)
+    name,
+    body.collapse_strain,
+    known.collapse[1],
+    known.collapse[2],
+    known.class,
+    body.damage_strain,
+    known.damage[1],
+    known.damage[2],
+    known.why
+  )
 end
 
 local function strains()
   local rows = {}
-  for _, name in ipairs(opt.asset) do rows[#rows + 1] = strain_row(name) end
+  for _, name in ipairs(opt.asset) do
+    rows[#rows + 1] = strain_row(name)
+  end
   return #rows > 0 and STRAINS .. table.concat(rows) .. "\n" .. sources.literature or ""
 end
 
 local function page(made)
-  local sections = { ["softvt.soft"] = { SOFT }, ["softvt.rigid"] = { RIGID }, ["softvt.articulated"] = { ARTICULATED } }
+  local sections =
+    { ["softvt.soft"] = { SOFT }, ["softvt.rigid"] = { RIGID }, ["softvt.articulated"] = { ARTICULATED } }
   for _, name in ipairs(opt.asset) do
     local rows = sections[kind(assets[name])]
     if rows then rows[#rows + 1] = made[name] end
@@ -159,18 +181,25 @@ return softvt.experiment {
   run = function(point)
     local size = views.size(assets[point.asset])
     return {
-      asset = point.asset, x_mm = 1e3 * size[1], y_mm = 1e3 * size[2], z_mm = 1e3 * size[3], text = row(point.asset),
+      asset = point.asset,
+      x_mm = 1e3 * size[1],
+      y_mm = 1e3 * size[2],
+      z_mm = 1e3 * size[3],
+      text = row(point.asset),
     }
   end,
   finish = function(rows)
     local made = {}
-    for _, row in ipairs(rows) do made[row.asset] = row.text end
+    for _, row in ipairs(rows) do
+      made[row.asset] = row.text
+    end
     local files = { [opt.folder .. "/assets.md"] = page(made) }
     for _, name in ipairs(opt.images and opt.asset or {}) do
       local at = ("%s/images/assets/%s"):format(opt.folder, name)
       files[at .. ".png"] = views.portrait(assets[name], opt.edge)
       if holds(assets[name]) then
-        files[at .. "_felt.png"] = views.held(assets[name], 0.06):tactile("left").image:resize(opt.edge * 4 // 3, opt.edge)
+        files[at .. "_felt.png"] =
+          views.held(assets[name], 0.06):tactile("left").image:resize(opt.edge * 4 // 3, opt.edge)
       end
     end
     return { files = files }

@@ -23,8 +23,12 @@ function views.portrait(asset, edge)
     scene:add { name = "object", asset = asset, at = { 0.1, 0 }, yaw = math.rad(25) }
     local middle = { 0.1, 0, size[3] / 2 }
     scene:add_camera {
-      name = "portrait", position = { 0.1 + reach * 0.71, -reach * 0.335, middle[3] + reach * 0.62 }, look_at = middle,
-      fovy = FOVY, width = edge, height = edge,
+      name = "portrait",
+      position = { 0.1 + reach * 0.71, -reach * 0.335, middle[3] + reach * 0.62 },
+      look_at = middle,
+      fovy = FOVY,
+      width = edge,
+      height = edge,
     }
   end)
   return softvt.simulate { layout = layout }:render { camera = "portrait" }

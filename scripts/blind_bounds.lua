@@ -1,5 +1,6 @@
--- Bounds of what controllers without touch can do in a suite, by arithmetic: the share of the instances that the suite draws whose safe
--- window contains the number that a controller keeps constant (experts.blind_grips). Nothing is simulated.
+-- Bounds of what controllers without touch can do in a suite, by arithmetic: the share of the instances that the suite
+-- draws whose safe window contains the number that a controller keeps constant (experts.blind_grips). Nothing is
+-- simulated.
 --
 --   softvt scripts/blind_bounds.lua --suite object_hidden
 --   softvt scripts/blind_bounds.lua --suite object_soft,object_varied --instances 500
@@ -7,7 +8,10 @@ local blind_grips = require "experts.blind_grips"
 local grasp = require "experts.grasp"
 
 local opt = softvt.options {
-  suite = { default = { "object_varied", "spatial_varied", "object_hidden", "spatial_hidden" }, help = "suites: files of suites/, without .lua" },
+  suite = {
+    default = { "object_varied", "spatial_varied", "object_hidden", "spatial_hidden" },
+    help = "suites: files of suites/, without .lua",
+  },
   page = { default = false, needs_out = true, help = "also write the tables, to bounds.md" },
   instances = { default = 1000, integer = true, min = 50, max = 20000, help = "instances per kind" },
 }
@@ -21,12 +25,15 @@ for _, name in ipairs(opt.suite) do
     if grasp.window { asset = kind } then kinds[#kinds + 1] = { suite = name, name = kind } end
   end
 end
-if #kinds == 0 then error("--suite: no goal object of these suites has a calibrated window; run softvt scripts/calibrate.lua first", 0) end
+if #kinds == 0 then
+  error("--suite: no goal object of these suites has a calibrated window; run softvt scripts/calibrate.lua first", 0)
+end
 
 -- A hand that feels: margin over the least force that holds the instance, and its relative error (1 sd).
 local MARGIN, ERROR = 1.2, 0.07
 
--- Share of a sample that is safe with the margin over its least force, known with the error: the mean over quantiles of the error.
+-- Share of a sample that is safe with the margin over its least force, known with the error: the mean over quantiles of
+-- the error.
 local function felt(sample)
   -- Normal quantiles at (k - 0.5) / 10.
   local quantiles, inside = { -1.645, -1.036, -0.674, -0.385, -0.126, 0.126, 0.385, 0.674, 1.036, 1.645 }, 0
@@ -42,13 +49,19 @@ end
 
 local function mean(sample, of)
   local sum = 0
-  for _, one in ipairs(sample) do sum = sum + of(one) end
+  for _, one in ipairs(sample) do
+    sum = sum + of(one)
+  end
   return sum / #sample
 end
 
 local columns = { "suite", "kind" }
-for _, name in ipairs(blind_grips.names) do columns[#columns + 1] = name end
-for _, name in ipairs { "felt", "kept_pct", "window_mm", "force_ratio" } do columns[#columns + 1] = name end
+for _, name in ipairs(blind_grips.names) do
+  columns[#columns + 1] = name
+end
+for _, name in ipairs { "felt", "kept_pct", "window_mm", "force_ratio" } do
+  columns[#columns + 1] = name
+end
 
 local function measured(point)
   local name, kind = kinds[point.kind].suite, kinds[point.kind].name
@@ -67,17 +80,25 @@ end
 
 -- Columns of the printed tables after their first, with formats.
 local SHOWN = {}
-for _, name in ipairs(blind_grips.names) do SHOWN[#SHOWN + 1] = { name, "%.0f" } end
-for _, column in ipairs { { "felt", "%.0f" }, { "kept_pct", "%.0f" }, { "window_mm", "%.2f" }, { "force_ratio", "%.2f" } } do SHOWN[#SHOWN + 1] = column end
+for _, name in ipairs(blind_grips.names) do
+  SHOWN[#SHOWN + 1] = { name, "%.0f" }
+end
+for _, column in ipairs { { "felt", "%.0f" }, { "kept_pct", "%.0f" }, { "window_mm", "%.2f" }, { "force_ratio", "%.2f" } } do
+  SHOWN[#SHOWN + 1] = column
+end
 
 -- A Markdown table with `first` above its first column; rows are a name and the values of the columns.
 local function table_of(first, rows)
   local header = { first }
-  for _, column in ipairs(SHOWN) do header[#header + 1] = column[1] end
+  for _, column in ipairs(SHOWN) do
+    header[#header + 1] = column[1]
+  end
   local lines = { "| " .. table.concat(header, " | ") .. " |", "|" .. ("---|"):rep(#header) }
   for _, row in ipairs(rows) do
     local cells = { row.name }
-    for _, column in ipairs(SHOWN) do cells[#cells + 1] = column[2]:format(row.values[column[1]]) end
+    for _, column in ipairs(SHOWN) do
+      cells[#cells + 1] = column[2]:format(row.values[column[1]])
+    end
     lines[#lines + 1] = "| " .. table.concat(cells, " | ") .. " |"
   end
   return table.concat(lines, "\n") .. "\n"
@@ -87,7 +108,9 @@ local function means(rows)
   local all = {}
   for _, column in ipairs(SHOWN) do
     local sum = 0
-    for _, row in ipairs(rows) do sum = sum + row.values[column[1]] end
+    for _, row in ipairs(rows) do
+      sum = sum + row.values[column[1]]
+    end
     all[column[1]] = sum / #rows
   end
   return all
@@ -110,7 +133,11 @@ local function report(rows)
     own[#own + 1] = { name = "mean", values = all }
     kinds_of_suites[#kinds_of_suites + 1] = table_of(name, own)
   end
-  return table_of("suite", suites) .. "\nBest without touch: " .. table.concat(best, "; ") .. ".\n\n" .. table.concat(kinds_of_suites, "\n")
+  return table_of("suite", suites)
+    .. "\nBest without touch: "
+    .. table.concat(best, "; ")
+    .. ".\n\n"
+    .. table.concat(kinds_of_suites, "\n")
 end
 
 return softvt.experiment {
@@ -119,7 +146,9 @@ return softvt.experiment {
   columns = columns,
   points = function()
     local list = {}
-    for index = 1, #kinds do list[index] = { kind = index } end
+    for index = 1, #kinds do
+      list[index] = { kind = index }
+    end
     return list
   end,
   run = measured,

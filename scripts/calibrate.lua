@@ -1,20 +1,23 @@
 -- Calibrates soft assets: the limit τ on D, and the safe window of widths between the gels.
 --
 --   softvt scripts/calibrate.lua --asset spiral_roll,sesame_bun
---   softvt scripts/calibrate.lua --asset spiral_roll --sweep-protocol hand --out hand_sweep    the sweep of the SoftVTBench paper
+--   softvt scripts/calibrate.lua --asset spiral_roll --sweep-protocol hand --out hand_sweep    as in SoftVTBench
 --
--- --sweep-protocol press (the default) tests the object alone, between two gel pads on rigid carriers (scripts/calibration/press.lua).
--- It closes in steps of the width until 5 % of the volume is beyond the stable strain of the material: the smaller of its
--- collapse_strain and damage_strain. D_ref is D at that width, interpolated, and τ = κ D_ref. A press that ends earlier is censored: the
--- file says why, and D_ref is a lower bound. The loose end of the window is the widest width at which five trials with the expert's
--- grasp hold while the pads lift; the tight end is the widest width at which D reaches τ in the press or in those trials.
+-- --sweep-protocol press (the default) tests the object alone, between two gel pads on rigid carriers
+-- (scripts/calibration/press.lua). It closes in steps of the width until 5 % of the volume is beyond the stable strain
+-- of the material: the smaller of its collapse_strain and damage_strain. D_ref is D at that width, interpolated, and τ
+-- = κ D_ref. A press that ends earlier is censored: the file says why, and D_ref is a lower bound. The loose end of the
+-- window is the widest width at which five trials with the expert's grasp hold while the pads lift; the tight end is
+-- the widest width at which D reaches τ in the press or in those trials.
 --
--- --sweep-protocol hand is the sweep of the paper (appendix C.3) with the robot's hand (scripts/calibration/hand.lua): its D_ref is the
--- largest stable D up to a closed hand.
+-- --sweep-protocol hand is the sweep of the paper (appendix C.3) with the robot's hand (scripts/calibration/hand.lua):
+-- its D_ref is the largest stable D up to a closed hand.
 --
--- The press is repeated at other sizes and stiffnesses, from which limits and windows of instances follow (softvt.grip_window).
+-- The press is repeated at other sizes and stiffnesses, from which limits and windows of instances follow
+-- (softvt.grip_window).
 --
--- Writes assets/calibration/<asset>.json, the rows of the sweep, the plot and the text of the envelope. If all standard assets are calibrated, it also writes docs/calibration.md. scripts/check_calibration.lua checks the results.
+-- Writes assets/calibration/<asset>.json, the rows of the sweep, the plot and the text of the envelope. If all standard
+-- assets are calibrated, it also writes docs/calibration.md. scripts/check_calibration.lua checks the results.
 local asset_names = require "asset_names"
 local calibration_page = require "calibration_page"
 local hand = require "calibration.hand"
@@ -25,12 +28,21 @@ local PRESS, HAND = { sweep_protocol = "press" }, { sweep_protocol = "hand" }
 local opt = softvt.options {
   asset = { default = asset_names.soft, help = "assets to calibrate" },
   sweep_protocol = {
-    default = "press", choices = { "press", "hand" }, needs_out = true,
+    default = "press",
+    choices = { "press", "hand" },
+    needs_out = true,
     help = "press test of the object alone, or the paper's sweep with the robot's hand",
   },
   kappa = { default = 0.5, min = 0.05, max = 1, needs_out = true, help = "τ as a fraction of D_ref" },
   step_mm = { default = 0.5, unit = "mm", min = 0.02, max = 5, only_with = PRESS, help = "step of the width" },
-  within_mm = { default = 0.02, unit = "mm", min = 0.01, max = 1, only_with = PRESS, help = "accuracy of the loose end" },
+  within_mm = {
+    default = 0.02,
+    unit = "mm",
+    min = 0.01,
+    max = 1,
+    only_with = PRESS,
+    help = "accuracy of the loose end",
+  },
   step = { default = 0.02, min = 0.002, max = 0.2, only_with = HAND, help = "step of the closure" },
   trials = { default = 5, integer = true, min = 1, max = 1000, only_with = HAND, help = "hold trials at each closure" },
   hold_s = { default = 1, unit = "s", min = 0.1, max = 60, only_with = HAND, help = "duration of a trial's hold" },
@@ -38,12 +50,20 @@ local opt = softvt.options {
 
 -- Episodes use only files that were read when the plan was made, so every asset is required here.
 local assets = {}
-for _, name in ipairs(opt.asset) do assets[name] = soft_asset("calibrate", name, assets) end
+for _, name in ipairs(opt.asset) do
+  assets[name] = soft_asset("calibrate", name, assets)
+end
 
--- Presses of each asset for its instances: as it is, at the ends of the sizes that the standard variations draw, and at other
--- stiffnesses, with half of the step.
+-- Presses of each asset for its instances: as it is, at the ends of the sizes that the standard variations draw, and at
+-- other stiffnesses, with half of the step.
 local VARIANTS = {
-  { 1, 1 }, { 0.88, 1 }, { 1.12, 1 }, { 1, 0.3 }, { 1, 3 }, { 1, 10 }, { 1, 30 },
+  { 1, 1 },
+  { 0.88, 1 },
+  { 1.12, 1 },
+  { 1, 0.3 },
+  { 1, 3 },
+  { 1, 10 },
+  { 1, 30 },
 }
 
 -- The rows of one variant, as softvt.envelope takes them.
@@ -67,11 +87,20 @@ local function envelope(name, rows, o)
     for _, row in ipairs(of.variant) do
       if row.scale == scale and row.youngs_factor == youngs then found[#found + 1] = row end
     end
-    if #found > 0 then variants[#variants + 1] = { scale = scale, youngs_factor = youngs, rows = variant_rows(found) } end
+    if #found > 0 then
+      variants[#variants + 1] = { scale = scale, youngs_factor = youngs, rows = variant_rows(found) }
+    end
   end
   return softvt.envelope {
-    asset = name, protocol = o.sweep_protocol, kappa = o.kappa, fingerprint = softvt.fingerprint(assets[name]), ended = last.ended,
-    stable_strain = last.stable_strain, holds = holds, sweep = sweep, variants = variants,
+    asset = name,
+    protocol = o.sweep_protocol,
+    kappa = o.kappa,
+    fingerprint = softvt.fingerprint(assets[name]),
+    ended = last.ended,
+    stable_strain = last.stable_strain,
+    holds = holds,
+    sweep = sweep,
+    variants = variants,
   }
 end
 
@@ -90,7 +119,9 @@ local function press_variant(name, factors, o)
     if row.stable then stable[#stable + 1] = row end
   end
   append(rows, "variant", name, stable)
-  for _, row in ipairs(rows) do row.scale, row.youngs_factor = change.scale, change.youngs_factor end
+  for _, row in ipairs(rows) do
+    row.scale, row.youngs_factor = change.scale, change.youngs_factor
+  end
   return rows
 end
 
@@ -103,7 +134,8 @@ local function press_asset(name, o)
   local found = envelope(name, rows, o)
   local at_tau, contact = found.window.tight.width_mm, found.width_contact_mm
   if at_tau and contact then
-    local holds = press.loose_end(asset, 1e-3 * at_tau, 1e-3 * contact, 1e-3 * found.width_at_d_ref_mm, 1e-3 * o.within_mm)
+    local holds =
+      press.loose_end(asset, 1e-3 * at_tau, 1e-3 * contact, 1e-3 * found.width_at_d_ref_mm, 1e-3 * o.within_mm)
     press.carried_end(asset, holds, found.tau)
     append(rows, "hold", name, holds)
   end
@@ -139,7 +171,11 @@ end
 
 local function three_kappas(found)
   if not found.d_ref then return "" end
-  return ("τ at κ 0.3, 0.5, 0.7: %.3f, %.3f, %.3f %%\n"):format(0.3 * found.d_ref, 0.5 * found.d_ref, 0.7 * found.d_ref)
+  return ("τ at κ 0.3, 0.5, 0.7: %.3f, %.3f, %.3f %%\n"):format(
+    0.3 * found.d_ref,
+    0.5 * found.d_ref,
+    0.7 * found.d_ref
+  )
 end
 
 local function warnings(name, found)
@@ -149,8 +185,11 @@ local function warnings(name, found)
     text = ("warning: the press of %s is censored: %s.%s\n"):format(name, found.censored, remedy)
   end
   if found.carried_d and found.tau and found.carried_d > found.tau then
-    text = text .. ("warning: D of the carried %s exceeds τ at every width (%.3f %% at least). Carry it slowly (the hint carry_pace), or make it stiffer, lighter or, if it bends, shorter.\n"):format(
-      name, found.carried_d)
+    text = text
+      .. ("warning: D of the carried %s exceeds τ at every width (%.3f %% at least). Carry it slowly (the hint carry_pace), or make it stiffer, lighter or, if it bends, shorter.\n"):format(
+        name,
+        found.carried_d
+      )
   end
   return text
 end
@@ -167,15 +206,20 @@ local function finish(rows, o)
   for _, name in ipairs(o.asset) do
     local one = envelope(name, rows, o)
     local at = "assets/calibration/" .. name
-    files[at .. ".json"], files[at .. ".sweep.jsonl"], files[at .. ".svg"], files[at .. ".txt"] = one.json, one.sweep, one.plot, one.text
+    files[at .. ".json"], files[at .. ".sweep.jsonl"], files[at .. ".svg"], files[at .. ".txt"] =
+      one.json, one.sweep, one.plot, one.text
     found[name] = one
     text[#text + 1] = one.text .. three_kappas(one) .. warnings(name, one)
     if not one.window.extent_mm then problems[#problems + 1] = problem_of(one) end
   end
-  if asset_names.has_all_soft(found) then files["docs/calibration.md"] = calibration_page(asset_names.soft, found, o) end
+  if asset_names.has_all_soft(found) then
+    files["docs/calibration.md"] = calibration_page(asset_names.soft, found, o)
+  end
   local problem
   if #problems > 0 then
-    problem = ("calibrate: %s\nThe files are written, without windows of these assets for experts."):format(table.concat(problems, "\n"))
+    problem = ("calibrate: %s\nThe files are written, without windows of these assets for experts."):format(
+      table.concat(problems, "\n")
+    )
   end
   return { text = table.concat(text, "\n"), files = files, problem = problem }
 end
@@ -187,7 +231,24 @@ return softvt.experiment {
   run = run,
   finish = finish,
   columns = {
-    "asset", "kind", "width_mm", "closure", "held", "trials", "d_peak_pct", "stable", "d_pct", "d_v1_pct", "force_n", "strain_p95", "min_det_f", "node_speed_m_s",
-    "both_pads", "slip_mm", "scale", "youngs_factor", "ended",
+    "asset",
+    "kind",
+    "width_mm",
+    "closure",
+    "held",
+    "trials",
+    "d_peak_pct",
+    "stable",
+    "d_pct",
+    "d_v1_pct",
+    "force_n",
+    "strain_p95",
+    "min_det_f",
+    "node_speed_m_s",
+    "both_pads",
+    "slip_mm",
+    "scale",
+    "youngs_factor",
+    "ended",
   },
 }

@@ -24,7 +24,8 @@ in hold trials, filled if all trials held; dashed lines are τ and D_ref, and th
 
 local PROTOCOLS = { press = "Sweep: press test", hand = "Sweep: the robot's hand, where D_ref is the largest stable D" }
 
--- Returns the page for `names`; `found` maps each name to a result of softvt.envelope. `o` has the fields sweep_protocol and kappa.
+-- Returns the page for `names`; `found` maps each name to a result of softvt.envelope. `o` has the fields
+-- sweep_protocol and kappa.
 return function(names, found, o)
   local function number(format, value) return value and format:format(value) or "–" end
   local rows, plots = {}, {}
@@ -33,13 +34,30 @@ return function(names, found, o)
     local window, d_ref = known.window, known.d_ref
     local force = number("%.2f", window.loose.force_n) .. " to " .. number("%.2f", window.tight.force_n)
     local cells = {
-      ("[%s](#%s)"):format(name, name), number("%.2f", known.stable_strain), number("%.3f", d_ref), number("%.3f", known.tau),
-      number("%.3f", d_ref and 0.3 * d_ref), number("%.3f", d_ref and 0.7 * d_ref), number("%.2f", window.loose.width_mm),
-      number("%.2f", window.tight.width_mm), number("%.2f", window.extent_mm), force, number("%.3f", known.carried_d),
+      ("[%s](#%s)"):format(name, name),
+      number("%.2f", known.stable_strain),
+      number("%.3f", d_ref),
+      number("%.3f", known.tau),
+      number("%.3f", d_ref and 0.3 * d_ref),
+      number("%.3f", d_ref and 0.7 * d_ref),
+      number("%.2f", window.loose.width_mm),
+      number("%.2f", window.tight.width_mm),
+      number("%.2f", window.extent_mm),
+      force,
+      number("%.3f", known.carried_d),
       known.censored or "no",
     }
     rows[#rows + 1] = "| " .. table.concat(cells, " | ") .. " |\n"
-    plots[#plots + 1] = ("\n## %s\n\n![](../assets/calibration/%s.svg)\n\n```text\n%s```\n"):format(name, name, known.text)
+    plots[#plots + 1] = ("\n## %s\n\n![](../assets/calibration/%s.svg)\n\n```text\n%s```\n"):format(
+      name,
+      name,
+      known.text
+    )
   end
-  return HEAD .. ("\n%s; κ = %g.\n\n"):format(PROTOCOLS[o.sweep_protocol], o.kappa) .. TABLE .. table.concat(rows) .. MIDDLE .. table.concat(plots)
+  return HEAD
+    .. ("\n%s; κ = %g.\n\n"):format(PROTOCOLS[o.sweep_protocol], o.kappa)
+    .. TABLE
+    .. table.concat(rows)
+    .. MIDDLE
+    .. table.concat(plots)
 end

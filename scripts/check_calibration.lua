@@ -1,12 +1,13 @@
--- Checks calibrations: how D_ref and τ depend on the step, the resolution and the size, and whether the ends of the windows act.
+-- Checks calibrations: how D_ref and τ depend on the step, the resolution and the size, and whether the ends of the
+-- windows act.
 --
 --   softvt scripts/check_calibration.lua                                  all standard soft assets
 --   softvt scripts/check_calibration.lua --asset cube --part ends --trials 20 --out checked
 --
--- --part numerics repeats the sweep of the press with half of the step, at resolutions 6 and 12, and with the object at 0.9 and 1.1 of
--- its size. --part ends runs trials with the robot's hand and the expert's lift, 5 % of the window inside and outside of each end, displaced
--- as in the calibration and as the expert displaces its grasps.
--- If all standard assets are checked in both parts, it writes docs/calibration_checks.md.
+-- --part numerics repeats the sweep of the press with half of the step, at resolutions 6 and 12, and with the object at
+-- 0.9 and 1.1 of its size. --part ends runs trials with the robot's hand and the expert's lift, 5 % of the window
+-- inside and outside of each end, displaced as in the calibration and as the expert displaces its grasps. If all
+-- standard assets are checked in both parts, it writes docs/calibration_checks.md.
 local asset_names = require "asset_names"
 local grasp = require "experts.grasp"
 local hand = require "calibration.hand"
@@ -18,45 +19,74 @@ local opt = softvt.options {
   asset = { default = asset_names.soft, help = "assets to check" },
   part = { default = { "numerics", "ends" }, choices = { "numerics", "ends" }, help = "checks" },
   step_mm = {
-    default = 0.5, unit = "mm", min = 0.04, max = 5, only_with = { part = "numerics" }, needs_out = true,
+    default = 0.5,
+    unit = "mm",
+    min = 0.04,
+    max = 5,
+    only_with = { part = "numerics" },
+    needs_out = true,
     help = "step of the width, which is halved",
   },
   trials = {
-    default = 100, integer = true, min = 1, max = 1000, only_with = { part = "ends" }, needs_out = true,
+    default = 100,
+    integer = true,
+    min = 1,
+    max = 1000,
+    only_with = { part = "ends" },
+    needs_out = true,
     help = "hold trials at each side of each end, displaced as in the calibration",
   },
   expert_trials = {
-    default = 20, integer = true, min = 1, max = 1000, only_with = { part = "ends" }, needs_out = true,
+    default = 20,
+    integer = true,
+    min = 1,
+    max = 1000,
+    only_with = { part = "ends" },
+    needs_out = true,
     help = "hold trials at each side of each end, displaced as the expert displaces its grasps",
   },
 }
 local parts = {}
-for _, part in ipairs(opt.part) do parts[part] = true end
+for _, part in ipairs(opt.part) do
+  parts[part] = true
+end
 
 local assets, calibrations = {}, {}
 for _, name in ipairs(opt.asset) do
   assets[name], calibrations[name] = soft_asset("check_calibration", name, assets), softvt.calibration(name)
   if parts.ends then
     local found = calibrations[name]
-    local is_present = found and found.table.fingerprints and found.table.fingerprints[name] == softvt.fingerprint(assets[name])
+    local is_present = found
+      and found.table.fingerprints
+      and found.table.fingerprints[name] == softvt.fingerprint(assets[name])
     if not (is_present and softvt.grip_window { asset = name }) then
-      error(("check_calibration: %s has no calibrated window, or one of another shape, material, friction or version; run softvt scripts/calibrate.lua --asset %s first"):format(
-        name, name), 0)
+      error(
+        ("check_calibration: %s has no calibrated window, or one of another shape, material, friction or version; run softvt scripts/calibrate.lua --asset %s first"):format(
+          name,
+          name
+        ),
+        0
+      )
     end
   end
 end
 
-local END_SHARE = 0.05    -- distance from an end of the window, as a share of the window
-local BATCH = 10          -- trials of a point
-local HOLD_S = 1          -- hold after the lift, s
--- Largest displacements of the grasps, m: that of the calibration and that of the expert; and the options with their trials.
+local END_SHARE = 0.05 -- distance from an end of the window, as a share of the window
+local BATCH = 10 -- trials of a point
+local HOLD_S = 1 -- hold after the lift, s
+-- Largest displacements of the grasps, m: that of the calibration and that of the expert; and the options with their
+-- trials.
 local SPREADS = { trial.DISPLACEMENT, grasp.SPREAD }
 local TRIALS = { "trials", "expert_trials" }
 
 -- Changes of the sweep by name, in the order of the page.
 local CHANGES = {
-  { name = "nominal" }, { name = "half_step", step = 0.5 }, { name = "resolution_6", resolution = 6 },
-  { name = "resolution_12", resolution = 12 }, { name = "scale_0.9", scale = 0.9 }, { name = "scale_1.1", scale = 1.1 },
+  { name = "nominal" },
+  { name = "half_step", step = 0.5 },
+  { name = "resolution_6", resolution = 6 },
+  { name = "resolution_12", resolution = 12 },
+  { name = "scale_0.9", scale = 0.9 },
+  { name = "scale_1.1", scale = 1.1 },
 }
 
 -- D_ref of the sweep with one change.
@@ -64,7 +94,11 @@ local function numerics(point, o)
   local change = point.change
   local sweep = press.sweep(assets[point.asset], 1e-3 * o.step_mm * (change.step or 1), change)
   local found = softvt.envelope {
-    asset = point.asset, stable_strain = sweep.stable_strain, ended = sweep.ended, sweep = sweep.rows, holds = {},
+    asset = point.asset,
+    stable_strain = sweep.stable_strain,
+    ended = sweep.ended,
+    sweep = sweep.rows,
+    holds = {},
   }
   return { asset = point.asset, check = change.name, d_ref_pct = found.d_ref, censored = found.censored }
 end
@@ -76,25 +110,38 @@ local function ends(point)
   local along = (point.at == "loose" and 0 or 1) + inward
   local width = 1e-3 * (window.loose.width_mm + along * (window.tight.width_mm - window.loose.width_mm))
   -- Before contact there is no force.
-  local grip = { width = width, force = softvt.force_at(calibrations[name].table.envelopes[name].sweep, 1e3 * width) or 0 }
+  local grip =
+    { width = width, force = softvt.force_at(calibrations[name].table.envelopes[name].sweep, 1e3 * width) or 0 }
   local held, d_peak_pct, width_mm = hand.trials(assets[name], grip, point.first, point.last, point.spread, HOLD_S)
   return {
-    asset = name, check = point.at .. "_" .. point.side, spread_mm = 1e3 * point.spread, width_mm = width_mm,
-    trials = point.last - point.first + 1, held = held, d_peak_pct = d_peak_pct,
+    asset = name,
+    check = point.at .. "_" .. point.side,
+    spread_mm = 1e3 * point.spread,
+    width_mm = width_mm,
+    trials = point.last - point.first + 1,
+    held = held,
+    d_peak_pct = d_peak_pct,
   }
 end
 
 local function points(o)
   local list = {}
   for _, name in ipairs(o.asset) do
-    for _, change in ipairs(parts.numerics and CHANGES or {}) do list[#list + 1] = { asset = name, change = change } end
+    for _, change in ipairs(parts.numerics and CHANGES or {}) do
+      list[#list + 1] = { asset = name, change = change }
+    end
     for _, at in ipairs(parts.ends and { "loose", "tight" } or {}) do
       for _, side in ipairs { "inside", "outside" } do
         for index, spread in ipairs(SPREADS) do
           local trials = o[TRIALS[index]]
           for first = 1, trials, BATCH do
             list[#list + 1] = {
-              asset = name, at = at, side = side, spread = spread, first = first, last = math.min(trials, first + BATCH - 1),
+              asset = name,
+              at = at,
+              side = side,
+              spread = spread,
+              first = first,
+              last = math.min(trials, first + BATCH - 1),
             }
           end
         end
@@ -115,7 +162,8 @@ local function by_asset(rows)
     found[row.asset] = of_asset
     local sum = of_asset[key(row.check, row.spread_mm)]
     if sum then
-      sum.held, sum.trials, sum.d_peak_pct = sum.held + row.held, sum.trials + row.trials, math.max(sum.d_peak_pct, row.d_peak_pct)
+      sum.held, sum.trials, sum.d_peak_pct =
+        sum.held + row.held, sum.trials + row.trials, math.max(sum.d_peak_pct, row.d_peak_pct)
     else
       of_asset[key(row.check, row.spread_mm)] = row
     end
@@ -125,7 +173,9 @@ end
 
 local function table_of(header, names, cells)
   local lines = { "| " .. table.concat(header, " | ") .. " |", "|" .. ("---|"):rep(#header) }
-  for _, name in ipairs(names) do lines[#lines + 1] = "| " .. table.concat(cells(name), " | ") .. " |" end
+  for _, name in ipairs(names) do
+    lines[#lines + 1] = "| " .. table.concat(cells(name), " | ") .. " |"
+  end
   return table.concat(lines, "\n") .. "\n"
 end
 
@@ -138,15 +188,22 @@ end
 
 local function numerics_table(found, names)
   return table_of(
-    { "asset", "resolution", "D_ref %", "half step, %", "resolution 6 → 12, %", "size 0.9, %", "size 1.1, %" }, names,
+    { "asset", "resolution", "D_ref %", "half step, %", "resolution 6 → 12, %", "size 0.9, %", "size 1.1, %" },
+    names,
     function(name)
       local rows = found[name]
       local nominal = rows.nominal
       return {
-        name, ("%d"):format(assets[name].body.resolution), nominal.d_ref_pct and ("%.3f"):format(nominal.d_ref_pct) or "–", change_of(nominal, rows.half_step),
-        change_of(rows.resolution_6, rows.resolution_12), change_of(nominal, rows["scale_0.9"]), change_of(nominal, rows["scale_1.1"]),
+        name,
+        ("%d"):format(assets[name].body.resolution),
+        nominal.d_ref_pct and ("%.3f"):format(nominal.d_ref_pct) or "–",
+        change_of(nominal, rows.half_step),
+        change_of(rows.resolution_6, rows.resolution_12),
+        change_of(nominal, rows["scale_0.9"]),
+        change_of(nominal, rows["scale_1.1"]),
       }
-    end)
+    end
+  )
 end
 
 local function ends_table(found, names)
@@ -155,18 +212,33 @@ local function ends_table(found, names)
   -- `show` of one side of an end, for each displacement.
   local function of_end(show, rows, at, side)
     local shown = {}
-    for _, spread in ipairs(SPREADS) do shown[#shown + 1] = show(rows[key(at .. "_" .. side, 1e3 * spread)]) end
+    for _, spread in ipairs(SPREADS) do
+      shown[#shown + 1] = show(rows[key(at .. "_" .. side, 1e3 * spread)])
+    end
     return table.concat(shown, ", ")
   end
   return table_of(
-    { "asset", "held, loose inside", "held, loose outside", "τ %", "largest D %, tight inside", "largest D %, tight outside" }, names,
+    {
+      "asset",
+      "held, loose inside",
+      "held, loose outside",
+      "τ %",
+      "largest D %, tight inside",
+      "largest D %, tight outside",
+    },
+    names,
     function(name)
       local rows = found[name]
       return {
-        name, of_end(held, rows, "loose", "inside"), of_end(held, rows, "loose", "outside"), ("%.3f"):format(calibrations[name].tau),
-        of_end(largest, rows, "tight", "inside"), of_end(largest, rows, "tight", "outside"),
+        name,
+        of_end(held, rows, "loose", "inside"),
+        of_end(held, rows, "loose", "outside"),
+        ("%.3f"):format(calibrations[name].tau),
+        of_end(largest, rows, "tight", "inside"),
+        of_end(largest, rows, "tight", "outside"),
       }
-    end)
+    end
+  )
 end
 
 local HEAD = [[
@@ -203,7 +275,13 @@ return softvt.experiment {
     if parts.ends then text[#text + 1] = ends_table(found, o.asset) end
     local is_page = parts.numerics and parts.ends and asset_names.has_all_soft(found)
     return {
-      text = table.concat(text, "\n"), files = is_page and { ["docs/calibration_checks.md"] = HEAD:format(o.step_mm) .. text[1] .. ENDS:format(1e3 * SPREADS[1], 1e3 * SPREADS[2]) .. text[2] } or {},
+      text = table.concat(text, "\n"),
+      files = is_page and {
+        ["docs/calibration_checks.md"] = HEAD:format(o.step_mm) .. text[1] .. ENDS:format(
+          1e3 * SPREADS[1],
+          1e3 * SPREADS[2]
+        ) .. text[2],
+      } or {},
     }
   end,
   columns = { "asset", "check", "d_ref_pct", "censored", "spread_mm", "width_mm", "trials", "held", "d_peak_pct" },

@@ -1,6 +1,7 @@
--- Checks the limits and safe windows of instances. Presses a sample of the instances that the hidden variation draws, and compares τ of the
--- press with the one that their episodes are judged by. Then carries them with the robot's hand, and compares the forces of the loosest
--- and the tightest safe grip with the ends of the window by which they were selected.
+-- Checks the limits and safe windows of instances. Presses a sample of the instances that the hidden variation draws,
+-- and compares τ of the press with the one that their episodes are judged by. Then carries them with the robot's hand,
+-- and compares the forces of the loosest and the tightest safe grip with the ends of the window by which they were
+-- selected.
 --
 --   softvt scripts/check_instances.lua                          every kind of the hidden suites
 --   softvt scripts/check_instances.lua --asset cube --count 20
@@ -17,7 +18,9 @@ local soft_asset = require "calibration.soft_asset"
 local STEP, SAMPLE = 2.5e-4, 1000
 
 local kinds = {}
-for k, task in ipairs(suite.tasks) do kinds[k] = task.goal.object end
+for k, task in ipairs(suite.tasks) do
+  kinds[k] = task.goal.object
+end
 
 local opt = softvt.options {
   asset = { default = kinds, help = "assets to check" },
@@ -41,7 +44,9 @@ largest.
 ]]
 
 local assets = {}
-for _, name in ipairs(opt.asset) do assets[name] = soft_asset("check_instances", name, assets) end
+for _, name in ipairs(opt.asset) do
+  assets[name] = soft_asset("check_instances", name, assets)
+end
 
 local function sample(name, count)
   return softvt.sample_instances { asset = assets[name], variation = hidden, suite = suite.name, count = count }
@@ -50,18 +55,31 @@ end
 local function run(point, o)
   local one = sample(point.asset, point.index)[point.index]
   local change = {
-    scale = one.scale, youngs_factor = one.youngs_factor, density_factor = one.density_factor, strain_factor = one.strain_factor,
+    scale = one.scale,
+    youngs_factor = one.youngs_factor,
+    density_factor = one.density_factor,
+    strain_factor = one.strain_factor,
   }
   local sweep = press.sweep(assets[point.asset], STEP, change)
   local pressed = softvt.envelope {
-    asset = point.asset, stable_strain = sweep.stable_strain, ended = sweep.ended, sweep = sweep.rows, holds = {},
+    asset = point.asset,
+    stable_strain = sweep.stable_strain,
+    ended = sweep.ended,
+    sweep = sweep.rows,
+    holds = {},
   }
   local window = grasp.window(one)
   local loose, tight = carry.ends(assets[point.asset], one, window, point.index)
   return {
-    asset = point.asset, scale = one.scale, youngs_factor = one.youngs_factor, strain_factor = one.strain_factor,
-    tau_pressed_pct = pressed.tau, tau_judged_pct = window.tau, censored = pressed.censored,
-    error_pct = pressed.tau and 100 * (window.tau / pressed.tau - 1), loose_ratio = loose and loose / window.loose.force,
+    asset = point.asset,
+    scale = one.scale,
+    youngs_factor = one.youngs_factor,
+    strain_factor = one.strain_factor,
+    tau_pressed_pct = pressed.tau,
+    tau_judged_pct = window.tau,
+    censored = pressed.censored,
+    error_pct = pressed.tau and 100 * (window.tau / pressed.tau - 1),
+    loose_ratio = loose and loose / window.loose.force,
     tight_ratio = tight and tight / window.tight.force,
   }
 end
@@ -75,13 +93,20 @@ local function spread(name, rows, column)
   table.sort(values)
   if #values == 0 then return "–" end
   local middle = (#values + 1) / 2
-  return ("%.2f (%.2f–%.2f)"):format(0.5 * (values[math.floor(middle)] + values[math.ceil(middle)]), values[1], values[#values])
+  return ("%.2f (%.2f–%.2f)"):format(
+    0.5 * (values[math.floor(middle)] + values[math.ceil(middle)]),
+    values[1],
+    values[#values]
+  )
 end
 
--- Row of the page about one asset: the share of the draws that is kept, the largest error of τ, and the ends of the windows.
+-- Row of the page about one asset: the share of the draws that is kept, the largest error of τ, and the ends of the
+-- windows.
 local function summary(name, rows)
   local draws, worst, count = 0, 0, 0
-  for _, one in ipairs(sample(name, SAMPLE)) do draws = draws + one.draws end
+  for _, one in ipairs(sample(name, SAMPLE)) do
+    draws = draws + one.draws
+  end
   for _, row in ipairs(rows) do
     if row.asset == name then
       count = count + 1
@@ -95,8 +120,11 @@ end
 
 local function finish(rows, o)
   local lines = {}
-  for k, name in ipairs(o.asset) do lines[k] = summary(name, rows) end
-  local header = "| asset | draws kept, % | instances | largest error of τ, % | loose end, carried / window | tight end, carried / window |\n|---|---|---|---|---|---|\n"
+  for k, name in ipairs(o.asset) do
+    lines[k] = summary(name, rows)
+  end
+  local header =
+    "| asset | draws kept, % | instances | largest error of τ, % | loose end, carried / window | tight end, carried / window |\n|---|---|---|---|---|---|\n"
   local text = header .. table.concat(lines, "\n") .. "\n"
   if #o.asset < #kinds then return { text = text } end
   local page = PAGE:format(SAMPLE, o.count) .. text
@@ -106,7 +134,9 @@ end
 local function points(o)
   local list = {}
   for _, name in ipairs(o.asset) do
-    for index = 1, o.count do list[#list + 1] = { asset = name, index = index } end
+    for index = 1, o.count do
+      list[#list + 1] = { asset = name, index = index }
+    end
   end
   return list
 end
@@ -118,6 +148,15 @@ return softvt.experiment {
   run = run,
   finish = finish,
   columns = {
-    "asset", "scale", "youngs_factor", "strain_factor", "tau_pressed_pct", "tau_judged_pct", "error_pct", "loose_ratio", "tight_ratio", "censored",
+    "asset",
+    "scale",
+    "youngs_factor",
+    "strain_factor",
+    "tau_pressed_pct",
+    "tau_judged_pct",
+    "error_pct",
+    "loose_ratio",
+    "tight_ratio",
+    "censored",
   },
 }

@@ -20,10 +20,12 @@ local opt = softvt.options {
 
 -- Episodes use only files that were read when the plan was made, so every asset is required here.
 local assets = {}
-for _, name in ipairs(opt.asset) do assets[name] = require("assets." .. name) end
+for _, name in ipairs(opt.asset) do
+  assets[name] = require("assets." .. name)
+end
 
 local WORDS, GROUND = { 40, 44, 50 }, { 244, 243, 240 }
-local LABEL = 34  -- pixels below each image
+local LABEL = 34 -- pixels below each image
 
 local function size_of(name) return views.size(assets[name]) end
 

@@ -1,4 +1,5 @@
--- What the hidden suites have in common: how stiff, brittle, heavy and slippery an object is does not show, and the teacher feels it.
+-- What the hidden suites have in common: how stiff, brittle, heavy and slippery an object is does not show, and the
+-- teacher feels it.
 local pick_place = require "experts.pick_place"
 local shifts = require "shifts"
 

@@ -1,4 +1,5 @@
--- Tactile images of each soft asset in the expert's grasp: image, markers and marker motion in one panel, and their numbers.
+-- Tactile images of each soft asset in the expert's grasp: image, markers and marker motion in one panel, and their
+-- numbers.
 --
 --   softvt scripts/imprints.lua
 --   softvt scripts/imprints.lua --asset my_pastry --write my_imprint.png
@@ -13,10 +14,12 @@ local opt = softvt.options {
 }
 
 local assets = {}
-for _, name in ipairs(opt.asset) do assets[name] = require("assets." .. name) end
+for _, name in ipairs(opt.asset) do
+  assets[name] = require("assets." .. name)
+end
 
 local WORDS, GROUND = { 40, 44, 50 }, { 244, 243, 240 }
-local LABEL, GAP = 28, 6  -- pixels
+local LABEL, GAP = 28, 6 -- pixels
 local WIDTH, HEIGHT = 240, 180
 
 local function held(name) return views.held(assets[name], opt.lift_mm * 1e-3) end
@@ -41,8 +44,13 @@ return softvt.experiment {
       local reading = sim:tactile(side)
       local x, y = drift(reading)
       rows[#rows + 1] = {
-        asset = name, side = side, force_n = -reading.force[3], shear_n = math.sqrt(reading.force[1] ^ 2 + reading.force[2] ^ 2),
-        depth_mm = reading.depth_mm, markers_x_px = x, markers_y_px = y,
+        asset = name,
+        side = side,
+        force_n = -reading.force[3],
+        shear_n = math.sqrt(reading.force[1] ^ 2 + reading.force[2] ^ 2),
+        depth_mm = reading.depth_mm,
+        markers_x_px = x,
+        markers_y_px = y,
       }
     end
     return rows
@@ -59,7 +67,10 @@ return softvt.experiment {
       for column, image in ipairs { left.image, left.dots, left.arrows, right.arrows } do
         panel:paste(image:resize(WIDTH, HEIGHT), x + (column - 1) * (WIDTH + GAP), y)
       end
-      local words = ("%s: left, its markers, their motion; right, its motion. %.2f N"):format(name:gsub("_", " "), -left.force[3])
+      local words = ("%s: left, its markers, their motion; right, its motion. %.2f N"):format(
+        name:gsub("_", " "),
+        -left.force[3]
+      )
       panel:text(words, { at = { x + 8, y + HEIGHT + 19 }, size = 16, colour = WORDS })
     end
     return { files = { [opt.write] = panel } }

@@ -23,11 +23,17 @@ function material.crust(o)
   local foot, sheen, seed = o.foot or { 0.80, 0.58, 0.30 }, o.sheen or 0.36, o.seed or 1
   local rise = o.rise_m or 14 * mm
   return {
-    albedo = base, roughness = sheen,
+    albedo = base,
+    roughness = sheen,
     layers = {
       layer(mask.facing { from = 0.25, to = 0.98 }, top, sheen, o.browning or 0.65),
       layer(mask.noise { size_m = 14 * mm, octaves = 4, from = 0.42, to = 0.85, seed = seed }, top, sheen + 0.06, 0.5),
-      layer(mask.noise { size_m = 9 * mm, octaves = 3, from = 0.50, to = 0.20, seed = seed + 7 }, foot, sheen + 0.1, 0.22),
+      layer(
+        mask.noise { size_m = 9 * mm, octaves = 3, from = 0.50, to = 0.20, seed = seed + 7 },
+        foot,
+        sheen + 0.1,
+        0.22
+      ),
       layer(mask.gradient { from_m = rise, to_m = 0.15 * rise }, foot, 0.62, 0.75),
       pores(2.6 * mm, 0.15 * mm, seed + 3, base),
     },
@@ -38,7 +44,8 @@ end
 function material.dough(o)
   local base, foot, seed = o.base or { 0.83, 0.755, 0.60 }, o.foot or { 0.70, 0.54, 0.32 }, o.seed or 1
   return {
-    albedo = base, roughness = 0.52,
+    albedo = base,
+    roughness = 0.52,
     layers = {
       layer(mask.noise { size_m = 11 * mm, octaves = 4, from = 0.45, to = 0.8, seed = seed }, foot, 0.5, 0.22),
       layer(mask.facing { from = 0.5, to = 1 }, { 0.88, 0.83, 0.72 }, 0.42, 0.5),
@@ -52,9 +59,15 @@ end
 function material.frosting(o)
   local base, seed = o.base or { 0.90, 0.885, 0.85 }, o.seed or 1
   return {
-    albedo = base, roughness = 0.24,
+    albedo = base,
+    roughness = 0.24,
     layers = {
-      layer(mask.noise { size_m = 6 * mm, octaves = 3, from = 0.5, to = 0.8, seed = seed }, { 0.80, 0.74, 0.64 }, 0.34, 0.35),
+      layer(
+        mask.noise { size_m = 6 * mm, octaves = 3, from = 0.5, to = 0.8, seed = seed },
+        { 0.80, 0.74, 0.64 },
+        0.34,
+        0.35
+      ),
       pores(4 * mm, 0.25 * mm, seed + 3, base),
     },
   }
@@ -64,9 +77,15 @@ end
 function material.seeds(o)
   local base, seed = o.base or { 0.86, 0.74, 0.50 }, o.seed or 1
   return {
-    albedo = base, roughness = 0.42,
+    albedo = base,
+    roughness = 0.42,
     layers = {
-      layer(mask.noise { size_m = 5 * mm, octaves = 2, from = 0.42, to = 0.62, seed = seed }, { 0.70, 0.50, 0.25 }, 0.45, 0.6),
+      layer(
+        mask.noise { size_m = 5 * mm, octaves = 2, from = 0.42, to = 0.62, seed = seed },
+        { 0.70, 0.50, 0.25 },
+        0.45,
+        0.6
+      ),
     },
   }
 end
@@ -75,7 +94,10 @@ end
 function material.floured(look, o)
   local dust = mask.noise { size_m = o.size_m or 3 * mm, octaves = 3, from = 0.5, to = 0.8, seed = o.seed or 1 }
   look.layers = look.layers or {}
-  table.insert(look.layers, layer(dust:intersect(mask.facing { from = 0.35, to = 0.85 }), { 0.78, 0.70, 0.58 }, 0.95, o.opacity or 0.5))
+  table.insert(
+    look.layers,
+    layer(dust:intersect(mask.facing { from = 0.35, to = 0.85 }), { 0.78, 0.70, 0.58 }, 0.95, o.opacity or 0.5)
+  )
   return look
 end
 
@@ -85,7 +107,8 @@ function material.foam(o)
   local deep = { base[1] * 0.62, base[2] * 0.62, base[3] * 0.62 }
   local worn = { 0.75 * base[1] + 0.2, 0.75 * base[2] + 0.2, 0.75 * base[3] + 0.2 }
   return {
-    albedo = base, roughness = 0.85,
+    albedo = base,
+    roughness = 0.85,
     layers = {
       layer(mask.noise { size_m = 16 * mm, octaves = 3, from = 0.4, to = 0.8, seed = seed }, worn, 0.88, 0.12),
       layer(mask.specks { spacing_m = 2.2 * mm, radius_m = 0.55 * mm, seed = seed + 1 }, deep, 0.95, 0.75, -0.18 * mm),
@@ -101,7 +124,8 @@ function material.silicone(o)
   local pale = { 0.9 * base[1] + 0.09, 0.9 * base[2] + 0.09, 0.9 * base[3] + 0.09 }
   local deep = { base[1] * 0.85, base[2] * 0.85, base[3] * 0.85 }
   return {
-    albedo = base, roughness = 0.38,
+    albedo = base,
+    roughness = 0.38,
     layers = {
       layer(mask.noise { size_m = 22 * mm, octaves = 3, from = 0.45, to = 0.8, seed = seed }, pale, 0.46, 0.4),
       layer(mask.noise { size_m = 9 * mm, octaves = 3, from = 0.5, to = 0.85, seed = seed + 1 }, deep, 0.34, 0.4),
@@ -114,9 +138,15 @@ end
 function material.ceramic(o)
   local base, seed = o.base or { 0.78, 0.77, 0.73 }, o.seed or 1
   return {
-    albedo = base, roughness = o.roughness or 0.24,
+    albedo = base,
+    roughness = o.roughness or 0.24,
     layers = {
-      layer(mask.noise { size_m = 40 * mm, octaves = 4, from = 0.4, to = 0.8, seed = seed }, o.shade or { 0.70, 0.67, 0.60 }, 0.28, 0.4),
+      layer(
+        mask.noise { size_m = 40 * mm, octaves = 4, from = 0.4, to = 0.8, seed = seed },
+        o.shade or { 0.70, 0.67, 0.60 },
+        0.28,
+        0.4
+      ),
     },
   }
 end
@@ -126,11 +156,27 @@ function material.wood(o)
   local base, dark, seed = o.base or { 0.43, 0.295, 0.175 }, o.dark or { 0.27, 0.165, 0.085 }, o.seed or 1
   local length, width = o.length_m or 0.9, o.width_m or 0.13
   return {
-    albedo = base, roughness = 0.46,
+    albedo = base,
+    roughness = 0.46,
     layers = {
-      layer(mask.boards { length_m = length, width_m = width, seed = seed }, o.light or { 0.52, 0.385, 0.25 }, 0.50, 0.7),
-      layer(mask.noise { size_m = { 0.30, 9 * mm, 9 * mm }, octaves = 4, from = 0.36, to = 0.92, seed = seed + 1 }, dark, 0.52, 0.50),
-      layer(mask.noise { size_m = { 0.07, 3 * mm, 3 * mm }, octaves = 2, from = 0.5, to = 0.95, seed = seed + 2 }, dark, 0.60, 0.4),
+      layer(
+        mask.boards { length_m = length, width_m = width, seed = seed },
+        o.light or { 0.52, 0.385, 0.25 },
+        0.50,
+        0.7
+      ),
+      layer(
+        mask.noise { size_m = { 0.30, 9 * mm, 9 * mm }, octaves = 4, from = 0.36, to = 0.92, seed = seed + 1 },
+        dark,
+        0.52,
+        0.50
+      ),
+      layer(
+        mask.noise { size_m = { 0.07, 3 * mm, 3 * mm }, octaves = 2, from = 0.5, to = 0.95, seed = seed + 2 },
+        dark,
+        0.60,
+        0.4
+      ),
       layer(mask.seams { length_m = length, width_m = width, gap_m = 1.4 * mm }, { 0.05, 0.027, 0.014 }, 0.8, 0.85),
     },
   }
@@ -139,8 +185,12 @@ end
 -- The boards of the room's floor: dark, wide and long.
 function material.floorboards()
   return material.wood {
-    base = { 0.150, 0.120, 0.095 }, dark = { 0.075, 0.058, 0.046 }, light = { 0.20, 0.165, 0.13 },
-    length_m = 1.6, width_m = 0.19, seed = 21,
+    base = { 0.150, 0.120, 0.095 },
+    dark = { 0.075, 0.058, 0.046 },
+    light = { 0.20, 0.165, 0.13 },
+    length_m = 1.6,
+    width_m = 0.19,
+    seed = 21,
   }
 end
 
@@ -149,9 +199,16 @@ function material.steel(o)
   local fine, long = 2 * mm, 80 * mm
   local size = ({ x = { long, fine, fine }, y = { fine, long, fine }, z = { fine, fine, long } })[o.along or "x"]
   return {
-    albedo = o.base or { 0.72, 0.73, 0.74 }, roughness = o.roughness or 0.30, metalness = 1,
+    albedo = o.base or { 0.72, 0.73, 0.74 },
+    roughness = o.roughness or 0.30,
+    metalness = 1,
     layers = {
-      layer(mask.noise { size_m = size, octaves = 2, from = 0.3, to = 0.7, seed = o.seed or 1 }, { 0.50, 0.51, 0.52 }, 0.42, 0.7),
+      layer(
+        mask.noise { size_m = size, octaves = 2, from = 0.3, to = 0.7, seed = o.seed or 1 },
+        { 0.50, 0.51, 0.52 },
+        0.42,
+        0.7
+      ),
     },
   }
 end
@@ -160,7 +217,8 @@ end
 function material.fabric(o)
   local base, thread = o.base or { 0.34, 0.31, 0.26 }, o.thread or { 0.70, 0.66, 0.58 }
   return {
-    albedo = base, roughness = 0.92,
+    albedo = base,
+    roughness = 0.92,
     layers = {
       layer(mask.weave { pitch_m = o.pitch_m or 2.4 * mm }, thread, 0.95, 0.9, 0.1 * mm),
       layer(mask.noise { size_m = 30 * mm, octaves = 3, from = 0.4, to = 0.8, seed = o.seed or 1 }, base, 0.95, 0.4),
@@ -175,7 +233,9 @@ function material.paint(o)
   local layers = {
     layer(mask.noise { size_m = o.size_m or 0.4, octaves = 4, from = 0.35, to = 0.8, seed = seed }, worn, 0.75, 0.5),
   }
-  for _, more in ipairs(o.layers or {}) do layers[#layers + 1] = more end
+  for _, more in ipairs(o.layers or {}) do
+    layers[#layers + 1] = more
+  end
   return { albedo = base, roughness = o.roughness or 0.65, layers = layers }
 end
 

@@ -13,14 +13,18 @@ local packaging = {}
 -- A solid of revolution of the polygon with corners (r, z), mm.
 function packaging.revolve(corners)
   local metres = {}
-  for i, corner in ipairs(corners) do metres[i] = { corner[1] * mm, corner[2] * mm } end
+  for i, corner in ipairs(corners) do
+    metres[i] = { corner[1] * mm, corner[2] * mm }
+  end
   return softvt.shape.lathe { corners = metres }
 end
 
 -- The polygon with corners (x, z), mm, extruded along y.
 function packaging.extrude(corners, length)
   local metres = {}
-  for i, corner in ipairs(corners) do metres[i] = { corner[1] * mm, corner[2] * mm } end
+  for i, corner in ipairs(corners) do
+    metres[i] = { corner[1] * mm, corner[2] * mm }
+  end
   return softvt.shape.prism { corners = metres, length = length * mm }
 end
 
@@ -37,17 +41,31 @@ end
 -- A can with seams, 62 mm across and 76 mm high. Material 0 is the metal, 1 the label.
 function packaging.can()
   local tin = packaging.revolve {
-    { 0, 0 }, { 30, 0 }, { 31, 0.8 }, { 31, 2.6 }, { 30.2, 3.4 }, { 30.2, 72.6 }, { 31, 73.4 }, { 31, 75.2 }, { 30.2, 76 },
-    { 29.2, 76 }, { 28.4, 74 }, { 0, 74 },
+    { 0, 0 },
+    { 30, 0 },
+    { 31, 0.8 },
+    { 31, 2.6 },
+    { 30.2, 3.4 },
+    { 30.2, 72.6 },
+    { 31, 73.4 },
+    { 31, 75.2 },
+    { 30.2, 76 },
+    { 29.2, 76 },
+    { 28.4, 74 },
+    { 0, 74 },
   }
   return tin:paint { material = 1, region = packaging.band(3.8, 72.2) }
 end
 
--- Orientation of each face's label in the object: rotations about x, then z. In the label's frame x points to the reader's
--- right, y up and z outwards.
+-- Orientation of each face's label in the object: rotations about x, then z. In the label's frame x points to the
+-- reader's right, y up and z outwards.
 local HALF = math.pi / 2
 local FACES = {
-  ["-y"] = { HALF, 0 }, ["+x"] = { HALF, HALF }, ["+y"] = { HALF, math.pi }, ["-x"] = { HALF, -HALF }, ["+z"] = { 0, 0 },
+  ["-y"] = { HALF, 0 },
+  ["+x"] = { HALF, HALF },
+  ["+y"] = { HALF, math.pi },
+  ["-x"] = { HALF, -HALF },
+  ["+z"] = { 0, 0 },
 }
 
 local function onto(shape, face)
@@ -63,9 +81,10 @@ local function point(x, y, z, face)
   return { (x * cos + z * sin) * mm, (x * sin - z * cos) * mm, y * mm }
 end
 
--- A label: the same print on each of the faces `on`, named by their outward direction ("+z" is the top). Positions are in mm
--- to the reader's right and up from the object's origin; `out` is the distance of the faces from it, `turn` rotates the
--- print. On round objects, `round` is the inner limit of motifs; with `wrap`, a radius in mm, text runs around the z axis.
+-- A label: the same print on each of the faces `on`, named by their outward direction ("+z" is the top). Positions are
+-- in mm to the reader's right and up from the object's origin; `out` is the distance of the faces from it, `turn`
+-- rotates the print. On round objects, `round` is the inner limit of motifs; with `wrap`, a radius in mm, text runs
+-- around the z axis.
 function packaging.label(spec)
   local label = { layers = {} }
   local out, turn = spec.out, spec.turn or 0
@@ -74,7 +93,10 @@ function packaging.label(spec)
   -- Adds a layer on top.
   function label.ink(where, albedo, more)
     more = more or {}
-    table.insert(label.layers, { mask = where, albedo = albedo, roughness = more.roughness or 0.42, opacity = more.opacity or 1 })
+    table.insert(
+      label.layers,
+      { mask = where, albedo = albedo, roughness = more.roughness or 0.42, opacity = more.opacity or 1 }
+    )
   end
 
   -- A motif: a shape in the label's frame.
@@ -122,10 +144,20 @@ function packaging.label(spec)
         local way = FACES[face][2] - HALF + x / spec.wrap
         facing, at = { math.cos(way), math.sin(way), 0 }, { 0, 0, y * mm }
       end
-      label.ink(mask.text {
-        text = words, height_m = high * mm, at = at, facing = facing, angle = turn + (more.lean or 0),
-        wrap_m = spec.wrap and spec.wrap * mm or nil, weight = more.weight or 0.14, font = more.font,
-      }, albedo, more)
+      label.ink(
+        mask.text {
+          text = words,
+          height_m = high * mm,
+          at = at,
+          facing = facing,
+          angle = turn + (more.lean or 0),
+          wrap_m = spec.wrap and spec.wrap * mm or nil,
+          weight = more.weight or 0.14,
+          font = more.font,
+        },
+        albedo,
+        more
+      )
     end
   end
 

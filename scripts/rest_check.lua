@@ -1,5 +1,5 @@
--- Checks that assets rest stably: each is settled alone on the table and observed for some seconds. An asset that rolls needs
--- a flatter base; scripts/contact_sheet.lua shows how it lies.
+-- Checks that assets rest stably: each is settled alone on the table and observed for some seconds. An asset that rolls
+-- needs a flatter base; scripts/contact_sheet.lua shows how it lies.
 --
 --   softvt scripts/rest_check.lua --asset my_pastry
 local soft_assets = require("asset_names").soft
@@ -13,7 +13,9 @@ local opt = softvt.options {
 
 -- Episodes use only files that were read when the plan was made, so every asset is required here.
 local assets = {}
-for _, name in ipairs(opt.asset) do assets[name] = require("assets." .. name) end
+for _, name in ipairs(opt.asset) do
+  assets[name] = require("assets." .. name)
+end
 
 -- Limits of an asset at rest: mm, degrees, m/s.
 local MOVED_MM, TURNED_DEG, SPEED = 0.1, 0.5, 1e-3
@@ -50,7 +52,12 @@ return softvt.experiment {
     -- Relative to the initial yaw, because settling may rotate the object too.
     local turned = math.deg(after.yaw) - opt.yaw_deg
     return {
-      asset = point.asset, moved_mm = moved, sunk_mm = sunk, turned_deg = turned, speed_m_s = seen.speed, asleep = seen.asleep,
+      asset = point.asset,
+      moved_mm = moved,
+      sunk_mm = sunk,
+      turned_deg = turned,
+      speed_m_s = seen.speed,
+      asleep = seen.asleep,
       rests = moved < MOVED_MM and math.abs(sunk) < MOVED_MM and math.abs(turned) < TURNED_DEG and seen.speed < SPEED,
     }
   end,

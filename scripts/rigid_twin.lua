@@ -1,4 +1,5 @@
--- The rigid twin of a suite: shapes, looks, masses, layouts, initial states and prompts are the same, and nothing deforms.
+-- The rigid twin of a suite: shapes, looks, masses, layouts, initial states and prompts are the same, and nothing
+-- deforms.
 local shifts = require "shifts"
 
 return function(name, soft)

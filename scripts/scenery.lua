@@ -16,20 +16,30 @@ local function floor(under)
   local look = material.floorboards()
   if under then
     table.insert(look.layers, {
-      mask = mask.inside { shape = under, soft_m = 0.9 }, albedo = { 0.035, 0.028, 0.022 }, roughness = 0.7, opacity = 0.8,
+      mask = mask.inside { shape = under, soft_m = 0.9 },
+      albedo = { 0.035, 0.028, 0.022 },
+      roughness = 0.7,
+      opacity = 0.8,
     })
   end
   return seen("floor", box { size = { 5, 5, 0.02 } }:translate(0, 0, -10 * mm), look)
 end
 local shaded_floor = floor(box { size = { 1.5, 1.5, 1 } }:translate(-0.85, 0, 0))
 
-local groove = { mask = mask.stripes { axis = "y", pitch_m = 0.16, share = 0.05 }, albedo = { 0.075, 0.095, 0.095 }, roughness = 0.8, opacity = 0.9 }
+local groove = {
+  mask = mask.stripes { axis = "y", pitch_m = 0.16, share = 0.05 },
+  albedo = { 0.075, 0.095, 0.095 },
+  roughness = 0.8,
+  opacity = 0.9,
+}
 local wall = seen(
-  "wall", box { size = { 0.04, 5, 3 } }:translate(-20 * mm, 0, 1.5),
+  "wall",
+  box { size = { 0.04, 5, 3 } }:translate(-20 * mm, 0, 1.5),
   material.paint { base = { 0.235, 0.285, 0.275 }, layers = { groove }, seed = 31 }
 )
 local skirting = seen(
-  "skirting", box { size = { 0.02, 5, 0.11 } }:translate(10 * mm, 0, 55 * mm),
+  "skirting",
+  box { size = { 0.02, 5, 0.11 } }:translate(10 * mm, 0, 55 * mm),
   material.paint { base = { 0.62, 0.60, 0.55 }, seed = 33 }
 )
 
@@ -43,14 +53,17 @@ for _, x in ipairs { -0.53, 0.53 } do
   end
 end
 for _, side in ipairs { -1, 1 } do
-  legs = legs:union(box { size = { 1.0, 0.025, 0.09 } }:translate(0, side * 0.73, HIGH - 0.045))
+  legs = legs
+    :union(box { size = { 1.0, 0.025, 0.09 } }:translate(0, side * 0.73, HIGH - 0.045))
     :union(box { size = { 0.025, 1.4, 0.09 } }:translate(side * 0.53, 0, HIGH - 0.045))
 end
 local frame = seen("table_frame", legs, { albedo = { 0.29, 0.185, 0.105 }, roughness = 0.5 })
 
--- The robot's stand: a column between two plates; its top is 10 mm under the table's, as high as the robot's base there.
+-- The robot's stand: a column between two plates; its top is 10 mm under the table's, as high as the robot's base
+-- there.
 local function stand(height)
-  local shape = box { size = { 0.23, 0.26, 0.02 } }:translate(-0.056, 0, height - 10 * mm)
+  local shape = box { size = { 0.23, 0.26, 0.02 } }
+    :translate(-0.056, 0, height - 10 * mm)
     :union(box { size = { 0.16, 0.16, height - 40 * mm } }:translate(-0.056, 0, height / 2))
     :union(box { size = { 0.36, 0.36, 0.02 } }:translate(-0.056, 0, 10 * mm))
   return seen("robot_stand", shape, { albedo = { 0.10, 0.105, 0.11 }, roughness = 0.42, metalness = 0.4 })
@@ -65,9 +78,7 @@ end
 
 -- Walls for scenes supported by the floor, z = 0: walls behind the robot and on the side away from the light. The floor
 -- itself is an asset, assets/floor.lua.
-function scenery.floor_room(scene)
-  walls(scene, 0)
-end
+function scenery.floor_room(scene) walls(scene, 0) end
 
 -- Walls for scenes supported by a table with its top at z = 0, with the robot on a stand next to it.
 function scenery.table_room(scene)

@@ -1,18 +1,26 @@
--- Shifts that a suite may declare, each of one factor, and lists of conditions: the standard ones of the benchmark's later
--- release, our own, and perturbations of what the policy perceives and how its actions arrive.
+-- Shifts that a suite may declare, each of one factor, and lists of conditions: the standard ones of the benchmark's
+-- later release, our own, and perturbations of what the policy perceives and how its actions arrive.
 local EXTRAS = {
-  require "assets.tomato_sauce", require "assets.cream_cheese", require "assets.butter", require "assets.alphabet_soup",
+  require "assets.tomato_sauce",
+  require "assets.cream_cheese",
+  require "assets.butter",
+  require "assets.alphabet_soup",
 }
 -- Region and clearance of additional distractors, draws per distractor, m.
 local REGION, CLEARANCE, DRAWS = { x = { -0.3, 0.3 }, y = { -0.42, 0.42 } }, 0.06, 400
 
 -- "pick up the soft cube and place it in the basket" in other words: the object, "in" or "on", and the target.
-local PARAPHRASES = { "put the %s %s the %s", "take the %s and set it down %s the %s", "move the %s so that it lies %s the %s" }
+local PARAPHRASES =
+  { "put the %s %s the %s", "take the %s and set it down %s the %s", "move the %s so that it lies %s the %s" }
 
 -- A factor on numbers of the materials of all objects.
 local function factor(name, keys, min, max)
   return softvt.shift {
-    name = name, unit = "1", default = 1, min = min, max = max,
+    name = name,
+    unit = "1",
+    default = 1,
+    min = min,
+    max = max,
     apply = function(scene, value)
       for _, object in ipairs(scene.objects) do
         for _, key in ipairs(keys) do
@@ -43,11 +51,19 @@ end
 local shifts = {
   -- The object of the task's goal alone, as in the later release.
   target_mass = softvt.shift {
-    name = "target_mass", unit = "1", default = 1, min = 0.01, max = 100,
+    name = "target_mass",
+    unit = "1",
+    default = 1,
+    min = 0.01,
+    max = 100,
     apply = function(scene, value) scene.goal_object:scale_mass(value) end,
   },
   target_stiffness = softvt.shift {
-    name = "target_stiffness", unit = "1", default = 1, min = 0.01, max = 100,
+    name = "target_stiffness",
+    unit = "1",
+    default = 1,
+    min = 0.01,
+    max = 100,
     apply = function(scene, value)
       local object = scene.goal_object
       object.youngs_pa = object.youngs_pa * value
@@ -57,23 +73,38 @@ local shifts = {
   stiffness = factor("stiffness", { "youngs_pa" }, 0.01, 100),
   -- Applies to soft and rigid bodies and to the moving parts of articulations; sizes stay.
   mass = softvt.shift {
-    name = "mass", unit = "1", default = 1, min = 0.01, max = 100,
+    name = "mass",
+    unit = "1",
+    default = 1,
+    min = 0.01,
+    max = 100,
     apply = function(scene, value)
-      for _, object in ipairs(scene.objects) do object:scale_mass(value) end
+      for _, object in ipairs(scene.objects) do
+        object:scale_mass(value)
+      end
     end,
   },
   -- A pair of surfaces takes the larger coefficient. The friction of the pads is a setting, robot.pads.
   friction = factor("friction", { "static_mu", "dynamic_mu" }, 0, 10),
   light = softvt.shift {
-    name = "light", unit = "1", default = 1, min = 0.01, max = 20,
+    name = "light",
+    unit = "1",
+    default = 1,
+    min = 0.01,
+    max = 20,
     apply = function(scene, value)
       scene.light.strength = scene.light.strength * value
       scene.light.sky_strength = scene.light.sky_strength * value
     end,
   },
-  -- Moves the third-person camera by so many cm in a random direction and turns it by as many degrees about a random axis.
+  -- Moves the third-person camera by so many cm in a random direction and turns it by as many degrees about a random
+  -- axis.
   camera = softvt.shift {
-    name = "camera", unit = "cm and degrees", default = 0, min = 0, max = 20,
+    name = "camera",
+    unit = "cm and degrees",
+    default = 0,
+    min = 0,
+    max = 20,
     apply = function(scene, value, rng)
       local draws, camera = rng:stream "camera", scene:camera "third_person"
       local p, x, y, z = camera.position, random_vector(draws, value / 100)
@@ -85,7 +116,11 @@ local shifts = {
   },
   -- Adds so many rigid objects at random free places.
   distractors = softvt.shift {
-    name = "distractors", unit = "1", default = 0, min = 0, max = #EXTRAS,
+    name = "distractors",
+    unit = "1",
+    default = 0,
+    min = 0,
+    max = #EXTRAS,
     apply = function(scene, value, rng)
       for k = 1, math.floor(value) do
         local low, high = EXTRAS[k].shape:bounds()
@@ -103,7 +138,11 @@ local shifts = {
   },
   -- The instruction in other words: 1, 2 or 3.
   prompt = softvt.shift {
-    name = "prompt", unit = "1", default = 0, min = 0, max = #PARAPHRASES,
+    name = "prompt",
+    unit = "1",
+    default = 0,
+    min = 0,
+    max = #PARAPHRASES,
     apply = function(scene, value)
       if value < 1 then return end
       local what, where, target = scene.prompt:match "^pick up the (.-) and place it (%a+) the (.+)$"
@@ -115,7 +154,13 @@ local shifts = {
 
 -- The shifts of soft and of rigid suites.
 shifts.rigid = {
-  shifts.target_mass, shifts.mass, shifts.light, shifts.friction, shifts.camera, shifts.distractors, shifts.prompt,
+  shifts.target_mass,
+  shifts.mass,
+  shifts.light,
+  shifts.friction,
+  shifts.camera,
+  shifts.distractors,
+  shifts.prompt,
 }
 shifts.soft = { shifts.target_stiffness, shifts.stiffness, table.unpack(shifts.rigid) }
 
@@ -123,7 +168,8 @@ shifts.soft = { shifts.target_stiffness, shifts.stiffness, table.unpack(shifts.r
 local function levels(list, shift, values)
   local only = shift:match "stiffness$" and "deformable" or nil
   for _, value in ipairs(values) do
-    list[#list + 1] = { name = ("%s x%.4g"):format(shift:gsub("_", " "), value), shift = { [shift] = value }, only = only }
+    list[#list + 1] =
+      { name = ("%s x%.4g"):format(shift:gsub("_", " "), value), shift = { [shift] = value }, only = only }
   end
 end
 
@@ -147,10 +193,16 @@ shifts.perturbations = {
   { name = "paraphrase 1", shift = { prompt = 1 } },
   { name = "paraphrase 2", shift = { prompt = 2 } },
   { name = "tactile noise", set = { ["tactile.wear.noise_px"] = 0.5, ["tactile.wear.image_noise"] = 5 } },
-  { name = "gel wear", set = { ["tactile.wear.gain"] = 0.7, ["tactile.wear.offset_px"] = 0.5, ["tactile.wear.dead_share"] = 0.2 } },
+  {
+    name = "gel wear",
+    set = { ["tactile.wear.gain"] = 0.7, ["tactile.wear.offset_px"] = 0.5, ["tactile.wear.dead_share"] = 0.2 },
+  },
   { name = "latency 50 ms", set = { ["robot.latency"] = 1 } },
   { name = "latency 150 ms", set = { ["robot.latency"] = 3 } },
-  { name = "disturbance 3 mm", set = { ["robot.disturbance.position"] = 0.003, ["robot.disturbance.rotation"] = 0.01 } },
+  {
+    name = "disturbance 3 mm",
+    set = { ["robot.disturbance.position"] = 0.003, ["robot.disturbance.rotation"] = 0.01 },
+  },
   { name = "rigid twin", rigid_twin = true },
 }
 

@@ -1,12 +1,16 @@
--- The squeeze experiment: two rigid flat pads with sharp edges grip, lift and hold a free soft body. Motions are prescribed, so
--- that other simulators and static solvers can be compared row by row. D is measured from the rest shape, not from the settled
--- shape as in the benchmark.
+-- The squeeze experiment: two rigid flat pads with sharp edges grip, lift and hold a free soft body. Motions are
+-- prescribed, so that other simulators and static solvers can be compared row by row. D is measured from the rest
+-- shape, not from the settled shape as in the benchmark.
 --
 --   softvt scripts/squeeze.lua --gap-mm 48,42,36 --json
 local mm = 1e-3
 
 local opt = softvt.options {
-  shape = { default = "cube", choices = { "cube", "sphere", "cylinder", "capsule" }, help = "shape of the body; cylinder and capsule lie on their side" },
+  shape = {
+    default = "cube",
+    choices = { "cube", "sphere", "cylinder", "capsule" },
+    help = "shape of the body; cylinder and capsule lie on their side",
+  },
   size_mm = { default = 50, unit = "mm", min = 1, max = 1000, help = "edge of the cube" },
   radius_mm = { default = 25, unit = "mm", min = 1, max = 500, help = "radius of the round shapes" },
   length_mm = { default = 80, unit = "mm", min = 1, max = 1000, help = "total length of cylinder and capsule" },
@@ -18,14 +22,18 @@ local opt = softvt.options {
   beta_s = { default = 2e-3, unit = "s", min = 0, max = 1, help = "stiffness-proportional damping" },
   pad_mm = { default = 22, unit = "mm", min = 1, max = 200, help = "edge of the pads" },
   pad_offset_mm = { default = { 0, 0 }, unit = "mm", help = "pads moved along y and z" },
-  gap_mm = { default = { 48, 46, 44, 42, 38, 34, 30 }, unit = "mm", help = "distances of the closed pads, one row each" },
+  gap_mm = {
+    default = { 48, 46, 44, 42, 38, 34, 30 },
+    unit = "mm",
+    help = "distances of the closed pads, one row each",
+  },
   lift_mm = { default = 100, unit = "mm", min = 0, max = 1000, help = "height of the lift" },
   hold_s = { default = 0.5, unit = "s", min = 0, max = 600, help = "time in the air" },
   dt = { default = 1 / 60, unit = "s", min = 1e-4, max = 0.05, help = "time step" },
 }
 
 local SETTLE_S, GRIP_S, LIFT_S = 0.10, 0.25, 1.0
-local CLEARANCE, CLOSING = 2 * mm, 0.04  -- m and m/s, each pad
+local CLEARANCE, CLOSING = 2 * mm, 0.04 -- m and m/s, each pad
 local PAD_THICKNESS = 10 * mm
 local GRIP_WINDOW_S, HOLD_WINDOW_S = 0.05, 0.3
 
@@ -33,9 +41,13 @@ local GRIP_WINDOW_S, HOLD_WINDOW_S = 0.05, 0.3
 local function shape_of(o)
   local radius, length = o.radius_mm * mm, o.length_mm * mm
   local lying = { axis = "x", angle = math.pi / 2 }
-  if o.shape == "cube" then return softvt.shape.box { size = { o.size_mm * mm, o.size_mm * mm, o.size_mm * mm } }, o.size_mm * mm end
+  if o.shape == "cube" then
+    return softvt.shape.box { size = { o.size_mm * mm, o.size_mm * mm, o.size_mm * mm } }, o.size_mm * mm
+  end
   if o.shape == "sphere" then return softvt.shape.sphere { radius = radius }, 2 * radius end
-  if o.shape == "cylinder" then return softvt.shape.cylinder { radius = radius, height = length }:rotate(lying), 2 * radius end
+  if o.shape == "cylinder" then
+    return softvt.shape.cylinder { radius = radius, height = length }:rotate(lying), 2 * radius
+  end
   return softvt.shape.capsule { radius = radius, length = length }:rotate(lying), 2 * radius
 end
 
@@ -44,7 +56,10 @@ local function build(o)
   local world = softvt.world { dt = o.dt, rayleigh_stiffness = o.beta_s, sleeping = false }
   local grip = { static_mu = o.friction, dynamic_mu = o.friction }
   local body = world:soft {
-    name = o.shape, shape = shape, friction = { static_mu = 0, dynamic_mu = 0 }, position = { 0, 0, width / 2 },
+    name = o.shape,
+    shape = shape,
+    friction = { static_mu = 0, dynamic_mu = 0 },
+    position = { 0, 0, width / 2 },
     body = softvt.soft { youngs_pa = o.youngs_pa, poisson = o.poisson, density = o.density, resolution = o.resolution },
   }
   local slab = softvt.shape.box { size = { 1, 1, 0.1 } }
@@ -53,7 +68,10 @@ local function build(o)
   local pads = {}
   for i, side in ipairs { -1, 1 } do
     local x = side * (width / 2 + CLEARANCE + PAD_THICKNESS / 2)
-    pads[i] = { side = side, solid = world:kinematic { name = "pad", shape = pad, friction = grip, position = { x, 0, width / 2 } } }
+    pads[i] = {
+      side = side,
+      solid = world:kinematic { name = "pad", shape = pad, friction = grip, position = { x, 0, width / 2 } },
+    }
   end
   return { world = world, body = body, pads = pads, width = width }
 end
@@ -134,9 +152,15 @@ local function run(point, o)
     invalid = problem,
     slip_mm = ok and o.lift_mm - rise / mm or nil,
     creep_mm_per_s = ok and creep_mm_per_s(hold) or nil,
-    d_grip_pct = mean(grip, "d"), d_hold_pct = ok and mean(hold, "d") or nil, d_peak_pct = peak,
-    force_grip_n = mean(grip, "force"), force_hold_n = ok and mean(hold, "force") or nil,
-    min_det_f = least, steps = steps, newton_mean = newton_mean, newton_max = newton_max,
+    d_grip_pct = mean(grip, "d"),
+    d_hold_pct = ok and mean(hold, "d") or nil,
+    d_peak_pct = peak,
+    force_grip_n = mean(grip, "force"),
+    force_hold_n = ok and mean(hold, "force") or nil,
+    min_det_f = least,
+    steps = steps,
+    newton_mean = newton_mean,
+    newton_max = newton_max,
   }
 end
 
@@ -145,12 +169,26 @@ return softvt.experiment {
   options = opt,
   points = function(o)
     local points = {}
-    for i, gap in ipairs(o.gap_mm) do points[i] = { gap_mm = gap } end
+    for i, gap in ipairs(o.gap_mm) do
+      points[i] = { gap_mm = gap }
+    end
     return points
   end,
   run = run,
   columns = {
-    "gap_mm", "holds", "slip_mm", "creep_mm_per_s", "d_grip_pct", "d_hold_pct", "d_peak_pct", "force_grip_n",
-    "force_hold_n", "min_det_f", "steps", "newton_mean", "newton_max", "invalid",
+    "gap_mm",
+    "holds",
+    "slip_mm",
+    "creep_mm_per_s",
+    "d_grip_pct",
+    "d_hold_pct",
+    "d_peak_pct",
+    "force_grip_n",
+    "force_hold_n",
+    "min_det_f",
+    "steps",
+    "newton_mean",
+    "newton_max",
+    "invalid",
   },
 }

@@ -1,26 +1,111 @@
--- Where the collapse and damage strains of the soft assets come from, for docs/assets.md. The values themselves are in the assets.
--- `collapse` and `damage` are the ranges in which the true values are thought to lie.
+-- Where the collapse and damage strains of the soft assets come from, for docs/assets.md. The values themselves are in
+-- the assets. `collapse` and `damage` are the ranges in which the true values are thought to lie.
 local crumb = "crumb: cell walls buckle at 0.05–0.15 (1, 2, 5)"
 local elastomer = "elastomer foam: 0.05 in theory, 0.05–0.10 in tests (5)"
 local sources = {
   assets = {
-    spiral_roll = { collapse = { 0.05, 0.15 }, damage = { 0.15, 0.35 }, class = crumb .. "; middle of the range", why = "icing cracks and layers shear before the crumb sets" },
-    steamed_bun = { collapse = { 0.08, 0.15 }, damage = { 0.28, 0.50 }, class = crumb .. "; upper half: moist, dense walls (7)", why = "most elastic crumb, no crust; texture tests squeeze it to 40–50 % (7, 8)" },
-    twisted_stick = { collapse = { 0.05, 0.15 }, damage = { 0.08, 0.30 }, class = crumb .. "; middle of the range", why = "thin strands with much crust (9)" },
-    long_roll = { collapse = { 0.05, 0.15 }, damage = { 0.25, 0.45 }, class = crumb .. "; middle of the range", why = "soft crumb; its slashes may tear (3, 8)" },
-    small_ridged_roll = { collapse = { 0.08, 0.15 }, damage = { 0.08, 0.25 }, class = crumb .. "; upper half: firm and dense", why = "leathery crust, one day old (9)" },
-    sesame_bun = { collapse = { 0.05, 0.15 }, damage = { 0.25, 0.45 }, class = crumb .. "; middle of the range", why = "soft crumb with a thin skin, which wrinkles first (3, 8)" },
-    croissant = { collapse = { 0.05, 0.12 }, damage = { 0.05, 0.18 }, class = "flaky layers: large thin-walled alveoli, lower half of the crumb's range (10)", why = "the flaky shell breaks, alveoli fold and do not reopen (10)" },
-    curved_layered = { collapse = { 0.05, 0.12 }, damage = { 0.03, 0.12 }, class = "flaky layers: dry leaves, lower half of the crumb's range (10)", why = "dry leaves are a brittle foam; the most fragile (10)" },
-    braided_roll = { collapse = { 0.05, 0.15 }, damage = { 0.20, 0.40 }, class = crumb .. "; middle of the range", why = "enriched crumb; the glaze cracks and strands part (3, 4)" },
-    golden_bun = { collapse = { 0.05, 0.15 }, damage = { 0.06, 0.20 }, class = crumb .. "; middle of the range", why = "its thin crisp crust cracks under the pads (9, 10)" },
-    oval_loaf = { collapse = { 0.08, 0.15 }, damage = { 0.06, 0.20 }, class = crumb .. "; upper half: firm and dense", why = "ridges of its thick crust crack first (9, 10)" },
-    yellow_roll = { collapse = { 0.05, 0.12 }, damage = { 0.10, 0.30 }, class = crumb .. "; lower half: sponge with thin walls (6)", why = "sponge crumbles earlier than bread, and cream flows out (6)" },
-    cube = { collapse = { 0.05, 0.10 }, damage = { 0.35, 0.70 }, class = elastomer .. "; polyurethane", why = "sets only near densification or by long holding (5, 11)" },
-    cylinder = { collapse = { 0.05, 0.10 }, damage = { 0.35, 0.70 }, class = elastomer .. "; polyurethane", why = "the same material as the cube (5, 11)" },
-    wedge = { collapse = { 0.05, 0.10 }, damage = { 0.35, 0.70 }, class = elastomer .. "; polyurethane", why = "the same material as the cube (5, 11)" },
-    capsule = { collapse = { 0.05, 0.12 }, damage = { 0.45, 0.75 }, class = "elastomer foam; upper end of 0.05–0.10: denser silicone with thick walls (5, 12)", why = "silicone sets least of all foams (12)" },
-    sphere = { collapse = { 0.05, 0.12 }, damage = { 0.45, 0.75 }, class = "elastomer foam; upper end of 0.05–0.10: denser silicone with thick walls (5, 12)", why = "silicone sets least of all foams (12)" },
+    spiral_roll = {
+      collapse = { 0.05, 0.15 },
+      damage = { 0.15, 0.35 },
+      class = crumb .. "; middle of the range",
+      why = "icing cracks and layers shear before the crumb sets",
+    },
+    steamed_bun = {
+      collapse = { 0.08, 0.15 },
+      damage = { 0.28, 0.50 },
+      class = crumb .. "; upper half: moist, dense walls (7)",
+      why = "most elastic crumb, no crust; texture tests squeeze it to 40–50 % (7, 8)",
+    },
+    twisted_stick = {
+      collapse = { 0.05, 0.15 },
+      damage = { 0.08, 0.30 },
+      class = crumb .. "; middle of the range",
+      why = "thin strands with much crust (9)",
+    },
+    long_roll = {
+      collapse = { 0.05, 0.15 },
+      damage = { 0.25, 0.45 },
+      class = crumb .. "; middle of the range",
+      why = "soft crumb; its slashes may tear (3, 8)",
+    },
+    small_ridged_roll = {
+      collapse = { 0.08, 0.15 },
+      damage = { 0.08, 0.25 },
+      class = crumb .. "; upper half: firm and dense",
+      why = "leathery crust, one day old (9)",
+    },
+    sesame_bun = {
+      collapse = { 0.05, 0.15 },
+      damage = { 0.25, 0.45 },
+      class = crumb .. "; middle of the range",
+      why = "soft crumb with a thin skin, which wrinkles first (3, 8)",
+    },
+    croissant = {
+      collapse = { 0.05, 0.12 },
+      damage = { 0.05, 0.18 },
+      class = "flaky layers: large thin-walled alveoli, lower half of the crumb's range (10)",
+      why = "the flaky shell breaks, alveoli fold and do not reopen (10)",
+    },
+    curved_layered = {
+      collapse = { 0.05, 0.12 },
+      damage = { 0.03, 0.12 },
+      class = "flaky layers: dry leaves, lower half of the crumb's range (10)",
+      why = "dry leaves are a brittle foam; the most fragile (10)",
+    },
+    braided_roll = {
+      collapse = { 0.05, 0.15 },
+      damage = { 0.20, 0.40 },
+      class = crumb .. "; middle of the range",
+      why = "enriched crumb; the glaze cracks and strands part (3, 4)",
+    },
+    golden_bun = {
+      collapse = { 0.05, 0.15 },
+      damage = { 0.06, 0.20 },
+      class = crumb .. "; middle of the range",
+      why = "its thin crisp crust cracks under the pads (9, 10)",
+    },
+    oval_loaf = {
+      collapse = { 0.08, 0.15 },
+      damage = { 0.06, 0.20 },
+      class = crumb .. "; upper half: firm and dense",
+      why = "ridges of its thick crust crack first (9, 10)",
+    },
+    yellow_roll = {
+      collapse = { 0.05, 0.12 },
+      damage = { 0.10, 0.30 },
+      class = crumb .. "; lower half: sponge with thin walls (6)",
+      why = "sponge crumbles earlier than bread, and cream flows out (6)",
+    },
+    cube = {
+      collapse = { 0.05, 0.10 },
+      damage = { 0.35, 0.70 },
+      class = elastomer .. "; polyurethane",
+      why = "sets only near densification or by long holding (5, 11)",
+    },
+    cylinder = {
+      collapse = { 0.05, 0.10 },
+      damage = { 0.35, 0.70 },
+      class = elastomer .. "; polyurethane",
+      why = "the same material as the cube (5, 11)",
+    },
+    wedge = {
+      collapse = { 0.05, 0.10 },
+      damage = { 0.35, 0.70 },
+      class = elastomer .. "; polyurethane",
+      why = "the same material as the cube (5, 11)",
+    },
+    capsule = {
+      collapse = { 0.05, 0.12 },
+      damage = { 0.45, 0.75 },
+      class = "elastomer foam; upper end of 0.05–0.10: denser silicone with thick walls (5, 12)",
+      why = "silicone sets least of all foams (12)",
+    },
+    sphere = {
+      collapse = { 0.05, 0.12 },
+      damage = { 0.45, 0.75 },
+      class = "elastomer foam; upper end of 0.05–0.10: denser silicone with thick walls (5, 12)",
+      why = "silicone sets least of all foams (12)",
+    },
   },
   literature = [[
 No full paper was read for these values: abstracts, tables and excerpts only. *Remembered* marks what was not checked at all.

@@ -1,11 +1,15 @@
--- Controllers that differ only in how the hand closes: the expert knows the object (reference), tactile-servo feels it, and the others know
--- only what can be seen of it, and the statistics of the suite. The best of those without touch says what a suite needs. Prints one table.
+-- Controllers that differ only in how the hand closes: the expert knows the object (reference), tactile-servo feels it,
+-- and the others know only what can be seen of it, and the statistics of the suite. The best of those without touch
+-- says what a suite needs. Prints one table.
 --
 --   softvt suites/controllers.lua --episodes 50
 return softvt.conditions {
   name = "controllers",
   suites = {
-    require "suites.object_varied", require "suites.spatial_varied", require "suites.object_hidden", require "suites.spatial_hidden",
+    require "suites.object_varied",
+    require "suites.spatial_varied",
+    require "suites.object_hidden",
+    require "suites.spatial_hidden",
   },
   conditions = {
     { name = "tactile-servo", policy = "tactile-servo" },

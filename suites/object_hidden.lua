@@ -1,10 +1,11 @@
--- Object-Hidden: soft objects to put into the basket, as in Object-Soft. How stiff, brittle, heavy and slippery each is does not show and
--- differs from episode to episode, and the safe grip forces of each lie within a factor of 1.25 to 1.5.
+-- Object-Hidden: soft objects to put into the basket, as in Object-Soft. How stiff, brittle, heavy and slippery each is
+-- does not show and differs from episode to episode, and the safe grip forces of each lie within a factor of 1.25 to
+-- 1.5.
 local hidden = require "hidden"
 local layouts = require "layouts.floor"
 
--- Kinds whose limit and window are known well at any size and stiffness. The long kinds bend by their own weight, D of the wedge grows
--- as it is lifted, and τ of the oval loaf jumps where another of its ridges meets a pad.
+-- Kinds whose limit and window are known well at any size and stiffness. The long kinds bend by their own weight, D of
+-- the wedge grows as it is lifted, and τ of the oval loaf jumps where another of its ridges meets a pad.
 local objects = {
   { "steamed_bun", "pale cream round steamed-bun pastry" },
   { "spiral_roll", "white spiral pastry with ridged frosting" },

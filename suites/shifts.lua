@@ -11,7 +11,8 @@ local LISTS = { standard = shifts.conditions, all_objects = shifts.all_objects, 
 local opt = softvt.options {
   suite = { default = { "spatial_soft" }, help = "suites to run: files of suites/, without .lua" },
   conditions = {
-    default = { "standard" }, choices = { "standard", "all_objects", "perturbations" },
+    default = { "standard" },
+    choices = { "standard", "all_objects", "perturbations" },
     help = "conditions: the nine of the later release; mass and stiffness of all objects and darker light; perception and control",
   },
 }
@@ -20,10 +21,14 @@ local suites, conditions = {}, {}
 for _, name in ipairs(opt.suite) do
   local found = require("suites." .. name)
   -- A file may return several, as suites/all.lua does.
-  for _, suite in ipairs(#found > 0 and found or { found }) do table.insert(suites, suite) end
+  for _, suite in ipairs(#found > 0 and found or { found }) do
+    table.insert(suites, suite)
+  end
 end
 for _, name in ipairs(opt.conditions) do
-  for _, condition in ipairs(LISTS[name]) do table.insert(conditions, condition) end
+  for _, condition in ipairs(LISTS[name]) do
+    table.insert(conditions, condition)
+  end
 end
 
 return softvt.conditions { name = "shifts", suites = suites, conditions = conditions }

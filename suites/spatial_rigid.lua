@@ -1,12 +1,20 @@
--- Spatial-Rigid: one of two black bowls is to be put on the plate; the prompt describes its location (LIBERO's spatial suite).
+-- Spatial-Rigid: one of two black bowls is to be put on the plate; the prompt describes its location (LIBERO's spatial
+-- suite).
 local layouts = require "layouts.spatial_rigid"
 local pick_place = require "experts.pick_place"
 local shifts = require "shifts"
 
 local locations = {
-  "between the plate and the ramekin", "next to the ramekin", "from table center", "on the cookie box",
-  "in the top drawer of the wooden cabinet", "on the ramekin", "next to the cookie box", "on the stove",
-  "next to the plate", "on the wooden cabinet",
+  "between the plate and the ramekin",
+  "next to the ramekin",
+  "from table center",
+  "on the cookie box",
+  "in the top drawer of the wooden cabinet",
+  "on the ramekin",
+  "next to the cookie box",
+  "on the stove",
+  "next to the plate",
+  "on the wooden cabinet",
 }
 
 local tasks = {}

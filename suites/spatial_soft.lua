@@ -5,9 +5,17 @@ local shifts = require "shifts"
 
 local objects = {
   { asset = "spiral_roll", description = "white spiral pastry with ridged frosting", sides = { "right", "left" } },
-  { asset = "steamed_bun", description = "pale cream round steamed-bun pastry with black eyes", sides = { "right", "left" } },
+  {
+    asset = "steamed_bun",
+    description = "pale cream round steamed-bun pastry with black eyes",
+    sides = { "right", "left" },
+  },
   { asset = "small_ridged_roll", description = "small dark brown oval pastry", sides = { "left", "right" } },
-  { asset = "braided_roll", description = "long golden braided pastry with orange stripes", sides = { "left", "right" } },
+  {
+    asset = "braided_roll",
+    description = "long golden braided pastry with orange stripes",
+    sides = { "left", "right" },
+  },
   { asset = "sesame_bun", description = "orange round bun pastry with sesame speckles", sides = { "right", "left" } },
 }
 

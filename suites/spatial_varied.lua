@@ -1,5 +1,5 @@
--- Spatial-Varied: the tasks of Spatial-Soft with two objects of one kind that differ from each other, and from episode to
--- episode, in size, stiffness, density, friction and colour.
+-- Spatial-Varied: the tasks of Spatial-Soft with two objects of one kind that differ from each other, and from episode
+-- to episode, in size, stiffness, density, friction and colour.
 local spatial_soft = require "suites.spatial_soft"
 local standard = require "variations.standard"
 

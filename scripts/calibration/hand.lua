@@ -1,22 +1,22 @@
--- Squeezes and hold trials of one soft object by the robot's hand, with the expert's grasp: the protocol of the SoftVTBench paper
--- (appendix C.3), and trials that check the ends of a window found by another protocol.
+-- Squeezes and hold trials of one soft object by the robot's hand, with the expert's grasp: the protocol of the
+-- SoftVTBench paper (appendix C.3), and trials that check the ends of a window found by another protocol.
 local grasp = require "experts.grasp"
 local table_top = require "assets.table"
 local trial = require "calibration.trial"
 
 local hand = {}
 
--- Displacement of a grasp, up to `offset` (m) and `turn` (rad), and height (m) and speed (m/s) of the lift: the expert's lift with an
--- offset, and the paper's trials.
+-- Displacement of a grasp, up to `offset` (m) and `turn` (rad), and height (m) and speed (m/s) of the lift: the
+-- expert's lift with an offset, and the paper's trials.
 local function expert(offset) return { offset = offset, turn = 0, lift = trial.LIFT, speed = trial.SPEED } end
 local PAPER = { offset = 0.005, turn = math.rad(10), lift = 0.10, speed = 0.25 }
-local REST_S, REST_SPEED = 0.5, 0.005     -- duration and node speed of a squeeze at rest, s and m/s
-local REST_TIMEOUT_S = 3                  -- largest time until a squeeze is at rest, s
-local FINE = 8                            -- fine steps per step
-local BEYOND = 3                          -- closures tried beyond the first that holds
+local REST_S, REST_SPEED = 0.5, 0.005 -- duration and node speed of a squeeze at rest, s and m/s
+local REST_TIMEOUT_S = 3 -- largest time until a squeeze is at rest, s
+local FINE = 8 -- fine steps per step
+local BEYOND = 3 -- closures tried beyond the first that holds
 
--- A layout of the object alone on the table. The displacement of a trial, up to `offset` (m) and `turn` (rad), is drawn with the
--- scene, so it depends only on the asset and the index of the trial.
+-- A layout of the object alone on the table. The displacement of a trial, up to `offset` (m) and `turn` (rad), is drawn
+-- with the scene, so it depends only on the asset and the index of the trial.
 local function single_object(asset, displacement, offset, turn)
   return softvt.layout("calibrate_" .. asset.name, function(scene, rng)
     scene:add { name = "table", asset = table_top, position = { 0, 0, 0 } }
@@ -32,7 +32,8 @@ end
 local function grasp_at(closure, displacement)
   return function(arm, scene)
     local object = scene:object "object"
-    local at = grasp.pose(object, grasp.height(object), displacement and displacement.offset, displacement and displacement.turn)
+    local at =
+      grasp.pose(object, grasp.height(object), displacement and displacement.offset, displacement and displacement.turn)
     arm:move_to(at:translated { 0, 0, 0.08 }, { speed = 0.6, angular_speed = 3 })
     arm:move_to(at, { speed = 0.25 })
     arm:wait(0.1)
@@ -69,11 +70,16 @@ local function hold_trial(asset, closure, k, how, hold_s)
   -- An object that was not lifted by now is not held.
   if ok and lag_mm(sim, before) < 0.5e3 * how.lift then ok = sim:wait(hold_s) end
   local slip = math.abs(lag_mm(sim, before))
-  return { held = ok and slip <= trial.SLIP_MM, slip_mm = slip, d_peak_pct = sim:measure "object".d_peak_pct, width_mm = width_mm }
+  return {
+    held = ok and slip <= trial.SLIP_MM,
+    slip_mm = slip,
+    d_peak_pct = sim:measure "object".d_peak_pct,
+    width_mm = width_mm,
+  }
 end
 
--- Trials `first` to `last` of a grip { width, force } with the expert's lift, displaced by up to `offset` (m) in each horizontal direction.
--- Returns the number that held, the largest peak D (%) and the mean width of the gels (mm).
+-- Trials `first` to `last` of a grip { width, force } with the expert's lift, displaced by up to `offset` (m) in each
+-- horizontal direction. Returns the number that held, the largest peak D (%) and the mean width of the gels (mm).
 function hand.trials(asset, grip, first, last, offset, hold_s)
   local closure, how, held, d_peak_pct, width_mm = grasp.command(grip), expert(offset), 0, 0, 0
   for k = first, last do
@@ -101,8 +107,8 @@ function hand.holds(asset, step, trials, hold_s)
   return rows
 end
 
--- One step of a squeeze: closes further and waits until the object is at rest or the timeout passes. Speed, det F and contact of
--- a row are those of the last REST_S seconds.
+-- One step of a squeeze: closes further and waits until the object is at rest or the timeout passes. Speed, det F and
+-- contact of a row are those of the last REST_S seconds.
 local function squeeze(sim, closure)
   local row = { closure = closure, stable = false }
   local ok = sim:drive(function(arm) arm:close_to(closure, { rate = 0.2 }) end)
@@ -112,7 +118,9 @@ local function squeeze(sim, closure)
     elapsed_s = elapsed_s + 0.05
     local seen = sim:measure "object"
     local touching = math.min(table.unpack(seen.pad_force)) > trial.CONTACT_N
-    if resting_s == 0 then row.min_det_f, row.node_speed_m_s, row.both_pads = math.huge, 0, true end
+    if resting_s == 0 then
+      row.min_det_f, row.node_speed_m_s, row.both_pads = math.huge, 0, true
+    end
     row.min_det_f = math.min(row.min_det_f, seen.min_det_f or 1)
     row.node_speed_m_s = math.max(row.node_speed_m_s, seen.speed)
     row.both_pads = row.both_pads and touching
@@ -127,8 +135,9 @@ local function squeeze(sim, closure)
   return row
 end
 
--- Squeezes from `first` in steps of `step` and appends the rows. Ends at the first unstable squeeze after a stable one, at a failed
--- physics step, or with the gripper closed. Returns the last stable closure, and true if an unstable one followed.
+-- Squeezes from `first` in steps of `step` and appends the rows. Ends at the first unstable squeeze after a stable one,
+-- at a failed physics step, or with the gripper closed. Returns the last stable closure, and true if an unstable one
+-- followed.
 local function squeeze_from(asset, first, step, rows)
   local sim = softvt.simulate { layout = single_object(asset) }
   sim:drive(grasp_at(first))
@@ -137,7 +146,11 @@ local function squeeze_from(asset, first, step, rows)
     local row = squeeze(sim, math.min(closure, 1))
     if not row then return last, true end
     rows[#rows + 1] = row
-    if row.stable then last = row.closure elseif last then return last, true end
+    if row.stable then
+      last = row.closure
+    elseif last then
+      return last, true
+    end
     closure = closure + step
   end
   return last, false

@@ -1,35 +1,38 @@
--- A press test of one soft object on the table: two gel pads of the robot on rigid carriers grip it where and along the axis that
--- the expert does. The width between the gels is prescribed and the force is not limited, so that no setting of the robot matters.
+-- A press test of one soft object on the table: two gel pads of the robot on rigid carriers grip it where and along the
+-- axis that the expert does. The width between the gels is prescribed and the force is not limited, so that no setting
+-- of the robot matters.
 local grasp = require "experts.grasp"
 local table_top = require "assets.table"
 local trial = require "calibration.trial"
 
 local press = {}
 
-local CLEARANCE = 4e-3                      -- gap between each gel and the object at the start, m
-local CONTACT_STEP = 5e-5                   -- step of the width until both pads touch, at rest too, m
-local CLOSING = 0.02                        -- speed at which each pad closes in the sweep, m/s
-local GRASPING = 0.024                      -- speed at which each pad closes in a hold trial, as the expert, m/s
-local REST_SPEED, REST_S = 5e-4, 0.15       -- largest node speed of an object at rest, and for how long, m/s and s
-local REST_TIMEOUT_S = 3                    -- longest wait for rest, s
-local SETTLE_SPEED, SETTLE_S = 1e-3, 0.5    -- the same for the object alone on the table
-local PERCENTILE = 95                       -- share of the volume that stays below the reported strain, %
-local UNSTABLE = 20                         -- rows before the first stable one that end a sweep
-local HOLD_S = 1                            -- hold after the lift, s
-local REFINEMENTS = 2                       -- hold trials near τ, for the tight end
+local CLEARANCE = 4e-3 -- gap between each gel and the object at the start, m
+local CONTACT_STEP = 5e-5 -- step of the width until both pads touch, at rest too, m
+local CLOSING = 0.02 -- speed at which each pad closes in the sweep, m/s
+local GRASPING = 0.024 -- speed at which each pad closes in a hold trial, as the expert, m/s
+local REST_SPEED, REST_S = 5e-4, 0.15 -- largest node speed of an object at rest, and for how long, m/s and s
+local REST_TIMEOUT_S = 3 -- longest wait for rest, s
+local SETTLE_SPEED, SETTLE_S = 1e-3, 0.5 -- the same for the object alone on the table
+local PERCENTILE = 95 -- share of the volume that stays below the reported strain, %
+local UNSTABLE = 20 -- rows before the first stable one that end a sweep
+local HOLD_S = 1 -- hold after the lift, s
+local REFINEMENTS = 2 -- hold trials near τ, for the tight end
 
 -- Grasps of the hold trials: in the middle, and displaced along both diagonals.
 local OFFSETS = { { 0, 0 } }
 for _, x in ipairs { 1, -1 } do
-  for _, y in ipairs { 1, -1 } do OFFSETS[#OFFSETS + 1] = { x * trial.DISPLACEMENT, y * trial.DISPLACEMENT } end
+  for _, y in ipairs { 1, -1 } do
+    OFFSETS[#OFFSETS + 1] = { x * trial.DISPLACEMENT, y * trial.DISPLACEMENT }
+  end
 end
 
 -- Widths are multiples of 10 µm, so that they have few digits.
 local function rounded(width) return math.floor(1e5 * width + 0.5) / 1e5 end
 local function in_mm(width) return math.floor(1e5 * width + 0.5) / 100 end
 
--- The asset at another size, resolution, stiffness, density or stable strain: { shape, body, friction, object }. `object` is what
--- experts see of it.
+-- The asset at another size, resolution, stiffness, density or stable strain: { shape, body, friction, object }.
+-- `object` is what experts see of it.
 local function instance(asset, change)
   local scale, from = change.scale or 1, asset.body
   local shape = scale == 1 and asset.shape or asset.shape:scale(scale, scale, scale)
@@ -39,15 +42,28 @@ local function instance(asset, change)
   local youngs, density, strain = change.youngs_factor or 1, change.density_factor or 1, change.strain_factor or 1
   local function changed(value) return value and strain * value end
   return {
-    shape = shape, friction = asset.friction,
+    shape = shape,
+    friction = asset.friction,
     body = softvt.soft {
-      youngs_pa = youngs * from.youngs_pa, poisson = from.poisson, density = density * from.density, grasp_spacing = scale * from.grasp_spacing,
-      resolution = change.resolution or from.resolution, collapse_strain = changed(from.collapse_strain),
+      youngs_pa = youngs * from.youngs_pa,
+      poisson = from.poisson,
+      density = density * from.density,
+      grasp_spacing = scale * from.grasp_spacing,
+      resolution = change.resolution or from.resolution,
+      collapse_strain = changed(from.collapse_strain),
       damage_strain = changed(from.damage_strain),
     },
     -- Centred above the origin, on the table.
     position = { -0.5 * (low[1] + high[1]), -0.5 * (low[2] + high[2]), -low[3] },
-    object = { name = asset.name, asset = asset.name, size = size, centre = { 0, 0, size[3] / 2 }, yaw = 0, hints = hints, scale = scale },
+    object = {
+      name = asset.name,
+      asset = asset.name,
+      size = size,
+      centre = { 0, 0, size[3] / 2 },
+      yaw = 0,
+      hints = hints,
+      scale = scale,
+    },
   }
 end
 
@@ -89,8 +105,8 @@ function Bench:close_to(width, speed)
   return true
 end
 
--- Waits until no node has been faster than `speed` for `seconds`. Returns the largest node speed in that time (or in the last
--- `seconds` before the timeout) and whether it rests, or nil if the physics failed.
+-- Waits until no node has been faster than `speed` for `seconds`. Returns the largest node speed in that time (or in
+-- the last `seconds` before the timeout) and whether it rests, or nil if the physics failed.
 function Bench:rest(speed, seconds)
   local elapsed, resting, fastest = 0, 0, 0
   while resting < seconds - 1e-9 and elapsed < REST_TIMEOUT_S do
@@ -112,21 +128,38 @@ function Bench:slip_mm() return math.max(self.body:slip_mm(self.pads[1].solid), 
 
 function Bench:both_touch() return math.min(self:force(1), self:force(2)) > trial.CONTACT_N end
 
--- A settled object between open pads, displaced by `offset` (m) from the expert's grasp. Returns the bench, or nil and the reason why the
--- object cannot be pressed; then the stable strain of its material. `change` has the optional fields scale, resolution, youngs_factor,
--- density_factor and strain_factor.
+-- A settled object between open pads, displaced by `offset` (m) from the expert's grasp. Returns the bench, or nil and
+-- the reason why the object cannot be pressed; then the stable strain of its material. `change` has the optional fields
+-- scale, resolution, youngs_factor, density_factor and strain_factor.
 function press.bench(asset, change, offset)
   local made = instance(asset, change or {})
   local object = made.object
   local world = softvt.world { sleeping = false }
-  world:static { name = "table", shape = softvt.shape.box { size = { 1, 1, 0.1 } }, friction = table_top.friction, position = { 0, 0, -0.05 } }
-  local body = world:soft { name = asset.name, shape = made.shape, body = made.body, friction = made.friction, position = made.position }
+  world:static {
+    name = "table",
+    shape = softvt.shape.box { size = { 1, 1, 0.1 } },
+    friction = table_top.friction,
+    position = { 0, 0, -0.05 },
+  }
+  local body = world:soft {
+    name = asset.name,
+    shape = made.shape,
+    body = made.body,
+    friction = made.friction,
+    position = made.position,
+  }
   local problem, stable_strain = grasp.problem(object), body:stable_strain()
   if problem then return nil, "it " .. problem, stable_strain end
   local yaw = grasp.hand_yaw(object)
   local bench = setmetatable({
-    world = world, dt = world:dt(), object = object, min_det_f = math.huge, pads = {},
-    width = grasp.width(object) + 2 * CLEARANCE, rise = 0, axis = { -math.sin(yaw), math.cos(yaw) },
+    world = world,
+    dt = world:dt(),
+    object = object,
+    min_det_f = math.huge,
+    pads = {},
+    width = grasp.width(object) + 2 * CLEARANCE,
+    rise = 0,
+    axis = { -math.sin(yaw), math.cos(yaw) },
     at = grasp.pose(object, grasp.height(object), offset).position,
     body = body,
   }, Bench)
@@ -138,7 +171,9 @@ function press.bench(asset, change, offset)
   bench:place(bench.width, 0)
   local _, rests = bench:rest(SETTLE_SPEED, SETTLE_S)
   if not rests then
-    return nil, "it does not come to rest between the open pads" .. (bench.problem and ": " .. bench.problem or ""), stable_strain
+    return nil,
+      "it does not come to rest between the open pads" .. (bench.problem and ": " .. bench.problem or ""),
+      stable_strain
   end
   bench.body:set_reference "now"
   return bench, nil, stable_strain
@@ -150,9 +185,16 @@ local function squeeze(bench, width)
   if not fastest then return nil end
   local d = bench.body:deformation()
   local row = {
-    width_mm = in_mm(width), d_pct = d.rms_pct, d_v1_pct = d.v1_rms_pct, force_n = 0.5 * (bench:force(1) + bench:force(2)),
-    strain_p95 = bench.body:strain_percentile(PERCENTILE), min_det_f = bench.min_det_f, node_speed_m_s = fastest,
-    both_pads = bench:both_touch(), slip_mm = bench:slip_mm(), stable = false,
+    width_mm = in_mm(width),
+    d_pct = d.rms_pct,
+    d_v1_pct = d.v1_rms_pct,
+    force_n = 0.5 * (bench:force(1) + bench:force(2)),
+    strain_p95 = bench.body:strain_percentile(PERCENTILE),
+    min_det_f = bench.min_det_f,
+    node_speed_m_s = fastest,
+    both_pads = bench:both_touch(),
+    slip_mm = bench:slip_mm(),
+    stable = false,
   }
   row.stable = softvt.stable(row)
   return row
@@ -167,8 +209,9 @@ local function find_contact(bench, step)
   return bench.width
 end
 
--- Presses from first contact inward in steps of `step` (m) until the 95th percentile of the strain has reached the stable strain,
--- or the press is no longer stable. Returns { rows, stable_strain, ended }: `ended` says why the sweep ended if the rows do not tell.
+-- Presses from first contact inward in steps of `step` (m) until the 95th percentile of the strain has reached the
+-- stable strain, or the press is no longer stable. Returns { rows, stable_strain, ended }: `ended` says why the sweep
+-- ended if the rows do not tell.
 function press.sweep(asset, step, change)
   local bench, problem, stable_strain = press.bench(asset, change)
   local sweep = { rows = {}, stable_strain = stable_strain, ended = problem }
@@ -196,8 +239,8 @@ end
 local function smooth(u) return u * u * u * (10 + u * (6 * u - 15)) end
 local PEAK = 1.875
 
--- A trial at `width` (m): grasps as fast as the expert does, lifts and holds. Returns whether it held, the slip on the pads (mm) and
--- the peak D (%).
+-- A trial at `width` (m): grasps as fast as the expert does, lifts and holds. Returns whether it held, the slip on the
+-- pads (mm) and the peak D (%).
 local function hold(asset, width, offset, change)
   local bench, problem = press.bench(asset, change, offset)
   if not bench then error(("press: %s: %s"):format(asset.name, problem), 0) end
@@ -230,8 +273,8 @@ local function holds_at(asset, width, change)
   return row
 end
 
--- Finds the widest width between `narrow` and `wide` (m) at which all trials hold, by bisection to `within` (m). If they do not
--- hold at `narrow`, it looks down to `narrowest`. Returns the rows of all widths tried.
+-- Finds the widest width between `narrow` and `wide` (m) at which all trials hold, by bisection to `within` (m). If
+-- they do not hold at `narrow`, it looks down to `narrowest`. Returns the rows of all widths tried.
 function press.loose_end(asset, narrow, wide, narrowest, within, change)
   local rows = {}
   local function all_hold(width)
@@ -246,13 +289,17 @@ function press.loose_end(asset, narrow, wide, narrowest, within, change)
   while wide - narrow > within do
     local middle = rounded(0.5 * (wide + narrow))
     if middle == wide or middle == narrow then break end
-    if all_hold(middle) then narrow = middle else wide = middle end
+    if all_hold(middle) then
+      narrow = middle
+    else
+      wide = middle
+    end
   end
   return rows
 end
 
--- Finds where the peak D of hold trials passes `tau_pct`, by linear interpolation between the two nearest widths in `rows`, which
--- are those of loose_end. Appends the trials made on the way.
+-- Finds where the peak D of hold trials passes `tau_pct`, by linear interpolation between the two nearest widths in
+-- `rows`, which are those of loose_end. Appends the trials made on the way.
 function press.carried_end(asset, rows, tau_pct, change)
   for _ = 1, REFINEMENTS do
     local below, above

@@ -2,6 +2,8 @@
 return function(script, name, loaded)
   if loaded[name] then error(("%s: --asset names %s twice"):format(script, name), 0) end
   local asset = require("assets." .. name)
-  if tostring(asset.body) ~= "softvt.soft" then error(("%s: %s is not soft: only a body of softvt.soft deforms"):format(script, name), 0) end
+  if tostring(asset.body) ~= "softvt.soft" then
+    error(("%s: %s is not soft: only a body of softvt.soft deforms"):format(script, name), 0)
+  end
   return asset
 end

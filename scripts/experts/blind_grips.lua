@@ -1,6 +1,7 @@
--- Grips of controllers that do not feel the instance in the hand. They know what shows of an object (its kind, size and pose) and the
--- statistics of the suite. Each keeps one number constant for all instances of a kind, scaled by a power of the size: the number that is
--- inside of the safe windows of the largest share of the instances that the suite draws. A policy without touch can do that much.
+-- Grips of controllers that do not feel the instance in the hand. They know what shows of an object (its kind, size and
+-- pose) and the statistics of the suite. Each keeps one number constant for all instances of a kind, scaled by a power
+-- of the size: the number that is inside of the safe windows of the largest share of the instances that the suite
+-- draws. A policy without touch can do that much.
 --
 -- look-retry is no such bound: it lifts, looks whether the object follows, and closes further.
 local grasp = require "experts.grasp"
@@ -11,18 +12,20 @@ local blind_grips = {}
 -- Instances of a kind that a number is optimised over.
 local INSTANCES = 600
 local STROKE = hand.STROKE
--- Largest speed of closing in contact, m/s, share of an error that is corrected per control step, largest duration, s, and tolerance, m.
--- The measured width lags by two steps behind its command; a larger share would overshoot.
+-- Largest speed of closing in contact, m/s, share of an error that is corrected per control step, largest duration, s,
+-- and tolerance, m. The measured width lags by two steps behind its command; a larger share would overshoot.
 local SPEED, SHARE, DURATION, TOLERANCE = 0.004, 0.15, 4, 1e-5
 -- Force on each pad that counts as contact, N.
 local CONTACT_FORCE = 0.005
--- Resolution of the width that the drives measure, m; steps of a hand that reads it, before and after contact, m, and time for each, s.
+-- Resolution of the width that the drives measure, m; steps of a hand that reads it, before and after contact, m, and
+-- time for each, s.
 local DRIVE_RESOLUTION, DRIVE_FAST, DRIVE_STEP, DRIVE_WAIT = 1e-4, 2e-4, 1e-4, 0.1
--- Gap that such a hand has on average when it first reads one, m: a reading rounds, and a step passes the threshold by half of itself.
+-- Gap that such a hand has on average when it first reads one, m: a reading rounds, and a step passes the threshold by
+-- half of itself.
 local CONTACT_GAP = 0.75 * DRIVE_RESOLUTION
--- Looking: height of a trial, m, error of a look, m (1 sd), looks that are averaged, and factors on the indentation after a trial that
--- failed and one that succeeded. The wrist camera has 2 mm per pixel at 128 pixels; the position of an outline some 25 pixels wide is known
--- to a third of a pixel.
+-- Looking: height of a trial, m, error of a look, m (1 sd), looks that are averaged, and factors on the indentation
+-- after a trial that failed and one that succeeded. The wrist camera has 2 mm per pixel at 128 pixels; the position of
+-- an outline some 25 pixels wide is known to a third of a pixel.
 local TRIAL_HEIGHT, LOOK_ERROR, LOOKS, TIGHTER, MARGIN = 0.004, 0.0007, 3, 1.15, 1.1
 
 -- Powers of the size by which a number may scale.
@@ -30,15 +33,19 @@ local SIZE_POWERS = { 0, 1, 2, 3 }
 
 local function clamp(closure) return math.max(0, math.min(1, closure)) end
 
--- The number inside the largest count of the intervals [lows[i], highs[i]]: the middle of the first such range. Returns it with
--- the count.
+-- The number inside the largest count of the intervals [lows[i], highs[i]]: the middle of the first such range. Returns
+-- it with the count.
 local function most_common(lows, highs)
   table.sort(lows)
   table.sort(highs)
   local passed, most, best = 0, 0, nil
   for index, low in ipairs(lows) do
-    while highs[passed + 1] < low do passed = passed + 1 end
-    if index - passed > most then most, best = index - passed, (low + highs[passed + 1]) / 2 end
+    while highs[passed + 1] < low do
+      passed = passed + 1
+    end
+    if index - passed > most then
+      most, best = index - passed, (low + highs[passed + 1]) / 2
+    end
   end
   return best, most
 end
@@ -46,7 +53,8 @@ end
 -- Indentation of a grip after first contact, of both pads together, m.
 local function depth(grip, window) return window.contact - grip.width end
 
--- Depth of its command below first contact, m: what the spring of the drives adds to the indentation is that of the force.
+-- Depth of its command below first contact, m: what the spring of the drives adds to the indentation is that of the
+-- force.
 local function command_depth(grip, window) return window.contact - grasp.command_width(grip) end
 
 local function force_of(grip) return grip.force end
@@ -58,7 +66,8 @@ local function depth_at(window, force)
   return power > 0 and loose * (force / window.loose.force) ^ (1 / power) or 0
 end
 
--- Sends closures until `missing` has settled at 0: the distance, in m of command, by which the hand is too loose (negative: too tight).
+-- Sends closures until `missing` has settled at 0: the distance, in m of command, by which the hand is too loose
+-- (negative: too tight).
 local function settle(arm, missing)
   local quiet, most = 0, SPEED * arm.dt
   for _ = 1, math.ceil(DURATION / arm.dt) do
@@ -88,7 +97,8 @@ local function close_to_force(arm, force)
   settle(arm, function() return 2 * (force - 0.5 * (arm.force[1] + arm.force[2])) / arm.finger_stiffness end)
 end
 
--- Products of the force and a power of the indentation, which the drives measure: 0 is the force alone, a large one the indentation alone.
+-- Products of the force and a power of the indentation, which the drives measure: 0 is the force alone, a large one the
+-- indentation alone.
 local function drive_numbers()
   local list = {}
   for _, power in ipairs { 0, 0.5, 1, 2, 4 } do
@@ -103,8 +113,8 @@ local function drive_numbers()
   return list
 end
 
--- Closes in steps and reads the gap of the commanded and the measured width after each: half of it is the displacement of the spring of
--- a finger.
+-- Closes in steps and reads the gap of the commanded and the measured width after each: half of it is the displacement
+-- of the spring of a finger.
 local function close_by_drives(arm, number, power)
   local function read(value) return math.floor(value / DRIVE_RESOLUTION + 0.5) * DRIVE_RESOLUTION end
   local function gap() return arm.width - STROKE * (1 - arm.closure) end
@@ -119,19 +129,23 @@ local function close_by_drives(arm, number, power)
   end
 end
 
--- By controller: the numbers that it may keep constant, as functions of a grip { width, force } and the window of its instance,
--- which rise as the hand closes; the powers of the size; and the motion of the hand, given the number and the width of first contact, m.
+-- By controller: the numbers that it may keep constant, as functions of a grip { width, force } and the window of its
+-- instance, which rise as the hand closes; the powers of the size; and the motion of the hand, given the number and the
+-- width of first contact, m.
 local LAWS = {
   ["fixed-closure"] = {
-    numbers = { { of = function(grip) return grasp.command(grip) end } }, size_powers = { 0 },
+    numbers = { { of = function(grip) return grasp.command(grip) end } },
+    size_powers = { 0 },
     close = function(arm, number) arm:grasp(clamp(number), { rate = RATE }) end,
   },
   ["size-seen"] = {
-    numbers = { { of = command_depth } }, size_powers = SIZE_POWERS,
+    numbers = { { of = command_depth } },
+    size_powers = SIZE_POWERS,
     close = function(arm, number, contact) close_to_command(arm, contact - number) end,
   },
   ["contact-depth"] = {
-    numbers = { { of = depth } }, size_powers = SIZE_POWERS,
+    numbers = { { of = depth } },
+    size_powers = SIZE_POWERS,
     close = function(arm, number)
       close_to_contact(arm)
       local width = arm.width - number
@@ -139,30 +153,42 @@ local LAWS = {
     end,
   },
   ["one-force"] = {
-    numbers = { { of = force_of } }, size_powers = SIZE_POWERS, close = close_to_force,
+    numbers = { { of = force_of } },
+    size_powers = SIZE_POWERS,
+    close = close_to_force,
   },
   ["one-force-for-all"] = {
-    numbers = { { of = force_of } }, size_powers = { 0 }, all_kinds = true, close = close_to_force,
+    numbers = { { of = force_of } },
+    size_powers = { 0 },
+    all_kinds = true,
+    close = close_to_force,
   },
-  drives = { numbers = drive_numbers(), size_powers = SIZE_POWERS, close = function(arm, number, _, power) close_by_drives(arm, number, power) end },
+  drives = {
+    numbers = drive_numbers(),
+    size_powers = SIZE_POWERS,
+    close = function(arm, number, _, power) close_by_drives(arm, number, power) end,
+  },
 }
 
 -- Names of the controllers that do not feel, in the order of tables.
 blind_grips.names = { "fixed-closure", "size-seen", "contact-depth", "one-force", "one-force-for-all", "drives" }
 
--- Instances with a window, as { instance, window } each, of the sample of an object in the scene or of a kind. Also returns the share of
--- the draws that the suite keeps.
+-- Instances with a window, as { instance, window } each, of the sample of an object in the scene or of a kind. Also
+-- returns the share of the draws that the suite keeps.
 local function with_windows(instances, name, count)
   local list, draws = {}, 0
   for _, other in ipairs(instances:sample(name, count)) do
     local window = grasp.window(other)
-    if window and grasp.command(window.loose) <= grasp.command(window.tight) then list[#list + 1] = { instance = other, window = window } end
+    if window and grasp.command(window.loose) <= grasp.command(window.tight) then
+      list[#list + 1] = { instance = other, window = window }
+    end
     draws = draws + other.draws
   end
   return list, count / draws
 end
 
--- The sample that the number of a controller is optimised over: instances of the kind of an object in the scene, or of all kinds.
+-- The sample that the number of a controller is optimised over: instances of the kind of an object in the scene, or of
+-- all kinds.
 function blind_grips.sample(name, instances, object, count)
   if not LAWS[name].all_kinds then return with_windows(instances, object, count or INSTANCES) end
   local list = {}
@@ -173,8 +199,8 @@ function blind_grips.sample(name, instances, object, count)
   return list
 end
 
--- The number of a controller that is inside of the windows of most instances of a sample: { value, size_power, of, power, share }, or
--- nil for an empty sample.
+-- The number of a controller that is inside of the windows of most instances of a sample: { value, size_power, of,
+-- power, share }, or nil for an empty sample.
 function blind_grips.best(name, sample)
   local law, best = LAWS[name], nil
   for _, number in ipairs(law.numbers) do
@@ -187,7 +213,14 @@ function blind_grips.best(name, sample)
       end
       local value, count = most_common(lows, highs)
       if value and (not best or count > best.count) then
-        best = { value = value, size_power = size_power, of = number.of, power = number.power, count = count, share = count / #sample }
+        best = {
+          value = value,
+          size_power = size_power,
+          of = number.of,
+          power = number.power,
+          count = count,
+          share = count / #sample,
+        }
       end
     end
   end
@@ -220,8 +253,8 @@ local function look(arm, scene, name)
   return sum / LOOKS
 end
 
--- Starts at the loosest command of the sample for the seen size, lifts by some millimetres, and closes further until the object is seen to
--- follow the hand. Repeated grasps begin where the last one ended.
+-- Starts at the loosest command of the sample for the seen size, lifts by some millimetres, and closes further until
+-- the object is seen to follow the hand. Repeated grasps begin where the last one ended.
 local function look_retry(instances, object)
   local loosest, tightest = math.huge, 0
   for _, one in ipairs((with_windows(instances, object.name, INSTANCES))) do
@@ -247,26 +280,29 @@ local function look_retry(instances, object)
   end
 end
 
--- The grip of a controller for an object: close(arm, scene, chosen), with the grasp of grasp.choose. Nil for an object without a safe window,
--- which any grip holds.
+-- The grip of a controller for an object: close(arm, scene, chosen), with the grasp of grasp.choose. Nil for an object
+-- without a safe window, which any grip holds.
 function blind_grips.controller(name, instances, object)
   local close
   if name == "look-retry" then
     close = look_retry(instances, object)
   else
     local best = blind_grips.best(name, blind_grips.sample(name, instances, object.name))
-    close = best and function(arm, _, _, contact)
-      LAWS[name].close(arm, best.value * object.scale ^ best.size_power, contact, best.power)
+    close = best
+      and function(arm, _, _, contact)
+        LAWS[name].close(arm, best.value * object.scale ^ best.size_power, contact, best.power)
+      end
+  end
+  return close
+    and function(arm, scene, chosen)
+      grasp.approach(arm, object, chosen.width)
+      -- States that the hand holds something from here on.
+      arm:grasp(arm.closure, { rate = RATE })
+      -- What shows of the object is its size: first contact is at the same width as for the nominal instance of that
+      -- size.
+      local nominal = grasp.window { asset = object.asset, scale = object.scale }
+      close(arm, scene, chosen, chosen.is_nominal and nominal.contact or chosen.width)
     end
-  end
-  return close and function(arm, scene, chosen)
-    grasp.approach(arm, object, chosen.width)
-    -- States that the hand holds something from here on.
-    arm:grasp(arm.closure, { rate = RATE })
-    -- What shows of the object is its size: first contact is at the same width as for the nominal instance of that size.
-    local nominal = grasp.window { asset = object.asset, scale = object.scale }
-    close(arm, scene, chosen, chosen.is_nominal and nominal.contact or chosen.width)
-  end
 end
 
 return blind_grips

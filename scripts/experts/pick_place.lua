@@ -2,19 +2,26 @@
 --
 --   expert = pick_place { object = "left", target = "plate" }
 --
--- The grip is drawn uniformly from a part of the safe window (`window`, 0.8 of it, around `share`, its middle), so that demonstrations do
--- not tell one width per object. The hand closes slowly from before first contact (`closing_speed`, 0.008 m/s). `stop = "touch"` ends closing by the force
--- on the pads instead of the width of the gels, as does a grasp that is turned or off-centre for want of clearance. `closure` commands
--- one closure instead.
+-- The grip is drawn uniformly from a part of the safe window (`window`, 0.8 of it, around `share`, its middle), so that
+-- demonstrations do not tell one width per object. The hand closes slowly from before first contact (`closing_speed`,
+-- 0.008 m/s). `stop = "touch"` ends closing by the force on the pads instead of the width of the gels, as does a grasp
+-- that is turned or off-centre for want of clearance. `closure` commands one closure instead.
 local grasp = require "experts.grasp"
 local route = require "experts.route"
 local blind_grips = require "experts.blind_grips"
 
 local FIELDS = {
-  object = "string", target = "string", closure = "number?", speed = "number?", window = "number?", share = "number?", stop = "string?",
+  object = "string",
+  target = "string",
+  closure = "number?",
+  speed = "number?",
+  window = "number?",
+  share = "number?",
+  stop = "string?",
   closing_speed = "number?",
 }
--- Default part of the safe window and its middle (0 is the loose end, 1 the tight one), and speed of closing in contact, m/s.
+-- Default part of the safe window and its middle (0 is the loose end, 1 the tight one), and speed of closing in
+-- contact, m/s.
 local WINDOW, MIDDLE, CLOSING_SPEED = 0.8, 0.5, 0.008
 -- Clearance above obstacles while carrying, above the target at release, and around the fingers, m.
 local CARRY_CLEARANCE, RELEASE_HEIGHT, FINGER_CLEARANCE = 0.025, 0.001, 0.002
@@ -27,8 +34,8 @@ local SPEED_SPREAD = 0.12
 
 local function spread(most) return (2 * math.random() - 1) * most end
 
--- Grasps the object and lifts it off its support; `close` is the grip of a controller in place of the expert's. Returns the grasp
--- { height, width } (m), or nil and the reason.
+-- Grasps the object and lifts it off its support; `close` is the grip of a controller in place of the expert's. Returns
+-- the grasp { height, width } (m), or nil and the reason.
 local function pick(arm, scene, spec, pace, share, close)
   local object = scene:object(spec.object)
   local height = grasp.height(object)
@@ -46,20 +53,29 @@ local function pick(arm, scene, spec, pace, share, close)
   else
     -- The width of a grip is that where the calibration presses; elsewhere the hand stops by force.
     local grip, stop = grasp.target(object, share), chosen.is_nominal and spec.stop or "touch"
-    grasp.close(arm, object, grip, { closing_speed = spec.closing_speed, stop = stop, closure = spec.closure, width = chosen.width })
+    grasp.close(
+      arm,
+      object,
+      grip,
+      { closing_speed = spec.closing_speed, stop = stop, closure = spec.closure, width = chosen.width }
+    )
   end
   arm:wait(0.3)
   arm:note("grip_width_mm", 1e3 * arm.width)
   -- Straight up first.
   arm:move_by({ 0, 0, 0.05 }, { speed = 0.2 * pace * grasp.carry_pace(object) })
-  if scene:object(spec.object).centre[3] - before > MIN_LIFT_FRACTION * 0.05 then return { height = height, width = chosen.width } end
+  if scene:object(spec.object).centre[3] - before > MIN_LIFT_FRACTION * 0.05 then
+    return { height = height, width = chosen.width }
+  end
   return nil, "was not lifted by the grasp"
 end
 
 -- Rotations of the hand for placing, smallest first, rad.
 local function place_rotations(object, target)
   local list = { 0 }
-  for k = 1, 6 do list[#list + 1], list[#list + 2] = k * math.rad(15), -k * math.rad(15) end
+  for k = 1, 6 do
+    list[#list + 1], list[#list + 2] = k * math.rad(15), -k * math.rad(15)
+  end
   -- A long object is aligned with the longer side of a container.
   local long, short = grasp.sides(object)
   if target.hints.wall_m and long > 1.3 * short then
@@ -96,7 +112,10 @@ local function place(arm, scene, spec, held, pace)
   pace = pace * grasp.carry_pace(object)
   local target_pose = release_pose(arm, scene, spec, held)
   local carried = { object = object, below = held.height }
-  local over = math.max(target_pose.z + 0.03, route.carry_height(scene, arm.pose.position, target_pose.position, carried, CARRY_CLEARANCE))
+  local over = math.max(
+    target_pose.z + 0.03,
+    route.carry_height(scene, arm.pose.position, target_pose.position, carried, CARRY_CLEARANCE)
+  )
   arm:move_to(arm.target:at { arm.target.x, arm.target.y, math.max(over, arm.target.z) }, { speed = 0.25 * pace })
   arm:move_to(target_pose:at { target_pose.x, target_pose.y, over }, { speed = 0.4 * pace })
   arm:move_to(target_pose, { speed = 0.2 * pace })
@@ -110,7 +129,9 @@ end
 -- The specification with its defaults. An error names the field.
 local function complete(spec)
   local full = {}
-  for key, value in pairs(spec) do full[key] = value end
+  for key, value in pairs(spec) do
+    full[key] = value
+  end
   full.window, full.stop = spec.window or WINDOW, spec.stop or "width"
   full.closing_speed, full.share = spec.closing_speed or CLOSING_SPEED, spec.share or MIDDLE
   local function refuse(key, expected)
@@ -118,7 +139,9 @@ local function complete(spec)
   end
   if full.window < 0 or full.window > 1 then refuse("window", "a share in 0..1") end
   local room = 0.5 * full.window
-  if full.share < room or full.share > 1 - room then refuse("share", ("a share in %g..%g, so that the part is within the window"):format(room, 1 - room)) end
+  if full.share < room or full.share > 1 - room then
+    refuse("share", ("a share in %g..%g, so that the part is within the window"):format(room, 1 - room))
+  end
   if full.stop ~= "width" and full.stop ~= "touch" then refuse("stop", '"width" or "touch"') end
   if full.closing_speed <= 0 or full.closing_speed > 0.2 then refuse("closing_speed", "m/s in 0..0.2, above 0") end
   return full

@@ -36,8 +36,8 @@ function route.carry_height(scene, from, to, carried, margin)
   return top + math.max(hand.CASE, carried.below) + margin
 end
 
--- Returns the lowest height of the tool centre point, at least `rise` (m) above `pose`, at which the empty hand moves from
--- `from` to above `pose` with `margin` (m) of clearance, or else the height with the largest clearance.
+-- Returns the lowest height of the tool centre point, at least `rise` (m) above `pose`, at which the empty hand moves
+-- from `from` to above `pose` with `margin` (m) of clearance, or else the height with the largest clearance.
 function route.approach_height(scene, from, pose, rise, margin)
   local best
   for step = 0, 8 do

@@ -3,8 +3,8 @@ local arrange = {}
 
 -- Standard deviation of the arm's initial joint angles, rad.
 local JOINT = 0.02
--- Half extents of the hand along and across the closing direction, with a margin, and the height that it passes above when
--- it grasps low, m.
+-- Half extents of the hand along and across the closing direction, with a margin, and the height that it passes above
+-- when it grasps low, m.
 local PALM, LOW = { 0.108, 0.036 }, 0.05
 -- Distance from the origin beyond which no object of a scene lies, m.
 local FAR = 3
@@ -12,8 +12,14 @@ local FAR = 3
 local DRAWS, REDRAWS, PLACEMENTS = 60, 40, 20
 
 local FIELDS = {
-  name = "string", asset = "table", at = "table", yaw = "number?",
-  position_range = "number?", yaw_range = "number?", clearance = "number?", reachable = "boolean?",
+  name = "string",
+  asset = "table",
+  at = "table",
+  yaw = "number?",
+  position_range = "number?",
+  yaw_range = "number?",
+  clearance = "number?",
+  reachable = "boolean?",
 }
 
 -- Checks the arguments of the function `name` of this file; errors are at the line that called it.
@@ -25,7 +31,9 @@ local function check(name, arguments, types)
     for i = 1, 2 do
       local at = object.at[i]
       if type(at) ~= "number" then wrong(k, "at", "expected a list of 2 numbers, x and y") end
-      if math.abs(at) > FAR then wrong(k, "at", ("(%g, %g) m is out of the scene; lengths are in metres"):format(at, object.at[2])) end
+      if math.abs(at) > FAR then
+        wrong(k, "at", ("(%g, %g) m is out of the scene; lengths are in metres"):format(at, object.at[2]))
+      end
     end
     for _, key in ipairs { "yaw", "yaw_range" } do
       if math.abs(object[key] or 0) > 2 * math.pi then
@@ -38,7 +46,9 @@ end
 -- Adds normal noise to the arm's initial joint angles.
 function arrange.arm(scene, rng)
   local joints, noise = scene.start_q, rng:stream "arm"
-  for i = 1, #joints do joints[i] = joints[i] + noise:normal(0, JOINT) end
+  for i = 1, #joints do
+    joints[i] = joints[i] + noise:normal(0, JOINT)
+  end
   scene.start_q = joints
 end
 
@@ -46,7 +56,10 @@ end
 local function footprint(asset, x, y, yaw)
   local low, high = asset.shape:bounds()
   return {
-    x = x, y = y, cos = math.cos(yaw), sin = math.sin(yaw),
+    x = x,
+    y = y,
+    cos = math.cos(yaw),
+    sin = math.sin(yaw),
     half = { (high[1] - low[1]) / 2, (high[2] - low[2]) / 2 },
   }
 end
@@ -64,10 +77,13 @@ local function gap(a, b)
   for _, side in ipairs { a, b } do
     for k = 1, 2 do
       local ux, uy = side.cos, side.sin
-      if k == 2 then ux, uy = -side.sin, side.cos end
+      if k == 2 then
+        ux, uy = -side.sin, side.cos
+      end
       local reach = 0
       for _, other in ipairs { a, b } do
-        reach = reach + other.half[1] * math.abs(ux * other.cos + uy * other.sin)
+        reach = reach
+          + other.half[1] * math.abs(ux * other.cos + uy * other.sin)
           + other.half[2] * math.abs(uy * other.cos - ux * other.sin)
       end
       most = math.max(most, math.abs(dx * ux + dy * uy) - reach)
@@ -86,7 +102,9 @@ end
 -- True if two placed objects keep their clearance, and a hand above either fits past the other.
 local function apart(a, b, clearance)
   if gap(a.print, b.print) < math.max(clearance, a.object.clearance or 0, b.object.clearance or 0) then return false end
-  return not (a.hand and b.high > LOW and gap(a.hand, b.print) < 0 or b.hand and a.high > LOW and gap(b.hand, a.print) < 0)
+  return not (
+    a.hand and b.high > LOW and gap(a.hand, b.print) < 0 or b.hand and a.high > LOW and gap(b.hand, a.print) < 0
+  )
 end
 
 -- Draws a placement of an object that is apart from all of `others`; nil if no draw succeeds.
@@ -95,17 +113,22 @@ local function place(rng, object, others, clearance)
     local at = draw(rng, object)
     local _, high = object.asset.shape:bounds()
     local one = {
-      object = object, at = at, high = high[3], print = footprint(object.asset, at.x, at.y, at.yaw),
+      object = object,
+      at = at,
+      high = high[3],
+      print = footprint(object.asset, at.x, at.y, at.yaw),
       hand = object.reachable and hand_footprint(object.asset, at.x, at.y, at.yaw),
     }
     local free = true
-    for _, other in ipairs(others) do free = free and apart(one, other, clearance) end
+    for _, other in ipairs(others) do
+      free = free and apart(one, other, clearance)
+    end
     if free then return one end
   end
 end
 
--- Returns `others` followed by placements of those objects whose `reachable` equals the argument, each apart from all before;
--- nil if an object finds no placement.
+-- Returns `others` followed by placements of those objects whose `reachable` equals the argument, each apart from all
+-- before; nil if an object finds no placement.
 local function place_all(rng, objects, others, reachable, clearance)
   local all = { table.unpack(others) }
   for _, object in ipairs(objects) do
@@ -126,13 +149,20 @@ local function scatter(name, rng, objects, clearance)
       local all = place_all(rng, objects, first, false, clearance)
       if all then
         local places = {}
-        for _, one in ipairs(all) do places[one.object] = one.at end
-        for k, object in ipairs(objects) do places[k] = places[object] end
+        for _, one in ipairs(all) do
+          places[one.object] = one.at
+        end
+        for k, object in ipairs(objects) do
+          places[k] = places[object]
+        end
         return places
       end
     end
   end
-  error(name .. ": no arrangement found; place the objects further apart, or give smaller ones (lengths are in metres)", 3)
+  error(
+    name .. ": no arrangement found; place the objects further apart, or give smaller ones (lengths are in metres)",
+    3
+  )
 end
 
 -- Draws positions of `objects` and returns a list of { x, y, yaw } in the same order. Each object is a table:
@@ -146,8 +176,11 @@ end
 -- Reachable objects are drawn first and keep their positions while the others are redrawn. Their distribution therefore
 -- does not depend on the other objects.
 function arrange.scatter(rng, objects, clearance)
-  check("arrange.scatter", { rng = rng, objects = objects, clearance = clearance },
-    { rng = "userdata", objects = "table", clearance = "number" })
+  check(
+    "arrange.scatter",
+    { rng = rng, objects = objects, clearance = clearance },
+    { rng = "userdata", objects = "table", clearance = "number" }
+  )
   -- No tail call: the level of errors counts this function.
   local places = scatter("arrange.scatter", rng, objects, clearance)
   return places
@@ -155,10 +188,18 @@ end
 
 -- Draws positions as arrange.scatter does and adds the objects to the scene.
 function arrange.add(scene, rng, objects, clearance)
-  check("arrange.add", { scene = scene, rng = rng, objects = objects, clearance = clearance },
-    { scene = "userdata", rng = "userdata", objects = "table", clearance = "number" })
+  check(
+    "arrange.add",
+    { scene = scene, rng = rng, objects = objects, clearance = clearance },
+    { scene = "userdata", rng = "userdata", objects = "table", clearance = "number" }
+  )
   for k, at in ipairs(scatter("arrange.add", rng, objects, clearance)) do
-    scene:add { name = objects[k].name, asset = objects[k].asset, at = { at.x, at.y }, yaw = math.fmod(at.yaw, 2 * math.pi) }
+    scene:add {
+      name = objects[k].name,
+      asset = objects[k].asset,
+      at = { at.x, at.y },
+      yaw = math.fmod(at.yaw, 2 * math.pi),
+    }
   end
 end
 

@@ -41,14 +41,19 @@ local function layout(name, asset, k, range)
   local recipe, objects = require("assets." .. asset), {}
   local function add(other, at, range)
     objects[#objects + 1] = {
-      name = other, asset = require("assets." .. other), at = at,
-      position_range = range.position_range, yaw_range = range.yaw_range,
+      name = other,
+      asset = require("assets." .. other),
+      at = at,
+      position_range = range.position_range,
+      yaw_range = range.yaw_range,
     }
   end
   add(asset, task.far and FAR or NEAR, range)
   objects[1].clearance, objects[1].reachable = TARGET_CLEARANCE, true
   add(task[2], task.far and NEAR or FAR, RIGID)
-  for i, at in ipairs(OTHERS) do add(task[i + 2], at, RIGID) end
+  for i, at in ipairs(OTHERS) do
+    add(task[i + 2], at, RIGID)
+  end
   objects[#objects + 1] = { name = "basket", asset = basket, at = BASKET, position_range = REGION }
   return softvt.layout(name, function(scene, rng)
     scene.base = { -0.6, 0, 0 }

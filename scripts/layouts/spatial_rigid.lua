@@ -1,5 +1,5 @@
--- The table scene of Spatial-Rigid: two black bowls, a plate, a ramekin, a box of cookies, a cabinet and a stove. The goal's bowl
--- is in one of ten relations to them. Positions are those of LIBERO's spatial suite.
+-- The table scene of Spatial-Rigid: two black bowls, a plate, a ramekin, a box of cookies, a cabinet and a stove. The
+-- goal's bowl is in one of ten relations to them. Positions are those of LIBERO's spatial suite.
 local arrange = require "layouts.arrange"
 local scenery = require "scenery"
 
@@ -29,8 +29,10 @@ local PLACES = {
   next_to_plate = { at = { 0, 340 * mm } },
   table_center = { at = { -75 * mm, 0 } },
   -- The bowl's foot enters the ramekin; it rests 29.7 mm above the table.
-  on_cookies = { on = "cookies" }, on_ramekin = { on = "ramekin", rests = 30.5 * mm },
-  on_cabinet = { on = "cabinet" }, on_stove = { on = "stove" },
+  on_cookies = { on = "cookies" },
+  on_ramekin = { on = "ramekin", rests = 30.5 * mm },
+  on_cabinet = { on = "cabinet" },
+  on_stove = { on = "stove" },
   in_drawer = { drawer = { 0, -168 * mm, 148 * mm } },
 }
 
@@ -64,7 +66,9 @@ function layouts.relation(k)
   for _, name in ipairs { "bowl", "other_bowl" } do
     if bowls[name].at then objects[#objects + 1] = { name = name, asset = bowl, at = bowls[name].at } end
   end
-  for _, object in ipairs(objects) do object.position_range = REGION end
+  for _, object in ipairs(objects) do
+    object.position_range = REGION
+  end
   local open = relation[1] == "in_drawer" and 0.15 or 0
 
   return softvt.layout("table_" .. relation[1], function(scene, rng)
@@ -74,7 +78,10 @@ function layouts.relation(k)
       local object = objects[i]
       placed[object.name] = place
       scene:add {
-        name = object.name, asset = object.asset, at = { place.x, place.y }, yaw = place.yaw,
+        name = object.name,
+        asset = object.asset,
+        at = { place.x, place.y },
+        yaw = place.yaw,
         joints = object.name == "cabinet" and { top_drawer = open } or nil,
       }
     end

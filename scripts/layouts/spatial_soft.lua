@@ -1,5 +1,5 @@
--- Two instances of the same soft object left and right of a plate. Left and right refer to the third-person image, whose
--- right is +y of the world. Both tasks of a mirrored pair use one layout, so they start from the same state.
+-- Two instances of the same soft object left and right of a plate. Left and right refer to the third-person image,
+-- whose right is +y of the world. Both tasks of a mirrored pair use one layout, so they start from the same state.
 local arrange = require "layouts.arrange"
 local plate = require "assets.plate"
 local scenery = require "scenery"
@@ -9,8 +9,8 @@ local mm = 1e-3
 -- Random ranges of position and yaw, in either direction.
 local POSITION_RANGE, YAW_RANGE = 20 * mm, math.rad(30)
 
--- Positions of the left and right object and of the plate, x and y in mm. An open hand with its sensors needs 70 mm on either
--- side of the grasped object, the random range adds 20 mm, and the plate has a radius of 69 mm.
+-- Positions of the left and right object and of the plate, x and y in mm. An open hand with its sensors needs 70 mm on
+-- either side of the grasped object, the random range adds 20 mm, and the plate has a radius of 69 mm.
 local PLACES = {
   { left = { -50, -190 }, right = { -50, 190 }, plate = { 40, 0 } },
   { left = { 10, -200 }, right = { 10, 200 }, plate = { -60, 0 } },

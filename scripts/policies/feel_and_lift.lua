@@ -1,15 +1,16 @@
--- Feels how firmly an object must be held, and lifts it. The hand moves down, closes until both gels touch, and tightens while it rises.
--- The shear of a gel that slides grows with the grip; that of an object that is held does not. By then the grip is firm enough: the
--- hand goes back down and lifts. The law that tactile-servo uses in full is in scripts/softvt/servo.lua.
+-- Feels how firmly an object must be held, and lifts it. The hand moves down, closes until both gels touch, and
+-- tightens while it rises. The shear of a gel that slides grows with the grip; that of an object that is held does not.
+-- By then the grip is firm enough: the hand goes back down and lifts. The law that tactile-servo uses in full is in
+-- scripts/softvt/servo.lua.
 --
 --   softvt suites/object_soft.lua --policy scripts/policies/feel_and_lift.lua --episodes 1
-local MM = 1 / 80                        -- closure per mm of width between the gels
-local DOWN, LOWEST, LIFT = 10, 25, 100   -- mm per control step; height above the base, and lift, mm
-local TOUCHED, COUNT = 4e-4, 8           -- divergence of the markers of a gel that is touched; readings averaged
-local CLOSING, SLIDE = 0.1, 15           -- mm per control step until touch; steps of lifting, 0.1 mm each, until the gels slide
-local FINEST, SHARE = 0.02, 0.02         -- tightening per control step: at least this, mm, and this share of the grip
-local SEEN, FOLLOWS, LEAST = 1.3, 1.1, 0.02  -- a grip firmer by SEEN, and shear (px) greater by less than FOLLOWS: it is held
-local HIGHEST = 8                        -- largest height of the trial lift, mm
+local MM = 1 / 80 -- closure per mm of width between the gels
+local DOWN, LOWEST, LIFT = 10, 25, 100 -- mm per control step; height above the base, and lift, mm
+local TOUCHED, COUNT = 4e-4, 8 -- divergence of the markers of a gel that is touched; readings averaged
+local CLOSING, SLIDE = 0.1, 15 -- mm per control step until touch; steps of lifting, 0.1 mm each, until the gels slide
+local FINEST, SHARE = 0.02, 0.02 -- tightening per control step: at least this, mm, and this share of the grip
+local SEEN, FOLLOWS, LEAST = 1.3, 1.1, 0.02 -- a grip firmer by SEEN, and shear (px) greater by less than FOLLOWS: it is held
+local HIGHEST = 8 -- largest height of the trial lift, mm
 
 local hand, closure, height, place
 
@@ -29,14 +30,18 @@ end
 -- Mean of `count` numbers of a list up to number `last`.
 local function mean(list, last, count)
   local sum = 0
-  for i = last - count + 1, last do sum = sum + list[i] end
+  for i = last - count + 1, last do
+    sum = sum + list[i]
+  end
   return sum / count
 end
 
 -- Closes until both gels touch. Returns the closure of first touch, about.
 local function touch()
   local loads = {}
-  for i = 1, COUNT do loads[i] = 0 end
+  for i = 1, COUNT do
+    loads[i] = 0
+  end
   while closure < 1 and mean(loads, #loads, COUNT) < TOUCHED do
     local _, load = move(CLOSING, 0)
     loads[#loads + 1] = load
@@ -47,12 +52,16 @@ end
 -- Tightens and rises until the shear no longer follows the grip.
 local function feel(first)
   local shears, grips, past = {}, {}, 1
-  for _ = 1, SLIDE do move(0, 0.1) end
+  for _ = 1, SLIDE do
+    move(0, 0.1)
+  end
   while closure < 1 and height < LOWEST + HIGHEST do
     local closing = math.max(FINEST, SHARE * (closure - first) / MM)
     local shear = move(closing, closing)
     shears[#shears + 1], grips[#grips + 1] = shear, closure - first
-    while SEEN * grips[past] < grips[#grips] do past = past + 1 end
+    while SEEN * grips[past] < grips[#grips] do
+      past = past + 1
+    end
     if past > 2 * COUNT then
       local before = mean(shears, past, COUNT)
       if before > LEAST and mean(shears, #shears, COUNT) < FOLLOWS * before then return end
@@ -61,11 +70,19 @@ local function feel(first)
 end
 
 local function grasp()
-  while height > LOWEST do move(0, math.max(-DOWN, LOWEST - height)) end
+  while height > LOWEST do
+    move(0, math.max(-DOWN, LOWEST - height))
+  end
   feel(touch())
-  while height > LOWEST do move(0, math.max(-0.2, LOWEST - height)) end
-  while height < LOWEST + LIFT do move(0, 3) end
-  while true do move(0, 0) end
+  while height > LOWEST do
+    move(0, math.max(-0.2, LOWEST - height))
+  end
+  while height < LOWEST + LIFT do
+    move(0, 3)
+  end
+  while true do
+    move(0, 0)
+  end
 end
 
 return softvt.policy {

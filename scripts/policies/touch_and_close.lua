@@ -2,16 +2,14 @@
 -- When the outward shear exceeds the residual, the gripper closes slightly more.
 --
 --   softvt suites/object_soft.lua --policy scripts/policies/touch_and_close.lua --episodes 1
-local DOWN, UP = 0.01, 0.005       -- m per control step
-local LOWEST, LIFT = 0.025, 0.10   -- height above the base, and lift, m
-local HELD, STEP = 0.08, 0.0125    -- px of marker motion; closure per control step
+local DOWN, UP = 0.01, 0.005 -- m per control step
+local LOWEST, LIFT = 0.025, 0.10 -- height above the base, and lift, m
+local HELD, STEP = 0.08, 0.0125 -- px of marker motion; closure per control step
 
 local phase, start, height, closure
 
 -- The smaller value of a measure over both fingers.
-local function least(fingers, measure)
-  return math.min(measure(fingers.left.markers), measure(fingers.right.markers))
-end
+local function least(fingers, measure) return math.min(measure(fingers.left.markers), measure(fingers.right.markers)) end
 
 local phases = {}
 
@@ -30,13 +28,17 @@ end
 
 function phases.lift(fingers)
   height = math.min(LOWEST + LIFT, height + UP)
-  if least(fingers, function(m) return m:rms_residual() - m:outward_shear() end) < 0 then closure = math.min(1, closure + STEP) end
+  if least(fingers, function(m) return m:rms_residual() - m:outward_shear() end) < 0 then
+    closure = math.min(1, closure + STEP)
+  end
 end
 
 return softvt.policy {
   name = "touch_and_close",
   observes = { tactile = true },
-  reset = function() phase, start, closure = "down", nil, 0 end,
+  reset = function()
+    phase, start, closure = "down", nil, 0
+  end,
   act = function(obs)
     if not start then
       start = { obs.position[1], obs.position[2] }

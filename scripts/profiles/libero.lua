@@ -12,7 +12,9 @@ return softvt.profile {
     { keys = { "__softvtbench_rng_seed" }, source = "query_seed" },
   },
   actions = {
-    pose = "delta_osc", translation_m = 0.05, rotation_rad = 0.5,
+    pose = "delta_osc",
+    translation_m = 0.05,
+    rotation_rad = 0.5,
     gripper = { open = -1, closed = 1, code = "binary" },
   },
 }

@@ -1,5 +1,5 @@
--- Both cameras, state, prompt and touch with absolute poses; equals the built-in profile visuo_tactile. A starting point for
--- your own profile.
+-- Both cameras, state, prompt and touch with absolute poses; equals the built-in profile visuo_tactile. A starting
+-- point for your own profile.
 --
 --   softvt suites/object_soft.lua --policy ws://host:8000 --profile scripts/profiles/visuo_tactile.lua
 local function both(name) return { "observation/" .. name, name } end

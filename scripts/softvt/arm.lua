@@ -1,5 +1,5 @@
--- The arm as experts control it. Each motion takes as many control steps as it needs; all are built on one primitive that sends
--- a command and waits for the next control step. Poses are of the tool centre point, in the world frame.
+-- The arm as experts control it. Each motion takes as many control steps as it needs; all are built on one primitive
+-- that sends a command and waits for the next control step. Poses are of the tool centre point, in the world frame.
 local host, check, servo, fingers, note = ...
 local yield, ceil, max, min = coroutine.yield, math.ceil, math.max, math.min
 
@@ -12,10 +12,12 @@ local PEAK = 1.875
 local function smooth(u) return u * u * u * (10 + u * (6 * u - 15)) end
 
 -- Lets go of what the tactile servo holds.
-local function end_servo(self) self.grip, self.wants_readings = nil, false end
+local function end_servo(self)
+  self.grip, self.wants_readings = nil, false
+end
 
--- Sends one command and returns at the next control step, or raises the error that the host reports. The hand keeps the closure
--- that the servo found.
+-- Sends one command and returns at the next control step, or raises the error that the host reports. The hand keeps the
+-- closure that the servo found.
 function Arm:command(pose, closure)
   if self.grip then closure = max(self.grip, closure) end
   self.target, self.closure = pose, closure
@@ -28,7 +30,9 @@ end
 
 -- Returns the readings of the fingers in this control step. They are computed on request only, from the next step on.
 function Arm:tactile()
-  if not fingers.available then check.refuse("arm:tactile: finger readings are available in simulation:drive and under --policy tactile-servo") end
+  if not fingers.available then
+    check.refuse("arm:tactile: finger readings are available in simulation:drive and under --policy tactile-servo")
+  end
   local readings = fingers.readings()
   if readings then return readings end
   local before = self.wants_readings
@@ -38,7 +42,8 @@ function Arm:tactile()
   return fingers.readings()
 end
 
--- Factor on the duration of a motion with an object that the tactile servo holds: its grip has little to spare for acceleration.
+-- Factor on the duration of a motion with an object that the tactile servo holds: its grip has little to spare for
+-- acceleration.
 local CAREFUL = 1.3
 
 local function travel(self, pose, options, closure)
@@ -67,20 +72,23 @@ function Arm:close_to(closure, options)
   if closure < start then end_servo(self) end
   local change = closure - start
   local steps = max(1, ceil((change < 0 and -change or change) / options.rate / host.dt))
-  for step = 1, steps do self:command(self.target, start * (1 - step / steps) + closure * (step / steps)) end
+  for step = 1, steps do
+    self:command(self.target, start * (1 - step / steps) + closure * (step / steps))
+  end
 end
 
--- Lag of the measurements behind the command, s; the trim to the width or the force of a grip: share of the error that a command
--- corrects, largest duration, s, and tolerance, m and as a share of the force.
+-- Lag of the measurements behind the command, s; the trim to the width or the force of a grip: share of the error that
+-- a command corrects, largest duration, s, and tolerance, m and as a share of the force.
 local LAG = 0.1
-local WIDTH_TRIM, FORCE_TRIM = { share = 0.5, seconds = 0.5, tolerance = 5e-5 }, { share = 0.15, seconds = 1, tolerance = 0.01 }
+local WIDTH_TRIM, FORCE_TRIM =
+  { share = 0.5, seconds = 0.5, tolerance = 5e-5 }, { share = 0.15, seconds = 1, tolerance = 0.01 }
 
 -- Force per pad, N: the mean of both, which the support of the object makes unequal until it is lifted.
 local function grip_force() return 0.5 * (host.force[1] + host.force[2]) end
 
--- Closes until the gels are at options.width or the pads press with options.force, at the latest at the closure. The measurements
--- lag behind the command, so closing ends before: width and force are expected to change on at the present rate. They are then trimmed,
--- which also corrects what the compliance of the fingers adds to the width.
+-- Closes until the gels are at options.width or the pads press with options.force, at the latest at the closure. The
+-- measurements lag behind the command, so closing ends before: width and force are expected to change on at the present
+-- rate. They are then trimmed, which also corrects what the compliance of the fingers adds to the width.
 local function close_until(self, closure, options)
   local rate, width, force = options.rate, options.width, options.force
   local step, pressed, rise = rate * host.dt, 0, 0
@@ -123,7 +131,8 @@ local function towards_left(pose)
   return { 2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x) }
 end
 
--- Grasps with the tactile servo, which lifts the hand by a few millimetres, moves it sideways and returns to the height of the grasp.
+-- Grasps with the tactile servo, which lifts the hand by a few millimetres, moves it sideways and returns to the height
+-- of the grasp.
 local function feel(self)
   end_servo(self)
   self.wants_readings = true
@@ -136,13 +145,16 @@ local function feel(self)
   self.wants_readings = false
 end
 
--- Closes on an object: to the given closure, or with the tactile servo, which feels how firmly the object must be held. A binary
--- gripper closes fully here, and not in close_to.
+-- Closes on an object: to the given closure, or with the tactile servo, which feels how firmly the object must be held.
+-- A binary gripper closes fully here, and not in close_to.
 function Arm:grasp(closure, options)
   self.gripping = true
   if host.grip_controller and not self.knows_controller then
-    check.refuse(("arm:grasp: the expert has no grip for --policy %s; let it read arm.grip_controller, as experts.pick_place does, or choose another policy"):format(
-      host.grip_controller))
+    check.refuse(
+      ("arm:grasp: the expert has no grip for --policy %s; let it read arm.grip_controller, as experts.pick_place does, or choose another policy"):format(
+        host.grip_controller
+      )
+    )
   end
   if fingers.servo then return feel(self) end
   if options.width or options.force then return close_until(self, closure, options) end
@@ -165,7 +177,9 @@ end
 
 -- Keeps the pose for a time, s.
 function Arm:wait(seconds)
-  for _ = 1, ceil(seconds / host.dt - 1e-9) do self:command(self.target, self.closure) end
+  for _ = 1, ceil(seconds / host.dt - 1e-9) do
+    self:command(self.target, self.closure)
+  end
 end
 
 -- Notes a number in the record of the episode.
@@ -176,9 +190,14 @@ function Arm:give_up(reason) yield(self.target, self.closure, self.gripping, rea
 
 -- An expert that reads the name of the controller is taken to follow it.
 local own = { target = true, closure = true, gripping = true, feels = true }
-local state, methods, arm = {
-  target = host.target, closure = host.closure, gripping = host.gripping, feels = fingers.servo, wants_readings = false,
-}, {}, nil
+local state, methods, arm =
+  {
+    target = host.target,
+    closure = host.closure,
+    gripping = host.gripping,
+    feels = fingers.servo,
+    wants_readings = false,
+  }, {}, nil
 
 -- Methods work on the state of the arm; scripts get wrappers that check their arguments.
 for name, method in pairs(Arm) do

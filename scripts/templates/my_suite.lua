@@ -17,7 +17,13 @@ local layout = softvt.layout("my_layout", function(scene, rng)
   scene:add { name = "table", asset = assets.table, position = { 0, 0, 0 } }
   arrange.add(scene, rng, {
     { name = "plate", asset = assets.plate, at = { 40 * mm, 120 * mm } },
-    { name = "loaf", asset = assets.loaf, at = { -40 * mm, -120 * mm }, position_range = 20 * mm, yaw_range = math.rad(30) },
+    {
+      name = "loaf",
+      asset = assets.loaf,
+      at = { -40 * mm, -120 * mm },
+      position_range = 20 * mm,
+      yaw_range = math.rad(30),
+    },
   }, 20 * mm)
   scenery.table_room(scene)
   arrange.arm(scene, rng)

@@ -1,5 +1,5 @@
--- The standard variation: no two objects of a kind are alike. The size decides how far a hand has to close; stiffness and density change
--- forces but hardly the safe widths. Colour, light and camera do not depend on them.
+-- The standard variation: no two objects of a kind are alike. The size decides how far a hand has to close; stiffness
+-- and density change forces but hardly the safe widths. Colour, light and camera do not depend on them.
 --
 --   softvt suites/object_soft.lua --vary
 return softvt.variation {

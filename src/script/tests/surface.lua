@@ -1,11 +1,32 @@
--- Makes an object of each class, calls everything with everything, and returns the messages. surface.rs prepends the names.
+-- Makes an object of each class, calls everything with everything, and returns the messages. surface.rs prepends the
+-- names.
 local errors = {}
 local function note(what, ok, message)
   if not ok then errors[#errors + 1] = { what = what, message = tostring(message), kind = type(message) } end
 end
 local wrong = {
-  "abc", "", "\255", {}, { 1, 2 }, { "a", "b", "c" }, { 0/0, 0, 0 }, { 1e308, 1e308, 1e308 }, { x = 1 }, { [1.5] = {} }, true, 1e308, -1e308,
-  -1, 0.5, 0/0, 1/0, 2^53, math.mininteger, function() end, coroutine.create(print), softvt.pose { position = { 0, 0, 0 } },
+  "abc",
+  "",
+  "\255",
+  {},
+  { 1, 2 },
+  { "a", "b", "c" },
+  { 0 / 0, 0, 0 },
+  { 1e308, 1e308, 1e308 },
+  { x = 1 },
+  { [1.5] = {} },
+  true,
+  1e308,
+  -1e308,
+  -1,
+  0.5,
+  0 / 0,
+  1 / 0,
+  2 ^ 53,
+  math.mininteger,
+  function() end,
+  coroutine.create(print),
+  softvt.pose { position = { 0, 0, 0 } },
   softvt.image { width = 1, height = 1, colour = { 0, 0, 0 } },
   setmetatable({}, { __index = function() error("trap") end, __len = function() return 1e9 end }),
 }
@@ -13,7 +34,11 @@ local function call(what, f, ...)
   note(what .. "()", pcall(f, ...))
   for i, w in ipairs(wrong) do
     local name = what .. "(" .. i .. ")"
-    if select("#", ...) > 0 then note(name, pcall(f, ..., w, w, w)) else note(name, pcall(f, w, w, w)) end
+    if select("#", ...) > 0 then
+      note(name, pcall(f, ..., w, w, w))
+    else
+      note(name, pcall(f, w, w, w))
+    end
   end
 end
 local function all(class, object)
@@ -23,7 +48,11 @@ local function all(class, object)
     call(class .. ":" .. name, with)
     -- Without an object, or with one of another class.
     note(class .. "." .. name, pcall(method))
-    for i, w in ipairs(wrong) do if not (class == "softvt.Image" or class == "softvt.Pose") then note(class .. "." .. name .. i, pcall(method, w)) end end
+    for i, w in ipairs(wrong) do
+      if not (class == "softvt.Image" or class == "softvt.Pose") then
+        note(class .. "." .. name .. i, pcall(method, w))
+      end
+    end
   end
   for i, key in ipairs { "foo", "width_", "__index", 1, 1.5, true, {} } do
     local ok, message = pcall(function() return object[key] end)
@@ -35,7 +64,9 @@ local function all(class, object)
   end
   for _, name in ipairs(NAMES[class].fields) do
     note(class .. "." .. name, pcall(function() return object[name] end))
-    for i, w in ipairs(wrong) do note(class .. "." .. name .. " = " .. i, pcall(function() object[name] = w end)) end
+    for i, w in ipairs(wrong) do
+      note(class .. "." .. name .. " = " .. i, pcall(function() object[name] = w end))
+    end
     note(class .. "." .. name .. " = nil", pcall(function() object[name] = nil end))
   end
   note(class .. " arithmetic", pcall(function() return object + 1 end))
@@ -43,8 +74,16 @@ local function all(class, object)
   SEEN[#SEEN + 1] = class
 end
 local box = softvt.shape.box { size = { 0.04, 0.04, 0.04 } }
-local floor = softvt.asset { name = "floor", body = softvt.static {}, shape = softvt.shape.box { size = { 2, 2, 0.1 } }:translate(0, 0, -0.05) }
-local cube = softvt.asset { name = "cube", shape = box:grounded(), body = softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300, resolution = 2 } }
+local floor = softvt.asset {
+  name = "floor",
+  body = softvt.static {},
+  shape = softvt.shape.box { size = { 2, 2, 0.1 } }:translate(0, 0, -0.05),
+}
+local cube = softvt.asset {
+  name = "cube",
+  shape = box:grounded(),
+  body = softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300, resolution = 2 },
+}
 local layout = softvt.layout("one", function(scene, rng)
   scene:add { name = "floor", asset = floor, position = { 0, 0, 0 } }
   scene:add { name = "cube", asset = cube, at = { 0, 0 } }
@@ -52,16 +91,26 @@ local layout = softvt.layout("one", function(scene, rng)
 end)
 ATTACK = function() end
 local function run()
-  for _, name in ipairs(FUNCTIONS) do call("softvt." .. name, softvt[name]) end
-  for _, name in ipairs(SHAPES) do call("softvt.shape." .. name, softvt.shape[name]) end
-  for _, name in ipairs(MASKS) do call("softvt.mask." .. name, softvt.mask[name]) end
+  for _, name in ipairs(FUNCTIONS) do
+    call("softvt." .. name, softvt[name])
+  end
+  for _, name in ipairs(SHAPES) do
+    call("softvt.shape." .. name, softvt.shape[name])
+  end
+  for _, name in ipairs(MASKS) do
+    call("softvt.mask." .. name, softvt.mask[name])
+  end
   all("softvt.Shape", box)
   all("softvt.Mask", softvt.mask.weave { pitch_m = 1 })
   all("softvt.Pose", softvt.pose { position = { 0, 0, 0 } })
   all("softvt.Image", softvt.image { width = 4, height = 3, colour = { 0, 0, 0 } })
   local world = softvt.world {}
   local solid = world:kinematic { shape = box, position = { 1, 0, 0 } }
-  local body = world:soft { shape = box, body = softvt.soft { youngs_pa = 1e4, poisson = 0.3, density = 300, resolution = 2 }, position = { 0, 0, 0 } }
+  local body = world:soft {
+    shape = box,
+    body = softvt.soft { youngs_pa = 1e4, poisson = 0.3, density = 300, resolution = 2 },
+    position = { 0, 0, 0 },
+  }
   all("softvt.Solid", solid)
   all("softvt.Body", body)
   all("softvt.World", world)
@@ -79,7 +128,9 @@ local function run()
   ATTACK = function() end
   -- An expert that gave up is not resumed: that has a test of its own.
   local methods = NAMES["softvt.Arm"].methods
-  for i = #methods, 1, -1 do if methods[i] == "give_up" then table.remove(methods, i) end end
+  for i = #methods, 1, -1 do
+    if methods[i] == "give_up" then table.remove(methods, i) end
+  end
   simulation:drive(function(arm, view)
     all("softvt.Arm", arm)
     all("softvt.SceneState", view)

@@ -95,7 +95,9 @@ local function ordered_keys(object)
     end
   end
   if not in_order then sort(keys, before) end
-  for i = 1, m do keys[n + i] = rest[i] end
+  for i = 1, m do
+    keys[n + i] = rest[i]
+  end
   return keys
 end
 
