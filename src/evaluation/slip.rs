@@ -64,7 +64,7 @@ impl SlipMonitor {
 /// Growth of the commanded width in a control step from which on the hand counts as opening, m.
 const LEAST_OPENING_M: f64 = 1e-4;
 
-/// Detects that the gripper is being opened: its commanded width has grown by [`LEAST_OPENING_M`] or more
+/// Detects that the gripper is being opened: its commanded width has grown by `LEAST_OPENING_M` or more
 /// within the last control step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OpeningMonitor {
