@@ -197,7 +197,7 @@ mod tests {
             root.get_subcommands().filter(takes_plan).map(clap::Command::get_name).collect();
         assert_eq!(
             names,
-            ["check", "view", "record", "serve"],
+            ["check", "view", "watch", "record", "serve"],
             "say in `takes` which plans a new command takes"
         );
         for command in COMMANDS {

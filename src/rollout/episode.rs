@@ -48,6 +48,7 @@ use softvt_robot::{
     rotation,
 };
 use softvt_scene::{Asset, Body, Camera, Scene};
+use softvt_sensing::{camera::RenderScene, tactile::TactileReading};
 
 /// Specification of an episode: task, scene and parameters. The controller
 /// is passed to [`Episode::run`](super::Episode::run).
@@ -355,12 +356,26 @@ impl Episode {
     /// the state is invalid.
     ///
     /// # Errors
-    /// The controller fails with an error that is not confined to the episode, a sensor stream cannot be computed, or
-    /// the process is [cancelled](softvt_common::cancel).
-    pub fn run(mut self, controller: &mut dyn Controller) -> Result<FinishedEpisode, EpisodeError> {
+    /// The controller fails with an error that is not confined to the episode, a sensor stream cannot be computed, or the
+    /// process is [cancelled](softvt_common::cancel).
+    pub fn run(self, controller: &mut dyn Controller) -> Result<FinishedEpisode, EpisodeError> {
+        self.run_watched(controller, &mut |_| Ok(()))
+    }
+
+    /// As [`run`](Self::run), and calls `watch` in the settled state and after each control step. What it calls must not change the
+    /// state; [`PolicyError::Interrupted`] ends the run.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run), and those of `watch`.
+    pub fn run_watched(
+        mut self,
+        controller: &mut dyn Controller,
+        watch: &mut dyn FnMut(&mut Self) -> Result<(), PolicyError>,
+    ) -> Result<FinishedEpisode, EpisodeError> {
         let mut action = self.start_hold;
         let streams = controller.streams();
         self.begin(streams.clone());
+        watch(&mut self).map_err(|source| self.control_error(source))?;
         while self.outcome.is_none() {
             let requested = if controller.wants_observation() { &streams } else { &SensorStreams::default() };
             let observation = self.observe(requested)?;
@@ -377,6 +392,7 @@ impl Episode {
                 Err(source) => return Err(self.control_error(source)),
             }
             self.step(&action);
+            watch(&mut self).map_err(|source| self.control_error(source))?;
         }
         // A controller that has given up commands nothing more; its last command stays.
         let is_far = matches!(self.outcome, Some(Outcome::Error { .. })) && self.far_commands == self.steps;
@@ -489,6 +505,29 @@ impl Episode {
         Ok(image.into_rgb_image())
     }
 
+    /// The meshes that images are drawn from.
+    ///
+    /// # Errors
+    /// As [`Sensors::render_scene`].
+    pub fn render_scene(&mut self) -> Result<&RenderScene, SensingError> {
+        self.sensors.render_scene()
+    }
+
+    /// The specification of the episode.
+    pub fn spec(&self) -> &EpisodeSpec {
+        &self.spec
+    }
+
+    /// The target in `sim.objects`.
+    pub fn target(&self) -> usize {
+        self.target
+    }
+
+    /// The last action; `None` before the first.
+    pub fn last_action(&self) -> Option<&Action> {
+        self.actions.last()
+    }
+
     /// Current poses of the scene's cameras, base frame, in their order.
     pub fn cameras_b(&self) -> Vec<Pose> {
         let b_from_w = self.sim.robot.base_w.inverse();
@@ -501,7 +540,15 @@ impl Episode {
     /// # Errors
     /// As [`Sensors::tactile_reading`].
     pub fn render_tactile(&mut self, side: Side) -> Result<RgbImage, SensingError> {
-        Ok(self.sensors.tactile_reading(&Sensors::frame(&self.sim), side)?.image)
+        Ok(self.tactile_reading(side)?.image)
+    }
+
+    /// The present reading of a tactile sensor. It does not change the record.
+    ///
+    /// # Errors
+    /// As [`Sensors::tactile_reading`].
+    pub fn tactile_reading(&mut self, side: Side) -> Result<TactileReading, SensingError> {
+        self.sensors.tactile_reading(&Sensors::frame(&self.sim), side)
     }
 
     /// Keeps the state for later observations and for the recording.

@@ -64,6 +64,7 @@ impl RecordedRuns {
         suite: &str,
         is_twin: bool,
         base_seed: u64,
+        split: EpisodeSplit,
         requested: &EpisodeList,
     ) -> Result<ReplaySource, RunError> {
         let run = self.run_of(suite, is_twin).ok_or_else(|| {
@@ -78,7 +79,7 @@ impl RecordedRuns {
         if seed != base_seed {
             return refuse(format!("its seed is {seed}, that of this run {base_seed}"));
         }
-        let (split, own) = (run.text("split"), EpisodeSplit::Validation.name());
+        let (split, own) = (run.text("split"), split.name());
         if split != own {
             return refuse(format!("its split is {split}, that of this run {own}"));
         }

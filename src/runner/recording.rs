@@ -113,12 +113,12 @@ impl<'a> SuiteRecording<'a> {
             return Err(config.error(message));
         }
         let folder_name = path_component(&config.suite_name(suite));
+        let out = layout::attempts(&options.out, &folder_name);
         let run = SuiteRun {
-            split: EpisodeSplit::Demonstration,
             renders_episodes: true,
             // The streams of contact, slip and drop come from the trace.
             records_trace: true,
-            ..SuiteRun::new(config, loaded, suite, jobs, layout::attempts(&options.out, &folder_name))?
+            ..SuiteRun::of_split(config, loaded, suite, jobs, out, EpisodeSplit::Demonstration)?
         };
         let grip_log = HoldingLog::default();
         let run = customize(run, &grip_log)?.prepare()?;

@@ -14,7 +14,7 @@ use crate::{
     episode_selector::EpisodeSelector,
     error::RunError,
     observer::Observer,
-    policy::{ControllerFactory, PolicyConfig},
+    policy::{ControllerFactory, PolicyConfig, PolicyOptions, PolicySource},
     run_manifest,
     selection::{select_tasks, suites_of},
     suite_run::{PreparedRun, SuiteRun},
@@ -207,6 +207,20 @@ impl StoredManifest<'_> {
             changed.join(", ")
         )))
     }
+}
+
+/// The configuration of a run, with a policy that repeats its actions. A judged run needs its `secret`.
+///
+/// # Errors
+/// The run is of another version, or cannot be read.
+pub fn recorded_config(
+    run: &StoredRun,
+    secret: Option<&SecretFile>,
+    observer: Arc<dyn Observer>,
+) -> Result<RunConfig, RunError> {
+    let stored = StoredManifest { path: &run.dir, manifest: &run.manifest, secret, observer };
+    let policy = PolicyConfig::load(&PolicyOptions::new(PolicySource::Run(run.dir.clone())))?;
+    Ok(RunConfig { tasks: Vec::new(), policy, ..stored.config(0)? })
 }
 
 /// A demonstration: its file, and its number in the file.

@@ -7,6 +7,7 @@ use crate::{
     suite_run::find_replay_source,
 };
 use softvt_benchmark::{Plan, Suite, Task};
+use softvt_common::episode_id::EpisodeSplit;
 use softvt_report::run_folder::RunFolder;
 
 /// The suites of a plan that is a suite or a list of suites; empty for other plans.
@@ -134,7 +135,7 @@ pub(crate) fn check_episodes(config: &RunConfig, suites: &[Suite]) -> Result<(),
     }
     for suite in suites.iter().filter(|_| config.policy.is_recorded()) {
         let jobs = select_episodes(config, suite, &select_tasks(config, suite)?);
-        find_replay_source(config, suite, &jobs)?;
+        find_replay_source(config, suite, &jobs, EpisodeSplit::Validation)?;
     }
     Ok(())
 }

@@ -105,13 +105,28 @@ impl<'a> SuiteRun<'a> {
         jobs: EpisodeList<'a>,
         out: PathBuf,
     ) -> Result<Self, RunError> {
+        Self::of_split(config, loaded, suite, jobs, out, EpisodeSplit::Validation)
+    }
+
+    /// As [`SuiteRun::new`], of the episodes of a split.
+    ///
+    /// # Errors
+    /// As [`SuiteRun::new`].
+    pub fn of_split(
+        config: &'a RunConfig,
+        loaded: &'a LoadedScript,
+        suite: &'a Suite,
+        jobs: EpisodeList<'a>,
+        out: PathBuf,
+        split: EpisodeSplit,
+    ) -> Result<Self, RunError> {
         let settings = suite.settings.with_all(&config.settings);
         let settings = settings.map_err(|error| config.error_of("settings", "", error))?;
         for ShiftValue { name, value } in &config.shifts {
             softvt_script::check_shift(&suite.shifts, name, *value)
                 .map_err(|error| config.error_of("shifts", "", error))?;
         }
-        let replay_source = find_replay_source(config, suite, &jobs)?;
+        let replay_source = find_replay_source(config, suite, &jobs, split)?;
         let connections = config.policy.connections();
         Ok(Self {
             config,
@@ -128,7 +143,7 @@ impl<'a> SuiteRun<'a> {
             out,
             renders_episodes: config.video.is_some(),
             records_trace: config.trace.is_some(),
-            split: EpisodeSplit::Validation,
+            split,
             controllers: config.policy.controller_factory(
                 connections.clone(),
                 &suite.name,
@@ -318,6 +333,23 @@ impl<'a> SuiteRun<'a> {
         let spec = EpisodeSpec { record_states: keep_states, ..spec };
         let started = Episode::start(spec, &self.assets, &self.sensor_assets);
         Ok(started.and_then(|started| started.run(&mut *controller)))
+    }
+
+    /// Runs one episode, and calls `watch` in its settled state and after each control step ([`Episode::run_watched`]).
+    ///
+    /// # Errors
+    /// As [`Self::run_episode`], and those of `watch`.
+    pub fn run_episode_watched(
+        &self,
+        job: EpisodeJob<'_>,
+        watch: &mut dyn FnMut(&mut Episode) -> Result<(), PolicyError>,
+    ) -> Result<FinishedEpisode, RunError> {
+        let (spec, opened) = self.spec(job.task, &self.episode_id(job.task, job.episode), None)?;
+        let brief = EpisodeBrief { prompt: opened.prompt.clone(), ..self.brief(job.task, job.episode) };
+        let mut controller = (self.controllers)(opened, brief)?;
+        let started = Episode::start(spec, &self.assets, &self.sensor_assets);
+        let run = started.and_then(|started| started.run_watched(&mut *controller, watch));
+        run.map_err(|error| self.episode_error(&error))
     }
 
     /// Starts an episode for an external client: settled, without a controller.
@@ -552,9 +584,10 @@ pub(crate) fn find_replay_source(
     config: &RunConfig,
     suite: &Suite,
     jobs: &EpisodeList,
+    split: EpisodeSplit,
 ) -> Result<Option<ReplaySource>, RunError> {
     let source = |recorded: &RecordedRuns| {
-        recorded.replay_source(&suite.name, config.rigid_twin, config.base_seed(), jobs)
+        recorded.replay_source(&suite.name, config.rigid_twin, config.base_seed(), split, jobs)
     };
     config.policy.recorded().map(source).transpose()
 }

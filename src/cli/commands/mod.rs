@@ -15,6 +15,7 @@ mod report;
 pub(super) mod run;
 mod serve;
 mod view;
+mod watch;
 
 use clap::Subcommand;
 
@@ -28,6 +29,7 @@ pub(crate) enum Command {
     Run(Box<run::RunArgs>),
     Check(Box<check::CheckArgs>),
     View(Box<view::ViewArgs>),
+    Watch(Box<watch::WatchArgs>),
     Record(Box<record::RecordArgs>),
     Replay(replay::ReplayArgs),
     Report(report::ReportArgs),
@@ -50,6 +52,7 @@ impl Command {
             Self::Run(args) => run::run(*args),
             Self::Check(args) => check::run(*args),
             Self::View(args) => view::run(*args),
+            Self::Watch(args) => watch::run(*args),
             Self::Record(args) => record::run(*args),
             Self::Replay(args) => replay::run(&args),
             Self::Report(args) => report::report(&args),
@@ -71,6 +74,7 @@ impl Command {
             Self::Run(args) => Some(&mut args.script),
             Self::Check(args) => Some(&mut args.script),
             Self::View(args) => Some(&mut args.script),
+            Self::Watch(args) => Some(&mut args.script),
             Self::Record(args) => Some(&mut args.script),
             Self::Serve(args) => Some(&mut args.script),
             Self::Dataset(dataset::DatasetCommand::Import(args)) => Some(&mut args.script),

@@ -22,6 +22,25 @@ pub fn compressive_strain(f: &Mat3) -> f64 {
     1.0 - smallest * if f.determinant() < 0.0 { -1.0 } else { 1.0 }
 }
 
+/// Compressive strain at every node, for displays: the mean over the Gauss points of its elements, weighted by their volume; 0 where
+/// none is counted.
+pub fn node_strains(state: &FemState) -> Vec<f64> {
+    let mesh = &state.model.mesh;
+    let (mut sums, mut weights) = (vec![0.0; mesh.nodes.len()], vec![0.0; mesh.nodes.len()]);
+    for (element, occupancy) in mesh.occupancy.iter().enumerate() {
+        let fill = occupancy.fraction();
+        if fill < MIN_COUNTED_FILL {
+            continue;
+        }
+        let mean = gradients_of(state, element).iter().map(compressive_strain).sum::<f64>() / POINTS as f64;
+        for &node in &mesh.elements[element] {
+            sums[node as usize] += fill * mean;
+            weights[node as usize] += fill;
+        }
+    }
+    sums.iter().zip(&weights).map(|(sum, weight)| if *weight > 0.0 { sum / weight } else { 0.0 }).collect()
+}
+
 /// Cauchy–Green tensor of a deformation gradient, and whether the gradient is inverted.
 struct Stretch {
     xx: f64,

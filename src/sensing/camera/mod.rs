@@ -73,6 +73,7 @@ pub use error::CameraError;
 pub use lens::check_cameras;
 pub(crate) use mesh::{lod::Lod, render_mesh::RenderSolid};
 pub use mesh::{
+    display::{DisplayMesh, NodeBinding},
     primitive::{box_mesh, flat_faces},
     render_mesh::RenderMesh,
 };

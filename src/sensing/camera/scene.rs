@@ -129,6 +129,11 @@ impl RenderScene {
         })
     }
 
+    /// The objects, in the order in which they were given.
+    pub fn objects(&self) -> &[RenderObject] {
+        &self.objects
+    }
+
     /// A level of detail of a fixed object in the world.
     pub(crate) fn fixed_mesh(&self, object: usize, level: usize) -> Result<Arc<PosedMesh>, CameraError> {
         self.fixed_meshes.get(&self.objects, object, level)

@@ -1,0 +1,128 @@
+//! `softvt watch`: episodes on a local web page.
+
+use std::{
+    path::PathBuf,
+    sync::{Arc, atomic::Ordering},
+};
+
+use clap::{Args, value_parser};
+
+use crate::{
+    QUIET_INTERRUPT,
+    args::{PolicyArgs, Request, ScriptArgs, parse_folder},
+    error::CliError,
+    output::{Console, print},
+};
+use softvt_common::episode_id::EpisodeSplit;
+use softvt_report::stored_run::{self, StoredRun};
+use softvt_runner::{
+    ConfiguredScript, Observer, RunConfig, replay::recorded_config, selection::select_tasks, selection::suites_of,
+    stored_folder::enter_for_run,
+};
+use softvt_watch::{Program, Selection, Watch};
+
+/// Show episodes on a local web page, while they are simulated and afterwards
+///
+/// The page has the scene to look around in, both tactile pictures, and what the judge measures. A script that is saved again starts
+/// anew. With a run folder, the page shows its episodes by their recorded actions.
+#[derive(Args, Clone, Debug)]
+#[command(override_usage = "softvt watch [OPTIONS] <FILE.lua|RUN>")]
+pub(crate) struct WatchArgs {
+    #[command(flatten)]
+    pub(super) script: ScriptArgs,
+    #[command(flatten)]
+    policy: PolicyArgs,
+    /// The first task: its index or part of its prompt
+    #[arg(long, value_name = "TASK", default_value = "0")]
+    task: String,
+    /// The first episode of the task
+    #[arg(long, value_name = "N", default_value = "0")]
+    episode: u32,
+    /// Port of the page; 0 for any free port
+    #[arg(long, value_name = "PORT", default_value = "0")]
+    port: u16,
+    /// Record the episodes that are driven from the page (policy teleop) in a run folder, which is continued if it exists; softvt record --policy DIR makes demonstrations of them
+    #[arg(long, value_name = "DIR", value_parser = parse_folder)]
+    out: Option<PathBuf>,
+    /// Episodes per task of the run in --out [default: set by the suite]
+    #[arg(long, value_name = "N", requires = "out", value_parser = value_parser!(u32).range(1..))]
+    episodes: Option<u32>,
+}
+
+/// Serves the page until the process is interrupted.
+///
+/// # Errors
+/// The script or the run is not valid, the task does not exist, or the port is in use; in the end, the interrupt.
+pub(super) fn run(args: WatchArgs) -> Result<(), CliError> {
+    let program = match args.script.file.is_dir() {
+        true => recorded_program(&args)?,
+        false => script_program(&args)?,
+    };
+    let watch = Watch::listen(args.port, token()?).map_err(|error| {
+        CliError::input(format!("--port {}: {}; choose another, or 0 for any free port", args.port, error.0))
+    })?;
+    print(&format!("{}\n", watch.url()))?;
+    QUIET_INTERRUPT.store(true, Ordering::Relaxed);
+    watch.run(program);
+    Err(CliError::interrupted(""))
+}
+
+/// The program of a script.
+fn script_program(args: &WatchArgs) -> Result<Program, CliError> {
+    let request = Request::new(args.script.clone())?;
+    let ConfiguredScript { config, script } = request.load_plan("watch", &args.policy)?;
+    let [suite, ..] = suites_of(&script.plan) else {
+        let message = "it has no suite to watch; name a file that returns softvt.suite or a list of suites";
+        return Err(config.error(message).into());
+    };
+    let chosen = RunConfig { tasks: vec![args.task.clone()], ..config.clone() };
+    let tasks = select_tasks(&chosen, suite)?;
+    let [task] = tasks[..] else {
+        let ids = tasks.iter().map(|task| task.id.to_string()).collect::<Vec<_>>().join(", ");
+        let message = format!("--task {:?} matches the tasks {ids}; select one by its index", args.task);
+        return Err(config.error(message).into());
+    };
+    let selection =
+        Selection { suite: suite.name.clone(), task: task.id, episode: args.episode, ..Selection::default() };
+    let config = RunConfig {
+        out: args.out.clone(),
+        resume: args.out.is_some(),
+        episodes: args.episodes,
+        ..config
+    };
+    Ok(Program { config, selection, split: EpisodeSplit::Validation })
+}
+
+/// The program of a stored run, whose actions are repeated.
+fn recorded_program(args: &WatchArgs) -> Result<Program, CliError> {
+    let dir = &args.script.file;
+    if let Some(flag) = args.script.given.iter().find(|flag| !["file", "port", "task", "episode"].contains(&flag.as_str())) {
+        let flag = flag.replace('_', "-");
+        let message = format!("--{flag} has no effect on the run {}; leave it out", dir.display());
+        return Err(CliError::input(message));
+    }
+    let stored = stored_run::load(dir)?;
+    let [stored] = &stored[..] else {
+        let names = stored.iter().map(|run| run.dir.display().to_string()).collect::<Vec<_>>().join(", ");
+        let message = format!("{} contains several runs; select one of {names}", dir.display());
+        return Err(CliError::input(message));
+    };
+    let observer: Arc<dyn Observer> = Arc::new(Console::default());
+    let stored = StoredRun { dir: enter_for_run(stored, &*observer)?, ..stored.clone() };
+    let config = recorded_config(&stored, None, observer)?;
+    let task = match args.task.parse() {
+        Ok(task) => task,
+        Err(_) => return Err(CliError::input("--task: expected the index of a task of the run")),
+    };
+    let suite = stored.text("suite").to_owned();
+    let selection = Selection { suite, task, episode: args.episode, ..Selection::default() };
+    let split = stored.text("split").parse().map_err(|error| CliError::input(error).prefixed(dir.display()))?;
+    Ok(Program { config, selection, split })
+}
+
+/// A token that nobody guesses.
+fn token() -> Result<String, CliError> {
+    let mut bytes = [0; 16];
+    getrandom::fill(&mut bytes).map_err(|error| CliError::input(format!("no random numbers: {error}")))?;
+    Ok(bytes.iter().map(|byte: &u8| format!("{byte:02x}")).collect())
+}

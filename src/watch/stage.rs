@@ -1,0 +1,284 @@
+//! The thread that simulates: the episode that was asked for last, from its start, again when one of its files is saved.
+
+use std::{
+    collections::BTreeMap,
+    path::PathBuf,
+    sync::{Arc, mpsc::Receiver},
+    time::{Duration, SystemTime},
+};
+
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use crate::{
+    feed::Feed,
+    geometry::{MovingObject, scene_message},
+    message::Message,
+    state::state_message,
+    teleop::{DriveInput, TELEOP, TeleopController},
+};
+use softvt_benchmark::{CONTROL_HZ, Suite, Task};
+use softvt_common::{cancel, episode_id::EpisodeSplit};
+use softvt_policy::PolicyError;
+use softvt_rollout::{Episode, FinishedEpisode, SensingError};
+use softvt_runner::{
+    BuiltinPolicy, ConfiguredScript, ControllerFactory, EpisodeJob, EpisodeList, PolicyConfig, PreparedRun, RunConfig,
+    RunError, ServedRuns, SuiteRun,
+    selection::{select_episodes, select_tasks, suites_of},
+};
+
+/// How often saved files are looked for.
+const POLL: Duration = Duration::from_millis(200);
+
+/// What a [`Watch`](crate::Watch) shows.
+pub struct Program {
+    /// The script, the changes of its scenes, and the policy that is offered beside the built-in ones.
+    pub config: RunConfig,
+    /// The first episode.
+    pub selection: Selection,
+    /// Split of the episodes. Those that are driven from the page and recorded are of the demonstration split.
+    pub split: EpisodeSplit,
+}
+
+/// An episode under a policy.
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Eq)]
+#[serde(deny_unknown_fields)]
+pub struct Selection {
+    /// Name of the suite; empty for the first one.
+    #[serde(default)]
+    pub suite: String,
+    /// Index of the task.
+    #[serde(default)]
+    pub task: usize,
+    /// Number of the episode.
+    #[serde(default)]
+    pub episode: u32,
+    /// Name of the policy; empty for that of the configuration.
+    #[serde(default)]
+    pub policy: String,
+}
+
+/// Sizes and times of the files of a script.
+type Versions = BTreeMap<PathBuf, Option<(u64, SystemTime)>>;
+
+/// The state of the thread.
+pub(crate) struct Stage {
+    pub(crate) program: Program,
+    pub(crate) feed: Arc<Feed>,
+    pub(crate) requests: Receiver<Selection>,
+    pub(crate) drive: Arc<DriveInput>,
+    pub(crate) files: Versions,
+}
+
+impl Stage {
+    /// Simulates episode after episode until the program is cancelled.
+    pub(crate) fn run(mut self) {
+        while !cancel::requested() {
+            match self.simulate() {
+                Ok(()) => {}
+                Err(_) if self.is_outdated() => continue,
+                Err(error) => self.feed.push(plain(json!({ "type": "error", "message": error.to_string() }))),
+            }
+            while !cancel::requested() && !self.is_outdated() {
+                std::thread::sleep(POLL);
+            }
+        }
+    }
+
+    /// True if another episode was asked for, or a file was saved. Takes in the request.
+    fn is_outdated(&mut self) -> bool {
+        if let Some(selection) = self.requests.try_iter().last() {
+            self.program.selection = selection;
+            return true;
+        }
+        cancel::requested() || self.files.iter().any(|(path, version)| version_of(path) != *version)
+    }
+
+    /// Simulates the selected episode and tells its states.
+    ///
+    /// # Errors
+    /// The script, the selection, the scene or the policy is not valid, or the episode is outdated.
+    fn simulate(&mut self) -> Result<(), RunError> {
+        let config = self.program.config.clone();
+        let main = config.file.clone();
+        // Until the script is loaded, its files are those of before.
+        self.files.entry(main).or_default();
+        self.files.iter_mut().for_each(|(path, version)| *version = version_of(path));
+        let name = config.file.display().to_string();
+        let loaded = config.load();
+        let about = |suites: &[Suite]| opening(&name, suites, &self.program);
+        let ConfiguredScript { mut config, script } = match loaded {
+            Ok(loaded) => loaded,
+            Err(error) => {
+                self.feed.begin(plain(about(&[])));
+                return Err(error);
+            }
+        };
+        let suites = suites_of(&script.plan);
+        self.feed.begin(plain(about(suites)));
+        let names = script.file_hashes().into_keys().map(PathBuf::from);
+        self.files = names.map(|path| (path.clone(), version_of(&path))).collect();
+        config.policy = self.policy()?;
+        let (suite, task) = find_task(&config, suites, &self.program.selection)?;
+        let job = EpisodeJob { task, episode: self.program.selection.episode };
+        let is_recorded = config.policy.name == TELEOP && config.out.is_some();
+        let (jobs, out, split) = match &config.out {
+            Some(out) if is_recorded => {
+                let jobs = select_episodes(&config, suite, &select_tasks(&config, suite)?);
+                (jobs, out.clone(), EpisodeSplit::Demonstration)
+            }
+            _ => (EpisodeList::listed(vec![job]), PathBuf::new(), self.program.split),
+        };
+        let mut run = SuiteRun::of_split(&config, &script, suite, jobs, out, split)?;
+        if config.policy.name == TELEOP {
+            run.controllers = self.teleop();
+        }
+        let run = run.rendered().prepare()?;
+        let mut moving: Option<Vec<MovingObject>> = None;
+        let mut tell = |episode: &mut Episode| self.tell(episode, &mut moving);
+        let finished = run.run_episode_watched(job, &mut tell)?;
+        let told = end_message(&finished);
+        if is_recorded {
+            record(&config, &run, finished)?;
+        }
+        self.feed.push(told);
+        Ok(())
+    }
+
+    /// Makes controllers that are driven from the page.
+    fn teleop(&self) -> ControllerFactory {
+        let input = self.drive.clone();
+        Box::new(move |_, _| Ok(Box::new(TeleopController::new(input.clone()))))
+    }
+
+    /// Tells the present state, and the scene before the first one.
+    fn tell(
+        &mut self,
+        episode: &mut Episode,
+        moving: &mut Option<Vec<MovingObject>>,
+    ) -> Result<(), PolicyError> {
+        if self.is_outdated() {
+            return Err(PolicyError::Interrupted);
+        }
+        let failed = |error: SensingError| PolicyError::Action(error.to_string());
+        if moving.is_none() {
+            let spec = episode.spec();
+            let about = json!({
+                "prompt": spec.task.prompt,
+                "layout": spec.task.layout,
+                "budget": spec.task.budget_steps,
+                "control_hz": CONTROL_HZ,
+                "effort_n": spec.settings.robot.gripper.effort,
+            });
+            let (message, objects) = scene_message(episode, about).map_err(failed)?;
+            self.feed.push(message);
+            *moving = Some(objects);
+        }
+        let message = state_message(episode, moving.as_deref().unwrap_or_default()).map_err(failed)?;
+        self.feed.push(message);
+        Ok(())
+    }
+
+    /// The policy of the selection.
+    ///
+    /// # Errors
+    /// There is no policy of that name.
+    fn policy(&self) -> Result<PolicyConfig, RunError> {
+        let (name, given) = (&self.program.selection.policy, &self.program.config.policy);
+        match name.as_str() {
+            // The page shows the true state to who drives.
+            TELEOP => {
+                let mut policy = PolicyConfig::external(TELEOP);
+                policy.privileged = true;
+                Ok(policy)
+            }
+            name if name.is_empty() || name == given.name => Ok(given.clone()),
+            name => PolicyConfig::named(name),
+        }
+    }
+}
+
+/// Adds an episode to the run folder of the configuration, if it is one of the run and is not there yet.
+///
+/// # Errors
+/// The folder holds another run, or cannot be written.
+fn record(config: &RunConfig, run: &PreparedRun, finished: FinishedEpisode) -> Result<(), RunError> {
+    let served = ServedRuns::open(config, std::slice::from_ref(run))?;
+    let recorder = served.recorder();
+    let recorded = match (recorder.selects)(&finished.record.header.id) {
+        true => (recorder.record)(finished).map_err(|error| RunError::input(error.to_string())),
+        false => Err(RunError::input("this episode was not recorded: the run has it already, or does not include it")),
+    };
+    drop(recorder);
+    let (_, written) = served.finish();
+    recorded.and(written)
+}
+
+fn version_of(path: &PathBuf) -> Option<(u64, SystemTime)> {
+    let metadata = std::fs::metadata(path).ok()?;
+    Some((metadata.len(), metadata.modified().ok()?))
+}
+
+/// The selected task, or the first one of the first suite if the script has no suite of that name.
+///
+/// # Errors
+/// The script has no suite, or the suite has no such task.
+fn find_task<'a>(
+    config: &RunConfig,
+    suites: &'a [Suite],
+    selection: &Selection,
+) -> Result<(&'a Suite, &'a Task), RunError> {
+    let first = suites.first().ok_or_else(|| {
+        config.error("it has no suite to watch; name a file that returns softvt.suite or a list of suites")
+    })?;
+    let suite = suites.iter().find(|suite| suite.name == selection.suite).unwrap_or(first);
+    let task = suite.tasks.iter().find(|task| task.id == selection.task).ok_or_else(|| {
+        let last = suite.tasks.len().saturating_sub(1);
+        config.error(format!("{} has no task {}; its tasks are 0 to {last}", suite.name, selection.task))
+    })?;
+    Ok((suite, task))
+}
+
+/// What a page needs before the scene: what can be selected, and what is.
+fn opening(file: &str, suites: &[Suite], program: &Program) -> Value {
+    let given = program.config.policy.name.as_str();
+    let builtin = BuiltinPolicy::ALL.map(BuiltinPolicy::name);
+    let policies: Vec<&str> =
+        std::iter::once(given).chain(builtin.into_iter().filter(|name| *name != given)).chain([TELEOP]).collect();
+    let task = |task: &Task| json!({ "id": task.id, "prompt": task.prompt });
+    let suite = |suite: &Suite| {
+        json!({
+            "name": suite.name,
+            "episodes": suite.episodes,
+            "tasks": suite.tasks.iter().map(task).collect::<Vec<_>>(),
+        })
+    };
+    let Selection { suite: selected, task: index, episode, policy } = &program.selection;
+    let selected = suites.iter().find(|suite| suite.name == *selected).or(suites.first());
+    json!({
+        "type": "open",
+        "file": file,
+        "suites": suites.iter().map(suite).collect::<Vec<_>>(),
+        "policies": policies,
+        "selected": {
+            "suite": selected.map(|suite| suite.name.as_str()),
+            "task": index,
+            "episode": episode,
+            "policy": if policy.is_empty() { given } else { policy.as_str() },
+        },
+    })
+}
+
+fn plain(content: Value) -> Vec<u8> {
+    Message::default().finish(content)
+}
+
+fn end_message(finished: &FinishedEpisode) -> Vec<u8> {
+    let record = &finished.record;
+    plain(json!({
+        "type": "end",
+        "outcome": record.outcome,
+        "verdict": record.verdict,
+        "gave_up": record.stats.gave_up,
+    }))
+}
