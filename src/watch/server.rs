@@ -15,6 +15,7 @@ use std::{
 };
 
 use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
 use tiny_http::{Header, Method, Request, Response, Server};
 use tungstenite::{Message as WebsocketMessage, WebSocket, handshake::derive_accept_key, protocol::Role};
 
@@ -196,7 +197,9 @@ fn read_json<T: DeserializeOwned>(request: &mut Request) -> Result<T, String> {
     let mut text = String::new();
     let read = request.as_reader().take(MAX_REQUEST).read_to_string(&mut text);
     read.map_err(|error| error.to_string())?;
-    serde_json::from_str(&text).map_err(|error| error.to_string())
+    // A list would be read as the fields in their order.
+    let object: Map<String, Value> = serde_json::from_str(&text).map_err(|error| error.to_string())?;
+    serde_json::from_value(Value::Object(object)).map_err(|error| error.to_string())
 }
 
 fn header(name: &str, value: &str) -> Header {

@@ -22,8 +22,8 @@ use softvt_common::{cancel, episode_id::EpisodeSplit};
 use softvt_policy::PolicyError;
 use softvt_rollout::{Episode, FinishedEpisode, SensingError};
 use softvt_runner::{
-    BuiltinPolicy, ConfiguredScript, ControllerFactory, EpisodeJob, EpisodeList, PolicyConfig, PreparedRun, RunConfig,
-    RunError, ServedRuns, SuiteRun,
+    BuiltinPolicy, ConfiguredScript, ControllerFactory, EpisodeJob, EpisodeList, PolicyConfig, PreparedRun,
+    RunConfig, RunError, ServedRuns, SuiteRun,
     selection::{select_episodes, select_tasks, suites_of},
 };
 
@@ -207,7 +207,9 @@ fn record(config: &RunConfig, run: &PreparedRun, finished: FinishedEpisode) -> R
     let recorder = served.recorder();
     let recorded = match (recorder.selects)(&finished.record.header.id) {
         true => (recorder.record)(finished).map_err(|error| RunError::input(error.to_string())),
-        false => Err(RunError::input("this episode was not recorded: the run has it already, or does not include it")),
+        false => Err(RunError::input(
+            "this episode was not recorded: the run has it already, or does not include it",
+        )),
     };
     drop(recorder);
     let (_, written) = served.finish();
@@ -243,8 +245,10 @@ fn find_task<'a>(
 fn opening(file: &str, suites: &[Suite], program: &Program) -> Value {
     let given = program.config.policy.name.as_str();
     let builtin = BuiltinPolicy::ALL.map(BuiltinPolicy::name);
-    let policies: Vec<&str> =
-        std::iter::once(given).chain(builtin.into_iter().filter(|name| *name != given)).chain([TELEOP]).collect();
+    let policies: Vec<&str> = std::iter::once(given)
+        .chain(builtin.into_iter().filter(|name| *name != given))
+        .chain([TELEOP])
+        .collect();
     let task = |task: &Task| json!({ "id": task.id, "prompt": task.prompt });
     let suite = |suite: &Suite| {
         json!({

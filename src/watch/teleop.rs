@@ -117,7 +117,9 @@ mod tests {
         let tool = Pose::identity();
         let drive = Drive { translate: [1.0, 0.0, 0.0], turn: 1.0, close: 1.0 };
         let (pose, closure) = advance(&tool, 0.5, &tool, &drive, 0.05);
-        assert!((pose.translation.x - SPEED * 0.05).abs() < 1e-12 && (pose.rotation.angle() - 0.05).abs() < 1e-12);
+        assert!(
+            (pose.translation.x - SPEED * 0.05).abs() < 1e-12 && (pose.rotation.angle() - 0.05).abs() < 1e-12
+        );
         assert!((closure - 0.5 - CLOSING_RATE * 0.05).abs() < 1e-12);
         let far = (0..100).fold(tool, |pose, _| advance(&pose, 0.0, &tool, &drive, 0.05).0);
         assert!((far.translation.vector.norm() - MAX_LEAD).abs() < 1e-12, "{far}");

@@ -22,3 +22,4 @@ mod served_runs;
 mod support;
 mod usage;
 mod view;
+mod watch;

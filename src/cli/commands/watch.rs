@@ -10,14 +10,14 @@ use clap::{Args, value_parser};
 use crate::{
     QUIET_INTERRUPT,
     args::{PolicyArgs, Request, ScriptArgs, parse_folder},
-    error::CliError,
+    error::{CliError, flag_of},
     output::{Console, print},
 };
 use softvt_common::episode_id::EpisodeSplit;
 use softvt_report::stored_run::{self, StoredRun};
 use softvt_runner::{
-    ConfiguredScript, Observer, RunConfig, replay::recorded_config, selection::select_tasks, selection::suites_of,
-    stored_folder::enter_for_run,
+    ConfiguredScript, Observer, RunConfig, replay::recorded_config, selection::select_tasks,
+    selection::suites_of, stored_folder::enter_for_run,
 };
 use softvt_watch::{Program, Selection, Watch};
 
@@ -84,21 +84,19 @@ fn script_program(args: &WatchArgs) -> Result<Program, CliError> {
     };
     let selection =
         Selection { suite: suite.name.clone(), task: task.id, episode: args.episode, ..Selection::default() };
-    let config = RunConfig {
-        out: args.out.clone(),
-        resume: args.out.is_some(),
-        episodes: args.episodes,
-        ..config
-    };
+    let config =
+        RunConfig { out: args.out.clone(), resume: args.out.is_some(), episodes: args.episodes, ..config };
     Ok(Program { config, selection, split: EpisodeSplit::Validation })
 }
 
 /// The program of a stored run, whose actions are repeated.
 fn recorded_program(args: &WatchArgs) -> Result<Program, CliError> {
     let dir = &args.script.file;
-    if let Some(flag) = args.script.given.iter().find(|flag| !["file", "port", "task", "episode"].contains(&flag.as_str())) {
-        let flag = flag.replace('_', "-");
-        let message = format!("--{flag} has no effect on the run {}; leave it out", dir.display());
+    // Groups of flags are listed by the names of their types.
+    let is_flag = |id: &&String| id.chars().all(|c| c.is_lowercase() || c == '_');
+    let has_effect = |id: &&String| ["file", "port", "task", "episode"].contains(&id.as_str());
+    if let Some(id) = args.script.given.iter().filter(is_flag).find(|id| !has_effect(id)) {
+        let message = format!("{} has no effect on the run {}; leave it out", flag_of(id), dir.display());
         return Err(CliError::input(message));
     }
     let stored = stored_run::load(dir)?;
@@ -116,7 +114,8 @@ fn recorded_program(args: &WatchArgs) -> Result<Program, CliError> {
     };
     let suite = stored.text("suite").to_owned();
     let selection = Selection { suite, task, episode: args.episode, ..Selection::default() };
-    let split = stored.text("split").parse().map_err(|error| CliError::input(error).prefixed(dir.display()))?;
+    let split =
+        stored.text("split").parse().map_err(|error| CliError::input(error).prefixed(dir.display()))?;
     Ok(Program { config, selection, split })
 }
 

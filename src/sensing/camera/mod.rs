@@ -71,12 +71,12 @@ mod tests;
 pub use self::image::{RenderedImage, encode_png};
 pub use error::CameraError;
 pub use lens::check_cameras;
-pub(crate) use mesh::{lod::Lod, render_mesh::RenderSolid};
 pub use mesh::{
     display::{DisplayMesh, NodeBinding},
     primitive::{box_mesh, flat_faces},
     render_mesh::RenderMesh,
 };
+pub(crate) use mesh::{lod::Lod, render_mesh::RenderSolid};
 pub use render::Renderer;
 pub use scene::{FrameView, RenderObject, RenderScene, check_light};
 pub use softvt_signal::resize::resize;
