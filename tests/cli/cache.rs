@@ -84,6 +84,36 @@ fn two_processes_share_a_new_cache() {
     assert!(left.iter().all(|(name, _)| name.ends_with(".softvt")), "nothing half-written is left");
 }
 
+#[cfg(unix)]
+#[test]
+fn a_process_that_ends_while_it_writes_leaves_a_sound_cache() {
+    use std::{
+        process::{Command, Stdio},
+        time::Duration,
+    };
+    let project = short();
+    view(&project, "whole", "expected");
+    let expected = contents(&project.path("expected"));
+    for (number, signal) in ["-INT", "-KILL", "-INT", "-KILL"].into_iter().enumerate() {
+        let mut child = Command::new(assert_cmd::cargo::cargo_bin!("softvt"))
+            .current_dir(project.path(""))
+            .args(["view", "x.lua", "--out", &format!("ended{number}")])
+            .env("SOFTVT_CACHE_DIR", "kept")
+            .env_remove("SOFTVT_NO_CACHE")
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("started");
+        // The first entries are written after some tens of milliseconds.
+        thread::sleep(Duration::from_millis(60 + 120 * number as u64));
+        let killed = Command::new("kill").args([signal, &child.id().to_string()]).status().expect("kill runs");
+        assert!(killed.success() || child.try_wait().expect("asked").is_some());
+        child.wait().expect("ended");
+    }
+    let output = view(&project, "kept", "after");
+    assert!(contents(&project.path("after")) == expected && !output.err.contains("cache"), "{}", output.err);
+}
+
 #[test]
 fn a_folder_that_cannot_be_written_costs_one_line() {
     let project = short();
