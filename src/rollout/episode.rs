@@ -668,7 +668,7 @@ impl Episode {
             let settled = reference.as_ref().map(|_| 0.0);
             let worst = scores.iter().map(|score| score.worst.deformation.map(|d| d.rms_pct));
             let worst_d_pct = std::iter::once(settled).chain(worst).collect();
-            StateRecording { sensors: self.sensors, frames, worst_d_pct }
+            StateRecording { sensors: self.sensors, frames, target: self.target, worst_d_pct }
         });
         FinishedEpisode { record, trace: self.trace, scores, actions: self.actions, reference, recording }
     }

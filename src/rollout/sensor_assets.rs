@@ -67,7 +67,7 @@ impl SensingError {
 }
 
 /// Meshes and sensor models shared by all episodes of a run; a clone shares the caches.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct SensorAssets {
     meshes: SharedCache<Arc<Asset>, Arc<RenderMesh>>,
     skins: SharedCache<Arc<Asset>, Arc<TactileSkin>>,
@@ -76,10 +76,25 @@ pub struct SensorAssets {
     disk: DiskCache,
 }
 
+/// Maximum number of skins, of some 20 MB each: in suites whose objects vary, no episode needs those of another. Episodes keep their own.
+const MAX_SKINS: usize = 8;
+
+impl Default for SensorAssets {
+    fn default() -> Self {
+        Self::stored_in(DiskCache::default())
+    }
+}
+
 impl SensorAssets {
     /// Empty caches that keep what takes long in `disk`; by default in the cache of the process.
     pub fn stored_in(disk: DiskCache) -> Self {
-        Self { disk, ..Self::default() }
+        Self {
+            meshes: SharedCache::default(),
+            skins: SharedCache::of_size(MAX_SKINS),
+            sensors: SharedCache::default(),
+            robot: SharedCache::default(),
+            disk,
+        }
     }
 
     /// Render mesh of an asset; `mesh` is the voxel mesh of a soft body.

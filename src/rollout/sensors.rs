@@ -4,15 +4,19 @@
 
 use std::sync::Arc;
 
+use image::RgbImage;
+use nalgebra::Point3;
+
 use super::{
     sensor_assets::{SensingError, SensorAssets},
     sensor_noise::SensorSeed,
     simulation::{ObjectInstance, Simulation},
 };
 use softvt_benchmark::CONTROL_DT;
-use softvt_geometry::{Pose, Vec3};
+use softvt_geometry::{Pose, Quat, Vec3};
 use softvt_physics::{
     ArticulationId, BodyId, ColliderId, ContactPartner,
+    fem::strain::node_strains,
     world::{ContactPatch, WorldSnapshot},
 };
 use softvt_policy::{PadForce, SensorStreams, TactileFrame};
@@ -23,7 +27,7 @@ use softvt_robot::{
     pads,
     panda::{self, ARM_DOFS},
 };
-use softvt_scene::{Camera, CameraMount, ROBOT_SEGMENTATION_ID, Scene};
+use softvt_scene::{Body, Camera, CameraMount, ROBOT_SEGMENTATION_ID, Scene};
 use softvt_sensing::{
     camera::{
         CameraError, FrameView, RenderObject, RenderScene, RenderedImage, Renderer, check_cameras,
@@ -46,6 +50,8 @@ pub struct Sensors {
     articulation: ArticulationId,
     objects: Vec<ObjectInstance>,
     assets: SensorAssets,
+    /// Skins of `objects` that have pressed on a gel. Kept here, since many episodes share the cache of the assets.
+    skins: Vec<Option<Arc<TactileSkin>>>,
     render_scene: Option<Arc<RenderScene>>,
     renderer: Renderer,
     gel_scratch: GelScratch,
@@ -62,6 +68,7 @@ impl Clone for Sensors {
             articulation: self.articulation,
             objects: self.objects.clone(),
             assets: self.assets.clone(),
+            skins: self.skins.clone(),
             render_scene: self.render_scene.clone(),
             renderer: Renderer::default(),
             gel_scratch: GelScratch::default(),
@@ -93,6 +100,7 @@ impl Sensors {
             articulation: sim.robot.articulation,
             objects: sim.objects.clone(),
             assets: assets.clone(),
+            skins: vec![None; sim.objects.len()],
             render_scene: None,
             renderer: Renderer::default(),
             gel_scratch: GelScratch::default(),
@@ -147,6 +155,43 @@ impl Sensors {
         image.map_err(|error| SensingError::from(error).set_by(camera))
     }
 
+    /// Renders a close-up of the object `index` as people see best how it deforms: without the robot, the skin of soft bodies coloured
+    /// by their strain over the stable strain of their material. Never an input of a policy.
+    ///
+    /// # Errors
+    /// As [`render`](Self::render).
+    pub fn close_up(
+        &mut self,
+        frame: &WorldSnapshot,
+        index: usize,
+        edge: usize,
+    ) -> Result<RgbImage, SensingError> {
+        let render_scene = match self.render_scene.take() {
+            Some(built) => built,
+            None => Arc::new(self.build()?),
+        };
+        let colours: Vec<Vec<[f32; 3]>> =
+            frame.nodes.iter().enumerate().map(|(body, x)| self.skin(body, x)).collect();
+        let view = FrameView { node_colours: &colours, hidden_id: ROBOT_SEGMENTATION_ID, ..self.view(frame) };
+        let camera = close_up_camera(&self.objects[index], frame, edge);
+        let image = Renderer::without_backgrounds().render(&render_scene, &view, &camera);
+        self.render_scene = Some(render_scene);
+        Ok(image?.into_rgb_image())
+    }
+
+    /// Colours of the nodes of a soft body by their strain; none without a stable strain.
+    fn skin(&self, body: usize, x: &[Vec3]) -> Vec<[f32; 3]> {
+        let is_body =
+            |object: &&ObjectInstance| matches!(object.body, BodyId::Soft(id) if id.index() == body);
+        let Some(object) = self.objects.iter().find(is_body) else { return Vec::new() };
+        let (Some(model), Body::Soft(material)) = (&object.model, &object.asset.body) else {
+            return Vec::new();
+        };
+        let limits = [material.collapse_strain, material.damage_strain];
+        let Some(stable) = limits.into_iter().flatten().reduce(f64::min) else { return Vec::new() };
+        node_strains(model, x).into_iter().map(|strain| strain_colour(strain / stable)).collect()
+    }
+
     /// As [`render`](Self::render), for a camera that is used once: nothing is kept for its next image.
     ///
     /// # Errors
@@ -181,7 +226,13 @@ impl Sensors {
     /// The parts of a state that images depend on.
     pub fn view<'a>(&self, frame: &'a WorldSnapshot) -> FrameView<'a> {
         let hand_w = frame.links[self.articulation.index()][panda::HAND_LINK] * panda::hand_in_link();
-        FrameView { nodes: &frame.nodes, rigid: &frame.rigid, links: &frame.links, hand_w: Some(hand_w) }
+        FrameView {
+            nodes: &frame.nodes,
+            rigid: &frame.rigid,
+            links: &frame.links,
+            hand_w: Some(hand_w),
+            ..FrameView::default()
+        }
     }
 
     /// Poses of the scene's cameras in a state, world, in their order.
@@ -305,9 +356,16 @@ impl Sensors {
             frame.links[self.articulation.index()][panda::finger_link(side)] * pads::pad_pose_in_finger(side);
         let mut placed: Vec<(Arc<TactileSkin>, Vec<Vec3>)> = Vec::new();
         let mut substrate = None;
-        for object in self.objects.iter().filter(|object| is_in_contact(object, patch)) {
+        for (index, object) in
+            self.objects.iter().enumerate().filter(|(_, object)| is_in_contact(object, patch))
+        {
             let mesh = object.model.as_ref().map(|model| &model.mesh);
-            let skin = self.assets.skin(&object.name, &object.asset, mesh)?;
+            let skin = match &self.skins[index] {
+                Some(skin) => skin.clone(),
+                None => {
+                    self.skins[index].insert(self.assets.skin(&object.name, &object.asset, mesh)?).clone()
+                }
+            };
             let mut vertices = Vec::new();
             let w_p = pad_w.inverse();
             match object.body {
@@ -400,6 +458,58 @@ impl Sensors {
             .into_iter()
             .collect())
     }
+}
+
+/// Direction from the object to the camera of a close-up, world.
+const CLOSE_UP_FROM: [f64; 3] = [0.8, -0.45, 0.5];
+/// Field of view of a close-up, rad, and its distance from the object, in diagonals of its bounds.
+const CLOSE_UP_FOVY: f64 = 0.5;
+const CLOSE_UP_DISTANCE: f64 = 2.6;
+
+/// A camera that looks at an object from nearby, always along the same direction.
+fn close_up_camera(object: &ObjectInstance, frame: &WorldSnapshot, edge: usize) -> Camera {
+    let centre = match object.body {
+        BodyId::Soft(id) => frame.soft(id).iter().sum::<Vec3>() / frame.soft(id).len().max(1) as f64,
+        BodyId::Rigid(id) => (frame.rigid(id) * Point3::from(object.bounds.centre())).coords,
+        BodyId::Link(id) => {
+            let object_w = frame.link(id) * object.joint_frame_o().inverse();
+            (object_w * Point3::from(object.bounds.centre())).coords
+        }
+        BodyId::World | BodyId::Kinematic(_) => {
+            (object.start_w * Point3::from(object.bounds.centre())).coords
+        }
+    };
+    let away = Vec3::from(CLOSE_UP_FROM).normalize();
+    let eye = centre + away * (CLOSE_UP_DISTANCE * object.bounds.size().norm());
+    let pose = Pose::from_parts(eye.into(), Quat::face_towards(&away, &Vec3::z()));
+    Camera {
+        name: "close_up".to_owned(),
+        mount: CameraMount::World,
+        pose,
+        fovy_rad: CLOSE_UP_FOVY,
+        near_m: 0.01,
+        far_m: 10.0,
+        width: edge,
+        height: edge,
+        set_at: None,
+    }
+}
+
+/// Linear RGB of a strain over the stable strain: pale to orange up to 1, vermilion beyond and nowhere else.
+fn strain_colour(ratio: f64) -> [f32; 3] {
+    const RAMP: [(f64, [f32; 3]); 4] = [
+        (0.0, [0.88, 0.85, 0.79]),
+        (0.3, [0.88, 0.85, 0.79]),
+        (0.65, [0.91, 0.68, 0.16]),
+        (1.0, [0.81, 0.28, 0.04]),
+    ];
+    if ratio > 1.0 {
+        return [0.45, 0.02, 0.02];
+    }
+    let after = RAMP.iter().position(|(at, _)| *at >= ratio).unwrap_or(RAMP.len() - 1).max(1);
+    let ((low, from), (high, to)) = (RAMP[after - 1], RAMP[after]);
+    let share = ((ratio - low) / (high - low)).clamp(0.0, 1.0) as f32;
+    std::array::from_fn(|channel| from[channel] + share * (to[channel] - from[channel]))
 }
 
 /// Pose of a camera, world.
@@ -495,6 +605,8 @@ pub struct StateRecording {
     pub sensors: Sensors,
     /// The settled state and the state after each control step.
     pub frames: Vec<WorldSnapshot>,
+    /// The target, as an object of `sensors`.
+    pub target: usize,
     /// The target's largest D over the physics steps of each control step, % of the settled diagonal, after 0 for the
     /// settled state; `None` for a rigid target.
     pub worst_d_pct: Vec<Option<f64>>,

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 
 use softvt_common::parallel::lock;
 
-/// Maximum number of entries. A suite has a few dozen assets, but a layout with random appearance adds new ones of
+/// Maximum number of entries, unless stated. A suite has a few dozen assets, but a layout with random appearance adds new ones of
 /// several megabytes in every episode.
 const MAX_ENTRIES: usize = 64;
 
@@ -19,17 +19,28 @@ type Entries<K, V> = Vec<(K, CacheSlot<V>)>;
 
 /// Values by key. Least recently used entries are evicted. A clone shares the entries.
 #[derive(Debug)]
-pub(super) struct SharedCache<K, V>(Arc<Mutex<Entries<K, V>>>);
+pub(super) struct SharedCache<K, V> {
+    entries: Arc<Mutex<Entries<K, V>>>,
+    /// Maximum number of entries.
+    most: usize,
+}
 
 impl<K, V> Clone for SharedCache<K, V> {
     fn clone(&self) -> Self {
-        Self(self.0.clone())
+        Self { entries: self.entries.clone(), most: self.most }
     }
 }
 
 impl<K, V> Default for SharedCache<K, V> {
     fn default() -> Self {
-        Self(Arc::default())
+        Self::of_size(MAX_ENTRIES)
+    }
+}
+
+impl<K, V> SharedCache<K, V> {
+    /// A cache of at most `most` entries.
+    pub(super) fn of_size(most: usize) -> Self {
+        Self { entries: Arc::default(), most }
     }
 }
 
@@ -57,12 +68,12 @@ impl<K: Clone, V: Clone> SharedCache<K, V> {
 
     /// The slot of a key, which becomes the most recently used one.
     fn cell(&self, key: &K, is_same: impl Fn(&K) -> bool) -> CacheSlot<V> {
-        let mut entries = lock(&self.0);
+        let mut entries = lock(&self.entries);
         let entry = match entries.iter().position(|(known, _)| is_same(known)) {
             Some(at) => entries.remove(at),
             None => (key.clone(), CacheSlot::default()),
         };
-        if entries.len() == MAX_ENTRIES {
+        if entries.len() >= self.most {
             entries.remove(0);
         }
         let cell = entry.1.clone();

@@ -40,7 +40,8 @@ pub(crate) fn state_message(episode: &mut Episode, moving: &[MovingObject]) -> R
         let BodyId::Soft(id) = object.body else { continue };
         let state = &world.soft(id).state;
         let nodes = message.floats(state.x.iter().flat_map(|x| [x.x, x.y, x.z]).map(|x| x as f32));
-        let strains = message.floats(node_strains(state).into_iter().map(|strain| strain as f32));
+        let strains =
+            message.floats(node_strains(&state.model, &state.x).into_iter().map(|strain| strain as f32));
         soft.push(json!({ "nodes": nodes, "strains": strains }));
     }
     let contacts = message.floats(contact_points(episode));

@@ -106,7 +106,8 @@ fn a_process_that_ends_while_it_writes_leaves_a_sound_cache() {
             .expect("started");
         // The first entries are written after some tens of milliseconds.
         thread::sleep(Duration::from_millis(60 + 120 * number as u64));
-        let killed = Command::new("kill").args([signal, &child.id().to_string()]).status().expect("kill runs");
+        let killed =
+            Command::new("kill").args([signal, &child.id().to_string()]).status().expect("kill runs");
         assert!(killed.success() || child.try_wait().expect("asked").is_some());
         child.wait().expect("ended");
     }

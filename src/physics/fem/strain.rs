@@ -8,7 +8,7 @@ use super::{
     body::{FemModel, FemState},
     force::{ElementCorners, gauss_gradients},
 };
-use softvt_geometry::Mat3;
+use softvt_geometry::{Mat3, Vec3, voxel::VoxelMesh};
 
 /// Fill fraction below which a voxel is not counted.
 const MIN_COUNTED_FILL: f64 = 0.1;
@@ -22,17 +22,17 @@ pub fn compressive_strain(f: &Mat3) -> f64 {
     1.0 - smallest * if f.determinant() < 0.0 { -1.0 } else { 1.0 }
 }
 
-/// Compressive strain at every node, for displays: the mean over the Gauss points of its elements, weighted by their volume; 0 where
+/// Compressive strain at every node of a body whose nodes are at `x`, for displays: the mean over the Gauss points of its elements, weighted by their volume; 0 where
 /// none is counted.
-pub fn node_strains(state: &FemState) -> Vec<f64> {
-    let mesh = &state.model.mesh;
+pub fn node_strains(model: &FemModel, x: &[Vec3]) -> Vec<f64> {
+    let mesh = &model.mesh;
     let (mut sums, mut weights) = (vec![0.0; mesh.nodes.len()], vec![0.0; mesh.nodes.len()]);
     for (element, occupancy) in mesh.occupancy.iter().enumerate() {
         let fill = occupancy.fraction();
         if fill < MIN_COUNTED_FILL {
             continue;
         }
-        let mean = gradients_of(state, element).iter().map(compressive_strain).sum::<f64>() / POINTS as f64;
+        let mean = gradients_at(mesh, x, element).iter().map(compressive_strain).sum::<f64>() / POINTS as f64;
         for &node in &mesh.elements[element] {
             sums[node as usize] += fill * mean;
             weights[node as usize] += fill;
@@ -196,10 +196,14 @@ struct WeightedStrain {
 
 /// Deformation gradients at the Gauss points of an element.
 fn gradients_of(state: &FemState, element: usize) -> [Mat3; POINTS] {
-    let mesh = &state.model.mesh;
+    gradients_at(&state.model.mesh, &state.x, element)
+}
+
+/// The same for nodes at `x`.
+fn gradients_at(mesh: &VoxelMesh, x: &[Vec3], element: usize) -> [Mat3; POINTS] {
     let nodes = &mesh.elements[element];
-    let x: ElementCorners = std::array::from_fn(|c| state.x[nodes[c] as usize]);
-    gauss_gradients(&x, mesh.edge)
+    let corners: ElementCorners = std::array::from_fn(|c| x[nodes[c] as usize]);
+    gauss_gradients(&corners, mesh.edge)
 }
 
 #[cfg(test)]

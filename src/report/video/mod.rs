@@ -1,5 +1,5 @@
-//! Videos and still images of episodes: both cameras on top, both fingers below them, and the deformation against its
-//! limit at the bottom.
+//! Videos and still images of episodes: the third-person camera and the target from nearby on top, the wrist camera and both fingers below
+//! them, and the deformation over its limit at the bottom.
 
 use std::{
     path::{Path, PathBuf},
@@ -13,7 +13,6 @@ use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{
     files::{FileError, replace},
     parallel::{self, lock},
-    text::format_number,
 };
 use softvt_media::{
     canvas::{Canvas, Rgb8},
@@ -30,15 +29,20 @@ use softvt_sensing::{
     tactile::{MarkerStyle, TactileReading},
 };
 
-/// Edge of a camera panel, pixels.
-const CAMERA_PANEL: u32 = 512;
-/// Height of a finger panel, pixels; its width is that of a camera panel.
-const FINGER_PANEL: u32 = 384;
+/// Edge of the panels on top, pixels: the third-person camera, and the target from nearby.
+const TOP_PANEL: u32 = 512;
+/// Edge of the panel of the wrist camera, pixels.
+const WRIST_PANEL: u32 = 384;
+/// Size of the finger panels beside it, pixels: that of the sensors' images.
+const FINGER_WIDTH: u32 = 320;
+const FINGER_HEIGHT: u32 = 240;
 /// Height of the caption at the bottom, pixels.
 const CAPTION_HEIGHT: u32 = 160;
-const WIDTH: u32 = 2 * CAMERA_PANEL;
-const HEIGHT: u32 = CAMERA_PANEL + FINGER_PANEL + CAPTION_HEIGHT;
+const WIDTH: u32 = 2 * TOP_PANEL;
+const HEIGHT: u32 = TOP_PANEL + WRIST_PANEL + CAPTION_HEIGHT;
 const MARGIN: f32 = 16.0;
+/// Time for which a video shows the last state, with the verdict, s.
+const LAST_STATE_S: f64 = 1.5;
 /// Edges of images in full size, pixels.
 const THIRD_PERSON_FULL_SIZE: usize = 1024;
 const OTHER_FULL_SIZE: usize = 512;
@@ -46,8 +50,9 @@ const OTHER_FULL_SIZE: usize = 512;
 const BACKGROUND: Rgb8 = [22, 24, 28];
 const TEXT: Rgb8 = [226, 229, 233];
 const FAINT: Rgb8 = [122, 128, 138];
-const SAFE: Rgb8 = [94, 201, 140];
-const HARM: Rgb8 = [240, 96, 84];
+/// Blue and vermilion of Okabe and Ito's palette, which most people tell apart, lightened for the dark background.
+const SAFE: Rgb8 = [86, 180, 233];
+const HARM: Rgb8 = [240, 120, 60];
 
 /// Why a video or still image cannot be written.
 #[allow(missing_docs, reason = "the messages describe the variants")]
@@ -120,9 +125,13 @@ pub fn write_video(
     let recording = &*recording;
     let draw = |index: usize| shared.lend(|sensors| video_frame(sensors, recording, caption, index));
     let (mut video, mut drawn) = (VideoWriter::new(WIDTH as usize, HEIGHT as usize, CONTROL_HZ)?, 0);
+    let held = (LAST_STATE_S * f64::from(CONTROL_HZ)) as usize;
     parallel::run_in_order(recording.frames.len(), threads, &is_cancelled, draw, |_, frame| {
         video.push(&frame)?;
         drawn += 1;
+        if drawn == recording.frames.len() {
+            (0..held).try_for_each(|_| video.push(&frame))?;
+        }
         on_frame();
         Ok::<_, EpisodeVideoError>(())
     })?;
@@ -176,21 +185,55 @@ fn video_frame(
 ) -> Result<RgbImage, EpisodeVideoError> {
     let mut canvas = Canvas::new(WIDTH, HEIGHT, BACKGROUND);
     let frame = recording.frames.get(index).ok_or(EpisodeVideoError::Empty)?;
-    for (side, name) in STANDARD_CAMERAS.into_iter().enumerate() {
-        let camera = sensors.camera(name)?.clone().with_edge(CAMERA_PANEL as usize);
-        let image = sensors.render(frame, &camera)?.into_rgb_image();
-        let x = CAMERA_PANEL * side as u32;
-        canvas.place(&image, x, 0);
-        draw_label(&mut canvas, ["third person", "wrist"][side], x, 0);
-    }
+    let seen = |sensors: &mut Sensors, name: &str, edge: u32| -> Result<RgbImage, EpisodeVideoError> {
+        let camera = sensors.camera(name)?.clone().with_edge(edge as usize);
+        Ok(sensors.render(frame, &camera)?.into_rgb_image())
+    };
+    canvas.place(&seen(sensors, STANDARD_CAMERAS[0], TOP_PANEL)?, 0, 0);
+    draw_label(&mut canvas, "third person", 0, 0);
+    canvas.place(&sensors.close_up(frame, recording.target, TOP_PANEL as usize)?, TOP_PANEL, 0);
+    draw_label(&mut canvas, "object without the robot, by strain", TOP_PANEL, 0);
+    canvas.place(&seen(sensors, STANDARD_CAMERAS[1], WRIST_PANEL)?, 0, TOP_PANEL);
+    draw_label(&mut canvas, "wrist", 0, TOP_PANEL);
     for (side, reading) in sensors.tactile_readings(frame)?.iter().enumerate() {
-        let image = reading.with_markers(MarkerStyle::Dots);
-        let x = CAMERA_PANEL * side as u32;
-        canvas.place(&resize(&image, CAMERA_PANEL, FINGER_PANEL), x, CAMERA_PANEL);
-        draw_label(&mut canvas, ["left finger", "right finger"][side], x, CAMERA_PANEL);
+        let image = reading.with_markers(MarkerStyle::Arrows);
+        let x = WRIST_PANEL + FINGER_WIDTH * side as u32;
+        canvas.place(&resize(&image, FINGER_WIDTH, FINGER_HEIGHT), x, TOP_PANEL);
+        draw_label(&mut canvas, ["left finger", "right finger"][side], x, TOP_PANEL);
+        let force = format!("{:.2} N", pad_force(frame, side));
+        canvas.write(&force, x as f32 + MARGIN, (TOP_PANEL + FINGER_HEIGHT) as f32 + 32.0, 22.0, TEXT);
     }
+    draw_badge(&mut canvas, recording, caption, index);
     draw_caption(&mut canvas, recording, caption, index);
     Ok(canvas.to_image())
+}
+
+/// Sum of the normal forces on a pad, N.
+fn pad_force(frame: &WorldSnapshot, side: usize) -> f64 {
+    let points = frame.patches.get(side).into_iter().flat_map(|patch| &patch.points);
+    points.map(|point| point.pressure * point.area).sum()
+}
+
+/// Index of the first state up to `index` at which D is above τ.
+fn first_over_limit(recording: &StateRecording, caption: &VideoCaption, index: usize) -> Option<usize> {
+    let tau = caption.tau_pct?;
+    recording.worst_d_pct.iter().take(index + 1).position(|d| d.is_some_and(|d| d > tau))
+}
+
+/// Draws the verdict so far, or the final one, below the fingers.
+fn draw_badge(canvas: &mut Canvas, recording: &StateRecording, caption: &VideoCaption, index: usize) {
+    let over = first_over_limit(recording, caption, index);
+    let is_last = index + 1 == recording.frames.len();
+    let (text, colour) = match (is_last, caption.tau_pct, over) {
+        (true, _, _) => (caption.verdict.clone(), if caption.is_safe { SAFE } else { HARM }),
+        (false, None, _) => ("no limit of the deformation".to_owned(), FAINT),
+        (false, Some(_), None) => ("within the limit so far".to_owned(), SAFE),
+        (false, Some(_), Some(at)) => (format!("over the limit since {:.2} s", at as f64 * CONTROL_DT), HARM),
+    };
+    let (x, y) = (WRIST_PANEL as f32 + MARGIN, (TOP_PANEL + FINGER_HEIGHT) as f32 + 60.0);
+    let width = canvas.text_width(&text, 24.0);
+    canvas.fill(x, y, width + 32.0, 48.0, colour, 1.0);
+    canvas.write(&text, x + 16.0, y + 33.0, 24.0, BACKGROUND);
 }
 
 /// Draws the name of a panel in its corner.
@@ -202,20 +245,17 @@ fn draw_label(canvas: &mut Canvas, name: &str, x: u32, y: u32) {
 }
 
 fn draw_caption(canvas: &mut Canvas, recording: &StateRecording, caption: &VideoCaption, index: usize) {
-    let top = (CAMERA_PANEL + FINGER_PANEL) as f32;
+    let top = (TOP_PANEL + WRIST_PANEL) as f32;
     canvas.write(&caption.prompt, MARGIN, top + 28.0, 20.0, TEXT);
     let time = index as f64 * CONTROL_DT;
     canvas.write(&format!("{} · {time:.2} s", caption.episode), MARGIN, top + 52.0, 16.0, FAINT);
-    let is_last = index + 1 == recording.frames.len();
-    if is_last {
-        let width = canvas.text_width(&caption.verdict, 20.0);
-        let colour = if caption.is_safe { SAFE } else { HARM };
-        canvas.write(&caption.verdict, WIDTH as f32 - MARGIN - width, top + 28.0, 20.0, colour);
-    }
     draw_deformation_chart(canvas, recording, caption, index, top + 68.0);
 }
 
-/// Plots the deformation D against time up to the state `index`, with the limit τ. `y` is the top of the chart.
+/// Upper end of the axis of D over τ.
+const MAX_RATIO: f64 = 2.0;
+
+/// Plots D over its limit τ against time up to the state `index`, on an axis that is the same in all videos. `y` is the top of the chart.
 fn draw_deformation_chart(
     canvas: &mut Canvas,
     recording: &StateRecording,
@@ -223,30 +263,42 @@ fn draw_deformation_chart(
     index: usize,
     y: f32,
 ) {
-    let (x, width, height) = (150.0, 800.0, 76.0);
-    let max = recording.worst_d_pct.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
-    let scale = 1.15 * max.max(caption.tau_pct.unwrap_or(0.0)).max(0.1);
+    let (x, width, height) = (150.0, 800.0, 68.0);
     let steps = recording.frames.len().saturating_sub(1).max(1) as f32;
-    let point = |at: usize, d: f64| [x + width * at as f32 / steps, y + height * (1.0 - (d / scale) as f32)];
     canvas.line(&[[x, y], [x, y + height], [x + width, y + height]], 1.0, 0.0, FAINT);
-    canvas.write("deformation", MARGIN, y + 22.0, 17.0, TEXT);
-    if let Some(tau) = caption.tau_pct {
-        let level = point(0, tau)[1];
-        canvas.line(&[[x, level], [x + width, level]], 1.5, 6.0, HARM);
-        let rounded = (100.0 * tau).round() / 100.0;
-        let label = format!("τ {} %", format_number(rounded));
-        canvas.write(&label, x + width + 8.0, level + 5.0, 16.0, HARM);
-    }
-    let so_far = recording.worst_d_pct.iter().enumerate().take(index + 1);
-    let curve: Vec<[f32; 2]> = so_far.filter_map(|(at, d)| Some(point(at, (*d)?))).collect();
-    let Some(now) = recording.worst_d_pct.get(index).copied().flatten() else {
-        let text = if max > 0.0 { "" } else { "none: a rigid body" };
-        canvas.write(text, MARGIN, y + 46.0, 16.0, FAINT);
+    let end = format!("{:.0} s", f64::from(steps) * CONTROL_DT);
+    canvas.write("0", x - 4.0, y + height + 15.0, 14.0, FAINT);
+    canvas.write(&end, x + width - 16.0, y + height + 15.0, 14.0, FAINT);
+    let now = recording.worst_d_pct.get(index).copied().flatten();
+    let (Some(tau), Some(now)) = (caption.tau_pct, now) else {
+        let rigid = recording.worst_d_pct.iter().flatten().next().is_none();
+        let text = if rigid { "rigid: no deformation" } else { "no limit τ" };
+        canvas.write(text, x + MARGIN, y + 30.0, 17.0, FAINT);
         return;
     };
-    let colour = if caption.tau_pct.is_some_and(|tau| now > tau) { HARM } else { SAFE };
-    canvas.line(&curve, 2.0, 0.0, SAFE);
-    canvas.write(&format!("{now:.2} %"), MARGIN, y + 48.0, 20.0, colour);
+    let point = |at: usize, ratio: f64| {
+        let share = (ratio / MAX_RATIO).min(1.0) as f32;
+        [x + width * at as f32 / steps, y + height * (1.0 - share)]
+    };
+    let level = point(0, 1.0)[1];
+    canvas.line(&[[x, level], [x + width, level]], 1.5, 6.0, HARM);
+    canvas.write("τ", x + width + 8.0, level + 5.0, 16.0, HARM);
+    canvas.write("D / τ", MARGIN, y + 22.0, 17.0, TEXT);
+    let ratio = now / tau;
+    let colour = |ratio: f64| if ratio > 1.0 { HARM } else { SAFE };
+    canvas.write(&format!("{ratio:.2}"), MARGIN, y + 50.0, 24.0, colour(ratio));
+    let ratios: Vec<(usize, f64)> = recording
+        .worst_d_pct
+        .iter()
+        .enumerate()
+        .take(index + 1)
+        .filter_map(|(at, d)| Some((at, (*d)? / tau)))
+        .collect();
+    // A part of the curve is as harmful as its worse end.
+    for pair in ratios.windows(2) {
+        let [(from, a), (to, b)] = [pair[0], pair[1]];
+        canvas.line(&[point(from, a), point(to, b)], 2.0, 0.0, colour(a.max(b)));
+    }
 }
 
 /// Path of an episode's video in a run folder.
@@ -263,11 +315,8 @@ pub fn still_path(dir: &Path, index: EpisodeIndex) -> PathBuf {
 /// Index of the state with the largest deformation of the target; of a rigid target, with the largest
 /// force on the pads.
 pub fn worst_state(recording: &StateRecording) -> usize {
-    // Sum of the normal forces, N.
-    let pad_force = |frame: &WorldSnapshot| -> f64 {
-        frame.patches.iter().flat_map(|patch| &patch.points).map(|point| point.pressure * point.area).sum()
-    };
-    let severity = |at: usize| recording.worst_d_pct[at].unwrap_or_else(|| pad_force(&recording.frames[at]));
+    let pad_forces = |frame: &WorldSnapshot| pad_force(frame, 0) + pad_force(frame, 1);
+    let severity = |at: usize| recording.worst_d_pct[at].unwrap_or_else(|| pad_forces(&recording.frames[at]));
     let states = 0..recording.frames.len().min(recording.worst_d_pct.len());
     // The first one of equals.
     states.max_by(|&a, &b| severity(a).total_cmp(&severity(b)).then(b.cmp(&a))).unwrap_or(0)

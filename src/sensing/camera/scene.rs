@@ -78,6 +78,10 @@ pub struct FrameView<'a> {
     pub links: &'a [Vec<Pose>],
     /// Pose of the robot's hand, world, for cameras mounted on it.
     pub hand_w: Option<Pose>,
+    /// Albedo at the nodes of each soft body, linear RGB, in place of its materials; those of its materials where it is empty.
+    pub node_colours: &'a [Vec<[f32; 3]>],
+    /// Segmentation id of objects that are left out of the image, and of its shadows; 0 for none.
+    pub hidden_id: u16,
 }
 
 impl RenderScene {
@@ -213,6 +217,8 @@ pub fn check_light(light: &Lighting) -> Result<(), CameraError> {
 pub(crate) struct PosedMesh {
     pub(crate) positions: Vec<V3>,
     pub(crate) normals: Vec<V3>,
+    /// Albedo in place of that of the materials; empty for the materials.
+    pub(crate) albedo: Vec<V3>,
 }
 
 impl PosedMesh {
@@ -234,7 +240,8 @@ impl PosedMesh {
             BodyId::Soft(id) => {
                 let nodes = view.nodes.get(id.index());
                 let nodes = nodes.ok_or_else(|| fail(format!("no soft body {}", id.index())))?;
-                return Self::embedded(lod, nodes).map_err(fail);
+                let colours = view.node_colours.get(id.index()).map_or(&[][..], Vec::as_slice);
+                return Self::embedded(lod, nodes, colours).map_err(fail);
             }
             BodyId::Kinematic(_) => return Err(fail("no pose for this kind of body".to_owned())),
         };
@@ -247,11 +254,13 @@ impl PosedMesh {
         Ok(Self {
             positions: lod.positions.iter().map(|p| rotation * p + translation).collect(),
             normals: lod.normals.iter().map(|n| rotation * n).collect(),
+            albedo: Vec::new(),
         })
     }
 
-    /// Places a level that is embedded in a soft body with these nodes. An error is the reason why it cannot.
-    fn embedded(lod: &Lod, nodes: &[Vec3]) -> Result<Self, String> {
+    /// Places a level that is embedded in a soft body with these nodes, and colours of them if there are any. An error is the
+    /// reason why it cannot.
+    fn embedded(lod: &Lod, nodes: &[Vec3], colours: &[[f32; 3]]) -> Result<Self, String> {
         if lod.embedding.len() != lod.positions.len() {
             return Err("nodes for it, but its mesh is not embedded in a soft body".to_owned());
         }
@@ -270,6 +279,14 @@ impl PosedMesh {
         };
         let positions: Vec<V3> = lod.embedding.iter().map(position).collect();
         let normals = vertex_normals(&positions, &lod.triangles);
-        Ok(Self { positions, normals })
+        let colour = |vertex: &NodeWeights| {
+            let weighted = vertex.nodes.iter().zip(&vertex.weights);
+            weighted.map(|(&node, weight)| V3::from(colours[node as usize]) * *weight).sum()
+        };
+        let albedo = match colours.len() == nodes.len() {
+            true => lod.embedding.iter().map(colour).collect(),
+            false => Vec::new(),
+        };
+        Ok(Self { positions, normals, albedo })
     }
 }

@@ -51,6 +51,7 @@ impl<'a> TriangleInterpolator<'a> {
             let v = lod.triangles[triangle][corner] as usize;
             let (p, n) = (instance.posed.positions[v] - lens.eye, instance.posed.normals[v]);
             let [r, g, b, roughness, metalness, sky]: [f32; 6] = lod.materials[v].into();
+            let [r, g, b] = instance.posed.albedo.get(v).map_or([r, g, b], |albedo| (*albedo).into());
             let [u, v] = lod.uvs.get(triangle).map_or([0.0; 2], |uvs| uvs[corner]);
             [p.x, p.y, p.z, n.x, n.y, n.z, r, g, b, roughness, metalness, sky, u, v]
         });
@@ -59,7 +60,11 @@ impl<'a> TriangleInterpolator<'a> {
             id,
             barycentric: [b.cross(&c), c.cross(&a), a.cross(&b)],
             corners,
-            chart: lod.chart_ids.get(triangle).map(|&chart| &lod.charts[chart as usize]),
+            chart: lod
+                .chart_ids
+                .get(triangle)
+                .filter(|_| instance.posed.albedo.is_empty())
+                .map(|&chart| &lod.charts[chart as usize]),
         }
     }
 

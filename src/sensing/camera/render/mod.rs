@@ -43,18 +43,22 @@ struct MovingShadow {
     nodes: Vec<Vec<Vec3>>,
     rigid: Vec<Pose>,
     links: Vec<Vec<Pose>>,
+    hidden_id: u16,
     map: ShadowMap,
 }
 
 impl MovingShadow {
     fn update(&mut self, view: &FrameView, objects: &[PosedObject]) {
-        if self.nodes == view.nodes && self.rigid == view.rigid && self.links == view.links {
+        let is_same = self.nodes == view.nodes && self.rigid == view.rigid && self.links == view.links;
+        if is_same && self.hidden_id == view.hidden_id {
             return;
         }
+        self.hidden_id = view.hidden_id;
         view.nodes.clone_into(&mut self.nodes);
         view.rigid.clone_into(&mut self.rigid);
         view.links.clone_into(&mut self.links);
-        let casters = objects.iter().filter(|o| o.object.casts_shadow && o.object.is_moving());
+        let casters =
+            objects.iter().filter(|o| o.object.casts_shadow && o.object.is_moving() && !o.is_hidden);
         self.map
             .draw(casters.map(|o| (o.caster.posed.positions.as_slice(), o.caster.lod.triangles.as_slice())));
     }
@@ -95,6 +99,7 @@ impl Renderer {
             nodes: Vec::new(),
             rigid: Vec::new(),
             links: Vec::new(),
+            hidden_id: 0,
             map: ShadowMap::new(&scene.lighting),
         });
         moving_shadow.update(view, &objects);
@@ -125,7 +130,8 @@ impl Renderer {
             });
             draw_over_background(&pass, &self.backgrounds[index], &mut self.bins)
         };
-        image.inside = objects.iter().find(|o| o.contains(&lens.eye)).map(|o| o.object.name.clone());
+        image.inside =
+            objects.iter().find(|o| !o.is_hidden && o.contains(&lens.eye)).map(|o| o.object.name.clone());
         Ok(image)
     }
 }

@@ -39,6 +39,8 @@ pub(crate) struct PosedObject<'a> {
     pub(crate) bounds: Bounds,
     /// The level of detail that the image shows; `None` if the object is out of view.
     pub(crate) drawn: Option<MeshInstance<'a>>,
+    /// True if the object is left out of the image.
+    pub(crate) is_hidden: bool,
 }
 
 impl<'a> PosedObject<'a> {
@@ -64,19 +66,21 @@ impl<'a> PosedObject<'a> {
         let caster = pose(caster_level)?;
         let bounds @ [low, high] = bounds_of(caster.posed.positions.iter().copied());
         let (centre, radius) = ((low + high) * 0.5, 0.5 * (high - low).norm());
-        let drawn = if lens.may_see(&centre, BOUNDS_MARGIN * radius) {
+        let is_hidden = view.hidden_id != 0 && object.segmentation_id == view.hidden_id;
+        let drawn = if !is_hidden && lens.may_see(&centre, BOUNDS_MARGIN * radius) {
             let pixel = (lens.depth(&centre) - radius).max(lens.near) / lens.focal;
             let level = mesh.coarsest_where(|lod| lod.is_fine_enough(pixel))?;
             Some(if level == caster_level { caster.clone() } else { pose(level)? })
         } else {
             None
         };
-        Ok(Self { object, caster, bounds, drawn })
+        Ok(Self { object, caster, bounds, drawn, is_hidden })
     }
 
     /// True for small objects that cast shadows, except links of articulations.
     pub(crate) fn is_occluder(&self) -> bool {
         self.object.casts_shadow
+            && !self.is_hidden
             && !matches!(self.object.body, BodyId::Link(_))
             && (self.bounds[1] - self.bounds[0]).max() < MAX_OCCLUDER_EXTENT
     }
