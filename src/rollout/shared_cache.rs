@@ -114,7 +114,7 @@ mod tests {
             assert_eq!(double(&cache, 0, &count), 0, "in use all the time");
         }
         assert_eq!(count.load(Ordering::Relaxed), 10 * MAX_ENTRIES);
-        assert_eq!(lock(&cache.0).len(), MAX_ENTRIES);
+        assert_eq!(lock(&cache.entries).len(), MAX_ENTRIES);
         double(&cache, 1, &count);
         assert_eq!(count.load(Ordering::Relaxed), 10 * MAX_ENTRIES + 1, "an evicted value is computed again");
     }
