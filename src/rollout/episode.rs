@@ -356,14 +356,14 @@ impl Episode {
     /// the state is invalid.
     ///
     /// # Errors
-    /// The controller fails with an error that is not confined to the episode, a sensor stream cannot be computed, or the
-    /// process is [cancelled](softvt_common::cancel).
+    /// The controller fails with an error that is not confined to the episode, a sensor stream cannot be computed, or
+    /// the process is [cancelled](softvt_common::cancel).
     pub fn run(self, controller: &mut dyn Controller) -> Result<FinishedEpisode, EpisodeError> {
         self.run_watched(controller, &mut |_| Ok(()))
     }
 
-    /// As [`run`](Self::run), and calls `watch` in the settled state and after each control step. What it calls must not change the
-    /// state; [`PolicyError::Interrupted`] ends the run.
+    /// As [`run`](Self::run), and calls `watch` in the settled state and after each control step. What it calls must
+    /// not change the state; [`PolicyError::Interrupted`] ends the run.
     ///
     /// # Errors
     /// As [`run`](Self::run), and those of `watch`.

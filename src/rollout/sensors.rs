@@ -155,8 +155,8 @@ impl Sensors {
         image.map_err(|error| SensingError::from(error).set_by(camera))
     }
 
-    /// Renders a close-up of the object `index` as people see best how it deforms: without the robot, the skin of soft bodies coloured
-    /// by their strain over the stable strain of their material. Never an input of a policy.
+    /// Renders a close-up of the object `index` as people see best how it deforms: without the robot, the skin of
+    /// soft bodies coloured by their strain over the stable strain of their material. Never an input of a policy.
     ///
     /// # Errors
     /// As [`render`](Self::render).

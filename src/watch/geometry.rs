@@ -5,8 +5,8 @@ use serde_json::{Value, json};
 use crate::message::Message;
 use softvt_geometry::Pose;
 use softvt_physics::BodyId;
-use softvt_rollout::{Episode, ObjectInstance, ROBOT_SEGMENTATION_ID, SensingError};
-use softvt_scene::{Body, Camera, CameraMount};
+use softvt_rollout::{Episode, ObjectInstance, SensingError};
+use softvt_scene::{Body, Camera, CameraMount, ROBOT_SEGMENTATION_ID};
 use softvt_sensing::camera::DisplayMesh;
 
 /// Numbers of a pose: position, m, and quaternion, x y z w.

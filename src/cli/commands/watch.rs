@@ -13,7 +13,7 @@ use crate::{
     error::{CliError, flag_of},
     output::{Console, print},
 };
-use softvt_common::episode_id::EpisodeSplit;
+use softvt_common::{episode_id::EpisodeSplit, text::hex};
 use softvt_report::stored_run::{self, StoredRun};
 use softvt_runner::{
     ConfiguredScript, Observer, RunConfig, replay::recorded_config, selection::select_tasks,
@@ -41,7 +41,10 @@ pub(crate) struct WatchArgs {
     /// Port of the page; 0 for any free port
     #[arg(long, value_name = "PORT", default_value = "0")]
     port: u16,
-    /// Record the episodes that are driven from the page (policy teleop) in a run folder, which is continued if it exists; softvt record --policy DIR makes demonstrations of them
+    /// Record the episodes that are driven by hand in a run folder
+    ///
+    /// Those of the policy teleop, of the demonstration split. A folder that exists is continued; softvt record --policy DIR
+    /// makes demonstrations of it.
     #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     out: Option<PathBuf>,
     /// Episodes per task of the run in --out [default: set by the suite]
@@ -123,5 +126,5 @@ fn recorded_program(args: &WatchArgs) -> Result<Program, CliError> {
 fn token() -> Result<String, CliError> {
     let mut bytes = [0; 16];
     getrandom::fill(&mut bytes).map_err(|error| CliError::input(format!("no random numbers: {error}")))?;
-    Ok(bytes.iter().map(|byte: &u8| format!("{byte:02x}")).collect())
+    Ok(hex(&bytes))
 }

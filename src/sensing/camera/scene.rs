@@ -78,7 +78,8 @@ pub struct FrameView<'a> {
     pub links: &'a [Vec<Pose>],
     /// Pose of the robot's hand, world, for cameras mounted on it.
     pub hand_w: Option<Pose>,
-    /// Albedo at the nodes of each soft body, linear RGB, in place of its materials; those of its materials where it is empty.
+    /// Albedo at the nodes of each soft body, linear RGB, in place of its materials; those of its materials where it
+    /// is empty.
     pub node_colours: &'a [Vec<[f32; 3]>],
     /// Segmentation id of objects that are left out of the image, and of its shadows; 0 for none.
     pub hidden_id: u16,
@@ -258,8 +259,8 @@ impl PosedMesh {
         })
     }
 
-    /// Places a level that is embedded in a soft body with these nodes, and colours of them if there are any. An error is the
-    /// reason why it cannot.
+    /// Places a level that is embedded in a soft body with these nodes, and colours of them if there are any. An
+    /// error is the reason why it cannot.
     fn embedded(lod: &Lod, nodes: &[Vec3], colours: &[[f32; 3]]) -> Result<Self, String> {
         if lod.embedding.len() != lod.positions.len() {
             return Err("nodes for it, but its mesh is not embedded in a soft body".to_owned());

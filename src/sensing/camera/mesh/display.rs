@@ -33,8 +33,8 @@ pub struct DisplayMesh {
 }
 
 impl RenderMesh {
-    /// The mesh at the level of detail that looks like the finest one at a millimetre per pixel, with the colour of its textures at
-    /// the vertices.
+    /// The mesh at the level of detail that looks like the finest one at a millimetre per pixel, with the colour of
+    /// its textures at the vertices.
     ///
     /// # Errors
     /// The level cannot be built.
