@@ -54,6 +54,7 @@ pub struct Sensors {
     skins: Vec<Option<Arc<TactileSkin>>>,
     render_scene: Option<Arc<RenderScene>>,
     renderer: Renderer,
+    close_up_renderer: Renderer,
     gel_scratch: GelScratch,
     seed: SensorSeed,
 }
@@ -71,6 +72,7 @@ impl Clone for Sensors {
             skins: self.skins.clone(),
             render_scene: self.render_scene.clone(),
             renderer: Renderer::default(),
+            close_up_renderer: Renderer::default(),
             gel_scratch: GelScratch::default(),
             seed: self.seed,
         }
@@ -103,6 +105,7 @@ impl Sensors {
             skins: vec![None; sim.objects.len()],
             render_scene: None,
             renderer: Renderer::default(),
+            close_up_renderer: Renderer::default(),
             gel_scratch: GelScratch::default(),
             seed: SensorSeed::default(),
         }
@@ -172,9 +175,14 @@ impl Sensors {
         };
         let colours: Vec<Vec<[f32; 3]>> =
             frame.nodes.iter().enumerate().map(|(body, x)| self.skin(body, x)).collect();
-        let view = FrameView { node_colours: &colours, hidden_id: ROBOT_SEGMENTATION_ID, ..self.view(frame) };
+        let view = FrameView {
+            node_colours: &colours,
+            hidden_id: ROBOT_SEGMENTATION_ID,
+            hand_w: Some(Pose::identity()),
+            ..self.view(frame)
+        };
         let camera = close_up_camera(&self.objects[index], frame, edge);
-        let image = Renderer::without_backgrounds().render(&render_scene, &view, &camera);
+        let image = self.close_up_renderer.render(&render_scene, &view, &camera);
         self.render_scene = Some(render_scene);
         Ok(image?.into_rgb_image())
     }
@@ -484,7 +492,8 @@ fn close_up_camera(object: &ObjectInstance, frame: &WorldSnapshot, edge: usize) 
     let pose = Pose::from_parts(eye.into(), Quat::face_towards(&away, &Vec3::z()));
     Camera {
         name: "close_up".to_owned(),
-        mount: CameraMount::World,
+        // With the hand at the world's origin: a moving camera keeps no background.
+        mount: CameraMount::Hand,
         pose,
         fovy_rad: CLOSE_UP_FOVY,
         near_m: 0.01,

@@ -31,6 +31,8 @@ use softvt_sensing::{
 
 /// Edge of the panels on top, pixels: the third-person camera, and the target from nearby.
 const TOP_PANEL: u32 = 512;
+/// Edge of the image of the target, which is drawn larger: it costs as much as the other two.
+const CLOSE_UP_EDGE: usize = 384;
 /// Edge of the panel of the wrist camera, pixels.
 const WRIST_PANEL: u32 = 384;
 /// Size of the finger panels beside it, pixels: that of the sensors' images.
@@ -191,7 +193,8 @@ fn video_frame(
     };
     canvas.place(&seen(sensors, STANDARD_CAMERAS[0], TOP_PANEL)?, 0, 0);
     draw_label(&mut canvas, "third person", 0, 0);
-    canvas.place(&sensors.close_up(frame, recording.target, TOP_PANEL as usize)?, TOP_PANEL, 0);
+    let close_up = sensors.close_up(frame, recording.target, CLOSE_UP_EDGE)?;
+    canvas.place(&resize(&close_up, TOP_PANEL, TOP_PANEL), TOP_PANEL, 0);
     draw_label(&mut canvas, "object without the robot, by strain", TOP_PANEL, 0);
     canvas.place(&seen(sensors, STANDARD_CAMERAS[1], WRIST_PANEL)?, 0, TOP_PANEL);
     draw_label(&mut canvas, "wrist", 0, TOP_PANEL);
