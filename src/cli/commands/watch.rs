@@ -43,8 +43,8 @@ pub(crate) struct WatchArgs {
     port: u16,
     /// Record the episodes that are driven by hand in a run folder
     ///
-    /// Those of the policy teleop, of the demonstration split. A folder that exists is continued; softvt record --policy DIR
-    /// makes demonstrations of it.
+    /// Those of the policy teleop, of the demonstration split. A folder that exists is continued. softvt record
+    /// --policy DIR makes demonstrations of it.
     #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     out: Option<PathBuf>,
     /// Episodes per task of the run in --out [default: set by the suite]
