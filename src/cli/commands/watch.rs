@@ -41,10 +41,7 @@ pub(crate) struct WatchArgs {
     /// Port of the page; 0 for any free port
     #[arg(long, value_name = "PORT", default_value = "0")]
     port: u16,
-    /// Record the episodes that are driven by hand in a run folder
-    ///
-    /// Those of the policy teleop, of the demonstration split. A folder that exists is continued. softvt record
-    /// --policy DIR makes demonstrations of it.
+    /// Record the episodes that are driven from the page in a run folder: docs/watch.md
     #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     out: Option<PathBuf>,
     /// Episodes per task of the run in --out [default: set by the suite]
