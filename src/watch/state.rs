@@ -29,7 +29,7 @@ pub(crate) fn state_message(episode: &mut Episode, moving: &[MovingObject]) -> R
         let markers = reading.markers.initial.iter().zip(&reading.markers.current);
         tactile.push(json!({
             "image": message.bytes(jpeg(&reading.image)),
-            "markers": message.floats(markers.flat_map(|(from, to)| [from[0], from[1], to[0], to[1]].map(|px| px as f32))),
+            "markers": message.floats(markers.flat_map(|(from, to)| [from[0], from[1], to[0], to[1]])),
         }));
     }
     let world = &episode.sim.world;
