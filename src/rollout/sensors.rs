@@ -504,7 +504,7 @@ fn close_up_camera(object: &ObjectInstance, frame: &WorldSnapshot, edge: usize) 
     }
 }
 
-/// Linear RGB of a strain over the stable strain: pale to orange up to 1, vermilion beyond and nowhere else.
+/// Linear RGB of a strain over the stable strain: pale to orange up to 1, red beyond and nowhere else.
 fn strain_colour(ratio: f64) -> [f32; 3] {
     const RAMP: [(f64, [f32; 3]); 4] = [
         (0.0, [0.88, 0.85, 0.79]),

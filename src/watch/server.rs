@@ -1,6 +1,6 @@
 //! The web server: the page, the feed over websockets, and the requests of pages.
 //!
-//! Requests are answered only with the token, which the address of the page has, and under the address of this machine, so that no
+//! Requests are answered only with the token, but for the scripts of the page; its address has the token, and under the address of this machine, so that no
 //! other page and no other user of the machine can use the server.
 
 use std::{
@@ -76,21 +76,32 @@ impl Watch {
     }
 
     /// Simulates and answers pages until the program is cancelled.
-    pub fn run(&self, program: Program) {
+    ///
+    /// # Errors
+    /// The server has failed.
+    pub fn run(&self, program: Program) -> Result<(), WatchError> {
         let (selections, requests) = channel();
         let (feed, drive) = (Arc::new(Feed::default()), Arc::new(DriveInput::default()));
         let page = Page { access: self.access.clone(), feed: feed.clone(), selections, drive: drive.clone() };
-        let stage = Stage { program, feed, requests, drive, files: Default::default() };
+        let stage = Stage { program, feed, requests, drive, files: Default::default(), is_outdated: false };
         thread::scope(|scope| {
             scope.spawn(move || stage.run());
             while !cancel::requested() {
-                // An error ends one connection.
-                let Ok(Some(request)) = self.server.recv_timeout(WAIT) else { continue };
+                let request = match self.server.recv_timeout(WAIT) {
+                    Ok(Some(request)) => request,
+                    Ok(None) => continue,
+                    // No connection is accepted any more.
+                    Err(error) => {
+                        cancel::request();
+                        return Err(WatchError(error));
+                    }
+                };
                 let page = page.clone();
                 // Not awaited at the end: a page that reads nothing would hold up the program.
                 thread::spawn(move || page.answer(request));
             }
-        });
+            Ok(())
+        })
     }
 }
 

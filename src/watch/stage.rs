@@ -2,7 +2,8 @@
 
 use std::{
     collections::BTreeMap,
-    path::PathBuf,
+    panic::{self, AssertUnwindSafe},
+    path::{Path, PathBuf},
     sync::{Arc, mpsc::Receiver},
     time::{Duration, SystemTime},
 };
@@ -68,30 +69,37 @@ pub(crate) struct Stage {
     pub(crate) requests: Receiver<Selection>,
     pub(crate) drive: Arc<DriveInput>,
     pub(crate) files: Versions,
+    /// True once the episode that is simulated was replaced by another, or one of its files was saved.
+    pub(crate) is_outdated: bool,
 }
 
 impl Stage {
     /// Simulates episode after episode until the program is cancelled.
     pub(crate) fn run(mut self) {
         while !cancel::requested() {
-            match self.simulate() {
+            self.is_outdated = false;
+            let simulated = panic::catch_unwind(AssertUnwindSafe(|| self.simulate()));
+            match simulated
+                .unwrap_or_else(|_| Err(RunError::input("internal error: the simulation has failed")))
+            {
                 Ok(()) => {}
-                Err(_) if self.is_outdated() => continue,
+                Err(_) if self.look_outdated() => continue,
                 Err(error) => self.feed.push(plain(json!({ "type": "error", "message": error.to_string() }))),
             }
-            while !cancel::requested() && !self.is_outdated() {
+            while !self.look_outdated() {
                 std::thread::sleep(POLL);
             }
         }
     }
 
-    /// True if another episode was asked for, or a file was saved. Takes in the request.
-    fn is_outdated(&mut self) -> bool {
+    /// True if another episode was asked for, a file was saved, or the program ends. Takes in the request.
+    fn look_outdated(&mut self) -> bool {
         if let Some(selection) = self.requests.try_iter().last() {
             self.program.selection = selection;
-            return true;
+            self.is_outdated = true;
         }
-        cancel::requested() || self.files.iter().any(|(path, version)| version_of(path) != *version)
+        self.is_outdated |= self.files.iter().any(|(path, version)| version_of(path) != *version);
+        self.is_outdated || cancel::requested()
     }
 
     /// Simulates the selected episode and tells its states.
@@ -101,8 +109,10 @@ impl Stage {
     fn simulate(&mut self) -> Result<(), RunError> {
         let config = self.program.config.clone();
         let main = config.file.clone();
-        // Until the script is loaded, its files are those of before.
-        self.files.entry(main).or_default();
+        // Versions are those before the script is read, so that no later one is missed. Until it is loaded, its files are
+        // those of before, and all scripts beside it: one of them may have the error.
+        self.files.entry(main.clone()).or_default();
+        scripts_beside(&main).into_iter().for_each(|path| drop(self.files.entry(path).or_default()));
         self.files.iter_mut().for_each(|(path, version)| *version = version_of(path));
         let name = config.file.display().to_string();
         let loaded = config.load();
@@ -117,7 +127,9 @@ impl Stage {
         let suites = suites_of(&script.plan);
         self.feed.begin(plain(about(suites)));
         let names = script.file_hashes().into_keys().map(PathBuf::from);
-        self.files = names.map(|path| (path.clone(), version_of(&path))).collect();
+        let before = std::mem::take(&mut self.files);
+        let version = |path: &PathBuf| before.get(path).copied().unwrap_or_else(|| version_of(path));
+        self.files = names.map(|path| (path.clone(), version(&path))).collect();
         config.policy = self.policy()?;
         let (suite, task) = find_task(&config, suites, &self.program.selection)?;
         let job = EpisodeJob { task, episode: self.program.selection.episode };
@@ -137,12 +149,8 @@ impl Stage {
         let mut moving: Option<Vec<MovingObject>> = None;
         let mut tell = |episode: &mut Episode| self.tell(episode, &mut moving);
         let finished = run.run_episode_watched(job, &mut tell)?;
-        let told = end_message(&finished);
-        if is_recorded {
-            record(&config, &run, finished)?;
-        }
-        self.feed.push(told);
-        Ok(())
+        self.feed.push(end_message(&finished));
+        if is_recorded { record(&config, &run, finished) } else { Ok(()) }
     }
 
     /// Makes controllers that are driven from the page.
@@ -157,7 +165,7 @@ impl Stage {
         episode: &mut Episode,
         moving: &mut Option<Vec<MovingObject>>,
     ) -> Result<(), PolicyError> {
-        if self.is_outdated() {
+        if self.look_outdated() {
             return Err(PolicyError::Interrupted);
         }
         let failed = |error: SensingError| PolicyError::Action(error.to_string());
@@ -214,6 +222,15 @@ fn record(config: &RunConfig, run: &PreparedRun, finished: FinishedEpisode) -> R
     drop(recorder);
     let (_, written) = served.finish();
     recorded.and(written)
+}
+
+/// The scripts in the folder of a script.
+fn scripts_beside(script: &Path) -> Vec<PathBuf> {
+    let folder = script.parent().unwrap_or(Path::new(""));
+    let listed = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let entries = std::fs::read_dir(listed).into_iter().flatten().filter_map(Result::ok);
+    let names = entries.map(|entry| folder.join(entry.file_name()));
+    names.filter(|path| path.extension().is_some_and(|extension| extension == "lua")).collect()
 }
 
 fn version_of(path: &PathBuf) -> Option<(u64, SystemTime)> {

@@ -161,6 +161,18 @@ fn a_saved_script_starts_anew_and_its_errors_are_told() {
 }
 
 #[test]
+fn an_episode_is_replaced_while_it_is_simulated() {
+    let project = Small { task: "budget_steps = 400", expert: "arm:wait(30)", ..Small::default() }.project();
+    let page = Page::start(&project, "x.lua");
+    let mut feed = page.feed();
+    feed.until("state");
+    assert_eq!(page.post("/select", &json!({ "episode": 2 })).0, 200);
+    let (opened, _) = feed.until("open");
+    assert_eq!(opened["selected"]["episode"], 2);
+    feed.until("state");
+}
+
+#[test]
 fn only_the_own_page_is_answered() {
     let project = project();
     let page = Page::start(&project, "x.lua");

@@ -23,8 +23,8 @@ use softvt_watch::{Program, Selection, Watch};
 
 /// Show episodes on a local web page, while they are simulated and afterwards
 ///
-/// The page has the scene to look around in, both tactile pictures, and what the judge measures. A script that is saved again starts
-/// anew. With a run folder, the page shows its episodes by their recorded actions.
+/// The page has the scene to look around in, both tactile pictures, and what the judge measures. A script that is
+/// saved again starts anew. With a run folder, the page shows its episodes by their recorded actions.
 #[derive(Args, Clone, Debug)]
 #[command(override_usage = "softvt watch [OPTIONS] <FILE.lua|RUN>")]
 pub(crate) struct WatchArgs {
@@ -63,7 +63,7 @@ pub(super) fn run(args: WatchArgs) -> Result<(), CliError> {
     })?;
     print(&format!("{}\n", watch.url()))?;
     QUIET_INTERRUPT.store(true, Ordering::Relaxed);
-    watch.run(program);
+    watch.run(program).map_err(|error| CliError::input(format!("the page has failed: {}", error.0)))?;
     Err(CliError::interrupted(""))
 }
 

@@ -81,7 +81,7 @@ pub struct FrameView<'a> {
     /// Albedo at the nodes of each soft body, linear RGB, in place of its materials; those of its materials where it
     /// is empty.
     pub node_colours: &'a [Vec<[f32; 3]>],
-    /// Segmentation id of objects that are left out of the image, and of its shadows; 0 for none.
+    /// Segmentation id of objects that are left out of the image, and of the shadows of what moves; 0 for none.
     pub hidden_id: u16,
 }
 

@@ -8,6 +8,7 @@ export class Plot {
   constructor(canvas, options, seek) {
     this.canvas = canvas;
     this.options = options;
+    this.span = 0;
     canvas.addEventListener("pointerdown", (event) => {
       const share = (event.offsetX - LEFT) / (canvas.clientWidth - LEFT);
       seek(Math.max(0, Math.min(1, share)) * this.span);

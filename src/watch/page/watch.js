@@ -210,7 +210,7 @@ $("back").onclick = () => { setPlaying(false); seek(Math.floor(player.cursor) - 
 $("forward").onclick = () => { setPlaying(false); seek(Math.floor(player.cursor) + 1); };
 $("time").oninput = () => { setPlaying(false); seek(Number($("time").value)); };
 $("suite").onchange = () => { fillTasks(0); select(); };
-for (const id of ["task", "episode", "policy"]) $(id).onchange = select;
+for (const id of ["task", "episode", "policy"]) $(id).onchange = () => { $(id).blur(); select(); };
 $("again").onclick = select;
 for (const id of ["camera", "skin"]) {
   $(id).onchange = () => {
@@ -239,7 +239,10 @@ const KEYS = {
 const pressed = new Set();
 const isTeleop = () => menu?.selected.policy === "teleop" && !player.end;
 addEventListener("keydown", (event) => {
-  if (isTeleop() && KEYS[event.key.toLowerCase()] && event.target.tagName !== "INPUT") pressed.add(event.key.toLowerCase());
+  if (!isTeleop() || !KEYS[event.key.toLowerCase()] || event.ctrlKey || event.metaKey || event.target.tagName === "INPUT") return;
+  // Letters would select an entry of a menu.
+  event.preventDefault();
+  pressed.add(event.key.toLowerCase());
 });
 addEventListener("keyup", (event) => pressed.delete(event.key.toLowerCase()));
 addEventListener("blur", () => pressed.clear());
