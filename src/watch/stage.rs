@@ -149,8 +149,10 @@ impl Stage {
         let mut moving: Option<Vec<MovingObject>> = None;
         let mut tell = |episode: &mut Episode| self.tell(episode, &mut moving);
         let finished = run.run_episode_watched(job, &mut tell)?;
-        self.feed.push(end_message(&finished));
-        if is_recorded { record(&config, &run, finished) } else { Ok(()) }
+        let told = end_message(&finished);
+        let recorded = if is_recorded { record(&config, &run, finished) } else { Ok(()) };
+        self.feed.push(told);
+        recorded
     }
 
     /// Makes controllers that are driven from the page.
