@@ -109,10 +109,12 @@ impl Stage {
     fn simulate(&mut self) -> Result<(), RunError> {
         let config = self.program.config.clone();
         let main = config.file.clone();
-        // Versions are those before the script is read, so that no later one is missed. Until it is loaded, its files are
-        // those of before, and all scripts beside it: one of them may have the error.
+        // Versions are those before the script is read, so that no later one is missed. Until it is loaded, its
+        // files are those of before, and all scripts beside it: one of them may have the error.
         self.files.entry(main.clone()).or_default();
-        scripts_beside(&main).into_iter().for_each(|path| drop(self.files.entry(path).or_default()));
+        for path in scripts_beside(&main) {
+            self.files.entry(path).or_default();
+        }
         self.files.iter_mut().for_each(|(path, version)| *version = version_of(path));
         let name = config.file.display().to_string();
         let loaded = config.load();
