@@ -7,8 +7,8 @@ use std::sync::{Arc, Mutex};
 
 use softvt_common::parallel::lock;
 
-/// Maximum number of entries, unless stated. A suite has a few dozen assets, but a layout with random appearance adds new ones of
-/// several megabytes in every episode.
+/// Maximum number of entries, unless stated. A suite has a few dozen assets, but a layout with random appearance adds
+/// new ones of several megabytes in every episode.
 const MAX_ENTRIES: usize = 64;
 
 /// The slot of a value: empty until the value is computed.

@@ -1,7 +1,8 @@
 //! Messages to a page: a JSON object and arrays of numbers or bytes that it refers to by index.
 //!
-//! In bytes: the length of the JSON text (u32, little-endian), the text, padded with spaces to a multiple of four bytes, then the
-//! arrays, each padded with zeros likewise. The field `blobs` of the object has their lengths in bytes.
+//! In bytes: the length of the JSON text (u32, little-endian), the text, padded with spaces to a multiple of four
+//! bytes, then the arrays, each padded with zeros likewise. The field `blobs` of the object has their lengths in
+//! bytes.
 
 use serde_json::{Value, json};
 

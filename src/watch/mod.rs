@@ -1,9 +1,9 @@
-//! Episodes on a local web page: a scene to look around in, both tactile pictures, and what the judge measures, while an
-//! episode is simulated and afterwards.
+//! Episodes on a local web page: a scene to look around in, both tactile pictures, and what the judge measures, while
+//! an episode is simulated and afterwards.
 //!
-//! A [`Watch`] has one thread that simulates the episode that was asked for last and appends a message for every control step
-//! to a feed; a server thread answers the requests of browsers, and each open page has a thread that sends it the feed over a
-//! websocket. A script that is saved again starts its episode anew.
+//! A [`Watch`] has one thread that simulates the episode that was asked for last and appends a message for every
+//! control step to a feed; a server thread answers the requests of browsers, and each open page has a thread that
+//! sends it the feed over a websocket. A script that is saved again starts its episode anew.
 #![warn(missing_docs, unreachable_pub)]
 
 mod feed;

@@ -1,7 +1,7 @@
 //! The web server: the page, the feed over websockets, and the requests of pages.
 //!
-//! Requests are answered only with the token, but for the scripts of the page; its address has the token, and under the address of this machine, so that no
-//! other page and no other user of the machine can use the server.
+//! Requests are answered only with the token, but for the scripts of the page; its address has the token, and under
+//! the address of this machine, so that no other page and no other user of the machine can use the server.
 
 use std::{
     io::{self, Read},

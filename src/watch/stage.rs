@@ -1,4 +1,5 @@
-//! The thread that simulates: the episode that was asked for last, from its start, again when one of its files is saved.
+//! The thread that simulates: the episode that was asked for last, from its start, again when one of its files is
+//! saved.
 
 use std::{
     collections::BTreeMap,

@@ -22,8 +22,8 @@ pub fn compressive_strain(f: &Mat3) -> f64 {
     1.0 - smallest * if f.determinant() < 0.0 { -1.0 } else { 1.0 }
 }
 
-/// Compressive strain at every node of a body whose nodes are at `x`, for displays: the mean over the Gauss points of its elements, weighted by their volume; 0 where
-/// none is counted.
+/// Compressive strain at every node of a body whose nodes are at `x`, for displays: the mean over the Gauss points of
+/// its elements, weighted by their volume; 0 where none is counted.
 pub fn node_strains(model: &FemModel, x: &[Vec3]) -> Vec<f64> {
     let mesh = &model.mesh;
     let (mut sums, mut weights) = (vec![0.0; mesh.nodes.len()], vec![0.0; mesh.nodes.len()]);

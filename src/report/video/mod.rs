@@ -1,5 +1,5 @@
-//! Videos and still images of episodes: the third-person camera and the target from nearby on top, the wrist camera and both fingers below
-//! them, and the deformation over its limit at the bottom.
+//! Videos and still images of episodes: the third-person camera and the target from nearby on top, the wrist camera
+//! and both fingers below them, and the deformation over its limit at the bottom.
 
 use std::{
     path::{Path, PathBuf},
@@ -258,7 +258,8 @@ fn draw_caption(canvas: &mut Canvas, recording: &StateRecording, caption: &Video
 /// Upper end of the axis of D over τ.
 const MAX_RATIO: f64 = 2.0;
 
-/// Plots D over its limit τ against time up to the state `index`, on an axis that is the same in all videos. `y` is the top of the chart.
+/// Plots D over its limit τ against time up to the state `index`, on an axis that is the same in all videos. `y` is
+/// the top of the chart.
 fn draw_deformation_chart(
     canvas: &mut Canvas,
     recording: &StateRecording,
