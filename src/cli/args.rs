@@ -2,17 +2,22 @@
 //!
 //! The doc comments of the fields are the help text that `--help` prints.
 
-use std::{path::PathBuf, sync::Arc, time::Duration};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Duration,
+};
 
 use clap::{Args, ValueEnum, value_parser};
 
 use crate::{error::CliError, output::Console, plan_flags};
-use softvt_benchmark::{ShiftValue, Teacher};
+use softvt_benchmark::{ShiftValue, Suite, Task, Teacher};
 use softvt_policy::{profile::GripCode, remote::ServerProtocol};
 use softvt_records::requirement::Requirement;
+use softvt_report::stored_run::{self, StoredRun};
 use softvt_runner::{
     ConfiguredScript, PolicyConfig, PolicyOptions, PolicySource, RunConfig, Shard, TraceDetail,
-    VideoSelection, parse_profile, read_secret, recording::RecordingOptions,
+    VideoSelection, parse_profile, read_secret, recording::RecordingOptions, selection::select_tasks,
 };
 use softvt_script::STANDARD_VARIATION;
 
@@ -321,4 +326,32 @@ fn parse_timeout(word: &str) -> Result<Duration, String> {
 fn parse_name(word: &str) -> Result<String, String> {
     let is_valid = !word.trim().is_empty() && word.len() <= 80 && !word.chars().any(char::is_control);
     if is_valid { Ok(word.to_owned()) } else { Err("expected a name of 1 to 80 characters".to_owned()) }
+}
+/// The only task that the configuration selects.
+///
+/// # Errors
+/// It selects none, or several.
+pub(crate) fn select_one_task<'a>(config: &RunConfig, suite: &'a Suite) -> Result<&'a Task, CliError> {
+    let tasks = select_tasks(config, suite)?;
+    let [task] = tasks[..] else {
+        let ids = tasks.iter().map(|task| task.id.to_string()).collect::<Vec<_>>().join(", ");
+        let word = config.tasks.join(",");
+        let message = format!("--task {word:?} matches the tasks {ids}; select one by its index");
+        return Err(config.error(message).into());
+    };
+    Ok(task)
+}
+
+/// The only run in a folder.
+///
+/// # Errors
+/// The folder contains no run, or several.
+pub(crate) fn load_one_run(dir: &Path) -> Result<StoredRun, CliError> {
+    let mut runs = stored_run::load(dir)?;
+    if runs.len() > 1 {
+        let names = runs.iter().map(|run| run.dir.display().to_string()).collect::<Vec<_>>().join(", ");
+        let message = format!("{} contains several runs; select one of {names}", dir.display());
+        return Err(CliError::input(message));
+    }
+    Ok(runs.remove(0))
 }

@@ -149,12 +149,8 @@ impl Sensors {
     /// # Errors
     /// A parameter of the camera or the light is out of range, or an object cannot be rendered.
     pub fn render(&mut self, frame: &WorldSnapshot, camera: &Camera) -> Result<RenderedImage, SensingError> {
-        let render_scene = match self.render_scene.take() {
-            Some(built) => built,
-            None => Arc::new(self.build()?),
-        };
+        let render_scene = self.built_scene()?;
         let image = self.renderer.render(&render_scene, &self.view(frame), camera);
-        self.render_scene = Some(render_scene);
         image.map_err(|error| SensingError::from(error).set_by(camera))
     }
 
@@ -169,10 +165,7 @@ impl Sensors {
         index: usize,
         edge: usize,
     ) -> Result<RgbImage, SensingError> {
-        let render_scene = match self.render_scene.take() {
-            Some(built) => built,
-            None => Arc::new(self.build()?),
-        };
+        let render_scene = self.built_scene()?;
         let colours: Vec<Vec<[f32; 3]>> =
             frame.nodes.iter().enumerate().map(|(body, x)| self.skin(body, x)).collect();
         let view = FrameView {
@@ -182,9 +175,8 @@ impl Sensors {
             ..self.view(frame)
         };
         let camera = close_up_camera(&self.objects[index], frame, edge);
-        let image = self.close_up_renderer.render(&render_scene, &view, &camera);
-        self.render_scene = Some(render_scene);
-        Ok(image?.into_rgb_image())
+        let image = self.close_up_renderer.render(&render_scene, &view, &camera)?;
+        Ok(image.into_rgb_image())
     }
 
     /// Colours of the nodes of a soft body by their strain; none without a stable strain.
@@ -195,8 +187,7 @@ impl Sensors {
         let (Some(model), Body::Soft(material)) = (&object.model, &object.asset.body) else {
             return Vec::new();
         };
-        let limits = [material.collapse_strain, material.damage_strain];
-        let Some(stable) = limits.into_iter().flatten().reduce(f64::min) else { return Vec::new() };
+        let Some(stable) = material.stable_strain() else { return Vec::new() };
         node_strains(model, x).into_iter().map(|strain| strain_colour(strain / stable)).collect()
     }
 
@@ -220,15 +211,17 @@ impl Sensors {
     /// # Errors
     /// An object cannot be rendered, or a parameter of the light is out of range.
     pub fn render_scene(&mut self) -> Result<&RenderScene, SensingError> {
-        let render_scene = match self.render_scene.take() {
-            Some(built) => built,
-            None => Arc::new(self.build()?),
-        };
-        Ok(self.render_scene.insert(render_scene))
+        let built = self.built_scene()?;
+        Ok(self.render_scene.insert(built))
     }
 
-    fn build(&self) -> Result<RenderScene, CameraError> {
-        RenderScene::new(self.render_objects()?, self.scene.lighting.clone())
+    /// The same, shared, so that a renderer can be used meanwhile.
+    fn built_scene(&mut self) -> Result<Arc<RenderScene>, CameraError> {
+        if let Some(built) = &self.render_scene {
+            return Ok(built.clone());
+        }
+        let built = Arc::new(RenderScene::new(self.render_objects()?, self.scene.lighting.clone())?);
+        Ok(self.render_scene.insert(built).clone())
     }
 
     /// The parts of a state that images depend on.

@@ -327,12 +327,24 @@ impl<'a> SuiteRun<'a> {
         keep_states: bool,
         controllers: &ControllerFactory,
     ) -> Result<Result<FinishedEpisode, EpisodeError>, RunError> {
+        self.simulate(job, origin, keep_states, controllers, &mut |_| Ok(()))
+    }
+
+    /// Runs one episode, and calls `watch` as [`Episode::run_watched`] does.
+    fn simulate(
+        &self,
+        job: EpisodeJob<'_>,
+        origin: Option<&DemonstrationOrigin>,
+        keep_states: bool,
+        controllers: &ControllerFactory,
+        watch: &mut dyn FnMut(&mut Episode) -> Result<(), PolicyError>,
+    ) -> Result<Result<FinishedEpisode, EpisodeError>, RunError> {
         let (spec, opened) = self.spec(job.task, &self.episode_id(job.task, job.episode), origin)?;
         let brief = EpisodeBrief { prompt: opened.prompt.clone(), ..self.brief(job.task, job.episode) };
         let mut controller = controllers(opened, brief)?;
         let spec = EpisodeSpec { record_states: keep_states, ..spec };
         let started = Episode::start(spec, &self.assets, &self.sensor_assets);
-        Ok(started.and_then(|started| started.run(&mut *controller)))
+        Ok(started.and_then(|started| started.run_watched(&mut *controller, watch)))
     }
 
     /// Runs one episode, and calls `watch` in its settled state and after each control step ([`Episode::run_watched`]).
@@ -344,11 +356,7 @@ impl<'a> SuiteRun<'a> {
         job: EpisodeJob<'_>,
         watch: &mut dyn FnMut(&mut Episode) -> Result<(), PolicyError>,
     ) -> Result<FinishedEpisode, RunError> {
-        let (spec, opened) = self.spec(job.task, &self.episode_id(job.task, job.episode), None)?;
-        let brief = EpisodeBrief { prompt: opened.prompt.clone(), ..self.brief(job.task, job.episode) };
-        let mut controller = (self.controllers)(opened, brief)?;
-        let started = Episode::start(spec, &self.assets, &self.sensor_assets);
-        let run = started.and_then(|started| started.run_watched(&mut *controller, watch));
+        let run = self.simulate(job, None, false, &self.controllers, watch)?;
         run.map_err(|error| self.episode_error(&error))
     }
 

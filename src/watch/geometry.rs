@@ -63,9 +63,7 @@ pub(crate) fn scene_message(
 /// The soft bodies in the order of their ids, with the strain at which their material stops being stable.
 fn soft_body(object: &ObjectInstance) -> Option<Value> {
     let (BodyId::Soft(_), Body::Soft(material)) = (object.body, &object.asset.body) else { return None };
-    let limits = [material.collapse_strain, material.damage_strain];
-    let stable = limits.into_iter().flatten().reduce(f64::min);
-    Some(json!({ "name": object.name, "stable_strain": stable }))
+    Some(json!({ "name": object.name, "stable_strain": material.stable_strain() }))
 }
 
 fn camera(camera: &Camera) -> Value {

@@ -178,10 +178,7 @@ impl Stage {
             let spec = episode.spec();
             let about = json!({
                 "prompt": spec.task.prompt,
-                "layout": spec.task.layout,
-                "budget": spec.task.budget_steps,
                 "control_hz": CONTROL_HZ,
-                "effort_n": spec.settings.robot.gripper.effort,
             });
             let (message, objects) = scene_message(episode, about).map_err(failed)?;
             self.feed.push(message);

@@ -11,7 +11,7 @@ use crate::{
 };
 use softvt_geometry::Pose;
 use softvt_physics::{BodyId, fem::strain::node_strains};
-use softvt_robot::{Side, rotation};
+use softvt_robot::Side;
 use softvt_rollout::{Episode, SensingError, Sensors};
 
 /// Quality of the tactile pictures, 1 to 100.
@@ -66,7 +66,6 @@ fn measured(episode: &Episode) -> Value {
     let target = &episode.sim.objects[episode.target()].name;
     let target = trace.objects.iter().find(|object| object.name == *target);
     json!({
-        "step": trace.step,
         "time_s": trace.time_s,
         "d_pct": target.and_then(|object| object.d_pct),
         "d_peak_pct": verdict.d_peak,
@@ -77,9 +76,7 @@ fn measured(episode: &Episode) -> Value {
         "closure": trace.closure,
         "grip_ratio": verdict.grip_ratio,
         "collapsed_pct": verdict.collapsed_volume_pct,
-        "goal": verdict.goal,
         "no_drop": verdict.no_drop,
-        "deformation_ok": verdict.deformation_ok,
     })
 }
 
@@ -101,8 +98,7 @@ fn contact_points(episode: &Episode) -> Vec<f32> {
 /// Pose that the last action asks the tool for, world.
 fn commanded(episode: &Episode) -> Option<Pose> {
     let action = episode.last_action()?;
-    let rotation = rotation::from_axis_angle(&action.axis_angle_b);
-    Some(episode.sim.robot.base_w * Pose::from_parts(action.position_b.into(), rotation))
+    Some(episode.sim.robot.base_w * action.pose_b())
 }
 
 fn jpeg(image: &RgbImage) -> Vec<u8> {

@@ -5,11 +5,12 @@ use std::{path::PathBuf, sync::Arc};
 use clap::Args;
 
 use crate::{
+    args::load_one_run,
     error::CliError,
     output::{Console, print, report_replays},
 };
 use softvt_dataset::layout::is_dataset;
-use softvt_report::stored_run::{self, StoredRun};
+use softvt_report::stored_run::StoredRun;
 use softvt_runner::{
     Observer,
     episode_selector::EpisodeSelector,
@@ -49,14 +50,9 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
         let demos = [args.episode.find_demo(&enter_for_dataset(dir, &*observer)?)?];
         return report_replays(&demos, &simulate_demos(&demos, &observer)?);
     }
-    let stored = stored_run::load(dir)?;
-    let [stored] = &stored[..] else {
-        let names = stored.iter().map(|run| run.dir.display().to_string()).collect::<Vec<_>>().join(", ");
-        let message = format!("{} contains several runs; select one of {names}", dir.display());
-        return Err(CliError::input(message));
-    };
-    args.episode.find_record(stored)?;
-    let stored = StoredRun { dir: enter_for_run(stored, &*observer)?, ..stored.clone() };
+    let stored = load_one_run(dir)?;
+    args.episode.find_record(&stored)?;
+    let stored = StoredRun { dir: enter_for_run(&stored, &*observer)?, ..stored };
     let EpisodeReplay { index, simulated, difference } =
         replay_episode(&stored, args.episode, secret.as_ref(), observer)?;
     match difference {

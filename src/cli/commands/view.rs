@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::{
-    args::{PolicyArgs, Request, ScriptArgs, parse_folder},
+    args::{PolicyArgs, Request, ScriptArgs, parse_folder, select_one_task},
     error::CliError,
     output::{Progress, print},
 };
@@ -13,9 +13,7 @@ use softvt_benchmark::Plan;
 use softvt_common::cancel;
 use softvt_common::files;
 use softvt_report::video::{VideoCaption, worst_state, write_stills, write_video, write_video_frame};
-use softvt_runner::{
-    ConfiguredScript, EpisodeJob, EpisodeList, RunConfig, SuiteRun, selection::select_tasks,
-};
+use softvt_runner::{ConfiguredScript, EpisodeJob, EpisodeList, RunConfig, SuiteRun};
 
 /// Render one episode: a video, and stills of every camera and tactile sensor
 #[derive(Args, Clone, Debug)]
@@ -52,12 +50,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
         let message = "expected a single suite; name a file that returns softvt.suite";
         return Err(config.error(message).into());
     };
-    let tasks = select_tasks(&config, suite)?;
-    let [task] = tasks[..] else {
-        let ids = tasks.iter().map(|task| task.id.to_string()).collect::<Vec<_>>().join(", ");
-        let message = format!("--task {:?} matches the tasks {ids}; select one by its index", args.task);
-        return Err(config.error(message).into());
-    };
+    let task = select_one_task(&config, suite)?;
     let dir = &args.out;
     let job = EpisodeJob { task, episode: args.episode };
     let run = SuiteRun::new(&config, &loaded, suite, EpisodeList::listed(vec![job]), dir.clone())?;

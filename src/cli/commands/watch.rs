@@ -9,15 +9,15 @@ use clap::{Args, value_parser};
 
 use crate::{
     QUIET_INTERRUPT,
-    args::{PolicyArgs, Request, ScriptArgs, parse_folder},
+    args::{PolicyArgs, Request, ScriptArgs, load_one_run, parse_folder, select_one_task},
     error::{CliError, flag_of},
     output::{Console, print},
 };
 use softvt_common::{episode_id::EpisodeSplit, text::hex};
-use softvt_report::stored_run::{self, StoredRun};
+use softvt_report::stored_run::StoredRun;
 use softvt_runner::{
-    ConfiguredScript, Observer, RunConfig, replay::recorded_config, selection::select_tasks,
-    selection::suites_of, stored_folder::enter_for_run,
+    ConfiguredScript, Observer, RunConfig, replay::recorded_config, selection::suites_of,
+    stored_folder::enter_for_run,
 };
 use softvt_watch::{Program, Selection, Watch};
 
@@ -76,12 +76,7 @@ fn script_program(args: &WatchArgs) -> Result<Program, CliError> {
         return Err(config.error(message).into());
     };
     let chosen = RunConfig { tasks: vec![args.task.clone()], ..config.clone() };
-    let tasks = select_tasks(&chosen, suite)?;
-    let [task] = tasks[..] else {
-        let ids = tasks.iter().map(|task| task.id.to_string()).collect::<Vec<_>>().join(", ");
-        let message = format!("--task {:?} matches the tasks {ids}; select one by its index", args.task);
-        return Err(config.error(message).into());
-    };
+    let task = select_one_task(&chosen, suite)?;
     let selection =
         Selection { suite: suite.name.clone(), task: task.id, episode: args.episode, ..Selection::default() };
     let config =
@@ -99,14 +94,9 @@ fn recorded_program(args: &WatchArgs) -> Result<Program, CliError> {
         let message = format!("{} has no effect on the run {}; leave it out", flag_of(id), dir.display());
         return Err(CliError::input(message));
     }
-    let stored = stored_run::load(dir)?;
-    let [stored] = &stored[..] else {
-        let names = stored.iter().map(|run| run.dir.display().to_string()).collect::<Vec<_>>().join(", ");
-        let message = format!("{} contains several runs; select one of {names}", dir.display());
-        return Err(CliError::input(message));
-    };
+    let stored = load_one_run(dir)?;
     let observer: Arc<dyn Observer> = Arc::new(Console::default());
-    let stored = StoredRun { dir: enter_for_run(stored, &*observer)?, ..stored.clone() };
+    let stored = StoredRun { dir: enter_for_run(&stored, &*observer)?, ..stored };
     let config = recorded_config(&stored, None, observer)?;
     let task = match args.task.parse() {
         Ok(task) => task,
