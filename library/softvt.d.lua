@@ -19,7 +19,8 @@
 ---@class softvt.Task
 ---@field prompt string Instruction for the policy.
 ---@field layout softvt.Layout Initial scene.
----@field goal softvt.On|softvt.Inside Success criterion.
+---@field goal softvt.Goal Success criterion.
+---@field object? string Scene name of the object whose deformation and grip the records hold; by default the first that the goal names. A goal of joints or functions alone needs it.
 ---@field expert? fun(arm: softvt.Arm, scene: softvt.SceneState) A coroutine that solves the task with privileged state.
 ---@field budget_steps? integer Control steps (20 Hz) that the policy has; by default 500 in suites that vary layouts, 700 in those that vary objects. Expects a whole number in 1..100000.
 
@@ -39,6 +40,68 @@
 ---@field object string Scene name of the object.
 ---@field target string Scene name of the target, or of a part of it (cabinet.top_drawer).
 ---@field hold_s? number Time that it must stay there. Expects seconds in 0..10. Default 0.4.
+
+---Each object rests on the one before it in the list, released, for a time.
+---@class softvt.Stacked
+---@field objects string[] Scene names, from the lowest object on; at least two.
+---@field hold_s? number Time that they must stay there. Expects seconds in 0..10. Default 0.4.
+
+---A joint is open.
+---@class softvt.Opened
+---@field joint string Part of an articulated object (cabinet.top_drawer).
+---@field share? number Smallest share of its range, from the lowest value on. Expects a number in 0..1. Default 0.7.
+
+---A joint is closed.
+---@class softvt.Closed
+---@field joint string Part of an articulated object (cabinet.top_drawer).
+---@field share? number Largest share of its range, from the lowest value on. Expects a number in 0..1. Default 0.1.
+
+---The value of a joint is within a range.
+---@class softvt.Turned
+---@field joint string Part of an articulated object (stove.knob).
+---@field range number[] Lowest and highest value, rad of a hinge and m of a slider. Expects a list of 2 numbers.
+
+---The centres of two objects are near each other in the horizontal plane, and the robot does not touch the object, for a time.
+---@class softvt.Near
+---@field object string Scene name of the object.
+---@field target string Scene name of the target, or of a part of it.
+---@field distance? number Largest distance. Expects metres in 0..10. Default 0.15.
+---@field hold_s? number Time that it must stay there. Expects seconds in 0..10. Default 0.4.
+
+---The object is beside the target, within 45° of a direction of the robot's base, and the robot does not touch it, for a time.
+---@class softvt.Beside
+---@field side "left_of"|"right_of"|"in_front_of"|"behind" Side of the target: "left_of" (+y of the base), "right_of", "in_front_of" (nearer to the robot, −x) or "behind".
+---@field object string Scene name of the object.
+---@field target string Scene name of the target, or of a part of it.
+---@field distance? number Smallest distance of the centres in that direction. Expects metres in 0..10. Default 0.05.
+---@field hold_s? number Time that it must stay there. Expects seconds in 0..10. Default 0.4.
+
+---The z axis of the object is upright, and the robot does not touch the object, for a time.
+---@class softvt.Upright
+---@field object string Scene name of the object.
+---@field angle? number Largest angle between the axis and the vertical. Expects radians in 0..3.1. Default 0.17.
+---@field hold_s? number Time that it must stay so. Expects seconds in 0..10. Default 0.4.
+
+---A function of the true scene returns true at the end of a control step. It must depend on its argument alone: variables that it changes would be shared by episodes.
+---@class softvt.Predicate
+---@field name string What holds, in words, as records and reports show it.
+---@field holds fun(scene: softvt.SceneState): boolean The function.
+
+---All of these goals hold at once.
+---@class softvt.All
+---@field goals softvt.Goal[] The goals.
+
+---At least one of these goals holds.
+---@class softvt.Any
+---@field goals softvt.Goal[] The goals.
+
+---None of these goals holds.
+---@class softvt.None
+---@field goals softvt.Goal[] The goals.
+
+---Each of these goals has held once after the one before it had, and the last one holds.
+---@class softvt.Sequence
+---@field goals softvt.Goal[] The goals, in order.
 
 ---A change of the scene that a run can request with --shift name=value. Limits of D stay those of the assets.
 ---@class softvt.Shift
@@ -570,6 +633,9 @@
 ---@class softvt.ReleaseOptions
 ---@field rate? number Rate of the gripper; 1 is the whole stroke in a second. Expects a number (1/s) above 0. Default 0.5.
 ---@field closure? number Closure at the end. Expects a number in 0..1. Default 0.
+
+---The goal of a task.
+---@alias softvt.Goal softvt.On|softvt.Inside|softvt.Stacked|softvt.Opened|softvt.Closed|softvt.Turned|softvt.Near|softvt.Beside|softvt.Upright|softvt.Predicate|softvt.All|softvt.Any|softvt.None|softvt.Sequence
 
 ---Settings; those that are left out keep their values. docs/settings.md lists all.
 ---@class softvt.Settings
@@ -1530,16 +1596,6 @@ function softvt.suite(spec) end
 ---@return softvt.Task
 function softvt.task(spec) end
 
----The object rests on the target, released, for a time.
----@param spec softvt.On
----@return softvt.On
-function softvt.on(spec) end
-
----The object rests in the target's cavity, carried by it or by objects in it, released, for a time. The cavity is the space in which its shape holds water.
----@param spec softvt.Inside
----@return softvt.Inside
-function softvt.inside(spec) end
-
 ---A change of the scene that a run can request with --shift name=value. Limits of D stay those of the assets.
 ---@param spec softvt.Shift
 ---@return softvt.Shift
@@ -1559,6 +1615,56 @@ function softvt.conditions(spec) end
 ---@param spec softvt.Experiment
 ---@return softvt.Experiment
 function softvt.experiment(spec) end
+
+---The object rests on the target, released, for a time.
+---@param spec softvt.On
+---@return softvt.On
+function softvt.on(spec) end
+
+---The object rests in the target's cavity, carried by it or by objects in it, released, for a time. The cavity is the space in which its shape holds water.
+---@param spec softvt.Inside
+---@return softvt.Inside
+function softvt.inside(spec) end
+
+---Each object rests on the one before it in the list, released, for a time.
+---@param spec softvt.Stacked
+---@return softvt.Stacked
+function softvt.stacked(spec) end
+
+---A joint is open.
+---@param spec softvt.Opened
+---@return softvt.Opened
+function softvt.opened(spec) end
+
+---A joint is closed.
+---@param spec softvt.Closed
+---@return softvt.Closed
+function softvt.closed(spec) end
+
+---The value of a joint is within a range.
+---@param spec softvt.Turned
+---@return softvt.Turned
+function softvt.turned(spec) end
+
+---The centres of two objects are near each other in the horizontal plane, and the robot does not touch the object, for a time.
+---@param spec softvt.Near
+---@return softvt.Near
+function softvt.near(spec) end
+
+---The object is beside the target, within 45° of a direction of the robot's base, and the robot does not touch it, for a time.
+---@param spec softvt.Beside
+---@return softvt.Beside
+function softvt.beside(spec) end
+
+---The z axis of the object is upright, and the robot does not touch the object, for a time.
+---@param spec softvt.Upright
+---@return softvt.Upright
+function softvt.upright(spec) end
+
+---A function of the true scene returns true at the end of a control step. It must depend on its argument alone: variables that it changes would be shared by episodes.
+---@param spec softvt.Predicate
+---@return softvt.Predicate
+function softvt.predicate(spec) end
 
 ---A kind of object. Its shape at rest has its lowest point at z = 0 and its centre on the z axis (see softvt.Shape:grounded).
 ---@param spec softvt.Asset
@@ -1616,6 +1722,46 @@ function softvt.profile(spec) end
 ---@param fields table<string, string>
 ---@return table
 function softvt.check_fields(label, value, fields) end
+
+---Returns a goal that holds while all of these do: `softvt.all { softvt.opened {…}, softvt.on {…} }`.
+---@param goals softvt.Goal[]
+---@return softvt.All
+function softvt.all(goals) end
+
+---Returns a goal that holds while at least one of these does.
+---@param goals softvt.Goal[]
+---@return softvt.Any
+function softvt.any(goals) end
+
+---Returns a goal that holds while none of these does.
+---@param goals softvt.Goal[]
+---@return softvt.None
+function softvt.none(goals) end
+
+---Returns a goal that holds while the last of these does, once each of the others has held, in this order.
+---@param goals softvt.Goal[]
+---@return softvt.Sequence
+function softvt.sequence(goals) end
+
+---softvt.beside with side = "left_of".
+---@param of { object: string, target: string, distance: number?, hold_s: number? }
+---@return softvt.Beside
+function softvt.left_of(of) end
+
+---softvt.beside with side = "right_of".
+---@param of { object: string, target: string, distance: number?, hold_s: number? }
+---@return softvt.Beside
+function softvt.right_of(of) end
+
+---softvt.beside with side = "in_front_of".
+---@param of { object: string, target: string, distance: number?, hold_s: number? }
+---@return softvt.Beside
+function softvt.in_front_of(of) end
+
+---softvt.beside with side = "behind".
+---@param of { object: string, target: string, distance: number?, hold_s: number? }
+---@return softvt.Beside
+function softvt.behind(of) end
 
 ---Returns a layout, given by name and function or by a table of name and build: `softvt.layout("table", function(scene, rng) … end)`.
 ---@param name string|softvt.Layout

@@ -4,7 +4,7 @@
 use std::{collections::BTreeMap, path::Path, sync::Arc};
 
 use softvt::{
-    benchmark::{Goal, GoalKind, Plan},
+    benchmark::{Goal, Placement, Plan},
     episode_id::{EpisodeId, EpisodeSplit},
     geometry::{
         Pose, Vec3,
@@ -205,7 +205,7 @@ fn left_and_right_are_as_in_the_image_and_prompts_name_the_goal() {
     for task in &suite.tasks {
         let scene = scene(&loaded, task.id, 0);
         assert!(pose(&scene, "left").translation.y < pose(&scene, "right").translation.y, "task {}", task.id);
-        let Goal { kind: GoalKind::On, object, target, .. } = &task.goal else { panic!("task {}", task.id) };
+        let Goal::On(Placement { object, target, .. }) = &task.goal else { panic!("task {}", task.id) };
         assert!(task.prompt.starts_with(&format!("pick up the {object} ")), "{}", task.prompt);
         assert_eq!(target, "plate");
     }

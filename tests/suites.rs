@@ -4,7 +4,7 @@
 use std::{collections::BTreeSet, path::Path};
 
 use softvt::{
-    benchmark::{Goal, GoalKind, Plan, ShiftValue, Suite, Task},
+    benchmark::{Goal, Placement, Plan, ShiftValue, Suite, Task},
     episode_id::{EpisodeId, EpisodeSplit},
     geometry::{Pose, Vec3, shape::Shape},
     scene::{Body, Object, Scene, part_poses},
@@ -103,12 +103,12 @@ fn prompts_are_those_of_the_paper_and_match_the_goals() {
         assert_eq!(tasks.len(), 10, "{name}");
         for (k, task) in tasks.iter().enumerate() {
             assert_eq!(task.prompt, expected(k), "{name}");
-            let Goal { kind, object: what, target, .. } = &task.goal;
-            let place = if *kind == GoalKind::Inside {
-                format!("in the {target}")
-            } else {
-                format!("on the {target}")
+            let (word, Placement { object: what, target, .. }) = match &task.goal {
+                Goal::On(of) => ("on", of),
+                Goal::Inside(of) => ("in", of),
+                other => panic!("{name} {k}: {other:?}"),
             };
+            let place = format!("{word} the {target}");
             assert!(task.prompt.ends_with(&place), "{name} {k}: {target}");
             let scene = open(&loaded, k, 0, EpisodeSplit::Validation);
             let soft = matches!(object(&scene, what).asset.body, Body::Soft(_));
@@ -143,7 +143,7 @@ fn prompts_are_those_of_the_paper_and_match_the_goals() {
 fn object_suites_have_the_distractors_of_libero() {
     let (rigid, soft) = (load("object_rigid"), load("object_soft"));
     for (k, [target, distractors @ ..]) in GROCERIES.iter().enumerate() {
-        for (loaded, target) in [(&rigid, *target), (&soft, &suite(&soft).tasks[k].goal.object)] {
+        for (loaded, target) in [(&rigid, *target), (&soft, &suite(&soft).tasks[k].object)] {
             let scene = open(loaded, k, 0, EpisodeSplit::Validation);
             let found: BTreeSet<&str> = colliding_objects(&scene).map(|o| o.asset.name.as_str()).collect();
             let expected: BTreeSet<&str> = distractors.iter().copied().chain([target, "basket"]).collect();
@@ -217,7 +217,7 @@ fn soft_targets_on_the_floor_start_within_20_mm_and_30_degrees() {
     for (k, task) in suite(&loaded).tasks.iter().enumerate() {
         let scenes: Vec<Scene> =
             (0..STANDARD as u32).map(|episode| open(&loaded, k, episode, EpisodeSplit::Validation)).collect();
-        all.push(poses(&scenes, &task.goal.object));
+        all.push(poses(&scenes, &task.object));
         middles.push(if FAR.contains(&k) { [-0.12, -0.24] } else { [0.05, -0.10] });
         arms.extend(scenes);
     }

@@ -1,6 +1,7 @@
 //! The benchmark as plain data, as scripts return it: suites, tasks, experiments and plans.
 #![warn(missing_docs, unreachable_pub)]
 
+pub mod goal;
 pub mod run_changes;
 pub mod seed;
 pub mod settings;
@@ -8,6 +9,7 @@ pub mod variation;
 
 use serde::{Deserialize, Serialize};
 
+pub use self::goal::{Goal, Placement};
 pub use self::settings::{CONTROL_DT, CONTROL_HZ, steps_per_control};
 
 /// Kind of the objects of a suite.
@@ -60,40 +62,6 @@ pub enum NeededKnowledge {
     Touch,
 }
 
-/// Success condition of a task: `object` rests at `target`, released, for `hold_s`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Goal {
-    /// Place at the target.
-    pub kind: GoalKind,
-    /// Scene name of the object to be moved.
-    pub object: String,
-    /// Scene name of the supporting object or container.
-    pub target: String,
-    /// Time for which the object must stay, s.
-    pub hold_s: f64,
-}
-
-/// Place at the target of a [`Goal`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum GoalKind {
-    /// On top of the target, carried by it.
-    On,
-    /// Between the walls of the target; "in" in files.
-    #[serde(rename = "in")]
-    Inside,
-}
-
-impl GoalKind {
-    /// Its word between the object and the target of a goal.
-    pub fn preposition(self) -> &'static str {
-        match self {
-            Self::On => "on",
-            Self::Inside => "in",
-        }
-    }
-}
-
 /// One task of a suite.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Task {
@@ -105,6 +73,8 @@ pub struct Task {
     pub layout: String,
     /// Condition of Goal Success, judged at every control step.
     pub goal: Goal,
+    /// Scene name of *the object*: that whose deformation and grip the records hold.
+    pub object: String,
     /// Maximum number of control steps.
     pub budget_steps: u32,
     /// True if the suite has a scripted expert for it.
@@ -242,5 +212,18 @@ impl Plan {
             Self::Suites { suites } | Self::Conditions { suites, .. } => suites,
             Self::Experiment { .. } => &[],
         }
+    }
+}
+
+impl Task {
+    /// Scene names of the objects that the task moves, each once: first the object, then the others of its goal.
+    pub fn targets(&self) -> Vec<&str> {
+        let mut names = vec![self.object.as_str()];
+        for name in self.goal.predicates().into_iter().filter_map(Goal::object) {
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        names
     }
 }

@@ -6,7 +6,7 @@ use softvt_geometry::{Pose, Vec3};
 
 use super::deformation::Deformation;
 
-/// Contact between one gripper pad and the target.
+/// Contact between one gripper pad and a target.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PadEvidence {
     /// Normal force between pad and target, N.
@@ -49,7 +49,7 @@ pub struct BodyEvidence {
     pub deformation: Option<Deformation>,
 }
 
-/// Load of the grip on the target.
+/// Load of the grip on a target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GripEvidence {
     /// Force of the whole robot on the target, N.
@@ -60,14 +60,38 @@ pub struct GripEvidence {
     pub dynamic_mu: f64,
 }
 
-/// State of the object that the target must be placed on or in.
+/// State of an object that a target must be placed on or in.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GoalEvidence {
+pub struct PlaceEvidence {
     /// Pose of its object frame (origin at the centre of its footprint).
     pub pose_w: Pose,
     /// Upward force on the target from it and, if the target must be placed inside, from objects in it that
     /// it carries, N.
     pub support_force_n: f64,
+}
+
+/// State of what a predicate of the goal is about.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PredicateEvidence {
+    /// The object that must carry a target.
+    Place(PlaceEvidence),
+    /// Whether a predicate holds that is not a placement; read at the end of control steps.
+    Given(bool),
+}
+
+/// State of an object that the task moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TargetEvidence {
+    /// State as of any body.
+    pub body: BodyEvidence,
+    /// Left and right pad against it.
+    pub pads: [PadEvidence; 2],
+    /// Normal force between it and the rest of the robot (hand, fingers, sensor cases), N.
+    pub hand_force_n: f64,
+    /// Load of the grip.
+    pub grip: GripEvidence,
+    /// Shares of its volume beyond the strain limits of its material.
+    pub crushed: CrushedShares,
 }
 
 /// State at the end of one physics step.
@@ -79,37 +103,37 @@ pub struct Evidence<'a> {
     pub hand_w: Vec3,
     /// Opening of the gripper.
     pub gripper: GripperEvidence,
-    /// Left and right pad against the target.
-    pub pads: [PadEvidence; 2],
-    /// Normal force between the target and the rest of the robot (hand, fingers, sensor cases), N.
-    pub robot_force_n: f64,
-    /// Load of the grip.
-    pub grip: GripEvidence,
-    /// State of the target.
-    pub target: BodyEvidence,
-    /// Shares of the target's volume beyond the strain limits of its material.
-    pub crushed: CrushedShares,
-    /// States of the other movable bodies, the one at the goal included, in the same order in every step.
+    /// States of the objects that the task moves, in the same order in every step.
+    pub targets: &'a [TargetEvidence],
+    /// States of the other movable bodies, those at a place included, in the same order in every step.
     pub others: &'a [BodyEvidence],
-    /// State of the object at the goal.
-    pub goal: GoalEvidence,
+    /// What the predicates of the goal are about, in their order.
+    pub predicates: &'a [PredicateEvidence],
 }
 
 impl Evidence<'_> {
     /// True if every number that the criteria read is finite. Deformations are not included: a missing
     /// one is counted apart.
     pub fn is_finite(&self) -> bool {
-        let bodies = self.others.iter().chain([&self.target]);
+        let bodies = self.others.iter().chain(self.targets.iter().map(|target| &target.body));
         let bodies = bodies.flat_map(|body| {
             let centre = body.centre_w;
             [centre.x, centre.y, centre.z, body.lowest_z_w, body.support_force_n, body.robot_force_n]
         });
-        let pads = self.pads.iter().flat_map(|pad| [pad.normal_force_n, pad.slip_speed_m_s]);
-        let (pose, gripper) = (self.goal.pose_w.to_homogeneous(), &self.gripper);
-        let forces = [self.robot_force_n, self.goal.support_force_n, self.grip.dynamic_mu];
-        let rest = [self.time_s, gripper.width_m, gripper.commanded_width_m].into_iter().chain(forces);
-        let grip = self.grip.load_n.iter().chain(self.grip.axis_w.iter());
-        let vectors = self.hand_w.iter().chain(pose.iter()).chain(grip).copied();
-        bodies.chain(pads).chain(rest).chain(vectors).all(f64::is_finite)
+        let targets = self.targets.iter().flat_map(|target| {
+            let [left, right] = target.pads;
+            let pads = [left, right].into_iter().flat_map(|pad| [pad.normal_force_n, pad.slip_speed_m_s]);
+            let (load, axis) = (target.grip.load_n, target.grip.axis_w);
+            let grip = [load.x, load.y, load.z, axis.x, axis.y, axis.z, target.grip.dynamic_mu];
+            pads.chain([target.hand_force_n]).chain(grip)
+        });
+        let places = self.predicates.iter().all(|predicate| match predicate {
+            PredicateEvidence::Place(PlaceEvidence { pose_w, support_force_n }) => {
+                support_force_n.is_finite() && pose_w.to_homogeneous().iter().all(|x| x.is_finite())
+            }
+            PredicateEvidence::Given(_) => true,
+        });
+        let rest = [self.time_s, self.gripper.width_m, self.gripper.commanded_width_m];
+        places && bodies.chain(targets).chain(rest).chain(self.hand_w.iter().copied()).all(f64::is_finite)
     }
 }

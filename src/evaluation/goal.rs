@@ -1,14 +1,15 @@
-//! Goal Success: the target rests at its goal, released, for long enough.
+//! The predicate of a placement: the target rests at a place, released, for long enough. [`super::goal_tree`] combines
+//! predicates to goals.
 //!
-//! Once per control step the target *rests at the goal* if
+//! Once per control step the target *rests at the place* if
 //! 1. its centre is over (`On`) or inside (`Inside`) the [`GoalRegion`],
 //! 2. at least [`support_share`](SuccessCriteria::support_share) of its weight, mean over the control step, is carried
 //!    by the object at the goal, or (`Inside`) by objects in it that it carries in turn,
 //! 3. no part of the robot pressed on it at any physics step of the control step.
 //!
-//! The goal is reached when this held for ⌈hold time / control step⌉ control steps in a row, at
-//! least one. A target that has rested at the goal for one control step and leaves it later
-//! counts as dropped ([`super::drop::DropReason::LeftGoal`]).
+//! The predicate holds when this held for ⌈hold time / control step⌉ control steps in a row, at least one. A target
+//! that has rested for one control step where it must be at the end, and leaves it later, counts as dropped
+//! ([`super::drop::DropReason::LeftGoal`]).
 
 use softvt_geometry::{Aabb, Pose, Vec3};
 
@@ -76,16 +77,14 @@ impl GoalRegion {
     }
 }
 
-/// One control step as [`GoalMonitor`] reads it.
+/// One control step as [`PlacementMonitor`] reads it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GoalSample {
-    /// End of the control step, s.
-    pub time_s: f64,
+pub struct PlacementSample {
     /// True if the centre is in the goal region at the end of the control step.
     pub is_inside: bool,
     /// True if it is in the region enlarged by [`SuccessCriteria::leave_margin_m`].
     pub is_inside_with_margin: bool,
-    /// True if the goal carries its share of the weight, mean over the control step.
+    /// True if the place carries its share of the weight, mean over the control step.
     pub is_supported: bool,
     /// True if a pad or another part of the robot pressed on the target at any time in the control step.
     pub is_touched: bool,
@@ -93,38 +92,53 @@ pub struct GoalSample {
     pub is_inside_v1: bool,
 }
 
-/// Counts consecutive control steps at the goal.
+impl PlacementSample {
+    /// The sample of a predicate that is not a placement.
+    pub fn given(holds: bool) -> Self {
+        Self {
+            is_inside: holds,
+            is_inside_with_margin: true,
+            is_supported: true,
+            is_touched: false,
+            is_inside_v1: holds,
+        }
+    }
+}
+
+/// Counts consecutive control steps at a place.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct GoalMonitor {
-    /// Time at which the goal had held for long enough, s; `None` before. It stays, also when the target leaves later.
-    pub reached_s: Option<f64>,
-    /// True if the predicate of the released code has held for as long.
-    pub is_reached_v1: bool,
+pub struct PlacementMonitor {
     steps_needed: u32,
     steps: u32,
     steps_v1: u32,
     has_entered: bool,
 }
 
-impl GoalMonitor {
-    /// Monitor of a goal that must hold for `hold_s`, sampled every `control_s`; at least one control step.
+impl PlacementMonitor {
+    /// Monitor of a placement that must last for `hold_s`, sampled every `control_s`; at least one control step.
     pub fn new(hold_s: f64, control_s: f64) -> Self {
         let steps_needed = (hold_s / control_s - 1e-6).ceil().max(1.0) as u32;
         Self { steps_needed, ..Self::default() }
     }
 
-    /// Takes in one control step. Returns true if the target has rested at the goal before and is now outside of the
+    /// Takes in one control step. Returns true if the target has rested at the place before and is now outside of the
     /// region enlarged by the margin.
-    pub fn update(&mut self, sample: &GoalSample) -> bool {
+    pub fn update(&mut self, sample: &PlacementSample) -> bool {
         let rests = sample.is_inside && sample.is_supported && !sample.is_touched;
         self.steps = if rests { self.steps + 1 } else { 0 };
         self.steps_v1 = if sample.is_inside_v1 { self.steps_v1 + 1 } else { 0 };
         self.has_entered |= rests;
-        if self.steps >= self.steps_needed {
-            self.reached_s.get_or_insert(sample.time_s);
-        }
-        self.is_reached_v1 |= self.steps_v1 >= self.steps_needed;
         self.has_entered && !sample.is_inside_with_margin
+    }
+
+    /// True if the target has rested at the place for long enough, up to now.
+    pub fn holds(&self) -> bool {
+        self.steps >= self.steps_needed
+    }
+
+    /// True if the predicate of the released code has held for as long, up to now.
+    pub fn holds_v1(&self) -> bool {
+        self.steps_v1 >= self.steps_needed
     }
 }
 
@@ -136,9 +150,8 @@ mod tests {
         Vec3::new(x, 0.0, z)
     }
 
-    fn step(rests: bool) -> GoalSample {
-        GoalSample {
-            time_s: 0.0,
+    fn step(rests: bool) -> PlacementSample {
+        PlacementSample {
             is_inside: rests,
             is_inside_with_margin: true,
             is_supported: true,
@@ -190,45 +203,46 @@ mod tests {
 
     #[test]
     fn eight_control_steps_in_a_row_are_needed() {
-        let mut goal = GoalMonitor::new(0.4, 0.05);
+        let mut goal = PlacementMonitor::new(0.4, 0.05);
         (0..7).for_each(|_| assert!(!goal.update(&step(true))));
         goal.update(&step(false));
         (0..7).for_each(|_| assert!(!goal.update(&step(true))));
-        assert_eq!(goal.reached_s, None);
-        goal.update(&GoalSample { time_s: 0.8, ..step(true) });
-        assert_eq!(goal.reached_s, Some(0.8));
-        assert!(goal.is_reached_v1);
+        assert!(!goal.holds() && goal.holds_v1());
+        goal.update(&step(true));
+        assert!(goal.holds());
+        goal.update(&step(false));
+        assert!(!goal.holds());
     }
 
     #[test]
     fn a_hold_of_zero_still_takes_one_control_step() {
-        let mut goal = GoalMonitor::new(0.0, 0.05);
+        let mut goal = PlacementMonitor::new(0.0, 0.05);
         goal.update(&step(false));
-        assert_eq!(goal.reached_s, None);
+        assert!(!goal.holds());
         goal.update(&step(true));
-        assert_eq!(goal.reached_s, Some(0.0));
+        assert!(goal.holds());
     }
 
     #[test]
     fn held_unsupported_or_outside_is_not_at_rest() {
         for sample in [
-            GoalSample { is_touched: true, ..step(true) },
-            GoalSample { is_supported: false, ..step(true) },
-            GoalSample { is_inside: false, ..step(true) },
+            PlacementSample { is_touched: true, ..step(true) },
+            PlacementSample { is_supported: false, ..step(true) },
+            PlacementSample { is_inside: false, ..step(true) },
         ] {
-            let mut goal = GoalMonitor::new(0.05, 0.05);
+            let mut goal = PlacementMonitor::new(0.05, 0.05);
             goal.update(&sample);
-            assert_eq!(goal.reached_s, None, "{sample:?}");
+            assert!(!goal.holds(), "{sample:?}");
         }
     }
 
     #[test]
     fn only_a_goal_that_was_entered_can_be_left() {
-        let mut goal = GoalMonitor::new(0.4, 0.05);
-        let outside = GoalSample { is_inside: false, is_inside_with_margin: false, ..step(false) };
+        let mut goal = PlacementMonitor::new(0.4, 0.05);
+        let outside = PlacementSample { is_inside: false, is_inside_with_margin: false, ..step(false) };
         assert!(!goal.update(&outside), "carried past");
         goal.update(&step(true));
-        assert!(!goal.update(&GoalSample { is_inside_with_margin: true, ..outside }), "on the margin");
+        assert!(!goal.update(&PlacementSample { is_inside_with_margin: true, ..outside }), "on the margin");
         assert!(goal.update(&outside));
     }
 }

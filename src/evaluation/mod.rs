@@ -18,7 +18,8 @@
 //! | question | module |
 //! |---|---|
 //! | How deformed is a soft body? | [`deformation`] |
-//! | Does the target rest at its goal, released? | [`goal`] |
+//! | Does a target rest at its place, released? | [`goal`] |
+//! | Does a goal of several parts hold? | [`goal_tree`] |
 //! | Was the object dropped, or released on purpose? | [`drop`](mod@drop) |
 //! | How far did it slide along the pads while they carried it? | [`slip`] |
 //! | How hard was the grip against the least that holds? | [`grip`] |
@@ -40,6 +41,7 @@ pub mod drop;
 pub mod envelope_text;
 pub mod evidence;
 pub mod goal;
+pub mod goal_tree;
 pub mod grip;
 pub mod instance;
 pub mod judge;

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     drop::DropEvent,
-    safety::{KappaVerdict, PeakDeformation},
+    safety::{DeformationLimit, KappaVerdict, PeakDeformation, SafetyParts},
     stage::TaskStage,
 };
 
@@ -94,24 +94,78 @@ pub struct OtherObjectDeformation {
     pub deformation_ok: Option<bool>,
 }
 
-/// Judgement of one episode. Percentages are of the diagonal of the settled bounding box.
+/// A predicate of a goal of several parts.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GoalPart {
+    /// What must hold, in words.
+    pub name: String,
+    /// True if it held at the end.
+    pub holds: bool,
+    /// Time at which it held first, s; null if it never did.
+    pub met_s: Option<f64>,
+}
+
+/// Handling of a target that is not the first; the fields are those of the [`Verdict`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct TargetVerdict {
+    /// Name of the object in the scene.
+    pub object: String,
+    /// True if it is a soft body.
+    pub soft: bool,
+    pub no_drop: bool,
+    pub drop: Option<DropEvent>,
+    pub no_slip: bool,
+    pub slip_mm: f64,
+    pub d_peak: Option<f64>,
+    pub missing_deformation: u64,
+    pub collapsed_volume_pct: Option<f64>,
+    pub damaged_volume_pct: Option<f64>,
+    pub kappa: Option<f64>,
+    pub tau: Option<f64>,
+    pub d_ref: Option<f64>,
+    pub deformation_ok: Option<bool>,
+    pub peak_pad_force_n: f64,
+    pub mean_pad_force_n: f64,
+    pub least_pad_force_n: Option<f64>,
+    pub grip_ratio: Option<f64>,
+}
+
+impl TargetVerdict {
+    /// True if D stayed within κ·D_ref of the target, with its own κ if none is given; `None` where that is unknown. A
+    /// rigid target always is.
+    pub fn is_within(&self, kappa: Option<f64>) -> Option<bool> {
+        if !self.soft {
+            return Some(true);
+        }
+        let limit = self.d_ref.zip(kappa.or(self.kappa));
+        let tau = limit.map(|(d_ref_pct, kappa)| DeformationLimit { d_ref_pct, kappa }.tau_pct());
+        PeakDeformation { d_pct: self.d_peak, missing: self.missing_deformation }.is_within(tau)
+    }
+}
+
+/// Judgement of one episode. *The object* is the first target of the task. Percentages are of the diagonal of the
+/// settled bounding box.
 ///
 /// [`super::judge`] defines each field.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
-    /// Goal Success: the target rested at its goal, released, for long enough.
+    /// Goal Success: the goal held, its placements released and for long enough.
     pub goal: bool,
     /// Time at which the goal had held for long enough, s; null without success.
     pub goal_time_s: Option<f64>,
     /// Goal Success by the looser predicate of SoftVTBench's released code.
     pub goal_v1: bool,
-    /// NoDrop: none of the events of [`super::drop`] happened.
+    /// The predicates of a goal of several parts.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub goal_parts: Vec<GoalPart>,
+    /// NoDrop: none of the events of [`super::drop`] happened to a target.
     pub no_drop: bool,
     /// The first event that made NoDrop false.
     pub drop: Option<DropEvent>,
     /// NoSlip; part of Safety Success only if the criteria require it.
     pub no_slip: bool,
-    /// Distance that the target slid along a pad while the pads alone carried it, mm; the worse pad.
+    /// Distance that a target slid along a pad while the pads alone carried it, mm; the worse pad and the worst target.
     pub slip_mm: f64,
     /// Peak D of the target, %; null for a rigid one.
     pub d_peak: Option<f64>,
@@ -155,12 +209,15 @@ pub struct Verdict {
     pub deformation_ok: Option<bool>,
     /// NoSlip where the criteria require it; null otherwise, and if the episode is invalid.
     pub slip_ok: Option<bool>,
-    /// Safety Success: goal, no drop, for a soft target D_peak ≤ τ, and no slip if the criteria require it.
+    /// Safety Success: goal, no drop, D_peak ≤ τ for each soft target, and no slip if the criteria require it.
     pub safety: bool,
     /// True if the evidence suffices to judge safety.
     pub safety_known: bool,
     /// Safety at each κ of the sensitivity table.
     pub kappas: Vec<KappaVerdict>,
+    /// The other targets, of a task that moves several.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub targets: Vec<TargetVerdict>,
     /// Number of physics steps whose evidence was not finite.
     pub missing_evidence: u64,
     /// Number of physics steps at which the target's D could not be measured.
@@ -185,5 +242,22 @@ impl Verdict {
     /// The peak deformation of the target, to compare with a limit.
     pub fn peak(&self) -> PeakDeformation {
         PeakDeformation { d_pct: self.d_peak, missing: self.missing_deformation }
+    }
+
+    /// What Safety Success asks for beside the deformation of the object, where each of the other targets may use
+    /// `kappa` of its D_ref, or its own κ if none is given.
+    pub fn safety_parts(&self, kappa: Option<f64>) -> SafetyParts {
+        let all = |all: Option<bool>, own: Option<bool>| match (all, own) {
+            (Some(false), _) | (_, Some(false)) => Some(false),
+            (Some(true), Some(true)) => Some(true),
+            _ => None,
+        };
+        let within = self.targets.iter().map(|target| target.is_within(kappa));
+        SafetyParts {
+            goal: self.goal,
+            no_drop: self.no_drop,
+            slip_ok: self.slip_ok,
+            targets_ok: within.fold(Some(true), all),
+        }
     }
 }

@@ -169,9 +169,11 @@ pub struct EpisodeRecord {
 }
 
 impl EpisodeRecord {
-    /// True if the episode counts in DSR: Goal Success with D_peak ≤ τ. Drops do not enter.
+    /// True if the episode counts in DSR: Goal Success with D_peak ≤ τ of each target. Drops do not enter.
     pub fn is_deformation_safe(&self) -> bool {
-        self.outcome.is_valid() && self.verdict.goal && self.verdict.deformation_ok == Some(true)
+        let v = &self.verdict;
+        let is_within = v.deformation_ok == Some(true) && v.safety_parts(None).targets_ok == Some(true);
+        self.outcome.is_valid() && v.goal && is_within
     }
 
     /// True if the deformation of the target can be judged. An invalid episode with a limit is judged: it fails.

@@ -4,8 +4,8 @@ use serde_json::Value;
 
 use super::record::EpisodeRecord;
 use softvt_evaluation::{
-    safety::{DeformationLimit, SafetyParts},
-    verdict::{OtherObjectDeformation, Outcome},
+    safety::DeformationLimit,
+    verdict::{OtherObjectDeformation, Outcome, TargetVerdict},
 };
 
 /// A text is not the record of an episode.
@@ -21,8 +21,17 @@ pub enum RecordError {
 }
 
 /// Keys that a record leaves out at their default.
-const OMITTED: [&str; 7] =
-    ["privileged", "variation", "origin", "others", "first_far_command", "gave_up", "notes"];
+const OMITTED: [&str; 9] = [
+    "privileged",
+    "variation",
+    "origin",
+    "goal_parts",
+    "others",
+    "targets",
+    "first_far_command",
+    "gave_up",
+    "notes",
+];
 
 /// Tolerance of sums and means, relative to 1.
 const TOLERANCE: f64 = 1e-9;
@@ -53,6 +62,7 @@ impl EpisodeRecord {
         self.check_goal()?;
         self.check_deformation()?;
         self.check_grip()?;
+        self.check_targets()?;
         self.check_others()
     }
 
@@ -154,22 +164,23 @@ impl EpisodeRecord {
             let got = or_null(v.deformation_ok);
             return Err(format!("deformation_ok is {got}, and d_peak is {d}, tau {tau}"));
         }
-        let required = SafetyParts { goal: v.goal, no_drop: v.no_drop, slip_ok: v.slip_ok };
-        let safe = |deformation_ok| required.is_safe(soft, deformation_ok);
+        let required = v.safety_parts(None);
         let parts = format!("goal is {}, no_drop {}", v.goal, v.no_drop);
-        if v.safety != safe(v.deformation_ok) {
+        if v.safety != required.is_safe(soft, v.deformation_ok) {
             let got = or_null(v.deformation_ok);
             return Err(format!("safety is {}, and {parts}, deformation_ok {got}", v.safety));
         }
         let is_known = self.outcome.is_valid() && v.missing_evidence == 0;
-        if v.safety_known != (is_known && (!soft || v.deformation_ok.is_some())) {
+        let is_judged = (!soft || v.deformation_ok.is_some()) && required.targets_ok.is_some();
+        if v.safety_known != (is_known && is_judged) {
             return Err(format!("safety_known is {}, which the evidence does not show", v.safety_known));
         }
         for at in &v.kappas {
             let name = format!("the tau_pct of kappa {}", at.kappa);
             let Some(limit) = &limit else { return Err(format!("{name} is a number, and tau is null")) };
             check_tau(&name, at.tau_pct, limit, at.kappa)?;
-            if at.deformation_ok != ok(Some(at.tau_pct)) || at.safety != safe(at.deformation_ok) {
+            let safe = v.safety_parts(Some(at.kappa)).is_safe(soft, at.deformation_ok);
+            if at.deformation_ok != ok(Some(at.tau_pct)) || at.safety != safe {
                 let (ok, tau) = (or_null(at.deformation_ok), at.tau_pct);
                 return Err(format!(
                     "at kappa {} deformation_ok is {ok} and safety {}, and {parts}, d_peak {d}, tau_pct {tau}",
@@ -213,6 +224,45 @@ impl EpisodeRecord {
                 "contact_safety is {}, and contact_success is {}, safety {}, no_slip {}",
                 v.contact_safety, v.contact_success, v.safety, v.no_slip
             ));
+        }
+        Ok(())
+    }
+
+    /// Checks that the other targets agree with their limits, and NoDrop and slip with all targets.
+    fn check_targets(&self) -> Result<(), String> {
+        let v = &self.verdict;
+        for target in &v.targets {
+            let TargetVerdict { object, d_peak, tau, deformation_ok, .. } = target;
+            let ok = target.is_within(None).filter(|_| target.soft && self.outcome.is_valid());
+            if *deformation_ok != ok {
+                let [d, tau] = [d_peak, tau].map(|x| or_null(*x));
+                let got = or_null(*deformation_ok);
+                return Err(format!("{object}: deformation_ok is {got}, and d_peak is {d}, tau {tau}"));
+            }
+            if let (Some(tau), Some(d_ref_pct), Some(kappa)) = (target.tau, target.d_ref, target.kappa) {
+                check_tau(
+                    &format!("the tau of {object}"),
+                    tau,
+                    &DeformationLimit { d_ref_pct, kappa },
+                    kappa,
+                )?;
+            }
+            if target.no_drop == target.drop.is_some() || (v.no_drop && !target.no_drop) {
+                let drop = if target.drop.is_some() { "an event" } else { "null" };
+                let (own, all) = (target.no_drop, v.no_drop);
+                return Err(format!("{object}: no_drop is {own}, and drop is {drop}, no_drop of all {all}"));
+            }
+            if target.slip_mm > v.slip_mm + TOLERANCE * (1.0 + v.slip_mm) {
+                return Err(format!(
+                    "{object}: slip_mm {} is above that of all, {}",
+                    target.slip_mm, v.slip_mm
+                ));
+            }
+        }
+        for part in &v.goal_parts {
+            if part.holds && part.met_s.is_none() {
+                return Err(format!("the part {:?} of the goal holds, and its met_s is null", part.name));
+            }
         }
         Ok(())
     }
@@ -382,6 +432,34 @@ mod tests {
             refusal(&[("others", other(0.5, true))])
                 .contains("d_peak_other is 0, and the largest of others is 0.5")
         );
+    }
+
+    #[test]
+    fn the_other_targets_agree_with_their_limits_and_with_safety() {
+        let target = |d: f64, ok: Option<bool>| {
+            json!([{
+                "object": "roll", "soft": true, "no_drop": true, "drop": null, "no_slip": true, "slip_mm": 0.0,
+                "d_peak": d, "missing_deformation": 0, "collapsed_volume_pct": null, "damaged_volume_pct": null,
+                "kappa": 0.5, "tau": 1.0, "d_ref": 2.0, "deformation_ok": ok, "peak_pad_force_n": 1.0,
+                "mean_pad_force_n": 0.5, "least_pad_force_n": null, "grip_ratio": null
+            }])
+        };
+        let claimed = refusal(&[("targets", target(1.5, Some(true)))]);
+        assert!(
+            claimed.contains("safety is true") || claimed.contains("roll: deformation_ok is true"),
+            "{claimed}"
+        );
+        let crushed = refusal(&[("targets", target(1.5, Some(false)))]);
+        assert!(crushed.contains("safety is true, and goal is true"), "{crushed}");
+        let mut line = serde_json::to_value(sample()).unwrap();
+        line["targets"] = target(0.5, Some(true));
+        line["kappas"] = json!([]);
+        line["goal_parts"] = json!([{ "name": "roll on plate", "holds": true, "met_s": 1.0 }]);
+        let record = EpisodeRecord::from_json(line.to_string().as_bytes()).unwrap();
+        assert_eq!(record.verdict.targets[0].object, "roll");
+        line["targets"][0]["colour"] = json!("red");
+        let unknown = EpisodeRecord::from_json(line.to_string().as_bytes()).unwrap_err().to_string();
+        assert!(unknown.contains("colour"), "{unknown}");
     }
 
     #[test]

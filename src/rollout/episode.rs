@@ -9,8 +9,8 @@ use super::{
     build_error::SceneBuildError,
     controller::Controller,
     disturbance::Disturbance,
-    evidence::{EvidenceCollector, lowest},
-    goal_in_scene::GoalInScene,
+    evidence::EvidenceCollector,
+    goal_in_scene::{GoalInScene, StatePredicate},
     observation_history::ObservationHistory,
     sensor_assets::{SensingError, SensorAssets},
     sensor_noise::SensorSeed,
@@ -70,6 +70,8 @@ pub struct EpisodeSpec {
     pub record_trace: bool,
     /// True if traces hold the node positions of soft bodies.
     pub trace_nodes: bool,
+    /// Functions of the script that the goal asks for ([`Goal::Predicate`]), in the order of the goal.
+    pub predicates: Vec<Arc<dyn StatePredicate>>,
     /// Secret of a judged run.
     pub secret: Option<SecretSeed>,
 }
@@ -106,6 +108,7 @@ impl EpisodeSpec {
             record_states: false,
             record_trace: false,
             trace_nodes: false,
+            predicates: Vec::new(),
             secret: None,
         }
     }
@@ -117,7 +120,7 @@ impl EpisodeSpec {
 
 /// Asset of a task's target in a scene.
 pub fn target_asset<'a>(scene: &'a Scene, task: &Task) -> Option<&'a Arc<Asset>> {
-    let name = &task.goal.object;
+    let name = &task.object;
     scene.objects.iter().find(|object| object.name == *name).map(|object| &object.asset)
 }
 
@@ -159,7 +162,7 @@ pub enum EpisodeError {
     NoObject {
         /// Task index.
         task: usize,
-        /// "object" or "target".
+        /// "object", "target" or "joint".
         role: &'static str,
         /// Name in the goal.
         name: String,
@@ -181,6 +184,19 @@ pub enum EpisodeError {
         /// `file:line` where the object was placed; empty if no script placed it.
         placed_at: String,
     },
+    /// The goal is about the joint of an object that has none.
+    #[error(
+        "task {task}: goal.joint names {name:?}, which has no joint; name a part of a softvt.articulated, as \
+         cabinet.top_drawer"
+    )]
+    NoJoint {
+        /// Task index.
+        task: usize,
+        /// Name in the goal.
+        name: String,
+        /// `file:line` where the object was placed; empty if no script placed it.
+        placed_at: String,
+    },
     /// Nothing has to carry the object of the goal.
     #[error(
         "task {task}: scene.gravity = {{ {}, {}, {} }} does not point down, and a goal judges what carries {object}; give it \
@@ -199,9 +215,9 @@ pub enum EpisodeError {
     },
     /// The goal holds before the robot moves.
     #[error(
-        "task {task}, episode {episode}: the goal already holds at the start: {} rests {} {} before the robot moves; \
-         place it elsewhere",
-        .goal.object, .goal.kind.preposition(), .goal.target
+        "task {task}, episode {episode}: the goal already holds at the start, before the robot moves: {}; change the layout or \
+         the goal",
+        .goal.describe()
     )]
     GoalHolds {
         /// Task index.
@@ -241,6 +257,7 @@ impl EpisodeError {
         match self {
             Self::Settle { source, .. } => source.place(),
             Self::NoCavity { placed_at, .. }
+            | Self::NoJoint { placed_at, .. }
             | Self::Gravity { placed_at, .. }
             | Self::GoalHolds { placed_at, .. } => Some(placed_at.as_str()).filter(|place| !place.is_empty()),
             _ => None,
@@ -303,21 +320,27 @@ impl Episode {
             .map_err(|source| spec.sense_error(source))?;
         let mut sim =
             Simulation::new(spec.scene.clone(), &spec.settings.physics, &spec.settings.robot, cache)?;
-        let goal = GoalInScene::find(&spec.task, &sim, cache)?;
-        let target = goal.object;
+        let goal = GoalInScene::find(&spec.task, &sim, cache, &spec.predicates)?;
+        let target = goal.targets[0];
         sim.settle().map_err(|source| EpisodeError::Settle {
             layout: spec.task.layout.clone(),
             episode: spec.header.id.episode,
             source,
         })?;
-        let evidence = EvidenceCollector::new(&sim, &goal, spec.settings.criteria.support_share);
-        let judge = settled_judge(&spec, &sim, &evidence, &goal);
-        if judge.rests_at_goal(&evidence.clone().collect(&sim, 0.0)) {
+        let evidence = EvidenceCollector::new(&sim, goal, &spec.settings.criteria);
+        let judge = settled_judge(&spec, &sim, &evidence);
+        let mut settled = evidence.clone();
+        let settled = settled.collect(&sim, 0.0, true).map_err(|message| EpisodeError::Control {
+            task: spec.task.id,
+            episode: spec.header.id.episode,
+            source: PolicyError::Script(message),
+        })?;
+        if judge.holds_at_start(&settled) {
             return Err(EpisodeError::GoalHolds {
                 task: spec.task.id,
                 episode: spec.header.id.episode,
                 goal: spec.task.goal.clone(),
-                placed_at: placed_at(&spec.scene, &spec.task.goal.object),
+                placed_at: placed_at(&spec.scene, &spec.task.object),
             });
         }
         let tool = sim.robot.tool_b(&sim.world);
@@ -435,8 +458,8 @@ impl Episode {
             self.first_far_command.get_or_insert(far);
         }
         self.clamped_grips += u32::from((action.closure() - 0.5).abs() > 0.5 + CLOSURE_ROUNDING);
-        if let Err(failure) = self.control_step(action) {
-            return Some(self.invalid(&failure));
+        if let Err(outcome) = self.control_step(action) {
+            return Some(outcome);
         }
         self.record_state();
         self.regular_outcome()
@@ -568,13 +591,18 @@ impl Episode {
         self.physics_steps as f64 * self.spec.settings.physics.dt
     }
 
-    fn control_step(&mut self, action: &Action) -> Result<(), StepFailure> {
+    /// Executes an action for one control step.
+    ///
+    /// # Errors
+    /// The outcome, if physics or a function of the goal fails.
+    fn control_step(&mut self, action: &Action) -> Result<(), Outcome> {
         let pose_b = self.disturbance.apply(&action.pose_b());
         self.sim.robot.command(&mut self.sim.world, pose_b, action.grip);
         self.steps += 1;
-        for _ in 0..steps_per_control(self.spec.settings.physics.dt) {
+        let physics_steps = steps_per_control(self.spec.settings.physics.dt);
+        for step in 1..=physics_steps {
             self.physics_steps += 1;
-            self.sim.step()?;
+            self.sim.step().map_err(|failure| self.invalid(&failure))?;
             let stats = self.sim.world.solver_stats();
             self.newton.total += u64::from(stats.newton_steps);
             self.newton.max = self.newton.max.max(stats.max_newton_steps);
@@ -582,7 +610,8 @@ impl Episode {
                 self.min_det_f = self.min_det_f.min(self.sim.world.soft(index).state.min_det_f().det_f);
             }
             let time = self.time();
-            self.judge.observe(&self.evidence.collect(&self.sim, time));
+            let evidence = self.evidence.collect(&self.sim, time, step == physics_steps);
+            self.judge.observe(&evidence.map_err(|message| Outcome::Error { message })?);
         }
         if self.spec.record_trace {
             self.trace.push(self.trace());
@@ -738,25 +767,16 @@ fn check_action(action: &Action, effort_n: f64) -> Result<(), ActionError> {
 }
 
 /// The judge of an episode, for its settled state.
-fn settled_judge(
-    spec: &EpisodeSpec,
-    sim: &Simulation,
-    evidence: &EvidenceCollector,
-    goal: &GoalInScene,
-) -> Judge {
-    let target = &sim.objects[goal.object];
+fn settled_judge(spec: &EpisodeSpec, sim: &Simulation, evidence: &EvidenceCollector) -> Judge {
     Judge::new(JudgeConfig {
         criteria: spec.settings.criteria.clone(),
         workspace: spec.scene.workspace,
-        goal: goal.region,
-        hold_s: spec.task.goal.hold_s,
+        goal: evidence.goal().goal.clone(),
+        predicates: evidence.goal().judged(),
+        targets: evidence.settled_targets(sim, &spec.limits),
+        others: evidence.other_bodies(sim, &spec.limits),
         dt_s: spec.settings.physics.dt,
         steps_per_control: steps_per_control(spec.settings.physics.dt),
-        target_weight_n: sim.weight(target),
-        is_target_soft: matches!(target.body, BodyId::Soft(_)),
-        limit: spec.limits.get(&target.name).copied(),
-        target_lowest_z_w: lowest(sim, target),
-        others: evidence.other_bodies(sim, &spec.limits),
         max_steps: spec.task.budget_steps as usize * steps_per_control(spec.settings.physics.dt) as usize,
     })
 }

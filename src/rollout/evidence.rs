@@ -3,16 +3,18 @@
 use std::collections::BTreeMap;
 
 use super::{
-    goal_in_scene::GoalInScene,
+    goal_in_scene::{GoalInScene, Subject},
     simulation::{ObjectInstance, Simulation},
 };
 use softvt_evaluation::{
+    criteria::SuccessCriteria,
     deformation::{Deformation, ReferenceShape},
     evidence::{
-        BodyEvidence, CrushedShares, Evidence, GoalEvidence, GripEvidence, GripperEvidence, PadEvidence,
+        BodyEvidence, CrushedShares, Evidence, GripEvidence, GripperEvidence, PadEvidence, PlaceEvidence,
+        PredicateEvidence, TargetEvidence,
     },
     goal::GoalRegion,
-    judge::OtherBody,
+    judge::{OtherBody, Target},
     safety::DeformationLimit,
 };
 use softvt_geometry::{Pose, Vec3};
@@ -24,28 +26,30 @@ use softvt_physics::{
 use softvt_robot::gripper::target_width;
 use softvt_scene::{Body, SoftMaterial};
 
-/// Collects the evidence of an episode: the target, its goal, the other movable objects, and their settled shapes.
+/// Collects the evidence of an episode: the targets, the places of the goal, the other movable objects, and their
+/// settled shapes.
 #[derive(Clone, Debug)]
 pub(super) struct EvidenceCollector {
-    target: usize,
-    goal: usize,
-    region: GoalRegion,
+    goal: GoalInScene,
     /// Share of its weight that must act on what carries an object.
     support_share: f64,
-    /// Movable objects that are not the target.
+    /// Force above which the robot touches an object, N.
+    touch_force_n: f64,
+    /// Movable objects that are not targets.
     others: Vec<usize>,
     references: Vec<Option<ReferenceShape>>,
     /// Deformation of each object in the last evidence; `None` if it is rigid or cannot be measured.
     deformations: Vec<Option<Deformation>>,
+    /// Strains of each target; `None` if it is rigid.
+    crushed: Vec<Option<StrainMeter>>,
+    targets: Vec<TargetEvidence>,
     bodies: Vec<BodyEvidence>,
-    crushed: Option<StrainMeter>,
+    predicates: Vec<PredicateEvidence>,
 }
 
 impl EvidenceCollector {
     /// Takes the current, settled state as the reference of deformation.
-    pub(super) fn new(sim: &Simulation, goal: &GoalInScene, support_share: f64) -> Self {
-        let &GoalInScene { object: target, target: goal, region } = goal;
-        let is_other = |i: &usize| *i != target && sim.objects[*i].body.is_free();
+    pub(super) fn new(sim: &Simulation, goal: GoalInScene, criteria: &SuccessCriteria) -> Self {
         let references: Vec<_> = sim
             .objects
             .iter()
@@ -57,17 +61,38 @@ impl EvidenceCollector {
                 _ => None,
             })
             .collect();
-        let others: Vec<usize> = (0..sim.objects.len()).filter(is_other).collect();
-        let bodies = Vec::with_capacity(others.len());
-        let crushed = match (sim.objects[target].body, &sim.objects[target].asset.body) {
-            (BodyId::Soft(index), Body::Soft(SoftMaterial { collapse_strain, damage_strain, .. })) => {
-                let limits = StrainLimits { collapse: *collapse_strain, damage: *damage_strain };
-                Some(StrainMeter::new(&sim.world.soft(index).state.model, limits))
+        let is_other = |i: &usize| !goal.targets.contains(i) && sim.objects[*i].body.is_free();
+        Self {
+            support_share: criteria.support_share,
+            touch_force_n: criteria.touch_force_n,
+            others: (0..sim.objects.len()).filter(is_other).collect(),
+            deformations: deformations(&references, sim).collect(),
+            references,
+            crushed: goal.targets.iter().map(|&target| strain_meter(sim, &sim.objects[target])).collect(),
+            targets: Vec::with_capacity(goal.targets.len()),
+            bodies: Vec::new(),
+            predicates: Vec::with_capacity(goal.predicates.len()),
+            goal,
+        }
+    }
+
+    /// The targets as they settled, with their deformation limits by name.
+    pub(super) fn settled_targets(
+        &self,
+        sim: &Simulation,
+        limits: &BTreeMap<String, DeformationLimit>,
+    ) -> Vec<Target> {
+        let target = |&index: &usize| {
+            let object = &sim.objects[index];
+            Target {
+                name: object.name.clone(),
+                weight_n: sim.weight(object),
+                is_soft: matches!(object.body, BodyId::Soft(_)),
+                limit: limits.get(&object.name).copied(),
+                lowest_z_w: lowest(sim, object),
             }
-            _ => None,
         };
-        let deformations = deformations(&references, sim).collect();
-        Self { target, goal, region, support_share, others, references, deformations, bodies, crushed }
+        self.goal.targets.iter().map(target).collect()
     }
 
     /// The other movable objects as they settled, with their deformation limits by name.
@@ -80,13 +105,18 @@ impl EvidenceCollector {
             let object = &sim.objects[index];
             OtherBody {
                 name: object.name.clone(),
-                is_goal: index == self.goal,
+                is_goal: self.goal.is_place(index),
                 is_soft: matches!(object.body, BodyId::Soft(_)),
                 limit: limits.get(&object.name).copied(),
                 lowest_z_w: lowest(sim, object),
             }
         };
         self.others.iter().map(other).collect()
+    }
+
+    /// The goal.
+    pub(super) fn goal(&self) -> &GoalInScene {
+        &self.goal
     }
 
     /// Deformation of an object in the last evidence, 0 before the first; `None` if it is rigid or cannot be measured.
@@ -99,70 +129,114 @@ impl EvidenceCollector {
         self.references[object].as_ref()
     }
 
-    /// The evidence of the last physics step.
-    pub(super) fn collect<'a>(&'a mut self, sim: &Simulation, time_s: f64) -> Evidence<'a> {
+    /// The evidence of the last physics step. Predicates that are not placements are evaluated in the last physics
+    /// step of a control step.
+    ///
+    /// # Errors
+    /// A function of the script fails.
+    pub(super) fn collect<'a>(
+        &'a mut self,
+        sim: &Simulation,
+        time_s: f64,
+        is_last: bool,
+    ) -> Result<Evidence<'a>, String> {
         self.deformations.clear();
         self.deformations.extend(deformations(&self.references, sim));
         let mut bodies = std::mem::take(&mut self.bodies);
         bodies.clear();
         bodies.extend(self.others.iter().map(|&i| self.body(sim, i)));
         self.bodies = bodies;
-        let target = &sim.objects[self.target];
-        let crushed = match (&mut self.crushed, target.body) {
-            (Some(meter), BodyId::Soft(index)) => {
-                meter.update(&sim.world.soft(index).state);
-                CrushedShares { collapsed: meter.collapsed_share(), damaged: meter.damaged_share() }
-            }
-            _ => CrushedShares::default(),
-        };
-        let goal = &sim.objects[self.goal];
-        let goal_w = foot_pose(sim, goal);
-        let carriers = self.carriers(sim, &goal_w);
-        let from_goal = carriers.iter().map(|&carrier| carried(sim, carrier, self.target)).sum::<f64>();
-        let from_robot = sim
-            .robot
-            .body
-            .iter()
-            .map(|&c| sim.contact(target, ContactPartner::Collider(c)).normal_force)
-            .sum::<f64>();
-        let of_robot = sim.robot.pads.iter().chain(&sim.robot.body);
-        let load_w: Vec3 = of_robot.map(|&c| sim.contact(target, ContactPartner::Collider(c)).force_w).sum();
-        Evidence {
+        let mut targets = std::mem::take(&mut self.targets);
+        targets.clear();
+        targets.extend((0..self.goal.targets.len()).map(|place| self.target(sim, place)));
+        self.targets = targets;
+        let mut predicates = std::mem::take(&mut self.predicates);
+        predicates.clear();
+        for number in 0..self.goal.predicates.len() {
+            predicates.push(match self.goal.predicates[number].subject {
+                Subject::Rests { target, on, region } => {
+                    PredicateEvidence::Place(self.place(sim, self.goal.targets[target], on, &region))
+                }
+                _ if is_last => {
+                    let is_touched = |object| self.is_touched(sim, object);
+                    PredicateEvidence::Given(self.goal.holds(number, sim, time_s, is_touched)?)
+                }
+                _ => PredicateEvidence::Given(false),
+            });
+        }
+        self.predicates = predicates;
+        Ok(Evidence {
             time_s,
             hand_w: sim.robot.hand_w(&sim.world),
             gripper: GripperEvidence {
                 width_m: sim.robot.width(&sim.world),
                 commanded_width_m: target_width(sim.robot.closure()),
             },
-            pads: sim.pad_contacts(target).map(|contact| PadEvidence {
+            targets: &self.targets,
+            others: &self.bodies,
+            predicates: &self.predicates,
+        })
+    }
+
+    /// The target of a place in the list of targets.
+    fn target(&mut self, sim: &Simulation, place: usize) -> TargetEvidence {
+        let index = self.goal.targets[place];
+        let object = &sim.objects[index];
+        let crushed = match (&mut self.crushed[place], object.body) {
+            (Some(meter), BodyId::Soft(index)) => {
+                meter.update(&sim.world.soft(index).state);
+                CrushedShares { collapsed: meter.collapsed_share(), damaged: meter.damaged_share() }
+            }
+            _ => CrushedShares::default(),
+        };
+        let contact = |&collider| sim.contact(object, ContactPartner::Collider(collider));
+        let load_w: Vec3 =
+            sim.robot.pads.iter().chain(&sim.robot.body).map(|collider| contact(collider).force_w).sum();
+        TargetEvidence {
+            body: self.body(sim, index),
+            pads: sim.pad_contacts(object).map(|contact| PadEvidence {
                 normal_force_n: contact.normal_force,
                 // A sleeping body keeps the contacts with which it fell asleep.
-                slip_speed_m_s: if sim.is_asleep(target) { 0.0 } else { contact.slip_speed },
+                slip_speed_m_s: if sim.is_asleep(object) { 0.0 } else { contact.slip_speed },
             }),
-            robot_force_n: from_robot,
+            hand_force_n: sim.robot.body.iter().map(|collider| contact(collider).normal_force).sum::<f64>(),
             grip: GripEvidence {
                 load_n: load_w,
                 axis_w: sim.robot.grip_axis_w(&sim.world),
-                dynamic_mu: sim.pad_friction(target).dynamic_mu,
+                dynamic_mu: sim.pad_friction(object).dynamic_mu,
             },
-            target: self.body(sim, self.target),
             crushed,
-            goal: GoalEvidence { pose_w: goal_w, support_force_n: from_goal },
-            others: &self.bodies,
         }
     }
 
-    /// Indices of the objects whose support of the target counts: the one at the goal and, for a container, the objects
+    /// The place on or in which an object must rest.
+    fn place(&self, sim: &Simulation, object: usize, on: usize, region: &GoalRegion) -> PlaceEvidence {
+        let pose_w = foot_pose(sim, &sim.objects[on]);
+        let carriers = self.carriers(sim, object, on, region, &pose_w);
+        let support_force_n = carriers.iter().map(|&carrier| carried(sim, carrier, object)).sum::<f64>();
+        PlaceEvidence { pose_w, support_force_n }
+    }
+
+    /// Indices of the objects whose support of an object counts: the one at the place and, for a container, the objects
     /// in it that it carries, directly or by one another.
-    fn carriers(&self, sim: &Simulation, goal_w: &Pose) -> Vec<usize> {
-        let mut carriers = vec![self.goal];
-        if !matches!(self.region, GoalRegion::Inside { .. }) {
+    fn carriers(
+        &self,
+        sim: &Simulation,
+        object: usize,
+        on: usize,
+        region: &GoalRegion,
+        place_w: &Pose,
+    ) -> Vec<usize> {
+        let mut carriers = vec![on];
+        if !matches!(region, GoalRegion::Inside { .. }) {
             return carriers;
         }
         let is_in = |&&index: &&usize| {
-            index != self.goal && self.region.contains(goal_w, &sim.centre(&sim.objects[index]), 0.0)
+            index != on && index != object && region.contains(place_w, &sim.centre(&sim.objects[index]), 0.0)
         };
-        let mut rest: Vec<usize> = self.others.iter().filter(is_in).copied().collect();
+        let movable = self.others.iter().chain(&self.goal.targets);
+        let mut rest: Vec<usize> = movable.filter(is_in).copied().collect();
+        rest.sort_unstable();
         while let Some(place) = rest.iter().position(|&index| {
             let upward: f64 = carriers.iter().map(|&carrier| carried(sim, carrier, index)).sum();
             upward >= self.support_share * sim.weight(&sim.objects[index])
@@ -170,6 +244,11 @@ impl EvidenceCollector {
             carriers.push(rest.remove(place));
         }
         carriers
+    }
+
+    /// True if the robot presses on an object.
+    fn is_touched(&self, sim: &Simulation, index: usize) -> bool {
+        self.body(sim, index).robot_force_n > self.touch_force_n
     }
 
     fn body(&self, sim: &Simulation, index: usize) -> BodyEvidence {
@@ -189,6 +268,16 @@ impl EvidenceCollector {
             robot_force_n: from_robot,
             deformation: self.deformations[index],
         }
+    }
+}
+
+fn strain_meter(sim: &Simulation, object: &ObjectInstance) -> Option<StrainMeter> {
+    match (object.body, &object.asset.body) {
+        (BodyId::Soft(index), Body::Soft(SoftMaterial { collapse_strain, damage_strain, .. })) => {
+            let limits = StrainLimits { collapse: *collapse_strain, damage: *damage_strain };
+            Some(StrainMeter::new(&sim.world.soft(index).state.model, limits))
+        }
+        _ => None,
     }
 }
 

@@ -1,4 +1,6 @@
-//! The goal of a task in a scene: its objects and its region.
+//! The goal of a task in a scene: its objects, regions and joints.
+
+use std::{fmt::Debug, sync::Arc};
 
 use super::{
     asset_cache::AssetCache,
@@ -6,76 +8,299 @@ use super::{
     evidence::foot_pose,
     simulation::{ObjectInstance, Simulation, placed_at},
 };
-use softvt_benchmark::{GoalKind, Task};
-use softvt_evaluation::goal::GoalRegion;
-use softvt_geometry::Aabb;
+use softvt_benchmark::{
+    Placement, Task,
+    goal::{Goal, Parts, Side},
+};
+use softvt_evaluation::{
+    goal::GoalRegion,
+    goal_tree::GoalNode,
+    judge::{Predicate, PredicateRule},
+};
+use softvt_geometry::{Aabb, Vec3};
+use softvt_physics::BodyId;
+
+/// A function of the true state that a goal asks for ([`Goal::Predicate`]).
+pub trait StatePredicate: Debug + Send + Sync {
+    /// True if it holds.
+    ///
+    /// # Errors
+    /// The function fails; the message names its place.
+    fn holds(&self, sim: &Simulation, time_s: f64) -> Result<bool, String>;
+}
 
 /// The goal of a task in a scene.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct GoalInScene {
-    /// Index of the object to be moved.
-    pub object: usize,
-    /// Index of the object that must carry it.
-    pub target: usize,
-    /// Region in the frame of the latter.
-    pub region: GoalRegion,
+    /// Indices of the objects that the task moves; the first is *the object*.
+    pub targets: Vec<usize>,
+    /// How the predicates combine.
+    pub goal: GoalNode,
+    /// What each predicate is about.
+    pub predicates: Vec<PredicateInScene>,
+    /// Functions of the script, which some predicates call.
+    functions: Vec<Arc<dyn StatePredicate>>,
+}
+
+/// A predicate of the goal; numbers are indices of objects where nothing else is said.
+#[derive(Clone, Debug)]
+pub(super) struct PredicateInScene {
+    /// What holds, in words.
+    name: String,
+    hold_s: f64,
+    pub subject: Subject,
+}
+
+/// What a predicate is about.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Subject {
+    /// A target (a place in [`GoalInScene::targets`]) rests in a region of an object.
+    Rests { target: usize, on: usize, region: GoalRegion },
+    /// The position of a joint is within a range.
+    Joint { part: usize, range: [f64; 2] },
+    /// The horizontal distance of two centres is at most this, m.
+    Near { object: usize, target: usize, distance_m: f64 },
+    /// The centre of an object is beyond another towards a side by at least this, m.
+    Beside { object: usize, target: usize, side: Side, distance_m: f64 },
+    /// The z axis of an object is within an angle of the vertical, given by its cosine.
+    Upright { object: usize, least_cosine: f64 },
+    /// A function of the script, by its place in [`GoalInScene::functions`].
+    Function(usize),
+}
+
+/// Builds a [`GoalInScene`].
+struct Finder<'a> {
+    task: &'a Task,
+    sim: &'a Simulation,
+    cache: &'a AssetCache,
+    found: GoalInScene,
 }
 
 impl GoalInScene {
-    /// The goal of a task. The scene need not have settled.
+    /// The goal of a task. The scene need not have settled. `functions` are those of its [`Goal::Predicate`]s, in
+    /// order.
     ///
     /// # Errors
-    /// The goal names an unknown object or a container without a cavity, or gravity does not point down.
-    pub(super) fn find(task: &Task, sim: &Simulation, cache: &AssetCache) -> Result<Self, EpisodeError> {
-        let find = |role, name: &str| {
-            sim.objects.iter().position(|o| o.name == name).ok_or_else(|| EpisodeError::NoObject {
-                task: task.id,
-                role,
-                name: name.to_owned(),
-                layout: task.layout.clone(),
-                have: sim.objects.iter().map(|o| o.name.as_str()).collect::<Vec<_>>().join(", "),
-            })
-        };
-        let (object, target) = (find("object", &task.goal.object)?, find("target", &task.goal.target)?);
-        let region = goal_region(task.goal.kind, &sim.objects[target], cache).ok_or_else(|| {
-            let (name, placed_at) = (task.goal.target.clone(), placed_at(&sim.scene, &task.goal.target));
-            EpisodeError::NoCavity { task: task.id, target: name, placed_at }
-        })?;
-        if sim.scene.gravity.z >= 0.0 {
+    /// The goal names an unknown object, a container without a cavity or something without a joint, or gravity does not
+    /// point down.
+    pub(super) fn find(
+        task: &Task,
+        sim: &Simulation,
+        cache: &AssetCache,
+        functions: &[Arc<dyn StatePredicate>],
+    ) -> Result<Self, EpisodeError> {
+        let functions = functions.to_vec();
+        let goal = GoalNode::All(Vec::new());
+        let found = Self { targets: Vec::new(), goal, predicates: Vec::new(), functions };
+        let mut finder = Finder { task, sim, cache, found };
+        for name in task.targets() {
+            let index = finder.index_of("object", name)?;
+            finder.found.targets.push(index);
+        }
+        finder.found.goal = finder.node(&task.goal)?;
+        let has_placement =
+            finder.found.predicates.iter().any(|p| matches!(p.subject, Subject::Rests { .. }));
+        if has_placement && sim.scene.gravity.z >= 0.0 {
             return Err(EpisodeError::Gravity {
                 task: task.id,
-                object: task.goal.object.clone(),
+                object: task.object.clone(),
                 gravity: sim.scene.gravity,
-                placed_at: placed_at(&sim.scene, &task.goal.object),
+                placed_at: placed_at(&sim.scene, &task.object),
             });
         }
-        Ok(Self { object, target, region })
+        Ok(finder.found)
     }
 
-    /// True if the object is over the region, at any height: the goal may hold once the scene has settled.
-    pub(super) fn is_object_over(&self, sim: &Simulation) -> bool {
-        let [object, target] = [self.object, self.target].map(|index| &sim.objects[index]);
-        self.region.is_over(&foot_pose(sim, target), &sim.centre(object))
+    /// The predicates as the judge reads them.
+    pub(super) fn judged(&self) -> Vec<Predicate> {
+        let judged = |PredicateInScene { name, hold_s, subject }: &PredicateInScene| Predicate {
+            name: name.clone(),
+            rule: match *subject {
+                Subject::Rests { target, region, .. } => {
+                    PredicateRule::Rests { target, region, hold_s: *hold_s }
+                }
+                _ => PredicateRule::Given { hold_s: *hold_s },
+            },
+        };
+        self.predicates.iter().map(judged).collect()
+    }
+
+    /// True if an object is one on or in which a target must rest.
+    pub(super) fn is_place(&self, object: usize) -> bool {
+        self.predicates.iter().any(|p| matches!(p.subject, Subject::Rests { on, .. } if on == object))
+    }
+
+    /// Whether a predicate that is not a placement holds. `is_touched` says of an object whether the robot presses on
+    /// it.
+    pub(super) fn holds(
+        &self,
+        predicate: usize,
+        sim: &Simulation,
+        time_s: f64,
+        is_touched: impl Fn(usize) -> bool,
+    ) -> Result<bool, String> {
+        let centre = |index: usize| sim.centre(&sim.objects[index]);
+        let offset_b = |object: usize, target: usize| {
+            sim.robot.base_w.rotation.inverse() * (centre(object) - centre(target))
+        };
+        Ok(match self.predicates[predicate].subject {
+            Subject::Rests { .. } => false,
+            Subject::Joint { part, range: [low, high] } => {
+                sim.joint(&sim.objects[part]).is_some_and(|q| (low..=high).contains(&q))
+            }
+            Subject::Near { object, target, distance_m } => {
+                !is_touched(object) && offset_b(object, target).xy().norm() <= distance_m
+            }
+            Subject::Beside { object, target, side, distance_m } => {
+                let offset = offset_b(object, target);
+                let [towards, across] = match side {
+                    Side::LeftOf => [offset.y, offset.x],
+                    Side::RightOf => [-offset.y, offset.x],
+                    Side::InFrontOf => [-offset.x, offset.y],
+                    Side::Behind => [offset.x, offset.y],
+                };
+                !is_touched(object) && towards >= distance_m && across.abs() <= towards
+            }
+            Subject::Upright { object, least_cosine } => {
+                let axis = sim.pose(&sim.objects[object]).rotation * Vec3::z();
+                !is_touched(object) && axis.z >= least_cosine
+            }
+            Subject::Function(place) => match self.functions.get(place) {
+                Some(function) => function.holds(sim, time_s)?,
+                None => {
+                    return Err(format!(
+                        "the episode lacks the function of {:?}",
+                        self.predicates[predicate].name
+                    ));
+                }
+            },
+        })
+    }
+
+    /// True if the goal may hold once the scene has settled. A conjunction may if each object is over its region, at
+    /// any height, and the other predicates hold already.
+    fn may_hold(&self, sim: &Simulation) -> bool {
+        !is_conjunction(&self.goal)
+            || (0..self.predicates.len()).all(|number| match self.predicates[number].subject {
+                Subject::Rests { target, on, region } => {
+                    let object = &sim.objects[self.targets[target]];
+                    region.is_over(&foot_pose(sim, &sim.objects[on]), &sim.centre(object))
+                }
+                _ => self.holds(number, sim, 0.0, |_| false).unwrap_or(true),
+            })
+    }
+}
+
+impl Finder<'_> {
+    fn index_of(&self, role: &'static str, name: &str) -> Result<usize, EpisodeError> {
+        self.sim.objects.iter().position(|o| o.name == name).ok_or_else(|| EpisodeError::NoObject {
+            task: self.task.id,
+            role,
+            name: name.to_owned(),
+            layout: self.task.layout.clone(),
+            have: self.sim.objects.iter().map(|o| o.name.as_str()).collect::<Vec<_>>().join(", "),
+        })
+    }
+
+    fn nodes(&mut self, parts: &Parts) -> Result<Vec<GoalNode>, EpisodeError> {
+        parts.goals.iter().map(|goal| self.node(goal)).collect()
+    }
+
+    fn node(&mut self, goal: &Goal) -> Result<GoalNode, EpisodeError> {
+        let (hold_s, subject) = match goal {
+            Goal::All(parts) => return self.nodes(parts).map(GoalNode::All),
+            Goal::Any(parts) => return self.nodes(parts).map(GoalNode::Any),
+            Goal::None(parts) => return self.nodes(parts).map(GoalNode::None),
+            Goal::Sequence(parts) => return self.nodes(parts).map(GoalNode::Sequence),
+            Goal::On(of) => (of.hold_s, self.placement(of, false)?),
+            Goal::Inside(of) => (of.hold_s, self.placement(of, true)?),
+            Goal::Near { of, distance_m } => {
+                let [object, target] = self.pair(of)?;
+                (of.hold_s, Subject::Near { object, target, distance_m: *distance_m })
+            }
+            Goal::Beside { side, of, distance_m } => {
+                let [object, target] = self.pair(of)?;
+                (of.hold_s, Subject::Beside { object, target, side: *side, distance_m: *distance_m })
+            }
+            Goal::Upright { object, hold_s, angle_rad } => {
+                let object = self.index_of("object", object)?;
+                (*hold_s, Subject::Upright { object, least_cosine: angle_rad.cos() })
+            }
+            Goal::Opened { joint, share } => {
+                (0.0, self.joint(joint, |[low, high]| [low + share * (high - low), high])?)
+            }
+            Goal::Closed { joint, share } => {
+                (0.0, self.joint(joint, |[low, high]| [low, low + share * (high - low)])?)
+            }
+            Goal::Turned { joint, range } => (0.0, self.joint(joint, |_| *range)?),
+            Goal::Predicate { .. } => {
+                let before = |p: &&PredicateInScene| matches!(p.subject, Subject::Function(_));
+                (0.0, Subject::Function(self.found.predicates.iter().filter(before).count()))
+            }
+        };
+        self.found.predicates.push(PredicateInScene { name: goal.describe(), hold_s, subject });
+        Ok(GoalNode::Predicate(self.found.predicates.len() - 1))
+    }
+
+    fn pair(&self, of: &Placement) -> Result<[usize; 2], EpisodeError> {
+        Ok([self.index_of("object", &of.object)?, self.index_of("target", &of.target)?])
+    }
+
+    fn placement(&self, of: &Placement, is_inside: bool) -> Result<Subject, EpisodeError> {
+        let [object, on] = self.pair(of)?;
+        let target = self.found.targets.iter().position(|target| *target == object).unwrap_or_default();
+        let region = region_of(&self.sim.objects[on], is_inside, self.cache).ok_or_else(|| {
+            let placed_at = placed_at(&self.sim.scene, &of.target);
+            EpisodeError::NoCavity { task: self.task.id, target: of.target.clone(), placed_at }
+        })?;
+        Ok(Subject::Rests { target, on, region })
+    }
+
+    /// A joint within what `range` makes of its limits, a rounding error beyond them included.
+    fn joint(&self, name: &str, range: impl Fn([f64; 2]) -> [f64; 2]) -> Result<Subject, EpisodeError> {
+        const ROUNDING: f64 = 1e-4;
+        let part = self.index_of("joint", name)?;
+        let joint = self.sim.objects[part].part.as_ref().map(|part| &part.joint);
+        let joint = joint.filter(|_| matches!(self.sim.objects[part].body, BodyId::Link(_)));
+        let Some(joint) = joint else {
+            let placed_at = placed_at(&self.sim.scene, name);
+            return Err(EpisodeError::NoJoint { task: self.task.id, name: name.to_owned(), placed_at });
+        };
+        let [low, high] = range([joint.lower, joint.upper]);
+        Ok(Subject::Joint { part, range: [low - ROUNDING, high + ROUNDING] })
+    }
+}
+
+/// True if a goal asks for all of its predicates at once.
+fn is_conjunction(goal: &GoalNode) -> bool {
+    match goal {
+        GoalNode::Predicate(_) => true,
+        GoalNode::All(parts) => parts.iter().all(is_conjunction),
+        _ => false,
     }
 }
 
 /// Checks the goal of a task in a scene that need not have settled. Returns true if the goal may hold once it has.
 ///
 /// # Errors
-/// The goal names an unknown object or a container without a cavity, or gravity does not point down.
-pub fn check_goal(task: &Task, sim: &Simulation, cache: &AssetCache) -> Result<bool, EpisodeError> {
-    Ok(GoalInScene::find(task, sim, cache)?.is_object_over(sim))
+/// The goal names an unknown object, a container without a cavity or something without a joint, or gravity does not
+/// point down.
+pub fn check_goal(
+    task: &Task,
+    sim: &Simulation,
+    cache: &AssetCache,
+    functions: &[Arc<dyn StatePredicate>],
+) -> Result<bool, EpisodeError> {
+    Ok(GoalInScene::find(task, sim, cache, functions)?.may_hold(sim))
 }
 
-/// Region in which the object must rest, in the frame of the target at its foot. `None` for `Inside` an object without
-/// a cavity.
-fn goal_region(kind: GoalKind, target: &ObjectInstance, cache: &AssetCache) -> Option<GoalRegion> {
-    match kind {
-        GoalKind::On => Some(GoalRegion::On { radius_m: 0.5 * target.bounds.size().xy().min() }),
-        GoalKind::Inside => {
-            let Aabb { min, max } = cache.cavity(&target.asset.shape)?;
-            let foot = target.foot_o();
-            Some(GoalRegion::Inside { space: Aabb { min: min - foot, max: max - foot } })
-        }
+/// Region in which an object must rest, in the frame of the object that carries it at its foot. `None` for the inside
+/// of an object without a cavity.
+fn region_of(target: &ObjectInstance, is_inside: bool, cache: &AssetCache) -> Option<GoalRegion> {
+    if !is_inside {
+        return Some(GoalRegion::On { radius_m: 0.5 * target.bounds.size().xy().min() });
     }
+    let Aabb { min, max } = cache.cavity(&target.asset.shape)?;
+    let foot = target.foot_o();
+    Some(GoalRegion::Inside { space: Aabb { min: min - foot, max: max - foot } })
 }

@@ -11,7 +11,7 @@
 //! ```no_run
 //! use std::sync::Arc;
 //!
-//! use softvt_benchmark::{Goal, GoalKind, Task, settings::Settings};
+//! use softvt_benchmark::{Goal, Placement, Task, settings::Settings};
 //! use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 //! use softvt_evaluation::verdict::Outcome;
 //! use softvt_geometry::{Aabb, Pose, Vec3, shape::Shape};
@@ -51,7 +51,8 @@
 //!     id: 0,
 //!     prompt: "do nothing".to_owned(),
 //!     layout: "cube".to_owned(),
-//!     goal: Goal { kind: GoalKind::On, object, target, hold_s: 10.0 },
+//!     goal: Goal::On(Placement { object: object.clone(), target, hold_s: 10.0 }),
+//!     object,
 //!     budget_steps: 3,
 //!     expert: false,
 //! };
@@ -91,7 +92,7 @@ pub use asset_cache::AssetCache;
 pub use build_error::SceneBuildError;
 pub use controller::{ChunkedPolicy, Controller};
 pub use episode::{Episode, EpisodeError, EpisodeSpec, FinishedEpisode, checksum, target_asset};
-pub use goal_in_scene::check_goal;
+pub use goal_in_scene::{StatePredicate, check_goal};
 pub use robot_instance::RobotInstance;
 pub use scene_warnings::scene_warnings;
 pub use sensor_assets::{SensingError, SensorAssets};

@@ -21,8 +21,9 @@ pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSe
             .map(move |warning| format!("asset {name}: {warning}"))
     };
     let mut all: BTreeSet<String> = scene.objects.iter().flat_map(|object| warnings(&object.asset)).collect();
-    let target = scene.objects.iter().find(|object| object.name == task.goal.object);
-    all.extend(target.and_then(|target| width_warning(&target.asset)));
+    let targets = task.targets();
+    let targets = scene.objects.iter().filter(|object| targets.contains(&object.name.as_str()));
+    all.extend(targets.filter_map(|target| width_warning(&target.asset)));
     all
 }
 

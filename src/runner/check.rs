@@ -65,7 +65,7 @@ fn check_first_scenes(
         let setup = scenes.with(|builder| builder.build(&run.episode_id(task, 0), &run.changes()))??;
         let mut warnings = scene_warnings(task, &setup.scene, &run.assets);
         let of_task = |warning: String| format!("task {}: {warning}", task.id);
-        warnings.extend(run.check_scene(task, setup.scene)?.map(of_task));
+        warnings.extend(run.check_scene(task, setup.scene, setup.predicates)?.map(of_task));
         Ok(warnings)
     };
     parallel::run(tasks.len(), run.config.thread_count(), cancel::requested, check, |_, found| {

@@ -173,15 +173,16 @@ impl<'a> Episodes<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use softvt_benchmark::{Goal, GoalKind};
+    use softvt_benchmark::{Goal, Placement};
 
     fn tasks(count: usize) -> Vec<Task> {
-        let goal = Goal { kind: GoalKind::On, object: "a".to_owned(), target: "b".to_owned(), hold_s: 0.4 };
+        let goal = Goal::On(Placement { object: "a".to_owned(), target: "b".to_owned(), hold_s: 0.4 });
         let task = |id| Task {
             id,
             prompt: "move".to_owned(),
             layout: "one".to_owned(),
             goal: goal.clone(),
+            object: "a".to_owned(),
             budget_steps: 1,
             expert: false,
         };

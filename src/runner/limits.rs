@@ -79,11 +79,11 @@ impl CalibrationFiles {
         Self { script: script.to_owned(), read: Mutex::default(), reported: Mutex::default(), observer }
     }
 
-    /// Limits of the soft objects of a scene. `target` is the object that the goal is about.
+    /// Limits of the soft objects of a scene. `targets` are the objects that the task moves.
     ///
     /// # Errors
     /// A calibration file that is not valid.
-    pub(crate) fn limits_of(&self, scene: &Scene, target: &str) -> Result<SceneLimits, RunError> {
+    pub(crate) fn limits_of(&self, scene: &Scene, targets: &[&str]) -> Result<SceneLimits, RunError> {
         let mut found = SceneLimits::default();
         for object in scene.objects.iter().filter(|object| matches!(object.asset.body, Body::Soft(_))) {
             found.assets.insert(object.nominal.name.clone());
@@ -91,7 +91,9 @@ impl CalibrationFiles {
                 Ok(limit) => {
                     found.by_object.insert(object.name.clone(), limit);
                 }
-                Err(missing) => found.missing.push(missing.describe(object, object.name == target)),
+                Err(missing) => {
+                    found.missing.push(missing.describe(object, targets.contains(&object.name.as_str())))
+                }
             }
         }
         Ok(found)

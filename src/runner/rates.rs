@@ -233,6 +233,7 @@ pub(crate) fn time_episode(
     let opened = EpisodeSetup::open(loaded, &id, &SceneChanges::default()).map_err(RunError::input)?;
     let (task, settings) = (&suite.tasks[0], &suite.settings);
     let spec = EpisodeSpec::new(id, "expert", task, &opened.nominal, opened.scene.clone(), settings);
+    let spec = EpisodeSpec { predicates: opened.predicates.clone(), ..spec };
     let expert =
         opened.expert(ExpertGrip::Commanded).ok_or_else(|| RunError::input("the suite has no expert"))?;
     let mut controller = ObservedExpert { expert, streams: streams.clone(), first_action: None };

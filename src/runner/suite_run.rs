@@ -22,9 +22,9 @@ use softvt_policy::{EpisodeBrief, PolicyError, SensorStreams, remote::PolicyConn
 use softvt_records::record::DemonstrationOrigin;
 use softvt_rollout::{
     AssetCache, Episode, EpisodeError, EpisodeSpec, FinishedEpisode, SceneBuildError, SensorAssets, Sensors,
-    Simulation, check_goal, check_sensors, cost_warning,
+    Simulation, StatePredicate, check_goal, check_sensors, cost_warning,
 };
-use softvt_scene::{Body, Scene};
+use softvt_scene::{Body, Object, Scene};
 use softvt_script::{EpisodeSetup, LoadedScript, SceneChanges};
 
 /// Episodes per task whose scenes are built before a run, to find all assets and the limits that are missing.
@@ -230,7 +230,7 @@ impl<'a> SuiteRun<'a> {
     /// A calibration file that is not valid.
     pub(crate) fn limits_of(&self, task: &Task, scene: &Scene) -> Result<SceneLimits, RunError> {
         match self.reads_limits {
-            true => self.calibration_files.limits_of(scene, &task.goal.object),
+            true => self.calibration_files.limits_of(scene, &task.targets()),
             false => Ok(SceneLimits::default()),
         }
     }
@@ -387,6 +387,7 @@ impl<'a> SuiteRun<'a> {
         let task = &Task { prompt: opened.prompt.clone(), ..task.clone() };
         let mut spec = EpisodeSpec::new(id, policy, task, &opened.nominal, scene, &self.settings);
         spec.secret.clone_from(&self.config.secret);
+        spec.predicates.clone_from(&opened.predicates);
         spec.header.privileged = self.is_privileged();
         spec.header.variation = opened.variation.clone().map(Box::new);
         spec.header.origin = origin.cloned().map(Box::new);
@@ -509,7 +510,12 @@ impl<'a> SuiteRun<'a> {
     ///
     /// # Errors
     /// A scene or sensor that is not valid.
-    pub fn check_scene(&self, task: &Task, scene: Scene) -> Result<Option<String>, RunError> {
+    pub fn check_scene(
+        &self,
+        task: &Task,
+        scene: Scene,
+        predicates: Vec<Arc<dyn StatePredicate>>,
+    ) -> Result<Option<String>, RunError> {
         self.check_object_type(task, &scene)?;
         let scene = Arc::new(scene);
         let settings = &self.settings;
@@ -518,11 +524,12 @@ impl<'a> SuiteRun<'a> {
             check_sensors(&scene, &settings.tactile, &self.sensor_assets).map_err(sense)?;
             let sim = Simulation::new(scene.clone(), &settings.physics, &settings.robot, &self.assets)?;
             sim.check_support()?;
-            if check_goal(task, &sim, &self.assets)? {
+            if check_goal(task, &sim, &self.assets, &predicates)? {
                 // Whether it holds is known once the scene has settled, with masses and contacts that are not
                 // approximate.
                 let id = self.episode_id(task, 0);
                 let spec = EpisodeSpec::new(id, "noop", task, &scene, Scene::clone(&scene), settings);
+                let spec = EpisodeSpec { predicates: predicates.clone(), ..spec };
                 Episode::start(spec, &AssetCache::default(), &self.sensor_assets)?;
             }
             let mut sensors = Sensors::new(&sim, &settings.tactile, &self.sensor_assets);
@@ -548,14 +555,15 @@ impl<'a> SuiteRun<'a> {
         if self.suite.object_type != ObjectType::Rigid || self.config.rigid_twin {
             return Ok(());
         }
-        let name = &task.goal.object;
-        let target = scene.objects.iter().find(|object| object.name == *name);
-        match target.filter(|object| matches!(object.asset.body, Body::Soft(_))) {
+        let names = task.targets();
+        let is_target = |object: &&Object| names.contains(&object.name.as_str());
+        let mut soft = scene.objects.iter().filter(|object| matches!(object.asset.body, Body::Soft(_)));
+        match soft.find(is_target) {
             None => Ok(()),
             Some(target) => Err(RunError::input(format!(
-                "{}: the target of task {}, {name}, is soft, but suite {} has object_type = \"rigid\"; set \
+                "{}: the target of task {}, {}, is soft, but suite {} has object_type = \"rigid\"; set \
                  \"deformable\"",
-                target.placed_at, task.id, self.suite.name
+                target.placed_at, task.id, target.name, self.suite.name
             ))),
         }
     }

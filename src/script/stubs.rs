@@ -5,10 +5,10 @@ use std::fmt::Write;
 use serde_json::Value;
 
 use super::{
-    api::{self, shapes::SHAPES, tasks::SETTINGS_CLASS, visuals::MASKS},
+    api::{self, goals::GoalSpec, shapes::SHAPES, tasks::SETTINGS_CLASS, visuals::MASKS},
     plan::options,
     schema::{
-        Class, Field, FieldDefault, Function, Record, Signature, Type,
+        Class, Field, FieldDefault, Function, LuaType, Record, Signature, Type,
         function::Param,
         object::{Access, LuaField},
     },
@@ -58,6 +58,20 @@ fn records() -> Vec<&'static Record> {
     records
 }
 
+/// Alias of the classes of goals.
+const GOAL: &str = "softvt.Goal";
+
+fn goal_classes() -> String {
+    match <GoalSpec as LuaType>::TYPE {
+        Type::Constructed(records) => classes(records),
+        _ => String::new(),
+    }
+}
+
+fn classes(records: &[&Record]) -> String {
+    records.iter().map(|record| record.class).collect::<Vec<_>>().join("|")
+}
+
 /// The LuaCATS type.
 fn lua_type(ty: &Type) -> String {
     match ty {
@@ -77,7 +91,10 @@ fn lua_type(ty: &Type) -> String {
         Type::Map(Type::Map(Type::Any)) => SETTINGS_CLASS.into(),
         Type::Map(of) => format!("table<string, {}>", lua_type(of)),
         Type::Nested(record) => record.class.into(),
-        Type::Constructed(records) => records.iter().map(|record| record.class).collect::<Vec<_>>().join("|"),
+        Type::Constructed(records) => match classes(records) {
+            all if all == goal_classes() => GOAL.into(),
+            all => all,
+        },
         Type::Object(class) => (*class).into(),
         Type::OneOf(types) => types.iter().map(lua_type).collect::<Vec<_>>().join("|"),
         Type::Any => "any".into(),
@@ -130,6 +147,7 @@ pub fn stubs() -> String {
         }
         out.push('\n');
     }
+    let _ = writeln!(out, "---The goal of a task.\n---@alias {GOAL} {}\n", goal_classes());
     for SettingGroup { class, fields } in setting_groups(&Settings::list()) {
         let about = "Settings; those that are left out keep their values. docs/settings.md lists all.";
         let _ = writeln!(out, "---{about}\n---@class {class}");

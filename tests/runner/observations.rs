@@ -287,7 +287,7 @@ fn left_and_right_are_those_of_the_image() {
         };
         let side = if task.prompt.contains(" right ") { "right" } else { "left" };
         assert!(task.prompt.contains(&format!("pick up the {side} ")));
-        assert_eq!(task.goal.object, side);
+        assert_eq!(task.object, side);
         assert!(column("left") < 100.0 && column("right") > 124.0, "task {}", task.id);
         assert!(column("left") < column("plate") && column("plate") < column("right"));
     }

@@ -7,7 +7,7 @@ use crate::{
     error::CliError,
     output::{eprint_notice, print},
 };
-use softvt_benchmark::{Goal, Plan, REFERENCE, Suite};
+use softvt_benchmark::{Plan, REFERENCE, Suite};
 use softvt_common::text::{self, counted};
 use softvt_runner::{
     ConfiguredScript, SuiteChecker, conditions, experiment, selection::check_distinct_out_dirs,
@@ -62,10 +62,8 @@ fn print_tasks(suite: &Suite) -> Result<(), CliError> {
     ))?;
     for task in &suite.tasks {
         let expert = if task.expert { "" } else { ", no expert" };
-        let Goal { kind, object, target, .. } = &task.goal;
-        let relation = kind.preposition();
-        let (id, prompt) = (task.id, text::escape_control(&task.prompt));
-        print(&format!("{id:>4} {prompt}: {object} {relation} {target}{expert}\n"))?;
+        let (id, prompt, goal) = (task.id, text::escape_control(&task.prompt), task.goal.describe());
+        print(&format!("{id:>4} {prompt}: {}{expert}\n", text::escape_control(&goal)))?;
     }
     Ok(())
 }

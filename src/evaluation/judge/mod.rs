@@ -12,20 +12,26 @@
 //! 4. **Lift.** A body is lifted if it is not supported and its lowest point is more than `lift_height_m` above its
 //!    settled height. The first body that is lifted decides `wrong_instance`; the target, if several are lifted in one
 //!    step.
-//! 5. **Release** and **slip**: [`ReleaseMonitor`], [`SlipMonitor`]. The pads carry the target while both touch it, it
+//! 5. **Release** and **slip**: [`ReleaseMonitor`](super::drop::ReleaseMonitor),
+//!    [`SlipMonitor`](super::slip::SlipMonitor). The pads carry the target while both touch it, it
 //!    is not supported and no release was commanded.
-//! 6. **Drop**: [`DropMonitor`].
-//! 7. **Goal**, at the last physics step of each control step: [`GoalMonitor`].
-//! 8. **Stage** of the episode: [`StageMonitor`].
-//! 9. **Grip** while the target is lifted and no release was commanded: [`GripMonitor`].
+//! 6. **Drop**: [`DropMonitor`](super::drop::DropMonitor).
+//! 7. **Goal**, at the last physics step of each control step: [`PlacementMonitor`] for each placement, [`GoalMonitor`]
+//!    for the whole.
+//! 8. **Stage** of the episode: [`StageMonitor`](super::stage::StageMonitor).
+//! 9. **Grip** while the target is lifted and no release was commanded: [`GripMonitor`](super::grip::GripMonitor).
+//!
+//! A goal may move several targets. Each has monitors of its own ([`target`]). The first is *the object*, whose
+//! deformation, grip and contacts the verdict holds; those of the others are in its list `targets`. NoDrop, NoSlip and
+//! Safety Success are of all targets.
 //!
 //! Harm to others is judged in addition: their peaks of D against their own τ, and the first contact of the robot with
 //! one of them.
 //!
-//! At the end ([`Judge::finish`]): Safety Success = Goal ∧ NoDrop ∧ D_peak ≤ τ, and NoSlip if the criteria require it
-//! ([`super::safety`]). Reported beside it: *gentle*, Goal with a grip ratio of at most `gentle_ratio`, and the nested
-//! successes of the SoftTacWorld challenge. Contact success is Goal with contact of both pads throughout the carry;
-//! contact safety is contact success with Safety and NoSlip.
+//! At the end ([`Judge::finish`]): Safety Success = Goal ∧ NoDrop ∧ D_peak ≤ τ for each target, and NoSlip if the
+//! criteria require it ([`super::safety`]). Reported beside it: *gentle*, Goal with a grip ratio of at most
+//! `gentle_ratio`, and the nested successes of the SoftTacWorld challenge. Contact success is Goal with contact of both
+//! pads throughout the carry; contact safety is contact success with Safety and NoSlip.
 //!
 //! # Example
 //!
@@ -36,52 +42,65 @@
 //!     criteria::SuccessCriteria,
 //!     deformation::ReferenceShape,
 //!     evidence::{
-//!         BodyEvidence, CrushedShares, Evidence, GoalEvidence, GripEvidence, GripperEvidence, PadEvidence,
+//!         BodyEvidence, CrushedShares, Evidence, GripEvidence, GripperEvidence, PadEvidence, PlaceEvidence,
+//!         PredicateEvidence, TargetEvidence,
 //!     },
 //!     goal::GoalRegion,
-//!     judge::{Judge, JudgeConfig},
+//!     goal_tree::GoalNode,
+//!     judge::{Judge, JudgeConfig, Predicate, PredicateRule, Target},
 //!     safety::DeformationLimit,
 //!     verdict::Outcome,
 //! };
 //! use softvt_geometry::{Aabb, Pose, Vec3};
 //!
 //! let (dt_s, weight_n) = (1.0 / 60.0, 0.3);
+//! let region = GoalRegion::On { radius_m: 0.08 };
 //! let mut judge = Judge::new(JudgeConfig {
 //!     criteria: SuccessCriteria::default(),
 //!     workspace: Aabb { min: Vec3::new(-1.0, -1.0, -0.1), max: Vec3::new(1.0, 1.0, 1.0) },
-//!     goal: GoalRegion::On { radius_m: 0.08 },
-//!     hold_s: 0.4,
+//!     goal: GoalNode::Predicate(0),
+//!     predicates: vec![Predicate {
+//!         name: "bun on plate".into(),
+//!         rule: PredicateRule::Rests { target: 0, region, hold_s: 0.4 },
+//!     }],
+//!     targets: vec![Target {
+//!         name: "bun".into(),
+//!         weight_n,
+//!         is_soft: true,
+//!         limit: Some(DeformationLimit { d_ref_pct: 2.0, kappa: 0.5 }),
+//!         lowest_z_w: 0.0,
+//!     }],
+//!     others: Vec::new(),
 //!     dt_s,
 //!     steps_per_control: 3,
-//!     target_weight_n: weight_n,
-//!     is_target_soft: true,
-//!     limit: Some(DeformationLimit { d_ref_pct: 2.0, kappa: 0.5 }),
-//!     target_lowest_z_w: 0.0,
-//!     others: Vec::new(),
 //!     max_steps: 27,
 //! });
 //! // Settled nodes, and the same stretched by 0.5 % along x.
 //! let settled = [Vec3::zeros(), Vec3::x() * 0.06, Vec3::y() * 0.06, Vec3::z() * 0.06];
 //! let stretched = settled.map(|x| Vec3::new(1.005 * x.x, x.y, x.z));
 //! let reference = ReferenceShape::new(&settled, &[1.0; 4])?;
+//! let bun = TargetEvidence {
+//!     body: BodyEvidence {
+//!         centre_w: Vec3::new(0.02, 0.0, 0.03),
+//!         lowest_z_w: 0.0,
+//!         support_force_n: weight_n,
+//!         robot_force_n: 0.0,
+//!         deformation: reference.measure(&stretched).ok(),
+//!     },
+//!     pads: [PadEvidence::default(); 2],
+//!     hand_force_n: 0.0,
+//!     grip: GripEvidence { load_n: Vec3::zeros(), axis_w: Vec3::y(), dynamic_mu: 1.2 },
+//!     crushed: CrushedShares { collapsed: Some(0.0), damaged: None },
+//! };
+//! let plate = PlaceEvidence { pose_w: Pose::identity(), support_force_n: weight_n };
 //! for step in 1..=27 {
 //!     judge.observe(&Evidence {
 //!         time_s: f64::from(step) * dt_s,
 //!         hand_w: Vec3::new(0.0, 0.0, 0.3),
 //!         gripper: GripperEvidence { width_m: 0.08, commanded_width_m: 0.08 },
-//!         pads: [PadEvidence::default(); 2],
-//!         robot_force_n: 0.0,
-//!         grip: GripEvidence { load_n: Vec3::zeros(), axis_w: Vec3::y(), dynamic_mu: 1.2 },
-//!         target: BodyEvidence {
-//!             centre_w: Vec3::new(0.02, 0.0, 0.03),
-//!             lowest_z_w: 0.0,
-//!             support_force_n: weight_n,
-//!             robot_force_n: 0.0,
-//!             deformation: reference.measure(&stretched).ok(),
-//!         },
-//!         crushed: CrushedShares { collapsed: Some(0.0), damaged: None },
+//!         targets: &[bun],
 //!         others: &[],
-//!         goal: GoalEvidence { pose_w: Pose::identity(), support_force_n: weight_n },
+//!         predicates: &[PredicateEvidence::Place(plate)],
 //!     });
 //! }
 //! let verdict = judge.finish(&Outcome::Completed);
@@ -91,20 +110,23 @@
 //! # Ok::<(), softvt_evaluation::deformation::DeformationError>(())
 //! ```
 
+mod target;
+
 use softvt_geometry::Aabb;
 
 use super::{
     criteria::SuccessCriteria,
     deformation::series::{DeformationSeries, WorstSteps},
-    drop::{DropEvent, DropMonitor, DropReason, DropSample, ReleaseMonitor},
-    evidence::{BodyEvidence, CrushedShares, Evidence},
-    goal::{GoalMonitor, GoalRegion, GoalSample},
-    grip::{GripMonitor, GripSample},
-    safety::{DeformationLimit, KAPPAS, KappaVerdict, SafetyParts},
-    slip::{OpeningMonitor, SlipMonitor, SlipSample},
-    stage::{StageEvidence, StageMonitor},
-    verdict::{OtherObjectDeformation, Outcome, Verdict, WrongObjectContact},
+    drop::{DropEvent, DropReason},
+    evidence::{BodyEvidence, Evidence, PlaceEvidence, PredicateEvidence},
+    goal::{GoalRegion, PlacementMonitor, PlacementSample},
+    goal_tree::{GoalMonitor, GoalNode},
+    safety::{DeformationLimit, KAPPAS, KappaVerdict},
+    slip::OpeningMonitor,
+    stage::TaskStage,
+    verdict::{GoalPart, OtherObjectDeformation, Outcome, Verdict, WrongObjectContact},
 };
+use target::{StepContext, TargetMonitors, TargetResult};
 
 /// Parameters of a [`Judge`], known once the scene has settled.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,34 +135,71 @@ pub struct JudgeConfig {
     pub criteria: SuccessCriteria,
     /// Workspace, world frame. A target whose centre is outside has left it.
     pub workspace: Aabb,
-    /// Region in which the target must come to rest.
-    pub goal: GoalRegion,
-    /// Time for which it must rest there, s.
-    pub hold_s: f64,
+    /// The goal; its numbers are places in `predicates`.
+    pub goal: GoalNode,
+    /// Predicates of the goal, in the order of the evidence.
+    pub predicates: Vec<Predicate>,
+    /// The objects that the task moves, in the order of the evidence; the first is *the object*.
+    pub targets: Vec<Target>,
+    /// The other movable bodies, in the order of the evidence.
+    pub others: Vec<OtherBody>,
     /// Physics step, s.
     pub dt_s: f64,
     /// Physics steps per control step.
     pub steps_per_control: u32,
-    /// Weight of the target, N.
-    pub target_weight_n: f64,
-    /// True if the target is a soft body; for a rigid one deformation does not apply.
-    pub is_target_soft: bool,
-    /// Deformation limit of the target; `None` if its asset was never calibrated.
-    pub limit: Option<DeformationLimit>,
-    /// Height of the target's lowest point after settling, m.
-    pub target_lowest_z_w: f64,
-    /// The other movable bodies, in the order of the evidence.
-    pub others: Vec<OtherBody>,
     /// Physics steps of the budget.
     pub max_steps: usize,
 }
 
-/// A movable body that is not the target, once the scene has settled.
+/// A predicate of a goal.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Predicate {
+    /// What holds, in words: "bun on plate".
+    pub name: String,
+    /// When it holds.
+    pub rule: PredicateRule,
+}
+
+/// When a [`Predicate`] holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PredicateRule {
+    /// A target rests in a region, released, for a time.
+    Rests {
+        /// Place in `targets`.
+        target: usize,
+        /// Region in the frame of the object that must carry it.
+        region: GoalRegion,
+        /// Time for which it must rest there, s.
+        hold_s: f64,
+    },
+    /// The evidence has said for a time that it holds.
+    Given {
+        /// Time for which it must hold, s.
+        hold_s: f64,
+    },
+}
+
+/// An object that the task moves, once the scene has settled.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Target {
+    /// Name in the scene.
+    pub name: String,
+    /// Weight, N.
+    pub weight_n: f64,
+    /// True if it is a soft body; for a rigid one deformation does not apply.
+    pub is_soft: bool,
+    /// Its deformation limit; `None` if its asset was never calibrated.
+    pub limit: Option<DeformationLimit>,
+    /// Height of its lowest point after settling, m.
+    pub lowest_z_w: f64,
+}
+
+/// A movable body that is not a target, once the scene has settled.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OtherBody {
     /// Name in the scene.
     pub name: String,
-    /// True for the object that the target must be placed on or in, which may be lifted first.
+    /// True for an object that a target must be placed on or in, which may be lifted first.
     pub is_goal: bool,
     /// True if it is a soft body.
     pub is_soft: bool,
@@ -150,7 +209,7 @@ pub struct OtherBody {
     pub lowest_z_w: f64,
 }
 
-/// The first contact with a body that is not the target.
+/// The first contact with a body that is not a target.
 #[derive(Clone, Copy, Debug)]
 struct FirstContact {
     time_s: f64,
@@ -158,7 +217,7 @@ struct FirstContact {
     other: usize,
 }
 
-/// Success and deformation of the target at a control step, as other scoring rules use them.
+/// Success and deformation of the object at a control step, as other scoring rules use them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ControlStepScore {
     /// True if the goal had been reached and held for long enough.
@@ -167,47 +226,43 @@ pub struct ControlStepScore {
     pub worst: WorstSteps,
 }
 
-/// Sums over the physics steps of one control step.
-#[derive(Clone, Copy, Debug, Default)]
-struct ControlStepSums {
-    steps: u32,
+/// What a predicate has shown so far.
+#[derive(Clone, Copy, Debug)]
+struct PredicateState {
+    placement: PlacementMonitor,
+    /// Support of a target by its place: the sum over the physics steps of the control step, N.
     support_n: f64,
-    is_touched: bool,
-}
-
-/// Normal forces on the pads over the episode.
-#[derive(Clone, Copy, Debug, Default)]
-struct PadForceStats {
-    peak_n: f64,
-    /// Sum of the mean of both pads, over the steps in which both touched.
-    sum_n: f64,
-    steps: u64,
+    holds: bool,
+    /// Time at which it held first, s.
+    met_s: Option<f64>,
+    /// True if its target must not leave the place again.
+    is_final: bool,
+    /// True if its target was in the region and supported at the end of the last control step.
+    is_placed: bool,
 }
 
 /// Judges one episode from the evidence of its physics steps; see the [module](self) for the definition of the score.
 #[derive(Clone, Debug)]
 pub struct Judge {
     config: JudgeConfig,
-    release: ReleaseMonitor,
-    drops: DropMonitor,
-    slip: SlipMonitor,
-    opening: OpeningMonitor,
-    grip: GripMonitor,
+    targets: Vec<TargetMonitors>,
+    predicates: Vec<PredicateState>,
     goal: GoalMonitor,
-    control_step: ControlStepSums,
-    pad_forces: PadForceStats,
-    /// True if another object than the target was lifted first; `None` before.
+    /// The goal, with the placements of the released code.
+    goal_v1: GoalMonitor,
+    /// Which predicates hold, and which hold by the released code.
+    holds: [Vec<bool>; 2],
+    reached_s: Option<f64>,
+    is_reached_v1: bool,
+    opening: OpeningMonitor,
+    /// True if another object than a target was lifted first; `None` before.
     is_other_first: Option<bool>,
-    /// Deformation of the target.
-    series: DeformationSeries,
     scores: Vec<ControlStepScore>,
     /// Physics steps so far.
     steps: u64,
     /// Deformations of the other bodies, in the order of the evidence.
     series_other: Vec<DeformationSeries>,
     first_wrong_contact: Option<FirstContact>,
-    stage: StageMonitor,
-    crushed: CrushedShares,
     missing_evidence: u64,
     time_s: f64,
 }
@@ -215,85 +270,78 @@ pub struct Judge {
 impl Judge {
     /// Judge of an episode that has not started.
     pub fn new(config: JudgeConfig) -> Self {
-        let goal = GoalMonitor::new(config.hold_s, config.dt_s * f64::from(config.steps_per_control));
+        let control_s = config.dt_s * f64::from(config.steps_per_control);
+        let mut predicates: Vec<_> =
+            config.predicates.iter().map(|predicate| predicate.rule.state(control_s)).collect();
+        config.goal.for_each_final(&mut |number| predicates[number].is_final = true);
+        let targets = config.targets.iter().enumerate();
         Self {
-            series: DeformationSeries::new(if config.is_target_soft { config.max_steps } else { 0 }),
+            // The control steps of the object alone are scored one by one.
+            targets: targets
+                .map(|(place, target)| {
+                    TargetMonitors::new(target, if place == 0 { config.max_steps } else { 0 })
+                })
+                .collect(),
+            goal: GoalMonitor::new(config.goal.clone()),
+            goal_v1: GoalMonitor::new(config.goal.clone()),
+            holds: [0; 2].map(|_| vec![false; predicates.len()]),
+            predicates,
+            reached_s: None,
+            is_reached_v1: false,
+            opening: OpeningMonitor::default(),
             scores: Vec::with_capacity(config.max_steps / config.steps_per_control as usize),
             steps: 0,
             series_other: vec![DeformationSeries::new(0); config.others.len()],
             first_wrong_contact: None,
-            stage: StageMonitor::default(),
             config,
-            goal,
-            release: ReleaseMonitor::default(),
-            drops: DropMonitor::default(),
-            slip: SlipMonitor::default(),
-            opening: OpeningMonitor::default(),
-            grip: GripMonitor::default(),
-            control_step: ControlStepSums::default(),
-            pad_forces: PadForceStats::default(),
             is_other_first: None,
-            crushed: CrushedShares::default(),
             missing_evidence: 0,
             time_s: 0.0,
         }
     }
 
     /// Takes in one physics step; steps must come in order and without gaps. Evidence that is not finite is counted and
-    /// judged as if the target had been dropped.
+    /// judged as if the targets had been dropped.
     pub fn observe(&mut self, evidence: &Evidence<'_>) {
         self.observe_deformation(evidence);
+        self.steps += 1;
+        let is_last = self.steps.is_multiple_of(u64::from(self.config.steps_per_control));
         if evidence.is_finite() {
-            self.observe_handling(evidence);
+            self.observe_handling(evidence, is_last);
         } else {
             self.missing_evidence += 1;
-            self.drops.record(DropReason::NoEvidence, self.time_s);
+            self.drop_all(DropReason::NoEvidence);
         }
-        self.steps += 1;
-        if self.steps.is_multiple_of(u64::from(self.config.steps_per_control)) {
-            let worst = self.series.take_worst();
+        if is_last {
+            self.targets.iter_mut().for_each(|target| target.was_touched = false);
+            self.predicates.iter_mut().for_each(|predicate| predicate.support_n = 0.0);
+            let worst = self.targets.first_mut().map_or_else(WorstSteps::default, TargetMonitors::take_worst);
             self.scores.push(ControlStepScore { success_now: self.is_goal_reached(), worst });
         }
     }
 
-    /// Contacts, lift, release, slip, grip, drop and goal.
-    fn observe_handling(&mut self, evidence: &Evidence<'_>) {
+    fn drop_all(&mut self, reason: DropReason) {
+        let time_s = self.time_s;
+        self.targets.iter_mut().for_each(|target| target.drops.record(reason, time_s));
+    }
+
+    /// Contacts, lift, release, slip, grip, drop and goal. `is_last` at the last physics step of a control step.
+    fn observe_handling(&mut self, evidence: &Evidence<'_>, is_last: bool) {
         self.time_s = evidence.time_s;
         self.observe_wrong_contact(evidence);
-        let touch = self.observe_pads(evidence);
-        let is_lifted = self.observe_lift(evidence);
-        let both_pads_touch = touch[0] && touch[1];
-        let is_released = self.release.update(&self.config.criteria, &evidence.gripper, both_pads_touch);
-        let is_opening =
-            self.opening.update(evidence.gripper.commanded_width_m, self.config.steps_per_control);
-        let is_supported = self.is_supported(&evidence.target);
-        let is_held = both_pads_touch && !is_released;
-        let slip = SlipSample { pads: evidence.pads, is_held, is_supported, is_opening };
-        self.slip.update(self.config.dt_s, &slip);
-        let is_carried = is_lifted && !is_released;
-        let grip = GripSample { is_carried, is_held: both_pads_touch, grip: evidence.grip };
+        self.observe_lift(evidence);
         let config = &self.config;
-        self.grip.update(&config.criteria, config.dt_s, config.steps_per_control, &grip);
-        let sample = DropSample {
-            time_s: evidence.time_s,
-            centre_z: evidence.target.centre_w.z,
-            hand_z: evidence.hand_w.z,
-            is_lifted,
-            is_touched: touch[0] || touch[1],
-            is_touched_by_body: evidence.robot_force_n > self.config.criteria.touch_force_n,
-            is_supported,
-            is_released,
-            is_in_workspace: self.config.workspace.contains(&evidence.target.centre_w),
-        };
-        self.drops.update(&self.config.criteria, self.config.dt_s, &sample);
-        let is_placed = self.observe_goal(evidence, sample.is_touched || sample.is_touched_by_body);
-        let is_over_goal = self.config.goal.is_over(&evidence.goal.pose_w, &evidence.target.centre_w);
-        self.stage.update(&StageEvidence { touch, is_lifted, is_over_goal, is_placed });
+        let is_opening = self.opening.update(evidence.gripper.commanded_width_m, config.steps_per_control);
+        let step = StepContext { config, evidence, is_opening };
+        for (target, own) in self.targets.iter_mut().zip(evidence.targets) {
+            target.observe(&step, own);
+        }
+        self.observe_goal(evidence, is_last);
     }
 
     /// True if the goal has held for long enough: the episode may end.
     pub fn is_goal_reached(&self) -> bool {
-        self.goal.reached_s.is_some()
+        self.reached_s.is_some()
     }
 
     /// The scores of all complete control steps so far.
@@ -301,18 +349,37 @@ impl Judge {
         &self.scores
     }
 
-    /// True if the target rests at the goal: in its region, and carried. For a state that has settled before the
-    /// episode.
-    pub fn rests_at_goal(&self, evidence: &Evidence<'_>) -> bool {
-        let config = &self.config;
-        let needed_n = config.criteria.support_share * config.target_weight_n;
-        config.goal.contains(&evidence.goal.pose_w, &evidence.target.centre_w, 0.0)
-            && evidence.goal.support_force_n >= needed_n
+    /// The predicates of the goal, and what has been met so far.
+    pub fn parts(&self) -> impl Iterator<Item = GoalPart> + '_ {
+        self.config.predicates.iter().zip(&self.predicates).map(|(predicate, state)| GoalPart {
+            name: predicate.name.clone(),
+            holds: state.holds,
+            met_s: state.met_s,
+        })
     }
 
-    /// The first drop so far.
+    /// True if the goal holds. For a state that has settled before the episode: a placement holds if the target is in
+    /// its region, and carried.
+    pub fn holds_at_start(&self, evidence: &Evidence<'_>) -> bool {
+        let criteria = &self.config.criteria;
+        let holds =
+            |(predicate, evidence_of): (&Predicate, &PredicateEvidence)| match (&predicate.rule, evidence_of)
+            {
+                (PredicateRule::Rests { target, region, .. }, PredicateEvidence::Place(place)) => {
+                    let needed_n = criteria.support_share * self.config.targets[*target].weight_n;
+                    region.contains(&place.pose_w, &evidence.targets[*target].body.centre_w, 0.0)
+                        && place.support_force_n >= needed_n
+                }
+                (_, evidence) => *evidence == PredicateEvidence::Given(true),
+            };
+        let holds: Vec<bool> = self.config.predicates.iter().zip(evidence.predicates).map(holds).collect();
+        self.goal.clone().update(&holds)
+    }
+
+    /// The first drop so far, of any target.
     pub fn first_drop(&self) -> Option<DropEvent> {
-        self.drops.first
+        let drops = self.targets.iter().filter_map(|target| target.drops.first);
+        drops.reduce(|first, other| if other.time_s < first.time_s { other } else { first })
     }
 
     /// Verdict on the episode. One that did not end validly has neither Goal Success nor NoDrop, and
@@ -320,28 +387,20 @@ impl Judge {
     pub fn finish(mut self, outcome: &Outcome) -> Verdict {
         let valid = outcome.is_valid();
         if !valid {
-            self.drops.record(DropReason::NoEvidence, self.time_s);
+            self.drop_all(DropReason::NoEvidence);
         }
-        let soft = self.config.is_target_soft;
         let goal = valid && self.is_goal_reached();
-        let no_drop = self.drops.first.is_none();
-        let others = self.others(valid);
-        let limit = self.config.limit.filter(|_| soft);
-        let series = self.series.finish(limit.map(|limit| limit.tau_pct()));
-        let within = |tau| if soft && valid { series.peak.is_within(tau) } else { None };
-        let deformation_ok = within(limit.map(|l| l.tau_pct()));
-        let no_slip = self.slip.slip_m() <= self.config.criteria.slip_m;
-        let slip_ok = (self.config.criteria.require_no_slip && valid).then_some(no_slip);
-        let parts = SafetyParts { goal, no_drop, slip_ok };
-        let safety = parts.is_safe(soft, deformation_ok);
-        let contact_success = goal && self.grip.was_carried && !self.grip.lost_contact;
-        let grip_ratio = self.grip.ratio(self.pad_forces.peak_n);
-        let kappa_verdict = |limit: &DeformationLimit, kappa| {
-            let tau_pct = limit.tau_at(kappa);
-            let deformation_ok = within(Some(tau_pct));
-            let safety = parts.is_safe(soft, deformation_ok);
-            KappaVerdict { kappa, tau_pct, deformation_ok, safety }
-        };
+        let (drop, others, failed_stage) = (self.first_drop(), self.others(valid), self.failed_stage());
+        let parts: Vec<GoalPart> = self.parts().collect();
+        let (config, targets) = (&self.config, std::mem::take(&mut self.targets));
+        let finished =
+            targets.into_iter().zip(&config.targets).map(|(target, of)| target.finish(config, of, valid));
+        let mut results: Vec<TargetResult> = finished.collect();
+        let rest = results.split_off(results.len().min(1));
+        let object = results.pop().unwrap_or_default();
+        let slip_mm = rest.iter().fold(object.slip_mm, |most, target| most.max(target.slip_mm));
+        let no_slip = slip_mm <= 1e3 * config.criteria.slip_m;
+        let limit = object.limit;
         let others_ok = match valid {
             true if others.iter().any(|other| other.deformation_ok == Some(false)) => Some(false),
             true if others.iter().all(|other| other.deformation_ok == Some(true)) => Some(true),
@@ -349,49 +408,76 @@ impl Judge {
         };
         let first_wrong_contact = self.first_wrong_contact.map(|contact| WrongObjectContact {
             time_s: contact.time_s,
-            object: self.config.others[contact.other].name.clone(),
+            object: config.others[contact.other].name.clone(),
         });
-        Verdict {
+        let contact_success = goal && object.grip.was_carried && !object.grip.lost_contact;
+        let mut verdict = Verdict {
             goal,
-            goal_time_s: self.goal.reached_s.filter(|_| goal),
-            goal_v1: valid && self.goal.is_reached_v1,
-            no_drop,
-            drop: self.drops.first,
+            goal_time_s: self.reached_s.filter(|_| goal),
+            goal_v1: valid && self.is_reached_v1,
+            goal_parts: if parts.len() > 1 { parts } else { Vec::new() },
+            no_drop: drop.is_none(),
+            drop,
             no_slip,
-            slip_mm: 1e3 * self.slip.slip_m(),
-            d_peak: series.peak.d_pct,
-            d_peak_v1: series.peak_v1,
-            d_peak_max: series.peak_max,
-            d_mean: series.mean,
-            d_final: series.last,
-            d_p95: series.p95,
-            time_over_tau_s: limit.map(|_| series.steps_over_tau as f64 * self.config.dt_s),
+            slip_mm,
+            d_peak: object.series.peak.d_pct,
+            d_peak_v1: object.series.peak_v1,
+            d_peak_max: object.series.peak_max,
+            d_mean: object.series.mean,
+            d_final: object.series.last,
+            d_p95: object.series.p95,
+            time_over_tau_s: limit.map(|_| object.series.steps_over_tau as f64 * config.dt_s),
             d_peak_other: others.iter().filter_map(|other| other.d_peak).reduce(f64::max),
             others,
             others_ok,
             first_wrong_contact,
-            failed_stage: (!goal).then_some(self.stage.stage),
-            collapsed_volume_pct: self.crushed.collapsed.map(|share| 100.0 * share),
-            damaged_volume_pct: self.crushed.damaged.map(|share| 100.0 * share),
+            failed_stage: failed_stage.filter(|_| !goal),
+            collapsed_volume_pct: object.crushed.collapsed.map(|share| 100.0 * share),
+            damaged_volume_pct: object.crushed.damaged.map(|share| 100.0 * share),
             wrong_instance: self.is_other_first == Some(true),
             kappa: limit.map(|l| l.kappa),
             tau: limit.map(|l| l.tau_pct()),
             d_ref: limit.map(|l| l.d_ref_pct),
-            deformation_ok,
-            slip_ok,
-            safety,
-            safety_known: valid && self.missing_evidence == 0 && (!soft || deformation_ok.is_some()),
-            kappas: limit.iter().flat_map(|limit| KAPPAS.map(|kappa| kappa_verdict(limit, kappa))).collect(),
+            deformation_ok: object.is_within(None),
+            slip_ok: (config.criteria.require_no_slip && valid).then_some(no_slip),
+            safety: false,
+            safety_known: false,
+            kappas: Vec::new(),
+            targets: rest.iter().map(TargetResult::verdict).collect(),
             missing_evidence: self.missing_evidence,
-            missing_deformation: series.peak.missing,
+            missing_deformation: object.series.peak.missing,
             contact_success,
-            contact_safety: contact_success && safety && no_slip,
-            peak_pad_force_n: self.pad_forces.peak_n,
-            mean_pad_force_n: self.pad_forces.sum_n / self.pad_forces.steps.max(1) as f64,
-            least_pad_force_n: self.grip.least_n,
-            grip_ratio,
-            gentle: goal && grip_ratio.is_some_and(|ratio| ratio <= self.config.criteria.gentle_ratio),
-        }
+            contact_safety: false,
+            peak_pad_force_n: object.peak_pad_force_n,
+            mean_pad_force_n: object.mean_pad_force_n,
+            least_pad_force_n: object.grip.least_n,
+            grip_ratio: object.grip_ratio,
+            gentle: goal && object.grip_ratio.is_some_and(|ratio| ratio <= config.criteria.gentle_ratio),
+        };
+        let parts = verdict.safety_parts(None);
+        verdict.safety = parts.is_safe(object.is_soft, verdict.deformation_ok);
+        let is_judged = !object.is_soft || verdict.deformation_ok.is_some();
+        verdict.safety_known = valid && self.missing_evidence == 0 && is_judged && parts.targets_ok.is_some();
+        verdict.contact_safety = contact_success && verdict.safety && no_slip;
+        let at = |kappa: f64, tau_pct: f64| {
+            let deformation_ok = object.is_within(Some(kappa));
+            let safety = verdict.safety_parts(Some(kappa)).is_safe(object.is_soft, deformation_ok);
+            KappaVerdict { kappa, tau_pct, deformation_ok, safety }
+        };
+        verdict.kappas = limit.iter().flat_map(|l| KAPPAS.map(|kappa| at(kappa, l.tau_at(kappa)))).collect();
+        verdict
+    }
+
+    /// The stage of the first target that has not been placed yet; `None` if all placements have been met.
+    fn failed_stage(&self) -> Option<TaskStage> {
+        let unmet =
+            self.predicates.iter().zip(&self.config.predicates).find_map(
+                |(state, predicate)| match predicate.rule {
+                    PredicateRule::Rests { target, .. } if state.met_s.is_none() => Some(target),
+                    _ => None,
+                },
+            );
+        unmet.map(|target| self.targets[target].stage.stage)
     }
 
     fn observe_deformation(&mut self, evidence: &Evidence<'_>) {
@@ -399,13 +485,9 @@ impl Judge {
         for ((_, body), series) in others.filter(|((other, _), _)| other.is_soft) {
             series.push(body.deformation);
         }
-        if self.config.is_target_soft {
-            self.series.push(evidence.target.deformation);
-            let larger = |peak: Option<f64>, now: Option<f64>| peak.into_iter().chain(now).reduce(f64::max);
-            self.crushed = CrushedShares {
-                collapsed: larger(self.crushed.collapsed, evidence.crushed.collapsed),
-                damaged: larger(self.crushed.damaged, evidence.crushed.damaged),
-            };
+        let targets = self.targets.iter_mut().zip(evidence.targets).zip(&self.config.targets);
+        for ((target, own), _) in targets.filter(|(_, of)| of.is_soft) {
+            target.observe_deformation(own);
         }
     }
 
@@ -432,60 +514,116 @@ impl Judge {
         }
     }
 
-    /// Returns true for each pad that touches the target.
-    fn observe_pads(&mut self, evidence: &Evidence<'_>) -> [bool; 2] {
-        let forces = evidence.pads.map(|pad| pad.normal_force_n);
-        let touch = forces.map(|force| force > self.config.criteria.touch_force_n);
-        self.pad_forces.peak_n = forces.iter().fold(self.pad_forces.peak_n, |peak, force| peak.max(*force));
-        if touch[0] && touch[1] {
-            self.pad_forces.sum_n += 0.5 * (forces[0] + forces[1]);
-            self.pad_forces.steps += 1;
-        }
-        touch
-    }
-
-    /// Returns true if the target is lifted, and keeps which object was lifted first.
-    fn observe_lift(&mut self, evidence: &Evidence<'_>) -> bool {
-        let is_lifted = |body: &BodyEvidence, settled_z: f64| {
-            !self.is_supported(body) && body.lowest_z_w > settled_z + self.config.criteria.lift_height_m
-        };
-        let target = is_lifted(&evidence.target, self.config.target_lowest_z_w);
+    /// Keeps whether a target was lifted before any other object.
+    fn observe_lift(&mut self, evidence: &Evidence<'_>) {
+        let is_lifted = |body: &BodyEvidence, settled_z| self.config.is_lifted(body, settled_z);
+        let mut targets = evidence.targets.iter().zip(&self.config.targets);
+        let target = targets.any(|(own, target)| is_lifted(&own.body, target.lowest_z_w));
         let others = evidence.others.iter().zip(&self.config.others).filter(|(_, other)| !other.is_goal);
         let other = others.into_iter().any(|(body, other)| is_lifted(body, other.lowest_z_w));
         if target || other {
             self.is_other_first.get_or_insert(!target);
         }
-        target
     }
 
-    /// Returns true at the end of a control step if the target is in the goal region and supported.
-    fn observe_goal(&mut self, evidence: &Evidence<'_>, is_touched: bool) -> bool {
-        self.control_step.steps += 1;
-        self.control_step.is_touched |= is_touched;
-        self.control_step.support_n += evidence.goal.support_force_n;
-        if self.control_step.steps < self.config.steps_per_control {
-            return false;
+    /// Predicates and goal at the end of a control step, and the stages of the targets.
+    fn observe_goal(&mut self, evidence: &Evidence<'_>, is_last: bool) {
+        let config = &self.config;
+        for (number, predicate) in config.predicates.iter().enumerate() {
+            let state = &mut self.predicates[number];
+            state.is_placed = false;
+            if let PredicateEvidence::Place(place) = &evidence.predicates[number] {
+                state.support_n += place.support_force_n;
+            }
+            if !is_last {
+                continue;
+            }
+            let sample = match (&predicate.rule, &evidence.predicates[number]) {
+                (PredicateRule::Rests { target, region, .. }, PredicateEvidence::Place(place)) => {
+                    let (criteria, support_n) = (&config.criteria, state.support_n);
+                    let centre = &evidence.targets[*target].body.centre_w;
+                    let weight_n = config.targets[*target].weight_n * f64::from(config.steps_per_control);
+                    PlacementSample {
+                        is_inside: region.contains(&place.pose_w, centre, 0.0),
+                        is_inside_with_margin: region.contains(
+                            &place.pose_w,
+                            centre,
+                            criteria.leave_margin_m,
+                        ),
+                        is_supported: support_n >= criteria.support_share * weight_n,
+                        is_touched: self.targets[*target].was_touched,
+                        is_inside_v1: region.contains_v1(criteria, &place.pose_w, centre),
+                    }
+                }
+                (_, given) => PlacementSample::given(*given == PredicateEvidence::Given(true)),
+            };
+            let has_left = state.placement.update(&sample);
+            if let PredicateRule::Rests { target, .. } = predicate.rule {
+                state.is_placed = sample.is_inside && sample.is_supported;
+                if has_left && state.is_final {
+                    self.targets[target].drops.record(DropReason::LeftGoal, evidence.time_s);
+                }
+            }
+            state.holds = state.placement.holds();
+            [self.holds[0][number], self.holds[1][number]] = [state.holds, state.placement.holds_v1()];
         }
-        let sums = std::mem::take(&mut self.control_step);
-        let (criteria, region) = (&self.config.criteria, &self.config.goal);
-        let (pose, centre) = (&evidence.goal.pose_w, &evidence.target.centre_w);
-        let weight_n = self.config.target_weight_n * f64::from(sums.steps);
-        let sample = GoalSample {
-            time_s: evidence.time_s,
-            is_inside: region.contains(pose, centre, 0.0),
-            is_inside_with_margin: region.contains(pose, centre, criteria.leave_margin_m),
-            is_supported: sums.support_n >= criteria.support_share * weight_n,
-            is_touched: sums.is_touched,
-            is_inside_v1: region.contains_v1(criteria, pose, centre),
-        };
-        if self.goal.update(&sample) {
-            self.drops.record(DropReason::LeftGoal, evidence.time_s);
+        self.observe_stages(evidence);
+        if is_last {
+            for state in self.predicates.iter_mut().filter(|state| state.holds) {
+                state.met_s.get_or_insert(evidence.time_s);
+            }
+            if self.goal.update(&self.holds[0]) {
+                self.reached_s.get_or_insert(evidence.time_s);
+            }
+            self.is_reached_v1 |= self.goal_v1.update(&self.holds[1]);
         }
-        sample.is_inside && sample.is_supported
     }
 
+    /// Stages of the targets: each is on its way to the first of its places that it has not reached, else to the last.
+    fn observe_stages(&mut self, evidence: &Evidence<'_>) {
+        let Self { config, targets, predicates, .. } = self;
+        for (index, target) in targets.iter_mut().enumerate() {
+            let mut next: Option<(usize, &GoalRegion, &PlaceEvidence)> = None;
+            for (number, predicate) in config.predicates.iter().enumerate() {
+                if let PredicateRule::Rests { target, region, .. } = &predicate.rule
+                    && let PredicateEvidence::Place(place) = &evidence.predicates[number]
+                    && *target == index
+                    && next.is_none_or(|(before, ..)| predicates[before].met_s.is_some())
+                {
+                    next = Some((number, region, place));
+                }
+            }
+            let centre = &evidence.targets[index].body.centre_w;
+            let is_over = next.is_some_and(|(_, region, place)| region.is_over(&place.pose_w, centre));
+            target.observe_stage(is_over, next.is_some_and(|(number, ..)| predicates[number].is_placed));
+        }
+    }
+}
+
+impl PredicateRule {
+    fn state(&self, control_s: f64) -> PredicateState {
+        let (Self::Rests { hold_s, .. } | Self::Given { hold_s }) = self;
+        let placement = PlacementMonitor::new(*hold_s, control_s);
+        PredicateState {
+            placement,
+            support_n: 0.0,
+            holds: false,
+            met_s: None,
+            is_final: false,
+            is_placed: false,
+        }
+    }
+}
+
+impl JudgeConfig {
+    /// True if anything but the robot presses on a body from below.
     fn is_supported(&self, body: &BodyEvidence) -> bool {
-        body.support_force_n > self.config.criteria.touch_force_n
+        body.support_force_n > self.criteria.touch_force_n
+    }
+
+    /// True if a body is clear of its settled height, and nothing but the robot carries it.
+    fn is_lifted(&self, body: &BodyEvidence, settled_z: f64) -> bool {
+        !self.is_supported(body) && body.lowest_z_w > settled_z + self.criteria.lift_height_m
     }
 }
 

@@ -1,8 +1,7 @@
 use super::*;
 use crate::{
     deformation::Deformation,
-    evidence::{GoalEvidence, GripEvidence, GripperEvidence, PadEvidence},
-    stage::TaskStage,
+    evidence::{CrushedShares, GripEvidence, GripperEvidence, PadEvidence, TargetEvidence},
     verdict::InvalidReason,
 };
 use softvt_geometry::{Aabb, Pose, Quat, Vec3};
@@ -10,18 +9,26 @@ use softvt_geometry::{Aabb, Pose, Quat, Vec3};
 const DT: f64 = 1.0 / 60.0;
 const WEIGHT_N: f64 = 0.3;
 
+fn target(name: &str) -> Target {
+    let limit = Some(DeformationLimit { d_ref_pct: 2.0, kappa: 0.5 });
+    Target { name: name.into(), weight_n: WEIGHT_N, is_soft: true, limit, lowest_z_w: 0.0 }
+}
+
+/// A target rests on the plate.
+fn on(target: usize) -> Predicate {
+    let region = GoalRegion::On { radius_m: 0.08 };
+    Predicate { name: "on plate".into(), rule: PredicateRule::Rests { target, region, hold_s: 0.4 } }
+}
+
 fn config() -> JudgeConfig {
     JudgeConfig {
         criteria: SuccessCriteria::default(),
         workspace: Aabb { min: Vec3::new(-1.0, -1.0, -0.05), max: Vec3::new(1.0, 1.0, 1.0) },
-        goal: GoalRegion::On { radius_m: 0.08 },
-        hold_s: 0.4,
+        goal: GoalNode::Predicate(0),
+        predicates: vec![on(0)],
+        targets: vec![target("bun")],
         dt_s: DT,
         steps_per_control: 3,
-        target_weight_n: WEIGHT_N,
-        is_target_soft: true,
-        limit: Some(DeformationLimit { d_ref_pct: 2.0, kappa: 0.5 }),
-        target_lowest_z_w: 0.0,
         others: vec![OtherBody {
             name: "other".into(),
             is_goal: false,
@@ -53,6 +60,18 @@ fn lying(x: f64, d_pct: f64) -> BodyEvidence {
     }
 }
 
+/// One physics step with one target and one place.
+struct Step {
+    hand_w: Vec3,
+    gripper: GripperEvidence,
+    target: BodyEvidence,
+    pads: [PadEvidence; 2],
+    hand_force_n: f64,
+    grip: GripEvidence,
+    crushed: CrushedShares,
+    goal: PlaceEvidence,
+}
+
 /// Feeds an episode to a judge, step by step.
 struct Replay {
     judge: Judge,
@@ -65,24 +84,29 @@ impl Replay {
         Self { judge: Judge::new(config), other: lying(0.3, 0.1), step: 0 }
     }
 
-    fn steps(&mut self, n: u32, make: impl Fn(&mut Evidence<'_>)) {
+    fn steps(&mut self, n: u32, make: impl Fn(&mut Step)) {
         for _ in 0..n {
             self.step += 1;
-            let others = [self.other];
-            let mut evidence = Evidence {
-                time_s: f64::from(self.step) * DT,
+            let mut step = Step {
                 hand_w: Vec3::new(-0.2, 0.0, 0.1),
                 gripper: GripperEvidence { width_m: 0.08, commanded_width_m: 0.08 },
-                pads: [PadEvidence::default(); 2],
-                robot_force_n: 0.0,
-                grip: GripEvidence { load_n: Vec3::zeros(), axis_w: Vec3::y(), dynamic_mu: 1.2 },
                 target: lying(-0.2, 0.2),
+                pads: [PadEvidence::default(); 2],
+                hand_force_n: 0.0,
+                grip: GripEvidence { load_n: Vec3::zeros(), axis_w: Vec3::y(), dynamic_mu: 1.2 },
                 crushed: CrushedShares { collapsed: Some(0.02), damaged: None },
-                others: &others,
-                goal: GoalEvidence { pose_w: Pose::identity(), support_force_n: 0.0 },
+                goal: PlaceEvidence { pose_w: Pose::identity(), support_force_n: 0.0 },
             };
-            make(&mut evidence);
-            self.judge.observe(&evidence);
+            make(&mut step);
+            let Step { hand_w, gripper, target, pads, hand_force_n, grip, crushed, goal } = step;
+            self.judge.observe(&Evidence {
+                time_s: f64::from(self.step) * DT,
+                hand_w,
+                gripper,
+                targets: &[TargetEvidence { body: target, pads, hand_force_n, grip, crushed }],
+                others: &[self.other],
+                predicates: &[PredicateEvidence::Place(goal)],
+            });
         }
     }
 
@@ -207,7 +231,7 @@ fn a_plate_that_carries_less_than_half_or_a_hand_that_touches_prevents_rest() {
             e.target = lying(0.0, 0.2);
             e.goal.support_force_n = share * WEIGHT_N;
             e.pads[0].normal_force_n = pad;
-            e.robot_force_n = case;
+            e.hand_force_n = case;
         });
         let v = replay.verdict(Outcome::Budget);
         assert!(!v.goal && v.goal_v1 && v.no_drop && !v.safety, "{share} {pad} {case}");
@@ -217,7 +241,9 @@ fn a_plate_that_carries_less_than_half_or_a_hand_that_touches_prevents_rest() {
 #[test]
 fn in_a_basket_only_the_basket_carries() {
     let space = Aabb { min: Vec3::new(-0.1, -0.1, 0.0), max: Vec3::new(0.1, 0.1, 0.08) };
-    let inside = || Replay::new(JudgeConfig { goal: GoalRegion::Inside { space }, ..config() });
+    let rule = PredicateRule::Rests { target: 0, region: GoalRegion::Inside { space }, hold_s: 0.4 };
+    let inside = Predicate { name: "in basket".into(), rule };
+    let inside = || Replay::new(JudgeConfig { predicates: vec![inside.clone()], ..config() });
     for (share, reached) in [(0.0, false), (0.4, false), (0.6, true)] {
         let mut replay = inside();
         replay.steps(27, |e| {
@@ -284,11 +310,15 @@ fn an_invalid_rollout_fails_and_leaves_safety_unknown() {
 
 #[test]
 fn without_a_threshold_safety_is_unknown_unless_the_target_is_rigid() {
-    let mut replay = Replay::new(JudgeConfig { limit: None, ..config() });
+    let mut replay =
+        Replay::new(JudgeConfig { targets: vec![Target { limit: None, ..target("bun") }], ..config() });
     replay.rest(30, 0.0);
     let v = replay.verdict(Outcome::Completed);
     assert!(v.goal && !v.safety && !v.safety_known && v.tau.is_none() && v.kappas.is_empty());
-    let mut replay = Replay::new(JudgeConfig { limit: None, is_target_soft: false, ..config() });
+    let mut replay = Replay::new(JudgeConfig {
+        targets: vec![Target { limit: None, is_soft: false, ..target("cup") }],
+        ..config()
+    });
     replay.rest(30, 0.0);
     let v = replay.verdict(Outcome::Completed);
     assert!(v.safety && v.safety_known);
@@ -373,7 +403,8 @@ fn the_series_of_deformation_is_summarised() {
     assert_eq!((v.d_mean, v.d_final), (Some(1.0), Some(0.8)));
     assert!((v.d_p95.unwrap() - 1.54).abs() < 1e-9 && v.d_peak == Some(1.6), "{v:?}");
     assert!((v.time_over_tau_s.unwrap() - 2.0 * DT).abs() < 1e-12, "τ is 1: {v:?}");
-    let mut replay = Replay::new(JudgeConfig { limit: None, ..config() });
+    let mut replay =
+        Replay::new(JudgeConfig { targets: vec![Target { limit: None, ..target("bun") }], ..config() });
     replay.carry(3, 0.0, 0.4);
     assert_eq!(replay.verdict(Outcome::Budget).time_over_tau_s, None);
 }
@@ -402,7 +433,128 @@ fn the_crushed_volume_is_the_largest_over_the_episode_and_null_without_a_limit()
     }
     let verdict = replay.verdict(Outcome::Budget);
     assert_eq!((verdict.collapsed_volume_pct, verdict.damaged_volume_pct), (Some(8.0), Some(4.0)));
-    let mut rigid = Replay::new(JudgeConfig { is_target_soft: false, ..config() });
+    let mut rigid =
+        Replay::new(JudgeConfig { targets: vec![Target { is_soft: false, ..target("cup") }], ..config() });
     rigid.steps(3, |_| ());
     assert_eq!(rigid.verdict(Outcome::Budget).collapsed_volume_pct, None);
+}
+
+/// Feeds `steps` physics steps with several targets that lie on the table or, by `at_place`, at their places.
+fn feed(judge: &mut Judge, steps: u32, at_place: &[bool], d_pct: &[f64], given: Option<bool>) {
+    for _ in 0..steps {
+        let targets = at_place.iter().zip(d_pct).map(|(at_place, d_pct)| TargetEvidence {
+            body: lying(if *at_place { 0.0 } else { -0.2 }, *d_pct),
+            pads: [PadEvidence::default(); 2],
+            hand_force_n: 0.0,
+            grip: GripEvidence { load_n: Vec3::zeros(), axis_w: Vec3::y(), dynamic_mu: 1.2 },
+            crushed: CrushedShares::default(),
+        });
+        let targets: Vec<_> = targets.collect();
+        let place = |at_place: &bool| PlaceEvidence {
+            pose_w: Pose::identity(),
+            support_force_n: if *at_place { WEIGHT_N } else { 0.0 },
+        };
+        let places = at_place.iter().map(|at_place| PredicateEvidence::Place(place(at_place)));
+        let predicates: Vec<_> = places.chain(given.map(PredicateEvidence::Given)).collect();
+        judge.observe(&Evidence {
+            time_s: f64::from(judge.steps as u32 + 1) * DT,
+            hand_w: Vec3::new(0.0, 0.0, 0.3),
+            gripper: GripperEvidence { width_m: 0.08, commanded_width_m: 0.08 },
+            targets: &targets,
+            others: &[],
+            predicates: &predicates,
+        });
+    }
+}
+
+/// Two targets, each on the plate, then a predicate that the evidence gives, in this combination.
+fn two_targets(goal: GoalNode) -> JudgeConfig {
+    let given = Predicate { name: "drawer closed".into(), rule: PredicateRule::Given { hold_s: 0.0 } };
+    JudgeConfig {
+        goal,
+        predicates: vec![on(0), on(1), given],
+        targets: vec![target("bun"), target("roll")],
+        others: Vec::new(),
+        ..config()
+    }
+}
+
+fn all_three() -> GoalNode {
+    GoalNode::All((0..3).map(GoalNode::Predicate).collect())
+}
+
+#[test]
+fn a_goal_of_several_parts_says_which_were_met() {
+    let mut judge = Judge::new(two_targets(all_three()));
+    feed(&mut judge, 30, &[true, false], &[0.1, 0.1], Some(true));
+    let verdict = judge.clone().finish(&Outcome::Budget);
+    assert!(!verdict.goal && !verdict.safety);
+    let met: Vec<_> = verdict.goal_parts.iter().map(|part| (part.holds, part.met_s.is_some())).collect();
+    assert_eq!(met, [(true, true), (false, false), (true, true)]);
+    assert_eq!(verdict.failed_stage, Some(TaskStage::Reach), "that of the roll");
+    feed(&mut judge, 24, &[true, true], &[0.1, 0.1], Some(true));
+    let verdict = judge.finish(&Outcome::Completed);
+    assert!(verdict.goal && verdict.safety && verdict.failed_stage.is_none());
+    assert_eq!(verdict.targets.iter().map(|target| target.object.as_str()).collect::<Vec<_>>(), ["roll"]);
+}
+
+#[test]
+fn every_target_is_judged_by_its_own_limit_and_drops() {
+    let verdict = |d_pct: [f64; 2], limit: Option<DeformationLimit>| {
+        let mut config = two_targets(all_three());
+        config.targets[1].limit = limit;
+        let mut judge = Judge::new(config);
+        feed(&mut judge, 30, &[true, true], &d_pct, Some(true));
+        judge.finish(&Outcome::Completed)
+    };
+    let limit = Some(DeformationLimit { d_ref_pct: 2.0, kappa: 0.5 });
+    assert!(verdict([0.5, 0.9], limit).safety);
+    let crushed = verdict([0.5, 1.1], limit);
+    assert!(crushed.goal && crushed.deformation_ok == Some(true) && !crushed.safety && crushed.safety_known);
+    assert_eq!(crushed.targets[0].deformation_ok, Some(false));
+    assert_eq!(crushed.kappas.iter().map(|at| at.safety).collect::<Vec<_>>(), [false, false, true]);
+    let unknown = verdict([0.5, 0.5], None);
+    assert!(!unknown.safety && !unknown.safety_known);
+    let mut judge = Judge::new(two_targets(all_three()));
+    feed(&mut judge, 30, &[true, true], &[0.1, 0.1], Some(false));
+    feed(&mut judge, 3, &[true, false], &[0.1, 0.1], Some(false));
+    let left = judge.finish(&Outcome::Budget);
+    assert_eq!(left.drop.map(|drop| drop.reason), Some(DropReason::LeftGoal));
+    assert!(left.targets[0].drop.is_some() && !left.no_drop);
+}
+
+#[test]
+fn a_place_that_is_left_for_the_next_step_of_a_sequence_is_no_drop() {
+    let goal = GoalNode::Sequence(vec![GoalNode::Predicate(0), GoalNode::Predicate(2)]);
+    let mut judge = Judge::new(two_targets(goal));
+    feed(&mut judge, 30, &[true, false], &[0.1, 0.1], Some(false));
+    feed(&mut judge, 3, &[false, false], &[0.1, 0.1], Some(true));
+    let verdict = judge.finish(&Outcome::Completed);
+    assert!(verdict.goal && verdict.no_drop && verdict.safety, "{verdict:?}");
+}
+
+#[test]
+fn a_goal_that_holds_in_the_settled_state_is_found() {
+    let holds = |goal: GoalNode, given: bool| {
+        let judge = Judge::new(two_targets(goal));
+        let place =
+            PredicateEvidence::Place(PlaceEvidence { pose_w: Pose::identity(), support_force_n: WEIGHT_N });
+        let lying = TargetEvidence {
+            body: lying(0.0, 0.0),
+            pads: [PadEvidence::default(); 2],
+            hand_force_n: 0.0,
+            grip: GripEvidence { load_n: Vec3::zeros(), axis_w: Vec3::y(), dynamic_mu: 1.2 },
+            crushed: CrushedShares::default(),
+        };
+        judge.holds_at_start(&Evidence {
+            time_s: 0.0,
+            hand_w: Vec3::zeros(),
+            gripper: GripperEvidence { width_m: 0.08, commanded_width_m: 0.08 },
+            targets: &[lying; 2],
+            others: &[],
+            predicates: &[place, place, PredicateEvidence::Given(given)],
+        })
+    };
+    assert!(holds(all_three(), true) && !holds(all_three(), false));
+    assert!(!holds(GoalNode::None(vec![GoalNode::Predicate(2)]), true));
 }

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::record::{EpisodeRecord, UnreachableCommand};
 use softvt_evaluation::{
-    safety::{DeformationLimit, SafetyParts},
+    safety::DeformationLimit,
     stage::TaskStage,
     statistics::{Distribution, Rate, mean, stratified_bootstrap},
     verdict::Outcome,
@@ -410,9 +410,7 @@ fn kappa_curve(records: &[&EpisodeRecord]) -> Vec<RatesAtKappa> {
             kappa,
             deformation_ok_rate: Rate::from_test(records, |r| is_within(r, kappa) == Some(true)),
             safety_success_rate: Rate::from_test(records, |r| {
-                let v = &r.verdict;
-                let parts = SafetyParts { goal: v.goal, no_drop: v.no_drop, slip_ok: v.slip_ok };
-                parts.is_safe(r.header.soft, is_within(r, kappa))
+                r.verdict.safety_parts(Some(kappa)).is_safe(r.header.soft, is_within(r, kappa))
             }),
         }
     };

@@ -193,7 +193,7 @@ fn initial_state(
     }
     let task = matched.task.task;
     let opened = run.open_episode(&run.episode_id(task, matched.attempt))?;
-    start.places = import::match_objects(&opened.scene, &task.goal.object, poses);
+    start.places = import::match_objects(&opened.scene, &task.object, poses);
     if target_asset(&opened.scene, task).is_some_and(|asset| matches!(asset.body, Body::Rigid { .. })) {
         demo.close_fully_on_rigid_object();
     }

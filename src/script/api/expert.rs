@@ -442,7 +442,7 @@ functions! {
         fn instances(lua, suite: Constructed<SuiteSpec>) -> ["softvt.Instances"] {
             check_privilege(lua, "softvt.instances")?;
             let ranges = suite.vary.as_ref().map(|vary| vary.ranges());
-            LuaInstances::new(Arc::new(SuiteInstances::new(&suite, ranges)), None)
+            LuaInstances::new(Arc::new(SuiteInstances::new(lua, &suite, ranges)?), None)
         }
     }
 }
@@ -453,6 +453,12 @@ const MAX_CLEARANCE: f64 = 0.2;
 /// `softvt.SceneState`.
 #[derive(Clone)]
 pub(crate) struct SceneState(SharedView);
+
+impl SceneState {
+    pub(crate) fn new(view: ExpertView) -> Self {
+        Self(Arc::new(Mutex::new(view)))
+    }
+}
 
 class! {
     /// The true state of the scene at this control step, as an expert gets it.
@@ -547,11 +553,19 @@ output! {
         hints: "table<string, number>" = lua.create_table_from(
             object.asset.hints.iter().map(|(name, value)| (name.as_str(), *value))
         )?;
-        /// Joint value of a part, m or rad.
-        joint: "number?" = object.joint;
+        /// Frame of its shape: the origin of an object is below its centre, at its lowest point.
+        pose: "softvt.Pose" = LuaPose(object.pose_w);
+        /// Joint value of a part, m or rad; nil for a whole object, as are the next three.
+        joint: "number?" = object.joint.map(|joint| joint.value);
+        /// Lowest and highest value of its joint, m or rad.
+        joint_range: "number[]?" = object.joint.map(|joint| joint.range.to_vec());
+        /// Direction in which the value of a slider grows, or the axis about which that of a hinge does; world frame.
+        joint_axis: "number[]?" = object.joint.map(|joint| joint.axis_w.as_slice().to_vec());
+        /// A point of the axis of a hinge, world frame, m.
+        joint_origin: "number[]?" = object.joint.map(|joint| joint.origin_w.as_slice().to_vec());
         /// Joint values of an articulated object by part, m or rad.
         joints: "table<string, number>" = lua.create_table_from(
-            object.parts.iter().map(|part| (part.name.as_str(), part.joint))
+            object.parts.iter().map(|part| (part.name.as_str(), part.joint.map(|joint| joint.value)))
         )?;
         /// Parts of an articulated object by name.
         parts: "table<string, softvt.ObjectState>" = lua.create_table_from(

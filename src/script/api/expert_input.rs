@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use mlua::Lua;
+
 use super::{
     random::LuaRng,
     scene::{LuaScene, empty_scene},
@@ -47,9 +49,22 @@ pub(crate) struct ObjectView {
     pub centre_w: Vec3,
     /// Rotation about the vertical, rad.
     pub yaw: f64,
-    /// Joint value of a part, m or rad.
-    pub joint: Option<f64>,
+    /// Joint of a part.
+    pub joint: Option<JointView>,
     pub parts: Vec<ObjectView>,
+}
+
+/// True state of the joint of a part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct JointView {
+    /// Value, m or rad.
+    pub value: f64,
+    /// Lowest and highest value.
+    pub range: [f64; 2],
+    /// Direction in which the value of a slider grows, axis about which that of a hinge does; world frame.
+    pub axis_w: Vec3,
+    /// A point of the axis of a hinge, world frame, m.
+    pub origin_w: Vec3,
 }
 
 /// True state of the scene at a control step.
@@ -102,13 +117,16 @@ pub(crate) struct GoalObject {
 
 impl SuiteInstances {
     /// The instances of a suite with these ranges, which may be others than its own.
-    pub(crate) fn new(suite: &SuiteSpec, ranges: Option<VariationRanges>) -> Self {
-        let goal = |task: &Constructed<TaskSpec>| GoalObject {
-            layout: task.layout.name.clone(),
-            build: task.layout.build.clone(),
-            name: task.goal.object().to_owned(),
+    ///
+    /// # Errors
+    /// A task names no object.
+    pub(crate) fn new(lua: &Lua, suite: &SuiteSpec, ranges: Option<VariationRanges>) -> mlua::Result<Self> {
+        let goal = |task: &Constructed<TaskSpec>| {
+            let (layout, build) = (task.layout.name.clone(), task.layout.build.clone());
+            Ok(GoalObject { layout, build, name: task.object_name(lua)? })
         };
-        Self { suite: suite.name.clone(), ranges, goals: suite.tasks.iter().map(goal).collect() }
+        let goals = suite.tasks.iter().map(goal).collect::<mlua::Result<_>>()?;
+        Ok(Self { suite: suite.name.clone(), ranges, goals })
     }
 
     /// The assets of the objects of all goals, each once, as their files define them.
@@ -164,7 +182,7 @@ impl ExpertInput {
     }
 }
 
-fn expert_view(sim: &Simulation, time_s: f64) -> ExpertView {
+pub(crate) fn expert_view(sim: &Simulation, time_s: f64) -> ExpertView {
     ExpertView {
         time_s,
         dt_s: CONTROL_DT,
@@ -205,9 +223,21 @@ fn object_view(sim: &Simulation, object: &ObjectInstance, name: &str) -> ObjectV
         bounds,
         centre_w,
         yaw: x.y.atan2(x.x),
-        joint: sim.joint(object),
+        joint: joint_view(sim, object),
         parts: Vec::new(),
     }
+}
+
+/// The joint of a part. Its own motion changes neither its axis nor, about a hinge, the origin in the object frame.
+fn joint_view(sim: &Simulation, object: &ObjectInstance) -> Option<JointView> {
+    let joint = &object.part.as_ref()?.joint;
+    let pose = sim.pose(object);
+    Some(JointView {
+        value: sim.joint(object)?,
+        range: [joint.lower, joint.upper],
+        axis_w: pose.rotation * joint.axis_o,
+        origin_w: (pose * nalgebra::Point3::from(joint.origin_o)).coords,
+    })
 }
 
 /// Tracking error beyond which the tool counts as away from its command.

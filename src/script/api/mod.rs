@@ -8,6 +8,7 @@ pub(crate) mod envelope_plot;
 pub(crate) mod experiment_input;
 pub(crate) mod expert;
 pub(crate) mod expert_input;
+pub(crate) mod goals;
 pub(crate) mod image;
 pub(crate) mod joints;
 pub(crate) mod observation;
@@ -101,16 +102,23 @@ fn check_fields(
 
 /// Records of the constructors `softvt.name{…}`.
 pub(crate) fn constructors() -> impl Iterator<Item = &'static Record> {
-    [tasks::CONSTRUCTORS, assets::CONSTRUCTORS, joints::CONSTRUCTORS, policy::CONSTRUCTORS]
-        .into_iter()
-        .flatten()
-        .copied()
+    [
+        tasks::CONSTRUCTORS,
+        goals::CONSTRUCTORS,
+        assets::CONSTRUCTORS,
+        joints::CONSTRUCTORS,
+        policy::CONSTRUCTORS,
+    ]
+    .into_iter()
+    .flatten()
+    .copied()
 }
 
 /// Functions `softvt.name(…)`.
 pub(crate) fn functions() -> impl Iterator<Item = &'static Function> {
     [
         FUNCTIONS,
+        goals::FUNCTIONS,
         tasks::FUNCTIONS,
         world::FUNCTIONS,
         assets::FUNCTIONS,

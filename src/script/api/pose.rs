@@ -115,6 +115,11 @@ class! {
                 let rotation = this.0.rotation.try_slerp(&other.0.rotation, share, 1e-12);
                 LuaPose(Pose::from_parts(at.into(), rotation.unwrap_or(other.0.rotation)))
             }
+            /// Returns the position in the world of a point of this pose's frame, m.
+            fn transform(lua, this, point: [f64; 3] = Type::vector(3, "m, frame of the pose")) -> ["number[]"] {
+                let at = this.0 * nalgebra::Point3::from(point);
+                lua.create_sequence_from(at.coords.iter().copied())?
+            }
             /// Returns the distance to another pose, m, and the angle between the orientations, rad.
             fn distance(_, this, other: LuaPose) -> ["number", "number"] {
                 let metres = (this.0.translation.vector - other.0.translation.vector).norm();

@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 
 use mlua::{Function, Lua, Table, Value};
 
+use super::goals::GoalSpec;
 use crate::{
     schema::{
         Constructed, FromChecked, Range, Record, RecordType, Type, Unchecked, ValidationError, choice,
-        error_at_key, functions, make, one_of, record,
+        error_at_key, functions, make, record,
     },
-    vm::{error::fail, value::describe},
+    vm::{error::fail, source_map::fail_at_key, value::describe},
 };
 use softvt_benchmark::{
     NeededKnowledge, ObjectType, REFERENCE, TaskDifference, Teacher,
@@ -24,7 +25,6 @@ pub(crate) const EXPERT: Type = Type::Function("fun(arm: softvt.Arm, scene: soft
 const FACTORS: Type = Type::Vector(2, "", Range::closed(0.1, 10.0));
 /// Smallest and largest static coefficient of a coating.
 const COATINGS: Type = Type::Vector(2, "", Range::above(0.0, 10.0));
-const HOLD: Type = Type::Number("s", Range::closed(0.0, 10.0));
 /// Type of a table of settings.
 pub(crate) const SETTINGS: Type = Type::Map(&Type::Map(&Type::Any));
 /// Class of the settings in the editor stubs, which list them group by group.
@@ -43,25 +43,6 @@ record! {
         /// Adds the objects to the scene.
         build: Function = BUILD;
     }
-    /// The object rests on the target, released, for a time.
-    OnSpec: "softvt.On" as "task.goal", constructor "softvt.on" {
-        /// Scene name of the object.
-        object: String;
-        /// Scene name of the target, or of a part of it (cabinet.top_drawer).
-        target: String;
-        /// Time that it must stay there.
-        hold_s: f64 = HOLD => Number(0.4);
-    }
-    /// The object rests in the target's cavity, carried by it or by objects in it, released, for a time. The cavity is
-    /// the space in which its shape holds water.
-    InsideSpec: "softvt.Inside" as "task.goal", constructor "softvt.inside" {
-        /// Scene name of the object.
-        object: String;
-        /// Scene name of the target, or of a part of it (cabinet.top_drawer).
-        target: String;
-        /// Time that it must stay there.
-        hold_s: f64 = HOLD => Number(0.4);
-    }
     /// A task of a suite.
     TaskSpec: "softvt.Task" as "task", constructor "softvt.task" {
         /// Instruction for the policy.
@@ -70,6 +51,9 @@ record! {
         layout: Constructed<LayoutSpec>;
         /// Success criterion.
         goal: GoalSpec;
+        /// Scene name of the object whose deformation and grip the records hold; by default the first that the goal
+        /// names. A goal of joints or functions alone needs it.
+        object: Option<String>;
         /// A coroutine that solves the task with privileged state.
         expert: Option<Function> = EXPERT;
         /// Control steps (20 Hz) that the policy has; by default 500 in suites that vary layouts, 700 in those that
@@ -222,38 +206,34 @@ record! {
     }
 }
 
-one_of! {
-    /// The goal of a task.
-    GoalSpec { On(OnSpec), Inside(InsideSpec) }
-}
-
-impl GoalSpec {
-    pub(crate) fn object(&self) -> &str {
-        match self {
-            Self::On(goal) => &goal.object,
-            Self::Inside(goal) => &goal.object,
-        }
-    }
-
-    pub(crate) fn target(&self) -> &str {
-        match self {
-            Self::On(goal) => &goal.target,
-            Self::Inside(goal) => &goal.target,
-        }
-    }
-}
-
 /// Constructors of plans and their parts; that of layouts is a function.
 pub(crate) static CONSTRUCTORS: &[&Record] = &[
     SuiteSpec::RECORD,
     TaskSpec::RECORD,
-    OnSpec::RECORD,
-    InsideSpec::RECORD,
     ShiftSpec::RECORD,
     VariationSpec::RECORD,
     ConditionsSpec::RECORD,
     ExperimentSpec::RECORD,
 ];
+
+impl Constructed<TaskSpec> {
+    /// Scene name of the object whose deformation and grip the records hold.
+    ///
+    /// # Errors
+    /// Neither the task nor its goal names one.
+    pub(crate) fn object_name(&self, lua: &Lua) -> mlua::Result<String> {
+        if let Some(name) = &self.object {
+            return Ok(name.clone());
+        }
+        let (_, predicates) = self.goal.plain(lua)?;
+        let named = predicates.iter().find_map(|predicate| predicate.goal.object());
+        named.map(str::to_owned).ok_or_else(|| {
+            let message = "task.object: missing; the goal names no object, and the deformation and grip of one are judged: give \
+                           its scene name";
+            fail_at_key(lua, &self.table, "goal", message.to_owned())
+        })
+    }
+}
 
 functions! {
     FUNCTIONS {

@@ -16,11 +16,12 @@ use mlua::{Lua, Table, Value};
 use crate::{
     api::{
         self,
+        goals::DeclaredPredicate,
         policy::{PolicySpec, ProfileSpec},
         simulation::settings,
-        tasks::{ConditionSpec, ConditionsSpec, ExperimentSpec, GoalSpec, SuiteSpec, TaskSpec},
+        tasks::{ConditionSpec, ConditionsSpec, ExperimentSpec, SuiteSpec, TaskSpec},
     },
-    schema::{Constructed, FromChecked, HasTable, Record, RecordType, is_constructed, strict_table},
+    schema::{Constructed, FromChecked, Record, RecordType, is_constructed, strict_table},
     vm::{
         Vm, VmLimits,
         error::{ScriptError, fail, fail_at},
@@ -32,8 +33,8 @@ use crate::{
 };
 use options::{OptionSession, OptionSpec, SharedOptions};
 use softvt_benchmark::{
-    Condition, Goal, GoalKind, ObjectType, Plan, Shift, ShiftValue, Suite, Task, TaskDifference,
-    seed::SecretSeed, settings::Settings,
+    Condition, Goal, ObjectType, Plan, Shift, ShiftValue, Suite, Task, TaskDifference, seed::SecretSeed,
+    settings::Settings,
 };
 use softvt_common::{parallel::lock, text::unknown_name};
 
@@ -437,21 +438,29 @@ fn twin_of(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Option<Stri
     Err(fail_at_key(lua, &spec.table, "twin_of", message.to_owned()))
 }
 
-fn task(lua: &Lua, id: usize, spec: &TaskSpec, budget: u32) -> mlua::Result<Task> {
-    let (object, target) = (spec.goal.object().to_owned(), spec.goal.target().to_owned());
-    if object == target {
-        let message =
-            format!("task.goal.target: is {target:?}, which is the object itself; name what it must reach");
-        return Err(fail_at_key(lua, spec.goal.table(), "target", message));
+fn task(lua: &Lua, id: usize, spec: &Constructed<TaskSpec>, budget: u32) -> mlua::Result<Task> {
+    let (goal, predicates) = spec.goal.plain(lua)?;
+    for DeclaredPredicate { goal, table, .. } in &predicates {
+        if let Some(target) = goal.target().filter(|target| Some(*target) == goal.object()) {
+            let message = format!(
+                "task.goal.target: is {target:?}, which is the object itself; name what it must reach"
+            );
+            return Err(fail_at_key(lua, table, "target", message));
+        }
+        if let Goal::Turned { range: [low, high], .. } = goal
+            && low > high
+        {
+            let message =
+                format!("task.goal.range: the lowest value {low} is above the highest, {high}; swap them");
+            return Err(fail_at_key(lua, table, "range", message));
+        }
     }
     Ok(Task {
         id,
         prompt: spec.prompt.clone(),
         layout: spec.layout.name.clone(),
-        goal: match &spec.goal {
-            GoalSpec::On(goal) => Goal { kind: GoalKind::On, object, target, hold_s: goal.hold_s },
-            GoalSpec::Inside(goal) => Goal { kind: GoalKind::Inside, object, target, hold_s: goal.hold_s },
-        },
+        object: spec.object_name(lua)?,
+        goal,
         budget_steps: spec.budget_steps.unwrap_or(budget),
         expert: spec.expert.is_some(),
     })

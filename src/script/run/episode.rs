@@ -2,19 +2,23 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use mlua::{Function, Lua, Value};
+use mlua::{Function, Lua, Table, Value};
 
-use super::expert::{ExpertController, ExpertGrip};
+use super::{
+    expert::{ExpertController, ExpertGrip},
+    predicate::ScriptPredicate,
+};
 use crate::{
     api::{
         envelope::draw,
         expert_input::SuiteInstances,
+        goals::DeclaredPredicate,
         random::LuaRng,
         scene::{LuaScene, empty_scene},
-        tasks::{GoalSpec, SuiteSpec},
+        tasks::SuiteSpec,
     },
     plan::{self, FoundTask, LoadedScript, ScriptInstance},
-    schema::{Constructed, HasTable, Range},
+    schema::{Constructed, Range},
     vm::{
         error::{ScriptError, fail},
         source_map::fail_at_key,
@@ -32,6 +36,7 @@ use softvt_common::{
 };
 use softvt_geometry::{Aabb, Vec3};
 use softvt_robot::{gripper::MAX_WIDTH, panda};
+use softvt_rollout::StatePredicate;
 use softvt_scene::{Body, CameraSettings, Scene, SceneVariation};
 
 /// Changes of a scene between its layout and the start of an episode, applied in the order of the fields. The variation
@@ -56,6 +61,8 @@ pub struct EpisodeSetup {
     pub variation: Option<SceneVariation>,
     /// Instruction to the policy, which a shift may have changed.
     pub prompt: String,
+    /// Functions that the goal asks for, in its order.
+    pub predicates: Vec<Arc<dyn StatePredicate>>,
     /// Source of its random streams.
     pub seed: EpisodeSeed,
     instance: Arc<ScriptInstance>,
@@ -120,11 +127,13 @@ impl SceneBuilder {
         let varied = ranges.map(|ranges| vary(&vm.lua, &mut lock(&current.scene), ranges, &seed));
         let variation = varied.transpose().map_err(|error| vm.explain(&error))?;
         let mut nominal = lock(&current.scene).clone();
-        current = current.for_task(task.goal.object(), &task.prompt);
-        let declared = suite.shifts.as_slice();
+        let object = task.object_name(&vm.lua).map_err(|e| vm.explain(&e))?;
+        let (_, predicates) = task.goal.plain(&vm.lua).map_err(|e| vm.explain(&e))?;
+        current = current.for_task(&object, &task.prompt);
+        let shifts = suite.shifts.as_slice();
         for ShiftValue { name, value } in &changes.shifts {
-            let Some(shift) = declared.iter().find(|shift| shift.name == *name) else {
-                let names = declared.iter().map(|shift| shift.name.as_str());
+            let Some(shift) = shifts.iter().find(|shift| shift.name == *name) else {
+                let names = shifts.iter().map(|shift| shift.name.as_str());
                 return Err(ScriptError::new(vm.main(), unknown_shift(name, names)));
             };
             current = self.shifted(&shift.apply, current, *value, &seed)?;
@@ -137,15 +146,29 @@ impl SceneBuilder {
         for scene in [&mut scene, &mut nominal] {
             changes.cameras.apply(&mut scene.cameras);
         }
-        check_goal(&vm.lua, &task.goal, &scene).map_err(|e| vm.explain(&e))?;
+        predicates
+            .iter()
+            .try_for_each(|p| check_predicate(&vm.lua, p, &scene))
+            .map_err(|e| vm.explain(&e))?;
+        if task.object.is_some() {
+            check_object(&vm.lua, &task.table, "task.object", "object", &object, &scene)
+                .map_err(|e| vm.explain(&e))?;
+        }
         check_workspace(&scene)
             .map_err(|what| vm.explain(&fail_at_key(&vm.lua, &task.layout.table, "build", what)))?;
         let largest = ranges.map_or(1.0, |ranges| ranges.size.max);
-        check_width(&scene, task.goal.object(), variation.as_ref(), largest)?;
+        check_width(&scene, &object, variation.as_ref(), largest)?;
         let (instance, expert) = (self.instance.clone(), task.expert.clone());
         let ranges = ranges.cloned();
-        let instances = Arc::new(SuiteInstances::new(&suite, ranges));
-        Ok(EpisodeSetup { scene, nominal, variation, prompt, seed, instance, expert, instances })
+        let instances = SuiteInstances::new(&vm.lua, &suite, ranges).map_err(|e| vm.explain(&e))?;
+        let instances = Arc::new(instances);
+        let predicate = |DeclaredPredicate { goal, function, .. }: DeclaredPredicate| {
+            let predicate =
+                ScriptPredicate { instance: instance.clone(), name: goal.describe(), function: function? };
+            Some(Arc::new(predicate) as Arc<dyn StatePredicate>)
+        };
+        let predicates = predicates.into_iter().filter_map(predicate).collect();
+        Ok(EpisodeSetup { scene, nominal, variation, prompt, predicates, seed, instance, expert, instances })
     }
 
     /// Checks that the script declares the suite of the plan again.
@@ -335,33 +358,62 @@ pub fn check_shift(shifts: &[Shift], name: &str, value: f64) -> Result<(), Shift
     Err(ShiftError::Value { name, range, unit, value })
 }
 
-/// Checks that the object and the target of a goal exist, and that the object can move.
-fn check_goal(lua: &Lua, goal: &GoalSpec, scene: &Scene) -> mlua::Result<()> {
-    for (key, name) in [("object", goal.object()), ("target", goal.target())] {
-        let wrong =
-            |what: String| Err(fail_at_key(lua, goal.table(), key, format!("task.goal.{key}: {what}")));
-        let mut known = scene.names();
-        if key == "object" {
-            // Parts of objects cannot be carried.
-            known.retain(|name| !name.contains('.'));
-        }
-        if !known.iter().any(|known| known == name) {
-            return wrong(unknown_name("object", name, known.iter().map(String::as_str)));
+/// Checks that the objects and joints of a predicate exist, and that its object can move.
+fn check_predicate(lua: &Lua, predicate: &DeclaredPredicate, scene: &Scene) -> mlua::Result<()> {
+    let DeclaredPredicate { goal, table, .. } = predicate;
+    if let Some(name) = goal.object() {
+        check_object(lua, table, "task.goal.object", "object", name, scene)?;
+    }
+    if let Some(name) = goal.target() {
+        let known = scene.names();
+        let known = known.iter().map(String::as_str);
+        if !known.clone().any(|known| known == name) {
+            let message = format!("task.goal.target: {}", unknown_name("object", name, known));
+            return Err(fail_at_key(lua, table, "target", message));
         }
         let object = scene.objects.iter().find(|object| object.name == name);
-        match (key, object.map(|object| &object.asset.body)) {
-            ("object", Some(Body::Static | Body::Articulated(_) | Body::Scenery)) => {
-                return wrong(format!(
-                    "{name:?} never moves; name an object whose body is softvt.soft or softvt.rigid"
-                ));
-            }
-            ("target", Some(Body::Scenery)) => {
-                return wrong(format!(
-                    "{name:?} is softvt.scenery, which has no contact; name an object that has"
-                ));
-            }
-            _ => {}
+        if let Some(Body::Scenery) = object.map(|object| &object.asset.body) {
+            let message = format!(
+                "task.goal.target: {name:?} is softvt.scenery, which has no contact; name an object that has"
+            );
+            return Err(fail_at_key(lua, table, "target", message));
+        }
+    }
+    if let Some(name) = goal.joint() {
+        let names = scene.names();
+        let parts = names.iter().map(String::as_str).filter(|name| name.contains('.'));
+        if !parts.clone().any(|part| part == name) {
+            let what = match parts.clone().next() {
+                Some(_) => unknown_name("joint", name, parts),
+                None => format!("unknown joint {name:?}; the scene has no softvt.articulated"),
+            };
+            return Err(fail_at_key(lua, table, "joint", format!("task.goal.joint: {what}")));
         }
     }
     Ok(())
+}
+
+/// Checks that the object named by the key `key` of `table` exists and can move.
+fn check_object(
+    lua: &Lua,
+    table: &Table,
+    label: &str,
+    key: &str,
+    name: &str,
+    scene: &Scene,
+) -> mlua::Result<()> {
+    let wrong = |what: String| Err(fail_at_key(lua, table, key, format!("{label}: {what}")));
+    let mut known = scene.names();
+    // Parts of objects cannot be carried.
+    known.retain(|name| !name.contains('.'));
+    if !known.iter().any(|known| known == name) {
+        return wrong(unknown_name("object", name, known.iter().map(String::as_str)));
+    }
+    let object = scene.objects.iter().find(|object| object.name == name);
+    match object.map(|object| &object.asset.body) {
+        Some(Body::Static | Body::Articulated(_) | Body::Scenery) => {
+            wrong(format!("{name:?} never moves; name an object whose body is softvt.soft or softvt.rigid"))
+        }
+        _ => Ok(()),
+    }
 }

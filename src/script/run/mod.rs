@@ -3,3 +3,4 @@
 pub(crate) mod episode;
 pub(crate) mod experiment;
 pub(crate) mod expert;
+pub(crate) mod predicate;

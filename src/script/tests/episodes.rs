@@ -6,7 +6,7 @@ use crate::{
     api::expert_input::{ExpertCommand, ExpertView, ObjectView},
     check_shift,
 };
-use softvt_benchmark::{Plan, ShiftValue};
+use softvt_benchmark::{Goal, Plan, ShiftValue};
 use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_geometry::{Pose, Vec3, shape::Shape};
 use softvt_rollout::Controller;
@@ -427,7 +427,9 @@ fn an_episode_of_another_suite_than_that_of_the_plan_is_refused() {
     };
     assert!(EpisodeSetup::open(&loaded, &id, &SceneChanges::default()).is_ok());
     let Plan::Suite(suite) = &mut loaded.plan else { panic!("a suite") };
-    suite.tasks[0].goal.target = "ball".into();
+    if let Goal::On(of) | Goal::Inside(of) = &mut suite.tasks[0].goal {
+        of.target = "ball".into();
+    }
     let Err(error) = EpisodeSetup::open(&loaded, &id, &SceneChanges::default()) else {
         panic!("another goal")
     };

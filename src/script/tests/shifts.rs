@@ -49,7 +49,7 @@ fn multiplied(setup: &EpisodeSetup, factor: f64) -> Vec<String> {
 fn shifts_of_the_target_leave_all_other_objects() {
     let suite = loaded("spatial_soft");
     let Plan::Suite(plan) = &suite.plan else { panic!("a suite") };
-    let target = plan.tasks[0].goal.object.clone();
+    let target = plan.tasks[0].object.clone();
     for (shift, factor) in [("target_mass", 2.5), ("target_stiffness", 0.5)] {
         let setup = episode(&suite, "spatial_soft", 0, &[(shift, factor)]);
         assert_eq!(multiplied(&setup, factor), std::slice::from_ref(&target), "{shift}");

@@ -416,6 +416,11 @@ impl MathRandom {
         *lock(&self.0) = rng;
     }
 
+    /// Continues with the numbers of `rng`; returns those that would have followed.
+    pub(crate) fn replace(&self, rng: ChaCha8Rng) -> ChaCha8Rng {
+        std::mem::replace(&mut lock(&self.0), rng)
+    }
+
     /// True if a number was drawn since the generator was seeded.
     pub(crate) fn has_drawn(&self) -> bool {
         lock(&self.0).get_word_pos() > 0

@@ -1,0 +1,188 @@
+//! Goals of tasks: predicates of the true scene, and their combinations.
+
+use serde::{Deserialize, Serialize};
+use softvt_common::text::format_number;
+
+/// Success condition of a task, judged at every control step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Goal {
+    /// The object rests on the target, released, for `hold_s`.
+    On(Placement),
+    /// The object rests in the cavity of the target, released, for `hold_s`.
+    #[serde(rename = "in")]
+    Inside(Placement),
+    /// A joint is open by a share of its range or more.
+    Opened {
+        /// Part of an articulated object: `cabinet.top_drawer`.
+        joint: String,
+        /// Smallest share of the range, 0..=1.
+        share: f64,
+    },
+    /// A joint is open by a share of its range or less.
+    Closed {
+        /// Part of an articulated object.
+        joint: String,
+        /// Largest share of the range, 0..=1.
+        share: f64,
+    },
+    /// The position of a joint is within a range.
+    Turned {
+        /// Part of an articulated object.
+        joint: String,
+        /// Lowest and highest position, rad of a hinge and m of a slider.
+        range: [f64; 2],
+    },
+    /// The object is near the target, and the robot does not touch it.
+    Near {
+        /// Objects and time.
+        #[serde(flatten)]
+        of: Placement,
+        /// Largest horizontal distance of the centres, m.
+        distance_m: f64,
+    },
+    /// The object is beside the target, and the robot does not touch it.
+    Beside {
+        /// Side of the target.
+        side: Side,
+        /// Objects and time.
+        #[serde(flatten)]
+        of: Placement,
+        /// Smallest distance of the centres towards that side, m.
+        distance_m: f64,
+    },
+    /// The object is upright, and the robot does not touch it.
+    Upright {
+        /// Scene name.
+        object: String,
+        /// Time for which it must stay so, s.
+        hold_s: f64,
+        /// Largest angle between its z axis and the vertical, rad.
+        angle_rad: f64,
+    },
+    /// A function of the script returns true.
+    Predicate {
+        /// What holds, in words.
+        name: String,
+    },
+    /// All of these hold at once.
+    All(Parts),
+    /// At least one of these holds.
+    Any(Parts),
+    /// None of these holds.
+    None(Parts),
+    /// Each of these has held once after the one before it had; the last one holds.
+    Sequence(Parts),
+}
+
+/// An object, what it is placed relative to, and for how long.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Placement {
+    /// Scene name of the object to be moved.
+    pub object: String,
+    /// Scene name of the other object.
+    pub target: String,
+    /// Time for which the object must stay, s.
+    pub hold_s: f64,
+}
+
+/// Goals that are combined.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Parts {
+    /// In order.
+    pub goals: Vec<Goal>,
+}
+
+/// A side of an object, seen along the x axis of the robot's base.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Side {
+    /// Towards +y of the base.
+    LeftOf,
+    /// Towards −y of the base.
+    RightOf,
+    /// Towards the base, −x.
+    InFrontOf,
+    /// Away from the base, +x.
+    Behind,
+}
+
+impl Side {
+    /// Its words: "left of".
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::LeftOf => "left of",
+            Self::RightOf => "right of",
+            Self::InFrontOf => "in front of",
+            Self::Behind => "behind",
+        }
+    }
+}
+
+impl Goal {
+    /// Its predicates, in the order in which they are written.
+    pub fn predicates(&self) -> Vec<&Self> {
+        match self {
+            Self::All(parts) | Self::Any(parts) | Self::None(parts) | Self::Sequence(parts) => {
+                parts.goals.iter().flat_map(Self::predicates).collect()
+            }
+            _ => vec![self],
+        }
+    }
+
+    /// Scene name of the object that a predicate moves; `None` for a joint, a function and a combination.
+    pub fn object(&self) -> Option<&str> {
+        match self {
+            Self::On(of) | Self::Inside(of) | Self::Near { of, .. } | Self::Beside { of, .. } => {
+                Some(&of.object)
+            }
+            Self::Upright { object, .. } => Some(object),
+            _ => None,
+        }
+    }
+
+    /// Scene name of what a predicate places its object relative to.
+    pub fn target(&self) -> Option<&str> {
+        match self {
+            Self::On(of) | Self::Inside(of) | Self::Near { of, .. } | Self::Beside { of, .. } => {
+                Some(&of.target)
+            }
+            _ => None,
+        }
+    }
+
+    /// Scene name of the part whose joint a predicate is about.
+    pub fn joint(&self) -> Option<&str> {
+        match self {
+            Self::Opened { joint, .. } | Self::Closed { joint, .. } | Self::Turned { joint, .. } => {
+                Some(joint)
+            }
+            _ => None,
+        }
+    }
+
+    /// What holds, in words: "bun in cabinet.top_drawer".
+    pub fn describe(&self) -> String {
+        let joined =
+            |parts: &Parts, word: &str| parts.goals.iter().map(Self::describe).collect::<Vec<_>>().join(word);
+        match self {
+            Self::On(Placement { object, target, .. }) => format!("{object} on {target}"),
+            Self::Inside(Placement { object, target, .. }) => format!("{object} in {target}"),
+            Self::Opened { joint, .. } => format!("{joint} open"),
+            Self::Closed { joint, .. } => format!("{joint} closed"),
+            Self::Turned { joint, range: [low, high] } => {
+                format!("{joint} turned to {}..{}", format_number(*low), format_number(*high))
+            }
+            Self::Near { of: Placement { object, target, .. }, .. } => format!("{object} near {target}"),
+            Self::Beside { side, of: Placement { object, target, .. }, .. } => {
+                format!("{object} {} {target}", side.words())
+            }
+            Self::Upright { object, .. } => format!("{object} upright"),
+            Self::Predicate { name } => name.clone(),
+            Self::All(parts) => joined(parts, " and "),
+            Self::Any(parts) => format!("({})", joined(parts, " or ")),
+            Self::None(parts) => format!("not ({})", joined(parts, " or ")),
+            Self::Sequence(parts) => joined(parts, ", then "),
+        }
+    }
+}
