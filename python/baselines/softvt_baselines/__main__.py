@@ -267,7 +267,9 @@ def _parser() -> argparse.ArgumentParser:
     study.add_argument("--compile", action="store_true", help="compile the networks")
     study.add_argument("--per-gpu", type=_positive, default=1, help="policies that are trained on one GPU at a time")
 
-    diagnose = command("diagnose", _diagnose, "say where the episodes of a run fail; the run was made with --trace, on an Object suite")
+    diagnose = command(
+        "diagnose", _diagnose, "say where the episodes of a run fail; the run was made with --trace, on an Object or a Spatial suite"
+    )
     diagnose.add_argument("run_folder", metavar="run", type=Path, help="run folder of softvt")
 
     page = command("page", _page, "write the tables and the figure of studies into docs/baselines.md")

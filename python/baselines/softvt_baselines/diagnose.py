@@ -18,8 +18,9 @@ from .numbers import turns
 MIDDLE = 0.003
 # Force on a pad from which on it touches, N.
 TOUCHES = 0.01
-# Position of the robot's base on the floor of the Object suites, m: traces have poses of the tool in its frame, those of objects in the world.
-BASE = np.array([-0.6, 0.0])
+# Position of the robot's base in the Object suites, on the floor, and in the Spatial ones, on the table, m: traces have poses of the tool in its
+# frame, those of objects in the world.
+BASE, TABLE_BASE = np.array([-0.6, 0.0]), np.array([-0.66, 0.0])
 
 
 @dataclass
@@ -43,15 +44,24 @@ def _yaw(quaternion: list[float]) -> float:
     return float(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
 
 
-def meeting(trace: list[dict], asset: str) -> Meeting | None:
+def _target(objects: list[dict], asset: str, prompt: str) -> tuple[dict, np.ndarray]:
+    """The object that is to be grasped, and where the robot stands: objects are named after their assets, or, of two of a kind, by a word of
+    the prompt."""
+    named = {thing["name"]: thing for thing in objects}
+    if asset in named:
+        return named[asset], BASE
+    return next(named[word] for word in prompt.split() if word in named), TABLE_BASE
+
+
+def meeting(trace: list[dict], asset: str, prompt: str = "") -> Meeting | None:
     """How the hand meets the object; None if it never does."""
     touching = [k for k, step in enumerate(trace) if max(step["pad_force_n"]) > TOUCHES]
     if not touching:
         return None
     k = touching[0]
     before = trace[max(k - 1, 0)]  # the object is still where it was
-    thing = next(other for other in before["objects"] if other["name"] == asset)
-    beside = np.array(before["ee_position_b"][:2]) + BASE - thing["position_w"][:2]
+    thing, base = _target(before["objects"], asset, prompt)
+    beside = np.array(before["ee_position_b"][:2]) + base - thing["position_w"][:2]
     fingers = turns(np.array(before["ee_axis_angle_b"]))[:2, 1]
     turned = np.arctan2(fingers[1], fingers[0]) - np.pi / 2 - _yaw(thing["quaternion_w"])
     period = np.pi / 2 if asset in SQUARE else np.pi
@@ -90,7 +100,7 @@ def diagnose(run: Path) -> str:
         if not path.is_file():
             raise UserError(f"{path} is missing: run softvt with --trace")
         trace = [json.loads(line) for line in path.read_text().splitlines()]
-        meetings.append(meeting(trace, row["asset"]))
+        meetings.append(meeting(trace, row["asset"], row.get("prompt", "")))
     for task in [None, *sorted({row["task"] for row in rows})]:
         chosen = [k for k, row in enumerate(rows) if task is None or row["task"] == task]
         own, all_met = [rows[k] for k in chosen], [meetings[k] for k in chosen]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from softvt_baselines import UserError
-from softvt_baselines.diagnose import BASE, diagnose, meeting
+from softvt_baselines.diagnose import BASE, TABLE_BASE, diagnose, meeting
 
 
 def trace(angle: float) -> list[dict]:
@@ -31,6 +31,15 @@ class Diagnoses(unittest.TestCase):
         self.assertAlmostEqual(abs(meeting(trace(np.pi / 2 - 0.2), "cube").turned), 0.2, places=5, msg="its sides are alike")
         self.assertEqual(meeting(trace(0.2), "cube").closing, found.closing)
         self.assertIsNone(meeting(trace(0.2)[:2], "cube"))
+
+    def test_one_of_two_of_a_kind_is_named_by_the_prompt(self):
+        steps = trace(0)
+        for step in steps:
+            far = {"name": "left", "position_w": [0.4, 0.3, 0], "quaternion_w": [1, 0, 0, 0]}
+            right = step["objects"][0] | {"name": "right", "position_w": [0.45 + TABLE_BASE[0], -0.1 + TABLE_BASE[1], 0]}
+            step["objects"] = [far, {"name": "plate", "position_w": [0, 0, 0], "quaternion_w": [1, 0, 0, 0]}, right]
+        found = meeting(steps, "cube", "pick up the right soft cube and place it on the plate")
+        self.assertAlmostEqual(found.beside, 0.003)
 
     def test_causes_are_counted_by_task(self):
         row = dict(asset="cube", task=0, goal=True, safety=True, deformation_ok=True, no_drop=True, grip_ratio=1.4, d_peak=0.1, tau=0.2)
