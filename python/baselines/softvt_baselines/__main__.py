@@ -2,12 +2,11 @@
 
 import argparse
 import asyncio
-import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from . import UserError
+from . import UserError, processors
 
 CODES = ["continuous", "binary", "two-width", "force"]
 INPUTS = {"vo": "vision only", "vp": "vision and drives", "vt": "vision and touch", "vpt": "all three"}
@@ -29,7 +28,7 @@ def _demonstrate(args: argparse.Namespace) -> None:
     from .demonstrate import Demonstrate, demonstrate
 
     options = {key: value for key, value in vars(args).items() if key not in ("command", "run", "flags")}
-    demonstrate(Demonstrate(**options | {"processes": args.processes or os.cpu_count() or 1}))
+    demonstrate(Demonstrate(**options | {"processes": args.processes or processors()}))
 
 
 def _train(args: argparse.Namespace) -> None:

@@ -6,7 +6,6 @@ The first reader of a recording packs it: pictures at the edge that policies see
 
 import hashlib
 import json
-import os
 import shutil
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ import h5py
 import numpy as np
 from PIL import Image
 
-from . import UserError
+from . import UserError, processors
 from .numbers import FINE, GRIPPER, Standard, fine, fold, hand, mean_axis, reference
 from .phases import is_seen, memory_begins
 
@@ -287,7 +286,7 @@ def load(
 
     Raises UserError if a recording is incomplete, or lacks the pictures or the grip code.
     """
-    folders = [pack(recording, edge, os.cpu_count() or 1, has_tactile) for recording in recordings]
+    folders = [pack(recording, edge, processors(), has_tactile) for recording in recordings]
     packed = [np.load(folder / "numbers.npz") for folder in folders]
     for recording, numbers in zip(recordings, packed):
         _check_grip_code(recording, code, numbers)

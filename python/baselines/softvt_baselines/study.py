@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from . import UserError
+from . import UserError, processors
 from .data import pack
 from .evaluate import recording_flags, run_softvt
 
@@ -214,7 +214,7 @@ def _check_options(study: Study) -> None:
 def _record(suite: str, study: Study) -> None:
     recording = study.out / "data" / suite
     if (recording / "dataset.json").is_file():
-        pack(recording, study.edge, os.cpu_count() or 1)
+        pack(recording, study.edge, processors())
         return
     _check_time(study)
     began = time.monotonic()
@@ -228,7 +228,7 @@ def _record(suite: str, study: Study) -> None:
         flags = ["--out", str(recording), "--resume", *recording_flags(study.demos, study.edge, study.teacher, study.disturbance)]
         flags += ["--task", study.task] if study.task else []
         run_softvt(["record", f"suites/{suite}.lua", *flags])
-    pack(recording, study.edge, os.cpu_count() or 1)
+    pack(recording, study.edge, processors())
     _note(study, f"recorded {suite}", began)
 
 
@@ -241,7 +241,7 @@ def run(study: Study) -> None:
 
     gpus: list[int | None] = list(range(torch.cuda.device_count())) or [None]
     # Threads that wait for answers leave their core to others.
-    threads = max(1, 2 * (os.cpu_count() or 1) // len(gpus))
+    threads = max(1, 2 * processors() // len(gpus))
     for folder in ("data", "logs", "runs", "checkpoints"):
         (study.out / folder).mkdir(parents=True, exist_ok=True)
     _check_options(study)
