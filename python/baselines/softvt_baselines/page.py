@@ -22,8 +22,8 @@ REFERENCES = {
     "fixed-closure": "fixed closure (privileged)",
     "size-seen": "size seen (privileged)",
 }
-# The inputs with which others are compared: what they add is the difference.
-WITHOUT = {"vp": "vo", "vt": "vo", "vpt": "vp"}
+# The inputs that are compared: what they add to others, and touch with the drives.
+COMPARED = [("vp", "vo"), ("vt", "vo"), ("vt", "vp"), ("vpt", "vp")]
 MEASURES = ["goal", "no_drop", "safety"]
 # Stages of an episode, in their order.
 STAGES = ["reach", "grasp", "lift", "carry", "place", "release"]
@@ -110,14 +110,37 @@ def _name(policy: Policy) -> str:
     return f"{policy.inputs.upper()}, {policy.code}"
 
 
-def _pairs(learned: dict[Policy, list[Run]]) -> list[tuple[Policy, list[Run], list[Run]]]:
-    """Policies with a further input (WITHOUT), and their runs without and with it: of the same suite, grip code, replanning and
-    condition, and with the same number of seeds."""
+@dataclass
+class Pair:
+    """Policies of two kinds of inputs, of the same suite, grip code, replanning and condition, and their runs of the training seeds that both
+    have."""
+
+    policy: Policy
+    other: str  # inputs of the other one
+    fewer: list[Run]
+    more: list[Run]
+
+    @property
+    def names(self) -> tuple[str, str]:
+        return self.other.upper(), self.policy.inputs.upper()
+
+    @property
+    def difference(self) -> str:
+        return f"{self.names[1]} − {self.names[0]}"
+
+
+def _seeds(runs: list[Run]) -> dict[str, Run]:
+    return {LEARNED.fullmatch(run.name)["seed"]: run for run in runs}
+
+
+def _pairs(learned: dict[Policy, list[Run]]) -> list[Pair]:
+    """The pairs of COMPARED with a common training seed."""
     pairs = []
-    for policy, more in sorted(learned.items()):
-        fewer = learned.get(replace(policy, inputs=WITHOUT.get(policy.inputs, "")), [])
-        if len(fewer) == len(more):
-            pairs.append((policy, fewer, more))
+    for policy, runs in sorted(learned.items()):
+        for inputs, other in COMPARED:
+            fewer, more = _seeds(learned.get(replace(policy, inputs=other), [])), _seeds(runs)
+            if inputs == policy.inputs and (common := sorted(fewer.keys() & more.keys())):
+                pairs.append(Pair(policy, other, [fewer[seed] for seed in common], [more[seed] for seed in common]))
     return pairs
 
 
@@ -135,10 +158,11 @@ def tables(folder: Path) -> str:
         rows += [_row(shown, [references[suite, name]], "") for name, shown in REFERENCES.items() if (suite, name) in references]
         text += _table(["policy", "replan", "seeds", "episodes", "Goal, %", "NoDrop, %", "Safety, %", "D/τ", "grip ratio"], rows)
         text += _origin(folder, suite)
-    pairs = [pair for pair in _pairs(learned) if pair[0].condition != UNCHANGED]
+    pairs = [pair for pair in _pairs(learned) if pair.policy.condition != UNCHANGED]
     if pairs:
         text += (
-            "### Differences, on the episodes that both have\n\n*Both succeed*: Safety of the episodes in which both reach the goal.\n\n"
+            "### Differences, on the episodes and the training seeds that both have\n\n*Both succeed*: Safety of the episodes in which both reach "
+            "the goal.\n\n"
         )
         measures = [f"{measure}, points" for measure in ("Goal", "NoDrop", "Safety")]
         heading = [
@@ -153,15 +177,16 @@ def tables(folder: Path) -> str:
             "both succeed",
             "Safety there, points",
         ]
-        text += _table(heading, [_difference(*pair) for pair in pairs])
+        text += _table(heading, [_difference(pair) for pair in pairs])
     if compared := _against_references(learned, references):
         text += "### Differences from reference controllers, on the episodes that both have\n\n"
         text += _table(["suite", "difference", "replan", "seeds", "episodes", "Goal, points", "Safety, points"], compared)
-    for policy, fewer, more in pairs:
+    for pair in pairs:
+        policy = pair.policy
         if not policy.condition:
-            text += f"### `{policy.suite}`, {_compared(policy)}, {policy.code}, replan {policy.replan}: by task and by stage\n\n"
-            text += "Safety by task, and the stages in which episodes without success ended, on the episodes that both have.\n\n"
-            text += _by_task(policy, fewer, more) + _by_stage(policy, fewer, more)
+            text += f"### `{policy.suite}`, {pair.difference}, {policy.code}, replan {policy.replan}: by task and by stage\n\n"
+            text += "Safety by task, and the stages in which episodes without success ended, on the same episodes and seeds.\n\n"
+            text += _by_task(pair) + _by_stage(pair)
     if shifted := _shifts(learned):
         text += "### Shifts\n\nThe change is that against the same policy without a shift, on the same episodes.\n\n"
         text += _table(["suite", "policy", "replan", "seeds", "shift", "Goal, %", "Safety, %", "change of Safety, points"], shifted)
@@ -181,14 +206,15 @@ def _origin(folder: Path, suite: str) -> str:
     return f"Made by {'; '.join(sorted(places))}. Checkpoints (SHA-256): {', '.join(weights)}.\n\n"
 
 
-def _compared(policy: Policy) -> str:
-    return f"{policy.inputs.upper()} − {WITHOUT[policy.inputs].upper()}"
+def _in_common(pair: Pair) -> tuple[list[Run], list[Run]]:
+    """The runs of a pair with the episodes that all of them have."""
+    common = results.in_common(pair.fewer + pair.more)
+    return common[: len(pair.fewer)], common[len(pair.fewer) :]
 
 
-def _difference(policy: Policy, fewer: list[Run], more: list[Run]) -> list[str]:
+def _difference(pair: Pair) -> list[str]:
     """The row of a pair in the table of differences."""
-    common = results.in_common(fewer + more)
-    fewer, more = common[: len(fewer)], common[len(fewer) :]
+    policy, (fewer, more) = pair.policy, _in_common(pair)
     shown = [results.difference(fewer, more, measure).text(signed=True) for measure in MEASURES]
     succeed, there = "–", "–"
     # With several seeds, success differs from seed to seed.
@@ -196,7 +222,7 @@ def _difference(policy: Policy, fewer: list[Run], more: list[Run]) -> list[str]:
         both = (fewer[0].goal * more[0].goal).astype(bool)
         succeed = str(both.sum())
         there = results.difference([fewer[0].where(both)], [more[0].where(both)], "safety").text(signed=True) if both.any() else "–"
-    names = [f"`{policy.suite}`", _compared(policy), policy.code, str(policy.replan), str(len(more)), policy.condition or "none"]
+    names = [f"`{policy.suite}`", pair.difference, policy.code, str(policy.replan), str(len(more)), policy.condition or "none"]
     return [*names, str(len(more[0].task)), *shown, succeed, there]
 
 
@@ -214,9 +240,9 @@ def _against_references(learned: dict[Policy, list[Run]], references: dict[tuple
     return rows
 
 
-def _by_task(policy: Policy, fewer: list[Run], more: list[Run]) -> str:
-    common = results.in_common(fewer + more)
-    assets = {task: asset for run in common for task, asset in run.assets.items()}
+def _by_task(pair: Pair) -> str:
+    fewer, more = _in_common(pair)
+    assets = {task: asset for run in fewer + more for task, asset in run.assets.items()}
 
     def safety(runs: list[Run], task: int) -> str:
         return f"{100 * np.mean([run.safety[run.task == task].mean() for run in runs]):.0f}"
@@ -225,23 +251,22 @@ def _by_task(policy: Policy, fewer: list[Run], more: list[Run]) -> str:
         [
             str(task),
             assets.get(task, "–"),
-            str((common[0].task == task).sum()),
-            safety(common[: len(fewer)], task),
-            safety(common[len(fewer) :], task),
+            str((more[0].task == task).sum()),
+            safety(fewer, task),
+            safety(more, task),
         ]
-        for task in np.unique(common[0].task)
+        for task in np.unique(more[0].task)
     ]
-    names = (WITHOUT[policy.inputs].upper(), policy.inputs.upper())
-    return _table(["task", "asset", "episodes", *(f"Safety of {name}, %" for name in names)], rows)
+    return _table(["task", "asset", "episodes", *(f"Safety of {name}, %" for name in pair.names)], rows)
 
 
-def _by_stage(policy: Policy, fewer: list[Run], more: list[Run]) -> str:
-    common = results.in_common(fewer + more)
-    counts = [Counter(stage for run in runs for stage in run.stage) for runs in (common[: len(fewer)], common[len(fewer) :])]
-    firm = [sum(int(((run.goal == 1) & (run.ratio > 1)).sum()) for run in runs) for runs in (common[: len(fewer)], common[len(fewer) :])]
+def _by_stage(pair: Pair) -> str:
+    both = _in_common(pair)
+    counts = [Counter(stage for run in runs for stage in run.stage) for runs in both]
+    firm = [sum(int(((run.goal == 1) & (run.ratio > 1)).sum()) for run in runs) for runs in both]
     rows = [[f"failed at *{stage}*", *(str(count[stage]) for count in counts)] for stage in STAGES if any(count[stage] for count in counts)]
     rows.append(["success beyond the limit", *map(str, firm)])
-    return _table(["episodes", WITHOUT[policy.inputs].upper(), policy.inputs.upper()], rows)
+    return _table(["episodes", *pair.names], rows)
 
 
 def _shifts(learned: dict[Policy, list[Run]]) -> list[list[str]]:

@@ -36,10 +36,10 @@ class Pages(unittest.TestCase):
         self.assertIn("| VT, continuous | 4 | 2 | 50 | 100.0 [100.0, 100.0] |", text)
         self.assertIn("| expert (privileged) |  | 1 | 50 | 100.0", text)
         difference = text.split("### Differences", 1)[1]
-        for pair in ("VP − VO", "VT − VO", "VPT − VP"):
+        for pair in ("VP − VO", "VT − VO", "VT − VP", "VPT − VP"):
             self.assertIn(f"| `one` | {pair} | continuous | 4 | 2 | none | 50 | +0.0 [+0.0, +0.0] |", difference)
         between, against = difference.split("### Differences from reference controllers")
-        self.assertEqual((between.count("| `one` |"), against.count("| `one` |")), (3, 4))
+        self.assertEqual((between.count("| `one` |"), against.count("| `one` |")), (4, 4))
         self.assertIn("| `one` | VT, continuous − expert (privileged) | 4 | 2 | 50 | +0.0 [+0.0, +0.0] | -", against)
         figure = (self.docs / "images" / "baselines.svg").read_bytes()
         page.write([], self.docs)
@@ -55,6 +55,14 @@ class Pages(unittest.TestCase):
         self.assertIn("| `one` | VT − VO | continuous | 4 | 1 | light x2 |", text)
         self.assertNotIn("| reference |", text)
         self.assertIn("| `one` | VT, continuous | 4 | 1 | light x2 | 100.0 [100.0, 100.0] | 100.0 [100.0, 100.0] | +100.0", text)
+
+    def test_policies_are_compared_on_the_seeds_that_both_have(self):
+        shutil.rmtree(self.study / "runs" / "one-vo-continuous-s0-r4")
+        page.collect(self.study, self.docs)
+        text = page.tables(self.docs)
+        self.assertIn("| VT, continuous | 4 | 2 | 50 |", text)
+        self.assertIn("| `one` | VT − VO | continuous | 4 | 1 | none | 50 |", text)
+        self.assertIn("| `one` | VT − VP | continuous | 4 | 2 | none | 50 |", text)
 
     def test_an_interrupted_run_that_was_collected_is_compared_on_the_episodes_that_both_have(self):
         page.collect(self.study, self.docs)
