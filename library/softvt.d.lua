@@ -1212,6 +1212,11 @@ function Pose:rotated(angle) end
 ---@return softvt.Pose
 function Pose:interpolate(other, share) end
 
+---Returns the position in the world of a point of this pose's frame, m.
+---@param point number[]
+---@return number[]
+function Pose:transform(point) end
+
 ---Returns the distance to another pose, m, and the angle between the orientations, rad.
 ---@param other softvt.Pose
 ---@return number
@@ -1396,7 +1401,11 @@ function SceneState:clearance(pose, options) end
 ---@field coating number? Static friction of its coating, which is that of every pair with it; nil without one.
 ---@field yaw number Rotation about the vertical, rad.
 ---@field hints table<string, number> Numbers of its asset for experts; those whose names end in _m are lengths and follow the scale.
----@field joint number? Joint value of a part, m or rad.
+---@field pose softvt.Pose Frame of its shape: the origin of an object is below its centre, at its lowest point.
+---@field joint number? Joint value of a part, m or rad; nil for a whole object, as are the next three.
+---@field joint_range number[]? Lowest and highest value of its joint, m or rad.
+---@field joint_axis number[]? Direction in which the value of a slider grows, or the axis about which that of a hinge does; world frame.
+---@field joint_origin number[]? A point of the axis of a hinge, world frame, m.
 ---@field joints table<string, number> Joint values of an articulated object by part, m or rad.
 ---@field parts table<string, softvt.ObjectState> Parts of an articulated object by name.
 local ObjectState = {}

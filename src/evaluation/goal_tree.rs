@@ -29,6 +29,22 @@ impl GoalNode {
         }
     }
 
+    /// Calls `visit` with the number of each predicate that must not hold: those under an odd number of `None`.
+    pub fn for_each_negated(&self, visit: &mut impl FnMut(usize)) {
+        self.walk_negated(false, visit);
+    }
+
+    fn walk_negated(&self, is_negated: bool, visit: &mut impl FnMut(usize)) {
+        match self {
+            Self::Predicate(number) if is_negated => visit(*number),
+            Self::Predicate(_) => {}
+            Self::None(parts) => parts.iter().for_each(|part| part.walk_negated(!is_negated, visit)),
+            Self::All(parts) | Self::Any(parts) | Self::Sequence(parts) => {
+                parts.iter().for_each(|part| part.walk_negated(is_negated, visit));
+            }
+        }
+    }
+
     fn sequences(&self) -> usize {
         match self {
             Self::Predicate(_) => 0,
@@ -156,5 +172,9 @@ mod tests {
         let mut numbers = Vec::new();
         goal.for_each_final(&mut |number| numbers.push(number));
         assert_eq!(numbers, [0, 2]);
+        let mut negated = Vec::new();
+        goal.for_each_negated(&mut |number| negated.push(number));
+        None(vec![None(vec![Predicate(5)])]).for_each_negated(&mut |number| negated.push(number));
+        assert_eq!(negated, [4]);
     }
 }

@@ -97,8 +97,11 @@ pub struct OtherObjectDeformation {
 /// A predicate of a goal of several parts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GoalPart {
-    /// What must hold, in words.
+    /// What it is about, in words.
     pub name: String,
+    /// True if it must not hold; absent otherwise.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub negated: bool,
     /// True if it held at the end.
     pub holds: bool,
     /// Time at which it held first, s; null if it never did.

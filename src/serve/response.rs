@@ -134,8 +134,10 @@ fn scene(live: &LiveEpisode, config: &ServerConfig) -> serde_json::Value {
     let sim = &live.episode.sim;
     let position: [f64; 3] = sim.robot.base_w.translation.vector.into();
     let q = rotation::canonical(&sim.robot.base_w.rotation);
+    let task = tasks.find(|task| task.id == id.task);
     json!({
-        "goal": tasks.find(|task| task.id == id.task).map(|task| &task.goal),
+        "goal": task.map(|task| &task.goal),
+        "object": task.map(|task| &task.object),
         "base_position_w": position,
         "base_quaternion_w": [q.w, q.i, q.j, q.k],
         "objects": sim.objects.iter().map(|object| &object.name).collect::<Vec<_>>(),

@@ -13,6 +13,7 @@ mod dataset_recording;
 mod determinism;
 mod expert_failure;
 mod external_scorer;
+mod goals;
 mod grip_codes;
 mod grip_force;
 mod initial_state_coverage;

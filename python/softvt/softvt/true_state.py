@@ -46,12 +46,19 @@ class Scene:
 
     @classmethod
     def read(cls, scene: Mapping[str, Any]) -> "Scene":
-        """The `info["scene"]` of a server. Raises ValueError if its goal is not that of one object at one target."""
-        goal = scene["goal"]
-        if not (isinstance(goal, Mapping) and "object" in goal and "target" in goal):
-            raise ValueError("obs='state' and reward='staged' need a goal of one object at one target, which this task has not")
+        """The `info["scene"]` of a server. Raises ValueError if its goal places the object of the task nowhere."""
+        placed = [goal for goal in _predicates(scene["goal"]) if goal.get("object") == scene["object"] and "target" in goal]
+        if not placed:
+            raise ValueError("obs='state' and reward='staged' need a goal that places the object of the task somewhere, which this one does not")
         position = np.array(scene["base_position_w"], dtype=np.float64)
-        return cls(goal["object"], goal["target"], position, _matrix_of_quaternion(scene["base_quaternion_w"]))
+        return cls(scene["object"], placed[0]["target"], position, _matrix_of_quaternion(scene["base_quaternion_w"]))
+
+
+def _predicates(goal: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The predicates of a goal, in the order in which they are written."""
+    if "goals" in goal:
+        return [predicate for part in goal["goals"] for predicate in _predicates(part)]
+    return [goal]
 
 
 @dataclass(frozen=True)
@@ -90,12 +97,21 @@ class TrueState:
 
 
 def progress(state: TrueState, verdict: Mapping[str, Any]) -> float:
-    """Progress of an episode, 0 to 1: the share of completed stages, and the way within reaching and carrying."""
+    """Progress of an episode, 0 to 1.
+
+    The share of completed stages, and the way within reaching and carrying. Of a goal of several parts: the share of parts that were met, and
+    the stages of the next object that must be placed.
+    """
     if verdict["goal"]:
         return 1.0
     stage = verdict["failed_stage"]
-    remaining = {"reach": state.reach_m, "carry": state.carry_m}.get(stage, math.inf)
-    return (STAGES.index(stage) + 1.0 - math.tanh(remaining / _NEAR_M)) / len(STAGES)
+    parts = [part for part in verdict.get("goal_parts", []) if not part.get("negated", False)]
+    met = sum(part["met_s"] is not None for part in parts)
+    # The way is known for the object of the task alone.
+    way = {"reach": state.reach_m, "carry": state.carry_m} if met == 0 else {}
+    remaining = way.get(stage, math.inf)
+    within = 0.0 if stage is None else (STAGES.index(stage) + 1.0 - math.tanh(remaining / _NEAR_M)) / len(STAGES)
+    return within if not parts else (met + within) / (len(parts) + 1)
 
 
 def _object(scene: Scene, state: Mapping[str, Any], name: str) -> tuple[np.ndarray, np.ndarray, float | None]:

@@ -237,6 +237,8 @@ struct PredicateState {
     met_s: Option<f64>,
     /// True if its target must not leave the place again.
     is_final: bool,
+    /// True if it must not hold.
+    is_negated: bool,
     /// True if its target was in the region and supported at the end of the last control step.
     is_placed: bool,
 }
@@ -274,6 +276,7 @@ impl Judge {
         let mut predicates: Vec<_> =
             config.predicates.iter().map(|predicate| predicate.rule.state(control_s)).collect();
         config.goal.for_each_final(&mut |number| predicates[number].is_final = true);
+        config.goal.for_each_negated(&mut |number| predicates[number].is_negated = true);
         let targets = config.targets.iter().enumerate();
         Self {
             // The control steps of the object alone are scored one by one.
@@ -353,6 +356,7 @@ impl Judge {
     pub fn parts(&self) -> impl Iterator<Item = GoalPart> + '_ {
         self.config.predicates.iter().zip(&self.predicates).map(|(predicate, state)| GoalPart {
             name: predicate.name.clone(),
+            negated: state.is_negated,
             holds: state.holds,
             met_s: state.met_s,
         })
@@ -473,7 +477,9 @@ impl Judge {
         let unmet =
             self.predicates.iter().zip(&self.config.predicates).find_map(
                 |(state, predicate)| match predicate.rule {
-                    PredicateRule::Rests { target, .. } if state.met_s.is_none() => Some(target),
+                    PredicateRule::Rests { target, .. } if state.met_s.is_none() && !state.is_negated => {
+                        Some(target)
+                    }
                     _ => None,
                 },
             );
@@ -610,6 +616,7 @@ impl PredicateRule {
             holds: false,
             met_s: None,
             is_final: false,
+            is_negated: false,
             is_placed: false,
         }
     }

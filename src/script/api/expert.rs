@@ -40,6 +40,13 @@ type SharedNotes = Arc<Mutex<BTreeMap<String, f64>>>;
 type SharedReadings = Arc<Mutex<Option<FingerReadings>>>;
 type SharedView = Arc<Mutex<ExpertView>>;
 
+/// `file:line` where a function of a script begins.
+pub(crate) fn defined_at(function: &Function) -> String {
+    let info = function.info();
+    let file = info.source.as_deref().and_then(|source| source.strip_prefix('@')).unwrap_or("the script");
+    info.line_defined.map_or(file.to_owned(), |line| format!("{file}:{line}"))
+}
+
 /// An expert as a coroutine of any virtual machine.
 pub(crate) struct Coroutine {
     function: Function,
@@ -130,11 +137,9 @@ impl Coroutine {
 
     /// The reason of an expert that ended in its first step.
     fn no_command_message(&self) -> String {
-        let info = self.function.info();
-        let file = info.source.as_deref().and_then(|source| source.strip_prefix('@')).unwrap_or("the script");
-        let line = info.line_defined.map_or(String::new(), |line| format!(":{line}"));
+        let place = defined_at(&self.function);
         format!(
-            "{file}{line}: the expert ended without a command; it is called once and returns when the task is done"
+            "{place}: the expert ended without a command; it is called once and returns when the task is done"
         )
     }
 

@@ -7,7 +7,7 @@ use crate::{
         FromChecked, HasTable, LuaType, Range, Record, RecordType, Type, Unchecked, choice, functions, make,
         one_of, record,
     },
-    vm::error::fail,
+    vm::{error::fail, source_map::fail_at_key},
 };
 use softvt_benchmark::{
     Placement,
@@ -295,10 +295,9 @@ impl GoalSpec {
         };
         if let Self::Stacked(spec) = self {
             if spec.objects.len() < 2 {
-                return Err(fail(
-                    lua,
-                    "task.goal.objects: expected at least two objects, from the lowest on",
-                ));
+                let message =
+                    "task.goal.objects: expected at least two objects, from the lowest on".to_owned();
+                return Err(fail_at_key(lua, &table, "objects", message));
             }
             let on = |pair: &[String]| declare(Goal::On(placement(&pair[1], &pair[0], spec.hold_s)));
             return Ok(Goal::All(Parts { goals: spec.objects.windows(2).map(on).collect() }));

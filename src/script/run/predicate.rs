@@ -5,7 +5,10 @@ use std::{fmt, sync::Arc};
 use mlua::{Function, Value};
 
 use crate::{
-    api::{expert::SceneState, expert_input::expert_view},
+    api::{
+        expert::{SceneState, defined_at},
+        expert_input::expert_view,
+    },
     plan::ScriptInstance,
     vm::value::describe,
 };
@@ -36,12 +39,10 @@ impl StatePredicate for ScriptPredicate {
         vm.random.reseed(before);
         match result.map_err(|error| error.to_string())? {
             Value::Boolean(holds) => Ok(holds),
-            other => Err(format!(
-                "{}: the predicate {:?} returned {}; return true or false",
-                vm.main(),
-                self.name,
-                describe(&other)
-            )),
+            other => {
+                let (place, got) = (defined_at(&self.function), describe(&other));
+                Err(format!("{place}: the predicate {:?} returned {got}; return true or false", self.name))
+            }
         }
     }
 }

@@ -179,8 +179,10 @@ impl Type {
             Self::Map(of) => format!("a table from names to {}", of.describe()),
             Self::Nested(record) => format!("a table of {}", joined(record)),
             Self::Constructed(records) => {
+                let separator = if records.len() > 3 { ", " } else { " or " };
                 let made: Vec<_> = records.iter().map(|record| format!("{}{{…}}", record.kind)).collect();
-                format!("the result of {}", made.join(" or "))
+                let which = if records.len() > 3 { "one of " } else { "" };
+                format!("the result of {which}{}", made.join(separator))
             }
             Self::Object(class) => format!("a {class}"),
             Self::OneOf(types) => types.iter().map(Self::describe).collect::<Vec<_>>().join(" or "),
