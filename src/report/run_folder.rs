@@ -18,6 +18,8 @@ use softvt_records::{record::EpisodeRecord, record_check::RecordError};
 pub const EPISODES: &str = "episodes.jsonl";
 /// Everything needed to repeat the run.
 pub const RUN: &str = "run.json";
+/// The scripts and calibrations that the run was made from.
+pub const SCRIPTS: &str = "scripts.zip";
 /// Results of a finished run.
 pub const SUMMARY: &str = "summary.json";
 

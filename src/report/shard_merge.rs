@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::{
     actions::{self, ActionsError},
-    run_folder::{EPISODE_FOLDERS, EPISODES, RUN, SUMMARY},
+    run_folder::{EPISODE_FOLDERS, EPISODES, RUN, SCRIPTS, SUMMARY},
     softvtbench_files,
     stored_run::{StoredRun, StoredRunError, load, remove_folder},
 };
@@ -165,6 +165,11 @@ impl<'a> MergedRun<'a> {
         }
         files::write_json_lines(&folder.join(EPISODES), records)?;
         files::write_json(&folder.join(RUN), manifest)?;
+        let scripts = shards[0].dir.join(SCRIPTS);
+        if scripts.is_file() {
+            let target = folder.join(SCRIPTS);
+            fs::copy(&scripts, &target).map_err(FileError::io("copy to", &target))?;
+        }
         let path = shards[0].dir.join(softvtbench_files::FOLDER).join(softvtbench_files::THRESHOLDS_JSON);
         softvtbench_files::write_scores(folder, records, &ThresholdFile::read_released(&path)?)?;
         // The records of a rigid twin carry its own suite name.

@@ -13,6 +13,7 @@ use crate::{
     error::RunError,
     observer::{JobList, Observer, SilentObserver},
     policy::PolicyConfig,
+    stored_scripts::StoredScripts,
 };
 use softvt_benchmark::{
     ShiftValue, Suite,
@@ -137,6 +138,8 @@ pub struct RunConfig {
     pub out: Option<PathBuf>,
     /// True to continue an interrupted run in the output folder.
     pub resume: bool,
+    /// Scripts of a stored run, which are used in place of those on the disk.
+    pub stored_scripts: Option<Arc<StoredScripts>>,
     /// Receiver of progress and messages.
     pub observer: Arc<dyn Observer>,
 }
@@ -161,6 +164,7 @@ impl Default for RunConfig {
             video: None,
             out: None,
             resume: false,
+            stored_scripts: None,
             observer: Arc::new(SilentObserver),
         }
     }
@@ -191,7 +195,10 @@ impl RunConfig {
     /// # Errors
     /// The script fails or returns no plan.
     pub fn load_script(&self) -> Result<LoadedScript, RunError> {
-        Ok(softvt_script::load(&self.file, &self.options)?)
+        match &self.stored_scripts {
+            Some(stored) => stored.load(&self.options),
+            None => Ok(softvt_script::load(&self.file, &self.options)?),
+        }
     }
 
     /// A loaded script with the secret, whose suites vary as the configuration says.

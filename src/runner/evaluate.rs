@@ -11,6 +11,7 @@ use crate::{
     observer::JobList,
     replay::{difference, replay_factory, with_policy_fields},
     run_manifest::{self, RunManifest},
+    stored_scripts::StoredScripts,
     suite_run::PreparedRun,
 };
 use softvt_common::cancel;
@@ -77,6 +78,7 @@ impl<'a> RunLog<'a> {
         let log = Self { run, folder, records };
         log.check_records()?;
         run_manifest::write(&log.folder, manifest)?;
+        StoredScripts::new(run.loaded, run.calibration_files.texts()).write(log.folder.path())?;
         log.check_contradictions(manifest)?;
         Ok(log)
     }

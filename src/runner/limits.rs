@@ -11,7 +11,7 @@ use std::{
     sync::{Arc, Mutex},
 };
 
-use crate::{error::RunError, observer::Observer};
+use crate::{error::RunError, observer::Observer, stored_scripts::StoredScripts};
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{files, parallel::lock, text::counted};
 use softvt_evaluation::{
@@ -27,6 +27,7 @@ const MAX_PARENT_FOLDERS: usize = 3;
 /// The calibration files of a script. Each is read when an object first needs it.
 pub(crate) struct CalibrationFiles {
     script: PathBuf,
+    stored: Option<Arc<StoredScripts>>,
     read: Mutex<BTreeMap<String, Option<Arc<CalibrationFile>>>>,
     /// Messages about missing limits that were told.
     reported: Mutex<BTreeSet<String>>,
@@ -41,6 +42,7 @@ struct CalibrationFile {
     /// Path as messages show it.
     path: String,
     sha256: String,
+    text: String,
     thresholds: ThresholdFile,
 }
 
@@ -75,8 +77,19 @@ pub(crate) struct SceneLimits {
 }
 
 impl CalibrationFiles {
-    pub(crate) fn new(script: &Path, observer: Arc<dyn Observer>) -> Self {
-        Self { script: script.to_owned(), read: Mutex::default(), reported: Mutex::default(), observer }
+    /// The files above a script, or those of a stored run.
+    pub(crate) fn new(
+        script: &Path,
+        stored: Option<Arc<StoredScripts>>,
+        observer: Arc<dyn Observer>,
+    ) -> Self {
+        Self {
+            script: script.to_owned(),
+            stored,
+            read: Mutex::default(),
+            reported: Mutex::default(),
+            observer,
+        }
     }
 
     /// Limits of the soft objects of a scene. `targets` are the objects that the task moves.
@@ -123,15 +136,29 @@ impl CalibrationFiles {
             return Ok(known.clone());
         }
         let relative_path = relative_path(asset);
-        let file = find_file(&self.script, &relative_path)?
+        let file = self
+            .find(&relative_path)?
             .map(|ProjectFile { text, path }| -> Result<_, RunError> {
                 let thresholds = ThresholdFile::parse(&text, &path)?;
                 let sha256 = softvt_script::sha256(text.as_bytes());
-                Ok(Arc::new(CalibrationFile { relative_path, path, sha256, thresholds }))
+                Ok(Arc::new(CalibrationFile { relative_path, path, sha256, text, thresholds }))
             })
             .transpose()?;
         read.insert(asset.to_owned(), file.clone());
         Ok(file)
+    }
+
+    fn find(&self, relative_path: &str) -> Result<Option<ProjectFile>, RunError> {
+        let Some(stored) = &self.stored else { return find_file(&self.script, relative_path) };
+        let path = || format!("{relative_path} (of the run)");
+        Ok(stored.calibration(relative_path).map(|text| ProjectFile { text: text.to_owned(), path: path() }))
+    }
+
+    /// The files that have been read, by their path below a project folder.
+    pub(crate) fn texts(&self) -> BTreeMap<String, String> {
+        let read = lock(&self.read);
+        let files = read.values().flatten();
+        files.map(|file| (file.relative_path.clone(), file.text.clone())).collect()
     }
 
     /// Tells the messages of a scene about missing limits, each once per run.

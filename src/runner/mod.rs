@@ -35,6 +35,7 @@ pub mod selection;
 mod served_runs;
 mod serving;
 pub mod stored_folder;
+mod stored_scripts;
 mod suite_run;
 
 pub use check::SuiteChecker;
@@ -53,4 +54,5 @@ pub use record::{DemoCount, record};
 pub use runner::Runner;
 pub use served_runs::ServedRuns;
 pub use serving::{check_served, first_observation, prepare_served, server_config};
+pub use stored_scripts::StoredScripts;
 pub use suite_run::{PreparedRun, SuiteRun};

@@ -17,6 +17,7 @@ use crate::{
     policy::{ControllerFactory, PolicyConfig, PolicyOptions, PolicySource},
     run_manifest,
     selection::{select_tasks, suites_of},
+    stored_scripts::StoredScripts,
     suite_run::{PreparedRun, SuiteRun},
 };
 use softvt_benchmark::{Suite, run_changes::RunChanges, seed::SecretSeed};
@@ -148,6 +149,7 @@ impl StoredManifest<'_> {
         Ok(RunConfig {
             policy: PolicyConfig::external("replay"),
             tasks: vec![task.to_string()],
+            stored_scripts: StoredScripts::read(self.path)?,
             observer: self.observer.clone(),
             ..RunConfig::of(self.text("script")).with_changes(changes, secret)
         })

@@ -11,14 +11,21 @@ use serde_json::Value;
 use crate::{error::RunError, observer::Observer, replay::demos_of};
 use softvt_common::files::{self, FileError};
 use softvt_dataset::{TaskFile, layout::ATTEMPTS};
-use softvt_report::{run_folder::RUN, stored_run::StoredRun};
+use softvt_report::{
+    run_folder::{RUN, SCRIPTS},
+    stored_run::StoredRun,
+};
 
 /// Makes the folder of a run the working folder, unless its script is in the present one. Returns the path of the run
-/// from the working folder.
+/// from the working folder. A run that has its scripts needs no folder, unless a file of `--vary` replaced its
+/// variation.
 ///
 /// # Errors
 /// The script is in none of the folders.
 pub fn enter_for_run(run: &StoredRun, observer: &dyn Observer) -> Result<PathBuf, RunError> {
+    if run.dir.join(SCRIPTS).is_file() && run.manifest["vary"].is_null() {
+        return Ok(run.dir.clone());
+    }
     enter(&run.dir, run.text("script"), run.manifest["folder"].as_str(), observer)
 }
 

@@ -135,7 +135,11 @@ impl<'a> SuiteRun<'a> {
             name: config.suite_name(suite),
             settings,
             jobs,
-            calibration_files: Arc::new(CalibrationFiles::new(&config.file, config.observer.clone())),
+            calibration_files: Arc::new(CalibrationFiles::new(
+                &config.file,
+                config.stored_scripts.clone(),
+                config.observer.clone(),
+            )),
             reads_limits: true,
             replay_source,
             assets: AssetCache::default(),

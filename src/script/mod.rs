@@ -15,7 +15,7 @@ mod vm;
 pub use api::envelope_plot::envelope_plot;
 pub use api::experiment_input::{ExperimentInput, ExperimentInputError};
 pub use plan::{
-    LoadedScript, ScriptSources, declared_options, load, load_with,
+    LoadedScript, ScriptSources, declared_options, load, load_files, load_with,
     options::{OptionSpec, ScriptOptionValue},
     policy_file::{LuaPolicy, PolicyFile},
     profile_file::load_profile,

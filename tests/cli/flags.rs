@@ -276,13 +276,18 @@ fn runs_and_datasets_are_replayed_from_any_folder() {
     let (script, _) = view.split_once(' ').expect("a script");
     assert!(project.path("elsewhere").join(script).is_file(), "{script}");
     assert!(page.contains("softvt replay ../runs/one 0/0"));
-    // The run has moved, and its own folder is gone: the message names both.
+    // The run has moved, and its script is gone: the run has a copy.
     let moved = tempfile::tempdir().expect("a folder");
     let copied = moved.path().join("one");
     fs::rename(project.path("runs/one"), &copied).expect("moved");
     let from = project.path("suites/x.lua");
     fs::remove_file(&from).expect("removed");
-    let refused = crate::support::refusal(elsewhere(&format!("replay {} 0/0", copied.display())), "replay");
+    let replay = format!("replay {} 0/0", copied.display());
+    let output = elsewhere(&replay);
+    assert!(output.code == 0 && output.out.contains("byte-identical"), "{}{}", output.out, output.err);
+    // Without it, the message names the folders that were searched.
+    fs::remove_file(copied.join("scripts.zip")).expect("removed");
+    let refused = crate::support::refusal(elsewhere(&replay), "replay");
     let folder = project.path("").canonicalize().expect("there").display().to_string();
     assert!(refused.contains("suites/x.lua is not in the working folder or in"), "{refused}");
     assert!(refused.contains(folder.trim_end_matches('/')), "{refused}");

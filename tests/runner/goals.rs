@@ -53,8 +53,7 @@ fn a_goal_combines_predicates_and_its_parts_are_recorded() {
     ));
     assert!(all.goal && all.safety && all.targets.is_empty());
     assert_snapshot!(parts(&all), @"block on chest.tray: holds, chest.tray closed: holds, chest.tray open: never");
-    let sequence =
-        verdict(&format!("softvt.sequence {{ on, softvt.opened {{ joint = 'chest.tray', share = 0.5 }} }}"));
+    let sequence = verdict("softvt.sequence { on, softvt.opened { joint = 'chest.tray', share = 0.5 } }");
     assert!(!sequence.goal);
     assert_snapshot!(parts(&sequence), @"block on chest.tray: holds, chest.tray open: never");
     let any = verdict("softvt.any { on, softvt.turned { joint = 'chest.tray', range = { 0.05, 0.08 } } }");

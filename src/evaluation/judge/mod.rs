@@ -21,7 +21,7 @@
 //! 8. **Stage** of the episode: [`StageMonitor`](super::stage::StageMonitor).
 //! 9. **Grip** while the target is lifted and no release was commanded: [`GripMonitor`](super::grip::GripMonitor).
 //!
-//! A goal may move several targets. Each has monitors of its own ([`target`]). The first is *the object*, whose
+//! A goal may move several targets. Each has monitors of its own. The first is *the object*, whose
 //! deformation, grip and contacts the verdict holds; those of the others are in its list `targets`. NoDrop, NoSlip and
 //! Safety Success are of all targets.
 //!

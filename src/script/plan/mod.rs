@@ -143,6 +143,21 @@ pub fn load_with(path: &Path, argv: &[String], limits: &VmLimits) -> Result<Load
     Ok(LoadedScript { sources, plan, options, secret: None, variation_files: BTreeMap::new() })
 }
 
+/// Loads a script of which all files are known, such as that of a stored run, and makes its plan. `main` is the name of
+/// its main file. Nothing is read from the disk.
+///
+/// # Errors
+/// If a file is missing, the script fails, or its options or its plan are invalid.
+pub fn load_files(main: &str, files: ScriptFiles, argv: &[String]) -> Result<LoadedScript, ScriptError> {
+    let (limits, bundle) = (VmLimits::default(), Arc::new(files));
+    let sources =
+        ScriptSources { kind: ScriptKind::Plan, main: main.to_owned(), bundle, argv: argv.to_vec(), limits };
+    let instance = sources.instance()?;
+    let options = lock(&instance.options).declared.clone();
+    let plan = instance.plan().map_err(|e| instance.vm.explain(&e))?;
+    Ok(LoadedScript { sources, plan, options, secret: None, variation_files: BTreeMap::new() })
+}
+
 /// The options that the script at `path` declares, for `--help`. If the script fails, those declared before.
 ///
 /// # Errors

@@ -1,0 +1,185 @@
+//! The scripts and calibrations that a run was made from, kept in its folder, so that its episodes can be repeated when
+//! the files have changed or are elsewhere.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs::File,
+    io::{Read, Write},
+    path::Path,
+    sync::Arc,
+};
+
+use serde::{Deserialize, Serialize};
+use softvt_common::files::{self, FileError};
+use softvt_report::run_folder::SCRIPTS;
+use softvt_script::{LoadedScript, ScriptFiles};
+use zip::{CompressionMethod, ZipArchive, ZipWriter, result::ZipError, write::SimpleFileOptions};
+
+use crate::error::RunError;
+
+/// Entry of the archive that says what the others are.
+const INDEX: &str = "index.json";
+/// Largest file of the archive, bytes.
+const MAX_BYTES: u64 = 64 << 20;
+
+/// The scripts and calibrations of a stored run.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StoredScripts {
+    /// Name of the main file.
+    main: String,
+    scripts: ScriptFiles,
+    /// Calibration files, by path below a project folder.
+    calibrations: BTreeMap<String, String>,
+}
+
+/// What the entries of the archive are.
+#[derive(Serialize, Deserialize)]
+struct Index {
+    main: String,
+    /// Entry of each script, by its name.
+    files: BTreeMap<String, String>,
+    served: BTreeMap<String, String>,
+    absent: BTreeSet<String>,
+    refused: BTreeMap<String, String>,
+    hidden: BTreeSet<String>,
+    /// Entry of each calibration file, by its path.
+    calibrations: BTreeMap<String, String>,
+}
+
+impl StoredScripts {
+    pub(crate) fn new(loaded: &LoadedScript, calibrations: BTreeMap<String, String>) -> Self {
+        let scripts = (*loaded.sources.bundle).clone();
+        Self { main: loaded.sources.main.clone(), scripts, calibrations }
+    }
+
+    /// Runs the main file with its options, and makes its plan.
+    ///
+    /// # Errors
+    /// The script fails.
+    pub(crate) fn load(&self, options: &[String]) -> Result<LoadedScript, RunError> {
+        Ok(softvt_script::load_files(&self.main, self.scripts.clone(), options)?)
+    }
+
+    /// A calibration file by its path below a project folder.
+    pub(crate) fn calibration(&self, path: &str) -> Option<&str> {
+        self.calibrations.get(path).map(String::as_str)
+    }
+
+    /// Writes the archive into a run folder, unless it is there.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub(crate) fn write(&self, folder: &Path) -> Result<(), RunError> {
+        let path = folder.join(SCRIPTS);
+        if path.exists() {
+            return Ok(());
+        }
+        let bytes = self.archive().map_err(|error| {
+            RunError::input(format!("{}: the scripts cannot be packed: {error}", path.display()))
+        })?;
+        Ok(files::replace(&path, &bytes)?)
+    }
+
+    /// The bytes of the archive, which depend on the files alone.
+    fn archive(&self) -> Result<Vec<u8>, ZipError> {
+        let mut entries: Vec<(String, &[u8])> = Vec::new();
+        let mut add = |kind: &str, (name, bytes): (&String, _)| {
+            let file = Path::new(name).file_name().map_or("file".into(), |name| name.to_string_lossy());
+            let entry = format!("{kind}/{:03}-{file}", entries.len());
+            entries.push((entry.clone(), bytes));
+            (name.clone(), entry)
+        };
+        let files =
+            self.scripts.files.iter().map(|(name, bytes)| add("scripts", (name, &bytes[..]))).collect();
+        let texts = self.calibrations.iter().map(|(name, text)| add("calibration", (name, text.as_bytes())));
+        let index = Index {
+            main: self.main.clone(),
+            calibrations: texts.collect(),
+            files,
+            served: self.scripts.served.clone(),
+            absent: self.scripts.absent.clone(),
+            refused: self.scripts.refused.clone(),
+            hidden: self.scripts.hidden.clone(),
+        };
+        let index = serde_json::to_vec_pretty(&index).map_err(std::io::Error::from)?;
+        let mut zip = ZipWriter::new(std::io::Cursor::new(Vec::new()));
+        let options = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated);
+        for (name, bytes) in std::iter::once((INDEX.to_owned(), &index[..])).chain(entries) {
+            zip.start_file(name, options)?;
+            zip.write_all(bytes)?;
+        }
+        Ok(zip.finish()?.into_inner())
+    }
+
+    /// Reads the archive of a run folder; `None` if it has none.
+    ///
+    /// # Errors
+    /// It is damaged.
+    pub(crate) fn read(folder: &Path) -> Result<Option<Arc<Self>>, RunError> {
+        let path = folder.join(SCRIPTS);
+        if !path.is_file() {
+            return Ok(None);
+        }
+        let file = File::open(&path).map_err(FileError::io("read", &path))?;
+        let read = || -> Result<Self, ZipError> {
+            let mut archive = ZipArchive::new(file)?;
+            let mut entry = |name: &str| -> Result<Vec<u8>, ZipError> {
+                let mut bytes = Vec::new();
+                archive.by_name(name)?.take(MAX_BYTES).read_to_end(&mut bytes)?;
+                Ok(bytes)
+            };
+            let index: Index = serde_json::from_slice(&entry(INDEX)?).map_err(std::io::Error::from)?;
+            let mut scripts = ScriptFiles {
+                served: index.served,
+                absent: index.absent,
+                refused: index.refused,
+                hidden: index.hidden,
+                ..ScriptFiles::default()
+            };
+            for (name, of) in index.files {
+                scripts.files.insert(name, entry(&of)?.into());
+            }
+            let mut calibrations = BTreeMap::new();
+            for (name, of) in index.calibrations {
+                let text = String::from_utf8(entry(&of)?).map_err(std::io::Error::other)?;
+                calibrations.insert(name, text);
+            }
+            Ok(Self { main: index.main, scripts, calibrations })
+        };
+        let stored = read().map_err(|error| {
+            let message = format!("{}: {error}; the archive is damaged, and without it", path.display());
+            RunError::input(format!("{message} the scripts on the disk are used: remove it to do so"))
+        })?;
+        Ok(Some(Arc::new(stored)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_archive_comes_back_and_has_the_same_bytes_each_time() {
+        let text = |text: &str| Arc::<[u8]>::from(text.as_bytes());
+        let scripts = ScriptFiles {
+            files: [
+                ("/home/me/a.lua".to_owned(), text("return 1")),
+                ("b/a.lua".to_owned(), text("return 2")),
+            ]
+            .into(),
+            served: [("b.a".to_owned(), "b/a.lua".to_owned())].into(),
+            absent: ["mesh.obj".to_owned()].into(),
+            ..ScriptFiles::default()
+        };
+        let calibrations = [("assets/calibration/bun.json".to_owned(), "{}".to_owned())].into();
+        let stored = StoredScripts { main: "/home/me/a.lua".to_owned(), scripts, calibrations };
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(StoredScripts::read(folder.path()).unwrap(), None);
+        stored.write(folder.path()).unwrap();
+        assert_eq!(*StoredScripts::read(folder.path()).unwrap().unwrap(), stored);
+        assert_eq!(stored.archive().unwrap(), stored.archive().unwrap());
+        std::fs::write(folder.path().join(SCRIPTS), "no archive").unwrap();
+        let error = StoredScripts::read(folder.path()).unwrap_err().to_string();
+        assert!(error.contains("scripts.zip") && error.contains("damaged"), "{error}");
+    }
+}
