@@ -79,7 +79,7 @@ for level, name in ipairs { "bottom_drawer", "middle_drawer", "top_drawer" } do
     shape = shape,
     density = 550,
     joint = softvt.slider { axis = { 0, -1, 0 }, lower = 0, upper = 0.15, damping = 6, friction = 1.2 },
-    hints = { handle_height_m = handle * mm, handle_out_m = (15.5 - FRONT + OVERLAY) * mm },
+    hints = { handle_height_m = handle * mm, handle_out_m = (15.5 - FRONT + OVERLAY) * mm, handle_width_m = 9 * mm },
     visuals = { front_wood(level), birch, brass },
   }
 end
