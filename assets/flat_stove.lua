@@ -89,6 +89,7 @@ return softvt.asset {
           damping = 2e-3,
           friction = 8e-3,
         },
+        hints = { grip_width_m = 8 * mm, grip_length_m = 38 * mm, grip_depth_m = GRIP - KNOB - 1 * mm },
         visuals = {
           { albedo = { 0.055, 0.057, 0.06 }, roughness = 0.42 },
           { albedo = { 0.82, 0.80, 0.74 }, roughness = 0.5 },

@@ -41,7 +41,7 @@ end
 -- Hands in front of the bar, closing across it.
 local function hands(bar, out)
   local list = {}
-  for _, sign in ipairs { -1, 1 } do
+  for _, sign in ipairs { 1, -1 } do
     list[#list + 1] = function(distance, height)
       local at = frames.add(frames.add(bar, out, distance), UP, height or 0)
       return frames.hand(at, frames.scaled(out, -1), { 0, 0, sign })

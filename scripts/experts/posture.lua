@@ -1,6 +1,9 @@
 -- Changes between a hand that points down and a hand in another orientation.
 local posture = {}
 
+-- Time after which the arm has arrived, s, and the largest distance from a pose where it has, m.
+local SETTLE, ARRIVED = 0.2, 0.01
+
 -- Height at which the hand is turned, m, and how fast, rad/s.
 local TURN_HEIGHT, TURN_SPEED = 0.33, 1
 -- Squeeze of a rigid part: the target width is below its width by this much, m.
@@ -12,10 +15,16 @@ function posture.rise(arm, height)
   arm:move_to(at:at { at.x, at.y, math.max(at.z, height) }, { speed = 0.4 })
 end
 
--- Moves to the first pose of a list that the arm reaches, and returns its index; nil if it reaches none.
+-- Moves to the first pose of a list at which the arm arrives, and returns its index; nil if it arrives at none. A pose can
+-- have joint angles that cannot be reached from the present ones.
 function posture.first(arm, poses, options)
+  local start = arm.target
   for k, pose in ipairs(poses) do
-    if pcall(arm.move_to, arm, pose, options) then return k end
+    if pcall(arm.move_to, arm, pose, options) then
+      arm:wait(SETTLE)
+      if arm.pose:distance(pose) < ARRIVED then return k end
+    end
+    pcall(arm.move_to, arm, start, options)
   end
 end
 

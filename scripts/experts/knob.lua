@@ -1,0 +1,154 @@
+-- Turns a knob with a horizontal axis to an angle.
+--
+--   expert = knob { joint = "stove.knob", angle = 0.9 }
+--
+-- The fingers grasp the grip of the knob from above and in front, across its faces or its ends, and turn it about its
+-- axis as far as the hand keeps clear of the table and of other objects. They then grasp it anew until the joint is at `angle`
+-- (rad, to 0.06). `speed` (0.6 rad/s) is that of the knob. The part's hints `grip_width_m`, `grip_length_m` and `grip_depth_m`
+-- are the sizes of the grip across, along and in front of the knob; at a joint of 0 it is upright.
+local frames = require "experts.frames"
+local mechanism = require "experts.mechanism"
+local posture = require "experts.posture"
+
+local FIELDS = { joint = "string", angle = "number", speed = "number?" }
+local SPEED, TOLERANCE, STROKES = 0.6, 0.06, 8
+-- Angles of the hand below the horizontal to try, rad. Below 75° the palm stays in front of the object.
+local TILTS = { math.rad(70), math.rad(60), math.rad(50), math.rad(75) }
+-- Distances of the tool from the middle of the grip, back along the fingers and out along the axis, to try, m.
+local BACK, OUT = { 0.026, 0.022, 0.018, 0.010, 0.003 }, { 0, 0.003, 0.006, 0.009, 0.012 }
+-- Free space on each side of the grip during the approach, clearance to leave around the hand, and distance from which
+-- the fingers approach, m.
+local GRIP_CLEARANCE, CLEARANCE, APPROACH = 0.004, 0.001, 0.08
+-- Step of the turn whose clearance is checked, the least and the largest turn of a stroke, rad.
+local CHECK_STEP, LEAST_STROKE, LARGEST_STROKE = math.rad(5), math.rad(8), math.rad(120)
+
+local UP = { 0, 0, 1 }
+
+-- Minimum-jerk time scaling on [0, 1], and its largest slope.
+local function smooth(u) return u * u * u * (10 + u * (6 * u - 15)) end
+local PEAK = 1.875
+
+-- The knob: its part, axis, middle of the grip, and sizes of the grip.
+local function knob_of(arm, scene, joint)
+  local object, part = mechanism.find(arm, scene, joint)
+  local axis, hints = mechanism.axis(object, part), part.hints
+  if not (hints.grip_width_m and hints.grip_length_m and hints.grip_depth_m) then
+    arm:give_up(joint .. " has no hints grip_width_m, grip_length_m and grip_depth_m")
+  end
+  if math.abs(axis[3]) > 0.1 then arm:give_up(joint .. " has an axis that is not horizontal") end
+  local middle = frames.add(part.centre, axis, (mechanism.extent(part, object.yaw, axis) - hints.grip_depth_m) / 2)
+  return { object = object, part = part, axis = axis, middle = middle }
+end
+
+-- A hand at the grip, turned about the axis by `angle` from where it closes horizontally.
+local function hand(knob, grip, angle, away)
+  local forward = frames.add(frames.scaled(knob.axis, -math.cos(grip.tilt)), UP, -math.sin(grip.tilt))
+  local across = frames.scaled(frames.cross(UP, knob.axis), grip.sign)
+  local offset = frames.add(frames.scaled(forward, -grip.back - (away or 0)), knob.axis, grip.out)
+  local function turned(v) return frames.rotated(v, knob.axis, angle) end
+  return frames.hand(frames.add(knob.middle, turned(offset)), turned(forward), turned(across))
+end
+
+-- How far a grip can turn towards `wanted` (rad, signed) while the hand keeps clear of the other objects.
+local function reach_of(scene, knob, grip, angle, wanted)
+  local sign, turn = wanted < 0 and -1 or 1, 0
+  while turn < math.abs(wanted) do
+    local next_turn = math.min(turn + CHECK_STEP, math.abs(wanted))
+    local pose = hand(knob, grip, angle + sign * next_turn)
+    if scene:clearance(pose, { width = grip.width, ignore = { knob.object.name } }) < CLEARANCE then break end
+    turn = next_turn
+  end
+  return sign * turn
+end
+
+-- Grips of the knob that keep clear of everything when grasped, best first: { tilt, back, out, width, angle, turn }.
+local function grips(scene, knob, wanted)
+  local list, hints = {}, knob.part.hints
+  -- Across the faces the hand closes horizontally at a joint of 0; across the ends a quarter turn from there.
+  for _, faces in ipairs { { hints.grip_width_m, 0 }, { hints.grip_length_m, math.pi / 2 } } do
+    local angle = (knob.part.joint + faces[2] + math.pi / 2) % math.pi - math.pi / 2
+    for _, tilt in ipairs(TILTS) do
+      for _, back in ipairs(BACK) do
+        for _, out in ipairs(OUT) do
+          local grip = { tilt = tilt, back = back, out = out, width = faces[1], angle = angle, sign = 1 }
+          local open = { width = math.min(0.08, grip.width + 2 * GRIP_CLEARANCE) }
+          if scene:clearance(hand(knob, grip, angle), open) >= CLEARANCE then
+            grip.turn = reach_of(scene, knob, grip, angle, wanted)
+            if math.abs(grip.turn) >= math.min(LEAST_STROKE, math.abs(wanted)) then list[#list + 1] = grip end
+            break
+          end
+        end
+      end
+    end
+  end
+  table.sort(list, function(a, b) return math.abs(a.turn) > math.abs(b.turn) end)
+  return list
+end
+
+-- Moves to the approach of the first grip that the arm reaches, and returns it; nil if it reaches none.
+local function approach(arm, knob, list)
+  local poses, chosen = {}, {}
+  for _, grip in ipairs(list) do
+    for _, sign in ipairs { 1, -1 } do
+      if #poses < 6 then
+        local signed = {}
+        for key, value in pairs(grip) do
+          signed[key] = value
+        end
+        signed.sign = sign
+        chosen[#chosen + 1], poses[#poses + 1] = signed, hand(knob, signed, grip.angle, APPROACH)
+      end
+    end
+  end
+  local closure = list[1] and 1 - (list[1].width + 2 * GRIP_CLEARANCE) / arm.stroke
+  return chosen[posture.first(arm, poses, { speed = 0.4, angular_speed = 1, closure = closure }) or 0]
+end
+
+-- Turns the grasped knob by an angle, rad.
+local function turn(arm, knob, grip, by, speed)
+  local steps = math.max(1, math.ceil(PEAK * math.abs(by) / speed / arm.dt))
+  for step = 1, steps do
+    arm:command(hand(knob, grip, grip.angle + by * smooth(step / steps)), arm.closure)
+  end
+  arm:wait(0.2)
+end
+
+local function stroke(arm, scene, spec)
+  local knob = knob_of(arm, scene, spec.joint)
+  local wanted = spec.angle - knob.part.joint
+  wanted = math.max(-LARGEST_STROKE, math.min(LARGEST_STROKE, wanted))
+  local grip = approach(arm, knob, grips(scene, knob, wanted))
+  if not grip then
+    arm:give_up(
+      ("%s is at %.2f rad and no grasp turns it further towards %.2f rad"):format(
+        spec.joint,
+        knob.part.joint,
+        spec.angle
+      )
+    )
+  end
+  arm:close_to(1 - (grip.width + 2 * GRIP_CLEARANCE) / arm.stroke)
+  arm:move_to(hand(knob, grip, grip.angle), { speed = 0.15 })
+  posture.clamp(arm, grip.width)
+  turn(arm, knob, grip, grip.turn, spec.speed)
+  arm:release { closure = 1 - (grip.width + 2 * GRIP_CLEARANCE) / arm.stroke }
+  arm:move_to(hand(knob, grip, grip.angle + grip.turn, APPROACH), { speed = 0.25 })
+end
+
+return function(spec)
+  softvt.check_fields("knob", spec, FIELDS)
+  local full = { joint = spec.joint, angle = spec.angle, speed = spec.speed or SPEED }
+  if full.speed <= 0 then error(("knob: speed: expected rad/s above 0, got %g"):format(full.speed), 2) end
+  return function(arm, scene)
+    posture.rise(arm, 0.25)
+    for _ = 1, STROKES do
+      if math.abs(knob_of(arm, scene, full.joint).part.joint - full.angle) <= TOLERANCE then break end
+      stroke(arm, scene, full)
+    end
+    posture.down(arm)
+    local at = knob_of(arm, scene, full.joint).part.joint
+    if math.abs(at - full.angle) > TOLERANCE then
+      arm:give_up(("%s ends at %.2f rad after %d strokes"):format(full.joint, at, STROKES))
+    end
+  end
+end
