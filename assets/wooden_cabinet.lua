@@ -29,7 +29,8 @@ for level = 0, 3 do
   if level < 3 then body = body:union(block(-half + PANEL, half - PANEL, FRONT, BACK - PANEL, z, z + PANEL)) end
 end
 
--- The closed drawer of a level (0 is the lowest).
+-- The closed drawer of a level (0 is the lowest), the height of its handle, and how far its floor lies above its lowest
+-- point, mm.
 local function drawer(level)
   local z = level * bay + PANEL + PLAY
   local side, back, rim = half - PANEL - PLAY - 0.25, BACK - PANEL - PLAY, z + WALL + 40
@@ -48,7 +49,8 @@ local function drawer(level)
   local posts = block(-36, -29, out - 15.5, out, middle - 3.5, middle + 3.5):union(
     block(29, 36, out - 15.5, out, middle - 3.5, middle + 3.5)
   )
-  return front:union(box:paint { material = 1 }):union(bar:union(posts):paint { material = 2 }), middle
+  local shape = front:union(box:paint { material = 1 }):union(bar:union(posts):paint { material = 2 })
+  return shape, middle, z + WALL - low
 end
 
 local birch = material.wood {
@@ -73,13 +75,18 @@ end
 
 local parts = {}
 for level, name in ipairs { "bottom_drawer", "middle_drawer", "top_drawer" } do
-  local shape, handle = drawer(level - 1)
+  local shape, handle, bottom = drawer(level - 1)
   parts[level] = {
     name = name,
     shape = shape,
     density = 550,
     joint = softvt.slider { axis = { 0, -1, 0 }, lower = 0, upper = 0.15, damping = 6, friction = 1.2 },
-    hints = { handle_height_m = handle * mm, handle_out_m = (15.5 - FRONT + OVERLAY) * mm, handle_width_m = 9 * mm },
+    hints = {
+      handle_height_m = handle * mm,
+      handle_out_m = (15.5 - FRONT + OVERLAY) * mm,
+      handle_width_m = 9 * mm,
+      surface_m = bottom * mm,
+    },
     visuals = { front_wood(level), birch, brass },
   }
 end

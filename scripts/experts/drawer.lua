@@ -10,6 +10,7 @@
 local frames = require "experts.frames"
 local grasp = require "experts.grasp"
 local mechanism = require "experts.mechanism"
+local places = require "experts.places"
 local posture = require "experts.posture"
 
 local FIELDS = { joint = "string", share = "number?", close = "boolean?", speed = "number?" }
@@ -34,7 +35,7 @@ local function handle(arm, scene, spec)
   local out = mechanism.axis(object, part)
   local height, width = part.hints.handle_height_m, part.hints.handle_width_m
   if not (height and width) then arm:give_up(spec.joint .. " has no hints handle_height_m and handle_width_m") end
-  local front = frames.add(part.centre, out, mechanism.extent(part, object.yaw, out) / 2 - width / 2)
+  local front = frames.add(part.centre, out, places.half_extent(part, out) - width / 2)
   return { front[1], front[2], grasp.bottom(object) + height }, out, width / 2, part
 end
 

@@ -8,6 +8,7 @@
 -- are the sizes of the grip across, along and in front of the knob; at a joint of 0 it is upright.
 local frames = require "experts.frames"
 local mechanism = require "experts.mechanism"
+local places = require "experts.places"
 local posture = require "experts.posture"
 
 local FIELDS = { joint = "string", angle = "number", speed = "number?" }
@@ -36,7 +37,7 @@ local function knob_of(arm, scene, joint)
     arm:give_up(joint .. " has no hints grip_width_m, grip_length_m and grip_depth_m")
   end
   if math.abs(axis[3]) > 0.1 then arm:give_up(joint .. " has an axis that is not horizontal") end
-  local middle = frames.add(part.centre, axis, (mechanism.extent(part, object.yaw, axis) - hints.grip_depth_m) / 2)
+  local middle = frames.add(part.centre, axis, places.half_extent(part, axis) - hints.grip_depth_m / 2)
   return { object = object, part = part, axis = axis, middle = middle }
 end
 

@@ -25,11 +25,4 @@ function mechanism.value(part, share)
   return range[1] + share * (range[2] - range[1])
 end
 
--- Extent of a part along a horizontal direction at rest, m.
-function mechanism.extent(part, yaw, direction)
-  local c, s = math.cos(yaw), math.sin(yaw)
-  local x, y = c * direction[1] + s * direction[2], c * direction[2] - s * direction[1]
-  return math.abs(x) * part.size[1] + math.abs(y) * part.size[2]
-end
-
 return mechanism

@@ -5,8 +5,11 @@
 -- The grip is drawn uniformly from a part of the safe window (`window`, 0.8 of it, around `share`, its middle), so that
 -- demonstrations do not tell one width per object. The hand closes slowly from before first contact (`closing_speed`,
 -- 0.008 m/s). `stop = "touch"` ends closing by the force on the pads instead of the width of the gels, as does a grasp
--- that is turned or off-centre for want of clearance. `closure` commands one closure instead.
+-- that is turned or off-centre for want of clearance. `closure` commands one closure instead. `to` places the object beside
+-- the target, on the same support: "near", or as seen from the robot "left_of", "right_of", "in_front_of" or "behind", with
+-- `distance` (m) between the centres.
 local grasp = require "experts.grasp"
+local places = require "experts.places"
 local route = require "experts.route"
 local blind_grips = require "experts.blind_grips"
 
@@ -19,12 +22,16 @@ local FIELDS = {
   share = "number?",
   stop = "string?",
   closing_speed = "number?",
+  to = "string?",
+  distance = "number?",
 }
 -- Default part of the safe window and its middle (0 is the loose end, 1 the tight one), and speed of closing in
 -- contact, m/s.
 local WINDOW, MIDDLE, CLOSING_SPEED = 0.8, 0.5, 0.008
 -- Clearance above obstacles while carrying, above the target at release, and around the fingers, m.
 local CARRY_CLEARANCE, RELEASE_HEIGHT, FINGER_CLEARANCE = 0.025, 0.001, 0.002
+-- Size from which an object is the support of the scene, m.
+local SUPPORT = 0.5
 -- Fraction of a lift that a held object must follow.
 local MIN_LIFT_FRACTION = 0.5
 -- Grasp attempts, and the largest displacement of the object before an attempt, m.
@@ -85,10 +92,31 @@ local function place_rotations(object, target)
   return list
 end
 
+-- Height of the highest surface of other objects at a point of the target, m; 0 without one.
+local function surface_at(scene, point, spec)
+  local top, own = 0, spec.target:match "^[^.]+"
+  for _, object in ipairs(scene:objects()) do
+    local c, s = math.cos(object.yaw), math.sin(object.yaw)
+    local dx, dy = point[1] - object.centre[1], point[2] - object.centre[2]
+    local along, across = math.abs(c * dx + s * dy), math.abs(c * dy - s * dx)
+    local covers = 2 * along < object.size[1] and 2 * across < object.size[2]
+    if covers and object.name ~= spec.object and object.name ~= own and object.size[1] < SUPPORT then
+      top = math.max(top, grasp.bottom(object) + (object.hints.surface_m or object.size[3]))
+    end
+  end
+  return top
+end
+
 -- The release pose: the object above the centre of the target, as low as the clearance of the hand allows.
 local function release_pose(arm, scene, spec, held)
-  local object, target = scene:object(spec.object), scene:object(spec.target)
-  local surface = grasp.bottom(target) + (target.hints.surface_m or target.size[3]) + held.height + RELEASE_HEIGHT
+  local object, target = scene:object(spec.object), places.state(scene, spec.target)
+  local centre, rise = target.centre, target.hints.surface_m or target.size[3]
+  if spec.to then
+    local beside, problem = places.beside(scene, spec)
+    if not beside then arm:give_up(problem) end
+    centre, rise = beside, 0
+  end
+  local surface = math.max(grasp.bottom(target) + rise, surface_at(scene, centre, spec)) + held.height + RELEASE_HEIGHT
   local width = arm.stroke * (1 - grasp.clear_closure(object, nil, held.width))
   -- The object's offset from the tool rotates with the hand.
   local dx, dy = object.centre[1] - arm.pose.x, object.centre[2] - arm.pose.y
@@ -96,7 +124,7 @@ local function release_pose(arm, scene, spec, held)
   for up = 0, 20 do
     for _, turn in ipairs(rotations) do
       local c, s = math.cos(turn), math.sin(turn)
-      local x, y = target.centre[1] - (c * dx - s * dy), target.centre[2] - (s * dx + c * dy)
+      local x, y = centre[1] - (c * dx - s * dy), centre[2] - (s * dx + c * dy)
       local pose = arm.target:rotated(turn):at { x, y, surface + 0.005 * up }
       local clearance = scene:clearance(pose, { width = width, ignore = { spec.object } })
       if not best or clearance > best.clearance then best = { pose = pose, clearance = clearance } end
@@ -143,6 +171,7 @@ local function complete(spec)
     refuse("share", ("a share in %g..%g, so that the part is within the window"):format(room, 1 - room))
   end
   if full.stop ~= "width" and full.stop ~= "touch" then refuse("stop", '"width" or "touch"') end
+  if full.to then places.check("pick_place", full) end
   if full.closing_speed <= 0 or full.closing_speed > 0.2 then refuse("closing_speed", "m/s in 0..0.2, above 0") end
   return full
 end
