@@ -160,9 +160,9 @@ local tasks = {
     budget_steps = 1300,
   },
   {
-    prompt = "close the top drawer of the cabinet and put the golden bun on top of the cabinet",
+    prompt = "close the top drawer of the cabinet and put the sesame bun on top of the cabinet",
     layout = layouts.cabinet("top", 0.12, {
-      { "bun", "golden_bun", -200, 100 },
+      { "bun", "sesame_bun", -200, 100 },
       { "plate", "plate", 60, 210 },
       { "roll", "small_ridged_roll", -90, 230 },
     }),
@@ -195,11 +195,11 @@ local tasks = {
     budget_steps = 900,
   },
   {
-    prompt = "push the ramekin next to the plate and put the bun on the plate",
+    prompt = "push the ramekin next to the plate and put the steamed bun on the plate",
     layout = layouts.cabinet("ramekin", 0, {
       { "plate", "plate", 90, 170 },
       { "ramekin", "ramekin", -190, 40 },
-      { "bun", "golden_bun", -120, 260 },
+      { "bun", "steamed_bun", -120, 260 },
     }),
     goal = goals.all {
       goals.near { object = "ramekin", target = "plate", distance = 0.15 },
@@ -212,31 +212,31 @@ local tasks = {
     budget_steps = 900,
   },
   {
-    prompt = "put the bun to the left of the plate as the robot sees it, then put the roll on the plate",
+    prompt = "put the golden bun to the left of the plate, as the robot sees it, then the croissant on the plate",
     layout = layouts.cabinet("left", 0, {
       { "plate", "plate", 60, 120 },
       { "bun", "golden_bun", -160, -20 },
-      { "roll", "small_ridged_roll", -170, 170 },
+      { "croissant", "croissant", -170, 170 },
     }),
     goal = goals.sequence {
       goals.left_of { object = "bun", target = "plate" },
       goals.all {
         goals.left_of { object = "bun", target = "plate" },
-        goals.on { object = "roll", target = "plate" },
+        goals.on { object = "croissant", target = "plate" },
       },
     },
     expert = sequence {
       pick_place { object = "bun", target = "plate", to = "left_of", distance = 0.14 },
-      pick_place { object = "roll", target = "plate" },
+      pick_place { object = "croissant", target = "plate" },
     },
     budget_steps = 900,
   },
   {
     never = "butter",
-    prompt = "put the ridged roll on the plate and turn the stove on",
+    prompt = "put the spiral roll on the plate and turn the stove on",
     layout = layouts.stove("on", 0, {
       { "plate", "plate", 80, 180 },
-      { "roll", "small_ridged_roll", 60, -100 },
+      { "roll", "spiral_roll", 60, -100 },
       { "butter", "butter", -120, 230 },
     }),
     goal = goals.all {
@@ -282,41 +282,41 @@ local tasks = {
   },
   {
     never = "roll",
-    prompt = "clear the plate: put the bun that lies on it into the basket, and turn the stove off",
+    prompt = "clear the plate: put the loaf that lies on it into the basket, and turn the stove off",
     layout = layouts.stove("clear", 0.62, {
       { "basket", "basket", 60, 230 },
       { "plate", "plate", 60, -60 },
-      { "bun", "golden_bun", 0, 0, on = "plate" },
+      { "loaf", "oval_loaf", 0, 0, on = "plate" },
       { "roll", "small_ridged_roll", -130, 60 },
     }),
     goal = goals.all {
-      goals.none { goals.on { object = "bun", target = "plate" }, goals.on { object = "roll", target = "plate" } },
-      goals.inside { object = "bun", target = "basket" },
+      goals.none { goals.on { object = "loaf", target = "plate" }, goals.on { object = "roll", target = "plate" } },
+      goals.inside { object = "loaf", target = "basket" },
       goals.turned { joint = "stove.knob", range = { -0.01, 0.15 } },
     },
     expert = sequence {
-      pick_place { object = "bun", target = "basket" },
+      pick_place { object = "loaf", target = "basket" },
       knob { joint = "stove.knob", angle = 0.04 },
     },
     budget_steps = 1000,
   },
   {
-    prompt = "push the cookies behind the plate, and put the capsule on the plate or on the cookies",
+    prompt = "push the cookies behind the plate, and put the cylinder on the plate or on the cookies",
     layout = layouts.stove("behind", 0, {
       { "plate", "plate", -60, 150 },
       { "cookies", "cookies", 50, 0 },
-      { "capsule", "capsule", -180, 20 },
+      { "cylinder", "cylinder", -180, 20 },
     }),
     goal = goals.all {
       goals.behind { object = "cookies", target = "plate" },
       goals.any {
-        goals.on { object = "capsule", target = "plate" },
-        goals.on { object = "capsule", target = "cookies" },
+        goals.on { object = "cylinder", target = "plate" },
+        goals.on { object = "cylinder", target = "cookies" },
       },
     },
     expert = sequence {
       push { object = "cookies", target = "plate", to = "behind" },
-      pick_place { object = "capsule", target = "plate" },
+      pick_place { object = "cylinder", target = "plate" },
     },
     budget_steps = 900,
   },

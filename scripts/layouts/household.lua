@@ -13,7 +13,7 @@ local ON_TOP = math.rad(10)
 local CLEARANCE = 12 * mm
 
 -- The cabinet's drawers open towards the middle of the table, and the stove's knob faces it.
-local CABINET = { name = "cabinet", asset = cabinet, at = { 80 * mm, -310 * mm }, yaw = math.rad(-150) }
+local CABINET = { name = "cabinet", asset = cabinet, at = { 50 * mm, -300 * mm }, yaw = math.rad(-150) }
 local STOVE = { name = "stove", asset = stove, at = { -300 * mm, -270 * mm }, yaw = math.rad(135) }
 
 local layouts = {}
