@@ -3,10 +3,11 @@
 --   expert = drawer { joint = "cabinet.top_drawer", share = 0.8 }
 --   expert = drawer { joint = "cabinet.top_drawer", close = true }
 --
--- The fingers grasp the bar of the handle from in front, one above and one below it, and pull along the joint until it is
--- open by `share` (0.85) of its range. `close` pushes the handle with the side of the closed fingers until at most `share`
--- (0.02) is open. `speed` (0.1 m/s) is that of the drawer. The part's hints `handle_height_m`, above the object's lowest point,
--- and `handle_width_m`, the thickness of the bar, describe the handle; it is in the middle of the front and stands out most.
+-- The fingers grasp the bar of the handle from in front, one above and one below it, and pull along the joint until it
+-- is open by `share` (0.85) of its range. `close` pushes the handle with the side of the closed fingers until at most
+-- `share` (0.02) is open. `speed` (0.1 m/s) is that of the drawer. The part's hints `handle_height_m`, above the
+-- object's lowest point, and `handle_width_m`, the thickness of the bar, describe the handle; it is in the middle of
+-- the front and stands out most.
 local frames = require "experts.frames"
 local grasp = require "experts.grasp"
 local mechanism = require "experts.mechanism"

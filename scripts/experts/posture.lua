@@ -3,7 +3,6 @@ local posture = {}
 
 -- Time after which the arm has arrived, s, and the largest distance from a pose where it has, m.
 local SETTLE, ARRIVED = 0.2, 0.01
-
 -- Height at which the hand is turned, m, and how fast, rad/s.
 local TURN_HEIGHT, TURN_SPEED = 0.33, 1
 -- Squeeze of a rigid part: the target width is below its width by this much, m.
@@ -15,8 +14,8 @@ function posture.rise(arm, height)
   arm:move_to(at:at { at.x, at.y, math.max(at.z, height) }, { speed = 0.4 })
 end
 
--- Moves to the first pose of a list at which the arm arrives, and returns its index; nil if it arrives at none. A pose can
--- have joint angles that cannot be reached from the present ones.
+-- Moves to the first pose of a list at which the arm arrives, and returns its index; nil if it arrives at none. A pose
+-- can have joint angles that cannot be reached from the present ones.
 function posture.first(arm, poses, options)
   local start = arm.target
   for k, pose in ipairs(poses) do
@@ -34,12 +33,14 @@ function posture.down(arm)
   arm:move_to(softvt.pose { position = arm.target.position }, { speed = 0.4, angular_speed = TURN_SPEED })
 end
 
--- Closes firmly on something rigid of a width (m). A tactile servo, which lifts what it grasps, is left out.
+-- Closes firmly on something rigid of a width (m), or the empty hand for a width of 0. A tactile servo lifts what it
+-- grasps, so the hand then closes without it.
 function posture.clamp(arm, width)
   local closure = math.min(1, 1 - (width - SQUEEZE) / arm.stroke)
   if arm.feels then
     arm:close_to(closure)
   else
+    -- A controller of the grip is for what is carried: reading its name tells that this grasp is not meant for it.
     local _ = arm.grip_controller
     arm:grasp(closure)
   end

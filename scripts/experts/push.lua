@@ -2,9 +2,10 @@
 --
 --   expert = push { object = "ramekin", target = "plate", to = "near", distance = 0.13 }
 --
--- `to` is "near" or a direction as seen from the robot: "left_of", "right_of", "in_front_of" or "behind". `distance` (m) is
--- that between the centres, by default with 15 mm of space between the two. Both fingers, half open, push from behind, so
--- that the object cannot slip off to a side, at `speed` (0.05 m/s), until its centre is within 10 mm of the place.
+-- `to` is "near" or a direction as seen from the robot: "left_of", "right_of", "in_front_of" or "behind". `distance`
+-- (m) is that between the centres, by default with 15 mm of space between the two. The side of the closed fingers
+-- pushes from behind at `speed` (0.05 m/s), until the centre of the object is within 10 mm of the place. Friction keeps
+-- the object at the fingers; one that rolls away is pushed again, up to three times.
 local frames = require "experts.frames"
 local grasp = require "experts.grasp"
 local hand = require "experts.hand"
@@ -17,8 +18,8 @@ local SPEED = 0.05
 -- Distance of the fingers from the object before the push, height of the sensor cases above the support, clearance to
 -- leave around the hand, and accepted distance from the place, m.
 local STANDOFF, UNDER, CLEARANCE, TOLERANCE = 0.02, 0.003, 0.002, 0.01
--- Half thickness of a finger along the hand's x axis, m, and distance of the gels as a share of the object's width.
-local FINGER, SPREAD = 0.014, 0.5
+-- Half thickness of a finger along the hand's x axis, m.
+local FINGER = 0.014
 -- Distance from the place at which a push ends, m.
 local ARRIVED = 0.002
 -- Distance of the retreat, m, and attempts.
@@ -47,7 +48,7 @@ local function follow(arm, scene, spec, place, along)
     if frames.dot(left, along) <= 0 or length(left) < ARRIVED then return end
     -- The hand slows down over the last centimetre.
     local speed = spec.speed * math.min(1, 0.2 + length(left) / 0.01)
-    -- The object moves with the hand, which holds it between the tips: the hand moves as the object has to.
+    -- The object sticks to the fingers: the hand moves as the object has to.
     arm:command(arm.target:translated(frames.scaled(frames.unit(left), speed * arm.dt)), arm.closure)
   end
 end
@@ -55,21 +56,21 @@ end
 local function attempt(arm, scene, spec, place)
   local object = scene:object(spec.object)
   local along = frames.unit(between(object.centre, place))
-  local across = { -along[2], along[1], 0 }
-  local gap = math.min(0.07, 2 * SPREAD * places.half_extent(object, across))
   local start = start_pose(object, along)
-  local clearance, nearest = scene:clearance(start, { width = gap })
+  local clearance, nearest = scene:clearance(start, { width = 0 })
   if clearance < CLEARANCE then
     arm:give_up(("%s leaves no room for the hand behind %s: %.0f mm"):format(nearest, spec.object, 1e3 * clearance))
   end
   local over = route.approach_height(scene, arm.pose.position, start, 0.08, 0.01)
   arm:move_to(arm.target:at { arm.target.x, arm.target.y, math.max(over, arm.target.z) }, { speed = 0.4 })
-  arm:move_to(start:at { start.x, start.y, over }, { speed = 0.4, closure = 1 - gap / arm.stroke })
+  arm:move_to(start:at { start.x, start.y, over }, { speed = 0.4 })
+  posture.clamp(arm, 0)
   arm:move_to(start, { speed = 0.25 })
   follow(arm, scene, spec, place, along)
   arm:wait(0.2)
   arm:move_by(frames.scaled(along, -RETREAT), { speed = 0.2 })
   posture.rise(arm, math.max(over, arm.target.z + 0.1))
+  arm:release { closure = 0.5, rate = 1 }
 end
 
 return function(spec)
