@@ -56,19 +56,18 @@ end
 local function hold(arm, scene, spec)
   local bar, out, radius = handle(arm, scene, spec)
   local opening = 2 * (radius + BAR_CLEARANCE)
-  local candidates, above = hands(bar, out), {}
-  local clearance = scene:clearance(candidates[1](TIP), { width = opening })
-  if clearance < CLEARANCE then
-    return nil, ("leaves the hand in front of its handle %.0f mm of clearance"):format(1e3 * clearance)
-  end
-  for k, hand in ipairs(candidates) do
-    above[k] = hand(APPROACH, ABOVE)
+  local paths = {}
+  for _, hand in ipairs(hands(bar, out)) do
+    local clearance = scene:clearance(hand(TIP), { width = opening })
+    if clearance < CLEARANCE then
+      return nil, ("leaves the hand in front of its handle %.0f mm of clearance"):format(1e3 * clearance)
+    end
+    paths[#paths + 1] = { hand(APPROACH, ABOVE), hand(APPROACH), hand(TIP) }
   end
   posture.rise(arm, bar[3] + ABOVE)
-  local chosen = posture.first(arm, above, { speed = 0.4, angular_speed = 1, closure = 1 - opening / arm.stroke })
-  if not chosen then return nil, "is out of reach of a hand in front of it" end
-  arm:move_to(candidates[chosen](APPROACH), { speed = 0.3 })
-  arm:move_to(candidates[chosen](TIP), { speed = 0.15 })
+  if not posture.first(arm, paths, { speed = 0.4, angular_speed = 1, closure = 1 - opening / arm.stroke }) then
+    return nil, "is out of reach of a hand in front of it"
+  end
   posture.clamp(arm, 2 * radius)
   return true
 end

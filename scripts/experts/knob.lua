@@ -22,6 +22,8 @@ local BACK, OUT = { 0.026, 0.022, 0.018, 0.010, 0.003 }, { 0, 0.003, 0.006, 0.00
 local GRIP_CLEARANCE, CLEARANCE, APPROACH = 0.004, 0.001, 0.08
 -- Step of the turn whose clearance is checked, the least and the largest turn of a stroke, rad.
 local CHECK_STEP, LEAST_STROKE, LARGEST_STROKE = math.rad(5), math.rad(8), math.rad(120)
+-- Number of grips whose reach is tried.
+local MOST_GRIPS = 4
 
 local UP = { 0, 0, 1 }
 
@@ -40,6 +42,9 @@ local function knob_of(arm, scene, joint)
   local middle = frames.add(part.centre, axis, places.half_extent(part, axis) - hints.grip_depth_m / 2)
   return { object = object, part = part, axis = axis, middle = middle }
 end
+
+-- The closure at which the fingers are clear of a grip.
+local function clear_closure(arm, grip) return math.max(0, 1 - (grip.width + 2 * GRIP_CLEARANCE) / arm.stroke) end
 
 -- A hand at the grip, turned about the axis by `angle` from where it closes horizontally.
 local function hand(knob, grip, angle, away)
@@ -62,7 +67,7 @@ local function reach_of(scene, knob, grip, angle, wanted)
   return sign * turn
 end
 
--- Grips of the knob that keep clear of everything when grasped, best first: { tilt, back, out, width, angle, turn }.
+-- Grips of the knob that keep clear of everything when grasped, best first: { tilt, back, out, width, angle, sign, turn }.
 local function grips(scene, knob, wanted)
   local list, hints = {}, knob.part.hints
   -- Across the faces the hand closes horizontally at a joint of 0; across the ends a quarter turn from there.
@@ -82,27 +87,31 @@ local function grips(scene, knob, wanted)
       end
     end
   end
-  table.sort(list, function(a, b) return math.abs(a.turn) > math.abs(b.turn) end)
+  -- Among equal turns the first one tried is best.
+  for k, grip in ipairs(list) do
+    grip.order = k
+  end
+  table.sort(list, function(a, b)
+    if a.turn ~= b.turn then return math.abs(a.turn) > math.abs(b.turn) end
+    return a.order < b.order
+  end)
   return list
 end
 
--- Moves to the approach of the first grip that the arm reaches, and returns it; nil if it reaches none.
-local function approach(arm, knob, list)
-  local poses, chosen = {}, {}
-  for _, grip in ipairs(list) do
-    for _, sign in ipairs { 1, -1 } do
-      if #poses < 6 then
-        local signed = {}
-        for key, value in pairs(grip) do
-          signed[key] = value
-        end
-        signed.sign = sign
-        chosen[#chosen + 1], poses[#poses + 1] = signed, hand(knob, signed, grip.angle, APPROACH)
-      end
+-- Moves to the first grip that the arm reaches, from either side of the hand, and returns it; nil if it reaches none.
+local function reach(arm, knob, list)
+  for k = 1, math.min(#list, MOST_GRIPS) do
+    local grip, paths = list[k], {}
+    for i, sign in ipairs { 1, -1 } do
+      grip.sign = sign
+      paths[i] = { hand(knob, grip, grip.angle, APPROACH), hand(knob, grip, grip.angle) }
+    end
+    local side = posture.first(arm, paths, { speed = 0.4, angular_speed = 1, closure = clear_closure(arm, grip) })
+    if side then
+      grip.sign = side == 1 and 1 or -1
+      return grip
     end
   end
-  local closure = list[1] and 1 - (list[1].width + 2 * GRIP_CLEARANCE) / arm.stroke
-  return chosen[posture.first(arm, poses, { speed = 0.4, angular_speed = 1, closure = closure }) or 0]
 end
 
 -- Turns the grasped knob by an angle, rad.
@@ -118,21 +127,14 @@ local function stroke(arm, scene, spec)
   local knob = knob_of(arm, scene, spec.joint)
   local wanted = spec.angle - knob.part.joint
   wanted = math.max(-LARGEST_STROKE, math.min(LARGEST_STROKE, wanted))
-  local grip = approach(arm, knob, grips(scene, knob, wanted))
+  local grip = reach(arm, knob, grips(scene, knob, wanted))
   if not grip then
-    arm:give_up(
-      ("%s is at %.2f rad and no grasp turns it further towards %.2f rad"):format(
-        spec.joint,
-        knob.part.joint,
-        spec.angle
-      )
-    )
+    local at = knob.part.joint
+    arm:give_up(("%s is at %.2f rad and no grasp turns it further towards %.2f rad"):format(spec.joint, at, spec.angle))
   end
-  arm:close_to(1 - (grip.width + 2 * GRIP_CLEARANCE) / arm.stroke)
-  arm:move_to(hand(knob, grip, grip.angle), { speed = 0.15 })
   posture.clamp(arm, grip.width)
   turn(arm, knob, grip, grip.turn, spec.speed)
-  arm:release { closure = 1 - (grip.width + 2 * GRIP_CLEARANCE) / arm.stroke }
+  arm:release { closure = clear_closure(arm, grip) }
   arm:move_to(hand(knob, grip, grip.angle + grip.turn, APPROACH), { speed = 0.25 })
 end
 

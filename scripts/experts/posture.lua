@@ -5,6 +5,8 @@ local posture = {}
 local SETTLE, ARRIVED = 0.2, 0.01
 -- Height at which the hand is turned, m, and how fast, rad/s.
 local TURN_HEIGHT, TURN_SPEED = 0.33, 1
+-- Motion close to an object.
+local NEAR = { speed = 0.2, angular_speed = TURN_SPEED }
 -- Squeeze of a rigid part: the target width is below its width by this much, m.
 local SQUEEZE = 0.012
 
@@ -14,14 +16,26 @@ function posture.rise(arm, height)
   arm:move_to(at:at { at.x, at.y, math.max(at.z, height) }, { speed = 0.4 })
 end
 
--- Moves to the first pose of a list at which the arm arrives, and returns its index; nil if it arrives at none. A pose
--- can have joint angles that cannot be reached from the present ones.
-function posture.first(arm, poses, options)
+-- Moves to a pose. Returns whether the arm has arrived: a pose can be out of reach, or have joint angles that cannot be
+-- reached from the present ones.
+local function arrives(arm, pose, options)
+  if not pcall(arm.move_to, arm, pose, options) then return false end
+  arm:wait(SETTLE)
+  return arm.pose:distance(pose) < ARRIVED
+end
+
+-- Moves along the first of several paths, lists of poses, on which the arm arrives everywhere, and returns its index. It
+-- returns to the start from the others; nil if there is none. `options` are those of the motion to the first pose.
+function posture.first(arm, paths, options)
   local start = arm.target
-  for k, pose in ipairs(poses) do
-    if pcall(arm.move_to, arm, pose, options) then
-      arm:wait(SETTLE)
-      if arm.pose:distance(pose) < ARRIVED then return k end
+  for k, path in ipairs(paths) do
+    local reached = 0
+    while reached < #path and arrives(arm, path[reached + 1], reached == 0 and options or NEAR) do
+      reached = reached + 1
+    end
+    if reached == #path then return k end
+    for back = reached, 1, -1 do
+      pcall(arm.move_to, arm, path[back], NEAR)
     end
     pcall(arm.move_to, arm, start, options)
   end
