@@ -123,9 +123,10 @@ return function(spec)
     error(("drawer: share: expected a share in 0..1, got %g"):format(full.share), 2)
   end
   return function(arm, scene)
+    local home = arm.target.position
     local move = spec.close and close or open
     move(arm, scene, full)
-    posture.down(arm)
+    posture.down(arm, home)
     local _, part = mechanism.find(arm, scene, full.joint)
     local limit = mechanism.value(part, full.share + (spec.close and TOLERANCE or -TOLERANCE))
     if (spec.close and part.joint > limit) or (not spec.close and part.joint < limit) then

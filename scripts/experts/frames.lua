@@ -48,6 +48,12 @@ function frames.hand(position, forward, closing)
   return softvt.pose { position = position, quaternion = quaternion(frames.cross(closing, forward), closing, forward) }
 end
 
+-- Direction in which the fingers of a hand at a pose point.
+function frames.forward(pose)
+  local w, x, y, z = table.unpack(pose.quaternion)
+  return { 2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y) }
+end
+
 -- Angle from the x axis, wrapped to (-90°, 90°]: a hand that points down closes along the same line after half a turn.
 function frames.half_turn_yaw(direction)
   local yaw = math.atan(direction[2], direction[1])

@@ -21,7 +21,9 @@ local BACK, OUT = { 0.026, 0.022, 0.018, 0.010, 0.003 }, { 0, 0.003, 0.006, 0.00
 -- the fingers approach, m.
 local GRIP_CLEARANCE, CLEARANCE, APPROACH = 0.004, 0.001, 0.08
 -- Step of the turn whose clearance is checked, the least and the largest turn of a stroke, rad.
-local CHECK_STEP, LEAST_STROKE, LARGEST_STROKE = math.rad(5), math.rad(8), math.rad(120)
+local CHECK_STEP, LEAST_STROKE, LARGEST_STROKE = math.rad(5), math.rad(8), math.rad(90)
+-- Distance of the hand behind its command at which a turn ends, m and rad.
+local MOST_LAG = { 0.02, 0.3 }
 -- Number of grips whose reach is tried.
 local MOST_GRIPS = 4
 
@@ -114,16 +116,21 @@ local function reach(arm, knob, list)
   end
 end
 
--- Turns the grasped knob by an angle, rad.
+-- Turns the grasped knob by an angle, rad. It ends early where the arm no longer follows: at the limit of the wrist.
 local function turn(arm, knob, grip, by, speed)
   local steps = math.max(1, math.ceil(PEAK * math.abs(by) / speed / arm.dt))
   for step = 1, steps do
     arm:command(hand(knob, grip, grip.angle + by * smooth(step / steps)), arm.closure)
+    local metres, radians = arm.pose:distance(arm.target)
+    if metres > MOST_LAG[1] or radians > MOST_LAG[2] then
+      arm:command(arm.pose, arm.closure)
+      break
+    end
   end
   arm:wait(0.2)
 end
 
-local function stroke(arm, scene, spec)
+local function stroke(arm, scene, spec, home)
   local knob = knob_of(arm, scene, spec.joint)
   local wanted = spec.angle - knob.part.joint
   wanted = math.max(-LARGEST_STROKE, math.min(LARGEST_STROKE, wanted))
@@ -135,7 +142,9 @@ local function stroke(arm, scene, spec)
   posture.clamp(arm, grip.width)
   turn(arm, knob, grip, grip.turn, spec.speed)
   arm:release { closure = clear_closure(arm, grip) }
-  arm:move_to(hand(knob, grip, grip.angle + grip.turn, APPROACH), { speed = 0.25 })
+  local forward = frames.forward(arm.target)
+  arm:move_by(frames.scaled(forward, -APPROACH), { speed = 0.25 })
+  posture.down(arm, home)
 end
 
 return function(spec)
@@ -143,12 +152,12 @@ return function(spec)
   local full = { joint = spec.joint, angle = spec.angle, speed = spec.speed or SPEED }
   if full.speed <= 0 then error(("knob: speed: expected rad/s above 0, got %g"):format(full.speed), 2) end
   return function(arm, scene)
-    posture.rise(arm, 0.25)
+    local home = arm.target.position
+    posture.down(arm, home)
     for _ = 1, STROKES do
       if math.abs(knob_of(arm, scene, full.joint).part.joint - full.angle) <= TOLERANCE then break end
-      stroke(arm, scene, full)
+      stroke(arm, scene, full, home)
     end
-    posture.down(arm)
     local at = knob_of(arm, scene, full.joint).part.joint
     if math.abs(at - full.angle) > TOLERANCE then
       arm:give_up(("%s ends at %.2f rad after %d strokes"):format(full.joint, at, STROKES))

@@ -41,10 +41,18 @@ function posture.first(arm, paths, options)
   end
 end
 
--- Rises and turns the hand until it points down, closing along the y axis of the world.
-function posture.down(arm)
+-- Rises and turns the hand until it points down, closing along the y axis of the world: where it is, or on the way to the
+-- point `home`, where it has been before.
+function posture.down(arm, home)
   posture.rise(arm, TURN_HEIGHT)
-  arm:move_to(softvt.pose { position = arm.target.position }, { speed = 0.4, angular_speed = TURN_SPEED })
+  local from, paths = arm.target, {}
+  for k = 0, 3 do
+    local x, y = from.x + k / 3 * (home[1] - from.x), from.y + k / 3 * (home[2] - from.y)
+    paths[#paths + 1] = { softvt.pose { position = { x, y, from.z } } }
+  end
+  if not posture.first(arm, paths, { speed = 0.4, angular_speed = TURN_SPEED }) then
+    arm:give_up "the hand cannot be turned down again"
+  end
 end
 
 -- Closes firmly on something rigid of a width (m), or the empty hand for a width of 0. A tactile servo lifts what it
