@@ -4,6 +4,7 @@ local layouts = require "layouts.household"
 local pick_place = require "experts.pick_place"
 local push = require "experts.push"
 local sequence = require "experts.sequence"
+local shifts = require "shifts"
 
 -- BEGIN SHIM
 local goals = {}
@@ -332,4 +333,5 @@ return softvt.suite {
   needs = "nothing",
   episodes = 5,
   tasks = tasks,
+  shifts = shifts.soft,
 }

@@ -4,7 +4,7 @@
 --   expert = drawer { joint = "cabinet.top_drawer", close = true }
 --
 -- The fingers grasp the bar of the handle from in front, one above and one below it, and pull along the joint until it
--- is open by `share` (0.85) of its range. `close` pushes the handle with the side of the closed fingers until at most
+-- is open by `share` (0.85) of its range. `close` pushes the handle with the tips of the closed fingers until at most
 -- `share` (0.02) is open. `speed` (0.1 m/s) is that of the drawer. The part's hints `handle_height_m`, above the
 -- object's lowest point, and `handle_width_m`, the thickness of the bar, describe the handle; it is in the middle of
 -- the front and stands out most.
@@ -21,8 +21,13 @@ local OPEN_SHARE, CLOSED_SHARE, SPEED = 0.85, 0.02, 0.1
 local TIP, APPROACH, ABOVE = 0.005, 0.09, 0.16
 -- Free space on each side of the bar during the approach, and clearance to leave around the hand, m.
 local BAR_CLEARANCE, CLEARANCE = 0.012, 0.001
--- Half thickness of a finger along the hand's x axis, m, and how far a push goes beyond the end of the joint, m.
-local FINGER, OVERSHOOT = 0.014, 0.003
+-- Rotations of the hand about its fingers to try, rad.
+local ROLLS = { 0, math.rad(25), math.rad(-25), math.rad(45), math.rad(-45) }
+-- Angle of the fingers below the horizontal in a push, rad; half thickness of a finger along the hand's x axis and
+-- extent of its tip towards the drawer in a push, m.
+local PUSH_TILT, FINGER, FINGER_TIP = math.rad(45), 0.014, 0.021
+-- Distance from the bar before a push, and how far the push goes beyond the end, m.
+local STANDOFF, OVERSHOOT = 0.03, 0.003
 -- Sliding of the bar between the gels while it is pulled, m.
 local SLIP = 0.003
 -- Accepted error of the joint, as a share of its range, and attempts.
@@ -40,75 +45,82 @@ local function handle(arm, scene, spec)
   return { front[1], front[2], grasp.bottom(object) + height }, out, width / 2, part
 end
 
--- Hands in front of the bar, closing across it.
-local function hands(bar, out)
-  local list = {}
-  for _, sign in ipairs { 1, -1 } do
-    list[#list + 1] = function(distance, height)
-      local at = frames.add(frames.add(bar, out, distance), UP, height or 0)
-      return frames.hand(at, frames.scaled(out, -1), { 0, 0, sign })
+-- Hands in front of the bar, as functions of the distance from it and the height above it, m, with the opening that
+-- passes over it: closing across the bar, or rolled about the fingers where the palm would touch something. The bar
+-- then crosses the pads aslant.
+local function hands(bar, out, radius)
+  local list, forward = {}, frames.scaled(out, -1)
+  for _, roll in ipairs(ROLLS) do
+    for _, sign in ipairs { 1, -1 } do
+      local closing = frames.rotated({ 0, 0, sign }, forward, roll)
+      local width = 2 * (radius / math.cos(roll) + FINGER * math.abs(math.tan(roll)))
+      local function at(distance, height)
+        return frames.hand(frames.add(frames.add(bar, out, distance), UP, height or 0), forward, closing)
+      end
+      list[#list + 1] = { at = at, width = width, opening = math.min(0.08, width + 2 * BAR_CLEARANCE) }
     end
   end
   return list
 end
 
--- Grasps the bar. Returns nil and the reason if it cannot.
+-- Grasps the bar. Returns the width between the fingers on the way to it, m; nil and the reason if it cannot.
 local function hold(arm, scene, spec)
   local bar, out, radius = handle(arm, scene, spec)
-  local opening = 2 * (radius + BAR_CLEARANCE)
-  local paths = {}
-  for _, hand in ipairs(hands(bar, out)) do
-    local clearance = scene:clearance(hand(TIP), { width = opening })
-    if clearance < CLEARANCE then
-      return nil, ("leaves the hand in front of its handle %.0f mm of clearance"):format(1e3 * clearance)
+  local paths, chosen, most = {}, {}, -math.huge
+  for _, hand in ipairs(hands(bar, out, radius)) do
+    local clearance = scene:clearance(hand.at(TIP), { width = hand.opening })
+    most = math.max(most, clearance)
+    if clearance >= CLEARANCE then
+      chosen[#chosen + 1] = hand
+      paths[#paths + 1] = { hand.at(APPROACH, ABOVE), hand.at(APPROACH), hand.at(TIP) }
     end
-    paths[#paths + 1] = { hand(APPROACH, ABOVE), hand(APPROACH), hand(TIP) }
   end
+  if #paths == 0 then return nil, ("leaves the hand in front of its handle %.0f mm of clearance"):format(1e3 * most) end
   posture.rise(arm, bar[3] + ABOVE)
-  if not posture.first(arm, paths, { speed = 0.4, angular_speed = 1, closure = 1 - opening / arm.stroke }) then
-    return nil, "is out of reach of a hand in front of it"
-  end
-  posture.clamp(arm, 2 * radius)
-  return true
-end
-
-local function let_go(arm, out)
-  arm:open { rate = 1 }
-  arm:move_by(frames.scaled(out, APPROACH), { speed = 0.3 })
+  arm:close_to(1 - chosen[1].opening / arm.stroke)
+  local k = posture.first(arm, paths, { speed = 0.4, angular_speed = 1 })
+  if not k then return nil, "is out of reach of a hand in front of it" end
+  posture.clamp(arm, chosen[k].width)
+  return chosen[k].opening
 end
 
 local function open(arm, scene, spec)
-  local reason
   for _ = 1, ATTEMPTS do
     local _, out, _, part = handle(arm, scene, spec)
-    local goal = mechanism.value(part, spec.share)
     if part.joint >= mechanism.value(part, spec.share - TOLERANCE) then return end
-    local held
-    held, reason = hold(arm, scene, spec)
-    if not held then arm:give_up(("%s %s"):format(spec.joint, reason)) end
+    local opening, reason = hold(arm, scene, spec)
+    if not opening then arm:give_up(("%s %s"):format(spec.joint, reason)) end
     -- The handle slips a little between the gels.
-    arm:move_by(frames.scaled(out, goal - part.joint + SLIP), { speed = spec.speed })
+    arm:move_by(frames.scaled(out, mechanism.value(part, spec.share) - part.joint + SLIP), { speed = spec.speed })
     arm:wait(0.2)
-    let_go(arm, out)
+    arm:release { closure = 1 - opening / arm.stroke, rate = 1 }
+    arm:wait(0.1)
+    arm:move_by(frames.scaled(out, APPROACH), { speed = 0.3 })
   end
 end
 
 local function close(arm, scene, spec)
   for _ = 1, ATTEMPTS do
     local bar, out, radius, part = handle(arm, scene, spec)
-    local goal = mechanism.value(part, spec.share)
-    if part.joint <= goal then return end
-    local outside = radius + FINGER
-    local turned = softvt.pose { position = bar, yaw = frames.half_turn_yaw(out) }
-    local start = turned:translated(frames.scaled(out, outside + 0.03))
+    local missing = part.joint - mechanism.value(part, spec.share)
+    if missing <= 0 then return end
+    -- The fingers point at the handle from above and in front, so that the palm stays clear of the handles above it.
+    local forward = frames.add(frames.scaled(out, -math.cos(PUSH_TILT)), UP, -math.sin(PUSH_TILT))
+    local paths = {}
+    for k, sign in ipairs { 1, -1 } do
+      local hand = frames.hand(bar, forward, { -sign * out[2], sign * out[1], 0 })
+      local start = hand:translated(frames.scaled(out, radius + FINGER_TIP + STANDOFF))
+      paths[k] = { start:translated { 0, 0, APPROACH }, start }
+    end
     posture.rise(arm, bar[3] + ABOVE)
-    arm:move_to(start:translated(frames.scaled(UP, ABOVE)), { speed = 0.4, closure = 1 })
-    arm:move_to(start, { speed = 0.25 })
-    local travel = part.joint - mechanism.range(part)[1] + OVERSHOOT
-    arm:move_to(turned:translated(frames.scaled(out, outside - travel)), { speed = spec.speed })
+    posture.clamp(arm, 0)
+    if not posture.first(arm, paths, { speed = 0.4, angular_speed = 1 }) then
+      arm:give_up(spec.joint .. " is out of reach of a hand in front of it")
+    end
+    arm:move_by(frames.scaled(out, -STANDOFF - missing - OVERSHOOT), { speed = spec.speed })
     arm:wait(0.2)
-    arm:move_by(frames.scaled(out, 0.03), { speed = 0.25 })
-    arm:move_by(frames.scaled(UP, ABOVE), { speed = 0.4 })
+    arm:move_by(frames.scaled(out, STANDOFF), { speed = 0.25 })
+    arm:release { closure = 0.5, rate = 1 }
   end
 end
 

@@ -69,7 +69,8 @@ local function reach_of(scene, knob, grip, angle, wanted)
   return sign * turn
 end
 
--- Grips of the knob that keep clear of everything when grasped, best first: { tilt, back, out, width, angle, sign, turn }.
+-- Grips of the knob that keep clear of everything when grasped, best first: { tilt, back, out, width, angle, sign, turn
+-- }.
 local function grips(scene, knob, wanted)
   local list, hints = {}, knob.part.hints
   -- Across the faces the hand closes horizontally at a joint of 0; across the ends a quarter turn from there.

@@ -24,8 +24,8 @@ local function arrives(arm, pose, options)
   return arm.pose:distance(pose) < ARRIVED
 end
 
--- Moves along the first of several paths, lists of poses, on which the arm arrives everywhere, and returns its index. It
--- returns to the start from the others; nil if there is none. `options` are those of the motion to the first pose.
+-- Moves along the first of several paths, lists of poses, on which the arm arrives everywhere, and returns its index.
+-- It returns to the start from the others; nil if there is none. `options` are those of the motion to the first pose.
 function posture.first(arm, paths, options)
   local start = arm.target
   for k, path in ipairs(paths) do
@@ -41,8 +41,8 @@ function posture.first(arm, paths, options)
   end
 end
 
--- Rises and turns the hand until it points down, closing along the y axis of the world: where it is, or on the way to the
--- point `home`, where it has been before.
+-- Rises and turns the hand until it points down, closing along the y axis of the world: where it is, or on the way to
+-- the point `home`, where it has been before.
 function posture.down(arm, home)
   posture.rise(arm, TURN_HEIGHT)
   local from, paths = arm.target, {}
@@ -58,13 +58,13 @@ end
 -- Closes firmly on something rigid of a width (m), or the empty hand for a width of 0. A tactile servo lifts what it
 -- grasps, so the hand then closes without it.
 function posture.clamp(arm, width)
-  local closure = math.min(1, 1 - (width - SQUEEZE) / arm.stroke)
+  local closure, rate = math.min(1, 1 - (width - SQUEEZE) / arm.stroke), { rate = width > 0 and 0.5 or 1 }
   if arm.feels then
-    arm:close_to(closure)
+    arm:close_to(closure, rate)
   else
     -- A controller of the grip is for what is carried: reading its name tells that this grasp is not meant for it.
     local _ = arm.grip_controller
-    arm:grasp(closure)
+    arm:grasp(closure, rate)
   end
   arm:wait(0.2)
 end
