@@ -10,6 +10,7 @@
 -- the front and stands out most.
 local frames = require "experts.frames"
 local grasp = require "experts.grasp"
+local hand = require "experts.hand"
 local mechanism = require "experts.mechanism"
 local places = require "experts.places"
 local posture = require "experts.posture"
@@ -23,9 +24,11 @@ local TIP, APPROACH, ABOVE = 0.005, 0.09, 0.16
 local BAR_CLEARANCE, CLEARANCE = 0.012, 0.001
 -- Rotations of the hand about its fingers to try, rad.
 local ROLLS = { 0, math.rad(25), math.rad(-25), math.rad(45), math.rad(-45) }
--- Angle of the fingers below the horizontal in a push, rad; half thickness of a finger along the hand's x axis and
--- extent of its tip towards the drawer in a push, m.
-local PUSH_TILT, FINGER, FINGER_TIP = math.rad(45), 0.014, 0.021
+-- Angle of the fingers below the horizontal in a push, rad, and half thickness of a finger along the hand's x axis, m.
+local PUSH_TILT, FINGER = math.rad(60), 0.014
+-- Place of the leading edge of the tips in a push, from the tool towards the drawer and downwards, m.
+local EDGE_OUT = hand.CASE * math.cos(PUSH_TILT) + FINGER * math.sin(PUSH_TILT)
+local EDGE_DOWN = hand.CASE * math.sin(PUSH_TILT) - FINGER * math.cos(PUSH_TILT)
 -- Distance from the bar before a push, and how far the push goes beyond the end, m.
 local STANDOFF, OVERSHOOT = 0.03, 0.003
 -- Sliding of the bar between the gels while it is pulled, m.
@@ -38,7 +41,7 @@ local UP = { 0, 0, 1 }
 -- Centre of the bar, direction out of the drawer, and half of the bar's thickness, m.
 local function handle(arm, scene, spec)
   local object, part = mechanism.find(arm, scene, spec.joint)
-  local out = mechanism.axis(object, part)
+  local out = part.joint_axis
   local height, width = part.hints.handle_height_m, part.hints.handle_width_m
   if not (height and width) then arm:give_up(spec.joint .. " has no hints handle_height_m and handle_width_m") end
   local front = frames.add(part.centre, out, places.half_extent(part, out) - width / 2)
@@ -67,12 +70,12 @@ end
 local function hold(arm, scene, spec)
   local bar, out, radius = handle(arm, scene, spec)
   local paths, chosen, most = {}, {}, -math.huge
-  for _, hand in ipairs(hands(bar, out, radius)) do
-    local clearance = scene:clearance(hand.at(TIP), { width = hand.opening })
+  for _, held in ipairs(hands(bar, out, radius)) do
+    local clearance = scene:clearance(held.at(TIP), { width = held.opening })
     most = math.max(most, clearance)
     if clearance >= CLEARANCE then
-      chosen[#chosen + 1] = hand
-      paths[#paths + 1] = { hand.at(APPROACH, ABOVE), hand.at(APPROACH), hand.at(TIP) }
+      chosen[#chosen + 1] = held
+      paths[#paths + 1] = { held.at(APPROACH, ABOVE), held.at(APPROACH), held.at(TIP) }
     end
   end
   if #paths == 0 then return nil, ("leaves the hand in front of its handle %.0f mm of clearance"):format(1e3 * most) end
@@ -108,8 +111,8 @@ local function close(arm, scene, spec)
     local forward = frames.add(frames.scaled(out, -math.cos(PUSH_TILT)), UP, -math.sin(PUSH_TILT))
     local paths = {}
     for k, sign in ipairs { 1, -1 } do
-      local hand = frames.hand(bar, forward, { -sign * out[2], sign * out[1], 0 })
-      local start = hand:translated(frames.scaled(out, radius + FINGER_TIP + STANDOFF))
+      local at = frames.add(frames.add(bar, out, radius + EDGE_OUT + STANDOFF), UP, EDGE_DOWN)
+      local start = frames.hand(at, forward, { -sign * out[2], sign * out[1], 0 })
       paths[k] = { start:translated { 0, 0, APPROACH }, start }
     end
     posture.rise(arm, bar[3] + ABOVE)

@@ -36,12 +36,13 @@ local PEAK = 1.875
 -- The knob: its part, axis, middle of the grip, and sizes of the grip.
 local function knob_of(arm, scene, joint)
   local object, part = mechanism.find(arm, scene, joint)
-  local axis, hints = mechanism.axis(object, part), part.hints
+  local axis, origin, hints = part.joint_axis, part.joint_origin, part.hints
   if not (hints.grip_width_m and hints.grip_length_m and hints.grip_depth_m) then
     arm:give_up(joint .. " has no hints grip_width_m, grip_length_m and grip_depth_m")
   end
   if math.abs(axis[3]) > 0.1 then arm:give_up(joint .. " has an axis that is not horizontal") end
-  local middle = frames.add(part.centre, axis, places.half_extent(part, axis) - hints.grip_depth_m / 2)
+  local front = frames.dot(frames.add(part.centre, origin, -1), axis) + places.half_extent(part, axis)
+  local middle = frames.add(origin, axis, front - hints.grip_depth_m / 2)
   return { object = object, part = part, axis = axis, middle = middle }
 end
 
