@@ -30,12 +30,10 @@ function posture.first(arm, paths, options)
   local start = arm.target
   for k, path in ipairs(paths) do
     local reached = 0
-
     while reached < #path and arrives(arm, path[reached + 1], reached == 0 and options or NEAR) do
       reached = reached + 1
     end
     if reached == #path then return k end
-
     for back = reached, 1, -1 do
       pcall(arm.move_to, arm, path[back], NEAR)
     end
