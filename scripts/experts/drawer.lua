@@ -66,21 +66,31 @@ local function hands(bar, out, radius)
   return list
 end
 
+-- Opens the hand to a width, m, and returns the measured one: a binary gripper opens all the way.
+local function open_to(arm, width)
+  arm:close_to(1 - width / arm.stroke, { rate = 1 })
+  arm:wait(0.2)
+  return math.min(arm.stroke, arm.width)
+end
+
 -- Grasps the bar. Returns the width between the fingers on the way to it, m; nil and the reason if it cannot.
 local function hold(arm, scene, spec)
   local bar, out, radius = handle(arm, scene, spec)
-  local paths, chosen, most = {}, {}, -math.huge
-  for _, held in ipairs(hands(bar, out, radius)) do
-    local clearance = scene:clearance(held.at(TIP), { width = held.opening })
+  local list, paths, chosen, most = hands(bar, out, radius), {}, {}, -math.huge
+  posture.rise(arm, bar[3] + ABOVE)
+  local opened = open_to(arm, list[1].opening)
+  local is_binary = opened > list[1].opening + BAR_CLEARANCE
+  for _, held in ipairs(list) do
+    local clearance = scene:clearance(held.at(TIP), { width = is_binary and opened or held.opening })
     most = math.max(most, clearance)
-    if clearance >= CLEARANCE then
+    -- All need the same opening.
+    if clearance >= CLEARANCE and held.opening == (chosen[1] or held).opening then
       chosen[#chosen + 1] = held
       paths[#paths + 1] = { held.at(APPROACH, ABOVE), held.at(APPROACH), held.at(TIP) }
     end
   end
   if #paths == 0 then return nil, ("leaves the hand in front of its handle %.0f mm of clearance"):format(1e3 * most) end
-  posture.rise(arm, bar[3] + ABOVE)
-  arm:close_to(1 - chosen[1].opening / arm.stroke)
+  open_to(arm, chosen[1].opening)
   local k = posture.first(arm, paths, { speed = 0.4, angular_speed = 1 })
   if not k then return nil, "is out of reach of a hand in front of it" end
   posture.clamp(arm, chosen[k].width)
