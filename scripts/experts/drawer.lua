@@ -42,6 +42,7 @@ local UP = { 0, 0, 1 }
 local function handle(arm, scene, spec)
   local object, part = mechanism.find(arm, scene, spec.joint)
   local out = part.joint_axis
+  if math.abs(out[3]) > 0.1 then arm:give_up(spec.joint .. " does not slide horizontally") end
   local height, width = part.hints.handle_height_m, part.hints.handle_width_m
   if not (height and width) then arm:give_up(spec.joint .. " has no hints handle_height_m and handle_width_m") end
   local front = frames.add(part.centre, out, places.half_extent(part, out) - width / 2)
@@ -146,6 +147,9 @@ return function(spec)
   }
   if full.share < 0 or full.share > 1 then
     error(("drawer: share: expected a share in 0..1, got %g"):format(full.share), 2)
+  end
+  if full.speed <= 0 or full.speed > 0.3 then
+    error(("drawer: speed: expected m/s in 0..0.3, above 0, got %g"):format(full.speed), 2)
   end
   return function(arm, scene)
     local home = arm.target.position

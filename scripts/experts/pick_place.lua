@@ -163,7 +163,7 @@ local function complete(spec)
   full.window, full.stop = spec.window or WINDOW, spec.stop or "width"
   full.closing_speed, full.share = spec.closing_speed or CLOSING_SPEED, spec.share or MIDDLE
   local function refuse(key, expected)
-    error(("pick_place: %s: expected %s, got %s"):format(key, expected, tostring(full[key])), 3)
+    error(("pick_place: %s: expected %s, got %s"):format(key, expected, tostring(full[key])), 4)
   end
   if full.window < 0 or full.window > 1 then refuse("window", "a share in 0..1") end
   local room = 0.5 * full.window
@@ -171,7 +171,7 @@ local function complete(spec)
     refuse("share", ("a share in %g..%g, so that the part is within the window"):format(room, 1 - room))
   end
   if full.stop ~= "width" and full.stop ~= "touch" then refuse("stop", '"width" or "touch"') end
-  if full.to then places.check("pick_place", full) end
+  if full.to then places.check("pick_place", full, 4) end
   if full.closing_speed <= 0 or full.closing_speed > 0.2 then refuse("closing_speed", "m/s in 0..0.2, above 0") end
   return full
 end

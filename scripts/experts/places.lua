@@ -27,12 +27,12 @@ function places.half_extent(object, direction)
   return (math.abs(x) * object.size[1] + math.abs(y) * object.size[2]) / 2
 end
 
--- Raises an error of the expert `name` if the field `to` of a specification is not a place.
-function places.check(name, spec)
+-- Raises an error of the expert `name` if the field `to` of a specification is not a place; `level` is that of error.
+function places.check(name, spec, level)
   if spec.to ~= "near" and not DIRECTIONS[spec.to] then
     error(
       ('%s: to: expected "near", "left_of", "right_of", "in_front_of" or "behind", got "%s"'):format(name, spec.to),
-      3
+      level
     )
   end
 end

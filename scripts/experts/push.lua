@@ -82,8 +82,10 @@ return function(spec)
     distance = spec.distance,
     speed = spec.speed or SPEED,
   }
-  places.check("push", full)
-  if full.speed <= 0 or full.speed > 0.3 then error("push: speed: expected m/s in 0..0.3, above 0", 2) end
+  places.check("push", full, 3)
+  if full.speed <= 0 or full.speed > 0.3 then
+    error(("push: speed: expected m/s in 0..0.3, above 0, got %g"):format(full.speed), 2)
+  end
   return function(arm, scene)
     local place, problem = places.beside(scene, full)
     if not place then arm:give_up(problem) end
