@@ -49,9 +49,10 @@ local function handle(arm, scene, spec)
   return { front[1], front[2], grasp.bottom(object) + height }, out, width / 2, part
 end
 
--- Hands in front of the bar, as functions of the distance from it and the height above it, m, with the opening that
--- passes over it: closing across the bar, or rolled about the fingers where the palm would touch something. The bar
--- then crosses the pads aslant.
+-- Hands in front of the bar: { at, width, opening }. `at` gives the pose by the distance from the bar and the height
+-- above it, `width` is that of what is between the fingers, and `opening` passes over it, m. The hand closes across the
+-- bar, or is rolled about its fingers where the palm would touch something. The bar is then aslant, and the edges of
+-- the cases hold it instead of the gels.
 local function hands(bar, out, radius)
   local list, forward = {}, frames.scaled(out, -1)
   for _, roll in ipairs(ROLLS) do
