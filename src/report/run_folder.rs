@@ -178,7 +178,7 @@ impl RunFolder {
     /// # Errors
     /// A file cannot be removed.
     pub fn discard(self) -> Result<(), RunFolderError> {
-        for name in [RUN, EPISODES] {
+        for name in [RUN, SCRIPTS, EPISODES] {
             files::remove_if_present(&self.dir.join(name))?;
         }
         for name in EPISODE_FOLDERS {

@@ -25,8 +25,8 @@ fn lists_are_printed_as_text_and_as_json() {
     let tasks = json("tasks");
     assert_eq!(
         tasks.len(),
-        100,
-        "those of four suites, two varied ones, two hidden ones and two twins; no task is listed twice"
+        110,
+        "those of four suites, two varied ones, two hidden ones, two twins and Household; none is listed twice"
     );
     let of_suite: Vec<_> = tasks.iter().filter(|t| t["suite"] == "spatial_soft").collect();
     assert_eq!(of_suite.len(), 10);

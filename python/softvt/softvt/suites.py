@@ -13,6 +13,7 @@ SUITES = (
     "spatial_varied",
     "object_hidden",
     "spatial_hidden",
+    "household",
 )
 """Names of the standard suites (`softvt list suites`)."""
 

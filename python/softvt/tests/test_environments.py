@@ -8,7 +8,7 @@ import gymnasium
 import numpy as np
 import softvt
 from gymnasium.utils.env_checker import check_env
-from softvt.true_state import STATE_BOUNDS, STATE_FIELDS
+from softvt.true_state import STATE_BOUNDS, STATE_FIELDS, TrueState, progress
 from suites_for_tests import STEPS, expert_run, same, short_suite
 
 # Policies of this field return poses in metres and radians, and depth is infinite in the background.
@@ -174,6 +174,27 @@ class Environments(unittest.TestCase):
         column = field(state, "object_rotation")[:3]
         w, x, y, z = left["quaternion_w"]
         np.testing.assert_allclose(column, [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], atol=1e-6)
+
+    def test_progress_counts_the_parts_of_a_goal(self):
+        state = TrueState(np.zeros(0, np.float32), reach_m=0.2, carry_m=0.2)
+        part = {"name": "", "holds": False, "met_s": None}
+        met, negated = part | {"met_s": 1.0}, part | {"negated": True, "met_s": 2.0}
+
+        def of(stage, *parts, goal=False):
+            return progress(state, {"goal": goal, "failed_stage": stage, "goal_parts": list(parts)})
+
+        self.assertEqual([of(None, goal=True), of("lift")], [1.0, 2 / 6])
+        self.assertAlmostEqual(of("reach"), (1 - np.tanh(1)) / 6)
+        self.assertAlmostEqual(of("reach", part, part), (1 - np.tanh(1)) / 6 / 3)
+        self.assertAlmostEqual(of("place", met, part, negated), (1 + 4 / 6) / 3, msg="the negated part does not count")
+        self.assertAlmostEqual(of(None, met, met), 2 / 3)
+
+    def test_tasks_of_several_steps_have_a_state_and_parts(self):
+        env = self.make("household", obs="state", reward="staged", privileged=True)
+        for task in range(10):
+            state, info = env.reset(options={"task": task, "episode": 0})
+            self.assertEqual(state.shape, STATE_BOUNDS.shape)
+            self.assertGreater(len(info["verdict"]["goal_parts"]), 1, info["prompt"])
 
     def test_a_camera_matrix_projects_the_object_to_its_pixels(self):
         env = self.make(obs="state+segmentation", task=3)

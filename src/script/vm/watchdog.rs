@@ -6,8 +6,8 @@
 //!
 //! A C function (`string.find` with a hostile pattern) never reaches the hook, and nothing can interrupt it. The
 //! watchdog is a thread that polls every running limit and then calls [`StuckHandler`], which ends the process. It does
-//! so only if the hook has not run since the last check, and if the process has had at least as much processor time as
-//! the script may take.
+//! so only if the hook has not run since the last check, and if the process has had at least as much processor time for
+//! each virtual machine as the script may take: threads that share too few processors each get a part of it.
 
 use std::{
     sync::{Arc, Mutex, Once, Weak},
@@ -42,22 +42,24 @@ fn watch(clock: &Arc<Mutex<ClockState>>) {
             thread::sleep(WATCHDOG_INTERVAL);
             lock(&CLOCKS).retain(|clock| clock.strong_count() > 0);
             let clocks = lock(&CLOCKS).clone();
-            clocks.iter().filter_map(Weak::upgrade).for_each(|clock| check(&clock));
+            let machines = clocks.len() as u32;
+            clocks.iter().filter_map(Weak::upgrade).for_each(|clock| check(&clock, machines));
         };
         // Without this thread a hostile C call would hang the run; everything else still works.
         let _ = thread::Builder::new().name("script-watchdog".into()).spawn(check_all);
     });
 }
 
-/// Calls `on_stuck` if the check of a running call is due and the hook has not run since it was set.
-fn check(clock: &Mutex<ClockState>) {
+/// Calls `on_stuck` if the check of a running call is due and the hook has not run since it was set. `machines` is the
+/// number of virtual machines, of which each may have a thread of its own.
+fn check(clock: &Mutex<ClockState>, machines: u32) {
     let mut state = lock(clock);
     let ClockState { file, hook_calls, grace, on_stuck, call } = &mut *state;
     let Some(call @ LimitedCall { remaining: Remaining::RunningUntil(_), .. }) = call else { return };
     let Some(check) = call.check.take_if(|check| Instant::now() >= check.due) else { return };
     if *hook_calls != check.hook_calls {
         call.check = Some(StuckCheck::after(*grace, *hook_calls));
-    } else if process_time() < check.process_time {
+    } else if process_time() < check.process_time + check.wait * machines {
         call.check = Some(check);
     } else {
         let message = format!(
@@ -100,7 +102,8 @@ enum Remaining {
 /// A check of the watchdog.
 struct StuckCheck {
     due: Instant,
-    /// Processor time of the process before which the script cannot have used up its own.
+    wait: Duration,
+    /// Processor time of the process when the check was set.
     process_time: Duration,
     /// Calls of the hook when the check was set.
     hook_calls: u64,
@@ -108,7 +111,7 @@ struct StuckCheck {
 
 impl StuckCheck {
     fn after(wait: Duration, hook_calls: u64) -> Self {
-        Self { due: Instant::now() + wait, process_time: process_time() + wait, hook_calls }
+        Self { due: Instant::now() + wait, wait, process_time: process_time(), hook_calls }
     }
 }
 
