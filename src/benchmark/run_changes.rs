@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
 use crate::ShiftValue;
-use softvt_common::text::hex;
+use softvt_common::text::{hex, significant};
 
 /// What a run changes of its suite, and the seed of its draws. Each field is the value of one flag and, under its name,
 /// a key of `run.json`.
@@ -53,9 +53,10 @@ impl RunChanges {
         self.twin == Some(Twin::Rigid)
     }
 
-    /// Shifts and settings, such as `mass=2.0`.
+    /// Shifts and settings as tables name them, such as `mass=2`; values have three digits.
     pub fn assignments(&self) -> Vec<String> {
-        self.shift_words().chain(self.set_words()).collect()
+        let shift = |ShiftValue { name, value }: &ShiftValue| format!("{name}={}", significant(*value, 3));
+        self.shifts.iter().map(shift).chain(self.set_words()).collect()
     }
 
     fn shift_words(&self) -> impl Iterator<Item = String> {
@@ -129,6 +130,14 @@ mod tests {
             ["--seed-file", "FILE"]
         );
         assert!(RunChanges::default().flags().is_empty());
+    }
+
+    #[test]
+    fn a_third_has_three_digits_in_tables_and_all_in_flags() {
+        let shifts = vec![ShiftValue { name: "light".into(), value: 4.0 / 3.0 }];
+        let changes = RunChanges { shifts, ..Default::default() };
+        assert_eq!(changes.assignments(), ["light=1.33"]);
+        assert_eq!(changes.flags(), ["--shift", "light=1.3333333333333333"]);
     }
 
     #[test]

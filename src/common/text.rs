@@ -8,6 +8,18 @@ pub fn format_number(x: f64) -> String {
     if plain { x.to_string() } else { format!("{x:e}") }
 }
 
+/// Formats a number with at most `digits` significant digits and without trailing zeros: 4/3 as 1.33.
+pub fn significant(x: f64, digits: usize) -> String {
+    if x == 0.0 || !x.is_finite() {
+        return format_number(x);
+    }
+    let scale = 10f64.powi(digits as i32 - 1 - x.abs().log10().floor() as i32);
+    // A division by a power of ten gives the nearest number; a product need not.
+    let rounded =
+        if scale >= 1.0 { (x * scale).round() / scale } else { (x * scale).round() * (1.0 / scale) };
+    format_number(if rounded.is_finite() { rounded } else { x })
+}
+
 /// Escapes control characters other than newlines and tabs, so that untrusted text cannot control a terminal.
 pub fn escape_control(text: &str) -> Cow<'_, str> {
     let harmful = |c: char| c.is_control() && c != '\n' && c != '\t';
@@ -203,6 +215,12 @@ mod tests {
     fn numbers_stay_short() {
         let shown = [0.0, -1.0, 0.25, 1234567.5, 1e300, -1e-9, f64::INFINITY].map(format_number);
         assert_eq!(shown, ["0", "-1", "0.25", "1234567.5", "1e300", "-1e-9", "inf"]);
+    }
+
+    #[test]
+    fn significant_digits_are_rounded_and_not_padded() {
+        let shown = [4.0 / 3.0, 0.1 + 0.2, 2.0, 1234.5, 0.0, -0.0066667].map(|x| significant(x, 3));
+        assert_eq!(shown, ["1.33", "0.3", "2", "1230", "0", "-0.00667"]);
     }
 
     #[test]

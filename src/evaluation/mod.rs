@@ -26,6 +26,7 @@
 //! | At which stage did the episode fail? | [`stage`] |
 //! | Goal, NoDrop and deformation limit together | [`safety`] |
 //! | What does the judge find, and how did the rollout end? | [`verdict`] |
+//! | Which one word describes the episode? | [`category`] |
 //! | Where does the limit τ of an asset come from? | [`calibration`], [`thresholds`], [`envelope_text`] |
 //! | What limit and window has another instance of an asset? | [`instance`] |
 //! | Every threshold of the judge | [`criteria`] |
@@ -35,6 +36,7 @@
 #![warn(missing_docs, unreachable_pub)]
 
 pub mod calibration;
+pub mod category;
 pub mod criteria;
 pub mod deformation;
 pub mod drop;

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize, Serializer, ser::SerializeMap};
 
 use softvt_common::episode_id::EpisodeId;
 use softvt_common::text::decimal;
+use softvt_evaluation::category::EpisodeCategory;
 use softvt_evaluation::verdict::{Outcome, Verdict};
 use softvt_scene::{InitialStateOverride, SceneVariation};
 
@@ -169,6 +170,11 @@ pub struct EpisodeRecord {
 }
 
 impl EpisodeRecord {
+    /// The one word for the result of the episode.
+    pub fn category(&self) -> EpisodeCategory {
+        EpisodeCategory::new(&self.outcome, &self.verdict)
+    }
+
     /// True if the episode counts in DSR: Goal Success with D_peak ≤ τ of each target. Drops do not enter.
     pub fn is_deformation_safe(&self) -> bool {
         let v = &self.verdict;
@@ -208,6 +214,43 @@ pub(crate) mod tests {
         });
         let far = "168 of 168 commands were out of reach, first: (467, 4.25, -260) m, 534.51 m and 0 rad from the tool";
         assert_eq!(stats.command_notes(), [far, "3 of 168 grip values were out of range"]);
+    }
+
+    #[test]
+    fn every_episode_has_one_category() {
+        let category = |change: fn(&mut EpisodeRecord)| {
+            let mut record = sample();
+            change(&mut record);
+            record.category()
+        };
+        let over =
+            |r: &mut EpisodeRecord| (r.verdict.safety, r.verdict.deformation_ok) = (false, Some(false));
+        assert_eq!(category(|_| ()), EpisodeCategory::Safe);
+        assert_eq!(category(over), EpisodeCategory::OverLimit);
+        let dropped_at_goal = |r: &mut EpisodeRecord| (r.verdict.safety, r.verdict.no_drop) = (false, false);
+        assert_eq!(category(dropped_at_goal), EpisodeCategory::Dropped);
+        let missed = |r: &mut EpisodeRecord| {
+            (r.verdict.safety, r.verdict.goal, r.verdict.deformation_ok) = (false, false, Some(false));
+        };
+        assert_eq!(
+            category(missed),
+            EpisodeCategory::GoalMissed,
+            "the limit counts where the goal is reached"
+        );
+        assert_eq!(
+            category(|r| (r.verdict.safety, r.verdict.slip_ok) = (false, Some(false))),
+            EpisodeCategory::Slipped
+        );
+        assert_eq!(
+            category(|r| (r.verdict.safety, r.verdict.deformation_ok) = (false, None)),
+            EpisodeCategory::NotJudged
+        );
+        assert_eq!(
+            category(|r| r.outcome = Outcome::Error { message: String::new() }),
+            EpisodeCategory::Invalid
+        );
+        let glyphs = EpisodeCategory::ALL.map(EpisodeCategory::glyph);
+        assert!(glyphs.iter().enumerate().all(|(at, glyph)| !glyphs[..at].contains(glyph)));
     }
 
     #[test]

@@ -10,6 +10,7 @@ pub mod condition_table;
 pub mod leaderboard;
 pub mod page;
 pub mod policy_ranking;
+pub mod report_files;
 pub mod run_check;
 pub mod run_folder;
 pub mod run_summary;

@@ -174,7 +174,7 @@ pub(super) mod tests {
             run("e", "pi", Some(("light", 2.0))),
         ];
         let names: Vec<String> = summarize_runs(runs).into_iter().map(|run| run.method).collect();
-        assert_eq!(names, ["pi", "pi · light=2.0", "pi · mass=2.5", "pi · mass=10.0", "noop"]);
+        assert_eq!(names, ["pi", "pi · light=2", "pi · mass=2.5", "pi · mass=10", "noop"]);
     }
 
     #[test]
@@ -195,7 +195,7 @@ pub(super) mod tests {
             names(&[&plain, &heavy, &forces]),
             [
                 "expert (privileged)",
-                "expert (privileged) · mass=2.0, robot.gripper.effort=3",
+                "expert (privileged) · mass=2, robot.gripper.effort=3",
                 "pi (force_observed)"
             ]
         );

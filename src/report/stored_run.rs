@@ -155,11 +155,13 @@ impl StoredRun {
     /// The changes to the suite; `None` for a suite as it is.
     pub fn condition(&self) -> Option<ConditionLabel> {
         let twin = self.is_rigid_twin().then(|| "rigid twin".to_owned());
-        let changes: Vec<String> = self.changes().assignments().into_iter().chain(twin).collect();
-        let label = changes.join(", ");
-        let (factor, value) = match &changes[..] {
-            [] => return None,
-            [single] => match single.split_once('=') {
+        let changes = self.changes();
+        let names: Vec<String> = changes.assignments().into_iter().chain(twin).collect();
+        let label = names.join(", ");
+        let (factor, value) = match (&names[..], &changes.shifts[..]) {
+            ([], _) => return None,
+            ([_], [shift]) => (shift.name.as_str(), Some(shift.value)),
+            ([single], _) => match single.split_once('=') {
                 Some((factor, value)) => (factor, value.parse().ok()),
                 None => (single.as_str(), None),
             },

@@ -9,19 +9,10 @@ use crate::{
     error::CliError,
     output::{eprint_notice, print, print_json},
 };
-use softvt_common::files;
 use softvt_report::{
-    comparison, leaderboard, page,
-    policy_ranking::PolicyRanking,
-    run_summary::summarize_runs,
-    shard_merge, stored_run,
-    tables::{ResultTable, all_tables},
-    terminal,
+    comparison, policy_ranking::PolicyRanking, report_files, run_summary::summarize_runs, shard_merge,
+    stored_run, terminal,
 };
-
-/// Comment at the top of the LaTeX file: the packages and engines it needs.
-const LATEX_HEADER: &str =
-    "% Needs \\usepackage{booktabs}; of names in other alphabets, LuaLaTeX or XeLaTeX.\n";
 
 /// Write an HTML page about runs, its tables as Markdown and LaTeX, and a JSON row per run
 #[derive(Args, Debug)]
@@ -69,18 +60,8 @@ pub(super) fn report(args: &ReportArgs) -> Result<(), CliError> {
     for warning in summaries.iter().flat_map(|summary| summary.run.warnings()) {
         eprint_notice(warning);
     }
-    let tables = all_tables(&summaries);
-    let joined =
-        |format: fn(&ResultTable) -> String| tables.iter().map(format).collect::<Vec<_>>().join("\n");
-    for (name, text) in [
-        ("report.html", page::page(&summaries, &args.out)),
-        ("report.md", joined(ResultTable::markdown)),
-        ("report.tex", LATEX_HEADER.to_owned() + &joined(ResultTable::latex)),
-        ("report.jsonl", leaderboard::rows(&summaries)),
-    ] {
-        files::replace(&args.out.join(name), text)?;
-    }
-    eprint_notice(args.out.join("report.html").display());
+    report_files::write(&summaries, &args.out)?;
+    eprint_notice(args.out.join(report_files::PAGE).display());
     Ok(())
 }
 

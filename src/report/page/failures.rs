@@ -1,16 +1,20 @@
-//! Unsafe episodes of a run: reasons, stills, and commands that show the episode.
+//! Episodes of a run that failed, by category: reasons, stills, and commands that show the episode.
 
 use std::path::Path;
 
 use maud::{Markup, html};
 
-use super::images::{ByteBudget, DataImage, embed_image, relative_link};
+use super::{
+    breakable,
+    images::{ByteBudget, DataImage, embed_image, relative_link},
+};
 use crate::{
     run_summary::{RunSummary, UnsafeEpisode},
     video::{still_path, video_path},
 };
 use softvt_common::episode_id::EpisodeId;
 use softvt_common::text::counted;
+use softvt_evaluation::category::EpisodeCategory;
 use softvt_records::record::EpisodeHeader;
 
 /// Largest number of episodes listed per run.
@@ -29,30 +33,49 @@ fn failures_of_run(run: &RunSummary, out: &Path, budget: usize) -> Markup {
     let all = run.unsafe_episodes();
     let count = run.run.records.len();
     if all.is_empty() {
+        let what = match (run.is_soft(), count) {
+            (false, _) => "reached the goal without a drop",
+            (true, 1) => "is safe",
+            (true, _) => "are safe",
+        };
         let note = match count {
             0 => "There is no episode yet.".to_owned(),
-            1 => "The episode is safe.".to_owned(),
-            _ => format!("All {count} episodes are safe."),
+            _ => format!(
+                "{} {what}.",
+                if count == 1 { "The episode".to_owned() } else { format!("All {count} episodes") }
+            ),
         };
         return html! { p.note { (note) } };
     }
     let listed = &all[..all.len().min(MAX_LISTED)];
     let mut budget = ByteBudget(budget);
-    let stills: Vec<Markup> =
-        listed.iter().filter_map(|episode| still(run, episode, out, &mut budget)).collect();
     let rest =
         if all.len() > MAX_LISTED { format!("; the first {MAX_LISTED} are listed") } else { String::new() };
     html! {
-        p.note { (all.len()) " of " (counted(count, "episode")) (rest) "." }
-        @if !stills.is_empty() { div.stills { @for still in &stills { (still) } } }
-        (failure_table(run, listed, out))
+        p.note { (all.len()) " of " (counted(count, "episode")) " failed" (rest) "." }
+        @for category in EpisodeCategory::ALL {
+            @let group: Vec<&UnsafeEpisode> =
+                listed.iter().filter(|episode| episode.record.category() == category).collect();
+            @if !group.is_empty() { (failures_of_category(run, category, &group, out, &mut budget)) }
+        }
     }
 }
 
-fn failure_table(run: &RunSummary, episodes: &[UnsafeEpisode], out: &Path) -> Markup {
+fn failures_of_category(
+    run: &RunSummary,
+    category: EpisodeCategory,
+    episodes: &[&UnsafeEpisode],
+    out: &Path,
+    budget: &mut ByteBudget,
+) -> Markup {
+    let stills: Vec<Markup> =
+        episodes.iter().filter_map(|episode| still(run, episode, out, budget)).collect();
+    let label = format!("Episodes of {}: {}", run.name(), category.name());
     html! {
-        div.scroll tabindex="0" role="group" aria-label=(format!("Unsafe episodes of {}", run.name())) {
-            table.failures {
+        h4 { (category.glyph()) " " (category.name()) ": " (counted(episodes.len(), "episode")) }
+        @if !stills.is_empty() { div.stills { @for still in &stills { (still) } } }
+        div.scroll tabindex="0" role="group" aria-label=(label) {
+            table.failures.cards {
                 thead {
                     tr {
                         th.number scope="col" { "Task" }
@@ -73,10 +96,10 @@ fn failure_row(run: &RunSummary, episode: &UnsafeEpisode, out: &Path) -> Markup 
     let video = relative_link(out, &video_path(&run.run.dir, id.index()));
     html! {
         tr {
-            th.number scope="row" { (id.task) }
-            td.number { (id.episode) }
-            td.text { (header.asset) }
-            td.text {
+            th.number scope="row" data-head="Task" { (id.task) }
+            td.number data-head="Episode" { (id.episode) }
+            td.text data-head="Object" { (breakable(&header.asset)) }
+            td.text data-head="Reason" {
                 (with_unbreakable_units(&episode.reason))
                 @if let Some(video) = video { br; a href=(video) { "video" } }
                 @else { @for command in view_commands(run, id) { br; code { (command) } } }

@@ -8,7 +8,7 @@ use crate::{
     condition_effects::{ConditionEffects, FactorTrend, TrendPoint},
     run_summary::RunSummary,
 };
-use softvt_common::text::{format_number, shortened};
+use softvt_common::text::{shortened, significant};
 use softvt_evaluation::statistics::{Distribution, Rate};
 use softvt_records::{paired_stats::d_over_tau, record::EpisodeRecord};
 
@@ -19,8 +19,15 @@ const BAR_PITCH: f64 = 15.0;
 const STRIP_HEIGHT: f64 = 30.0;
 /// Height of the plot of curves, pixels.
 const PLOT_HEIGHT: f64 = 240.0;
-/// Largest D/τ of the axis; larger values are drawn at its end.
-const MAX_D_OVER_TAU: f64 = 6.0;
+/// Ends of the logarithmic axis of D/τ, the same for all strips. Values beyond are arrows at its ends.
+const D_OVER_TAU: [f64; 2] = [0.05, 50.0];
+/// Labelled values of that axis.
+const D_TICKS: [f64; 6] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0];
+
+/// Place of D/τ on the axis, 0 to 1 within its ends.
+fn d_share(d_over_tau: f64) -> f64 {
+    (d_over_tau.max(f64::MIN_POSITIVE) / D_OVER_TAU[0]).ln() / (D_OVER_TAU[1] / D_OVER_TAU[0]).ln()
+}
 
 /// Coordinate at a fraction of the width.
 fn x(fraction: f64) -> String {
@@ -29,11 +36,6 @@ fn x(fraction: f64) -> String {
 
 fn y(at: f64) -> String {
     format!("{at:.1}")
-}
-
-fn short(number: f64) -> String {
-    let text = format!("{number:.2}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 /// Goal and Safety Success: a pair of bars per run, with intervals.
@@ -164,33 +166,36 @@ pub(super) fn by_asset(run: &RunSummary) -> Markup {
 }
 
 fn strip_chart(strips: &[Strip]) -> Markup {
-    let dots = strips.iter().flat_map(|strip| &strip.dots);
-    let max = dots.map(|dot| dot.d_over_tau).fold(1.5, f64::max).min(MAX_D_OVER_TAU).ceil();
-    let step = if max > 3.0 { 1.0 } else { 0.5 };
-    let ticks: Vec<f64> = (0..).map(|i| f64::from(i) * step).take_while(|value| *value <= max).collect();
-    let label = |value: &f64| if *value == 1.0 { "τ".to_owned() } else { short(*value) };
     html! {
         div.chart {
             @for strips in strips.chunk_by(|a, b| a.suite == b.suite) {
                 @if !strips[0].suite.is_empty() { p.suite { (strips[0].suite) } }
-                @for strip in strips { (strip_row(strip, &ticks, max)) }
+                @for strip in strips { (strip_row(strip)) }
             }
-            (axis(&ticks.iter().map(label).collect::<Vec<_>>()))
+            div.row.axis {
+                span.name {}
+                svg width="100%" height="18" aria-hidden="true" {
+                    @for tick in D_TICKS {
+                        text.tick x=(x(d_share(tick))) y="13" text-anchor="middle" { @if tick == 1.0 { "limit τ" } @else { (tick) " ×" } }
+                    }
+                }
+                span.value {}
+            }
         }
     }
 }
 
-fn strip_row(strip: &Strip, ticks: &[f64], max: f64) -> Markup {
+fn strip_row(strip: &Strip) -> Markup {
     let distribution = Distribution::from_values(strip.dots.iter().map(|dot| dot.d_over_tau).collect());
-    let median = distribution.median.map_or_else(|| "no D".to_owned(), |m| format!("median {}", short(m)));
+    let median = distribution.median.map_or_else(|| "no D".to_owned(), |m| format!("median {m:.2}"));
     html! {
         div.row {
             span.name { (strip.name) }
             svg width="100%" height=(STRIP_HEIGHT) aria-hidden="true" {
-                (vertical_lines("grid", ticks.iter().map(|value| value / max)))
-                (vertical_lines("limit", std::iter::once(1.0 / max)))
-                (distribution_mark(&distribution, max))
-                @for (k, dot) in strip.dots.iter().enumerate() { (dot_mark(dot, k, max)) }
+                (vertical_lines("grid", D_TICKS.into_iter().map(d_share)))
+                (vertical_lines("limit", std::iter::once(d_share(1.0))))
+                (distribution_mark(&distribution))
+                @for (k, dot) in strip.dots.iter().enumerate() { (dot_mark(dot, k)) }
             }
             span.value { (median) br; "n " (distribution.n) }
         }
@@ -198,21 +203,25 @@ fn strip_row(strip: &Strip, ticks: &[f64], max: f64) -> Markup {
 }
 
 /// The k-th dot of a strip, offset vertically so that equal values stay apart.
-fn dot_mark(dot: &Dot, k: usize, max: f64) -> Markup {
+fn dot_mark(dot: &Dot, k: usize) -> Markup {
     let class = if dot.reached_goal { "dot" } else { "dot failed" };
     let offset = (((k * 5) % 9) as f64 - 4.0) * 2.4;
-    html! { circle class=(class) cx=(x(dot.d_over_tau / max)) cy=(y(0.5 * STRIP_HEIGHT + offset)) r="3" {} }
+    let (at, height) = (d_share(dot.d_over_tau), 0.5 * STRIP_HEIGHT + offset);
+    html! {
+        @if (0.0..=1.0).contains(&at) { circle class=(class) cx=(x(at)) cy=(y(height)) r="3" {} }
+        @else { text.beyond x=(x(at)) y=(y(height + 4.0)) text-anchor=(if at > 1.0 { "end" } else { "start" }) { (if at > 1.0 { "▶" } else { "◀" }) } }
+    }
 }
 
 /// P5 to P95, and the median.
-fn distribution_mark(of: &Distribution, max: f64) -> Markup {
+fn distribution_mark(of: &Distribution) -> Markup {
     let middle = y(0.5 * STRIP_HEIGHT);
     html! {
         @if let Some((low, high)) = of.p5.zip(of.p95) {
-            line.spread x1=(x(low / max)) x2=(x(high / max)) y1=(middle) y2=(middle) {}
+            line.spread x1=(x(d_share(low))) x2=(x(d_share(high))) y1=(middle) y2=(middle) {}
         }
         @if let Some(median) = of.median {
-            line.median x1=(x(median / max)) x2=(x(median / max)) y1="4" y2=(y(STRIP_HEIGHT - 4.0)) {}
+            line.median x1=(x(d_share(median))) x2=(x(d_share(median))) y1="4" y2=(y(STRIP_HEIGHT - 4.0)) {}
         }
     }
 }
@@ -308,7 +317,7 @@ fn trend_plot(trend: &FactorTrend, reference: [Option<f64>; 2]) -> Markup {
                 (rate_grid())
                 @for (series, reference) in SERIES.iter().zip(reference) { (trend_series(series, points, at, reference)) }
                 @for value in labelled {
-                    text.tick x=(x(at(value))) y=(y(PLOT_HEIGHT + 16.0)) text-anchor="middle" { (format_number(value)) }
+                    text.tick x=(x(at(value))) y=(y(PLOT_HEIGHT + 16.0)) text-anchor="middle" { (significant(value, 3)) }
                 }
                 text.tick x="50%" y=(y(PLOT_HEIGHT + 34.0)) text-anchor="middle" {
                     "value of " (name) @if is_log { ", log scale" }

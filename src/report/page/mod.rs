@@ -51,7 +51,7 @@ pub fn page(runs: &[RunSummary], out: &Path) -> String {
                         @if has_conditions { a href="#conditions" { "Conditions" } }
                         @if is_soft { a href="#deformation" { "Deformation" } }
                         a href="#tasks" { "Tasks" }
-                        a href="#failures" { "Unsafe episodes" }
+                        a href="#failures" { "Episodes that failed" }
                         a href="#settings" { "Settings" }
                     }
                 }
@@ -66,8 +66,8 @@ pub fn page(runs: &[RunSummary], out: &Path) -> String {
 fn sections(runs: &[RunSummary], out: &Path) -> Markup {
     // Collapsible, one per run.
     let tasks = html! {
-        @for run in runs {
-            details open[runs.len() <= MAX_EXPANDED] { summary { (run.name()) } (table(&task_table(run))) }
+        @for (i, run) in runs.iter().enumerate() {
+            details open[runs.len() <= MAX_EXPANDED] { summary { (run.name()) } (table(&format!("tasks-{i}"), &task_table(run))) }
         }
     };
     html! {
@@ -75,7 +75,7 @@ fn sections(runs: &[RunSummary], out: &Path) -> Markup {
         @if let Some(conditions) = conditions(runs) { (section("conditions", "Conditions", &conditions)) }
         @if let Some(deformation) = deformation(runs) { (section("deformation", "Deformation", &deformation)) }
         (section("tasks", "Tasks", &tasks))
-        (section("failures", "Unsafe episodes", &failures::failures(runs, out)))
+        (section("failures", "Episodes that failed", &failures::failures(runs, out)))
         (section("settings", "Settings", &html! { @for run in runs { (settings(run)) } }))
     }
 }
@@ -94,7 +94,7 @@ fn section(id: &str, heading: &str, content: &Markup) -> Markup {
 fn results(runs: &[RunSummary]) -> Markup {
     let any = |test: fn(&RunSummary) -> bool| runs.iter().any(test);
     html! {
-        (table(&main_table(runs)))
+        (table("results-table", &main_table(runs)))
         @if any(|run| run.summary.privileged) {
             p.note { b { "privileged" } ": the policy has access to ground-truth state, which no robot has." }
         }
@@ -106,9 +106,9 @@ fn results(runs: &[RunSummary]) -> Markup {
             (figures::goal_and_safety(runs))
             figcaption { "Goal Success (TSR) and Safety Success. The gap between them is invisible in success rates alone. Whiskers are 95 % Wilson intervals." }
         }
-        @if let Some(bootstrap) = bootstrap_table(runs) { (table(&bootstrap)) }
-        @if let Some(stages) = stage_table(runs) { (table(&stages)) }
-        @if let Some(commands) = command_table(runs) { (table(&commands)) }
+        @if let Some(bootstrap) = bootstrap_table(runs) { (table("bootstrap-table", &bootstrap)) }
+        @if let Some(stages) = stage_table(runs) { (table("stage-table", &stages)) }
+        @if let Some(commands) = command_table(runs) { (table("command-table", &commands)) }
     }
 }
 
@@ -117,7 +117,7 @@ fn conditions(runs: &[RunSummary]) -> Option<Markup> {
     let effects = condition_effects(runs);
     let effects_table = effects_table(&effects)?;
     Some(html! {
-        (table(&effects_table))
+        (table("condition-table", &effects_table))
         @for suite in effects.iter().filter(|suite| !suite.trends().is_empty()) {
             figure {
                 (figures::trends(suite))
@@ -134,7 +134,7 @@ fn conditions(runs: &[RunSummary]) -> Option<Markup> {
 fn deformation(runs: &[RunSummary]) -> Option<Markup> {
     let (deformations, kappas) = (deformation_table(runs)?, kappa_table(runs)?);
     Some(html! {
-        (table(&deformations))
+        (table("deformation-table", &deformations))
         figure {
             (figures::distributions(runs))
             figcaption { "Peak deformation of every valid episode, divided by the threshold τ of its object; episodes right of the line are unsafe. Hollow dots missed the goal. Bars span P5 to P95; the tick is the median." }
@@ -145,9 +145,9 @@ fn deformation(runs: &[RunSummary]) -> Option<Markup> {
                 figure { (figures::by_asset(run)) }
             }
         }
-        @if let Some(crushed) = crushed_table(runs) { (table(&crushed)) }
+        @if let Some(crushed) = crushed_table(runs) { (table("crushed-table", &crushed)) }
         h3 { "Strictness of the threshold" }
-        (table(&kappas))
+        (table("kappa-table", &kappas))
         figure {
             (figures::kappa_curves(runs))
             figcaption { "Safety Success for stricter (left) and looser (right) thresholds; κ = 0.5 is nominal." }
@@ -155,40 +155,46 @@ fn deformation(runs: &[RunSummary]) -> Option<Markup> {
     })
 }
 
-/// A table that scrolls horizontally where it is too wide.
-fn table(table: &ResultTable) -> Markup {
+/// A table with its caption. The table scrolls where it is too wide, the caption does not; narrow windows show rows as
+/// cards. `id` is unique on the page.
+fn table(id: &str, table: &ResultTable) -> Markup {
     let has_index = table.rows.iter().all(|row| row[0].chars().all(|c| c.is_ascii_digit()));
     let class = |column: usize| match column {
         0 if has_index => "index",
         column if column < TEXT_COLUMNS => "text",
         _ => "number",
     };
-    let head = html! {
-        @for (i, head) in table.head.iter().enumerate() { th scope="col" class=(class(i)) { (head) } }
-    };
     let row = |row: &[String]| {
         html! {
-            th scope="row" class=(class(0)) { (row[0]) }
+            th scope="row" class=(class(0)) data-head=(table.head[0]) { (breakable(&row[0])) }
             @for (i, text) in row.iter().enumerate().skip(1) {
-                td class=(class(i)) { (cell(text, i < TEXT_COLUMNS)) }
+                td class=(class(i)) data-head=(table.head[i]) { (cell(text, i < TEXT_COLUMNS)) }
             }
         }
     };
     html! {
-        div.scroll tabindex="0" role="group" aria-label=(table.caption) {
-            table {
-                caption { span { (table.caption) } }
-                thead { tr { (head) } }
-                tbody { @for cells in &table.rows { tr { (row(cells)) } } }
+        figure.table {
+            div.scroll tabindex="0" role="group" aria-labelledby=(id) {
+                table.cards aria-labelledby=(id) {
+                    thead { tr { @for (i, head) in table.head.iter().enumerate() { th scope="col" class=(class(i)) { (head) } } } }
+                    tbody { @for cells in &table.rows { tr { (row(cells)) } } }
+                }
             }
+            figcaption id=(id) { (table.caption) }
         }
     }
+}
+
+/// A name that may break after underscores.
+fn breakable(name: &str) -> Markup {
+    html! { @for (i, part) in name.split('_').enumerate() { @if i > 0 { "_" wbr; } (part) } }
 }
 
 /// A cell; the interval of a number is shown below it.
 fn cell(text: &str, is_text: bool) -> Markup {
     match text.split_once(" [").filter(|_| !is_text) {
         Some((number, interval)) => html! { (number) " " span.interval { "[" (interval) } },
+        None if is_text => breakable(text),
         None => html! { (text) },
     }
 }

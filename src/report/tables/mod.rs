@@ -443,6 +443,7 @@ fn escape_latex(text: &str) -> String {
             '→' => out += "$\\rightarrow$",
             '×' => out += "$\\times$",
             '·' => out += "$\\cdot$",
+            '−' => out += "$-$",
             '–' => out += "--",
             '…' => out += "\\ldots{}",
             '∞' => out += "$\\infty$",
