@@ -19,7 +19,8 @@ local TABLE = [[
 local MIDDLE = [[
 
 Each plot shows D (% of the bounding-box diagonal) over the width. Dots are stable squeezes, rings unstable ones; diamonds are peaks of D
-in hold trials, filled if all trials held; dashed lines are τ and D_ref, and the band is the safe window.
+in hold trials, filled if all trials held; dashed lines are τ and D_ref, and the band is the safe window. A hatched band holds for presses
+only: the carried object was above τ at every width, which "pressed only" says in the table.
 ]]
 
 local PROTOCOLS = { press = "Sweep: press test", hand = "Sweep: the robot's hand, where D_ref is the largest stable D" }
@@ -33,6 +34,7 @@ return function(names, found, o)
     local known = found[name]
     local window, d_ref = known.window, known.d_ref
     local force = number("%.2f", window.loose.force_n) .. " to " .. number("%.2f", window.tight.force_n)
+    local is_pressed_only = known.carried_d and known.tau and known.carried_d > known.tau
     local cells = {
       ("[%s](#%s)"):format(name, name),
       number("%.2f", known.stable_strain),
@@ -42,13 +44,14 @@ return function(names, found, o)
       number("%.3f", d_ref and 0.7 * d_ref),
       number("%.2f", window.loose.width_mm),
       number("%.2f", window.tight.width_mm),
-      number("%.2f", window.extent_mm),
+      number("%.2f", window.extent_mm) .. (is_pressed_only and " (pressed only)" or ""),
       force,
       number("%.3f", known.carried_d),
       known.censored or "no",
     }
     rows[#rows + 1] = "| " .. table.concat(cells, " | ") .. " |\n"
-    plots[#plots + 1] = ("\n## %s\n\n![](../assets/calibration/%s.svg)\n\n```text\n%s```\n"):format(
+    plots[#plots + 1] = ("\n## %s\n\n![D of %s over the width between the gels](../assets/calibration/%s.svg)\n\n```text\n%s```\n"):format(
+      name,
       name,
       name,
       known.text

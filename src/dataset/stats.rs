@@ -1,11 +1,12 @@
 //! Distributions of actions, lengths and deformations in a dataset.
 
-use std::{fmt::Write, path::Path};
+use std::path::Path;
 
 use serde::Serialize;
 
 use super::{DatasetError, TaskFile};
 use softvt_common::text::{TextColumn, TextTable, decimal};
+use softvt_media::histogram::{self, Histogram};
 
 /// Columns of an action.
 const ACTION_NAMES: [&str; 7] =
@@ -95,46 +96,10 @@ pub fn table(columns: &[ColumnStatistics]) -> String {
     table.text
 }
 
-/// Width and height of a histogram with its labels, and histograms per row.
-const CELL_WIDTH: usize = 260;
-const CELL_HEIGHT: usize = 160;
-const COLUMNS: usize = 4;
-
 /// The histograms as an SVG image.
 pub fn svg(columns: &[ColumnStatistics]) -> String {
-    let rows = columns.len().div_ceil(COLUMNS);
-    let (width, height) = (CELL_WIDTH, CELL_HEIGHT);
-    let mut page = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" \
-         font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
-        COLUMNS * width,
-        rows * height
-    );
-    for (at, s) in columns.iter().enumerate() {
-        let (x, y) = (at % COLUMNS * width + 20, at / COLUMNS * height + 24);
-        let _ = writeln!(page, "<text x=\"{x}\" y=\"{y}\" font-weight=\"bold\">{}</text>", s.name);
-        let max_count = s.bins.iter().copied().max().unwrap_or(1).max(1) as f64;
-        let bar = (width - 40) as f64 / BINS as f64;
-        for (i, count) in s.bins.iter().enumerate() {
-            let high = (height - 64) as f64 * *count as f64 / max_count;
-            let left = x as f64 + bar * i as f64;
-            let top = (y + height - 56) as f64 - high;
-            let _ = writeln!(
-                page,
-                "<rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{high:.1}\" fill=\"#3b7dd8\"/>",
-                bar - 1.0
-            );
-        }
-        let under = y + height - 42;
-        let _ = writeln!(page, "<text x=\"{x}\" y=\"{under}\" fill=\"#555\">{:.3}</text>", s.min);
-        let right = x + width - 40;
-        let _ = writeln!(
-            page,
-            "<text x=\"{right}\" y=\"{under}\" fill=\"#555\" text-anchor=\"end\">{:.3}</text>",
-            s.max
-        );
-    }
-    page + "</svg>\n"
+    let panels = columns.iter().map(|s| Histogram { title: &s.name, min: s.min, max: s.max, bins: &s.bins });
+    histogram::svg(&panels.collect::<Vec<_>>())
 }
 
 #[cfg(test)]
@@ -149,6 +114,6 @@ mod tests {
         assert_eq!((s.bins[0], s.bins[BINS - 1], s.bins.iter().sum::<usize>()), (1, 1, 4));
         assert_eq!(ColumnStatistics::new("none", Vec::new()), None);
         let page = svg(&[s]);
-        assert!(page.starts_with("<svg") && page.matches("<rect").count() == BINS + 1, "{page}");
+        assert!(page.starts_with("<svg") && page.matches("class=\"bar\"").count() == 4, "{page}");
     }
 }

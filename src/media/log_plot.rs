@@ -1,6 +1,9 @@
 //! Panels of curves with logarithmic axes, as SVG.
 
-use super::plot::{CURVE, PlotPoint, line, text};
+use super::{
+    plot::PlotPoint,
+    svg::{self, Anchor, Place, at, circle, line, polyline, text},
+};
 
 /// Width and height of a panel, px.
 const PANEL: [f64; 2] = [320.0, 240.0];
@@ -9,7 +12,7 @@ const LEFT: f64 = 52.0;
 const RIGHT: f64 = 14.0;
 const TOP: f64 = 26.0;
 const BOTTOM: f64 = 40.0;
-const GRID: &str = "stroke=\"#dddddd\"";
+const FONT_SIZE: f64 = 11.0;
 
 /// A curve of positive values in a panel of its own.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,10 +29,8 @@ pub struct LogPanel {
 pub fn svg(panels: &[LogPanel]) -> String {
     let [width, height] = [2.0 * PANEL[0], PANEL[1] * panels.len().div_ceil(2) as f64];
     let drawn: String = panels.iter().enumerate().map(|(index, panel)| draw(index, panel)).collect();
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" \
-         font-size=\"11\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n{drawn}</svg>\n"
-    )
+    let titles: Vec<&str> = panels.iter().map(|panel| panel.title.as_str()).collect();
+    svg::image(width, height, FONT_SIZE, &titles.join("; "), &drawn)
 }
 
 /// The range of whole powers of ten around values.
@@ -66,26 +67,22 @@ fn draw(index: usize, panel: &LogPanel) -> String {
     let x = |value: f64| left + across.share(value) * (right - left);
     let y = |value: f64| base - up.share(value) * (base - top);
     let columns = across.ticks().map(|tick| {
-        line(x(tick), top, x(tick), base, GRID) + &text(x(tick), base + 14.0, "middle", &short(tick))
+        line(at(x(tick), top), at(x(tick), base), "grid")
+            + &text(at(x(tick), base + 14.0), Anchor::Middle, "", &short(tick))
     });
     let rows = up.ticks().map(|tick| {
-        line(left, y(tick), right, y(tick), GRID) + &text(left - 5.0, y(tick) + 4.0, "end", &short(tick))
+        line(at(left, y(tick)), at(right, y(tick)), "grid")
+            + &text(at(left - 5.0, y(tick) + 4.0), Anchor::End, "", &short(tick))
     });
-    let at = |point: &PlotPoint| format!("{:.1},{:.1}", x(point.x), y(point.y));
-    let path: Vec<String> = panel.points.iter().map(at).collect();
-    let mark = |point: &PlotPoint| {
-        let fill = if point.is_filled { CURVE } else { "white" };
-        format!(
-            "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"3\" fill=\"{fill}\" stroke=\"{CURVE}\"/>\n",
-            x(point.x),
-            y(point.y)
-        )
+    let places: Vec<Place> = panel.points.iter().map(|point| at(x(point.x), y(point.y))).collect();
+    let mark = |(point, place): (&PlotPoint, &Place)| {
+        circle(*place, 3.0, if point.is_filled { "dot" } else { "ring" })
     };
     let grid: String = columns.chain(rows).collect();
-    grid + &format!("<polyline points=\"{}\" fill=\"none\" stroke=\"{CURVE}\"/>\n", path.join(" "))
-        + &panel.points.iter().map(mark).collect::<String>()
-        + &text(left, y0 + 16.0, "start", &panel.title)
-        + &text(0.5 * (left + right), base + 30.0, "middle", &panel.x_label)
+    grid + &polyline(&places, "curve")
+        + &panel.points.iter().zip(&places).map(mark).collect::<String>()
+        + &text(at(left, y0 + 16.0), Anchor::Start, "title", &panel.title)
+        + &text(at(0.5 * (left + right), base + 30.0), Anchor::Middle, "", &panel.x_label)
 }
 
 /// A power of ten.

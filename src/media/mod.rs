@@ -1,7 +1,12 @@
-//! Drawing on images ([`canvas`]), plots ([`plot`], [`log_plot`]) and video files ([`video`]).
+//! Drawing on images ([`canvas`]), plots as SVG ([`plot`], [`log_plot`], [`histogram`]) of the same elements ([`svg`]),
+//! axes ([`ticks`]) and colours ([`palette`]), and video files ([`video`]).
 #![warn(missing_docs, unreachable_pub)]
 
 pub mod canvas;
+pub mod histogram;
 pub mod log_plot;
+pub mod palette;
 pub mod plot;
+pub mod svg;
+pub mod ticks;
 pub mod video;

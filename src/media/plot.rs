@@ -1,20 +1,24 @@
 //! A plot of values over a horizontal axis, as SVG.
 
-use std::fmt::Write;
+use super::{
+    svg::{self, Anchor, Area, Place, at, circle, diamond, line, polyline, rect, text, upward_text},
+    ticks::{linear_ticks, tick_label, tick_step},
+};
 
 /// Size of the image, px.
 const WIDTH: f64 = 640.0;
-const HEIGHT: f64 = 300.0;
+const HEIGHT: f64 = 320.0;
 /// Margins around the plotting area, px.
 const LEFT: f64 = 64.0;
-const RIGHT: f64 = 16.0;
-const TOP: f64 = 34.0;
+const RIGHT: f64 = 84.0;
+const TOP: f64 = 62.0;
 const BOTTOM: f64 = 46.0;
-/// Intervals between the labels of the horizontal axis.
-const TICKS: u32 = 5;
-
-pub(super) const CURVE: &str = "#2050a0";
-const DIAMOND: &str = "#c07020";
+const FONT_SIZE: f64 = 12.0;
+/// Numbers of intervals of the axes, at most.
+const X_TICKS: usize = 6;
+const Y_TICKS: usize = 5;
+/// Width of a letter, px, from which it follows whether a label fits.
+const LETTER: f64 = 6.6;
 
 /// Contents of a plot. The vertical axis begins at 0.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -23,11 +27,11 @@ pub struct Plot {
     pub title: String,
     /// Ends of the horizontal axis.
     pub x: HorizontalAxis,
+    /// Title of the vertical axis, with its unit.
+    pub y_label: String,
     /// Value at the upper end of the vertical axis, positive.
     pub top: f64,
-    /// Label of the lower end of the vertical axis.
-    pub zero: String,
-    /// Range of the horizontal axis with a green background.
+    /// Range of the horizontal axis with a coloured background.
     pub band: Option<AxisBand>,
     /// Dashed horizontal lines.
     pub levels: Vec<LevelLine>,
@@ -57,6 +61,8 @@ pub struct AxisBand {
     pub left: f64,
     /// Right end.
     pub right: f64,
+    /// Text in the band where it does not hold what it seems to; the band is then hatched.
+    pub objection: Option<&'static str>,
 }
 
 /// A value on the vertical axis.
@@ -64,7 +70,7 @@ pub struct AxisBand {
 pub struct LevelLine {
     /// The value.
     pub y: f64,
-    /// Text beside the axis.
+    /// Text at the right end of the line.
     pub label: String,
 }
 
@@ -86,36 +92,28 @@ pub struct VerticalMark {
     pub x: f64,
     /// Text above the line.
     pub label: String,
-    /// Side of the line on which the text is.
-    pub side: LabelSide,
-}
-
-/// Side of a vertical line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LabelSide {
-    /// The text ends at the line.
-    Left,
-    /// The text begins at the line.
-    Right,
 }
 
 /// An image with a text in place of a plot, as SVG.
 pub fn text_image(what: &str) -> String {
-    image(&text(LEFT, TOP, "start", what))
+    image(what, &text(at(LEFT, TOP), Anchor::Start, "", what))
 }
 
 impl Plot {
     /// The plot as SVG.
     pub fn svg(&self) -> String {
+        let title = text(at(12.0, 20.0), Anchor::Start, "title", &self.title);
         let parts = [
+            self.grid(),
             self.background(),
             self.axes(),
             self.level_lines(),
             self.curve(),
             self.diamonds(),
             self.mark_lines(),
+            title,
         ];
-        image(&(parts.concat() + &text(LEFT, 20.0, "start", &self.title)))
+        image(&self.title, &parts.concat())
     }
 
     fn x_px(&self, x: f64) -> f64 {
@@ -128,39 +126,55 @@ impl Plot {
         HEIGHT - BOTTOM - share * (HEIGHT - TOP - BOTTOM)
     }
 
+    fn place(&self, point: &PlotPoint) -> Place {
+        at(self.x_px(point.x), self.y_px(point.y))
+    }
+
     fn background(&self) -> String {
-        let Some(AxisBand { left, right }) = self.band else { return String::new() };
+        let Some(AxisBand { left, right, objection }) = self.band else { return String::new() };
         let (from, to) = (self.x_px(left), self.x_px(right));
-        format!(
-            "<rect x=\"{from:.1}\" y=\"{TOP}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"#d9efd9\"/>\n",
-            to - from,
-            HEIGHT - TOP - BOTTOM
-        )
+        let area = Area { x: from, y: TOP, width: to - from, height: HEIGHT - TOP - BOTTOM };
+        let class = if objection.is_some() { "pressed" } else { "band" };
+        let said = objection
+            .map(|what| text(at(0.5 * (from + to), HEIGHT - BOTTOM - 10.0), Anchor::Middle, "over", what));
+        rect(area, class) + &said.unwrap_or_default()
+    }
+
+    fn grid(&self) -> String {
+        let drawn = linear_ticks(0.0, self.top, Y_TICKS).into_iter().map(|tick| {
+            let y = self.y_px(tick);
+            line(at(LEFT, y), at(WIDTH - RIGHT, y), "grid")
+        });
+        drawn.collect()
     }
 
     fn axes(&self) -> String {
         let base = HEIGHT - BOTTOM;
-        let black = "stroke=\"black\"";
         let HorizontalAxis { label, left, right } = &self.x;
-        let tick = |k: u32| {
-            let value = left - (left - right) * f64::from(k) / f64::from(TICKS);
-            let x = self.x_px(value);
-            line(x, base, x, base + 4.0, black) + &text(x, base + 17.0, "middle", &format!("{value:.1}"))
-        };
-        let ticks: String = (0..=TICKS).map(tick).collect();
+        let step = tick_step((left - right).abs(), X_TICKS);
+        let below = linear_ticks(*left, *right, X_TICKS).into_iter().map(|tick| {
+            let x = self.x_px(tick);
+            let label = text(at(x, base + 17.0), Anchor::Middle, "", &tick_label(tick, step));
+            line(at(x, base), at(x, base + 4.0), "axis") + &label
+        });
+        let step = tick_step(self.top, Y_TICKS);
+        let beside = linear_ticks(0.0, self.top, Y_TICKS).into_iter().map(|tick| {
+            text(at(LEFT - 6.0, self.y_px(tick) + 4.0), Anchor::End, "", &tick_label(tick, step))
+        });
         let middle = LEFT + (WIDTH - LEFT - RIGHT) / 2.0;
-        line(LEFT, base, WIDTH - RIGHT, base, black)
-            + &line(LEFT, TOP, LEFT, base, black)
+        let ticks: String = below.chain(beside).collect();
+        line(at(LEFT, base), at(WIDTH - RIGHT, base), "axis")
+            + &line(at(LEFT, TOP), at(LEFT, base), "axis")
             + &ticks
-            + &text(middle, HEIGHT - 10.0, "middle", label)
-            + &text(LEFT - 6.0, base, "end", &self.zero)
+            + &text(at(middle, HEIGHT - 10.0), Anchor::Middle, "", label)
+            + &upward_text(at(16.0, 0.5 * (TOP + base)), &self.y_label)
     }
 
     fn level_lines(&self) -> String {
-        let dashed = "stroke=\"#b03030\" stroke-dasharray=\"5 4\"";
         let drawn = self.levels.iter().map(|LevelLine { y, label }| {
             let y = self.y_px(*y);
-            line(LEFT, y, WIDTH - RIGHT, y, dashed) + &text(LEFT - 6.0, y + 4.0, "end", label)
+            line(at(LEFT, y), at(WIDTH - RIGHT, y), "limit")
+                + &text(at(WIDTH - RIGHT + 6.0, y + 4.0), Anchor::Start, "", label)
         });
         drawn.collect()
     }
@@ -169,64 +183,38 @@ impl Plot {
         if self.curve.is_empty() {
             return String::new();
         }
-        let path: Vec<String> = self
+        let places: Vec<Place> = self.curve.iter().map(|point| self.place(point)).collect();
+        let dots = self
             .curve
             .iter()
-            .map(|point| format!("{:.1},{:.1}", self.x_px(point.x), self.y_px(point.y)))
-            .collect();
-        let mut drawn =
-            format!("<polyline points=\"{}\" fill=\"none\" stroke=\"{CURVE}\"/>\n", path.join(" "));
-        for point in &self.curve {
-            let fill = if point.is_filled { CURVE } else { "white" };
-            let (x, y) = (self.x_px(point.x), self.y_px(point.y));
-            let _ = writeln!(
-                drawn,
-                "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\" fill=\"{fill}\" stroke=\"{CURVE}\"/>"
-            );
-        }
-        drawn
+            .zip(&places)
+            .map(|(point, place)| circle(*place, 3.0, if point.is_filled { "dot" } else { "ring" }));
+        polyline(&places, "curve") + &dots.collect::<String>()
     }
 
     fn diamonds(&self) -> String {
-        let drawn = self.diamonds.iter().map(|point| {
-            let fill = if point.is_filled { DIAMOND } else { "white" };
-            let (x, y) = (self.x_px(point.x), self.y_px(point.y));
-            let (left, right, top, bottom) = (x - 4.0, x + 4.0, y - 4.0, y + 4.0);
-            format!(
-                "<polygon points=\"{left:.1},{y:.1} {x:.1},{top:.1} {right:.1},{y:.1} {x:.1},{bottom:.1}\" \
-                 fill=\"{fill}\" stroke=\"{DIAMOND}\"/>\n"
-            )
-        });
+        let drawn = self
+            .diamonds
+            .iter()
+            .map(|point| diamond(self.place(point), 4.0, if point.is_filled { "mark" } else { "mark-ring" }));
         drawn.collect()
     }
 
+    /// Lines with their labels, each in a row of its own, on the side on which it fits.
     fn mark_lines(&self) -> String {
-        let drawn = self.marks.iter().map(|VerticalMark { x, label, side }| {
+        let drawn = self.marks.iter().enumerate().map(|(row, VerticalMark { x, label })| {
             let x = self.x_px(*x);
-            let anchor = match side {
-                LabelSide::Left => "end",
-                LabelSide::Right => "start",
-            };
-            line(x, TOP, x, HEIGHT - BOTTOM, "stroke=\"#308030\"") + &text(x, TOP - 2.0, anchor, label)
+            let y = TOP - 18.0 + 14.0 * (row % 2) as f64;
+            let fits = x + LETTER * label.chars().count() as f64 <= WIDTH;
+            let (anchor, gap) = if fits { (Anchor::Start, 4.0) } else { (Anchor::End, -4.0) };
+            line(at(x, y - 10.0), at(x, HEIGHT - BOTTOM), "end") + &text(at(x + gap, y), anchor, "", label)
         });
         drawn.collect()
     }
 }
 
-fn image(contents: &str) -> String {
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" font-family=\"sans-serif\" \
-         font-size=\"12\">\n<rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"white\"/>\n{contents}</svg>\n"
-    )
-}
-
-pub(super) fn text(x: f64, y: f64, anchor: &str, what: &str) -> String {
-    let escaped = what.replace('&', "&amp;").replace('<', "&lt;");
-    format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{escaped}</text>\n")
-}
-
-pub(super) fn line(x1: f64, y1: f64, x2: f64, y2: f64, style: &str) -> String {
-    format!("<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" {style}/>\n")
+fn image(label: &str, contents: &str) -> String {
+    svg::image(WIDTH, HEIGHT, FONT_SIZE, label, contents)
 }
 
 #[cfg(test)]
@@ -238,29 +226,33 @@ mod tests {
         let plot = Plot {
             title: "a < b".to_owned(),
             x: HorizontalAxis { label: "width".to_owned(), left: 10.0, right: 0.0 },
+            y_label: "D, %".to_owned(),
             top: 2.0,
-            zero: "0".to_owned(),
-            band: Some(AxisBand { left: 10.0, right: 5.0 }),
+            band: Some(AxisBand { left: 10.0, right: 5.0, objection: None }),
             levels: vec![LevelLine { y: 1.0, label: "half".to_owned() }],
             curve: vec![
                 PlotPoint { x: 10.0, y: 0.0, is_filled: true },
                 PlotPoint { x: -7.0, y: 9.0, is_filled: false },
             ],
             diamonds: vec![PlotPoint { x: 5.0, y: 1.0, is_filled: true }],
-            marks: vec![VerticalMark { x: 5.0, label: "end".to_owned(), side: LabelSide::Left }],
+            marks: vec![VerticalMark { x: 5.0, label: "end".to_owned() }],
         };
         let svg = plot.svg();
         for part in [
-            "<rect x=\"64.0\" y=\"34\" width=\"280.0\" height=\"220.0\" fill=\"#d9efd9\"/>",
-            "<line x1=\"64.0\" y1=\"144.0\" x2=\"624.0\" y2=\"144.0\" stroke=\"#b03030\" stroke-dasharray=\"5 4\"/>",
-            "<polyline points=\"64.0,254.0 624.0,34.0\"",
-            "<circle cx=\"624.0\" cy=\"34.0\" r=\"3\" fill=\"white\"",
-            "<polygon points=\"340.0,144.0 344.0,140.0 348.0,144.0 344.0,148.0\"",
-            "<text x=\"344.0\" y=\"32.0\" text-anchor=\"end\">end</text>",
+            "<rect x=\"64.0\" y=\"62.0\" width=\"246.0\" height=\"212.0\" class=\"band\"/>",
+            "<line x1=\"64.0\" y1=\"168.0\" x2=\"556.0\" y2=\"168.0\" class=\"limit\"/>",
+            "<polyline points=\"64.0,274.0 556.0,62.0\"",
+            "<circle cx=\"556.0\" cy=\"62.0\" r=\"3\" class=\"ring\"",
+            "<polygon points=\"306.0,168.0 310.0,164.0 314.0,168.0 310.0,172.0\"",
+            "<text x=\"314.0\" y=\"44.0\" text-anchor=\"start\">end</text>",
             ">a &lt; b</text>",
+            ">D, %</text>",
         ] {
             assert!(svg.contains(part), "{part} in\n{svg}");
         }
+        let objection = Some("pressed only");
+        let hatched = Plot { band: Some(AxisBand { left: 10.0, right: 5.0, objection }), ..plot }.svg();
+        assert!(hatched.contains("class=\"pressed\"") && hatched.contains(">pressed only<"), "{hatched}");
         assert!(text_image("nothing").contains(">nothing</text>\n</svg>\n"));
     }
 }

@@ -1,12 +1,10 @@
 //! The safe interaction envelope of an asset as a plot of D over the width.
 
 use softvt_evaluation::{
-    calibration::{Envelope, HoldRow, SafeWindow, SweepRow},
+    calibration::{Envelope, HoldRow, SafeWindow, SweepRow, WindowEnd},
     safety::DeformationLimit,
 };
-use softvt_media::plot::{
-    AxisBand, HorizontalAxis, LabelSide, LevelLine, Plot, PlotPoint, VerticalMark, text_image,
-};
+use softvt_media::plot::{AxisBand, HorizontalAxis, LevelLine, Plot, PlotPoint, VerticalMark, text_image};
 
 /// Plots D over the width as SVG: stable squeezes as dots, unstable ones as rings, peak D of hold trials as diamonds
 /// (filled if every trial held), τ and D_ref as dashed lines, and the safe window as a band. Widths decrease to the
@@ -26,7 +24,9 @@ pub fn envelope_plot(asset: &str, envelope: &Envelope, limit: Option<Deformation
     let top = 1.05 * d_max.max(1e-9);
     let widest = if widest > narrowest { widest } else { widest + 1.0 };
     let has_carried = envelope.holds.iter().any(|row| row.d_peak_pct.is_some());
-    let trials = if has_carried { "; diamonds: lifted and held" } else { "" };
+    let trials = if has_carried { " · diamonds: lifted and held" } else { "" };
+    let objection = limit.filter(|limit| envelope.exceeds_when_carried(*limit)).map(|_| "pressed only");
+    let verdict = if objection.is_some() { ": cannot be carried below τ" } else { "" };
     // Failed trials beyond the axes are left out.
     let carried = |row: &HoldRow| {
         let d_pct = row.d_peak_pct.filter(|d| *d <= top && row.width_mm <= widest)?;
@@ -34,15 +34,15 @@ pub fn envelope_plot(asset: &str, envelope: &Envelope, limit: Option<Deformation
     };
     let squeezed = |row: &&SweepRow| PlotPoint { x: row.width_mm, y: row.d_pct, is_filled: row.stable };
     Plot {
-        title: format!("{asset}: D over the width between the gels{trials}"),
+        title: format!("{asset}{verdict}{trials}"),
         x: HorizontalAxis {
-            label: "width, mm (closing to the right)".to_owned(),
+            label: "width between the gels, mm (closing to the right)".to_owned(),
             left: widest,
             right: narrowest,
         },
         top,
-        zero: "0 %".to_owned(),
-        band: band(&envelope.window),
+        y_label: "D, % of the diagonal".to_owned(),
+        band: band(&envelope.window, objection),
         levels: limit.map_or_else(Vec::new, limit_levels),
         curve: rows.iter().map(squeezed).collect(),
         diamonds: envelope.holds.iter().filter_map(carried).collect(),
@@ -51,26 +51,23 @@ pub fn envelope_plot(asset: &str, envelope: &Envelope, limit: Option<Deformation
     .svg()
 }
 
-fn band(window: &SafeWindow) -> Option<AxisBand> {
+fn band(window: &SafeWindow, objection: Option<&'static str>) -> Option<AxisBand> {
     window.extent_mm()?;
-    Some(AxisBand { left: window.loose.width_mm?, right: window.tight.width_mm? })
+    Some(AxisBand { left: window.loose.width_mm?, right: window.tight.width_mm?, objection })
 }
 
 fn limit_levels(limit: DeformationLimit) -> Vec<LevelLine> {
     let level = |d: f64, name: &str| LevelLine { y: d, label: format!("{name} {d:.2} %") };
-    vec![level(limit.tau_pct(), "τ"), level(limit.d_ref_pct, "")]
+    vec![level(limit.tau_pct(), "τ"), level(limit.d_ref_pct, "D_ref")]
 }
 
 /// The two ends of the window with their widths and forces.
 fn window_ends(window: &SafeWindow) -> Vec<VerticalMark> {
-    let end = |width: Option<f64>, force: Option<f64>, side: LabelSide| {
-        let (width, force) = width.zip(force)?;
-        Some(VerticalMark { x: width, label: format!("{width:.1} mm, {force:.2} N"), side })
+    let end = |name: &str, WindowEnd { width_mm, force_n }: WindowEnd| {
+        let (width, force) = width_mm.zip(force_n)?;
+        Some(VerticalMark { x: width, label: format!("{name}: {width:.1} mm, {force:.2} N") })
     };
-    let ends = [
-        end(window.loose.width_mm, window.loose.force_n, LabelSide::Left),
-        end(window.tight.width_mm, window.tight.force_n, LabelSide::Right),
-    ];
+    let ends = [end("loose", window.loose), end("tight", window.tight)];
     ends.into_iter().flatten().collect()
 }
 
@@ -96,7 +93,7 @@ mod tests {
         let svg = plotted(&envelope);
         let count = |what: &str| svg.matches(what).count();
         assert_eq!(count("<circle"), envelope.sweep.len(), "{svg}");
-        assert_eq!((count("stroke-dasharray"), count("#d9efd9")), (2, 1), "{svg}");
+        assert_eq!((count("class=\"limit\""), count("class=\"band\"")), (2, 1), "{svg}");
         for end in [envelope.window.loose, envelope.window.tight] {
             let (width, force) = (end.width_mm.unwrap(), end.force_n.unwrap());
             assert!(svg.contains(&format!("{width:.1} mm, {force:.2} N")), "{svg}");
@@ -105,7 +102,7 @@ mod tests {
         assert!(svg.contains(&format!("τ {tau:.2} %")), "{svg}");
         assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n") && !svg.contains("NaN"));
         envelope.window.tight = envelope.window.loose;
-        assert_eq!(plotted(&envelope).matches("#d9efd9").count(), 0, "an empty window has no band");
+        assert_eq!(plotted(&envelope).matches("class=\"band\"").count(), 0, "an empty window has no band");
     }
 
     #[test]
@@ -119,6 +116,16 @@ mod tests {
         let peak = |row: &HoldRow| Some(if row.all_held() { 9.0 } else { 99.0 });
         envelope.holds.iter_mut().for_each(|row| row.d_peak_pct = peak(row));
         assert_eq!(diamonds(&envelope), held);
+    }
+
+    #[test]
+    fn a_window_in_which_nothing_can_be_carried_is_hatched() {
+        let mut envelope = calibrated();
+        assert!(!plotted(&envelope).contains("cannot be carried"));
+        envelope.carried_d_pct = Some(1.0 + envelope.limit(0.5).unwrap().tau_pct());
+        let svg = plotted(&envelope);
+        assert!(svg.contains("cannot be carried below τ") && svg.contains("class=\"pressed\""), "{svg}");
+        assert!(!svg.contains("class=\"band\""), "{svg}");
     }
 
     #[test]
