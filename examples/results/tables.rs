@@ -94,7 +94,7 @@ pub fn page(results: &[Results], labels: &Value, physics: &str) -> String {
                     cell["invalid"].to_string(),
                     rate("goal_success_rate"),
                     rate("no_drop_rate"),
-                    rate("safety_success_rate"),
+                    safety(cell),
                     median("d_over_tau_median"),
                     median("grip_ratio_median"),
                     number(&cell["goal_time_s_median"], 1),
@@ -173,11 +173,16 @@ fn title(name: &str) -> String {
 
 /// Goal and Safety with its interval.
 fn verdicts(cell: &Value) -> String {
-    format!(
-        "{} / {}",
-        number(&cell["goal_success_rate"]["rate"], 1),
+    format!("{} / {}", number(&cell["goal_success_rate"]["rate"], 1), safety(cell))
+}
+
+/// Safety with its interval. Where no object has a limit, Safety does not apply.
+fn safety(cell: &Value) -> String {
+    if cell["d_over_tau_median"].is_null() {
+        "N/A".to_owned()
+    } else {
         with_interval(&cell["safety_success_rate"])
-    )
+    }
 }
 
 fn with_interval(rate: &Value) -> String {

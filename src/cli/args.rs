@@ -84,6 +84,9 @@ pub(crate) struct RunFlags {
     /// Condition on each suite, such as "safety>=0.9"; exit code 99 if it does not hold
     #[arg(long = "require", value_name = "CONDITION")]
     pub requirements: Vec<Requirement>,
+    /// Print all tasks and figures, not only tasks that failed
+    #[arg(long, conflicts_with = "json")]
+    pub details: bool,
     /// Print JSON; an array for a list of suites, a line per row for an experiment
     #[arg(long)]
     pub json: bool,

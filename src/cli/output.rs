@@ -1,6 +1,7 @@
 //! Standard output and progress.
 
 use std::{
+    collections::BTreeMap,
     io::{self, IsTerminal, Write},
     path::Path,
     sync::{
@@ -11,6 +12,7 @@ use std::{
     time::Duration,
 };
 
+use console::Term;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::error::CliError;
@@ -18,6 +20,8 @@ use softvt_common::{
     parallel::lock,
     text::{self, counted},
 };
+use softvt_evaluation::category::EpisodeCategory;
+use softvt_report::styled_text::TerminalFormat;
 use softvt_runner::{
     Observer,
     recording::RecordingSummary,
@@ -30,12 +34,37 @@ use softvt_runner::{
 /// # Errors
 /// The text cannot be written, for example to a full disk.
 pub(crate) fn print(text: &str) -> Result<(), CliError> {
+    write_out(&text::escape_control(text))
+}
+
+fn write_out(text: &str) -> Result<(), CliError> {
     let mut out = io::stdout().lock();
-    match out.write_all(text::escape_control(text).as_bytes()).and_then(|()| out.flush()) {
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(CliError::input(format!("cannot write to standard output: {error}")))
         }
         _ => Ok(()),
+    }
+}
+
+/// Prints a table whose names have been escaped already, and which may have colours.
+///
+/// # Errors
+/// As [`print`].
+pub(crate) fn print_table(table: &str) -> Result<(), CliError> {
+    write_out(table)
+}
+
+/// The layout of tables for standard output: as wide as the terminal, coloured unless `NO_COLOR` is set; 80 columns and
+/// no colours where it is no terminal.
+pub(crate) fn terminal_format(has_details: bool) -> TerminalFormat {
+    let is_set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    let terminal = io::stdout().is_terminal();
+    let width = Term::stdout().size_checked().filter(|_| terminal).map(|(_, columns)| usize::from(columns));
+    TerminalFormat {
+        width: width.unwrap_or(TerminalFormat::DEFAULT_WIDTH).max(TerminalFormat::DEFAULT_WIDTH),
+        is_coloured: terminal && !is_set("NO_COLOR") && std::env::var("TERM").as_deref() != Ok("dumb"),
+        has_details,
     }
 }
 
@@ -143,6 +172,8 @@ pub(crate) struct Progress {
     first: Option<Activity>,
     total: usize,
     done: usize,
+    /// Number of episodes by category.
+    tally: BTreeMap<EpisodeCategory, usize>,
 }
 
 impl Progress {
@@ -150,7 +181,7 @@ impl Progress {
         let bar = std::io::stderr().is_terminal().then(|| {
             let bar = ProgressBar::new(total as u64);
             let template =
-                format!("{what} {{bar:32}} {{pos}}/{{len}}  {{elapsed}} elapsed, {{eta}} left  {{msg}}");
+                format!("{what} {{bar:10}} {{pos}}/{{len}}  {{elapsed}} elapsed, {{eta}} left  {{wide_msg}}");
             if let Ok(style) = ProgressStyle::with_template(&template) {
                 bar.set_style(style);
             }
@@ -158,13 +189,24 @@ impl Progress {
             bar
         });
         let first = bar.is_none().then(|| Activity::new(what));
-        Self { bar, first, total, done: 0 }
+        Self { bar, first, total, done: 0, tally: BTreeMap::new() }
     }
 
     /// There are `count` more jobs.
     pub(crate) fn expect(&mut self, count: usize) {
         self.total += count;
         self.bar.iter().for_each(|bar| bar.inc_length(count as u64));
+    }
+
+    /// Counts an episode.
+    pub(crate) fn judged(&mut self, category: EpisodeCategory) {
+        *self.tally.entry(category).or_insert(0) += 1;
+    }
+
+    /// The numbers of episodes by category, by their marks.
+    fn tally(&self) -> String {
+        let count = |(category, count): (&EpisodeCategory, &usize)| format!("{} {count}", category.glyph());
+        self.tally.iter().map(count).collect::<Vec<_>>().join(" ")
     }
 
     /// Reports the end of one job.
@@ -174,7 +216,8 @@ impl Progress {
         let message = text::escape_control(message);
         match &self.bar {
             Some(bar) => {
-                bar.set_message(message.into_owned());
+                let tally = self.tally();
+                bar.set_message(if tally.is_empty() { message.into_owned() } else { tally });
                 bar.inc(1);
             }
             None => text::eprint_line(&format!("[{}/{}] {message}", self.done, self.total)),
@@ -227,6 +270,12 @@ impl Observer for Console {
     fn advance(&self, line: &str) {
         if let Some(progress) = &mut *lock(&self.progress) {
             progress.tick(line);
+        }
+    }
+
+    fn judged(&self, category: EpisodeCategory) {
+        if let Some(progress) = &mut *lock(&self.progress) {
+            progress.judged(category);
         }
     }
 

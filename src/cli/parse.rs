@@ -9,9 +9,9 @@ use clap::{
 use super::{
     commands::{Command, run::RunArgs},
     error::CliError,
-    output::print,
+    output::{print, print_table, terminal_format},
 };
-use softvt_common::text;
+use softvt_common::text::{self, escape_control};
 use softvt_script::{OptionSpec, ScriptOptionValue};
 
 /// Parses the command line. Returns `None` if it asked for help or the version, which is then printed.
@@ -36,7 +36,10 @@ pub(super) fn parse(words: &[String]) -> Result<Option<Command>, CliError> {
     let matches = match command.try_get_matches_from(words) {
         Ok(matches) => matches,
         Err(error) if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
-            print(&error.to_string())?;
+            match terminal_format(false).is_coloured {
+                true => print_table(&error.render().ansi().to_string())?,
+                false => print(&error.to_string())?,
+            }
             return Ok(None);
         }
         Err(error) => return Err(in_file(usage_error(&error.to_string()))),
@@ -107,7 +110,7 @@ fn script_arg(option: &OptionSpec, help: &str) -> Arg {
     };
     let arg = Arg::new(script_arg_id(option))
         .long(option.flag().trim_start_matches("--").to_owned())
-        .help(format!("{help} [{}; default {default}]", option.expects()))
+        .help(escape_control(&format!("{help} [{}; default {default}]", option.expects())).into_owned())
         .help_heading("Options of the script");
     match option.default {
         ScriptOptionValue::Flag(_) => {

@@ -91,6 +91,7 @@ static EFFECTS: [Effect; 3] = [
             "trace",
             "video",
             "resume",
+            "details",
         ],
         acts_on: EPISODES,
     },
@@ -165,6 +166,7 @@ mod tests {
         ("resume", "--resume --out OUT"),
         ("shard", "--shard 1/2"),
         ("requirements", "--require safety>=0"),
+        ("details", "--details"),
     ];
 
     const PLANS: [(PlanKind, &str); 2] = [

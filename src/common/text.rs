@@ -162,7 +162,7 @@ pub struct TextTable {
 
 impl TextTable {
     /// Width of a rule, and the largest width of a table.
-    pub const WIDTH: usize = 99;
+    pub const WIDTH: usize = 79;
 
     /// An empty table.
     pub fn new(columns: impl Into<Vec<TextColumn>>) -> Self {

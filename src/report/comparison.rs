@@ -10,7 +10,8 @@ use serde_json::Value;
 
 use super::{
     stored_run::{StoredRun, records_as},
-    terminal::{TaskName, task_names},
+    styled_text::{Emphasis, StyledText, TerminalFormat},
+    task_names::{TaskName, task_names},
 };
 use softvt_benchmark::run_changes::RunChanges;
 use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
@@ -25,7 +26,7 @@ use softvt_records::{
 };
 
 /// Width of a policy's name in the header, columns.
-const POLICY_WIDTH: usize = 40;
+const POLICY_WIDTH: usize = 27;
 
 /// Differences of one task.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -281,44 +282,89 @@ fn in_project(path: &str) -> &str {
     start.map_or(path, |at| &path[at..])
 }
 
-/// The comparison as a plain-text table of at most 100 columns.
-pub fn table(comparison: &Comparison) -> String {
-    let mut table = TextTable::new(NAMED_COLUMNS);
-    table.line(format!(
+/// The comparison as a table: all episodes first, then the tasks in which a rate changed. With details it has all
+/// measures and all tasks.
+pub fn table(comparison: &Comparison, format: TerminalFormat) -> String {
+    let mut text = StyledText::new(format);
+    let title = format!(
         "{} → {} · {}",
         shortened(&comparison.first, POLICY_WIDTH),
         shortened(&comparison.second, POLICY_WIDTH),
         counted(comparison.all.pairs, "paired episode")
-    ));
-    table.rule();
+    );
+    text.line(Emphasis::Bold, title);
+    let mut table = TextTable::new(COLUMNS);
     let [first, second] = [0, 1].map(|side| shortened(&comparison.headings[side], HEADING_WIDTH));
     push_headings(&mut table, "", &first, &second);
-    let push = |table: &mut TextTable, name: &str, differences: &PairedComparison| {
-        push_rates(table, name, differences);
-        if comparison.deformable {
-            push_difference(table, "", "D peak, %", &differences.d_peak, 2);
-        }
-    };
-    let mut suite = "";
-    let tasks: Vec<TaskName> = comparison.by_task.iter().map(TaskDifferences::name).collect();
-    for (task, name) in comparison.by_task.iter().zip(task_names(&tasks)) {
-        if task.suite != suite {
-            suite = &task.suite;
-            table.rule();
-            table.line(shortened(suite, TextTable::WIDTH));
-        }
-        push(&mut table, &format!("{:>3} {name}", task.task), &task.differences);
+    push_rates(&mut table, &comparison.all);
+    if comparison.deformable {
+        push_difference(&mut table, "D/limit", &comparison.all.d_over_tau, 2);
+        push_difference(&mut table, "collapsed, %", &comparison.all.collapsed_volume_pct, 1);
     }
-    table.rule();
-    push(&mut table, "all", &comparison.all);
-    push_details(&mut table, comparison.deformable, &comparison.all);
-    table.rule();
-    table.line(LEGEND);
-    table.line("Goal is TSR · DSR: goal with D within τ · failed: better where more stages were completed");
-    table.line("N/A: no pair of episodes has it in both runs");
-    table.line(e_values(&comparison.all));
+    if format.has_details {
+        push_details(&mut table, comparison.deformable, &comparison.all);
+    }
+    text.plain(&table.text);
+    text.end();
+    push_tasks(&mut text, comparison, format);
+    push_notes(&mut text, comparison, format);
+    text.into_text()
+}
+
+/// One line per task in which a rate changed, or per task with details.
+fn push_tasks(text: &mut StyledText, comparison: &Comparison, format: TerminalFormat) {
+    let named: Vec<TaskName> = comparison.by_task.iter().map(TaskDifferences::name).collect();
+    let has_changed = |paired: &PairedComparison| {
+        [paired.goal, paired.no_drop, paired.safety].iter().any(|rate| rate.better + rate.worse > 0)
+    };
+    let all: Vec<(&TaskDifferences, String)> = comparison.by_task.iter().zip(task_names(&named)).collect();
+    let is_shown = |task: &TaskDifferences| format.has_details || has_changed(&task.differences);
+    let shown = all.iter().filter(|(task, _)| is_shown(task));
+    let mut table = TextTable::new([
+        TextColumn::Right(3),
+        TextColumn::Left(format.width.saturating_sub(1 + 57).clamp(14, 40)),
+        TextColumn::Right(16),
+        TextColumn::Right(16),
+        TextColumn::Right(18),
+    ]);
+    let mut suite = "";
+    table.row(["#", "task", "Goal, %", "Safety, %", "D/limit"]);
+    let headings = table.text.len();
+    for (task, name) in shown {
+        if task.suite != suite && comparison.by_task.iter().any(|other| other.suite != task.suite) {
+            table.line(shortened(&task.suite, TextTable::WIDTH));
+        }
+        suite = &task.suite;
+        let PairedComparison { goal, safety, d_over_tau, .. } = &task.differences;
+        let change = |of: &PairedDifference, digits: usize| match of.n {
+            0 => "N/A".to_owned(),
+            _ => format!("{} → {}", decimal(of.first, digits), decimal(of.second, digits)),
+        };
+        let [goal, safety] = [goal, safety].map(|rate| change(rate, 0));
+        table.row([task.task.to_string(), name.clone(), goal, safety, change(d_over_tau, 2)]);
+    }
+    if table.text.len() > headings {
+        text.plain(&table.text);
+    }
+    let hidden = all.iter().filter(|(task, _)| !is_shown(task)).count();
+    if hidden > 0 {
+        let them = format!("{} with the same rates; --details shows all", counted(hidden, "task"));
+        text.line(Emphasis::Faint, them);
+    }
+    text.end();
+}
+
+/// What the numbers mean, and what reduces their meaning.
+fn push_notes(text: &mut StyledText, comparison: &Comparison, format: TerminalFormat) {
+    let mut note = |sentence: &str| text.wrapped(sentence, format.width - 1);
+    note(LEGEND);
+    note("Goal is TSR · D/limit: peak D over τ · N/A: no pair of episodes has it in both runs");
+    if format.has_details {
+        note("DSR: goal with D within τ · failed: better where more stages were completed");
+    }
+    note(&e_values(&comparison.all));
     if comparison.all.invalid_pairs > 0 {
-        table.line(format!(
+        note(&format!(
             "{} with an invalid episode: failed in success rates; without D, time over τ and volumes",
             counted(comparison.all.invalid_pairs, "pair")
         ));
@@ -326,78 +372,61 @@ pub fn table(comparison: &Comparison) -> String {
     if comparison.unpaired > 0 {
         let verb = if comparison.unpaired == 1 { "was" } else { "were" };
         let episodes = counted(comparison.unpaired, "episode");
-        table.line(format!("{episodes} present in only one run {verb} skipped"));
+        note(&format!("{episodes} present in only one run {verb} skipped"));
     }
-    comparison.pairing.iter().chain(&comparison.incomplete).for_each(|sentence| table.line(sentence));
+    comparison.pairing.iter().chain(&comparison.incomplete).for_each(|sentence| note(sentence));
     if !comparison.differing_fields.is_empty() {
-        table.line(format!("the runs also differ in {} (run.json)", comparison.differing_fields.join(", ")));
+        note(&format!("the runs also differ in {} (run.json)", comparison.differing_fields.join(", ")));
     }
-    table.text
 }
 
 /// Width of a run's name in the headings, columns.
-const HEADING_WIDTH: usize = 10;
+const HEADING_WIDTH: usize = 8;
 
-/// As [`COLUMNS`], wide enough for the names of runs.
-const NAMED_COLUMNS: [TextColumn; 9] = {
+/// Columns of a table of differences: measure, both values, difference, better, worse, interval and p.
+pub(super) const COLUMNS: [TextColumn; 8] = {
     use TextColumn::{Left, Right};
-    [
-        Left(21),
-        Left(9),
-        Right(HEADING_WIDTH),
-        Right(HEADING_WIDTH),
-        Right(7),
-        Right(17),
-        Right(6),
-        Right(5),
-        Right(6),
-    ]
-};
-
-/// Columns of a table of differences: name, measure, both values, difference, interval, better, worse and p.
-pub(super) const COLUMNS: [TextColumn; 9] = {
-    use TextColumn::{Left, Right};
-    [Left(28), Left(9), Right(6), Right(7), Right(7), Right(17), Right(6), Right(5), Right(6)]
+    [Left(18), Right(HEADING_WIDTH), Right(HEADING_WIDTH), Right(7), Right(6), Right(5), Right(16), Right(4)]
 };
 
 /// Appends the rows that only the table of all episodes has.
 fn push_details(table: &mut TextTable, deformable: bool, paired: &PairedComparison) {
     let of_soft_targets = [
-        ("DSR", "%", &paired.dsr, 1),
-        ("D mean", "%", &paired.d_mean, 2),
-        ("D final", "%", &paired.d_final, 2),
-        ("D P95", "%", &paired.d_p95, 2),
-        ("time over τ", "s", &paired.time_over_tau_s, 2),
-        ("collapsed volume", "%", &paired.collapsed_volume_pct, 2),
-        ("damaged volume", "%", &paired.damaged_volume_pct, 2),
+        ("DSR, %", &paired.dsr, 1),
+        ("D peak, %", &paired.d_peak, 2),
+        ("D mean, %", &paired.d_mean, 2),
+        ("D final, %", &paired.d_final, 2),
+        ("D P95, %", &paired.d_p95, 2),
+        ("time over τ, s", &paired.time_over_tau_s, 2),
+        ("damaged, %", &paired.damaged_volume_pct, 1),
     ];
     let of_all = [
-        ("contact success", "%", &paired.contact_success, 1),
-        ("contact safety", "%", &paired.contact_safety, 1),
-        ("gentle", "%", &paired.gentle, 1),
-        ("grip ratio", "", &paired.grip_ratio, 2),
-        ("others within their τ", "%", &paired.others_ok, 1),
-        ("touched other objects", "%", &paired.wrong_contact, 1),
+        ("contact, %", &paired.contact_success, 1),
+        ("contact safety, %", &paired.contact_safety, 1),
+        ("gentle, %", &paired.gentle, 1),
+        ("grip ratio", &paired.grip_ratio, 1),
+        ("others within τ, %", &paired.others_ok, 1),
+        ("touched others, %", &paired.wrong_contact, 1),
     ];
-    for (name, unit, difference, digits) in of_soft_targets.into_iter().filter(|_| deformable).chain(of_all) {
-        push_difference(table, name, unit, difference, digits);
+    for (name, difference, digits) in of_soft_targets.into_iter().filter(|_| deformable).chain(of_all) {
+        push_difference(table, name, difference, digits);
     }
     push_stages(table, &paired.failed_stages);
 }
 
 /// Appends the number of failed episodes, in total and by stage.
 fn push_stages(table: &mut TextTable, stages: &PairedStages) {
-    const UNIT: &str = "episodes";
+    const FAILED: &str = "failed episodes";
     if stages.n == 0 {
-        return table.row(["failed at any stage", UNIT, "N/A", "N/A"]);
+        return table.row([FAILED, "N/A", "N/A"]);
     }
     let counts = |name: String, first: usize, second: usize| {
         let difference = second as f64 - first as f64;
-        [name, UNIT.to_owned(), first.to_string(), second.to_string(), signed(Some(difference), 0)]
+        [name, first.to_string(), second.to_string(), signed(Some(difference), 0)]
     };
     let [first, second] = [&stages.first, &stages.second];
-    let total = counts("failed at any stage".to_owned(), first.values().sum(), second.values().sum());
-    table.row(total.into_iter().chain([String::new(), stages.better.to_string(), stages.worse.to_string()]));
+    let total = counts(FAILED.to_owned(), first.values().sum(), second.values().sum());
+    table.row(total.into_iter().chain([stages.better.to_string(), stages.worse.to_string()]));
     for stage in TaskStage::ALL {
         let [first, second] = [first, second].map(|of| of.get(&stage).copied().unwrap_or(0));
         if first + second > 0 {
@@ -406,42 +435,36 @@ fn push_stages(table: &mut TextTable, stages: &PairedStages) {
     }
 }
 
-/// Legend of the rows.
-pub(super) const LEGEND: &str = "diff.: right minus left · 95 % intervals: Agresti and Min for rates, bootstrap for D (n ≥ 10)\nbetter, worse: number of episodes; a lower D is better · p: McNemar's exact test of rates,\nWilcoxon's signed-rank test of other measures";
+/// Legend of the columns.
+pub(super) const LEGEND: &str = "diff.: right minus left · better, worse: number of episodes; a lower D is better · 95 % intervals: Agresti and Min for rates, bootstrap for others (n≥10) · p: McNemar's exact test of rates, Wilcoxon's signed-rank test of others";
 
 /// Appends the column headings, with `name` above the names of the rows.
 pub(super) fn push_headings(table: &mut TextTable, name: &str, first: &str, second: &str) {
-    table.row([name, "", first, second, "diff.", "95 % interval", "better", "worse", "p"]);
+    table.row([name, first, second, "diff.", "better", "worse", "95 % interval", "p"]);
 }
 
-/// Appends one row per rate, the first with the name.
-pub(super) fn push_rates(table: &mut TextTable, name: &str, paired: &PairedComparison) {
-    let rates = [("Goal, %", paired.goal), ("NoDrop, %", paired.no_drop), ("Safety, %", paired.safety)];
-    for ((measure, rate), name) in rates.into_iter().zip([name, "", ""]) {
-        push_difference(table, name, measure, &rate, 1);
+/// Appends one row per rate.
+pub(super) fn push_rates(table: &mut TextTable, paired: &PairedComparison) {
+    for (name, rate) in
+        [("Goal, %", paired.goal), ("NoDrop, %", paired.no_drop), ("Safety, %", paired.safety)]
+    {
+        push_difference(table, name, &rate, 1);
     }
 }
 
-/// Appends a row with `digits` decimals, or N/A without a pair that has the quantity.
-pub(super) fn push_difference(
-    table: &mut TextTable,
-    name: &str,
-    measure: &str,
-    paired: &PairedDifference,
-    digits: usize,
-) {
+/// Appends a row with `digits` decimals, or N/A without a pair that has the quantity. One pair has no interval.
+pub(super) fn push_difference(table: &mut TextTable, name: &str, paired: &PairedDifference, digits: usize) {
     if paired.n == 0 {
-        return table.row([name, measure, "N/A", "N/A"]);
+        return table.row([name, "N/A", "N/A"]);
     }
     let cells = [
         name.to_owned(),
-        measure.to_owned(),
         decimal(paired.first, digits),
         decimal(paired.second, digits),
         signed(paired.difference, digits),
-        interval(paired.interval95, digits),
         paired.better.to_string(),
         paired.worse.to_string(),
+        interval(paired.interval95.filter(|_| paired.n > 1), digits),
     ];
     table.row(cells.into_iter().chain(paired.p.map(probability)));
 }
@@ -458,17 +481,24 @@ fn e_value_text(e: f64) -> String {
     if e >= 1e4 { format!("{e:.1e}") } else { format!("{e:.2}") }
 }
 
-/// A p-value with three decimals.
+/// A p-value with three decimals, without the zero before them.
 fn probability(p: f64) -> String {
-    if p < 0.001 { "<0.001".to_owned() } else { format!("{p:.3}") }
+    match p {
+        p if p < 0.001 => "<.001".to_owned(),
+        p if p > 0.9995 => "1".to_owned(),
+        p => format!("{p:.3}").trim_start_matches('0').to_owned(),
+    }
 }
 
 pub(super) fn signed(value: Option<f64>, digits: usize) -> String {
-    value.map_or_else(|| "–".to_owned(), |value| format!("{value:+.digits$}"))
+    value.map_or_else(|| "–".to_owned(), |value| format!("{value:+.digits$}").replace('-', "−"))
 }
 
 pub(super) fn interval(bounds: Option<[f64; 2]>, digits: usize) -> String {
-    bounds.map_or_else(|| "–".to_owned(), |[low, high]| format!("[{low:+.digits$}, {high:+.digits$}]"))
+    bounds.map_or_else(
+        || "–".to_owned(),
+        |[low, high]| format!("[{}, {}]", signed(Some(low), digits), signed(Some(high), digits)),
+    )
 }
 
 #[cfg(test)]
@@ -494,10 +524,9 @@ mod tests {
         stored(dir, "pi", stages.into_iter().enumerate().map(record).collect())
     }
 
-    /// The rows below "all" by their first word.
+    /// The cells of a row by the start of its name.
     fn words(text: &str, name: &str) -> Vec<String> {
-        let (_, all) = text.split_once("\nall ").expect("all episodes");
-        let row = all.lines().find(|line| line.trim_start().starts_with(name)).unwrap_or_default();
+        let row = text.lines().find(|line| line.trim_start().starts_with(name)).unwrap_or_default();
         let cells = row.trim_start().trim_start_matches(name).split_whitespace();
         cells.map(str::to_owned).collect()
     }
@@ -509,23 +538,24 @@ mod tests {
         second.records[0].verdict.first_wrong_contact =
             Some(WrongObjectContact { time_s: 1.0, object: "bun".to_owned() });
         second.records[2].outcome = Outcome::Invalid { reason: InvalidReason::Inverted, step: 3, node: None };
-        let text = table(&compare(&[first], &[second]).expect("the same episodes"));
-        assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
-        assert_eq!(words(&text, "D mean"), ["%", "0.25", "0.50", "+0.25", "–", "0", "2", "0.500"], "{text}");
-        assert_eq!(words(&text, "D final")[..4], ["%", "0.10", "0.10", "+0.00"]);
-        assert_eq!(words(&text, "D P95")[..4], ["%", "0.30", "0.30", "+0.00"]);
-        assert_eq!(words(&text, "time over τ")[..4], ["s", "0.50", "0.50", "+0.00"]);
-        assert_eq!(words(&text, "collapsed volume")[..3], ["%", "1.25", "1.25"]);
-        assert_eq!(words(&text, "damaged volume")[..3], ["%", "0.50", "0.50"]);
-        assert_eq!(words(&text, "gentle")[..4], ["%", "100.0", "0.0", "-100.0"]);
-        assert_eq!(words(&text, "grip ratio")[..3], ["2.50", "5.00", "+2.50"]);
-        assert_eq!(words(&text, "others within their τ")[..3], ["%", "100.0", "100.0"]);
-        let touched = words(&text, "touched other objects");
-        assert_eq!(touched[..4], ["%", "0.0", "33.3", "+33.3"]);
-        assert_eq!(touched[touched.len() - 3..], ["0", "1", "1.000"]);
-        assert_eq!(words(&text, "failed at any stage"), ["episodes", "2", "1", "-1", "2", "0"]);
-        assert_eq!(words(&text, "reach"), ["episodes", "1", "0", "-1"]);
-        assert_eq!(words(&text, "carry"), ["episodes", "0", "1", "+1"]);
+        let compared = compare(&[first], &[second]).expect("the same episodes");
+        let text = table(&compared, TerminalFormat::PLAIN.with_details());
+        assert!(text.lines().all(|line| line.chars().count() < 80), "{text}");
+        assert_eq!(words(&text, "D mean, %"), ["0.25", "0.50", "+0.25", "0", "2", "–", ".500"], "{text}");
+        assert_eq!(words(&text, "D final, %")[..3], ["0.10", "0.10", "+0.00"]);
+        assert_eq!(words(&text, "D P95, %")[..3], ["0.30", "0.30", "+0.00"]);
+        assert_eq!(words(&text, "time over τ, s")[..3], ["0.50", "0.50", "+0.00"]);
+        assert_eq!(words(&text, "collapsed, %")[..2], ["1.2", "1.2"]);
+        assert_eq!(words(&text, "damaged, %")[..2], ["0.5", "0.5"]);
+        assert_eq!(words(&text, "gentle, %")[..3], ["100.0", "0.0", "−100.0"]);
+        assert_eq!(words(&text, "grip ratio")[..3], ["2.5", "5.0", "+2.5"]);
+        assert_eq!(words(&text, "others within τ, %")[..2], ["100.0", "100.0"]);
+        let touched = words(&text, "touched others, %");
+        assert_eq!(touched[..3], ["0.0", "33.3", "+33.3"]);
+        assert_eq!(touched[3..5], ["0", "1"]);
+        assert_eq!(words(&text, "failed episodes"), ["2", "1", "−1", "2", "0"]);
+        assert_eq!(words(&text, "reach"), ["1", "0", "−1"]);
+        assert_eq!(words(&text, "carry"), ["0", "1", "+1"]);
         assert!(words(&text, "place").is_empty(), "{text}");
         assert!(text.contains("1 pair with an invalid episode: failed in success rates"), "{text}");
     }
@@ -560,13 +590,13 @@ mod tests {
         assert_eq!(heads(&a, &b), ["a", "b"], "one policy in two folders");
         b.manifest["policy"] = json!("servo");
         assert_eq!(heads(&a, &b), ["pi", "servo"]);
-        let text = table(&compare(&[a], &[b]).expect("pairs"));
-        let head: Vec<&str> = text.lines().nth(2).unwrap_or_default().split_whitespace().collect();
+        let text = table(&compare(&[a], &[b]).expect("pairs"), TerminalFormat::PLAIN);
+        let head: Vec<&str> = text.lines().nth(1).unwrap_or_default().split_whitespace().collect();
         assert_eq!(head[..3], ["pi", "servo", "diff."], "{text}");
     }
 
     #[test]
     fn small_probabilities_are_bounds() {
-        assert_eq!([0.25, 0.001, 0.0009, 0.0].map(probability), ["0.250", "0.001", "<0.001", "<0.001"]);
+        assert_eq!([0.25, 0.001, 0.0009, 0.0].map(probability), [".250", ".001", "<.001", "<.001"]);
     }
 }

@@ -245,7 +245,7 @@ mod tests {
         assert_eq!(safety, [Rate::new(2, 4), Rate::new(1, 4)]);
         let table = effects_table(&all).expect("effects");
         assert_eq!(table.rows.len(), 4);
-        assert!(table.rows[1][4].starts_with("-50.0 ["), "{:?}", table.rows);
+        assert!(table.rows[1][4].starts_with("−50.0 ["), "{:?}", table.rows);
         assert_eq!(table.rows[3][1], "mean of 3 conditions");
         assert!(condition_effects(&runs[1..3]).is_empty(), "there is no reference");
     }

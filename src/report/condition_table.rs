@@ -2,12 +2,16 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{comparison, stored_run::records_as};
+use super::{
+    comparison::{self, signed},
+    stored_run::records_as,
+    styled_text::{Emphasis, StyledText, TerminalFormat},
+};
 use softvt_benchmark::ShiftValue;
-use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
+use softvt_common::text::{TextColumn, TextTable, counted, decimal, escape_control, shortened};
 use softvt_evaluation::statistics::{Distribution, Rate};
 use softvt_records::{
-    paired_stats::{PairedComparison, d_over_tau, pair_episodes},
+    paired_stats::{PairedComparison, PairedDifference, d_over_tau, pair_episodes},
     record::EpisodeRecord,
     summary::GroupScores,
 };
@@ -90,47 +94,65 @@ pub struct ConditionTable {
     pub rows: Vec<ConditionRow>,
 }
 
-/// Plain-text tables of at most 100 columns: rates per condition, and paired change from the reference.
-pub fn table(suite: &ConditionTable) -> String {
-    const COLUMNS: [TextColumn; 6] = {
-        use TextColumn::{Left, Right};
-        [Left(40), Right(10), Right(10), Right(10), Right(10), Right(10)]
-    };
-    let mut table = TextTable::new(COLUMNS);
+/// A suite under conditions: one row per condition with its change from the reference. With details also all paired
+/// differences.
+pub fn table(suite: &ConditionTable, format: TerminalFormat) -> String {
+    let mut text = StyledText::new(format);
     let conditions = counted(suite.rows.len().saturating_sub(1), "condition");
     let episodes = suite.rows.iter().find_map(|row| row.outcome.as_ref()).map_or(0, |o| o.episodes);
-    let episodes = counted(episodes, "episode");
-    table.line(format!("{} · policy {} · {conditions} · {episodes} each", suite.suite, suite.policy));
-    table.rule();
-    table.row(["condition", "Goal, %", "NoDrop, %", "Safety, %", "D peak/τ", "invalid"]);
-    table.rule();
-    for row in &suite.rows {
-        table.row(cells(row, suite.deformable));
-    }
-    table.rule();
+    let title =
+        format!("{} · {} · {conditions} · {} each", suite.suite, suite.policy, counted(episodes, "episode"));
+    text.line(Emphasis::Bold, shortened(&title, format.width - 1));
+    let mut table = TextTable::new([
+        TextColumn::Left(format.width.saturating_sub(1 + 51).clamp(16, 40)),
+        TextColumn::Right(7),
+        TextColumn::Right(9),
+        TextColumn::Right(9),
+        TextColumn::Right(10),
+        TextColumn::Right(11),
+    ]);
+    table.row(["condition", "Goal, %", "Safety, %", "Δ Safety", "D/limit", "Δ D/limit"]);
+    suite.rows.iter().for_each(|row| table.row(cells(row, suite.deformable)));
+    text.plain(&table.text);
+    let mut note = |sentence: &str| text.wrapped(sentence, format.width - 1);
     for row in &suite.rows {
         if let Some(why) = &row.not_applicable {
-            table.line(format!("{}: N/A, {why}", row.condition));
+            note(&format!("{}: N/A, {why}", row.condition));
+        }
+        if let Some(outcome) = row.outcome.as_ref().filter(|outcome| outcome.invalid > 0) {
+            let invalid = counted(outcome.invalid, "invalid episode");
+            note(&format!("{}: {invalid}, counted as failed", row.condition));
         }
     }
-    let mut changes = TextTable::new(comparison::COLUMNS);
-    comparison::push_headings(&mut changes, "change from the reference", "ref.", "cond.");
-    changes.rule();
-    for row in &suite.rows {
-        if let Some(paired) = row.outcome.as_ref().and_then(|outcome| outcome.paired.as_ref()) {
-            comparison::push_rates(&mut changes, &row.condition, paired);
-            if suite.deformable {
-                comparison::push_difference(&mut changes, "", "D peak/τ", &paired.d_over_tau, 2);
-            }
-        }
+    note(
+        "Δ: change from the reference on the same episodes · D/limit: mean of peak D over τ · *: p < 0.05 (paired tests)",
+    );
+    if format.has_details {
+        push_details(&mut text, suite, format);
     }
-    changes.rule();
-    changes.line(comparison::LEGEND);
-    table.text + &changes.text
+    text.into_text()
 }
 
-/// Suites side by side in [`controllers_table`].
-const SUITES_PER_TABLE: usize = 4;
+/// All paired differences, one block per condition.
+fn push_details(text: &mut StyledText, suite: &ConditionTable, format: TerminalFormat) {
+    for row in &suite.rows {
+        let Some(paired) = row.outcome.as_ref().and_then(|outcome| outcome.paired.as_ref()) else { continue };
+        text.end();
+        text.line(Emphasis::Bold, shortened(&row.condition, format.width - 1));
+        let mut changes = TextTable::new(comparison::COLUMNS);
+        comparison::push_headings(&mut changes, "", "ref.", "cond.");
+        comparison::push_rates(&mut changes, paired);
+        if suite.deformable {
+            comparison::push_difference(&mut changes, "D/limit", &paired.d_over_tau, 2);
+        }
+        text.plain(&changes.text);
+    }
+    text.end();
+    text.wrapped(comparison::LEGEND, format.width - 1);
+}
+
+/// Columns of the name of a policy in [`controllers_table`].
+const POLICY_WIDTH: usize = 22;
 /// Characters of the column of a suite.
 const SUITE_WIDTH: usize = 18;
 
@@ -142,14 +164,16 @@ pub fn compares_policies(tables: &[ConditionTable]) -> bool {
             .all(|row| row.policy.is_some() && row.shift.is_empty() && row.set.is_empty() && !row.rigid_twin)
 }
 
-/// Plain-text tables of policies by suite, of at most 100 columns, for conditions that differ in the policy alone. All
-/// suites have the same rows. Under each the best policy without touch.
-pub fn controllers_table(tables: &[ConditionTable]) -> String {
-    tables.chunks(SUITES_PER_TABLE).map(controllers_of_suites).collect()
+/// Tables of policies by suite, for conditions that differ in the policy alone. All suites have the same rows. Under
+/// each the best policy without touch.
+pub fn controllers_table(tables: &[ConditionTable], format: TerminalFormat) -> String {
+    let per_table = (format.width.saturating_sub(1 + POLICY_WIDTH) / (SUITE_WIDTH + 1)).clamp(1, 4);
+    let text: String = tables.chunks(per_table).map(controllers_of_suites).collect();
+    escape_control(&text).into_owned()
 }
 
 fn controllers_of_suites(suites: &[ConditionTable]) -> String {
-    let mut columns = vec![TextColumn::Left(22)];
+    let mut columns = vec![TextColumn::Left(POLICY_WIDTH)];
     columns.resize(1 + suites.len(), TextColumn::Right(SUITE_WIDTH));
     let mut table = TextTable::new(columns);
     let episodes = suites.iter().flat_map(|suite| &suite.rows).filter_map(|row| row.outcome.as_ref());
@@ -204,18 +228,22 @@ fn best_blind(suite: &ConditionTable) -> String {
 
 fn cells(row: &ConditionRow, deformable: bool) -> [String; 6] {
     let Some(outcome) = &row.outcome else {
-        return [&row.condition, "N/A", "N/A", "N/A", "N/A", "N/A"].map(str::to_owned);
+        return [&row.condition, "N/A", "N/A", "", "N/A", ""].map(str::to_owned);
     };
+    let paired = outcome.paired.as_ref();
+    let change = |difference: Option<PairedDifference>, digits: usize| {
+        let Some(difference) = difference.filter(|difference| difference.n > 0) else { return String::new() };
+        let mark = if difference.p.is_some_and(|p| p < 0.05) { " *" } else { "" };
+        format!("{}{mark}", signed(difference.difference, digits))
+    };
+    let not_applicable = || "N/A".to_owned();
     [
         row.condition.clone(),
         decimal(outcome.goal_success_rate.rate, 1),
-        decimal(outcome.no_drop_rate.rate, 1),
-        decimal(outcome.safety_success_rate.rate, 1),
-        match outcome.d_over_tau.mean {
-            None if !deformable => "N/A".to_owned(),
-            mean => decimal(mean, 3),
-        },
-        outcome.invalid.to_string(),
+        if deformable { decimal(outcome.safety_success_rate.rate, 1) } else { not_applicable() },
+        change(paired.filter(|_| deformable).map(|paired| paired.safety), 1),
+        if deformable { decimal(outcome.d_over_tau.mean, 2) } else { not_applicable() },
+        change(paired.map(|paired| paired.d_over_tau), 2),
     ]
 }
 
@@ -253,26 +281,27 @@ mod tests {
                 row("a condition with a name that is very long", None),
             ],
         };
-        let text = table(&suite);
-        assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
-        let words = |start: &str| -> Vec<&str> {
-            text.lines().find(|line| line.starts_with(start)).unwrap().split_whitespace().collect()
+        let text = table(&suite, TerminalFormat::PLAIN);
+        assert!(text.lines().all(|line| line.chars().count() < 80), "{text}");
+        let words = |text: &str, start: &str| -> Vec<String> {
+            let line = text.lines().find(|line| line.starts_with(start)).expect("a row");
+            line.split_whitespace().map(str::to_owned).collect()
         };
-        assert_eq!(words("reference"), ["reference", "100.0", "100.0", "100.0", "0.333", "0"]);
-        assert_eq!(words("heavy  "), ["heavy", "100.0", "100.0", "0.0", "1.500", "0"]);
-        assert!(!compares_policies(&[suite]));
-        let (_, against) = text.split_once("change from the reference").unwrap();
-        let rows: Vec<&str> = against.lines().skip_while(|line| !line.starts_with("heavy")).take(4).collect();
-        let cell = |row: usize, columns: &[&str]| {
-            assert!(columns.iter().all(|cell| rows[row].contains(cell)), "{columns:?} in {}", rows[row]);
-        };
-        cell(0, &["heavy", "Goal, %", "100.0   100.0", "+0.0 ", " 0     0 "]);
-        cell(2, &["Safety, %", "100.0     0.0", "-100.0", " 0     1 ", "1.000"]);
-        cell(3, &["D peak/τ", "0.33    1.50", "+1.17", " 0     1"]);
+        assert_eq!(words(&text, "reference"), ["reference", "100.0", "100.0", "0.33"]);
+        assert_eq!(words(&text, "heavy"), ["heavy", "100.0", "0.0", "−100.0", "1.50", "+1.17"]);
         assert!(
-            text.contains("a condition with a name that is very lo…")
-                && text.contains(": N/A, nothing in it deforms")
+            text.contains("a condition with a name tha…") && text.contains(": N/A, nothing in it deforms"),
+            "{text}"
         );
+        assert!(!text.contains("better"), "{text}");
+        assert!(!compares_policies(std::slice::from_ref(&suite)));
+        let details = table(&suite, TerminalFormat::PLAIN.with_details());
+        assert!(details.lines().all(|line| line.chars().count() < 80), "{details}");
+        assert_eq!(
+            words(&details, "Safety, %"),
+            ["Safety,", "%", "100.0", "0.0", "−100.0", "0", "1", "–", "1"]
+        );
+        assert_eq!(words(&details, "D/limit  ")[1..4], ["0.33", "1.50", "+1.17"]);
     }
 
     #[test]
@@ -305,12 +334,12 @@ mod tests {
         };
         let suites = ["buns", "rolls", "cubes", "a suite with a long name", "loaves"].map(suite);
         assert!(compares_policies(&suites));
-        let text = controllers_table(&suites);
-        assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
+        let text = controllers_table(&suites, TerminalFormat::PLAIN);
+        assert!(text.lines().all(|line| line.chars().count() < 80), "{text}");
         let lines = |start: &str| text.lines().filter(|line| line.starts_with(start)).collect::<Vec<_>>();
         assert_eq!(lines("expert").len(), 2, "five suites take two tables: {text}");
         let words: Vec<&str> = lines("middle *")[1].split_whitespace().collect();
-        assert_eq!(words, ["middle", "*", "100.0", "/", "50.0"]);
+        assert_eq!(words, ["middle", "*", "100.0", "/", "50.0", "100.0", "/", "50.0"]);
         assert_eq!(
             lines("best without touch, rolls"),
             ["best without touch, rolls: middle, Safety 50.0 % [9.5, 90.5]"]

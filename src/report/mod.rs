@@ -4,6 +4,7 @@
 #![warn(missing_docs, unreachable_pub)]
 
 pub mod actions;
+pub mod commands;
 pub mod comparison;
 pub mod condition_effects;
 pub mod condition_table;
@@ -17,8 +18,11 @@ pub mod run_summary;
 pub mod shard_merge;
 pub mod softvtbench_files;
 pub mod stored_run;
+pub mod styled_text;
 pub mod tables;
+mod task_names;
 pub mod terminal;
+mod terminal_details;
 pub mod video;
 
 /// A successful, safe soft episode.

@@ -95,15 +95,15 @@ impl PolicyRanking {
     pub fn table(&self) -> String {
         const COLUMNS: [TextColumn; 6] = {
             use TextColumn::{Left, Right};
-            [Left(30), Right(20), Right(20), Left(6), Right(6), Left(6)]
+            [Left(28), Right(15), Right(15), Left(4), Right(7), Left(4)]
         };
         let mut table = TextTable::new(COLUMNS);
         table.line(format!("{} that all runs have", counted(self.episodes, "episode")));
-        table.row(["policy", "Goal, %", "Safety, %", "", "D/τ", ""]);
+        table.row(["policy", "Goal, %", "Safety, %", "", "D/limit", ""]);
         table.rule();
         for run in &self.runs {
             table.row([
-                shortened(&run.name, 30),
+                shortened(&run.name, 28),
                 interval(&run.goal),
                 interval(&run.safety),
                 run.safety_letters.clone(),
@@ -112,9 +112,9 @@ impl PolicyRanking {
             ]);
         }
         table.rule();
-        table.line("95 % Wilson intervals · D/τ: median of the episodes that have it");
-        table.line("policies that share a letter do not differ at 5 % (paired tests: McNemar's of Safety, Wilcoxon's");
-        table.line("signed-rank of D/τ; adjusted for the number of pairs by Holm's method)");
+        table.line("95 % Wilson intervals · D/limit: median of peak D over τ");
+        table.line("policies that share a letter do not differ at 5 % (paired tests: McNemar's of");
+        table.line("Safety, Wilcoxon's signed-rank of D/limit; adjusted by Holm's method)");
         table.text
     }
 }
@@ -131,8 +131,8 @@ fn letters_of(count: usize, p_value: impl Fn(usize, usize) -> Option<f64>) -> Ve
 
 fn interval(rate: &Rate) -> String {
     match rate.wilson95 {
-        Some([low, high]) => format!("{} [{low:.1}, {high:.1}]", decimal(rate.rate, 1)),
-        None => decimal(rate.rate, 1),
+        Some([low, high]) => format!("{} [{low:.0}, {high:.0}]", decimal(rate.rate, 0)),
+        None => decimal(rate.rate, 0),
     }
 }
 

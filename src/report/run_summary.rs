@@ -69,7 +69,7 @@ fn summarize(run: StoredRun) -> RunSummary {
 impl RunSummary {
     /// True if its targets deform.
     pub fn is_soft(&self) -> bool {
-        self.summary.scores.deformation_ok_rate.is_some()
+        self.summary.scores.is_soft()
     }
 
     /// Suite and method.

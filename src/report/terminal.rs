@@ -1,80 +1,194 @@
-//! The results table of a run in the terminal.
+//! The results of a run in the terminal: the verdict first, then one line per task that failed. With details also all
+//! other tasks and the figures of `summary.json`.
 
-use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
+use super::{
+    styled_text::{Emphasis, StyledText, TerminalFormat},
+    task_names::{TaskName, task_names},
+    terminal_details::push_details,
+};
+use softvt_common::text::{counted, decimal, shortened};
 use softvt_evaluation::{
-    safety::KAPPAS,
+    category::{EpisodeCategory, is_crushed},
     statistics::{Distribution, Rate},
 };
 use softvt_records::paired_tests::{DetectableDifference, MIN_DISCORDANT};
 use softvt_records::summary::{
-    AbortedEpisode, CommandCounts, EpisodeDeformation, GroupScores, InvalidEpisode, SuiteSummary, TauRange,
+    AbortedEpisode, CommandCounts, GroupScores, InvalidEpisode, SuiteSummary, TaskScores, TauRange,
 };
 
-/// Columns: index and prompt of the task, three rates, four figures of D, τ and the number of invalid episodes.
-const COLUMNS: [TextColumn; 11] = {
-    use TextColumn::{Left, Right};
-    [
-        Right(3),
-        Left(27),
-        Right(6),
-        Right(6),
-        Right(6),
-        Right(7),
-        Right(6),
-        Right(6),
-        Right(6),
-        Right(9),
-        Right(7),
-    ]
-};
-
+/// Columns of a row of a task other than its name and, at the end, its categories.
+const NUMBERS_WIDTH: usize = 41;
+/// Columns for the categories of a task.
+const CATEGORIES_WIDTH: usize = 19;
+/// Width from which rows also have NoDrop, D and τ.
+const WIDE: usize = 110;
+/// Columns of the bar of a rate.
+const BAR_WIDTH: usize = 12;
+/// Number of episodes below which intervals are called wide.
+const FEW_EPISODES: usize = 30;
 /// Largest number of invalid episodes listed.
 const MAX_INVALID_LISTED: usize = 5;
 /// Largest number of aborted episodes listed.
 const MAX_ABORTED_LISTED: usize = 10;
 
-/// The results of one suite: one row per task, one for all, and the rates with their intervals.
-pub fn table(summary: &SuiteSummary) -> String {
-    let mut table = TextTable::new(COLUMNS);
+/// The results of one suite.
+pub fn table(summary: &SuiteSummary, format: TerminalFormat) -> String {
+    let mut text = StyledText::new(format);
     let scores = &summary.scores;
-    let is_soft = scores.deformation_ok_rate.is_some();
     let episodes = counted(scores.episodes, "episode");
-    table.line(format!("{} · policy {} · {episodes}", summary.suite, summary.method_label()));
-    table.rule();
-    table.row(["#", "task", "Goal", "NoDrop", "Safety", "D mean", "P5", "median", "P95", "τ", "invalid"]);
-    table.rule();
-    let named: Vec<TaskName> =
-        summary.by_task.iter().map(|task| TaskName { prompt: &task.prompt, asset: &task.asset }).collect();
-    for (task, name) in summary.by_task.iter().zip(task_names(&named)) {
-        table.row(cells(&task.task.to_string(), &name, &task.scores, is_soft));
+    let title = format!("{} · {} · {episodes}", summary.suite, summary.method_label());
+    text.line(Emphasis::Bold, shortened(&title, format.width - 1));
+    push_categories(&mut text, scores);
+    text.end();
+    push_rate(&mut text, "Goal", scores.goal_success_rate, EpisodeCategory::Safe).end();
+    push_safety(&mut text, scores);
+    text.end();
+    push_tasks(&mut text, summary, format);
+    if format.has_details {
+        push_details(&mut text, summary);
     }
-    table.rule();
-    table.row(cells("", "all", scores, is_soft));
-    table.rule();
-    push_rates(&mut table, summary);
-    push_harm_and_stages(&mut table, scores);
-    push_notes(&mut table, summary);
-    table.line(resolution(scores));
-    table.text
+    push_notes(&mut text, summary, format);
+    text.into_text()
 }
 
-fn cells(number: &str, name: &str, scores: &GroupScores, is_soft: bool) -> [String; 11] {
-    let Distribution { mean, p5, median, p95, .. } = scores.deformation;
-    let not_applicable = || "N/A".to_owned();
-    let percentile = |value| if is_soft { percentile(&scores.deformation, value) } else { not_applicable() };
+/// The number of episodes of each category that occurs. Rigid objects have no limit to be within.
+fn push_categories(text: &mut StyledText, scores: &GroupScores) {
+    let counts = EpisodeCategory::ALL.map(|category| (category, scores.count(category)));
+    for (at, (category, count)) in counts.into_iter().filter(|(_, count)| *count > 0).enumerate() {
+        let gap = if at > 0 { "  " } else { "" };
+        let name = match (category, scores.is_soft()) {
+            (EpisodeCategory::Safe, false) => "placed without a drop",
+            _ => category.name(),
+        };
+        let part = format!("{} {count} {name}", category.glyph());
+        text.push(Emphasis::None, gap).push(Emphasis::Category(category), part);
+    }
+    text.end();
+}
+
+/// Appends a rate with its interval and a bar.
+fn push_rate<'a>(
+    text: &'a mut StyledText,
+    name: &str,
+    rate: Rate,
+    category: EpisodeCategory,
+) -> &'a mut StyledText {
+    let Some(value) = rate.rate else {
+        return text.push(Emphasis::None, format!("{name:<7} N/A"));
+    };
+    let bounds = rate.wilson95.map(|[low, high]| format!("[{low:>3.0}, {high:>3.0}]")).unwrap_or_default();
+    let filled = (0.01 * value * BAR_WIDTH as f64).round() as usize;
+    let [full, empty] = [("█", filled), ("░", BAR_WIDTH - filled.min(BAR_WIDTH))].map(|(c, n)| c.repeat(n));
+    text.push(Emphasis::Bold, format!("{name:<7}{value:>4.0} %"))
+        .push(Emphasis::None, format!("  {bounds}  "))
+        .push(Emphasis::Category(category), full)
+        .push(Emphasis::Faint, empty)
+}
+
+/// Safety Success, and what separates it from Goal Success.
+fn push_safety(text: &mut StyledText, scores: &GroupScores) {
+    if !scores.is_soft() {
+        return text.line(Emphasis::None, "Safety  N/A  rigid objects have no limit of their deformation");
+    }
+    if scores.safety_success_rate.rate.is_none() {
+        let what = format!("Safety  N/A  not judged: {}", scores.not_judged);
+        return text.line(Emphasis::None, what);
+    }
+    push_rate(text, "Safety", scores.safety_success_rate, EpisodeCategory::Safe);
+    let over = scores.count(EpisodeCategory::OverLimit);
+    let gap = scores.goal_safe_gap.filter(|gap| *gap > 0.0);
+    if let (Some(gap), true) = (gap, over > 0) {
+        let is_crushed = is_crushed(scores.collapsed_volume.mean);
+        let harm = if is_crushed { "placed, but crushed" } else { "placed over the limit" };
+        let category = Emphasis::Category(EpisodeCategory::OverLimit);
+        text.push(Emphasis::None, "  ").push(category, format!("gap {gap:.0} points: {harm}"));
+    }
+    text.end();
+}
+
+/// One line per task that has a failed episode, or per task with details, and one for all.
+fn push_tasks(text: &mut StyledText, summary: &SuiteSummary, format: TerminalFormat) {
+    let tasks = &summary.by_task;
+    let named: Vec<TaskName> =
+        tasks.iter().map(|task| TaskName { prompt: &task.prompt, asset: &task.asset }).collect();
+    let names = task_names(&named);
+    let has_failed = |task: &TaskScores| task.scores.count(EpisodeCategory::Safe) < task.scores.episodes;
+    let is_shown = |task: &TaskScores| format.has_details || has_failed(task);
+    let is_wide = format.width >= WIDE;
+    let wide = if is_wide { WIDE_WIDTH } else { 0 };
+    let room = format.width.saturating_sub(1 + NUMBERS_WIDTH + CATEGORIES_WIDTH + wide);
+    let name_width = room.clamp(12, 40);
+    let row = |number: &str, name: &str, scores: &GroupScores| {
+        let GroupScores { episodes: n, goal_success_rate, .. } = scores;
+        let goal = (0.01 * goal_success_rate.rate.unwrap_or(0.0) * *n as f64).round();
+        let is_judged = scores.is_soft() && scores.safety_success_rate.rate.is_some();
+        let safe =
+            if is_judged { format!("{}/{n}", scores.count(EpisodeCategory::Safe)) } else { "N/A".to_owned() };
+        let collapsed =
+            scores.collapsed_volume.mean.map_or_else(|| "–".to_owned(), |pct| format!("{pct:.0} %"));
+        let mut line = format!(
+            "{number:>3} {:<name_width$} {:>7} {safe:>7} {:>8} {collapsed:>9}",
+            shortened(name, name_width),
+            format!("{goal}/{n}"),
+            decimal(scores.d_over_tau.median, 2)
+        );
+        if is_wide {
+            line += &wide_cells(scores).map(|cell| format!(" {cell:>9}")).concat();
+        }
+        line
+    };
+    if tasks.is_empty() {
+        return;
+    }
+    let mut heading = format!(
+        "{:>3} {:<name_width$} {:>7} {:>7} {:>8} {:>9}",
+        "#", "object", "goal", "safe", "D/limit", "collapsed"
+    );
+    if is_wide {
+        heading += &WIDE_HEADINGS.map(|cell| format!(" {cell:>9}")).concat();
+    }
+    text.line(Emphasis::Faint, heading);
+    for (task, name) in tasks.iter().zip(&names).filter(|(task, _)| is_shown(task)) {
+        text.push(Emphasis::None, row(&task.task.to_string(), name, &task.scores)).push(Emphasis::None, "  ");
+        push_failures(text, &task.scores);
+    }
+    let hidden = tasks.iter().filter(|task| !is_shown(task)).count();
+    text.line(Emphasis::Bold, row("", "all", &summary.scores));
+    if hidden > 0 {
+        let others = if hidden < tasks.len() { "other " } else { "" };
+        let what = if summary.scores.is_soft() { "without a failure" } else { "placed without a drop" };
+        let them = format!("    {} {what}; --details shows all", counted(hidden, &format!("{others}task")));
+        text.line(Emphasis::Faint, them);
+    }
+}
+
+/// Headings and columns that wide terminals have in addition.
+const WIDE_HEADINGS: [&str; 3] = ["NoDrop, %", "D, %", "τ, %"];
+const WIDE_WIDTH: usize = 30;
+
+fn wide_cells(scores: &GroupScores) -> [String; 3] {
     [
-        number.to_owned(),
-        name.to_owned(),
-        decimal(scores.goal_success_rate.rate, 1),
         decimal(scores.no_drop_rate.rate, 1),
-        scores.safety_success_rate.rate.map_or_else(not_applicable, |rate| format!("{rate:.1}")),
-        if is_soft { decimal(mean, 2) } else { not_applicable() },
-        percentile(p5),
-        percentile(median),
-        percentile(p95),
+        percentile(&scores.deformation, scores.deformation.median),
         tau_range(scores.tau_range),
-        scores.invalid.to_string(),
     ]
+}
+
+/// The categories of the failed episodes of a task, with their numbers if there are several episodes.
+fn push_failures(text: &mut StyledText, scores: &GroupScores) {
+    let failed = EpisodeCategory::ALL.into_iter().skip(1).filter(|category| scores.count(*category) > 0);
+    let failed: Vec<EpisodeCategory> = failed.collect();
+    for (at, category) in failed.iter().enumerate() {
+        let gap = if at > 0 { " " } else { "" };
+        let what = match (scores.episodes, &failed[..]) {
+            (1, _) => category.name().to_owned(),
+            (_, [single]) => format!("{} {}", scores.count(*single), single.name()),
+            _ => scores.count(*category).to_string(),
+        };
+        let part = format!("{} {what}", category.glyph());
+        text.push(Emphasis::None, gap).push(Emphasis::Category(*category), part);
+    }
+    text.end();
 }
 
 /// A percentile of D, with two decimals; "∞" if it falls on an invalid episode.
@@ -89,203 +203,76 @@ pub(crate) fn tau_range(range: Option<TauRange>) -> String {
     if min == max { min } else { format!("{min}–{max}") }
 }
 
-fn push_rates(table: &mut TextTable, summary: &SuiteSummary) {
-    let scores = &summary.scores;
-    for (name, rate) in [
-        ("Goal Success (TSR)", Some(scores.goal_success_rate)),
-        ("NoDrop", Some(scores.no_drop_rate)),
-        ("Deformation within τ", scores.deformation_ok_rate),
-        ("Safety Success", Some(scores.safety_success_rate)),
-        ("DSR", scores.dsr),
-    ] {
-        let text = match rate.filter(|rate| rate.rate.is_some()) {
-            Some(rate) => interval(rate),
-            None if scores.not_judged > 0 => format!("   N/A  not judged: {}", scores.not_judged),
-            None => "   N/A".to_owned(),
-        };
-        push_named(table, name, &text);
-    }
-    push_named(table, "Goal–safety gap", &format!("{:>6} pp", decimal(scores.goal_safe_gap, 1)));
-    push_grip(table, scores);
-    if summary.kappa.is_empty() {
-        return;
-    }
-    let at = KAPPAS.iter().filter_map(|kappa| summary.kappa.iter().find(|row| row.kappa == *kappa));
-    let rates = at.map(|row| format!("κ={}: {} %", row.kappa, decimal(row.safety_success_rate.rate, 1)));
-    push_named(table, "Safety Success at", &rates.collect::<Vec<_>>().join(" · "));
-    let (all, goal) = (scores.deformation, scores.deformation_goal);
-    let of_goal = goal.mean.map_or_else(|| "–".to_owned(), |mean| format!("{mean:.2} %"));
-    table.line(format!(
-        "D is the peak in % of the bounding-box diagonal; n {}; mean {of_goal} over the {} at the goal",
-        all.n, goal.n
-    ));
-    if all.has_invalid() {
-        table.line(format!("percentiles rank the {} as worst (∞)", counted(all.invalid, "invalid episode")));
-    }
-    let EpisodeDeformation { d_mean, d_final, d_p95, time_over_tau_s } = scores.within_episodes;
-    if d_mean.is_some() {
-        table.line(format!(
-            "within an episode, on average: D mean {} %, final {} %, P95 {} %; over τ for {} s",
-            decimal(d_mean, 2),
-            decimal(d_final, 2),
-            decimal(d_p95, 2),
-            decimal(time_over_tau_s, 2)
-        ));
-    }
-}
-
-/// Contact success and the grip ratio.
-fn push_grip(table: &mut TextTable, scores: &GroupScores) {
-    let (contact, safe) =
-        (interval(scores.contact_success_rate), decimal(scores.contact_safety_rate.rate, 1));
-    push_named(table, "Contact success", &format!("{contact}  safe and without slip: {safe} %"));
-    let Distribution { p5, median, p95, .. } = scores.grip_ratio;
-    let [p5, median, p95] = [p5, median, p95].map(|ratio| decimal(ratio, 1));
-    let gentle = interval(scores.gentle_rate);
-    push_named(table, "Gentle", &format!("{gentle}  grip ratio: P5 {p5}, median {median}, P95 {p95}"));
-}
-
-/// Harm to other objects, and the stages at which episodes failed.
-fn push_harm_and_stages(table: &mut TextTable, scores: &GroupScores) {
-    if let Some(rate) = scores.others_ok_rate {
-        let unknown = match scores.others_unknown {
-            0 => String::new(),
-            unknown => format!("  unknown: {unknown}"),
-        };
-        push_named(table, "Others within their τ", &format!("{}{unknown}", interval(rate)));
-    }
-    push_named(table, "Touched other objects", &interval(scores.wrong_contact_rate));
-    if !scores.failed_stages.is_empty() {
-        let stages = scores.failed_stages.iter().map(|(stage, count)| format!("{} {count}", stage.name()));
-        push_named(table, "Failed while", &stages.collect::<Vec<_>>().join(" · "));
-    }
-}
-
-/// What the number of episodes can separate.
-fn resolution(scores: &GroupScores) -> String {
-    let rate = scores.safety_success_rate.rate.or(scores.goal_success_rate.rate).unwrap_or(0.0);
-    let n = scores.episodes;
-    let episodes = counted(n, "episode");
-    match DetectableDifference::new((0.01 * rate * n as f64).round() as usize, n) {
-        Some(DetectableDifference { smallest, found }) => format!(
-            "{episodes} separate two policies from a difference of {smallest:.0} points on, in 4 of 5 cases from {found:.0} on"
-        ),
-        None => format!("{episodes} cannot separate two policies: {MIN_DISCORDANT} are needed at least"),
-    }
-}
-
-fn push_notes(table: &mut TextTable, summary: &SuiteSummary) {
-    let scores = &summary.scores;
+fn push_notes(text: &mut StyledText, summary: &SuiteSummary, format: TerminalFormat) {
+    let (scores, width) = (&summary.scores, format.width - 1);
+    let mut note = |what: &str| text.wrapped(what, width);
     if summary.no_slip_required {
-        table.line("Safety Success also requires no slip in the hand (criteria.require_no_slip)");
+        note("Safety Success also requires no slip in the hand (criteria.require_no_slip)");
     }
     if summary.privileged {
-        table.line("privileged policy: it had access to ground-truth state");
+        note("privileged: it reads the true state, which no robot has");
     }
     if summary.force_observed {
-        table.line(
-            "force_observed policy: it observed ground-truth forces at the pads, which no real sensor measures",
-        );
+        note("force_observed: it reads the true forces at the pads, which no real sensor measures");
     }
-    push_commands(table, &summary.commands);
+    command_notes(&summary.commands).iter().for_each(|line| note(line));
     if scores.safety_unknown > 0 {
-        table.line(format!(
-            "safety could not be judged in {} (no threshold, or D not measured); counted as unsafe",
+        note(&format!(
+            "safety could not be judged in {} (no threshold, or D not measured); counted as not safe",
             counted(scores.safety_unknown, "episode")
         ));
     }
     if scores.invalid > 0 {
-        table.line(format!("{} counted as failed in every rate", counted(scores.invalid, "invalid episode")));
+        note(&format!("{} counted as failed in every rate", counted(scores.invalid, "invalid episode")));
     }
     let invalid = &summary.invalid_episodes;
     for InvalidEpisode { task, episode, reason } in invalid.iter().take(MAX_INVALID_LISTED) {
-        table.line(shortened(
-            &format!("  task {task} episode {episode}: invalid: {reason}"),
-            TextTable::WIDTH,
-        ));
+        note(&shortened(&format!("  task {task} episode {episode}: invalid: {reason}"), width));
     }
     if invalid.len() > MAX_INVALID_LISTED {
-        table.line(format!("  … and {} more, in summary.json", invalid.len() - MAX_INVALID_LISTED));
+        note(&format!("  … and {} more, in summary.json", invalid.len() - MAX_INVALID_LISTED));
     }
     let aborted = &summary.gave_up;
-    if aborted.is_empty() {
-        return;
+    if !aborted.is_empty() {
+        note(&format!("{} gave up in {}:", summary.policy, counted(aborted.len(), "episode")));
     }
-    table.line(format!("{} gave up in {}:", summary.policy, counted(aborted.len(), "episode")));
     for AbortedEpisode { task, episode, reason } in aborted.iter().take(MAX_ABORTED_LISTED) {
-        table.line(shortened(&format!("  task {task} episode {episode}: {reason}"), TextTable::WIDTH));
+        note(&shortened(&format!("  task {task} episode {episode}: {reason}"), width));
     }
     if aborted.len() > MAX_ABORTED_LISTED {
-        table.line(format!("  … and {} more, in summary.json", aborted.len() - MAX_ABORTED_LISTED));
+        note(&format!("  … and {} more, in summary.json", aborted.len() - MAX_ABORTED_LISTED));
+    }
+    note(&resolution(scores));
+}
+
+/// What the number of episodes can separate.
+fn resolution(scores: &GroupScores) -> String {
+    let rate = if scores.is_soft() { scores.safety_success_rate } else { scores.goal_success_rate };
+    let n = scores.episodes;
+    let wide = if n < FEW_EPISODES { format!("n = {n}: intervals are wide; ") } else { String::new() };
+    match DetectableDifference::new((0.01 * rate.rate.unwrap_or(0.0) * n as f64).round() as usize, n) {
+        Some(DetectableDifference { smallest, .. }) => {
+            format!("{wide}{} tell policies apart from {smallest:.0} points on", counted(n, "episode"))
+        }
+        None => format!("{wide}telling policies apart takes at least {MIN_DISCORDANT}"),
     }
 }
 
 /// Commands that were not executed as given.
-fn push_commands(table: &mut TextTable, commands: &CommandCounts) {
+fn command_notes(commands: &CommandCounts) -> Vec<String> {
     let of = |count: u64, what: &str, episodes: usize| {
         format!("{count} of {} {what} in {}", commands.steps, counted(episodes, "episode"))
     };
+    let mut notes = Vec::new();
     if commands.far > 0 {
-        table.line(of(commands.far, "commands were out of reach", commands.far_episodes));
-        if let Some(first) = commands.first_far {
-            table.line(format!("  first: {first}"));
-        }
+        notes.push(of(commands.far, "commands were out of reach", commands.far_episodes));
+        notes.extend(commands.first_far.map(|first| format!("  first: {first}")));
     }
     if commands.clamped_grips > 0 {
         let grips = of(commands.clamped_grips, "grip values were out of range", commands.clamped_episodes);
-        table.line(format!("{grips}; the hand clamped them"));
+        notes.push(format!("{grips}; the hand clamped them"));
     }
-}
-
-/// Appends a line of a figure below the table.
-fn push_named(table: &mut TextTable, name: &str, text: &str) {
-    table.line(format!("{name:<22}{text}"));
-}
-
-fn interval(rate: Rate) -> String {
-    let bounds = rate.wilson95.map(|[low, high]| format!("  [{low:.1}, {high:.1}]")).unwrap_or_default();
-    let by_task = rate
-        .bootstrap95
-        .map(|[low, high]| format!("  bootstrap by task [{low:.1}, {high:.1}]"))
-        .unwrap_or_default();
-    format!("{:>6} %{bounds}{by_task}", decimal(rate.rate, 1))
-}
-
-/// Fields from which a task gets its name in a table.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct TaskName<'a> {
-    /// Instruction given to the policy.
-    pub prompt: &'a str,
-    /// Asset of the object.
-    pub asset: &'a str,
-}
-
-/// Short names of tasks: the parts in which their prompts differ, with the asset where those of several tasks coincide.
-pub(crate) fn task_names(tasks: &[TaskName]) -> Vec<String> {
-    let prompts: Vec<&str> = tasks.iter().map(|task| task.prompt).collect();
-    let parts = distinct_parts(&prompts);
-    let name = |(part, task): (&&str, &TaskName)| match parts.iter().filter(|other| *other == part).count() {
-        1 => (*part).to_owned(),
-        _ => format!("{part} ({})", task.asset),
-    };
-    parts.iter().zip(tasks).map(name).collect()
-}
-
-/// The prompts without the whole words with which all of them begin or end.
-fn distinct_parts<'a>(prompts: &[&'a str]) -> Vec<&'a str> {
-    let words: Vec<Vec<&str>> = prompts.iter().map(|p| p.split(' ').collect()).collect();
-    let Some(shortest) = words.iter().map(Vec::len).min() else { return Vec::new() };
-    if words.iter().all(|w| *w == words[0]) {
-        return prompts.to_vec();
-    }
-    let same = |at: &dyn Fn(&[&'a str]) -> &'a str| words.iter().all(|w| at(w) == at(&words[0]));
-    let head = (0..shortest - 1).take_while(|i| same(&|w| w[*i])).count();
-    let tail = (1..shortest - head).take_while(|i| same(&|w| w[w.len() - *i])).count();
-    let length = |words: &[&str]| words.iter().map(|word| word.len() + 1).sum::<usize>();
-    let cut = |prompt: &'a str, w: &[&str]| {
-        &prompt[length(&w[..head])..prompt.len() - length(&w[w.len() - tail..])]
-    };
-    prompts.iter().zip(&words).map(|(prompt, w)| cut(prompt, w)).collect()
+    notes
 }
 
 #[cfg(test)]
@@ -316,30 +303,70 @@ mod tests {
         ]
     }
 
+    fn plain(summary: &SuiteSummary) -> String {
+        table(summary, TerminalFormat::PLAIN.with_details())
+    }
+
+    /// Words of the first line that starts with `start`, without spaces before it.
+    fn words(text: &str, start: &str) -> Vec<String> {
+        let line = text.lines().find(|line| line.trim_start().starts_with(start)).unwrap_or_default();
+        line.split_whitespace().map(str::to_owned).collect()
+    }
+
     #[test]
-    fn the_table_has_fewer_than_100_columns_and_the_expected_numbers() {
-        let text = table(&SuiteSummary::from_records("suite", "expert", &records()));
-        assert!(text.lines().all(|line| line.chars().count() < 100), "{text}");
+    fn the_verdict_comes_first_and_only_failed_tasks_have_lines() {
+        let summary = SuiteSummary::from_records("suite", "expert", &records());
+        let text = table(&summary, TerminalFormat::PLAIN);
+        assert!(text.lines().all(|line| line.chars().count() < 80), "{text}");
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines[..2], ["suite · expert · 3 episodes", "● 1 safe  ✗ 1 over the limit  ▨ 1 invalid"]);
+        assert_eq!(words(&text, "Safety")[..6], ["Safety", "33", "%", "[", "6,", "79]"]);
+        assert!(text.contains("gap 33 points: placed over the limit\n"), "1.25 % collapsed: {text}");
+        assert_eq!(
+            words(&text, "0 bun")[3..],
+            ["2/2", "1/2", "0.92", "1", "%", "✗", "1", "over", "the", "limit"]
+        );
+        assert_eq!(words(&text, "1 bun")[3..], ["0/1", "0/1", "–", "–", "▨", "invalid"]);
+        assert!(text.contains("n = 3: intervals are wide; "), "{text}");
+        assert!(!text.contains("DSR") && !text.contains('\u{1b}'), "{text}");
+        let safe = SuiteSummary::from_records("suite", "expert", &records()[..1]);
+        let text = table(&safe, TerminalFormat::PLAIN);
+        assert!(!text.contains("0 bun") && text.contains("1 task without a failure; --details"), "{text}");
+        let colours = table(&summary, TerminalFormat { is_coloured: true, ..TerminalFormat::PLAIN });
+        assert!(colours.contains("\u{1b}[38;5;166m✗ 1 over the limit\u{1b}[0m"), "{colours}");
+    }
+
+    #[test]
+    fn an_object_is_called_crushed_from_5_percent_of_collapsed_volume_on() {
+        let crushed = episode(0, "put it there", |r| {
+            (r.verdict.deformation_ok, r.verdict.safety) = (Some(false), false);
+            r.verdict.collapsed_volume_pct = Some(67.0);
+        });
+        let text = plain(&SuiteSummary::from_records("suite", "expert", &[crushed]));
+        assert!(text.contains("gap 100 points: placed, but crushed\n"), "{text}");
+    }
+
+    #[test]
+    fn details_have_every_task_and_the_figures_of_the_summary() {
+        let text = plain(&SuiteSummary::from_records("suite", "expert", &records()));
+        assert!(text.lines().all(|line| line.chars().count() < 80), "{text}");
         let row = |start: &str| text.lines().find(|line| line.starts_with(start)).unwrap_or_default();
-        let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
-        assert_eq!(
-            words(row("  0 left")),
-            ["0", "left", "100.0", "100.0", "50.0", "0.92", "0.39", "0.92", "1.44", "1.00", "0"]
-        );
-        assert_eq!(
-            words(row("  1 right")),
-            ["1", "right", "0.0", "0.0", "0.0", "–", "∞", "∞", "∞", "1.00", "1"]
-        );
         assert_eq!(row("Safety Success  "), "Safety Success          33.3 %  [6.1, 79.2]");
         assert_eq!(row("Goal–safety gap"), "Goal–safety gap         33.3 pp");
         assert_eq!(
             row("Safety Success at"),
             "Safety Success at     κ=0.3: 33.3 % · κ=0.5: 33.3 % · κ=0.7: 33.3 %"
         );
+        assert_eq!(row("Peak D"), "Peak D, % of diagonal mean 0.92, P5 0.45, median 1.50, P95 ∞; n 2");
         assert!(text.contains("1 invalid episode counted as failed"));
         assert!(text.contains("  task 1 episode 0: invalid: x\n"), "the reason is given: {text}");
         assert!(text.contains("percentiles rank the 1 invalid episode as worst"), "{text}");
         assert_eq!(row("DSR"), "DSR                     33.3 %  [6.1, 79.2]");
+        let wide = table(
+            &SuiteSummary::from_records("suite", "expert", &records()),
+            TerminalFormat { width: 120, ..TerminalFormat::PLAIN },
+        );
+        assert_eq!(words(&wide, "0 bun")[8..11], ["100.0", "0.92", "1.00"], "{wide}");
     }
 
     #[test]
@@ -351,20 +378,18 @@ mod tests {
                 r.verdict.slip_ok = Some(true);
             })
         });
-        let text = table(&SuiteSummary::from_records("suite", "expert", &records));
-        assert!(text.lines().all(|line| line.chars().count() < 100), "{text}");
+        let text = plain(&SuiteSummary::from_records("suite", "expert", &records));
+        assert!(text.lines().all(|line| line.chars().count() < 80), "{text}");
         let row = |start: &str| text.lines().find(|line| line.starts_with(start)).unwrap_or_default();
         assert_eq!(
             row("Contact success"),
-            "Contact success        100.0 %  [34.2, 100.0]  safe and without slip: 50.0 %"
+            "Contact success        100.0 %  [34.2, 100.0]  safe, no slip: 50.0 %"
         );
-        assert_eq!(
-            row("Gentle"),
-            "Gentle                  50.0 %  [9.5, 90.5]  grip ratio: P5 1.7, median 3.8, P95 5.8"
-        );
+        assert_eq!(row("Gentle"), "Gentle                  50.0 %  [9.5, 90.5]");
+        assert_eq!(row("Grip ratio"), "Grip ratio            P5 1.7, median 3.8, P95 5.8");
         assert!(text.contains("also requires no slip in the hand"), "{text}");
-        let plain = table(&SuiteSummary::from_records("suite", "expert", &self::records()));
-        assert!(!plain.contains("also requires no slip"), "{plain}");
+        let text = plain(&SuiteSummary::from_records("suite", "expert", &self::records()));
+        assert!(!text.contains("also requires no slip"), "{text}");
     }
 
     #[test]
@@ -373,7 +398,7 @@ mod tests {
             (r.verdict.tau, r.verdict.d_ref, r.verdict.deformation_ok) = (None, None, None);
             (r.verdict.safety, r.verdict.safety_known) = (false, false);
         });
-        let text = table(&SuiteSummary::from_records("suite", "expert", &[unknown]));
+        let text = plain(&SuiteSummary::from_records("suite", "expert", &[unknown]));
         let row = |start: &str| text.lines().find(|line| line.starts_with(start)).unwrap_or_default();
         assert_eq!(row("Deformation within τ"), "Deformation within τ     N/A  not judged: 1");
         assert_eq!(row("Safety Success  "), "Safety Success           N/A  not judged: 1");
@@ -397,9 +422,10 @@ mod tests {
             r.header.soft = false;
             (r.verdict.d_peak, r.verdict.deformation_ok, r.verdict.tau) = (None, None, None);
         });
-        let text = table(&SuiteSummary::from_records("suite", "expert", &[rigid]));
-        assert!(text.contains("N/A") && !text.contains('κ'), "{text}");
-        assert!(text.contains("lift it"));
+        let text = plain(&SuiteSummary::from_records("suite", "expert", &[rigid]));
+        assert!(text.contains("Safety  N/A  rigid objects") && !text.contains('κ'), "{text}");
+        assert!(text.contains("● 1 placed without a drop") && !text.contains("safe:"), "{text}");
+        assert_eq!(words(&text, "0 bun")[2..4], ["1/1", "N/A"]);
     }
 
     #[test]
@@ -410,7 +436,7 @@ mod tests {
             r.stats.first_far_command =
                 Some(UnreachableCommand { position_m, distance_m: 534.5, angle_rad: 0.0 });
         });
-        let text = table(&SuiteSummary::from_records("suite", "pi", &[far, episode(0, "lift it", |_| ())]));
+        let text = plain(&SuiteSummary::from_records("suite", "pi", &[far, episode(0, "lift it", |_| ())]));
         let lines = "100 of 336 commands were out of reach in 1 episode\n  first: (467, 4, 260) m, 534.5 m and 0 rad from the tool\n";
         assert!(text.contains(lines), "{text}");
         assert!(
@@ -421,24 +447,7 @@ mod tests {
 
     #[test]
     fn an_empty_run_has_a_table() {
-        let text = table(&SuiteSummary::from_records("suite", "expert", &[]));
+        let text = plain(&SuiteSummary::from_records("suite", "expert", &[]));
         assert!(text.contains("0 episodes"), "{text}");
-    }
-
-    #[test]
-    fn equal_prompts_are_told_apart_by_their_assets() {
-        let task = |prompt, asset| TaskName { prompt, asset };
-        let tasks =
-            [task("lift a roll", "bun"), task("lift a pastry", "croissant"), task("lift a pastry", "eclair")];
-        assert_eq!(task_names(&tasks), ["roll", "pastry (croissant)", "pastry (eclair)"]);
-    }
-
-    #[test]
-    fn prompts_are_reduced_to_their_distinct_parts() {
-        assert_eq!(distinct_parts(&["put a on it", "put b c on it"]), ["a", "b c"]);
-        assert_eq!(distinct_parts(&["same", "same"]), ["same", "same"]);
-        assert_eq!(distinct_parts(&["put it", "put it down"]), ["it", "it down"]);
-        assert_eq!(distinct_parts(&["étoile à gauche", "étoile à droite"]), ["gauche", "droite"]);
-        assert!(distinct_parts(&[]).is_empty());
     }
 }

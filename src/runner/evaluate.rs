@@ -1,6 +1,9 @@
 //! Evaluation of a policy on a suite. With a folder, an interrupted run can be continued.
 
-use std::{collections::BTreeSet, path::Path};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use serde::Serialize;
 
@@ -17,7 +20,7 @@ use crate::{
 use softvt_common::cancel;
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{files, parallel, text::counted};
-use softvt_evaluation::verdict::Outcome;
+use softvt_evaluation::{category::EpisodeCategory, verdict::Outcome};
 use softvt_records::{record::EpisodeRecord, summary::SuiteSummary};
 use softvt_report::{
     actions,
@@ -30,6 +33,8 @@ use softvt_rollout::FinishedEpisode;
 /// The episodes of a finished run, in order, with their summary.
 #[derive(Clone, Debug)]
 pub struct SuiteResult {
+    /// Folder of the run, if it has one.
+    pub folder: Option<PathBuf>,
     /// Rates and distributions.
     pub summary: SuiteSummary,
     /// One record per episode, in order of task and episode.
@@ -247,7 +252,11 @@ pub(crate) fn run_suite(
         && log.records.iter().all(|record| artifacts.missing(record).is_empty())
     {
         config.notice(format!("{out} is already complete"));
-        return Ok(SuiteResult { summary: log.summary(), records: log.records });
+        return Ok(SuiteResult {
+            folder: Some(run.out.clone()),
+            summary: log.summary(),
+            records: log.records,
+        });
     }
     let simulate = |job: EpisodeJob| {
         let mut finished = run.run_episode(job, artifacts.may_render(job.episode), &run.controllers)?;
@@ -257,6 +266,7 @@ pub(crate) fn run_suite(
     let outcome = restore_artifacts(run, &log.records).and_then(|()| {
         let line = |record: &EpisodeRecord| {
             on_episode(record);
+            config.observer.judged(record.category());
             episode_line(record)
         };
         log.run_jobs(
@@ -280,7 +290,7 @@ pub(crate) fn run_suite(
     }
     log.write_results()?;
     config.notice(out);
-    Ok(SuiteResult { summary: log.summary(), records: log.records })
+    Ok(SuiteResult { folder: Some(run.out.clone()), summary: log.summary(), records: log.records })
 }
 
 /// Runs the episodes of a prepared suite and writes nothing. Calls `on_episode` for each, in the order in which they
@@ -300,6 +310,7 @@ pub(crate) fn run_episodes(
         simulate,
         |_, finished: FinishedEpisode| {
             on_episode(&finished.record);
+            config.observer.judged(finished.record.category());
             let line = episode_line(&finished.record);
             records.push(finished.record);
             Ok(line)
@@ -310,7 +321,7 @@ pub(crate) fn run_episodes(
     }
     records.sort_by_key(|record| record.header.id.index());
     let summary = SuiteSummary::from_records(&run.name, &config.policy.name, &records);
-    Ok(SuiteResult { summary, records })
+    Ok(SuiteResult { folder: None, summary, records })
 }
 
 /// True if a folder contains a finished run.
@@ -327,21 +338,23 @@ fn report_unrendered(config: &RunConfig, index: EpisodeIndex, rendered: Result<(
 
 /// Formats an episode as one line of progress.
 pub(crate) fn episode_line(record: &EpisodeRecord) -> String {
-    let verdict = &record.verdict;
-    let d = verdict.d_peak.map_or(String::new(), |d| format!(", D {d:.2} %"));
-    let outcome = match &record.outcome {
-        Outcome::Invalid { reason, .. } => format!("invalid ({reason}){d}"),
-        Outcome::Error { message } => format!("invalid ({message}){d}"),
-        _ if verdict.safety => format!("safe{d}"),
-        _ if verdict.goal => match (verdict.deformation_ok, verdict.d_peak, verdict.tau) {
-            (Some(false), Some(d), Some(tau)) => format!("goal reached, unsafe (D {d:.2} % > τ {tau:.2} %)"),
-            _ if verdict.no_drop && verdict.slip_ok == Some(false) => {
-                format!("goal reached, unsafe (slipped by {:.1} mm){d}", verdict.slip_mm)
-            }
-            _ => format!("goal reached, unsafe{d}"),
-        },
-        _ => format!("failed{d}"),
+    let (verdict, category) = (&record.verdict, record.category());
+    let name = match category {
+        EpisodeCategory::Safe if !record.header.soft => "placed",
+        category => category.name(),
     };
+    let reason = match &record.outcome {
+        Outcome::Invalid { reason, .. } => format!(" ({reason})"),
+        Outcome::Error { message } => format!(" ({message})"),
+        _ if category == EpisodeCategory::Slipped => format!(" by {:.1} mm", verdict.slip_mm),
+        _ => String::new(),
+    };
+    let d = match (verdict.d_peak, verdict.tau.filter(|tau| *tau > 0.0)) {
+        (Some(d), Some(tau)) => format!(", D {d:.2} % = {:.2} × limit", d / tau),
+        (Some(d), None) => format!(", D {d:.2} %"),
+        (None, _) => String::new(),
+    };
+    let outcome = format!("{} {name}{reason}{d}", category.glyph());
     let stats = &record.stats;
     let mut line = format!("{}: {outcome}, {:.1} s simulated", record.header.id.index(), stats.time_s);
     if let Some(reason) = &stats.gave_up {

@@ -2,6 +2,8 @@
 
 use std::ops::Deref;
 
+use softvt_evaluation::category::EpisodeCategory;
+
 /// Receives the progress and the messages of runs. Its methods are called from any thread; by default they do nothing.
 pub trait Observer: Send + Sync {
     /// A message that needs no answer, such as a warning.
@@ -28,6 +30,11 @@ pub trait Observer: Send + Sync {
     /// A job of the list has ended, with one line about its result.
     fn advance(&self, line: &str) {
         let _ = line;
+    }
+
+    /// An episode of the list has been judged; [`Self::advance`] follows.
+    fn judged(&self, category: EpisodeCategory) {
+        let _ = category;
     }
 
     /// The list, or the work, has ended.

@@ -8,8 +8,9 @@ use crate::support::fixtures::{CONDITIONS, conditions_project};
 fn the_comparison_is_printed_as_a_table_and_as_json() {
     let project = conditions_project(CONDITIONS, "deformable");
     let output = project.succeeds("suites/trial.lua --policy noop --out run");
-    let (_, against) = output.out.split_once("change from the reference").expect("a second table");
-    assert!(against.contains("95 % interval") && against.contains("\nheavy x2"), "{}", output.out);
+    let (rows, legend) = output.out.split_once("Δ: ").expect("a legend");
+    assert!(rows.contains("Δ Safety") && rows.contains("\nheavy x2"), "{}", output.out);
+    assert!(legend.contains("change from the reference"), "{}", output.out);
     assert!(output.err.ends_with("run/conditions.json\n"), "{}", output.err);
     let printed = project.succeeds("suites/trial.lua --policy noop --out json --json").out;
     assert_eq!(project.json("json/conditions.json"), serde_json::from_str::<Value>(&printed).expect("JSON"));

@@ -33,9 +33,9 @@ fn errors_of_scenes_and_experts_have_their_line() {
 
 #[test]
 fn control_characters_of_scripts_are_escaped() {
-    let text = Small::default().text().replace("prompt = \"wait\"", "prompt = \"wait\\27[2Jfor it\"");
+    let text = Small { expert: "arm:give_up('wait\\27[2Jfor it')", ..Small::default() }.text();
     let project = Project::new(&[("x.lua", &format!("print('\\27]0;mine\\7')\n{text}"))]);
-    let output = project.succeeds("x.lua --policy noop --out run");
+    let output = project.succeeds("x.lua --out run");
     assert!(
         !output.out.contains('\u{1b}') && !output.err.contains('\u{1b}'),
         "{} {}",

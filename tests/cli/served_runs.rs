@@ -48,7 +48,7 @@ fn the_end_of_a_recording_server_is_reported() {
     let output = server.interrupt();
     let kept = "interrupted; 1 of 2 episodes are in served; continue with --resume --out served\n";
     assert!(output.code == 130 && output.err.ends_with(kept), "{}", output.err);
-    assert!(output.err.contains("one [1/2] task 0 episode 1: failed"), "{}", output.err);
+    assert!(output.err.contains("one [1/2] task 0 episode 1: ○ goal missed"), "{}", output.err);
     assert!(output.out.contains("mine") && output.out.contains("Safety"), "a table: {}", output.out);
     let reported = project.succeeds("report served --out report");
     assert!(reported.err.contains("served is not finished: it has 1 of 2 episodes"), "{}", reported.err);

@@ -1,6 +1,10 @@
 //! Experts that give up leave their reason in the record and in the results.
 
-use softvt::{evaluation::verdict::Outcome, report::terminal, runner::SuiteResult};
+use softvt::{
+    evaluation::verdict::Outcome,
+    report::{styled_text::TerminalFormat, terminal},
+    runner::SuiteResult,
+};
 
 use crate::support::{Project, Small};
 
@@ -8,12 +12,12 @@ use crate::support::{Project, Small};
 fn the_reason_of_give_up_is_recorded() {
     let project = Small { expert: "arm:wait(0.1) arm:give_up('too slippery')", ..Small::default() }.project();
     let finished = project.run("x.lua").episodes(2).finish();
-    let line = "task 0 episode 0: failed, D 0.00 %, 2.0 s simulated; gave up: too slippery";
+    let line = "task 0 episode 0: ○ goal missed, D 0.00 %, 2.0 s simulated; gave up: too slippery";
     assert!(finished.messages.contains(line), "{}", finished.messages);
-    let SuiteResult { summary, records } = finished.result();
+    let SuiteResult { summary, records, .. } = finished.result();
     let list =
         "expert gave up in 2 episodes:\n  task 0 episode 0: too slippery\n  task 0 episode 1: too slippery\n";
-    let table = terminal::table(&summary);
+    let table = terminal::table(&summary, TerminalFormat::PLAIN.with_details());
     assert!(table.contains(list), "{table}");
     for (episode, record) in (0..).zip(&records) {
         assert_eq!(
@@ -30,7 +34,10 @@ fn without_give_up_there_is_no_reason() {
     let project = Small::default().project();
     let finished = project.run("x.lua").out("run").finish();
     assert!(!finished.messages.contains("gave up"), "{}", finished.messages);
-    assert!(!terminal::table(&finished.result().summary).contains("gave up"));
+    assert!(
+        !terminal::table(&finished.result().summary, TerminalFormat::PLAIN.with_details())
+            .contains("gave up")
+    );
     assert!(project.lines("run/episodes.jsonl")[0].get("gave_up").is_none());
     assert!(project.json("run/summary.json").get("gave_up").is_none());
 }

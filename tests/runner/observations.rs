@@ -9,7 +9,7 @@ use softvt::{
         Action, ActionChunk, EpisodeBrief, Observation, Policy, PolicyError, RobotState, SensorStreams,
     },
     records::{record::EpisodeRecord, summary::SuiteSummary},
-    report::terminal,
+    report::{styled_text::TerminalFormat, terminal},
     rollout::{AssetCache, ChunkedPolicy, Episode, EpisodeSpec, SensorAssets, Sensors, Simulation},
     script::{self, LoadedScript},
     sensing::tactile::TactileMosaicLayout,
@@ -192,7 +192,11 @@ fn results_record_whether_true_forces_were_observed() {
         assert!(line.contains(&format!("\"force_observed\":{force},")), "{line}");
         let summary = SuiteSummary::from_records("one", "witness", &[record]);
         assert_eq!(summary.force_observed, force);
-        assert_eq!(terminal::table(&summary).contains("force_observed policy"), force);
+        assert_eq!(
+            terminal::table(&summary, TerminalFormat::PLAIN.with_details())
+                .contains("force_observed: it reads"),
+            force
+        );
     }
 }
 

@@ -6,7 +6,7 @@ use softvt::{
     evaluation::{stage::TaskStage, verdict::Outcome},
     policy::{builtin::NoopPolicy, profile::GripCode, remote::ServerProtocol},
     records::record::EpisodeRecord,
-    report::comparison,
+    report::{comparison, styled_text::TerminalFormat},
     runner::PolicyConfig,
 };
 
@@ -137,7 +137,9 @@ fn a_policy_that_declares_access_to_limits_is_marked_in_its_results() {
     project.run("x.lua").policy("run").out("again").finish();
     let compared = project.compare("run", "again").expect("comparable");
     assert_eq!(compared.first, "knows (privileged)");
-    assert!(comparison::table(&compared).contains("knows (privileged)"));
+    assert!(
+        comparison::table(&compared, TerminalFormat::PLAIN.with_details()).contains("knows (privileged)")
+    );
 }
 
 #[test]

@@ -17,7 +17,7 @@ use rmpv::Value;
 use softvt::{
     evaluation::verdict::Outcome,
     policy::{profile::GripCode, remote::ServerProtocol},
-    report::terminal,
+    report::{styled_text::TerminalFormat, terminal},
     runner::RunErrorCause,
 };
 use tungstenite::{Message, WebSocket, accept};
@@ -416,7 +416,7 @@ fn commands_that_are_not_executed_as_given_are_shown() {
     assert!(messages.contains("; 6 of 12 grip values were out of range"), "{messages}");
     let summary = finished.result().summary;
     assert_eq!((summary.commands.far, summary.commands.clamped_grips), (6, 6));
-    let table = terminal::table(&summary);
+    let table = terminal::table(&summary, TerminalFormat::PLAIN.with_details());
     for line in [
         "6 of 12 commands were out of reach in 1 episode",
         "6 of 12 grip values were out of range in 1 episode",

@@ -6,7 +6,7 @@ use rmpv::Value;
 use softvt::{
     episode_id::{EpisodeIndex, EpisodeSplit},
     policy::{Action, profile::GripCode},
-    report::{actions, comparison, terminal},
+    report::{actions, comparison, styled_text::TerminalFormat, terminal},
 };
 
 use crate::{
@@ -84,14 +84,18 @@ fn a_served_run_equals_a_run_of_the_same_actions() {
     assert!(first.is_recorded(&actions[11..]));
     assert!(project.path("served/summary.json").exists(), "written with the last episode");
     let (summaries, messages) = server.finish();
-    assert!(messages.contains("one [1/2] task 0 episode 1: failed"), "{messages}");
+    assert!(messages.contains("one [1/2] task 0 episode 1: ○ goal missed"), "{messages}");
     assert!(!messages.contains("will not be recorded"), "{messages}");
 
     project.run("x.lua").policy("random").episodes(2).out("two").finish();
     let repeated = project.run("x.lua").policy("two").episodes(2).out("repeated").finish().result();
-    let table = terminal::table(&summaries[0]);
+    let table = terminal::table(&summaries[0], TerminalFormat::PLAIN.with_details());
     assert!(table.contains("client") && table.contains("Safety"), "{table}");
-    assert_eq!(table.replace("client", "replay"), terminal::table(&repeated.summary), "the table");
+    assert_eq!(
+        table.replace("client", "replay"),
+        terminal::table(&repeated.summary, TerminalFormat::PLAIN.with_details()),
+        "the table"
+    );
     for file in ["episodes.jsonl", "summary.json"] {
         let served = without_policy(&project, &format!("served/{file}"), "client");
         assert_eq!(served, without_policy(&project, &format!("repeated/{file}"), "replay"), "{file}");
@@ -132,7 +136,7 @@ fn a_served_run_is_replayed_compared_and_reported() {
     let viewed = "softvt view x.lua --task 0 --policy served --out seen";
     assert!(report.html.contains(viewed), "a command that repeats the actions");
     let compared = project.compare("random", "served").expect("comparable");
-    let table = comparison::table(&compared);
+    let table = comparison::table(&compared, TerminalFormat::PLAIN.with_details());
     assert!(table.contains("random → mine · 2 paired episodes"), "{table}");
     // The last episode, by a server that resumes the run.
     let server = Server::start(&mine().resume());

@@ -2,7 +2,10 @@
 
 use softvt::{
     records::record::EpisodeRecord,
-    report::condition_table::{compares_policies, controllers_table},
+    report::{
+        condition_table::{compares_policies, controllers_table},
+        styled_text::TerminalFormat,
+    },
     runner::{Runner, TraceDetail},
     scene::ObjectVariation,
     script::STANDARD_VARIATION,
@@ -107,11 +110,11 @@ fn conditions_may_name_a_built_in_policy() {
     assert_eq!(tables[0].rows[1].policy.as_deref(), Some("noop"));
     assert_eq!(project.json("run/conditions.json")["suites"][0]["rows"][1]["policy"], "noop");
     assert!(compares_policies(&tables));
-    let printed = controllers_table(&tables);
+    let printed = controllers_table(&tables, TerminalFormat::PLAIN);
     assert!(printed.contains("controller") && !printed.contains("change from the reference"), "{printed}");
     project.write("trial.lua", plan("size-seen").as_bytes());
     let tables = project.run("trial.lua").out("blind").conditions().expect("valid");
-    let printed = controllers_table(&tables);
+    let printed = controllers_table(&tables, TerminalFormat::PLAIN);
     assert!(
         printed.contains("\nother *") && printed.contains("best without touch, one: other, Safety"),
         "{printed}"

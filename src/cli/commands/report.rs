@@ -7,7 +7,7 @@ use clap::Args;
 use crate::{
     args::parse_folder,
     error::CliError,
-    output::{eprint_notice, print, print_json},
+    output::{eprint_notice, print, print_json, print_table, terminal_format},
 };
 use softvt_report::{
     comparison, policy_ranking::PolicyRanking, report_files, run_summary::summarize_runs, shard_merge,
@@ -31,6 +31,9 @@ pub(crate) struct CompareArgs {
     /// Run folders, or folders that contain run folders: two in detail, more in one table
     #[arg(value_name = "RUN", required = true, num_args = 2..)]
     runs: Vec<PathBuf>,
+    /// All measures and tasks, not only those that changed
+    #[arg(long, conflicts_with = "json")]
+    details: bool,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -45,6 +48,9 @@ pub(crate) struct MergeArgs {
     /// Folders of all shards
     #[arg(value_name = "SHARD", required = true)]
     shards: Vec<PathBuf>,
+    /// Print all tasks and figures, not only tasks that failed
+    #[arg(long)]
+    details: bool,
 }
 
 /// Writes `report.html`, `report.md`, `report.tex` and `report.jsonl`.
@@ -74,7 +80,11 @@ pub(super) fn compare(args: &CompareArgs) -> Result<(), CliError> {
     let folders = args.runs.iter().map(|dir| stored_run::load(dir)).collect::<Result<Vec<_>, _>>()?;
     if let [first, second] = &folders[..] {
         let compared = comparison::compare(first, second)?;
-        return if args.json { print_json(&compared) } else { print(&comparison::table(&compared)) };
+        return if args.json {
+            print_json(&compared)
+        } else {
+            print_table(&comparison::table(&compared, terminal_format(args.details)))
+        };
     }
     let ranking = PolicyRanking::new(&folders)?;
     if args.json { print_json(&ranking) } else { print(&ranking.table()) }
@@ -86,7 +96,8 @@ pub(super) fn compare(args: &CompareArgs) -> Result<(), CliError> {
 /// The shards do not belong to one run, or a file cannot be read or written.
 pub(super) fn merge(args: &MergeArgs) -> Result<(), CliError> {
     let summaries = shard_merge::merge(&args.out, &args.shards)?;
-    summaries.iter().try_for_each(|summary| print(&terminal::table(summary)))?;
+    let format = terminal_format(args.details);
+    summaries.iter().try_for_each(|summary| print_table(&terminal::table(summary, format)))?;
     eprint_notice(args.out.display());
     Ok(())
 }

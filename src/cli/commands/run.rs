@@ -1,20 +1,23 @@
 //! `softvt FILE.lua`: the plan of a script.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::Parser;
 
 use crate::{
     args::{PolicyArgs, Request, RunFlags, ScriptArgs},
     error::{CliError, Exit},
-    output::{eprint_notice, print, print_json},
+    output::{eprint_notice, print, print_json, print_table, terminal_format},
     plan_flags,
 };
 use softvt_benchmark::Plan;
 use softvt_policy::profile::Profile;
 use softvt_records::{requirement::Requirement, summary::SuiteSummary};
 use softvt_report::{
+    commands::next_commands,
     condition_table::{ConditionTable, compares_policies, controllers_table, table},
+    stored_run,
+    styled_text::TerminalFormat,
     terminal,
 };
 use softvt_runner::{
@@ -51,6 +54,7 @@ pub(crate) struct RunArgs {
 /// The script, a flag, the folder or the policy is not valid, or an episode fails.
 pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
     let (json, requirements) = (args.flags.json, args.flags.requirements.clone());
+    let format = terminal_format(args.flags.details);
     let request = Request::new(args.script)?.with(|config| args.flags.apply(config));
     let run = request.load_plan(plan_flags::RUN, &args.policy)?;
     let ConfiguredScript { config, script: loaded } = &run;
@@ -63,11 +67,18 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
             let is_list = matches!(plan, Plan::Suites { .. });
             let results = Runner::new(&run).numbered().run(|_| ())?;
             let failed = results.iter().find_map(SuiteResult::refusal_of_all_actions);
+            let folders: Vec<PathBuf> = results.iter().filter_map(|result| result.folder.clone()).collect();
             let summaries: Vec<SuiteSummary> = results.into_iter().map(|result| result.summary).collect();
             match &summaries[..] {
                 [summary] if json && !is_list => print_json(summary),
                 summaries if json => print_json(&summaries),
-                summaries => summaries.iter().try_for_each(|summary| print(&terminal::table(summary))),
+                summaries => {
+                    summaries
+                        .iter()
+                        .try_for_each(|summary| print_table(&terminal::table(summary, format)))?;
+                    print_next_commands(&folders);
+                    Ok(())
+                }
             }?;
             match failed {
                 Some(message) => Err(CliError::new(Exit::Policy, message)),
@@ -78,7 +89,7 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
             check_distinct_out_dirs(config, suites)?;
             check_parent_folder(config)?;
             let out = config.out.clone().unwrap_or_else(|| next_run_dir(config, name));
-            run_conditions(&run, suites.len(), &out, json)
+            run_conditions(&run, suites.len(), &out, (!json).then_some(format))
         }
         Plan::Experiment { columns, .. } => experiment::run(&run, |output| -> Result<(), CliError> {
             match output {
@@ -90,19 +101,39 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
     }
 }
 
-/// Runs suites under conditions and prints their tables: policies side by side once all have run, other conditions
-/// after each suite.
-fn run_conditions(run: &ConfiguredScript, suites: usize, out: &Path, json: bool) -> Result<(), CliError> {
+/// Says on standard error what to do next: the report of the runs, and a view of the worst episode of the first run
+/// that has one.
+fn print_next_commands(folders: &[PathBuf]) {
+    let Some(parent) = folders.first().and_then(|folder| folder.parent()) else { return };
+    let mut runs = folders.iter().filter_map(|folder| stored_run::load(folder).ok()).flatten().peekable();
+    let Some(commands) = runs.peek().map(next_commands) else { return };
+    match folders {
+        [_] => eprint_notice(format!("next: {}", commands[0])),
+        _ => eprint_notice(format!("next: softvt report {}", parent.display())),
+    }
+    if let Some(view) = runs.find_map(|run| next_commands(&run).into_iter().nth(1)) {
+        eprint_notice(format!("next: {view}"));
+    }
+}
+
+/// Runs suites under conditions and prints their tables, or JSON without a format. Policies are side by side once all
+/// have run, other conditions after each suite.
+fn run_conditions(
+    run: &ConfiguredScript,
+    suites: usize,
+    out: &Path,
+    format: Option<TerminalFormat>,
+) -> Result<(), CliError> {
     let print_last = |tables: &[ConditionTable]| -> Result<(), CliError> {
+        let Some(format) = format else { return Ok(()) };
         match tables.last() {
-            _ if json => Ok(()),
-            Some(last) if !compares_policies(tables) => print(&table(last)),
-            Some(_) if tables.len() == suites => print(&controllers_table(tables)),
+            Some(last) if !compares_policies(tables) => print_table(&table(last, format)),
+            Some(_) if tables.len() == suites => print_table(&controllers_table(tables, format)),
             _ => Ok(()),
         }
     };
     let tables = conditions::run(run, out, print_last)?;
-    if json {
+    if format.is_none() {
         print_json(&conditions::document(run, &tables))?;
     }
     eprint_notice(out.join(conditions::FILE).display());

@@ -14,7 +14,7 @@ use crate::{
     QUIET_INTERRUPT,
     args::{ProfileArgs, Request, ScriptArgs, parse_folder},
     error::{CliError, Exit},
-    output::{eprint_notice, print},
+    output::{eprint_notice, print, print_table, terminal_format},
 };
 use softvt_common::{
     cancel::{self, CancelFlag},
@@ -149,7 +149,8 @@ fn serve(args: ServeArgs) -> Result<(), CliError> {
     match served {
         Some(served) => {
             let (summaries, outcome) = served.finish();
-            summaries.iter().try_for_each(|summary| print(&terminal::table(summary)))?;
+            let format = terminal_format(false);
+            summaries.iter().try_for_each(|summary| print_table(&terminal::table(summary, format)))?;
             Ok(outcome?)
         }
         None => Err(CliError::interrupted("")),

@@ -8,8 +8,12 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::record::{EpisodeRecord, UnreachableCommand};
+use super::{
+    paired_stats::d_over_tau,
+    record::{EpisodeRecord, UnreachableCommand},
+};
 use softvt_evaluation::{
+    category::EpisodeCategory,
     safety::DeformationLimit,
     stage::TaskStage,
     statistics::{Distribution, Rate, mean, stratified_bootstrap},
@@ -68,6 +72,12 @@ pub struct GroupScores {
     pub wrong_contact_rate: Rate,
     /// Number of episodes without Goal Success by the stage at which they ended.
     pub failed_stages: BTreeMap<TaskStage, usize>,
+    /// Number of episodes by their category.
+    #[serde(default)]
+    pub categories: BTreeMap<EpisodeCategory, usize>,
+    /// Peak D over τ, of the valid episodes that have both.
+    #[serde(default)]
+    pub d_over_tau: Distribution,
     /// Smallest and largest τ that was applied, %; null without any.
     pub tau_range: Option<TauRange>,
     /// Deformation within the episodes.
@@ -228,6 +238,16 @@ pub struct SuiteSummary {
 }
 
 impl GroupScores {
+    /// True if a target deforms.
+    pub fn is_soft(&self) -> bool {
+        self.deformation_ok_rate.is_some()
+    }
+
+    /// Number of episodes of a category.
+    pub fn count(&self, category: EpisodeCategory) -> usize {
+        self.categories.get(&category).copied().unwrap_or(0)
+    }
+
     /// Scores of `records`.
     pub fn from_records(records: &[&EpisodeRecord]) -> Self {
         let valid: Vec<_> = records.iter().copied().filter(|r| r.outcome.is_valid()).collect();
@@ -255,6 +275,10 @@ impl GroupScores {
         let mut failed_stages = BTreeMap::new();
         for stage in records.iter().filter_map(|r| r.verdict.failed_stage) {
             *failed_stages.entry(stage).or_insert(0) += 1;
+        }
+        let mut categories = BTreeMap::new();
+        for record in records {
+            *categories.entry(record.category()).or_insert(0) += 1;
         }
         let taus = || soft.iter().filter_map(|r| r.verdict.tau);
         let tau_range = taus().reduce(f64::min).zip(taus().reduce(f64::max));
@@ -285,6 +309,8 @@ impl GroupScores {
             others_unknown: valid.len() - others.len(),
             wrong_contact_rate: Rate::from_test(records, |r| r.verdict.first_wrong_contact.is_some()),
             failed_stages,
+            categories,
+            d_over_tau: over_valid(d_over_tau),
             tau_range: tau_range.map(|(min, max)| TauRange { min, max }),
             within_episodes: EpisodeDeformation {
                 d_mean: mean_of(|r| r.verdict.d_mean),

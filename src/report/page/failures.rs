@@ -9,6 +9,7 @@ use super::{
     images::{ByteBudget, DataImage, embed_image, relative_link},
 };
 use crate::{
+    commands::{replay_command, view_command},
     run_summary::{RunSummary, UnsafeEpisode},
     video::{still_path, video_path},
 };
@@ -102,7 +103,7 @@ fn failure_row(run: &RunSummary, episode: &UnsafeEpisode, out: &Path) -> Markup 
             td.text data-head="Reason" {
                 (with_unbreakable_units(&episode.reason))
                 @if let Some(video) = video { br; a href=(video) { "video" } }
-                @else { @for command in view_commands(run, id) { br; code { (command) } } }
+                @else { @for command in commands(run, id) { br; code { (command) } } }
             }
         }
     }
@@ -126,77 +127,12 @@ fn still(run: &RunSummary, episode: &UnsafeEpisode, out: &Path, budget: &mut Byt
     Some(html! { figure.still { (image) figcaption { b { (title) } ": " (caption) } } })
 }
 
+/// Commands that render an episode without a video, and that replay it.
+fn commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
+    [view_command(&run.run, id), replay_command(&run.run, id)]
+}
+
 /// Replaces spaces between numbers and units by no-break spaces.
 fn with_unbreakable_units(text: &str) -> String {
     text.replace(" %", "\u{a0}%").replace("τ ", "τ\u{a0}")
-}
-
-/// Commands that render an episode without a video, and that replay it.
-fn view_commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
-    let (run, manifest) = (&run.run, &run.run.manifest);
-    let changes = run.changes();
-    // The script that returns the suite itself: `view` does not accept a list of suites, which may be what was run.
-    let main = run.text("script");
-    let located = |path: &str| located(path, manifest["folder"].as_str());
-    let sibling = Path::new(main).with_file_name(format!("{}.lua", run.text("suite"))).display().to_string();
-    let is_main = sibling == main || manifest["sources"].get(&sibling).is_none();
-    let mut view = vec![located(if is_main { main } else { &sibling })];
-    if is_main {
-        view.extend(changes.arguments.clone());
-    }
-    let mut add = |flag: &str, value: String| view.extend([flag.to_owned(), value]);
-    add("--task", id.task.to_string());
-    // Defaults are omitted.
-    if id.episode > 0 {
-        add("--episode", id.episode.to_string());
-    }
-    let policy = match (manifest["policy_file"].as_str(), manifest["replayed"]["run"].as_str()) {
-        // A client of `softvt serve` cannot be called; its actions can be repeated.
-        _ if manifest["served"] == true => run.dir.display().to_string(),
-        // The address of a remote policy is not stored in run.json.
-        _ if manifest["profile"].is_object() => "ws://HOST:PORT".to_owned(),
-        (Some(path), _) | (None, Some(path)) => located(path),
-        (None, None) => run.text("policy").to_owned(),
-    };
-    add("--policy", policy);
-    view.extend(changes.flags());
-    view.extend(["--out", "seen"].map(str::to_owned));
-    let view: Vec<String> = view.iter().map(|word| quoted(word)).collect();
-    let replayed = quoted(&run.dir.display().to_string());
-    [
-        format!("softvt view {}", view.join(" ")),
-        format!(
-            "softvt replay {replayed} {}/{}{}",
-            id.task,
-            id.episode,
-            if changes.seed_hash.is_some() { " --seed-file FILE" } else { "" }
-        ),
-    ]
-}
-
-/// The path of a file of a run from the working folder: the path itself, or that in the folder in which the run was
-/// made.
-fn located(path: &str, folder: Option<&str>) -> String {
-    let stored = folder.map(|folder| Path::new(folder).join(path));
-    match stored.filter(|stored| !Path::new(path).exists() && stored.exists()) {
-        Some(stored) => stored.display().to_string(),
-        None => path.to_owned(),
-    }
-}
-
-/// Quotes a word for a shell where necessary; with control characters as escapes, which a terminal does not execute.
-fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        return word.to_owned();
-    }
-    if word.contains(char::is_control) {
-        let escape = |c: char| match c {
-            '\'' | '\\' => format!("\\{c}"),
-            c if c.is_control() => c.to_string().bytes().map(|byte| format!("\\x{byte:02x}")).collect(),
-            c => c.to_string(),
-        };
-        return format!("$'{}'", word.chars().map(escape).collect::<String>());
-    }
-    format!("'{}'", word.replace('\'', "'\\''"))
 }

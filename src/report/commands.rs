@@ -1,0 +1,111 @@
+//! Command lines that show or repeat the episodes of a run.
+
+use std::path::Path;
+
+use super::stored_run::StoredRun;
+use softvt_common::episode_id::EpisodeId;
+use softvt_evaluation::category::EpisodeCategory;
+use softvt_records::{paired_stats::d_over_tau, record::EpisodeRecord};
+
+/// The command that renders an episode.
+pub fn view_command(run: &StoredRun, id: &EpisodeId) -> String {
+    let manifest = &run.manifest;
+    let changes = run.changes();
+    // The script that returns the suite itself: `view` does not accept a list of suites, which may be what was run.
+    let main = run.text("script");
+    let located = |path: &str| located(path, manifest["folder"].as_str());
+    let sibling = Path::new(main).with_file_name(format!("{}.lua", run.text("suite"))).display().to_string();
+    let is_main = sibling == main || manifest["sources"].get(&sibling).is_none();
+    let mut view = vec![located(if is_main { main } else { &sibling })];
+    if is_main {
+        view.extend(changes.arguments.clone());
+    }
+    let mut add = |flag: &str, value: String| view.extend([flag.to_owned(), value]);
+    add("--task", id.task.to_string());
+    // Defaults are omitted.
+    if id.episode > 0 {
+        add("--episode", id.episode.to_string());
+    }
+    let policy = match (manifest["policy_file"].as_str(), manifest["replayed"]["run"].as_str()) {
+        // A client of `softvt serve` cannot be called; its actions can be repeated.
+        _ if manifest["served"] == true => run.dir.display().to_string(),
+        // The address of a remote policy is not stored in run.json.
+        _ if manifest["profile"].is_object() => "ws://HOST:PORT".to_owned(),
+        (Some(path), _) | (None, Some(path)) => located(path),
+        (None, None) => run.text("policy").to_owned(),
+    };
+    add("--policy", policy);
+    view.extend(changes.flags());
+    view.extend(["--out", "seen"].map(str::to_owned));
+    let view: Vec<String> = view.iter().map(|word| quoted(word)).collect();
+    format!("softvt view {}", view.join(" "))
+}
+
+/// The command that simulates an episode again.
+pub fn replay_command(run: &StoredRun, id: &EpisodeId) -> String {
+    let secret = if run.changes().seed_hash.is_some() { " --seed-file FILE" } else { "" };
+    format!("softvt replay {} {}/{}{secret}", quoted(&run.dir.display().to_string()), id.task, id.episode)
+}
+
+/// The commands that a reader of the results of a run may want next: the report, and a view of the worst episode.
+pub fn next_commands(run: &StoredRun) -> Vec<String> {
+    let report = format!("softvt report {}", quoted(&run.dir.display().to_string()));
+    let view = worst_episode(&run.records).map(|record| view_command(run, &record.header.id));
+    [report].into_iter().chain(view).collect()
+}
+
+/// The episode farthest over its limit, or another one that failed; `None` if none failed.
+fn worst_episode(records: &[EpisodeRecord]) -> Option<&EpisodeRecord> {
+    let of = |category: EpisodeCategory| records.iter().filter(move |record| record.category() == category);
+    let ratio = |record: &EpisodeRecord| d_over_tau(record).unwrap_or(0.0);
+    let over = of(EpisodeCategory::OverLimit).max_by(|a, b| ratio(a).total_cmp(&ratio(b)));
+    over.or_else(|| EpisodeCategory::ALL.into_iter().skip(1).find_map(|category| of(category).next()))
+}
+
+/// The path of a file of a run from the working folder: the path itself, or that in the folder in which the run was
+/// made.
+fn located(path: &str, folder: Option<&str>) -> String {
+    let stored = folder.map(|folder| Path::new(folder).join(path));
+    match stored.filter(|stored| !Path::new(path).exists() && stored.exists()) {
+        Some(stored) => stored.display().to_string(),
+        None => path.to_owned(),
+    }
+}
+
+/// Quotes a word for a shell where necessary; with control characters as escapes, which a terminal does not execute.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.to_owned();
+    }
+    if word.contains(char::is_control) {
+        let escape = |c: char| match c {
+            '\'' | '\\' => format!("\\{c}"),
+            c if c.is_control() => c.to_string().bytes().map(|byte| format!("\\x{byte:02x}")).collect(),
+            c => c.to_string(),
+        };
+        return format!("$'{}'", word.chars().map(escape).collect::<String>());
+    }
+    format!("'{}'", word.replace('\'', "'\\''"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{run_summary::tests::stored, sample_record};
+
+    #[test]
+    fn the_next_commands_are_the_report_and_the_episode_farthest_over_the_limit() {
+        let record = |episode: u32, d: f64| {
+            let mut record = sample_record();
+            (record.header.id.episode, record.verdict.d_peak) = (episode, Some(d));
+            (record.verdict.deformation_ok, record.verdict.safety) = (Some(d <= 1.0), d <= 1.0);
+            record
+        };
+        let run = stored("runs/a", "noop", vec![record(0, 1.5), record(1, 9.0), record(2, 0.5)]);
+        let view = "softvt view x.lua --task 0 --episode 1 --policy noop --seed 11 --out seen";
+        assert_eq!(next_commands(&run), ["softvt report runs/a", view]);
+        let safe = stored("runs/a", "noop", vec![record(2, 0.5)]);
+        assert_eq!(next_commands(&safe).len(), 1);
+    }
+}
