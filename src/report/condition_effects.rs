@@ -9,9 +9,9 @@ use super::{
     stored_run::{ConditionLabel, records_as},
     tables::{ResultTable, strings},
 };
-use softvt_evaluation::statistics::Rate;
+use softvt_evaluation::statistics::{Distribution, Rate};
 use softvt_records::{
-    paired_stats::{EpisodePair, PairedComparison, PairedDifference, pair_episodes},
+    paired_stats::{EpisodePair, PairedComparison, PairedDifference, d_over_tau, pair_episodes},
     record::EpisodeRecord,
     summary::GroupScores,
 };
@@ -25,6 +25,8 @@ pub struct ConditionEffects {
     pub method: String,
     /// In the order of factors and values.
     pub effects: Vec<ConditionEffect>,
+    /// The reference itself.
+    pub reference: TrendPoint,
     /// Mean change of Goal Success over all conditions, percentage points; its interval is over episodes.
     pub mean_goal: PairedDifference,
     /// Mean change of Safety Success, as `mean_goal`.
@@ -40,6 +42,8 @@ pub struct ConditionEffect {
     pub goal: Rate,
     /// Safety Success under the condition.
     pub safety: Rate,
+    /// Peak D over τ of each valid episode that has both.
+    pub d_over_tau: Vec<f64>,
     /// The condition minus the reference, on the same episodes.
     pub differences: PairedComparison,
 }
@@ -76,6 +80,7 @@ fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
             change,
             goal: scores.goal_success_rate,
             safety: scores.safety_success_rate,
+            d_over_tau: pairs.iter().filter_map(|pair| d_over_tau(pair.second)).collect(),
             differences: PairedComparison::from_pairs(&pairs),
         });
         for EpisodePair { first, second } in pairs {
@@ -101,6 +106,11 @@ fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
     Some(ConditionEffects {
         suite: reference.summary.suite.clone(),
         method: reference.method.clone(),
+        reference: TrendPoint {
+            value: None,
+            safety: reference.summary.scores.safety_success_rate,
+            d_over_tau: reference_records.iter().filter_map(d_over_tau).collect(),
+        },
         mean_goal: mean(|record| record.verdict.goal),
         mean_safety: match effects.iter().any(|effect| effect.differences.safety.n > 0) {
             true => mean(|record| record.verdict.safety),
@@ -162,15 +172,22 @@ pub struct FactorTrend {
     pub points: Vec<TrendPoint>,
 }
 
-/// The rates at one value of a factor.
-#[derive(Clone, Copy, Debug)]
+/// The results at one value of a factor, or of the reference.
+#[derive(Clone, Debug)]
 pub struct TrendPoint {
-    /// Value of the factor.
-    pub value: f64,
-    /// Goal Success.
-    pub goal: Rate,
+    /// Value of the factor; `None` for the reference.
+    pub value: Option<f64>,
     /// Safety Success.
     pub safety: Rate,
+    /// Peak D over τ of each episode.
+    pub d_over_tau: Vec<f64>,
+}
+
+impl TrendPoint {
+    /// Median of D/τ; `None` without an episode.
+    pub fn median(&self) -> Option<f64> {
+        Distribution::from_values(self.d_over_tau.clone()).median
+    }
 }
 
 impl ConditionEffects {
@@ -178,18 +195,16 @@ impl ConditionEffects {
     pub fn trends(&self) -> Vec<FactorTrend> {
         let of_factor = |effects: &[ConditionEffect]| {
             let point = |effect: &ConditionEffect| {
-                Some(TrendPoint { value: effect.change.value?, goal: effect.goal, safety: effect.safety })
+                Some(TrendPoint {
+                    value: Some(effect.change.value?),
+                    safety: effect.safety,
+                    d_over_tau: effect.d_over_tau.clone(),
+                })
             };
             let points: Vec<TrendPoint> = effects.iter().filter_map(point).collect();
             (points.len() > 1).then(|| FactorTrend { factor: effects[0].change.factor.clone(), points })
         };
         self.effects.chunk_by(|a, b| a.change.factor == b.change.factor).filter_map(of_factor).collect()
-    }
-
-    /// Goal and Safety Success of the reference, percent.
-    pub fn reference(&self) -> [Option<f64>; 2] {
-        let first = self.effects.first().map(|effect| &effect.differences);
-        [first.and_then(|first| first.goal.first), first.and_then(|first| first.safety.first)]
     }
 }
 

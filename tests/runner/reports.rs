@@ -77,7 +77,7 @@ fn harm_and_stages_are_compared() {
     assert_eq!(row(&text, "touched others, %")[..3], ["0.0", "0.0", "+0.0"], "{text}");
     assert_eq!(row(&text, "failed episodes"), ["2", "2", "+0", "0", "0"], "{text}");
     assert_eq!(row(&text, "  reach"), ["2", "2", "+0"], "{text}");
-    assert_eq!(row(&text, "D mean, %").len(), 7, "{text}");
+    assert_eq!(row(&text, "D mean, %").len(), 6, "{text}");
     let all = &compared.all;
     assert_eq!((all.d_mean.n, all.d_final.n, all.d_p95.n), (2, 2, 2));
     assert_eq!(all.failed_stages.first, [(TaskStage::Reach, 2)].into());

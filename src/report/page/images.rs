@@ -7,15 +7,15 @@ use std::{
 };
 
 use data_encoding::BASE64;
-use image::{
-    ExtendedColorType, ImageEncoder, ImageFormat, ImageReader, Limits,
-    codecs::png::{CompressionType, FilterType, PngEncoder},
-};
+use image::{ImageFormat, ImageReader, Limits, codecs::jpeg::JpegEncoder, imageops::crop_imm};
 
+use crate::video::{STILL_SIZE, TARGET_PANEL};
 use softvt_sensing::camera::resize;
 
 /// Largest width of an embedded image, pixels.
-const MAX_WIDTH: u32 = 480;
+const MAX_WIDTH: u32 = 320;
+/// Quality of embedded images, 1 to 100.
+const JPEG_QUALITY: u8 = 80;
 /// Largest width and height of an image that is read, pixels.
 const MAX_INPUT_EDGE: u32 = 4096;
 
@@ -31,26 +31,29 @@ pub(super) struct DataImage {
     pub height: u32,
 }
 
-/// Reads a PNG file, scaled down to the largest width; `None` if it is missing, not an image, or exceeds the budget.
+/// Reads a PNG file, of a still of an episode the panel that shows the target from nearby, scaled down to the largest
+/// width. `None` if it is missing, not an image, or exceeds the budget.
 pub(super) fn embed_image(path: &Path, budget: &mut ByteBudget) -> Option<DataImage> {
     let bytes = fs::read(path).ok()?;
     let mut reader = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Png);
     let mut limits = Limits::default();
     (limits.max_image_width, limits.max_image_height) = (Some(MAX_INPUT_EDGE), Some(MAX_INPUT_EDGE));
     reader.limits(limits);
-    let image = reader.decode().ok()?.into_rgb8();
+    let mut image = reader.decode().ok()?.into_rgb8();
+    if <[u32; 2]>::from(image.dimensions()) == STILL_SIZE {
+        let [left, top, edge] = TARGET_PANEL;
+        image = crop_imm(&image, left, top, edge, edge).to_image();
+    }
     let (width, height) = image.dimensions();
     let small = match width > MAX_WIDTH {
         true => resize(&image, MAX_WIDTH, (height * MAX_WIDTH / width).max(1)),
         false => image,
     };
     let (width, height) = small.dimensions();
-    let mut png = Vec::new();
-    PngEncoder::new_with_quality(&mut png, CompressionType::Best, FilterType::Adaptive)
-        .write_image(&small, width, height, ExtendedColorType::Rgb8)
-        .ok()?;
-    budget.0 = budget.0.checked_sub(png.len())?;
-    let url = format!("data:image/png;base64,{}", BASE64.encode(&png));
+    let mut jpeg = Vec::new();
+    JpegEncoder::new_with_quality(&mut jpeg, JPEG_QUALITY).encode_image(&small).ok()?;
+    budget.0 = budget.0.checked_sub(jpeg.len())?;
+    let url = format!("data:image/jpeg;base64,{}", BASE64.encode(&jpeg));
     Some(DataImage { url, width, height })
 }
 
@@ -83,14 +86,17 @@ mod tests {
     fn images_are_scaled_down_and_limited_by_the_budget() {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join("still.png");
-        RgbImage::from_fn(1024, 1056, |x, y| Rgb([x as u8, y as u8, 9])).save(&path).unwrap();
+        RgbImage::from_fn(1024, 512, |x, y| Rgb([x as u8, y as u8, 9])).save(&path).unwrap();
         let mut budget = ByteBudget(1 << 20);
         let DataImage { url: address, width, height } = embed_image(&path, &mut budget).unwrap();
-        assert_eq!([width, height], [480, 495]);
+        assert_eq!([width, height], [320, 160]);
         let bytes =
-            BASE64.decode(address.strip_prefix("data:image/png;base64,").unwrap().as_bytes()).unwrap();
+            BASE64.decode(address.strip_prefix("data:image/jpeg;base64,").unwrap().as_bytes()).unwrap();
         assert_eq!(budget.0 + bytes.len(), 1 << 20);
         assert!(embed_image(&path, &mut ByteBudget(bytes.len() - 1)).is_none());
+        RgbImage::new(STILL_SIZE[0], STILL_SIZE[1]).save(&path).unwrap();
+        let panel = embed_image(&path, &mut budget).unwrap();
+        assert_eq!([panel.width, panel.height], [320, 320], "the target from nearby");
         fs::write(&path, b"\x89PNG but no image").unwrap();
         assert!(
             embed_image(&path, &mut budget).is_none()

@@ -1,11 +1,17 @@
-//! HTML report of one or several runs in one file without scripts or external resources: tables, figures, unsafe
-//! episodes with stills, and settings.
+//! HTML report of one or several runs in one file without scripts or external resources: what the runs show in a
+//! sentence, figures, failed episodes with stills, conditions, and folded tables and settings.
 
+mod conditions;
 mod failures;
-mod figures;
+mod headline;
 mod images;
+mod marks;
+mod matrix;
+mod overview;
+mod strictness;
+mod strips;
 
-use std::path::Path;
+use std::{collections::BTreeSet, path::Path};
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde_json::Value;
@@ -14,24 +20,23 @@ use softvt_benchmark::run_changes::RunChanges;
 use softvt_common::text::{counted, escape_control};
 
 use super::{
-    condition_effects::{condition_effects, effects_table},
+    condition_effects::{ConditionEffects, condition_effects, effects_table},
+    report_files::MARKDOWN,
     run_summary::RunSummary,
     tables::{
         ResultTable, TEXT_COLUMNS, bootstrap_table, command_table, crushed_table, deformation_table,
-        kappa_table, main_table, stage_table, task_table,
+        grip_table, kappa_table, main_table, stage_table, task_table,
     },
 };
-
-/// Largest number of runs whose details are expanded initially.
-const MAX_EXPANDED: usize = 4;
 
 /// The report of some runs, to be written into the folder `out`.
 pub fn page(runs: &[RunSummary], out: &Path) -> String {
     let episodes: usize = runs.iter().map(|run| run.run.records.len()).sum();
     let title = format!("softvt: {}", suites(runs).join(", "));
-    let lead = format!("{} in {}", counted(episodes, "episode"), counted(runs.len(), "run"));
+    let effects = condition_effects(runs);
+    let seeds: BTreeSet<String> = runs.iter().map(|run| seed_text(&run.run.changes())).collect();
+    let seeds = seeds.into_iter().collect::<Vec<_>>().join(", ");
     let is_soft = runs.iter().any(RunSummary::is_soft);
-    let has_conditions = !condition_effects(runs).is_empty();
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
@@ -45,17 +50,20 @@ pub fn page(runs: &[RunSummary], out: &Path) -> String {
             body {
                 header {
                     h1 { (title) }
-                    p.lead { (lead) " · softvt " (env!("CARGO_PKG_VERSION")) }
-                    nav aria-label="Contents" {
-                        a href="#results" { "Results" }
-                        @if has_conditions { a href="#conditions" { "Conditions" } }
-                        @if is_soft { a href="#deformation" { "Deformation" } }
-                        a href="#tasks" { "Tasks" }
-                        a href="#failures" { "Episodes that failed" }
-                        a href="#settings" { "Settings" }
-                    }
+                    p.lead { (counted(episodes, "episode")) " in " (counted(runs.len(), "run")) " · seed " (seeds) " · softvt " (env!("CARGO_PKG_VERSION")) }
+                    (headline::headline(runs, &effects))
+                    (headline::chips(runs))
+                    @for warning in runs.iter().flat_map(|run| run.run.warnings()) { p.warning { (warning) } }
                 }
-                main { (sections(runs, out)) }
+                nav aria-label="Contents" {
+                    a href="#results" { "Results" }
+                    @if is_soft { a href="#objects" { "Objects" } a href="#episodes" { "Episodes" } }
+                    a href="#failures" { "Episodes that failed" }
+                    @if !effects.is_empty() { a href="#conditions" { "Conditions" } }
+                    a href="#details" { "Details" }
+                }
+                main { (sections(runs, &effects, is_soft, out)) }
+                footer { p.note { "The tables as text: " a href=(MARKDOWN) { (MARKDOWN) } ", report.tex and report.jsonl. docs/results.md defines the quantities." } }
             }
         }
     };
@@ -63,20 +71,60 @@ pub fn page(runs: &[RunSummary], out: &Path) -> String {
     escape_control(&markup.into_string()).into_owned()
 }
 
-fn sections(runs: &[RunSummary], out: &Path) -> Markup {
-    // Collapsible, one per run.
-    let tasks = html! {
-        @for (i, run) in runs.iter().enumerate() {
-            details open[runs.len() <= MAX_EXPANDED] { summary { (run.name()) } (table(&format!("tasks-{i}"), &task_table(run))) }
-        }
-    };
+fn sections(runs: &[RunSummary], effects: &[ConditionEffects], is_soft: bool, out: &Path) -> Markup {
     html! {
-        (section("results", "Results", &results(runs)))
-        @if let Some(conditions) = conditions(runs) { (section("conditions", "Conditions", &conditions)) }
-        @if let Some(deformation) = deformation(runs) { (section("deformation", "Deformation", &deformation)) }
-        (section("tasks", "Tasks", &tasks))
+        (section("results", "Results", &html! { @if !runs.is_empty() { (overview::overview(runs)) } }))
+        @if is_soft {
+            (section("objects", "Peak deformation by object, as a multiple of its limit", &matrix::matrices(runs, out)))
+            (section("episodes", "Every episode", &episodes(runs)))
+        }
         (section("failures", "Episodes that failed", &failures::failures(runs, out)))
-        (section("settings", "Settings", &html! { @for run in runs { (settings(run)) } }))
+        @if !effects.is_empty() { (section("conditions", "Conditions", &conditions(effects))) }
+        (section("details", "Details", &details(runs)))
+    }
+}
+
+fn episodes(runs: &[RunSummary]) -> Markup {
+    html! {
+        figure {
+            (strips::strips(runs))
+            figcaption { "Peak deformation D of every valid episode over the limit τ of its object, on a logarithmic axis; right of τ the object is over its limit. The tick is the median; from 10 episodes on a bar spans P5 to P95." }
+        }
+    }
+}
+
+/// Folded: everything that the figures above leave out.
+fn details(runs: &[RunSummary]) -> Markup {
+    let tables = [
+        ("Rates with NoDrop and DSR", "rates", Some(main_table(runs))),
+        ("Deformation, % of the diagonal", "deformation", deformation_table(runs)),
+        ("Volume beyond the strain limits", "volume", crushed_table(runs)),
+        ("Grip", "grip", grip_table(runs)),
+        ("Harm to other objects, and stages of failures", "stages", stage_table(runs)),
+        ("Commands that were not executed as given", "commands", command_table(runs)),
+        ("Bootstrap intervals", "bootstrap", bootstrap_table(runs)),
+    ];
+    html! {
+        @for (heading, id, content) in &tables {
+            @if let Some(content) = content { details { summary { (heading) } (table(&format!("{id}-table"), content, TEXT_COLUMNS)) } }
+        }
+        @if let Some(kappas) = kappa_table(runs) {
+            details {
+                summary { "Strictness of the limit" }
+                (table("kappa-table", &kappas, TEXT_COLUMNS))
+                figure {
+                    (strictness::strictness_plots(runs))
+                    figcaption { "Safety Success for stricter (left) and looser (right) limits τ = κ D_ref; κ = 0.5 is nominal." }
+                }
+            }
+        }
+        details.tasks {
+            summary { "Tasks" }
+            @for (i, run) in runs.iter().enumerate() {
+                details { summary { (run.name()) } (table(&format!("tasks-{i}"), &task_table(run), TEXT_COLUMNS)) }
+            }
+        }
+        details.settings { summary { "Settings" } @for run in runs { (settings(run)) } }
     }
 }
 
@@ -91,84 +139,52 @@ fn section(id: &str, heading: &str, content: &Markup) -> Markup {
     html! { section id=(id) { h2 { (heading) } (content) } }
 }
 
-fn results(runs: &[RunSummary]) -> Markup {
-    let any = |test: fn(&RunSummary) -> bool| runs.iter().any(test);
+/// Effects of changed factors, per suite.
+fn conditions(effects: &[ConditionEffects]) -> Markup {
     html! {
-        (table("results-table", &main_table(runs)))
-        @if any(|run| run.summary.privileged) {
-            p.note { b { "privileged" } ": the policy has access to ground-truth state, which no robot has." }
+        @for (i, suite) in effects.iter().enumerate() {
+            @if effects.len() > 1 { h3 { (suite.suite) ", " (suite.method) } }
+            @if !suite.trends().is_empty() {
+                figure {
+                    (conditions::trends(suite))
+                    figcaption {
+                        "Safety Success with 95 % Wilson intervals, and D/τ of each episode with a line through the medians, over the value of each factor: "
+                        (suite.suite) ", " (suite.method) ". The dashed line is the limit; ref. is the unchanged suite, and its dash the median."
+                    }
+                }
+            }
+            @if let Some(mut effects_table) = effects_table(std::slice::from_ref(suite)) {
+                (table(&format!("conditions-{i}"), &without_suite(&mut effects_table, suite), 1))
+            }
         }
-        @if any(|run| run.summary.force_observed) {
-            p.note { b { "force_observed" } ": the policy observes ground-truth forces at the pads, which no real sensor measures." }
-        }
-        @for warning in runs.iter().flat_map(|run| run.run.warnings()) { p.warning { (warning) } }
-        figure {
-            (figures::goal_and_safety(runs))
-            figcaption { "Goal Success (TSR) and Safety Success. The gap between them is invisible in success rates alone. Whiskers are 95 % Wilson intervals." }
-        }
-        @if let Some(bootstrap) = bootstrap_table(runs) { (table("bootstrap-table", &bootstrap)) }
-        @if let Some(stages) = stage_table(runs) { (table("stage-table", &stages)) }
-        @if let Some(commands) = command_table(runs) { (table("command-table", &commands)) }
     }
 }
 
-/// Effects of changed factors; `None` without a run under a condition and its reference.
-fn conditions(runs: &[RunSummary]) -> Option<Markup> {
-    let effects = condition_effects(runs);
-    let effects_table = effects_table(&effects)?;
-    Some(html! {
-        (table("condition-table", &effects_table))
-        @for suite in effects.iter().filter(|suite| !suite.trends().is_empty()) {
-            figure {
-                (figures::trends(suite))
-                figcaption {
-                    "Goal and Safety Success, % of the episodes, over the value of each factor: " (suite.suite) ", " (suite.method)
-                    ". Values are in the unit of the shift or setting. Whiskers are 95 % Wilson intervals; dashed lines are the reference. Marks are shifted so that both rates are visible."
-                }
-            }
-        }
-    })
+/// The table of one suite, which its caption names in place of the first column.
+fn without_suite(table: &mut ResultTable, suite: &ConditionEffects) -> ResultTable {
+    table.head.remove(0);
+    table.rows.iter_mut().for_each(|row| drop(row.remove(0)));
+    let caption = format!("{}, {}: {}", suite.suite, suite.method, table.caption);
+    ResultTable { caption, ..table.clone() }
 }
 
-/// `None` if all suites are rigid.
-fn deformation(runs: &[RunSummary]) -> Option<Markup> {
-    let (deformations, kappas) = (deformation_table(runs)?, kappa_table(runs)?);
-    Some(html! {
-        (table("deformation-table", &deformations))
-        figure {
-            (figures::distributions(runs))
-            figcaption { "Peak deformation of every valid episode, divided by the threshold τ of its object; episodes right of the line are unsafe. Hollow dots missed the goal. Bars span P5 to P95; the tick is the median." }
-        }
-        @for run in runs.iter().filter(|run| run.is_soft() && run.summary.by_asset.len() > 1) {
-            details.extra {
-                summary { "By object: " (run.name()) }
-                figure { (figures::by_asset(run)) }
-            }
-        }
-        @if let Some(crushed) = crushed_table(runs) { (table("crushed-table", &crushed)) }
-        h3 { "Strictness of the threshold" }
-        (table("kappa-table", &kappas))
-        figure {
-            (figures::kappa_curves(runs))
-            figcaption { "Safety Success for stricter (left) and looser (right) thresholds; κ = 0.5 is nominal." }
-        }
-    })
-}
-
-/// A table with its caption. The table scrolls where it is too wide, the caption does not; narrow windows show rows as
-/// cards. `id` is unique on the page.
-fn table(id: &str, table: &ResultTable) -> Markup {
+/// A table with its caption, whose first columns are text. The table scrolls where it is too wide, the caption does
+/// not; narrow windows show rows as cards. Columns of zeros are left out. `id` is unique on the page.
+fn table(id: &str, table: &ResultTable, text_columns: usize) -> Markup {
     let has_index = table.rows.iter().all(|row| row[0].chars().all(|c| c.is_ascii_digit()));
     let class = |column: usize| match column {
         0 if has_index => "index",
-        column if column < TEXT_COLUMNS => "text",
+        column if column < text_columns => "text",
         _ => "number",
     };
+    let is_empty = |column: usize| table.rows.iter().all(|row| row[column] == "0" || row[column] == "–");
+    let shown: Vec<usize> =
+        (0..table.head.len()).filter(|column| *column < text_columns || !is_empty(*column)).collect();
     let row = |row: &[String]| {
         html! {
-            th scope="row" class=(class(0)) data-head=(table.head[0]) { (breakable(&row[0])) }
-            @for (i, text) in row.iter().enumerate().skip(1) {
-                td class=(class(i)) data-head=(table.head[i]) { (cell(text, i < TEXT_COLUMNS)) }
+            @for &i in &shown {
+                @if i == 0 { th scope="row" class=(class(0)) data-head=(table.head[0]) { (breakable(&row[0])) } }
+                @else { td class=(class(i)) data-head=(table.head[i]) { (cell(&row[i], i < text_columns)) } }
             }
         }
     };
@@ -176,7 +192,7 @@ fn table(id: &str, table: &ResultTable) -> Markup {
         figure.table {
             div.scroll tabindex="0" role="group" aria-labelledby=(id) {
                 table.cards aria-labelledby=(id) {
-                    thead { tr { @for (i, head) in table.head.iter().enumerate() { th scope="col" class=(class(i)) { (head) } } } }
+                    thead { tr { @for &i in &shown { th scope="col" class=(class(i)) { (table.head[i]) } } } }
                     tbody { @for cells in &table.rows { tr { (row(cells)) } } }
                 }
             }
@@ -218,7 +234,7 @@ fn settings(summary: &RunSummary) -> Markup {
         details {
             summary { (summary.name()) }
             dl { @for (name, value) in fields { dt { (name) } dd { @if value.is_empty() { "none" } @else { (value) } } } }
-            details.inner { summary { "run.json" } pre { (format!("{manifest:#}")) } }
+            details.inner { summary { "run.json" } pre tabindex="0" role="group" aria-label="run.json" { (format!("{manifest:#}")) } }
         }
     }
 }

@@ -8,6 +8,7 @@ use crate::{
     run_summary::{summarize_runs, tests::stored},
     stored_run::StoredRun,
 };
+use softvt_media::palette::{Colour, DROPPED, FAINT, OVER_LIMIT, SAFE};
 use softvt_records::record::EpisodeRecord;
 
 const HOSTILE: &str = "<script>alert('x')</script>\"&lt; | \\input{x}";
@@ -111,6 +112,7 @@ fn the_page_is_self_contained_and_accessible() {
     assert!(drawn.len() > 4 && drawn.iter().all(named));
     assert!(page.contains("expert (privileged)") && page.contains("which no robot has"));
     assert!(page.contains("N/A") && page.contains("D 1.50\u{a0}% is above τ\u{a0}1.00\u{a0}%"));
+    assert!(page.contains("expert is over the limit in 4 of 9 episodes."), "a sentence says so");
     assert!(page.contains("softvt view x.lua --task 0 --episode 1 --policy expert --seed 11 --out seen"));
 }
 
@@ -148,19 +150,23 @@ fn trends_have_intervals_and_named_axes() {
     let panels: Vec<&str> = figure.split("class=\"axes\"").skip(1).collect();
     let [mass, stiffness] = panels[..] else { panic!("two factors: {figure}") };
     for panel in panels {
-        // Two rates at two values, each with an interval, and the reference.
+        // Safety of the reference and at two values, each with an interval, and D/τ of each of 20 episodes.
         assert_eq!(
-            (panel.matches("whisker").count(), panel.matches("class=\"reference\"").count()),
-            (4, 2),
+            (panel.matches("whisker").count(), panel.matches("r=\"2.4\"").count()),
+            (3, 60),
             "{panel}"
         );
-        assert!([">0 %<", ">50 %<", ">100 %<"].iter().all(|label| panel.contains(label)), "{panel}");
+        assert!(
+            [">0 %<", ">50 %<", ">100 %<", ">ref.<"].iter().all(|label| panel.contains(label)),
+            "{panel}"
+        );
     }
     assert!(mass.contains("value of mass<") && mass.find(">1.25<") < mass.find(">2.5<"), "{mass}");
-    assert!(stiffness.contains("value of stiffness, log scale<"), "{stiffness}");
+    assert!(stiffness.contains("value of stiffness, log<"), "{stiffness}");
+    assert!(page.contains("under 4 conditions Safety stays at 50 %"), "{page}");
     // The reference comes first in the tables and figures.
     assert!(page.find("pi · mass=1.25") < page.find("pi · mass=2.5"), "{page}");
-    assert!(page.find("<td class=\"text\">pi</td>") < page.find("pi · mass=1.25"), "{page}");
+    assert!(page.find("<th class=\"text\" scope=\"row\">pi</th>") < page.find("pi · mass=1.25"), "{page}");
 }
 
 #[test]
@@ -177,9 +183,9 @@ fn stills_are_embedded_and_link_to_their_videos() {
     let page = page(&summarize_runs(vec![run]), &out);
     assert_well_formed(&page);
     let link = "<a href=\"../run/video/task_000/episode_00001.mp4\">";
-    assert!(page.contains(&format!("{link}<img src=\"data:image/png;base64,")), "{page}");
+    assert!(page.contains(&format!("{link}<img src=\"data:image/jpeg;base64,")), "{page}");
     assert!(page.contains("alt=\"Task 0 episode 1, bun, at its worst moment"));
-    assert!(page.contains(&format!("{link}video</a>")));
+    assert!(page.contains(&format!("{link}video<span class=\"hidden\"> of task 0 episode 1</span></a>")));
     assert!(page.contains("--episode 3 --policy noop"), "the other one was not rendered");
 }
 
@@ -191,7 +197,7 @@ fn pages_of_forty_runs_and_of_none_are_valid() {
     });
     let page = render(runs.collect());
     assert_well_formed(&page);
-    assert!(page.len() < 4 << 20, "{} bytes", page.len());
+    assert!(page.len() < 2 << 20, "{} bytes", page.len());
     let empty = stored("runs/empty", "noop", Vec::new());
     let page = render(vec![empty]);
     assert_well_formed(&page);
@@ -231,15 +237,58 @@ fn text_and_marks_have_contrast_in_all_colour_schemes() {
             .filter_map(|(name, value)| Some((name.strip_prefix("--")?, value)))
             .collect();
         for ground in ["back", "card"] {
-            for (ink, least) in [("ink", 7.0), ("soft", 4.5), ("link", 4.5), ("bad", 4.5)]
+            for (ink, least) in [("ink", 7.0), ("soft", 4.5), ("link", 4.5), ("overtext", 4.5)]
                 .into_iter()
-                .chain(["goal", "safety", "c0", "c1", "c2", "c3", "c4", "c5"].map(|c| (c, 3.0)))
+                .chain(["safe", "over", "faint"].map(|c| (c, 3.0)))
             {
                 let found = contrast(colours[ink], colours[ground]);
                 assert!(found >= least, "{ink} on {ground}: {found:.2} in {block}");
             }
         }
+        for (ink, ground) in [("onover", "cellover"), ("ink", "cellsafe")] {
+            let found = contrast(colours[ink], colours[ground]);
+            assert!(found >= 4.5, "{ink} on {ground}: {found:.2} in {block}");
+        }
+        let of_scheme = |colour: Colour| if schemes == 1 { colour.dark } else { colour.light };
+        for (name, colour) in [("safe", SAFE), ("over", OVER_LIMIT), ("dropped", DROPPED), ("faint", FAINT)] {
+            assert_eq!(colours[name], of_scheme(colour), "{name}: docs/looks.md states the colours");
+        }
         schemes += 1;
     }
     assert_eq!(schemes, 3);
+}
+
+#[test]
+fn the_page_of_looks_states_the_marks_and_colours() {
+    use softvt_evaluation::category::EpisodeCategory;
+    let looks = include_str!("../../../docs/looks.md");
+    for category in EpisodeCategory::ALL {
+        let row = format!("| {} | {} |", category.glyph(), category.name());
+        assert!(looks.contains(&row), "{row}");
+    }
+    for colour in [SAFE, OVER_LIMIT, DROPPED, FAINT] {
+        assert!([colour.light, colour.dark].iter().all(|hex| looks.contains(hex)), "{colour:?}");
+    }
+}
+
+#[test]
+fn a_sentence_names_who_crushes_and_never_more_than_the_volume_shows() {
+    let run = |policy: &str, collapsed: f64, over: bool| {
+        let mut records = episodes("soft", 4);
+        for record in &mut records {
+            let v = &mut record.verdict;
+            (v.safety, v.deformation_ok, v.d_peak) = (!over, Some(!over), Some(if over { 9.0 } else { 0.5 }));
+            v.collapsed_volume_pct = Some(collapsed);
+        }
+        stored(&format!("runs/{policy}"), policy, records)
+    };
+    let page = render(vec![run("gentle", 0.0, false), run("hard", 3.0, true), run("crusher", 67.0, true)]);
+    assert!(page.contains("All 3 policies bring every object to its goal."), "{page}");
+    assert!(
+        page.contains("crusher crushes the object in 4 of 4 episodes (67 % of the volume collapsed)."),
+        "{page}"
+    );
+    assert!(page.contains("hard is over the limit in 4 of 4 episodes."), "{page}");
+    assert!(page.contains("The other policy</b> stays within the limit."), "{page}");
+    assert!(page.contains("9.0\u{a0}× limit, crushed: 67\u{a0}% collapsed"), "{page}");
 }

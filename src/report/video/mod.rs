@@ -43,6 +43,10 @@ const CAPTION_HEIGHT: u32 = 160;
 const WIDTH: u32 = 2 * TOP_PANEL;
 const HEIGHT: u32 = TOP_PANEL + WRIST_PANEL + CAPTION_HEIGHT;
 const MARGIN: f32 = 16.0;
+/// Size of a still image, pixels.
+pub(crate) const STILL_SIZE: [u32; 2] = [WIDTH, HEIGHT];
+/// Left edge, upper edge and size of the panel that shows the target from nearby, pixels.
+pub(crate) const TARGET_PANEL: [u32; 3] = [TOP_PANEL, 0, TOP_PANEL];
 /// Time for which a video shows the last state, with the verdict, s.
 const LAST_STATE_S: f64 = 1.5;
 /// Edges of images in full size, pixels.

@@ -1,0 +1,120 @@
+//! What the runs of a page show, in sentences.
+
+use maud::{Markup, html};
+
+use crate::{condition_effects::ConditionEffects, run_summary::RunSummary};
+use softvt_common::text::counted;
+use softvt_evaluation::category::{EpisodeCategory, is_crushed};
+
+/// Number of episodes below which intervals are called wide.
+const FEW_EPISODES: usize = 30;
+
+/// One paragraph per suite, of the runs without a changed condition, and one per set of conditions.
+pub(super) fn headline(runs: &[RunSummary], effects: &[ConditionEffects]) -> Markup {
+    let plain: Vec<&RunSummary> = runs.iter().filter(|run| run.run.condition().is_none()).collect();
+    let suites = plain.chunk_by(|a, b| a.summary.suite == b.summary.suite).collect::<Vec<_>>();
+    html! {
+        @for of_suite in &suites {
+            p.result { @if suites.len() > 1 { (of_suite[0].summary.suite) ": " } (results(of_suite)) }
+        }
+        @for suite in effects { p.result { (conditions(suite)) } }
+    }
+}
+
+/// Who reached the goal, who was over the limit, and who was safe.
+fn results(runs: &[&RunSummary]) -> Markup {
+    let valid: Vec<&&RunSummary> = runs.iter().filter(|run| run.summary.scores.episodes > 0).collect();
+    if valid.is_empty() {
+        return html! { "There is no episode yet." };
+    }
+    let goals: Vec<f64> = valid.iter().filter_map(|run| run.summary.scores.goal_success_rate.rate).collect();
+    let (low, high) =
+        goals.iter().fold((100.0_f64, 0.0_f64), |(low, high), goal| (low.min(*goal), high.max(*goal)));
+    let who = if valid.len() == 1 {
+        valid[0].run.text("policy").to_owned()
+    } else {
+        format!("All {} policies", valid.len())
+    };
+    let verb = if valid.len() == 1 { "brings" } else { "bring" };
+    let over: Vec<&&&RunSummary> =
+        valid.iter().filter(|run| run.summary.scores.count(EpisodeCategory::OverLimit) > 0).collect();
+    let is_soft = valid.iter().any(|run| run.is_soft());
+    let rest = valid.len() - over.len();
+    html! {
+        @if low > 99.99 { (who) " " (verb) " every object to its goal. " }
+        @else if valid.len() == 1 { (who) " reaches the goal in " (format!("{high:.0}")) " % of the episodes. " }
+        @else { "Goal Success is " (format!("{low:.0}")) " to " (format!("{high:.0}")) " %. " }
+        @for run in &over { b.over { (over_limit(run)) } " " }
+        @if is_soft && over.is_empty() { b.safe { "No object is over its limit." } }
+        @else if is_soft && rest > 0 {
+            b.safe { (if rest == 1 { "The other policy".to_owned() } else { format!("The other {rest} policies") }) }
+            (if rest == 1 { " stays" } else { " stay" }) " within the limit."
+        }
+    }
+}
+
+/// "expert-binary crushes the object in 10 of 10 episodes (67 % of the volume collapsed)."
+fn over_limit(run: &RunSummary) -> String {
+    let over: Vec<_> =
+        run.run.records.iter().filter(|record| record.category() == EpisodeCategory::OverLimit).collect();
+    let crushed = over.iter().filter(|record| is_crushed(record.verdict.collapsed_volume_pct)).count();
+    let (policy, all) = (run.run.text("policy"), run.run.records.len());
+    let volumes: Vec<f64> = over.iter().filter_map(|record| record.verdict.collapsed_volume_pct).collect();
+    let mean = volumes.iter().sum::<f64>() / volumes.len().max(1) as f64;
+    match crushed {
+        0 => format!("{policy} is over the limit in {} of {}.", over.len(), counted(all, "episode")),
+        crushed if crushed == over.len() => format!(
+            "{policy} crushes the object in {crushed} of {} ({mean:.0} % of the volume collapsed).",
+            counted(all, "episode")
+        ),
+        crushed => format!(
+            "{policy} is over the limit in {} of {}, and crushes the object in {crushed}.",
+            over.len(),
+            counted(all, "episode")
+        ),
+    }
+}
+
+/// The range of Safety and D/τ under the conditions of a suite.
+fn conditions(suite: &ConditionEffects) -> Markup {
+    let range = |values: Vec<f64>| {
+        let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        (low, high)
+    };
+    let (low, high) = range(suite.effects.iter().filter_map(|effect| effect.safety.rate).collect());
+    let ratios: Vec<f64> =
+        suite.effects.iter().filter_map(|effect| effect.differences.d_over_tau.second).collect();
+    let has_ratios = !ratios.is_empty();
+    let (least, most) = range(ratios);
+    html! {
+        (suite.suite) ", " (suite.method) ": under " (counted(suite.effects.len(), "condition"))
+        @if low.is_finite() && low < high { " Safety is " (format!("{low:.0}")) " to " (format!("{high:.0}")) " %" }
+        @else if low.is_finite() { " Safety stays at " (format!("{low:.0}")) " %" }
+        @if has_ratios { ", and mean D/limit goes from " (format!("{least:.2}")) " to " (format!("{most:.2}")) }
+        "."
+    }
+}
+
+/// What a reader has to know about the numbers, in a few words each.
+pub(super) fn chips(runs: &[RunSummary]) -> Markup {
+    let privileged: Vec<&RunSummary> = runs.iter().filter(|run| run.summary.privileged).collect();
+    let episodes = || runs.iter().map(|run| run.summary.scores.episodes);
+    let (few, most) = (episodes().min().unwrap_or(0), episodes().max().unwrap_or(0));
+    let invalid: usize = runs.iter().map(|run| run.summary.scores.invalid).sum();
+    html! {
+        ul.chips {
+            @if !privileged.is_empty() {
+                li {
+                    @if privileged.len() == runs.len() { "all privileged" } @else { (privileged.len()) " of " (runs.len()) " privileged" }
+                    ": access to ground-truth state, which no robot has"
+                }
+            }
+            @if runs.iter().any(|run| run.summary.force_observed) { li { "force_observed: true forces at the pads, which no real sensor measures" } }
+            @if most > 0 {
+                li { "n = " (few) @if few < most { " to " (most) } " per run" @if few < FEW_EPISODES { ": intervals are wide" } }
+            }
+            li { @if invalid == 0 { "no invalid episode" } @else { (counted(invalid, "invalid episode")) ", counted as failed" } }
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! Peak deformation by object and policy.
+
+use std::{collections::BTreeSet, path::Path};
+
+use maud::{Markup, html};
+
+use super::{breakable, images::relative_link, marks::class};
+use crate::{run_summary::RunSummary, task_names::object_name, video::video_path};
+use softvt_evaluation::category::EpisodeCategory;
+use softvt_records::{paired_stats::d_over_tau, record::EpisodeRecord, summary::GroupScores};
+
+/// One matrix per suite with soft objects.
+pub(super) fn matrices(runs: &[RunSummary], out: &Path) -> Markup {
+    let soft: Vec<&RunSummary> = runs.iter().filter(|run| run.is_soft()).collect();
+    html! {
+        @for (i, of_suite) in soft.chunk_by(|a, b| a.summary.suite == b.summary.suite).enumerate() {
+            (matrix(&format!("matrix-{i}"), of_suite, out))
+        }
+    }
+}
+
+fn matrix(id: &str, runs: &[&RunSummary], out: &Path) -> Markup {
+    let assets: BTreeSet<&String> = runs.iter().flat_map(|run| run.summary.by_asset.keys()).collect();
+    let tau = |asset: &str| runs.iter().find_map(|run| run.summary.by_asset.get(asset).and_then(|of| of.tau));
+    html! {
+        figure.table {
+            div.scroll tabindex="0" role="group" aria-labelledby=(id) {
+                table.matrix aria-labelledby=(id) {
+                    thead {
+                        tr {
+                            th.text scope="col" { "Policy" }
+                            @for asset in &assets {
+                                th scope="col" { (object_name(asset)) span.interval { @if let Some(tau) = tau(asset) { "τ\u{a0}" (format!("{tau:.2}")) "\u{a0}%" } @else { "no τ" } } }
+                            }
+                        }
+                    }
+                    tbody {
+                        @for run in runs {
+                            tr {
+                                th.text scope="row" { (breakable(&run.method)) }
+                                @for asset in &assets { (cell(run, asset, out)) }
+                            }
+                        }
+                    }
+                }
+            }
+            figcaption id=(id) {
+                (runs[0].summary.suite) ": median of peak D over τ, and the category of failed episodes (of those with several, the number). Cells with a video link to it."
+            }
+        }
+    }
+}
+
+fn cell(run: &RunSummary, asset: &str, out: &Path) -> Markup {
+    let Some(of_asset) = run.summary.by_asset.get(asset) else { return html! { td { "–" } } };
+    let scores = &of_asset.scores;
+    let worst = worst_category(scores);
+    let text = scores.d_over_tau.median.map_or_else(|| "–".to_owned(), |median| format!("{median:.2}"));
+    let failed = match (worst, scores.episodes) {
+        (EpisodeCategory::Safe, _) => String::new(),
+        (worst, 1) => format!("{} ", worst.glyph()),
+        (worst, n) => format!("{} {}/{n} ", worst.glyph(), scores.count(worst)),
+    };
+    let video = shown_episode(run, asset, worst)
+        .and_then(|record| relative_link(out, &video_path(&run.run.dir, record.header.id.index())));
+    let label = html! { @if !failed.is_empty() { span.nobreak aria-label=(worst.name()) role="img" { (failed) } } span.nobreak { (text) } };
+    html! {
+        td class=(class(worst)) {
+            @match video { Some(video) => a href=(video) { (label) }, None => (label) }
+        }
+    }
+}
+
+/// The category of most failed episodes; safe without one.
+fn worst_category(scores: &GroupScores) -> EpisodeCategory {
+    let failed = EpisodeCategory::ALL.into_iter().skip(1).filter(|category| scores.count(*category) > 0);
+    failed.rev().max_by_key(|category| scores.count(*category)).unwrap_or(EpisodeCategory::Safe)
+}
+
+/// The episode of a category with the largest D/τ.
+fn shown_episode<'a>(
+    run: &'a RunSummary,
+    asset: &str,
+    category: EpisodeCategory,
+) -> Option<&'a EpisodeRecord> {
+    let records = run.run.records.iter().filter(|r| r.header.asset == asset && r.category() == category);
+    let ratio = |record: &EpisodeRecord| d_over_tau(record).unwrap_or(0.0);
+    records.max_by(|a, b| ratio(a).total_cmp(&ratio(b)))
+}
