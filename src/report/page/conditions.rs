@@ -111,6 +111,7 @@ fn safety_marks(points: &[&TrendPoint], axis: &ValueAxis) -> Markup {
     html! {
         @for percent in [0.0, 50.0, 100.0] { line.grid x1="0" x2="100%" y1=(place(percent)) y2=(place(percent)) {} }
         (vertical_lines("grid", std::iter::once(0.5 * (REFERENCE + VALUES[0]))))
+        text.tick x="0" y=(place(50.0)) dy="-4" { "Safety" }
         @for pair in points[1..].windows(2) {
             @if let Some((a, b)) = pair[0].safety.rate.zip(pair[1].safety.rate) {
                 line.trend x1=(x(axis.place(pair[0].value))) x2=(x(axis.place(pair[1].value))) y1=(place(a)) y2=(place(b)) {}
@@ -142,6 +143,8 @@ fn ratio_marks(points: &[&TrendPoint], axis: &ValueAxis, largest: f64) -> Markup
         @for tick in linear_ticks(0.0, largest, 3) { line.grid x1="0" x2="100%" y1=(place(tick)) y2=(place(tick)) {} }
         (vertical_lines("grid", std::iter::once(0.5 * (REFERENCE + VALUES[0]))))
         line.limit x1="0" x2="100%" y1=(place(1.0)) y2=(place(1.0)) {}
+        text.tick x="100%" y=(place(1.0)) dy="-4" text-anchor="end" { "limit τ" }
+        text.tick x="0" y=(place(1.0)) dy="-4" { "D/limit" }
         @for point in points {
             @let at = x(axis.place(point.value));
             @for ratio in &point.d_over_tau {

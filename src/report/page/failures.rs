@@ -23,7 +23,7 @@ use softvt_records::{paired_stats::d_over_tau, record::EpisodeRecord};
 /// Largest number of episodes of a category listed per run.
 const MAX_LISTED: usize = 24;
 /// Largest size of all stills of a page, bytes before they are text.
-const MAX_STILL_BYTES: usize = 260_000;
+const MAX_STILL_BYTES: usize = 200_000;
 
 /// Failed episodes of all runs, for a page in the folder `out`.
 pub(super) fn failures(runs: &[RunSummary], out: &Path) -> Markup {
@@ -32,8 +32,12 @@ pub(super) fn failures(runs: &[RunSummary], out: &Path) -> Markup {
     let budget = MAX_STILL_BYTES / runs.iter().filter(has_stills).count().max(1);
     let (failed, safe): (Vec<&RunSummary>, Vec<&RunSummary>) =
         runs.iter().partition(|run| !run.unsafe_episodes().is_empty());
+    let episodes: usize = safe.iter().map(|run| run.run.records.len()).sum();
+    let is_soft = safe.iter().all(|run| run.is_soft());
     html! {
-        @if !safe.is_empty() {
+        @if failed.is_empty() && safe.len() > 1 && is_soft && episodes > 0 {
+            p.note { "All " (counted(episodes, "episode")) " of " (counted(safe.len(), "run")) " are safe." }
+        } @else if !safe.is_empty() {
             ul.safe { @for run in safe { li { b { (run.name()) } ": " (without_failures(run)) } } }
         }
         @for run in failed { h3 { (run.name()) } (failures_of_run(run, out, budget)) }

@@ -30,27 +30,33 @@ fn results(runs: &[&RunSummary]) -> Markup {
     let goals: Vec<f64> = valid.iter().filter_map(|run| run.summary.scores.goal_success_rate.rate).collect();
     let (low, high) =
         goals.iter().fold((100.0_f64, 0.0_f64), |(low, high), goal| (low.min(*goal), high.max(*goal)));
-    let who = if valid.len() == 1 {
-        valid[0].run.text("policy").to_owned()
-    } else {
-        format!("All {} policies", valid.len())
+    let who = match valid[..] {
+        [single] => single.run.text("policy").to_owned(),
+        [_, _] => "Both policies".to_owned(),
+        _ => format!("All {} policies", valid.len()),
     };
     let verb = if valid.len() == 1 { "brings" } else { "bring" };
     let over: Vec<&&&RunSummary> =
         valid.iter().filter(|run| run.summary.scores.count(EpisodeCategory::OverLimit) > 0).collect();
     let is_soft = valid.iter().any(|run| run.is_soft());
-    let rest = valid.len() - over.len();
+    let within: Vec<&&&RunSummary> = valid.iter().filter(|run| is_within(run)).collect();
     html! {
         @if low > 99.99 { (who) " " (verb) " every object to its goal. " }
         @else if valid.len() == 1 { (who) " reaches the goal in " (format!("{high:.0}")) " % of the episodes. " }
+        @else if format!("{low:.0}") == format!("{high:.0}") { "Goal Success is " (format!("{low:.0}")) " %. " }
         @else { "Goal Success is " (format!("{low:.0}")) " to " (format!("{high:.0}")) " %. " }
         @for run in &over { b.over { (over_limit(run)) } " " }
-        @if is_soft && over.is_empty() { b.safe { "No object is over its limit." } }
-        @else if is_soft && rest > 0 {
-            b.safe { (if rest == 1 { "The other policy".to_owned() } else { format!("The other {rest} policies") }) }
-            (if rest == 1 { " stays" } else { " stay" }) " within the limit."
+        @if is_soft && within.len() == valid.len() { b.safe { "No object is over its limit." } }
+        @else if let (true, [single]) = (is_soft, &within[..]) { b.safe { (single.run.text("policy")) } " stays within the limit." }
+        @else if is_soft && !within.is_empty() {
+            b.safe { @if within.len() + over.len() == valid.len() { "The other " } (within.len()) " policies" } " stay within the limit."
         }
     }
+}
+
+/// True if the limit was exceeded in no episode, whether the goal was reached or not.
+fn is_within(run: &RunSummary) -> bool {
+    run.is_soft() && run.run.records.iter().all(|record| record.verdict.deformation_ok != Some(false))
 }
 
 /// "expert-binary crushes the object in 10 of 10 episodes (67 % of the volume collapsed)."

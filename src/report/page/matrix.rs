@@ -5,9 +5,13 @@ use std::{collections::BTreeSet, path::Path};
 use maud::{Markup, html};
 
 use super::{breakable, images::relative_link, marks::class};
-use crate::{run_summary::RunSummary, task_names::object_name, video::video_path};
+use crate::{run_summary::RunSummary, task_names::object_name, terminal::tau_range, video::video_path};
 use softvt_evaluation::category::EpisodeCategory;
-use softvt_records::{paired_stats::d_over_tau, record::EpisodeRecord, summary::GroupScores};
+use softvt_records::{
+    paired_stats::d_over_tau,
+    record::EpisodeRecord,
+    summary::{GroupScores, TauRange},
+};
 
 /// One matrix per suite with soft objects.
 pub(super) fn matrices(runs: &[RunSummary], out: &Path) -> Markup {
@@ -21,7 +25,11 @@ pub(super) fn matrices(runs: &[RunSummary], out: &Path) -> Markup {
 
 fn matrix(id: &str, runs: &[&RunSummary], out: &Path) -> Markup {
     let assets: BTreeSet<&String> = runs.iter().flat_map(|run| run.summary.by_asset.keys()).collect();
-    let tau = |asset: &str| runs.iter().find_map(|run| run.summary.by_asset.get(asset).and_then(|of| of.tau));
+    // Instances of one asset may have different limits.
+    let tau = |asset: &str| {
+        let ranges = runs.iter().filter_map(|run| run.summary.by_asset.get(asset)?.scores.tau_range);
+        tau_range(ranges.reduce(|a, b| TauRange { min: a.min.min(b.min), max: a.max.max(b.max) }))
+    };
     html! {
         figure.table {
             div.scroll tabindex="0" role="group" aria-labelledby=(id) {
@@ -30,7 +38,7 @@ fn matrix(id: &str, runs: &[&RunSummary], out: &Path) -> Markup {
                         tr {
                             th.text scope="col" { "Policy" }
                             @for asset in &assets {
-                                th scope="col" { (object_name(asset)) span.interval { @if let Some(tau) = tau(asset) { "τ\u{a0}" (format!("{tau:.2}")) "\u{a0}%" } @else { "no τ" } } }
+                                th scope="col" { (object_name(asset)) span.interval { @if tau(asset).is_empty() { "no τ" } @else { "τ\u{a0}" (tau(asset)) "\u{a0}%" } } }
                             }
                         }
                     }

@@ -22,6 +22,7 @@ use softvt_common::text::{counted, escape_control};
 use super::{
     condition_effects::{ConditionEffects, condition_effects, effects_table},
     report_files::MARKDOWN,
+    run_folder::{RUN, SUMMARY},
     run_summary::RunSummary,
     tables::{
         ResultTable, TEXT_COLUMNS, bootstrap_table, command_table, crushed_table, deformation_table,
@@ -80,7 +81,7 @@ fn sections(runs: &[RunSummary], effects: &[ConditionEffects], is_soft: bool, ou
         }
         (section("failures", "Episodes that failed", &failures::failures(runs, out)))
         @if !effects.is_empty() { (section("conditions", "Conditions", &conditions(effects))) }
-        (section("details", "Details", &details(runs)))
+        (section("details", "Details", &details(runs, out)))
     }
 }
 
@@ -94,7 +95,7 @@ fn episodes(runs: &[RunSummary]) -> Markup {
 }
 
 /// Folded: everything that the figures above leave out.
-fn details(runs: &[RunSummary]) -> Markup {
+fn details(runs: &[RunSummary], out: &Path) -> Markup {
     let tables = [
         ("Rates with NoDrop and DSR", "rates", Some(main_table(runs))),
         ("Deformation, % of the diagonal", "deformation", deformation_table(runs)),
@@ -124,7 +125,7 @@ fn details(runs: &[RunSummary]) -> Markup {
                 details { summary { (run.name()) } (table(&format!("tasks-{i}"), &task_table(run), TEXT_COLUMNS)) }
             }
         }
-        details.settings { summary { "Settings" } @for run in runs { (settings(run)) } }
+        details.settings { summary { "Settings" } @for run in runs { (settings(run, out)) } }
     }
 }
 
@@ -215,8 +216,8 @@ fn cell(text: &str, is_text: bool) -> Markup {
     }
 }
 
-/// The main fields of `run.json`, followed by the whole file.
-fn settings(summary: &RunSummary) -> Markup {
+/// The main fields of `run.json`, and links to the files of the run.
+fn settings(summary: &RunSummary, out: &Path) -> Markup {
     let manifest = &summary.run.manifest;
     let fields = [
         ("Folder", summary.run.dir.display().to_string()),
@@ -234,7 +235,11 @@ fn settings(summary: &RunSummary) -> Markup {
         details {
             summary { (summary.name()) }
             dl { @for (name, value) in fields { dt { (name) } dd { @if value.is_empty() { "none" } @else { (value) } } } }
-            details.inner { summary { "run.json" } pre tabindex="0" role="group" aria-label="run.json" { (format!("{manifest:#}")) } }
+            @let links: Vec<(&str, String)> = [RUN, SUMMARY]
+                .into_iter()
+                .filter_map(|file| Some((file, images::relative_link(out, &summary.run.dir.join(file))?)))
+                .collect();
+            @if !links.is_empty() { p.note { @for (file, link) in links { a href=(link) { (file) span.hidden { " of " (summary.name()) } } " " } } }
         }
     }
 }
