@@ -20,7 +20,7 @@ pub(super) fn strictness_plots(runs: &[RunSummary]) -> Markup {
     let is_flat = |run: &&RunSummary| curve_corners(run).iter().all(|corner| corner.percent == 0.0);
     html! {
         @for runs in soft.chunk_by(|a, b| a.summary.suite == b.summary.suite) {
-            @if !runs.iter().all(|run| is_flat(run)) {
+            @if !runs.iter().all(is_flat) {
                 p.suite { (runs[0].summary.suite) }
                 (plot(&runs[0].summary.suite, runs))
             }

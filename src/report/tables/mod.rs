@@ -236,12 +236,7 @@ fn soft_table(
 
 /// Results per task of a run.
 pub fn task_table(run: &RunSummary) -> ResultTable {
-    let tasks = &run.summary.by_task;
-    // Several tasks may have one prompt.
-    let prompt = |task: &TaskScores| match tasks.iter().filter(|other| other.prompt == task.prompt).count() {
-        1 => task.prompt.clone(),
-        _ => format!("{} ({})", task.prompt, task.asset),
-    };
+    let prompt = |task: &TaskScores| format!("{} ({})", task.prompt, task.asset);
     let row = |task: &TaskScores| {
         let s = &task.scores;
         let not_applicable = || "N/A".to_owned();
@@ -258,7 +253,10 @@ pub fn task_table(run: &RunSummary) -> ResultTable {
         ]
     };
     ResultTable {
-        caption: format!("{}: per task, % of episodes with 95 % Wilson intervals.", run.name()),
+        caption: format!(
+            "{}: per task, with the asset of the object, % of episodes with 95 % Wilson intervals.",
+            run.name()
+        ),
         head: strings(["Task", "Prompt", "Episodes", "Goal", "NoDrop", "Safety", "D median, %", "τ, %"]),
         rows: run.summary.by_task.iter().map(row).collect(),
     }

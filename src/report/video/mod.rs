@@ -14,6 +14,7 @@ use softvt_common::{
     files::{FileError, replace},
     parallel::{self, lock},
 };
+use softvt_evaluation::category::EpisodeCategory;
 use softvt_media::{
     canvas::{Canvas, Rgb8},
     video::{VideoError, VideoWriter},
@@ -94,10 +95,10 @@ impl VideoCaption {
     pub fn new(record: &EpisodeRecord) -> Self {
         let (header, verdict) = (&record.header, &record.verdict);
         let id = &header.id;
-        let word = match (verdict.safety, verdict.goal) {
-            (true, _) => "safe",
-            (false, true) => "goal reached, not safe",
-            _ => "failed",
+        let category = record.category();
+        let word = match category {
+            EpisodeCategory::Safe if !header.soft => "placed without a drop",
+            category => category.name(),
         };
         Self {
             prompt: header.prompt.clone(),
