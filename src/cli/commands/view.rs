@@ -9,10 +9,13 @@ use crate::{
     error::CliError,
     output::{Progress, print},
 };
-use softvt_benchmark::Plan;
+use softvt_benchmark::{CONTROL_DT, Plan};
 use softvt_common::cancel;
 use softvt_common::files;
-use softvt_report::video::{VideoCaption, worst_state, write_stills, write_video, write_video_frame};
+use softvt_report::{
+    episode_page,
+    video::{VideoCaption, worst_state, write_stills, write_video, write_video_frame},
+};
 use softvt_runner::{ConfiguredScript, EpisodeJob, EpisodeList, RunConfig, SuiteRun};
 
 /// Render one episode: a video, and stills of every camera and tactile sensor
@@ -37,8 +40,8 @@ pub(crate) struct ViewArgs {
     out: PathBuf,
 }
 
-/// Runs one episode and writes `episode.mp4`, a frame of it as `episode.png`, and stills of the first, worst and last
-/// state of every camera and tactile sensor. Existing files are replaced.
+/// Runs one episode and writes `episode.mp4`, a frame of it as `episode.png`, stills of the first, worst and last state
+/// of every camera and tactile sensor, and a page that shows them. Existing files are replaced.
 ///
 /// # Errors
 /// The script is not a suite, the task or episode fails, or a file cannot be rendered or written.
@@ -66,15 +69,20 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     let moments = [("start", 0), ("worst", worst), ("end", last)];
     config.observer.work("drawing the stills");
     let threads = config.thread_count();
-    let mut written = write_stills(&mut states, &moments, args.full_size, dir, threads, cancel::requested)?;
+    write_stills(&mut states, &moments, args.full_size, dir, threads, cancel::requested)?;
     let still = dir.join("episode.png");
     write_video_frame(&mut states, &caption, worst, &still)?;
-    written.push(still);
     config.observer.end();
     let video = dir.join("episode.mp4");
     let progress = Progress::new(states.frames.len(), "rendering the video");
     write_video(&mut states, &caption, &video, threads, cancel::requested, || progress.step())?;
     drop(progress);
-    written.push(video);
-    written.iter().try_for_each(|path| print(&format!("{}\n", path.display())))
+    let worst_time_s = worst as f64 * CONTROL_DT;
+    episode_page::write(&finished.record, worst_time_s, dir)?;
+    print(&format!(
+        "{}\n{}\n{}\n",
+        episode_page::sentence(&finished.record, worst_time_s),
+        dir.join(episode_page::PAGE).display(),
+        video.display()
+    ))
 }

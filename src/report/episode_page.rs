@@ -1,0 +1,174 @@
+//! The page of one episode: what happened in a sentence, the video, and the stills of every camera and finger.
+
+use std::path::Path;
+
+use data_encoding::BASE64;
+use image::{ImageFormat, Luma, Rgb, RgbImage};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use softvt_common::{
+    files::{self, FileError},
+    text::escape_control,
+};
+use softvt_evaluation::category::EpisodeCategory;
+use softvt_records::record::EpisodeRecord;
+
+/// Name of the page in the folder of the stills.
+pub const PAGE: &str = "index.html";
+/// Names of the moments of stills, in the names of files and in words.
+const MOMENTS: [(&str, &str); 3] =
+    [("start", "At the start"), ("worst", "At the worst moment"), ("end", "At the end")];
+/// Stills of a moment, by the names of files and in words.
+const STILLS: [(&str, &str); 6] = [
+    ("third_person", "third person"),
+    ("wrist", "wrist"),
+    ("tactile_left_arrows", "left finger, motion of the markers"),
+    ("tactile_right_arrows", "right finger, motion of the markers"),
+    ("tactile_left", "left finger"),
+    ("tactile_right", "right finger"),
+];
+/// Cameras with depth and segmentation.
+const CAMERAS: [&str; 2] = ["third_person", "wrist"];
+/// Colours of the objects of a segmentation, in turn: those of Okabe and Ito.
+const OBJECT_COLOURS: [[u8; 3]; 7] = [
+    [86, 180, 233],
+    [230, 159, 0],
+    [0, 158, 115],
+    [204, 121, 167],
+    [240, 228, 66],
+    [0, 114, 178],
+    [213, 94, 0],
+];
+const STYLE: &str = "body{margin:1.5rem auto;max-width:70rem;padding:0 1rem;font:15px/1.5 system-ui,sans-serif}\
+    :root{color-scheme:light dark}h1{font-size:18px}h2{font-size:15px;margin:1.5rem 0 .4rem}\
+    video{width:100%;max-width:46rem}ul{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(13rem,46%),1fr));\
+    gap:.7rem;list-style:none;padding:0}img{width:100%;height:auto;display:block;border-radius:5px}li{font-size:13px}";
+
+/// What was seen in an episode: "✗ over the limit: D 1.93 % = 5.14 × limit at 4.95 s". `worst_time_s` is the time of
+/// the largest deformation.
+pub fn sentence(record: &EpisodeRecord, worst_time_s: f64) -> String {
+    let (verdict, category) = (&record.verdict, record.category());
+    let name = match category {
+        EpisodeCategory::Safe if !record.header.soft => "placed without a drop",
+        category => category.name(),
+    };
+    let d = match (verdict.d_peak, verdict.tau.filter(|tau| *tau > 0.0)) {
+        (Some(d), Some(tau)) => format!(": D {d:.2} % = {:.2} × limit at {worst_time_s:.2} s", d / tau),
+        (Some(d), None) => format!(": D {d:.2} % at {worst_time_s:.2} s"),
+        (None, _) => String::new(),
+    };
+    format!("{} {name}{d}", category.glyph())
+}
+
+/// Writes [`PAGE`] about the video and the stills in the folder `dir`. Depth and segmentation, which viewers show white
+/// and black, are drawn in grey and in colours.
+///
+/// # Errors
+/// The page cannot be written.
+pub fn write(record: &EpisodeRecord, worst_time_s: f64, dir: &Path) -> Result<(), FileError> {
+    let header = &record.header;
+    let id = &header.id;
+    let title = format!("{} · task {} · episode {} · {}", id.suite, id.task, id.episode, header.policy);
+    let markup = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { (title) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                main {
+                    h1 { (sentence(record, worst_time_s)) }
+                    p { (title) br; (header.prompt) }
+                    @if dir.join("episode.mp4").is_file() { video controls muted src="episode.mp4" poster="episode.png" {} }
+                    @for (moment, words) in MOMENTS { h2 { (words) } ul { (stills(moment, words, dir)) } }
+                }
+            }
+        }
+    };
+    files::replace(&dir.join(PAGE), escape_control(&markup.into_string()).as_bytes())
+}
+
+fn stills(moment: &str, words: &str, dir: &Path) -> Markup {
+    let still = |source: String, what: &str| {
+        html! { li { img src=(source) alt=(format!("{words}: {what}")); (what) } }
+    };
+    html! {
+        @for (name, what) in STILLS {
+            @let file = format!("{moment}_{name}.png");
+            @if dir.join(&file).is_file() { (still(file, what)) }
+        }
+        @for camera in CAMERAS {
+            @let numbers = |suffix: &str| image::open(dir.join(format!("{moment}_{camera}_{suffix}.png"))).ok();
+            @if let Some(depth) = numbers("depth").and_then(|image| data_url(&grey_depth(&image.into_luma16()))) {
+                (still(depth, &format!("{}, depth: near is bright", camera.replace('_', " "))))
+            }
+            @if let Some(objects) = numbers("segmentation").and_then(|image| data_url(&coloured(&image.into_luma16()))) {
+                (still(objects, &format!("{}, objects by colour", camera.replace('_', " "))))
+            }
+        }
+    }
+}
+
+type Numbers = image::ImageBuffer<Luma<u16>, Vec<u16>>;
+
+/// Depth in grey, from the nearest to the farthest.
+fn grey_depth(depth: &Numbers) -> RgbImage {
+    let known = || depth.pixels().map(|pixel| pixel.0[0]).filter(|depth| *depth > 0);
+    let (near, far) = (known().min().unwrap_or(0), known().max().unwrap_or(1));
+    let grey =
+        |depth: u16| 255 - (235 * (u32::from(depth.max(near) - near)) / u32::from((far - near).max(1))) as u8;
+    RgbImage::from_fn(depth.width(), depth.height(), |x, y| Rgb([grey(depth.get_pixel(x, y).0[0]); 3]))
+}
+
+/// Objects by colour; 0 is black.
+fn coloured(objects: &Numbers) -> RgbImage {
+    let colour = |object: u16| match object {
+        0 => [0; 3],
+        object => OBJECT_COLOURS[usize::from(object) % OBJECT_COLOURS.len()],
+    };
+    RgbImage::from_fn(objects.width(), objects.height(), |x, y| Rgb(colour(objects.get_pixel(x, y).0[0])))
+}
+
+fn data_url(image: &RgbImage) -> Option<String> {
+    let mut png = std::io::Cursor::new(Vec::new());
+    image.write_to(&mut png, ImageFormat::Png).ok()?;
+    Some(format!("data:image/png;base64,{}", BASE64.encode(png.get_ref())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sample_record;
+
+    #[test]
+    fn the_sentence_names_the_category_and_the_multiple_of_the_limit() {
+        let mut record = sample_record();
+        assert_eq!(sentence(&record, 2.0), "● safe: D 0.33 % = 0.33 × limit at 2.00 s");
+        (record.verdict.d_peak, record.verdict.deformation_ok) = (Some(5.1), Some(false));
+        record.verdict.safety = false;
+        assert_eq!(sentence(&record, 4.95), "✗ over the limit: D 5.10 % = 5.10 × limit at 4.95 s");
+    }
+
+    #[test]
+    fn the_page_shows_the_stills_of_its_folder_with_depth_in_grey_and_objects_in_colour() {
+        let root = tempfile::tempdir().unwrap();
+        let numbers = Numbers::from_fn(4, 4, |x, _| Luma([9000 + 100 * x as u16]));
+        numbers.save(root.path().join("start_wrist_depth.png")).unwrap();
+        RgbImage::new(4, 4).save(root.path().join("start_wrist.png")).unwrap();
+        let mut record = sample_record();
+        record.header.prompt = "<b>wait\u{1b}[2J".to_owned();
+        write(&record, 1.0, root.path()).unwrap();
+        let page = std::fs::read_to_string(root.path().join(PAGE)).unwrap();
+        assert!(
+            page.contains("&lt;b&gt;wait\\u{1b}[2J") && page.contains("src=\"start_wrist.png\""),
+            "{page}"
+        );
+        assert_eq!(page.matches("<img ").count(), 2, "{page}");
+        let grey = grey_depth(&numbers);
+        assert_eq!([grey.get_pixel(0, 0).0[0], grey.get_pixel(3, 0).0[0]], [255, 20]);
+        assert_eq!(coloured(&Numbers::from_pixel(1, 1, Luma([1]))).get_pixel(0, 0).0, OBJECT_COLOURS[1]);
+    }
+}
