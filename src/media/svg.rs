@@ -1,5 +1,5 @@
-//! Elements of SVG images. All images have one style: the colours of [`palette`](super::palette), on light and on dark
-//! ground, by the classes of [`image`].
+//! Elements of SVG images. All images have one style: the colours of [`palette`], on light and on dark ground, by the
+//! classes of [`image()`].
 
 use super::palette::{self, Colour};
 

@@ -1,4 +1,4 @@
-//! [`StyledText`]: text for a terminal, with colours where the terminal has them.
+//! Text for a terminal, with colours where the terminal has them.
 
 use anstyle::{Ansi256Color, AnsiColor, Style};
 

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, ConsoleMessage, Page, sync_playwright
 
 # Names, widths and colour schemes of the windows.
 WINDOWS = [("1400", 1400, "light"), ("800", 800, "light"), ("400", 400, "light"), ("dark", 1400, "dark")]
@@ -21,11 +21,15 @@ def violations(page: Page, axe: Path) -> list[str]:
 
 def open_page(browser: Browser, file: Path, axe: Path, pictures: Path) -> list[str]:
     """Problems of a page in any window."""
-    problems = []
+    problems: list[str] = []
     name = file.parent.name
+
+    def note(message: ConsoleMessage) -> None:
+        problems.append(message.text)
+
     for window, width, scheme in WINDOWS:
         page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
-        page.on("console", lambda message: problems.append(message.text))
+        page.on("console", note)
         page.goto(file.as_uri())
         page.screenshot(path=pictures / f"{name}-{window}.png", full_page=True)
         where = f"{name} at {window}"
