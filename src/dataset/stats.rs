@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::{DatasetError, TaskFile};
+use softvt_benchmark::CONTROL_DT;
 use softvt_common::text::{TextColumn, TextTable, decimal};
 use softvt_media::histogram::{self, Histogram};
 
@@ -59,12 +60,15 @@ impl ColumnStatistics {
 /// A file cannot be read.
 pub fn column_statistics(paths: &[impl AsRef<Path>]) -> Result<Vec<ColumnStatistics>, DatasetError> {
     let mut columns: [Vec<f64>; 7] = Default::default();
-    let (mut lengths, mut peaks, mut soft) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut lengths, mut peaks, mut soft, mut speeds) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for path in paths {
         let file = TaskFile::open(path.as_ref())?;
         for &demo in &file.demos {
             let actions = file.actions(demo)?;
             lengths.push(actions.len() as f64);
+            speeds.extend(
+                actions.windows(2).map(|pair| commanded_speed(pair[0].to_array(), pair[1].to_array())),
+            );
             for action in &actions {
                 columns.iter_mut().zip(action.to_array()).for_each(|(column, x)| column.push(x));
             }
@@ -76,8 +80,15 @@ pub fn column_statistics(paths: &[impl AsRef<Path>]) -> Result<Vec<ColumnStatist
         }
     }
     let named = ACTION_NAMES.into_iter().zip(columns);
-    let all = [("length (steps)", lengths), ("peak D (%)", peaks), ("D (%)", soft)].into_iter().chain(named);
+    let all = [("length (steps)", lengths), ("peak D (%)", peaks), ("D (%)", soft), ("speed (m/s)", speeds)];
+    let all = all.into_iter().chain(named);
     Ok(all.filter_map(|(name, numbers)| ColumnStatistics::new(name, numbers)).collect())
+}
+
+/// Speed of the commanded tool from one action to the next, m/s.
+fn commanded_speed(from: [f64; 7], to: [f64; 7]) -> f64 {
+    let squares = (0..3).map(|axis| (to[axis] - from[axis]).powi(2));
+    squares.sum::<f64>().sqrt() / CONTROL_DT
 }
 
 /// The statistics as a plain-text table.
@@ -112,6 +123,8 @@ mod tests {
         assert_eq!((s.count, s.min, s.median, s.mean, s.max), (4, 1.0, 2.5, 2.5, 4.0));
         assert!((s.sd - 1.25_f64.sqrt()).abs() < 1e-12);
         assert_eq!((s.bins[0], s.bins[BINS - 1], s.bins.iter().sum::<usize>()), (1, 1, 4));
+        let at = |x: f64, z: f64| [x, 0.0, z, 0.0, 0.0, 0.0, 0.0];
+        assert!((commanded_speed(at(0.0, 0.0), at(0.03, 0.04)) - 0.05 / CONTROL_DT).abs() < 1e-12);
         assert_eq!(ColumnStatistics::new("none", Vec::new()), None);
         let page = svg(&[s]);
         assert!(page.starts_with("<svg") && page.matches("class=\"bar\"").count() == 4, "{page}");
