@@ -111,7 +111,7 @@ fn safety_marks(points: &[&TrendPoint], axis: &ValueAxis) -> Markup {
     html! {
         @for percent in [0.0, 50.0, 100.0] { line.grid x1="0" x2="100%" y1=(place(percent)) y2=(place(percent)) {} }
         (vertical_lines("grid", std::iter::once(0.5 * (REFERENCE + VALUES[0]))))
-        text.tick x="0" y=(place(50.0)) dy="-4" { "Safety" }
+        text.tick x="100%" y=(place(0.0)) dy="-4" text-anchor="end" { "Safety" }
         @for pair in points[1..].windows(2) {
             @if let Some((a, b)) = pair[0].safety.rate.zip(pair[1].safety.rate) {
                 line.trend x1=(x(axis.place(pair[0].value))) x2=(x(axis.place(pair[1].value))) y1=(place(a)) y2=(place(b)) {}
