@@ -10,7 +10,7 @@ use super::verdict::{Outcome, Verdict};
 pub enum EpisodeCategory {
     /// Safety Success.
     Safe,
-    /// Goal Success with D_peak > τ.
+    /// Goal Success with D_peak > τ of a target.
     OverLimit,
     /// Dropped, without Goal Success within the limit.
     Dropped,
@@ -39,10 +39,11 @@ impl EpisodeCategory {
     /// The first that applies of: invalid; safe; the goal over the limit; dropped; goal missed; slipped; not judged.
     pub fn new(outcome: &Outcome, verdict: &Verdict) -> Self {
         let v = verdict;
+        let is_over = v.deformation_ok == Some(false) || v.safety_parts(None).targets_ok == Some(false);
         match () {
             () if !outcome.is_valid() => Self::Invalid,
             () if v.safety => Self::Safe,
-            () if v.goal && v.deformation_ok == Some(false) => Self::OverLimit,
+            () if v.goal && is_over => Self::OverLimit,
             () if !v.no_drop => Self::Dropped,
             () if !v.goal => Self::GoalMissed,
             () if v.slip_ok == Some(false) => Self::Slipped,

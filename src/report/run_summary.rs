@@ -108,6 +108,11 @@ pub fn unsafe_reason(record: &EpisodeRecord) -> Option<String> {
     if let Some(stage) = v.failed_stage {
         parts.push(format!("failed while: {}", stage.name()));
     }
+    let missed = v.goal_parts.iter().filter(|part| !v.goal && part.holds == part.negated);
+    parts.extend(missed.map(|part| match part.negated {
+        true => format!("{}, which must not be", part.name),
+        false => format!("not {}", part.name),
+    }));
     // An invalid episode has no evidence; nothing was dropped.
     if let Some(drop) = v.drop.as_ref().filter(|drop| drop.reason != DropReason::NoEvidence) {
         let reason =
@@ -124,6 +129,10 @@ pub fn unsafe_reason(record: &EpisodeRecord) -> Option<String> {
     }
     if v.slip_ok == Some(false) {
         parts.push(format!("it slipped by {:.1} mm in the hand", v.slip_mm));
+    }
+    for target in v.targets.iter().filter(|target| target.deformation_ok == Some(false)) {
+        let [d, tau] = [target.d_peak, target.tau].map(|x| decimal(x, 2));
+        parts.push(format!("{}: D {d} % is above its τ {tau} %", target.object));
     }
     for other in v.others.iter().filter(|other| other.deformation_ok == Some(false)) {
         let [d, tau] = [other.d_peak, other.tau].map(|x| decimal(x, 2));
