@@ -77,6 +77,7 @@ fn measured(episode: &Episode) -> Value {
         "grip_ratio": verdict.grip_ratio,
         "collapsed_pct": verdict.collapsed_volume_pct,
         "no_drop": verdict.no_drop,
+        "goal_parts": verdict.goal_parts,
     })
 }
 

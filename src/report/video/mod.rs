@@ -59,7 +59,7 @@ const TEXT: Rgb8 = [226, 229, 233];
 const FAINT: Rgb8 = [122, 128, 138];
 /// Blue and vermilion of Okabe and Ito's palette, which most people tell apart, lightened for the dark background.
 const SAFE: Rgb8 = [86, 180, 233];
-const HARM: Rgb8 = [240, 120, 60];
+const HARM: Rgb8 = [255, 138, 61];
 
 /// Why a video or still image cannot be written.
 #[allow(missing_docs, reason = "the messages describe the variants")]

@@ -41,9 +41,11 @@ function fixed(value, digits, unit = "") {
 function showBadge(measured) {
   const badge = $("badge"), is_last = player.end && Math.floor(player.cursor) >= player.states.length - 1;
   const peak = measured.tau_pct ? measured.d_peak_pct / measured.tau_pct : null;
-  const is_crushed = peak !== null && peak > 1;
-  let text = peak === null ? "no limit of D" : `${is_crushed ? "crushed" : "within τ"} so far: peak D/τ ${peak.toFixed(2)}`;
-  let is_harmed = is_crushed || !measured.no_drop;
+  const is_over = peak !== null && peak > 1;
+  // The share of the volume from which docs/looks.md calls an object crushed.
+  const word = !is_over ? "within τ" : measured.collapsed_pct >= 5 ? "crushed" : "over the limit";
+  let text = peak === null ? "no limit of D" : `${word} so far: peak D/τ ${peak.toFixed(2)}`;
+  let is_harmed = is_over || !measured.no_drop;
   if (!measured.no_drop) text += ", dropped";
   if (is_last) {
     const verdict = player.end.verdict;
@@ -55,6 +57,19 @@ function showBadge(measured) {
   badge.hidden = false;
   badge.textContent = text;
   badge.className = is_harmed ? "harm" : "safe";
+}
+
+// Lists the parts of a goal of several parts: filled while they hold, half once they were met.
+function showParts(parts) {
+  const list = $("parts");
+  list.hidden = parts.length === 0;
+  list.replaceChildren(...parts.map((part) => {
+    const item = document.createElement("li");
+    const word = part.holds ? "holds" : part.met_s !== null ? `was met at ${part.met_s.toFixed(1)} s` : "not yet";
+    const mark = part.holds ? "●" : part.met_s !== null ? "◐" : "○";
+    item.textContent = `${mark} ${part.negated ? "must not be: " : ""}${part.name}, ${word}`;
+    return item;
+  }));
 }
 
 // Factor by which the motion of the markers is drawn.
@@ -97,6 +112,7 @@ function update() {
   ["left", "right"].forEach((id, side) => drawMarkers(id, state.floats(state.tactile[side].markers)));
   view.show(state);
   showBadge(measured);
+  showParts(measured.goal_parts);
   const hz = player.scene.control_hz, span = Math.max(player.states.length - 1, 10 * hz);
   const until = player.states.slice(0, Math.floor(player.cursor) + 1);
   plots.forEach((plot) => plot.draw(until, Math.floor(player.cursor), span, hz));
