@@ -49,7 +49,7 @@ class Scene:
         """The `info["scene"]` of a server. Raises ValueError if its goal places the object of the task nowhere."""
         placed = [goal for goal in _predicates(scene["goal"]) if goal.get("object") == scene["object"] and "target" in goal]
         if not placed:
-            raise ValueError("obs='state' and reward='staged' need a goal that places the object of the task somewhere, which this one does not")
+            raise ValueError("obs='state' and reward='staged' need a goal that places the object of the task, which this one does not")
         position = np.array(scene["base_position_w"], dtype=np.float64)
         return cls(scene["object"], placed[0]["target"], position, _matrix_of_quaternion(scene["base_quaternion_w"]))
 
