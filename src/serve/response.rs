@@ -1,6 +1,6 @@
 //! Responses to clients.
 
-use std::fmt::Display;
+use std::{collections::BTreeMap, fmt::Display};
 
 use rmpv::Value;
 use serde_json::{Map, json};
@@ -20,6 +20,7 @@ use softvt_policy::{
     profile::{Profile, ProfileInput},
 };
 use softvt_robot::rotation;
+use softvt_rollout::ObjectInstance;
 
 /// Version of the protocol.
 const PROTOCOL: u32 = 1;
@@ -134,12 +135,16 @@ fn scene(live: &LiveEpisode, config: &ServerConfig) -> serde_json::Value {
     let sim = &live.episode.sim;
     let position: [f64; 3] = sim.robot.base_w.translation.vector.into();
     let q = rotation::canonical(&sim.robot.base_w.rotation);
+    let fixed = sim.objects.iter().filter(|object| !object.body.is_free() && object.part.is_none());
+    let at = |object: &ObjectInstance| -> [f64; 3] { sim.pose(object).translation.vector.into() };
+    let fixed: BTreeMap<&str, [f64; 3]> = fixed.map(|object| (object.name.as_str(), at(object))).collect();
     let task = tasks.find(|task| task.id == id.task);
     json!({
         "goal": task.map(|task| &task.goal),
         "object": task.map(|task| &task.object),
         "base_position_w": position,
         "base_quaternion_w": [q.w, q.i, q.j, q.k],
+        "fixed_positions_w": fixed,
         "objects": sim.objects.iter().map(|object| &object.name).collect::<Vec<_>>(),
     })
 }

@@ -43,6 +43,7 @@ class Scene:
     target: str
     base_position: np.ndarray  # (3), m
     base_rotation: np.ndarray  # (3, 3)
+    fixed: Mapping[str, Any]  # positions in the world of objects that never move, m
 
     @classmethod
     def read(cls, scene: Mapping[str, Any]) -> "Scene":
@@ -51,7 +52,8 @@ class Scene:
         if not placed:
             raise ValueError("obs='state' and reward='staged' need a goal that places the object of the task, which this one does not")
         position = np.array(scene["base_position_w"], dtype=np.float64)
-        return cls(scene["object"], placed[0]["target"], position, _matrix_of_quaternion(scene["base_quaternion_w"]))
+        rotation, fixed = _matrix_of_quaternion(scene["base_quaternion_w"]), scene["fixed_positions_w"]
+        return cls(scene["object"], placed[0]["target"], position, rotation, fixed)
 
 
 def _predicates(goal: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -116,6 +118,8 @@ def progress(state: TrueState, verdict: Mapping[str, Any]) -> float:
 
 def _object(scene: Scene, state: Mapping[str, Any], name: str) -> tuple[np.ndarray, np.ndarray, float | None]:
     """Position (m) and rotation in the base frame, and D (%)."""
+    if name in scene.fixed:
+        return scene.base_rotation.T @ (np.array(scene.fixed[name]) - scene.base_position), scene.base_rotation.T, None
     for entry in state["objects"]:
         if entry["name"] == name:
             position = scene.base_rotation.T @ (np.array(entry["position_w"]) - scene.base_position)
