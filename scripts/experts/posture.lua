@@ -25,7 +25,8 @@ local function arrives(arm, pose, options)
 end
 
 -- Moves along the first of several paths, lists of poses, on which the arm arrives everywhere, and returns its index.
--- It returns to the start from the others; nil if there is none. `options` are those of the motion to the first pose.
+-- It returns to the start from the others. Returns nil if no path is reached. `options` are those of the motion to the
+-- first pose.
 function posture.first(arm, paths, options)
   local start = arm.target
   for k, path in ipairs(paths) do

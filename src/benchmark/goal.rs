@@ -35,7 +35,7 @@ pub enum Goal {
     },
     /// The object is near the target, and the robot does not touch it.
     Near {
-        /// Objects and time.
+        /// The object, the target, and how long the relation must hold.
         #[serde(flatten)]
         of: Placement,
         /// Largest horizontal distance of the centres, m.
@@ -45,7 +45,7 @@ pub enum Goal {
     Beside {
         /// Side of the target.
         side: Side,
-        /// Objects and time.
+        /// The object, the target, and how long the relation must hold.
         #[serde(flatten)]
         of: Placement,
         /// Smallest distance of the centres towards that side, m.
@@ -53,16 +53,16 @@ pub enum Goal {
     },
     /// The object is upright, and the robot does not touch it.
     Upright {
-        /// Scene name.
+        /// Scene name of the object.
         object: String,
-        /// Time for which it must stay so, s.
+        /// Time for which it must stay upright, s.
         hold_s: f64,
         /// Largest angle between its z axis and the vertical, rad.
         angle_rad: f64,
     },
     /// A function of the script returns true.
     Predicate {
-        /// What holds, in words.
+        /// Description of the condition, as records and reports show it.
         name: String,
     },
     /// All of these hold at once.
@@ -161,7 +161,7 @@ impl Goal {
         }
     }
 
-    /// What holds, in words: "bun in cabinet.top_drawer".
+    /// Description of the goal: "bun in cabinet.top_drawer".
     pub fn describe(&self) -> String {
         let joined =
             |parts: &Parts, word: &str| parts.goals.iter().map(Self::describe).collect::<Vec<_>>().join(word);

@@ -1,4 +1,4 @@
-//! [`EpisodeCategory`]: the one result of an episode that tables, pages and videos name.
+//! [`EpisodeCategory`]: the result of an episode, one per episode, as tables, pages and videos name it.
 
 use serde::{Deserialize, Serialize};
 

@@ -70,7 +70,7 @@ pub struct PlaceEvidence {
     pub support_force_n: f64,
 }
 
-/// State of what a predicate of the goal is about.
+/// Evidence of one predicate of the goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PredicateEvidence {
     /// The object that must carry a target.
@@ -107,7 +107,7 @@ pub struct Evidence<'a> {
     pub targets: &'a [TargetEvidence],
     /// States of the other movable bodies, those at a place included, in the same order in every step.
     pub others: &'a [BodyEvidence],
-    /// What the predicates of the goal are about, in their order.
+    /// Evidence of the predicates of the goal, in their order.
     pub predicates: &'a [PredicateEvidence],
 }
 

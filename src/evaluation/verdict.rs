@@ -97,7 +97,7 @@ pub struct OtherObjectDeformation {
 /// A predicate of a goal of several parts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GoalPart {
-    /// What it is about, in words.
+    /// Description of the predicate: "bun on plate".
     pub name: String,
     /// True if it must not hold; absent otherwise.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -247,7 +247,7 @@ impl Verdict {
         PeakDeformation { d_pct: self.d_peak, missing: self.missing_deformation }
     }
 
-    /// What Safety Success asks for beside the deformation of the object, where each of the other targets may use
+    /// Parts of Safety Success other than the deformation of the object, where each of the other targets may use
     /// `kappa` of its D_ref, or its own κ if none is given.
     pub fn safety_parts(&self, kappa: Option<f64>) -> SafetyParts {
         let all = |all: Option<bool>, own: Option<bool>| match (all, own) {

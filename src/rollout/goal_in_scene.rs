@@ -36,7 +36,7 @@ pub(super) struct GoalInScene {
     pub targets: Vec<usize>,
     /// How the predicates combine.
     pub goal: GoalNode,
-    /// What each predicate is about.
+    /// The predicates, by number.
     pub predicates: Vec<PredicateInScene>,
     /// Functions of the script, which some predicates call.
     functions: Vec<Arc<dyn StatePredicate>>,
@@ -45,13 +45,13 @@ pub(super) struct GoalInScene {
 /// A predicate of the goal; numbers are indices of objects where nothing else is said.
 #[derive(Clone, Debug)]
 pub(super) struct PredicateInScene {
-    /// What holds, in words.
+    /// Description, as records show it.
     name: String,
     hold_s: f64,
     pub subject: Subject,
 }
 
-/// What a predicate is about.
+/// Subject of a predicate.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Subject {
     /// A target (a place in [`GoalInScene::targets`]) rests in a region of an object.

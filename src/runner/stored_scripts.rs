@@ -17,7 +17,7 @@ use zip::{CompressionMethod, ZipArchive, ZipWriter, result::ZipError, write::Sim
 
 use crate::error::RunError;
 
-/// Entry of the archive that says what the others are.
+/// Entry that lists the other entries of the archive.
 const INDEX: &str = "index.json";
 /// Largest file of the archive, bytes.
 const MAX_BYTES: u64 = 64 << 20;
@@ -32,7 +32,7 @@ pub struct StoredScripts {
     calibrations: BTreeMap<String, String>,
 }
 
-/// What the entries of the archive are.
+/// Contents of the archive.
 #[derive(Serialize, Deserialize)]
 struct Index {
     main: String,

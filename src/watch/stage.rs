@@ -192,11 +192,11 @@ impl Stage {
     /// The policy of the selection.
     ///
     /// # Errors
-    /// There is no policy of that name.
+    /// The name is not that of a policy.
     fn policy(&self) -> Result<PolicyConfig, RunError> {
         let (name, given) = (&self.program.selection.policy, &self.program.config.policy);
         match name.as_str() {
-            // The page shows the true state to who drives.
+            // Whoever drives the arm sees the true state on the page.
             TELEOP => {
                 let mut policy = PolicyConfig::external(TELEOP);
                 policy.privileged = true;

@@ -109,7 +109,7 @@ fn recorded_program(args: &WatchArgs) -> Result<Program, CliError> {
     Ok(Program { config, selection, split })
 }
 
-/// A token that nobody guesses.
+/// A random token of 128 bits.
 fn token() -> Result<String, CliError> {
     let mut bytes = [0; 16];
     getrandom::fill(&mut bytes).map_err(|error| CliError::input(format!("no random numbers: {error}")))?;
