@@ -10,6 +10,7 @@ pub mod condition_effects;
 pub mod condition_table;
 pub mod episode_page;
 pub mod leaderboard;
+pub mod mcap;
 pub mod page;
 pub mod policy_ranking;
 pub mod report_files;

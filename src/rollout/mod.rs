@@ -50,6 +50,7 @@
 //! let task = Task {
 //!     id: 0,
 //!     prompt: "do nothing".to_owned(),
+//!     prompt_varies: false,
 //!     layout: "cube".to_owned(),
 //!     goal: Goal::On(Placement { object: object.clone(), target, hold_s: 10.0 }),
 //!     object,
@@ -99,7 +100,7 @@ pub use sensor_assets::{SensingError, SensorAssets};
 pub use sensor_noise::SensorSeed;
 pub use sensors::{
     BodyConfiguration, CAMERA_IMAGE_SUFFIXES, Proprioception, Sensors, StateRecording,
-    TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES, check_sensors,
+    TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES, check_sensors, strain_colour,
 };
 pub use simulation::{ArticulatedPart, ObjectInstance, SettleError, Simulation, state_hash};
 pub use soft_model::{cost_warning, soft_model};

@@ -166,8 +166,10 @@ impl Sensors {
         edge: usize,
     ) -> Result<RgbImage, SensingError> {
         let render_scene = self.built_scene()?;
-        let colours: Vec<Vec<[f32; 3]>> =
-            frame.nodes.iter().enumerate().map(|(body, x)| self.skin(body, x)).collect();
+        let colours = |(body, x): (usize, &Vec<Vec3>)| {
+            self.strain_ratios(body, x).into_iter().map(strain_colour).collect()
+        };
+        let colours: Vec<Vec<[f32; 3]>> = frame.nodes.iter().enumerate().map(colours).collect();
         let view = FrameView {
             node_colours: &colours,
             hidden_id: ROBOT_SEGMENTATION_ID,
@@ -179,8 +181,9 @@ impl Sensors {
         Ok(image.into_rgb_image())
     }
 
-    /// Colours of the nodes of a soft body by their strain; none without a stable strain.
-    fn skin(&self, body: usize, x: &[Vec3]) -> Vec<[f32; 3]> {
+    /// Strain at the nodes of a soft body, at the positions `x`, over the stable strain of its material: above 1 the
+    /// material has collapsed. Empty without a stable strain.
+    pub fn strain_ratios(&self, body: usize, x: &[Vec3]) -> Vec<f64> {
         let is_body =
             |object: &&ObjectInstance| matches!(object.body, BodyId::Soft(id) if id.index() == body);
         let Some(object) = self.objects.iter().find(is_body) else { return Vec::new() };
@@ -188,7 +191,7 @@ impl Sensors {
             return Vec::new();
         };
         let Some(stable) = material.stable_strain() else { return Vec::new() };
-        node_strains(model, x).into_iter().map(|strain| strain_colour(strain / stable)).collect()
+        node_strains(model, x).into_iter().map(|strain| strain / stable).collect()
     }
 
     /// As [`render`](Self::render), for a camera that is used once: nothing is kept for its next image.
@@ -353,8 +356,7 @@ impl Sensors {
         let inside = |p: &Vec3| sensor.gel.pad.edge_distance(p.x, p.y) < -sensor.gel.cell;
         let patch = frame.patches.get(index).filter(|patch| patch.points.iter().any(|p| inside(&p.p_p)));
         let patch = patch.unwrap_or(&none);
-        let pad_w =
-            frame.links[self.articulation.index()][panda::finger_link(side)] * pads::pad_pose_in_finger(side);
+        let pad_w = self.pads_w(frame)[index];
         let mut placed: Vec<(Arc<TactileSkin>, Vec<Vec3>)> = Vec::new();
         let mut substrate = None;
         for (index, object) in
@@ -392,6 +394,18 @@ impl Sensors {
         let mut reading = sensor.read(&contact, &mut self.gel_scratch)?;
         self.seed.apply_wear(&self.spec.wear, side, frame.step, &sensor.untouched_image, &mut reading);
         Ok(reading)
+    }
+
+    /// Frames of the pads of the left and right finger in a state, world.
+    pub fn pads_w(&self, frame: &WorldSnapshot) -> [Pose; 2] {
+        [Side::Left, Side::Right].map(|side| {
+            frame.links[self.articulation.index()][panda::finger_link(side)] * pads::pad_pose_in_finger(side)
+        })
+    }
+
+    /// Base of the robot, world.
+    pub fn base_w(&self) -> Pose {
+        self.scene.base_w
     }
 
     /// Proprioception in a state.
@@ -498,7 +512,7 @@ fn close_up_camera(object: &ObjectInstance, frame: &WorldSnapshot, edge: usize) 
 }
 
 /// Linear RGB of a strain over the stable strain: pale to orange up to 1, red beyond and nowhere else.
-fn strain_colour(ratio: f64) -> [f32; 3] {
+pub fn strain_colour(ratio: f64) -> [f32; 3] {
     const RAMP: [(f64, [f32; 3]); 4] = [
         (0.0, [0.88, 0.85, 0.79]),
         (0.3, [0.88, 0.85, 0.79]),

@@ -1,4 +1,5 @@
-//! Files of an episode other than its line: actions, the log for SoftVTBench's scorer, trace, video and still.
+//! Files of an episode other than its line: actions, the log for SoftVTBench's scorer, trace, video, still and MCAP
+//! file.
 
 use std::{
     path::{Path, PathBuf},
@@ -12,15 +13,15 @@ use softvt_common::files;
 use softvt_evaluation::judge::ControlStepScore;
 use softvt_records::record::EpisodeRecord;
 use softvt_report::{
-    actions,
+    actions, mcap,
     softvtbench_files::{self, DebugFrame, DebugShape},
     video::{self, VideoCaption},
 };
 use softvt_rollout::FinishedEpisode;
 
-/// Episodes of a run that become videos.
+/// Episodes of a run that become videos or MCAP files.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum VideoSelection {
+pub enum EpisodeFilter {
     /// All that are not safe.
     Failed,
     /// All episodes.
@@ -29,7 +30,23 @@ pub enum VideoSelection {
     Episodes(Vec<u32>),
 }
 
-impl FromStr for VideoSelection {
+impl EpisodeFilter {
+    /// True if the episode may be selected, before its outcome is known.
+    fn may_select(&self, episode: u32) -> bool {
+        match self {
+            Self::Episodes(selected) => selected.contains(&episode),
+            Self::All | Self::Failed => true,
+        }
+    }
+
+    /// True if the finished episode is selected.
+    fn selects(&self, record: &EpisodeRecord) -> bool {
+        let is_excluded = *self == Self::Failed && record.verdict.safety;
+        self.may_select(record.header.id.episode) && !is_excluded
+    }
+}
+
+impl FromStr for EpisodeFilter {
     type Err = String;
 
     fn from_str(word: &str) -> Result<Self, String> {
@@ -50,23 +67,24 @@ impl FromStr for VideoSelection {
 pub(crate) struct EpisodeArtifacts<'a> {
     pub dir: &'a Path,
     pub trace: bool,
-    pub video: Option<&'a VideoSelection>,
+    pub video: Option<&'a EpisodeFilter>,
+    pub mcap: Option<&'a EpisodeFilter>,
 }
 
 impl EpisodeArtifacts<'_> {
-    /// True if a video of the episode may be requested, before its outcome is known.
+    /// True if a file that is made of the states of the episode may be requested, before its outcome is known.
     pub(crate) fn may_render(&self, episode: u32) -> bool {
-        match self.video {
-            None => false,
-            Some(VideoSelection::Episodes(selected)) => selected.contains(&episode),
-            Some(VideoSelection::All | VideoSelection::Failed) => true,
-        }
+        [self.video, self.mcap].into_iter().flatten().any(|filter| filter.may_select(episode))
     }
 
     /// True if a video of the finished episode is requested.
-    fn is_rendered(&self, record: &EpisodeRecord) -> bool {
-        let is_excluded = self.video == Some(&VideoSelection::Failed) && record.verdict.safety;
-        self.may_render(record.header.id.episode) && !is_excluded
+    fn has_video(&self, record: &EpisodeRecord) -> bool {
+        self.video.is_some_and(|filter| filter.selects(record))
+    }
+
+    /// True if an MCAP file of the finished episode is requested.
+    fn has_mcap(&self, record: &EpisodeRecord) -> bool {
+        self.mcap.is_some_and(|filter| filter.selects(record))
     }
 
     /// The requested files of a finished episode that do not exist, and its actions if they are damaged.
@@ -77,7 +95,10 @@ impl EpisodeArtifacts<'_> {
         if self.trace {
             requested.push(self.trace_path(index));
         }
-        if self.is_rendered(record) {
+        if self.has_mcap(record) {
+            requested.push(mcap::mcap_path(self.dir, index));
+        }
+        if self.has_video(record) {
             requested.push(video::video_path(self.dir, index));
             if !record.verdict.safety {
                 requested.push(video::still_path(self.dir, index));
@@ -97,7 +118,7 @@ impl EpisodeArtifacts<'_> {
         actions::verify(self.dir, record).is_ok()
     }
 
-    /// Writes all files except video and still.
+    /// Writes all files that are not made of the states.
     ///
     /// # Errors
     /// A file cannot be written.
@@ -113,17 +134,22 @@ impl EpisodeArtifacts<'_> {
         Ok(actions::write(&path, &finished.actions)?)
     }
 
-    /// Renders the requested video, and for an unsafe episode a still of its worst moment.
-    /// Consumes the recorded states.
+    /// Writes the requested MCAP file and renders the requested video, and for an unsafe episode a still of its worst
+    /// moment. Consumes the recorded states.
     ///
     /// # Errors
     /// An image cannot be rendered or written.
     pub(crate) fn render(&self, finished: &mut FinishedEpisode) -> Result<(), RunError> {
         let (record, Some(mut states)) = (&finished.record, finished.recording.take()) else { return Ok(()) };
-        if !self.is_rendered(record) {
+        let index = record.header.id.index();
+        if self.has_mcap(record) {
+            let path = mcap::mcap_path(self.dir, index);
+            mcap::write_mcap(&mut states, record, &path, 1, cancel::requested, || ())?;
+        }
+        if !self.has_video(record) {
             return Ok(());
         }
-        let (index, caption) = (record.header.id.index(), VideoCaption::new(record));
+        let caption = VideoCaption::new(record);
         let path = video::video_path(self.dir, index);
         files::create_folder(path.parent().unwrap_or(self.dir))?;
         if !record.verdict.safety {

@@ -112,6 +112,7 @@ input_errors!(
     softvt_dataset::DatasetError,
     softvt_evaluation::thresholds::ThresholdError,
     softvt_report::actions::ActionsError,
+    softvt_report::mcap::EpisodeMcapError,
     softvt_report::run_folder::RunFolderError,
     softvt_report::stored_run::StoredRunError,
     softvt_report::video::EpisodeVideoError,

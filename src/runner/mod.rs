@@ -16,6 +16,7 @@ pub mod episode_selector;
 mod error;
 mod evaluate;
 pub mod experiment;
+mod experiment_folder;
 mod golden;
 pub mod growth;
 pub mod import;
@@ -40,7 +41,7 @@ mod suite_run;
 
 pub use check::SuiteChecker;
 pub use config::{ConfiguredScript, RunConfig, Shard, TraceDetail, read_secret, thread_count};
-pub use episode_artifacts::VideoSelection;
+pub use episode_artifacts::EpisodeFilter;
 pub use episode_list::{EpisodeJob, EpisodeList};
 pub use error::{FaultySetting, RunError, RunErrorCause};
 pub use evaluate::SuiteResult;

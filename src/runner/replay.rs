@@ -33,7 +33,7 @@ use softvt_evaluation::verdict::Outcome;
 use softvt_policy::{Action, builtin::RecordedPolicy};
 use softvt_records::record::EpisodeRecord;
 use softvt_report::{actions, stored_run::StoredRun};
-use softvt_rollout::ChunkedPolicy;
+use softvt_rollout::{ChunkedPolicy, FinishedEpisode, StateRecording};
 use softvt_script::LoadedScript;
 
 /// A controller factory that repeats the actions of a recorded episode, and its error if it ended with one.
@@ -99,8 +99,14 @@ impl StoredManifest<'_> {
     ///
     /// # Errors
     /// The scripts have changed since, or the episode cannot be run.
-    fn simulate(&self, record: &EpisodeRecord, actions: Vec<Action>) -> Result<EpisodeRecord, RunError> {
-        Ok(with_policy_fields(self.simulate_with(record, replay_factory(actions, record))?, record))
+    fn simulate(
+        &self,
+        record: &EpisodeRecord,
+        actions: Vec<Action>,
+        keeps_states: bool,
+    ) -> Result<FinishedEpisode, RunError> {
+        let finished = self.simulate_with(record, replay_factory(actions, record), keeps_states)?;
+        Ok(FinishedEpisode { record: with_policy_fields(finished.record, record), ..finished })
     }
 
     /// Simulates an episode again with other controllers.
@@ -111,7 +117,8 @@ impl StoredManifest<'_> {
         &self,
         record: &EpisodeRecord,
         controllers: ControllerFactory,
-    ) -> Result<EpisodeRecord, RunError> {
+        keeps_states: bool,
+    ) -> Result<FinishedEpisode, RunError> {
         let index = record.header.id.index();
         let config = self.config(index.task)?;
         let ConfiguredScript { config, script: loaded } = config.load()?;
@@ -124,9 +131,9 @@ impl StoredManifest<'_> {
             origins: record.header.origin.iter().map(|origin| (index, (**origin).clone())).collect(),
             ..SuiteRun::new(&config, &loaded, suite, EpisodeList::listed(vec![job]), PathBuf::new())?
         };
-        let run = run.prepare()?;
+        let run = if keeps_states { run.rendered() } else { run }.prepare()?;
         self.check_sources(&run)?;
-        Ok(run.run_episode(job, false, &run.controllers)?.record)
+        run.run_episode(job, keeps_states, &run.controllers)
     }
 
     fn text(&self, field: &str) -> &str {
@@ -274,7 +281,7 @@ pub fn demos_of(path: &Path) -> Result<Vec<DemoRef>, RunError> {
 }
 
 /// An episode of a run that was simulated again by its recorded actions.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct EpisodeReplay {
     /// Task and episode.
     pub index: EpisodeIndex,
@@ -282,6 +289,8 @@ pub struct EpisodeReplay {
     pub simulated: EpisodeRecord,
     /// First difference from the recorded one. `None` if they are byte-identical.
     pub difference: Option<String>,
+    /// Its states, if they were asked for.
+    pub recording: Option<StateRecording>,
 }
 
 /// Simulates an episode of a run again by its recorded actions. A judged run needs its `secret`.
@@ -292,13 +301,16 @@ pub fn replay_episode(
     run: &StoredRun,
     episode: EpisodeSelector,
     secret: Option<&SecretFile>,
+    keeps_states: bool,
     observer: Arc<dyn Observer>,
 ) -> Result<EpisodeReplay, RunError> {
     let record = episode.find_record(run)?;
     let index = record.header.id.index();
     let manifest = StoredManifest { path: &run.dir, manifest: &run.manifest, secret, observer };
-    let simulated = manifest.simulate(record, actions::read(&actions::path(&run.dir, index))?)?;
-    Ok(EpisodeReplay { index, difference: difference(record, &simulated)?, simulated })
+    let actions = actions::read(&actions::path(&run.dir, index))?;
+    let FinishedEpisode { record: simulated, recording, .. } =
+        manifest.simulate(record, actions, keeps_states)?;
+    Ok(EpisodeReplay { index, difference: difference(record, &simulated)?, simulated, recording })
 }
 
 /// Simulates demonstrations again by their actions alone.
@@ -340,7 +352,7 @@ pub(crate) fn simulate_demo_with(
         secret: None,
         observer: observer.clone(),
     };
-    stored.simulate_with(&record, controllers(file.actions(demo.demo)?))
+    Ok(stored.simulate_with(&record, controllers(file.actions(demo.demo)?), false)?.record)
 }
 
 fn replay_demo(demo: &DemoRef, observer: &Arc<dyn Observer>) -> Result<DemoReplay, RunError> {

@@ -8,7 +8,7 @@ use std::{
 
 use crate::{
     config::{ConfiguredScript, RunConfig, Shard, TraceDetail},
-    episode_artifacts::VideoSelection,
+    episode_artifacts::EpisodeFilter,
     error::RunError,
     evaluate::{SuiteResult, run_episodes, run_suite},
     observer::Observer,
@@ -100,8 +100,13 @@ impl<'a> Runner<'a> {
     }
 
     /// Renders videos of these episodes into the output folder.
-    pub fn video(self, episodes: VideoSelection) -> Self {
+    pub fn video(self, episodes: EpisodeFilter) -> Self {
         self.change(|config| config.video = Some(episodes))
+    }
+
+    /// Writes these episodes as MCAP files for Foxglove and Rerun into the output folder.
+    pub fn mcap(self, episodes: EpisodeFilter) -> Self {
+        self.change(|config| config.mcap = Some(episodes))
     }
 
     /// Only one part of the episodes.
@@ -139,15 +144,16 @@ impl<'a> Runner<'a> {
     ///
     /// # Errors
     /// The script has no suite; a scene, a setting or the policy is not valid; a folder contains something else; a
-    /// trace, a video or a resumed run without an output folder; or a request to stop. Finished episodes are kept in
+    /// trace, videos, MCAP files or a resumed run without an output folder; or a request to stop. Finished episodes are kept in
     /// the output folder.
     pub fn run(&self, mut on_episode: impl FnMut(&EpisodeRecord)) -> Result<Vec<SuiteResult>, RunError> {
         let (config, plan) = (&self.config, &self.script.plan);
         let is_list = matches!(plan, Plan::Suites { .. });
         let suites = select_suites(config, plan)?;
-        let needs_folder = config.trace.is_some() || config.video.is_some() || config.resume;
+        let needs_folder =
+            config.trace.is_some() || config.video.is_some() || config.mcap.is_some() || config.resume;
         if needs_folder && config.out.is_none() && !self.is_numbered {
-            return Err(config.error("a trace, a video and a resumed run need an output folder"));
+            return Err(config.error("a trace, videos, MCAP files and a resumed run need an output folder"));
         }
         check_episodes(config, suites)?;
         if is_list {

@@ -9,6 +9,9 @@ use softvt_rollout::{Episode, ObjectInstance, SensingError};
 use softvt_scene::{Body, Camera, CameraMount, ROBOT_SEGMENTATION_ID};
 use softvt_sensing::camera::DisplayMesh;
 
+/// Size of a pixel of the page on an object, m: meshes look like the finest ones from about 0.5 m.
+const PIXEL: f32 = 1e-3;
+
 /// Numbers of a pose: position, m, and quaternion, x y z w.
 pub(crate) fn pose_numbers(pose: &Pose) -> [f32; 7] {
     let (t, q) = (pose.translation.vector, pose.rotation.coords);
@@ -36,7 +39,7 @@ pub(crate) fn scene_message(
     let mut message = Message::default();
     let (mut objects, mut moving) = (Vec::new(), Vec::new());
     for object in episode.render_scene()?.objects() {
-        let mut entry = mesh_entry(&mut message, &object.mesh.display_mesh()?);
+        let mut entry = mesh_entry(&mut message, &object.mesh.display_mesh(PIXEL)?);
         entry["name"] = json!(object.name);
         entry["target"] = json!(object.name == target);
         entry["robot"] = json!(object.segmentation_id == ROBOT_SEGMENTATION_ID);

@@ -7,16 +7,18 @@ use clap::Args;
 use crate::{
     args::load_one_run,
     error::CliError,
-    output::{Console, print, report_replays},
+    output::{Console, Progress, print, report_replays},
 };
+use softvt_common::cancel;
 use softvt_dataset::layout::is_dataset;
-use softvt_report::stored_run::StoredRun;
+use softvt_report::{mcap::write_mcap, stored_run::StoredRun};
 use softvt_runner::{
     Observer,
     episode_selector::EpisodeSelector,
     read_secret,
     replay::{EpisodeReplay, SecretFile, check_complete, replay_episode, simulate_demos},
     stored_folder::{enter_for_dataset, enter_for_run},
+    thread_count,
 };
 
 /// Simulate a recorded episode again; exit code 0 if the result is byte-identical
@@ -29,6 +31,9 @@ pub(crate) struct ReplayArgs {
     /// Secret seed of a judged run
     #[arg(long, value_name = "FILE")]
     seed_file: Option<PathBuf>,
+    /// Also write the episode as an MCAP file for Foxglove and Rerun
+    #[arg(long, value_name = "FILE")]
+    mcap: Option<PathBuf>,
 }
 
 /// Simulates an episode of a run or a demonstration of a dataset again, by its recorded actions.
@@ -46,6 +51,9 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
         if secret.is_some() {
             return Err(CliError::input("--seed-file: demonstrations have no secret seed; leave it out"));
         }
+        if args.mcap.is_some() {
+            return Err(CliError::input("--mcap: demonstrations have no MCAP files; leave it out"));
+        }
         check_complete(dir)?;
         let demos = [args.episode.find_demo(&enter_for_dataset(dir, &*observer)?)?];
         return report_replays(&demos, &simulate_demos(&demos, &observer)?);
@@ -53,8 +61,14 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
     let stored = load_one_run(dir)?;
     args.episode.find_record(&stored)?;
     let stored = StoredRun { dir: enter_for_run(&stored, &*observer)?, ..stored };
-    let EpisodeReplay { index, simulated, difference } =
-        replay_episode(&stored, args.episode, secret.as_ref(), observer)?;
+    let keeps_states = args.mcap.is_some();
+    let EpisodeReplay { index, simulated, difference, recording } =
+        replay_episode(&stored, args.episode, secret.as_ref(), keeps_states, observer)?;
+    if let (Some(path), Some(mut states)) = (&args.mcap, recording) {
+        let progress = Progress::new(states.frames.len(), "writing the MCAP file");
+        let threads = thread_count(None);
+        write_mcap(&mut states, &simulated, path, threads, cancel::requested, || progress.step())?;
+    }
     match difference {
         None => print(&format!("{index}: byte-identical, final state {}\n", simulated.stats.state_hash)),
         Some(difference) => Err(CliError::other_result(format!("{index} differs: {difference}"))),

@@ -147,20 +147,20 @@ pub fn write_video(
 }
 
 /// Sensors of several threads, which share their meshes and have their own working memory.
-struct SharedSensors {
+pub(crate) struct SharedSensors {
     original: Sensors,
     idle: Mutex<Vec<Sensors>>,
 }
 
 impl SharedSensors {
-    fn new(sensors: &mut Sensors) -> Result<Self, SensingError> {
+    pub(crate) fn new(sensors: &mut Sensors) -> Result<Self, SensingError> {
         // The copies share the meshes from here on.
         sensors.render_scene()?;
         Ok(Self { original: sensors.clone(), idle: Mutex::default() })
     }
 
     /// Lends sensors that no other thread uses to `work`.
-    fn lend<T>(&self, work: impl FnOnce(&mut Sensors) -> T) -> T {
+    pub(crate) fn lend<T>(&self, work: impl FnOnce(&mut Sensors) -> T) -> T {
         let taken = lock(&self.idle).pop();
         let mut sensors = taken.unwrap_or_else(|| self.original.clone());
         let result = work(&mut sensors);

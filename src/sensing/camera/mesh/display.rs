@@ -3,9 +3,6 @@
 use super::{lod::Lod, render_mesh::RenderMesh};
 use crate::camera::{error::CameraError, math::f32x8};
 
-/// Size of a pixel of the viewer on the object, m: the level of detail that looks like the finest one from about 0.5 m.
-const PIXEL: f32 = 1e-3;
-
 /// A vertex of a soft body as a weighted sum of nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NodeBinding {
@@ -33,13 +30,13 @@ pub struct DisplayMesh {
 }
 
 impl RenderMesh {
-    /// The mesh at the level of detail that looks like the finest one at a millimetre per pixel, with the colour of
-    /// its textures at the vertices.
+    /// The mesh at the coarsest level of detail that looks like the finest one where a pixel of the viewer covers
+    /// `pixel` metres, with the colour of its textures at the vertices.
     ///
     /// # Errors
     /// The level cannot be built.
-    pub fn display_mesh(&self) -> Result<DisplayMesh, CameraError> {
-        let lod = self.level(self.coarsest_where(|lod| lod.is_fine_enough(PIXEL))?)?;
+    pub fn display_mesh(&self, pixel: f32) -> Result<DisplayMesh, CameraError> {
+        let lod = self.level(self.coarsest_where(|lod| lod.is_fine_enough(pixel))?)?;
         let roughness = lod.materials.iter().map(|material| material[3]).sum::<f32>();
         Ok(DisplayMesh {
             positions: lod.positions.iter().map(|p| (*p).into()).collect(),
