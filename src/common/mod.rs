@@ -1,5 +1,5 @@
 //! What all layers share: the identity of an episode ([`episode_id`]), the flag that ends long loops ([`cancel`]), a
-//! [`disk_cache`], atomic [`files`], declarations of [`settings`](mod@settings), numpy files ([`npy`]), jobs on threads
+//! [`disk_cache`], atomic [`files`], files of finished work ([`journal`]), declarations of [`settings`](mod@settings), numpy files ([`npy`]), jobs on threads
 //! ([`parallel`]), ranges of numbers ([`range`]), and numbers and [`text`] in messages.
 #![warn(missing_docs, unreachable_pub)]
 
@@ -7,6 +7,7 @@ pub mod cancel;
 pub mod disk_cache;
 pub mod episode_id;
 pub mod files;
+pub mod journal;
 pub mod npy;
 pub mod parallel;
 pub mod range;

@@ -2,6 +2,9 @@
 
 use std::borrow::Cow;
 
+/// Longest prompt, name or other short text of a script, bytes. Plans copy texts, which scripts may share.
+pub const MAX_TEXT_BYTES: usize = 4096;
+
 /// Formats a number in decimal, or in scientific notation if it is below 1e-6 or at least 1e9 in magnitude.
 pub fn format_number(x: f64) -> String {
     let plain = x == 0.0 || !x.is_finite() || (1e-6..1e9).contains(&x.abs());

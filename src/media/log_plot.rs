@@ -3,6 +3,7 @@
 use super::{
     plot::PlotPoint,
     svg::{self, Anchor, Place, at, circle, line, polyline, text},
+    ticks::Decades,
 };
 
 /// Width and height of a panel, px.
@@ -31,31 +32,6 @@ pub fn svg(panels: &[LogPanel]) -> String {
     let drawn: String = panels.iter().enumerate().map(|(index, panel)| draw(index, panel)).collect();
     let titles: Vec<&str> = panels.iter().map(|panel| panel.title.as_str()).collect();
     svg::image(width, height, FONT_SIZE, &titles.join("; "), &drawn)
-}
-
-/// The range of whole powers of ten around values.
-struct Decades {
-    low: f64,
-    high: f64,
-}
-
-impl Decades {
-    fn around(values: impl Iterator<Item = f64>) -> Self {
-        let (low, high) = values
-            .map(|value| value.max(f64::MIN_POSITIVE).log10())
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
-        let (low, high) = ((low + 1e-9).floor(), (high - 1e-9).ceil());
-        Self { low, high: high.max(low + 1.0) }
-    }
-
-    /// Position of a value between the ends, 0..=1.
-    fn share(&self, value: f64) -> f64 {
-        (value.max(f64::MIN_POSITIVE).log10() - self.low) / (self.high - self.low)
-    }
-
-    fn ticks(&self) -> impl Iterator<Item = f64> {
-        (self.low as i32..=self.high as i32).map(|power| 10f64.powi(power))
-    }
 }
 
 fn draw(index: usize, panel: &LogPanel) -> String {

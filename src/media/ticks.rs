@@ -31,6 +31,34 @@ pub fn tick_label(tick: f64, step: f64) -> String {
     text.replace('-', "−")
 }
 
+/// The range of whole powers of ten around values.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Decades {
+    low: f64,
+    high: f64,
+}
+
+impl Decades {
+    /// The range around positive values; from 1 to 10 without any.
+    pub fn around(values: impl Iterator<Item = f64>) -> Self {
+        let (low, high) = values
+            .map(|value| value.max(f64::MIN_POSITIVE).log10())
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        let (low, high) = ((low + 1e-9).floor(), (high - 1e-9).ceil());
+        Self { low, high: high.max(low + 1.0) }
+    }
+
+    /// Position of a value between the ends, 0..=1.
+    pub fn share(&self, value: f64) -> f64 {
+        (value.max(f64::MIN_POSITIVE).log10() - self.low) / (self.high - self.low)
+    }
+
+    /// The powers of ten in the range.
+    pub fn ticks(&self) -> impl Iterator<Item = f64> {
+        (self.low as i32..=self.high as i32).map(|power| 10f64.powi(power))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -5,13 +5,15 @@
 //! number of threads nor on interruptions.
 
 use std::{
-    fs::{self, File, OpenOptions, TryLockError},
-    io::{self, Read, Write},
+    fs, io,
     path::{Path, PathBuf},
 };
 
 use super::softvtbench_files;
-use softvt_common::files::{self, FileError};
+use softvt_common::{
+    files::{self, FileError},
+    journal::{Journal, JournalError, whole_lines},
+};
 use softvt_records::{record::EpisodeRecord, record_check::RecordError};
 
 /// One line per episode.
@@ -24,7 +26,8 @@ pub const SCRIPTS: &str = "scripts.zip";
 pub const SUMMARY: &str = "summary.json";
 
 /// Folders with files of single episodes.
-pub(super) const EPISODE_FOLDERS: [&str; 4] = ["actions", "trace", "video", softvtbench_files::FOLDER];
+pub(super) const EPISODE_FOLDERS: [&str; 5] =
+    ["actions", "trace", "video", "mcap", softvtbench_files::FOLDER];
 
 /// Error of using a run folder.
 #[allow(missing_docs, reason = "the messages describe the variants")]
@@ -49,7 +52,7 @@ pub enum RunFolderError {
 #[derive(Debug)]
 pub struct RunFolder {
     dir: PathBuf,
-    episodes: File,
+    episodes: Journal,
 }
 
 impl RunFolder {
@@ -92,17 +95,8 @@ impl RunFolder {
     pub fn create(dir: &Path) -> Result<Self, RunFolderError> {
         files::create_folder(dir)?;
         Self::check_new(dir)?;
-        let path = dir.join(EPISODES);
-        // `create_new`: if two runs start in one folder at the same time, one must fail here.
-        let episodes = OpenOptions::new().append(true).create_new(true).open(&path).map_err(|source| {
-            match source.kind() {
-                io::ErrorKind::AlreadyExists => {
-                    RunFolderError::Occupied { dir: dir.display().to_string(), found: EPISODES }
-                }
-                _ => FileError::io("create", &path)(source).into(),
-            }
-        })?;
-        lock(&episodes, dir)?;
+        // If two runs start in one folder at the same time, one fails here.
+        let episodes = Journal::create(&dir.join(EPISODES)).map_err(of_folder(dir, EPISODES))?;
         Ok(Self { dir: dir.into(), episodes })
     }
 
@@ -117,16 +111,9 @@ impl RunFolder {
             check_own(dir)?;
         }
         let path = dir.join(EPISODES);
-        let episodes = OpenOptions::new().read(true).append(true).create(true).open(&path);
-        let mut episodes = episodes.map_err(FileError::io("open", &path))?;
-        lock(&episodes, dir)?;
-        let mut bytes = Vec::new();
-        episodes.read_to_end(&mut bytes).map_err(FileError::io("read", &path))?;
+        let (mut episodes, bytes) = Journal::resume(&path).map_err(of_folder(dir, EPISODES))?;
         let records = parse(&bytes, &path)?;
-        let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
-        if whole < bytes.len() {
-            episodes.set_len(whole as u64).map_err(FileError::io("shorten", &path))?;
-        }
+        episodes.keep_whole_lines(&bytes)?;
         Ok((Self { dir: dir.into(), episodes }, records))
     }
 
@@ -155,9 +142,7 @@ impl RunFolder {
     /// The line cannot be written.
     pub fn append(&mut self, record: &EpisodeRecord) -> Result<(), RunFolderError> {
         let path = self.dir.join(EPISODES);
-        let line = files::json_lines(&path, [record])?;
-        self.episodes.write_all(line.as_bytes()).map_err(FileError::io("write to", &path))?;
-        Ok(self.episodes.sync_data().map_err(FileError::io("sync", &path))?)
+        Ok(self.episodes.append(&files::json_lines(&path, [record])?)?)
     }
 
     /// Rewrites the lines in the order of `records`, which must be all of them.
@@ -166,11 +151,7 @@ impl RunFolder {
     /// The file cannot be written.
     pub fn write_in_order(&mut self, records: &[EpisodeRecord]) -> Result<(), RunFolderError> {
         let path = self.dir.join(EPISODES);
-        let lines = files::json_lines(&path, records)?;
-        if fs::read(&path).map_err(FileError::io("read", &path))? != lines.as_bytes() {
-            files::replace(&path, &lines)?;
-        }
-        Ok(())
+        Ok(self.episodes.replace(&files::json_lines(&path, records)?)?)
     }
 
     /// Removes the files of a run without episodes, and the folder if it is empty then.
@@ -211,12 +192,13 @@ fn check_own(dir: &Path) -> Result<(), RunFolderError> {
     }
 }
 
-/// Locks the file until it is closed; the system closes it when the process dies.
-fn lock(episodes: &File, dir: &Path) -> Result<(), RunFolderError> {
-    match episodes.try_lock() {
-        Err(TryLockError::WouldBlock) => Err(RunFolderError::Busy { dir: dir.display().to_string() }),
-        // The file system does not support locks.
-        Ok(()) | Err(TryLockError::Error(_)) => Ok(()),
+/// Names the folder in errors of its journal `found`, for `map_err`.
+pub fn of_folder(dir: &Path, found: &'static str) -> impl FnOnce(JournalError) -> RunFolderError + use<> {
+    let dir = dir.display().to_string();
+    move |error| match error {
+        JournalError::Exists => RunFolderError::Occupied { dir, found },
+        JournalError::Busy => RunFolderError::Busy { dir },
+        JournalError::File(error) => error.into(),
     }
 }
 
@@ -235,12 +217,11 @@ pub(super) fn is_truncated(dir: &Path) -> bool {
 }
 
 fn parse(bytes: &[u8], path: &Path) -> Result<Vec<EpisodeRecord>, RunFolderError> {
-    // Text after the last line break was truncated.
-    let lines: Vec<&[u8]> = bytes.split(|byte| *byte == b'\n').collect();
-    let whole = lines[..lines.len() - 1].iter().enumerate().filter(|(_, line)| !line.is_empty());
-    let bad_line =
-        |i: usize, source| RunFolderError::BadLine { path: path.display().to_string(), line: i + 1, source };
-    whole.map(|(i, line)| EpisodeRecord::from_json(line).map_err(|source| bad_line(i, source))).collect()
+    let record = |(line, text): (usize, &[u8])| {
+        let path = path.display().to_string();
+        EpisodeRecord::from_json(text).map_err(|source| RunFolderError::BadLine { path, line, source })
+    };
+    whole_lines(bytes).map(record).collect()
 }
 
 #[cfg(test)]

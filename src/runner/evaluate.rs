@@ -82,7 +82,7 @@ impl<'a> RunLog<'a> {
     ) -> Result<Self, RunError> {
         let log = Self { run, folder, records };
         log.check_records()?;
-        run_manifest::write(&log.folder, manifest)?;
+        run_manifest::write_or_compare(log.folder.path(), manifest)?;
         StoredScripts::new(run.loaded, run.calibration_files.texts()).write(log.folder.path())?;
         log.check_contradictions(manifest)?;
         Ok(log)

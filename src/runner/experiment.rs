@@ -12,22 +12,19 @@ use serde_json::Value;
 use crate::{
     config::{ConfiguredScript, RunConfig},
     error::RunError,
-    run_manifest,
+    experiment_folder::{ExperimentFolder, FinishedPoint, RESERVED},
 };
 use softvt_benchmark::Plan;
 use softvt_common::cancel;
 use softvt_common::{
-    files::{self, replace},
+    files::replace,
     parallel,
     text::{TextTable, counted},
 };
-use softvt_report::run_folder::{RUN, RunFolder};
+use softvt_report::run_folder::RunFolder;
 use softvt_script::{
     Experiment, ExperimentInput, ExperimentInputError, ExperimentRow, LoadedScript, OptionSpec,
 };
-
-/// The rows of an experiment, one JSON object per line.
-const ROWS: &str = "rows.jsonl";
 
 /// `run.json` of an experiment.
 #[derive(Serialize)]
@@ -81,8 +78,9 @@ fn cell(value: Option<&Value>) -> String {
     }
 }
 
-/// Runs all points of the experiment that a script returned. With an output folder, the rows and the files of the
-/// script are written into it; without one, the files of the script are written below the working folder.
+/// Runs all points of the experiment that a script returned, or of an interrupted one the others. With an output folder,
+/// the rows and the files of the script are written into it; without one, the files of the script are written below the
+/// working folder.
 ///
 /// # Errors
 /// The script fails or tells a problem, a setting or the seed changes nothing, or a file cannot be written.
@@ -94,7 +92,7 @@ pub fn run<E: From<RunError>>(
         return Err(config.error("the script returned no experiment").into());
     };
     let (points, out) = (*points, config.out.as_deref());
-    if let Some(dir) = out {
+    if let Some(dir) = out.filter(|_| !config.resume) {
         RunFolder::check_new(dir).map_err(|error| config.error(error))?;
     }
     let input = Arc::new(input(config)?);
@@ -107,39 +105,65 @@ pub fn run<E: From<RunError>>(
         Some(experiment) => Ok(experiment),
         None => Experiment::open_with(loaded, &input).map_err(RunError::from),
     };
-    let mut rows: Vec<Vec<ExperimentRow>> = vec![Vec::new(); points];
-    let run_point = |point| {
-        let experiment = take()?;
+    let (mut folder, mut finished) = match out {
+        Some(dir) => {
+            let manifest = manifest(config, loaded, name, points);
+            let (folder, finished) = match config.resume {
+                true => ExperimentFolder::resume(dir, &manifest)?,
+                false => (ExperimentFolder::create(dir, &manifest)?, BTreeMap::new()),
+            };
+            (Some(folder), finished)
+        }
+        None => (None, BTreeMap::new()),
+    };
+    let left: Vec<usize> = (0..points).filter(|point| !finished.contains_key(point)).collect();
+    let run_point = |job: usize| {
+        let (experiment, point) = (take()?, left[job]);
         let rows = experiment.run(point)?;
+        // Points may hold functions, which are no parameters.
+        let parameters = experiment.point(point).unwrap_or_default();
         // A script can catch the error of an interrupt and return a row that is not valid.
         if cancel::requested() {
             return Err(RunError::interrupted("interrupted"));
         }
         parallel::lock(&idle).push(experiment);
-        Ok(rows)
+        Ok(FinishedPoint { point, parameters, rows })
     };
     let list = config.job_list(name);
-    let outcome = config.run_jobs(&list, points, run_point, |point, found: Vec<ExperimentRow>| {
-        let line = format!("point {point}: {}", counted(found.len(), "row"));
-        rows[point] = found;
+    let outcome = config.run_jobs(&list, left.len(), run_point, |_, found: FinishedPoint| {
+        let line = format!("point {}: {}", found.point, counted(found.rows.len(), "row"));
+        if let Some(folder) = &mut folder {
+            folder.add(&found)?;
+        }
+        finished.insert(found.point, found);
         Ok(line)
     });
     drop(list);
-    let done = rows.iter().filter(|rows| !rows.is_empty()).count();
-    let rows: Vec<ExperimentRow> = rows.into_iter().flatten().collect();
+    let finished: Vec<FinishedPoint> = finished.into_values().collect();
+    let rows: Vec<ExperimentRow> = finished.iter().flat_map(|point| point.rows.clone()).collect();
     if cancel::requested() {
         on_output(ExperimentOutput::Rows(&rows))?;
-        return Err(RunError::interrupted(format!(
-            "interrupted; the rows of {done} of {points} points are above; no file was written"
-        ))
-        .into());
+        let done = format!("interrupted; the rows of {} of {points} points are above", finished.len());
+        let Some(dir) = out else {
+            return Err(RunError::interrupted(format!("{done}; no file was written")).into());
+        };
+        return Err(RunError { resumable: Some(dir.into()), ..RunError::interrupted(done) }.into());
+    }
+    if outcome.is_err() && finished.is_empty() {
+        folder.take().map_or(Ok(()), ExperimentFolder::discard)?;
     }
     outcome?;
-    input.check_used().map_err(|error| input_error(config, &error))?;
+    // Points of an earlier process may have used what these did not.
+    if left.len() == points
+        && let Err(error) = input.check_used()
+    {
+        folder.take().map_or(Ok(()), ExperimentFolder::discard)?;
+        return Err(input_error(config, &error).into());
+    }
     // The rows are kept if finish fails.
     on_output(ExperimentOutput::Rows(&rows))?;
-    if let Some(dir) = out {
-        files::write_json_lines(&dir.join(ROWS), &rows).map_err(RunError::from)?;
+    if let (Some(folder), Plan::Experiment { columns, .. }) = (&mut folder, &loaded.plan) {
+        folder.write_rows(&finished, columns)?;
     }
     let finish = take()?.finish(&rows).map_err(RunError::from)?;
     if let Some(text) = &finish.text {
@@ -147,16 +171,23 @@ pub fn run<E: From<RunError>>(
     }
     let base = out.map(Path::to_owned).unwrap_or_default();
     if let Some((reserved, _)) =
-        finish.files.iter().find(|(path, _)| out.is_some() && [RUN, ROWS].contains(&path.as_str()))
+        finish.files.iter().find(|(path, _)| out.is_some() && RESERVED.contains(&path.as_str()))
     {
         let message = format!("finish.files: {reserved} is written by softvt; give another path");
         return Err(config.error(message).into());
     }
     finish.files.iter().try_for_each(|(relative, bytes)| write(config, &base, relative, bytes))?;
-    let outcome = finish.problem.map_or(Ok(()), |problem| Err(config.error(problem)));
-    let Some(dir) = out else { return Ok(outcome?) };
+    Ok(finish.problem.map_or(Ok(()), |problem| Err(config.error(problem)))?)
+}
+
+fn manifest<'a>(
+    config: &'a RunConfig,
+    loaded: &'a LoadedScript,
+    name: &'a str,
+    points: usize,
+) -> ExperimentManifest<'a> {
     let options = loaded.options.iter();
-    let manifest = ExperimentManifest {
+    ExperimentManifest {
         softvt: env!("CARGO_PKG_VERSION"),
         script: &loaded.sources.main,
         experiment: name,
@@ -166,9 +197,7 @@ pub fn run<E: From<RunError>>(
         arguments: &config.options,
         set: &config.settings,
         sources: loaded.sources.bundle.hashes(),
-    };
-    run_manifest::write_new(dir, &manifest)?;
-    Ok(outcome?)
+    }
 }
 
 /// Checks the settings of a run for an experiment without running it.

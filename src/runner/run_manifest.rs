@@ -19,10 +19,7 @@ use softvt_common::files;
 use softvt_dataset::card::ImportedFile;
 use softvt_evaluation::deformation::METRIC_ID;
 use softvt_policy::profile::{GripCode, Profile};
-use softvt_report::{
-    run_folder::{RUN, RunFolder},
-    stored_run,
-};
+use softvt_report::{run_folder::RUN, stored_run};
 
 /// Content of `run.json`.
 #[derive(Serialize)]
@@ -76,6 +73,9 @@ pub(crate) struct RunManifest<'a> {
     tasks: Vec<usize>,
     /// Episodes per task.
     episodes: u32,
+    /// The episodes of each task, if only some are run.
+    #[serde(skip_serializing_if = "<[u32]>::is_empty")]
+    selected_episodes: &'a [u32],
     /// The part of the run, such as 2/8.
     #[serde(skip_serializing_if = "Option::is_none")]
     shard: Option<String>,
@@ -127,6 +127,7 @@ impl<'a> RunManifest<'a> {
             split: run.split.name(),
             tasks: run.jobs.tasks().iter().map(|task| task.id).collect(),
             episodes,
+            selected_episodes: &config.selected_episodes,
             shard: config.shard.map(|shard| shard.to_string()),
             shifts,
             options: options.map(|option| (option.name.clone(), format!("{:?}", option.value))).collect(),
@@ -159,15 +160,16 @@ pub(crate) fn write_new(dir: &Path, manifest: &impl Serialize) -> Result<(), Run
     Ok(files::write_json(&dir.join(RUN), &LocatedManifest { manifest, folder })?)
 }
 
-/// Writes the manifest into a run folder. An existing manifest must be equal.
+/// Writes the manifest into a folder. An existing manifest must be equal.
 ///
 /// # Errors
 /// The file cannot be written, or belongs to another run.
-pub(crate) fn write(folder: &RunFolder, manifest: &impl Serialize) -> Result<(), RunError> {
-    let path = folder.path().join(RUN);
-    let Some(stored) = folder.read(RUN)? else {
-        return write_new(folder.path(), manifest);
-    };
+pub(crate) fn write_or_compare(dir: &Path, manifest: &impl Serialize) -> Result<(), RunError> {
+    let path = dir.join(RUN);
+    if !path.exists() {
+        return write_new(dir, manifest);
+    }
+    let stored = files::read_text(&path)?;
     let path = path.display();
     let mut stored: Value = serde_json::from_str(&stored)
         .map_err(|error| RunError::input(format!("{path} is not a valid run file: {error}")))?;

@@ -9,7 +9,7 @@ use std::{
 
 use assert_cmd::cargo::cargo_bin;
 
-use crate::support::{Project, Small};
+use crate::support::{Project, Small, files};
 
 /// An experiment that squeezes a soft cube with the robot, drops one without it, and draws random numbers.
 const SQUEEZE: &str = r#"local floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 1, 1, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} }
@@ -97,11 +97,23 @@ fn an_experiment_writes_its_rows_and_its_command_line() {
     );
     let printed = project.succeeds("x.lua --json --out run --seed 1 --set robot.gripper.speed=0.01").out;
     assert_eq!(project.text("run/rows.jsonl"), printed);
+    assert!(project.text("run/rows.csv").lines().count() == 4, "{}", project.text("run/rows.csv"));
     assert_eq!(project.json("run/assets/n.json")["n"], 3);
     let run = project.json("run/run.json");
     assert_eq!((&run["experiment"], &run["seed"], &run["script"]), (&"e".into(), &1.into(), &"x.lua".into()));
     assert_eq!(run["set"], serde_json::json!([["robot.gripper.speed", "0.01"]]));
     assert!(project.refusal("x.lua --out run").contains("run already holds a run (run.json)"));
+    let before = files(&project.path("run"));
+    for name in ["rows.jsonl", "rows.csv", "assets/n.json"] {
+        fs::remove_file(project.path("run").join(name)).expect("removed");
+    }
+    let points = project.text("run/points.jsonl");
+    let whole: String = points.split_inclusive('\n').take(1).collect();
+    project.write("run/points.jsonl", format!("{whole}{{\"poi").as_bytes());
+    let other = project.refusal("x.lua --resume --out run --seed 2 --set robot.gripper.speed=0.01");
+    assert!(other.contains("seed: 1 before, 2 now"), "{other}");
+    let resumed = project.succeeds("x.lua --json --resume --out run --seed 1 --set robot.gripper.speed=0.01");
+    assert!(resumed.out == printed && files(&project.path("run")) == before, "{}", resumed.err);
     assert!(project.refusal("report run").contains("run holds an experiment, not a run of a suite"));
 }
 

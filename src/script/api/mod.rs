@@ -12,6 +12,7 @@ pub(crate) mod goals;
 pub(crate) mod image;
 pub(crate) mod joints;
 pub(crate) mod observation;
+pub(crate) mod plots;
 pub(crate) mod policy;
 pub(crate) mod pose;
 pub(crate) mod random;
@@ -126,6 +127,7 @@ pub(crate) fn functions() -> impl Iterator<Item = &'static Function> {
         envelope::FUNCTIONS,
         expert::FUNCTIONS,
         image::FUNCTIONS,
+        plots::FUNCTIONS,
         pose::FUNCTIONS,
         shapes::FUNCTIONS,
     ]

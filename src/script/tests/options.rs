@@ -95,3 +95,29 @@ proptest::proptest! {
         proptest::prop_assert!(error.file.ends_with("x.lua"), "{}", error);
     }
 }
+
+#[test]
+fn plots_are_drawn_or_refused_at_their_line() {
+    let plot = |rest: &str| {
+        format!(
+            "local s = softvt.plot {{ title = 'a', x = {{ label = 'x' }}, y = {{ label = 'y', log = true }}, {rest} }}\n"
+        )
+    };
+    let error = |rest: &str| error_of(&plot(rest));
+    let good = plot(
+        "series = { { label = 'one', points = { { 0, 1 }, { 1, 10 } } } }, levels = { { y = 5, label = 'limit' } }",
+    );
+    let text = error_of(&(good + "error(s:sub(1, 4) .. tostring(s:find('limit', 1, true) ~= nil), 0)"));
+    assert!(text.contains("<svgtrue"), "{text}");
+    let zero = "suites/x.lua:1: plot.y.log: 0 has no logarithm; leave log out, or such values";
+    assert_eq!(error("series = { { points = { { 0, 0 } } } }"), zero);
+    let many = "series = { {points={}}, {points={}}, {points={}}, {points={}}, {points={}}, {points={}}, {points={}} }";
+    assert!(
+        error(many).contains("plot.series: 7 series cannot be told apart; give at most 6"),
+        "{}",
+        error(many)
+    );
+    let nan = error("series = { { points = { { 0 / 0, 1 } } } }");
+    assert!(nan.contains("plot.series[1].points[1]"), "{nan}");
+    assert!(error("series = { { points = { { 1 } } } }").contains("plot.series[1].points[1]"));
+}

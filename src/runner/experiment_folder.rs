@@ -1,0 +1,211 @@
+//! The folder of an experiment: `run.json`, and `points.jsonl` with the parameters and the rows of each finished point,
+//! from which an interrupted experiment continues; at the end `rows.jsonl` and `rows.csv`, and the files of the script.
+//!
+//! The fields of CSV are quoted by hand (RFC 4180 has one rule): a crate would be larger than the function.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::{error::RunError, run_manifest};
+use softvt_common::{
+    files::{self, json_lines, replace},
+    journal::{Journal, whole_lines},
+};
+use softvt_report::run_folder::{RUN, RunFolder, of_folder};
+use softvt_script::ExperimentRow;
+
+/// The finished points, one JSON object per line.
+const POINTS: &str = "points.jsonl";
+/// The rows of all points, one JSON object per line.
+pub(crate) const ROWS: &str = "rows.jsonl";
+/// The same as a table, with the parameters of the points.
+const TABLE: &str = "rows.csv";
+
+/// Files that softvt writes: the script cannot.
+pub(crate) const RESERVED: [&str; 4] = [RUN, POINTS, ROWS, TABLE];
+
+/// A finished point.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct FinishedPoint {
+    /// Its number.
+    pub point: usize,
+    /// What the script calls the point: its parameters.
+    pub parameters: Value,
+    pub rows: Vec<ExperimentRow>,
+}
+
+/// The folder of an experiment in progress.
+pub(crate) struct ExperimentFolder {
+    dir: PathBuf,
+    points: Journal,
+}
+
+impl ExperimentFolder {
+    /// Creates the folder.
+    ///
+    /// # Errors
+    /// It holds something, or cannot be written to.
+    pub(crate) fn create(dir: &Path, manifest: &impl Serialize) -> Result<Self, RunError> {
+        RunFolder::check_new(dir)?;
+        files::create_folder(dir)?;
+        let points = Journal::create(&dir.join(POINTS)).map_err(of_folder(dir, POINTS))?;
+        run_manifest::write_new(dir, manifest)?;
+        Ok(Self { dir: dir.into(), points })
+    }
+
+    /// Opens the folder of the same experiment, and returns its finished points by number.
+    ///
+    /// # Errors
+    /// It holds another experiment or something else, another process uses it, or a line is not a point.
+    pub(crate) fn resume(
+        dir: &Path,
+        manifest: &impl Serialize,
+    ) -> Result<(Self, BTreeMap<usize, FinishedPoint>), RunError> {
+        let path = dir.join(POINTS);
+        if !path.exists() {
+            return Ok((Self::create(dir, manifest)?, BTreeMap::new()));
+        }
+        let (mut points, bytes) = Journal::resume(&path).map_err(of_folder(dir, POINTS))?;
+        run_manifest::write_or_compare(dir, manifest)?;
+        let finished = whole_lines(&bytes).map(|(line, text)| {
+            let point: FinishedPoint = serde_json::from_slice(text)
+                .map_err(|error| RunError::input(format!("{}:{line}: {error}", path.display())))?;
+            Ok((point.point, point))
+        });
+        let finished = finished.collect::<Result<_, RunError>>()?;
+        points.keep_whole_lines(&bytes)?;
+        Ok((Self { dir: dir.into(), points }, finished))
+    }
+
+    /// Adds a finished point.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(crate) fn add(&mut self, point: &FinishedPoint) -> Result<(), RunError> {
+        Ok(self.points.append(&json_lines(&self.dir.join(POINTS), [point])?)?)
+    }
+
+    /// Removes the files of an experiment without a finished point, and the folder if it is empty then.
+    ///
+    /// # Errors
+    /// A file cannot be removed.
+    pub(crate) fn discard(self) -> Result<(), RunError> {
+        for name in [RUN, POINTS] {
+            files::remove_if_present(&self.dir.join(name))?;
+        }
+        files::remove_empty_folders(&[self.dir]);
+        Ok(())
+    }
+
+    /// Writes the rows of all points, in their order.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub(crate) fn write_rows(
+        &mut self,
+        points: &[FinishedPoint],
+        columns: &[String],
+    ) -> Result<(), RunError> {
+        self.points.replace(&json_lines(&self.dir.join(POINTS), points)?)?;
+        let rows = points.iter().flat_map(|point| &point.rows);
+        files::write_json_lines(&self.dir.join(ROWS), rows)?;
+        Ok(replace(&self.dir.join(TABLE), csv(points, columns))?)
+    }
+}
+
+/// The rows as CSV: the parameters of the points that are not columns of the rows too, then the columns, in the given
+/// order or sorted, and the others.
+fn csv(points: &[FinishedPoint], columns: &[String]) -> String {
+    let rows = || points.iter().flat_map(|point| &point.rows);
+    let of_rows: BTreeSet<&String> = rows().flat_map(|row| row.keys()).collect();
+    let parameters =
+        points.iter().filter_map(|point| point.parameters.as_object()).flat_map(|all| all.keys());
+    let parameters: BTreeSet<&String> = parameters.filter(|name| !of_rows.contains(name)).collect();
+    let named: Vec<&String> = columns.iter().filter(|name| of_rows.contains(name)).collect();
+    let others = of_rows.iter().copied().filter(|name| !named.contains(name));
+    let names: Vec<&String> = parameters.into_iter().chain(named.iter().copied()).chain(others).collect();
+    let line = |fields: Vec<String>| fields.join(",") + "\n";
+    let mut text = line(names.iter().map(|name| quoted((*name).clone())).collect());
+    for point in points {
+        for row in &point.rows {
+            let value = |name: &&String| row.get(*name).or_else(|| point.parameters.get(*name));
+            text += &line(names.iter().map(|name| field(value(name))).collect());
+        }
+    }
+    text
+}
+
+/// A value as a field: text as it is, nothing for null, and lists and tables as JSON.
+fn field(value: Option<&Value>) -> String {
+    match value {
+        None | Some(Value::Null) => String::new(),
+        Some(Value::String(text)) => quoted(text.clone()),
+        Some(other) => quoted(other.to_string()),
+    }
+}
+
+/// A field in quotation marks where it has to be.
+fn quoted(text: String) -> String {
+    match text.contains([',', '"', '\n', '\r']) {
+        true => format!("\"{}\"", text.replace('"', "\"\"")),
+        false => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn point(number: usize, parameters: Value, rows: Value) -> FinishedPoint {
+        let point = json!({ "point": number, "parameters": parameters, "rows": rows });
+        serde_json::from_value(point).expect("a point")
+    }
+
+    #[test]
+    fn a_table_has_the_parameters_of_the_points_and_quotes_what_it_must() {
+        let points = [
+            point(0, json!({ "gap": 42, "kind": "a" }), json!([{ "d": 0.5, "kind": "a, b" }])),
+            point(
+                1,
+                json!({ "gap": 48, "kind": "b" }),
+                json!([{ "d": 1.5, "note": "5 \"mm\"" }, { "list": [1, 2] }]),
+            ),
+        ];
+        let text = "gap,d,kind,list,note\n42,0.5,\"a, b\",,\n48,1.5,b,,\"5 \"\"mm\"\"\"\n48,,b,\"[1,2]\",\n";
+        assert_eq!(csv(&points, &[]), text);
+        let ordered = csv(&points, &["note".to_owned(), "absent".to_owned(), "d".to_owned()]);
+        assert!(ordered.starts_with("gap,note,d,kind,list\n"), "{ordered}");
+    }
+
+    #[test]
+    fn an_interrupted_experiment_keeps_its_points() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let (dir, manifest) = (dir.path().join("e"), json!({ "experiment": "e", "seed": 0 }));
+        let second = point(1, json!({ "gap": 1 }), json!([{ "d": 2 }]));
+        let mut folder = ExperimentFolder::create(&dir, &manifest).expect("created");
+        folder.add(&second).expect("written");
+        assert!(ExperimentFolder::resume(&dir, &manifest).is_err(), "another process uses it");
+        drop(folder);
+        assert!(ExperimentFolder::create(&dir, &manifest).is_err());
+        let other = ExperimentFolder::resume(&dir, &json!({ "experiment": "e", "seed": 1 }));
+        assert!(other.err().expect("refused").to_string().contains("seed: 0 before, 1 now"));
+        let path = dir.join(POINTS);
+        let whole = std::fs::read(&path).expect("read");
+        std::fs::write(&path, [&whole[..], b"{\"poi"].concat()).expect("written");
+        let (mut folder, finished) = ExperimentFolder::resume(&dir, &manifest).expect("resumed");
+        assert_eq!(finished, BTreeMap::from([(1, second.clone())]));
+        let first = point(0, json!({ "gap": 0 }), json!([]));
+        folder.add(&first).expect("written");
+        folder.write_rows(&[first, second], &[]).expect("written");
+        let text = |name: &str| std::fs::read_to_string(dir.join(name)).expect("read");
+        assert!(text(POINTS).starts_with("{\"point\":0,") && text(POINTS).lines().count() == 2);
+        assert_eq!((text(ROWS).as_str(), text(TABLE).as_str()), ("{\"d\":2}\n", "gap,d\n1,2\n"));
+    }
+}
