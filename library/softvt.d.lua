@@ -17,7 +17,8 @@
 
 ---A task of a suite.
 ---@class softvt.Task
----@field prompt string Instruction for the policy.
+---@field prompt string Instruction for the policy, and name of the task in results.
+---@field episode_prompt? fun(scene: softvt.Scene, rng: softvt.Rng): string Returns the prompt of an episode, given its initial scene: for prompts that name what was drawn, as the larger of two objects or the side of the plate. It must not change the scene. Shifts come after it.
 ---@field layout softvt.Layout Initial scene.
 ---@field goal softvt.Goal Success criterion.
 ---@field object? string Scene name of the object whose deformation and grip the records hold; by default the first that the goal names. A goal of joints or functions alone needs it.
@@ -361,6 +362,30 @@
 ---@field width integer Width, pixels. Expects a whole number in 1..8192.
 ---@field height integer Height, pixels. Expects a whole number in 1..8192.
 ---@field colour number[] Colour. Expects a list of 3 numbers (sRGB of 0 to 255).
+
+---Returns a plot as SVG, for the files of an experiment: `softvt.plot { title = "…", x = { label = "gap, mm" }, y = { label = "D, %" }, series = { { label = "bun", points = { { 40, 0.1 }, { 38, 0.4 } } } } }`.
+---@class softvt.Plot
+---@field title string Title.
+---@field x softvt.PlotAxis Horizontal axis.
+---@field y softvt.PlotAxis Vertical axis.
+---@field series softvt.PlotSeries[] The series, at most six.
+---@field levels? softvt.PlotLevel[] Horizontal lines, such as limits.
+
+---An axis of a plot.
+---@class softvt.PlotAxis
+---@field label string Title, with the unit.
+---@field log? boolean True for a logarithmic axis, whose values must be positive. Default false.
+
+---Values of a plot that belong together.
+---@class softvt.PlotSeries
+---@field label? string Name beside the last point.
+---@field points number[][] Points { x, y }, in the order in which a line joins them.
+---@field line? boolean False for points without a line. Default true.
+
+---A horizontal line of a plot.
+---@class softvt.PlotLevel
+---@field y number Its value. Expects a number.
+---@field label? string Text on it.
 
 ---Returns a pose in the world frame: `softvt.pose { position = { 0.4, 0, 0.2 }, yaw = math.pi / 2 }`. Without a quaternion the hand points straight down.
 ---@class softvt.PoseSpec
@@ -1833,6 +1858,11 @@ function softvt.instances(suite) end
 ---@param spec softvt.NewImage
 ---@return softvt.Image
 function softvt.image(spec) end
+
+---Returns a plot as SVG, for the files of an experiment: `softvt.plot { title = "…", x = { label = "gap, mm" }, y = { label = "D, %" }, series = { { label = "bun", points = { { 40, 0.1 }, { 38, 0.4 } } } } }`.
+---@param spec softvt.Plot
+---@return string
+function softvt.plot(spec) end
 
 ---Returns a pose in the world frame: `softvt.pose { position = { 0.4, 0, 0.2 }, yaw = math.pi / 2 }`. Without a quaternion the hand points straight down.
 ---@param spec softvt.PoseSpec

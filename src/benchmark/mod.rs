@@ -67,8 +67,11 @@ pub enum NeededKnowledge {
 pub struct Task {
     /// Index in the suite.
     pub id: usize,
-    /// The instruction to the policy.
+    /// The instruction to the policy, and the name of the task in results.
     pub prompt: String,
+    /// True if each episode has a prompt of its own.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub prompt_varies: bool,
     /// Name of the layout; tasks that share it share initial states.
     pub layout: String,
     /// Condition of Goal Success, judged at every control step.

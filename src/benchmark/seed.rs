@@ -40,11 +40,13 @@ pub enum RandomStream {
     Disturbance,
     /// Properties of objects that do not show.
     Hidden,
+    /// Choices of the prompt of an episode.
+    Prompt,
 }
 
 impl RandomStream {
     /// Every stream with the name that scripts use.
-    const NAMES: [(Self, &str); 13] = [
+    const NAMES: [(Self, &str); 14] = [
         (Self::Layout, "layout"),
         (Self::Arm, "arm"),
         (Self::Material, "material"),
@@ -58,6 +60,7 @@ impl RandomStream {
         (Self::Policy, "policy"),
         (Self::Disturbance, "disturbance"),
         (Self::Hidden, "hidden"),
+        (Self::Prompt, "prompt"),
     ];
 
     /// The stream of this name in scripts.

@@ -16,8 +16,8 @@ use softvt_policy::{profile::GripCode, remote::ServerProtocol};
 use softvt_records::requirement::Requirement;
 use softvt_report::stored_run::{self, StoredRun};
 use softvt_runner::{
-    ConfiguredScript, PolicyConfig, PolicyOptions, PolicySource, RunConfig, Shard, TraceDetail,
-    VideoSelection, parse_profile, read_secret, recording::RecordingOptions, selection::select_tasks,
+    ConfiguredScript, EpisodeFilter, PolicyConfig, PolicyOptions, PolicySource, RunConfig, Shard,
+    TraceDetail, parse_profile, read_secret, recording::RecordingOptions, selection::select_tasks,
 };
 use softvt_script::STANDARD_VARIATION;
 
@@ -63,6 +63,9 @@ pub(crate) struct RunFlags {
     /// Episodes per task [default: set by the suite]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..))]
     pub episodes: Option<u32>,
+    /// Run only these episodes of each task, counted from 0, separated by commas
+    #[arg(long = "episode", value_name = "K", value_delimiter = ',', conflicts_with_all = ["episodes", "shard"])]
+    pub selected_episodes: Vec<u32>,
     /// Number of threads; results do not depend on it [default: number of processors]
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
@@ -71,7 +74,10 @@ pub(crate) struct RunFlags {
     pub trace: Option<TraceDetail>,
     /// Render videos of unsafe episodes; =all for all, =0,3 for these episodes of each task
     #[arg(long, value_name = "WHICH", num_args = 0..=1, require_equals = true, default_missing_value = "failed")]
-    pub video: Option<VideoSelection>,
+    pub video: Option<EpisodeFilter>,
+    /// Write unsafe episodes as MCAP files for Foxglove and Rerun; =all for all, =0,3 for these episodes of each task
+    #[arg(long, value_name = "WHICH", num_args = 0..=1, require_equals = true, default_missing_value = "failed")]
+    pub mcap: Option<EpisodeFilter>,
     /// Output folder; must not already contain a run [default: the next runs/<suite>-<policy>-NNN]
     #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     pub out: Option<PathBuf>,
@@ -98,10 +104,12 @@ impl RunFlags {
         RunConfig {
             tasks: self.tasks,
             episodes: self.episodes,
+            selected_episodes: self.selected_episodes,
             shard: self.shard,
             threads: self.threads,
             trace: self.trace,
             video: self.video,
+            mcap: self.mcap,
             out: self.out,
             resume: self.resume,
             ..config

@@ -54,6 +54,7 @@ impl<E: Error + 'static> From<E> for CliError {
 pub(crate) fn flag_of(field: &str) -> String {
     let name = match field {
         "tasks" => "task",
+        "selected_episodes" => "episode",
         "settings" => "set",
         "shifts" => "shift",
         "requirements" => "require",

@@ -71,7 +71,7 @@ struct Effect {
 
 /// Every flag of the [`COMMANDS`].
 static EFFECTS: [Effect; 3] = [
-    Effect { flags: &["seed", "settings", "threads", "out", "json"], acts_on: ALL },
+    Effect { flags: &["seed", "settings", "threads", "out", "resume", "json"], acts_on: ALL },
     Effect {
         flags: &[
             "shifts",
@@ -87,10 +87,11 @@ static EFFECTS: [Effect; 3] = [
             "name",
             "tasks",
             "episodes",
+            "selected_episodes",
             "shard",
             "trace",
             "video",
-            "resume",
+            "mcap",
             "details",
         ],
         acts_on: EPISODES,
@@ -161,9 +162,10 @@ mod tests {
         ("gripper", "--gripper binary"),
         ("tasks", "--task 0"),
         ("episodes", "--episodes 1"),
+        ("selected_episodes", "--episode 1"),
         ("trace", "--trace"),
         ("video", "--video"),
-        ("resume", "--resume --out OUT"),
+        ("mcap", "--mcap"),
         ("shard", "--shard 1/2"),
         ("requirements", "--require safety>=0"),
         ("details", "--details"),

@@ -22,6 +22,9 @@ pub struct EpisodeHeader {
     pub id: EpisodeId,
     /// Instruction given to the policy.
     pub prompt: String,
+    /// Prompt of the task, where each episode has a prompt of its own.
+    #[serde(default)]
+    pub task_prompt: Option<String>,
     /// Name of the layout.
     pub layout: String,
     /// Name of the policy.
@@ -39,6 +42,13 @@ pub struct EpisodeHeader {
     pub origin: Option<Box<DemonstrationOrigin>>,
 }
 
+impl EpisodeHeader {
+    /// Prompt of the task, which names it in results.
+    pub fn task_prompt(&self) -> &str {
+        self.task_prompt.as_ref().unwrap_or(&self.prompt)
+    }
+}
+
 impl Serialize for EpisodeHeader {
     /// Writes the keys in the order of the result files, in which those of the id are not adjacent.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -47,6 +57,9 @@ impl Serialize for EpisodeHeader {
         map.serialize_entry("suite", suite)?;
         map.serialize_entry("task", task)?;
         map.serialize_entry("prompt", &self.prompt)?;
+        if let Some(prompt) = &self.task_prompt {
+            map.serialize_entry("task_prompt", prompt)?;
+        }
         map.serialize_entry("layout", &self.layout)?;
         map.serialize_entry("episode", episode)?;
         map.serialize_entry("seed", base_seed)?;

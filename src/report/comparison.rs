@@ -107,10 +107,10 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
         return Err(no_common_episode(first, second));
     }
     let task = |pairs: &[EpisodePair]| {
-        let EpisodeHeader { id, prompt, asset, .. } = &pairs[0].first.header;
+        let header @ EpisodeHeader { id, asset, .. } = &pairs[0].first.header;
         let differences = PairedComparison::from_pairs(pairs);
         let (suite, asset) = (id.suite.clone(), asset.clone());
-        TaskDifferences { suite, task: id.task, prompt: prompt.clone(), asset, differences }
+        TaskDifferences { suite, task: id.task, prompt: header.task_prompt().to_owned(), asset, differences }
     };
     let all = || first.iter().chain(second);
     Ok(Comparison {

@@ -91,6 +91,7 @@ impl EpisodeSpec {
         let header = EpisodeHeader {
             id,
             prompt: task.prompt.clone(),
+            task_prompt: None,
             layout: task.layout.clone(),
             policy: policy.to_owned(),
             privileged: false,

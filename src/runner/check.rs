@@ -1,10 +1,10 @@
-//! [`SuiteChecker`]: the first scenes and the limits of a suite, without an episode.
+//! [`SuiteChecker`]: the scenes of the first episodes and the limits of a suite, without an episode.
 
 use std::{collections::BTreeSet, path::PathBuf};
 
 use crate::{
     config::{ConfiguredScript, RunConfig},
-    episode_list::EpisodeList,
+    episode_list::{EpisodeJob, EpisodeList},
     error::RunError,
     scene_pool::ScenePool,
     selection::select_episodes,
@@ -31,12 +31,13 @@ impl<'a> SuiteChecker<'a> {
         Self { config, script, scenes: ScenePool::new(script), assets, sensor_assets }
     }
 
-    /// Builds and checks the first scene of every task on all processors, gives their warnings to `warn`, and reads the
-    /// limits of their objects. Nothing is rendered; a scene settles only if its goal may hold at the start.
+    /// Builds and checks the scenes of the first episodes of every task on all processors, gives their warnings to
+    /// `warn`, and reads the limits of their objects. Nothing is rendered; a scene settles only if its goal may hold at
+    /// the start.
     ///
     /// # Errors
     /// A setting, a scene, a sensor or a calibration file that is not valid; a request to stop.
-    pub fn check(&self, suite: &Suite, warn: impl FnMut(String)) -> Result<(), RunError> {
+    pub fn check(&self, suite: &Suite, episodes: u32, warn: impl FnMut(String)) -> Result<(), RunError> {
         self.config.observer.work(&format!("checking {}", suite.name));
         let tasks: Vec<&Task> = suite.tasks.iter().collect();
         // Without episodes, a run whose actions are repeated may have fewer of them than the suite.
@@ -46,7 +47,8 @@ impl<'a> SuiteChecker<'a> {
             sensor_assets: self.sensor_assets.clone(),
             ..SuiteRun::new(self.config, self.script, suite, none, PathBuf::new())?
         };
-        let warnings = check_first_scenes(&run, &self.scenes, &tasks)?;
+        let jobs = EpisodeList::of_tasks(&tasks, episodes, None);
+        let warnings = check_scenes(&run, &self.scenes, &jobs)?;
         self.config.observer.end();
         warnings.into_iter().for_each(warn);
         SuiteRun { jobs: select_episodes(self.config, suite, &tasks), ..run }.scan_limits(&self.scenes)?;
@@ -54,21 +56,28 @@ impl<'a> SuiteChecker<'a> {
     }
 }
 
-fn check_first_scenes(
+fn check_scenes(
     run: &SuiteRun,
     scenes: &ScenePool,
-    tasks: &[&Task],
+    jobs: &EpisodeList,
 ) -> Result<BTreeSet<String>, RunError> {
     let mut warnings = BTreeSet::new();
-    let check = |job: usize| -> Result<BTreeSet<String>, RunError> {
-        let task = tasks[job];
-        let setup = scenes.with(|builder| builder.build(&run.episode_id(task, 0), &run.changes()))??;
+    let check_scene = |EpisodeJob { task, episode }: EpisodeJob| -> Result<BTreeSet<String>, RunError> {
+        let setup =
+            scenes.with(|builder| builder.build(&run.episode_id(task, episode), &run.changes()))??;
         let mut warnings = scene_warnings(task, &setup.scene, &run.assets);
         let of_task = |warning: String| format!("task {}: {warning}", task.id);
-        warnings.extend(run.check_scene(task, setup.scene, setup.predicates)?.map(of_task));
+        warnings.extend(run.check_scene(task, episode, setup.scene, setup.predicates)?.map(of_task));
         Ok(warnings)
     };
-    parallel::run(tasks.len(), run.config.thread_count(), cancel::requested, check, |_, found| {
+    let check = |position: usize| {
+        let job = jobs.job(position);
+        check_scene(job).map_err(|error| match job.episode {
+            0 => error,
+            episode => error.within(&format!("task {} episode {episode}", job.task.id)),
+        })
+    };
+    parallel::run(jobs.len(), run.config.thread_count(), cancel::requested, check, |_, found| {
         warnings.extend(found);
         Ok(())
     })?;

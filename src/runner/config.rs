@@ -1,6 +1,7 @@
 //! [`RunConfig`]: the script of a run, changes of its scenes, policy, episodes and output.
 
 use std::{
+    collections::BTreeSet,
     fmt,
     io::{ErrorKind, Read},
     path::{Path, PathBuf},
@@ -9,7 +10,7 @@ use std::{
 };
 
 use crate::{
-    episode_artifacts::VideoSelection,
+    episode_artifacts::EpisodeFilter,
     error::RunError,
     observer::{JobList, Observer, SilentObserver},
     policy::PolicyConfig,
@@ -126,6 +127,8 @@ pub struct RunConfig {
     pub tasks: Vec<String>,
     /// Episodes per task; by default the number that the suite states.
     pub episodes: Option<u32>,
+    /// Only these episodes of each task; empty for the first [`episodes`](Self::episodes).
+    pub selected_episodes: Vec<u32>,
     /// The part of the episodes to run; by default all.
     pub shard: Option<Shard>,
     /// Number of threads; results do not depend on it. By default that of the processors.
@@ -133,7 +136,9 @@ pub struct RunConfig {
     /// Detail of the recorded control steps; by default none are recorded.
     pub trace: Option<TraceDetail>,
     /// Episodes that become videos.
-    pub video: Option<VideoSelection>,
+    pub video: Option<EpisodeFilter>,
+    /// Episodes that become MCAP files.
+    pub mcap: Option<EpisodeFilter>,
     /// Folder of the results. Without one, a [`Runner`](super::Runner) writes nothing.
     pub out: Option<PathBuf>,
     /// True to continue an interrupted run in the output folder.
@@ -158,10 +163,12 @@ impl Default for RunConfig {
             policy: PolicyConfig::default(),
             tasks: Vec::new(),
             episodes: None,
+            selected_episodes: Vec::new(),
             shard: None,
             threads: None,
             trace: None,
             video: None,
+            mcap: None,
             out: None,
             resume: false,
             stored_scripts: None,
@@ -290,9 +297,20 @@ impl RunConfig {
         JobList::begin(&*self.observer, what)
     }
 
-    /// Episodes per task of a suite.
+    /// Number of episodes per task of a suite.
     pub fn episodes_of(&self, suite: &Suite) -> u32 {
-        self.episodes.unwrap_or(suite.episodes)
+        match &self.selected_episodes[..] {
+            [] => self.episodes.unwrap_or(suite.episodes),
+            selected => selected.iter().collect::<BTreeSet<_>>().len() as u32,
+        }
+    }
+
+    /// True if an episode of each task of a suite is run.
+    pub(crate) fn runs_episode(&self, suite: &Suite, episode: u32) -> bool {
+        match &self.selected_episodes[..] {
+            [] => episode < self.episodes_of(suite),
+            selected => selected.contains(&episode),
+        }
     }
 
     /// Name of a suite in results. It has a suffix if `vary` or the rigid twin changes the objects, whose places stay.

@@ -179,6 +179,7 @@ mod tests {
         let goal = Goal::On(Placement { object: "a".to_owned(), target: "b".to_owned(), hold_s: 0.4 });
         let task = |id| Task {
             id,
+            prompt_varies: false,
             prompt: "move".to_owned(),
             layout: "one".to_owned(),
             goal: goal.clone(),

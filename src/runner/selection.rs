@@ -3,7 +3,10 @@
 use std::{collections::BTreeSet, path::PathBuf};
 
 use crate::{
-    config::RunConfig, episode_artifacts::VideoSelection, episode_list::EpisodeList, error::RunError,
+    config::RunConfig,
+    episode_artifacts::EpisodeFilter,
+    episode_list::{EpisodeJob, EpisodeList},
+    error::RunError,
     suite_run::find_replay_source,
 };
 use softvt_benchmark::{Plan, Suite, Task};
@@ -73,10 +76,16 @@ pub fn select_tasks<'a>(config: &RunConfig, suite: &'a Suite) -> Result<Vec<&'a 
     Ok(selected)
 }
 
-/// All episodes of the tasks, or those of the shard.
+/// All episodes of the tasks, or those that are selected, or those of the shard.
 pub fn select_episodes<'a>(config: &RunConfig, suite: &Suite, tasks: &[&'a Task]) -> EpisodeList<'a> {
-    let episodes = config.episodes_of(suite);
-    EpisodeList::of_tasks(tasks, episodes, config.shard)
+    let selected: BTreeSet<u32> = config.selected_episodes.iter().copied().collect();
+    if selected.is_empty() {
+        return EpisodeList::of_tasks(tasks, config.episodes_of(suite), config.shard);
+    }
+    let jobs = |task: &&'a Task| {
+        selected.iter().map(move |episode| EpisodeJob { task, episode: *episode }).collect::<Vec<_>>()
+    };
+    EpisodeList::listed(tasks.iter().flat_map(jobs).collect())
 }
 
 /// Checks that every suite gets an output folder of its own.
@@ -131,7 +140,8 @@ pub fn next_run_dir(config: &RunConfig, name: &str) -> PathBuf {
 /// The first suite that lacks an episode.
 pub(crate) fn check_episodes(config: &RunConfig, suites: &[Suite]) -> Result<(), RunError> {
     for suite in suites {
-        check_video_episodes(config, suite)?;
+        check_filter(config, suite, "video", config.video.as_ref())?;
+        check_filter(config, suite, "mcap", config.mcap.as_ref())?;
     }
     for suite in suites.iter().filter(|_| config.policy.is_recorded()) {
         let jobs = select_episodes(config, suite, &select_tasks(config, suite)?);
@@ -140,17 +150,26 @@ pub(crate) fn check_episodes(config: &RunConfig, suites: &[Suite]) -> Result<(),
     Ok(())
 }
 
-fn check_video_episodes(config: &RunConfig, suite: &Suite) -> Result<(), RunError> {
-    let Some(VideoSelection::Episodes(selected)) = &config.video else { return Ok(()) };
-    let episodes = config.episodes_of(suite);
-    let Some(beyond) = selected.iter().find(|episode| **episode >= episodes) else { return Ok(()) };
-    let available = match episodes {
-        1 => "only episode 0".to_owned(),
-        count => format!("episodes 0 to {}", count.saturating_sub(1)),
+/// Checks the episodes that `filter`, the value of `setting`, selects.
+fn check_filter(
+    config: &RunConfig,
+    suite: &Suite,
+    setting: &'static str,
+    filter: Option<&EpisodeFilter>,
+) -> Result<(), RunError> {
+    let Some(EpisodeFilter::Episodes(selected)) = filter else { return Ok(()) };
+    let Some(beyond) = selected.iter().find(|episode| !config.runs_episode(suite, **episode)) else {
+        return Ok(());
     };
-    let message = format!(
-        "suite {} runs {available} of each task; select one of them, or raise the number of episodes",
-        suite.name
-    );
-    Err(config.error_of("video", beyond, message))
+    let available = match (&config.selected_episodes[..], config.episodes_of(suite)) {
+        ([], 1) => "only episode 0".to_owned(),
+        ([], count) => format!("episodes 0 to {}", count.saturating_sub(1)),
+        (selected, _) => {
+            let list: Vec<String> = selected.iter().map(u32::to_string).collect();
+            format!("only episode {}", list.join(", "))
+        }
+    };
+    let message =
+        format!("suite {} runs {available} of each task; select one of them, or run others", suite.name);
+    Err(config.error_of(setting, beyond, message))
 }

@@ -145,7 +145,7 @@ impl<'a> SuiteRun<'a> {
             assets: AssetCache::default(),
             sensor_assets: SensorAssets::default(),
             out,
-            renders_episodes: config.video.is_some(),
+            renders_episodes: config.video.is_some() || config.mcap.is_some(),
             records_trace: config.trace.is_some(),
             split,
             controllers: config.policy.controller_factory(
@@ -301,8 +301,13 @@ impl<'a> SuiteRun<'a> {
 
     /// Files of the episodes, other than their lines in `episodes.jsonl`.
     pub(crate) fn artifacts(&self) -> EpisodeArtifacts<'_> {
-        let RunConfig { trace, video, .. } = self.config;
-        EpisodeArtifacts { dir: &self.out, trace: trace.is_some(), video: video.as_ref() }
+        let RunConfig { trace, video, mcap, .. } = self.config;
+        EpisodeArtifacts {
+            dir: &self.out,
+            trace: trace.is_some(),
+            video: video.as_ref(),
+            mcap: mcap.as_ref(),
+        }
     }
 
     /// Runs one episode, from the start of its foreign demonstration if it has one. With `keep_states` the
@@ -388,10 +393,12 @@ impl<'a> SuiteRun<'a> {
         self.calibration_files.report(id.index(), &limits);
         let id = EpisodeId { suite: self.name.clone(), ..id.clone() };
         let (policy, scene) = (&self.config.policy.name, opened.scene.clone());
+        let task_prompt = task.prompt_varies.then(|| task.prompt.clone());
         let task = &Task { prompt: opened.prompt.clone(), ..task.clone() };
         let mut spec = EpisodeSpec::new(id, policy, task, &opened.nominal, scene, &self.settings);
         spec.secret.clone_from(&self.config.secret);
         spec.predicates.clone_from(&opened.predicates);
+        spec.header.task_prompt = task_prompt;
         spec.header.privileged = self.is_privileged();
         spec.header.variation = opened.variation.clone().map(Box::new);
         spec.header.origin = origin.cloned().map(Box::new);
@@ -471,7 +478,7 @@ impl<'a> SuiteRun<'a> {
         for task in self.jobs.tasks() {
             let first = self.jobs.episodes_of(task.id).next().unwrap_or(0);
             let opened = self.open_episode(&self.episode_id(task, first))?;
-            has_changed |= opened.scene != opened.nominal || opened.prompt != task.prompt;
+            has_changed |= opened.scene != opened.nominal || opened.prompt != opened.nominal_prompt;
             self.check_object_type(task, &opened.nominal)?;
             let scene = Arc::new(opened.scene.clone());
             self.check_declared_cameras(&scene, task)?;
@@ -509,7 +516,7 @@ impl<'a> SuiteRun<'a> {
         }
     }
 
-    /// Checks the first scene of a task as far as it can be checked before anything moves. It settles only if
+    /// Checks the scene of an episode as far as it can be checked before anything moves. It settles only if
     /// the goal may hold at the start. Returns a warning about its cost.
     ///
     /// # Errors
@@ -517,13 +524,14 @@ impl<'a> SuiteRun<'a> {
     pub fn check_scene(
         &self,
         task: &Task,
+        episode: u32,
         scene: Scene,
         predicates: Vec<Arc<dyn StatePredicate>>,
     ) -> Result<Option<String>, RunError> {
         self.check_object_type(task, &scene)?;
         let scene = Arc::new(scene);
         let settings = &self.settings;
-        let sense = |source| EpisodeError::Sense { task: task.id, episode: 0, source };
+        let sense = |source| EpisodeError::Sense { task: task.id, episode, source };
         let check = || -> Result<Option<String>, EpisodeError> {
             check_sensors(&scene, &settings.tactile, &self.sensor_assets).map_err(sense)?;
             let sim = Simulation::new(scene.clone(), &settings.physics, &settings.robot, &self.assets)?;
@@ -531,7 +539,7 @@ impl<'a> SuiteRun<'a> {
             if check_goal(task, &sim, &self.assets, &predicates)? {
                 // Whether it holds is known once the scene has settled, with masses and contacts that are not
                 // approximate.
-                let id = self.episode_id(task, 0);
+                let id = self.episode_id(task, episode);
                 let spec = EpisodeSpec::new(id, "noop", task, &scene, Scene::clone(&scene), settings);
                 let spec = EpisodeSpec { predicates: predicates.clone(), ..spec };
                 Episode::start(spec, &AssetCache::default(), &self.sensor_assets)?;

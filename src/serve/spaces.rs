@@ -6,6 +6,7 @@ use std::{collections::BTreeSet, f64::consts::PI};
 use rmpv::Value;
 
 use super::config::ServerConfig;
+use softvt_common::text::MAX_TEXT_BYTES;
 use softvt_policy::{
     Observation,
     encode::{ObservationEntry, content},
@@ -67,11 +68,16 @@ pub(super) fn action(encoding: &ActionEncoding, effort_n: f64) -> Value {
     array_space("<f8", &[ACTION_LEN], low, high)
 }
 
-/// Space of the prompts: the length of the longest one and all characters in use.
+/// Space of the prompts: the length of the longest one and all characters in use. Prompts that differ between the
+/// episodes of a task have at most [`MAX_TEXT_BYTES`] printable characters of ASCII, or of the others in use.
 fn text(config: &ServerConfig) -> Value {
-    let prompts = config.suites.iter().flat_map(|suite| &suite.tasks).map(|task| task.prompt.as_str());
-    let longest = prompts.clone().map(|prompt| prompt.chars().count()).max().unwrap_or(0);
-    let characters: BTreeSet<char> = prompts.flat_map(str::chars).collect();
+    let tasks = || config.suites.iter().flat_map(|suite| &suite.tasks);
+    let mut longest = tasks().map(|task| task.prompt.chars().count()).max().unwrap_or(0);
+    let mut characters: BTreeSet<char> = tasks().flat_map(|task| task.prompt.chars()).collect();
+    if tasks().any(|task| task.prompt_varies) {
+        longest = MAX_TEXT_BYTES;
+        characters.extend(' '..='~');
+    }
     map([("max_length", longest.into()), ("charset", String::from_iter(characters).into())])
 }
 

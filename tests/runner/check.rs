@@ -167,3 +167,14 @@ fn a_scene_of_too_many_nodes_is_refused_with_its_cost() {
     let both = refusal(&project);
     assert!(both.starts_with("x.lua:7: the soft bodies of the scene have 48778 nodes"), "{both}");
 }
+
+#[test]
+fn scenes_of_later_episodes_are_checked_on_request() {
+    let text = Small::default()
+        .text()
+        .replace("(scene)\n", "(scene, rng) assert(rng:uniform(0, 1) < 0.7, 'no place')\n");
+    let project = Project::new(&[("x.lua", &text)]);
+    assert!(project.run("x.lua").check().is_ok(), "the first scene is good");
+    let message = project.message(project.run("x.lua").episodes(20).check());
+    assert_snapshot!(message, @"x.lua:4: no place (task 0 episode 2)");
+}

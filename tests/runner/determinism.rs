@@ -1,8 +1,8 @@
 //! Equal runs give byte-identical results.
 
-use softvt::runner::TraceDetail;
+use softvt::runner::{EpisodeFilter, RunConfig, TraceDetail};
 
-use crate::support::{Project, SPATIAL_SOFT};
+use crate::support::{Project, SPATIAL_SOFT, Small};
 
 #[test]
 fn episodes_are_byte_identical_for_any_threads() {
@@ -39,4 +39,20 @@ fn another_seed_gives_other_episodes() {
         run.seed(seed).record().stats.state_hash
     };
     assert_ne!(hash(0), hash(1));
+}
+
+#[test]
+fn selected_episodes_are_those_of_a_whole_run() {
+    let project = Small::default().project();
+    let whole = project.run("x.lua").episodes(4).records();
+    let selected =
+        |numbers: &[u32]| project.run("x.lua").with(|config| config.selected_episodes = numbers.to_vec());
+    let records = selected(&[3, 1, 3]).out("some").records();
+    assert_eq!(records, [whole[1].clone(), whole[3].clone()]);
+    assert!(!project.stored("some").expect("a run")[0].is_partial());
+    let other = selected(&[1]).out("some").resume().error();
+    assert!(other.contains("task 0 episode 3 belongs to another run"), "{other}");
+    let video = |config: &mut RunConfig| config.video = Some(EpisodeFilter::Episodes(vec![0]));
+    let video = selected(&[1]).out("other").with(video).error();
+    assert!(video.contains("runs only episode 1 of each task"), "{video}");
 }

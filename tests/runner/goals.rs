@@ -63,6 +63,28 @@ fn a_goal_combines_predicates_and_its_parts_are_recorded() {
 }
 
 #[test]
+fn a_prompt_of_an_episode_is_recorded_beside_that_of_the_task() {
+    let project = project("on");
+    let text = project.text("x.lua").replace(
+        "return softvt.suite",
+        "task.episode_prompt = function(scene, rng)
+  return ('push %s, please %d'):format(scene.objects[3].name, rng:int(1, 1000000))
+end
+return softvt.suite",
+    );
+    project.write("x.lua", text.as_bytes());
+    let run = project.run("x.lua").episodes(2).out("run").finish();
+    let records: Vec<_> = project.stored("run").expect("a run").remove(0).records;
+    for record in &records {
+        assert!(record.header.prompt.starts_with("push block, please "), "{}", record.header.prompt);
+        assert_eq!(record.header.task_prompt.as_deref(), Some("push"));
+    }
+    assert_ne!(records[0].header.prompt, records[1].header.prompt);
+    assert_eq!(run.results[0].summary.by_task[0].prompt, "push");
+    assert!(project.is_reproduced("run", "0/1"));
+}
+
+#[test]
 fn relations_are_seen_from_the_base_of_the_robot_and_need_the_hand_away() {
     // The cube is pushed along x to the middle of the tray.
     let met = |goal: &str| verdict(&format!("softvt.all {{ on, {goal} }}")).goal;

@@ -126,7 +126,7 @@ impl Project {
         let simulate = || {
             let episode = episode.parse::<EpisodeSelector>().expect("an episode");
             let observer = Arc::new(Messages::default());
-            Ok(replay::replay_episode(stored, episode, secret.as_ref(), observer)?.difference)
+            Ok(replay::replay_episode(stored, episode, secret.as_ref(), false, observer)?.difference)
         };
         simulate().map_err(|error: RunError| self.relative(error))
     }
@@ -332,7 +332,7 @@ impl Run<'_> {
             check_distinct_out_dirs(config, script.plan.suites())?;
             let (checker, mut warnings) = (SuiteChecker::new(&run), Vec::new());
             for suite in script.plan.suites() {
-                checker.check(suite, |warning| warnings.push(warning))?;
+                checker.check(suite, config.episodes.unwrap_or(1), |warning| warnings.push(warning))?;
             }
             match &script.plan {
                 Plan::Conditions { .. } => {

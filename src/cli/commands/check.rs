@@ -1,6 +1,6 @@
 //! `softvt check`: validation of a script without running its plan.
 
-use clap::Args;
+use clap::{Args, value_parser};
 
 use crate::{
     args::{PolicyArgs, Request, ScriptArgs},
@@ -21,9 +21,12 @@ pub(crate) struct CheckArgs {
     pub(super) script: ScriptArgs,
     #[command(flatten)]
     policy: PolicyArgs,
+    /// Episodes per task whose scenes are checked
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u32).range(1..))]
+    episodes: u32,
 }
 
-/// Loads a script and builds the first scene of every task. Nothing is run or rendered; a scene settles only if its
+/// Loads a script and builds the scenes of the first episodes of every task. Nothing is run or rendered; a scene settles only if its
 /// goal may hold at the start.
 ///
 /// # Errors
@@ -35,7 +38,7 @@ pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
     check_distinct_out_dirs(config, plan.suites())?;
     let checker = SuiteChecker::new(&run);
     for suite in plan.suites() {
-        checker.check(suite, |warning| eprint_notice(format!("warning: {warning}")))?;
+        checker.check(suite, args.episodes, |warning| eprint_notice(format!("warning: {warning}")))?;
         print_tasks(suite)?;
     }
     match plan {

@@ -358,7 +358,7 @@ impl SuiteSummary {
         let mut records: Vec<_> = records.iter().filter(|r| r.header.id.suite == suite).collect();
         records.sort_by_key(|r| r.header.id.index());
         let task_scores = |(task, group): (usize, Vec<&EpisodeRecord>)| {
-            let (prompt, asset) = (group[0].header.prompt.clone(), group[0].header.asset.clone());
+            let (prompt, asset) = (group[0].header.task_prompt().to_owned(), group[0].header.asset.clone());
             TaskScores { task, prompt, asset, scores: GroupScores::from_records(&group) }
         };
         let asset_scores = |(asset, group): (String, Vec<&EpisodeRecord>)| {

@@ -203,7 +203,7 @@ fn task_of<'a>(
     // An index alone identifies a task only within a suite that is known.
     let index_is_enough = prompts.is_empty() && (names_a_suite || named.is_none());
     match select(&|task| Some(task.id) == *id)[..] {
-        [only] if index_is_enough => Ok(only),
+        [only] if index_is_enough || names_a_suite && only.task.prompt_varies => Ok(only),
         _ => Err(no_task(config, suites, file, demo)),
     }
 }

@@ -142,7 +142,7 @@ impl LuaScene {
         let Some(task) = &self.task else {
             return Err(fail(
                 lua,
-                "scene.prompt: a layout has no prompt; set it in a shift, or in softvt.task",
+                "scene.prompt: a layout has no prompt; set it in softvt.task, whose episode_prompt sees the scene, or in a shift",
             ));
         };
         if prompt.trim().is_empty() {

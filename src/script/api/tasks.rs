@@ -19,6 +19,8 @@ use softvt_benchmark::{
 
 /// Type of a layout's function.
 const BUILD: Type = Type::Function("fun(scene: softvt.Scene, rng: softvt.Rng)");
+/// Type of a function that gives the prompts of the episodes of a task.
+const EPISODE_PROMPT: Type = Type::Function("fun(scene: softvt.Scene, rng: softvt.Rng): string");
 /// Type of a task's expert.
 pub(crate) const EXPERT: Type = Type::Function("fun(arm: softvt.Arm, scene: softvt.SceneState)");
 /// Smallest and largest factor.
@@ -45,8 +47,11 @@ record! {
     }
     /// A task of a suite.
     TaskSpec: "softvt.Task" as "task", constructor "softvt.task" {
-        /// Instruction for the policy.
+        /// Instruction for the policy, and name of the task in results.
         prompt: String;
+        /// Returns the prompt of an episode, given its initial scene: for prompts that name what was drawn, as the
+        /// larger of two objects or the side of the plate. It must not change the scene. Shifts come after it.
+        episode_prompt: Option<Function> = EPISODE_PROMPT;
         /// Initial scene.
         layout: Constructed<LayoutSpec>;
         /// Success criterion.

@@ -473,6 +473,7 @@ fn task(lua: &Lua, id: usize, spec: &Constructed<TaskSpec>, budget: u32) -> mlua
     Ok(Task {
         id,
         prompt: spec.prompt.clone(),
+        prompt_varies: spec.episode_prompt.is_some(),
         layout: spec.layout.name.clone(),
         object: spec.object_name(lua)?,
         goal,

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use mlua::{Function, Lua, Table, Value};
+use mlua::{FromLua, Function, Lua, Table, Value};
 
 use super::{
     expert::{ExpertController, ExpertGrip},
@@ -15,10 +15,10 @@ use crate::{
         goals::DeclaredPredicate,
         random::LuaRng,
         scene::{LuaScene, empty_scene},
-        tasks::SuiteSpec,
+        tasks::{SuiteSpec, TaskSpec},
     },
     plan::{self, FoundTask, LoadedScript, ScriptInstance},
-    schema::{Constructed, Range},
+    schema::{Constructed, Range, Type},
     vm::{
         error::{ScriptError, fail},
         source_map::fail_at_key,
@@ -61,6 +61,8 @@ pub struct EpisodeSetup {
     pub variation: Option<SceneVariation>,
     /// Instruction to the policy, which a shift may have changed.
     pub prompt: String,
+    /// The same without the shifts.
+    pub nominal_prompt: String,
     /// Functions that the goal asks for, in its order.
     pub predicates: Vec<Arc<dyn StatePredicate>>,
     /// Source of its random streams.
@@ -129,7 +131,8 @@ impl SceneBuilder {
         let mut nominal = lock(&current.scene).clone();
         let object = task.object_name(&vm.lua).map_err(|e| vm.explain(&e))?;
         let (_, predicates) = task.goal.plain(&vm.lua).map_err(|e| vm.explain(&e))?;
-        current = current.for_task(&object, &task.prompt);
+        let nominal_prompt = self.episode_prompt(&task, &nominal, &seed)?;
+        current = current.for_task(&object, &nominal_prompt);
         let shifts = suite.shifts.as_slice();
         for ShiftValue { name, value } in &changes.shifts {
             let Some(shift) = shifts.iter().find(|shift| shift.name == *name) else {
@@ -138,7 +141,7 @@ impl SceneBuilder {
             };
             current = self.shifted(&shift.apply, current, *value, &seed)?;
         }
-        let prompt = current.prompt().unwrap_or_else(|| task.prompt.clone());
+        let prompt = current.prompt().unwrap_or_else(|| nominal_prompt.clone());
         let mut scene = lock(&current.scene).clone();
         if suite.twin_of.is_some() || changes.rigid_twin {
             (scene, nominal) = (scene.rigid_twin(), nominal.rigid_twin());
@@ -168,7 +171,18 @@ impl SceneBuilder {
             Some(Arc::new(predicate) as Arc<dyn StatePredicate>)
         };
         let predicates = predicates.into_iter().filter_map(predicate).collect();
-        Ok(EpisodeSetup { scene, nominal, variation, prompt, predicates, seed, instance, expert, instances })
+        Ok(EpisodeSetup {
+            scene,
+            nominal,
+            variation,
+            prompt,
+            nominal_prompt,
+            predicates,
+            seed,
+            instance,
+            expert,
+            instances,
+        })
     }
 
     /// Checks that the script declares the suite of the plan again.
@@ -186,6 +200,34 @@ impl SceneBuilder {
             spec.name
         );
         Err(fail_at_key(lua, &spec.table, "tasks", message))
+    }
+
+    /// The prompt of an episode of this initial scene: that of the task, or what its function returns.
+    fn episode_prompt(
+        &self,
+        task: &Constructed<TaskSpec>,
+        scene: &Scene,
+        seed: &EpisodeSeed,
+    ) -> Result<String, ScriptError> {
+        let Some(function) = &task.episode_prompt else { return Ok(task.prompt.clone()) };
+        let vm = &self.instance.vm;
+        let wrong = |what: String| {
+            vm.explain(&fail_at_key(
+                &vm.lua,
+                &task.table,
+                "episode_prompt",
+                format!("task.episode_prompt: {what}"),
+            ))
+        };
+        let given = LuaScene::new(scene.clone());
+        let rng = LuaRng::new(seed.clone(), RandomStream::Prompt);
+        let prompt = vm.call::<Value>(function, (given.clone(), rng))?;
+        if *lock(&given.scene) != *scene {
+            return Err(wrong("changed the scene; change it in the layout".to_owned()));
+        }
+        let checked =
+            Type::Text.check(&vm.lua, &prompt).map_err(|error| wrong(error.describe("what it returned")))?;
+        String::from_lua(checked, &vm.lua).map_err(|error| vm.explain(&error))
     }
 
     /// The result of a shift's function: a scene, or nothing if it changed the given one.

@@ -9,13 +9,10 @@ use crate::vm::{
     source_map,
     value::{describe, number, sorted_pairs},
 };
-use softvt_common::text::{suggest, unknown_name};
+use softvt_common::text::{MAX_TEXT_BYTES, suggest, unknown_name};
 
 /// Numbers whose largest magnitude is smaller have no direction.
 pub(crate) const MIN_LENGTH: f64 = 1e-9;
-
-/// Longest prompt, name or other short text, bytes. Plans copy texts, which scripts may share.
-const MAX_TEXT_BYTES: usize = 4096;
 
 impl Type {
     /// Checks `value` and returns it as it is stored: numbers converted, lists of the host as plain tables, nested

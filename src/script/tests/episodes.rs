@@ -436,3 +436,56 @@ fn an_episode_of_another_suite_than_that_of_the_plan_is_refused() {
     assert!(error.message.starts_with("suite \"test\" differs from that of the plan"), "{error}");
     assert!(error.line.is_some(), "{error}");
 }
+
+/// The setup of an episode of a suite whose task has this `episode_prompt` and a shift of the prompt.
+fn with_episode_prompt(function: &str, episode: u32, shifts: &[ShiftValue]) -> Result<EpisodeSetup, String> {
+    let shift = "softvt.shift { name = 'shout', default = 0, apply = function(scene) scene.prompt = scene.prompt .. '!' end }";
+    let rest = format!(
+        "local s = suite(nil, {{ {shift} }})\ns.tasks[1].episode_prompt = function(scene, rng) {function} end\nreturn s"
+    );
+    let project = project(&rest);
+    let loaded = project.load("x.lua", &[]).map_err(|error| error.to_string())?;
+    let changes = SceneChanges { shifts: shifts.into(), ..SceneChanges::default() };
+    EpisodeSetup::open(&loaded, &episode_id(episode, 0), &changes)
+        .map_err(|error| error.to_string().rsplit_once("x.lua:").expect("a line").1.to_owned())
+}
+
+#[test]
+fn a_prompt_may_depend_on_what_was_drawn() {
+    let function = "local y = scene:object('ball').position[2] return ('%s the ball at %.4f'):format(rng:choice { 'lift', 'raise' }, y)";
+    let setup =
+        |episode, shifts: &[ShiftValue]| with_episode_prompt(function, episode, shifts).expect("it opens");
+    let prompts: Vec<String> = (0..8).map(|episode| setup(episode, &[]).prompt).collect();
+    for (episode, prompt) in (0..).zip(&prompts) {
+        let setup = setup(episode, &[]);
+        let y = setup.scene.objects[0].pose_w.translation.vector.y;
+        assert!(prompt.ends_with(&format!(" the ball at {y:.4}")), "{prompt}, {y}");
+        assert_eq!((&setup.prompt, &setup.nominal_prompt), (prompt, prompt), "it is reproducible");
+    }
+    assert!(prompts.iter().any(|p| p.starts_with("lift")) && prompts.iter().any(|p| p.starts_with("raise")));
+    let shouted = setup(0, &[ShiftValue { name: "shout".into(), value: 1.0 }]);
+    assert_eq!((shouted.prompt, shouted.nominal_prompt), (format!("{}!", prompts[0]), prompts[0].clone()));
+}
+
+#[test]
+fn the_function_of_a_prompt_returns_a_text_and_leaves_the_scene() {
+    let error = |function| with_episode_prompt(function, 0, &[]).err().expect("an error");
+    let lines: Vec<&str> = SUITE.lines().collect();
+    let of_task = lines.iter().position(|line| line.contains("softvt.task {")).expect("a task") + 1;
+    let label = format!("{of_task}: task.episode_prompt: ");
+    assert_eq!(error(""), format!("{label}what it returned: expected a string that is not empty, got nil"));
+    assert_eq!(
+        error("return ''"),
+        format!("{label}what it returned: expected a string that is not empty, got \"\"")
+    );
+    assert!(
+        error("return ('x'):rep(5000)")
+            .starts_with(&format!("{label}what it returned: expected a text of at most 4096"))
+    );
+    assert_eq!(
+        error("scene:object('ball').yaw = 1 return 'lift'"),
+        format!("{label}changed the scene; change it in the layout")
+    );
+    assert_eq!(error("error('no')"), format!("{}: no", lines.len() + 2));
+    assert!(error("while true do end").contains("ran for more than 0.3 s"));
+}
