@@ -27,6 +27,8 @@ COMPARED = [("vp", "vo"), ("vt", "vo"), ("vt", "vp"), ("vpt", "vp")]
 MEASURES = ["goal", "no_drop", "safety"]
 # Stages of an episode, in their order.
 STAGES = ["reach", "grasp", "lift", "carry", "place", "release"]
+# Ratios from which on tables do not show them.
+MOST = 99
 # The condition of suites/shifts.lua that changes nothing.
 UNCHANGED = "reference"
 
@@ -91,11 +93,12 @@ def _table(heading: list[str], rows: list[list[str]]) -> str:
 
 
 def _spread(values: np.ndarray) -> str:
-    """Median, and the 5th and 95th percentile."""
-    if not len(values) or np.isnan(values).all():
+    """Median, and the 5th and 95th percentile. Where nothing has a limit, only invalid episodes have a ratio, which is infinite."""
+    if not np.isfinite(values).any():
         return "–"
-    low, median, high = np.nanpercentile(np.minimum(values, 99), [5, 50, 95])
-    return f"{median:.2f} [{low:.2f}, {high:.2f}]"
+    percentiles = np.nanpercentile(np.minimum(values, MOST), [5, 50, 95])
+    low, median, high = (f"{value:.2f}" if value < MOST else f"> {MOST}" for value in percentiles)
+    return f"{median} [{low}, {high}]"
 
 
 def _row(name: str, runs: list[Run], replan: str) -> list[str]:
@@ -283,7 +286,7 @@ def _shifts(learned: dict[Policy, list[Run]]) -> list[list[str]]:
 
 
 def figure(folder: Path, path: Path) -> None:
-    """Goal and Safety of each policy with continuous closure, and the distribution of D/τ, by suite."""
+    """Goal and Safety of each policy, and the distribution of D/τ, by suite. Suites without limits are left out, if others have some."""
     import matplotlib
 
     matplotlib.use("svg")
@@ -292,16 +295,18 @@ def figure(folder: Path, path: Path) -> None:
     from matplotlib import pyplot
 
     learned, references = _grouped(folder)
-    suites = sorted({policy.suite for policy in learned if not policy.condition})
-    if not suites:
+    shown = {policy.suite: runs for policy, runs in learned.items() if not policy.condition}
+    if not shown:
         raise UserError(f"{folder}: no runs of learned policies")
+    limited = [suite for suite, runs in shown.items() if np.isfinite(runs[0].ratio).any()]
+    suites = sorted(limited or shown)
     colours = {"goal": "#9db8d2", "safety": "#1f5a94"}
-    shown, axes = pyplot.subplots(2, len(suites), figsize=(3.6 * len(suites), 5), squeeze=False, layout="constrained")
+    whole, axes = pyplot.subplots(2, len(suites), figsize=(3.6 * len(suites), 5), squeeze=False, layout="constrained")
     for column, suite in enumerate(suites):
         groups = {
-            f"{policy.inputs.upper()}, {policy.replan}": runs
+            f"{policy.inputs.upper()}{'' if policy.code == 'continuous' else f' {policy.code}'}, {policy.replan}": runs
             for policy, runs in sorted(learned.items())
-            if (policy.suite, policy.code, policy.condition) == (suite, "continuous", "")
+            if (policy.suite, policy.condition) == (suite, "")
         }
         groups |= {name: [references[suite, name]] for name in REFERENCES if (suite, name) in references}
         top, bottom = axes[0][column], axes[1][column]
@@ -320,8 +325,8 @@ def figure(folder: Path, path: Path) -> None:
         bottom.set(xlim=(0, 3), ylim=(0, 100), xlabel="peak D/τ", ylabel="% of episodes below")
         bottom.legend(fontsize=6)
     path.parent.mkdir(parents=True, exist_ok=True)
-    shown.savefig(path, metadata={"Date": None})
-    pyplot.close(shown)
+    whole.savefig(path, metadata={"Date": None})
+    pyplot.close(whole)
 
 
 def _bars(rates: list[Estimate]) -> np.ndarray:

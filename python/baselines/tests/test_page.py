@@ -86,6 +86,11 @@ class Pages(unittest.TestCase):
         published = (docs / "baselines.md").read_text().split(page.BEGIN)[1].split(page.END)[0]
         self.assertEqual(published.strip(), page.tables(docs / "baselines").strip())
 
+    def test_ratios_without_a_limit_and_very_large_ones_have_no_numbers(self):
+        self.assertEqual(page._spread(np.array([np.nan, np.inf])), "–", "an invalid episode of a suite without limits")
+        self.assertEqual(page._spread(np.array([1.0, 2.0, 400.0])), "2.00 [1.10, 89.30]")
+        self.assertEqual(page._spread(np.array([200.0, 300.0])), "> 99 [> 99, > 99]")
+
     def test_runs_say_where_they_come_from(self):
         origin = {"machine": "a machine", "commit": "abc", "checkpoint_sha256": "0123456789abcdef" * 4}
         run = self.study / "runs" / "one-vo-continuous-s0-r4" / "one"
