@@ -9,6 +9,7 @@ use softvt_robot::{
     rotation,
 };
 use softvt_rollout::{FinishedEpisode, Sensors, StateRecording};
+use softvt_scene::STANDARD_CAMERAS;
 use softvt_sensing::tactile::{MARKER_COUNT, Markers};
 
 use super::{
@@ -52,7 +53,8 @@ impl Demonstration {
         let privileged = if with_privileged { privileged::streams(finished, recording) } else { Vec::new() };
         Self {
             record: finished.record.clone(),
-            observed: proprioception_streams(recording, &actions),
+            observed: [proprioception_streams(recording, &actions), camera_streams(recording, actions.len())]
+                .concat(),
             grip_labels_n: grip_labels::forces(&grip_forces(recording, actions.len()), &gripper_closed),
             gripper_closed,
             actions,
@@ -137,6 +139,25 @@ fn grip_forces(recording: &StateRecording, steps: usize) -> Vec<f64> {
         pads.iter().map(|pad| pad.wrench.normal().max(0.0)).sum::<f64>() / pads.len() as f64
     };
     after.take(steps).map(force).collect()
+}
+
+/// Names of the streams with the poses of the standard cameras.
+const CAMERA_POSES: [&str; 2] = ["obs/agentview_pose", "obs/eye_in_hand_pose"];
+
+/// Poses of the standard cameras before each action, with their intrinsic matrices.
+fn camera_streams(recording: &StateRecording, steps: usize) -> Vec<DataStream> {
+    let sensors = &recording.sensors;
+    let base_inverse = sensors.base_w().inverse();
+    let stream = |(camera_name, stream_name): (&str, &str)| {
+        let index = sensors.cameras().iter().position(|camera| camera.name == camera_name)?;
+        let pose_b = |frame| base_inverse * sensors.cameras_w(frame)[index];
+        let poses = recording.frames.iter().take(steps).flat_map(|frame| pose_row(&pose_b(frame)));
+        let stream = DataStream::f64(stream_name, &[7], poses.collect()).unit("m, 1", BASE);
+        let meaning = "position, quaternion w x y z with w >= 0; x right, y up, view along -z";
+        let matrix = format!("{:?}", sensors.cameras()[index].intrinsic());
+        Some(stream.attribute("meaning", meaning).attribute("intrinsic", &matrix))
+    };
+    STANDARD_CAMERAS.into_iter().zip(CAMERA_POSES).filter_map(stream).collect()
 }
 
 /// Proprioception before each action.

@@ -22,6 +22,8 @@ SHAPES = {
     "obs/gripper_width_sensed": (1,),
     "obs/gripper_close_norm": (1,),
     "obs/gripper_closure": (1,),
+    "obs/agentview_pose": (7,),
+    "obs/eye_in_hand_pose": (7,),
     "obs/gripper_marker_motion": (2, 2, 99, 2),
 }
 PICTURES = {
@@ -72,6 +74,12 @@ def numbers(demo, steps):
     assert np.allclose(pose[:, :3], state[:, :3])
     for q, v in zip(pose[:, 3:], state[:, 3:6]):
         assert np.allclose(turn(q), rodrigues(v), atol=1e-9)
+    wrist, agent = demo["obs/eye_in_hand_pose"], demo["obs/agentview_pose"]
+    in_tool = [turn(q).T @ (camera[:3] - tool[:3]) for q, camera, tool in zip(pose[:, 3:], wrist[:], pose)]
+    assert np.allclose(in_tool, in_tool[0], atol=1e-6) and (agent[:] == agent[0]).all(), "one camera moves with the hand"
+    for camera in wrist, agent:
+        matrix = np.array(json.loads(camera.attrs["intrinsic"]))
+        assert matrix[0, 0] == matrix[1, 1] > 100 and (matrix[:2, 2] == 112).all(), matrix
     width = demo["obs/gripper_width"][:, 0]
     assert np.allclose(width, demo["obs/gripper_pos"][:].sum(axis=1)) and np.allclose(state[:, 6], width / 2)
     sensed = demo["obs/gripper_width_sensed"][:, 0]

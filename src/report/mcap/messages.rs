@@ -88,17 +88,15 @@ pub(super) fn image(image: &RgbImage, frame_id: &str, time_ns: u64) -> Compresse
 
 /// The matrices of a camera without distortion.
 pub(super) fn calibration(camera: &Camera, time_ns: u64) -> CameraCalibration {
-    let (width, height) = (camera.width as f64, camera.height as f64);
-    let focal = 0.5 * height / (0.5 * camera.fovy_rad).tan();
-    let (x, y) = (0.5 * width, 0.5 * height);
+    let k = camera.intrinsic();
     CameraCalibration {
         timestamp: timestamp(time_ns),
         frame_id: camera.name.clone(),
         width: camera.width as u32,
         height: camera.height as u32,
-        k: vec![focal, 0.0, x, 0.0, focal, y, 0.0, 0.0, 1.0],
+        k: k.as_flattened().to_vec(),
         r: vec![1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        p: vec![focal, 0.0, x, 0.0, 0.0, focal, y, 0.0, 0.0, 0.0, 1.0, 0.0],
+        p: k.iter().flat_map(|row| row.iter().copied().chain([0.0])).collect(),
         ..CameraCalibration::default()
     }
 }
