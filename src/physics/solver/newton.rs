@@ -210,19 +210,19 @@ impl Solver {
                 progress = NewtonProgress { steps: 0, initial_ratio: ratio };
             }
             self.find_step(problem, island);
-            let Some(lower) = self.line_search(problem, island, cost) else {
-                if !is_new || self.cache.precision() == Precision::Single {
-                    // A new factor that gives no descent is too coarse.
-                    precision = if is_new { Precision::Double } else { precision };
-                    has_factor = false;
-                    continue;
-                }
+            let lower = self.line_search(problem, island, cost, by_interpolation);
+            if lower.is_none() && (!is_new || self.cache.precision() == Precision::Single) {
+                // A new factor that gives no descent is too coarse.
+                precision = if is_new { Precision::Double } else { precision };
+                has_factor = false;
+                continue;
+            }
+            if lower.is_none() && ratio < 1e3 {
                 // No descent is left in floating point: converged to its precision if the residual is small already.
-                return if ratio < 1e3 {
-                    Ok(step)
-                } else {
-                    Err(SolverFailure { block: island.blocks[0], residual_ratio: ratio })
-                };
+                return Ok(step);
+            }
+            let Some(lower) = lower.or_else(|| self.line_search(problem, island, cost, by_bisection)) else {
+                return Err(SolverFailure { block: island.blocks[0], residual_ratio: ratio });
             };
             cost = lower;
             self.correct_factor(problem, island);
@@ -379,9 +379,15 @@ impl Solver {
 
     /// Moves along `step` to a lower cost: by the full step if that descends enough, else to the minimum on the line.
     ///
-    /// Returns the new cost; the gradient there is in `gradient`, the former point and its gradient in `trial`. `None`
-    /// if no descent was found.
-    fn line_search(&mut self, problem: &ContactProblem, island: &Island, cost: f64) -> Option<f64> {
+    /// `next_trial` chooses a point in the bracket of that minimum. Returns the new cost; the gradient there is in
+    /// `gradient`, the former point and its gradient in `trial`. `None` if no descent was found.
+    fn line_search(
+        &mut self,
+        problem: &ContactProblem,
+        island: &Island,
+        cost: f64,
+        next_trial: fn(LinePoint, LinePoint) -> f64,
+    ) -> Option<f64> {
         let slope: f64 = self.gradient.iter().zip(&self.step).map(|(g, s)| g * s).sum();
         if slope.is_nan() || slope >= 0.0 {
             return None;
@@ -486,12 +492,81 @@ struct LinePoint {
 /// Root of the linear interpolation of the slope of the cost between two points of a line.
 ///
 /// The slope of a convex cost grows monotonically, so this is nearer to the minimum than the middle; it keeps a tenth
-/// of the bracket from either end.
-fn next_trial(low: LinePoint, high: LinePoint) -> f64 {
+/// of the bracket from either end. Where friction reverses, however, the slope jumps. If it jumps near the low end, to
+/// less than about a ninth of the slope there, only the high end moves, by a tenth of the bracket per trial (one end
+/// of a regula falsi may stay for ever: Dowell & Jarratt 1971), and the trials may end before any of them descends.
+fn by_interpolation(low: LinePoint, high: LinePoint) -> f64 {
     if !high.position.is_finite() {
         return 1.5 * low.position;
     }
     let share = low.slope / (low.slope - high.slope);
     let share = if share.is_finite() { share.clamp(0.1, 0.9) } else { 0.5 };
     low.position + share * (high.position - low.position)
+}
+
+/// Middle between two points of a line. It halves the bracket whatever the slopes are, and is the fallback of the line
+/// search of Drake's contact solver, too (`DoNewtonWithBisectionFallback`).
+fn by_bisection(low: LinePoint, high: LinePoint) -> f64 {
+    if high.position.is_finite() { 0.5 * (low.position + high.position) } else { 1.5 * low.position }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solver::{ContactCluster, ContactPoint, Endpoint, VelocityBlock};
+
+    /// Mass, kg; friction bound and normal impulse, N s; product of step and tangential stiffness, N s/m.
+    const MASS: f64 = 0.05;
+    const BOUND: f64 = 0.5 * WEIGHT;
+    const WEIGHT: f64 = MASS * 9.81 / 60.0;
+    const SHEAR: f64 = 5e5 / 60.0;
+
+    /// A light body on a stiff floor that slid to the left and is now pushed to the right with a share of the friction
+    /// bound.
+    fn pushed_back(share: f64) -> ContactProblem {
+        let (dt, stiffness, left) = (1.0 / 60.0, 1e6, -1e-6);
+        let mut weights_a = [0.0; 8];
+        weights_a[0] = 1.0;
+        let block = VelocityBlock {
+            dim: 3,
+            matrix: (0..9).map(|i| if i % 4 == 0 { MASS } else { 0.0 }).collect(),
+            rhs: vec![share * BOUND, 0.0, -WEIGHT],
+            v: vec![left, 0.0, 0.0],
+            ..VelocityBlock::default()
+        };
+        let point = ContactPoint {
+            weights_a,
+            normal: Vec3::z(),
+            stiffness,
+            shear_stiffness: SHEAR / dt,
+            gap: -WEIGHT / (dt * stiffness),
+            offset: Vec3::x() * (-BOUND / SHEAR),
+            mu: 0.5,
+            previous_normal_impulse: WEIGHT,
+            ..ContactPoint::default()
+        };
+        let node = Endpoint::Nodes { block: 0, at: [0; 8], count: 4 };
+        ContactProblem {
+            dt,
+            dissipation_time: 5e-3,
+            blocks: vec![block],
+            clusters: vec![ContactCluster { a: node, b: Endpoint::Known, first: 0, last: 1 }],
+            points: vec![point],
+            ..ContactProblem::default()
+        }
+    }
+
+    #[test]
+    fn a_light_body_sticks_where_friction_reverses_at_the_start_of_a_long_step() {
+        for share in [0.3, 0.6, 0.8, 0.82, 0.85, 0.9, 0.95] {
+            let mut problem = pushed_back(share);
+            Solver::default()
+                .solve(&mut problem)
+                .unwrap_or_else(|failure| panic!("share {share}: {failure}"));
+            let v = problem.blocks[0].v[0];
+            let expected = (1.0 + share) * BOUND / (MASS + SHEAR * (problem.dt + problem.dissipation_time));
+            assert!((v / expected - 1.0).abs() < 1e-5, "share {share}: {v} m/s, expected {expected} m/s");
+            assert!(!problem.points[0].is_slipping, "share {share}");
+        }
+    }
 }
