@@ -1,5 +1,5 @@
-//! A chart of several series over two axes, linear or logarithmic, as SVG. Series differ in their strokes and marks, and
-//! are named at their last points.
+//! A chart of several series over two axes, linear or logarithmic, as SVG. Series differ in their strokes and marks,
+//! and are named at their last points.
 
 use super::{
     svg::{self, Anchor, Place, at, circle, diamond, line, polyline, text, upward_text},

@@ -78,9 +78,9 @@ fn cell(value: Option<&Value>) -> String {
     }
 }
 
-/// Runs all points of the experiment that a script returned, or of an interrupted one the others. With an output folder,
-/// the rows and the files of the script are written into it; without one, the files of the script are written below the
-/// working folder.
+/// Runs all points of the experiment that a script returned, or of an interrupted one the others. With an output
+/// folder, the rows and the files of the script are written into it; without one, the files of the script are written
+/// below the working folder.
 ///
 /// # Errors
 /// The script fails or tells a problem, a setting or the seed changes nothing, or a file cannot be written.

@@ -144,8 +144,8 @@ impl<'a> Runner<'a> {
     ///
     /// # Errors
     /// The script has no suite; a scene, a setting or the policy is not valid; a folder contains something else; a
-    /// trace, videos, MCAP files or a resumed run without an output folder; or a request to stop. Finished episodes are kept in
-    /// the output folder.
+    /// trace, videos, MCAP files or a resumed run without an output folder; or a request to stop. Finished episodes are
+    /// kept in the output folder.
     pub fn run(&self, mut on_episode: impl FnMut(&EpisodeRecord)) -> Result<Vec<SuiteResult>, RunError> {
         let (config, plan) = (&self.config, &self.script.plan);
         let is_list = matches!(plan, Plan::Suites { .. });
