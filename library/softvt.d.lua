@@ -363,7 +363,7 @@
 ---@field height integer Height, pixels. Expects a whole number in 1..8192.
 ---@field colour number[] Colour. Expects a list of 3 numbers (sRGB of 0 to 255).
 
----Returns a plot as SVG, for the files of an experiment: `softvt.plot { title = "…", x = { label = "gap, mm" }, y = { label = "D, %" }, series = { { label = "bun", points = { { 40, 0.1 }, { 38, 0.4 } } } } }`.
+---Returns a plot as SVG, for the files of an experiment: `softvt.plot { title = "…", x = { label = "gap" }, y = { label = "D, %" }, series = { { label = "bun", points = { { 40, 0.1 }, { 38, 0.4 } } } } }`.
 ---@class softvt.Plot
 ---@field title string Title.
 ---@field x softvt.PlotAxis Horizontal axis.
@@ -1859,7 +1859,7 @@ function softvt.instances(suite) end
 ---@return softvt.Image
 function softvt.image(spec) end
 
----Returns a plot as SVG, for the files of an experiment: `softvt.plot { title = "…", x = { label = "gap, mm" }, y = { label = "D, %" }, series = { { label = "bun", points = { { 40, 0.1 }, { 38, 0.4 } } } } }`.
+---Returns a plot as SVG, for the files of an experiment: `softvt.plot { title = "…", x = { label = "gap" }, y = { label = "D, %" }, series = { { label = "bun", points = { { 40, 0.1 }, { 38, 0.4 } } } } }`.
 ---@param spec softvt.Plot
 ---@return string
 function softvt.plot(spec) end

@@ -34,8 +34,8 @@ record! {
 
 functions! {
     FUNCTIONS {
-        /// Returns a plot as SVG, for the files of an experiment: `softvt.plot { title = "…", x = { label = "gap, mm" }, y
-        /// = { label = "D, %" }, series = { { label = "bun", points = { { 40, 0.1 }, { 38, 0.4 } } } } }`.
+        /// Returns a plot as SVG, for the files of an experiment: `softvt.plot { title = "…", x = { label = "gap" },
+        /// y = { label = "D, %" }, series = { { label = "bun", points = { { 40, 0.1 }, { 38, 0.4 } } } } }`.
         fn plot(lua) takes spec "softvt.Plot" {
             /// Title.
             title: String;
