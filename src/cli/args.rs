@@ -183,6 +183,23 @@ pub(crate) struct PolicyArgs {
     #[arg(long, value_name = "POLICY")]
     policy: Option<PolicySource>,
     #[command(flatten)]
+    pub connection: ConnectionArgs,
+}
+
+// The policies of a command that shows several at once. A doc comment would replace the description of the command.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct ComparedPolicyArgs {
+    /// Policy: a name, Lua file, server or run; repeated, up to four are shown side by side [default: expert]
+    #[arg(id = "policy", long = "policy", value_name = "POLICY")]
+    policies: Vec<PolicySource>,
+    #[command(flatten)]
+    connection: ConnectionArgs,
+}
+
+// How policies are connected. A doc comment would replace the description of the commands.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct ConnectionArgs {
+    #[command(flatten)]
     pub profile: ProfileArgs,
     /// Protocol of a policy server [default: openpi]
     #[arg(long, value_name = "PROTOCOL")]
@@ -217,6 +234,62 @@ impl ProfileArgs {
     }
 }
 
+impl ConnectionArgs {
+    /// The options of the default policy.
+    fn options(&self) -> PolicyOptions {
+        PolicyOptions {
+            protocol: self.protocol,
+            replan: self.replan,
+            timeout: self.policy_timeout,
+            ..self.profile.options()
+        }
+    }
+}
+
+impl ComparedPolicyArgs {
+    /// The largest number of policies that are shown side by side.
+    const MAX_POLICIES: usize = 4;
+
+    /// Loads the policies; the expert if none is named. Policies of one name get the number of their flag.
+    ///
+    /// # Errors
+    /// Too many policies, one named twice, a name for several, an option that none of them takes, or a policy that
+    /// cannot be loaded.
+    pub(crate) fn load(&self) -> Result<Vec<PolicyConfig>, CliError> {
+        let (options, count) = (self.connection.options(), self.policies.len());
+        if count <= 1 {
+            let source = self.policies.first().cloned().unwrap_or_default();
+            return Ok(vec![PolicyConfig::load(&PolicyOptions { source, ..options })?]);
+        }
+        if count > Self::MAX_POLICIES {
+            let most = Self::MAX_POLICIES;
+            let message = format!(
+                "--policy: expected at most {most} policies side by side, got {count}; leave some out"
+            );
+            return Err(CliError::input(message));
+        }
+        if let Some(again) = (1..count).find(|at| self.policies[..*at].contains(&self.policies[*at])) {
+            let word = self.policies[again].word();
+            let message = format!("--policy {word}: named twice; name each policy once");
+            return Err(CliError::input(message));
+        }
+        if options.name.is_some() {
+            let message = "--name: applies to one policy; leave it out, and each is shown under its own name";
+            return Err(CliError::input(message));
+        }
+        let load = |options| Ok(PolicyConfig::load(&options)?);
+        let mut loaded: Vec<PolicyConfig> =
+            options.shared_by(&self.policies).into_iter().map(load).collect::<Result<_, CliError>>()?;
+        let names: Vec<String> = loaded.iter().map(|policy| policy.name.clone()).collect();
+        for (number, policy) in (1..).zip(&mut loaded) {
+            if names.iter().filter(|name| **name == policy.name).count() > 1 {
+                policy.name = format!("{} {number}", policy.name);
+            }
+        }
+        Ok(loaded)
+    }
+}
+
 impl PolicyArgs {
     /// True if a policy was named.
     pub(crate) fn is_given(&self) -> bool {
@@ -225,13 +298,7 @@ impl PolicyArgs {
 
     /// The policy and its options.
     pub(crate) fn options(&self) -> PolicyOptions {
-        PolicyOptions {
-            source: self.policy.clone().unwrap_or_default(),
-            protocol: self.protocol,
-            replan: self.replan,
-            timeout: self.policy_timeout,
-            ..self.profile.options()
-        }
+        PolicyOptions { source: self.policy.clone().unwrap_or_default(), ..self.connection.options() }
     }
 
     /// The options for a suite of a teacher, which `--policy` replaces.
@@ -244,7 +311,8 @@ impl PolicyArgs {
     /// own.
     pub(crate) fn take_export_code(&mut self) -> Option<GripCode> {
         let has_code = matches!(self.policy, Some(PolicySource::Server(_) | PolicySource::Lua(_)));
-        if has_code { self.profile.gripper } else { self.profile.gripper.take() }
+        let gripper = &mut self.connection.profile.gripper;
+        if has_code { *gripper } else { gripper.take() }
     }
 }
 

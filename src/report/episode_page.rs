@@ -1,4 +1,5 @@
-//! The page of one episode: what happened in a sentence, the video, and the stills of every camera and finger.
+//! The page of one episode: what happened in a sentence, the video, and the stills of every camera and finger; and that
+//! of one episode under several policies.
 
 use std::path::Path;
 
@@ -15,6 +16,10 @@ use softvt_records::record::EpisodeRecord;
 
 /// Name of the page in the folder of the stills.
 pub const PAGE: &str = "index.html";
+/// Name of the video in that folder.
+pub const VIDEO: &str = "episode.mp4";
+/// Name of a frame of the video in that folder.
+pub const FRAME: &str = "episode.png";
 /// Names of the moments of stills, in the names of files and in words.
 const MOMENTS: [(&str, &str); 3] =
     [("start", "At the start"), ("worst", "At the worst moment"), ("end", "At the end")];
@@ -44,6 +49,10 @@ const STYLE: &str = "body{margin:1.5rem auto;max-width:70rem;padding:0 1rem;font
     video{width:100%;max-width:46rem}ul{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(13rem,46%),1fr));\
     gap:.7rem;list-style:none;padding:0}img{width:100%;height:auto;display:block;border-radius:5px}li{font-size:13px}";
 
+/// What the page of several policies has in addition.
+const STYLE_OF_SEVERAL: &str =
+    "h3{font-size:13px;margin:.8rem 0 .3rem}.said{display:block}.said li{font-size:15px}";
+
 /// What was seen in an episode: "✗ over the limit: D 1.93 % = 5.14 × limit at 4.95 s". `worst_time_s` is the time of
 /// the largest deformation.
 pub fn sentence(record: &EpisodeRecord, worst_time_s: f64) -> String {
@@ -60,6 +69,53 @@ pub fn sentence(record: &EpisodeRecord, worst_time_s: f64) -> String {
     format!("{} {name}{d}", category.glyph())
 }
 
+/// An episode under one of several policies.
+pub struct PolicyPart {
+    /// Its record.
+    pub record: EpisodeRecord,
+    /// Time of the largest deformation, s.
+    pub worst_time_s: f64,
+    /// Name of the folder of its stills in that of the page.
+    pub folder: String,
+}
+
+impl PolicyPart {
+    /// What was seen under the policy: "expert: ● safe: D 0.09 % = 0.36 × limit at 4.45 s".
+    pub fn sentence(&self) -> String {
+        format!("{}: {}", self.record.header.policy, sentence(&self.record, self.worst_time_s))
+    }
+}
+
+/// Writes [`PAGE`] about one episode under several policies: a sentence for each, the video in the folder `dir`, and
+/// each policy's stills, with a link to the page of its own that is written beside them.
+///
+/// # Errors
+/// A page cannot be written.
+pub fn write_several(parts: &[PolicyPart], dir: &Path) -> Result<(), FileError> {
+    let Some(PolicyPart { record, .. }) = parts.first() else { return Ok(()) };
+    for PolicyPart { record, worst_time_s, folder } in parts {
+        write(record, *worst_time_s, &dir.join(folder))?;
+    }
+    let id = &record.header.id;
+    let title = format!("{} · task {} · episode {}", id.suite, id.task, id.episode);
+    let contents = html! {
+        h1 { (title) }
+        p { (record.header.prompt) }
+        ul.said { @for part in parts { li { (part.sentence()) } } }
+        video controls muted src=(VIDEO) poster=(FRAME) {}
+        @for (moment, words) in MOMENTS {
+            h2 { (words) }
+            @for PolicyPart { record, folder, .. } in parts {
+                @let policy = &record.header.policy;
+                h3 { a href=(format!("{folder}/{PAGE}")) { (policy) } }
+                ul { (stills(moment, &format!("{policy}, {}", words.to_lowercase()), dir, &format!("{folder}/"))) }
+            }
+        }
+    };
+    let style = format!("{STYLE}{STYLE_OF_SEVERAL}");
+    files::replace(&dir.join(PAGE), page(&title, &style, &contents).as_bytes())
+}
+
 /// Writes [`PAGE`] about the video and the stills in the folder `dir`. Depth and segmentation, which viewers show white
 /// and black, are drawn in grey and in colours.
 ///
@@ -69,6 +125,16 @@ pub fn write(record: &EpisodeRecord, worst_time_s: f64, dir: &Path) -> Result<()
     let header = &record.header;
     let id = &header.id;
     let title = format!("{} · task {} · episode {} · {}", id.suite, id.task, id.episode, header.policy);
+    let contents = html! {
+        h1 { (sentence(record, worst_time_s)) }
+        p { (title) br; (header.prompt) }
+        @if dir.join(VIDEO).is_file() { video controls muted src=(VIDEO) poster=(FRAME) {} }
+        @for (moment, words) in MOMENTS { h2 { (words) } ul { (stills(moment, words, dir, "")) } }
+    };
+    files::replace(&dir.join(PAGE), page(&title, STYLE, &contents).as_bytes())
+}
+
+fn page(title: &str, style: &str, contents: &Markup) -> String {
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
@@ -76,32 +142,26 @@ pub fn write(record: &EpisodeRecord, worst_time_s: f64, dir: &Path) -> Result<()
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 title { (title) }
-                style { (PreEscaped(STYLE)) }
+                style { (PreEscaped(style)) }
             }
-            body {
-                main {
-                    h1 { (sentence(record, worst_time_s)) }
-                    p { (title) br; (header.prompt) }
-                    @if dir.join("episode.mp4").is_file() { video controls muted src="episode.mp4" poster="episode.png" {} }
-                    @for (moment, words) in MOMENTS { h2 { (words) } ul { (stills(moment, words, dir)) } }
-                }
-            }
+            body { main { (contents) } }
         }
     };
-    files::replace(&dir.join(PAGE), escape_control(&markup.into_string()).as_bytes())
+    escape_control(&markup.into_string()).into_owned()
 }
 
-fn stills(moment: &str, words: &str, dir: &Path) -> Markup {
+/// The stills of a moment; `folder` is that of their files in `dir`, with a slash, or empty.
+fn stills(moment: &str, words: &str, dir: &Path, folder: &str) -> Markup {
     let still = |source: String, what: &str| {
         html! { li { img src=(source) alt=(format!("{words}: {what}")); (what) } }
     };
     html! {
         @for (name, what) in STILLS {
-            @let file = format!("{moment}_{name}.png");
+            @let file = format!("{folder}{moment}_{name}.png");
             @if dir.join(&file).is_file() { (still(file, what)) }
         }
         @for camera in CAMERAS {
-            @let numbers = |suffix: &str| image::open(dir.join(format!("{moment}_{camera}_{suffix}.png"))).ok();
+            @let numbers = |suffix: &str| image::open(dir.join(format!("{folder}{moment}_{camera}_{suffix}.png"))).ok();
             @if let Some(depth) = numbers("depth").and_then(|image| data_url(&grey_depth(&image.into_luma16()))) {
                 (still(depth, &format!("{}, depth: near is bright", camera.replace('_', " "))))
             }
@@ -167,6 +227,20 @@ mod tests {
             "{page}"
         );
         assert_eq!(page.matches("<img ").count(), 2, "{page}");
+        record.header.policy = "a<b".to_owned();
+        let part = PolicyPart { record, worst_time_s: 1.0, folder: "a_b".to_owned() };
+        std::fs::create_dir(root.path().join("a_b")).unwrap();
+        RgbImage::new(4, 4).save(root.path().join("a_b/worst_wrist.png")).unwrap();
+        write_several(&[part], root.path()).unwrap();
+        let several = std::fs::read_to_string(root.path().join(PAGE)).unwrap();
+        for text in [
+            "<li>a&lt;b: ● safe: D 0.33 % = 0.33 × limit at 1.00 s</li>",
+            "href=\"a_b/index.html\"",
+            "src=\"a_b/worst_wrist.png\"",
+        ] {
+            assert!(several.contains(text), "{text}: {several}");
+        }
+        assert!(root.path().join("a_b").join(PAGE).is_file(), "a page of its own");
         let grey = grey_depth(&numbers);
         assert_eq!([grey.get_pixel(0, 0).0[0], grey.get_pixel(3, 0).0[0]], [255, 20]);
         assert_eq!(coloured(&Numbers::from_pixel(1, 1, Luma([1]))).get_pixel(0, 0).0, OBJECT_COLOURS[1]);

@@ -8,6 +8,7 @@ pub mod commands;
 pub mod comparison;
 pub mod condition_effects;
 pub mod condition_table;
+mod d_axis;
 pub mod episode_page;
 pub mod leaderboard;
 pub mod mcap;

@@ -92,6 +92,15 @@ const TRIAL_EDGE: usize = 16;
 /// Taxels of the force maps along x and y, 1 mm each.
 const TAXELS: [usize; 2] = [25, 21];
 
+/// How a close-up is rendered.
+#[derive(Clone, Copy, Debug)]
+pub struct CloseUp {
+    /// Width and height, pixels.
+    pub edge: usize,
+    /// True to leave out what is between the camera and the object.
+    pub cuts_foreground: bool,
+}
+
 impl Sensors {
     /// The sensors of a simulation.
     pub fn new(sim: &Simulation, spec: &TactileSpec, assets: &SensorAssets) -> Self {
@@ -163,21 +172,39 @@ impl Sensors {
         &mut self,
         frame: &WorldSnapshot,
         index: usize,
-        edge: usize,
+        CloseUp { edge, cuts_foreground }: CloseUp,
     ) -> Result<RgbImage, SensingError> {
-        let render_scene = self.built_scene()?;
         let colours = |(body, x): (usize, &Vec<Vec3>)| {
             self.strain_ratios(body, x).into_iter().map(strain_colour).collect()
         };
         let colours: Vec<Vec<[f32; 3]>> = frame.nodes.iter().enumerate().map(colours).collect();
+        let camera = close_up_camera(&self.objects[index], frame, edge, CLOSE_UP_DISTANCE);
+        let camera = if cuts_foreground { self.cut(index, camera, CLOSE_UP_DISTANCE) } else { camera };
+        self.without_robot(frame, &colours, &camera)
+    }
+
+    /// A close-up's camera that does not see what is between it and the object, such as the wall of a basket.
+    fn cut(&self, index: usize, camera: Camera, distance: f64) -> Camera {
+        let diagonal = self.objects[index].bounds.size().norm();
+        Camera { near_m: (distance - FOREGROUND) * diagonal, ..camera }
+    }
+
+    /// Renders what a camera with the hand at the world's origin sees, with colours at the nodes of soft bodies, if
+    /// there are any.
+    fn without_robot(
+        &mut self,
+        frame: &WorldSnapshot,
+        colours: &[Vec<[f32; 3]>],
+        camera: &Camera,
+    ) -> Result<RgbImage, SensingError> {
+        let render_scene = self.built_scene()?;
         let view = FrameView {
-            node_colours: &colours,
+            node_colours: colours,
             hidden_id: ROBOT_SEGMENTATION_ID,
             hand_w: Some(Pose::identity()),
             ..self.view(frame)
         };
-        let camera = close_up_camera(&self.objects[index], frame, edge);
-        let image = self.close_up_renderer.render(&render_scene, &view, &camera)?;
+        let image = self.close_up_renderer.render(&render_scene, &view, camera)?;
         Ok(image.into_rgb_image())
     }
 
@@ -480,9 +507,11 @@ const CLOSE_UP_FROM: [f64; 3] = [0.8, -0.45, 0.5];
 /// Field of view of a close-up, rad, and its distance from the object, in diagonals of its bounds.
 const CLOSE_UP_FOVY: f64 = 0.5;
 const CLOSE_UP_DISTANCE: f64 = 2.6;
+/// Distance from the object, in diagonals of its bounds, beyond which a cut foreground ends.
+const FOREGROUND: f64 = 0.55;
 
-/// A camera that looks at an object from nearby, always along the same direction.
-fn close_up_camera(object: &ObjectInstance, frame: &WorldSnapshot, edge: usize) -> Camera {
+/// A camera that looks at an object from a distance in diagonals of its bounds, always along the same direction.
+fn close_up_camera(object: &ObjectInstance, frame: &WorldSnapshot, edge: usize, distance: f64) -> Camera {
     let centre = match object.body {
         BodyId::Soft(id) => frame.soft(id).iter().sum::<Vec3>() / frame.soft(id).len().max(1) as f64,
         BodyId::Rigid(id) => (frame.rigid(id) * Point3::from(object.bounds.centre())).coords,
@@ -495,7 +524,7 @@ fn close_up_camera(object: &ObjectInstance, frame: &WorldSnapshot, edge: usize) 
         }
     };
     let away = Vec3::from(CLOSE_UP_FROM).normalize();
-    let eye = centre + away * (CLOSE_UP_DISTANCE * object.bounds.size().norm());
+    let eye = centre + away * (distance * object.bounds.size().norm());
     let pose = Pose::from_parts(eye.into(), Quat::face_towards(&away, &Vec3::z()));
     Camera {
         name: "close_up".to_owned(),

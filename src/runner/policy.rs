@@ -58,6 +58,42 @@ impl PolicyOptions {
     pub fn new(source: PolicySource) -> Self {
         Self { source, ..Self::default() }
     }
+
+    /// These options for each of several policies. A policy goes without those that act on others of them only; an
+    /// option that acts on none is left to [`PolicyConfig::load`] to refuse.
+    pub fn shared_by(&self, sources: &[PolicySource]) -> Vec<Self> {
+        let of = |source: &PolicySource| Self { source: source.clone(), ..self.clone() };
+        let acts_somewhere =
+            |option: &str| sources.iter().any(|source| !of(source).without_effect().contains(&option));
+        let shared = sources.iter().map(|source| {
+            let mut options = of(source);
+            for option in options.without_effect().into_iter().filter(|option| acts_somewhere(option)) {
+                match option {
+                    "profile" => options.profile = None,
+                    "protocol" => options.protocol = None,
+                    "gripper" => options.gripper = None,
+                    "timeout" => options.timeout = None,
+                    _ => options.replan = None,
+                }
+            }
+            options
+        });
+        shared.collect()
+    }
+
+    /// Names of the options that the policy would ignore.
+    fn without_effect(&self) -> Vec<&'static str> {
+        let is_server = matches!(self.source, PolicySource::Server(_));
+        let is_lua = matches!(self.source, PolicySource::Lua(_));
+        let options = [
+            ("profile", self.profile.is_some() && !is_server),
+            ("protocol", self.protocol.is_some() && !is_server),
+            ("gripper", self.gripper.is_some() && !is_server && !is_lua),
+            ("timeout", self.timeout.is_some() && !is_server),
+            ("replan", self.replan.is_some() && !is_server && !is_lua),
+        ];
+        options.into_iter().filter(|(_, is_ignored)| *is_ignored).map(|(option, _)| option).collect()
+    }
 }
 
 /// Sources of policies.
@@ -191,7 +227,7 @@ impl BuiltinPolicy {
 
 impl PolicySource {
     /// As it was typed.
-    fn word(&self) -> String {
+    pub fn word(&self) -> String {
         match self {
             Self::Builtin(policy) => policy.name().to_owned(),
             Self::Lua(path) | Self::Run(path) => path.display().to_string(),
@@ -591,16 +627,7 @@ fn load_profile_of(args: &PolicyOptions) -> Result<(Profile, BTreeMap<String, St
 
 /// Refuses options that the policy would ignore.
 fn refuse_options_without_effect(args: &PolicyOptions) -> Result<(), RunError> {
-    let is_server = matches!(args.source, PolicySource::Server(_));
-    let is_lua = matches!(args.source, PolicySource::Lua(_));
-    let options = [
-        ("profile", args.profile.is_some() && !is_server),
-        ("protocol", args.protocol.is_some() && !is_server),
-        ("gripper", args.gripper.is_some() && !is_server && !is_lua),
-        ("timeout", args.timeout.is_some() && !is_server),
-        ("replan", args.replan.is_some() && !is_server && !is_lua),
-    ];
-    let Some((option, _)) = options.into_iter().find(|(_, is_ignored)| *is_ignored) else { return Ok(()) };
+    let Some(option) = args.without_effect().first().copied() else { return Ok(()) };
     let of_both = ["replan", "gripper"].contains(&option);
     let kinds = if of_both { "policy servers and Lua policies" } else { "policy servers" };
     let policy = args.source.word();
@@ -654,5 +681,16 @@ mod tests {
         ] {
             assert!(message(options).starts_with(&format!("{flag}: applies to policy servers only")));
         }
+    }
+
+    #[test]
+    fn several_policies_share_the_options_that_act_on_any_of_them() {
+        let [noop, server] = ["noop", "ws://x:1"].map(|word| word.parse::<PolicySource>().unwrap());
+        let options = PolicyOptions { replan: Some(3), profile: Some("vision".into()), ..Default::default() };
+        let shared = options.shared_by(&[noop.clone(), server]);
+        assert_eq!((shared[0].replan, &shared[0].profile), (None, &None));
+        assert_eq!((shared[1].replan, shared[1].profile.as_deref()), (Some(3), Some("vision")));
+        let ignored = options.shared_by(&[noop]);
+        assert!(PolicyConfig::load(&ignored[0]).is_err(), "an option that acts on none is refused");
     }
 }

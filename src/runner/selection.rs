@@ -120,7 +120,7 @@ pub fn check_parent_folder(config: &RunConfig) -> Result<(), RunError> {
 }
 
 /// Replaces characters of a name that a script could use to leave the output folder.
-pub(crate) fn path_component(name: &str) -> String {
+pub fn path_component(name: &str) -> String {
     name.replace(|c: char| !(c.is_alphanumeric() || c == '_' || c == '-'), "_")
 }
 

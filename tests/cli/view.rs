@@ -65,6 +65,54 @@ fn view_writes_identical_stills_and_video_each_time() {
 }
 
 #[test]
+fn several_policies_are_shown_side_by_side() {
+    let project = short();
+    let words = "view x.lua --policy expert --policy expert-binary --out seen";
+    let output = project.succeeds(words);
+    let lines: Vec<&str> = output.out.lines().collect();
+    let [expert, binary, page, video] = lines[..] else { panic!("{}", output.out) };
+    assert!(expert.starts_with("expert: ○ goal missed: D ") && binary.starts_with("expert-binary: ○ "));
+    assert_eq!([page, video], ["seen/index.html", "seen/episode.mp4"]);
+    let shown = project.text(page);
+    assert!(shown.contains(expert) && shown.contains(binary), "{shown}");
+    assert_eq!(shown.matches("<img ").count(), 2 * 3 * (6 + 2 * 2));
+    assert!(project.path("seen/expert-binary/worst_wrist.png").is_file());
+    assert!(!project.path("seen/expert/episode.mp4").exists(), "one video of both");
+    let still = |out: &str| fs::read(project.path(&format!("{out}/episode.png"))).expect("written");
+    assert_eq!(png_size(&still("seen"))[0], 1024);
+    assert!(shows_something(&still("seen"), png_size(&still("seen"))));
+    for out in ["first", "second"] {
+        project.succeeds(&format!("view x.lua --policy noop --policy random --policy expert --out {out}"));
+    }
+    assert_eq!(png_size(&still("first"))[0], 1296, "three columns");
+    for file in ["episode.mp4", "episode.png", "index.html", "random/end_third_person.png"] {
+        let of = |out: &str| fs::read(project.path(&format!("{out}/{file}"))).expect("written");
+        assert!(of("first") == of("second"), "{file}");
+    }
+}
+
+#[test]
+fn views_of_policies_that_cannot_be_compared_are_refused() {
+    let project = short();
+    for (flags, message) in [
+        ("--policy noop --policy noop", "--policy noop: named twice; name each policy once"),
+        ("--policy noop --policy random --name a", "--name: applies to one policy"),
+        ("--policy noop --policy random --replan 2", "the policy noop ignores it"),
+        (
+            "--policy noop --policy random --policy expert --policy drives --policy one-force",
+            "--policy: expected at most 4 policies side by side, got 5",
+        ),
+        ("--policy noop --policy exprt", "did you mean expert?"),
+    ] {
+        let output = project.refusal(&format!("view x.lua {flags} --out seen"));
+        assert!(output.contains(message), "{flags}\n{output}");
+    }
+    let message = project.refusal("x.lua --policy noop --policy random --out run");
+    assert!(message.contains("'--policy <POLICY>' cannot be used multiple times"), "{message}");
+    assert!(!project.path("seen").exists());
+}
+
+#[test]
 fn native_stills_have_the_native_size() {
     let project = short();
     project.succeeds("view x.lua --full-size --policy noop --out seen");

@@ -1,22 +1,30 @@
 //! `softvt view`: one episode as a video and stills.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use crate::{
-    args::{PolicyArgs, Request, ScriptArgs, parse_folder, select_one_task},
+    args::{ComparedPolicyArgs, Request, ScriptArgs, parse_folder, select_one_task},
     error::CliError,
     output::{Progress, print},
 };
 use softvt_benchmark::{CONTROL_DT, Plan};
-use softvt_common::cancel;
-use softvt_common::files;
+use softvt_common::{cancel, files, parallel};
+use softvt_records::record::EpisodeRecord;
 use softvt_report::{
-    episode_page,
-    video::{VideoCaption, worst_state, write_stills, write_video, write_video_frame},
+    episode_page::{self, PolicyPart},
+    video::{
+        VideoCaption,
+        side_by_side::{self, PolicyEpisode},
+        worst_state, write_stills, write_video, write_video_frame,
+    },
 };
-use softvt_runner::{ConfiguredScript, EpisodeJob, EpisodeList, RunConfig, SuiteRun};
+use softvt_rollout::{FinishedEpisode, StateRecording};
+use softvt_runner::{
+    ConfiguredScript, EpisodeJob, EpisodeList, PreparedRun, RunConfig, RunError, SuiteRun,
+    selection::path_component,
+};
 
 /// Render one episode: a video, and stills of every camera and tactile sensor
 #[derive(Args, Clone, Debug)]
@@ -25,7 +33,7 @@ pub(crate) struct ViewArgs {
     #[command(flatten)]
     pub(super) script: ScriptArgs,
     #[command(flatten)]
-    policy: PolicyArgs,
+    policies: ComparedPolicyArgs,
     /// The task: its index or part of its prompt
     #[arg(long, value_name = "TASK", default_value = "0")]
     task: String,
@@ -41,48 +49,114 @@ pub(crate) struct ViewArgs {
 }
 
 /// Runs one episode and writes `episode.mp4`, a frame of it as `episode.png`, stills of the first, worst and last state
-/// of every camera and tactile sensor, and a page that shows them. Existing files are replaced.
+/// of every camera and tactile sensor, and a page that shows them. Under several policies, video and frame show them
+/// side by side, and the stills of each are in a folder of its name. Existing files are replaced.
 ///
 /// # Errors
 /// The script is not a suite, the task or episode fails, or a file cannot be rendered or written.
 pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     let tasks = vec![args.task.clone()];
-    let request = Request::new(args.script)?.with(|config| RunConfig { tasks, ..config });
-    let ConfiguredScript { config, script: loaded } = request.load_plan("view", &args.policy)?;
+    let request = Request::new(args.script.clone())?.with(|config| RunConfig { tasks, ..config });
+    let ConfiguredScript { config, script: loaded } = request.load("view")?;
+    let policies = args.policies.load()?;
     let Plan::Suite(suite) = &loaded.plan else {
         let message = "expected a single suite; name a file that returns softvt.suite";
         return Err(config.error(message).into());
     };
-    let task = select_one_task(&config, suite)?;
-    let dir = &args.out;
-    let job = EpisodeJob { task, episode: args.episode };
-    let run = SuiteRun::new(&config, &loaded, suite, EpisodeList::listed(vec![job]), dir.clone())?;
-    let run = run.rendered().prepare()?;
-    files::create_folder(dir)?;
+    let job = EpisodeJob { task: select_one_task(&config, suite)?, episode: args.episode };
+    let configs: Vec<RunConfig> =
+        policies.into_iter().map(|policy| config.clone().with_policy(policy)).collect();
+    let prepare = |config| {
+        let run = SuiteRun::new(config, &loaded, suite, EpisodeList::listed(vec![job]), args.out.clone())?;
+        run.rendered().prepare()
+    };
+    let runs: Vec<PreparedRun> = configs.iter().map(prepare).collect::<Result<_, _>>()?;
+    files::create_folder(&args.out)?;
     config.observer.work("simulating the episode");
-    let finished = run.run_episode(job, true, &run.controllers)?;
+    let simulate = |number: usize| runs[number].run_episode(job, true, &runs[number].controllers);
+    let mut episodes = Vec::new();
+    parallel::run_in_order(runs.len(), config.thread_count(), cancel::requested, simulate, |_, finished| {
+        episodes.push(finished);
+        Ok::<_, RunError>(())
+    })?;
     config.observer.end();
-    let caption = VideoCaption::new(&finished.record);
-    let Some(mut states) = finished.recording else { return Ok(()) };
-    let last = states.frames.len().saturating_sub(1);
-    let worst = worst_state(&states);
-    let moments = [("start", 0), ("worst", worst), ("end", last)];
+    let mut seen = Vec::new();
+    for FinishedEpisode { record, recording, .. } in episodes {
+        // A request to stop ends the episodes early.
+        let Some(states) = recording else { return Err(CliError::interrupted("")) };
+        seen.push(SeenEpisode { record, states });
+    }
+    match seen.len() {
+        count if count < runs.len() => Err(CliError::interrupted("")),
+        1 => seen.pop().map_or(Ok(()), |episode| show_one(&args, &config, episode)),
+        _ => show_several(&args, &config, seen),
+    }
+}
+
+/// An episode with its states.
+struct SeenEpisode {
+    record: EpisodeRecord,
+    states: StateRecording,
+}
+
+/// Draws the stills of an episode into a folder.
+fn draw_stills(
+    args: &ViewArgs,
+    config: &RunConfig,
+    states: &mut StateRecording,
+    dir: &Path,
+) -> Result<(), CliError> {
+    let moments =
+        [("start", 0), ("worst", worst_state(states)), ("end", states.frames.len().saturating_sub(1))];
     config.observer.work("drawing the stills");
-    let threads = config.thread_count();
-    write_stills(&mut states, &moments, args.full_size, dir, threads, cancel::requested)?;
-    let still = dir.join("episode.png");
-    write_video_frame(&mut states, &caption, worst, &still)?;
+    write_stills(states, &moments, args.full_size, dir, config.thread_count(), cancel::requested)?;
     config.observer.end();
-    let video = dir.join("episode.mp4");
+    Ok(())
+}
+
+/// Draws an episode under one policy.
+fn show_one(args: &ViewArgs, config: &RunConfig, seen: SeenEpisode) -> Result<(), CliError> {
+    let SeenEpisode { record, mut states } = seen;
+    let (dir, caption, worst) = (&args.out, VideoCaption::new(&record), worst_state(&states));
+    draw_stills(args, config, &mut states, dir)?;
+    write_video_frame(&mut states, &caption, worst, &dir.join(episode_page::FRAME))?;
+    let video = dir.join(episode_page::VIDEO);
     let progress = Progress::new(states.frames.len(), "rendering the video");
+    let threads = config.thread_count();
     write_video(&mut states, &caption, &video, threads, cancel::requested, || progress.step())?;
     drop(progress);
     let worst_time_s = worst as f64 * CONTROL_DT;
-    episode_page::write(&finished.record, worst_time_s, dir)?;
-    print(&format!(
-        "{}\n{}\n{}\n",
-        episode_page::sentence(&finished.record, worst_time_s),
-        dir.join(episode_page::PAGE).display(),
-        video.display()
-    ))
+    episode_page::write(&record, worst_time_s, dir)?;
+    print_seen(dir, &[episode_page::sentence(&record, worst_time_s)])
+}
+
+/// Draws an episode under several policies, side by side.
+fn show_several(args: &ViewArgs, config: &RunConfig, seen: Vec<SeenEpisode>) -> Result<(), CliError> {
+    let dir = &args.out;
+    let (mut parts, mut episodes) = (Vec::<PolicyPart>::new(), Vec::new());
+    for SeenEpisode { record, mut states } in seen {
+        let mut folder = path_component(&record.header.policy);
+        if parts.iter().any(|part| part.folder == folder) {
+            folder = format!("{folder}_{}", parts.len() + 1);
+        }
+        files::create_folder(&dir.join(&folder))?;
+        draw_stills(args, config, &mut states, &dir.join(&folder))?;
+        let worst_time_s = worst_state(&states) as f64 * CONTROL_DT;
+        episodes.push(PolicyEpisode::new(&record, states));
+        parts.push(PolicyPart { record, worst_time_s, folder });
+    }
+    let worst = side_by_side::worst_moment(&episodes);
+    side_by_side::write_video_frame(&mut episodes, worst, &dir.join(episode_page::FRAME))?;
+    let progress = Progress::new(side_by_side::state_count(&episodes), "rendering the video");
+    let (video, threads) = (dir.join(episode_page::VIDEO), config.thread_count());
+    side_by_side::write_video(&mut episodes, &video, threads, cancel::requested, || progress.step())?;
+    drop(progress);
+    episode_page::write_several(&parts, dir)?;
+    print_seen(dir, &parts.iter().map(PolicyPart::sentence).collect::<Vec<_>>())
+}
+
+/// Prints what was seen, and where.
+fn print_seen(dir: &Path, sentences: &[String]) -> Result<(), CliError> {
+    let (page, video) = (dir.join(episode_page::PAGE), dir.join(episode_page::VIDEO));
+    print(&format!("{}\n{}\n{}\n", sentences.join("\n"), page.display(), video.display()))
 }

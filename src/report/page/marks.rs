@@ -1,19 +1,9 @@
 //! Marks that the figures of the page share: places in percent of the width, so that text does not shrink on narrow
-//! screens, and the axis of D/τ.
+//! screens.
 
 use maud::{Markup, html};
 
 use softvt_evaluation::category::EpisodeCategory;
-
-/// Ends of the logarithmic axis of D/τ, the same for all figures. Values beyond are arrows at its ends.
-const D_OVER_TAU: [f64; 2] = [0.05, 50.0];
-/// Labelled values of that axis.
-pub(super) const D_TICKS: [f64; 6] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0];
-
-/// Place of D/τ on the axis, 0 to 1 within its ends.
-pub(super) fn d_share(d_over_tau: f64) -> f64 {
-    (d_over_tau.max(f64::MIN_POSITIVE) / D_OVER_TAU[0]).ln() / (D_OVER_TAU[1] / D_OVER_TAU[0]).ln()
-}
 
 /// Coordinate at a fraction of the width.
 pub(super) fn x(fraction: f64) -> String {

@@ -2,8 +2,11 @@
 
 use maud::{Markup, html};
 
-use super::marks::{D_TICKS, d_share, legend, mark, vertical_lines, x, y};
-use crate::run_summary::RunSummary;
+use super::marks::{legend, mark, vertical_lines, x, y};
+use crate::{
+    d_axis::{D_TICKS, d_share},
+    run_summary::RunSummary,
+};
 use softvt_evaluation::{category::EpisodeCategory, statistics::Distribution};
 use softvt_records::paired_stats::d_over_tau;
 

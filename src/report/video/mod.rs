@@ -1,5 +1,8 @@
 //! Videos and still images of episodes: the third-person camera and the target from nearby on top, the wrist camera
-//! and both fingers below them, and the deformation over its limit at the bottom.
+//! and both fingers below them, and the deformation over its limit at the bottom. Those of one episode under several
+//! policies are in [`side_by_side`].
+
+pub mod side_by_side;
 
 use std::{
     path::{Path, PathBuf},
@@ -22,7 +25,8 @@ use softvt_media::{
 use softvt_physics::world::WorldSnapshot;
 use softvt_records::record::EpisodeRecord;
 use softvt_rollout::{
-    CAMERA_IMAGE_SUFFIXES, SensingError, Sensors, StateRecording, TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES,
+    CAMERA_IMAGE_SUFFIXES, CloseUp, SensingError, Sensors, StateRecording, TACTILE_IMAGE_SUFFIXES,
+    TACTILE_IMAGES,
 };
 use softvt_scene::{Camera, STANDARD_CAMERAS};
 use softvt_sensing::{
@@ -123,7 +127,7 @@ pub fn write_video(
     path: &Path,
     threads: usize,
     is_cancelled: impl Fn() -> bool + Sync,
-    mut on_frame: impl FnMut(),
+    on_frame: impl FnMut(),
 ) -> Result<(), EpisodeVideoError> {
     if is_cancelled() {
         return Err(EpisodeVideoError::Interrupted);
@@ -131,19 +135,43 @@ pub fn write_video(
     let shared = SharedSensors::new(&mut recording.sensors)?;
     let recording = &*recording;
     let draw = |index: usize| shared.lend(|sensors| video_frame(sensors, recording, caption, index));
-    let (mut video, mut drawn) = (VideoWriter::new(WIDTH as usize, HEIGHT as usize, CONTROL_HZ)?, 0);
-    let held = (LAST_STATE_S * f64::from(CONTROL_HZ)) as usize;
-    parallel::run_in_order(recording.frames.len(), threads, &is_cancelled, draw, |_, frame| {
-        video.push(&frame)?;
-        drawn += 1;
-        if drawn == recording.frames.len() {
-            (0..held).try_for_each(|_| video.push(&frame))?;
-        }
-        on_frame();
-        Ok::<_, EpisodeVideoError>(())
-    })?;
-    // A request to stop ends the frames early.
-    if drawn < recording.frames.len() { Err(EpisodeVideoError::Interrupted) } else { Ok(video.save(path)?) }
+    let frames = FrameList { size: [WIDTH, HEIGHT], count: recording.frames.len(), draw };
+    frames.encode(path, threads, is_cancelled, on_frame)
+}
+
+/// The frames of a video, which are drawn one by one.
+struct FrameList<D> {
+    /// Width and height, pixels.
+    size: [u32; 2],
+    count: usize,
+    /// Draws the frame of an index.
+    draw: D,
+}
+
+impl<D: Fn(usize) -> Result<RgbImage, EpisodeVideoError> + Sync> FrameList<D> {
+    /// Draws the frames on up to `threads` threads and writes the video, in which the last frame is held.
+    fn encode(
+        self,
+        path: &Path,
+        threads: usize,
+        is_cancelled: impl Fn() -> bool + Sync,
+        mut on_frame: impl FnMut(),
+    ) -> Result<(), EpisodeVideoError> {
+        let [width, height] = self.size.map(|edge| edge as usize);
+        let (mut video, mut drawn) = (VideoWriter::new(width, height, CONTROL_HZ)?, 0);
+        let held = (LAST_STATE_S * f64::from(CONTROL_HZ)) as usize;
+        parallel::run_in_order(self.count, threads, &is_cancelled, &self.draw, |_, frame| {
+            video.push(&frame)?;
+            drawn += 1;
+            if drawn == self.count {
+                (0..held).try_for_each(|_| video.push(&frame))?;
+            }
+            on_frame();
+            Ok::<_, EpisodeVideoError>(())
+        })?;
+        // A request to stop ends the frames early.
+        if drawn < self.count { Err(EpisodeVideoError::Interrupted) } else { Ok(video.save(path)?) }
+    }
 }
 
 /// Sensors of several threads, which share their meshes and have their own working memory.
@@ -197,21 +225,23 @@ fn video_frame(
         Ok(sensors.render(frame, &camera)?.into_rgb_image())
     };
     canvas.place(&seen(sensors, STANDARD_CAMERAS[0], TOP_PANEL)?, 0, 0);
-    draw_label(&mut canvas, "third person", 0, 0);
-    let close_up = sensors.close_up(frame, recording.target, CLOSE_UP_EDGE)?;
+    draw_label(&mut canvas, "third person", 0, 0, PANEL_NAME_SIZE);
+    let close_up =
+        sensors.close_up(frame, recording.target, CloseUp { edge: CLOSE_UP_EDGE, cuts_foreground: false })?;
     canvas.place(&resize(&close_up, TOP_PANEL, TOP_PANEL), TOP_PANEL, 0);
-    draw_label(&mut canvas, "object without the robot, by strain", TOP_PANEL, 0);
+    draw_label(&mut canvas, "object without the robot, by strain", TOP_PANEL, 0, PANEL_NAME_SIZE);
     canvas.place(&seen(sensors, STANDARD_CAMERAS[1], WRIST_PANEL)?, 0, TOP_PANEL);
-    draw_label(&mut canvas, "wrist", 0, TOP_PANEL);
+    draw_label(&mut canvas, "wrist", 0, TOP_PANEL, PANEL_NAME_SIZE);
     for (side, reading) in sensors.tactile_readings(frame)?.iter().enumerate() {
         let image = reading.with_markers(MarkerStyle::Arrows);
         let x = WRIST_PANEL + FINGER_WIDTH * side as u32;
         canvas.place(&resize(&image, FINGER_WIDTH, FINGER_HEIGHT), x, TOP_PANEL);
-        draw_label(&mut canvas, ["left finger", "right finger"][side], x, TOP_PANEL);
+        draw_label(&mut canvas, ["left finger", "right finger"][side], x, TOP_PANEL, PANEL_NAME_SIZE);
         let force = format!("{:.2} N", pad_force(frame, side));
         canvas.write(&force, x as f32 + MARGIN, (TOP_PANEL + FINGER_HEIGHT) as f32 + 32.0, 22.0, TEXT);
     }
-    draw_badge(&mut canvas, recording, caption, index);
+    let badge = Badge::new(recording, caption, index);
+    badge.draw(&mut canvas, WRIST_PANEL as f32 + MARGIN, (TOP_PANEL + FINGER_HEIGHT) as f32 + 60.0, 24.0);
     draw_caption(&mut canvas, recording, caption, index);
     Ok(canvas.to_image())
 }
@@ -228,28 +258,45 @@ fn first_over_limit(recording: &StateRecording, caption: &VideoCaption, index: u
     recording.worst_d_pct.iter().take(index + 1).position(|d| d.is_some_and(|d| d > tau))
 }
 
-/// Draws the verdict so far, or the final one, below the fingers.
-fn draw_badge(canvas: &mut Canvas, recording: &StateRecording, caption: &VideoCaption, index: usize) {
-    let over = first_over_limit(recording, caption, index);
-    let is_last = index + 1 == recording.frames.len();
-    let (text, colour) = match (is_last, caption.tau_pct, over) {
-        (true, _, _) => (caption.verdict.clone(), if caption.is_safe { SAFE } else { HARM }),
-        (false, None, _) => ("no limit of the deformation".to_owned(), FAINT),
-        (false, Some(_), None) => ("within the limit so far".to_owned(), SAFE),
-        (false, Some(_), Some(at)) => (format!("over the limit since {:.2} s", at as f64 * CONTROL_DT), HARM),
-    };
-    let (x, y) = (WRIST_PANEL as f32 + MARGIN, (TOP_PANEL + FINGER_HEIGHT) as f32 + 60.0);
-    let width = canvas.text_width(&text, 24.0);
-    canvas.fill(x, y, width + 32.0, 48.0, colour, 1.0);
-    canvas.write(&text, x + 16.0, y + 33.0, 24.0, BACKGROUND);
+/// A verdict in words, and the colour of its ground.
+struct Badge {
+    text: String,
+    colour: Rgb8,
 }
 
-/// Draws the name of a panel in its corner.
-fn draw_label(canvas: &mut Canvas, name: &str, x: u32, y: u32) {
+impl Badge {
+    /// The verdict so far in the state `index`, or the final one in the last state.
+    fn new(recording: &StateRecording, caption: &VideoCaption, index: usize) -> Self {
+        let over = first_over_limit(recording, caption, index);
+        let is_last = index + 1 == recording.frames.len();
+        let (text, colour) = match (is_last, caption.tau_pct, over) {
+            (true, _, _) => (caption.verdict.clone(), if caption.is_safe { SAFE } else { HARM }),
+            (false, None, _) => ("no limit of the deformation".to_owned(), FAINT),
+            (false, Some(_), None) => ("within the limit so far".to_owned(), SAFE),
+            (false, Some(_), Some(at)) => {
+                (format!("over the limit since {:.2} s", at as f64 * CONTROL_DT), HARM)
+            }
+        };
+        Self { text, colour }
+    }
+
+    /// Draws the badge with text of this size; (x, y) is its upper left corner.
+    fn draw(&self, canvas: &mut Canvas, x: f32, y: f32, size: f32) {
+        let width = canvas.text_width(&self.text, size);
+        canvas.fill(x, y, width + size * 4.0 / 3.0, 2.0 * size, self.colour, 1.0);
+        canvas.write(&self.text, x + size * 2.0 / 3.0, y + 1.375 * size, size, BACKGROUND);
+    }
+}
+
+/// Size of the names of panels, pixels.
+const PANEL_NAME_SIZE: f32 = 19.0;
+
+/// Draws the name of a panel in its corner, with letters of this size.
+fn draw_label(canvas: &mut Canvas, name: &str, x: u32, y: u32, size: f32) {
     let (x, y) = (x as f32, y as f32);
-    let width = canvas.text_width(name, 19.0);
-    canvas.fill(x + 8.0, y + 8.0, width + 16.0, 26.0, [0, 0, 0], 0.45);
-    canvas.write(name, x + 16.0, y + 27.0, 19.0, [255, 255, 255]);
+    let width = canvas.text_width(name, size);
+    canvas.fill(x + 8.0, y + 8.0, width + 16.0, size + 7.0, [0, 0, 0], 0.45);
+    canvas.write(name, x + 16.0, y + 8.0 + size, size, [255, 255, 255]);
 }
 
 fn draw_caption(canvas: &mut Canvas, recording: &StateRecording, caption: &VideoCaption, index: usize) {
