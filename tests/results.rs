@@ -19,11 +19,34 @@ fn the_published_tables_are_those_of_the_summaries() {
         (collected::read(root).expect("summaries"), collected::labels(root).expect("labels"));
     let physics = collected::physics(root).expect("a golden state");
     let readme = fs::read_to_string(root.join("README.md")).expect("a README");
-    let expected = tables::replaced(&readme, &tables::overview(&results, &labels, &physics));
+    let expected = tables::written(&readme, &results, &labels, &physics);
     let expected = expected.expect("a place for the tables");
     assert_eq!(readme, expected, "run .ci/regenerate results");
     let page = fs::read_to_string(root.join(tables::PAGE)).expect("a page");
     assert_eq!(page, tables::page(&results, &labels, &physics), "run .ci/regenerate results");
+}
+
+#[test]
+fn the_first_screen_shows_the_bound_without_touch() {
+    let cell = |name: &str, safety: f64| {
+        let rate = |rate: f64| json!({ "rate": rate, "wilson95": [rate, rate] });
+        json!({
+            "name": name, "goal_success_rate": rate(90.0), "safety_success_rate": rate(safety), "d_over_tau_median": 1.0,
+        })
+    };
+    let controllers =
+        [cell("expert", 99.0), cell("look-retry", 60.0), cell("drives", 30.0), cell("one-force", 40.0)];
+    let suites = vec![json!({ "name": "object_hidden", "controllers": controllers })];
+    let hidden = collected::Results { script: "suites/hidden.lua".to_owned(), has_conditions: false, suites };
+    let table = tables::first_screen(&[hidden], &json!({ "expert": "knows the object" }));
+    assert_eq!(
+        table,
+        "|  | Object-Hidden: Goal % | Safety % |\n|---|---:|---:|\n\
+         | `expert`: knows the object | 90.0 | 99.0 [99.0, 99.0] |\n| `tactile-servo` | – | – |\n\
+         | `look-retry` | 90.0 | 60.0 [60.0, 60.0] |\n\
+         | [bound without touch](docs/touch.md): `one-force` | 90.0 | 40.0 [40.0, 40.0] |\n| `expert-binary` | – | – |\n",
+        "look-retry adapts its grip, so it is not among those of the bound"
+    );
 }
 
 /// Writes a run of `suite` with two episodes, of which one is safe.
@@ -82,15 +105,15 @@ fn rows_and_columns_follow_the_runs() {
     let overview = tables::overview(&results, &labels, "abc");
     assert_eq!(
         overview,
-        "`softvt suites/controllers.lua --episodes 2`: 2 episodes per cell. Goal / Safety in %, with the 95 % interval of Safety. No episode was invalid. \
+        "`softvt suites/controllers.lua --episodes 2`: 2 episodes per row and suite; the brackets are the 95 % interval of Safety. No episode was invalid. \
          All controllers plan from ground-truth state (*privileged*).\n\n\
-         |  | One-Varied | Two |\n|---|---|---|\n\
-         | `expert` | 100.0 / 50.0 [25.0, 50.0] | 100.0 / 50.0 [25.0, 50.0] |\n\
-         | `size-seen`: sees the size | 100.0 / 50.0 [25.0, 50.0] | 100.0 / 50.0 [25.0, 50.0] |\n\n\
-         `softvt suites/all.lua --episodes 2 --policy NAME` for each controller: 2 episodes per cell. Goal / Safety in %, with the 95 % interval of Safety. No episode was invalid. All controllers \
+         |  | One-Varied: Goal % | Safety % | Two: Goal % | Safety % |\n|---|---:|---:|---:|---:|\n\
+         | `expert` | 100.0 | 50.0 [25.0, 50.0] | 100.0 | 50.0 [25.0, 50.0] |\n\
+         | `size-seen`: sees the size | 100.0 | 50.0 [25.0, 50.0] | 100.0 | 50.0 [25.0, 50.0] |\n\n\
+         `softvt suites/all.lua --episodes 2 --policy NAME` for each controller: 2 episodes per row and suite; the brackets are the 95 % interval of Safety. No episode was invalid. All controllers \
          plan from ground-truth state (*privileged*).\n\n\
-         |  | One |\n|---|---|\n\
-         | `expert` | 100.0 / 50.0 [25.0, 50.0] |\n| `binary` | 100.0 / 50.0 [25.0, 50.0] |\n"
+         |  | One: Goal % | Safety % |\n|---|---:|---:|\n\
+         | `expert` | 100.0 | 50.0 [25.0, 50.0] |\n| `binary` | 100.0 | 50.0 [25.0, 50.0] |\n"
     );
     assert!(
         tables::overview(&results, &labels, "abcd")

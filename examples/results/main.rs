@@ -19,7 +19,7 @@ fn main() -> Result<(), String> {
     let (results, labels, physics) =
         (collected::read(root)?, collected::labels(root)?, collected::physics(root)?);
     let readme = fs::read_to_string("README.md").map_err(|error| format!("README.md: {error}"))?;
-    write("README.md", &tables::replaced(&readme, &tables::overview(&results, &labels, &physics))?)?;
+    write("README.md", &tables::written(&readme, &results, &labels, &physics)?)?;
     write(tables::PAGE, &tables::page(&results, &labels, &physics))
 }
 

@@ -1,28 +1,81 @@
 //! The tables of results, in Markdown.
 
 use serde_json::Value;
+use softvt::runner::PolicyConfig;
 
 use crate::collected::Results;
 
 /// The file with all columns.
 pub const PAGE: &str = "docs/results/README.md";
 
-/// The tables of the README stand between these lines.
-const BEGIN: &str = "<!-- results:begin -->\n";
-const END: &str = "<!-- results:end -->";
+/// Names of the marked parts of the README: the table of its first screen, and those of all results.
+const FIRST_SCREEN: &str = "verdicts";
+const ALL: &str = "results";
+/// Script of the runs on the first screen.
+const FIRST_SCRIPT: &str = "suites/hidden.lua";
+/// Controllers on the first screen above and below the bound without touch.
+const ABOVE_BOUND: [&str; 3] = ["expert", "tactile-servo", "look-retry"];
+const BELOW_BOUND: [&str; 1] = ["expert-binary"];
 
-/// The README with new tables.
+/// The README with new tables, if it has places for them.
 ///
 /// # Errors
-/// If it does not have the lines around them once each.
-pub fn replaced(readme: &str, tables: &str) -> Result<String, String> {
-    let parts = readme.split_once(BEGIN).and_then(|(before, rest)| Some((before, rest.split_once(END)?.1)));
+/// If it does not have the lines around a part once each.
+pub fn written(readme: &str, results: &[Results], labels: &Value, physics: &str) -> Result<String, String> {
+    let readme = replaced(readme, FIRST_SCREEN, &first_screen(results, labels))?;
+    replaced(&readme, ALL, &overview(results, labels, physics))
+}
+
+/// The README with a new part of a name.
+///
+/// # Errors
+/// If it does not have the lines around the part once each.
+fn replaced(readme: &str, name: &str, tables: &str) -> Result<String, String> {
+    let (begin, end) = (format!("<!-- {name}:begin -->\n"), format!("<!-- {name}:end -->"));
+    let parts = readme.split_once(&begin).and_then(|(before, rest)| Some((before, rest.split_once(&end)?.1)));
     match parts {
-        Some((before, after)) if readme.matches(BEGIN).count() + readme.matches(END).count() == 2 => {
-            Ok(format!("{before}{BEGIN}{tables}{END}{after}"))
+        Some((before, after)) if readme.matches(&begin).count() + readme.matches(&end).count() == 2 => {
+            Ok(format!("{before}{begin}{tables}{end}{after}"))
         }
-        _ => Err(format!("README.md: expected the lines {BEGIN} and {END} once each, around the tables")),
+        _ => Err(format!("README.md: expected the lines {begin} and {end} once each, around the tables")),
     }
+}
+
+/// Both verdicts in the suites that need touch: of controllers at both ends, and the bound without touch.
+pub fn first_screen(results: &[Results], labels: &Value) -> String {
+    let Some(one) = results.iter().find(|one| one.script == FIRST_SCRIPT) else { return String::new() };
+    let mut text = verdict_header(&one.suites);
+    let shown = |cells: Vec<Option<&Value>>, name: String| {
+        row(std::iter::once(name).chain(cells.into_iter().flat_map(verdicts)))
+    };
+    let of =
+        |name: &str| shown(one.suites.iter().map(|suite| found(suite, name)).collect(), label(labels, name));
+    let best: Vec<Option<&Value>> = one.suites.iter().map(blind_bound).collect();
+    let mut names: Vec<&str> = best.iter().flatten().filter_map(|cell| cell["name"].as_str()).collect();
+    names.dedup();
+    let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+    text += &ABOVE_BOUND.map(of).concat();
+    text += &shown(best, format!("[bound without touch](docs/touch.md): {}", names.join(", ")));
+    text + &BELOW_BOUND.map(of).concat()
+}
+
+/// The controller of a suite with the highest Safety among those that keep one number constant.
+fn blind_bound(suite: &Value) -> Option<&Value> {
+    let is_bound = |cell: &&Value| {
+        let name = cell["name"].as_str().unwrap_or_default();
+        PolicyConfig::named(name).is_ok_and(|policy| policy.is_blind_bound())
+    };
+    let safety = |cell: &Value| cell["safety_success_rate"]["rate"].as_f64().unwrap_or(-1.0);
+    let cells = suite["controllers"].as_array()?.iter().filter(is_bound);
+    cells.max_by(|a, b| safety(a).total_cmp(&safety(b)))
+}
+
+/// Two columns for the verdicts of each suite.
+fn verdict_header(suites: &[Value]) -> String {
+    let names = suites.iter().filter_map(|suite| suite["name"].as_str());
+    let columns: Vec<String> =
+        names.flat_map(|name| [format!("{}: Goal %", title(name)), "Safety %".to_owned()]).collect();
+    format!("|  | {} |\n|---|{}\n", columns.join(" | "), "---:|".repeat(columns.len()))
 }
 
 /// One table per script: controllers × suites. Suites that an earlier table shows are left out. Results of another
@@ -34,13 +87,10 @@ pub fn overview(results: &[Results], labels: &Value, physics: &str) -> String {
                 .iter()
                 .any(|before| before.suites.iter().any(|known| known["name"] == suite["name"]))
         };
-        let suites: Vec<&Value> = one.suites.iter().filter(|suite| !is_known(suite)).collect();
-        let names: Vec<&str> = suites.iter().filter_map(|suite| suite["name"].as_str()).collect();
-        let mut text = format!("{}\n\n", caption(one));
-        text += &header(std::iter::once(String::new()).chain(names.iter().map(|name| title(name))));
+        let suites: Vec<Value> = one.suites.iter().filter(|suite| !is_known(suite)).cloned().collect();
+        let mut text = format!("{}\n\n", caption(one)) + &verdict_header(&suites);
         for controller in controllers(one) {
-            let cells =
-                suites.iter().map(|suite| found(suite, &controller).map_or_else(|| "–".to_owned(), verdicts));
+            let cells = suites.iter().flat_map(|suite| verdicts(found(suite, &controller)));
             text += &row(std::iter::once(label(labels, &controller)).chain(cells));
         }
         text
@@ -127,7 +177,7 @@ fn caption(one: &Results) -> String {
     };
     let each = if one.has_conditions { "" } else { " for each controller" };
     format!(
-        "`{}`{each}: {episodes} episodes per cell. Goal / Safety in %, with the 95 % interval of Safety. {invalid}{privileged}.",
+        "`{}`{each}: {episodes} episodes per row and suite; the brackets are the 95 % interval of Safety. {invalid}{privileged}.",
         command(one)
     )
 }
@@ -171,9 +221,12 @@ fn title(name: &str) -> String {
     name.split('_').filter(|word| !word.is_empty()).map(capital).collect::<Vec<_>>().join("-")
 }
 
-/// Goal and Safety with its interval.
-fn verdicts(cell: &Value) -> String {
-    format!("{} / {}", number(&cell["goal_success_rate"]["rate"], 1), safety(cell))
+/// Goal, and Safety with its interval.
+fn verdicts(cell: Option<&Value>) -> [String; 2] {
+    cell.map_or_else(
+        || ["–".to_owned(), "–".to_owned()],
+        |cell| [number(&cell["goal_success_rate"]["rate"], 1), safety(cell)],
+    )
 }
 
 /// Safety with its interval. Where no object has a limit, Safety does not apply.

@@ -1,7 +1,9 @@
-//! Drawing on images ([`canvas`]), plots as SVG ([`chart`], [`plot`], [`log_plot`], [`histogram`]) of the same elements
-//! ([`svg`]), axes ([`ticks`]) and colours ([`palette`]), and video files ([`video`]).
+//! Drawing on images ([`canvas`]), plots as SVG ([`chart`], [`plot`], [`log_plot`], [`histogram`]) of the
+//! same elements ([`svg`]), axes ([`ticks`]) and colours ([`palette`]), and files of moving pictures ([`video`],
+//! [`animation`]).
 #![warn(missing_docs, unreachable_pub)]
 
+pub mod animation;
 pub mod canvas;
 pub mod chart;
 pub mod histogram;

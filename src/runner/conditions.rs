@@ -20,7 +20,7 @@ use softvt_report::{
     condition_table::{ConditionOutcome, ConditionRow, ConditionTable},
     run_folder::RunFolder,
 };
-use softvt_script::{ExpertGrip, LoadedScript};
+use softvt_script::LoadedScript;
 
 /// Name of the file with the comparison of all suites, in the folder above all runs.
 pub const FILE: &str = "conditions.json";
@@ -215,7 +215,7 @@ fn compare_conditions(
             shift: case.condition.shift.clone(),
             set: case.condition.set.clone(),
             policy: case.condition.policy.clone(),
-            blind: is_blind(&case.config.policy),
+            blind: case.config.policy.is_blind_bound(),
             outcome,
             not_applicable: case.not_applicable.clone(),
         });
@@ -223,11 +223,6 @@ fn compare_conditions(
     let deformable = suite.object_type == ObjectType::Deformable && !config.rigid_twin;
     let policy = method_label(&config.policy.name, config.policy.privileged, force_observed);
     Ok(ConditionTable { suite: config.suite_name(suite), policy, deformable, rows })
-}
-
-/// True for a bound of what can be done without touch.
-fn is_blind(policy: &PolicyConfig) -> bool {
-    matches!(policy.expert(), Some(ExpertGrip::Blind(grip)) if grip.is_bound())
 }
 
 /// The content of `conditions.json`.

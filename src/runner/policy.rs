@@ -490,6 +490,11 @@ impl PolicyConfig {
         }
     }
 
+    /// True for a bound of what can be done without touch: a grip that keeps one number constant.
+    pub fn is_blind_bound(&self) -> bool {
+        matches!(self.expert(), Some(ExpertGrip::Blind(grip)) if grip.is_bound())
+    }
+
     /// The server of the policy, if it has one.
     pub(crate) fn server(&self) -> Option<&PolicyServer> {
         match &self.kind {

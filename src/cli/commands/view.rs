@@ -43,6 +43,9 @@ pub(crate) struct ViewArgs {
     /// Stills at the full size of the cameras: 1024 and 512 pixels instead of 224
     #[arg(long)]
     full_size: bool,
+    /// Also write animation.png, a loop at twice the speed for web pages, 320 pixels wide per policy
+    #[arg(long)]
+    animation: bool,
     /// Output folder
     #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     out: PathBuf,
@@ -125,6 +128,9 @@ fn show_one(args: &ViewArgs, config: &RunConfig, seen: SeenEpisode) -> Result<()
     let threads = config.thread_count();
     write_video(&mut states, &caption, &video, threads, cancel::requested, || progress.step())?;
     drop(progress);
+    if args.animation {
+        animate(args, config, &mut [PolicyEpisode::new(&record, states)])?;
+    }
     let worst_time_s = worst as f64 * CONTROL_DT;
     episode_page::write(&record, worst_time_s, dir)?;
     print_seen(dir, &[episode_page::sentence(&record, worst_time_s)])
@@ -151,8 +157,20 @@ fn show_several(args: &ViewArgs, config: &RunConfig, seen: Vec<SeenEpisode>) -> 
     let (video, threads) = (dir.join(episode_page::VIDEO), config.thread_count());
     side_by_side::write_video(&mut episodes, &video, threads, cancel::requested, || progress.step())?;
     drop(progress);
+    if args.animation {
+        animate(args, config, &mut episodes)?;
+    }
     episode_page::write_several(&parts, dir)?;
     print_seen(dir, &parts.iter().map(PolicyPart::sentence).collect::<Vec<_>>())
+}
+
+/// Writes the episodes as a loop for web pages.
+fn animate(args: &ViewArgs, config: &RunConfig, episodes: &mut [PolicyEpisode]) -> Result<(), CliError> {
+    config.observer.work("rendering the animation");
+    let path = args.out.join("animation.png");
+    side_by_side::write_animation(episodes, &path, config.thread_count(), cancel::requested)?;
+    config.observer.end();
+    Ok(())
 }
 
 /// Prints what was seen, and where.

@@ -19,6 +19,7 @@ use softvt_common::{
 };
 use softvt_evaluation::category::EpisodeCategory;
 use softvt_media::{
+    animation::AnimationError,
     canvas::{Canvas, Rgb8},
     video::{VideoError, VideoWriter},
 };
@@ -73,6 +74,8 @@ pub enum EpisodeVideoError {
     Sensing(#[from] SensingError),
     #[error(transparent)]
     Video(#[from] VideoError),
+    #[error(transparent)]
+    Animation(#[from] AnimationError),
     #[error("cannot encode the image: {0}")]
     Png(#[from] ImageError),
     #[error(transparent)]

@@ -3,18 +3,19 @@
 //!
 //! The shorter episodes hold their last state until the longest ends.
 
-use std::path::Path;
+use std::{path::Path, time::Duration};
 
 use image::RgbImage;
 
 use super::{
-    BACKGROUND, Badge, CLOSE_UP_EDGE, EpisodeVideoError, FAINT, FrameList, HARM, SAFE, SharedSensors, TEXT,
-    VideoCaption, draw_label, pad_force, worst_state,
+    BACKGROUND, Badge, CLOSE_UP_EDGE, EpisodeVideoError, FAINT, FrameList, HARM, LAST_STATE_S, SAFE,
+    SharedSensors, TEXT, VideoCaption, draw_label, pad_force, worst_state,
 };
 use crate::d_axis::{D_TICKS, d_share};
 use softvt_benchmark::CONTROL_DT;
-use softvt_common::{files::replace, text::shortened};
+use softvt_common::{files::replace, parallel, text::shortened};
 use softvt_media::{
+    animation,
     canvas::{Canvas, Rgb8},
     ticks::{linear_ticks, tick_label, tick_step},
 };
@@ -132,6 +133,40 @@ pub fn write_video_frame(
     let column = video_column(episodes.len());
     let frame = Film::new(episodes, column)?.frame(index)?;
     Ok(replace(path, encode_png(&frame)?)?)
+}
+
+/// Width of a column of an animation, pixels, and the control steps between two of its frames.
+const ANIMATION_COLUMN: u32 = 320;
+const ANIMATION_STEPS: usize = 4;
+/// Speed of an animation over that of the episode.
+const ANIMATION_SPEED: f64 = 2.0;
+
+/// Renders the episodes as an animated PNG file for web pages, at twice their speed, in which the last state is held.
+/// Other arguments and errors are those of [`write_video`].
+///
+/// # Errors
+/// As [`write_video`].
+pub fn write_animation(
+    episodes: &mut [PolicyEpisode],
+    path: &Path,
+    threads: usize,
+    is_cancelled: impl Fn() -> bool + Sync,
+) -> Result<(), EpisodeVideoError> {
+    let last = state_count(episodes).saturating_sub(1);
+    let indices: Vec<usize> = (0..last).step_by(ANIMATION_STEPS).chain([last]).collect();
+    let film = Film::new(episodes, ANIMATION_COLUMN)?;
+    let mut frames = Vec::new();
+    let draw = |number: usize| film.frame(indices[number]);
+    parallel::run_in_order(indices.len(), threads, &is_cancelled, draw, |_, frame| {
+        frames.push(frame);
+        Ok::<_, EpisodeVideoError>(())
+    })?;
+    // A request to stop ends the frames early.
+    if frames.len() < indices.len() {
+        return Err(EpisodeVideoError::Interrupted);
+    }
+    let each = Duration::from_secs_f64(ANIMATION_STEPS as f64 * CONTROL_DT / ANIMATION_SPEED);
+    Ok(replace(path, animation::encode(&frames, each, Duration::from_secs_f64(LAST_STATE_S))?)?)
 }
 
 /// Width of a column of a video, pixels.
