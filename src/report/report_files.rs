@@ -3,7 +3,8 @@
 use std::{fs, path::Path};
 
 use super::{
-    leaderboard, page,
+    leaderboard,
+    page::{self, Thumbnails},
     run_summary::RunSummary,
     tables::{ResultTable, all_tables},
 };
@@ -18,18 +19,19 @@ pub const MARKDOWN: &str = "report.md";
 const LATEX_HEADER: &str =
     "% Needs \\usepackage{booktabs}; of names in other alphabets, LuaLaTeX or XeLaTeX.\n";
 
-/// Writes [`PAGE`], [`MARKDOWN`], `report.tex` and `report.jsonl` about some runs into the folder `out`.
+/// Writes [`PAGE`], [`MARKDOWN`], `report.tex` and `report.jsonl` about some runs into the folder `out`. The page shows
+/// the objects that have a picture in `thumbnails`.
 ///
 /// # Errors
 /// A file cannot be written.
-pub fn write(runs: &[RunSummary], out: &Path) -> Result<(), FileError> {
+pub fn write(runs: &[RunSummary], thumbnails: &Thumbnails, out: &Path) -> Result<(), FileError> {
     // Links of the page lead from this folder.
     fs::create_dir_all(out).map_err(FileError::io("create", out))?;
     let tables = all_tables(runs);
     let joined =
         |format: fn(&ResultTable) -> String| tables.iter().map(format).collect::<Vec<_>>().join("\n");
     for (name, text) in [
-        (PAGE, page::page(runs, out)),
+        (PAGE, page::page(runs, thumbnails, out)),
         (MARKDOWN, joined(ResultTable::markdown)),
         ("report.tex", LATEX_HEADER.to_owned() + &joined(ResultTable::latex)),
         ("report.jsonl", leaderboard::rows(runs)),
@@ -58,7 +60,7 @@ mod tests {
             (false, Some(1.5), Some(false));
         let runs = summarize_runs(vec![stored(&dir.display().to_string(), "noop", vec![record])]);
         let out = root.path().join("new/folder");
-        write(&runs, &out).unwrap();
+        write(&runs, &Thumbnails::new(), &out).unwrap();
         let page = fs::read_to_string(out.join(PAGE)).unwrap();
         assert!(page.contains("href=\"../../run/video/task_000/episode_00000.mp4\""), "{page}");
     }

@@ -126,6 +126,11 @@ impl StoredRun {
         self.manifest["privileged"].as_bool() == Some(true)
     }
 
+    /// True if the policy is a bound of what can be done without touch. Runs of earlier versions do not say so.
+    pub fn is_blind_bound(&self) -> bool {
+        self.manifest["blind"].as_bool() == Some(true)
+    }
+
     /// True if the policy observes ground-truth forces at the pads.
     pub fn observes_forces(&self) -> bool {
         self.manifest["force_observed"].as_bool() == Some(true)

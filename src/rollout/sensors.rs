@@ -183,6 +183,21 @@ impl Sensors {
         self.without_robot(frame, &colours, &camera)
     }
 
+    /// Renders the object `index` from nearby as it looks, without the robot. Never an input of a policy.
+    ///
+    /// # Errors
+    /// As [`render`](Self::render).
+    pub fn portrait(
+        &mut self,
+        frame: &WorldSnapshot,
+        index: usize,
+        edge: usize,
+    ) -> Result<RgbImage, SensingError> {
+        let camera = close_up_camera(&self.objects[index], frame, edge, PORTRAIT_DISTANCE);
+        let camera = self.cut(index, camera, PORTRAIT_DISTANCE);
+        self.without_robot(frame, &[], &camera)
+    }
+
     /// A close-up's camera that does not see what is between it and the object, such as the wall of a basket.
     fn cut(&self, index: usize, camera: Camera, distance: f64) -> Camera {
         let diagonal = self.objects[index].bounds.size().norm();
@@ -504,9 +519,11 @@ impl Sensors {
 
 /// Direction from the object to the camera of a close-up, world.
 const CLOSE_UP_FROM: [f64; 3] = [0.8, -0.45, 0.5];
-/// Field of view of a close-up, rad, and its distance from the object, in diagonals of its bounds.
+/// Field of view of a close-up, rad, and its distance from the object, in diagonals of its bounds; a portrait is
+/// closer.
 const CLOSE_UP_FOVY: f64 = 0.5;
 const CLOSE_UP_DISTANCE: f64 = 2.6;
+const PORTRAIT_DISTANCE: f64 = 1.9;
 /// Distance from the object, in diagonals of its bounds, beyond which a cut foreground ends.
 const FOREGROUND: f64 = 0.55;
 

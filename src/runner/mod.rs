@@ -38,6 +38,7 @@ mod serving;
 pub mod stored_folder;
 mod stored_scripts;
 mod suite_run;
+mod thumbnails;
 
 pub use check::SuiteChecker;
 pub use config::{ConfiguredScript, RunConfig, Shard, TraceDetail, read_secret, thread_count};
@@ -57,3 +58,4 @@ pub use served_runs::ServedRuns;
 pub use serving::{check_served, first_observation, prepare_served, server_config};
 pub use stored_scripts::StoredScripts;
 pub use suite_run::{PreparedRun, SuiteRun};
+pub use thumbnails::thumbnails;

@@ -150,7 +150,7 @@ impl StoredManifest<'_> {
     }
 
     /// The configuration of the run, for one task and with a policy whose actions come from elsewhere.
-    fn config(&self, task: usize) -> Result<RunConfig, RunError> {
+    pub(crate) fn config(&self, task: usize) -> Result<RunConfig, RunError> {
         let changes = self.changes()?;
         let secret = self.secret(changes.seed_hash.as_deref())?.cloned();
         Ok(RunConfig {
@@ -187,12 +187,12 @@ impl StoredManifest<'_> {
         }
     }
 
-    fn split(&self) -> Result<EpisodeSplit, RunError> {
+    pub(crate) fn split(&self) -> Result<EpisodeSplit, RunError> {
         let name = self.text("split");
         name.parse().map_err(|_| RunError::input(format!("{}: unknown split {name:?}", self.path.display())))
     }
 
-    fn suite<'a>(&self, loaded: &'a LoadedScript) -> Result<&'a Suite, RunError> {
+    pub(crate) fn suite<'a>(&self, loaded: &'a LoadedScript) -> Result<&'a Suite, RunError> {
         let name = self.text("suite");
         let suite = suites_of(&loaded.plan).iter().find(|suite| suite.name == name);
         suite

@@ -65,6 +65,9 @@ pub(crate) struct RunManifest<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     replan: Option<usize>,
     privileged: bool,
+    /// True if the policy is a bound of what can be done without touch.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    blind: bool,
     seed: u64,
     /// Hash of the secret of a judged run.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -122,6 +125,7 @@ impl<'a> RunManifest<'a> {
             imported: Some(&run.imported[..]).filter(|files| !files.is_empty()),
             replan: config.policy.replan,
             privileged: run.is_privileged(),
+            blind: config.policy.is_blind_bound(),
             seed,
             seed_hash,
             split: run.split.name(),
@@ -174,7 +178,7 @@ pub(crate) fn write_or_compare(dir: &Path, manifest: &impl Serialize) -> Result<
     let mut stored: Value = serde_json::from_str(&stored)
         .map_err(|error| RunError::input(format!("{path} is not a valid run file: {error}")))?;
     stored_run::remove_folder(&mut stored);
-    match difference(&stored, &json!(manifest)) {
+    match difference(&stored, &comparable(manifest, &stored)) {
         None => Ok(()),
         Some(what) => Err(RunError::input(format!(
             "{path} belongs to another run: {what}; resume it with its original arguments, or select another output folder"
@@ -190,8 +194,19 @@ pub(crate) fn is_in(dir: &Path, manifest: &RunManifest) -> Result<bool, RunError
     let text = files::read_text(&dir.join(RUN))?;
     Ok(serde_json::from_str::<Value>(&text).is_ok_and(|mut stored| {
         stored_run::remove_folder(&mut stored);
-        stored == json!(manifest)
+        stored == comparable(manifest, &stored)
     }))
+}
+
+/// A manifest without the fields that earlier versions did not write, if the stored one lacks them.
+fn comparable(manifest: &impl Serialize, stored: &Value) -> Value {
+    let mut manifest = json!(manifest);
+    if stored["blind"].is_null()
+        && let Some(fields) = manifest.as_object_mut()
+    {
+        fields.shift_remove("blind");
+    }
+    manifest
 }
 
 /// Longest value that a message shows in full, in characters. A SHA-256 fits.
@@ -242,6 +257,16 @@ mod tests {
         assert_eq!(difference(&a, &b).unwrap(), "settings.physics.dt: 0.0166 before, 0.01 now");
         let c = json!({ "seed": 0, "settings": { "physics": { "dt": 0.0166 } } });
         assert_eq!(difference(&a, &c).unwrap(), "shifts: [] before, null now");
+    }
+
+    #[test]
+    fn a_run_of_an_earlier_version_may_lack_what_it_did_not_write() {
+        let now = json!({ "policy": "drives", "blind": true, "seed": 0 });
+        assert_eq!(
+            comparable(&now, &json!({ "policy": "drives", "seed": 0 })),
+            json!({ "policy": "drives", "seed": 0 })
+        );
+        assert_eq!(comparable(&now, &now), now);
     }
 
     #[test]

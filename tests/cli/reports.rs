@@ -86,3 +86,22 @@ fn commands_in_the_report_are_valid() {
     project.succeeds(&view);
     assert!(project.path("seen/episode.mp4").exists());
 }
+
+#[test]
+fn a_report_has_pictures_of_the_objects_of_runs_with_their_scripts() {
+    let project = Small { task: "budget_steps = 4", ..Small::default() }.project();
+    project.succeeds("x.lua --policy noop --out run");
+    let pictures = |out: &str| {
+        project.succeeds(&format!("report run --out {out}"));
+        project.text(&format!("{out}/report.html")).matches("<img src=\"data:image/jpeg;base64,").count()
+    };
+    assert_eq!(pictures("with"), 1, "of the cube");
+    assert!(
+        project.text("with/report.html") == {
+            pictures("again");
+            project.text("again/report.html")
+        }
+    );
+    std::fs::remove_file(project.path("run/scripts.zip")).expect("removed");
+    assert_eq!(pictures("without"), 0);
+}

@@ -111,7 +111,7 @@ impl Project {
         let warnings = summaries.iter().flat_map(|summary| summary.run.warnings());
         let warnings = warnings.map(|warning| self.relative(warning)).collect();
         let markdown: Vec<String> = all_tables(&summaries).iter().map(ResultTable::markdown).collect();
-        let html = page::page(&summaries, &self.path("page"));
+        let html = page::page(&summaries, &page::Thumbnails::new(), &self.path("page"));
         Report { html: self.relative(html), markdown: self.relative(markdown.join("\n")), warnings }
     }
 

@@ -1,18 +1,19 @@
 //! Commands about finished runs: `softvt report`, `softvt compare` and `softvt merge`.
 
-use std::path::PathBuf;
+use std::{path::PathBuf, sync::Arc};
 
 use clap::Args;
 
 use crate::{
     args::parse_folder,
     error::CliError,
-    output::{eprint_notice, print, print_json, print_table, terminal_format},
+    output::{Console, eprint_notice, print, print_json, print_table, terminal_format},
 };
 use softvt_report::{
     comparison, policy_ranking::PolicyRanking, report_files, run_summary::summarize_runs, shard_merge,
     stored_run, terminal,
 };
+use softvt_runner::{Observer, thumbnails};
 
 /// Write an HTML page about runs, its tables as Markdown and LaTeX, and a JSON row per run
 #[derive(Args, Debug)]
@@ -66,7 +67,11 @@ pub(super) fn report(args: &ReportArgs) -> Result<(), CliError> {
     for warning in summaries.iter().flat_map(|summary| summary.run.warnings()) {
         eprint_notice(warning);
     }
-    report_files::write(&summaries, &args.out)?;
+    let observer: Arc<dyn Observer> = Arc::new(Console::default());
+    observer.work("drawing the objects");
+    let thumbnails = thumbnails(summaries.iter().map(|summary| &summary.run), &observer);
+    observer.end();
+    report_files::write(&summaries, &thumbnails, &args.out)?;
     eprint_notice(args.out.join(report_files::PAGE).display());
     Ok(())
 }

@@ -8,6 +8,7 @@ use super::{
     breakable,
     images::{ByteBudget, DataImage, embed_image, relative_link},
     marks::class,
+    subheading,
 };
 use crate::{
     commands::{replay_command, view_command},
@@ -40,7 +41,10 @@ pub(super) fn failures(runs: &[RunSummary], out: &Path) -> Markup {
         } @else if !safe.is_empty() {
             ul.safe { @for run in safe { li { b { (run.name()) } ": " (without_failures(run)) } } }
         }
-        @for run in failed { h3 { (run.name()) } (failures_of_run(run, out, budget)) }
+        @for (i, run) in failed.into_iter().enumerate() {
+            (subheading(&format!("failures-{i}"), &run.name()))
+            (failures_of_run(run, out, budget))
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use std::{
 };
 
 use data_encoding::BASE64;
-use image::{ImageFormat, ImageReader, Limits, codecs::jpeg::JpegEncoder, imageops::crop_imm};
+use image::{ImageFormat, ImageReader, Limits, RgbImage, codecs::jpeg::JpegEncoder, imageops::crop_imm};
 
 use crate::video::{STILL_SIZE, TARGET_PANEL};
 use softvt_sensing::camera::resize;
@@ -49,9 +49,14 @@ pub(super) fn embed_image(path: &Path, budget: &mut ByteBudget) -> Option<DataIm
         true => resize(&image, MAX_WIDTH, (height * MAX_WIDTH / width).max(1)),
         false => image,
     };
-    let (width, height) = small.dimensions();
+    embed(&small, budget)
+}
+
+/// An image as it is. `None` if it exceeds the budget.
+pub(super) fn embed(image: &RgbImage, budget: &mut ByteBudget) -> Option<DataImage> {
+    let (width, height) = image.dimensions();
     let mut jpeg = Vec::new();
-    JpegEncoder::new_with_quality(&mut jpeg, JPEG_QUALITY).encode_image(&small).ok()?;
+    JpegEncoder::new_with_quality(&mut jpeg, JPEG_QUALITY).encode_image(image).ok()?;
     budget.0 = budget.0.checked_sub(jpeg.len())?;
     let url = format!("data:image/jpeg;base64,{}", BASE64.encode(&jpeg));
     Some(DataImage { url, width, height })
@@ -78,7 +83,7 @@ fn percent_encode(part: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use image::{Rgb, RgbImage};
+    use image::Rgb;
 
     use super::*;
 

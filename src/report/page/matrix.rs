@@ -1,10 +1,17 @@
 //! Peak deformation by object and policy.
 
-use std::{collections::BTreeSet, path::Path};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+};
 
 use maud::{Markup, html};
 
-use super::{breakable, images::relative_link, marks::class};
+use super::{
+    Thumbnails, breakable,
+    images::{ByteBudget, DataImage, embed, relative_link},
+    marks::class,
+};
 use crate::{run_summary::RunSummary, task_names::object_name, terminal::tau_range, video::video_path};
 use softvt_evaluation::category::EpisodeCategory;
 use softvt_records::{
@@ -13,17 +20,25 @@ use softvt_records::{
     summary::{GroupScores, TauRange},
 };
 
+/// Largest size of all pictures of objects, bytes before they are text.
+const MAX_THUMBNAIL_BYTES: usize = 70_000;
+/// Edge of a picture of an object on the page, pixels.
+const THUMBNAIL_EDGE: u32 = 64;
+
 /// One matrix per suite with soft objects.
-pub(super) fn matrices(runs: &[RunSummary], out: &Path) -> Markup {
+pub(super) fn matrices(runs: &[RunSummary], thumbnails: &Thumbnails, out: &Path) -> Markup {
     let soft: Vec<&RunSummary> = runs.iter().filter(|run| run.is_soft()).collect();
+    let mut budget = ByteBudget(MAX_THUMBNAIL_BYTES);
+    let pictures: BTreeMap<&String, DataImage> =
+        thumbnails.iter().filter_map(|(asset, image)| Some((asset, embed(image, &mut budget)?))).collect();
     html! {
         @for (i, of_suite) in soft.chunk_by(|a, b| a.summary.suite == b.summary.suite).enumerate() {
-            (matrix(&format!("matrix-{i}"), of_suite, out))
+            (matrix(&format!("matrix-{i}"), of_suite, &pictures, out))
         }
     }
 }
 
-fn matrix(id: &str, runs: &[&RunSummary], out: &Path) -> Markup {
+fn matrix(id: &str, runs: &[&RunSummary], pictures: &BTreeMap<&String, DataImage>, out: &Path) -> Markup {
     let assets: BTreeSet<&String> = runs.iter().flat_map(|run| run.summary.by_asset.keys()).collect();
     // Instances of one asset may have different limits.
     let tau = |asset: &str| {
@@ -38,7 +53,7 @@ fn matrix(id: &str, runs: &[&RunSummary], out: &Path) -> Markup {
                         tr {
                             th.text scope="col" { "Policy" }
                             @for asset in &assets {
-                                th scope="col" { (object_name(asset)) span.interval { @if tau(asset).is_empty() { "no τ" } @else { "τ\u{a0}" (tau(asset)) "\u{a0}%" } } }
+                                th scope="col" { (picture(pictures.get(asset))) (object_name(asset)) span.interval { @if tau(asset).is_empty() { "no τ" } @else { "τ\u{a0}" (tau(asset)) "\u{a0}%" } } }
                             }
                         }
                     }
@@ -57,6 +72,11 @@ fn matrix(id: &str, runs: &[&RunSummary], out: &Path) -> Markup {
             }
         }
     }
+}
+
+/// The picture above the name of an object, which says what it shows.
+fn picture(image: Option<&DataImage>) -> Markup {
+    html! { @if let Some(image) = image { img src=(image.url) width=(THUMBNAIL_EDGE) height=(THUMBNAIL_EDGE) alt=""; } }
 }
 
 fn cell(run: &RunSummary, asset: &str, out: &Path) -> Markup {

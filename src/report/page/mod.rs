@@ -11,8 +11,12 @@ mod overview;
 mod strictness;
 mod strips;
 
-use std::{collections::BTreeSet, path::Path};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+};
 
+use image::RgbImage;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde_json::Value;
 
@@ -30,8 +34,11 @@ use super::{
     },
 };
 
-/// The report of some runs, to be written into the folder `out`.
-pub fn page(runs: &[RunSummary], out: &Path) -> String {
+/// Small pictures of objects, by asset.
+pub type Thumbnails = BTreeMap<String, RgbImage>;
+
+/// The report of some runs, to be written into the folder `out`. Objects without a picture are shown by name only.
+pub fn page(runs: &[RunSummary], thumbnails: &Thumbnails, out: &Path) -> String {
     let episodes: usize = runs.iter().map(|run| run.run.records.len()).sum();
     let title = format!("softvt: {}", suites(runs).join(", "));
     let effects = condition_effects(runs);
@@ -63,7 +70,7 @@ pub fn page(runs: &[RunSummary], out: &Path) -> String {
                     @if !effects.is_empty() { a href="#conditions" { "Conditions" } }
                     a href="#details" { "Details" }
                 }
-                main { (sections(runs, &effects, is_soft, out)) }
+                main { (sections(runs, thumbnails, &effects, is_soft, out)) }
                 footer { p.note { "The tables as text: " a href=(MARKDOWN) { (MARKDOWN) } ", report.tex and report.jsonl. docs/results.md defines the quantities." } }
             }
         }
@@ -72,11 +79,17 @@ pub fn page(runs: &[RunSummary], out: &Path) -> String {
     escape_control(&markup.into_string()).into_owned()
 }
 
-fn sections(runs: &[RunSummary], effects: &[ConditionEffects], is_soft: bool, out: &Path) -> Markup {
+fn sections(
+    runs: &[RunSummary],
+    thumbnails: &Thumbnails,
+    effects: &[ConditionEffects],
+    is_soft: bool,
+    out: &Path,
+) -> Markup {
     html! {
         (section("results", "Results", &html! { @if !runs.is_empty() { (overview::overview(runs)) } }))
         @if is_soft {
-            (section("objects", "Peak deformation by object, as a multiple of its limit", &matrix::matrices(runs, out)))
+            (section("objects", "Peak deformation by object, as a multiple of its limit", &matrix::matrices(runs, thumbnails, out)))
             (section("episodes", "Every episode", &episodes(runs)))
         }
         (section("failures", "Episodes that failed", &failures::failures(runs, out)))
@@ -115,7 +128,7 @@ fn details(runs: &[RunSummary], out: &Path) -> Markup {
                 (table("kappa-table", &kappas, TEXT_COLUMNS))
                 figure {
                     (strictness::strictness_plots(runs))
-                    figcaption { "Safety Success for stricter (left) and looser (right) limits τ = κ D_ref; κ = 0.5 is nominal." }
+                    figcaption { "Safety Success for stricter (left) and looser (right) limits τ = κ D_ref; κ = 0.5 is nominal. Bands are 95 % Wilson intervals." }
                 }
             }
         }
@@ -140,11 +153,16 @@ fn section(id: &str, heading: &str, content: &Markup) -> Markup {
     html! { section id=(id) { h2 { (heading) } (content) } }
 }
 
+/// A heading within a section, with a link to itself. `id` is unique on the page.
+fn subheading(id: &str, heading: &str) -> Markup {
+    html! { h3 id=(id) { (heading) " " a.anchor href=(format!("#{id}")) aria-label=(format!("Link to {heading}")) { "#" } } }
+}
+
 /// Effects of changed factors, per suite.
 fn conditions(effects: &[ConditionEffects]) -> Markup {
     html! {
         @for (i, suite) in effects.iter().enumerate() {
-            @if effects.len() > 1 { h3 { (suite.suite) ", " (suite.method) } }
+            @if effects.len() > 1 { (subheading(&format!("suite-{i}"), &format!("{}, {}", suite.suite, suite.method))) }
             @if !suite.trends().is_empty() {
                 figure {
                     (conditions::trends(suite))

@@ -26,17 +26,42 @@ pub(super) fn overview(runs: &[RunSummary]) -> Markup {
                     @for of_suite in runs.chunk_by(|a, b| a.summary.suite == b.summary.suite) {
                         tbody {
                             @if has_several { tr.suite { th scope="rowgroup" colspan="8" { (breakable(&of_suite[0].summary.suite)) } } }
-                            @for run in of_suite { (row(run)) }
+                            @let bound = blind_bound(of_suite);
+                            @for run in of_suite { (row(run, bound.as_ref())) }
                         }
                     }
                 }
             }
             (legend(runs.iter().any(RunSummary::is_soft), |category| count(category) > 0))
+            @for of_suite in runs.chunk_by(|a, b| a.summary.suite == b.summary.suite) {
+                @if let Some(bound) = blind_bound(of_suite) {
+                    p.note {
+                        "Dashed in " (of_suite[0].summary.suite) ": Safety of the best controller here that keeps one number constant, without touch ("
+                        (bound.policy) ", " (format!("{:.0}", bound.safety)) " %)."
+                    }
+                }
+            }
             figcaption id="results-table" {
                 "Goal Success (ring) and Safety Success (dot), % of episodes; the line between them is the gap, the band the 95 % Wilson interval of Safety. Safety needs the goal, no drop, and a peak deformation D within the limit τ of the object; it does not apply to rigid objects. Collapsed: mean of the largest share of the volume beyond the collapse strain of its material. D/limit: median of peak D over τ."
             }
         }
     }
+}
+
+/// The best of the controllers that show what can be done without touch.
+struct BlindBound {
+    policy: String,
+    /// Safety Success, %.
+    safety: f64,
+}
+
+/// The bound of a suite whose runs include such controllers.
+fn blind_bound(runs: &[RunSummary]) -> Option<BlindBound> {
+    let bounds = runs.iter().filter(|run| run.is_soft() && run.run.is_blind_bound()).filter_map(|run| {
+        let safety = run.summary.scores.safety_success_rate.rate?;
+        Some(BlindBound { policy: run.run.text("policy").to_owned(), safety })
+    });
+    bounds.reduce(|a, b| if b.safety > a.safety { b } else { a })
 }
 
 fn headings() -> Markup {
@@ -58,7 +83,7 @@ fn headings() -> Markup {
     }
 }
 
-fn row(run: &RunSummary) -> Markup {
+fn row(run: &RunSummary, bound: Option<&BlindBound>) -> Markup {
     let scores = &run.summary.scores;
     let goal = scores.goal_success_rate;
     let is_judged = run.is_soft() && scores.safety_success_rate.rate.is_some();
@@ -67,8 +92,8 @@ fn row(run: &RunSummary) -> Markup {
     let count = run.run.records.len();
     html! {
         tr {
-            th.text scope="row" { (breakable(&run.method)) }
-            td.text.chart data-head="Goal → Safety" { (dumbbell(goal, safety, scores.count(EpisodeCategory::OverLimit) > 0)) }
+            th.text scope="row" { (breakable(&run.method)) @if run.run.is_blind_bound() { span.interval { "constant grip, without touch" } } }
+            td.text.chart data-head="Goal → Safety" { (dumbbell(goal, safety, scores.count(EpisodeCategory::OverLimit) > 0, bound)) }
             td.number data-head="Goal, %" { (rate(goal)) }
             td.number data-head="Safety, %" { @match safety { Some(safety) => b { (rate(safety)) }, None => "N/A" } }
             td.number data-head="Gap" { (decimal(gap, 0)) }
@@ -111,13 +136,14 @@ fn collapsed(mean: Option<f64>) -> Markup {
 }
 
 /// Goal and Safety, and the line between them.
-fn dumbbell(goal: Rate, safety: Option<Rate>, is_over: bool) -> Markup {
+fn dumbbell(goal: Rate, safety: Option<Rate>, is_over: bool, bound: Option<&BlindBound>) -> Markup {
     let middle = 0.5 * HEIGHT;
     let at = |rate: Rate| rate.rate.map(|value| 0.01 * value);
     let verdict = if is_over { "over" } else { "safe" };
     html! {
         svg width="100%" height=(HEIGHT) aria-hidden="true" {
             (vertical_lines("grid", (0..=4).map(|quarter| 0.25 * f64::from(quarter))))
+            @if let Some(bound) = bound { (vertical_lines("bound", std::iter::once(0.01 * bound.safety))) }
             @if let Some([low, high]) = safety.and_then(|safety| safety.wilson95) {
                 rect class=(format!("band {verdict}")) x=(x(0.01 * low)) width=(x(0.01 * (high - low))) y="5" height=(HEIGHT - 10.0) {}
             }

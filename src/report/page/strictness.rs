@@ -5,6 +5,7 @@ use maud::{Markup, html};
 use super::marks::{x, y};
 use crate::run_summary::RunSummary;
 use softvt_common::text::shortened;
+use softvt_evaluation::statistics::Rate;
 use softvt_records::record::EpisodeRecord;
 
 /// Height of the plot, pixels, and the margin above its highest line.
@@ -92,6 +93,8 @@ fn style(index: usize) -> String {
 struct CurvePoint {
     kappa: f64,
     percent: f64,
+    /// 95 % Wilson interval, %.
+    interval: [f64; 2],
 }
 
 /// The corners of the curve. Safety Success is a step function of κ: it rises where κ reaches D_peak / D_ref of an
@@ -110,10 +113,17 @@ fn curve_corners(run: &RunSummary) -> Vec<CurvePoint> {
     };
     let mut steps: Vec<f64> = records.iter().filter_map(safe_from).filter(|kappa| *kappa <= 1.0).collect();
     steps.sort_by(f64::total_cmp);
-    let percent = |count: usize| 100.0 * count as f64 / records.len().max(1) as f64;
-    let mut corners = vec![CurvePoint { kappa: 0.0, percent: 0.0 }];
+    let corner = |kappa: f64, count: usize| {
+        let rate = Rate::new(count, records.len());
+        CurvePoint {
+            kappa,
+            percent: rate.rate.unwrap_or(0.0),
+            interval: rate.wilson95.unwrap_or([0.0, 100.0]),
+        }
+    };
+    let mut corners = vec![corner(0.0, 0)];
     for (count, kappa) in steps.into_iter().enumerate() {
-        corners.extend([count, count + 1].map(|count| CurvePoint { kappa, percent: percent(count) }));
+        corners.extend([count, count + 1].map(|count| corner(kappa, count)));
     }
     let last = corners[corners.len() - 1];
     corners.push(CurvePoint { kappa: 1.0, ..last });
@@ -125,6 +135,10 @@ fn curve(run: &RunSummary, index: usize) -> Markup {
     // Separates coinciding lines.
     let offset = 1.5 * ((index % 5) as f64 - 2.0);
     html! {
+        @for pair in corners.windows(2).filter(|pair| pair[1].kappa > pair[0].kappa) {
+            @let [low, high] = pair[0].interval;
+            rect.uncertain x=(x(pair[0].kappa)) width=(x(pair[1].kappa - pair[0].kappa)) y=(y(level(high))) height=(y(level(low) - level(high))) {}
+        }
         g class=(style(index)) {
             @for pair in corners.windows(2) {
                 line x1=(x(pair[0].kappa)) x2=(x(pair[1].kappa)) y1=(y(level(pair[0].percent) + offset)) y2=(y(level(pair[1].percent) + offset)) {}
@@ -154,8 +168,12 @@ mod tests {
         let corners = curve_corners(&runs[0]);
         let level = |step: usize| 100.0 * step as f64 / 3.0;
         let expected = [(0.0, 0), (0.225, 0), (0.225, 1), (0.8, 1), (0.8, 2), (1.0, 2)]
-            .map(|(kappa, step)| CurvePoint { kappa, percent: level(step) });
-        assert_eq!(corners, expected);
+            .map(|(kappa, step)| (kappa, level(step)));
+        let found: Vec<(f64, f64)> = corners.iter().map(|corner| (corner.kappa, corner.percent)).collect();
+        assert_eq!(found, expected);
+        assert_eq!(Some(corners[2].interval), Rate::new(1, 3).wilson95);
+        let plot = strictness_plots(&runs).into_string();
+        assert_eq!(plot.matches("<rect class=\"uncertain\"").count(), 3, "a band between the steps: {plot}");
         let rises = |pair: &[CurvePoint]| pair[0].percent != pair[1].percent;
         assert!(corners.windows(2).filter(|pair| rises(pair)).all(|pair| pair[0].kappa == pair[1].kappa));
     }

@@ -29,7 +29,7 @@ fn episodes(suite: &str, count: u32) -> Vec<EpisodeRecord> {
 }
 
 fn render(runs: Vec<StoredRun>) -> String {
-    page(&summarize_runs(runs), Path::new("."))
+    page(&summarize_runs(runs), &Thumbnails::new(), Path::new("."))
 }
 
 /// Elements that are opened must be closed in order; of attributes, none may come from a name.
@@ -117,6 +117,25 @@ fn the_page_is_self_contained_and_accessible() {
 }
 
 #[test]
+fn bounds_without_touch_and_pictures_of_objects_are_shown() {
+    let mut blind = stored("a", "drives", episodes("soft", 4));
+    blind.manifest["blind"] = json!(true);
+    let runs = summarize_runs(vec![blind, stored("b", "pi", episodes("soft", 9))]);
+    let asset = runs[0].run.records[0].header.asset.clone();
+    let picture = RgbImage::from_pixel(128, 128, image::Rgb([9, 80, 200]));
+    let page = page(&runs, &Thumbnails::from([(asset, picture)]), Path::new("."));
+    assert_well_formed(&page);
+    assert_eq!(page.matches("<line class=\"bound\"").count(), 2, "beside every policy of the suite");
+    assert!(page.contains("keeps one number constant, without touch (drives, 50 %)."), "{page}");
+    assert_eq!(page.matches(">constant grip, without touch</span>").count(), 1);
+    assert_eq!(page.matches("<img src=\"data:image/jpeg;base64,").count(), 1);
+    assert!(
+        page.contains("<h3 id=\"failures-0\">soft, drives") && page.contains("href=\"#failures-0\""),
+        "{page}"
+    );
+}
+
+#[test]
 fn an_episode_of_a_client_is_viewed_by_its_actions() {
     let mut run = stored("runs/mine", "client", episodes("soft", 4));
     run.manifest["profile"] = json!({ "name": "vision" });
@@ -180,7 +199,7 @@ fn stills_are_embedded_and_link_to_their_videos() {
     let run = stored(&dir.display().to_string(), "noop", episodes("soft", 4));
     let out = root.path().join("page");
     fs::create_dir_all(&out).unwrap();
-    let page = page(&summarize_runs(vec![run]), &out);
+    let page = page(&summarize_runs(vec![run]), &Thumbnails::new(), &out);
     assert_well_formed(&page);
     let link = "<a href=\"../run/video/task_000/episode_00001.mp4\">";
     assert!(page.contains(&format!("{link}<img src=\"data:image/jpeg;base64,")), "{page}");
