@@ -34,26 +34,43 @@ function views.portrait(asset, edge)
   return softvt.simulate { layout = layout }:render { camera = "portrait" }
 end
 
--- A simulation of the asset in the expert's grasp, lifted by `lift` (m).
-function views.held(asset, lift)
+-- A simulation of the asset on the table, before the hand touches it.
+function views.untouched(asset)
   local layout = softvt.layout("imprint_" .. asset.name, function(scene)
     scene:add { name = "table", asset = table_top, position = { 0, 0, 0 } }
     scene:add { name = "object", asset = asset, at = { -0.05, 0 } }
   end)
-  local sim = softvt.simulate { layout = layout }
+  return softvt.simulate { layout = layout }
+end
+
+-- A simulation in which the hand has moved around the asset, and then did as `close` says.
+local function grasped(asset, close)
+  local sim = views.untouched(asset)
   local ok, why = sim:drive(function(arm, scene)
     local object = scene:object "object"
     local at = grasp.pose(object, grasp.height(object))
     if object.hints.grasp_rim_m then at = grasp.choose(scene, object, grasp.height(object)).pose end
     arm:move_to(at:translated { 0, 0, 0.08 }, { speed = 0.6, angular_speed = 3 })
     arm:move_to(at, { speed = 0.25 })
-    arm:grasp(grasp.closure(object), { rate = 0.6 })
-    arm:wait(0.3)
-    arm:move_by({ 0, 0, lift }, { speed = 0.2 })
+    close(arm, object)
     arm:wait(0.3)
   end)
   if not ok then error(asset.name .. ": " .. why) end
   return sim
+end
+
+-- A simulation of the asset in the expert's grasp, lifted by `lift` (m).
+function views.held(asset, lift)
+  return grasped(asset, function(arm, object)
+    arm:grasp(grasp.closure(object), { rate = 0.6 })
+    arm:wait(0.3)
+    arm:move_by({ 0, 0, lift }, { speed = 0.2 })
+  end)
+end
+
+-- A simulation of the asset on the table, pressed at a mean force per pad (N).
+function views.pressed(asset, force)
+  return grasped(asset, function(arm) arm:grasp(1, { rate = 0.04, force = force }) end)
 end
 
 return views

@@ -11,6 +11,14 @@ peak of D while the object was lifted and held; an object with a carried D above
 resolution and size, and trials at the ends of the windows.
 ]]
 
+local SHEET = [[
+![D over its limit, over the closing of the pads from first contact, of every asset on the same axes](images/calibration.svg)
+
+D over τ against the closing of the pads from first contact, of all assets on the same axes, those first that bear the least closing. The
+dashed line is the limit; the band is the safe window, hatched if it holds for presses only.
+
+]]
+
 local TABLE = [[
 | asset | stable strain | D_ref % | τ % | κ 0.3 | κ 0.7 | loose mm | tight mm | window mm | force N | carried D % | censored |
 |---|---|---|---|---|---|---|---|---|---|---|---|
@@ -59,6 +67,7 @@ return function(names, found, o)
   end
   return HEAD
     .. ("\n%s; κ = %g.\n\n"):format(PROTOCOLS[o.sweep_protocol], o.kappa)
+    .. SHEET
     .. TABLE
     .. table.concat(rows)
     .. MIDDLE

@@ -1,6 +1,13 @@
 //! Validity of the documentation. Files of a page are written into an empty folder and its commands run there in order;
 //! generated pages must be current.
 
+#[path = "../../examples/pictures/calibration.rs"]
+mod calibration_picture;
+#[path = "../../examples/pictures/results.rs"]
+mod results_picture;
+#[path = "../../examples/pictures/validation.rs"]
+mod validation_picture;
+
 use std::{path::Path, time::Duration};
 
 use softvt::{
@@ -222,6 +229,23 @@ fn the_calibration_page_is_current() {
             "{asset}: {:?}",
             envelope.window
         );
+    }
+}
+
+#[test]
+fn the_pictures_of_committed_results_are_current() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let calibration = calibration_picture::svg(root).expect("calibrations");
+    assert_eq!(
+        (calibration.matches("<polyline").count(), calibration.matches("class=\"pressed\"").count()),
+        (17, 1)
+    );
+    for (path, drawn) in [
+        (calibration_picture::IMAGE, calibration),
+        (results_picture::IMAGE, results_picture::svg(root).expect("results")),
+        (validation_picture::IMAGE, validation_picture::svg(root).expect("claims")),
+    ] {
+        assert!(read(path) == drawn, "{path}: run .ci/regenerate pictures");
     }
 }
 

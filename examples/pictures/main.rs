@@ -1,0 +1,18 @@
+//! Draws the pictures of `docs/images/` that follow from committed results: `cargo run --release --example pictures`
+
+mod calibration;
+mod results;
+mod validation;
+
+use std::{fs, path::Path};
+
+fn main() -> Result<(), String> {
+    let root = Path::new(".");
+    write(calibration::IMAGE, &calibration::svg(root)?)?;
+    write(results::IMAGE, &results::svg(root)?)?;
+    write(validation::IMAGE, &validation::svg(root)?)
+}
+
+fn write(path: &str, text: &str) -> Result<(), String> {
+    fs::write(path, text).map_err(|error| format!("{path}: {error}"))
+}
