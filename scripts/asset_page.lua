@@ -38,10 +38,15 @@ local SOFT = [[
 
 ## Soft
 
-Linear elastic, isotropic finite elements in a corotated frame: Young's modulus E, Poisson's ratio ν.
+| asset | image | tactile | size mm | mass g | friction |
+|---|---|---|---|---:|---|
+]]
+local MECHANICS = [[
 
-| asset | image | tactile | size mm | mass g | E kPa | ν | density kg/m³ | friction | ε_c | ε_y | τ % | loose mm | tight mm |
-|---|---|---|---|---|---|---|---|---|---|---|---|---|---|
+Linear elastic, isotropic finite elements in a corotated frame: Young's modulus E, Poisson's ratio ν, strain limits ε_c and ε_y (below).
+
+| asset | E kPa | ν | density kg/m³ | ε_c | ε_y | τ % | loose mm | tight mm |
+|---|---:|---:|---:|---:|---:|---:|---:|---:|
 ]]
 local STRAINS = [[
 
@@ -62,7 +67,7 @@ local RIGID = [[
 ## Rigid
 
 | asset | image | tactile | size mm | mass g | density kg/m³ | friction |
-|---|---|---|---|---|---|---|
+|---|---|---|---|---:|---:|---|
 ]]
 local ARTICULATED = [[
 
@@ -83,11 +88,14 @@ local function graspable(asset)
   return hints.grasp_rim_m ~= nil or (hints.grasp_width_m or math.min(size[1], size[2])) < 0.08
 end
 
-local function image(name, suffix) return ("![](images/assets/%s%s.png)"):format(name, suffix) end
+-- An image of a fixed width: tables of Markdown shrink theirs until no word breaks.
+local function image(name, suffix, alt)
+  return ("<img src=%q width=\"96\" alt=%q>"):format(("images/assets/%s%s.png"):format(name, suffix), alt)
+end
 
 local function millimetres(asset)
   local size = views.size(asset)
-  return ("%.0f × %.0f × %.0f"):format(1e3 * size[1], 1e3 * size[2], 1e3 * size[3])
+  return ("%.0f×%.0f×%.0f"):format(1e3 * size[1], 1e3 * size[2], 1e3 * size[3])
 end
 
 local function friction(asset) return ("%g / %g"):format(asset.friction.static_mu, asset.friction.dynamic_mu) end
@@ -110,8 +118,10 @@ local function parts(asset)
   return table.concat(list, "; ")
 end
 
+-- The row of an asset in the table of its kind, which shows how it looks.
 local function row(name)
-  local asset, cells = assets[name], { ("<a id=%q></a>%s"):format(name, name), image(name, "") }
+  local asset, words = assets[name], name:gsub("_", " ")
+  local cells = { ("<a id=%q></a>%s"):format(name, name), image(name, "", words) }
   local function add(...)
     for _, cell in ipairs { ... } do
       cells[#cells + 1] = cell
@@ -120,19 +130,40 @@ local function row(name)
   if kind(asset) == "softvt.articulated" then
     add(millimetres(asset), friction(asset), parts(asset))
   else
-    local body = asset.body
-    add(graspable(asset) and image(name, "_felt") or "–", millimetres(asset), grams(asset.shape, body.density))
-    if kind(asset) == "softvt.soft" then add(("%g"):format(body.youngs_pa / 1e3), ("%.2f"):format(body.poisson)) end
-    add(("%g"):format(body.density), friction(asset))
-    if kind(asset) == "softvt.soft" then
-      local limit = known[name]
-      local function number(format, value) return value and format:format(value) or "–" end
-      local window = limit and limit.window
-      add(number("%.2f", body.collapse_strain), number("%.2f", body.damage_strain), number("%.3f", limit and limit.tau))
-      add(number("%.2f", window and window.loose.width_mm), number("%.2f", window and window.tight.width_mm))
-    end
+    local felt = graspable(asset) and image(name, "_felt", "imprint of " .. words) or "–"
+    add(felt, millimetres(asset), grams(asset.shape, asset.body.density))
+    if kind(asset) == "softvt.rigid" then add(("%g"):format(asset.body.density)) end
+    add(friction(asset))
   end
   return "| " .. table.concat(cells, " | ") .. " |\n"
+end
+
+-- The row of a soft asset in the table of the mechanics; nil for others.
+local function mechanics_row(name)
+  local asset, limit = assets[name], known[name]
+  if kind(asset) ~= "softvt.soft" then return nil end
+  local function number(format, value) return value and format:format(value) or "–" end
+  local body, window = asset.body, limit and limit.window
+  local cells = {
+    ("[%s](#%s)"):format(name, name),
+    ("%g"):format(body.youngs_pa / 1e3),
+    ("%.2f"):format(body.poisson),
+    ("%g"):format(body.density),
+    number("%.2f", body.collapse_strain),
+    number("%.2f", body.damage_strain),
+    number("%.3f", limit and limit.tau),
+    number("%.2f", window and window.loose.width_mm),
+    number("%.2f", window and window.tight.width_mm),
+  }
+  return "| " .. table.concat(cells, " | ") .. " |\n"
+end
+
+local function mechanics()
+  local rows = {}
+  for _, name in ipairs(opt.asset) do
+    rows[#rows + 1] = mechanics_row(name)
+  end
+  return #rows > 0 and MECHANICS .. table.concat(rows) or ""
 end
 
 -- The strains of a soft asset with their ranges and reasons; nil if it has no sources.
@@ -170,6 +201,7 @@ local function page(made)
   local text = HEAD
   for _, key in ipairs { "softvt.soft", "softvt.rigid", "softvt.articulated" } do
     if #sections[key] > 1 then text = text .. table.concat(sections[key]) end
+    if key == "softvt.soft" then text = text .. mechanics() end
   end
   return text .. strains()
 end
@@ -197,7 +229,7 @@ return softvt.experiment {
     for _, name in ipairs(opt.images and opt.asset or {}) do
       local at = ("%s/images/assets/%s"):format(opt.folder, name)
       files[at .. ".png"] = views.portrait(assets[name], opt.edge)
-      if holds(assets[name]) then
+      if graspable(assets[name]) then
         files[at .. "_felt.png"] =
           views.held(assets[name], 0.06):tactile("left").image:resize(opt.edge * 4 // 3, opt.edge)
       end

@@ -7,6 +7,7 @@ alone, between two gel pads of the robot at a prescribed width. D_ref is D at th
 strain* of the material, and τ = κ D_ref. Each object is safe at widths between the *loose* end, up to which friction carries it,
 and the *tight* end, at which D reaches τ, pressed on the table or carried. Forces are those per pad at rest. *Carried D* is the smallest
 peak of D while the object was lifted and held; an object with a carried D above τ cannot be carried safely, whatever the grip.
+A press that ended before the stable strain gives a lower bound of D_ref (≥).
 [assets.md](assets.md) gives the strains with their sources, [calibration_checks.md](calibration_checks.md) how the results depend on step,
 resolution and size, and trials at the ends of the windows.
 ]]
@@ -20,8 +21,8 @@ dashed line is the limit; the band is the safe window, hatched if it holds for p
 ]]
 
 local TABLE = [[
-| asset | stable strain | D_ref % | τ % | κ 0.3 | κ 0.7 | loose mm | tight mm | window mm | force N | carried D % | censored |
-|---|---|---|---|---|---|---|---|---|---|---|---|
+| asset | stable strain | D_ref % | τ % | κ 0.3 | κ 0.7 | loose mm | tight mm | window mm | force N | carried D % |
+|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|
 ]]
 
 local MIDDLE = [[
@@ -41,12 +42,12 @@ return function(names, found, o)
   for _, name in ipairs(names) do
     local known = found[name]
     local window, d_ref = known.window, known.d_ref
-    local force = number("%.2f", window.loose.force_n) .. " to " .. number("%.2f", window.tight.force_n)
+    local force = number("%.2f", window.loose.force_n) .. "–" .. number("%.2f", window.tight.force_n)
     local is_pressed_only = known.carried_d and known.tau and known.carried_d > known.tau
     local cells = {
       ("[%s](#%s)"):format(name, name),
       number("%.2f", known.stable_strain),
-      number("%.3f", d_ref),
+      number(known.censored and "≥ %.3f" or "%.3f", d_ref),
       number("%.3f", known.tau),
       number("%.3f", d_ref and 0.3 * d_ref),
       number("%.3f", d_ref and 0.7 * d_ref),
@@ -55,7 +56,6 @@ return function(names, found, o)
       number("%.2f", window.extent_mm) .. (is_pressed_only and " (pressed only)" or ""),
       force,
       number("%.3f", known.carried_d),
-      known.censored or "no",
     }
     rows[#rows + 1] = "| " .. table.concat(cells, " | ") .. " |\n"
     plots[#plots + 1] = ("\n## %s\n\n![D of %s over the width between the gels](../assets/calibration/%s.svg)\n\n```text\n%s```\n"):format(

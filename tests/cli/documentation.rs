@@ -196,8 +196,8 @@ fn the_asset_page_is_current() {
     let (kept, made) = (read("docs/assets.md"), project.text("made/docs/assets.md"));
     assert!(kept == made, "docs/assets.md is out of date: run softvt scripts/asset_page.lua");
     let mut bytes = 0;
-    for part in kept.split("](images/").skip(1) {
-        let path = part.split(')').next().unwrap_or_default();
+    for part in kept.split("src=\"images/").skip(1) {
+        let path = part.split('"').next().unwrap_or_default();
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/images").join(path);
         bytes += std::fs::metadata(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())).len();
     }
