@@ -15,7 +15,7 @@ local opt = softvt.options {
   asset = { default = STANDARD, help = "assets to draw" },
   write = { default = "docs/images/assets.png", help = "image file to write" },
   columns = { default = 6, integer = true, min = 1, max = 12, help = "images per row" },
-  edge = { default = 320, unit = "pixels", integer = true, min = 64, max = 1024, help = "edge of each image" },
+  edge = { default = 160, unit = "pixels", integer = true, min = 64, max = 1024, help = "edge of each image" },
 }
 
 -- Episodes use only files that were read when the plan was made, so every asset is required here.
@@ -25,7 +25,7 @@ for _, name in ipairs(opt.asset) do
 end
 
 local WORDS, GROUND = { 40, 44, 50 }, { 244, 243, 240 }
-local LABEL = 34 -- pixels below each image
+local LABEL, SIZE = 22, 12 -- pixels below each image, and of its letters
 
 local function size_of(name) return views.size(assets[name]) end
 
@@ -47,7 +47,7 @@ return softvt.experiment {
       local x, y = (index - 1) % columns * opt.edge, (index - 1) // columns * cell
       sheet:paste(views.portrait(assets[name], opt.edge), x, y)
       local words = ("%s, %.0f mm"):format(name:gsub("_", " "), 1e3 * math.max(table.unpack(size_of(name))))
-      sheet:text(words, { at = { x + 12, y + opt.edge + 23 }, size = 19, colour = WORDS })
+      sheet:text(words, { at = { x + 6, y + opt.edge + 15 }, size = SIZE, colour = WORDS })
     end
     return { files = { [opt.write] = sheet } }
   end,
