@@ -61,7 +61,7 @@ fn shortened(command: &str) -> String {
     let (script, _) = command.split_once(' ').unwrap_or((command, ""));
     match script {
         "scripts/calibrate.lua" => format!("{command} --step-mm 1 --within-mm 0.4"),
-        script if script.ends_with(".lua") => format!("{command} --episodes 1 --json --out run"),
+        script if script.starts_with("suites/") => format!("{command} --episodes 1 --json --out run"),
         _ => command.to_owned(),
     }
 }
@@ -110,7 +110,9 @@ fn the_tutorial_leads_to_a_safe_suite() {
         "nothing is judged before the calibration, everything is safe after it"
     );
     assert!(
-        project.path("assets/calibration/brick.json").exists() && project.path("seen/episode.mp4").exists()
+        project.path("assets/calibration/brick.json").exists()
+            && project.path("seen/episode.mp4").exists()
+            && project.text("sag/sag.svg").contains("sag, mm")
     );
 }
 

@@ -121,6 +121,23 @@ fn native_stills_have_the_native_size() {
 }
 
 #[test]
+fn the_mcap_file_of_a_view_is_that_of_a_run_and_of_its_replay() {
+    let project = short();
+    project.succeeds("x.lua --episodes 1 --mcap=all --threads 1 --out run");
+    let of_run = fs::read(project.path("run/mcap/task_000/episode_00000.mcap")).expect("written");
+    assert!(of_run.starts_with(b"\x89MCAP0\r\n"), "{:?}", &of_run[..8]);
+    project.succeeds("replay run 0/0 --mcap replayed/episode.mcap");
+    project.succeeds("view x.lua --policy expert --policy noop --mcap --out seen");
+    for path in ["replayed/episode.mcap", "seen/expert/episode.mcap"] {
+        assert!(fs::read(project.path(path)).expect("written") == of_run, "{path}");
+    }
+    assert!(fs::read(project.path("seen/noop/episode.mcap")).expect("written") != of_run);
+    let refused = project.refusal("x.lua --episodes 1 --mcap=3");
+    assert!(refused.contains("--mcap 3: suite one runs only episode 0 of each task"), "{refused}");
+    assert!(project.refusal("replay run 0/0 --mcap run").contains("run"), "a folder");
+}
+
+#[test]
 fn a_run_renders_the_requested_episodes() {
     let project = short();
     let drawn = |flag: &str, out: &str| {

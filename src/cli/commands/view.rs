@@ -14,6 +14,7 @@ use softvt_common::{cancel, files, parallel};
 use softvt_records::record::EpisodeRecord;
 use softvt_report::{
     episode_page::{self, PolicyPart},
+    mcap::write_mcap,
     video::{
         VideoCaption,
         side_by_side::{self, PolicyEpisode},
@@ -46,6 +47,9 @@ pub(crate) struct ViewArgs {
     /// Also write animation.png, a loop at twice the speed for web pages, 320 pixels wide per policy
     #[arg(long)]
     animation: bool,
+    /// Also write the episode as episode.mcap, for Foxglove and Rerun
+    #[arg(long)]
+    mcap: bool,
     /// Output folder
     #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     out: PathBuf,
@@ -102,11 +106,11 @@ struct SeenEpisode {
     states: StateRecording,
 }
 
-/// Draws the stills of an episode into a folder.
-fn draw_stills(
+/// Draws the stills of an episode into a folder, and writes its MCAP file if it is asked for.
+fn write_parts(
     args: &ViewArgs,
     config: &RunConfig,
-    states: &mut StateRecording,
+    SeenEpisode { record, states }: &mut SeenEpisode,
     dir: &Path,
 ) -> Result<(), CliError> {
     let moments =
@@ -114,14 +118,20 @@ fn draw_stills(
     config.observer.work("drawing the stills");
     write_stills(states, &moments, args.full_size, dir, config.thread_count(), cancel::requested)?;
     config.observer.end();
+    if args.mcap {
+        let progress = Progress::new(states.frames.len(), "writing the MCAP file");
+        let (path, threads) = (dir.join("episode.mcap"), config.thread_count());
+        write_mcap(states, record, &path, threads, cancel::requested, || progress.step())?;
+    }
     Ok(())
 }
 
 /// Draws an episode under one policy.
-fn show_one(args: &ViewArgs, config: &RunConfig, seen: SeenEpisode) -> Result<(), CliError> {
+fn show_one(args: &ViewArgs, config: &RunConfig, mut seen: SeenEpisode) -> Result<(), CliError> {
+    let dir = &args.out;
+    write_parts(args, config, &mut seen, dir)?;
     let SeenEpisode { record, mut states } = seen;
-    let (dir, caption, worst) = (&args.out, VideoCaption::new(&record), worst_state(&states));
-    draw_stills(args, config, &mut states, dir)?;
+    let (caption, worst) = (VideoCaption::new(&record), worst_state(&states));
     write_video_frame(&mut states, &caption, worst, &dir.join(episode_page::FRAME))?;
     let video = dir.join(episode_page::VIDEO);
     let progress = Progress::new(states.frames.len(), "rendering the video");
@@ -140,13 +150,14 @@ fn show_one(args: &ViewArgs, config: &RunConfig, seen: SeenEpisode) -> Result<()
 fn show_several(args: &ViewArgs, config: &RunConfig, seen: Vec<SeenEpisode>) -> Result<(), CliError> {
     let dir = &args.out;
     let (mut parts, mut episodes) = (Vec::<PolicyPart>::new(), Vec::new());
-    for SeenEpisode { record, mut states } in seen {
-        let mut folder = path_component(&record.header.policy);
+    for mut seen in seen {
+        let mut folder = path_component(&seen.record.header.policy);
         if parts.iter().any(|part| part.folder == folder) {
             folder = format!("{folder}_{}", parts.len() + 1);
         }
         files::create_folder(&dir.join(&folder))?;
-        draw_stills(args, config, &mut states, &dir.join(&folder))?;
+        write_parts(args, config, &mut seen, &dir.join(&folder))?;
+        let SeenEpisode { record, states } = seen;
         let worst_time_s = worst_state(&states) as f64 * CONTROL_DT;
         episodes.push(PolicyEpisode::new(&record, states));
         parts.push(PolicyPart { record, worst_time_s, folder });
