@@ -40,7 +40,7 @@ pub fn svg(root: &Path) -> Result<String, String> {
         drawn += &circle(centre, RADIUS, if *share > 1.0 { "ring" } else { "dot" });
     }
     let reached = shares.iter().filter(|share| **share <= 1.0).count();
-    let said = format!("{reached} of {} bounds are reached; rings are the others", shares.len());
+    let said = format!("{reached} of {} results are within their bound; rings are the others", shares.len());
     drawn += &text(at(LEFT, 16.0), Anchor::Start, "title", &said);
     Ok(svg::image(LEFT + PLOT + RIGHT, base + BOTTOM, FONT_SIZE, &said, &drawn))
 }
