@@ -3,6 +3,7 @@
 //! The doc comments of the fields are the help text that `--help` prints.
 
 use std::{
+    collections::BTreeSet,
     path::{Path, PathBuf},
     sync::Arc,
     time::Duration,
@@ -101,10 +102,11 @@ pub(crate) struct RunFlags {
 impl RunFlags {
     /// Adds the episodes and the output to a configuration.
     pub(crate) fn apply(self, config: RunConfig) -> RunConfig {
+        let selected: BTreeSet<u32> = self.selected_episodes.into_iter().collect();
         RunConfig {
             tasks: self.tasks,
             episodes: self.episodes,
-            selected_episodes: self.selected_episodes,
+            selected_episodes: selected.into_iter().collect(),
             shard: self.shard,
             threads: self.threads,
             trace: self.trace,

@@ -105,9 +105,14 @@ pub fn rename(from: &Path, to: &Path) -> Result<(), FileError> {
 /// Replaces `path` by `content`, creating missing folders. Readers see the old or the new file, never a part of it.
 ///
 /// # Errors
-/// The system refuses; the temporary file is removed.
+/// The path is a folder, a device or a pipe; or the system refuses, and the temporary file is removed.
 pub fn replace(path: &Path, content: impl AsRef<[u8]>) -> Result<(), FileError> {
     create_parent(path)?;
+    // Devices and pipes would cease to be what they are.
+    if fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+        let source = io::Error::other("it is not a regular file");
+        return Err(FileError::io("replace", path)(source));
+    }
     let temp = temp_path(path);
     // Created, not truncated: if the name is a symbolic link, its target must not be overwritten.
     remove_if_present(&temp)?;

@@ -17,8 +17,15 @@ const BOTTOM: f64 = 46.0;
 const FONT_SIZE: f64 = 12.0;
 /// Number of intervals of an axis, at most.
 const TICKS: usize = 6;
+/// Number of labelled powers of ten, at most.
+const LOG_TICKS: usize = 8;
 /// Least distance of the names of series, px.
 const NAME_HEIGHT: f64 = 14.0;
+/// Letters of the name of a series, and of titles, for which there is room.
+const NAME_LETTERS: usize = 19;
+const TITLE_LETTERS: usize = 80;
+/// Largest and smallest extent of an axis whose ticks are written as decimals.
+const DECIMALS: std::ops::Range<f64> = 1e-4..1e6;
 /// Strokes of the second and third series, beside the classes of [`svg::image`].
 const STYLE: &str = "<style>.second{stroke:var(--ink);stroke-dasharray:7 3}.third{stroke:var(--soft);stroke-dasharray:2 3}</style>\n";
 /// Share of the extent of the points that a linear axis adds at both ends.
@@ -80,7 +87,7 @@ impl Chart {
             x: Scale::around(&self.x, points().map(|[x, _]| *x)),
             y: Scale::around(&self.y, points().map(|[_, y]| *y).chain(levels)),
         };
-        let title = text(at(12.0, 20.0), Anchor::Start, "title", &self.title);
+        let title = text(at(12.0, 20.0), Anchor::Start, "title", &shortened(&self.title, TITLE_LETTERS));
         let drawn: String =
             self.series.iter().enumerate().map(|(i, series)| draw(i, series, &scales)).collect();
         let parts = [
@@ -135,12 +142,29 @@ impl Chart {
             .collect();
         names.sort_by(|(a, i), (b, j)| a.total_cmp(b).then(i.cmp(j)));
         let mut lowest = f64::NEG_INFINITY;
-        let drawn = names.into_iter().map(|(y, index)| {
+        for (y, _) in &mut names {
             lowest = y.max(lowest + NAME_HEIGHT);
-            let (mark, name) = (at(WIDTH - RIGHT + 12.0, lowest - 4.0), at(WIDTH - RIGHT + 22.0, lowest));
-            marked(index, mark) + &text(name, Anchor::Start, "", &self.series[index].label)
+            *y = lowest;
+        }
+        let mut highest = HEIGHT - BOTTOM + 4.0 + NAME_HEIGHT;
+        for (y, _) in names.iter_mut().rev() {
+            highest = y.min(highest - NAME_HEIGHT);
+            *y = highest;
+        }
+        let drawn = names.into_iter().map(|(y, index)| {
+            let (mark, name) = (at(WIDTH - RIGHT + 12.0, y - 4.0), at(WIDTH - RIGHT + 22.0, y));
+            marked(index, mark)
+                + &text(name, Anchor::Start, "", &shortened(&self.series[index].label, NAME_LETTERS))
         });
         drawn.collect()
+    }
+}
+
+/// A text of at most `letters` letters.
+fn shortened(text: &str, letters: usize) -> String {
+    match text.chars().count() > letters {
+        true => text.chars().take(letters - 1).chain(['…']).collect(),
+        false => text.to_owned(),
     }
 }
 
@@ -217,13 +241,22 @@ impl Scale {
         match self {
             Self::Linear { low, high } => {
                 let step = tick_step(high - low, TICKS);
-                linear_ticks(*low, *high, TICKS)
-                    .into_iter()
-                    .map(|tick| (tick, tick_label(tick, step)))
-                    .collect()
+                let is_decimal = DECIMALS.contains(&low.abs().max(high.abs()));
+                let label = |tick: f64| match is_decimal {
+                    true => tick_label(tick, step),
+                    // Rounded, since multiples of the step are not exact.
+                    false => format!("{:e}", format!("{tick:.3e}").parse::<f64>().unwrap_or(tick)),
+                };
+                linear_ticks(*low, *high, TICKS).into_iter().map(|tick| (tick, label(tick))).collect()
             }
             Self::Logarithmic(decades) => {
-                decades.ticks().map(|tick| (tick, tick_label(tick, tick.min(1.0)))).collect()
+                let ticks: Vec<f64> = decades.ticks().collect();
+                let label = |tick: f64| match DECIMALS.contains(&tick) {
+                    true => tick_label(tick, tick.min(1.0)),
+                    false => format!("{tick:e}"),
+                };
+                let every = ticks.len().div_ceil(LOG_TICKS);
+                ticks.into_iter().step_by(every).map(|tick| (tick, label(tick))).collect()
             }
         }
     }
@@ -277,6 +310,10 @@ mod tests {
             series: vec![Series { points: points.to_vec(), ..Series::default() }],
             ..Chart::default()
         };
+        let wide = chart(&[[1.0, 1e-9], [1e12, 1e9]], true).svg();
+        assert!(wide.contains(">1e12<") && !wide.contains(">100<"), "{wide}");
+        let large = chart(&[[0.0, 0.0], [1.0, 3e9]], false).svg();
+        assert!(large.contains(">3e9<"), "{large}");
         let decades = chart(&[[1.0, 0.01], [1000.0, 10.0]], true).svg();
         for tick in [">1<", ">10<", ">100<", ">1000<", ">0.01<", ">0.1<"] {
             assert!(decades.contains(tick), "{tick} in\n{decades}");

@@ -83,7 +83,9 @@ fn style() -> String {
 }
 
 fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;")
+    // XML has no control characters, and no end of a section in a text.
+    let printed: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    printed.replace('&', "&amp;").replace('<', "&lt;").replace("]]>", "]]&gt;")
 }
 
 /// A text.

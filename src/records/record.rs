@@ -188,6 +188,14 @@ impl EpisodeRecord {
         EpisodeCategory::new(&self.outcome, &self.verdict)
     }
 
+    /// The same in words: of a rigid object *safe* is *placed*.
+    pub fn outcome_name(&self) -> &'static str {
+        match self.category() {
+            EpisodeCategory::Safe if !self.header.soft => "placed",
+            category => category.name(),
+        }
+    }
+
     /// True if the episode counts in DSR: Goal Success with D_peak ≤ τ of each target. Drops do not enter.
     pub fn is_deformation_safe(&self) -> bool {
         let v = &self.verdict;

@@ -142,12 +142,13 @@ impl EpisodeArtifacts<'_> {
     pub(crate) fn render(&self, finished: &mut FinishedEpisode) -> Result<(), RunError> {
         let (record, Some(mut states)) = (&finished.record, finished.recording.take()) else { return Ok(()) };
         let index = record.header.id.index();
+        let mut written = Ok(());
         if self.has_mcap(record) {
             let path = mcap::mcap_path(self.dir, index);
-            mcap::write_mcap(&mut states, record, &path, 1, cancel::requested, || ())?;
+            written = mcap::write_mcap(&mut states, record, &path, 1, cancel::requested, || ());
         }
         if !self.has_video(record) {
-            return Ok(());
+            return Ok(written?);
         }
         let caption = VideoCaption::new(record);
         let path = video::video_path(self.dir, index);
@@ -157,7 +158,8 @@ impl EpisodeArtifacts<'_> {
             let still = video::still_path(self.dir, index);
             video::write_video_frame(&mut states, &caption, worst, &still)?;
         }
-        Ok(video::write_video(&mut states, &caption, &path, 1, cancel::requested, || ())?)
+        video::write_video(&mut states, &caption, &path, 1, cancel::requested, || ())?;
+        Ok(written?)
     }
 
     fn trace_path(&self, index: EpisodeIndex) -> PathBuf {

@@ -329,20 +329,17 @@ pub(crate) fn is_finished(dir: &Path) -> bool {
     dir.join(SUMMARY).is_file() && dir.join(RUN).is_file()
 }
 
-/// Reports an episode whose video could not be written. The episode counts nevertheless.
+/// Reports an episode whose video or MCAP file could not be written. The episode counts nevertheless.
 fn report_unrendered(config: &RunConfig, index: EpisodeIndex, rendered: Result<(), RunError>) {
     if let Err(error) = rendered {
-        config.notice(format!("no video of {index}: {error}"));
+        config.notice(format!("warning: {index} lacks a file: {error}"));
     }
 }
 
 /// Formats an episode as one line of progress.
 pub(crate) fn episode_line(record: &EpisodeRecord) -> String {
     let (verdict, category) = (&record.verdict, record.category());
-    let name = match category {
-        EpisodeCategory::Safe if !record.header.soft => "placed",
-        category => category.name(),
-    };
+    let name = record.outcome_name();
     let reason = match &record.outcome {
         Outcome::Invalid { reason, .. } => format!(" ({reason})"),
         Outcome::Error { message } => format!(" ({message})"),

@@ -116,12 +116,20 @@ pub fn run<E: From<RunError>>(
         }
         None => (None, BTreeMap::new()),
     };
+    if let Some(beyond) = finished.keys().find(|point| **point >= points) {
+        let message =
+            format!("its folder has point {beyond}, and there are {points}; give another output folder");
+        return Err(config.error(message).into());
+    }
     let left: Vec<usize> = (0..points).filter(|point| !finished.contains_key(point)).collect();
     let run_point = |job: usize| {
         let (experiment, point) = (take()?, left[job]);
-        let rows = experiment.run(point)?;
-        // Points may hold functions, which are no parameters.
-        let parameters = experiment.point(point).unwrap_or_default();
+        // Before the script can change its point.
+        let parameters = experiment.parameters(point);
+        let rows = experiment.run(point).map_err(|error| {
+            let parameters = serde_json::to_string(&parameters).unwrap_or_default();
+            RunError::from(error).within(&format!("point {point} {parameters}"))
+        })?;
         // A script can catch the error of an interrupt and return a row that is not valid.
         if cancel::requested() {
             return Err(RunError::interrupted("interrupted"));
@@ -170,9 +178,13 @@ pub fn run<E: From<RunError>>(
         on_output(ExperimentOutput::Text(text))?;
     }
     let base = out.map(Path::to_owned).unwrap_or_default();
-    if let Some((reserved, _)) =
-        finish.files.iter().find(|(path, _)| out.is_some() && RESERVED.contains(&path.as_str()))
-    {
+    // Also on systems where the case of names does not count.
+    let is_reserved = |path: &str| {
+        RESERVED
+            .iter()
+            .any(|name| path.split('/').next().is_some_and(|first| first.eq_ignore_ascii_case(name)))
+    };
+    if let Some((reserved, _)) = finish.files.iter().find(|(path, _)| out.is_some() && is_reserved(path)) {
         let message = format!("finish.files: {reserved} is written by softvt; give another path");
         return Err(config.error(message).into());
     }

@@ -34,8 +34,8 @@ pub(crate) const RESERVED: [&str; 4] = [RUN, POINTS, ROWS, TABLE];
 pub(crate) struct FinishedPoint {
     /// Its number.
     pub point: usize,
-    /// What the script calls the point: its parameters.
-    pub parameters: Value,
+    /// Its fields that are data.
+    pub parameters: ExperimentRow,
     pub rows: Vec<ExperimentRow>,
 }
 
@@ -118,22 +118,28 @@ impl ExperimentFolder {
     }
 }
 
-/// The rows as CSV: the parameters of the points that are not columns of the rows too, then the columns, in the given
-/// order or sorted, and the others.
+/// The rows as CSV: the parameters of the points, but those of which rows have a value of the same name, then the
+/// columns, in the given order or sorted, and the others.
 fn csv(points: &[FinishedPoint], columns: &[String]) -> String {
     let rows = || points.iter().flat_map(|point| &point.rows);
     let of_rows: BTreeSet<&String> = rows().flat_map(|row| row.keys()).collect();
-    let parameters =
-        points.iter().filter_map(|point| point.parameters.as_object()).flat_map(|all| all.keys());
+    let parameters = points.iter().flat_map(|point| point.parameters.keys());
     let parameters: BTreeSet<&String> = parameters.filter(|name| !of_rows.contains(name)).collect();
-    let named: Vec<&String> = columns.iter().filter(|name| of_rows.contains(name)).collect();
+    let mut named: Vec<&String> = Vec::new();
+    for name in columns.iter().filter(|name| of_rows.contains(name)) {
+        if !named.contains(&name) {
+            named.push(name);
+        }
+    }
     let others = of_rows.iter().copied().filter(|name| !named.contains(name));
-    let names: Vec<&String> = parameters.into_iter().chain(named.iter().copied()).chain(others).collect();
+    let names: Vec<&String> = parameters.iter().copied().chain(named.iter().copied()).chain(others).collect();
     let line = |fields: Vec<String>| fields.join(",") + "\n";
     let mut text = line(names.iter().map(|name| quoted((*name).clone())).collect());
     for point in points {
         for row in &point.rows {
-            let value = |name: &&String| row.get(*name).or_else(|| point.parameters.get(*name));
+            let value = |name: &&String| {
+                if parameters.contains(*name) { point.parameters.get(*name) } else { row.get(*name) }
+            };
             text += &line(names.iter().map(|name| field(value(name))).collect());
         }
     }
@@ -178,7 +184,7 @@ mod tests {
                 json!([{ "d": 1.5, "note": "5 \"mm\"" }, { "list": [1, 2] }]),
             ),
         ];
-        let text = "gap,d,kind,list,note\n42,0.5,\"a, b\",,\n48,1.5,b,,\"5 \"\"mm\"\"\"\n48,,b,\"[1,2]\",\n";
+        let text = "gap,d,kind,list,note\n42,0.5,\"a, b\",,\n48,1.5,,,\"5 \"\"mm\"\"\"\n48,,,\"[1,2]\",\n";
         assert_eq!(csv(&points, &[]), text);
         let ordered = csv(&points, &["note".to_owned(), "absent".to_owned(), "d".to_owned()]);
         assert!(ordered.starts_with("gap,note,d,kind,list\n"), "{ordered}");

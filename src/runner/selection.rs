@@ -166,7 +166,7 @@ fn check_filter(
         ([], count) => format!("episodes 0 to {}", count.saturating_sub(1)),
         (selected, _) => {
             let list: Vec<String> = selected.iter().map(u32::to_string).collect();
-            format!("only episode {}", list.join(", "))
+            format!("only episode{} {}", if list.len() == 1 { "" } else { "s" }, list.join(", "))
         }
     };
     let message =

@@ -160,6 +160,7 @@ fn info(
     let mut put = |name: &str, value| info.insert(name.to_owned(), value);
     put("task", json!(live.state.id.task));
     put("episode", json!(live.state.id.episode));
+    put("prompt", json!(observation.prompt));
     put("step", json!(live.state.actions.len()));
     put("time_s", json!(observation.time_s));
     put("success", json!(live.has_succeeded()));

@@ -285,7 +285,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         raw = response["info"]
         self._last = None
         self.task = raw["task"]
-        self.task_description = self._prompts[self.task]
+        self.task_description = raw["prompt"]
         self._verdict = raw.get("verdict", {})
         self._scene = None
         if self._needs_state():

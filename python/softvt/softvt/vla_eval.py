@@ -116,7 +116,7 @@ class SoftVTBenchmark(StepBenchmark):
     def make_obs(self, raw_obs: Any, task: Task) -> Observation:
         """Observation in vla-eval's convention."""
         images = {_CAMERAS[camera]: raw_obs[camera] for camera in self._cameras}
-        observation: Observation = {"images": images, "task_description": task["name"]}
+        observation: Observation = {"images": images, "task_description": self._environment().task_description}
         if self._sends_tactile:
             images["tactile_image"] = raw_obs["tactile_image"]
             observation["tactile_marker_motion"] = raw_obs["tactile_marker_motion"]

@@ -1,6 +1,6 @@
 //! Meshes, frames and point clouds of the states.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use foxglove::messages::{
     Color, FrameTransform, FrameTransforms, PackedElementField, Point3, PointCloud, SceneEntity, SceneUpdate,
@@ -15,6 +15,8 @@ use softvt_sensing::camera::DisplayMesh;
 
 /// The frame of everything else.
 const WORLD: &str = "world";
+/// The frame between the fingers.
+const TOOL: &str = "tool";
 /// Frames of the left and right pad.
 pub(super) const PAD_FRAMES: [&str; 2] = ["pad_left", "pad_right"];
 /// Size of a pixel of the viewer on rigid objects, m, which are written once.
@@ -39,13 +41,13 @@ struct DrawnObject {
 impl SceneGeometry {
     pub(super) fn new(sensors: &mut Sensors) -> Result<Self, SensingError> {
         let (mut objects, mut soft_names) = (Vec::new(), BTreeMap::new());
-        let mut uses: BTreeMap<String, usize> = BTreeMap::new();
+        let reserved = [WORLD, TOOL].into_iter().chain(PAD_FRAMES);
+        let cameras = sensors.cameras().iter().map(|camera| camera.name.clone());
+        let mut known: BTreeSet<String> = reserved.map(str::to_owned).chain(cameras).collect();
         for object in sensors.render_scene()?.objects() {
             let pixel = if matches!(object.body, BodyId::Soft(_)) { SOFT_PIXEL } else { PIXEL };
-            // Links of the robot may share a name; those of frames are unique.
-            let count = uses.entry(object.name.clone()).or_default();
-            *count += 1;
-            let name = if *count == 1 { object.name.clone() } else { format!("{}_{count}", object.name) };
+            let name = unique_name(&object.name, &known);
+            known.insert(name.clone());
             if let BodyId::Soft(id) = object.body {
                 soft_names.insert(id.index(), name.clone());
             }
@@ -91,7 +93,7 @@ impl SceneGeometry {
             translation: Some(translation(&pose_w)),
             rotation: Some(rotation(&pose_w)),
         };
-        let robot = [("tool", tool_w)].into_iter().chain(PAD_FRAMES.into_iter().zip(sensors.pads_w(frame)));
+        let robot = [(TOOL, tool_w)].into_iter().chain(PAD_FRAMES.into_iter().zip(sensors.pads_w(frame)));
         FrameTransforms { transforms: robot.chain(cameras).chain(objects).map(transform).collect() }
     }
 
@@ -128,6 +130,12 @@ impl SceneGeometry {
         let entities: Vec<SceneEntity> = self.objects.iter().filter_map(entity).collect();
         (!entities.is_empty()).then(|| SceneUpdate { entities, deletions: Vec::new() })
     }
+}
+
+/// A name of a frame that no other has: links of the robot may share a name, and objects that of a camera.
+fn unique_name(name: &str, known: &BTreeSet<String>) -> String {
+    let numbered = (2..).map(|number| format!("{name}_{number}"));
+    std::iter::once(name.to_owned()).chain(numbered).find(|name| !known.contains(name)).unwrap_or_default()
 }
 
 /// The nodes of a soft body in a state, and their colours by strain, if it has a stable strain.

@@ -122,7 +122,7 @@ pub(super) fn prompt(record: &EpisodeRecord) -> Log {
 /// The verdict, at the end.
 pub(super) fn verdict(record: &EpisodeRecord, time_ns: u64) -> Log {
     let level = if record.verdict.safety { Level::Info } else { Level::Warning };
-    log_line(record, time_ns, level, record.category().name().to_owned())
+    log_line(record, time_ns, level, record.outcome_name().to_owned())
 }
 
 fn log_line(record: &EpisodeRecord, time_ns: u64, level: Level, message: String) -> Log {

@@ -66,6 +66,12 @@ functions! {
                     return Err(fail(lua, message));
                 }
             }
+            /// Beyond this, differences of values are not finite.
+            const LARGEST: f64 = 1e300;
+            let all = series.iter().flat_map(|series| series.points.iter().flatten()).chain(levels.iter().map(|level| &level.y));
+            if let Some(value) = all.copied().find(|value| value.abs() > LARGEST) {
+                return Err(fail(lua, format!("plot: {value:e} is too large to be drawn; leave it out")));
+            }
             let axis = |AxisSpec { label, log }| ChartAxis { label, is_logarithmic: log };
             let one = |SeriesSpec { label, points, line }| Series {
                 label: label.unwrap_or_default(),

@@ -131,7 +131,7 @@ impl SceneBuilder {
         let mut nominal = lock(&current.scene).clone();
         let object = task.object_name(&vm.lua).map_err(|e| vm.explain(&e))?;
         let (_, predicates) = task.goal.plain(&vm.lua).map_err(|e| vm.explain(&e))?;
-        let nominal_prompt = self.episode_prompt(&task, &nominal, &seed)?;
+        let nominal_prompt = self.episode_prompt(&suite, &task, &current, &seed)?;
         current = current.for_task(&object, &nominal_prompt);
         let shifts = suite.shifts.as_slice();
         for ShiftValue { name, value } in &changes.shifts {
@@ -205,8 +205,9 @@ impl SceneBuilder {
     /// The prompt of an episode of this initial scene: that of the task, or what its function returns.
     fn episode_prompt(
         &self,
+        suite: &SuiteSpec,
         task: &Constructed<TaskSpec>,
-        scene: &Scene,
+        current: &LuaScene,
         seed: &EpisodeSeed,
     ) -> Result<String, ScriptError> {
         let Some(function) = &task.episode_prompt else { return Ok(task.prompt.clone()) };
@@ -219,15 +220,31 @@ impl SceneBuilder {
                 format!("task.episode_prompt: {what}"),
             ))
         };
+        let scene = lock(&current.scene).clone();
         let given = LuaScene::new(scene.clone());
         let rng = LuaRng::new(seed.clone(), RandomStream::Prompt);
-        let prompt = vm.call::<Value>(function, (given.clone(), rng))?;
-        if *lock(&given.scene) != *scene {
+        // What shifts draw must not depend on whether a prompt was drawn.
+        let before = vm.random.replace(seed.stream(RandomStream::Prompt));
+        let prompt = vm.call::<Value>(function, (given.clone(), rng));
+        vm.random.reseed(before);
+        let prompt = prompt?;
+        // A script may have kept the scene of the layout.
+        if *lock(&given.scene) != scene || *lock(&current.scene) != scene {
             return Err(wrong("changed the scene; change it in the layout".to_owned()));
         }
         let checked =
             Type::Text.check(&vm.lua, &prompt).map_err(|error| wrong(error.describe("what it returned")))?;
-        String::from_lua(checked, &vm.lua).map_err(|error| vm.explain(&error))
+        let prompt = String::from_lua(checked, &vm.lua).map_err(|error| vm.explain(&error))?;
+        // Spaces of clients list the characters of prompts.
+        let is_known =
+            |c: char| (' '..='~').contains(&c) || suite.tasks.iter().any(|task| task.prompt.contains(c));
+        match prompt.chars().find(|c| !is_known(*c)) {
+            _ if prompt.trim().is_empty() => Err(wrong("returned a blank text".to_owned())),
+            Some(c) => Err(wrong(format!(
+                "returned {prompt:?}, whose {c:?} is no printable character of ASCII, and in no prompt of the suite"
+            ))),
+            None => Ok(prompt),
+        }
     }
 
     /// The result of a shift's function: a scene, or nothing if it changed the given one.

@@ -90,6 +90,20 @@ impl Experiment {
         to_json(&vm.lua, &self.value(index), "point").map_err(|e| vm.explain(&e))
     }
 
+    /// The parameters of a point: its fields that are data, such as numbers and texts.
+    pub fn parameters(&self, index: usize) -> Map<String, Json> {
+        let Value::Table(point) = self.value(index) else { return Map::new() };
+        let lua = &self.instance.vm.lua;
+        let mut parameters = Map::new();
+        for (key, value) in point.pairs::<String, Value>().filter_map(Result::ok) {
+            if let Ok(value) = to_json(lua, &value, "point") {
+                parameters.insert(key, value);
+            }
+        }
+        parameters.sort_keys();
+        parameters
+    }
+
     fn value(&self, index: usize) -> Value {
         self.points.get(index).cloned().unwrap_or(Value::Nil)
     }

@@ -487,5 +487,12 @@ fn the_function_of_a_prompt_returns_a_text_and_leaves_the_scene() {
         format!("{label}changed the scene; change it in the layout")
     );
     assert_eq!(error("error('no')"), format!("{}: no", lines.len() + 2));
+    assert_eq!(error("return '  '"), format!("{label}returned a blank text"));
+    assert_eq!(
+        error("return 'lift \\t'"),
+        format!(
+            "{label}returned \"lift \\t\", whose '\\t' is no printable character of ASCII, and in no prompt of the suite"
+        )
+    );
     assert!(error("while true do end").contains("ran for more than 0.3 s"));
 }
