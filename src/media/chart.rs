@@ -5,6 +5,7 @@ use super::{
     svg::{self, Anchor, Place, at, circle, diamond, line, polyline, text, upward_text},
     ticks::{Decades, linear_ticks, tick_label, tick_step},
 };
+use softvt_common::text::shortened;
 
 /// Size of the image, px.
 const WIDTH: f64 = 640.0;
@@ -157,14 +158,6 @@ impl Chart {
                 + &text(name, Anchor::Start, "", &shortened(&self.series[index].label, NAME_LETTERS))
         });
         drawn.collect()
-    }
-}
-
-/// A text of at most `letters` letters.
-fn shortened(text: &str, letters: usize) -> String {
-    match text.chars().count() > letters {
-        true => text.chars().take(letters - 1).chain(['…']).collect(),
-        false => text.to_owned(),
     }
 }
 

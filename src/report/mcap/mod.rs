@@ -11,8 +11,8 @@
 //! | `/camera/NAME` | `foxglove.CompressedImage` | image of a camera; `/camera/NAME/calibration` has its matrices |
 //! | `/tactile/left`, `right` | `foxglove.CompressedImage` | tactile image |
 //! | `/joints` | `foxglove.JointStates` | arm, rad, and fingers, m |
-//! | `/gripper` | [`Gripper`](messages::Gripper) | width and normal forces |
-//! | `/deformation` | [`Deformation`](messages::Deformation) | D of the object and its limit |
+//! | `/gripper` | `Gripper` | width and normal forces |
+//! | `/deformation` | `Deformation` | D of the object and its limit |
 //! | `/log` | `foxglove.Log` | prompt at the start, verdict at the end |
 //!
 //! The attachment `episode.json` is the record of the episode.

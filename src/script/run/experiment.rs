@@ -81,15 +81,6 @@ impl Experiment {
         self.points.is_empty()
     }
 
-    /// A point as data.
-    ///
-    /// # Errors
-    /// If it contains something other than data.
-    pub fn point(&self, index: usize) -> Result<Json, ScriptError> {
-        let vm = &self.instance.vm;
-        to_json(&vm.lua, &self.value(index), "point").map_err(|e| vm.explain(&e))
-    }
-
     /// The parameters of a point: its fields that are data, such as numbers and texts.
     pub fn parameters(&self, index: usize) -> Map<String, Json> {
         let Value::Table(point) = self.value(index) else { return Map::new() };
