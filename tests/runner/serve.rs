@@ -202,7 +202,10 @@ fn a_client_runs_an_episode_to_its_end() {
     assert_eq!(keys(get(&start, "observation")), ["image", "wrist_image", "state", "prompt"]);
     let mut info = keys(get(&start, "info"));
     info.sort_unstable();
-    assert_eq!(info, ["clamped_grips", "episode", "far_commands", "step", "success", "task", "time_s"]);
+    assert_eq!(
+        info,
+        ["clamped_grips", "episode", "far_commands", "prompt", "step", "success", "task", "time_s"]
+    );
     let middle = client.ask(&step(11));
     assert_eq!(get(&middle, "truncated").as_bool(), Some(false));
     assert_eq!(get(get(&middle, "info"), "carried_out").as_u64(), Some(11));
