@@ -78,7 +78,7 @@ class Datasets(unittest.TestCase):
     def test_what_is_missing_is_named(self):
         for arguments, words in [
             ({"path": FOLDER / "nothing"}, "no recording"),
-            ({"path": self.folder, "keys": ("agentview",)}, "no stream obs/agentview; obs has agentview_rgb"),
+            ({"path": self.folder, "keys": ("agentview",)}, "no stream obs/agentview; obs has agentview_pose, agentview_rgb"),
             ({"path": self.folder, "task": 7}, "no demonstration of task 7"),
             ({"path": self.folder, "gripper": "soft"}, "expected one of continuous"),
             ({"path": self.folder, "horizon": 0}, "at least 1"),
