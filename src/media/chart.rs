@@ -2,6 +2,7 @@
 //! and are named at their last points.
 
 use super::{
+    labels::spread,
     svg::{self, Anchor, Place, at, circle, diamond, line, polyline, text, upward_text},
     ticks::{Decades, linear_ticks, tick_label, tick_step},
 };
@@ -22,7 +23,7 @@ const TICKS: usize = 6;
 const LOG_TICKS: usize = 8;
 /// Least distance of the names of series, px.
 const NAME_HEIGHT: f64 = 14.0;
-/// Letters of the name of a series, and of titles, for which there is room.
+/// Letters of the name of a series, and of a title, that fit.
 const NAME_LETTERS: usize = 19;
 const TITLE_LETTERS: usize = 80;
 /// Largest and smallest extent of an axis whose ticks are written as decimals.
@@ -142,16 +143,8 @@ impl Chart {
             .filter_map(|(index, series)| Some((last(series)?, index)))
             .collect();
         names.sort_by(|(a, i), (b, j)| a.total_cmp(b).then(i.cmp(j)));
-        let mut lowest = f64::NEG_INFINITY;
-        for (y, _) in &mut names {
-            lowest = y.max(lowest + NAME_HEIGHT);
-            *y = lowest;
-        }
-        let mut highest = HEIGHT - BOTTOM + 4.0 + NAME_HEIGHT;
-        for (y, _) in names.iter_mut().rev() {
-            highest = y.min(highest - NAME_HEIGHT);
-            *y = highest;
-        }
+        let mut heights: Vec<&mut f64> = names.iter_mut().map(|(y, _)| y).collect();
+        spread(&mut heights, NAME_HEIGHT, [f64::NEG_INFINITY, HEIGHT - BOTTOM + 4.0]);
         let drawn = names.into_iter().map(|(y, index)| {
             let (mark, name) = (at(WIDTH - RIGHT + 12.0, y - 4.0), at(WIDTH - RIGHT + 22.0, y));
             marked(index, mark)

@@ -24,7 +24,7 @@ const Y_TICKS: usize = 3;
 /// Plots with the same axes, both of which begin at 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SmallMultiples {
-    /// What the image shows, for those who do not see it.
+    /// Title of the image, for screen readers.
     pub title: String,
     /// Title of the horizontal axis, with its unit.
     pub x_label: String,

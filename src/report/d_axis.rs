@@ -1,4 +1,4 @@
-//! The logarithmic axis of D/τ, the same for all figures and for films of several policies.
+//! The logarithmic axis of D/τ, the same for all figures and for videos of several policies.
 
 /// Ends of the axis.
 const D_OVER_TAU: [f64; 2] = [0.05, 50.0];

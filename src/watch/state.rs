@@ -1,8 +1,5 @@
 //! The message about the state after a control step.
 
-use std::io::Cursor;
-
-use image::{RgbImage, codecs::jpeg::JpegEncoder};
 use serde_json::{Value, json};
 
 use crate::{
@@ -10,6 +7,7 @@ use crate::{
     message::Message,
 };
 use softvt_geometry::Pose;
+use softvt_media::jpeg::encode_jpeg;
 use softvt_physics::{BodyId, fem::strain::node_strains};
 use softvt_robot::Side;
 use softvt_rollout::{Episode, SensingError, Sensors};
@@ -28,7 +26,7 @@ pub(crate) fn state_message(episode: &mut Episode, moving: &[MovingObject]) -> R
         let reading = episode.tactile_reading(side)?;
         let markers = reading.markers.initial.iter().zip(&reading.markers.current);
         tactile.push(json!({
-            "image": message.bytes(jpeg(&reading.image)),
+            "image": message.bytes(encode_jpeg(&reading.image, JPEG_QUALITY).unwrap_or_default()),
             "markers": message.floats(markers.flat_map(|(from, to)| [from[0], from[1], to[0], to[1]])),
         }));
     }
@@ -100,11 +98,4 @@ fn contact_points(episode: &Episode) -> Vec<f32> {
 fn commanded(episode: &Episode) -> Option<Pose> {
     let action = episode.last_action()?;
     Some(episode.sim.robot.base_w * action.pose_b())
-}
-
-fn jpeg(image: &RgbImage) -> Vec<u8> {
-    let mut bytes = Cursor::new(Vec::new());
-    // Writing to memory does not fail; the page shows no picture if it did.
-    let _ = JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY).encode_image(image);
-    bytes.into_inner()
 }

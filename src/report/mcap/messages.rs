@@ -7,9 +7,10 @@ use foxglove::{
         Timestamp, Vector3, log::Level,
     },
 };
-use image::{RgbImage, codecs::jpeg::JpegEncoder};
+use image::RgbImage;
 
 use softvt_geometry::Pose;
+use softvt_media::jpeg::encode_jpeg;
 use softvt_physics::world::WorldSnapshot;
 use softvt_records::record::EpisodeRecord;
 use softvt_robot::gripper;
@@ -75,13 +76,10 @@ pub(super) fn pose(pose: &Pose) -> Option<PoseMessage> {
 
 /// A compressed image seen from the frame `frame_id`.
 pub(super) fn image(image: &RgbImage, frame_id: &str, time_ns: u64) -> CompressedImage {
-    let mut jpeg = Vec::new();
-    // Writing to memory does not fail.
-    let _ = JpegEncoder::new_with_quality(&mut jpeg, JPEG_QUALITY).encode_image(image);
     CompressedImage {
         timestamp: timestamp(time_ns),
         frame_id: frame_id.to_owned(),
-        data: jpeg.into(),
+        data: encode_jpeg(image, JPEG_QUALITY).unwrap_or_default().into(),
         format: "jpeg".to_owned(),
     }
 }

@@ -253,7 +253,7 @@ impl StateMessages<'_> {
         let before = index.checked_sub(1).map(|before| &recording.frames[before]);
         let robot = sensors.proprioception(frame);
         let mut all = vec![
-            encoded(topics.transforms, &geometry.transforms(sensors, frame, time_ns))?,
+            encoded(topics.transforms, &geometry.transforms(sensors, frame, &robot, time_ns))?,
             encoded(topics.joints, &messages::joints(&robot, time_ns))?,
             encoded(topics.gripper, &Gripper::new(frame, &robot))?,
         ];

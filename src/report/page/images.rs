@@ -7,9 +7,10 @@ use std::{
 };
 
 use data_encoding::BASE64;
-use image::{ImageFormat, ImageReader, Limits, RgbImage, codecs::jpeg::JpegEncoder, imageops::crop_imm};
+use image::{ImageFormat, ImageReader, Limits, RgbImage, imageops::crop_imm};
 
 use crate::video::{STILL_SIZE, TARGET_PANEL};
+use softvt_media::jpeg::encode_jpeg;
 use softvt_sensing::camera::resize;
 
 /// Largest width of an embedded image, pixels.
@@ -55,8 +56,7 @@ pub(super) fn embed_image(path: &Path, budget: &mut ByteBudget) -> Option<DataIm
 /// An image as it is. `None` if it exceeds the budget.
 pub(super) fn embed(image: &RgbImage, budget: &mut ByteBudget) -> Option<DataImage> {
     let (width, height) = image.dimensions();
-    let mut jpeg = Vec::new();
-    JpegEncoder::new_with_quality(&mut jpeg, JPEG_QUALITY).encode_image(image).ok()?;
+    let jpeg = encode_jpeg(image, JPEG_QUALITY)?;
     budget.0 = budget.0.checked_sub(jpeg.len())?;
     let url = format!("data:image/jpeg;base64,{}", BASE64.encode(&jpeg));
     Some(DataImage { url, width, height })

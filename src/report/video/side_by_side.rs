@@ -17,6 +17,7 @@ use softvt_common::{files::replace, parallel, text::shortened};
 use softvt_media::{
     animation,
     canvas::{Canvas, Rgb8},
+    labels::spread,
     ticks::{linear_ticks, tick_label, tick_step},
 };
 use softvt_records::record::EpisodeRecord;
@@ -116,8 +117,8 @@ pub fn write_video(
     on_frame: impl FnMut(),
 ) -> Result<(), EpisodeVideoError> {
     let count = state_count(episodes);
-    let film = Film::new(episodes, video_column(episodes.len()))?;
-    let frames = FrameList { size: film.layout.size(), count, draw: |index| film.frame(index) };
+    let context = FrameContext::new(episodes, video_column(episodes.len()))?;
+    let frames = FrameList { size: context.layout.size(), count, draw: |index| context.frame(index) };
     frames.encode(path, threads, is_cancelled, on_frame)
 }
 
@@ -131,7 +132,7 @@ pub fn write_video_frame(
     path: &Path,
 ) -> Result<(), EpisodeVideoError> {
     let column = video_column(episodes.len());
-    let frame = Film::new(episodes, column)?.frame(index)?;
+    let frame = FrameContext::new(episodes, column)?.frame(index)?;
     Ok(replace(path, encode_png(&frame)?)?)
 }
 
@@ -154,9 +155,9 @@ pub fn write_animation(
 ) -> Result<(), EpisodeVideoError> {
     let last = state_count(episodes).saturating_sub(1);
     let indices: Vec<usize> = (0..last).step_by(ANIMATION_STEPS).chain([last]).collect();
-    let film = Film::new(episodes, ANIMATION_COLUMN)?;
+    let context = FrameContext::new(episodes, ANIMATION_COLUMN)?;
     let mut frames = Vec::new();
-    let draw = |number: usize| film.frame(indices[number]);
+    let draw = |number: usize| context.frame(indices[number]);
     parallel::run_in_order(indices.len(), threads, &is_cancelled, draw, |_, frame| {
         frames.push(frame);
         Ok::<_, EpisodeVideoError>(())
@@ -179,7 +180,7 @@ fn video_column(policies: usize) -> u32 {
 }
 
 /// Everything that all frames share.
-struct Film<'a> {
+struct FrameContext<'a> {
     episodes: &'a [PolicyEpisode],
     sensors: Vec<SharedSensors>,
     layout: Layout,
@@ -221,7 +222,7 @@ impl Layout {
     }
 }
 
-impl<'a> Film<'a> {
+impl<'a> FrameContext<'a> {
     fn new(episodes: &'a mut [PolicyEpisode], column: u32) -> Result<Self, EpisodeVideoError> {
         let sensors = episodes.iter_mut().map(|episode| SharedSensors::new(&mut episode.recording.sensors));
         let sensors = sensors.collect::<Result<_, _>>()?;
@@ -350,7 +351,9 @@ impl<'a> Film<'a> {
                 labels.push(Label { policy: column, x, y, colour: end.colour });
             }
         }
-        spread(&mut labels, area.layout.px(14.0), area.top, area.bottom - area.layout.px(6.0));
+        labels.sort_by(|a, b| a.y.total_cmp(&b.y));
+        let mut heights: Vec<&mut f32> = labels.iter_mut().map(|label| &mut label.y).collect();
+        spread(&mut heights, area.layout.px(14.0), [area.top, area.bottom - area.layout.px(6.0)]);
         for Label { policy, x, y, colour } in labels {
             let name = shortened(&self.episodes[policy].policy, LABEL_LETTERS);
             let (size, gap) = (area.layout.px(12.0), area.layout.px(4.0));
@@ -387,21 +390,6 @@ struct Label {
     x: f32,
     y: f32,
     colour: Rgb8,
-}
-
-/// Moves labels apart that are less than `gap` above each other, within the plot.
-fn spread(labels: &mut [Label], gap: f32, top: f32, bottom: f32) {
-    labels.sort_by(|a, b| a.y.total_cmp(&b.y));
-    let mut least = top;
-    for label in labels.iter_mut() {
-        label.y = label.y.max(least);
-        least = label.y + gap;
-    }
-    let mut most = bottom;
-    for label in labels.iter_mut().rev() {
-        label.y = label.y.min(most);
-        most = label.y - gap;
-    }
 }
 
 /// The area of a plot over time, pixels.
@@ -464,15 +452,6 @@ impl PlotArea {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn labels_keep_apart_within_the_plot() {
-        let label = |policy, y| Label { policy, x: 0.0, y, colour: TEXT };
-        let mut labels = [label(0, 50.0), label(1, 50.0), label(2, 58.0), label(3, 3.0)];
-        spread(&mut labels, 10.0, 5.0, 60.0);
-        let places: Vec<(usize, f32)> = labels.iter().map(|label| (label.policy, label.y)).collect();
-        assert_eq!(places, [(3, 5.0), (0, 40.0), (1, 50.0), (2, 60.0)]);
-    }
 
     #[test]
     fn frames_have_even_sizes_that_videos_can_have() {
