@@ -201,8 +201,8 @@ impl<'a> StepRenderer<'a> {
     fn render(&mut self, step: usize) -> Result<Option<StepImages>, DatasetError> {
         let Some(frame) = self.recording.frames.get(step) else { return Ok(None) };
         let sensors = &mut self.recording.sensors;
-        let third_person = sensors.render(frame, &self.cameras[0])?.into_rgb_image();
-        let wrist = sensors.render(frame, &self.cameras[1])?.into_rgb_image();
+        let third_person = sensors.render_rgb(frame, &self.cameras[0])?.into_rgb_image();
+        let wrist = sensors.render_rgb(frame, &self.cameras[1])?.into_rgb_image();
         let tactile = sensors.tactile_readings(frame)?;
         let [left, right] = [0, 1].map(|side: usize| tactile[side].image.clone());
         let [left_markers, right_markers] =

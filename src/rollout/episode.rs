@@ -522,7 +522,7 @@ impl Episode {
             Camera { width: width.unwrap_or(own.width), height: height.unwrap_or(own.height), ..own.clone() };
         let frame = Sensors::frame(&self.sim);
         let image = if camera == own {
-            self.sensors.render(&frame, &camera)?
+            self.sensors.render_rgb(&frame, &camera)?
         } else {
             self.sensors.render_once(&frame, &camera)?
         };

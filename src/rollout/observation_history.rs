@@ -111,7 +111,10 @@ impl HistoryEntry {
         let mut images = Vec::with_capacity(streams.cameras.len());
         for name in &streams.cameras {
             let camera = sensors.camera(name)?.clone();
-            let rendered = sensors.render(&self.frame, &camera)?;
+            let rendered = match streams.depth || streams.segmentation {
+                true => sensors.render(&self.frame, &camera)?,
+                false => sensors.render_rgb(&self.frame, &camera)?,
+            };
             self.camera_inside |= rendered.inside.is_some();
             let depth = streams.depth.then(|| rendered.depth.clone());
             let segmentation = streams.segmentation.then(|| rendered.segmentation.clone());

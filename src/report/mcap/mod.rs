@@ -281,7 +281,7 @@ impl StateMessages<'_> {
         all: &mut Vec<EncodedMessage>,
     ) -> Result<(), EpisodeMcapError> {
         for CameraTopics { camera, image, calibration } in &self.topics.cameras {
-            let picture = sensors.render(frame, camera)?.into_rgb_image();
+            let picture = sensors.render_rgb(frame, camera)?.into_rgb_image();
             all.push(encoded(*image, &messages::image(&picture, &camera.name, time_ns))?);
             all.push(encoded(*calibration, &messages::calibration(camera, time_ns))?);
         }

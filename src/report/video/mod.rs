@@ -225,7 +225,7 @@ fn video_frame(
     let frame = recording.frames.get(index).ok_or(EpisodeVideoError::Empty)?;
     let seen = |sensors: &mut Sensors, name: &str, edge: u32| -> Result<RgbImage, EpisodeVideoError> {
         let camera = sensors.camera(name)?.clone().with_edge(edge as usize);
-        Ok(sensors.render(frame, &camera)?.into_rgb_image())
+        Ok(sensors.render_rgb(frame, &camera)?.into_rgb_image())
     };
     canvas.place(&seen(sensors, STANDARD_CAMERAS[0], TOP_PANEL)?, 0, 0);
     draw_label(&mut canvas, "third person", 0, 0, PANEL_NAME_SIZE);

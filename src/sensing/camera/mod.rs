@@ -9,7 +9,8 @@
 //!
 //! 1. Objects are posed at the coarsest level of detail that looks like the finest one (`render::pass`, `mesh`).
 //! 2. Triangles are projected, clipped and sorted into tiles of 32 × 32 pixels (`raster`).
-//! 3. Each tile is rasterised with four samples per pixel into triangle ids and depths (`raster`).
+//! 3. Each tile is rasterised with four samples per pixel into triangle ids and depths, and with one at the centre
+//!    for depth and segmentation (`raster`).
 //! 4. Each surface that a pixel shows is shaded once, eight points at a time (`render::tile`): Lambert and GGX under a
 //!    key light with soft shadows and a sky (`shade`).
 //!

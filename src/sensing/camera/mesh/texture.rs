@@ -563,15 +563,20 @@ impl MipLevel {
         let (x, y) = (clamped(u, self.size[0]), clamped(v, self.size[1]));
         let (i, j) = (x.fast_trunc_int(), y.fast_trunc_int());
         let columns = self.size[0].div_ceil(TILE);
-        let (at_x, at_y) = (i.to_array(), j.to_array());
+        let (at_x, at_y): ([u32; LANES], [u32; LANES]) = (cast(i), cast(j));
         let mut corners = [[0_u32; LANES]; 4];
+        // The tile of the last lane: neighbouring points mostly have the same.
+        let (mut known, mut texels, mut width) = (usize::MAX, &[][..], 0);
         for lane in 0..LANES {
-            let [i, j] = [at_x, at_y].map(|at| at[lane] as u32 as usize);
+            let [i, j] = [at_x, at_y].map(|at| at[lane] as usize);
             let (column, row) = (i / TILE, j / TILE);
-            let Some(tile) = self.tiles.get(row * columns + column) else { continue };
-            let corner = [column * TILE, row * TILE];
-            let texels = tile.get_or_init(|| paint(corner));
-            let width = self.tile_size(corner)[0];
+            let index = row * columns + column;
+            if index != known {
+                let corner = [column * TILE, row * TILE];
+                known = index;
+                texels = self.tiles.get(index).map_or(&[][..], |tile| tile.get_or_init(|| paint(corner)));
+                width = self.tile_size(corner)[0];
+            }
             let first = (j % TILE) * width + i % TILE;
             let rows = texels.get(first..first + width + 2).unwrap_or_default();
             if let (Some(top), Some(bottom)) = (rows.first_chunk::<2>(), rows.last_chunk::<2>()) {

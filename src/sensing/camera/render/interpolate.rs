@@ -22,9 +22,9 @@ pub(crate) struct MeshInstance<'a> {
     pub(crate) posed: Arc<PosedMesh>,
 }
 
-/// Values that are interpolated over a triangle: position relative to the eye, normal, material, and texture
-/// coordinates.
-const ATTRIBUTES: usize = 14;
+/// Values that are interpolated over a triangle: position relative to the eye, normal, material, texture coordinates,
+/// and two that make two vectors full.
+const ATTRIBUTES: usize = 2 * LANES;
 /// Index of the first component of the normal.
 const NORMAL: usize = 3;
 /// Index of the first component of the material.
@@ -53,7 +53,7 @@ impl<'a> TriangleInterpolator<'a> {
             let [r, g, b, roughness, metalness, sky]: [f32; 6] = lod.materials[v].into();
             let [r, g, b] = instance.posed.albedo.get(v).map_or([r, g, b], |albedo| (*albedo).into());
             let [u, v] = lod.uvs.get(triangle).map_or([0.0; 2], |uvs| uvs[corner]);
-            [p.x, p.y, p.z, n.x, n.y, n.z, r, g, b, roughness, metalness, sky, u, v]
+            [p.x, p.y, p.z, n.x, n.y, n.z, r, g, b, roughness, metalness, sky, u, v, 0.0, 0.0]
         });
         let [a, b, c] = corners.map(|corner| V3::new(corner[0], corner[1], corner[2]).cast::<f64>());
         Self {
@@ -119,9 +119,9 @@ impl<'a> TriangleInterpolator<'a> {
     pub(crate) fn push(&self, batch: &mut ShadingBatch<'a>, lens: &Lens, x: f32, y: f32) {
         let w = self.nearest_weights(lens, x, y);
         let ([a, b, c], lane) = (&self.corners, batch.count);
-        for (i, values) in batch.attributes.iter_mut().enumerate() {
-            values[lane] = a[i] * w[0] + b[i] * w[1] + c[i] * w[2];
-        }
+        let half = |of: &[f32; ATTRIBUTES], i: usize| f32x8::new(of.as_chunks::<LANES>().0[i]);
+        let w = w.map(f32x8::splat);
+        batch.attributes[lane] = [0, 1].map(|i| half(a, i) * w[0] + half(b, i) * w[1] + half(c, i) * w[2]);
         batch.object[lane] = object_index(self.id) as f32;
         batch.charts[lane] = self.chart;
     }
@@ -163,7 +163,8 @@ pub(crate) struct ShadingBatch<'a> {
     pub(crate) pixel: [u32; LANES],
     /// Fraction of the pixel that each point accounts for.
     pub(crate) share: [f32; LANES],
-    attributes: [[f32; LANES]; ATTRIBUTES],
+    /// The two halves of the attributes of each point.
+    attributes: [[f32x8; 2]; LANES],
     object: [f32; LANES],
     charts: [Option<&'a TextureChart>; LANES],
 }
@@ -171,7 +172,8 @@ pub(crate) struct ShadingBatch<'a> {
 impl ShadingBatch<'_> {
     /// Returns the points; lanes from `count` on hold leftovers.
     pub(crate) fn samples(&self, lens: &Lens) -> SurfaceSamples {
-        let attribute = |i: usize| f32x8::new(self.attributes[i]);
+        let halves = [0, 1].map(|half| f32x8::transpose(self.attributes.map(|point| point[half])));
+        let attribute = |i: usize| halves[i / LANES][i % LANES];
         let mut samples = surface_samples(attribute, f32x8::new(self.object), lens);
         let chart_of = |lane: usize| self.charts[lane].map_or(std::ptr::null(), |c| c as *const TextureChart);
         for lane in 0..self.count {

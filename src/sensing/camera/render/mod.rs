@@ -13,7 +13,7 @@ use super::{
     error::CameraError,
     image::RenderedImage,
     lens::Lens,
-    raster::{TILE_EDGE, TileBins, TileSamples},
+    raster::{TileBins, TileSamples, TriangleBlock},
     scene::{FrameView, RenderScene},
     shade::{occlusion::OcclusionEllipsoid, shadow::ShadowMap},
 };
@@ -71,7 +71,7 @@ impl Renderer {
         Self { is_transient: true, ..Self::default() }
     }
 
-    /// Draws the image that `camera` sees of `scene` in the state `view`.
+    /// Draws the image that `camera` sees of `scene` in the state `view`: colour, depth and segmentation.
     ///
     /// The result depends on the arguments alone and is byte-identical on every machine.
     ///
@@ -83,6 +83,29 @@ impl Renderer {
         scene: &RenderScene,
         view: &FrameView,
         camera: &Camera,
+    ) -> Result<RenderedImage, CameraError> {
+        self.draw(scene, view, camera, true)
+    }
+
+    /// As [`render`](Self::render), faster, but with the same colours alone: depth and segmentation are empty.
+    ///
+    /// # Errors
+    /// As [`render`](Self::render).
+    pub fn render_rgb(
+        &mut self,
+        scene: &RenderScene,
+        view: &FrameView,
+        camera: &Camera,
+    ) -> Result<RenderedImage, CameraError> {
+        self.draw(scene, view, camera, false)
+    }
+
+    fn draw(
+        &mut self,
+        scene: &RenderScene,
+        view: &FrameView,
+        camera: &Camera,
+        has_depth: bool,
     ) -> Result<RenderedImage, CameraError> {
         let lens = Lens::new(camera, view.hand_w)?;
         if self.scene_id != Some(scene.id) {
@@ -117,6 +140,7 @@ impl Renderer {
             fixed_occluders: &occluders(false),
             moving_occluders: &occluders(true),
             moving_shadow: &moving_shadow.map,
+            has_depth,
         };
         let mut image = if camera.mount != CameraMount::World {
             draw_all(&pass, &mut self.bins)
@@ -125,6 +149,7 @@ impl Renderer {
         } else {
             let known = self.backgrounds.iter().position(|background| background.camera == *camera);
             let index = known.unwrap_or_else(|| {
+                let pass = RenderPass { has_depth: true, ..pass };
                 self.backgrounds.push(draw_background(&pass, camera, &mut self.bins));
                 self.backgrounds.len() - 1
             });
@@ -139,28 +164,29 @@ impl Renderer {
 fn blank_image(pass: &RenderPass) -> RenderedImage {
     let (width, height) = (pass.lens.width, pass.lens.height);
     let pixels = width * height;
+    let depth_pixels = if pass.has_depth { pixels } else { 0 };
     RenderedImage {
         width,
         height,
         rgb: vec![0; 3 * pixels],
-        depth: vec![0.0; pixels],
-        segmentation: vec![0; pixels],
+        depth: vec![0.0; depth_pixels],
+        segmentation: vec![0; depth_pixels],
         inside: None,
     }
 }
 
 fn blank_samples(pass: &RenderPass) -> TileSamples {
-    TileSamples::new(TILE_EDGE, TILE_EDGE, 1.0 / pass.lens.far, true)
+    TileSamples::new(1.0 / pass.lens.far, pass.has_depth)
 }
 
 /// Draws all objects, without a cached background.
 fn draw_all(pass: &RenderPass, bins: &mut TileBins) -> RenderedImage {
     pass.bin(&[false, true], bins);
     let (mut image, mut display) = (blank_image(pass), TileDisplay::zeros());
-    let mut samples = blank_samples(pass);
+    let (mut samples, mut blocks) = (blank_samples(pass), Vec::new());
     for (tile, rect) in TileRect::all(pass.lens).enumerate() {
         samples.clear(1.0 / pass.lens.far);
-        let covering = bins.draw_tile(tile, rect.origin(), &mut samples, true);
+        let covering = bins.draw_tile(tile, rect.origin(), &mut samples, &mut blocks, true);
         let mut resolver = TileResolver::new(pass, rect, &samples, &mut display, &mut image);
         match covering {
             Some(id) => resolver.run_covered(id),
@@ -191,7 +217,7 @@ fn draw_background_tile(
     image: &mut RenderedImage,
 ) -> BackgroundTile {
     let mut samples = blank_samples(pass);
-    bins.draw_tile(tile, rect.origin(), &mut samples, false);
+    bins.draw_tile(tile, rect.origin(), &mut samples, &mut Vec::new(), false);
     let mut background = BackgroundTile::new();
     TileResolver::new(pass, rect, &samples, &mut background, image).run(false);
     background.finish(pass, samples);
@@ -205,7 +231,12 @@ fn draw_over_background(
     bins: &mut TileBins,
 ) -> RenderedImage {
     pass.bin(&[true], bins);
-    let (mut image, mut working) = (background.image.clone(), TileWorkspace::new(pass));
+    let (mut image, mut working) = (blank_image(pass), TileWorkspace::new(pass));
+    image.rgb.clone_from(&background.image.rgb);
+    if pass.has_depth {
+        image.depth.clone_from(&background.image.depth);
+        image.segmentation.clone_from(&background.image.segmentation);
+    }
     for (tile, (rect, fixed)) in TileRect::all(pass.lens).zip(&background.tiles).enumerate() {
         working.draw_over(pass, tile, rect, fixed, bins, &mut image);
     }
@@ -229,12 +260,13 @@ fn draw_by_tiles(pass: &RenderPass, fixed_bins: &mut TileBins) -> RenderedImage 
 /// Working memory for the moving objects in one tile.
 struct TileWorkspace {
     samples: TileSamples,
+    blocks: Vec<TriangleBlock>,
     display: TileDisplay,
 }
 
 impl TileWorkspace {
     fn new(pass: &RenderPass) -> Self {
-        Self { samples: blank_samples(pass), display: TileDisplay::zeros() }
+        Self { samples: blank_samples(pass), blocks: Vec::new(), display: TileDisplay::zeros() }
     }
 
     /// Draws the moving objects of a tile over its background, which `image` shows already.
@@ -247,11 +279,11 @@ impl TileWorkspace {
         bins: &TileBins,
         image: &mut RenderedImage,
     ) {
-        let Self { samples, display } = self;
+        let Self { samples, blocks, display } = self;
         let occluders = fixed.moving_occluders(pass);
         if bins.is_occupied(tile) {
-            samples.clone_from(&fixed.samples);
-            bins.draw_tile(tile, rect.origin(), samples, false);
+            samples.copy_from(&fixed.samples);
+            bins.draw_tile(tile, rect.origin(), samples, blocks, false);
             fixed.relight(pass, occluders.as_deref(), |first| is_all_moving(samples, first), display);
             TileResolver::new(pass, rect, samples, display, image).run(true);
         } else if occluders.is_some() {

@@ -111,6 +111,8 @@ pub(crate) struct RenderPass<'a> {
     pub(crate) fixed_occluders: &'a [OcclusionEllipsoid],
     pub(crate) moving_occluders: &'a [OcclusionEllipsoid],
     pub(crate) moving_shadow: &'a ShadowMap,
+    /// True if depth and segmentation are drawn too.
+    pub(crate) has_depth: bool,
 }
 
 impl RenderPass<'_> {

@@ -11,8 +11,7 @@ use crate::camera::{
     lens::Lens,
     math::{LANE_INDEX, LANES, Vec3x8, f32x8, floor_to_u32},
     raster::{
-        CENTRE_ROW, MOVING_FLAG, NO_TRIANGLE, ROWS_PER_PIXEL, SAMPLE_OFFSETS, TILE_EDGE, TileSamples,
-        object_index,
+        MOVING_FLAG, NO_TRIANGLE, SAMPLE_OFFSETS, SAMPLES_PER_PIXEL, TILE_EDGE, TileSamples, object_index,
     },
     shade::shading::{DirectAndAmbient, SurfaceSamples},
 };
@@ -193,24 +192,29 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
     pub(crate) fn run(&mut self, only_moving: bool) {
         for y in 0..self.rect.height {
             for x in (0..self.rect.width).step_by(LANES) {
-                let rows = sample_ids(self.samples, x, y);
-                let ids = rows.map(u32x8::new);
+                let samples = self.samples.colour_ids(x, y);
                 let all = (1 << (self.rect.width - x).min(LANES)) - 1;
-                let any_moving = ids.iter().fold(u32x8::ZERO, |any, row| any | *row);
-                let moving = (any_moving & u32x8::splat(MOVING_FLAG)).to_bitmask();
-                let selected = if only_moving { moving & all } else { all };
-                if selected == 0 {
+                let colours = if only_moving { moving_pixels(&samples) & all } else { all };
+                let mut centres = all;
+                if self.samples.has_centres() {
+                    let (ids, w) = self.samples.centres(x, y);
+                    if only_moving {
+                        centres &= moving_bits(&ids) | colours;
+                    }
+                    if centres != 0 {
+                        self.write_centres(x, y, &ids, w);
+                    }
+                }
+                if colours == 0 {
                     continue;
                 }
-                self.write_centres(x, y, &rows[CENTRE_ROW]);
-                let first = u32x8::splat(rows[0][0]);
-                let same = ids.iter().fold(u32x8::MAX, |same, row| same & row.simd_eq(first));
-                if same.all() && selected == all {
-                    self.shade_row(rows[0][0], x, y);
+                if colours == all && is_uniform(&samples) {
+                    self.shade_row(samples[0], x, y);
                     continue;
                 }
-                for lane in (0..LANES).filter(|lane| selected >> lane & 1 == 1) {
-                    self.shade_pixel(rows.map(|row| row[lane]), x + lane, y);
+                let pixels = samples.as_chunks::<SAMPLES_PER_PIXEL>().0;
+                for (lane, ids) in pixels.iter().enumerate().filter(|(lane, _)| colours >> lane & 1 == 1) {
+                    self.shade_pixel(*ids, x + lane, y);
                 }
             }
         }
@@ -221,16 +225,17 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
     pub(crate) fn run_covered(&mut self, id: u32) {
         for y in 0..self.rect.height {
             for x in (0..self.rect.width).step_by(LANES) {
-                self.write_centres(x, y, &[id; LANES]);
+                if self.samples.has_centres() {
+                    self.write_centres(x, y, &[id; LANES], self.samples.centres(x, y).1);
+                }
                 self.shade_row(id, x, y);
             }
         }
     }
 
-    /// Writes depth and segmentation of eight pixels from (x, y) on; `ids` are the triangles at their centres.
-    fn write_centres(&mut self, x: usize, y: usize, ids: &[u32; LANES]) {
-        let from = (ROWS_PER_PIXEL * y + CENTRE_ROW) * self.samples.stride() + x;
-        let w = f32x8::new(self.samples.w[from..].first_chunk::<LANES>().copied().unwrap_or_default());
+    /// Writes depth and segmentation of eight pixels from (x, y) on; `ids` are the triangles at their centres, and `w`
+    /// the reciprocal depths.
+    fn write_centres(&mut self, x: usize, y: usize, ids: &[u32; LANES], w: f32x8) {
         let depths = (f32x8::ONE / w).to_array();
         let at = (self.rect.y + y) * self.image.width + self.rect.x + x;
         let end = at + (self.rect.width - x).min(LANES);
@@ -260,29 +265,28 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
     }
 
     /// Shades a pixel: each surface once, at the mean position of its samples.
-    fn shade_pixel(&mut self, ids: [u32; ROWS_PER_PIXEL], x: usize, y: usize) {
-        const COLOUR_ROWS: [usize; 4] = [0, 1, 3, 4];
+    fn shade_pixel(&mut self, ids: [u32; SAMPLES_PER_PIXEL], x: usize, y: usize) {
         let pixel = y * TILE_EDGE + x;
         self.sink.begin_pixel(pixel);
-        let position = |row: usize| [0, 1].map(|axis| [x, y][axis] as f32 + SAMPLE_OFFSETS[row][axis]);
-        if COLOUR_ROWS.iter().all(|&row| ids[row] == ids[0]) {
-            self.shade_share(ids[0], position(CENTRE_ROW), pixel, 1.0);
+        if ids == [ids[0]; SAMPLES_PER_PIXEL] {
+            self.shade_share(ids[0], [x, y].map(|at| at as f32 + 0.5), pixel, 1.0);
             return;
         }
+        let position = |sample: usize| [0, 1].map(|axis| [x, y][axis] as f32 + SAMPLE_OFFSETS[sample][axis]);
         let surfaces = ids.map(|id| self.pass.surface(id));
-        for first in COLOUR_ROWS {
-            let members = || COLOUR_ROWS.into_iter().filter(|&row| surfaces[row] == surfaces[first]);
+        for first in 0..SAMPLES_PER_PIXEL {
+            let members = || (0..SAMPLES_PER_PIXEL).filter(|&other| surfaces[other] == surfaces[first]);
             if members().next() != Some(first) {
                 continue;
             }
             let count = members().count() as f32;
-            let mean = [0, 1].map(|axis| members().map(|row| position(row)[axis]).sum::<f32>() / count);
-            let distance2 = |row: usize| {
-                let [u, v] = position(row);
+            let mean = [0, 1].map(|axis| members().map(|sample| position(sample)[axis]).sum::<f32>() / count);
+            let distance2 = |sample: usize| {
+                let [u, v] = position(sample);
                 (u - mean[0]) * (u - mean[0]) + (v - mean[1]) * (v - mean[1])
             };
-            let nearest =
-                members().fold(first, |best, row| if distance2(row) < distance2(best) { row } else { best });
+            let nearest = members()
+                .fold(first, |best, other| if distance2(other) < distance2(best) { other } else { best });
             self.shade_share(ids[nearest], mean, pixel, 0.25 * count);
         }
     }
@@ -318,19 +322,37 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
     }
 }
 
-/// Triangle ids of the samples of eight pixels from (x, y) on, by sample row.
-fn sample_ids(samples: &TileSamples, x: usize, y: usize) -> [[u32; LANES]; ROWS_PER_PIXEL] {
-    std::array::from_fn(|row| {
-        let at = (ROWS_PER_PIXEL * y + row) * samples.stride() + x;
-        samples.ids[at..].first_chunk::<LANES>().copied().unwrap_or([NO_TRIANGLE; LANES])
+/// Bit mask of the ids of moving objects.
+#[inline(always)]
+fn moving_bits(ids: &[u32; LANES]) -> u32 {
+    // The flag is the sign bit, of which the mask is made.
+    const { assert!(MOVING_FLAG == 1 << 31) };
+    u32x8::new(*ids).to_bitmask()
+}
+
+/// Bit mask of the pixels of which any sample shows a moving object.
+#[inline(always)]
+fn moving_pixels(samples: &[u32; SAMPLES_PER_PIXEL * LANES]) -> u32 {
+    let chunks = samples.as_chunks::<LANES>().0;
+    let bits =
+        (0..).zip(chunks).fold(0, |bits, (chunk, ids)| bits | moving_bits(ids) << (chunk * LANES as u32));
+    (0..LANES as u32).fold(0, |pixels, pixel| {
+        pixels | u32::from(bits >> (pixel * SAMPLES_PER_PIXEL as u32) & 0xF != 0) << pixel
     })
+}
+
+/// True if all samples show one triangle.
+#[inline(always)]
+fn is_uniform(samples: &[u32; SAMPLES_PER_PIXEL * LANES]) -> bool {
+    let first = u32x8::splat(samples[0]);
+    let chunks = samples.as_chunks::<LANES>().0.iter();
+    chunks.fold(u32x8::MAX, |same, ids| same & u32x8::new(*ids).simd_eq(first)).all()
 }
 
 /// True if eight pixels from `first` on show moving objects only.
 pub(crate) fn is_all_moving(samples: &TileSamples, first: usize) -> bool {
-    let rows = sample_ids(samples, first % TILE_EDGE, first / TILE_EDGE);
-    let all = rows.iter().fold(u32x8::MAX, |all, row| all & u32x8::new(*row));
-    (all & u32x8::splat(MOVING_FLAG)).to_bitmask() == 0xFF
+    let samples = samples.colour_ids(first % TILE_EDGE, first / TILE_EDGE);
+    samples.as_chunks::<LANES>().0.iter().all(|ids| moving_bits(ids) == 0xFF)
 }
 
 /// Number of prepared triangles that a tile keeps: neighbouring pixels alternate between a few.

@@ -8,7 +8,7 @@ use wide::i32x8;
 
 use crate::camera::{
     math::{LANE_INDEX, LANES, V3, Vec3x8, f32x8, sum_lanes},
-    raster::SampleBuffer,
+    raster::HeightBuffer,
 };
 use softvt_geometry::basis_from_reference;
 use softvt_scene::Lighting;
@@ -87,7 +87,7 @@ pub(crate) struct ShadowMap {
     /// Ranges compare heights above level ground: an occluder is further along the light than its receiver and thus
     /// also higher above level ground, whereas level ground never rises above itself.
     ground_slope: [f32; 2],
-    heights: SampleBuffer<1>,
+    texels: HeightBuffer,
     /// Heights above level ground in and around each tile.
     ranges: Vec<HeightRange>,
 }
@@ -125,24 +125,26 @@ impl ShadowMap {
             centre: lighting.shadow_centre_w.cast(),
             texels_per_metre,
             tangent: lighting.key.softness_rad.tan() as f32,
-            heights: SampleBuffer::new(EDGE, EDGE, EMPTY, false),
+            texels: HeightBuffer::new(EDGE, EMPTY),
             ranges: vec![HeightRange::EMPTY; TILES * TILES],
         }
     }
 
     /// Redraws the map with these casters, each given by its vertices (world) and triangles.
     pub(crate) fn draw<'a>(&mut self, casters: impl Iterator<Item = (&'a [V3], &'a [[u32; 3]])>) {
-        self.heights.clear(EMPTY);
+        self.texels.clear(EMPTY);
+        let mut facing = Vec::new();
         for (positions, triangles) in casters {
             let vertices: Vec<[f32; 3]> = positions.iter().map(|p| self.project_vertex(p)).collect();
             for t in triangles {
                 let corners @ [a, b, c] = t.map(|v| vertices[v as usize]);
                 // u × v points to the light, so triangles that face it have positive area.
                 if (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]) > 0.0 {
-                    self.heights.draw(&corners, [0.0; 2], 0);
+                    facing.push(corners);
                 }
             }
         }
+        self.texels.draw(&facing);
         self.update_ranges();
     }
 
@@ -167,18 +169,18 @@ impl ShadowMap {
     /// Computes the ranges of heights.
     fn update_ranges(&mut self) {
         self.ranges.fill(HeightRange::EMPTY);
-        let [from, to] = self.heights.drawn_rows;
+        let [from, to] = self.texels.drawn_rows;
         if from >= to {
             return;
         }
         let mut tile_ranges = vec![HeightRange::EMPTY; TILES * TILES];
-        let stride = self.heights.stride();
+        let stride = self.texels.stride();
         for row in from / TILE..to.div_ceil(TILE) {
             for column in 0..TILES {
                 let (mut low, mut high) = (f32x8::splat(f32::MAX), f32x8::splat(EMPTY));
                 for y in row * TILE..(row + 1) * TILE {
                     let at = y * stride + column * TILE;
-                    let Some(texels) = self.heights.w[at..].first_chunk::<TILE>() else { continue };
+                    let Some(texels) = self.texels.heights[at..].first_chunk::<TILE>() else { continue };
                     let u = LANE_INDEX + f32x8::splat((column * TILE) as f32 + 0.5);
                     let ground = u * f32x8::splat(self.ground_slope[0])
                         + f32x8::splat(self.ground_slope[1] * (y as f32 + 0.5));
@@ -228,7 +230,7 @@ impl ShadowMap {
     #[inline(always)]
     pub(crate) fn visibility(&self, at: &LightSpacePoints, n: &Vec3x8, mask: f32x8) -> f32x8 {
         let inside = (self.contains(at) & mask).to_bitmask();
-        let [first, last] = self.heights.drawn_rows;
+        let [first, last] = self.texels.drawn_rows;
         if inside == 0 || first >= last {
             return f32x8::ONE;
         }
@@ -402,17 +404,21 @@ impl PenumbraFilter<'_> {
         let [cone, min_radius] = [self.cone, MIN_RADIUS].map(f32x8::splat);
         let max_reach = f32x8::splat(if SEARCH { radius } else { f32::MAX });
         let (mut lit, mut occluded, mut occluder_height) = (f32x8::ZERO, f32x8::ZERO, f32x8::ZERO);
-        let stride = self.map.heights.stride();
+        let stride = self.map.texels.stride();
         for row in (from.div_ceil(STEP) * STEP..to).step_by(STEP) {
             let dv = row as f32 + 0.5 - v;
             let row_weight = f32x8::splat((1.0 - dv * dv * inverse2).max(0.0));
             let [row_rise, row_height, dv2] =
                 [self.slope[1] * dv, self.clamped_slope[1] * dv, dv * dv].map(f32x8::splat);
-            let texels = self.map.heights.w.get(row * stride + first..).unwrap_or_default();
+            let texels = self.map.texels.heights.get(row * stride + first..).unwrap_or_default();
             for (c, texels) in texels.as_chunks::<LANES>().0.iter().take(CHUNKS).enumerate() {
                 let heights = f32x8::new(*texels);
                 let weight = weights[c] * row_weight;
                 let is_higher = heights.simd_gt(limit + (plane_rise[c] + row_rise).fast_max(f32x8::ZERO));
+                if !is_higher.any() {
+                    lit += weight;
+                    continue;
+                }
                 lit += weight & !is_higher;
                 let rise = heights - plane_height[c] - row_height;
                 let reach = (rise * cone + min_radius).fast_min(max_reach);
