@@ -229,10 +229,13 @@ fn video_frame(
     };
     canvas.place(&seen(sensors, STANDARD_CAMERAS[0], TOP_PANEL)?, 0, 0);
     draw_label(&mut canvas, "third person", 0, 0, PANEL_NAME_SIZE);
-    let close_up =
-        sensors.close_up(frame, recording.target, CloseUp { edge: CLOSE_UP_EDGE, cuts_foreground: false })?;
+    let close_up = sensors.close_up(
+        frame,
+        recording.target,
+        CloseUp { edge: CLOSE_UP_EDGE, settled: &recording.frames[0] },
+    )?;
     canvas.place(&resize(&close_up, TOP_PANEL, TOP_PANEL), TOP_PANEL, 0);
-    draw_label(&mut canvas, "object without the robot, by strain", TOP_PANEL, 0, PANEL_NAME_SIZE);
+    draw_label(&mut canvas, "object by strain", TOP_PANEL, 0, PANEL_NAME_SIZE);
     canvas.place(&seen(sensors, STANDARD_CAMERAS[1], WRIST_PANEL)?, 0, TOP_PANEL);
     draw_label(&mut canvas, "wrist", 0, TOP_PANEL, PANEL_NAME_SIZE);
     for (side, reading) in sensors.tactile_readings(frame)?.iter().enumerate() {

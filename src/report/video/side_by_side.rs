@@ -256,13 +256,13 @@ impl<'a> FrameContext<'a> {
         let (x, px) = (left as f32 + layout.px(10.0), |units| layout.px(units));
         canvas.write(&shortened(policy, 34), x, px(20.0), px(NAME_SIZE), TEXT);
         Badge::new(recording, caption, index).draw(canvas, x, px(28.0), px(BADGE_SIZE));
-        // The last states show the object in its place, which may be a basket.
-        let seen = CloseUp { edge: CLOSE_UP_EDGE.min(edge as usize), cuts_foreground: true };
+        let settled = recording.frames.first().ok_or(EpisodeVideoError::Empty)?;
+        let seen = CloseUp { edge: CLOSE_UP_EDGE.min(edge as usize), settled };
         let close_up =
             self.sensors[column].lend(|sensors| sensors.close_up(frame, recording.target, seen))?;
         canvas.place(&resize(&close_up, edge, edge), left, layout.panel_top());
         if column == 0 {
-            let name = "object without the robot, by strain";
+            let name = "object by strain";
             draw_label(canvas, name, left, layout.panel_top(), px(PANEL_NAME_SIZE));
         }
         let force = self.pad_force_n[column].get(index).copied().unwrap_or(0.0);

@@ -69,7 +69,7 @@ mod tests {
             let rim = [[-3.0, -3.0], [16.0, -3.0], [40.0, -3.0], [40.0, 16.0], [40.0, 40.0], [-3.0, 40.0]];
             let mut hits = vec![0; (SAMPLES_PER_PIXEL + 1) * TILE_EDGE * TILE_EDGE];
             for i in 0..rim.len() {
-                let mut samples = TileSamples::new(0.0, true);
+                let mut samples = TileSamples::new(0.0, true, true);
                 let [a, b] = [rim[i], rim[(i + 1) % rim.len()]].map(|[x, y]| [x, y, 1.0]);
                 draw(&mut samples, &[[middle[0], middle[1], 1.0], a, b], 7);
                 hits.iter_mut().zip(ids(&samples)).for_each(|(hits, id)| *hits += i32::from(id == 7));
@@ -80,7 +80,7 @@ mod tests {
 
     #[test]
     fn the_number_of_covered_samples_matches_the_area() {
-        let mut samples = TileSamples::new(0.0, true);
+        let mut samples = TileSamples::new(0.0, true, true);
         draw(&mut samples, &[[2.2, 3.1, 1.0], [29.7, 8.4, 1.0], [11.5, 30.3, 1.0]], 1);
         let area = 0.5 * (27.5 * 27.2 - 9.3 * 5.3);
         let count = ids(&samples).iter().filter(|id| **id == 1).count() as f32;

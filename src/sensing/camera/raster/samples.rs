@@ -39,7 +39,8 @@ const fn chunk_offsets(axis: usize) -> [f32; LANES] {
 /// The samples of a tile. Each keeps the greatest reciprocal depth drawn there and the id of its triangle.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TileSamples {
-    /// The samples of the colours: row by row, pixel by pixel, each with its four samples.
+    /// The samples of the colours: row by row, pixel by pixel, each with its four samples; empty if they are not asked
+    /// for.
     colours: SamplePlane,
     /// The samples of depth and object at the centres, row by row; empty if they are not asked for.
     centres: SamplePlane,
@@ -118,10 +119,10 @@ impl TileSamples {
     }
 
     /// Samples cleared to `w`.
-    pub(crate) fn new(w: f32, has_centres: bool) -> Self {
+    pub(crate) fn new(w: f32, has_colours: bool, has_centres: bool) -> Self {
         let pixels = TILE_EDGE * TILE_EDGE;
         Self {
-            colours: SamplePlane::new(SAMPLES_PER_PIXEL * pixels, w),
+            colours: SamplePlane::new(if has_colours { SAMPLES_PER_PIXEL * pixels } else { 0 }, w),
             centres: SamplePlane::new(if has_centres { pixels } else { 0 }, w),
             drawn_rows: [TILE_EDGE, 0],
         }
@@ -136,7 +137,9 @@ impl TileSamples {
     pub(crate) fn clear(&mut self, w: f32) {
         let [from, to] = self.drawn_rows.map(|row| row * TILE_EDGE);
         if from < to {
-            self.colours.clear(SAMPLES_PER_PIXEL * from..SAMPLES_PER_PIXEL * to, w);
+            if !self.colours.w.is_empty() {
+                self.colours.clear(SAMPLES_PER_PIXEL * from..SAMPLES_PER_PIXEL * to, w);
+            }
             if self.has_centres() {
                 self.centres.clear(from..to, w);
             }
@@ -156,7 +159,9 @@ impl TileSamples {
     /// Draws a triangle where no nearer one was drawn before.
     #[inline(always)]
     pub(crate) fn draw(&mut self, t: &TriangleSetup) {
-        self.draw_colours(t);
+        if !self.colours.w.is_empty() {
+            self.draw_colours(t);
+        }
         self.draw_centres(t);
     }
 

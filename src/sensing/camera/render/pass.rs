@@ -111,8 +111,26 @@ pub(crate) struct RenderPass<'a> {
     pub(crate) fixed_occluders: &'a [OcclusionEllipsoid],
     pub(crate) moving_occluders: &'a [OcclusionEllipsoid],
     pub(crate) moving_shadow: &'a ShadowMap,
-    /// True if depth and segmentation are drawn too.
-    pub(crate) has_depth: bool,
+    pub(crate) channels: Channels,
+}
+
+/// What is drawn of an image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Channels {
+    All,
+    Colours,
+    /// Depth and segmentation.
+    Centres,
+}
+
+impl Channels {
+    pub(crate) fn has_colours(self) -> bool {
+        self != Self::Centres
+    }
+
+    pub(crate) fn has_centres(self) -> bool {
+        self != Self::Colours
+    }
 }
 
 impl RenderPass<'_> {

@@ -221,6 +221,16 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
         self.flush();
     }
 
+    /// Writes depth and segmentation alone.
+    pub(crate) fn run_centres(&mut self) {
+        for y in 0..self.rect.height {
+            for x in (0..self.rect.width).step_by(LANES) {
+                let (ids, w) = self.samples.centres(x, y);
+                self.write_centres(x, y, &ids, w);
+            }
+        }
+    }
+
     /// Shades all pixels of a tile that triangle `id` covers wholly; only the samples at their centres are read.
     pub(crate) fn run_covered(&mut self, id: u32) {
         for y in 0..self.rect.height {

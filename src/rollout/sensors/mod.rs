@@ -2,10 +2,11 @@
 //! Each is a pure function of a [`WorldSnapshot`] (a state of the world), so that it can be computed on demand, also
 //! after the episode.
 
+mod close_up;
+
 use std::sync::Arc;
 
-use image::RgbImage;
-use nalgebra::Point3;
+pub use close_up::{CloseUp, strain_colour};
 
 use super::{
     sensor_assets::{SensingError, SensorAssets},
@@ -13,10 +14,9 @@ use super::{
     simulation::{ObjectInstance, Simulation},
 };
 use softvt_benchmark::CONTROL_DT;
-use softvt_geometry::{Pose, Quat, Vec3};
+use softvt_geometry::{Pose, Vec3};
 use softvt_physics::{
     ArticulationId, BodyId, ColliderId, ContactPartner,
-    fem::strain::node_strains,
     world::{ContactPatch, WorldSnapshot},
 };
 use softvt_policy::{PadForce, SensorStreams, TactileFrame};
@@ -27,7 +27,7 @@ use softvt_robot::{
     pads,
     panda::{self, ARM_DOFS},
 };
-use softvt_scene::{Body, Camera, CameraMount, ROBOT_SEGMENTATION_ID, Scene};
+use softvt_scene::{Camera, CameraMount, ROBOT_SEGMENTATION_ID, Scene};
 use softvt_sensing::{
     camera::{
         CameraError, FrameView, RenderObject, RenderScene, RenderedImage, Renderer, check_cameras,
@@ -91,15 +91,6 @@ const TRIAL_EDGE: usize = 16;
 
 /// Taxels of the force maps along x and y, 1 mm each.
 const TAXELS: [usize; 2] = [25, 21];
-
-/// How a close-up is rendered.
-#[derive(Clone, Copy, Debug)]
-pub struct CloseUp {
-    /// Width and height, pixels.
-    pub edge: usize,
-    /// True to leave out what is between the camera and the object.
-    pub cuts_foreground: bool,
-}
 
 impl Sensors {
     /// The sensors of a simulation.
@@ -175,79 +166,6 @@ impl Sensors {
         let render_scene = self.built_scene()?;
         let image = self.renderer.render_rgb(&render_scene, &self.view(frame), camera);
         image.map_err(|error| SensingError::from(error).set_by(camera))
-    }
-
-    /// Renders a close-up of the object `index` as people see best how it deforms: without the robot, the skin of
-    /// soft bodies coloured by their strain over the stable strain of their material. Never an input of a policy.
-    ///
-    /// # Errors
-    /// As [`render`](Self::render).
-    pub fn close_up(
-        &mut self,
-        frame: &WorldSnapshot,
-        index: usize,
-        CloseUp { edge, cuts_foreground }: CloseUp,
-    ) -> Result<RgbImage, SensingError> {
-        let colours = |(body, x): (usize, &Vec<Vec3>)| {
-            self.strain_ratios(body, x).into_iter().map(strain_colour).collect()
-        };
-        let colours: Vec<Vec<[f32; 3]>> = frame.nodes.iter().enumerate().map(colours).collect();
-        let camera = close_up_camera(&self.objects[index], frame, edge, CLOSE_UP_DISTANCE);
-        let camera = if cuts_foreground { self.cut(index, camera, CLOSE_UP_DISTANCE) } else { camera };
-        self.without_robot(frame, &colours, &camera)
-    }
-
-    /// Renders the object `index` from nearby as it looks, without the robot. Never an input of a policy.
-    ///
-    /// # Errors
-    /// As [`render`](Self::render).
-    pub fn portrait(
-        &mut self,
-        frame: &WorldSnapshot,
-        index: usize,
-        edge: usize,
-    ) -> Result<RgbImage, SensingError> {
-        let camera = close_up_camera(&self.objects[index], frame, edge, PORTRAIT_DISTANCE);
-        let camera = self.cut(index, camera, PORTRAIT_DISTANCE);
-        self.without_robot(frame, &[], &camera)
-    }
-
-    /// A close-up's camera that does not see what is between it and the object, such as the wall of a basket.
-    fn cut(&self, index: usize, camera: Camera, distance: f64) -> Camera {
-        let diagonal = self.objects[index].bounds.size().norm();
-        Camera { near_m: (distance - FOREGROUND) * diagonal, ..camera }
-    }
-
-    /// Renders what a camera with the hand at the world's origin sees, with colours at the nodes of soft bodies, if
-    /// there are any.
-    fn without_robot(
-        &mut self,
-        frame: &WorldSnapshot,
-        colours: &[Vec<[f32; 3]>],
-        camera: &Camera,
-    ) -> Result<RgbImage, SensingError> {
-        let render_scene = self.built_scene()?;
-        let view = FrameView {
-            node_colours: colours,
-            hidden_id: ROBOT_SEGMENTATION_ID,
-            hand_w: Some(Pose::identity()),
-            ..self.view(frame)
-        };
-        let image = self.close_up_renderer.render_rgb(&render_scene, &view, camera)?;
-        Ok(image.into_rgb_image())
-    }
-
-    /// Strain at the nodes of a soft body, at the positions `x`, over the stable strain of its material: above 1 the
-    /// material has collapsed. Empty without a stable strain.
-    pub fn strain_ratios(&self, body: usize, x: &[Vec3]) -> Vec<f64> {
-        let is_body =
-            |object: &&ObjectInstance| matches!(object.body, BodyId::Soft(id) if id.index() == body);
-        let Some(object) = self.objects.iter().find(is_body) else { return Vec::new() };
-        let (Some(model), Body::Soft(material)) = (&object.model, &object.asset.body) else {
-            return Vec::new();
-        };
-        let Some(stable) = material.stable_strain() else { return Vec::new() };
-        node_strains(model, x).into_iter().map(|strain| strain / stable).collect()
     }
 
     /// As [`render`](Self::render), for a camera that is used once: nothing is kept for its next image.
@@ -529,63 +447,6 @@ impl Sensors {
             .into_iter()
             .collect())
     }
-}
-
-/// Direction from the object to the camera of a close-up, world.
-const CLOSE_UP_FROM: [f64; 3] = [0.8, -0.45, 0.5];
-/// Field of view of a close-up, rad, and its distance from the object, in diagonals of its bounds; a portrait is
-/// closer.
-const CLOSE_UP_FOVY: f64 = 0.5;
-const CLOSE_UP_DISTANCE: f64 = 2.6;
-const PORTRAIT_DISTANCE: f64 = 1.9;
-/// Distance from the object, in diagonals of its bounds, beyond which a cut foreground ends.
-const FOREGROUND: f64 = 0.55;
-
-/// A camera that looks at an object from a distance in diagonals of its bounds, always along the same direction.
-fn close_up_camera(object: &ObjectInstance, frame: &WorldSnapshot, edge: usize, distance: f64) -> Camera {
-    let centre = match object.body {
-        BodyId::Soft(id) => frame.soft(id).iter().sum::<Vec3>() / frame.soft(id).len().max(1) as f64,
-        BodyId::Rigid(id) => (frame.rigid(id) * Point3::from(object.bounds.centre())).coords,
-        BodyId::Link(id) => {
-            let object_w = frame.link(id) * object.joint_frame_o().inverse();
-            (object_w * Point3::from(object.bounds.centre())).coords
-        }
-        BodyId::World | BodyId::Kinematic(_) => {
-            (object.start_w * Point3::from(object.bounds.centre())).coords
-        }
-    };
-    let away = Vec3::from(CLOSE_UP_FROM).normalize();
-    let eye = centre + away * (distance * object.bounds.size().norm());
-    let pose = Pose::from_parts(eye.into(), Quat::face_towards(&away, &Vec3::z()));
-    Camera {
-        name: "close_up".to_owned(),
-        // With the hand at the world's origin: a moving camera keeps no background.
-        mount: CameraMount::Hand,
-        pose,
-        fovy_rad: CLOSE_UP_FOVY,
-        near_m: 0.01,
-        far_m: 10.0,
-        width: edge,
-        height: edge,
-        set_at: None,
-    }
-}
-
-/// Linear RGB of a strain over the stable strain: pale to orange up to 1, red beyond and nowhere else.
-pub fn strain_colour(ratio: f64) -> [f32; 3] {
-    const RAMP: [(f64, [f32; 3]); 4] = [
-        (0.0, [0.88, 0.85, 0.79]),
-        (0.3, [0.88, 0.85, 0.79]),
-        (0.65, [0.91, 0.68, 0.16]),
-        (1.0, [0.81, 0.28, 0.04]),
-    ];
-    if ratio > 1.0 {
-        return [0.45, 0.02, 0.02];
-    }
-    let after = RAMP.iter().position(|(at, _)| *at >= ratio).unwrap_or(RAMP.len() - 1).max(1);
-    let ((low, from), (high, to)) = (RAMP[after - 1], RAMP[after]);
-    let share = ((ratio - low) / (high - low)).clamp(0.0, 1.0) as f32;
-    std::array::from_fn(|channel| from[channel] + share * (to[channel] - from[channel]))
 }
 
 /// Pose of a camera, world.
