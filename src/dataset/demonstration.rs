@@ -6,6 +6,8 @@ use softvt_records::record::EpisodeRecord;
 use softvt_robot::{
     GripTarget,
     gripper::{self, MAX_WIDTH},
+    ik::ArmAngles,
+    panda::ARM_DOFS,
     rotation,
 };
 use softvt_rollout::{FinishedEpisode, Sensors, StateRecording};
@@ -26,6 +28,9 @@ pub struct Demonstration {
     pub record: EpisodeRecord,
     /// Commanded action per control step.
     pub actions: Vec<Action>,
+    /// Joint positions that each action means, rad; see
+    /// [`FinishedEpisode::joint_commands`](softvt_rollout::FinishedEpisode::joint_commands).
+    pub joint_commands: Vec<ArmAngles>,
     /// True in steps in which the gripper is commanded to hold: its binary code.
     pub gripper_closed: Vec<bool>,
     /// Seventh numbers of the actions in the code force, N.
@@ -58,6 +63,7 @@ impl Demonstration {
             grip_labels_n: grip_labels::forces(&grip_forces(recording, actions.len()), &gripper_closed),
             gripper_closed,
             actions,
+            joint_commands: finished.joint_commands.clone(),
             privileged,
         }
     }
@@ -80,6 +86,24 @@ impl Demonstration {
     pub fn top_level_streams(&self) -> Vec<DataStream> {
         let steps = self.steps();
         let mut all = GripCode::ALL.map(|code| self.actions_in(code)).to_vec();
+        all.push(
+            DataStream::f64(
+                JOINT_ACTIONS,
+                &[ARM_DOFS],
+                self.joint_commands.iter().flatten().copied().collect(),
+            )
+            .unit("rad", "")
+            .attribute("meaning", "the motion of the actions as commanded joint positions"),
+        );
+        if self.actions.iter().any(|action| action.joints.is_some()) {
+            let are_joints = self.actions.iter().map(|action| u8::from(action.joints.is_some()));
+            all.push(
+                DataStream::u8(COMMANDS_JOINTS, &[], are_joints.collect()).attribute(
+                    "meaning",
+                    "1 where the recorded policy commanded joint positions, not a pose",
+                ),
+            );
+        }
         let last = |step: usize| step + 1 == steps;
         all.extend([
             DataStream::f64("rewards", &[], (0..steps).map(|step| f64::from(u8::from(last(step)))).collect()),
@@ -120,6 +144,11 @@ impl Demonstration {
             .attribute("grip_code", code.name())
     }
 }
+
+/// Name of the stream of actions as joint positions.
+pub(crate) const JOINT_ACTIONS: &str = "actions_joints";
+/// Name of the stream that marks actions that commanded joint positions; present if there are any.
+pub(crate) const COMMANDS_JOINTS: &str = "commands_joints";
 
 /// Name of the stream of actions in a grip code.
 pub(crate) fn actions_stream_name(code: GripCode) -> &'static str {

@@ -76,7 +76,7 @@ impl RecordedPolicy {
         Self { commands: commands.into_iter(), last: None, ending }
     }
 
-    /// Replays absolute poses; see [`new`](Self::new).
+    /// Replays absolute poses and joint positions; see [`new`](Self::new).
     pub fn from_actions(actions: &[Action], ending: Option<String>) -> Self {
         Self::new(actions.iter().copied().map(ToolCommand::from).collect(), ending)
     }
@@ -103,7 +103,7 @@ impl Policy for RecordedPolicy {
 /// The command that keeps the tool where `command` has brought it.
 fn held(command: ToolCommand) -> ToolCommand {
     let motion = match command.motion {
-        pose @ ToolMotion::Pose { .. } => pose,
+        fixed @ (ToolMotion::Pose { .. } | ToolMotion::Joints(_)) => fixed,
         ToolMotion::Delta { full, .. } => {
             ToolMotion::Delta { full, translation_b: Vec3::zeros(), rotation_b: Vec3::zeros() }
         }

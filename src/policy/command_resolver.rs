@@ -28,7 +28,11 @@ impl CommandResolver {
         match command.motion {
             ToolMotion::Pose { position_b, axis_angle_b } => {
                 self.stop();
-                Action { position_b, axis_angle_b, grip }
+                Action { position_b, axis_angle_b, joints: None, grip }
+            }
+            ToolMotion::Joints(joints) => {
+                self.stop();
+                Action::of_joints(joints, grip)
             }
             ToolMotion::Delta { full, translation_b, rotation_b } => {
                 let (translation_b, rotation_b) = if full {

@@ -5,7 +5,7 @@ use rmpv::Value;
 use super::{
     ActionChunk, PolicyError, ToolCommand, ToolMotion,
     msgpack::{NumberArray, entry, kind, names, numbers},
-    profile::{ACTION_LEN, ActionEncoding, ActionUnits, PoseEncoding},
+    profile::{ActionEncoding, PoseEncoding},
 };
 use softvt_geometry::Vec3;
 
@@ -16,7 +16,7 @@ pub const MAX_CHUNK_LEN: usize = 10_000;
 pub const PADDED_ACTION_LEN: usize = 32;
 
 /// Decodes a response: a map whose entry `actions` (or `action`) has the shape (horizon, n), (1, horizon, n) or
-/// (n). Without a length in the profile, n is 7, or 32 with padding.
+/// (n). Without a length in the profile, n is 7, or 8 for joint positions, or 32 with padding.
 ///
 /// ```
 /// use rmpv::Value;
@@ -44,9 +44,10 @@ pub fn chunk(response: &Value, encoding: &ActionEncoding) -> Result<ActionChunk,
         .ok_or_else(|| PolicyError::Response(format!("has no entry actions; it has {}", names(response))))?;
     let NumberArray { shape, values } = numbers(actions)
         .map_err(|error| PolicyError::Response(format!("has {error} as actions; expected numbers")))?;
+    let own = encoding.numbers();
     let wrong = |problem: &str| {
         PolicyError::Response(format!(
-            "has actions of shape {shape:?}: {problem}; expected ({ACTION_LEN}), (horizon, {ACTION_LEN}) or (1, horizon, {ACTION_LEN})"
+            "has actions of shape {shape:?}: {problem}; expected ({own}), (horizon, {own}) or (1, horizon, {own})"
         ))
     };
     let (horizon, width) = match shape[..] {
@@ -57,37 +58,49 @@ pub fn chunk(response: &Value, encoding: &ActionEncoding) -> Result<ActionChunk,
     match (horizon, width) {
         (0, _) => return Err(wrong("no action at all")),
         (MAX_CHUNK_LEN.., _) => return Err(wrong("too many")),
-        (_, ..ACTION_LEN) => return Err(wrong("too few numbers per action")),
+        (_, width) if width < own => return Err(wrong("too few numbers per action")),
         _ => {}
     }
     match encoding.length {
         Some(length) if length != width => {
             return Err(wrong(&format!("the profile requires {length} numbers per action")));
         }
-        // Eight numbers may be a position, a quaternion and a gripper: more than seven have to be known as padding.
-        None if ![ACTION_LEN, PADDED_ACTION_LEN].contains(&width) => {
+        // Eight numbers may be a position, a quaternion and a gripper, or joint positions and a gripper: those that are
+        // padding have to be known.
+        None if ![own, PADDED_ACTION_LEN].contains(&width) => {
             return Err(wrong(&format!(
-                "{width} numbers per action are neither {ACTION_LEN} nor the {PADDED_ACTION_LEN} of openpi's padding; if the \
+                "{width} numbers per action are neither {own} nor the {PADDED_ACTION_LEN} of openpi's padding; if the \
                  others are padding, a profile states length = {width}"
             )));
         }
         _ => {}
     }
-    let rows = values.chunks_exact(width).filter_map(<[f64]>::first_chunk);
-    Ok(ActionChunk { commands: rows.map(|row| command(row, encoding)).collect::<Result<_, _>>()? })
+    let rows = values.chunks_exact(width).map(|row| command(&row[..own], encoding));
+    Ok(ActionChunk { commands: rows.collect::<Result<_, _>>()? })
 }
 
-/// Decodes the seven numbers of an action.
+/// Decodes the numbers of an action without padding.
 ///
 /// # Errors
-/// [`PolicyError::Action`] if a number is not finite.
-pub fn command(row: &[f64; ACTION_LEN], encoding: &ActionEncoding) -> Result<ToolCommand, PolicyError> {
+/// [`PolicyError::Action`] if a number is not finite, [`PolicyError::Response`] if there are more or fewer than
+/// [`ActionEncoding::numbers`].
+pub fn command(row: &[f64], encoding: &ActionEncoding) -> Result<ToolCommand, PolicyError> {
     if row.iter().any(|number| !number.is_finite()) {
         return Err(PolicyError::Action(format!("the action {row:?} holds a number that is not finite")));
     }
-    let ActionUnits { scale, offset } = encoding.units.unwrap_or(ActionUnits::IDENTITY);
-    let [x, y, z, rx, ry, rz] = std::array::from_fn(|i| scale[i] * row[i] + offset[i]);
-    let (linear, angular) = (Vec3::new(x, y, z), Vec3::new(rx, ry, rz));
+    let (own, count) = (encoding.numbers(), row.len());
+    let Some((grip, motion)) = row.split_last().filter(|_| count == own) else {
+        return Err(PolicyError::Response(format!("has an action of {count} numbers; expected {own}")));
+    };
+    let si = |i: usize| match &encoding.units {
+        Some(units) => units.to_si(i, motion[i]),
+        None => motion[i],
+    };
+    let grip = encoding.gripper.command(*grip);
+    if encoding.pose == PoseEncoding::Joints {
+        return Ok(ToolCommand { motion: ToolMotion::Joints(std::array::from_fn(si)), grip });
+    }
+    let (linear, angular) = (Vec3::from_fn(|i, _| si(i)), Vec3::from_fn(|i, _| si(3 + i)));
     // robosuite's controller clips to −1..=1 as well.
     let delta = |full, translation_m: f64, rotation_rad: f64| ToolMotion::Delta {
         full,
@@ -95,17 +108,23 @@ pub fn command(row: &[f64; ACTION_LEN], encoding: &ActionEncoding) -> Result<Too
         rotation_b: angular.map(|x| x.clamp(-1.0, 1.0)) * rotation_rad,
     };
     let motion = match encoding.pose {
-        PoseEncoding::Absolute => ToolMotion::Pose { position_b: linear, axis_angle_b: angular },
+        PoseEncoding::Absolute | PoseEncoding::Joints => {
+            ToolMotion::Pose { position_b: linear, axis_angle_b: angular }
+        }
         PoseEncoding::Delta { translation_m, rotation_rad } => delta(true, translation_m, rotation_rad),
         PoseEncoding::DeltaOsc { translation_m, rotation_rad } => delta(false, translation_m, rotation_rad),
     };
-    Ok(ToolCommand { motion, grip: encoding.gripper.command(row[6]) })
+    Ok(ToolCommand { motion, grip })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Action, EncodedGrip, GripTarget, msgpack::pack_array, profile::Profile};
+    use crate::{
+        Action, EncodedGrip, GripTarget,
+        msgpack::pack_array,
+        profile::{ActionUnits, Profile},
+    };
     use softvt_common::npy::NpyArray;
 
     fn read(value: Value) -> Result<ActionChunk, PolicyError> {
@@ -168,13 +187,39 @@ mod tests {
         // Millimetres from a point half a metre in front of the base, and degrees.
         let (mm, degree) = (1e-3, 1.0_f64.to_radians());
         code.units = Some(ActionUnits {
-            scale: [mm, mm, mm, degree, degree, degree],
-            offset: [0.5, 0.0, 0.1, 0.0, 0.0, 0.0],
+            scale: vec![mm, mm, mm, degree, degree, degree],
+            offset: vec![0.5, 0.0, 0.1, 0.0, 0.0, 0.0],
         });
         let decoded = command(&[20.0, -30.0, 0.0, 180.0, 0.0, 0.0, 1.0], &code).unwrap();
         let ToolMotion::Pose { position_b, axis_angle_b } = decoded.motion else { panic!("a pose") };
         assert!((position_b - Vec3::new(0.52, -0.03, 0.1)).norm() < 1e-12);
         assert!((axis_angle_b - Vec3::new(std::f64::consts::PI, 0.0, 0.0)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn joint_positions_have_eight_numbers_and_may_be_in_degrees() {
+        let mut code = Profile::named("vision_joints").unwrap().actions;
+        let padded = chunk(&reply(vec![2, 32], 0.25), &code).unwrap();
+        let one = chunk(&reply(vec![8], 0.25), &code).unwrap();
+        let grip = EncodedGrip::Target(GripTarget::Closure(0.25));
+        for command in [padded.commands[1], one.commands[0]] {
+            assert_eq!(command, ToolCommand { motion: ToolMotion::Joints([0.25; 7]), grip });
+        }
+        match chunk(&reply(vec![10, 7], 0.25), &code) {
+            Err(PolicyError::Response(message)) => {
+                assert!(
+                    message.contains("too few numbers per action; expected (8), (horizon, 8)"),
+                    "{message}"
+                );
+            }
+            other => panic!("{other:?}"),
+        }
+        assert!(matches!(chunk(&reply(vec![8], f32::NAN), &code), Err(PolicyError::Action(_))));
+        code.units = Some(ActionUnits { scale: vec![1.0_f64.to_radians(); 7], offset: vec![0.0; 7] });
+        let decoded = command(&[180.0, 0.0, 0.0, 0.0, 0.0, 0.0, -90.0, 0.0], &code).unwrap();
+        let ToolMotion::Joints(joints) = decoded.motion else { panic!("{decoded:?}") };
+        assert!((joints[0] - std::f64::consts::PI).abs() < 1e-12);
+        assert!((joints[6] + std::f64::consts::FRAC_PI_2).abs() < 1e-12);
     }
 
     #[test]

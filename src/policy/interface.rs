@@ -5,7 +5,7 @@ use sha2::{Digest, Sha256};
 use super::{Observation, SensorStreams};
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_geometry::{Pose, Vec3};
-use softvt_robot::{GripTarget, rotation};
+use softvt_robot::{GripTarget, ik::ArmAngles, panda, rotation};
 
 /// Command of one control step: where the tool and the gripper should be at its end.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,6 +14,9 @@ pub struct Action {
     pub position_b: Vec3,
     /// Absolute tool orientation in the base frame as axis-angle, rad.
     pub axis_angle_b: Vec3,
+    /// Arm joint positions (rad) that are commanded directly; the pose is that of the tool there. `None` for a pose
+    /// that inverse kinematics turns into joint positions.
+    pub joints: Option<ArmAngles>,
     /// Target of the gripper. The hand clamps closures outside of 0..=1, which the record counts; a grip force is at
     /// most the effort of the gripper.
     pub grip: GripTarget,
@@ -22,7 +25,14 @@ pub struct Action {
 impl Action {
     /// An action that commands a closure.
     pub fn new(position_b: Vec3, axis_angle_b: Vec3, closure: f64) -> Self {
-        Self { position_b, axis_angle_b, grip: GripTarget::Closure(closure) }
+        Self { position_b, axis_angle_b, joints: None, grip: GripTarget::Closure(closure) }
+    }
+
+    /// An action that commands arm joint positions, rad.
+    pub fn of_joints(joints: ArmAngles, grip: GripTarget) -> Self {
+        let tool_b = panda::tool_pose(&joints);
+        let (position_b, axis_angle_b) = (tool_b.translation.vector, rotation::axis_angle(&tool_b.rotation));
+        Self { position_b, axis_angle_b, joints: Some(joints), grip }
     }
 
     /// Gripper closure, 0 (open) ..= 1 (closed); 1 with a grip force.
@@ -46,9 +56,10 @@ impl Action {
         Pose::from_parts(self.position_b.into(), rotation::from_axis_angle(&self.axis_angle_b))
     }
 
-    /// All numbers of the action: those of [`Self::to_array`], and the grip force if it commands one.
+    /// All numbers of the action: those of [`Self::to_array`], and the grip force and the joint positions if it
+    /// commands them.
     pub fn numbers(self) -> impl Iterator<Item = f64> {
-        self.to_array().into_iter().chain(self.force_n())
+        self.to_array().into_iter().chain(self.force_n()).chain(self.joints.into_iter().flatten())
     }
 
     /// Position, axis-angle and closure: the row of an action in recorded files.
@@ -57,7 +68,7 @@ impl Action {
         [p.x, p.y, p.z, r.x, r.y, r.z, self.closure()]
     }
 
-    /// Inverse of [`Self::to_array`], without a grip force.
+    /// Inverse of [`Self::to_array`], without a grip force and joint positions.
     pub fn from_array([x, y, z, rx, ry, rz, closure]: [f64; 7]) -> Self {
         Self::new(Vec3::new(x, y, z), Vec3::new(rx, ry, rz), closure)
     }
@@ -83,6 +94,8 @@ pub enum ToolMotion {
         /// Orientation in the base frame as axis-angle, rad.
         axis_angle_b: Vec3,
     },
+    /// Arm joint positions, rad.
+    Joints(ArmAngles),
     /// A displacement from the measured tool pose.
     Delta {
         /// True to command the displaced pose itself; false to command what robosuite's
@@ -113,8 +126,9 @@ pub enum EncodedGrip {
 
 impl From<Action> for ToolCommand {
     fn from(action: Action) -> Self {
-        let Action { position_b, axis_angle_b, grip } = action;
-        Self { motion: ToolMotion::Pose { position_b, axis_angle_b }, grip: EncodedGrip::Target(grip) }
+        let Action { position_b, axis_angle_b, joints, grip } = action;
+        let pose = ToolMotion::Pose { position_b, axis_angle_b };
+        Self { motion: joints.map_or(pose, ToolMotion::Joints), grip: EncodedGrip::Target(grip) }
     }
 }
 

@@ -24,7 +24,8 @@ pub fn goal(
     grip: GripTarget,
 ) -> Action {
     let orientation = rotation::from_axis_angle(&rotation_b) * orientation_b;
-    Action { position_b: position_b + translation_b, axis_angle_b: rotation::axis_angle(&orientation), grip }
+    let (position_b, axis_angle_b) = (position_b + translation_b, rotation::axis_angle(&orientation));
+    Action { position_b, axis_angle_b, joints: None, grip }
 }
 
 /// Distance that the spring covers in a control step towards a goal at `step`. Updates its velocity.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{EncodedGrip, GripHysteresis, SensorStreams};
-use softvt_robot::{GripTarget, Side};
+use softvt_robot::{GripTarget, Side, panda::ARM_DOFS};
 use softvt_scene::STANDARD_CAMERAS;
 use softvt_sensing::tactile::{HISTORY_LENGTH, MarkerStyle, TactileMosaicLayout};
 
@@ -171,34 +171,50 @@ impl RobotStatePart {
     }
 }
 
-/// Encoding of an action: three numbers for the position, three for the orientation, one for the gripper.
-/// Further numbers are padding.
+/// Encoding of an action: numbers for the motion of the arm and one for the gripper. Further numbers are padding.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ActionEncoding {
-    /// Meaning of the first six numbers.
+    /// Meaning of the numbers before that of the gripper.
     pub pose: PoseEncoding,
-    /// Meaning of the seventh number.
+    /// Meaning of the number of the gripper.
     pub gripper: GripperValues,
-    /// Conversion of the first six numbers to the units of `pose`, if they differ.
+    /// Conversion of the first numbers to the units of `pose`, if they differ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units: Option<ActionUnits>,
-    /// Required length of an action including padding. `None` accepts 7, and 32 as openpi's models pad them.
+    /// Required length of an action including padding. `None` accepts that without padding, and 32 as openpi's models
+    /// pad them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub length: Option<usize>,
 }
 
-/// Affine conversion `scale · number + offset` of the first six numbers of an action.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// Affine conversion `scale · number + offset` of the numbers of an action before that of the gripper.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ActionUnits {
-    /// Factors of the first six numbers.
-    pub scale: [f64; 6],
+    /// Factors.
+    pub scale: Vec<f64>,
     /// Offsets, m and rad.
-    pub offset: [f64; 6],
+    pub offset: Vec<f64>,
 }
 
 impl ActionUnits {
-    /// SI units already: nothing is converted.
-    pub const IDENTITY: Self = Self { scale: [1.0; 6], offset: [0.0; 6] };
+    /// A number of an action in SI units.
+    pub fn to_si(&self, index: usize, number: f64) -> f64 {
+        self.factor(index) * number + self.origin(index)
+    }
+
+    /// A number of an action for a value in SI units.
+    pub fn from_si(&self, index: usize, value: f64) -> f64 {
+        (value - self.origin(index)) / self.factor(index)
+    }
+
+    // Numbers that a file leaves out are not converted.
+    fn factor(&self, index: usize) -> f64 {
+        self.scale.get(index).copied().unwrap_or(1.0)
+    }
+
+    fn origin(&self, index: usize) -> f64 {
+        self.offset.get(index).copied().unwrap_or(0.0)
+    }
 }
 
 impl ActionEncoding {
@@ -206,17 +222,37 @@ impl ActionEncoding {
     pub fn new(pose: PoseEncoding, gripper: GripperValues) -> Self {
         Self { pose, gripper, units: None, length: None }
     }
+
+    /// Numbers of an action without padding: those of the motion, and one of the gripper.
+    pub fn numbers(&self) -> usize {
+        self.pose.numbers() + 1
+    }
+
+    /// Names of the numbers of an action without padding.
+    pub fn names(&self) -> Vec<&'static str> {
+        let motion = match self.pose {
+            PoseEncoding::Joints => JOINT_NAMES.as_slice(),
+            _ => POSE_NAMES.as_slice(),
+        };
+        let grip = if self.gripper.code == GripCode::Force { "grip_force" } else { "gripper" };
+        motion.iter().copied().chain([grip]).collect()
+    }
 }
 
-/// Numbers of an action that have a meaning; further ones are padding.
-pub const ACTION_LEN: usize = 7;
+/// Names of the numbers of an action that give a pose or a displacement.
+pub const POSE_NAMES: [&str; 6] = ["x", "y", "z", "axis_angle_x", "axis_angle_y", "axis_angle_z"];
+/// Names of the arm's joints.
+pub const JOINT_NAMES: [&str; ARM_DOFS] =
+    ["joint_1", "joint_2", "joint_3", "joint_4", "joint_5", "joint_6", "joint_7"];
 
-/// Meaning of the first six numbers of an action.
+/// Meaning of the numbers of an action before that of the gripper.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum PoseEncoding {
     /// Tool pose in the base frame: position, m, and axis-angle, rad.
     Absolute,
+    /// Positions of the seven arm joints, rad.
+    Joints,
     /// Displacement from the measured tool pose, each number −1..=1 times the limit of its axis, executed in full.
     Delta {
         /// Largest translation along each axis, m.
@@ -233,7 +269,30 @@ pub enum PoseEncoding {
     },
 }
 
-/// Grip code: what the seventh number of an action commands.
+impl PoseEncoding {
+    /// All names, in the order of the documentation.
+    pub const NAMES: [&str; 4] = ["absolute", "delta", "delta_osc", "joints"];
+
+    /// How many numbers it has.
+    pub fn numbers(self) -> usize {
+        match self {
+            Self::Joints => JOINT_NAMES.len(),
+            Self::Absolute | Self::Delta { .. } | Self::DeltaOsc { .. } => POSE_NAMES.len(),
+        }
+    }
+
+    /// Name in files and in the metadata of servers.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Absolute => "absolute",
+            Self::Joints => "joints",
+            Self::Delta { .. } => "delta",
+            Self::DeltaOsc { .. } => "delta_osc",
+        }
+    }
+}
+
+/// Grip code: what the last number of an action commands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum GripCode {
@@ -352,13 +411,15 @@ impl GripperValues {
 }
 
 /// Built-in profiles and their descriptions.
-pub const PROFILES: [(&str, &str); 7] = [
+pub const PROFILES: [(&str, &str); 9] = [
     ("vision", "both cameras, state, prompt; absolute pose; gripper open or closed (binary)"),
     (
         "vision_drives",
         "vision with the exact finger position and the commanded closure, whose gap is the grip force; continuous gripper",
     ),
     ("visuo_tactile", "vision plus tactile images and markers of 8 frames; continuous gripper"),
+    ("vision_joints", "vision with joint positions in state and actions; continuous gripper"),
+    ("visuo_tactile_joints", "visuo_tactile with joint positions in state and actions"),
     ("softvtbench", "keys and units of the released SoftVTBench client, with true forces (force_observed)"),
     (
         "softvtbench_v02",
@@ -378,7 +439,9 @@ impl Profile {
         };
         // SoftVTBench's interfaces and LIBERO's have the exact position of the fingers.
         let finger = match name {
-            "vision" | "visuo_tactile" => RobotStatePart::SensedFingerPosition,
+            "vision" | "visuo_tactile" | "vision_joints" | "visuo_tactile_joints" => {
+                RobotStatePart::SensedFingerPosition
+            }
             _ => RobotStatePart::FingerPosition,
         };
         let input = ProfileInput::new;
@@ -407,6 +470,13 @@ impl Profile {
             "visuo_tactile" => {
                 inputs.extend(tactile);
                 absolute(closure)
+            }
+            "vision_joints" | "visuo_tactile_joints" => {
+                inputs[2].source = ObservationSource::State { parts: vec![RobotStatePart::Joints, finger] };
+                if name == "visuo_tactile_joints" {
+                    inputs.extend(tactile);
+                }
+                ActionEncoding::new(PoseEncoding::Joints, closure)
             }
             "softvtbench" => {
                 inputs.extend(tactile);
@@ -487,6 +557,18 @@ mod tests {
             assert_eq!(Profile::named(name).map(|p| p.name), Some(name.to_owned()));
         }
         assert_eq!(Profile::named("pi"), None);
+    }
+
+    #[test]
+    fn actions_in_joint_positions_have_eight_named_numbers() {
+        for name in ["vision_joints", "visuo_tactile_joints"] {
+            let Profile { inputs, actions, .. } = Profile::named(name).unwrap();
+            assert_eq!((actions.numbers(), actions.names().len()), (8, 8));
+            assert_eq!(actions.names()[6..], ["joint_7", "gripper"]);
+            let ObservationSource::State { parts } = &inputs[2].source else { panic!("{inputs:?}") };
+            assert_eq!(parts[..], [RobotStatePart::Joints, RobotStatePart::SensedFingerPosition]);
+        }
+        assert_eq!(Profile::named("libero").unwrap().actions.numbers(), 7);
     }
 
     #[test]

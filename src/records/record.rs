@@ -95,7 +95,7 @@ pub struct DemonstrationOrigin {
     pub start: InitialStateOverride,
 }
 
-/// A command that is out of reach of one step of the inverse kinematics.
+/// A command that is out of reach of one step of the inverse kinematics, or outside of the joints' limits.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct UnreachableCommand {
     /// Commanded position of the tool in the base frame, m.
@@ -104,6 +104,22 @@ pub struct UnreachableCommand {
     pub distance_m: f64,
     /// Angle from the orientation of the tool, rad.
     pub angle_rad: f64,
+    /// The first commanded joint position that is outside of its limits, if one is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint: Option<JointOutsideLimits>,
+}
+
+/// A commanded joint position outside of the limits of its joint.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JointOutsideLimits {
+    /// Number of the joint, from 1 at the base.
+    pub number: u8,
+    /// Commanded position, rad.
+    pub position_rad: f64,
+    /// Lower limit, rad.
+    pub lower_rad: f64,
+    /// Upper limit, rad.
+    pub upper_rad: f64,
 }
 
 impl fmt::Display for UnreachableCommand {
@@ -111,6 +127,10 @@ impl fmt::Display for UnreachableCommand {
         let short = |x: f64| decimal(Some(x), 3).trim_end_matches('0').trim_end_matches('.').to_owned();
         let position = self.position_m.map(short).join(", ");
         let (distance, angle) = (short(self.distance_m), short(self.angle_rad));
+        if let Some(JointOutsideLimits { number, position_rad, lower_rad, upper_rad }) = self.joint {
+            let [at, lower, upper] = [position_rad, lower_rad, upper_rad].map(short);
+            return write!(f, "joint {number} at {at} rad, whose limits are {lower} to {upper} rad");
+        }
         write!(f, "({position}) m, {distance} m and {angle} rad from the tool")
     }
 }
@@ -134,7 +154,8 @@ pub struct RolloutStats {
     /// scene beyond that object.
     pub camera_inside: u32,
     /// Number of control steps whose command was farther from the tool than one step of the inverse kinematics
-    /// reaches (0.2 m, 0.6 rad): out of reach, or in the wrong frame or unit.
+    /// reaches (0.2 m, 0.6 rad), or had a joint position outside of its limits: out of reach, or in the wrong frame or
+    /// unit.
     pub far_commands: u32,
     /// The first of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -232,6 +253,7 @@ pub(crate) mod tests {
             position_m: [467.0, 4.25, -260.0],
             distance_m: 534.5104,
             angle_rad: 0.0,
+            joint: None,
         });
         let far = "168 of 168 commands were out of reach, first: (467, 4.25, -260) m, 534.51 m and 0 rad from the tool";
         assert_eq!(stats.command_notes(), [far, "3 of 168 grip values were out of range"]);

@@ -1,6 +1,7 @@
 //! Recorded actions of an episode as a `.npy` file: float64 of shape (steps, 7) with the tool's position (m) and
 //! axis-angle (rad) in the base frame, and the gripper closure. If any action commands a grip force, an eighth column
-//! has it in N, and −1 in the rows of actions that command a closure.
+//! has it in N, and −1 in the rows of actions that command a closure. If any action commands joint positions, there are
+//! seven more columns: these (rad), and NaN in the rows of actions that command a pose.
 
 use std::{
     fs,
@@ -14,11 +15,13 @@ use softvt_common::{
 };
 use softvt_policy::{Action, GripTarget};
 use softvt_records::record::EpisodeRecord;
+use softvt_robot::panda::ARM_DOFS;
 use softvt_rollout::checksum;
 
-/// Numbers per action, without and with a grip force.
+/// Numbers per action: of the pose and the closure, with a grip force, with joint positions.
 const WIDTH: usize = 7;
 const WIDTH_WITH_FORCE: usize = 8;
+const WIDTH_WITH_JOINTS: usize = WIDTH_WITH_FORCE + ARM_DOFS;
 /// Grip force of an action that commands a closure.
 const NO_FORCE: f64 = -1.0;
 
@@ -53,10 +56,17 @@ pub fn path(dir: &Path, index: EpisodeIndex) -> PathBuf {
 /// # Errors
 /// The file cannot be written.
 pub fn write(path: &Path, actions: &[Action]) -> Result<(), FileError> {
-    let has_force = actions.iter().any(|action| action.force_n().is_some());
-    let filler = |action: &Action| (has_force && action.force_n().is_none()).then_some(NO_FORCE);
-    let numbers = actions.iter().flat_map(|action| action.numbers().chain(filler(action)));
-    let width = if has_force { WIDTH_WITH_FORCE } else { WIDTH };
+    let width = match actions {
+        _ if actions.iter().any(|action| action.joints.is_some()) => WIDTH_WITH_JOINTS,
+        _ if actions.iter().any(|action| action.force_n().is_some()) => WIDTH_WITH_FORCE,
+        _ => WIDTH,
+    };
+    let row = |action: &Action| {
+        let force = action.force_n().unwrap_or(NO_FORCE);
+        let joints = action.joints.unwrap_or([f64::NAN; ARM_DOFS]);
+        action.to_array().into_iter().chain([force]).chain(joints).take(width)
+    };
+    let numbers = actions.iter().flat_map(row);
     replace(path, NpyArray::from_f64(vec![actions.len(), width], numbers).to_npy())
 }
 
@@ -72,19 +82,22 @@ pub fn read(path: &Path) -> Result<Vec<Action>, ActionsError> {
         Err(source) => return Err(ActionsError::Npy { path, source }),
     };
     let width = match array.shape[..] {
-        [_, width @ (WIDTH | WIDTH_WITH_FORCE)] if array.dtype == "<f8" => width,
+        [_, width @ (WIDTH | WIDTH_WITH_FORCE | WIDTH_WITH_JOINTS)] if array.dtype == "<f8" => width,
         _ => return Err(ActionsError::Shape { path, dtype: array.dtype, shape: array.shape }),
     };
-    let numbers = array.values();
-    if !numbers.iter().all(|x| x.is_finite()) {
-        return Err(ActionsError::NotFinite { path });
-    }
     let action = |row: &[f64]| {
         let closing = Action::from_array(std::array::from_fn(|i| row[i]));
         let force = row.get(WIDTH).copied().filter(|force| *force >= 0.0);
-        Action { grip: force.map_or(closing.grip, GripTarget::Force), ..closing }
+        let joints = row.get(WIDTH_WITH_FORCE..).and_then(<[f64]>::first_chunk).copied();
+        let action = Action {
+            grip: force.map_or(closing.grip, GripTarget::Force),
+            joints: joints.filter(|joints| !joints.iter().all(|x| x.is_nan())),
+            ..closing
+        };
+        action.numbers().all(f64::is_finite).then_some(action)
     };
-    Ok(numbers.chunks_exact(width).map(action).collect())
+    let actions: Option<Vec<Action>> = array.values().chunks_exact(width).map(action).collect();
+    actions.ok_or(ActionsError::NotFinite { path })
 }
 
 /// Checks that the file of an episode below the run folder `dir` holds the actions of its record.
@@ -162,5 +175,15 @@ mod tests {
             .map(|grip| Action { grip, ..one(1) });
         write(&at, &forces).unwrap();
         assert_eq!(read(&at).unwrap(), forces);
+        let joints = [0.1, -0.2, 0.3, -2.4, 0.5, 2.2, 1.0 / 3.0];
+        let mixed = [Action::of_joints(joints, GripTarget::Force(2.0)), forces[0], forces[2]];
+        write(&at, &mixed).unwrap();
+        assert_eq!(read(&at).unwrap(), mixed);
+        let array = NpyArray::parse(&fs::read(&at).unwrap()).unwrap();
+        assert_eq!(array.shape, [3, 15]);
+        let mut numbers = array.values();
+        numbers[9] = f64::NAN;
+        fs::write(&at, NpyArray::from_f64(vec![3, 15], numbers).to_npy()).unwrap();
+        assert!(read(&at).unwrap_err().to_string().contains("not finite"));
     }
 }

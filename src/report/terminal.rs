@@ -434,7 +434,7 @@ mod tests {
             (r.stats.far_commands, r.stats.clamped_grips) = (100, 7);
             let position_m = [467.0, 4.0, 260.0];
             r.stats.first_far_command =
-                Some(UnreachableCommand { position_m, distance_m: 534.5, angle_rad: 0.0 });
+                Some(UnreachableCommand { position_m, distance_m: 534.5, angle_rad: 0.0, joint: None });
         });
         let text = plain(&SuiteSummary::from_records("suite", "pi", &[far, episode(0, "lift it", |_| ())]));
         let lines = "100 of 336 commands were out of reach in 1 episode\n  first: (467, 4, 260) m, 534.5 m and 0 rad from the tool\n";

@@ -140,15 +140,45 @@ impl DiffIk {
     /// change of all joints is scaled down by one factor, which keeps the direction. The speed of the command is
     /// limited, not its lead over `q_now`, so that lagging drives still reach full speed. All numbers must be finite.
     pub fn step(&mut self, q_now: &ArmAngles, target_b: &Pose) -> ArmAngles {
+        let command = self.preview(q_now, target_b);
+        self.command = Some(command.into());
+        command
+    }
+
+    /// What [`step`](Self::step) would return.
+    pub fn preview(&self, q_now: &ArmAngles, target_b: &Pose) -> ArmAngles {
         let q: Joints = (*q_now).into();
         let last = self.command.unwrap_or(q);
         let change = q + self.increment(&q, target_b) - last;
-        let allowed_share =
-            |(delta, link): (&f64, &Link)| link.velocity_limit * self.dt / delta.abs().max(f64::MIN_POSITIVE);
-        let share = change.iter().zip(&self.chain.links).map(allowed_share).fold(1.0, f64::min);
-        let command = self.clamp_to_limits(&(last + change * share));
+        self.clamp_to_limits(&(last + change * self.allowed_share(&change))).into()
+    }
+
+    /// Joint targets (rad) for the next control step towards the joint positions `joints`, from measured ones `q_now`,
+    /// within the limits of position and speed as for [`step`](Self::step). The targets that `step` returned in the
+    /// same states are reached bit for bit. All numbers must be finite.
+    pub fn step_joints(&mut self, q_now: &ArmAngles, joints: &ArmAngles) -> ArmAngles {
+        /// Excess over a speed limit that rounding explains.
+        const ROUNDING: f64 = 1e-9;
+        let wanted = self.clamp_to_limits(&(*joints).into());
+        let last = self.command.unwrap_or_else(|| (*q_now).into());
+        let change = wanted - last;
+        let share = self.allowed_share(&change);
+        let command = if share > 1.0 - ROUNDING { wanted } else { last + change * share };
         self.command = Some(command);
         command.into()
+    }
+
+    /// Joint positions (rad) whose tool pose is moved from that of `joints` as `target_b` is, by one damped step.
+    pub fn moved(&self, joints: &ArmAngles, target_b: &Pose) -> ArmAngles {
+        let q = self.clamp_to_limits(&(*joints).into());
+        (q + self.increment(&q, target_b)).into()
+    }
+
+    /// The share of a change of the command that no joint's speed limit forbids, at most 1.
+    fn allowed_share(&self, change: &Joints) -> f64 {
+        let allowed =
+            |(delta, link): (&f64, &Link)| link.velocity_limit * self.dt / delta.abs().max(f64::MIN_POSITIVE);
+        change.iter().zip(&self.chain.links).map(allowed).fold(1.0, f64::min)
     }
 
     /// Joint angles (rad) with the tool at `target_b` (base frame), to 0.1 mm and 1 mrad.
@@ -341,6 +371,35 @@ mod tests {
             let error = PoseDifference::between(&ik.tool_pose(&q), &target);
             assert!(NEAR.contains(&error), "{error:?}");
         }
+    }
+
+    #[test]
+    fn joint_targets_are_reached_bit_for_bit_and_limited_in_position_and_speed() {
+        let (mut by_pose, mut by_joints) = (ik(), ik());
+        let target = down(0.4, -0.45, 0.3, -1.0);
+        let mut q = START;
+        for _ in 0..40 {
+            assert_eq!(by_pose.preview(&q, &target), by_pose.clone().step(&q, &target));
+            let command = by_pose.step(&q, &target);
+            assert_eq!(by_joints.step_joints(&q, &command), command);
+            q = std::array::from_fn(|i| q[i] + 0.4 * (command[i] - q[i]));
+        }
+        let mut ik = ik();
+        let mut far = START;
+        far[3] = 5.0;
+        let first = ik.step_joints(&START, &far);
+        assert!((first[3] - START[3] - 2.175 * DT).abs() < 1e-12, "{first:?}");
+        let last = (0..60).fold(first, |q, _| ik.step_joints(&q, &far));
+        assert_eq!(last[3], -0.0698);
+    }
+
+    #[test]
+    fn moved_joints_follow_a_small_displacement_of_the_tool() {
+        let ik = ik();
+        let mut target = panda::tool_pose(&START);
+        target.translation.vector += Vec3::new(0.003, -0.002, 0.001);
+        let error = PoseDifference::between(&panda::tool_pose(&ik.moved(&START, &target)), &target);
+        assert!(error.distance() < 1e-4 && error.angle() < 1e-3, "{error:?}");
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! Kinematics, limits and mass properties of the Franka Emika Panda with its hand, as a joint tree.
 
+use std::sync::LazyLock;
+
 use softvt_geometry::{Mat3, Pose, Quat, Vec3};
-use softvt_physics::joints::{JointKind, JointTree, Link};
+use softvt_physics::joints::{JointKind, JointTree, Link, forward};
 
 use super::{
     gripper::MAX_WIDTH,
@@ -199,6 +201,36 @@ pub fn tree(base_w: Pose, gripper: &GripperSpec) -> JointTree {
     JointTree { links, base_w }
 }
 
+/// Range of an arm joint, rad.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointRange {
+    /// Lower limit.
+    pub lower: f64,
+    /// Upper limit.
+    pub upper: f64,
+}
+
+impl JointRange {
+    /// Excess over a limit that rounding to single precision explains, rad.
+    const ROUNDING: f64 = 1e-6;
+
+    /// True for a joint position within the limits, but for rounding.
+    pub fn contains(&self, position: f64) -> bool {
+        (self.lower - Self::ROUNDING..=self.upper + Self::ROUNDING).contains(&position)
+    }
+}
+
+/// Ranges of the arm joints.
+pub fn joint_ranges() -> [JointRange; ARM_DOFS] {
+    LIMITS.each_ref().map(|limits| JointRange { lower: limits.lower, upper: limits.upper })
+}
+
+/// Pose of the tool in the base frame at arm joint positions `q` (rad).
+pub fn tool_pose(q: &[f64; ARM_DOFS]) -> Pose {
+    static CHAIN: LazyLock<JointTree> = LazyLock::new(arm_chain);
+    forward(&CHAIN, q)[HAND_LINK] * tool_in_link()
+}
+
 /// The joint tree of the seven arm links without hand and fingers, in the base frame, for kinematics.
 pub fn arm_chain() -> JointTree {
     JointTree { links: (0..ARM_DOFS).map(arm_link).collect(), base_w: Pose::identity() }
@@ -251,7 +283,7 @@ fn finger(side: Side, gripper: &GripperSpec) -> Link {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use softvt_physics::joints::{bias, forward, mass_matrix};
+    use softvt_physics::joints::{bias, mass_matrix};
 
     /// Start pose of the SoftVTBench release, fingers open.
     const START: [f64; DOFS] = [-0.01988, -0.18734, 0.00767, -2.40340, 0.00496, 2.24534, 0.79485, 0.04, 0.04];

@@ -12,6 +12,7 @@ use super::{
     evidence::EvidenceCollector,
     goal_in_scene::{GoalInScene, StatePredicate},
     observation_history::ObservationHistory,
+    robot_instance::ArmCommand,
     sensor_assets::{SensingError, SensorAssets},
     sensor_noise::SensorSeed,
     sensors::{Sensors, StateRecording, check_sensors},
@@ -41,11 +42,13 @@ use softvt_physics::{
     world::{StepFailure, WorldSnapshot},
 };
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
-use softvt_records::record::{EpisodeHeader, EpisodeRecord, RolloutStats, UnreachableCommand};
+use softvt_records::record::{
+    EpisodeHeader, EpisodeRecord, JointOutsideLimits, RolloutStats, UnreachableCommand,
+};
 use softvt_robot::{
     Side,
-    ik::{LINEARISATION_RANGE, PoseDifference},
-    rotation,
+    ik::{ArmAngles, LINEARISATION_RANGE, PoseDifference},
+    panda, rotation,
 };
 use softvt_scene::{Asset, Body, Camera, Scene};
 use softvt_sensing::{camera::RenderScene, tactile::TactileReading};
@@ -136,6 +139,9 @@ pub struct FinishedEpisode {
     pub scores: Vec<ControlStepScore>,
     /// Action of each control step.
     pub actions: Vec<Action>,
+    /// Joint positions that each action means, rad: those that it commands, or those of inverse kinematics when the
+    /// robot responds to it, without a disturbance. Those of actions to which it no longer responds repeat the last.
+    pub joint_commands: Vec<ArmAngles>,
     /// Settled shape of a soft target.
     pub reference: Option<ReferenceShape>,
     /// States of the episode, if requested.
@@ -288,6 +294,8 @@ pub struct Episode {
     min_det_f: f64,
     trace: Vec<StepTrace>,
     actions: Vec<Action>,
+    /// Joint positions that the actions mean, rad; fewer than actions if the robot responds late.
+    joint_commands: Vec<ArmAngles>,
     disturbance: Disturbance,
     sensors: Sensors,
     history: ObservationHistory,
@@ -364,6 +372,7 @@ impl Episode {
             min_det_f: f64::INFINITY,
             trace: Vec::new(),
             actions: Vec::new(),
+            joint_commands: Vec::new(),
             disturbance,
             sensors,
             history: ObservationHistory::default(),
@@ -597,8 +606,9 @@ impl Episode {
     /// # Errors
     /// The outcome, if physics or a function of the goal fails.
     fn control_step(&mut self, action: &Action) -> Result<(), Outcome> {
-        let pose_b = self.disturbance.apply(&action.pose_b());
-        self.sim.robot.command(&mut self.sim.world, pose_b, action.grip);
+        let (pose_b, joints) = (action.pose_b(), action.joints);
+        let arm = ArmCommand { pose_b, executed_b: self.disturbance.apply(&pose_b), joints };
+        self.joint_commands.extend(self.sim.robot.command(&mut self.sim.world, arm, action.grip));
         self.steps += 1;
         let physics_steps = steps_per_control(self.spec.settings.physics.dt);
         for step in 1..=physics_steps {
@@ -700,7 +710,10 @@ impl Episode {
             let worst_d_pct = std::iter::once(settled).chain(worst).collect();
             StateRecording { sensors: self.sensors, frames, target: self.target, worst_d_pct }
         });
-        FinishedEpisode { record, trace: self.trace, scores, actions: self.actions, reference, recording }
+        let (actions, mut joint_commands) = (self.actions, self.joint_commands);
+        let last = joint_commands.last().copied().unwrap_or_else(|| self.sim.robot.q(&self.sim.world));
+        joint_commands.resize(actions.len(), last);
+        FinishedEpisode { record, trace: self.trace, scores, actions, joint_commands, reference, recording }
     }
 }
 
@@ -713,17 +726,32 @@ pub fn checksum(actions: &[Action]) -> String {
     hex(&hash.finalize())
 }
 
-/// The command, if it is farther from the tool than one step of the inverse kinematics reaches; both in the base frame.
+/// The command, if it is farther from the tool than one step of the inverse kinematics reaches, both in the base frame,
+/// or outside of the joints' limits.
 fn far_command(tool_b: &Pose, action: &Action) -> Option<UnreachableCommand> {
     let turn = rotation::error(
         &rotation::from_axis_angle(&rotation::axis_angle(&tool_b.rotation)),
         &rotation::from_axis_angle(&action.axis_angle_b),
     );
     let error = PoseDifference { translation: action.position_b - tool_b.translation.vector, rotation: turn };
-    (!LINEARISATION_RANGE.contains(&error)).then(|| UnreachableCommand {
+    let joint = action.joints.and_then(joint_outside_limits);
+    (joint.is_some() || !LINEARISATION_RANGE.contains(&error)).then(|| UnreachableCommand {
         position_m: action.position_b.into(),
         distance_m: error.translation.norm(),
         angle_rad: error.rotation.norm(),
+        joint,
+    })
+}
+
+/// The first joint position outside of its limits.
+fn joint_outside_limits(joints: ArmAngles) -> Option<JointOutsideLimits> {
+    let all = (1..).zip(joints).zip(panda::joint_ranges());
+    let mut outside = all.filter(|((_, position), range)| !range.contains(*position));
+    outside.next().map(|((number, position_rad), range)| JointOutsideLimits {
+        number,
+        position_rad,
+        lower_rad: range.lower,
+        upper_rad: range.upper,
     })
 }
 
@@ -737,17 +765,20 @@ const MAX_ACTION: f64 = 1e6;
 #[derive(Debug, thiserror::Error)]
 enum ActionError {
     #[error("the action {0:?} holds a number that is not finite")]
-    NotFinite([f64; 7]),
-    #[error("the action {action:?} holds {number:e}, which is not a pose in m and rad")]
-    Implausible { action: [f64; 7], number: f64 },
+    NotFinite(Vec<f64>),
+    #[error("the action {action:?} holds {number:e}, which is not {expected}")]
+    Implausible { action: Vec<f64>, number: f64, expected: &'static str },
     #[error(
         "the action asks for a grip force of {force_n} N; expected 0 to {effort_n} N (robot.gripper.effort), or less \
          than 0 to open"
     )]
     GripForce { force_n: f64, effort_n: f64 },
     #[error(
-        "all {steps} commands were out of reach, first: {first}; expected positions in m and axis-angles in rad, in the \
-         robot's base frame"
+        "all {steps} commands were out of reach, first: {first}; expected {}",
+        match first.joint {
+            Some(_) => "joint positions in rad, within the limits of the joints",
+            None => "positions in m and axis-angles in rad, in the robot's base frame",
+        }
     )]
     OutOfReach { steps: u32, first: UnreachableCommand },
 }
@@ -757,12 +788,22 @@ fn check_action(action: &Action, effort_n: f64) -> Result<(), ActionError> {
     if let Some(force_n) = action.force_n().filter(|force| !(0.0..=effort_n).contains(force)) {
         return Err(ActionError::GripForce { force_n, effort_n });
     }
-    let action = action.to_array();
-    if !action.iter().all(|x| x.is_finite()) {
-        return Err(ActionError::NotFinite(action));
+    // The pose of joint positions follows from them.
+    let numbers = || match action.joints {
+        Some(joints) => joints.into_iter().chain([action.closure()]).collect::<Vec<f64>>(),
+        None => action.to_array().to_vec(),
+    };
+    if !action.numbers().all(f64::is_finite) {
+        return Err(ActionError::NotFinite(numbers()));
     }
-    match action.iter().find(|x| x.abs() > MAX_ACTION) {
-        Some(&number) => Err(ActionError::Implausible { action, number }),
+    match action.numbers().find(|x| x.abs() > MAX_ACTION) {
+        Some(number) => {
+            let expected = match action.joints {
+                Some(_) => "a joint position in rad",
+                None => "a pose in m and rad",
+            };
+            Err(ActionError::Implausible { action: numbers(), number, expected })
+        }
         None => Ok(()),
     }
 }
@@ -801,5 +842,25 @@ mod tests {
                 .is_err_and(|error| error.contains("70.1 N; expected 0 to 70 N (robot.gripper.effort)"))
         );
         assert!(force(f64::NAN).is_err());
+    }
+
+    #[test]
+    fn joint_positions_outside_of_their_limits_are_far_commands() {
+        let start = [0.0, -0.2, 0.0, -2.4, 0.0, 2.2, 0.8];
+        let tool_b = panda::tool_pose(&start);
+        let action = |change: [f64; 7]| {
+            let joints = std::array::from_fn(|i| start[i] + change[i]);
+            Action::of_joints(joints, GripTarget::Closure(0.0))
+        };
+        let far = |change| far_command(&tool_b, &action(change)).map(|far| far.to_string());
+        assert_eq!(far([0.05; 7]), None);
+        // Degrees.
+        let joint = far([0.0, 0.0, 0.0, -135.0, 0.0, 0.0, 0.0]).unwrap();
+        assert_eq!(joint, "joint 4 at -137.4 rad, whose limits are -3.072 to -0.07 rad");
+        assert!(far([1.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).unwrap().contains("rad from the tool"));
+        let refusal = |x| check_action(&action([x; 7]), 70.0).map_err(|error| error.to_string());
+        assert_eq!(refusal(500.0), Ok(()));
+        assert!(refusal(1e9).is_err_and(|error| error.contains("1e9, which is not a joint position in rad")));
+        assert!(refusal(f64::NAN).is_err_and(|error| error.contains("not finite")));
     }
 }

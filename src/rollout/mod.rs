@@ -94,7 +94,7 @@ pub use build_error::SceneBuildError;
 pub use controller::{ChunkedPolicy, Controller};
 pub use episode::{Episode, EpisodeError, EpisodeSpec, FinishedEpisode, checksum, target_asset};
 pub use goal_in_scene::{StatePredicate, check_goal};
-pub use robot_instance::RobotInstance;
+pub use robot_instance::{ArmCommand, RobotInstance};
 pub use scene_warnings::scene_warnings;
 pub use sensor_assets::{SensingError, SensorAssets};
 pub use sensor_noise::SensorSeed;

@@ -13,7 +13,7 @@ use softvt_policy::RobotState;
 use softvt_robot::{
     RobotSpec, Side,
     gripper::{self, FingerState, GripTarget, GripperSetpoint},
-    ik::DiffIk,
+    ik::{ArmAngles, DiffIk},
     pads::{self, PadSurface},
     panda::{self, ARM_DOFS},
     rotation,
@@ -39,10 +39,29 @@ pub struct RobotInstance {
     delayed: VecDeque<DelayedCommand>,
 }
 
+/// Where the arm should be at the end of a control step.
+#[derive(Clone, Copy, Debug)]
+pub struct ArmCommand {
+    /// Commanded pose of the tool, base frame.
+    pub pose_b: Pose,
+    /// The pose that is executed in its place, base frame: another one under a disturbance.
+    pub executed_b: Pose,
+    /// Joint positions (rad) that are commanded directly; `pose_b` is that of the tool there. `None` for a pose that
+    /// inverse kinematics turns into joint positions.
+    pub joints: Option<ArmAngles>,
+}
+
+impl ArmCommand {
+    /// A pose of the tool, base frame, without a disturbance.
+    pub fn pose(pose_b: Pose) -> Self {
+        Self { pose_b, executed_b: pose_b, joints: None }
+    }
+}
+
 /// An earlier command of [`RobotInstance::command`].
 #[derive(Clone, Copy, Debug)]
 struct DelayedCommand {
-    pose_b: Pose,
+    arm: ArmCommand,
     grip: GripTarget,
 }
 
@@ -96,18 +115,29 @@ impl RobotInstance {
         }
     }
 
-    /// Commands where the tool (base frame) and the gripper should be at the end of a control step. The robot responds
-    /// in the next control step, or `spec.latency` steps later; until then it follows the earlier commands.
-    pub fn command(&mut self, world: &mut World, pose_b: Pose, grip: GripTarget) {
-        self.delayed.push_back(DelayedCommand { pose_b, grip });
+    /// Commands where arm and gripper should be at the end of a control step. The robot responds in the next control
+    /// step, or `spec.latency` steps later; until then it follows the earlier commands.
+    ///
+    /// Returns the joint positions (rad) that the command to which it now responds means, without a disturbance: those
+    /// that it commands, or those of inverse kinematics. `None` while there is no such command.
+    pub fn command(&mut self, world: &mut World, arm: ArmCommand, grip: GripTarget) -> Option<ArmAngles> {
+        self.delayed.push_back(DelayedCommand { arm, grip });
         if self.delayed.len() <= self.spec.latency as usize {
-            return;
+            return None;
         }
-        let Some(DelayedCommand { pose_b, grip }) = self.delayed.pop_front() else { return };
-        let target = self.ik.step(&self.q(world), &pose_b);
+        let DelayedCommand { arm, grip } = self.delayed.pop_front()?;
+        let ArmCommand { pose_b, executed_b, joints } = arm;
+        let (q, is_disturbed) = (self.q(world), executed_b != pose_b);
+        let commanded = joints.unwrap_or_else(|| self.ik.preview(&q, &pose_b));
+        let target = match joints {
+            None => self.ik.step(&q, &executed_b),
+            Some(joints) if is_disturbed => self.ik.step_joints(&q, &self.ik.moved(&joints, &executed_b)),
+            Some(joints) => self.ik.step_joints(&q, &joints),
+        };
         let drives = world.articulation_mut(self.articulation).drives_mut();
         drives.iter_mut().flatten().zip(target).for_each(|(drive, q)| drive.target = q);
         self.gripper.command(grip);
+        Some(commanded)
     }
 
     /// Advances the finger targets by one physics step; called before the step.

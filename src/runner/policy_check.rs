@@ -26,7 +26,11 @@ use softvt_policy::{
     Action, ActionChunk, EpisodeBrief, Observation, Policy, PolicyError, SensorStreams, ToolCommand,
     ToolMotion,
 };
-use softvt_robot::rotation;
+use softvt_robot::{
+    ik::ArmAngles,
+    panda::{self, JointRange},
+    rotation,
+};
 use softvt_rollout::{ChunkedPolicy, Controller, Simulation};
 
 const NOT_COMPARABLE: &str = "only policy servers and policies in Lua can be compared with demonstrations";
@@ -149,6 +153,7 @@ fn path_of(start_b: Vec3, commands: &[ToolCommand]) -> Vec<Vec3> {
     let next = |command: &ToolCommand| {
         at_b = match command.motion {
             ToolMotion::Pose { position_b, .. } => position_b,
+            ToolMotion::Joints(joints) => panda::tool_pose(&joints).translation.vector,
             ToolMotion::Delta { translation_b, .. } => at_b + translation_b,
         };
         at_b
@@ -254,8 +259,14 @@ impl PolicyCheck {
             AnswerAgreement::of_numbers(&grips),
         );
         let mut findings = Vec::new();
-        findings.extend(explain_translation(&translations, &translation, steps));
-        findings.extend(explain_rotation(&rotations, &rotation, steps));
+        match explain_joints(steps) {
+            // The poses of such joint positions say nothing.
+            Some(finding) => findings.push(finding),
+            None => {
+                findings.extend(explain_translation(&translations, &translation, steps));
+                findings.extend(explain_rotation(&rotations, &rotation, steps));
+            }
+        }
         findings.extend(explain_grip(&grips, &grip));
         findings.extend(explain_rate(demos));
         Self {
@@ -386,6 +397,33 @@ fn other_axes(pairs: &[VectorPair], agreement: &AnswerAgreement) -> Option<Strin
         format!("{}{}", if best[(row, column)] < 0.0 { "−" } else { "" }, ["x", "y", "z"][column])
     };
     Some(format!("({}, {}, {})", name(0), name(1), name(2)))
+}
+
+/// Joint positions of answers that are outside of the limits of their joints.
+fn explain_joints(steps: &[StepSample]) -> Option<String> {
+    /// Joint positions beyond any limit, rad: half of the answers exceed it if they are in degrees.
+    const DEGREES: f64 = 10.0;
+    let answers: Vec<ArmAngles> = steps.iter().filter_map(|s| s.answered.joints).collect();
+    let ranges = panda::joint_ranges();
+    let outside = |joint: usize| answers.iter().filter(|q| !ranges[joint].contains(q[joint])).count();
+    let joint = (0..ranges.len()).max_by_key(|joint| outside(*joint))?;
+    if 2 * outside(joint) <= answers.len() {
+        return None;
+    }
+    let mut largest: Vec<f64> =
+        answers.iter().map(|q| q.iter().fold(0.0, |most: f64, x| most.max(x.abs()))).collect();
+    largest.sort_by(f64::total_cmp);
+    let unit = match quantile(&largest, 0.5) {
+        Some(median) if median > DEGREES => ": radians are expected, these look like degrees",
+        _ => ": check the order of the joints, and whether the normalisation was undone",
+    };
+    let JointRange { lower, upper } = ranges[joint];
+    Some(format!(
+        "joints: {} of {} answers have joint {} outside of its limits, {lower} to {upper} rad{unit}",
+        outside(joint),
+        answers.len(),
+        joint + 1
+    ))
 }
 
 fn explain_translation(pairs: &[VectorPair], of: &AnswerAgreement, steps: &[StepSample]) -> Option<String> {

@@ -8,10 +8,7 @@ use super::{
 };
 use softvt_benchmark::Suite;
 use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
-use softvt_policy::{
-    msgpack::{NumberArray, entry, kind, names, numbers},
-    profile::ACTION_LEN,
-};
+use softvt_policy::msgpack::{NumberArray, entry, kind, names, numbers};
 
 /// Maximum number of actions of one step, which bounds the time until its response.
 const MAX_STEP_ACTIONS: usize = 1000;
@@ -73,7 +70,7 @@ impl Request {
         };
         match what.as_str() {
             "reset" => Ok(Self::Reset(episode_id(&fields(&EPISODE_FIELDS)?, config)?)),
-            "step" => step(&fields(&["action", "actions"])?),
+            "step" => step(&fields(&["action", "actions"])?, config),
             "render" => {
                 let fields = fields(&["camera", "width", "height"])?;
                 let edge = |name| Ok::<_, RequestError>(fields.integer(name, 1 << 16)?.map(|n| n as usize));
@@ -128,31 +125,38 @@ fn task_list(suite: &Suite) -> String {
     format!("served tasks {}", ids.join(", "))
 }
 
-fn step(fields: &RequestFields) -> Result<Request, RequestError> {
+fn step(fields: &RequestFields, config: &ServerConfig) -> Result<Request, RequestError> {
     let value = match (fields.get("action"), fields.get("actions")) {
         (Some(one), None) | (None, Some(one)) => one,
         (None, None) => return Err(fields.error("it has neither action nor actions")),
         (Some(_), Some(_)) => return Err(fields.error("it has both action and actions; expected one")),
     };
-    let rows = action_rows(fields, value, MAX_STEP_ACTIONS)?;
+    let rows = action_rows(fields, value, config, MAX_STEP_ACTIONS)?;
     if rows.is_empty() {
         return Err(fields.error("actions is empty; expected at least one action"));
     }
     Ok(Request::Step(rows))
 }
 
-/// An array of shape (7) or (horizon, 7).
-fn action_rows(fields: &RequestFields, value: &Value, most: usize) -> Result<Vec<ActionRow>, RequestError> {
-    let expected = format!("expected shape ({ACTION_LEN}) or (horizon, {ACTION_LEN}), horizon up to {most}");
+/// An array of shape (n) or (horizon, n), n being the numbers of an action.
+fn action_rows(
+    fields: &RequestFields,
+    value: &Value,
+    config: &ServerConfig,
+    most: usize,
+) -> Result<Vec<ActionRow>, RequestError> {
+    let own = config.profile.actions.numbers();
+    let expected = format!("expected shape ({own}) or (horizon, {own}), horizon up to {most}");
     let NumberArray { shape, values } =
         numbers(value).map_err(|error| fields.error(&format!("the actions are {error}; {expected}")))?;
     match *shape.as_slice() {
-        [ACTION_LEN] => {}
-        [0] | [0, ACTION_LEN] => return Ok(Vec::new()),
-        [horizon, ACTION_LEN] if horizon <= most => {}
+        [0] => return Ok(Vec::new()),
+        [0, width] if width == own => return Ok(Vec::new()),
+        [width] if width == own => {}
+        [horizon, width] if width == own && horizon <= most => {}
         _ => return Err(fields.error(&format!("the actions have the shape {shape:?}; {expected}"))),
     }
-    let rows: Vec<ActionRow> = values.as_chunks::<ACTION_LEN>().0.to_vec();
+    let rows: Vec<ActionRow> = values.chunks_exact(own).map(<[f64]>::to_vec).collect();
     match rows.iter().position(|row| row.iter().any(|number| !number.is_finite())) {
         None => Ok(rows),
         Some(at) => {
@@ -178,7 +182,7 @@ fn state(fields: &RequestFields, config: &ServerConfig) -> Result<Request, Reque
         }
     }
     let actions = inner.required("actions", inner.get("actions"))?;
-    let actions = action_rows(&inner, actions, MAX_STATE_ACTIONS)?;
+    let actions = action_rows(&inner, actions, config, MAX_STATE_ACTIONS)?;
     Ok(Request::SetState(Box::new(EpisodeState { id: episode_id(&inner, config)?, actions })))
 }
 

@@ -61,6 +61,7 @@ pub fn hello(config: &ServerConfig, first: &Observation) -> Value {
         "protocol": PROTOCOL,
         "suites": suites.collect::<Vec<_>>(),
         "profile": config.profile.name,
+        "pose": config.profile.actions.pose.name(),
         "gripper": config.profile.actions.gripper.code.name(),
         "privileged": config.privileged,
         "seed": config.seed,

@@ -12,10 +12,11 @@ use softvt_policy::{
     encode::{ObservationEntry, content},
     msgpack::map,
     profile::{
-        ACTION_LEN, ActionEncoding, ActionUnits, GripCode, GripperValues, ObservationSource, PoseEncoding,
-        ProfileInput, RobotStatePart,
+        ActionEncoding, GripCode, GripperValues, ObservationSource, PoseEncoding, ProfileInput,
+        RobotStatePart,
     },
 };
+use softvt_robot::panda::{self, JointRange};
 
 /// Bound of positions along any axis of the base frame, m; larger than the reach of the arm.
 const MAX_POSITION_M: f64 = 2.0;
@@ -49,23 +50,37 @@ pub(super) fn observation(config: &ServerConfig, first: &Observation) -> Value {
     map(entries)
 }
 
-/// Space of the actions. Grip forces go up to the effort of the gripper.
+/// Space of the actions, with the names of its numbers. Joint positions have the limits of the joints, grip forces go up
+/// to the effort of the gripper.
 pub(super) fn action(encoding: &ActionEncoding, effort_n: f64) -> Value {
-    let most = match encoding.pose {
+    let symmetric = |most: f64| JointRange { lower: -most, upper: most };
+    let ranges: Vec<JointRange> = match encoding.pose {
         PoseEncoding::Absolute => {
             [MAX_POSITION_M, MAX_POSITION_M, MAX_POSITION_M, MAX_ANGLE, MAX_ANGLE, MAX_ANGLE]
+                .map(symmetric)
+                .to_vec()
         }
-        PoseEncoding::Delta { .. } | PoseEncoding::DeltaOsc { .. } => [1.0; ACTION_LEN - 1],
+        PoseEncoding::Joints => panda::joint_ranges().to_vec(),
+        PoseEncoding::Delta { .. } | PoseEncoding::DeltaOsc { .. } => {
+            vec![symmetric(1.0); encoding.pose.numbers()]
+        }
     };
-    let ActionUnits { scale, offset } = encoding.units.unwrap_or(ActionUnits::IDENTITY);
     // In the units of the action, whose factors may be negative.
-    let end = |i: usize, sign: f64| (sign * scale[i].signum() * most[i] - offset[i]) / scale[i];
-    let mut low: Vec<f64> = (0..most.len()).map(|i| end(i, -1.0)).collect();
-    let mut high: Vec<f64> = (0..most.len()).map(|i| end(i, 1.0)).collect();
+    let ends = |(i, range): (usize, &JointRange)| match &encoding.units {
+        Some(units) => [range.lower, range.upper].map(|value| units.from_si(i, value)),
+        None => [range.lower, range.upper],
+    };
+    let ends: Vec<[f64; 2]> = ranges.iter().enumerate().map(ends).collect();
+    let mut low: Vec<f64> = ends.iter().map(|[a, b]| a.min(*b)).collect();
+    let mut high: Vec<f64> = ends.iter().map(|[a, b]| a.max(*b)).collect();
     let GripperValues { open, closed, code, .. } = encoding.gripper;
     low.push(open.min(closed));
     high.push(if code == GripCode::Force { effort_n } else { open.max(closed) });
-    array_space("<f8", &[ACTION_LEN], low, high)
+    let space = array_space("<f8", &[encoding.numbers()], low, high);
+    let names = encoding.names().into_iter().map(Value::from).collect();
+    let Value::Map(mut entries) = space else { return space };
+    entries.push(("names".into(), Value::Array(names)));
+    Value::Map(entries)
 }
 
 /// Space of the prompts: the length of the longest one and all characters in use. Prompts that differ between the
@@ -123,5 +138,38 @@ fn max_magnitude(part: RobotStatePart) -> f64 {
         RobotStatePart::JointTorques => MAX_TORQUE,
         // Quaternions, the closure, and widths in metres.
         _ => 1.0 + 1e-3,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use softvt_policy::{
+        msgpack::entry,
+        profile::{ActionUnits, Profile},
+    };
+
+    fn numbers(space: &Value, key: &str) -> Vec<f64> {
+        let list = entry(space, key).and_then(Value::as_array).expect("a list");
+        list.iter().map(|number| number.as_f64().expect("a number")).collect()
+    }
+
+    #[test]
+    fn the_space_of_joint_positions_has_the_limits_of_the_joints() {
+        let mut encoding = Profile::named("vision_joints").unwrap().actions;
+        let space = action(&encoding, 70.0);
+        let [low, high] = ["low", "high"].map(|end| numbers(&space, end));
+        assert_eq!((low[3], high[3], low[7], high[7]), (-3.0718, -0.0698, 0.0, 1.0));
+        let names = entry(&space, "names").and_then(Value::as_array).unwrap();
+        assert_eq!(
+            (names.len(), names[0].as_str(), names[7].as_str()),
+            (8, Some("joint_1"), Some("gripper"))
+        );
+        // Degrees, counted the other way round.
+        let degrees = -(1.0_f64.to_radians());
+        encoding.units = Some(ActionUnits { scale: vec![degrees; 7], offset: vec![0.0; 7] });
+        let space = action(&encoding, 70.0);
+        let [low, high] = ["low", "high"].map(|end| numbers(&space, end)[3]);
+        assert!((low - 4.0).abs() < 0.01 && (high - 176.0).abs() < 0.01, "{low} {high}");
     }
 }

@@ -10,12 +10,11 @@ use softvt_evaluation::verdict::Outcome;
 use softvt_policy::{
     CommandResolver, Observation, SensorStreams, decode,
     msgpack::{map, pack_array},
-    profile::ACTION_LEN,
 };
 use softvt_rollout::{Episode, EpisodeError};
 
-/// The seven numbers of an action, in the encoding of the profile.
-pub(super) type ActionRow = [f64; ACTION_LEN];
+/// The numbers of an action, in the encoding of the profile.
+pub(super) type ActionRow = Vec<f64>;
 
 /// State of an episode.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,7 +28,8 @@ pub(super) struct EpisodeState {
 impl EpisodeState {
     /// Number of actions that lead from this state to `other`, `None` if `other` does not continue this state.
     pub(super) fn steps_to(&self, other: &Self) -> Option<usize> {
-        let same = |(a, b): (&ActionRow, &ActionRow)| a.map(f64::to_bits) == b.map(f64::to_bits);
+        let bits = |row: &ActionRow| row.iter().map(|number| number.to_bits()).collect::<Vec<_>>();
+        let same = |(a, b): (&ActionRow, &ActionRow)| bits(a) == bits(b);
         let is_prefix = self.id == other.id
             && self.actions.len() <= other.actions.len()
             && self.actions.iter().zip(&other.actions).all(same);
@@ -40,7 +40,8 @@ impl EpisodeState {
     pub(super) fn to_value(&self, config: &ServerConfig) -> Value {
         let EpisodeId { suite, task, episode, base_seed, split } = &self.id;
         let data = self.actions.iter().flatten().flat_map(|number| number.to_le_bytes()).collect();
-        let actions = NpyArray { dtype: "<f8".to_owned(), shape: vec![self.actions.len(), ACTION_LEN], data };
+        let shape = vec![self.actions.len(), config.profile.actions.numbers()];
+        let actions = NpyArray { dtype: "<f8".to_owned(), shape, data };
         map([
             ("suite", suite.as_str().into()),
             ("task", (*task).into()),
@@ -97,7 +98,7 @@ impl LiveEpisode {
         let observation = self.episode.observe(&SensorStreams::default())?;
         let action = self.resolver.resolve(&observation, command);
         self.episode.step(&action);
-        self.state.actions.push(*row);
+        self.state.actions.push(row.clone());
         Ok(())
     }
 
@@ -115,7 +116,7 @@ mod tests {
     fn state(episode: u32, actions: &[f64]) -> EpisodeState {
         let (suite, split) = ("one".to_owned(), EpisodeSplit::Validation);
         let id = EpisodeId { suite, task: 0, episode, base_seed: 0, split };
-        EpisodeState { id, actions: actions.iter().map(|x| [*x; ACTION_LEN]).collect() }
+        EpisodeState { id, actions: actions.iter().map(|x| vec![*x; 7]).collect() }
     }
 
     #[test]

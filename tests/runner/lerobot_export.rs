@@ -15,7 +15,7 @@ use softvt::{
     dataset::{
         TaskFile,
         card::DatasetCard,
-        lerobot::{self, ExportConfig, ExportSummary, LeRobotVersion},
+        lerobot::{self, ArmControl, ExportConfig, ExportSummary, LeRobotVersion},
         manifest,
     },
     episode_id::EpisodeSplit,
@@ -67,6 +67,7 @@ fn config(project: &Project, version: LeRobotVersion, out: &str) -> ExportConfig
         data: project.path("data"),
         out: project.path(out),
         version,
+        control: ArmControl::Pose,
         gripper: None,
         tasks: Vec::new(),
         threads: 2,

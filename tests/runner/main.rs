@@ -19,6 +19,7 @@ mod grip_force;
 mod initial_state_coverage;
 mod invalid_scenes;
 mod invalid_scripts;
+mod joint_control;
 mod judged_runs;
 mod judging;
 mod lerobot_export;

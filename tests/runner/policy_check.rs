@@ -57,6 +57,20 @@ impl Policy for Memory {
 fn check(dataset: &Path, stride: usize, change: Change) -> PolicyCheck {
     let demo = &demos_of(dataset).expect("a dataset")[0];
     let actions = TaskFile::open(&demo.file).and_then(|file| file.actions(demo.demo)).expect("actions");
+    check_answers(dataset, actions, stride, change)
+}
+
+/// As [`check`], with the joint positions of the recorded actions, changed.
+fn check_joints(dataset: &Path, change: fn([f64; 7]) -> [f64; 7]) -> PolicyCheck {
+    let demo = &demos_of(dataset).expect("a dataset")[0];
+    let file = TaskFile::open(&demo.file).expect("a file");
+    let (actions, joints) = (file.actions(demo.demo), file.joint_commands(demo.demo));
+    let actions = actions.expect("actions").into_iter().zip(joints.expect("joint positions"));
+    let actions = actions.map(|(action, joints)| Action::of_joints(change(joints), action.grip)).collect();
+    check_answers(dataset, actions, 1, |action, _, _| action)
+}
+
+fn check_answers(dataset: &Path, actions: Vec<Action>, stride: usize, change: Change) -> PolicyCheck {
     let start = move |_: &_| -> Box<dyn Policy> {
         Box::new(Memory { actions: actions.clone(), step: 0, stride, change })
     };
@@ -96,6 +110,11 @@ fn what_is_wrong_with_answers_is_named() {
             ..a
         }),
     ];
+    let same = check_joints(&dataset, |joints| joints);
+    assert_eq!(same.findings, [""; 0], "{same:?}");
+    assert!(same.translation.error.is_some_and(|error| error < 2e-3), "{same:?}");
+    let degrees = check_joints(&dataset, |joints| joints.map(f64::to_degrees));
+    assert!(degrees.findings.iter().any(|f| f.contains("these look like degrees")), "{degrees:?}");
     for (expected, stride, change) in cases {
         let found = check(&dataset, stride, change);
         assert!(found.findings.iter().any(|finding| finding.contains(expected)), "{expected}: {found:#?}");

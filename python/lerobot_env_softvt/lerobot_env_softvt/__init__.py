@@ -12,7 +12,7 @@ from lerobot.envs import EnvConfig
 from lerobot.utils.constants import ACTION, OBS_ENV_STATE, OBS_IMAGES, OBS_STATE
 from softvt import SoftVTVectorEnv
 from softvt.env import FIRST_SEED
-from softvt.profile import PROPRIO_SIZE, parse_parts
+from softvt.profile import action_size, parse_parts, proprio_parts
 from softvt.true_state import STATE_BOUNDS
 
 _CAMERAS = ("third_person", "wrist")
@@ -37,7 +37,7 @@ class SoftVTEnvConfig(EnvConfig):
     obs: str = "pixels+proprio"
     """Parts of the observation, joined by +: pixels, proprio, tactile_image, tactile, marker_motion, state."""
     control: str = "pose"
-    """Meaning of an action: "pose", "delta" or "delta_osc"."""
+    """Meaning of an action: "pose", "joints", "delta" or "delta_osc"."""
     gripper: str = "continuous"
     """Grip code of the last number of an action."""
     reward: str = "safety"
@@ -65,7 +65,7 @@ class SoftVTEnvConfig(EnvConfig):
             "tactile": {"tactile_left": finger, "tactile_right": finger},
         }
         other = {
-            "proprio": ("agent_pos", OBS_STATE, PolicyFeature(FeatureType.STATE, (PROPRIO_SIZE,))),
+            "proprio": ("agent_pos", OBS_STATE, PolicyFeature(FeatureType.STATE, (sum(proprio_parts(self.control).values()),))),
             "state": ("environment_state", OBS_ENV_STATE, PolicyFeature(FeatureType.ENV, STATE_BOUNDS.shape)),
             "marker_motion": (
                 "tactile_marker_motion",
@@ -73,7 +73,7 @@ class SoftVTEnvConfig(EnvConfig):
                 PolicyFeature(FeatureType.STATE, (3, 198, 2)),
             ),
         }
-        self._add(ACTION, ACTION, PolicyFeature(FeatureType.ACTION, (7,)))
+        self._add(ACTION, ACTION, PolicyFeature(FeatureType.ACTION, (action_size(self.control),)))
         for part in parse_parts(self.obs):
             for name, shape in visual.get(part, {}).items():
                 # The key by which `--eval.recording` finds the pictures too.

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 ACTIONS = {"continuous": "actions", "binary": "actions_binary", "two-width": "actions_two_width", "force": "actions_force"}
 """Streams of the actions in each grip code (docs/data.md)."""
 
+JOINT_ACTIONS = "actions_joints"
+"""Stream of the motion of the actions as joint positions, rad."""
+
 OBSERVATIONS = ("agentview_rgb", "eye_in_hand_rgb", "state")
 """Streams that an item has by default."""
 
@@ -41,7 +44,8 @@ class Dataset:
     An item is a dict of the requested observation streams and of
 
     - `actions` (horizon, 7): the actions from this step on; after the last step they repeat the last one, and `actions_is_pad` (horizon) is
-      true there. Position (m), axis-angle (rad), and the gripper in the grip code.
+      true there. Position (m), axis-angle (rad), and the gripper in the grip code. With control="joints" (horizon, 8): the positions of the seven
+      joints (rad), and the gripper.
     - `prompt`, `episode` (number of the demonstration in `demonstrations`) and `step`.
 
     Files are opened by each process that reads, so that loaders with workers are safe.
@@ -56,6 +60,7 @@ class Dataset:
         keys: Sequence[str] = OBSERVATIONS,
         *,
         horizon: int = 1,
+        control: str = "pose",
         gripper: str = "continuous",
         task: int | Sequence[int] | None = None,
     ):
@@ -64,6 +69,7 @@ class Dataset:
         path: folder that `softvt record` wrote, or one of its HDF5 files.
         keys: streams of `obs`, such as "state" or "gsmini_left_tactile_rgb", and others by their path, such as "privileged/d".
         horizon: number of actions of an item.
+        control: motion of the actions, "pose" or "joints".
         gripper: grip code of the actions.
         task: only these tasks.
 
@@ -71,10 +77,12 @@ class Dataset:
         """
         if gripper not in ACTIONS:
             raise ValueError(f"gripper={gripper!r}: expected one of {', '.join(ACTIONS)}")
+        if control not in ("pose", "joints"):
+            raise ValueError(f"control={control!r}: expected 'pose' or 'joints'")
         if horizon < 1:
             raise ValueError(f"horizon={horizon}: expected at least 1")
         self._streams = {key: key if "/" in key else f"obs/{key}" for key in keys}
-        self._actions, self._horizon = ACTIONS[gripper], horizon
+        self._actions, self._horizon, self._control = ACTIONS[gripper], horizon, control
         self._files: dict[Path, h5py.File] = {}
         self._process = os.getpid()
         tasks = None if task is None else {task} if isinstance(task, int) else {*task}
@@ -96,7 +104,7 @@ class Dataset:
         demo, step = self.demonstrations[episode], number - int(self._starts[episode])
         group = self._group(demo)
         item: dict[str, Any] = {key: np.asarray(group[stream][step]) for key, stream in self._streams.items()}
-        actions = np.asarray(group[self._actions][step : step + self._horizon], dtype=np.float32)
+        actions = self._actions_of(group, slice(step, step + self._horizon)).astype(np.float32)
         missing = self._horizon - len(actions)
         item["actions"] = np.concatenate([actions, np.repeat(actions[-1:], missing, axis=0)])
         item["actions_is_pad"] = np.arange(self._horizon) >= len(actions)
@@ -106,7 +114,7 @@ class Dataset:
         """All steps of a demonstration: the requested streams and `actions`, each with the steps along its first axis."""
         group = self._group(self.demonstrations[number])
         streams = {key: np.asarray(group[stream]) for key, stream in self._streams.items()}
-        return {**streams, "actions": np.asarray(group[self._actions])}
+        return {**streams, "actions": self._actions_of(group, slice(None))}
 
     def close(self) -> None:
         """Closes the files. They are opened again when they are needed."""
@@ -123,7 +131,8 @@ class Dataset:
         found = []
         for name in sorted(data, key=lambda name: int(name.removeprefix("demo_"))):
             group, attrs = data[name], data[name].attrs
-            for stream in [*self._streams.values(), self._actions]:
+            joints = [JOINT_ACTIONS] if self._control == "joints" else []
+            for stream in [*self._streams.values(), self._actions, *joints]:
                 if stream not in group:
                     have = ", ".join(sorted(group["obs"]))
                     raise ValueError(f"{file}: data/{name} has no stream {stream}; obs has {have}")
@@ -135,6 +144,12 @@ class Dataset:
                 )
             )
         return found
+
+    def _actions_of(self, group: Any, steps: slice) -> np.ndarray:
+        poses = np.asarray(group[self._actions][steps])
+        if self._control == "pose":
+            return poses
+        return np.concatenate([np.asarray(group[JOINT_ACTIONS][steps]), poses[:, -1:]], axis=1)
 
     def _group(self, demo: Demonstration) -> Any:
         return self._open(demo.file)["data"][demo.name]

@@ -79,7 +79,8 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         task: number of a task, part of its prompt, or several numbers, of which each reset draws one; None for all tasks.
         obs: parts of the observation (`softvt.profile.PARTS`), such as "state", or joined by +, such as "pixels+proprio". By default "state";
             with `url` or `profile`, all that the server sends.
-        control: "delta" (fractions −1..1 of 20 mm and 0.2 rad), "delta_osc" (of 50 mm and 0.5 rad, as LIBERO has them) or "pose" (absolute).
+        control: "delta" (fractions −1..1 of 20 mm and 0.2 rad), "delta_osc" (of 50 mm and 0.5 rad, as LIBERO has them), "pose" (absolute), or
+            "joints" (positions of the seven joints, rad).
         gripper: grip code of the last number of an action: "continuous", "binary", "two-width" or "force".
         reward: 1 at the goal ("sparse"), 1 at a goal reached safely ("safety"), or the increase of progress ("staged").
         layout: keys of the observation: "flat", or those that LeRobot reads.
@@ -188,7 +189,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         return self.end_reset()
 
     def step(self, action: np.ndarray) -> Step:
-        """Executes an action (7), or several (n, 7), and returns the result of the last one."""
+        """Executes an action, of the length of the action space, or several (n, length), and returns the result of the last one."""
         self.begin_step(action)
         return self.end_step()
 

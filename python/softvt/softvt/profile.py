@@ -9,12 +9,8 @@ PARTS = ("state", "proprio", "pixels", "depth", "segmentation", "tactile", "tact
 CONTROLS = ("delta", "delta_osc", "pose", "joints")
 """Values of the argument `control`."""
 
-PROPRIO = ("position", "axis_angle", "sensed_finger_position")
-"""Parts of the entry `proprio`: tool position (m) and axis-angle (rad) in the base frame, and half of the width that the sensor of a real hand
-measures (m); the `state` of the profiles `vision` and `visuo_tactile`."""
-
-PROPRIO_SIZE = 7
-"""Numbers of the entry `proprio`."""
+_POSE = {"position": 3, "axis_angle": 3}
+_JOINTS = {"joints": 7}
 
 GRIPPERS = ("continuous", "binary", "two-width", "force")
 """Grip codes (docs/policies.md)."""
@@ -40,8 +36,6 @@ class ProfileSpec:
         for part in self.parts:
             require_one_of("obs", part, PARTS)
         require_one_of("control", self.control, CONTROLS)
-        if self.control == "joints":
-            raise ValueError("control='joints': softvt commands tool poses, not joint angles; use 'pose' or 'delta'")
         require_one_of("gripper", self.gripper, GRIPPERS)
         if not 1 <= self.history <= MAX_HISTORY:
             raise ValueError(f"history={self.history}: expected 1 to {MAX_HISTORY} control steps")
@@ -55,7 +49,7 @@ class ProfileSpec:
                 inputs.append(f"    {{ keys = {{ {_quoted(key)} }}, {source}{'' if part in ('prompt', 'tactile_image') else frames} }},")
         if not inputs:
             # A profile has at least one entry. The true state is not one of them: it comes with each answer.
-            inputs.append(f"    {{ keys = {{ 'proprio' }}, {_proprio()} }},")
+            inputs.append(f"    {{ keys = {{ 'proprio' }}, {self._proprio()} }},")
         return "\n".join(
             ["return softvt.profile {", '  name = "python",', "  inputs = {", *inputs, "  },", f"  {self._actions()},", "}", ""]
         )
@@ -74,19 +68,37 @@ class ProfileSpec:
             case "marker_motion":
                 return [("tactile_marker_motion", 'source = "marker_motion"')]
             case "proprio":
-                return [(part, _proprio())]
+                return [(part, self._proprio())]
         return []
+
+    def _proprio(self) -> str:
+        parts = ", ".join(_quoted(part) for part in proprio_parts(self.control))
+        return f'source = "state", parts = {{ {parts} }}'
 
     def _actions(self) -> str:
         match self.control:
             case "pose":
                 pose, ends = 'pose = "absolute"', "open = 0, closed = 1"
+            case "joints":
+                pose, ends = 'pose = "joints"', "open = 0, closed = 1"
             case "delta":
                 pose, ends = 'pose = "delta", translation_m = 0.02, rotation_rad = 0.2', "open = -1, closed = 1"
             case _:
                 pose, ends = 'pose = "delta_osc", translation_m = 0.05, rotation_rad = 0.5', "open = -1, closed = 1"
         ends = "" if self.gripper == "force" else f"{ends}, "
         return f'actions = {{ {pose}, gripper = {{ {ends}code = "{self.gripper}" }} }}'
+
+
+def proprio_parts(control: str) -> dict[str, int]:
+    """Parts of the entry `proprio` with their lengths. Tool position (m) and axis-angle (rad) in the base frame, or with control="joints" the
+    positions of the arm's joints (rad); then half of the width that the sensor of a real hand measures (m). They are the `state` of the profiles
+    `visuo_tactile` and `visuo_tactile_joints`."""
+    return {**(_JOINTS if control == "joints" else _POSE), "sensed_finger_position": 1}
+
+
+def action_size(control: str) -> int:
+    """Numbers of an action: of the arm, and one of the gripper."""
+    return 8 if control == "joints" else 7
 
 
 def parse_parts(obs: str | Sequence[str]) -> tuple[str, ...]:
@@ -101,11 +113,6 @@ def require_one_of(argument: str, value: str, known: Sequence[str]) -> None:
     """Raises ValueError unless the value of an argument is one of those."""
     if value not in known:
         raise ValueError(f"{argument}={value!r}: expected {', '.join(map(repr, known[:-1]))} or {known[-1]!r}")
-
-
-def _proprio() -> str:
-    parts = ", ".join(_quoted(part) for part in PROPRIO)
-    return f'source = "state", parts = {{ {parts} }}'
 
 
 def _quoted(text: str) -> str:

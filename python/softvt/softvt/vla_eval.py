@@ -20,7 +20,7 @@ from vla_eval.specs import (
 from vla_eval.types import Action, EpisodeResult, Observation, Task
 
 from .env import SoftVTEnv
-from .profile import PROPRIO_SIZE
+from .profile import action_size, proprio_parts
 
 # Names of the cameras in observations, as `softvt --protocol vla-eval` has them.
 _CAMERAS = {"third_person": "agentview", "wrist": "wrist"}
@@ -59,7 +59,8 @@ class SoftVTBenchmark(StepBenchmark):
         suite: standard suite, or a Lua file.
         seed: seed of all episodes.
         control, gripper: meaning of actions, as of SoftVTEnv.
-        send_state: True for `states` (7): tool position (m), axis-angle (rad), half of the sensed width (m).
+        send_state: True for `states` (7): tool position (m), axis-angle (rad), half of the sensed width (m). With control="joints" (8): joint
+            positions (rad), half of the sensed width.
         send_wrist_image: True for the wrist camera too.
         send_tactile: True for touch: the picture `tactile_image` and the markers `tactile_marker_motion` (9, 198, 2).
         image_size: edge of the camera images, pixels.
@@ -96,10 +97,12 @@ class SoftVTBenchmark(StepBenchmark):
         return observation
 
     def step(self, action: Action) -> StepResult:
-        """Executes `action["actions"]`, of 7 numbers. Raises ValueError for another length."""
+        """Executes `action["actions"]`, of 7 numbers, or 8 with control="joints". Raises ValueError for another length."""
         numbers = np.asarray(action["actions"], dtype=np.float64).reshape(-1)
-        if numbers.shape != (7,):
-            raise ValueError(f"the action has {numbers.size} numbers; softvt expects 7: position, axis-angle and gripper")
+        size = action_size(self.control)
+        if numbers.shape != (size,):
+            motion = "joint positions" if self.control == "joints" else "position, axis-angle"
+            raise ValueError(f"the action has {numbers.size} numbers; softvt expects {size}: {motion} and gripper")
         observation, reward, terminated, truncated, info = self._environment().step(numbers)
         done = terminated or truncated
         self._recorder.record_step(
@@ -145,31 +148,32 @@ class SoftVTBenchmark(StepBenchmark):
 
     def get_action_spec(self) -> dict[str, DimSpec]:
         """Format of the actions."""
-        is_pose = self.control == "pose"
-        grippers = {"continuous": GRIPPER_01 if is_pose else RAW, "binary": GRIPPER_CLOSE_01 if is_pose else GRIPPER_CLOSE_POS}
-        return {
-            "position": POSITION_ABSOLUTE if is_pose else POSITION_DELTA,
-            "rotation": ROTATION_AA,
-            "gripper": grippers.get(self.gripper, RAW),
-        }
+        is_absolute = self.control in ("pose", "joints")
+        grippers = {"continuous": GRIPPER_01 if is_absolute else RAW, "binary": GRIPPER_CLOSE_01 if is_absolute else GRIPPER_CLOSE_POS}
+        gripper = grippers.get(self.gripper, RAW)
+        if self.control == "joints":
+            return {"joints": DimSpec("joints", 7, "joint_positions_rad"), "gripper": gripper}
+        return {"position": POSITION_ABSOLUTE if is_absolute else POSITION_DELTA, "rotation": ROTATION_AA, "gripper": gripper}
 
     def get_observation_spec(self) -> dict[str, DimSpec]:
         """Format of the observations."""
         spec = {_CAMERAS[camera]: IMAGE_RGB for camera in self._cameras}
         spec["language"] = LANGUAGE
         if self._sends_state:
-            spec["state"] = DimSpec("state", PROPRIO_SIZE, "eef_pos3_axisangle3_finger1")
+            names = "joints7_finger1" if self.control == "joints" else "eef_pos3_axisangle3_finger1"
+            spec["state"] = DimSpec("state", sum(proprio_parts(self.control).values()), names)
         if self._sends_tactile:
             spec["tactile_image"] = IMAGE_RGB
         return spec
 
     def get_hold_action(self, last_action: Action | None) -> Action:
-        """Repeats an absolute pose, and steps by zero with the last gripper value. Before the first action the hand is open."""
-        if self.control == "pose":
+        """Repeats an absolute pose or joint positions, and steps by zero with the last gripper value. Before the first action the hand is open."""
+        if self.control in ("pose", "joints"):
             if last_action is not None:
                 return last_action
-            pose = np.zeros(6) if self._last_result.obs is None else self._last_result.obs["proprio"][:6]
-            return {"actions": np.append(pose, 0.0).astype(np.float32)}
+            size = action_size(self.control) - 1
+            arm = np.zeros(size) if self._last_result.obs is None else self._last_result.obs["proprio"][:size]
+            return {"actions": np.append(arm, 0.0).astype(np.float32)}
         grip = -1.0 if last_action is None else np.asarray(last_action["actions"]).reshape(-1)[-1]
         return {"actions": np.append(np.zeros(6), grip).astype(np.float32)}
 

@@ -41,7 +41,6 @@ class Arguments(unittest.TestCase):
     def test_impossible_arguments_are_refused_with_what_is_possible(self):
         for arguments, words in [
             ({"parts": (), "control": "delta"}, "no part"),
-            ({"parts": ("state",), "control": "joints"}, "use 'pose' or 'delta'"),
             ({"parts": ("state",), "control": "velocity"}, "expected 'delta'"),
             ({"parts": ("state",), "control": "pose", "gripper": "soft"}, "expected 'continuous'"),
             ({"parts": ("state",), "control": "pose", "history": 33}, "1 to 32"),

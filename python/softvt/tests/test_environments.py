@@ -40,6 +40,7 @@ class Environments(unittest.TestCase):
             {"obs": "pixels+depth+segmentation+state", "image_size": (40, 48), "history": 3, "privileged": True},
             {"obs": "proprio+pixels+tactile_image+marker_motion+state", "layout": "lerobot", "control": "pose", "reward": "safety"},
             {"obs": "pixels+prompt", "control": "delta_osc", "gripper": "binary"},
+            {"obs": "proprio+pixels", "control": "joints", "layout": "lerobot", "image_size": 48},
             {"profile": "libero"},
             {"profile": "visuo_tactile", "layout": "lerobot"},
         ]:
@@ -110,6 +111,23 @@ class Environments(unittest.TestCase):
         tasks = [env.reset(seed=seed)[1]["task"] for seed in range(12)]
         self.assertGreater(len(set(tasks)), 3)
         self.assertEqual(tasks, [env.reset(seed=seed)[1]["task"] for seed in range(12)])
+
+    def test_joint_positions_are_commanded_within_the_limits_of_the_joints(self):
+        env = self.make(obs="proprio", control="joints", task=2)
+        self.assertEqual((env.action_space.shape, env.observation_space.shape), ((8,), (8,)))
+        np.testing.assert_allclose([env.action_space.low[3], env.action_space.high[3]], [-3.0718, -0.0698], rtol=1e-6)
+        self.assertEqual(env.hello["action_space"]["names"][3:5] + [env.hello["pose"]], ["joint_4", "joint_5", "joints"])
+        start, _ = env.reset(seed=1001)
+        action = np.append(start[:7], 0.0)
+        action[0] += 0.05
+        for _ in range(10):
+            observation, *_, info = env.step(action)
+        np.testing.assert_allclose(observation[:7], action[:7], atol=2e-3)
+        self.assertEqual(info["far_commands"], 0)
+        *_, info = env.step(np.full(8, 5.0))
+        self.assertEqual((info["far_commands"], info["clamped_grips"]), (1, 1))
+        with self.assertRaisesRegex(softvt.ServerError, r"expected shape \(8\)"):
+            env.step(np.zeros(7))
 
     def test_the_same_actions_give_the_same_observations_and_a_state_is_restored(self):
         env = self.make(obs="state+pixels+tactile", image_size=48)

@@ -64,6 +64,14 @@ class Datasets(unittest.TestCase):
         np.testing.assert_array_equal(whole["actions"][-1].astype(np.float32), last["actions"][0])
         np.testing.assert_array_equal(whole["state"][-1], last["state"])
 
+    def test_actions_may_be_joint_positions(self):
+        data = softvt.Dataset(self.folder, keys=("arm_joint_pos",), control="joints", horizon=2)
+        self.assertEqual(data[5]["actions"].shape, (2, 8))
+        whole, poses = data.episode(0), softvt.Dataset(self.folder, keys=()).episode(0)
+        np.testing.assert_array_equal(whole["actions"][:, 7], poses["actions"][:, 6])
+        # The joints follow their commands.
+        self.assertLess(np.abs(whole["arm_joint_pos"][1:] - whole["actions"][:-1, :7]).max(), 0.1)
+
     def test_grip_codes_and_other_streams(self):
         data = softvt.Dataset(next((self.folder / "hdf5").iterdir()), keys=("gripper_width", "privileged/pad_force"), gripper="binary")
         self.assertEqual(set(np.unique([item["actions"][0, 6] for item in data])), {0.0, 1.0})
@@ -80,6 +88,7 @@ class Datasets(unittest.TestCase):
             ({"path": FOLDER / "nothing"}, "no recording"),
             ({"path": self.folder, "keys": ("agentview",)}, "no stream obs/agentview; obs has agentview_pose, agentview_rgb"),
             ({"path": self.folder, "task": 7}, "no demonstration of task 7"),
+            ({"path": self.folder, "control": "delta"}, "expected 'pose' or 'joints'"),
             ({"path": self.folder, "gripper": "soft"}, "expected one of continuous"),
             ({"path": self.folder, "horizon": 0}, "at least 1"),
         ]:

@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::{
     DatasetError, StreamValues, TaskFile,
     card::DatasetCard,
-    demonstration::actions_stream_name,
+    demonstration::{JOINT_ACTIONS, actions_stream_name},
     layout::{IMAGE_STREAMS, MANIFEST},
     manifest::{self, ManifestEntry},
 };
@@ -19,7 +19,7 @@ use softvt_common::{files::FileError, text::counted};
 use softvt_geometry::{Quat, Vec3};
 use softvt_media::video;
 use softvt_policy::profile::GripCode;
-use softvt_robot::rotation;
+use softvt_robot::{panda::ARM_DOFS, rotation};
 use softvt_sensing::tactile::MARKER_COUNT;
 
 /// Result of a check.
@@ -36,9 +36,10 @@ pub struct CheckReport {
 }
 
 /// Streams of every demonstration, with their shape per step.
-const REQUIRED_STREAMS: [(&str, &[usize]); 14] = [
+const REQUIRED_STREAMS: [(&str, &[usize]); 15] = [
     ("actions", &[7]),
     ("actions_binary", &[7]),
+    (JOINT_ACTIONS, &[ARM_DOFS]),
     ("rewards", &[]),
     ("dones", &[]),
     ("timestamps", &[]),

@@ -34,6 +34,7 @@ fn demonstration(salt: f64) -> Demonstration {
         record: serde_json::from_str(include_str!("../../../tests/data/episode_record.json"))
             .expect("a valid record"),
         actions: (0..STEPS).map(|step| Action::new(place(step), turn(step), 0.3)).collect(),
+        joint_commands: (0..STEPS).map(|step| [0.1 * step as f64 + salt; 7]).collect(),
         gripper_closed: (0..STEPS).map(|step| step > 4).collect(),
         grip_labels_n: (0..STEPS).map(|step| if step > 4 { 2.5 } else { -1.0 }).collect(),
         observed: vec![

@@ -11,12 +11,16 @@ use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group, Hdf5Error};
 use serde_json::Value;
 
 use super::{
-    super::{DataStream, DatasetError, Demonstration, StreamValues, demonstration::actions_stream_name},
+    super::{
+        DataStream, DatasetError, Demonstration, StreamValues,
+        demonstration::{COMMANDS_JOINTS, JOINT_ACTIONS, actions_stream_name},
+    },
     limits::{self, ListError},
 };
 use softvt_common::files::FileError;
 use softvt_policy::{Action, profile::GripCode};
 use softvt_records::record::EpisodeRecord;
+use softvt_robot::{ik::ArmAngles, panda::ARM_DOFS};
 
 /// The HDF5 file of a task, with the demonstrations `/data/demo_0`, `/data/demo_1`, …
 pub struct TaskFile {
@@ -340,7 +344,8 @@ impl TaskFile {
         Ok(ImageStack { bytes: bytes.map_err(self.failed(demo, name))?, height, width })
     }
 
-    /// Reads the actions of a demonstration: absolute tool poses in the base frame, continuous gripper closure.
+    /// Reads the actions of a demonstration: absolute tool poses in the base frame, or joint positions where the recorded
+    /// policy commanded these, and continuous gripper closure.
     ///
     /// # Errors
     /// The demonstration is missing, or its actions are not finite numbers of shape (steps, 7 or more).
@@ -352,7 +357,37 @@ impl TaskFile {
         }
         let rows = self.finite_array(demo, "actions")?.values;
         let action = |row: &[f64]| Action::from_array(std::array::from_fn(|i| row[i]));
-        Ok(rows.chunks_exact(shape[1]).map(action).collect())
+        let mut actions: Vec<Action> = rows.chunks_exact(shape[1]).map(action).collect();
+        if self.has(demo, COMMANDS_JOINTS) {
+            let StreamValues::U8(are_joints) = self.stream(demo, COMMANDS_JOINTS)?.values else {
+                return Err(self.error(demo, COMMANDS_JOINTS, "expected uint8"));
+            };
+            for ((action, joints), are_joints) in
+                actions.iter_mut().zip(self.joint_commands(demo)?).zip(are_joints)
+            {
+                action.joints = (are_joints == 1).then_some(joints);
+            }
+        }
+        Ok(actions)
+    }
+
+    /// Reads the joint positions that the actions of a demonstration mean, rad.
+    ///
+    /// # Errors
+    /// There are none, or they are not finite numbers of shape (steps, 7).
+    pub fn joint_commands(&self, demo: usize) -> Result<Vec<ArmAngles>, DatasetError> {
+        if !self.has(demo, JOINT_ACTIONS) {
+            let what = "the recording has no joint positions of its actions: it is of an earlier version; record it again";
+            return Err(self.error(demo, JOINT_ACTIONS, what));
+        }
+        let FloatArray { values, shape } = self.finite_array(demo, JOINT_ACTIONS)?;
+        match shape[..] {
+            [_, ARM_DOFS] => Ok(values.as_chunks::<ARM_DOFS>().0.to_vec()),
+            _ => {
+                let what = format!("expected the shape (steps, {ARM_DOFS}), got {shape:?}");
+                Err(self.error(demo, JOINT_ACTIONS, what))
+            }
+        }
     }
 
     /// Reads a demonstration without its images.
@@ -365,6 +400,7 @@ impl TaskFile {
         let mut read = Demonstration {
             record: self.record(demo)?,
             actions: self.actions(demo)?,
+            joint_commands: self.joint_commands(demo)?,
             gripper_closed: binary.chunks(7).map(|row| row[6] > 0.5).collect(),
             grip_labels_n: forces.chunks(7).map(|row| row[6]).collect(),
             observed: Vec::new(),

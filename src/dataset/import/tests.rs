@@ -244,7 +244,7 @@ fn a_goal_without_rotation_keeps_the_last_goals_orientation() {
     let found = goals(&tool, &[step(Vec3::zeros()), step(Vec3::z() * 0.1), step(Vec3::zeros())]);
     let turned = |k: usize| match found[k].motion {
         ToolMotion::Pose { axis_angle_b, .. } => rotation::from_axis_angle(&axis_angle_b),
-        ToolMotion::Delta { .. } => panic!("a step"),
+        other => panic!("{other:?}"),
     };
     let spun = Quat::from_axis_angle(&Vec3::z_axis(), 0.1) * tool[1].rotation;
     assert!(turned(0).angle_to(&tool[0].rotation) < 1e-9);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 
-use softvt_policy::profile::GripCode;
+use softvt_policy::profile::{GripCode, JOINT_NAMES, POSE_NAMES};
 
 /// Version of LeRobot's dataset layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -17,6 +17,41 @@ pub enum LeRobotVersion {
     V30,
 }
 
+/// Meaning of the motion in the actions of an export, and of the state of the arm.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum ArmControl {
+    /// Tool poses: position and axis-angle.
+    #[default]
+    #[value(help = None::<&str>)]
+    Pose,
+    /// Joint positions.
+    #[value(help = None::<&str>)]
+    Joints,
+}
+
+impl ArmControl {
+    /// Name in files and flags.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Pose => "pose",
+            Self::Joints => "joints",
+        }
+    }
+
+    /// Names of the numbers of a motion.
+    pub(super) fn motion_names(self) -> &'static [&'static str] {
+        match self {
+            Self::Pose => &POSE_NAMES,
+            Self::Joints => &JOINT_NAMES,
+        }
+    }
+
+    /// Length of the state and of an action: those of the arm, and one of the gripper.
+    pub(super) fn vector_length(self) -> usize {
+        self.motion_names().len() + 1
+    }
+}
+
 /// Options of an export.
 #[derive(Clone, Debug)]
 pub struct ExportConfig {
@@ -26,7 +61,9 @@ pub struct ExportConfig {
     pub out: PathBuf,
     /// Version of the format.
     pub version: LeRobotVersion,
-    /// Code of the seventh number of an action; `None` for that of the recording, or continuous.
+    /// Motion of the actions, and state of the arm.
+    pub control: ArmControl,
+    /// Code of the last number of an action; `None` for that of the recording, or continuous.
     pub gripper: Option<GripCode>,
     /// Tasks to export, each an index or part of a prompt; empty for all.
     pub tasks: Vec<String>,

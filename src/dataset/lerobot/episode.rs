@@ -3,15 +3,20 @@
 use image::{ImageError, RgbImage};
 
 use super::{
-    config::{ExportConfig, LeRobotVersion},
-    features::{IMAGE_FEATURES, INDEX_FEATURES, MARKER_SHAPE, VECTOR_LENGTH},
+    config::{ArmControl, ExportConfig, LeRobotVersion},
+    features::{IMAGE_FEATURES, INDEX_FEATURES, MARKER_SHAPE},
     parquet_table::{ColumnValues, EmbeddedImage},
     selection::{ImageSize, SelectedDemo, Selection},
     statistics::{FeatureStatistics, QuantileSource, ValueCounts, ValueMoments, ValueStatistics},
 };
-use crate::{DatasetError, ImageStack, TaskFile, demonstration::actions_stream_name, layout::IMAGE_STREAMS};
+use crate::{
+    DatasetError, ImageStack, TaskFile,
+    demonstration::{JOINT_ACTIONS, actions_stream_name},
+    layout::IMAGE_STREAMS,
+};
 use softvt_benchmark::CONTROL_HZ;
-use softvt_robot::tactile::IMAGE_SIZE;
+use softvt_policy::profile::GripCode;
+use softvt_robot::{panda::ARM_DOFS, tactile::IMAGE_SIZE};
 use softvt_sensing::{
     camera::encode_png,
     tactile::{HISTORY_LENGTH, MARKER_COUNT, TactileMosaicLayout, mosaic, mosaic_cell},
@@ -19,6 +24,8 @@ use softvt_sensing::{
 
 /// Images decompressed at once: whole chunks of the file.
 const IMAGES_PER_BLOCK: usize = 32;
+/// Numbers of a row of `actions` and of `obs/state`: a pose, and one of the gripper.
+const ACTION_ROW: usize = 7;
 /// Numbers of the markers in a row, and of one state of one finger.
 const MARKER_ROW: usize = MARKER_SHAPE[0] * MARKER_SHAPE[1] * MARKER_SHAPE[2];
 const FINGER_COORDINATES: usize = 2 * MARKER_COUNT;
@@ -56,13 +63,8 @@ impl<'a> EpisodeData<'a> {
         let demo = &selection.demos[index];
         let steps = demo.entry.num_samples;
         let reader = DemoStreams { file: &TaskFile::open(&demo.path)?, demo: demo.entry.demo_id, steps };
-        let mut state = reader.floats("obs/state", &[VECTOR_LENGTH])?;
-        let widths = reader.floats("obs/gripper_width_sensed", &[1])?;
-        state
-            .chunks_exact_mut(VECTOR_LENGTH)
-            .zip(widths)
-            .for_each(|(row, width)| row[VECTOR_LENGTH - 1] = 0.5 * width);
-        let actions = reader.floats(actions_stream_name(selection.gripper), &[VECTOR_LENGTH])?;
+        let length = config.control.vector_length();
+        let [state, actions] = reader.vectors(config.control, selection.gripper)?;
         let markers = marker_rows(&reader.floats("obs/gripper_marker_motion", &[2, 2, MARKER_COUNT, 2])?);
         let images = reader.image_columns(config.version, selection.image_sizes, is_cancelled)?;
         let timestamps: Vec<f32> =
@@ -79,9 +81,9 @@ impl<'a> EpisodeData<'a> {
             episode.push(key(name), &[3, 1, 1], parts, ColumnValues::Images(images));
         }
         for (name, rows) in [("state", state), ("actions", actions)] {
-            let column = |i: usize| rows.iter().skip(i).step_by(VECTOR_LENGTH).map(|x| f64::from(*x));
-            let parts = (0..VECTOR_LENGTH).map(|i| ValueStatistics::of(column(i).collect())).collect();
-            episode.push(key(name), &[VECTOR_LENGTH], parts, ColumnValues::F32(rows));
+            let column = |i: usize| rows.iter().skip(i).step_by(length).map(|x| f64::from(*x));
+            let parts = (0..length).map(|i| ValueStatistics::of(column(i).collect())).collect();
+            episode.push(key(name), &[length], parts, ColumnValues::F32(rows));
         }
         let (shape, parts) = match config.version {
             LeRobotVersion::V21 => (&MARKER_SHAPE[..], statistics_per_marker(&markers)),
@@ -188,6 +190,38 @@ impl DemoStreams<'_> {
         self.check_shape(name, row_shape)?;
         let values = self.file.finite_array(self.demo, name)?.values;
         Ok(values.into_iter().map(|x| x as f32).collect())
+    }
+
+    /// States and actions, row by row: of the arm, and one number of the gripper.
+    fn vectors(&self, control: ArmControl, gripper: GripCode) -> Result<[Vec<f32>; 2], DatasetError> {
+        let states = self.floats("obs/state", &[ACTION_ROW])?;
+        let widths = self.floats("obs/gripper_width_sensed", &[1])?;
+        let actions = self.floats(actions_stream_name(gripper), &[ACTION_ROW])?;
+        let (arm, motions) = match control {
+            ArmControl::Pose => {
+                let without_gripper = |rows: &[f32]| -> Vec<f32> {
+                    rows.chunks_exact(ACTION_ROW).flat_map(|row| &row[..ACTION_ROW - 1]).copied().collect()
+                };
+                (without_gripper(&states), without_gripper(&actions))
+            }
+            ArmControl::Joints => {
+                let commanded = self.file.joint_commands(self.demo)?;
+                self.check_shape(JOINT_ACTIONS, &[ARM_DOFS])?;
+                let joints = self.floats("obs/arm_joint_pos", &[ARM_DOFS])?;
+                (joints, commanded.into_iter().flatten().map(|x| x as f32).collect())
+            }
+        };
+        let rows = |motion: Vec<f32>, grip: Vec<f32>| -> Vec<f32> {
+            let width = control.vector_length() - 1;
+            motion
+                .chunks_exact(width)
+                .zip(grip)
+                .flat_map(|(row, grip)| row.iter().copied().chain([grip]))
+                .collect()
+        };
+        let fingers = widths.into_iter().map(|width| 0.5 * width).collect();
+        let grips = actions.chunks_exact(ACTION_ROW).map(|row| row[ACTION_ROW - 1]).collect();
+        Ok([rows(arm, fingers), rows(motions, grips)])
     }
 
     /// The four image streams of some steps. `sizes` are those of the cameras.

@@ -4,7 +4,7 @@ use parquet::file::metadata::KeyValue;
 use serde_json::{Map, Value, json};
 
 use super::{
-    config::LeRobotVersion,
+    config::ExportConfig,
     parquet_table::{ColumnType, ParquetColumn, TableSchema},
     selection::ImageSize,
 };
@@ -14,13 +14,8 @@ use softvt_sensing::tactile::MARKER_COUNT;
 pub(super) const IMAGE_FEATURES: [&str; 3] = ["image", "wrist_image", "tactile_image"];
 /// Index features of a row, in order: the last ones.
 pub(super) const INDEX_FEATURES: [&str; 4] = ["frame_index", "episode_index", "index", "task_index"];
-/// Length of the state and of an action.
-pub(super) const VECTOR_LENGTH: usize = 7;
 /// Shape of the markers of a row: initial positions, those of the previous step and of this one; both fingers; x and y.
 pub(super) const MARKER_SHAPE: [usize; 3] = [3, 2 * MARKER_COUNT, 2];
-
-/// Names of the first numbers of state and action.
-const POSE: [&str; 6] = ["x", "y", "z", "axis_angle_x", "axis_angle_y", "axis_angle_z"];
 
 /// A feature.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,7 +31,9 @@ pub(super) struct Feature {
 }
 
 /// All features in order; those that LeRobot adds to every dataset come last. `sizes` are those of the cameras.
-pub(super) fn all(version: LeRobotVersion, [third_person, wrist]: [ImageSize; 2]) -> Vec<Feature> {
+pub(super) fn all(config: &ExportConfig, [third_person, wrist]: [ImageSize; 2]) -> Vec<Feature> {
+    let ExportConfig { version, control, .. } = config;
+    let vector = [control.vector_length()];
     let feature = |name, dtype, shape: &[usize], names| Feature {
         name: version.key(name),
         dtype,
@@ -48,10 +45,10 @@ pub(super) fn all(version: LeRobotVersion, [third_person, wrist]: [ImageSize; 2]
     let images = images.map(|(name, ImageSize { height, width })| {
         feature(name, "image", &[height, width, 3], json!(["height", "width", "channel"]))
     });
-    let with = |last: &'static str| json!(POSE.iter().chain([&last]).collect::<Vec<_>>());
+    let with = |last: &'static str| json!(control.motion_names().iter().chain([&last]).collect::<Vec<_>>());
     let own = [
-        feature("state", "float32", &[VECTOR_LENGTH], with("finger")),
-        feature("actions", "float32", &[VECTOR_LENGTH], with("closure")),
+        feature("state", "float32", &vector, with("finger")),
+        feature("actions", "float32", &vector, with("closure")),
         feature("tactile_marker_motion", "float32", &MARKER_SHAPE, json!(["time", "marker", "xy"])),
         feature("timestamp", "float32", &[1], Value::Null),
     ];

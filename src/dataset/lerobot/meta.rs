@@ -6,12 +6,15 @@ use parquet::file::metadata::KeyValue;
 use serde_json::{Value, json};
 
 use super::{
-    config::{CHUNK, ExportConfig, ExportSummary, LeRobotVersion, MAX_TABLE_MB},
+    config::{ArmControl, CHUNK, ExportConfig, ExportSummary, LeRobotVersion, MAX_TABLE_MB},
     features::{self, Feature},
     parquet_table::{ColumnType, ColumnValues, ParquetColumn, ParquetTable},
     selection::{SelectedDemo, Selection},
 };
-use crate::{DatasetError, demonstration::actions_stream_name};
+use crate::{
+    DatasetError,
+    demonstration::{JOINT_ACTIONS, actions_stream_name},
+};
 use softvt_benchmark::CONTROL_HZ;
 use softvt_common::files;
 use softvt_policy::profile::GripCode;
@@ -29,10 +32,15 @@ pub(super) fn write(
         LeRobotVersion::V30 => write_task_table(dir, &selection.prompts)?,
     }
     write_origins(dir, selection)?;
+    let grip_stream = actions_stream_name(selection.gripper);
     let encoding = json!({
         "softvt": env!("CARGO_PKG_VERSION"),
+        "control": config.control.name(),
         "gripper": selection.gripper.name(),
-        "source": actions_stream_name(selection.gripper),
+        "source": match config.control {
+            ArmControl::Pose => grip_stream.to_owned(),
+            ArmControl::Joints => format!("{JOINT_ACTIONS}, gripper of {grip_stream}"),
+        },
     });
     files::write_json(&dir.join("meta/softvt.json"), &encoding)?;
     files::replace(&dir.join("README.md"), readme(config, selection, summary))?;
@@ -127,6 +135,15 @@ fn readme(config: &ExportConfig, selection: &Selection, summary: ExportSummary) 
         }
         GripCode::Force => "grip force in N while closed, -1 while open",
     };
+    let (arm, motion) = match config.control {
+        ArmControl::Pose => (
+            "tool position (m), axis-angle (rad) in the robot's base frame",
+            "absolute tool position and axis-angle",
+        ),
+        ArmControl::Joints => {
+            ("positions of the seven joints of the arm (rad)", "commanded joint positions (rad)")
+        }
+    };
     let key = |name| config.version.key(name);
     let [image, wrist, tactile] = features::IMAGE_FEATURES.map(key);
     let (markers, state, actions) = (key("tactile_marker_motion"), key("state"), key("actions"));
@@ -142,13 +159,14 @@ fn readme(config: &ExportConfig, selection: &Selection, summary: ExportSummary) 
          | `{image}`, `{wrist}` | third person and wrist |\n\
          | `{tactile}` | 4 × 4 cells: the last 8 images of the left finger above, of the right finger below |\n\
          | `{markers}` | (3, 198, 2) px: initial marker positions, those of the previous step and of this one; left finger first |\n\
-         | `{state}` | tool position (m), axis-angle (rad) in the robot's base frame; position of one finger, 0 closed to 0.04 m |\n\
-         | `{actions}` | absolute tool position and axis-angle; {gripper} |\n\n\
-         `meta/softvt.json` states the grip code ({}), and `meta/softvt.jsonl` the demonstration of each episode.\n\n\
+         | `{state}` | {arm}; position of one finger, 0 closed to 0.04 m |\n\
+         | `{actions}` | {motion}; {gripper} |\n\n\
+         `meta/softvt.json` states the control ({}) and the grip code ({}), and `meta/softvt.jsonl` the demonstration of each episode.\n\n\
          {prompts}",
         config.version.code(),
         CONTROL_HZ,
         env!("CARGO_PKG_VERSION"),
+        config.control.name(),
         selection.gripper.name(),
     )
 }

@@ -15,7 +15,7 @@ pub use self::connection::{PolicyServer, ServerProtocol};
 use super::{
     ActionChunk, EpisodeBrief, Observation, Policy, PolicyError, QueryId, SensorStreams, decode, encode,
     msgpack::{entry, kind},
-    profile::{GripCode, Profile},
+    profile::{GripCode, PoseEncoding, Profile},
 };
 use softvt_benchmark::CONTROL_DT;
 use softvt_common::parallel::lock;
@@ -172,7 +172,7 @@ fn greet_openpi(connection: &mut PolicyConnection, deadline: Instant) -> Result<
         return Err(connection.server.error(&what));
     }
     connection.observes_every_step = observes_every_step(&connection.server, &metadata)?;
-    check_grip_code(&connection.server, &metadata)
+    check_action_codes(&connection.server, &metadata)
 }
 
 /// True if the entry `observe_every_step` of a server's metadata asks for an observation in every control step.
@@ -191,32 +191,53 @@ fn observes_every_step(server: &PolicyServer, metadata: &Value) -> Result<bool, 
     })
 }
 
-/// Checks the grip code that a server states in the entry `gripper` of its metadata, if it does.
+/// Checks the entries `gripper` and `pose` of a server's metadata, by which it states the meaning of its actions.
 ///
 /// # Errors
-/// It is not that of the profile.
-fn check_grip_code(server: &PolicyServer, metadata: &Value) -> Result<(), PolicyError> {
-    let Some(stated) = entry(metadata, "gripper").filter(|value| !value.is_nil()) else { return Ok(()) };
-    let bytes = stated.as_str().map(str::as_bytes).or(stated.as_slice()).unwrap_or_default();
-    let stated = String::from_utf8_lossy(bytes);
+/// They are not those of the profile.
+fn check_action_codes(server: &PolicyServer, metadata: &Value) -> Result<(), PolicyError> {
     let Profile { name, actions, .. } = &server.profile;
-    let own = actions.gripper.code;
-    match GripCode::named(&stated) {
-        Some(code) if code == own => Ok(()),
-        Some(code) => Err(server.error(&format!(
-            "states the grip code {} in its metadata, and the profile {name} reads {}: choose the grip code {}",
-            code.name(),
-            own.name(),
-            code.name()
-        ))),
-        None => {
-            let known = GripCode::ALL.map(GripCode::name).join(", ");
-            Err(server.error(&format!(
-                "states the grip code {:?} in the entry gripper of its metadata; expected one of {known}",
-                stated.chars().take(80).collect::<String>()
-            )))
+    let stated = |key: &str| {
+        let value = entry(metadata, key).filter(|value| !value.is_nil())?;
+        let bytes = value.as_str().map(str::as_bytes).or(value.as_slice()).unwrap_or_default();
+        Some(String::from_utf8_lossy(bytes).chars().take(80).collect::<String>())
+    };
+    let unknown = |key: &str, stated: &str, known: &[&str]| {
+        let known = known.join(", ");
+        server
+            .error(&format!("states {stated:?} in the entry {key} of its metadata; expected one of {known}"))
+    };
+    if let Some(stated) = stated("gripper") {
+        let own = actions.gripper.code;
+        match GripCode::named(&stated) {
+            Some(code) if code == own => {}
+            Some(code) => {
+                return Err(server.error(&format!(
+                    "states the grip code {} in its metadata, and the profile {name} reads {}: choose the grip code {}",
+                    code.name(),
+                    own.name(),
+                    code.name()
+                )));
+            }
+            None => {
+                let known = GripCode::ALL.map(GripCode::name);
+                return Err(unknown("gripper", &stated, &known));
+            }
         }
     }
+    if let Some(stated) = stated("pose") {
+        let own = actions.pose.name();
+        if !PoseEncoding::NAMES.contains(&stated.as_str()) {
+            return Err(unknown("pose", &stated, &PoseEncoding::NAMES));
+        }
+        if stated != own {
+            return Err(server.error(&format!(
+                "states actions of pose {stated} in its metadata, and the profile {name} reads {own}: choose a profile whose \
+                 actions have pose = {stated:?}"
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// openpi's protocol: sends an observation and receives a chunk of actions.

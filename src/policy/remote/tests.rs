@@ -260,19 +260,20 @@ fn the_timeout_holds_while_bytes_arrive() {
 }
 
 #[test]
-fn a_server_may_state_its_grip_code() {
-    let stating = |code: Value| {
+fn a_server_may_state_the_meaning_of_its_actions() {
+    let stating = |key: &'static str, code: Value| {
         server(move |mut socket| {
-            send(&mut socket, &map([("gripper", code.clone())]));
+            send(&mut socket, &map([(key, code.clone())]));
             while observe(&mut socket) {
                 send(&mut socket, &chunk(0.25));
             }
         })
     };
-    let check = |code: Value| {
-        let own = policy_server(stating(code), GripCode::TwoWidth, Duration::from_secs(20));
+    let check_entry = |key, code: Value| {
+        let own = policy_server(stating(key, code), GripCode::TwoWidth, Duration::from_secs(20));
         PolicyConnections::new(own).check().map_err(|error| error.to_string())
     };
+    let check = |code| check_entry("gripper", code);
     assert_eq!(check("two-width".into()), Ok(()));
     assert_eq!(check(Value::Binary(b"two-width".to_vec())), Ok(()));
     let error = check("binary".into()).unwrap_err();
@@ -284,4 +285,9 @@ fn a_server_may_state_its_grip_code() {
         let error = check(other).unwrap_err();
         assert!(error.contains("expected one of continuous, binary, two-width, force"), "{error}");
     }
+    assert_eq!(check_entry("pose", "absolute".into()), Ok(()));
+    let error = check_entry("pose", "joints".into()).unwrap_err();
+    assert!(error.contains("actions of pose joints") && error.contains("state reads absolute"), "{error}");
+    let error = check_entry("pose", "tool".into()).unwrap_err();
+    assert!(error.contains("expected one of absolute, delta, delta_osc, joints"), "{error}");
 }

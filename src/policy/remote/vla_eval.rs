@@ -32,7 +32,7 @@ pub(super) fn greet(connection: &mut PolicyConnection, deadline: Instant) -> Res
         return Err(connection.server.error(&format!("answered hello with {kind:?}")));
     }
     match entry(payload, "protocol_version").and_then(Value::as_u64) {
-        Some(VERSION) | None => super::check_grip_code(&connection.server, payload),
+        Some(VERSION) | None => super::check_action_codes(&connection.server, payload),
         Some(other) => {
             let what = format!("uses version {other} of vla-eval's protocol; expected {VERSION}");
             Err(connection.server.error(&what))

@@ -37,15 +37,18 @@ record! {
         /// strain_sources and experts. Its results say that it is privileged.
         privileged: bool => Boolean(false);
     }
-    /// A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame, and a
-    /// closure or a grip force. Give either axis_angle or quaternion, and either closure or force.
+    /// A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame, or positions
+    /// of the arm's joints, and a closure or a grip force. Give either joints, or position with axis_angle or
+    /// quaternion; and either closure or force.
     ActionSpec: "softvt.Action" as "action" {
         /// Position.
-        position: [f64; 3] = Type::vector(3, "m, base frame");
+        position: Option<[f64; 3]> = Type::vector(3, "m, base frame");
         /// Orientation as axis-angle.
         axis_angle: Option<[f64; 3]> = Type::vector(3, "rad, base frame");
         /// Orientation as quaternion.
         quaternion: Option<[f64; 4]> = Type::Quaternion("base frame");
+        /// Positions of the arm's joints, from the base on.
+        joints: Option<[f64; 7]> = Type::vector(7, "rad");
         /// Gripper closure: 0 is open, 1 is closed. The grip code of the policy says what it commands.
         closure: Option<f64> = Type::Number("", Range::closed(0.0, 1.0));
         /// Grip force at which closing stops, at most robot.gripper.effort; below 0 opens.
@@ -80,26 +83,28 @@ record! {
         /// For tactile: the finger.
         finger: Option<Side>;
     }
-    /// The meaning of the numbers of an action: three of position, three of orientation (axis-angle), one of the
-    /// gripper; further ones are padding.
+    /// The meaning of the numbers of an action: three of position, three of orientation (axis-angle), or seven joint
+    /// positions, and one of the gripper; further ones are padding.
     ActionEncodingSpec: "softvt.ActionEncoding" as "profile.actions" {
         /// absolute: a pose in the base frame. delta: shares -1 to 1 of a step away from the tool's pose. delta_osc:
-        /// the same, reduced to what robosuite's controller reaches within a control step.
+        /// the same, reduced to what robosuite's controller reaches within a control step. joints: positions of the
+        /// seven joints of the arm, rad.
         pose: PoseKind;
         /// For delta and delta_osc: the step of a share of 1, m.
         translation_m: Option<f64> = STEP;
         /// For delta and delta_osc: the rotation of a share of 1, rad.
         rotation_rad: Option<f64> = STEP;
-        /// Factors on the first six numbers, applied first.
-        scale: Option<[f64; 6]>;
+        /// Factors on the numbers before that of the gripper, six or seven, applied first.
+        scale: Option<Vec<f64>> = Type::List(&Type::Number("", Range::ANY));
         /// Offsets added after that.
-        offset: Option<[f64; 6]>;
-        /// Length that an action must have, padding included; by default 7, or 32 as openpi's models pad them.
+        offset: Option<Vec<f64>> = Type::List(&Type::Number("", Range::ANY));
+        /// Length that an action must have, padding included; by default 7, or 8 for joints, or 32 as openpi's models
+        /// pad them.
         length: Option<usize> = Type::Integer(Range::closed(7.0, 4096.0));
-        /// The seventh number.
+        /// The number of the gripper.
         gripper: GripperValuesSpec;
     }
-    /// The seventh number of an action.
+    /// The number of the gripper, the last of an action without padding.
     GripperValuesSpec: "softvt.GripperValues" as "profile.actions.gripper" {
         /// Value that opens the gripper; not for code = "force".
         open: Option<f64>;
@@ -199,8 +204,10 @@ choice! {
     }
 }
 choice! {
-    /// The reference of an action's pose.
-    enum PoseKind { "absolute" => Absolute, "delta" => Delta, "delta_osc" => DeltaOsc }
+    /// The meaning of the numbers of an action before that of the gripper.
+    enum PoseKind {
+        "absolute" => Absolute, "delta" => Delta, "delta_osc" => DeltaOsc, "joints" => Joints,
+    }
 }
 
 pub(crate) static CONSTRUCTORS: &[&Record] = &[PolicySpec::RECORD, ProfileSpec::RECORD];

@@ -39,7 +39,7 @@ use softvt_evaluation::deformation::{Deformation, ReferenceShape};
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::BodyId;
 use softvt_robot::{Side, gripper::GripTarget, rotation};
-use softvt_rollout::{AssetCache, SensingError, SensorAssets, SensorSeed, Sensors, Simulation};
+use softvt_rollout::{ArmCommand, AssetCache, SensingError, SensorAssets, SensorSeed, Sensors, Simulation};
 use softvt_sensing::tactile::{MarkerStyle, PadWrench, TactileReading};
 
 const EPISODE: Type = Type::Integer(Range::closed(0.0, 1e9));
@@ -198,7 +198,8 @@ impl SimulationState {
             self.failed = Some("interrupted".into());
         }
         if let Some(ExpertCommand { pose_b, closure, .. }) = command {
-            self.sim.robot.command(&mut self.sim.world, *pose_b, GripTarget::Closure(*closure));
+            let arm = ArmCommand::pose(*pose_b);
+            self.sim.robot.command(&mut self.sim.world, arm, GripTarget::Closure(*closure));
         }
         let _pause = self.clock.pause();
         for _ in 0..steps_per_control(self.sim.world.params.dt) {

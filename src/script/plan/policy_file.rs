@@ -213,10 +213,25 @@ impl LuaPolicy {
     fn checked_action(&self, table: &Table) -> Result<ToolCommand, ValidationError> {
         let lua = &self.instance.vm.lua;
         let spec = ActionSpec::from_checked(Value::Table(check(lua, ActionSpec::RECORD, table)?), lua)?;
-        let axis_angle_b = match (spec.axis_angle, spec.quaternion) {
-            (Some(axis_angle), None) => Vec3::from(axis_angle),
-            (None, Some(wxyz)) => rotation::axis_angle(&rotation_from_wxyz(wxyz).unwrap_or_default()),
-            _ => return Err(ValidationError::new("give either axis_angle or quaternion")),
+        let pose = |position: [f64; 3], axis_angle_b| ToolMotion::Pose {
+            position_b: Vec3::from(position),
+            axis_angle_b,
+        };
+        let motion = match (spec.joints, spec.position, spec.axis_angle, spec.quaternion) {
+            (Some(joints), None, None, None) => ToolMotion::Joints(joints),
+            (None, Some(position), Some(axis_angle), None) => pose(position, Vec3::from(axis_angle)),
+            (None, Some(position), None, Some(wxyz)) => {
+                pose(position, rotation::axis_angle(&rotation_from_wxyz(wxyz).unwrap_or_default()))
+            }
+            (None, Some(_), ..) => return Err(ValidationError::new("give either axis_angle or quaternion")),
+            (Some(_), ..) => {
+                let message = "joints has a position, axis_angle or quaternion beside it; give one of both";
+                return Err(ValidationError::new(message));
+            }
+            (None, None, ..) => {
+                let message = "position: missing; give position with axis_angle or quaternion, or joints";
+                return Err(ValidationError::new(message));
+            }
         };
         let (code, value) = match (self.gripper, spec.closure, spec.force) {
             (None, Some(closure), None) => (GripCode::Continuous, closure),
@@ -230,7 +245,6 @@ impl LuaPolicy {
             }
         };
         let values = GripperValues { code, ..GripperValues::new(0.0, 1.0) };
-        let motion = ToolMotion::Pose { position_b: Vec3::from(spec.position), axis_angle_b };
         Ok(ToolCommand { motion, grip: values.command(value) })
     }
 

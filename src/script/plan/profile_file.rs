@@ -133,15 +133,19 @@ impl ProfileReader<'_> {
         };
         let translation_m = |pose| spec.translation_m.ok_or_else(|| missing("translation_m", pose));
         let rotation_rad = |pose| spec.rotation_rad.ok_or_else(|| missing("rotation_rad", pose));
-        let pose = match spec.pose {
-            PoseKind::Absolute => {
-                let given = [("translation_m", spec.translation_m), ("rotation_rad", spec.rotation_rad)];
-                if let Some((key, _)) = given.iter().find(|(_, step)| step.is_some()) {
-                    let message = format!("actions.{key}: pose = \"absolute\" has no steps; leave it out");
-                    return Err(self.wrong(key, message));
+        let stepless = |name: &str, pose: PoseEncoding| {
+            let given = [("translation_m", spec.translation_m), ("rotation_rad", spec.rotation_rad)];
+            match given.iter().find(|(_, step)| step.is_some()) {
+                Some((key, _)) => {
+                    let message = format!("actions.{key}: pose = {name:?} has no steps; leave it out");
+                    Err(self.wrong(key, message))
                 }
-                PoseEncoding::Absolute
+                None => Ok(pose),
             }
+        };
+        let pose = match spec.pose {
+            PoseKind::Absolute => stepless("absolute", PoseEncoding::Absolute)?,
+            PoseKind::Joints => stepless("joints", PoseEncoding::Joints)?,
             PoseKind::Delta => PoseEncoding::Delta {
                 translation_m: translation_m("delta")?,
                 rotation_rad: rotation_rad("delta")?,
@@ -151,14 +155,31 @@ impl ProfileReader<'_> {
                 rotation_rad: rotation_rad("delta_osc")?,
             },
         };
-        let (scale, offset) = (spec.scale, spec.offset);
-        if let Some(at) = scale.and_then(|scale| scale.iter().position(|factor| *factor == 0.0)) {
+        let (scale, offset) = (&spec.scale, &spec.offset);
+        let count = pose.numbers();
+        for (key, numbers) in [("scale", scale), ("offset", offset)] {
+            if let Some(numbers) = numbers.as_ref().filter(|numbers| numbers.len() != count) {
+                let (name, got) = (pose.name(), numbers.len());
+                let message =
+                    format!("actions.{key}: expected {count} numbers with pose = {name:?}, got {got}");
+                return Err(self.wrong(key, message));
+            }
+        }
+        if let Some(at) = scale.as_ref().and_then(|scale| scale.iter().position(|factor| *factor == 0.0)) {
             let message = format!("actions.scale[{}]: expected a number other than 0, got 0", at + 1);
             return Err(self.wrong("scale", message));
         }
+        if let Some(length) = spec.length.filter(|length| *length <= count) {
+            let least = count + 1;
+            let message = format!(
+                "actions.length: expected at least {least} numbers with pose = {:?}, got {length}",
+                pose.name()
+            );
+            return Err(self.wrong("length", message));
+        }
         let units = (scale.is_some() || offset.is_some()).then(|| ActionUnits {
-            scale: scale.unwrap_or(ActionUnits::IDENTITY.scale),
-            offset: offset.unwrap_or(ActionUnits::IDENTITY.offset),
+            scale: scale.clone().unwrap_or_else(|| vec![1.0; count]),
+            offset: offset.clone().unwrap_or_else(|| vec![0.0; count]),
         });
         Ok(ActionEncoding { pose, gripper: self.gripper(&spec.gripper)?, units, length: spec.length })
     }

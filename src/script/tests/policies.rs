@@ -143,6 +143,8 @@ fn actions_are_accepted_alone_or_as_lists_with_either_form_of_rotation() {
     assert!((axis_angle_b - Vec3::new(std::f64::consts::PI, 0.0, 0.0)).norm() < 1e-9);
     assert_eq!(position_b, Vec3::new(0.5, -0.125, 0.25));
     assert_eq!(turned.commands[0].grip, EncodedGrip::Target(GripTarget::Closure(0.25)));
+    let joints = act("return { joints = { 0, -0.2, 0, -2.4, 0, 2.2, 0.8 }, closure = 1 }").unwrap();
+    assert_eq!(joints.commands[0].motion, ToolMotion::Joints([0.0, -0.2, 0.0, -2.4, 0.0, 2.2, 0.8]));
 }
 
 #[test]
@@ -164,6 +166,12 @@ fn malformed_actions_end_the_run_at_the_line_of_act() {
         (
             "return { position = { 0, 0, 0 }, closure = 0 }",
             format!("{at}: give either axis_angle or quaternion"),
+        ),
+        ("return { closure = 0 }", format!("{at}: position: missing; give position with axis_angle")),
+        ("return { joints = { 0, 0 }, closure = 0 }", format!("{at}.joints: expected a list of 7 numbers")),
+        (
+            "return { position = { 0, 0, 0 }, joints = { 0, 0, 0, 0, 0, 0, 0 }, closure = 0 }",
+            format!("{at}: joints has a position, axis_angle or quaternion beside it; give one of both"),
         ),
         (
             "return { position = { 0, 0, 0 }, axis_angle = { 0, 0, 0 }, closure = 2 }",
@@ -298,6 +306,11 @@ fn the_built_in_profiles_can_be_written_in_lua() {
         (tactile, ""),
         ("\"sensed_finger_position\"", "\"finger_position\", \"closure\""),
     ];
+    let joints = [
+        ("name = \"visuo_tactile\"", "name = \"visuo_tactile_joints\""),
+        ("\"position\", \"axis_angle\"", "\"joints\""),
+        ("\"absolute\"", "\"joints\""),
+    ];
     let force = format!("{tactile}\n{{ keys = both \"tactile_gripper_force\", source = \"force\" }},");
     let released = [
         ("name = \"visuo_tactile\"", "name = \"softvtbench\""),
@@ -312,6 +325,7 @@ fn the_built_in_profiles_can_be_written_in_lua() {
         ("vision", changed("visuo_tactile", &vision)),
         ("vision_drives", changed("visuo_tactile", &drives)),
         ("softvtbench", changed("visuo_tactile", &released)),
+        ("visuo_tactile_joints", changed("visuo_tactile", &joints)),
     ] {
         assert_eq!(profile(&text).unwrap(), Profile::named(name).unwrap());
     }
@@ -333,7 +347,7 @@ fn a_profile_may_name_other_cameras_units_and_paddings() {
     let profile = profile(&changed("libero", &changes)).unwrap();
     assert_eq!(profile.streams().cameras, ["third_person", "side"]);
     let units = profile.actions.units.unwrap();
-    assert_eq!((profile.actions.length, units.scale[0], units.offset), (Some(32), 2.0, [0.0; 6]));
+    assert_eq!((profile.actions.length, units.scale[0], units.offset), (Some(32), 2.0, vec![0.0; 6]));
 }
 
 #[test]
@@ -368,6 +382,16 @@ fn errors_in_profiles_are_reported_with_their_line() {
             "profile.actions.translation_m: missing; pose = \"delta_osc\" needs it",
         ),
         ("\"delta_osc\"", "\"absolute\"", "profile.actions.translation_m: pose = \"absolute\" has no steps"),
+        (
+            "pose = \"delta_osc\"",
+            "pose = \"delta\", scale = { 1, 1, 1 }",
+            "profile.actions.scale: expected 6 numbers with pose = \"delta\", got 3",
+        ),
+        (
+            "pose = \"delta_osc\", translation_m = 0.05, rotation_rad = 0.5",
+            "pose = \"joints\", length = 7",
+            "profile.actions.length: expected at least 8 numbers with pose = \"joints\", got 7",
+        ),
         ("open = -1", "open = 1", "profile.actions.gripper.closed: is 1 like open"),
         ("code = \"binary\"", "code = \"two-widths\"", "did you mean \"two-width\"?"),
         ("code = \"binary\"", "code = \"force\"", "profile.actions.gripper.open: code = \"force\" has none"),

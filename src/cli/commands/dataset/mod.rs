@@ -15,7 +15,7 @@ use softvt_common::cancel;
 use softvt_common::{files, text::counted};
 use softvt_dataset::{
     DatasetError, check,
-    lerobot::{self, ExportConfig, LeRobotVersion},
+    lerobot::{self, ArmControl, ExportConfig, LeRobotVersion},
     stats,
 };
 use softvt_policy::profile::GripCode;
@@ -57,6 +57,9 @@ pub(crate) struct ExportArgs {
     /// Output folder; must be new
     #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     out: PathBuf,
+    /// Motion of the actions, and state of the arm: tool poses or joint positions
+    #[arg(long, value_name = "CONTROL", default_value = "pose")]
+    control: ArmControl,
     /// Grip code of the actions: docs/policies.md [default: that of the recording, or continuous]
     #[arg(long, value_name = "CODE")]
     gripper: Option<GripCode>,
@@ -147,6 +150,7 @@ fn run_export(args: ExportArgs) -> Result<(), CliError> {
         data: args.path,
         out: args.out,
         version: args.format,
+        control: args.control,
         gripper: args.gripper,
         tasks: args.tasks,
         threads: thread_count(args.threads),
