@@ -13,6 +13,7 @@ use clap::{Args, ValueEnum, value_parser};
 
 use crate::{error::CliError, output::Console, plan_flags};
 use softvt_benchmark::{ShiftValue, Suite, Task, Teacher};
+use softvt_dataset::OptionalStream;
 use softvt_policy::{profile::GripCode, remote::ServerProtocol};
 use softvt_records::requirement::Requirement;
 use softvt_report::stored_run::{self, StoredRun};
@@ -330,6 +331,9 @@ pub(crate) struct RecordingArgs {
     /// Leave out the true state: node positions, deformation, contacts, forces
     #[arg(long)]
     pub no_privileged: bool,
+    /// Further streams of the HDF5 files, separated by commas: depth of both cameras, torques of the arm's drives
+    #[arg(long, value_name = "STREAM", value_delimiter = ',')]
+    pub streams: Vec<OptionalStream>,
     /// Number of threads; the dataset does not depend on it [default: number of processors]
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
@@ -364,6 +368,7 @@ impl RecordingArgs {
             out: self.out.clone(),
             has_images: self.images == ImageStorage::Hdf5,
             has_privileged: !self.no_privileged,
+            streams: self.streams.iter().copied().collect(),
             resume: self.resume,
             gripper,
         }

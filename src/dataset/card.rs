@@ -1,11 +1,14 @@
 //! [`DatasetCard`]: contents of a dataset, as `dataset.json` and as a human-readable `README.md`.
 
-use std::{collections::BTreeMap, path::Path};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+};
 
 use serde::{Deserialize, Serialize};
 
 use super::{
-    DatasetError,
+    DatasetError, OptionalStream,
     layout::{CARD, DATASET},
 };
 use softvt_common::files;
@@ -64,6 +67,9 @@ pub struct DatasetCard {
     /// True if privileged streams are stored.
     #[serde(rename = "privileged")]
     pub has_privileged: bool,
+    /// Further streams that are stored.
+    #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
+    pub streams: BTreeSet<OptionalStream>,
     /// Grip code of exports that name none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gripper: Option<GripCode>,
@@ -121,12 +127,17 @@ impl DatasetCard {
             let ImportedFile { file, sha256, format, demos, commands } = source;
             format!("| {file} | {sha256} | {format} | {demos} | {commands} |\n")
         };
+        let streams: Vec<&str> = self.streams.iter().map(|stream| stream.name()).collect();
+        let streams = match &streams[..] {
+            [] => String::new(),
+            some => format!("| further streams | {} |\n", some.join(", ")),
+        };
         let mut page = format!(
             "---\nlicense: apache-2.0\ntask_categories:\n- robotics\n---\n\
              # Demonstrations of soft-object manipulation\n\n\
              Recorded by softvt {} in simulation; every demonstration reaches its goal and is safe by softvt's evaluator.\n\n\
              | | |\n|---|---|\n| demonstrations | {} |\n| control steps | {} ({hours:.2} h at {} Hz) |\n\
-             | HDF5 | {} MB |\n| videos | {} MB |\n| images in HDF5 | {} |\n| privileged streams | {} |\n\n",
+             | HDF5 | {} MB |\n| videos | {} MB |\n| images in HDF5 | {} |\n| privileged streams | {} |\n{streams}\n",
             self.softvt,
             self.demos(),
             self.samples(),

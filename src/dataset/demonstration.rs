@@ -73,6 +73,15 @@ impl Demonstration {
         self.actions.len()
     }
 
+    /// Appends the stream of the torques of the arm's drives, given per state.
+    pub fn set_joint_torques(&mut self, torques: &[[f64; ARM_DOFS]]) {
+        let rows = torques.iter().take(self.steps()).flatten().copied().collect();
+        let stream = DataStream::f64(JOINT_TORQUES, &[ARM_DOFS], rows)
+            .unit("N m", "")
+            .attribute("meaning", "torques of the arm's drives; gravity is compensated and not part of them");
+        self.observed.push(stream);
+    }
+
     /// Appends the stream of tactile marker positions, given per step and finger (left, right).
     pub fn set_markers(&mut self, markers: &[[Markers; 2]]) {
         let positions = markers.iter().flatten().flat_map(Markers::to_array).flatten().flatten().collect();
@@ -145,6 +154,8 @@ impl Demonstration {
     }
 }
 
+/// Name of the stream of the torques of the arm's drives.
+pub(crate) const JOINT_TORQUES: &str = "obs/joint_torques";
 /// Name of the stream of actions as joint positions.
 pub(crate) const JOINT_ACTIONS: &str = "actions_joints";
 /// Name of the stream that marks actions that commanded joint positions; present if there are any.

@@ -1,22 +1,25 @@
 //! [`DemonstrationWriter`]: renders a recorded rollout into the files of one demonstration.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use image::RgbImage;
 use rust_hdf5::H5Dataset;
 use serde_json::Value;
 
 use super::{
-    DatasetError, Demonstration,
+    DatasetError, Demonstration, OptionalStream,
     hdf5::{ChunkedSteps, Hdf5Writer, write_file},
-    layout::IMAGE_STREAMS,
+    layout::{DEPTH_STREAMS, IMAGE_STREAMS},
 };
 use softvt_benchmark::CONTROL_HZ;
 use softvt_media::video::VideoWriter;
 use softvt_rollout::StateRecording;
 use softvt_scene::{Camera, STANDARD_CAMERAS};
 use softvt_sensing::{
-    camera::resize,
+    camera::{RenderedImage, resize},
     tactile::{MarkerStyle, Markers},
 };
 
@@ -30,6 +33,8 @@ pub struct DemonstrationWriter<'a> {
     pub preview: PathBuf,
     /// True to store images in the HDF5 file as well.
     pub store_images: bool,
+    /// Further streams of the HDF5 file.
+    pub streams: &'a BTreeSet<OptionalStream>,
     /// `env_args` of the HDF5 file.
     pub environment: &'a Value,
 }
@@ -60,7 +65,7 @@ impl DemonstrationWriter<'_> {
     ) -> Result<(), DatasetError> {
         let (steps, path) = (demonstration.steps(), writer.path);
         writer.write_attributes(0, &demonstration.record, steps)?;
-        let mut renderer = StepRenderer::new(recording)?;
+        let mut renderer = StepRenderer::new(recording, self.streams.contains(&OptionalStream::Depth))?;
         let mut outputs: Option<ImageOutputs> = None;
         let mut markers = Vec::with_capacity(steps);
         for step in 0..steps {
@@ -71,12 +76,15 @@ impl DemonstrationWriter<'_> {
             let outputs = match &mut outputs {
                 Some(outputs) => outputs,
                 // The sizes of the images are known from the first step on.
-                none => none.insert(ImageOutputs::new(&images, writer, steps, self.store_images)?),
+                none => none.insert(ImageOutputs::new(&images, writer, steps, self)?),
             };
             outputs.push(path, &images, step + 1 == steps)?;
             markers.push(images.markers);
         }
         demonstration.set_markers(&markers);
+        if self.streams.contains(&OptionalStream::JointTorques) {
+            demonstration.set_joint_torques(&renderer.recording.joint_torques);
+        }
         writer.write_streams(0, demonstration)?;
         outputs.map_or(Ok(()), |outputs| outputs.finish(self))
     }
@@ -91,13 +99,13 @@ struct ImageStreamWriter {
     dataset: H5Dataset,
     name: &'static str,
     images_per_chunk: usize,
-    /// Images of the current chunk.
+    /// Images of the current chunk; numbers are little-endian.
     bytes: Vec<u8>,
     chunks_written: usize,
 }
 
 impl ImageStreamWriter {
-    fn push(&mut self, path: &Path, image: &RgbImage, is_last: bool) -> Result<(), DatasetError> {
+    fn push(&mut self, path: &Path, image: &[u8], is_last: bool) -> Result<(), DatasetError> {
         self.bytes.extend_from_slice(image);
         let chunk_bytes = self.images_per_chunk * image.len();
         // HDF5 chunks are always full: the last one is padded with its last image.
@@ -117,6 +125,7 @@ impl ImageStreamWriter {
 /// Writers that take one image per step.
 struct ImageOutputs {
     streams: Vec<ImageStreamWriter>,
+    depths: Vec<ImageStreamWriter>,
     videos: Vec<VideoWriter>,
     preview: VideoWriter,
 }
@@ -126,21 +135,37 @@ impl ImageOutputs {
         first: &StepImages,
         writer: &mut Hdf5Writer,
         steps: usize,
-        store_images: bool,
+        files: &DemonstrationWriter,
     ) -> Result<Self, DatasetError> {
         let video =
             |image: &RgbImage| VideoWriter::new(image.width() as usize, image.height() as usize, CONTROL_HZ);
         let mut streams = Vec::new();
         let named = IMAGE_STREAMS.into_iter().zip(&first.images).zip(IMAGES_PER_CHUNK);
-        for ((name, image), images_per_chunk) in named.filter(|_| store_images) {
+        for ((name, image), images_per_chunk) in named.filter(|_| files.store_images) {
             let images_per_chunk = images_per_chunk.min(steps);
             let length = ChunkedSteps { steps, per_chunk: images_per_chunk };
             let dataset = writer.create_image_dataset(0, name, length, image.width(), image.height())?;
             let bytes = Vec::with_capacity(images_per_chunk * image.len());
             streams.push(ImageStreamWriter { dataset, name, images_per_chunk, bytes, chunks_written: 0 });
         }
+        let mut depths = Vec::new();
+        let named = DEPTH_STREAMS.into_iter().zip(&first.images).zip(IMAGES_PER_CHUNK);
+        let has_depth = files.streams.contains(&OptionalStream::Depth);
+        for ((name, image), images_per_chunk) in named.filter(|_| has_depth) {
+            let images_per_chunk = images_per_chunk.min(steps);
+            let length = ChunkedSteps { steps, per_chunk: images_per_chunk };
+            let dataset = writer.create_depth_dataset(0, name, length, image.width(), image.height())?;
+            depths.push(ImageStreamWriter {
+                dataset,
+                name,
+                images_per_chunk,
+                bytes: Vec::new(),
+                chunks_written: 0,
+            });
+        }
         Ok(Self {
             streams,
+            depths,
             videos: first.video_frames.iter().map(video).collect::<Result<_, _>>()?,
             preview: video(&first.preview())?,
         })
@@ -149,6 +174,10 @@ impl ImageOutputs {
     fn push(&mut self, path: &Path, images: &StepImages, is_last: bool) -> Result<(), DatasetError> {
         for (stream, image) in self.streams.iter_mut().zip(&images.images) {
             stream.push(path, image, is_last)?;
+        }
+        for (stream, depth) in self.depths.iter_mut().zip(&images.depths) {
+            let bytes: Vec<u8> = depth.iter().flat_map(|metres| metres.to_le_bytes()).collect();
+            stream.push(path, &bytes, is_last)?;
         }
         for (video, frame) in self.videos.iter_mut().zip(&images.video_frames) {
             video.push(frame)?;
@@ -173,6 +202,8 @@ const CELL_HEIGHT: u32 = 240;
 struct StepImages {
     /// In the order of [`IMAGE_STREAMS`].
     images: [RgbImage; 4],
+    /// In the order of [`DEPTH_STREAMS`], m; empty if depth is not asked for.
+    depths: [Vec<f32>; 2],
     /// In the order of [`super::layout::VIDEO_STREAMS`].
     video_frames: [RgbImage; 4],
     /// Marker positions of the left and right finger, px.
@@ -183,15 +214,16 @@ struct StepImages {
 struct StepRenderer<'a> {
     recording: &'a mut StateRecording,
     cameras: Vec<Camera>,
+    has_depth: bool,
 }
 
 impl<'a> StepRenderer<'a> {
     /// # Errors
     /// The scene lacks the camera `third_person` or `wrist`.
-    fn new(recording: &'a mut StateRecording) -> Result<Self, DatasetError> {
+    fn new(recording: &'a mut StateRecording, has_depth: bool) -> Result<Self, DatasetError> {
         let camera = |name: &str| Ok(recording.sensors.camera(name)?.clone());
         let cameras = STANDARD_CAMERAS.into_iter().map(camera).collect::<Result<_, DatasetError>>()?;
-        Ok(Self { recording, cameras })
+        Ok(Self { recording, cameras, has_depth })
     }
 
     /// Renders state `step`; `None` after the last state.
@@ -201,8 +233,14 @@ impl<'a> StepRenderer<'a> {
     fn render(&mut self, step: usize) -> Result<Option<StepImages>, DatasetError> {
         let Some(frame) = self.recording.frames.get(step) else { return Ok(None) };
         let sensors = &mut self.recording.sensors;
-        let third_person = sensors.render_rgb(frame, &self.cameras[0])?.into_rgb_image();
-        let wrist = sensors.render_rgb(frame, &self.cameras[1])?.into_rgb_image();
+        let mut rendered = match self.has_depth {
+            true => [sensors.render(frame, &self.cameras[0])?, sensors.render(frame, &self.cameras[1])?],
+            false => {
+                [sensors.render_rgb(frame, &self.cameras[0])?, sensors.render_rgb(frame, &self.cameras[1])?]
+            }
+        };
+        let depths = rendered.each_mut().map(|image| std::mem::take(&mut image.depth));
+        let [third_person, wrist] = rendered.map(RenderedImage::into_rgb_image);
         let tactile = sensors.tactile_readings(frame)?;
         let [left, right] = [0, 1].map(|side: usize| tactile[side].image.clone());
         let [left_markers, right_markers] =
@@ -210,6 +248,7 @@ impl<'a> StepRenderer<'a> {
         Ok(Some(StepImages {
             video_frames: [third_person.clone(), wrist.clone(), left_markers, right_markers],
             images: [third_person, wrist, left, right],
+            depths,
             markers: [0, 1].map(|side: usize| tactile[side].markers),
         }))
     }

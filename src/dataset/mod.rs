@@ -24,4 +24,4 @@ mod stream;
 pub use demonstration::Demonstration;
 pub use error::DatasetError;
 pub use hdf5::{FloatArray, ImageStack, TaskFile, merge_parts};
-pub use stream::{DataStream, StreamValues};
+pub use stream::{DataStream, OptionalStream, StreamValues};

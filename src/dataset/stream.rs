@@ -1,7 +1,30 @@
 //! [`DataStream`]: one quantity of a demonstration over time.
 
+use serde::{Deserialize, Serialize};
 use softvt_geometry::Pose;
 use softvt_robot::rotation;
+
+/// Streams that a recording has only if they are asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum OptionalStream {
+    /// Depth of the images of both cameras, m.
+    #[value(help = None::<&str>)]
+    Depth,
+    /// Torques of the arm's drives, N m.
+    #[value(help = None::<&str>)]
+    JointTorques,
+}
+
+impl OptionalStream {
+    /// Name in flags and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Depth => "depth",
+            Self::JointTorques => "joint-torques",
+        }
+    }
+}
 
 /// Values of a [`DataStream`], step by step.
 #[derive(Clone, Debug, PartialEq)]

@@ -48,7 +48,8 @@ use softvt_records::record::{
 use softvt_robot::{
     Side,
     ik::{ArmAngles, LINEARISATION_RANGE, PoseDifference},
-    panda, rotation,
+    panda::{self, ARM_DOFS},
+    rotation,
 };
 use softvt_scene::{Asset, Body, Camera, Scene};
 use softvt_sensing::{camera::RenderScene, tactile::TactileReading};
@@ -299,12 +300,19 @@ pub struct Episode {
     disturbance: Disturbance,
     sensors: Sensors,
     history: ObservationHistory,
-    recorded: Option<Vec<WorldSnapshot>>,
+    recorded: Option<Vec<RecordedState>>,
     /// Streams that will be requested.
     streams: SensorStreams,
     far_commands: u32,
     first_far_command: Option<UnreachableCommand>,
     clamped_grips: u32,
+}
+
+/// A state that is kept for the recording.
+#[derive(Clone)]
+struct RecordedState {
+    frame: WorldSnapshot,
+    joint_torques: [f64; ARM_DOFS],
 }
 
 /// Number of Newton steps so far.
@@ -590,10 +598,11 @@ impl Episode {
             return;
         }
         let frame = Sensors::frame(&self.sim);
-        if let Some(recorded) = &mut self.recorded {
-            recorded.push(frame.clone());
-        }
         let robot = self.sim.robot.state(&self.sim.world, self.sensors.seed());
+        if let Some(recorded) = &mut self.recorded {
+            let joint_torques = robot.joint_torques;
+            recorded.push(RecordedState { frame: frame.clone(), joint_torques });
+        }
         self.history.push(frame, robot, self.streams.past_steps);
     }
 
@@ -704,11 +713,13 @@ impl Episode {
         let record = self.record(gave_up);
         let reference = self.evidence.reference(self.target).cloned();
         let scores = self.judge.scores().to_vec();
-        let recording = self.recorded.map(|frames| {
+        let recording = self.recorded.map(|states| {
+            let joint_torques = states.iter().map(|state| state.joint_torques).collect();
+            let frames = states.into_iter().map(|state| state.frame).collect();
             let settled = reference.as_ref().map(|_| 0.0);
             let worst = scores.iter().map(|score| score.worst.deformation.map(|d| d.rms_pct));
             let worst_d_pct = std::iter::once(settled).chain(worst).collect();
-            StateRecording { sensors: self.sensors, frames, target: self.target, worst_d_pct }
+            StateRecording { sensors: self.sensors, frames, joint_torques, target: self.target, worst_d_pct }
         });
         let (actions, mut joint_commands) = (self.actions, self.joint_commands);
         let last = joint_commands.last().copied().unwrap_or_else(|| self.sim.robot.q(&self.sim.world));

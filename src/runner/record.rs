@@ -61,6 +61,7 @@ pub fn record(
         "privileged": options.has_privileged,
         "suites": names,
     });
+    options.describe(&mut request);
     if let Some(code) = options.gripper {
         request["gripper"] = json!(code);
     }

@@ -5,7 +5,7 @@
 //! of a task is merged from them, so an interrupted recording can be continued.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     fs,
     io::ErrorKind,
     path::{Path, PathBuf},
@@ -33,7 +33,7 @@ use softvt_common::{
     text::counted,
 };
 use softvt_dataset::{
-    Demonstration,
+    Demonstration, OptionalStream,
     card::{DatasetCard, TaskCount, rejection_counts},
     check,
     demonstration_writer::DemonstrationWriter,
@@ -61,6 +61,8 @@ pub struct RecordingOptions {
     pub has_images: bool,
     /// True to add the true state: node positions, deformation, contacts, forces.
     pub has_privileged: bool,
+    /// Further streams of the HDF5 files.
+    pub streams: BTreeSet<OptionalStream>,
     /// True to continue an interrupted recording.
     pub resume: bool,
     /// Grip code of exports that name none.
@@ -84,6 +86,15 @@ pub struct SuiteRecording<'a> {
     manifest: Value,
     /// Environment arguments of the HDF5 files, in robomimic's form.
     environment: Value,
+}
+
+impl RecordingOptions {
+    /// Adds to a request what it contains beside what every request has.
+    pub(crate) fn describe(&self, request: &mut Value) {
+        if !self.streams.is_empty() {
+            request["streams"] = json!(self.streams);
+        }
+    }
 }
 
 impl<'a> SuiteRecording<'a> {
@@ -215,6 +226,7 @@ impl<'a> SuiteRecording<'a> {
             videos: VIDEO_STREAMS.map(|video| paths.part(attempt, &format!("{video}.mp4"))),
             preview: paths.part(attempt, "preview.mp4"),
             store_images: self.options.has_images,
+            streams: &self.options.streams,
             environment: &self.environment,
         };
         writer.write(&mut states, demonstration, cancel::requested)?;
@@ -553,6 +565,7 @@ fn write_summary(
         fps: CONTROL_HZ,
         has_images: options.has_images,
         has_privileged: options.has_privileged,
+        streams: options.streams.clone(),
         gripper: options.gripper,
         imported: suites.first().map(|suite| suite.run.imported.clone()).unwrap_or_default(),
         tasks,
@@ -563,8 +576,6 @@ fn write_summary(
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeSet;
-
     use super::*;
 
     /// Runs attempts that are kept if `good` is true of their number. Returns their numbers and how many were kept. If

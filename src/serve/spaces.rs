@@ -50,8 +50,8 @@ pub(super) fn observation(config: &ServerConfig, first: &Observation) -> Value {
     map(entries)
 }
 
-/// Space of the actions, with the names of its numbers. Joint positions have the limits of the joints, grip forces go up
-/// to the effort of the gripper.
+/// Space of the actions, with the names of its numbers. Joint positions have the limits of the joints, grip forces go
+/// up to the effort of the gripper.
 pub(super) fn action(encoding: &ActionEncoding, effort_n: f64) -> Value {
     let symmetric = |most: f64| JointRange { lower: -most, upper: most };
     let ranges: Vec<JointRange> = match encoding.pose {

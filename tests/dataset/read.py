@@ -11,6 +11,7 @@ import numpy as np
 SHAPES = {
     "actions": (7,),
     "actions_binary": (7,),
+    "actions_joints": (7,),
     "rewards": (),
     "dones": (),
     "timestamps": (),

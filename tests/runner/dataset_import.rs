@@ -1,6 +1,9 @@
 //! Imports: re-execution of foreign demonstrations, and refused files.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use rust_hdf5::H5File;
 use softvt::{
@@ -37,6 +40,7 @@ fn import(
         out: project.path(out),
         has_images: false,
         has_privileged: true,
+        streams: BTreeSet::new(),
         resume: false,
         gripper: None,
     };

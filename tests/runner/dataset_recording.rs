@@ -1,10 +1,10 @@
 //! Recordings: kept demonstrations, refused folders, and independence of threads and interruptions.
 
-use std::{fs, path::Path, sync::Arc};
+use std::{collections::BTreeSet, fs, path::Path, sync::Arc};
 
 use softvt::{
     benchmark::Teacher,
-    dataset::{card::DatasetCard, check, manifest, stats},
+    dataset::{OptionalStream, StreamValues, TaskFile, card::DatasetCard, check, manifest, stats},
     episode_id::EpisodeSplit,
     policy::profile::GripCode,
     runner::{
@@ -36,6 +36,7 @@ impl<'a> Recording<'a> {
             out: run.project.path(out),
             has_images: true,
             has_privileged: true,
+            streams: BTreeSet::new(),
             resume: false,
             gripper: None,
         };
@@ -117,6 +118,38 @@ fn the_first_good_attempts_are_kept() {
     record("b", 3).with(|options| options.resume = true).record();
     assert!(files(&project.path("a")) == files(&project.path("b")), "not the same bytes");
     assert!(record("b", 3).try_record().expect("a recording").is_none(), "already complete");
+}
+
+#[test]
+fn depth_is_recorded_as_policies_observe_it() {
+    let project = project();
+    let run = project.run("x.lua").set("cameras.width", 40).set("cameras.height", 30);
+    let recording = Recording::new(run, 1, "a");
+    let recording = recording.with(|options| {
+        options.streams = [OptionalStream::Depth, OptionalStream::JointTorques].into();
+    });
+    recording.record();
+    let a = project.path("a");
+    assert_eq!(DatasetCard::read(&a).expect("a card").streams, recording.options.streams);
+    assert!(project.text("a/README.md").contains("| further streams | depth, joint-torques |"));
+    let checked = check::folder(&a).expect("a dataset");
+    assert_eq!(checked.problems, [""; 0]);
+    let file = TaskFile::open(&project.path("a/hdf5/one_task0_demo.hdf5")).expect("a file");
+    let steps = file.steps(0).expect("steps");
+    for name in ["obs/agentview_depth", "obs/eye_in_hand_depth"] {
+        let stream = file.stream(0, name).expect("a stream");
+        assert_eq!(stream.row_shape, [30, 40]);
+        let StreamValues::F32(metres) = stream.values else { panic!("{name}") };
+        assert_eq!(metres.len(), steps * 30 * 40);
+        let nearest = metres.iter().copied().fold(f32::INFINITY, f32::min);
+        assert!((0.02..2.0).contains(&nearest), "{name}: {nearest} m");
+    }
+    assert_eq!(file.stream(0, "obs/joint_torques").expect("a stream").row_shape, [7]);
+    let read = file.read(0).expect("a demonstration");
+    assert!(read.observed.iter().all(|stream| !stream.name.ends_with("_depth")), "images are not read");
+    // With other streams it is another recording.
+    let other = recording.with(|options| options.streams.clear());
+    assert!(other.refusal().contains("another recording"), "{}", other.refusal());
 }
 
 #[test]

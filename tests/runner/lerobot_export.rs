@@ -13,7 +13,7 @@ use parquet::{
 use rmpv::Value;
 use softvt::{
     dataset::{
-        TaskFile,
+        OptionalStream, TaskFile,
         card::DatasetCard,
         lerobot::{self, ArmControl, ExportConfig, ExportSummary, LeRobotVersion},
         manifest,
@@ -175,6 +175,46 @@ fn key_of_lerobot(name: &str) -> &str {
         "actions" => "action",
         other => other,
     }
+}
+
+#[test]
+fn joint_positions_and_torques_are_exported() {
+    let project = project();
+    let recording = Recording::new(project.run("x.lua").tasks(&[0]), 1, "data");
+    recording.with(|options| options.streams = [OptionalStream::JointTorques].into()).record();
+    let joints =
+        |version, out: &str| ExportConfig { control: ArmControl::Joints, ..config(&project, version, out) };
+    export(&joints(LeRobotVersion::V21, "a"));
+    export(&joints(LeRobotVersion::V30, "b"));
+    let file = TaskFile::open(&project.path("data/hdf5/one_task0_demo.hdf5")).expect("a file");
+    let stream = |name: &str| file.array(0, name).expect("a stream").values;
+    let (positions, torques) = (stream("obs/arm_joint_pos"), stream("obs/joint_torques"));
+    let (widths, commands) = (stream("obs/gripper_width_sensed"), file.joint_commands(0).expect("joints"));
+    let actions = file.actions(0).expect("actions");
+    let single = |numbers: &[f64]| numbers.iter().map(|x| *x as f32).collect::<Vec<f32>>();
+    let apart = rows(&project.path("a/data/chunk-000/episode_000000.parquet"));
+    let together = rows(&project.path("b/data/chunk-000/file-000.parquet"));
+    assert_eq!((apart.len(), together.len()), (actions.len(), actions.len()));
+    for (step, (row, other)) in apart.iter().zip(&together).enumerate() {
+        let seven = 7 * step..7 * step + 7;
+        let state = [&positions[seven.clone()], &[0.5 * widths[step]]].concat();
+        assert_eq!(numbers(field(row, "state")), single(&state), "step {step}");
+        let action = [&commands[step][..], &[actions[step].closure()]].concat();
+        assert_eq!(numbers(field(row, "actions")), single(&action), "step {step}");
+        assert_eq!(numbers(field(row, "joint_torques")), single(&torques[seven]), "step {step}");
+        for (name, key) in [
+            ("state", "observation.state"),
+            ("actions", "action"),
+            ("joint_torques", "observation.joint_torques"),
+        ] {
+            assert_eq!(field(row, name), field(other, key), "{name} at step {step}");
+        }
+    }
+    assert!(torques.iter().any(|torque| torque.abs() > 0.05), "the hand pushes");
+    let features = &project.json("b/meta/info.json")["features"];
+    assert_eq!(features["action"]["shape"][0], 8);
+    assert_eq!(features["action"]["names"][6], "joint_7");
+    assert_eq!(project.json("a/meta/softvt.json")["control"], "joints");
 }
 
 #[test]

@@ -67,7 +67,8 @@ class Dataset:
         """Opens a recording.
 
         path: folder that `softvt record` wrote, or one of its HDF5 files.
-        keys: streams of `obs`, such as "state" or "gsmini_left_tactile_rgb", and others by their path, such as "privileged/d".
+        keys: streams of `obs`, such as "state", "gsmini_left_tactile_rgb", or "agentview_depth" if it was recorded, and others by their path, such
+            as "privileged/d".
         horizon: number of actions of an item.
         control: motion of the actions, "pose" or "joints".
         gripper: grip code of the actions.

@@ -39,7 +39,7 @@ class Datasets(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = FOLDER / "demonstrations"
         command = ["record", "suites/object_rigid.lua", "--task", "0,1", "--demos", "1", "--out", str(cls.folder)]
-        small = ["--set", "cameras.width=32", "--set", "cameras.height=24"]
+        small = ["--set", "cameras.width=32", "--set", "cameras.height=24", "--streams", "depth,joint-torques"]
         subprocess.run([softvt.find_binary(), *command, *small], check=True, capture_output=True)
 
     def test_items_are_the_steps_of_all_demonstrations(self):
@@ -72,6 +72,13 @@ class Datasets(unittest.TestCase):
         # The joints follow their commands.
         self.assertLess(np.abs(whole["arm_joint_pos"][1:] - whole["actions"][:-1, :7]).max(), 0.1)
 
+    def test_depth_and_torques_are_streams_of_their_own(self):
+        data = softvt.Dataset(self.folder, keys=("agentview_depth", "joint_torques"), task=0)
+        item = data[3]
+        self.assertEqual((item["agentview_depth"].shape, item["agentview_depth"].dtype), ((24, 32), np.float32))
+        self.assertTrue((item["agentview_depth"] > 0.1).all())
+        self.assertEqual(item["joint_torques"].shape, (7,))
+
     def test_grip_codes_and_other_streams(self):
         data = softvt.Dataset(next((self.folder / "hdf5").iterdir()), keys=("gripper_width", "privileged/pad_force"), gripper="binary")
         self.assertEqual(set(np.unique([item["actions"][0, 6] for item in data])), {0.0, 1.0})
@@ -86,7 +93,7 @@ class Datasets(unittest.TestCase):
     def test_what_is_missing_is_named(self):
         for arguments, words in [
             ({"path": FOLDER / "nothing"}, "no recording"),
-            ({"path": self.folder, "keys": ("agentview",)}, "no stream obs/agentview; obs has agentview_pose, agentview_rgb"),
+            ({"path": self.folder, "keys": ("agentview",)}, "no stream obs/agentview; obs has agentview_depth, agentview_pose"),
             ({"path": self.folder, "task": 7}, "no demonstration of task 7"),
             ({"path": self.folder, "control": "delta"}, "expected 'pose' or 'joints'"),
             ({"path": self.folder, "gripper": "soft"}, "expected one of continuous"),

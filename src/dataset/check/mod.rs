@@ -11,7 +11,7 @@ use super::{
     DatasetError, StreamValues, TaskFile,
     card::DatasetCard,
     demonstration::{JOINT_ACTIONS, actions_stream_name},
-    layout::{IMAGE_STREAMS, MANIFEST},
+    layout::{DEPTH_STREAMS, IMAGE_STREAMS, MANIFEST},
     manifest::{self, ManifestEntry},
 };
 use softvt_benchmark::{CONTROL_DT, CONTROL_HZ};
@@ -222,13 +222,21 @@ impl DemoCheck<'_> {
         if count != steps * width {
             self.add(name, format!("{} steps, the actions have {steps}", count / width.max(1)));
         }
+        let is_depth = DEPTH_STREAMS.iter().any(|depth| name == format!("obs/{depth}"));
         let not_finite = match &stream.values {
             StreamValues::F64(values) => values.iter().position(|x| !x.is_finite()),
+            // Depth is infinite in the background.
+            StreamValues::F32(values) if is_depth => values.iter().position(|x| x.is_nan() || *x <= 0.0),
             StreamValues::F32(values) => values.iter().position(|x| !x.is_finite()),
             StreamValues::U8(_) => None,
         };
         if let Some(at) = not_finite {
-            self.add(name, format!("step {}: a number that is not finite", at / width.max(1)));
+            let what = if is_depth { "a depth that is not above 0" } else { "a number that is not finite" };
+            self.add(name, format!("step {}: {what}", at / width.max(1)));
+        }
+        if is_depth && (stream.row_shape.len() != 2 || !matches!(stream.values, StreamValues::F32(_))) {
+            let got = &stream.row_shape;
+            self.add(name, format!("expected float32 of shape (steps, height, width), got {got:?} per step"));
         }
         let is_image = IMAGE_STREAMS.iter().any(|image| name == format!("obs/{image}"));
         if is_image && !matches!(stream.row_shape[..], [_, _, 3]) {

@@ -14,6 +14,7 @@ use super::{
     super::{
         DataStream, DatasetError, Demonstration, StreamValues,
         demonstration::{COMMANDS_JOINTS, JOINT_ACTIONS, actions_stream_name},
+        layout,
     },
     limits::{self, ListError},
 };
@@ -344,8 +345,8 @@ impl TaskFile {
         Ok(ImageStack { bytes: bytes.map_err(self.failed(demo, name))?, height, width })
     }
 
-    /// Reads the actions of a demonstration: absolute tool poses in the base frame, or joint positions where the recorded
-    /// policy commanded these, and continuous gripper closure.
+    /// Reads the actions of a demonstration: absolute tool poses in the base frame, or joint positions where the
+    /// recorded policy commanded these, and continuous gripper closure.
     ///
     /// # Errors
     /// The demonstration is missing, or its actions are not finite numbers of shape (steps, 7 or more).
@@ -409,7 +410,7 @@ impl TaskFile {
         for name in self.names(demo)? {
             if name.starts_with("privileged/") {
                 read.privileged.push(self.stream(demo, &name)?);
-            } else if name.starts_with("obs/") && !name.ends_with("_rgb") {
+            } else if name.starts_with("obs/") && !layout::is_image_stream(&name) {
                 read.observed.push(self.stream(demo, &name)?);
             }
         }

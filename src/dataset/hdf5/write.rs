@@ -186,6 +186,28 @@ impl<'a> Hdf5Writer<'a> {
         Ok(data)
     }
 
+    /// Creates the dataset of a stream of depth images, float32.
+    pub(crate) fn create_depth_dataset(
+        &mut self,
+        demo: usize,
+        name: &str,
+        length: ChunkedSteps,
+        width: u32,
+        height: u32,
+    ) -> Result<H5Dataset, DatasetError> {
+        let key = format!("data/demo_{demo}/obs/{name}");
+        let row_shape = [height as usize, width as usize];
+        let data = self.create_dataset::<f32>(&key, length, &row_shape, size_of::<f32>())?;
+        let attributes = [
+            ("unit", "m"),
+            ("axes", "step, row from the top, column"),
+            ("meaning", "depth along the optical axis; infinite in the background"),
+        ];
+        let attributes = attributes.map(|(name, text)| (name.to_owned(), text.to_owned()));
+        self.write_text_attributes(&key, &data, &attributes)?;
+        Ok(data)
+    }
+
     /// Closes the file. If `written` is an error, the file is closed without syncing and the error returned.
     fn close(self, written: Result<(), DatasetError>) -> Result<(), DatasetError> {
         if written.is_err() {

@@ -106,6 +106,7 @@ impl LeRobotVersion {
             (Self::V30, "tactile_image") => "observation.images.tactile_image",
             (Self::V30, "state") => "observation.state",
             (Self::V30, "tactile_marker_motion") => "observation.tactile_marker_motion",
+            (Self::V30, "joint_torques") => "observation.joint_torques",
             (Self::V30, "actions") => "action",
             // Those that LeRobot adds to every dataset.
             (Self::V30, _) => name,

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     DatasetError, ImageStack, TaskFile,
-    demonstration::{JOINT_ACTIONS, actions_stream_name},
+    demonstration::{JOINT_ACTIONS, JOINT_TORQUES, actions_stream_name},
     layout::IMAGE_STREAMS,
 };
 use softvt_benchmark::CONTROL_HZ;
@@ -65,6 +65,8 @@ impl<'a> EpisodeData<'a> {
         let reader = DemoStreams { file: &TaskFile::open(&demo.path)?, demo: demo.entry.demo_id, steps };
         let length = config.control.vector_length();
         let [state, actions] = reader.vectors(config.control, selection.gripper)?;
+        let torques = selection.has_joint_torques.then(|| reader.floats(JOINT_TORQUES, &[ARM_DOFS]));
+        let torques = torques.transpose()?;
         let markers = marker_rows(&reader.floats("obs/gripper_marker_motion", &[2, 2, MARKER_COUNT, 2])?);
         let images = reader.image_columns(config.version, selection.image_sizes, is_cancelled)?;
         let timestamps: Vec<f32> =
@@ -80,16 +82,16 @@ impl<'a> EpisodeData<'a> {
             let parts = counts.into_iter().map(ValueStatistics::counted).collect();
             episode.push(key(name), &[3, 1, 1], parts, ColumnValues::Images(images));
         }
-        for (name, rows) in [("state", state), ("actions", actions)] {
-            let column = |i: usize| rows.iter().skip(i).step_by(length).map(|x| f64::from(*x));
-            let parts = (0..length).map(|i| ValueStatistics::of(column(i).collect())).collect();
-            episode.push(key(name), &[length], parts, ColumnValues::F32(rows));
-        }
+        episode.push_vectors(key("state"), length, state);
+        episode.push_vectors(key("actions"), length, actions);
         let (shape, parts) = match config.version {
             LeRobotVersion::V21 => (&MARKER_SHAPE[..], statistics_per_marker(&markers)),
             LeRobotVersion::V30 => (&[2][..], statistics_of_all_markers(&markers)),
         };
         episode.push(key("tactile_marker_motion"), shape, parts, ColumnValues::F32(markers));
+        if let Some(torques) = torques {
+            episode.push_vectors(key("joint_torques"), ARM_DOFS, torques);
+        }
         let part = |numbers: Vec<f64>| vec![ValueStatistics::of(numbers)];
         let seconds = timestamps.iter().map(|time| f64::from(*time)).collect();
         episode.push("timestamp", &[1], part(seconds), ColumnValues::F32(timestamps));
@@ -98,6 +100,13 @@ impl<'a> EpisodeData<'a> {
             episode.push(name, &[1], parts, ColumnValues::I64(numbers));
         }
         Ok(episode)
+    }
+
+    /// Adds a column of vectors, row by row.
+    fn push_vectors(&mut self, name: &'static str, length: usize, rows: Vec<f32>) {
+        let column = |i: usize| rows.iter().skip(i).step_by(length).map(|x| f64::from(*x));
+        let parts = (0..length).map(|i| ValueStatistics::of(column(i).collect())).collect();
+        self.push(name, &[length], parts, ColumnValues::F32(rows));
     }
 
     fn push(

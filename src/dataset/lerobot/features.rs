@@ -6,8 +6,9 @@ use serde_json::{Map, Value, json};
 use super::{
     config::ExportConfig,
     parquet_table::{ColumnType, ParquetColumn, TableSchema},
-    selection::ImageSize,
+    selection::{ImageSize, Selection},
 };
+use softvt_policy::profile::JOINT_NAMES;
 use softvt_sensing::tactile::MARKER_COUNT;
 
 /// Names of the image features of a row, in order.
@@ -30,9 +31,10 @@ pub(super) struct Feature {
     names: Value,
 }
 
-/// All features in order; those that LeRobot adds to every dataset come last. `sizes` are those of the cameras.
-pub(super) fn all(config: &ExportConfig, [third_person, wrist]: [ImageSize; 2]) -> Vec<Feature> {
+/// All features in order; those that LeRobot adds to every dataset come last.
+pub(super) fn all(config: &ExportConfig, selection: &Selection) -> Vec<Feature> {
     let ExportConfig { version, control, .. } = config;
+    let [third_person, wrist] = selection.image_sizes;
     let vector = [control.vector_length()];
     let feature = |name, dtype, shape: &[usize], names| Feature {
         name: version.key(name),
@@ -50,10 +52,13 @@ pub(super) fn all(config: &ExportConfig, [third_person, wrist]: [ImageSize; 2]) 
         feature("state", "float32", &vector, with("finger")),
         feature("actions", "float32", &vector, with("closure")),
         feature("tactile_marker_motion", "float32", &MARKER_SHAPE, json!(["time", "marker", "xy"])),
-        feature("timestamp", "float32", &[1], Value::Null),
     ];
+    let torques = selection
+        .has_joint_torques
+        .then(|| feature("joint_torques", "float32", &[JOINT_NAMES.len()], json!(JOINT_NAMES)));
+    let timestamp = feature("timestamp", "float32", &[1], Value::Null);
     let numbered = INDEX_FEATURES.map(|name| feature(name, "int64", &[1], Value::Null));
-    images.chain(own).chain(numbered).collect()
+    images.chain(own).chain(torques).chain([timestamp]).chain(numbered).collect()
 }
 
 impl Feature {

@@ -145,6 +145,12 @@ fn readme(config: &ExportConfig, selection: &Selection, summary: ExportSummary) 
         }
     };
     let key = |name| config.version.key(name);
+    let torques = match selection.has_joint_torques {
+        true => {
+            format!("| `{}` | torques of the arm's drives (N m), without gravity |\n", key("joint_torques"))
+        }
+        false => String::new(),
+    };
     let [image, wrist, tactile] = features::IMAGE_FEATURES.map(key);
     let (markers, state, actions) = (key("tactile_marker_motion"), key("state"), key("actions"));
     let prompts: String = selection.prompts.iter().map(|prompt| format!("- {prompt}\n")).collect();
@@ -160,7 +166,7 @@ fn readme(config: &ExportConfig, selection: &Selection, summary: ExportSummary) 
          | `{tactile}` | 4 × 4 cells: the last 8 images of the left finger above, of the right finger below |\n\
          | `{markers}` | (3, 198, 2) px: initial marker positions, those of the previous step and of this one; left finger first |\n\
          | `{state}` | {arm}; position of one finger, 0 closed to 0.04 m |\n\
-         | `{actions}` | {motion}; {gripper} |\n\n\
+         | `{actions}` | {motion}; {gripper} |\n{torques}\n\
          `meta/softvt.json` states the control ({}) and the grip code ({}), and `meta/softvt.jsonl` the demonstration of each episode.\n\n\
          {prompts}",
         config.version.code(),

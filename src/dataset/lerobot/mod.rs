@@ -1,9 +1,9 @@
 //! Export of recorded demonstrations as LeRobot datasets, in the versions used for training: v2.1 and v3.0.
 //!
 //! A row holds what a policy of the profile `visuo_tactile` (or `visuo_tactile_joints`) observes at that step, and the
-//! action commanded then. Of the eight past marker states only the last two are stored, as in SoftVTBench. `docs/data.md`
-//! describes the files. Demonstrations are read and their images encoded on several threads, and written in
-//! order; each thread holds one demonstration.
+//! action commanded then. Of the eight past marker states only the last two are stored, as in SoftVTBench.
+//! `docs/data.md` describes the files. Demonstrations are read and their images encoded on several threads, and written
+//! in order; each thread holds one demonstration.
 
 mod config;
 mod episode;
@@ -44,7 +44,7 @@ pub fn export(
 ) -> Result<ExportSummary, DatasetError> {
     staged_dir::check_empty(&config.out)?;
     let selection = selection::select(config)?;
-    let features = features::all(config, selection.image_sizes);
+    let features = features::all(config, &selection);
     let staged = StagedDir::create(&config.out)?;
     match write(config, &selection, &features, &staged, is_cancelled, on_episode) {
         Ok(summary) => staged.commit().map(|()| summary),

@@ -7,7 +7,7 @@ use std::{
 
 use super::ExportConfig;
 use crate::{
-    DatasetError, TaskFile,
+    DatasetError, OptionalStream, TaskFile,
     card::DatasetCard,
     layout::{DATASET, IMAGE_STREAMS, MANIFEST},
     manifest::{self, ManifestEntry},
@@ -42,8 +42,10 @@ pub(super) struct Selection {
     pub prompts: Vec<String>,
     /// Image sizes of both cameras in the first demonstration.
     pub image_sizes: [ImageSize; 2],
-    /// Code of the seventh number of an action.
+    /// Code of the last number of an action.
     pub gripper: GripCode,
+    /// True if the recording has the torques of the arm's drives.
+    pub has_joint_torques: bool,
 }
 
 /// Selects the demonstrations of the tasks that the configuration names.
@@ -86,7 +88,8 @@ pub(super) fn select(config: &ExportConfig) -> Result<Selection, DatasetError> {
     };
     let image_sizes = image_sizes(first)?;
     let gripper = config.gripper.or(card.gripper).unwrap_or_default();
-    Ok(Selection { demos, prompts, image_sizes, gripper })
+    let has_joint_torques = card.streams.contains(&OptionalStream::JointTorques);
+    Ok(Selection { demos, prompts, image_sizes, gripper, has_joint_torques })
 }
 
 fn matching_entries(

@@ -542,6 +542,8 @@ pub struct StateRecording {
     pub sensors: Sensors,
     /// The settled state and the state after each control step.
     pub frames: Vec<WorldSnapshot>,
+    /// Torques of the arm's drives in these states, N m; see [`RobotState::joint_torques`](softvt_policy::RobotState).
+    pub joint_torques: Vec<[f64; ARM_DOFS]>,
     /// The target, as an object of `sensors`.
     pub target: usize,
     /// The target's largest D over the physics steps of each control step, % of the settled diagonal, after 0 for the

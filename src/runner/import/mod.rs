@@ -60,7 +60,7 @@ pub fn import(
     let matched = match_demos(config, suites, &files, options.attempts.unwrap_or(u32::MAX))?;
     let names: BTreeSet<String> =
         matched.iter().map(|demo| config.suite_name(&suites[demo.task.suite])).collect();
-    let request = json!({
+    let mut request = json!({
         "softvt": env!("CARGO_PKG_VERSION"),
         "imported": sources,
         "attempts": options.attempts,
@@ -70,6 +70,7 @@ pub fn import(
         "privileged": recording.has_privileged,
         "suites": names,
     });
+    recording.describe(&mut request);
     record_all(recording, &request, || {
         for ImportedFile { file, format, demos, commands, .. } in &sources {
             config.notice(format!("{file}: {format}, {}: {commands}", counted(*demos, "demonstration")));
