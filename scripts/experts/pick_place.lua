@@ -8,6 +8,9 @@
 -- that is turned or off-centre for want of clearance. `closure` commands one closure instead. `to` places the object
 -- beside the target, on the same support: "near", or as seen from the robot "left_of", "right_of", "in_front_of" or
 -- "behind", with `distance` (m) between the centres.
+--
+-- `stack = true` places for stacking: the object is centred again above the target, lowered slowly until it presses
+-- lightly, and released once it rests; the hand leaves it slowly once it rests again.
 local grasp = require "experts.grasp"
 local places = require "experts.places"
 local route = require "experts.route"
@@ -24,6 +27,7 @@ local FIELDS = {
   closing_speed = "number?",
   to = "string?",
   distance = "number?",
+  stack = "boolean?",
 }
 -- Default part of the safe window and its middle (0 is the loose end, 1 the tight one), and speed of closing in
 -- contact, m/s.
@@ -38,6 +42,12 @@ local MIN_LIFT_FRACTION = 0.5
 local ATTEMPTS, MAX_DISPLACEMENT = 3, 0.08
 -- Random variation of the speed (relative), so that demonstrations differ.
 local SPEED_SPREAD = 0.12
+
+-- Placing for stacking: speed of lowering, m/s; how far the object yields in the hand when it presses lightly, and the
+-- largest way down to there, m; rate of opening, 1/s; speed of leaving, m/s, and its way, m.
+local PRESS = { speed = 0.01, yield = 3e-4, travel = 0.01, rate = 0.2, leave_speed = 0.05, leave = 0.02 }
+-- An object rests below this speed, m/s, for this time, s. The longest wait, s.
+local REST = { speed = 0.002, seconds = 0.2, limit = 2 }
 
 local function spread(most) return (2 * math.random() - 1) * most end
 
@@ -134,6 +144,44 @@ local function release_pose(arm, scene, spec, held)
   return best.pose
 end
 
+-- Waits until an object rests.
+local function wait_for_rest(arm, scene, name)
+  local still, last = 0, scene:object(name).centre
+  for _ = 1, math.ceil(REST.limit / arm.dt) do
+    arm:wait(arm.dt)
+    local now = scene:object(name).centre
+    local moved = math.sqrt((now[1] - last[1]) ^ 2 + (now[2] - last[2]) ^ 2 + (now[3] - last[3]) ^ 2)
+    still = moved < REST.speed * arm.dt and still + arm.dt or 0
+    if still >= REST.seconds then return end
+    last = now
+  end
+end
+
+-- Lowers the object slowly until it yields in the hand, which shows a light press.
+local function press(arm, scene, name)
+  local function yields() return scene:object(name).centre[3] - arm.pose.z end
+  local free = yields()
+  for _ = 1, math.ceil(PRESS.travel / (PRESS.speed * arm.dt)) do
+    if yields() - free > PRESS.yield then return end
+    arm:command(arm.target:translated { 0, 0, -PRESS.speed * arm.dt }, arm.closure)
+  end
+end
+
+-- Releases the object of a grasp { height, width } on the target, above which the hand holds it.
+local function stack(arm, scene, spec, held, over, pace)
+  local object = scene:object(spec.object)
+  -- What was held may have moved in the hand on the way.
+  local pose = release_pose(arm, scene, spec, held)
+  arm:move_to(pose:at { pose.x, pose.y, over }, { speed = 0.1 * pace })
+  wait_for_rest(arm, scene, spec.object)
+  arm:move_to(pose:at { pose.x, pose.y, pose.z + 0.003 }, { speed = 0.15 * pace })
+  press(arm, scene, spec.object)
+  wait_for_rest(arm, scene, spec.object)
+  arm:release { closure = grasp.clear_closure(object, nil, held.width), rate = PRESS.rate }
+  wait_for_rest(arm, scene, spec.object)
+  arm:move_by({ 0, 0, PRESS.leave }, { speed = PRESS.leave_speed })
+end
+
 -- Carries the object of a grasp { height, width } to the target and releases it there.
 local function place(arm, scene, spec, held, pace)
   local object = scene:object(spec.object)
@@ -146,11 +194,15 @@ local function place(arm, scene, spec, held, pace)
   )
   arm:move_to(arm.target:at { arm.target.x, arm.target.y, math.max(over, arm.target.z) }, { speed = 0.25 * pace })
   arm:move_to(target_pose:at { target_pose.x, target_pose.y, over }, { speed = 0.4 * pace })
-  arm:move_to(target_pose, { speed = 0.2 * pace })
-  arm:wait(0.2)
-  -- Opens only as far as needed, since a rim or a wall may be close.
-  arm:release { closure = grasp.clear_closure(object, nil, held.width), rate = 0.4 }
-  arm:wait(0.1)
+  if spec.stack then
+    stack(arm, scene, spec, held, over, pace)
+  else
+    arm:move_to(target_pose, { speed = 0.2 * pace })
+    arm:wait(0.2)
+    -- Opens only as far as needed, since a rim or a wall may be close.
+    arm:release { closure = grasp.clear_closure(object, nil, held.width), rate = 0.4 }
+    arm:wait(0.1)
+  end
   arm:move_by({ 0, 0, math.max(0.08, over - target_pose.z) }, { speed = 0.25 * pace })
 end
 

@@ -32,6 +32,7 @@ mod script_timeouts;
 mod serve;
 mod served_runs;
 mod shut_hand;
+mod stacking;
 mod support;
 mod tactile_forces;
 mod turned_grasp;
