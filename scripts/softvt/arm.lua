@@ -1,6 +1,6 @@
 -- The arm as experts control it. Each motion takes as many control steps as it needs; all are built on one primitive
 -- that sends a command and waits for the next control step. Poses are of the tool centre point, in the world frame.
-local host, check, servo, fingers, note = ...
+local host, check, servo, fingers, note, reaches = ...
 local yield, ceil, max, min = coroutine.yield, math.ceil, math.max, math.min
 
 local Arm = {}
@@ -181,6 +181,9 @@ function Arm:wait(seconds)
     self:command(self.target, self.closure)
   end
 end
+
+-- Returns true if the arm gets to a pose, or false and the distance at which it stops, m.
+function Arm:reaches(pose) return reaches(host, pose) end
 
 -- Notes a number in the record of the episode.
 function Arm:note(name, value) note(name, value) end

@@ -200,7 +200,11 @@ fn arm(lua: &Lua, host: &mlua::AnyUserData, fingers: Table, notes: &SharedNotes)
         }
         Ok(())
     })?;
-    library_chunk(lua, "arm")?.call((host, checks(lua)?, servo, fingers, note))
+    let reaches = lua.create_function(|_, (host, pose): (mlua::AnyUserData, LuaPose)| {
+        let miss = host.borrow::<MeasuredArm>()?.read(|view| view.reach.miss(&view.base_w.inv_mul(&pose.0)));
+        Ok((miss.is_none(), miss.map_or(0.0, |miss| miss.distance())))
+    })?;
+    library_chunk(lua, "arm")?.call((host, checks(lua)?, servo, fingers, note, reaches))
 }
 
 /// A file of the library's own Lua code, out of the reach of scripts.
@@ -364,6 +368,10 @@ class! {
             /// Returns the present readings of the tactile sensors; the first call waits for a control step. Available
             /// in simulation:drive and under --policy tactile-servo.
             fn tactile() -> ["softvt.Fingers"];
+            /// Returns true if the arm gets to a pose from its present joint positions, to 1 mm and 0.01 rad, by the
+            /// steps of inverse kinematics that a motion takes; else false and the distance at which it stops, m. It
+            /// knows nothing of obstacles.
+            fn reaches(pose: LuaPose) -> ["boolean", "number"];
             /// Holds the last command for a time.
             fn wait(seconds: f64 = Type::Number("s", Range::closed(0.0, 600.0))) -> [];
             /// Notes a number, such as the width of a grip, in the episode's record and in the manifest of a dataset.

@@ -18,7 +18,10 @@ use softvt_benchmark::{
 use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_common::parallel::lock;
 use softvt_geometry::{Aabb, Pose, Vec3};
-use softvt_robot::ik::{PoseDifference, PoseTolerance, UnreachablePose};
+use softvt_robot::{
+    DiffIk, IkSpec,
+    ik::{ArmAngles, PoseDifference, PoseTolerance, UnreachablePose},
+};
 use softvt_rollout::{ObjectInstance, Simulation};
 use softvt_scene::{Asset, Object};
 
@@ -76,6 +79,8 @@ pub(crate) struct ExpertView {
     pub dt_s: f64,
     /// Robot base in the world.
     pub base_w: Pose,
+    /// Kinematics of the arm from its present joint positions.
+    pub reach: ArmReach,
     /// Tool centre point in the robot base frame.
     pub tcp_b: Pose,
     /// Distance of the gels, m.
@@ -182,11 +187,47 @@ impl ExpertInput {
     }
 }
 
+/// The poses that the arm reaches from its present joint positions.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ArmReach {
+    /// Parameters of inverse kinematics.
+    pub ik: IkSpec,
+    /// Joint positions, rad.
+    pub joints: ArmAngles,
+}
+
+impl ArmReach {
+    /// Difference of poses up to which one is reached.
+    const TOLERANCE: PoseTolerance = PoseTolerance { distance: 1e-3, angle: 0.01 };
+    /// Control steps in which the arm may get there: 20 s.
+    const STEPS: usize = 400;
+
+    /// What remains to a tool pose, base frame, where the arm gets no nearer to it. `None` if it gets there.
+    pub(crate) fn miss(&self, pose_b: &Pose) -> Option<PoseDifference> {
+        let mut ik = DiffIk::new(&self.ik, self.joints, CONTROL_DT);
+        let mut joints = self.joints;
+        let mut miss = PoseDifference::between(&ik.tool_pose(&joints), pose_b);
+        for _ in 0..Self::STEPS {
+            if Self::TOLERANCE.contains(&miss) {
+                return None;
+            }
+            let next = ik.step(&joints, pose_b);
+            if next == joints {
+                break;
+            }
+            joints = next;
+            miss = PoseDifference::between(&ik.tool_pose(&joints), pose_b);
+        }
+        Some(miss)
+    }
+}
+
 pub(crate) fn expert_view(sim: &Simulation, time_s: f64) -> ExpertView {
     ExpertView {
         time_s,
         dt_s: CONTROL_DT,
         base_w: sim.robot.base_w,
+        reach: ArmReach { ik: sim.robot.spec.ik.clone(), joints: sim.robot.q(&sim.world) },
         tcp_b: sim.robot.tool_b(&sim.world),
         width_m: sim.robot.width(&sim.world),
         finger_stiffness: sim.robot.finger_stiffness(),

@@ -3,12 +3,13 @@ use std::sync::Arc;
 use super::*;
 use crate::{
     EpisodeSetup, ExpertController, ExpertGrip, SceneChanges,
-    api::expert_input::{ExpertCommand, ExpertView, ObjectView},
+    api::expert_input::{ArmReach, ExpertCommand, ExpertView, ObjectView},
     check_shift,
 };
 use softvt_benchmark::{Goal, Plan, ShiftValue};
 use softvt_common::episode_id::{EpisodeId, EpisodeSplit};
 use softvt_geometry::{Pose, Vec3, shape::Shape};
+use softvt_robot::IkSpec;
 use softvt_rollout::Controller;
 use softvt_scene::{Asset, Body};
 
@@ -51,6 +52,7 @@ fn view() -> ExpertView {
     ExpertView {
         time_s: 0.0,
         dt_s: 0.05,
+        reach: ArmReach { ik: IkSpec::default(), joints: [0.0, -0.2, 0.0, -2.4, 0.0, 2.2, 0.8] },
         base_w: Pose::translation(-0.66, 0.0, 0.012),
         tcp_b: Pose::translation(0.66, 0.0, 0.288),
         width_m: 0.08,
@@ -495,4 +497,19 @@ fn the_function_of_a_prompt_returns_a_text_and_leaves_the_scene() {
         )
     );
     assert!(error("while true do end").contains("ran for more than 0.3 s"));
+}
+
+#[test]
+fn an_expert_learns_what_the_arm_reaches() {
+    let (_project, mut expert) = expert(
+        "local down = softvt.pose { position = { -0.15, 0.1, 0.2 }, quaternion = { 0, 1, 0, 0 } }
+         local near, none = arm:reaches(down)
+         local far, miss = arm:reaches(down:at { 1.2, 0, 0.2 })
+         arm:note('near', near and none == 0 and 1 or 0) arm:note('far', far and 1 or 0) arm:note('miss_m', miss)
+         arm:wait(1)",
+    );
+    step(&mut expert).expect("a command");
+    let notes = expert.notes();
+    assert_eq!((notes["near"], notes["far"]), (1.0, 0.0));
+    assert!((0.5..1.5).contains(&notes["miss_m"]), "{notes:?}");
 }
