@@ -64,6 +64,12 @@ impl Mesh {
 
     /// Merges vertices with equal positions and removes triangles that become degenerate.
     pub fn welded(&self) -> Self {
+        self.welded_keeping().0
+    }
+
+    /// As [`welded`](Self::welded), with the indices of the triangles that were kept.
+    pub(crate) fn welded_keeping(&self) -> (Self, Vec<u32>) {
+        let mut kept = Vec::with_capacity(self.triangles.len());
         let mut index = BTreeMap::new();
         let mut out = Self::default();
         let key = |v: &Vec3| [v.x, v.y, v.z].map(|x| (x + 0.0).to_bits());
@@ -82,9 +88,10 @@ impl Mesh {
             if a != b && b != c && c != a {
                 out.triangles.push([a, b, c]);
                 out.uvs.extend(self.uvs.get(index));
+                kept.push(index as u32);
             }
         }
-        out
+        (out, kept)
     }
 
     /// Validates indices and coordinates.

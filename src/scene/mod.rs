@@ -44,6 +44,7 @@ mod camera;
 mod decal;
 mod fingerprint;
 mod light;
+mod mesh_colours;
 mod plausibility;
 mod scale;
 mod variation;
@@ -59,6 +60,7 @@ pub use asset::{Asset, Body, Joint, JointMotion, MovingPart, SoftMaterial, part_
 pub use camera::{Camera, CameraMount, CameraSettings, MAX_CAMERAS, STANDARD_CAMERAS};
 pub use decal::{GlyphCoverage, LabelLine, MAX_LETTERS, TextDecal, Typeface};
 pub use light::{KeyLight, Lighting, Sky};
+pub use mesh_colours::{ColouredMesh, MeshColours, MeshMaterial, SurfaceImage};
 pub use scale::LENGTH_HINT;
 pub use variation::{CameraVariation, HiddenProperties, LightVariation, ObjectVariation, SceneVariation};
 pub use visual::{Mask, Visual, VisualLayer};

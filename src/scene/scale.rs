@@ -37,6 +37,9 @@ impl Object {
             own.grasp_spacing = grasp_spacing * scale;
         }
         for (own, visual) in asset.visuals.iter_mut().zip(&nominal.visuals) {
+            if let (Some(own), Some(nominal)) = (&mut own.colours, &visual.colours) {
+                own.shape = Arc::new(resized(&nominal.shape, scale));
+            }
             for (layer, nominal) in own.layers.iter_mut().zip(&visual.layers) {
                 layer.mask = nominal.mask.scaled(scale);
                 layer.relief_m = nominal.relief_m * scale;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::decal::TextDecal;
+use super::{decal::TextDecal, mesh_colours::MeshColours};
 use softvt_geometry::shape::Shape;
 
 /// Visual material of a surface (metalness–roughness model). Colours are linear RGB.
@@ -20,18 +20,26 @@ pub struct Visual {
     pub metalness: f64,
     /// Layers over the base, from the bottom to the top.
     pub layers: Vec<VisualLayer>,
+    /// Colours of a mesh file, by which the base colour is multiplied.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub colours: Option<MeshColours>,
 }
 
 impl Default for Visual {
     fn default() -> Self {
-        Self { albedo: [0.7, 0.7, 0.7], roughness: 0.6, metalness: 0.0, layers: Vec::new() }
+        Self::plain([0.7, 0.7, 0.7], 0.6, 0.0)
     }
 }
 
 impl Visual {
     /// A material without layers.
     pub fn plain(albedo: [f64; 3], roughness: f64, metalness: f64) -> Self {
-        Self { albedo, roughness, metalness, layers: Vec::new() }
+        Self { albedo, roughness, metalness, layers: Vec::new(), colours: None }
+    }
+
+    /// True if it is the same at every point.
+    pub fn is_uniform(&self) -> bool {
+        self.layers.is_empty() && self.colours.is_none()
     }
 
     /// The same material with another layer on top.

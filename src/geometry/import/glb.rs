@@ -8,7 +8,7 @@ use gltf::{
     mesh::Mode,
 };
 
-use super::{MeshImportError, check_size};
+use super::{ImportedColours, ImportedImage, ImportedMaterial, MeshImportError, check_size};
 use crate::mesh::Mesh;
 
 type Transform = nalgebra::Matrix4<f64>;
@@ -32,16 +32,66 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mesh, MeshImportError> {
     if !file.buffers().all(is_inside) {
         return Err(outside);
     }
-    let mut reader = Reader { blob, mesh: Mesh::default(), nodes: 0 };
+    let mut reader = Reader { blob, mesh: Mesh::default(), has_uvs: false, nodes: 0 };
     let scene = file.default_scene().or_else(|| file.scenes().next());
     for node in scene.iter().flat_map(gltf::Scene::nodes) {
         reader.add_node(&node, &Transform::identity(), 0)?;
     }
     let mut mesh = reader.mesh;
-    if mesh.uvs.len() != mesh.triangles.len() {
+    if !reader.has_uvs {
         mesh.uvs.clear();
     }
     Ok(mesh)
+}
+
+/// The materials of a file that [`read`] accepts, and those of its triangles.
+pub(super) fn colours(bytes: &[u8]) -> Result<ImportedColours, String> {
+    let file = gltf::Gltf::from_slice(bytes).map_err(|error| error.to_string())?;
+    let blob = file.blob.as_deref().unwrap_or_default();
+    let mut materials: Vec<ImportedMaterial> =
+        file.materials().map(|material| material_of(&material, blob)).collect::<Result<_, _>>()?;
+    if materials.is_empty() {
+        return Ok(ImportedColours::default());
+    }
+    let plain = materials.len() as u16;
+    materials.push(ImportedMaterial::default());
+    let mut material_ids = Vec::new();
+    let scene = file.default_scene().or_else(|| file.scenes().next());
+    for node in scene.iter().flat_map(gltf::Scene::nodes) {
+        add_material_ids(&node, plain, &mut material_ids);
+    }
+    Ok(ImportedColours { materials, material_ids })
+}
+
+/// Appends the material of each triangle, in the order of [`Reader::add_node`].
+fn add_material_ids(node: &gltf::Node, plain: u16, ids: &mut Vec<u16>) {
+    for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {
+        let positions = || primitive.get(&Semantic::Positions);
+        let corners = primitive.indices().or_else(positions).map_or(0, |accessor| accessor.count());
+        let id = primitive.material().index().map_or(plain, |index| index as u16);
+        ids.extend(std::iter::repeat_n(id, corners / 3));
+    }
+    node.children().for_each(|child| add_material_ids(&child, plain, ids));
+}
+
+fn material_of(material: &gltf::Material, blob: &[u8]) -> Result<ImportedMaterial, String> {
+    let surface = material.pbr_metallic_roughness();
+    let [r, g, b, _] = surface.base_color_factor().map(|x| f64::from(x).clamp(0.0, 1.0));
+    let image = surface.base_color_texture().map(|info| match info.texture().source().source() {
+        gltf::image::Source::Uri { uri, .. } => Ok::<_, String>(ImportedImage::File(uri.to_owned())),
+        gltf::image::Source::View { view, .. } => {
+            let end = view.offset().saturating_add(view.length());
+            let bytes = blob.get(view.offset()..end);
+            let outside = || "an image lies outside of the file; export the mesh again".to_owned();
+            Ok(ImportedImage::Bytes(bytes.ok_or_else(outside)?.to_vec()))
+        }
+    });
+    Ok(ImportedMaterial {
+        albedo: [r, g, b],
+        roughness: Some(f64::from(surface.roughness_factor()).clamp(0.0, 1.0)),
+        metalness: Some(f64::from(surface.metallic_factor()).clamp(0.0, 1.0)),
+        image: image.transpose()?,
+    })
 }
 
 /// Compares the length in the header with that of the file. Without a header of glTF the crate says what is wrong.
@@ -59,6 +109,8 @@ fn check_length(bytes: &[u8]) -> Result<(), MeshImportError> {
 struct Reader<'a> {
     blob: &'a [u8],
     mesh: Mesh,
+    /// True if a primitive has texture coordinates; those of others are 0.
+    has_uvs: bool,
     nodes: usize,
 }
 
@@ -116,7 +168,9 @@ impl Reader<'_> {
         let uvs: Vec<[f64; 2]> = match attributes.uvs {
             true => {
                 let uvs = reader.read_tex_coords(0).ok_or_else(|| outside(TEXCOORD))?;
-                uvs.into_f32().map(|uv| uv.map(f64::from)).collect()
+                self.has_uvs = true;
+                // glTF counts from the top of the image.
+                uvs.into_f32().map(|[u, v]| [f64::from(u), 1.0 - f64::from(v)]).collect()
             }
             false => Vec::new(),
         };
@@ -125,9 +179,7 @@ impl Reader<'_> {
         for t in indices.chunks_exact(3) {
             let t = if mirrored { [t[0], t[2], t[1]] } else { [t[0], t[1], t[2]] };
             self.mesh.triangles.push(t.map(|v| v + vertices as u32));
-            if let [Some(a), Some(b), Some(c)] = t.map(|v| uvs.get(v as usize)) {
-                self.mesh.uvs.push([*a, *b, *c]);
-            }
+            self.mesh.uvs.push(t.map(|v| uvs.get(v as usize).copied().unwrap_or_default()));
         }
         Ok(())
     }

@@ -71,9 +71,66 @@ pub const MAX_TRIANGLES: usize = 2_000_000;
 /// Largest number of vertices of a mesh.
 pub const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
 
+/// The colours that a mesh file states.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ImportedColours {
+    /// The materials; empty if the file has none.
+    pub materials: Vec<ImportedMaterial>,
+    /// Index of the material of each triangle.
+    pub material_ids: Vec<u16>,
+}
+
+/// A material of a mesh file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImportedMaterial {
+    /// Colour, linear RGB, 0..=1, by which that of the image is multiplied.
+    pub albedo: [f64; 3],
+    /// Roughness, 0..=1, if the file states it.
+    pub roughness: Option<f64>,
+    /// Metalness, 0..=1, if the file states it.
+    pub metalness: Option<f64>,
+    /// Image of the colour, PNG or JPEG.
+    pub image: Option<ImportedImage>,
+}
+
+impl Default for ImportedMaterial {
+    fn default() -> Self {
+        Self { albedo: [0.7; 3], roughness: None, metalness: None, image: None }
+    }
+}
+
+/// Source of an image of a material.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ImportedImage {
+    /// A file, by its path from the folder of the mesh file.
+    File(String),
+    /// Its bytes.
+    Bytes(Vec<u8>),
+}
+
+/// Reads the colours of a mesh file. `read_file` returns a file by its path from the folder of the mesh file.
+///
+/// The materials of OBJ files are those of their MTL files: the colour `Kd`, or the image `map_Kd` in its place. Those
+/// of glTF files have their base colours, multiplied by the image that they name. STL files have none.
+///
+/// # Errors
+/// A file that the mesh file names cannot be read; the message names it.
+pub fn import_colours(
+    bytes: &[u8],
+    format: MeshFormat,
+    read_file: &dyn Fn(&str) -> Result<Vec<u8>, String>,
+) -> Result<ImportedColours, String> {
+    match format {
+        MeshFormat::Obj => obj_colours(bytes, read_file),
+        MeshFormat::Stl => Ok(ImportedColours::default()),
+        MeshFormat::Gltf => glb::colours(bytes),
+    }
+}
+
 /// Reads a mesh from the bytes of a file, in metres with z up. All objects of the file are merged into one mesh.
 ///
-/// Materials are ignored. [`Shape::from_mesh`](super::shape::Shape::from_mesh) turns a closed mesh into a solid.
+/// [`import_colours`] reads its materials. [`Shape::from_mesh`](super::shape::Shape::from_mesh) turns a closed mesh
+/// into a solid.
 ///
 /// # Errors
 /// If the bytes do not parse, the mesh is empty or larger than the limits, or a coordinate or an index is invalid.
@@ -107,15 +164,67 @@ fn check_size(vertices: usize, triangles: usize) -> Result<(), MeshImportError> 
     check("vertices", vertices, MAX_VERTICES)
 }
 
+const OBJ_OPTIONS: tobj::LoadOptions =
+    tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: false, ignore_lines: false };
+
+fn obj_colours(
+    bytes: &[u8],
+    read_file: &dyn Fn(&str) -> Result<Vec<u8>, String>,
+) -> Result<ImportedColours, String> {
+    let problem = std::cell::RefCell::new(None);
+    let load = |path: &std::path::Path| {
+        let text = read_file(&path.to_string_lossy()).map_err(|error| {
+            problem.borrow_mut().get_or_insert(error);
+            tobj::LoadError::OpenFileFailed
+        })?;
+        tobj::load_mtl_buf(&mut Cursor::new(text)).inspect_err(|error| {
+            problem.borrow_mut().get_or_insert(format!("{}: {error}", path.display()));
+        })
+    };
+    let loaded = tobj::load_obj_buf(&mut Cursor::new(bytes), &OBJ_OPTIONS, load);
+    let (models, materials) = loaded.map_err(|error| error.to_string())?;
+    if let Some(problem) = problem.into_inner() {
+        return Err(problem);
+    }
+    // Without any material file this is an error of the library.
+    let mut materials: Vec<ImportedMaterial> =
+        materials.unwrap_or_default().into_iter().map(material_of_mtl).collect();
+    if materials.is_empty() {
+        return Ok(ImportedColours::default());
+    }
+    let plain = materials.len() as u16;
+    materials.push(ImportedMaterial::default());
+    let ids = models.iter().flat_map(|model| {
+        let id = model.mesh.material_id.map_or(plain, |id| id as u16);
+        std::iter::repeat_n(id, model.mesh.indices.len() / 3)
+    });
+    Ok(ImportedColours { material_ids: ids.collect(), materials })
+}
+
+fn material_of_mtl(material: tobj::Material) -> ImportedMaterial {
+    // Options before the name, such as "-bm 1", are not followed.
+    let image = material.diffuse_texture.map(|text| match text.starts_with('-') {
+        true => text.split_whitespace().next_back().unwrap_or_default().to_owned(),
+        false => text.trim().to_owned(),
+    });
+    let plain = ImportedMaterial::default();
+    let albedo = match (&image, material.diffuse) {
+        // Exporters write a grey beside an image.
+        (Some(_), _) => [1.0; 3],
+        (None, Some(colour)) => colour.map(|x| f64::from(x).clamp(0.0, 1.0)),
+        (None, None) => plain.albedo,
+    };
+    ImportedMaterial { albedo, image: image.map(ImportedImage::File), ..plain }
+}
+
 fn read_obj(bytes: &[u8]) -> Result<Mesh, MeshImportError> {
     let unreadable = |reason: String| MeshImportError::Unreadable { format: "OBJ", reason };
-    let options = tobj::LoadOptions { triangulate: true, single_index: true, ..Default::default() };
-    // Appearance is defined in asset scripts, so material files are not opened.
+    // Materials split meshes, which would change the order of vertices: `obj_colours` reads them separately.
     let no_materials = |_: &std::path::Path| Err(tobj::LoadError::OpenFileFailed);
-    let (models, _) = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, no_materials)
+    let (models, _) = tobj::load_obj_buf(&mut Cursor::new(bytes), &OBJ_OPTIONS, no_materials)
         .map_err(|error| unreadable(error.to_string()))?;
     let mut out = Mesh::default();
-    let textured = models.iter().all(|model| !model.mesh.texcoords.is_empty());
+    let textured = models.iter().any(|model| !model.mesh.texcoords.is_empty());
     for tobj::Model { mesh, .. } in &models {
         let base = out.vertices.len() as u32;
         let place = |p: &[f32]| Vec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]));
@@ -125,7 +234,7 @@ fn read_obj(bytes: &[u8]) -> Result<Mesh, MeshImportError> {
             if textured {
                 let uv = |v: u32| {
                     let at = 2 * v as usize;
-                    [f64::from(mesh.texcoords[at]), f64::from(mesh.texcoords[at + 1])]
+                    mesh.texcoords.get(at..at + 2).map_or([0.0; 2], |uv| [uv[0], uv[1]].map(f64::from))
                 };
                 out.uvs.push([uv(t[0]), uv(t[1]), uv(t[2])]);
             }

@@ -18,7 +18,22 @@ use crate::{
 #[derive(Clone)]
 pub struct MeshSolid {
     mesh: Mesh,
+    /// Index of each triangle in the mesh that it was made from.
+    sources: Vec<u32>,
     tree: TriMesh,
+}
+
+/// The point of a mesh nearest to a point of space.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshPoint<'a> {
+    /// The mesh.
+    pub solid: &'a MeshSolid,
+    /// Index of the triangle.
+    pub triangle: usize,
+    /// Texture coordinates, if the mesh has them.
+    pub uv: Option<[f64; 2]>,
+    /// Change of the texture coordinates per metre along the triangle; 0 without coordinates.
+    pub uv_per_m: f64,
 }
 
 impl PartialEq for MeshSolid {
@@ -55,7 +70,7 @@ fn digest(mesh: &Mesh) -> String {
 impl MeshSolid {
     pub(super) fn new(mesh: Mesh) -> Result<Self, MeshError> {
         mesh.validate()?;
-        let mut mesh = mesh.welded();
+        let (mut mesh, sources) = mesh.welded_keeping();
         mesh.validate()?;
         mesh.validate_closed()?;
         let volume = mesh.volume();
@@ -69,7 +84,30 @@ impl MeshSolid {
         let points = mesh.vertices.iter().map(to_parry).collect();
         let tree = TriMesh::with_flags(points, mesh.triangles.clone(), TriMeshFlags::ORIENTED)
             .map_err(|_| MeshError::Empty)?;
-        Ok(Self { mesh, tree })
+        Ok(Self { mesh, sources, tree })
+    }
+
+    /// Index of each triangle in the mesh that the solid was made from.
+    pub fn sources(&self) -> &[u32] {
+        &self.sources
+    }
+
+    /// The point of the surface nearest to `p`.
+    pub(super) fn nearest(&self, p: &Vec3) -> MeshPoint<'_> {
+        use parry3d_f64::query::PointQueryWithLocation;
+        let (_, (face, location)) = self.tree.project_local_point_and_get_location(to_parry(p), false);
+        let triangle = face as usize;
+        let corners = self.mesh.triangles[triangle].map(|v| self.mesh.vertices[v as usize]);
+        let uvs = self.mesh.uvs.get(triangle);
+        let weights = location.barycentric_coordinates();
+        let uv = uvs.zip(weights).map(|(uvs, weights)| {
+            [0, 1].map(|axis| uvs.iter().zip(weights).map(|(uv, weight)| uv[axis] * weight).sum())
+        });
+        let area = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).norm();
+        let uv_area = uvs
+            .map_or(0.0, |[a, b, c]| ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs());
+        let uv_per_m = if area > 0.0 { (uv_area / area).sqrt() } else { 0.0 };
+        MeshPoint { solid: self, triangle, uv, uv_per_m }
     }
 
     /// The closed mesh, triangles oriented outwards.

@@ -20,7 +20,7 @@ mod warp;
 pub(crate) use combine::SignedDistance;
 pub use contact::SampleContact;
 pub use displacement::{Bumps, Ramp, Ridges, SurfaceRelief};
-pub use mesh_solid::MeshSolid;
+pub use mesh_solid::{MeshPoint, MeshSolid};
 pub use polygon::Polygon;
 pub use tree::{Shape, ShapeTreeSize};
 pub use validate::ShapeError;

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::{
+    mesh_solid::MeshPoint,
     tree::{Shape, to_local, without_parts},
     warp,
 };
@@ -33,6 +34,31 @@ impl Shape {
                 }
             }
             without_parts!() => 0,
+        }
+    }
+
+    /// The point of a mesh at a point on or near the surface; `None` where the surface is not that of a mesh.
+    pub fn mesh_point(&self, p_o: &Vec3) -> Option<MeshPoint<'_>> {
+        match self {
+            Self::Mesh(solid) => Some(solid.nearest(p_o)),
+            Self::Placed { shape, pose } => shape.mesh_point(&to_local(pose, p_o)),
+            Self::Scaled { shape, scale } => {
+                let found = shape.mesh_point(&p_o.component_div(scale))?;
+                Some(MeshPoint { uv_per_m: found.uv_per_m / scale.product().cbrt(), ..found })
+            }
+            Self::Twist { shape, axis, rate } => shape.mesh_point(&warp::untwist(p_o, *axis, *rate).0),
+            Self::Bend { shape, along, towards, curvature } => {
+                shape.mesh_point(&warp::unbend(p_o, *along, *towards, *curvature).0)
+            }
+            Self::Rounded { shape, .. }
+            | Self::Shell { shape, .. }
+            | Self::Displace { shape, .. }
+            | Self::Paint { shape, .. } => shape.mesh_point(p_o),
+            Self::Union(parts) | Self::Intersect(parts) | Self::SmoothUnion { parts, .. } => {
+                nearest_part(parts, p_o)?.mesh_point(p_o)
+            }
+            Self::Subtract { from, .. } | Self::SmoothSubtract { from, .. } => from.mesh_point(p_o),
+            _ => None,
         }
     }
 

@@ -3,7 +3,10 @@ use rand::Rng;
 
 use crate::{
     Aabb, Vec3,
-    import::{MeshFormat, MeshImportError, MeshImportOptions, import},
+    import::{
+        ImportedColours, ImportedImage, ImportedMaterial, MeshFormat, MeshImportError, MeshImportOptions,
+        import, import_colours,
+    },
     mesh::{Mesh, MeshError},
     shape::Shape,
     surface_mesh::SurfaceMesh,
@@ -230,4 +233,65 @@ fn a_small_glb_that_expands_without_bound_is_refused_by_its_limit() {
     let repeated = Glb::new(&Mesh { triangles, ..cube });
     let message = repeated.refusal(r#"{"mesh":0,"translation":[1,0,0]}"#, &nodes);
     assert_eq!(message, "has more than 2000000 triangles; simplify the mesh");
+}
+
+#[test]
+fn materials_of_obj_files_are_those_of_their_mtl_files() {
+    let coloured = CUBE
+        .replace(
+            "f 4 3 2 1",
+            "mtllib cube.mtl\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl paper\nf 4/4 3/3 2/2 1/1",
+        )
+        .replace("f 5 6 7 8", "usemtl blue\nf 5 6 7 8");
+    let mtl = "newmtl paper\nKd 0.8 0.8 0.8\nmap_Kd -bm 1 wood.png\nnewmtl blue\nKd 0 0.25 1\n";
+    let read = |text: &'static str| {
+        move |name: &str| match name {
+            "cube.mtl" => Ok(text.as_bytes().to_vec()),
+            other => Err(format!("no file {other}")),
+        }
+    };
+    let colours = |text: &str, file: &dyn Fn(&str) -> Result<Vec<u8>, String>| {
+        import_colours(text.as_bytes(), MeshFormat::Obj, file)
+    };
+    let ImportedColours { materials, material_ids } = colours(&coloured, &read(mtl)).expect("materials");
+    assert_eq!(material_ids, [vec![0; 2], vec![1; 10]].concat());
+    let image = Some(ImportedImage::File("wood.png".to_owned()));
+    let paper = ImportedMaterial { albedo: [1.0; 3], image, ..ImportedMaterial::default() };
+    let blue = ImportedMaterial { albedo: [0.0, 0.25, 1.0], ..ImportedMaterial::default() };
+    assert_eq!(materials, [paper, blue, ImportedMaterial::default()]);
+    let mesh = read_obj(&coloured).expect("a cube");
+    assert_eq!(mesh.vertices.len(), read_obj(CUBE).expect("a cube").vertices.len() + 4, "seams of the image");
+    assert_eq!((mesh.uvs.len(), mesh.uvs[0][0], mesh.uvs[11]), (12, [0.0, 1.0], [[0.0; 2]; 3]));
+    assert_eq!(colours(CUBE, &read(mtl)), Ok(ImportedColours::default()), "no material file");
+    let missing = colours(&coloured, &|name| Err(format!("no file {name}")));
+    assert_eq!(missing, Err("no file cube.mtl".to_owned()));
+}
+
+#[test]
+fn materials_of_gltf_files_have_embedded_images() {
+    let mut cube = Glb::new(&read_obj(CUBE).expect("a cube"));
+    let start = cube.blob.len();
+    cube.blob.extend(b"picture!");
+    cube.json = cube
+        .json
+        .replace(&format!("\"byteLength\":{start}}}]"), &format!("\"byteLength\":{}}}]", start + 8))
+        .replace(
+            "\"accessors\"",
+            "\"materials\":[{\"pbrMetallicRoughness\":{\"baseColorFactor\":[0.5,1,1,1],\"metallicFactor\":0,\
+             \"roughnessFactor\":0.25,\"baseColorTexture\":{\"index\":0}}}],\"textures\":[{\"source\":0}],\
+             \"images\":[{\"bufferView\":2,\"mimeType\":\"image/png\"}],\"accessors\"",
+        )
+        .replace("\"indices\":1}", "\"indices\":1,\"material\":0}");
+    let views = cube.json.find("\"bufferViews\":[").expect("views") + "\"bufferViews\":[".len();
+    let end = views + cube.json[views..].find(']').expect("its end");
+    cube.json.insert_str(end, &format!(",{{\"buffer\":0,\"byteOffset\":{start},\"byteLength\":8}}"));
+    let read = |_: &str| Err("no file is read".to_owned());
+    let ImportedColours { materials, material_ids } =
+        import_colours(&cube.bytes(), MeshFormat::Gltf, &read).expect("materials");
+    assert_eq!(material_ids, [0; 12]);
+    let image = Some(ImportedImage::Bytes(b"picture!".to_vec()));
+    let expected =
+        ImportedMaterial { albedo: [0.5, 1.0, 1.0], roughness: Some(0.25), metalness: Some(0.0), image };
+    assert_eq!(materials[0], expected);
+    import(&cube.bytes(), MeshFormat::Gltf, &METRES).expect("a cube");
 }

@@ -94,7 +94,7 @@ record! {
         body: BodySpec;
         /// Friction of its surface.
         friction: Friction;
-        /// Visuals by material id of the shape, from 0; plain grey by default.
+        /// Visuals by material id of the shape, from 0; by default the colours of its mesh file, or plain grey.
         visuals: Vec<Visual> => Empty;
         /// Numbers for experts (grasp height …). Those whose names end in _m are lengths, which follow an object's
         /// scale.
@@ -145,7 +145,7 @@ impl AssetSpec {
         let shape = self.shape.copy();
         Ok(Asset {
             name: self.name.clone(),
-            visuals: visuals_of(lua, &self.name, visuals, &shape)?,
+            visuals: visuals_of(lua, &self.name, visuals, &self.shape)?,
             shape,
             body: match &self.body {
                 BodySpec::Soft(soft) => Body::Soft(soft.spec.clone()),

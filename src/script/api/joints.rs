@@ -136,12 +136,11 @@ pub(crate) fn parts(
     let mut parts: Vec<MovingPart> = Vec::new();
     for index in order(&body.parts).map_err(|error| fail(lua, error.describe("articulated")))? {
         let PartSpec { name, shape, density, joint, parent, visuals, hints } = &body.parts[index];
-        let shape = shape.copy();
         let visuals = if visuals.is_empty() { asset_visuals } else { visuals };
         let asset = Asset {
             name: name.clone(),
-            visuals: visuals_of(lua, name, visuals, &shape)?,
-            shape,
+            visuals: visuals_of(lua, name, visuals, shape)?,
+            shape: shape.copy(),
             body: Body::Rigid { density: *density },
             friction,
             hints: hints.clone(),

@@ -11,6 +11,7 @@ pub(crate) mod expert_input;
 pub(crate) mod goals;
 pub(crate) mod image;
 pub(crate) mod joints;
+mod mesh_colours;
 pub(crate) mod observation;
 pub(crate) mod plots;
 pub(crate) mod policy;

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use mlua::Lua;
 
+use super::mesh_colours::FileColours;
 use crate::{
     schema::{Range, Type, choice, class, functions, record_of},
     vm::{
@@ -15,10 +16,11 @@ use crate::{
 use softvt_common::parallel::lock;
 use softvt_geometry::{
     Quat, Vec3,
-    import::{MeshFormat, MeshImportError, MeshImportOptions, import},
+    import::{MeshFormat, MeshImportError, MeshImportOptions, import, import_colours},
     mass::mass_properties,
     shape::{Axis, Bumps, Ramp, Ridges, Shape, ShapeError, ShapeTreeSize, SurfaceRelief},
 };
+use softvt_scene::Visual;
 
 const LENGTH: Type = Type::Number("m", Range::POSITIVE);
 const METRES: Type = Type::Number("m", Range::ANY);
@@ -49,12 +51,22 @@ pub(crate) struct LuaShape(Arc<Node>);
 #[derive(Debug)]
 struct Node {
     shape: Shape,
+    /// Colours of the mesh files in it, or why they cannot be read.
+    colours: Result<Vec<Arc<FileColours>>, String>,
     /// Memory it keeps, bytes; parts shared with other shapes count for each of them.
     bytes: usize,
     _reserved: Reservation,
 }
 
 impl LuaShape {
+    /// The visual that its mesh files state; `None` without one.
+    ///
+    /// # Errors
+    /// A file that a mesh file names cannot be read.
+    pub(crate) fn file_visual(&self) -> Result<Option<Visual>, String> {
+        self.0.colours.clone().map(|colours| FileColours::visual(&colours, self.shape()))
+    }
+
     pub(crate) fn shape(&self) -> &Shape {
         &self.0.shape
     }
@@ -66,6 +78,15 @@ impl LuaShape {
 
     /// Checks a shape that keeps `extra_bytes` in addition to its tree.
     fn new(lua: &Lua, shape: Shape, extra_bytes: usize) -> mlua::Result<Self> {
+        Self::coloured(lua, shape, extra_bytes, Ok(Vec::new()))
+    }
+
+    fn coloured(
+        lua: &Lua,
+        shape: Shape,
+        extra_bytes: usize,
+        colours: Result<Vec<Arc<FileColours>>, String>,
+    ) -> mlua::Result<Self> {
         let ShapeTreeSize { nodes, depth, work } = shape.tree_size();
         if work > MAX_TREE.work {
             let message = "shape: cuts or unions are nested too deeply to be evaluated; join the parts by union first \
@@ -83,7 +104,7 @@ impl LuaShape {
         }
         shape.validate().map_err(|error| fail(lua, format!("shape.{error}")))?;
         let bytes = nodes * size_of::<Shape>() + extra_bytes;
-        Ok(Self(Arc::new(Node { shape, bytes, _reserved: reserve(lua, bytes)? })))
+        Ok(Self(Arc::new(Node { shape, colours, bytes, _reserved: reserve(lua, bytes)? })))
     }
 
     /// A copy of its tree.
@@ -95,7 +116,9 @@ impl LuaShape {
     fn derived(&self, lua: &Lua, shape: Shape, others: &[&Self]) -> mlua::Result<Self> {
         let own = |shape: &Self| shape.0.bytes - shape.0.shape.tree_size().nodes * size_of::<Shape>();
         let extra_bytes = others.iter().map(|other| own(other)).sum::<usize>() + own(self);
-        Self::new(lua, shape, extra_bytes)
+        let parts = std::iter::once(self).chain(others.iter().copied());
+        let colours = parts.map(|part| part.0.colours.clone()).collect::<Result<Vec<_>, String>>();
+        Self::coloured(lua, shape, extra_bytes, colours.map(|all| all.concat()))
     }
 }
 
@@ -183,7 +206,8 @@ functions! {
 functions! {
     FUNCTIONS {
         /// Reads a shape from an OBJ, STL or GLB file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface
-        /// must be closed.
+        /// must be closed. An asset without visuals has the colours and images of the materials in the file: Kd and
+        /// map_Kd of the MTL files that an OBJ file names, or the base colours of a GLB file; images are PNG or JPEG.
         fn mesh(lua) takes spec "softvt.MeshSpec" {
             /// Path inside of the project, next to the Lua file or from a root folder.
             file: String;
@@ -207,7 +231,21 @@ functions! {
             let needed = (MESH_BYTES_PER_FILE_BYTE * bytes.len()).max(BYTES_PER_TRIANGLE * mesh.triangles.len());
             drop(reserve(lua, needed)?);
             let shape = Shape::from_mesh(mesh).map_err(|error| refused(error.into()))?;
-            LuaShape::new(lua, shape, needed)?
+            let beside = |name: &str| {
+                let path = file.rsplit_once('/').map_or(name.to_owned(), |(folder, _)| format!("{folder}/{name}"));
+                let found = lock(&library).data(&path, requester.as_deref());
+                found.map(|found| found.bytes.to_vec()).map_err(|error| error.to_string())
+            };
+            let colours = match &shape {
+                Shape::Mesh(solid) => MeshFormat::from_extension(extension)
+                    .map_err(|error| error.to_string())
+                    .and_then(|format| import_colours(&bytes, format, &beside))
+                    .and_then(|colours| FileColours::new(lua, colours, solid, &beside))
+                    .map(|colours| colours.map(Arc::new).into_iter().collect())
+                    .map_err(|error| format!("{file}: {error}")),
+                _ => Ok(Vec::new()),
+            };
+            LuaShape::coloured(lua, shape, needed, colours)?
         }
     }
 }

@@ -14,7 +14,6 @@ use crate::{
     },
 };
 use softvt_common::parallel::lock;
-use softvt_geometry::shape::Shape;
 use softvt_scene::{LabelLine, MAX_LETTERS, Mask, Scene, TextDecal, Typeface, Visual, VisualLayer};
 
 /// Lengths of patterns. Finer ones cannot be seen, and their waves exceed the numbers of the renderer.
@@ -39,7 +38,7 @@ record_of! {
         metalness: f64 = SHARE => Number(0.0);
         /// Layers painted over the base, in this order.
         layers: Vec<VisualLayer> => Empty;
-    }
+    } by make_visual;
     /// A colour laid over the layers below where a mask is not 0.
     VisualLayer: "softvt.Layer" as "layer" {
         /// Weight of the layer; 1 everywhere by default.
@@ -53,6 +52,16 @@ record_of! {
         /// Height of the drawn surface where the mask is 1. It is drawn only: contact does not see it.
         relief_m: f64 = Type::Number("m", Range::closed(-0.005, 0.005)) => Number(0.0);
     }
+}
+
+fn make_visual(
+    _: &Lua,
+    albedo: [f64; 3],
+    roughness: f64,
+    metalness: f64,
+    layers: Vec<VisualLayer>,
+) -> mlua::Result<Visual> {
+    Ok(Visual { layers, ..Visual::plain(albedo, roughness, metalness) })
 }
 
 choice! { Typeface { "sans" => Sans, "mono" => Mono } }
@@ -343,11 +352,19 @@ pub(crate) fn visuals_of(
     lua: &Lua,
     name: &str,
     visuals: &[Visual],
-    shape: &Shape,
+    shape: &LuaShape,
 ) -> mlua::Result<Vec<Visual>> {
-    let needed = usize::from(shape.highest_material()) + 1;
+    let needed = usize::from(shape.shape().highest_material()) + 1;
     if visuals.is_empty() {
-        return Ok(vec![Visual::default(); needed]);
+        let mut plain = vec![Visual::default(); needed];
+        let own = shape.file_visual().map_err(|error| {
+            let message = format!(
+                "asset {name}: visuals: the colours of its mesh cannot be read: {error}; add what is missing, or give visuals"
+            );
+            fail(lua, message)
+        })?;
+        plain[0] = own.unwrap_or_default();
+        return Ok(plain);
     }
     if visuals.len() < needed {
         let message = format!(

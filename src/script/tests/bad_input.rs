@@ -255,6 +255,38 @@ fn invalid_meshes_are_refused_with_their_file() {
 }
 
 #[test]
+fn colours_of_mesh_files_are_those_of_assets_without_visuals() {
+    let cube = "mtllib c.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\nvt 0 0\nusemtl a\n\
+        f 4/1 3/1 2/1 1/1\nf 5/1 6/1 7/1 8/1\nf 1/1 2/1 6/1 5/1\nf 2/1 3/1 7/1 6/1\nf 3/1 4/1 8/1 7/1\nf 4/1 1/1 5/1 8/1\n";
+    let asset = |more: &str| {
+        format!(
+            "return {{ asset = softvt.asset {{ name = 'c', shape = softvt.mesh {{ file = 'parts/c.obj', scale = 0.05 }}\n  \
+             :grounded(), body = softvt.static {{}}, {more} }} }}"
+        )
+    };
+    let project = Project::new(&[("parts/c.obj", cube)]);
+    let error = |more: &str| {
+        project.write("a.lua", asset(more).as_bytes());
+        project.write("x.lua", b"softvt.fingerprint(require('a').asset)\nerror('fine', 0)");
+        project.error("x.lua", &[])
+    };
+    assert!(error("").contains("c.mtl"), "{}", error(""));
+    assert_eq!(error("visuals = { { albedo = { 1, 0, 0 } } }"), "x.lua:2: fine", "its own visuals");
+    project.write("parts/c.mtl", b"newmtl a\nmap_Kd wood.png\n");
+    assert!(error("").contains("no file \"parts/wood.png\""), "{}", error(""));
+    project.write("parts/wood.png", b"not a picture");
+    assert!(
+        error("").contains("wood.png: ") && error("").contains("give a PNG or JPEG file"),
+        "{}",
+        error("")
+    );
+    let mut png = std::io::Cursor::new(Vec::new());
+    image::RgbImage::new(3, 2).write_to(&mut png, image::ImageFormat::Png).expect("a PNG file");
+    project.write("parts/wood.png", png.get_ref());
+    assert_eq!(error(""), "x.lua:2: fine");
+}
+
+#[test]
 fn meshes_are_searched_next_to_the_requesting_file() {
     let closed = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
     let own = "return { shape = softvt.mesh { file = 'm.obj' } }";

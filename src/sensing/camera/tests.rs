@@ -10,7 +10,10 @@ use super::{
 use softvt_common::disk_cache::DiskCache;
 use softvt_geometry::{Pose, Quat, Vec3, mesh::Mesh, shape::Shape};
 use softvt_physics::{BodyId, RigidId};
-use softvt_scene::{Camera, CameraMount, Lighting, Mask, Visual, VisualLayer};
+use softvt_scene::{
+    Camera, CameraMount, ColouredMesh, Lighting, Mask, MeshColours, MeshMaterial, SurfaceImage, Visual,
+    VisualLayer,
+};
 
 fn rigid(index: usize) -> BodyId {
     BodyId::Rigid(RigidId::new(index))
@@ -418,4 +421,45 @@ fn invalid_meshes_states_and_lights_are_rejected() {
     light.key.direction_w = Vec3::zeros();
     let dark = RenderScene::new(Vec::new(), light).expect_err("no direction");
     assert!(dark.to_string().starts_with("light: direction: expected a direction"), "{dark}");
+}
+
+#[test]
+fn a_mesh_shows_the_image_of_its_file_where_its_texture_coordinates_have_it() {
+    // Seen from above, the left half of the image is red and the right half green.
+    let size = 0.2;
+    let mut mesh = box_mesh(&Vec3::repeat(0.5 * size));
+    let uv = |v: u32| {
+        let p = mesh.vertices[v as usize] / size;
+        [p.x + 0.5, p.y + 0.5]
+    };
+    mesh.uvs = mesh.triangles.iter().map(|t| t.map(uv)).collect();
+    let shape = Shape::from_mesh(mesh).expect("a cube").translated(Vec3::new(0.0, 0.0, 0.1));
+    let Some(found) = shape.mesh_point(&Vec3::new(0.0, 0.0, 0.2)) else { panic!("a mesh") };
+    assert!(found.uv.is_some_and(|uv| (uv[0] - 0.5).abs() < 1e-9) && (found.uv_per_m - 5.0).abs() < 1e-6);
+    let Shape::Placed { shape: inner, .. } = &shape else { panic!("{shape:?}") };
+    let Shape::Mesh(solid) = &**inner else { panic!("{inner:?}") };
+    let pixels: Vec<u8> = (0..64).flat_map(|x| if x < 32 { [200, 20, 20] } else { [20, 200, 20] }).collect();
+    let image = Some(Arc::new(SurfaceImage::new(64, &pixels.repeat(64))));
+    let mesh = ColouredMesh {
+        solid: solid.clone(),
+        material_ids: vec![0; 12].into(),
+        materials: vec![MeshMaterial { albedo: [1.0; 3], image }].into(),
+    };
+    let colours = MeshColours { shape: Arc::new(shape.clone()), meshes: vec![mesh] };
+    let visual = Visual { colours: Some(colours), ..Visual::plain([1.0; 3], 1.0, 0.0) };
+    let mesh = RenderMesh::from_shape("cube", &shape, &[visual], &DiskCache::DISABLED).expect("a cube");
+    let camera = above(1.0);
+    let image = draw(&scene(vec![object(1, mesh, BodyId::World, Pose::identity())]), &camera);
+    let (centre, aside) = (camera.width / 2, (0.05 * focal(&camera) / 0.8) as usize);
+    let pixel = |x: usize| {
+        let at = 3 * (camera.height / 2 * camera.width + x);
+        [0, 1, 2].map(|c| i32::from(image.rgb[at + c]))
+    };
+    let ([left_r, left_g, _], [right_r, right_g, _]) = (pixel(centre - aside), pixel(centre + aside));
+    assert!(
+        left_r > left_g + 60 && right_g > right_r + 60,
+        "{:?} {:?}",
+        pixel(centre - aside),
+        pixel(centre + aside)
+    );
 }

@@ -217,7 +217,7 @@ impl RenderMesh {
         let key = cache.key("mesh", &(mesh, visuals));
         let mut mesh = mesh.clone();
         let mut edge = extent(&mesh);
-        let has_pattern = !visuals[0].layers.is_empty();
+        let has_pattern = !visuals[0].is_uniform();
         let lod = if has_pattern && suits_flat_charts(&mesh, visuals.iter().any(pattern::has_text)) {
             flat_charts(&mesh, &visuals[0])
         } else {
@@ -286,7 +286,7 @@ impl ShapeSurface {
         voxels: Option<VoxelMesh>,
         cache: &DiskCache,
     ) -> Self {
-        let is_textured = visuals.len() > 1 || visuals.iter().any(|visual| !visual.layers.is_empty());
+        let is_textured = visuals.len() > 1 || visuals.iter().any(|visual| !visual.is_uniform());
         let baked = |v: &Visual| if is_textured { without_colours(v) } else { v.clone() };
         Self {
             name: name.to_owned(),
@@ -402,7 +402,7 @@ fn without_colours(visual: &Visual) -> Visual {
     let (albedo, roughness) = ([0.0; 3], 1.0);
     let raised = visual.layers.iter().filter(|layer| layer.relief_m != 0.0);
     let layers = raised.map(|layer| VisualLayer { albedo, roughness, ..layer.clone() }).collect();
-    Visual { albedo, roughness, layers, ..visual.clone() }
+    Visual { albedo, roughness, layers, colours: None, ..visual.clone() }
 }
 
 fn check_mesh(name: &str, mesh: &Mesh, material_ids: &[u16], visuals: &[Visual]) -> Result<(), CameraError> {

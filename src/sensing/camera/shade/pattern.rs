@@ -102,6 +102,12 @@ pub(crate) fn sample_visual(
     let at = &PatternPoints { p: at.p - at.n * f32x8::splat(SAMPLE_DEPTH), ..*at };
     let [r, g, b] = visual.albedo;
     let mut material = [r, g, b, visual.roughness].map(|x| f32x8::splat(x as f32));
+    if let Some(colours) = &visual.colours {
+        let tint = |channel: usize| {
+            at.each(|p, _| colours.at(&p.cast(), f64::from(spacing)).map_or(1.0, |colour| colour[channel]))
+        };
+        (0..3).for_each(|channel| material[channel] *= tint(channel));
+    }
     let mut relief = f32x8::ZERO;
     for layer in &visual.layers {
         let mask = mask_value(&layer.mask, at, spacing);
@@ -142,7 +148,9 @@ pub(crate) fn finest_feature(visual: &Visual) -> f32 {
             _ => 0.0,
         }
     }
-    visual.layers.iter().map(|layer| mask_feature(&layer.mask)).fold(f64::INFINITY, f64::min) as f32
+    // An image may have any detail.
+    let finest = if visual.colours.is_some() { 0.0 } else { f64::INFINITY };
+    visual.layers.iter().map(|layer| mask_feature(&layer.mask)).fold(finest, f64::min) as f32
 }
 
 /// True if a visual has printed text.
