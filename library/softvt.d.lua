@@ -165,7 +165,7 @@
 ---@field shape softvt.Shape Shape, in metres.
 ---@field body softvt.Soft|softvt.Rigid|softvt.Articulated|softvt.Static|softvt.Scenery Mechanics.
 ---@field friction? softvt.Friction Friction of its surface.
----@field visuals? softvt.Visual[] Visuals by material id of the shape, from 0; plain grey by default.
+---@field visuals? softvt.Visual[] Visuals by material id of the shape, from 0; by default the colours of its mesh file, or plain grey.
 ---@field hints? table<string, number> Numbers for experts (grasp height …). Those whose names end in _m are lengths, which follow an object's scale.
 
 ---A finite-element soft body of linear-elastic, isotropic material.
@@ -276,17 +276,17 @@
 ---@field layout? "rows"|"columns" For tactile_image: the left finger above the right one (rows, the default) or left of it.
 ---@field finger? "left"|"right" For tactile: the finger.
 
----The meaning of the numbers of an action: three of position, three of orientation (axis-angle), one of the gripper; further ones are padding.
+---The meaning of the numbers of an action: three of position, three of orientation (axis-angle), or seven joint positions, and one of the gripper; further ones are padding.
 ---@class softvt.ActionEncoding
----@field pose "absolute"|"delta"|"delta_osc" absolute: a pose in the base frame. delta: shares -1 to 1 of a step away from the tool's pose. delta_osc: the same, reduced to what robosuite's controller reaches within a control step.
+---@field pose "absolute"|"delta"|"delta_osc"|"joints" absolute: a pose in the base frame. delta: shares -1 to 1 of a step away from the tool's pose. delta_osc: the same, reduced to what robosuite's controller reaches within a control step. joints: positions of the seven joints of the arm, rad.
 ---@field translation_m? number For delta and delta_osc: the step of a share of 1, m. Expects a number in above 0..10.
 ---@field rotation_rad? number For delta and delta_osc: the rotation of a share of 1, rad. Expects a number in above 0..10.
----@field scale? number[] Factors on the first six numbers, applied first. Expects a list of 6 numbers.
----@field offset? number[] Offsets added after that. Expects a list of 6 numbers.
----@field length? integer Length that an action must have, padding included; by default 7, or 32 as openpi's models pad them. Expects a whole number in 7..4096.
----@field gripper? softvt.GripperValues The seventh number.
+---@field scale? number[] Factors on the numbers before that of the gripper, six or seven, applied first.
+---@field offset? number[] Offsets added after that.
+---@field length? integer Length that an action must have, padding included; by default 7, or 8 for joints, or 32 as openpi's models pad them. Expects a whole number in 7..4096.
+---@field gripper? softvt.GripperValues The number of the gripper.
 
----The seventh number of an action.
+---The number of the gripper, the last of an action without padding.
 ---@class softvt.GripperValues
 ---@field open? number Value that opens the gripper; not for code = "force". Expects a number.
 ---@field closed? number Value that closes it; not for code = "force". Expects a number.
@@ -305,11 +305,12 @@
 ---@field files? table<string, string|softvt.Image|table<string, any>|any[]> Files to write, by relative path: text as it is, images as PNG, tables as JSON with sorted keys.
 ---@field problem? string Fault of the results. The files are written, then the command fails with this message.
 
----A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame, and a closure or a grip force. Give either axis_angle or quaternion, and either closure or force.
+---A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame, or positions of the arm's joints, and a closure or a grip force. Give either joints, or position with axis_angle or quaternion; and either closure or force.
 ---@class softvt.Action
----@field position number[] Position. Expects a list of 3 numbers (m, base frame).
+---@field position? number[] Position. Expects a list of 3 numbers (m, base frame).
 ---@field axis_angle? number[] Orientation as axis-angle. Expects a list of 3 numbers (rad, base frame).
 ---@field quaternion? number[] Orientation as quaternion. Expects a list of 4 numbers (w, x, y, z, base frame).
+---@field joints? number[] Positions of the arm's joints, from the base on. Expects a list of 7 numbers (rad).
 ---@field closure? number Gripper closure: 0 is open, 1 is closed. The grip code of the policy says what it commands. Expects a number in 0..1.
 ---@field force? number Grip force at which closing stops, at most robot.gripper.effort; below 0 opens. Expects a number (N).
 
@@ -393,7 +394,7 @@
 ---@field yaw? number Rotation of the downward hand about the vertical. Expects radians. Default 0.
 ---@field quaternion? number[] Orientation instead of yaw. Expects a list of 4 numbers (w, x, y, z).
 
----Reads a shape from an OBJ, STL or GLB file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface must be closed.
+---Reads a shape from an OBJ, STL or GLB file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface must be closed. An asset without visuals has the colours and images of the materials in the file: Kd and map_Kd of the MTL files that an OBJ file names, or the base colours of a GLB file; images are PNG or JPEG.
 ---@class softvt.MeshSpec
 ---@field file string Path inside of the project, next to the Lua file or from a root folder.
 ---@field scale? number Metres per unit of the file: 0.001 for millimetres. Expects metres above 0. Default 1.
@@ -1503,6 +1504,12 @@ function Arm:open(options) end
 ---@return softvt.Fingers
 function Arm:tactile() end
 
+---Returns true if the arm gets to a pose from its present joint positions, to 1 mm and 0.01 rad, by the steps of inverse kinematics that a motion takes; else false and the distance at which it stops, m. It knows nothing of obstacles.
+---@param pose softvt.Pose
+---@return boolean
+---@return number
+function Arm:reaches(pose) end
+
 ---Holds the last command for a time.
 ---@param seconds number
 function Arm:wait(seconds) end
@@ -1869,7 +1876,7 @@ function softvt.plot(spec) end
 ---@return softvt.Pose
 function softvt.pose(spec) end
 
----Reads a shape from an OBJ, STL or GLB file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface must be closed.
+---Reads a shape from an OBJ, STL or GLB file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface must be closed. An asset without visuals has the colours and images of the materials in the file: Kd and map_Kd of the MTL files that an OBJ file names, or the base colours of a GLB file; images are PNG or JPEG.
 ---@param spec softvt.MeshSpec
 ---@return softvt.Shape
 function softvt.mesh(spec) end

@@ -2,7 +2,7 @@
 
 use std::{io::Cursor, sync::Arc};
 
-use image::{ImageReader, RgbImage};
+use image::{ImageReader, RgbImage, imageops::FilterType};
 use mlua::Lua;
 
 use crate::vm::memory_budget::{Reservation, reserve};
@@ -67,6 +67,10 @@ impl FileColours {
     }
 }
 
+/// Largest width and height of an image that is kept, pixels: surfaces are drawn with fewer texels. Larger ones are
+/// scaled down.
+const KEPT_EDGE: u32 = 2048;
+
 /// Decodes the image of a material.
 fn image_of(
     material: &ImportedMaterial,
@@ -89,5 +93,10 @@ fn image_of(
             "{name}: {width} × {height} pixels; at most {most} × {most} are drawn, scale it down"
         ));
     }
-    Ok(Some(reader()?.decode().map_err(|error| unreadable(&error))?.to_rgb8()))
+    let decoded = reader()?.decode().map_err(|error| unreadable(&error))?;
+    let kept = match width.max(height) > KEPT_EDGE {
+        true => decoded.resize(KEPT_EDGE, KEPT_EDGE, FilterType::Triangle),
+        false => decoded,
+    };
+    Ok(Some(kept.to_rgb8()))
 }

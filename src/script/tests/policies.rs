@@ -388,7 +388,7 @@ fn errors_in_profiles_are_reported_with_their_line() {
             "profile.actions.scale: expected 6 numbers with pose = \"delta\", got 3",
         ),
         (
-            "pose = \"delta_osc\", translation_m = 0.05, rotation_rad = 0.5",
+            "pose = \"delta_osc\",\n    translation_m = 0.05,\n    rotation_rad = 0.5",
             "pose = \"joints\", length = 7",
             "profile.actions.length: expected at least 8 numbers with pose = \"joints\", got 7",
         ),
