@@ -52,11 +52,13 @@ fn lists_are_printed_as_text_and_as_json() {
     );
     assert!(names("policies").contains(&"scripts/policies/hold.lua".into()));
     assert_eq!(
-        names("profiles")[..7],
+        names("profiles")[..9],
         [
             "vision",
             "vision_drives",
             "visuo_tactile",
+            "vision_joints",
+            "visuo_tactile_joints",
             "softvtbench",
             "softvtbench_v02",
             "softvtbench_v02_latched",
