@@ -43,7 +43,7 @@ class SoftVTInputs(_transforms.DataTransformFn):
 
     model_type: _model.ModelType
     tactile: bool
-    # Not in the paper: see one_side.
+    # Not in the paper: see one_side. Of no use for joint positions.
     fold_rotations: bool = False
 
     def __call__(self, data: dict) -> dict:
@@ -71,10 +71,12 @@ class SoftVTInputs(_transforms.DataTransformFn):
 
 @dataclasses.dataclass(frozen=True)
 class SoftVTOutputs(_transforms.DataTransformFn):
-    """An answer as softvt reads it: pose and gripper, without the padding."""
+    """An answer as softvt reads it: pose, or joint positions, and gripper, without the padding."""
+
+    joints: bool
 
     def __call__(self, data: dict) -> dict:
-        return {"actions": np.asarray(data["actions"][..., :7])}
+        return {"actions": np.asarray(data["actions"][..., : 8 if self.joints else 7])}
 
 
 def get_softvt_configs():
@@ -88,7 +90,8 @@ def get_softvt_configs():
         action_expert_variant="gemma_300m_lora",
     )
 
-    def config(name: str, repo_id: str, *, tactile: bool, gripper: str):
+    # joints: of an export with --control joints.
+    def config(name: str, repo_id: str, *, tactile: bool, gripper: str, joints: bool = False):
         keys = TACTILE_KEYS if tactile else VISION_KEYS
         return TrainConfig(
             name=name,
@@ -97,7 +100,7 @@ def get_softvt_configs():
                 repo_id=repo_id,
                 data_transforms=lambda model: _transforms.Group(
                     inputs=[SoftVTInputs(model_type=model.model_type, tactile=tactile)],
-                    outputs=[SoftVTOutputs()],
+                    outputs=[SoftVTOutputs(joints=joints)],
                 ),
                 base_config=DataConfig(
                     prompt_from_task=True,
@@ -106,8 +109,8 @@ def get_softvt_configs():
             ),
             weight_loader=weight_loaders.CheckpointWeightLoader("gs://openpi-assets/checkpoints/pi05_base/params"),
             freeze_filter=model.get_freeze_filter(),
-            # The grip code of the export. The server states it, and softvt refuses a profile with another one.
-            policy_metadata={"gripper": gripper},
+            # The grip code of the export, and what the poses are. The server states them, and softvt refuses a profile with others.
+            policy_metadata={"gripper": gripper, "pose": "joints" if joints else "absolute"},
             # Averaged weights are not for LoRA.
             ema_decay=None,
             batch_size=256,

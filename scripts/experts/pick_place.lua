@@ -157,14 +157,15 @@ local function wait_for_rest(arm, scene, name)
   end
 end
 
--- Lowers the object slowly until it yields in the hand, which shows a light press.
+-- Lowers the object slowly until it yields in the hand, which shows a light press. Returns true if it does.
 local function press(arm, scene, name)
   local function yields() return scene:object(name).centre[3] - arm.pose.z end
   local free = yields()
   for _ = 1, math.ceil(PRESS.travel / (PRESS.speed * arm.dt)) do
-    if yields() - free > PRESS.yield then return end
+    if yields() - free > PRESS.yield then return true end
     arm:command(arm.target:translated { 0, 0, -PRESS.speed * arm.dt }, arm.closure)
   end
+  return false
 end
 
 -- Releases the object of a grasp { height, width } on the target, above which the hand holds it.
@@ -175,7 +176,9 @@ local function stack(arm, scene, spec, held, over, pace)
   arm:move_to(pose:at { pose.x, pose.y, over }, { speed = 0.1 * pace })
   wait_for_rest(arm, scene, spec.object)
   arm:move_to(pose:at { pose.x, pose.y, pose.z + 0.003 }, { speed = 0.15 * pace })
-  press(arm, scene, spec.object)
+  if not press(arm, scene, spec.object) then
+    arm:give_up(("%s does not meet %s below it"):format(spec.object, spec.target))
+  end
   wait_for_rest(arm, scene, spec.object)
   arm:release { closure = grasp.clear_closure(object, nil, held.width), rate = PRESS.rate }
   wait_for_rest(arm, scene, spec.object)
@@ -224,6 +227,7 @@ local function complete(spec)
   end
   if full.stop ~= "width" and full.stop ~= "touch" then refuse("stop", '"width" or "touch"') end
   if full.to then places.check("pick_place", full, 4) end
+  if full.to and full.stack then refuse("stack", "nothing beside `to`, which places beside the target") end
   if full.closing_speed <= 0 or full.closing_speed > 0.2 then refuse("closing_speed", "m/s in 0..0.2, above 0") end
   return full
 end

@@ -97,20 +97,16 @@ pub fn command(row: &[f64], encoding: &ActionEncoding) -> Result<ToolCommand, Po
         None => motion[i],
     };
     let grip = encoding.gripper.command(*grip);
-    if encoding.pose == PoseEncoding::Joints {
-        return Ok(ToolCommand { motion: ToolMotion::Joints(std::array::from_fn(si)), grip });
-    }
-    let (linear, angular) = (Vec3::from_fn(|i, _| si(i)), Vec3::from_fn(|i, _| si(3 + i)));
+    let (linear, angular) = (|| Vec3::from_fn(|i, _| si(i)), || Vec3::from_fn(|i, _| si(3 + i)));
     // robosuite's controller clips to −1..=1 as well.
     let delta = |full, translation_m: f64, rotation_rad: f64| ToolMotion::Delta {
         full,
-        translation_b: linear.map(|x| x.clamp(-1.0, 1.0)) * translation_m,
-        rotation_b: angular.map(|x| x.clamp(-1.0, 1.0)) * rotation_rad,
+        translation_b: linear().map(|x| x.clamp(-1.0, 1.0)) * translation_m,
+        rotation_b: angular().map(|x| x.clamp(-1.0, 1.0)) * rotation_rad,
     };
     let motion = match encoding.pose {
-        PoseEncoding::Absolute | PoseEncoding::Joints => {
-            ToolMotion::Pose { position_b: linear, axis_angle_b: angular }
-        }
+        PoseEncoding::Joints => ToolMotion::Joints(std::array::from_fn(si)),
+        PoseEncoding::Absolute => ToolMotion::Pose { position_b: linear(), axis_angle_b: angular() },
         PoseEncoding::Delta { translation_m, rotation_rad } => delta(true, translation_m, rotation_rad),
         PoseEncoding::DeltaOsc { translation_m, rotation_rad } => delta(false, translation_m, rotation_rad),
     };

@@ -493,7 +493,8 @@ impl Episode {
         }
         match self.first_far_command.filter(|_| self.far_commands == self.steps) {
             Some(first) => {
-                let error = ActionError::OutOfReach { steps: self.steps, first };
+                let are_joints = self.actions.last().is_some_and(|action| action.joints.is_some());
+                let error = ActionError::OutOfReach { steps: self.steps, first, are_joints };
                 Some(Outcome::Error { message: error.to_string() })
             }
             None => Some(Outcome::Budget),
@@ -786,12 +787,12 @@ enum ActionError {
     GripForce { force_n: f64, effort_n: f64 },
     #[error(
         "all {steps} commands were out of reach, first: {first}; expected {}",
-        match first.joint {
-            Some(_) => "joint positions in rad, within the limits of the joints",
-            None => "positions in m and axis-angles in rad, in the robot's base frame",
+        match are_joints {
+            true => "joint positions in rad, within the limits of the joints and near the present ones",
+            false => "positions in m and axis-angles in rad, in the robot's base frame",
         }
     )]
-    OutOfReach { steps: u32, first: UnreachableCommand },
+    OutOfReach { steps: u32, first: UnreachableCommand, are_joints: bool },
 }
 
 /// Checks that the numbers of an action are finite and plausible, and a grip force within the effort of the gripper.

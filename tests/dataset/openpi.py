@@ -96,8 +96,10 @@ def main(root):
             for sample in (one, other):
                 assert sample["image"][slot].dtype == np.uint8 and (sample["image"][slot] == expected).all(), (slot, tactile)
     folds(softvt, pq.read_table(sorted(pathlib.Path(root).glob("data/*/*.parquet"))[0], columns=["state", "actions"]))
-    answer = softvt.SoftVTOutputs()({"actions": np.ones((50, 32))})
+    answer = softvt.SoftVTOutputs(joints=False)({"actions": np.ones((50, 32))})
     assert answer["actions"].shape == (50, 7)
+    joints = softvt.SoftVTOutputs(joints=True)({"actions": np.ones((50, 32))})
+    assert joints["actions"].shape == (50, 8)
     vision, touch = softvt.get_softvt_configs()
     assert (vision.fields["num_train_steps"], vision.fields["batch_size"]) == (7000, 256)
     for config, keys in ((vision, softvt.VISION_KEYS), (touch, softvt.TACTILE_KEYS)):

@@ -135,6 +135,8 @@ class Dataset:
             joints = [JOINT_ACTIONS] if self._control == "joints" else []
             for stream in [*self._streams.values(), self._actions, *joints]:
                 if stream not in group:
+                    if stream == JOINT_ACTIONS:
+                        raise ValueError(f"{file}: data/{name} has no {stream}: an earlier version of softvt recorded it; record it again")
                     have = ", ".join(sorted(group["obs"]))
                     raise ValueError(f"{file}: data/{name} has no stream {stream}; obs has {have}")
             text = {key: _text(attrs[key]) for key in ("task_suite", "language")}

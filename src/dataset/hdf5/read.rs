@@ -363,9 +363,13 @@ impl TaskFile {
             let StreamValues::U8(are_joints) = self.stream(demo, COMMANDS_JOINTS)?.values else {
                 return Err(self.error(demo, COMMANDS_JOINTS, "expected uint8"));
             };
-            for ((action, joints), are_joints) in
-                actions.iter_mut().zip(self.joint_commands(demo)?).zip(are_joints)
-            {
+            let joint_commands = self.joint_commands(demo)?;
+            if [joint_commands.len(), are_joints.len()] != [actions.len(); 2] {
+                let (steps, joints, flags) = (actions.len(), joint_commands.len(), are_joints.len());
+                let what = format!("{flags} values and {joints} joint positions for {steps} actions");
+                return Err(self.error(demo, COMMANDS_JOINTS, what));
+            }
+            for ((action, joints), are_joints) in actions.iter_mut().zip(joint_commands).zip(are_joints) {
                 action.joints = (are_joints == 1).then_some(joints);
             }
         }

@@ -213,6 +213,10 @@ fn patch_mask(patch: &ContactPatch, pad_w: &Pose, camera: &Camera, depth: &[f32]
     let focal = 0.5 * edge as f64 / (0.5 * camera.fovy_rad).tan();
     for point in &patch.points {
         let p = camera.pose.inverse_transform_point(&(pad_w * Point3::from(point.p_p)));
+        // Pads nearer than the camera sees are cut away.
+        if -p.z < camera.near_m {
+            continue;
+        }
         let scale = focal / -p.z;
         let centre = [0.5 * edge as f64 + scale * p.x, 0.5 * edge as f64 - scale * p.y];
         // A disc of the area that the point stands for, a little larger, so that neighbours join.

@@ -370,7 +370,7 @@ class! {
             fn tactile() -> ["softvt.Fingers"];
             /// Returns true if the arm gets to a pose from its present joint positions, to 1 mm and 0.01 rad, by the
             /// steps of inverse kinematics that a motion takes; else false and the distance at which it stops, m. It
-            /// knows nothing of obstacles.
+            /// ignores obstacles. The distance may be 0 where only the angle is not reached.
             fn reaches(pose: LuaPose) -> ["boolean", "number"];
             /// Holds the last command for a time.
             fn wait(seconds: f64 = Type::Number("s", Range::closed(0.0, 600.0))) -> [];

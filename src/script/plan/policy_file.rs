@@ -225,7 +225,8 @@ impl LuaPolicy {
             }
             (None, Some(_), ..) => return Err(ValidationError::new("give either axis_angle or quaternion")),
             (Some(_), ..) => {
-                let message = "joints has a position, axis_angle or quaternion beside it; give one of both";
+                let message =
+                    "joints has a position, axis_angle or quaternion beside it; give either joints or a pose";
                 return Err(ValidationError::new(message));
             }
             (None, None, ..) => {

@@ -131,6 +131,32 @@ fn difference(a: &[f64], b: &[u8]) -> f64 {
 }
 
 #[test]
+fn images_of_colours_or_of_segmentation_alone_are_those_of_whole_images() {
+    let (objects, fixed) = still_life();
+    let scene = scene(objects);
+    let rigid = [Pose::translation(-0.05, -0.1, 0.05)];
+    // The last camera sees a part of the floor beyond its greatest distance.
+    let moving = Camera { mount: CameraMount::Hand, ..fixed.clone() };
+    let short = Camera { far_m: 0.95, ..moving.clone() };
+    for camera in [&fixed, &moving, &short] {
+        let view = FrameView { hand_w: Some(Pose::identity()), ..cube_view(&rigid) };
+        // Renderers that have drawn another kind of image before, and fresh ones.
+        let mut used = Renderer::default();
+        for _ in 0..2 {
+            let rgb = used.render_rgb(&scene, &view, camera).expect("colours");
+            let segmentation = used.render_segmentation(&scene, &view, camera).expect("segmentation");
+            let whole = used.render(&scene, &view, camera).expect("an image");
+            let alone = Renderer::default().render(&scene, &view, camera).expect("an image");
+            assert_eq!(whole, alone);
+            assert!(rgb.depth.is_empty() && rgb.segmentation.is_empty() && segmentation.rgb.is_empty());
+            assert_eq!(rgb.rgb, whole.rgb);
+            assert_eq!(segmentation.segmentation, whole.segmentation);
+            assert_eq!(segmentation.depth, whole.depth);
+        }
+    }
+}
+
+#[test]
 fn a_cached_background_does_not_change_the_image() {
     let (objects, camera) = still_life();
     let scene = scene(objects);

@@ -236,7 +236,8 @@ impl<'a, 'p, S: ShadingSink> TileResolver<'a, 'p, S> {
         for y in 0..self.rect.height {
             for x in (0..self.rect.width).step_by(LANES) {
                 if self.samples.has_centres() {
-                    self.write_centres(x, y, &[id; LANES], self.samples.centres(x, y).1);
+                    let (ids, w) = self.samples.centres(x, y);
+                    self.write_centres(x, y, &ids, w);
                 }
                 self.shade_row(id, x, y);
             }
