@@ -1504,7 +1504,7 @@ function Arm:open(options) end
 ---@return softvt.Fingers
 function Arm:tactile() end
 
----Returns true if the arm gets to a pose from its present joint positions, to 1 mm and 0.01 rad, by the steps of inverse kinematics that a motion takes; else false and the distance at which it stops, m. It knows nothing of obstacles.
+---Returns true if the arm gets to a pose from its present joint positions, to 1 mm and 0.01 rad, by the steps of inverse kinematics that a motion takes; else false and the distance at which it stops, m. It ignores obstacles. The distance may be 0 where only the angle is not reached.
 ---@param pose softvt.Pose
 ---@return boolean
 ---@return number
