@@ -132,26 +132,27 @@ def shrink(pictures: np.ndarray, edge: int) -> np.ndarray:
     return np.stack([np.asarray(picture) for picture in small])
 
 
-def opening_steps(closure: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """True for the steps in which the expert opens the hand, given the closures (M,) that it commands in demonstrations of some lengths."""
+def hand_steps(closure: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """True for the steps in which the expert opens or closes the hand, given the closures (M,) that it commands in demonstrations of some
+    lengths."""
     change, first = np.diff(closure, prepend=closure[0]), np.cumsum(lengths) - lengths
     change[first] = 0
-    return change < -IDLE_GRIP * np.ptp(closure)
+    return np.abs(change) > IDLE_GRIP * np.ptp(closure)
 
 
-def moving_steps(actions: np.ndarray, grip_range: float, opening: np.ndarray | None = None) -> np.ndarray:
-    """True for the steps of a demonstration (T, 7) that are kept, those of `opening` (T,) among them.
+def moving_steps(actions: np.ndarray, grip_range: float, hand_moves: np.ndarray | None = None) -> np.ndarray:
+    """True for the steps of a demonstration (T, 7) that are kept, those of `hand_moves` (T,) among them.
 
     An expert that waits teaches a policy without memory to wait forever, since its observation does not change meanwhile. In a code that
-    switches, a single step shows how the hand lets go, in the midst of others that look alike and still hold: a policy would not learn it from
-    that step alone.
+    switches, the actions do not change while the fingers move: the steps in which they do would count as waiting, and a policy would learn
+    neither to let go nor to wait until the hand has closed.
     """
     kept, last = np.ones(len(actions), bool), actions[0]
     for step, action in enumerate(actions[1:], 1):
         change = np.abs(action - last)
         moves = np.linalg.norm(change[:3]) > IDLE_MOTION or np.linalg.norm(change[3:6]) > IDLE_TURN
         moves = moves or change[6] > IDLE_GRIP * grip_range
-        kept[step] = moves or (opening is not None and opening[step])
+        kept[step] = moves or (hand_moves is not None and hand_moves[step])
         last = action if moves else last
     return kept
 
@@ -315,10 +316,10 @@ def load(
     state, actions = fold(with_hand(joined("state"), joined("sensed_width"), joined("closure"), has_drives), axis), fold(actions, axis)
     grip_range, ends = float(np.ptp(actions[:, 6])), np.cumsum(recorded)[:-1]
     commanded = ACTIONS["continuous"]
-    opening = opening_steps(joined(commanded if all(commanded in numbers for numbers in packed) else ACTIONS[code])[:, 6], recorded)
+    hand_moves = hand_steps(joined(commanded if all(commanded in numbers for numbers in packed) else ACTIONS[code])[:, 6], recorded)
     moving = [
-        np.ones(len(one), bool) if has_memory else moving_steps(one, grip_range, is_opening)
-        for one, is_opening in zip(np.split(actions, ends), np.split(opening, ends))
+        np.ones(len(one), bool) if has_memory else moving_steps(one, grip_range, own)
+        for one, own in zip(np.split(actions, ends), np.split(hand_moves, ends))
     ]
     kept, lengths = np.concatenate(moving), np.array([mask.sum() for mask in moving])
     prompts = sorted(set(names.tolist()))

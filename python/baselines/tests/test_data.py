@@ -8,7 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 from softvt_baselines import UserError, prompts
-from softvt_baselines.data import ACTIONS, CAMERAS, TACTILE, Statistics, displacements, load, moving_steps, opening_steps, readings, shrink
+from softvt_baselines.data import ACTIONS, CAMERAS, TACTILE, Statistics, displacements, hand_steps, load, moving_steps, readings, shrink
 from softvt_baselines.inputs import LIMITS, RECENT, REMEMBERED, Past, Shape, read, remembered
 from softvt_baselines.numbers import FINE, Standard, coarse, fine, fold, hand, mean_axis, reference, turned, turns
 from softvt_baselines.phases import is_seen, memory_begins
@@ -143,11 +143,13 @@ class Numbers(unittest.TestCase):
         slow = np.zeros((10, 7))
         slow[:, 0] = 0.0003 * np.arange(10)
         self.assertEqual(moving_steps(slow, 1.0).tolist(), [True, False] * 5, "slow motion is not waiting")
-        switched, closure = np.zeros((10, 7)), np.array([0.5] * 10 + [0.5, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0, 0.0, 0.0, 0.0])
-        switched[:2, 6] = 1
-        opening = opening_steps(closure, np.array([10, 10]))[10:]
-        self.assertEqual(moving_steps(switched, 1.0).sum(), 2)
-        self.assertEqual(moving_steps(switched, 1.0, opening).tolist(), [True, False] + [True] * 5 + [False] * 3, "while the hand opens")
+        closure = np.array([0.5] * 10 + [0.0, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.5, 0.5, 0.4, 0.2, 0.0, 0.0, 0.0])
+        switched = np.zeros((14, 7))
+        switched[2:9, 6] = 1
+        moves = hand_steps(closure, np.array([10, 14]))[10:]
+        self.assertEqual(np.flatnonzero(moving_steps(switched, 1.0)).tolist(), [0, 2, 9])
+        kept = np.flatnonzero(moving_steps(switched, 1.0, moves)).tolist()
+        self.assertEqual(kept, [0, 2, 3, 4, 5, 6, 9, 10, 11], "while the hand closes and while it opens")
         felt = np.zeros((60, 7))
         felt[:, 6], felt[:, 2] = 0.4 + 0.00025 * np.arange(60), 2e-5 * np.arange(60)
         self.assertGreater(moving_steps(felt, 1.0).sum(), 6, "nor is tightening by 0.02 mm per step while the hand rises")
