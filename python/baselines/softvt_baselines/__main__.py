@@ -9,7 +9,14 @@ from pathlib import Path
 from . import UserError, processors
 
 CODES = ["continuous", "binary", "two-width", "force"]
-INPUTS = {"vo": "vision only", "vp": "vision and drives", "vt": "vision and touch", "vpt": "all three"}
+INPUTS = {
+    "vo": "vision only",
+    "vp": "vision and drives",
+    "vt": "vision and touch",
+    "vpt": "all three",
+    "vb": "vision and contact bits",
+    "vi": "vision and tactile pictures",
+}
 # Disturbances of recordings, m: of ordinary ones, and of those of a teacher that feels.
 DISTURBANCE, FELT_DISTURBANCE = 0.002, 0.00003
 REFERENCES = ["expert", "tactile-servo", "fixed-closure", "size-seen"]
@@ -41,14 +48,9 @@ def _train(args: argparse.Namespace) -> None:
     if args.out.is_dir():
         raise UserError(f"--out {args.out}: expected a file, this is a folder")
     args.out.parent.mkdir(parents=True, exist_ok=True)
-    inputs = {
-        "has_touch": args.touch or args.tactile_pictures,
-        "has_tactile_pictures": args.tactile_pictures,
-        "has_drives": args.drives,
-        "has_memory": args.memory,
-    }
+    inputs = {"touch": args.touch, "has_drives": args.drives, "has_memory": args.memory}
     shape = Shape(**inputs, code=args.gripper, head=args.head, frames=args.frames, edge=args.edge, chunk=20 if args.memory else 50)
-    demos = load(args.recordings, args.gripper, args.edge, args.tactile_pictures, args.drives, args.memory)
+    demos = load(args.recordings, args.gripper, args.edge, shape.has_tactile_pictures, args.drives, args.memory)
     options = TrainOptions(shape, args.steps, args.batch, args.seed, device, args.compile, args.seconds)
     train(demos, options, args.out, {"recordings": [recording.name for recording in args.recordings]})
 
@@ -193,6 +195,9 @@ def _parser() -> argparse.ArgumentParser:
     demonstrate.add_argument("--task", default="", help="only these tasks: indices, separated by commas")
     demonstrate.add_argument("--seed", type=_positive, default=1, help="seed of the episodes; evaluations use 0")
     demonstrate.add_argument("--teacher", default="tactile-servo", help="built-in policy that demonstrates")
+    demonstrate.add_argument(
+        "--tactile-pictures", action="store_true", help="store the tactile pictures of both fingers as well, for train --touch pictures"
+    )
     demonstrate.add_argument("--processes", type=int, default=0, help="processes; 0: one per processor")
     with_disturbance(demonstrate, FELT_DISTURBANCE)
     with_edge(demonstrate)
@@ -200,15 +205,19 @@ def _parser() -> argparse.ArgumentParser:
     train = command("train", _train, "train a policy")
     train.add_argument("recordings", type=Path, nargs="+", help="folders of softvt record")
     train.add_argument("--out", type=Path, required=True, help="checkpoint to write")
-    train.add_argument("--touch", action="store_true", help="give the policy the markers of both fingers")
-    train.add_argument("--tactile-pictures", action="store_true", help="give it the markers and the tactile pictures of both fingers")
+    train.add_argument(
+        "--touch",
+        default="",
+        choices=["markers", "contact", "pictures"],
+        help="what the policy sees of both fingers: their markers, whether each touches, or their tactile pictures; by default nothing",
+    )
     train.add_argument(
         "--drives", action="store_true", help="give it the exact finger position and the commanded closure, whose gap is the grip force"
     )
     train.add_argument(
         "--memory",
         action="store_true",
-        help="let it remember the last 20 s of slow motion, and close the hand by that memory alone, without pictures",
+        help="let it remember the last 20 s of slow motion, and close the hand by that memory and touch, without cameras",
     )
     train.add_argument("--gripper", default="continuous", choices=CODES, help="grip code")
     train.add_argument("--head", default="regression", choices=["regression", "flow"], help="how actions are predicted")

@@ -12,7 +12,7 @@ from .inputs import Shape
 from .model import Policy
 from .numbers import Standard
 
-VERSION = 6
+VERSION = 7
 
 
 @dataclass
@@ -64,7 +64,7 @@ def load(path: Path, device: torch.device) -> Checkpoint:
         content = torch.load(path, map_location="cpu", weights_only=True)
         if content["version"] != VERSION:
             raise UserError(f"{path}: a checkpoint of version {content['version']}, expected {VERSION}; train it again")
-        shape = Shape(**{key: tuple(value) if isinstance(value, list) else value for key, value in content["shape"].items()})
+        shape = Shape(**content["shape"])
         stated = content["statistics"]
         numbers = {name: Standard(*(part.numpy() for part in stated[name])) for name in ("state", "action", "felt")}
         statistics = Statistics(numbers["state"], numbers["action"], numbers["felt"], float(stated["marker_scale"]), stated["axis"].numpy())

@@ -1,7 +1,7 @@
 """Demonstrations of `softvt record`, as arrays.
 
 The first reader of a recording packs it: pictures at the edge that policies see, and all numbers, as numpy files in
-`RECORDING/packed_EDGE/`. Later readers map these files into memory.
+`RECORDING/packed_EDGE/`, and tactile pictures in `RECORDING/packed_tactile/`. Later readers map these files into memory.
 """
 
 import hashlib
@@ -22,9 +22,11 @@ from .phases import is_seen, memory_begins
 
 # The grip codes and the streams that hold the actions in them.
 ACTIONS = {"continuous": "actions", "binary": "actions_binary", "two-width": "actions_two_width", "force": "actions_force"}
-# Pictures by their keys in an observation, and their streams: of the cameras, and of the tactile sensors.
+# Pictures of the cameras by their keys in an observation, and their streams; streams of the tactile pictures of both fingers.
 CAMERAS = {"image": "agentview_rgb", "wrist_image": "eye_in_hand_rgb"}
-TACTILE = {"left_tactile_image": "gsmini_left_tactile_rgb", "right_tactile_image": "gsmini_right_tactile_rgb"}
+TACTILE = ["gsmini_left_tactile_rgb", "gsmini_right_tactile_rgb"]
+# Shape of the tactile pictures of a step: finger, and a cell of softvt's `tactile_image`, without drawn markers. 19 kB.
+CELLS = (2, 56, 56, 3)
 # Motion below which a step is idle: of the position (m), of the rotation vector (rad), and of the gripper as a share of its range in
 # the recording.
 IDLE_MOTION, IDLE_TURN, IDLE_GRIP = 0.0005, 0.005, 0.002
@@ -36,6 +38,10 @@ LEAST_FINE_SPREAD = 0.2
 PACKED = 5
 # Length of the marker displacements of a step: finger, marker, (x, y).
 MARKERS = 2 * 99 * 2
+# A finger touches if the mean divergence of its markers over the last steps is above a limit (about 0.08 N), as tactile-servo feels it.
+TOUCHES, TOUCH_WINDOW = 4e-4, 5
+# Columns of the readings that hold the divergence of each finger.
+DIVERGENCE = [2, 5]
 
 
 @dataclass
@@ -48,6 +54,8 @@ class Demonstrations:
     commands: np.ndarray  # (M, 7): the action before each step; that of a first step is its state
     markers: np.ndarray  # (M, 396) px: displacements of the markers of both fingers
     readings: np.ndarray  # (M, 6): of both fingers
+    tactile_pictures: np.ndarray | None  # (P, *CELLS) uint8, if they were asked for
+    tactile_picture: np.ndarray | None  # (M,) index of the tactile pictures of each recorded step, -1 without
     actions: np.ndarray  # (N, 7): tool position, rotation vector, gripper in the grip code; folded
     row: np.ndarray  # (N,) index among the recorded steps
     start: np.ndarray  # (N,) index of the first recorded step of the same demonstration
@@ -57,6 +65,13 @@ class Demonstrations:
     axis: np.ndarray  # (3,) the side of the rotation vectors
     is_relative: bool  # True if the closure of an answer is relative to the commanded one
     has_memory: bool = False  # True if answers are on the fine scale, and relative to the command before while the hand feels
+
+    @property
+    def contact(self) -> np.ndarray:
+        """(M, 2): 1 in the steps in which each finger touches."""
+        first = np.zeros(len(self.readings), int)
+        first[self.start] = self.start
+        return contact(self.readings, np.maximum.accumulate(first))
 
     @property
     def begin(self) -> np.ndarray:
@@ -107,6 +122,12 @@ def readings(motion: np.ndarray) -> np.ndarray:
     return np.concatenate([moved.mean(axis=2), gradient.sum(axis=2, keepdims=True)], 2).reshape(len(motion), -1).astype(np.float32)
 
 
+def contact(felt: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Whether each finger touches (M, 2), 0 or 1, given readings (M, 6) and the row (M,) at which the episode of each begins."""
+    rows = np.maximum(np.arange(len(felt))[:, None] - np.arange(TOUCH_WINDOW), first[:, None])
+    return np.float32(felt[:, DIVERGENCE][rows].mean(1) > TOUCHES)
+
+
 def is_relative(code: str, has_drives: bool) -> bool:
     """True if the closure of an answer is relative to the commanded one.
 
@@ -130,6 +151,13 @@ def shrink(pictures: np.ndarray, edge: int) -> np.ndarray:
         return pictures
     small = [Image.fromarray(picture).resize((edge, edge), Image.Resampling.BOX) for picture in pictures]
     return np.stack([np.asarray(picture) for picture in small])
+
+
+def tactile_cells(fingers: list[np.ndarray]) -> np.ndarray:
+    """Tactile pictures (T, *CELLS) of both fingers, given those of each (T, h, w, 3), scaled as softvt scales the cells of `tactile_image`."""
+    size = CELLS[1:3]
+    cells = [[np.asarray(Image.fromarray(one).resize(size, Image.Resampling.BILINEAR)) for one in pictures] for pictures in fingers]
+    return np.stack([np.stack(one) for one in cells], 1)
 
 
 def hand_steps(closure: np.ndarray, lengths: np.ndarray) -> np.ndarray:
@@ -166,22 +194,28 @@ class _Job:
     steps: int
     row: int
     folder: Path
-    edge: int
-    streams: dict[str, str]  # of pictures, by key
+    edge: int | None  # of the pictures of the cameras; None: the tactile pictures are packed
+
+
+def _pictures(job: _Job, obs, streams: list[str]) -> list[np.ndarray]:
+    if missing := [stream for stream in streams if stream not in obs]:
+        raise UserError(f"{job.file}: {job.name} has no pictures ({', '.join(missing)}): it was recorded with --images video")
+    return [obs[stream][:] for stream in streams]
 
 
 def _pack_one(job: _Job) -> dict[str, np.ndarray | str]:
-    """Writes the pictures of a demonstration to their rows, and returns its numbers."""
+    """Writes the pictures of a demonstration to their rows, and returns its numbers; none with the tactile pictures."""
     rows = slice(job.row, job.row + job.steps)
     with h5py.File(job.file) as file:
         demo = file["data"][job.name]
         obs = demo["obs"]
-        if missing := [stream for stream in job.streams.values() if stream not in obs]:
-            raise UserError(f"{job.file}: {job.name} has no pictures ({', '.join(missing)}): it was recorded with --images video")
-        for key, stream in job.streams.items():
-            if key in CAMERAS and (height := obs[stream].shape[1]) != job.edge:
+        if job.edge is None:
+            np.load(job.folder / "tactile.npy", mmap_mode="r+")[rows] = tactile_cells(_pictures(job, obs, TACTILE))
+            return {}
+        for key, pictures in zip(CAMERAS, _pictures(job, obs, [*CAMERAS.values()])):
+            if (height := pictures.shape[1]) != job.edge:
                 raise UserError(f"{job.file}: pictures of {height} pixels; record with --edge {job.edge}, or train with --edge {height}")
-            np.load(job.folder / f"{key}.npy", mmap_mode="r+")[rows] = shrink(obs[stream][:], job.edge)
+            np.load(job.folder / f"{key}.npy", mmap_mode="r+")[rows] = shrink(pictures, job.edge)
         actions = {stream: demo[stream][:].astype(np.float32) for stream in ACTIONS.values() if stream in demo}
         motion = obs["gripper_marker_motion"][:]
         return actions | {
@@ -214,27 +248,37 @@ def _demonstrations(recording: Path) -> list[tuple[Path, str, int]]:
     return found
 
 
-def pack(recording: Path, edge: int, processes: int, has_tactile: bool = False) -> Path:
-    """Packs a recording, with its tactile pictures if they are asked for, unless that was done before. Returns the folder of the
-    packed files.
+def packed_folder(recording: Path, edge: int | None) -> Path:
+    """The folder of the packed files with pictures of an edge, or of those with the tactile pictures."""
+    return recording / f"packed_{'tactile' if edge is None else edge}"
 
-    Raises UserError if the recording is incomplete or has no pictures.
-    """
+
+def identity(recording: Path) -> str:
+    """What packed files of a recording were made of. Raises UserError if it is incomplete."""
     card = recording / "dataset.json"
     if not card.is_file():
         raise UserError(f"{recording} is no complete recording of softvt: it has no dataset.json")
-    identity = f"{PACKED} {hashlib.sha256(card.read_bytes()).hexdigest()}"
-    streams = CAMERAS | TACTILE if has_tactile else CAMERAS
-    folder = recording / (f"packed_{edge}_tactile" if has_tactile else f"packed_{edge}")
+    return f"{PACKED} {hashlib.sha256(card.read_bytes()).hexdigest()}"
+
+
+def pack(recording: Path, edge: int | None, processes: int) -> Path:
+    """Packs a recording with pictures of an edge, or its tactile pictures, unless that was done before. Returns the folder of the packed
+    files.
+
+    Raises UserError if the recording is incomplete or has no such pictures.
+    """
+    own, folder = identity(recording), packed_folder(recording, edge)
 
     def is_packed() -> bool:
-        return (folder / "identity").is_file() and (folder / "identity").read_text() == identity
+        return (folder / "identity").is_file() and (folder / "identity").read_text() == own
 
     if is_packed():
         return folder
     demos = _demonstrations(recording)
     if not demos:
-        others = [other.name.removeprefix("packed_") for other in recording.glob("packed_*") if other.name != folder.name]
+        others = sorted(other.name.removeprefix("packed_") for other in recording.glob("packed_*") if other.name != folder.name)
+        if others and edge is None:
+            raise UserError(f"{recording} has no tactile pictures: record it again, demonstrate with --tactile-pictures")
         raise UserError(
             f"{recording}: no demonstrations" + (f" with pictures of {edge} pixels, but of {', '.join(others)}" if others else "")
         )
@@ -242,8 +286,8 @@ def pack(recording: Path, edge: int, processes: int, has_tactile: bool = False) 
     with TemporaryDirectory(dir=recording, prefix="packing_") as scratch:
         part = Path(scratch) / folder.name
         part.mkdir()
-        _write_packed(part, demos, edge, streams, processes)
-        (part / "identity").write_text(identity)
+        _write_packed(part, demos, edge, processes)
+        (part / "identity").write_text(own)
         if is_packed():  # by another process, which reads it by now
             return folder
         shutil.rmtree(folder, ignore_errors=True)
@@ -255,14 +299,22 @@ def pack(recording: Path, edge: int, processes: int, has_tactile: bool = False) 
     return folder
 
 
-def _write_packed(folder: Path, demos: list[tuple[Path, str, int]], edge: int, streams: dict[str, str], processes: int) -> None:
-    """Writes the pictures and numbers of demonstrations (file, name, steps)."""
+def create_pictures(folder: Path, edge: int | None, count: int) -> None:
+    """Creates the files for `count` pictures of each camera, or of the tactile sensors. They are sparse: only what is written takes space."""
+    shapes = {"tactile": CELLS} if edge is None else {key: (edge, edge, 3) for key in CAMERAS}
+    for key, shape in shapes.items():
+        np.lib.format.open_memmap(folder / f"{key}.npy", "w+", np.uint8, (count, *shape))
+
+
+def _write_packed(folder: Path, demos: list[tuple[Path, str, int]], edge: int | None, processes: int) -> None:
+    """Writes the pictures and, with those of the cameras, the numbers of demonstrations (file, name, steps)."""
     ends = np.cumsum([steps for _, _, steps in demos])
-    for key in streams:
-        np.lib.format.open_memmap(folder / f"{key}.npy", "w+", np.uint8, (int(ends[-1]), edge, edge, 3))
-    jobs = [_Job(path, name, steps, int(end) - steps, folder, edge, streams) for (path, name, steps), end in zip(demos, ends)]
+    create_pictures(folder, edge, int(ends[-1]))
+    jobs = [_Job(path, name, steps, int(end) - steps, folder, edge) for (path, name, steps), end in zip(demos, ends)]
     with ProcessPoolExecutor(processes) as pool:
         numbers = list(pool.map(_read_one, jobs))
+    if edge is None:
+        return
     common = set.intersection(*(set(one) for one in numbers)) - {"prompt"}
     arrays = {stream: np.concatenate([one[stream] for one in numbers]) for stream in sorted(common)}
     prompts = np.array([one["prompt"] for one in numbers])
@@ -296,7 +348,7 @@ def load(
 
     Raises UserError if a recording is incomplete, or lacks the pictures or the grip code.
     """
-    folders = [pack(recording, edge, processors(), has_tactile) for recording in recordings]
+    folders = [pack(recording, edge, processors()) for recording in recordings]
     packed = [np.load(folder / "numbers.npz") for folder in folders]
     for recording, numbers in zip(recordings, packed):
         _check_grip_code(recording, code, numbers)
@@ -304,12 +356,22 @@ def load(
     def joined(stream: str) -> np.ndarray:
         return np.concatenate([numbers[stream] for numbers in packed])
 
-    picture = [numbers["picture"] if "picture" in numbers else np.arange(numbers["lengths"].sum()) for numbers in packed]
-    counts = [int(one.max()) + 1 for one in picture]
+    def indices(key: str) -> tuple[np.ndarray, list[int]]:
+        """The index of the pictures of each recorded step, -1 without, and the number of pictures of each recording."""
+        own = [numbers[key] if key in numbers else np.arange(numbers["lengths"].sum()) for numbers in packed]
+        counts = [int(one.max()) + 1 for one in own]
+        return np.concatenate([np.where(one < 0, -1, one + first) for one, first in zip(own, np.cumsum(counts) - counts)]), counts
 
-    def pictures(key: str) -> np.ndarray:
+    def pictures(folders: list[Path], key: str, counts: list[int]) -> np.ndarray:
         mapped = [np.load(folder / f"{key}.npy", mmap_mode="r")[:count] for folder, count in zip(folders, counts)]
         return mapped[0] if len(mapped) == 1 else np.concatenate(mapped)
+
+    picture, counts = indices("picture")
+    tactile_pictures = tactile_picture = None
+    if has_tactile:
+        tactile_folders = [pack(recording, None, processors()) for recording in recordings]
+        tactile_picture, tactile_counts = indices("tactile_picture")
+        tactile_pictures = pictures(tactile_folders, "tactile", tactile_counts)
 
     recorded, names, actions = joined("lengths"), joined("prompts"), joined(ACTIONS[code])
     axis = mean_axis(actions[:, 3:6])
@@ -324,12 +386,14 @@ def load(
     kept, lengths = np.concatenate(moving), np.array([mask.sum() for mask in moving])
     prompts = sorted(set(names.tolist()))
     return Demonstrations(
-        pictures={key: pictures(key) for key in (CAMERAS | TACTILE if has_tactile else CAMERAS)},
-        picture=np.concatenate([np.where(one < 0, -1, one + first) for one, first in zip(picture, np.cumsum(counts) - counts)]),
+        pictures={key: pictures(folders, key, counts) for key in CAMERAS},
+        picture=picture,
         state=state,
         commands=commands(state, actions, recorded),
         markers=joined("markers"),
         readings=joined("readings"),
+        tactile_pictures=tactile_pictures,
+        tactile_picture=tactile_picture,
         actions=actions[kept],
         row=np.flatnonzero(kept),
         start=np.repeat(np.cumsum(recorded) - recorded, lengths),

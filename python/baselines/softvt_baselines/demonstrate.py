@@ -2,10 +2,10 @@
 
 A teacher such as tactile-servo first runs without cameras. What it did is repeated through `softvt serve`, with pictures only where a policy
 looks: its grip as it was, and the way from there by a law. In further scenes, where the teacher runs until it begins to close, another law
-reaches the object from random places. The recording is written as `data.pack` writes it.
+reaches the object from random places. The recording is written as `data.pack` writes it. Tactile pictures, if they are asked for, are stored
+for all steps in which a policy sees them.
 """
 
-import hashlib
 import json
 import multiprocessing
 from collections import Counter
@@ -17,9 +17,9 @@ import numpy as np
 
 from . import UserError, laws
 from .client import Client, serving
-from .data import ACTIONS, CAMERAS, PACKED, displacements, readings
+from .data import ACTIONS, CAMERAS, commands, create_pictures, displacements, identity, packed_folder, readings
 from .evaluate import camera_flags, run_softvt
-from .inputs import RECENT
+from .inputs import MOSAIC, RECENT, REMEMBERED_PICTURES, TOUCH_STEPS, mosaic_cells
 from .laws import Grasp, Release
 from .numbers import GRIPPER, ROTATION, between, rotated
 from .phases import is_seen, memory_begins
@@ -57,11 +57,15 @@ PROFILE = """return softvt.profile {
     { keys = { "wrist_image" }, source = "camera", camera = "wrist" },
     { keys = { "state" }, source = "state", parts = { "position", "axis_angle", "finger_position", "sensed_finger_position", "closure" }, frames = RECENT },
     { keys = { "tactile_marker_motion" }, source = "marker_motion", frames = RECENT },
-    { keys = { "prompt" }, source = "prompt" },
+    { keys = { "prompt" }, source = "prompt" },TACTILE
   },
   actions = { pose = "absolute", gripper = { open = 0, closed = 1, code = "continuous" } },
 }
 """
+TACTILE = """
+    { keys = { "tactile_image" }, source = "tactile_image" },"""
+# Counts of the pictures of both cameras and of both fingers.
+COUNTS = ("picture", "tactile_picture")
 
 
 @dataclass
@@ -163,6 +167,7 @@ class Episode:
     def __init__(self, client: Client, task: int, episode: int):
         self.client, self.shown = client, Shown()
         obs = client.reset(task, episode)
+        self.most = MOSAIC if "tactile_image" in obs else RECENT  # steps that one observation shows
         self.prompt, self.is_over, self.info = str(obs["prompt"]), False, {}
         self.next = self._rows(obs, 1)[0]  # the row of the next step
 
@@ -172,6 +177,9 @@ class Episode:
         pairs = np.stack([np.broadcast_to(motion[:1], moved.shape), moved], 2)
         felt, markers, states = readings(pairs), displacements(pairs).astype(np.float32), np.asarray(obs["state"])[-count:]
         rows = [{"state": states[k], "markers": markers[k], "readings": felt[k]} for k in range(count)]
+        if "tactile_image" in obs:
+            for row, cells in zip(rows, mosaic_cells(np.asarray(obs["tactile_image"]))[-count:]):
+                row["tactile"] = cells
         rows[-1] |= {key: np.asarray(obs[key]) for key in CAMERAS}
         return rows
 
@@ -181,7 +189,7 @@ class Episode:
         done = 0
         for stop in stops:
             while done < stop and not self.is_over:
-                part = actions[done : min(stop, done + RECENT)]
+                part = actions[done : min(stop, done + self.most)]
                 response = self.client.step(part)
                 count = int(response["info"]["carried_out"])
                 self.info, self.is_over = response["info"], response["terminated"] or response["truncated"]
@@ -206,9 +214,21 @@ class Job:
 @dataclass
 class Settings:
     address: str
-    folder: Path
+    out: Path
     edge: int
     seed: int
+    tactile_pictures: bool
+
+
+def _tactile_rows(states: np.ndarray, actions: np.ndarray, picture: np.ndarray) -> np.ndarray:
+    """Steps of a demonstration whose tactile pictures a policy sees, given the index of the pictures of the cameras in each, -1 without: those
+    that are trained on, and those that are seen before them."""
+    steps, before = np.arange(len(actions)), commands(states, actions, np.array([len(actions)]))
+    begins = memory_begins(before, np.array([0]))
+    trained = (picture >= 0) | ~is_seen(before, steps, begins)
+    seen = [np.maximum(steps - back, begins)[trained] for back in REMEMBERED_PICTURES]
+    seen += [np.maximum(steps - back, 0)[trained] for back in TOUCH_STEPS]
+    return np.unique(np.concatenate(seen))
 
 
 class _Worker:
@@ -216,26 +236,37 @@ class _Worker:
 
     def __init__(self, settings: Settings, used):
         self.client, self.settings, self.used = Client(settings.address), settings, used
-        self.files = {key: np.load(settings.folder / f"{key}.npy", mmap_mode="r+") for key in CAMERAS}
+        folder = packed_folder(settings.out, settings.edge)
+        self.files = {key: np.load(folder / f"{key}.npy", mmap_mode="r+") for key in CAMERAS}
+        if settings.tactile_pictures:
+            self.files["tactile"] = np.load(packed_folder(settings.out, None) / "tactile.npy", mmap_mode="r+")
+
+    def store(self, rows: list[dict], wanted: np.ndarray, keys: tuple[str, ...], count: str) -> np.ndarray:
+        """Writes pictures of the wanted rows to the files. Returns the index of those of each row, -1 without."""
+        with self.used[count].get_lock():
+            at = self.used[count].value
+            self.used[count].value += len(wanted)
+        for key in keys:
+            for k, row in enumerate(wanted):
+                self.files[key][at + k] = rows[row][key]
+        found = np.full(len(rows), -1)
+        found[wanted] = at + np.arange(len(wanted))
+        return found
 
     def demonstration(self, shown: Shown, prompt: str, pictured: np.ndarray, first: int) -> dict:
         """The rows from the first one, whose pictures go to the files."""
         rows = shown.rows[first:]
+        states, actions = np.array([row["state"] for row in rows], np.float32), np.array(shown.actions[first:], np.float32)
         chosen = {*(pictured - first).tolist()}
-        wanted = [k for k, row in enumerate(rows) if k in chosen and "image" in row]
-        with self.used.get_lock():
-            at = self.used.value
-            self.used.value += len(wanted)
-        for key, file in self.files.items():
-            for k, row in enumerate(wanted):
-                file[at + k] = rows[row][key]
-        picture = np.full(len(rows), -1)
-        picture[wanted] = at + np.arange(len(wanted))
-        states = np.array([row["state"] for row in rows], np.float32)
-        return {
+        wanted = np.array([k for k, row in enumerate(rows) if k in chosen and "image" in row], int)
+        picture, tactile = self.store(rows, wanted, (*CAMERAS,), "picture"), {}
+        if self.settings.tactile_pictures:
+            seen = _tactile_rows(states[:, :7], actions, picture)
+            tactile["tactile_picture"] = self.store(rows, seen, ("tactile",), "tactile_picture")
+        return tactile | {
             "prompt": prompt,
             "picture": picture,
-            ACTIONS["continuous"]: np.array(shown.actions[first:], np.float32),
+            ACTIONS["continuous"]: actions,
             "state": states[:, :7],
             "sensed_width": 2 * states[:, 7:8],
             "closure": states[:, 8:9],
@@ -327,6 +358,7 @@ class Demonstrate:
     disturbance: float  # m
     teacher: str
     task: str  # only these tasks: indices, separated by commas; "": all
+    tactile_pictures: bool  # store them
     processes: int
 
     @property
@@ -363,16 +395,16 @@ class Demonstrate:
     def repeat(self, jobs: list[Job], seed: int, used) -> tuple[list[dict], Counter]:
         """The demonstrations of jobs, and what became of them."""
         profile, found, fates = self.out / "profile.lua", [], Counter()
-        profile.write_text(PROFILE.replace("RECENT", str(RECENT)))
+        profile.write_text(PROFILE.replace("RECENT", str(RECENT)).replace("TACTILE", TACTILE if self.tactile_pictures else ""))
         flags = ["--threads", str(self.processes), "--privileged", "--profile", str(profile), "--seed", str(seed), *self.common]
         with serving(self.suite, [*flags, *camera_flags(self.edge)]) as address:
-            settings = Settings(address, self.out / f"packed_{self.edge}", self.edge, seed)
+            settings = Settings(address, self.out, self.edge, seed, self.tactile_pictures)
             with ProcessPoolExecutor(self.processes, CONTEXT, _begin, (settings, used)) as pool:
                 for number, (shown, fate) in enumerate(pool.map(_show, jobs), 1):
                     found += shown
                     fates[fate] += 1
                     if number % 100 == 0 or number == len(jobs):
-                        print(f"{self.out.name}: {number} of {len(jobs)} repeated, {used.value} pictures", flush=True)
+                        print(f"{self.out.name}: {number} of {len(jobs)} repeated, {used['picture'].value} pictures", flush=True)
         return found, fates
 
 
@@ -381,23 +413,23 @@ def demonstrate(one: Demonstrate) -> None:
 
     Raises UserError if softvt fails.
     """
-    out, folder = one.out, one.out / f"packed_{one.edge}"
+    out, edges = one.out, [one.edge, None] if one.tactile_pictures else [one.edge]
     if (out / "dataset.json").is_file():
         return
-    folder.mkdir(parents=True, exist_ok=True)
+    for edge in edges:
+        packed_folder(out, edge).mkdir(parents=True, exist_ok=True)
     grips = one.jobs(one.run_teacher(one.seed, one.attempts, None), 0)
     ways = one.jobs(one.run_teacher(one.seed + NEXT_SEED, one.scenes, REACHES), one.ways)
     if not grips:
         raise UserError(f"{out}: no attempt of the teacher is safe")
-    most = len(grips) * GRIP_PICTURES + len(ways) * one.ways * WAY_PICTURES
-    for key in CAMERAS:  # sparse: only what is written takes space
-        np.lib.format.open_memmap(folder / f"{key}.npy", "w+", np.uint8, (most, one.edge, one.edge, 3))
-    used = CONTEXT.Value("q", 0)
+    for edge, most in zip(edges, (GRIP_PICTURES, MOST_STEPS)):
+        create_pictures(packed_folder(out, edge), edge, len(grips) * most + len(ways) * one.ways * WAY_PICTURES)
+    used = {count: CONTEXT.Value("q", 0) for count in COUNTS}
     (found, fates), (more, others) = one.repeat(grips, one.seed, used), one.repeat(ways, one.seed + NEXT_SEED, used)
     found += more
     lengths = np.array([len(one["state"]) for one in found])
     arrays = {key: np.concatenate([one[key] for one in found]) for key in found[0] if key != "prompt"}
-    np.savez(folder / "numbers.npz", lengths=lengths, prompts=np.array([one["prompt"] for one in found]), **arrays)
+    np.savez(packed_folder(out, one.edge) / "numbers.npz", lengths=lengths, prompts=np.array([one["prompt"] for one in found]), **arrays)
     (out / "recording.json").write_text(json.dumps({"gripper": None}) + "\n")
     card = {key: value for key, value in vars(one).items() if key not in ("out", "processes")} | {
         "safe_attempts": len(grips),
@@ -405,8 +437,10 @@ def demonstrate(one: Demonstrate) -> None:
         "scenes_shown": dict(sorted(others.items())),
         "demonstrations": len(found),
         "steps": int(lengths.sum()),
-        "pictures": used.value,
+        "pictures": used["picture"].value,
+        "tactile_picture_steps": used["tactile_picture"].value,
     }
     (out / "dataset.json").write_text(json.dumps(card, indent=1) + "\n")
-    (folder / "identity").write_text(f"{PACKED} {hashlib.sha256((out / 'dataset.json').read_bytes()).hexdigest()}")
+    for edge in edges:
+        (packed_folder(out, edge) / "identity").write_text(identity(out))
     print(f"{out.name}: {json.dumps(card)}", flush=True)

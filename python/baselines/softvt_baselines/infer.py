@@ -5,7 +5,7 @@ import torch
 
 from . import UserError, prompts
 from .checkpoint import Checkpoint
-from .inputs import RECENT, read
+from .inputs import read
 from .model import Policy
 from .numbers import FINE, coarse, turned
 from .serve import Plan, Request
@@ -60,10 +60,10 @@ class Answering:
         """The inputs of the network for a request, which gets the memory after it."""
         shape, last, before = self.checkpoint.policy.shape, request.last, None
         if shape.has_memory and last is not None:
-            executed, most = request.obs.get("softvt", {}).get("step", 0) - last.step, min(RECENT, len(last.actions))
+            executed, most = request.obs.get("softvt", {}).get("step", 0) - last.step, shape.most_executed
             if not 0 < executed <= most:
                 raise UserError(
-                    f"{executed} steps after an answer of {len(last.actions)} actions: a policy with memory needs --replan {most} or less"
+                    f"{executed} steps after an answer of {len(last.actions)} actions: this policy remembers and needs --replan {most} or less"
                 )
             before = last.memory, last.actions[:executed]
         inputs, request.memory = read(request.obs, shape, self.checkpoint.statistics, self.vocabulary, before)

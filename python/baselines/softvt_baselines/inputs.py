@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from . import UserError, prompts
-from .data import CAMERAS, MARKERS, TACTILE, Statistics, is_relative, readings, seen_reference, shrink
+from .data import CAMERAS, CELLS, MARKERS, TOUCH_WINDOW, Statistics, contact, is_relative, readings, seen_reference
 from .numbers import GRIPPER, ROTATION, fold, hand, reference, turned, turns
 from .phases import holds, is_seen, memory_begins
 
@@ -20,13 +20,20 @@ INTERVALS, REMEMBERED = len(LIMITS) - 1, LIMITS[-1]
 SHARES = np.float32([[(first <= back < end) / (end - first) for back in range(REMEMBERED)] for first, end in pairwise(LIMITS)])
 # Control steps in an observation of such a policy, softvt's largest number: as many actions may be executed of an answer.
 RECENT = 32
+# What a policy sees of the fingers, and how many numbers per step it remembers of it: the readings of the markers, or whether each touches.
+TOUCH = {"": 0, "markers": 6, "contact": 2, "pictures": 0}
+# Steps before the present one whose touch is seen, and those of a policy that remembers, whose memory has no numbers of tactile pictures. Those
+# from before its memory begins are replaced by that at which it does.
+TOUCH_STEPS, REMEMBERED_PICTURES = (4, 0), (128, 32, 8, 0)
+# Control steps in `tactile_image`, a mosaic of 4 × 4 cells: as many actions may be executed of an answer of a policy that remembers them.
+MOSAIC = 8
 
 
 @dataclass
 class Shape:
     """Inputs and size of a network."""
 
-    has_touch: bool  # the markers of both fingers
+    touch: str = ""  # a key of TOUCH
     code: str = "continuous"  # grip code of its answers
     head: str = "regression"  # or "flow"
     frames: int = 1  # control steps whose pictures and states are seen
@@ -35,8 +42,6 @@ class Shape:
     width: int = 384
     layers: int = 4  # of the encoder and of the decoder
     action: int = 7
-    marker_steps: tuple[int, ...] = (4, 0)  # steps before the present one whose markers are seen
-    has_tactile_pictures: bool = False  # besides the markers
     has_drives: bool = False  # the exact finger position and the commanded closure, whose gap is the grip force
     has_memory: bool = False  # states, commands and readings of earlier steps; answers are then relative to the command before
 
@@ -45,8 +50,27 @@ class Shape:
 
     @property
     def pictures(self) -> list[str]:
-        """Keys of the pictures."""
-        return [*CAMERAS, *TACTILE] if self.has_tactile_pictures else [*CAMERAS]
+        """Keys of the pictures of the cameras."""
+        return [*CAMERAS]
+
+    @property
+    def has_markers(self) -> bool:
+        """True if softvt sends the markers."""
+        return self.touch in ("markers", "contact")
+
+    @property
+    def has_tactile_pictures(self) -> bool:
+        return self.touch == "pictures"
+
+    @property
+    def touch_steps(self) -> tuple[int, ...]:
+        """Steps before the present one whose touch is seen."""
+        return REMEMBERED_PICTURES if self.has_tactile_pictures and self.has_memory else TOUCH_STEPS
+
+    @property
+    def most_executed(self) -> int:
+        """Largest number of actions of an answer that may be executed before the next one."""
+        return min(self.chunk, MOSAIC if self.has_tactile_pictures else RECENT) if self.has_memory else self.chunk
 
     @property
     def state(self) -> int:
@@ -67,12 +91,11 @@ class Shape:
         inputs = {
             "image": 'source = "camera", camera = "third_person"' + history,
             "wrist_image": 'source = "camera", camera = "wrist"' + history,
-            "left_tactile_image": 'source = "tactile", finger = "left"' + history,
-            "right_tactile_image": 'source = "tactile", finger = "right"' + history,
             "state": f'source = "state", parts = {{ {", ".join(map(json.dumps, parts))} }}' + states,
             "prompt": 'source = "prompt"',
             "softvt": 'source = "query"',
             "tactile_marker_motion": f'source = "marker_motion", frames = {self.marker_rows - 1}',
+            "tactile_image": 'source = "tactile_image"',
         }
         lines = "".join(f'    {{ keys = {{ "{key}" }}, {inputs[key]} }},\n' for key in self.keys)
         ends = "" if self.code == "force" else "open = 0, closed = 1, "
@@ -82,12 +105,14 @@ class Shape:
     @property
     def marker_rows(self) -> int:
         """Length of tactile_marker_motion (rows, 198, 2): the initial positions of the markers, and those of the last steps."""
-        return RECENT + 1 if self.has_memory else max(self.marker_steps) + 2
+        own = max(TOUCH_STEPS) + (TOUCH_WINDOW if self.touch == "contact" else 1)
+        return 1 + (RECENT if self.has_memory else own)
 
     @property
     def keys(self) -> list[str]:
         """Keys of an observation."""
-        return [*self.pictures, "state", "prompt", "softvt"] + ["tactile_marker_motion"] * self.has_touch
+        touch = ["tactile_marker_motion"] * self.has_markers + ["tactile_image"] * self.has_tactile_pictures
+        return [*self.pictures, "state", "prompt", "softvt", *touch]
 
 
 @dataclass
@@ -97,7 +122,8 @@ class Past:
 
     states: np.ndarray  # (T, 7): in the units of commands
     commands: np.ndarray  # (T, 7): the action before each step
-    readings: np.ndarray  # (T, 6): of the fingers
+    readings: np.ndarray  # (T, n): what is remembered of the fingers
+    tactile: np.ndarray | None = None  # (t, *CELLS) tactile pictures of the last steps, as many as are seen
 
     def inputs(self) -> dict[str, np.ndarray]:
         """The means of the remembered steps, each with a first axis of length 1: states and commands relative to the command before, along
@@ -108,7 +134,11 @@ class Past:
         rows, now, is_known = np.maximum(last - np.arange(REMEMBERED), begin), self.commands[-1], np.float32(begin < last)
         axes = turns(now[ROTATION])
         states, commands = (turned(is_known * (numbers[rows] - now), axes) for numbers in (self.states, self.commands))
-        return {
+        seen = {}
+        if self.tactile is not None:
+            back = np.minimum(REMEMBERED_PICTURES, last - begin)
+            seen["tactile"] = self.tactile[len(self.tactile) - 1 - back][None]
+        return seen | {
             "states": (SHARES @ states)[None],
             "commands": (SHARES @ commands)[None],
             "extremes": np.stack([commands.min(0), commands.max(0)])[None],
@@ -119,16 +149,39 @@ class Past:
         }
 
 
-def remembered(states: np.ndarray, felt: np.ndarray, before: tuple[Past, np.ndarray] | None) -> Past:
-    """What was seen up to the present step, given the states (RECENT, 7) and readings of the last steps, and what had been seen at the
-    observation before with the actions (n, 7) executed since; None at the start."""
+def mosaic_cells(mosaic: np.ndarray) -> np.ndarray:
+    """The tactile pictures (MOSAIC, *CELLS) in `tactile_image`, oldest first: four to a row, those of the left finger above."""
+    fingers, height, width, colors = CELLS
+    return mosaic.reshape(fingers, 2, height, 4, width, colors).transpose(1, 3, 0, 2, 4, 5).reshape(MOSAIC, *CELLS)
+
+
+def remembered(states: np.ndarray, felt: np.ndarray, before: tuple[Past, np.ndarray] | None, tactile: np.ndarray | None = None) -> Past:
+    """What was seen up to the present step, given the states (RECENT, 7), what is remembered of the fingers and the tactile pictures
+    (MOSAIC, *CELLS), if they are seen, of the last steps, and what had been seen at the observation before with the actions (n, 7) executed
+    since; None at the start."""
     if before is None:
-        return Past(states[-1:], states[-1:], felt[-1:])
+        return Past(states[-1:], states[-1:], felt[-1:], None if tactile is None else tactile[-1:])
     past, actions = before
     steps, commands = len(actions), actions.astype(np.float32)
     commands[:, GRIPPER] = commands[:, GRIPPER].clip(0, 1)
     pairs = (past.states, states[-steps:]), (past.commands, commands), (past.readings, felt[-steps:])
-    return Past(*(np.concatenate(pair) for pair in pairs))
+    pictures = None
+    if tactile is not None:
+        pictures = np.concatenate([past.tactile, tactile[-steps:]])[-1 - max(REMEMBERED_PICTURES) :]
+    return Past(*(np.concatenate(pair) for pair in pairs), pictures)
+
+
+def _felt(obs: dict, shape: Shape) -> tuple[np.ndarray, np.ndarray]:
+    """The displacements (T, 396) of the markers in the last steps, px, and what is remembered of them (T, n), or if each finger touches."""
+    motion = np.array(obs["tactile_marker_motion"])
+    if motion.shape != (expected := (shape.marker_rows, MARKERS // 2, 2)):
+        raise UserError(f"tactile_marker_motion has the shape {motion.shape}, expected {expected}; {USE_PROFILE}")
+    fingers = motion.reshape(-1, 2, MARKERS // 4, 2)
+    moved = fingers[1:]
+    felt = readings(np.stack([np.broadcast_to(fingers[:1], moved.shape), moved], 2))
+    if shape.touch == "contact":
+        felt = contact(felt, np.zeros(len(felt), int))
+    return (motion[1:] - motion[0]).reshape(len(moved), -1), felt
 
 
 def read(
@@ -160,10 +213,10 @@ def read(
         pictures = frames(key, 3)
         if pictures.dtype != np.uint8 or pictures.shape[3] != 3:
             raise UserError(f"{key} is {pictures.dtype} with {pictures.shape[3]} channels, expected uint8 with 3")
-        if key in CAMERAS and pictures.shape[1:3] != (shape.edge, shape.edge):
+        if pictures.shape[1:3] != (shape.edge, shape.edge):
             size = f"--set cameras.width={shape.edge} --set cameras.height={shape.edge}"
             raise UserError(f"{key} has {pictures.shape[2]} x {pictures.shape[1]} pixels; the policy needs softvt {size}")
-        inputs[key] = shrink(pictures, shape.edge)[None]
+        inputs[key] = pictures[None]
     recent = fold(frames("state", 1, RECENT if shape.has_memory else shape.frames), statistics.axis)
     if recent.shape[-1] != shape.state:
         raise UserError(f"state has {recent.shape[-1]} numbers, expected {shape.state}; {USE_PROFILE}")
@@ -172,21 +225,21 @@ def read(
     inputs["prompt"] = np.array([prompts.encode(str(obs["prompt"]))])
     random = np.random.default_rng(obs["softvt"]["seed"])
     inputs["noise"] = random.standard_normal((1, shape.chunk, shape.action), np.float32)
-    if shape.has_touch:
-        motion = np.array(obs["tactile_marker_motion"])
-        if motion.shape != (expected := (shape.marker_rows, MARKERS // 2, 2)):
-            raise UserError(f"tactile_marker_motion has the shape {motion.shape}, expected {expected}; {USE_PROFILE}")
-        rows = [motion[-1 - back] - motion[0] for back in shape.marker_steps]
-        inputs["markers"] = np.stack(rows).reshape(1, len(rows), -1) / np.float32(statistics.marker_scale)
+    felt, tactile = np.zeros((RECENT, 0), np.float32), None
+    present = [-1 - back for back in shape.touch_steps]
+    if shape.has_markers:
+        moved, felt = _felt(obs, shape)
+        inputs["touch"] = (felt if shape.touch == "contact" else moved / np.float32(statistics.marker_scale))[present][None]
+    if shape.has_tactile_pictures:
+        mosaic = np.array(obs["tactile_image"])
+        if mosaic.shape != (expected := (4 * CELLS[1], 4 * CELLS[2], CELLS[3])) or mosaic.dtype != np.uint8:
+            raise UserError(f"tactile_image is {mosaic.dtype} of the shape {mosaic.shape}, expected uint8 of {expected}; {USE_PROFILE}")
+        tactile = mosaic_cells(mosaic)
+        if not shape.has_memory:
+            inputs["tactile"] = tactile[present][None]
     if not shape.has_memory:
         return inputs, None
-    count = 1 if before is None else len(before[1])
-    felt = np.zeros((count, 6), np.float32)
-    if shape.has_touch:
-        fingers = motion.reshape(-1, 2, MARKERS // 4, 2)
-        moved = fingers[-count:]
-        felt = readings(np.stack([np.broadcast_to(fingers[:1], moved.shape), moved], 2))
-    past = remembered(hand(recent), felt, before)
+    past = remembered(hand(recent), felt, before, tactile)
     inputs |= past.inputs()
     command = past.commands[None, -1:]
     inputs["reference"] = seen_reference(states[:, -1:], command) if inputs["seen"] else command

@@ -7,10 +7,11 @@ in a few steps (flow matching, Lipman et al., 2023) instead of regressing them.
 import torch
 from torch import Tensor, nn
 from torchvision.models import resnet18
+from torchvision.models.resnet import BasicBlock
 
 from . import prompts
 from .data import MARKERS
-from .inputs import INTERVALS, Shape
+from .inputs import INTERVALS, TOUCH, Shape
 from .numbers import FINE, FINE_READINGS, GRIPPER, coarse, fine
 
 # Steps of the integration of a flow.
@@ -21,6 +22,8 @@ MEMORY_WIDTH, MEMORY_TOKENS, DROPOUT = 1024, 4, 0.1
 PRESENT, LEAST_PRESENT, MOST_RATIO = 4, 4, 5
 # Pixels of a picture along an edge of a cell of its last map.
 CELL = 16
+# Channels of the stages of the encoder of tactile pictures, cells along an edge of its last map, and numbers of a picture for a hand that feels.
+TACTILE_CHANNELS, TACTILE_CELLS, FELT = (16, 32, 64, 128), 4, 64
 # Largest number on the fine scale whose change is looked at in training: 4 m.
 MOST = 12
 
@@ -34,22 +37,46 @@ def _pictures_encoder() -> nn.Module:
     return nn.Sequential(*list(net.children())[:-2])
 
 
-class Memory(nn.Module):
-    """Numbers of the remembered states and commands, and of the readings of the fingers with touch."""
+def _tactile_encoder() -> nn.Module:
+    """As the encoder of the other pictures, with one block per stage and a quarter of the channels: a gel fills its picture and is always at
+    the same place."""
+    first, *others = TACTILE_CHANNELS
 
-    def __init__(self, has_touch: bool):
+    def norm(channels: int) -> nn.Module:
+        return nn.GroupNorm(channels // 16, channels)
+
+    layers = [nn.Conv2d(3, first, 7, 2, 3, bias=False), norm(first), nn.ReLU(inplace=True)]
+    for before, channels in zip(TACTILE_CHANNELS, others):
+        shortcut = nn.Sequential(nn.Conv2d(before, channels, 1, 2, bias=False), norm(channels))
+        layers.append(BasicBlock(before, channels, 2, shortcut, norm_layer=norm))
+    return nn.Sequential(*layers)
+
+
+def _planes(pictures: Tensor) -> Tensor:
+    """Pictures (..., h, w, 3) uint8 as planes (N, 3, h, w) from -1 to 1."""
+    planes = pictures.flatten(0, -4).permute(0, 3, 1, 2).float() / 127.5 - 1
+    return planes.contiguous(memory_format=torch.channels_last)
+
+
+class Memory(nn.Module):
+    """Numbers of the remembered states and commands, and of what is remembered of the fingers with touch."""
+
+    def __init__(self, touch: str):
         super().__init__()
-        self.has_touch = has_touch
+        self.touch = touch
         self.register_buffer("scale", torch.from_numpy(FINE), persistent=False)
         self.register_buffer("readings_scale", torch.from_numpy(FINE_READINGS), persistent=False)
-        self.count = 1 + (2 * INTERVALS + 2) * 7 + (2 * INTERVALS * 6 if has_touch else 0)
+        # The readings are also seen relative to their mean.
+        self.count = 1 + (2 * INTERVALS + 2) * 7 + INTERVALS * TOUCH[touch] * (2 if touch == "markers" else 1)
 
     def forward(self, obs: dict[str, Tensor]) -> Tensor:
-        """Numbers (B, count) of changes of states and commands (B, intervals, 7), their extremes (B, 2, 7) and readings (B, intervals, 6),
+        """Numbers (B, count) of changes of states and commands (B, intervals, 7), their extremes (B, 2, 7) and readings (B, intervals, n),
         and whether the hand holds what it has felt (B, 1)."""
         parts = [fine(obs[key].float(), self.scale) for key in ("states", "commands", "extremes")]
-        if self.has_touch:
-            felt = obs["readings"].float()
+        felt = obs["readings"].float()
+        if self.touch == "contact":
+            parts.append(felt)
+        if self.touch == "markers":
             present = felt[:, :PRESENT].mean(1, keepdim=True).abs()
             # Readings of a gel that slides and of one that is held differ by a few per cent.
             ratios = felt / torch.maximum(present, LEAST_PRESENT * self.readings_scale)
@@ -60,9 +87,9 @@ class Memory(nn.Module):
 class Remembering(nn.Module):
     """Tokens of the memory."""
 
-    def __init__(self, width: int, has_touch: bool):
+    def __init__(self, width: int, touch: str):
         super().__init__()
-        self.memory, hidden = Memory(has_touch), MEMORY_WIDTH
+        self.memory, hidden = Memory(touch), MEMORY_WIDTH
         self.net = nn.Sequential(
             nn.Linear(self.memory.count, hidden), nn.GELU(), nn.Linear(hidden, hidden), nn.GELU(), nn.Linear(hidden, MEMORY_TOKENS * width)
         )
@@ -74,16 +101,20 @@ class Remembering(nn.Module):
 
 
 class Feeling(nn.Module):
-    """Answers while the hand feels, along its axes, from the memory and the prompt alone: a grip that pictures do not tell could still be
-    learned by heart from them, since every demonstration looks different."""
+    """Answers while the hand feels, along its axes, from the memory, the prompt and tactile pictures, if they are seen: a grip that the
+    pictures of the cameras do not tell could still be learned by heart from them, since every demonstration looks different."""
 
     def __init__(self, shape: Shape):
         super().__init__()
         self.shape, width = shape, MEMORY_WIDTH
         self.ngrams = nn.EmbeddingBag(prompts.BUCKETS, 32, mode="sum", padding_idx=0)
         nn.init.zeros_(self.ngrams.weight)
-        self.memory = Memory(shape.has_touch)
+        self.memory = Memory(shape.touch)
         count, answers = self.memory.count + 32, shape.chunk * shape.action
+        if shape.has_tactile_pictures:
+            cells = TACTILE_CHANNELS[-1] * TACTILE_CELLS**2
+            self.tactile = nn.Sequential(_tactile_encoder(), nn.Flatten(), nn.Linear(cells, FELT))
+            count += FELT * 2 * len(shape.touch_steps)
         self.first = nn.Linear(count, width)
         self.layers = nn.ModuleList(
             nn.Sequential(nn.LayerNorm(width), nn.Linear(width, width), nn.GELU(), nn.Dropout(DROPOUT), nn.Linear(width, width))
@@ -96,6 +127,8 @@ class Feeling(nn.Module):
     def forward(self, obs: dict[str, Tensor]) -> Tensor:
         with torch.autocast(obs["states"].device.type, enabled=False):
             numbers = torch.cat([self.memory(obs), self.ngrams(obs["prompt"])], 1)
+            if self.shape.has_tactile_pictures:
+                numbers = torch.cat([numbers, self.tactile(_planes(obs["tactile"])).unflatten(0, (len(numbers), -1)).flatten(1)], 1)
             found = self.first(numbers)
             for layer in self.layers:
                 found = found + layer(found)
@@ -118,29 +151,35 @@ class Tokens(nn.Module):
         self.ngrams = nn.EmbeddingBag(prompts.BUCKETS, width, mode="sum", padding_idx=0)
         nn.init.zeros_(self.ngrams.weight)
         self.prompt = nn.Sequential(nn.LayerNorm(width), nn.Linear(width, width))
-        if shape.has_touch:
-            self.touch = nn.Sequential(nn.Linear(MARKERS, 2 * width), nn.GELU(), nn.Linear(2 * width, width))
-            self.touch_place = nn.Parameter(0.02 * torch.randn(len(shape.marker_steps), width))
+        if shape.has_markers:
+            count = TOUCH["contact"] if shape.touch == "contact" else MARKERS
+            self.touch = nn.Sequential(nn.Linear(count, 2 * width), nn.GELU(), nn.Linear(2 * width, width))
+            self.touch_place = nn.Parameter(0.02 * torch.randn(len(shape.touch_steps), width))
+        if shape.has_tactile_pictures:
+            self.tactile, self.project_tactile = _tactile_encoder(), nn.Linear(TACTILE_CHANNELS[-1], width)
+            self.tactile_place = nn.Parameter(0.02 * torch.randn(2 * len(shape.touch_steps), TACTILE_CELLS**2, width))
         if shape.has_memory:
-            self.memory = Remembering(width, shape.has_touch)
+            self.memory = Remembering(width, shape.touch)
 
     def forward(self, obs: dict[str, Tensor]) -> Tensor:
         """Tokens (B, T, width) of pictures (B, frames, edge, edge, 3) uint8, standardised states (B, frames, 7 or 8), prompt
-        buckets (B, L), and with touch scaled markers (B, steps, 396)."""
+        buckets (B, L), and of touch (B, steps, n) scaled markers or contacts, or tactile pictures (B, steps, *CELLS)."""
         tokens = []
         for key, net in self.pictures.items():
             batch, frames = obs[key].shape[:2]
-            planes = obs[key].flatten(0, 1).permute(0, 3, 1, 2).float() / 127.5 - 1
-            cells = net(planes.contiguous(memory_format=torch.channels_last)).flatten(2).transpose(1, 2)
+            cells = net(_planes(obs[key])).flatten(2).transpose(1, 2)
             cells = self.project[key](cells).unflatten(0, (batch, frames)) + self.place[key]
             tokens.append(cells.flatten(1, 2))
         # Half precision would round positions to a millimetre.
         with torch.autocast(obs["state"].device.type, enabled=False):
             tokens.append(self.state(obs["state"].float()) + self.state_place)
         tokens.append(self.prompt(self.ngrams(obs["prompt"])).unsqueeze(1))
-        if self.shape.has_touch:
+        if self.shape.has_markers:
             # A firm grasp moves the markers ten times as far as a first contact, which is to be seen as well.
-            tokens.append(self.touch(obs["markers"].asinh()) + self.touch_place)
+            tokens.append(self.touch(obs["touch"].asinh()) + self.touch_place)
+        if self.shape.has_tactile_pictures:
+            cells = self.project_tactile(self.tactile(_planes(obs["tactile"])).flatten(2).transpose(1, 2))
+            tokens.append((cells.unflatten(0, (len(obs["tactile"]), -1)) + self.tactile_place).flatten(1, 2))
         if self.shape.has_memory:
             tokens.append(self.memory(obs))
         return torch.cat(tokens, 1)

@@ -15,15 +15,15 @@ from .study import ORIGIN
 
 # The tables stand between these lines of the page.
 BEGIN, END = "<!-- tables: softvt-baselines page -->", "<!-- end of tables -->"
-LEARNED = re.compile(r"(?P<suite>\w+)-(?P<inputs>vo|vp|vt|vpt)-(?P<code>[a-z-]+)-s(?P<seed>\d+)-r(?P<replan>\d+)(?P<condition>\+.*)?")
+LEARNED = re.compile(r"(?P<suite>\w+)-(?P<inputs>vo|vp|vt|vpt|vb|vi)-(?P<code>[a-z-]+)-s(?P<seed>\d+)-r(?P<replan>\d+)(?P<condition>\+.*)?")
 REFERENCES = {
     "expert": "expert (privileged)",
     "tactile-servo": "tactile servo (privileged)",
     "fixed-closure": "fixed closure (privileged)",
     "size-seen": "size seen (privileged)",
 }
-# The inputs that are compared: what they add to others, and touch with the drives.
-COMPARED = [("vp", "vo"), ("vt", "vo"), ("vt", "vp"), ("vpt", "vp")]
+# The inputs that are compared: what they add to others, touch with the drives, and the markers with the other kinds of touch.
+COMPARED = [("vp", "vo"), ("vt", "vo"), ("vt", "vp"), ("vpt", "vp"), ("vb", "vo"), ("vi", "vo"), ("vt", "vb"), ("vt", "vi")]
 MEASURES = ["goal", "no_drop", "safety"]
 # Stages of an episode, in their order.
 STAGES = ["reach", "grasp", "lift", "carry", "place", "release"]
@@ -40,7 +40,7 @@ class Policy:
     suite: str
     code: str
     replan: int
-    inputs: str  # "vo", "vp", "vt", "vpt"
+    inputs: str  # as in a study
     condition: str = ""
 
 

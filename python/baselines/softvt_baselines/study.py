@@ -23,11 +23,14 @@ from pathlib import Path
 from . import UserError, processors
 from .data import pack
 from .evaluate import recording_flags, run_softvt
+from .inputs import MOSAIC
 
 # Script that runs a suite under conditions.
 SHIFTS = "shifts"
 # Options that all results in the folder of a study have in common.
 SAME = ["demos", "steps", "edge", "teacher", "disturbance", "blend", "episodes", "task", "memory", "attempts", "scenes", "ways"]
+# Switches of train by the letters of inputs.
+SWITCHES = {"p": ["--drives"], "t": ["--touch", "markers"], "b": ["--touch", "contact"], "i": ["--touch", "pictures"]}
 # File beside the results of a run that says where they come from.
 ORIGIN = "origin.json"
 
@@ -37,7 +40,7 @@ class Study:
     """What a study compares. Every combination is one policy."""
 
     suites: list[str]
-    inputs: list[str]  # "vo", "vp", "vt", "vpt": vision only, with the drives, with touch, with both
+    inputs: list[str]  # "v", and the letters of SWITCHES: what is added to vision; "vo": nothing
     seeds: list[int]
     codes: list[str]
     replans: list[int]
@@ -106,7 +109,7 @@ def _train(job: Job, study: Study, gpu: int | None) -> None:
         return
     _check_time(study)
     began = time.monotonic()
-    switches = ["--touch"] * ("t" in job.inputs) + ["--drives"] * ("p" in job.inputs) + ["--compile"] * study.compile
+    switches = [word for letter in job.inputs for word in SWITCHES.get(letter, [])] + ["--compile"] * study.compile
     switches += ["--memory"] * study.memory + (["--seconds", str(study.seconds)] if study.seconds < float("inf") else [])
     shape = ["--gripper", job.code, "--edge", str(study.edge), "--steps", str(study.steps), "--seed", str(job.seed), *switches]
     words = ["train", str(study.out / "data" / job.suite), "--out", str(checkpoint), "--device", _device(gpu), *shape]
@@ -201,7 +204,9 @@ class _Workers:
 
 
 def _check_options(study: Study) -> None:
-    """Raises UserError if the folder has results of a study with other options."""
+    """Raises UserError if the options do not fit each other, or the folder has results of a study with others."""
+    if study.memory and "vi" in study.inputs and max(study.replans) > MOSAIC:
+        raise UserError(f"--replans {max(study.replans)}: --inputs vi with --memory needs {MOSAIC} or less")
     path, options = study.out / "study.json", {key: getattr(study, key) for key in SAME}
     if not path.is_file():
         path.write_text(json.dumps(options, indent=1) + "\n")
@@ -223,6 +228,7 @@ def _record(suite: str, study: Study) -> None:
         words += ["--scenes", str(study.scenes), "--ways", str(study.ways)]
         words += ["--edge", str(study.edge), "--disturbance", str(study.disturbance), *(["--task", study.task] if study.task else [])]
         words += ["--teacher", study.teacher] if study.teacher != "suite" else []
+        words += ["--tactile-pictures"] * any("i" in inputs for inputs in study.inputs)
         _call(words, study.out / "logs" / f"{suite}.log")
     else:
         flags = ["--out", str(recording), "--resume", *recording_flags(study.demos, study.edge, study.teacher, study.disturbance)]

@@ -13,7 +13,7 @@ from torch import Tensor
 from . import UserError, prompts
 from .checkpoint import Checkpoint, save
 from .data import LEAST_SPREAD, Demonstrations, Statistics, seen_reference
-from .inputs import REMEMBERED, SHARES, Shape
+from .inputs import REMEMBERED, SHARES, TOUCH, Shape
 from .model import Policy
 from .numbers import FINE, FINE_READINGS, ROTATION, Standard, fine, hand, reference, turned, turns
 from .phases import holds
@@ -65,11 +65,15 @@ class Batches:
         self.row, self.start, self.last = on_device(demos.row), on_device(demos.start), on_device(demos.last)
         self.prompts = on_device(np.array([prompts.encode(prompt) for prompt in demos.prompts]))
         self.prompt = on_device(demos.prompt)
-        if self.shape.has_touch:
-            self.markers = on_device((demos.markers / statistics.marker_scale).astype(np.float16))
+        if self.shape.has_markers:
+            touch = demos.contact if self.shape.touch == "contact" else demos.markers / statistics.marker_scale
+            self.touch = on_device(touch.astype(np.float16))
+        if self.shape.has_tactile_pictures:
+            self.tactile_pictures, self.tactile_picture = on_device(demos.tactile_pictures), on_device(demos.tactile_picture)
         self.steps = torch.arange(len(demos.actions), device=options.device)
         if self.shape.has_memory:
-            self.hand, self.commands, self.readings = on_device(hand(demos.state)), on_device(demos.commands), on_device(demos.readings)
+            felt = demos.contact if self.shape.touch == "contact" else demos.readings[:, : TOUCH[self.shape.touch]]
+            self.hand, self.commands, self.readings = on_device(hand(demos.state)), on_device(demos.commands), on_device(felt)
             begin, seen = demos.begin, demos.seen
             self.begin, self.shares = on_device(begin), on_device(SHARES)
             self.axes = on_device(turns(demos.commands[:, ROTATION]))
@@ -81,7 +85,12 @@ class Batches:
             self.held = on_device(np.float32(holds(demos.commands, demos.start, begin))[:, None])
             self.steps = on_device(np.flatnonzero(seen & (demos.picture >= 0)))
             self.hidden = on_device(np.float32(HIDDEN_MOTION))
-            self.fine, self.fine_readings = on_device(FINE), on_device(FINE_READINGS)
+            # A finger touches or not: nothing lies between.
+            self.fine, self.fine_readings = on_device(FINE), on_device(FINE_READINGS if self.shape.touch == "markers" else np.float32(0))
+        if self.shape.has_tactile_pictures:
+            trained = [self.steps, self.feeling_steps] if self.shape.has_memory else [self.steps]
+            if any((self.tactile_picture[self._tactile_rows(steps)] < 0).any() for steps in trained):
+                raise UserError("the recording has no tactile pictures of some steps; make it again, with demonstrate --tactile-pictures")
         self.random = torch.Generator(options.device).manual_seed(options.seed)
 
     def _past(self, steps: Tensor, back: tuple[int, ...]) -> Tensor:
@@ -103,6 +112,16 @@ class Batches:
         noise = torch.randn((2, *numbers.shape), generator=self.random, device=self.device)
         return numbers + MEMORY_NOISE * (noise[0] * numbers + noise[1] * scale)
 
+    def _tactile_rows(self, steps: Tensor) -> Tensor:
+        """The recorded steps (B, steps) whose tactile pictures are seen in some steps."""
+        rows = self._past(steps, self.shape.touch_steps)
+        return torch.maximum(rows, self.begin[self.row[steps]][:, None]) if self.shape.has_memory else rows
+
+    def _tactile(self, steps: Tensor) -> Tensor:
+        """The tactile pictures (B, steps, *CELLS) that are seen in some steps. They are not shifted, since the gel is always at the same
+        place."""
+        return self.tactile_pictures[self.tactile_picture[self._tactile_rows(steps)]]
+
     def _remembered(self, steps: Tensor) -> dict[str, Tensor]:
         """The memory in some steps, as inputs.Past gives it."""
         last = self.row[steps]
@@ -113,8 +132,9 @@ class Batches:
         extremes = torch.stack([commands.amin(1), commands.amax(1)], 1)
         found = {"states": self.shares @ states, "commands": self.shares @ commands, "extremes": extremes}
         found = {key: self._blurred(numbers, self.fine) for key, numbers in found.items()}
-        felt = self._blurred(self.shares @ self.readings[rows], self.fine_readings)
-        return found | {"readings": felt, "seen": self.seen[last], "held": self.held[last]}
+        found |= {"readings": self._blurred(self.shares @ self.readings[rows], self.fine_readings)}
+        found |= {"tactile": self._tactile(steps)} if self.shape.has_tactile_pictures else {}
+        return found | {"seen": self.seen[last], "held": self.held[last]}
 
     def _noise(self, steps: Tensor) -> Tensor:
         """Noise of the state (B, 1, 7 or 8)."""
@@ -138,8 +158,10 @@ class Batches:
         noise = self._noise(steps)
         states = self.state[frames] + noise
         obs["state"] = (states - self.state_mean) / self.state_std
-        if self.shape.has_touch:
-            obs["markers"] = self.markers[self._past(steps, self.shape.marker_steps)].float()
+        if self.shape.has_markers:
+            obs["touch"] = self.touch[self._past(steps, self.shape.touch_steps)].float()
+        if self.shape.has_tactile_pictures:
+            obs["tactile"] = self._tactile(steps)
         ahead = steps[:, None] + torch.arange(self.shape.chunk, device=self.device)
         future = self.actions[ahead.clamp(max=len(self.actions) - 1)]
         if self.shape.has_memory:

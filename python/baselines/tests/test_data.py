@@ -8,8 +8,22 @@ from pathlib import Path
 import h5py
 import numpy as np
 from softvt_baselines import UserError, prompts
-from softvt_baselines.data import ACTIONS, CAMERAS, TACTILE, Statistics, displacements, hand_steps, load, moving_steps, readings, shrink
-from softvt_baselines.inputs import LIMITS, RECENT, REMEMBERED, Past, Shape, read, remembered
+from softvt_baselines.data import (
+    ACTIONS,
+    CAMERAS,
+    CELLS,
+    TACTILE,
+    Statistics,
+    contact,
+    displacements,
+    hand_steps,
+    load,
+    moving_steps,
+    pack,
+    readings,
+    shrink,
+)
+from softvt_baselines.inputs import LIMITS, MOSAIC, RECENT, REMEMBERED, Past, Shape, mosaic_cells, read, remembered
 from softvt_baselines.numbers import FINE, Standard, coarse, fine, fold, hand, mean_axis, reference, turned, turns
 from softvt_baselines.phases import is_seen, memory_begins
 
@@ -36,7 +50,7 @@ def recording(folder: Path, demos: int = 2, without: tuple[str, ...] = (), gripp
             actions = np.zeros((STEPS, 7))
             actions[:, 0], actions[:, 3], actions[:, 6] = 0.01 * np.arange(STEPS), 3.1, 0.1 * index
             streams = {f"obs/{stream}": np.full((STEPS, edge, edge, 3), 10 * index, np.uint8) for stream in CAMERAS.values()}
-            streams |= {f"obs/{stream}": np.full((STEPS, 6, 8, 3), 20 * index, np.uint8) for stream in TACTILE.values()}
+            streams |= {f"obs/{stream}": np.full((STEPS, 6, 8, 3), 20 * index, np.uint8) for stream in TACTILE}
             streams |= {stream: actions for stream in ACTIONS.values()}
             streams["obs/state"], streams["obs/gripper_closure"] = actions, np.full((STEPS, 1), 0.1 * index)
             streams["obs/gripper_width_sensed"] = np.full((STEPS, 1), 0.04 * index)
@@ -79,8 +93,10 @@ class Recordings(unittest.TestCase):
         np.testing.assert_allclose(vision.state[STEPS:, 6], 0.02, rtol=1e-6, err_msg="half the sensed width")
         self.assertEqual((drives.state.shape, drives.is_relative), ((2 * STEPS, 8), True))
         np.testing.assert_allclose(drives.state[STEPS:, 6:], 0.1, rtol=1e-6)
-        self.assertIn('parts = { "position", "axis_angle", "sensed_finger_position" }', Shape(True).profile("vt"))
-        self.assertIn('parts = { "position", "axis_angle", "finger_position", "closure" }', Shape(True, has_drives=True).profile("vpt"))
+        self.assertIn('parts = { "position", "axis_angle", "sensed_finger_position" }', Shape("markers").profile("vt"))
+        self.assertIn(
+            'parts = { "position", "axis_angle", "finger_position", "closure" }', Shape("markers", has_drives=True).profile("vpt")
+        )
         self.assertFalse(load([folder], "force", 4, has_drives=True).is_relative, "a force is no change of a closure")
 
     def test_what_is_missing_is_named(self):
@@ -92,6 +108,16 @@ class Recordings(unittest.TestCase):
         for stream in ("gripper_closure", "gripper_width_sensed"):
             self.refused(stream, [recording(self.folder / stream, without=(f"obs/{stream}",))], "continuous", 4)
         self.refused("--gripper force", [recording(self.folder / "c", gripper="force")], "continuous", 4)
+
+    def test_tactile_pictures_are_those_of_both_fingers(self):
+        demos = load([recording(self.folder / "a"), recording(self.folder / "b", demos=1)], "continuous", 4, has_tactile=True)
+        self.assertEqual(demos.tactile_pictures.shape, (3 * STEPS, *CELLS))
+        self.assertEqual(demos.tactile_pictures[demos.tactile_picture][:, 1, 0, 0, 0].tolist(), [0] * STEPS + [20] * STEPS + [0] * STEPS)
+        recorded = self.folder / "c"
+        (recorded / "packed_4").mkdir(parents=True)
+        (recorded / "dataset.json").write_text("{}")
+        with self.assertRaisesRegex(UserError, "no tactile pictures: record it again, demonstrate with --tactile-pictures"):
+            pack(recorded, None, 1)
 
     def test_a_new_recording_in_the_same_folder_is_packed_again(self):
         folder = recording(self.folder / "a")
@@ -225,15 +251,44 @@ class Inputs(unittest.TestCase):
         return read(self.obs | changes, shape, self.statistics, self.vocabulary)[0]
 
     def test_an_observation_becomes_the_inputs_of_the_network(self):
-        shape = Shape(has_touch=True, edge=4, has_drives=True)
+        shape = Shape("markers", edge=4, has_drives=True)
         found = self.read(shape)
         self.assertEqual(found["image"].shape, (1, 1, 4, 4, 3))
         np.testing.assert_allclose(found["state"][0, 0, 3], 2 * np.pi - 3.1, rtol=1e-6)
         self.assertEqual(found["reference"].shape, (1, 1, 7))
         self.assertEqual(found["reference"][0, 0, 6], np.float32(0.3))
-        self.assertEqual((found["markers"][0, 0].max(), found["markers"][0, 1].max()), (0, 3))
+        self.assertEqual((found["touch"][0, 0].max(), found["touch"][0, 1].max()), (0, 3))
         np.testing.assert_array_equal(found["noise"], self.read(shape)["noise"])
         self.assertFalse((found["noise"] == self.read(shape, softvt={"seed": 8, "step": 0})["noise"]).all())
+
+    def test_a_finger_touches_if_its_markers_diverge_over_five_steps(self):
+        motion = np.repeat(GRID[None, None, None], 12, 0).repeat(2, 1).repeat(2, 2)
+        middle = GRID.mean(0)
+        for step in range(6, 12):
+            motion[step, 1, 1] = middle + (GRID - middle) * (1 + 1e-3 / 2)
+        felt = readings(motion)
+        self.assertEqual(contact(felt, np.zeros(12, int)).tolist(), [[0, 0]] * 7 + [[0, 1]] * 5, "once its mean is above 4e-4")
+        self.assertEqual(contact(felt, np.repeat([0, 6], 6))[6].tolist(), [0, 1], "earlier steps are of another episode")
+        obs = {
+            "tactile_marker_motion": np.concatenate([motion[:1, :, 0], motion[:9, :, 1]]).reshape(10, 198, 2),
+        }
+        shape = Shape("contact", edge=4, has_drives=True)
+        self.assertEqual(shape.marker_rows, 10)
+        self.assertEqual(self.read(shape, **obs)["touch"].tolist(), [[[0, 0], [0, 1]]], "four steps ago and now")
+        self.assertEqual(self.read(Shape("contact", edge=4, has_drives=True), **obs)["touch"].dtype, np.float32)
+
+    def test_cells_of_a_mosaic_run_from_the_oldest_to_the_present(self):
+        mosaic = np.zeros((224, 224, 3), np.uint8)
+        for finger in range(2):
+            for place in range(MOSAIC):
+                row, column = 2 * finger + place // 4, place % 4
+                mosaic[56 * row : 56 * row + 56, 56 * column : 56 * column + 56] = 10 * finger + place
+        found = mosaic_cells(mosaic)
+        self.assertEqual(found.shape, (MOSAIC, *CELLS))
+        self.assertEqual(found[:, :, 5, 50, 1].tolist(), [[place, 10 + place] for place in range(MOSAIC)])
+        seen = self.read(Shape("pictures", edge=4, has_drives=True), tactile_image=mosaic)["tactile"]
+        self.assertEqual(seen[0, :, :, 0, 0, 0].tolist(), [[3, 13], [7, 17]], "four steps ago and now")
+        self.assertIn('{ keys = { "tactile_image" }, source = "tactile_image" }', Shape("pictures").profile("vi"))
 
     def test_fast_motions_of_the_arm_and_the_hand_are_not_remembered(self):
         commands = np.zeros((10, 7), np.float32)
@@ -267,17 +322,22 @@ class Inputs(unittest.TestCase):
         self.assertFalse(past.inputs()["seen"].any())
 
     def test_memory_needs_the_last_steps_of_states_and_markers_only(self):
-        profile = Shape(True, has_memory=True).profile("vt").splitlines()
+        profile = Shape("markers", has_memory=True).profile("vt").splitlines()
         self.assertEqual([line.split('"')[1] for line in profile if f"frames = {RECENT}" in line], ["state", "tactile_marker_motion"])
 
     def test_what_does_not_fit_is_named(self):
         for shape, changes, words in [
-            (Shape(True, edge=4), {"tactile_marker_motion": None}, "no tactile_marker_motion; use the profile"),
-            (Shape(False, frames=2), {}, "image has the shape (4, 4, 3), expected 2 frames"),
-            (Shape(False, edge=32), {}, "--set cameras.width=32"),
-            (Shape(False, edge=4), {"softvt": {"step": 0}}, "no seed"),
-            (Shape(False, edge=4), {"prompt": "fly away"}, "was not trained for the prompt"),
-            (Shape(False, edge=4), {}, "state has 8 numbers, expected 7; use the profile"),
+            (Shape("markers", edge=4), {"tactile_marker_motion": None}, "no tactile_marker_motion; use the profile"),
+            (Shape(frames=2), {}, "image has the shape (4, 4, 3), expected 2 frames"),
+            (Shape(edge=32), {}, "--set cameras.width=32"),
+            (Shape(edge=4), {"softvt": {"step": 0}}, "no seed"),
+            (Shape(edge=4), {"prompt": "fly away"}, "was not trained for the prompt"),
+            (
+                Shape("pictures", edge=4, has_drives=True),
+                {"tactile_image": np.zeros((224, 224, 3))},
+                "float64 of the shape (224, 224, 3), expected uint8",
+            ),
+            (Shape(edge=4), {}, "state has 8 numbers, expected 7; use the profile"),
         ]:
             obs = {key: value for key, value in (self.obs | changes).items() if value is not None}
             with self.assertRaises(UserError) as caught:

@@ -16,7 +16,7 @@ class Studies(unittest.TestCase):
         scratch = tempfile.TemporaryDirectory()
         self.addCleanup(scratch.cleanup)
         self.out = Path(scratch.name)
-        self.calls, self.switches = [], {}
+        self.calls, self.words, self.switches = [], [], {}
         cuda = types.SimpleNamespace(device_count=lambda: 0)
         for patch in (
             mock.patch.dict(sys.modules, {"torch": types.SimpleNamespace(cuda=cuda)}),
@@ -29,13 +29,13 @@ class Studies(unittest.TestCase):
         self.failing = ""
 
     def call(self, words, log, gpu=None):
+        self.words.append(words)
         self.calls.append(" ".join(words[:1] + words[words.index("--out") + 1 :][:1]).replace(f"{self.out}/", ""))
         if self.failing and self.failing in self.calls[-1]:
             raise UserError("it failed")
         if words[0] == "train":
-            self.switches[Path(words[words.index("--out") + 1]).stem.split("-")[1]] = {
-                word for word in words if word in ("--touch", "--drives", "--memory")
-            }
+            kept = ("--touch", "markers", "contact", "pictures", "--drives", "--memory")
+            self.switches[Path(words[words.index("--out") + 1]).stem.split("-")[1]] = " ".join(word for word in words if word in kept)
             Path(words[words.index("--out") + 1]).touch()
         if words[0] == "evaluate":
             (Path(words[words.index("--out") + 1]) / Path(words[2]).stem).mkdir(parents=True)
@@ -62,8 +62,9 @@ class Studies(unittest.TestCase):
         self.assertEqual(self.calls, ["record suites/one.lua"], "what is there is not made again")
 
     def test_inputs_are_switches_of_training(self):
-        study.run(self.study(inputs=["vo", "vp", "vt", "vpt"]))
-        self.assertEqual(self.switches, {"vo": set(), "vp": {"--drives"}, "vt": {"--touch"}, "vpt": {"--drives", "--touch"}})
+        study.run(self.study(inputs=["vo", "vp", "vt", "vpt", "vb", "vi"]))
+        expected = {"vo": "", "vp": "--drives", "vt": "--touch markers", "vpt": "--drives --touch markers"}
+        self.assertEqual(self.switches, expected | {"vb": "--touch contact", "vi": "--touch pictures"})
 
     def test_what_fails_is_named_and_the_rest_goes_on(self):
         self.failing = "train checkpoints/one-vo"
@@ -98,6 +99,15 @@ class Studies(unittest.TestCase):
         study.run(self.study(memory=True, attempts=7, task="0,3", inputs=["vt"]))
         self.assertEqual(self.calls[0], "demonstrate data/one")
         self.assertIn("--memory", self.switches["vt"])
+        self.assertNotIn("--tactile-pictures", self.words[0])
+
+    def test_tactile_pictures_are_recorded_if_a_policy_sees_them(self):
+        study.run(self.study(memory=True, inputs=["vt", "vi"], replans=[4]))
+        self.assertIn("--tactile-pictures", self.words[0])
+
+    def test_tactile_pictures_are_remembered_for_few_steps(self):
+        with self.assertRaisesRegex(UserError, "--replans 10: --inputs vi with --memory needs 8 or less"):
+            study.run(self.study(memory=True, inputs=["vi"]))
 
     def test_a_queue_has_a_study_per_line(self):
         path = self.out / "queue"
