@@ -50,7 +50,7 @@ def _train(args: argparse.Namespace) -> None:
     args.out.parent.mkdir(parents=True, exist_ok=True)
     inputs = {"touch": args.touch, "has_drives": args.drives, "has_memory": args.memory}
     shape = Shape(**inputs, code=args.gripper, head=args.head, frames=args.frames, edge=args.edge, chunk=20 if args.memory else 50)
-    demos = load(args.recordings, args.gripper, args.edge, shape.has_tactile_pictures, args.drives, args.memory)
+    demos = load(args.recordings, args.gripper, args.edge, shape.has_tactile_pictures, args.drives, args.memory, args.frames)
     options = TrainOptions(shape, args.steps, args.batch, args.seed, device, args.compile, args.seconds)
     train(demos, options, args.out, {"recordings": [recording.name for recording in args.recordings]})
 
@@ -155,6 +155,9 @@ def _parser() -> argparse.ArgumentParser:
     def with_edge(sub: argparse.ArgumentParser) -> None:
         sub.add_argument("--edge", type=_edge, default=128, help="width and height of the pictures, pixels; a multiple of 32")
 
+    def with_frames(sub: argparse.ArgumentParser) -> None:
+        sub.add_argument("--frames", type=int, default=1, choices=[1, 2], help="control steps whose pictures and states the policy sees")
+
     def with_steps(sub: argparse.ArgumentParser) -> None:
         sub.add_argument("--steps", type=_positive, default=6000, help="training steps")
         sub.add_argument(
@@ -201,6 +204,7 @@ def _parser() -> argparse.ArgumentParser:
     demonstrate.add_argument("--processes", type=int, default=0, help="processes; 0: one per processor")
     with_disturbance(demonstrate, FELT_DISTURBANCE)
     with_edge(demonstrate)
+    with_frames(demonstrate)
 
     train = command("train", _train, "train a policy")
     train.add_argument("recordings", type=Path, nargs="+", help="folders of softvt record")
@@ -221,7 +225,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     train.add_argument("--gripper", default="continuous", choices=CODES, help="grip code")
     train.add_argument("--head", default="regression", choices=["regression", "flow"], help="how actions are predicted")
-    train.add_argument("--frames", type=int, default=1, choices=[1, 2], help="control steps whose pictures and states the policy sees")
+    with_frames(train)
     with_edge(train)
     with_steps(train)
     train.add_argument("--batch", type=_positive, default=256, help="samples per step")
@@ -265,6 +269,7 @@ def _parser() -> argparse.ArgumentParser:
     study.add_argument("--replans", type=_positive, nargs="+", default=[4], help="actions executed of each answer")
     study.add_argument("--shifts", action="store_true", help="evaluate also under the nine conditions of suites/shifts.lua")
     study.add_argument("--references", nargs="*", default=REFERENCES, choices=REFERENCES, help="built-in policies for comparison")
+    with_frames(study)
     with_steps(study)
     study.add_argument("--episodes", type=_positive, default=50, help="episodes per task")
     with_recording(study)

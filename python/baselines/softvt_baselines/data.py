@@ -321,16 +321,19 @@ def _write_packed(folder: Path, demos: list[tuple[Path, str, int]], edge: int | 
     np.savez(folder / "numbers.npz", lengths=[steps for _, _, steps in demos], prompts=prompts, **arrays)
 
 
-def _check_grip_code(recording: Path, code: str, packed) -> None:
-    """Raises UserError if the recording was made for another grip code, or has no actions in this one."""
+def _check_recording(recording: Path, code: str, frames: int, packed) -> None:
+    """Raises UserError if the recording was made for another grip code, has no actions in this one, or too few steps with pictures."""
     card = recording / "recording.json"
     if not card.is_file():
         raise UserError(f"{recording} is no complete recording of softvt: it has no recording.json")
-    stated = json.loads(card.read_text()).get("gripper")
+    about = json.loads(card.read_text())
+    stated = about.get("gripper")
     if stated and stated != code:
         raise UserError(f"{recording} was recorded for the grip code {stated}: pass --gripper {stated}")
     if ACTIONS[code] not in packed:
         raise UserError(f"{recording} has no {ACTIONS[code]}, the actions in the grip code {code}: record it again")
+    if "picture" in packed and about.get("frames", 1) < frames:
+        raise UserError(f"{recording} has no pictures of {frames} steps in a row: record it again, demonstrate with --frames {frames}")
 
 
 def commands(state: np.ndarray, actions: np.ndarray, lengths: np.ndarray) -> np.ndarray:
@@ -341,17 +344,23 @@ def commands(state: np.ndarray, actions: np.ndarray, lengths: np.ndarray) -> np.
 
 
 def load(
-    recordings: list[Path], code: str, edge: int, has_tactile: bool = False, has_drives: bool = False, has_memory: bool = False
+    recordings: list[Path],
+    code: str,
+    edge: int,
+    has_tactile: bool = False,
+    has_drives: bool = False,
+    has_memory: bool = False,
+    frames: int = 1,
 ) -> Demonstrations:
-    """Reads all demonstrations of recordings, with their tactile pictures and the drives of the fingers if they are asked for. For a
-    policy with memory, waiting is kept.
+    """Reads all demonstrations of recordings, with their tactile pictures and the drives of the fingers if they are asked for, for a policy
+    that sees a number of frames. For one with memory, waiting is kept.
 
     Raises UserError if a recording is incomplete, or lacks the pictures or the grip code.
     """
     folders = [pack(recording, edge, processors()) for recording in recordings]
     packed = [np.load(folder / "numbers.npz") for folder in folders]
     for recording, numbers in zip(recordings, packed):
-        _check_grip_code(recording, code, numbers)
+        _check_recording(recording, code, frames, numbers)
 
     def joined(stream: str) -> np.ndarray:
         return np.concatenate([numbers[stream] for numbers in packed])

@@ -53,8 +53,8 @@ CONTEXT = multiprocessing.get_context("spawn")
 PROFILE = """return softvt.profile {
   name = "demonstrations",
   inputs = {
-    { keys = { "image" }, source = "camera", camera = "third_person" },
-    { keys = { "wrist_image" }, source = "camera", camera = "wrist" },
+    { keys = { "image" }, source = "camera", camera = "third_person"FRAMES },
+    { keys = { "wrist_image" }, source = "camera", camera = "wrist"FRAMES },
     { keys = { "state" }, source = "state", parts = { "position", "axis_angle", "finger_position", "sensed_finger_position", "closure" }, frames = RECENT },
     { keys = { "tactile_marker_motion" }, source = "marker_motion", frames = RECENT },
     { keys = { "prompt" }, source = "prompt" },TACTILE
@@ -162,25 +162,31 @@ class Shown:
 
 
 class Episode:
-    """An episode that is stepped with pictures where they are wanted."""
+    """An episode that is stepped with pictures where they are wanted, each with those of `frames` - 1 steps before it."""
 
-    def __init__(self, client: Client, task: int, episode: int):
-        self.client, self.shown = client, Shown()
+    def __init__(self, client: Client, task: int, episode: int, frames: int):
+        self.client, self.shown, self.frames = client, Shown(), frames
         obs = client.reset(task, episode)
         self.most = MOSAIC if "tactile_image" in obs else RECENT  # steps that one observation shows
         self.prompt, self.is_over, self.info = str(obs["prompt"]), False, {}
-        self.next = self._rows(obs, 1)[0]  # the row of the next step
+        self.next = {}  # the row of the next step
+        self._add(obs, 1)
 
-    def _rows(self, obs: dict, count: int) -> list[dict]:
+    def _add(self, obs: dict, count: int) -> list[dict]:
+        """Rows of the next step and of `count` steps after it, the last of which is now the next one."""
         motion = np.asarray(obs["tactile_marker_motion"]).reshape(-1, 2, 99, 2)
         moved = motion[-count:]
         pairs = np.stack([np.broadcast_to(motion[:1], moved.shape), moved], 2)
         felt, markers, states = readings(pairs), displacements(pairs).astype(np.float32), np.asarray(obs["state"])[-count:]
-        rows = [{"state": states[k], "markers": markers[k], "readings": felt[k]} for k in range(count)]
+        rows = [self.next, *({"state": states[k], "markers": markers[k], "readings": felt[k]} for k in range(count))]
         if "tactile_image" in obs:
-            for row, cells in zip(rows, mosaic_cells(np.asarray(obs["tactile_image"]))[-count:]):
+            for row, cells in zip(rows[1:], mosaic_cells(np.asarray(obs["tactile_image"]))[-count:]):
                 row["tactile"] = cells
-        rows[-1] |= {key: np.asarray(obs[key]) for key in CAMERAS}
+        for key in CAMERAS:
+            pictures = np.asarray(obs[key])
+            for row, picture in zip(rows[-self.frames :], pictures if pictures.ndim == 4 else pictures[None]):
+                row[key] = picture
+        self.next = rows[-1]
         return rows
 
     def play(self, actions: np.ndarray, pictured: np.ndarray) -> None:
@@ -193,10 +199,9 @@ class Episode:
                 response = self.client.step(part)
                 count = int(response["info"]["carried_out"])
                 self.info, self.is_over = response["info"], response["terminated"] or response["truncated"]
-                rows = [self.next, *self._rows(response["observation"], count)]
-                self.shown.rows += rows[:-1]
+                self.shown.rows += self._add(response["observation"], count)[:-1]
                 self.shown.actions += [*part[:count]]
-                self.next, done = rows[-1], done + len(part)
+                done += len(part)
 
     def positions(self) -> np.ndarray:
         return np.array([thing["position_w"] for thing in self.info["state"]["objects"]])
@@ -218,6 +223,7 @@ class Settings:
     edge: int
     seed: int
     tactile_pictures: bool
+    frames: int
 
 
 def _tactile_rows(states: np.ndarray, actions: np.ndarray, picture: np.ndarray) -> np.ndarray:
@@ -257,7 +263,7 @@ class _Worker:
         """The rows from the first one, whose pictures go to the files."""
         rows = shown.rows[first:]
         states, actions = np.array([row["state"] for row in rows], np.float32), np.array(shown.actions[first:], np.float32)
-        chosen = {*(pictured - first).tolist()}
+        chosen = {step - back for step in (pictured - first).tolist() for back in range(self.settings.frames)}
         wanted = np.array([k for k, row in enumerate(rows) if k in chosen and "image" in row], int)
         picture, tactile = self.store(rows, wanted, (*CAMERAS,), "picture"), {}
         if self.settings.tactile_pictures:
@@ -276,7 +282,7 @@ class _Worker:
 
     def grip(self, job: Job, plan: Plan) -> dict | str:
         """The teacher's grip, and the way to where it lets go; or the reason why it is not shown."""
-        episode = Episode(self.client, job.task, job.episode)
+        episode = Episode(self.client, job.task, job.episode, self.settings.frames)
         episode.play(plan.actions, np.zeros(0, int))
         if episode.is_over:
             return "ended early"
@@ -298,7 +304,7 @@ class _Worker:
     def ways(self, job: Job, actions: np.ndarray, grasp: Grasp) -> list[dict]:
         """Ways from random places to where the teacher grasped."""
         random = np.random.default_rng([self.settings.seed, job.task, job.episode])
-        episode = Episode(self.client, job.task, job.episode)
+        episode = Episode(self.client, job.task, job.episode, self.settings.frames)
         home = actions[0].copy()
         grasp = turned_home(grasp, home, job.asset)
         command, places, found = home, None, []
@@ -359,6 +365,7 @@ class Demonstrate:
     teacher: str
     task: str  # only these tasks: indices, separated by commas; "": all
     tactile_pictures: bool  # store them
+    frames: int  # control steps with pictures where a policy looks
     processes: int
 
     @property
@@ -395,10 +402,11 @@ class Demonstrate:
     def repeat(self, jobs: list[Job], seed: int, used) -> tuple[list[dict], Counter]:
         """The demonstrations of jobs, and what became of them."""
         profile, found, fates = self.out / "profile.lua", [], Counter()
-        profile.write_text(PROFILE.replace("RECENT", str(RECENT)).replace("TACTILE", TACTILE if self.tactile_pictures else ""))
+        frames, tactile = f", frames = {self.frames}" if self.frames > 1 else "", TACTILE if self.tactile_pictures else ""
+        profile.write_text(PROFILE.replace("RECENT", str(RECENT)).replace("FRAMES", frames).replace("TACTILE", tactile))
         flags = ["--threads", str(self.processes), "--privileged", "--profile", str(profile), "--seed", str(seed), *self.common]
         with serving(self.suite, [*flags, *camera_flags(self.edge)]) as address:
-            settings = Settings(address, self.out, self.edge, seed, self.tactile_pictures)
+            settings = Settings(address, self.out, self.edge, seed, self.tactile_pictures, self.frames)
             with ProcessPoolExecutor(self.processes, CONTEXT, _begin, (settings, used)) as pool:
                 for number, (shown, fate) in enumerate(pool.map(_show, jobs), 1):
                     found += shown
@@ -422,7 +430,7 @@ def demonstrate(one: Demonstrate) -> None:
     ways = one.jobs(one.run_teacher(one.seed + NEXT_SEED, one.scenes, REACHES), one.ways)
     if not grips:
         raise UserError(f"{out}: no attempt of the teacher is safe")
-    for edge, most in zip(edges, (GRIP_PICTURES, MOST_STEPS)):
+    for edge, most in zip(edges, (one.frames * GRIP_PICTURES, MOST_STEPS)):
         create_pictures(packed_folder(out, edge), edge, len(grips) * most + len(ways) * one.ways * WAY_PICTURES)
     used = {count: CONTEXT.Value("q", 0) for count in COUNTS}
     (found, fates), (more, others) = one.repeat(grips, one.seed, used), one.repeat(ways, one.seed + NEXT_SEED, used)
@@ -430,7 +438,7 @@ def demonstrate(one: Demonstrate) -> None:
     lengths = np.array([len(one["state"]) for one in found])
     arrays = {key: np.concatenate([one[key] for one in found]) for key in found[0] if key != "prompt"}
     np.savez(packed_folder(out, one.edge) / "numbers.npz", lengths=lengths, prompts=np.array([one["prompt"] for one in found]), **arrays)
-    (out / "recording.json").write_text(json.dumps({"gripper": None}) + "\n")
+    (out / "recording.json").write_text(json.dumps({"gripper": None, "frames": one.frames}) + "\n")
     card = {key: value for key, value in vars(one).items() if key not in ("out", "processes")} | {
         "safe_attempts": len(grips),
         "grips": dict(sorted(fates.items())),

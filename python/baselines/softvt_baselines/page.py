@@ -15,7 +15,9 @@ from .study import ORIGIN
 
 # The tables stand between these lines of the page.
 BEGIN, END = "<!-- tables: softvt-baselines page -->", "<!-- end of tables -->"
-LEARNED = re.compile(r"(?P<suite>\w+)-(?P<inputs>vo|vp|vt|vpt|vb|vi)-(?P<code>[a-z-]+)-s(?P<seed>\d+)-r(?P<replan>\d+)(?P<condition>\+.*)?")
+LEARNED = re.compile(
+    r"(?P<suite>\w+)-(?P<inputs>(?:vo|vp|vt|vpt|vb|vi)2?)-(?P<code>[a-z-]+)-s(?P<seed>\d+)-r(?P<replan>\d+)(?P<condition>\+.*)?"
+)
 REFERENCES = {
     "expert": "expert (privileged)",
     "tactile-servo": "tactile servo (privileged)",
@@ -24,6 +26,8 @@ REFERENCES = {
 }
 # The inputs that are compared: what they add to others, touch with the drives, and the markers with the other kinds of touch.
 COMPARED = [("vp", "vo"), ("vt", "vo"), ("vt", "vp"), ("vpt", "vp"), ("vb", "vo"), ("vi", "vo"), ("vt", "vb"), ("vt", "vi")]
+# The same with two frames, and two frames with one.
+COMPARED += [(f"{one}2", f"{other}2") for one, other in COMPARED] + [(f"{one}2", one) for one in ("vo", "vp", "vt", "vpt", "vb", "vi")]
 MEASURES = ["goal", "no_drop", "safety"]
 # Stages of an episode, in their order.
 STAGES = ["reach", "grasp", "lift", "carry", "place", "release"]
@@ -40,7 +44,7 @@ class Policy:
     suite: str
     code: str
     replan: int
-    inputs: str  # as in a study
+    inputs: str  # as in the name of a run: "vo", or "vo2" with two frames
     condition: str = ""
 
 
@@ -109,8 +113,13 @@ def _row(name: str, runs: list[Run], replan: str) -> list[str]:
     return [name, replan, str(len(runs)), episodes, *rates, _spread(ratio), _spread(grip)]
 
 
+def _inputs(inputs: str) -> str:
+    """Inputs in words."""
+    return inputs.upper().replace("2", " of two frames")
+
+
 def _name(policy: Policy) -> str:
-    return f"{policy.inputs.upper()}, {policy.code}"
+    return f"{_inputs(policy.inputs)}, {policy.code}"
 
 
 @dataclass
@@ -125,7 +134,7 @@ class Pair:
 
     @property
     def names(self) -> tuple[str, str]:
-        return self.other.upper(), self.policy.inputs.upper()
+        return _inputs(self.other), _inputs(self.policy.inputs)
 
     @property
     def difference(self) -> str:

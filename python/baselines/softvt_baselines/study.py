@@ -28,7 +28,7 @@ from .inputs import MOSAIC
 # Script that runs a suite under conditions.
 SHIFTS = "shifts"
 # Options that all results in the folder of a study have in common.
-SAME = ["demos", "steps", "edge", "teacher", "disturbance", "blend", "episodes", "task", "memory", "attempts", "scenes", "ways"]
+SAME = ["demos", "steps", "edge", "teacher", "disturbance", "blend", "episodes", "task", "memory", "attempts", "scenes", "ways", "frames"]
 # Switches of train by the letters of inputs.
 SWITCHES = {"p": ["--drives"], "t": ["--touch", "markers"], "b": ["--touch", "contact"], "i": ["--touch", "pictures"]}
 # File beside the results of a run that says where they come from.
@@ -62,6 +62,7 @@ class Study:
     attempts: int = 100  # of the teacher per task, for these
     scenes: int = 200  # with ways to the object, per task
     ways: int = 4  # per scene
+    frames: int = 1  # control steps whose pictures and states a policy sees
     flags: tuple[str, ...] = ()  # further flags of the evaluations of learned policies
     until: float = float("inf")  # time (time.monotonic()) after which no further part is begun
 
@@ -72,10 +73,12 @@ class Job:
     inputs: str
     code: str
     seed: int
+    frames: int
 
     @property
     def name(self) -> str:
-        return f"{self.suite}-{self.inputs}-{self.code}-s{self.seed}"
+        """The number of frames stands behind the inputs if there are several."""
+        return f"{self.suite}-{self.inputs}{self.frames if self.frames > 1 else ''}-{self.code}-s{self.seed}"
 
 
 class OutOfTime(UserError):
@@ -112,6 +115,7 @@ def _train(job: Job, study: Study, gpu: int | None) -> None:
     switches = [word for letter in job.inputs for word in SWITCHES.get(letter, [])] + ["--compile"] * study.compile
     switches += ["--memory"] * study.memory + (["--seconds", str(study.seconds)] if study.seconds < float("inf") else [])
     shape = ["--gripper", job.code, "--edge", str(study.edge), "--steps", str(study.steps), "--seed", str(job.seed), *switches]
+    shape += ["--frames", str(study.frames)]
     words = ["train", str(study.out / "data" / job.suite), "--out", str(checkpoint), "--device", _device(gpu), *shape]
     _call(words, study.out / "logs" / f"{job.name}.log", gpu)
     _note(study, f"trained {job.name}", began)
@@ -212,7 +216,9 @@ def _check_options(study: Study) -> None:
         path.write_text(json.dumps(options, indent=1) + "\n")
         return
     before = json.loads(path.read_text())
-    if changed := [f"{key} {before.get(key)}, now {value}" for key, value in options.items() if before.get(key) != value]:
+    # Those that studies did not have at first are at their defaults.
+    before = {key: getattr(Study, key, None) for key in SAME} | before
+    if changed := [f"{key} {before[key]}, now {value}" for key, value in options.items() if before[key] != value]:
         raise UserError(f"{study.out} has a study with other options ({'; '.join(changed)}); choose another --out")
 
 
@@ -228,6 +234,7 @@ def _record(suite: str, study: Study) -> None:
         words += ["--scenes", str(study.scenes), "--ways", str(study.ways)]
         words += ["--edge", str(study.edge), "--disturbance", str(study.disturbance), *(["--task", study.task] if study.task else [])]
         words += ["--teacher", study.teacher] if study.teacher != "suite" else []
+        words += ["--frames", str(study.frames)]
         words += ["--tactile-pictures"] * any("i" in inputs for inputs in study.inputs)
         _call(words, study.out / "logs" / f"{suite}.log")
     else:
@@ -275,7 +282,7 @@ def run(study: Study) -> None:
             for policy in study.references:
                 evaluation.add(partial(_evaluate_reference, suite, policy, study, threads))
             for seed, code, inputs in itertools.product(study.seeds, study.codes, study.inputs):
-                add(Job(suite, inputs, code, seed))
+                add(Job(suite, inputs, code, seed, study.frames))
         problems += training.problems() + evaluation.problems()
     except KeyboardInterrupt:
         training.cancel()

@@ -83,10 +83,11 @@ class Batches:
                 )
             self.seen, self.feeling_steps = on_device(seen.astype(np.float32)), on_device(np.flatnonzero(~seen))
             self.held = on_device(np.float32(holds(demos.commands, demos.start, begin))[:, None])
-            self.steps = on_device(np.flatnonzero(seen & (demos.picture >= 0)))
+            self.steps = on_device(np.flatnonzero(seen))
             self.hidden = on_device(np.float32(HIDDEN_MOTION))
             # A finger touches or not: nothing lies between.
             self.fine, self.fine_readings = on_device(FINE), on_device(FINE_READINGS if self.shape.touch == "markers" else np.float32(0))
+        self.steps = self.steps[(self.picture[self._frames(self.steps)] >= 0).all(1)]
         if self.shape.has_tactile_pictures:
             trained = [self.steps, self.feeling_steps] if self.shape.has_memory else [self.steps]
             if any((self.tactile_picture[self._tactile_rows(steps)] < 0).any() for steps in trained):
@@ -97,6 +98,10 @@ class Batches:
         """Recorded steps (B, len(back)) before some steps, at the earliest the first of their demonstrations."""
         earlier = self.row[steps][:, None] - torch.tensor(back, device=self.device)
         return torch.maximum(earlier, self.start[steps][:, None])
+
+    def _frames(self, steps: Tensor) -> Tensor:
+        """The recorded steps (B, frames) whose pictures and states are seen in some steps."""
+        return self._past(steps, tuple(range(self.shape.frames - 1, -1, -1)))
 
     def _shifted(self, pictures: Tensor) -> Tensor:
         """Pictures (B, F, E, E, 3), each group of frames moved by a few pixels, with the border repeated."""
@@ -149,7 +154,7 @@ class Batches:
     def draw(self, count: int) -> tuple[dict[str, Tensor], Tensor, Tensor]:
         """Observations, chunks of actions (count, chunk, 7), and which of these lie within the demonstration."""
         steps = self.steps[torch.randint(len(self.steps), (count,), generator=self.random, device=self.device)]
-        frames = self._past(steps, tuple(range(self.shape.frames - 1, -1, -1)))
+        frames = self._frames(steps)
         obs = {"prompt": self.prompts[self.prompt[steps]]}
         for key, pictures in self.pictures.items():
             shifted = self._shifted(pictures[self.picture[frames]])

@@ -107,6 +107,10 @@ class Recordings(unittest.TestCase):
         self.refused("recording.json", [recording(self.folder / "e", gripper="")], "continuous", 4)
         for stream in ("gripper_closure", "gripper_width_sensed"):
             self.refused(stream, [recording(self.folder / stream, without=(f"obs/{stream}",))], "continuous", 4)
+        shown = recording(self.folder / "shown")
+        numbers = pack(shown, 4, 1) / "numbers.npz"
+        np.savez(numbers, **np.load(numbers), picture=np.arange(2 * STEPS))
+        self.refused("demonstrate with --frames 2", [shown], "continuous", 4, False, False, True, 2)
         self.refused("--gripper force", [recording(self.folder / "c", gripper="force")], "continuous", 4)
 
     def test_tactile_pictures_are_those_of_both_fingers(self):

@@ -56,6 +56,15 @@ class Pages(unittest.TestCase):
         self.assertNotIn("| reference |", text)
         self.assertIn("| `one` | VT, continuous | 4 | 1 | light x2 | 100.0 [100.0, 100.0] | 100.0 [100.0, 100.0] | +100.0", text)
 
+    def test_policies_of_two_frames_are_compared_with_each_other_and_with_one(self):
+        for inputs in ("vo2", "vt2"):
+            self.run_of(f"one-{inputs}-continuous-s0-r4/one", np.ones((10, 5), bool))
+        page.collect(self.study, self.docs)
+        text = page.tables(self.docs)
+        self.assertIn("| VT of two frames, continuous | 4 | 1 | 50 | 100.0 [100.0, 100.0] |", text)
+        for difference in ("VT of two frames − VO of two frames", "VT of two frames − VT"):
+            self.assertIn(f"| `one` | {difference} | continuous | 4 | 1 | none |", text)
+
     def test_policies_are_compared_on_the_seeds_that_both_have(self):
         shutil.rmtree(self.study / "runs" / "one-vo-continuous-s0-r4")
         page.collect(self.study, self.docs)

@@ -74,7 +74,7 @@ class Policies(unittest.TestCase):
             ("", "regression", 1, True),
             ("markers", "regression", 1, True),
             ("contact", "regression", 1, True),
-            ("pictures", "regression", 1, True),
+            ("pictures", "regression", 2, True),
             ("markers", "flow", 1, True),
         ]:
             options = dict(head=head, frames=frames, has_memory=has_memory)
@@ -156,6 +156,18 @@ class Policies(unittest.TestCase):
         self.assertEqual(found[0].shape, (5, 7))
         self.assertIn("needs --replan 5 or less", str(found[1]))
         self.assertEqual(Shape("pictures", has_memory=True).most_executed, MOSAIC, "an observation has no more tactile pictures")
+
+    def test_steps_are_trained_on_whose_frames_have_pictures(self):
+        demos = load_demonstrations([self.folder / "data"], "continuous", 32, has_memory=True)
+        demos.commands[:] = 0
+        demos.commands[:, 6] = 0.005 * (np.arange(len(demos.actions)) % STEPS)  # from the fourth step on, the hand feels
+        demos.picture[2:STEPS] = -1
+        demos.picture[STEPS + 1 :: 3] = -1
+        for frames, expected in ((1, {0, 1, 12, 14}), (2, {0, 1, 12})):
+            batches = Batches(
+                demos, Statistics.of(demos, 5), TrainOptions(Shape(edge=32, chunk=5, frames=frames, has_memory=True), 1, 1, 0, CPU)
+            )
+            self.assertEqual({*batches.steps.tolist()}, expected)
 
     def test_training_is_repeatable(self):
         shape = Shape(edge=32, chunk=5, width=32, layers=1, has_drives=True)

@@ -101,6 +101,21 @@ class Studies(unittest.TestCase):
         self.assertIn("--memory", self.switches["vt"])
         self.assertNotIn("--tactile-pictures", self.words[0])
 
+    def test_frames_are_recorded_trained_and_named(self):
+        study.run(self.study(memory=True, inputs=["vt"], frames=2))
+        self.assertEqual(self.calls[:2], ["demonstrate data/one", "train checkpoints/one-vt2-continuous-s0.pt"])
+        self.assertTrue(all(words[words.index("--frames") + 1] == "2" for words in self.words[:2]))
+
+    def test_studies_from_before_an_option_have_its_default(self):
+        study.run(self.study())
+        path = self.out / "study.json"
+        before = json.loads(path.read_text())
+        del before["frames"]
+        path.write_text(json.dumps(before))
+        study.run(self.study())
+        with self.assertRaisesRegex(UserError, "frames 1, now 2"):
+            study.run(self.study(frames=2))
+
     def test_tactile_pictures_are_recorded_if_a_policy_sees_them(self):
         study.run(self.study(memory=True, inputs=["vt", "vi"], replans=[4]))
         self.assertIn("--tactile-pictures", self.words[0])
