@@ -9,6 +9,8 @@ from pathlib import Path
 from . import UserError, processors
 
 CODES = ["continuous", "binary", "two-width", "force"]
+# Those in which a grip that was felt can be shown: a binary hand closes with its whole effort.
+FELT_CODES = ["continuous", "two-width", "force"]
 INPUTS = {
     "vo": "vision only",
     "vp": "vision and drives",
@@ -44,6 +46,8 @@ def _train(args: argparse.Namespace) -> None:
     from .inputs import Shape
     from .train import TrainOptions, train
 
+    if args.memory and args.gripper != "continuous":
+        raise UserError(f"--memory needs --gripper continuous: in the code {args.gripper} a hand closes at once and has nothing to feel")
     device = device_of(args.device)
     if args.out.is_dir():
         raise UserError(f"--out {args.out}: expected a file, this is a folder")
@@ -84,6 +88,8 @@ def _study(args: argparse.Namespace) -> None:
     until = time.monotonic() + 60 * args.minutes
 
     def one(given: argparse.Namespace, out: Path) -> None:
+        if given.memory and (unfelt := [code for code in given.codes if code not in FELT_CODES]):
+            raise UserError(f"--codes {' '.join(unfelt)}: --memory has demonstrations in the codes {', '.join(FELT_CODES)} only")
         own = ("command", "run", "flags", "queue", "minutes", "out")
         options = {key: value for key, value in vars(given).items() if key not in own}
         if given.disturbance is None:
@@ -205,6 +211,12 @@ def _parser() -> argparse.ArgumentParser:
     with_disturbance(demonstrate, FELT_DISTURBANCE)
     with_edge(demonstrate)
     with_frames(demonstrate)
+    demonstrate.add_argument(
+        "--gripper",
+        default="continuous",
+        choices=FELT_CODES,
+        help="grip code; in two-width and force the hand closes at once to what the teacher found, and train takes no --memory",
+    )
 
     train = command("train", _train, "train a policy")
     train.add_argument("recordings", type=Path, nargs="+", help="folders of softvt record")
@@ -275,7 +287,11 @@ def _parser() -> argparse.ArgumentParser:
     with_recording(study)
     with_blend(study)
     study.add_argument("--task", default="", help="only these tasks: indices, separated by commas")
-    study.add_argument("--memory", action="store_true", help="policies that remember, from recordings of demonstrate")
+    study.add_argument(
+        "--memory",
+        action="store_true",
+        help="policies from recordings of demonstrate, which remember; those of the codes two-width and force have nothing to remember",
+    )
     with_demonstrations(study)
     study.add_argument("--compile", action="store_true", help="compile the networks")
     study.add_argument("--per-gpu", type=_positive, default=1, help="policies that are trained on one GPU at a time")

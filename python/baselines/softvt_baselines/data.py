@@ -161,8 +161,7 @@ def tactile_cells(fingers: list[np.ndarray]) -> np.ndarray:
 
 
 def hand_steps(closure: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """True for the steps in which the expert opens or closes the hand, given the closures (M,) that it commands in demonstrations of some
-    lengths."""
+    """True for the steps in which the hand opens or closes, given its closures (M,) in demonstrations of some lengths."""
     change, first = np.diff(closure, prepend=closure[0]), np.cumsum(lengths) - lengths
     change[first] = 0
     return np.abs(change) > IDLE_GRIP * np.ptp(closure)
@@ -331,7 +330,8 @@ def _check_recording(recording: Path, code: str, frames: int, packed) -> None:
     if stated and stated != code:
         raise UserError(f"{recording} was recorded for the grip code {stated}: pass --gripper {stated}")
     if ACTIONS[code] not in packed:
-        raise UserError(f"{recording} has no {ACTIONS[code]}, the actions in the grip code {code}: record it again")
+        again = f"record it again, demonstrate with --gripper {code}" if "picture" in packed else "record it again"
+        raise UserError(f"{recording} has no {ACTIONS[code]}, the actions in the grip code {code}: {again}")
     if "picture" in packed and about.get("frames", 1) < frames:
         raise UserError(f"{recording} has no pictures of {frames} steps in a row: record it again, demonstrate with --frames {frames}")
 
@@ -386,8 +386,10 @@ def load(
     axis = mean_axis(actions[:, 3:6])
     state, actions = fold(with_hand(joined("state"), joined("sensed_width"), joined("closure"), has_drives), axis), fold(actions, axis)
     grip_range, ends = float(np.ptp(actions[:, 6])), np.cumsum(recorded)[:-1]
-    commanded = ACTIONS["continuous"]
-    hand_moves = hand_steps(joined(commanded if all(commanded in numbers for numbers in packed) else ACTIONS[code])[:, 6], recorded)
+    # What was recorded in another code has no commanded closure: the fingers tell how far the hand is closed.
+    is_commanded = all(ACTIONS["continuous"] in numbers for numbers in packed)
+    closure = joined(ACTIONS["continuous"])[:, GRIPPER] if is_commanded else hand(joined("state"))[:, GRIPPER]
+    hand_moves = hand_steps(closure, recorded)
     moving = [
         np.ones(len(one), bool) if has_memory else moving_steps(one, grip_range, own)
         for one, own in zip(np.split(actions, ends), np.split(hand_moves, ends))

@@ -4,6 +4,9 @@ A teacher such as tactile-servo first runs without cameras. What it did is repea
 looks: its grip as it was, and the way from there by a law. In further scenes, where the teacher runs until it begins to close, another law
 reaches the object from random places. The recording is written as `data.pack` writes it. Tactile pictures, if they are asked for, are stored
 for all steps in which a policy sees them.
+
+In the codes two-width and force, a hand does not feel its way: it closes at once, to what the teacher found in the same scene. Such grips
+are executed in that code and kept if they are safe; the ways to the object end with the first action that closes.
 """
 
 import json
@@ -19,7 +22,7 @@ from . import UserError, laws
 from .client import Client, serving
 from .data import ACTIONS, CAMERAS, commands, create_pictures, displacements, identity, packed_folder, readings
 from .evaluate import camera_flags, run_softvt
-from .inputs import MOSAIC, RECENT, REMEMBERED_PICTURES, TOUCH_STEPS, mosaic_cells
+from .inputs import MOSAIC, RECENT, REMEMBERED_PICTURES, TOUCH_STEPS, gripper, mosaic_cells
 from .laws import Grasp, Release
 from .numbers import GRIPPER, ROTATION, between, rotated
 from .phases import is_seen, memory_begins
@@ -47,6 +50,11 @@ SPREAD, REACHES = 0.003, 90
 CLEARANCE = 0.003
 # Seeds of the scenes follow that of the grips by this much.
 NEXT_SEED = 1000
+# The number that opens the hand, by the codes in which it closes at once.
+OPENS = {"two-width": 0.0, "force": -1.0}
+# Such a hand has closed once its fingers move by less than this in CLOSING_PART steps, m, and at most CLOSING_MOST steps later: a force of
+# 0.1 N closes by 1 mm/s. Steps over which the force of the teacher's grip is averaged.
+CLOSED, CLOSING_PART, CLOSING_MOST, FORCE_STEPS = 2e-5, 4, 160, 5
 # Largest number of pictures of a grip and of a way.
 GRIP_PICTURES, WAY_PICTURES = 250, laws.MOST_STEPS
 CONTEXT = multiprocessing.get_context("spawn")
@@ -59,7 +67,7 @@ PROFILE = """return softvt.profile {
     { keys = { "tactile_marker_motion" }, source = "marker_motion", frames = RECENT },
     { keys = { "prompt" }, source = "prompt" },TACTILE
   },
-  actions = { pose = "absolute", gripper = { open = 0, closed = 1, code = "continuous" } },
+  actions = { pose = "absolute", gripper = GRIPPER_CODE },
 }
 """
 TACTILE = """
@@ -119,6 +127,21 @@ def plan_of(actions: np.ndarray) -> Plan | None:
     end = lift + int(opens[0])
     release = Release(actions[end, :6], float(actions[lift:end, 2].max()), float(actions[end:, GRIPPER].min()))
     return Plan(actions[:lift], int(begins[feels[0]]), release)
+
+
+def number_of(job: "Job", plan: Plan, code: str) -> float:
+    """The number by which a hand closes at once to the grip that the teacher found: its closure, or the mean force of the pads, N."""
+    if code == "two-width":
+        return float(plan.actions[-1, GRIPPER])
+    trace, lift = job.trace.read_text().splitlines(), len(plan.actions)
+    return float(np.mean([json.loads(line)["pad_force_n"] for line in trace[lift - FORCE_STEPS : lift]]))
+
+
+def in_code(actions: np.ndarray, held: float, number: float, code: str) -> np.ndarray:
+    """Actions (n, 7) of a hand that closes at once: by a number from the closure `held` on, else open."""
+    found = actions.copy()
+    found[:, GRIPPER] = np.where(actions[:, GRIPPER] > held - 1e-6, number, OPENS[code])
+    return found
 
 
 def turned_home(grasp: Grasp, home: np.ndarray, asset: str) -> Grasp:
@@ -203,6 +226,17 @@ class Episode:
                 self.shown.actions += [*part[:count]]
                 done += len(part)
 
+    def close(self, action: np.ndarray) -> np.ndarray:
+        """Executes an action until the hand has closed. Returns the steps with pictures."""
+        begin, before = len(self.shown.rows), np.inf
+        while not self.is_over and len(self.shown.rows) < begin + CLOSING_MOST:
+            self.play(action[None].repeat(CLOSING_PART, 0), np.array([CLOSING_PART // 2]))
+            finger = self.next["state"][GRIPPER]
+            if abs(finger - before) < CLOSED:
+                break
+            before = finger
+        return np.arange(begin, len(self.shown.rows), CLOSING_PART // 2)
+
     def positions(self) -> np.ndarray:
         return np.array([thing["position_w"] for thing in self.info["state"]["objects"]])
 
@@ -213,6 +247,7 @@ class Job:
     episode: int
     asset: str
     file: Path  # of the teacher's actions
+    trace: Path  # of its steps, for the code force
     ways: int  # to the object; 0: the grip is repeated
 
 
@@ -224,6 +259,7 @@ class Settings:
     seed: int
     tactile_pictures: bool
     frames: int
+    gripper: str  # grip code
 
 
 def _tactile_rows(states: np.ndarray, actions: np.ndarray, picture: np.ndarray) -> np.ndarray:
@@ -272,7 +308,7 @@ class _Worker:
         return tactile | {
             "prompt": prompt,
             "picture": picture,
-            ACTIONS["continuous"]: actions,
+            ACTIONS[self.settings.gripper]: actions,
             "state": states[:, :7],
             "sensed_width": 2 * states[:, 7:8],
             "closure": states[:, 8:9],
@@ -281,13 +317,23 @@ class _Worker:
         }
 
     def grip(self, job: Job, plan: Plan) -> dict | str:
-        """The teacher's grip, and the way to where it lets go; or the reason why it is not shown."""
-        episode = Episode(self.client, job.task, job.episode, self.settings.frames)
-        episode.play(plan.actions, np.zeros(0, int))
+        """The teacher's grip, or one that closes at once, and the way to where it lets go; or the reason why it is not shown."""
+        episode, code, none = Episode(self.client, job.task, job.episode, self.settings.frames), self.settings.gripper, np.zeros(0, int)
+        carried = laws.carry(plan.actions[-1], plan.release)
+        if code == "continuous":
+            episode.play(plan.actions, none)
+            first, closing = plan.begin - BEFORE, none
+        else:
+            reached = plan.actions[: plan.begin]
+            carried = laws.carry(np.append(reached[-1, :GRIPPER], plan.actions[-1, GRIPPER]), plan.release)
+            number = number_of(job, plan, code)
+            carried = in_code(carried, plan.actions[-1, GRIPPER], number, code)
+            episode.play(np.insert(reached[:, :GRIPPER], GRIPPER, OPENS[code], 1), np.array([len(reached) - 1]))
+            first = len(episode.shown.rows) - 1
+            closing = np.append(first, episode.close(np.append(reached[-1, :GRIPPER], number)))
         if episode.is_over:
             return "ended early"
-        carried = laws.carry(plan.actions[-1], plan.release)
-        lift, pictured = len(plan.actions), np.arange(0, len(carried), CARRY_STRIDE)
+        lift, pictured = len(episode.shown.rows), np.arange(0, len(carried), CARRY_STRIDE)
         episode.play(carried, np.concatenate([pictured, np.arange(len(carried) - 24, len(carried))]))
         count = len(episode.shown.rows)
         while not episode.is_over and len(episode.shown.rows) < count + 40:
@@ -299,32 +345,42 @@ class _Worker:
             )
         shown = Shown(episode.shown.rows[:count], episode.shown.actions[:count])
         kept = lift + np.concatenate([pictured, np.arange(max(0, len(carried) - 24), len(carried))])
-        return self.demonstration(shown, episode.prompt, kept, plan.begin - BEFORE)
+        return self.demonstration(shown, episode.prompt, np.concatenate([closing, kept]), first)
 
-    def ways(self, job: Job, actions: np.ndarray, grasp: Grasp) -> list[dict]:
-        """Ways from random places to where the teacher grasped."""
+    def ways(self, job: Job, actions: np.ndarray, grasp: Grasp, number: float | None) -> list[dict]:
+        """Ways from random places to where the teacher grasped; with the number of a hand that closes at once, they end with the action by
+        which it does."""
         random = np.random.default_rng([self.settings.seed, job.task, job.episode])
         episode = Episode(self.client, job.task, job.episode, self.settings.frames)
         home = actions[0].copy()
-        grasp = turned_home(grasp, home, job.asset)
+        grasp, code = turned_home(grasp, home, job.asset), self.settings.gripper
+        if number is not None:
+            grasp = Grasp(grasp.pose, grasp.over, 0.0, 0.0)
         command, places, found = home, None, []
-        for number in range(job.ways):
-            start = start_of(grasp, home, random) if number else home
+        for index in range(job.ways):
+            start = start_of(grasp, home, random) if index else home
             going, way = laws.travel(command, start, grasp.over), laws.reach(start, grasp)
+            if number is not None:
+                way = way[way[:, GRIPPER] <= 0]
             if len(episode.shown.rows) + len(going) + len(way) > MOST_STEPS or len(way) >= laws.MOST_STEPS:
                 continue
             # The hand comes to rest where it starts.
-            episode.play(np.concatenate([going, start[None].repeat(4, 0)]), np.array([len(going) + 3]))
+            rest = np.concatenate([going, start[None].repeat(4, 0)])
+            episode.play(rest if number is None else in_code(rest, np.inf, number, code), np.array([len(going) + 3]))
             places = episode.positions() if places is None else places
             before = np.concatenate([start[None], way[:-1]])
             near = np.linalg.norm(before[:, :3] - grasp.pose[:3], axis=1) < NEAR
             steps = np.arange(len(way))
             pictured = steps[np.where(near, steps % NEAR_STRIDE, steps % FAR_STRIDE) == 0]
             first = len(episode.shown.rows)
-            episode.play(way, pictured)
+            episode.play(way if number is None else in_code(way, np.inf, number, code), pictured)
             if episode.is_over or np.abs(episode.positions() - places).max() > UNTOUCHED:
                 break
-            found.append(self.demonstration(episode.shown, episode.prompt, first + pictured, first))
+            shown, pictured = episode.shown, first + pictured
+            if number is not None:
+                shown = Shown([*shown.rows, episode.next], [*shown.actions, np.append(way[-1, :GRIPPER], number)])
+                pictured = np.append(pictured, len(shown.rows) - 1)
+            found.append(self.demonstration(shown, episode.prompt, pictured, first))
             command = way[-1]
         return found
 
@@ -339,13 +395,15 @@ def _begin(settings: Settings, used) -> None:
 
 def _show(job: Job) -> tuple[list[dict], str]:
     """The demonstrations of an attempt or a scene, and what became of it."""
-    actions = np.load(job.file)
-    if job.ways:
+    actions, code = np.load(job.file), _worker.settings.gripper
+    if job.ways and code == "continuous":
         grasp = grasp_of(actions)
-        return (_worker.ways(job, actions, grasp), "ways") if grasp else ([], "not reached")
+        return (_worker.ways(job, actions, grasp, None), "ways") if grasp else ([], "not reached")
     plan = plan_of(actions)
     if plan is None:
         return [], "grasped again"
+    if job.ways:
+        return _worker.ways(job, actions, grasp_of(actions), number_of(job, plan, code)), "ways"
     grip = _worker.grip(job, plan)
     return ([grip], "kept") if isinstance(grip, dict) else ([], grip)
 
@@ -366,6 +424,7 @@ class Demonstrate:
     task: str  # only these tasks: indices, separated by commas; "": all
     tactile_pictures: bool  # store them
     frames: int  # control steps with pictures where a policy looks
+    gripper: str  # grip code: "continuous" or a key of OPENS
     processes: int
 
     @property
@@ -374,18 +433,18 @@ class Demonstrate:
         moves = ["--set", f"robot.disturbance.position={self.disturbance}", "--set", f"robot.disturbance.rotation={4 * self.disturbance}"]
         return [*(["--task", self.task] if self.task else []), *moves]
 
-    def run_teacher(self, seed: int, episodes: int, steps: int | None) -> Path:
-        """The folder of a run of the teacher, with `steps` control steps per episode if they are given."""
-        name = "attempts" if steps is None else "scenes"
+    def run_teacher(self, name: str, seed: int, episodes: int, steps: int | None) -> Path:
+        """The folder of a run of the teacher: attempts, or scenes, with a number of control steps per episode if it is given."""
         lines = [
             'local grasp = require "experts.grasp"',
-            f"grasp.SPREAD, grasp.CONTACT_CLEARANCE = {SPREAD if steps is None else 0}, {CLEARANCE}",
+            f"grasp.SPREAD, grasp.CONTACT_CLEARANCE = {SPREAD if name == 'attempts' else 0}, {CLEARANCE}",
         ]
         lines += [f"local suite = require {json.dumps('suites.' + Path(self.suite).stem)}"]
         lines += [] if steps is None else [f"for _, task in ipairs(suite.tasks) do task.budget_steps = {steps} end"]
         script, run = self.out / f"{name}.lua", self.out / name
         script.write_text("\n".join([*lines, "return suite\n"]))
         words = [str(script), "--policy", self.teacher, "--seed", str(seed), *self.common, "--episodes", str(episodes)]
+        words += ["--trace"] * (self.gripper == "force")
         run_softvt([*words, "--threads", str(self.processes), "--out", str(run), "--resume"])
         return run
 
@@ -393,9 +452,10 @@ class Demonstrate:
         found = []
         for line in (run / "episodes.jsonl").read_text().splitlines():
             row = json.loads(line)
-            if ways or row["safety"]:
-                file = run / "actions" / f"task_{row['task']:03}" / f"episode_{row['episode']:05}.npy"
-                found.append(Job(row["task"], row["episode"], row["asset"], file, ways))
+            if row["safety"] or (ways and self.gripper == "continuous"):
+                name = f"task_{row['task']:03}/episode_{row['episode']:05}"
+                files = run / "actions" / f"{name}.npy", run / "trace" / f"{name}.jsonl"
+                found.append(Job(row["task"], row["episode"], row["asset"], *files, ways))
         # Long ones of a task do not come last.
         return sorted(found, key=lambda job: (job.episode, job.task))
 
@@ -403,10 +463,14 @@ class Demonstrate:
         """The demonstrations of jobs, and what became of them."""
         profile, found, fates = self.out / "profile.lua", [], Counter()
         frames, tactile = f", frames = {self.frames}" if self.frames > 1 else "", TACTILE if self.tactile_pictures else ""
-        profile.write_text(PROFILE.replace("RECENT", str(RECENT)).replace("FRAMES", frames).replace("TACTILE", tactile))
+        replaced = {"RECENT": str(RECENT), "FRAMES": frames, "TACTILE": tactile, "GRIPPER_CODE": gripper(self.gripper)}
+        text = PROFILE
+        for word, value in replaced.items():
+            text = text.replace(word, value)
+        profile.write_text(text)
         flags = ["--threads", str(self.processes), "--privileged", "--profile", str(profile), "--seed", str(seed), *self.common]
         with serving(self.suite, [*flags, *camera_flags(self.edge)]) as address:
-            settings = Settings(address, self.out, self.edge, seed, self.tactile_pictures, self.frames)
+            settings = Settings(address, self.out, self.edge, seed, self.tactile_pictures, self.frames, self.gripper)
             with ProcessPoolExecutor(self.processes, CONTEXT, _begin, (settings, used)) as pool:
                 for number, (shown, fate) in enumerate(pool.map(_show, jobs), 1):
                     found += shown
@@ -426,8 +490,10 @@ def demonstrate(one: Demonstrate) -> None:
         return
     for edge in edges:
         packed_folder(out, edge).mkdir(parents=True, exist_ok=True)
-    grips = one.jobs(one.run_teacher(one.seed, one.attempts, None), 0)
-    ways = one.jobs(one.run_teacher(one.seed + NEXT_SEED, one.scenes, REACHES), one.ways)
+    grips = one.jobs(one.run_teacher("attempts", one.seed, one.attempts, None), 0)
+    # A hand that closes at once has to know what the teacher finds, and so what happens after its reach.
+    steps = REACHES if one.gripper == "continuous" else None
+    ways = one.jobs(one.run_teacher("scenes", one.seed + NEXT_SEED, one.scenes, steps), one.ways)
     if not grips:
         raise UserError(f"{out}: no attempt of the teacher is safe")
     for edge, most in zip(edges, (one.frames * GRIP_PICTURES, MOST_STEPS)):
@@ -435,10 +501,14 @@ def demonstrate(one: Demonstrate) -> None:
     used = {count: CONTEXT.Value("q", 0) for count in COUNTS}
     (found, fates), (more, others) = one.repeat(grips, one.seed, used), one.repeat(ways, one.seed + NEXT_SEED, used)
     found += more
+    if not found:
+        raise UserError(f"{out}: no grip in the code {one.gripper} is safe, and no way reaches an object")
     lengths = np.array([len(one["state"]) for one in found])
     arrays = {key: np.concatenate([one[key] for one in found]) for key in found[0] if key != "prompt"}
     np.savez(packed_folder(out, one.edge) / "numbers.npz", lengths=lengths, prompts=np.array([one["prompt"] for one in found]), **arrays)
-    (out / "recording.json").write_text(json.dumps({"gripper": None, "frames": one.frames}) + "\n")
+    (out / "recording.json").write_text(
+        json.dumps({"gripper": None if one.gripper == "continuous" else one.gripper, "frames": one.frames}) + "\n"
+    )
     card = {key: value for key, value in vars(one).items() if key not in ("out", "processes")} | {
         "safe_attempts": len(grips),
         "grips": dict(sorted(fates.items())),

@@ -29,6 +29,12 @@ TOUCH_STEPS, REMEMBERED_PICTURES = (4, 0), (128, 32, 8, 0)
 MOSAIC = 8
 
 
+def gripper(code: str) -> str:
+    """The gripper of a profile of softvt in a grip code, in Lua."""
+    ends = "" if code == "force" else "open = 0, closed = 1, "
+    return f'{{ {ends}code = "{code}" }}'
+
+
 @dataclass
 class Shape:
     """Inputs and size of a network."""
@@ -98,8 +104,7 @@ class Shape:
             "tactile_image": 'source = "tactile_image"',
         }
         lines = "".join(f'    {{ keys = {{ "{key}" }}, {inputs[key]} }},\n' for key in self.keys)
-        ends = "" if self.code == "force" else "open = 0, closed = 1, "
-        actions = f'{{ pose = "absolute", gripper = {{ {ends}code = "{self.code}" }} }}'
+        actions = f'{{ pose = "absolute", gripper = {gripper(self.code)} }}'
         return f"return softvt.profile {{\n  name = {json.dumps(name, ensure_ascii=False)},\n  inputs = {{\n{lines}  }},\n  actions = {actions},\n}}\n"
 
     @property

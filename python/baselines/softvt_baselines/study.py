@@ -58,7 +58,7 @@ class Study:
     compile: bool = False  # compile the networks
     seconds: float = float("inf")  # time that training a policy may take
     task: str = ""  # only these tasks: indices, separated by commas
-    memory: bool = False  # policies that remember, from demonstrations of `demonstrate`
+    memory: bool = False  # policies from demonstrations of `demonstrate`, which remember, except in codes in which the hand closes at once
     attempts: int = 100  # of the teacher per task, for these
     scenes: int = 200  # with ways to the object, per task
     ways: int = 4  # per scene
@@ -113,10 +113,12 @@ def _train(job: Job, study: Study, gpu: int | None) -> None:
     _check_time(study)
     began = time.monotonic()
     switches = [word for letter in job.inputs for word in SWITCHES.get(letter, [])] + ["--compile"] * study.compile
-    switches += ["--memory"] * study.memory + (["--seconds", str(study.seconds)] if study.seconds < float("inf") else [])
+    switches += ["--memory"] * (study.memory and job.code == "continuous") + (
+        ["--seconds", str(study.seconds)] if study.seconds < float("inf") else []
+    )
     shape = ["--gripper", job.code, "--edge", str(study.edge), "--steps", str(study.steps), "--seed", str(job.seed), *switches]
     shape += ["--frames", str(study.frames)]
-    words = ["train", str(study.out / "data" / job.suite), "--out", str(checkpoint), "--device", _device(gpu), *shape]
+    words = ["train", str(_recording(job.suite, job.code, study)), "--out", str(checkpoint), "--device", _device(gpu), *shape]
     _call(words, study.out / "logs" / f"{job.name}.log", gpu)
     _note(study, f"trained {job.name}", began)
 
@@ -222,8 +224,13 @@ def _check_options(study: Study) -> None:
         raise UserError(f"{study.out} has a study with other options ({'; '.join(changed)}); choose another --out")
 
 
-def _record(suite: str, study: Study) -> None:
-    recording = study.out / "data" / suite
+def _recording(suite: str, code: str, study: Study) -> Path:
+    """The recording for policies of a grip code. `softvt record` has the actions in all codes, `demonstrate` makes a recording for each."""
+    return study.out / "data" / (f"{suite}-{code}" if study.memory and code != "continuous" else suite)
+
+
+def _record(suite: str, code: str, study: Study) -> None:
+    recording = _recording(suite, code, study)
     if (recording / "dataset.json").is_file():
         pack(recording, study.edge, processors())
         return
@@ -234,15 +241,15 @@ def _record(suite: str, study: Study) -> None:
         words += ["--scenes", str(study.scenes), "--ways", str(study.ways)]
         words += ["--edge", str(study.edge), "--disturbance", str(study.disturbance), *(["--task", study.task] if study.task else [])]
         words += ["--teacher", study.teacher] if study.teacher != "suite" else []
-        words += ["--frames", str(study.frames)]
+        words += ["--frames", str(study.frames), "--gripper", code]
         words += ["--tactile-pictures"] * any("i" in inputs for inputs in study.inputs)
-        _call(words, study.out / "logs" / f"{suite}.log")
+        _call(words, study.out / "logs" / f"{recording.name}.log")
     else:
         flags = ["--out", str(recording), "--resume", *recording_flags(study.demos, study.edge, study.teacher, study.disturbance)]
         flags += ["--task", study.task] if study.task else []
         run_softvt(["record", f"suites/{suite}.lua", *flags])
     pack(recording, study.edge, processors())
-    _note(study, f"recorded {suite}", began)
+    _note(study, f"recorded {recording.name}", began)
 
 
 def run(study: Study) -> None:
@@ -274,15 +281,20 @@ def run(study: Study) -> None:
     problems = []
     try:
         for suite in study.suites:
-            try:
-                _record(suite, study)
-            except UserError as error:
-                problems.append(str(error))
-                continue
-            for policy in study.references:
-                evaluation.add(partial(_evaluate_reference, suite, policy, study, threads))
-            for seed, code, inputs in itertools.product(study.seeds, study.codes, study.inputs):
-                add(Job(suite, inputs, code, seed, study.frames))
+            references, recordings = study.references, {}
+            for code in study.codes:
+                recordings.setdefault(_recording(suite, code, study), []).append(code)
+            for codes in recordings.values():
+                try:
+                    _record(suite, codes[0], study)
+                except UserError as error:
+                    problems.append(str(error))
+                    continue
+                for policy in references:
+                    evaluation.add(partial(_evaluate_reference, suite, policy, study, threads))
+                references = ()
+                for seed, code, inputs in itertools.product(study.seeds, codes, study.inputs):
+                    add(Job(suite, inputs, code, seed, study.frames))
         problems += training.problems() + evaluation.problems()
     except KeyboardInterrupt:
         training.cancel()

@@ -184,6 +184,17 @@ class Numbers(unittest.TestCase):
         felt[:, 6], felt[:, 2] = 0.4 + 0.00025 * np.arange(60), 2e-5 * np.arange(60)
         self.assertGreater(moving_steps(felt, 1.0).sum(), 6, "nor is tightening by 0.02 mm per step while the hand rises")
 
+    def test_the_fingers_tell_that_a_hand_closes_if_no_closure_was_recorded(self):
+        with tempfile.TemporaryDirectory() as scratch:
+            folder = recording(Path(scratch) / "a", demos=1, without=("actions", "actions_binary"))
+            with h5py.File(folder / "hdf5" / "suite_task0_demo.hdf5", "a") as file:
+                demo = file["data/demo_0"]
+                demo["actions_two_width"][:, :3] = 0
+                demo["actions_two_width"][2:, 6] = 0.5
+                demo["obs/state"][:, 6] = [0.04] * 3 + [0.035, 0.03, 0.025] + [0.02] * 6
+            demos = load([folder], "two-width", 4)
+        self.assertEqual(demos.row.tolist(), [0, 2, 3, 4, 5, 6], "and the steps after it are waiting")
+
     def test_memory_keeps_waiting_and_the_command_before_each_step(self):
         with tempfile.TemporaryDirectory() as scratch:
             demos = load([recording(Path(scratch) / "a")], "continuous", 4, has_drives=True, has_memory=True)

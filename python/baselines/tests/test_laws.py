@@ -1,10 +1,13 @@
 """Motions by feedback laws, and what is taken of a teacher's attempt. Needs no learning library."""
 
+import json
+import tempfile
 import unittest
+from pathlib import Path
 
 import numpy as np
 from softvt_baselines import laws
-from softvt_baselines.demonstrate import grasp_of, plan_of, start_of, turned_home
+from softvt_baselines.demonstrate import Job, Plan, grasp_of, in_code, number_of, plan_of, start_of, turned_home
 from softvt_baselines.laws import Grasp, Release
 from softvt_baselines.numbers import GRIPPER, ROTATION, between, rotated
 from softvt_baselines.phases import FAST_GRIP, FEELS, holds, is_seen, memory_begins
@@ -101,6 +104,20 @@ class Plans(unittest.TestCase):
         self.assertAlmostEqual(plan.release.closure, Carrying.release.closure)
         self.assertIsNone(plan_of(np.concatenate([actions, actions])), "it grasped twice")
         self.assertIsNone(plan_of(reached), "it never felt")
+
+    def test_a_hand_that_closes_at_once_closes_to_what_the_teacher_found(self):
+        plan = Plan(np.array([[0, 0, 0, 0, 0, 0, closure] for closure in (0, 0.2, 0.3, 0.4, 0.41, 0.42, 0.43)]), 2, Carrying.release)
+        with tempfile.TemporaryDirectory() as scratch:
+            trace = Path(scratch) / "trace.jsonl"
+            forces = [0, 9, 1, 2, 3, 4, 5, 100]  # the last one after the lift
+            trace.write_text("".join(json.dumps({"pad_force_n": [force, force + 1]}) + "\n" for force in forces))
+            job = Job(0, 0, "cube", Path(), trace, 0)
+            self.assertEqual((number_of(job, plan, "two-width"), number_of(job, plan, "force")), (0.43, 3.5))
+        carried = laws.carry(np.array([0.4, 0, 0.02, *DOWN, 0.43]), Carrying.release)
+        found = in_code(carried, 0.43, 3.5, "force")
+        np.testing.assert_array_equal(found[:, :6], carried[:, :6])
+        self.assertEqual({*found[:-20, GRIPPER]}, {3.5})
+        self.assertEqual({*found[-20:, GRIPPER]}, {-1.0}, "from the first step of the release on")
 
 
 if __name__ == "__main__":

@@ -101,6 +101,15 @@ class Studies(unittest.TestCase):
         self.assertIn("--memory", self.switches["vt"])
         self.assertNotIn("--tactile-pictures", self.words[0])
 
+    def test_codes_in_which_a_hand_closes_at_once_have_recordings_of_their_own_and_no_memory(self):
+        study.run(self.study(memory=True, inputs=["vt"], codes=["continuous", "two-width"], replans=[4], references=("expert",)))
+        self.assertEqual([call for call in self.calls if "demonstrate" in call], ["demonstrate data/one", "demonstrate data/one-two-width"])
+        trained = {Path(words[words.index("--out") + 1]).stem: words for words in self.words if words[0] == "train"}
+        self.assertIn("--memory", trained["one-vt-continuous-s0"])
+        self.assertNotIn("--memory", trained["one-vt-two-width-s0"])
+        self.assertEqual(Path(trained["one-vt-two-width-s0"][1]).name, "one-two-width")
+        self.assertEqual(sum("suites/one.lua" in call for call in self.calls), 1, "a reference runs once")
+
     def test_frames_are_recorded_trained_and_named(self):
         study.run(self.study(memory=True, inputs=["vt"], frames=2))
         self.assertEqual(self.calls[:2], ["demonstrate data/one", "train checkpoints/one-vt2-continuous-s0.pt"])
