@@ -80,33 +80,39 @@ def _evaluate(args: argparse.Namespace) -> None:
     evaluate(Evaluation(args.checkpoint, profile, edge, args.scripts, name, args.out, args.flags, args.device, args.blend))
 
 
+def _study_of(given: argparse.Namespace, out: Path, flags: list[str], until: float):
+    """The study of some options. Raises UserError if they do not fit each other."""
+    from .inputs import MOSAIC
+    from .study import Study
+
+    if given.memory and (unfelt := [code for code in given.codes if code not in FELT_CODES]):
+        raise UserError(f"--codes {' '.join(unfelt)}: --memory has demonstrations in the codes {', '.join(FELT_CODES)} only")
+    if given.memory and "vi" in given.inputs and max(given.replans) > MOSAIC:
+        raise UserError(f"--replans {max(given.replans)}: --inputs vi with --memory needs {MOSAIC} or less")
+    own = ("command", "run", "flags", "queue", "minutes", "out")
+    options = {key: value for key, value in vars(given).items() if key not in own}
+    if given.disturbance is None:
+        options["disturbance"] = FELT_DISTURBANCE if given.memory else DISTURBANCE
+    return Study(**options, out=out, flags=tuple(flags), until=until)
+
+
 def _study(args: argparse.Namespace) -> None:
     import time
 
-    from .study import Study, read_queue, run
+    from .study import read_queue, run
 
     until = time.monotonic() + 60 * args.minutes
-
-    def one(given: argparse.Namespace, out: Path) -> None:
-        if given.memory and (unfelt := [code for code in given.codes if code not in FELT_CODES]):
-            raise UserError(f"--codes {' '.join(unfelt)}: --memory has demonstrations in the codes {', '.join(FELT_CODES)} only")
-        own = ("command", "run", "flags", "queue", "minutes", "out")
-        options = {key: value for key, value in vars(given).items() if key not in own}
-        if given.disturbance is None:
-            options["disturbance"] = FELT_DISTURBANCE if given.memory else DISTURBANCE
-        run(Study(**options, out=out, flags=tuple(args.flags), until=until))
-
     if args.queue is None:
         if not args.suites:
             raise UserError("study: name a suite, or a --queue")
-        return one(args, args.out)
+        return run(_study_of(args, args.out, args.flags, until))
     if args.suites:
         raise UserError("study: a --queue names the suites")
     # All lines are read before the first study runs.
-    studies = [(name, _parser().parse_args(["study", *words, "--out", "."])) for name, *words in read_queue(args.queue)]
-    for name, given in studies:
+    lines = [(name, _parser().parse_args(["study", *words, "--out", "."])) for name, *words in read_queue(args.queue)]
+    for study in [_study_of(given, args.out / name, args.flags, until) for name, given in lines]:
         if time.monotonic() < until:
-            one(given, args.out / name)
+            run(study)
 
 
 def _diagnose(args: argparse.Namespace) -> None:

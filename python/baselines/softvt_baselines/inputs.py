@@ -139,15 +139,16 @@ class Past:
         rows, now, is_known = np.maximum(last - np.arange(REMEMBERED), begin), self.commands[-1], np.float32(begin < last)
         axes = turns(now[ROTATION])
         states, commands = (turned(is_known * (numbers[rows] - now), axes) for numbers in (self.states, self.commands))
-        seen = {}
+        touch = {}
+        if self.readings.shape[1]:
+            touch["readings"] = (SHARES @ self.readings[rows])[None]
         if self.tactile is not None:
             back = np.minimum(REMEMBERED_PICTURES, last - begin)
-            seen["tactile"] = self.tactile[len(self.tactile) - 1 - back][None]
-        return seen | {
+            touch["tactile"] = self.tactile[len(self.tactile) - 1 - back][None]
+        return touch | {
             "states": (SHARES @ states)[None],
             "commands": (SHARES @ commands)[None],
             "extremes": np.stack([commands.min(0), commands.max(0)])[None],
-            "readings": (SHARES @ self.readings[rows])[None],
             "seen": np.float32([is_seen(self.commands, last, begin)]),
             "held": np.float32([[holds(self.commands, np.array([0]), begins)[-1]]]),
             "axes": axes[None],

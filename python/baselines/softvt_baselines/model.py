@@ -73,10 +73,10 @@ class Memory(nn.Module):
         """Numbers (B, count) of changes of states and commands (B, intervals, 7), their extremes (B, 2, 7) and readings (B, intervals, n),
         and whether the hand holds what it has felt (B, 1)."""
         parts = [fine(obs[key].float(), self.scale) for key in ("states", "commands", "extremes")]
-        felt = obs["readings"].float()
         if self.touch == "contact":
-            parts.append(felt)
+            parts.append(obs["readings"].float())
         if self.touch == "markers":
+            felt = obs["readings"].float()
             present = felt[:, :PRESENT].mean(1, keepdim=True).abs()
             # Readings of a gel that slides and of one that is held differ by a few per cent.
             ratios = felt / torch.maximum(present, LEAST_PRESENT * self.readings_scale)

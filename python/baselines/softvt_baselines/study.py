@@ -23,7 +23,6 @@ from pathlib import Path
 from . import UserError, processors
 from .data import pack
 from .evaluate import recording_flags, run_softvt
-from .inputs import MOSAIC
 
 # Script that runs a suite under conditions.
 SHIFTS = "shifts"
@@ -210,9 +209,7 @@ class _Workers:
 
 
 def _check_options(study: Study) -> None:
-    """Raises UserError if the options do not fit each other, or the folder has results of a study with others."""
-    if study.memory and "vi" in study.inputs and max(study.replans) > MOSAIC:
-        raise UserError(f"--replans {max(study.replans)}: --inputs vi with --memory needs {MOSAIC} or less")
+    """Raises UserError if the folder has results of a study with other options."""
     path, options = study.out / "study.json", {key: getattr(study, key) for key in SAME}
     if not path.is_file():
         path.write_text(json.dumps(options, indent=1) + "\n")

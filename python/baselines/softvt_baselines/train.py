@@ -137,7 +137,8 @@ class Batches:
         extremes = torch.stack([commands.amin(1), commands.amax(1)], 1)
         found = {"states": self.shares @ states, "commands": self.shares @ commands, "extremes": extremes}
         found = {key: self._blurred(numbers, self.fine) for key, numbers in found.items()}
-        found |= {"readings": self._blurred(self.shares @ self.readings[rows], self.fine_readings)}
+        if TOUCH[self.shape.touch]:
+            found["readings"] = self._blurred(self.shares @ self.readings[rows], self.fine_readings)
         found |= {"tactile": self._tactile(steps)} if self.shape.has_tactile_pictures else {}
         return found | {"seen": self.seen[last], "held": self.held[last]}
 

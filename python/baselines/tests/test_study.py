@@ -9,6 +9,7 @@ from pathlib import Path
 from unittest import mock
 
 from softvt_baselines import UserError, study
+from softvt_baselines.__main__ import _parser, _study_of
 
 
 class Studies(unittest.TestCase):
@@ -129,9 +130,25 @@ class Studies(unittest.TestCase):
         study.run(self.study(memory=True, inputs=["vt", "vi"], replans=[4]))
         self.assertIn("--tactile-pictures", self.words[0])
 
-    def test_tactile_pictures_are_remembered_for_few_steps(self):
-        with self.assertRaisesRegex(UserError, "--replans 10: --inputs vi with --memory needs 8 or less"):
-            study.run(self.study(memory=True, inputs=["vi"]))
+    def test_options_that_do_not_fit_each_other_are_refused(self):
+        for words, problem in [
+            ("--memory --inputs vi --replans 4 10", "--replans 10: --inputs vi with --memory needs 8 or less"),
+            ("--memory --codes binary", "--codes binary: --memory has demonstrations in the codes continuous, two-width, force only"),
+        ]:
+            given = _parser().parse_args(["study", "one", "--out", ".", *words.split()])
+            with self.assertRaisesRegex(UserError, problem):
+                _study_of(given, self.out, [], 0)
+
+    def test_the_queue_in_the_documentation_is_valid(self):
+        text = (Path(__file__).parents[3] / "docs" / "baselines.md").read_text()
+        path = self.out / "missing.txt"
+        path.write_text(text.split("cat > missing.txt <<'END'\n")[1].split("END\n")[0])
+        suites = {file.stem for file in (Path(__file__).parents[3] / "suites").glob("*.lua")}
+        lines = study.read_queue(path)
+        self.assertEqual(len({name for name, *_ in lines}), 12, "each in a folder of its own")
+        for name, *words in lines:
+            given = _parser().parse_args(["study", *words, "--out", "."])
+            self.assertLessEqual({*_study_of(given, self.out / name, [], 0).suites}, suites)
 
     def test_a_queue_has_a_study_per_line(self):
         path = self.out / "queue"
