@@ -25,6 +25,8 @@ pub enum MeshError {
     Empty,
     #[error("vertex {vertex} has a coordinate that is not a number; export the mesh again")]
     NotFinite { vertex: usize },
+    #[error("triangle {triangle} has a texture coordinate that is not a number; export the mesh again")]
+    TextureNotFinite { triangle: usize },
     #[error(
         "triangle {triangle} names vertex {vertex}, but there are {vertices} vertices; export the mesh again"
     )]
@@ -53,13 +55,13 @@ impl Mesh {
 
     /// Surface area, m².
     pub fn area(&self) -> f64 {
-        self.triangles
-            .iter()
-            .map(|t| {
-                let [a, b, c] = t.map(|v| self.vertices[v as usize]);
-                0.5 * (b - a).cross(&(c - a)).norm()
-            })
-            .sum()
+        self.triangles.iter().map(|t| self.triangle_area(t)).sum()
+    }
+
+    /// Area of a triangle between three vertices of the mesh, m².
+    pub fn triangle_area(&self, triangle: &[u32; 3]) -> f64 {
+        let [a, b, c] = triangle.map(|v| self.vertices[v as usize]);
+        0.5 * (b - a).cross(&(c - a)).norm()
     }
 
     /// Merges vertices with equal positions and removes triangles that become degenerate.
@@ -97,13 +99,17 @@ impl Mesh {
     /// Validates indices and coordinates.
     ///
     /// # Errors
-    /// If the mesh has no triangles, a coordinate is not finite or an index is out of range.
+    /// If the mesh has no triangles, a coordinate of a vertex or a texture is not finite or an index is out of range.
     pub fn validate(&self) -> Result<(), MeshError> {
         if self.triangles.is_empty() {
             return Err(MeshError::Empty);
         }
         if let Some(vertex) = self.vertices.iter().position(|v| v.iter().any(|x| !x.is_finite())) {
             return Err(MeshError::NotFinite { vertex });
+        }
+        let is_infinite = |uvs: &[[f64; 2]; 3]| uvs.iter().flatten().any(|x| !x.is_finite());
+        if let Some(triangle) = self.uvs.iter().position(is_infinite) {
+            return Err(MeshError::TextureNotFinite { triangle });
         }
         let vertices = self.vertices.len();
         for (triangle, corners) in self.triangles.iter().enumerate() {

@@ -1,14 +1,20 @@
 //! Binary glTF 2.0. Accessors are validated before the readers of the `gltf` crate run, which panic on types that the
 //! specification does not allow and reinterpret others.
 
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
+
 use gltf::{
     Accessor, Semantic,
     accessor::{DataType, Dimensions},
     buffer::Source,
     mesh::Mode,
+    texture,
 };
 
-use super::{ImportedColours, ImportedImage, ImportedMaterial, MeshImportError, check_size};
+use super::{ImportedColours, ImportedImage, ImportedMaterial, MeshImportError, check_size, plain_id};
 use crate::mesh::Mesh;
 
 type Transform = nalgebra::Matrix4<f64>;
@@ -48,18 +54,23 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mesh, MeshImportError> {
 pub(super) fn colours(bytes: &[u8]) -> Result<ImportedColours, String> {
     let file = gltf::Gltf::from_slice(bytes).map_err(|error| error.to_string())?;
     let blob = file.blob.as_deref().unwrap_or_default();
-    let mut materials: Vec<ImportedMaterial> =
-        file.materials().map(|material| material_of(&material, blob)).collect::<Result<_, _>>()?;
-    if materials.is_empty() {
+    if file.materials().len() == 0 {
         return Ok(ImportedColours::default());
     }
-    let plain = materials.len() as u16;
-    materials.push(ImportedMaterial::default());
+    let plain = plain_id(file.materials().len())?;
     let mut material_ids = Vec::new();
     let scene = file.default_scene().or_else(|| file.scenes().next());
     for node in scene.iter().flat_map(gltf::Scene::nodes) {
         add_material_ids(&node, plain, &mut material_ids);
     }
+    let used: BTreeSet<u16> = material_ids.iter().copied().collect();
+    let mut images = Images { blob, known: BTreeMap::new() };
+    let materials = (0..plain).zip(file.materials()).map(|(id, material)| match used.contains(&id) {
+        true => material_of(&material, &mut images).map_err(|error| format!("material {id}: {error}")),
+        false => Ok(ImportedMaterial::default()),
+    });
+    let mut materials = materials.collect::<Result<Vec<_>, String>>()?;
+    materials.push(ImportedMaterial::default());
     Ok(ImportedColours { materials, material_ids })
 }
 
@@ -74,24 +85,74 @@ fn add_material_ids(node: &gltf::Node, plain: u16, ids: &mut Vec<u16>) {
     node.children().for_each(|child| add_material_ids(&child, plain, ids));
 }
 
-fn material_of(material: &gltf::Material, blob: &[u8]) -> Result<ImportedMaterial, String> {
+fn material_of(material: &gltf::Material, images: &mut Images) -> Result<ImportedMaterial, String> {
     let surface = material.pbr_metallic_roughness();
     let [r, g, b, _] = surface.base_color_factor().map(|x| f64::from(x).clamp(0.0, 1.0));
-    let image = surface.base_color_texture().map(|info| match info.texture().source().source() {
-        gltf::image::Source::Uri { uri, .. } => Ok::<_, String>(ImportedImage::File(uri.to_owned())),
-        gltf::image::Source::View { view, .. } => {
-            let end = view.offset().saturating_add(view.length());
-            let bytes = blob.get(view.offset()..end);
-            let outside = || "an image lies outside of the file; export the mesh again".to_owned();
-            Ok(ImportedImage::Bytes(bytes.ok_or_else(outside)?.to_vec()))
-        }
-    });
+    // With a texture the factors multiply its values, which are not read; both are 1 by default.
+    let is_textured = surface.metallic_roughness_texture().is_some();
+    let factor = |x: f32| (!is_textured).then_some(f64::from(x).clamp(0.0, 1.0));
     Ok(ImportedMaterial {
         albedo: [r, g, b],
-        roughness: Some(f64::from(surface.roughness_factor()).clamp(0.0, 1.0)),
-        metalness: Some(f64::from(surface.metallic_factor()).clamp(0.0, 1.0)),
-        image: image.transpose()?,
+        roughness: factor(surface.roughness_factor()),
+        metalness: factor(surface.metallic_factor()),
+        image: surface.base_color_texture().map(|info| images.of(&info)).transpose()?,
     })
+}
+
+/// The images of a file, each copied once.
+struct Images<'a> {
+    blob: &'a [u8],
+    /// Those so far, by index.
+    known: BTreeMap<usize, ImportedImage>,
+}
+
+impl Images<'_> {
+    /// The image of a base colour.
+    fn of(&mut self, info: &texture::Info) -> Result<ImportedImage, String> {
+        let transform = info.texture_transform();
+        let set = transform.as_ref().and_then(|t| t.tex_coord()).unwrap_or(info.tex_coord());
+        if set != 0 {
+            return Err(format!(
+                "its image has the texture coordinates TEXCOORD_{set}, but only {TEXCOORD} is read; export one set of \
+                 coordinates"
+            ));
+        }
+        let is_identity = |t: &texture::TextureTransform| {
+            (t.offset(), t.rotation(), t.scale()) == ([0.0; 2], 0.0, [1.0; 2])
+        };
+        if transform.is_some_and(|t| !is_identity(&t)) {
+            return Err("its image is placed by KHR_texture_transform, which is not supported; apply the transform to \
+                        the texture coordinates"
+                .to_owned());
+        }
+        let image = info.texture().source();
+        if let Some(known) = self.known.get(&image.index()) {
+            return Ok(known.clone());
+        }
+        let read = match image.source() {
+            gltf::image::Source::Uri { uri, .. } => ImportedImage::File(decoded_path(uri)?),
+            gltf::image::Source::View { view, .. } => {
+                let end = view.offset().saturating_add(view.length());
+                let bytes = self.blob.get(view.offset()..end);
+                let bytes = bytes.ok_or("its image lies outside of the file; export the mesh again")?;
+                ImportedImage::Bytes(Arc::from(bytes))
+            }
+        };
+        self.known.insert(image.index(), read.clone());
+        Ok(read)
+    }
+}
+
+/// The path that a relative URI names.
+fn decoded_path(uri: &str) -> Result<String, String> {
+    if uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:")) {
+        return Err(
+            "its image is a data URI, which is not supported; store it in the .glb file or beside it"
+                .to_owned(),
+        );
+    }
+    let path = urlencoding::decode(uri);
+    Ok(path.map_err(|_| "the name of its image is not UTF-8 text; rename the image")?.into_owned())
 }
 
 /// Compares the length in the header with that of the file. Without a header of glTF the crate says what is wrong.

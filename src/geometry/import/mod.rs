@@ -2,7 +2,7 @@
 
 mod glb;
 
-use std::io::Cursor;
+use std::{cell::RefCell, collections::BTreeSet, io::Cursor, sync::Arc};
 
 use super::{
     Mat3, Vec3,
@@ -104,17 +104,19 @@ impl Default for ImportedMaterial {
 pub enum ImportedImage {
     /// A file, by its path from the folder of the mesh file.
     File(String),
-    /// Its bytes.
-    Bytes(Vec<u8>),
+    /// Its bytes, which materials of the same image share.
+    Bytes(Arc<[u8]>),
 }
 
 /// Reads the colours of a mesh file. `read_file` returns a file by its path from the folder of the mesh file.
 ///
 /// The materials of OBJ files are those of their MTL files: the colour `Kd`, or the image `map_Kd` in its place. Those
-/// of glTF files have their base colours, multiplied by the image that they name. STL files have none.
+/// of glTF files have their base colours, multiplied by the image that they name; those that no triangle has are left
+/// plain. STL files have none.
 ///
 /// # Errors
-/// A file that the mesh file names cannot be read; the message names it.
+/// A file that the mesh file names cannot be read, a material is unknown or states what is not supported, or there are
+/// too many of them; the message names the file or the material.
 pub fn import_colours(
     bytes: &[u8],
     format: MeshFormat,
@@ -171,34 +173,87 @@ fn obj_colours(
     bytes: &[u8],
     read_file: &dyn Fn(&str) -> Result<Vec<u8>, String>,
 ) -> Result<ImportedColours, String> {
-    let problem = std::cell::RefCell::new(None);
+    let problem = RefCell::new(None);
+    let libraries = RefCell::new(Vec::new());
     let load = |path: &std::path::Path| {
-        let text = read_file(&path.to_string_lossy()).map_err(|error| {
+        let path = path.to_string_lossy();
+        let text = read_file(&path).map_err(|error| {
             problem.borrow_mut().get_or_insert(error);
             tobj::LoadError::OpenFileFailed
         })?;
-        tobj::load_mtl_buf(&mut Cursor::new(text)).inspect_err(|error| {
-            problem.borrow_mut().get_or_insert(format!("{}: {error}", path.display()));
-        })
+        let loaded = tobj::load_mtl_buf(&mut Cursor::new(text)).inspect_err(|error| {
+            problem.borrow_mut().get_or_insert(format!("{path}: {error}; export it again"));
+        })?;
+        let names = loaded.1.keys().cloned().collect();
+        libraries.borrow_mut().push(MaterialLibrary { path: path.into_owned(), names });
+        Ok(loaded)
     };
     let loaded = tobj::load_obj_buf(&mut Cursor::new(bytes), &OBJ_OPTIONS, load);
     let (models, materials) = loaded.map_err(|error| error.to_string())?;
     if let Some(problem) = problem.into_inner() {
         return Err(problem);
     }
+    check_material_names(bytes, &libraries.into_inner())?;
     // Without any material file this is an error of the library.
     let mut materials: Vec<ImportedMaterial> =
         materials.unwrap_or_default().into_iter().map(material_of_mtl).collect();
     if materials.is_empty() {
         return Ok(ImportedColours::default());
     }
-    let plain = materials.len() as u16;
+    let plain = plain_id(materials.len())?;
     materials.push(ImportedMaterial::default());
     let ids = models.iter().flat_map(|model| {
         let id = model.mesh.material_id.map_or(plain, |id| id as u16);
         std::iter::repeat_n(id, model.mesh.indices.len() / 3)
     });
     Ok(ImportedColours { material_ids: ids.collect(), materials })
+}
+
+/// An MTL file that an OBJ file names.
+struct MaterialLibrary {
+    path: String,
+    names: BTreeSet<String>,
+}
+
+/// Refuses materials that no library above their use has, of a file with `libraries` in order.
+fn check_material_names(obj: &[u8], libraries: &[MaterialLibrary]) -> Result<(), String> {
+    let mut known = 0;
+    for line in String::from_utf8_lossy(obj).lines() {
+        let name = || line.trim().split_once(' ').map_or("", |(_, name)| name.trim());
+        match line.split_whitespace().next() {
+            Some("mtllib") => known += 1,
+            Some("usemtl") => {
+                let has = |library: &MaterialLibrary| library.names.contains(name());
+                if libraries.iter().take(known).any(has) {
+                    continue;
+                }
+                let name = shortened(name());
+                if let Some(later) = libraries.iter().find(|library| has(library)) {
+                    let path = shortened(&later.path);
+                    return Err(format!("usemtl {name} is above mtllib {path}; move mtllib to the top"));
+                }
+                if let Some(last) = libraries.last() {
+                    let path = shortened(&last.path);
+                    return Err(format!("{path} has no material {name}; add it there, or correct usemtl"));
+                }
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// The name of a file or material for a message.
+fn shortened(name: &str) -> String {
+    const MOST: usize = 80;
+    let cut = if name.chars().nth(MOST).is_some() { "…" } else { "" };
+    name.chars().take(MOST).chain(cut.chars()).collect()
+}
+
+/// Index of the plain material after the `count` materials of a file.
+fn plain_id(count: usize) -> Result<u16, String> {
+    let most = u16::MAX;
+    u16::try_from(count).map_err(|_| format!("has {count} materials; at most {most} are drawn, merge some"))
 }
 
 fn material_of_mtl(material: tobj::Material) -> ImportedMaterial {

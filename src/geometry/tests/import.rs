@@ -137,6 +137,8 @@ fn open_empty_flat_and_malformed_files_are_refused_with_a_reason() {
         refusal(&CUBE.replace("v 1 1 1", "v 1 nan 1")),
         MeshImportError::Mesh(MeshError::NotFinite { vertex: 6 })
     );
+    let textured = CUBE.replace("f 4 3 2 1", "vt 0 0\nvt nan 0\nf 4/1 3/1 2/2 1/1");
+    assert_eq!(refusal(&textured), MeshImportError::Mesh(MeshError::TextureNotFinite { triangle: 0 }));
     let sheet = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1\n";
     assert_eq!(refusal(sheet), MeshImportError::Mesh(MeshError::Flat));
     let twice = format!("{CUBE}f 4 3 2 1\n");
@@ -265,6 +267,32 @@ fn materials_of_obj_files_are_those_of_their_mtl_files() {
     assert_eq!(colours(CUBE, &read(mtl)), Ok(ImportedColours::default()), "no material file");
     let missing = colours(&coloured, &|name| Err(format!("no file {name}")));
     assert_eq!(missing, Err("no file cube.mtl".to_owned()));
+    let unknown = coloured.replace("usemtl blue", "usemtl bleu");
+    let error = "cube.mtl has no material bleu; add it there, or correct usemtl".to_owned();
+    assert_eq!(colours(&unknown, &read(mtl)), Err(error));
+    let late = format!("usemtl blue\n{coloured}");
+    let error = "usemtl blue is above mtllib cube.mtl; move mtllib to the top".to_owned();
+    assert_eq!(colours(&late, &read(mtl)), Err(error));
+    assert_eq!(colours(&late.replace("mtllib", "#"), &read(mtl)), Ok(ImportedColours::default()));
+    let (named, long) = ("x".repeat(1000), "x".repeat(80));
+    let error = colours(&coloured.replace("blue", &named), &read(mtl)).expect_err("unknown");
+    assert!(error.contains(&format!("material {long}…;")), "{error}");
+}
+
+#[test]
+fn more_materials_than_indices_are_refused() {
+    let mtl: String = (0..=u16::MAX).map(|i| format!("newmtl m{i}\n")).collect();
+    let most = mtl.strip_suffix("newmtl m65535\n").expect("the last").to_owned();
+    let text = format!("mtllib c.mtl\nusemtl m1\n{CUBE}");
+    let read =
+        |mtl: String| import_colours(text.as_bytes(), MeshFormat::Obj, &|_| Ok(mtl.clone().into_bytes()));
+    let refusal = Err("has 65536 materials; at most 65535 are drawn, merge some".to_owned());
+    assert_eq!(read(mtl), refusal);
+    assert_eq!(read(most).map(|colours| colours.material_ids), Ok(vec![1; 12]));
+    let mut cube = Glb::new(&read_obj(CUBE).expect("a cube"));
+    let materials = format!("\"materials\":[{}],\"accessors\"", vec!["{}"; 65536].join(","));
+    cube.json = cube.json.replace("\"accessors\"", &materials);
+    assert_eq!(import_colours(&cube.bytes(), MeshFormat::Gltf, &|_| Err(String::new())), refusal);
 }
 
 #[test]
@@ -289,9 +317,75 @@ fn materials_of_gltf_files_have_embedded_images() {
     let ImportedColours { materials, material_ids } =
         import_colours(&cube.bytes(), MeshFormat::Gltf, &read).expect("materials");
     assert_eq!(material_ids, [0; 12]);
-    let image = Some(ImportedImage::Bytes(b"picture!".to_vec()));
+    let image = Some(ImportedImage::Bytes(b"picture!".as_slice().into()));
     let expected =
         ImportedMaterial { albedo: [0.5, 1.0, 1.0], roughness: Some(0.25), metalness: Some(0.0), image };
     assert_eq!(materials[0], expected);
     import(&cube.bytes(), MeshFormat::Gltf, &METRES).expect("a cube");
+}
+
+/// A cube with a material and an image beside the file.
+fn textured_glb(surface: &str, uri: &str) -> Glb {
+    let mut cube = Glb::new(&read_obj(CUBE).expect("a cube"));
+    let materials = format!(
+        "\"materials\":[{{\"pbrMetallicRoughness\":{{{surface}}}}}],\"textures\":[{{\"source\":0}}],\
+         \"images\":[{{\"uri\":\"{uri}\"}}],\"accessors\""
+    );
+    cube.json = cube
+        .json
+        .replace("\"accessors\"", &materials)
+        .replace("\"indices\":1}", "\"indices\":1,\"material\":0}");
+    cube
+}
+
+fn glb_colours(cube: &Glb) -> Result<ImportedColours, String> {
+    import_colours(&cube.bytes(), MeshFormat::Gltf, &|_| Err("no file is read".to_owned()))
+}
+
+#[test]
+fn factors_that_multiply_a_texture_of_roughness_are_left_out() {
+    let surface = |surface: &str| {
+        let colours = glb_colours(&textured_glb(surface, "a.png")).expect("a material");
+        (colours.materials[0].roughness, colours.materials[0].metalness)
+    };
+    assert_eq!(surface(""), (Some(1.0), Some(1.0)));
+    assert_eq!(surface("\"metallicRoughnessTexture\":{\"index\":0}"), (None, None));
+}
+
+#[test]
+fn addresses_of_gltf_images_are_decoded_and_data_is_not_printed() {
+    let image = |uri: &str| {
+        let colours = glb_colours(&textured_glb("\"baseColorTexture\":{\"index\":0}", uri));
+        colours.map(|colours| colours.materials[0].image.clone())
+    };
+    assert_eq!(image("maps/dark%20oak.png"), Ok(Some(ImportedImage::File("maps/dark oak.png".to_owned()))));
+    let error = image("data:image/png;base64,AAAA").expect_err("data");
+    assert_eq!(
+        error,
+        "material 0: its image is a data URI, which is not supported; store it in the .glb file or beside it"
+    );
+    assert!(image("%ff.png").expect_err("bytes").contains("is not UTF-8 text"));
+}
+
+#[test]
+fn other_texture_coordinates_of_gltf_images_are_refused() {
+    let colours = |info: &str| {
+        let mut cube = textured_glb(&format!("\"baseColorTexture\":{{\"index\":0{info}}}"), "a.png");
+        cube.json = cube.json.replacen('{', "{\"extensionsUsed\":[\"KHR_texture_transform\"],", 1);
+        (glb_colours(&cube), cube)
+    };
+    let transform = |inner: &str| format!(",\"extensions\":{{\"KHR_texture_transform\":{{{inner}}}}}");
+    for (info, expected) in [
+        (",\"texCoord\":1".to_owned(), "TEXCOORD_1"),
+        (transform("\"texCoord\":2"), "TEXCOORD_2"),
+        (transform("\"scale\":[2,2]"), "KHR_texture_transform"),
+        (transform("\"offset\":[0.5,0]"), "KHR_texture_transform"),
+    ] {
+        let (found, mut cube) = colours(&info);
+        let error = found.expect_err(&info);
+        assert!(error.starts_with("material 0: its image ") && error.contains(expected), "{error}");
+        cube.json = cube.json.replace(",\"material\":0", "");
+        assert!(glb_colours(&cube).is_ok(), "no triangle has it");
+    }
+    assert!(colours(&transform("\"scale\":[1,1]")).0.is_ok(), "without effect");
 }
