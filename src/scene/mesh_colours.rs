@@ -4,6 +4,8 @@ use std::{fmt, sync::Arc};
 
 use serde::{Serialize, Serializer};
 use sha2::{Digest, Sha256};
+
+use super::visual::Visual;
 use softvt_common::text::hex;
 use softvt_geometry::{
     Vec3,
@@ -144,9 +146,13 @@ fn decode_srgb(byte: u8) -> f32 {
 }
 
 impl MeshColours {
-    /// Colour at a point on or near the surface, averaged over about `spacing` (m) along it, linear RGB. `None` where
-    /// the surface is not that of a coloured mesh.
-    pub fn at(&self, p_o: &Vec3, spacing: f64) -> Option<[f32; 3]> {
+    /// Colour at a point on or near the surface, averaged over about `spacing` (m) along it, linear RGB. Where the
+    /// surface is not that of a coloured mesh, it is the colour of a [`Visual`] by default.
+    pub fn at(&self, p_o: &Vec3, spacing: f64) -> [f32; 3] {
+        self.of_mesh(p_o, spacing).unwrap_or_else(|| Visual::default().albedo.map(|x| x as f32))
+    }
+
+    fn of_mesh(&self, p_o: &Vec3, spacing: f64) -> Option<[f32; 3]> {
         let found = self.shape.mesh_point(p_o)?;
         let mesh = self.meshes.iter().find(|mesh| std::ptr::eq(&*mesh.solid, found.solid))?;
         let id = mesh.material_ids.get(found.triangle)?;
@@ -179,6 +185,24 @@ impl Serialize for SurfaceImage {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use softvt_geometry::mesh::Mesh;
+
+    #[test]
+    fn parts_without_colours_are_grey() {
+        let mesh = Mesh {
+            vertices: [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(Into::into).to_vec(),
+            triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+            uvs: Vec::new(),
+        };
+        let Ok(Shape::Mesh(solid)) = Shape::from_mesh(mesh) else { panic!("a solid") };
+        let far = Shape::Sphere { radius: 0.1 }.translated(Vec3::new(5.0, 0.0, 0.0));
+        let shape = Arc::new(Shape::Mesh(solid.clone()).union(far));
+        let materials = vec![MeshMaterial { albedo: [1.0, 0.5, 0.0], image: None }].into();
+        let mesh = ColouredMesh { solid, material_ids: vec![0; 4].into(), materials };
+        let colours = MeshColours { shape, meshes: vec![mesh] };
+        assert_eq!(colours.at(&Vec3::new(0.2, 0.2, 0.0), 1e-3), [1.0, 0.5, 0.0]);
+        assert_eq!(colours.at(&Vec3::new(5.0, 0.0, 0.1), 1e-3), [0.7; 3], "the sphere");
+    }
 
     #[test]
     fn images_are_sampled_between_texels_repeat_and_are_averaged_from_afar() {

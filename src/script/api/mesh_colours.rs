@@ -1,13 +1,14 @@
 //! Colours of mesh files: their materials and images, as colours of a shape.
 
-use std::{io::Cursor, sync::Arc};
+use std::{collections::BTreeMap, io::Cursor, sync::Arc};
 
-use image::{ImageReader, RgbImage, imageops::FilterType};
+use image::{ImageReader, imageops::FilterType};
 use mlua::Lua;
 
 use crate::vm::memory_budget::{Reservation, reserve};
+use softvt_common::text::shortened;
 use softvt_geometry::{
-    import::{ImportedColours, ImportedImage, ImportedMaterial},
+    import::{ImportedColours, ImportedImage},
     shape::{MeshSolid, Shape},
 };
 use softvt_scene::{ColouredMesh, MeshColours, MeshMaterial, SurfaceImage, Visual};
@@ -18,15 +19,15 @@ pub(crate) struct FileColours {
     mesh: ColouredMesh,
     roughness: Option<f64>,
     metalness: Option<f64>,
-    _reserved: Reservation,
+    _reserved: Vec<Reservation>,
 }
 
 impl FileColours {
-    /// The colours of a solid from what its file states; `None` without materials. `read` returns a file by its path
-    /// from the folder of the mesh file.
+    /// The colours of a solid from what its file states; `None` without materials. Roughness and metalness are those of
+    /// the material of the largest area. `read` returns a file by its path from the folder of the mesh file.
     ///
     /// # Errors
-    /// An image cannot be read, or does not fit into memory; the message names it.
+    /// An image of a triangle cannot be read, or does not fit into memory; the message names it.
     pub(crate) fn new(
         lua: &Lua,
         imported: ImportedColours,
@@ -34,21 +35,25 @@ impl FileColours {
         read: &dyn Fn(&str) -> Result<Vec<u8>, String>,
     ) -> Result<Option<Self>, String> {
         let ImportedColours { materials, material_ids } = imported;
-        let Some(first) = materials.first() else { return Ok(None) };
-        let (roughness, metalness) = (first.roughness, first.metalness);
-        let mut bytes = 0;
-        let materials = materials.iter().map(|material| {
-            let image = image_of(material, read)?.map(|image| {
-                bytes += SurfaceImage::bytes(image.width(), image.height());
-                Arc::new(SurfaceImage::new(image.width(), image.as_raw()))
-            });
+        if materials.is_empty() {
+            return Ok(None);
+        }
+        let ids = solid.sources().iter().map(|triangle| material_ids.get(*triangle as usize).copied());
+        let material_ids: Arc<[u16]> = ids.map(Option::unwrap_or_default).collect();
+        let areas = material_areas(solid, &material_ids);
+        let by_area = areas.iter().rev().max_by(|a, b| a.1.total_cmp(b.1));
+        let main = by_area.and_then(|(id, _)| materials.get(usize::from(*id)));
+        let (roughness, metalness) = main.map_or((None, None), |main| (main.roughness, main.metalness));
+        let mut images = Images { lua, read, decoded: BTreeMap::new(), reserved: Vec::new() };
+        let materials = materials.iter().enumerate().map(|(id, material)| {
+            let is_used = u16::try_from(id).is_ok_and(|id| areas.contains_key(&id));
+            let image =
+                material.image.as_ref().filter(|_| is_used).map(|image| images.of(image)).transpose()?;
             Ok(MeshMaterial { albedo: material.albedo, image })
         });
         let materials: Arc<[MeshMaterial]> = materials.collect::<Result<Vec<_>, String>>()?.into();
-        let ids = solid.sources().iter().map(|triangle| material_ids.get(*triangle as usize).copied());
-        let material_ids: Arc<[u16]> = ids.map(Option::unwrap_or_default).collect();
+        let reserved = std::mem::take(&mut images.reserved);
         let mesh = ColouredMesh { solid: solid.clone(), material_ids, materials };
-        let reserved = reserve(lua, bytes).map_err(|error| error.to_string())?;
         Ok(Some(Self { mesh, roughness, metalness, _reserved: reserved }))
     }
 
@@ -67,36 +72,233 @@ impl FileColours {
     }
 }
 
+/// Area of each material that a triangle of a solid has, m².
+fn material_areas(solid: &MeshSolid, material_ids: &[u16]) -> BTreeMap<u16, f64> {
+    let mesh = solid.mesh();
+    let mut areas = BTreeMap::new();
+    for (triangle, id) in mesh.triangles.iter().zip(material_ids) {
+        *areas.entry(*id).or_default() += mesh.triangle_area(triangle);
+    }
+    areas
+}
+
+/// Longest path of a file that a mesh file names, bytes.
+const MAX_PATH: usize = 255;
+/// Longest path in a message, characters.
+const SHOWN_PATH: usize = 80;
+
+/// The path of the file `name`, which `mesh_file` states as a path from its own folder.
+///
+/// # Errors
+/// The path is absolute, too long or leads out of the project.
+pub(crate) fn path_beside(mesh_file: &str, name: &str) -> Result<String, String> {
+    let shown = shortened(name, SHOWN_PATH);
+    let name = name.replace('\\', "/");
+    let refused = |reason: &str| {
+        Err(format!("{shown:?} {reason}; name the file by its path from the folder of the mesh file"))
+    };
+    let is_drive = |name: &str| name.as_bytes().get(1) == Some(&b':');
+    if name.starts_with('/') || is_drive(&name) {
+        return refused("is an absolute path");
+    }
+    if name.contains(':') {
+        return refused("is an address");
+    }
+    if name.len() > MAX_PATH {
+        return Err(format!("{shown:?} is a path of more than {MAX_PATH} bytes; rename the file"));
+    }
+    let folder = mesh_file.rsplit_once('/').map_or("", |(folder, _)| folder);
+    let mut parts = Vec::new();
+    for part in folder.split('/').chain(name.split('/')) {
+        match part {
+            "" | "." => {}
+            ".." if parts.pop().is_none() => return refused("leads out of the project"),
+            ".." => {}
+            _ => parts.push(part),
+        }
+    }
+    Ok(parts.join("/"))
+}
+
 /// Largest width and height of an image that is kept, pixels: surfaces are drawn with fewer texels. Larger ones are
 /// scaled down.
 const KEPT_EDGE: u32 = 2048;
 
-/// Decodes the image of a material.
-fn image_of(
-    material: &ImportedMaterial,
-    read: &dyn Fn(&str) -> Result<Vec<u8>, String>,
-) -> Result<Option<RgbImage>, String> {
-    let (name, bytes) = match &material.image {
-        None => return Ok(None),
-        Some(ImportedImage::File(path)) => (path.as_str(), read(path)?),
-        Some(ImportedImage::Bytes(bytes)) => ("its image", bytes.clone()),
-    };
-    let unreadable = |error: &dyn std::fmt::Display| format!("{name}: {error}; give a PNG or JPEG file");
-    let reader = || {
-        let reader = ImageReader::new(Cursor::new(&bytes)).with_guessed_format();
-        reader.map_err(|error| unreadable(&error))
-    };
-    let (width, height) = reader()?.into_dimensions().map_err(|error| unreadable(&error))?;
-    let most = SurfaceImage::MAX_EDGE;
-    if width > most || height > most {
-        return Err(format!(
-            "{name}: {width} × {height} pixels; at most {most} × {most} are drawn, scale it down"
-        ));
+/// The images of a mesh file, each decoded once.
+struct Images<'a> {
+    lua: &'a Lua,
+    read: &'a dyn Fn(&str) -> Result<Vec<u8>, String>,
+    /// Those so far, by their path or the address of their bytes.
+    decoded: BTreeMap<(&'a str, *const u8), Arc<SurfaceImage>>,
+    /// Memory of those so far.
+    reserved: Vec<Reservation>,
+}
+
+impl<'a> Images<'a> {
+    fn of(&mut self, image: &'a ImportedImage) -> Result<Arc<SurfaceImage>, String> {
+        let key = match image {
+            ImportedImage::File(path) => (path.as_str(), std::ptr::null()),
+            ImportedImage::Bytes(bytes) => ("", bytes.as_ptr()),
+        };
+        if let Some(known) = self.decoded.get(&key) {
+            return Ok(known.clone());
+        }
+        let decoded = match image {
+            ImportedImage::File(path) => self.decode(&shortened(path, SHOWN_PATH), &(self.read)(path)?)?,
+            ImportedImage::Bytes(bytes) => self.decode("an image in the file", bytes)?,
+        };
+        Ok(self.decoded.entry(key).or_insert(Arc::new(decoded)).clone())
     }
-    let decoded = reader()?.decode().map_err(|error| unreadable(&error))?;
-    let kept = match width.max(height) > KEPT_EDGE {
-        true => decoded.resize(KEPT_EDGE, KEPT_EDGE, FilterType::Triangle),
-        false => decoded,
-    };
-    Ok(Some(kept.to_rgb8()))
+
+    fn decode(&mut self, name: &str, bytes: &[u8]) -> Result<SurfaceImage, String> {
+        let unreadable = |error: &dyn std::fmt::Display| format!("{name}: {error}; give a PNG or JPEG file");
+        let reader = || {
+            let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+            reader.map_err(|error| unreadable(&error))
+        };
+        let (width, height) = reader()?.into_dimensions().map_err(|error| unreadable(&error))?;
+        let most = SurfaceImage::MAX_EDGE;
+        if width > most || height > most {
+            return Err(format!(
+                "{name}: {width} × {height} pixels; at most {most} × {most} are drawn, scale it down"
+            ));
+        }
+        // Before it is decoded, which takes little more for one image at a time.
+        let longest = width.max(height);
+        let kept = |edge: u32| (edge * KEPT_EDGE).div_ceil(longest.max(KEPT_EDGE));
+        let kept = SurfaceImage::bytes(kept(width), kept(height));
+        let reserved = reserve(self.lua, kept);
+        self.reserved.push(reserved.map_err(|_| {
+            format!(
+                "{name}: {width} × {height} pixels do not fit into the memory of images, shapes and masks; scale it \
+                 down or use fewer images"
+            )
+        })?);
+        let decoded = reader()?.decode().map_err(|error| unreadable(&error))?;
+        let kept = match longest > KEPT_EDGE {
+            true => decoded.resize(KEPT_EDGE, KEPT_EDGE, FilterType::Triangle),
+            false => decoded,
+        };
+        let kept = kept.to_rgb8();
+        Ok(SurfaceImage::new(kept.width(), kept.as_raw()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::RefCell;
+
+    use image::{ImageFormat, RgbImage};
+
+    use super::*;
+    use crate::vm::memory_budget::MemoryUse;
+    use softvt_geometry::{import::ImportedMaterial, mesh::Mesh};
+
+    /// A tetrahedron, whose last face is the largest.
+    fn tetrahedron() -> Arc<MeshSolid> {
+        let mesh = Mesh {
+            vertices: [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(Into::into).to_vec(),
+            triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+            uvs: Vec::new(),
+        };
+        let Ok(Shape::Mesh(solid)) = Shape::from_mesh(mesh) else { panic!("a solid") };
+        solid
+    }
+
+    fn png(edge: u32) -> Vec<u8> {
+        let mut png = Cursor::new(Vec::new());
+        RgbImage::new(edge, edge).write_to(&mut png, ImageFormat::Png).expect("a PNG file");
+        png.into_inner()
+    }
+
+    fn textured(path: &str, roughness: f64) -> ImportedMaterial {
+        let image = Some(ImportedImage::File(path.to_owned()));
+        ImportedMaterial { image, roughness: Some(roughness), ..ImportedMaterial::default() }
+    }
+
+    fn lua() -> Lua {
+        let lua = Lua::new();
+        lua.set_app_data(MemoryUse::default());
+        lua
+    }
+
+    #[test]
+    fn an_image_is_decoded_once_and_only_if_a_triangle_has_it() {
+        let materials = vec![textured("unused.png", 0.1), textured("a.png", 0.2), textured("a.png", 0.3)];
+        let imported = ImportedColours { materials, material_ids: vec![1, 1, 1, 2] };
+        let requests = RefCell::new(Vec::new());
+        let read = |path: &str| {
+            requests.borrow_mut().push(path.to_owned());
+            Ok(png(4))
+        };
+        let colours = FileColours::new(&lua(), imported, &tetrahedron(), &read).expect("an image");
+        let FileColours { mesh, roughness, .. } = colours.expect("materials");
+        assert_eq!(requests.into_inner(), ["a.png"]);
+        let [None, Some(a), Some(b)] = [0, 1, 2].map(|id| mesh.materials[id].image.clone()) else {
+            panic!("{:?}", mesh.materials)
+        };
+        assert!(Arc::ptr_eq(&a, &b));
+        assert_eq!(roughness, Some(0.2), "three faces of area 1/2 each against one of 0.87");
+    }
+
+    #[test]
+    fn the_roughness_is_that_of_the_largest_area() {
+        let imported = |material_ids| ImportedColours {
+            materials: [0.1, 0.2, 0.3]
+                .map(|roughness| ImportedMaterial {
+                    roughness: Some(roughness),
+                    ..ImportedMaterial::default()
+                })
+                .to_vec(),
+            material_ids,
+        };
+        let read = |path: &str| Err(path.to_owned());
+        let roughness = |ids: [u16; 4]| {
+            let colours = FileColours::new(&lua(), imported(ids.to_vec()), &tetrahedron(), &read);
+            colours.expect("no image").expect("materials").roughness
+        };
+        assert_eq!(roughness([1, 1, 2, 2]), Some(0.3));
+        assert_eq!(roughness([1, 0, 2, 2]), Some(0.3));
+        assert_eq!(roughness([2, 1, 2, 1]), Some(0.2), "the largest face");
+    }
+
+    #[test]
+    fn memory_is_reserved_before_an_image_is_decoded() {
+        let lua = lua();
+        let rest = 1000;
+        let _others = reserve(&lua, (512 << 20) - rest).expect("it fits");
+        // Its pixels are missing.
+        let cut: Vec<u8> = png(64).into_iter().take(60).collect();
+        let imported =
+            || ImportedColours { materials: vec![textured("a.png", 0.5)], material_ids: vec![0; 4] };
+        let error = |lua: &Lua| {
+            FileColours::new(lua, imported(), &tetrahedron(), &|_| Ok(cut.clone())).expect_err("refused")
+        };
+        assert!(
+            error(&lua).starts_with("a.png: 64 × 64 pixels do not fit into the memory"),
+            "{}",
+            error(&lua)
+        );
+        let empty = self::lua();
+        assert!(error(&empty).ends_with("give a PNG or JPEG file"), "{}", error(&empty));
+    }
+
+    #[test]
+    fn paths_are_those_from_the_folder_of_the_mesh_file() {
+        let path = |name: &str| path_beside("parts/c.obj", name);
+        for name in ["c.mtl", "./c.mtl", ".\\c.mtl", "x//..\\./c.mtl", "../parts/c.mtl"] {
+            assert_eq!(path(name).as_deref(), Ok("parts/c.mtl"), "{name}");
+        }
+        assert_eq!(path_beside("c.obj", "./maps\\a.png").as_deref(), Ok("maps/a.png"));
+        for (name, reason) in [
+            ("/home/a/c.mtl", "is an absolute path"),
+            ("C:\\a\\c.mtl", "is an absolute path"),
+            ("https://example.org/c.mtl", "is an address"),
+            ("../../c.mtl", "leads out of the project"),
+        ] {
+            let error = path(name).expect_err(name);
+            assert!(error.starts_with(&format!("{name:?} {reason}; name the file by its path")), "{error}");
+        }
+        assert!(path(&"x".repeat(5000)).is_err_and(|error| error.len() < 200));
+    }
 }

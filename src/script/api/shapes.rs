@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use mlua::Lua;
 
-use super::mesh_colours::FileColours;
+use super::mesh_colours::{FileColours, path_beside};
 use crate::{
     schema::{Range, Type, choice, class, functions, record_of},
     vm::{
         error::{app_data, current_line, fail},
-        library::SharedLibrary,
+        library::{LibraryError, SharedLibrary},
         memory_budget::{Reservation, reserve},
     },
 };
@@ -232,9 +232,11 @@ functions! {
             drop(reserve(lua, needed)?);
             let shape = Shape::from_mesh(mesh).map_err(|error| refused(error.into()))?;
             let beside = |name: &str| {
-                let path = file.rsplit_once('/').map_or(name.to_owned(), |(folder, _)| format!("{folder}/{name}"));
-                let found = lock(&library).data(&path, requester.as_deref());
-                found.map(|found| found.bytes.to_vec()).map_err(|error| error.to_string())
+                let found = lock(&library).data(&path_beside(&file, name)?, requester.as_deref());
+                found.map(|found| found.bytes.to_vec()).map_err(|error| match error {
+                    missing @ LibraryError::NoFile { .. } => format!("{missing}; add it"),
+                    other => other.to_string(),
+                })
             };
             let colours = match &shape {
                 Shape::Mesh(solid) => MeshFormat::from_extension(extension)

@@ -359,7 +359,7 @@ pub(crate) fn visuals_of(
         let mut plain = vec![Visual::default(); needed];
         let own = shape.file_visual().map_err(|error| {
             let message = format!(
-                "asset {name}: visuals: the colours of its mesh cannot be read: {error}; add what is missing, or give visuals"
+                "asset {name}: visuals: the colours of its mesh cannot be read: {error}, or give the asset visuals"
             );
             fail(lua, message)
         })?;

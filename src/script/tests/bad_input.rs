@@ -284,6 +284,18 @@ fn colours_of_mesh_files_are_those_of_assets_without_visuals() {
     image::RgbImage::new(3, 2).write_to(&mut png, image::ImageFormat::Png).expect("a PNG file");
     project.write("parts/wood.png", png.get_ref());
     assert_eq!(error(""), "x.lua:2: fine");
+    project.write("parts/c.obj", cube.replace("c.mtl", "./c.mtl").as_bytes());
+    project.write("parts/c.mtl", b"newmtl a\nmap_Kd .\\..\\parts\\wood.png\n");
+    assert_eq!(error(""), "x.lua:2: fine");
+    project.write("parts/c.mtl", b"newmtl a\nmap_Kd /home/me/wood.png\n");
+    assert!(
+        error("")
+            .contains("parts/c.obj: \"/home/me/wood.png\" is an absolute path; name the file by its path"),
+        "{}",
+        error("")
+    );
+    project.write("parts/c.obj", cube.replace("usemtl a", "usemtl b").as_bytes());
+    assert!(error("").contains("parts/c.obj: c.mtl has no material b; add it there"), "{}", error(""));
 }
 
 #[test]

@@ -103,9 +103,7 @@ pub(crate) fn sample_visual(
     let [r, g, b] = visual.albedo;
     let mut material = [r, g, b, visual.roughness].map(|x| f32x8::splat(x as f32));
     if let Some(colours) = &visual.colours {
-        let tint = |channel: usize| {
-            at.each(|p, _| colours.at(&p.cast(), f64::from(spacing)).map_or(1.0, |colour| colour[channel]))
-        };
+        let tint = |channel: usize| at.each(|p, _| colours.at(&p.cast(), f64::from(spacing))[channel]);
         (0..3).for_each(|channel| material[channel] *= tint(channel));
     }
     let mut relief = f32x8::ZERO;
