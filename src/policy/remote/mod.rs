@@ -197,11 +197,13 @@ fn observes_every_step(server: &PolicyServer, metadata: &Value) -> Result<bool, 
 /// They are not those of the profile.
 fn check_action_codes(server: &PolicyServer, metadata: &Value) -> Result<(), PolicyError> {
     let Profile { name, actions, .. } = &server.profile;
-    let stated = |key: &str| -> Result<Option<String>, PolicyError> {
+    let stated = |key: &str, known: &[&str]| -> Result<Option<String>, PolicyError> {
         let Some(value) = entry(metadata, key).filter(|value| !value.is_nil()) else { return Ok(None) };
         let Some(bytes) = value.as_str().map(str::as_bytes).or(value.as_slice()) else {
-            let found = kind(value);
-            return Err(server.error(&format!("has {found} as {key} in its metadata; expected text")));
+            let (found, known) = (kind(value), known.join(", "));
+            return Err(
+                server.error(&format!("has {found} as {key} in its metadata; expected one of {known}"))
+            );
         };
         Ok(Some(String::from_utf8_lossy(bytes).chars().take(80).collect()))
     };
@@ -210,7 +212,7 @@ fn check_action_codes(server: &PolicyServer, metadata: &Value) -> Result<(), Pol
         server
             .error(&format!("states {stated:?} in the entry {key} of its metadata; expected one of {known}"))
     };
-    if let Some(stated) = stated("gripper")? {
+    if let Some(stated) = stated("gripper", &GripCode::ALL.map(GripCode::name))? {
         let own = actions.gripper.code;
         match GripCode::named(&stated) {
             Some(code) if code == own => {}
@@ -228,7 +230,7 @@ fn check_action_codes(server: &PolicyServer, metadata: &Value) -> Result<(), Pol
             }
         }
     }
-    if let Some(stated) = stated("pose")? {
+    if let Some(stated) = stated("pose", &PoseEncoding::NAMES)? {
         let own = actions.pose.name();
         if !PoseEncoding::NAMES.contains(&stated.as_str()) {
             return Err(unknown("pose", &stated, &PoseEncoding::NAMES));
