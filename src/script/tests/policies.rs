@@ -171,7 +171,9 @@ fn malformed_actions_end_the_run_at_the_line_of_act() {
         ("return { joints = { 0, 0 }, closure = 0 }", format!("{at}.joints: expected a list of 7 numbers")),
         (
             "return { position = { 0, 0, 0 }, joints = { 0, 0, 0, 0, 0, 0, 0 }, closure = 0 }",
-            format!("{at}: joints has a position, axis_angle or quaternion beside it; give one of both"),
+            format!(
+                "{at}: joints has a position, axis_angle or quaternion beside it; give either joints or a pose"
+            ),
         ),
         (
             "return { position = { 0, 0, 0 }, axis_angle = { 0, 0, 0 }, closure = 2 }",
