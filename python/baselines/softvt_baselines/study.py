@@ -76,7 +76,7 @@ class Job:
 
     @property
     def name(self) -> str:
-        """The number of frames stands behind the inputs if there are several."""
+        """The inputs, followed by the number of frames if there are several."""
         return f"{self.suite}-{self.inputs}{self.frames if self.frames > 1 else ''}-{self.code}-s{self.seed}"
 
 

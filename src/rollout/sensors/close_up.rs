@@ -1,4 +1,4 @@
-//! Pictures of one object from nearby, for people: never an input of a policy.
+//! Close-up pictures of one object for videos and reports; never an input of a policy.
 
 use image::RgbImage;
 use nalgebra::Point3;

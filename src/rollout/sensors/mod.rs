@@ -149,9 +149,7 @@ impl Sensors {
     /// # Errors
     /// A parameter of the camera or the light is out of range, or an object cannot be rendered.
     pub fn render(&mut self, frame: &WorldSnapshot, camera: &Camera) -> Result<RenderedImage, SensingError> {
-        let render_scene = self.built_scene()?;
-        let image = self.renderer.render(&render_scene, &self.view(frame), camera);
-        image.map_err(|error| SensingError::from(error).set_by(camera))
+        self.render_by(Renderer::render, frame, camera)
     }
 
     /// As [`render`](Self::render), faster, but with the same colours alone: depth and segmentation are empty.
@@ -163,8 +161,17 @@ impl Sensors {
         frame: &WorldSnapshot,
         camera: &Camera,
     ) -> Result<RenderedImage, SensingError> {
-        let render_scene = self.built_scene()?;
-        let image = self.renderer.render_rgb(&render_scene, &self.view(frame), camera);
+        self.render_by(Renderer::render_rgb, frame, camera)
+    }
+
+    fn render_by(
+        &mut self,
+        render: fn(&mut Renderer, &RenderScene, &FrameView, &Camera) -> Result<RenderedImage, CameraError>,
+        frame: &WorldSnapshot,
+        camera: &Camera,
+    ) -> Result<RenderedImage, SensingError> {
+        let (render_scene, view) = (self.built_scene()?, self.view(frame));
+        let image = render(&mut self.renderer, &render_scene, &view, camera);
         image.map_err(|error| SensingError::from(error).set_by(camera))
     }
 
