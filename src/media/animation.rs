@@ -26,25 +26,33 @@ pub enum AnimationError {
     #[error("the animation has no frames")]
     Empty,
     /// The frames have different sizes.
-    #[error("frame {index} of the animation has another size than the first")]
+    #[error("frame {index} of the animation has another size than its still picture")]
     Size { index: usize },
     /// The encoder failed.
     #[error("cannot encode the animation: {0}")]
     Encoding(#[from] png::EncodingError),
 }
 
-/// Encodes frames that are each shown for `each`, the last one for `last`, again and again.
+/// Encodes frames that are each shown for `each`, the last one for `last`, again and again. Programs that show no
+/// animations show the picture `still`.
 ///
 /// # Errors
-/// There are no frames, or they differ in size.
-pub fn encode(frames: &[RgbImage], each: Duration, last: Duration) -> Result<Vec<u8>, AnimationError> {
-    let first = frames.first().ok_or(AnimationError::Empty)?;
-    if let Some(index) = frames.iter().position(|frame| frame.dimensions() != first.dimensions()) {
+/// There are no frames, or they differ in size from `still`.
+pub fn encode(
+    still: &RgbImage,
+    frames: &[RgbImage],
+    each: Duration,
+    last: Duration,
+) -> Result<Vec<u8>, AnimationError> {
+    if frames.is_empty() {
+        return Err(AnimationError::Empty);
+    }
+    if let Some(index) = frames.iter().position(|frame| frame.dimensions() != still.dimensions()) {
         return Err(AnimationError::Size { index });
     }
-    let palette = Palette::new(frames);
+    let palette = Palette::new(frames.iter().chain([still]));
     let mut file = Vec::new();
-    let mut encoder = Encoder::new(&mut file, first.width(), first.height());
+    let mut encoder = Encoder::new(&mut file, still.width(), still.height());
     encoder.set_color(ColorType::Indexed);
     encoder.set_depth(BitDepth::Eight);
     encoder.set_palette(palette.bytes());
@@ -54,8 +62,10 @@ pub fn encode(frames: &[RgbImage], each: Duration, last: Duration) -> Result<Vec
     encoder.set_compression(png::Compression::High);
     encoder.set_filter(png::Filter::NoFilter);
     encoder.set_animated(frames.len() as u32, 0)?;
+    encoder.set_sep_def_img(true)?;
     encoder.set_blend_op(BlendOp::Over)?;
     let mut writer = encoder.write_header()?;
+    writer.write_image_data(&palette.indices(still))?;
     let mut shown: Vec<u8> = Vec::new();
     for (index, frame) in frames.iter().enumerate() {
         let pixels = palette.indices(frame);
@@ -83,9 +93,9 @@ struct Palette {
 }
 
 impl Palette {
-    fn new(frames: &[RgbImage]) -> Self {
+    fn new<'a>(pictures: impl Iterator<Item = &'a RgbImage>) -> Self {
         let mut counts = vec![ColourCount::default(); BINS];
-        for pixel in frames.iter().flat_map(|frame| frame.pixels()) {
+        for pixel in pictures.flat_map(|picture| picture.pixels()) {
             counts[bin(pixel.0)].add(pixel.0);
         }
         let used: Vec<ColourCount> = counts.iter().filter(|count| count.pixels > 0).copied().collect();
@@ -203,13 +213,15 @@ mod tests {
             RgbImage::from_fn(40, 30, |x, _| if x / 8 == at { Rgb([213, 94, 0]) } else { Rgb([22, 24, 28]) })
         };
         let frames = [frame(0), frame(1), frame(4)];
-        let file = encode(&frames, Duration::from_millis(100), Duration::from_millis(1500)).unwrap();
+        let file = encode(&frame(2), &frames, Duration::from_millis(100), Duration::from_millis(1500)).unwrap();
         let read = decoded(&file);
         assert_eq!(read.len(), 3);
         for (read, frame) in read.iter().zip(&frames) {
             let same = read.buffer().pixels().zip(frame.pixels()).all(|(a, b)| a.0[..3] == b.0);
             assert!(same, "few colours are kept exactly");
         }
+        let still = image::load_from_memory(&file).unwrap().into_rgb8();
+        assert_eq!(still, frame(2), "what programs without animations show");
         let milliseconds: Vec<u32> = read.iter().map(|frame| frame.delay().numer_denom_ms().0).collect();
         assert_eq!(milliseconds, [100, 100, 1500]);
     }
@@ -217,7 +229,7 @@ mod tests {
     #[test]
     fn many_colours_are_near_to_those_of_the_frame() {
         let frame = RgbImage::from_fn(128, 128, |x, y| Rgb([2 * x as u8, 2 * y as u8, (x + y) as u8]));
-        let file = encode(std::slice::from_ref(&frame), Duration::ZERO, Duration::ZERO).unwrap();
+        let file = encode(&frame, std::slice::from_ref(&frame), Duration::ZERO, Duration::ZERO).unwrap();
         let read = decoded(&file).remove(0);
         let worst = read
             .buffer()
@@ -225,8 +237,10 @@ mod tests {
             .zip(frame.pixels())
             .flat_map(|(a, b)| a.0.into_iter().zip(b.0).map(|(a, b)| a.abs_diff(b)).collect::<Vec<_>>());
         assert!(worst.max() < Some(24), "16384 colours in 255");
-        assert!(encode(&[], Duration::ZERO, Duration::ZERO).is_err());
-        let sizes = encode(&[RgbImage::new(2, 2), RgbImage::new(3, 2)], Duration::ZERO, Duration::ZERO);
+        let still = RgbImage::new(2, 2);
+        assert!(encode(&still, &[], Duration::ZERO, Duration::ZERO).is_err());
+        let frames = [RgbImage::new(2, 2), RgbImage::new(3, 2)];
+        let sizes = encode(&still, &frames, Duration::ZERO, Duration::ZERO);
         assert!(matches!(sizes, Err(AnimationError::Size { index: 1 })));
     }
 }

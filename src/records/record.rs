@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize, Serializer, ser::SerializeMap};
 
 use softvt_common::episode_id::EpisodeId;
 use softvt_common::text::decimal;
-use softvt_evaluation::category::EpisodeCategory;
+use softvt_evaluation::category::{EpisodeCategory, is_crushed};
 use softvt_evaluation::verdict::{Outcome, Verdict};
 use softvt_scene::{InitialStateOverride, SceneVariation};
 
@@ -215,6 +215,22 @@ impl EpisodeRecord {
             EpisodeCategory::Safe if !self.header.soft => "placed",
             category => category.name(),
         }
+    }
+
+    /// The same with harm that the name does not tell: "dropped, over the limit", "over the limit, crushed".
+    pub fn result_and_harm(&self) -> String {
+        let is_over = self.verdict.deformation_ok == Some(false);
+        let harm = match self.crushed_volume_pct() {
+            Some(_) => ", crushed",
+            None if is_over && self.category() != EpisodeCategory::OverLimit => ", over the limit",
+            None => "",
+        };
+        format!("{}{harm}", self.outcome_name())
+    }
+
+    /// Share of the volume that collapsed, %, if it is large enough for the object to be called crushed.
+    pub fn crushed_volume_pct(&self) -> Option<f64> {
+        self.verdict.collapsed_volume_pct.filter(|pct| is_crushed(Some(*pct)))
     }
 
     /// True if the episode counts in DSR: Goal Success with D_peak ≤ τ of each target. Drops do not enter.

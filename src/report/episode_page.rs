@@ -7,11 +7,11 @@ use data_encoding::BASE64;
 use image::{ImageFormat, Luma, Rgb, RgbImage};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+use crate::video::CLOSE_UP_STILL;
 use softvt_common::{
     files::{self, FileError},
     text::escape_control,
 };
-use softvt_evaluation::category::EpisodeCategory;
 use softvt_records::record::EpisodeRecord;
 
 /// Name of the page in the folder of the stills.
@@ -24,7 +24,8 @@ pub const FRAME: &str = "episode.png";
 const MOMENTS: [(&str, &str); 3] =
     [("start", "At the start"), ("worst", "At the worst moment"), ("end", "At the end")];
 /// Stills of a moment, by the names of files and in words.
-const STILLS: [(&str, &str); 6] = [
+const STILLS: [(&str, &str); 7] = [
+    (CLOSE_UP_STILL, "object by strain"),
     ("third_person", "third person"),
     ("wrist", "wrist"),
     ("tactile_left_arrows", "left finger, motion of the markers"),
@@ -56,17 +57,15 @@ const STYLE_OF_SEVERAL: &str =
 /// What was seen in an episode: "✗ over the limit: D 1.93 % = 5.14 × limit at 4.95 s". `worst_time_s` is the time of
 /// the largest deformation.
 pub fn sentence(record: &EpisodeRecord, worst_time_s: f64) -> String {
-    let (verdict, category) = (&record.verdict, record.category());
-    let name = match category {
-        EpisodeCategory::Safe if !record.header.soft => "placed without a drop",
-        category => category.name(),
-    };
+    let verdict = &record.verdict;
     let d = match (verdict.d_peak, verdict.tau.filter(|tau| *tau > 0.0)) {
         (Some(d), Some(tau)) => format!(": D {d:.2} % = {:.2} × limit at {worst_time_s:.2} s", d / tau),
         (Some(d), None) => format!(": D {d:.2} % at {worst_time_s:.2} s"),
         (None, _) => String::new(),
     };
-    format!("{} {name}{d}", category.glyph())
+    let collapsed = record.crushed_volume_pct().map(|pct| format!(", {pct:.0} % of the volume collapsed"));
+    let collapsed = collapsed.unwrap_or_default();
+    format!("{} {}{d}{collapsed}", record.category().glyph(), record.result_and_harm())
 }
 
 /// An episode under one of several policies.

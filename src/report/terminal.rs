@@ -8,7 +8,7 @@ use super::{
 };
 use softvt_common::text::{counted, decimal, shortened};
 use softvt_evaluation::{
-    category::{EpisodeCategory, is_crushed},
+    category::EpisodeCategory,
     statistics::{Distribution, Rate},
 };
 use softvt_records::paired_tests::{DetectableDifference, MIN_DISCORDANT};
@@ -98,8 +98,11 @@ fn push_safety(text: &mut StyledText, scores: &GroupScores) {
     let over = scores.count(EpisodeCategory::OverLimit);
     let gap = scores.goal_safe_gap.filter(|gap| *gap > 0.0);
     if let (Some(gap), true) = (gap, over > 0) {
-        let is_crushed = is_crushed(scores.collapsed_volume.mean);
-        let harm = if is_crushed { "placed, but crushed" } else { "placed over the limit" };
+        let harm = match scores.crushed_over_limit {
+            0 => "placed over the limit".to_owned(),
+            crushed if crushed == over => "placed, but crushed".to_owned(),
+            crushed => format!("placed over the limit, {crushed} of {over} crushed"),
+        };
         let category = Emphasis::Category(EpisodeCategory::OverLimit);
         text.push(Emphasis::None, "  ").push(category, format!("gap {gap:.0} points: {harm}"));
     }

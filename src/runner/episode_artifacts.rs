@@ -134,8 +134,8 @@ impl EpisodeArtifacts<'_> {
         Ok(actions::write(&path, &finished.actions)?)
     }
 
-    /// Writes the requested MCAP file and renders the requested video, and for an unsafe episode a still of its worst
-    /// moment. Consumes the recorded states.
+    /// Writes the requested MCAP file and renders the requested video, and for an unsafe episode a still of the
+    /// moment that shows its result. Consumes the recorded states.
     ///
     /// # Errors
     /// An image cannot be rendered or written.
@@ -154,9 +154,8 @@ impl EpisodeArtifacts<'_> {
         let path = video::video_path(self.dir, index);
         files::create_folder(path.parent().unwrap_or(self.dir))?;
         if !record.verdict.safety {
-            let worst = video::worst_state(&states);
             let still = video::still_path(self.dir, index);
-            video::write_video_frame(&mut states, &caption, worst, &still)?;
+            video::write_decisive_frame(&mut states, &caption, &still)?;
         }
         video::write_video(&mut states, &caption, &path, 1, cancel::requested, || ())?;
         Ok(written?)

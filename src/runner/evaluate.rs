@@ -339,7 +339,7 @@ fn report_unrendered(config: &RunConfig, index: EpisodeIndex, rendered: Result<(
 /// Formats an episode as one line of progress.
 pub(crate) fn episode_line(record: &EpisodeRecord) -> String {
     let (verdict, category) = (&record.verdict, record.category());
-    let name = record.outcome_name();
+    let name = record.result_and_harm();
     let reason = match &record.outcome {
         Outcome::Invalid { reason, .. } => format!(" ({reason})"),
         Outcome::Error { message } => format!(" ({message})"),

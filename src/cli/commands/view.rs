@@ -18,7 +18,7 @@ use softvt_report::{
     video::{
         VideoCaption,
         side_by_side::{self, PolicyEpisode},
-        worst_state, write_stills, write_video, write_video_frame,
+        worst_state, write_decisive_frame, write_stills, write_video,
     },
 };
 use softvt_rollout::{FinishedEpisode, StateRecording};
@@ -55,9 +55,10 @@ pub(crate) struct ViewArgs {
     out: PathBuf,
 }
 
-/// Runs one episode and writes `episode.mp4`, a frame of it as `episode.png`, stills of the first, worst and last state
-/// of every camera and tactile sensor, and a page that shows them. Under several policies, video and frame show them
-/// side by side, and the stills of each are in a folder of its name. Existing files are replaced.
+/// Runs one episode and writes `episode.mp4`, a picture with the verdict as `episode.png`, stills of the first, worst
+/// and last state of every camera and tactile sensor and of the target from nearby, and a page that shows them. Under
+/// several policies, video and picture show them side by side, and the stills of each are in a folder of its name.
+/// Existing files are replaced.
 ///
 /// # Errors
 /// The script is not a suite, the task or episode fails, or a file cannot be rendered or written.
@@ -132,7 +133,7 @@ fn show_one(args: &ViewArgs, config: &RunConfig, mut seen: SeenEpisode) -> Resul
     write_parts(args, config, &mut seen, dir)?;
     let SeenEpisode { record, mut states } = seen;
     let (caption, worst) = (VideoCaption::new(&record), worst_state(&states));
-    write_video_frame(&mut states, &caption, worst, &dir.join(episode_page::FRAME))?;
+    write_decisive_frame(&mut states, &caption, &dir.join(episode_page::FRAME))?;
     let video = dir.join(episode_page::VIDEO);
     let progress = Progress::new(states.frames.len(), "rendering the video");
     let threads = config.thread_count();
@@ -162,8 +163,7 @@ fn show_several(args: &ViewArgs, config: &RunConfig, seen: Vec<SeenEpisode>) -> 
         episodes.push(PolicyEpisode::new(&record, states));
         parts.push(PolicyPart { record, worst_time_s, folder });
     }
-    let worst = side_by_side::worst_moment(&episodes);
-    side_by_side::write_video_frame(&mut episodes, worst, &dir.join(episode_page::FRAME))?;
+    side_by_side::write_decisive_frame(&mut episodes, &dir.join(episode_page::FRAME))?;
     let progress = Progress::new(side_by_side::state_count(&episodes), "rendering the video");
     let (video, threads) = (dir.join(episode_page::VIDEO), config.thread_count());
     side_by_side::write_video(&mut episodes, &video, threads, cancel::requested, || progress.step())?;

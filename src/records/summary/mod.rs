@@ -75,6 +75,9 @@ pub struct GroupScores {
     /// Number of episodes by their category.
     #[serde(default)]
     pub categories: BTreeMap<EpisodeCategory, usize>,
+    /// Number of episodes of the category "over the limit" in which the object was crushed.
+    #[serde(default)]
+    pub crushed_over_limit: usize,
     /// Peak D over τ, of the valid episodes that have both.
     #[serde(default)]
     pub d_over_tau: Distribution,
@@ -280,6 +283,9 @@ impl GroupScores {
         for record in records {
             *categories.entry(record.category()).or_insert(0) += 1;
         }
+        let is_crushed_over_limit = |r: &&EpisodeRecord| {
+            r.category() == EpisodeCategory::OverLimit && r.crushed_volume_pct().is_some()
+        };
         let taus = || soft.iter().filter_map(|r| r.verdict.tau);
         let tau_range = taus().reduce(f64::min).zip(taus().reduce(f64::max));
         let over_valid = |value: fn(&EpisodeRecord) -> Option<f64>| {
@@ -310,6 +316,7 @@ impl GroupScores {
             wrong_contact_rate: Rate::from_test(records, |r| r.verdict.first_wrong_contact.is_some()),
             failed_stages,
             categories,
+            crushed_over_limit: records.iter().copied().filter(is_crushed_over_limit).count(),
             d_over_tau: over_valid(d_over_tau),
             tau_range: tau_range.map(|(min, max)| TauRange { min, max }),
             within_episodes: EpisodeDeformation {

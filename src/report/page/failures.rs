@@ -5,7 +5,6 @@ use std::path::Path;
 use maud::{Markup, html};
 
 use super::{
-    breakable,
     images::{ByteBudget, DataImage, embed_image, relative_link},
     marks::class,
     subheading,
@@ -18,7 +17,7 @@ use crate::{
 };
 use softvt_common::episode_id::EpisodeId;
 use softvt_common::text::counted;
-use softvt_evaluation::category::{EpisodeCategory, is_crushed};
+use softvt_evaluation::category::EpisodeCategory;
 use softvt_records::{paired_stats::d_over_tau, record::EpisodeRecord};
 
 /// Largest number of episodes of a category listed per run.
@@ -86,7 +85,8 @@ fn card(run: &RunSummary, episode: &UnsafeEpisode, out: &Path, budget: &mut Byte
     let title = format!("Task {} episode {}", id.task, id.episode);
     let still = embed_image(&still_path(&run.run.dir, id.index()), budget);
     let image = still.map(|DataImage { url, width, height }| {
-        let alt = format!("{title}, {}, at its worst moment, coloured by strain", object_name(&header.asset));
+        let result = episode.record.result_and_harm();
+        let alt = format!("{title}, {}, {result}, coloured by strain", object_name(&header.asset));
         html! { img src=(url) width=(width) height=(height) alt=(alt); }
     });
     html! {
@@ -97,7 +97,7 @@ fn card(run: &RunSummary, episode: &UnsafeEpisode, out: &Path, budget: &mut Byte
                 (None, _) => "",
             }
             p {
-                b { (breakable(&header.asset)) }
+                b { (object_name(&header.asset)) }
                 span.interval { (title) @if let Some(video) = &video { " · " a href=(video) { "video" span.hidden { " of task " (id.task) " episode " (id.episode) } } } }
                 @if let Some(amount) = amount(episode.record) { span.amount { (amount) } }
                 (with_unbreakable_units(&episode.reason))
@@ -112,8 +112,8 @@ fn card(run: &RunSummary, episode: &UnsafeEpisode, out: &Path, budget: &mut Byte
 /// How far D was above its limit, and how much of the volume collapsed if the object may be called crushed.
 fn amount(record: &EpisodeRecord) -> Option<String> {
     let ratio = d_over_tau(record).filter(|ratio| *ratio > 1.0)?;
-    let collapsed = record.verdict.collapsed_volume_pct.filter(|pct| is_crushed(Some(*pct)));
-    let crushed = collapsed.map_or_else(String::new, |pct| format!(", crushed: {pct:.0}\u{a0}% collapsed"));
+    let crushed = record.crushed_volume_pct().map(|pct| format!(", crushed: {pct:.0}\u{a0}% collapsed"));
+    let crushed = crushed.unwrap_or_default();
     Some(format!("{ratio:.1}\u{a0}× limit{crushed}"))
 }
 

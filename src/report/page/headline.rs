@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use crate::{condition_effects::ConditionEffects, run_summary::RunSummary};
 use softvt_common::text::counted;
-use softvt_evaluation::category::{EpisodeCategory, is_crushed};
+use softvt_evaluation::category::EpisodeCategory;
 
 /// Number of episodes below which intervals are called wide.
 const FEW_EPISODES: usize = 30;
@@ -38,6 +38,7 @@ fn results(runs: &[&RunSummary]) -> Markup {
     let verb = if valid.len() == 1 { "brings" } else { "bring" };
     let over: Vec<&&&RunSummary> =
         valid.iter().filter(|run| run.summary.scores.count(EpisodeCategory::OverLimit) > 0).collect();
+    let drops = valid.iter().filter_map(|run| dropped(run)).collect::<Vec<_>>();
     let is_soft = valid.iter().any(|run| run.is_soft());
     let within: Vec<&&&RunSummary> = valid.iter().filter(|run| is_within(run)).collect();
     html! {
@@ -51,6 +52,7 @@ fn results(runs: &[&RunSummary]) -> Markup {
         @else if is_soft && !within.is_empty() {
             b.safe { @if within.len() + over.len() == valid.len() { "The other " } (within.len()) " policies" } " stay within the limit."
         }
+        @for sentence in &drops { " " b.dropped { (sentence) } }
     }
 }
 
@@ -59,15 +61,30 @@ fn is_within(run: &RunSummary) -> bool {
     run.is_soft() && run.run.records.iter().all(|record| record.verdict.deformation_ok != Some(false))
 }
 
+/// "tactile-servo drops 1 of 10."
+fn dropped(run: &RunSummary) -> Option<String> {
+    let drops = run.run.records.iter().filter(|record| !record.verdict.no_drop).count();
+    let all = run.run.records.len();
+    (drops > 0).then(|| format!("{} drops {drops} of {all}.", run.run.text("policy")))
+}
+
 /// "expert-binary crushes the object in 10 of 10 episodes (67 % of the volume collapsed)."
 fn over_limit(run: &RunSummary) -> String {
     let over: Vec<_> =
         run.run.records.iter().filter(|record| record.category() == EpisodeCategory::OverLimit).collect();
-    let crushed = over.iter().filter(|record| is_crushed(record.verdict.collapsed_volume_pct)).count();
+    let crushed = over.iter().filter(|record| record.crushed_volume_pct().is_some()).count();
     let (policy, all) = (run.run.text("policy"), run.run.records.len());
     let volumes: Vec<f64> = over.iter().filter_map(|record| record.verdict.collapsed_volume_pct).collect();
     let mean = volumes.iter().sum::<f64>() / volumes.len().max(1) as f64;
-    match crushed {
+    // Harm in episodes that another category names.
+    let elsewhere = run.run.records.iter().filter(|record| {
+        record.verdict.deformation_ok == Some(false) && record.category() != EpisodeCategory::OverLimit
+    });
+    let elsewhere = match elsewhere.count() {
+        0 => String::new(),
+        count => format!(" It is over the limit in {count} more that missed the goal or dropped the object."),
+    };
+    let placed = match crushed {
         0 => format!("{policy} is over the limit in {} of {}.", over.len(), counted(all, "episode")),
         crushed if crushed == over.len() => format!(
             "{policy} crushes the object in {crushed} of {} ({mean:.0} % of the volume collapsed).",
@@ -78,7 +95,8 @@ fn over_limit(run: &RunSummary) -> String {
             over.len(),
             counted(all, "episode")
         ),
-    }
+    };
+    placed + &elsewhere
 }
 
 /// The range of Safety and D/τ under the conditions of a suite.

@@ -68,7 +68,7 @@ fn matrix(id: &str, runs: &[&RunSummary], pictures: &BTreeMap<&String, DataImage
                 }
             }
             figcaption id=(id) {
-                (runs[0].summary.suite) ": median of peak D over τ, and the category of failed episodes (of those with several, the number). Cells with a video link to it."
+                (runs[0].summary.suite) ": the category of most failed episodes with their number and the largest peak D over τ among them; without a failure, the median of peak D over τ. Cells with a video link to it."
             }
         }
     }
@@ -83,13 +83,18 @@ fn cell(run: &RunSummary, asset: &str, out: &Path) -> Markup {
     let Some(of_asset) = run.summary.by_asset.get(asset) else { return html! { td { "–" } } };
     let scores = &of_asset.scores;
     let worst = worst_category(scores);
-    let text = scores.d_over_tau.median.map_or_else(|| "–".to_owned(), |median| format!("{median:.2}"));
+    let shown = shown_episode(run, asset, worst);
+    let ratio = match worst {
+        EpisodeCategory::Safe => scores.d_over_tau.median,
+        _ => shown.and_then(d_over_tau),
+    };
+    let text = ratio.map_or_else(|| "–".to_owned(), |ratio| format!("{ratio:.2}"));
     let failed = match (worst, scores.episodes) {
         (EpisodeCategory::Safe, _) => String::new(),
         (worst, 1) => format!("{} ", worst.glyph()),
         (worst, n) => format!("{} {}/{n} ", worst.glyph(), scores.count(worst)),
     };
-    let video = shown_episode(run, asset, worst)
+    let video = shown
         .and_then(|record| relative_link(out, &video_path(&run.run.dir, record.header.id.index())));
     let label = html! { @if !failed.is_empty() { span.nobreak aria-label=(worst.name()) role="img" { (failed) } } span.nobreak { (text) } };
     html! {

@@ -1,7 +1,8 @@
 //! Videos and still images of episodes: the third-person camera and the target from nearby on top, the wrist camera
-//! and both fingers below them, and the deformation over its limit at the bottom. Those of one episode under several
-//! policies are in [`side_by_side`].
+//! and both fingers below them, and plots of the deformation over its limit and of the force at the bottom. Those of one
+//! episode under several policies are in [`side_by_side`].
 
+mod plots;
 pub mod side_by_side;
 
 use std::{
@@ -11,6 +12,7 @@ use std::{
 
 use image::{ImageBuffer, ImageError, Luma, RgbImage};
 
+use plots::{EpisodeCurves, EventMark, PLOTS_HEIGHT, Plots, ratio_colour};
 use softvt_benchmark::{CONTROL_DT, CONTROL_HZ};
 use softvt_common::episode_id::EpisodeIndex;
 use softvt_common::{
@@ -44,17 +46,27 @@ const WRIST_PANEL: u32 = 384;
 /// Size of the finger panels beside it, pixels: that of the sensors' images.
 const FINGER_WIDTH: u32 = 320;
 const FINGER_HEIGHT: u32 = 240;
-/// Height of the caption at the bottom, pixels.
-const CAPTION_HEIGHT: u32 = 160;
+/// Size of the panels with the change of the fingers' images, pixels.
+const CHANGE_WIDTH: u32 = 148;
+const CHANGE_HEIGHT: u32 = 111;
+/// Height of the lines of text above the plots, pixels.
+const CAPTION_HEIGHT: u32 = 60;
+/// Pixels of a unit of the plots.
+const PLOT_UNIT: f32 = 1.25;
 const WIDTH: u32 = 2 * TOP_PANEL;
-const HEIGHT: u32 = TOP_PANEL + WRIST_PANEL + CAPTION_HEIGHT;
+const HEIGHT: u32 =
+    (TOP_PANEL + WRIST_PANEL + CAPTION_HEIGHT + (PLOT_UNIT * PLOTS_HEIGHT) as u32).next_multiple_of(2);
 const MARGIN: f32 = 16.0;
 /// Size of a still image, pixels.
 pub(crate) const STILL_SIZE: [u32; 2] = [WIDTH, HEIGHT];
 /// Left edge, upper edge and size of the panel that shows the target from nearby, pixels.
 pub(crate) const TARGET_PANEL: [u32; 3] = [TOP_PANEL, 0, TOP_PANEL];
+/// Time after a drop at which the object is seen on its way, s.
+const AFTER_DROP_S: f64 = 0.2;
 /// Time for which a video shows the last state, with the verdict, s.
 const LAST_STATE_S: f64 = 1.5;
+/// Name of a still of the target from nearby.
+pub(crate) const CLOSE_UP_STILL: &str = "object";
 /// Edges of images in full size, pixels.
 const THIRD_PERSON_FULL_SIZE: usize = 1024;
 const OTHER_FULL_SIZE: usize = 512;
@@ -62,9 +74,11 @@ const OTHER_FULL_SIZE: usize = 512;
 const BACKGROUND: Rgb8 = [22, 24, 28];
 const TEXT: Rgb8 = [226, 229, 233];
 const FAINT: Rgb8 = [122, 128, 138];
-/// Blue and vermilion of Okabe and Ito's palette, which most people tell apart, lightened for the dark background.
+// Colours of the palette in docs/looks.md on dark ground.
 const SAFE: Rgb8 = [86, 180, 233];
 const HARM: Rgb8 = [255, 138, 61];
+const DROPPED: Rgb8 = [204, 121, 167];
+const MISSED: Rgb8 = [154, 161, 171];
 
 /// Why a video or still image cannot be written.
 #[allow(missing_docs, reason = "the messages describe the variants")]
@@ -86,15 +100,19 @@ pub enum EpisodeVideoError {
     Interrupted,
 }
 
-/// Text below the panels of a video.
+/// What a video says of its episode.
 #[derive(Clone, Debug)]
 pub struct VideoCaption {
     prompt: String,
     episode: String,
+    category: EpisodeCategory,
+    /// The result, with the harm and the crushed volume if there is any.
     verdict: String,
     /// Limit τ on the deformation, %.
     tau_pct: Option<f64>,
-    is_safe: bool,
+    /// Time of the drop, s.
+    drop_s: Option<f64>,
+    is_soft: bool,
 }
 
 impl VideoCaption {
@@ -102,18 +120,69 @@ impl VideoCaption {
     pub fn new(record: &EpisodeRecord) -> Self {
         let (header, verdict) = (&record.header, &record.verdict);
         let id = &header.id;
-        let category = record.category();
-        let word = match category {
-            EpisodeCategory::Safe if !header.soft => "placed without a drop",
-            category => category.name(),
-        };
+        let collapsed = record.crushed_volume_pct().map(|pct| format!(": {pct:.0} % collapsed"));
         Self {
             prompt: header.prompt.clone(),
             episode: format!("{} · task {} · episode {} · {}", id.suite, id.task, id.episode, header.policy),
-            verdict: word.to_owned(),
+            category: record.category(),
+            verdict: record.result_and_harm() + &collapsed.unwrap_or_default(),
             tau_pct: verdict.tau,
-            is_safe: verdict.safety,
+            drop_s: verdict.drop.map(|event| event.time_s),
+            is_soft: header.soft,
         }
+    }
+
+    /// Name of the panel that shows the target from nearby.
+    fn close_up_name(&self) -> &'static str {
+        if self.is_soft { "object, red: collapsed" } else { "object" }
+    }
+
+    /// The state that shows the result best: the drop, the end of a goal that was missed, or the worst one.
+    fn decisive_state(&self, recording: &StateRecording) -> usize {
+        let last = recording.frames.len().saturating_sub(1);
+        match self.category {
+            EpisodeCategory::Dropped => {
+                let seconds = self.drop_s.unwrap_or(f64::MAX) + AFTER_DROP_S;
+                ((seconds / CONTROL_DT).round() as usize).min(last)
+            }
+            EpisodeCategory::GoalMissed => last,
+            _ => worst_state(recording),
+        }
+    }
+}
+
+/// What a frame shows of an episode: a state of it with the verdict until then, or with the final one.
+#[derive(Clone, Copy, Debug)]
+struct Moment {
+    /// Index of the state.
+    state: usize,
+    is_final: bool,
+}
+
+impl Moment {
+    /// The state `index`; the last one, with the final verdict, if the episode has ended before.
+    fn at(recording: &StateRecording, index: usize) -> Self {
+        let last = recording.frames.len().saturating_sub(1);
+        Self { state: index.min(last), is_final: index >= last }
+    }
+
+    /// The [decisive state](VideoCaption::decisive_state) with the final verdict.
+    fn decisive(recording: &StateRecording, caption: &VideoCaption) -> Self {
+        Self { state: caption.decisive_state(recording), is_final: true }
+    }
+
+    /// The state up to which curves are drawn.
+    fn end_of_curves(self) -> usize {
+        if self.is_final { usize::MAX } else { self.state }
+    }
+
+    /// D over its limit in words, with its colour: that of the state, or the largest one with the final verdict.
+    fn ratio(self, curves: &EpisodeCurves) -> Option<(String, Rgb8)> {
+        let (word, ratio) = match self.is_final {
+            true => ("peak D", curves.peak_until(usize::MAX)?),
+            false => ("D", *curves.d_over_tau.get(self.state)?),
+        };
+        Some((format!("{word} {ratio:.2} × limit"), ratio_colour(ratio)))
     }
 }
 
@@ -137,7 +206,11 @@ pub fn write_video(
     }
     let shared = SharedSensors::new(&mut recording.sensors)?;
     let recording = &*recording;
-    let draw = |index: usize| shared.lend(|sensors| video_frame(sensors, recording, caption, index));
+    let film = shared.lend(|sensors| Film::new(sensors, recording, caption))?;
+    let draw = |index: usize| {
+        let moment = Moment::at(recording, index);
+        shared.lend(|sensors| film.frame(sensors, moment))
+    };
     let frames = FrameList { size: [WIDTH, HEIGHT], count: recording.frames.len(), draw };
     frames.encode(path, threads, is_cancelled, on_frame)
 }
@@ -200,68 +273,155 @@ impl SharedSensors {
     }
 }
 
-/// Writes one frame of the video as a PNG file.
+/// Writes a picture of an episode as a PNG file: the state that shows its result best, with the final verdict and the
+/// whole curves.
 ///
 /// # Errors
 /// The state cannot be rendered, or the file cannot be written.
-pub fn write_video_frame(
+pub fn write_decisive_frame(
     recording: &mut StateRecording,
     caption: &VideoCaption,
-    index: usize,
     path: &Path,
 ) -> Result<(), EpisodeVideoError> {
     recording.sensors.render_scene()?;
-    let frame = video_frame(&mut recording.sensors.clone(), recording, caption, index)?;
+    let mut sensors = recording.sensors.clone();
+    let moment = Moment::decisive(recording, caption);
+    let frame = Film::new(&mut sensors, recording, caption)?.frame(&mut sensors, moment)?;
     Ok(replace(path, encode_png(&frame)?)?)
 }
 
-fn video_frame(
-    sensors: &mut Sensors,
-    recording: &StateRecording,
-    caption: &VideoCaption,
-    index: usize,
-) -> Result<RgbImage, EpisodeVideoError> {
-    let mut canvas = Canvas::new(WIDTH, HEIGHT, BACKGROUND);
-    let frame = recording.frames.get(index).ok_or(EpisodeVideoError::Empty)?;
-    let seen = |sensors: &mut Sensors, name: &str, edge: u32| -> Result<RgbImage, EpisodeVideoError> {
-        let camera = sensors.camera(name)?.clone().with_edge(edge as usize);
-        Ok(sensors.render_rgb(frame, &camera)?.into_rgb_image())
-    };
-    canvas.place(&seen(sensors, STANDARD_CAMERAS[0], TOP_PANEL)?, 0, 0);
-    draw_label(&mut canvas, "third person", 0, 0, PANEL_NAME_SIZE);
-    let close_up = sensors.close_up(
-        frame,
-        recording.target,
-        CloseUp { edge: CLOSE_UP_EDGE, settled: &recording.frames[0] },
-    )?;
-    canvas.place(&resize(&close_up, TOP_PANEL, TOP_PANEL), TOP_PANEL, 0);
-    draw_label(&mut canvas, "object by strain", TOP_PANEL, 0, PANEL_NAME_SIZE);
-    canvas.place(&seen(sensors, STANDARD_CAMERAS[1], WRIST_PANEL)?, 0, TOP_PANEL);
-    draw_label(&mut canvas, "wrist", 0, TOP_PANEL, PANEL_NAME_SIZE);
-    for (side, reading) in sensors.tactile_readings(frame)?.iter().enumerate() {
-        let image = reading.with_markers(MarkerStyle::Arrows);
-        let x = WRIST_PANEL + FINGER_WIDTH * side as u32;
-        canvas.place(&resize(&image, FINGER_WIDTH, FINGER_HEIGHT), x, TOP_PANEL);
-        draw_label(&mut canvas, ["left finger", "right finger"][side], x, TOP_PANEL, PANEL_NAME_SIZE);
-        let force = format!("{:.2} N", pad_force(frame, side));
-        canvas.write(&force, x as f32 + MARGIN, (TOP_PANEL + FINGER_HEIGHT) as f32 + 32.0, 22.0, TEXT);
+/// Everything that all frames of a video share.
+struct Film<'a> {
+    recording: &'a StateRecording,
+    caption: &'a VideoCaption,
+    curves: EpisodeCurves,
+    /// The images of the fingers in the settled state.
+    fingers_at_rest: Vec<RgbImage>,
+}
+
+impl<'a> Film<'a> {
+    fn new(
+        sensors: &mut Sensors,
+        recording: &'a StateRecording,
+        caption: &'a VideoCaption,
+    ) -> Result<Self, EpisodeVideoError> {
+        let settled = recording.frames.first().ok_or(EpisodeVideoError::Empty)?;
+        let fingers_at_rest =
+            sensors.tactile_readings(settled)?.into_iter().map(|reading| reading.image).collect();
+        let curves = EpisodeCurves::new(recording, caption.tau_pct);
+        Ok(Self { recording, caption, curves, fingers_at_rest })
     }
-    let badge = Badge::new(recording, caption, index);
-    badge.draw(&mut canvas, WRIST_PANEL as f32 + MARGIN, (TOP_PANEL + FINGER_HEIGHT) as f32 + 60.0, 24.0);
-    draw_caption(&mut canvas, recording, caption, index);
-    Ok(canvas.to_image())
+
+    fn frame(&self, sensors: &mut Sensors, moment: Moment) -> Result<RgbImage, EpisodeVideoError> {
+        let mut canvas = Canvas::new(WIDTH, HEIGHT, BACKGROUND);
+        let frame = self.recording.frames.get(moment.state).ok_or(EpisodeVideoError::Empty)?;
+        self.draw_cameras(&mut canvas, sensors, frame)?;
+        self.draw_fingers(&mut canvas, sensors, frame)?;
+        let (x, y) = (WRIST_PANEL as f32 + MARGIN, (TOP_PANEL + FINGER_HEIGHT) as f32);
+        Badge::new(self.recording, self.caption, moment).draw(&mut canvas, x, y + 20.0, 16.0);
+        if let Some((text, colour)) = moment.ratio(&self.curves) {
+            canvas.write(&text, x, y + 92.0, 24.0, colour);
+        }
+        draw_caption(&mut canvas, self.caption, moment);
+        let events = events(self.recording, self.caption, moment.end_of_curves());
+        let plots = Plots {
+            episodes: std::slice::from_ref(&self.curves),
+            names: &[],
+            events: &events,
+            steps: self.recording.frames.len().saturating_sub(1),
+            unit: PLOT_UNIT,
+        };
+        let top = TOP_PANEL + WRIST_PANEL + CAPTION_HEIGHT;
+        plots.draw(&mut canvas, top as f32, WIDTH as f32, moment.end_of_curves());
+        Ok(canvas.to_image())
+    }
+
+    fn draw_cameras(
+        &self,
+        canvas: &mut Canvas,
+        sensors: &mut Sensors,
+        frame: &WorldSnapshot,
+    ) -> Result<(), EpisodeVideoError> {
+        let seen =
+            |sensors: &mut Sensors, name: &str, edge: u32| -> Result<RgbImage, EpisodeVideoError> {
+                let camera = sensors.camera(name)?.clone().with_edge(edge as usize);
+                Ok(sensors.render_rgb(frame, &camera)?.into_rgb_image())
+            };
+        canvas.place(&seen(sensors, STANDARD_CAMERAS[0], TOP_PANEL)?, 0, 0);
+        draw_label(canvas, "third person", 0, 0, PANEL_NAME_SIZE);
+        let closely = CloseUp { edge: CLOSE_UP_EDGE, settled: &self.recording.frames[0] };
+        let close_up = sensors.close_up(frame, self.recording.target, closely)?;
+        canvas.place(&resize(&close_up, TOP_PANEL, TOP_PANEL), TOP_PANEL, 0);
+        draw_label(canvas, self.caption.close_up_name(), TOP_PANEL, 0, PANEL_NAME_SIZE);
+        canvas.place(&seen(sensors, STANDARD_CAMERAS[1], WRIST_PANEL)?, 0, TOP_PANEL);
+        draw_label(canvas, "wrist", 0, TOP_PANEL, PANEL_NAME_SIZE);
+        Ok(())
+    }
+
+    /// Draws the images of the fingers with the motion of their markers, and below them the change since the settled
+    /// state.
+    fn draw_fingers(
+        &self,
+        canvas: &mut Canvas,
+        sensors: &mut Sensors,
+        frame: &WorldSnapshot,
+    ) -> Result<(), EpisodeVideoError> {
+        let (gap, top) = (8, TOP_PANEL + FINGER_HEIGHT + 12);
+        let left = WIDTH - 2 * (CHANGE_WIDTH + gap);
+        let readings = sensors.tactile_readings(frame)?;
+        for (side, (reading, at_rest)) in readings.iter().zip(&self.fingers_at_rest).enumerate() {
+            let name = format!("{} finger, {:.2} N", ["left", "right"][side], pad_force(frame, side));
+            let (image, x) =
+                (reading.with_markers(MarkerStyle::Arrows), WRIST_PANEL + FINGER_WIDTH * side as u32);
+            canvas.place(&resize(&image, FINGER_WIDTH, FINGER_HEIGHT), x, TOP_PANEL);
+            draw_label(canvas, &name, x, TOP_PANEL, PANEL_NAME_SIZE);
+            let change = amplified_change(&reading.image, at_rest);
+            let x = left + (CHANGE_WIDTH + gap) * side as u32;
+            canvas.place(&resize(&change, CHANGE_WIDTH, CHANGE_HEIGHT), x, top);
+        }
+        let below = (top + CHANGE_HEIGHT) as f32 + 16.0;
+        canvas.write("change of the images since the start, × 4", left as f32, below, 13.0, FAINT);
+        Ok(())
+    }
+}
+
+/// The difference of two images, four times as large, around medium grey.
+fn amplified_change(image: &RgbImage, at_rest: &RgbImage) -> RgbImage {
+    let mut change = image.clone();
+    for (now, before) in change.iter_mut().zip(at_rest.iter()) {
+        *now = (128 + 4 * (i32::from(*now) - i32::from(*before))).clamp(0, 255) as u8;
+    }
+    change
 }
 
 /// Sum of the normal forces on a pad, N.
 fn pad_force(frame: &WorldSnapshot, side: usize) -> f64 {
     let points = frame.patches.get(side).into_iter().flat_map(|patch| &patch.points);
-    points.map(|point| point.pressure * point.area).sum()
+    // Without the negative zero of an empty sum.
+    points.map(|point| point.pressure * point.area).sum::<f64>() + 0.0
 }
 
 /// Index of the first state up to `index` at which D is above τ.
 fn first_over_limit(recording: &StateRecording, caption: &VideoCaption, index: usize) -> Option<usize> {
     let tau = caption.tau_pct?;
     recording.worst_d_pct.iter().take(index + 1).position(|d| d.is_some_and(|d| d > tau))
+}
+
+/// When the object was grasped, released and dropped, of what happened up to the state `index`.
+fn events(recording: &StateRecording, caption: &VideoCaption, index: usize) -> Vec<EventMark> {
+    let is_held = |frame: &WorldSnapshot| (0..2).all(|side| pad_force(frame, side) > 0.0);
+    let held = recording.frames.iter().position(is_held);
+    let released = recording.frames.iter().rposition(is_held).map(|last| last + 1);
+    let is_kept = released == Some(recording.frames.len());
+    let time = |state: usize| state as f64 * CONTROL_DT;
+    let now_s = time(index);
+    let all = [
+        ("grasp", held.map(time)),
+        ("release", released.filter(|_| !is_kept && caption.drop_s.is_none()).map(time)),
+        ("drop", caption.drop_s),
+    ];
+    let known = all.into_iter().filter_map(|(name, time_s)| Some(EventMark { name, time_s: time_s? }));
+    known.filter(|event| event.time_s <= now_s).collect()
 }
 
 /// A verdict in words, and the colour of its ground.
@@ -271,17 +431,28 @@ struct Badge {
 }
 
 impl Badge {
-    /// The verdict so far in the state `index`, or the final one in the last state.
-    fn new(recording: &StateRecording, caption: &VideoCaption, index: usize) -> Self {
-        let over = first_over_limit(recording, caption, index);
-        let is_last = index + 1 == recording.frames.len();
-        let (text, colour) = match (is_last, caption.tau_pct, over) {
-            (true, _, _) => (caption.verdict.clone(), if caption.is_safe { SAFE } else { HARM }),
-            (false, None, _) => ("no limit of the deformation".to_owned(), FAINT),
-            (false, Some(_), None) => ("within the limit so far".to_owned(), SAFE),
-            (false, Some(_), Some(at)) => {
-                (format!("over the limit since {:.2} s", at as f64 * CONTROL_DT), HARM)
-            }
+    /// The verdict so far, or the final one.
+    fn new(recording: &StateRecording, caption: &VideoCaption, moment: Moment) -> Self {
+        if moment.is_final {
+            let colour = match caption.category {
+                EpisodeCategory::Safe => SAFE,
+                EpisodeCategory::OverLimit => HARM,
+                EpisodeCategory::Dropped | EpisodeCategory::Slipped => DROPPED,
+                EpisodeCategory::GoalMissed | EpisodeCategory::NotJudged | EpisodeCategory::Invalid => MISSED,
+            };
+            return Self { text: caption.verdict.clone(), colour };
+        }
+        let now_s = moment.state as f64 * CONTROL_DT;
+        let over = first_over_limit(recording, caption, moment.state)
+            .map(|at| format!("over the limit since {:.2} s", at as f64 * CONTROL_DT));
+        let dropped = caption.drop_s.filter(|at| *at <= now_s).map(|at| format!("dropped at {at:.2} s"));
+        let (text, colour) = match (over, dropped) {
+            (Some(_), Some(dropped)) => (format!("over the limit, {dropped}"), HARM),
+            (Some(over), None) => (over, HARM),
+            (None, Some(dropped)) => (dropped, DROPPED),
+            (None, None) if !caption.is_soft => ("not dropped so far".to_owned(), SAFE),
+            (None, None) if caption.tau_pct.is_none() => ("no limit of the deformation".to_owned(), FAINT),
+            (None, None) => ("within the limit so far".to_owned(), SAFE),
         };
         Self { text, colour }
     }
@@ -305,62 +476,11 @@ fn draw_label(canvas: &mut Canvas, name: &str, x: u32, y: u32, size: f32) {
     canvas.write(name, x + 16.0, y + 8.0 + size, size, [255, 255, 255]);
 }
 
-fn draw_caption(canvas: &mut Canvas, recording: &StateRecording, caption: &VideoCaption, index: usize) {
+fn draw_caption(canvas: &mut Canvas, caption: &VideoCaption, moment: Moment) {
     let top = (TOP_PANEL + WRIST_PANEL) as f32;
     canvas.write(&caption.prompt, MARGIN, top + 28.0, 20.0, TEXT);
-    let time = index as f64 * CONTROL_DT;
-    canvas.write(&format!("{} · {time:.2} s", caption.episode), MARGIN, top + 52.0, 16.0, FAINT);
-    draw_deformation_chart(canvas, recording, caption, index, top + 68.0);
-}
-
-/// Upper end of the axis of D over τ.
-const MAX_RATIO: f64 = 2.0;
-
-/// Plots D over its limit τ against time up to the state `index`, on an axis that is the same in all videos. `y` is
-/// the top of the chart.
-fn draw_deformation_chart(
-    canvas: &mut Canvas,
-    recording: &StateRecording,
-    caption: &VideoCaption,
-    index: usize,
-    y: f32,
-) {
-    let (x, width, height) = (150.0, 800.0, 68.0);
-    let steps = recording.frames.len().saturating_sub(1).max(1) as f32;
-    canvas.line(&[[x, y], [x, y + height], [x + width, y + height]], 1.0, 0.0, FAINT);
-    let end = format!("{:.0} s", f64::from(steps) * CONTROL_DT);
-    canvas.write("0", x - 4.0, y + height + 15.0, 14.0, FAINT);
-    canvas.write(&end, x + width - 16.0, y + height + 15.0, 14.0, FAINT);
-    let now = recording.worst_d_pct.get(index).copied().flatten();
-    let (Some(tau), Some(now)) = (caption.tau_pct, now) else {
-        let rigid = recording.worst_d_pct.iter().flatten().next().is_none();
-        let text = if rigid { "rigid: no deformation" } else { "no limit τ" };
-        canvas.write(text, x + MARGIN, y + 30.0, 17.0, FAINT);
-        return;
-    };
-    let point = |at: usize, ratio: f64| {
-        let share = (ratio / MAX_RATIO).min(1.0) as f32;
-        [x + width * at as f32 / steps, y + height * (1.0 - share)]
-    };
-    let level = point(0, 1.0)[1];
-    canvas.line(&[[x, level], [x + width, level]], 1.5, 6.0, HARM);
-    canvas.write("τ", x + width + 8.0, level + 5.0, 16.0, HARM);
-    canvas.write("D / τ", MARGIN, y + 22.0, 17.0, TEXT);
-    let ratio = now / tau;
-    let colour = |ratio: f64| if ratio > 1.0 { HARM } else { SAFE };
-    canvas.write(&format!("{ratio:.2}"), MARGIN, y + 50.0, 24.0, colour(ratio));
-    let ratios: Vec<(usize, f64)> = recording
-        .worst_d_pct
-        .iter()
-        .enumerate()
-        .take(index + 1)
-        .filter_map(|(at, d)| Some((at, (*d)? / tau)))
-        .collect();
-    // A part of the curve is as harmful as its worse end.
-    for pair in ratios.windows(2) {
-        let [(from, a), (to, b)] = [pair[0], pair[1]];
-        canvas.line(&[point(from, a), point(to, b)], 2.0, 0.0, colour(a.max(b)));
-    }
+    let time_s = moment.state as f64 * CONTROL_DT;
+    canvas.write(&format!("{} · {time_s:.2} s", caption.episode), MARGIN, top + 52.0, 16.0, FAINT);
 }
 
 /// Path of an episode's video in a run folder.
@@ -369,7 +489,7 @@ pub fn video_path(dir: &Path, index: EpisodeIndex) -> PathBuf {
     dir.join(format!("video/task_{task:03}/episode_{episode:05}.mp4"))
 }
 
-/// Path in a run folder of the still image of an episode's [worst state](worst_state).
+/// Path in a run folder of the picture of an episode that [`write_decisive_frame`] writes.
 pub fn still_path(dir: &Path, index: EpisodeIndex) -> PathBuf {
     video_path(dir, index).with_extension("png")
 }
@@ -407,8 +527,9 @@ pub fn write_stills(
 ) -> Result<Vec<PathBuf>, EpisodeVideoError> {
     let shared = SharedSensors::new(&mut recording.sensors)?;
     let (recording, cameras) = (&*recording, shared.original.cameras().to_vec());
-    // In each state the images of every camera, then those of the fingers.
-    let per_state = cameras.len() + 1;
+    // In each state the images of every camera, then the target from nearby, then those of the fingers.
+    let per_state = cameras.len() + 2;
+    let close_up_edge = if is_full_size { OTHER_FULL_SIZE } else { CLOSE_UP_EDGE };
     let draw = |job: usize| {
         let (state, index) = states[job / per_state];
         let frame = recording.frames.get(index).ok_or(EpisodeVideoError::Empty)?;
@@ -422,6 +543,11 @@ pub fn write_stills(
                 for (suffix, png) in CAMERA_IMAGE_SUFFIXES.into_iter().zip(encode_camera_image(image)?) {
                     drawn.push(Still { path: named(&camera.name, suffix), png });
                 }
+            }
+            None if job % per_state == cameras.len() => {
+                let seen = CloseUp { edge: close_up_edge, settled: &recording.frames[0] };
+                let image = shared.lend(|sensors| sensors.close_up(frame, recording.target, seen))?;
+                drawn.push(Still { path: named(CLOSE_UP_STILL, ""), png: encode_png(&image)? });
             }
             None => {
                 let readings = shared.lend(|sensors| sensors.tactile_readings(frame))?;

@@ -30,6 +30,8 @@ const ROBOT_OUTLINE: Overlay = Overlay { colour: [105, 105, 112], opacity: 0.6 }
 const PATCH_OUTLINE: Overlay = Overlay { colour: [25, 25, 28], opacity: 0.9 };
 const SETTLED_OUTLINE: Overlay = Overlay { colour: [72, 72, 78], opacity: 1.0 };
 
+/// Distance from which a close-up sees what is not cut, m.
+const WHOLE_NEAR: f64 = 0.01;
 /// Step of depth between neighbouring pixels from which the robot has an edge there, m.
 const DEPTH_EDGE: f32 = 8e-3;
 /// Depth behind what a pixel shows up to which a contact point is visible, m: pads sink into what they hold.
@@ -54,9 +56,15 @@ impl Sensors {
         let colours: Vec<Vec<[f32; 3]>> = frame.nodes.iter().enumerate().map(colours).collect();
         let camera = self.near_camera(frame, index, edge, CLOSE_UP_DISTANCE);
         let mut image = self.without_robot(frame, &colours, &camera)?;
-        let whole = self.segmentation(frame, &camera, 0)?;
-        let is_robot = Mask::new(edge, |pixel| whole.segmentation[pixel] == ROBOT_SEGMENTATION_ID);
-        let has_edge = |a: usize, b: usize| (whole.depth[a] - whole.depth[b]).abs() > DEPTH_EDGE;
+        // The robot is drawn whole where nothing is before it, and cut like the rest behind what was left out.
+        let whole_camera = Camera { near_m: WHOLE_NEAR, ..camera.clone() };
+        let whole = self.segmentation(frame, &whole_camera, 0)?;
+        let cut = self.segmentation(frame, &camera, 0)?;
+        let is_whole = |pixel: usize| whole.segmentation[pixel] == ROBOT_SEGMENTATION_ID;
+        let is_robot =
+            Mask::new(edge, |pixel| is_whole(pixel) || cut.segmentation[pixel] == ROBOT_SEGMENTATION_ID);
+        let depth = |pixel: usize| if is_whole(pixel) { whole.depth[pixel] } else { cut.depth[pixel] };
+        let has_edge = |a: usize, b: usize| (depth(a) - depth(b)).abs() > DEPTH_EDGE;
         let robot_edges = is_robot.outline(|a, b| is_robot.0[a] && is_robot.0[b] && has_edge(a, b));
         ROBOT.draw(&mut image.rgb, &is_robot);
         ROBOT_OUTLINE.draw(&mut image.rgb, &robot_edges);
@@ -267,7 +275,7 @@ fn close_up_camera(object: &ObjectInstance, frame: &WorldSnapshot, edge: usize, 
         mount: CameraMount::Hand,
         pose,
         fovy_rad: CLOSE_UP_FOVY,
-        near_m: 0.01,
+        near_m: WHOLE_NEAR,
         far_m: 10.0,
         width: edge,
         height: edge,

@@ -2,9 +2,12 @@
 
 // Margin for the axis labels, px.
 const LEFT = 28, BOTTOM = 14;
+// Ends and labels of the logarithmic axis of D/τ, the same as in videos and reports.
+const D_ENDS = [0.05, 50], D_TICKS = [0.1, 0.3, 1, 3, 10, 30];
 
 export class Plot {
-  // `options`: values (of a state, one per line), most (upper end of the axis at least), limit (a line to stay below).
+  // `options`: values (of a state, one per line), most (upper end of the axis at least), limit (a line to stay below),
+  // is_d (the values are D/τ, on its logarithmic axis).
   constructor(canvas, options, seek) {
     this.canvas = canvas;
     this.options = options;
@@ -33,13 +36,20 @@ export class Plot {
     g.setTransform(ratio, 0, 0, ratio, 0, 0);
     g.clearRect(0, 0, width, height);
     const x = (step) => LEFT + (step / span) * (width - LEFT - 2);
-    const y = (value) => height - BOTTOM - (Math.min(value, most) / most) * (height - BOTTOM - 6);
+    const share = (value) => options.is_d
+      ? Math.log(Math.max(value, D_ENDS[0]) / D_ENDS[0]) / Math.log(D_ENDS[1] / D_ENDS[0])
+      : value / most;
+    const y = (value) => height - BOTTOM - Math.min(share(value), 1) * (height - BOTTOM - 6);
     g.font = "11px system-ui, sans-serif";
     g.strokeStyle = line;
     g.fillStyle = mute;
     g.strokeRect(LEFT, 6, width - LEFT - 2, height - BOTTOM - 6);
-    g.fillText("0", LEFT - 12, height - BOTTOM);
-    g.fillText(String(Number(most.toPrecision(2))), 2, 14);
+    if (options.is_d) {
+      for (const tick of D_TICKS.filter((tick) => tick !== options.limit)) g.fillText(String(tick), 2, y(tick) + 4);
+    } else {
+      g.fillText("0", LEFT - 12, height - BOTTOM);
+      g.fillText(String(Number(most.toPrecision(2))), 2, 14);
+    }
     g.fillText(`${(span / hz).toFixed(0)} s`, width - 26, height - 2);
     if (options.limit !== undefined) {
       g.strokeStyle = harm;

@@ -28,7 +28,7 @@ function setPlaying(is_playing) {
 
 const relative = (measured) => (measured.tau_pct ? [measured.d_pct / measured.tau_pct] : [null]);
 const plots = [
-  new Plot($("d-plot"), { values: (state) => relative(state.measured), most: 2, fixed: true, limit: 1 }, seek),
+  new Plot($("d-plot"), { values: (state) => relative(state.measured), is_d: true, limit: 1 }, seek),
   new Plot($("force-plot"), { values: (state) => state.measured.pad_force_n, most: 2 }, seek),
   new Plot($("width-plot"), { values: (state) => [state.measured.width_mm], most: 80, fixed: true }, seek),
 ];
@@ -52,6 +52,7 @@ function showBadge(measured) {
     is_harmed = !verdict.safety;
     text = `Goal ${verdict.goal ? "✓" : "✗"}  Safety ${verdict.safety ? "✓" : "✗"}`;
     if (peak !== null) text += `  peak D/τ ${peak.toFixed(2)}`;
+    if (is_over && measured.collapsed_pct >= 5) text += "  crushed";
     if (!verdict.no_drop) text += "  dropped";
   }
   badge.hidden = false;
