@@ -28,13 +28,13 @@ impl CommandResolver {
         match command.motion {
             ToolMotion::Pose { position_b, axis_angle_b } => {
                 self.stop();
-                Action { position_b, axis_angle_b, joints: None, grip }
+                Action::of_pose(position_b, axis_angle_b, grip)
             }
             ToolMotion::Joints(joints) => {
                 self.stop();
                 Action::of_joints(joints, grip)
             }
-            ToolMotion::Delta { full, translation_b, rotation_b } => {
+            ToolMotion::Delta { full, translation_b, rotation_b, is_clamped } => {
                 let (translation_b, rotation_b) = if full {
                     self.stop();
                     (translation_b, rotation_b)
@@ -43,7 +43,8 @@ impl CommandResolver {
                     (moved, osc::spring(&rotation_b, &mut self.angular_velocity))
                 };
                 let orientation_b = rotation::from_axis_angle(&observation.robot.ee_axis_angle_b);
-                osc::goal(observation.robot.ee_position_b, orientation_b, translation_b, rotation_b, grip)
+                let at = observation.robot.ee_position_b;
+                Action { is_clamped, ..osc::goal(at, orientation_b, translation_b, rotation_b, grip) }
             }
         }
     }

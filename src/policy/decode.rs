@@ -79,6 +79,9 @@ pub fn chunk(response: &Value, encoding: &ActionEncoding) -> Result<ActionChunk,
     Ok(ActionChunk { commands: rows.collect::<Result<_, _>>()? })
 }
 
+/// Excess of a number of a displacement over its range −1..=1 up to which it is clamped without being counted.
+const STEP_OVERSHOOT: f64 = 0.2;
+
 /// Decodes the numbers of an action without padding.
 ///
 /// # Errors
@@ -103,6 +106,7 @@ pub fn command(row: &[f64], encoding: &ActionEncoding) -> Result<ToolCommand, Po
         full,
         translation_b: linear().map(|x| x.clamp(-1.0, 1.0)) * translation_m,
         rotation_b: angular().map(|x| x.clamp(-1.0, 1.0)) * rotation_rad,
+        is_clamped: (0..6).any(|i| si(i).abs() > 1.0 + STEP_OVERSHOOT),
     };
     let motion = match encoding.pose {
         PoseEncoding::Joints => ToolMotion::Joints(std::array::from_fn(si)),

@@ -20,19 +20,26 @@ pub struct Action {
     /// Target of the gripper. The hand clamps closures outside of 0..=1, which the record counts; a grip force is at
     /// most the effort of the gripper.
     pub grip: GripTarget,
+    /// True if it is a displacement whose answer was out of range, and clamped.
+    pub is_clamped: bool,
 }
 
 impl Action {
     /// An action that commands a closure.
     pub fn new(position_b: Vec3, axis_angle_b: Vec3, closure: f64) -> Self {
-        Self { position_b, axis_angle_b, joints: None, grip: GripTarget::Closure(closure) }
+        Self::of_pose(position_b, axis_angle_b, GripTarget::Closure(closure))
+    }
+
+    /// An action that commands a tool pose.
+    pub fn of_pose(position_b: Vec3, axis_angle_b: Vec3, grip: GripTarget) -> Self {
+        Self { position_b, axis_angle_b, joints: None, grip, is_clamped: false }
     }
 
     /// An action that commands arm joint positions, rad.
     pub fn of_joints(joints: ArmAngles, grip: GripTarget) -> Self {
         let tool_b = panda::tool_pose(&joints);
         let (position_b, axis_angle_b) = (tool_b.translation.vector, rotation::axis_angle(&tool_b.rotation));
-        Self { position_b, axis_angle_b, joints: Some(joints), grip }
+        Self { joints: Some(joints), ..Self::of_pose(position_b, axis_angle_b, grip) }
     }
 
     /// Gripper closure, 0 (open) ..= 1 (closed); 1 with a grip force.
@@ -105,6 +112,8 @@ pub enum ToolMotion {
         translation_b: Vec3,
         /// Rotation vector about the axes of the base frame, rad.
         rotation_b: Vec3,
+        /// True if numbers of the answer were beyond −1..=1 by more than a tenth of that range. They are clamped.
+        is_clamped: bool,
     },
 }
 
@@ -126,7 +135,7 @@ pub enum EncodedGrip {
 
 impl From<Action> for ToolCommand {
     fn from(action: Action) -> Self {
-        let Action { position_b, axis_angle_b, joints, grip } = action;
+        let Action { position_b, axis_angle_b, joints, grip, .. } = action;
         let pose = ToolMotion::Pose { position_b, axis_angle_b };
         Self { motion: joints.map_or(pose, ToolMotion::Joints), grip: EncodedGrip::Target(grip) }
     }

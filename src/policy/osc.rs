@@ -25,7 +25,7 @@ pub fn goal(
 ) -> Action {
     let orientation = rotation::from_axis_angle(&rotation_b) * orientation_b;
     let (position_b, axis_angle_b) = (position_b + translation_b, rotation::axis_angle(&orientation));
-    Action { position_b, axis_angle_b, joints: None, grip }
+    Action::of_pose(position_b, axis_angle_b, grip)
 }
 
 /// Distance that the spring covers in a control step towards a goal at `step`. Updates its velocity.

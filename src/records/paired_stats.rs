@@ -141,9 +141,9 @@ impl PairedComparison {
         let soft: Vec<_> =
             pairs.iter().filter(|pair| pair.first.header.soft && pair.second.header.soft).collect();
         // As in a summary: what was judged in no episode of a run has no rate.
-        let is_judged = soft.is_empty()
-            || soft.iter().any(|pair| pair.first.is_deformation_judged())
-                && soft.iter().any(|pair| pair.second.is_deformation_judged());
+        let is_judged = soft.iter().any(|pair| pair.first.is_deformation_judged())
+            && soft.iter().any(|pair| pair.second.is_deformation_judged());
+        let judged = || soft.iter().filter(|_| is_judged);
         let touches_other = |r: &EpisodeRecord| r.verdict.first_wrong_contact.is_some();
         Self {
             pairs: pairs.len(),
@@ -153,14 +153,11 @@ impl PairedComparison {
                 .count(),
             goal: rate(|r| r.verdict.goal),
             no_drop: rate(|r| r.verdict.no_drop),
-            safety: match is_judged || soft.len() < pairs.len() {
-                true => rate(|r| r.verdict.safety),
-                false => PairedDifference::default(),
-            },
+            safety: PairedDifference::from_successes(judged().map(|pair| {
+                [pair.first, pair.second].map(|r| r.outcome.is_valid() && r.verdict.safety)
+            })),
             dsr: PairedDifference::from_successes(
-                soft.iter()
-                    .filter(|_| is_judged)
-                    .map(|pair| [pair.first, pair.second].map(EpisodeRecord::is_deformation_safe)),
+                judged().map(|pair| [pair.first, pair.second].map(EpisodeRecord::is_deformation_safe)),
             ),
             contact_success: rate(|r| r.verdict.contact_success),
             contact_safety: rate(|r| r.verdict.contact_safety),
@@ -467,12 +464,12 @@ mod tests {
         unjudged[0] = judged[0].clone();
         let paired = compared(&judged, &unjudged);
         assert_eq!((paired.safety.n, paired.safety.second, paired.dsr.n), (2, Some(50.0), 2));
-        // Safety Success of rigid targets needs no judgement of D.
+        // Rigid targets have no limit, and so no Safety Success.
         for record in &mut unjudged {
             (record.header.soft, record.verdict.deformation_ok, record.verdict.tau) = (false, None, None);
         }
         let paired = compared(&unjudged, &judged);
-        assert_eq!((paired.safety.n, paired.dsr.n), (2, 0));
+        assert_eq!((paired.goal.n, paired.safety.n, paired.dsr.n), (2, 0, 0));
     }
 
     #[test]

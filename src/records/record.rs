@@ -163,6 +163,9 @@ pub struct RolloutStats {
     /// Number of control steps whose grip value was outside of its range, and was clamped: for decoded answers of
     /// policies by more than a tenth of the range.
     pub clamped_grips: u32,
+    /// Number of control steps whose displacement was beyond −1..=1 by more than a tenth of that range, and was clamped.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub clamped_steps: u32,
     /// Reason given by the controller for aborting the episode, if it did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gave_up: Option<String>,
@@ -175,6 +178,12 @@ pub struct RolloutStats {
     pub state_hash: String,
 }
 
+/// True for the count of what did not happen, which records leave out.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_zero(count: &u32) -> bool {
+    *count == 0
+}
+
 impl RolloutStats {
     /// What of the commands was not executed as given, one phrase each.
     pub fn command_notes(&self) -> Vec<String> {
@@ -183,7 +192,9 @@ impl RolloutStats {
             .then(|| format!("{} of {} commands were out of reach{first}", self.far_commands, self.steps));
         let clamped = (self.clamped_grips > 0)
             .then(|| format!("{} of {} grip values were out of range", self.clamped_grips, self.steps));
-        far.into_iter().chain(clamped).collect()
+        let steps = (self.clamped_steps > 0)
+            .then(|| format!("{} of {} displacements were beyond −1..1", self.clamped_steps, self.steps));
+        far.into_iter().chain(clamped).chain(steps).collect()
     }
 }
 
@@ -226,6 +237,16 @@ impl EpisodeRecord {
             None => "",
         };
         format!("{}{harm}", self.outcome_name())
+    }
+
+    /// The parts of a missed goal that did not hold at the end: "not bowl on plate".
+    pub fn missed_parts(&self) -> Vec<String> {
+        let missed = self.verdict.goal_parts.iter().filter(|part| part.holds == part.negated);
+        let words = missed.filter(|_| !self.verdict.goal).map(|part| match part.negated {
+            true => format!("{}, which must not be", part.name),
+            false => format!("not {}", part.name),
+        });
+        words.collect()
     }
 
     /// Share of the volume that collapsed, %, if it is large enough for the object to be called crushed.

@@ -110,6 +110,7 @@ impl EpisodeRecord {
             ("kappa", v.kappa, "1", Some(1.0)),
             ("far_commands", Some(f64::from(s.far_commands)), "steps", Some(f64::from(s.steps))),
             ("clamped_grips", Some(f64::from(s.clamped_grips)), "steps", Some(f64::from(s.steps))),
+            ("clamped_steps", Some(f64::from(s.clamped_steps)), "steps", Some(f64::from(s.steps))),
         ];
         for (low_name, low, high_name, high) in ordered {
             if let Some((low, high)) = low.zip(high).filter(|(low, high)| is_above(*low, *high)) {

@@ -79,7 +79,7 @@ fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
         effects.push(ConditionEffect {
             change,
             goal: scores.goal_success_rate,
-            safety: scores.safety_success_rate,
+            safety: scores.soft_safety_rate(),
             d_over_tau: pairs.iter().filter_map(|pair| d_over_tau(pair.second)).collect(),
             differences: PairedComparison::from_pairs(&pairs),
         });
@@ -108,7 +108,7 @@ fn effects_of_group(group: &[&RunSummary]) -> Option<ConditionEffects> {
         method: reference.method.clone(),
         reference: TrendPoint {
             value: None,
-            safety: reference.summary.scores.safety_success_rate,
+            safety: reference.summary.scores.soft_safety_rate(),
             d_over_tau: reference_records.iter().filter_map(d_over_tau).collect(),
         },
         mean_goal: mean(|record| record.verdict.goal),

@@ -51,7 +51,7 @@ impl ConditionOutcome {
             invalid: scores.invalid,
             goal_success_rate: scores.goal_success_rate,
             no_drop_rate: scores.no_drop_rate,
-            safety_success_rate: scores.safety_success_rate,
+            safety_success_rate: scores.soft_safety_rate(),
             d_over_tau: Distribution::from_values(records.iter().filter_map(d_over_tau).collect()),
             paired,
         }
@@ -237,10 +237,11 @@ fn cells(row: &ConditionRow, deformable: bool) -> [String; 6] {
         format!("{}{mark}", signed(difference.difference, digits))
     };
     let not_applicable = || "N/A".to_owned();
+    let safety = outcome.safety_success_rate.rate.filter(|_| deformable);
     [
         row.condition.clone(),
         decimal(outcome.goal_success_rate.rate, 1),
-        if deformable { decimal(outcome.safety_success_rate.rate, 1) } else { not_applicable() },
+        safety.map_or_else(not_applicable, |rate| decimal(Some(rate), 1)),
         change(paired.filter(|_| deformable).map(|paired| paired.safety), 1),
         if deformable { decimal(outcome.d_over_tau.mean, 2) } else { not_applicable() },
         change(paired.map(|paired| paired.d_over_tau), 2),

@@ -108,11 +108,7 @@ pub fn unsafe_reason(record: &EpisodeRecord) -> Option<String> {
     if let Some(stage) = v.failed_stage {
         parts.push(format!("failed while: {}", stage.name()));
     }
-    let missed = v.goal_parts.iter().filter(|part| !v.goal && part.holds == part.negated);
-    parts.extend(missed.map(|part| match part.negated {
-        true => format!("{}, which must not be", part.name),
-        false => format!("not {}", part.name),
-    }));
+    parts.extend(record.missed_parts());
     // An invalid episode has no evidence; nothing was dropped.
     if let Some(drop) = v.drop.as_ref().filter(|drop| drop.reason != DropReason::NoEvidence) {
         let reason =

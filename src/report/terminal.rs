@@ -275,6 +275,10 @@ fn command_notes(commands: &CommandCounts) -> Vec<String> {
         let grips = of(commands.clamped_grips, "grip values were out of range", commands.clamped_episodes);
         notes.push(format!("{grips}; the hand clamped them"));
     }
+    if commands.clamped_steps > 0 {
+        let what = "displacements were beyond −1..1, and clamped,";
+        notes.push(of(commands.clamped_steps, what, commands.clamped_step_episodes));
+    }
     notes
 }
 

@@ -306,6 +306,7 @@ pub struct Episode {
     far_commands: u32,
     first_far_command: Option<UnreachableCommand>,
     clamped_grips: u32,
+    clamped_steps: u32,
 }
 
 /// A state that is kept for the recording.
@@ -389,6 +390,7 @@ impl Episode {
             far_commands: 0,
             first_far_command: None,
             clamped_grips: 0,
+            clamped_steps: 0,
             outcome: None,
         })
     }
@@ -476,6 +478,7 @@ impl Episode {
             self.first_far_command.get_or_insert(far);
         }
         self.clamped_grips += u32::from((action.closure() - 0.5).abs() > 0.5 + CLOSURE_ROUNDING);
+        self.clamped_steps += u32::from(action.is_clamped);
         if let Err(outcome) = self.control_step(action) {
             return Some(outcome);
         }
@@ -686,6 +689,11 @@ impl Episode {
         self.clamped_grips
     }
 
+    /// Number of displacements so far that were out of range.
+    pub fn clamped_steps(&self) -> u32 {
+        self.clamped_steps
+    }
+
     /// The record so far. `gave_up` is the reason why the controller aborted, if it did.
     pub fn record(&self, gave_up: Option<String>) -> EpisodeRecord {
         let soft = matches!(self.sim.objects[self.target].body, BodyId::Soft(_));
@@ -700,6 +708,7 @@ impl Episode {
             far_commands: self.far_commands,
             first_far_command: self.first_far_command,
             clamped_grips: self.clamped_grips,
+            clamped_steps: self.clamped_steps,
             gave_up,
             notes: BTreeMap::new(),
             actions_sha256: checksum(&self.actions),

@@ -52,15 +52,16 @@ fn voxel_warning(asset: &Asset, cache: &AssetCache) -> Option<String> {
     ))
 }
 
-/// A warning about a rigid body of several pieces.
+/// A warning about a body of several pieces.
 fn pieces_warning(asset: &Asset, cache: &AssetCache) -> Option<String> {
-    if !matches!(asset.body, Body::Rigid { .. }) {
-        return None;
-    }
+    let joined = match asset.body {
+        Body::Rigid { .. } => "which move as one rigid body",
+        Body::Soft(_) => "which its coarser voxel mesh joins into one soft body",
+        _ => return None,
+    };
     cache.pieces(&asset.shape).map(|SeparatePieces { count, gap }| {
         format!(
-            "its shape has {count} separate pieces, {:.0} mm apart, which move as one rigid body; join them, or make each \
-             an asset of its own",
+            "its shape has {count} separate pieces, {:.0} mm apart, {joined}; join them, or make each an asset of its own",
             1e3 * gap
         )
     })

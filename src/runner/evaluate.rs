@@ -344,7 +344,10 @@ pub(crate) fn episode_line(record: &EpisodeRecord) -> String {
         Outcome::Invalid { reason, .. } => format!(" ({reason})"),
         Outcome::Error { message } => format!(" ({message})"),
         _ if category == EpisodeCategory::Slipped => format!(" by {:.1} mm", verdict.slip_mm),
-        _ => String::new(),
+        _ => match record.missed_parts() {
+            parts if parts.is_empty() => String::new(),
+            parts => format!(" ({})", parts.join(", ")),
+        },
     };
     let d = match (verdict.d_peak, verdict.tau.filter(|tau| *tau > 0.0)) {
         (Some(d), Some(tau)) => format!(", D {d:.2} % = {:.2} × limit", d / tau),
@@ -354,6 +357,9 @@ pub(crate) fn episode_line(record: &EpisodeRecord) -> String {
     let outcome = format!("{} {name}{reason}{d}", category.glyph());
     let stats = &record.stats;
     let mut line = format!("{}: {outcome}, {:.1} s simulated", record.header.id.index(), stats.time_s);
+    if !verdict.goal && verdict.wrong_instance {
+        line += "; another object was lifted first";
+    }
     if let Some(reason) = &stats.gave_up {
         line += &format!("; gave up: {reason}");
     }

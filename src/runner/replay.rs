@@ -56,6 +56,7 @@ pub(crate) fn with_policy_fields(mut simulated: EpisodeRecord, record: &EpisodeR
     simulated.stats.camera_inside = record.stats.camera_inside;
     simulated.stats.gave_up.clone_from(&record.stats.gave_up);
     simulated.stats.notes.clone_from(&record.stats.notes);
+    simulated.stats.clamped_steps = record.stats.clamped_steps;
     simulated
 }
 

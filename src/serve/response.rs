@@ -167,6 +167,7 @@ fn info(
     put("success", json!(live.has_succeeded()));
     put("far_commands", json!(live.episode.far_commands()));
     put("clamped_grips", json!(live.episode.clamped_grips()));
+    put("clamped_steps", json!(live.episode.clamped_steps()));
     if let Some(Executed { count, recorded }) = executed {
         put("carried_out", json!(count));
         if let Some(recorded) = recorded {

@@ -191,6 +191,12 @@ pub struct CommandCounts {
     pub clamped_grips: u64,
     /// Number of episodes with such a value.
     pub clamped_episodes: usize,
+    /// Number of displacements that were out of range, and clamped.
+    #[serde(default)]
+    pub clamped_steps: u64,
+    /// Number of episodes with such a displacement.
+    #[serde(default)]
+    pub clamped_step_episodes: usize,
 }
 
 impl CommandCounts {
@@ -204,6 +210,8 @@ impl CommandCounts {
             first_far: stats().find_map(|s| s.first_far_command),
             clamped_grips: stats().map(|s| u64::from(s.clamped_grips)).sum(),
             clamped_episodes: stats().filter(|s| s.clamped_grips > 0).count(),
+            clamped_steps: stats().map(|s| u64::from(s.clamped_steps)).sum(),
+            clamped_step_episodes: stats().filter(|s| s.clamped_steps > 0).count(),
         }
     }
 }
@@ -244,6 +252,11 @@ impl GroupScores {
     /// True if a target deforms.
     pub fn is_soft(&self) -> bool {
         self.deformation_ok_rate.is_some()
+    }
+
+    /// Safety Success; of rigid targets, which have no limit, no rate.
+    pub fn soft_safety_rate(&self) -> Rate {
+        if self.is_soft() { self.safety_success_rate } else { Rate::default() }
     }
 
     /// Number of episodes of a category.

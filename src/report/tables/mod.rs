@@ -295,13 +295,18 @@ pub fn command_table(runs: &[RunSummary]) -> Option<ResultTable> {
             commands.far_episodes.to_string(),
             commands.clamped_grips.to_string(),
             commands.clamped_episodes.to_string(),
+            commands.clamped_steps.to_string(),
+            commands.clamped_step_episodes.to_string(),
             commands.first_far.map_or_else(|| "–".to_owned(), |first| first.to_string()),
         ]
     };
-    let is_affected = |run: &&RunSummary| run.summary.commands.far + run.summary.commands.clamped_grips > 0;
+    let is_affected = |run: &&RunSummary| {
+        let commands = &run.summary.commands;
+        commands.far + commands.clamped_grips + commands.clamped_steps > 0
+    };
     let rows: Vec<Vec<String>> = runs.iter().filter(is_affected).map(row).collect();
     (!rows.is_empty()).then(|| ResultTable {
-        caption: "Commands that were not executed as given: poses out of reach of one control step, and grip values out of their range, which the hand clamps. Many of them mean another unit or frame.".to_owned(),
+        caption: "Commands that were not executed as given: poses out of reach of one control step, and grip values and displacements out of their range, which are clamped. Many of them mean another unit or frame.".to_owned(),
         head: strings([
             "Suite",
             "Method",
@@ -309,6 +314,8 @@ pub fn command_table(runs: &[RunSummary]) -> Option<ResultTable> {
             "Out of reach",
             "Episodes",
             "Grips out of range",
+            "Episodes",
+            "Displacements out of range",
             "Episodes",
             "First out of reach",
         ]),

@@ -31,7 +31,7 @@ export class Plot {
     const [ink, line, mute, harm] = ["--ink", "--line", "--mute", "--harm"].map((name) => style.getPropertyValue(name));
     const all = states.map((state) => options.values(state));
     const finite = all.flat().filter((value) => value !== null && value !== undefined);
-    const most = options.fixed ? options.most : Math.max(options.most, ...finite);
+    const most = options.fixed ? options.most : Math.max(options.most ?? 0, ...finite);
     const g = canvas.getContext("2d");
     g.setTransform(ratio, 0, 0, ratio, 0, 0);
     g.clearRect(0, 0, width, height);
