@@ -45,6 +45,7 @@ end
 
 -- Adds normal noise to the arm's initial joint angles.
 function arrange.arm(scene, rng)
+  if rng == nil then error("arrange.arm: expected the layout's random numbers as the second argument: arrange.arm(scene, rng)", 2) end
   local joints, noise = scene.start_q, rng:stream "arm"
   for i = 1, #joints do
     joints[i] = joints[i] + noise:normal(0, JOINT)

@@ -78,7 +78,7 @@ pub enum VariationError {
     /// The asset has no calibrated window for the condition on it.
     #[error(
         "asset {asset} has no calibrated window, by which the variation {variation:?} selects instances; \
-         scripts/calibrate.lua calibrates it (asset={asset})"
+         calibrate it: softvt scripts/calibrate.lua --asset {asset}"
     )]
     NoWindow {
         /// Name of the asset.

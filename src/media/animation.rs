@@ -213,7 +213,8 @@ mod tests {
             RgbImage::from_fn(40, 30, |x, _| if x / 8 == at { Rgb([213, 94, 0]) } else { Rgb([22, 24, 28]) })
         };
         let frames = [frame(0), frame(1), frame(4)];
-        let file = encode(&frame(2), &frames, Duration::from_millis(100), Duration::from_millis(1500)).unwrap();
+        let file =
+            encode(&frame(2), &frames, Duration::from_millis(100), Duration::from_millis(1500)).unwrap();
         let read = decoded(&file);
         assert_eq!(read.len(), 3);
         for (read, frame) in read.iter().zip(&frames) {

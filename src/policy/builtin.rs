@@ -104,9 +104,12 @@ impl Policy for RecordedPolicy {
 fn held(command: ToolCommand) -> ToolCommand {
     let motion = match command.motion {
         fixed @ (ToolMotion::Pose { .. } | ToolMotion::Joints(_)) => fixed,
-        ToolMotion::Delta { full, .. } => {
-            ToolMotion::Delta { full, translation_b: Vec3::zeros(), rotation_b: Vec3::zeros(), is_clamped: false }
-        }
+        ToolMotion::Delta { full, .. } => ToolMotion::Delta {
+            full,
+            translation_b: Vec3::zeros(),
+            rotation_b: Vec3::zeros(),
+            is_clamped: false,
+        },
     };
     ToolCommand { motion, ..command }
 }

@@ -177,6 +177,7 @@ mod tests {
             full: false,
             translation_b: Vec3::new(0.05, -0.05, 0.025),
             rotation_b: Vec3::new(0.0, 0.0, 0.5),
+            is_clamped: true,
         };
         assert_eq!(delta, ToolCommand { motion, grip: EncodedGrip::Target(GripTarget::Closure(1.0)) });
     }

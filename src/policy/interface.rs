@@ -233,7 +233,9 @@ pub enum PolicyError {
         problem: String,
     },
     /// No server accepted a connection in time.
-    #[error("no policy server at {url}: {reason}; tried for {seconds} s: start it, or allow it more time")]
+    #[error(
+        "no policy server at {url}: {reason}; tried for {seconds} s: start it, or allow it more time (--policy-timeout)"
+    )]
     Unreachable {
         /// Address of the server.
         url: String,

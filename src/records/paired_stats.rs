@@ -153,9 +153,10 @@ impl PairedComparison {
                 .count(),
             goal: rate(|r| r.verdict.goal),
             no_drop: rate(|r| r.verdict.no_drop),
-            safety: PairedDifference::from_successes(judged().map(|pair| {
-                [pair.first, pair.second].map(|r| r.outcome.is_valid() && r.verdict.safety)
-            })),
+            safety: PairedDifference::from_successes(
+                judged()
+                    .map(|pair| [pair.first, pair.second].map(|r| r.outcome.is_valid() && r.verdict.safety)),
+            ),
             dsr: PairedDifference::from_successes(
                 judged().map(|pair| [pair.first, pair.second].map(EpisodeRecord::is_deformation_safe)),
             ),

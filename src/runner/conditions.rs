@@ -123,6 +123,15 @@ fn condition_cases(
                 same.condition.name, condition.name
             )));
         }
+        let changes = !(condition.shift.is_empty() && condition.set.is_empty())
+            || condition.policy.is_some()
+            || condition.rigid_twin;
+        if !changes && condition.name != REFERENCE {
+            return Err(config.error(format!(
+                "the condition {:?} changes nothing; give it shifts, set, policy or rigid_twin",
+                condition.name
+            )));
+        }
         let mut changed = config.clone();
         changed.shifts.extend(condition.shift.iter().cloned());
         changed.settings.extend(condition.set.iter().cloned());

@@ -264,7 +264,8 @@ impl RunConfig {
         RunError::of_setting(field, value, message).at(self.file.display())
     }
 
-    pub(crate) fn notice(&self, message: impl fmt::Display) {
+    /// Tells whoever watches the run something.
+    pub fn notice(&self, message: impl fmt::Display) {
         self.observer.notice(&message.to_string());
     }
 

@@ -104,9 +104,18 @@ impl<'a> RunLog<'a> {
                 && id.base_seed == config.base_seed()
                 && header.policy == config.policy.name;
             let problem = if !is_own || run.jobs.find(index).is_none() {
-                "belongs to another run"
+                let (seed, policy) = (id.base_seed, &header.policy);
+                let own = (config.base_seed(), &config.policy.name);
+                match is_own {
+                    true => "belongs to another run: this command does not ask for it; resume with the original arguments".to_owned(),
+                    false => format!(
+                        "belongs to another run: {} with seed {seed} and {policy}, and this command has {} with seed {} and \
+                         {}; select another output folder, or resume with the original arguments",
+                        id.suite, run.name, own.0, own.1
+                    ),
+                }
             } else if !seen.insert(index) {
-                "occurs twice"
+                "occurs twice".to_owned()
             } else {
                 continue;
             };

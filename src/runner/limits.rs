@@ -188,7 +188,7 @@ impl MissingLimit {
             true => "its episodes cannot be judged safe",
             false => "harm to it cannot be judged (others_ok is null)",
         };
-        let calibrate = format!("scripts/calibrate.lua calibrates it (asset={name})");
+        let calibrate = format!("calibrate it: softvt scripts/calibrate.lua --asset {name}");
         match self {
             Self::NotCalibrated { path } => {
                 format!("{name} is not calibrated (no {path}): {effect}; {calibrate}")

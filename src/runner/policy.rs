@@ -255,7 +255,11 @@ impl FromStr for PolicySource {
             folder if Path::new(folder).is_dir() => Self::Run(folder.into()),
             other => {
                 let known = BuiltinPolicy::ALL.map(BuiltinPolicy::name);
-                let hint = suggestion(other, known.into_iter());
+                let is_address = other.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok());
+                let hint = match is_address {
+                    true => format!("; did you mean ws://{other}?"),
+                    false => suggestion(other, known.into_iter()),
+                };
                 return Err(format!(
                     "expected {}, a Lua file such as my_policy.lua, a server such as ws://host:8000, or a run folder{hint}",
                     known.join(", ")

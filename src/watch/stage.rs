@@ -149,13 +149,57 @@ impl Stage {
             run.controllers = self.teleop();
         }
         let run = run.rendered().prepare()?;
+        if is_recorded {
+            return self.drive_and_record(&config, &run, job);
+        }
+        let finished = self.simulate_told(&run, job)?;
+        self.feed.push(end_message(&finished));
+        Ok(())
+    }
+
+    /// Simulates an episode and tells its states.
+    fn simulate_told(&mut self, run: &PreparedRun, job: EpisodeJob) -> Result<FinishedEpisode, RunError> {
         let mut moving: Option<Vec<MovingObject>> = None;
-        let mut tell = |episode: &mut Episode| self.tell(episode, &mut moving);
-        let finished = run.run_episode_watched(job, &mut tell)?;
-        let told = end_message(&finished);
-        let recorded = if is_recorded { record(&config, &run, finished) } else { Ok(()) };
-        self.feed.push(told);
-        recorded
+        run.run_episode_watched(job, &mut |episode| self.tell(episode, &mut moving))
+    }
+
+    /// Simulates an episode that is driven from the page, and adds it to the run folder of the configuration. Whether
+    /// it can be added is known before it is driven.
+    ///
+    /// # Errors
+    /// The folder holds another run or the episode already, or cannot be written, or the episode is not finished.
+    fn drive_and_record(
+        &mut self,
+        config: &RunConfig,
+        run: &PreparedRun,
+        job: EpisodeJob,
+    ) -> Result<(), RunError> {
+        let id = run.episode_id(job.task, job.episode);
+        let served = ServedRuns::open(config, std::slice::from_ref(run))?;
+        let recorder = served.recorder();
+        let driven = match (recorder.selects)(&id) {
+            true => self.simulate_told(run, job).inspect_err(|_| {
+                config.notice(format!(
+                    "{}: the drive of {} was not finished and is not recorded",
+                    id.suite,
+                    id.index()
+                ));
+            }),
+            false => Err(RunError::input(format!(
+                "{} has {} already, or does not include it; select another episode",
+                run.out.display(),
+                id.index()
+            ))),
+        };
+        let recorded = driven.and_then(|finished| {
+            let told = end_message(&finished);
+            let recorded = (recorder.record)(finished).map_err(|error| RunError::input(error.to_string()));
+            self.feed.push(told);
+            recorded
+        });
+        drop(recorder);
+        let (_, written) = served.finish();
+        recorded.and(written)
     }
 
     /// Makes controllers that are driven from the page.
@@ -206,24 +250,6 @@ impl Stage {
             name => PolicyConfig::named(name),
         }
     }
-}
-
-/// Adds an episode to the run folder of the configuration, if it is one of the run and is not there yet.
-///
-/// # Errors
-/// The folder holds another run, or cannot be written.
-fn record(config: &RunConfig, run: &PreparedRun, finished: FinishedEpisode) -> Result<(), RunError> {
-    let served = ServedRuns::open(config, std::slice::from_ref(run))?;
-    let recorder = served.recorder();
-    let recorded = match (recorder.selects)(&finished.record.header.id) {
-        true => (recorder.record)(finished).map_err(|error| RunError::input(error.to_string())),
-        false => Err(RunError::input(
-            "this episode was not recorded: the run has it already, or does not include it",
-        )),
-    };
-    drop(recorder);
-    let (_, written) = served.finish();
-    recorded.and(written)
 }
 
 /// The scripts in the folder of a script.

@@ -28,8 +28,8 @@ fn view_writes_identical_stills_and_video_each_time() {
     let page = project.text("seen/index.html");
     assert_eq!(
         page.matches("<img ").count(),
-        3 * (6 + 2 * 2),
-        "two cameras with depth and objects, two fingers twice"
+        3 * (7 + 2 * 2),
+        "two cameras with depth and objects, the target from nearby, two fingers twice"
     );
     let names: Vec<String> = fs::read_dir(project.path("seen"))
         .expect("a folder")
@@ -75,7 +75,7 @@ fn several_policies_are_shown_side_by_side() {
     assert_eq!([page, video], ["seen/index.html", "seen/episode.mp4"]);
     let shown = project.text(page);
     assert!(shown.contains(expert) && shown.contains(binary), "{shown}");
-    assert_eq!(shown.matches("<img ").count(), 2 * 3 * (6 + 2 * 2));
+    assert_eq!(shown.matches("<img ").count(), 2 * 3 * (7 + 2 * 2));
     assert!(project.path("seen/expert-binary/worst_wrist.png").is_file());
     assert!(!project.path("seen/expert/episode.mp4").exists(), "one video of both");
     let still = |out: &str| fs::read(project.path(&format!("{out}/episode.png"))).expect("written");
@@ -148,10 +148,10 @@ fn a_run_renders_the_requested_episodes() {
     assert_eq!(drawn("--video=1", "chosen"), [false, true]);
     assert_eq!(drawn("--video", "failed"), [true, true], "waiting is not safe");
     assert_eq!(drawn("--video=all", "all"), [true, true]);
-    // Unsafe episodes have a still of the worst moment, as large as a frame of the video.
+    // Unsafe episodes have a picture with the verdict, as large as a frame of the video.
     let still = fs::read(project.path("failed/video/task_000/episode_00001.png")).expect("written");
-    assert_eq!(png_size(&still), [1024, 1056]);
-    assert!(shows_something(&still, [1024, 1056]));
+    assert_eq!(png_size(&still), [1024, 1152]);
+    assert!(shows_something(&still, [1024, 1152]));
     assert!(!project.path("chosen/video/task_000/episode_00000.png").exists());
     assert_eq!(
         project.text("none/episodes.jsonl"),

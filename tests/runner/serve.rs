@@ -204,7 +204,17 @@ fn a_client_runs_an_episode_to_its_end() {
     info.sort_unstable();
     assert_eq!(
         info,
-        ["clamped_grips", "episode", "far_commands", "prompt", "step", "success", "task", "time_s"]
+        [
+            "clamped_grips",
+            "clamped_steps",
+            "episode",
+            "far_commands",
+            "prompt",
+            "step",
+            "success",
+            "task",
+            "time_s"
+        ]
     );
     let middle = client.ask(&step(11));
     assert_eq!(get(&middle, "truncated").as_bool(), Some(false));

@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::{
     DatasetError, StreamValues, TaskFile,
     card::DatasetCard,
-    demonstration::{JOINT_ACTIONS, actions_stream_name},
+    demonstration::{JOINT_ACTIONS, JOINT_TORQUES, actions_stream_name},
     layout::{DEPTH_STREAMS, IMAGE_STREAMS, MANIFEST},
     manifest::{self, ManifestEntry},
 };
@@ -19,7 +19,10 @@ use softvt_common::{files::FileError, text::counted};
 use softvt_geometry::{Quat, Vec3};
 use softvt_media::video;
 use softvt_policy::profile::GripCode;
-use softvt_robot::{panda::ARM_DOFS, rotation};
+use softvt_robot::{
+    panda::{self, ARM_DOFS, JointRange},
+    rotation,
+};
 use softvt_sensing::tactile::MARKER_COUNT;
 
 /// Result of a check.
@@ -55,6 +58,10 @@ const REQUIRED_STREAMS: [(&str, &[usize]); 15] = [
 ];
 /// Tolerance of rotations, quaternion lengths and timestamps.
 const TOLERANCE: f64 = 1e-6;
+/// Excess over the limits of a joint up to which a commanded position is likely meant, rad.
+const JOINT_MARGIN: f64 = 0.05;
+/// Greatest depth that a camera can see, m: another one is in another unit.
+const MAX_DEPTH_M: f32 = 100.0;
 
 impl CheckReport {
     fn add(&mut self, path: &Path, key: &str, what: impl Into<String>) {
@@ -231,13 +238,22 @@ impl DemoCheck<'_> {
         let not_finite = match &stream.values {
             StreamValues::F64(values) => values.iter().position(|x| !x.is_finite()),
             // Depth is infinite in the background.
-            StreamValues::F32(values) if is_depth => values.iter().position(|x| x.is_nan() || *x <= 0.0),
+            StreamValues::F32(values) if is_depth => {
+                let is_depth_m = |x: &f32| *x > 0.0 && (*x <= MAX_DEPTH_M || x.is_infinite());
+                values.iter().position(|x| !is_depth_m(x))
+            }
             StreamValues::F32(values) => values.iter().position(|x| !x.is_finite()),
             StreamValues::U8(_) => None,
         };
         if let Some(at) = not_finite {
-            let what = if is_depth { "a depth that is not above 0" } else { "a number that is not finite" };
-            self.add(name, format!("step {}: {what}", at / width.max(1)));
+            let step = at / width.max(1);
+            let what = match is_depth {
+                true => format!(
+                    "step {step}: a depth that is neither infinite nor above 0 and up to {MAX_DEPTH_M} m"
+                ),
+                false => format!("step {step}: a number that is not finite"),
+            };
+            self.add(name, what);
         }
         if is_depth && (stream.row_shape.len() != 2 || !matches!(stream.values, StreamValues::F32(_))) {
             let got = &stream.row_shape;
@@ -265,6 +281,49 @@ impl DemoCheck<'_> {
         if let Some(step) = bad {
             let q = &poses[7 * step + 3..7 * step + 7];
             self.add(name, format!("step {step}: not a unit quaternion w x y z with w >= 0: {q:?}"));
+        }
+    }
+
+    /// Checks that commanded joint positions are within the limits of the joints, and lead to the pose of the action
+    /// where they are the action.
+    fn check_joint_actions(&mut self) {
+        let Some(joints) = self.report.take(self.file.joint_commands(self.demo)) else { return };
+        let is_beyond = |(q, range): (&f64, &JointRange)| {
+            *q < range.lower - JOINT_MARGIN || *q > range.upper + JOINT_MARGIN
+        };
+        let ranges = panda::joint_ranges();
+        let beyond = joints
+            .iter()
+            .enumerate()
+            .find_map(|(step, row)| Some((step, row.iter().zip(&ranges).position(is_beyond)?)));
+        if let Some((step, joint)) = beyond {
+            let q = joints[step][joint];
+            let what = format!("step {step}: joint {} at {q} rad is outside of its limits", joint + 1);
+            return self.add(JOINT_ACTIONS, what);
+        }
+        let Some(actions) = self.report.take(self.file.actions(self.demo)) else { return };
+        let mut differs = actions.iter().map(|action| {
+            let reached = action.joints.map(|joints| panda::tool_pose(&joints).translation.vector);
+            reached.is_some_and(|reached| (reached - action.position_b).norm() > TOLERANCE)
+        });
+        if let Some(step) = differs.position(|differs| differs) {
+            self.add(
+                JOINT_ACTIONS,
+                format!("step {step}: not the joint positions at the pose of the action"),
+            );
+        }
+    }
+
+    /// Checks that the arm's drives hold it: they are never without torque after the first action.
+    fn check_joint_torques(&mut self) {
+        if !self.file.has(self.demo, JOINT_TORQUES) {
+            return;
+        }
+        let Some(torques) = self.report.take(self.file.array(self.demo, JOINT_TORQUES)) else { return };
+        let mut rows = torques.values.chunks_exact(ARM_DOFS).skip(1);
+        if let Some(after_first) = rows.position(|row| row.iter().all(|torque| *torque == 0.0)) {
+            let what = format!("step {}: no torque, which lets the arm fall", after_first + 1);
+            self.add(JOINT_TORQUES, what);
         }
     }
 
@@ -318,6 +377,8 @@ impl DemoCheck<'_> {
         if let Some(step) = both.position(|pair| !is_binary_of(pair)) {
             self.add("actions_binary", format!("step {step}: not the actions with a gripper of 0 or 1"));
         }
+        self.check_joint_actions();
+        self.check_joint_torques();
         for code in [GripCode::TwoWidth, GripCode::Force] {
             self.check_grip_labels(code, &actions, &binary);
         }

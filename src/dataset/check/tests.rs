@@ -30,11 +30,12 @@ fn demonstration(salt: f64) -> Demonstration {
     let zeros = |name: &str, row: &[usize]| {
         DataStream::f64(name, row, vec![0.1 + salt; STEPS * row.iter().product::<usize>()]).unit("m", "")
     };
+    let posture = |step: usize| [0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8].map(|q| q + 0.01 * step as f64 + salt);
     let mut demonstration = Demonstration {
         record: serde_json::from_str(include_str!("../../../tests/data/episode_record.json"))
             .expect("a valid record"),
         actions: (0..STEPS).map(|step| Action::new(place(step), turn(step), 0.3)).collect(),
-        joint_commands: (0..STEPS).map(|step| [0.1 * step as f64 + salt; 7]).collect(),
+        joint_commands: (0..STEPS).map(posture).collect(),
         gripper_closed: (0..STEPS).map(|step| step > 4).collect(),
         grip_labels_n: (0..STEPS).map(|step| if step > 4 { 2.5 } else { -1.0 }).collect(),
         observed: vec![
@@ -130,6 +131,36 @@ fn problems_of_a_stream_name_its_file_and_key() {
     let shape =
         problems(|streams| streams[2] = DataStream::f64("obs/arm_joint_pos", &[6], vec![0.0; 6 * STEPS]));
     assert!(shape.contains("obs/arm_joint_pos: expected the shape (steps, 7), got [9, 6]"), "{shape}");
+}
+
+#[test]
+fn joint_positions_torques_and_depths_in_other_units_are_reported() {
+    let text = problems(|streams| {
+        streams.push(DataStream::f64("obs/joint_torques", &[7], vec![0.0; 7 * STEPS]));
+        streams.push(DataStream::f32("obs/agentview_depth", &[2, 2], vec![900.0; 4 * STEPS]));
+    });
+    for words in
+        ["obs/joint_torques: step 1: no torque", "obs/agentview_depth: step 0: a depth that is neither"]
+    {
+        assert!(text.contains(words), "{text}");
+    }
+    let mut in_degrees = demonstration(0.0);
+    in_degrees.joint_commands[3] = in_degrees.joint_commands[3].map(f64::to_degrees);
+    let (_folder, path) = write(&in_degrees, "task.hdf5");
+    let text = file(&path).unwrap().problems.join("\n");
+    assert!(
+        text.contains("actions_joints: step 3: joint 1 at")
+            || text.contains("actions_joints: step 3: joint 2 at"),
+        "{text}"
+    );
+    let mut elsewhere = demonstration(0.0);
+    elsewhere.actions[2].joints = Some(elsewhere.joint_commands[2]);
+    let (_folder, path) = write(&elsewhere, "task.hdf5");
+    let text = file(&path).unwrap().problems.join("\n");
+    assert!(
+        text.contains("actions_joints: step 2: not the joint positions at the pose of the action"),
+        "{text}"
+    );
 }
 
 #[test]

@@ -202,7 +202,7 @@ fn without_joints_the_recorded_tool_is_transformed_to_our_frames() {
     assert!(lost.refusal().contains("the robot's position is not known"));
     // Without poses, steps stay relative and follow robosuite's spring.
     let (_, demo) = FileBuilder::libero().without("obs/").without("states").read();
-    let ToolMotion::Delta { full: false, translation_b, rotation_b } = demo.commands[1].motion else {
+    let ToolMotion::Delta { full: false, translation_b, rotation_b, .. } = demo.commands[1].motion else {
         panic!("no step")
     };
     let [x, _, _, _, b, _, _] = share(1);
@@ -238,7 +238,12 @@ fn robomimics_quaternions_in_another_order_are_detected_by_the_joints() {
 fn a_goal_without_rotation_keeps_the_last_goals_orientation() {
     let tool = [tool(0), tool(1), tool(2)];
     let step = |turn: Vec3| ToolCommand {
-        motion: ToolMotion::Delta { full: false, translation_b: Vec3::x(), rotation_b: turn },
+        motion: ToolMotion::Delta {
+            full: false,
+            translation_b: Vec3::x(),
+            rotation_b: turn,
+            is_clamped: false,
+        },
         grip: EncodedGrip::Target(GripTarget::Closure(0.0)),
     };
     let found = goals(&tool, &[step(Vec3::zeros()), step(Vec3::z() * 0.1), step(Vec3::zeros())]);

@@ -94,8 +94,8 @@ fn cell(run: &RunSummary, asset: &str, out: &Path) -> Markup {
         (worst, 1) => format!("{} ", worst.glyph()),
         (worst, n) => format!("{} {}/{n} ", worst.glyph(), scores.count(worst)),
     };
-    let video = shown
-        .and_then(|record| relative_link(out, &video_path(&run.run.dir, record.header.id.index())));
+    let video =
+        shown.and_then(|record| relative_link(out, &video_path(&run.run.dir, record.header.id.index())));
     let label = html! { @if !failed.is_empty() { span.nobreak aria-label=(worst.name()) role="img" { (failed) } } span.nobreak { (text) } };
     html! {
         td class=(class(worst)) {

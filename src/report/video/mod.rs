@@ -342,11 +342,10 @@ impl<'a> Film<'a> {
         sensors: &mut Sensors,
         frame: &WorldSnapshot,
     ) -> Result<(), EpisodeVideoError> {
-        let seen =
-            |sensors: &mut Sensors, name: &str, edge: u32| -> Result<RgbImage, EpisodeVideoError> {
-                let camera = sensors.camera(name)?.clone().with_edge(edge as usize);
-                Ok(sensors.render_rgb(frame, &camera)?.into_rgb_image())
-            };
+        let seen = |sensors: &mut Sensors, name: &str, edge: u32| -> Result<RgbImage, EpisodeVideoError> {
+            let camera = sensors.camera(name)?.clone().with_edge(edge as usize);
+            Ok(sensors.render_rgb(frame, &camera)?.into_rgb_image())
+        };
         canvas.place(&seen(sensors, STANDARD_CAMERAS[0], TOP_PANEL)?, 0, 0);
         draw_label(canvas, "third person", 0, 0, PANEL_NAME_SIZE);
         let closely = CloseUp { edge: CLOSE_UP_EDGE, settled: &self.recording.frames[0] };

@@ -8,8 +8,8 @@ use std::{path::Path, time::Duration};
 use image::RgbImage;
 
 use super::{
-    BACKGROUND, Badge, CLOSE_UP_EDGE, EpisodeVideoError, FAINT, FrameList, LAST_STATE_S, Moment, SharedSensors,
-    TEXT, VideoCaption, draw_label,
+    BACKGROUND, Badge, CLOSE_UP_EDGE, EpisodeVideoError, FAINT, FrameList, LAST_STATE_S, Moment,
+    SharedSensors, TEXT, VideoCaption, draw_label,
     plots::{EpisodeCurves, PLOTS_HEIGHT, Plots},
 };
 use softvt_benchmark::CONTROL_DT;

@@ -2,7 +2,8 @@
 
 use nalgebra::Quaternion;
 
-use crate::schema::{Range, Type, check::MIN_LENGTH, class, functions};
+use super::scene::YAW;
+use crate::schema::{Type, check::MIN_LENGTH, class, functions};
 use softvt_geometry::{Pose, Quat, Vec3};
 use softvt_robot::rotation;
 
@@ -54,7 +55,7 @@ functions! {
             /// Position.
             position: [f64; 3] = POSITION;
             /// Rotation of the downward hand about the vertical.
-            yaw: f64 = Type::Number("rad", Range::ANY) => Number(0.0);
+            yaw: f64 = YAW => Number(0.0);
             /// Orientation instead of yaw.
             quaternion: Option<[f64; 4]> = Type::Quaternion("");
         } -> ["softvt.Pose"] {
@@ -104,7 +105,7 @@ class! {
                 LuaPose(Pose::from_parts(Vec3::from(position).into(), this.0.rotation))
             }
             /// Returns the same position, rotated by an angle about the world's vertical, rad.
-            fn rotated(_, this, angle: f64) -> ["softvt.Pose"] {
+            fn rotated(_, this, angle: f64 = YAW) -> ["softvt.Pose"] {
                 let rotation = Quat::from_axis_angle(&Vec3::z_axis(), angle);
                 LuaPose(Pose::from_parts(this.0.translation, rotation * this.0.rotation))
             }

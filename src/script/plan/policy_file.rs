@@ -183,6 +183,13 @@ impl LuaPolicy {
         if count == 0 && !table.is_empty() {
             return Ok(ActionChunk { commands: vec![self.action(label, table)?] });
         }
+        if count == 0 {
+            return wrong(
+                "expected an action or a list of actions, got an empty table; an action has position, axis_angle or \
+                 quaternion, and closure"
+                    .to_owned(),
+            );
+        }
         if !(1..MAX_CHUNK_LEN).contains(&count) {
             return wrong(format!("expected 1 to {MAX_CHUNK_LEN} actions, got {count}"));
         }

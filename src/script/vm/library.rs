@@ -177,8 +177,9 @@ impl Library {
         match self.find(module, None, &candidates, late) {
             Ok(Some(file)) => Ok(file),
             Ok(None) => {
-                let names: Vec<String> =
+                let mut names: Vec<String> =
                     ["scripts", "suites", "assets"].into_iter().flat_map(module_names).collect();
+                names.extend(self.modules_beside(&path));
                 let close = suggest(module, names.iter().map(String::as_str));
                 let suggestion = close.map_or(String::new(), |close| format!("; did you mean {close:?}?"));
                 Err(LibraryError::NoModule {
@@ -317,6 +318,21 @@ impl Library {
         read(path).map_err(error)
     }
 
+    /// Names of the modules of the project in the folder of a module's `path`.
+    fn modules_beside(&self, path: &str) -> Vec<String> {
+        let folder = Path::new(path).parent().unwrap_or(Path::new(""));
+        let entries = self
+            .roots
+            .iter()
+            .flat_map(|root| fs::read_dir(root.join(folder)).into_iter().flatten().flatten());
+        let files = entries.map(|entry| folder.join(entry.file_name()));
+        let scripts = files.filter(|file| file.extension().is_some_and(|extension| extension == "lua"));
+        let mut names: Vec<String> =
+            scripts.map(|file| display(&file.with_extension("")).replace('/', ".")).collect();
+        names.sort();
+        names
+    }
+
     fn root_names(&self) -> String {
         let names: Vec<_> = self.roots.iter().map(|root| format!("{:?}", display(root))).collect();
         names.join(", ")
@@ -377,7 +393,11 @@ fn read(path: &Path) -> io::Result<Vec<u8>> {
 
 fn read_main(main: &Path, name: &str) -> Result<Vec<u8>, ScriptError> {
     if main.is_dir() {
-        return Err(ScriptError::new(name, "is a folder, not a Lua file").hint("name a file inside of it"));
+        let hint = match main.join("run.json").is_file() {
+            true => "it is a run folder, which softvt report, watch and compare take",
+            false => "name a file inside of it",
+        };
+        return Err(ScriptError::new(name, "is a folder, not a Lua file").hint(hint));
     }
     match read(main) {
         Ok(bytes) => Ok(bytes),

@@ -103,6 +103,9 @@ impl Default for VmLimits {
     }
 }
 
+/// Names of Lua's library that scripts do not have.
+const UNAVAILABLE: [&str; 6] = ["os", "io", "debug", "package", "dofile", "loadfile"];
+
 /// State that the callbacks of a virtual machine share.
 struct VmState {
     main: String,
@@ -120,6 +123,13 @@ impl VmState {
         let raised = lock(&self.raised).clone();
         let memory_bytes = self.limits.memory_bytes;
         let error = ErrorTranslator { main: &self.main, files: &files, raised, memory_bytes }.explain(error);
+        if let Some(name) =
+            UNAVAILABLE.iter().find(|name| error.message.contains(&format!("(global '{name}')")))
+        {
+            let message =
+                format!("{name} is not available to scripts, which reach neither files nor the clock");
+            return ScriptError { message, ..error };
+        }
         match self.close_name(&error) {
             Some(close) if error.hint.is_none() => error.hint(format!("did you mean {close:?}?")),
             _ => error,
