@@ -130,7 +130,7 @@ impl Demonstration {
             GripCode::Continuous => (closures, "continuous closure: 1 - commanded width / 0.08 m"),
             GripCode::Binary => {
                 let closed = self.gripper_closed.iter().map(|is_closed| f64::from(u8::from(*is_closed)));
-                (closed.collect(), "binary: 1 while the gripper is meant to hold, else 0")
+                (closed.collect(), "binary: 1 while the gripper closes to hold, and holds, else 0")
             }
             GripCode::TwoWidth => (
                 grip_labels::two_widths(&closures, &self.gripper_closed),

@@ -15,7 +15,9 @@ use crate::{
 };
 use softvt_benchmark::{Suite, Teacher};
 use softvt_common::{episode_id::EpisodeIndex, parallel};
+use softvt_geometry::Vec3;
 use softvt_policy::{Action, Observation, PolicyError, SensorStreams};
+use softvt_robot::GripTarget;
 use softvt_rollout::{Controller, Simulation};
 use softvt_script::ExpertController;
 
@@ -90,7 +92,7 @@ fn record_grips<'a>(run: SuiteRun<'a>, log: &HoldingLog) -> SuiteRun<'a> {
     let controllers: ControllerFactory = Box::new(move |opened, brief| {
         Ok(Box::new(GripRecorder {
             expert: expert_controller(opened, policy)?,
-            is_holding: Vec::new(),
+            steps: Vec::new(),
             index: brief.index(),
             log: log.clone(),
         }))
@@ -104,7 +106,7 @@ fn record_grips<'a>(run: SuiteRun<'a>, log: &HoldingLog) -> SuiteRun<'a> {
 /// object is nearly open while it holds.
 struct GripRecorder {
     expert: ExpertController,
-    is_holding: Vec<bool>,
+    steps: Vec<GripStep>,
     index: EpisodeIndex,
     log: HoldingLog,
 }
@@ -124,12 +126,63 @@ impl Controller for GripRecorder {
 
     fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, PolicyError> {
         let action = self.expert.act(sim, observation)?;
-        self.is_holding.push(self.expert.is_gripping);
+        let is_gripping = self.expert.is_gripping;
+        self.steps.extend(action.map(|Action { position_b, grip, .. }| GripStep { is_gripping, position_b, grip }));
         Ok(action)
     }
 
     fn finish(&mut self) -> Result<(), PolicyError> {
-        parallel::lock(&self.log).insert(self.index, std::mem::take(&mut self.is_holding));
+        parallel::lock(&self.log).insert(self.index, closing_or_holding(&std::mem::take(&mut self.steps)));
         Ok(())
+    }
+}
+
+/// What an expert commands in a control step.
+#[derive(Clone, Copy, Debug)]
+struct GripStep {
+    is_gripping: bool,
+    position_b: Vec3,
+    grip: GripTarget,
+}
+
+/// True for the steps in which the hand holds, or closes at one place in order to hold.
+///
+/// An expert closes fast until just before the object and grips from there. A binary hand closes in one go, so that its
+/// code is closed from the first of these steps on.
+fn closing_or_holding(steps: &[GripStep]) -> Vec<bool> {
+    let mut found: Vec<bool> = steps.iter().map(|step| step.is_gripping).collect();
+    for at in (1..steps.len().saturating_sub(1)).rev() {
+        let [before, step] = [steps[at - 1], steps[at]];
+        let closes = match (before.grip, step.grip) {
+            (GripTarget::Closure(from), GripTarget::Closure(to)) => to > from,
+            _ => false,
+        };
+        found[at] |= found[at + 1] && closes && before.position_b == step.position_b;
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hand_is_closed_from_the_step_on_in_which_it_begins_to_close_in_order_to_hold() {
+        let step = |x: f64, closure: f64, is_gripping: bool| GripStep {
+            is_gripping,
+            position_b: Vec3::new(x, 0.0, 0.0),
+            grip: GripTarget::Closure(closure),
+        };
+        let steps = [
+            step(0.0, 0.0, false),
+            step(0.1, 0.1, false), // Closes on the way.
+            step(0.2, 0.2, false),
+            step(0.2, 0.4, false), // Closes fast.
+            step(0.2, 0.6, false),
+            step(0.2, 0.65, true),
+            step(0.2, 0.65, true),
+            step(0.5, 0.2, false), // Lets go.
+        ];
+        assert_eq!(closing_or_holding(&steps), [false, false, false, true, true, true, true, false]);
     }
 }
