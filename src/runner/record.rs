@@ -127,7 +127,11 @@ impl Controller for GripRecorder {
     fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, PolicyError> {
         let action = self.expert.act(sim, observation)?;
         let is_gripping = self.expert.is_gripping;
-        self.steps.extend(action.map(|Action { position_b, grip, .. }| GripStep { is_gripping, position_b, grip }));
+        self.steps.extend(action.map(|Action { position_b, grip, .. }| GripStep {
+            is_gripping,
+            position_b,
+            grip,
+        }));
         Ok(action)
     }
 

@@ -35,7 +35,7 @@ fn view_writes_identical_stills_and_video_each_time() {
         .expect("a folder")
         .map(|entry| entry.expect("a file").file_name().to_string_lossy().into_owned())
         .collect();
-    assert_eq!(names.len(), 3 * (2 * 3 + 2 * 3) + 3, "{names:?}");
+    assert_eq!(names.len(), 3 * (2 * 3 + 1 + 2 * 3) + 3, "{names:?}");
     for moment in ["start", "worst", "end"] {
         for (stream, size) in [
             ("third_person", [224, 224]),

@@ -228,7 +228,7 @@ fn a_run_is_shown_by_its_actions_and_teleoperation_is_recorded() {
     // The same episode is there already.
     assert_eq!(page.post("/select", &json!({ "policy": "teleop" })).0, 200);
     let (error, _) = feed.until("error");
-    assert!(error["message"].as_str().unwrap().contains("was not recorded"), "{error}");
+    assert!(error["message"].as_str().unwrap().contains("has task 0 episode 0 already"), "{error}");
     // Its actions fit the episodes of demonstrations only.
     let message = project.refusal("x.lua --policy driven --out again");
     assert!(message.contains("its split is demonstration, that of this run validation"), "{message}");

@@ -26,7 +26,7 @@ fn brick(material: &str) -> Project {
     let text = format!(
         "return softvt.asset {{\n  name = 'brick',\n  \
          shape = softvt.shape.box {{ size = {{ 0.04, 0.03, 0.024 }} }}:round(0.003):grounded(),\n  \
-         body = softvt.soft {{ youngs_pa = 4e4, poisson = 0.3, density = 300, resolution = 4, grasp_spacing = 0.0015, {material} }},\n}}\n"
+         body = softvt.soft {{ youngs_pa = 4e4, poisson = 0.3, density = 300, resolution = 4, grasp_spacing = 0.003, {material} }},\n}}\n"
     );
     Project::new(&[("assets/brick.lua", &text), CALIBRATE, CHECK])
 }

@@ -94,7 +94,11 @@ fn invalid_conditions_are_reported_before_anything_runs() {
         ("{ name = \"a\", shift = { mass = -1 } }", "shift mass: expected a number in 0.01..100"),
         ("{ name = \"a\" },\n{ name = \"a\" }", "is the name of another condition; give another"),
         ("{ name = \"reference\" }", "\"reference\" is the name of the run without changes; give another"),
-        ("{ name = \"a b\" },\n{ name = \"a_b\" }", "share the folder a_b; rename one"),
+        (
+            "{ name = \"a b\", shift = { mass = 2 } },\n{ name = \"a_b\", shift = { mass = 3 } }",
+            "share the folder a_b; rename one",
+        ),
+        ("{ name = \"a\" }", "the condition \"a\" changes nothing; give it shifts, set, policy or rigid_twin"),
         ("{ name = \"a\", mass = 2 }", "unknown key \"mass\""),
     ] {
         let message = refused(conditions);

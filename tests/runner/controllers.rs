@@ -9,7 +9,7 @@ const BLIND: [&str; 6] =
 /// Mean over the kinds of a suite by column of `scripts/blind_bounds.lua`.
 fn bounds(suite: &str) -> impl Fn(&str) -> f64 {
     let project = Project::new(&[]);
-    let options = format!("--suite={suite} --instances=400");
+    let options = format!("--suite={suite} --instances=200");
     let rows = project.run("scripts/blind_bounds.lua").options(&options).rows();
     assert!(rows.len() >= 5, "{rows:?}");
     move |column: &str| {
@@ -68,7 +68,7 @@ fn compare_controllers(tasks: &[usize]) {
 
 #[test]
 fn only_the_expert_and_a_hand_that_feels_are_safe_where_touch_is_needed() {
-    compare_controllers(&[2, 6]);
+    compare_controllers(&[6]);
 }
 
 #[test]

@@ -28,7 +28,6 @@ mod policies;
 mod policy_check;
 mod policy_servers;
 mod reports;
-mod script_timeouts;
 mod serve;
 mod served_runs;
 mod shut_hand;
