@@ -90,13 +90,13 @@ impl Policy for RecordedPolicy {
     fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError> {
         if let Some(command) = self.commands.next() {
             self.last = Some(command);
-            return Ok(ActionChunk { commands: vec![command] });
+            return Ok(vec![command].into());
         }
         if let Some(message) = &self.ending {
             return Err(PolicyError::Action(message.clone()));
         }
         let still = tool_pose(observation).into();
-        Ok(ActionChunk { commands: vec![self.last.map_or(still, held)] })
+        Ok(vec![self.last.map_or(still, held)].into())
     }
 }
 

@@ -75,8 +75,18 @@ pub fn chunk(response: &Value, encoding: &ActionEncoding) -> Result<ActionChunk,
         }
         _ => {}
     }
-    let rows = values.chunks_exact(width).map(|row| command(&row[..own], encoding));
-    Ok(ActionChunk { commands: rows.collect::<Result<_, _>>()? })
+    ActionChunk::decode(values.chunks_exact(width).map(|row| row[..own].to_vec()).collect(), encoding)
+}
+
+impl ActionChunk {
+    /// Decodes actions without padding, and keeps their numbers.
+    ///
+    /// # Errors
+    /// As [`command`].
+    pub fn decode(rows: Vec<Vec<f64>>, encoding: &ActionEncoding) -> Result<Self, PolicyError> {
+        let commands = rows.iter().map(|row| command(row, encoding)).collect::<Result<_, _>>()?;
+        Ok(Self { commands, rows })
+    }
 }
 
 /// Excess of a number of a displacement over its range −1..=1 up to which it is clamped without being counted.
@@ -88,6 +98,21 @@ const STEP_OVERSHOOT: f64 = 0.2;
 /// [`PolicyError::Action`] if a number is not finite, [`PolicyError::Response`] if there are more or fewer than
 /// [`ActionEncoding::numbers`].
 pub fn command(row: &[f64], encoding: &ActionEncoding) -> Result<ToolCommand, PolicyError> {
+    // robosuite's controller clips to −1..=1 as well.
+    command_within(row, encoding, 1.0)
+}
+
+/// Decodes the numbers of an action as [`command`] does, but with displacements beyond −1..=1 in full: a scale that is
+/// wrong shows in them.
+///
+/// # Errors
+/// As [`command`].
+pub fn unclamped_command(row: &[f64], encoding: &ActionEncoding) -> Result<ToolCommand, PolicyError> {
+    command_within(row, encoding, f64::INFINITY)
+}
+
+/// Decodes the numbers of an action; those of displacements are clamped to `limit`.
+fn command_within(row: &[f64], encoding: &ActionEncoding, limit: f64) -> Result<ToolCommand, PolicyError> {
     if row.iter().any(|number| !number.is_finite()) {
         return Err(PolicyError::Action(format!("the action {row:?} holds a number that is not finite")));
     }
@@ -101,11 +126,10 @@ pub fn command(row: &[f64], encoding: &ActionEncoding) -> Result<ToolCommand, Po
     };
     let grip = encoding.gripper.command(*grip);
     let (linear, angular) = (|| Vec3::from_fn(|i, _| si(i)), || Vec3::from_fn(|i, _| si(3 + i)));
-    // robosuite's controller clips to −1..=1 as well.
     let delta = |full, translation_m: f64, rotation_rad: f64| ToolMotion::Delta {
         full,
-        translation_b: linear().map(|x| x.clamp(-1.0, 1.0)) * translation_m,
-        rotation_b: angular().map(|x| x.clamp(-1.0, 1.0)) * rotation_rad,
+        translation_b: linear().map(|x| x.clamp(-limit, limit)) * translation_m,
+        rotation_b: angular().map(|x| x.clamp(-limit, limit)) * rotation_rad,
         is_clamped: (0..6).any(|i| si(i).abs() > 1.0 + STEP_OVERSHOOT),
     };
     let motion = match encoding.pose {
@@ -180,6 +204,9 @@ mod tests {
             is_clamped: true,
         };
         assert_eq!(delta, ToolCommand { motion, grip: EncodedGrip::Target(GripTarget::Closure(1.0)) });
+        let full = unclamped_command(&[1.0, -9.0, 0.5, 0.0, 0.0, 2.0, 1.0], &code).unwrap();
+        let ToolMotion::Delta { translation_b, rotation_b, .. } = full.motion else { panic!("{full:?}") };
+        assert_eq!((translation_b.y, rotation_b.z), (-9.0 * 0.05, 2.0 * 0.5));
     }
 
     #[test]

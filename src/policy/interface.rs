@@ -146,11 +146,19 @@ impl From<Action> for ToolCommand {
 pub struct ActionChunk {
     /// At least one command, in order of execution.
     pub commands: Vec<ToolCommand>,
+    /// The numbers that each command was decoded from, without padding; empty if it was not.
+    pub rows: Vec<Vec<f64>>,
+}
+
+impl From<Vec<ToolCommand>> for ActionChunk {
+    fn from(commands: Vec<ToolCommand>) -> Self {
+        Self { commands, rows: Vec::new() }
+    }
 }
 
 impl From<Action> for ActionChunk {
     fn from(action: Action) -> Self {
-        Self { commands: vec![action.into()] }
+        vec![ToolCommand::from(action)].into()
     }
 }
 

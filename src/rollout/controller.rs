@@ -82,7 +82,7 @@ impl Controller for ChunkedPolicy<'_> {
             self.policy.reset(&brief)?;
         }
         if self.remaining.is_empty() {
-            let ActionChunk { mut commands } = self.policy.act(observation)?;
+            let ActionChunk { mut commands, .. } = self.policy.act(observation)?;
             commands.truncate(self.replan);
             self.remaining = commands.into();
         } else if self.policy.observes_every_step() {

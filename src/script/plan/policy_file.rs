@@ -181,7 +181,7 @@ impl LuaPolicy {
         };
         let count = table.raw_len();
         if count == 0 && !table.is_empty() {
-            return Ok(ActionChunk { commands: vec![self.action(label, table)?] });
+            return Ok(vec![self.action(label, table)?].into());
         }
         if count == 0 {
             return wrong(
