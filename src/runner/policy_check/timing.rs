@@ -1,0 +1,200 @@
+//! The speed at which answers advance along the demonstrations.
+
+use super::{
+    agreement::{CLEARLY_BETTER, EXPLAINS, VectorPair, correlation, factor, mean},
+    sampling::{AnswerSample, DemoSamples, StepSample},
+};
+use softvt_benchmark::CONTROL_HZ;
+use softvt_geometry::Vec3;
+
+/// Recorded control steps per command that are considered, besides one.
+const RATES: [f64; 14] =
+    [0.5, 2.0, 0.25, 4.0, 1.0 / 3.0, 3.0, 2.0 / 3.0, 4.0 / 3.0, 0.2, 5.0, 0.4, 6.0, 0.125, 8.0];
+/// Commands that an answer needs to tell its rate.
+const LEAST_COMMANDS: usize = 4;
+/// Share of the recorded motion below which answers hold still.
+const STILL: f64 = 0.3;
+
+/// The control step of a demonstration, from that of the request on, that a command stands for.
+#[derive(Clone, Copy, Debug)]
+enum Phase {
+    First,
+    Last,
+    Repeated,
+}
+
+/// Commands that stand for more or less than a control step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stretch {
+    /// Recorded control steps per command.
+    rate: f64,
+    phase: Phase,
+}
+
+/// What is wrong with the speed of answers.
+#[derive(Clone, Debug)]
+pub(super) struct TimingFinding {
+    pub text: String,
+    /// Other than 1 command per control step; `None` if the answers hold the pose of the observation.
+    pub stretch: Option<Stretch>,
+}
+
+/// A fit of the paths of answers.
+#[derive(Clone, Copy, Debug)]
+struct StretchFit {
+    stretch: Stretch,
+    error: f64,
+    correlation: f64,
+}
+
+impl Stretch {
+    const NONE: Self = Self { rate: 1.0, phase: Phase::First };
+
+    fn steps(self, command: usize) -> f64 {
+        let command = command as f64;
+        match self.phase {
+            Phase::First => self.rate * command,
+            Phase::Last => self.rate * (command + 1.0) - 1.0,
+            // Thirds are not exact.
+            Phase::Repeated => (self.rate * command + 1e-9).floor(),
+        }
+    }
+}
+
+/// Recorded positions of a demonstration, as answers count them.
+struct RecordedPath {
+    positions: Vec<Vec3>,
+    /// True if `positions` are sums of displacements.
+    are_sums: bool,
+}
+
+impl RecordedPath {
+    fn of(demo: &DemoSamples) -> Self {
+        let are_sums = demo.steps.iter().any(|s| s.is_step);
+        let mut sum = Vec3::zeros();
+        let position = |s: &StepSample| {
+            sum += s.recorded.action.position_b - s.tool.position;
+            if are_sums { sum } else { s.recorded.action.position_b }
+        };
+        Self { positions: demo.steps.iter().map(position).collect(), are_sums }
+    }
+
+    /// Position between two control steps; `None` after the last one.
+    fn at(&self, step: f64) -> Option<Vec3> {
+        if step < 0.0 && self.are_sums {
+            return Some(Vec3::zeros());
+        }
+        let (whole, share) = (step.max(0.0).floor(), step.max(0.0).fract());
+        let low = *self.positions.get(whole as usize)?;
+        match share {
+            0.0 => Some(low),
+            _ => Some(low.lerp(self.positions.get(whole as usize + 1)?, share)),
+        }
+    }
+
+    /// Displacement from the request to the control step of a command.
+    fn displacement(&self, answer: &AnswerSample, steps: f64) -> Option<Vec3> {
+        let start = if self.are_sums { self.at(answer.step as f64 - 1.0)? } else { answer.start };
+        Some(self.at(answer.step as f64 + steps)? - start)
+    }
+}
+
+fn pairs(demos: &[DemoSamples], least: usize, stretch: Stretch) -> Vec<VectorPair> {
+    let mut all = Vec::new();
+    for demo in demos {
+        let path = RecordedPath::of(demo);
+        for answer in demo.answers.iter().filter(|answer| answer.path.len() >= least) {
+            for (command, position) in answer.path.iter().enumerate() {
+                let recorded = path.displacement(answer, stretch.steps(command));
+                let answered = position - answer.start;
+                all.extend(recorded.map(|recorded| VectorPair { recorded, answered }));
+            }
+        }
+    }
+    all
+}
+
+fn error(pairs: &[VectorPair], factor: f64) -> f64 {
+    mean(pairs.iter().map(|p| (p.answered - factor * p.recorded).norm()))
+}
+
+/// Names answers of another rate, and answers that hold still.
+pub(super) fn explain_timing(demos: &[DemoSamples]) -> Option<TimingFinding> {
+    let own = pairs(demos, 1, Stretch::NONE);
+    let moved = mean(own.iter().map(|p| p.recorded.norm()));
+    let still = mean(own.iter().map(|p| p.answered.norm()));
+    let before = error(&own, 1.0);
+    let holds = moved > 0.002 && still <= STILL * moved && still <= CLEARLY_BETTER * before;
+    let best = best_stretch(demos);
+    if holds && best.is_none_or(|fit| fit.error > 0.75 * still) {
+        let (still, moved) = (1e3 * still, 1e3 * moved);
+        return Some(TimingFinding {
+            text: format!(
+                "motion: the answers hold the pose of the observation: they lie {still:.1} mm from it in the mean, the \
+                 recorded actions {moved:.1} mm: check what the policy was trained to predict, and that its answers are not \
+                 those of a start or a fallback"
+            ),
+            stretch: None,
+        });
+    }
+    let fit = best?;
+    let StretchFit { stretch: Stretch { rate, .. }, error, .. } = fit;
+    let hz = f64::from(CONTROL_HZ) / rate;
+    Some(TimingFinding {
+        text: format!(
+            "rate: the answers advance {} control steps of the demonstrations per action (mean error {:.1} mm at one step per \
+             action, {:.1} mm so read): actions are executed at {CONTROL_HZ} Hz, these look like {} Hz: resample them",
+            short(rate),
+            1e3 * before_of(demos),
+            1e3 * error,
+            short(hz)
+        ),
+        stretch: Some(fit.stretch),
+    })
+}
+
+fn short(x: f64) -> String {
+    let text = format!("{x:.3}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+fn before_of(demos: &[DemoSamples]) -> f64 {
+    error(&pairs(demos, LEAST_COMMANDS, Stretch::NONE), 1.0)
+}
+
+/// The stretch that explains the paths of answers clearly better than none.
+fn best_stretch(demos: &[DemoSamples]) -> Option<StretchFit> {
+    let own = pairs(demos, LEAST_COMMANDS, Stretch::NONE);
+    let before = error(&own, 1.0);
+    if before < 1e-3 {
+        return None;
+    }
+    let fit = |stretch: Stretch| {
+        let pairs = pairs(demos, LEAST_COMMANDS, stretch);
+        let correlation = correlation(&pairs).unwrap_or(0.0);
+        StretchFit { stretch, error: error(&pairs, 1.0), correlation }
+    };
+    let phases =
+        |rate: f64| [Phase::First, Phase::Last, Phase::Repeated].map(|phase| Stretch { rate, phase });
+    let fits = RATES.into_iter().flat_map(phases).map(fit);
+    let explained = fits.filter(|fit| fit.correlation >= EXPLAINS && fit.error <= CLEARLY_BETTER * before);
+    let best = explained.min_by(|a, b| a.error.total_cmp(&b.error))?;
+    // A longer displacement is a matter of units where answers are displacements, and one of the rate elsewhere.
+    let scaled = error(&own, factor(&own).unwrap_or(1.0));
+    let are_steps = demos.iter().flat_map(|demo| &demo.steps).any(|s| s.is_step);
+    let share = if are_steps { 0.75 } else { 4.0 / 3.0 };
+    (best.error <= share * scaled).then_some(best)
+}
+
+/// The steps with the recorded actions that their commands stand for.
+pub(super) fn retimed(demos: &[DemoSamples], stretch: Stretch) -> Vec<StepSample> {
+    let of_demo = |demo: &DemoSamples| -> Vec<StepSample> {
+        let retimed = |s: &StepSample| {
+            let steps = stretch.steps(s.step - s.request_step).round();
+            let step = (s.request_step as f64 + steps).max(0.0) as usize;
+            Some(StepSample { recorded: demo.steps.get(step)?.recorded, ..s.clone() })
+        };
+        demo.steps.iter().filter_map(retimed).collect()
+    };
+    demos.iter().flat_map(of_demo).collect()
+}
