@@ -405,7 +405,9 @@ impl Reading {
 }
 
 fn listed(vector: &Vec3) -> String {
-    format!("{:.3}, {:.3}, {:.3}", vector.x, vector.y, vector.z)
+    // Adding 0.0 turns −0.0 into 0.0.
+    let [x, y, z] = [vector.x, vector.y, vector.z].map(|x| (1e3 * x).round() / 1e3 + 0.0);
+    format!("{x:.3}, {y:.3}, {z:.3}")
 }
 
 fn axes_words(axes: &AxisChange, evidence: &Evidence) -> String {

@@ -124,7 +124,9 @@ pub(super) fn explain_timing(demos: &[DemoSamples]) -> Option<TimingFinding> {
     let moved = mean(own.iter().map(|p| p.recorded.norm()));
     let still = mean(own.iter().map(|p| p.answered.norm()));
     let before = error(&own, 1.0);
-    let holds = moved > 0.002 && still <= STILL * moved && still <= CLEARLY_BETTER * before;
+    let is_short = moved > 0.002 && still <= STILL * moved && still <= CLEARLY_BETTER * before;
+    // Short answers in the right direction are a matter of units.
+    let holds = is_short && correlation(&own).is_none_or(|r| r < EXPLAINS);
     let best = best_stretch(demos);
     if holds && best.is_none_or(|fit| fit.error > 0.75 * still) {
         let (still, moved) = (1e3 * still, 1e3 * moved);
