@@ -8,8 +8,9 @@ use softvt_policy::profile::{GripCode, GripperValues};
 
 /// Range of closures below which a gripper does not move.
 const STILL: f64 = 0.05;
-/// Error of a closure from which on another reading is looked for.
+/// Error of a closure from which on another reading is looked for, and the share of the recorded range.
 const WRONG: f64 = 0.25;
+const WRONG_SHARE: f64 = 0.5;
 /// Share of the error that another reading may leave.
 const LEFT: f64 = 0.3;
 
@@ -29,14 +30,14 @@ const fn range(name: &'static str, open: f64, closed: f64) -> GripRange {
 const RANGES: [GripRange; 16] = [
     range("closures", 0.0, 1.0),
     range("openings", 1.0, 0.0),
-    range("closures from −1 to 1", -1.0, 1.0),
-    range("openings from −1 to 1", 1.0, -1.0),
-    range("closures from 0 to 255", 0.0, 255.0),
-    range("openings from 0 to 255", 255.0, 0.0),
-    range("closures in percent", 0.0, 100.0),
-    range("openings in percent", 100.0, 0.0),
-    range("closures from 0 to 1000", 0.0, 1000.0),
-    range("openings from 0 to 1000", 1000.0, 0.0),
+    range("closures", -1.0, 1.0),
+    range("openings", 1.0, -1.0),
+    range("closures", 0.0, 255.0),
+    range("openings", 255.0, 0.0),
+    range("closures", 0.0, 100.0),
+    range("openings", 100.0, 0.0),
+    range("closures", 0.0, 1000.0),
+    range("openings", 1000.0, 0.0),
     range("finger positions in m", 0.04, 0.0),
     range("widths in m", 0.08, 0.0),
     range("finger positions in mm", 40.0, 0.0),
@@ -74,7 +75,8 @@ pub(super) fn explain_grip(
     let middle = 0.5 * (low + high);
     let before = error(pairs, middle, &own, &own);
     let r = of.correlation.unwrap_or(0.0);
-    if r.abs() >= AGREES && before >= WRONG {
+    let is_wrong = r <= -AGREES || r >= AGREES && before >= WRONG.min(WRONG_SHARE * (high - low));
+    if is_wrong {
         let inverted = range("", own.closed, own.open);
         let explain = |range: GripRange| Explanation { range, error: error(pairs, middle, &own, &range) };
         let explained = [inverted].into_iter().chain(RANGES).map(explain);

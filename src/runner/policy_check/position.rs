@@ -78,6 +78,7 @@ struct Explanation {
 pub(super) struct Evidence {
     pub before: f64,
     pub after: f64,
+    /// Unit, with the space before it.
     pub unit: &'static str,
     /// Factor from SI units to `unit`.
     pub scale: f64,
@@ -86,8 +87,8 @@ pub(super) struct Evidence {
 impl fmt::Display for Evidence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { before, after, unit, scale } = self;
-        write!(f, "mean error {} {unit} as received, ", short(scale * before))?;
-        write!(f, "{} {unit} so read", short(scale * after))
+        write!(f, "mean error {}{unit} as received, ", short(scale * before))?;
+        write!(f, "{}{unit} so read", short(scale * after))
     }
 }
 
@@ -96,7 +97,7 @@ fn short(x: f64) -> String {
     match x.abs() {
         100.0.. => format!("{x:.0}"),
         1.0.. => format!("{x:.1}"),
-        0.1.. | 0.0 => format!("{x:.2}"),
+        0.1.. => format!("{x:.2}"),
         1e-4.. => format!("{x:.4}"),
         _ => "0.00".to_owned(),
     }
@@ -191,7 +192,7 @@ fn received_error(steps: &[StepSample]) -> f64 {
 pub(super) fn explain_position(steps: &[StepSample], of: &AnswerAgreement) -> Option<PositionFinding> {
     let before = received_error(steps);
     if let Some(Explanation { reading, error }) = best_reading(steps, before) {
-        let evidence = Evidence { before, after: error, unit: "mm", scale: 1e3 };
+        let evidence = Evidence { before, after: error, unit: " mm", scale: 1e3 };
         return Some(reading.finding(steps, &evidence));
     }
     if of.agrees() || of.n < 10 {
@@ -460,5 +461,8 @@ fn lengths(steps: &[StepSample], factor: f64, evidence: &str) -> String {
             "check the scale of the profile's actions, and whether their normalisation was undone".to_owned()
         }
     };
-    format!("translation: the answers are {factor:.3} times as long as the recorded ones{evidence}: {remedy}")
+    format!(
+        "translation: the answers are {} times as long as the recorded ones{evidence}: {remedy}",
+        short(factor)
+    )
 }
