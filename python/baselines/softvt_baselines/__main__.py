@@ -307,7 +307,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     diagnose.add_argument("run_folder", metavar="run", type=Path, help="run folder of softvt")
 
-    page = command("page", _page, "write the tables and the figure of studies into docs/baselines.md")
+    page = command("page", _page, "write the tables and the pictures of studies into docs/baselines.md and docs/images")
     page.add_argument("studies", type=Path, nargs="*", help="folders of studies to collect; none: those that were collected")
     page.add_argument("--docs", type=Path, default=Path("docs"), help="folder of the documentation")
     return parser

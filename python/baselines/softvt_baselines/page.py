@@ -1,4 +1,4 @@
-"""The page of a study: collects its runs, and writes tables and figures of those that were collected."""
+"""The page of a study: collects its runs, and writes tables and pictures of those that were collected."""
 
 import json
 import re
@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from . import UserError, results
-from .results import Estimate, Run
+from . import UserError, figure, results
+from .figure import Plot
+from .results import Run
 from .study import ORIGIN
 
 # The tables stand between these lines of the page.
@@ -33,6 +34,10 @@ MEASURES = ["goal", "no_drop", "safety"]
 STAGES = ["reach", "grasp", "lift", "carry", "place", "release"]
 # Ratios from which on tables do not show them.
 MOST = 99
+# What the pictures show: suites in the order of their plots, inputs in that of their rows, and steps per answer.
+SUITES = ["object_hidden", "spatial_hidden", "object_soft", "spatial_soft"]
+INPUT_WORDS = {"vo": "cameras", "vp": "with drives", "vt": "with touch", "vpt": "with both"}
+INPUTS, REPLAN = list(INPUT_WORDS), 4
 # The condition of suites/shifts.lua that changes nothing.
 UNCHANGED = "reference"
 
@@ -294,57 +299,35 @@ def _shifts(learned: dict[Policy, list[Run]]) -> list[list[str]]:
     return rows
 
 
-def figure(folder: Path, path: Path) -> None:
-    """Goal and Safety of each policy, and the distribution of D/τ, by suite. Suites without limits are left out, if others have some."""
-    import matplotlib
+def plots(folder: Path) -> list[Plot]:
+    """What the pictures show: the suites and the inputs of the text, at one number of steps per answer. Raises UserError without learned policies.
 
-    matplotlib.use("svg")
-    # Equal files for equal numbers.
-    matplotlib.rcParams.update({"svg.hashsalt": "softvt", "svg.fonttype": "none", "font.size": 8})
-    from matplotlib import pyplot
-
+    A study of other suites has all of its own, without those that have no limit if others have some.
+    """
     learned, references = _grouped(folder)
-    shown = {policy.suite: runs for policy, runs in learned.items() if not policy.condition}
-    if not shown:
+    runs = {policy.suite: runs for policy, runs in learned.items() if not policy.condition}
+    if not runs:
         raise UserError(f"{folder}: no runs of learned policies")
-    limited = [suite for suite, runs in shown.items() if np.isfinite(runs[0].ratio).any()]
-    suites = sorted(limited or shown)
-    colours = {"goal": "#9db8d2", "safety": "#1f5a94"}
-    whole, axes = pyplot.subplots(2, len(suites), figsize=(3.6 * len(suites), 5), squeeze=False, layout="constrained")
-    for column, suite in enumerate(suites):
-        groups = {
-            f"{policy.inputs.upper()}{'' if policy.code == 'continuous' else f' {policy.code}'}, {policy.replan}": runs
-            for policy, runs in sorted(learned.items())
-            if (policy.suite, policy.condition) == (suite, "")
-        }
-        groups |= {name: [references[suite, name]] for name in REFERENCES if (suite, name) in references}
-        top, bottom = axes[0][column], axes[1][column]
-        for place, measure in enumerate(("goal", "safety")):
-            rates = [results.rate(runs, measure) for runs in groups.values()]
-            at = np.arange(len(rates)) + 0.4 * place - 0.2
-            top.bar(at, [rate.mean for rate in rates], 0.38, color=colours[measure], label=measure.capitalize())
-            top.errorbar(at, [rate.mean for rate in rates], _bars(rates), fmt="none", ecolor="black", elinewidth=0.8)
-        top.set(title=suite, ylim=(0, 122), yticks=range(0, 101, 20), ylabel="% of episodes")
-        top.set_xticks(range(len(groups)), groups, rotation=60, ha="right")
-        top.legend(loc="upper center", ncol=2, frameon=False)
-        for name, runs in groups.items():
-            ratio = np.sort(np.concatenate([run.ratio for run in runs]))
-            bottom.step(ratio, 100 * np.arange(1, len(ratio) + 1) / len(ratio), where="post", label=name, linewidth=1)
-        bottom.axvline(1, color="black", linewidth=0.8, linestyle=":")
-        bottom.set(xlim=(0, 3), ylim=(0, 100), xlabel="peak D/τ", ylabel="% of episodes below")
-        bottom.legend(fontsize=6)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    whole.savefig(path, metadata={"Date": None})
-    pyplot.close(whole)
+    limited = sorted(suite for suite in runs if np.isfinite(runs[suite][0].ratio).any()) or sorted(runs)
+    shown = []
+    for suite in [suite for suite in SUITES if suite in limited] or limited:
+        policies = [policy for policy in learned if (policy.suite, policy.condition) == (suite, "") and policy.inputs in INPUTS]
+        replan = min((policy.replan for policy in policies), key=lambda replan: (abs(replan - REPLAN), replan), default=REPLAN)
+        policies = sorted((policy for policy in policies if policy.replan == replan), key=lambda policy: INPUTS.index(policy.inputs))
+        has_codes = len({policy.code for policy in policies}) > 1
+        own = {_row_name(policy, has_codes): learned[policy] for policy in policies}
+        others = {name.replace("-", " "): [references[suite, name]] for name in REFERENCES if (suite, name) in references}
+        shown.append(Plot(suite, own, others))
+    return shown
 
 
-def _bars(rates: list[Estimate]) -> np.ndarray:
-    """Lengths of error bars below and above."""
-    return np.array([[rate.mean - rate.low for rate in rates], [rate.high - rate.mean for rate in rates]]).clip(min=0)
+def _row_name(policy: Policy, has_codes: bool) -> str:
+    """What a row is called in a plot of several grip codes, or of one."""
+    return f"{policy.inputs.upper()} {policy.code}" if has_codes else f"{policy.inputs.upper()}: {INPUT_WORDS[policy.inputs]}"
 
 
 def write(studies: list[Path], docs: Path) -> None:
-    """Collects studies into DOCS/baselines, and writes the tables into DOCS/baselines.md and the figure beside the other images.
+    """Collects studies into DOCS/baselines, and writes the tables into DOCS/baselines.md and the pictures beside the others.
 
     Raises UserError if the page has no place for the tables.
     """
@@ -355,6 +338,9 @@ def write(studies: list[Path], docs: Path) -> None:
     for study in studies:
         collect(study, folder)
     found = tables(folder)
-    figure(folder, docs / "images" / "baselines.svg")
+    images, shown = docs / "images", plots(folder)
+    images.mkdir(parents=True, exist_ok=True)
+    (images / "baselines.svg").write_text(figure.rates(shown))
+    (images / "baselines_d.svg").write_text(figure.distributions(shown))
     before, after = text.split(BEGIN)[0], text.split(END)[1]
     page.write_text(f"{before}{BEGIN}\n\n{found}{END}{after}")

@@ -1,13 +1,14 @@
 """The page of a study."""
 
 import json
+import re
 import shutil
 import tempfile
 import unittest
 from pathlib import Path
 
 import numpy as np
-from softvt_baselines import UserError, page
+from softvt_baselines import UserError, figure, page
 from test_results import run
 
 
@@ -28,7 +29,10 @@ class Pages(unittest.TestCase):
         folder.parent.mkdir(parents=True, exist_ok=True)
         run(folder, safe, suite="one")
 
-    def test_tables_and_figure_are_repeatable_from_what_was_collected(self):
+    def pictures(self, docs: Path) -> list[str]:
+        return [(docs / "images" / f"{name}.svg").read_text() for name in ("baselines", "baselines_d")]
+
+    def test_tables_and_pictures_are_repeatable_from_what_was_collected(self):
         (self.docs / "baselines.md").write_text(f"before\n{page.BEGIN}\nold\n{page.END}\nafter\n")
         page.write([self.study], self.docs)
         text = (self.docs / "baselines.md").read_text()
@@ -41,10 +45,12 @@ class Pages(unittest.TestCase):
         between, against = difference.split("### Differences from reference controllers")
         self.assertEqual((between.count("| `one` |"), against.count("| `one` |")), (4, 4))
         self.assertIn("| `one` | VT, continuous − expert (privileged) | 4 | 2 | 50 | +0.0 [+0.0, +0.0] | -", against)
-        figure = (self.docs / "images" / "baselines.svg").read_bytes()
+        drawn = self.pictures(self.docs)
+        self.assertIn(">VT: with touch</text>", drawn[0])
+        self.assertIn(">expert</text>", drawn[0])
         page.write([], self.docs)
         self.assertEqual((self.docs / "baselines.md").read_text(), text)
-        self.assertEqual((self.docs / "images" / "baselines.svg").read_bytes(), figure)
+        self.assertEqual(self.pictures(self.docs), drawn)
 
     def test_runs_under_a_condition_are_rows_of_their_own(self):
         for inputs in ("vo", "vt"):
@@ -94,6 +100,36 @@ class Pages(unittest.TestCase):
         docs = Path(__file__).parents[3] / "docs"
         published = (docs / "baselines.md").read_text().split(page.BEGIN)[1].split(page.END)[0]
         self.assertEqual(published.strip(), page.tables(docs / "baselines").strip())
+        plots = page.plots(docs / "baselines")
+        self.assertEqual(self.pictures(docs), [figure.rates(plots), figure.distributions(plots)])
+
+    def test_pictures_have_the_colours_of_the_others(self):
+        palette = (Path(__file__).parents[3] / "src" / "media" / "palette.rs").read_text()
+        colours = {name: (light, dark) for name, light, dark in re.findall(r'const (\w+): Colour = colour\("(#\w+)", "(#\w+)"\)', palette)}
+        same = {"safe": "SAFE", "over": "OVER_LIMIT", "soft": "FAINT", "ink": "INK", "rule": "RULE", "ground": "GROUND"}
+        self.assertEqual(figure.COLOURS, {name: colours[other] for name, other in same.items()})
+
+    def test_pictures_show_the_rows_at_the_common_replan(self):
+        for code, replan in (("binary", 4), ("continuous", 10)):
+            self.run_of(f"one-vo-{code}-s0-r{replan}/one", np.zeros((10, 5), bool))
+        self.run_of("one-vb-continuous-s0-r4/one", np.ones((10, 5), bool))
+        page.collect(self.study, self.docs)
+        (plot,) = page.plots(self.docs)
+        self.assertEqual(list(plot.learned), ["VO binary", "VO continuous", "VP continuous", "VT continuous", "VPT continuous"])
+        self.assertEqual((len(plot.learned["VO continuous"]), list(plot.references)), (2, ["expert"]))
+
+    def test_a_row_is_orange_where_a_success_is_over_the_limit(self):
+        page.collect(self.study, self.docs)
+        (plot,) = page.plots(self.docs)
+        shown = figure.Plot("one", {}, plot.references)
+        self.assertNotIn('r="4.5" class="over"', figure.rates([shown]).split("<g ")[0])
+        shown.references["expert"][0].safety[3] = 0
+        shown.references["expert"][0].ratio[3] = 1.2
+        self.assertIn('r="4.5" class="over"', figure.rates([shown]).split("<g ")[0])
+
+    def test_a_bar_includes_the_limit_and_the_axis_ends_with_what_is_beyond_it(self):
+        counts = figure._counts(np.array([0.0, 1.0, 1.0001, 400.0]))
+        self.assertEqual(np.flatnonzero(counts).tolist(), [0, figure.PER_DECADE - 1, figure.PER_DECADE, len(figure.EDGES) - 2])
 
     def test_ratios_without_a_limit_and_very_large_ones_have_no_numbers(self):
         self.assertEqual(page._spread(np.array([np.nan, np.inf])), "–", "an invalid episode of a suite without limits")
