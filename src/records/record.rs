@@ -163,7 +163,8 @@ pub struct RolloutStats {
     /// Number of control steps whose grip value was outside of its range, and was clamped: for decoded answers of
     /// policies by more than a tenth of the range.
     pub clamped_grips: u32,
-    /// Number of control steps whose displacement was beyond −1..=1 by more than a tenth of that range, and was clamped.
+    /// Number of control steps whose displacement was beyond −1..=1 by more than a tenth of that range, and was
+    /// clamped.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub clamped_steps: u32,
     /// Reason given by the controller for aborting the episode, if it did.

@@ -1,6 +1,6 @@
 //! Videos and still images of episodes: the third-person camera and the target from nearby on top, the wrist camera
-//! and both fingers below them, and plots of the deformation over its limit and of the force at the bottom. Those of one
-//! episode under several policies are in [`side_by_side`].
+//! and both fingers below them, and at the bottom plots of the deformation over its limit and of the force. Those of
+//! one episode under several policies are in [`side_by_side`].
 
 mod plots;
 pub mod side_by_side;
