@@ -98,7 +98,10 @@ fn invalid_conditions_are_reported_before_anything_runs() {
             "{ name = \"a b\", shift = { mass = 2 } },\n{ name = \"a_b\", shift = { mass = 3 } }",
             "share the folder a_b; rename one",
         ),
-        ("{ name = \"a\" }", "the condition \"a\" changes nothing; give it shifts, set, policy or rigid_twin"),
+        (
+            "{ name = \"a\" }",
+            "the condition \"a\" changes nothing; give it shifts, set, policy or rigid_twin",
+        ),
         ("{ name = \"a\", mass = 2 }", "unknown key \"mass\""),
     ] {
         let message = refused(conditions);
