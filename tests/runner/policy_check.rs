@@ -437,7 +437,7 @@ const GRIPS: [Case; 11] = [
     case("open or closed", &[], |a| gripped(a, |c| f64::from(u8::from(c > 0.1)))),
 ];
 
-const STEPS: [Case; 12] = [
+const STEPS: [Case; 14] = [
     case("none", &[], |a| step(a, |s| s)),
     case("noise", &[], |a| step(a, |s| std::array::from_fn(|i| s[i] * 1.1 + 0.1 * a.noise(i)))),
     case("x and y exchanged", &["translation: (x, y, z) of the answers are (y, x, z)"], |a| {
@@ -459,6 +459,18 @@ const STEPS: [Case; 12] = [
         let action = a.now().action;
         let is_closed = action.closure() > 0.1;
         row(action.position_b, action.axis_angle_b, if is_closed { 1.0 } else { -1.0 })
+    }),
+    case("x and y exchanged, noise", &["translation: (x, y, z) of the answers are (y, x, z)"], |a| {
+        step(a, |[x, y, z, u, v, w]| {
+            let noise = 0.05 * a.noise_of(0);
+            [y + noise.x, x + noise.y, z + noise.z, u, v, w]
+        })
+    }),
+    case("every second action", &["these look like 10 Hz"], |a| {
+        let of = |k: usize| a.demo.steps[(a.step + 2 * a.index + k).min(a.demo.steps.len() - 1)];
+        let is_closed = a.at(a.step + 2 * a.index).action.closure() > 0.1;
+        let sum: [f64; 6] = std::array::from_fn(|i| of(0)[i] + of(1)[i]);
+        sum.into_iter().chain([if is_closed { 1.0 } else { -1.0 }]).collect()
     }),
     case("axes of the tool", &["translation: the answers move along the axes of the tool"], |a| {
         let tool =
