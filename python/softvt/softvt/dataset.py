@@ -1,12 +1,15 @@
 """Recordings of `softvt record` as a data set of control steps, for the loaders of PyTorch and others."""
 
+import operator
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from .arguments import require_one_of, texts, whole_number
 
 if TYPE_CHECKING:
     import h5py
@@ -76,17 +79,17 @@ class Dataset:
 
         Raises ValueError if there is no such stream or no demonstration, and ImportError without h5py.
         """
-        if gripper not in ACTIONS:
-            raise ValueError(f"gripper={gripper!r}: expected one of {', '.join(ACTIONS)}")
-        if control not in ("pose", "joints"):
-            raise ValueError(f"control={control!r}: expected 'pose' or 'joints'")
-        if horizon < 1:
-            raise ValueError(f"horizon={horizon}: expected at least 1")
+        require_one_of("gripper", gripper, [*ACTIONS])
+        require_one_of("control", control, ("pose", "joints"))
+        horizon = whole_number("horizon", horizon, 1)
+        keys = texts("keys", keys)
+        if not isinstance(path, str | os.PathLike):
+            raise ValueError(f"path={path!r}: expected the path of a recording")
         self._streams = {key: key if "/" in key else f"obs/{key}" for key in keys}
         self._actions, self._horizon, self._control = ACTIONS[gripper], horizon, control
         self._files: dict[Path, h5py.File] = {}
         self._process = os.getpid()
-        tasks = None if task is None else {task} if isinstance(task, int) else {*task}
+        tasks = None if task is None else _tasks(task)
         self.demonstrations = [demo for file in _hdf5_files(Path(path)) for demo in self._read(file) if tasks is None or demo.task in tasks]
         if not self.demonstrations:
             raise ValueError(f"{path}: no demonstration" + ("" if tasks is None else f" of task {', '.join(map(str, sorted(tasks)))}"))
@@ -98,6 +101,10 @@ class Dataset:
 
     def __getitem__(self, index: int) -> dict[str, Any]:
         """The control step of a number, from 0; negative ones count from the end."""
+        try:
+            index = operator.index(index)
+        except TypeError:
+            raise TypeError(f"step {index!r}: expected a whole number; `episode` gives all steps of a demonstration") from None
         number = index + len(self) if index < 0 else index
         if not 0 <= number < len(self):
             raise IndexError(f"step {index} of {len(self)}")
@@ -113,6 +120,9 @@ class Dataset:
 
     def episode(self, number: int) -> dict[str, np.ndarray]:
         """All steps of a demonstration: the requested streams and `actions`, each with the steps along its first axis."""
+        number = whole_number("number", number)
+        if not -len(self.demonstrations) <= number < len(self.demonstrations):
+            raise IndexError(f"demonstration {number} of {len(self.demonstrations)}")
         group = self._group(self.demonstrations[number])
         streams = {key: np.asarray(group[stream]) for key, stream in self._streams.items()}
         return {**streams, "actions": self._actions_of(group, slice(None))}
@@ -128,7 +138,10 @@ class Dataset:
         return {**self.__dict__, "_files": {}}
 
     def _read(self, file: Path) -> list[Demonstration]:
-        data = self._open(file)["data"]
+        try:
+            data = self._open(file)["data"]
+        except (OSError, KeyError) as error:
+            raise ValueError(f"{file}: no recording of softvt: {str(error).strip(chr(34))}") from error
         found = []
         for name in sorted(data, key=lambda name: int(name.removeprefix("demo_"))):
             group, attrs = data[name], data[name].attrs
@@ -137,8 +150,12 @@ class Dataset:
                 if stream not in group:
                     if stream == JOINT_ACTIONS:
                         raise ValueError(f"{file}: data/{name} has no {stream}: an earlier version of softvt recorded it; record it again")
-                    have = ", ".join(sorted(group["obs"]))
-                    raise ValueError(f"{file}: data/{name} has no stream {stream}; obs has {have}")
+                    if stream.removeprefix("obs/") in ACTIONS.values():
+                        raise ValueError(f"keys: {stream.removeprefix('obs/')!r} is no observation; an item has `actions` in any case")
+                    folder = stream.rpartition("/")[0]
+                    folder = folder if folder in group else "obs"
+                    have = ", ".join(sorted(group[folder]))
+                    raise ValueError(f"{file}: data/{name} has no stream {stream}; {folder} has {have}")
             text = {key: _text(attrs[key]) for key in ("task_suite", "language")}
             numbers = {key: int(attrs[key]) for key in ("num_samples", "task_id", "attempt")}
             found.append(
@@ -176,6 +193,18 @@ def _hdf5_files(path: Path) -> list[Path]:
     if not found:
         raise ValueError(f"{path}: no recording; give a folder that softvt record wrote, or one of its HDF5 files")
     return found
+
+
+def _tasks(task: Any) -> set[int]:
+    """Numbers of the tasks that an argument names. Raises ValueError for anything else."""
+    try:
+        many = isinstance(task, Iterable) and not isinstance(task, str | bytes)
+        numbers = {whole_number("task", number) for number in (task if many else [task])}
+    except ValueError:
+        raise ValueError(f"task={task!r}: expected a number or a list of numbers") from None
+    if not numbers:
+        raise ValueError(f"task={task!r}: no number in the list; None is for all tasks")
+    return numbers
 
 
 def _text(value: Any) -> str:

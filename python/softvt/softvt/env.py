@@ -1,18 +1,21 @@
 """softvt as a Gymnasium environment: a client of `softvt serve` that starts its own server, or connects to one."""
 
 import inspect
+import os
+import shutil
 import weakref
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from .profile import CONTROLS, PARTS, ProfileSpec, parse_parts, require_one_of
+from .arguments import is_bool, require_bool, require_one_of, require_text, texts, whole_number
+from .profile import CAMERA_PARTS, CONTROLS, GRIPPERS, PARTS, PARTS_OF_ONE_STEP, ProfileSpec, parse_parts
 from .readings import Readings
-from .serve import Client, Lease, lease
+from .serve import Client, Lease, ServerError, lease
 from .true_state import STATE_BOUNDS, Scene, TrueState, progress
 
 REWARDS = ("sparse", "staged", "safety")
@@ -20,6 +23,9 @@ REWARDS = ("sparse", "staged", "safety")
 
 LAYOUTS = ("flat", "lerobot")
 """Values of the argument `layout`."""
+
+SPLITS = ("validation", "demonstration", "experiment")
+"""Lists of episodes."""
 
 FIRST_SEED = 1000
 """Seed of episode 0: the first seed of lerobot-eval, so that it judges the episodes of `softvt FILE.lua`."""
@@ -29,6 +35,10 @@ NEW_ROLLOUT = "lerobot_new_rollout"
 
 _EPISODES = 2**32
 _RENDER_MODES = ("rgb_array", "sensors")
+_FINGERS = ("left", "right")
+_MAX_IMAGE_EDGE = 4096  # pixels
+# What the server tells in `info` and the environment passes on under another name, or not at all.
+_OTHER_NUMBERS = ("task", "episode", "step", "carried_out")
 _SENSOR_EDGE = 240  # pixels of each image of the render mode "sensors"
 
 Observation = np.ndarray | dict[str, Any]
@@ -45,7 +55,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
 
     def __init__(
         self,
-        script: str | None = None,
+        script: str | os.PathLike[str] | None = None,
         *,
         url: str | None = None,
         token: str | None = None,
@@ -58,8 +68,8 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         layout: str = "flat",
         history: int = 1,
         cameras: Sequence[str] = ("third_person", "wrist"),
-        image_size: int | tuple[int, int] | None = None,
-        profile: str | None = None,
+        image_size: int | Sequence[int] | None = None,
+        profile: str | os.PathLike[str] | None = None,
         cost: bool = True,
         privileged: bool = False,
         split: str | None = None,
@@ -78,15 +88,16 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         suite: name of one of several suites of the script; by default the first.
         task: number of a task, part of its prompt, or several numbers, of which each reset draws one; None for all tasks.
         obs: parts of the observation (`softvt.profile.PARTS`), such as "state", or joined by +, such as "pixels+proprio". By default "state";
-            with `url` or `profile`, all that the server sends.
+            with `url`, all that the server sends. Not with `profile`, which states its own.
         control: "delta" (fractions −1..1 of 20 mm and 0.2 rad), "delta_osc" (of 50 mm and 0.5 rad, as LIBERO has them), "pose" (absolute), or
             "joints" (positions of the seven joints, rad).
         gripper: grip code of the last number of an action: "continuous", "binary", "two-width" or "force".
         reward: 1 at the goal ("sparse"), 1 at a goal reached safely ("safety"), or the increase of progress ("staged").
         layout: keys of the observation: "flat", or those that LeRobot reads.
         history: control steps of each entry, the present one last, along a first axis if there are several.
-        cameras: names of the cameras of pixels, depth and segmentation.
-        image_size: pixels of the camera images, (height, width) or one number for both; by default those of the scene.
+        cameras: names of the cameras of pixels, depth and segmentation. Only with one of them in `obs`.
+        image_size: pixels of the camera images, (height, width) or one number for both; by default those of the scene. Only with such a part,
+            a profile, or render_mode="rgb_array".
         profile: a profile of softvt by name or file, in place of `obs`, `control`, `gripper`, `history` and `cameras`.
         cost: True for `info["cost"]`, which needs a server with access to the true state (`--privileged`).
         privileged: True for `info["verdict"]` and `info["state"]`.
@@ -96,25 +107,53 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         flags: further flags of `softvt serve`, such as ("--shift", "stiffness=0.5").
         binary: the program; by default `softvt.find_binary()`.
         render_mode: "rgb_array" for the image of `camera`, or "sensors" for both cameras above both fingers.
-        camera: a camera's name (default: the scene's first), or "left" or "right" for a finger.
+        camera: a camera's name (default: the scene's first), or "left" or "right" for a finger. Only with render_mode="rgb_array".
 
         Raises ValueError for an argument that is not possible, and ServerError with the message of the program if it does not start.
         """
         require_one_of("reward", reward, REWARDS)
         require_one_of("layout", layout, LAYOUTS)
         require_one_of("control", control, CONTROLS)
+        require_one_of("gripper", gripper, GRIPPERS)
         if render_mode is not None:
             require_one_of("render_mode", render_mode, _RENDER_MODES)
+        if split is not None:
+            require_one_of("split", split, SPLITS)
+        for name, value in (("cost", cost), ("privileged", privileged), ("freeze", freeze)):
+            require_bool(name, value)
+        for name, text in (("url", url), ("token", token), ("camera", camera)):
+            if text is not None:
+                require_text(name, text)
+        first_seed = whole_number("first_seed", first_seed)
+        cameras, flags = texts("cameras", cameras), texts("flags", flags)
+        image_shape = _image_shape(image_size)
+        script, profile = _path("script", script), _path("profile", profile)
+        if binary is not None and shutil.which(binary) is None:
+            raise ValueError(f"binary={binary!r}: there is no such program; leave it out for that of the package")
+        if url is not None and not url.startswith(("ws://", "wss://")):
+            raise ValueError(f"url={url!r}: expected an address such as 'ws://127.0.0.1:8765'")
         if (script is None) == (url is None):
             raise ValueError("give either the script of a suite or the url of a server")
-        own = {"control": control, "gripper": gripper, "history": history, "cameras": tuple(cameras)}
+        own = {"control": control, "gripper": gripper, "history": history, "cameras": cameras}
         _refuse_changed("profile", profile, own)
-        _refuse_changed("url", url, {**own, "profile": profile, "image_size": image_size, "flags": tuple(flags), "binary": binary})
+        _refuse_changed("url", url, {**own, "profile": profile, "image_size": image_size, "flags": flags, "binary": binary})
         _refuse_changed("script", script, {"token": token})
+        if profile is not None and obs is not None:
+            raise ValueError(
+                f"obs={obs!r} and profile={profile!r}: a profile states all observations; leave out one of them. The true state is in "
+                'info["state"] with privileged=True'
+            )
         # None for all that the server sends.
         parts: tuple[str, ...] | None = None if url or profile else ("state",)
         if obs is not None:
             parts = parse_parts(obs)
+        if url is None and parts is not None:
+            _refuse_without_effect(parts, obs, cameras, image_size, history, render_mode)
+        if camera is not None and render_mode != "rgb_array":
+            raise ValueError(
+                f"camera={camera!r} has no effect with render_mode={render_mode!r}; give render_mode='rgb_array', or leave it out"
+            )
+        _check_task(task)
         needs_truth = cost or privileged or reward != "sparse" or (parts is not None and "state" in parts)
         self.render_mode = render_mode
         self._camera, self._reward, self._layout, self._freezes = camera, reward, layout, freeze
@@ -122,8 +161,8 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         self._parts, self._split, self._first_seed = parts, split, first_seed
         self._lease: Lease | None = None
         if script is not None:
-            spec = None if profile or parts is None else ProfileSpec(parts, control, gripper, tuple(cameras), history)
-            own_flags = _flags(profile, image_size, needs_truth) + tuple(flags)
+            spec = None if profile or parts is None else ProfileSpec(parts, control, gripper, cameras, history)
+            own_flags = _flags(profile, image_shape, needs_truth) + flags
             self._lease = lease(_script(script), own_flags, binary, None if spec is None else spec.to_lua())
             connect = self._lease.connect
         else:
@@ -143,6 +182,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         self._closer.atexit = False
         try:
             self._begin(suite, task, needs_truth, history)
+            self._check_camera()
         except BaseException:
             self.close()
             raise
@@ -177,6 +217,20 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         self._progress = 0.0
         self._last: Step | None = None
         self._pending = ""
+        # True while the only episode of the server is that of `_check_camera`.
+        self._has_probe = False
+
+    def _check_camera(self) -> None:
+        """Raises ValueError if the scene has no camera of the argument. Only an episode has cameras; this one is not begun by an action."""
+        if self._camera is None or self._camera in _FINGERS:
+            return
+        self._client.request("reset", suite=self._suite, task=self.task, episode=0)
+        self._has_probe = True
+        names = [*self.camera_matrices()]
+        if self._camera not in names:
+            raise ValueError(
+                f"camera={self._camera!r}: expected a camera of the scene, {', '.join(map(repr, names))}, or 'left' or 'right'"
+            )
 
     # Gymnasium's interface.
 
@@ -238,14 +292,21 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         if self._freezes and self._last is not None:
             self._pending = "frozen"
             return
+        if self._has_probe:
+            # For `end_step`, so that the requests of a vector environment and their answers stay in step.
+            self._pending = "refused"
+            return
         self._client.send("step", action=np.asarray(action))
         self._pending = "step"
 
     def end_step(self) -> Step:
         """Waits for `begin_step`."""
-        if self._take_pending() == "frozen":
+        pending = self._take_pending()
+        if pending == "frozen":
             assert self._last is not None
             return self._last
+        if pending == "refused":
+            raise ServerError("step: no episode yet; call reset first")
         response = self._client.receive()
         before = self._verdict
         self._verdict = response["info"].get("verdict", {})
@@ -284,7 +345,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
     def _restart(self, response: dict[str, Any]) -> tuple[Observation, dict[str, Any]]:
         """Takes in the first answer of an episode or of a restored state."""
         raw = response["info"]
-        self._last = None
+        self._last, self._has_probe = None, False
         self.task = raw["task"]
         self.task_description = raw["prompt"]
         self._verdict = raw.get("verdict", {})
@@ -382,7 +443,8 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
 
     def _info(self, raw: dict[str, Any], before: Mapping[str, Any]) -> dict[str, Any]:
         """`before` is the verdict of the previous step."""
-        info: dict[str, Any] = {key: raw[key] for key in ("task", "step", "time_s", "far_commands", "clamped_grips")}
+        info: dict[str, Any] = {key: raw[key] for key in ("task", "step", "time_s")}
+        info.update(_counters(raw))
         # Not "episode", under which wrappers of Gymnasium and Stable-Baselines3 put their statistics.
         info["episode_index"] = raw["episode"]
         info["prompt"] = self.task_description
@@ -423,21 +485,85 @@ def _refuse_changed(cause: str, given: object, arguments: Mapping[str, object]) 
             raise ValueError(f"{name}={value!r} has no effect with {cause}={given!r}; leave it out")
 
 
+def _refuse_without_effect(
+    parts: Sequence[str],
+    obs: object,
+    cameras: tuple[str, ...],
+    image_size: object,
+    history: int,
+    render_mode: str | None,
+) -> None:
+    """Raises ValueError for arguments that change nothing about these parts of an observation."""
+    shown = "state" if obs is None else obs
+    found = f"obs={shown!r}"
+    pictures = "which has no pixels, depth or segmentation; leave it out"
+    if not any(part in CAMERA_PARTS for part in parts):
+        if cameras != inspect.signature(SoftVTEnv.__init__).parameters["cameras"].default:
+            raise ValueError(f"cameras={cameras!r} has no effect with {found}, {pictures}")
+        if image_size is not None and render_mode != "rgb_array":
+            raise ValueError(f"image_size={image_size!r} has no effect with {found}, {pictures}")
+    if history != 1 and parts and all(part in PARTS_OF_ONE_STEP for part in parts):
+        raise ValueError(f"history={history!r} has no effect with {found}; leave it out")
+
+
+def _image_shape(image_size: Any) -> tuple[int, int] | None:
+    """Height and width that the argument states. Raises ValueError for anything else than one or two whole numbers."""
+    if image_size is None:
+        return None
+    pair = (image_size, image_size)
+    if isinstance(image_size, Sequence | np.ndarray) and not isinstance(image_size, str | bytes):
+        pair = tuple(image_size)
+    try:
+        height, width = (whole_number("image_size", edge, 1, _MAX_IMAGE_EDGE) for edge in pair)
+    except ValueError:
+        raise ValueError(
+            f"image_size={image_size!r}: expected (height, width) or one number for both, each a whole number from 1 to {_MAX_IMAGE_EDGE}"
+        ) from None
+    return height, width
+
+
+def _path(argument: str, value: Any) -> str | None:
+    """A name or path as text. Raises ValueError for what is neither."""
+    if value is None:
+        return None
+    if not isinstance(value, str | os.PathLike):
+        raise ValueError(f"{argument}={value!r}: expected a name or the path of a Lua file")
+    return os.fspath(value)
+
+
+def _counters(raw: Mapping[str, Any]) -> dict[str, int]:
+    """All that the server counts in an episode, such as `far_commands`."""
+    return {key: value for key, value in raw.items() if isinstance(value, int) and not is_bool(value) and key not in _OTHER_NUMBERS}
+
+
 def _script(name: str) -> str:
     """Path of a Lua file, or of a standard suite."""
-    return str(name) if str(name).endswith(".lua") else f"suites/{name}.lua"
+    return name if name.endswith(".lua") else f"suites/{name}.lua"
 
 
-def _flags(profile: str | None, image_size: int | tuple[int, int] | None, needs_truth: bool) -> tuple[str, ...]:
+def _flags(profile: str | None, image_shape: tuple[int, int] | None, needs_truth: bool) -> tuple[str, ...]:
     flags: list[str] = []
     if profile is not None:
         flags += ["--profile", profile]
-    if image_size is not None:
-        height, width = (image_size, image_size) if isinstance(image_size, int) else image_size
+    if image_shape is not None:
+        height, width = image_shape
         flags += ["--set", f"cameras.height={height}", "--set", f"cameras.width={width}"]
     if needs_truth:
         flags.append("--privileged")
     return tuple(flags)
+
+
+def _check_task(task: Any) -> None:
+    """Raises ValueError unless the argument is None, a number, text, or numbers."""
+    if task is None or isinstance(task, str):
+        return
+    many = isinstance(task, Sequence | np.ndarray | range | set) and not isinstance(task, bytes)
+    try:
+        numbers = [whole_number("task", number) for number in (task if many else [task])]
+    except (TypeError, ValueError):
+        raise ValueError(f"task={task!r}: expected a number, text or a list of numbers") from None
+    if not numbers:
+        raise ValueError(f"task={task!r}: no number in the list; None is for all tasks")
 
 
 def _tasks(suite: str, task: int | str | Sequence[int] | None, prompts: Mapping[int, str]) -> list[int]:
@@ -446,19 +572,19 @@ def _tasks(suite: str, task: int | str | Sequence[int] | None, prompts: Mapping[
         return [*prompts]
     if isinstance(task, str):
         found = [number for number, prompt in prompts.items() if task.lower() in prompt.lower()]
+        if not found and task.isdecimal():
+            raise ValueError(f"task={task!r}: text is a part of a prompt; write task={int(task)} for the task of this number")
         if len(found) != 1:
             raise ValueError(
                 f"task={task!r}: {len(found)} prompts of suite {suite} contain it; expected one of: {'; '.join(prompts.values())}"
             )
         return found
-    numbers = [int(task)] if isinstance(task, int | np.integer) else [int(number) for number in task]
+    numbers = [int(number) for number in (task if isinstance(task, Iterable) else [task])]
     for number in numbers:
         if number not in prompts:
             known = [*prompts]
             have = f"0 to {known[-1]}" if known == [*range(len(known))] else ", ".join(map(str, known))
             raise ValueError(f"task {number}: suite {suite} has the tasks {have}")
-    if not numbers:
-        raise ValueError("task: no number in the list")
     return numbers
 
 

@@ -1,10 +1,19 @@
 """Profiles of `softvt serve` for the arguments of an environment: which observations it sends, and what its actions mean."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from .arguments import require_one_of, whole_number
+
 PARTS = ("state", "proprio", "pixels", "depth", "segmentation", "tactile", "tactile_image", "marker_motion", "prompt")
 """Parts of an observation, by their names in the argument `obs`."""
+
+CAMERA_PARTS = ("pixels", "depth", "segmentation")
+"""Parts with an entry for each camera."""
+
+PARTS_OF_ONE_STEP = ("prompt", "tactile_image")
+"""Parts that the argument `history` does not change."""
 
 CONTROLS = ("delta", "delta_osc", "pose", "joints")
 """Values of the argument `control`."""
@@ -37,8 +46,12 @@ class ProfileSpec:
             require_one_of("obs", part, PARTS)
         require_one_of("control", self.control, CONTROLS)
         require_one_of("gripper", self.gripper, GRIPPERS)
-        if not 1 <= self.history <= MAX_HISTORY:
-            raise ValueError(f"history={self.history}: expected 1 to {MAX_HISTORY} control steps")
+        whole_number("history", self.history, 1, MAX_HISTORY)
+        uses_cameras = any(part in CAMERA_PARTS for part in self.parts)
+        if uses_cameras and not self.cameras:
+            raise ValueError(f"cameras={self.cameras!r}: no camera for obs={'+'.join(self.parts)!r}; name one, or leave cameras out")
+        if len({*self.cameras}) < len(self.cameras):
+            raise ValueError(f"cameras={self.cameras!r}: a camera is named twice")
 
     def to_lua(self) -> str:
         """The profile as a Lua file. Its entries have the keys of observations with `layout="flat"`."""
@@ -46,7 +59,7 @@ class ProfileSpec:
         inputs = []
         for part in self.parts:
             for key, source in self._sources(part):
-                inputs.append(f"    {{ keys = {{ {_quoted(key)} }}, {source}{'' if part in ('prompt', 'tactile_image') else frames} }},")
+                inputs.append(f"    {{ keys = {{ {_quoted(key)} }}, {source}{'' if part in PARTS_OF_ONE_STEP else frames} }},")
         if not inputs:
             # A profile has at least one entry. The true state is not one of them: it comes with each answer.
             inputs.append(f"    {{ keys = {{ 'proprio' }}, {self._proprio()} }},")
@@ -103,16 +116,14 @@ def action_size(control: str) -> int:
 
 def parse_parts(obs: str | Sequence[str]) -> tuple[str, ...]:
     """Parts of an observation from a list, or from text such as "pixels+proprio". Raises ValueError for an unknown one."""
+    if not isinstance(obs, str | Sequence):
+        raise ValueError(f"obs={obs!r}: expected text such as 'pixels+proprio', or a list of parts")
     parts = tuple(obs.split("+")) if isinstance(obs, str) else tuple(obs)
+    if isinstance(obs, str) and (words := re.findall(r"[^\s,+]+", obs)) and {*parts} != {*words} <= {*PARTS}:
+        raise ValueError(f"obs={obs!r}: parts are joined by +; write obs={'+'.join(words)!r}")
     for part in parts:
         require_one_of("obs", part, PARTS)
     return tuple(dict.fromkeys(parts))
-
-
-def require_one_of(argument: str, value: str, known: Sequence[str]) -> None:
-    """Raises ValueError unless the value of an argument is one of those."""
-    if value not in known:
-        raise ValueError(f"{argument}={value!r}: expected {', '.join(map(repr, known[:-1]))} or {known[-1]!r}")
 
 
 def _quoted(text: str) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space, concatenate, create_empty_array, iterate
 
+from .arguments import require_one_of, whole_number
 from .env import SoftVTEnv
 
 
@@ -22,8 +23,11 @@ class SoftVTVectorEnv(VectorEnv):
         **arguments: Any,
     ):
         """`arguments` are those of SoftVTEnv. `max_episode_steps` truncates episodes before the budget of their task."""
-        if num_envs < 1:
-            raise ValueError(f"num_envs={num_envs}: expected at least 1")
+        num_envs = whole_number("num_envs", num_envs, 1)
+        if max_episode_steps is not None:
+            max_episode_steps = whole_number("max_episode_steps", max_episode_steps, 1)
+        if not isinstance(autoreset_mode, AutoresetMode):
+            require_one_of("autoreset_mode", autoreset_mode, [mode.value for mode in AutoresetMode])
         self.envs: list[SoftVTEnv] = []
         try:
             for _ in range(num_envs):

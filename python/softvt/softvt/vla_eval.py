@@ -19,8 +19,9 @@ from vla_eval.specs import (
 )
 from vla_eval.types import Action, EpisodeResult, Observation, Task
 
+from .arguments import require_bool, require_one_of, texts, whole_number
 from .env import SoftVTEnv
-from .profile import action_size, proprio_parts
+from .profile import CONTROLS, GRIPPERS, action_size, proprio_parts
 
 # Names of the cameras in observations, as `softvt --protocol vla-eval` has them.
 _CAMERAS = {"third_person": "agentview", "wrist": "wrist"}
@@ -67,6 +68,12 @@ class SoftVTBenchmark(StepBenchmark):
         flags: further flags of `softvt serve`.
         """
         super().__init__()
+        require_one_of("control", control, CONTROLS)
+        require_one_of("gripper", gripper, GRIPPERS)
+        for name, value in (("send_state", send_state), ("send_wrist_image", send_wrist_image), ("send_tactile", send_tactile)):
+            require_bool(name, value)
+        seed, image_size = whole_number("seed", seed, 0), whole_number("image_size", image_size, 1)
+        flags = texts("flags", flags)
         self.suite, self.seed, self.control, self.gripper = suite, seed, control, gripper
         self._sends_state = send_state
         self._cameras = tuple(_CAMERAS) if send_wrist_image else ("third_person",)
@@ -79,7 +86,7 @@ class SoftVTBenchmark(StepBenchmark):
             "cameras": self._cameras,
             "image_size": image_size,
             "privileged": True,
-            "flags": tuple(flags),
+            "flags": flags,
             "render_mode": "rgb_array",
         }
         self._env: SoftVTEnv | None = None

@@ -96,11 +96,24 @@ class Datasets(unittest.TestCase):
             ({"path": self.folder, "keys": ("agentview",)}, "no stream obs/agentview; obs has agentview_depth, agentview_pose"),
             ({"path": self.folder, "task": 7}, "no demonstration of task 7"),
             ({"path": self.folder, "control": "delta"}, "expected 'pose' or 'joints'"),
-            ({"path": self.folder, "gripper": "soft"}, "expected one of continuous"),
+            ({"path": self.folder, "gripper": "soft"}, "gripper='soft': expected 'continuous'"),
             ({"path": self.folder, "horizon": 0}, "at least 1"),
+            ({"path": self.folder, "horizon": 2.5}, "horizon=2.5: expected a whole number"),
+            ({"path": self.folder, "keys": "state"}, r'keys=\'state\': expected a list; write keys=\("state",\)'),
+            ({"path": self.folder, "keys": ("actions",)}, "'actions' is no observation"),
+            ({"path": self.folder, "keys": ("privileged/nope",)}, "no stream privileged/nope; privileged has actions_with_force"),
+            ({"path": self.folder, "task": "0"}, "task='0': expected a number or a list of numbers"),
+            ({"path": self.folder, "task": []}, "no number in the list"),
+            ({"path": None}, "path=None: expected the path of a recording"),
+            ({"path": self.folder / "manifest.jsonl"}, "no recording of softvt: .*signature"),
         ]:
             with self.subTest(arguments), self.assertRaisesRegex(ValueError, words):
                 softvt.Dataset(**arguments)
+        data = softvt.Dataset(self.folder)
+        with self.assertRaisesRegex(TypeError, "step slice.*`episode` gives all steps"):
+            data[0:3]
+        with self.assertRaisesRegex(IndexError, "demonstration 2 of 2"):
+            data.episode(2)
 
 
 if __name__ == "__main__":

@@ -96,6 +96,17 @@ class Benchmarks(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "8 numbers"):
             pose.step({"actions": np.zeros(8)})
 
+    def test_impossible_parameters_are_refused_before_a_server_starts(self):
+        for arguments, words in [
+            ({"control": "delt"}, "control='delt': expected 'delta'"),
+            ({"seed": "a"}, "seed='a': expected a whole number"),
+            ({"image_size": [64, 64]}, r"image_size=\[64, 64\]: expected a whole number"),
+            ({"flags": "--rigid-twin"}, r'write flags=\("--rigid-twin",\)'),
+            ({"send_state": "no"}, "send_state='no': expected True or False"),
+        ]:
+            with self.subTest(arguments), self.assertRaisesRegex(ValueError, words):
+                SoftVTBenchmark(**arguments)
+
 
 if __name__ == "__main__":
     unittest.main()
