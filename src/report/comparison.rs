@@ -282,6 +282,19 @@ fn in_project(path: &str) -> &str {
     start.map_or(path, |at| &path[at..])
 }
 
+/// The headings within the width of a column: their beginnings, or their ends where the beginnings are the same.
+fn distinct_headings(names: &[String; 2]) -> [String; 2] {
+    let [first, second] = names.each_ref().map(|name| shortened(name, HEADING_WIDTH));
+    if first != second {
+        return [first, second];
+    }
+    let end = |name: &String| -> String {
+        let letters = name.chars().rev().take(HEADING_WIDTH - 1).collect::<Vec<_>>();
+        std::iter::once('…').chain(letters.into_iter().rev()).collect()
+    };
+    names.each_ref().map(|name| if name.chars().count() > HEADING_WIDTH { end(name) } else { name.clone() })
+}
+
 /// The comparison as a table: all episodes first, then the tasks in which a rate changed. With details it has all
 /// measures and all tasks.
 pub fn table(comparison: &Comparison, format: TerminalFormat) -> String {
@@ -294,7 +307,7 @@ pub fn table(comparison: &Comparison, format: TerminalFormat) -> String {
     );
     text.line(Emphasis::Bold, title);
     let mut table = TextTable::new(COLUMNS);
-    let [first, second] = [0, 1].map(|side| shortened(&comparison.headings[side], HEADING_WIDTH));
+    let [first, second] = distinct_headings(&comparison.headings);
     push_headings(&mut table, "", &first, &second);
     push_rates(&mut table, &comparison.all);
     if comparison.deformable {
@@ -529,6 +542,14 @@ mod tests {
         let row = text.lines().find(|line| line.trim_start().starts_with(name)).unwrap_or_default();
         let cells = row.trim_start().trim_start_matches(name).split_whitespace();
         cells.map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn headings_of_two_policies_differ_where_their_names_do() {
+        let of = |first: &str, second: &str| distinct_headings(&[first.to_owned(), second.to_owned()]);
+        assert_eq!(of("expert", "noop"), ["expert", "noop"]);
+        assert_eq!(of("tactile-servo", "expert-binary"), ["tactile…", "expert-…"]);
+        assert_eq!(of("policy_of_a", "policy_of_b"), ["…cy_of_a", "…cy_of_b"]);
     }
 
     #[test]
