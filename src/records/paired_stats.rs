@@ -153,10 +153,14 @@ impl PairedComparison {
                 .count(),
             goal: rate(|r| r.verdict.goal),
             no_drop: rate(|r| r.verdict.no_drop),
-            safety: PairedDifference::from_successes(
-                judged()
-                    .map(|pair| [pair.first, pair.second].map(|r| r.outcome.is_valid() && r.verdict.safety)),
-            ),
+            safety: match is_judged {
+                true => {
+                    PairedDifference::from_successes(judged().map(|pair| {
+                        [pair.first, pair.second].map(|r| r.outcome.is_valid() && r.verdict.safety)
+                    }))
+                }
+                false => PairedDifference::default(),
+            },
             dsr: PairedDifference::from_successes(
                 judged().map(|pair| [pair.first, pair.second].map(EpisodeRecord::is_deformation_safe)),
             ),

@@ -283,16 +283,16 @@ fn in_project(path: &str) -> &str {
 }
 
 /// The headings within the width of a column: their beginnings, or their ends where the beginnings are the same.
-fn distinct_headings(names: &[String; 2]) -> [String; 2] {
-    let [first, second] = names.each_ref().map(|name| shortened(name, HEADING_WIDTH));
-    if first != second {
-        return [first, second];
+fn distinct_headings(names: [&str; 2]) -> [String; 2] {
+    let beginnings = names.map(|name| shortened(name, HEADING_WIDTH));
+    if beginnings[0] != beginnings[1] {
+        return beginnings;
     }
-    let end = |name: &String| -> String {
+    let end = |name: &str| -> String {
         let letters = name.chars().rev().take(HEADING_WIDTH - 1).collect::<Vec<_>>();
         std::iter::once('…').chain(letters.into_iter().rev()).collect()
     };
-    names.each_ref().map(|name| if name.chars().count() > HEADING_WIDTH { end(name) } else { name.clone() })
+    names.map(|name| if name.chars().count() > HEADING_WIDTH { end(name) } else { name.to_owned() })
 }
 
 /// The comparison as a table: all episodes first, then the tasks in which a rate changed. With details it has all
@@ -307,7 +307,7 @@ pub fn table(comparison: &Comparison, format: TerminalFormat) -> String {
     );
     text.line(Emphasis::Bold, title);
     let mut table = TextTable::new(COLUMNS);
-    let [first, second] = distinct_headings(&comparison.headings);
+    let [first, second] = distinct_headings([0, 1].map(|side| comparison.headings[side].as_str()));
     push_headings(&mut table, "", &first, &second);
     push_rates(&mut table, &comparison.all);
     if comparison.deformable {
@@ -546,7 +546,7 @@ mod tests {
 
     #[test]
     fn headings_of_two_policies_differ_where_their_names_do() {
-        let of = |first: &str, second: &str| distinct_headings(&[first.to_owned(), second.to_owned()]);
+        let of = |first: &str, second: &str| distinct_headings([first, second]);
         assert_eq!(of("expert", "noop"), ["expert", "noop"]);
         assert_eq!(of("tactile-servo", "expert-binary"), ["tactile…", "expert-…"]);
         assert_eq!(of("policy_of_a", "policy_of_b"), ["…cy_of_a", "…cy_of_b"]);

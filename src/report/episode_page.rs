@@ -22,10 +22,10 @@ pub const VIDEO: &str = "episode.mp4";
 pub const FRAME: &str = "episode.png";
 /// Names of the moments of stills, in the names of files and in words.
 const MOMENTS: [(&str, &str); 3] =
-    [("start", "At the start"), ("worst", "At the worst moment"), ("end", "At the end")];
+    [("worst", "At the worst moment"), ("start", "At the start"), ("end", "At the end")];
 /// Stills of a moment, by the names of files and in words.
 const STILLS: [(&str, &str); 7] = [
-    (CLOSE_UP_STILL, "object by strain"),
+    (CLOSE_UP_STILL, "object from nearby; red: collapsed material"),
     ("third_person", "third person"),
     ("wrist", "wrist"),
     ("tactile_left_arrows", "left finger, motion of the markers"),
@@ -54,11 +54,16 @@ const STYLE: &str = "body{margin:1.5rem auto;max-width:70rem;padding:0 1rem;font
 const STYLE_OF_SEVERAL: &str =
     "h3{font-size:13px;margin:.8rem 0 .3rem}.said{display:block}.said li{font-size:15px}";
 
+/// Least D over τ that two decimals show.
+const SMALLEST_RATIO: f64 = 0.005;
+
 /// What was seen in an episode: "✗ over the limit: D 1.93 % = 5.14 × limit at 4.95 s". `worst_time_s` is the time of
 /// the largest deformation.
 pub fn sentence(record: &EpisodeRecord, worst_time_s: f64) -> String {
     let verdict = &record.verdict;
     let d = match (verdict.d_peak, verdict.tau.filter(|tau| *tau > 0.0)) {
+        // What was not touched has no number.
+        (Some(d), Some(tau)) if d < SMALLEST_RATIO * tau => String::new(),
         (Some(d), Some(tau)) => format!(": D {d:.2} % = {:.2} × limit at {worst_time_s:.2} s", d / tau),
         (Some(d), None) => format!(": D {d:.2} % at {worst_time_s:.2} s"),
         (None, _) => String::new(),

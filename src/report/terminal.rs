@@ -60,7 +60,11 @@ fn push_categories(text: &mut StyledText, scores: &GroupScores) {
             (EpisodeCategory::Safe, false) => "placed without a drop",
             _ => category.name(),
         };
-        let part = format!("{} {count} {name}", category.glyph());
+        let crushed = match (category, scores.crushed_over_limit) {
+            (EpisodeCategory::OverLimit, crushed @ 1..) => format!(" ({crushed} crushed)"),
+            _ => String::new(),
+        };
+        let part = format!("{} {count} {name}{crushed}", category.glyph());
         text.push(Emphasis::None, gap).push(Emphasis::Category(category), part);
     }
     text.end();
@@ -183,7 +187,11 @@ fn push_failures(text: &mut StyledText, scores: &GroupScores) {
     let failed: Vec<EpisodeCategory> = failed.collect();
     for (at, category) in failed.iter().enumerate() {
         let gap = if at > 0 { " " } else { "" };
+        let crushed = if *category == EpisodeCategory::OverLimit { scores.crushed_over_limit } else { 0 };
         let what = match (scores.episodes, &failed[..]) {
+            (1, _) if crushed > 0 => "crushed".to_owned(),
+            _ if crushed == scores.count(*category) => format!("{crushed} crushed"),
+            _ if crushed > 0 => format!("{}, {crushed} crushed", scores.count(*category)),
             (1, _) => category.name().to_owned(),
             (_, [single]) => format!("{} {}", scores.count(*single), single.name()),
             _ => scores.count(*category).to_string(),

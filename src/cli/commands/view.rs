@@ -101,6 +101,9 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     }
 }
 
+/// Name of the loop for web pages.
+const ANIMATION: &str = "animation.png";
+
 /// An episode with its states.
 struct SeenEpisode {
     record: EpisodeRecord,
@@ -144,7 +147,7 @@ fn show_one(args: &ViewArgs, config: &RunConfig, mut seen: SeenEpisode) -> Resul
     }
     let worst_time_s = worst as f64 * CONTROL_DT;
     episode_page::write(&record, worst_time_s, dir)?;
-    print_seen(dir, &[episode_page::sentence(&record, worst_time_s)])
+    print_seen(args.animation, dir, &[episode_page::sentence(&record, worst_time_s)])
 }
 
 /// Draws an episode under several policies, side by side.
@@ -172,20 +175,24 @@ fn show_several(args: &ViewArgs, config: &RunConfig, seen: Vec<SeenEpisode>) -> 
         animate(args, config, &mut episodes)?;
     }
     episode_page::write_several(&parts, dir)?;
-    print_seen(dir, &parts.iter().map(PolicyPart::sentence).collect::<Vec<_>>())
+    print_seen(args.animation, dir, &parts.iter().map(PolicyPart::sentence).collect::<Vec<_>>())
 }
 
 /// Writes the episodes as a loop for web pages.
 fn animate(args: &ViewArgs, config: &RunConfig, episodes: &mut [PolicyEpisode]) -> Result<(), CliError> {
     config.observer.work("rendering the animation");
-    let path = args.out.join("animation.png");
+    let path = args.out.join(ANIMATION);
     side_by_side::write_animation(episodes, &path, config.thread_count(), cancel::requested)?;
     config.observer.end();
     Ok(())
 }
 
 /// Prints what was seen, and where.
-fn print_seen(dir: &Path, sentences: &[String]) -> Result<(), CliError> {
-    let (page, video) = (dir.join(episode_page::PAGE), dir.join(episode_page::VIDEO));
-    print(&format!("{}\n{}\n{}\n", sentences.join("\n"), page.display(), video.display()))
+fn print_seen(has_animation: bool, dir: &Path, sentences: &[String]) -> Result<(), CliError> {
+    let files = [episode_page::PAGE, ANIMATION, episode_page::VIDEO].map(|name| dir.join(name));
+    let written = files
+        .iter()
+        .filter(|file| has_animation || !file.ends_with(ANIMATION))
+        .map(|file| format!("{}\n", file.display()));
+    print(&format!("{}\n{}", sentences.join("\n"), written.collect::<String>()))
 }

@@ -82,7 +82,7 @@ fn over_limit(run: &RunSummary) -> String {
     });
     let elsewhere = match elsewhere.count() {
         0 => String::new(),
-        count => format!(" It is over the limit in {count} more that missed the goal or dropped the object."),
+        count => format!(" In {count} more it is over the limit, and misses the goal or drops the object."),
     };
     let placed = match crushed {
         0 => format!("{policy} is over the limit in {} of {}.", over.len(), counted(all, "episode")),

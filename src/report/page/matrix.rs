@@ -88,6 +88,13 @@ fn cell(run: &RunSummary, asset: &str, out: &Path) -> Markup {
         EpisodeCategory::Safe => scores.d_over_tau.median,
         _ => shown.and_then(d_over_tau),
     };
+    let crushed = match scores.crushed_over_limit {
+        0 => None,
+        count if count == scores.count(worst) || worst != EpisodeCategory::OverLimit => {
+            Some(format!("{count} crushed"))
+        }
+        count => Some(format!("{count} of them crushed")),
+    };
     let text = ratio.map_or_else(|| "–".to_owned(), |ratio| format!("{ratio:.2}"));
     let failed = match (worst, scores.episodes) {
         (EpisodeCategory::Safe, _) => String::new(),
@@ -96,7 +103,7 @@ fn cell(run: &RunSummary, asset: &str, out: &Path) -> Markup {
     };
     let video =
         shown.and_then(|record| relative_link(out, &video_path(&run.run.dir, record.header.id.index())));
-    let label = html! { @if !failed.is_empty() { span.nobreak aria-label=(worst.name()) role="img" { (failed) } } span.nobreak { (text) } };
+    let label = html! { @if !failed.is_empty() { span.nobreak aria-label=(worst.name()) role="img" { (failed) } } span.nobreak { (text) } @if let Some(crushed) = crushed { br; span.nobreak { (crushed) } } };
     html! {
         td class=(class(worst)) {
             @match video { Some(video) => a href=(video) { (label) }, None => (label) }

@@ -113,6 +113,7 @@ pub struct VideoCaption {
     /// Time of the drop, s.
     drop_s: Option<f64>,
     is_soft: bool,
+    is_crushed: bool,
 }
 
 impl VideoCaption {
@@ -129,6 +130,7 @@ impl VideoCaption {
             tau_pct: verdict.tau,
             drop_s: verdict.drop.map(|event| event.time_s),
             is_soft: header.soft,
+            is_crushed: record.crushed_volume_pct().is_some(),
         }
     }
 
@@ -176,12 +178,13 @@ impl Moment {
         if self.is_final { usize::MAX } else { self.state }
     }
 
-    /// D over its limit in words, with its colour: that of the state, or the largest one with the final verdict.
+    /// D over its limit in words, with its colour: that of the state, or the largest one with the final verdict and
+    /// once that is above the limit and D is not.
     fn ratio(self, curves: &EpisodeCurves) -> Option<(String, Rgb8)> {
-        let (word, ratio) = match self.is_final {
-            true => ("peak D", curves.peak_until(usize::MAX)?),
-            false => ("D", *curves.d_over_tau.get(self.state)?),
-        };
+        let now = *curves.d_over_tau.get(self.state)?;
+        let peak = curves.peak_until(self.end_of_curves())?;
+        let (word, ratio) =
+            if self.is_final || peak > 1.0 && now <= 1.0 { ("peak D", peak) } else { ("D", now) };
         Some((format!("{word} {ratio:.2} × limit"), ratio_colour(ratio)))
     }
 }
@@ -434,6 +437,7 @@ impl Badge {
     fn new(recording: &StateRecording, caption: &VideoCaption, moment: Moment) -> Self {
         if moment.is_final {
             let colour = match caption.category {
+                _ if caption.is_crushed => HARM,
                 EpisodeCategory::Safe => SAFE,
                 EpisodeCategory::OverLimit => HARM,
                 EpisodeCategory::Dropped | EpisodeCategory::Slipped => DROPPED,
@@ -442,11 +446,16 @@ impl Badge {
             return Self { text: caption.verdict.clone(), colour };
         }
         let now_s = moment.state as f64 * CONTROL_DT;
-        let over = first_over_limit(recording, caption, moment.state)
-            .map(|at| format!("over the limit since {:.2} s", at as f64 * CONTROL_DT));
+        let is_crushed = caption.is_crushed && moment.state >= worst_state(recording);
+        let over = first_over_limit(recording, caption, moment.state).map(|at| match is_crushed {
+            true => "crushed".to_owned(),
+            false => format!("over the limit at {:.2} s", at as f64 * CONTROL_DT),
+        });
         let dropped = caption.drop_s.filter(|at| *at <= now_s).map(|at| format!("dropped at {at:.2} s"));
         let (text, colour) = match (over, dropped) {
-            (Some(_), Some(dropped)) => (format!("over the limit, {dropped}"), HARM),
+            (Some(over), Some(dropped)) => {
+                (format!("{over}, {dropped}"), if is_crushed { HARM } else { DROPPED })
+            }
             (Some(over), None) => (over, HARM),
             (None, Some(dropped)) => (dropped, DROPPED),
             (None, None) if !caption.is_soft => ("not dropped so far".to_owned(), SAFE),
@@ -471,7 +480,7 @@ const PANEL_NAME_SIZE: f32 = 19.0;
 fn draw_label(canvas: &mut Canvas, name: &str, x: u32, y: u32, size: f32) {
     let (x, y) = (x as f32, y as f32);
     let width = canvas.text_width(name, size);
-    canvas.fill(x + 8.0, y + 8.0, width + 16.0, size + 7.0, [0, 0, 0], 0.45);
+    canvas.fill(x + 8.0, y + 8.0, width + 16.0, size + 7.0, [0, 0, 0], 0.8);
     canvas.write(name, x + 16.0, y + 8.0 + size, size, [255, 255, 255]);
 }
 

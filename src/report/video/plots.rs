@@ -19,7 +19,7 @@ const PLOT_RIGHT: f32 = 12.0;
 const PLOT_TOP: f32 = 24.0;
 const PLOT_BOTTOM: f32 = 20.0;
 /// Width of the names between the two plots, units.
-const LEGEND: f32 = 132.0;
+const LEGEND: f32 = 138.0;
 /// Share of the width without names that the plot of D over τ has; the rest is that of the force.
 const D_PLOT_SHARE: f32 = 0.56;
 /// Dashes of the curves in turn, units; 0 is a solid line.
@@ -116,8 +116,8 @@ impl Plots<'_> {
         for (number, (name, episode)) in self.names.iter().zip(self.episodes).enumerate() {
             let (y, colour) = (top + px(20.0) * number as f32, episode.colour_until(index));
             let (height, dash) = (y - px(4.0), px(DASHES[number % DASHES.len()]));
-            canvas.line(&[[left, height], [left + px(20.0), height]], px(1.6), dash, colour);
-            canvas.write(&shortened(name, NAME_LETTERS), left + px(24.0), y, px(TITLE_SIZE), colour);
+            canvas.line(&[[left, height], [left + px(26.0), height]], px(1.6), dash, colour);
+            canvas.write(&shortened(name, NAME_LETTERS), left + px(30.0), y, px(TITLE_SIZE), colour);
         }
     }
 

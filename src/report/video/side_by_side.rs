@@ -202,7 +202,7 @@ impl<'a> FrameContext<'a> {
     fn decisive_frame(&self) -> Result<RgbImage, EpisodeVideoError> {
         let decisive = |PolicyEpisode { recording, caption, .. }: &_| Moment::decisive(recording, caption);
         let moments: Vec<Moment> = self.episodes.iter().map(decisive).collect();
-        self.frame(&moments, usize::MAX, "the moment that shows each result")
+        self.frame(&moments, usize::MAX, "the moment of the result")
     }
 
     /// Draws a moment of each episode, and the curves up to the state `index`.
@@ -260,7 +260,10 @@ impl<'a> FrameContext<'a> {
         let px = |units| self.layout.px(units);
         let top = self.layout.plots_top() + px(PLOTS_HEIGHT);
         canvas.write(&caption.prompt, px(10.0), top + px(16.0), px(TEXT_SIZE), TEXT);
-        let text = format!("{place} · {when} · red: beyond the stable strain of the material");
+        // A single column is too narrow for it.
+        let red =
+            if self.episodes.len() > 1 { " · red: beyond the stable strain of the material" } else { "" };
+        let text = format!("{place} · {when}{red}");
         canvas.write(&text, px(10.0), top + px(34.0), px(12.0), FAINT);
     }
 }

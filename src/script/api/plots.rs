@@ -48,15 +48,15 @@ functions! {
             /// Horizontal lines, such as limits.
             levels: Vec<LevelSpec> => Empty;
         } -> ["string"] {
-            if series.iter().all(|series| series.points.is_empty()) {
-                return Err(fail(lua, "plot.series: expected at least one series with a point".to_owned()));
-            }
             if series.len() > MAX_SERIES {
                 let message = format!(
                     "plot.series: {} series cannot be told apart; give at most {MAX_SERIES}, and further ones in another plot",
                     series.len()
                 );
                 return Err(fail(lua, message));
+            }
+            if series.iter().all(|series| series.points.is_empty()) {
+                return Err(fail(lua, "plot.series: expected at least one series with a point".to_owned()));
             }
             let values = |axis: usize| series.iter().flat_map(|series| &series.points).map(move |point| point[axis]);
             let of_levels = levels.iter().map(|level| level.y);

@@ -111,6 +111,7 @@ fn plots_are_drawn_or_refused_at_their_line() {
     assert!(text.contains("<svgtrue"), "{text}");
     let zero = "suites/x.lua:1: plot.y.log: 0 has no logarithm; leave log out, or such values";
     assert_eq!(error("series = { { points = { { 0, 0 } } } }"), zero);
+    assert!(error("series = {}").contains("plot.series: expected at least one series with a point"));
     let many = "series = { {points={}}, {points={}}, {points={}}, {points={}}, {points={}}, {points={}}, {points={}} }";
     assert!(
         error(many).contains("plot.series: 7 series cannot be told apart; give at most 6"),

@@ -153,7 +153,12 @@ fn malformed_actions_end_the_run_at_the_line_of_act() {
     for (body, expected) in [
         ("return", format!("{at}: expected an action or a list of actions, got nil")),
         ("return 'left'", format!("{at}: expected an action or a list of actions, got \"left\"")),
-        ("return {}", format!("{at}: expected 1 to 10000 actions, got 0")),
+        (
+            "return {}",
+            format!(
+                "{at}: expected an action or a list of actions, got an empty table; an action has position, axis_angle or quaternion, and closure"
+            ),
+        ),
         ("return { 1, 2 }", format!("{at}.[1]: expected an action, got 1").replace(".[", "[")),
         (
             "return { positon = { 0, 0, 0 }, closure = 0 }",

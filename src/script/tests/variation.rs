@@ -327,7 +327,7 @@ fn ranges_that_leave_no_instance_are_refused_with_the_remedy() {
     let message = refusal("sphere = soft");
     assert!(
         message.contains("asset ball has no calibrated window")
-            && message.contains("calibrate.lua calibrates it (asset=ball)"),
+            && message.contains("softvt scripts/calibrate.lua --asset ball"),
         "{message}"
     );
 }
