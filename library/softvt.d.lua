@@ -391,7 +391,7 @@
 ---Returns a pose in the world frame: `softvt.pose { position = { 0.4, 0, 0.2 }, yaw = math.pi / 2 }`. Without a quaternion the hand points straight down.
 ---@class softvt.PoseSpec
 ---@field position number[] Position. Expects a list of 3 numbers (m, world).
----@field yaw? number Rotation of the downward hand about the vertical. Expects radians. Default 0.
+---@field yaw? number Rotation of the downward hand about the vertical. Expects radians in -6.2832..6.2832. Default 0.
 ---@field quaternion? number[] Orientation instead of yaw. Expects a list of 4 numbers (w, x, y, z).
 
 ---Reads a shape from an OBJ, STL or GLB file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface must be closed. An asset without visuals has the colours and images of the materials in the file: Kd and map_Kd of the MTL files that an OBJ file names, or the base colours of a GLB file; images are PNG or JPEG.
