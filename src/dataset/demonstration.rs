@@ -182,7 +182,7 @@ fn grip_forces(recording: &StateRecording, steps: usize) -> Vec<f64> {
 }
 
 /// Names of the streams with the poses of the standard cameras.
-const CAMERA_POSES: [&str; 2] = ["obs/agentview_pose", "obs/eye_in_hand_pose"];
+pub(crate) const CAMERA_POSES: [&str; 2] = ["obs/agentview_pose", "obs/eye_in_hand_pose"];
 
 /// Poses of the standard cameras before each action, with their intrinsic matrices.
 fn camera_streams(recording: &StateRecording, steps: usize) -> Vec<DataStream> {

@@ -27,10 +27,8 @@ pub fn view_command(run: &StoredRun, id: &EpisodeId) -> String {
         add("--episode", id.episode.to_string());
     }
     let policy = match (manifest["policy_file"].as_str(), manifest["replayed"]["run"].as_str()) {
-        // A client of `softvt serve` cannot be called; its actions can be repeated.
-        _ if manifest["served"] == true => run.dir.display().to_string(),
-        // The address of a remote policy is not stored in run.json.
-        _ if manifest["profile"].is_object() => "ws://HOST:PORT".to_owned(),
+        // Neither a client of `softvt serve` nor a policy server can be called; their actions can be repeated.
+        _ if manifest["profile"].is_object() || manifest["served"] == true => run.dir.display().to_string(),
         (Some(path), _) | (None, Some(path)) => located(path),
         (None, None) => run.text("policy").to_owned(),
     };

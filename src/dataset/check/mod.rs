@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::{
     DatasetError, StreamValues, TaskFile,
     card::DatasetCard,
-    demonstration::{JOINT_ACTIONS, JOINT_TORQUES, actions_stream_name},
+    demonstration::{CAMERA_POSES, JOINT_ACTIONS, JOINT_TORQUES, actions_stream_name},
     layout::{DEPTH_STREAMS, IMAGE_STREAMS, MANIFEST},
     manifest::{self, ManifestEntry},
 };
@@ -264,7 +264,8 @@ impl DemoCheck<'_> {
             let got = &stream.row_shape;
             self.add(name, format!("expected the shape (steps, height, width, 3), got {got:?} per step"));
         }
-        if name.ends_with("/root_pose_w") && width == 7 {
+        let is_pose = name.ends_with("/root_pose_w") || CAMERA_POSES.contains(&name);
+        if is_pose && width == 7 {
             match &stream.values {
                 StreamValues::F64(poses) => self.check_quaternions(name, poses),
                 _ => self.add(name, "expected float64"),
@@ -365,6 +366,13 @@ impl DemoCheck<'_> {
                 "step {step}: the quaternion is not the rotation of obs/state: is its order w x y z?"
             );
             self.add("obs/eef_pose", what);
+        }
+        let same_place = |(pose, state): (&[f64], &[f64])| {
+            (0..3).all(|axis| (pose[axis] - state[axis]).abs() <= TOLERANCE)
+        };
+        let mut places = poses.chunks_exact(7).zip(states.chunks_exact(7));
+        if let Some(step) = places.position(|pair| !same_place(pair)) {
+            self.add("obs/state", format!("step {step}: not the position of obs/eef_pose: is it in m?"));
         }
         let expected = |step: usize| step as f64 * CONTROL_DT;
         let is_late = |(step, t): (usize, &f64)| (t - expected(step)).abs() > TOLERANCE;

@@ -106,7 +106,7 @@ fn matching_entries(
             let known: BTreeSet<usize> = entries.iter().map(|entry| entry.task_id).collect();
             let known: Vec<String> = known.iter().map(usize::to_string).collect();
             let what = format!(
-                "no task matches {word:?}: expected an index or part of a prompt; there are {}",
+                "no task matches {word:?}: expected an index or part of a prompt; the recording has the tasks {}",
                 known.join(", ")
             );
             return Err(DatasetError::content(root, MANIFEST, what));

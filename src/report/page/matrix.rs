@@ -90,6 +90,7 @@ fn cell(run: &RunSummary, asset: &str, out: &Path) -> Markup {
     };
     let crushed = match scores.crushed_over_limit {
         0 => None,
+        _ if scores.episodes == 1 => Some("crushed".to_owned()),
         count if count == scores.count(worst) || worst != EpisodeCategory::OverLimit => {
             Some(format!("{count} crushed"))
         }

@@ -136,11 +136,11 @@ fn bounds_without_touch_and_pictures_of_objects_are_shown() {
 }
 
 #[test]
-fn an_episode_of_a_client_is_viewed_by_its_actions() {
+fn an_episode_of_a_policy_server_or_a_client_is_viewed_by_its_actions() {
     let mut run = stored("runs/mine", "client", episodes("soft", 4));
     run.manifest["profile"] = json!({ "name": "vision" });
     let remote = render(vec![run.clone()]);
-    assert!(remote.contains("--policy ws://HOST:PORT"), "a policy server");
+    assert!(remote.contains("--policy runs/mine"), "a policy server");
     run.manifest["served"] = json!(true);
     let page = render(vec![run]);
     assert!(page.contains("--episode 1 --policy runs/mine --seed 11"), "{page}");
