@@ -264,7 +264,7 @@ impl RunConfig {
         RunError::of_setting(field, value, message).at(self.file.display())
     }
 
-    /// Tells whoever watches the run something.
+    /// Reports a message to the observer of the run.
     pub fn notice(&self, message: impl fmt::Display) {
         self.observer.notice(&message.to_string());
     }
