@@ -42,9 +42,9 @@ fn the_first_screen_shows_the_bound_without_touch() {
     assert_eq!(
         table,
         "|  | Object-Hidden: Goal % | Safety % |\n|---|---:|---:|\n\
-         | `expert`: knows the object | 90.0 | 99.0 [99.0, 99.0] |\n| `tactile-servo` | – | – |\n\
-         | `look-retry` | 90.0 | 60.0 [60.0, 60.0] |\n\
-         | [bound without touch](docs/touch.md): `one-force` | 90.0 | 40.0 [40.0, 40.0] |\n| `expert-binary` | – | – |\n",
+         | `expert`: knows the object | 90.0 | 99.0\u{a0}[99.0,\u{a0}99.0] |\n| `tactile-servo` | – | – |\n\
+         | `look-retry` | 90.0 | 60.0\u{a0}[60.0,\u{a0}60.0] |\n\
+         | [bound without touch](docs/touch.md): `one-force` | 90.0 | 40.0\u{a0}[40.0,\u{a0}40.0] |\n| `expert-binary` | – | – |\n",
         "look-retry adapts its grip, so it is not among those of the bound"
     );
 }
@@ -108,12 +108,12 @@ fn rows_and_columns_follow_the_runs() {
         "`softvt suites/controllers.lua --episodes 2`: 2 episodes per row and suite; the brackets are the 95 % interval of Safety. No episode was invalid. \
          All controllers plan from ground-truth state (*privileged*).\n\n\
          |  | One-Varied: Goal % | Safety % | Two: Goal % | Safety % |\n|---|---:|---:|---:|---:|\n\
-         | `expert` | 100.0 | 50.0 [25.0, 50.0] | 100.0 | 50.0 [25.0, 50.0] |\n\
-         | `size-seen`: sees the size | 100.0 | 50.0 [25.0, 50.0] | 100.0 | 50.0 [25.0, 50.0] |\n\n\
+         | `expert` | 100.0 | 50.0\u{a0}[25.0,\u{a0}50.0] | 100.0 | 50.0\u{a0}[25.0,\u{a0}50.0] |\n\
+         | `size-seen`: sees the size | 100.0 | 50.0\u{a0}[25.0,\u{a0}50.0] | 100.0 | 50.0\u{a0}[25.0,\u{a0}50.0] |\n\n\
          `softvt suites/all.lua --episodes 2 --policy NAME` for each controller: 2 episodes per row and suite; the brackets are the 95 % interval of Safety. No episode was invalid. All controllers \
          plan from ground-truth state (*privileged*).\n\n\
          |  | One: Goal % | Safety % |\n|---|---:|---:|\n\
-         | `expert` | 100.0 | 50.0 [25.0, 50.0] |\n| `binary` | 100.0 | 50.0 [25.0, 50.0] |\n"
+         | `expert` | 100.0 | 50.0\u{a0}[25.0,\u{a0}50.0] |\n| `binary` | 100.0 | 50.0\u{a0}[25.0,\u{a0}50.0] |\n"
     );
     assert!(
         tables::overview(&results, &labels, "abcd")
@@ -121,7 +121,7 @@ fn rows_and_columns_follow_the_runs() {
     );
     // Medians of D/τ 0.5 and 2, of grip ratios 1.5 and 2.5, and of times 4 and 6 s.
     let page = tables::page(&results, &labels, "abcd");
-    assert!(page.contains("| 50.0 [25.0, 50.0] | 1.25 | 2.00 | 5.0 | `abc` |"), "{page}");
+    assert!(page.contains("| 50.0\u{a0}[25.0,\u{a0}50.0] | 1.25 | 2.00 | 5.0 | `abc` |"), "{page}");
     let error = collected::add(root, &root.join("docs")).expect_err("no run");
     assert!(error.contains("no finished run"), "{error}");
 }

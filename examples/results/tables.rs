@@ -241,7 +241,7 @@ fn safety(cell: &Value) -> String {
 fn with_interval(rate: &Value) -> String {
     match rate["wilson95"].as_array().map(Vec::as_slice) {
         Some([low, high]) => {
-            format!("{} [{}, {}]", number(&rate["rate"], 1), number(low, 1), number(high, 1))
+            format!("{}\u{a0}[{},\u{a0}{}]", number(&rate["rate"], 1), number(low, 1), number(high, 1))
         }
         _ => number(&rate["rate"], 1),
     }
