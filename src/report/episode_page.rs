@@ -62,7 +62,7 @@ const SMALLEST_RATIO: f64 = 0.005;
 pub fn sentence(record: &EpisodeRecord, worst_time_s: f64) -> String {
     let verdict = &record.verdict;
     let d = match (verdict.d_peak, verdict.tau.filter(|tau| *tau > 0.0)) {
-        // What was not touched has no number.
+        // An object that was hardly touched is not described by its D.
         (Some(d), Some(tau)) if d < SMALLEST_RATIO * tau => String::new(),
         (Some(d), Some(tau)) => format!(": D {d:.2} % = {:.2} × limit at {worst_time_s:.2} s", d / tau),
         (Some(d), None) => format!(": D {d:.2} % at {worst_time_s:.2} s"),

@@ -102,7 +102,7 @@ fn material_of(material: &gltf::Material, images: &mut Images) -> Result<Importe
 /// The images of a file, each copied once.
 struct Images<'a> {
     blob: &'a [u8],
-    /// Those so far, by index.
+    /// Images copied before, by index.
     known: BTreeMap<usize, ImportedImage>,
 }
 

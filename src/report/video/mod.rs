@@ -209,10 +209,10 @@ pub fn write_video(
     }
     let shared = SharedSensors::new(&mut recording.sensors)?;
     let recording = &*recording;
-    let film = shared.lend(|sensors| Film::new(sensors, recording, caption))?;
+    let context = shared.lend(|sensors| VideoContext::new(sensors, recording, caption))?;
     let draw = |index: usize| {
         let moment = Moment::at(recording, index);
-        shared.lend(|sensors| film.frame(sensors, moment))
+        shared.lend(|sensors| context.frame(sensors, moment))
     };
     let frames = FrameList { size: [WIDTH, HEIGHT], count: recording.frames.len(), draw };
     frames.encode(path, threads, is_cancelled, on_frame)
@@ -289,20 +289,21 @@ pub fn write_decisive_frame(
     recording.sensors.render_scene()?;
     let mut sensors = recording.sensors.clone();
     let moment = Moment::decisive(recording, caption);
-    let frame = Film::new(&mut sensors, recording, caption)?.frame(&mut sensors, moment)?;
+    let frame = VideoContext::new(&mut sensors, recording, caption)?.frame(&mut sensors, moment)?;
     Ok(replace(path, encode_png(&frame)?)?)
 }
 
 /// Everything that all frames of a video share.
-struct Film<'a> {
+struct VideoContext<'a> {
     recording: &'a StateRecording,
     caption: &'a VideoCaption,
     curves: EpisodeCurves,
+    events: Vec<EventMark>,
     /// The images of the fingers in the settled state.
     fingers_at_rest: Vec<RgbImage>,
 }
 
-impl<'a> Film<'a> {
+impl<'a> VideoContext<'a> {
     fn new(
         sensors: &mut Sensors,
         recording: &'a StateRecording,
@@ -312,7 +313,7 @@ impl<'a> Film<'a> {
         let fingers_at_rest =
             sensors.tactile_readings(settled)?.into_iter().map(|reading| reading.image).collect();
         let curves = EpisodeCurves::new(recording, caption.tau_pct);
-        Ok(Self { recording, caption, curves, fingers_at_rest })
+        Ok(Self { recording, caption, curves, events: events(recording, caption), fingers_at_rest })
     }
 
     fn frame(&self, sensors: &mut Sensors, moment: Moment) -> Result<RgbImage, EpisodeVideoError> {
@@ -321,16 +322,15 @@ impl<'a> Film<'a> {
         self.draw_cameras(&mut canvas, sensors, frame)?;
         self.draw_fingers(&mut canvas, sensors, frame)?;
         let (x, y) = (WRIST_PANEL as f32 + MARGIN, (TOP_PANEL + FINGER_HEIGHT) as f32);
-        Badge::new(self.recording, self.caption, moment).draw(&mut canvas, x, y + 20.0, 16.0);
+        Badge::new(self.recording, self.caption, &self.curves, moment).draw(&mut canvas, x, y + 20.0, 16.0);
         if let Some((text, colour)) = moment.ratio(&self.curves) {
             canvas.write(&text, x, y + 92.0, 24.0, colour);
         }
         draw_caption(&mut canvas, self.caption, moment);
-        let events = events(self.recording, self.caption, moment.end_of_curves());
         let plots = Plots {
             episodes: std::slice::from_ref(&self.curves),
             names: &[],
-            events: &events,
+            events: &self.events,
             steps: self.recording.frames.len().saturating_sub(1),
             unit: PLOT_UNIT,
         };
@@ -409,21 +409,19 @@ fn first_over_limit(recording: &StateRecording, caption: &VideoCaption, index: u
     recording.worst_d_pct.iter().take(index + 1).position(|d| d.is_some_and(|d| d > tau))
 }
 
-/// When the object was grasped, released and dropped, of what happened up to the state `index`.
-fn events(recording: &StateRecording, caption: &VideoCaption, index: usize) -> Vec<EventMark> {
+/// When the object was grasped, released and dropped.
+fn events(recording: &StateRecording, caption: &VideoCaption) -> Vec<EventMark> {
     let is_held = |frame: &WorldSnapshot| (0..2).all(|side| pad_force(frame, side) > 0.0);
     let held = recording.frames.iter().position(is_held);
     let released = recording.frames.iter().rposition(is_held).map(|last| last + 1);
     let is_kept = released == Some(recording.frames.len());
     let time = |state: usize| state as f64 * CONTROL_DT;
-    let now_s = time(index);
     let all = [
         ("grasp", held.map(time)),
         ("release", released.filter(|_| !is_kept && caption.drop_s.is_none()).map(time)),
         ("drop", caption.drop_s),
     ];
-    let known = all.into_iter().filter_map(|(name, time_s)| Some(EventMark { name, time_s: time_s? }));
-    known.filter(|event| event.time_s <= now_s).collect()
+    all.into_iter().filter_map(|(name, time_s)| Some(EventMark { name, time_s: time_s? })).collect()
 }
 
 /// A verdict in words, and the colour of its ground.
@@ -434,7 +432,12 @@ struct Badge {
 
 impl Badge {
     /// The verdict so far, or the final one.
-    fn new(recording: &StateRecording, caption: &VideoCaption, moment: Moment) -> Self {
+    fn new(
+        recording: &StateRecording,
+        caption: &VideoCaption,
+        curves: &EpisodeCurves,
+        moment: Moment,
+    ) -> Self {
         if moment.is_final {
             let colour = match caption.category {
                 _ if caption.is_crushed => HARM,
@@ -446,7 +449,7 @@ impl Badge {
             return Self { text: caption.verdict.clone(), colour };
         }
         let now_s = moment.state as f64 * CONTROL_DT;
-        let is_crushed = caption.is_crushed && moment.state >= worst_state(recording);
+        let is_crushed = caption.is_crushed && moment.state >= curves.worst_state;
         let over = first_over_limit(recording, caption, moment.state).map(|at| match is_crushed {
             true => "crushed".to_owned(),
             false => format!("over the limit at {:.2} s", at as f64 * CONTROL_DT),

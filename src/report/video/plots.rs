@@ -1,7 +1,7 @@
 //! Plots against time below the pictures of a video: D over its limit, and the force on the pads, with a curve per
 //! episode.
 
-use super::{BACKGROUND, FAINT, HARM, SAFE, TEXT, pad_force};
+use super::{BACKGROUND, FAINT, HARM, SAFE, TEXT, pad_force, worst_state};
 use crate::d_axis::{D_TICKS, d_share};
 use softvt_benchmark::CONTROL_DT;
 use softvt_common::text::shortened;
@@ -43,6 +43,8 @@ pub(super) struct EpisodeCurves {
     pub(super) d_over_tau: Vec<f64>,
     /// The larger normal force of the two pads, N.
     pub(super) pad_force_n: Vec<f64>,
+    /// Index of the [worst state](worst_state).
+    pub(super) worst_state: usize,
     is_rigid: bool,
 }
 
@@ -54,6 +56,7 @@ impl EpisodeCurves {
         Self {
             d_over_tau: ratios.collect::<Option<_>>().unwrap_or_default(),
             pad_force_n: forces.collect(),
+            worst_state: worst_state(recording),
             is_rigid: recording.worst_d_pct.contains(&None),
         }
     }
@@ -80,7 +83,7 @@ pub(super) struct Plots<'a> {
     pub(super) episodes: &'a [EpisodeCurves],
     /// Names of the episodes, shown if there are several.
     pub(super) names: &'a [&'a str],
-    /// Events up to now.
+    /// Events, of which those up to the last state of the curves are shown.
     pub(super) events: &'a [EventMark],
     /// Control steps of the time axis.
     pub(super) steps: usize,
@@ -139,7 +142,8 @@ impl Plots<'_> {
             area.tick(canvas, d_share(tick), &label, if tick == 1.0 { HARM } else { FAINT });
         }
         canvas.line(&[[area.left, limit], [area.right, limit]], area.px(1.2), 0.0, HARM);
-        for EventMark { name, time_s } in self.events {
+        let now_s = index as f64 * CONTROL_DT;
+        for EventMark { name, time_s } in self.events.iter().filter(|event| event.time_s <= now_s) {
             let [x, _] = area.point((time_s / CONTROL_DT).round() as usize, 0.0);
             canvas.line(&[[x, area.top], [x, area.bottom]], area.px(0.8), area.px(2.0), FAINT);
             let width = canvas.text_width(name, area.px(TICK_SIZE));

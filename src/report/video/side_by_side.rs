@@ -237,7 +237,12 @@ impl<'a> FrameContext<'a> {
         let left = column as u32 * edge;
         let (x, px) = (left as f32 + layout.px(10.0), |units| layout.px(units));
         canvas.write(&shortened(policy, 34), x, px(20.0), px(NAME_SIZE), TEXT);
-        Badge::new(recording, caption, moment).draw(canvas, x, px(28.0), px(BADGE_SIZE));
+        Badge::new(recording, caption, &self.curves[column], moment).draw(
+            canvas,
+            x,
+            px(28.0),
+            px(BADGE_SIZE),
+        );
         let settled = recording.frames.first().ok_or(EpisodeVideoError::Empty)?;
         let seen = CloseUp { edge: CLOSE_UP_EDGE.min(edge as usize), settled };
         let close_up =
