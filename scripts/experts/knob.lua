@@ -153,7 +153,9 @@ end
 return function(spec)
   softvt.check_fields("knob", spec, FIELDS)
   local full = { joint = spec.joint, angle = spec.angle, speed = spec.speed or SPEED }
-  if full.speed <= 0 then error(("knob: speed: expected rad/s above 0, got %g"):format(full.speed), 2) end
+  if full.speed <= 0 or full.speed > 2.5 then
+    error(("knob: speed: expected rad/s in 0..2.5, above 0, got %g"):format(full.speed), 2)
+  end
   return function(arm, scene)
     local home = arm.target.position
     posture.down(arm, home)

@@ -40,6 +40,8 @@ local SUPPORT = 0.5
 local MIN_LIFT_FRACTION = 0.5
 -- Grasp attempts, and the largest displacement of the object before an attempt, m.
 local ATTEMPTS, MAX_DISPLACEMENT = 3, 0.08
+-- Largest factor of the usual speeds, with which the fastest motion is within the limits of the arm.
+local MAX_PACE = 3
 -- Random variation of the speed (relative), so that demonstrations differ.
 local SPEED_SPREAD = 0.12
 
@@ -219,6 +221,10 @@ local function complete(spec)
   full.closing_speed, full.share = spec.closing_speed or CLOSING_SPEED, spec.share or MIDDLE
   local function refuse(key, expected)
     error(("pick_place: %s: expected %s, got %s"):format(key, expected, tostring(full[key])), 4)
+  end
+  if full.closure and (full.closure < 0 or full.closure > 1) then refuse("closure", "a closure in 0..1") end
+  if full.speed and (full.speed <= 0 or full.speed > MAX_PACE) then
+    refuse("speed", ("a factor of the usual speeds in 0..%g, above 0"):format(MAX_PACE))
   end
   if full.window < 0 or full.window > 1 then refuse("window", "a share in 0..1") end
   local room = 0.5 * full.window

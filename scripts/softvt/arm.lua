@@ -156,6 +156,9 @@ function Arm:grasp(closure, options)
       )
     )
   end
+  if options.width and options.force then
+    check.refuse("arm:grasp: closing stops at options.width or at options.force; give one of them")
+  end
   if fingers.servo then return feel(self) end
   if options.width or options.force then return close_until(self, closure, options) end
   self:close_to(closure, options)

@@ -2,6 +2,7 @@
 #![warn(missing_docs, unreachable_pub)]
 
 pub mod goal;
+pub mod goal_conflict;
 pub mod run_changes;
 pub mod seed;
 pub mod settings;

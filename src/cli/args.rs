@@ -5,6 +5,7 @@
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
+    str::FromStr,
     sync::Arc,
     time::Duration,
 };
@@ -63,7 +64,7 @@ pub(crate) struct RunFlags {
     #[arg(long = "task", value_name = "TASK", value_delimiter = ',')]
     pub tasks: Vec<String>,
     /// Episodes per task [default: set by the suite]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = parse_count::<u32>)]
     pub episodes: Option<u32>,
     /// Run only these episodes of each task, counted from 0, separated by commas
     #[arg(long = "episode", value_name = "K", value_delimiter = ',', conflicts_with_all = ["episodes", "shard"])]
@@ -92,7 +93,7 @@ pub(crate) struct RunFlags {
     /// Condition on each suite, such as "safety>=0.9"; exit code 99 if it does not hold
     #[arg(long = "require", value_name = "CONDITION")]
     pub requirements: Vec<Requirement>,
-    /// Print all tasks and figures, not only tasks that failed
+    /// Print all tasks and figures, not only tasks that failed; of an experiment all rows, not only up to 40
     #[arg(long, conflicts_with = "json")]
     pub details: bool,
     /// Print JSON; an array for a list of suites, a line per row for an experiment
@@ -208,7 +209,7 @@ pub(crate) struct ConnectionArgs {
     #[arg(long, value_name = "PROTOCOL")]
     protocol: Option<ServerProtocol>,
     /// Actions executed from each predicted chunk [default: 10 for servers]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = parse_count::<u16>)]
     replan: Option<u16>,
     /// Timeout in seconds, for connecting and for each reply [default: 60]
     #[arg(long, value_name = "SECONDS", value_parser = parse_timeout)]
@@ -381,6 +382,12 @@ pub(crate) fn parse_folder(word: &str) -> Result<PathBuf, String> {
         return Err("expected a folder; \".\" is the working folder".to_owned());
     }
     Ok(word.into())
+}
+
+/// Parses a count of 1 or more.
+pub(crate) fn parse_count<T: FromStr + From<u8> + PartialOrd>(word: &str) -> Result<T, String> {
+    let count = word.parse().ok().filter(|count| *count >= T::from(1));
+    count.ok_or_else(|| "expected a whole number of 1 or more".to_owned())
 }
 
 fn parse_seed(word: &str) -> Result<u64, String> {

@@ -71,7 +71,7 @@ struct Effect {
 
 /// Every flag of the [`COMMANDS`].
 static EFFECTS: [Effect; 3] = [
-    Effect { flags: &["seed", "settings", "threads", "out", "resume", "json"], acts_on: ALL },
+    Effect { flags: &["seed", "settings", "threads", "out", "resume", "json", "details"], acts_on: ALL },
     Effect {
         flags: &[
             "shifts",
@@ -92,7 +92,6 @@ static EFFECTS: [Effect; 3] = [
             "trace",
             "video",
             "mcap",
-            "details",
         ],
         acts_on: EPISODES,
     },
@@ -168,7 +167,6 @@ mod tests {
         ("mcap", "--mcap"),
         ("shard", "--shard 1/2"),
         ("requirements", "--require safety>=0"),
-        ("details", "--details"),
     ];
 
     const PLANS: [(PlanKind, &str); 2] = [

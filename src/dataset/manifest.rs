@@ -99,6 +99,15 @@ pub fn write(root: &Path, entries: &[ManifestEntry]) -> Result<(), DatasetError>
 /// The file cannot be read, or a line is not an entry.
 pub fn read(root: &Path) -> Result<Vec<ManifestEntry>, DatasetError> {
     let path = root.join(MANIFEST);
+    if !path.exists() {
+        let what = match root.join("meta/info.json").is_file() {
+            true => {
+                "it is missing; the folder is a LeRobot dataset: give the recording that it was exported from"
+            }
+            false => "it is missing; expected the folder of a finished recording",
+        };
+        return Err(DatasetError::content(root, MANIFEST, what));
+    }
     let text = files::read_text(&path)?;
     let parse = |(i, line): (usize, &str)| {
         serde_json::from_str(line)

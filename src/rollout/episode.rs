@@ -6,9 +6,9 @@ use image::RgbImage;
 
 use super::{
     asset_cache::AssetCache,
-    build_error::SceneBuildError,
     controller::Controller,
     disturbance::Disturbance,
+    episode_error::EpisodeError,
     evidence::EvidenceCollector,
     goal_in_scene::{GoalInScene, StatePredicate},
     observation_history::ObservationHistory,
@@ -16,27 +16,27 @@ use super::{
     sensor_assets::{SensingError, SensorAssets},
     sensor_noise::SensorSeed,
     sensors::{Sensors, StateRecording, check_sensors},
-    simulation::{SettleError, Simulation, placed_at, state_hash},
+    simulation::{Simulation, placed_at, state_hash},
     trace::StepTrace,
 };
 use sha2::{Digest, Sha256};
 use softvt_common::cancel;
 
 use softvt_benchmark::{
-    Goal, Task,
+    Task,
     seed::{EpisodeSeed, SecretSeed},
     settings::Settings,
     steps_per_control,
 };
 use softvt_common::episode_id::EpisodeId;
-use softvt_common::text::{format_number, hex};
+use softvt_common::text::hex;
 use softvt_evaluation::{
     deformation::ReferenceShape,
     judge::{ControlStepScore, Judge, JudgeConfig},
     safety::DeformationLimit,
     verdict::{InvalidReason, Outcome, Verdict},
 };
-use softvt_geometry::{Pose, Vec3};
+use softvt_geometry::Pose;
 use softvt_physics::{
     BodyId,
     world::{StepFailure, WorldSnapshot},
@@ -147,130 +147,6 @@ pub struct FinishedEpisode {
     pub reference: Option<ReferenceShape>,
     /// States of the episode, if requested.
     pub recording: Option<StateRecording>,
-}
-
-/// An episode cannot be run: an error in the user's input, or a failure of the controller.
-#[derive(Debug, thiserror::Error)]
-pub enum EpisodeError {
-    /// The scene cannot be built.
-    #[error(transparent)]
-    Build(#[from] SceneBuildError),
-    /// The scene does not come to rest.
-    #[error("layout {layout}, episode {episode}: {source}")]
-    Settle {
-        /// Layout name.
-        layout: String,
-        /// Episode index.
-        episode: u32,
-        /// The cause.
-        source: SettleError,
-    },
-    /// The goal names an object that is not in the scene.
-    #[error("task {task}: goal.{role} names {name:?}, but layout {layout} places {have}")]
-    NoObject {
-        /// Task index.
-        task: usize,
-        /// "object", "target" or "joint".
-        role: &'static str,
-        /// Name in the goal.
-        name: String,
-        /// Layout name.
-        layout: String,
-        /// Names in the scene.
-        have: String,
-    },
-    /// The goal is inside an object that holds nothing.
-    #[error(
-        "task {task}: goal.target {target} has no cavity, and softvt.inside needs one: a floor and walls all around, \
-         upright as the asset is declared; use softvt.on, or a container"
-    )]
-    NoCavity {
-        /// Task index.
-        task: usize,
-        /// Name in the goal.
-        target: String,
-        /// `file:line` where the object was placed; empty if no script placed it.
-        placed_at: String,
-    },
-    /// The goal is about the joint of an object that has none.
-    #[error(
-        "task {task}: goal.joint names {name:?}, which has no joint; name a part of a softvt.articulated, as \
-         cabinet.top_drawer"
-    )]
-    NoJoint {
-        /// Task index.
-        task: usize,
-        /// Name in the goal.
-        name: String,
-        /// `file:line` where the object was placed; empty if no script placed it.
-        placed_at: String,
-    },
-    /// Nothing has to carry the object of the goal.
-    #[error(
-        "task {task}: scene.gravity = {{ {}, {}, {} }} does not point down, and a goal judges what carries {object}; give it \
-         a z below 0",
-        format_number(.gravity.x), format_number(.gravity.y), format_number(.gravity.z)
-    )]
-    Gravity {
-        /// Task index.
-        task: usize,
-        /// Object of the goal.
-        object: String,
-        /// Gravity of the scene, m/s².
-        gravity: Vec3,
-        /// `file:line` where the object was placed; empty if no script placed it.
-        placed_at: String,
-    },
-    /// The goal holds before the robot moves.
-    #[error(
-        "task {task}, episode {episode}: the goal already holds at the start, before the robot moves: {}; change the layout or \
-         the goal",
-        .goal.describe()
-    )]
-    GoalHolds {
-        /// Task index.
-        task: usize,
-        /// Episode index.
-        episode: u32,
-        /// The goal.
-        goal: Goal,
-        /// `file:line` where its object was placed; empty if no script placed it.
-        placed_at: String,
-    },
-    /// Data of a sensor cannot be computed.
-    #[error("task {task}, episode {episode}: {source}")]
-    Sense {
-        /// Task index.
-        task: usize,
-        /// Episode index.
-        episode: u32,
-        /// The cause.
-        source: SensingError,
-    },
-    /// The controller or its connection failed.
-    #[error("task {task}, episode {episode}: {source}")]
-    Control {
-        /// Task index.
-        task: usize,
-        /// Episode index.
-        episode: u32,
-        /// The cause.
-        source: PolicyError,
-    },
-}
-
-impl EpisodeError {
-    /// `file:line` of the error, if it is known and the message does not contain it.
-    pub fn place(&self) -> Option<&str> {
-        match self {
-            Self::Settle { source, .. } => source.place(),
-            Self::NoCavity { placed_at, .. }
-            | Self::NoJoint { placed_at, .. }
-            | Self::Gravity { placed_at, .. }
-            | Self::GoalHolds { placed_at, .. } => Some(placed_at.as_str()).filter(|place| !place.is_empty()),
-            _ => None,
-        }
-    }
 }
 
 /// An episode in progress.
@@ -847,6 +723,7 @@ fn settled_judge(spec: &EpisodeSpec, sim: &Simulation, evidence: &EvidenceCollec
 #[cfg(test)]
 mod tests {
     use super::*;
+    use softvt_geometry::Vec3;
     use softvt_robot::GripTarget;
 
     #[test]

@@ -4,7 +4,7 @@ use std::{fmt::Debug, sync::Arc};
 
 use super::{
     asset_cache::AssetCache,
-    episode::EpisodeError,
+    episode_error::EpisodeError,
     evidence::foot_pose,
     simulation::{ObjectInstance, Simulation, placed_at},
 };
@@ -232,7 +232,10 @@ impl Finder<'_> {
             Goal::Closed { joint, share } => {
                 (0.0, self.joint(joint, |[low, high]| [low, low + share * (high - low)])?)
             }
-            Goal::Turned { joint, range } => (0.0, self.joint(joint, |_| *range)?),
+            Goal::Turned { joint, range } => {
+                self.check_range(joint, *range)?;
+                (0.0, self.joint(joint, |_| *range)?)
+            }
             Goal::Predicate { .. } => {
                 let before = |p: &&PredicateInScene| matches!(p.subject, Subject::Function(_));
                 (0.0, Subject::Function(self.found.predicates.iter().filter(before).count()))
@@ -256,17 +259,33 @@ impl Finder<'_> {
         Ok(Subject::Rests { target, on, region })
     }
 
-    /// A joint within what `range` makes of its limits, a rounding error beyond them included.
-    fn joint(&self, name: &str, range: impl Fn([f64; 2]) -> [f64; 2]) -> Result<Subject, EpisodeError> {
-        const ROUNDING: f64 = 1e-4;
+    /// The part of a name and the limits of its joint.
+    fn part(&self, name: &str) -> Result<(usize, [f64; 2]), EpisodeError> {
         let part = self.index_of("joint", name)?;
         let joint = self.sim.objects[part].part.as_ref().map(|part| &part.joint);
         let joint = joint.filter(|_| matches!(self.sim.objects[part].body, BodyId::Link(_)));
-        let Some(joint) = joint else {
+        let limits = joint.map(|joint| [joint.lower, joint.upper]).ok_or_else(|| {
             let placed_at = placed_at(&self.sim.scene, name);
-            return Err(EpisodeError::NoJoint { task: self.task.id, name: name.to_owned(), placed_at });
-        };
-        let [low, high] = range([joint.lower, joint.upper]);
+            EpisodeError::NoJoint { task: self.task.id, name: name.to_owned(), placed_at }
+        })?;
+        Ok((part, limits))
+    }
+
+    /// Checks that a joint can be within a range.
+    fn check_range(&self, name: &str, [low, high]: [f64; 2]) -> Result<(), EpisodeError> {
+        let (_, [lower, upper]) = self.part(name)?;
+        if low <= upper && high >= lower {
+            return Ok(());
+        }
+        let placed_at = placed_at(&self.sim.scene, name);
+        Err(EpisodeError::JointRange { task: self.task.id, name: name.to_owned(), lower, upper, placed_at })
+    }
+
+    /// A joint within what `range` makes of its limits, a rounding error beyond them included.
+    fn joint(&self, name: &str, range: impl Fn([f64; 2]) -> [f64; 2]) -> Result<Subject, EpisodeError> {
+        const ROUNDING: f64 = 1e-4;
+        let (part, limits) = self.part(name)?;
+        let [low, high] = range(limits);
         Ok(Subject::Joint { part, range: [low - ROUNDING, high + ROUNDING] })
     }
 }

@@ -1,7 +1,10 @@
 //! `softvt.conditions`: every suite as it is (the reference) and under each condition, one run folder each, and their
 //! comparison.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use serde_json::{Value, json};
 
@@ -13,7 +16,7 @@ use crate::{
     selection::{check_episodes, path_component, select_episodes, select_tasks},
     suite_run::{PreparedRun, SuiteRun},
 };
-use softvt_benchmark::{Condition, ObjectType, Plan, REFERENCE, Suite, Task};
+use softvt_benchmark::{Condition, ObjectType, Plan, REFERENCE, Suite, Task, settings::Settings};
 use softvt_common::{files::replace, text};
 use softvt_records::summary::method_label;
 use softvt_report::{
@@ -34,6 +37,8 @@ struct ConditionCase {
     config: RunConfig,
     /// The reason for which the condition does not apply to the suite.
     not_applicable: Option<String>,
+    /// True if the condition applies, but sets what the suite has without it.
+    is_neutral: bool,
 }
 
 /// Runs every suite of a script as it is and under each of its conditions, into folders below `out`. All scenes and
@@ -51,10 +56,7 @@ pub fn run<E: From<RunError>>(
     let ConfiguredScript { config, script: loaded } = run;
     let (suites, conditions) = conditions_of(run)?;
     check_episodes(config, suites)?;
-    let cases: Vec<Vec<ConditionCase>> = suites
-        .iter()
-        .map(|suite| condition_cases(config, suite, conditions, suites.len() > 1))
-        .collect::<Result<_, _>>()?;
+    let cases = cases_of_suites(config, suites, conditions)?;
     let mut prepared = Vec::new();
     for (suite, cases) in suites.iter().zip(&cases) {
         prepared.push(prepare_runs(loaded, suite, cases, &select_tasks(config, suite)?, out)?);
@@ -86,12 +88,35 @@ fn conditions_of(
 pub fn check(run: &ConfiguredScript) -> Result<(), RunError> {
     let ConfiguredScript { config, script: loaded } = run;
     let (suites, conditions) = conditions_of(run)?;
-    for suite in suites {
+    for (suite, cases) in suites.iter().zip(cases_of_suites(config, suites, conditions)?) {
         let first: Vec<&Task> = suite.tasks.iter().take(1).collect();
-        let cases = condition_cases(config, suite, conditions, false)?;
         prepare_runs(loaded, suite, &cases, &first, Path::new(""))?;
     }
     Ok(())
+}
+
+/// The cases of each suite.
+///
+/// # Errors
+/// A condition that does not fit a suite, or that changes none.
+fn cases_of_suites(
+    config: &RunConfig,
+    suites: &[Suite],
+    conditions: &[Condition],
+) -> Result<Vec<Vec<ConditionCase>>, RunError> {
+    let cases_of = |suite| condition_cases(config, suite, conditions, suites.len() > 1);
+    let cases: Vec<Vec<ConditionCase>> = suites.iter().map(cases_of).collect::<Result<_, _>>()?;
+    // The reference is the first.
+    for (at, condition) in (1..).zip(conditions) {
+        if cases.iter().all(|cases| cases[at].is_neutral) {
+            return Err(config.error(format!(
+                "the condition {:?} sets what {} without it; leave it out, or give other values",
+                condition.name,
+                if suites.len() == 1 { "the suite has" } else { "the suites have" }
+            )));
+        }
+    }
+    Ok(cases)
 }
 
 /// The reference and all conditions of a suite, in folders below one of the suite if there are several suites.
@@ -142,7 +167,7 @@ fn condition_cases(
         if condition.rigid_twin {
             changed.rigid_twin = true;
         }
-        let not_applicable = not_applicable(condition, object_type);
+        let mut not_applicable = not_applicable(condition, object_type);
         // Settings of the command line are checked with the reference.
         if not_applicable.is_none() && suite.settings.with_all(&config.settings).is_ok() {
             suite.settings.with_all(&changed.settings).map_err(|error| {
@@ -150,9 +175,38 @@ fn condition_cases(
                 config.error(format!("set: {error}")).within(&place)
             })?;
         }
-        cases.push(ConditionCase { condition: condition.clone(), folder, config: changed, not_applicable });
+        let is_neutral = condition.name != REFERENCE
+            && not_applicable.is_none()
+            && Effect::of(config, suite).is_some_and(|own| Effect::of(&changed, suite) == Some(own));
+        if is_neutral {
+            not_applicable = Some("the suite has the same values without it".to_owned());
+        }
+        let condition = condition.clone();
+        cases.push(ConditionCase { condition, folder, config: changed, not_applicable, is_neutral });
     }
     Ok(cases)
+}
+
+/// What the changes of a configuration make of a suite.
+#[derive(PartialEq)]
+struct Effect<'a> {
+    /// The shifts that differ from their defaults; of one that is given twice, the last value.
+    shifts: BTreeMap<&'a str, f64>,
+    settings: Settings,
+    policy: &'a str,
+    rigid_twin: bool,
+}
+
+impl<'a> Effect<'a> {
+    /// `None` if a setting is not valid.
+    fn of(config: &'a RunConfig, suite: &Suite) -> Option<Self> {
+        let default_of = |name: &str| suite.shifts.iter().find(|s| s.name == name).map(|s| s.default);
+        let mut shifts: BTreeMap<&str, f64> =
+            config.shifts.iter().map(|shift| (shift.name.as_str(), shift.value)).collect();
+        shifts.retain(|name, value| default_of(name) != Some(*value));
+        let settings = suite.settings.with_all(&config.settings).ok()?;
+        Some(Self { shifts, settings, policy: &config.policy.name, rigid_twin: config.rigid_twin })
+    }
 }
 
 fn not_applicable(condition: &Condition, object_type: ObjectType) -> Option<String> {

@@ -102,6 +102,11 @@ fn invalid_conditions_are_reported_before_anything_runs() {
             "{ name = \"a\" }",
             "the condition \"a\" changes nothing; give it shifts, set, policy or rigid_twin",
         ),
+        (
+            "{ name = \"a\", shift = { mass = 1 }, set = { [\"robot.latency\"] = 0 } }",
+            "the condition \"a\" sets what the suite has without it; leave it out, or give other values",
+        ),
+        ("{ name = \"a\", policy = \"noop\" }", "the condition \"a\" sets what the suite has without it"),
         ("{ name = \"a\", mass = 2 }", "unknown key \"mass\""),
     ] {
         let message = refused(conditions);

@@ -112,7 +112,7 @@ fn own_demonstrations_end_in_the_same_states() {
     let origin = entries("again")[1].origin.clone().expect("an origin");
     assert_eq!((origin.demo.as_str(), origin.format.as_str()), ("demo_1", "softvt"));
     assert!(project.text("again/README.md").contains(&origin.sha256));
-    let checked = check::folder(&project.path("again")).expect("a dataset");
+    let checked = check::folder(&project.path("again"), check::CheckScope::Whole).expect("a dataset");
     assert_eq!((checked.demos, checked.problems), (2, Vec::new()));
     assert!(is_reproduced(&project.path("again")));
     assert!(project.is_reproduced("again/attempts/one", "0/1"));
@@ -143,7 +143,12 @@ fn objects_start_where_the_file_has_them() {
     for attempt in 0..3 {
         assert!(project.is_reproduced("made/attempts/one", &format!("0/{attempt}")), "{attempt}");
     }
-    assert!(check::folder(&project.path("made")).expect("a dataset").problems.is_empty());
+    assert!(
+        check::folder(&project.path("made"), check::CheckScope::Whole)
+            .expect("a dataset")
+            .problems
+            .is_empty()
+    );
     assert!(is_reproduced(&project.path("made")));
     let laid_out = ImportOptions { ignore_recorded_poses: true, ..ImportOptions::default() };
     import(&run, &["inside.hdf5"], "kept", laid_out).expect("the layout has it elsewhere");

@@ -132,7 +132,7 @@ fn depth_is_recorded_as_policies_observe_it() {
     let a = project.path("a");
     assert_eq!(DatasetCard::read(&a).expect("a card").streams, recording.options.streams);
     assert!(project.text("a/README.md").contains("| further streams | depth, joint-torques |"));
-    let checked = check::folder(&a).expect("a dataset");
+    let checked = check::folder(&a, check::CheckScope::Whole).expect("a dataset");
     assert_eq!(checked.problems, [""; 0]);
     let file = TaskFile::open(&project.path("a/hdf5/one_task0_demo.hdf5")).expect("a file");
     let steps = file.steps(0).expect("steps");
@@ -163,7 +163,7 @@ fn datasets_are_checked_and_reproduced() {
     recording.record();
     let a = project.path("a");
     assert_eq!(DatasetCard::read(&a).expect("a card").gripper, Some(GripCode::TwoWidth));
-    let checked = check::folder(&a).expect("a dataset");
+    let checked = check::folder(&a, check::CheckScope::Whole).expect("a dataset");
     assert_eq!((checked.demos, checked.videos, checked.problems), (2, 8, Vec::new()));
     let demos = demos_of(&a).expect("demonstrations");
     assert_eq!(demos.len(), 2);
@@ -178,7 +178,7 @@ fn datasets_are_checked_and_reproduced() {
     project.write("a/videos/one_task0/demo_0_eye_in_hand_rgb.mp4", b"not a video");
     let whole = fs::read(&hdf5).expect("read");
     fs::write(&hdf5, &whole[..whole.len() / 2]).expect("written");
-    let problems = check::folder(&a).expect("a dataset").problems;
+    let problems = check::folder(&a, check::CheckScope::Whole).expect("a dataset").problems;
     assert_eq!(problems.len(), 2, "{problems:?}");
     for words in ["demo_0_eye_in_hand_rgb.mp4: eye_in_hand_rgb: not an MP4 file", "one_task0_demo.hdf5"] {
         assert!(problems.iter().any(|problem| problem.contains(words)), "{problems:?}");

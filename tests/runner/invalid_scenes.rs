@@ -106,7 +106,7 @@ fn mistakes_of_a_layout_are_reported_at_its_own_line() {
     let unknown = Small { at: "at = plac(0)", ..Small::default() };
     let text = format!("local function place(x) return {{ x, 0 }} end {}", unknown.text());
     let message = check(&Project::new(&[("x.lua", &text)]));
-    assert_snapshot!(message, @r#"x.lua:6: attempt to call a nil value (global 'plac'); did you mean "place"?"#);
+    assert_snapshot!(message, @r#"x.lua:6: the variable "plac" is not defined; did you mean "place"?"#);
 }
 
 #[test]

@@ -49,7 +49,7 @@ fn an_episode_recorded_in_joint_positions_is_repeated_by_them() {
     let recorded = file.actions(0).expect("actions");
     assert!(recorded.iter().zip(&joints).all(|(action, joints)| action.joints == Some(*joints)));
     assert_eq!(file.record(0).expect("a record").stats.far_commands, 0);
-    assert_eq!(check::folder(&data).expect("a dataset").problems, [""; 0]);
+    assert_eq!(check::folder(&data, check::CheckScope::Whole).expect("a dataset").problems, [""; 0]);
     assert!(is_reproduced(&data));
 }
 

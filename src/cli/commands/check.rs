@@ -1,9 +1,9 @@
 //! `softvt check`: validation of a script without running its plan.
 
-use clap::{Args, value_parser};
+use clap::Args;
 
 use crate::{
-    args::{PolicyArgs, Request, ScriptArgs},
+    args::{PolicyArgs, Request, ScriptArgs, parse_count},
     error::CliError,
     output::{eprint_notice, print},
 };
@@ -22,7 +22,7 @@ pub(crate) struct CheckArgs {
     #[command(flatten)]
     policy: PolicyArgs,
     /// Episodes per task whose scenes are checked
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = parse_count::<u32>)]
     episodes: u32,
 }
 

@@ -82,6 +82,16 @@ pub(super) fn report(args: &ReportArgs) -> Result<(), CliError> {
 /// # Errors
 /// A folder without a run or with two of one suite, or no common episode.
 pub(super) fn compare(args: &CompareArgs) -> Result<(), CliError> {
+    for (at, run) in args.runs.iter().enumerate() {
+        let folder = |path: &PathBuf| path.canonicalize().ok();
+        if let Some(same) =
+            args.runs[..at].iter().find(|other| folder(other).is_some_and(|f| folder(run) == Some(f)))
+        {
+            let message =
+                format!("{} and {} are the same folder; give different runs", same.display(), run.display());
+            return Err(CliError::input(message));
+        }
+    }
     let folders = args.runs.iter().map(|dir| stored_run::load(dir)).collect::<Result<Vec<_>, _>>()?;
     if let [first, second] = &folders[..] {
         let compared = comparison::compare(first, second)?;

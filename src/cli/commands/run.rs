@@ -54,7 +54,8 @@ pub(crate) struct RunArgs {
 /// The script, a flag, the folder or the policy is not valid, or an episode fails.
 pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
     let (json, requirements) = (args.flags.json, args.flags.requirements.clone());
-    let format = terminal_format(args.flags.details);
+    let details = args.flags.details;
+    let format = terminal_format(details);
     let request = Request::new(args.script)?.with(|config| args.flags.apply(config));
     let run = request.load_plan(plan_flags::RUN, &args.policy)?;
     let ConfiguredScript { config, script: loaded } = &run;
@@ -93,7 +94,8 @@ pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
         }
         Plan::Experiment { columns, .. } => experiment::run(&run, |output| -> Result<(), CliError> {
             match output {
-                ExperimentOutput::Rows(rows) => print_rows(rows, columns, json),
+                ExperimentOutput::Rows(rows) if json => print_json_lines(rows),
+                ExperimentOutput::Rows(rows) => print_rows(rows, columns, details),
                 ExperimentOutput::Text(_) if json => Ok(()),
                 ExperimentOutput::Text(text) => print(&format!("{text}\n")),
             }
@@ -150,13 +152,25 @@ fn check_requirements(requirements: &[Requirement], summaries: &[SuiteSummary]) 
     if unmet.is_empty() { Ok(()) } else { Err(CliError::new(Exit::RequirementNotMet, unmet.join("\n"))) }
 }
 
-/// Prints rows as JSON lines or as a table.
+/// Prints rows as JSON lines.
 ///
 /// # Errors
 /// As [`print`].
-fn print_rows(rows: &[ExperimentRow], columns: &[String], json: bool) -> Result<(), CliError> {
-    match json {
-        true => rows.iter().try_for_each(|row| print(&format!("{}\n", serde_json::json!(row)))),
-        false => print(&experiment::table(rows, columns)),
+fn print_json_lines(rows: &[ExperimentRow]) -> Result<(), CliError> {
+    rows.iter().try_for_each(|row| print(&format!("{}\n", serde_json::json!(row))))
+}
+
+/// Largest number of rows that are printed without `--details`.
+const SHORT_TABLE: usize = 40;
+
+/// Prints rows as a table, unless it is long and the details are not asked for.
+///
+/// # Errors
+/// As [`print`].
+fn print_rows(rows: &[ExperimentRow], columns: &[String], details: bool) -> Result<(), CliError> {
+    if rows.len() > SHORT_TABLE && !details {
+        eprint_notice(format!("{} rows: --details prints them, --out DIR writes them", rows.len()));
+        return Ok(());
     }
+    print(&experiment::table(rows, columns))
 }

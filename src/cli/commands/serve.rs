@@ -12,7 +12,7 @@ use clap::{Args, value_parser};
 
 use crate::{
     QUIET_INTERRUPT,
-    args::{ProfileArgs, Request, ScriptArgs, parse_folder},
+    args::{ProfileArgs, Request, ScriptArgs, parse_count, parse_folder},
     error::{CliError, Exit},
     output::{eprint_notice, print, print_table, terminal_format},
 };
@@ -67,7 +67,7 @@ pub(crate) struct ServeArgs {
     #[arg(long, requires = "out")]
     resume: bool,
     /// Episodes per task of the run in --out [default: set by the suite]
-    #[arg(long, value_name = "N", requires = "out", value_parser = value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", requires = "out", value_parser = parse_count::<u32>)]
     episodes: Option<u32>,
     /// Record only the I-th of N parts of the run; softvt merge combines them
     #[arg(long, value_name = "I/N", requires = "out")]

@@ -5,11 +5,11 @@ use std::{
     sync::{Arc, atomic::Ordering},
 };
 
-use clap::{Args, value_parser};
+use clap::Args;
 
 use crate::{
     QUIET_INTERRUPT,
-    args::{PolicyArgs, Request, ScriptArgs, load_one_run, parse_folder, select_one_task},
+    args::{PolicyArgs, Request, ScriptArgs, load_one_run, parse_count, parse_folder, select_one_task},
     error::{CliError, flag_of},
     output::{Console, print},
 };
@@ -45,7 +45,7 @@ pub(crate) struct WatchArgs {
     #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     out: Option<PathBuf>,
     /// Episodes per task of the run in --out [default: set by the suite]
-    #[arg(long, value_name = "N", requires = "out", value_parser = value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", requires = "out", value_parser = parse_count::<u32>)]
     episodes: Option<u32>,
 }
 
@@ -54,7 +54,12 @@ pub(crate) struct WatchArgs {
 /// # Errors
 /// The script or the run is not valid, the task does not exist, or the port is in use; in the end, the interrupt.
 pub(super) fn run(args: WatchArgs) -> Result<(), CliError> {
-    let program = match args.script.file.is_dir() {
+    let file = &args.script.file;
+    if !file.exists() && file.extension().is_none_or(|extension| extension != "lua") {
+        let message = "no such file or folder; give a Lua file or a run folder";
+        return Err(CliError::input(message).prefixed(file.display()));
+    }
+    let program = match file.is_dir() {
         true => recorded_program(&args)?,
         false => script_program(&args)?,
     };
@@ -102,6 +107,19 @@ fn recorded_program(args: &WatchArgs) -> Result<Program, CliError> {
         Ok(task) => task,
         Err(_) => return Err(CliError::input("--task: expected the index of a task of the run")),
     };
+    let episodes = || stored.records.iter().map(|record| &record.header.id).filter(|id| id.task == task);
+    if !episodes().any(|id| id.episode == args.episode) {
+        let recorded: Vec<String> = episodes().map(|id| id.episode.to_string()).collect();
+        let message = match recorded.is_empty() {
+            true => format!("the run has no episode of task {task}"),
+            false => format!(
+                "the run has no episode {} of task {task}; it has {}",
+                args.episode,
+                recorded.join(", ")
+            ),
+        };
+        return Err(CliError::input(message).prefixed(dir.display()));
+    }
     let suite = stored.text("suite").to_owned();
     let selection = Selection { suite, task, episode: args.episode, ..Selection::default() };
     let split =

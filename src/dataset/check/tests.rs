@@ -15,22 +15,23 @@ const STEPS: usize = 9;
 
 /// A demonstration whose tool turns while it rises.
 fn demonstration(salt: f64) -> Demonstration {
-    let turn = |step: usize| Vec3::new(2.9 - 0.1 * step as f64, 0.3 + salt, -0.2);
-    let place = |step: usize| Vec3::new(0.4 + salt, 1.0 / 3.0, 0.01 * step as f64);
+    let posture = |step: usize| [0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8].map(|q| q + 0.01 * step as f64 + salt);
+    let place = |step: usize| panda::tool_pose(&posture(step)).translation.vector;
+    let turn = |step: usize| rotation::axis_angle(&panda::tool_pose(&posture(step)).rotation);
     let q = |step: usize| rotation::from_axis_angle(&turn(step));
     let each = |row: &dyn Fn(usize) -> Vec<f64>| (0..STEPS).flat_map(row).collect::<Vec<f64>>();
     let state = |step: usize| {
         let (p, r) = (place(step), turn(step));
-        vec![p.x, p.y, p.z, r.x, r.y, r.z, 0.04]
+        vec![p.x, p.y, p.z, r.x, r.y, r.z, 0.03]
     };
     let pose = |step: usize| {
         let (p, q) = (place(step), q(step));
         vec![p.x, p.y, p.z, q.w, q.i, q.j, q.k]
     };
-    let zeros = |name: &str, row: &[usize]| {
-        DataStream::f64(name, row, vec![0.1 + salt; STEPS * row.iter().product::<usize>()]).unit("m", "")
+    let constant = |name: &str, row: &[usize], value: f64| {
+        DataStream::f64(name, row, vec![value; STEPS * row.iter().product::<usize>()]).unit("m", "")
     };
-    let posture = |step: usize| [0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8].map(|q| q + 0.01 * step as f64 + salt);
+    let spread: [[f32; 2]; MARKER_COUNT] = std::array::from_fn(|marker| [1.5 + marker as f32, 1.5]);
     let mut demonstration = Demonstration {
         record: serde_json::from_str(include_str!("../../../tests/data/episode_record.json"))
             .expect("a valid record"),
@@ -41,12 +42,12 @@ fn demonstration(salt: f64) -> Demonstration {
         observed: vec![
             DataStream::f64("obs/eef_pose", &[7], each(&pose)),
             DataStream::f64("obs/state", &[7], each(&state)),
-            zeros("obs/arm_joint_pos", &[7]),
-            zeros("obs/gripper_pos", &[2]),
-            zeros("obs/gripper_width", &[1]),
-            zeros("obs/gripper_width_sensed", &[1]),
-            zeros("obs/gripper_close_norm", &[1]),
-            zeros("obs/gripper_closure", &[1]),
+            DataStream::f64("obs/arm_joint_pos", &[7], each(&|step| posture(step).to_vec())),
+            constant("obs/gripper_pos", &[2], 0.03),
+            constant("obs/gripper_width", &[1], 0.06),
+            constant("obs/gripper_width_sensed", &[1], 0.0592),
+            constant("obs/gripper_close_norm", &[1], 0.25),
+            constant("obs/gripper_closure", &[1], 0.2 + salt),
         ],
         privileged: vec![
             DataStream::f32("privileged/states/deformable_object/bun/nodal_pos_w", &[70_000, 3], {
@@ -55,9 +56,7 @@ fn demonstration(salt: f64) -> Demonstration {
             DataStream::u8("privileged/contact", &[2], vec![1; 2 * STEPS]).attribute("meaning", "touching"),
         ],
     };
-    demonstration.set_markers(
-        &[[Markers { initial: [[1.5; 2]; MARKER_COUNT], current: [[1.5; 2]; MARKER_COUNT] }; 2]; STEPS],
-    );
+    demonstration.set_markers(&[[Markers { initial: spread, current: spread }; 2]; STEPS]);
     demonstration
 }
 
@@ -131,6 +130,78 @@ fn problems_of_a_stream_name_its_file_and_key() {
     let shape =
         problems(|streams| streams[2] = DataStream::f64("obs/arm_joint_pos", &[6], vec![0.0; 6 * STEPS]));
     assert!(shape.contains("obs/arm_joint_pos: expected the shape (steps, 7), got [9, 6]"), "{shape}");
+}
+
+#[test]
+fn readings_in_other_units_or_without_content_are_reported() {
+    let scaled = |at: usize, factor: f64| {
+        problems(|streams| numbers(&mut streams[at]).iter_mut().for_each(|value| *value *= factor))
+    };
+    for (at, factor, words) in [
+        (2, 180.0 / std::f64::consts::PI, "obs/arm_joint_pos: step 0: beyond the limits of the joints"),
+        (2, 0.9, "obs/arm_joint_pos: step 0: not the joint positions at obs/eef_pose"),
+        (3, 1e3, "obs/gripper_pos: step 0: expected positions of the fingers in 0..0.04 m"),
+        (4, 1e3, "obs/gripper_width: step 0: not the sum of obs/gripper_pos"),
+        (5, 1e3, "obs/gripper_width_sensed: step 0: not near obs/gripper_width"),
+        (5, 0.0, "obs/gripper_width_sensed: step 0: not near obs/gripper_width"),
+        (6, 100.0, "obs/gripper_close_norm: step 0: not 1 - width / 0.08 m"),
+        (7, 255.0, "obs/gripper_closure: step 0: expected a closure in 0..1"),
+    ] {
+        let text = scaled(at, factor);
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    let picture = |step: usize| if step == 4 { [7; 12] } else { std::array::from_fn(|i| i as u8) };
+    let text = problems(|streams| {
+        let pixels = (0..STEPS).flat_map(picture).collect();
+        streams.push(DataStream::u8("obs/agentview_rgb", &[2, 2, 3], pixels));
+        numbers(&mut streams[1]).chunks_exact_mut(7).for_each(|row| row[6] = 0.06);
+        let markers = streams.iter_mut().find(|stream| stream.name == "obs/gripper_marker_motion");
+        let StreamValues::F32(markers) = &mut markers.expect("markers").values else { panic!("float32") };
+        markers[8 * MARKER_COUNT..].fill(0.0);
+    });
+    for words in [
+        "obs/agentview_rgb: step 4: a picture of one colour",
+        "obs/state: step 0: its last number is not half of obs/gripper_width",
+        "obs/gripper_marker_motion: step 1: all markers of a finger are at one place",
+    ] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+}
+
+#[test]
+fn true_states_that_contradict_each_other_are_reported() {
+    let mut wrong = demonstration(0.0);
+    wrong.privileged.push(DataStream::f64("privileged/pad_force", &[2], vec![0.0; 2 * STEPS]));
+    wrong.privileged.push(DataStream::f64("privileged/d", &[], vec![0.2; STEPS]));
+    wrong.privileged.push(DataStream::f64("privileged/d_max", &[], vec![0.1; STEPS]));
+    wrong.privileged.push(DataStream::f64("privileged/gripper_net_force", &[2, 3], vec![0.0; 6 * STEPS]));
+    wrong.privileged.push(DataStream::f64("privileged/actions_with_force", &[13], vec![0.0; 13 * STEPS]));
+    let pose = [500.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0].repeat(STEPS);
+    wrong.privileged.push(DataStream::f64("privileged/states/rigid_object/can/root_pose_w", &[7], pose));
+    let StreamValues::F32(nodes) = &mut wrong.privileged[0].values else { panic!("float32") };
+    nodes[210_000..420_000].fill(0.0);
+    let (_folder, path) = write(&wrong, "task.hdf5");
+    let text = file(&path).unwrap().problems.join("\n");
+    for words in [
+        "privileged/contact: step 0: not where privileged/pad_force is above 0",
+        "privileged/d: step 0: expected 0 or more and at most privileged/d_max",
+        "privileged/actions_with_force: step 0: not the action and privileged/gripper_net_force",
+        "can/root_pose_w: step 0: a place more than 20 m away",
+        "bun/nodal_pos_w: step 1: all nodes are at one place",
+    ] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    let ends = changed(|file| {
+        file.delete_dataset("data/demo_0/rewards").unwrap();
+        demo_0(file)
+            .new_dataset::<f64>()
+            .shape([STEPS])
+            .create("rewards")
+            .unwrap()
+            .write_raw(&[0.0; STEPS])
+            .unwrap();
+    });
+    assert!(ends.contains("rewards: step 8: expected 1 in the last step and 0 before"), "{ends}");
 }
 
 #[test]

@@ -251,19 +251,25 @@ fn checks(lua: &Lua) -> mlua::Result<Table> {
 const CLOSURE: Type = Type::Number("", Range::closed(0.0, 1.0));
 /// Rate of the gripper; 1 is the whole stroke in a second.
 const RATE: Type = Type::Number("1/s", Range::POSITIVE);
+/// Largest speed and angular speed of the tool, m/s and rad/s (Franka Control Interface documentation, Robot and
+/// interface specifications: Cartesian space limits).
+const MAX_SPEED: f64 = 1.7;
+const MAX_ANGULAR_SPEED: f64 = 2.5;
+/// Largest force of the hand, N (Franka Hand, product manual: maximum grasping force).
+const MAX_GRIP_FORCE: f64 = 140.0;
 
 #[expect(dead_code, reason = "the arm's Lua code reads the fields")]
 mod options {
-    use super::{CLOSURE, MAX_WIDTH, RATE};
+    use super::{CLOSURE, MAX_ANGULAR_SPEED, MAX_GRIP_FORCE, MAX_SPEED, MAX_WIDTH, RATE};
     use crate::schema::{Range, Type, record};
 
     record! {
         /// Options of a motion of the arm.
         MotionOptions: "softvt.MotionOptions" as "arm:move_to" {
             /// Largest speed.
-            speed: f64 = Type::Number("m/s", Range::POSITIVE) => Number(0.25);
+            speed: f64 = Type::Number("m/s", Range::above(0.0, MAX_SPEED)) => Number(0.25);
             /// Largest angular speed.
-            angular_speed: f64 = Type::Number("rad/s", Range::POSITIVE) => Number(1.5);
+            angular_speed: f64 = Type::Number("rad/s", Range::above(0.0, MAX_ANGULAR_SPEED)) => Number(1.5);
             /// Closure at the end; by default it stays.
             closure: Option<f64> = CLOSURE;
         }
@@ -279,7 +285,7 @@ mod options {
             /// Measured distance of the gels at which closing stops. A tactile servo ignores it.
             width: Option<f64> = Type::Number("m", Range::closed(0.0, MAX_WIDTH));
             /// Mean normal force per pad at which closing stops. A tactile servo ignores it.
-            force: Option<f64> = Type::Number("N", Range::POSITIVE);
+            force: Option<f64> = Type::Number("N", Range::above(0.0, MAX_GRIP_FORCE));
         }
         /// Options of releasing an object.
         ReleaseOptions: "softvt.ReleaseOptions" as "arm:release" {

@@ -33,8 +33,8 @@ use crate::{
 };
 use options::{OptionSession, OptionSpec, SharedOptions};
 use softvt_benchmark::{
-    Condition, Goal, ObjectType, Plan, Shift, ShiftValue, Suite, Task, TaskDifference, seed::SecretSeed,
-    settings::Settings,
+    CONTROL_DT, Condition, Goal, ObjectType, Plan, Shift, ShiftValue, Suite, Task, TaskDifference,
+    goal_conflict::conflict, seed::SecretSeed, settings::Settings,
 };
 use softvt_common::{parallel::lock, text::unknown_name};
 
@@ -470,6 +470,11 @@ fn task(lua: &Lua, id: usize, spec: &Constructed<TaskSpec>, budget: u32) -> mlua
             return Err(fail_at_key(lua, table, "range", message));
         }
     }
+    let budget_steps = spec.budget_steps.unwrap_or(budget);
+    if let Some(conflict) = conflict(&goal, f64::from(budget_steps) * CONTROL_DT) {
+        let message = format!("task.goal: can never be met: {conflict}");
+        return Err(fail_at_key(lua, &spec.table, "goal", message));
+    }
     Ok(Task {
         id,
         prompt: spec.prompt.clone(),
@@ -477,7 +482,7 @@ fn task(lua: &Lua, id: usize, spec: &Constructed<TaskSpec>, budget: u32) -> mlua
         layout: spec.layout.name.clone(),
         object: spec.object_name(lua)?,
         goal,
-        budget_steps: spec.budget_steps.unwrap_or(budget),
+        budget_steps,
         expert: spec.expert.is_some(),
     })
 }

@@ -106,6 +106,17 @@ impl Default for VmLimits {
 /// Names of Lua's library that scripts do not have.
 const UNAVAILABLE: [&str; 6] = ["os", "io", "debug", "package", "dofile", "loadfile"];
 
+/// The keywords of Lua (Lua 5.4 Reference Manual, 3.1).
+const KEYWORDS: [&str; 22] = [
+    "and", "break", "do", "else", "elseif", "end", "false", "for", "function", "goto", "if", "in", "local",
+    "nil", "not", "or", "repeat", "return", "then", "true", "until", "while",
+];
+
+/// The name in an error of [`refuse_undefined_variables`].
+fn undefined_variable(message: &str) -> Option<&str> {
+    message.strip_prefix("the variable \"")?.strip_suffix("\" is not defined")
+}
+
 /// State that the callbacks of a virtual machine share.
 struct VmState {
     main: String,
@@ -123,9 +134,7 @@ impl VmState {
         let raised = lock(&self.raised).clone();
         let memory_bytes = self.limits.memory_bytes;
         let error = ErrorTranslator { main: &self.main, files: &files, raised, memory_bytes }.explain(error);
-        if let Some(name) =
-            UNAVAILABLE.iter().find(|name| error.message.contains(&format!("(global '{name}')")))
-        {
+        if let Some(name) = undefined_variable(&error.message).filter(|name| UNAVAILABLE.contains(name)) {
             let message =
                 format!("{name} is not available to scripts, which reach neither files nor the clock");
             return ScriptError { message, ..error };
@@ -138,12 +147,11 @@ impl VmState {
 
     /// A word of the file that is close to the unknown global name of an error.
     fn close_name(&self, error: &ScriptError) -> Option<String> {
-        let (_, rest) = error.message.split_once("a nil value (global '")?;
-        let (unknown, _) = rest.split_once('\'')?;
+        let unknown = undefined_variable(&error.message)?;
         let text = lock(&self.library).text(&error.file).ok()?;
         let words: BTreeSet<&str> = text
             .split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))
-            .filter(|word| !word.is_empty() && *word != unknown)
+            .filter(|word| !word.is_empty() && *word != unknown && !KEYWORDS.contains(word))
             .collect();
         suggest(unknown, words.into_iter()).map(str::to_owned)
     }
@@ -204,6 +212,7 @@ impl Vm {
         let random = MathRandom::install(&lua)?;
         globals.set("softvt", &api)?;
         clock.install(&lua)?;
+        refuse_undefined_variables(&lua)?;
         Ok(Self { lua, clock, random, library: library.clone(), privilege, state: state.clone(), api })
     }
 
@@ -256,6 +265,18 @@ fn remove_unsafe_functions(lua: &Lua) -> mlua::Result<()> {
         lua.globals().set(name, Value::Nil)?;
     }
     lua.globals().get::<Table>("string")?.set("dump", Value::Nil)
+}
+
+/// Makes reading a global variable that was never set an error: a misspelt name would be `nil`, and an option that is
+/// `nil` has its default.
+fn refuse_undefined_variables(lua: &Lua) -> mlua::Result<()> {
+    let refuse = lua.create_function(|lua, (_, name): (Value, Value)| -> mlua::Result<Value> {
+        let name = name.as_string().map_or_else(|| describe(&name), |name| name.to_string_lossy());
+        Err(fail(lua, format!("the variable {name:?} is not defined")))
+    })?;
+    let meta = lua.create_table()?;
+    meta.set("__index", refuse)?;
+    lua.globals().set_metatable(Some(meta))
 }
 
 /// Stores a copy of the base library out of the reach of scripts, for the library's own Lua code.

@@ -2,7 +2,10 @@
 
 mod import;
 
-use std::{path::PathBuf, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use clap::{Args, Subcommand, value_parser};
 
@@ -14,7 +17,8 @@ use crate::{
 use softvt_common::cancel;
 use softvt_common::{files, text::counted};
 use softvt_dataset::{
-    DatasetError, check,
+    DatasetError,
+    check::{self, CheckScope},
     lerobot::{self, ArmControl, ExportConfig, LeRobotVersion},
     stats,
 };
@@ -108,7 +112,7 @@ fn parse_replays(word: &str) -> Result<usize, String> {
 fn run_check(args: &DatasetCheckArgs) -> Result<(), CliError> {
     let path = &args.path;
     check_complete(path)?;
-    let report = if path.is_dir() { check::folder(path) } else { check::file(path) }?;
+    let report = if path.is_dir() { check::folder(path, CheckScope::Whole) } else { check::file(path) }?;
     if !report.problems.is_empty() {
         return Err(CliError::input(format!(
             "{}\n{}: {}",
@@ -160,6 +164,7 @@ fn run_export(args: ExportArgs) -> Result<(), CliError> {
         progress.get_or_insert_with(|| Progress::new(total, "export")).tick(episode);
     });
     drop(progress);
+    warn_of_problems(&config.data)?;
     let exported = exported.map_err(|error| match error {
         DatasetError::Interrupted => CliError::interrupted("interrupted; nothing was written"),
         other => CliError::input(other),
@@ -171,6 +176,18 @@ fn run_export(args: ExportArgs) -> Result<(), CliError> {
         counted(exported.tasks, "prompt"),
         config.out.display()
     ))
+}
+
+/// Tells the first problem of the numbers of a recording. Recordings of earlier versions lack streams that an export does
+/// not need.
+fn warn_of_problems(data: &Path) -> Result<(), CliError> {
+    let problems = check::folder(data, CheckScope::Numbers)?.problems;
+    if let Some(first) = problems.first() {
+        let count = counted(problems.len(), "problem");
+        let all = format!("softvt dataset check {}", data.display());
+        eprint_notice(format!("{first}: the recording has {count}; {all} lists them and checks its images"));
+    }
+    Ok(())
 }
 
 /// Prints and plots the distributions.

@@ -1,0 +1,240 @@
+//! Goals that no state can meet.
+
+use std::collections::BTreeMap;
+
+use crate::goal::{Goal, Parts};
+
+/// The reason for which a goal can never be met within `budget_s`, in words; `None` if none was found.
+///
+/// Predicates that must hold at once are compared in pairs, and what rests on what must not be a circle. Of
+/// `softvt.any`, each alternative is compared with what must hold beside it. Geometry is not considered.
+pub fn conflict(goal: &Goal, budget_s: f64) -> Option<String> {
+    let least_s = least_time(goal);
+    if least_s > budget_s {
+        return Some(format!(
+            "what it must hold takes {least_s} s, and the budget of the task is {budget_s} s"
+        ));
+    }
+    conflict_within(goal)
+}
+
+/// Least time that a goal takes, s: its predicates must hold for a time.
+fn least_time(goal: &Goal) -> f64 {
+    let times = |parts: &Parts| parts.goals.iter().map(least_time).collect::<Vec<_>>();
+    match goal {
+        Goal::On(of) | Goal::Inside(of) | Goal::Near { of, .. } | Goal::Beside { of, .. } => of.hold_s,
+        Goal::Upright { hold_s, .. } => *hold_s,
+        Goal::All(parts) => times(parts).into_iter().fold(0.0, f64::max),
+        Goal::Any(parts) => times(parts).into_iter().reduce(f64::min).unwrap_or(0.0),
+        Goal::Sequence(parts) => times(parts).iter().sum(),
+        Goal::Opened { .. }
+        | Goal::Closed { .. }
+        | Goal::Turned { .. }
+        | Goal::Predicate { .. }
+        | Goal::None(_) => 0.0,
+    }
+}
+
+/// What must hold at one moment.
+#[derive(Clone, Default)]
+struct Moment<'a> {
+    required: Vec<&'a Goal>,
+    forbidden: Vec<&'a Goal>,
+    /// Of each list, one must hold.
+    alternatives: Vec<&'a Parts>,
+    /// Earlier steps of sequences, each of which must hold at a moment of its own.
+    earlier: Vec<&'a Goal>,
+}
+
+impl<'a> Moment<'a> {
+    fn of(goal: &'a Goal) -> Self {
+        let mut moment = Self::default();
+        moment.add(goal);
+        moment
+    }
+
+    fn add(&mut self, goal: &'a Goal) {
+        match goal {
+            Goal::All(parts) => parts.goals.iter().for_each(|part| self.add(part)),
+            Goal::None(parts) => parts.goals.iter().for_each(|part| self.forbid(part)),
+            Goal::Any(parts) => match &parts.goals[..] {
+                [only] => self.add(only),
+                _ => self.alternatives.push(parts),
+            },
+            Goal::Sequence(parts) => {
+                if let Some((last, earlier)) = parts.goals.split_last() {
+                    self.earlier.extend(earlier);
+                    self.add(last);
+                }
+            }
+            predicate => self.required.push(predicate),
+        }
+    }
+
+    /// Adds a goal that must not hold. A sequence within `softvt.none` may not have begun, so that it forbids nothing.
+    fn forbid(&mut self, goal: &'a Goal) {
+        match goal {
+            Goal::Any(parts) => parts.goals.iter().for_each(|part| self.forbid(part)),
+            Goal::All(parts) | Goal::None(parts) if parts.goals.len() == 1 => {
+                if matches!(goal, Goal::All(_)) {
+                    self.forbid(&parts.goals[0]);
+                } else {
+                    self.add(&parts.goals[0]);
+                }
+            }
+            Goal::None(parts) => self.alternatives.push(parts),
+            Goal::All(_) | Goal::Sequence(_) => {}
+            predicate => self.forbidden.push(predicate),
+        }
+    }
+
+    fn conflict(&self) -> Option<String> {
+        if let Some(both) = self.required.iter().find(|goal| self.forbidden.contains(goal)) {
+            return Some(format!("{:?} must hold and must not hold", both.describe()));
+        }
+        for (at, first) in self.required.iter().enumerate() {
+            if let Some(other) = self.required[at + 1..].iter().find(|other| excludes(first, other)) {
+                let [first, other] = [first, other].map(|goal| goal.describe());
+                return Some(format!("{first:?} and {other:?} cannot hold at once"));
+            }
+        }
+        self.circle().map(|objects| format!("{} rest on each other in a circle", objects.join(", ")))
+    }
+
+    /// Objects that would have to rest on each other in a circle.
+    fn circle(&self) -> Option<Vec<&'a str>> {
+        let mut supports: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+        for goal in &self.required {
+            if let Goal::On(of) | Goal::Inside(of) = goal {
+                supports.entry(&of.object).or_default().push(&of.target);
+            }
+        }
+        supports.keys().find_map(|object| circle_from(&supports, vec![object]))
+    }
+}
+
+/// A path of supports from the first object of `path` back to it.
+fn circle_from<'a>(supports: &BTreeMap<&'a str, Vec<&'a str>>, path: Vec<&'a str>) -> Option<Vec<&'a str>> {
+    let below = supports.get(path.last()?)?;
+    if below.contains(&path[0]) {
+        return Some(path);
+    }
+    let further = below.iter().filter(|next| !path.contains(next));
+    further.into_iter().find_map(|next| circle_from(supports, path.iter().copied().chain([*next]).collect()))
+}
+
+fn conflict_within(goal: &Goal) -> Option<String> {
+    let moment = Moment::of(goal);
+    if let Some(found) = moment.conflict() {
+        return Some(found);
+    }
+    if let Some(found) = moment.earlier.iter().find_map(|step| conflict_within(step)) {
+        return Some(found);
+    }
+    moment.alternatives.iter().find_map(|parts| {
+        let conflicts = parts.goals.iter().map(|part| {
+            let mut with = Moment { earlier: Vec::new(), ..moment.clone() };
+            with.add(part);
+            with.conflict()
+        });
+        conflicts.collect::<Option<Vec<String>>>().and_then(|mut found| found.pop())
+    })
+}
+
+/// True if two predicates can never hold at once.
+fn excludes(first: &Goal, other: &Goal) -> bool {
+    match (first, other) {
+        (Goal::Opened { joint, share }, Goal::Closed { joint: same, share: most })
+        | (Goal::Closed { joint, share: most }, Goal::Opened { joint: same, share }) => {
+            joint == same && share > most
+        }
+        (Goal::Turned { joint, range: [low, high] }, Goal::Turned { joint: same, range: [from, to] }) => {
+            joint == same && (low > to || from > high)
+        }
+        // Both are within 45° of their directions.
+        (Goal::Beside { side, of, .. }, Goal::Beside { side: another, of: same, .. }) => {
+            side != another && (&of.object, &of.target) == (&same.object, &same.target)
+        }
+        (Goal::Near { of, distance_m: most }, Goal::Beside { of: same, distance_m: least, .. })
+        | (Goal::Beside { of, distance_m: least, .. }, Goal::Near { of: same, distance_m: most }) => {
+            (&of.object, &of.target) == (&same.object, &same.target) && least > most
+        }
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Placement, goal::Side};
+
+    fn on(object: &str, target: &str) -> Goal {
+        Goal::On(Placement { object: object.into(), target: target.into(), hold_s: 0.4 })
+    }
+
+    fn opened(share: f64) -> Goal {
+        Goal::Opened { joint: "drawer".into(), share }
+    }
+
+    fn closed(share: f64) -> Goal {
+        Goal::Closed { joint: "drawer".into(), share }
+    }
+
+    fn beside(side: Side) -> Goal {
+        let of = Placement { object: "a".into(), target: "b".into(), hold_s: 0.0 };
+        Goal::Beside { side, of, distance_m: 0.05 }
+    }
+
+    fn all(goals: Vec<Goal>) -> Goal {
+        Goal::All(Parts { goals })
+    }
+
+    fn any(goals: Vec<Goal>) -> Goal {
+        Goal::Any(Parts { goals })
+    }
+
+    fn none(goals: Vec<Goal>) -> Goal {
+        Goal::None(Parts { goals })
+    }
+
+    fn sequence(goals: Vec<Goal>) -> Goal {
+        Goal::Sequence(Parts { goals })
+    }
+
+    #[test]
+    fn goals_that_contradict_themselves_are_found() {
+        let found = |goal: Goal, expected: &str| {
+            let message = conflict(&goal, 10.0).unwrap_or_default();
+            assert!(message.contains(expected), "{expected}: {message:?}");
+        };
+        found(all(vec![on("a", "b"), none(vec![on("a", "b")])]), "\"a on b\" must hold and must not hold");
+        found(all(vec![on("a", "b"), on("b", "c"), on("c", "a")]), "a, b, c rest on each other in a circle");
+        found(
+            all(vec![opened(0.7), closed(0.1)]),
+            "\"drawer open\" and \"drawer closed\" cannot hold at once",
+        );
+        found(all(vec![beside(Side::LeftOf), beside(Side::Behind)]), "\"a left of b\" and \"a behind b\"");
+        found(all(vec![opened(0.7), any(vec![closed(0.1), none(vec![opened(0.7)])])]), "drawer open");
+        found(sequence(vec![all(vec![opened(0.7), closed(0.1)]), on("a", "b")]), "cannot hold at once");
+        found(none(vec![none(vec![opened(0.7)]), opened(0.7)]), "must hold and must not hold");
+        let held = |hold_s| Goal::Upright { object: "a".into(), hold_s, angle_rad: 0.1 };
+        found(sequence(vec![held(6.0), held(5.0)]), "takes 11 s, and the budget of the task is 10 s");
+    }
+
+    #[test]
+    fn goals_that_can_be_met_are_not() {
+        for goal in [
+            all(vec![on("a", "b"), on("b", "c"), on("a", "c")]),
+            all(vec![opened(0.5), closed(0.5)]),
+            any(vec![opened(0.7), closed(0.1)]),
+            all(vec![opened(0.7), any(vec![closed(0.1), on("a", "b")])]),
+            sequence(vec![opened(0.7), closed(0.1)]),
+            sequence(vec![on("a", "b"), on("b", "a")]),
+            all(vec![on("a", "b"), none(vec![all(vec![on("a", "b"), opened(0.7)])])]),
+            none(vec![opened(0.7), closed(0.1)]),
+            all(vec![closed(0.1), none(vec![sequence(vec![opened(0.7), closed(0.1)])])]),
+        ] {
+            assert_eq!(conflict(&goal, 10.0), None, "{}", goal.describe());
+        }
+    }
+}

@@ -1,0 +1,190 @@
+//! Checks of readings: units, what one stream says of another, and readings that say nothing.
+
+use super::{DemoCheck, JOINT_MARGIN, TOLERANCE};
+use crate::StreamValues;
+use softvt_robot::{
+    gripper::MAX_WIDTH,
+    panda::{self, ARM_DOFS},
+};
+use softvt_sensing::tactile::MARKER_COUNT;
+
+/// Excess over the stroke of a finger that contact and inertia explain, m.
+const STROKE_MARGIN: f64 = 1e-3;
+/// Largest difference between the width and that of the sensor of a real hand, m.
+const SENSOR_ERROR: f64 = 2e-3;
+/// Largest distance of an object from the origin, m: another one is in another unit.
+const MAX_DISTANCE_M: f64 = 20.0;
+
+impl DemoCheck<'_> {
+    /// The numbers of a stream; none if it is missing, which is a problem only of required streams.
+    fn values(&mut self, name: &str) -> Vec<f64> {
+        if !self.file.has(self.demo, name) {
+            return Vec::new();
+        }
+        self.report.take(self.file.array(self.demo, name)).map_or(Vec::new(), |array| array.values)
+    }
+
+    /// Adds a problem at the first of `rows` for which `is_wrong` holds.
+    fn add_first<T>(
+        &mut self,
+        name: &str,
+        rows: impl IntoIterator<Item = T>,
+        is_wrong: impl Fn(&T) -> bool,
+        what: &str,
+    ) {
+        if let Some(step) = rows.into_iter().position(|row| is_wrong(&row)) {
+            self.add(name, format!("step {step}: {what}"));
+        }
+    }
+
+    pub(super) fn check_readings(&mut self) {
+        self.check_arm();
+        self.check_gripper();
+        self.check_ends();
+        self.check_markers();
+        self.check_forces();
+        self.check_shapes();
+    }
+
+    /// Checks that measured joint positions are within the limits of the joints and put the tool where it is.
+    fn check_arm(&mut self) {
+        let (joints, poses) = (self.values("obs/arm_joint_pos"), self.values("obs/eef_pose"));
+        let ranges = panda::joint_ranges();
+        let rows = || joints.as_chunks::<ARM_DOFS>().0.iter();
+        let is_beyond = |row: &&[f64; ARM_DOFS]| {
+            row.iter()
+                .zip(&ranges)
+                .any(|(q, range)| *q < range.lower - JOINT_MARGIN || *q > range.upper + JOINT_MARGIN)
+        };
+        if rows().any(|row| is_beyond(&row)) {
+            let what = "beyond the limits of the joints: are they in rad?";
+            return self.add_first("obs/arm_joint_pos", rows(), is_beyond, what);
+        }
+        let is_elsewhere = |(row, pose): &(&[f64; ARM_DOFS], &[f64; 7])| {
+            let tool = panda::tool_pose(row).translation.vector;
+            (0..3).any(|axis| (tool[axis] - pose[axis]).abs() > TOLERANCE)
+        };
+        let pairs = rows().zip(poses.as_chunks::<7>().0);
+        let what = "not the joint positions at obs/eef_pose";
+        self.add_first("obs/arm_joint_pos", pairs, is_elsewhere, what);
+    }
+
+    /// Checks units of the readings of the gripper, and that they agree with each other.
+    fn check_gripper(&mut self) {
+        let stroke = 0.5 * MAX_WIDTH;
+        let fingers = self.values("obs/gripper_pos");
+        let is_beyond = |x: &&f64| **x < -STROKE_MARGIN || **x > stroke + STROKE_MARGIN;
+        if fingers.iter().any(|x| is_beyond(&x)) {
+            let rows = fingers.as_chunks::<2>().0;
+            let is_wrong = |row: &&[f64; 2]| row.iter().any(|x| is_beyond(&x));
+            return self.add_first(
+                "obs/gripper_pos",
+                rows,
+                is_wrong,
+                "expected positions of the fingers in 0..0.04 m",
+            );
+        }
+        let widths: Vec<f64> = fingers.as_chunks::<2>().0.iter().map(|[left, right]| left + right).collect();
+        let of_width: [(&str, fn(f64) -> f64, f64, &str); 3] = [
+            ("obs/gripper_width", |width| width, TOLERANCE, "not the sum of obs/gripper_pos"),
+            (
+                "obs/gripper_width_sensed",
+                |width| width,
+                SENSOR_ERROR,
+                "not near obs/gripper_width: is it in m?",
+            ),
+            ("obs/gripper_close_norm", |width| 1.0 - width / MAX_WIDTH, TOLERANCE, "not 1 - width / 0.08 m"),
+        ];
+        for (name, expected, tolerance, what) in of_width {
+            let values = self.values(name);
+            let is_wrong = |(value, width): &(&f64, &f64)| (*value - expected(**width)).abs() > tolerance;
+            self.add_first(name, values.iter().zip(&widths), is_wrong, what);
+        }
+        let states = self.values("obs/state");
+        let fingers = states.as_chunks::<7>().0.iter().map(|row| row[6]).zip(&widths);
+        let is_wrong = |(finger, width): &(f64, &f64)| (finger - 0.5 * *width).abs() > 0.5 * SENSOR_ERROR;
+        self.add_first(
+            "obs/state",
+            fingers,
+            is_wrong,
+            "its last number is not half of obs/gripper_width, in m",
+        );
+        let closures = self.values("obs/gripper_closure");
+        let is_wrong = |closure: &&f64| !(-TOLERANCE..=1.0 + TOLERANCE).contains(*closure);
+        self.add_first("obs/gripper_closure", &closures, is_wrong, "expected a closure in 0..1");
+    }
+
+    /// Checks that the reward is 1 in the last step alone, which is the end.
+    fn check_ends(&mut self) {
+        let last = self.steps.saturating_sub(1);
+        for name in ["rewards", "dones"] {
+            let values = self.values(name);
+            let is_wrong = |(step, value): &(usize, &f64)| **value != f64::from(u8::from(*step == last));
+            let what = "expected 1 in the last step and 0 before: demonstrations end at the goal";
+            self.add_first(name, values.iter().enumerate(), is_wrong, what);
+        }
+    }
+
+    /// Checks that no picture is of one colour, as of a camera that was not read.
+    pub(super) fn check_pictures(&mut self, name: &str, pixels: &StreamValues, size: usize) {
+        let StreamValues::U8(pixels) = pixels else { return self.add(name, "expected uint8") };
+        let is_plain =
+            |picture: &&[u8]| picture.iter().skip(3).zip(*picture).all(|(after, pixel)| after == pixel);
+        self.add_first(name, pixels.chunks_exact(size.max(1)), is_plain, "a picture of one colour");
+    }
+
+    /// Checks that the markers of a finger are at different places.
+    fn check_markers(&mut self) {
+        let name = "obs/gripper_marker_motion";
+        let values = self.values(name);
+        let is_point = |row: &&[f64]| {
+            row.chunks_exact(2 * MARKER_COUNT)
+                .any(|markers| markers.as_chunks::<2>().0.windows(2).all(|pair| pair[0] == pair[1]))
+        };
+        let rows = values.chunks_exact(8 * MARKER_COUNT);
+        self.add_first(name, rows, is_point, "all markers of a finger are at one place");
+    }
+
+    /// Checks that contacts, forces and the actions beside them agree.
+    fn check_forces(&mut self) {
+        let pads = self.values("privileged/pad_force");
+        self.add_first("privileged/pad_force", &pads, |force| **force < 0.0, "a normal force below 0");
+        let contacts = self.values("privileged/contact");
+        let is_wrong = |(contact, force): &(&f64, &f64)| (**contact != 0.0) != (**force > 0.0);
+        if let Some(at) = contacts.iter().zip(&pads).position(|pair| is_wrong(&pair)) {
+            let what = format!("step {}: not where privileged/pad_force is above 0", at / 2);
+            self.add("privileged/contact", what);
+        }
+        let (both, actions) = (self.values("privileged/actions_with_force"), self.values("actions"));
+        let net = self.values("privileged/gripper_net_force");
+        let parts =
+            both.as_chunks::<13>().0.iter().zip(actions.as_chunks::<7>().0).zip(net.as_chunks::<6>().0);
+        let is_wrong = |((both, action), net): &((&[f64; 13], &[f64; 7]), &[f64; 6])| {
+            both[..7] != action[..] || both[7..] != net[..]
+        };
+        let what = "not the action and privileged/gripper_net_force";
+        self.add_first("privileged/actions_with_force", parts, is_wrong, what);
+    }
+
+    /// Checks true deformations and places.
+    fn check_shapes(&mut self) {
+        let (rms, most) = (self.values("privileged/d"), self.values("privileged/d_max"));
+        let is_wrong = |(rms, most): &(&f64, &f64)| **rms < 0.0 || **rms > **most + TOLERANCE;
+        let what = "expected 0 or more and at most privileged/d_max";
+        self.add_first("privileged/d", rms.iter().zip(&most), is_wrong, what);
+        let Some(names) = self.report.take(self.file.names(self.demo)) else { return };
+        for name in names.iter().filter(|name| name.starts_with("privileged/states/")) {
+            let values = self.values(name);
+            let width = values.len() / self.steps.max(1);
+            let (rows, numbers) =
+                (values.chunks_exact(width.max(1)), if name.ends_with("nodal_pos_w") { width } else { 3 });
+            let is_far = |row: &&[f64]| row.iter().take(numbers).any(|x| x.abs() > MAX_DISTANCE_M);
+            self.add_first(name, rows.clone(), is_far, "a place more than 20 m away: is it in m?");
+            if numbers == width {
+                let is_point =
+                    |row: &&[f64]| row.as_chunks::<3>().0.windows(2).all(|pair| pair[0] == pair[1]);
+                self.add_first(name, rows, is_point, "all nodes are at one place");
+            }
+        }
+    }
+}
