@@ -34,10 +34,10 @@ MEASURES = ["goal", "no_drop", "safety"]
 STAGES = ["reach", "grasp", "lift", "carry", "place", "release"]
 # Ratios from which on tables do not show them.
 MOST = 99
-# What the pictures show: suites in the order of their plots, inputs in that of their rows, and steps per answer.
+# What the pictures show: suites in the order of their plots, inputs in that of their rows, grip codes, and steps per answer.
 SUITES = ["object_hidden", "spatial_hidden", "object_soft", "spatial_soft"]
 INPUT_WORDS = {"vo": "cameras", "vp": "with drives", "vt": "with touch", "vpt": "with both"}
-INPUTS, REPLAN = list(INPUT_WORDS), 4
+INPUTS, CODES, REPLAN = list(INPUT_WORDS), ["binary", "continuous"], 4
 # The condition of suites/shifts.lua that changes nothing.
 UNCHANGED = "reference"
 
@@ -312,6 +312,7 @@ def plots(folder: Path) -> list[Plot]:
     shown = []
     for suite in [suite for suite in SUITES if suite in limited] or limited:
         policies = [policy for policy in learned if (policy.suite, policy.condition) == (suite, "") and policy.inputs in INPUTS]
+        policies = [policy for policy in policies if policy.code in CODES] or policies
         replan = min((policy.replan for policy in policies), key=lambda replan: (abs(replan - REPLAN), replan), default=REPLAN)
         policies = sorted((policy for policy in policies if policy.replan == replan), key=lambda policy: INPUTS.index(policy.inputs))
         has_codes = len({policy.code for policy in policies}) > 1

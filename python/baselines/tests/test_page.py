@@ -112,7 +112,8 @@ class Pages(unittest.TestCase):
     def test_pictures_show_the_rows_at_the_common_replan(self):
         for code, replan in (("binary", 4), ("continuous", 10)):
             self.run_of(f"one-vo-{code}-s0-r{replan}/one", np.zeros((10, 5), bool))
-        self.run_of("one-vb-continuous-s0-r4/one", np.ones((10, 5), bool))
+        for name in ("vb-continuous", "vt-force"):
+            self.run_of(f"one-{name}-s0-r4/one", np.ones((10, 5), bool))
         page.collect(self.study, self.docs)
         (plot,) = page.plots(self.docs)
         self.assertEqual(list(plot.learned), ["VO binary", "VO continuous", "VP continuous", "VT continuous", "VPT continuous"])
