@@ -145,7 +145,7 @@ class Studies(unittest.TestCase):
         path.write_text(text.split("cat > missing.txt <<'END'\n")[1].split("END\n")[0])
         suites = {file.stem for file in (Path(__file__).parents[3] / "suites").glob("*.lua")}
         lines = study.read_queue(path)
-        self.assertEqual(len({name for name, *_ in lines}), 12, "each in a folder of its own")
+        self.assertEqual(len({name for name, *_ in lines}), len(lines), "each in a folder of its own")
         for name, *words in lines:
             given = _parser().parse_args(["study", *words, "--out", "."])
             self.assertLessEqual({*_study_of(given, self.out / name, [], 0).suites}, suites)
