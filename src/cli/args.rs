@@ -14,7 +14,7 @@ use clap::{Args, ValueEnum, value_parser};
 
 use crate::{error::CliError, output::Console, plan_flags};
 use softvt_benchmark::{ShiftValue, Suite, Task, Teacher};
-use softvt_dataset::OptionalStream;
+use softvt_dataset::{OptionalStream, card::KeptOutcome};
 use softvt_policy::{profile::GripCode, remote::ServerProtocol};
 use softvt_records::requirement::Requirement;
 use softvt_report::stored_run::{self, StoredRun};
@@ -335,6 +335,9 @@ pub(crate) struct RecordingArgs {
     /// Further streams of the HDF5 files, separated by commas: depth of both cameras, torques of the arm's drives
     #[arg(long, value_name = "STREAM", value_delimiter = ',')]
     pub streams: Vec<OptionalStream>,
+    /// Attempts to keep: those that are safe, or all that reach the goal
+    #[arg(long, value_name = "OUTCOME", default_value = "safe", hide_possible_values = true)]
+    pub keep: KeptOutcome,
     /// Number of threads; the dataset does not depend on it [default: number of processors]
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
@@ -370,6 +373,7 @@ impl RecordingArgs {
             has_images: self.images == ImageStorage::Hdf5,
             has_privileged: !self.no_privileged,
             streams: self.streams.iter().copied().collect(),
+            keep: self.keep,
             resume: self.resume,
             gripper,
         }

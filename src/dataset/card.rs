@@ -70,6 +70,9 @@ pub struct DatasetCard {
     /// Further streams that are stored.
     #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
     pub streams: BTreeSet<OptionalStream>,
+    /// Outcome of all demonstrations.
+    #[serde(default, skip_serializing_if = "KeptOutcome::is_safe")]
+    pub keep: KeptOutcome,
     /// Grip code of exports that name none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gripper: Option<GripCode>,
@@ -78,6 +81,35 @@ pub struct DatasetCard {
     pub imported: Vec<ImportedFile>,
     /// The demonstrations of each task.
     pub tasks: Vec<TaskCount>,
+}
+
+/// Outcome that an attempt must have to become a demonstration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum KeptOutcome {
+    /// Safety Success: the goal without a drop, within the deformation limit.
+    #[default]
+    Safe,
+    /// Goal Success, also if the object was dropped or deformed too much.
+    Goal,
+}
+
+impl KeptOutcome {
+    /// True for [`Self::Safe`].
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+    pub fn is_safe(&self) -> bool {
+        *self == Self::Safe
+    }
+
+    /// What every demonstration does, in words.
+    fn words(self) -> &'static str {
+        match self {
+            Self::Safe => "reaches its goal and is safe by softvt's evaluator",
+            Self::Goal => {
+                "reaches its goal by softvt's evaluator; some are not safe (`success` of manifest.jsonl is false)"
+            }
+        }
+    }
 }
 
 impl DatasetCard {
@@ -135,10 +167,11 @@ impl DatasetCard {
         let mut page = format!(
             "---\nlicense: apache-2.0\ntask_categories:\n- robotics\n---\n\
              # Demonstrations of soft-object manipulation\n\n\
-             Recorded by softvt {} in simulation; every demonstration reaches its goal and is safe by softvt's evaluator.\n\n\
+             Recorded by softvt {} in simulation; every demonstration {}.\n\n\
              | | |\n|---|---|\n| demonstrations | {} |\n| control steps | {} ({hours:.2} h at {} Hz) |\n\
              | HDF5 | {} MB |\n| videos | {} MB |\n| images in HDF5 | {} |\n| privileged streams | {} |\n{streams}\n",
             self.softvt,
+            self.keep.words(),
             self.demos(),
             self.samples(),
             self.fps,

@@ -34,7 +34,7 @@ use softvt_common::{
 };
 use softvt_dataset::{
     Demonstration, OptionalStream,
-    card::{DatasetCard, TaskCount, rejection_counts},
+    card::{DatasetCard, KeptOutcome, TaskCount, rejection_counts},
     check,
     demonstration_writer::DemonstrationWriter,
     layout::{self, DATASET, MANIFEST, PARTS, RECORDING, TaskPaths, VIDEO_STREAMS},
@@ -65,6 +65,8 @@ pub struct RecordingOptions {
     pub streams: BTreeSet<OptionalStream>,
     /// True to continue an interrupted recording.
     pub resume: bool,
+    /// Outcome that an attempt must have to be kept.
+    pub keep: KeptOutcome,
     /// Grip code of exports that name none.
     pub gripper: Option<GripCode>,
 }
@@ -93,6 +95,9 @@ impl RecordingOptions {
     pub(crate) fn describe(&self, request: &mut Value) {
         if !self.streams.is_empty() {
             request["streams"] = json!(self.streams);
+        }
+        if !self.keep.is_safe() {
+            request["keep"] = json!(self.keep);
         }
     }
 }
@@ -157,7 +162,7 @@ impl<'a> SuiteRecording<'a> {
             outcome => outcome,
         };
         log.sort()?;
-        let kept = log.records.iter().filter(|record| rejection(record).is_none()).count();
+        let kept = log.records.iter().filter(|record| self.is_kept(record)).count();
         let out = &self.options.out;
         let kept = format!("{} in {}", counted(kept, "demonstration"), out.display());
         with_kept(outcome, &kept, Some(out))?;
@@ -181,10 +186,11 @@ impl<'a> SuiteRecording<'a> {
             if !jobs.is_empty() {
                 let record =
                     |job| Ok(SimulatedEpisode { finished: self.record_attempt(job)?, rendered: Ok(()) });
-                log.run_jobs(&list, &jobs, record, write_actions, attempt_line)?;
+                let line = |record: &EpisodeRecord| attempt_line(record, self.options.keep);
+                log.run_jobs(&list, &jobs, record, write_actions, line)?;
             }
             for task in &self.tasks {
-                let kept = kept(&log.records, task.id);
+                let kept = kept(&log.records, task.id, self.options.keep);
                 let is_complete = match self.demos {
                     Some(required) => kept.len() == required as usize,
                     None => self.due(&log.records, task.id).is_empty(),
@@ -199,11 +205,14 @@ impl<'a> SuiteRecording<'a> {
         }
     }
 
+    fn is_kept(&self, record: &EpisodeRecord) -> bool {
+        rejection(record, self.options.keep).is_none()
+    }
+
     fn due(&self, records: &[EpisodeRecord], task: usize) -> Vec<u32> {
         let attempts = self.run.jobs.episodes_of(task);
         let finished = records.iter().filter(|record| record.header.id.task == task);
-        let finished =
-            finished.map(|record| (record.header.id.episode, rejection(record).is_none())).collect();
+        let finished = finished.map(|record| (record.header.id.episode, self.is_kept(record))).collect();
         due(&attempts.collect::<Vec<_>>(), &finished, self.demos.map_or(usize::MAX, |demos| demos as usize))
     }
 
@@ -212,7 +221,7 @@ impl<'a> SuiteRecording<'a> {
         let mut finished = self.run_attempt(job)?;
         let recorded_grip = parallel::lock(&self.grip_log).remove(&job.index());
         let states = finished.recording.take();
-        let Some(mut states) = states.filter(|_| rejection(&finished.record).is_none()) else {
+        let Some(mut states) = states.filter(|_| self.is_kept(&finished.record)) else {
             return Ok(finished);
         };
         let commanded_grip = || finished.actions.iter().map(|action| action.closure() > 0.5).collect();
@@ -315,10 +324,10 @@ impl<'a> SuiteRecording<'a> {
 
     /// Counts of a task, without the sizes of its files.
     fn count(&self, task: &Task, records: &[EpisodeRecord]) -> TaskCount {
-        let kept = kept(records, task.id);
+        let kept = kept(records, task.id, self.options.keep);
         let attempts = || records.iter().filter(|record| record.header.id.task == task.id);
         let mut rejected = BTreeMap::new();
-        for reason in attempts().filter_map(rejection) {
+        for reason in attempts().filter_map(|record| rejection(record, self.options.keep)) {
             *rejected.entry(reason).or_insert(0) += 1;
         }
         TaskCount {
@@ -346,8 +355,9 @@ fn move_part(part: &Path, path: &Path) -> Result<(), RunError> {
 }
 
 /// Attempts at a task that became demonstrations, in order.
-fn kept(records: &[EpisodeRecord], task: usize) -> Vec<&EpisodeRecord> {
-    let is_kept = |record: &&EpisodeRecord| record.header.id.task == task && rejection(record).is_none();
+fn kept(records: &[EpisodeRecord], task: usize, keep: KeptOutcome) -> Vec<&EpisodeRecord> {
+    let is_kept =
+        |record: &&EpisodeRecord| record.header.id.task == task && rejection(record, keep).is_none();
     let mut kept: Vec<_> = records.iter().filter(is_kept).collect();
     kept.sort_by_key(|record| record.header.id.episode);
     kept
@@ -378,10 +388,10 @@ fn due(attempts: &[u32], finished: &BTreeMap<u32, bool>, demos: usize) -> Vec<u3
 }
 
 /// The reason for which an attempt is not kept. `None` if it is.
-fn rejection(record: &EpisodeRecord) -> Option<String> {
+fn rejection(record: &EpisodeRecord, keep: KeptOutcome) -> Option<String> {
     let verdict = &record.verdict;
     let reason = match &record.outcome {
-        _ if verdict.safety => return None,
+        _ if verdict.safety || (keep == KeptOutcome::Goal && verdict.goal) => return None,
         Outcome::Invalid { reason, .. } => return Some(format!("invalid ({reason})")),
         Outcome::Error { message } if message.starts_with(START_FAILED) => "could not start",
         Outcome::Error { .. } => "ended by an error",
@@ -397,9 +407,9 @@ fn rejection(record: &EpisodeRecord) -> Option<String> {
 }
 
 /// Formats an attempt as one line of progress.
-fn attempt_line(record: &EpisodeRecord) -> String {
+fn attempt_line(record: &EpisodeRecord, keep: KeptOutcome) -> String {
     let id = &record.header.id;
-    let result = match (rejection(record), &record.outcome) {
+    let result = match (rejection(record, keep), &record.outcome) {
         (None, _) => "kept".to_owned(),
         (Some(reason), Outcome::Error { message }) => format!("not kept: {reason} ({message})"),
         (Some(reason), _) => format!("not kept: {reason}"),
@@ -534,7 +544,7 @@ fn write_summary(
     for (suite, records) in suites.iter().zip(records) {
         for task in &suite.tasks {
             let paths = suite.paths(task.id);
-            let kept = kept(records, task.id).into_iter().enumerate();
+            let kept = kept(records, task.id, options.keep).into_iter().enumerate();
             let new: Vec<ManifestEntry> =
                 kept.map(|(demo, record)| ManifestEntry::new(&paths, demo, record)).collect();
             let videos = new.iter().flat_map(|entry| entry.video_files.values());
@@ -566,6 +576,7 @@ fn write_summary(
         has_images: options.has_images,
         has_privileged: options.has_privileged,
         streams: options.streams.clone(),
+        keep: options.keep,
         gripper: options.gripper,
         imported: suites.first().map(|suite| suite.run.imported.clone()).unwrap_or_default(),
         tasks,

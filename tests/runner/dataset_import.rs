@@ -7,7 +7,7 @@ use std::{
 
 use rust_hdf5::H5File;
 use softvt::{
-    dataset::{StreamValues, TaskFile, check, manifest},
+    dataset::{StreamValues, TaskFile, card::KeptOutcome, check, manifest},
     runner::{
         PolicySource, RunError,
         import::{self, ImportOptions},
@@ -41,6 +41,7 @@ fn import(
         has_images: false,
         has_privileged: true,
         streams: BTreeSet::new(),
+        keep: KeptOutcome::Safe,
         resume: false,
         gripper: None,
     };

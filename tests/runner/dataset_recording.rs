@@ -4,11 +4,15 @@ use std::{collections::BTreeSet, fs, path::Path, sync::Arc};
 
 use softvt::{
     benchmark::Teacher,
-    dataset::{OptionalStream, StreamValues, TaskFile, card::DatasetCard, check, manifest, stats},
+    dataset::{
+        OptionalStream, StreamValues, TaskFile,
+        card::{DatasetCard, KeptOutcome},
+        check, manifest, stats,
+    },
     episode_id::EpisodeSplit,
     policy::profile::GripCode,
     runner::{
-        DemoCount, PolicyOptions, SilentObserver,
+        BuiltinPolicy, DemoCount, PolicyOptions, PolicySource, SilentObserver,
         episode_selector::EpisodeSelector,
         record,
         recording::{RecordingOptions, RecordingSummary},
@@ -23,7 +27,7 @@ use crate::support::{Project, Run, SOLIDS, files, fixtures::MISPLACED_CUBE};
 pub struct Recording<'a> {
     pub run: Run<'a>,
     /// The policy; by default the teacher of the suite.
-    pub policy: Option<Teacher>,
+    pub policy: Option<PolicySource>,
     pub options: RecordingOptions,
     pub demos: u32,
     pub attempts: Option<u32>,
@@ -37,6 +41,7 @@ impl<'a> Recording<'a> {
             has_images: true,
             has_privileged: true,
             streams: BTreeSet::new(),
+            keep: KeptOutcome::Safe,
             resume: false,
             gripper: None,
         };
@@ -52,7 +57,7 @@ impl<'a> Recording<'a> {
     /// Makes it. Returns `None` if it is complete already.
     pub fn try_record(&self) -> Result<Option<RecordingSummary>, String> {
         let count = DemoCount { demos: self.demos, attempts: self.attempts };
-        let policy_of = |teacher| PolicyOptions::new(self.policy.unwrap_or(teacher).into());
+        let policy_of = |teacher: Teacher| PolicyOptions::new(self.policy.clone().unwrap_or_else(|| teacher.into()));
         let loaded = self.run.load();
         let recorded = loaded.and_then(|loaded| record(&loaded, policy_of, count, &self.options));
         recorded.map_err(|error| self.run.project.relative(error))
@@ -118,6 +123,40 @@ fn the_first_good_attempts_are_kept() {
     record("b", 3).with(|options| options.resume = true).record();
     assert!(files(&project.path("a")) == files(&project.path("b")), "not the same bytes");
     assert!(record("b", 3).try_record().expect("a recording").is_none(), "already complete");
+}
+
+#[test]
+fn unsafe_demonstrations_are_kept_on_request() {
+    let project = Project::new(&[]);
+    let run = || {
+        project.run("suites/object_soft.lua").tasks(&[3]).set("cameras.width", 40).set("cameras.height", 30)
+    };
+    let by_binary_hand = |out: &str| Recording {
+        policy: Some(PolicySource::Builtin(BuiltinPolicy::ExpertBinary)),
+        attempts: Some(1),
+        ..Recording::new(run(), 1, out)
+    };
+    let refused = by_binary_hand("safe").refusal();
+    assert!(refused.contains("0 of 1 demonstration after 1 attempt (1 deformed too much)"), "{refused}");
+    let summary = by_binary_hand("goal").with(|options| options.keep = KeptOutcome::Goal).record();
+    assert_eq!((summary.tasks[0].demos, summary.tasks[0].attempts), (1, 1));
+    let root = project.path("goal");
+    assert!(!manifest::read(&root).expect("a manifest")[0].success);
+    assert_eq!(DatasetCard::read(&root).expect("a card").keep, KeptOutcome::Goal);
+    assert_eq!(project.json("goal/recording.json")["keep"], "goal");
+    assert_eq!(check::folder(&root, check::CheckScope::Whole).expect("a dataset").problems, [""; 0]);
+    // The label of the grip is that of the closed hand.
+    let path = root.join(&manifest::read(&root).expect("a manifest")[0].hdf5_path);
+    let file = TaskFile::open(&path).expect("a file");
+    let labels = file.array(0, "actions_binary").expect("labels").values;
+    let closures = file.array(0, "actions").expect("actions").values;
+    assert!(
+        labels
+            .chunks(7)
+            .zip(closures.chunks(7))
+            .filter(|(_, action)| action[6] > 0.5)
+            .all(|(label, _)| label[6] == 1.0)
+    );
 }
 
 #[test]
@@ -211,7 +250,7 @@ fn the_teacher_of_a_suite_demonstrates_unless_a_policy_is_given() {
     let taught = MISPLACED_CUBE.replace("episodes = 1,", "episodes = 1, teacher = \"tactile-servo\",");
     let project = Project::new(&[("x.lua", &taught), SOLIDS]);
     let record = |out: &str| Recording::new(project.run("x.lua").threads(1), 1, out);
-    for (given, policy) in [(None, "tactile-servo"), (Some(Teacher::Expert), "expert")] {
+    for (given, policy) in [(None, "tactile-servo"), (Some(Teacher::Expert.into()), "expert")] {
         Recording { policy: given, ..record(policy) }.record();
         let attempts = project.stored(&format!("{policy}/attempts")).expect("a run");
         assert_eq!(attempts[0].text("policy"), policy);
