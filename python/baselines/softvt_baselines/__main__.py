@@ -29,7 +29,7 @@ def _record(args: argparse.Namespace) -> None:
 
     disturbance = DISTURBANCE if args.disturbance is None else args.disturbance
     run_softvt(
-        ["record", args.suite, "--out", str(args.out), *recording_flags(args.demos, args.edge, args.teacher, disturbance), *args.flags]
+        ["record", args.suite, "--out", str(args.out), *recording_flags(args.demos, args.edge, args.teacher, args.keep, disturbance), *args.flags]
     )
 
 
@@ -89,6 +89,8 @@ def _study_of(given: argparse.Namespace, out: Path, flags: list[str], until: flo
         raise UserError(f"--codes {' '.join(unfelt)}: --memory has demonstrations in the codes {', '.join(FELT_CODES)} only")
     if given.memory and "vi" in given.inputs and max(given.replans) > MOSAIC:
         raise UserError(f"--replans {max(given.replans)}: --inputs vi with --memory needs {MOSAIC} or less")
+    if given.memory and (given.keep != "safe" or given.teacher == "expert-binary"):
+        raise UserError("--keep goal and --teacher expert-binary are of recordings of softvt record, which --memory does not use")
     own = ("command", "run", "flags", "queue", "minutes", "out")
     options = {key: value for key, value in vars(given).items() if key not in own}
     if given.disturbance is None:
@@ -186,8 +188,14 @@ def _parser() -> argparse.ArgumentParser:
         sub.add_argument(
             "--teacher",
             default="suite",
-            choices=["suite", "expert", "tactile-servo"],
+            choices=["suite", "expert", "expert-binary", "tactile-servo"],
             help="policy that demonstrates; suite: that of the suite",
+        )
+        sub.add_argument(
+            "--keep",
+            default="safe",
+            choices=["safe", "goal"],
+            help="demonstrations to keep: safe ones, or all that reach the goal; goal is for a teacher that crushes, as expert-binary",
         )
         with_disturbance(sub, None, f"; by default {DISTURBANCE}, and {FELT_DISTURBANCE} with --memory")
 

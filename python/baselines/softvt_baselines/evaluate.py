@@ -32,12 +32,12 @@ def camera_flags(edge: int) -> list[str]:
     return ["--set", f"cameras.width={edge}", "--set", f"cameras.height={edge}"]
 
 
-def recording_flags(demos: int, edge: int, teacher: str, disturbance: float) -> list[str]:
-    """Flags of softvt record. `teacher` is a built-in policy, or "suite" for that of the suite; `disturbance` is the deviation of the robot from its commands, m and
-    4 rad/m."""
+def recording_flags(demos: int, edge: int, teacher: str, keep: str, disturbance: float) -> list[str]:
+    """Flags of softvt record. `teacher` is a built-in policy, or "suite" for that of the suite; `keep` is "safe" or "goal"; `disturbance` is the
+    deviation of the robot from its commands, m and 4 rad/m."""
     moves = ["--set", f"robot.disturbance.position={disturbance}", "--set", f"robot.disturbance.rotation={4 * disturbance}"]
     demonstrates = [] if teacher == "suite" else ["--policy", teacher]
-    return [*demonstrates, "--demos", str(demos), "--no-privileged", *camera_flags(edge), *moves]
+    return [*demonstrates, "--keep", keep, "--demos", str(demos), "--no-privileged", *camera_flags(edge), *moves]
 
 
 @contextmanager

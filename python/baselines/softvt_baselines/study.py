@@ -27,7 +27,7 @@ from .evaluate import recording_flags, run_softvt
 # Script that runs a suite under conditions.
 SHIFTS = "shifts"
 # Options that all results in the folder of a study have in common.
-SAME = ["demos", "steps", "edge", "teacher", "disturbance", "blend", "episodes", "task", "memory", "attempts", "scenes", "ways", "frames"]
+SAME = ["demos", "steps", "edge", "teacher", "keep", "disturbance", "blend", "episodes", "task", "memory", "attempts", "scenes", "ways", "frames"]
 # Switches of train by the letters of inputs.
 SWITCHES = {"p": ["--drives"], "t": ["--touch", "markers"], "b": ["--touch", "contact"], "i": ["--touch", "pictures"]}
 # File beside the results of a run that says where they come from.
@@ -49,6 +49,7 @@ class Study:
     episodes: int
     edge: int = 128
     teacher: str = "suite"  # built-in policy that demonstrates; "suite": that of the suite
+    keep: str = "safe"  # demonstrations to keep: "safe", or "goal" for all that reach it
     disturbance: float = 0.002  # m
     blend: float = 0.5  # share of the last answer in the next one
     per_gpu: int = 1  # policies that are trained on one GPU at a time
@@ -242,7 +243,7 @@ def _record(suite: str, code: str, study: Study) -> None:
         words += ["--tactile-pictures"] * any("i" in inputs for inputs in study.inputs)
         _call(words, study.out / "logs" / f"{recording.name}.log")
     else:
-        flags = ["--out", str(recording), "--resume", *recording_flags(study.demos, study.edge, study.teacher, study.disturbance)]
+        flags = ["--out", str(recording), "--resume", *recording_flags(study.demos, study.edge, study.teacher, study.keep, study.disturbance)]
         flags += ["--task", study.task] if study.task else []
         run_softvt(["record", f"suites/{suite}.lua", *flags])
     pack(recording, study.edge, processors())
