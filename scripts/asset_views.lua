@@ -50,7 +50,7 @@ local function grasped(asset, close)
     local object = scene:object "object"
     local at = grasp.pose(object, grasp.height(object))
     if object.hints.grasp_rim_m then at = grasp.choose(scene, object, grasp.height(object)).pose end
-    arm:move_to(at:translated { 0, 0, 0.08 }, { speed = 0.6, angular_speed = 2.5 })
+    arm:move_to(at:translated { 0, 0, 0.08 }, { speed = 0.6, angular_speed = 3 })
     arm:move_to(at, { speed = 0.25 })
     close(arm, object)
     arm:wait(0.3)

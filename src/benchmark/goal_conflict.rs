@@ -4,22 +4,30 @@ use std::collections::BTreeMap;
 
 use crate::goal::{Goal, Parts};
 
-/// The reason for which a goal can never be met within `budget_s`, in words; `None` if none was found.
+/// The reason for which a goal can never be met, in words; `None` if none was found.
 ///
 /// Predicates that must hold at once are compared in pairs, and what rests on what must not be a circle. Of
 /// `softvt.any`, each alternative is compared with what must hold beside it. Geometry is not considered.
-pub fn conflict(goal: &Goal, budget_s: f64) -> Option<String> {
-    let least_s = least_time(goal);
-    if least_s > budget_s {
-        return Some(format!(
-            "what it must hold takes {least_s} s, and the budget of the task is {budget_s} s"
-        ));
+pub fn conflict(goal: &Goal) -> Option<String> {
+    let moment = Moment::of(goal);
+    if let Some(found) = moment.conflict() {
+        return Some(found);
     }
-    conflict_within(goal)
+    if let Some(found) = moment.earlier.iter().find_map(|step| conflict(step)) {
+        return Some(found);
+    }
+    moment.alternatives.iter().find_map(|parts| {
+        let conflicts = parts.goals.iter().map(|part| {
+            let mut with = Moment { earlier: Vec::new(), ..moment.clone() };
+            with.add(part);
+            with.conflict()
+        });
+        conflicts.collect::<Option<Vec<String>>>().and_then(|mut found| found.pop())
+    })
 }
 
 /// Least time that a goal takes, s: its predicates must hold for a time.
-fn least_time(goal: &Goal) -> f64 {
+pub fn least_time(goal: &Goal) -> f64 {
     let times = |parts: &Parts| parts.goals.iter().map(least_time).collect::<Vec<_>>();
     match goal {
         Goal::On(of) | Goal::Inside(of) | Goal::Near { of, .. } | Goal::Beside { of, .. } => of.hold_s,
@@ -123,24 +131,6 @@ fn circle_from<'a>(supports: &BTreeMap<&'a str, Vec<&'a str>>, path: Vec<&'a str
     further.into_iter().find_map(|next| circle_from(supports, path.iter().copied().chain([*next]).collect()))
 }
 
-fn conflict_within(goal: &Goal) -> Option<String> {
-    let moment = Moment::of(goal);
-    if let Some(found) = moment.conflict() {
-        return Some(found);
-    }
-    if let Some(found) = moment.earlier.iter().find_map(|step| conflict_within(step)) {
-        return Some(found);
-    }
-    moment.alternatives.iter().find_map(|parts| {
-        let conflicts = parts.goals.iter().map(|part| {
-            let mut with = Moment { earlier: Vec::new(), ..moment.clone() };
-            with.add(part);
-            with.conflict()
-        });
-        conflicts.collect::<Option<Vec<String>>>().and_then(|mut found| found.pop())
-    })
-}
-
 /// True if two predicates can never hold at once.
 fn excludes(first: &Goal, other: &Goal) -> bool {
     match (first, other) {
@@ -204,7 +194,7 @@ mod tests {
     #[test]
     fn goals_that_contradict_themselves_are_found() {
         let found = |goal: Goal, expected: &str| {
-            let message = conflict(&goal, 10.0).unwrap_or_default();
+            let message = conflict(&goal).unwrap_or_default();
             assert!(message.contains(expected), "{expected}: {message:?}");
         };
         found(all(vec![on("a", "b"), none(vec![on("a", "b")])]), "\"a on b\" must hold and must not hold");
@@ -217,8 +207,14 @@ mod tests {
         found(all(vec![opened(0.7), any(vec![closed(0.1), none(vec![opened(0.7)])])]), "drawer open");
         found(sequence(vec![all(vec![opened(0.7), closed(0.1)]), on("a", "b")]), "cannot hold at once");
         found(none(vec![none(vec![opened(0.7)]), opened(0.7)]), "must hold and must not hold");
+    }
+
+    #[test]
+    fn the_least_time_of_a_goal_is_that_of_its_longest_way() {
         let held = |hold_s| Goal::Upright { object: "a".into(), hold_s, angle_rad: 0.1 };
-        found(sequence(vec![held(6.0), held(5.0)]), "takes 11 s, and the budget of the task is 10 s");
+        let both = || vec![held(6.0), held(5.0)];
+        let least = [sequence(both()), all(both()), any(both()), none(both())].map(|goal| least_time(&goal));
+        assert_eq!(least, [11.0, 6.0, 5.0, 0.0]);
     }
 
     #[test]
@@ -234,7 +230,7 @@ mod tests {
             none(vec![opened(0.7), closed(0.1)]),
             all(vec![closed(0.1), none(vec![sequence(vec![opened(0.7), closed(0.1)])])]),
         ] {
-            assert_eq!(conflict(&goal, 10.0), None, "{}", goal.describe());
+            assert_eq!(conflict(&goal), None, "{}", goal.describe());
         }
     }
 }

@@ -3,13 +3,14 @@
 use std::collections::BTreeSet;
 
 use super::asset_cache::{AssetCache, ThicknessProbe};
-use softvt_benchmark::Task;
+use softvt_benchmark::{CONTROL_DT, Task, goal_conflict::least_time};
+use softvt_common::text::format_number;
 use softvt_geometry::pieces::SeparatePieces;
 use softvt_robot::gripper::MAX_WIDTH;
 use softvt_scene::{Asset, Body, Scene, SoftMaterial};
 
-/// Warnings about a scene of a task, one line each: materials, soft bodies of few voxels, rigid bodies of several
-/// pieces, and a target that the gripper cannot grasp.
+/// Warnings about a scene of a task, one line each: materials, soft bodies of few voxels, bodies of several pieces, a
+/// target that the gripper cannot grasp, and a budget below what the goal takes.
 pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSet<String> {
     let warnings = |asset: &Asset| {
         let name = asset.name.clone();
@@ -24,7 +25,21 @@ pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSe
     let targets = task.targets();
     let targets = scene.objects.iter().filter(|object| targets.contains(&object.name.as_str()));
     all.extend(targets.filter_map(|target| width_warning(&target.asset)));
+    all.extend(budget_warning(task));
     all
+}
+
+/// A warning about a task whose budget ends before its goal can have held.
+fn budget_warning(task: &Task) -> Option<String> {
+    let (least_s, budget_s) = (least_time(&task.goal), f64::from(task.budget_steps) * CONTROL_DT);
+    (least_s > budget_s).then(|| {
+        format!(
+            "task {}: the goal must hold for {} s, and the budget is {} s: no episode can reach it",
+            task.id,
+            format_number(least_s),
+            format_number(budget_s)
+        )
+    })
 }
 
 /// Voxels across a soft body below which its forces can be wrong by more than half.

@@ -20,6 +20,9 @@ fn warnings_are_printed_and_errors_refused() {
     let output = light.project().succeeds("check x.lua");
     assert!(output.err.contains("softvt: warning: asset cube: youngs_pa is 40 Pa"), "{}", output.err);
     assert!(!Small::default().project().succeeds("check x.lua").err.contains("warning"));
+    let short = Small { task: "budget_steps = 4", ..Small::default() }.project().succeeds("check x.lua").err;
+    let expected = "task 0: the goal must hold for 0.4 s, and the budget is 0.2 s: no episode can reach it";
+    assert!(short.contains(expected), "{short}");
     let sunk = Small { at: "position = { 0, 0.1, -0.012 }", ..Small::default() };
     assert_eq!(
         sunk.project().refusal("check x.lua"),

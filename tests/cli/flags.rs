@@ -191,11 +191,12 @@ fn a_folder_with_other_files_is_refused() {
 fn a_full_device_is_an_error_and_a_closed_pipe_is_not() {
     let project = Small { task: "budget_steps = 1", ..Small::default() }.project();
     project.succeeds("x.lua --policy noop --out run");
+    project.succeeds("x.lua --policy random --out random");
     for words in [
         "list tasks",
         "list assets --json",
         "--version",
-        "compare run run",
+        "compare run random",
         "x.lua --policy noop --json --out run",
         "check x.lua",
     ] {

@@ -253,6 +253,10 @@ fn what_cannot_be_shown_is_refused() {
         ("watch run --policy noop".to_owned(), "--policy has no effect on the run run; leave it out"),
         ("watch run --task cube".to_owned(), "--task: expected the index"),
         ("watch none.lua".to_owned(), "none.lua"),
+        ("watch none".to_owned(), "none: no such file or folder; give a Lua file or a run folder"),
+        ("watch run --episode 9".to_owned(), "run: the run has no episode 9 of task 0; it has 0"),
+        ("watch run --task 5".to_owned(), "run: the run has no episode of task 5"),
+        ("compare run run".to_owned(), "run and run are the same folder; give different runs"),
         ("watch x.lua --episodes 3".to_owned(), "--out"),
     ] {
         let message = project.refusal(&words);

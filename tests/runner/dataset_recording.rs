@@ -57,7 +57,8 @@ impl<'a> Recording<'a> {
     /// Makes it. Returns `None` if it is complete already.
     pub fn try_record(&self) -> Result<Option<RecordingSummary>, String> {
         let count = DemoCount { demos: self.demos, attempts: self.attempts };
-        let policy_of = |teacher: Teacher| PolicyOptions::new(self.policy.clone().unwrap_or_else(|| teacher.into()));
+        let policy_of =
+            |teacher: Teacher| PolicyOptions::new(self.policy.clone().unwrap_or_else(|| teacher.into()));
         let loaded = self.run.load();
         let recorded = loaded.and_then(|loaded| record(&loaded, policy_of, count, &self.options));
         recorded.map_err(|error| self.run.project.relative(error))

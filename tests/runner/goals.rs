@@ -111,6 +111,9 @@ fn wrong_goals_are_refused_at_their_line() {
     assert_snapshot!(error("softvt.all { on, chest }"), @"x.lua:11: softvt.all: goals[2]: expected the result of one of softvt.on{…}, softvt.inside{…}, softvt.stacked{…}, softvt.opened{…}, softvt.closed{…}, softvt.turned{…}, softvt.near{…}, softvt.beside{…}, softvt.upright{…}, softvt.predicate{…}, softvt.all{…}, softvt.any{…}, softvt.none{…}, softvt.sequence{…}, got a table");
     assert_snapshot!(error("softvt.opened { joint = 'chest.tray' }"), @"x.lua:12: task.object: missing; the goal names no object, and the deformation and grip of one are judged: give its scene name");
     assert_snapshot!(error("softvt.all { on, softvt.opened { joint = 'chest.try' } }"), @r#"x.lua:11: task.goal.joint: unknown joint "chest.try"; did you mean "chest.tray"?"#);
+    assert_snapshot!(error("softvt.all { on, softvt.none { softvt.any { on } } }"), @r#"x.lua:12: task.goal: can never be met: "block on chest.tray" must hold and must not hold"#);
+    assert_snapshot!(error("softvt.stacked { objects = { 'block', 'chest', 'block' } }"), @"x.lua:12: task.goal: can never be met: block, chest rest on each other in a circle");
+    assert_snapshot!(error("softvt.all { on, softvt.turned { joint = 'chest.tray', range = { 2, 3 } } }"), @"x.lua:8: task 0: goal.range is beyond the limits of chest.tray, 0..0.08");
     assert_snapshot!(error("softvt.all { on, softvt.turned { joint = 'chest.tray', range = { 2, 1 } } }"), @"x.lua:11: task.goal.range: the lowest value 2 is above the highest, 1; swap them");
     assert_snapshot!(error("softvt.stacked { objects = { 'block' } }"), @"x.lua:11: task.goal.objects: expected at least two objects, from the lowest on");
     assert_snapshot!(error("softvt.left_of { object = 'block' }"), @"x.lua:11: task.goal.target: missing; expected a string that is not empty");

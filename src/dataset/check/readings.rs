@@ -21,7 +21,12 @@ impl DemoCheck<'_> {
         if !self.file.has(self.demo, name) {
             return Vec::new();
         }
-        self.report.take(self.file.array(self.demo, name)).map_or(Vec::new(), |array| array.values)
+        match self.report.take(self.file.stream(self.demo, name)).map(|stream| stream.values) {
+            Some(StreamValues::F64(values)) => values,
+            Some(StreamValues::F32(values)) => values.into_iter().map(f64::from).collect(),
+            Some(StreamValues::U8(values)) => values.into_iter().map(f64::from).collect(),
+            None => Vec::new(),
+        }
     }
 
     /// Adds a problem at the first of `rows` for which `is_wrong` holds.

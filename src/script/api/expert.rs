@@ -251,10 +251,10 @@ fn checks(lua: &Lua) -> mlua::Result<Table> {
 const CLOSURE: Type = Type::Number("", Range::closed(0.0, 1.0));
 /// Rate of the gripper; 1 is the whole stroke in a second.
 const RATE: Type = Type::Number("1/s", Range::POSITIVE);
-/// Largest speed and angular speed of the tool, m/s and rad/s (Franka Control Interface documentation, Robot and
-/// interface specifications: Cartesian space limits).
-const MAX_SPEED: f64 = 1.7;
-const MAX_ANGULAR_SPEED: f64 = 2.5;
+/// Largest speed and angular speed of the tool, m/s and rad/s: four times the limits of the real arm (Franka Control
+/// Interface documentation, Robot and interface specifications: Cartesian space limits). Above, the unit is likely wrong.
+const MAX_SPEED: f64 = 6.8;
+const MAX_ANGULAR_SPEED: f64 = 10.0;
 /// Largest force of the hand, N (Franka Hand, product manual: maximum grasping force).
 const MAX_GRIP_FORCE: f64 = 140.0;
 

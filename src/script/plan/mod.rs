@@ -33,7 +33,7 @@ use crate::{
 };
 use options::{OptionSession, OptionSpec, SharedOptions};
 use softvt_benchmark::{
-    CONTROL_DT, Condition, Goal, ObjectType, Plan, Shift, ShiftValue, Suite, Task, TaskDifference,
+    Condition, Goal, ObjectType, Plan, Shift, ShiftValue, Suite, Task, TaskDifference,
     goal_conflict::conflict, seed::SecretSeed, settings::Settings,
 };
 use softvt_common::{parallel::lock, text::unknown_name};
@@ -470,8 +470,7 @@ fn task(lua: &Lua, id: usize, spec: &Constructed<TaskSpec>, budget: u32) -> mlua
             return Err(fail_at_key(lua, table, "range", message));
         }
     }
-    let budget_steps = spec.budget_steps.unwrap_or(budget);
-    if let Some(conflict) = conflict(&goal, f64::from(budget_steps) * CONTROL_DT) {
+    if let Some(conflict) = conflict(&goal) {
         let message = format!("task.goal: can never be met: {conflict}");
         return Err(fail_at_key(lua, &spec.table, "goal", message));
     }
@@ -482,7 +481,7 @@ fn task(lua: &Lua, id: usize, spec: &Constructed<TaskSpec>, budget: u32) -> mlua
         layout: spec.layout.name.clone(),
         object: spec.object_name(lua)?,
         goal,
-        budget_steps,
+        budget_steps: spec.budget_steps.unwrap_or(budget),
         expert: spec.expert.is_some(),
     })
 }

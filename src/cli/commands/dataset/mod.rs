@@ -164,11 +164,11 @@ fn run_export(args: ExportArgs) -> Result<(), CliError> {
         progress.get_or_insert_with(|| Progress::new(total, "export")).tick(episode);
     });
     drop(progress);
-    warn_of_problems(&config.data)?;
     let exported = exported.map_err(|error| match error {
         DatasetError::Interrupted => CliError::interrupted("interrupted; nothing was written"),
         other => CliError::input(other),
     })?;
+    warn_of_problems(&config.data)?;
     print(&format!(
         "{}, {}, {}: {}\n",
         counted(exported.episodes, "episode"),
