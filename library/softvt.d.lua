@@ -641,8 +641,8 @@
 
 ---Options of a motion of the arm.
 ---@class softvt.MotionOptions
----@field speed? number Largest speed. Expects a number (m/s) above 0. Default 0.25.
----@field angular_speed? number Largest angular speed. Expects a number (rad/s) above 0. Default 1.5.
+---@field speed? number Largest speed. Expects a number (m/s) in above 0..6.8. Default 0.25.
+---@field angular_speed? number Largest angular speed. Expects a number (rad/s) in above 0..10. Default 1.5.
 ---@field closure? number Closure at the end; by default it stays. Expects a number in 0..1.
 
 ---Options of closing and opening.
@@ -653,7 +653,7 @@
 ---@class softvt.GraspOptions
 ---@field rate? number Rate of the gripper; 1 is the whole stroke in a second. Expects a number (1/s) above 0. Default 0.5.
 ---@field width? number Measured distance of the gels at which closing stops. A tactile servo ignores it. Expects metres in 0..0.08.
----@field force? number Mean normal force per pad at which closing stops. A tactile servo ignores it. Expects a number (N) above 0.
+---@field force? number Mean normal force per pad at which closing stops. A tactile servo ignores it. Expects a number (N) in above 0..140.
 
 ---Options of releasing an object.
 ---@class softvt.ReleaseOptions

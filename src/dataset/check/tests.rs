@@ -226,6 +226,7 @@ fn joint_positions_torques_and_depths_in_other_units_are_reported() {
     );
     let mut elsewhere = demonstration(0.0);
     elsewhere.actions[2].joints = Some(elsewhere.joint_commands[2]);
+    elsewhere.actions[2].position_b.x += 0.01;
     let (_folder, path) = write(&elsewhere, "task.hdf5");
     let text = file(&path).unwrap().problems.join("\n");
     assert!(

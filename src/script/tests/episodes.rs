@@ -318,7 +318,7 @@ fn an_object_can_stand_on_another() {
 fn a_motion_is_straight_and_never_faster_than_requested() {
     let commands = run(
         "local ball = scene:object 'ball'\n\
-         arm:move_to(softvt.pose { position = ball.centre }, { speed = 0.2, angular_speed = 100 })\narm:close_to(0.5, { rate = 1 })",
+         arm:move_to(softvt.pose { position = ball.centre }, { speed = 0.2, angular_speed = 10 })\narm:close_to(0.5, { rate = 1 })",
     )
     .unwrap();
     let at = |c: &ExpertCommand| c.pose_b.translation.vector;
