@@ -96,7 +96,6 @@ pub enum KeptOutcome {
 
 impl KeptOutcome {
     /// True for [`Self::Safe`].
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
     pub fn is_safe(&self) -> bool {
         *self == Self::Safe
     }

@@ -90,21 +90,16 @@ impl DemoCheck<'_> {
             );
         }
         let widths: Vec<f64> = fingers.as_chunks::<2>().0.iter().map(|[left, right]| left + right).collect();
-        let of_width: [(&str, fn(f64) -> f64, f64, &str); 3] = [
-            ("obs/gripper_width", |width| width, TOLERANCE, "not the sum of obs/gripper_pos"),
-            (
-                "obs/gripper_width_sensed",
-                |width| width,
-                SENSOR_ERROR,
-                "not near obs/gripper_width: is it in m?",
-            ),
-            ("obs/gripper_close_norm", |width| 1.0 - width / MAX_WIDTH, TOLERANCE, "not 1 - width / 0.08 m"),
-        ];
-        for (name, expected, tolerance, what) in of_width {
+        let mut check = |name: &str, tolerance: f64, what: &str, expected: &dyn Fn(f64) -> f64| {
             let values = self.values(name);
             let is_wrong = |(value, width): &(&f64, &f64)| (*value - expected(**width)).abs() > tolerance;
             self.add_first(name, values.iter().zip(&widths), is_wrong, what);
-        }
+        };
+        check("obs/gripper_width", TOLERANCE, "not the sum of obs/gripper_pos", &|width| width);
+        let far = "not near obs/gripper_width: is it in m?";
+        check("obs/gripper_width_sensed", SENSOR_ERROR, far, &|width| width);
+        let not_norm = "not 1 - width / 0.08 m";
+        check("obs/gripper_close_norm", TOLERANCE, not_norm, &|width| 1.0 - width / MAX_WIDTH);
         let states = self.values("obs/state");
         let fingers = states.as_chunks::<7>().0.iter().map(|row| row[6]).zip(&widths);
         let is_wrong = |(finger, width): &(f64, &f64)| (finger - 0.5 * *width).abs() > 0.5 * SENSOR_ERROR;

@@ -252,7 +252,8 @@ const CLOSURE: Type = Type::Number("", Range::closed(0.0, 1.0));
 /// Rate of the gripper; 1 is the whole stroke in a second.
 const RATE: Type = Type::Number("1/s", Range::POSITIVE);
 /// Largest speed and angular speed of the tool, m/s and rad/s: four times the limits of the real arm (Franka Control
-/// Interface documentation, Robot and interface specifications: Cartesian space limits). Above, the unit is likely wrong.
+/// Interface documentation, Robot and interface specifications: Cartesian space limits). Above them, the unit is likely
+/// wrong.
 const MAX_SPEED: f64 = 6.8;
 const MAX_ANGULAR_SPEED: f64 = 10.0;
 /// Largest force of the hand, N (Franka Hand, product manual: maximum grasping force).

@@ -178,8 +178,8 @@ fn run_export(args: ExportArgs) -> Result<(), CliError> {
     ))
 }
 
-/// Tells the first problem of the numbers of a recording. Recordings of earlier versions lack streams that an export does
-/// not need.
+/// Tells the first problem of the numbers of a recording. Recordings of earlier versions lack streams that an export
+/// does not need.
 fn warn_of_problems(data: &Path) -> Result<(), CliError> {
     let problems = check::folder(data, CheckScope::Numbers)?.problems;
     if let Some(first) = problems.first() {
