@@ -46,7 +46,7 @@ def texts(argument: str, value: Any) -> tuple[str, ...]:
     found = tuple(value)
     for entry in found:
         if not isinstance(entry, str):
-            raise ValueError(f"{argument}={value!r}: expected a list of texts; {entry!r} is none")
+            raise ValueError(f"{argument}={value!r}: expected a list of texts, got {entry!r} in it")
     return found
 
 

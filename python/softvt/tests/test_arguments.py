@@ -99,7 +99,7 @@ class Arguments(unittest.TestCase):
                 ("first_seed", "a", "expected a whole number"),
                 ("cameras", "wrist", r'expected a list; write cameras=\("wrist",\)'),
                 ("flags", "--shift stiffness=0.5", r'expected a list; write flags=\("--shift", "stiffness=0.5"\)'),
-                ("flags", ("--shift", 0.5), "0.5 is none"),
+                ("flags", ("--shift", 0.5), "got 0.5 in it"),
                 ("cost", "no", "expected True or False"),
                 ("gripper", None, "expected 'continuous'"),
             ]:
