@@ -74,7 +74,8 @@ pub struct EpisodeSpec {
     pub record_trace: bool,
     /// True if traces hold the node positions of soft bodies.
     pub trace_nodes: bool,
-    /// Functions of the script that the goal asks for ([`Goal::Predicate`](softvt_benchmark::Goal::Predicate)), in the order of the goal.
+    /// Functions of the script that the goal asks for
+    /// ([`Goal::Predicate`](softvt_benchmark::Goal::Predicate)), in the order of the goal.
     pub predicates: Vec<Arc<dyn StatePredicate>>,
     /// Secret of a judged run.
     pub secret: Option<SecretSeed>,
