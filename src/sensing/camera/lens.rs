@@ -170,11 +170,9 @@ impl Lens {
         (corner + right * x + down * y).normalized().z
     }
 
-    /// Least depth along the optical axis of the points of a box `[low, high]`, m.
-    pub(crate) fn least_depth(&self, [low, high]: &[V3; 2]) -> f32 {
-        let axis: V3 = -self.to_view.row(2).transpose();
-        let middle = (low + high) * 0.5 - self.eye;
-        middle.dot(&axis) - 0.5 * (high - low).dot(&axis.abs())
+    /// Depth of a point of the world along the optical axis, m.
+    pub(crate) fn depth(&self, p_w: &V3) -> f32 {
+        -self.in_camera_frame(p_w).z
     }
 
     /// False if a ball lies wholly outside the view frustum.

@@ -23,7 +23,7 @@ const CREASE_COSINE: f32 = 0.8;
 /// Maximum length of the edges of a coarse level with a pattern, pixels.
 const MAX_EDGE_PIXELS: f32 = 1.7;
 /// Maximum geometric error of a coarse level that is uniform or textured, pixels.
-const MAX_ERROR_PIXELS: f32 = 0.5;
+const MAX_ERROR_PIXELS: f32 = 0.25;
 /// Reach of ambient occlusion by the object itself, in longest extents of the object.
 const OCCLUSION_REACH: f64 = 0.12;
 

@@ -531,8 +531,7 @@ pub(crate) fn restore_tiles(charts: &[TextureChart], tiles: Vec<PaintedTile>) {
 }
 
 /// Edge of a tile, texels.
-const TILE: usize = 1 << TILE_BITS;
-const TILE_BITS: i32 = 5;
+const TILE: usize = 32;
 
 /// A level of a mip map, in tiles of packed texels.
 #[derive(Clone, Debug)]
@@ -564,38 +563,25 @@ impl MipLevel {
         let (x, y) = (clamped(u, self.size[0]), clamped(v, self.size[1]));
         let (i, j) = (x.fast_trunc_int(), y.fast_trunc_int());
         let columns = self.size[0].div_ceil(TILE);
-        let tiles = (j >> TILE_BITS) * i32x8::splat(columns as i32) + (i >> TILE_BITS);
-        let tile = tiles.to_array()[0] as usize;
-        // Texels and width of a tile.
-        let texels_of = |index: usize| {
-            let corner = [index % columns * TILE, index / columns * TILE];
-            let texels = self.tiles.get(index).map_or(&[][..], |tile| tile.get_or_init(|| paint(corner)));
-            (texels, self.tile_size(corner)[0])
-        };
-        let (mut texels, mut width) = texels_of(tile);
-        let within = i32x8::splat(TILE as i32 - 1);
+        let (at_x, at_y): ([u32; LANES], [u32; LANES]) = (cast(i), cast(j));
         let mut corners = [[0_u32; LANES]; 4];
-        let mut fetch = |lane: usize, first: usize, texels: &[u32], width: usize| {
+        // The tile of the last lane: neighbouring points mostly have the same.
+        let (mut known, mut texels, mut width) = (usize::MAX, &[][..], 0);
+        for lane in 0..LANES {
+            let [i, j] = [at_x, at_y].map(|at| at[lane] as usize);
+            let (column, row) = (i / TILE, j / TILE);
+            let index = row * columns + column;
+            if index != known {
+                let corner = [column * TILE, row * TILE];
+                known = index;
+                texels = self.tiles.get(index).map_or(&[][..], |tile| tile.get_or_init(|| paint(corner)));
+                width = self.tile_size(corner)[0];
+            }
+            let first = (j % TILE) * width + i % TILE;
             let rows = texels.get(first..first + width + 2).unwrap_or_default();
             if let (Some(top), Some(bottom)) = (rows.first_chunk::<2>(), rows.last_chunk::<2>()) {
                 (corners[0][lane], corners[1][lane]) = (top[0], top[1]);
                 (corners[2][lane], corners[3][lane]) = (bottom[0], bottom[1]);
-            }
-        };
-        if tiles.simd_eq(i32x8::splat(tile as i32)).all() {
-            let first = ((j & within) * i32x8::splat(width as i32) + (i & within)).to_array();
-            (0..LANES).for_each(|lane| fetch(lane, first[lane] as usize, texels, width));
-        } else {
-            let (at_x, at_y, tiles) = ((i & within).to_array(), (j & within).to_array(), tiles.to_array());
-            // Neighbouring points mostly have the same tile.
-            let mut known = tile;
-            for lane in 0..LANES {
-                let index = tiles[lane] as usize;
-                if index != known {
-                    known = index;
-                    (texels, width) = texels_of(index);
-                }
-                fetch(lane, at_y[lane] as usize * width + at_x[lane] as usize, texels, width);
             }
         }
         let fraction = |x: f32x8, i: i32x8| x - f32x8::from_i32x8(i);
@@ -612,15 +598,13 @@ fn blend(corners: [u32x8; 4], x: f32x8, y: f32x8) -> [f32x8; 4] {
     let mask = u32x8::splat(0xFF);
     let mut sum = [f32x8::ZERO; 4];
     for (texel, weight) in corners.into_iter().zip(weights) {
-        let byte = |texel: u32x8| f32x8::from_i32x8(cast(texel & mask));
+        let byte = |texel: u32x8| f32x8::from_i32x8(cast(texel & mask)) * f32x8::splat(1.0 / 255.0);
         let [r, g, b, roughness] = [byte(texel), byte(texel >> 8), byte(texel >> 16), byte(texel >> 24)];
         for (sum, value) in sum.iter_mut().zip([r * r, g * g, b * b, roughness]) {
             *sum += weight * value;
         }
     }
-    let [r, g, b, roughness] = sum;
-    let square = f32x8::splat(1.0 / (255.0 * 255.0));
-    [r * square, g * square, b * square, roughness * f32x8::splat(1.0 / 255.0)]
+    sum
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The texels of a shadow map: the greatest height drawn at the centre of each, and every other one for wide filters.
+//! The texels of a shadow map: the greatest height drawn at the centre of each.
 
 use super::{
     ScreenCorners,
@@ -12,8 +12,6 @@ pub(crate) struct HeightBuffer {
     edge: usize,
     /// Height towards the light. Rows are [`LANES`] longer than `edge`, since texels are written eight at a time.
     pub(crate) heights: Vec<f32>,
-    /// Every other texel of every other row, beginning with the first, with longer rows as well.
-    pub(crate) sparse: Vec<f32>,
     /// First row drawn to, and the end of the last one.
     pub(crate) drawn_rows: [usize; 2],
 }
@@ -21,13 +19,7 @@ pub(crate) struct HeightBuffer {
 impl HeightBuffer {
     /// A buffer of `edge` × `edge` texels of this height.
     pub(crate) fn new(edge: usize, height: f32) -> Self {
-        let half = edge / 2;
-        Self {
-            edge,
-            heights: vec![height; edge * (edge + LANES)],
-            sparse: vec![height; half * (half + LANES)],
-            drawn_rows: [edge, 0],
-        }
+        Self { edge, heights: vec![height; edge * (edge + LANES)], drawn_rows: [edge, 0] }
     }
 
     /// Length of a row in memory.
@@ -35,18 +27,11 @@ impl HeightBuffer {
         self.edge + LANES
     }
 
-    /// Length of a row of [`sparse`](Self::sparse) in memory.
-    pub(crate) fn sparse_stride(&self) -> usize {
-        self.edge / 2 + LANES
-    }
-
     /// Clears the rows that were drawn to.
     pub(crate) fn clear(&mut self, height: f32) {
-        let [from, to] = self.drawn_rows;
+        let [from, to] = self.drawn_rows.map(|row| row * self.stride());
         if from < to {
-            let (stride, sparse_stride) = (self.stride(), self.sparse_stride());
-            self.heights[from * stride..to * stride].fill(height);
-            self.sparse[from.div_ceil(2) * sparse_stride..to.div_ceil(2) * sparse_stride].fill(height);
+            self.heights[from..to].fill(height);
         }
         self.drawn_rows = [self.edge, 0];
     }
@@ -58,13 +43,6 @@ impl HeightBuffer {
         for some in triangles.chunks(LANES) {
             let block = TriangleBlock::new(some.iter().map(|corners| (corners, 0)), &target);
             block.triangles().for_each(|t| self.draw_triangle(&t));
-        }
-        let (stride, sparse_stride) = (self.stride(), self.sparse_stride());
-        let [from, to] = self.drawn_rows.map(|row| row.div_ceil(2));
-        for row in from..to {
-            let texels = self.heights[2 * row * stride..].as_chunks::<2>().0;
-            let sparse = &mut self.sparse[row * sparse_stride..][..self.edge / 2];
-            sparse.iter_mut().zip(texels).for_each(|(sparse, [first, _])| *sparse = *first);
         }
     }
 

@@ -68,9 +68,8 @@ impl<'a> PosedObject<'a> {
         let (centre, radius) = ((low + high) * 0.5, 0.5 * (high - low).norm());
         let is_hidden = view.hidden_id != 0 && object.segmentation_id == view.hidden_id;
         let drawn = if !is_hidden && lens.may_see(&centre, BOUNDS_MARGIN * radius) {
-            let pixel = lens.least_depth(&bounds).max(lens.near) / lens.focal;
-            // What is drawn is not coarser than its shadow, or it would shade itself.
-            let level = mesh.coarsest_where(|lod| lod.is_fine_enough(pixel))?.min(caster_level);
+            let pixel = (lens.depth(&centre) - radius).max(lens.near) / lens.focal;
+            let level = mesh.coarsest_where(|lod| lod.is_fine_enough(pixel))?;
             Some(if level == caster_level { caster.clone() } else { pose(level)? })
         } else {
             None

@@ -34,11 +34,11 @@ const MAX_NORMAL_ERROR: f32 = 0.1;
 const MIN_COSINE: f32 = 0.02;
 /// Maximum slope of a receiver plane; steeper ones say nothing about the height of occluders.
 const MAX_RECEIVER_SLOPE: f32 = 1.5;
-/// Maximum radius of the filter and of the search for occluders, texels: one vector wide, of every other texel.
+/// Maximum radius of the filter and of the search for occluders, texels: two vectors wide.
 const MAX_RADIUS: f32 = 7.4;
 /// Minimum radius of the filter, texels.
 const MIN_RADIUS: f32 = 1.5;
-/// Maximum radius of a filter of all texels, which is one vector wide, texels.
+/// Maximum radius of a filter one vector wide, texels.
 const MAX_RADIUS_ONE_VECTOR: f32 = 3.4;
 /// Maximum length of a run of eight points, texels, that is interpolated from [`RUN_NODES`]: the
 /// filter is smooth enough.
@@ -268,9 +268,9 @@ impl ShadowMap {
         let filter = |i: usize| {
             let receiver = PenumbraFilter {
                 map: self,
-                position: [position[0][i], position[1][i], position[2][i]],
-                slope: [slopes[0][i], slopes[1][i]],
-                clamped_slope: [clamped_slope[0][i], clamped_slope[1][i]],
+                position: position.map(|x| x[i]),
+                slope: slopes.map(|slope| slope[i]),
+                clamped_slope: clamped_slope.map(|slope| slope[i]),
                 bias: bias[i],
                 cone: self.tangent * self.texels_per_metre,
             };
@@ -346,12 +346,12 @@ struct PenumbraFilter<'a> {
     cone: f32,
 }
 
-/// Weighted sums over the texels around a receiver, by column.
+/// Weighted sums over the texels around a receiver.
 struct FilterSums {
-    lit: f32x8,
-    occluded: f32x8,
+    lit: f32,
+    occluded: f32,
     /// Of occluders: weight × height above the receiver, m.
-    occluder_height: f32x8,
+    occluder_height: f32,
 }
 
 impl PenumbraFilter<'_> {
@@ -365,81 +365,78 @@ impl PenumbraFilter<'_> {
         let deviation = both_axes(|f, axis| (f.map.ground_slope[axis] - f.clamped_slope[axis]).abs());
         let search_radius =
             (MIN_RADIUS + (range.max + deviation * MAX_RADIUS) * self.cone).clamp(MIN_RADIUS, MAX_RADIUS);
-        let search = self.sums::<true>(search_radius);
-        let is_positive = |sum: f32x8| sum.simd_gt(f32x8::ZERO).any();
-        if !is_positive(search.occluded) {
+        let search = match search_radius {
+            ..=MAX_RADIUS_ONE_VECTOR => self.sums::<1, 1, true>(search_radius),
+            _ => self.sums::<2, 2, true>(search_radius),
+        };
+        if search.occluded <= 0.0 {
             return 1.0;
         }
-        if !is_positive(search.lit) {
+        if search.lit <= 0.0 {
             return 0.0;
         }
-        let mean_height = sum_lanes(search.occluder_height) / sum_lanes(search.occluded);
+        let mean_height = search.occluder_height / search.occluded;
         let radius = (mean_height * self.cone).clamp(MIN_RADIUS, search_radius);
-        let FilterSums { lit, occluded, .. } = self.sums::<false>(radius);
-        if !is_positive(occluded) {
-            return 1.0;
-        }
-        let lit = sum_lanes(lit);
-        lit / (lit + sum_lanes(occluded))
+        let filtered = match radius {
+            ..=MAX_RADIUS_ONE_VECTOR => self.sums::<1, 1, false>(radius),
+            _ => self.sums::<2, 2, false>(radius),
+        };
+        if filtered.occluded <= 0.0 { 1.0 } else { filtered.lit / (filtered.lit + filtered.occluded) }
     }
 
-    /// Sums over a disc of `radius` texels, of every other texel and row if the disc is wider than a vector.
+    /// Sums over a disc of `radius` texels, `CHUNKS` vectors wide, in every `STEP`th row.
     ///
     /// A `SEARCH` weighs occluders by the lamp's cone alone, so that the result does not depend on the search radius.
     #[inline(always)]
-    fn sums<const SEARCH: bool>(&self, radius: f32) -> FilterSums {
+    fn sums<const CHUNKS: usize, const STEP: usize, const SEARCH: bool>(&self, radius: f32) -> FilterSums {
         let [u, v, height] = self.position;
-        let texels = &self.map.texels;
-        let is_sparse = radius > MAX_RADIUS_ONE_VECTOR;
-        let (heights, stride, spacing) = match is_sparse {
-            true => (&texels.sparse, texels.sparse_stride(), 2.0),
-            false => (&texels.heights, texels.stride(), 1.0),
-        };
-        // The first texel of the map is the first one of every other, too.
-        let in_steps = |x: f32| if is_sparse { 0.5 * x + 0.25 } else { x };
-        let reach = if is_sparse { 0.5 * radius } else { radius };
-        let (column, row) = (in_steps(u), in_steps(v));
-        // Conversions to `i32` are fast, and the border of the map keeps the indices positive.
-        let index = |x: f32| x as i32 as usize;
-        let first = index(column - reach);
-        let (from, to) = (index(row - reach), index(row + reach) + 1);
+        let first = (u - radius) as usize;
+        let (from, to) = ((v - radius) as usize, (v + radius) as usize + 1);
         let inverse2 = 1.0 / (radius * radius);
-        let du = (LANE_INDEX + f32x8::splat(first as i32 as f32 + 0.5 - column)) * f32x8::splat(spacing);
-        let du2 = du * du;
+        let du: [f32x8; CHUNKS] =
+            std::array::from_fn(|c| LANE_INDEX + f32x8::splat((first + c * LANES) as f32 + 0.5 - u));
+        let du2 = du.map(|d| d * d);
         // The product of two parabolas: smoother than a box, and separable.
-        let column_weight = (f32x8::ONE - du2 * f32x8::splat(inverse2)).fast_max(f32x8::ZERO);
-        let plane_rise = du * f32x8::splat(self.slope[0]);
-        let plane_height = du * f32x8::splat(self.clamped_slope[0]) + f32x8::splat(height);
+        let weights = du2.map(|d2| (f32x8::ONE - d2 * f32x8::splat(inverse2)).fast_max(f32x8::ZERO));
+        let plane_rise = du.map(|d| d * f32x8::splat(self.slope[0]));
+        let plane_height = du.map(|d| d * f32x8::splat(self.clamped_slope[0]) + f32x8::splat(height));
         let limit = f32x8::splat(height + self.bias);
-        let (cone, min_radius) = (f32x8::splat(self.cone), f32x8::splat(MIN_RADIUS));
+        let [cone, min_radius] = [self.cone, MIN_RADIUS].map(f32x8::splat);
         let max_reach = f32x8::splat(if SEARCH { radius } else { f32::MAX });
         let (mut lit, mut occluded, mut occluder_height) = (f32x8::ZERO, f32x8::ZERO, f32x8::ZERO);
-        for at in from..to {
-            let dv = (at as i32 as f32 + 0.5 - row) * spacing;
-            let weight = column_weight * f32x8::splat((1.0 - dv * dv * inverse2).max(0.0));
-            let (row_rise, dv2) = (f32x8::splat(self.slope[1] * dv), f32x8::splat(dv * dv));
-            let row_height = f32x8::splat(self.clamped_slope[1] * dv);
-            let texels = heights.get(at * stride + first..).unwrap_or_default();
-            let Some(texels) = texels.first_chunk::<LANES>() else { break };
-            let heights = f32x8::new(*texels);
-            let is_higher = heights.simd_gt(limit + (plane_rise + row_rise).fast_max(f32x8::ZERO));
-            if !is_higher.any() {
-                lit += weight;
-                continue;
-            }
-            lit += weight & !is_higher;
-            let rise = heights - plane_height - row_height;
-            let reach = (rise * cone + min_radius).fast_min(max_reach);
-            // Full weight inside the cone, which fades out towards its border.
-            let within = (reach * reach - du2 - dv2) * f32x8::splat(1.0 / (MIN_RADIUS * MIN_RADIUS));
-            let within = is_higher & within.fast_max(f32x8::ZERO).fast_min(f32x8::ONE);
-            if SEARCH {
-                occluded += within;
-                occluder_height += within * rise;
-            } else {
-                occluded += weight * within;
+        let stride = self.map.texels.stride();
+        for row in (from.div_ceil(STEP) * STEP..to).step_by(STEP) {
+            let dv = row as f32 + 0.5 - v;
+            let row_weight = f32x8::splat((1.0 - dv * dv * inverse2).max(0.0));
+            let [row_rise, row_height, dv2] =
+                [self.slope[1] * dv, self.clamped_slope[1] * dv, dv * dv].map(f32x8::splat);
+            let texels = self.map.texels.heights.get(row * stride + first..).unwrap_or_default();
+            for (c, texels) in texels.as_chunks::<LANES>().0.iter().take(CHUNKS).enumerate() {
+                let heights = f32x8::new(*texels);
+                let weight = weights[c] * row_weight;
+                let is_higher = heights.simd_gt(limit + (plane_rise[c] + row_rise).fast_max(f32x8::ZERO));
+                if !is_higher.any() {
+                    lit += weight;
+                    continue;
+                }
+                lit += weight & !is_higher;
+                let rise = heights - plane_height[c] - row_height;
+                let reach = (rise * cone + min_radius).fast_min(max_reach);
+                // Full weight inside the cone, which fades out towards its border.
+                let within = (reach * reach - du2[c] - dv2) * f32x8::splat(1.0 / (MIN_RADIUS * MIN_RADIUS));
+                let within = is_higher & within.fast_max(f32x8::ZERO).fast_min(f32x8::ONE);
+                if SEARCH {
+                    occluded += within;
+                    occluder_height += within * rise;
+                } else {
+                    occluded += weight * within;
+                }
             }
         }
-        FilterSums { lit, occluded, occluder_height }
+        FilterSums {
+            lit: sum_lanes(lit),
+            occluded: sum_lanes(occluded),
+            occluder_height: sum_lanes(occluder_height),
+        }
     }
 }
