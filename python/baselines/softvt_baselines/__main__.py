@@ -29,7 +29,14 @@ def _record(args: argparse.Namespace) -> None:
 
     disturbance = DISTURBANCE if args.disturbance is None else args.disturbance
     run_softvt(
-        ["record", args.suite, "--out", str(args.out), *recording_flags(args.demos, args.edge, args.teacher, args.keep, disturbance), *args.flags]
+        [
+            "record",
+            args.suite,
+            "--out",
+            str(args.out),
+            *recording_flags(args.demos, args.edge, args.teacher, args.keep, disturbance),
+            *args.flags,
+        ]
     )
 
 

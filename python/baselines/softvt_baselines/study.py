@@ -27,7 +27,22 @@ from .evaluate import recording_flags, run_softvt
 # Script that runs a suite under conditions.
 SHIFTS = "shifts"
 # Options that all results in the folder of a study have in common.
-SAME = ["demos", "steps", "edge", "teacher", "keep", "disturbance", "blend", "episodes", "task", "memory", "attempts", "scenes", "ways", "frames"]
+SAME = [
+    "demos",
+    "steps",
+    "edge",
+    "teacher",
+    "keep",
+    "disturbance",
+    "blend",
+    "episodes",
+    "task",
+    "memory",
+    "attempts",
+    "scenes",
+    "ways",
+    "frames",
+]
 # Switches of train by the letters of inputs.
 SWITCHES = {"p": ["--drives"], "t": ["--touch", "markers"], "b": ["--touch", "contact"], "i": ["--touch", "pictures"]}
 # File beside the results of a run that says where they come from.
@@ -243,7 +258,12 @@ def _record(suite: str, code: str, study: Study) -> None:
         words += ["--tactile-pictures"] * any("i" in inputs for inputs in study.inputs)
         _call(words, study.out / "logs" / f"{recording.name}.log")
     else:
-        flags = ["--out", str(recording), "--resume", *recording_flags(study.demos, study.edge, study.teacher, study.keep, study.disturbance)]
+        flags = [
+            "--out",
+            str(recording),
+            "--resume",
+            *recording_flags(study.demos, study.edge, study.teacher, study.keep, study.disturbance),
+        ]
         flags += ["--task", study.task] if study.task else []
         run_softvt(["record", f"suites/{suite}.lua", *flags])
     pack(recording, study.edge, processors())
