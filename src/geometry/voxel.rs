@@ -5,12 +5,13 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Vec3, hex8,
+    Aabb, Vec3, hex8,
     shape::{Shape, ShapeError},
 };
 
 /// Sub-cells of a voxel along each axis, on which its filled part is known.
 pub const SUBCELLS: usize = 6;
+const CELLS_PER_VOXEL: usize = SUBCELLS * SUBCELLS * SUBCELLS;
 
 /// Filled sub-cells of a voxel: bit `i + SUBCELLS (j + SUBCELLS k)` is set if the centre of the sub-cell
 /// is inside the body.
@@ -21,7 +22,7 @@ impl OccupancyMask {
     /// The mask of a voxel that is entirely inside.
     pub fn full() -> Self {
         let mut fill = Self::default();
-        (0..SUBCELLS * SUBCELLS * SUBCELLS).for_each(|cell| fill.insert(cell));
+        (0..CELLS_PER_VOXEL).for_each(|cell| fill.insert(cell));
         fill
     }
 
@@ -37,7 +38,19 @@ impl OccupancyMask {
 
     /// Filled share of the voxel, 0..=1.
     pub fn fraction(&self) -> f64 {
-        self.0.iter().map(|w| w.count_ones()).sum::<u32>() as f64 / (SUBCELLS * SUBCELLS * SUBCELLS) as f64
+        self.count() as f64 / CELLS_PER_VOXEL as f64
+    }
+
+    /// Number of filled sub-cells.
+    fn count(&self) -> u32 {
+        self.0.iter().map(|w| w.count_ones()).sum()
+    }
+
+    /// Box around the filled sub-cells, local coordinates; `None` without any.
+    pub(super) fn bounds(&self) -> Option<Aabb> {
+        let centres: Vec<Vec3> =
+            (0..CELLS_PER_VOXEL).filter(|&cell| self.contains(cell)).map(Self::centre).collect();
+        Aabb::from_points(&centres).map(|around| around.loosened(0.5 / SUBCELLS as f64))
     }
 
     /// Local coordinates `ξ ∈ [0, 1]³` of the centre of sub-cell `cell`.
@@ -122,8 +135,8 @@ pub enum VoxelMeshError {
 
 /// Largest resolution; a cube then has a million voxels.
 pub const MAX_RESOLUTION: usize = 100;
-/// Filled share from which a grid cell becomes an element.
-const MIN_FILL: f64 = 0.01;
+/// Filled sub-cells from which a grid cell becomes an element: more than 1 % of the voxel.
+const MIN_FILLED: u32 = 3;
 /// Distance outside of a voxel, in edges, up to which its trilinear map is used. Beyond, embedded points are clamped,
 /// and the map of a deformed body is continued linearly.
 pub const MAX_EXTRAPOLATION: f64 = 0.3;
@@ -148,18 +161,7 @@ pub const MAX_EXTRAPOLATION: f64 = 0.3;
 /// # Ok::<(), softvt_geometry::voxel::VoxelMeshError>(())
 /// ```
 pub fn voxel_mesh(shape: &Shape, spec: &VoxelSpec) -> Result<VoxelMesh, VoxelMeshError> {
-    shape.validate()?;
-    if !(1..=MAX_RESOLUTION).contains(&spec.resolution) {
-        return Err(VoxelMeshError::Resolution(spec.resolution));
-    }
-    let bounds = shape.bounds();
-    let edge = bounds.size().max() / spec.resolution as f64;
-    if !(edge > 0.0 && edge.is_finite()) {
-        return Err(VoxelMeshError::Empty);
-    }
-    // The tolerance avoids an extra layer through rounding if the size is a whole number of edges.
-    let grid = std::array::from_fn(|axis| ((bounds.size()[axis] / edge - 1e-6).ceil() as usize).max(1));
-    let origin = bounds.centre() - Vec3::from_fn(|axis, _| 0.5 * edge * grid[axis] as f64);
+    let VoxelGrid { edge, grid, origin } = VoxelGrid::covering(shape, spec)?;
     let mut mesh = VoxelMesh {
         edge,
         nodes: Vec::new(),
@@ -171,7 +173,7 @@ pub fn voxel_mesh(shape: &Shape, spec: &VoxelSpec) -> Result<VoxelMesh, VoxelMes
     };
     for cell in 0..mesh.cell_element.len() {
         let fill = fill_of(shape, &(origin + grid_step(cell, grid) * edge), edge);
-        if fill.fraction() >= MIN_FILL {
+        if fill.count() >= MIN_FILLED {
             mesh.cell_element[cell] = mesh.occupancy.len() as u32;
             mesh.occupancy.push(fill);
         }
@@ -183,22 +185,97 @@ pub fn voxel_mesh(shape: &Shape, spec: &VoxelSpec) -> Result<VoxelMesh, VoxelMes
     Ok(mesh)
 }
 
+/// The grid of a voxel mesh.
+pub(super) struct VoxelGrid {
+    /// Edge of the cells, m.
+    edge: f64,
+    /// Number of cells along each axis.
+    pub(super) grid: [usize; 3],
+    /// Lowest corner, object frame, m.
+    origin: Vec3,
+}
+
+impl VoxelGrid {
+    /// The grid of [`voxel_mesh`].
+    pub(super) fn covering(shape: &Shape, spec: &VoxelSpec) -> Result<Self, VoxelMeshError> {
+        shape.validate()?;
+        if !(1..=MAX_RESOLUTION).contains(&spec.resolution) {
+            return Err(VoxelMeshError::Resolution(spec.resolution));
+        }
+        let bounds = shape.bounds();
+        let edge = bounds.size().max() / spec.resolution as f64;
+        if !(edge > 0.0 && edge.is_finite()) {
+            return Err(VoxelMeshError::Empty);
+        }
+        // The tolerance avoids an extra layer through rounding if the size is a whole number of edges.
+        let grid = std::array::from_fn(|axis| ((bounds.size()[axis] / edge - 1e-6).ceil() as usize).max(1));
+        let origin = bounds.centre() - Vec3::from_fn(|axis, _| 0.5 * edge * grid[axis] as f64);
+        Ok(Self { edge, grid, origin })
+    }
+
+    /// True for each cell, x fastest, that is an element of the mesh. Faster than making the mesh.
+    pub(super) fn elements(&self, shape: &Shape) -> Vec<bool> {
+        let cells = 0..self.grid.iter().product();
+        cells
+            .map(|cell| is_element(shape, &(self.origin + grid_step(cell, self.grid) * self.edge), self.edge))
+            .collect()
+    }
+}
+
+/// True if a voxel has enough filled sub-cells.
+fn is_element(shape: &Shape, corner: &Vec3, edge: f64) -> bool {
+    const HALF: usize = SUBCELLS / 2;
+    // Of the centre of an eighth to those of its sub-cells; beyond twice that, its sign holds for all of them.
+    let reach = 3.0_f64.sqrt() * (HALF as f64 - 1.0) / 2.0 / SUBCELLS as f64 * edge;
+    let at = |step: [usize; 3], size: usize| {
+        let size = size as f64 / SUBCELLS as f64;
+        corner + Vec3::from_fn(|axis, _| (step[axis] as f64 + 0.5) * size) * edge
+    };
+    let filled_of_eighth = |eighth: usize| {
+        let step = hex8::corner_index(eighth);
+        let middle = shape.distance(&at(step, HALF));
+        if middle.abs() > 2.0 * reach {
+            return if middle < 0.0 { MIN_FILLED as usize } else { 0 };
+        }
+        let inside = (0..HALF.pow(3)).filter(|cell| {
+            let within = [cell % HALF, cell / HALF % HALF, cell / HALF / HALF];
+            shape.distance(&at(std::array::from_fn(|axis| HALF * step[axis] + within[axis]), 1)) < 0.0
+        });
+        inside.take(MIN_FILLED as usize).count()
+    };
+    sign_of_voxel(shape, corner, edge).unwrap_or_else(|| {
+        let mut filled = 0;
+        (0..8).any(|eighth| {
+            filled += filled_of_eighth(eighth);
+            filled >= MIN_FILLED as usize
+        })
+    })
+}
+
 /// Grid coordinates of a cell, x fastest.
 fn grid_step(cell: usize, grid: [usize; 3]) -> Vec3 {
     Vec3::new((cell % grid[0]) as f64, (cell / grid[0] % grid[1]) as f64, (cell / grid[0] / grid[1]) as f64)
 }
 
-fn fill_of(shape: &Shape, corner: &Vec3, edge: f64) -> OccupancyMask {
+/// True for a voxel that is known to be inside, false for one outside, `None` near the surface.
+fn sign_of_voxel(shape: &Shape, corner: &Vec3, edge: f64) -> Option<bool> {
     let middle = shape.distance(&(corner + Vec3::repeat(0.5 * edge)));
     // Beyond twice the half diagonal, the sign of the first-order distance holds for the whole voxel.
-    if middle.abs() > 3.0_f64.sqrt() * edge {
-        return if middle < 0.0 { OccupancyMask::full() } else { OccupancyMask::default() };
+    (middle.abs() > 3.0_f64.sqrt() * edge).then_some(middle < 0.0)
+}
+
+fn fill_of(shape: &Shape, corner: &Vec3, edge: f64) -> OccupancyMask {
+    match sign_of_voxel(shape, corner, edge) {
+        Some(true) => OccupancyMask::full(),
+        Some(false) => OccupancyMask::default(),
+        None => {
+            let mut fill = OccupancyMask::default();
+            (0..CELLS_PER_VOXEL)
+                .filter(|&cell| shape.distance(&(corner + OccupancyMask::centre(cell) * edge)) < 0.0)
+                .for_each(|cell| fill.insert(cell));
+            fill
+        }
     }
-    let mut fill = OccupancyMask::default();
-    (0..SUBCELLS * SUBCELLS * SUBCELLS)
-        .filter(|&cell| shape.distance(&(corner + OccupancyMask::centre(cell) * edge)) < 0.0)
-        .for_each(|cell| fill.insert(cell));
-    fill
 }
 
 /// Numbers the corners of all elements in x-fastest order.

@@ -12,7 +12,7 @@ use softvt_geometry::{
     mass::{MassProperties, approximate_mass_properties, mass_properties},
     pieces::SeparatePieces,
     shape::Shape,
-    voxel::{VoxelSpec, voxel_mesh},
+    voxel::VoxelSpec,
 };
 use softvt_physics::{
     BodyId, World,
@@ -108,10 +108,7 @@ impl AssetCache {
 
     /// Separate pieces of a shape; gaps below a voxel are not seen.
     pub(super) fn pieces(&self, shape: &Shape) -> Option<SeparatePieces> {
-        let find = || {
-            let mesh = voxel_mesh(shape, &VoxelSpec { resolution: PIECES_RESOLUTION }).ok()?;
-            SeparatePieces::find(&mesh)
-        };
+        let find = || SeparatePieces::of_shape(shape, &VoxelSpec { resolution: PIECES_RESOLUTION });
         of_shape(&self.pieces, shape, || stored(&self.disk, "pieces", shape, find))
     }
 

@@ -76,7 +76,7 @@ fn pieces_warning(asset: &Asset, cache: &AssetCache) -> Option<String> {
     };
     cache.pieces(&asset.shape).map(|SeparatePieces { count, gap }| {
         format!(
-            "its shape has {count} separate pieces, {:.0} mm apart, {joined}; join them, or make each an asset of its own",
+            "its shape has {count} separate pieces, about {:.0} mm apart, {joined}; join them, or make each an asset of its own",
             1e3 * gap
         )
     })
