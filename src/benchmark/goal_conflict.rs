@@ -7,7 +7,7 @@ use crate::goal::{Goal, Parts};
 /// The reason for which a goal can never be met, in words; `None` if none was found.
 ///
 /// Predicates that must hold at once are compared in pairs, and what rests on what must not be a circle. Of
-/// `softvt.any`, each alternative is compared with what must hold beside it. Geometry is not considered.
+/// `softvt.any`, each alternative is compared with what must hold at the same time. Geometry is not considered.
 pub fn conflict(goal: &Goal) -> Option<String> {
     let moment = Moment::of(goal);
     if let Some(found) = moment.conflict() {

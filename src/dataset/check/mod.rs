@@ -74,6 +74,13 @@ pub enum CheckScope {
     Numbers,
 }
 
+/// Index of the first joint whose position is beyond its limits.
+fn joint_beyond_limits(row: &[f64; ARM_DOFS]) -> Option<usize> {
+    let is_beyond =
+        |(q, range): (&f64, &JointRange)| *q < range.lower - JOINT_MARGIN || *q > range.upper + JOINT_MARGIN;
+    row.iter().zip(&panda::joint_ranges()).position(is_beyond)
+}
+
 impl CheckReport {
     fn add(&mut self, path: &Path, key: &str, what: impl Into<String>) {
         self.problems.push(DatasetError::content(path, key, what).to_string());
@@ -306,14 +313,8 @@ impl DemoCheck<'_> {
     /// where they are the action.
     fn check_joint_actions(&mut self) {
         let Some(joints) = self.report.take(self.file.joint_commands(self.demo)) else { return };
-        let is_beyond = |(q, range): (&f64, &JointRange)| {
-            *q < range.lower - JOINT_MARGIN || *q > range.upper + JOINT_MARGIN
-        };
-        let ranges = panda::joint_ranges();
-        let beyond = joints
-            .iter()
-            .enumerate()
-            .find_map(|(step, row)| Some((step, row.iter().zip(&ranges).position(is_beyond)?)));
+        let beyond =
+            joints.iter().enumerate().find_map(|(step, row)| Some((step, joint_beyond_limits(row)?)));
         if let Some((step, joint)) = beyond {
             let q = joints[step][joint];
             let what = format!("step {step}: joint {} at {q} rad is outside of its limits", joint + 1);

@@ -1,6 +1,6 @@
 //! Checks of readings: units, what one stream says of another, and readings that say nothing.
 
-use super::{DemoCheck, JOINT_MARGIN, TOLERANCE};
+use super::{DemoCheck, TOLERANCE, joint_beyond_limits};
 use crate::StreamValues;
 use softvt_robot::{
     gripper::MAX_WIDTH,
@@ -54,16 +54,15 @@ impl DemoCheck<'_> {
     /// Checks that measured joint positions are within the limits of the joints and put the tool where it is.
     fn check_arm(&mut self) {
         let (joints, poses) = (self.values("obs/arm_joint_pos"), self.values("obs/eef_pose"));
-        let ranges = panda::joint_ranges();
         let rows = || joints.as_chunks::<ARM_DOFS>().0.iter();
-        let is_beyond = |row: &&[f64; ARM_DOFS]| {
-            row.iter()
-                .zip(&ranges)
-                .any(|(q, range)| *q < range.lower - JOINT_MARGIN || *q > range.upper + JOINT_MARGIN)
-        };
-        if rows().any(|row| is_beyond(&row)) {
+        if rows().any(|row| joint_beyond_limits(row).is_some()) {
             let what = "beyond the limits of the joints: are they in rad?";
-            return self.add_first("obs/arm_joint_pos", rows(), is_beyond, what);
+            return self.add_first(
+                "obs/arm_joint_pos",
+                rows(),
+                |row| joint_beyond_limits(row).is_some(),
+                what,
+            );
         }
         let is_elsewhere = |(row, pose): &(&[f64; ARM_DOFS], &[f64; 7])| {
             let tool = panda::tool_pose(row).translation.vector;
