@@ -305,6 +305,22 @@ impl PolicyArgs {
         PolicyOptions { source: self.policy.clone().unwrap_or_default(), ..self.connection.options() }
     }
 
+    /// Loads the policy of a check, which needs no server for its profile.
+    ///
+    /// # Errors
+    /// A policy or profile that cannot be loaded, or an option without effect.
+    pub(crate) fn checked(&self) -> Result<PolicyConfig, CliError> {
+        let profile = &self.connection.profile;
+        let is_alone = self.policy.is_none()
+            && profile.profile.is_some()
+            && self.connection.options() == profile.options();
+        Ok(if is_alone {
+            PolicyConfig::client(&profile.options(), false)?
+        } else {
+            PolicyConfig::load(&self.options())?
+        })
+    }
+
     /// The options for a suite of a teacher, which `--policy` replaces.
     pub(crate) fn taught_by(&self, teacher: Teacher) -> PolicyOptions {
         let source = self.policy.clone().unwrap_or_else(|| teacher.into());

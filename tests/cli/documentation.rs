@@ -160,6 +160,10 @@ fn the_policy_and_the_profile_of_the_page_work() {
     let third = files[0].text.replace("\"side\"", "\"third_person\"");
     project.write("third.lua", third.as_bytes());
     assert!(stderr_with("third.lua").contains("no policy server"), "the profile is read");
+    let check = |flags: &str| project.softvt(&format!("check suites/object_soft.lua --profile {flags}"));
+    assert!(check("my_profile.lua").err.contains("inputs: unknown camera \"side\""));
+    assert_eq!(check("third.lua").code, 0);
+    assert!(check("third.lua --replan 4").err.contains("--replan: applies to policy servers"));
 }
 
 /// Commands that run an embedded suite or script.

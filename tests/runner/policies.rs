@@ -158,12 +158,14 @@ fn missing_cameras_are_reported_before_anything_runs() {
          actions = { pose = 'absolute', gripper = { open = 0, closed = 1 } } }";
     project.write("v.lua", profile.as_bytes());
     let profile = project.path("v.lua").display().to_string();
-    let run = project.run("x.lua").policy("ws://127.0.0.1:1").out("run");
-    let message = run.with_policy(|policy| policy.profile = Some(profile)).error();
-    assert_eq!(
-        message,
-        "profile v.lua: inputs: unknown camera \"wirst\"; did you mean \"wrist\"? (scene of task 0)"
-    );
+    let run = || {
+        let run = project.run("x.lua").policy("ws://127.0.0.1:1").out("run");
+        run.with_policy(|policy| policy.profile = Some(profile.clone()))
+    };
+    let expected =
+        "profile v.lua: inputs: unknown camera \"wirst\"; did you mean \"wrist\"? (scene of task 0)";
+    assert_eq!(run().error(), expected);
+    assert_eq!(project.message(run().check()), expected);
     assert!(!project.path("run").exists());
 }
 

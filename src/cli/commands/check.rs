@@ -32,7 +32,8 @@ pub(crate) struct CheckArgs {
 /// # Errors
 /// The first thing that is not valid.
 pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
-    let run = Request::new(args.script)?.load_plan("check", &args.policy)?;
+    let ConfiguredScript { config, script } = Request::new(args.script)?.load("check")?;
+    let run = ConfiguredScript { config: config.with_policy(args.policy.checked()?), script };
     let ConfiguredScript { config, script: loaded } = &run;
     let plan = &loaded.plan;
     check_distinct_out_dirs(config, plan.suites())?;

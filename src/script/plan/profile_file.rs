@@ -108,8 +108,13 @@ impl ProfileReader<'_> {
             InputKind::Depth => ObservationSource::Depth { camera: camera()?, half_turn },
             InputKind::Segmentation => ObservationSource::Segmentation { camera: camera()?, half_turn },
             InputKind::State => {
-                let parts = parts.clone().filter(|parts| !parts.is_empty());
-                ObservationSource::State { parts: parts.ok_or_else(|| missing("parts"))? }
+                let parts =
+                    parts.clone().filter(|parts| !parts.is_empty()).ok_or_else(|| missing("parts"))?;
+                if let Some(at) = (1..parts.len()).find(|&at| parts[..at].contains(&parts[at])) {
+                    let message = format!("{place}.parts[{}]: is given before; leave it out", at + 1);
+                    return Err(self.wrong("parts", message));
+                }
+                ObservationSource::State { parts }
             }
             InputKind::Prompt => ObservationSource::Prompt,
             InputKind::TactileImage => {

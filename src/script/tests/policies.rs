@@ -367,6 +367,7 @@ fn errors_in_profiles_are_reported_with_their_line() {
         ),
         ("source = \"prompt\"", "source = \"promt\"", "p.lua:7: profile.inputs[4].source: expected one of"),
         ("\"finger_pair\"", "\"finger_pairs\"", "did you mean \"finger_pair\"?"),
+        ("\"finger_pair\"", "\"position\"", "profile.inputs[3].parts[3]: is given before; leave it out"),
         (
             "camera = \"wrist\", half_turn = true",
             "half_turn = true",
