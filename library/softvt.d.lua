@@ -10,6 +10,7 @@
 ---@field episodes? integer Default number of episodes per task. Expects a whole number in 1..1000000. Default 5.
 ---@field tasks softvt.Task[] The tasks, in order.
 ---@field shifts? softvt.Shift[] Changes of the scene that a run can request.
+---@field metrics? softvt.Metric[] Numbers of each episode that records and tables show beside the verdict.
 ---@field vary? softvt.Variation Ranges from which the soft objects, the light and the cameras of every episode are drawn.
 ---@field settings? softvt.Settings Changed settings (docs/settings.md): { physics = {…}, robot = {…}, criteria = {…}, tactile = {…}, cameras = {…} }.
 ---@field twin_of? string Name of the suite of soft objects whose rigid twin this is. All soft bodies become rigid, with the same shape, mass and looks; initial states are those of that suite, so tasks and layouts must be its own.
@@ -112,6 +113,12 @@
 ---@field min? number Lowest value. Expects a number.
 ---@field max? number Highest value. Expects a number.
 ---@field apply fun(scene: softvt.Scene, value: number, rng: softvt.Rng): softvt.Scene? Changes the scene; may return another one. scene.goal_object is the object of the task's goal and scene.prompt the instruction. Draw from rng:stream "camera", "light", "material" or "sensor", whichever the shift changes.
+
+---A number of each episode, beside the verdict: of the true state, which policies do not see.
+---@class softvt.Metric
+---@field name string Name in records and tables, with its unit, as tilt_deg.
+---@field of fun(scene: softvt.SceneState, step: table): number? Returns the value after a control step, or nil where it has none. `step` is a row of the trace (docs/results.md): forces of the pads, D of each object, what touches what.
+---@field over? "last"|"max"|"min"|"mean" How the values of an episode become one: "last", "max", "min" or "mean". Default "last".
 
 ---Ranges from which every episode of a suite draws: factors on size, stiffness, density and friction of each soft object, its colour, the light and the poses of the cameras. The policy sees none of the drawn numbers; records do.
 ---@class softvt.Variation
@@ -1641,6 +1648,11 @@ function softvt.task(spec) end
 ---@param spec softvt.Shift
 ---@return softvt.Shift
 function softvt.shift(spec) end
+
+---A number of each episode, beside the verdict: of the true state, which policies do not see.
+---@param spec softvt.Metric
+---@return softvt.Metric
+function softvt.metric(spec) end
 
 ---Ranges from which every episode of a suite draws: factors on size, stiffness, density and friction of each soft object, its colour, the light and the poses of the cameras. The policy sees none of the drawn numbers; records do.
 ---@param spec softvt.Variation

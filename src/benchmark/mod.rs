@@ -3,6 +3,7 @@
 
 pub mod goal;
 pub mod goal_conflict;
+pub mod metric;
 pub mod run_changes;
 pub mod seed;
 pub mod settings;
@@ -121,6 +122,9 @@ pub struct Suite {
     /// Ranges from which the soft objects, the light and the cameras of every episode are drawn, if they vary.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vary: Option<variation::VariationRanges>,
+    /// Numbers of each episode that the suite measures beside the verdict.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub metrics: Vec<metric::Metric>,
     /// Settings of physics, robot, sensors and judge.
     pub settings: settings::Settings,
     /// The suite of soft objects whose rigid twin this is; its initial states are those of that suite.

@@ -48,6 +48,9 @@ pub struct ManifestEntry {
     /// Numbers noted by the expert, such as the grip that it chose.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub notes: BTreeMap<String, f64>,
+    /// Metrics of the suite, by name; null for those without a value.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub metrics: BTreeMap<String, Option<f64>>,
     /// Imported demonstration of which it is a re-execution.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub origin: Option<Box<DemonstrationOrigin>>,
@@ -77,6 +80,7 @@ impl ManifestEntry {
             seed: id.base_seed,
             state_hash: record.stats.state_hash.clone(),
             notes: record.stats.notes.clone(),
+            metrics: record.stats.metrics.clone(),
             origin: header.origin.clone(),
             video_files: videos
                 .map(|(i, name)| ((*name).to_owned(), paths.video_relative(demo, i)))

@@ -4,7 +4,7 @@
 //! seed, so that nothing else differs between them. Rates are compared by McNemar's exact test with the interval of
 //! Agresti and Min; deformations by the bootstrap of the mean difference.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
@@ -124,6 +124,9 @@ pub struct PairedComparison {
     pub d_peak: PairedDifference,
     /// Peak D over τ where both runs have both.
     pub d_over_tau: PairedDifference,
+    /// Metrics of the suite that both runs have, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub metrics: BTreeMap<String, PairedDifference>,
 }
 
 impl PairedComparison {
@@ -144,6 +147,21 @@ impl PairedComparison {
         let is_judged = soft.iter().any(|pair| pair.first.is_deformation_judged())
             && soft.iter().any(|pair| pair.second.is_deformation_judged());
         let judged = || soft.iter().filter(|_| is_judged);
+        let safety_rate = |test: fn(&EpisodeRecord) -> bool| match is_judged {
+            true => PairedDifference::from_successes(
+                judged().map(|pair| [pair.first, pair.second].map(|r| r.outcome.is_valid() && test(r))),
+            ),
+            false => PairedDifference::default(),
+        };
+        let names: BTreeSet<&String> =
+            pairs.iter().flat_map(|pair| pair.first.stats.metrics.keys()).collect();
+        let of_metric = |name: &String| {
+            let value = |r: &EpisodeRecord| {
+                r.stats.metrics.get(name).copied().flatten().filter(|_| r.outcome.is_valid())
+            };
+            let both = |pair: &EpisodePair| Some([value(pair.first)?, value(pair.second)?]);
+            PairedDifference::from_values(pairs.iter().filter_map(both))
+        };
         let touches_other = |r: &EpisodeRecord| r.verdict.first_wrong_contact.is_some();
         Self {
             pairs: pairs.len(),
@@ -153,19 +171,12 @@ impl PairedComparison {
                 .count(),
             goal: rate(|r| r.verdict.goal),
             no_drop: rate(|r| r.verdict.no_drop),
-            safety: match is_judged {
-                true => {
-                    PairedDifference::from_successes(judged().map(|pair| {
-                        [pair.first, pair.second].map(|r| r.outcome.is_valid() && r.verdict.safety)
-                    }))
-                }
-                false => PairedDifference::default(),
-            },
+            safety: safety_rate(|r| r.verdict.safety),
             dsr: PairedDifference::from_successes(
                 judged().map(|pair| [pair.first, pair.second].map(EpisodeRecord::is_deformation_safe)),
             ),
             contact_success: rate(|r| r.verdict.contact_success),
-            contact_safety: rate(|r| r.verdict.contact_safety),
+            contact_safety: safety_rate(|r| r.verdict.contact_safety),
             gentle: rate(|r| r.verdict.gentle),
             grip_ratio: mean(|r| r.verdict.grip_ratio),
             others_ok: PairedDifference::from_successes(
@@ -187,6 +198,7 @@ impl PairedComparison {
             damaged_volume_pct: mean(|r| r.verdict.damaged_volume_pct),
             d_peak: mean(d_peak),
             d_over_tau: mean(d_over_tau),
+            metrics: names.into_iter().map(|name| (name.clone(), of_metric(name))).collect(),
         }
     }
 }

@@ -173,6 +173,9 @@ pub struct RolloutStats {
     /// Numbers noted by the controller, such as the grip that an expert chose.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub notes: BTreeMap<String, f64>,
+    /// Metrics of the suite, by name; null for those without a value.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub metrics: BTreeMap<String, Option<f64>>,
     /// SHA-256 of the actions, as the float64 numbers of their file (little-endian), hexadecimal.
     pub actions_sha256: String,
     /// Hash of the final state, hexadecimal.

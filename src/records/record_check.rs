@@ -21,7 +21,7 @@ pub enum RecordError {
 }
 
 /// Keys that a record leaves out at their default.
-const OMITTED: [&str; 9] = [
+const OMITTED: [&str; 10] = [
     "privileged",
     "variation",
     "origin",
@@ -31,6 +31,7 @@ const OMITTED: [&str; 9] = [
     "first_far_command",
     "gave_up",
     "notes",
+    "metrics",
 ];
 
 /// Tolerance of sums and means, relative to 1.

@@ -314,6 +314,9 @@ pub fn table(comparison: &Comparison, format: TerminalFormat) -> String {
         push_difference(&mut table, "D/limit", &comparison.all.d_over_tau, 2);
         push_difference(&mut table, "collapsed, %", &comparison.all.collapsed_volume_pct, 1);
     }
+    for (name, difference) in &comparison.all.metrics {
+        push_metric(&mut table, name, difference);
+    }
     if format.has_details {
         push_details(&mut table, comparison.deformable, &comparison.all);
     }
@@ -396,10 +399,22 @@ fn push_notes(text: &mut StyledText, comparison: &Comparison, format: TerminalFo
 /// Width of a run's name in the headings, columns.
 const HEADING_WIDTH: usize = 8;
 
+/// Width of the name of a measure, columns.
+const NAME_WIDTH: usize = 18;
+
 /// Columns of a table of differences: measure, both values, difference, better, worse, interval and p.
 pub(super) const COLUMNS: [TextColumn; 8] = {
     use TextColumn::{Left, Right};
-    [Left(18), Right(HEADING_WIDTH), Right(HEADING_WIDTH), Right(7), Right(6), Right(5), Right(16), Right(4)]
+    [
+        Left(NAME_WIDTH),
+        Right(HEADING_WIDTH),
+        Right(HEADING_WIDTH),
+        Right(7),
+        Right(6),
+        Right(5),
+        Right(16),
+        Right(4),
+    ]
 };
 
 /// Appends the rows that only the table of all episodes has.
@@ -467,19 +482,33 @@ pub(super) fn push_rates(table: &mut TextTable, paired: &PairedComparison) {
 
 /// Appends a row with `digits` decimals, or N/A without a pair that has the quantity. One pair has no interval.
 pub(super) fn push_difference(table: &mut TextTable, name: &str, paired: &PairedDifference, digits: usize) {
+    let counts = [paired.better, paired.worse].map(|count| count.to_string());
+    push_row(table, name, paired, digits, counts);
+}
+
+/// Appends the row of a metric of the suite, of which it is not known whether less is better.
+fn push_metric(table: &mut TextTable, name: &str, paired: &PairedDifference) {
+    push_row(table, &shortened(name, NAME_WIDTH), paired, 3, Default::default());
+}
+
+fn push_row(
+    table: &mut TextTable,
+    name: &str,
+    paired: &PairedDifference,
+    digits: usize,
+    counts: [String; 2],
+) {
     if paired.n == 0 {
         return table.row([name, "N/A", "N/A"]);
     }
-    let cells = [
+    let values = [
         name.to_owned(),
         decimal(paired.first, digits),
         decimal(paired.second, digits),
         signed(paired.difference, digits),
-        paired.better.to_string(),
-        paired.worse.to_string(),
-        interval(paired.interval95.filter(|_| paired.n > 1), digits),
     ];
-    table.row(cells.into_iter().chain(paired.p.map(probability)));
+    let interval = interval(paired.interval95.filter(|_| paired.n > 1), digits);
+    table.row(values.into_iter().chain(counts).chain([interval]).chain(paired.p.map(probability)));
 }
 
 /// The e-values of the rates, which a reader who watches a run may use.

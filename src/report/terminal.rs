@@ -6,7 +6,7 @@ use super::{
     task_names::{TaskName, task_names},
     terminal_details::push_details,
 };
-use softvt_common::text::{counted, decimal, shortened};
+use softvt_common::text::{counted, decimal, shortened, significant};
 use softvt_evaluation::{
     category::EpisodeCategory,
     statistics::{Distribution, Rate},
@@ -44,6 +44,7 @@ pub fn table(summary: &SuiteSummary, format: TerminalFormat) -> String {
     push_safety(&mut text, scores);
     text.end();
     push_tasks(&mut text, summary, format);
+    push_metrics(&mut text, scores, format);
     if format.has_details {
         push_details(&mut text, summary);
     }
@@ -212,6 +213,23 @@ pub(crate) fn tau_range(range: Option<TauRange>) -> String {
     let Some(TauRange { min, max }) = range else { return String::new() };
     let [min, max] = [min, max].map(|tau| format!("{tau:.2}"));
     if min == max { min } else { format!("{min}–{max}") }
+}
+
+/// One line per metric of the suite.
+fn push_metrics(text: &mut StyledText, scores: &GroupScores, format: TerminalFormat) {
+    if scores.metrics.is_empty() {
+        return;
+    }
+    let width = format.width.saturating_sub(1 + 45).clamp(12, 40);
+    let row = |name: &str, cells: [String; 4], n: &str| {
+        let cells = cells.map(|cell| format!(" {cell:>9}")).concat();
+        format!("{:<width$}{cells} {n:>4}", shortened(name, width))
+    };
+    text.line(Emphasis::Faint, row("metric", ["mean", "P5", "median", "P95"].map(str::to_owned), "n"));
+    for (name, Distribution { mean, p5, median, p95, n, .. }) in &scores.metrics {
+        let number = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| significant(value, 4));
+        text.line(Emphasis::None, row(name, [*mean, *p5, *median, *p95].map(number), &n.to_string()));
+    }
 }
 
 fn push_notes(text: &mut StyledText, summary: &SuiteSummary, format: TerminalFormat) {

@@ -11,6 +11,7 @@ use super::{
     episode_error::EpisodeError,
     evidence::EvidenceCollector,
     goal_in_scene::{GoalInScene, StatePredicate},
+    metric::{MeasuredMetric, MetricValues},
     observation_history::ObservationHistory,
     robot_instance::ArmCommand,
     sensor_assets::{SensingError, SensorAssets},
@@ -77,6 +78,8 @@ pub struct EpisodeSpec {
     /// Functions of the script that the goal asks for
     /// ([`Goal::Predicate`](softvt_benchmark::Goal::Predicate)), in the order of the goal.
     pub predicates: Vec<Arc<dyn StatePredicate>>,
+    /// Metrics of the suite.
+    pub metrics: Vec<MeasuredMetric>,
     /// Secret of a judged run.
     pub secret: Option<SecretSeed>,
 }
@@ -115,6 +118,7 @@ impl EpisodeSpec {
             record_trace: false,
             trace_nodes: false,
             predicates: Vec::new(),
+            metrics: Vec::new(),
             secret: None,
         }
     }
@@ -170,6 +174,8 @@ pub struct Episode {
     physics_steps: u64,
     newton: NewtonCount,
     min_det_f: f64,
+    /// In the order of the metrics.
+    metric_values: Vec<MetricValues>,
     trace: Vec<StepTrace>,
     actions: Vec<Action>,
     /// Joint positions that the actions mean, rad; fewer than actions if the robot responds late.
@@ -245,6 +251,7 @@ impl Episode {
         let sensors =
             Sensors::new(&sim, &spec.settings.tactile, sensor_assets).with_seed(SensorSeed::new(&seed));
         let recorded = spec.record_states.then(Vec::new);
+        let metric_values = vec![MetricValues::default(); spec.metrics.len()];
         Ok(Self {
             spec,
             sim,
@@ -256,6 +263,7 @@ impl Episode {
             physics_steps: 0,
             newton: NewtonCount::default(),
             min_det_f: f64::INFINITY,
+            metric_values,
             trace: Vec::new(),
             actions: Vec::new(),
             joint_commands: Vec::new(),
@@ -514,8 +522,17 @@ impl Episode {
             let evidence = self.evidence.collect(&self.sim, time, step == physics_steps);
             self.judge.observe(&evidence.map_err(|message| Outcome::Error { message })?);
         }
-        if self.spec.record_trace {
-            self.trace.push(self.trace());
+        if self.spec.record_trace || !self.spec.metrics.is_empty() {
+            let trace = self.trace();
+            for (metric, values) in self.spec.metrics.iter().zip(&mut self.metric_values) {
+                let value = metric.function.value(&self.sim, &trace);
+                if let Some(value) = value.map_err(|message| Outcome::Error { message })? {
+                    values.add(value);
+                }
+            }
+            if self.spec.record_trace {
+                self.trace.push(trace);
+            }
         }
         Ok(())
     }
@@ -571,6 +588,12 @@ impl Episode {
         self.clamped_steps
     }
 
+    /// The metrics so far, by name; `None` for those without a value.
+    pub fn metrics(&self) -> BTreeMap<String, Option<f64>> {
+        let pairs = self.spec.metrics.iter().zip(&self.metric_values);
+        pairs.map(|(of, values)| (of.metric.name.clone(), values.reduced(of.metric.over))).collect()
+    }
+
     /// The record so far. `gave_up` is the reason why the controller aborted, if it did.
     pub fn record(&self, gave_up: Option<String>) -> EpisodeRecord {
         let soft = matches!(self.sim.objects[self.target].body, BodyId::Soft(_));
@@ -588,6 +611,7 @@ impl Episode {
             clamped_steps: self.clamped_steps,
             gave_up,
             notes: BTreeMap::new(),
+            metrics: self.metrics(),
             actions_sha256: checksum(&self.actions),
             state_hash: state_hash(&self.sim),
         };

@@ -398,6 +398,7 @@ impl<'a> SuiteRun<'a> {
         let mut spec = EpisodeSpec::new(id, policy, task, &opened.nominal, scene, &self.settings);
         spec.secret.clone_from(&self.config.secret);
         spec.predicates.clone_from(&opened.predicates);
+        spec.metrics.clone_from(&opened.metrics);
         spec.header.task_prompt = task_prompt;
         spec.header.privileged = self.is_privileged();
         spec.header.variation = opened.variation.clone().map(Box::new);
@@ -529,6 +530,7 @@ impl<'a> SuiteRun<'a> {
         predicates: Vec<Arc<dyn StatePredicate>>,
     ) -> Result<Option<String>, RunError> {
         self.check_object_type(task, &scene)?;
+        self.check_declared_cameras(&scene, task)?;
         let scene = Arc::new(scene);
         let settings = &self.settings;
         let sense = |source| EpisodeError::Sense { task: task.id, episode, source };

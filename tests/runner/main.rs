@@ -23,6 +23,7 @@ mod joint_control;
 mod judged_runs;
 mod judging;
 mod lerobot_export;
+mod metrics;
 mod observations;
 mod policies;
 mod policy_check;

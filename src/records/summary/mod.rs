@@ -4,7 +4,7 @@
 //! What was judged in no episode has no rate. Distributions of D are over all episodes with a soft target: means over
 //! the valid ones, percentiles with invalid ones ranked as worst.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
@@ -53,7 +53,7 @@ pub struct GroupScores {
     pub no_slip_rate: Rate,
     /// Goal Success with contact of both pads throughout the carry.
     pub contact_success_rate: Rate,
-    /// Contact success with Safety Success and NoSlip.
+    /// Contact success with Safety Success and NoSlip; null where that of Safety Success is.
     pub contact_safety_rate: Rate,
     /// Goal Success with a gentle grip.
     pub gentle_rate: Rate,
@@ -89,6 +89,9 @@ pub struct GroupScores {
     pub deformation: Distribution,
     /// Peak D of the valid episodes that reached the goal, %.
     pub deformation_goal: Distribution,
+    /// Metrics of the suite over the valid episodes that have them, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub metrics: BTreeMap<String, Distribution>,
     /// Largest share of the target's volume beyond its collapse strain, over all valid episodes, %.
     pub collapsed_volume: Distribution,
     /// Share of the target's volume that was ever beyond its damage strain, over all valid episodes, %.
@@ -277,10 +280,11 @@ impl GroupScores {
             false => Rate::not_judged(),
         };
         let goal = rate(|r| r.verdict.goal);
-        let safety = match soft.len() == records.len() {
-            true => judged_rate(|r| r.verdict.safety),
-            false => rate(|r| r.verdict.safety),
+        let safety_rate = |test: fn(&EpisodeRecord) -> bool| match soft.len() == records.len() {
+            true => judged_rate(test),
+            false => rate(test),
         };
+        let safety = safety_rate(|r| r.verdict.safety);
         let peaks = |reached: fn(&EpisodeRecord) -> bool| -> Vec<f64> {
             valid.iter().filter(|r| reached(r)).filter_map(|r| r.verdict.d_peak).collect()
         };
@@ -304,6 +308,7 @@ impl GroupScores {
         let over_valid = |value: fn(&EpisodeRecord) -> Option<f64>| {
             Distribution::from_values(valid.iter().filter_map(|r| value(r)).collect())
         };
+        let names: BTreeSet<&String> = valid.iter().flat_map(|r| r.stats.metrics.keys()).collect();
         Self {
             episodes: records.len(),
             invalid: records.len() - valid.len(),
@@ -319,7 +324,7 @@ impl GroupScores {
             goal_safe_gap: goal.rate.zip(safety.rate).map(|(goal, safety)| goal - safety),
             no_slip_rate: rate(|r| r.verdict.no_slip),
             contact_success_rate: rate(|r| r.verdict.contact_success),
-            contact_safety_rate: rate(|r| r.verdict.contact_safety),
+            contact_safety_rate: safety_rate(|r| r.verdict.contact_safety),
             gentle_rate: rate(|r| r.verdict.gentle),
             grip_ratio: over_valid(|r| r.verdict.grip_ratio),
             goal_v1_rate: rate(|r| r.verdict.goal_v1),
@@ -343,6 +348,14 @@ impl GroupScores {
                 soft.iter().filter(|r| !r.outcome.is_valid()).count(),
             ),
             deformation_goal: Distribution::from_values(peaks(|r| r.verdict.goal)),
+            metrics: names
+                .into_iter()
+                .map(|name| {
+                    let values =
+                        valid.iter().filter_map(|r| r.stats.metrics.get(name).copied().flatten()).collect();
+                    (name.clone(), Distribution::from_values(values))
+                })
+                .collect(),
             collapsed_volume: over_valid(|r| r.verdict.collapsed_volume_pct),
             damaged_volume: over_valid(|r| r.verdict.damaged_volume_pct),
         }

@@ -30,7 +30,7 @@ use super::{
     run_summary::RunSummary,
     tables::{
         ResultTable, TEXT_COLUMNS, bootstrap_table, command_table, crushed_table, deformation_table,
-        grip_table, kappa_table, main_table, stage_table, task_table,
+        grip_table, kappa_table, main_table, metric_table, stage_table, task_table,
     },
 };
 
@@ -114,6 +114,7 @@ fn details(runs: &[RunSummary], out: &Path) -> Markup {
         ("Deformation, % of the diagonal", "deformation", deformation_table(runs)),
         ("Volume beyond the strain limits", "volume", crushed_table(runs)),
         ("Grip", "grip", grip_table(runs)),
+        ("Metrics of the suite", "metrics", metric_table(runs)),
         ("Harm to other objects, and stages of failures", "stages", stage_table(runs)),
         ("Commands that were not executed as given", "commands", command_table(runs)),
         ("Bootstrap intervals", "bootstrap", bootstrap_table(runs)),

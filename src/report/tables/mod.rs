@@ -7,7 +7,7 @@ use super::{
     run_summary::RunSummary,
     terminal::{percentile, tau_range},
 };
-use softvt_common::text::decimal;
+use softvt_common::text::{decimal, significant};
 use softvt_evaluation::{
     safety::KAPPAS,
     stage::TaskStage,
@@ -153,7 +153,8 @@ pub fn grip_table(runs: &[RunSummary]) -> Option<ResultTable> {
         let s = &run.summary.scores;
         let Distribution { p5, median, p95, n, .. } = s.grip_ratio;
         let head = [run.summary.suite.clone(), run.method.clone()];
-        let rates = [&s.contact_success_rate, &s.contact_safety_rate, &s.gentle_rate].map(rate);
+        let contact_safety = soft_rate(run, s, &s.contact_safety_rate);
+        let rates = [rate(&s.contact_success_rate), contact_safety, rate(&s.gentle_rate)];
         let ratios = [p5, median, p95].map(|ratio| decimal(ratio, 2));
         head.into_iter().chain(rates).chain(ratios).chain([n.to_string()]).collect()
     };
@@ -171,6 +172,25 @@ pub fn grip_table(runs: &[RunSummary]) -> Option<ResultTable> {
             "P95",
             "Episodes",
         ]),
+        rows,
+    })
+}
+
+/// Metrics of the suites; `None` without any.
+pub fn metric_table(runs: &[RunSummary]) -> Option<ResultTable> {
+    let rows_of = |run: &RunSummary| -> Vec<Vec<String>> {
+        let row = |(name, of): (&String, &Distribution)| {
+            let numbers = [of.mean, of.p5, of.median, of.p95]
+                .map(|value| value.map_or_else(|| "–".to_owned(), |value| significant(value, 4)));
+            let head = [run.summary.suite.clone(), format!("{}: {name}", run.method)];
+            head.into_iter().chain(numbers).chain([of.n.to_string()]).collect()
+        };
+        run.summary.scores.metrics.iter().map(row).collect()
+    };
+    let rows: Vec<Vec<String>> = runs.iter().flat_map(rows_of).collect();
+    (!rows.is_empty()).then(|| ResultTable {
+        caption: "Metrics of the suites over the valid episodes that have them.".to_owned(),
+        head: strings(["Suite", "Method: metric", "Mean", "P5", "Median", "P95", "Episodes"]),
         rows,
     })
 }
@@ -352,6 +372,7 @@ pub fn all_tables(runs: &[RunSummary]) -> Vec<ResultTable> {
     all.extend(deformation_table(runs));
     all.extend(crushed_table(runs));
     all.extend(grip_table(runs));
+    all.extend(metric_table(runs));
     all.extend(kappa_table(runs));
     all.extend(stage_table(runs));
     all.extend(command_table(runs));

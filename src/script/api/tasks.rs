@@ -14,6 +14,7 @@ use crate::{
 };
 use softvt_benchmark::{
     NeededKnowledge, ObjectType, REFERENCE, TaskDifference, Teacher,
+    metric::{Metric, Reduction},
     variation::{FactorRange, HiddenRanges, VariationRanges},
 };
 
@@ -34,6 +35,7 @@ pub(crate) const SETTINGS_CLASS: &str = "softvt.Settings";
 
 choice! { ObjectType { "deformable" => Deformable, "rigid" => Rigid } }
 choice! { NeededKnowledge { "nothing" => Nothing, "size" => Size, "touch" => Touch } }
+choice! { Reduction { "last" => Last, "max" => Max, "min" => Min, "mean" => Mean } }
 choice! { Teacher { "expert" => Expert, "tactile-servo" => TactileServo } }
 choice! { TaskDifference { "object" => Object, "spatial" => Spatial } }
 
@@ -124,6 +126,16 @@ record! {
         /// Largest over smallest safe grip force of the instances that are kept, at least 1.
         window_ratio: [f64; 2] = Type::Vector(2, "", Range::closed(1.0, 1000.0));
     }
+    /// A number of each episode, beside the verdict: of the true state, which policies do not see.
+    MetricSpec: "softvt.Metric" as "metric", constructor "softvt.metric" {
+        /// Name in records and tables, with its unit, as tilt_deg.
+        name: String = Type::Name;
+        /// Returns the value after a control step, or nil where it has none. `step` is a row of the trace
+        /// (docs/results.md): forces of the pads, D of each object, what touches what.
+        of: Function = Type::Function("fun(scene: softvt.SceneState, step: table): number?");
+        /// How the values of an episode become one: "last", "max", "min" or "mean".
+        over: Reduction => Text("last");
+    }
     /// A set of tasks that are reported together.
     SuiteSpec: "softvt.Suite" as "suite", constructor "softvt.suite" {
         /// Name in results; part of the seed.
@@ -141,6 +153,8 @@ record! {
         tasks: Vec<Constructed<TaskSpec>>;
         /// Changes of the scene that a run can request.
         shifts: Vec<Constructed<ShiftSpec>> => Empty;
+        /// Numbers of each episode that records and tables show beside the verdict.
+        metrics: Vec<Constructed<MetricSpec>> => Empty;
         /// Ranges from which the soft objects, the light and the cameras of every episode are drawn.
         vary: Option<Constructed<VariationSpec>>;
         /// Changed settings (docs/settings.md): { physics = {…}, robot = {…}, criteria = {…}, tactile = {…}, cameras =
@@ -216,10 +230,18 @@ pub(crate) static CONSTRUCTORS: &[&Record] = &[
     SuiteSpec::RECORD,
     TaskSpec::RECORD,
     ShiftSpec::RECORD,
+    MetricSpec::RECORD,
     VariationSpec::RECORD,
     ConditionsSpec::RECORD,
     ExperimentSpec::RECORD,
 ];
+
+impl MetricSpec {
+    /// As plain data.
+    pub(crate) fn plain(&self) -> Metric {
+        Metric { name: self.name.clone(), over: self.over }
+    }
+}
 
 impl Constructed<TaskSpec> {
     /// Scene name of the object whose deformation and grip the records hold.

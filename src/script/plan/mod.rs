@@ -34,7 +34,7 @@ use crate::{
 use options::{OptionSession, OptionSpec, SharedOptions};
 use softvt_benchmark::{
     Condition, Goal, ObjectType, Plan, Shift, ShiftValue, Suite, Task, TaskDifference,
-    goal_conflict::conflict, seed::SecretSeed, settings::Settings,
+    goal_conflict::conflict, metric::Metric, seed::SecretSeed, settings::Settings,
 };
 use softvt_common::{parallel::lock, text::unknown_name};
 
@@ -436,10 +436,30 @@ pub(crate) fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Su
         tasks,
         shifts: shifts.collect(),
         vary: spec.vary.as_ref().map(|vary| vary.ranges()),
+        metrics: metrics(lua, spec)?,
         settings: settings(lua, "suite.settings", spec.settings.as_ref())?,
         twin_of: twin_of(lua, spec)?,
         teacher: spec.teacher.unwrap_or_default(),
     })
+}
+
+/// Largest number of metrics of a suite.
+const MAX_METRICS: usize = 32;
+
+/// The metrics of a suite, whose names must differ.
+fn metrics(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Vec<Metric>> {
+    let metrics: Vec<Metric> = spec.metrics.iter().map(|metric| metric.plain()).collect();
+    let twice = (1..metrics.len()).find(|&at| metrics[..at].iter().any(|m| m.name == metrics[at].name));
+    let message = match twice {
+        Some(at) => {
+            format!("suite.metrics: two are named {:?}; give each a name of its own", metrics[at].name)
+        }
+        None if metrics.len() > MAX_METRICS => {
+            format!("suite.metrics: there are {}; give at most {MAX_METRICS}", metrics.len())
+        }
+        None => return Ok(metrics),
+    };
+    Err(fail_at_key(lua, &spec.table, "metrics", message))
 }
 
 /// The suite whose rigid twin this one is, which must say that its objects are rigid.

@@ -6,7 +6,7 @@ use mlua::{FromLua, Function, Lua, Table, Value};
 
 use super::{
     expert::{ExpertController, ExpertGrip},
-    predicate::ScriptPredicate,
+    predicate::{ScriptMetric, ScriptPredicate},
 };
 use crate::{
     api::{
@@ -36,7 +36,7 @@ use softvt_common::{
 };
 use softvt_geometry::{Aabb, Vec3};
 use softvt_robot::{gripper::MAX_WIDTH, panda};
-use softvt_rollout::StatePredicate;
+use softvt_rollout::{MeasuredMetric, StatePredicate};
 use softvt_scene::{Body, CameraSettings, Scene, SceneVariation};
 
 /// Changes of a scene between its layout and the start of an episode, applied in the order of the fields. The variation
@@ -65,6 +65,8 @@ pub struct EpisodeSetup {
     pub nominal_prompt: String,
     /// Functions that the goal asks for, in its order.
     pub predicates: Vec<Arc<dyn StatePredicate>>,
+    /// Metrics of the suite.
+    pub metrics: Vec<MeasuredMetric>,
     /// Source of its random streams.
     pub seed: EpisodeSeed,
     instance: Arc<ScriptInstance>,
@@ -171,6 +173,15 @@ impl SceneBuilder {
             Some(Arc::new(predicate) as Arc<dyn StatePredicate>)
         };
         let predicates = predicates.into_iter().filter_map(predicate).collect();
+        let metrics = suite.metrics.iter().map(|spec| MeasuredMetric {
+            metric: spec.plain(),
+            function: Arc::new(ScriptMetric {
+                instance: instance.clone(),
+                name: spec.name.clone(),
+                function: spec.of.clone(),
+            }),
+        });
+        let metrics = metrics.collect();
         Ok(EpisodeSetup {
             scene,
             nominal,
@@ -178,6 +189,7 @@ impl SceneBuilder {
             prompt,
             nominal_prompt,
             predicates,
+            metrics,
             seed,
             instance,
             expert,

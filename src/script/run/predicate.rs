@@ -1,8 +1,8 @@
-//! Functions of goals as predicates of the true state.
+//! Functions of the script of the true state: predicates of goals, and metrics of suites.
 
 use std::{fmt, sync::Arc};
 
-use mlua::{Function, Value};
+use mlua::{Function, IntoLuaMulti, Lua, LuaSerdeExt, Value, serde::SerializeOptions};
 
 use crate::{
     api::{
@@ -13,7 +13,7 @@ use crate::{
     vm::value::describe,
 };
 use softvt_benchmark::seed::keyed_rng;
-use softvt_rollout::{Simulation, StatePredicate};
+use softvt_rollout::{Simulation, StateFunction, StatePredicate, StepTrace};
 
 /// A function of the script, given to `softvt.predicate`.
 pub(crate) struct ScriptPredicate {
@@ -30,14 +30,9 @@ impl fmt::Debug for ScriptPredicate {
 }
 
 impl StatePredicate for ScriptPredicate {
-    /// Calls the function with the time limit of one call. Random numbers are the same at every call, and those of the
-    /// expert go on as if it had not been called.
     fn holds(&self, sim: &Simulation, time_s: f64) -> Result<bool, String> {
-        let vm = &self.instance.vm;
-        let before = vm.random.replace(keyed_rng(&["softvt goal"]));
-        let result = vm.call::<Value>(&self.function, SceneState::new(expert_view(sim, time_s)));
-        vm.random.reseed(before);
-        match result.map_err(|error| error.to_string())? {
+        let scene = SceneState::new(expert_view(sim, time_s));
+        match call(&self.instance, &self.function, scene)? {
             Value::Boolean(holds) => Ok(holds),
             other => {
                 let (place, got) = (defined_at(&self.function), describe(&other));
@@ -45,4 +40,57 @@ impl StatePredicate for ScriptPredicate {
             }
         }
     }
+}
+
+/// Calls a function with the time limit of one call and the same random numbers each time. Those of the expert go on as
+/// if it had not been called.
+fn call(
+    instance: &ScriptInstance,
+    function: &Function,
+    arguments: impl IntoLuaMulti,
+) -> Result<Value, String> {
+    let vm = &instance.vm;
+    let before = vm.random.replace(keyed_rng(&["softvt goal"]));
+    let result = vm.call::<Value>(function, arguments);
+    vm.random.reseed(before);
+    result.map_err(|error| error.to_string())
+}
+
+/// A function of the script, given to `softvt.metric`.
+pub(crate) struct ScriptMetric {
+    pub(crate) instance: Arc<ScriptInstance>,
+    pub(crate) name: String,
+    pub(crate) function: Function,
+}
+
+impl fmt::Debug for ScriptMetric {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("ScriptMetric").field("name", &self.name).finish_non_exhaustive()
+    }
+}
+
+impl StateFunction for ScriptMetric {
+    fn value(&self, sim: &Simulation, step: &StepTrace) -> Result<Option<f64>, String> {
+        let vm = &self.instance.vm;
+        let row = step_table(&vm.lua, step).map_err(|error| error.to_string())?;
+        let scene = SceneState::new(expert_view(sim, step.time_s));
+        let value = call(&self.instance, &self.function, (scene, row))?;
+        let got = match value {
+            Value::Nil => return Ok(None),
+            Value::Integer(value) => return Ok(Some(value as f64)),
+            Value::Number(value) if value.is_finite() => return Ok(Some(value)),
+            Value::Number(value) => value.to_string(),
+            other => describe(&other),
+        };
+        let place = defined_at(&self.function);
+        Err(format!(
+            "{place}: the metric {:?} returned {got}; return a finite number, or nil where it has none",
+            self.name
+        ))
+    }
+}
+
+/// A row of the trace as a table; what is null is absent.
+fn step_table(lua: &Lua, step: &StepTrace) -> mlua::Result<Value> {
+    lua.to_value_with(step, SerializeOptions::new().serialize_none_to_null(false).set_array_metatable(false))
 }

@@ -1,0 +1,26 @@
+//! Metrics of a suite: numbers of each episode beside its verdict.
+
+use serde::{Deserialize, Serialize};
+
+/// A number of each episode that a suite measures from the true state. It changes no verdict.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Metric {
+    /// Name in records and tables.
+    pub name: String,
+    /// How the values of the control steps become one.
+    pub over: Reduction,
+}
+
+/// How the values of the control steps of an episode become one number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reduction {
+    /// The last value.
+    Last,
+    /// The largest value.
+    Max,
+    /// The smallest value.
+    Min,
+    /// The mean of the values.
+    Mean,
+}

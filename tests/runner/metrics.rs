@@ -1,0 +1,63 @@
+//! Metrics of suites: values, where they appear, and refused declarations.
+
+use insta::assert_snapshot;
+use softvt::{evaluation::verdict::Outcome, runner::SuiteResult};
+
+use crate::support::{Project, Small};
+
+/// The small suite with metrics, whose list is in one line.
+fn project(metrics: &str) -> Project {
+    let text =
+        Small::default().text().replace("episodes = ", &format!("metrics = {{ {metrics} }}, episodes = "));
+    assert!(text.contains("metrics ="));
+    Project::new(&[("x.lua", &text)])
+}
+
+const STEPS: &str = r#"
+softvt.metric { name = "steps", of = function(_, step) return step.step end },
+softvt.metric { name = "first", over = "min", of = function(_, step) return step.time_s end },
+softvt.metric { name = "rest_m", over = "mean", of = function(scene) return scene:object("cube").centre[3] end },
+softvt.metric { name = "draw", over = "max", of = function() return math.random() end },
+softvt.metric { name = "force_n", over = "max", of = function(_, step) if step.pad_force_n[1] > 0 then return step.pad_force_n[1] end end },
+"#;
+
+#[test]
+fn metrics_of_a_suite_are_in_records_and_summaries_and_change_nothing_else() {
+    let plain = Project::new(&[("x.lua", &Small::default().text())]).run("x.lua").record();
+    let project = project(&STEPS.replace('\n', " "));
+    let SuiteResult { records, summary, .. } = project.run("x.lua").finish().result();
+    let record = &records[0];
+    assert_eq!(record.verdict, plain.verdict);
+    assert_eq!(record.stats.state_hash, plain.stats.state_hash);
+    let metrics = &record.stats.metrics;
+    assert_eq!(metrics["steps"], Some(f64::from(record.stats.steps)));
+    assert_eq!(metrics["first"], Some(0.05));
+    assert!((0.0..0.2).contains(&metrics["rest_m"].unwrap()), "{metrics:?}");
+    // The same draw in each step.
+    assert!((0.0..1.0).contains(&metrics["draw"].unwrap()), "{metrics:?}");
+    assert_eq!(summary.scores.metrics["steps"].mean, metrics["steps"]);
+    assert_eq!(summary.scores.metrics["force_n"].n, usize::from(metrics["force_n"].is_some()));
+}
+
+#[test]
+fn a_metric_that_is_no_number_ends_the_episode_and_says_where() {
+    let returned = [("0 / 0", "NaN"), ("'x'", "\"x\""), ("{}", "a table"), ("true", "true")];
+    for (value, got) in returned {
+        let metric = format!("softvt.metric {{ name = 'm', of = function() return {value} end }}");
+        let record = project(&metric).run("x.lua").record();
+        let Outcome::Error { message } = &record.outcome else { panic!("{:?}", record.outcome) };
+        let expected = format!("x.lua:9: the metric \"m\" returned {got}; return a finite number");
+        assert!(message.contains(&expected), "{message}");
+    }
+}
+
+#[test]
+fn wrong_metrics_are_refused() {
+    let refusal = |metrics: &str| project(metrics).run("x.lua").error();
+    let metric = |fields: &str| format!("softvt.metric {{ {fields} }}");
+    let good = metric("name = 'm', of = function() end");
+    assert_snapshot!(refusal(&format!("{good}, {good}")), @r#"x.lua:9: suite.metrics: two are named "m"; give each a name of its own"#);
+    assert_snapshot!(refusal(&metric("name = 'm', over = 'sum', of = function() end")), @r#"x.lua:9: metric.over: expected one of "last", "max", "min", "mean", got "sum""#);
+    assert_snapshot!(refusal(&metric("name = 'm'")), @"");
+    assert_snapshot!(refusal("function() end"), @"");
+}
