@@ -310,15 +310,13 @@ impl PolicyArgs {
     /// # Errors
     /// A policy or profile that cannot be loaded, or an option without effect.
     pub(crate) fn checked(&self) -> Result<PolicyConfig, CliError> {
-        let profile = &self.connection.profile;
-        let is_alone = self.policy.is_none()
-            && profile.profile.is_some()
-            && self.connection.options() == profile.options();
-        Ok(if is_alone {
-            PolicyConfig::client(&profile.options(), false)?
-        } else {
-            PolicyConfig::load(&self.options())?
-        })
+        let of_profile = self.connection.profile.options();
+        if self.policy.is_some() || of_profile.profile.is_none() {
+            return Ok(PolicyConfig::load(&self.options())?);
+        }
+        // Options that act on servers only.
+        PolicyConfig::load(&PolicyOptions { profile: None, gripper: None, name: None, ..self.options() })?;
+        Ok(PolicyConfig::client(&of_profile, false)?)
     }
 
     /// The options for a suite of a teacher, which `--policy` replaces.

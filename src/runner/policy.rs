@@ -35,7 +35,7 @@ const CLIENT: &str = "client";
 const DEFAULT_PROFILE: &str = "visuo_tactile";
 
 /// A policy that is not loaded yet, and how it is connected. By default, the expert of the task.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub struct PolicyOptions {
     /// The policy.
     pub source: PolicySource,
