@@ -82,12 +82,15 @@ def load(folder: Path) -> Run:
 
 
 def save(run: Run, folder: Path) -> None:
-    """Writes the outcomes of a run into a folder."""
+    """Writes the outcomes of a run into a folder.
+
+    Ratios are written as they are: one just above 1 is not safe. Files of before have four digits, and 1 may stand for 1.00003 there.
+    """
     with open(folder / OUTCOMES, "w", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(COLUMNS)
         for row in zip(run.task, run.episode, run.goal, run.no_drop, run.safety, run.ratio, run.stage, run.grip):
-            table.writerow([*map(int, row[:5]), f"{row[5]:.4g}", row[6], f"{row[7]:.4g}"])
+            table.writerow([*map(int, row[:5]), repr(float(row[5])), row[6], f"{row[7]:.4g}"])
 
 
 @dataclass
