@@ -228,6 +228,11 @@ def _parser() -> argparse.ArgumentParser:
     demonstrate.add_argument(
         "--tactile-pictures", action="store_true", help="store the tactile pictures of both fingers as well, for train --touch pictures"
     )
+    demonstrate.add_argument(
+        "--teacher-runs",
+        type=Path,
+        help="folder of the runs of the teacher, kept if they are there: the same for two-width and force; by default that of the recording",
+    )
     demonstrate.add_argument("--processes", type=int, default=0, help="processes; 0: one per processor")
     with_disturbance(demonstrate, FELT_DISTURBANCE)
     with_edge(demonstrate)

@@ -426,6 +426,7 @@ class Demonstrate:
     frames: int  # control steps with pictures where a policy looks
     gripper: str  # grip code: "continuous" or a key of OPENS
     processes: int
+    teacher_runs: Path | None = None  # folder of the teacher's runs, which the keys of OPENS may share; None: that of the recording
 
     @property
     def common(self) -> list[str]:
@@ -441,10 +442,12 @@ class Demonstrate:
         ]
         lines += [f"local suite = require {json.dumps('suites.' + Path(self.suite).stem)}"]
         lines += [] if steps is None else [f"for _, task in ipairs(suite.tasks) do task.budget_steps = {steps} end"]
-        script, run = self.out / f"{name}.lua", self.out / name
+        folder = self.teacher_runs or self.out
+        folder.mkdir(parents=True, exist_ok=True)
+        script, run = folder / f"{name}.lua", folder / name
         script.write_text("\n".join([*lines, "return suite\n"]))
         words = [str(script), "--policy", self.teacher, "--seed", str(seed), *self.common, "--episodes", str(episodes)]
-        words += ["--trace"] * (self.gripper == "force")
+        words += ["--trace"] * (self.gripper != "continuous")  # force reads it, and the run is the same for all codes that may share it
         run_softvt([*words, "--threads", str(self.processes), "--out", str(run), "--resume"])
         return run
 
@@ -509,7 +512,7 @@ def demonstrate(one: Demonstrate) -> None:
     (out / "recording.json").write_text(
         json.dumps({"gripper": None if one.gripper == "continuous" else one.gripper, "frames": one.frames}) + "\n"
     )
-    card = {key: value for key, value in vars(one).items() if key not in ("out", "processes")} | {
+    card = {key: value for key, value in vars(one).items() if key not in ("out", "processes", "teacher_runs")} | {
         "safe_attempts": len(grips),
         "grips": dict(sorted(fates.items())),
         "scenes_shown": dict(sorted(others.items())),

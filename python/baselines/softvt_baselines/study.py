@@ -255,6 +255,8 @@ def _record(suite: str, code: str, study: Study) -> None:
         words += ["--edge", str(study.edge), "--disturbance", str(study.disturbance), *(["--task", study.task] if study.task else [])]
         words += ["--teacher", study.teacher] if study.teacher != "suite" else []
         words += ["--frames", str(study.frames), "--gripper", code]
+        # Where the hand closes at once, the attempts of the teacher are the same in all codes.
+        words += ["--teacher-runs", str(study.out / "data" / f"{suite}-teacher")] if code != "continuous" else []
         words += ["--tactile-pictures"] * any("i" in inputs for inputs in study.inputs)
         _call(words, study.out / "logs" / f"{recording.name}.log")
     else:

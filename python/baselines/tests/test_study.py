@@ -111,6 +111,13 @@ class Studies(unittest.TestCase):
         self.assertEqual(Path(trained["one-vt-two-width-s0"][1]).name, "one-two-width")
         self.assertEqual(sum("suites/one.lua" in call for call in self.calls), 1, "a reference runs once")
 
+    def test_codes_in_which_a_hand_closes_at_once_share_the_runs_of_the_teacher(self):
+        study.run(self.study(memory=True, inputs=["vt"], codes=["continuous", "two-width", "force"], replans=[4]))
+        words = [words for words in self.words if words[0] == "demonstrate"]
+        self.assertNotIn("--teacher-runs", words[0])
+        shared = [given[given.index("--teacher-runs") + 1] for given in words[1:]]
+        self.assertEqual(shared, [str(self.out / "data" / "one-teacher")] * 2)
+
     def test_frames_are_recorded_trained_and_named(self):
         study.run(self.study(memory=True, inputs=["vt"], frames=2))
         self.assertEqual(self.calls[:2], ["demonstrate data/one", "train checkpoints/one-vt2-continuous-s0.pt"])
