@@ -17,7 +17,7 @@ from .study import ORIGIN
 # The tables stand between these lines of the page.
 BEGIN, END = "<!-- tables: softvt-baselines page -->", "<!-- end of tables -->"
 LEARNED = re.compile(
-    r"(?P<suite>\w+)-(?P<inputs>(?:vo|vp|vt|vpt|vb|vi)2?)-(?P<code>[a-z-]+)-s(?P<seed>\d+)-r(?P<replan>\d+)(?P<condition>\+.*)?"
+    r"(?P<suite>\w+)-(?P<inputs>(?:vo|vp|vt|vpt|vb|vi)2?)-(?P<code>[a-z-]+?)(?:-by-(?P<teacher>[a-z-]+))?-s(?P<seed>\d+)-r(?P<replan>\d+)(?P<condition>\+.*)?"
 )
 REFERENCES = {
     "expert": "expert (privileged)",
@@ -51,6 +51,7 @@ class Policy:
     replan: int
     inputs: str  # as in the name of a run: "vo", or "vo2" with two frames
     condition: str = ""
+    teacher: str = ""  # "": that of the suite
 
 
 def collect(study: Path, into: Path) -> None:
@@ -77,7 +78,9 @@ def _identify(folder: Path, suite: str) -> Policy | str:
     """The policy of a collected run: a learned one, or the name of a reference. Raises UserError for other runs."""
     if found := LEARNED.fullmatch(folder.name):
         part = found.groupdict()
-        return Policy(part["suite"], part["code"], int(part["replan"]), part["inputs"], (part["condition"] or "")[1:])
+        return Policy(
+            part["suite"], part["code"], int(part["replan"]), part["inputs"], (part["condition"] or "")[1:], part["teacher"] or ""
+        )
     if (reference := folder.name.removeprefix(f"{suite}-")) in REFERENCES:
         return reference
     raise UserError(f"{folder}: not named as a run of a study")
@@ -118,28 +121,28 @@ def _row(name: str, runs: list[Run], replan: str) -> list[str]:
     return [name, replan, str(len(runs)), episodes, *rates, _spread(ratio), _spread(grip)]
 
 
-def _inputs(inputs: str) -> str:
-    """Inputs in words."""
-    return inputs.upper().replace("2", " of two frames")
+def _inputs(policy: Policy) -> str:
+    """The inputs of a policy in words, and its teacher if it is not that of the suite."""
+    return policy.inputs.upper().replace("2", " of two frames") + (f" shown by {policy.teacher}" if policy.teacher else "")
 
 
 def _name(policy: Policy) -> str:
-    return f"{_inputs(policy.inputs)}, {policy.code}"
+    return f"{_inputs(policy)}, {policy.code}"
 
 
 @dataclass
 class Pair:
-    """Policies of two kinds of inputs, of the same suite, grip code, replanning and condition, and their runs of the training seeds that both
-    have."""
+    """Policies of two kinds of inputs, or of two teachers, of the same suite, grip code, replanning and condition, and their runs of the training
+    seeds that both have."""
 
     policy: Policy
-    other: str  # inputs of the other one
+    other: Policy
     fewer: list[Run]
     more: list[Run]
 
     @property
     def names(self) -> tuple[str, str]:
-        return _inputs(self.other), _inputs(self.policy.inputs)
+        return _inputs(self.other), _inputs(self.policy)
 
     @property
     def difference(self) -> str:
@@ -151,12 +154,14 @@ def _seeds(runs: list[Run]) -> dict[str, Run]:
 
 
 def _pairs(learned: dict[Policy, list[Run]]) -> list[Pair]:
-    """The pairs of COMPARED with a common training seed."""
+    """The pairs of COMPARED, and of a policy of another teacher with that of the suite's, with a common training seed."""
     pairs = []
     for policy, runs in sorted(learned.items()):
-        for inputs, other in COMPARED:
-            fewer, more = _seeds(learned.get(replace(policy, inputs=other), [])), _seeds(runs)
-            if inputs == policy.inputs and (common := sorted(fewer.keys() & more.keys())):
+        others = [replace(policy, inputs=other) for inputs, other in COMPARED if inputs == policy.inputs]
+        others += [replace(policy, teacher="")] if policy.teacher else []
+        for other in others:
+            fewer, more = _seeds(learned.get(other, [])), _seeds(runs)
+            if common := sorted(fewer.keys() & more.keys()):
                 pairs.append(Pair(policy, other, [fewer[seed] for seed in common], [more[seed] for seed in common]))
     return pairs
 
@@ -314,7 +319,10 @@ def plots(folder: Path) -> list[Plot]:
         policies = [policy for policy in learned if (policy.suite, policy.condition) == (suite, "") and policy.inputs in INPUTS]
         policies = [policy for policy in policies if policy.code in CODES] or policies
         replan = min((policy.replan for policy in policies), key=lambda replan: (abs(replan - REPLAN), replan), default=REPLAN)
-        policies = sorted((policy for policy in policies if policy.replan == replan), key=lambda policy: INPUTS.index(policy.inputs))
+        policies = sorted(
+            (policy for policy in policies if policy.replan == replan),
+            key=lambda policy: (INPUTS.index(policy.inputs), policy.code, policy.teacher),
+        )
         has_codes = len({policy.code for policy in policies}) > 1
         own = {_row_name(policy, has_codes): learned[policy] for policy in policies}
         others = {name.replace("-", " "): [references[suite, name]] for name in REFERENCES if (suite, name) in references}
@@ -323,8 +331,9 @@ def plots(folder: Path) -> list[Plot]:
 
 
 def _row_name(policy: Policy, has_codes: bool) -> str:
-    """What a row is called in a plot of several grip codes, or of one."""
-    return f"{policy.inputs.upper()} {policy.code}" if has_codes else f"{policy.inputs.upper()}: {INPUT_WORDS[policy.inputs]}"
+    """What a row is called in a plot of several grip codes, or of one. An asterisk marks another teacher than that of the suite."""
+    name = f"{policy.inputs.upper()} {policy.code}" if has_codes else f"{policy.inputs.upper()}: {INPUT_WORDS[policy.inputs]}"
+    return name + "*" * bool(policy.teacher)
 
 
 def write(studies: list[Path], docs: Path) -> None:

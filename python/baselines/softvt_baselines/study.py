@@ -89,11 +89,13 @@ class Job:
     code: str
     seed: int
     frames: int
+    teacher: str  # as in Study
 
     @property
     def name(self) -> str:
-        """The inputs, followed by the number of frames if there are several."""
-        return f"{self.suite}-{self.inputs}{self.frames if self.frames > 1 else ''}-{self.code}-s{self.seed}"
+        """The inputs are followed by the number of frames if there are several, the grip code by the teacher if it is not that of the suite."""
+        frames, by = self.frames if self.frames > 1 else "", f"-by-{self.teacher}" if self.teacher != "suite" else ""
+        return f"{self.suite}-{self.inputs}{frames}-{self.code}{by}-s{self.seed}"
 
 
 class OutOfTime(UserError):
@@ -314,7 +316,7 @@ def run(study: Study) -> None:
                     evaluation.add(partial(_evaluate_reference, suite, policy, study, threads))
                 references = ()
                 for seed, code, inputs in itertools.product(study.seeds, codes, study.inputs):
-                    add(Job(suite, inputs, code, seed, study.frames))
+                    add(Job(suite, inputs, code, seed, study.frames, study.teacher))
         problems += training.problems() + evaluation.problems()
     except KeyboardInterrupt:
         training.cancel()

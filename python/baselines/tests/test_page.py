@@ -71,6 +71,19 @@ class Pages(unittest.TestCase):
         for difference in ("VT of two frames − VO of two frames", "VT of two frames − VT"):
             self.assertIn(f"| `one` | {difference} | continuous | 4 | 1 | none |", text)
 
+    def test_policies_of_another_teacher_stand_beside_those_of_the_suite(self):
+        self.run_of("one-vo-binary-s0-r4/one", np.zeros((10, 5), bool))
+        for inputs in ("vo", "vt"):
+            self.run_of(f"one-{inputs}-binary-by-expert-binary-s0-r4/one", np.ones((10, 5), bool))
+        page.collect(self.study, self.docs)
+        text = page.tables(self.docs)
+        self.assertIn("| VO, binary | 4 | 1 | 50 | 100.0", text)
+        self.assertIn("| VO shown by expert-binary, binary | 4 | 1 | 50 | 100.0 [100.0, 100.0] |", text)
+        for difference in ("VO shown by expert-binary − VO", "VT shown by expert-binary − VO shown by expert-binary"):
+            self.assertIn(f"| `one` | {difference} | binary | 4 | 1 | none | 50 |", text)
+        (plot,) = page.plots(self.docs)
+        self.assertEqual(list(plot.learned)[:3], ["VO binary", "VO binary*", "VO continuous"])
+
     def test_policies_are_compared_on_the_seeds_that_both_have(self):
         shutil.rmtree(self.study / "runs" / "one-vo-continuous-s0-r4")
         page.collect(self.study, self.docs)

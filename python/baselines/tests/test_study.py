@@ -118,6 +118,10 @@ class Studies(unittest.TestCase):
         shared = [given[given.index("--teacher-runs") + 1] for given in words[1:]]
         self.assertEqual(shared, [str(self.out / "data" / "one-teacher")] * 2)
 
+    def test_policies_are_named_by_a_teacher_that_is_not_that_of_the_suite(self):
+        study.run(self.study(inputs=["vo"], codes=["binary"], replans=[4], teacher="expert-binary", keep="goal"))
+        self.assertIn("evaluate runs/one-vo-binary-by-expert-binary-s0-r4", self.calls)
+
     def test_frames_are_recorded_trained_and_named(self):
         study.run(self.study(memory=True, inputs=["vt"], frames=2))
         self.assertEqual(self.calls[:2], ["demonstrate data/one", "train checkpoints/one-vt2-continuous-s0.pt"])
