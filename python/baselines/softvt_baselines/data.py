@@ -388,8 +388,12 @@ def load(
     grip_range, ends = float(np.ptp(actions[:, 6])), np.cumsum(recorded)[:-1]
     # What was recorded in another code has no commanded closure: the fingers tell how far the hand is closed.
     is_commanded = all(ACTIONS["continuous"] in numbers for numbers in packed)
-    closure = joined(ACTIONS["continuous"])[:, GRIPPER] if is_commanded else hand(joined("state"))[:, GRIPPER]
+    fingers = hand(joined("state"))[:, GRIPPER]
+    closure = joined(ACTIONS["continuous"])[:, GRIPPER] if is_commanded else fingers
     hand_moves = hand_steps(closure, recorded)
+    if code != "continuous":
+        # The command of a hand that is open or closed switches in one step, and its fingers move in the next ones.
+        hand_moves |= hand_steps(fingers, recorded)
     moving = [
         np.ones(len(one), bool) if has_memory else moving_steps(one, grip_range, own)
         for one, own in zip(np.split(actions, ends), np.split(hand_moves, ends))

@@ -195,6 +195,18 @@ class Numbers(unittest.TestCase):
             demos = load([folder], "two-width", 4)
         self.assertEqual(demos.row.tolist(), [0, 2, 3, 4, 5, 6], "and the steps after it are waiting")
 
+    def test_the_steps_in_which_the_fingers_follow_a_command_that_switched_are_kept(self):
+        with tempfile.TemporaryDirectory() as scratch:
+            folder = recording(Path(scratch) / "a", demos=1)
+            with h5py.File(folder / "hdf5" / "suite_task0_demo.hdf5", "a") as file:
+                demo = file["data/demo_0"]
+                for stream in ("actions", "actions_binary"):
+                    demo[stream][:, :3] = 0
+                    demo[stream][:, 6] = [0] * 2 + [1] * 5 + [0] * 5
+                demo["obs/state"][:, 6] = [0.04] * 3 + [0.025, 0.01, 0.01, 0.01, 0.01, 0.03, 0.04, 0.04, 0.04]
+            demos = load([folder], "binary", 4)
+        self.assertEqual(demos.row.tolist(), [0, 2, 3, 4, 7, 8, 9], "while the hand closes and opens; it waits in the others")
+
     def test_memory_keeps_waiting_and_the_command_before_each_step(self):
         with tempfile.TemporaryDirectory() as scratch:
             demos = load([recording(Path(scratch) / "a")], "continuous", 4, has_drives=True, has_memory=True)
