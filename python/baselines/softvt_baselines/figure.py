@@ -162,7 +162,10 @@ def _picture(
                 body += "".join(_text(left + PLOT * at, base + 20, words, "middle", "soft") for at, words in ticks.items())
         y = base + FOOT
     y += TICKS
-    for line in [*key, _text(0, 0, "grey names: scripted controllers, which know the state", "start", "soft")]:
+    notes = ["grey names: scripted controllers, which know the state"]
+    if any(name.endswith("*") for plot in plots for name in plot.learned):
+        notes.append("asterisk: from demonstrations of another teacher than the suite's")
+    for line in [*key, *(_text(0, 0, note, "start", "soft") for note in notes)]:
         body += f'<g transform="translate({NAMES} {y})">\n{line}</g>\n'
         y += KEY
     return _image(width, y - KEY + 14, title, body)

@@ -83,6 +83,10 @@ class Pages(unittest.TestCase):
             self.assertIn(f"| `one` | {difference} | binary | 4 | 1 | none | 50 |", text)
         (plot,) = page.plots(self.docs)
         self.assertEqual(list(plot.learned)[:3], ["VO binary", "VO binary*", "VO continuous"])
+        self.assertIn(">asterisk:", figure.rates([plot]))
+        for name in ("VO binary*", "VT binary*"):
+            del plot.learned[name]
+        self.assertNotIn("asterisk", figure.rates([plot]))
 
     def test_policies_are_compared_on_the_seeds_that_both_have(self):
         shutil.rmtree(self.study / "runs" / "one-vo-continuous-s0-r4")
