@@ -257,7 +257,7 @@ local ENDS = [[
 
 ## Ends of the window
 
-Trials with the robot's hand and the expert's lift, 5 % of the window inside and outside of each end. The hand is commanded to the width
+Trials with the robot's hand and the expert's lift, 5 %% of the window inside and outside of each end. The hand is commanded to the width
 and force of the press there. Trials differ in the place of the grasp alone: it is displaced in each horizontal direction by up to
 %g mm, as in the press that found the window (before the comma), and by up to %g mm, as the expert displaces its own grasps (after
 the comma). The hand is not turned.

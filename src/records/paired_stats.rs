@@ -71,10 +71,10 @@ pub fn d_peak(record: &EpisodeRecord) -> Option<f64> {
     record.verdict.d_peak.filter(|_| record.outcome.is_valid())
 }
 
-/// Peak D over τ of a valid episode; `None` without a limit or a measurement.
+/// Peak D over τ of a valid episode, of the object that the goal moves for which it is largest; `None` without a limit or
+/// a measurement.
 pub fn d_over_tau(record: &EpisodeRecord) -> Option<f64> {
-    let (d, tau) = d_peak(record).zip(record.verdict.tau)?;
-    (tau > 0.0).then_some(d / tau)
+    record.most_deformed().filter(|_| record.outcome.is_valid()).map(|target| target.ratio())
 }
 
 /// Differences of the second run from the first. An invalid episode succeeds at nothing and has no deformation.
@@ -116,7 +116,7 @@ pub struct PairedComparison {
     pub d_final: PairedDifference,
     /// 95th percentile of D within the episode, %.
     pub d_p95: PairedDifference,
-    /// Largest share of the target's volume beyond its collapse strain, %.
+    /// Largest share of the volume of a target beyond its collapse strain, %.
     pub collapsed_volume_pct: PairedDifference,
     /// Share of the target's volume that was ever beyond its damage strain, %.
     pub damaged_volume_pct: PairedDifference,
@@ -141,8 +141,10 @@ impl PairedComparison {
             let both = |pair: &EpisodePair| Some([of_valid(pair.first)?, of_valid(pair.second)?]);
             PairedDifference::from_values(pairs.iter().filter_map(both))
         };
-        let soft: Vec<_> =
-            pairs.iter().filter(|pair| pair.first.header.soft && pair.second.header.soft).collect();
+        let soft: Vec<_> = pairs
+            .iter()
+            .filter(|pair| pair.first.has_soft_target() && pair.second.has_soft_target())
+            .collect();
         // As in a summary: what was judged in no episode of a run has no rate.
         let is_judged = soft.iter().any(|pair| pair.first.is_deformation_judged())
             && soft.iter().any(|pair| pair.second.is_deformation_judged());
@@ -194,7 +196,7 @@ impl PairedComparison {
             d_mean: mean(|r| r.verdict.d_mean),
             d_final: mean(|r| r.verdict.d_final),
             d_p95: mean(|r| r.verdict.d_p95),
-            collapsed_volume_pct: mean(|r| r.verdict.collapsed_volume_pct),
+            collapsed_volume_pct: mean(EpisodeRecord::collapsed_volume_pct),
             damaged_volume_pct: mean(|r| r.verdict.damaged_volume_pct),
             d_peak: mean(d_peak),
             d_over_tau: mean(d_over_tau),

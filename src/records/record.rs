@@ -227,14 +227,14 @@ impl EpisodeRecord {
     /// The same in words: of a rigid object *safe* is *placed*.
     pub fn outcome_name(&self) -> &'static str {
         match self.category() {
-            EpisodeCategory::Safe if !self.header.soft => "placed",
+            EpisodeCategory::Safe if !self.has_soft_target() => "placed",
             category => category.name(),
         }
     }
 
     /// The same with harm that the name does not tell: "dropped, over the limit", "over the limit, crushed".
     pub fn result_and_harm(&self) -> String {
-        let is_over = self.verdict.deformation_ok == Some(false);
+        let is_over = self.is_within_limits() == Some(false);
         let harm = match self.crushed_volume_pct() {
             Some(_) => ", crushed",
             None if is_over && self.category() != EpisodeCategory::OverLimit => ", over the limit",
@@ -253,36 +253,137 @@ impl EpisodeRecord {
         words.collect()
     }
 
-    /// Share of the volume that collapsed, %, if it is large enough for the object to be called crushed.
+    /// True if an object that the goal moves is soft.
+    pub fn has_soft_target(&self) -> bool {
+        self.header.soft || self.verdict.targets.iter().any(|target| target.soft)
+    }
+
+    /// True if D stayed within the limit of each soft object that the goal moves; `None` where one of them is unknown and
+    /// none is over its limit.
+    pub fn is_within_limits(&self) -> Option<bool> {
+        let object = if self.header.soft { self.verdict.deformation_ok } else { Some(true) };
+        let others =
+            self.verdict.targets.iter().filter(|target| target.soft).map(|target| target.deformation_ok);
+        let all: Vec<Option<bool>> = others.chain([object]).collect();
+        match all.contains(&Some(false)) {
+            true => Some(false),
+            false => (!all.contains(&None)).then_some(true),
+        }
+    }
+
+    /// The soft object that the goal moves with the largest peak D over τ; `None` without any that has both.
+    pub fn most_deformed(&self) -> Option<DeformedTarget<'_>> {
+        let v = &self.verdict;
+        let object = self.header.soft.then_some((None, v.d_peak, v.tau));
+        let others = v.targets.iter().filter(|target| target.soft);
+        let others = others.map(|target| (Some(target.object.as_str()), target.d_peak, target.tau));
+        let all = object.into_iter().chain(others).filter_map(|(object, d_peak, tau)| {
+            let (d_peak, tau) = d_peak.zip(tau)?;
+            (tau > 0.0).then_some(DeformedTarget { object, d_peak, tau })
+        });
+        all.reduce(|worst, next| if next.ratio() > worst.ratio() { next } else { worst })
+    }
+
+    /// Largest share of the volume of an object that the goal moves that collapsed, %.
+    pub fn collapsed_volume_pct(&self) -> Option<f64> {
+        let others = self.verdict.targets.iter().filter_map(|target| target.collapsed_volume_pct);
+        self.verdict.collapsed_volume_pct.into_iter().chain(others).reduce(f64::max)
+    }
+
+    /// [`collapsed_volume_pct`](Self::collapsed_volume_pct), if it is large enough for the object to be called crushed.
     pub fn crushed_volume_pct(&self) -> Option<f64> {
-        self.verdict.collapsed_volume_pct.filter(|pct| is_crushed(Some(*pct)))
+        self.collapsed_volume_pct().filter(|pct| is_crushed(Some(*pct)))
     }
 
     /// True if the episode counts in DSR: Goal Success with D_peak ≤ τ of each target. Drops do not enter.
     pub fn is_deformation_safe(&self) -> bool {
-        let v = &self.verdict;
-        let is_within = v.deformation_ok == Some(true) && v.safety_parts(None).targets_ok == Some(true);
-        self.outcome.is_valid() && v.goal && is_within
+        self.outcome.is_valid() && self.verdict.goal && self.is_within_limits() == Some(true)
     }
 
-    /// True if the deformation of the target can be judged. An invalid episode with a limit is judged: it fails.
+    /// True if the deformation of each soft target can be judged. An invalid episode with limits is judged: it fails.
     pub fn is_deformation_judged(&self) -> bool {
-        match self.outcome.is_valid() {
-            true => self.verdict.deformation_ok.is_some(),
-            false => self.verdict.tau.is_some(),
-        }
+        let v = &self.verdict;
+        let is_known = |ok: Option<bool>, tau: Option<f64>| {
+            if self.outcome.is_valid() { ok.is_some() } else { tau.is_some() }
+        };
+        let others = v.targets.iter().filter(|target| target.soft);
+        (!self.header.soft || is_known(v.deformation_ok, v.tau))
+            && others.fold(true, |all, target| all && is_known(target.deformation_ok, target.tau))
+    }
+}
+
+/// A soft object that the goal moves, and its peak deformation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DeformedTarget<'a> {
+    /// Name in the scene; `None` for the object of the task.
+    pub object: Option<&'a str>,
+    /// Peak D, % of its diagonal.
+    pub d_peak: f64,
+    /// Its limit, %.
+    pub tau: f64,
+}
+
+impl DeformedTarget<'_> {
+    /// Peak D over τ.
+    pub fn ratio(&self) -> f64 {
+        self.d_peak / self.tau
+    }
+}
+
+impl std::fmt::Display for DeformedTarget<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let of = self.object.map(|object| format!(" of {object}")).unwrap_or_default();
+        write!(f, "D {:.2} %{of} = {:.2} × limit", self.d_peak, self.ratio())
     }
 }
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use softvt_evaluation::verdict::InvalidReason;
+    use softvt_evaluation::verdict::{InvalidReason, TargetVerdict};
 
     use super::*;
 
     /// A successful, safe soft episode.
     pub(crate) fn sample() -> EpisodeRecord {
         serde_json::from_str(include_str!("../../tests/data/episode_record.json")).expect("a valid record")
+    }
+
+    #[test]
+    fn deformation_is_judged_of_every_soft_object_of_the_goal() {
+        let mut record = sample();
+        let other = TargetVerdict {
+            object: "roll".to_owned(),
+            soft: true,
+            no_drop: true,
+            drop: None,
+            no_slip: true,
+            slip_mm: 0.0,
+            d_peak: Some(3.0),
+            missing_deformation: 0,
+            collapsed_volume_pct: Some(60.0),
+            damaged_volume_pct: None,
+            kappa: Some(0.5),
+            tau: Some(0.5),
+            d_ref: Some(1.0),
+            deformation_ok: Some(false),
+            peak_pad_force_n: 1.0,
+            mean_pad_force_n: 1.0,
+            least_pad_force_n: None,
+            grip_ratio: None,
+        };
+        assert_eq!((record.is_within_limits(), record.crushed_volume_pct()), (Some(true), None));
+        record.verdict.targets = vec![other];
+        assert_eq!((record.is_within_limits(), record.crushed_volume_pct()), (Some(false), Some(60.0)));
+        assert_eq!(record.most_deformed().unwrap().to_string(), "D 3.00 % of roll = 6.00 × limit");
+        record.verdict.targets[0].deformation_ok = None;
+        assert_eq!((record.is_within_limits(), record.is_deformation_judged()), (None, false));
+        record.verdict.targets[0].soft = false;
+        assert!(record.is_deformation_judged() && record.most_deformed().unwrap().object.is_none());
+        // The other way round: a rigid object of the task, and a soft one that the goal moves too.
+        record.header.soft = false;
+        assert!(!record.has_soft_target());
+        record.verdict.targets[0].soft = true;
+        assert!(record.has_soft_target());
     }
 
     #[test]

@@ -60,13 +60,14 @@ const SMALLEST_RATIO: f64 = 0.005;
 /// What was seen in an episode: "✗ over the limit: D 1.93 % = 5.14 × limit at 4.95 s". `worst_time_s` is the time of
 /// the largest deformation.
 pub fn sentence(record: &EpisodeRecord, worst_time_s: f64) -> String {
-    let verdict = &record.verdict;
-    let d = match (verdict.d_peak, verdict.tau.filter(|tau| *tau > 0.0)) {
+    let d = match (record.most_deformed(), record.verdict.d_peak) {
         // An object that was hardly touched is not described by its D.
-        (Some(d), Some(tau)) if d < SMALLEST_RATIO * tau => String::new(),
-        (Some(d), Some(tau)) => format!(": D {d:.2} % = {:.2} × limit at {worst_time_s:.2} s", d / tau),
-        (Some(d), None) => format!(": D {d:.2} % at {worst_time_s:.2} s"),
-        (None, _) => String::new(),
+        (Some(target), _) if target.ratio() < SMALLEST_RATIO => String::new(),
+        // The time is that of the object of the task.
+        (Some(target), _) if target.object.is_some() => format!(": {target}"),
+        (Some(target), _) => format!(": {target} at {worst_time_s:.2} s"),
+        (None, Some(d)) => format!(": D {d:.2} % at {worst_time_s:.2} s"),
+        (None, None) => String::new(),
     };
     let collapsed = record.crushed_volume_pct().map(|pct| format!(", {pct:.0} % of the volume collapsed"));
     let collapsed = collapsed.unwrap_or_default();

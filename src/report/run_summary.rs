@@ -123,6 +123,8 @@ pub fn unsafe_reason(record: &EpisodeRecord) -> Option<String> {
         (_, None) if record.header.soft => parts.push("the object has no threshold".to_owned()),
         _ => {}
     }
+    let without_limit = v.targets.iter().filter(|target| target.soft && target.tau.is_none());
+    parts.extend(without_limit.map(|target| format!("{} has no threshold", target.object)));
     if v.slip_ok == Some(false) {
         parts.push(format!("it slipped by {:.1} mm in the hand", v.slip_mm));
     }

@@ -245,6 +245,9 @@ fn push_notes(text: &mut StyledText, summary: &SuiteSummary, format: TerminalFor
         note("force_observed: it reads the true forces at the pads, which no real sensor measures");
     }
     command_notes(&summary.commands).iter().for_each(|line| note(line));
+    for (name, _) in scores.metrics.iter().filter(|(_, values)| values.n == 0) {
+        note(&format!("metric {name} has no value in any valid episode: its function returned nil"));
+    }
     if scores.safety_unknown > 0 {
         note(&format!(
             "safety could not be judged in {} (no threshold, or D not measured); counted as not safe",

@@ -176,6 +176,8 @@ pub struct Episode {
     min_det_f: f64,
     /// In the order of the metrics.
     metric_values: Vec<MetricValues>,
+    /// The first error of a metric's function.
+    metric_error: Option<String>,
     trace: Vec<StepTrace>,
     actions: Vec<Action>,
     /// Joint positions that the actions mean, rad; fewer than actions if the robot responds late.
@@ -264,6 +266,7 @@ impl Episode {
             newton: NewtonCount::default(),
             min_det_f: f64::INFINITY,
             metric_values,
+            metric_error: None,
             trace: Vec::new(),
             actions: Vec::new(),
             joint_commands: Vec::new(),
@@ -320,6 +323,9 @@ impl Episode {
                 Err(source) => return Err(self.control_error(source)),
             }
             self.step(&action);
+            if let Some(message) = self.take_metric_error() {
+                return Err(self.control_error(PolicyError::Script(message)));
+            }
             watch(&mut self).map_err(|source| self.control_error(source))?;
         }
         // A controller that has given up commands nothing more; its last command stays.
@@ -525,9 +531,11 @@ impl Episode {
         if self.spec.record_trace || !self.spec.metrics.is_empty() {
             let trace = self.trace();
             for (metric, values) in self.spec.metrics.iter().zip(&mut self.metric_values) {
-                let value = metric.function.value(&self.sim, &trace);
-                if let Some(value) = value.map_err(|message| Outcome::Error { message })? {
-                    values.add(value);
+                match metric.function.value(&self.sim, &trace) {
+                    Ok(value) => value.into_iter().for_each(|value| values.add(value)),
+                    Err(message) => {
+                        self.metric_error.get_or_insert(message);
+                    }
                 }
             }
             if self.spec.record_trace {
@@ -586,6 +594,11 @@ impl Episode {
     /// Number of displacements so far that were out of range.
     pub fn clamped_steps(&self) -> u32 {
         self.clamped_steps
+    }
+
+    /// The first error of a metric's function since the last call; the metric has no value of that step.
+    pub fn take_metric_error(&mut self) -> Option<String> {
+        self.metric_error.take()
     }
 
     /// The metrics so far, by name; `None` for those without a value.

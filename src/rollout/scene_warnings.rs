@@ -7,10 +7,11 @@ use softvt_benchmark::{CONTROL_DT, Task, goal_conflict::least_time};
 use softvt_common::text::format_number;
 use softvt_geometry::pieces::SeparatePieces;
 use softvt_robot::gripper::MAX_WIDTH;
-use softvt_scene::{Asset, Body, Scene, SoftMaterial};
+use softvt_scene::{Asset, Body, Object, Scene, SoftMaterial};
 
-/// Warnings about a scene of a task, one line each: materials, soft bodies of few voxels, bodies of several pieces, a
-/// target that the gripper cannot grasp, and a budget below what the goal takes.
+/// Warnings about a scene of a task, one line each: materials, soft bodies of few voxels, bodies of several pieces or off
+/// their axis, a target that the gripper cannot grasp, objects outside of the workspace, and a budget below what the goal
+/// takes.
 pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSet<String> {
     let warnings = |asset: &Asset| {
         let name = asset.name.clone();
@@ -19,12 +20,19 @@ pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSe
             .into_iter()
             .chain(voxel_warning(asset, cache))
             .chain(pieces_warning(asset, cache))
+            .chain(origin_warning(asset, cache))
             .map(move |warning| format!("asset {name}: {warning}"))
     };
     let mut all: BTreeSet<String> = scene.objects.iter().flat_map(|object| warnings(&object.asset)).collect();
     let targets = task.targets();
     let targets = scene.objects.iter().filter(|object| targets.contains(&object.name.as_str()));
-    all.extend(targets.filter_map(|target| width_warning(&target.asset)));
+    all.extend(targets.clone().filter_map(|target| width_warning(&target.asset)));
+    all.extend(targets.filter_map(|target| workspace_warning(scene, target, cache)));
+    let goals = task.goal.predicates();
+    let is_place = |object: &&Object| goals.iter().any(|goal| goal.target() == Some(&object.name));
+    all.extend(
+        scene.objects.iter().filter(is_place).filter_map(|place| workspace_warning(scene, place, cache)),
+    );
     all.extend(budget_warning(task));
     all
 }
@@ -65,6 +73,42 @@ fn voxel_warning(asset: &Asset, cache: &AssetCache) -> Option<String> {
         1e3 * thickness,
         1e3 * edge
     ))
+}
+
+/// A warning about an object that begins outside of the workspace, or a place there.
+fn workspace_warning(scene: &Scene, object: &Object, cache: &AssetCache) -> Option<String> {
+    let centre = object.pose_w.transform_point(&cache.bounds(&object.asset.shape).centre().into());
+    (!scene.workspace.contains(&centre.coords)).then(|| {
+        format!(
+            "object {}: it is at ({}, {}) m, outside of the workspace, where an object counts as dropped; move it, or set \
+             scene.workspace_min and scene.workspace_max",
+            object.name,
+            format_number(centre.x),
+            format_number(centre.y)
+        )
+    })
+}
+
+/// Distance of the lowest point of an asset from z = 0, and share of its size by which its centre is off the z axis, that
+/// are likely not meant.
+const MAX_LIFT_M: f64 = 1e-3;
+const MAX_OFFSET_SHARE: f64 = 0.3;
+
+/// A warning about an asset whose origin is not below its centre.
+fn origin_warning(asset: &Asset, cache: &AssetCache) -> Option<String> {
+    if !matches!(asset.body, Body::Rigid { .. } | Body::Soft(_)) {
+        return None;
+    }
+    let bounds = cache.bounds(&asset.shape);
+    let (centre, size) = (bounds.centre(), bounds.size());
+    let is_off = (0..2).any(|axis| centre[axis].abs() > MAX_OFFSET_SHARE * size[axis]);
+    (is_off || bounds.min.z.abs() > MAX_LIFT_M).then(|| {
+        format!(
+            "its centre is {:.0} mm off the z axis, and its lowest point at z = {:.0} mm; end its shape with :grounded()",
+            1e3 * centre.xy().norm(),
+            1e3 * bounds.min.z
+        )
+    })
 }
 
 /// A warning about a body of several pieces.

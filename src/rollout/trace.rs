@@ -54,6 +54,8 @@ pub struct ObjectTrace {
     pub min_det_f: Option<f64>,
     /// True if the body sleeps.
     pub asleep: bool,
+    /// Normal force of the left and right pad on it, N.
+    pub pad_force_n: [f64; 2],
     /// Names of the objects and colliders in contact with it.
     pub touches: Vec<String>,
     /// Node positions, m, world, if requested.
@@ -114,6 +116,7 @@ fn object(sim: &Simulation, evidence: &EvidenceCollector, index: usize, with_nod
         d_pct: evidence.deformation(index).map(|d| d.rms_pct),
         min_det_f: soft.map(|s| s.state.min_det_f().det_f),
         asleep: sim.is_asleep(instance),
+        pad_force_n: sim.pad_contacts(instance).map(|t| t.normal_force),
         touches: contacts.map(|contact| sim.world.partner_name(contact.partner).to_owned()).collect(),
         nodes: soft.filter(|_| with_nodes).map(|s| s.state.x.iter().map(|x| (*x).into()).collect()),
     }

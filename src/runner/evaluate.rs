@@ -358,10 +358,10 @@ pub(crate) fn episode_line(record: &EpisodeRecord) -> String {
             parts => format!(" ({})", parts.join(", ")),
         },
     };
-    let d = match (verdict.d_peak, verdict.tau.filter(|tau| *tau > 0.0)) {
-        (Some(d), Some(tau)) => format!(", D {d:.2} % = {:.2} × limit", d / tau),
-        (Some(d), None) => format!(", D {d:.2} %"),
-        (None, _) => String::new(),
+    let d = match (record.most_deformed(), verdict.d_peak) {
+        (Some(target), _) => format!(", {target}"),
+        (None, Some(d)) => format!(", D {d:.2} %"),
+        (None, None) => String::new(),
     };
     let outcome = format!("{} {name}{reason}{d}", category.glyph());
     let stats = &record.stats;

@@ -3,7 +3,7 @@
 use std::{
     collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
-    sync::{Arc, Mutex},
+    sync::Arc,
 };
 
 use serde::Serialize;
@@ -18,8 +18,7 @@ use softvt_benchmark::Plan;
 use softvt_common::cancel;
 use softvt_common::{
     files::replace,
-    parallel,
-    text::{TextTable, counted},
+    text::{TextTable, counted, unknown_name},
 };
 use softvt_report::run_folder::RunFolder;
 use softvt_script::{
@@ -99,12 +98,8 @@ pub fn run<E: From<RunError>>(
     if *has_finish && out.is_none() {
         refuse_changed_project_files(config, loaded)?;
     }
-    // Opening an experiment runs the whole script, so each thread takes an idle one before it opens another.
-    let idle: Mutex<Vec<Experiment>> = Mutex::default();
-    let take = || match parallel::lock(&idle).pop() {
-        Some(experiment) => Ok(experiment),
-        None => Experiment::open_with(loaded, &input).map_err(RunError::from),
-    };
+    // Each point runs the script anew: what a point changes of its variables does not reach others.
+    let open = || Experiment::open_with(loaded, &input).map_err(RunError::from);
     let (mut folder, mut finished) = match out {
         Some(dir) => {
             let manifest = manifest(config, loaded, name, points);
@@ -123,7 +118,7 @@ pub fn run<E: From<RunError>>(
     }
     let left: Vec<usize> = (0..points).filter(|point| !finished.contains_key(point)).collect();
     let run_point = |job: usize| {
-        let (experiment, point) = (take()?, left[job]);
+        let (experiment, point) = (open()?, left[job]);
         // Before the script can change its point.
         let parameters = experiment.parameters(point);
         let rows = experiment.run(point).map_err(|error| {
@@ -134,7 +129,6 @@ pub fn run<E: From<RunError>>(
         if cancel::requested() {
             return Err(RunError::interrupted("interrupted"));
         }
-        parallel::lock(&idle).push(experiment);
         Ok(FinishedPoint { point, parameters, rows })
     };
     let list = config.job_list(name);
@@ -168,12 +162,19 @@ pub fn run<E: From<RunError>>(
         folder.take().map_or(Ok(()), ExperimentFolder::discard)?;
         return Err(input_error(config, &error).into());
     }
+    if left.len() == points
+        && let Plan::Experiment { columns, .. } = &loaded.plan
+        && let Some(problem) = problem_of(&rows, columns)
+    {
+        folder.take().map_or(Ok(()), ExperimentFolder::discard)?;
+        return Err(config.error(problem).into());
+    }
     // The rows are kept if finish fails.
     on_output(ExperimentOutput::Rows(&rows))?;
     if let (Some(folder), Plan::Experiment { columns, .. }) = (&mut folder, &loaded.plan) {
         folder.write_rows(&finished, columns)?;
     }
-    let finish = take()?.finish(&rows).map_err(RunError::from)?;
+    let finish = open()?.finish(&rows).map_err(RunError::from)?;
     if let Some(text) = &finish.text {
         on_output(ExperimentOutput::Text(text))?;
     }
@@ -190,6 +191,21 @@ pub fn run<E: From<RunError>>(
     }
     finish.files.iter().try_for_each(|(relative, bytes)| write(config, &base, relative, bytes))?;
     Ok(finish.problem.map_or(Ok(()), |problem| Err(config.error(problem)))?)
+}
+
+/// What the rows of all points lack.
+fn problem_of(rows: &[ExperimentRow], columns: &[String]) -> Option<String> {
+    if rows.is_empty() {
+        return Some(
+            "experiment.run: no point returned a row; return a table with a key per column".to_owned(),
+        );
+    }
+    let known: BTreeSet<&str> = rows.iter().flat_map(|row| row.keys().map(String::as_str)).collect();
+    let missing = columns.iter().find(|column| !known.contains(column.as_str()))?;
+    Some(format!(
+        "experiment.columns: {}: no row has it",
+        unknown_name("column", missing, known.iter().copied())
+    ))
 }
 
 fn manifest<'a>(

@@ -398,9 +398,9 @@ fn rejection(record: &EpisodeRecord, keep: KeptOutcome) -> Option<String> {
         _ if record.stats.gave_up.is_some() => "given up",
         _ if !verdict.goal => "goal not reached",
         _ if !verdict.no_drop => "dropped",
-        _ if verdict.deformation_ok == Some(false) => "deformed too much",
+        _ if record.is_within_limits() == Some(false) => "deformed too much",
         _ if verdict.slip_ok == Some(false) => "slipped in the hand",
-        _ if record.header.soft && verdict.tau.is_none() => "without a known limit of deformation",
+        _ if record.is_within_limits().is_none() => "without a known limit of deformation",
         _ => "not safe",
     };
     Some(reason.to_owned())

@@ -88,7 +88,7 @@ impl LiveEpisode {
     /// Executes an action of finite numbers. Does nothing once the episode has ended.
     ///
     /// # Errors
-    /// The action cannot be decoded.
+    /// The action cannot be decoded, or a metric of the suite fails.
     pub(super) fn advance(&mut self, config: &ServerConfig, row: &ActionRow) -> Result<(), RequestError> {
         if self.episode.outcome().is_some() {
             return Ok(());
@@ -99,7 +99,7 @@ impl LiveEpisode {
         let action = self.resolver.resolve(&observation, command);
         self.episode.step(&action);
         self.state.actions.push(row.clone());
-        Ok(())
+        self.episode.take_metric_error().map_or(Ok(()), |message| Err(message.into()))
     }
 
     /// True if the goal was reached.

@@ -125,6 +125,16 @@ fn implausible_units_and_wide_objects_are_doubted() {
     assert_eq!(of(Small::default()), "");
     let soft = of(Small { material: "youngs_pa = 600, poisson = 0.3, density = 900", ..Small::default() });
     assert!(soft.contains("asset cube: it sags to about 71 % of its height under its own weight"), "{soft}");
+    let off = of(Small {
+        shape: "softvt.shape.box { size = { 0.04, 0.04, 0.04 } }:grounded():translate(0.03, 0, 0)",
+        ..Small::default()
+    });
+    assert!(
+        off.contains("asset cube: its centre is 30 mm off the z axis, and its lowest point at z = 0 mm"),
+        "{off}"
+    );
+    let outside = of(Small { at: "at = { 0.45, 0.7 }", ..Small::default() });
+    assert!(outside.contains("object cube: it is at (0.45, 0.7) m, outside of the workspace"), "{outside}");
     let ball = "softvt.shape.sphere { radius = 0.02 }";
     let text = Small::default()
         .text()

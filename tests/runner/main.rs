@@ -11,6 +11,7 @@ mod controllers;
 mod dataset_import;
 mod dataset_recording;
 mod determinism;
+mod experiments;
 mod expert_failure;
 mod external_scorer;
 mod goals;

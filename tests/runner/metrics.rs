@@ -40,15 +40,29 @@ fn metrics_of_a_suite_are_in_records_and_summaries_and_change_nothing_else() {
 }
 
 #[test]
-fn a_metric_that_is_no_number_ends_the_episode_and_says_where() {
+fn a_metric_that_fails_ends_the_run_and_says_where() {
     let returned = [("0 / 0", "NaN"), ("'x'", "\"x\""), ("{}", "a table"), ("true", "true")];
     for (value, got) in returned {
         let metric = format!("softvt.metric {{ name = 'm', of = function() return {value} end }}");
-        let record = project(&metric).run("x.lua").record();
-        let Outcome::Error { message } = &record.outcome else { panic!("{:?}", record.outcome) };
         let expected = format!("x.lua:9: the metric \"m\" returned {got}; return a finite number");
+        let message = project(&metric).run("x.lua").error();
         assert!(message.contains(&expected), "{message}");
     }
+    let unknown = |body: &str, expected: &str| {
+        let metric = format!("softvt.metric {{ name = 'm', of = function(_, step) {body} end }}");
+        let message = project(&metric).run("x.lua").error();
+        assert!(message.contains(expected), "{message}");
+    };
+    unknown("return step.pad_forces_n", "step: unknown key \"pad_forces_n\"; did you mean \"pad_force_n\"?");
+    unknown("return step.objects[1].d", "step.objects: unknown key \"d\"; did you mean \"d_pct\"?");
+}
+
+#[test]
+fn a_metric_without_values_is_told() {
+    let metric = "softvt.metric { name = 'never', of = function(_, step) return step.objects[1].nodes end }";
+    let result = project(metric).run("x.lua").finish().result();
+    assert_eq!(result.records[0].stats.metrics["never"], None);
+    assert_eq!(result.summary.scores.metrics["never"].n, 0);
 }
 
 #[test]

@@ -43,7 +43,7 @@ pub struct GroupScores {
     pub goal_success_rate: Rate,
     /// Rate of NoDrop over all episodes.
     pub no_drop_rate: Rate,
-    /// D_peak ≤ τ; null where no target deforms. Its rate is null where none was judged.
+    /// D_peak ≤ τ of each soft target; null where no target deforms. Its rate is null where none was judged.
     pub deformation_ok_rate: Option<Rate>,
     /// Rate of Safety Success over all episodes; null where all targets are soft and none was judged.
     pub safety_success_rate: Rate,
@@ -78,7 +78,7 @@ pub struct GroupScores {
     /// Number of episodes of the category "over the limit" in which the object was crushed.
     #[serde(default)]
     pub crushed_over_limit: usize,
-    /// Peak D over τ, of the valid episodes that have both.
+    /// Peak D over τ of the target for which it is largest, of the valid episodes that have both.
     #[serde(default)]
     pub d_over_tau: Distribution,
     /// Smallest and largest τ that was applied, %; null without any.
@@ -92,7 +92,7 @@ pub struct GroupScores {
     /// Metrics of the suite over the valid episodes that have them, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub metrics: BTreeMap<String, Distribution>,
-    /// Largest share of the target's volume beyond its collapse strain, over all valid episodes, %.
+    /// Largest share of the volume of a target beyond its collapse strain, over all valid episodes, %.
     pub collapsed_volume: Distribution,
     /// Share of the target's volume that was ever beyond its damage strain, over all valid episodes, %.
     pub damaged_volume: Distribution,
@@ -273,7 +273,7 @@ impl GroupScores {
         let rate = |test: fn(&EpisodeRecord) -> bool| {
             Rate::new(valid.iter().filter(|r| test(r)).count(), records.len())
         };
-        let soft: Vec<_> = records.iter().copied().filter(|r| r.header.soft).collect();
+        let soft: Vec<_> = records.iter().copied().filter(|r| r.has_soft_target()).collect();
         let is_judged = soft.is_empty() || soft.iter().any(|r| r.is_deformation_judged());
         let judged_rate = |test: fn(&EpisodeRecord) -> bool| match is_judged {
             true => rate(test),
@@ -319,7 +319,7 @@ impl GroupScores {
             goal_success_rate: goal,
             no_drop_rate: rate(|r| r.verdict.no_drop),
             deformation_ok_rate: (!soft.is_empty())
-                .then(|| judged_rate(|r| r.verdict.deformation_ok == Some(true))),
+                .then(|| judged_rate(|r| r.is_within_limits() == Some(true))),
             safety_success_rate: safety,
             goal_safe_gap: goal.rate.zip(safety.rate).map(|(goal, safety)| goal - safety),
             no_slip_rate: rate(|r| r.verdict.no_slip),
@@ -356,7 +356,7 @@ impl GroupScores {
                     (name.clone(), Distribution::from_values(values))
                 })
                 .collect(),
-            collapsed_volume: over_valid(|r| r.verdict.collapsed_volume_pct),
+            collapsed_volume: over_valid(EpisodeRecord::collapsed_volume_pct),
             damaged_volume: over_valid(|r| r.verdict.damaged_volume_pct),
         }
     }
@@ -455,10 +455,10 @@ fn grouped<'a, K: Ord>(
 
 /// Safety as a function of κ; everything but τ stays.
 fn kappa_curve(records: &[&EpisodeRecord]) -> Vec<RatesAtKappa> {
-    if !records.iter().any(|r| r.header.soft) {
+    if !records.iter().any(|r| r.has_soft_target()) {
         return Vec::new();
     }
-    let is_judged = records.iter().any(|r| r.header.soft && r.is_deformation_judged());
+    let is_judged = records.iter().any(|r| r.has_soft_target() && r.is_deformation_judged());
     let row = |step| {
         let kappa = f64::from(step) / f64::from(KAPPA_STEPS);
         if !is_judged {
@@ -467,7 +467,12 @@ fn kappa_curve(records: &[&EpisodeRecord]) -> Vec<RatesAtKappa> {
         }
         RatesAtKappa {
             kappa,
-            deformation_ok_rate: Rate::from_test(records, |r| is_within(r, kappa) == Some(true)),
+            deformation_ok_rate: Rate::from_test(records, |r| {
+                let is_object_within = !r.header.soft || is_within(r, kappa) == Some(true);
+                is_object_within
+                    && r.outcome.is_valid()
+                    && r.verdict.safety_parts(Some(kappa)).targets_ok == Some(true)
+            }),
             safety_success_rate: Rate::from_test(records, |r| {
                 r.verdict.safety_parts(Some(kappa)).is_safe(r.header.soft, is_within(r, kappa))
             }),

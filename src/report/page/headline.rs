@@ -58,7 +58,7 @@ fn results(runs: &[&RunSummary]) -> Markup {
 
 /// True if the limit was exceeded in no episode, whether the goal was reached or not.
 fn is_within(run: &RunSummary) -> bool {
-    run.is_soft() && run.run.records.iter().all(|record| record.verdict.deformation_ok != Some(false))
+    run.is_soft() && run.run.records.iter().all(|record| record.is_within_limits() != Some(false))
 }
 
 /// "tactile-servo drops 1 of 10."
@@ -74,11 +74,11 @@ fn over_limit(run: &RunSummary) -> String {
         run.run.records.iter().filter(|record| record.category() == EpisodeCategory::OverLimit).collect();
     let crushed = over.iter().filter(|record| record.crushed_volume_pct().is_some()).count();
     let (policy, all) = (run.run.text("policy"), run.run.records.len());
-    let volumes: Vec<f64> = over.iter().filter_map(|record| record.verdict.collapsed_volume_pct).collect();
+    let volumes: Vec<f64> = over.iter().filter_map(|record| record.collapsed_volume_pct()).collect();
     let mean = volumes.iter().sum::<f64>() / volumes.len().max(1) as f64;
     // Harm in episodes that another category names.
     let elsewhere = run.run.records.iter().filter(|record| {
-        record.verdict.deformation_ok == Some(false) && record.category() != EpisodeCategory::OverLimit
+        record.is_within_limits() == Some(false) && record.category() != EpisodeCategory::OverLimit
     });
     let elsewhere = match elsewhere.count() {
         0 => String::new(),

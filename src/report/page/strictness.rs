@@ -106,10 +106,15 @@ fn curve_corners(run: &RunSummary) -> Vec<CurvePoint> {
     let records = &run.run.records;
     let safe_from = |record: &EpisodeRecord| {
         let v = &record.verdict;
-        if !(record.outcome.is_valid() && v.goal && v.no_drop && v.missing_deformation == 0) {
+        if !(record.outcome.is_valid() && v.goal && v.no_drop && v.missing_deformation == 0)
+            || v.targets.iter().any(|target| target.missing_deformation > 0)
+        {
             return None;
         }
-        if record.header.soft { v.d_peak.zip(v.d_ref).map(|(d, d_ref)| d / d_ref) } else { Some(0.0) }
+        let object = if record.header.soft { v.d_peak.zip(v.d_ref) } else { Some((0.0, 1.0)) };
+        let others =
+            v.targets.iter().filter(|target| target.soft).map(|target| target.d_peak.zip(target.d_ref));
+        others.chain([object]).try_fold(0.0, |kappa: f64, of| of.map(|(d, d_ref)| kappa.max(d / d_ref)))
     };
     let mut steps: Vec<f64> = records.iter().filter_map(safe_from).filter(|kappa| *kappa <= 1.0).collect();
     steps.sort_by(f64::total_cmp);

@@ -117,7 +117,7 @@ record! {
         hold_s: f64 = HOLD => Number(0.4);
     }
     /// A function of the true scene returns true at the end of a control step. It must depend on its argument alone:
-    /// variables that it changes would be shared by episodes.
+    /// variables that it changes are not part of the state of an episode.
     PredicateSpec: "softvt.Predicate" as "task.goal", constructor "softvt.predicate" {
         /// What holds, in words, as records and reports show it.
         name: String;

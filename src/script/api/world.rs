@@ -263,20 +263,27 @@ impl LuaWorld {
     }
 
     /// Makes one step; returns true, or false and the reason why the state of the world is invalid.
+    ///
+    /// # Errors
+    /// The state was invalid before.
     fn step(&self, lua: &Lua) -> mlua::Result<(bool, Option<String>)> {
         if cancel::requested() {
             return Err(fail(lua, "interrupted"));
         }
         let inner = &mut *lock(&self.0);
-        if inner.failed.is_none() {
-            let _pause = inner.clock.pause();
-            let Inner { world, timing, .. } = inner;
-            let dt = world.params.dt;
-            inner.failed = timing.measure(dt, || world.step()).err();
-            let stats = inner.world.solver_stats();
-            inner.newton_total += u64::from(stats.newton_steps);
-            inner.newton_max = inner.newton_max.max(stats.max_newton_steps);
+        if let Some(failure) = &inner.failed {
+            return Err(fail(
+                lua,
+                format!("world:step: the world is invalid: {failure}; stop where world:step returns false"),
+            ));
         }
+        let _pause = inner.clock.pause();
+        let Inner { world, timing, .. } = inner;
+        let dt = world.params.dt;
+        inner.failed = timing.measure(dt, || world.step()).err();
+        let stats = inner.world.solver_stats();
+        inner.newton_total += u64::from(stats.newton_steps);
+        inner.newton_max = inner.newton_max.max(stats.max_newton_steps);
         Ok((inner.failed.is_none(), inner.failed.as_ref().map(StepFailure::to_string)))
     }
 }
@@ -310,7 +317,7 @@ class! {
             /// Adds a gel pad of the robot, with the shape and the default contact law of its fingers, on a carrier
             /// that solid:move_to moves. Its frame is at the apex of the gel, which faces along x.
             fn gel_pad(lua, this, spec: WorldGelPadSpec) -> ["softvt.Solid"] { this.add_gel_pad(lua, &spec)? }
-            /// Makes one time step. Returns false and the reason once the state is invalid.
+            /// Makes one time step. Returns false and the reason if the state is invalid then; a further step is an error.
             fn step(lua, this) -> ["boolean", "string?"] { this.step(lua)? }
             /// Returns the time step, s.
             fn dt(_, this) -> ["number"] { lock(&this.0).world.params.dt }

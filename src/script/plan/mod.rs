@@ -551,12 +551,21 @@ pub(crate) fn points(lua: &Lua, spec: &ExperimentSpec) -> mlua::Result<Vec<Value
                 return Err(fail(lua, message));
             };
             let points: Vec<Value> = list.clone().sequence_values().collect::<mlua::Result<_>>()?;
-            match points.iter().all(Value::is_table) {
-                true => Ok(points),
-                false => Err(fail(lua, "experiment.points: every point is a table")),
+            match (points.is_empty(), points.iter().all(Value::is_table)) {
+                (true, _) => {
+                    Err(fail(lua, "experiment.points: expected a list of at least one table, got none"))
+                }
+                (false, true) => Ok(points),
+                (false, false) => Err(fail(lua, "experiment.points: every point is a table")),
             }
         }
         (None, Some(grid)) => {
+            if let Some(name) = grid.iter().find_map(|(name, values)| values.is_empty().then_some(name)) {
+                return Err(fail(
+                    lua,
+                    format!("experiment.grid.{name}: expected at least one value, got none"),
+                ));
+            }
             let count = grid.values().fold(1_usize, |count, values| count.saturating_mul(values.len()));
             if count > MAX_POINTS {
                 return Err(fail(lua, "experiment.grid: has more than a million points; give fewer values"));

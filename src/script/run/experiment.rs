@@ -35,7 +35,7 @@ pub struct ExperimentSummary {
     pub problem: Option<String>,
 }
 
-/// A virtual machine that runs points of an experiment; every thread needs its own.
+/// A virtual machine that runs points of an experiment. Variables that a point changes stay changed for later ones.
 pub struct Experiment {
     instance: ScriptInstance,
     points: Vec<Value>,

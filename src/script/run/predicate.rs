@@ -2,7 +2,7 @@
 
 use std::{fmt, sync::Arc};
 
-use mlua::{Function, IntoLuaMulti, Lua, LuaSerdeExt, Value, serde::SerializeOptions};
+use mlua::{Function, IntoLuaMulti, Lua, LuaSerdeExt, Table, Value, serde::SerializeOptions};
 
 use crate::{
     api::{
@@ -10,6 +10,7 @@ use crate::{
         expert_input::expert_view,
     },
     plan::ScriptInstance,
+    schema::strict_table,
     vm::value::describe,
 };
 use softvt_benchmark::seed::keyed_rng;
@@ -90,7 +91,18 @@ impl StateFunction for ScriptMetric {
     }
 }
 
-/// A row of the trace as a table; what is null is absent.
-fn step_table(lua: &Lua, step: &StepTrace) -> mlua::Result<Value> {
-    lua.to_value_with(step, SerializeOptions::new().serialize_none_to_null(false).set_array_metatable(false))
+/// A row of the trace as a table, of which unknown keys cannot be read; what is null is nil.
+fn step_table(lua: &Lua, step: &StepTrace) -> mlua::Result<Table> {
+    let options = SerializeOptions::new().serialize_none_to_null(false).set_array_metatable(false);
+    let table: Table = lua.unpack(lua.to_value_with(step, options)?)?;
+    for object in table.get::<Table>("objects")?.sequence_values::<Table>() {
+        strict_table(lua, "step.objects", object?, OBJECT_KEYS.map(str::to_owned).to_vec())?;
+    }
+    let keys = table.pairs::<String, Value>().map(|pair| pair.map(|(key, _)| key));
+    let keys = keys.collect::<mlua::Result<_>>()?;
+    strict_table(lua, "step", table, keys)
 }
+
+/// Keys of an object in a row of the trace.
+const OBJECT_KEYS: [&str; 9] =
+    ["name", "position_w", "quaternion_w", "d_pct", "min_det_f", "asleep", "pad_force_n", "touches", "nodes"];
