@@ -33,10 +33,25 @@ def short_suite() -> str:
 
 
 @cache
-def expert_run(policy: str = "expert") -> tuple[np.ndarray, dict]:
-    """Actions (steps, 7) and record of an expert in task 0, episode 0 of Object-Soft."""
-    out = FOLDER / policy
-    command = [softvt.find_binary(), "suites/object_soft.lua", "--task", "0", "--episodes", "1", "--policy", policy, "--out", str(out)]
+def crushing_suite() -> str:
+    """Path of a suite of one task, whose goal moves a bun and a croissant, and whose expert crushes the croissant."""
+    path = FOLDER / "crushing.lua"
+    path.write_text("""
+local suite = require "suites.household"
+local task = suite.tasks[5]
+task.expert = require("experts.pick_place") { object = "croissant", target = "plate", closure = 0.7 }
+task.budget_steps = 120
+suite.tasks = { task }
+return suite
+""")
+    return str(path)
+
+
+@cache
+def expert_run(policy: str = "expert", suite: str = "suites/object_soft.lua") -> tuple[np.ndarray, dict]:
+    """Actions (steps, 7) and record of an expert in task 0, episode 0 of a suite, by default Object-Soft."""
+    out = FOLDER / f"{Path(suite).stem}-{policy}"
+    command = [softvt.find_binary(), suite, "--task", "0", "--episodes", "1", "--policy", policy, "--out", str(out)]
     subprocess.run(command, check=True, capture_output=True)
     record = json.loads((out / "episodes.jsonl").read_text())
     return np.load(out / "actions/task_000/episode_00000.npy"), record
