@@ -77,7 +77,7 @@ class Dataset:
         gripper: grip code of the actions.
         task: only these tasks.
 
-        Raises ValueError if there is no such stream or no demonstration, and ImportError without h5py.
+        Raises ValueError if there is no such stream, or no demonstration of one of the tasks, and ImportError without h5py.
         """
         require_one_of("gripper", gripper, [*ACTIONS])
         require_one_of("control", control, ("pose", "joints"))
@@ -90,9 +90,13 @@ class Dataset:
         self._files: dict[Path, h5py.File] = {}
         self._process = os.getpid()
         tasks = None if task is None else _tasks(task)
-        self.demonstrations = [demo for file in _hdf5_files(Path(path)) for demo in self._read(file) if tasks is None or demo.task in tasks]
-        if not self.demonstrations:
-            raise ValueError(f"{path}: no demonstration" + ("" if tasks is None else f" of task {', '.join(map(str, sorted(tasks)))}"))
+        recorded = [demo for file in _hdf5_files(Path(path)) for demo in self._read(file)]
+        if not recorded:
+            raise ValueError(f"{path}: no demonstration")
+        known = {demo.task for demo in recorded}
+        if tasks is not None and (missing := tasks - known):
+            raise ValueError(f"{path}: no demonstration of task {_listed(missing)}; the recording has those of task {_listed(known)}")
+        self.demonstrations = [demo for demo in recorded if tasks is None or demo.task in tasks]
         self._starts = np.cumsum([0, *(demo.steps for demo in self.demonstrations)])
 
     def __len__(self) -> int:
@@ -205,6 +209,10 @@ def _tasks(task: Any) -> set[int]:
     if not numbers:
         raise ValueError(f"task={task!r}: no number in the list; None is for all tasks")
     return numbers
+
+
+def _listed(tasks: Iterable[int]) -> str:
+    return ", ".join(map(str, sorted(tasks)))
 
 
 def _text(value: Any) -> str:

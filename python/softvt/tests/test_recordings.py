@@ -94,7 +94,8 @@ class Datasets(unittest.TestCase):
         for arguments, words in [
             ({"path": FOLDER / "nothing"}, "no recording"),
             ({"path": self.folder, "keys": ("agentview",)}, "no stream obs/agentview; obs has agentview_depth, agentview_pose"),
-            ({"path": self.folder, "task": 7}, "no demonstration of task 7"),
+            ({"path": self.folder, "task": 7}, "no demonstration of task 7; the recording has those of task 0, 1"),
+            ({"path": self.folder, "task": [0, 9, 7]}, "no demonstration of task 7, 9; the recording has those of task 0, 1"),
             ({"path": self.folder, "control": "delta"}, "expected 'pose' or 'joints'"),
             ({"path": self.folder, "gripper": "soft"}, "gripper='soft': expected 'continuous'"),
             ({"path": self.folder, "horizon": 0}, "at least 1"),
