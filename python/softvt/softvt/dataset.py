@@ -190,9 +190,15 @@ class Dataset:
 
 
 def _hdf5_files(path: Path) -> list[Path]:
-    """The HDF5 files of a recording, in order of their names. Raises ValueError if there is none."""
+    """The HDF5 files of a recording, in order of their names. Raises ValueError if there is none, or if the recording is not complete."""
     if path.is_file():
         return [path]
+    # softvt writes the first file at the start of a recording, and the second at its end.
+    if (path / "recording.json").is_file() and not (path / "dataset.json").is_file():
+        raise ValueError(
+            f"{path}: the recording was interrupted; complete it by its command with --resume (softvt record … --resume --out {path}), or give "
+            "the HDF5 file of a task that is complete"
+        )
     found = sorted((path / "hdf5").glob("*.hdf5")) or sorted(path.glob("*.hdf5"))
     if not found:
         raise ValueError(f"{path}: no recording; give a folder that softvt record wrote, or one of its HDF5 files")

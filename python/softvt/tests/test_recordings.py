@@ -90,6 +90,20 @@ class Datasets(unittest.TestCase):
         data.close()
         self.assertEqual(data[3]["step"], 3)
 
+    def test_an_interrupted_recording_is_refused_with_the_way_to_complete_it(self):
+        folder = FOLDER / "interrupted"
+        (folder / "hdf5").mkdir(parents=True)
+        (folder / "recording.json").write_text("{}")
+        words = r"interrupted: the recording was interrupted; complete it .*softvt record … --resume --out .*interrupted"
+        with self.assertRaisesRegex(ValueError, words):
+            softvt.Dataset(folder)
+        # Also if some of its tasks are complete.
+        file = folder / "hdf5" / "task.hdf5"
+        file.write_bytes(next((self.folder / "hdf5").iterdir()).read_bytes())
+        with self.assertRaisesRegex(ValueError, words):
+            softvt.Dataset(folder)
+        self.assertEqual(len(softvt.Dataset(file).demonstrations), 1)
+
     def test_what_is_missing_is_named(self):
         for arguments, words in [
             ({"path": FOLDER / "nothing"}, "no recording"),
