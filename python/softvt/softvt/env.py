@@ -16,6 +16,7 @@ from .arguments import is_bool, require_bool, require_one_of, require_text, text
 from .profile import CAMERA_PARTS, CONTROLS, GRIPPERS, PARTS, PARTS_OF_ONE_STEP, ProfileSpec, parse_parts
 from .readings import Readings
 from .serve import Client, Lease, ServerError, lease
+from .suites import FILE_ID, environment_id
 from .true_state import STATE_BOUNDS, Scene, TrueState, progress
 
 REWARDS = ("sparse", "staged", "safety")
@@ -79,6 +80,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         binary: str | None = None,
         render_mode: str | None = None,
         camera: str | None = None,
+        registered_suite: str | None = None,
     ):
         """Starts a server, or shares one that was started with equal arguments.
 
@@ -108,6 +110,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         binary: the program; by default `softvt.find_binary()`.
         render_mode: "rgb_array" for the image of `camera`, or "sensors" for both cameras above both fingers.
         camera: a camera's name (default: the scene's first), or "left" or "right" for a finger. Only with render_mode="rgb_array".
+        registered_suite: the standard suite of an identifier of Gymnasium's registry, which gives it. `script` and `url` must not name others.
 
         Raises ValueError for an argument that is not possible, and ServerError with the message of the program if it does not start.
         """
@@ -128,6 +131,9 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         cameras, flags = texts("cameras", cameras), texts("flags", flags)
         image_shape = _image_shape(image_size)
         script, profile = _path("script", script), _path("profile", profile)
+        if registered_suite is not None:
+            _refuse_other_suites(registered_suite, script, url)
+            script = registered_suite
         if binary is not None and shutil.which(binary) is None:
             raise ValueError(f"binary={binary!r}: there is no such program; leave it out for that of the package")
         if url is not None and not url.startswith(("ws://", "wss://")):
@@ -473,6 +479,14 @@ def _close(client: Client, lease: Lease | None) -> None:
     client.close()
     if lease is not None:
         lease.release()
+
+
+def _refuse_other_suites(registered: str, script: str | None, url: str | None) -> None:
+    """Raises ValueError for a script or a server that is not the suite of an identifier."""
+    known = environment_id(registered)
+    for name, value in (("script", script), ("url", url)):
+        if value is not None and (name == "url" or _script(value) != _script(registered)):
+            raise ValueError(f"{name}={value!r}: {known} is the suite {registered}; write gymnasium.make({FILE_ID!r}, {name}={value!r})")
 
 
 def _refuse_changed(cause: str, given: object, arguments: Mapping[str, object]) -> None:

@@ -29,6 +29,7 @@ def environment_id(suite: str) -> str:
 
 def register() -> None:
     """Registers all identifiers. Importing softvt calls it."""
-    arguments: dict[str, dict[str, str]] = {environment_id(suite): {"script": suite} for suite in SUITES}
-    for name, script in {FILE_ID: {}, **arguments}.items():
-        gymnasium.register(id=name, entry_point="softvt.env:SoftVTEnv", vector_entry_point="softvt.vector:SoftVTVectorEnv", kwargs=script)
+    # Not as `script`, which an argument of that name would replace.
+    arguments: dict[str, dict[str, str]] = {environment_id(suite): {"registered_suite": suite} for suite in SUITES}
+    for name, given in {FILE_ID: {}, **arguments}.items():
+        gymnasium.register(id=name, entry_point="softvt.env:SoftVTEnv", vector_entry_point="softvt.vector:SoftVTVectorEnv", kwargs=given)

@@ -87,6 +87,25 @@ class Arguments(unittest.TestCase):
                 with self.subTest(arguments), self.assertRaisesRegex(ValueError, words):
                     softvt.SoftVTEnv(**arguments)
 
+    def test_an_identifier_is_that_of_its_suite_alone(self):
+        with mock.patch("softvt.env.lease", side_effect=AssertionError("a server was started")):
+            for arguments, words in [
+                (
+                    {"script": "suites/mine.lua"},
+                    "script='suites/mine.lua': softvt/ObjectSoft-v0 is the suite object_soft; "
+                    "write gymnasium.make('softvt/File-v0', script='suites/mine.lua')",
+                ),
+                ({"script": "spatial_soft"}, "script='spatial_soft': softvt/ObjectSoft-v0 is"),
+                ({"url": "ws://127.0.0.1:9"}, "url='ws://127.0.0.1:9': softvt/ObjectSoft-v0 is"),
+            ]:
+                for make in (gymnasium.make, gymnasium.make_vec):
+                    with self.subTest(arguments, make=make.__name__), self.assertRaises(ValueError) as caught:
+                        make("softvt/ObjectSoft-v0", **arguments)
+                    self.assertIn(words, str(caught.exception))
+            for script in ("object_soft", "suites/object_soft.lua"):
+                with self.assertRaisesRegex(AssertionError, "a server was started"):
+                    gymnasium.make("softvt/ObjectSoft-v0", script=script)
+
     def test_values_of_another_type_are_refused_with_the_name_of_their_argument(self):
         with mock.patch("softvt.env.lease", side_effect=AssertionError("a server was started")):
             for argument, value, words in [
