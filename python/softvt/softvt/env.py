@@ -243,7 +243,8 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, dict[str, Any]]:
         """Starts episode `seed - first_seed` of the task, or a random one.
 
-        `options` may name another `task` or `split`, the `episode`, and the `seed` of the whole list of episodes.
+        `options` may name another `task` or `split`, the `episode`, and the `seed` of the whole list of episodes. Raises ValueError for another
+        option, and for an `episode` beside the seed of another one.
         """
         self.begin_reset(seed, options)
         return self.end_reset()
@@ -281,6 +282,9 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         drawn = int(self.np_random.integers(_EPISODES))
         task = self._tasks[int(self.np_random.integers(len(self._tasks)))]
         episode = drawn if seed is None else (seed - self._first_seed) % _EPISODES
+        named = options.get("episode")
+        if seed is not None and named is not None and named != episode:
+            raise ValueError(f"reset: seed={seed} is episode {episode}, and options name episode {named}; leave out one of them")
         requested = {"suite": self._suite, "task": task, "episode": episode, "split": self._split, **options}
         self._client.send("reset", **{key: value for key, value in requested.items() if value is not None})
         self._pending = "reset"

@@ -59,8 +59,13 @@ class SoftVTVectorEnv(VectorEnv):
         options = dict(options or {})
         mask = np.asarray(options.pop("reset_mask", np.ones(self.num_envs, dtype=np.bool_)))
         chosen = [int(index) for index in np.flatnonzero(mask)]
-        for index in chosen:
-            self.envs[index].begin_reset(seeds[index], options)
+        for number, index in enumerate(chosen):
+            try:
+                self.envs[index].begin_reset(seeds[index], options)
+            except BaseException:
+                # So that no answer is left for a later request.
+                self._wait(chosen[:number], self._end_reset)
+                raise
         infos: dict[str, Any] = {}
         for index, info in self._wait(chosen, self._end_reset).items():
             infos = self._add_info(infos, info, index)

@@ -119,6 +119,10 @@ class Environments(unittest.TestCase):
         self.assertFalse(same(env.reset(options={"episode": 3, "split": "demonstration"})[0], first))
         with self.assertRaisesRegex(ValueError, "'episodes'; expected task, episode, split or seed"):
             env.reset(options={"episodes": 3})
+        with self.assertRaisesRegex(ValueError, "seed=1003 is episode 3, and options name episode 7; leave out one of them"):
+            env.reset(seed=1003, options={"episode": 7})
+        self.assertTrue(same(env.reset(seed=1003, options={"episode": 3})[0], first))
+        self.assertEqual(env.reset(seed=1003, options={"task": 4})[1]["task"], 4)
 
     def test_without_a_task_every_reset_draws_one(self):
         env = self.make(obs="proprio", task=None)
@@ -424,6 +428,15 @@ class Vectors(unittest.TestCase):
             envs.step(np.array([HOLD * np.nan, HOLD], dtype=np.float32))
         *_, info = envs.step(np.zeros((2, 7), dtype=np.float32))
         self.assertEqual(info["step"].tolist(), [1, 2])
+
+    def test_a_seed_that_contradicts_the_options_leaves_the_environments_of_a_vector_in_step(self):
+        envs = softvt.SoftVTVectorEnv(2, script=short_suite(), obs="proprio")
+        self.addCleanup(envs.close)
+        envs.reset(seed=1000)
+        with self.assertRaisesRegex(ValueError, "seed=1008 is episode 8, and options name episode 7"):
+            envs.reset(seed=1007, options={"episode": 7})
+        self.assertEqual(envs.reset(options={"episode": 7})[1]["episode_index"].tolist(), [7, 7])
+        self.assertEqual(envs.reset(seed=[1003, 1004])[1]["episode_index"].tolist(), [3, 4])
 
     def test_a_vector_calls_its_environments(self):
         envs = softvt.SoftVTVectorEnv(2, script=short_suite(), obs="proprio", render_mode="rgb_array", camera="left")
