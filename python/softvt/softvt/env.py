@@ -16,7 +16,7 @@ from .arguments import is_bool, require_bool, require_one_of, require_text, text
 from .profile import CAMERA_PARTS, CONTROLS, GRIPPERS, PARTS, PARTS_OF_ONE_STEP, ProfileSpec, parse_parts
 from .readings import Readings
 from .serve import Client, Lease, ServerError, lease
-from .suites import FILE_ID, environment_id
+from .suites import FILE_ID, SUITES, environment_id
 from .true_state import STATE_BOUNDS, Scene, TrueState, progress
 
 REWARDS = ("sparse", "staged", "safety")
@@ -41,6 +41,8 @@ _MAX_IMAGE_EDGE = 4096  # pixels
 # What the server tells in `info` and the environment passes on under another name, or not at all.
 _OTHER_NUMBERS = ("task", "episode", "step", "carried_out")
 _SENSOR_EDGE = 240  # pixels of each image of the render mode "sensors"
+# Servers, suites and tasks whose goals were checked, so that a vector does it once.
+_with_true_state: set[tuple[str, str, int]] = set()
 
 Observation = np.ndarray | dict[str, Any]
 Step = tuple[Observation, float, bool, bool, dict[str, Any]]
@@ -188,6 +190,8 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         self._closer.atexit = False
         try:
             self._begin(suite, task, needs_truth, history)
+            if self._needs_state() and script not in SUITES:
+                self._check_goals()
             self._check_camera()
         except BaseException:
             self.close()
@@ -223,15 +227,27 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         self._progress = 0.0
         self._last: Step | None = None
         self._pending = ""
-        # True while the only episode of the server is that of `_check_camera`.
+        # True while the only episode of the server is that of `_probe`.
         self._has_probe = False
 
+    def _probe(self, task: int) -> dict[str, Any]:
+        """First answer of an episode, for checks of what only episodes have. It is not begun by an action."""
+        self._has_probe = True
+        return self._client.request("reset", suite=self._suite, task=task, episode=0)
+
+    def _check_goals(self) -> None:
+        """Raises ValueError if the goal of a task has nothing that the true state consists of."""
+        for task in self._tasks:
+            key = (self._client.url, self._suite, task)
+            if key not in _with_true_state:
+                _read_scene(self._probe(task)["info"])
+                _with_true_state.add(key)
+
     def _check_camera(self) -> None:
-        """Raises ValueError if the scene has no camera of the argument. Only an episode has cameras; this one is not begun by an action."""
+        """Raises ValueError if the scene has no camera of the argument."""
         if self._camera is None or self._camera in _FINGERS:
             return
-        self._client.request("reset", suite=self._suite, task=self.task, episode=0)
-        self._has_probe = True
+        self._probe(self.task)
         names = [*self.camera_matrices()]
         if self._camera not in names:
             raise ValueError(
@@ -361,7 +377,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         self._verdict = raw.get("verdict", {})
         self._scene = None
         if self._needs_state():
-            self._scene = Scene.read(raw["scene"])
+            self._scene = _read_scene(raw)
         observation, state = self._observe(response, is_first=True)
         self._progress = progress(state, self._verdict) if state is not None else 0.0
         return observation, self._info(raw, None)
@@ -483,6 +499,19 @@ def _close(client: Client, lease: Lease | None) -> None:
     client.close()
     if lease is not None:
         lease.release()
+
+
+def _read_scene(raw: Mapping[str, Any]) -> Scene:
+    """The scene of an episode's first answer. Raises ValueError, with what to use instead, if it has no true state."""
+    try:
+        scene = Scene.read(raw["scene"])
+        TrueState.read(scene, raw["state"], raw["verdict"])
+    except ValueError as error:
+        raise ValueError(
+            f"task {raw['task']}: obs='state' and reward='staged' need the object and its target, but {error}; use obs='proprio' or other parts, "
+            "and reward='sparse' or 'safety'. The true state is in info[\"state\"] with privileged=True"
+        ) from None
+    return scene
 
 
 def _refuse_other_suites(registered: str, script: str | None, url: str | None) -> None:

@@ -47,10 +47,12 @@ class Scene:
 
     @classmethod
     def read(cls, scene: Mapping[str, Any]) -> "Scene":
-        """The `info["scene"]` of a server. Raises ValueError if its goal places the object of the task nowhere."""
-        placed = [goal for goal in _predicates(scene["goal"]) if goal.get("object") == scene["object"] and "target" in goal]
+        """The `info["scene"]` of a server. Raises ValueError if its goal gives the object of the task no target."""
+        predicates = _predicates(scene["goal"])
+        placed = [goal for goal in predicates if goal.get("object") == scene["object"] and "target" in goal]
         if not placed:
-            raise ValueError("obs='state' and reward='staged' need a goal that places the object of the task, which this one does not")
+            kinds = ", ".join(dict.fromkeys(goal["kind"] for goal in predicates))
+            raise ValueError(f"the goal ({kinds}) has no target for {scene['object']!r}")
         position = np.array(scene["base_position_w"], dtype=np.float64)
         rotation, fixed = _matrix_of_quaternion(scene["base_quaternion_w"]), scene["fixed_positions_w"]
         return cls(scene["object"], placed[0]["target"], position, rotation, fixed)
@@ -124,7 +126,7 @@ def _object(scene: Scene, state: Mapping[str, Any], name: str) -> tuple[np.ndarr
         if entry["name"] == name:
             position = scene.base_rotation.T @ (np.array(entry["position_w"]) - scene.base_position)
             return position, scene.base_rotation.T @ _matrix_of_quaternion(entry["quaternion_w"]), entry["d_pct"]
-    raise ValueError(f"obs='state' and reward='staged' need the position of {name!r}, which the server does not send")
+    raise ValueError(f"the server does not send the position of {name!r}")
 
 
 def _two_columns(rotation: np.ndarray) -> np.ndarray:

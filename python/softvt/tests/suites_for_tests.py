@@ -33,6 +33,20 @@ def short_suite() -> str:
 
 
 @cache
+def drawer_suite() -> str:
+    """Path of a suite of two tasks: to place an object, and to open a drawer."""
+    path = FOLDER / "drawer.lua"
+    path.write_text("""
+local suite = require "suites.household"
+local open = suite.tasks[1]
+open.goal, open.object = softvt.opened { joint = "cabinet.top_drawer" }, "roll"
+suite.tasks = { suite.tasks[5], open }
+return suite
+""")
+    return str(path)
+
+
+@cache
 def crushing_suite() -> str:
     """Path of a suite of one task, whose goal moves a bun and a croissant, and whose expert crushes the croissant."""
     path = FOLDER / "crushing.lua"

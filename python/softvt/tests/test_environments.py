@@ -10,7 +10,7 @@ import softvt
 from gymnasium.utils.env_checker import check_env
 from softvt.env import _costs
 from softvt.true_state import STATE_BOUNDS, STATE_FIELDS, TrueState, progress
-from suites_for_tests import STEPS, crushing_suite, expert_run, same, short_suite
+from suites_for_tests import STEPS, crushing_suite, drawer_suite, expert_run, same, short_suite
 
 # Policies of this field return poses in metres and radians, and depth is infinite in the background.
 EXPECTED_WARNINGS = ("we recommend using a symmetric and normalized space", "is infinity", "is -infinity")
@@ -94,6 +94,19 @@ class Environments(unittest.TestCase):
             self.assertRaisesRegex(ValueError, "entry 'state' of its own"),
         ):
             softvt.SoftVTEnv(url=server.url, token=server.token, obs="proprio+state")
+
+    def test_a_goal_without_a_target_for_the_object_is_refused_where_the_true_state_is_asked_for(self):
+        words = r"task 1: .*the goal \(opened\) has no target for 'roll'; use obs='proprio' .* reward='sparse'"
+        for arguments in ({}, {"task": None}, {"obs": "proprio+state"}, {"obs": "proprio", "reward": "staged"}):
+            with self.subTest(arguments), self.assertRaisesRegex(ValueError, words):
+                self.make(drawer_suite(), **{"task": 1, **arguments})
+        env = self.make(drawer_suite(), task=0)
+        with self.assertRaisesRegex(softvt.ServerError, "no episode yet"):
+            env.step(HOLD)
+        env.reset(seed=1000)
+        with self.assertRaisesRegex(ValueError, words):
+            env.reset(options={"task": 1})
+        self.assertEqual(self.make(drawer_suite(), task=1, obs="proprio", reward="safety").reset(seed=1000)[1]["task"], 1)
 
     def test_a_camera_that_the_scene_has_not_is_refused_and_the_check_begins_no_episode(self):
         with self.assertRaisesRegex(ValueError, "camera='frnt': expected a camera of the scene, 'third_person', 'wrist', or 'left'"):
