@@ -71,6 +71,16 @@ def expert_run(policy: str = "expert", suite: str = "suites/object_soft.lua") ->
     return np.load(out / "actions/task_000/episode_00000.npy"), record
 
 
+@cache
+def recording() -> Path:
+    """Folder of a recording: a demonstration of each of tasks 0 and 1 of Object-Rigid, with small images."""
+    folder = FOLDER / "demonstrations"
+    command = ["record", "suites/object_rigid.lua", "--task", "0,1", "--demos", "1", "--out", str(folder)]
+    small = ["--set", "cameras.width=32", "--set", "cameras.height=24", "--streams", "depth,joint-torques"]
+    subprocess.run([softvt.find_binary(), *command, *small], check=True, capture_output=True)
+    return folder
+
+
 def same(a, b) -> bool:
     """True if two observations are equal bit for bit."""
     if isinstance(a, dict):

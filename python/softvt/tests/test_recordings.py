@@ -7,7 +7,7 @@ import unittest
 
 import numpy as np
 import softvt
-from suites_for_tests import FOLDER, expert_run
+from suites_for_tests import FOLDER, expert_run, recording
 
 
 class Runs(unittest.TestCase):
@@ -37,10 +37,7 @@ class Runs(unittest.TestCase):
 class Datasets(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.folder = FOLDER / "demonstrations"
-        command = ["record", "suites/object_rigid.lua", "--task", "0,1", "--demos", "1", "--out", str(cls.folder)]
-        small = ["--set", "cameras.width=32", "--set", "cameras.height=24", "--streams", "depth,joint-torques"]
-        subprocess.run([softvt.find_binary(), *command, *small], check=True, capture_output=True)
+        cls.folder = recording()
 
     def test_items_are_the_steps_of_all_demonstrations(self):
         data = softvt.Dataset(self.folder, horizon=4)
