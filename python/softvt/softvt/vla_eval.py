@@ -140,8 +140,11 @@ class SoftVTBenchmark(StepBenchmark):
         result: EpisodeResult = {
             key: bool(verdict[name]) for key, name in (("success", "goal"), ("safety", "safety"), ("no_drop", "no_drop"))
         }
-        if verdict["d_peak"] is not None and verdict["tau"]:
-            result["d_over_tau"] = verdict["d_peak"] / verdict["tau"]
+        # Of the objects that the goal moves.
+        objects = [verdict, *verdict.get("targets", ())]
+        ratios = [one["d_peak"] / one["tau"] for one in objects if one["d_peak"] is not None and one["tau"]]
+        if ratios:
+            result["d_over_tau"] = max(ratios)
         return result
 
     def get_metric_keys(self) -> dict[str, str]:

@@ -9,6 +9,7 @@ import unittest
 import numpy as np
 from softvt.vla_eval import SoftVTBenchmark
 from suites_for_tests import FOLDER, expert_run, short_suite
+from vla_eval.benchmarks.base import StepResult
 from vla_eval.specs import GRIPPER_CLOSE_POS, POSITION_ABSOLUTE
 
 SERVER = """
@@ -95,6 +96,14 @@ class Benchmarks(unittest.TestCase):
         self.assertEqual(pose.get_metadata()["max_steps"], 12)
         with self.assertRaisesRegex(ValueError, "8 numbers"):
             pose.step({"actions": np.zeros(8)})
+
+    def test_the_ratio_is_that_of_the_object_for_which_it_is_largest(self):
+        verdict = {"goal": True, "safety": False, "no_drop": True, "d_peak": 0.2, "tau": 0.4}
+        rigid, crushed = {"d_peak": None, "tau": None}, {"d_peak": 3.0, "tau": 0.5}
+        benchmark = SoftVTBenchmark(short_suite())
+        for objects, ratio in [(verdict, 0.5), (verdict | {"targets": [rigid, crushed]}, 6.0), (verdict | rigid, None)]:
+            result = benchmark.get_step_result(StepResult(None, 0.0, True, {"verdict": objects}))
+            self.assertEqual(result.get("d_over_tau"), ratio)
 
     def test_impossible_parameters_are_refused_before_a_server_starts(self):
         for arguments, words in [
