@@ -11,11 +11,12 @@ pub mod check;
 mod demonstration;
 pub mod demonstration_writer;
 mod error;
+pub mod export;
 mod grip_labels;
 mod hdf5;
 pub mod import;
 pub mod layout;
-pub mod lerobot;
+
 pub mod manifest;
 mod privileged;
 pub mod stats;

@@ -15,7 +15,7 @@ use softvt::{
     dataset::{
         OptionalStream, TaskFile,
         card::DatasetCard,
-        lerobot::{self, ArmControl, ExportConfig, ExportSummary, LeRobotVersion},
+        export::{self, ArmControl, ExportConfig, ExportFormat, ExportSummary, LeRobotVersion},
         manifest,
     },
     episode_id::EpisodeSplit,
@@ -57,16 +57,19 @@ return softvt.suite { name = "one", object_type = "rigid", tasks_differ_in = "sp
   tasks = { task("wait a while"), task("wait for it") } }
 "#;
 
+const V21: ExportFormat = ExportFormat::LeRobot(LeRobotVersion::V21);
+const V30: ExportFormat = ExportFormat::LeRobot(LeRobotVersion::V30);
+
 fn project() -> Project {
     Project::new(&[("x.lua", SUITE), SOLIDS])
 }
 
 /// An export from the folder `data` of a project into `out`.
-fn config(project: &Project, version: LeRobotVersion, out: &str) -> ExportConfig {
+fn config(project: &Project, format: ExportFormat, out: &str) -> ExportConfig {
     ExportConfig {
         data: project.path("data"),
         out: project.path(out),
-        version,
+        format,
         control: ArmControl::Pose,
         gripper: None,
         tasks: Vec::new(),
@@ -75,7 +78,7 @@ fn config(project: &Project, version: LeRobotVersion, out: &str) -> ExportConfig
 }
 
 fn export(config: &ExportConfig) -> ExportSummary {
-    lerobot::export(config, || false, |_, _| ()).unwrap_or_else(|error| panic!("{error}"))
+    export::export(config, || false, |_, _| ()).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn rows(path: &Path) -> Vec<Row> {
@@ -128,7 +131,7 @@ fn floats(bytes: &[u8]) -> Vec<f32> {
 fn rows_are_the_inputs_of_a_policy() {
     let project = project();
     Recording::new(project.run("x.lua").tasks(&[0]), 1, "data").record();
-    export(&config(&project, LeRobotVersion::V21, "out"));
+    export(&config(&project, V21, "out"));
     let rows = rows(&project.path("out/data/chunk-000/episode_000000.parquet"));
     let actions = TaskFile::open(&project.path("data/hdf5/one_task0_demo.hdf5"))
         .and_then(|file| file.actions(0))
@@ -183,9 +186,9 @@ fn joint_positions_and_torques_are_exported() {
     let recording = Recording::new(project.run("x.lua").tasks(&[0]), 1, "data");
     recording.with(|options| options.streams = [OptionalStream::JointTorques].into()).record();
     let joints =
-        |version, out: &str| ExportConfig { control: ArmControl::Joints, ..config(&project, version, out) };
-    export(&joints(LeRobotVersion::V21, "a"));
-    export(&joints(LeRobotVersion::V30, "b"));
+        |format, out: &str| ExportConfig { control: ArmControl::Joints, ..config(&project, format, out) };
+    export(&joints(V21, "a"));
+    export(&joints(V30, "b"));
     let file = TaskFile::open(&project.path("data/hdf5/one_task0_demo.hdf5")).expect("a file");
     let stream = |name: &str| file.array(0, name).expect("a stream").values;
     let (positions, torques) = (stream("obs/arm_joint_pos"), stream("obs/joint_torques"));
@@ -222,12 +225,12 @@ fn both_versions_have_the_same_rows() {
     let project = project();
     Recording::new(project.run("x.lua"), 2, "data").with(|options| options.has_privileged = false).record();
     assert_eq!(DatasetCard::read(&project.path("data")).expect("a card").gripper, None);
-    let v21 = |out: &str, threads| ExportConfig { threads, ..config(&project, LeRobotVersion::V21, out) };
+    let v21 = |out: &str, threads| ExportConfig { threads, ..config(&project, V21, out) };
     let exported = export(&v21("a", 1));
     assert_eq!((exported.episodes, exported.tasks), (4, 2));
     export(&v21("b", 3));
     assert!(files(&project.path("a")) == files(&project.path("b")), "not the same bytes");
-    let v30 = |out: &str| config(&project, LeRobotVersion::V30, out);
+    let v30 = |out: &str| config(&project, V30, out);
     assert_eq!(export(&ExportConfig { data: project.path("data/"), ..v30("c/") }), exported);
     let apart: Vec<Row> = (0..4)
         .flat_map(|i| rows(&project.path(&format!("a/data/chunk-000/episode_{i:06}.parquet"))))
@@ -286,11 +289,9 @@ fn invalid_exports_are_refused_and_leave_nothing() {
     record("plain").with(|options| options.has_images = false).record();
     project.write("full/mine", b"mine");
     let hdf5 = project.path("data/hdf5/one_task0_demo.hdf5");
-    let refusal = |config: &ExportConfig| project.message(lerobot::export(config, || false, |_, _| ()));
-    let config = |data: &str, out: &str| ExportConfig {
-        data: project.path(data),
-        ..config(&project, LeRobotVersion::V21, out)
-    };
+    let refusal = |config: &ExportConfig| project.message(export::export(config, || false, |_, _| ()));
+    let config =
+        |data: &str, out: &str| ExportConfig { data: project.path(data), ..config(&project, V21, out) };
     let task = |word: &str| ExportConfig { tasks: vec![word.to_owned()], ..config("data", "x") };
     for (config, output) in [
         (config("data", "full"), "full: it holds mine; nothing was written"),

@@ -19,7 +19,7 @@ use softvt_common::{files, text::counted};
 use softvt_dataset::{
     DatasetError,
     check::{self, CheckScope},
-    lerobot::{self, ArmControl, ExportConfig, LeRobotVersion},
+    export::{self, ArmControl, ExportConfig, ExportFormat},
     stats,
 };
 use softvt_policy::profile::GripCode;
@@ -57,7 +57,7 @@ pub(crate) struct ExportArgs {
     path: PathBuf,
     /// Version of the layout: v2.1 for openpi, v3.0 for LeRobot itself
     #[arg(long, value_name = "FORMAT")]
-    format: LeRobotVersion,
+    format: ExportFormat,
     /// Output folder; must be new
     #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     out: PathBuf,
@@ -147,20 +147,20 @@ fn sample(demos: &[DemoRef], count: usize) -> Vec<DemoRef> {
 /// Exports a recording.
 ///
 /// # Errors
-/// As [`lerobot::export`]. No output remains then.
+/// As [`export::export`]. No output remains then.
 fn run_export(args: ExportArgs) -> Result<(), CliError> {
     check_complete(&args.path)?;
     let config = ExportConfig {
         data: args.path,
         out: args.out,
-        version: args.format,
+        format: args.format,
         control: args.control,
         gripper: args.gripper,
         tasks: args.tasks,
         threads: thread_count(args.threads),
     };
     let mut progress: Option<Progress> = None;
-    let exported = lerobot::export(&config, cancel::requested, |total, episode| {
+    let exported = export::export(&config, cancel::requested, |total, episode| {
         progress.get_or_insert_with(|| Progress::new(total, "export")).tick(episode);
     });
     drop(progress);

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value, json};
 
 use super::{
-    config::{CHUNK, MAX_TABLE_MB},
     episode::{EpisodeData, EpisodeWriter},
     parquet_table::{ColumnType, ColumnValues, ParquetColumn, ParquetTable, TableSchema},
     statistics::{FeatureStatistics, Figure, NestedList},
+    version::{CHUNK, MAX_TABLE_MB},
 };
 use crate::DatasetError;
 use softvt_common::files;

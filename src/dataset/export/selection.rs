@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::ExportConfig;
+use super::{ExportConfig, ExportSummary};
 use crate::{
     DatasetError, OptionalStream, TaskFile,
     card::DatasetCard,
@@ -20,6 +20,11 @@ pub(super) struct ImageSize {
     pub height: usize,
     pub width: usize,
 }
+
+/// Names of the images of a row, in order: both cameras, and the mosaic of the fingers.
+pub(super) const IMAGE_FEATURES: [&str; 3] = ["image", "wrist_image", "tactile_image"];
+/// Size of the mosaic.
+const MOSAIC_SIZE: ImageSize = ImageSize { height: 224, width: 224 };
 
 /// A demonstration that becomes an episode.
 #[derive(Clone, Debug)]
@@ -46,6 +51,20 @@ pub(super) struct Selection {
     pub gripper: GripCode,
     /// True if the recording has the torques of the arm's drives.
     pub has_joint_torques: bool,
+}
+
+impl Selection {
+    /// Sizes of the images of a row, in the order of [`IMAGE_FEATURES`].
+    pub(super) fn feature_sizes(&self) -> [ImageSize; 3] {
+        let [third_person, wrist] = self.image_sizes;
+        [third_person, wrist, MOSAIC_SIZE]
+    }
+
+    /// Numbers of episodes, rows and prompts.
+    pub(super) fn summary(&self) -> ExportSummary {
+        let frames = self.demos.iter().map(|demo| demo.entry.num_samples).sum();
+        ExportSummary { episodes: self.demos.len(), frames, tasks: self.prompts.len() }
+    }
 }
 
 /// Selects the demonstrations of the tasks that the configuration names.

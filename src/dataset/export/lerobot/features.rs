@@ -4,19 +4,18 @@ use parquet::file::metadata::KeyValue;
 use serde_json::{Map, Value, json};
 
 use super::{
-    config::ExportConfig,
     parquet_table::{ColumnType, ParquetColumn, TableSchema},
-    selection::{ImageSize, Selection},
+    version::LeRobotVersion,
+};
+use crate::export::{
+    ExportJob,
+    demo_reader::MARKER_SHAPE,
+    selection::{IMAGE_FEATURES, ImageSize},
 };
 use softvt_policy::profile::JOINT_NAMES;
-use softvt_sensing::tactile::MARKER_COUNT;
 
-/// Names of the image features of a row, in order.
-pub(super) const IMAGE_FEATURES: [&str; 3] = ["image", "wrist_image", "tactile_image"];
 /// Index features of a row, in order: the last ones.
 pub(super) const INDEX_FEATURES: [&str; 4] = ["frame_index", "episode_index", "index", "task_index"];
-/// Shape of the markers of a row: initial positions, those of the previous step and of this one; both fingers; x and y.
-pub(super) const MARKER_SHAPE: [usize; 3] = [3, 2 * MARKER_COUNT, 2];
 
 /// A feature.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,9 +31,8 @@ pub(super) struct Feature {
 }
 
 /// All features in order; those that LeRobot adds to every dataset come last.
-pub(super) fn all(config: &ExportConfig, selection: &Selection) -> Vec<Feature> {
-    let ExportConfig { version, control, .. } = config;
-    let [third_person, wrist] = selection.image_sizes;
+pub(super) fn all(job: &ExportJob<'_>, version: LeRobotVersion) -> Vec<Feature> {
+    let control = job.config.control;
     let vector = [control.vector_length()];
     let feature = |name, dtype, shape: &[usize], names| Feature {
         name: version.key(name),
@@ -42,8 +40,7 @@ pub(super) fn all(config: &ExportConfig, selection: &Selection) -> Vec<Feature> 
         shape: shape.to_vec(),
         names,
     };
-    let mosaic = ImageSize { height: 224, width: 224 };
-    let images = IMAGE_FEATURES.into_iter().zip([third_person, wrist, mosaic]);
+    let images = IMAGE_FEATURES.into_iter().zip(job.selection.feature_sizes());
     let images = images.map(|(name, ImageSize { height, width })| {
         feature(name, "image", &[height, width, 3], json!(["height", "width", "channel"]))
     });
@@ -53,7 +50,8 @@ pub(super) fn all(config: &ExportConfig, selection: &Selection) -> Vec<Feature> 
         feature("actions", "float32", &vector, with("closure")),
         feature("tactile_marker_motion", "float32", &MARKER_SHAPE, json!(["time", "marker", "xy"])),
     ];
-    let torques = selection
+    let torques = job
+        .selection
         .has_joint_torques
         .then(|| feature("joint_torques", "float32", &[JOINT_NAMES.len()], json!(JOINT_NAMES)));
     let timestamp = feature("timestamp", "float32", &[1], Value::Null);

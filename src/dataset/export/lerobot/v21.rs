@@ -11,10 +11,10 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::{
-    config::CHUNK,
     episode::{EpisodeData, EpisodeWriter},
     parquet_table::{ParquetTable, TableSchema},
     statistics::{FeatureStatistics, NestedList},
+    version::CHUNK,
 };
 use crate::DatasetError;
 use softvt_common::files::{self, FileError};

@@ -6,45 +6,36 @@ use parquet::file::metadata::KeyValue;
 use serde_json::{Value, json};
 
 use super::{
-    config::{ArmControl, CHUNK, ExportConfig, ExportSummary, LeRobotVersion, MAX_TABLE_MB},
     features::{self, Feature},
     parquet_table::{ColumnType, ColumnValues, ParquetColumn, ParquetTable},
-    selection::{SelectedDemo, Selection},
+    version::{CHUNK, LeRobotVersion, MAX_TABLE_MB},
 };
 use crate::{
     DatasetError,
-    demonstration::{JOINT_ACTIONS, actions_stream_name},
+    export::{
+        ExportJob, ExportSummary,
+        description::{self, FormatText},
+        selection::{SelectedDemo, Selection},
+    },
 };
 use softvt_benchmark::CONTROL_HZ;
 use softvt_common::files;
-use softvt_policy::profile::GripCode;
 
 /// Writes all files that do not describe single episodes. `info.json` is last: LeRobot opens nothing without it.
 pub(super) fn write(
-    dir: &Path,
-    config: &ExportConfig,
-    selection: &Selection,
+    job: &ExportJob<'_>,
+    version: LeRobotVersion,
     features: &[Feature],
-    summary: ExportSummary,
 ) -> Result<(), DatasetError> {
-    match config.version {
+    let ExportJob { dir, selection, .. } = job;
+    match version {
         LeRobotVersion::V21 => write_task_lines(dir, &selection.prompts)?,
         LeRobotVersion::V30 => write_task_table(dir, &selection.prompts)?,
     }
     write_origins(dir, selection)?;
-    let grip_stream = actions_stream_name(selection.gripper);
-    let encoding = json!({
-        "softvt": env!("CARGO_PKG_VERSION"),
-        "control": config.control.name(),
-        "gripper": selection.gripper.name(),
-        "source": match config.control {
-            ArmControl::Pose => grip_stream.to_owned(),
-            ArmControl::Joints => format!("{JOINT_ACTIONS}, gripper of {grip_stream}"),
-        },
-    });
-    files::write_json(&dir.join("meta/softvt.json"), &encoding)?;
-    files::replace(&dir.join("README.md"), readme(config, selection, summary))?;
-    Ok(files::write_json(&dir.join("meta/info.json"), &info(config.version, features, summary))?)
+    files::write_json(&dir.join("meta/softvt.json"), &description::encoding(job))?;
+    files::replace(&dir.join("README.md"), readme(job, version))?;
+    Ok(files::write_json(&dir.join("meta/info.json"), &info(version, features, selection.summary()))?)
 }
 
 fn info(version: LeRobotVersion, features: &[Feature], summary: ExportSummary) -> Value {
@@ -124,55 +115,21 @@ fn write_origins(dir: &Path, selection: &Selection) -> Result<(), DatasetError> 
     Ok(files::write_json_lines(&dir.join("meta/softvt.jsonl"), lines)?)
 }
 
-/// The human-readable description, with the metadata that Hugging Face's hub reads.
-fn readme(config: &ExportConfig, selection: &Selection, summary: ExportSummary) -> String {
-    let ExportSummary { episodes, frames, tasks } = summary;
-    let gripper = match selection.gripper {
-        GripCode::Continuous => "the commanded closure, 0 open to 1 closed",
-        GripCode::Binary => "1 while the gripper is commanded to hold, else 0",
-        GripCode::TwoWidth => {
-            "closure 0 while open, the median commanded closure of the demonstration while closed"
-        }
-        GripCode::Force => "grip force in N while closed, -1 while open",
-    };
-    let (arm, motion) = match config.control {
-        ArmControl::Pose => (
-            "tool position (m), axis-angle (rad) in the robot's base frame",
-            "absolute tool position and axis-angle",
-        ),
-        ArmControl::Joints => {
-            ("positions of the seven joints of the arm (rad)", "commanded joint positions (rad)")
-        }
-    };
-    let key = |name| config.version.key(name);
-    let torques = match selection.has_joint_torques {
-        true => {
-            format!("| `{}` | torques of the arm's drives (N m), without gravity |\n", key("joint_torques"))
-        }
-        false => String::new(),
-    };
-    let [image, wrist, tactile] = features::IMAGE_FEATURES.map(key);
-    let (markers, state, actions) = (key("tactile_marker_motion"), key("state"), key("actions"));
-    let prompts: String = selection.prompts.iter().map(|prompt| format!("- {prompt}\n")).collect();
-    format!(
-        "---\nlicense: apache-2.0\ntask_categories:\n- robotics\ntags:\n- LeRobot\nconfigs:\n- config_name: default\n  \
-         data_files: data/*/*.parquet\n---\n\
-         # Demonstrations of soft-object manipulation, LeRobot {}\n\n\
-         {episodes} episodes, {frames} frames at {} Hz, {tasks} prompts; exported by softvt {} from a recording in \
-         simulation. Every episode reaches its goal and is safe by softvt's evaluator.\n\n\
-         Frame t holds the observation of a policy at step t and the action commanded then.\n\n\
-         | key | |\n|---|---|\n\
-         | `{image}`, `{wrist}` | third person and wrist |\n\
-         | `{tactile}` | 4 × 4 cells: the last 8 images of the left finger above, of the right finger below |\n\
-         | `{markers}` | (3, 198, 2) px: initial marker positions, those of the previous step and of this one; left finger first |\n\
-         | `{state}` | {arm}; position of one finger, 0 closed to 0.04 m |\n\
-         | `{actions}` | {motion}; {gripper} |\n{torques}\n\
-         `meta/softvt.json` states the control ({}) and the grip code ({}), and `meta/softvt.jsonl` the demonstration of each episode.\n\n\
-         {prompts}",
-        config.version.code(),
-        CONTROL_HZ,
-        env!("CARGO_PKG_VERSION"),
-        config.control.name(),
-        selection.gripper.name(),
+/// The human-readable description.
+fn readme(job: &ExportJob<'_>, version: LeRobotVersion) -> String {
+    let encoding = format!(
+        "`meta/softvt.json` states the control ({}) and the grip code ({}), and `meta/softvt.jsonl` the demonstration of each episode.",
+        job.config.control.name(),
+        job.selection.gripper.name(),
+    );
+    description::readme(
+        job,
+        &FormatText {
+            hub: "tags:\n- LeRobot\nconfigs:\n- config_name: default\n  data_files: data/*/*.parquet\n",
+            name: &format!("LeRobot {}", version.code()),
+            key: |name| version.key(name).to_owned(),
+            more_keys: "",
+            files: encoding,
+        },
     )
 }

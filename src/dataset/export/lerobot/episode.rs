@@ -1,0 +1,161 @@
+//! [`EpisodeData`]: the rows of an episode with their statistics, ready to be written.
+
+use image::{ImageError, RgbImage};
+
+use super::{
+    features::INDEX_FEATURES,
+    parquet_table::{ColumnValues, EmbeddedImage},
+    statistics::{FeatureStatistics, QuantileSource, ValueCounts, ValueMoments, ValueStatistics},
+    version::LeRobotVersion,
+};
+use crate::{
+    DatasetError,
+    export::{
+        ExportJob,
+        demo_reader::{DemoNumbers, DemoReader, MARKER_ROW, MARKER_SHAPE},
+        selection::{IMAGE_FEATURES, SelectedDemo},
+    },
+};
+use softvt_benchmark::CONTROL_HZ;
+use softvt_robot::panda::ARM_DOFS;
+use softvt_sensing::camera::encode_png;
+
+/// Resolution and range of the counts from which quantiles of marker positions are taken, px.
+const MARKER_STEP: f64 = 0.01;
+const MARKER_RANGE: f64 = 400.0;
+
+/// Writes the files of a layout, episode by episode.
+pub(super) trait EpisodeWriter: Send {
+    fn add(&mut self, episode: EpisodeData<'_>) -> Result<(), DatasetError>;
+    fn finish(self: Box<Self>) -> Result<(), DatasetError>;
+}
+
+/// An episode ready to be written.
+pub(super) struct EpisodeData<'a> {
+    pub index: usize,
+    pub demo: &'a SelectedDemo,
+    /// Columns of its table, in the order of the features.
+    pub columns: Vec<ColumnValues>,
+    /// Statistics of the columns.
+    pub statistics: Vec<FeatureStatistics>,
+}
+
+impl<'a> EpisodeData<'a> {
+    /// Reads episode `index`.
+    ///
+    /// # Errors
+    /// A stream is missing, of unexpected shape or not finite; or the export was cancelled.
+    pub(super) fn read(
+        job: &ExportJob<'_>,
+        version: LeRobotVersion,
+        index: usize,
+        demo: &'a SelectedDemo,
+    ) -> Result<Self, DatasetError> {
+        let steps = demo.entry.num_samples;
+        let reader = DemoReader::open(demo)?;
+        let length = job.config.control.vector_length();
+        let DemoNumbers { state, actions, markers, joint_torques } = reader.numbers(job)?;
+        let mut images = IMAGE_FEATURES.map(|_| ImageColumn::new());
+        reader.for_each_step(job, |step, step_images| {
+            let mut columns = images.iter_mut().zip(&step_images);
+            columns.try_for_each(|(column, image)| column.push(image, version.image_name(step)))
+        })?;
+        let timestamps: Vec<f32> =
+            (0..steps).map(|step| (step as f64 / f64::from(CONTROL_HZ)) as f32).collect();
+        let constant = |number: usize| vec![number as i64; steps];
+        let counted = |from: usize| (from..from + steps).map(|i| i as i64).collect();
+        let indices: [Vec<i64>; 4] =
+            [counted(0), constant(index), counted(demo.first_frame), constant(demo.prompt)];
+
+        let mut episode = Self { index, demo, columns: Vec::new(), statistics: Vec::new() };
+        let key = |name| version.key(name);
+        for (name, ImageColumn { images, counts }) in IMAGE_FEATURES.into_iter().zip(images) {
+            let parts = counts.into_iter().map(ValueStatistics::counted).collect();
+            episode.push(key(name), &[3, 1, 1], parts, ColumnValues::Images(images));
+        }
+        episode.push_vectors(key("state"), length, state);
+        episode.push_vectors(key("actions"), length, actions);
+        let (shape, parts) = match version {
+            LeRobotVersion::V21 => (&MARKER_SHAPE[..], statistics_per_marker(&markers)),
+            LeRobotVersion::V30 => (&[2][..], statistics_of_all_markers(&markers)),
+        };
+        episode.push(key("tactile_marker_motion"), shape, parts, ColumnValues::F32(markers));
+        if let Some(torques) = joint_torques {
+            episode.push_vectors(key("joint_torques"), ARM_DOFS, torques);
+        }
+        let part = |numbers: Vec<f64>| vec![ValueStatistics::of(numbers)];
+        let seconds = timestamps.iter().map(|time| f64::from(*time)).collect();
+        episode.push("timestamp", &[1], part(seconds), ColumnValues::F32(timestamps));
+        for (name, numbers) in INDEX_FEATURES.into_iter().zip(indices) {
+            let parts = part(numbers.iter().map(|number| *number as f64).collect());
+            episode.push(name, &[1], parts, ColumnValues::I64(numbers));
+        }
+        Ok(episode)
+    }
+
+    /// Adds a column of vectors, row by row.
+    fn push_vectors(&mut self, name: &'static str, length: usize, rows: Vec<f32>) {
+        let column = |i: usize| rows.iter().skip(i).step_by(length).map(|x| f64::from(*x));
+        let parts = (0..length).map(|i| ValueStatistics::of(column(i).collect())).collect();
+        self.push(name, &[length], parts, ColumnValues::F32(rows));
+    }
+
+    fn push(
+        &mut self,
+        name: &'static str,
+        shape: &[usize],
+        parts: Vec<ValueStatistics>,
+        values: ColumnValues,
+    ) {
+        let steps = self.demo.entry.num_samples as u64;
+        self.statistics.push(FeatureStatistics { name, shape: shape.to_vec(), steps, parts });
+        self.columns.push(values);
+    }
+}
+
+/// Images of a feature.
+struct ImageColumn {
+    images: Vec<EmbeddedImage>,
+    /// Counts of the values of each channel.
+    counts: [ValueCounts; 3],
+}
+
+impl ImageColumn {
+    fn new() -> Self {
+        let counts = std::array::from_fn(|_| ValueCounts::new(1.0 / 255.0, 256));
+        Self { images: Vec::new(), counts }
+    }
+
+    fn push(&mut self, image: &RgbImage, name: String) -> Result<(), ImageError> {
+        for pixel in image.pixels() {
+            for (counts, value) in self.counts.iter_mut().zip(pixel.0) {
+                counts.count(usize::from(value));
+            }
+        }
+        self.images.push(EmbeddedImage { png: encode_png(image)?, name });
+        Ok(())
+    }
+}
+
+fn marker_moments(rows: &[f32]) -> Vec<ValueMoments> {
+    let column = |i: usize| rows.iter().skip(i).step_by(MARKER_ROW).map(|x| f64::from(*x));
+    (0..MARKER_ROW).map(|i| ValueMoments::of(column(i))).collect()
+}
+
+/// Statistics of each marker coordinate, without quantiles.
+fn statistics_per_marker(rows: &[f32]) -> Vec<ValueStatistics> {
+    let part = |moments| ValueStatistics { moments, quantile_source: QuantileSource::None };
+    marker_moments(rows).into_iter().map(part).collect()
+}
+
+/// Statistics of x and y over all markers.
+fn statistics_of_all_markers(rows: &[f32]) -> Vec<ValueStatistics> {
+    let moments = marker_moments(rows);
+    let part = |axis| {
+        let mut counts = ValueCounts::new(MARKER_STEP, (MARKER_RANGE / MARKER_STEP) as usize + 1);
+        rows.iter().skip(axis).step_by(2).for_each(|x| counts.count_nearest(f64::from(*x)));
+        let moments = ValueMoments::merged(moments.iter().skip(axis).step_by(2));
+        ValueStatistics { moments, quantile_source: QuantileSource::Counts(counts) }
+    };
+    (0..2).map(part).collect()
+}
