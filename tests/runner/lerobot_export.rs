@@ -57,15 +57,15 @@ return softvt.suite { name = "one", object_type = "rigid", tasks_differ_in = "sp
   tasks = { task("wait a while"), task("wait for it") } }
 "#;
 
-const V21: ExportFormat = ExportFormat::LeRobot(LeRobotVersion::V21);
+pub(crate) const V21: ExportFormat = ExportFormat::LeRobot(LeRobotVersion::V21);
 const V30: ExportFormat = ExportFormat::LeRobot(LeRobotVersion::V30);
 
-fn project() -> Project {
+pub(crate) fn project() -> Project {
     Project::new(&[("x.lua", SUITE), SOLIDS])
 }
 
 /// An export from the folder `data` of a project into `out`.
-fn config(project: &Project, format: ExportFormat, out: &str) -> ExportConfig {
+pub(crate) fn config(project: &Project, format: ExportFormat, out: &str) -> ExportConfig {
     ExportConfig {
         data: project.path("data"),
         out: project.path(out),
@@ -77,22 +77,22 @@ fn config(project: &Project, format: ExportFormat, out: &str) -> ExportConfig {
     }
 }
 
-fn export(config: &ExportConfig) -> ExportSummary {
+pub(crate) fn export(config: &ExportConfig) -> ExportSummary {
     export::export(config, || false, |_, _| ()).unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn rows(path: &Path) -> Vec<Row> {
+pub(crate) fn rows(path: &Path) -> Vec<Row> {
     let reader = SerializedFileReader::new(File::open(path).expect("a table")).expect("Parquet");
     reader.get_row_iter(None).expect("rows").map(|row| row.expect("a row")).collect()
 }
 
-fn field<'a>(row: &'a Row, name: &str) -> &'a Field {
+pub(crate) fn field<'a>(row: &'a Row, name: &str) -> &'a Field {
     let found = row.get_column_iter().find(|(column, _)| *column == name);
     found.unwrap_or_else(|| panic!("no {name}")).1
 }
 
 /// Flattens nested lists of numbers.
-fn numbers(field: &Field) -> Vec<f32> {
+pub(crate) fn numbers(field: &Field) -> Vec<f32> {
     match field {
         Field::Float(x) => vec![*x],
         Field::ListInternal(list) => list.elements().iter().flat_map(numbers).collect(),

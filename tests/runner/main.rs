@@ -30,6 +30,7 @@ mod policies;
 mod policy_check;
 mod policy_servers;
 mod reports;
+mod rlds_export;
 mod serve;
 mod served_runs;
 mod shut_hand;

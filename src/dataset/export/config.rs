@@ -12,17 +12,20 @@ use softvt_policy::profile::{GripCode, JOINT_NAMES, POSE_NAMES};
 pub enum ExportFormat {
     /// Parquet tables for LeRobot.
     LeRobot(LeRobotVersion),
+    /// Episodes in TFRecord files, which TensorFlow Datasets reads.
+    Rlds,
 }
 
 impl ValueEnum for ExportFormat {
     fn value_variants<'a>() -> &'a [Self] {
-        &[Self::LeRobot(LeRobotVersion::V21), Self::LeRobot(LeRobotVersion::V30)]
+        &[Self::LeRobot(LeRobotVersion::V21), Self::LeRobot(LeRobotVersion::V30), Self::Rlds]
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
         Some(PossibleValue::new(match self {
             Self::LeRobot(LeRobotVersion::V21) => "lerobot-v2.1",
             Self::LeRobot(LeRobotVersion::V30) => "lerobot-v3.0",
+            Self::Rlds => "rlds",
         }))
     }
 }

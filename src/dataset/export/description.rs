@@ -68,6 +68,8 @@ pub(super) const MOSAIC: &str =
 /// Meaning of the markers.
 pub(super) const MARKERS: &str =
     "(3, 198, 2) px: initial marker positions, those of the previous step and of this one; left finger first";
+/// Meaning of the joint positions that are observed in addition to the state.
+pub(super) const JOINT_STATE: &str = "measured positions of the seven joints of the arm (rad)";
 /// Meaning of the torques.
 pub(super) const TORQUES: &str = "torques of the arm's drives (N m), without gravity";
 

@@ -1,4 +1,4 @@
-//! Export of recorded demonstrations as datasets for training: LeRobot v2.1 and v3.0.
+//! Export of recorded demonstrations as datasets for training: LeRobot v2.1 and v3.0, and RLDS.
 //!
 //! A row holds what a policy of the profile `visuo_tactile` (or `visuo_tactile_joints`) observes at that step, and the
 //! action commanded then; its numbers are the same in every format. Of the eight past marker states only the last two
@@ -9,6 +9,7 @@ mod config;
 mod demo_reader;
 mod description;
 mod lerobot;
+mod rlds;
 mod selection;
 mod staged_dir;
 
@@ -52,6 +53,7 @@ fn export_with(
     let job = ExportJob { config, selection: &selection, dir: staged.path(), is_cancelled };
     let written = match config.format {
         ExportFormat::LeRobot(version) => lerobot::write(&job, version, on_episode),
+        ExportFormat::Rlds => rlds::write(&job, on_episode),
     };
     match written {
         Ok(()) => staged.commit().map(|()| selection.summary()),

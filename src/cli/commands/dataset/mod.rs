@@ -49,13 +49,13 @@ pub(crate) struct DatasetCheckArgs {
     replays: usize,
 }
 
-/// Write a recording as a LeRobot dataset, for training: docs/train-openpi.md
+/// Write a recording as a LeRobot or RLDS dataset, for training: docs/data.md, docs/train-openpi.md
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ExportArgs {
     /// Folder of a finished recording
     #[arg(value_name = "DATASET")]
     path: PathBuf,
-    /// Version of the layout: v2.1 for openpi, v3.0 for LeRobot itself
+    /// Format: LeRobot v2.1 for openpi, v3.0 for LeRobot itself, RLDS for OpenVLA and Octo
     #[arg(long, value_name = "FORMAT")]
     format: ExportFormat,
     /// Output folder; must be new

@@ -23,6 +23,9 @@ fn exports_are_printed_and_invalid_ones_refused() {
     let output = project.succeeds("dataset export data --format lerobot-v2.1 --out a --threads 1").out;
     assert!(output.starts_with("1 episode, ") && output.ends_with(" frames, 1 prompt: a\n"), "{output}");
     project.succeeds("dataset export data/ --format lerobot-v3.0 --gripper binary --task wait --out c/");
+    let output = project.succeeds("dataset export data --format rlds --out r").out;
+    assert!(output.starts_with("1 episode, ") && output.ends_with(" frames, 1 prompt: r\n"), "{output}");
+    assert_eq!(project.json("r/softvt_one/1.0.0/softvt.json")["gripper"], "two-width");
     // The code of the recording, or the given one.
     let code = |out: &str| project.json(&format!("{out}/meta/softvt.json"))["gripper"].clone();
     assert_eq!((code("a"), code("c")), ("two-width".into(), "binary".into()));
@@ -34,7 +37,7 @@ fn exports_are_printed_and_invalid_ones_refused() {
             "data --format lerobot-v3.0 --out x --gripper wide",
             "[possible values: continuous, binary, two-width, force]",
         ),
-        ("data --format lerobot-v2.0 --out x", "[possible values: lerobot-v2.1, lerobot-v3.0]"),
+        ("data --format lerobot-v2.0 --out x", "[possible values: lerobot-v2.1, lerobot-v3.0, rlds]"),
         ("data --out x", "--format"),
         ("data --format lerobot-v2.1", "--out"),
         ("full --format lerobot-v2.1 --out x", "full: dataset.json: it is missing; expected the folder"),

@@ -1,0 +1,108 @@
+//! The content of `features.json`: the message `Feature` of TensorFlow Datasets, whose 64-bit numbers are texts in
+//! JSON.
+
+use serde_json::{Map, Value, json};
+
+use crate::export::{
+    ExportJob,
+    demo_reader::MARKER_SHAPE,
+    description,
+    selection::{IMAGE_FEATURES, ImageSize},
+};
+use softvt_robot::panda::ARM_DOFS;
+
+/// Features of an episode.
+pub(super) fn json(job: &ExportJob<'_>) -> Value {
+    let steps = json!({
+        "pythonClassName": class("dataset_feature.Dataset"),
+        "sequence": { "feature": steps(job), "length": "-1" },
+    });
+    dictionary([("steps", steps), ("episode_metadata", episode_metadata())])
+}
+
+fn steps(job: &ExportJob<'_>) -> Value {
+    let vector = [job.config.control.vector_length()];
+    dictionary([
+        ("observation", observation(job)),
+        ("action", floats(&vector, &description::action(job))),
+        ("discount", scalar("float32", "always 1")),
+        ("reward", scalar("float32", "1 in the last step, else 0")),
+        ("is_first", scalar("bool", "true in the first step")),
+        ("is_last", scalar("bool", "true in the last step")),
+        ("is_terminal", scalar("bool", "true in the last step, which reaches the goal")),
+        ("language_instruction", text("prompt of the task")),
+    ])
+}
+
+fn observation(job: &ExportJob<'_>) -> Value {
+    let control = job.config.control;
+    let abouts = ["image of the third-person camera", "image of the wrist camera", description::MOSAIC];
+    let sizes = job.selection.feature_sizes();
+    let images = IMAGE_FEATURES.into_iter().zip(sizes.into_iter().zip(abouts));
+    let images = images.map(|(name, (size, about))| (name, png(size, about)));
+    let numbers = [
+        ("state", floats(&[control.vector_length()], &description::state(control))),
+        ("joint_state", floats(&[ARM_DOFS], description::JOINT_STATE)),
+        ("tactile_marker_motion", floats(&MARKER_SHAPE, description::MARKERS)),
+    ];
+    let has_torques = job.selection.has_joint_torques;
+    let torques = has_torques.then(|| ("joint_torques", floats(&[ARM_DOFS], description::TORQUES)));
+    dictionary(images.chain(numbers).chain(torques))
+}
+
+fn episode_metadata() -> Value {
+    dictionary([
+        ("file_path", text("HDF5 file of the recording")),
+        ("suite", text("name of the suite")),
+        ("task_id", scalar("int64", "index of the task in the suite")),
+        ("episode", scalar("int64", "index of the attempt in the split of demonstrations")),
+        ("demo_id", scalar("int64", "index of the demonstration in the file")),
+        ("asset_name", text("asset of the target")),
+        ("success", scalar("bool", "safe: without a drop, within the deformation limit")),
+    ])
+}
+
+fn class(name: &str) -> String {
+    format!("tensorflow_datasets.core.features.{name}")
+}
+
+fn dictionary(entries: impl IntoIterator<Item = (&'static str, Value)>) -> Value {
+    let features: Map<String, Value> =
+        entries.into_iter().map(|(name, feature)| (name.to_owned(), feature)).collect();
+    json!({
+        "pythonClassName": class("features_dict.FeaturesDict"),
+        "featuresDict": { "features": features },
+    })
+}
+
+fn dimensions(shape: &[usize]) -> Value {
+    json!({ "dimensions": shape.iter().map(usize::to_string).collect::<Vec<_>>() })
+}
+
+fn png(ImageSize { height, width }: ImageSize, about: &str) -> Value {
+    json!({
+        "pythonClassName": class("image_feature.Image"),
+        "image": { "shape": dimensions(&[height, width, 3]), "dtype": "uint8", "encodingFormat": "png" },
+        "description": about,
+    })
+}
+
+fn floats(shape: &[usize], about: &str) -> Value {
+    json!({
+        "pythonClassName": class("tensor_feature.Tensor"),
+        "tensor": { "shape": dimensions(shape), "dtype": "float32", "encoding": "none" },
+        "description": about,
+    })
+}
+
+fn scalar(dtype: &str, about: &str) -> Value {
+    json!({
+        "pythonClassName": class("scalar.Scalar"),
+        "tensor": { "shape": {}, "dtype": dtype, "encoding": "none" },
+        "description": about,
+    })
+}
+
+fn text(about: &str) -> Value {
+    json!({ "pythonClassName": class("text_feature.Text"), "text": {}, "description": about })
+}
