@@ -71,8 +71,8 @@ pub fn d_peak(record: &EpisodeRecord) -> Option<f64> {
     record.verdict.d_peak.filter(|_| record.outcome.is_valid())
 }
 
-/// Peak D over τ of a valid episode, of the object that the goal moves for which it is largest; `None` without a limit or
-/// a measurement.
+/// Largest peak D over τ of the objects that the goal moves, of a valid episode; `None` without a limit or a
+/// measurement.
 pub fn d_over_tau(record: &EpisodeRecord) -> Option<f64> {
     record.most_deformed().filter(|_| record.outcome.is_valid()).map(|target| target.ratio())
 }

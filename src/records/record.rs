@@ -258,8 +258,8 @@ impl EpisodeRecord {
         self.header.soft || self.verdict.targets.iter().any(|target| target.soft)
     }
 
-    /// True if D stayed within the limit of each soft object that the goal moves; `None` where one of them is unknown and
-    /// none is over its limit.
+    /// True if D stayed within the limit of each soft object that the goal moves, false if one is known to exceed its
+    /// own; `None` where neither is known.
     pub fn is_within_limits(&self) -> Option<bool> {
         let object = if self.header.soft { self.verdict.deformation_ok } else { Some(true) };
         let others =

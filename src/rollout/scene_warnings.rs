@@ -9,9 +9,9 @@ use softvt_geometry::pieces::SeparatePieces;
 use softvt_robot::gripper::MAX_WIDTH;
 use softvt_scene::{Asset, Body, Object, Scene, SoftMaterial};
 
-/// Warnings about a scene of a task, one line each: materials, soft bodies of few voxels, bodies of several pieces or off
-/// their axis, a target that the gripper cannot grasp, objects outside of the workspace, and a budget below what the goal
-/// takes.
+/// Warnings about a scene of a task, one line each: materials, soft bodies of few voxels, bodies of several pieces or
+/// off their axis, a target that the gripper cannot grasp, objects outside of the workspace, and a budget below what
+/// the goal takes.
 pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSet<String> {
     let warnings = |asset: &Asset| {
         let name = asset.name.clone();
@@ -89,8 +89,8 @@ fn workspace_warning(scene: &Scene, object: &Object, cache: &AssetCache) -> Opti
     })
 }
 
-/// Distance of the lowest point of an asset from z = 0, and share of its size by which its centre is off the z axis, that
-/// are likely not meant.
+/// Distance of the lowest point of an asset from z = 0, and share of its size by which its centre is off the z axis,
+/// that are likely not meant.
 const MAX_LIFT_M: f64 = 1e-3;
 const MAX_OFFSET_SHARE: f64 = 0.3;
 

@@ -87,12 +87,14 @@ pub(super) fn readme<Key: Fn(&'static str) -> String>(
     };
     let [image, wrist, tactile] = IMAGE_FEATURES.map(key);
     let (markers_key, state_key, action_key) = (key("tactile_marker_motion"), key("state"), key("actions"));
+    let safe =
+        if job.selection.is_safe { " and is safe by softvt's evaluator" } else { "; some are not safe" };
     let prompts: String = job.selection.prompts.iter().map(|prompt| format!("- {prompt}\n")).collect();
     format!(
         "---\nlicense: apache-2.0\ntask_categories:\n- robotics\n{hub}---\n\
          # Demonstrations of soft-object manipulation, {name}\n\n\
          {episodes} episodes, {frames} frames at {} Hz, {tasks} prompts; exported by softvt {} from a recording in \
-         simulation. Every episode reaches its goal and is safe by softvt's evaluator.\n\n\
+         simulation. Every episode reaches its goal{safe}.\n\n\
          Frame t holds the observation of a policy at step t and the action commanded then.\n\n\
          | key | |\n|---|---|\n\
          | `{image}`, `{wrist}` | third person and wrist |\n\

@@ -51,6 +51,8 @@ pub(super) struct Selection {
     pub gripper: GripCode,
     /// True if the recording has the torques of the arm's drives.
     pub has_joint_torques: bool,
+    /// True if each demonstration is safe, and does not only reach its goal.
+    pub is_safe: bool,
 }
 
 impl Selection {
@@ -108,7 +110,7 @@ pub(super) fn select(config: &ExportConfig) -> Result<Selection, DatasetError> {
     let image_sizes = image_sizes(first)?;
     let gripper = config.gripper.or(card.gripper).unwrap_or_default();
     let has_joint_torques = card.streams.contains(&OptionalStream::JointTorques);
-    Ok(Selection { demos, prompts, image_sizes, gripper, has_joint_torques })
+    Ok(Selection { demos, prompts, image_sizes, gripper, has_joint_torques, is_safe: card.keep.is_safe() })
 }
 
 fn matching_entries(

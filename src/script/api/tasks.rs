@@ -202,8 +202,8 @@ record! {
         grid: Option<BTreeMap<String, Vec<Value>>>;
         /// Returns the points instead of a grid.
         points: Option<Function> = Type::Function("fun(opt: table): table[]");
-        /// Returns a row, or a list of rows, for one point. Points run in any order and on several threads, each in a new
-        /// run of the script: variables that one changes are not seen by others.
+        /// Returns a row, or a list of rows, for one point. Points run in any order and on several threads, each in a
+        /// new run of the script: variables that one changes are not seen by others.
         run: Function = Type::Function("fun(point: table, opt: table): table|table[]");
         /// Summarizes all rows.
         finish: Option<Function> = Type::Function("fun(rows: table[], opt: table): softvt.Finish?");

@@ -317,7 +317,8 @@ class! {
             /// Adds a gel pad of the robot, with the shape and the default contact law of its fingers, on a carrier
             /// that solid:move_to moves. Its frame is at the apex of the gel, which faces along x.
             fn gel_pad(lua, this, spec: WorldGelPadSpec) -> ["softvt.Solid"] { this.add_gel_pad(lua, &spec)? }
-            /// Makes one time step. Returns false and the reason if the state is invalid then; a further step is an error.
+            /// Makes one time step. Returns false and the reason if the state is invalid then; a further step is an
+            /// error.
             fn step(lua, this) -> ["boolean", "string?"] { this.step(lua)? }
             /// Returns the time step, s.
             fn dt(_, this) -> ["number"] { lock(&this.0).world.params.dt }
