@@ -84,7 +84,7 @@
 ---@field angle? number Largest angle between the axis and the vertical. Expects radians in 0..3.1. Default 0.17.
 ---@field hold_s? number Time that it must stay so. Expects seconds in 0..10. Default 0.4.
 
----A function of the true scene returns true at the end of a control step. It must depend on its argument alone: variables that it changes would be shared by episodes.
+---A function of the true scene returns true at the end of a control step. It must depend on its argument alone: variables that it changes are not part of the state of an episode.
 ---@class softvt.Predicate
 ---@field name string What holds, in words, as records and reports show it.
 ---@field holds fun(scene: softvt.SceneState): boolean The function.
@@ -162,7 +162,7 @@
 ---@field options? any Result of softvt.options, passed to the functions below as opt.
 ---@field grid? table<string, any[]> Values of each parameter. Every combination is run, names in alphabetical order, the last one fastest.
 ---@field points? fun(opt: table): table[] Returns the points instead of a grid.
----@field run fun(point: table, opt: table): table|table[] Returns a row, or a list of rows, for one point. Points run in any order and on several threads.
+---@field run fun(point: table, opt: table): table|table[] Returns a row, or a list of rows, for one point. Points run in any order and on several threads, each in a new run of the script: variables that one changes are not seen by others.
 ---@field finish? fun(rows: table[], opt: table): softvt.Finish? Summarizes all rows.
 ---@field columns? string[] Columns of the table, in order; by default all, sorted.
 
@@ -928,7 +928,7 @@ function World:static(spec) end
 ---@return softvt.Solid
 function World:gel_pad(spec) end
 
----Makes one time step. Returns false and the reason once the state is invalid.
+---Makes one time step. Returns false and the reason if the state is invalid then; a further step is an error.
 ---@return boolean
 ---@return string?
 function World:step() end
@@ -1714,7 +1714,7 @@ function softvt.beside(spec) end
 ---@return softvt.Upright
 function softvt.upright(spec) end
 
----A function of the true scene returns true at the end of a control step. It must depend on its argument alone: variables that it changes would be shared by episodes.
+---A function of the true scene returns true at the end of a control step. It must depend on its argument alone: variables that it changes are not part of the state of an episode.
 ---@param spec softvt.Predicate
 ---@return softvt.Predicate
 function softvt.predicate(spec) end

@@ -106,7 +106,8 @@ fn origin_warning(asset: &Asset, cache: &AssetCache) -> Option<String> {
         format!(
             "its centre is {:.0} mm off the z axis, and its lowest point at z = {:.0} mm; end its shape with :grounded()",
             1e3 * centre.xy().norm(),
-            1e3 * bounds.min.z
+            // Not −0.
+            (1e3 * bounds.min.z).round() + 0.0
         )
     })
 }

@@ -122,7 +122,9 @@ fn implausible_units_and_wide_objects_are_doubted() {
     let wide =
         of(Small { shape: "softvt.shape.box { size = { 0.12, 0.1, 0.04 } }:grounded()", ..Small::default() });
     assert!(wide.contains("asset cube: it is 100 mm wide, and the gripper opens 80 mm"), "{wide}");
-    assert_eq!(of(Small::default()), "");
+    // The post, which no episode is to reach.
+    assert!(of(Small::default()).starts_with("object post: it is at (0, 2) m, outside of the workspace"));
+    assert_eq!(of(Small::default()).lines().count(), 1);
     let soft = of(Small { material: "youngs_pa = 600, poisson = 0.3, density = 900", ..Small::default() });
     assert!(soft.contains("asset cube: it sags to about 71 % of its height under its own weight"), "{soft}");
     let off = of(Small {
@@ -133,8 +135,6 @@ fn implausible_units_and_wide_objects_are_doubted() {
         off.contains("asset cube: its centre is 30 mm off the z axis, and its lowest point at z = 0 mm"),
         "{off}"
     );
-    let outside = of(Small { at: "at = { 0.45, 0.7 }", ..Small::default() });
-    assert!(outside.contains("object cube: it is at (0.45, 0.7) m, outside of the workspace"), "{outside}");
     let ball = "softvt.shape.sphere { radius = 0.02 }";
     let text = Small::default()
         .text()

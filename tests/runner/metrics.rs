@@ -1,7 +1,7 @@
 //! Metrics of suites: values, where they appear, and refused declarations.
 
 use insta::assert_snapshot;
-use softvt::{evaluation::verdict::Outcome, runner::SuiteResult};
+use softvt::runner::SuiteResult;
 
 use crate::support::{Project, Small};
 
@@ -54,7 +54,7 @@ fn a_metric_that_fails_ends_the_run_and_says_where() {
         assert!(message.contains(expected), "{message}");
     };
     unknown("return step.pad_forces_n", "step: unknown key \"pad_forces_n\"; did you mean \"pad_force_n\"?");
-    unknown("return step.objects[1].d", "step.objects: unknown key \"d\"; did you mean \"d_pct\"?");
+    unknown("return step.objects[1].d", "step.objects: unknown key \"d\"; there are name, ");
 }
 
 #[test]
@@ -72,6 +72,6 @@ fn wrong_metrics_are_refused() {
     let good = metric("name = 'm', of = function() end");
     assert_snapshot!(refusal(&format!("{good}, {good}")), @r#"x.lua:9: suite.metrics: two are named "m"; give each a name of its own"#);
     assert_snapshot!(refusal(&metric("name = 'm', over = 'sum', of = function() end")), @r#"x.lua:9: metric.over: expected one of "last", "max", "min", "mean", got "sum""#);
-    assert_snapshot!(refusal(&metric("name = 'm'")), @"");
-    assert_snapshot!(refusal("function() end"), @"");
+    assert_snapshot!(refusal(&metric("name = 'm'")), @"x.lua:9: metric.of: missing; expected a function, fun(scene: softvt.SceneState, step: table): number?");
+    assert_snapshot!(refusal("function() end"), @"x.lua:9: suite.metrics[1]: expected the result of softvt.metric{…}, got a function");
 }
