@@ -5,5 +5,10 @@ return function(script, name, loaded)
   if tostring(asset.body) ~= "softvt.soft" then
     error(("%s: %s is not soft: only a body of softvt.soft deforms"):format(script, name), 0)
   end
+  -- Limits are found by the name of the asset, and scripts name its file.
+  if asset.name ~= name then
+    local message = "%s: assets/%s.lua has the name %q; name it %q, or the file %s.lua"
+    error(message:format(script, name, asset.name, name, asset.name), 0)
+  end
   return asset
 end

@@ -306,9 +306,9 @@ impl EpisodeRecord {
         let is_known = |ok: Option<bool>, tau: Option<f64>| {
             if self.outcome.is_valid() { ok.is_some() } else { tau.is_some() }
         };
-        let others = v.targets.iter().filter(|target| target.soft);
+        let mut others = v.targets.iter().filter(|target| target.soft);
         (!self.header.soft || is_known(v.deformation_ok, v.tau))
-            && others.fold(true, |all, target| all && is_known(target.deformation_ok, target.tau))
+            && others.all(|target| is_known(target.deformation_ok, target.tau))
     }
 }
 

@@ -11,11 +11,12 @@ use softvt_records::{paired_stats::d_over_tau, record::EpisodeRecord};
 pub fn view_command(run: &StoredRun, id: &EpisodeId) -> String {
     let manifest = &run.manifest;
     let changes = run.changes();
-    // The script that returns the suite itself: `view` does not accept a list of suites, which may be what was run.
+    // Of a list of suites, the script that returns the suite itself: `view` does not accept a list.
     let main = run.text("script");
     let located = |path: &str| located(path, manifest["folder"].as_str());
     let sibling = Path::new(main).with_file_name(format!("{}.lua", run.text("suite"))).display().to_string();
-    let is_main = sibling == main || manifest["sources"].get(&sibling).is_none();
+    let is_listed = manifest["several_suites"] == true;
+    let is_main = !is_listed || sibling == main || manifest["sources"].get(&sibling).is_none();
     let mut view = vec![located(if is_main { main } else { &sibling })];
     if is_main {
         view.extend(changes.arguments.clone());
@@ -91,6 +92,17 @@ fn quoted(word: &str) -> String {
 mod tests {
     use super::*;
     use crate::{run_summary::tests::stored, sample_record};
+
+    #[test]
+    fn the_script_of_a_view_is_that_of_the_run_unless_it_returned_a_list() {
+        let mut run = stored("runs/a", "noop", vec![sample_record()]);
+        let id = run.records[0].header.id.clone();
+        let sibling = format!("{}.lua", run.text("suite"));
+        run.manifest["sources"] = serde_json::json!({ "x.lua": "", sibling.clone(): "" });
+        assert!(view_command(&run, &id).starts_with("softvt view x.lua "));
+        run.manifest["several_suites"] = true.into();
+        assert!(view_command(&run, &id).starts_with(&format!("softvt view {sibling} ")));
+    }
 
     #[test]
     fn the_next_commands_are_the_report_and_the_episode_farthest_over_the_limit() {

@@ -201,11 +201,10 @@ fn problem_of(rows: &[ExperimentRow], columns: &[String]) -> Option<String> {
         );
     }
     let known: BTreeSet<&str> = rows.iter().flat_map(|row| row.keys().map(String::as_str)).collect();
-    let missing = columns.iter().find(|column| !known.contains(column.as_str()))?;
-    Some(format!(
-        "experiment.columns: {}: no row has it",
-        unknown_name("column", missing, known.iter().copied())
-    ))
+    // Rows of some options lack some columns.
+    let first = columns.first().filter(|_| columns.iter().all(|column| !known.contains(column.as_str())))?;
+    let unknown = unknown_name("column", first, known.iter().copied());
+    Some(format!("experiment.columns: no row has any of them: {unknown}"))
 }
 
 fn manifest<'a>(

@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 
 use crate::{error::RunError, recorded_runs::ReplaySource, suite_run::PreparedRun};
 use softvt_benchmark::{
-    NeededKnowledge, ShiftValue,
+    NeededKnowledge, Plan, ShiftValue,
     run_changes::{RunChanges, Twin},
     settings::Settings,
     variation::VariationRanges,
@@ -28,6 +28,9 @@ pub(crate) struct RunManifest<'a> {
     softvt: &'a str,
     script: String,
     suite: &'a str,
+    /// True if the script returned more than this suite.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    several_suites: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     twin: Option<Twin>,
     /// Ranges within which the episodes vary, if they do.
@@ -110,6 +113,7 @@ impl<'a> RunManifest<'a> {
             softvt: env!("CARGO_PKG_VERSION"),
             script: run.loaded.sources.main.clone(),
             suite: &run.suite.name,
+            several_suites: !matches!(run.loaded.plan, Plan::Suite(_)),
             twin,
             variation: run.suite.vary.as_ref(),
             vary,

@@ -38,7 +38,11 @@ fn experiments_without_results_are_refused() {
     let misspelt = "grid = { a = { 1 } }, run = function(point) return { b = point.aa } end";
     assert!(problem(misspelt).contains("experiment.run: no point returned a row"));
     let columns = format!("grid = {{ a = {{ 1 }} }}, columns = {{ 'bb' }}, {run}");
-    assert!(problem(&columns).contains("experiment.columns: unknown column \"bb\"; did you mean \"b\"?"));
+    assert!(
+        problem(&columns).contains(
+            "experiment.columns: no row has any of them: unknown column \"bb\"; did you mean \"b\"?"
+        )
+    );
 }
 
 #[test]
