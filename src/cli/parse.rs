@@ -19,6 +19,9 @@ use softvt_script::{OptionSpec, ScriptOptionValue};
 /// # Errors
 /// Usage errors, with suggestions for misspelled flags and values.
 pub(super) fn parse(words: &[String]) -> Result<Option<Command>, CliError> {
+    if let Some(message) = misspelt_command(words) {
+        return Err(CliError::input(message));
+    }
     let file = script_file(words);
     let in_file = |error: CliError| match file {
         Some(file) => error.prefixed(file),
@@ -162,6 +165,18 @@ fn usage_error(text: &str) -> CliError {
     CliError::input(message.trim_end())
 }
 
+/// A message about a first word that is neither a file nor a command, and near a command.
+fn misspelt_command(words: &[String]) -> Option<String> {
+    let first = words.get(1).filter(|word| !word.starts_with('-') && !word.contains(['.', '/', '\\']))?;
+    let command = clap_command();
+    let names: Vec<&str> = command.get_subcommands().map(clap::Command::get_name).collect();
+    if names.contains(&first.as_str()) || first == "help" || Path::new(first).exists() {
+        return None;
+    }
+    let close = text::suggest(first, names.into_iter())?;
+    Some(format!("unknown command {first:?}; did you mean {close:?}?"))
+}
+
 /// Finds the script on the command line: the first word that ends in `.lua` and is not the value of another flag.
 fn script_file(words: &[String]) -> Option<&str> {
     let pairs = words.iter().zip(words.iter().skip(1));
@@ -180,5 +195,18 @@ mod tests {
     #[test]
     fn the_definition_of_the_command_line_is_consistent() {
         clap_command().debug_assert();
+    }
+
+    #[test]
+    fn misspelt_commands_are_named() {
+        let message = |words: &[&str]| {
+            misspelt_command(&["softvt"].iter().chain(words).map(ToString::to_string).collect::<Vec<_>>())
+        };
+        let expected = "unknown command \"recrod\"; did you mean \"record\"?";
+        assert_eq!(message(&["recrod", "suites/x.lua"]).as_deref(), Some(expected));
+        for words in [&["record", "x.lua"][..], &["help"], &["suites/x.lua"], &["x.lua"], &["--version"], &[]]
+        {
+            assert_eq!(message(words), None, "{words:?}");
+        }
     }
 }

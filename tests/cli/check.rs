@@ -19,7 +19,12 @@ fn warnings_are_printed_and_errors_refused() {
     let light = Small { material: "youngs_pa = 40, poisson = 0.3, density = 0.3", ..Small::default() };
     let output = light.project().succeeds("check x.lua");
     assert!(output.err.contains("softvt: warning: asset cube: youngs_pa is 40 Pa"), "{}", output.err);
-    assert!(!Small::default().project().succeeds("check x.lua").err.contains("warning"));
+    // Its post is out of reach.
+    let of_post = Small::default().project().succeeds("check x.lua").err;
+    assert!(
+        of_post.contains("warning: object post: it is at (0, 2) m")
+            && of_post.matches("warning").count() == 1
+    );
     let short = Small { task: "budget_steps = 4", ..Small::default() }.project().succeeds("check x.lua").err;
     let expected = "task 0: the goal must hold for 0.4 s, and the budget is 0.2 s: no episode can reach it";
     assert!(short.contains(expected), "{short}");

@@ -132,7 +132,7 @@ fn invalid_servers_are_refused() {
     let project = project();
     project.write(
         "e.lua",
-        b"return softvt.experiment { name = \"e\", points = function() return {} end, run = function() end }",
+        b"return softvt.experiment { name = \"e\", grid = { a = { 1 } }, run = function() end }",
     );
     let taken = TcpListener::bind("127.0.0.1:0").expect("a port");
     let port = taken.local_addr().expect("an address").port();

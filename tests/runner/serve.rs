@@ -545,7 +545,7 @@ fn invalid_servers_are_refused() {
     let project = project();
     project.write(
         "e.lua",
-        b"return softvt.experiment { name = \"e\", points = function() return {} end, run = function() end }",
+        b"return softvt.experiment { name = \"e\", grid = { a = { 1 } }, run = function() end }",
     );
     for (run, expected) in [
         (project.run("e.lua"), "expected a suite or a list of suites"),
