@@ -87,7 +87,7 @@ pub fn run<E: From<RunError>>(
     ConfiguredScript { config, script: loaded }: &ConfiguredScript,
     mut on_output: impl FnMut(ExperimentOutput) -> Result<(), E>,
 ) -> Result<(), E> {
-    let Plan::Experiment { name, points, has_finish, .. } = &loaded.plan else {
+    let Plan::Experiment { name, points, has_finish, columns, .. } = &loaded.plan else {
         return Err(config.error("the script returned no experiment").into());
     };
     let (points, out) = (*points, config.out.as_deref());
@@ -163,7 +163,6 @@ pub fn run<E: From<RunError>>(
         return Err(input_error(config, &error).into());
     }
     if left.len() == points
-        && let Plan::Experiment { columns, .. } = &loaded.plan
         && let Some(problem) = problem_of(&rows, columns)
     {
         folder.take().map_or(Ok(()), ExperimentFolder::discard)?;
@@ -171,7 +170,7 @@ pub fn run<E: From<RunError>>(
     }
     // The rows are kept if finish fails.
     on_output(ExperimentOutput::Rows(&rows))?;
-    if let (Some(folder), Plan::Experiment { columns, .. }) = (&mut folder, &loaded.plan) {
+    if let Some(folder) = &mut folder {
         folder.write_rows(&finished, columns)?;
     }
     let finish = open()?.finish(&rows).map_err(RunError::from)?;

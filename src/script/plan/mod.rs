@@ -540,8 +540,44 @@ fn condition(lua: &Lua, list: &Table, spec: &ConditionSpec) -> mlua::Result<Cond
 /// Points of the grid of an experiment.
 const MAX_POINTS: usize = 1_000_000;
 
+/// The points of an experiment.
+pub(crate) enum Points {
+    /// Those of its function.
+    Listed(Vec<Value>),
+    /// Every combination of the values of a grid, the last parameter first.
+    Grid(Vec<(String, Vec<Value>)>),
+}
+
+impl Points {
+    /// Number of points.
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Self::Listed(points) => points.len(),
+            Self::Grid(grid) => {
+                grid.iter().fold(1, |count: usize, (_, values)| count.saturating_mul(values.len()))
+            }
+        }
+    }
+
+    /// Point `index`; nil beyond the last. Only this one is made, since each point of a run opens the script.
+    pub(crate) fn get(&self, lua: &Lua, mut index: usize) -> mlua::Result<Value> {
+        match self {
+            _ if index >= self.len() => Ok(Value::Nil),
+            Self::Listed(points) => Ok(points[index].clone()),
+            Self::Grid(grid) => {
+                let point = lua.create_table()?;
+                for (name, values) in grid {
+                    point.raw_set(name.as_str(), &values[index % values.len()])?;
+                    index /= values.len();
+                }
+                Ok(Value::Table(point))
+            }
+        }
+    }
+}
+
 /// The points of an experiment: those of its function, or every combination of its grid.
-pub(crate) fn points(lua: &Lua, spec: &ExperimentSpec) -> mlua::Result<Vec<Value>> {
+pub(crate) fn points(lua: &Lua, spec: &ExperimentSpec) -> mlua::Result<Points> {
     match (&spec.points, &spec.grid) {
         (Some(points), None) => {
             let list: Value = points.call(spec.options.clone())?;
@@ -555,7 +591,7 @@ pub(crate) fn points(lua: &Lua, spec: &ExperimentSpec) -> mlua::Result<Vec<Value
                 (true, _) => {
                     Err(fail(lua, "experiment.points: expected a list of at least one table, got none"))
                 }
-                (false, true) => Ok(points),
+                (false, true) => Ok(Points::Listed(points)),
                 (false, false) => Err(fail(lua, "experiment.points: every point is a table")),
             }
         }
@@ -566,19 +602,13 @@ pub(crate) fn points(lua: &Lua, spec: &ExperimentSpec) -> mlua::Result<Vec<Value
                     format!("experiment.grid.{name}: expected at least one value, got none"),
                 ));
             }
-            let count = grid.values().fold(1_usize, |count, values| count.saturating_mul(values.len()));
-            if count > MAX_POINTS {
+            let grid = Points::Grid(
+                grid.iter().rev().map(|(name, values)| (name.clone(), values.clone())).collect(),
+            );
+            if grid.len() > MAX_POINTS {
                 return Err(fail(lua, "experiment.grid: has more than a million points; give fewer values"));
             }
-            let point = |mut index: usize| {
-                let point = lua.create_table()?;
-                for (name, values) in grid.iter().rev() {
-                    point.raw_set(name.as_str(), &values[index % values.len()])?;
-                    index /= values.len();
-                }
-                Ok(Value::Table(point))
-            };
-            (0..count).map(point).collect()
+            Ok(grid)
         }
         _ => Err(fail(lua, "experiment: give either grid or points")),
     }

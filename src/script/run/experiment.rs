@@ -11,7 +11,7 @@ use crate::{
         image::image_of,
         tasks::{ExperimentSpec, FinishSpec},
     },
-    plan::{LoadedScript, ScriptInstance, points},
+    plan::{LoadedScript, Points, ScriptInstance, points},
     schema::{Constructed, FromChecked, RecordType, validate},
     vm::{
         error::{ScriptError, fail},
@@ -38,7 +38,7 @@ pub struct ExperimentSummary {
 /// A virtual machine that runs points of an experiment. Variables that a point changes stay changed for later ones.
 pub struct Experiment {
     instance: ScriptInstance,
-    points: Vec<Value>,
+    points: Points,
     input: Arc<ExperimentInput>,
 }
 
@@ -60,7 +60,7 @@ impl Experiment {
         let instance = loaded.sources.instance_with(|lua| {
             lua.set_app_data(Arc::clone(&input));
         })?;
-        let mut experiment = Self { instance, points: Vec::new(), input };
+        let mut experiment = Self { instance, points: Points::Listed(Vec::new()), input };
         let vm = &experiment.instance.vm;
         let points = {
             let _deadline = vm.call_deadline();
@@ -78,13 +78,13 @@ impl Experiment {
 
     /// True if the experiment has no points.
     pub fn is_empty(&self) -> bool {
-        self.points.is_empty()
+        self.len() == 0
     }
 
     /// The parameters of a point: its fields that are data, such as numbers and texts.
     pub fn parameters(&self, index: usize) -> Map<String, Json> {
-        let Value::Table(point) = self.value(index) else { return Map::new() };
         let lua = &self.instance.vm.lua;
+        let Ok(Value::Table(point)) = self.points.get(lua, index) else { return Map::new() };
         let mut parameters = Map::new();
         for (key, value) in point.pairs::<String, Value>().filter_map(Result::ok) {
             if let Ok(value) = to_json(lua, &value, "point") {
@@ -93,10 +93,6 @@ impl Experiment {
         }
         parameters.sort_keys();
         parameters
-    }
-
-    fn value(&self, index: usize) -> Value {
-        self.points.get(index).cloned().unwrap_or(Value::Nil)
     }
 
     /// The declaration, checked again: the script may have changed its table.
@@ -117,7 +113,8 @@ impl Experiment {
         vm.random.reseed(softvt_benchmark::seed::keyed_rng(&["softvt point", &index_key, &seed_key]));
         let spec = self.spec()?;
         let _deadline = vm.point_deadline();
-        let result = vm.call(&spec.run, (self.value(index), spec.options.clone()))?;
+        let point = self.points.get(&vm.lua, index).map_err(|e| vm.explain(&e))?;
+        let result = vm.call(&spec.run, (point, spec.options.clone()))?;
         if vm.random.has_drawn() {
             self.input.record_random();
         }
