@@ -271,6 +271,13 @@ impl EpisodeRecord {
         }
     }
 
+    /// True if a soft object that the goal moves has no limit.
+    pub fn lacks_limit(&self) -> bool {
+        let mut others = self.verdict.targets.iter();
+        self.header.soft && self.verdict.tau.is_none()
+            || others.any(|target| target.soft && target.tau.is_none())
+    }
+
     /// The soft object that the goal moves with the largest peak D over τ; `None` without any that has both.
     pub fn most_deformed(&self) -> Option<DeformedTarget<'_>> {
         let v = &self.verdict;

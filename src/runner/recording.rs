@@ -400,7 +400,7 @@ fn rejection(record: &EpisodeRecord, keep: KeptOutcome) -> Option<String> {
         _ if !verdict.no_drop => "dropped",
         _ if record.is_within_limits() == Some(false) => "deformed too much",
         _ if verdict.slip_ok == Some(false) => "slipped in the hand",
-        _ if record.is_within_limits().is_none() => "without a known limit of deformation",
+        _ if record.lacks_limit() => "without a known limit of deformation",
         _ => "not safe",
     };
     Some(reason.to_owned())
