@@ -64,12 +64,11 @@ fn is_connected(is_element: &[bool], grid: [usize; 3]) -> bool {
         let at = [cell % grid[0], cell / grid[0] % grid[1], cell / grid[0] / grid[1]];
         // Half of the 26 neighbours: the others are joined from their side.
         for step in (14..27).map(|k| [k % 3, k / 3 % 3, k / 9]) {
-            let beside: Option<[usize; 3]> = (0..3)
-                .map(|axis| (at[axis] + step[axis]).checked_sub(1).filter(|&i| i < grid[axis]))
-                .collect::<Option<Vec<_>>>()
-                .and_then(|cells| cells.try_into().ok());
-            if let Some(other) = beside.map(index).filter(|&other| is_element[other]) {
-                sets.union(cell, other);
+            // Steps are one too many along each axis.
+            let neighbour: [usize; 3] = std::array::from_fn(|axis| at[axis] + step[axis]);
+            let is_inside = (0..3).all(|axis| (1..=grid[axis]).contains(&neighbour[axis]));
+            if is_inside && is_element[index(neighbour.map(|i| i - 1))] {
+                sets.union(cell, index(neighbour.map(|i| i - 1)));
             }
         }
     }
