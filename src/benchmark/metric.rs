@@ -1,4 +1,4 @@
-//! Metrics of a suite: numbers of each episode beside its verdict.
+//! Metrics of a suite: numbers of each episode in addition to its verdict.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 pub struct Metric {
     /// Name in records and tables.
     pub name: String,
-    /// How the values of the control steps become one.
+    /// Reduction of the values of the control steps to one.
     pub over: Reduction,
 }
 
-/// How the values of the control steps of an episode become one number.
+/// Reduction of the values of the control steps of an episode to one number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reduction {
