@@ -70,6 +70,7 @@
 //! ```
 #![warn(missing_docs, unreachable_pub)]
 
+mod action_check;
 mod asset_cache;
 mod build;
 mod build_error;
