@@ -1,7 +1,11 @@
 //! The shipped assets: size, material, mass, meshes, samples and stability; and the start states of the Spatial-Soft
 //! suite.
 
-use std::{collections::BTreeMap, path::Path, sync::Arc};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+    sync::Arc,
+};
 
 use softvt::{
     benchmark::{Goal, Placement, Plan},
@@ -14,7 +18,7 @@ use softvt::{
     },
     robot::{RobotSpec, gripper},
     rollout::{AssetCache, Simulation},
-    scene::{Asset, Body, Mask, Scene},
+    scene::{Asset, Body, EXPERT_HINTS, Mask, Scene},
     script::{self, EpisodeSetup, LoadedScript, SceneChanges},
 };
 
@@ -296,6 +300,20 @@ fn the_standard_hand_of_the_experts_is_that_of_the_robot() {
     for number in [format!("STROKE = {stroke},"), format!("STIFFNESS = {stiffness} }}")] {
         assert!(hand.contains(&number), "{number} in {hand}");
     }
+}
+
+#[test]
+fn the_hints_of_experts_are_those_that_the_standard_experts_read() {
+    let mut read = BTreeSet::new();
+    for entry in std::fs::read_dir("scripts/experts").expect("is a folder") {
+        let text = std::fs::read_to_string(entry.expect("is readable").path()).expect("is text");
+        let names = text.split("hints.").skip(1);
+        read.extend(names.map(|rest| {
+            rest.split(|c: char| c != '_' && !c.is_alphanumeric()).next().unwrap_or("").to_owned()
+        }));
+    }
+    let known = EXPERT_HINTS.map(str::to_owned);
+    assert_eq!(read, BTreeSet::from(known));
 }
 
 fn rigid_assets() -> Vec<Arc<Asset>> {

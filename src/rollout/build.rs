@@ -12,11 +12,11 @@ use softvt_common::text::format_number;
 use softvt_geometry::{Pose, Vec3};
 use softvt_physics::{
     ArticulationId, BodyId, LinkId, World,
-    contact::ContactSurface,
+    contact::{ContactSurface, Friction},
     joints::{JointKind, JointTree, Link},
     rigid::RigidState,
 };
-use softvt_scene::{Body, JointMotion, MovingPart, Object, Scene};
+use softvt_scene::{Asset, Body, JointMotion, MovingPart, Object, Scene};
 
 /// Minimum thickness of rigid walls, m. Other bodies can pass through thinner ones between two steps.
 const MIN_WALL: f64 = 2e-3;
@@ -123,6 +123,20 @@ pub(super) fn check_base(scene: &Scene) -> Result<(), SceneBuildError> {
     Ok(())
 }
 
+/// Checks that a surface that slides holds no better than one that rests, as layouts change both numbers separately.
+fn check_friction(asset: &Asset) -> Result<(), SceneBuildError> {
+    let Friction { static_mu, dynamic_mu, .. } = asset.friction;
+    if dynamic_mu <= static_mu {
+        return Ok(());
+    }
+    let what = format!(
+        "dynamic_mu is {}, above static_mu, {}; set both, the larger one as static_mu",
+        format_number(dynamic_mu),
+        format_number(static_mu)
+    );
+    Err(SceneBuildError::Material { asset: asset.name.clone(), what })
+}
+
 /// Adds an object with its parts to the world and to `instances`.
 fn add(
     world: &mut World,
@@ -132,6 +146,7 @@ fn add(
 ) -> Result<(), SceneBuildError> {
     let asset = &object.asset;
     check_scale(object, cache)?;
+    check_friction(asset)?;
     if matches!(asset.body, Body::Rigid { .. })
         && let Some(wall) = cache.wall(&asset.shape).filter(|wall| *wall < MIN_WALL)
     {

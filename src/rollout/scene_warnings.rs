@@ -4,14 +4,14 @@ use std::collections::BTreeSet;
 
 use super::asset_cache::{AssetCache, ThicknessProbe};
 use softvt_benchmark::{CONTROL_DT, Task, goal_conflict::least_time};
-use softvt_common::text::format_number;
+use softvt_common::text::{format_number, suggest};
 use softvt_geometry::pieces::SeparatePieces;
 use softvt_robot::gripper::MAX_WIDTH;
-use softvt_scene::{Asset, Body, Object, Scene, SoftMaterial};
+use softvt_scene::{Asset, Body, EXPERT_HINTS, GRASP_WIDTH_HINT, Object, Scene, SoftMaterial};
 
 /// Warnings about a scene of a task, one line each: materials, soft bodies of few voxels, bodies of several pieces or
-/// off their axis, a target that the gripper cannot grasp, objects outside of the workspace, and a budget below what
-/// the goal takes.
+/// off their axis, hints with misspelt names, a target that the gripper cannot grasp, objects outside of the workspace,
+/// and a budget below what the goal takes.
 pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSet<String> {
     let warnings = |asset: &Asset| {
         let name = asset.name.clone();
@@ -21,6 +21,7 @@ pub fn scene_warnings(task: &Task, scene: &Scene, cache: &AssetCache) -> BTreeSe
             .chain(voxel_warning(asset, cache))
             .chain(pieces_warning(asset, cache))
             .chain(origin_warning(asset, cache))
+            .chain(hint_warnings(asset))
             .map(move |warning| format!("asset {name}: {warning}"))
     };
     let mut all: BTreeSet<String> = scene.objects.iter().flat_map(|object| warnings(&object.asset)).collect();
@@ -129,12 +130,11 @@ fn pieces_warning(asset: &Asset, cache: &AssetCache) -> Option<String> {
 
 /// The width where the stock experts grasp an object, if it exceeds the opening of the gripper.
 fn width_warning(asset: &Asset) -> Option<String> {
-    let size = asset.shape.bounds().size();
-    let width = asset.hints.get(GRASP_WIDTH).copied().unwrap_or(size.x.min(size.y));
+    let width = asset.grasp_width();
     (width >= MAX_WIDTH).then(|| {
         format!(
             "asset {}: it is {:.0} mm wide, and the gripper opens {:.0} mm; make it smaller, or give the width where it \
-             can be grasped in hints.{GRASP_WIDTH}",
+             can be grasped in hints.{GRASP_WIDTH_HINT}",
             asset.name,
             1e3 * width,
             1e3 * MAX_WIDTH
@@ -142,5 +142,13 @@ fn width_warning(asset: &Asset) -> Option<String> {
     })
 }
 
-/// Hint for experts: width of the object where the fingers grasp it, m.
-const GRASP_WIDTH: &str = "grasp_width_m";
+/// Warnings about hints whose names are close to one that the standard experts read, of the asset and of its parts.
+fn hint_warnings(asset: &Asset) -> Vec<String> {
+    let of_parts = asset.parts().iter().flat_map(|part| part.asset.hints.keys());
+    let unknown = asset.hints.keys().chain(of_parts).filter(|name| !EXPERT_HINTS.contains(&name.as_str()));
+    let warning = |name: &String| {
+        let close = suggest(name, EXPERT_HINTS.into_iter())?;
+        Some(format!("the standard experts do not read hints.{name}; did you mean {close}?"))
+    };
+    unknown.filter_map(warning).collect()
+}

@@ -10,7 +10,23 @@ use softvt_geometry::{Pose, Vec3, mass::mass_properties, shape::Shape};
 use softvt_physics::{contact::Friction, fem::ElasticMaterial};
 
 /// Hint that gives the width of an asset where the fingers grasp it.
-const GRASP_WIDTH_HINT: &str = "grasp_width_m";
+pub const GRASP_WIDTH_HINT: &str = "grasp_width_m";
+
+/// Hints that the standard experts read. An asset may have others, for experts of its own.
+pub const EXPERT_HINTS: [&str; 12] = [
+    "grasp_height_m",
+    GRASP_WIDTH_HINT,
+    "grasp_rim_m",
+    "grasp_offset_m",
+    "carry_pace",
+    "surface_m",
+    "wall_m",
+    "handle_height_m",
+    "handle_width_m",
+    "grip_width_m",
+    "grip_length_m",
+    "grip_depth_m",
+];
 
 /// Kind of body that an object is.
 #[derive(Clone, Debug, PartialEq)]

@@ -56,6 +56,11 @@ fn invalid_scenes_are_found_without_settling() {
         ..Small::default()
     });
     assert_snapshot!(dust, @"x.lua:6: asset cube: it is 4.0e-5 m long, expected at least 0.001 m; sizes are in metres (a mesh has a scale)");
+    let slides = of(Small {
+        at: "at = { 0, 0.1 } } scene:object(\"cube\").static_mu = 0.2 local _ = {",
+        ..Small::default()
+    });
+    assert_snapshot!(slides, @"x.lua:6: asset cube: dynamic_mu is 0.5, above static_mu, 0.2; set both, the larger one as static_mu");
     let hand = of(Small { at: "position = { -0.187, 0.03, 0.29 }", ..Small::default() });
     assert!(hand.starts_with("x.lua:6: object cube starts inside of the robot's hand ("), "{hand}");
 }
@@ -135,6 +140,18 @@ fn implausible_units_and_wide_objects_are_doubted() {
         off.contains("asset cube: its centre is 30 mm off the z axis, and its lowest point at z = 0 mm"),
         "{off}"
     );
+    let misspelt = Small::default().text().replace(
+        "name = \"cube\", shape",
+        "hints = { grasp_heigth_m = 0.01, weight = 1 }, name = \"cube\", shape",
+    );
+    let misspelt = warnings(&Project::new(&[("x.lua", &misspelt)]));
+    assert!(
+        misspelt.contains(
+            "asset cube: the standard experts do not read hints.grasp_heigth_m; did you mean grasp_height_m?"
+        ),
+        "{misspelt}"
+    );
+    assert!(!misspelt.contains("weight"), "{misspelt}");
     let ball = "softvt.shape.sphere { radius = 0.02 }";
     let text = Small::default()
         .text()
