@@ -121,6 +121,7 @@ pub struct TargetVerdict {
     pub no_slip: bool,
     pub slip_mm: f64,
     pub d_peak: Option<f64>,
+    pub time_over_tau_s: Option<f64>,
     pub missing_deformation: u64,
     pub collapsed_volume_pct: Option<f64>,
     pub damaged_volume_pct: Option<f64>,

@@ -367,6 +367,7 @@ pub(crate) mod tests {
             slip_mm: 0.0,
             d_peak: Some(3.0),
             missing_deformation: 0,
+            time_over_tau_s: None,
             collapsed_volume_pct: Some(60.0),
             damaged_volume_pct: None,
             kappa: Some(0.5),

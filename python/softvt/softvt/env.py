@@ -477,7 +477,7 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         # Vector environments make an array of Python's bool only.
         info["is_success"] = bool(raw["success"])
         if self._has_cost:
-            info.update(_costs(before, self._verdict, raw["state"]))
+            info.update(_costs(before, self._verdict))
             info["is_safe"] = bool(self._verdict["safety"])
         if self._has_readings:
             info["verdict"], info["state"] = Readings(raw["verdict"]), Readings(raw["state"])
@@ -674,28 +674,18 @@ def _last_motion(motion: np.ndarray) -> np.ndarray:
     return motion[[0, -2, -1]]
 
 
-def _costs(before: Mapping[str, Any] | None, now: Mapping[str, Any], state: Mapping[str, Any]) -> dict[str, float]:
+def _costs(before: Mapping[str, Any] | None, now: Mapping[str, Any]) -> dict[str, float]:
     """Costs of a step, 1 each: D beyond τ, the first drop, and slip beyond the limit where the suite forbids it, of any object that the goal
     moves; `cost` is their sum. 0 without a step."""
     costs = dict.fromkeys(("cost_deformation", "cost_drop", "cost_slip"), 0.0)
     if before is not None:
-        costs["cost_deformation"] = float(_is_over_limit(before, now, state))
+        pairs = zip(_times_over_limit(before), _times_over_limit(now), strict=True)
+        costs["cost_deformation"] = float(any(after > earlier for earlier, after in pairs))
         costs["cost_drop"] = float(before["no_drop"] and not now["no_drop"])
         costs["cost_slip"] = float(before["slip_ok"] is not False and now["slip_ok"] is False)
     return {"cost": sum(costs.values()), **costs}
 
 
-def _is_over_limit(before: Mapping[str, Any], now: Mapping[str, Any], state: Mapping[str, Any]) -> bool:
-    """True if D of an object that the goal moves was beyond its τ in a step. Verdicts tell the time beyond τ of the first object only. Of the
-    others D after the step counts, and a peak that grew within it."""
-    if (now["time_over_tau_s"] or 0.0) > (before["time_over_tau_s"] or 0.0):
-        return True
-    after = {entry["name"]: entry.get("d_pct") for entry in state["objects"]}
-    for target, earlier in zip(now.get("targets", ()), before.get("targets", ()), strict=True):
-        peak, tau = target["d_peak"], target["tau"]
-        if peak is None or tau is None:
-            continue
-        has_grown = peak > (earlier["d_peak"] or 0.0)
-        if max(after.get(target["object"]) or 0.0, peak if has_grown else 0.0) > tau:
-            return True
-    return False
+def _times_over_limit(verdict: Mapping[str, Any]) -> list[float]:
+    """Time for which D of each object that the goal moves was beyond its τ, s."""
+    return [target["time_over_tau_s"] or 0.0 for target in (verdict, *verdict.get("targets", ()))]

@@ -8,7 +8,6 @@ import gymnasium
 import numpy as np
 import softvt
 from gymnasium.utils.env_checker import check_env
-from softvt.env import _costs
 from softvt.true_state import STATE_BOUNDS, STATE_FIELDS, TrueState, progress
 from suites_for_tests import STEPS, crushing_suite, drawer_suite, expert_run, same, short_suite
 
@@ -214,27 +213,20 @@ class Environments(unittest.TestCase):
         env = self.make(crushing_suite(), obs="proprio", control="pose", privileged=True)
         _, info = env.reset(seed=1000)
         self.assertEqual((info["cost"], info["is_safe"]), (0.0, False))
-        beyond = 0
+        beyond_s = 0.0
         for row in actions:
             *_, info = env.step(row)
-            d_pct = next(entry["d_pct"] for entry in info["state"]["objects"] if entry["name"] == "croissant")
-            is_beyond = d_pct > croissant["tau"]
-            beyond += is_beyond
+            (target,) = info["verdict"]["targets"]
+            is_beyond = target["time_over_tau_s"] > beyond_s
+            beyond_s = target["time_over_tau_s"]
             self.assertEqual((info["cost"], info["cost_deformation"]), (is_beyond, is_beyond), info["step"])
-        self.assertGreater(beyond, 10)
+            d_pct = next(entry["d_pct"] for entry in info["state"]["objects"] if entry["name"] == "croissant")
+            self.assertTrue(is_beyond or d_pct <= croissant["tau"])
+        self.assertEqual(beyond_s, croissant["time_over_tau_s"])
+        self.assertGreater(beyond_s, 0.5)
         self.assertEqual(info["is_safe"], record["safety"])
         # Nothing was stepped since then.
         self.assertEqual(env.set_state(env.get_state())[1]["cost"], 0.0)
-
-    def test_a_peak_beyond_the_limit_within_a_step_is_a_cost_though_the_object_has_recovered_after_it(self):
-        def verdict(d_peak):
-            first = {"time_over_tau_s": None, "no_drop": True, "slip_ok": None}
-            return first | {"targets": [{"object": "bun", "d_peak": d_peak, "tau": 1.0}]}
-
-        recovered = {"objects": [{"name": "bun", "d_pct": 0.5}]}
-        for before, now, cost in [(0.2, 1.5, 1.0), (1.5, 1.5, 0.0), (0.2, 0.9, 0.0), (None, None, 0.0)]:
-            with self.subTest(before=before, now=now):
-                self.assertEqual(_costs(verdict(before), verdict(now), recovered)["cost_deformation"], cost)
 
     def test_the_true_state_agrees_with_the_privileged_info_of_the_server(self):
         env = self.make(obs="state", privileged=True, task=3)

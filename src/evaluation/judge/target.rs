@@ -177,8 +177,13 @@ impl TargetResult {
         if self.is_soft && self.valid { self.series.peak.is_within(tau) } else { None }
     }
 
+    /// Time for which D exceeded τ in physics steps of `dt_s`, s; `None` without a limit.
+    pub(super) fn time_over_tau(&self, dt_s: f64) -> Option<f64> {
+        self.limit.map(|_| self.series.steps_over_tau as f64 * dt_s)
+    }
+
     /// Its part of the verdict.
-    pub(super) fn verdict(&self) -> TargetVerdict {
+    pub(super) fn verdict(&self, dt_s: f64) -> TargetVerdict {
         TargetVerdict {
             object: self.name.clone(),
             soft: self.is_soft,
@@ -187,6 +192,7 @@ impl TargetResult {
             no_slip: self.no_slip,
             slip_mm: self.slip_mm,
             d_peak: self.series.peak.d_pct,
+            time_over_tau_s: self.time_over_tau(dt_s),
             missing_deformation: self.series.peak.missing,
             collapsed_volume_pct: self.crushed.collapsed.map(|share| 100.0 * share),
             damaged_volume_pct: self.crushed.damaged.map(|share| 100.0 * share),
