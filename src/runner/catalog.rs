@@ -10,20 +10,28 @@ use softvt_benchmark::{Plan, Task, settings::Settings};
 use softvt_common::settings::Setting;
 use softvt_policy::profile::PROFILES;
 
+/// Rows of all files that can be loaded, and why the others cannot.
+pub struct Listing {
+    /// JSON objects, in the order of their files.
+    pub rows: Vec<Value>,
+    /// One error per file that cannot be loaded.
+    pub errors: Vec<RunError>,
+}
+
+impl From<Vec<Value>> for Listing {
+    fn from(rows: Vec<Value>) -> Self {
+        Self { rows, errors: Vec::new() }
+    }
+}
+
 /// Suites, with the numbers of their tasks and episodes.
-///
-/// # Errors
-/// A suite in the working folder cannot be loaded.
-pub fn suites() -> Result<Vec<Value>, RunError> {
-    Ok(plans()?.iter().filter_map(|(path, plan)| suite_row(path, plan)).collect())
+pub fn suites() -> Listing {
+    list_plans(|path, plan| suite_row(path, plan).into_iter().collect())
 }
 
 /// Tasks of suites, with their prompts.
-///
-/// # Errors
-/// As [`suites`].
-pub fn tasks() -> Result<Vec<Value>, RunError> {
-    Ok(plans()?.iter().flat_map(|(path, plan)| task_rows(path, plan)).collect())
+pub fn tasks() -> Listing {
+    list_plans(task_rows)
 }
 
 /// Assets, with their files.
@@ -126,10 +134,13 @@ fn scripts(folder: &str) -> BTreeSet<String> {
     found
 }
 
-fn plans() -> Result<Vec<(String, Plan)>, RunError> {
-    let load = |path: String| {
-        let loaded = softvt_script::load(Path::new(&path), &[])?;
-        Ok((path, loaded.plan))
-    };
-    scripts("suites").into_iter().map(load).collect()
+fn list_plans(rows_of: impl Fn(&str, &Plan) -> Vec<Value>) -> Listing {
+    let mut listing = Listing::from(Vec::new());
+    for path in scripts("suites") {
+        match softvt_script::load(Path::new(&path), &[]) {
+            Ok(loaded) => listing.rows.extend(rows_of(&path, &loaded.plan)),
+            Err(error) => listing.errors.push(error.into()),
+        }
+    }
+    listing
 }

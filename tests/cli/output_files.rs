@@ -73,6 +73,16 @@ fn lists_are_printed_as_text_and_as_json() {
             "a heading and one line each"
         );
     }
+    project.write("suites/broken.lua", b"return nothing.at_all");
+    for what in ["suites", "tasks"] {
+        let listed = project.softvt(&format!("list {what}"));
+        assert_eq!(listed.code, 2, "{}", listed.err);
+        assert!(
+            listed.err.contains("suites/broken.lua:1:") && listed.out.contains("spatial_soft"),
+            "{}",
+            listed.err
+        );
+    }
     assert!(
         project
             .refusal("list robots")

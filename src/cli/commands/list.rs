@@ -8,7 +8,7 @@ use crate::{
     output::{print, print_json},
 };
 use softvt_common::text::TextTable;
-use softvt_runner::catalog;
+use softvt_runner::catalog::{self, Listing};
 
 /// List suites, tasks, assets, policies, profiles or settings
 #[derive(Args, Debug)]
@@ -34,17 +34,25 @@ enum ListKind {
 /// Lists what the arguments ask for.
 ///
 /// # Errors
-/// A suite in the working folder cannot be loaded.
+/// A suite in the working folder cannot be loaded; the others are listed.
 pub(super) fn run(args: &ListArgs) -> Result<(), CliError> {
-    let rows = match args.what {
-        ListKind::Suites => catalog::suites()?,
-        ListKind::Tasks => catalog::tasks()?,
-        ListKind::Assets => catalog::assets(),
-        ListKind::Policies => catalog::policies(),
-        ListKind::Profiles => catalog::profiles(),
-        ListKind::Settings => catalog::settings(),
+    let Listing { rows, errors } = match args.what {
+        ListKind::Suites => catalog::suites(),
+        ListKind::Tasks => catalog::tasks(),
+        ListKind::Assets => catalog::assets().into(),
+        ListKind::Policies => catalog::policies().into(),
+        ListKind::Profiles => catalog::profiles().into(),
+        ListKind::Settings => catalog::settings().into(),
     };
-    if args.json { print_json(&rows) } else { print(&table(&rows)) }
+    if args.json {
+        print_json(&rows)?
+    } else {
+        print(&table(&rows))?
+    }
+    if errors.is_empty() {
+        return Ok(());
+    }
+    Err(CliError::input(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("\nsoftvt: ")))
 }
 
 /// Formats rows as a table with the keys of all rows as headings. Numbers are right-aligned.
