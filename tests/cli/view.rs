@@ -92,6 +92,25 @@ fn several_policies_are_shown_side_by_side() {
 }
 
 #[test]
+fn a_view_replaces_an_earlier_one_and_keeps_other_files() {
+    let project = short();
+    project.succeeds("view x.lua --policy noop --policy expert --animation --out seen");
+    project.write("seen/noop/notes.txt", b"mine");
+    project.succeeds("view x.lua --policy noop --out seen");
+    for gone in ["expert", "animation.png", "noop/worst_wrist.png"] {
+        assert!(!project.path(&format!("seen/{gone}")).exists(), "{gone}");
+    }
+    for kept in ["noop/notes.txt", "episode.mp4", "index.html"] {
+        assert!(project.path(&format!("seen/{kept}")).is_file(), "{kept}");
+    }
+    // The folder of something else.
+    project.write("page/index.html", b"mine");
+    project.write("page/end_of_study.png", b"mine");
+    project.succeeds("view x.lua --policy noop --out page");
+    assert!(project.path("page/end_of_study.png").is_file());
+}
+
+#[test]
 fn views_of_policies_that_cannot_be_compared_are_refused() {
     let project = short();
     for (flags, message) in [

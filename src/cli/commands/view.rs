@@ -10,7 +10,11 @@ use crate::{
     output::{Progress, print},
 };
 use softvt_benchmark::{CONTROL_DT, Plan};
-use softvt_common::{cancel, files, parallel};
+use softvt_common::{
+    cancel,
+    files::{self, FileError},
+    parallel,
+};
 use softvt_records::record::EpisodeRecord;
 use softvt_report::{
     episode_page::{self, PolicyPart},
@@ -58,7 +62,7 @@ pub(crate) struct ViewArgs {
 /// Runs one episode and writes `episode.mp4`, a picture with the verdict as `episode.png`, stills of the first, worst
 /// and last state of every camera and tactile sensor and of the target from nearby, and a page that shows them. Under
 /// several policies, video and picture show them side by side, and the stills of each are in a folder of its name.
-/// Existing files are replaced.
+/// What an earlier view left in the folder is removed.
 ///
 /// # Errors
 /// The script is not a suite, the task or episode fails, or a file cannot be rendered or written.
@@ -80,6 +84,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
     };
     let runs: Vec<PreparedRun> = configs.iter().map(prepare).collect::<Result<_, _>>()?;
     files::create_folder(&args.out)?;
+    remove_earlier(&args.out)?;
     config.observer.work("simulating the episode");
     let simulate = |number: usize| runs[number].run_episode(job, true, &runs[number].controllers);
     let mut episodes = Vec::new();
@@ -103,6 +108,50 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CliError> {
 
 /// Name of the loop for web pages.
 const ANIMATION: &str = "animation.png";
+/// Name of the MCAP file.
+const MCAP: &str = "episode.mcap";
+/// Moments of the stills, with which the names of their files begin.
+const MOMENTS: [&str; 3] = ["start", "worst", "end"];
+
+/// Removes the files of an earlier view from a folder and from the folders of its policies.
+fn remove_earlier(dir: &Path) -> Result<(), CliError> {
+    if ![episode_page::PAGE, episode_page::FRAME].iter().all(|name| dir.join(name).is_file()) {
+        return Ok(());
+    }
+    remove_files(dir)?;
+    for entry in entries(dir)? {
+        if entry.is_dir() {
+            remove_files(&entry)?;
+            // One with other files stays.
+            let _ = std::fs::remove_dir(&entry);
+        }
+    }
+    Ok(())
+}
+
+/// Paths of what is in a folder.
+fn entries(dir: &Path) -> Result<Vec<PathBuf>, FileError> {
+    let listed = std::fs::read_dir(dir).and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect());
+    listed.map_err(FileError::io("read", dir))
+}
+
+/// Removes the files that a view writes into a folder.
+fn remove_files(dir: &Path) -> Result<(), CliError> {
+    let whole = [episode_page::PAGE, episode_page::VIDEO, episode_page::FRAME, ANIMATION, MCAP];
+    let is_still = |name: &str| {
+        name.ends_with(".png")
+            && MOMENTS
+                .iter()
+                .any(|moment| name.strip_prefix(moment).is_some_and(|rest| rest.starts_with('_')))
+    };
+    for path in entries(dir)? {
+        let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+        if path.is_file() && (whole.contains(&name) || is_still(name)) {
+            files::remove_if_present(&path)?;
+        }
+    }
+    Ok(())
+}
 
 /// An episode with its states.
 struct SeenEpisode {
@@ -117,14 +166,14 @@ fn write_parts(
     SeenEpisode { record, states }: &mut SeenEpisode,
     dir: &Path,
 ) -> Result<(), CliError> {
-    let moments =
-        [("start", 0), ("worst", worst_state(states)), ("end", states.frames.len().saturating_sub(1))];
+    let [start, worst, end] = MOMENTS;
+    let moments = [(start, 0), (worst, worst_state(states)), (end, states.frames.len().saturating_sub(1))];
     config.observer.work("drawing the stills");
     write_stills(states, &moments, args.full_size, dir, config.thread_count(), cancel::requested)?;
     config.observer.end();
     if args.mcap {
         let progress = Progress::new(states.frames.len(), "writing the MCAP file");
-        let (path, threads) = (dir.join("episode.mcap"), config.thread_count());
+        let (path, threads) = (dir.join(MCAP), config.thread_count());
         write_mcap(states, record, &path, threads, cancel::requested, || progress.step())?;
     }
     Ok(())
