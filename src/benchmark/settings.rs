@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use softvt_common::{
     range::RangeError,
     settings::{Setting, SettingField},
-    text::format_number,
+    text::{format_number, suggest},
 };
 use softvt_evaluation::criteria::SuccessCriteria;
 use softvt_physics::PhysicsParams;
@@ -29,7 +29,7 @@ pub fn steps_per_control(dt: f64) -> u32 {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum SettingsError {
-    #[error("no setting {path:?}; {group} has: {}", known.join(", "))]
+    #[error("no setting {path:?}; {}", known_settings(path, group, known))]
     UnknownField { path: String, group: String, known: Vec<String> },
     #[error("no setting {path:?}; {parent} is a single value")]
     NotAGroup { path: String, parent: String },
@@ -50,6 +50,17 @@ pub enum SettingsError {
         format_number(*.dt), format_number(*.below), format_number(*.above)
     )]
     TimeStep { dt: f64, below: f64, above: f64 },
+}
+
+/// What to write in place of a path whose part below `group` is unknown.
+fn known_settings(path: &str, group: &str, known: &[String]) -> String {
+    let below = path.strip_prefix(group).unwrap_or(path).trim_start_matches('.');
+    let key = below.split('.').next().unwrap_or_default();
+    let prefix = if group.is_empty() { String::new() } else { format!("{group}.") };
+    match suggest(key, known.iter().map(String::as_str)) {
+        Some(close) => format!("did you mean {prefix}{close}?"),
+        None => format!("{} has: {}", if group.is_empty() { "the root" } else { group }, known.join(", ")),
+    }
 }
 
 /// All settings of a run. The defaults are those of the benchmark.
@@ -124,10 +135,7 @@ impl Settings {
                 let group = parents.join(".");
                 match known.is_empty() {
                     true => SettingsError::NotAGroup { path: path.to_owned(), parent: group },
-                    false => {
-                        let group = if group.is_empty() { "the root".to_owned() } else { group };
-                        SettingsError::UnknownField { path: path.to_owned(), group, known }
-                    }
+                    false => SettingsError::UnknownField { path: path.to_owned(), group, known },
                 }
             })?;
             parents.push(key);
@@ -230,7 +238,7 @@ fn without_links(text: &str) -> String {
 const ROUNDING: f64 = 5e-4;
 
 /// Names the kind of a setting that can be of several: `tactile.optics.model`.
-const MODEL: &str = "model";
+pub const MODEL: &str = "model";
 
 /// A whole number, which scripts may write as 2.0.
 fn whole_number(path: &str, value: &Value) -> Result<Value, SettingsError> {

@@ -61,7 +61,8 @@ fn unknown_tasks_shifts_and_settings_are_reported() {
     assert!(small("--set physics.dt=0.02").contains("dt must divide 0.05 s"));
     assert_snapshot!(small("--shift stiffness=2"), @r#"x.lua: --shift: unknown shift "stiffness"; the suite declares none"#);
     assert_snapshot!(small("--shift stiffness"), @r#"x.lua: --shift: expected NAME=VALUE, got "stiffness""#);
-    assert_snapshot!(small("--set robot.pad=1"), @r#"x.lua: --set: no setting "robot.pad"; robot has: arm, gripper, pads, ik, width_sensor, latency, disturbance"#);
+    assert_snapshot!(small("--set robot.pad=1"), @r#"x.lua: --set: no setting "robot.pad"; did you mean robot.pads?"#);
+    assert_snapshot!(small("--set robot.mass=1"), @r#"x.lua: --set: no setting "robot.mass"; robot has: arm, gripper, pads, ik, width_sensor, latency, disturbance"#);
     assert_snapshot!(small("--set robot.pads.static_mu=1 --set robot.pads.dynamic_mu=2"), @"x.lua: --set: robot.pads.dynamic_mu: expected a number in 0..1, got 2");
     let shift = Project::new(&[]).refusal(&format!("{SPATIAL_SOFT} --out run --shift stiffnes=2"));
     assert_snapshot!(shift, @r#"suites/spatial_soft.lua: --shift: unknown shift "stiffnes"; did you mean "stiffness"?"#);

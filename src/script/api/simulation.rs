@@ -20,7 +20,7 @@ use super::{
 use crate::{
     schema::{Constructed, Range, Type, choice, class, functions, output},
     vm::{
-        error::{app_data, fail},
+        error::{SourceLine, app_data, current_line, fail, fail_at},
         json::{deserialize, to_json},
         memory_budget::{Reservation, reserve_in_world},
         value::finite,
@@ -29,7 +29,7 @@ use crate::{
 };
 use softvt_benchmark::{
     seed::{EpisodeSeed, RandomStream},
-    settings::{Settings, SettingsError},
+    settings::{MODEL, Settings, SettingsError},
     steps_per_control,
 };
 use softvt_common::cancel;
@@ -49,8 +49,13 @@ const BYTES_PER_SIMULATION: usize = 4 << 20;
 
 choice! { Side { "left" => Left, "right" => Right } }
 
-/// Reads a table of settings; `label` names it in messages.
-pub(crate) fn settings(lua: &Lua, label: &str, table: Option<&Table>) -> mlua::Result<Settings> {
+/// Reads a table of settings; `label` names it in messages, and `place` is its line.
+pub(crate) fn settings(
+    lua: &Lua,
+    label: &str,
+    table: Option<&Table>,
+    place: Option<SourceLine>,
+) -> mlua::Result<Settings> {
     let Some(table) = table else { return Ok(Settings::default()) };
     let value = Value::Table(table.clone());
     let settings: Settings = deserialize(lua, label, &value).map_err(|error| {
@@ -58,13 +63,18 @@ pub(crate) fn settings(lua: &Lua, label: &str, table: Option<&Table>) -> mlua::R
         let data = to_json(lua, &value, label).unwrap_or_default();
         let wrong = leaves(String::new(), &data).into_iter().find_map(|field| {
             match Settings::default().check_fields(&[field]) {
-                Err(error @ SettingsError::Type { .. }) => Some(error),
+                // Fields of a model that is not the default one are unknown on their own.
+                Err(SettingsError::UnknownField { known, .. }) if known.iter().any(|key| key == MODEL) => {
+                    None
+                }
+                Err(wrong @ SettingsError::UnknownField { .. }) => Some(format!("{label}: {wrong}")),
+                Err(wrong @ SettingsError::Type { .. }) => Some(format!("{label}.{wrong}")),
                 _ => None,
             }
         });
-        wrong.map_or(error, |wrong| fail(lua, format!("{label}.{wrong}")))
+        wrong.map_or(error, |wrong| fail_at(lua, place.clone(), wrong))
     })?;
-    settings.validated().map_err(|e| fail(lua, format!("{label}: {e}")))
+    settings.validated().map_err(|e| fail_at(lua, place, format!("{label}: {e}")))
 }
 
 /// The single values of settings, with their dotted paths.
@@ -85,7 +95,7 @@ fn simulation_settings(lua: &Lua, table: Option<&Table>) -> mlua::Result<Setting
     if table.is_some_and(|table| table.contains_key("criteria").unwrap_or(false)) {
         return Err(fail(lua, format!("{LABEL}.criteria: a simulation judges no episodes; leave it out")));
     }
-    let own = settings(lua, LABEL, table)?;
+    let own = settings(lua, LABEL, table, current_line(lua))?;
     experiment_input::simulation_settings(lua, &own)
         .map_err(|e| fail(lua, format!("{LABEL}, with those of the run: {e}")))
 }

@@ -437,7 +437,12 @@ pub(crate) fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Su
         shifts: shifts.collect(),
         vary: spec.vary.as_ref().map(|vary| vary.ranges()),
         metrics: metrics(lua, spec)?,
-        settings: settings(lua, "suite.settings", spec.settings.as_ref())?,
+        settings: settings(
+            lua,
+            "suite.settings",
+            spec.settings.as_ref(),
+            origin_of_key(lua, &spec.table, &["settings"]),
+        )?,
         twin_of: twin_of(lua, spec)?,
         teacher: spec.teacher.unwrap_or_default(),
     })

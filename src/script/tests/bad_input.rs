@@ -9,6 +9,13 @@ fn a_missing_file_is_named() {
         error,
         "nowhere/x.lua: no such file; give the path of a Lua file; the standard suites are in suites/"
     );
+    let hint = |path: &str| load_with(&PathBuf::from(path), &[], &limits()).unwrap_err().to_string();
+    assert!(hint("object_sotf").ends_with("did you mean suites/object_soft.lua?"), "{}", hint("object_sotf"));
+    assert!(
+        hint("suites/brick.lua").ends_with("the standard suites are in suites/"),
+        "{}",
+        hint("suites/brick.lua")
+    );
     assert!(error_of_folder().starts_with("suites: is a folder"));
 }
 
@@ -200,6 +207,33 @@ fn a_wrong_table_is_reported_with_key_and_line() {
     assert_eq!(
         error_of("softvt.on 'a'"),
         "suites/x.lua:1: task.goal: expected a table of object, target, hold_s, got \"a\""
+    );
+}
+
+#[test]
+fn wrong_settings_are_named_with_their_line_and_a_close_name() {
+    let message = |settings: &str| {
+        error_of(&format!(
+            "{SUITE}local tasks = suite().tasks\nreturn softvt.suite {{\n  name = 'a', object_type = 'deformable', \
+             tasks_differ_in = 'spatial', tasks = tasks,\n  settings = {settings},\n}}"
+        ))
+    };
+    let line = SUITE.lines().count() + 4;
+    for (settings, expected) in [
+        (
+            "{ robot = { gripper = { kpp = 1 } } }",
+            ": no setting \"robot.gripper.kpp\"; did you mean robot.gripper.kp?",
+        ),
+        (
+            "{ nonsense = 1 }",
+            ": no setting \"nonsense.a\"; the root has: physics, robot, criteria, tactile, cameras",
+        ),
+        ("{ physics = { dt = 'a' } }", ".physics.dt: expected a number, got \"a\""),
+    ] {
+        assert_eq!(message(settings), format!("suites/x.lua:{line}: suite.settings{expected}"));
+    }
+    assert!(
+        message("{ physics = { dt = 0.4 } }").starts_with(&format!("suites/x.lua:{line}: suite.settings: "))
     );
 }
 

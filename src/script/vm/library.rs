@@ -415,9 +415,20 @@ fn missing(main: &Path, name: &str) -> ScriptError {
     let entries = fs::read_dir(folder_of(main)).into_iter().flatten().flatten();
     known.extend(entries.map(|e| display(&e.path())).filter(|n| n.ends_with(".lua")));
     let error = ScriptError::new(name, "no such file");
-    let stem = |path: &str| Path::new(path).file_stem().map(std::ffi::OsStr::to_os_string);
-    let same_stem = known.iter().filter(|path| stem(path) == stem(name)).max().map(String::as_str);
-    match same_stem.or_else(|| suggest(name, known.iter().map(String::as_str))) {
+    // Folders and endings are alike, and would make distant names close.
+    let stem = |path: &str| {
+        Path::new(path).file_stem().and_then(|stem| stem.to_str()).unwrap_or_default().to_owned()
+    };
+    let stems: Vec<String> = known.iter().map(|path| stem(path)).collect();
+    let close_stem = suggest(&stem(name), stems.iter().map(String::as_str));
+    // Of several, that of the suites.
+    let close = known
+        .iter()
+        .zip(&stems)
+        .filter(|(_, stem)| Some(stem.as_str()) == close_stem)
+        .map(|(path, _)| path)
+        .max();
+    match close {
         Some(close) => error.hint(format!("did you mean {close}?")),
         None => error.hint("give the path of a Lua file; the standard suites are in suites/"),
     }
