@@ -49,6 +49,8 @@ pub(super) struct PredicateInScene {
     name: String,
     hold_s: f64,
     pub subject: Subject,
+    /// True if it must not hold.
+    is_negated: bool,
 }
 
 /// Subject of a predicate.
@@ -97,7 +99,9 @@ impl GoalInScene {
             let index = finder.index_of("object", name)?;
             finder.found.targets.push(index);
         }
-        finder.found.goal = finder.node(&task.goal)?;
+        let goal = finder.node(&task.goal)?;
+        goal.for_each_negated(&mut |number| finder.found.predicates[number].is_negated = true);
+        finder.found.goal = goal;
         let has_placement =
             finder.found.predicates.iter().any(|p| matches!(p.subject, Subject::Rests { .. }));
         if has_placement && sim.scene.gravity.z >= 0.0 {
@@ -113,7 +117,7 @@ impl GoalInScene {
 
     /// The predicates as the judge reads them.
     pub(super) fn judged(&self) -> Vec<Predicate> {
-        let judged = |PredicateInScene { name, hold_s, subject }: &PredicateInScene| Predicate {
+        let judged = |PredicateInScene { name, hold_s, subject, .. }: &PredicateInScene| Predicate {
             name: name.clone(),
             rule: match *subject {
                 Subject::Rests { target, region, .. } => {
@@ -131,7 +135,7 @@ impl GoalInScene {
     }
 
     /// Whether a predicate that is not a placement holds. `is_touched` says of an object whether the robot presses on
-    /// it.
+    /// it, which does not end what must not hold.
     pub(super) fn holds(
         &self,
         predicate: usize,
@@ -139,11 +143,13 @@ impl GoalInScene {
         time_s: f64,
         is_touched: impl Fn(usize) -> bool,
     ) -> Result<bool, String> {
+        let PredicateInScene { subject, is_negated, .. } = self.predicates[predicate];
+        let is_touched = |object: usize| !is_negated && is_touched(object);
         let centre = |index: usize| sim.centre(&sim.objects[index]);
         let offset_b = |object: usize, target: usize| {
             sim.robot.base_w.rotation.inverse() * (centre(object) - centre(target))
         };
-        Ok(match self.predicates[predicate].subject {
+        Ok(match subject {
             Subject::Rests { .. } => false,
             Subject::Joint { part, range: [low, high] } => {
                 sim.joint(&sim.objects[part]).is_some_and(|q| (low..=high).contains(&q))
@@ -241,7 +247,12 @@ impl Finder<'_> {
                 (0.0, Subject::Function(self.found.predicates.iter().filter(before).count()))
             }
         };
-        self.found.predicates.push(PredicateInScene { name: goal.describe(), hold_s, subject });
+        self.found.predicates.push(PredicateInScene {
+            name: goal.describe(),
+            hold_s,
+            subject,
+            is_negated: false,
+        });
         Ok(GoalNode::Predicate(self.found.predicates.len() - 1))
     }
 
@@ -281,12 +292,16 @@ impl Finder<'_> {
         Err(EpisodeError::JointRange { task: self.task.id, name: name.to_owned(), lower, upper, placed_at })
     }
 
-    /// A joint within what `range` makes of its limits, a rounding error beyond them included.
+    /// A joint within what `range` makes of its limits, with a rounding error. A range that includes a limit has no end
+    /// there.
     fn joint(&self, name: &str, range: impl Fn([f64; 2]) -> [f64; 2]) -> Result<Subject, EpisodeError> {
         const ROUNDING: f64 = 1e-4;
         let (part, limits) = self.part(name)?;
         let [low, high] = range(limits);
-        Ok(Subject::Joint { part, range: [low - ROUNDING, high + ROUNDING] })
+        // A joint that presses on its stop is a little beyond its limit.
+        let low = if low <= limits[0] + ROUNDING { f64::NEG_INFINITY } else { low - ROUNDING };
+        let high = if high >= limits[1] - ROUNDING { f64::INFINITY } else { high + ROUNDING };
+        Ok(Subject::Joint { part, range: [low, high] })
     }
 }
 

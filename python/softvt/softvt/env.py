@@ -1,11 +1,13 @@
 """softvt as a Gymnasium environment: a client of `softvt serve` that starts its own server, or connects to one."""
 
 import inspect
+import math
 import os
 import shutil
 import weakref
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import gymnasium
@@ -33,6 +35,9 @@ FIRST_SEED = 1000
 
 NEW_ROLLOUT = "lerobot_new_rollout"
 """Option of `reset` by which lerobot-eval begins an episode."""
+
+CONTROL_DT = 0.05
+"""Duration of a control step, s."""
 
 _EPISODES = 2**32
 _RENDER_MODES = ("rgb_array", "sensors")
@@ -172,22 +177,17 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
             spec = None if profile or parts is None else ProfileSpec(parts, control, gripper, cameras, history)
             own_flags = _flags(profile, image_shape, needs_truth) + flags
             self._lease = lease(_script(script), own_flags, binary, None if spec is None else spec.to_lua())
-            connect = self._lease.connect
+            self._connect = self._lease.connect
         else:
             assert url is not None
-
-            def connect() -> Client:
-                return Client(url, token)
-
+            self._connect = partial(Client, url, token)
         try:
-            self._client = connect()
+            self._client = self._connect()
         except BaseException:
             if self._lease is not None:
                 self._lease.release()
             raise
-        self._closer = weakref.finalize(self, _close, self._client, self._lease)
-        # Servers end with their process anyway.
-        self._closer.atexit = False
+        self._closer = self._finalizer()
         try:
             self._begin(suite, task, needs_truth, history)
             if self._needs_state() and script not in SUITES:
@@ -196,6 +196,20 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         except BaseException:
             self.close()
             raise
+
+    def _finalizer(self) -> Any:
+        """Closes what this environment uses, once it is called or the environment is gone."""
+        closer = weakref.finalize(self, _close, self._client, self._lease)
+        # Servers end with their process anyway.
+        closer.atexit = False
+        return closer
+
+    def _reconnect(self) -> None:
+        """Replaces a connection in which a request was interrupted."""
+        self._client.close()
+        self._client = self._connect()
+        self._closer.detach()
+        self._closer = self._finalizer()
 
     def _begin(self, suite: str | None, task: int | str | Sequence[int] | None, needs_truth: bool, history: int) -> None:
         hello = self._client.hello
@@ -301,6 +315,8 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         named = options.get("episode")
         if seed is not None and named is not None and named != episode:
             raise ValueError(f"reset: seed={seed} is episode {episode}, and options name episode {named}; leave out one of them")
+        if self._client.is_interrupted and self._closer.alive:
+            self._reconnect()
         requested = {"suite": self._suite, "task": task, "episode": episode, "split": self._split, **options}
         self._client.send("reset", **{key: value for key, value in requested.items() if value is not None})
         self._pending = "reset"
@@ -318,9 +334,9 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         if self._freezes and self._last is not None:
             self._pending = "frozen"
             return
-        if self._has_probe:
+        if self._has_probe or self._client.is_interrupted:
             # For `end_step`, so that the requests of a vector environment and their answers stay in step.
-            self._pending = "refused"
+            self._pending = "no episode yet" if self._has_probe else "the request before was interrupted"
             return
         self._client.send("step", action=np.asarray(action))
         self._pending = "step"
@@ -331,8 +347,8 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
         if pending == "frozen":
             assert self._last is not None
             return self._last
-        if pending == "refused":
-            raise ServerError("step: no episode yet; call reset first")
+        if pending != "step":
+            raise ServerError(f"step: {pending}; call reset first")
         response = self._client.receive()
         before = self._verdict
         self._verdict = response["info"].get("verdict", {})
@@ -675,12 +691,13 @@ def _last_motion(motion: np.ndarray) -> np.ndarray:
 
 
 def _costs(before: Mapping[str, Any] | None, now: Mapping[str, Any]) -> dict[str, float]:
-    """Costs of a step, 1 each: D beyond τ, the first drop, and slip beyond the limit where the suite forbids it, of any object that the goal
+    """Costs of a control step, 1 each: D beyond τ, the first drop, and slip beyond the limit where the suite forbids it, of any object that the goal
     moves; `cost` is their sum. 0 without a step."""
     costs = dict.fromkeys(("cost_deformation", "cost_drop", "cost_slip"), 0.0)
     if before is not None:
         pairs = zip(_times_over_limit(before), _times_over_limit(now), strict=True)
-        costs["cost_deformation"] = float(any(after > earlier for earlier, after in pairs))
+        # A step of several actions costs the time beyond τ in control steps, rounded up.
+        costs["cost_deformation"] = float(max(math.ceil((after - earlier) / CONTROL_DT - 1e-6) for earlier, after in pairs))
         costs["cost_drop"] = float(before["no_drop"] and not now["no_drop"])
         costs["cost_slip"] = float(before["slip_ok"] is not False and now["slip_ok"] is False)
     return {"cost": sum(costs.values()), **costs}

@@ -59,6 +59,7 @@ class Client:
         self.url = url
         self._server = server
         self._socket: Any = None
+        self._awaits_response = True
         header = {"Authorization": f"Bearer {token}"} if token else {}
         try:
             self._socket = create_connection(url, header=header)
@@ -80,17 +81,25 @@ class Client:
         self.send(kind, **fields)
         return self.receive()
 
+    @property
+    def is_interrupted(self) -> bool:
+        """True if a request has no response: it was interrupted, for example by Ctrl-C, and the connection cannot be used any more."""
+        return self._awaits_response
+
     def send(self, kind: str, **fields: Any) -> None:
-        """Sends a request without waiting. Each has to be followed by a `receive`."""
+        """Sends a request without waiting. It has to be followed by a `receive` before the next one."""
         if self._socket is None:
             raise ServerError("the connection is closed")
+        if self._awaits_response:
+            raise ServerError(f"{kind}: the request before was interrupted; make a new connection")
+        self._awaits_response = True
         try:
             self._socket.send_binary(msgpack.packb({"type": kind, **fields}, default=_pack))
         except (OSError, WebSocketException) as error:
             raise self._lost(error) from error
 
     def receive(self) -> dict[str, Any]:
-        """Waits for the response to the earliest request that has none yet."""
+        """Waits for the response to the last request."""
         if self._socket is None:
             raise ServerError("the connection is closed")
         try:
@@ -99,6 +108,7 @@ class Client:
             raise self._lost(error) from error
         if not message:
             raise self._lost("it closed the connection")
+        self._awaits_response = False
         response: dict[str, Any] = msgpack.unpackb(message, object_hook=_unpack)
         if response["type"] == "error":
             raise ServerError(response["error"])

@@ -59,13 +59,7 @@ class SoftVTVectorEnv(VectorEnv):
         options = dict(options or {})
         mask = np.asarray(options.pop("reset_mask", np.ones(self.num_envs, dtype=np.bool_)))
         chosen = [int(index) for index in np.flatnonzero(mask)]
-        for number, index in enumerate(chosen):
-            try:
-                self.envs[index].begin_reset(seeds[index], options)
-            except BaseException:
-                # So that no answer is left for a later request.
-                self._wait(chosen[:number], self._end_reset)
-                raise
+        self._begin_all(chosen, lambda index: self.envs[index].begin_reset(seeds[index], options), self._end_reset)
         infos: dict[str, Any] = {}
         for index, info in self._wait(chosen, self._end_reset).items():
             infos = self._add_info(infos, info, index)
@@ -75,12 +69,9 @@ class SoftVTVectorEnv(VectorEnv):
         """Executes an action in each environment. An environment whose episode has ended is reset as the autoreset mode says."""
         if self.autoreset_mode == AutoresetMode.DISABLED and self._ended.any():
             raise RuntimeError("step: an episode has ended; reset it first, by options={'reset_mask': …}")
+        if len(actions) != self.num_envs:
+            raise ValueError(f"step: {len(actions)} actions for {self.num_envs} environments")
         restarting = self._ended.copy()
-        for index, action in enumerate(iterate(self.action_space, actions)):
-            if restarting[index]:
-                self.envs[index].begin_reset()
-            else:
-                self.envs[index].begin_step(action)
         rewards = np.zeros(self.num_envs)
         terminated, truncated = np.zeros((2, self.num_envs), dtype=np.bool_)
 
@@ -93,6 +84,12 @@ class SoftVTVectorEnv(VectorEnv):
                 truncated[index] = True
             return info
 
+        each = [*iterate(self.action_space, actions)]
+        self._begin_all(
+            range(self.num_envs),
+            lambda index: self.envs[index].begin_reset() if restarting[index] else self.envs[index].begin_step(each[index]),
+            end,
+        )
         found = self._wait(range(self.num_envs), end)
         infos: dict[str, Any] = {}
         self._ended = terminated | truncated
@@ -129,6 +126,16 @@ class SoftVTVectorEnv(VectorEnv):
         """Closes all environments."""
         for env in self.envs:
             env.close()
+
+    def _begin_all(self, indices: Sequence[int], begin: Callable[[int], None], end: Callable[[int], dict[str, Any]]) -> None:
+        """Sends a request for each of these environments. If one fails, the answers to those before are read, so that none is left for a later
+        request."""
+        for number, index in enumerate(indices):
+            try:
+                begin(index)
+            except BaseException:
+                self._wait(indices[:number], end)
+                raise
 
     def _wait(self, indices: Iterable[int], end: Callable[[int], dict[str, Any]]) -> dict[int, dict[str, Any]]:
         """Reads the answers of all these environments. The first error is raised after that, so that no answer is left for a later request."""

@@ -8,6 +8,7 @@ import gymnasium
 import numpy as np
 import softvt
 from gymnasium.utils.env_checker import check_env
+from softvt.env import CONTROL_DT
 from softvt.true_state import STATE_BOUNDS, STATE_FIELDS, TrueState, progress
 from suites_for_tests import STEPS, crushing_suite, drawer_suite, expert_run, same, short_suite
 
@@ -205,6 +206,53 @@ class Environments(unittest.TestCase):
                     costs = [one[4]["cost"] for one in steps]
                     self.assertEqual(sum(costs) > 0, not kept["safety"])
                     self.assertEqual([type(one) for one in (costs[0], rewards[0], terminated)], [float, float, bool])
+
+    def test_a_step_of_several_actions_costs_as_much_time_beyond_the_limit_as_single_steps(self):
+        actions, record = expert_run(suite=crushing_suite())
+        (croissant,) = record["targets"]
+        costs = []
+        for count in (1, 7):
+            env = self.make(crushing_suite(), obs="proprio", control="pose")
+            env.reset(seed=1000)
+            costs.append(sum(env.step(actions[at : at + count])[4]["cost_deformation"] for at in range(0, len(actions), count)))
+        single, several = costs
+        self.assertGreater(single, 10)
+        # Each begins and ends within a control step.
+        self.assertLessEqual(abs(several - single), 3)
+        self.assertLessEqual(abs(single * CONTROL_DT - croissant["time_over_tau_s"]), 3 * CONTROL_DT)
+
+    def test_after_an_interrupted_step_an_episode_is_begun_anew(self):
+        env = self.make(obs="proprio")
+        first, _ = env.reset(seed=1003)
+        action = np.array([1.0, 0, 0, 0, 0, 0, -1])
+        after, *_ = env.step(action)
+        # As Ctrl-C leaves it.
+        env.begin_step(action)
+        for _ in range(2):
+            with self.assertRaisesRegex(softvt.ServerError, "step: the request before was interrupted; call reset first"):
+                env.step(action)
+        again, info = env.reset(seed=1003)
+        np.testing.assert_array_equal(again, first)
+        self.assertEqual(info["step"], 0)
+        np.testing.assert_array_equal(env.step(action)[0], after)
+
+    def test_after_an_interrupted_step_a_vector_is_reset(self):
+        envs = softvt.SoftVTVectorEnv(2, script=short_suite(), obs="proprio")
+        try:
+            first, _ = envs.reset(seed=1000)
+            actions = np.tile([1.0, 0, 0, 0, 0, 0, -1], (2, 1))
+            after = envs.step(actions)[0]
+            envs.envs[1].begin_step(actions[1])
+            with self.assertRaisesRegex(softvt.ServerError, "interrupted; call reset first"):
+                envs.step(actions)
+            np.testing.assert_array_equal(envs.reset(seed=1000)[0], first)
+            np.testing.assert_array_equal(envs.step(actions)[0], after)
+            for rows in (1, 4):
+                with self.assertRaisesRegex(ValueError, f"step: {rows} actions for 2 environments"):
+                    envs.step(np.zeros((rows, 7)))
+            self.assertEqual(list(envs.step(actions)[4]["step"]), [2, 2])
+        finally:
+            envs.close()
 
     def test_every_object_that_the_goal_moves_has_costs(self):
         actions, record = expert_run(suite=crushing_suite())

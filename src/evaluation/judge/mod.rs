@@ -277,14 +277,9 @@ impl Judge {
             config.predicates.iter().map(|predicate| predicate.rule.state(control_s)).collect();
         config.goal.for_each_final(&mut |number| predicates[number].is_final = true);
         config.goal.for_each_negated(&mut |number| predicates[number].is_negated = true);
-        let targets = config.targets.iter().enumerate();
+        let targets = config.targets.iter();
         Self {
-            // The control steps of the object alone are scored one by one.
-            targets: targets
-                .map(|(place, target)| {
-                    TargetMonitors::new(target, if place == 0 { config.max_steps } else { 0 })
-                })
-                .collect(),
+            targets: targets.map(|target| TargetMonitors::new(target, config.max_steps)).collect(),
             goal: GoalMonitor::new(config.goal.clone()),
             goal_v1: GoalMonitor::new(config.goal.clone()),
             holds: [0; 2].map(|_| vec![false; predicates.len()]),
@@ -563,9 +558,24 @@ impl Judge {
                 }
                 (_, given) => PlacementSample::given(*given == PredicateEvidence::Given(true)),
             };
+            let applies = sample.is_inside && sample.is_supported;
+            if state.is_negated {
+                // Its absence must last as long as it would have to.
+                let absent = PlacementSample {
+                    is_inside_v1: !sample.is_inside_v1,
+                    ..PlacementSample::given(!applies)
+                };
+                state.placement.update(&absent);
+                state.holds = !state.placement.holds();
+                [self.holds[0][number], self.holds[1][number]] = [state.holds, !state.placement.holds_v1()];
+                if applies {
+                    state.met_s.get_or_insert(evidence.time_s);
+                }
+                continue;
+            }
             let has_left = state.placement.update(&sample);
             if let PredicateRule::Rests { target, .. } = predicate.rule {
-                state.is_placed = sample.is_inside && sample.is_supported;
+                state.is_placed = applies;
                 if has_left && state.is_final {
                     self.targets[target].drops.record(DropReason::LeftGoal, evidence.time_s);
                 }
@@ -575,7 +585,7 @@ impl Judge {
         }
         self.observe_stages(evidence);
         if is_last {
-            for state in self.predicates.iter_mut().filter(|state| state.holds) {
+            for state in self.predicates.iter_mut().filter(|state| state.holds && !state.is_negated) {
                 state.met_s.get_or_insert(evidence.time_s);
             }
             if self.goal.update(&self.holds[0]) {

@@ -50,7 +50,7 @@ pub(super) struct TargetMonitors {
 }
 
 impl TargetMonitors {
-    /// Monitors of a target that has not moved; `steps` physics steps of its deformation are scored one by one.
+    /// Monitors of a target that has not moved; the episode has at most `steps` physics steps.
     pub(super) fn new(target: &Target, steps: usize) -> Self {
         Self {
             release: ReleaseMonitor::default(),

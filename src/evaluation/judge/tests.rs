@@ -499,6 +499,25 @@ fn a_goal_of_several_parts_says_which_were_met() {
 }
 
 #[test]
+fn what_must_not_hold_must_be_gone_for_the_time_for_which_it_would_have_to_hold() {
+    let none = || two_targets(GoalNode::None(vec![GoalNode::Predicate(0)]));
+    let is_reached = |parts: &[(u32, bool)]| {
+        let mut judge = Judge::new(none());
+        parts.iter().for_each(|&(steps, at_place)| {
+            feed(&mut judge, steps, &[at_place, false], &[0.1, 0.1], Some(false))
+        });
+        (judge.is_goal_reached(), judge.parts().next().is_some_and(|part| part.holds && part.met_s.is_some()))
+    };
+    // 24 physics steps are 0.4 s.
+    assert_eq!(is_reached(&[(90, true)]), (false, true));
+    assert_eq!(is_reached(&[(30, true), (21, false)]), (false, true));
+    assert_eq!(is_reached(&[(30, true), (24, false)]), (true, false));
+    assert_eq!(is_reached(&[(30, true), (12, false), (3, true), (21, false)]), (false, true));
+    assert_eq!(is_reached(&[(21, false)]).0, false);
+    assert_eq!(is_reached(&[(24, false)]), (true, false));
+}
+
+#[test]
 fn every_target_is_judged_by_its_own_limit_and_drops() {
     let verdict = |d_pct: [f64; 2], limit: Option<DeformationLimit>| {
         let mut config = two_targets(all_three());
@@ -512,9 +531,12 @@ fn every_target_is_judged_by_its_own_limit_and_drops() {
     let crushed = verdict([0.5, 1.1], limit);
     assert!(crushed.goal && crushed.deformation_ok == Some(true) && !crushed.safety && crushed.safety_known);
     assert_eq!(crushed.targets[0].deformation_ok, Some(false));
+    assert_eq!(crushed.time_over_tau_s, Some(0.0));
+    assert!(crushed.targets[0].time_over_tau_s.is_some_and(|time_s| (time_s - 30.0 * DT).abs() < 1e-12));
     assert_eq!(crushed.kappas.iter().map(|at| at.safety).collect::<Vec<_>>(), [false, false, true]);
     let unknown = verdict([0.5, 0.5], None);
     assert!(!unknown.safety && !unknown.safety_known);
+    assert_eq!(unknown.targets[0].time_over_tau_s, None);
     let mut judge = Judge::new(two_targets(all_three()));
     feed(&mut judge, 30, &[true, true], &[0.1, 0.1], Some(false));
     feed(&mut judge, 3, &[true, false], &[0.1, 0.1], Some(false));
