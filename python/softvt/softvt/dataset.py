@@ -1,5 +1,6 @@
 """Recordings of `softvt record` as a data set of control steps, for the loaders of PyTorch and others."""
 
+import json
 import operator
 import os
 from collections.abc import Iterable, Sequence
@@ -199,7 +200,12 @@ def _hdf5_files(path: Path) -> list[Path]:
             f"{path}: the recording was interrupted; complete it by its command with --resume (softvt record … --resume --out {path}), or give "
             "the HDF5 file of a task that is complete"
         )
-    found = sorted((path / "hdf5").glob("*.hdf5")) or sorted(path.glob("*.hdf5"))
+    manifest = path / "manifest.jsonl"
+    if manifest.is_file():
+        names = {json.loads(line)["hdf5_path"] for line in manifest.read_text(encoding="utf-8").splitlines()}
+        found = [path / name for name in sorted(names)]
+    else:
+        found = sorted((path / "hdf5").glob("*.hdf5")) or sorted(path.glob("*.hdf5"))
     if not found:
         raise ValueError(f"{path}: no recording; give a folder that softvt record wrote, or one of its HDF5 files")
     return found

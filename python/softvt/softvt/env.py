@@ -301,6 +301,8 @@ class SoftVTEnv(gymnasium.Env[Observation, np.ndarray]):
     def begin_reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
         """As `reset`, without waiting; `end_reset` has to follow. Several environments thus work at the same time."""
         super().reset(seed=seed)
+        if options is not None and not isinstance(options, Mapping):
+            raise ValueError(f"reset: options: expected a dict, got {options!r}")
         options = dict(options or {})
         is_new = options.pop(NEW_ROLLOUT, False) or seed is not None or bool(options)
         if self._freezes and self._last is not None and not is_new:

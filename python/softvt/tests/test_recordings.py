@@ -2,6 +2,7 @@
 
 import json
 import pickle
+import shutil
 import subprocess
 import unittest
 
@@ -51,6 +52,17 @@ class Datasets(unittest.TestCase):
         self.assertEqual([len(data), data[-1]["step"]], [len([*data]), second.steps - 1])
         with self.assertRaises(IndexError):
             data[len(data)]
+
+    def test_files_that_the_manifest_does_not_name_are_left_out(self):
+        stray = self.folder / "hdf5" / "copy.hdf5"
+        shutil.copy(next((self.folder / "hdf5").iterdir()), stray)
+        try:
+            self.assertEqual(len(softvt.Dataset(self.folder).demonstrations), 2)
+            checked = subprocess.run([softvt.find_binary(), "dataset", "check", str(self.folder)], capture_output=True, text=True)
+            self.assertEqual(checked.returncode, 2)
+            self.assertIn("copy.hdf5", checked.stdout + checked.stderr)
+        finally:
+            stray.unlink()
 
     def test_actions_after_the_last_step_are_marked(self):
         data = softvt.Dataset(self.folder, keys=("state",), horizon=3, task=0)
