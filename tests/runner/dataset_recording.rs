@@ -215,6 +215,14 @@ fn datasets_are_checked_and_reproduced() {
     assert!(project.message(find(&a, "0/2").map(|_| ())).contains("no such demonstration"));
     let columns = stats::column_statistics(&[&hdf5]).expect("numbers");
     assert!(stats::table(&columns).contains("length (steps)") && stats::svg(&columns).starts_with("<svg"));
+    let stray = project.path("a/hdf5/copy.hdf5");
+    fs::copy(&hdf5, &stray).expect("copied");
+    let problems = check::folder(&a, check::CheckScope::Whole).expect("a dataset").problems;
+    assert!(
+        matches!(&problems[..], [one] if one.contains("copy.hdf5") && one.contains("remove it")),
+        "{problems:?}"
+    );
+    fs::remove_file(stray).expect("removed");
     project.write("a/videos/one_task0/demo_0_eye_in_hand_rgb.mp4", b"not a video");
     let whole = fs::read(&hdf5).expect("read");
     fs::write(&hdf5, &whole[..whole.len() / 2]).expect("written");

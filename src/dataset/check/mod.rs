@@ -3,8 +3,8 @@
 mod readings;
 
 use std::{
-    collections::BTreeMap,
-    path::{Component, Path},
+    collections::{BTreeMap, BTreeSet},
+    path::{Component, Path, PathBuf},
 };
 
 use serde_json::Value;
@@ -117,6 +117,9 @@ pub fn folder(root: &Path, scope: CheckScope) -> Result<CheckReport, DatasetErro
             report.add(&root.join(MANIFEST), "lines", what);
         }
     }
+    for path in stray_files(root, &files) {
+        report.add(&path, "/data", "the manifest has no line of this file; remove it");
+    }
     for (path, entries) in files {
         let path = root.join(path);
         let Some(file) = report.take(TaskFile::open(&path)) else { continue };
@@ -135,6 +138,18 @@ pub fn folder(root: &Path, scope: CheckScope) -> Result<CheckReport, DatasetErro
         check_demonstrations(&mut report, &file, scope);
     }
     Ok(report)
+}
+
+/// HDF5 files beside those that the manifest names.
+fn stray_files(root: &Path, named: &BTreeMap<&str, Vec<&ManifestEntry>>) -> Vec<PathBuf> {
+    let known: BTreeSet<PathBuf> = named.keys().map(|path| root.join(path)).collect();
+    let folders: BTreeSet<&Path> = known.iter().filter_map(|path| path.parent()).collect();
+    let entries = folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten().flatten();
+    let files =
+        entries.map(|entry| entry.path()).filter(|path| path.extension().is_some_and(|end| end == "hdf5"));
+    let mut stray: Vec<PathBuf> = files.filter(|path| !known.contains(path)).collect();
+    stray.sort();
+    stray
 }
 
 /// Checks one HDF5 file.
