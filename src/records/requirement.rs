@@ -23,25 +23,38 @@ pub struct Requirement {
 #[derive(Debug)]
 struct Metric {
     name: &'static str,
-    /// True for shares of 1; false for deformations in percent and for counts.
-    is_rate: bool,
+    unit: Unit,
     /// The value, if it is defined for the suite.
     value: fn(&GroupScores) -> Option<f64>,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Unit {
+    /// A share of 1.
+    Share,
+    /// Percent of a length.
+    Percent,
+    /// A number of episodes.
+    Episodes,
+}
+
 static METRICS: [Metric; 8] = [
-    Metric { name: "goal", is_rate: true, value: |scores| share(&scores.goal_success_rate) },
-    Metric { name: "no_drop", is_rate: true, value: |scores| share(&scores.no_drop_rate) },
+    Metric { name: "goal", unit: Unit::Share, value: |scores| share(&scores.goal_success_rate) },
+    Metric { name: "no_drop", unit: Unit::Share, value: |scores| share(&scores.no_drop_rate) },
     Metric {
         name: "deformation_ok",
-        is_rate: true,
+        unit: Unit::Share,
         value: |scores| share(scores.deformation_ok_rate.as_ref()?),
     },
-    Metric { name: "safety", is_rate: true, value: |scores| share(&scores.safety_success_rate) },
-    Metric { name: "gap", is_rate: true, value: |scores| scores.goal_safe_gap.map(|points| points / 100.0) },
-    Metric { name: "d_median", is_rate: false, value: |scores| scores.deformation.median },
-    Metric { name: "d_p95", is_rate: false, value: |scores| scores.deformation.p95 },
-    Metric { name: "invalid", is_rate: false, value: |scores| Some(scores.invalid as f64) },
+    Metric { name: "safety", unit: Unit::Share, value: |scores| share(&scores.safety_success_rate) },
+    Metric {
+        name: "gap",
+        unit: Unit::Share,
+        value: |scores| scores.goal_safe_gap.map(|points| points / 100.0),
+    },
+    Metric { name: "d_median", unit: Unit::Percent, value: |scores| scores.deformation.median },
+    Metric { name: "d_p95", unit: Unit::Percent, value: |scores| scores.deformation.p95 },
+    Metric { name: "invalid", unit: Unit::Episodes, value: |scores| Some(scores.invalid as f64) },
 ];
 
 fn share(rate: &Rate) -> Option<f64> {
@@ -76,13 +89,20 @@ impl FromStr for Requirement {
         let (name, bound) = (name.trim(), bound.trim());
         let metric = METRICS.iter().find(|metric| metric.name == name);
         let metric = metric.ok_or_else(|| format!("unknown metric {name:?}; metrics are {}", names()))?;
-        let (number, unit) = bound.strip_suffix('%').map_or((bound, 1.0), |number| (number, 0.01));
+        let (number, factor) = match (bound.strip_suffix('%'), metric.unit) {
+            (None, _) => (bound, 1.0),
+            (Some(number), Unit::Share) => (number, 0.01),
+            (Some(number), Unit::Percent) => (number, 1.0),
+            (Some(_), Unit::Episodes) => {
+                return Err(format!("{name} is a number of episodes, got {bound}; write {name}<1"));
+            }
+        };
         let value: Option<f64> = number.trim().parse().ok().filter(|value: &f64| value.is_finite());
         let value = value.ok_or_else(|| format!("expected a number after the sign, got {bound:?}"))?;
-        if metric.is_rate && !(-1.0..=1.0).contains(&(unit * value)) {
+        if metric.unit == Unit::Share && !(-1.0..=1.0).contains(&(factor * value)) {
             return Err(format!("{name} is a share of 1, got {bound}; write 0.9 or 90%"));
         }
-        Ok(Self { text: word.to_owned(), metric, comparison, bound: unit * value })
+        Ok(Self { text: word.to_owned(), metric, comparison, bound: factor * value })
     }
 }
 
@@ -120,7 +140,15 @@ mod tests {
     fn requirements_are_met_up_to_their_bounds() {
         let unmet = |word: &str, summary: &SuiteSummary| word.parse::<Requirement>().unwrap().unmet(summary);
         let nine = summary(9, 10);
-        for met in ["safety>=0.9", "safety >= 90 %", "goal>0.99", "gap<=0.1", "invalid<1", "d_p95<0.34"] {
+        for met in [
+            "safety>=0.9",
+            "safety >= 90 %",
+            "goal>0.99",
+            "gap<=0.1",
+            "invalid<1",
+            "d_p95<0.34",
+            "d_p95<0.34%",
+        ] {
             assert_eq!(unmet(met, &nine), None, "{met}");
         }
         assert!(unmet("safety>0.9", &nine).is_some_and(|m| m.contains("safety is 0.9000")));
@@ -137,6 +165,7 @@ mod tests {
             ("safety>=NaN", "got \"NaN\""),
             ("safety>=", "got \"\""),
             ("no_drop>=90", "a share of 1, got 90"),
+            ("invalid<1%", "a number of episodes, got 1%; write invalid<1"),
         ] {
             let error = word.parse::<Requirement>().expect_err(words);
             assert!(error.contains(words), "{error}");
