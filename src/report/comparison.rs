@@ -119,7 +119,7 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
         headings: names(&[first, second]),
         deformable: pairs.iter().any(|pair| pair.first.has_soft_target()),
         unpaired: count(first) + count(second) - 2 * pairs.len(),
-        differing_fields: differing_fields(first, second),
+        differing_fields: differing_fields(first, second).into_iter().collect(),
         pairing,
         incomplete: all()
             .filter(|run| run.is_partial())
@@ -242,35 +242,55 @@ pub(super) fn names(folders: &[impl AsRef<[StoredRun]>]) -> Vec<String> {
 
 /// Fields of `run.json` about the conditions of a run in which two runs of one suite differ. Of files and limits, those
 /// that both runs read are compared, since a run of fewer tasks reads fewer; the differing ones follow in brackets.
-fn differing_fields(first: &[StoredRun], second: &[StoredRun]) -> Vec<String> {
-    let condition_fields = || [&["softvt", "metric_id"], &RunChanges::EFFECTS[..], &KEYED_FIELDS].concat();
-    /// Fields with an entry per file or asset.
-    const KEYED_FIELDS: [&str; 2] = ["sources", "thresholds"];
+pub(super) fn differing_fields(first: &[StoredRun], second: &[StoredRun]) -> BTreeSet<String> {
+    let fields = [&["softvt", "metric_id"], &RunChanges::EFFECTS[..], &KEYED_FIELDS].concat();
     let mut found = BTreeSet::new();
     for a in first {
         let Some(b) = second.iter().find(|b| b.suite() == a.suite()) else { continue };
-        for field in condition_fields() {
-            let (a, b) = (&a.manifest[field], &b.manifest[field]);
-            if a == b {
-                continue;
-            }
-            let (Some(own), Some(other), true) =
-                (a.as_object(), b.as_object(), KEYED_FIELDS.contains(&field))
-            else {
-                found.insert(field.to_owned());
-                continue;
-            };
-            let other: BTreeMap<&str, &Value> =
-                other.iter().map(|(name, value)| (in_project(name), value)).collect();
-            let own = own.iter().map(|(name, value)| (in_project(name), value));
-            let is_other = |(name, value): &(&str, &Value)| other.get(name).is_some_and(|x| x != value);
-            let names: Vec<&str> = own.filter(is_other).map(|(name, _)| name).collect();
-            if !names.is_empty() {
-                found.insert(format!("{field} ({})", names.join(", ")));
-            }
+        found.extend(fields.iter().filter_map(|field| difference_of_field(a, b, field)));
+    }
+    found
+}
+
+/// Fields with an entry per file or asset.
+const KEYED_FIELDS: [&str; 2] = ["sources", LIMITS];
+/// Field with the limit τ of each asset.
+const LIMITS: &str = "thresholds";
+
+/// The field, if two runs differ in it, with the names of the differing entries.
+fn difference_of_field(a: &StoredRun, b: &StoredRun, field: &str) -> Option<String> {
+    let (a, b) = (&a.manifest[field], &b.manifest[field]);
+    if a == b {
+        return None;
+    }
+    let (Some(own), Some(other), true) = (a.as_object(), b.as_object(), KEYED_FIELDS.contains(&field)) else {
+        return Some(field.to_owned());
+    };
+    let other: BTreeMap<&str, &Value> = other.iter().map(|(name, value)| (in_project(name), value)).collect();
+    let own = own.iter().map(|(name, value)| (in_project(name), value));
+    let is_other = |(name, value): &(&str, &Value)| other.get(name).is_some_and(|x| x != value);
+    let names: Vec<&str> = own.filter(is_other).map(|(name, _)| name).collect();
+    (!names.is_empty()).then(|| format!("{field} ({})", names.join(", ")))
+}
+
+/// One sentence for each run that is judged by other limits than the first run of its suite.
+pub fn limit_warnings<'a>(runs: impl Iterator<Item = &'a StoredRun>) -> Vec<String> {
+    let mut firsts: Vec<&StoredRun> = Vec::new();
+    let mut warnings = Vec::new();
+    for run in runs {
+        let Some(first) = firsts.iter().find(|first| first.suite() == run.suite()) else {
+            firsts.push(run);
+            continue;
+        };
+        if let Some(field) = difference_of_field(first, run, LIMITS) {
+            warnings.push(format!(
+                "{} and {} have different {field}",
+                first.dir.display(),
+                run.dir.display()
+            ));
         }
     }
-    found.into_iter().collect()
+    warnings
 }
 
 /// The path of a file in its project, whatever the folder from which a run named it: `../scripts/shifts.lua` is
@@ -548,6 +568,7 @@ mod tests {
     use serde_json::json;
 
     use super::*;
+    use crate::policy_ranking::PolicyRanking;
     use crate::{run_summary::tests::stored, sample_record};
     use softvt_evaluation::verdict::{InvalidReason, Outcome, WrongObjectContact};
 
@@ -627,6 +648,14 @@ mod tests {
         assert_eq!((in_project("x.lua"), in_project("my_suites/x.lua")), ("x.lua", "my_suites/x.lua"));
         part.manifest["thresholds"]["bun"] = json!(1.5);
         assert_eq!(differing(&part), ["sources (y.lua)", "thresholds (bun)"]);
+        let warnings = limit_warnings([&whole, &part, &whole].into_iter());
+        assert_eq!(warnings, ["a and b have different thresholds (bun)"]);
+        let three = PolicyRanking::new(&[&whole, &whole, &part].map(|run| vec![run.clone()]))
+            .expect("common episodes");
+        assert_eq!(three.differing_fields, ["sources (y.lua)", "thresholds (bun)"]);
+        assert!(
+            three.table().contains("the runs also differ in sources (y.lua), thresholds (bun) (run.json)")
+        );
         part.manifest["settings"] = json!({ "robot": 1 });
         assert_eq!(differing(&part)[0], "settings");
     }

@@ -1,11 +1,11 @@
 //! Comparison of three or more runs on the episodes that all of them have.
 
-use std::cmp::Reverse;
+use std::{cmp::Reverse, collections::BTreeSet};
 
 use serde::Serialize;
 
 use super::{
-    comparison::{CompareError, check_unique, names, no_common_episode, records},
+    comparison::{CompareError, check_unique, differing_fields, names, no_common_episode, records},
     stored_run::StoredRun,
 };
 use softvt_common::text::{TextColumn, TextTable, counted, decimal, shortened};
@@ -45,6 +45,8 @@ pub struct PolicyRanking {
     pub level: f64,
     /// The runs.
     pub runs: Vec<RankedRun>,
+    /// Fields of `run.json`, other than the policy, in which a run differs from the first one.
+    pub differing_fields: Vec<String>,
 }
 
 impl PolicyRanking {
@@ -55,7 +57,7 @@ impl PolicyRanking {
     pub fn new(folders: &[Vec<StoredRun>]) -> Result<Self, CompareError> {
         folders.iter().try_for_each(|runs| check_unique(runs))?;
         let Some((first, rest)) = folders.split_first() else {
-            return Ok(Self { episodes: 0, level: LEVEL, runs: Vec::new() });
+            return Ok(Self { episodes: 0, level: LEVEL, runs: Vec::new(), differing_fields: Vec::new() });
         };
         let mut common: Vec<&EpisodeRecord> = records(first).collect();
         for other in rest {
@@ -65,6 +67,8 @@ impl PolicyRanking {
                 return Err(no_common_episode(first, other));
             }
         }
+        let differing: BTreeSet<String> =
+            rest.iter().flat_map(|other| differing_fields(first, other)).collect();
         let in_common = |runs: &'_ [StoredRun]| {
             let pairs = pair_episodes(common.iter().copied(), records(runs));
             pairs.into_iter().map(|pair| pair.second.clone()).collect()
@@ -88,7 +92,12 @@ impl PolicyRanking {
             safety_letters,
             d_over_tau_letters,
         });
-        Ok(Self { episodes: common.len(), level: LEVEL, runs: runs.collect() })
+        Ok(Self {
+            episodes: common.len(),
+            level: LEVEL,
+            runs: runs.collect(),
+            differing_fields: differing.into_iter().collect(),
+        })
     }
 
     /// The ranking as a plain-text table.
@@ -115,6 +124,9 @@ impl PolicyRanking {
         table.line("95 % Wilson intervals · D/limit: median of peak D over τ");
         table.line("policies that share a letter do not differ at 5 % (paired tests: McNemar's of");
         table.line("Safety, Wilcoxon's signed-rank of D/limit; adjusted by Holm's method)");
+        if !self.differing_fields.is_empty() {
+            table.line(format!("the runs also differ in {} (run.json)", self.differing_fields.join(", ")));
+        }
         table.text
     }
 }

@@ -56,6 +56,8 @@ pub enum StoredRunError {
     Experiment { dir: String },
     #[error("{dir} holds no run: neither the folder nor any of its subfolders has {RUN} and {EPISODES}")]
     None { dir: String },
+    #[error("{dir} holds no run; those in {inner} are runs")]
+    Deeper { dir: String, inner: String },
     #[error("{path}:{line}: {episode} occurs twice (first in line {first}): remove one of the lines")]
     DuplicateEpisode { path: String, line: usize, first: usize, episode: EpisodeIndex },
     #[error("{path}:{line}: the record contradicts {RUN}: {what}; one of the two was changed after the run")]
@@ -233,12 +235,25 @@ pub fn load(dir: &Path) -> Result<Vec<StoredRun>, StoredRunError> {
         }
         Err(error) => return Err(FileError::io("read", dir)(error).into()),
     };
-    inner.retain(|path| path.join(RUN).is_file() && path.join(EPISODES).is_file());
+    inner.retain(|path| is_run(path));
     inner.sort();
     if inner.is_empty() {
-        return Err(StoredRunError::None { dir: name() });
+        return Err(match folder_of_runs(dir) {
+            Some(inner) => StoredRunError::Deeper { dir: name(), inner: inner.display().to_string() },
+            None => StoredRunError::None { dir: name() },
+        });
     }
     inner.iter().map(|dir| load_one(dir)).collect()
+}
+
+fn is_run(dir: &Path) -> bool {
+    dir.join(RUN).is_file() && dir.join(EPISODES).is_file()
+}
+
+/// The first folder in `dir` that holds runs, such as that of the attempts of a dataset.
+fn folder_of_runs(dir: &Path) -> Option<PathBuf> {
+    let folders = |dir: &Path| fs::read_dir(dir).into_iter().flatten().flatten().map(|entry| entry.path());
+    folders(dir).filter(|inner| folders(inner).any(|path| is_run(&path))).min()
 }
 
 fn load_one(dir: &Path) -> Result<StoredRun, StoredRunError> {

@@ -92,6 +92,9 @@ fn push_rate<'a>(
 
 /// Safety Success, and what separates it from Goal Success.
 fn push_safety(text: &mut StyledText, scores: &GroupScores) {
+    if scores.episodes == 0 {
+        return text.line(Emphasis::None, "Safety  N/A  no episodes");
+    }
     if !scores.is_soft() {
         return text.line(Emphasis::None, "Safety  N/A  rigid objects have no limit of their deformation");
     }

@@ -64,7 +64,8 @@ pub(super) fn report(args: &ReportArgs) -> Result<(), CliError> {
         stored.extend(stored_run::load(dir)?);
     }
     let summaries = summarize_runs(stored);
-    for warning in summaries.iter().flat_map(|summary| summary.run.warnings()) {
+    let of_runs = summaries.iter().flat_map(|summary| summary.run.warnings());
+    for warning in of_runs.chain(comparison::limit_warnings(summaries.iter().map(|summary| &summary.run))) {
         eprint_notice(warning);
     }
     let observer: Arc<dyn Observer> = Arc::new(Console::default());

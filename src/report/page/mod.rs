@@ -24,6 +24,7 @@ use softvt_benchmark::run_changes::RunChanges;
 use softvt_common::text::{counted, escape_control};
 
 use super::{
+    comparison::limit_warnings,
     condition_effects::{ConditionEffects, condition_effects, effects_table},
     report_files::MARKDOWN,
     run_folder::{RUN, SUMMARY},
@@ -62,6 +63,7 @@ pub fn page(runs: &[RunSummary], thumbnails: &Thumbnails, out: &Path) -> String 
                     (headline::headline(runs, &effects))
                     (headline::chips(runs))
                     @for warning in runs.iter().flat_map(|run| run.run.warnings()) { p.warning { (warning) } }
+                    @for warning in limit_warnings(runs.iter().map(|run| &run.run)) { p.warning { (warning) } }
                 }
                 nav aria-label="Contents" {
                     a href="#results" { "Results" }
